@@ -1,0 +1,198 @@
+//! The camera's orthonormal frame in f64 and the world-to-eye matrix. How the
+//! frame moves is in `controls`; what the lens sees is in `lens`.
+
+use glam::{DMat3, DMat4, DVec3, DVec4};
+
+use super::{CameraError, finite};
+
+/// Eye position and the unit vectors u (right), v (up) and n (backward: the
+/// camera looks along -n). Right-handed: `u x v = n`.
+///
+/// From "3D Viewing and Camera Control" (E. Agu, CS 543), with the lecture's
+/// names.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Frame {
+    pub eye: DVec3,
+    pub(super) u: DVec3,
+    pub(super) v: DVec3,
+    pub(super) n: DVec3,
+    /// Rotations since the last correction, see `controls`.
+    pub(super) rotations: u32,
+}
+
+/// The frame that looks from `eye` to `look` with `up` upward:
+/// `n = (eye - look)/|eye - look|`, `u = (up x n)/|up x n|`, `v = n x u`.
+///
+/// Vectors are scaled before they are squared, so lengths from 1e-300 to
+/// 1e300 work.
+///
+/// # Errors
+/// A value that is not finite, `eye == look`, `up` zero or parallel to the
+/// direction of view.
+pub fn look_at(eye: DVec3, look: DVec3, up: DVec3) -> Result<Frame, CameraError> {
+    check_finite(["look x", "look y", "look z"], look)?;
+    check_finite(["eye x", "eye y", "eye z"], eye)?;
+    // Halved first: the difference of two finite values may overflow.
+    Frame::looking_along(eye, look / 2.0 - eye / 2.0, up)
+}
+
+fn check_finite(names: [&'static str; 3], v: DVec3) -> Result<(), CameraError> {
+    for (name, value) in names.into_iter().zip(v.to_array()) {
+        finite(name, value)?;
+    }
+    Ok(())
+}
+
+/// The unit vector along `v`, whatever its length; `None` for zero.
+fn unit(v: DVec3) -> Option<DVec3> {
+    let largest = v.abs().max_element();
+    if largest == 0.0 {
+        return None;
+    }
+    // Twice: 1/largest alone overflows for subnormal lengths.
+    let scaled = v / largest;
+    Some(scaled / scaled.length())
+}
+
+impl Frame {
+    /// The frame at `eye` that looks along `forward`.
+    ///
+    /// # Errors
+    /// As [`look_at`].
+    pub fn looking_along(eye: DVec3, forward: DVec3, up: DVec3) -> Result<Frame, CameraError> {
+        check_finite(["eye x", "eye y", "eye z"], eye)?;
+        check_finite(["forward x", "forward y", "forward z"], forward)?;
+        check_finite(["up x", "up y", "up z"], up)?;
+        let n = -unit(forward).ok_or(CameraError::EyeIsLook)?;
+        let up = unit(up).ok_or(CameraError::UpParallel)?;
+        let across = up.cross(n);
+        // Rounding of the two unit vectors alone makes up to ~2e-16.
+        if across.abs().max_element() <= 4.0 * f64::EPSILON {
+            return Err(CameraError::UpParallel);
+        }
+        let u = unit(across).ok_or(CameraError::UpParallel)?;
+        let mut frame = Frame {
+            eye,
+            u,
+            v: n.cross(u),
+            n,
+            rotations: 0,
+        };
+        // With `up` nearly parallel to the view the cross product keeps few
+        // digits of orthogonality; one correction restores them.
+        frame.orthonormalise();
+        Ok(frame)
+    }
+
+    /// Right.
+    pub fn u(&self) -> DVec3 {
+        self.u
+    }
+
+    /// Up.
+    pub fn v(&self) -> DVec3 {
+        self.v
+    }
+
+    /// Backward.
+    pub fn n(&self) -> DVec3 {
+        self.n
+    }
+
+    /// The direction of view, -n.
+    pub fn forward(&self) -> DVec3 {
+        -self.n
+    }
+
+    /// The world-to-eye matrix: rows u, v, n with `-e.u`, `-e.v`, `-e.n` in
+    /// the last column.
+    pub fn world_to_eye(&self) -> DMat4 {
+        let (u, v, n, e) = (self.u, self.v, self.n, self.eye);
+        DMat4::from_cols(
+            DVec4::new(u.x, v.x, n.x, 0.0),
+            DVec4::new(u.y, v.y, n.y, 0.0),
+            DVec4::new(u.z, v.z, n.z, 0.0),
+            DVec4::new(-e.dot(u), -e.dot(v), -e.dot(n), 1.0),
+        )
+    }
+
+    /// The same frame seen from another origin.
+    pub fn relative_to(&self, origin: DVec3) -> Frame {
+        Frame {
+            eye: self.eye - origin,
+            ..*self
+        }
+    }
+
+    /// Largest deviation of u, v, n from an orthonormal basis.
+    pub fn orthogonality_error(&self) -> f64 {
+        let basis = DMat3::from_cols(self.u, self.v, self.n);
+        let gram = basis.transpose() * basis - DMat3::IDENTITY;
+        gram.to_cols_array()
+            .into_iter()
+            .fold(0.0, |worst: f64, e| worst.max(e.abs()))
+    }
+
+    /// One Newton step towards the nearest orthonormal frame (polar factor;
+    /// Higham 1986, "Computing the polar decomposition", eq. 3.1 in its
+    /// inverse-free form): X(3I - X^T X)/2.
+    pub fn orthonormalise(&mut self) {
+        let x = DMat3::from_cols(self.u, self.v, self.n);
+        let x = x * (DMat3::from_diagonal(DVec3::splat(3.0)) - x.transpose() * x) * 0.5;
+        (self.u, self.v, self.n) = (x.x_axis, x.y_axis, x.z_axis);
+        self.rotations = 0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_lectures_frame_from_eye_look_and_up() {
+        let frame = look_at(DVec3::new(0.0, 0.0, 1.0), DVec3::ZERO, DVec3::Y).unwrap();
+        assert_eq!(
+            (frame.u(), frame.v(), frame.n()),
+            (DVec3::X, DVec3::Y, DVec3::Z)
+        );
+        assert_eq!(frame.forward(), -DVec3::Z);
+    }
+
+    #[test]
+    fn lengths_of_1e_30_and_1e30_work() {
+        for length in [1e-300, 1e-30, 1.0, 1e30, 1e300] {
+            let frame = look_at(DVec3::ZERO, -DVec3::Z * length, DVec3::Y * length).unwrap();
+            assert_eq!(frame.n(), DVec3::Z, "{length}");
+        }
+        let far = look_at(-DVec3::X * 1.7e308, DVec3::X * 1.7e308, DVec3::Z).unwrap();
+        assert_eq!(far.forward(), DVec3::X);
+    }
+
+    #[test]
+    fn impossible_frames_are_typed_errors() {
+        let (o, y) = (DVec3::ZERO, DVec3::Y);
+        assert_eq!(look_at(o, o, y), Err(CameraError::EyeIsLook));
+        assert_eq!(look_at(o, -y, y), Err(CameraError::UpParallel));
+        assert_eq!(look_at(o, y, o), Err(CameraError::UpParallel));
+        let odd = DVec3::new(1.0, 2.0, 2.0);
+        assert_eq!(look_at(o, odd, odd * 0.1), Err(CameraError::UpParallel));
+        assert!(matches!(
+            look_at(DVec3::new(f64::NAN, 0.0, 0.0), o, y),
+            Err(CameraError::NotFinite { name: "eye x", .. })
+        ));
+        assert!(look_at(o, o, DVec3::INFINITY).is_err());
+    }
+
+    #[test]
+    fn a_nearly_parallel_up_still_gives_an_orthonormal_frame() {
+        let look = DVec3::new(1e-6, -1.0, 2e-6);
+        let frame = look_at(DVec3::ZERO, look, DVec3::Y).unwrap();
+        assert!(
+            frame.orthogonality_error() < 1e-15,
+            "{}",
+            frame.orthogonality_error()
+        );
+        let expected = DVec3::new(-2.0, 0.0, 1.0) / 5f64.sqrt();
+        assert!((frame.u() - expected).length() < 1e-9, "{}", frame.u());
+    }
+}

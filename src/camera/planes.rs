@@ -1,0 +1,259 @@
+//! From a camera to the planes of its view volume: the selectable derivations
+//! (from the frame or from a matrix, in f32 or f64) and the conservative
+//! epsilon that makes a false negative impossible.
+
+use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
+
+use super::projection::{gribb_hartmann_f32, projection_f32, projection_f64, view_f32};
+use super::{Camera, CameraError, ClipSpace, Frame, Lens, gribb_hartmann};
+use crate::geometry::rounding::round_up;
+use crate::geometry::{ConvexVolume, FrustumPlane, Plane};
+
+/// Where the planes come from.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PlaneMethod {
+    /// Frame and lens in f64, each plane rounded once.
+    #[default]
+    Frame,
+    /// The same formulas with every operation in f32.
+    FrameF32,
+    GhGlF32,
+    GhGlF64,
+    GhD3dF32,
+    GhD3dF64,
+    GhRevzF32,
+    GhRevzF64,
+}
+
+/// Every method with its name and what it is.
+pub const PLANE_METHODS: [(PlaneMethod, &str, &str); 8] = [
+    (
+        PlaneMethod::Frame,
+        "frame",
+        "from the camera's frame in f64, rounded once (default)",
+    ),
+    (
+        PlaneMethod::FrameF32,
+        "frame-f32",
+        "from the frame, every operation in f32",
+    ),
+    (
+        PlaneMethod::GhGlF32,
+        "gh-gl-f32",
+        "Gribb-Hartmann from an f32 OpenGL matrix",
+    ),
+    (
+        PlaneMethod::GhGlF64,
+        "gh-gl-f64",
+        "Gribb-Hartmann from an f64 OpenGL matrix",
+    ),
+    (
+        PlaneMethod::GhD3dF32,
+        "gh-d3d-f32",
+        "Gribb-Hartmann from an f32 D3D/Vulkan matrix",
+    ),
+    (
+        PlaneMethod::GhD3dF64,
+        "gh-d3d-f64",
+        "Gribb-Hartmann from an f64 D3D/Vulkan matrix",
+    ),
+    (
+        PlaneMethod::GhRevzF32,
+        "gh-revz-f32",
+        "Gribb-Hartmann from an f32 reversed-Z matrix",
+    ),
+    (
+        PlaneMethod::GhRevzF64,
+        "gh-revz-f64",
+        "Gribb-Hartmann from an f64 reversed-Z matrix",
+    ),
+];
+
+impl PlaneMethod {
+    pub fn name(self) -> &'static str {
+        let row = PLANE_METHODS.iter().find(|row| row.0 == self);
+        row.map_or("", |row| row.1)
+    }
+
+    pub fn named(name: &str) -> Option<PlaneMethod> {
+        PLANE_METHODS
+            .iter()
+            .find(|row| row.1 == name)
+            .map(|row| row.0)
+    }
+}
+
+/// The factor c of the conservative epsilon that covers the rounding of the
+/// planes (f64 to f32) and of the plane test itself.
+pub const DEFAULT_EPSILON: f64 = 8.0;
+
+/// How to derive the planes.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct PlaneOptions {
+    pub method: PlaneMethod,
+    /// The factor c; 0 leaves the planes as they come.
+    pub epsilon: f64,
+}
+
+impl Default for PlaneOptions {
+    fn default() -> Self {
+        PlaneOptions {
+            method: PlaneMethod::default(),
+            epsilon: DEFAULT_EPSILON,
+        }
+    }
+}
+
+/// What the planes must know of the scene: prepared once per scene, so that
+/// every structure is asked with the very same planes.
+#[derive(Clone, Copy, PartialEq, Default, Debug)]
+pub struct Surroundings {
+    /// World position of the scene's local zero.
+    pub origin: DVec3,
+    /// Largest absolute local coordinate of any item, per axis; bounds the
+    /// epsilon of a volume without a far plane.
+    pub reach: Vec3,
+}
+
+impl Camera {
+    /// The view volume in scene-local f32 coordinates.
+    ///
+    /// With a positive epsilon c each plane is moved outward to
+    /// `d' = round_up(d + c*u*(sum |n_k|*A_k + |d|) + 2^-147)`, u = 2^-24,
+    /// A_k the largest absolute coordinate k of the volume's corners (of the
+    /// scene, if the volume has no far plane). Why that is enough: a box that
+    /// meets the volume holds a point x of it, and the p-vertex evaluates no
+    /// lower than x does (rounding is monotone); evaluating at x errs by less
+    /// than the margin.
+    ///
+    /// # Errors
+    /// [`CameraError::Volume`] if a plane does not fit f32 (or the chosen
+    /// method loses it).
+    pub fn volume(
+        &self,
+        options: &PlaneOptions,
+        around: &Surroundings,
+    ) -> Result<ConvexVolume, CameraError> {
+        let frame = self.frame.relative_to(around.origin);
+        let mut planes = derive(&frame, &self.lens, options.method);
+        let reach = match self.lens.corners(&frame) {
+            Some(corners) => corners
+                .iter()
+                .fold(DVec3::ZERO, |reach, corner| reach.max(corner.abs())),
+            None => around.reach.as_dvec3(),
+        };
+        if options.epsilon > 0.0 {
+            for (_, plane) in &mut planes {
+                *plane = moved_outward(plane, reach, options.epsilon);
+            }
+        }
+        Ok(ConvexVolume::from_named_planes(&planes)?)
+    }
+}
+
+fn moved_outward(plane: &Plane, reach: DVec3, c: f64) -> Plane {
+    const UNIT_ROUNDOFF: f64 = 1.0 / (1u64 << 24) as f64;
+    // Below half the smallest subnormal f32 times four: covers underflow.
+    const TINY: f64 = f64::from_bits((1023 - 147) << 52);
+    let d = f64::from(plane.d);
+    let size = plane.normal.as_dvec3().abs().dot(reach) + d.abs();
+    Plane::new(plane.normal, round_up(d + c * UNIT_ROUNDOFF * size + TINY))
+}
+
+type NamedPlanes = Vec<(FrustumPlane, Plane)>;
+
+fn derive(frame: &Frame, lens: &Lens, method: PlaneMethod) -> NamedPlanes {
+    let matrix = |clip: ClipSpace| from_matrix(frame, lens, clip);
+    let matrix_f32 = |clip: ClipSpace| from_matrix_f32(frame, lens, clip);
+    match method {
+        PlaneMethod::Frame => from_frame(frame, lens),
+        PlaneMethod::FrameF32 => from_frame_f32(frame, lens),
+        PlaneMethod::GhGlF32 => matrix_f32(ClipSpace::OpenGl),
+        PlaneMethod::GhGlF64 => matrix(ClipSpace::OpenGl),
+        PlaneMethod::GhD3dF32 => matrix_f32(ClipSpace::D3d),
+        PlaneMethod::GhD3dF64 => matrix(ClipSpace::D3d),
+        PlaneMethod::GhRevzF32 => matrix_f32(ClipSpace::ReversedZ),
+        PlaneMethod::GhRevzF64 => matrix(ClipSpace::ReversedZ),
+    }
+}
+
+/// The side planes pass through the eye along the window's edges (or, for an
+/// orthographic lens, stand beside it); near and far face each other.
+macro_rules! planes_from_frame {
+    ($name:ident, $float:ty, $vec:ty, $convert:expr, $plane:expr) => {
+        fn $name(frame: &Frame, lens: &Lens) -> NamedPlanes {
+            let convert: fn(DVec3) -> $vec = $convert;
+            let (u, v, n) = (convert(frame.u()), convert(frame.v()), convert(frame.n()));
+            let eye = convert(frame.eye);
+            let [left, right, bottom, top] = lens.window().map(|edge| edge as $float);
+            let to_plane: fn($vec, $float) -> Plane = $plane;
+            // The edge at `edge` along `axis`, seen from its inner side.
+            let side = |axis: $vec, edge: $float| {
+                if lens.is_orthographic() {
+                    return to_plane(axis, -axis.dot(eye) - edge);
+                }
+                let normal = (axis + n * edge) / (1.0 + edge * edge).sqrt();
+                to_plane(normal, -normal.dot(eye))
+            };
+            let mut planes = vec![
+                (FrustumPlane::Left, side(u, left)),
+                (FrustumPlane::Right, side(-u, -right)),
+                (FrustumPlane::Bottom, side(v, bottom)),
+                (FrustumPlane::Top, side(-v, -top)),
+                (
+                    FrustumPlane::Near,
+                    to_plane(-n, n.dot(eye) - lens.near() as $float),
+                ),
+            ];
+            if let Some(far) = lens.far() {
+                let far = to_plane(n, far as $float - n.dot(eye));
+                planes.push((FrustumPlane::Far, far));
+            }
+            planes
+        }
+    };
+}
+
+planes_from_frame!(from_frame, f64, DVec3, |v| v, |normal, d| Plane::new(
+    normal.as_vec3(),
+    d as f32
+));
+planes_from_frame!(from_frame_f32, f32, Vec3, |v| v.as_vec3(), Plane::new);
+
+fn from_matrix(frame: &Frame, lens: &Lens, clip: ClipSpace) -> NamedPlanes {
+    let matrix = projection_f64(lens, clip) * frame.world_to_eye();
+    let rows = gribb_hartmann(&matrix, clip);
+    named(
+        lens,
+        rows.map(|row| {
+            let normal = row.truncate();
+            let length = normal.length();
+            Plane::new((normal / length).as_vec3(), (row.w / length) as f32)
+        }),
+    )
+}
+
+fn from_matrix_f32(frame: &Frame, lens: &Lens, clip: ClipSpace) -> NamedPlanes {
+    let matrix = projection_f32(lens, clip) * view_f32(frame);
+    let rows = gribb_hartmann_f32(&matrix, clip);
+    named(
+        lens,
+        rows.map(|row| {
+            let normal = row.truncate();
+            let length = normal.length();
+            Plane::new(normal / length, row.w / length)
+        }),
+    )
+}
+
+/// An infinite far plane is the absence of `far`, whatever its row holds.
+fn named(lens: &Lens, rows: [Plane; 6]) -> NamedPlanes {
+    let count = if lens.far().is_some() { 6 } else { 5 };
+    FrustumPlane::ALL
+        .into_iter()
+        .zip(rows)
+        .take(count)
+        .collect()
+}

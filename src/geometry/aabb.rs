@@ -1,0 +1,142 @@
+//! The axis-aligned box. It owns containment, union and outward rounding;
+//! which side of a plane a box lies on is the plane's business.
+
+use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
+
+use super::rounding::{difference_down, difference_up};
+
+/// A closed axis-aligned box `[min, max]` in scene-local f32 coordinates.
+///
+/// Zero thickness is allowed. A box with `min > max` on any axis is the empty
+/// set: nothing sees it, and no union grows by it.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+#[repr(C)]
+pub struct Aabb {
+    pub min: Vec3,
+    pub max: Vec3,
+}
+
+impl Aabb {
+    /// The empty box: the neutral element of [`Aabb::union`].
+    pub const EMPTY: Aabb = Aabb {
+        min: Vec3::INFINITY,
+        max: Vec3::NEG_INFINITY,
+    };
+
+    pub const fn new(min: Vec3, max: Vec3) -> Self {
+        Aabb { min, max }
+    }
+
+    /// The box between `centre - half` and `centre + half`.
+    pub fn around(centre: Vec3, half: Vec3) -> Self {
+        Aabb::new(centre - half, centre + half)
+    }
+
+    /// The smallest f32 box about `origin` that holds the f64 box exactly:
+    /// both bounds are rounded outward, so nothing inside is ever lost.
+    ///
+    /// Bounds beyond the range of f32 come out infinite; check
+    /// [`Aabb::is_finite`].
+    pub fn rounded_outward(min: DVec3, max: DVec3, origin: DVec3) -> Self {
+        let down = |axis: usize| difference_down(min[axis], origin[axis]);
+        let up = |axis: usize| difference_up(max[axis], origin[axis]);
+        Aabb::new(
+            Vec3::new(down(0), down(1), down(2)),
+            Vec3::new(up(0), up(1), up(2)),
+        )
+    }
+
+    /// Whether the box holds no point at all (`min > max` somewhere).
+    pub fn is_empty(&self) -> bool {
+        !self.min.cmple(self.max).all()
+    }
+
+    /// Whether all six bounds are finite.
+    pub fn is_finite(&self) -> bool {
+        self.min.is_finite() && self.max.is_finite()
+    }
+
+    /// The smallest box that holds both. Exact: min and max never round.
+    pub fn union(&self, other: &Aabb) -> Aabb {
+        Aabb::new(self.min.min(other.min), self.max.max(other.max))
+    }
+
+    /// The smallest box that holds all the non-empty boxes of `boxes`.
+    pub fn union_of<'a>(boxes: impl IntoIterator<Item = &'a Aabb>) -> Aabb {
+        boxes
+            .into_iter()
+            .filter(|b| !b.is_empty())
+            .fold(Aabb::EMPTY, |all, b| all.union(b))
+    }
+
+    /// Whether the point lies in the closed box.
+    pub fn contains_point(&self, p: Vec3) -> bool {
+        p.cmpge(self.min).all() && p.cmple(self.max).all()
+    }
+
+    /// Whether `other` lies wholly in the closed box.
+    pub fn contains(&self, other: &Aabb) -> bool {
+        other.min.cmpge(self.min).all() && other.max.cmple(self.max).all()
+    }
+
+    /// Whether the two closed boxes share a point (touching counts).
+    pub fn intersects(&self, other: &Aabb) -> bool {
+        self.min.cmple(other.max).all() && other.min.cmple(self.max).all()
+    }
+
+    /// Mid point. Halves before adding, so that huge bounds do not overflow.
+    pub fn centre(&self) -> Vec3 {
+        self.min * 0.5 + self.max * 0.5
+    }
+
+    /// Edge lengths, zero for a point, negative for an empty box.
+    pub fn extent(&self) -> Vec3 {
+        self.max - self.min
+    }
+
+    /// Largest absolute coordinate on each axis: how far from the local
+    /// origin anything in the box can be.
+    pub fn reach(&self) -> Vec3 {
+        self.min.abs().max(self.max.abs())
+    }
+
+    /// Corner `i` of eight: bit k of `i` picks `max` on axis k.
+    pub fn corner(&self, i: usize) -> Vec3 {
+        let pick = |axis: usize| {
+            if i >> axis & 1 == 1 {
+                self.max[axis]
+            } else {
+                self.min[axis]
+            }
+        };
+        Vec3::new(pick(0), pick(1), pick(2))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn closed_bounds_touch_and_inverted_boxes_are_empty() {
+        let unit = Aabb::new(Vec3::ZERO, Vec3::ONE);
+        let next = Aabb::new(Vec3::X, Vec3::new(2.0, 1.0, 1.0));
+        assert!(unit.intersects(&next) && unit.contains_point(Vec3::ONE));
+        let inverted = Aabb::new(Vec3::ONE, Vec3::ZERO);
+        assert!(inverted.is_empty() && !unit.is_empty());
+        assert_eq!(Aabb::union_of(&[unit, inverted]), unit);
+        assert!(Aabb::union_of(&[]).is_empty());
+    }
+
+    #[test]
+    fn outward_rounding_never_loses_a_point() {
+        let (min, max) = (DVec3::splat(0.1), DVec3::splat(0.3));
+        let origin = DVec3::new(0.0, 1e7, -0.1);
+        let b = Aabb::rounded_outward(min, max, origin);
+        for axis in 0..3 {
+            assert!(f64::from(b.min[axis]) <= min[axis] - origin[axis]);
+            assert!(f64::from(b.max[axis]) >= max[axis] - origin[axis]);
+        }
+    }
+}

@@ -1,0 +1,204 @@
+//! The query volume: an intersection of at most 32 half-spaces, with the six
+//! planes of a frustum named. It owns the plane mask logic (inside, straddle,
+//! outside); where the planes come from is the camera's business.
+
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use super::{Aabb, Plane};
+
+/// Largest number of planes of one volume: one bit each in a [`PlaneMask`].
+pub const MAX_PLANES: usize = 32;
+
+/// The planes that are not yet decided: bit i stands for plane i.
+///
+/// A node that lies wholly inside plane i hands its children a mask without
+/// bit i (Assarsson and Moeller 2000, "Optimized view frustum culling
+/// algorithms for bounding boxes", Journal of Graphics Tools 5(1), p. 15).
+pub type PlaneMask = u32;
+
+/// The names of a view frustum's planes, in the order a camera emits them.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FrustumPlane {
+    Left,
+    Right,
+    Bottom,
+    Top,
+    Near,
+    Far,
+}
+
+impl FrustumPlane {
+    pub const ALL: [FrustumPlane; 6] = [
+        FrustumPlane::Left,
+        FrustumPlane::Right,
+        FrustumPlane::Bottom,
+        FrustumPlane::Top,
+        FrustumPlane::Near,
+        FrustumPlane::Far,
+    ];
+
+    pub const fn name(self) -> &'static str {
+        match self {
+            FrustumPlane::Left => "left",
+            FrustumPlane::Right => "right",
+            FrustumPlane::Bottom => "bottom",
+            FrustumPlane::Top => "top",
+            FrustumPlane::Near => "near",
+            FrustumPlane::Far => "far",
+        }
+    }
+}
+
+/// Why a set of planes is no volume.
+#[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
+pub enum VolumeError {
+    #[error("a volume has at most 32 planes, not {count}")]
+    TooManyPlanes { count: usize },
+    #[error("plane {index} is not finite: ({}, {}, {}, {})", plane.normal.x, plane.normal.y, plane.normal.z, plane.d)]
+    NonFinitePlane { index: usize, plane: Plane },
+}
+
+/// The closed intersection of up to [`MAX_PLANES`] half-spaces.
+///
+/// It may be unbounded (an infinite far plane is simply an absent one), and it
+/// may be empty. Zero planes mean all of space.
+///
+/// ```
+/// use cullbench::geometry::{Aabb, ConvexVolume, Plane};
+/// use glam::Vec3;
+///
+/// // The slab 0 <= x <= 10.
+/// let slab = ConvexVolume::from_planes(&[
+///     Plane::new(Vec3::X, 0.0),
+///     Plane::new(-Vec3::X, 10.0),
+/// ])?;
+/// let touching = Aabb::new(Vec3::splat(-1.0), Vec3::new(0.0, 1.0, 1.0));
+/// assert!(slab.sees(&touching), "bounds are closed: touching is visible");
+/// # Ok::<(), cullbench::geometry::VolumeError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct ConvexVolume {
+    planes: [Plane; MAX_PLANES],
+    names: [Option<FrustumPlane>; MAX_PLANES],
+    count: usize,
+}
+
+impl ConvexVolume {
+    /// A volume of unnamed planes. O(planes).
+    ///
+    /// # Errors
+    /// More than 32 planes, or a plane with a NaN or infinite number.
+    pub fn from_planes(planes: &[Plane]) -> Result<Self, VolumeError> {
+        Self::collect(planes.iter().map(|&plane| (plane, None)))
+    }
+
+    /// A view frustum: named planes, `Far` left out when it is infinite.
+    ///
+    /// # Errors
+    /// As [`ConvexVolume::from_planes`].
+    pub fn from_named_planes(planes: &[(FrustumPlane, Plane)]) -> Result<Self, VolumeError> {
+        Self::collect(planes.iter().map(|&(name, plane)| (plane, Some(name))))
+    }
+
+    fn collect(
+        planes: impl ExactSizeIterator<Item = (Plane, Option<FrustumPlane>)>,
+    ) -> Result<Self, VolumeError> {
+        let count = planes.len();
+        if count > MAX_PLANES {
+            return Err(VolumeError::TooManyPlanes { count });
+        }
+        let mut volume = ConvexVolume {
+            planes: [Plane::new(Vec3::ZERO, 0.0); MAX_PLANES],
+            names: [None; MAX_PLANES],
+            count,
+        };
+        for (index, (plane, name)) in planes.enumerate() {
+            if !plane.is_finite() {
+                return Err(VolumeError::NonFinitePlane { index, plane });
+            }
+            volume.planes[index] = plane;
+            volume.names[index] = name;
+        }
+        Ok(volume)
+    }
+
+    pub fn planes(&self) -> &[Plane] {
+        &self.planes[..self.count]
+    }
+
+    /// Plane `index` of a mask bit: like `planes()[index]`, but without a check
+    /// in the inner loop (a bit index is always below [`MAX_PLANES`]).
+    #[inline(always)]
+    pub fn plane_of_bit(&self, index: u32) -> &Plane {
+        &self.planes[index as usize % MAX_PLANES]
+    }
+
+    /// The plane of that name, if the volume has one.
+    pub fn plane(&self, name: FrustumPlane) -> Option<&Plane> {
+        let index = self.names[..self.count]
+            .iter()
+            .position(|&n| n == Some(name))?;
+        Some(&self.planes[index])
+    }
+
+    /// The name of plane `index` ("left", ...) or its number.
+    pub fn plane_label(&self, index: usize) -> String {
+        match self.names.get(index).copied().flatten() {
+            Some(name) => name.name().to_owned(),
+            None => format!("plane {index}"),
+        }
+    }
+
+    /// Bits of the planes that constrain anything.
+    pub fn mask(&self) -> PlaneMask {
+        self.planes()
+            .iter()
+            .enumerate()
+            .filter(|(_, plane)| !plane.is_trivial())
+            .fold(0, |mask, (i, _)| mask | 1 << i)
+    }
+
+    /// The six-plane box test: true unless one plane has the whole box on its
+    /// outer side. Conservative: boxes beside a frustum edge may pass. An
+    /// empty box is never seen. O(planes).
+    pub fn sees(&self, b: &Aabb) -> bool {
+        !b.is_empty() && !self.planes().iter().any(|plane| plane.excludes(b))
+    }
+
+    /// Whether the point lies in the closed volume (the lecture's
+    /// `CullPointAgainstFrustum`, with inward normals). O(planes).
+    pub fn contains_point(&self, p: Vec3) -> bool {
+        self.planes().iter().all(|plane| plane.contains_point(p))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn zero_planes_are_no_constraint_or_the_empty_set() {
+        let b = Aabb::new(Vec3::ZERO, Vec3::ONE);
+        let free = ConvexVolume::from_planes(&[Plane::new(Vec3::ZERO, 0.0)]).unwrap();
+        assert!(free.sees(&b) && free.mask() == 0);
+        let empty = ConvexVolume::from_planes(&[Plane::new(Vec3::ZERO, -1.0)]).unwrap();
+        assert!(!empty.sees(&b));
+        assert_eq!(empty.mask(), 1, "an impossible plane must stay in the mask");
+        assert!(ConvexVolume::from_planes(&[]).unwrap().sees(&b));
+    }
+
+    #[test]
+    fn bad_planes_are_typed_errors() {
+        let nan = Plane::new(Vec3::new(f32::NAN, 0.0, 0.0), 0.0);
+        assert!(matches!(
+            ConvexVolume::from_planes(&[Plane::new(Vec3::X, 0.0), nan]),
+            Err(VolumeError::NonFinitePlane { index: 1, .. })
+        ));
+        assert!(matches!(
+            ConvexVolume::from_planes(&[Plane::new(Vec3::X, 0.0); 33]),
+            Err(VolumeError::TooManyPlanes { count: 33 })
+        ));
+    }
+}

@@ -1,0 +1,11 @@
+//! Boxes, planes and convex volumes, and the one plane test that every
+//! structure shares. Nothing here knows what an index, a camera or a file is.
+
+mod aabb;
+mod convex_volume;
+mod plane;
+pub mod rounding;
+
+pub use aabb::Aabb;
+pub use convex_volume::{ConvexVolume, FrustumPlane, MAX_PLANES, PlaneMask, VolumeError};
+pub use plane::Plane;

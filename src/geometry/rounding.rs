@@ -1,0 +1,81 @@
+//! Directed rounding from f64 to f32: the two functions that keep a bound a
+//! bound. They own no policy; who rounds which way is decided by the caller.
+
+/// The smallest f32 that is not below `x` (towards +infinity).
+///
+/// Returns `+inf` above [`f32::MAX`] and NaN for NaN.
+///
+/// ```
+/// use cullbench::geometry::rounding::{round_down, round_up};
+/// assert_eq!(round_up(0.5), 0.5);
+/// assert!(f64::from(round_up(0.1)) > 0.1 && f64::from(round_down(0.1)) < 0.1);
+/// ```
+pub fn round_up(x: f64) -> f32 {
+    let nearest = x as f32;
+    if f64::from(nearest) < x {
+        nearest.next_up()
+    } else {
+        nearest
+    }
+}
+
+/// The largest f32 that is not above `x` (towards -infinity).
+///
+/// Returns `-inf` below [`f32::MIN`] and NaN for NaN.
+pub fn round_down(x: f64) -> f32 {
+    -round_up(-x)
+}
+
+/// `a - b` rounded down to f32, true to the exact difference.
+///
+/// The f64 subtraction may itself have rounded up onto an f32 value; Knuth's
+/// TwoSum (The Art of Computer Programming 2, 4.2.2, theorem B) gives the
+/// part that was lost, and one step down repairs it.
+pub fn difference_down(a: f64, b: f64) -> f32 {
+    -difference_up(b, a)
+}
+
+/// `a - b` rounded up to f32, true to the exact difference.
+pub fn difference_up(a: f64, b: f64) -> f32 {
+    let sum = a - b;
+    let rounded = round_up(sum);
+    let virtual_b = a - sum;
+    let virtual_a = sum + virtual_b;
+    let lost = (a - virtual_a) + (virtual_b - b);
+    if lost > 0.0 && f64::from(rounded) == sum {
+        rounded.next_up()
+    } else {
+        rounded
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn a_difference_that_f64_rounds_onto_an_f32_still_moves_outward() {
+        // 2^30 + 2^-60 minus 2^30 loses the small part in f64 already.
+        let (a, b) = (1.0, f64::EPSILON / 8.0);
+        assert_eq!(a - b, 1.0, "the premise: f64 cannot hold the difference");
+        assert!(difference_down(a, b) < 1.0);
+        assert_eq!(difference_up(a, b), 1.0);
+        assert!(difference_up(a, -b) > 1.0);
+    }
+
+    proptest! {
+        #[test]
+        fn rounding_brackets_the_value_within_one_ulp(x in prop::num::f64::NORMAL | prop::num::f64::ZERO) {
+            let (down, up) = (round_down(x), round_up(x));
+            prop_assert!(f64::from(down) <= x && x <= f64::from(up));
+            prop_assert!(down == up || down.next_up() == up);
+        }
+
+        #[test]
+        fn differences_bracket_the_nearest_f64(a in -1e9f64..1e9, b in -1e9f64..1e9) {
+            let (down, up) = (difference_down(a, b), difference_up(a, b));
+            prop_assert!(f64::from(down) <= a - b && a - b <= f64::from(up));
+        }
+    }
+}

@@ -1,0 +1,165 @@
+//! The bounding volume hierarchy of the crate `obvhs`: its builders decide
+//! the topology, and the items are then re-laid so that an accepted subtree
+//! is one slice. obvhs has no frustum traversal of its own; ours is shared.
+
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+use glam::Vec3;
+use obvhs::bvh2::builder::build_bvh2;
+use obvhs::{Boundable, BvhBuildParams};
+use serde::{Deserialize, Serialize};
+
+use super::tree::{PackedTree, Step};
+use super::{BuildError, FrustumQuery, MemoryUsage, RegionIndex, indexable};
+use crate::geometry::{Aabb, ConvexVolume};
+use crate::query::{ItemId, Recorder, Sink};
+
+/// A BVH built bottom-up (PLOC: Meister and Bittner 2018, "Parallel locally
+/// ordered clustering for bounding volume hierarchy construction", with
+/// reinsertion: Meister and Bittner 2018b), by obvhs.
+pub struct Bvh {
+    tree: PackedTree,
+}
+
+/// Parameters: `bvh:preset=medium,leaf=4`.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct BvhParams {
+    /// obvhs's build preset: build time against tree quality.
+    pub preset: BvhPreset,
+    /// Most items of a leaf (1 to 255).
+    pub leaf: u32,
+}
+
+impl Default for BvhParams {
+    fn default() -> Self {
+        BvhParams {
+            preset: BvhPreset::Fast,
+            leaf: 8,
+        }
+    }
+}
+
+/// The presets of obvhs by their own names.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum BvhPreset {
+    Fastest,
+    VeryFast,
+    Fast,
+    Medium,
+    Slow,
+    VerySlow,
+}
+
+impl BvhPreset {
+    fn params(self) -> BvhBuildParams {
+        match self {
+            BvhPreset::Fastest => BvhBuildParams::fastest_build(),
+            BvhPreset::VeryFast => BvhBuildParams::very_fast_build(),
+            BvhPreset::Fast => BvhBuildParams::fast_build(),
+            BvhPreset::Medium => BvhBuildParams::medium_build(),
+            BvhPreset::Slow => BvhBuildParams::slow_build(),
+            BvhPreset::VerySlow => BvhBuildParams::very_slow_build(),
+        }
+    }
+}
+
+/// An item as obvhs wants to see it.
+struct Bounded(Aabb);
+
+impl Boundable for Bounded {
+    fn aabb(&self) -> obvhs::aabb::Aabb {
+        obvhs::aabb::Aabb::new(self.0.min.into(), self.0.max.into())
+    }
+}
+
+/// A power of two that brings the scene near unit size, or 1 where it is
+/// not needed: areas of boxes beyond 2^60 or below 2^-60 would overflow or
+/// vanish in f32, and every cost comparison with them.
+fn scale_for(items: &[Aabb]) -> f32 {
+    let largest = Aabb::union_of(items).reach().max_element();
+    let exponent = libm::ilogbf(largest);
+    if largest == 0.0 || !largest.is_finite() || exponent.abs() <= 40 {
+        return 1.0;
+    }
+    // Powers of two beyond 2^127 are not needed: |exponent| <= 149.
+    libm::ldexpf(1.0, (-exponent).clamp(-126, 126))
+}
+
+impl RegionIndex for Bvh {
+    const NAME: &'static str = "bvh";
+    const SUMMARY: &'static str =
+        "bounding volume hierarchy (crate obvhs), items re-laid in tree order, plane masks";
+    type Params = BvhParams;
+
+    fn build(items: &[Aabb], params: &BvhParams) -> Result<Self, BuildError> {
+        if !(1..=255).contains(&params.leaf) {
+            return Err(BuildError::Params {
+                structure: Self::NAME,
+                reason: format!("leaf={}; expected 1 to 255", params.leaf),
+            });
+        }
+        let ids = indexable(items)?;
+        let scale = scale_for(items);
+        let bounded: Vec<Bounded> = ids
+            .iter()
+            .map(|&id| {
+                let b = items[id as usize];
+                Bounded(Aabb::new(b.min * scale, b.max * scale))
+            })
+            .collect();
+        if bounded.is_empty() {
+            return Ok(Bvh {
+                tree: PackedTree::default(),
+            });
+        }
+        let config = BvhBuildParams {
+            max_prims_per_leaf: params.leaf,
+            ..params.preset.params()
+        };
+        let built = build_bvh2(&bounded, config, &mut Duration::default());
+        drop(bounded);
+        let order: Vec<ItemId> = built
+            .primitive_indices
+            .iter()
+            .map(|&place| ids[place as usize])
+            .collect();
+        drop(ids);
+        let tree = PackedTree::pack(items, 0, &order, |at| {
+            let node = &built.nodes[at as usize];
+            let first = node.first_index;
+            if node.is_leaf() {
+                Step::Leaf(first as usize..(first + node.prim_count) as usize)
+            } else {
+                Step::Inner([first, first + 1])
+            }
+        });
+        Ok(Bvh { tree })
+    }
+
+    fn memory(&self) -> MemoryUsage {
+        self.tree.memory()
+    }
+
+    fn locate<S: Sink, R: Recorder>(
+        &self,
+        p: Vec3,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        self.tree.query(&p, sink, recorder)
+    }
+}
+
+impl FrustumQuery for Bvh {
+    fn visible<S: Sink, R: Recorder>(
+        &self,
+        volume: &ConvexVolume,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        self.tree.query(volume, sink, recorder)
+    }
+}

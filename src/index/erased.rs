@@ -1,0 +1,221 @@
+//! One object type for all structures, and the table they are listed in.
+//! Dispatch happens once per query, never per node: behind each method stands
+//! a traversal compiled for that structure, sink and recorder.
+
+use glam::Vec3;
+use serde_json::{Map, Value};
+
+use super::{BuildError, Bvh, FrustumQuery, Linear, MemoryUsage, RegionIndex};
+use crate::geometry::{Aabb, ConvexVolume};
+use crate::query::{ItemId, NoRecorder, QueryCost};
+use crate::spec::{Spec, SpecError};
+
+/// A built structure of any kind. Answers are appended to `out`.
+pub trait DynIndex: Send + Sync {
+    fn memory(&self) -> MemoryUsage;
+    /// The timed path: nothing is counted.
+    fn visible(&self, volume: &ConvexVolume, out: &mut Vec<ItemId>);
+    /// The same query with its cost added up.
+    fn visible_counted(&self, volume: &ConvexVolume, out: &mut Vec<ItemId>, cost: &mut QueryCost);
+    /// The timed path: nothing is counted.
+    fn locate(&self, p: Vec3, out: &mut Vec<ItemId>);
+    /// The same search with its cost added up.
+    fn locate_counted(&self, p: Vec3, out: &mut Vec<ItemId>, cost: &mut QueryCost);
+}
+
+impl<T: FrustumQuery> DynIndex for T {
+    fn memory(&self) -> MemoryUsage {
+        RegionIndex::memory(self)
+    }
+
+    fn visible(&self, volume: &ConvexVolume, out: &mut Vec<ItemId>) {
+        // A Vec never breaks off.
+        let _ = FrustumQuery::visible(self, volume, out, &mut NoRecorder);
+    }
+
+    fn visible_counted(&self, volume: &ConvexVolume, out: &mut Vec<ItemId>, cost: &mut QueryCost) {
+        let _ = FrustumQuery::visible(self, volume, out, cost);
+    }
+
+    fn locate(&self, p: Vec3, out: &mut Vec<ItemId>) {
+        let _ = RegionIndex::locate(self, p, out, &mut NoRecorder);
+    }
+
+    fn locate_counted(&self, p: Vec3, out: &mut Vec<ItemId>, cost: &mut QueryCost) {
+        let _ = RegionIndex::locate(self, p, out, cost);
+    }
+}
+
+type Build = fn(&[Aabb], &Value) -> Result<Box<dyn DynIndex>, BuildError>;
+
+/// A row of the table of structures.
+pub struct Backend {
+    pub name: &'static str,
+    pub summary: &'static str,
+    /// Builds from parameters as JSON; missing ones take their defaults.
+    pub build: Build,
+    /// All parameters of a request, defaults filled in.
+    pub params: fn(&Value) -> Result<Value, BuildError>,
+}
+
+impl Backend {
+    const fn of<T: FrustumQuery + 'static>() -> Backend {
+        fn typed<T: RegionIndex>(params: &Value) -> Result<T::Params, BuildError> {
+            serde_json::from_value(params.clone()).map_err(|error| BuildError::Params {
+                structure: T::NAME,
+                reason: match culprit::<T>(params) {
+                    Some(pair) => format!("{pair}: {error}"),
+                    None => error.to_string(),
+                },
+            })
+        }
+        /// The one pair that cannot be read; serde's message lacks its name.
+        fn culprit<T: RegionIndex>(params: &Value) -> Option<String> {
+            let bad = params.as_object()?.iter().find(|(key, value)| {
+                let alone = Map::from_iter([((*key).clone(), (*value).clone())]);
+                serde_json::from_value::<T::Params>(Value::Object(alone)).is_err()
+            });
+            bad.map(|(key, value)| format!("{key}={value}"))
+        }
+        Backend {
+            name: T::NAME,
+            summary: T::SUMMARY,
+            build: |items, params| Ok(Box::new(T::build(items, &typed::<T>(params)?)?)),
+            params: |params| {
+                let filled = typed::<T>(params)?;
+                Ok(serde_json::to_value(filled).unwrap_or_default())
+            },
+        }
+    }
+
+    pub fn named(name: &str) -> Option<&'static Backend> {
+        BACKENDS.iter().find(|b| b.name == name)
+    }
+}
+
+/// All structures. The first one is the yardstick of every ratio.
+pub static BACKENDS: &[Backend] = &[Backend::of::<Linear>(), Backend::of::<Bvh>()];
+
+/// A structure as asked for: a backend with its parameters.
+#[derive(Clone)]
+pub struct StructureSpec {
+    /// As typed: `bvh` or `bvh:leaf=4`.
+    pub label: String,
+    pub backend: &'static Backend,
+    /// Complete, defaults filled in.
+    pub params: Value,
+}
+
+impl StructureSpec {
+    /// # Errors
+    /// An unknown structure (with the nearest name), an unknown or bad
+    /// parameter.
+    pub fn parse(text: &str) -> Result<StructureSpec, SpecError> {
+        let spec = Spec::parse(text)?;
+        let Some(backend) = Backend::named(spec.name()) else {
+            let known = BACKENDS.iter().map(|b| b.name);
+            return Err(SpecError::unknown("structure", spec.name(), known));
+        };
+        let given: Map<String, Value> = spec
+            .given()
+            .map(|(key, value)| {
+                // Numbers and booleans as such, anything else as text.
+                let parsed = serde_json::from_str(value);
+                (
+                    key.to_owned(),
+                    parsed.unwrap_or_else(|_| Value::from(value)),
+                )
+            })
+            .collect();
+        let params = (backend.params)(&Value::Object(given)).map_err(SpecError::new)?;
+        Ok(StructureSpec {
+            label: text.to_owned(),
+            backend,
+            params,
+        })
+    }
+
+    pub fn build(&self, items: &[Aabb]) -> Result<Box<dyn DynIndex>, BuildError> {
+        (self.backend.build)(items, &self.params)
+    }
+}
+
+/// The structures of a comma-separated list, or of `all`.
+///
+/// # Errors
+/// As [`StructureSpec::parse`]; an empty list, a structure named twice.
+pub fn structures(list: &str) -> Result<Vec<StructureSpec>, SpecError> {
+    let mut chosen: Vec<StructureSpec> = Vec::new();
+    for text in Spec::split_list(list) {
+        let more = match text.as_str() {
+            "all" => BACKENDS
+                .iter()
+                .map(|b| StructureSpec::parse(b.name))
+                .collect::<Result<_, _>>()?,
+            _ => vec![StructureSpec::parse(&text)?],
+        };
+        for spec in more {
+            if chosen.iter().any(|c| c.label == spec.label) {
+                return Err(SpecError::new(format_args!(
+                    "structure '{}' is named twice",
+                    spec.label
+                )));
+            }
+            chosen.push(spec);
+        }
+    }
+    if chosen.is_empty() {
+        return Err(SpecError::new(
+            "no structure is named; expected 'all' or a list such as linear,bvh",
+        ));
+    }
+    Ok(chosen)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn structures_are_found_with_their_parameters() {
+        let all = structures("all").unwrap();
+        assert_eq!(all.len(), BACKENDS.len());
+        let two = structures("bvh:leaf=4,preset=medium,linear").unwrap();
+        assert_eq!(two[0].params["leaf"], 4);
+        assert_eq!(two[0].params["preset"], "medium");
+        assert_eq!(two[1].label, "linear");
+    }
+
+    #[test]
+    fn mistakes_are_named() {
+        for (text, wanted) in [
+            ("bhv", "did you mean 'bvh'"),
+            ("bvh:leav=4", "unknown field `leav`"),
+            ("bvh:leaf=many", "leaf"),
+            ("bvh:preset=best", "unknown variant `best`"),
+            ("bvh,bvh", "named twice"),
+            ("", "no structure"),
+            ("linear:leaf=3", "unknown field `leaf`"),
+        ] {
+            let error = structures(text)
+                .err()
+                .map(|e| e.to_string())
+                .unwrap_or_default();
+            assert!(error.contains(wanted), "{text}: {error}");
+        }
+    }
+
+    #[test]
+    fn items_that_cannot_be_indexed_are_named() {
+        let sound = Aabb::around(Vec3::ZERO, Vec3::ONE);
+        let nan = Aabb::new(Vec3::splat(f32::NAN), Vec3::ONE);
+        for backend in BACKENDS {
+            let spec = StructureSpec::parse(backend.name).unwrap();
+            let error = spec.build(&[sound, nan]).err();
+            assert!(matches!(
+                error,
+                Some(BuildError::NonFiniteItem { item: 1, .. })
+            ));
+        }
+    }
+}

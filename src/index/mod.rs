@@ -1,0 +1,121 @@
+//! The contract of a structure, and the table of all of them. Adding one is a
+//! file beside this one and a row in [`BACKENDS`]; list, run, query, verify,
+//! benches and conformance tests pick it up from there.
+
+mod bvh;
+mod erased;
+mod linear;
+mod tree;
+
+use std::ops::ControlFlow;
+
+use glam::Vec3;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use crate::geometry::{Aabb, ConvexVolume};
+use crate::query::{ItemId, Recorder, Sink};
+
+pub use bvh::{Bvh, BvhParams, BvhPreset};
+pub use erased::{BACKENDS, Backend, DynIndex, StructureSpec, structures};
+pub use linear::Linear;
+pub use tree::{PackedTree, TreeNode};
+
+/// Why an index could not be built.
+#[derive(Clone, PartialEq, Debug, thiserror::Error)]
+pub enum BuildError {
+    #[error("item {item} has the bounds {bounds:?}; expected finite numbers")]
+    NonFiniteItem { item: usize, bounds: Aabb },
+    #[error("{count} items; expected at most {most}")]
+    TooManyItems { count: usize, most: usize },
+    #[error("parameters of '{structure}': {reason}")]
+    Params {
+        structure: &'static str,
+        reason: String,
+    },
+}
+
+/// Heap bytes of an index. Temporary memory of the build does not count.
+#[derive(Clone, Copy, Default, PartialEq, Eq, Debug)]
+pub struct MemoryUsage {
+    pub node_bytes: usize,
+    /// Copies of item bounds and the ids.
+    pub item_bytes: usize,
+}
+
+impl MemoryUsage {
+    pub fn total(&self) -> usize {
+        self.node_bytes + self.item_bytes
+    }
+}
+
+/// A structure built over item bounds.
+///
+/// Items are numbered by their place in the slice. An empty box (min > max)
+/// is an item that no query ever returns. The order of answers is the
+/// structure's own, but each id comes at most once.
+pub trait RegionIndex: Sized + Send + Sync {
+    /// As typed on the command line.
+    const NAME: &'static str;
+    /// One line for `cullbench list`; says so if the layout is special.
+    const SUMMARY: &'static str;
+    /// Build parameters, `name:key=value` on the command line.
+    type Params: Default + Serialize + DeserializeOwned;
+
+    /// Builds the structure. Deterministic: the same items and parameters
+    /// give the same structure.
+    ///
+    /// # Errors
+    /// An item with a NaN or infinite bound (named), more items than ids.
+    fn build(items: &[Aabb], params: &Self::Params) -> Result<Self, BuildError>;
+
+    fn memory(&self) -> MemoryUsage;
+
+    /// Region search: hands every item whose closed box holds `p` to the
+    /// sink. `Break` if the sink ended the query.
+    fn locate<S: Sink, R: Recorder>(
+        &self,
+        p: Vec3,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()>;
+}
+
+/// A structure that finds what a convex volume sees.
+pub trait FrustumQuery: RegionIndex {
+    /// Hands every item that the six-plane test (or as many planes as there
+    /// are) does not exclude to the sink: exactly the set
+    /// `{ i : volume.sees(items[i]) }`, bit for bit.
+    fn visible<S: Sink, R: Recorder>(
+        &self,
+        volume: &ConvexVolume,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()>;
+}
+
+/// The items a structure has to hold: finite and not empty, with their ids.
+///
+/// # Errors
+/// As [`RegionIndex::build`].
+pub fn indexable(items: &[Aabb]) -> Result<Vec<ItemId>, BuildError> {
+    // The top id stays free as a mark of "none".
+    let most = ItemId::MAX as usize - 1;
+    if items.len() > most {
+        return Err(BuildError::TooManyItems {
+            count: items.len(),
+            most,
+        });
+    }
+    if let Some(item) = items.iter().position(|b| !b.is_finite()) {
+        return Err(BuildError::NonFiniteItem {
+            item,
+            bounds: items[item],
+        });
+    }
+    let ids = items.iter().zip(0..);
+    Ok(ids
+        .filter(|(b, _)| !b.is_empty())
+        .map(|(_, id)| id)
+        .collect())
+}

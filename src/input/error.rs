@@ -1,0 +1,47 @@
+//! What can be wrong with a scene or a camera file, each as one line that
+//! says where, what was found and what was expected.
+
+use std::path::PathBuf;
+
+use crate::spec::SpecError;
+
+#[derive(Debug, thiserror::Error)]
+pub enum InputError {
+    #[error("{}: {source}", path.display())]
+    Io {
+        path: PathBuf,
+        source: std::io::Error,
+    },
+    /// A text file: `line` counts from 1 and includes the header.
+    #[error("{file}, line {line}: {found}; expected {expected}")]
+    Line {
+        file: String,
+        line: u64,
+        found: String,
+        expected: String,
+    },
+    /// A binary file.
+    #[error("{file}, byte {offset}: {found}; expected {expected}")]
+    Byte {
+        file: String,
+        offset: u64,
+        found: String,
+        expected: String,
+    },
+    /// Several items of a file are bad; the first is named.
+    #[error(
+        "{first} ({count} bad item(s) in all; --skip-bad-items leaves them out and reports the count)"
+    )]
+    BadItems {
+        first: Box<InputError>,
+        count: usize,
+    },
+    #[error("scene '{scene}', item {item}: {reason}")]
+    BadItem {
+        scene: String,
+        item: usize,
+        reason: String,
+    },
+    #[error("{0}")]
+    Spec(#[from] SpecError),
+}

@@ -1,0 +1,101 @@
+//! Finding the far plane that makes a given share of a scene visible: the
+//! axis "visible fraction" of every comparison. It works on a sample and
+//! knows no index.
+
+use super::PathError;
+use crate::camera::{Camera, CameraError, Lens, PlaneOptions, Surroundings};
+use crate::geometry::Aabb;
+use crate::scene::Scene;
+
+/// Most items and cameras that are looked at per step of the search.
+const MOST_ITEMS: usize = 8_000;
+const MOST_CAMERAS: usize = 128;
+
+/// The cameras with far (and near, a thousandth of it) scaled alike so that
+/// on average `share` of the items is visible, within the sample's accuracy.
+///
+/// # Errors
+/// A share that even four times the present far plane does not reach.
+pub(super) fn to_visible_share(
+    path: &str,
+    scene: &Scene,
+    cameras: Vec<Camera>,
+    share: f64,
+) -> Result<Vec<Camera>, PathError> {
+    let items = every_nth(&scene.items, MOST_ITEMS);
+    let sample = every_nth(&cameras, MOST_CAMERAS);
+    let around = scene.surroundings();
+    let visible = |scale: f64| -> Result<f64, PathError> {
+        let mut seen = 0;
+        for camera in &sample {
+            seen += count(camera, scale, &items, &around).map_err(|e| unfit(path, &e))?;
+        }
+        Ok(seen as f64 / (items.len() * sample.len()).max(1) as f64)
+    };
+    let (mut low, mut high) = (1e-4, 4.0);
+    let most = visible(high)?;
+    if most < share {
+        return Err(PathError::Unfit {
+            path: path.to_owned(),
+            reason: format!(
+                "visible={share} cannot be reached: at most {:.2}% of '{}' is visible along it",
+                most * 100.0,
+                scene.name
+            ),
+        });
+    }
+    for _ in 0..16 {
+        let middle = f64::sqrt(low * high);
+        if visible(middle)? < share {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    let scaled = cameras.iter().map(|camera| rescaled(camera, high));
+    scaled
+        .collect::<Result<_, _>>()
+        .map_err(|e| unfit(path, &e))
+}
+
+fn unfit(path: &str, error: &CameraError) -> PathError {
+    PathError::Unfit {
+        path: path.to_owned(),
+        reason: error.to_string(),
+    }
+}
+
+fn count(
+    camera: &Camera,
+    scale: f64,
+    items: &[Aabb],
+    around: &Surroundings,
+) -> Result<usize, CameraError> {
+    let volume = rescaled(camera, scale)?.volume(&PlaneOptions::default(), around)?;
+    Ok(items.iter().filter(|b| volume.sees(b)).count())
+}
+
+fn rescaled(camera: &Camera, scale: f64) -> Result<Camera, CameraError> {
+    let lens = match camera.lens {
+        Lens::Perspective {
+            fovy_deg,
+            aspect,
+            near,
+            far,
+        } => {
+            // An infinite far plane is replaced: its near stood at far/1000.
+            let far = far.unwrap_or(near * 1000.0) * scale;
+            Lens::perspective(fovy_deg, aspect, far / 1000.0, Some(far))?
+        }
+        other => other,
+    };
+    Ok(Camera { lens, ..*camera })
+}
+
+/// At most `most` elements, evenly spaced.
+fn every_nth<T: Copy>(all: &[T], most: usize) -> Vec<T> {
+    all.iter()
+        .copied()
+        .step_by(all.len().div_ceil(most).max(1))
+        .collect()
+}

@@ -1,0 +1,396 @@
+//! Ways through a scene: sequences of cameras, generated, recorded, or taken
+//! from the scene's own places. It owns the table of path families and what
+//! they share; each family has a file of its own.
+
+mod calibrate;
+mod flythrough;
+mod orbit;
+mod outside;
+mod places;
+mod recorded;
+mod spin;
+mod teleport;
+mod zoom;
+
+use std::path::Path;
+
+use glam::DVec3;
+
+use crate::camera::{Camera, CameraError, Frame, Lens, Surroundings};
+use crate::input::InputError;
+use crate::scene::{Dice, Scene, WorldBox};
+use crate::spec::{Spec, SpecError};
+
+pub use recorded::{LensDefaults, read_cameras_csv, read_points_csv};
+
+/// A named sequence of cameras.
+#[derive(Clone, Debug)]
+pub struct CameraPath {
+    /// As it was asked for: a file or a spec such as `orbit:frames=512`.
+    pub name: String,
+    pub cameras: Vec<Camera>,
+}
+
+/// A kind of path.
+pub struct PathFamily {
+    pub name: &'static str,
+    pub summary: &'static str,
+    frames: fn(&Stage, &mut Spec) -> Result<Vec<Pose>, PathError>,
+}
+
+/// All generated families, in the order of the help.
+pub static PATHS: &[PathFamily] = &[
+    PathFamily {
+        name: "orbit",
+        summary: "a full circle about the scene, looking at its centre",
+        frames: orbit::frames,
+    },
+    PathFamily {
+        name: "flythrough",
+        summary: "a closed spline through seeded way points, looking ahead",
+        frames: flythrough::frames,
+    },
+    PathFamily {
+        name: "spin",
+        summary: "a full turn in place at the centre (yaw)",
+        frames: spin::frames,
+    },
+    PathFamily {
+        name: "zoom",
+        summary: "a dolly towards the centre, then a zoom by field of view",
+        frames: zoom::frames,
+    },
+    PathFamily {
+        name: "teleport",
+        summary: "a new random place and direction every frame: no coherence",
+        frames: teleport::frames,
+    },
+    PathFamily {
+        name: "outside",
+        summary: "the whole scene from outside, from all around",
+        frames: outside::frames,
+    },
+    PathFamily {
+        name: "places",
+        summary: "the scene's own camera places (the things of a Doom map)",
+        frames: places::frames,
+    },
+];
+
+/// Parameters that every generated path takes.
+pub const PATH_PARAMS: &str = "frames=256, seed=1, fovy=60 (degrees), aspect=16/9, near=far/1000, \
+     far=the scene's diagonal (or inf), visible (choose far so that this share of the items \
+     is visible on average, e.g. visible=2%)";
+
+/// A path that cannot be made or read.
+#[derive(Debug, thiserror::Error)]
+pub enum PathError {
+    #[error(transparent)]
+    Input(#[from] InputError),
+    #[error(transparent)]
+    Spec(#[from] SpecError),
+    #[error("path '{path}', camera {index}: {error}")]
+    Camera {
+        path: String,
+        index: usize,
+        error: CameraError,
+    },
+    #[error("path '{path}': {reason}")]
+    Unfit { path: String, reason: String },
+}
+
+/// What a path is made for.
+pub(crate) struct Stage<'a> {
+    scene: &'a Scene,
+    bounds: WorldBox,
+    count: usize,
+    seed: u64,
+}
+
+/// One camera without its far plane decided. `magnification` divides the
+/// window (zoom by field of view).
+pub(crate) struct Pose {
+    eye: DVec3,
+    forward: DVec3,
+    magnification: f64,
+}
+
+impl Pose {
+    fn new(eye: DVec3, forward: DVec3) -> Pose {
+        Pose {
+            eye,
+            forward,
+            magnification: 1.0,
+        }
+    }
+}
+
+impl Stage<'_> {
+    fn centre(&self) -> DVec3 {
+        self.bounds.min / 2.0 + self.bounds.max / 2.0
+    }
+
+    fn extent(&self) -> DVec3 {
+        self.bounds.max - self.bounds.min
+    }
+
+    /// Half the diagonal; never zero.
+    fn radius(&self) -> f64 {
+        let half = self.extent().length() / 2.0;
+        if half > 0.0 { half } else { 1.0 }
+    }
+
+    /// A height range to fly in: inside the scene, or above it if it is flat.
+    fn flight_level(&self, share: f64) -> f64 {
+        let width = self.extent().x.max(self.extent().y);
+        self.bounds.min.z + share * self.extent().z.max(0.1 * width)
+    }
+
+    fn dice(&self) -> Dice {
+        Dice::new(self.seed)
+    }
+
+    /// `0/count, 1/count, ...`: positions on a closed path.
+    fn turns(&self) -> impl Iterator<Item = f64> + use<> {
+        let count = self.count;
+        (0..count).map(move |i| i as f64 / count as f64)
+    }
+}
+
+impl Scene {
+    /// What camera planes must know of this scene.
+    pub fn surroundings(&self) -> Surroundings {
+        Surroundings {
+            origin: self.origin,
+            reach: if self.bounds.is_empty() {
+                glam::Vec3::ZERO
+            } else {
+                self.bounds.reach()
+            },
+        }
+    }
+}
+
+/// Makes or reads a path: `orbit:frames=512`, or a cameras CSV. An existing
+/// file wins over a name.
+///
+/// # Errors
+/// One line that names what was found and what was expected.
+pub fn load(source: &str, scene: &Scene, defaults: &LensDefaults) -> Result<CameraPath, PathError> {
+    if Path::new(source).is_file() || source.ends_with(".csv") {
+        let file = std::fs::File::open(source).map_err(|error| InputError::Io {
+            path: source.into(),
+            source: error,
+        })?;
+        return read_cameras_csv(file, source, defaults);
+    }
+    let mut spec = Spec::parse(source)?;
+    let Some(family) = PATHS.iter().find(|p| p.name == spec.name()) else {
+        let known = PATHS.iter().map(|p| p.name);
+        return Err(SpecError::unknown("path", spec.name(), known).into());
+    };
+    let stage = Stage {
+        scene,
+        bounds: scene.world_bounds(),
+        count: spec.whole("frames", 256, 1_000_000)?.max(1) as usize,
+        seed: spec.whole("seed", 1, u64::MAX)?,
+    };
+    let poses = (family.frames)(&stage, &mut spec)?;
+    let optics = Optics::from_spec(&mut spec, defaults, &stage, &poses)?;
+    spec.finish()?;
+    let cameras = optics.cameras(source, &poses)?;
+    if cameras.is_empty() {
+        return Err(PathError::Unfit {
+            path: source.to_owned(),
+            reason: "no camera in it; expected at least one".to_owned(),
+        });
+    }
+    let cameras = match optics.visible {
+        Some(share) => calibrate::to_visible_share(source, scene, cameras, share)?,
+        None => cameras,
+    };
+    Ok(CameraPath {
+        name: source.to_owned(),
+        cameras,
+    })
+}
+
+/// The lens parameters of a generated path.
+struct Optics {
+    fovy_deg: f64,
+    aspect: f64,
+    near: Option<f64>,
+    far: Option<f64>,
+    visible: Option<f64>,
+}
+
+impl Optics {
+    fn from_spec(
+        spec: &mut Spec,
+        defaults: &LensDefaults,
+        stage: &Stage,
+        poses: &[Pose],
+    ) -> Result<Optics, SpecError> {
+        // From the farthest eye everything up to the far side is in reach.
+        let farthest = poses.iter().map(|p| (p.eye - stage.centre()).length());
+        let natural = farthest.fold(0.0, f64::max) + stage.radius();
+        let far = match spec.text("far").as_deref() {
+            Some("inf") => None,
+            Some(_) => Some(spec.number("far", natural)?),
+            None => defaults.far.unwrap_or(Some(natural)),
+        };
+        let near = match spec.text("near") {
+            Some(_) => Some(spec.number("near", 0.0)?),
+            None => defaults.near,
+        };
+        let visible = match spec.text("visible") {
+            Some(_) => Some(spec.number_between("visible", 0.0, 0.0, 1.0)?),
+            None => None,
+        };
+        Ok(Optics {
+            fovy_deg: spec.number("fovy", defaults.fovy_deg)?,
+            aspect: spec.number("aspect", defaults.aspect)?,
+            near: near.or_else(|| far.is_none().then_some(natural / 1000.0)),
+            far,
+            visible,
+        })
+    }
+
+    fn cameras(&self, path: &str, poses: &[Pose]) -> Result<Vec<Camera>, PathError> {
+        let near = self
+            .near
+            .or(self.far.map(|far| far / 1000.0))
+            .unwrap_or(1.0);
+        let camera = |pose: &Pose| -> Result<Camera, CameraError> {
+            let frame = Frame::looking_along(pose.eye, pose.forward, up_for(pose.forward))?;
+            let lens = Lens::perspective(self.fovy_deg, self.aspect, near, self.far)?;
+            let mut camera = Camera { frame, lens };
+            if pose.magnification != 1.0 {
+                camera.zoom(pose.magnification)?;
+            }
+            Ok(camera)
+        };
+        poses
+            .iter()
+            .enumerate()
+            .map(|(index, pose)| {
+                camera(pose).map_err(|error| PathError::Camera {
+                    path: path.to_owned(),
+                    index,
+                    error,
+                })
+            })
+            .collect()
+    }
+}
+
+/// z, or y for a camera that looks straight up or down.
+fn up_for(forward: DVec3) -> DVec3 {
+    if forward.x.abs() + forward.y.abs() > 1e-6 * forward.z.abs() {
+        DVec3::Z
+    } else {
+        DVec3::Y
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::PlaneOptions;
+    use crate::scene;
+
+    fn scene(source: &str) -> Scene {
+        scene::load(source, &Default::default()).unwrap()
+    }
+
+    fn path(source: &str, scene: &Scene) -> CameraPath {
+        load(source, scene, &LensDefaults::default()).unwrap()
+    }
+
+    fn visible_share(path: &CameraPath, scene: &Scene) -> f64 {
+        let around = scene.surroundings();
+        let visible = path.cameras.iter().map(|camera| {
+            let volume = camera.volume(&PlaneOptions::default(), &around).unwrap();
+            scene.items.iter().filter(|b| volume.sees(b)).count()
+        });
+        visible.sum::<usize>() as f64 / (path.cameras.len() * scene.items.len()) as f64
+    }
+
+    #[test]
+    fn every_family_works_on_every_kind_of_scene() {
+        for source in [
+            "uniform:n=0",
+            "uniform:n=1",
+            "city:n=300",
+            "us-counties",
+            "freedm-map12",
+        ] {
+            let scene = scene(source);
+            for family in PATHS.iter().filter(|p| p.name != "places") {
+                let path = path(&format!("{}:frames=9", family.name), &scene);
+                assert_eq!(path.cameras.len(), 9, "{source} {}", family.name);
+                for camera in &path.cameras {
+                    let volume = camera.volume(&PlaneOptions::default(), &scene.surroundings());
+                    assert!(volume.is_ok(), "{source} {}", family.name);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn outside_sees_everything_and_the_others_see_something() {
+        let scene = scene("city:n=2000");
+        assert_eq!(
+            visible_share(&path("outside:frames=12", &scene), &scene),
+            1.0
+        );
+        for source in [
+            "orbit:frames=8",
+            "flythrough:frames=32",
+            "spin:frames=8",
+            "zoom:frames=8",
+        ] {
+            let share = visible_share(&path(source, &scene), &scene);
+            assert!(share > 0.001, "{source}: {share}");
+        }
+    }
+
+    #[test]
+    fn a_visible_share_can_be_asked_for() {
+        let scene = scene("uniform:n=20000");
+        for (source, wanted) in [
+            ("flythrough:visible=2%", 0.02),
+            ("teleport:frames=128,visible=0.05", 0.05),
+        ] {
+            let share = visible_share(&path(source, &scene), &scene);
+            assert!((share / wanted - 1.0).abs() < 0.1, "{source}: {share}");
+        }
+    }
+
+    #[test]
+    fn the_maps_things_are_camera_places() {
+        let map = scene("freedm-map12");
+        let things = path("places", &map);
+        assert_eq!(things.cameras.len(), map.places.len());
+        let none = load("places", &scene("city:n=10"), &LensDefaults::default());
+        assert!(none.unwrap_err().to_string().contains("no camera places"));
+    }
+
+    #[test]
+    fn what_cannot_be_a_path_says_why() {
+        let scene = scene("city:n=10");
+        for (source, wanted) in [
+            ("orbt", "did you mean 'orbit'"),
+            ("orbit:frame=3", "did you mean 'frames'"),
+            ("orbit:fovy=0", "field of view is 0"),
+            ("orbit:near=5,far=5", "near < far"),
+            ("orbit:visible=2", "visible=2"),
+            ("nothing.csv", "No such file"),
+        ] {
+            let error = load(source, &scene, &LensDefaults::default())
+                .unwrap_err()
+                .to_string();
+            assert!(error.contains(wanted), "{source}: {error}");
+        }
+    }
+}

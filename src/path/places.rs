@@ -1,0 +1,21 @@
+//! The scene's own camera places: where its author put something to look
+//! from. For a Doom map these are its things, at eye height.
+
+use super::{PathError, Pose, Stage};
+use crate::spec::Spec;
+
+pub(super) fn frames(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, PathError> {
+    if stage.scene.places.is_empty() {
+        return Err(PathError::Unfit {
+            path: "places".to_owned(),
+            reason: format!(
+                "scene '{}' has no camera places of its own",
+                stage.scene.name
+            ),
+        });
+    }
+    let places = stage.scene.places.iter();
+    Ok(places
+        .map(|place| Pose::new(place.eye, place.forward))
+        .collect())
+}

@@ -1,0 +1,241 @@
+//! Recorded cameras and points: the CSV formats that other tools write. It
+//! owns their columns; missing lens columns come from the caller's defaults.
+
+use std::io::Read;
+
+use glam::DVec3;
+
+use super::{CameraPath, PathError};
+use crate::camera::{Camera, CameraError, Frame, Lens, look_at};
+use crate::input::{InputError, Row, TableReader};
+
+/// Lens values for columns that a file does not have, and for generated
+/// paths. `None` leaves the choice to the path.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct LensDefaults {
+    pub fovy_deg: f64,
+    pub aspect: f64,
+    pub near: Option<f64>,
+    /// `Some(None)` is an infinite far plane.
+    pub far: Option<Option<f64>>,
+    pub up: DVec3,
+}
+
+impl Default for LensDefaults {
+    fn default() -> Self {
+        LensDefaults {
+            fovy_deg: 60.0,
+            aspect: 16.0 / 9.0,
+            near: None,
+            far: None,
+            up: DVec3::Z,
+        }
+    }
+}
+
+/// Near and far for files without such columns when the caller has no wish.
+const NEAR: f64 = 0.1;
+const FAR: f64 = 1000.0;
+
+/// Reads a cameras CSV: `eye_x,eye_y,eye_z`, then `look_*` or `forward_*`,
+/// and any of `up_*`, `fovy_deg`, `aspect`, `near`, `far` (empty or `inf` =
+/// infinite). Columns in any order; unknown ones are ignored.
+///
+/// # Errors
+/// The line of the first value that is no number or makes no camera; a file
+/// without cameras.
+pub fn read_cameras_csv(
+    input: impl Read,
+    file: &str,
+    defaults: &LensDefaults,
+) -> Result<CameraPath, PathError> {
+    let mut table = TableReader::open(input, file)?;
+    let eye = table.columns(&["eye_x", "eye_y", "eye_z"])?;
+    let by_forward = table.column("forward_x").is_some() && table.column("look_x").is_none();
+    let target = if by_forward {
+        table.columns(&["forward_x", "forward_y", "forward_z"])?
+    } else {
+        table.columns(&["look_x", "look_y", "look_z"])?
+    };
+    let up = match table
+        .column("up_x")
+        .or(table.column("up_y"))
+        .or(table.column("up_z"))
+    {
+        Some(_) => Some(table.columns(&["up_x", "up_y", "up_z"])?),
+        None => None,
+    };
+    let [fovy, aspect, near, far] = ["fovy_deg", "aspect", "near", "far"].map(|c| table.column(c));
+    let mut cameras = Vec::new();
+    while let Some(row) = table.next_row() {
+        let row = row?;
+        let number = |column: Option<usize>, default: f64| match column {
+            Some(column) => row.finite_number(column),
+            None => Ok(default),
+        };
+        let eye = vector(&row, eye)?;
+        let target = vector(&row, target)?;
+        let up = match up {
+            Some(columns) => vector(&row, columns)?,
+            None => defaults.up,
+        };
+        let far = match far {
+            Some(column)
+                if ["", "inf", "+inf", "infinity"]
+                    .contains(&row.text(column).to_lowercase().as_str()) =>
+            {
+                None
+            }
+            Some(column) => Some(row.finite_number(column)?),
+            None => defaults.far.unwrap_or(Some(FAR)),
+        };
+        let (fovy, aspect) = (
+            number(fovy, defaults.fovy_deg)?,
+            number(aspect, defaults.aspect)?,
+        );
+        let near = number(near, defaults.near.unwrap_or(NEAR))?;
+        let camera = || -> Result<Camera, CameraError> {
+            let frame = if by_forward {
+                Frame::looking_along(eye, target, up)?
+            } else {
+                look_at(eye, target, up)?
+            };
+            Ok(Camera {
+                frame,
+                lens: Lens::perspective(fovy, aspect, near, far)?,
+            })
+        };
+        // The camera's own message says what was expected.
+        cameras.push(camera().map_err(|error| {
+            let message = error.to_string();
+            let (found, expected) = message
+                .split_once("; expected ")
+                .unwrap_or((&message, "a camera"));
+            row.error(found.to_owned(), expected.to_owned())
+        })?);
+    }
+    if cameras.is_empty() {
+        return Err(InputError::Line {
+            file: file.to_owned(),
+            line: 2,
+            found: "no camera".to_owned(),
+            expected: "at least one row after the header".to_owned(),
+        }
+        .into());
+    }
+    Ok(CameraPath {
+        name: file.to_owned(),
+        cameras,
+    })
+}
+
+/// Reads a points CSV with the columns `x,y,z`.
+///
+/// # Errors
+/// The line of the first value that is no finite number; a file without
+/// points.
+pub fn read_points_csv(input: impl Read, file: &str) -> Result<Vec<DVec3>, InputError> {
+    let mut table = TableReader::open(input, file)?;
+    let columns = table.columns(&["x", "y", "z"])?;
+    let mut points = Vec::new();
+    while let Some(row) = table.next_row() {
+        points.push(vector(&row?, columns)?);
+    }
+    if points.is_empty() {
+        return Err(InputError::Line {
+            file: file.to_owned(),
+            line: 2,
+            found: "no point".to_owned(),
+            expected: "at least one row after the header".to_owned(),
+        });
+    }
+    Ok(points)
+}
+
+fn vector(row: &Row, columns: [usize; 3]) -> Result<DVec3, InputError> {
+    let [x, y, z] = columns;
+    Ok(DVec3::new(
+        row.finite_number(x)?,
+        row.finite_number(y)?,
+        row.finite_number(z)?,
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<CameraPath, PathError> {
+        read_cameras_csv(text.as_bytes(), "c.csv", &LensDefaults::default())
+    }
+
+    #[test]
+    fn full_rows_in_any_order_and_bare_ones_with_defaults() {
+        let full = "far,near,eye_x,eye_y,eye_z,note,look_x,look_y,look_z,up_x,up_y,up_z,fovy_deg,aspect\n\
+                    inf,0.5,1,2,3,hello,1,2,-7,0,1,0,90,1.5\n,0.5,1,2,3,,1,2,-7,0,1,0,90,1.5\n";
+        let path = read(full).unwrap();
+        assert_eq!(path.cameras[0], path.cameras[1]);
+        assert_eq!(path.cameras[0].frame.eye, DVec3::new(1.0, 2.0, 3.0));
+        assert_eq!(path.cameras[0].frame.forward(), -DVec3::Z);
+        assert_eq!(
+            path.cameras[0].lens,
+            Lens::perspective(90.0, 1.5, 0.5, None).unwrap()
+        );
+        let bare = "eye_x,eye_y,eye_z,forward_x,forward_y,forward_z\n0,0,0,0,2,0\n";
+        let path = read(bare).unwrap();
+        assert_eq!(path.cameras[0].frame.forward(), DVec3::Y);
+        assert_eq!(path.cameras[0].frame.v(), DVec3::Z);
+    }
+
+    #[test]
+    fn bad_cameras_name_their_line_and_the_rule() {
+        let header =
+            "eye_x,eye_y,eye_z,look_x,look_y,look_z,up_x,up_y,up_z,fovy_deg,aspect,near,far";
+        let good = "0,0,0,1,0,0,0,0,1,60,1,1,9";
+        let cases = [
+            ("0,0,0,1,0,0,0,0,1,0,1,1,9", "field of view is 0"),
+            (
+                "0,0,0,1,0,0,0,0,1,60,1,9,9",
+                "near is 9 and far 9; expected near < far",
+            ),
+            ("0,0,0,1,0,0,0,0,1,60,1,0,9", "near is 0"),
+            ("0,0,0,0,0,2,0,0,1,60,1,1,9", "parallel"),
+            ("0,0,0,0,0,0,0,0,1,60,1,1,9", "same point"),
+            ("0,0,0,1,0,0,0,0,1,60,-1,1,9", "aspect ratio is -1"),
+            ("0,0,zero,1,0,0,0,0,1,60,1,1,9", "eye_z 'zero'"),
+            ("0,0,nan,1,0,0,0,0,1,60,1,1,9", "eye_z 'nan'"),
+        ];
+        for (row, wanted) in cases {
+            let error = read(&format!("{header}\n{good}\n{row}\n"))
+                .unwrap_err()
+                .to_string();
+            assert!(
+                error.starts_with("c.csv, line 3: ") && error.contains(wanted),
+                "{error}"
+            );
+        }
+        assert!(read("").unwrap_err().to_string().contains("an empty file"));
+        let none = read(&format!("{header}\n")).unwrap_err().to_string();
+        assert!(none.contains("no camera"), "{none}");
+        let wrong = read("x,y,z\n1,2,3\n").unwrap_err().to_string();
+        assert!(wrong.contains("no column 'eye_x'"), "{wrong}");
+    }
+
+    #[test]
+    fn points_are_three_columns() {
+        assert_eq!(
+            read_points_csv("z,y,x\n3,2,1\n".as_bytes(), "p.csv").unwrap(),
+            [DVec3::new(1.0, 2.0, 3.0)]
+        );
+        for (text, wanted) in [
+            ("", "empty file"),
+            ("x,y,z\n", "no point"),
+            ("x,y,z\n1,2,q\n", "z 'q'"),
+        ] {
+            let error = read_points_csv(text.as_bytes(), "p.csv")
+                .unwrap_err()
+                .to_string();
+            assert!(error.contains(wanted), "{error}");
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! What is counted while a query runs, and the recorder that counts nothing.
+
+use serde::{Deserialize, Serialize};
+
+/// Counts what a query does. The calls of [`NoRecorder`] compile to nothing,
+/// and nothing is ever timed with counters on.
+pub trait Recorder {
+    /// A node's bounds were classified.
+    #[inline(always)]
+    fn node_tested(&mut self) {}
+    /// One plane was evaluated against a node or an item.
+    #[inline(always)]
+    fn plane_tested(&mut self) {}
+    /// One item's bounds were tested.
+    #[inline(always)]
+    fn item_tested(&mut self) {}
+    /// A subtree was accepted whole: `items` ids that nobody tested.
+    #[inline(always)]
+    fn subtree_accepted(&mut self, _items: usize) {}
+    /// A subtree was rejected whole.
+    #[inline(always)]
+    fn subtree_rejected(&mut self) {}
+}
+
+/// Records nothing.
+#[derive(Clone, Copy, Default, Debug)]
+pub struct NoRecorder;
+
+impl Recorder for NoRecorder {}
+
+/// What one query, or a sum of queries, cost.
+#[derive(Clone, Copy, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct QueryCost {
+    pub nodes_tested: u64,
+    pub planes_tested: u64,
+    pub items_tested: u64,
+    pub items_accepted_untested: u64,
+    pub subtrees_accepted: u64,
+    pub subtrees_rejected: u64,
+}
+
+impl QueryCost {
+    /// Bounds looked at, of nodes and items together: the "compares" of the
+    /// lecture's O(n) against O(log n).
+    pub fn comparisons(&self) -> u64 {
+        self.nodes_tested + self.items_tested
+    }
+}
+
+impl Recorder for QueryCost {
+    fn node_tested(&mut self) {
+        self.nodes_tested += 1;
+    }
+    fn plane_tested(&mut self) {
+        self.planes_tested += 1;
+    }
+    fn item_tested(&mut self) {
+        self.items_tested += 1;
+    }
+    fn subtree_accepted(&mut self, items: usize) {
+        self.subtrees_accepted += 1;
+        self.items_accepted_untested += items as u64;
+    }
+    fn subtree_rejected(&mut self) {
+        self.subtrees_rejected += 1;
+    }
+}
+
+impl std::ops::AddAssign for QueryCost {
+    fn add_assign(&mut self, other: QueryCost) {
+        self.nodes_tested += other.nodes_tested;
+        self.planes_tested += other.planes_tested;
+        self.items_tested += other.items_tested;
+        self.items_accepted_untested += other.items_accepted_untested;
+        self.subtrees_accepted += other.subtrees_accepted;
+        self.subtrees_rejected += other.subtrees_rejected;
+    }
+}

@@ -1,0 +1,200 @@
+//! Boxes as CSV: `min_x,min_y,min_z,max_x,max_y,max_z` and any further
+//! columns as labels; the item id is the zero-based data row. It owns the
+//! reading and writing of that one format.
+
+use std::io::{self, Read, Write};
+
+use glam::DVec3;
+
+use super::{Labels, Scene, WorldBox};
+use crate::input::{InputError, TableReader};
+
+const BOUNDS: [&str; 6] = ["min_x", "min_y", "min_z", "max_x", "max_y", "max_z"];
+
+/// Reads a scene from boxes CSV; numbers are f64 and are rounded outward to
+/// f32 about an origin chosen in f64. `file` only names the source in errors.
+///
+/// With `skip_bad_items`, rows that are not a finite box with min <= max are
+/// left out and counted in [`Scene::skipped_items`]; ids then count the rows
+/// that are kept.
+///
+/// # Errors
+/// [`InputError::Line`] for a missing or wrong header, [`InputError::BadItems`]
+/// with the first bad row and the number of all.
+pub fn read_boxes_csv(
+    input: impl Read,
+    file: &str,
+    skip_bad_items: bool,
+) -> Result<Scene, InputError> {
+    let mut table = TableReader::open(input, file)?;
+    let columns = table.columns(&BOUNDS)?;
+    let mut labels: Vec<(usize, Labels)> = table
+        .header()
+        .iter()
+        .enumerate()
+        .filter(|(i, _)| !columns.contains(i))
+        .map(|(i, name)| (i, Labels::new(name)))
+        .collect();
+    let (mut boxes, mut first_bad, mut bad) = (Vec::new(), None, 0);
+    while let Some(row) = table.next_row() {
+        let checked = row.and_then(|row| {
+            let mut bounds = [0.0; 6];
+            for (bound, &column) in bounds.iter_mut().zip(&columns) {
+                *bound = row.finite_number(column)?;
+            }
+            let b = WorldBox::new(
+                DVec3::new(bounds[0], bounds[1], bounds[2]),
+                DVec3::new(bounds[3], bounds[4], bounds[5]),
+            );
+            for axis in 0..3 {
+                let (low, high) = (b.min[axis], b.max[axis]);
+                if low > high {
+                    let name = ["x", "y", "z"][axis];
+                    return Err(row.error(
+                        format!("an inverted box, min_{name} {low} > max_{name} {high}"),
+                        format!("min_{name} <= max_{name}"),
+                    ));
+                }
+                let limit = f64::from(f32::MAX);
+                if low < -limit || high > limit {
+                    return Err(row.error(
+                        format!("a bound beyond the range of f32 ({low} to {high})"),
+                        format!("numbers within +-{limit:e}"),
+                    ));
+                }
+            }
+            for (column, label) in &mut labels {
+                label.push(row.text(*column));
+            }
+            Ok(b)
+        });
+        match checked {
+            Ok(b) => boxes.push(b),
+            Err(error) => {
+                bad += 1;
+                first_bad.get_or_insert(error);
+            }
+        }
+    }
+    if let Some(first) = first_bad.filter(|_| !skip_bad_items) {
+        return Err(match bad {
+            1 => first,
+            count => InputError::BadItems {
+                first: Box::new(first),
+                count,
+            },
+        });
+    }
+    let mut scene = Scene::from_boxes(file, &boxes)?;
+    scene.labels = labels.into_iter().map(|(_, label)| label).collect();
+    scene.skipped_items = bad;
+    Ok(scene)
+}
+
+/// Writes a scene's boxes in world coordinates, with its labels as further
+/// columns. Numbers are written so that reading them back gives the same f64.
+pub fn write_boxes_csv(scene: &Scene, output: impl Write) -> io::Result<()> {
+    let mut csv = csv::Writer::from_writer(output);
+    let labels = scene.labels.iter().map(|l| l.column.as_str());
+    csv.write_record(BOUNDS.into_iter().chain(labels))?;
+    let mut record = csv::ByteRecord::new();
+    for (item, b) in scene.items.iter().enumerate() {
+        record.clear();
+        for corner in [b.min, b.max] {
+            for value in (scene.origin + corner.as_dvec3()).to_array() {
+                record.push_field(value.to_string().as_bytes());
+            }
+        }
+        for label in &scene.labels {
+            record.push_field(label.get(item).as_bytes());
+        }
+        csv.write_byte_record(&record)?;
+    }
+    csv.flush()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Scene, InputError> {
+        read_boxes_csv(text.as_bytes(), "b.csv", false)
+    }
+
+    #[test]
+    fn columns_in_any_order_with_labels() {
+        let text = "kind,max_x,max_y,max_z,min_z,min_y,min_x\nhut,4,5,6,3,2,1\n";
+        let scene = read(text).unwrap();
+        let b = scene.world_bounds();
+        assert_eq!(
+            (b.min, b.max),
+            (DVec3::new(1.0, 2.0, 3.0), DVec3::new(4.0, 5.0, 6.0))
+        );
+        assert_eq!(scene.labels[0].get(0), "hut");
+    }
+
+    #[test]
+    fn each_bad_file_gets_its_line_and_what_was_expected() {
+        let header = "min_x,min_y,min_z,max_x,max_y,max_z";
+        let cases = [
+            (String::new(), "line 1: an empty file"),
+            ("a,b,c\n1,2,3\n".into(), "line 1: no column 'min_x'"),
+            (
+                format!("{header}\n1,2,3,4,five,6\n"),
+                "line 2: max_y 'five'",
+            ),
+            (
+                format!("{header}\n0,0,0,1,1,1\n1,2,3,4,nan,6\n"),
+                "line 3: max_y 'nan'",
+            ),
+            (format!("{header}\n1,2,3,4,inf,6\n"), "line 2: max_y 'inf'"),
+            (
+                format!("{header}\n1,2,3,4,1,6\n"),
+                "inverted box, min_y 2 > max_y 1",
+            ),
+            (format!("{header}\n1,2,3\n"), "line 2: 3 fields"),
+            (
+                format!("{header}\n0,0,0,1,1,1e39\n"),
+                "beyond the range of f32",
+            ),
+            (format!("{header},min_x\n"), "column 'min_x' twice"),
+            (format!("{header}\n1,2,3,4,,6\n"), "line 2: max_y ''"),
+        ];
+        for (text, wanted) in cases {
+            let error = read(&text).unwrap_err().to_string();
+            assert!(error.contains(wanted), "{text:?}: {error}");
+            assert!(
+                error.contains("expected") && !error.contains('\n'),
+                "{error}"
+            );
+        }
+    }
+
+    #[test]
+    fn bad_rows_are_counted_and_skipped_only_on_request() {
+        let text = "min_x,min_y,min_z,max_x,max_y,max_z,kind\n\
+                    0,0,0,1,1,1,a\n0,0,0,-1,1,1,b\n0,0,0,nan,1,1,c\n2,2,2,3,3,3,d\n";
+        let error = read(text).unwrap_err().to_string();
+        assert!(
+            error.contains("2 bad item(s)") && error.contains("line 3"),
+            "{error}"
+        );
+        let scene = read_boxes_csv(text.as_bytes(), "b.csv", true).unwrap();
+        assert_eq!((scene.items.len(), scene.skipped_items), (2, 2));
+        assert_eq!(scene.labels[0].get(1), "d");
+    }
+
+    #[test]
+    fn writing_and_reading_back_is_the_identity() {
+        let text =
+            "min_x,min_y,min_z,max_x,max_y,max_z,kind\n0.1,1e7,-3,0.7,10000001.5,2,\"a,b\"\n";
+        let scene = read(text).unwrap();
+        let mut bytes = Vec::new();
+        write_boxes_csv(&scene, &mut bytes).unwrap();
+        let again = read_boxes_csv(&bytes[..], "b.csv", false).unwrap();
+        assert_eq!(
+            (scene.digest(), "a,b"),
+            (again.digest(), again.labels[0].get(0))
+        );
+    }
+}

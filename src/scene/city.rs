@@ -1,0 +1,67 @@
+//! A flat city: square blocks between streets, tall buildings in the blocks,
+//! tiny street furniture along the kerbs. Wide in two axes and thin in the
+//! third, with sizes from decimetres to a hundred metres.
+
+use glam::DVec3;
+
+use super::WorldBox;
+use super::generate::{Dice, World};
+use crate::spec::{Spec, SpecError};
+
+/// Items of one block on average: the city grows with the item count and
+/// keeps its density.
+const ITEMS_PER_BLOCK: f64 = 40.0;
+/// Share of the items that are buildings; the rest stands in the streets.
+const BUILDINGS: f64 = 0.25;
+
+pub fn build(spec: &mut Spec, n: usize, dice: &mut Dice) -> Result<World, SpecError> {
+    let block = spec.number_between("block", 80.0, 0.0, f64::INFINITY)?;
+    let street = spec.number_between("street", 16.0, 0.0, f64::INFINITY)?;
+    let blocks = (n as f64 / ITEMS_PER_BLOCK).sqrt().ceil().max(1.0) as usize;
+    let pitch = block + street;
+    // Centred on zero: the tallest houses stand in the middle.
+    let corner = -(blocks as f64) * pitch / 2.0;
+    let boxes = (0..n).map(|_| {
+        let cell = DVec3::new(dice.below(blocks) as f64, dice.below(blocks) as f64, 0.0);
+        let low = cell * pitch + DVec3::new(corner, corner, 0.0);
+        if dice.unit() < BUILDINGS {
+            building(low, block, -corner, dice)
+        } else {
+            furniture(low, block, street, dice)
+        }
+    });
+    Ok(boxes.collect::<Vec<WorldBox>>().into())
+}
+
+/// A house on one of 4 x 4 plots of the block; towers grow towards the centre.
+fn building(block_low: DVec3, block: f64, half_city: f64, dice: &mut Dice) -> WorldBox {
+    let plot = block / 4.0;
+    let cell = DVec3::new(dice.below(4) as f64, dice.below(4) as f64, 0.0);
+    let centre = block_low + (cell + DVec3::new(0.5, 0.5, 0.0)) * plot;
+    let downtown = 1.0 - (centre.x.abs().max(centre.y.abs()) / half_city).min(1.0);
+    let floors = 2.0 + 4.0 * dice.unit() + 40.0 * downtown * downtown * dice.unit();
+    let size = DVec3::new(
+        dice.between(0.5, 0.95) * plot,
+        dice.between(0.5, 0.95) * plot,
+        3.0 * floors,
+    );
+    WorldBox::standing(centre, size)
+}
+
+/// A lamp, bin, sign or car on the street that borders the block.
+fn furniture(block_low: DVec3, block: f64, street: f64, dice: &mut Dice) -> WorldBox {
+    let along = dice.between(0.0, block + street);
+    let across = block + dice.unit() * street;
+    let place = if dice.unit() < 0.5 {
+        DVec3::new(along, across, 0.0)
+    } else {
+        DVec3::new(across, along, 0.0)
+    };
+    let size = match dice.below(4) {
+        0 => DVec3::new(0.2, 0.2, 5.0),
+        1 => DVec3::new(0.5, 0.5, 1.0),
+        2 => DVec3::new(0.1, 0.6, 2.2),
+        _ => DVec3::new(4.2, 1.8, 1.5),
+    };
+    WorldBox::standing(block_low + place, size)
+}

@@ -1,0 +1,230 @@
+//! The table of generated worlds and what they share: the named random
+//! generator, the item count, the seed and the offset. Each family has a file
+//! of its own; adding one is that file and one row here.
+
+use glam::DVec3;
+use rand::{Rng, RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+use super::{Regions, Scene, WorldBox, city, clustered, forest, rooms, uniform};
+use crate::input::InputError;
+use crate::spec::{Spec, SpecError};
+
+/// The generator behind every seeded choice. Its stream is fixed by its
+/// definition (O'Neill 2014, PCG XSL RR 128/64), so the same seed gives the
+/// same scene on every machine.
+pub const GENERATOR_NAME: &str = "rand_pcg::Pcg64 (PCG XSL RR 128/64)";
+
+/// A kind of generated world.
+pub struct Family {
+    pub name: &'static str,
+    pub summary: &'static str,
+    /// Parameters beyond `n`, `seed` and `offset`, for the help.
+    pub params: &'static str,
+    build: fn(&mut Spec, usize, &mut Dice) -> Result<World, SpecError>,
+}
+
+/// What a family makes, in world coordinates.
+pub struct World {
+    pub boxes: Vec<WorldBox>,
+    /// Regions that are not the items, with their portals.
+    pub rooms: Option<rooms::Plan>,
+}
+
+impl From<Vec<WorldBox>> for World {
+    fn from(boxes: Vec<WorldBox>) -> Self {
+        World { boxes, rooms: None }
+    }
+}
+
+/// All families, in the order of the help.
+pub static FAMILIES: &[Family] = &[
+    Family {
+        name: "uniform",
+        summary: "boxes scattered evenly in a cube",
+        params: "side=1000 (cube edge, m), size=0.2*side/cbrt(n) (mean box edge, m)",
+        build: uniform::build,
+    },
+    Family {
+        name: "clustered",
+        summary: "Gaussian clusters of uneven weight",
+        params: "clusters=64, side=1000 (m), spread=0.02 (standard deviation / side)",
+        build: clustered::build,
+    },
+    Family {
+        name: "city",
+        summary: "a flat grid of blocks: tall buildings, streets, tiny street furniture",
+        params: "block=80 (m), street=16 (m)",
+        build: city::build,
+    },
+    Family {
+        name: "forest",
+        summary: "trees, bushes and rocks on a fractal heightfield",
+        params: "relief=0.12 (height / width), spacing=5 (m between plants)",
+        build: forest::build,
+    },
+    Family {
+        name: "rooms",
+        summary: "an indoor block of cells joined by doors; the cells are the regions",
+        params: "storeys=3, room=6 (mean edge, m)",
+        build: rooms::build,
+    },
+];
+
+/// Largest scene a spec may ask for: ids are 32 bits.
+const MOST_ITEMS: u64 = 1_000_000_000;
+
+impl Family {
+    pub fn named(name: &str) -> Option<&'static Family> {
+        FAMILIES.iter().find(|f| f.name == name)
+    }
+
+    /// Generates the scene that the spec describes.
+    ///
+    /// # Errors
+    /// A parameter that is unknown or out of range.
+    pub fn generate(&self, text: &str, mut spec: Spec) -> Result<Scene, InputError> {
+        let n = spec.whole("n", 100_000, MOST_ITEMS)? as usize;
+        let seed = spec.whole("seed", 1, u64::MAX)?;
+        let offset = spec.number("offset", 0.0)?;
+        let mut dice = Dice::new(seed);
+        let mut world = (self.build)(&mut spec, n, &mut dice)?;
+        spec.finish()?;
+        if offset != 0.0 {
+            for b in &mut world.boxes {
+                *b = WorldBox::new(b.min + offset, b.max + offset);
+            }
+        }
+        let mut scene = Scene::from_boxes(text, &world.boxes)?;
+        if let Some(mut plan) = world.rooms {
+            plan.shift(DVec3::splat(offset));
+            scene.regions = Regions::Tiling(plan.tiling(scene.origin));
+        }
+        Ok(scene)
+    }
+}
+
+/// Seeded randomness with the few distributions that the families need.
+pub struct Dice(Pcg64);
+
+impl Dice {
+    pub fn new(seed: u64) -> Self {
+        Dice(Pcg64::seed_from_u64(seed))
+    }
+
+    /// Uniform in `[0, 1)`: 53 random bits.
+    pub fn unit(&mut self) -> f64 {
+        self.0.random::<f64>()
+    }
+
+    /// Uniform in `[low, high)`.
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.unit()
+    }
+
+    /// Uniform in `0..count`; 0 for an empty range.
+    pub fn below(&mut self, count: usize) -> usize {
+        // Widening multiply (Lemire 2019); the bias is below 2^-32 here.
+        ((u128::from(self.0.next_u64()) * count as u128) >> 64) as usize
+    }
+
+    /// A point in the unit cube.
+    pub fn point(&mut self) -> DVec3 {
+        DVec3::new(self.unit(), self.unit(), self.unit())
+    }
+
+    /// Standard normal (Box and Muller 1958), through `libm` so that every
+    /// platform rounds alike.
+    pub fn normal(&mut self) -> f64 {
+        let radius = (-2.0 * libm::log(1.0 - self.unit())).sqrt();
+        radius * libm::cos(std::f64::consts::TAU * self.unit())
+    }
+
+    /// Three independent standard normals.
+    pub fn normal3(&mut self) -> DVec3 {
+        DVec3::new(self.normal(), self.normal(), self.normal())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scene(text: &str) -> Scene {
+        let spec = Spec::parse(text).unwrap();
+        Family::named(spec.name())
+            .unwrap()
+            .generate(text, spec)
+            .unwrap()
+    }
+
+    #[test]
+    fn every_family_makes_exactly_n_sound_items_from_zero_up() {
+        for family in FAMILIES {
+            for n in [0, 1, 2, 7, 100, 5000] {
+                let scene = scene(&format!("{}:n={n}", family.name));
+                assert_eq!(scene.items.len(), n, "{}", family.name);
+                assert!(scene.items.iter().all(|b| b.is_finite() && !b.is_empty()));
+            }
+        }
+    }
+
+    #[test]
+    fn the_seed_decides_everything() {
+        for family in FAMILIES {
+            let with = |seed: u32| scene(&format!("{}:n=500,seed={seed}", family.name)).digest();
+            assert_eq!(with(3), with(3), "{}", family.name);
+            assert_ne!(with(3), with(4), "{}", family.name);
+        }
+    }
+
+    /// Pinned digests: a change of any generated world is a change of every
+    /// published figure and belongs into the CHANGELOG.
+    #[test]
+    fn generated_worlds_are_the_published_ones() {
+        let digests: Vec<_> = FAMILIES
+            .iter()
+            .map(|f| {
+                (
+                    f.name,
+                    scene(&format!("{}:n=1000,seed=7", f.name)).digest()[..16].to_owned(),
+                )
+            })
+            .collect();
+        let published = [
+            ("uniform", "6e496c75c0c8539c"),
+            ("clustered", "6889a887e28a9de3"),
+            ("city", "023a1af6a01737dc"),
+            ("forest", "804ec45de682b582"),
+            ("rooms", "539912803cdf76de"),
+        ];
+        let published: Vec<_> = published
+            .map(|(name, digest)| (name, digest.to_owned()))
+            .into();
+        assert_eq!(digests, published);
+    }
+
+    #[test]
+    fn an_offset_moves_the_origin_and_keeps_the_boxes() {
+        let (here, far) = (scene("uniform:n=100"), scene("uniform:n=100,offset=1e7"));
+        assert_eq!(here.origin, DVec3::ZERO);
+        assert!((far.origin.x - 1e7).abs() < 2000.0);
+        let drift = far.world_bounds().min - here.world_bounds().min - 1e7;
+        assert!(drift.abs().max_element() < 1e-3, "{drift}");
+    }
+
+    #[test]
+    fn bad_parameters_are_refused() {
+        for text in [
+            "city:n=-1",
+            "city:n=1.5",
+            "uniform:side=0",
+            "rooms:storeys=0",
+            "city:trees=4",
+        ] {
+            let spec = Spec::parse(text).unwrap();
+            let result = Family::named(spec.name()).unwrap().generate(text, spec);
+            assert!(matches!(result, Err(InputError::Spec(_))), "{text}");
+        }
+    }
+}

@@ -1,0 +1,226 @@
+//! A scene: boxes in local f32 coordinates about an f64 origin, the regions
+//! that region search looks for, and camera places the scene itself knows.
+//! Generators and readers each have a file of their own; this one owns what
+//! they all produce and how the origin is chosen.
+
+mod boxes_csv;
+mod city;
+mod clustered;
+mod forest;
+mod generate;
+mod labels;
+mod regions;
+mod rooms;
+mod samples;
+mod source;
+mod uniform;
+mod wad;
+
+use glam::DVec3;
+use sha2::{Digest, Sha256};
+
+use crate::geometry::Aabb;
+use crate::input::InputError;
+
+pub use boxes_csv::{read_boxes_csv, write_boxes_csv};
+pub(crate) use generate::Dice;
+pub use generate::{FAMILIES, Family, GENERATOR_NAME};
+pub use labels::Labels;
+pub use regions::{BspNode, BspRegions, Portal, Regions, Tiling};
+pub use samples::{SAMPLES, Sample};
+pub use source::{LoadOptions, load};
+pub use wad::{WadMap, map_names};
+
+/// A box in world coordinates, as a file or a generator states it.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct WorldBox {
+    pub min: DVec3,
+    pub max: DVec3,
+}
+
+impl WorldBox {
+    pub fn new(min: DVec3, max: DVec3) -> Self {
+        WorldBox { min, max }
+    }
+
+    /// The box standing on `base` (centre of its bottom face).
+    pub fn standing(base: DVec3, size: DVec3) -> Self {
+        let half = DVec3::new(size.x / 2.0, size.y / 2.0, 0.0);
+        WorldBox::new(base - half, base + half + DVec3::Z * size.z)
+    }
+
+    /// The box about `centre` with the given edge lengths.
+    pub fn around(centre: DVec3, size: DVec3) -> Self {
+        WorldBox::new(centre - size / 2.0, centre + size / 2.0)
+    }
+}
+
+/// A place and direction that the scene itself offers to a camera.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct CameraPlace {
+    pub eye: DVec3,
+    pub forward: DVec3,
+}
+
+/// What every structure is built from. z is up.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// As it was asked for: a file or a spec such as `city:n=100000,seed=7`.
+    pub name: String,
+    /// Where the local coordinates' zero lies in the world.
+    pub origin: DVec3,
+    /// Item bounds, rounded outward about the origin; the id is the index.
+    pub items: Vec<Aabb>,
+    /// Union of the items, local.
+    pub bounds: Aabb,
+    pub regions: Regions,
+    pub labels: Vec<Labels>,
+    pub places: Vec<CameraPlace>,
+    /// Items left out on request (`--skip-bad-items`).
+    pub skipped_items: usize,
+}
+
+impl Scene {
+    /// Rounds the boxes outward about the origin that suits them.
+    ///
+    /// # Errors
+    /// [`InputError::BadItem`] for the first box that is not finite, inverted
+    /// or too large for f32.
+    pub fn from_boxes(name: impl Into<String>, boxes: &[WorldBox]) -> Result<Scene, InputError> {
+        let origin = choose_origin(boxes);
+        Scene::about(name, boxes, origin)
+    }
+
+    /// The same about a given origin.
+    pub fn about(
+        name: impl Into<String>,
+        boxes: &[WorldBox],
+        origin: DVec3,
+    ) -> Result<Scene, InputError> {
+        let name = name.into();
+        let items = boxes
+            .iter()
+            .enumerate()
+            .map(|(item, b)| {
+                let rounded = Aabb::rounded_outward(b.min, b.max, origin);
+                let sound = rounded.is_finite() && !rounded.is_empty();
+                sound.then_some(rounded).ok_or_else(|| InputError::BadItem {
+                    scene: name.clone(),
+                    item,
+                    reason: format!("{b:?} is not a finite box with min <= max"),
+                })
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        Ok(Scene {
+            bounds: Aabb::union_of(&items),
+            name,
+            origin,
+            items,
+            regions: Regions::Items,
+            labels: Vec::new(),
+            places: Vec::new(),
+            skipped_items: 0,
+        })
+    }
+
+    /// The bounds of all items in world coordinates; a unit box about the
+    /// origin for a scene without items.
+    pub fn world_bounds(&self) -> WorldBox {
+        if self.bounds.is_empty() {
+            return WorldBox::around(self.origin, DVec3::ONE);
+        }
+        WorldBox::new(
+            self.origin + self.bounds.min.as_dvec3(),
+            self.origin + self.bounds.max.as_dvec3(),
+        )
+    }
+
+    /// SHA-256 over origin and item bounds: two scenes with the same digest
+    /// ask the same questions of every structure. O(n).
+    pub fn digest(&self) -> String {
+        let mut hash = Sha256::new();
+        for value in self.origin.to_array() {
+            hash.update(value.to_bits().to_le_bytes());
+        }
+        for item in &self.items {
+            for value in item.min.to_array().into_iter().chain(item.max.to_array()) {
+                hash.update(value.to_bits().to_le_bytes());
+            }
+        }
+        hex(&hash.finalize())
+    }
+}
+
+/// Lower-case hexadecimal.
+pub(crate) fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// Zero on every axis where moving the boxes would gain less than two bits:
+/// their coordinates then stay as written and exact ties stay ties. Otherwise
+/// the centre, rounded to a power of two near the width, so that round
+/// coordinates stay round.
+fn choose_origin(boxes: &[WorldBox]) -> DVec3 {
+    let finite = boxes
+        .iter()
+        .filter(|b| b.min.is_finite() && b.max.is_finite());
+    let (low, high) = finite.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), b| {
+        (low.min(b.min), high.max(b.max))
+    });
+    let axis = |k: usize| {
+        let (width, centre) = (high[k] - low[k], low[k] / 2.0 + high[k] / 2.0);
+        // The comparison is false for an empty scene's NaN as well.
+        if !(centre.abs() > 4.0 * width) {
+            return 0.0;
+        }
+        let floor = centre.abs() * f64::EPSILON;
+        let grid = libm::exp2(libm::floor(libm::log2(width.max(floor))));
+        (centre / grid).round() * grid
+    };
+    DVec3::new(axis(0), axis(1), axis(2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scene(min: f64, max: f64) -> Scene {
+        let b = WorldBox::new(DVec3::splat(min), DVec3::splat(max));
+        Scene::from_boxes("test", &[b]).unwrap()
+    }
+
+    #[test]
+    fn a_scene_near_zero_keeps_its_coordinates() {
+        let near = scene(-10.0, 1000.0);
+        assert_eq!(near.origin, DVec3::ZERO);
+        assert_eq!(near.items[0].max.x, 1000.0);
+    }
+
+    #[test]
+    fn a_scene_far_from_zero_is_moved_and_loses_nothing() {
+        let far = scene(1e9 + 0.25, 1e9 + 100.5);
+        assert!((far.origin.x - 1e9).abs() < 200.0);
+        assert_eq!(far.origin.x.fract(), 0.0);
+        let world = far.world_bounds();
+        assert_eq!((world.min.x, world.max.x), (1e9 + 0.25, 1e9 + 100.5));
+        // One far point: width zero.
+        assert!(scene(1e7, 1e7).items[0].min.x.abs() < 1.0);
+    }
+
+    #[test]
+    fn boxes_that_f32_cannot_hold_are_named() {
+        let ok = WorldBox::around(DVec3::ZERO, DVec3::ONE);
+        let huge = WorldBox::around(DVec3::ZERO, DVec3::splat(1e40));
+        let error = Scene::from_boxes("test", &[ok, huge]).unwrap_err();
+        assert!(
+            matches!(error, InputError::BadItem { item: 1, .. }),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn the_digest_tells_scenes_apart() {
+        assert_eq!(scene(0.0, 1.0).digest(), scene(0.0, 1.0).digest());
+        assert_ne!(scene(0.0, 1.0).digest(), scene(0.0, 2.0).digest());
+    }
+}

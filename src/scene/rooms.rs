@@ -1,0 +1,207 @@
+//! An indoor block: storeys of box-shaped rooms joined by doors. The rooms
+//! tile the block and are the regions of region search; the doors are the
+//! portals between them; slabs, walls and furniture are the items.
+
+use glam::DVec3;
+
+use super::generate::{Dice, World};
+use super::{Portal, Tiling, WorldBox};
+use crate::geometry::Aabb;
+use crate::query::ItemId;
+use crate::spec::{Spec, SpecError};
+
+const STOREY_HEIGHT: f64 = 3.0;
+const WALL: f64 = 0.2;
+const DOOR_WIDTH: f64 = 1.0;
+const DOOR_HEIGHT: f64 = 2.1;
+/// Items of a room on average, furniture included.
+const ITEMS_PER_ROOM: usize = 16;
+
+/// The rooms and doors in world coordinates.
+#[derive(Default)]
+pub struct Plan {
+    rooms: Vec<WorldBox>,
+    doors: Vec<([ItemId; 2], WorldBox)>,
+}
+
+impl Plan {
+    pub fn shift(&mut self, by: DVec3) {
+        let all = self
+            .rooms
+            .iter_mut()
+            .chain(self.doors.iter_mut().map(|(_, b)| b));
+        for b in all {
+            *b = WorldBox::new(b.min + by, b.max + by);
+        }
+    }
+
+    pub fn tiling(&self, origin: DVec3) -> Tiling {
+        let local = |b: &WorldBox| Aabb::rounded_outward(b.min, b.max, origin);
+        Tiling {
+            boxes: self.rooms.iter().map(local).collect(),
+            portals: self
+                .doors
+                .iter()
+                .map(|(between, opening)| Portal {
+                    between: *between,
+                    opening: local(opening),
+                })
+                .collect(),
+        }
+    }
+}
+
+pub fn build(spec: &mut Spec, n: usize, dice: &mut Dice) -> Result<World, SpecError> {
+    let storeys = spec.whole("storeys", 3, 1000)? as usize;
+    let edge = spec.number_between("room", 6.0, 2.0 * DOOR_WIDTH, 1e6)?;
+    if storeys == 0 {
+        return Err(SpecError::new(
+            "in 'rooms': storeys=0 is not a whole number from 1 to 1000",
+        ));
+    }
+    let wanted = n.div_ceil(ITEMS_PER_ROOM).max(1);
+    let storeys = storeys.min(wanted);
+    let per_side = ((wanted / storeys) as f64).sqrt().floor().max(1.0) as usize;
+    // Wall lines at jittered multiples of a quarter of a metre: doors fit,
+    // and walls of neighbouring rooms share exact coordinates.
+    let mut lines = || {
+        let jitter = (edge - 2.0 * DOOR_WIDTH) / 2.0;
+        let mut at = 0.0;
+        let mut lines = vec![0.0];
+        for _ in 0..per_side {
+            let width: f64 = edge + dice.between(-jitter, jitter);
+            at += (width * 4.0).round() / 4.0;
+            lines.push(at);
+        }
+        lines
+    };
+    let (xs, ys) = (lines(), lines());
+    let mut plan = Plan::default();
+    let mut boxes = Vec::with_capacity(n);
+    for storey in 0..storeys {
+        for (j, y) in ys.windows(2).enumerate() {
+            for (i, x) in xs.windows(2).enumerate() {
+                let low = DVec3::new(x[0], y[0], storey as f64 * STOREY_HEIGHT);
+                let high = DVec3::new(x[1], y[1], low.z + STOREY_HEIGHT);
+                let id = plan.rooms.len();
+                let room = WorldBox::new(low, high);
+                boxes.push(WorldBox::new(low, DVec3::new(high.x, high.y, low.z + WALL)));
+                // The walls towards the rooms before this one carry doors.
+                for (axis, first, before) in [(0, i == 0, 1), (1, j == 0, per_side)] {
+                    let door = door_in(&room, axis, dice);
+                    push_wall(&mut boxes, &room, axis, (!first).then_some(&door));
+                    if !first {
+                        plan.doors
+                            .push(([(id - before) as ItemId, id as ItemId], door));
+                    }
+                }
+                plan.rooms.push(room);
+            }
+        }
+    }
+    boxes.truncate(n);
+    while boxes.len() < n {
+        let room = plan.rooms[dice.below(plan.rooms.len())];
+        boxes.push(furniture(&room, dice));
+    }
+    // Storeys are joined by one stairwell: the first room of each.
+    let per_storey = per_side * per_side;
+    for storey in 1..storeys {
+        let (below, above) = ((storey - 1) * per_storey, storey * per_storey);
+        let room = plan.rooms[above];
+        let hole = DVec3::new(DOOR_WIDTH, DOOR_WIDTH, 0.0);
+        let opening = WorldBox::new(room.min, room.min + hole);
+        plan.doors
+            .push(([below as ItemId, above as ItemId], opening));
+    }
+    Ok(World {
+        boxes,
+        rooms: Some(plan),
+    })
+}
+
+/// The door in the room's low wall across `axis`: flat in that axis.
+fn door_in(room: &WorldBox, axis: usize, dice: &mut Dice) -> WorldBox {
+    let along = 1 - axis;
+    let free = room.max[along] - room.min[along] - 2.0 * WALL - DOOR_WIDTH;
+    let (mut low, mut high) = (room.min, room.min);
+    low[along] += WALL + dice.unit() * free;
+    high[along] = low[along] + DOOR_WIDTH;
+    low.z += WALL;
+    high.z = low.z + DOOR_HEIGHT;
+    WorldBox::new(low, high)
+}
+
+/// The low wall across `axis`: whole, or two pieces and a lintel round a door.
+fn push_wall(boxes: &mut Vec<WorldBox>, room: &WorldBox, axis: usize, door: Option<&WorldBox>) {
+    let along = 1 - axis;
+    let mut wall = *room;
+    wall.max[axis] = wall.min[axis] + WALL;
+    let Some(door) = door else {
+        boxes.push(wall);
+        return;
+    };
+    let (mut left, mut right, mut lintel) = (wall, wall, wall);
+    left.max[along] = door.min[along];
+    right.min[along] = door.max[along];
+    lintel.min[along] = door.min[along];
+    lintel.max[along] = door.max[along];
+    lintel.min.z = door.max.z;
+    boxes.extend([left, right, lintel]);
+}
+
+/// A table, cupboard or trinket on the room's floor.
+fn furniture(room: &WorldBox, dice: &mut Dice) -> WorldBox {
+    let size = match dice.below(3) {
+        0 => DVec3::new(dice.between(0.6, 1.6), dice.between(0.6, 1.0), 0.8),
+        1 => DVec3::new(0.5, dice.between(0.5, 1.5), dice.between(1.2, 2.0)),
+        _ => DVec3::splat(dice.between(0.05, 0.3)),
+    };
+    let free = room.max - room.min - size - 2.0 * WALL;
+    let place = DVec3::new(dice.unit() * free.x, dice.unit() * free.y, 0.0);
+    let low = room.min + WALL + place;
+    WorldBox::new(low, low + size)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn world(text: &str, n: usize) -> World {
+        build(&mut Spec::parse(text).unwrap(), n, &mut Dice::new(3)).unwrap()
+    }
+
+    #[test]
+    fn rooms_tile_the_block_and_doors_join_them_all() {
+        let plan = world("rooms:storeys=2", 2000).rooms.unwrap();
+        let tiling = plan.tiling(DVec3::ZERO);
+        let block = Aabb::union_of(&tiling.boxes);
+        let volume =
+            |b: &Aabb| f64::from(b.extent().x) * f64::from(b.extent().y) * f64::from(b.extent().z);
+        let filled: f64 = tiling.boxes.iter().map(volume).sum();
+        assert_eq!(filled, volume(&block), "no gap and no overlap");
+        // Reachability: a portal lies on both of its rooms, and from room 0
+        // every room can be reached.
+        let mut reached = vec![false; tiling.boxes.len()];
+        reached[0] = true;
+        for _ in 0..tiling.boxes.len() {
+            for portal in &tiling.portals {
+                let [a, b] = portal.between.map(|id| id as usize);
+                assert!(tiling.boxes[a].intersects(&portal.opening));
+                assert!(tiling.boxes[b].intersects(&portal.opening));
+                let both = reached[a] || reached[b];
+                (reached[a], reached[b]) = (both, both);
+            }
+        }
+        assert!(reached.iter().all(|&r| r), "every room has a way out");
+    }
+
+    #[test]
+    fn the_shell_fits_the_item_budget() {
+        // Slab, two walls in two pieces each, and their lintels.
+        const SHELL_ITEMS: usize = 7;
+        let most = world("rooms", 5000);
+        let rooms = most.rooms.unwrap().rooms.len();
+        assert!(rooms * SHELL_ITEMS <= 5000, "{rooms} rooms");
+    }
+}

@@ -1,0 +1,92 @@
+//! The real scenes that come with the program, by name. They are compiled in,
+//! so that the main job needs no file; their provenance is in
+//! `datasets/README.md`.
+
+use super::Scene;
+use super::source::{LoadOptions, parse_bytes};
+use crate::input::InputError;
+
+/// A real scene that is part of the program.
+pub struct Sample {
+    pub name: &'static str,
+    pub summary: &'static str,
+    pub licence: &'static str,
+    /// The file under `datasets/`.
+    pub file: &'static str,
+    pub bytes: &'static [u8],
+}
+
+macro_rules! sample {
+    ($name:literal, $file:literal, $licence:literal, $summary:literal) => {
+        Sample {
+            name: $name,
+            summary: $summary,
+            licence: $licence,
+            file: $file,
+            bytes: include_bytes!(concat!("../../datasets/", $file)),
+        }
+    };
+}
+
+/// All of them, in the order of the quick suite.
+pub static SAMPLES: &[Sample] = &[
+    sample!(
+        "freedm-map12",
+        "freedm_map12.wad",
+        "BSD-3-Clause",
+        "small Doom deathmatch map: linedefs and things, 87 BSP leaves as regions"
+    ),
+    sample!(
+        "freedm-map20",
+        "freedm_map20.wad",
+        "BSD-3-Clause",
+        "large Doom deathmatch map, 825 BSP leaves as regions"
+    ),
+    sample!(
+        "helsinki",
+        "helsinki_boxes.csv",
+        "ODbL-1.0, (c) OpenStreetMap contributors",
+        "11,065 objects of central Helsinki in metres"
+    ),
+    sample!(
+        "us-counties",
+        "us_counties_boxes.csv",
+        "ISC",
+        "3,510 flat county boxes in degrees, sizes 1 : 10,000"
+    ),
+];
+
+impl Sample {
+    pub fn named(name: &str) -> Option<&'static Sample> {
+        SAMPLES.iter().find(|s| s.name == name)
+    }
+
+    pub fn load(&self) -> Result<Scene, InputError> {
+        parse_bytes(self.bytes, self.file, self.name, &LoadOptions::default())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sha2::{Digest, Sha256};
+
+    #[test]
+    fn files_are_byte_for_byte_the_documented_ones() {
+        let readme = include_str!("../../datasets/README.md");
+        for sample in SAMPLES {
+            let digest = super::super::hex(&Sha256::digest(sample.bytes));
+            assert!(readme.contains(&digest), "{}: {digest}", sample.file);
+            assert!(readme.contains(sample.file));
+        }
+    }
+
+    #[test]
+    fn every_sample_loads_with_its_published_size() {
+        let sizes: Vec<_> = SAMPLES
+            .iter()
+            .map(|s| s.load().unwrap().items.len())
+            .collect();
+        assert_eq!(sizes[2..], [11_065, 3_510]);
+    }
+}

@@ -1,0 +1,123 @@
+//! From what a user names to a scene: a built-in sample, a generated family
+//! with parameters, or a file by its contents. It owns that decision only.
+
+use std::fs;
+use std::path::Path;
+
+use super::{FAMILIES, Family, SAMPLES, Sample, Scene, WadMap, boxes_csv};
+use crate::input::InputError;
+use crate::spec::{Spec, SpecError, nearest};
+
+/// How to read a scene.
+#[derive(Clone, Copy, Default, Debug)]
+pub struct LoadOptions {
+    /// Leave out rows that are no finite box, and count them.
+    pub skip_bad_items: bool,
+}
+
+/// Loads `freedm-map12`, `city:n=100000,seed=7`, `boxes.csv`, `map.wad` or
+/// `maps.wad#MAP07`. An existing file wins over a name.
+///
+/// # Errors
+/// One line that names what was found and what was expected.
+pub fn load(source: &str, options: &LoadOptions) -> Result<Scene, InputError> {
+    let (file, map) = match source.rsplit_once('#') {
+        Some((file, map)) if !Path::new(source).exists() => (file, Some(map)),
+        _ => (source, None),
+    };
+    if Path::new(file).is_file() {
+        let bytes = fs::read(file).map_err(|error| InputError::Io {
+            path: file.into(),
+            source: error,
+        })?;
+        return match map {
+            Some(map) => WadMap::read(&bytes, file, Some(map))?.into_scene(source),
+            None => parse_bytes(&bytes, file, source, options),
+        };
+    }
+    let looks_like_a_file = source.contains(['/', '\\', '.']) && !source.contains('=');
+    if !looks_like_a_file {
+        let spec = Spec::parse(source)?;
+        if let Some(family) = Family::named(spec.name()) {
+            return family.generate(source, spec);
+        }
+        if let Some(sample) = Sample::named(spec.name()) {
+            spec.finish()?;
+            return sample.load();
+        }
+        return Err(unknown_scene(spec.name()).into());
+    }
+    Err(InputError::Io {
+        path: file.into(),
+        source: match fs::metadata(file) {
+            Ok(_) => std::io::Error::other("is not a file"),
+            Err(error) => error,
+        },
+    })
+}
+
+/// A WAD by its magic, anything else as boxes CSV.
+pub(super) fn parse_bytes(
+    bytes: &[u8],
+    file: &str,
+    name: &str,
+    options: &LoadOptions,
+) -> Result<Scene, InputError> {
+    let is_wad = bytes.starts_with(b"PWAD") || bytes.starts_with(b"IWAD");
+    let named_wad = Path::new(file)
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("wad"));
+    if is_wad || named_wad {
+        return WadMap::read(bytes, file, None)?.into_scene(name);
+    }
+    let mut scene = boxes_csv::read_boxes_csv(bytes, file, options.skip_bad_items)?;
+    scene.name = name.to_owned();
+    Ok(scene)
+}
+
+fn unknown_scene(word: &str) -> SpecError {
+    let families = FAMILIES.iter().map(|f| f.name);
+    let known = families.chain(SAMPLES.iter().map(|s| s.name));
+    let hint = match nearest(word, known.clone()) {
+        Some(guess) => format!("; did you mean '{guess}'?"),
+        None => String::new(),
+    };
+    SpecError::new(format_args!(
+        "unknown scene '{word}': neither a file nor a built-in scene{hint} (built in: {})",
+        known.collect::<Vec<_>>().join(", ")
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn error(source: &str) -> String {
+        load(source, &LoadOptions::default())
+            .unwrap_err()
+            .to_string()
+    }
+
+    #[test]
+    fn names_specs_and_files_load() {
+        for source in [
+            "freedm-map12",
+            "city:n=10",
+            "datasets/freedm_map20.wad",
+            "datasets/freedm_map12.wad#map12",
+        ] {
+            let scene = load(source, &LoadOptions::default()).unwrap();
+            assert_eq!(scene.name, source);
+            assert!(!scene.items.is_empty());
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_loaded_says_why() {
+        assert!(error("unifrom").contains("did you mean 'uniform'"));
+        assert!(error("no/such/file.csv").contains("no/such/file.csv: No such file"));
+        assert!(error("datasets/").contains("not a file"));
+        assert!(error("datasets/freedm_map12.wad#MAP99").contains("no map 'MAP99'"));
+        assert!(error("helsinki:n=3").contains("unknown parameter"));
+    }
+}

@@ -1,0 +1,264 @@
+//! The little language of the command line: `name:key=value,key=value` names
+//! a scene family, a camera path or a structure together with its parameters.
+//! It owns the syntax, numbers such as `100k` or `2%`, and the nearest
+//! suggestion for a misspelt word; what the words mean is up to their owners.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+/// A name with its parameters, as typed.
+///
+/// ```
+/// use cullbench::spec::Spec;
+/// let mut spec = Spec::parse("city:n=100k,seed=7")?;
+/// assert_eq!(spec.name(), "city");
+/// assert_eq!(spec.number("n", 10.0)?, 100_000.0);
+/// assert_eq!(spec.number("seed", 1.0)?, 7.0);
+/// spec.finish()?;
+/// # Ok::<(), cullbench::spec::SpecError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Spec {
+    name: String,
+    given: BTreeMap<String, String>,
+    known: Vec<&'static str>,
+}
+
+/// What is wrong with a spec, in one line.
+#[derive(Clone, PartialEq, Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct SpecError(String);
+
+impl SpecError {
+    pub fn new(message: impl fmt::Display) -> Self {
+        SpecError(message.to_string())
+    }
+
+    /// "unknown structure 'bhv'; did you mean 'bvh'? (known: ...)".
+    pub fn unknown<'a>(
+        what: &str,
+        word: &str,
+        known: impl IntoIterator<Item = &'a str> + Clone,
+    ) -> Self {
+        let all = known.clone().into_iter().collect::<Vec<_>>().join(", ");
+        let hint = match nearest(word, known) {
+            Some(guess) => format!("; did you mean '{guess}'?"),
+            None => String::new(),
+        };
+        SpecError(format!("unknown {what} '{word}'{hint} (known: {all})"))
+    }
+}
+
+/// The known word most like `word`, if any is alike at all.
+pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    known
+        .into_iter()
+        .map(|k| (likeness(&word.to_lowercase(), k), k))
+        .filter(|(score, _)| *score > 0.6)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, k)| k)
+}
+
+/// 1 for equal words. Swapped and missing letters count little (Damerau), and
+/// so does a missing ending (Jaro and Winkler).
+fn likeness(word: &str, known: &str) -> f64 {
+    let edits = strsim::normalized_damerau_levenshtein(word, known);
+    let prefix = if word.len() > 2 {
+        strsim::jaro_winkler(word, known) - 0.2
+    } else {
+        0.0
+    };
+    edits.max(prefix)
+}
+
+/// A number with an optional suffix: `250`, `1e6`, `100k`, `10M`, `2%`,
+/// `1_000`.
+pub fn parse_number(text: &str) -> Option<f64> {
+    let plain = text.trim().replace('_', "");
+    let (digits, factor) = match plain.char_indices().next_back()? {
+        (at, 'k') => (&plain[..at], 1e3),
+        (at, 'M') => (&plain[..at], 1e6),
+        (at, '%') => (&plain[..at], 1e-2),
+        _ => (plain.as_str(), 1.0),
+    };
+    let value = digits.parse::<f64>().ok()? * factor;
+    value.is_finite().then_some(value)
+}
+
+impl Spec {
+    /// Splits `name:key=value,...`. The name may stand alone.
+    pub fn parse(text: &str) -> Result<Spec, SpecError> {
+        let (name, rest) = text.split_once(':').unwrap_or((text, ""));
+        let mut given = BTreeMap::new();
+        for pair in rest.split(',').filter(|p| !p.trim().is_empty()) {
+            let Some((key, value)) = pair.split_once('=') else {
+                return Err(SpecError(format!(
+                    "in '{text}': '{pair}' is not of the form key=value"
+                )));
+            };
+            let (key, value) = (key.trim().to_owned(), value.trim().to_owned());
+            if given.insert(key.clone(), value).is_some() {
+                return Err(SpecError(format!("in '{text}': '{key}' is given twice")));
+            }
+        }
+        Ok(Spec {
+            name: name.trim().to_owned(),
+            given,
+            known: Vec::new(),
+        })
+    }
+
+    /// Splits a comma-separated list of specs whose parameters use commas as
+    /// well: `bvh:leaf=4,preset=fast,linear` is two specs, because a bare
+    /// `key=value` belongs to the spec before it.
+    pub fn split_list(text: &str) -> Vec<String> {
+        let mut specs: Vec<String> = Vec::new();
+        for part in text.split(',').map(str::trim).filter(|p| !p.is_empty()) {
+            match specs.last_mut() {
+                Some(last) if part.contains('=') && !part.contains(':') => {
+                    last.push(if last.contains(':') { ',' } else { ':' });
+                    last.push_str(part);
+                }
+                _ => specs.push(part.to_owned()),
+            }
+        }
+        specs
+    }
+
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// All parameters as typed, for owners that check them themselves.
+    pub fn given(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.given.iter().map(|(k, v)| (k.as_str(), v.as_str()))
+    }
+
+    /// A text parameter, if given.
+    pub fn text(&mut self, key: &'static str) -> Option<String> {
+        self.known.push(key);
+        self.given.get(key).cloned()
+    }
+
+    /// A finite number, or the default.
+    pub fn number(&mut self, key: &'static str, default: f64) -> Result<f64, SpecError> {
+        match self.text(key) {
+            None => Ok(default),
+            Some(text) => parse_number(&text).ok_or_else(|| self.bad(key, &text, "a number")),
+        }
+    }
+
+    /// A number in the open interval `(low, high)`, or the default.
+    pub fn number_between(
+        &mut self,
+        key: &'static str,
+        default: f64,
+        low: f64,
+        high: f64,
+    ) -> Result<f64, SpecError> {
+        let value = self.number(key, default)?;
+        if value > low && value < high {
+            return Ok(value);
+        }
+        let wanted = if high.is_finite() {
+            format!("a number between {low} and {high}")
+        } else {
+            format!("a number above {low}")
+        };
+        Err(self.bad(key, &value.to_string(), &wanted))
+    }
+
+    /// A whole number in `0..=most`, or the default.
+    pub fn whole(&mut self, key: &'static str, default: u64, most: u64) -> Result<u64, SpecError> {
+        let Some(text) = self.text(key) else {
+            return Ok(default);
+        };
+        // Plain digits first: a 64-bit seed does not fit an f64.
+        let exact = text.replace('_', "").parse::<u64>().ok();
+        let rounded = parse_number(&text)
+            .filter(|v| v.fract() == 0.0 && (0.0..9e15).contains(v))
+            .map(|v| v as u64);
+        exact
+            .or(rounded)
+            .filter(|v| *v <= most)
+            .ok_or_else(|| self.bad(key, &text, &format!("a whole number from 0 to {most}")))
+    }
+
+    /// Call last: refuses parameters that nobody asked for.
+    pub fn finish(&self) -> Result<(), SpecError> {
+        match self
+            .given
+            .keys()
+            .find(|k| !self.known.contains(&k.as_str()))
+        {
+            None => Ok(()),
+            Some(key) => Err(SpecError::unknown(
+                &format!("parameter of '{}':", self.name),
+                key,
+                self.known.iter().copied(),
+            )),
+        }
+    }
+
+    fn bad(&self, key: &str, found: &str, expected: &str) -> SpecError {
+        SpecError(format!(
+            "in '{}': {key}={found} is not {expected}",
+            self.name
+        ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_take_suffixes() {
+        let cases = [
+            ("100k", 1e5),
+            ("10M", 1e7),
+            ("2%", 0.02),
+            ("1_000", 1e3),
+            ("1e6", 1e6),
+        ];
+        for (text, value) in cases {
+            assert_eq!(parse_number(text), Some(value), "{text}");
+        }
+        for text in ["", "k", "ten", "inf", "nan", "1e999"] {
+            assert_eq!(parse_number(text), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn lists_keep_parameters_with_their_structure() {
+        assert_eq!(
+            Spec::split_list("bvh:leaf=4,preset=fast, linear"),
+            ["bvh:leaf=4,preset=fast", "linear"]
+        );
+    }
+
+    #[test]
+    fn unknown_words_get_the_nearest_suggestion() {
+        let error = SpecError::unknown("structure", "bhv", ["linear", "bvh"]);
+        assert!(error.to_string().contains("did you mean 'bvh'"), "{error}");
+        let mut spec = Spec::parse("city:sed=3").unwrap();
+        spec.whole("seed", 1, u64::MAX).unwrap();
+        let error = spec.finish().unwrap_err().to_string();
+        assert!(error.contains("did you mean 'seed'"), "{error}");
+    }
+
+    #[test]
+    fn bad_values_say_what_was_expected() {
+        let mut spec = Spec::parse("city:n=many,seed=18446744073709551615,x=3").unwrap();
+        assert!(
+            spec.whole("n", 1, 10)
+                .unwrap_err()
+                .to_string()
+                .contains("n=many")
+        );
+        assert_eq!(spec.whole("seed", 1, u64::MAX).unwrap(), u64::MAX);
+        assert!(spec.number_between("x", 1.0, 0.0, 2.0).is_err());
+        assert!(Spec::parse("city:n").is_err());
+        assert!(Spec::parse("city:n=1,n=2").is_err());
+    }
+}
