@@ -1,1 +1,10 @@
-fn main() {}
+//! The `cullbench` program. Everything is in `cli`; the library never depends
+//! on it.
+
+mod cli;
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    cli::main()
+}

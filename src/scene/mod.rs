@@ -169,8 +169,8 @@ fn choose_origin(boxes: &[WorldBox]) -> DVec3 {
     });
     let axis = |k: usize| {
         let (width, centre) = (high[k] - low[k], low[k] / 2.0 + high[k] / 2.0);
-        // The comparison is false for an empty scene's NaN as well.
-        if !(centre.abs() > 4.0 * width) {
+        // An empty scene's width is -inf and its centre NaN.
+        if centre.is_nan() || centre.abs() <= 4.0 * width {
             return 0.0;
         }
         let floor = centre.abs() * f64::EPSILON;

@@ -1,0 +1,72 @@
+//! Tells the program what it was built from and with, so that every report
+//! can say so: compiler, flags, profile, features, commit. Everything is
+//! optional; a build without git or from a package still works.
+
+use std::env;
+use std::process::Command;
+
+fn main() {
+    let rustc = env::var("RUSTC").unwrap_or_else(|_| "rustc".into());
+    let features: Vec<String> = env::vars()
+        .filter_map(|(key, _)| key.strip_prefix("CARGO_FEATURE_").map(str::to_lowercase))
+        .filter(|feature| feature != "default")
+        .collect();
+    let flags = env::var("CARGO_ENCODED_RUSTFLAGS").unwrap_or_default();
+    let commit = output("git", &["rev-parse", "HEAD"]);
+    let changes = output(
+        "git",
+        &[
+            "status",
+            "--porcelain",
+            "--",
+            "src",
+            "Cargo.toml",
+            "Cargo.lock",
+        ],
+    );
+    let facts = [
+        ("RUSTC", output(&rustc, &["--version"])),
+        ("RUSTFLAGS", Some(flags.replace('\u{1f}', " "))),
+        ("PROFILE", env::var("PROFILE").ok()),
+        ("OPT_LEVEL", env::var("OPT_LEVEL").ok()),
+        ("TARGET", env::var("TARGET").ok()),
+        ("FEATURES", Some(features.join(","))),
+        (
+            "DIRTY",
+            commit
+                .as_ref()
+                .and(changes)
+                .map(|c| (!c.is_empty()).to_string()),
+        ),
+        ("COMMIT", commit),
+    ];
+    for (name, value) in facts {
+        println!(
+            "cargo::rustc-env=CULLBENCH_{name}={}",
+            value.unwrap_or_default()
+        );
+    }
+    // Anything that a commit or an edit touches; missing paths are skipped,
+    // because cargo would otherwise rerun this script every time.
+    for path in [
+        ".git/HEAD",
+        ".git/index",
+        ".git/refs/heads",
+        "src",
+        "Cargo.toml",
+        "Cargo.lock",
+    ] {
+        if std::path::Path::new(path).exists() {
+            println!("cargo::rerun-if-changed={path}");
+        }
+    }
+}
+
+fn output(program: &str, args: &[&str]) -> Option<String> {
+    let output = Command::new(program).args(args).output().ok()?;
+    let text = String::from_utf8(output.stdout).ok()?;
+    output
+        .status
+        .success()
+        .then(|| text.trim().replace('\n', "; "))
+}

@@ -1,0 +1,334 @@
+//! What can be typed. Values are checked where they are used, so that every
+//! message can say what was found and what was expected.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use cullbench::camera::{DEFAULT_EPSILON, PLANE_METHODS, PlaneMethod, PlaneOptions};
+use cullbench::path::LensDefaults;
+use cullbench::spec::SpecError;
+use glam::DVec3;
+
+/// Which spatial index finds what a camera sees, and where the camera is:
+/// how fast, and is the answer right?
+#[derive(Parser, Debug)]
+#[command(name = "cullbench", version, about, max_term_width = 100, after_help = EXAMPLES)]
+pub struct Cli {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  cullbench run                                        the quick suite, a ranked table per scene
+  cullbench run --scene my.csv --path my_cameras.csv   your scene, your cameras
+  cullbench query --scene city:n=100000 --cameras orbit:frames=8 --structure all
+  cullbench locate --scene freedm-map12 --points points.csv --structure bvh
+
+Scenes and paths are files or specs such as city:n=100000,seed=7; `cullbench list` names them all.
+Exit codes: 0 ok, 1 a wrong answer or failed verification, 2 usage or bad input, 130 interrupted.";
+
+#[derive(Subcommand, Debug)]
+pub enum Command {
+    /// Show the structures, scenes, paths, tests and metrics there are
+    List(ListArgs),
+    /// Measure structures on scenes along camera paths (the main job)
+    Run(RunArgs),
+    /// Answer frustum queries: what each structure sees from each camera
+    Query(QueryArgs),
+    /// Answer region searches: which regions hold each point
+    Locate(LocateArgs),
+    /// Cross-check all structures against the reference scan
+    Verify(VerifyArgs),
+    /// Look at or generate scenes
+    #[command(subcommand)]
+    Scene(SceneCommand),
+    /// Show the machine, toolchain and source that reports record
+    Env(EnvArgs),
+    /// Print shell completions
+    Completions { shell: clap_complete::Shell },
+    /// Print the manual page (roff)
+    Man,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum, Debug)]
+pub enum TableFormat {
+    Table,
+    Json,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum, Debug)]
+pub enum RowFormat {
+    Csv,
+    Json,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum, Debug)]
+pub enum ListTopic {
+    Structures,
+    Scenes,
+    Paths,
+    Tests,
+    Metrics,
+}
+
+#[derive(Args, Debug)]
+pub struct ListArgs {
+    /// What to list [default: everything]
+    pub topic: Option<ListTopic>,
+    #[arg(long, value_enum, default_value = "table")]
+    pub format: TableFormat,
+}
+
+#[derive(Args, Debug)]
+pub struct SceneArgs {
+    /// Leave out items that are no finite box, and report their number
+    #[arg(long)]
+    pub skip_bad_items: bool,
+}
+
+/// Values for cameras that do not bring their own.
+#[derive(Args, Debug)]
+pub struct LensArgs {
+    /// Vertical field of view in degrees for cameras without one
+    #[arg(
+        long,
+        value_name = "DEG",
+        default_value_t = 60.0,
+        allow_negative_numbers = true
+    )]
+    pub fovy: f64,
+    /// Width / height for cameras without one
+    #[arg(long, default_value_t = 16.0 / 9.0, allow_negative_numbers = true)]
+    pub aspect: f64,
+    /// Near plane for cameras without one [default: 0.1 for recorded cameras, far/1000 for paths]
+    #[arg(long, allow_negative_numbers = true)]
+    pub near: Option<f64>,
+    /// Far plane for cameras without one, or inf [default: 1000 for recorded cameras, the scene for paths]
+    #[arg(long, allow_negative_numbers = true)]
+    pub far: Option<String>,
+    /// Where the planes come from: frame, frame-f32, gh-gl-f32, gh-gl-f64, gh-d3d-f32, gh-d3d-f64, gh-revz-f32, gh-revz-f64
+    #[arg(long, value_name = "METHOD", default_value = "frame")]
+    pub planes: String,
+    /// Factor c of the conservative epsilon; 0 leaves the planes as derived
+    #[arg(long, value_name = "C", default_value_t = DEFAULT_EPSILON, allow_negative_numbers = true)]
+    pub epsilon: f64,
+}
+
+impl LensArgs {
+    pub fn defaults(&self) -> Result<LensDefaults, SpecError> {
+        let far = match self.far.as_deref() {
+            None => None,
+            Some("inf") => Some(None),
+            Some(text) => match text.parse::<f64>() {
+                Ok(far) if far.is_finite() => Some(Some(far)),
+                _ => {
+                    return Err(SpecError::new(format_args!(
+                        "--far is '{text}'; expected a finite number or inf"
+                    )));
+                }
+            },
+        };
+        Ok(LensDefaults {
+            fovy_deg: self.fovy,
+            aspect: self.aspect,
+            near: self.near,
+            far,
+            up: DVec3::Z,
+        })
+    }
+
+    pub fn plane_options(&self) -> Result<PlaneOptions, SpecError> {
+        let method = PlaneMethod::named(&self.planes).ok_or_else(|| {
+            SpecError::unknown(
+                "plane method",
+                &self.planes,
+                PLANE_METHODS.iter().map(|row| row.1),
+            )
+        })?;
+        if !(self.epsilon >= 0.0 && self.epsilon.is_finite()) {
+            return Err(SpecError::new(format_args!(
+                "--epsilon is {}; expected a number of at least 0",
+                self.epsilon
+            )));
+        }
+        Ok(PlaneOptions {
+            method,
+            epsilon: self.epsilon,
+        })
+    }
+}
+
+#[derive(Args, Debug)]
+pub struct RunArgs {
+    /// quick, standard or full: the scenes, paths and rounds
+    #[arg(long, default_value = "quick")]
+    pub suite: String,
+    /// A scene (file or spec) instead of the suite's; may be repeated
+    #[arg(long, value_name = "SCENE")]
+    pub scene: Vec<String>,
+    /// A camera path (spec or cameras CSV) instead of the suite's; may be repeated
+    #[arg(long, visible_alias = "cameras", value_name = "PATH")]
+    pub path: Vec<String>,
+    /// Structures, e.g. linear,bvh:leaf=4; may be repeated
+    #[arg(long, value_name = "LIST", default_value = "all")]
+    pub structure: Vec<String>,
+    /// The culling test
+    #[arg(long, value_name = "TEST", default_value = "six-plane")]
+    pub test: Vec<String>,
+    /// Seed of the order in which structures are measured
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Folder for report.json, summary.csv and samples.csv [default: a new one under results/]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Go on with the run in --out (or the newest unfinished one under results/)
+    #[arg(long)]
+    pub resume: bool,
+    /// Measure with cold caches as well
+    #[arg(long)]
+    pub cold: bool,
+    #[command(flatten)]
+    pub scene_args: SceneArgs,
+    #[command(flatten)]
+    pub lens: LensArgs,
+}
+
+#[derive(Args, Debug)]
+pub struct QueryArgs {
+    /// A scene: boxes CSV, Doom WAD, built-in name or spec
+    #[arg(long)]
+    pub scene: String,
+    /// Cameras: a cameras CSV or a path spec
+    #[arg(long, visible_alias = "path")]
+    pub cameras: String,
+    /// Structures, e.g. linear,bvh:leaf=4
+    #[arg(long, value_name = "LIST", default_value = "all")]
+    pub structure: String,
+    /// The culling test
+    #[arg(long, default_value = "six-plane")]
+    pub test: String,
+    /// Print the visible ids as well
+    #[arg(long)]
+    pub ids: bool,
+    #[arg(long, value_enum, default_value = "csv")]
+    pub format: RowFormat,
+    #[command(flatten)]
+    pub scene_args: SceneArgs,
+    #[command(flatten)]
+    pub lens: LensArgs,
+}
+
+#[derive(Args, Debug)]
+pub struct LocateArgs {
+    /// A scene: boxes CSV, Doom WAD, built-in name or spec
+    #[arg(long)]
+    pub scene: String,
+    /// Points CSV: x,y,z
+    #[arg(long)]
+    pub points: PathBuf,
+    /// Structures, e.g. linear,bvh:leaf=4
+    #[arg(long, value_name = "LIST", default_value = "all")]
+    pub structure: String,
+    #[arg(long, value_enum, default_value = "csv")]
+    pub format: RowFormat,
+    #[command(flatten)]
+    pub scene_args: SceneArgs,
+}
+
+#[derive(Args, Debug)]
+pub struct VerifyArgs {
+    /// A scene (file or spec); may be repeated [default: small ones of every family and the real ones]
+    #[arg(long, value_name = "SCENE")]
+    pub scene: Vec<String>,
+    /// A camera path (spec or cameras CSV); may be repeated [default: several]
+    #[arg(long, visible_alias = "cameras", value_name = "PATH")]
+    pub path: Vec<String>,
+    /// Structures, e.g. linear,bvh:leaf=4
+    #[arg(long, value_name = "LIST", default_value = "all")]
+    pub structure: String,
+    /// Random differential cases [default: 20000, or 0 if scenes or paths are named]
+    #[arg(long, value_name = "N")]
+    pub cases: Option<u64>,
+    /// Seed of the first case; case i has seed N + i
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    #[arg(long, value_enum, default_value = "table")]
+    pub format: TableFormat,
+    #[command(flatten)]
+    pub scene_args: SceneArgs,
+    #[command(flatten)]
+    pub lens: LensArgs,
+}
+
+#[derive(Subcommand, Debug)]
+pub enum SceneCommand {
+    /// Show what is in a scene
+    Info(SceneInfoArgs),
+    /// Write a scene as boxes CSV
+    Generate(SceneGenerateArgs),
+}
+
+#[derive(Args, Debug)]
+pub struct SceneInfoArgs {
+    /// A scene: boxes CSV, Doom WAD, built-in name or spec
+    #[arg(value_name = "SCENE")]
+    pub scene: String,
+    #[arg(long, value_enum, default_value = "table")]
+    pub format: TableFormat,
+    #[command(flatten)]
+    pub scene_args: SceneArgs,
+}
+
+#[derive(Args, Debug)]
+pub struct SceneGenerateArgs {
+    /// A spec such as city:n=100000,seed=7
+    #[arg(value_name = "SCENE")]
+    pub scene: String,
+    /// The file to write [default: standard output]
+    #[arg(long, short, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+}
+
+#[derive(Args, Debug)]
+pub struct EnvArgs {
+    #[arg(long, value_enum, default_value = "table")]
+    pub format: TableFormat,
+}
+
+/// The culling tests there are.
+pub const TESTS: [(&str, &str); 1] = [(
+    "six-plane",
+    "outside if one plane has the whole box on its outer side (p-vertex)",
+)];
+
+/// The named test.
+pub fn test_named(name: &str) -> Result<&'static str, SpecError> {
+    let known = TESTS.iter().map(|t| t.0);
+    known
+        .clone()
+        .find(|t| *t == name)
+        .ok_or_else(|| SpecError::unknown("test", name, known))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn every_plane_method_is_in_the_help() {
+        let help = Cli::command()
+            .find_subcommand_mut("query")
+            .map(|c| c.render_long_help().to_string())
+            .unwrap_or_default();
+        for (_, name, _) in PLANE_METHODS {
+            assert!(help.contains(name), "{name}");
+        }
+    }
+}

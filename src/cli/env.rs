@@ -1,0 +1,55 @@
+//! `cullbench env`: what every report records about where it was made.
+
+use std::io::{self, Write};
+
+use serde_json::{Value, json};
+
+use super::args::{EnvArgs, TableFormat};
+use super::{Ending, text};
+use cullbench::measure::{Machine, Source, Toolchain, harness_overhead_ns};
+
+pub fn env(args: &EnvArgs) -> anyhow::Result<Ending> {
+    let facts = json!({
+        "machine": Machine::capture(),
+        "toolchain": Toolchain::capture(),
+        "source": Source::capture(),
+        "harness_overhead_ns": harness_overhead_ns(),
+    });
+    let mut out = io::stdout().lock();
+    match args.format {
+        TableFormat::Json => writeln!(out, "{}", serde_json::to_string_pretty(&facts)?)?,
+        TableFormat::Table => {
+            let mut table = text::table(&["fact", "value"], &[]);
+            for (group, facts) in facts.as_object().into_iter().flatten() {
+                match facts.as_object() {
+                    Some(facts) => {
+                        for (name, value) in facts {
+                            table.add_row([format!("{group}.{name}"), plain(value)]);
+                        }
+                    }
+                    None => {
+                        table.add_row([group.clone(), plain(facts)]);
+                    }
+                }
+            }
+            writeln!(out, "{table}")?;
+        }
+    }
+    Ok(Ending::Ok)
+}
+
+fn plain(value: &Value) -> String {
+    match value {
+        Value::Null => "unknown".to_owned(),
+        Value::String(text) => text.clone(),
+        Value::Array(values) => values.iter().map(plain).collect::<Vec<_>>().join(" "),
+        Value::Object(fields) => {
+            let fields: Vec<String> = fields
+                .iter()
+                .map(|(k, v)| format!("{k}={}", plain(v)))
+                .collect();
+            format!("({})", fields.join(", "))
+        }
+        other => other.to_string(),
+    }
+}

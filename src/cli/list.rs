@@ -1,0 +1,134 @@
+//! `cullbench list`: everything that has a name.
+
+use std::io::{self, Write};
+
+use serde_json::{Map, Value, json};
+
+use super::args::{ListArgs, ListTopic, TESTS, TableFormat};
+use super::{Ending, text};
+use cullbench::index::{BACKENDS, StructureSpec};
+use cullbench::measure::METRICS;
+use cullbench::path::{PATH_PARAMS, PATHS};
+use cullbench::scene::{FAMILIES, SAMPLES};
+use cullbench::suite::SUITES;
+
+/// Name, further columns by name, summary.
+type Row = (String, Vec<(&'static str, String)>, String);
+
+pub fn list(args: &ListArgs) -> anyhow::Result<Ending> {
+    let topics = match args.topic {
+        Some(topic) => vec![topic],
+        None => vec![
+            ListTopic::Structures,
+            ListTopic::Scenes,
+            ListTopic::Paths,
+            ListTopic::Tests,
+            ListTopic::Metrics,
+        ],
+    };
+    let mut out = io::stdout().lock();
+    let mut all = Map::new();
+    for topic in &topics {
+        let (name, note, rows) = rows(*topic)?;
+        match args.format {
+            TableFormat::Json => {
+                all.insert(name.to_owned(), rows.into_iter().map(as_json).collect());
+            }
+            TableFormat::Table => {
+                let mut header = vec![name];
+                header.extend(rows.first().iter().flat_map(|r| r.1.iter().map(|c| c.0)));
+                header.push("");
+                let mut table = text::table(&header, &[]);
+                for (name, columns, summary) in rows {
+                    let columns = columns.into_iter().map(|(_, value)| value);
+                    table.add_row([name].into_iter().chain(columns).chain([summary]));
+                }
+                writeln!(out, "{table}")?;
+                if !note.is_empty() {
+                    writeln!(out, "{note}\n")?;
+                }
+            }
+        }
+    }
+    if args.format == TableFormat::Json {
+        // One topic is a plain array, all of them an object.
+        let value = match args.topic {
+            Some(_) => all.into_iter().next().map(|(_, v)| v).unwrap_or_default(),
+            None => Value::Object(all),
+        };
+        writeln!(out, "{}", serde_json::to_string_pretty(&value)?)?;
+    }
+    Ok(Ending::Ok)
+}
+
+fn as_json((name, columns, summary): Row) -> Value {
+    let mut row = json!({ "name": name, "summary": summary });
+    for (column, value) in columns {
+        row[column] = Value::from(value);
+    }
+    row
+}
+
+fn rows(topic: ListTopic) -> anyhow::Result<(&'static str, String, Vec<Row>)> {
+    let plain = |name: &str, summary: &str| (name.to_owned(), Vec::new(), summary.to_owned());
+    Ok(match topic {
+        ListTopic::Structures => {
+            let rows = BACKENDS.iter().map(|b| {
+                let params = StructureSpec::parse(b.name)?.params.to_string();
+                let params = vec![("params", params)];
+                Ok((b.name.to_owned(), params, b.summary.to_owned()))
+            });
+            let note = "Parameters follow the name: bvh:leaf=4,preset=medium";
+            (
+                "structures",
+                note.to_owned(),
+                rows.collect::<anyhow::Result<_>>()?,
+            )
+        }
+        ListTopic::Scenes => {
+            let families = FAMILIES.iter().map(|f| {
+                let params = format!("n=100000, seed=1, offset=0, {}", f.params);
+                (
+                    f.name.to_owned(),
+                    vec![("params", params)],
+                    f.summary.to_owned(),
+                )
+            });
+            let samples = SAMPLES.iter().map(|s| {
+                let licence = vec![("params", format!("real; {}", s.licence))];
+                (s.name.to_owned(), licence, s.summary.to_owned())
+            });
+            let suites: Vec<String> = SUITES
+                .iter()
+                .map(|s| format!("  {:<9} {}", s.name, s.summary))
+                .collect();
+            let note = format!(
+                "A scene is also a file: boxes CSV, or a Doom WAD (maps.wad#MAP07 picks a map).\nSuites of `run`:\n{}",
+                suites.join("\n")
+            );
+            ("scenes", note, families.chain(samples).collect())
+        }
+        ListTopic::Paths => (
+            "paths",
+            format!(
+                "Parameters of every path: {PATH_PARAMS}.\nA path is also a file: a cameras CSV."
+            ),
+            PATHS.iter().map(|p| plain(p.name, p.summary)).collect(),
+        ),
+        ListTopic::Tests => (
+            "tests",
+            String::new(),
+            TESTS.iter().map(|(n, s)| plain(n, s)).collect(),
+        ),
+        ListTopic::Metrics => {
+            let rows = METRICS.iter().map(|m| {
+                (
+                    m.name.to_owned(),
+                    vec![("unit", m.unit.to_owned())],
+                    m.summary.to_owned(),
+                )
+            });
+            ("metrics", String::new(), rows.collect())
+        }
+    })
+}

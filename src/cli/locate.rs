@@ -1,0 +1,89 @@
+//! `cullbench locate`: one row per point and structure.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+
+use anyhow::Context;
+use serde_json::{Value, json};
+
+use super::Ending;
+use super::args::{LocateArgs, RowFormat};
+use super::compare_structures::{Answer, all_agree, ask_all, joined};
+use super::query::with_ids;
+use cullbench::index::structures;
+use cullbench::path::read_points_csv;
+use cullbench::scene::{self, LoadOptions};
+use glam::Vec3;
+
+pub fn locate(args: &LocateArgs) -> anyhow::Result<Ending> {
+    let structures = structures(&args.structure)?;
+    let load = LoadOptions {
+        skip_bad_items: args.scene_args.skip_bad_items,
+    };
+    let scene = scene::load(&args.scene, &load)?;
+    let name = args.points.display().to_string();
+    let file = File::open(&args.points).with_context(|| name.clone())?;
+    let points: Vec<Vec3> = read_points_csv(file, &name)?
+        .into_iter()
+        .map(|p| scene.regions.local_point(p, scene.origin))
+        .collect();
+    let boxes = scene.regions.boxes(&scene.items);
+    let ask =
+        |index: &dyn cullbench::index::DynIndex, point: usize, out: &mut Vec<_>, cost: &mut _| {
+            index.locate_counted(points[point], out, cost);
+            scene.regions.refine(points[point], out);
+        };
+    let answers = ask_all(&structures, boxes, points.len(), true, ask)?;
+    write(args, &answers)?;
+    Ok(if all_agree(&answers, "point") {
+        Ending::Ok
+    } else {
+        Ending::WrongAnswer
+    })
+}
+
+fn write(args: &LocateArgs, answers: &[Answer]) -> io::Result<()> {
+    let mut out = BufWriter::new(io::stdout().lock());
+    match args.format {
+        RowFormat::Csv => {
+            let mut csv = csv::Writer::from_writer(&mut out);
+            csv.write_record([
+                "point",
+                "structure",
+                "region_count",
+                "region_id_sum",
+                "region_ids",
+                "nodes_tested",
+            ])?;
+            for a in answers {
+                csv.write_record([
+                    a.question.to_string(),
+                    a.structure.clone(),
+                    a.count.to_string(),
+                    a.id_sum.to_string(),
+                    a.ids.as_deref().map(joined).unwrap_or_default(),
+                    a.cost.nodes_tested.to_string(),
+                ])?;
+            }
+            csv.flush()?;
+        }
+        RowFormat::Json => {
+            let rows: Vec<Value> = answers
+                .iter()
+                .map(|a| {
+                    let row = json!({
+                        "point": a.question,
+                        "structure": a.structure,
+                        "region_count": a.count,
+                        "region_id_sum": a.id_sum,
+                        "nodes_tested": a.cost.nodes_tested,
+                    });
+                    with_ids(row, "region_ids", a)
+                })
+                .collect();
+            serde_json::to_writer_pretty(&mut out, &rows)?;
+            writeln!(out)?;
+        }
+    }
+    out.flush()
+}

@@ -1,0 +1,113 @@
+//! `cullbench query`: one row per camera and structure.
+
+use std::io::{self, BufWriter, Write};
+
+use serde_json::{Map, Value, json};
+
+use super::Ending;
+use super::args::{QueryArgs, RowFormat, test_named};
+use super::compare_structures::{Answer, all_agree, ask_all, joined};
+use cullbench::index::structures;
+use cullbench::measure::Workload;
+use cullbench::path;
+use cullbench::scene::{self, LoadOptions};
+
+pub fn query(args: &QueryArgs) -> anyhow::Result<Ending> {
+    let test = test_named(&args.test)?;
+    let structures = structures(&args.structure)?;
+    let (defaults, options) = (args.lens.defaults()?, args.lens.plane_options()?);
+    let load = LoadOptions {
+        skip_bad_items: args.scene_args.skip_bad_items,
+    };
+    let scene = scene::load(&args.scene, &load)?;
+    let cameras = path::load(&args.cameras, &scene, &defaults)?;
+    let workload = Workload::new(&scene, &cameras, &options)?;
+    if scene.skipped_items > 0 {
+        eprintln!(
+            "note: {} bad item(s) left out of {}",
+            scene.skipped_items, scene.name
+        );
+    }
+    let ask = |index: &dyn cullbench::index::DynIndex, camera: usize, out: &mut _, cost: &mut _| {
+        index.visible_counted(&workload.volumes[camera], out, cost);
+    };
+    let answers = ask_all(
+        &structures,
+        &scene.items,
+        workload.volumes.len(),
+        args.ids,
+        ask,
+    )?;
+    write(args, test, scene.items.len(), &answers)?;
+    Ok(if all_agree(&answers, "camera") {
+        Ending::Ok
+    } else {
+        Ending::WrongAnswer
+    })
+}
+
+fn write(args: &QueryArgs, test: &str, total: usize, answers: &[Answer]) -> io::Result<()> {
+    let mut out = BufWriter::new(io::stdout().lock());
+    match args.format {
+        RowFormat::Csv => {
+            let mut csv = csv::Writer::from_writer(&mut out);
+            let mut header = vec![
+                "camera",
+                "structure",
+                "test",
+                "total_count",
+                "visible_count",
+                "visible_id_sum",
+                "nodes_tested",
+                "items_tested",
+            ];
+            header.extend(args.ids.then_some("visible_ids"));
+            csv.write_record(header)?;
+            for a in answers {
+                let mut row = vec![
+                    a.question.to_string(),
+                    a.structure.clone(),
+                    test.to_owned(),
+                    total.to_string(),
+                    a.count.to_string(),
+                    a.id_sum.to_string(),
+                    a.cost.nodes_tested.to_string(),
+                    a.cost.items_tested.to_string(),
+                ];
+                row.extend(a.ids.as_deref().map(joined));
+                csv.write_record(&row)?;
+            }
+            csv.flush()?;
+        }
+        RowFormat::Json => {
+            let rows: Vec<Value> = answers
+                .iter()
+                .map(|a| {
+                    let row = json!({
+                        "camera": a.question,
+                        "structure": a.structure,
+                        "test": test,
+                        "total_count": total,
+                        "visible_count": a.count,
+                        "visible_id_sum": a.id_sum,
+                        "nodes_tested": a.cost.nodes_tested,
+                        "items_tested": a.cost.items_tested,
+                    });
+                    with_ids(row, "visible_ids", a)
+                })
+                .collect();
+            serde_json::to_writer_pretty(&mut out, &rows)?;
+            writeln!(out)?;
+        }
+    }
+    out.flush()
+}
+
+/// The row with the answer's ids as an array, if they were kept.
+pub fn with_ids(row: Value, name: &str, answer: &Answer) -> Value {
+    let mut row: Map<String, Value> = row.as_object().cloned().unwrap_or_default();
+    if let Some(ids) = &answer.ids {
+        row.insert(name.to_owned(), json!(ids));
+    }
+    Value::Object(row)
+}

@@ -1,0 +1,126 @@
+//! `cullbench scene`: looking at scenes and writing generated ones.
+
+use std::io::{self, BufWriter, Write};
+
+use serde_json::json;
+
+use super::args::{SceneGenerateArgs, SceneInfoArgs, TableFormat};
+use super::{Ending, text};
+use cullbench::measure::SceneInfo;
+use cullbench::report::write_atomically;
+use cullbench::scene::{self, LoadOptions, Regions, Scene, write_boxes_csv};
+use cullbench::statistics::{quantile, sorted};
+
+pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
+    let load = LoadOptions {
+        skip_bad_items: args.scene_args.skip_bad_items,
+    };
+    let scene = scene::load(&args.scene, &load)?;
+    let info = SceneInfo::of(&scene);
+    let sizes = sizes(&scene);
+    let portals = match &scene.regions {
+        Regions::Tiling(tiling) => tiling.portals.len(),
+        _ => 0,
+    };
+    let mut out = io::stdout().lock();
+    if args.format == TableFormat::Json {
+        let mut value = serde_json::to_value(&info)?;
+        value["region_kind"] = json!(scene.regions.kind());
+        value["portal_count"] = json!(portals);
+        value["camera_place_count"] = json!(scene.places.len());
+        let names = ["size_min", "size_median", "size_max"];
+        for (name, size) in names.into_iter().zip(sizes) {
+            value[name] = json!(size);
+        }
+        for labels in &scene.labels {
+            value["labels"][&labels.column] = labels.histogram().into_iter().collect();
+        }
+        writeln!(out, "{}", serde_json::to_string_pretty(&value)?)?;
+        return Ok(Ending::Ok);
+    }
+    let mut table = text::table(&["scene", &info.name], &[]);
+    let [low, high, origin] = [info.bounds_min, info.bounds_max, info.origin]
+        .map(|v| format!("({}, {}, {})", v[0], v[1], v[2]));
+    let mut rows = vec![
+        ("items", text::count(info.total_count)),
+        ("bounds", format!("{low} to {high}")),
+        ("origin", origin),
+        (
+            "longest edges",
+            match sizes {
+                [Some(low), Some(middle), Some(high)] => {
+                    format!("min {low}, median {middle}, max {high}")
+                }
+                _ => "no items".to_owned(),
+            },
+        ),
+        (
+            "regions",
+            format!(
+                "{}: {}",
+                text::count(info.region_count),
+                scene.regions.kind()
+            ),
+        ),
+    ];
+    if portals > 0 {
+        rows.push(("portals", text::count(portals)));
+    }
+    if !scene.places.is_empty() {
+        rows.push(("camera places", text::count(scene.places.len())));
+    }
+    if info.skipped_items > 0 {
+        rows.push(("bad items left out", text::count(info.skipped_items)));
+    }
+    for (name, value) in rows {
+        table.add_row([name, &value]);
+    }
+    for labels in &scene.labels {
+        let counts = labels.histogram();
+        let mut shown: Vec<String> = counts
+            .iter()
+            .take(8)
+            .map(|(label, count)| format!("{label} {}", text::count(*count)))
+            .collect();
+        if counts.len() > shown.len() {
+            shown.push(format!(
+                "and {} more",
+                text::count(counts.len() - shown.len())
+            ));
+        }
+        table.add_row([format!("label {}", labels.column), shown.join(", ")]);
+    }
+    table.add_row(["digest (SHA-256)", &info.digest]);
+    writeln!(out, "{table}")?;
+    Ok(Ending::Ok)
+}
+
+/// Smallest, median and largest longest edge of the items.
+fn sizes(scene: &Scene) -> [Option<f64>; 3] {
+    let edges = scene
+        .items
+        .iter()
+        .map(|b| f64::from(b.extent().max_element()));
+    let edges = sorted(edges.collect());
+    [0.0, 0.5, 1.0].map(|q| quantile(&edges, q))
+}
+
+pub fn generate(args: &SceneGenerateArgs) -> anyhow::Result<Ending> {
+    let scene = scene::load(&args.scene, &LoadOptions::default())?;
+    match &args.out {
+        Some(path) => {
+            write_atomically(path, |out| write_boxes_csv(&scene, out))?;
+            eprintln!(
+                "{}: {} items",
+                path.display(),
+                text::count(scene.items.len())
+            );
+        }
+        None => {
+            let mut out = BufWriter::new(io::stdout().lock());
+            write_boxes_csv(&scene, &mut out)?;
+            out.flush()?;
+        }
+    }
+    Ok(Ending::Ok)
+}

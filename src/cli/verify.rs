@@ -1,0 +1,288 @@
+//! `cullbench verify`: every structure on every scene and path against the
+//! reference scan, then random differential cases. Prints the first
+//! difference of each kind with what is needed to see it again.
+
+use std::io::{self, Write};
+use std::time::Instant;
+
+use indicatif::ProgressBar;
+use serde::Serialize;
+
+use super::args::{LensArgs, TableFormat, VerifyArgs};
+use super::{Ending, interrupt, text};
+use cullbench::index::{DynIndex, StructureSpec, structures};
+use cullbench::measure::{Contender, Workload, count_pass};
+use cullbench::path;
+use cullbench::scene::{self, FAMILIES, LoadOptions, SAMPLES};
+use cullbench::verify::{RandomCase, Reference, explain_containment, explain_visibility};
+
+/// One structure on one scene and path (or on all random cases).
+#[derive(Serialize)]
+struct Check {
+    scene: String,
+    path: String,
+    structure: String,
+    volumes: usize,
+    verdicts: u64,
+    status: &'static str,
+    /// The first difference and the command that shows it again.
+    difference: Option<String>,
+}
+
+#[derive(Serialize)]
+struct Outcome {
+    ok: bool,
+    verdicts: u64,
+    mismatches: usize,
+    seconds: f64,
+    seed: u64,
+    cases: u64,
+    checks: Vec<Check>,
+}
+
+/// Items of a generated scene when none is named.
+const ITEMS: usize = 5_000;
+const PATHS: [&str; 4] = [
+    "flythrough:frames=32",
+    "teleport:frames=32",
+    "outside:frames=4",
+    "teleport:frames=8,far=inf",
+];
+const CASES: u64 = 20_000;
+
+pub fn verify(args: &VerifyArgs) -> anyhow::Result<Ending> {
+    let structures = structures(&args.structure)?;
+    let defaults = args.lens.defaults()?;
+    let planes = args.lens.plane_options()?;
+    let load = LoadOptions {
+        skip_bad_items: args.scene_args.skip_bad_items,
+    };
+    let by_hand = !args.scene.is_empty() || !args.path.is_empty();
+    let cases = args.cases.unwrap_or(if by_hand { 0 } else { CASES });
+    // Random cases alone, if only they are asked for.
+    let scenes = match (&args.scene[..], args.cases) {
+        ([], Some(_)) if !by_hand => Vec::new(),
+        ([], _) => default_scenes(),
+        (named, _) => named.to_vec(),
+    };
+    let started = Instant::now();
+    let bar = ProgressBar::new(scenes.len() as u64 + 1);
+    let mut checks = Vec::new();
+    let mut interrupted = false;
+    for source in &scenes {
+        bar.set_message(source.clone());
+        let scene = scene::load(source, &load)?;
+        let contenders: Vec<Contender> = structures
+            .iter()
+            .map(|s| Contender::build(s.clone(), false, &scene))
+            .collect();
+        for path in paths(args, &scene) {
+            if interrupt::asked() {
+                interrupted = true;
+                break;
+            }
+            let cameras = path::load(&path, &scene, &defaults)?;
+            let workload = Workload::new(&scene, &cameras, &planes)?;
+            let again = reproduce(source, &path, &args.lens);
+            checks.extend(check(&workload, &contenders, &again));
+        }
+        bar.inc(1);
+    }
+    if cases > 0 && !interrupted {
+        bar.set_message(format!("{cases} random cases"));
+        checks.extend(random_cases(&structures, args.seed, cases));
+    }
+    bar.finish_and_clear();
+    let outcome = Outcome {
+        ok: checks.iter().all(|c| c.difference.is_none()),
+        verdicts: checks.iter().map(|c| c.verdicts).sum(),
+        mismatches: checks.iter().filter(|c| c.difference.is_some()).count(),
+        seconds: started.elapsed().as_secs_f64(),
+        seed: args.seed,
+        cases,
+        checks,
+    };
+    show(&outcome, args.format)?;
+    Ok(match (outcome.ok, interrupted) {
+        (false, _) => Ending::WrongAnswer,
+        (true, true) => Ending::Interrupted,
+        (true, false) => Ending::Ok,
+    })
+}
+
+fn default_scenes() -> Vec<String> {
+    let generated = FAMILIES.iter().map(|f| format!("{}:n={ITEMS}", f.name));
+    let far = ["city:n=5000,offset=1e7".to_owned()];
+    let real = SAMPLES.iter().map(|s| s.name.to_owned());
+    generated.chain(far).chain(real).collect()
+}
+
+fn paths(args: &VerifyArgs, scene: &scene::Scene) -> Vec<String> {
+    if !args.path.is_empty() {
+        return args.path.clone();
+    }
+    let own = (!scene.places.is_empty()).then_some("places");
+    PATHS.into_iter().chain(own).map(str::to_owned).collect()
+}
+
+/// The command that checks this scene and path alone.
+fn reproduce(scene: &str, path: &str, lens: &LensArgs) -> String {
+    format!(
+        "cullbench verify --scene '{scene}' --path '{path}' --planes {} --epsilon {}",
+        lens.planes, lens.epsilon
+    )
+}
+
+fn check(workload: &Workload, contenders: &[Contender], again: &str) -> Vec<Check> {
+    let built: Vec<_> = contenders
+        .iter()
+        .filter_map(|c| c.built.as_ref().ok())
+        .collect();
+    let mut counted = count_pass(workload, &built).into_iter();
+    let scene = workload.scene;
+    let questions = workload.volumes.len() * scene.items.len()
+        + workload.points.len() * scene.regions.boxes(&scene.items).len();
+    let checks = contenders.iter().map(|contender| {
+        let verdict = match &contender.built {
+            Ok(_) => counted.next().map(|c| c.verdict),
+            Err(verdict) => Some(verdict.clone()),
+        };
+        let status = verdict.as_ref().map_or("left_out", |v| v.status.name());
+        let reason = verdict
+            .filter(|v| v.status.is_failure())
+            .and_then(|v| v.reason);
+        Check {
+            scene: scene.name.clone(),
+            path: workload.path.clone(),
+            structure: contender.spec.label.clone(),
+            volumes: workload.volumes.len(),
+            verdicts: questions as u64,
+            status,
+            difference: reason.map(|reason| format!("{reason}\n  again: {again}")),
+        }
+    });
+    checks.collect()
+}
+
+fn random_cases(structures: &[StructureSpec], seed: u64, cases: u64) -> Vec<Check> {
+    let mut checks: Vec<Check> = structures
+        .iter()
+        .map(|s| Check {
+            scene: "random".to_owned(),
+            path: format!("{cases} cases from seed {seed}"),
+            structure: s.label.clone(),
+            volumes: 0,
+            verdicts: 0,
+            status: "ok",
+            difference: None,
+        })
+        .collect();
+    for case_seed in (0..cases).map(|i| seed.wrapping_add(i)) {
+        if interrupt::asked() {
+            break;
+        }
+        let case = RandomCase::new(case_seed);
+        let mut seen = Reference::new(case.items.len());
+        seen.see(&case.items, &case.volume);
+        let mut holding = Reference::new(case.items.len());
+        let regions = scene::Regions::Items.holding(case.point, &case.items);
+        holding.expect(regions.into_iter());
+        for (spec, check) in structures.iter().zip(&mut checks) {
+            check.volumes += 1;
+            check.verdicts += 2 * case.items.len() as u64;
+            if check.difference.is_some() {
+                continue;
+            }
+            let difference = match spec.build(&case.items) {
+                Ok(index) => differ(&case, index.as_ref(), &mut seen, &mut holding),
+                Err(error) => Some(error.to_string()),
+            };
+            if let Some(difference) = difference {
+                check.status = "wrong";
+                let kind = cullbench::verify::VOLUME_KINDS[case.kind];
+                check.difference = Some(format!(
+                    "{kind} volume, {} items: {difference}\n  again: cullbench verify --cases 1 --seed {case_seed}",
+                    case.items.len()
+                ));
+            }
+        }
+    }
+    checks
+}
+
+fn differ(
+    case: &RandomCase,
+    index: &dyn DynIndex,
+    seen: &mut Reference,
+    holding: &mut Reference,
+) -> Option<String> {
+    let mut out = Vec::new();
+    index.visible(&case.volume, &mut out);
+    let difference = seen.compare(&out);
+    if !difference.is_none() {
+        let item = difference.first.and_then(|id| case.items.get(id as usize));
+        let why = item
+            .map(|b| explain_visibility(b, &case.volume))
+            .unwrap_or_default();
+        return Some(format!("{difference}: {why}"));
+    }
+    out.clear();
+    index.locate(case.point, &mut out);
+    let difference = holding.compare(&out);
+    if !difference.is_none() {
+        let item = difference.first.and_then(|id| case.items.get(id as usize));
+        let why = item
+            .map(|b| explain_containment(b, case.point))
+            .unwrap_or_default();
+        return Some(format!("region search: {difference}: {why}"));
+    }
+    None
+}
+
+fn show(outcome: &Outcome, format: TableFormat) -> anyhow::Result<()> {
+    let mut out = io::stdout().lock();
+    if format == TableFormat::Json {
+        writeln!(out, "{}", serde_json::to_string_pretty(outcome)?)?;
+        return Ok(());
+    }
+    let mut table = text::table(
+        &[
+            "scene",
+            "path",
+            "structure",
+            "volumes",
+            "verdicts",
+            "status",
+        ],
+        &[3, 4],
+    );
+    for check in &outcome.checks {
+        table.add_row([
+            check.scene.clone(),
+            check.path.clone(),
+            check.structure.clone(),
+            text::count(check.volumes),
+            text::count(check.verdicts as usize),
+            check.status.to_owned(),
+        ]);
+    }
+    writeln!(out, "{table}")?;
+    for check in &outcome.checks {
+        if let Some(difference) = &check.difference {
+            writeln!(
+                out,
+                "{} on {}, {}:\n  {difference}",
+                check.structure, check.scene, check.path
+            )?;
+        }
+    }
+    writeln!(
+        out,
+        "{} verdicts in {:.1} s ({:.1} million/s), {} mismatches",
+        text::count(outcome.verdicts as usize),
+        outcome.seconds,
+        outcome.verdicts as f64 / outcome.seconds / 1e6,
+        outcome.mismatches
+    )?;
+    Ok(())
+}

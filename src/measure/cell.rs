@@ -1,0 +1,504 @@
+//! From passes to figures: the cells of a report with their named metrics,
+//! and the ratio of the twin that gives the run its noise floor. It owns the
+//! list of metrics; how they are written is the report's business.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::{
+    Built, Contender, Counted, Protocol, Sample, Status, Task, Timed, Verdict, Workload,
+    count_pass, timed_pass,
+};
+use crate::scene::Scene;
+use crate::statistics::{Estimate, bootstrap_median, median, quantile, sorted};
+
+/// One metric of the list; the unit is part of its name where it has one.
+pub struct MetricInfo {
+    pub name: &'static str,
+    pub unit: &'static str,
+    pub summary: &'static str,
+}
+
+macro_rules! metrics {
+    ($($name:literal, $unit:literal, $summary:literal;)*) => {
+        /// All metrics of a cell, in the order of the columns.
+        pub static METRICS: &[MetricInfo] =
+            &[$(MetricInfo { name: $name, unit: $unit, summary: $summary }),*];
+    };
+}
+
+metrics! {
+    "visible_count", "items", "visible items a query, mean over the path";
+    "cull_rate", "1", "1 - visible/total, mean over the path";
+    "query_ns", "ns", "thread CPU time of a frustum query: median over the frames, each the median over the rounds; interval over the rounds";
+    "query_ns_p5", "ns", "5th percentile over the frames";
+    "query_ns_p95", "ns", "95th percentile over the frames";
+    "query_ns_p99", "ns", "99th percentile over the frames";
+    "query_ns_max", "ns", "slowest frame";
+    "query_wall_ns", "ns", "as query_ns, wall time";
+    "ns_per_visible", "ns", "CPU time of all queries / visible items of all queries";
+    "ratio_to_linear", "1", "time of linear / time of this structure, paired by round: above 1 is faster";
+    "nodes_tested", "nodes", "node bounds classified a query, mean";
+    "planes_tested", "planes", "plane tests a query, of nodes and items, mean";
+    "items_tested", "items", "item bounds tested a query, mean";
+    "items_accepted_untested", "items", "items reported with a whole subtree, untested, a query, mean";
+    "build_ms", "ms", "CPU time of a build, median of up to three";
+    "memory_bytes_per_item", "bytes", "nodes, item bounds and ids / items";
+    "break_even_queries", "queries", "queries after which the build is repaid against linear; empty if never";
+    "locate_ns", "ns", "thread CPU time of a region search at the eye, mean over the path, median over the rounds";
+    "locate_ratio_to_linear", "1", "as ratio_to_linear, for region search";
+    "comparisons", "bounds", "bounds looked at a region search, of nodes and items, mean";
+    "regions_found", "regions", "regions that hold the eye, mean over the path";
+}
+
+/// A value, with its 95 % interval where it was sampled.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Metric {
+    pub value: f64,
+    pub lower: Option<f64>,
+    pub upper: Option<f64>,
+    pub unit: String,
+}
+
+/// The scene of a cell.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct SceneInfo {
+    pub name: String,
+    pub total_count: usize,
+    pub region_count: usize,
+    pub origin: [f64; 3],
+    pub bounds_min: [f64; 3],
+    pub bounds_max: [f64; 3],
+    pub skipped_items: usize,
+    /// SHA-256 over origin and item bounds.
+    pub digest: String,
+}
+
+impl SceneInfo {
+    pub fn of(scene: &Scene) -> SceneInfo {
+        let bounds = scene.world_bounds();
+        SceneInfo {
+            name: scene.name.clone(),
+            total_count: scene.items.len(),
+            region_count: scene.regions.boxes(&scene.items).len(),
+            origin: scene.origin.to_array(),
+            bounds_min: bounds.min.to_array(),
+            bounds_max: bounds.max.to_array(),
+            skipped_items: scene.skipped_items,
+            digest: scene.digest(),
+        }
+    }
+}
+
+/// The queries of a cell.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct PathInfo {
+    pub name: String,
+    pub camera_count: usize,
+    /// "warm" or "cold".
+    pub cache: String,
+    /// Where the planes come from, and the factor c of their epsilon.
+    pub planes: String,
+    pub epsilon: f64,
+}
+
+/// One structure on one scene and path.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Cell {
+    pub structure: String,
+    pub params: Value,
+    pub verdict: Verdict,
+    pub metrics: BTreeMap<String, Metric>,
+}
+
+/// The same structure measured twice: what a ratio of 1 looks like here.
+#[derive(Clone, PartialEq, Debug)]
+pub struct TwinRatio {
+    pub structure: String,
+    pub ratio: Estimate,
+}
+
+/// All cells of a scene and path, with their samples.
+pub struct Group {
+    pub cells: Vec<Cell>,
+    pub twin: Option<TwinRatio>,
+    /// Label of the contender (a twin is told apart), task and sample.
+    pub samples: Vec<(String, Task, Sample)>,
+}
+
+/// Counts, verifies and times all contenders. `None` if stopped.
+pub fn measure_group(
+    workload: &Workload,
+    contenders: &[Contender],
+    protocol: &Protocol,
+    stop: &dyn Fn() -> bool,
+) -> Option<Group> {
+    let mut entries: Vec<Entry> = contenders.iter().map(Entry::new).collect();
+    let built: Vec<&Built> = contenders
+        .iter()
+        .filter_map(|c| c.built.as_ref().ok())
+        .collect();
+    let mut counted = count_pass(workload, &built).into_iter();
+    for entry in entries.iter_mut().filter(|e| e.contender.built.is_ok()) {
+        entry.counted = counted.next();
+        if let Some(counted) = &entry.counted {
+            entry.verdict = counted.verdict.clone();
+        }
+    }
+    for task in [Task::Query, Task::Locate] {
+        let places: Vec<usize> = (0..entries.len()).filter(|&i| entries[i].runs()).collect();
+        let running: Vec<(&Built, &Counted)> =
+            places.iter().filter_map(|&i| entries[i].passed()).collect();
+        let timed = timed_pass(task, workload, &running, protocol, stop)?;
+        for (i, result) in places.into_iter().zip(timed) {
+            match result {
+                Ok(timed) => entries[i].set(task, timed),
+                Err(verdict) => entries[i].verdict = verdict,
+            }
+        }
+    }
+    let yardstick = entries
+        .iter()
+        .find(|e| e.contender.spec.backend.name == "linear" && !e.contender.is_twin);
+    let twin = entries
+        .iter()
+        .find(|e| e.contender.is_twin)
+        .and_then(|twin| {
+            let original = entries.iter().find(|e| {
+                !e.contender.is_twin && e.contender.spec.label == twin.contender.spec.label
+            })?;
+            Some(TwinRatio {
+                structure: twin.contender.spec.label.clone(),
+                ratio: paired_ratio(original.query.as_ref()?, twin.query.as_ref()?)?,
+            })
+        });
+    let cells = entries
+        .iter()
+        .filter(|e| !e.contender.is_twin)
+        .map(|e| e.cell(workload, yardstick))
+        .collect();
+    let samples = entries
+        .iter()
+        .flat_map(|e| {
+            let tasks = [(Task::Query, &e.query), (Task::Locate, &e.locate)];
+            tasks.into_iter().flat_map(move |(task, timed)| {
+                let samples = timed.iter().flat_map(|t| t.samples.iter());
+                samples.map(move |s| (e.contender.label(), task, *s))
+            })
+        })
+        .collect();
+    Some(Group {
+        cells,
+        twin,
+        samples,
+    })
+}
+
+/// A contender on its way through the passes.
+struct Entry<'a> {
+    contender: &'a Contender,
+    verdict: Verdict,
+    counted: Option<Counted>,
+    query: Option<Timed>,
+    locate: Option<Timed>,
+}
+
+impl<'a> Entry<'a> {
+    fn new(contender: &'a Contender) -> Self {
+        let verdict = match &contender.built {
+            Ok(_) => Verdict::ok(),
+            Err(verdict) => verdict.clone(),
+        };
+        Entry {
+            contender,
+            verdict,
+            counted: None,
+            query: None,
+            locate: None,
+        }
+    }
+
+    fn runs(&self) -> bool {
+        self.verdict.status == Status::Ok && self.passed().is_some()
+    }
+
+    fn passed(&self) -> Option<(&'a Built, &Counted)> {
+        Some((self.contender.built.as_ref().ok()?, self.counted.as_ref()?))
+    }
+
+    fn set(&mut self, task: Task, timed: Timed) {
+        match task {
+            Task::Query => self.query = Some(timed),
+            Task::Locate => self.locate = Some(timed),
+        }
+    }
+
+    fn cell(&self, workload: &Workload, yardstick: Option<&Entry>) -> Cell {
+        let mut metrics = Metrics::default();
+        if let Ok(built) = &self.contender.built {
+            let items = workload.scene.items.len();
+            metrics.set("build_ms", built.build_ms);
+            metrics.ratio(
+                "memory_bytes_per_item",
+                built.memory.total() as f64,
+                items as f64,
+            );
+            if let Some(counted) = self.counted.as_ref().filter(|_| self.runs()) {
+                count_metrics(&mut metrics, counted, items);
+            }
+        }
+        if let (true, Some(query), Some(locate)) = (self.runs(), &self.query, &self.locate) {
+            time_metrics(&mut metrics, query, locate);
+            if let Some(linear) = yardstick.filter(|y| y.runs()) {
+                self.compare(&mut metrics, linear);
+            }
+        }
+        Cell {
+            structure: self.contender.spec.label.clone(),
+            params: self.contender.spec.params.clone(),
+            verdict: self.verdict.clone(),
+            metrics: metrics.0,
+        }
+    }
+
+    fn compare(&self, metrics: &mut Metrics, linear: &Entry) {
+        let both = |base: &Option<Timed>, this: &Option<Timed>| {
+            paired_ratio(base.as_ref()?, this.as_ref()?)
+        };
+        metrics.estimate("ratio_to_linear", both(&linear.query, &self.query));
+        metrics.estimate("locate_ratio_to_linear", both(&linear.locate, &self.locate));
+        let cost = |e: &Entry| -> Option<(f64, f64)> {
+            let built = e.contender.built.as_ref().ok()?;
+            let per_round = round_means(e.query.as_ref()?);
+            Some((built.build_ms * 1e6, median(&per_round)?))
+        };
+        if let (Some((build, query)), Some((linear_build, linear_query))) =
+            (cost(self), cost(linear))
+        {
+            let (price, gain) = (build - linear_build, linear_query - query);
+            if gain > 0.0 && price > 0.0 {
+                metrics.set("break_even_queries", (price / gain).ceil());
+            }
+        }
+    }
+}
+
+fn count_metrics(metrics: &mut Metrics, counted: &Counted, items: usize) {
+    let queries = counted.frames.len() as f64;
+    let visible: u64 = counted.frames.iter().map(|f| f.visible).sum();
+    metrics.ratio("visible_count", visible as f64, queries);
+    if items > 0 && queries > 0.0 {
+        metrics.set("cull_rate", 1.0 - visible as f64 / (queries * items as f64));
+    }
+    let cost = &counted.cost;
+    for (name, value) in [
+        ("nodes_tested", cost.nodes_tested),
+        ("planes_tested", cost.planes_tested),
+        ("items_tested", cost.items_tested),
+        ("items_accepted_untested", cost.items_accepted_untested),
+    ] {
+        metrics.ratio(name, value as f64, queries);
+    }
+    let searches = counted.locate.found.len() as f64;
+    metrics.ratio(
+        "comparisons",
+        counted.locate.cost.comparisons() as f64,
+        searches,
+    );
+    metrics.ratio(
+        "regions_found",
+        counted.locate.found.iter().sum::<u64>() as f64,
+        searches,
+    );
+}
+
+fn time_metrics(metrics: &mut Metrics, query: &Timed, locate: &Timed) {
+    let frames = frame_medians(query, |s| s.cpu_ns);
+    let per_round: Vec<f64> = (0..query.rounds)
+        .filter_map(|round| {
+            median(
+                &round_samples(query, round)
+                    .map(|s| s.cpu_ns)
+                    .collect::<Vec<_>>(),
+            )
+        })
+        .collect();
+    let interval = bootstrap_median(&per_round, 1);
+    if let (Some(middle), Some(interval)) = (quantile(&frames, 0.5), interval) {
+        metrics.estimate(
+            "query_ns",
+            Some(Estimate {
+                value: middle,
+                ..interval
+            }),
+        );
+    }
+    for (name, q) in [
+        ("query_ns_p5", 0.05),
+        ("query_ns_p95", 0.95),
+        ("query_ns_p99", 0.99),
+        ("query_ns_max", 1.0),
+    ] {
+        metrics.maybe(name, quantile(&frames, q));
+    }
+    metrics.maybe(
+        "query_wall_ns",
+        quantile(&frame_medians(query, |s| s.wall_ns), 0.5),
+    );
+    let returned: u64 = query.samples.iter().map(|s| s.returned).sum();
+    let spent: f64 = query
+        .samples
+        .iter()
+        .map(|s| s.cpu_ns * f64::from(s.queries))
+        .sum();
+    metrics.ratio("ns_per_visible", spent, returned as f64);
+    metrics.estimate("locate_ns", bootstrap_median(&round_means(locate), 1));
+}
+
+/// Per clock reading along the path the median over the rounds, ascending.
+fn frame_medians(timed: &Timed, value: impl Fn(&Sample) -> f64) -> Vec<f64> {
+    let mut by_frame: BTreeMap<u32, Vec<f64>> = BTreeMap::new();
+    for sample in &timed.samples {
+        by_frame
+            .entry(sample.frame)
+            .or_default()
+            .push(value(sample));
+    }
+    sorted(
+        by_frame
+            .values()
+            .filter_map(|values| median(values))
+            .collect(),
+    )
+}
+
+fn round_samples(timed: &Timed, round: usize) -> impl Iterator<Item = &Sample> {
+    timed
+        .samples
+        .iter()
+        .filter(move |s| s.round as usize == round)
+}
+
+/// Mean CPU time of a query in each round.
+fn round_means(timed: &Timed) -> Vec<f64> {
+    (0..timed.rounds)
+        .map(|round| {
+            let (mut spent, mut queries) = (0.0, 0.0);
+            for s in round_samples(timed, round) {
+                spent += s.cpu_ns * f64::from(s.queries);
+                queries += f64::from(s.queries);
+            }
+            spent / queries
+        })
+        .filter(|mean| mean.is_finite())
+        .collect()
+}
+
+/// Time of `base` / time of `other`, round by round: both saw the same state
+/// of the machine.
+fn paired_ratio(base: &Timed, other: &Timed) -> Option<Estimate> {
+    let pairs = round_means(base).into_iter().zip(round_means(other));
+    let ratios: Vec<f64> = pairs
+        .map(|(b, o)| b / o)
+        .filter(|r| r.is_finite())
+        .collect();
+    bootstrap_median(&ratios, 2)
+}
+
+#[derive(Default)]
+struct Metrics(BTreeMap<String, Metric>);
+
+impl Metrics {
+    fn insert(&mut self, name: &str, value: f64, interval: Option<(f64, f64)>) {
+        let info = METRICS.iter().find(|m| m.name == name);
+        debug_assert!(info.is_some(), "{name} is not in the list of metrics");
+        // A missing value is absent, never 0 and never NaN.
+        if let Some(info) = info.filter(|_| value.is_finite()) {
+            let metric = Metric {
+                value,
+                lower: interval.map(|i| i.0),
+                upper: interval.map(|i| i.1),
+                unit: info.unit.to_owned(),
+            };
+            self.0.insert(name.to_owned(), metric);
+        }
+    }
+
+    fn set(&mut self, name: &str, value: f64) {
+        self.insert(name, value, None);
+    }
+
+    fn maybe(&mut self, name: &str, value: Option<f64>) {
+        if let Some(value) = value {
+            self.set(name, value);
+        }
+    }
+
+    fn ratio(&mut self, name: &str, sum: f64, count: f64) {
+        self.set(name, sum / count);
+    }
+
+    fn estimate(&mut self, name: &str, estimate: Option<Estimate>) {
+        if let Some(e) = estimate {
+            self.insert(name, e.value, Some((e.lower, e.upper)));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn timed(rounds: &[[f64; 2]]) -> Timed {
+        let samples = rounds.iter().zip(0..).flat_map(|(frames, round)| {
+            frames.iter().zip(0..).map(move |(&ns, frame)| Sample {
+                round,
+                frame,
+                queries: 1,
+                cpu_ns: ns,
+                wall_ns: 2.0 * ns,
+                returned: 10,
+            })
+        });
+        Timed {
+            samples: samples.collect(),
+            rounds: rounds.len(),
+        }
+    }
+
+    #[test]
+    fn frames_take_the_median_over_rounds_then_quantiles_over_frames() {
+        // One round was disturbed; the medians do not move.
+        let query = timed(&[[10.0, 30.0], [500.0, 700.0], [10.0, 30.0]]);
+        let mut metrics = Metrics::default();
+        time_metrics(&mut metrics, &query, &query);
+        assert_eq!(metrics.0["query_ns"].value, 20.0);
+        assert_eq!(metrics.0["query_ns_max"].value, 30.0);
+        assert_eq!(metrics.0["query_wall_ns"].value, 40.0);
+    }
+
+    #[test]
+    fn ratios_are_paired_by_round() {
+        // The machine slows down threefold; the ratio does not.
+        let slow = timed(&[[40.0, 40.0], [120.0, 120.0], [40.0, 40.0]]);
+        let fast = timed(&[[10.0, 10.0], [30.0, 30.0], [10.0, 10.0]]);
+        let ratio = paired_ratio(&slow, &fast).unwrap();
+        assert_eq!((ratio.value, ratio.lower, ratio.upper), (4.0, 4.0, 4.0));
+    }
+
+    #[test]
+    fn what_was_not_measured_is_absent() {
+        let mut metrics = Metrics::default();
+        metrics.ratio("ns_per_visible", 5.0, 0.0);
+        metrics.estimate(
+            "ratio_to_linear",
+            paired_ratio(&Timed::default(), &Timed::default()),
+        );
+        assert!(metrics.0.is_empty());
+    }
+}

@@ -1,0 +1,101 @@
+//! A contender of a measurement: a structure, built over its own copy of the
+//! data so that nobody is warmed by a neighbour. It owns the timing of the
+//! build and the net under panics.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::Duration;
+
+use super::clock::Stopwatch;
+use super::{Status, Verdict};
+use crate::index::{DynIndex, MemoryUsage, StructureSpec};
+use crate::scene::Scene;
+use crate::statistics::median;
+
+/// A structure with its two indexes: over the items (what does the camera
+/// see) and over the regions (where is the camera).
+pub struct Contender {
+    pub spec: StructureSpec,
+    /// Entered a second time, for the run's noise floor only.
+    pub is_twin: bool,
+    pub built: Result<Built, Verdict>,
+}
+
+pub struct Built {
+    pub items: Box<dyn DynIndex>,
+    /// `None` where the regions are the items themselves.
+    regions: Option<Box<dyn DynIndex>>,
+    /// CPU time of one build over the items, median of all builds, ms.
+    pub build_ms: f64,
+    pub memory: MemoryUsage,
+}
+
+impl Built {
+    /// The index that answers region search.
+    pub fn regions(&self) -> &dyn DynIndex {
+        self.regions.as_deref().unwrap_or(self.items.as_ref())
+    }
+}
+
+/// Builds are repeated this often, or until they have taken this long.
+const BUILDS: usize = 3;
+const BUILD_TIME: Duration = Duration::from_millis(300);
+
+impl Contender {
+    /// Builds the structure; a panic or a refusal becomes its verdict.
+    pub fn build(spec: StructureSpec, is_twin: bool, scene: &Scene) -> Contender {
+        let built = guarded(|| build(&spec, scene)).unwrap_or_else(Err);
+        Contender {
+            spec,
+            is_twin,
+            built,
+        }
+    }
+
+    /// The name in samples: a twin is told apart.
+    pub fn label(&self) -> String {
+        match self.is_twin {
+            true => format!("{}#twin", self.spec.label),
+            false => self.spec.label.clone(),
+        }
+    }
+}
+
+fn build(spec: &StructureSpec, scene: &Scene) -> Result<Built, Verdict> {
+    let refused = |error| Verdict::new(Status::Refused, format!("{error}"));
+    let (mut times, mut index) = (Vec::new(), None);
+    let total = Stopwatch::start();
+    while times.len() < BUILDS && total.lap().wall_ns < BUILD_TIME.as_nanos() as f64 {
+        // Never two at once: a large scene would not fit twice.
+        drop(index.take());
+        let watch = Stopwatch::start();
+        index = Some(spec.build(&scene.items).map_err(refused)?);
+        times.push(watch.lap().cpu_ns / 1e6);
+    }
+    let Some(items) = index else {
+        return Err(Verdict::new(Status::TimedOut, "no time left for a build"));
+    };
+    let boxes = scene.regions.boxes(&scene.items);
+    let regions = if std::ptr::eq(boxes, &scene.items[..]) {
+        None
+    } else {
+        Some(spec.build(boxes).map_err(refused)?)
+    };
+    Ok(Built {
+        memory: items.memory(),
+        build_ms: median(&times).unwrap_or(f64::NAN),
+        items,
+        regions,
+    })
+}
+
+/// Runs foreign code; a panic becomes a verdict with its message.
+pub(super) fn guarded<T>(work: impl FnOnce() -> T) -> Result<T, Verdict> {
+    catch_unwind(AssertUnwindSafe(work)).map_err(|panic| {
+        let text = panic
+            .downcast_ref::<String>()
+            .map(String::as_str)
+            .or_else(|| panic.downcast_ref::<&str>().copied())
+            .unwrap_or("no message");
+        Verdict::new(Status::Panicked, format!("panicked: {text}"))
+    })
+}

@@ -1,0 +1,233 @@
+//! Where a figure was measured and what measured it: machine, toolchain and
+//! source. A fact that cannot be found out is null, never a guess.
+
+use std::fs;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use sysinfo::{CpuRefreshKind, MemoryRefreshKind, RefreshKind, System};
+
+use crate::scene::hex;
+
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Machine {
+    pub cpu: Option<String>,
+    /// SIMD features that kernels may choose by.
+    pub features: Vec<String>,
+    pub cores: usize,
+    /// Data and unified caches of the first core, innermost first.
+    pub caches: Vec<Cache>,
+    pub memory_bytes: Option<u64>,
+    pub os: Option<String>,
+    pub kernel: Option<String>,
+    /// Load average over one minute at the start.
+    pub load: Option<f64>,
+}
+
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Cache {
+    pub level: u32,
+    pub bytes: u64,
+}
+
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Toolchain {
+    pub rustc: Option<String>,
+    pub target: Option<String>,
+    pub flags: String,
+    pub profile: Option<String>,
+    pub opt_level: Option<String>,
+    pub features: Vec<String>,
+    /// SHA-256 of Cargo.lock: which dependencies.
+    pub lock_digest: String,
+}
+
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Source {
+    pub version: String,
+    pub commit: Option<String>,
+    /// Whether files differed from the commit when the program was built.
+    pub dirty: Option<bool>,
+}
+
+impl Machine {
+    pub fn capture() -> Machine {
+        let wanted = RefreshKind::nothing()
+            .with_cpu(CpuRefreshKind::nothing())
+            .with_memory(MemoryRefreshKind::nothing().with_ram());
+        let system = System::new_with_specifics(wanted).ok();
+        let brand = system
+            .as_ref()
+            .and_then(|s| Some(s.cpus().first()?.brand().trim().to_owned()));
+        Machine {
+            cpu: brand.filter(|brand| !brand.is_empty()),
+            features: simd_features(),
+            cores: std::thread::available_parallelism().map_or(1, usize::from),
+            caches: caches(Path::new("/sys/devices/system/cpu/cpu0/cache")),
+            memory_bytes: system.map(|s| s.total_memory()),
+            os: System::long_os_version().ok(),
+            kernel: System::kernel_version().ok(),
+            load: System::load_average().ok().map(|load| load.one),
+        }
+    }
+
+    /// Bytes that surely push everything else out of the caches: twice the
+    /// last level, at least 64 MiB.
+    pub fn cache_sweep_bytes(&self) -> usize {
+        let last = self.caches.iter().map(|c| c.bytes).max().unwrap_or(0);
+        usize::try_from(2 * last)
+            .unwrap_or(usize::MAX)
+            .max(64 << 20)
+    }
+
+    /// A short name for folders: `amd-epyc-2c`.
+    pub fn slug(&self) -> String {
+        let brand = self.cpu.as_deref().unwrap_or("unknown");
+        let words = brand.split(|c: char| !c.is_ascii_alphanumeric());
+        let short: Vec<String> = words
+            .filter(|w| !w.is_empty())
+            .take(3)
+            .map(str::to_ascii_lowercase)
+            .collect();
+        format!("{}-{}c", short.join("-"), self.cores)
+    }
+}
+
+fn simd_features() -> Vec<String> {
+    let mut found = Vec::new();
+    #[cfg(target_arch = "x86_64")]
+    {
+        macro_rules! detect {
+            ($($name:tt),*) => {
+                $(if std::arch::is_x86_feature_detected!($name) { found.push($name.to_owned()); })*
+            };
+        }
+        detect!(
+            "sse2",
+            "sse4.2",
+            "avx",
+            "avx2",
+            "fma",
+            "bmi2",
+            "avx512f",
+            "avx512bw",
+            "avx512vl",
+            "avx512vbmi2"
+        );
+    }
+    #[cfg(target_arch = "aarch64")]
+    if std::arch::is_aarch64_feature_detected!("neon") {
+        found.push("neon".to_owned());
+    }
+    found
+}
+
+/// Linux lists a core's caches as folders; elsewhere there is nothing to read.
+fn caches(folder: &Path) -> Vec<Cache> {
+    let read = |index: usize, name: &str| -> Option<String> {
+        let text = fs::read_to_string(folder.join(format!("index{index}/{name}"))).ok()?;
+        Some(text.trim().to_owned())
+    };
+    (0..8)
+        .filter_map(|index| {
+            if read(index, "type")? == "Instruction" {
+                return None;
+            }
+            let size = read(index, "size")?;
+            let bytes = match size.strip_suffix('K') {
+                Some(kilo) => kilo.parse::<u64>().ok()? << 10,
+                None => size.strip_suffix('M')?.parse::<u64>().ok()? << 20,
+            };
+            Some(Cache {
+                level: read(index, "level")?.parse().ok()?,
+                bytes,
+            })
+        })
+        .collect()
+}
+
+/// What build.rs left in the environment; empty means unknown.
+fn built_with(value: &str) -> Option<String> {
+    Some(value.to_owned()).filter(|v| !v.is_empty())
+}
+
+impl Toolchain {
+    pub fn capture() -> Toolchain {
+        let lock = include_bytes!("../../Cargo.lock");
+        Toolchain {
+            rustc: built_with(env!("CULLBENCH_RUSTC")),
+            target: built_with(env!("CULLBENCH_TARGET")),
+            flags: env!("CULLBENCH_RUSTFLAGS").to_owned(),
+            profile: built_with(env!("CULLBENCH_PROFILE")),
+            opt_level: built_with(env!("CULLBENCH_OPT_LEVEL")),
+            features: env!("CULLBENCH_FEATURES")
+                .split(',')
+                .filter(|f| !f.is_empty())
+                .map(str::to_owned)
+                .collect(),
+            lock_digest: hex(&Sha256::digest(lock)),
+        }
+    }
+}
+
+impl Source {
+    pub fn capture() -> Source {
+        Source {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            commit: built_with(env!("CULLBENCH_COMMIT")),
+            dirty: built_with(env!("CULLBENCH_DIRTY")).map(|d| d == "true"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_machine_and_the_build_are_known_here() {
+        let machine = Machine::capture();
+        assert!(machine.cores >= 1 && machine.memory_bytes > Some(0));
+        assert!(machine.slug().ends_with('c') && !machine.slug().contains(' '));
+        assert!(machine.cache_sweep_bytes() >= 64 << 20);
+        let toolchain = Toolchain::capture();
+        assert!(toolchain.rustc.unwrap().starts_with("rustc 1."));
+        assert_eq!(toolchain.lock_digest.len(), 64);
+    }
+
+    #[test]
+    fn cache_sizes_are_read_from_the_folders() {
+        let folder = tempfile::tempdir().unwrap();
+        for (index, kind, level, size) in [
+            (0, "Data", 1, "48K"),
+            (1, "Instruction", 1, "32K"),
+            (2, "Unified", 3, "32M"),
+        ] {
+            let at = folder.path().join(format!("index{index}"));
+            fs::create_dir(&at).unwrap();
+            for (name, text) in [
+                ("type", kind.to_owned()),
+                ("level", level.to_string()),
+                ("size", size.to_owned()),
+            ] {
+                fs::write(at.join(name), text + "\n").unwrap();
+            }
+        }
+        let wanted = [
+            Cache {
+                level: 1,
+                bytes: 48 << 10,
+            },
+            Cache {
+                level: 3,
+                bytes: 32 << 20,
+            },
+        ];
+        assert_eq!(caches(folder.path()), wanted);
+    }
+}

@@ -1,0 +1,90 @@
+//! Measuring: a count pass that verifies every answer, then a timed pass that
+//! counts nothing. It owns the protocol, the clocks and the metrics; what a
+//! structure does and how results are written are not its business.
+//!
+//! The road every measurement walks: [`Workload`] (scene, volumes, points) ->
+//! [`Contender`]s (built structures) -> [`count_pass`] -> [`timed_pass`] ->
+//! [`Cell`]s with named metrics.
+
+mod cell;
+mod clock;
+mod contender;
+mod count;
+mod environment;
+mod timing;
+mod workload;
+
+use serde::{Deserialize, Serialize};
+
+pub use cell::{
+    Cell, Group, METRICS, Metric, MetricInfo, PathInfo, SceneInfo, TwinRatio, measure_group,
+};
+pub use clock::{Lap, Stopwatch};
+pub use contender::{Built, Contender};
+pub use count::{Counted, FrameCount, LocateCount, count_pass, id_sum};
+pub use environment::{Machine, Source, Toolchain};
+pub use timing::{Protocol, Sample, Task, Timed, harness_overhead_ns, timed_pass};
+pub use workload::Workload;
+
+/// What became of a cell. A gap is never silent.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// Every answer equals the reference.
+    Ok,
+    /// An answer holds ids it should not, or one twice.
+    Wrong,
+    /// An answer lacks ids: false negatives.
+    Unsafe,
+    /// The structure cannot take this scene or these parameters.
+    Refused,
+    /// Not run, for a stated reason.
+    LeftOut,
+    TimedOut,
+    Panicked,
+    OutOfMemory,
+}
+
+impl Status {
+    pub fn name(self) -> &'static str {
+        match self {
+            Status::Ok => "ok",
+            Status::Wrong => "wrong",
+            Status::Unsafe => "unsafe",
+            Status::Refused => "refused",
+            Status::LeftOut => "left_out",
+            Status::TimedOut => "timed_out",
+            Status::Panicked => "panicked",
+            Status::OutOfMemory => "out_of_memory",
+        }
+    }
+
+    /// Whether this means a wrong answer (exit code 1).
+    pub fn is_failure(self) -> bool {
+        matches!(self, Status::Wrong | Status::Unsafe | Status::Panicked)
+    }
+}
+
+/// A status with its reason.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Verdict {
+    pub status: Status,
+    pub reason: Option<String>,
+}
+
+impl Verdict {
+    pub fn ok() -> Self {
+        Verdict {
+            status: Status::Ok,
+            reason: None,
+        }
+    }
+
+    pub fn new(status: Status, reason: impl Into<String>) -> Self {
+        Verdict {
+            status,
+            reason: Some(reason.into()),
+        }
+    }
+}

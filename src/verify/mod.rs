@@ -1,0 +1,245 @@
+//! Cross-checking structures: the reference answer by the plainest loop there
+//! is, the comparison with it, and the first difference in words. Random
+//! differential cases live in `random`. Nothing here is ever timed.
+
+mod random;
+
+use std::fmt;
+
+use glam::Vec3;
+
+use crate::geometry::{Aabb, ConvexVolume};
+use crate::query::ItemId;
+
+pub use random::{RandomCase, VOLUME_KINDS};
+
+/// The reference: each box against each plane with [`ConvexVolume::sees`], no
+/// structure, no mask, no early way out. O(items * planes) per volume.
+///
+/// Reuses its memory from query to query.
+pub struct Reference {
+    /// Per item: the number of the query that marked it last, twice: +0 if
+    /// the reference wants it, +1 once a structure has returned it.
+    marks: Vec<u64>,
+    stamp: u64,
+    expected: usize,
+}
+
+/// How a structure's answer differs from the reference.
+#[derive(Clone, Copy, Default, PartialEq, Eq, Debug)]
+pub struct Difference {
+    /// Wanted by the reference, not returned (false negatives).
+    pub missing: usize,
+    /// Returned, not wanted.
+    pub extra: usize,
+    /// Returned a second time, or an id that does not exist.
+    pub invalid: usize,
+    /// The first item concerned.
+    pub first: Option<ItemId>,
+}
+
+impl Difference {
+    pub fn is_none(&self) -> bool {
+        *self == Difference::default()
+    }
+}
+
+impl fmt::Display for Difference {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{} missing, {} extra, {} repeated or unknown",
+            self.missing, self.extra, self.invalid
+        )?;
+        match self.first {
+            Some(id) => write!(f, "; first: item {id}"),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Reference {
+    pub fn new(item_count: usize) -> Self {
+        Reference {
+            marks: vec![0; item_count],
+            stamp: 0,
+            expected: 0,
+        }
+    }
+
+    /// Computes the reference answer to a frustum query; its size.
+    pub fn see(&mut self, items: &[Aabb], volume: &ConvexVolume) -> usize {
+        let wanted = items.iter().zip(0..).filter(|(b, _)| volume.sees(b));
+        self.expect(wanted.map(|(_, id)| id))
+    }
+
+    /// Takes over a reference answer found by other means; its size.
+    pub fn expect(&mut self, wanted: impl Iterator<Item = ItemId>) -> usize {
+        self.stamp += 2;
+        self.expected = 0;
+        for id in wanted {
+            self.marks[id as usize] = self.stamp;
+            self.expected += 1;
+        }
+        self.expected
+    }
+
+    /// Compares a structure's answer, in any order, with the reference. May
+    /// be called for one structure after another. O(items) in the worst case,
+    /// O(answer) if the answer is right.
+    pub fn compare(&mut self, found: &[ItemId]) -> Difference {
+        let mut difference = Difference::default();
+        let mut right = 0;
+        for &id in found {
+            let bad = match self.marks.get_mut(id as usize) {
+                Some(mark) if *mark == self.stamp => {
+                    *mark += 1;
+                    right += 1;
+                    continue;
+                }
+                Some(mark) if *mark == self.stamp + 1 => &mut difference.invalid,
+                Some(_) => &mut difference.extra,
+                None => &mut difference.invalid,
+            };
+            *bad += 1;
+            difference.first.get_or_insert(id);
+        }
+        difference.missing = self.expected - right;
+        if difference.missing > 0 {
+            let lost = self.marks.iter().position(|mark| *mark == self.stamp);
+            difference.first = lost.map(|id| id as ItemId);
+        }
+        // Ready for the next structure.
+        for &id in found {
+            if let Some(mark) = self
+                .marks
+                .get_mut(id as usize)
+                .filter(|m| **m == self.stamp + 1)
+            {
+                *mark = self.stamp;
+            }
+        }
+        difference
+    }
+}
+
+/// The verdict of a volume about one box in words: each plane that matters
+/// with the value of the box's p-vertex, so that a reader can check by hand.
+pub fn explain_visibility(b: &Aabb, volume: &ConvexVolume) -> String {
+    let [low, high] = [b.min, b.max].map(|v| format!("({}, {}, {})", v.x, v.y, v.z));
+    let bounds = format!("box {low} to {high}");
+    if b.is_empty() {
+        return format!("{bounds} is empty");
+    }
+    let values = volume
+        .planes()
+        .iter()
+        .map(|plane| plane.value_at(plane.p_vertex(b)));
+    let lowest = values.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+    let Some((index, value)) = lowest else {
+        return format!("{bounds}: the volume has no plane");
+    };
+    let plane = volume.planes()[index];
+    format!(
+        "{bounds}: {} ({}, {}, {}, {}) has the lowest p-vertex value {value:e}, so the box is {}",
+        volume.plane_label(index),
+        plane.normal.x,
+        plane.normal.y,
+        plane.normal.z,
+        plane.d,
+        if value < 0.0 {
+            "not visible"
+        } else {
+            "visible"
+        }
+    )
+}
+
+/// The same for region search.
+pub fn explain_containment(b: &Aabb, p: Vec3) -> String {
+    let verdict = if b.contains_point(p) {
+        "holds"
+    } else {
+        "does not hold"
+    };
+    format!(
+        "box {:?} to {:?} {verdict} the point {p:?}",
+        b.min.to_array(),
+        b.max.to_array()
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Plane;
+
+    #[test]
+    fn each_kind_of_wrong_answer_is_told_apart() {
+        let items: Vec<Aabb> = (0..6)
+            .map(|i| Aabb::around(Vec3::new(i as f32, 0.0, 0.0), Vec3::splat(0.25)))
+            .collect();
+        let half = ConvexVolume::from_planes(&[Plane::new(Vec3::X, -2.5)]).unwrap();
+        let mut reference = Reference::new(items.len());
+        assert_eq!(reference.see(&items, &half), 3);
+        assert!(reference.compare(&[5, 3, 4]).is_none());
+        let cases: [(&[ItemId], Difference); 5] = [
+            (
+                &[3, 4],
+                Difference {
+                    missing: 1,
+                    first: Some(5),
+                    ..Default::default()
+                },
+            ),
+            (
+                &[3, 4, 5, 1],
+                Difference {
+                    extra: 1,
+                    first: Some(1),
+                    ..Default::default()
+                },
+            ),
+            (
+                &[3, 4, 5, 4],
+                Difference {
+                    invalid: 1,
+                    first: Some(4),
+                    ..Default::default()
+                },
+            ),
+            (
+                &[3, 4, 5, 99],
+                Difference {
+                    invalid: 1,
+                    first: Some(99),
+                    ..Default::default()
+                },
+            ),
+            (
+                &[],
+                Difference {
+                    missing: 3,
+                    first: Some(3),
+                    ..Default::default()
+                },
+            ),
+        ];
+        for (answer, wanted) in cases {
+            assert_eq!(reference.compare(answer), wanted, "{answer:?}");
+            assert!(reference.compare(&[3, 4, 5]).is_none(), "state is restored");
+        }
+    }
+
+    #[test]
+    fn explanations_name_the_deciding_plane() {
+        let volume =
+            ConvexVolume::from_planes(&[Plane::new(Vec3::X, 0.0), Plane::new(-Vec3::X, 10.0)])
+                .unwrap();
+        let text = explain_visibility(&Aabb::new(Vec3::splat(12.0), Vec3::splat(13.0)), &volume);
+        assert!(
+            text.contains("plane 1") && text.contains("-2e0") && text.contains("not visible"),
+            "{text}"
+        );
+    }
+}

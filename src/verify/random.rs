@@ -1,0 +1,222 @@
+//! Random differential cases: small scenes made to be unpleasant (touching
+//! faces, repeated and flat boxes, wild sizes) and volumes of every kind. A
+//! case is its seed, so that any failure is one number.
+
+use glam::{DVec3, Vec3};
+
+use crate::camera::{Camera, Frame, Lens, PlaneOptions, Surroundings};
+use crate::geometry::{Aabb, ConvexVolume, Plane};
+use crate::scene::Dice;
+
+/// The volumes that cases are drawn from.
+pub const VOLUME_KINDS: [&str; 9] = [
+    "perspective",
+    "infinite far",
+    "orthographic",
+    "off-axis",
+    "sheared",
+    "unbounded (1 to 5 planes)",
+    "12 planes",
+    "31 planes",
+    "empty",
+];
+
+/// One scene with one volume and one point.
+pub struct RandomCase {
+    pub items: Vec<Aabb>,
+    pub volume: ConvexVolume,
+    /// Index into [`VOLUME_KINDS`].
+    pub kind: usize,
+    pub point: Vec3,
+}
+
+impl RandomCase {
+    /// The case of a seed; the same on every machine.
+    pub fn new(seed: u64) -> RandomCase {
+        let mut dice = Dice::new(seed ^ 0xC011_BE7C);
+        let scale = libm::exp2((dice.below(41) as f64) - 20.0);
+        let count = [0, 1, 2, 17, 120, 600][dice.below(6)];
+        let items: Vec<Aabb> = (0..count).map(|_| item(&mut dice, scale)).collect();
+        let kind = dice.below(VOLUME_KINDS.len());
+        let volume = loop {
+            // A drawn camera may be impossible (up along the view): again.
+            if let Some(volume) = volume(&mut dice, kind, scale, &items) {
+                break volume;
+            }
+        };
+        let mut point = grid_point(&mut dice, scale);
+        if let Some(b) = items
+            .get(dice.below(count.max(1)))
+            .filter(|_| dice.unit() < 0.5)
+        {
+            point = b.corner(dice.below(8));
+        }
+        RandomCase {
+            items,
+            volume,
+            kind,
+            point,
+        }
+    }
+}
+
+/// A point on a coarse grid half of the time: exact ties are the point.
+fn grid_point(dice: &mut Dice, scale: f64) -> Vec3 {
+    let on_grid = dice.unit() < 0.5;
+    let p = (dice.point() * 2.0 - 1.0) * 8.0;
+    ((if on_grid { p.round() } else { p }) * scale).as_vec3()
+}
+
+fn item(dice: &mut Dice, scale: f64) -> Aabb {
+    let (a, b) = (grid_point(dice, scale), grid_point(dice, scale));
+    match dice.below(8) {
+        // A point, a flat box, a needle, an inverted (empty) box.
+        0 => Aabb::new(a, a),
+        1 => Aabb::new(a.min(b), a.max(b).with_z(a.min(b).z)),
+        2 => Aabb::new(
+            a.min(b).with_y(a.y).with_z(a.z),
+            a.max(b).with_y(a.y).with_z(a.z),
+        ),
+        3 => Aabb::new(a.max(b) + Vec3::splat(scale as f32), a.min(b)),
+        4 => Aabb::new(
+            a,
+            a + Vec3::splat((scale * libm::exp2(-dice.unit() * 20.0)) as f32),
+        ),
+        // Overlapping boxes of the scene's own size.
+        _ => Aabb::new(a.min(b), a.max(b)),
+    }
+}
+
+fn volume(dice: &mut Dice, kind: usize, scale: f64, items: &[Aabb]) -> Option<ConvexVolume> {
+    match kind {
+        0..=3 => camera_volume(dice, kind, scale, items),
+        4 => {
+            // A perspective volume with its x sheared along y and z: opposite
+            // planes are no longer mirror images.
+            let straight = camera_volume(dice, 0, scale, items)?;
+            let (a, b) = (
+                dice.between(-1.0, 1.0) as f32,
+                dice.between(-1.0, 1.0) as f32,
+            );
+            let sheared = straight.planes().iter().map(|p| {
+                let n = p.normal;
+                Plane::new(Vec3::new(n.x, n.y + a * n.x, n.z + b * n.x), p.d)
+            });
+            ConvexVolume::from_planes(&sheared.collect::<Vec<_>>()).ok()
+        }
+        5 => {
+            let count = 1 + dice.below(5);
+            planes(dice, count, scale)
+        }
+        6 => planes(dice, 12, scale),
+        7 => planes(dice, 31, scale),
+        _ => {
+            // Two half-spaces that face away from each other, or none at all.
+            let normal = dice.normal3().as_vec3();
+            let gap = (scale * dice.unit()) as f32;
+            let impossible = Plane::new(Vec3::ZERO, -1.0);
+            let pair = [Plane::new(normal, -gap), Plane::new(-normal, -gap)];
+            let planes = if dice.unit() < 0.5 {
+                vec![impossible]
+            } else {
+                pair.to_vec()
+            };
+            ConvexVolume::from_planes(&planes).ok()
+        }
+    }
+}
+
+/// Planes near the middle of the scene, facing it more often than not; some
+/// axis-parallel, some through grid points, so that boxes touch them.
+fn planes(dice: &mut Dice, count: usize, scale: f64) -> Option<ConvexVolume> {
+    let planes = (0..count).map(|_| {
+        let axis = [Vec3::X, Vec3::Y, Vec3::Z][dice.below(3)];
+        let normal = match dice.below(3) {
+            0 => axis,
+            1 => -axis,
+            _ => dice.normal3().as_vec3(),
+        };
+        let through = grid_point(dice, scale);
+        let facing = if normal.dot(through) > 0.0 && dice.unit() < 0.8 {
+            -normal
+        } else {
+            normal
+        };
+        Plane::through(through, facing)
+    });
+    ConvexVolume::from_planes(&planes.collect::<Vec<_>>()).ok()
+}
+
+fn camera_volume(dice: &mut Dice, kind: usize, scale: f64, items: &[Aabb]) -> Option<ConvexVolume> {
+    let eye = grid_point(dice, scale).as_dvec3();
+    let axis = [DVec3::X, DVec3::Y, DVec3::Z][dice.below(3)];
+    let forward = if dice.unit() < 0.3 {
+        axis
+    } else {
+        dice.normal3()
+    };
+    let frame = Frame::looking_along(eye, forward, dice.normal3()).ok()?;
+    let near = scale * dice.between(0.001, 1.0);
+    let far = near + scale * dice.between(0.1, 16.0);
+    let fovy = dice.between(1.0, 175.0);
+    let aspect = dice.between(0.2, 4.0);
+    let lens = match kind {
+        0 => Lens::perspective(fovy, aspect, near, Some(far)),
+        1 => Lens::perspective(fovy, aspect, near, None),
+        2 => Lens::orthographic(scale * dice.between(0.1, 8.0), aspect, -near, far),
+        _ => {
+            let low = dice.between(-2.0, 0.5) * near;
+            let window = [
+                low,
+                low + near * dice.between(0.1, 2.0),
+                -near,
+                near * aspect,
+            ];
+            Lens::off_axis(window, near, Some(far))
+        }
+    };
+    let reach = Aabb::union_of(items).reach();
+    let around = Surroundings {
+        origin: DVec3::ZERO,
+        reach: if items.is_empty() { Vec3::ZERO } else { reach },
+    };
+    let epsilon = if dice.unit() < 0.5 {
+        0.0
+    } else {
+        PlaneOptions::default().epsilon
+    };
+    let options = PlaneOptions {
+        epsilon,
+        ..PlaneOptions::default()
+    };
+    Camera {
+        frame,
+        lens: lens.ok()?,
+    }
+    .volume(&options, &around)
+    .ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cases_repeat_and_cover_every_kind() {
+        let mut seen = [0; VOLUME_KINDS.len()];
+        let (mut verdicts, mut visible) = (0, 0);
+        for seed in 0..500 {
+            let case = RandomCase::new(seed);
+            let again = RandomCase::new(seed);
+            assert_eq!((&case.items, case.point), (&again.items, again.point));
+            seen[case.kind] += 1;
+            verdicts += case.items.len();
+            visible += case.items.iter().filter(|b| case.volume.sees(b)).count();
+        }
+        assert!(seen.iter().all(|&count| count > 20), "{seen:?}");
+        assert!(
+            visible * 20 > verdicts && visible * 20 < verdicts * 19,
+            "{visible} of {verdicts}"
+        );
+    }
+}
