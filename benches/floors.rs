@@ -1,1 +1,106 @@
-fn main() {}
+//! The speed floors this project promises, each a ratio in one run: all
+//! contenders of a row are interleaved and paired by the same harness as
+//! `cullbench run`. Exits 3 if a floor is missed. `-- --test` only checks that
+//! every row runs.
+
+use std::process::ExitCode;
+use std::time::Duration;
+
+use cullbench::camera::PlaneOptions;
+use cullbench::index::structures;
+use cullbench::measure::{
+    Contender, Machine, Protocol, Status, Workload, harness_overhead_ns, measure_group,
+};
+use cullbench::{path, scene};
+
+/// `structure` must be at least `floor` times as fast as `linear`.
+struct Floor {
+    scene: &'static str,
+    path: &'static str,
+    structure: &'static str,
+    floor: f64,
+}
+
+const FLOORS: [Floor; 4] = [
+    Floor {
+        scene: "uniform:n=1000000",
+        path: "flythrough:frames=64,visible=2%",
+        structure: "bvh",
+        floor: 20.0,
+    },
+    Floor {
+        scene: "city:n=1000000",
+        path: "flythrough:frames=64,visible=2%",
+        structure: "bvh",
+        floor: 20.0,
+    },
+    Floor {
+        scene: "clustered:n=1000000",
+        path: "flythrough:frames=64,visible=2%",
+        structure: "bvh",
+        floor: 20.0,
+    },
+    Floor {
+        scene: "helsinki",
+        path: "flythrough:frames=512,visible=2%",
+        structure: "bvh",
+        floor: 4.0,
+    },
+];
+
+fn main() -> ExitCode {
+    let only_test = std::env::args().any(|arg| arg == "--test");
+    let protocol = Protocol {
+        min_rounds: if only_test { 1 } else { 9 },
+        max_rounds: if only_test { 1 } else { 25 },
+        budget: Duration::from_secs(if only_test { 0 } else { 8 }),
+        pass: Duration::from_millis(if only_test { 20 } else { 600 }),
+        cold: false,
+        seed: 1,
+        overhead_ns: harness_overhead_ns(),
+        cache_bytes: Machine::capture().cache_sweep_bytes(),
+    };
+    println!(
+        "harness: {:.0} ns a clock reading; queries are batched until that is 2 %",
+        protocol.overhead_ns
+    );
+    let mut missed = 0;
+    for row in &FLOORS {
+        let source = if only_test {
+            row.scene.replace("1000000", "1000")
+        } else {
+            row.scene.to_owned()
+        };
+        let scene = scene::load(&source, &Default::default()).expect(row.scene);
+        let cameras = path::load(row.path, &scene, &Default::default()).expect(row.path);
+        let workload = Workload::new(&scene, &cameras, &PlaneOptions::default()).expect(row.path);
+        let specs = structures(&format!("linear,{}", row.structure)).expect(row.structure);
+        let twin = specs[1].clone();
+        let mut contenders: Vec<Contender> = specs
+            .into_iter()
+            .map(|spec| Contender::build(spec, false, &scene))
+            .collect();
+        contenders.push(Contender::build(twin, true, &scene));
+        let group =
+            measure_group(&workload, &contenders, &protocol, &|| false).expect("not stopped");
+        let cell = &group.cells[1];
+        assert_eq!(cell.verdict.status, Status::Ok, "{:?}", cell.verdict);
+        let ratio = &cell.metrics["ratio_to_linear"];
+        let noise = group
+            .twin
+            .map_or(f64::NAN, |t| (t.ratio.value - 1.0).abs() * 100.0);
+        let holds = only_test || ratio.value >= row.floor;
+        missed += u32::from(!holds);
+        println!(
+            "{source}, {}: {} {:.1} x linear [{:.1}, {:.1}], floor {} x, twin differs by {noise:.1} %: {}",
+            row.path,
+            row.structure,
+            ratio.value,
+            ratio.lower.unwrap_or(f64::NAN),
+            ratio.upper.unwrap_or(f64::NAN),
+            row.floor,
+            if holds { "ok" } else { "MISSED" }
+        );
+    }
+    ExitCode::from(if missed > 0 { 3 } else { 0 })
+}

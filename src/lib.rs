@@ -1,3 +1,50 @@
+//! Which spatial index finds what a camera sees, and where the camera is: how
+//! fast, and is the answer right?
+//!
+//! cullbench puts interchangeable structures behind one trait pair, builds
+//! scenes and drives cameras through them, checks every answer, and measures.
+//! The story of the crate in the order of its modules:
+//!
+//! - [`geometry`]: boxes, planes, convex volumes, and THE plane test
+//! - [`query`]: what a query asks ([`query::Region`]), where answers go
+//!   ([`query::Sink`]) and what is counted ([`query::Recorder`])
+//! - [`camera`]: eye, u, v, n; lenses; matrices; the planes of the view
+//! - [`index`]: the contract [`index::RegionIndex`] and
+//!   [`index::FrustumQuery`], and the structures behind it
+//! - [`scene`]: generated and real worlds, and the regions in them
+//! - [`path`]: ways through a scene
+//! - [`verify`]: the reference answer and how others differ from it
+//! - [`measure`]: count, verify, time; [`statistics`] makes figures of it
+//! - [`report`]: the files that other tools read; [`suite`]: what to run
+//! - [`spec`] and [`input`]: what users type and the files they bring
+//!
+//! ```
+//! use cullbench::camera::PlaneOptions;
+//! use cullbench::index::StructureSpec;
+//! use cullbench::{path, scene};
+//!
+//! let city = scene::load("city:n=2000,seed=7", &Default::default())?;
+//! let orbit = path::load("orbit:frames=8", &city, &Default::default())?;
+//! let linear = StructureSpec::parse("linear")?.build(&city.items)?;
+//! let bvh = StructureSpec::parse("bvh:leaf=4")?.build(&city.items)?;
+//!
+//! for camera in &orbit.cameras {
+//!     let volume = camera.volume(&PlaneOptions::default(), &city.surroundings())?;
+//!     let (mut slow, mut fast) = (Vec::new(), Vec::new());
+//!     linear.visible(&volume, &mut slow);
+//!     bvh.visible(&volume, &mut fast);
+//!     fast.sort_unstable();
+//!     assert_eq!(slow, fast, "every structure returns the very same set");
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Conventions: everything is right-handed; z is up in scenes; bounds are
+//! closed, so touching counts as visible; plane normals point inward; angles
+//! are degrees; items are numbered by their place in the scene.
+
+#![forbid(unsafe_code)]
+
 pub mod camera;
 pub mod geometry;
 pub mod index;

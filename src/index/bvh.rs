@@ -2,6 +2,7 @@
 //! the topology, and the items are then re-laid so that an accepted subtree
 //! is one slice. obvhs has no frustum traversal of its own; ours is shared.
 
+use std::borrow::Cow;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
@@ -66,25 +67,36 @@ impl BvhPreset {
     }
 }
 
-/// An item as obvhs wants to see it.
-struct Bounded(Aabb);
-
-impl Boundable for Bounded {
+impl Boundable for Aabb {
     fn aabb(&self) -> obvhs::aabb::Aabb {
-        obvhs::aabb::Aabb::new(self.0.min.into(), self.0.max.into())
+        obvhs::aabb::Aabb::new(self.min.into(), self.max.into())
     }
 }
 
-/// A power of two that brings the scene near unit size, or 1 where it is
-/// not needed: areas of boxes beyond 2^60 or below 2^-60 would overflow or
-/// vanish in f32, and every cost comparison with them.
+/// The boxes that obvhs is to build over: the items themselves where they can
+/// be used as they are, so that ten million of them are not copied.
+fn buildable<'a>(items: &'a [Aabb], ids: &[ItemId]) -> Cow<'a, [Aabb]> {
+    let scale = scale_for(items);
+    if scale == 1.0 && ids.len() == items.len() {
+        return Cow::Borrowed(items);
+    }
+    let scaled = ids.iter().map(|&id| {
+        let b = items[id as usize];
+        Aabb::new(b.min * scale, b.max * scale)
+    });
+    scaled.collect()
+}
+
+/// A power of two that brings the scene near unit size, or 1 for coordinates
+/// between 2^-40 and 2^40: beyond, the areas that the builder compares would
+/// overflow or vanish in f32.
 fn scale_for(items: &[Aabb]) -> f32 {
     let largest = Aabb::union_of(items).reach().max_element();
     let exponent = libm::ilogbf(largest);
     if largest == 0.0 || !largest.is_finite() || exponent.abs() <= 40 {
         return 1.0;
     }
-    // Powers of two beyond 2^127 are not needed: |exponent| <= 149.
+    // Clamped to normal numbers; a subnormal scene is brought to 2^-23.
     libm::ldexpf(1.0, (-exponent).clamp(-126, 126))
 }
 
@@ -102,25 +114,18 @@ impl RegionIndex for Bvh {
             });
         }
         let ids = indexable(items)?;
-        let scale = scale_for(items);
-        let bounded: Vec<Bounded> = ids
-            .iter()
-            .map(|&id| {
-                let b = items[id as usize];
-                Bounded(Aabb::new(b.min * scale, b.max * scale))
-            })
-            .collect();
-        if bounded.is_empty() {
+        if ids.is_empty() {
             return Ok(Bvh {
                 tree: PackedTree::default(),
             });
         }
+        let boxes = buildable(items, &ids);
         let config = BvhBuildParams {
             max_prims_per_leaf: params.leaf,
             ..params.preset.params()
         };
-        let built = build_bvh2(&bounded, config, &mut Duration::default());
-        drop(bounded);
+        let built = build_bvh2(&boxes, config, &mut Duration::default());
+        drop(boxes);
         let order: Vec<ItemId> = built
             .primitive_indices
             .iter()

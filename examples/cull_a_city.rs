@@ -1,0 +1,42 @@
+//! The shortest useful program: a city, a camera, a structure, the visible
+//! ids. Then the second question: which building stands where the camera is?
+
+use cullbench::camera::{Camera, Lens, PlaneOptions, look_at};
+use cullbench::index::{Bvh, FrustumQuery, RegionIndex};
+use cullbench::query::{Count, NoRecorder, QueryCost};
+use cullbench::scene;
+use glam::DVec3;
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let city = scene::load("city:n=50000,seed=7", &Default::default())?;
+    let bvh = Bvh::build(&city.items, &Default::default())?;
+
+    let frame = look_at(DVec3::new(-300.0, -300.0, 120.0), DVec3::ZERO, DVec3::Z)?;
+    let lens = Lens::perspective(60.0, 16.0 / 9.0, 0.5, Some(800.0))?;
+    let mut camera = Camera { frame, lens };
+
+    // Fly ahead and bank, as the lectures do.
+    for step in 0..4 {
+        let volume = camera.volume(&PlaneOptions::default(), &city.surroundings())?;
+        let (mut visible, mut cost) = (Vec::new(), QueryCost::default());
+        let _ = bvh.visible(&volume, &mut visible, &mut cost);
+        println!(
+            "step {step}: {} of {} visible; {} nodes and {} items looked at, {} accepted unseen",
+            visible.len(),
+            city.items.len(),
+            cost.nodes_tested,
+            cost.items_tested,
+            cost.items_accepted_untested
+        );
+        camera.frame.advance(60.0);
+        camera.frame.roll(10.0);
+        camera.frame.pitch(-3.0);
+    }
+
+    // Region search, with a sink that only counts: walk into the first house.
+    let inside = city.items[0].centre();
+    let mut houses = Count::default();
+    let _ = bvh.locate(inside, &mut houses, &mut NoRecorder);
+    println!("{} item(s) hold the point {inside}", houses.0);
+    Ok(())
+}
