@@ -2,6 +2,7 @@
 
 use std::io::{self, Write};
 
+use comfy_table::ContentArrangement;
 use serde_json::{Map, Value, json};
 
 use super::args::{ListArgs, ListTopic, TESTS, TableFormat};
@@ -11,6 +12,9 @@ use cullbench::measure::METRICS;
 use cullbench::path::{PATH_PARAMS, PATHS};
 use cullbench::scene::{FAMILIES, SAMPLES};
 use cullbench::suite::SUITES;
+
+/// Long summaries wrap at this width.
+const LIST_WIDTH: u16 = 110;
 
 /// Name, further columns by name, summary.
 type Row = (String, Vec<(&'static str, String)>, String);
@@ -39,6 +43,9 @@ pub fn list(args: &ListArgs) -> anyhow::Result<Ending> {
                 header.extend(rows.first().iter().flat_map(|r| r.1.iter().map(|c| c.0)));
                 header.push("");
                 let mut table = text::table(&header, &[]);
+                table
+                    .set_content_arrangement(ContentArrangement::Dynamic)
+                    .set_width(LIST_WIDTH);
                 for (name, columns, summary) in rows {
                     let columns = columns.into_iter().map(|(_, value)| value);
                     table.add_row([name].into_iter().chain(columns).chain([summary]));

@@ -5,12 +5,11 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context, bail};
 use comfy_table::Table;
 use indicatif::{ProgressBar, ProgressStyle};
-use jiff::{Timestamp, Unit};
 
 use super::args::{RunArgs, test_named};
 use super::{Ending, interrupt, text};
@@ -172,7 +171,7 @@ pub fn run(args: &RunArgs) -> anyhow::Result<Ending> {
     }
     bar.finish_and_clear();
     if !interrupted {
-        report.run.finished_at = Some(Timestamp::now().to_string());
+        report.run.finished_at = Some(utc_now());
         folder.save(&report)?;
     }
     close(&report, &folder, started, interrupted)
@@ -189,16 +188,10 @@ fn open(args: &RunArgs, plan: &Plan, machine: &Machine) -> anyhow::Result<(RunFo
         same_experiment(&report, plan, args).with_context(|| path.display().to_string())?;
         return Ok((folder, report));
     }
-    let now = Timestamp::now().round(Unit::Second)?;
-    let id = format!(
-        "{:04x}",
-        (Timestamp::now().as_nanosecond() ^ i128::from(std::process::id())) & 0xFFFF
-    );
-    let stamp: String = now
-        .to_string()
-        .chars()
-        .filter(|c| !matches!(c, '-' | ':'))
-        .collect();
+    let now = utc_now();
+    let nanos = SystemTime::now().duration_since(UNIX_EPOCH)?.subsec_nanos();
+    let id = format!("{:04x}", (nanos ^ std::process::id()) & 0xFFFF);
+    let stamp: String = now.chars().filter(|c| !matches!(c, '-' | ':')).collect();
     let path = match &args.out {
         Some(path) => path.clone(),
         None => PathBuf::from(format!("results/{stamp}-{}-{id}", machine.slug())),
@@ -208,7 +201,7 @@ fn open(args: &RunArgs, plan: &Plan, machine: &Machine) -> anyhow::Result<(RunFo
         schema_version: SCHEMA_VERSION,
         run: RunInfo {
             id: format!("{stamp}-{id}"),
-            started_at: now.to_string(),
+            started_at: now,
             finished_at: None,
             command: std::env::args()
                 .skip(1)
@@ -228,6 +221,11 @@ fn open(args: &RunArgs, plan: &Plan, machine: &Machine) -> anyhow::Result<(RunFo
     };
     folder.save(&report)?;
     Ok((folder, report))
+}
+
+/// RFC 3339 in UTC, to the second.
+fn utc_now() -> String {
+    humantime::format_rfc3339_seconds(SystemTime::now()).to_string()
 }
 
 fn newest_unfinished(results: &Path) -> anyhow::Result<PathBuf> {
@@ -381,20 +379,17 @@ fn show_scene(report: &Report, scene: &str) -> io::Result<()> {
     };
     let mut table = text::table(
         &[
-            "path",
+            "path / structure",
             "cull rate",
-            "#",
-            "structure",
             "query median",
             "p95",
-            "vs linear",
-            "95 % interval",
+            "times linear [95 % interval]",
             "build",
             "B/item",
             "locate",
             "status",
         ],
-        &[1, 2, 4, 5, 6, 7, 8, 9, 10],
+        &[1, 2, 3, 4, 5, 6, 7],
     );
     let mut groups: Vec<&PathOf> = Vec::new();
     let keys: Vec<PathOf> = cells.iter().map(|c| path_of(c)).collect();
@@ -445,45 +440,46 @@ fn add_path(table: &mut Table, mut cells: Vec<&ReportCell>, floor: f64) {
         _ => f64::INFINITY,
     };
     cells.sort_by(|a, b| key(a).total_cmp(&key(b)));
+    let Some(first) = cells.first() else { return };
+    let head = match first.path.cache.as_str() {
+        "warm" => first.path.name.clone(),
+        cache => format!("{} ({cache})", first.path.name),
+    };
+    let culled = cells.iter().find_map(|c| c.value("cull_rate"));
+    table.add_row([head, culled.map(text::percent).unwrap_or_default()]);
     let (mut rank, mut leader) = (0, 0.0);
     for (place, cell) in cells.iter().enumerate() {
         let value =
             |name: &str, show: fn(f64) -> String| cell.value(name).map(show).unwrap_or_default();
-        let ranked = key(cell).is_finite();
-        // Within the noise floor of the one before it: a tie.
+        // Within the noise floor of the leader of its rank: a tie.
         if rank == 0 || key(cell) > leader * (1.0 + floor) {
             (rank, leader) = (place + 1, key(cell));
         }
-        let interval = cell.metrics.get("ratio_to_linear").and_then(|m| {
-            Some(format!(
-                "{} to {}",
-                text::significant(m.lower?),
-                text::significant(m.upper?)
-            ))
-        });
-        let times = |v: f64| format!("{} x", text::significant(v));
-        let head = match (place, cell.path.cache.as_str()) {
-            (0, "warm") => cell.path.name.clone(),
-            (0, cache) => format!("{} ({cache})", cell.path.name),
-            _ => String::new(),
+        let number = if key(cell).is_finite() {
+            rank.to_string()
+        } else {
+            "-".to_owned()
         };
+        let ratio = cell.metrics.get("ratio_to_linear").map(|m| {
+            let interval = m.lower.zip(m.upper).map(|(lower, upper)| {
+                format!(
+                    " [{}, {}]",
+                    text::significant(lower),
+                    text::significant(upper)
+                )
+            });
+            format!(
+                "{}{}",
+                text::significant(m.value),
+                interval.unwrap_or_default()
+            )
+        });
         table.add_row([
-            head,
-            if place == 0 {
-                value("cull_rate", text::percent)
-            } else {
-                String::new()
-            },
-            if ranked {
-                rank.to_string()
-            } else {
-                "-".to_owned()
-            },
-            cell.structure.clone(),
+            format!("  {number} {}", cell.structure),
+            String::new(),
             value("query_ns", text::time),
             value("query_ns_p95", text::time),
-            value("ratio_to_linear", times),
-            interval.unwrap_or_default(),
+            ratio.unwrap_or_default(),
             value("build_ms", |ms| text::time(ms * 1e6)),
             value("memory_bytes_per_item", |b| format!("{b:.1}")),
             value("locate_ns", text::time),

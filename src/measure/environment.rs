@@ -5,7 +5,6 @@ use std::fs;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 use sysinfo::{CpuRefreshKind, MemoryRefreshKind, RefreshKind, System};
 
 use crate::scene::hex;
@@ -170,7 +169,7 @@ impl Toolchain {
                 .filter(|f| !f.is_empty())
                 .map(str::to_owned)
                 .collect(),
-            lock_digest: hex(&Sha256::digest(lock)),
+            lock_digest: hex(&hmac_sha256::Hash::hash(lock)),
         }
     }
 }

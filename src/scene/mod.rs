@@ -17,7 +17,6 @@ mod uniform;
 mod wad;
 
 use glam::DVec3;
-use sha2::{Digest, Sha256};
 
 use crate::geometry::Aabb;
 use crate::input::InputError;
@@ -138,7 +137,7 @@ impl Scene {
     /// SHA-256 over origin and item bounds: two scenes with the same digest
     /// ask the same questions of every structure. O(n).
     pub fn digest(&self) -> String {
-        let mut hash = Sha256::new();
+        let mut hash = hmac_sha256::Hash::new();
         for value in self.origin.to_array() {
             hash.update(value.to_bits().to_le_bytes());
         }
