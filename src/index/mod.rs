@@ -113,9 +113,9 @@ pub fn indexable(items: &[Aabb]) -> Result<Vec<ItemId>, BuildError> {
             bounds: items[item],
         });
     }
-    let ids = items.iter().zip(0..);
-    Ok(ids
-        .filter(|(b, _)| !b.is_empty())
-        .map(|(_, id)| id)
-        .collect())
+    let sound = || items.iter().zip(0..).filter(|(b, _)| !b.is_empty());
+    // Counted first: a structure keeps this list, so no slack.
+    let mut ids = Vec::with_capacity(sound().count());
+    ids.extend(sound().map(|(_, id)| id));
+    Ok(ids)
 }

@@ -94,6 +94,8 @@ impl PackedTree {
             }
         }
         tree.nodes.shrink_to_fit();
+        tree.boxes.shrink_to_fit();
+        tree.ids.shrink_to_fit();
         tree
     }
 
