@@ -1,0 +1,19 @@
+//! Any bytes as a Doom WAD: no panic, one-line errors, and a map that is
+//! accepted has one region for every point.
+#![no_main]
+
+use cullbench::scene::WadMap;
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|bytes: &[u8]| {
+    let scene = WadMap::read(bytes, "fuzz.wad", None).and_then(|map| map.into_scene("fuzz"));
+    match scene {
+        Err(error) => assert!(!error.to_string().contains('\n'), "{error}"),
+        Ok(scene) => {
+            for place in &scene.places {
+                let p = scene.regions.local_point(place.eye, scene.origin);
+                assert_eq!(scene.regions.holding(p, &scene.items).len(), 1);
+            }
+        }
+    }
+});
