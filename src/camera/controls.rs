@@ -65,14 +65,19 @@ impl Frame {
         over: f64,
     ) -> Result<(), CameraError> {
         let axis = axis.try_normalize().ok_or(CameraError::UpParallel)?;
-        for (axis, degrees) in [(axis, around), (self.u, over)] {
-            let (sin, cos) = sin_cos(degrees / 2.0);
-            let turn = DQuat::from_xyzw(axis.x * sin, axis.y * sin, axis.z * sin, cos);
-            self.eye = centre + turn * (self.eye - centre);
-            (self.u, self.v, self.n) = (turn * self.u, turn * self.v, turn * self.n);
-            self.rotated();
-        }
+        self.swing(centre, axis, around);
+        // Read only now: the first swing has turned u.
+        self.swing(centre, self.u, over);
         Ok(())
+    }
+
+    /// Turns eye and axes about the unit vector `axis` through `centre`.
+    fn swing(&mut self, centre: DVec3, axis: DVec3, degrees: f64) {
+        let (sin, cos) = sin_cos(degrees / 2.0);
+        let turn = DQuat::from_xyzw(axis.x * sin, axis.y * sin, axis.z * sin, cos);
+        self.eye = centre + turn * (self.eye - centre);
+        (self.u, self.v, self.n) = (turn * self.u, turn * self.v, turn * self.n);
+        self.rotated();
     }
 
     fn rotated(&mut self) {

@@ -54,6 +54,33 @@ fn unit(v: DVec3) -> Option<DVec3> {
     Some(scaled / scaled.length())
 }
 
+/// The vector times a power of two that brings its largest component to
+/// [1, 2): unlike [`unit`], without any rounding. `None` for zero.
+fn scaled(v: DVec3) -> Option<DVec3> {
+    let largest = v.abs().max_element();
+    if largest == 0.0 {
+        return None;
+    }
+    let exponent = libm::ilogb(largest);
+    Some(v.map(|component| libm::ldexp(component, -exponent)))
+}
+
+/// `a x b`, each component true to about an ulp however much cancels
+/// (Kahan's difference of products; Jeannerod, Louvet and Muller 2013,
+/// "Further analysis of Kahan's algorithm for the accurate computation of
+/// 2 x 2 determinants").
+fn cross(a: DVec3, b: DVec3) -> DVec3 {
+    fn difference(a: f64, b: f64, c: f64, d: f64) -> f64 {
+        let cd = c * d;
+        libm::fma(a, b, -cd) + libm::fma(-c, d, cd)
+    }
+    DVec3::new(
+        difference(a.y, b.z, a.z, b.y),
+        difference(a.z, b.x, a.x, b.z),
+        difference(a.x, b.y, a.y, b.x),
+    )
+}
+
 impl Frame {
     /// The frame at `eye` that looks along `forward`.
     ///
@@ -63,11 +90,14 @@ impl Frame {
         check_finite(["eye x", "eye y", "eye z"], eye)?;
         check_finite(["forward x", "forward y", "forward z"], forward)?;
         check_finite(["up x", "up y", "up z"], up)?;
+        let forward = scaled(forward).ok_or(CameraError::EyeIsLook)?;
+        let up = scaled(up).ok_or(CameraError::UpParallel)?;
         let n = -unit(forward).ok_or(CameraError::EyeIsLook)?;
-        let up = unit(up).ok_or(CameraError::UpParallel)?;
-        let across = up.cross(n);
-        // Rounding of the two unit vectors alone makes up to ~2e-16.
-        if across.abs().max_element() <= 4.0 * f64::EPSILON {
+        // up x n, but for its length. Of vectors not yet rounded to unit
+        // length: nearly parallel, their rounding would be all that is left.
+        let across = cross(forward, up);
+        let parallel = 4.0 * f64::EPSILON * forward.length() * up.length();
+        if across.abs().max_element() <= parallel {
             return Err(CameraError::UpParallel);
         }
         let u = unit(across).ok_or(CameraError::UpParallel)?;
@@ -78,8 +108,7 @@ impl Frame {
             n,
             rotations: 0,
         };
-        // With `up` nearly parallel to the view the cross product keeps few
-        // digits of orthogonality; one correction restores them.
+        // The last digit or two of orthogonality.
         frame.orthonormalise();
         Ok(frame)
     }
