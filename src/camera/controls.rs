@@ -4,6 +4,7 @@
 
 use glam::{DQuat, DVec3};
 
+use super::frame::unit;
 use super::{Camera, CameraError, Frame, Lens};
 
 /// Rotations between two corrections: a rotation drifts by about 2e-16, so
@@ -64,7 +65,8 @@ impl Frame {
         around: f64,
         over: f64,
     ) -> Result<(), CameraError> {
-        let axis = axis.try_normalize().ok_or(CameraError::UpParallel)?;
+        let finite = Some(axis).filter(|axis| axis.is_finite());
+        let axis = finite.and_then(unit).ok_or(CameraError::Axis)?;
         self.swing(centre, axis, around);
         // Read only now: the first swing has turned u.
         self.swing(centre, self.u, over);
@@ -102,11 +104,8 @@ impl Camera {
 impl Lens {
     /// The lens with its window made smaller by `factor`.
     fn zoomed(&self, factor: f64) -> Result<Lens, CameraError> {
-        if factor.is_nan() || factor <= 0.0 {
-            return Err(CameraError::NotFinite {
-                name: "zoom factor",
-                value: factor,
-            });
+        if !factor.is_finite() || factor <= 0.0 {
+            return Err(CameraError::Zoom { factor });
         }
         match *self {
             Lens::Perspective {

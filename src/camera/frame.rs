@@ -44,7 +44,7 @@ fn check_finite(names: [&'static str; 3], v: DVec3) -> Result<(), CameraError> {
 }
 
 /// The unit vector along `v`, whatever its length; `None` for zero.
-fn unit(v: DVec3) -> Option<DVec3> {
+pub(super) fn unit(v: DVec3) -> Option<DVec3> {
     let largest = v.abs().max_element();
     if largest == 0.0 {
         return None;

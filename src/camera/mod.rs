@@ -66,6 +66,10 @@ pub enum CameraError {
         low: f64,
         high: f64,
     },
+    #[error("the zoom factor is {factor}; expected a number above 0")]
+    Zoom { factor: f64 },
+    #[error("the axis of the orbit is zero or not finite; expected a direction")]
+    Axis,
     #[error("the view volume does not fit f32: {0}")]
     Volume(#[from] VolumeError),
 }
