@@ -2,10 +2,12 @@
 //! structure shares. Nothing here knows what an index, a camera or a file is.
 
 mod aabb;
+mod box_block;
 mod convex_volume;
 mod plane;
 pub mod rounding;
 
 pub use aabb::Aabb;
+pub use box_block::{BoxBlock, BoxBlocks, LANES, LaneMask};
 pub use convex_volume::{ConvexVolume, FrustumPlane, MAX_PLANES, PlaneMask, VolumeError};
 pub use plane::Plane;

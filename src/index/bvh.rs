@@ -8,10 +8,11 @@ use std::time::Duration;
 
 use glam::Vec3;
 use obvhs::bvh2::builder::build_bvh2;
+use obvhs::bvh2::node::Bvh2Node;
 use obvhs::{Boundable, BvhBuildParams};
 use serde::{Deserialize, Serialize};
 
-use super::tree::{PackedTree, Step};
+use super::tree::{PackedTree, TreeWriter};
 use super::{BuildError, FrustumQuery, MemoryUsage, RegionIndex, indexable};
 use crate::geometry::{Aabb, ConvexVolume};
 use crate::query::{ItemId, Recorder, Sink};
@@ -100,6 +101,40 @@ fn scale_for(items: &[Aabb]) -> f32 {
     libm::ldexpf(1.0, (-exponent).clamp(-126, 126))
 }
 
+/// Lays the items out in depth-first order. An item that comes again (obvhs
+/// splits large ones on request) is kept once. Iterative, so that a degenerate
+/// tree cannot overflow the stack. O(n).
+fn relaid(items: &[Aabb], order: &[ItemId], nodes: &[Bvh2Node]) -> PackedTree {
+    enum Task {
+        Enter(u32),
+        Leave(usize),
+    }
+    let mut writer = TreeWriter::with_capacity(order.len());
+    let mut placed = vec![false; items.len()];
+    let mut open = vec![Task::Enter(0)];
+    while let Some(task) = open.pop() {
+        let source = match task {
+            Task::Leave(node) => {
+                writer.close(node);
+                continue;
+            }
+            Task::Enter(source) => &nodes[source as usize],
+        };
+        open.push(Task::Leave(writer.open()));
+        let first = source.first_index;
+        if source.is_leaf() {
+            for &id in &order[first as usize..(first + source.prim_count) as usize] {
+                if !std::mem::replace(&mut placed[id as usize], true) {
+                    writer.push(id, &items[id as usize]);
+                }
+            }
+        } else {
+            open.extend([Task::Enter(first + 1), Task::Enter(first)]);
+        }
+    }
+    writer.finish()
+}
+
 impl RegionIndex for Bvh {
     const NAME: &'static str = "bvh";
     const SUMMARY: &'static str =
@@ -132,16 +167,9 @@ impl RegionIndex for Bvh {
             .map(|&place| ids[place as usize])
             .collect();
         drop(ids);
-        let tree = PackedTree::pack(items, 0, &order, |at| {
-            let node = &built.nodes[at as usize];
-            let first = node.first_index;
-            if node.is_leaf() {
-                Step::Leaf(first as usize..(first + node.prim_count) as usize)
-            } else {
-                Step::Inner([first, first + 1])
-            }
-        });
-        Ok(Bvh { tree })
+        Ok(Bvh {
+            tree: relaid(items, &order, &built.nodes),
+        })
     }
 
     fn memory(&self) -> MemoryUsage {

@@ -31,7 +31,7 @@ impl Linear {
     ) -> ControlFlow<()> {
         let memo = region.start();
         for (b, id) in self.boxes.iter().zip(&self.ids) {
-            recorder.item_tested();
+            recorder.items_tested(1);
             if region.admits(b, memo, recorder) {
                 sink.accept(std::slice::from_ref(id))?;
             }

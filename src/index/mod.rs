@@ -5,6 +5,7 @@
 mod bvh;
 mod erased;
 mod linear;
+mod partition;
 mod tree;
 
 use std::ops::ControlFlow;
@@ -19,7 +20,8 @@ use crate::query::{ItemId, Recorder, Sink};
 pub use bvh::{Bvh, BvhParams, BvhPreset};
 pub use erased::{BACKENDS, Backend, DynIndex, StructureSpec, structures};
 pub use linear::Linear;
-pub use tree::{PackedTree, TreeNode};
+pub use partition::{Part, Record, Splitter, build_top_down};
+pub use tree::{PackedTree, TreeNode, TreeWriter, scan_blocks};
 
 /// Why an index could not be built.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]

@@ -1,11 +1,11 @@
-//! The machinery that tree structures share: nodes in depth-first order over
-//! items in tree order, so that every subtree is one slice of ids, and one
-//! traversal with plane masks for every kind of region. How the tree came to
-//! be is each structure's own business.
+//! The machinery that all trees share: nodes in depth-first order over items
+//! in tree order, so that every subtree is one slice of ids; item bounds in
+//! blocks of sixteen; one traversal with plane masks for every kind of region;
+//! refitting. How a tree comes to be is each structure's own business.
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 
-use crate::geometry::Aabb;
+use crate::geometry::{Aabb, BoxBlocks};
 use crate::query::{Containment, ItemId, Recorder, Region, Sink};
 
 use super::MemoryUsage;
@@ -24,99 +24,97 @@ pub struct TreeNode {
     after: u32,
 }
 
-/// A tree packed for querying: 36 bytes a node, 28 an item.
+impl TreeNode {
+    /// The places of the subtree's items in tree order.
+    pub fn items(&self) -> Range<usize> {
+        self.first as usize..(self.first + self.count) as usize
+    }
+
+    /// The node after this subtree in depth-first order.
+    pub fn after(&self) -> usize {
+        self.after as usize
+    }
+}
+
+/// A tree packed for querying: 36 bytes a node, 28 an item. Nodes may have
+/// any number of children.
 #[derive(Default)]
 pub struct PackedTree {
     nodes: Vec<TreeNode>,
-    boxes: Vec<Aabb>,
+    boxes: BoxBlocks,
     ids: Vec<ItemId>,
     depth: usize,
+    /// Place of each item in tree order, made when first needed.
+    place_of: Vec<u32>,
 }
 
-/// What a builder knows of one of its nodes.
-pub enum Step {
-    /// Children, in the order in which they are to be laid out.
-    Inner([u32; 2]),
-    /// The items of a leaf: a range of the builder's own item list.
-    Leaf(std::ops::Range<usize>),
+/// Mark of an item that is not in the tree.
+const ABSENT: u32 = u32::MAX;
+
+/// Writes a tree in depth-first order: open a node, push its items or write
+/// its children, close it.
+pub struct TreeWriter {
+    tree: PackedTree,
+    level: usize,
 }
 
-/// Subtrees whose traversal may be open at once: one per level. Trees deeper
-/// than this spill to the heap.
-const STACK: usize = 64;
-
-impl PackedTree {
-    /// Packs a binary tree given as a function from node numbers to steps.
-    /// `order` lists item ids as the leaves' ranges refer to them; an id that
-    /// comes again (a builder that splits items) is kept once.
-    ///
-    /// Iterative, so that a degenerate tree cannot overflow the stack. O(n).
-    pub fn pack(items: &[Aabb], root: u32, order: &[ItemId], step: impl Fn(u32) -> Step) -> Self {
-        enum Task {
-            Enter(u32, usize),
-            Leave(usize),
+impl TreeWriter {
+    pub fn with_capacity(items: usize) -> Self {
+        TreeWriter {
+            tree: PackedTree {
+                boxes: BoxBlocks::with_capacity(items),
+                ids: Vec::with_capacity(items),
+                ..PackedTree::default()
+            },
+            level: 0,
         }
-        let mut tree = PackedTree {
-            boxes: Vec::with_capacity(order.len()),
-            ids: Vec::with_capacity(order.len()),
-            ..PackedTree::default()
-        };
-        let mut packed = vec![false; items.len()];
-        let mut open = vec![Task::Enter(root, 1)];
-        while let Some(task) = open.pop() {
-            match task {
-                Task::Enter(source, depth) => {
-                    let at = tree.nodes.len();
-                    tree.depth = tree.depth.max(depth);
-                    tree.nodes.push(TreeNode {
-                        bounds: Aabb::EMPTY,
-                        first: tree.ids.len() as u32,
-                        count: 0,
-                        after: 0,
-                    });
-                    open.push(Task::Leave(at));
-                    match step(source) {
-                        Step::Inner([left, right]) => {
-                            open.push(Task::Enter(right, depth + 1));
-                            open.push(Task::Enter(left, depth + 1));
-                        }
-                        Step::Leaf(range) => {
-                            for &id in &order[range] {
-                                if !std::mem::replace(&mut packed[id as usize], true) {
-                                    tree.ids.push(id);
-                                    tree.boxes.push(items[id as usize]);
-                                }
-                            }
-                        }
-                    }
-                }
-                Task::Leave(at) => tree.close(at),
-            }
-        }
-        tree.nodes.shrink_to_fit();
-        tree.boxes.shrink_to_fit();
-        tree.ids.shrink_to_fit();
-        tree
     }
 
-    /// Fixes what is known of a node only after its whole subtree: one pass
-    /// over its children, not over its items.
-    fn close(&mut self, at: usize) {
-        let after = self.nodes.len();
-        let first = self.nodes[at].first as usize;
-        let mut bounds = Aabb::EMPTY;
-        if after == at + 1 {
-            bounds = Aabb::union_of(&self.boxes[first..]);
-        }
-        let mut child = at + 1;
-        while child < after {
-            bounds = bounds.union(&self.nodes[child].bounds);
-            child = self.nodes[child].after as usize;
-        }
-        let node = &mut self.nodes[at];
-        node.bounds = bounds;
-        node.count = (self.ids.len() - first) as u32;
-        node.after = after as u32;
+    /// Begins a node below the ones that are open; its number.
+    pub fn open(&mut self) -> usize {
+        self.level += 1;
+        self.tree.depth = self.tree.depth.max(self.level);
+        self.tree.nodes.push(TreeNode {
+            bounds: Aabb::EMPTY,
+            first: self.tree.ids.len() as u32,
+            count: 0,
+            after: 0,
+        });
+        self.tree.nodes.len() - 1
+    }
+
+    /// Adds an item to the leaf that is open.
+    pub fn push(&mut self, id: ItemId, bounds: &Aabb) {
+        self.tree.ids.push(id);
+        self.tree.boxes.push(bounds);
+    }
+
+    /// Ends a node: its subtree is complete.
+    pub fn close(&mut self, node: usize) {
+        self.level -= 1;
+        let (after, items) = (self.tree.nodes.len(), self.tree.ids.len());
+        let closed = &mut self.tree.nodes[node];
+        closed.count = items as u32 - closed.first;
+        closed.after = after as u32;
+        self.tree.fit(node);
+    }
+
+    pub fn finish(mut self) -> PackedTree {
+        self.tree.nodes.shrink_to_fit();
+        self.tree.boxes.shrink_to_fit();
+        self.tree.ids.shrink_to_fit();
+        self.tree
+    }
+}
+
+impl PackedTree {
+    pub fn nodes(&self) -> &[TreeNode] {
+        &self.nodes
+    }
+
+    /// Whether the node has no children.
+    pub fn is_leaf(&self, node: usize) -> bool {
+        self.nodes[node].after() == node + 1
     }
 
     /// Levels from the root to the deepest leaf; 0 for no items.
@@ -127,111 +125,224 @@ impl PackedTree {
     pub fn memory(&self) -> MemoryUsage {
         MemoryUsage {
             node_bytes: size_of_val(&self.nodes[..]),
-            item_bytes: size_of_val(&self.boxes[..]) + size_of_val(&self.ids[..]),
+            item_bytes: self.boxes.bytes()
+                + size_of_val(&self.ids[..])
+                + size_of_val(&self.place_of[..]),
         }
     }
 
     /// Hands every item that the region admits to the sink, in tree order.
     ///
-    /// Depth-first: a rejected subtree is skipped, an accepted one is a single
-    /// slice, and a straddling one passes its memo (for a frustum the mask of
-    /// planes still open) to its children.
+    /// One walk along the nodes in memory order: a rejected subtree is jumped
+    /// over, an accepted one is a single slice, and a straddling one leaves
+    /// its memo (for a frustum the mask of planes still open) for all nodes up
+    /// to its end.
     pub fn query<G: Region, S: Sink, R: Recorder>(
         &self,
         region: &G,
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()> {
-        if self.ids.is_empty() {
-            return ControlFlow::Continue(());
-        }
-        let mut open: Stack<G::Memo> = Stack::new(region.start());
-        while let Some((at, memo)) = open.pop() {
-            let node = &self.nodes[at as usize];
+        let mut above = Stack::new((self.nodes.len() as u32, region.start()));
+        let mut at = 0;
+        while let Some(node) = self.nodes.get(at as usize) {
+            let mut top = above.top();
+            while at >= top.0 {
+                top = above.pop();
+            }
             recorder.node_tested();
-            let (verdict, memo) = region.classify(&node.bounds, memo, recorder);
-            let (first, end) = (node.first as usize, (node.first + node.count) as usize);
+            let (verdict, memo) = region.classify(&node.bounds, top.1, recorder);
             match verdict {
-                Containment::Outside => recorder.subtree_rejected(),
-                Containment::Inside => {
-                    recorder.subtree_accepted(end - first);
-                    sink.accept(&self.ids[first..end])?;
+                Containment::Outside => {
+                    recorder.subtree_rejected();
+                    at = node.after;
                 }
-                Containment::Straddles if node.after == at + 1 => {
-                    self.test_leaf(first, end, region, memo, sink, recorder)?;
+                Containment::Inside => {
+                    recorder.subtree_accepted(node.count as usize);
+                    sink.accept(&self.ids[node.items()])?;
+                    at = node.after;
                 }
                 Containment::Straddles => {
-                    let left = at + 1;
-                    open.push(self.nodes[left as usize].after, memo);
-                    open.push(left, memo);
+                    at += 1;
+                    if node.after == at {
+                        self.test_items(node.items(), region, memo, sink, recorder)?;
+                    } else {
+                        above.push((node.after, memo));
+                    }
                 }
             }
         }
         ControlFlow::Continue(())
     }
 
-    /// Tests a leaf's items one by one and hands over runs of admitted ones.
+    /// Tests items block by block and hands over runs of admitted ones.
     #[inline(always)]
-    fn test_leaf<G: Region, S: Sink, R: Recorder>(
+    pub fn test_items<G: Region, S: Sink, R: Recorder>(
         &self,
-        first: usize,
-        end: usize,
+        items: Range<usize>,
         region: &G,
         memo: G::Memo,
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()> {
-        let mut run = first;
-        for (i, b) in self.boxes[first..end].iter().enumerate() {
-            recorder.item_tested();
-            if !region.admits(b, memo, recorder) {
-                let at = first + i;
-                if run < at {
-                    sink.accept(&self.ids[run..at])?;
-                }
-                run = at + 1;
+        scan_blocks(&self.boxes, &self.ids, items, region, memo, sink, recorder)
+    }
+
+    /// Takes over the new bounds of moved items without changing the tree's
+    /// shape: nodes on the way to them are fitted anew. False, with the tree
+    /// unchanged, if an item enters or leaves the tree (it is or was empty).
+    ///
+    /// O(moved * depth), or O(nodes) where that is less. `fitted` is told of
+    /// every node that changed, children first.
+    pub fn refit(
+        &mut self,
+        items: &[Aabb],
+        moved: &[ItemId],
+        mut fitted: impl FnMut(&PackedTree, usize),
+    ) -> bool {
+        if self.place_of.len() != items.len() {
+            self.place_of = vec![ABSENT; items.len()];
+            for (place, &id) in self.ids.iter().enumerate() {
+                self.place_of[id as usize] = place as u32;
             }
         }
-        if run < end {
-            sink.accept(&self.ids[run..end])?;
+        let stays = |id: &ItemId| {
+            let (was, is) = (
+                self.place_of[*id as usize] != ABSENT,
+                !items[*id as usize].is_empty(),
+            );
+            was == is
+        };
+        if !moved.iter().all(stays) {
+            return false;
         }
-        ControlFlow::Continue(())
+        let mut dirty = vec![false; self.nodes.len()];
+        let all = moved.len() * self.depth.max(1) > self.nodes.len();
+        for &id in moved {
+            let place = self.place_of[id as usize];
+            if place != ABSENT {
+                self.boxes.set(place as usize, &items[id as usize]);
+                if !all {
+                    self.mark_path(place as usize, &mut dirty);
+                }
+            }
+        }
+        for node in (0..self.nodes.len())
+            .rev()
+            .filter(|&node| all || dirty[node])
+        {
+            self.fit(node);
+            fitted(self, node);
+        }
+        true
+    }
+
+    /// Marks the nodes from the root to the leaf that holds a place.
+    fn mark_path(&self, place: usize, dirty: &mut [bool]) {
+        let mut node = 0;
+        loop {
+            dirty[node] = true;
+            if self.is_leaf(node) {
+                return;
+            }
+            node += 1;
+            while !self.nodes[node].items().contains(&place) {
+                node = self.nodes[node].after();
+            }
+        }
+    }
+
+    /// A node's bounds from its children, or from its items if it is a leaf.
+    fn fit(&mut self, node: usize) {
+        let mut bounds = Aabb::EMPTY;
+        if self.is_leaf(node) {
+            for place in self.nodes[node].items() {
+                bounds = bounds.union(&self.boxes.get(place));
+            }
+        }
+        let mut child = node + 1;
+        while child < self.nodes[node].after() {
+            bounds = bounds.union(&self.nodes[child].bounds);
+            child = self.nodes[child].after();
+        }
+        self.nodes[node].bounds = bounds;
     }
 }
 
-/// Open subtrees: a fixed array, then the heap.
+/// Tests a range of items in blocks and hands over runs of admitted ones: the
+/// leaf test of every tree and the whole of the linear scan.
+#[inline(always)]
+pub fn scan_blocks<G: Region, S: Sink, R: Recorder>(
+    boxes: &BoxBlocks,
+    ids: &[ItemId],
+    items: Range<usize>,
+    region: &G,
+    memo: G::Memo,
+    sink: &mut S,
+    recorder: &mut R,
+) -> ControlFlow<()> {
+    for (start, lanes, block) in boxes.range(items.start, items.end) {
+        let tested = lanes.count_ones();
+        recorder.items_tested(tested);
+        recorder.planes_tested(tested * G::planes_open(memo));
+        let mut admitted = u32::from(region.admit_lanes(block, memo) & lanes);
+        while admitted != 0 {
+            let from = admitted.trailing_zeros();
+            let run = (!(admitted >> from)).trailing_zeros();
+            let first = start + from as usize;
+            sink.accept(&ids[first..first + run as usize])?;
+            admitted &= !(((1 << run) - 1) << from);
+        }
+    }
+    ControlFlow::Continue(())
+}
+
+/// Open subtrees kept without the heap: enough for any balanced tree.
+const NEAR: usize = 64;
+
+/// Ends and memos of the straddling nodes above the present one.
 struct Stack<M> {
-    near: [(u32, M); STACK],
+    near: [(u32, M); NEAR],
     used: usize,
+    /// Deeper levels of degenerate trees.
     far: Vec<(u32, M)>,
 }
 
 impl<M: Copy> Stack<M> {
-    fn new(root: M) -> Self {
+    fn new(root: (u32, M)) -> Self {
         Stack {
-            near: [(0, root); STACK],
+            near: [root; NEAR],
             used: 1,
             far: Vec::new(),
         }
     }
 
     #[inline(always)]
-    fn push(&mut self, node: u32, memo: M) {
-        if let Some(slot) = self.near.get_mut(self.used) {
-            *slot = (node, memo);
-            self.used += 1;
-        } else {
-            self.far.push((node, memo));
+    fn top(&self) -> (u32, M) {
+        match self.far.last() {
+            Some(&top) => top,
+            None => self.near[self.used - 1],
         }
     }
 
+    /// Takes the top off; the new top. The root is never taken off: its end
+    /// is the end of the walk.
     #[inline(always)]
-    fn pop(&mut self) -> Option<(u32, M)> {
-        if let Some(top) = self.far.pop() {
-            return Some(top);
+    fn pop(&mut self) -> (u32, M) {
+        if self.far.pop().is_none() {
+            self.used -= 1;
         }
-        self.used = self.used.checked_sub(1)?;
-        Some(self.near[self.used])
+        self.top()
+    }
+
+    #[inline(always)]
+    fn push(&mut self, entry: (u32, M)) {
+        if let Some(slot) = self.near.get_mut(self.used) {
+            *slot = entry;
+            self.used += 1;
+        } else {
+            self.far.push(entry);
+        }
     }
 }
 
@@ -241,63 +352,68 @@ mod tests {
     use crate::query::{Count, NoRecorder};
     use glam::Vec3;
 
-    /// A degenerate list of a tree: node i has leaf i on the left and the
-    /// rest on the right.
+    /// A degenerate list of a tree: each node has one leaf and the rest.
     fn comb(items: &[Aabb]) -> PackedTree {
-        let n = items.len() as u32;
-        let order: Vec<u32> = (0..n).collect();
-        PackedTree::pack(items, 0, &order, |node| {
-            // Even numbers are inner nodes, odd ones the leaves beside them.
-            let i = node / 2;
-            if node % 2 == 1 || i + 1 == n {
-                Step::Leaf(i as usize..i as usize + 1)
-            } else {
-                Step::Inner([node + 1, node + 2])
-            }
-        })
+        let mut writer = TreeWriter::with_capacity(items.len());
+        let mut open = Vec::new();
+        for (id, b) in items.iter().enumerate() {
+            open.push(writer.open());
+            let leaf = writer.open();
+            writer.push(id as ItemId, b);
+            writer.close(leaf);
+        }
+        while let Some(node) = open.pop() {
+            writer.close(node);
+        }
+        writer.finish()
+    }
+
+    fn row(count: usize) -> Vec<Aabb> {
+        let place = |i| Vec3::new(i as f32, -(i as f32), 0.1);
+        (0..count)
+            .map(|i| Aabb::around(place(i), Vec3::splat(0.3)))
+            .collect()
     }
 
     #[test]
     fn a_tree_of_a_hundred_thousand_levels_is_walked_without_recursion() {
-        let items: Vec<Aabb> = (0..100_000)
-            .map(|i| Aabb::around(Vec3::new(i as f32, 0.0, 0.0), Vec3::splat(0.5)))
-            .collect();
+        let items = row(100_000);
         let tree = comb(&items);
-        assert_eq!(tree.depth(), 100_000);
+        assert_eq!(tree.depth(), 100_001);
         let mut all = Count::default();
         let everything = Aabb::new(Vec3::splat(-1e9), Vec3::splat(1e9));
         let _ = tree.query(&everything, &mut all, &mut NoRecorder);
         assert_eq!(all.0, 100_000);
-        let mut found = Vec::new();
-        let _ = tree.query(&Vec3::new(99_999.25, 0.0, 0.0), &mut found, &mut NoRecorder);
-        assert_eq!(found, [99_999]);
+        for id in [0, 50_000, 99_999] {
+            let mut found = Vec::new();
+            let _ = tree.query(&items[id].centre(), &mut found, &mut NoRecorder);
+            assert_eq!(found, [id as ItemId]);
+        }
     }
 
-    #[test]
-    fn nodes_hold_the_exact_union_of_their_items() {
-        let items: Vec<Aabb> = (0..9)
-            .map(|i| Aabb::around(Vec3::new(i as f32, -(i as f32), 0.1), Vec3::splat(0.3)))
-            .collect();
-        let tree = comb(&items);
+    fn assert_fitted(tree: &PackedTree, items: &[Aabb]) {
         for node in &tree.nodes {
-            let range = node.first as usize..(node.first + node.count) as usize;
-            assert_eq!(node.bounds, Aabb::union_of(&tree.boxes[range]));
+            let own = tree.ids[node.items()].iter().map(|&id| &items[id as usize]);
+            assert_eq!(node.bounds, Aabb::union_of(own));
         }
     }
 
     #[test]
-    fn an_item_that_a_builder_split_is_kept_once() {
-        let items = [
-            Aabb::around(Vec3::ZERO, Vec3::ONE),
-            Aabb::around(Vec3::X, Vec3::ONE),
-        ];
-        let tree = PackedTree::pack(&items, 0, &[0, 1, 0], |node| match node {
-            0 => Step::Inner([1, 2]),
-            1 => Step::Leaf(0..2),
-            _ => Step::Leaf(2..3),
-        });
-        let mut found = Vec::new();
-        let _ = tree.query(&Vec3::ZERO, &mut found, &mut NoRecorder);
-        assert_eq!(found, [0, 1]);
+    fn nodes_hold_the_exact_union_of_their_items_also_after_moves() {
+        let mut items = row(40);
+        let mut tree = comb(&items);
+        assert_fitted(&tree, &items);
+        for moved in [vec![3], vec![39, 0], (0..40).collect::<Vec<ItemId>>()] {
+            for &id in &moved {
+                items[id as usize] = Aabb::around(Vec3::splat(id as f32 * 7.0), Vec3::ONE);
+            }
+            assert!(tree.refit(&items, &moved, |_, _| ()));
+            assert_fitted(&tree, &items);
+        }
+        items[5] = Aabb::EMPTY;
+        assert!(
+            !tree.refit(&items, &[5], |_, _| ()),
+            "an item that leaves needs a rebuild"
+        );
     }
 }

@@ -8,12 +8,12 @@ pub trait Recorder {
     /// A node's bounds were classified.
     #[inline(always)]
     fn node_tested(&mut self) {}
-    /// One plane was evaluated against a node or an item.
+    /// Planes were evaluated against nodes or items.
     #[inline(always)]
-    fn plane_tested(&mut self) {}
-    /// One item's bounds were tested.
+    fn planes_tested(&mut self, _count: u32) {}
+    /// Bounds of items were tested.
     #[inline(always)]
-    fn item_tested(&mut self) {}
+    fn items_tested(&mut self, _count: u32) {}
     /// A subtree was accepted whole: `items` ids that nobody tested.
     #[inline(always)]
     fn subtree_accepted(&mut self, _items: usize) {}
@@ -51,11 +51,11 @@ impl Recorder for QueryCost {
     fn node_tested(&mut self) {
         self.nodes_tested += 1;
     }
-    fn plane_tested(&mut self) {
-        self.planes_tested += 1;
+    fn planes_tested(&mut self, count: u32) {
+        self.planes_tested += u64::from(count);
     }
-    fn item_tested(&mut self) {
-        self.items_tested += 1;
+    fn items_tested(&mut self, count: u32) {
+        self.items_tested += u64::from(count);
     }
     fn subtree_accepted(&mut self, items: usize) {
         self.subtrees_accepted += 1;

@@ -5,7 +5,7 @@
 use glam::Vec3;
 
 use super::Recorder;
-use crate::geometry::{Aabb, ConvexVolume, PlaneMask};
+use crate::geometry::{Aabb, BoxBlock, ConvexVolume, LaneMask, PlaneMask};
 
 /// How a box lies to a region.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -43,6 +43,15 @@ pub trait Region {
     fn admits<R: Recorder>(&self, item: &Aabb, memo: Self::Memo, recorder: &mut R) -> bool {
         self.classify(item, memo, recorder).0 != Containment::Outside
     }
+
+    /// [`Region::admits`] for sixteen items at once, one bit each. Lanes that
+    /// hold no item may come out either way.
+    fn admit_lanes(&self, block: &BoxBlock, memo: Self::Memo) -> LaneMask;
+
+    /// How many planes a test with this memo evaluates.
+    fn planes_open(_memo: Self::Memo) -> u32 {
+        0
+    }
 }
 
 /// Region search: which boxes hold this point (closed bounds).
@@ -58,6 +67,10 @@ impl Region for Vec3 {
         } else {
             (Containment::Outside, ())
         }
+    }
+    #[inline(always)]
+    fn admit_lanes(&self, block: &BoxBlock, _: ()) -> LaneMask {
+        block.holding(*self)
     }
 }
 
@@ -76,6 +89,10 @@ impl Region for Aabb {
         } else {
             (Containment::Straddles, ())
         }
+    }
+    #[inline(always)]
+    fn admit_lanes(&self, block: &BoxBlock, _: ()) -> LaneMask {
+        block.meeting(self)
     }
 }
 
@@ -96,12 +113,9 @@ impl Region for ConvexVolume {
         recorder: &mut R,
     ) -> (Containment, PlaneMask) {
         let mut undecided = mask;
-        let mut left = mask;
-        while left != 0 {
-            let index = left.trailing_zeros();
-            left &= left - 1;
+        for index in Bits(mask) {
             let plane = self.plane_of_bit(index);
-            recorder.plane_tested();
+            recorder.planes_tested(1);
             if plane.excludes(bounds) {
                 return (Containment::Outside, mask);
             }
@@ -121,16 +135,38 @@ impl Region for ConvexVolume {
     /// a mask to, so its n-vertices are never needed.
     #[inline(always)]
     fn admits<R: Recorder>(&self, item: &Aabb, mask: PlaneMask, recorder: &mut R) -> bool {
-        let mut left = mask;
-        while left != 0 {
-            let index = left.trailing_zeros();
-            left &= left - 1;
-            recorder.plane_tested();
+        for index in Bits(mask) {
+            recorder.planes_tested(1);
             if self.plane_of_bit(index).excludes(item) {
                 return false;
             }
         }
         true
+    }
+    #[inline(always)]
+    fn admit_lanes(&self, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
+        block.admitted_by(Bits(mask).map(|index| self.plane_of_bit(index)))
+    }
+
+    fn planes_open(mask: PlaneMask) -> u32 {
+        mask.count_ones()
+    }
+}
+
+/// The bits that are set, lowest first.
+struct Bits(PlaneMask);
+
+impl Iterator for Bits {
+    type Item = u32;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<u32> {
+        if self.0 == 0 {
+            return None;
+        }
+        let index = self.0.trailing_zeros();
+        self.0 &= self.0 - 1;
+        Some(index)
     }
 }
 

@@ -1,0 +1,265 @@
+//! Sixteen boxes side by side: the layout in which leaves and scans test their
+//! items. It owns the block kernels; each lane computes exactly what
+//! [`Plane::excludes`] computes for one box.
+
+use glam::Vec3;
+
+use super::{Aabb, Plane};
+
+/// Boxes of one block.
+pub const LANES: usize = 16;
+
+/// One bit per lane of a [`BoxBlock`].
+pub type LaneMask = u16;
+
+/// Sixteen boxes as six rows: min x, y, z, then max x, y, z. 384 bytes.
+///
+/// Lanes that hold no box hold the empty box; callers mask them out.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[repr(C, align(64))]
+pub struct BoxBlock {
+    rows: [[f32; LANES]; 6],
+}
+
+impl BoxBlock {
+    pub const EMPTY: BoxBlock = BoxBlock {
+        rows: [
+            [f32::INFINITY; LANES],
+            [f32::INFINITY; LANES],
+            [f32::INFINITY; LANES],
+            [f32::NEG_INFINITY; LANES],
+            [f32::NEG_INFINITY; LANES],
+            [f32::NEG_INFINITY; LANES],
+        ],
+    };
+
+    pub fn set(&mut self, lane: usize, b: &Aabb) {
+        let values = b.min.to_array().into_iter().chain(b.max.to_array());
+        for (row, value) in self.rows.iter_mut().zip(values) {
+            row[lane] = value;
+        }
+    }
+
+    pub fn get(&self, lane: usize) -> Aabb {
+        let row = |k: usize| self.rows[k][lane];
+        Aabb::new(
+            Vec3::new(row(0), row(1), row(2)),
+            Vec3::new(row(3), row(4), row(5)),
+        )
+    }
+
+    /// The lanes whose box the plane excludes: bit for bit
+    /// [`Plane::excludes`], lane by lane. Lanes without a box come out as
+    /// they may.
+    #[inline(always)]
+    pub fn excluded_by(&self, plane: &Plane) -> LaneMask {
+        let mut values = [0.0; LANES];
+        self.p_vertex_values(plane, &mut values);
+        below_zero(&values)
+    }
+
+    /// The lanes that none of the planes excludes.
+    #[inline(always)]
+    pub fn admitted_by<'p>(&self, planes: impl Iterator<Item = &'p Plane>) -> LaneMask {
+        // The lowest value over all planes: below zero iff some plane's is. A
+        // NaN (an overflow on both sides) excludes nothing, as in the scalar
+        // test, because it compares false.
+        let mut lowest = [f32::INFINITY; LANES];
+        for plane in planes {
+            let mut values = [0.0; LANES];
+            self.p_vertex_values(plane, &mut values);
+            for (low, value) in lowest.iter_mut().zip(values) {
+                *low = if value < *low { value } else { *low };
+            }
+        }
+        !below_zero(&lowest)
+    }
+
+    #[inline(always)]
+    fn p_vertex_values(&self, plane: &Plane, values: &mut [f32; LANES]) {
+        let n = plane.normal;
+        // The p-vertex row of an axis is the same for every box.
+        let row = |k: usize, n: f32| {
+            if n >= 0.0 {
+                &self.rows[k + 3]
+            } else {
+                &self.rows[k]
+            }
+        };
+        let (x, y, z) = (row(0, n.x), row(1, n.y), row(2, n.z));
+        for lane in 0..LANES {
+            values[lane] = ((n.x * x[lane] + n.y * y[lane]) + n.z * z[lane]) + plane.d;
+        }
+    }
+
+    /// The lanes whose closed box holds the point.
+    #[inline(always)]
+    pub fn holding(&self, p: Vec3) -> LaneMask {
+        let mut held = [true; LANES];
+        for (k, x) in p.to_array().into_iter().enumerate() {
+            let (low, high) = (&self.rows[k], &self.rows[k + 3]);
+            for lane in 0..LANES {
+                held[lane] &= low[lane] <= x && x <= high[lane];
+            }
+        }
+        bits(&held)
+    }
+
+    /// The lanes whose closed box shares a point with `b`.
+    #[inline(always)]
+    pub fn meeting(&self, b: &Aabb) -> LaneMask {
+        let mut met = [true; LANES];
+        for k in 0..3 {
+            let (low, high) = (&self.rows[k], &self.rows[k + 3]);
+            for lane in 0..LANES {
+                met[lane] &= low[lane] <= b.max[k] && b.min[k] <= high[lane];
+            }
+        }
+        bits(&met)
+    }
+}
+
+#[inline(always)]
+fn below_zero(values: &[f32; LANES]) -> LaneMask {
+    values.iter().enumerate().fold(0, |mask, (lane, value)| {
+        mask | (LaneMask::from(*value < 0.0) << lane)
+    })
+}
+
+#[inline(always)]
+fn bits(flags: &[bool; LANES]) -> LaneMask {
+    flags.iter().enumerate().fold(0, |mask, (lane, flag)| {
+        mask | (LaneMask::from(*flag) << lane)
+    })
+}
+
+/// Boxes in blocks, in the order in which they were pushed; the last block is
+/// filled up with empty boxes. 24 bytes a box.
+#[derive(Clone, Default, Debug)]
+pub struct BoxBlocks {
+    blocks: Vec<BoxBlock>,
+    count: usize,
+}
+
+impl BoxBlocks {
+    pub fn with_capacity(boxes: usize) -> Self {
+        BoxBlocks {
+            blocks: Vec::with_capacity(boxes.div_ceil(LANES)),
+            count: 0,
+        }
+    }
+
+    pub fn push(&mut self, b: &Aabb) {
+        let lane = self.count % LANES;
+        if lane == 0 {
+            self.blocks.push(BoxBlock::EMPTY);
+        }
+        if let Some(block) = self.blocks.last_mut() {
+            block.set(lane, b);
+        }
+        self.count += 1;
+    }
+
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    pub fn get(&self, place: usize) -> Aabb {
+        self.blocks[place / LANES].get(place % LANES)
+    }
+
+    pub fn set(&mut self, place: usize, b: &Aabb) {
+        self.blocks[place / LANES].set(place % LANES, b);
+    }
+
+    pub fn shrink_to_fit(&mut self) {
+        self.blocks.shrink_to_fit();
+    }
+
+    /// Heap bytes.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.blocks[..])
+    }
+
+    /// The blocks that hold the boxes `first..end`, each with the place of its
+    /// lane 0 and the lanes that belong to the range.
+    #[inline(always)]
+    pub fn range(
+        &self,
+        first: usize,
+        end: usize,
+    ) -> impl Iterator<Item = (usize, LaneMask, &BoxBlock)> {
+        let blocks = first / LANES..end.div_ceil(LANES);
+        self.blocks[blocks.clone()]
+            .iter()
+            .zip(blocks)
+            .map(move |(block, at)| {
+                let start = at * LANES;
+                let low = first.saturating_sub(start);
+                let high = (end - start).min(LANES);
+                // At least one lane belongs to the range, so 1 <= high.
+                let lanes = (LaneMask::MAX << low) & (LaneMask::MAX >> (LANES - high));
+                (start, lanes, block)
+            })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Small integers (ties), anything normal (overflow), tiny, signed zero.
+    fn number() -> impl Strategy<Value = f32> {
+        prop_oneof![
+            (-8i8..8).prop_map(f32::from),
+            prop::num::f32::NORMAL,
+            prop::num::f32::SUBNORMAL,
+            Just(-0.0),
+        ]
+    }
+
+    prop_compose! {
+        fn any_box()(a in [number(), number(), number()], b in [number(), number(), number()]) -> Aabb {
+            let (a, b) = (Vec3::from_array(a), Vec3::from_array(b));
+            Aabb::new(a.min(b), a.max(b))
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn every_lane_is_the_scalar_test(
+            boxes in prop::collection::vec(any_box(), 1..40),
+            planes in prop::collection::vec(([number(), number(), number()], number()), 0..8),
+            point in [number(), number(), number()],
+        ) {
+            let planes: Vec<Plane> =
+                planes.into_iter().map(|(n, d)| Plane::new(Vec3::from_array(n), d)).collect();
+            let point = Vec3::from_array(point);
+            let mut blocks = BoxBlocks::with_capacity(boxes.len());
+            boxes.iter().for_each(|b| blocks.push(b));
+            let (first, end) = (boxes.len() / 3, boxes.len());
+            let mut seen = 0;
+            for (start, lanes, block) in blocks.range(first, end) {
+                let admitted = block.admitted_by(planes.iter());
+                for lane in (0..LANES).filter(|lane| lanes >> lane & 1 == 1) {
+                    let b = &boxes[start + lane];
+                    seen += 1;
+                    prop_assert_eq!(&block.get(lane), b);
+                    let scalar = !planes.iter().any(|p| p.excludes(b));
+                    prop_assert_eq!(admitted >> lane & 1 == 1, scalar);
+                    for plane in &planes {
+                        prop_assert_eq!(block.excluded_by(plane) >> lane & 1 == 1, plane.excludes(b));
+                    }
+                    prop_assert_eq!(block.holding(point) >> lane & 1 == 1, b.contains_point(point));
+                    prop_assert_eq!(block.meeting(&boxes[0]) >> lane & 1 == 1, b.intersects(&boxes[0]));
+                }
+            }
+            prop_assert_eq!(seen, end - first);
+        }
+    }
+}
