@@ -9,7 +9,7 @@ use glam::DVec3;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let city = scene::load("city:n=50000,seed=7", &Default::default())?;
-    let bvh = Bvh::build(&city.items, &Default::default())?;
+    let bvh = Bvh::build(&city.items, None, &Default::default())?;
 
     let frame = look_at(DVec3::new(-300.0, -300.0, 120.0), DVec3::ZERO, DVec3::Z)?;
     let lens = Lens::perspective(60.0, 16.0 / 9.0, 0.5, Some(800.0))?;

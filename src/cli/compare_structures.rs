@@ -4,8 +4,10 @@
 
 use std::collections::BTreeMap;
 
+use cullbench::geometry::Aabb;
 use cullbench::index::{DynIndex, StructureSpec};
 use cullbench::query::{ItemId, QueryCost};
+use cullbench::scene::Scene;
 
 /// One structure's answer to one question.
 pub struct Answer {
@@ -21,7 +23,8 @@ pub struct Answer {
 /// then of structures. Ids (ascending) are kept only if wanted.
 pub fn ask_all(
     structures: &[StructureSpec],
-    boxes: &[cullbench::geometry::Aabb],
+    scene: &Scene,
+    boxes: &[Aabb],
     questions: usize,
     keep_ids: bool,
     ask: impl Fn(&dyn DynIndex, usize, &mut Vec<ItemId>, &mut QueryCost),
@@ -30,7 +33,7 @@ pub fn ask_all(
     let mut out = Vec::new();
     for spec in structures {
         let index = spec
-            .build(boxes)
+            .build_with(boxes, scene.own_tree.as_ref())
             .map_err(|error| anyhow::anyhow!("structure '{}': {error}", spec.label))?;
         for (question, row) in answers.iter_mut().enumerate() {
             out.clear();

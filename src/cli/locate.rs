@@ -33,7 +33,7 @@ pub fn locate(args: &LocateArgs) -> anyhow::Result<Ending> {
             index.locate_counted(points[point], out, cost);
             scene.regions.refine(points[point], out);
         };
-    let answers = ask_all(&structures, boxes, points.len(), true, ask)?;
+    let answers = ask_all(&structures, &scene, boxes, points.len(), true, ask)?;
     write(args, &answers)?;
     Ok(if all_agree(&answers, "point") {
         Ending::Ok

@@ -33,6 +33,7 @@ pub fn query(args: &QueryArgs) -> anyhow::Result<Ending> {
     };
     let answers = ask_all(
         &structures,
+        &scene,
         &scene.items,
         workload.volumes.len(),
         args.ids,

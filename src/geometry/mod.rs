@@ -5,9 +5,11 @@ mod aabb;
 mod box_block;
 mod convex_volume;
 mod plane;
+mod plane_tree;
 pub mod rounding;
 
 pub use aabb::Aabb;
 pub use box_block::{BoxBlock, BoxBlocks, LANES, LaneMask};
 pub use convex_volume::{ConvexVolume, FrustumPlane, MAX_PLANES, PlaneMask, VolumeError};
 pub use plane::Plane;
+pub use plane_tree::{PlaneTree, PlaneTreeNode};

@@ -13,8 +13,8 @@ use obvhs::{Boundable, BvhBuildParams};
 use serde::{Deserialize, Serialize};
 
 use super::tree::{PackedTree, TreeWriter};
-use super::{BuildError, FrustumQuery, MemoryUsage, RegionIndex, indexable};
-use crate::geometry::{Aabb, ConvexVolume};
+use super::{BuildError, FrustumQuery, MemoryUsage, RegionIndex, check_range, indexable};
+use crate::geometry::{Aabb, ConvexVolume, PlaneTree};
 use crate::query::{ItemId, Recorder, Sink};
 
 /// A BVH built bottom-up (PLOC: Meister and Bittner 2018, "Parallel locally
@@ -141,13 +141,12 @@ impl RegionIndex for Bvh {
         "bounding volume hierarchy (crate obvhs), items re-laid in tree order, plane masks";
     type Params = BvhParams;
 
-    fn build(items: &[Aabb], params: &BvhParams) -> Result<Self, BuildError> {
-        if !(1..=255).contains(&params.leaf) {
-            return Err(BuildError::Params {
-                structure: Self::NAME,
-                reason: format!("leaf={}; expected 1 to 255", params.leaf),
-            });
-        }
+    fn build(
+        items: &[Aabb],
+        _: Option<&PlaneTree>,
+        params: &BvhParams,
+    ) -> Result<Self, BuildError> {
+        check_range(Self::NAME, "leaf", params.leaf.into(), 1.0, 255.0)?;
         let ids = indexable(items)?;
         if ids.is_empty() {
             return Ok(Bvh {
@@ -183,6 +182,9 @@ impl RegionIndex for Bvh {
         recorder: &mut R,
     ) -> ControlFlow<()> {
         self.tree.query(&p, sink, recorder)
+    }
+    fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
+        self.tree.refit(items, moved, |_, _| ())
     }
 }
 

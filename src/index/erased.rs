@@ -5,8 +5,11 @@
 use glam::Vec3;
 use serde_json::{Map, Value};
 
-use super::{BuildError, Bvh, FrustumQuery, Linear, MemoryUsage, RegionIndex};
-use crate::geometry::{Aabb, ConvexVolume};
+use super::{
+    Bsp, BuildError, Bvh, FrustumQuery, Linear, LinearScalar, MemoryUsage, Octree, Quadtree,
+    RegionIndex,
+};
+use crate::geometry::{Aabb, ConvexVolume, PlaneTree};
 use crate::query::{ItemId, NoRecorder, QueryCost};
 use crate::spec::{Spec, SpecError};
 
@@ -21,6 +24,8 @@ pub trait DynIndex: Send + Sync {
     fn locate(&self, p: Vec3, out: &mut Vec<ItemId>);
     /// The same search with its cost added up.
     fn locate_counted(&self, p: Vec3, out: &mut Vec<ItemId>, cost: &mut QueryCost);
+    /// See [`RegionIndex::refit`].
+    fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool;
 }
 
 impl<T: FrustumQuery> DynIndex for T {
@@ -44,9 +49,13 @@ impl<T: FrustumQuery> DynIndex for T {
     fn locate_counted(&self, p: Vec3, out: &mut Vec<ItemId>, cost: &mut QueryCost) {
         let _ = RegionIndex::locate(self, p, out, cost);
     }
+
+    fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
+        RegionIndex::refit(self, items, moved)
+    }
 }
 
-type Build = fn(&[Aabb], &Value) -> Result<Box<dyn DynIndex>, BuildError>;
+type Build = fn(&[Aabb], Option<&PlaneTree>, &Value) -> Result<Box<dyn DynIndex>, BuildError>;
 
 /// A row of the table of structures.
 pub struct Backend {
@@ -80,7 +89,9 @@ impl Backend {
         Backend {
             name: T::NAME,
             summary: T::SUMMARY,
-            build: |items, params| Ok(Box::new(T::build(items, &typed::<T>(params)?)?)),
+            build: |items, own_tree, params| {
+                Ok(Box::new(T::build(items, own_tree, &typed::<T>(params)?)?))
+            },
             params: |params| {
                 let filled = typed::<T>(params)?;
                 Ok(serde_json::to_value(filled).unwrap_or_default())
@@ -93,8 +104,15 @@ impl Backend {
     }
 }
 
-/// All structures. The first one is the yardstick of every ratio.
-pub static BACKENDS: &[Backend] = &[Backend::of::<Linear>(), Backend::of::<Bvh>()];
+/// All structures, in the order of the help.
+pub static BACKENDS: &[Backend] = &[
+    Backend::of::<LinearScalar>(),
+    Backend::of::<Linear>(),
+    Backend::of::<Bsp>(),
+    Backend::of::<Octree>(),
+    Backend::of::<Quadtree>(),
+    Backend::of::<Bvh>(),
+];
 
 /// A structure as asked for: a backend with its parameters.
 #[derive(Clone)]
@@ -135,8 +153,48 @@ impl StructureSpec {
         })
     }
 
+    /// Builds over boxes that bring no partition of their own.
+    ///
+    /// # Errors
+    /// As [`RegionIndex::build`].
     pub fn build(&self, items: &[Aabb]) -> Result<Box<dyn DynIndex>, BuildError> {
-        (self.backend.build)(items, &self.params)
+        self.build_with(items, None)
+    }
+
+    /// # Errors
+    /// As [`RegionIndex::build`].
+    pub fn build_with(
+        &self,
+        items: &[Aabb],
+        own_tree: Option<&PlaneTree>,
+    ) -> Result<Box<dyn DynIndex>, BuildError> {
+        (self.backend.build)(items, own_tree, &self.params)
+    }
+
+    /// Brings an index up to date after items have moved: by refitting where
+    /// the structure can, else by building it anew. True for a refit.
+    ///
+    /// # Errors
+    /// A moved item with a NaN or infinite bound; the index is unchanged.
+    pub fn update(
+        &self,
+        index: &mut Box<dyn DynIndex>,
+        items: &[Aabb],
+        own_tree: Option<&PlaneTree>,
+        moved: &[ItemId],
+    ) -> Result<bool, BuildError> {
+        if let Some(&id) = moved.iter().find(|&&id| !items[id as usize].is_finite()) {
+            let item = id as usize;
+            return Err(BuildError::NonFiniteItem {
+                item,
+                bounds: items[item],
+            });
+        }
+        if index.refit(items, moved) {
+            return Ok(true);
+        }
+        *index = self.build_with(items, own_tree)?;
+        Ok(false)
     }
 }
 

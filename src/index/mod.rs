@@ -2,10 +2,14 @@
 //! file beside this one and a row in [`BACKENDS`]; list, run, query, verify,
 //! benches and conformance tests pick it up from there.
 
+mod bsp;
 mod bvh;
+mod cells;
 mod erased;
 mod linear;
+mod octree;
 mod partition;
+mod quadtree;
 mod tree;
 
 use std::ops::ControlFlow;
@@ -14,13 +18,16 @@ use glam::Vec3;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use crate::geometry::{Aabb, ConvexVolume};
+use crate::geometry::{Aabb, ConvexVolume, PlaneTree};
 use crate::query::{ItemId, Recorder, Sink};
 
+pub use bsp::{Bsp, BspBuilder, BspParams};
 pub use bvh::{Bvh, BvhParams, BvhPreset};
 pub use erased::{BACKENDS, Backend, DynIndex, StructureSpec, structures};
-pub use linear::Linear;
+pub use linear::{Linear, LinearScalar};
+pub use octree::{CellParams, Octree};
 pub use partition::{Part, Record, Splitter, build_top_down};
+pub use quadtree::Quadtree;
 pub use tree::{PackedTree, TreeNode, TreeWriter, scan_blocks};
 
 /// Why an index could not be built.
@@ -67,9 +74,17 @@ pub trait RegionIndex: Sized + Send + Sync {
     /// Builds the structure. Deterministic: the same items and parameters
     /// give the same structure.
     ///
+    /// `own_tree` is a partition that the scene itself brings, if any; most
+    /// structures have no use for it.
+    ///
     /// # Errors
-    /// An item with a NaN or infinite bound (named), more items than ids.
-    fn build(items: &[Aabb], params: &Self::Params) -> Result<Self, BuildError>;
+    /// An item with a NaN or infinite bound (named), more items than ids,
+    /// parameters out of range.
+    fn build(
+        items: &[Aabb],
+        own_tree: Option<&PlaneTree>,
+        params: &Self::Params,
+    ) -> Result<Self, BuildError>;
 
     fn memory(&self) -> MemoryUsage;
 
@@ -81,6 +96,13 @@ pub trait RegionIndex: Sized + Send + Sync {
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()>;
+
+    /// Takes over the new bounds of `moved` items (`items` holds all bounds,
+    /// the new ones included; they are finite) without building anew. False,
+    /// with the structure unchanged, if it cannot; the caller then rebuilds.
+    fn refit(&mut self, _items: &[Aabb], _moved: &[ItemId]) -> bool {
+        false
+    }
 }
 
 /// A structure that finds what a convex volume sees.
@@ -94,6 +116,23 @@ pub trait FrustumQuery: RegionIndex {
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()>;
+}
+
+/// A parameter in its range, or the error that names both.
+pub(crate) fn check_range(
+    structure: &'static str,
+    name: &str,
+    value: f64,
+    low: f64,
+    high: f64,
+) -> Result<(), BuildError> {
+    if (low..=high).contains(&value) {
+        return Ok(());
+    }
+    Err(BuildError::Params {
+        structure,
+        reason: format!("{name}={value}; expected {low} to {high}"),
+    })
 }
 
 /// The items a structure has to hold: finite and not empty, with their ids.

@@ -147,8 +147,10 @@ impl PackedTree {
         let mut at = 0;
         while let Some(node) = self.nodes.get(at as usize) {
             let mut top = above.top();
+            // The root's end is the end of the walk: it is never taken off.
             while at >= top.0 {
-                top = above.pop();
+                above.pop();
+                top = above.top();
             }
             recorder.node_tested();
             let (verdict, memo) = region.classify(&node.bounds, top.1, recorder);
@@ -300,8 +302,9 @@ pub fn scan_blocks<G: Region, S: Sink, R: Recorder>(
 /// Open subtrees kept without the heap: enough for any balanced tree.
 const NEAR: usize = 64;
 
-/// Ends and memos of the straddling nodes above the present one.
-struct Stack<M> {
+/// Nodes with what is known of them, such as the ends and memos of the
+/// straddling nodes above the present one.
+pub(super) struct Stack<M> {
     near: [(u32, M); NEAR],
     used: usize,
     /// Deeper levels of degenerate trees.
@@ -309,7 +312,7 @@ struct Stack<M> {
 }
 
 impl<M: Copy> Stack<M> {
-    fn new(root: (u32, M)) -> Self {
+    pub(super) fn new(root: (u32, M)) -> Self {
         Stack {
             near: [root; NEAR],
             used: 1,
@@ -325,18 +328,17 @@ impl<M: Copy> Stack<M> {
         }
     }
 
-    /// Takes the top off; the new top. The root is never taken off: its end
-    /// is the end of the walk.
     #[inline(always)]
-    fn pop(&mut self) -> (u32, M) {
-        if self.far.pop().is_none() {
-            self.used -= 1;
+    pub(super) fn pop(&mut self) -> Option<(u32, M)> {
+        if let Some(top) = self.far.pop() {
+            return Some(top);
         }
-        self.top()
+        self.used = self.used.checked_sub(1)?;
+        Some(self.near[self.used])
     }
 
     #[inline(always)]
-    fn push(&mut self, entry: (u32, M)) {
+    pub(super) fn push(&mut self, entry: (u32, M)) {
         if let Some(slot) = self.near.get_mut(self.used) {
             *slot = entry;
             self.used += 1;

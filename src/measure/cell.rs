@@ -131,10 +131,12 @@ pub struct Group {
     pub samples: Vec<(String, Task, Sample)>,
 }
 
-/// Counts, verifies and times all contenders. `None` if stopped.
+/// Counts, verifies and times all contenders; ratios are against the one named
+/// `yardstick`, if it is there. `None` if stopped.
 pub fn measure_group(
     workload: &Workload,
     contenders: &[Contender],
+    yardstick: &str,
     protocol: &Protocol,
     stop: &dyn Fn() -> bool,
 ) -> Option<Group> {
@@ -164,7 +166,7 @@ pub fn measure_group(
     }
     let yardstick = entries
         .iter()
-        .find(|e| e.contender.spec.backend.name == "linear" && !e.contender.is_twin);
+        .find(|e| e.contender.spec.label == yardstick && !e.contender.is_twin);
     let twin = entries
         .iter()
         .find(|e| e.contender.is_twin)

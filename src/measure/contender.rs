@@ -68,7 +68,10 @@ fn build(spec: &StructureSpec, scene: &Scene) -> Result<Built, Verdict> {
         // Never two at once: a large scene would not fit twice.
         drop(index.take());
         let watch = Stopwatch::start();
-        index = Some(spec.build(&scene.items).map_err(refused)?);
+        index = Some(
+            spec.build_with(&scene.items, scene.own_tree.as_ref())
+                .map_err(refused)?,
+        );
         times.push(watch.lap().cpu_ns / 1e6);
     }
     let Some(items) = index else {
@@ -78,7 +81,10 @@ fn build(spec: &StructureSpec, scene: &Scene) -> Result<Built, Verdict> {
     let regions = if std::ptr::eq(boxes, &scene.items[..]) {
         None
     } else {
-        Some(spec.build(boxes).map_err(refused)?)
+        Some(
+            spec.build_with(boxes, scene.own_tree.as_ref())
+                .map_err(refused)?,
+        )
     };
     Ok(Built {
         memory: items.memory(),

@@ -305,6 +305,9 @@ pub fn harness_overhead_ns() -> f64 {
         fn visible_counted(&self, _: &ConvexVolume, _: &mut Vec<ItemId>, _: &mut QueryCost) {}
         fn locate(&self, _: Vec3, _: &mut Vec<ItemId>) {}
         fn locate_counted(&self, _: Vec3, _: &mut Vec<ItemId>, _: &mut QueryCost) {}
+        fn refit(&mut self, _: &[Aabb], _: &[ItemId]) -> bool {
+            false
+        }
     }
     let Ok(volume) = ConvexVolume::from_planes(&[]) else {
         return 0.0;
@@ -318,6 +321,7 @@ pub fn harness_overhead_ns() -> f64 {
         labels: Vec::new(),
         places: Vec::new(),
         skipped_items: 0,
+        own_tree: None,
     };
     let workload = Workload {
         scene: &scene,

@@ -18,7 +18,7 @@ mod wad;
 
 use glam::DVec3;
 
-use crate::geometry::Aabb;
+use crate::geometry::{Aabb, PlaneTree};
 use crate::input::InputError;
 
 pub use boxes_csv::{read_boxes_csv, write_boxes_csv};
@@ -75,6 +75,8 @@ pub struct Scene {
     pub regions: Regions,
     pub labels: Vec<Labels>,
     pub places: Vec<CameraPlace>,
+    /// The partition that the scene's file brings, local coordinates.
+    pub own_tree: Option<PlaneTree>,
     /// Items left out on request (`--skip-bad-items`).
     pub skipped_items: usize,
 }
@@ -118,6 +120,7 @@ impl Scene {
             regions: Regions::Items,
             labels: Vec::new(),
             places: Vec::new(),
+            own_tree: None,
             skipped_items: 0,
         })
     }

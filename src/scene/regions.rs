@@ -4,7 +4,7 @@
 
 use glam::{DVec2, DVec3, Vec3};
 
-use crate::geometry::Aabb;
+use crate::geometry::{Aabb, Plane, PlaneTree, PlaneTreeNode};
 use crate::query::ItemId;
 
 /// The regions of a scene, numbered from zero.
@@ -210,6 +210,27 @@ impl BspRegions {
             leaf_parent,
             extent: Aabb::new(corner(low), corner(high)),
         })
+    }
+
+    /// The tree's lines as upright planes, for structures that can use them.
+    /// Ties do not matter to those: they keep their own bounds.
+    pub fn plane_tree(&self) -> PlaneTree {
+        let below = |child: BspChild| match child {
+            BspChild::Node(node) => Some(node),
+            BspChild::Leaf(_) => None,
+        };
+        let node = |node: &BspNode| {
+            // Right of the direction is the front.
+            let normal = Vec3::new(node.dy as f32, -node.dx as f32, 0.0);
+            PlaneTreeNode {
+                plane: Plane::through(Vec3::new(node.x as f32, node.y as f32, 0.0), normal),
+                children: node.children.map(below),
+            }
+        };
+        PlaneTree {
+            nodes: self.nodes.iter().map(node).collect(),
+            root: below(self.root),
+        }
     }
 
     pub fn len(&self) -> usize {

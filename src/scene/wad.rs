@@ -93,6 +93,7 @@ impl WadMap {
         }
         // Map coordinates are small integers, exact in f32: no other origin.
         let mut scene = Scene::about(name, &boxes, DVec3::ZERO)?;
+        scene.own_tree = Some(self.bsp.plane_tree());
         scene.regions = Regions::Bsp(self.bsp);
         scene.labels = vec![kinds];
         scene.places = places;

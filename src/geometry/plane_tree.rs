@@ -1,0 +1,20 @@
+//! A binary partition of space that comes from elsewhere, such as a map file:
+//! planes with their children. It holds no items and decides nothing.
+
+use super::Plane;
+
+/// Planes in a tree. Nodes refer to each other by their place in the list.
+#[derive(Clone, Default, PartialEq, Debug)]
+pub struct PlaneTree {
+    pub nodes: Vec<PlaneTreeNode>,
+    /// `None` for a space that is not divided.
+    pub root: Option<u32>,
+}
+
+/// A dividing plane; its inside is the front.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct PlaneTreeNode {
+    pub plane: Plane,
+    /// Front, then back; `None` where the division ends.
+    pub children: [Option<u32>; 2],
+}

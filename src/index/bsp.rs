@@ -1,0 +1,440 @@
+//! The BSP tree: planes of any orientation divide the items, and region search
+//! goes down by the planes alone. It owns the builders that choose planes and
+//! the import of a map's own tree.
+
+use std::ops::ControlFlow;
+
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use super::partition::{Part, Record, Splitter, build_top_down};
+use super::tree::{PackedTree, Stack};
+use super::{BuildError, FrustumQuery, MemoryUsage, RegionIndex, check_range, indexable};
+use crate::geometry::{Aabb, ConvexVolume, Plane, PlaneTree};
+use crate::query::{ItemId, Recorder, Sink};
+
+/// A binary space partition (Fuchs, Kedem and Naylor 1980, "On visible surface
+/// generation by a priori tree structures").
+///
+/// An item that a plane cuts is neither split nor stored twice: it goes to the
+/// side of its centre, and the node keeps how far each side reaches across the
+/// plane (two offsets, as in a bounding interval hierarchy, Waechter and Keller
+/// 2006, but for planes of any direction). On a tiling the offsets meet and the
+/// tree is an exact partition: a point takes one side, O(log n); where items
+/// overlap, it takes both sides where it must.
+pub struct Bsp {
+    tree: PackedTree,
+    /// Per node; unused for leaves.
+    splits: Vec<Split>,
+}
+
+/// The direction of a node's plane and how far its two sides reach along it.
+#[derive(Clone, Copy, Debug)]
+struct Split {
+    normal: Vec3,
+    /// Nothing on the back side reaches farther than this along the normal.
+    back_high: f32,
+    /// Nothing on the front side reaches back beyond this.
+    front_low: f32,
+}
+
+impl Split {
+    const NONE: Split = Split {
+        normal: Vec3::ZERO,
+        back_high: 0.0,
+        front_low: 0.0,
+    };
+
+    /// Position along the normal, by the plane test's own arithmetic: being
+    /// monotone, it never puts a point of an item beyond the item's corner.
+    fn along(&self) -> Plane {
+        Plane::new(self.normal, 0.0)
+    }
+}
+
+/// How planes are chosen.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum BspBuilder {
+    /// Axis-parallel planes by the surface area heuristic, 16 bins (Wald 2007,
+    /// "On fast construction of SAH-based bounding volume hierarchies").
+    Sah,
+    /// The median of the centres along the widest axis: perfectly balanced.
+    Median,
+    /// The median across the direction of largest spread (principal axis of
+    /// the centres): planes of any orientation.
+    Oblique,
+    /// Auto-partition: of the planes that the scene's own boxes and diagonals
+    /// offer, the one that balances best for the fewest cut items.
+    Auto,
+    /// The map's own tree (a Doom WAD has one); what its branches leave
+    /// together is divided by `sah`.
+    Import,
+}
+
+/// Parameters: `bsp:builder=auto,leaf=16,cut=2`.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct BspParams {
+    pub builder: BspBuilder,
+    /// Most items of a leaf (1 to 4096).
+    pub leaf: u32,
+    /// For `auto`: how many items of imbalance one cut item counts as (0 to
+    /// 1000).
+    pub cut: f32,
+}
+
+impl Default for BspParams {
+    fn default() -> Self {
+        BspParams {
+            builder: BspBuilder::Sah,
+            leaf: 16,
+            cut: 1.0,
+        }
+    }
+}
+
+struct PlaneSplitter<'a> {
+    params: BspParams,
+    imported: Option<&'a PlaneTree>,
+    splits: Vec<Split>,
+}
+
+/// What the splitter knows of a group: the imported node to divide it by.
+type Source = Option<u32>;
+
+impl Splitter for PlaneSplitter<'_> {
+    type Cell = Source;
+
+    fn split(
+        &mut self,
+        records: &mut [Record],
+        source: Source,
+        node: usize,
+        parts: &mut Vec<Part<Source>>,
+    ) {
+        let mut at = source;
+        // Imported planes with everything on one side are passed by.
+        while let Some(imported) = at.and_then(|at| self.imported?.nodes.get(at as usize)) {
+            let back = divide(records, |r| {
+                !imported.plane.contains_point(r.bounds.centre())
+            });
+            let [front_child, back_child] = imported.children;
+            if back == 0 || back == records.len() {
+                at = if back == 0 { front_child } else { back_child };
+                continue;
+            }
+            self.keep(node, imported.plane.normal);
+            parts.push(Part {
+                items: back,
+                cell: Some(back_child),
+            });
+            parts.push(Part {
+                items: records.len() - back,
+                cell: Some(front_child),
+            });
+            return;
+        }
+        let chosen = match self.params.builder {
+            BspBuilder::Sah | BspBuilder::Import => by_surface_area(records),
+            BspBuilder::Median => None,
+            BspBuilder::Oblique => by_principal_axis(records),
+            BspBuilder::Auto => by_own_planes(records, self.params.cut),
+        };
+        let (normal, back) = match chosen.filter(|(_, back)| (1..records.len()).contains(back)) {
+            Some(chosen) => chosen,
+            None => by_median(records, widest_axis(records)),
+        };
+        self.keep(node, normal);
+        parts.push(Part {
+            items: back,
+            cell: Some(None),
+        });
+        parts.push(Part {
+            items: records.len() - back,
+            cell: Some(None),
+        });
+    }
+}
+
+impl PlaneSplitter<'_> {
+    fn keep(&mut self, node: usize, normal: Vec3) {
+        if self.splits.len() <= node {
+            self.splits.resize(node + 1, Split::NONE);
+        }
+        self.splits[node].normal = normal;
+    }
+}
+
+/// Moves the records that belong to the back to the front of the slice,
+/// keeping nothing else in order; how many they are. O(n).
+fn divide(records: &mut [Record], to_back: impl Fn(&Record) -> bool) -> usize {
+    let mut back = 0;
+    for i in 0..records.len() {
+        if to_back(&records[i]) {
+            records.swap(back, i);
+            back += 1;
+        }
+    }
+    back
+}
+
+fn centres(records: &[Record]) -> Aabb {
+    let boxes = records.iter().map(|r| r.bounds.centre());
+    boxes.fold(Aabb::EMPTY, |all, c| all.union(&Aabb::new(c, c)))
+}
+
+const AXES: [Vec3; 3] = [Vec3::X, Vec3::Y, Vec3::Z];
+
+fn widest_axis(records: &[Record]) -> Vec3 {
+    let centres = centres(records);
+    let width = centres.max * 0.5 - centres.min * 0.5;
+    let widest = (0..3).max_by(|&a, &b| width[a].total_cmp(&width[b]));
+    AXES[widest.unwrap_or(0)]
+}
+
+/// Halves the records along a direction; ties by id, so that the same items
+/// always give the same tree.
+fn by_median(records: &mut [Record], normal: Vec3) -> (Vec3, usize) {
+    let half = records.len() / 2;
+    let along = Plane::new(normal, 0.0);
+    records.select_nth_unstable_by(half, |a, b| {
+        let [a_at, b_at] = [a, b].map(|r| along.value_at(r.bounds.centre()));
+        a_at.total_cmp(&b_at).then(a.id.cmp(&b.id))
+    });
+    (normal, half)
+}
+
+/// Bins per axis of the surface area heuristic.
+const BINS: usize = 16;
+
+/// The best of 15 planes on each axis by area times count, both sides; `None`
+/// if all centres coincide.
+fn by_surface_area(records: &mut [Record]) -> Option<(Vec3, usize)> {
+    let centres = centres(records);
+    let low = centres.min;
+    let width = centres.max - low;
+    // Beyond f32's range, or no width at all: bins would be NaN.
+    let scale = Vec3::splat(BINS as f32 * 0.999) / width;
+    let usable: Vec<usize> = (0..3)
+        .filter(|&k| scale[k].is_finite() && scale[k] > 0.0)
+        .collect();
+    let bin = |r: &Record, k: usize| {
+        (((r.bounds.centre()[k] - low[k]) * scale[k]) as usize).min(BINS - 1)
+    };
+    let mut bins = [[(Aabb::EMPTY, 0usize); BINS]; 3];
+    for record in records.iter() {
+        for &k in &usable {
+            let (bounds, count) = &mut bins[k][bin(record, k)];
+            *bounds = bounds.union(&record.bounds);
+            *count += 1;
+        }
+    }
+    let mut best: Option<(f32, usize, usize)> = None;
+    for &k in &usable {
+        let mut right = [0.0; BINS];
+        let (mut bounds, mut count) = (Aabb::EMPTY, 0);
+        for i in (1..BINS).rev() {
+            bounds = bounds.union(&bins[k][i].0);
+            count += bins[k][i].1;
+            right[i] = half_area(&bounds) * count as f32;
+        }
+        let (mut bounds, mut count) = (Aabb::EMPTY, 0);
+        for i in 1..BINS {
+            bounds = bounds.union(&bins[k][i - 1].0);
+            count += bins[k][i - 1].1;
+            let cost = half_area(&bounds) * count as f32 + right[i];
+            if best.is_none_or(|(lowest, _, _)| cost < lowest) && count > 0 && count < records.len()
+            {
+                best = Some((cost, k, i));
+            }
+        }
+    }
+    let (_, k, split) = best?;
+    let back = divide(records, |r| bin(r, k) < split);
+    Some((AXES[k], back))
+}
+
+fn half_area(b: &Aabb) -> f32 {
+    let e = b.extent().max(Vec3::ZERO);
+    e.x * e.y + e.y * e.z + e.z * e.x
+}
+
+/// The median across the principal axis of the centres: the dominant
+/// eigenvector of their covariance, by power iteration in f64.
+fn by_principal_axis(records: &mut [Record]) -> Option<(Vec3, usize)> {
+    let centres = centres(records);
+    let middle = centres.centre().as_dvec3();
+    let width = (centres.max.as_dvec3() - centres.min.as_dvec3()).max_element();
+    if width == 0.0 || !width.is_finite() {
+        return None;
+    }
+    let mut covariance = glam::DMat3::ZERO;
+    for record in records.iter() {
+        let d = (record.bounds.centre().as_dvec3() - middle) / width;
+        covariance += glam::DMat3::from_cols(d * d.x, d * d.y, d * d.z);
+    }
+    let mut axis = widest_axis(records).as_dvec3() + glam::DVec3::new(1e-3, 2e-3, 3e-3);
+    for _ in 0..16 {
+        axis = (covariance * axis).try_normalize()?;
+    }
+    Some(by_median(records, axis.as_vec3()))
+}
+
+/// Planes that `auto` looks at per node, and items it judges them by.
+const CANDIDATES: usize = 24;
+const JUDGES: usize = 128;
+
+/// Of the faces of some of the boxes, and of diagonals through their corners,
+/// the plane with the least imbalance plus cut items.
+fn by_own_planes(records: &mut [Record], cut: f32) -> Option<(Vec3, usize)> {
+    let step = records.len().div_ceil(CANDIDATES / 8).max(1);
+    let diagonals = [Vec3::new(1.0, 1.0, 0.0), Vec3::new(1.0, -1.0, 0.0)];
+    let candidates = records.iter().step_by(step).flat_map(|r| {
+        let faces = AXES
+            .into_iter()
+            .flat_map(|n| [(n, r.bounds.min), (n, r.bounds.max)]);
+        let corners = diagonals.into_iter().map(|n| (n, r.bounds.centre()));
+        faces
+            .chain(corners)
+            .map(|(normal, at)| Plane::through(at, normal))
+            .collect::<Vec<_>>()
+    });
+    let judges = records.len().div_ceil(JUDGES).max(1);
+    let mut best: Option<(f32, Plane)> = None;
+    for plane in candidates {
+        let (mut balance, mut cuts) = (0i32, 0u32);
+        for record in records.iter().step_by(judges) {
+            balance += if plane.contains_point(record.bounds.centre()) {
+                1
+            } else {
+                -1
+            };
+            let crosses = !plane.excludes(&record.bounds) && !plane.contains(&record.bounds);
+            cuts += u32::from(crosses);
+        }
+        let cost = balance.unsigned_abs() as f32 + cut * cuts as f32;
+        if best.is_none_or(|(lowest, _)| cost < lowest) {
+            best = Some((cost, plane));
+        }
+    }
+    let (_, plane) = best?;
+    let back = divide(records, |r| !plane.contains_point(r.bounds.centre()));
+    Some((plane.normal, back))
+}
+
+/// How far the two sides of a node reach along its normal, from the bounds of
+/// its children.
+fn measure_reach(splits: &mut [Split], tree: &PackedTree, node: usize) {
+    if tree.is_leaf(node) {
+        return;
+    }
+    let back = &tree.nodes()[node + 1];
+    let front = &tree.nodes()[back.after()];
+    let split = &mut splits[node];
+    let along = split.along();
+    split.back_high = along.value_at(along.p_vertex(&back.bounds));
+    split.front_low = along.value_at(along.n_vertex(&front.bounds));
+}
+
+impl RegionIndex for Bsp {
+    const NAME: &'static str = "bsp";
+    const SUMMARY: &'static str =
+        "binary space partition by planes of any orientation; region search by plane descent";
+    type Params = BspParams;
+
+    fn build(
+        items: &[Aabb],
+        own_tree: Option<&PlaneTree>,
+        params: &BspParams,
+    ) -> Result<Self, BuildError> {
+        check_range(Self::NAME, "leaf", params.leaf.into(), 1.0, 4096.0)?;
+        check_range(Self::NAME, "cut", params.cut.into(), 0.0, 1000.0)?;
+        let imported = match (params.builder, own_tree) {
+            (BspBuilder::Import, None) => {
+                return Err(BuildError::Params {
+                    structure: Self::NAME,
+                    reason: "builder=import, but the scene has no tree of its own".to_owned(),
+                });
+            }
+            (BspBuilder::Import, own) => own,
+            _ => None,
+        };
+        let ids = indexable(items)?;
+        let mut splitter = PlaneSplitter {
+            params: *params,
+            imported,
+            splits: Vec::new(),
+        };
+        let root = imported.and_then(|planes| planes.root);
+        let tree = build_top_down(items, &ids, params.leaf as usize, root, &mut splitter);
+        let mut splits = splitter.splits;
+        splits.resize(tree.nodes().len(), Split::NONE);
+        splits.shrink_to_fit();
+        for node in 0..splits.len() {
+            measure_reach(&mut splits, &tree, node);
+        }
+        Ok(Bsp { tree, splits })
+    }
+
+    fn memory(&self) -> MemoryUsage {
+        let mut memory = self.tree.memory();
+        memory.node_bytes += size_of_val(&self.splits[..]);
+        memory
+    }
+
+    /// Descends by planes: one dot product a node, O(log n) on a tiling.
+    fn locate<S: Sink, R: Recorder>(
+        &self,
+        p: Vec3,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        let nodes = self.tree.nodes();
+        let mut open = Stack::new((0, ()));
+        while let Some((at, ())) = open.pop() {
+            let mut at = at as usize;
+            // An empty tree has no node 0.
+            while let Some(node) = nodes.get(at) {
+                recorder.node_tested();
+                if self.tree.is_leaf(at) {
+                    self.tree.test_items(node.items(), &p, (), sink, recorder)?;
+                    break;
+                }
+                let split = &self.splits[at];
+                let value = split.along().value_at(p);
+                let front = nodes[at + 1].after();
+                // Not `<=`: a NaN (coordinates beyond f32) enters both sides.
+                let beyond_back = value > split.back_high;
+                let before_front = value < split.front_low;
+                at = match (beyond_back, before_front) {
+                    (true, true) => break,
+                    (true, false) => front,
+                    (false, true) => at + 1,
+                    (false, false) => {
+                        open.push((front as u32, ()));
+                        at + 1
+                    }
+                };
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
+    fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
+        let splits = &mut self.splits;
+        self.tree
+            .refit(items, moved, |tree, node| measure_reach(splits, tree, node))
+    }
+}
+
+impl FrustumQuery for Bsp {
+    fn visible<S: Sink, R: Recorder>(
+        &self,
+        volume: &ConvexVolume,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        self.tree.query(volume, sink, recorder)
+    }
+}
