@@ -95,42 +95,52 @@ impl BoxBlock {
     /// The lanes whose closed box holds the point.
     #[inline(always)]
     pub fn holding(&self, p: Vec3) -> LaneMask {
-        let mut held = [true; LANES];
-        for (k, x) in p.to_array().into_iter().enumerate() {
-            let (low, high) = (&self.rows[k], &self.rows[k + 3]);
-            for lane in 0..LANES {
-                held[lane] &= low[lane] <= x && x <= high[lane];
-            }
-        }
-        bits(&held)
+        self.meeting(&Aabb::new(p, p))
     }
 
     /// The lanes whose closed box shares a point with `b`.
     #[inline(always)]
     pub fn meeting(&self, b: &Aabb) -> LaneMask {
-        let mut met = [true; LANES];
-        for k in 0..3 {
-            let (low, high) = (&self.rows[k], &self.rows[k + 3]);
-            for lane in 0..LANES {
-                met[lane] &= low[lane] <= b.max[k] && b.min[k] <= high[lane];
-            }
+        let [low_x, low_y, low_z, high_x, high_y, high_z] = &self.rows;
+        let mut met = [0; LANES];
+        for lane in 0..LANES {
+            let x = (low_x[lane] <= b.max.x) & (b.min.x <= high_x[lane]);
+            let y = (low_y[lane] <= b.max.y) & (b.min.y <= high_y[lane]);
+            let z = (low_z[lane] <= b.max.z) & (b.min.z <= high_z[lane]);
+            met[lane] = if x & y & z { LANE_BITS[lane] } else { 0 };
         }
-        bits(&met)
+        joined(&met)
     }
 }
 
+/// The bit of each lane, as wide as a float: a comparison then selects among
+/// them without leaving the vector.
+const LANE_BITS: [u32; LANES] = {
+    let mut bits = [0; LANES];
+    let mut lane = 0;
+    while lane < LANES {
+        bits[lane] = 1 << lane;
+        lane += 1;
+    }
+    bits
+};
+
 #[inline(always)]
 fn below_zero(values: &[f32; LANES]) -> LaneMask {
-    values.iter().enumerate().fold(0, |mask, (lane, value)| {
-        mask | (LaneMask::from(*value < 0.0) << lane)
-    })
+    let mut below = [0; LANES];
+    for lane in 0..LANES {
+        below[lane] = if values[lane] < 0.0 {
+            LANE_BITS[lane]
+        } else {
+            0
+        };
+    }
+    joined(&below)
 }
 
 #[inline(always)]
-fn bits(flags: &[bool; LANES]) -> LaneMask {
-    flags.iter().enumerate().fold(0, |mask, (lane, flag)| {
-        mask | (LaneMask::from(*flag) << lane)
-    })
+fn joined(bits: &[u32; LANES]) -> LaneMask {
+    bits.iter().fold(0, |all, bit| all | bit) as LaneMask
 }
 
 /// Boxes in blocks, in the order in which they were pushed; the last block is

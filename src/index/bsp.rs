@@ -87,7 +87,7 @@ pub struct BspParams {
 impl Default for BspParams {
     fn default() -> Self {
         BspParams {
-            builder: BspBuilder::Sah,
+            builder: BspBuilder::Median,
             leaf: 16,
             cut: 1.0,
         }
