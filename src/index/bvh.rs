@@ -7,8 +7,8 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use glam::Vec3;
+use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
-use obvhs::bvh2::node::Bvh2Node;
 use obvhs::{Boundable, BvhBuildParams};
 use serde::{Deserialize, Serialize};
 
@@ -74,18 +74,76 @@ impl Boundable for Aabb {
     }
 }
 
-/// The boxes that obvhs is to build over: the items themselves where they can
-/// be used as they are, so that ten million of them are not copied.
-fn buildable<'a>(items: &'a [Aabb], ids: &[ItemId]) -> Cow<'a, [Aabb]> {
-    let scale = scale_for(items);
-    if scale == 1.0 && ids.len() == items.len() {
-        return Cow::Borrowed(items);
+/// Items in stacks of the very same bounds. Clustering by nearest neighbour
+/// finds no nearest one among equals and needs quadratic time: obvhs gets one
+/// box for a stack, and the stack's items share its leaf.
+struct Stacks {
+    members: Vec<ItemId>,
+    /// Where each stack begins in `members`; empty if every item stands alone.
+    starts: Vec<u32>,
+}
+
+/// Items that are looked at to see whether there are stacks at all. What slips
+/// through is small, and so is its cost.
+const STACK_SAMPLE: usize = 4096;
+
+impl Stacks {
+    fn of(items: &[Aabb], mut ids: Vec<ItemId>) -> Stacks {
+        let key = |&id: &ItemId| {
+            let b = items[id as usize];
+            [b.min, b.max].map(|corner| corner.to_array().map(f32::to_bits))
+        };
+        let step = ids.len().div_ceil(STACK_SAMPLE).max(1);
+        let mut sample: Vec<_> = ids.iter().step_by(step).map(key).collect();
+        sample.sort_unstable();
+        let mut starts = Vec::new();
+        if sample.windows(2).any(|pair| pair[0] == pair[1]) {
+            ids.sort_unstable_by_key(|id| (key(id), *id));
+            let begins = |i: usize| i == 0 || key(&ids[i]) != key(&ids[i - 1]);
+            starts = (0..ids.len())
+                .filter(|&i| begins(i))
+                .map(|i| i as u32)
+                .collect();
+        }
+        Stacks {
+            members: ids,
+            starts,
+        }
     }
-    let scaled = ids.iter().map(|&id| {
-        let b = items[id as usize];
-        Aabb::new(b.min * scale, b.max * scale)
-    });
-    scaled.collect()
+
+    fn get(&self, stack: u32) -> &[ItemId] {
+        let stack = stack as usize;
+        if self.starts.is_empty() {
+            return &self.members[stack..=stack];
+        }
+        let end = self
+            .starts
+            .get(stack + 1)
+            .map_or(self.members.len(), |&end| end as usize);
+        &self.members[self.starts[stack] as usize..end]
+    }
+
+    /// The boxes that obvhs is to build over, one a stack: the items
+    /// themselves where they can be used as they are, so that ten million of
+    /// them are not copied.
+    fn boxes<'a>(&self, items: &'a [Aabb]) -> Cow<'a, [Aabb]> {
+        let scale = scale_for(items);
+        if scale == 1.0 && self.starts.is_empty() && self.members.len() == items.len() {
+            return Cow::Borrowed(items);
+        }
+        let scaled = |&id: &ItemId| {
+            let b = items[id as usize];
+            Aabb::new(b.min * scale, b.max * scale)
+        };
+        match self.starts.is_empty() {
+            true => self.members.iter().map(scaled).collect(),
+            false => self
+                .starts
+                .iter()
+                .map(|&at| scaled(&self.members[at as usize]))
+                .collect(),
+        }
+    }
 }
 
 /// A power of two that brings the scene near unit size, or 1 for coordinates
@@ -104,12 +162,13 @@ fn scale_for(items: &[Aabb]) -> f32 {
 /// Lays the items out in depth-first order. An item that comes again (obvhs
 /// splits large ones on request) is kept once. Iterative, so that a degenerate
 /// tree cannot overflow the stack. O(n).
-fn relaid(items: &[Aabb], order: &[ItemId], nodes: &[Bvh2Node]) -> PackedTree {
+fn relaid(items: &[Aabb], stacks: &Stacks, built: &Bvh2) -> PackedTree {
     enum Task {
         Enter(u32),
         Leave(usize),
     }
-    let mut writer = TreeWriter::with_capacity(order.len());
+    let order = &built.primitive_indices;
+    let mut writer = TreeWriter::with_capacity(stacks.members.len());
     let mut placed = vec![false; items.len()];
     let mut open = vec![Task::Enter(0)];
     while let Some(task) = open.pop() {
@@ -118,12 +177,13 @@ fn relaid(items: &[Aabb], order: &[ItemId], nodes: &[Bvh2Node]) -> PackedTree {
                 writer.close(node);
                 continue;
             }
-            Task::Enter(source) => &nodes[source as usize],
+            Task::Enter(source) => &built.nodes[source as usize],
         };
         open.push(Task::Leave(writer.open()));
         let first = source.first_index;
         if source.is_leaf() {
-            for &id in &order[first as usize..(first + source.prim_count) as usize] {
+            let places = &order[first as usize..(first + source.prim_count) as usize];
+            for &id in places.iter().flat_map(|&place| stacks.get(place)) {
                 if !std::mem::replace(&mut placed[id as usize], true) {
                     writer.push(id, &items[id as usize]);
                 }
@@ -147,27 +207,21 @@ impl RegionIndex for Bvh {
         params: &BvhParams,
     ) -> Result<Self, BuildError> {
         check_range(Self::NAME, "leaf", params.leaf.into(), 1.0, 255.0)?;
-        let ids = indexable(items)?;
-        if ids.is_empty() {
+        let stacks = Stacks::of(items, indexable(items)?);
+        let boxes = stacks.boxes(items);
+        if boxes.is_empty() || stacks.members.is_empty() {
             return Ok(Bvh {
                 tree: PackedTree::default(),
             });
         }
-        let boxes = buildable(items, &ids);
         let config = BvhBuildParams {
             max_prims_per_leaf: params.leaf,
             ..params.preset.params()
         };
         let built = build_bvh2(&boxes, config, &mut Duration::default());
         drop(boxes);
-        let order: Vec<ItemId> = built
-            .primitive_indices
-            .iter()
-            .map(|&place| ids[place as usize])
-            .collect();
-        drop(ids);
         Ok(Bvh {
-            tree: relaid(items, &order, &built.nodes),
+            tree: relaid(items, &stacks, &built),
         })
     }
 
