@@ -63,7 +63,7 @@ pub fn all_agree(answers: &[Answer], what: &str) -> bool {
         let base = first.entry(answer.question).or_insert(answer);
         if (base.count, base.id_sum) != (answer.count, answer.id_sum) {
             agree = false;
-            eprintln!(
+            super::tell(&format!(
                 "error: {what} {}: {} finds {} ids with sum {}, {} finds {} with sum {}",
                 answer.question,
                 base.structure,
@@ -72,7 +72,7 @@ pub fn all_agree(answers: &[Answer], what: &str) -> bool {
                 answer.structure,
                 answer.count,
                 answer.id_sum
-            );
+            ));
         }
     }
     agree

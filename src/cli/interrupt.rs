@@ -19,6 +19,6 @@ pub fn install() {
     // Without a handler Ctrl-C simply ends the program: nothing is lost but
     // the cell that was being measured.
     if let Err(error) = ctrlc::set_handler(handler) {
-        eprintln!("warning: no clean stop on Ctrl-C: {error}");
+        super::tell(&format!("warning: no clean stop on Ctrl-C: {error}"));
     }
 }

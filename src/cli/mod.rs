@@ -16,7 +16,8 @@ mod scene;
 mod text;
 mod verify;
 
-use std::io;
+use std::error::Error;
+use std::io::{self, Write};
 use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser};
@@ -45,10 +46,7 @@ pub fn main() -> ExitCode {
         Command::Scene(SceneCommand::Info(args)) => scene::info(&args),
         Command::Scene(SceneCommand::Generate(args)) => scene::generate(&args),
         Command::Env(args) => env::env(&args),
-        Command::Completions { shell } => {
-            clap_complete::generate(shell, &mut Cli::command(), "cullbench", &mut io::stdout());
-            Ok(Ending::Ok)
-        }
+        Command::Completions { shell } => completions(shell),
         Command::Man => man(),
     };
     match ended {
@@ -56,25 +54,93 @@ pub fn main() -> ExitCode {
         Ok(Ending::WrongAnswer) => ExitCode::from(1),
         Ok(Ending::Interrupted) => ExitCode::from(130),
         // Nobody reads on: not our failure.
-        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) if error.chain().any(is_broken_pipe) => ExitCode::SUCCESS,
         Err(error) => {
-            // One line: the context first, then its causes.
-            eprintln!("error: {error:#}");
+            tell(&format!("error: {}", told_once(&error)));
             ExitCode::from(2)
         }
     }
 }
 
-fn is_broken_pipe(error: &anyhow::Error) -> bool {
-    error.chain().any(|cause| {
-        let io = cause.downcast_ref::<io::Error>();
-        io.is_some_and(|e| e.kind() == io::ErrorKind::BrokenPipe)
-    })
+/// One line on stderr, whatever is in the text. Unlike `eprintln!` it does
+/// not panic when nobody can be told.
+fn tell(line: &str) {
+    let plain = line.replace(char::is_control, " ");
+    let _ = writeln!(io::stderr(), "{plain}");
+}
+
+/// The context first, then its causes, but for those that the text before
+/// them has told already.
+fn told_once(error: &anyhow::Error) -> String {
+    let mut text = String::new();
+    for cause in error.chain().map(ToString::to_string) {
+        if text.is_empty() {
+            text = cause;
+        } else if !text.contains(&cause) {
+            text = format!("{text}: {cause}");
+        }
+    }
+    text
+}
+
+/// Whether an error is or wraps a broken pipe. `io` and `csv` errors wrap one
+/// another without naming each other as the source.
+fn is_broken_pipe(error: &(dyn Error + 'static)) -> bool {
+    if let Some(io) = error.downcast_ref::<io::Error>() {
+        return io.kind() == io::ErrorKind::BrokenPipe
+            || io.get_ref().is_some_and(|inner| is_broken_pipe(inner));
+    }
+    let csv = error.downcast_ref::<csv::Error>();
+    csv.is_some_and(
+        |e| matches!(e.kind(), csv::ErrorKind::Io(io) if io.kind() == io::ErrorKind::BrokenPipe),
+    )
+}
+
+fn completions(shell: clap_complete::Shell) -> anyhow::Result<Ending> {
+    // Written to memory first: clap_complete panics on a closed pipe.
+    let mut script = Vec::new();
+    clap_complete::generate(shell, &mut Cli::command(), "cullbench", &mut script);
+    io::stdout().write_all(&script)?;
+    Ok(Ending::Ok)
 }
 
 fn man() -> anyhow::Result<Ending> {
     let mut page = Vec::new();
     clap_mangen::Man::new(Cli::command()).render(&mut page)?;
-    io::Write::write_all(&mut io::stdout(), &page)?;
+    io::stdout().write_all(&page)?;
     Ok(Ending::Ok)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use anyhow::Context;
+
+    fn broken() -> io::Error {
+        io::ErrorKind::BrokenPipe.into()
+    }
+
+    #[test]
+    fn a_broken_pipe_is_found_below_any_wrapping() {
+        let wrapped = [
+            anyhow::Error::from(broken()),
+            anyhow::Error::from(csv::Error::from(broken())),
+            anyhow::Error::from(io::Error::from(csv::Error::from(broken()))),
+        ];
+        for error in wrapped {
+            let error = Err::<(), _>(error).context("writing").unwrap_err();
+            assert!(error.chain().any(is_broken_pipe), "{error:#}");
+        }
+        let other = io::Error::from(csv::Error::from(io::Error::other("full")));
+        assert!(!is_broken_pipe(&other));
+    }
+
+    #[test]
+    fn no_cause_is_told_twice() {
+        let error = Err::<(), _>(io::Error::other("b: is full"))
+            .context("b: is full")
+            .context("a")
+            .unwrap_err();
+        assert_eq!(told_once(&error), "a: b: is full");
+    }
 }

@@ -4,9 +4,9 @@ use std::io::{self, BufWriter, Write};
 
 use serde_json::{Map, Value, json};
 
-use super::Ending;
 use super::args::{QueryArgs, RowFormat, test_named};
 use super::compare_structures::{Answer, all_agree, ask_all, joined};
+use super::{Ending, tell};
 use cullbench::index::structures;
 use cullbench::measure::Workload;
 use cullbench::path;
@@ -23,10 +23,10 @@ pub fn query(args: &QueryArgs) -> anyhow::Result<Ending> {
     let cameras = path::load(&args.cameras, &scene, &defaults)?;
     let workload = Workload::new(&scene, &cameras, &options)?;
     if scene.skipped_items > 0 {
-        eprintln!(
+        tell(&format!(
             "note: {} bad item(s) left out of {}",
             scene.skipped_items, scene.name
-        );
+        ));
     }
     let ask = |index: &dyn cullbench::index::DynIndex, camera: usize, out: &mut _, cost: &mut _| {
         index.visible_counted(&workload.volumes[camera], out, cost);

@@ -5,7 +5,7 @@ use std::io::{self, BufWriter, Write};
 use serde_json::json;
 
 use super::args::{SceneGenerateArgs, SceneInfoArgs, TableFormat};
-use super::{Ending, text};
+use super::{Ending, tell, text};
 use cullbench::measure::SceneInfo;
 use cullbench::report::write_atomically;
 use cullbench::scene::{self, LoadOptions, Regions, Scene, write_boxes_csv};
@@ -110,11 +110,11 @@ pub fn generate(args: &SceneGenerateArgs) -> anyhow::Result<Ending> {
     match &args.out {
         Some(path) => {
             write_atomically(path, |out| write_boxes_csv(&scene, out))?;
-            eprintln!(
+            tell(&format!(
                 "{}: {} items",
                 path.display(),
                 text::count(scene.items.len())
-            );
+            ));
         }
         None => {
             let mut out = BufWriter::new(io::stdout().lock());
