@@ -2,15 +2,17 @@
 //! file, line and column. It owns the mechanics that the box, camera and point
 //! readers share; what the columns mean is theirs.
 
-use std::io::Read;
+use std::collections::VecDeque;
+use std::io::{self, Read};
 
 use super::InputError;
 
 /// A CSV file with its header read.
 pub struct TableReader<R> {
     file: String,
-    csv: csv::Reader<R>,
+    csv: csv::Reader<LineCounter<R>>,
     header: Vec<String>,
+    header_line: u64,
     record: csv::ByteRecord,
 }
 
@@ -31,7 +33,7 @@ impl<R: Read> TableReader<R> {
         let mut csv = csv::ReaderBuilder::new()
             .flexible(true)
             .trim(csv::Trim::All)
-            .from_reader(input);
+            .from_reader(LineCounter::new(input));
         let fields = csv
             .byte_headers()
             .map_err(|error| csv_error(file, error))?
@@ -44,9 +46,10 @@ impl<R: Read> TableReader<R> {
                     .to_owned()
             })
             .collect();
+        let header_line = csv.get_mut().line_of_record_at(0);
         let complain = |found: String, expected: &str| InputError::Line {
             file: file.to_owned(),
-            line: 1,
+            line: header_line,
             found,
             expected: expected.to_owned(),
         };
@@ -55,7 +58,7 @@ impl<R: Read> TableReader<R> {
         }
         for (i, name) in header.iter().enumerate() {
             if !name.is_empty() && header[..i].contains(name) {
-                let found = format!("column '{name}' twice");
+                let found = format!("column '{}' twice", shortened(name));
                 return Err(complain(found, "each column once"));
             }
         }
@@ -63,6 +66,7 @@ impl<R: Read> TableReader<R> {
             file: file.to_owned(),
             csv,
             header,
+            header_line,
             record: csv::ByteRecord::new(),
         })
     }
@@ -82,7 +86,7 @@ impl<R: Read> TableReader<R> {
         for (place, name) in places.iter_mut().zip(names) {
             *place = self.column(name).ok_or_else(|| InputError::Line {
                 file: self.file.clone(),
-                line: 1,
+                line: self.header_line,
                 found: format!(
                     "no column '{name}' in '{}'",
                     shortened(&self.header.join(","))
@@ -99,10 +103,11 @@ impl<R: Read> TableReader<R> {
             Ok(false) => None,
             Err(error) => Some(Err(csv_error(&self.file, error))),
             Ok(true) => {
+                let start = self.record.position().map_or(0, csv::Position::byte);
                 let row = Row {
                     file: &self.file,
                     header: &self.header,
-                    line: self.record.position().map_or(0, csv::Position::line),
+                    line: self.csv.get_mut().line_of_record_at(start),
                     record: &self.record,
                 };
                 let (found, wanted) = (self.record.len(), self.header.len());
@@ -144,6 +149,59 @@ impl Row<'_> {
     }
 }
 
+/// Counts lines as an editor does, on the way to the CSV reader. That one
+/// states where it began to look for a record, which after an empty line, and
+/// after every line of a file with Windows line ends, is a line too early.
+struct LineCounter<R> {
+    input: R,
+    offset: u64,
+    line: u64,
+    last: u8,
+    /// Offset and number of the lines that are not empty, as far as the CSV
+    /// reader has not passed them.
+    starts: VecDeque<(u64, u64)>,
+}
+
+impl<R> LineCounter<R> {
+    fn new(input: R) -> Self {
+        LineCounter {
+            input,
+            offset: 0,
+            line: 0,
+            last: b'\n',
+            starts: VecDeque::new(),
+        }
+    }
+
+    /// The line of the first record that begins at or after a byte. Records
+    /// must be asked for in the order of the file.
+    fn line_of_record_at(&mut self, byte: u64) -> u64 {
+        while self.starts.front().is_some_and(|start| start.0 < byte) {
+            self.starts.pop_front();
+        }
+        self.starts
+            .front()
+            .map_or(self.line.max(1), |start| start.1)
+    }
+}
+
+impl<R: Read> Read for LineCounter<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.input.read(buffer)?;
+        for &byte in &buffer[..count] {
+            let is_end = |b: u8| b == b'\n' || b == b'\r';
+            if is_end(self.last) && (self.last, byte) != (b'\r', b'\n') {
+                self.line += 1;
+                if !is_end(byte) {
+                    self.starts.push_back((self.offset, self.line));
+                }
+            }
+            (self.last, self.offset) = (byte, self.offset + 1);
+        }
+        Ok(count)
+    }
+}
+
 /// Long or multi-line text cut down to what fits an error line.
 fn shortened(text: &str) -> String {
     let mut short: String = text
@@ -170,5 +228,54 @@ fn csv_error(file: &str, error: csv::Error) -> InputError {
             found: format!("{other:?}"),
             expected: "comma-separated values".into(),
         },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The line of the first row whose field `x` is no number.
+    fn bad_line(text: &str) -> u64 {
+        let mut table = TableReader::open(text.as_bytes(), "t.csv").unwrap();
+        while let Some(row) = table.next_row() {
+            match row.and_then(|row| row.finite_number(0)) {
+                Err(InputError::Line { line, .. }) => return line,
+                other => assert!(other.is_ok(), "{other:?}"),
+            }
+        }
+        0
+    }
+
+    #[test]
+    fn lines_are_those_of_an_editor() {
+        for end in ["\n", "\r\n", "\r"] {
+            let cases = [
+                ("x,y|1,2|q,2|", 3),
+                ("x,y|1,2|q,2", 3),
+                ("||x,y|||1,2||q,2|", 8),
+                ("x,y|1,\"a|b||c\"|q,2|", 6),
+                ("x,y|1,2|1|", 3),
+                ("\u{feff}x,y|q,2|", 2),
+            ];
+            for (text, line) in cases {
+                assert_eq!(bad_line(&text.replace('|', end)), line, "{text} {end:?}");
+            }
+        }
+        // Longer than any buffer.
+        let rows = format!("1,{}\r\n", "a".repeat(100)).repeat(5000);
+        assert_eq!(bad_line(&format!("x,y\r\n{rows}q,2\r\n")), 5002);
+    }
+
+    #[test]
+    fn header_errors_fit_one_line() {
+        let twice = format!("\n\"{0}\n\",\"{0}\n\"\n", "long".repeat(50));
+        let error = TableReader::open(twice.as_bytes(), "t.csv").err().unwrap();
+        let error = error.to_string();
+        assert!(
+            error.starts_with("t.csv, line 2: column 'longlong"),
+            "{error}"
+        );
+        assert!(!error.contains('\n') && error.len() < 150, "{error}");
     }
 }
