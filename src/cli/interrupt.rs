@@ -1,9 +1,16 @@
-//! Ctrl-C: the first one asks the work to stop at the next safe place, the
-//! second one ends the program at once.
+//! Ctrl-C. Until a command has something to keep, it ends the program at
+//! once. After `from_now_on_finish` the first one asks the work to stop at the
+//! next safe place, and the second one ends the program.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
 static ASKED: AtomicBool = AtomicBool::new(false);
+static TO_FINISH: AtomicBool = AtomicBool::new(false);
+
+/// From now on the work looks at [`asked`] and leaves nothing half done.
+pub fn from_now_on_finish() {
+    TO_FINISH.store(true, Ordering::Relaxed);
+}
 
 /// Whether somebody has asked to stop.
 pub fn asked() -> bool {
@@ -12,7 +19,7 @@ pub fn asked() -> bool {
 
 pub fn install() {
     let handler = || {
-        if ASKED.swap(true, Ordering::Relaxed) {
+        if ASKED.swap(true, Ordering::Relaxed) || !TO_FINISH.load(Ordering::Relaxed) {
             std::process::exit(130);
         }
     };

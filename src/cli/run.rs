@@ -116,6 +116,7 @@ fn scenes(args: &RunArgs, suite: &Suite) -> Vec<(String, Vec<String>)> {
 pub fn run(args: &RunArgs) -> anyhow::Result<Ending> {
     let plan = Plan::new(args)?;
     let machine = Machine::capture();
+    interrupt::from_now_on_finish();
     let (mut folder, mut report) = open(args, &plan, &machine)?;
     let started = Instant::now();
     let bar = progress(plan.groups() as u64);

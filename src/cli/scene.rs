@@ -5,7 +5,7 @@ use std::io::{self, BufWriter, Write};
 use serde_json::json;
 
 use super::args::{SceneGenerateArgs, SceneInfoArgs, TableFormat};
-use super::{Ending, tell, text};
+use super::{Ending, interrupt, tell, text};
 use cullbench::measure::SceneInfo;
 use cullbench::report::write_atomically;
 use cullbench::scene::{self, LoadOptions, Regions, Scene, write_boxes_csv};
@@ -109,7 +109,13 @@ pub fn generate(args: &SceneGenerateArgs) -> anyhow::Result<Ending> {
     let scene = scene::load(&args.scene, &LoadOptions::default())?;
     match &args.out {
         Some(path) => {
-            write_atomically(path, |out| write_boxes_csv(&scene, out))?;
+            interrupt::from_now_on_finish();
+            let written =
+                write_atomically(path, |out| write_boxes_csv(&scene, UntilInterrupted(out)));
+            if interrupt::asked() {
+                return Ok(Ending::Interrupted);
+            }
+            written?;
             tell(&format!(
                 "{}: {} items",
                 path.display(),
@@ -123,4 +129,20 @@ pub fn generate(args: &SceneGenerateArgs) -> anyhow::Result<Ending> {
         }
     }
     Ok(Ending::Ok)
+}
+
+/// Fails once somebody has asked to stop: the half-written file then goes.
+struct UntilInterrupted<W>(W);
+
+impl<W: Write> Write for UntilInterrupted<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if interrupt::asked() {
+            return Err(io::Error::other("interrupted"));
+        }
+        self.0.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.0.flush()
+    }
 }

@@ -5,11 +5,12 @@
 use std::io::{self, Write};
 use std::time::Instant;
 
+use anyhow::bail;
 use indicatif::ProgressBar;
 use serde::Serialize;
 
 use super::args::{LensArgs, TableFormat, VerifyArgs};
-use super::{Ending, interrupt, text};
+use super::{Ending, interrupt, tell, text};
 use cullbench::index::{DynIndex, StructureSpec, structures};
 use cullbench::measure::{Contender, Workload, count_pass};
 use cullbench::path;
@@ -65,11 +66,18 @@ pub fn verify(args: &VerifyArgs) -> anyhow::Result<Ending> {
         ([], _) => default_scenes(),
         (named, _) => named.to_vec(),
     };
+    if scenes.is_empty() && cases == 0 {
+        bail!("nothing to verify: no scene and --cases 0; expected one or the other");
+    }
+    interrupt::from_now_on_finish();
     let started = Instant::now();
     let bar = ProgressBar::new(scenes.len() as u64 + 1);
     let mut checks = Vec::new();
     let mut interrupted = false;
     for source in &scenes {
+        if interrupted {
+            break;
+        }
         bar.set_message(source.clone());
         let scene = scene::load(source, &load)?;
         let contenders: Vec<Contender> = structures
@@ -90,7 +98,9 @@ pub fn verify(args: &VerifyArgs) -> anyhow::Result<Ending> {
     }
     if cases > 0 && !interrupted {
         bar.set_message(format!("{cases} random cases"));
-        checks.extend(random_cases(&structures, args.seed, cases));
+        let checked = random_cases(&structures, args.seed, cases);
+        interrupted = checked.first().is_some_and(|c| (c.volumes as u64) < cases);
+        checks.extend(checked);
     }
     bar.finish_and_clear();
     let outcome = Outcome {
@@ -103,6 +113,9 @@ pub fn verify(args: &VerifyArgs) -> anyhow::Result<Ending> {
         checks,
     };
     show(&outcome, args.format)?;
+    if interrupted {
+        tell("interrupted: only what is shown was checked");
+    }
     Ok(match (outcome.ok, interrupted) {
         (false, _) => Ending::WrongAnswer,
         (true, true) => Ending::Interrupted,
