@@ -6,6 +6,8 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
+use tempfile::NamedTempFile;
+
 use super::{Report, ReportCell, SCHEMA_VERSION, SamplesRef};
 use crate::measure::{METRICS, Sample, Task};
 
@@ -37,11 +39,19 @@ pub enum FolderError {
     },
     #[error("{}: schema version {found}; expected {SCHEMA_VERSION}", path.display())]
     Version { path: PathBuf, found: u32 },
+    #[error("{}: {found} rows; expected {rows} that report.json refers to", path.display())]
+    Samples {
+        path: PathBuf,
+        found: u64,
+        rows: u64,
+    },
     #[error("{} already holds a run; expected an empty or new folder (--resume goes on with it)", path.display())]
     Taken { path: PathBuf },
 }
 
-/// Writes a file whole or not at all.
+/// Writes a file whole or not at all. A link stays one, and its target is
+/// what is replaced; an existing file keeps its permissions. What is no file
+/// (a terminal, a pipe, `/dev/null`) is written to and never replaced.
 ///
 /// # Errors
 /// What the file system says, with the path.
@@ -50,21 +60,35 @@ pub fn write_atomically(
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), FolderError> {
     let attempt = || -> io::Result<()> {
-        let folder = match path.parent() {
+        let old = fs::metadata(path).ok();
+        if old
+            .as_ref()
+            .is_some_and(|old| !old.is_file() && !old.is_dir())
+        {
+            let mut stream = BufWriter::new(OpenOptions::new().write(true).open(path)?);
+            write(&mut stream)?;
+            return stream.flush();
+        }
+        let target = match &old {
+            Some(_) => fs::canonicalize(path)?,
+            None => path.to_owned(),
+        };
+        let folder = match target.parent() {
             Some(parent) if !parent.as_os_str().is_empty() => parent,
             _ => Path::new("."),
         };
-        let mut file = tempfile::Builder::new()
-            .prefix(".cullbench-")
-            .suffix(".tmp")
-            .tempfile_in(folder)?;
+        // A missing folder is reported by its own name, not by a temporary one.
+        fs::metadata(folder)?;
+        let mut file = temporary_beside(folder)?;
         {
             let mut buffered = BufWriter::new(&mut file);
             write(&mut buffered)?;
             buffered.flush()?;
         }
-        share(file.as_file())?;
-        file.persist(path)?;
+        if let Some(old) = old.filter(fs::Metadata::is_file) {
+            file.as_file().set_permissions(old.permissions())?;
+        }
+        file.persist(target)?;
         Ok(())
     };
     attempt().map_err(|source| FolderError::Io {
@@ -73,16 +97,17 @@ pub fn write_atomically(
     })
 }
 
-/// Temporary files are private; results are meant to be read.
-#[cfg(unix)]
-fn share(file: &File) -> io::Result<()> {
-    use std::os::unix::fs::PermissionsExt;
-    file.set_permissions(fs::Permissions::from_mode(0o644))
-}
-
-#[cfg(not(unix))]
-fn share(_: &File) -> io::Result<()> {
-    Ok(())
+/// Temporary files are private by themselves; results are meant to be read,
+/// as far as the user's umask lets them.
+fn temporary_beside(folder: &Path) -> io::Result<NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".cullbench-").suffix(".tmp");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(fs::Permissions::from_mode(0o666));
+    }
+    builder.tempfile_in(folder)
 }
 
 /// An open run.
@@ -96,14 +121,17 @@ impl RunFolder {
     /// Makes the folder of a new run.
     ///
     /// # Errors
-    /// [`FolderError::Taken`] if it holds a report already.
+    /// [`FolderError::Taken`] if it holds a file of a run already.
     pub fn create(path: &Path) -> Result<RunFolder, FolderError> {
         let io = |source| FolderError::Io {
             path: path.to_owned(),
             source,
         };
         fs::create_dir_all(path).map_err(io)?;
-        if path.join(REPORT).exists() {
+        if [REPORT, SUMMARY, SAMPLES]
+            .iter()
+            .any(|f| path.join(f).exists())
+        {
             return Err(FolderError::Taken {
                 path: path.to_owned(),
             });
@@ -121,21 +149,37 @@ impl RunFolder {
     /// that no cell refers to (the stop came in between) are cut off.
     ///
     /// # Errors
-    /// No report, not a report, or one of another schema version.
+    /// No report, not a report, one of another schema version, or fewer
+    /// samples than the report refers to.
     pub fn resume(path: &Path) -> Result<(RunFolder, Report), FolderError> {
         let report = Self::read(path)?;
         let rows = report.cells.iter().filter_map(|c| c.samples_ref.as_ref());
-        let rows = rows.map(|r| r.first_row + r.rows).max().unwrap_or(0);
+        let rows = rows
+            .map(|r| r.first_row.saturating_add(r.rows))
+            .max()
+            .unwrap_or(0);
         let file = path.join(SAMPLES);
         let io = |source| FolderError::Io {
             path: file.clone(),
             source,
         };
         let text = fs::read(&file).map_err(io)?;
-        let lines = text
-            .split_inclusive(|b| *b == b'\n')
-            .take(rows as usize + 1);
-        let length = lines.map(|line| line.len() as u64).sum();
+        let (mut length, mut found) = (0, 0);
+        for line in text.split_inclusive(|b| *b == b'\n') {
+            if found > rows {
+                break;
+            }
+            length += line.len() as u64;
+            found += 1;
+        }
+        if found <= rows {
+            let found = found.saturating_sub(1);
+            return Err(FolderError::Samples {
+                path: file,
+                found,
+                rows,
+            });
+        }
         let mut samples = OpenOptions::new().write(true).open(&file).map_err(io)?;
         samples.set_len(length).map_err(io)?;
         samples.seek(SeekFrom::End(0)).map_err(io)?;
@@ -324,5 +368,26 @@ mod tests {
         assert!(failed.unwrap_err().to_string().contains("disk full"));
         assert_eq!(fs::read_to_string(&path).unwrap(), "old");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+        let nowhere = folder.path().join("no/file.txt");
+        let error = write_atomically(&nowhere, |_| Ok(())).unwrap_err();
+        assert!(!error.to_string().contains(".cullbench-"), "{error}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_and_permissions_stay() {
+        use std::os::unix::fs::{PermissionsExt, symlink};
+        let folder = tempfile::tempdir().unwrap();
+        let (file, link) = (folder.path().join("file"), folder.path().join("link"));
+        fs::write(&file, "old").unwrap();
+        fs::set_permissions(&file, fs::Permissions::from_mode(0o600)).unwrap();
+        symlink("file", &link).unwrap();
+        write_atomically(&link, |out| out.write_all(b"new")).unwrap();
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(fs::read_to_string(&file).unwrap(), "new");
+        assert_eq!(
+            fs::metadata(&file).unwrap().permissions().mode() & 0o777,
+            0o600
+        );
     }
 }
