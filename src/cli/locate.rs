@@ -6,10 +6,10 @@ use std::io::{self, BufWriter, Write};
 use anyhow::Context;
 use serde_json::{Value, json};
 
-use super::Ending;
 use super::args::{LocateArgs, RowFormat};
 use super::compare_structures::{Answer, all_agree, ask_all, joined};
 use super::query::with_ids;
+use super::{Ending, unread_is_fine};
 use cullbench::index::structures;
 use cullbench::path::read_points_csv;
 use cullbench::scene::{self, LoadOptions};
@@ -34,7 +34,7 @@ pub fn locate(args: &LocateArgs) -> anyhow::Result<Ending> {
             scene.regions.refine(points[point], out);
         };
     let answers = ask_all(&structures, &scene, boxes, points.len(), true, ask)?;
-    write(args, &answers)?;
+    unread_is_fine(write(args, &answers))?;
     Ok(if all_agree(&answers, "point") {
         Ending::Ok
     } else {

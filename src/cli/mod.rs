@@ -69,6 +69,15 @@ fn tell(line: &str) {
     let _ = writeln!(io::stderr(), "{plain}");
 }
 
+/// For output that comes after the work: a reader who leaves early changes
+/// neither what was done nor the exit code.
+fn unread_is_fine(written: io::Result<()>) -> io::Result<()> {
+    match written {
+        Err(error) if is_broken_pipe(&error) => Ok(()),
+        other => other,
+    }
+}
+
 /// The context first, then its causes, but for those that the text before
 /// them has told already.
 fn told_once(error: &anyhow::Error) -> String {

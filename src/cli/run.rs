@@ -12,7 +12,7 @@ use comfy_table::Table;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::args::{RunArgs, test_named};
-use super::{Ending, interrupt, text};
+use super::{Ending, interrupt, text, unread_is_fine};
 use cullbench::camera::PlaneOptions;
 use cullbench::index::{StructureSpec, structures};
 use cullbench::measure::{
@@ -67,10 +67,29 @@ impl Plan {
                 vec![false]
             },
         };
-        if !plan.from_suite {
+        plan.check_names()?;
+        // A suite as it comes is known to be sound.
+        let as_it_comes =
+            plan.lens == LensDefaults::default() && plan.planes == PlaneOptions::default();
+        if !(plan.from_suite && as_it_comes) {
             plan.check_inputs()?;
         }
         Ok(plan)
+    }
+
+    /// A cell is found by its names: each may come once.
+    fn check_names(&self) -> anyhow::Result<()> {
+        for (i, (scene, paths)) in self.scenes.iter().enumerate() {
+            if self.scenes[..i].iter().any(|other| other.0 == *scene) {
+                bail!("scene '{scene}' is named twice");
+            }
+            for (k, path) in paths.iter().enumerate() {
+                if paths[..k].contains(path) {
+                    bail!("path '{path}' is named twice");
+                }
+            }
+        }
+        Ok(())
     }
 
     /// A mistake in the last file should not show after an hour.
@@ -133,6 +152,7 @@ pub fn run(args: &RunArgs) -> anyhow::Result<Ending> {
             bar.set_message(format!("{source}: building"));
             let scene = scene::load(source, &plan.load)?;
             let info = SceneInfo::of(&scene);
+            same_scene(&report, &info)?;
             let contenders = contenders(&plan, &scene);
             for (path, cold) in paths
                 .iter()
@@ -164,18 +184,24 @@ pub fn run(args: &RunArgs) -> anyhow::Result<Ending> {
             }
         }
         if shown > 0 || !done.is_empty() {
-            bar.suspend(|| show_scene(&report, source))?;
+            bar.suspend(|| unread_is_fine(show_scene(&report, source)))?;
         }
         if interrupted {
             break;
         }
     }
     bar.finish_and_clear();
-    if !interrupted {
+    if !interrupted && report.run.finished_at.is_none() {
         report.run.finished_at = Some(utc_now());
         folder.save(&report)?;
     }
-    close(&report, &folder, started, interrupted)
+    unread_is_fine(close(&report, &folder, started, interrupted))?;
+    let failed = report.cells.iter().any(|c| c.status.is_failure());
+    Ok(match (interrupted, failed) {
+        (true, _) => Ending::Interrupted,
+        (false, true) => Ending::WrongAnswer,
+        (false, false) => Ending::Ok,
+    })
 }
 
 /// A new folder with an empty report, or the one to go on with.
@@ -197,16 +223,17 @@ fn open(args: &RunArgs, plan: &Plan, machine: &Machine) -> anyhow::Result<(RunFo
         Some(path) => path.clone(),
         None => PathBuf::from(format!("results/{stamp}-{}-{id}", machine.slug())),
     };
-    let folder = RunFolder::create(&path)?;
     let report = Report {
         schema_version: SCHEMA_VERSION,
         run: RunInfo {
             id: format!("{stamp}-{id}"),
             started_at: now,
             finished_at: None,
-            command: std::env::args()
+            command: std::env::args_os()
                 .skip(1)
-                .fold("cullbench".to_owned(), |all, arg| all + " " + &arg),
+                .fold("cullbench".to_owned(), |all, arg| {
+                    all + " " + &arg.to_string_lossy()
+                }),
             seed: args.seed,
             suite: plan.from_suite.then(|| plan.suite.name.to_owned()),
             generator: GENERATOR_NAME.to_owned(),
@@ -220,6 +247,7 @@ fn open(args: &RunArgs, plan: &Plan, machine: &Machine) -> anyhow::Result<(RunFo
         },
         cells: Vec::new(),
     };
+    let folder = RunFolder::create(&path)?;
     folder.save(&report)?;
     Ok((folder, report))
 }
@@ -281,6 +309,20 @@ fn same_experiment(report: &Report, plan: &Plan, args: &RunArgs) -> anyhow::Resu
         bail!("was begun by another build of cullbench; expected the same one");
     }
     Ok(())
+}
+
+/// A file may have changed since its first cells were measured.
+fn same_scene(report: &Report, now: &SceneInfo) -> anyhow::Result<()> {
+    let of_scene = |c: &&ReportCell| c.scene.name == now.name;
+    match report.cells.iter().find(of_scene) {
+        Some(cell) if cell.scene.digest != now.digest => bail!(
+            "scene '{}' has changed: its digest is {}; expected {} as in the cells measured before",
+            now.name,
+            now.digest,
+            cell.scene.digest
+        ),
+        _ => Ok(()),
+    }
 }
 
 /// Paths of a scene that the report has already, with their cache state.
@@ -360,6 +402,8 @@ fn keep(
             .cells
             .push(ReportCell::new(scene, path, plan.test, cell, samples));
     }
+    // A finished run that was asked for more goes on.
+    report.run.finished_at = None;
     folder.save(report)?;
     Ok(())
 }
@@ -413,9 +457,13 @@ fn show_scene(report: &Report, scene: &str) -> io::Result<()> {
     let mut out = io::stdout().lock();
     writeln!(
         out,
-        "\n{scene}: {} items, {} regions",
+        "\n{scene}: {} items, {} regions{}",
         text::count(first.scene.total_count),
-        text::count(first.scene.region_count)
+        text::count(first.scene.region_count),
+        match first.scene.skipped_items {
+            0 => String::new(),
+            bad => format!(", {} bad items left out", text::count(bad)),
+        }
     )?;
     writeln!(out, "{table}")?;
     for cell in cells.iter().filter(|c| c.reason.is_some()) {
@@ -497,7 +545,7 @@ fn close(
     folder: &RunFolder,
     started: Instant,
     interrupted: bool,
-) -> anyhow::Result<Ending> {
+) -> io::Result<()> {
     let failed = report
         .cells
         .iter()
@@ -527,11 +575,6 @@ fn close(
             out,
             "interrupted: finished cells are kept; --resume goes on"
         )?;
-        return Ok(Ending::Interrupted);
     }
-    Ok(if failed > 0 {
-        Ending::WrongAnswer
-    } else {
-        Ending::Ok
-    })
+    out.flush()
 }

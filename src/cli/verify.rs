@@ -10,7 +10,7 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 
 use super::args::{LensArgs, TableFormat, VerifyArgs};
-use super::{Ending, interrupt, tell, text};
+use super::{Ending, interrupt, tell, text, unread_is_fine};
 use cullbench::index::{DynIndex, StructureSpec, structures};
 use cullbench::measure::{Contender, Workload, count_pass};
 use cullbench::path;
@@ -112,7 +112,7 @@ pub fn verify(args: &VerifyArgs) -> anyhow::Result<Ending> {
         cases,
         checks,
     };
-    show(&outcome, args.format)?;
+    unread_is_fine(show(&outcome, args.format))?;
     if interrupted {
         tell("interrupted: only what is shown was checked");
     }
@@ -252,7 +252,7 @@ fn differ(
     None
 }
 
-fn show(outcome: &Outcome, format: TableFormat) -> anyhow::Result<()> {
+fn show(outcome: &Outcome, format: TableFormat) -> io::Result<()> {
     let mut out = io::stdout().lock();
     if format == TableFormat::Json {
         writeln!(out, "{}", serde_json::to_string_pretty(outcome)?)?;

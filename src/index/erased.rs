@@ -127,7 +127,7 @@ pub struct StructureSpec {
 impl StructureSpec {
     /// # Errors
     /// An unknown structure (with the nearest name), an unknown or bad
-    /// parameter.
+    /// parameter, or one out of range.
     pub fn parse(text: &str) -> Result<StructureSpec, SpecError> {
         let spec = Spec::parse(text)?;
         let Some(backend) = Backend::named(spec.name()) else {
@@ -146,6 +146,8 @@ impl StructureSpec {
             })
             .collect();
         let params = (backend.params)(&Value::Object(given)).map_err(SpecError::new)?;
+        // Ranges are the build's to check: let it see no items.
+        (backend.build)(&[], &params).map_err(SpecError::new)?;
         Ok(StructureSpec {
             label: text.to_owned(),
             backend,
@@ -250,6 +252,7 @@ mod tests {
             ("bhv", "did you mean 'bvh'"),
             ("bvh:leav=4", "unknown field `leav`"),
             ("bvh:leaf=many", "leaf"),
+            ("bvh:leaf=0", "leaf=0; expected 1 to 255"),
             ("bvh:preset=best", "unknown variant `best`"),
             ("bvh,bvh", "named twice"),
             ("", "no structure"),
