@@ -282,12 +282,14 @@ pub struct SceneInfoArgs {
 
 #[derive(Args, Debug)]
 pub struct SceneGenerateArgs {
-    /// A spec such as city:n=100000,seed=7
+    /// A spec such as city:n=100000,seed=7, or any other scene
     #[arg(value_name = "SCENE")]
     pub scene: String,
     /// The file to write [default: standard output]
     #[arg(long, short, value_name = "FILE")]
     pub out: Option<PathBuf>,
+    #[command(flatten)]
+    pub scene_args: SceneArgs,
 }
 
 #[derive(Args, Debug)]

@@ -9,18 +9,14 @@ use serde_json::{Value, json};
 use super::args::{LocateArgs, RowFormat};
 use super::compare_structures::{Answer, all_agree, ask_all, joined};
 use super::query::with_ids;
-use super::{Ending, unread_is_fine};
+use super::{Ending, load_scene, unread_is_fine};
 use cullbench::index::structures;
 use cullbench::path::read_points_csv;
-use cullbench::scene::{self, LoadOptions};
 use glam::Vec3;
 
 pub fn locate(args: &LocateArgs) -> anyhow::Result<Ending> {
     let structures = structures(&args.structure)?;
-    let load = LoadOptions {
-        skip_bad_items: args.scene_args.skip_bad_items,
-    };
-    let scene = scene::load(&args.scene, &load)?;
+    let scene = load_scene(&args.scene, &args.scene_args)?;
     let name = args.points.display().to_string();
     let file = File::open(&args.points).with_context(|| name.clone())?;
     let points: Vec<Vec3> = read_points_csv(file, &name)?

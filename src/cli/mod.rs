@@ -21,6 +21,8 @@ use std::io::{self, Write};
 use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser};
+use cullbench::input::InputError;
+use cullbench::scene::{LoadOptions, Scene};
 
 use args::{Cli, Command, SceneCommand};
 
@@ -67,6 +69,21 @@ pub fn main() -> ExitCode {
 fn tell(line: &str) {
     let plain = line.replace(char::is_control, " ");
     let _ = writeln!(io::stderr(), "{plain}");
+}
+
+/// Loads a scene and says so if some of it was left out.
+fn load_scene(source: &str, args: &args::SceneArgs) -> Result<Scene, InputError> {
+    let options = LoadOptions {
+        skip_bad_items: args.skip_bad_items,
+    };
+    let scene = cullbench::scene::load(source, &options)?;
+    if scene.skipped_items > 0 {
+        tell(&format!(
+            "note: {} bad item(s) left out of {}",
+            scene.skipped_items, scene.name
+        ));
+    }
+    Ok(scene)
 }
 
 /// For output that comes after the work: a reader who leaves early changes

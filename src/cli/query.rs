@@ -6,28 +6,18 @@ use serde_json::{Map, Value, json};
 
 use super::args::{QueryArgs, RowFormat, test_named};
 use super::compare_structures::{Answer, all_agree, ask_all, joined};
-use super::{Ending, tell, unread_is_fine};
+use super::{Ending, load_scene, unread_is_fine};
 use cullbench::index::structures;
 use cullbench::measure::Workload;
 use cullbench::path;
-use cullbench::scene::{self, LoadOptions};
 
 pub fn query(args: &QueryArgs) -> anyhow::Result<Ending> {
     let test = test_named(&args.test)?;
     let structures = structures(&args.structure)?;
     let (defaults, options) = (args.lens.defaults()?, args.lens.plane_options()?);
-    let load = LoadOptions {
-        skip_bad_items: args.scene_args.skip_bad_items,
-    };
-    let scene = scene::load(&args.scene, &load)?;
+    let scene = load_scene(&args.scene, &args.scene_args)?;
     let cameras = path::load(&args.cameras, &scene, &defaults)?;
     let workload = Workload::new(&scene, &cameras, &options)?;
-    if scene.skipped_items > 0 {
-        tell(&format!(
-            "note: {} bad item(s) left out of {}",
-            scene.skipped_items, scene.name
-        ));
-    }
     let ask = |index: &dyn cullbench::index::DynIndex, camera: usize, out: &mut _, cost: &mut _| {
         index.visible_counted(&workload.volumes[camera], out, cost);
     };

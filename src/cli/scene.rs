@@ -5,17 +5,14 @@ use std::io::{self, BufWriter, Write};
 use serde_json::json;
 
 use super::args::{SceneGenerateArgs, SceneInfoArgs, TableFormat};
-use super::{Ending, interrupt, tell, text};
+use super::{Ending, interrupt, load_scene, tell, text};
 use cullbench::measure::SceneInfo;
 use cullbench::report::write_atomically;
-use cullbench::scene::{self, LoadOptions, Regions, Scene, write_boxes_csv};
+use cullbench::scene::{Regions, Scene, write_boxes_csv};
 use cullbench::statistics::{quantile, sorted};
 
 pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
-    let load = LoadOptions {
-        skip_bad_items: args.scene_args.skip_bad_items,
-    };
-    let scene = scene::load(&args.scene, &load)?;
+    let scene = load_scene(&args.scene, &args.scene_args)?;
     let info = SceneInfo::of(&scene);
     let sizes = sizes(&scene);
     let portals = match &scene.regions {
@@ -106,7 +103,7 @@ fn sizes(scene: &Scene) -> [Option<f64>; 3] {
 }
 
 pub fn generate(args: &SceneGenerateArgs) -> anyhow::Result<Ending> {
-    let scene = scene::load(&args.scene, &LoadOptions::default())?;
+    let scene = load_scene(&args.scene, &args.scene_args)?;
     match &args.out {
         Some(path) => {
             interrupt::from_now_on_finish();

@@ -10,11 +10,11 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 
 use super::args::{LensArgs, TableFormat, VerifyArgs};
-use super::{Ending, interrupt, tell, text, unread_is_fine};
+use super::{Ending, interrupt, load_scene, tell, text, unread_is_fine};
 use cullbench::index::{DynIndex, StructureSpec, structures};
 use cullbench::measure::{Contender, Workload, count_pass};
 use cullbench::path;
-use cullbench::scene::{self, FAMILIES, LoadOptions, SAMPLES};
+use cullbench::scene::{self, FAMILIES, SAMPLES};
 use cullbench::verify::{RandomCase, Reference, explain_containment, explain_visibility};
 
 /// One structure on one scene and path (or on all random cases).
@@ -55,9 +55,6 @@ pub fn verify(args: &VerifyArgs) -> anyhow::Result<Ending> {
     let structures = structures(&args.structure)?;
     let defaults = args.lens.defaults()?;
     let planes = args.lens.plane_options()?;
-    let load = LoadOptions {
-        skip_bad_items: args.scene_args.skip_bad_items,
-    };
     let by_hand = !args.scene.is_empty() || !args.path.is_empty();
     let cases = args.cases.unwrap_or(if by_hand { 0 } else { CASES });
     // Random cases alone, if only they are asked for.
@@ -79,7 +76,7 @@ pub fn verify(args: &VerifyArgs) -> anyhow::Result<Ending> {
             break;
         }
         bar.set_message(source.clone());
-        let scene = scene::load(source, &load)?;
+        let scene = load_scene(source, &args.scene_args)?;
         let contenders: Vec<Contender> = structures
             .iter()
             .map(|s| Contender::build(s.clone(), false, &scene))
