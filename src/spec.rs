@@ -165,7 +165,9 @@ impl Spec {
         } else {
             format!("a number above {low}")
         };
-        Err(self.bad(key, &value.to_string(), &wanted))
+        // A default can be out of range too; then it was not typed.
+        let found = self.text(key).unwrap_or_else(|| format!("{value:?}"));
+        Err(self.bad(key, &found, &wanted))
     }
 
     /// A whole number in `0..=most`, or the default.

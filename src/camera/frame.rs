@@ -33,7 +33,10 @@ pub fn look_at(eye: DVec3, look: DVec3, up: DVec3) -> Result<Frame, CameraError>
     check_finite(["look x", "look y", "look z"], look)?;
     check_finite(["eye x", "eye y", "eye z"], eye)?;
     // Halved first: the difference of two finite values may overflow.
-    Frame::looking_along(eye, look / 2.0 - eye / 2.0, up)
+    Frame::looking_along(eye, look / 2.0 - eye / 2.0, up).map_err(|error| match error {
+        CameraError::ForwardIsZero => CameraError::EyeIsLook,
+        other => other,
+    })
 }
 
 fn check_finite(names: [&'static str; 3], v: DVec3) -> Result<(), CameraError> {
@@ -85,14 +88,14 @@ impl Frame {
     /// The frame at `eye` that looks along `forward`.
     ///
     /// # Errors
-    /// As [`look_at`].
+    /// As [`look_at`], but for `forward` zero.
     pub fn looking_along(eye: DVec3, forward: DVec3, up: DVec3) -> Result<Frame, CameraError> {
         check_finite(["eye x", "eye y", "eye z"], eye)?;
         check_finite(["forward x", "forward y", "forward z"], forward)?;
         check_finite(["up x", "up y", "up z"], up)?;
-        let forward = scaled(forward).ok_or(CameraError::EyeIsLook)?;
+        let forward = scaled(forward).ok_or(CameraError::ForwardIsZero)?;
         let up = scaled(up).ok_or(CameraError::UpParallel)?;
-        let n = -unit(forward).ok_or(CameraError::EyeIsLook)?;
+        let n = -unit(forward).ok_or(CameraError::ForwardIsZero)?;
         // up x n, but for its length. Of vectors not yet rounded to unit
         // length: nearly parallel, their rounding would be all that is left.
         let across = cross(forward, up);
@@ -201,6 +204,10 @@ mod tests {
     fn impossible_frames_are_typed_errors() {
         let (o, y) = (DVec3::ZERO, DVec3::Y);
         assert_eq!(look_at(o, o, y), Err(CameraError::EyeIsLook));
+        assert_eq!(
+            Frame::looking_along(o, o, y),
+            Err(CameraError::ForwardIsZero)
+        );
         assert_eq!(look_at(o, -y, y), Err(CameraError::UpParallel));
         assert_eq!(look_at(o, y, o), Err(CameraError::UpParallel));
         let odd = DVec3::new(1.0, 2.0, 2.0);

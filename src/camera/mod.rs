@@ -48,6 +48,8 @@ pub enum CameraError {
     NotFinite { name: &'static str, value: f64 },
     #[error("eye and look are the same point; expected two different points")]
     EyeIsLook,
+    #[error("forward is zero; expected a direction")]
+    ForwardIsZero,
     #[error(
         "up is zero or parallel to the direction of view; expected an up vector that is neither"
     )]
@@ -70,7 +72,7 @@ pub enum CameraError {
     Zoom { factor: f64 },
     #[error("the axis of the orbit is zero or not finite; expected a direction")]
     Axis,
-    #[error("the view volume does not fit f32: {0}")]
+    #[error("the view volume does not fit f32: {0}; expected planes within its range")]
     Volume(#[from] VolumeError),
 }
 

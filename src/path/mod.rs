@@ -78,7 +78,7 @@ pub static PATHS: &[PathFamily] = &[
 ];
 
 /// Parameters that every generated path takes.
-pub const PATH_PARAMS: &str = "frames=256, seed=1, fovy=60 (degrees), aspect=16/9, near=far/1000, \
+pub const PATH_PARAMS: &str = "frames=256, seed=1, fovy=60 (degrees), aspect=1.778 (16:9), near=far/1000, \
      far=the scene's diagonal (or inf), visible (choose far so that this share of the items \
      is visible on average, e.g. visible=2%)";
 
@@ -177,7 +177,9 @@ impl Scene {
 /// # Errors
 /// One line that names what was found and what was expected.
 pub fn load(source: &str, scene: &Scene, defaults: &LensDefaults) -> Result<CameraPath, PathError> {
-    if Path::new(source).is_file() || source.ends_with(".csv") {
+    // A name has neither a slash nor a dot before its parameters.
+    let name = source.split(':').next().unwrap_or_default();
+    if Path::new(source).is_file() || source.ends_with(".csv") || name.contains(['/', '\\', '.']) {
         let file = std::fs::File::open(source).map_err(|error| InputError::Io {
             path: source.into(),
             source: error,
@@ -386,6 +388,9 @@ mod tests {
             ("orbit:near=5,far=5", "near < far"),
             ("orbit:visible=2", "visible=2"),
             ("nothing.csv", "No such file"),
+            ("nothing.txt", "No such file"),
+            ("no/where", "No such file"),
+            ("datasets/", "datasets/: Is a directory"),
         ] {
             let error = load(source, &scene, &LensDefaults::default())
                 .unwrap_err()

@@ -51,14 +51,14 @@ pub fn read_boxes_csv(
                 if low > high {
                     let name = ["x", "y", "z"][axis];
                     return Err(row.error(
-                        format!("an inverted box, min_{name} {low} > max_{name} {high}"),
+                        format!("an inverted box, min_{name} {low:?} > max_{name} {high:?}"),
                         format!("min_{name} <= max_{name}"),
                     ));
                 }
                 let limit = f64::from(f32::MAX);
                 if low < -limit || high > limit {
                     return Err(row.error(
-                        format!("a bound beyond the range of f32 ({low} to {high})"),
+                        format!("a bound beyond the range of f32 ({low:?} to {high:?})"),
                         format!("numbers within +-{limit:e}"),
                     ));
                 }
@@ -150,7 +150,7 @@ mod tests {
             (format!("{header}\n1,2,3,4,inf,6\n"), "line 2: max_y 'inf'"),
             (
                 format!("{header}\n1,2,3,4,1,6\n"),
-                "inverted box, min_y 2 > max_y 1",
+                "inverted box, min_y 2.0 > max_y 1.0",
             ),
             (format!("{header}\n1,2,3\n"), "line 2: 3 fields"),
             (

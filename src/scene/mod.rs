@@ -108,7 +108,11 @@ impl Scene {
                 sound.then_some(rounded).ok_or_else(|| InputError::BadItem {
                     scene: name.clone(),
                     item,
-                    reason: format!("{b:?} is not a finite box with min <= max"),
+                    reason: format!(
+                        "a box from {:?} to {:?}; expected min <= max within the range of f32",
+                        b.min.to_array(),
+                        b.max.to_array()
+                    ),
                 })
             })
             .collect::<Result<Vec<_>, _>>()?;
