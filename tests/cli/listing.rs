@@ -1,0 +1,116 @@
+//! What the program says of itself: lists, help, JSON wherever it is offered,
+//! and that everything in a list can be used.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+
+use super::process::*;
+use super::queries::query;
+
+fn names(list: &Value) -> impl Iterator<Item = &str> {
+    let rows = list.as_array().expect("an array").iter();
+    rows.map(|row| row["name"].as_str().expect("a name"))
+}
+
+#[test]
+fn json_outputs_are_json() {
+    let folder = with_good_files(&[]);
+    let ask = |line: &str| json(&works(folder.path(), &format!("{line} --format json")));
+    let list = ask("list");
+    assert_eq!(keys(&list), set("structures scenes paths tests metrics"));
+    for topic in keys(&list) {
+        assert_eq!(ask(&format!("list {topic}")), list[topic]);
+        // The table says the same, for people.
+        let table = works(folder.path(), &format!("list {topic}"));
+        for name in names(&list[topic]) {
+            assert!(!name.is_empty() && table.contains(name), "{topic} {name}");
+        }
+        let rows = list[topic].as_array().expect("an array");
+        assert!(!rows.is_empty() && rows.iter().all(|row| row["summary"].is_string()));
+    }
+    let env = ask("env");
+    let facts = set("machine toolchain source harness_overhead_ns");
+    assert_eq!(keys(&env), facts);
+    let verify = ask("verify --scene scene.csv --path orbit:frames=4 --cases 50");
+    assert_eq!(verify["ok"], true);
+    assert_eq!(verify["mismatches"], 0);
+    let checks = verify["checks"].as_array().expect("an array");
+    assert_eq!(checks.len(), 2 * structure_names().len());
+    let info = ask("scene info scene.csv");
+    assert_eq!(info["total_count"], 2);
+    assert_eq!(info["bounds_max"], json("[6.0, 1.0, 1.0]"));
+}
+
+#[test]
+fn every_scene_and_path_of_the_list_can_be_used() {
+    let here = Path::new(".");
+    let list = json(&works(here, "list --format json"));
+    let real = set("freedm-map12 freedm-map20 helsinki us-counties");
+    for name in names(&list["scenes"]) {
+        let size = if real.contains(name) { "" } else { ":n=60" };
+        let rows = query(here, &format!("{name}{size}"), "orbit:frames=2", "");
+        assert_eq!(rows.len(), 2 * structure_names().len(), "{name}");
+    }
+    for name in names(&list["paths"]) {
+        let rows = query(here, "freedm-map12", name, "");
+        assert!(rows.len() >= 21 * structure_names().len(), "{name}");
+    }
+}
+
+#[test]
+fn a_generated_scene_reads_back_as_the_same() {
+    let folder = folder(&[]);
+    let digest = |scene: &str| {
+        let info = works(folder.path(), &format!("scene info {scene} --format json"));
+        json(&info)["digest"].as_str().expect("a digest").to_owned()
+    };
+    let specs = "uniform:n=50 uniform:n=1 city:n=50 forest:n=50,seed=9 freedm-map12 us-counties";
+    for spec in specs.split(' ') {
+        let printed = works(folder.path(), &format!("scene generate {spec}"));
+        let done = cullbench(folder.path(), &format!("scene generate {spec} --out f.csv"));
+        assert_eq!((done.code, done.out.as_str()), (Some(0), ""));
+        let written = fs::read_to_string(folder.path().join("f.csv"));
+        assert_eq!(written.expect("written"), printed);
+        assert_eq!(digest("f.csv"), digest(spec), "{spec}");
+    }
+    // An existing file wins over a name.
+    fs::copy(folder.path().join("f.csv"), folder.path().join("uniform")).expect("writable");
+    assert_eq!(digest("uniform"), digest("us-counties"));
+}
+
+/// The commands that a help text lists.
+fn commands_of(help: &str) -> Vec<&str> {
+    let lines = help.lines().skip_while(|line| *line != "Commands:").skip(1);
+    let listed = lines.take_while(|line| line.starts_with("  "));
+    let names = listed.filter(|line| !line.starts_with("   "));
+    let names = names.filter_map(|line| line.split_whitespace().next());
+    names.filter(|name| *name != "help").collect()
+}
+
+#[test]
+fn every_command_has_help() {
+    let here = Path::new(".");
+    let top = works(here, "--help");
+    let commands = commands_of(&top);
+    for name in set("run query locate verify list scene env completions man") {
+        assert!(commands.contains(&name), "{name}: {commands:?}");
+    }
+    for command in commands {
+        let help = works(here, &format!("{command} --help"));
+        let usage = format!("Usage: cullbench {command}");
+        assert!(help.contains(&usage), "{command}: {help}");
+        for below in commands_of(&help) {
+            let help = works(here, &format!("{command} {below} --help"));
+            assert!(help.contains(&format!("{usage} {below}")), "{help}");
+        }
+    }
+    let version = concat!("cullbench ", env!("CARGO_PKG_VERSION"), "\n");
+    assert_eq!(works(here, "--version"), version);
+    for shell in ["bash", "zsh", "fish"] {
+        let script = works(here, &format!("completions {shell}"));
+        assert!(script.contains("cullbench"), "{shell}");
+    }
+    assert!(works(here, "man").contains("cullbench"));
+}

@@ -1,0 +1,22 @@
+//! The contract of the program as a user meets it: every command runs as a
+//! process of its own and is judged by its output, its exit code and what it
+//! leaves on disk. Expected answers come from code in these files, not from
+//! the library; only `readers` calls the library, with damaged input.
+#![cfg(feature = "cli")]
+
+mod bad_input;
+mod listing;
+mod pipes;
+mod process;
+mod queries;
+mod readers;
+mod region_search;
+mod runs;
+#[cfg(unix)]
+mod signals;
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_cullbench");
+const BOXES: &str = "min_x,min_y,min_z,max_x,max_y,max_z";
+const EYE_LOOK: &str = "eye_x,eye_y,eye_z,look_x,look_y,look_z";
+const FULL_CAMERA: &str =
+    "eye_x,eye_y,eye_z,look_x,look_y,look_z,up_x,up_y,up_z,fovy_deg,aspect,near,far";

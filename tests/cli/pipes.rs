@@ -1,0 +1,156 @@
+//! Where output goes: a reader who leaves early, a full disk, and files that
+//! are links or pipes.
+
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::Stdio;
+
+use super::BOXES;
+use super::process::*;
+use super::queries::QUERY;
+use super::runs::{cells, check_run};
+
+/// Runs a command of whose output only so many lines are read.
+fn cut_off(folder: &Path, line: &str, lines: usize) -> Done {
+    let (reader, writer) = std::io::pipe().expect("a pipe");
+    let mut reader = (lines > 0).then(|| BufReader::new(reader));
+    let mut command = command(folder, line);
+    command.stdout(writer).stderr(Stdio::piped());
+    let child = command.spawn().expect("the program starts");
+    // The command holds a writing end of its own.
+    drop(command);
+    let mut out = String::new();
+    for _ in 0..lines {
+        let reader = reader.as_mut().expect("open");
+        reader.read_line(&mut out).expect("a line");
+    }
+    drop(reader);
+    let output = child.wait_with_output().expect("a child");
+    Done {
+        code: output.status.code(),
+        out,
+        err: String::from_utf8(output.stderr).expect("UTF-8"),
+    }
+}
+
+#[test]
+fn a_reader_who_leaves_early_is_no_error() {
+    let folder = with_good_files(&[]);
+    let commands = [
+        "list",
+        "list --format json",
+        "env",
+        "env --format json",
+        "man",
+        "completions bash",
+        "completions zsh",
+        "completions fish",
+        "completions elvish",
+        "completions powershell",
+        "--help",
+        "run --help",
+        "--version",
+        "query --scene scene.csv --cameras cameras.csv",
+        "query --scene uniform:n=50 --cameras orbit:frames=20000",
+        "query --scene uniform:n=50 --cameras orbit:frames=20000 --format json",
+        "locate --scene scene.csv --points points.csv",
+        "locate --scene scene.csv --points points.csv --format json",
+        "verify --scene scene.csv --path orbit:frames=2",
+        "verify --scene scene.csv --path orbit:frames=2 --format json",
+        "scene info scene.csv",
+        "scene generate uniform:n=20000",
+        "run --scene uniform:n=50 --scene city:n=50 --path orbit:frames=8 --out run",
+    ];
+    for line in commands {
+        let done = cut_off(folder.path(), line, 0);
+        assert_eq!((done.code, done.err.as_str()), (Some(0), ""), "{line}");
+    }
+    // The figures are on disk, whether or not somebody reads the table.
+    let report = check_run(&folder.path().join("run"));
+    assert_eq!(cells(&report).len(), 2 * structure_names().len());
+    assert!(report["run"]["finished_at"].is_string());
+    // `| head -1`, with far more to come than a pipe holds.
+    for (line, first) in [
+        (
+            "query --scene uniform:n=50 --cameras orbit:frames=20000",
+            QUERY,
+        ),
+        ("scene generate uniform:n=20000", BOXES),
+    ] {
+        let done = cut_off(folder.path(), line, 1);
+        assert_eq!((done.code, done.err.as_str()), (Some(0), ""), "{line}");
+        assert_eq!(done.out.trim_end(), first);
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_one_error_line() {
+    let folder = with_good_files(&[]);
+    let full = || {
+        let mut options = std::fs::OpenOptions::new();
+        options.write(true).open("/dev/full").expect("/dev/full")
+    };
+    let commands = [
+        "list",
+        "env --format json",
+        "man",
+        "completions bash",
+        "query --scene scene.csv --cameras cameras.csv",
+        "locate --scene scene.csv --points points.csv --format json",
+        "verify --cases 5",
+        "scene generate uniform:n=20000",
+        "scene generate uniform:n=20000 --out /dev/full",
+        "scene info scene.csv",
+        "run --scene scene.csv --path orbit:frames=2 --out run",
+    ];
+    for line in commands {
+        let output = command(folder.path(), line).stdout(full()).output();
+        let output = output.expect("the program starts");
+        let done = Done {
+            code: output.status.code(),
+            out: String::new(),
+            err: String::from_utf8(output.stderr).expect("UTF-8"),
+        };
+        assert_refused(&done, "No space left", line);
+    }
+    // The table is lost, the cells are not.
+    check_run(&folder.path().join("run"));
+    // Not even the error can be told: still no panic.
+    let mut command = command(folder.path(), "scene info nothing");
+    let status = command.stderr(full()).status();
+    assert_eq!(status.expect("the program starts").code(), Some(2));
+}
+
+#[cfg(unix)]
+#[test]
+fn links_and_pipes_are_written_to_and_not_replaced() {
+    use std::fs;
+    use std::os::unix::fs::{FileTypeExt, symlink};
+
+    let folder = folder(&[("file.csv", b"old")]);
+    let at = |name: &str| folder.path().join(name);
+    let generate = |out: &str| {
+        let done = cullbench(
+            folder.path(),
+            &format!("scene generate uniform:n=5 --out {out}"),
+        );
+        assert_eq!(done.code, Some(0), "{done:?}");
+    };
+    symlink("file.csv", at("link.csv")).expect("writable");
+    generate("link.csv");
+    let link = fs::symlink_metadata(at("link.csv")).expect("there");
+    assert!(link.is_symlink());
+    let written = fs::read_to_string(at("file.csv")).expect("there");
+    assert!(written.starts_with(BOXES), "{written}");
+
+    let mut mkfifo = std::process::Command::new("mkfifo");
+    let made = mkfifo.arg(at("pipe")).status().expect("mkfifo");
+    assert!(made.success());
+    let pipe = at("pipe");
+    let reader = std::thread::spawn(move || fs::read_to_string(pipe).expect("readable"));
+    generate("pipe");
+    let pipe = fs::metadata(at("pipe")).expect("there");
+    assert!(pipe.file_type().is_fifo());
+    assert_eq!(reader.join().expect("no panic"), written);
+}

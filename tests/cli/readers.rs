@@ -1,0 +1,127 @@
+//! The library's readers, fed with damaged copies of good input and with
+//! plain noise: no panic, and every error is one line that says where.
+
+use cullbench::path::{LensDefaults, read_cameras_csv, read_points_csv};
+use cullbench::scene::{WadMap, map_names, read_boxes_csv};
+
+use super::process::*;
+use super::{BOXES, FULL_CAMERA};
+
+/// Bytes that readers are known to stumble over.
+const WORDS: &[&[u8]] = &[
+    b"nan",
+    b"-inf",
+    b"1e999",
+    b"1e308",
+    b"-1e39",
+    b"\"",
+    b",",
+    b"\n",
+    b"\r\n",
+    b"\r",
+    b"\0",
+    b"-",
+    b"\xff\xfe",
+    b"\xef\xbb\xbf",
+    b"4294967296",
+    b"\xff\xff\xff\x7f",
+];
+
+/// A damaged copy: a few bytes changed, taken out, put in, or the end lost.
+fn damaged(random: &mut Random, good: &[u8]) -> Vec<u8> {
+    let mut bytes = good.to_vec();
+    for _ in 0..=random.below(6) {
+        let at = random.below(bytes.len() + 1);
+        let end = (at + random.below(12)).min(bytes.len());
+        match random.below(8) {
+            0 => bytes.truncate(at),
+            1 => drop(bytes.drain(at..end)),
+            2 => {
+                let copy = bytes[at..end].to_vec();
+                bytes.splice(at..at, copy);
+            }
+            3 | 4 => {
+                let word = WORDS[random.below(WORDS.len())];
+                bytes.splice(at..at, word.iter().copied());
+            }
+            _ => bytes[at..end].fill_with(|| random.next() as u8),
+        }
+    }
+    bytes
+}
+
+/// Feeds a reader with its good input, damaged copies of it, and noise.
+fn feed(name: &str, good: &[u8], read: fn(&[u8]) -> Result<(), String>) {
+    assert_eq!(read(good), Ok(()), "{name}");
+    let (mut refused, rounds) = (0, 1500);
+    for seed in 1..=rounds {
+        let mut random = Random(u64::wrapping_mul(seed, 0x9E37_79B9_7F4A_7C15));
+        let bytes = if seed % 8 == 0 {
+            (0..random.below(400))
+                .map(|_| random.next() as u8)
+                .collect()
+        } else {
+            damaged(&mut random, good)
+        };
+        let result = std::panic::catch_unwind(|| read(&bytes));
+        let Ok(result) = result else {
+            panic!("{name}, seed {seed} panicked on: {}", bytes.escape_ascii());
+        };
+        if let Err(error) = result {
+            refused += 1;
+            let clear = error.contains("in.file") && error.contains("expected");
+            assert!(clear && error.len() < 600, "{name}, seed {seed}: {error}");
+            let one_line = !error.contains(char::is_control);
+            assert!(one_line, "{name}, seed {seed}: {error:?}");
+        }
+    }
+    assert!(refused * 4 > rounds, "{name}: only {refused} were refused");
+}
+
+#[test]
+fn damaged_boxes() {
+    let good = format!("{BOXES},kind\n0,0,0,1,1,1,a\n-2.5,0,1e3,4,5,6e3,\"b,c\"\n7,7,7,7,7,7,\n");
+    feed("boxes", good.as_bytes(), |bytes| {
+        let skipped = read_boxes_csv(bytes, "in.file", true);
+        let strict = read_boxes_csv(bytes, "in.file", false);
+        // Skipping bad rows makes nothing worse, and leaves only good ones.
+        assert!(skipped.is_ok() || strict.is_err());
+        for scene in skipped.iter().chain(&strict) {
+            assert!(scene.items.iter().all(|b| b.is_finite() && !b.is_empty()));
+        }
+        strict.map(|_| ()).map_err(|e| e.to_string())
+    });
+}
+
+#[test]
+fn damaged_cameras() {
+    let rows = "0,0,0,1,0,0,0,0,1,60,1.5,0.1,100\n1,2,3,4,5,6,0,0,1,90,1,1,inf\n";
+    let good = format!("{FULL_CAMERA}\n{rows}");
+    feed("cameras", good.as_bytes(), |bytes| {
+        let path = read_cameras_csv(bytes, "in.file", &LensDefaults::default());
+        let path = path.map_err(|e| e.to_string())?;
+        assert!(!path.cameras.is_empty());
+        Ok(())
+    });
+}
+
+#[test]
+fn damaged_points() {
+    feed("points", b"x,y,z\n0,0,0\n-1.5,2e3,3\n4,5,6\n", |bytes| {
+        let points = read_points_csv(bytes, "in.file").map_err(|e| e.to_string())?;
+        assert!(!points.is_empty() && points.iter().all(|p| p.is_finite()));
+        Ok(())
+    });
+}
+
+#[test]
+fn damaged_maps() {
+    feed("map", &map12(), |bytes| {
+        let names = map_names(bytes, "in.file");
+        let map = WadMap::read(bytes, "in.file", None).map_err(|e| e.to_string())?;
+        assert!(names.is_ok());
+        let scene = map.into_scene("in.file").map_err(|e| e.to_string())?;
+        assert!(scene.items.iter().all(|b| b.is_finite() && !b.is_empty()));
+        Ok(())
+    });
+}

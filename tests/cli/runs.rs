@@ -1,0 +1,228 @@
+//! `run`: the files of a run against the contract, runs that must not be
+//! written over, and what may and may not be resumed.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+
+use super::BOXES;
+use super::process::*;
+
+pub fn report(run: &Path) -> Value {
+    json(&fs::read_to_string(run.join("report.json")).expect("a report"))
+}
+
+pub fn cells(report: &Value) -> &Vec<Value> {
+    report["cells"].as_array().expect("an array")
+}
+
+/// Metrics that every cell of these scenes has.
+const METRICS: &str = "query_ns ns_per_visible visible_count cull_rate ratio_to_linear \
+    nodes_tested items_tested build_ms memory_bytes_per_item \
+    locate_ns comparisons regions_found";
+
+/// What holds for the files of every run, finished or not: the fields of the
+/// contract, every path with all structures, samples where the cells say.
+pub fn check_run(run: &Path) -> Value {
+    let report = report(run);
+    let top = "schema_version run machine toolchain source noise cells";
+    assert_eq!(keys(&report), set(top));
+    for (part, fields) in [
+        ("run", "id started_at command seed suite"),
+        (
+            "machine",
+            "cpu features cores caches memory_bytes kernel load",
+        ),
+        ("toolchain", "rustc flags profile features lock_digest"),
+        ("source", "commit dirty"),
+        ("noise", "aa_ratio"),
+    ] {
+        let missing: Vec<_> = set(fields)
+            .difference(&keys(&report[part]))
+            .copied()
+            .collect();
+        assert!(missing.is_empty(), "{part} lacks {missing:?}");
+    }
+    let summary = rows(&fs::read_to_string(run.join("summary.csv")).expect("summary.csv"));
+    let samples = rows(&fs::read_to_string(run.join("samples.csv")).expect("samples.csv"));
+    assert_eq!(summary.len(), cells(&report).len());
+    let mut structures: BTreeMap<[&str; 3], Vec<&str>> = BTreeMap::new();
+    let mut referred = 0;
+    for (cell, row) in cells(&report).iter().zip(&summary) {
+        let fields = "scene path structure params test status reason metrics left_out samples_ref";
+        assert_eq!(keys(cell), set(fields));
+        let text = |value: &Value| value.as_str().expect("text").to_owned();
+        assert_eq!(cell["status"], "ok", "{cell}");
+        for (column, value) in [
+            ("scene", &cell["scene"]["name"]),
+            ("path", &cell["path"]["name"]),
+            ("cache", &cell["path"]["cache"]),
+            ("structure", &cell["structure"]),
+            ("test", &cell["test"]),
+            ("status", &cell["status"]),
+        ] {
+            assert_eq!(row[column], text(value), "{column}");
+        }
+        let metrics = cell["metrics"].as_object().expect("an object");
+        for name in set(METRICS) {
+            assert_eq!(
+                keys(&metrics[name]),
+                set("value lower upper unit"),
+                "{name}"
+            );
+            let value = metrics[name]["value"].as_f64().expect(name);
+            assert_eq!(row[name].parse(), Ok(value), "{name}");
+        }
+        let of_path = ["scene", "path", "cache"].map(|column| row[column].as_str());
+        structures
+            .entry(of_path)
+            .or_default()
+            .push(&row["structure"]);
+        let place = &cell["samples_ref"];
+        assert_eq!(place["file"], "samples.csv");
+        let [first, count] = ["first_row", "rows"].map(|k| place[k].as_u64().expect(k) as usize);
+        assert!(count > 0);
+        for sample in &samples[first..first + count] {
+            for column in ["scene", "path", "cache", "structure"] {
+                assert_eq!(sample[column], row[column]);
+            }
+            let time: f64 = sample["cpu_ns"].parse().expect("a number");
+            assert!(time >= 0.0 && ["query", "locate"].contains(&sample["task"].as_str()));
+        }
+        referred += count;
+    }
+    // The rest are those of the twins.
+    let twins = samples
+        .iter()
+        .filter(|row| row["structure"].ends_with("#twin"));
+    assert_eq!(referred + twins.count(), samples.len());
+    let names: Vec<String> = structure_names();
+    for (path, found) in structures {
+        assert_eq!(found, names, "{path:?}");
+    }
+    let left: Vec<String> = contents(run)
+        .into_keys()
+        .filter(|name| name.ends_with(".tmp"))
+        .collect();
+    assert!(left.is_empty(), "{left:?}");
+    report
+}
+
+const TINY: &str = "run --scene uniform:n=200 --path orbit:frames=16 --out out/run";
+
+#[test]
+fn a_run_leaves_a_complete_report_and_is_not_written_over() {
+    let folder = folder(&[]);
+    let run = folder.path().join("out/run");
+    let table = works(folder.path(), TINY);
+    let report = check_run(&run);
+    assert!(
+        table.contains("uniform:n=200: 200 items") && table.contains("report.json"),
+        "{table}"
+    );
+    assert_eq!(cells(&report).len(), structure_names().len());
+    assert_eq!(
+        (&report["run"]["suite"], &report["run"]["seed"]),
+        (&Value::Null, &1.into())
+    );
+    assert!(report["run"]["finished_at"].is_string());
+    assert_eq!(cells(&report)[0]["scene"]["total_count"], 200);
+    assert_eq!(cells(&report)[0]["path"]["camera_count"], 16);
+    let before = contents(&run);
+    let again = cullbench(folder.path(), TINY);
+    assert_refused(
+        &again,
+        "out/run already holds a run | expected",
+        "run twice",
+    );
+    assert!(contents(&run) == before, "the refused run changed files");
+    // Nothing is left to do, and nothing is done.
+    works(folder.path(), &format!("{TINY} --resume"));
+    assert!(
+        contents(&run) == before,
+        "resuming a finished run changed files"
+    );
+    // Another experiment does not belong into this report.
+    let others: [(&str, &str); 3] = [
+        ("--seed 2", "--seed 1"),
+        ("--structure linear", "expected linear"),
+        ("--planes frame-f32", "other planes"),
+    ];
+    for (other, wanted) in others {
+        let done = cullbench(folder.path(), &format!("{TINY} --resume {other}"));
+        assert_refused(&done, &format!("out/run | {wanted} | expected"), wanted);
+        assert!(contents(&run) == before, "{other:?} changed files");
+    }
+    // More of the same one does.
+    works(
+        folder.path(),
+        &format!("{TINY} --resume --path spin:frames=16"),
+    );
+    let more = check_run(&run);
+    assert_eq!(cells(&more)[..cells(&report).len()], cells(&report)[..]);
+    assert_eq!(cells(&more).len(), 2 * cells(&report).len());
+}
+
+#[test]
+fn damaged_runs_are_not_resumed() {
+    let folder = folder(&[]);
+    works(folder.path(), TINY);
+    let run = folder.path().join("out/run");
+    let whole = fs::read_to_string(run.join("report.json")).expect("a report");
+    let samples = fs::read(run.join("samples.csv")).expect("samples");
+    let swap = |from: &str, to: &str| {
+        assert!(whole.contains(from), "{from}");
+        whole.replace(from, to).into_bytes()
+    };
+    let damages: [(&str, Vec<u8>, &str); 7] = [
+        ("report.json", vec![], "report.json"),
+        (
+            "report.json",
+            whole.as_bytes()[..whole.len() / 2].to_vec(),
+            "expected the report of a run",
+        ),
+        ("report.json", vec![0xFF; 64], "report.json"),
+        (
+            "report.json",
+            swap("\"schema_version\": 1", "\"schema_version\": 9"),
+            "schema version 9; expected 1",
+        ),
+        (
+            "report.json",
+            swap("\"rows\": ", "\"rows\": 1844674407370955"),
+            "report.json refers to",
+        ),
+        (
+            "samples.csv",
+            samples[..samples.len() / 2].to_vec(),
+            "samples.csv",
+        ),
+        ("samples.csv", vec![], "samples.csv: 0 rows; expected"),
+    ];
+    for (file, bytes, wanted) in damages {
+        fs::write(run.join("report.json"), &whole).expect("writable");
+        fs::write(run.join("samples.csv"), &samples).expect("writable");
+        fs::write(run.join(file), bytes).expect("writable");
+        let before = contents(&run);
+        let done = cullbench(folder.path(), &format!("{TINY} --resume"));
+        assert_refused(&done, &format!("out/run/ | {wanted}"), wanted);
+        assert!(contents(&run) == before, "{wanted}");
+    }
+}
+
+#[test]
+fn a_scene_that_changes_between_stop_and_resume_is_noticed() {
+    let folder = with_good_files(&[]);
+    let run = "run --scene scene.csv --path orbit:frames=4 --out r";
+    works(folder.path(), run);
+    let other = format!("{BOXES}\n0,0,0,1,1,2\n");
+    fs::write(folder.path().join("scene.csv"), other).expect("writable");
+    let resume = format!("{run} --path spin:frames=4 --resume");
+    all_refused(
+        &folder,
+        &[resume],
+        "scene 'scene.csv' has changed | expected",
+    );
+}

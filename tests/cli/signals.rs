@@ -1,0 +1,121 @@
+//! Ctrl-C, sent by the system's own `kill`: a run keeps what it has finished,
+//! everything else ends at once and leaves nothing.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+
+use super::process::*;
+use super::runs::{cells, check_run, report};
+
+fn start(folder: &Path, line: &str) -> Child {
+    let mut command = command(folder, line);
+    command.stdout(Stdio::null()).stderr(Stdio::piped());
+    command.spawn().expect("the program starts")
+}
+
+fn wait_until(what: &str, mut ready: impl FnMut() -> bool) {
+    let begin = Instant::now();
+    while !ready() {
+        assert!(begin.elapsed() < Duration::from_secs(30), "{what}");
+        sleep(Duration::from_millis(2));
+    }
+}
+
+/// Sends Ctrl-C and waits for the end; the exit code and stderr.
+fn interrupt(mut child: Child) -> (Option<i32>, String) {
+    let ended = child.try_wait().expect("a child");
+    assert!(ended.is_none(), "ended by itself: {ended:?}");
+    let id = child.id().to_string();
+    let sent = Command::new("kill").args(["-INT", &id]).status();
+    assert!(sent.expect("kill").success());
+    let begin = Instant::now();
+    while child.try_wait().expect("a child").is_none() {
+        if begin.elapsed() > Duration::from_secs(20) {
+            let _ = child.kill();
+            panic!("Ctrl-C does not end the program");
+        }
+        sleep(Duration::from_millis(2));
+    }
+    let output = child.wait_with_output().expect("a child");
+    let err = String::from_utf8(output.stderr).expect("UTF-8");
+    (output.status.code(), err)
+}
+
+#[test]
+fn an_interrupted_run_keeps_its_finished_cells_and_goes_on() {
+    let folder = folder(&[]);
+    let run = folder.path().join("r");
+    let paths = ["orbit", "spin", "outside", "zoom"].map(|p| format!(" --path {p}:frames=64"));
+    let line = format!("run --scene uniform:n=20000 --out r{}", paths.concat());
+    let child = start(folder.path(), &line);
+    wait_until("no first cell", || {
+        run.join("report.json").exists() && !cells(&report(&run)).is_empty()
+    });
+    assert_eq!(interrupt(child), (Some(130), String::new()));
+
+    let stopped = check_run(&run);
+    let done = cells(&stopped).len();
+    let all = paths.len() * structure_names().len();
+    assert!(done > 0 && done < all, "{done} of {all} cells");
+    assert_eq!(stopped["run"]["finished_at"], Value::Null);
+    let read = |file: &str| fs::read(run.join(file)).expect(file);
+    let (samples, summary) = (read("samples.csv"), read("summary.csv"));
+    let refused = cullbench(folder.path(), &line);
+    assert_refused(&refused, "already holds a run | --resume", "run again");
+    // A stop may fall between samples and report: rows that nobody knows.
+    let rubbish = b"uniform:n=20000,spin:frames=64,warm,bvh,query,0,0,1,1.0,1.0,0\nhalf a r";
+    fs::write(run.join("samples.csv"), [&samples[..], rubbish].concat()).expect("writable");
+
+    works(folder.path(), &format!("{line} --resume"));
+    let finished = check_run(&run);
+    assert_eq!(cells(&finished).len(), all);
+    assert_eq!(cells(&finished)[..done], cells(&stopped)[..]);
+    assert_eq!(finished["run"]["id"], stopped["run"]["id"]);
+    assert!(finished["run"]["finished_at"].is_string());
+    // Not a digit of the finished cells has changed.
+    assert!(read("samples.csv").starts_with(&samples));
+    assert!(read("summary.csv").starts_with(&summary));
+}
+
+#[test]
+fn ctrl_c_ends_commands_that_keep_nothing() {
+    let folder = folder(&[("kept.csv", b"kept")]);
+    let before = contents(folder.path());
+    let commands = [
+        "query --scene uniform:n=2000000 --cameras orbit:frames=1000",
+        "scene generate uniform:n=2000000",
+        "scene generate uniform:n=2000000 --out kept.csv",
+    ];
+    for line in commands {
+        let child = start(folder.path(), line);
+        sleep(Duration::from_millis(300));
+        assert_eq!(interrupt(child), (Some(130), String::new()), "{line}");
+        assert!(contents(folder.path()) == before, "{line}");
+    }
+}
+
+#[test]
+fn ctrl_c_while_a_file_is_written_leaves_the_old_one() {
+    let folder = folder(&[("kept.csv", b"kept")]);
+    let before = contents(folder.path());
+    let line = "scene generate uniform:n=500000 --out kept.csv";
+    let child = start(folder.path(), line);
+    let files = || fs::read_dir(folder.path()).expect("readable").count();
+    wait_until("no temporary file", || files() > 1);
+    assert_eq!(interrupt(child), (Some(130), String::new()));
+    assert!(contents(folder.path()) == before);
+}
+
+#[test]
+fn a_stopped_verify_does_not_claim_success() {
+    let child = start(Path::new("."), "verify --cases 100000000");
+    sleep(Duration::from_millis(300));
+    let (code, err) = interrupt(child);
+    assert_eq!(code, Some(130));
+    assert!(err.contains("interrupted"), "{err}");
+}
