@@ -147,7 +147,7 @@ impl StructureSpec {
             .collect();
         let params = (backend.params)(&Value::Object(given)).map_err(SpecError::new)?;
         // Ranges are the build's to check: let it see no items.
-        (backend.build)(&[], &params).map_err(SpecError::new)?;
+        (backend.build)(&[], Some(&PlaneTree::default()), &params).map_err(SpecError::new)?;
         Ok(StructureSpec {
             label: text.to_owned(),
             backend,
