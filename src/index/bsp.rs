@@ -72,7 +72,7 @@ pub enum BspBuilder {
     Import,
 }
 
-/// Parameters: `bsp:builder=auto,leaf=16,cut=2`.
+/// Parameters: `bsp:builder=auto,leaf=32,cut=2`.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct BspParams {
@@ -88,7 +88,7 @@ impl Default for BspParams {
     fn default() -> Self {
         BspParams {
             builder: BspBuilder::Median,
-            leaf: 16,
+            leaf: 32,
             cut: 1.0,
         }
     }

@@ -22,7 +22,7 @@ use crate::geometry::{Aabb, ConvexVolume, PlaneTree};
 use crate::query::{ItemId, Recorder, Sink};
 
 pub use bsp::{Bsp, BspBuilder, BspParams};
-pub use bvh::{Bvh, BvhParams, BvhPreset};
+pub use bvh::{Bvh, BvhLayout, BvhParams, BvhPreset};
 pub use erased::{BACKENDS, Backend, DynIndex, StructureSpec, structures};
 pub use linear::{Linear, LinearScalar};
 pub use octree::{CellParams, Octree};

@@ -27,7 +27,7 @@ pub struct Octree {
     tree: PackedTree,
 }
 
-/// Parameters: `octree:leaf=16,depth=20,loose=2`.
+/// Parameters: `octree:leaf=32,depth=20,loose=2`.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CellParams {
@@ -43,7 +43,7 @@ pub struct CellParams {
 impl Default for CellParams {
     fn default() -> Self {
         CellParams {
-            leaf: 16,
+            leaf: 32,
             depth: 24,
             loose: 1.0,
         }
