@@ -1,7 +1,10 @@
 //! Cross-checking structures: the reference answer by the plainest loop there
 //! is, the comparison with it, and the first difference in words. Random
-//! differential cases live in `random`. Nothing here is ever timed.
+//! differential cases live in `random`, degenerate scenes in `edges`, and the
+//! contract of a structure as tests in [`conformance`]. Nothing here is timed.
 
+pub mod conformance;
+mod edges;
 mod random;
 
 use std::fmt;
@@ -11,6 +14,7 @@ use glam::Vec3;
 use crate::geometry::{Aabb, ConvexVolume};
 use crate::query::ItemId;
 
+pub use edges::{edge_scenes, edge_volumes};
 pub use random::{RandomCase, VOLUME_KINDS};
 
 /// The reference: each box against each plane with [`ConvexVolume::sees`], no

@@ -1,0 +1,340 @@
+//! Does the conformance suite catch what it is there for? One small tree,
+//! sound to begin with, and broken in one way at a time: each break must fail
+//! the properties named beside it, and each property must catch some break.
+
+use std::collections::BTreeSet;
+use std::ops::{ControlFlow, Range};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use cullbench::geometry::{Aabb, ConvexVolume, PlaneTree};
+use cullbench::index::{BuildError, FrustumQuery, MemoryUsage, RegionIndex, indexable};
+use cullbench::query::{Containment, ItemId, NoRecorder, Recorder, Region, Sink};
+use cullbench::verify::conformance::properties;
+use glam::Vec3;
+
+/// How the tree is broken.
+type Fault = u8;
+
+const NONE: Fault = 0;
+const DROPS_AN_ITEM: Fault = 1;
+const RETURNS_ONE_TWICE: Fault = 2;
+const STALE_NODES_AFTER_REFIT: Fault = 3;
+const LEAF_ENDS_ONE_EARLY: Fault = 4;
+const MASK_OF_ONE_CHILD_FOR_THE_OTHER: Fault = 5;
+const MASK_LOSES_AN_OPEN_PLANE: Fault = 6;
+const TOUCHING_IS_OUTSIDE: Fault = 7;
+const TOUCHING_A_POINT_IS_OUTSIDE: Fault = 8;
+const INVERTED_BOXES_ARE_SOUND: Fault = 9;
+const IGNORES_BREAK: Fault = 10;
+const FORGETS_TO_PASS_BREAK_ON: Fault = 11;
+const ONLY_SIX_PLANES: Fault = 12;
+const KEEPS_ITEMS_THAT_LEAVE: Fault = 13;
+const REFUSES_REFIT_HALFWAY: Fault = 14;
+const TAKES_BAD_ITEMS: Fault = 15;
+const NAMES_THE_NEXT_ITEM: Fault = 16;
+const COUNTS_NO_ITEMS: Fault = 17;
+const EVERY_OTHER_BUILD_DIFFERS: Fault = 18;
+const COUNTED_QUERY_DIFFERS: Fault = 19;
+
+/// Which way the next build of [`EVERY_OTHER_BUILD_DIFFERS`] goes.
+static TURN: AtomicBool = AtomicBool::new(false);
+
+/// Items sorted along x in a binary tree, four a leaf.
+struct Toy<const FAULT: Fault> {
+    ids: Vec<ItemId>,
+    boxes: Vec<Aabb>,
+    root: Option<Node>,
+}
+
+struct Node {
+    bounds: Aabb,
+    items: Range<usize>,
+    children: Vec<Node>,
+}
+
+impl Node {
+    fn over(boxes: &[Aabb], items: Range<usize>) -> Node {
+        let middle = items.start + items.len() / 2;
+        let children = match items.len() {
+            0..=4 => vec![],
+            _ => vec![
+                Node::over(boxes, items.start..middle),
+                Node::over(boxes, middle..items.end),
+            ],
+        };
+        Node {
+            bounds: Aabb::union_of(&boxes[items.clone()]),
+            items,
+            children,
+        }
+    }
+
+    fn fit(&mut self, boxes: &[Aabb]) {
+        self.bounds = Aabb::union_of(&boxes[self.items.clone()]);
+        self.children.iter_mut().for_each(|child| child.fit(boxes));
+    }
+}
+
+/// What the faults need from a kind of region beyond [`Region`].
+trait Breakable: Region {
+    const FRUSTUM: bool;
+    /// The test with touching taken for outside.
+    fn half_open(&self, b: &Aabb) -> bool;
+    /// A memo that wrongly calls one open plane decided.
+    fn loses_a_plane(memo: Self::Memo) -> Self::Memo;
+    fn planes(&self) -> usize;
+}
+
+impl Breakable for ConvexVolume {
+    const FRUSTUM: bool = true;
+    fn half_open(&self, b: &Aabb) -> bool {
+        let mut planes = ConvexVolume::planes(self).iter();
+        planes.all(|plane| plane.value_at(plane.p_vertex(b)) > 0.0)
+    }
+    fn loses_a_plane(memo: u32) -> u32 {
+        memo & memo.wrapping_sub(1)
+    }
+    fn planes(&self) -> usize {
+        ConvexVolume::planes(self).len()
+    }
+}
+
+impl Breakable for Vec3 {
+    const FRUSTUM: bool = false;
+    fn half_open(&self, b: &Aabb) -> bool {
+        self.cmpge(b.min).all() && self.cmplt(b.max).all()
+    }
+    fn loses_a_plane(_: ()) {}
+    fn planes(&self) -> usize {
+        0
+    }
+}
+
+impl<const FAULT: Fault> Toy<FAULT> {
+    fn query<G: Breakable, S: Sink, R: Recorder>(
+        &self,
+        region: &G,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        let Some(root) = &self.root else {
+            return ControlFlow::Continue(());
+        };
+        if FAULT == ONLY_SIX_PLANES && region.planes() > 6 {
+            return sink.accept(&self.ids);
+        }
+        let flow = self.walk(root, region, region.start(), sink, recorder);
+        if FAULT == FORGETS_TO_PASS_BREAK_ON {
+            return ControlFlow::Continue(());
+        }
+        flow.map_break(drop)
+    }
+
+    fn walk<G: Breakable, S: Sink, R: Recorder>(
+        &self,
+        node: &Node,
+        region: &G,
+        memo: G::Memo,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        recorder.node_tested();
+        let (verdict, mut memo) = region.classify(&node.bounds, memo, recorder);
+        if verdict == Containment::Outside {
+            recorder.subtree_rejected();
+            return ControlFlow::Continue(());
+        }
+        if verdict == Containment::Inside {
+            recorder.subtree_accepted(node.items.len());
+            return self.hand_over(node.items.clone(), sink);
+        }
+        if FAULT == MASK_LOSES_AN_OPEN_PLANE && node.items.len() < 64 {
+            memo = G::loses_a_plane(memo);
+        }
+        for child in &node.children {
+            self.walk(child, region, memo, sink, recorder)?;
+            if FAULT == MASK_OF_ONE_CHILD_FOR_THE_OTHER {
+                memo = region.classify(&child.bounds, memo, &mut NoRecorder).1;
+            }
+        }
+        if node.children.is_empty() {
+            let mut items = node.items.clone();
+            if FAULT == LEAF_ENDS_ONE_EARLY {
+                items.end -= 1;
+            }
+            for place in items {
+                if FAULT != COUNTS_NO_ITEMS {
+                    recorder.items_tested(1);
+                }
+                let b = &self.boxes[place];
+                let admitted = match FAULT {
+                    TOUCHING_IS_OUTSIDE if G::FRUSTUM => region.half_open(b),
+                    TOUCHING_A_POINT_IS_OUTSIDE if !G::FRUSTUM => region.half_open(b),
+                    // A recorder that records has a size.
+                    COUNTED_QUERY_DIFFERS if size_of::<R>() > 0 => true,
+                    _ => region.admits(b, memo, recorder),
+                };
+                if admitted {
+                    self.hand_over(place..place + 1, sink)?;
+                }
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
+    fn hand_over<S: Sink>(&self, places: Range<usize>, sink: &mut S) -> ControlFlow<()> {
+        let ids = &self.ids[places];
+        let mut flow = sink.accept(ids);
+        if FAULT == RETURNS_ONE_TWICE && ids.contains(&7) && flow.is_continue() {
+            flow = sink.accept(&[7]);
+        }
+        if FAULT == IGNORES_BREAK {
+            flow = ControlFlow::Continue(());
+        }
+        flow
+    }
+}
+
+impl<const FAULT: Fault> RegionIndex for Toy<FAULT> {
+    const NAME: &'static str = "toy";
+    const SUMMARY: &'static str = "a binary tree along x, broken on request";
+    type Params = ();
+
+    fn build(items: &[Aabb], _: Option<&PlaneTree>, _: &()) -> Result<Self, BuildError> {
+        let mut ids = match (FAULT, indexable(items)) {
+            (TAKES_BAD_ITEMS, Err(_)) => vec![],
+            (NAMES_THE_NEXT_ITEM, Err(BuildError::NonFiniteItem { item, bounds })) => {
+                let item = item + 1;
+                return Err(BuildError::NonFiniteItem { item, bounds });
+            }
+            (INVERTED_BOXES_ARE_SOUND, Ok(_)) => (0..items.len() as ItemId).collect(),
+            (_, ids) => ids?,
+        };
+        if FAULT == DROPS_AN_ITEM && ids.len() > 100 {
+            ids.pop();
+        }
+        let x = |id: &ItemId| items[*id as usize].centre().x;
+        ids.sort_by(|a, b| x(a).total_cmp(&x(b)));
+        if FAULT == EVERY_OTHER_BUILD_DIFFERS && TURN.fetch_xor(true, Ordering::Relaxed) {
+            ids.reverse();
+        }
+        let boxes: Vec<Aabb> = ids.iter().map(|&id| items[id as usize]).collect();
+        let root = (!ids.is_empty()).then(|| {
+            let mut root = Node::over(&boxes, 0..boxes.len());
+            if root.bounds.is_empty() {
+                root.bounds = boxes[0];
+            }
+            root
+        });
+        Ok(Toy { ids, boxes, root })
+    }
+
+    fn memory(&self) -> MemoryUsage {
+        MemoryUsage::default()
+    }
+
+    fn locate<S: Sink, R: Recorder>(
+        &self,
+        p: Vec3,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        self.query(&p, sink, recorder)
+    }
+
+    fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
+        let stays = |id: &&ItemId| self.ids.contains(id) != items[**id as usize].is_empty();
+        let stay = moved.iter().filter(stays).count();
+        if FAULT == REFUSES_REFIT_HALFWAY {
+            self.boxes = self.ids.iter().map(|&id| items[id as usize]).collect();
+            return false;
+        }
+        if stay < moved.len() && FAULT != KEEPS_ITEMS_THAT_LEAVE {
+            return false;
+        }
+        for (b, &id) in self.boxes.iter_mut().zip(&self.ids) {
+            if !items[id as usize].is_empty() {
+                *b = items[id as usize];
+            }
+        }
+        if let Some(root) = &mut self.root
+            && FAULT != STALE_NODES_AFTER_REFIT
+        {
+            root.fit(&self.boxes);
+        }
+        true
+    }
+}
+
+impl<const FAULT: Fault> FrustumQuery for Toy<FAULT> {
+    fn visible<S: Sink, R: Recorder>(
+        &self,
+        volume: &ConvexVolume,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        self.query(volume, sink, recorder)
+    }
+}
+
+/// The tree without a fault passes: what fails below fails for the fault.
+mod without_a_fault {
+    cullbench::conformance!(super::Toy<{ super::NONE }>);
+}
+
+/// The properties that a fault fails, with what they say.
+fn failing<const FAULT: Fault>() -> Vec<(&'static str, String)> {
+    let checked = properties::<Toy<FAULT>>().iter();
+    checked
+        .filter_map(|p| Some((p.name, (p.check)().err()?)))
+        .collect()
+}
+
+#[test]
+fn every_fault_is_caught_and_every_property_catches_one() {
+    macro_rules! faults {
+        ($($fault:ident: $($property:literal),+;)*) => {
+            [$((stringify!($fault), failing::<$fault>(), &[$($property),+][..])),*]
+        };
+    }
+    let faults = faults! {
+        DROPS_AN_ITEM: "reference_set_on_edge_scenes", "reference_set_on_random_cases",
+            "reference_set_on_generated_scenes", "inside_means_all_and_outside_none";
+        RETURNS_ONE_TWICE: "each_id_comes_once", "reference_set_on_generated_scenes";
+        STALE_NODES_AFTER_REFIT: "refit_equals_a_fresh_build";
+        LEAF_ENDS_ONE_EARLY: "reference_set_on_edge_scenes", "order_of_items_changes_nothing";
+        MASK_OF_ONE_CHILD_FOR_THE_OTHER: "reference_set_on_generated_scenes";
+        MASK_LOSES_AN_OPEN_PLANE: "reference_set_on_edge_scenes", "reference_set_on_random_cases";
+        TOUCHING_IS_OUTSIDE: "reference_set_on_edge_scenes";
+        TOUCHING_A_POINT_IS_OUTSIDE: "region_search_is_the_closed_box_scan";
+        INVERTED_BOXES_ARE_SOUND: "reference_set_on_edge_scenes";
+        IGNORES_BREAK: "a_sink_that_breaks_is_not_called_again";
+        FORGETS_TO_PASS_BREAK_ON: "a_sink_that_breaks_is_not_called_again";
+        ONLY_SIX_PLANES: "smaller_volume_sees_a_subset";
+        KEEPS_ITEMS_THAT_LEAVE: "items_that_come_and_go_are_followed";
+        REFUSES_REFIT_HALFWAY: "refit_equals_a_fresh_build";
+        TAKES_BAD_ITEMS: "bad_items_are_refused_and_named";
+        NAMES_THE_NEXT_ITEM: "bad_items_are_refused_and_named";
+        COUNTS_NO_ITEMS: "counters_are_plausible";
+        EVERY_OTHER_BUILD_DIFFERS: "building_again_gives_the_same_structure";
+        COUNTED_QUERY_DIFFERS: "counters_are_plausible";
+    };
+    let mut useful = BTreeSet::new();
+    for (fault, failed, expected) in faults {
+        // Seen with `cargo test --test sabotage -- --nocapture`.
+        println!("{fault}:");
+        for (property, error) in &failed {
+            println!("    {property}: {error}");
+        }
+        for property in expected {
+            assert!(
+                failed.iter().any(|(name, _)| name == property),
+                "{fault} is not caught by {property}, only by {:?}",
+                failed.iter().map(|(name, _)| name).collect::<Vec<_>>()
+            );
+        }
+        useful.extend(failed.into_iter().map(|(name, _)| name));
+    }
+    let all: BTreeSet<_> = properties::<Toy<NONE>>().iter().map(|p| p.name).collect();
+    assert_eq!(useful, all, "a property that catches no fault");
+}
