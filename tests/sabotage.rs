@@ -110,6 +110,19 @@ impl Breakable for Vec3 {
     }
 }
 
+/// Passes everything on and does not stop when told to.
+struct Deaf<'a, S> {
+    sink: &'a mut S,
+    broke: bool,
+}
+
+impl<S: Sink> Sink for Deaf<'_, S> {
+    fn accept(&mut self, ids: &[ItemId]) -> ControlFlow<()> {
+        self.broke |= self.sink.accept(ids).is_break();
+        ControlFlow::Continue(())
+    }
+}
+
 impl<const FAULT: Fault> Toy<FAULT> {
     fn query<G: Breakable, S: Sink, R: Recorder>(
         &self,
@@ -123,11 +136,20 @@ impl<const FAULT: Fault> Toy<FAULT> {
         if FAULT == ONLY_SIX_PLANES && region.planes() > 6 {
             return sink.accept(&self.ids);
         }
+        if FAULT == IGNORES_BREAK {
+            let mut deaf = Deaf { sink, broke: false };
+            let _ = self.walk(root, region, region.start(), &mut deaf, recorder);
+            return if deaf.broke {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            };
+        }
         let flow = self.walk(root, region, region.start(), sink, recorder);
         if FAULT == FORGETS_TO_PASS_BREAK_ON {
             return ControlFlow::Continue(());
         }
-        flow.map_break(drop)
+        flow
     }
 
     fn walk<G: Breakable, S: Sink, R: Recorder>(
@@ -187,9 +209,6 @@ impl<const FAULT: Fault> Toy<FAULT> {
         let mut flow = sink.accept(ids);
         if FAULT == RETURNS_ONE_TWICE && ids.contains(&7) && flow.is_continue() {
             flow = sink.accept(&[7]);
-        }
-        if FAULT == IGNORES_BREAK {
-            flow = ControlFlow::Continue(());
         }
         flow
     }
