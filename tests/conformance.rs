@@ -1,6 +1,6 @@
 //! Every structure through the conformance suite, also with parameters other
 //! than the defaults; then what needs the table of structures: all scenes and
-//! paths, memory, the map's own tree. New structures are picked up there.
+//! paths, memory, the map's own tree.
 
 use std::ops::ControlFlow;
 
