@@ -1,15 +1,16 @@
-//! Criterion benchmarks: groups `build`, `cull` and `locate` over scenes and
-//! structures, named `group/structure/scene`, so that critcmp can compare two
+//! Criterion benchmarks: groups `build`, `cull`, `locate` and `update` over
+//! scenes and structures, and `kernels` by themselves, named `group/structure/scene`, so that critcmp can compare two
 //! runs. Loops over the same tables and walks the same road as `run`; it
 //! measures single structures, ratios belong to `floors` and to `run`.
 
 use std::hint::black_box;
 use std::time::Duration;
 
-use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use cullbench::camera::PlaneOptions;
+use cullbench::geometry::BoxBlocks;
 use cullbench::index::{BACKENDS, StructureSpec};
-use cullbench::measure::Workload;
+use cullbench::measure::{UPDATE_SHARES, Workload, move_share};
 use cullbench::path;
 use cullbench::scene::{self, Scene};
 
@@ -97,11 +98,71 @@ fn locate(c: &mut Criterion) {
     group.finish();
 }
 
+/// Bringing an index up to date after a share of the items has moved.
+fn update(c: &mut Criterion) {
+    let mut group = c.benchmark_group("update");
+    group.sample_size(10);
+    for source in ["uniform:n=100000", "city:n=100000"] {
+        let scene = load(source);
+        for backend in BACKENDS {
+            let spec = StructureSpec::parse(backend.name).expect(backend.name);
+            for share in UPDATE_SHARES {
+                let mut items = scene.items.clone();
+                let moved = move_share(&mut items, share);
+                let name = format!("{source}/{}%", share * 100.0);
+                group.bench_function(BenchmarkId::new(backend.name, name), |b| {
+                    b.iter_batched_ref(
+                        || spec.build(&scene.items).expect(backend.name),
+                        |index| {
+                            spec.update(index, &items, None, &moved)
+                                .expect(backend.name)
+                        },
+                        BatchSize::PerIteration,
+                    );
+                });
+            }
+        }
+    }
+    group.finish();
+}
+
+/// The plane test, box by box and sixteen at a time, over the same boxes.
+fn kernels(c: &mut Criterion) {
+    let mut group = c.benchmark_group("kernels");
+    group.sample_size(20);
+    let scene = load("uniform:n=4096");
+    let cameras = path::load("orbit:frames=1", &scene, &Default::default()).expect("orbit");
+    let workload = Workload::new(&scene, &cameras, &PlaneOptions::default()).expect("orbit");
+    let volume = &workload.volumes[0];
+    let mut blocks = BoxBlocks::with_capacity(scene.items.len());
+    scene.items.iter().for_each(|b| blocks.push(b));
+    group.throughput(Throughput::Elements(scene.items.len() as u64));
+    group.bench_function("scalar", |b| {
+        b.iter(|| {
+            scene
+                .items
+                .iter()
+                .filter(|item| volume.sees(black_box(item)))
+                .count()
+        });
+    });
+    group.bench_function("block", |b| {
+        b.iter(|| {
+            let blocks = black_box(&blocks).range(0, scene.items.len());
+            let seen = blocks.map(|(_, lanes, block)| {
+                (block.admitted_by(volume.planes().iter()) & lanes).count_ones()
+            });
+            seen.sum::<u32>()
+        });
+    });
+    group.finish();
+}
+
 criterion_group! {
     name = benches;
     config = Criterion::default()
         .warm_up_time(Duration::from_millis(300))
         .measurement_time(Duration::from_secs(1));
-    targets = build, cull, locate
+    targets = build, cull, locate, update, kernels
 }
 criterion_main!(benches);

@@ -11,11 +11,14 @@ use serde::Serialize;
 
 use super::args::{LensArgs, TableFormat, VerifyArgs};
 use super::{Ending, interrupt, load_scene, tell, text, unread_is_fine};
+use cullbench::camera::PlaneOptions;
 use cullbench::index::{DynIndex, StructureSpec, structures};
 use cullbench::measure::{Contender, Workload, count_pass};
-use cullbench::path;
+use cullbench::path::{self, CameraPath};
 use cullbench::scene::{self, FAMILIES, SAMPLES};
-use cullbench::verify::{RandomCase, Reference, explain_containment, explain_visibility};
+use cullbench::verify::{
+    RandomCase, Reference, VOLUME_KINDS, explain_containment, explain_visibility, variants,
+};
 
 /// One structure on one scene and path (or on all random cases).
 #[derive(Serialize)]
@@ -87,9 +90,19 @@ pub fn verify(args: &VerifyArgs) -> anyhow::Result<Ending> {
                 break;
             }
             let cameras = path::load(&path, &scene, &defaults)?;
-            let workload = Workload::new(&scene, &cameras, &planes)?;
             let again = reproduce(source, &path, &args.lens);
-            checks.extend(check(&workload, &contenders, &again));
+            let mut rows: Vec<Check> = Vec::new();
+            for (kind, workload) in workloads(&scene, &cameras, &planes)? {
+                let checked = check(&workload, &contenders, kind, &again);
+                if rows.is_empty() {
+                    rows = checked;
+                } else {
+                    rows.iter_mut()
+                        .zip(checked)
+                        .for_each(|(row, more)| row.add(more));
+                }
+            }
+            checks.extend(rows);
         }
         bar.inc(1);
     }
@@ -143,7 +156,53 @@ fn reproduce(scene: &str, path: &str, lens: &LensArgs) -> String {
     )
 }
 
-fn check(workload: &Workload, contenders: &[Contender], again: &str) -> Vec<Check> {
+/// The queries of a path once for each kind of volume; the points to locate
+/// are asked once.
+fn workloads<'a>(
+    scene: &'a scene::Scene,
+    cameras: &CameraPath,
+    options: &PlaneOptions,
+) -> anyhow::Result<Vec<(&'static str, Workload<'a>)>> {
+    let around = scene.surroundings();
+    let first = Workload::new(scene, cameras, options)?;
+    let mut all: Vec<(&str, Workload)> = VOLUME_KINDS
+        .into_iter()
+        .map(|kind| {
+            let (path, points) = (cameras.name.clone(), Vec::new());
+            (
+                kind,
+                Workload {
+                    scene,
+                    path,
+                    volumes: Vec::new(),
+                    points,
+                },
+            )
+        })
+        .collect();
+    for (i, camera) in cameras.cameras.iter().enumerate() {
+        let volumes = variants(camera, options, &around, i)?;
+        for ((_, workload), (_, volume)) in all.iter_mut().zip(volumes) {
+            workload.volumes.push(volume);
+        }
+    }
+    all[0].1 = first;
+    Ok(all)
+}
+
+impl Check {
+    /// Takes in another kind of volume; the first difference stays.
+    fn add(&mut self, more: Check) {
+        self.volumes += more.volumes;
+        self.verdicts += more.verdicts;
+        if self.difference.is_none() {
+            self.status = more.status;
+            self.difference = more.difference;
+        }
+    }
+}
+
+fn check(workload: &Workload, contenders: &[Contender], kind: &str, again: &str) -> Vec<Check> {
     let built: Vec<_> = contenders
         .iter()
         .filter_map(|c| c.built.as_ref().ok())
@@ -168,7 +227,7 @@ fn check(workload: &Workload, contenders: &[Contender], again: &str) -> Vec<Chec
             volumes: workload.volumes.len(),
             verdicts: questions as u64,
             status,
-            difference: reason.map(|reason| format!("{reason}\n  again: {again}")),
+            difference: reason.map(|reason| format!("{kind} volume, {reason}\n  again: {again}")),
         }
     });
     checks.collect()
@@ -209,7 +268,7 @@ fn random_cases(structures: &[StructureSpec], seed: u64, cases: u64) -> Vec<Chec
             };
             if let Some(difference) = difference {
                 check.status = "wrong";
-                let kind = cullbench::verify::VOLUME_KINDS[case.kind];
+                let kind = VOLUME_KINDS[case.kind];
                 check.difference = Some(format!(
                     "{kind} volume, {} items: {difference}\n  again: cullbench verify --cases 1 --seed {case_seed}",
                     case.items.len()

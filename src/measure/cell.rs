@@ -45,6 +45,10 @@ metrics! {
     "items_tested", "items", "item bounds tested a query, mean";
     "items_accepted_untested", "items", "items reported with a whole subtree, untested, a query, mean";
     "build_ms", "ms", "CPU time of a build, median of up to three";
+    "update_ms_0_1_percent", "ms", "CPU time of an update after 0.1 % of the items have moved (scenes of up to 2 million)";
+    "update_ms", "ms", "as above, 1 % moved";
+    "update_ms_10_percent", "ms", "as above, 10 % moved";
+    "update_ms_100_percent", "ms", "as above, all moved";
     "memory_bytes_per_item", "bytes", "nodes, item bounds and ids / items";
     "break_even_queries", "queries", "queries after which the build is repaid against linear; empty if never";
     "locate_ns", "ns", "thread CPU time of a region search at the eye, mean over the path, median over the rounds";
@@ -52,6 +56,14 @@ metrics! {
     "comparisons", "bounds", "bounds looked at a region search, of nodes and items, mean";
     "regions_found", "regions", "regions that hold the eye, mean over the path";
 }
+
+/// In the order of [`super::UPDATE_SHARES`].
+const UPDATE_METRICS: [&str; 4] = [
+    "update_ms_0_1_percent",
+    "update_ms",
+    "update_ms_10_percent",
+    "update_ms_100_percent",
+];
 
 /// A value, with its 95 % interval where it was sampled.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
@@ -245,6 +257,9 @@ impl<'a> Entry<'a> {
         if let Ok(built) = &self.contender.built {
             let items = workload.scene.items.len();
             metrics.set("build_ms", built.build_ms);
+            for (name, &ms) in UPDATE_METRICS.into_iter().zip(&built.update_ms) {
+                metrics.set(name, ms);
+            }
             metrics.ratio(
                 "memory_bytes_per_item",
                 built.memory.total() as f64,

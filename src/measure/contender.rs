@@ -7,7 +7,9 @@ use std::time::Duration;
 
 use super::clock::Stopwatch;
 use super::{Status, Verdict};
-use crate::index::{DynIndex, MemoryUsage, StructureSpec};
+use crate::geometry::Aabb;
+use crate::index::{BuildError, DynIndex, MemoryUsage, StructureSpec};
+use crate::query::ItemId;
 use crate::scene::Scene;
 use crate::statistics::median;
 
@@ -27,6 +29,9 @@ pub struct Built {
     /// CPU time of one build over the items, median of all builds, ms.
     pub build_ms: f64,
     pub memory: MemoryUsage,
+    /// CPU time of an update, ms, for each of [`UPDATE_SHARES`]; empty for
+    /// scenes too large to be moved in passing.
+    pub update_ms: Vec<f64>,
 }
 
 impl Built {
@@ -35,6 +40,11 @@ impl Built {
         self.regions.as_deref().unwrap_or(self.items.as_ref())
     }
 }
+
+/// Shares of the items that move in the updates that are measured.
+pub const UPDATE_SHARES: [f64; 4] = [0.001, 0.01, 0.1, 1.0];
+/// Largest scene whose updates are measured: they need a second copy of it.
+const MOST_UPDATED: usize = 2_000_000;
 
 /// Builds are repeated this often, or until they have taken this long.
 const BUILDS: usize = 3;
@@ -74,6 +84,14 @@ fn build(spec: &StructureSpec, scene: &Scene) -> Result<Built, Verdict> {
         );
         times.push(watch.lap().cpu_ns / 1e6);
     }
+    let mut update_ms = Vec::new();
+    if let Some(spare) = index.take() {
+        update_ms = measure_updates(spec, scene, spare).map_err(refused)?;
+        index = Some(
+            spec.build_with(&scene.items, scene.own_tree.as_ref())
+                .map_err(refused)?,
+        );
+    }
     let Some(items) = index else {
         return Err(Verdict::new(Status::TimedOut, "no time left for a build"));
     };
@@ -89,9 +107,45 @@ fn build(spec: &StructureSpec, scene: &Scene) -> Result<Built, Verdict> {
     Ok(Built {
         memory: items.memory(),
         build_ms: median(&times).unwrap_or(f64::NAN),
+        update_ms,
         items,
         regions,
     })
+}
+
+/// Moves a share of the items by their own size and times bringing the index
+/// up to date; once for each share, on an index that is then thrown away.
+fn measure_updates(
+    spec: &StructureSpec,
+    scene: &Scene,
+    mut index: Box<dyn DynIndex>,
+) -> Result<Vec<f64>, BuildError> {
+    if scene.items.is_empty() || scene.items.len() > MOST_UPDATED {
+        return Ok(Vec::new());
+    }
+    let mut items = scene.items.clone();
+    let mut times = Vec::with_capacity(UPDATE_SHARES.len());
+    for share in UPDATE_SHARES {
+        let moved = move_share(&mut items, share);
+        let watch = Stopwatch::start();
+        spec.update(&mut index, &items, scene.own_tree.as_ref(), &moved)?;
+        times.push(watch.lap().cpu_ns / 1e6);
+    }
+    Ok(times)
+}
+
+/// Moves evenly spread items by their own extent; which ones.
+pub fn move_share(items: &mut [Aabb], share: f64) -> Vec<ItemId> {
+    let count = ((items.len() as f64 * share).round() as usize).clamp(1, items.len());
+    let moved: Vec<ItemId> = (0..count)
+        .map(|i| (i * items.len() / count) as ItemId)
+        .collect();
+    for &id in &moved {
+        let b = &mut items[id as usize];
+        let step = b.extent();
+        *b = Aabb::new(b.min + step, b.max + step);
+    }
+    moved
 }
 
 /// Runs foreign code; a panic becomes a verdict with its message.

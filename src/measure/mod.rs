@@ -20,7 +20,7 @@ pub use cell::{
     Cell, Group, METRICS, Metric, MetricInfo, PathInfo, SceneInfo, TwinRatio, measure_group,
 };
 pub use clock::{Lap, Stopwatch};
-pub use contender::{Built, Contender};
+pub use contender::{Built, Contender, UPDATE_SHARES, move_share};
 pub use count::{Counted, FrameCount, LocateCount, count_pass, id_sum};
 pub use environment::{Machine, Source, Toolchain};
 pub use timing::{Protocol, Sample, Task, Timed, harness_overhead_ns, timed_pass};

@@ -6,6 +6,7 @@
 pub mod conformance;
 mod edges;
 mod random;
+mod variants;
 
 use std::fmt;
 
@@ -16,6 +17,7 @@ use crate::query::ItemId;
 
 pub use edges::{edge_scenes, edge_volumes};
 pub use random::{RandomCase, VOLUME_KINDS};
+pub use variants::variants;
 
 /// The reference: each box against each plane with [`ConvexVolume::sees`], no
 /// structure, no mask, no early way out. O(items * planes) per volume.

@@ -1,0 +1,94 @@
+//! One camera, every kind of volume: what a structure must get right beyond
+//! the six planes of a perspective view.
+
+use glam::Vec3;
+
+use super::VOLUME_KINDS;
+use crate::camera::{Camera, CameraError, Lens, PlaneOptions, Surroundings};
+use crate::geometry::{ConvexVolume, Plane};
+
+/// The volumes of all [`VOLUME_KINDS`] at a camera's place, with their kind;
+/// `seed` picks how many planes an unbounded volume keeps.
+///
+/// # Errors
+/// A volume whose planes do not fit f32.
+pub fn variants(
+    camera: &Camera,
+    options: &PlaneOptions,
+    around: &Surroundings,
+    seed: usize,
+) -> Result<Vec<(&'static str, ConvexVolume)>, CameraError> {
+    let near = camera.lens.near();
+    let far = camera.lens.far().unwrap_or(near * 1000.0);
+    let with = |lens: Lens| Camera { lens, ..*camera }.volume(options, around);
+    let straight = camera.volume(options, around)?;
+    let planes = straight.planes().to_vec();
+    let ortho = Lens::orthographic(0.3 * far, 1.5, -0.1 * far, 0.6 * far)?;
+    let window = [-0.2, 0.9, -0.7, 0.1].map(|edge| edge * near);
+    let sheared = planes.iter().map(|p| {
+        let n = p.normal;
+        Plane::new(Vec3::new(n.x, n.y + 0.4 * n.x, n.z - 0.3 * n.x), p.d)
+    });
+    let mut turned = *camera;
+    turned.frame.yaw(25.0);
+    turned.frame.pitch(-10.0);
+    let meeting = turned.volume(options, around)?;
+    let twelve = planes.iter().chain(meeting.planes()).copied();
+    let many = twelve.clone().cycle().take(31).enumerate().map(|(i, p)| {
+        // The same planes again, each a little farther out.
+        Plane::new(p.normal, p.d + (i / 12) as f32 * 0.01 * far as f32)
+    });
+    let away = Plane::new(-planes[0].normal, -planes[0].d - 0.01 * far as f32);
+    let sets = [
+        vec![],
+        vec![],
+        vec![],
+        vec![],
+        sheared.collect(),
+        planes[..1 + seed % 5].to_vec(),
+        twelve.clone().collect(),
+        many.collect(),
+        vec![planes[0], away],
+    ];
+    let mut volumes = Vec::with_capacity(VOLUME_KINDS.len());
+    for (kind, planes) in VOLUME_KINDS.into_iter().zip(sets) {
+        let volume = match kind {
+            "perspective" => straight.clone(),
+            "infinite far" => with(camera.lens.with_far(None).unwrap_or(camera.lens))?,
+            "orthographic" => with(ortho)?,
+            "off-axis" => with(Lens::off_axis(window, near, Some(far))?)?,
+            _ => ConvexVolume::from_planes(&planes)?,
+        };
+        volumes.push((kind, volume));
+    }
+    Ok(volumes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::look_at;
+    use glam::DVec3;
+
+    #[test]
+    fn every_kind_is_what_it_is_called() {
+        let frame = look_at(DVec3::ZERO, DVec3::X, DVec3::Z).unwrap();
+        let lens = Lens::perspective(60.0, 1.5, 0.1, Some(100.0)).unwrap();
+        let camera = Camera { frame, lens };
+        let volumes = variants(
+            &camera,
+            &PlaneOptions::default(),
+            &Surroundings::default(),
+            2,
+        )
+        .unwrap();
+        let counts: Vec<_> = volumes.iter().map(|(_, v)| v.planes().len()).collect();
+        assert_eq!(counts, [6, 5, 6, 6, 6, 3, 12, 31, 2]);
+        let ahead = Vec3::new(50.0, 0.0, 0.0);
+        let holds: Vec<_> = volumes
+            .iter()
+            .map(|(_, v)| v.contains_point(ahead))
+            .collect();
+        assert!(holds[..4].iter().all(|&h| h) && !holds[8], "{holds:?}");
+    }
+}
