@@ -104,6 +104,16 @@ fn a_scene_file_that_is_none_is_refused_by_every_command() {
             "windows.csv, line 4: min_x 'x'",
         ),
         (
+            "macintosh.csv",
+            Some(
+                text("x,0,0,1,1,1")
+                    .iter()
+                    .map(|b| if *b == b'\n' { b'\r' } else { *b })
+                    .collect(),
+            ),
+            "macintosh.csv, line 3: min_x 'x'",
+        ),
+        (
             "cut.wad",
             Some(wad[..wad.len() / 2].to_vec()),
             "cut.wad, byte | the end of the file | expected",

@@ -100,7 +100,6 @@ fn a_full_disk_is_one_error_line() {
         "locate --scene scene.csv --points points.csv --format json",
         "verify --cases 5",
         "scene generate uniform:n=20000",
-        "scene generate uniform:n=20000 --out /dev/full",
         "scene info scene.csv",
         "run --scene scene.csv --path orbit:frames=2 --out run",
     ];

@@ -64,6 +64,9 @@ pub fn assert_refused(done: &Done, wanted: &str, what: &str) {
         done.err
     );
     assert!(!line.contains("panicked"), "{what}: {line}");
+    let told: Vec<&str> = line.split(": ").filter(|part| part.len() > 12).collect();
+    let distinct: BTreeSet<&&str> = told.iter().collect();
+    assert_eq!(told.len(), distinct.len(), "{what}: told twice: {line}");
     for part in wanted.split(" | ") {
         assert!(line.contains(part), "{what}: no '{part}' in: {line}");
     }

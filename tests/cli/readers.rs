@@ -125,3 +125,28 @@ fn damaged_maps() {
         Ok(())
     });
 }
+
+/// Nodes that lead back into the tree, twice to one place or out of it.
+#[test]
+fn maps_whose_nodes_are_no_tree() {
+    let good = map12();
+    let is_nodes = |name: &[u8]| name == b"NODES\0\0\0";
+    let name = good.windows(8).rposition(is_nodes).expect("NODES");
+    let int =
+        |at: usize| i32::from_le_bytes(good[at..at + 4].try_into().expect("4 bytes")) as usize;
+    let (start, count) = (int(name - 8), int(name - 4) / 28);
+    for node in 0..count {
+        let at = start + 28 * node + 24;
+        let other = [good[at + 2], good[at + 3]];
+        let root = (count as u16 - 1).to_le_bytes();
+        let itself = (node as u16).to_le_bytes();
+        for child in [other, root, itself, [0xFF, 0x7F], [0xFF, 0xFF]] {
+            let mut bytes = good.clone();
+            bytes[at..at + 2].copy_from_slice(&child);
+            let error = WadMap::read(&bytes, "in.file", None).expect_err("no tree");
+            let error = error.to_string();
+            let clear = error.contains("in.file, byte ") && error.contains("expected a BSP tree");
+            assert!(clear, "node {node} to {child:?}: {error}");
+        }
+    }
+}

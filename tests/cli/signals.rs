@@ -14,7 +14,7 @@ use super::runs::{cells, check_run, report};
 
 fn start(folder: &Path, line: &str) -> Child {
     let mut command = command(folder, line);
-    command.stdout(Stdio::null()).stderr(Stdio::piped());
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
     command.spawn().expect("the program starts")
 }
 
@@ -26,8 +26,8 @@ fn wait_until(what: &str, mut ready: impl FnMut() -> bool) {
     }
 }
 
-/// Sends Ctrl-C and waits for the end; the exit code and stderr.
-fn interrupt(mut child: Child) -> (Option<i32>, String) {
+/// Sends Ctrl-C and waits for the end. Nobody reads the output until then.
+fn interrupt(mut child: Child) -> Done {
     let ended = child.try_wait().expect("a child");
     assert!(ended.is_none(), "ended by itself: {ended:?}");
     let id = child.id().to_string();
@@ -42,8 +42,15 @@ fn interrupt(mut child: Child) -> (Option<i32>, String) {
         sleep(Duration::from_millis(2));
     }
     let output = child.wait_with_output().expect("a child");
-    let err = String::from_utf8(output.stderr).expect("UTF-8");
-    (output.status.code(), err)
+    Done {
+        code: output.status.code(),
+        out: String::from_utf8(output.stdout).expect("UTF-8"),
+        err: String::from_utf8(output.stderr).expect("UTF-8"),
+    }
+}
+
+fn assert_stopped(done: &Done, what: &str) {
+    assert_eq!((done.code, done.err.as_str()), (Some(130), ""), "{what}");
 }
 
 #[test]
@@ -56,7 +63,9 @@ fn an_interrupted_run_keeps_its_finished_cells_and_goes_on() {
     wait_until("no first cell", || {
         run.join("report.json").exists() && !cells(&report(&run)).is_empty()
     });
-    assert_eq!(interrupt(child), (Some(130), String::new()));
+    let done = interrupt(child);
+    assert_stopped(&done, &line);
+    assert!(done.out.contains("--resume goes on"), "{}", done.out);
 
     let stopped = check_run(&run);
     let done = cells(&stopped).len();
@@ -94,7 +103,7 @@ fn ctrl_c_ends_commands_that_keep_nothing() {
     for line in commands {
         let child = start(folder.path(), line);
         sleep(Duration::from_millis(300));
-        assert_eq!(interrupt(child), (Some(130), String::new()), "{line}");
+        assert_stopped(&interrupt(child), line);
         assert!(contents(folder.path()) == before, "{line}");
     }
 }
@@ -107,7 +116,7 @@ fn ctrl_c_while_a_file_is_written_leaves_the_old_one() {
     let child = start(folder.path(), line);
     let files = || fs::read_dir(folder.path()).expect("readable").count();
     wait_until("no temporary file", || files() > 1);
-    assert_eq!(interrupt(child), (Some(130), String::new()));
+    assert_stopped(&interrupt(child), line);
     assert!(contents(folder.path()) == before);
 }
 
@@ -115,7 +124,7 @@ fn ctrl_c_while_a_file_is_written_leaves_the_old_one() {
 fn a_stopped_verify_does_not_claim_success() {
     let child = start(Path::new("."), "verify --cases 100000000");
     sleep(Duration::from_millis(300));
-    let (code, err) = interrupt(child);
-    assert_eq!(code, Some(130));
-    assert!(err.contains("interrupted"), "{err}");
+    let done = interrupt(child);
+    assert_eq!(done.code, Some(130));
+    assert!(done.err.contains("interrupted"), "{}", done.err);
 }
