@@ -77,7 +77,7 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
         let mut shown: Vec<String> = counts
             .iter()
             .take(8)
-            .map(|(label, count)| format!("{label} {}", text::count(*count)))
+            .map(|(label, count)| format!("{} {}", plain(label), text::count(*count)))
             .collect();
         if counts.len() > shown.len() {
             shown.push(format!(
@@ -85,11 +85,16 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
                 text::count(counts.len() - shown.len())
             ));
         }
-        table.add_row([format!("label {}", labels.column), shown.join(", ")]);
+        table.add_row([format!("label {}", plain(&labels.column)), shown.join(", ")]);
     }
     table.add_row(["digest (SHA-256)", &info.digest]);
     writeln!(out, "{table}")?;
     Ok(Ending::Ok)
+}
+
+/// Text of a file as a terminal may have it: no control characters.
+fn plain(text: &str) -> String {
+    text.replace(char::is_control, " ")
 }
 
 /// Smallest, median and largest longest edge of the items.

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
+use super::BOXES;
 use super::process::*;
 use super::queries::query;
 
@@ -78,6 +79,21 @@ fn a_generated_scene_reads_back_as_the_same() {
     // An existing file wins over a name.
     fs::copy(folder.path().join("f.csv"), folder.path().join("uniform")).expect("writable");
     assert_eq!(digest("uniform"), digest("us-counties"));
+}
+
+#[test]
+fn labels_of_a_file_do_not_control_the_terminal() {
+    let scene = format!("{BOXES},\"two\nlines\"\n0,0,0,1,1,1,\x1b[31mred\n");
+    let folder = folder(&[("s.csv", scene.as_bytes())]);
+    let table = works(folder.path(), "scene info s.csv");
+    assert!(
+        table.contains("two lines") && table.contains("[31mred 1"),
+        "{table}"
+    );
+    assert!(!table.contains('\x1b'));
+    // They are kept as they are where programs read them.
+    let printed = works(folder.path(), "scene generate s.csv");
+    assert_eq!(printed, scene);
 }
 
 /// The commands that a help text lists.
