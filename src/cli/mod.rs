@@ -21,7 +21,6 @@ use std::io::{self, Write};
 use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser};
-use cullbench::input::InputError;
 use cullbench::scene::{LoadOptions, Scene};
 
 use args::{Cli, Command, SceneCommand};
@@ -72,7 +71,7 @@ fn tell(line: &str) {
 }
 
 /// Loads a scene and says so if some of it was left out.
-fn load_scene(source: &str, args: &args::SceneArgs) -> Result<Scene, InputError> {
+fn load_scene(source: &str, args: &args::SceneArgs) -> anyhow::Result<Scene> {
     let options = LoadOptions {
         skip_bad_items: args.skip_bad_items,
     };
