@@ -21,11 +21,23 @@ struct Floor {
     floor: f64,
 }
 
-const FLOORS: [Floor; 4] = [
+const FLOORS: [Floor; 8] = [
     Floor {
         scene: "uniform:n=1000000",
         path: "flythrough:frames=64,visible=2%",
         structure: "bvh",
+        floor: 20.0,
+    },
+    Floor {
+        scene: "uniform:n=1000000",
+        path: "flythrough:frames=64,visible=2%",
+        structure: "bsp",
+        floor: 20.0,
+    },
+    Floor {
+        scene: "uniform:n=1000000",
+        path: "flythrough:frames=64,visible=2%",
+        structure: "octree",
         floor: 20.0,
     },
     Floor {
@@ -35,16 +47,28 @@ const FLOORS: [Floor; 4] = [
         floor: 20.0,
     },
     Floor {
+        scene: "city:n=1000000",
+        path: "flythrough:frames=64,visible=2%",
+        structure: "bsp",
+        floor: 20.0,
+    },
+    Floor {
+        scene: "city:n=1000000",
+        path: "flythrough:frames=64,visible=2%",
+        structure: "octree",
+        floor: 20.0,
+    },
+    Floor {
+        scene: "city:n=1000000",
+        path: "flythrough:frames=64,visible=2%",
+        structure: "quadtree",
+        floor: 20.0,
+    },
+    Floor {
         scene: "clustered:n=1000000",
         path: "flythrough:frames=64,visible=2%",
         structure: "bvh",
         floor: 20.0,
-    },
-    Floor {
-        scene: "helsinki",
-        path: "flythrough:frames=512,visible=2%",
-        structure: "bvh",
-        floor: 4.0,
     },
 ];
 

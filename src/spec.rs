@@ -186,6 +186,14 @@ impl Spec {
             .ok_or_else(|| self.bad(key, &text, &format!("a whole number from 0 to {most}")))
     }
 
+    /// A whole number in `1..=most`, or the default.
+    pub fn count(&mut self, key: &'static str, default: u64, most: u64) -> Result<u64, SpecError> {
+        match self.whole(key, default, most)? {
+            0 => Err(self.bad(key, "0", &format!("a whole number from 1 to {most}"))),
+            count => Ok(count),
+        }
+    }
+
     /// Call last: refuses parameters that nobody asked for.
     pub fn finish(&self) -> Result<(), SpecError> {
         match self

@@ -119,7 +119,7 @@ impl LensArgs {
     pub fn defaults(&self) -> Result<LensDefaults, SpecError> {
         let far = match self.far.as_deref() {
             None => None,
-            Some("inf") => Some(None),
+            Some(text) if text.eq_ignore_ascii_case("inf") => Some(None),
             Some(text) => match text.parse::<f64>() {
                 Ok(far) if far.is_finite() => Some(Some(far)),
                 _ => {

@@ -150,10 +150,18 @@ fn paths(args: &VerifyArgs, scene: &scene::Scene) -> Vec<String> {
 
 /// The command that checks this scene and path alone.
 fn reproduce(scene: &str, path: &str, lens: &LensArgs) -> String {
-    format!(
-        "cullbench verify --scene '{scene}' --path '{path}' --planes {} --epsilon {}",
-        lens.planes, lens.epsilon
-    )
+    let mut command = format!(
+        "cullbench verify --scene '{scene}' --path '{path}' --planes {} --epsilon {} \
+         --fovy {} --aspect {}",
+        lens.planes, lens.epsilon, lens.fovy, lens.aspect
+    );
+    if let Some(near) = lens.near {
+        command += &format!(" --near {near}");
+    }
+    if let Some(far) = &lens.far {
+        command += &format!(" --far {far}");
+    }
+    command
 }
 
 /// The queries of a path once for each kind of volume; the points to locate

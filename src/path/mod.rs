@@ -194,7 +194,7 @@ pub fn load(source: &str, scene: &Scene, defaults: &LensDefaults) -> Result<Came
     let stage = Stage {
         scene,
         bounds: scene.world_bounds(),
-        count: spec.whole("frames", 256, 1_000_000)?.max(1) as usize,
+        count: spec.count("frames", 256, 1_000_000)? as usize,
         seed: spec.whole("seed", 1, u64::MAX)?,
     };
     let poses = (family.frames)(&stage, &mut spec)?;

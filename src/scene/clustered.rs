@@ -8,7 +8,7 @@ use crate::spec::{Spec, SpecError};
 /// Cluster k attracts items in proportion to 1/(k+1) (Zipf), so that a few
 /// clusters hold most of the scene.
 pub fn build(spec: &mut Spec, n: usize, dice: &mut Dice) -> Result<World, SpecError> {
-    let clusters = spec.whole("clusters", 64, 1_000_000)?.max(1) as usize;
+    let clusters = spec.count("clusters", 64, 1_000_000)? as usize;
     let side = spec.number_between("side", 1000.0, 0.0, f64::INFINITY)?;
     let spread = spec.number_between("spread", 0.02, 0.0, 10.0)? * side;
     let centres: Vec<_> = (0..clusters).map(|_| dice.point() * side).collect();

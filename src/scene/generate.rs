@@ -71,8 +71,8 @@ pub static FAMILIES: &[Family] = &[
     },
 ];
 
-/// Largest scene a spec may ask for: ids are 32 bits.
-const MOST_ITEMS: u64 = 1_000_000_000;
+/// Largest scene a spec may ask for: some 5 GB while it is made.
+const MOST_ITEMS: u64 = 100_000_000;
 
 impl Family {
     pub fn named(name: &str) -> Option<&'static Family> {

@@ -52,13 +52,8 @@ impl Plan {
 }
 
 pub fn build(spec: &mut Spec, n: usize, dice: &mut Dice) -> Result<World, SpecError> {
-    let storeys = spec.whole("storeys", 3, 1000)? as usize;
+    let storeys = spec.count("storeys", 3, 1000)? as usize;
     let edge = spec.number_between("room", 6.0, 2.0 * DOOR_WIDTH, 1e6)?;
-    if storeys == 0 {
-        return Err(SpecError::new(
-            "in 'rooms': storeys=0 is not a whole number from 1 to 1000",
-        ));
-    }
     let wanted = n.div_ceil(ITEMS_PER_ROOM).max(1);
     let storeys = storeys.min(wanted);
     let per_side = ((wanted / storeys) as f64).sqrt().floor().max(1.0) as usize;
