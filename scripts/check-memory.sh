@@ -14,4 +14,4 @@ measure() {
 out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
 measure query --scene uniform:n=10000000 --cameras flythrough:frames=4,visible=2% --structure all
-measure run --scene uniform:n=10000000 --path flythrough:frames=8,visible=2% --out "$out/run"
+measure run --scene uniform:n=10000000 --path flythrough:frames=8,visible=2% --structure linear,bvh --out "$out/run"

@@ -38,6 +38,9 @@ pub struct BvhParams {
     /// together (0 to 1000): items are tested sixteen at a time, so it pays to
     /// fill leaves more than obvhs's own 3 does.
     pub collapse: f32,
+    /// Share of the nodes that are considered for reinsertion (0 to 100; more
+    /// than 1 goes over them several times); the preset's own if left out.
+    pub reinsertion: Option<f32>,
     /// obvhs's binary tree, or its wide one with up to eight children and at
     /// most three items a leaf.
     pub layout: BvhLayout,
@@ -56,9 +59,10 @@ pub enum BvhLayout {
 impl Default for BvhParams {
     fn default() -> Self {
         BvhParams {
-            preset: BvhPreset::Fast,
+            preset: BvhPreset::VeryFast,
             leaf: 32,
             collapse: 30.0,
+            reinsertion: None,
             layout: BvhLayout::Bvh2,
             pre_split: false,
         }
@@ -321,6 +325,15 @@ impl RegionIndex for Bvh {
     ) -> Result<Self, BuildError> {
         check_range(Self::NAME, "leaf", params.leaf.into(), 1.0, 255.0)?;
         check_range(Self::NAME, "collapse", params.collapse.into(), 0.0, 1000.0)?;
+        let mut config = BvhBuildParams {
+            max_prims_per_leaf: params.leaf,
+            collapse_traversal_cost: params.collapse,
+            ..params.preset.params()
+        };
+        if let Some(share) = params.reinsertion {
+            check_range(Self::NAME, "reinsertion", share.into(), 0.0, 100.0)?;
+            config.reinsertion_batch_ratio = share;
+        }
         let stacks = Stacks::of(items, indexable(items)?);
         let boxes = stacks.boxes(items);
         if boxes.is_empty() || stacks.members.is_empty() {
@@ -328,11 +341,6 @@ impl RegionIndex for Bvh {
                 tree: PackedTree::default(),
             });
         }
-        let config = BvhBuildParams {
-            max_prims_per_leaf: params.leaf,
-            collapse_traversal_cost: params.collapse,
-            ..params.preset.params()
-        };
         let (pieces, owners) = match params.pre_split {
             true => {
                 let (pieces, owners) = pre_split(&boxes);

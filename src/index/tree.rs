@@ -112,6 +112,16 @@ impl PackedTree {
         &self.nodes
     }
 
+    /// Item bounds in tree order.
+    pub fn boxes(&self) -> &BoxBlocks {
+        &self.boxes
+    }
+
+    /// Item ids in tree order.
+    pub fn ids(&self) -> &[ItemId] {
+        &self.ids
+    }
+
     /// Whether the node has no children.
     pub fn is_leaf(&self, node: usize) -> bool {
         self.nodes[node].after() == node + 1
@@ -143,14 +153,14 @@ impl PackedTree {
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()> {
-        let mut above = Stack::new((self.nodes.len() as u32, region.start()));
+        let mut top = (self.nodes.len() as u32, region.start());
+        // What lies below the innermost straddling node; its own root, never
+        // taken off, ends with the walk.
+        let mut below = Stack::new(top);
         let mut at = 0;
         while let Some(node) = self.nodes.get(at as usize) {
-            let mut top = above.top();
-            // The root's end is the end of the walk: it is never taken off.
             while at >= top.0 {
-                above.pop();
-                top = above.top();
+                top = below.pop().unwrap_or(top);
             }
             recorder.node_tested();
             let (verdict, memo) = region.classify(&node.bounds, top.1, recorder);
@@ -169,7 +179,8 @@ impl PackedTree {
                     if node.after == at {
                         self.test_items(node.items(), region, memo, sink, recorder)?;
                     } else {
-                        above.push((node.after, memo));
+                        below.push(top);
+                        top = (node.after, memo);
                     }
                 }
             }
@@ -317,14 +328,6 @@ impl<M: Copy> Stack<M> {
             near: [root; NEAR],
             used: 1,
             far: Vec::new(),
-        }
-    }
-
-    #[inline(always)]
-    fn top(&self) -> (u32, M) {
-        match self.far.last() {
-            Some(&top) => top,
-            None => self.near[self.used - 1],
         }
     }
 

@@ -147,12 +147,13 @@ pub fn explain_visibility(b: &Aabb, volume: &ConvexVolume) -> String {
     };
     let plane = volume.planes()[index];
     format!(
-        "{bounds}: {} ({}, {}, {}, {}) has the lowest p-vertex value {value:e}, so the box is {}",
+        "{bounds}: {} ({}, {}, {}, {}) has the lowest p-vertex value {value:e} (n-vertex {:e}), so the box is {}",
         volume.plane_label(index),
         plane.normal.x,
         plane.normal.y,
         plane.normal.z,
         plane.d,
+        plane.value_at(plane.n_vertex(b)),
         if value < 0.0 {
             "not visible"
         } else {
