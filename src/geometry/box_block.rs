@@ -48,17 +48,9 @@ impl BoxBlock {
         )
     }
 
-    /// The lanes whose box the plane excludes: bit for bit
-    /// [`Plane::excludes`], lane by lane. Lanes without a box come out as
-    /// they may.
-    #[inline(always)]
-    pub fn excluded_by(&self, plane: &Plane) -> LaneMask {
-        let mut values = [0.0; LANES];
-        self.p_vertex_values(plane, &mut values);
-        below_zero(&values)
-    }
-
-    /// The lanes that none of the planes excludes.
+    /// The lanes that none of the planes excludes: bit for bit
+    /// [`Plane::excludes`], lane by lane. Lanes without a box come out as they
+    /// may.
     #[inline(always)]
     pub fn admitted_by<'p>(&self, planes: impl Iterator<Item = &'p Plane>) -> LaneMask {
         // The lowest value over all planes: below zero iff some plane's is. A
@@ -262,9 +254,6 @@ mod tests {
                     prop_assert_eq!(&block.get(lane), b);
                     let scalar = !planes.iter().any(|p| p.excludes(b));
                     prop_assert_eq!(admitted >> lane & 1 == 1, scalar);
-                    for plane in &planes {
-                        prop_assert_eq!(block.excluded_by(plane) >> lane & 1 == 1, plane.excludes(b));
-                    }
                     prop_assert_eq!(block.holding(point) >> lane & 1 == 1, b.contains_point(point));
                     prop_assert_eq!(block.meeting(&boxes[0]) >> lane & 1 == 1, b.intersects(&boxes[0]));
                 }

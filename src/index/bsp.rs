@@ -8,9 +8,9 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::partition::{Part, Record, Splitter, build_top_down};
-use super::tree::{PackedTree, Stack};
-use super::{BuildError, FrustumQuery, MemoryUsage, RegionIndex, check_range, indexable};
-use crate::geometry::{Aabb, ConvexVolume, Plane, PlaneTree};
+use super::tree::{PackedTree, Stack, seen_by_tree};
+use super::{BuildError, MemoryUsage, RegionIndex, check_range, indexable};
+use crate::geometry::{Aabb, Plane, PlaneTree};
 use crate::query::{ItemId, Recorder, Sink};
 
 /// A binary space partition (Fuchs, Kedem and Naylor 1980, "On visible surface
@@ -428,13 +428,4 @@ impl RegionIndex for Bsp {
     }
 }
 
-impl FrustumQuery for Bsp {
-    fn visible<S: Sink, R: Recorder>(
-        &self,
-        volume: &ConvexVolume,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        self.tree.query(volume, sink, recorder)
-    }
-}
+seen_by_tree!(Bsp);

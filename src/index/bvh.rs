@@ -3,10 +3,9 @@
 //! is one slice. obvhs has no frustum traversal of its own; ours is shared.
 
 use std::borrow::Cow;
-use std::ops::{ControlFlow, Range};
+use std::ops::Range;
 use std::time::Duration;
 
-use glam::Vec3;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 use obvhs::cwbvh::CwBvh;
@@ -14,10 +13,10 @@ use obvhs::cwbvh::builder::build_cwbvh;
 use obvhs::{Boundable, BvhBuildParams};
 use serde::{Deserialize, Serialize};
 
-use super::tree::{PackedTree, TreeWriter};
-use super::{BuildError, FrustumQuery, MemoryUsage, RegionIndex, check_range, indexable};
-use crate::geometry::{Aabb, ConvexVolume, PlaneTree};
-use crate::query::{ItemId, Recorder, Sink};
+use super::tree::{PackedTree, TreeWriter, searched_by_tree, seen_by_tree};
+use super::{BuildError, RegionIndex, check_range, indexable};
+use crate::geometry::{Aabb, PlaneTree};
+use crate::query::ItemId;
 
 /// A BVH built bottom-up (PLOC: Meister and Bittner 2018, "Parallel locally
 /// ordered clustering for bounding volume hierarchy construction", with
@@ -359,30 +358,7 @@ impl RegionIndex for Bvh {
         })
     }
 
-    fn memory(&self) -> MemoryUsage {
-        self.tree.memory()
-    }
-
-    fn locate<S: Sink, R: Recorder>(
-        &self,
-        p: Vec3,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        self.tree.query(&p, sink, recorder)
-    }
-    fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        self.tree.refit(items, moved, |_, _| ())
-    }
+    searched_by_tree!();
 }
 
-impl FrustumQuery for Bvh {
-    fn visible<S: Sink, R: Recorder>(
-        &self,
-        volume: &ConvexVolume,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        self.tree.query(volume, sink, recorder)
-    }
-}
+seen_by_tree!(Bvh);

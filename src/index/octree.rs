@@ -1,16 +1,13 @@
 //! The octree: a cube split in the middle of all three axes, again and again.
 
-use std::ops::ControlFlow;
-
-use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::cells::{Cell, CellSplitter};
 use super::partition::build_top_down;
-use super::tree::PackedTree;
-use super::{BuildError, FrustumQuery, MemoryUsage, RegionIndex, check_range, indexable};
-use crate::geometry::{Aabb, ConvexVolume, PlaneTree};
-use crate::query::{ItemId, Recorder, Sink};
+use super::tree::{PackedTree, searched_by_tree, seen_by_tree};
+use super::{BuildError, RegionIndex, check_range, indexable};
+use crate::geometry::{Aabb, PlaneTree};
+use crate::query::ItemId;
 
 /// An octree with fitted nodes (Meagher 1982, "Geometric modeling using octree
 /// encoding"; loose variant Ulrich 2000).
@@ -90,31 +87,7 @@ impl RegionIndex for Octree {
         Ok(Octree { tree })
     }
 
-    fn memory(&self) -> MemoryUsage {
-        self.tree.memory()
-    }
-
-    fn locate<S: Sink, R: Recorder>(
-        &self,
-        p: Vec3,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        self.tree.query(&p, sink, recorder)
-    }
-
-    fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        self.tree.refit(items, moved, |_, _| ())
-    }
+    searched_by_tree!();
 }
 
-impl FrustumQuery for Octree {
-    fn visible<S: Sink, R: Recorder>(
-        &self,
-        volume: &ConvexVolume,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        self.tree.query(volume, sink, recorder)
-    }
-}
+seen_by_tree!(Octree);

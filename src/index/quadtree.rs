@@ -1,15 +1,10 @@
 //! The quadtree: splits the two axes in which the scene is widest and leaves
 //! the third alone. For terrain, cities and maps, which are flat.
 
-use std::ops::ControlFlow;
-
-use glam::Vec3;
-
 use super::octree::CellParams;
-use super::tree::PackedTree;
-use super::{BuildError, FrustumQuery, MemoryUsage, RegionIndex, indexable};
-use crate::geometry::{Aabb, ConvexVolume, PlaneTree};
-use crate::query::{ItemId, Recorder, Sink};
+use super::tree::{PackedTree, searched_by_tree, seen_by_tree};
+use super::{BuildError, RegionIndex, indexable};
+use crate::geometry::{Aabb, PlaneTree};
 
 /// A quadtree (Finkel and Bentley 1974) with fitted three-dimensional node
 /// bounds, so that the height still culls. Crossing and coincident items are
@@ -46,38 +41,15 @@ impl RegionIndex for Quadtree {
         Ok(Quadtree { tree })
     }
 
-    fn memory(&self) -> MemoryUsage {
-        self.tree.memory()
-    }
-
-    fn locate<S: Sink, R: Recorder>(
-        &self,
-        p: Vec3,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        self.tree.query(&p, sink, recorder)
-    }
-
-    fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        self.tree.refit(items, moved, |_, _| ())
-    }
+    searched_by_tree!();
 }
 
-impl FrustumQuery for Quadtree {
-    fn visible<S: Sink, R: Recorder>(
-        &self,
-        volume: &ConvexVolume,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        self.tree.query(volume, sink, recorder)
-    }
-}
+seen_by_tree!(Quadtree);
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::Vec3;
 
     #[test]
     fn the_narrowest_axis_is_left_alone() {

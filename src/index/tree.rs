@@ -282,6 +282,47 @@ impl PackedTree {
     }
 }
 
+/// What a structure that is nothing but a tree (in a field `tree`) leaves to it
+/// of [`super::RegionIndex`].
+macro_rules! searched_by_tree {
+    () => {
+        fn memory(&self) -> $crate::index::MemoryUsage {
+            self.tree.memory()
+        }
+
+        fn locate<S: $crate::query::Sink, R: $crate::query::Recorder>(
+            &self,
+            p: glam::Vec3,
+            sink: &mut S,
+            recorder: &mut R,
+        ) -> std::ops::ControlFlow<()> {
+            self.tree.query(&p, sink, recorder)
+        }
+
+        fn refit(&mut self, items: &[Aabb], moved: &[$crate::query::ItemId]) -> bool {
+            self.tree.refit(items, moved, |_, _| ())
+        }
+    };
+}
+pub(super) use searched_by_tree;
+
+/// [`super::FrustumQuery`] for a structure that has a field `tree`.
+macro_rules! seen_by_tree {
+    ($structure:ty) => {
+        impl $crate::index::FrustumQuery for $structure {
+            fn visible<S: $crate::query::Sink, R: $crate::query::Recorder>(
+                &self,
+                volume: &$crate::geometry::ConvexVolume,
+                sink: &mut S,
+                recorder: &mut R,
+            ) -> std::ops::ControlFlow<()> {
+                self.tree.query(volume, sink, recorder)
+            }
+        }
+    };
+}
+pub(super) use seen_by_tree;
+
 /// Tests a range of items in blocks and hands over runs of admitted ones: the
 /// leaf test of every tree and the whole of the linear scan.
 #[inline(always)]

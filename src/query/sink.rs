@@ -47,3 +47,16 @@ impl Sink for First {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_answer_ends_the_query_and_an_empty_slice_is_none() {
+        let mut first = First::default();
+        assert!(first.accept(&[]).is_continue());
+        assert_eq!(first.accept(&[7, 8]), ControlFlow::Break(()));
+        assert_eq!(first.0, Some(7));
+    }
+}
