@@ -5,6 +5,7 @@
 //! scenes and drives cameras through them, checks every answer, and measures.
 //! The story of the crate in the order of its modules:
 //!
+//! - [`arithmetic`]: directed rounding, exact sums and products
 //! - [`geometry`]: boxes, planes, convex volumes, and THE plane test
 //! - [`query`]: what a query asks ([`query::Region`]), where answers go
 //!   ([`query::Sink`]) and what is counted ([`query::Recorder`])
@@ -45,6 +46,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod arithmetic;
 pub mod camera;
 pub mod geometry;
 pub mod index;

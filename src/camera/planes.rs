@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::projection::{gribb_hartmann_f32, projection_f32, projection_f64, view_f32};
 use super::{Camera, CameraError, ClipSpace, Frame, Lens, gribb_hartmann};
-use crate::geometry::rounding::round_up;
+use crate::arithmetic::rounding::round_up;
 use crate::geometry::{ConvexVolume, FrustumPlane, Plane};
 
 /// Where the planes come from.

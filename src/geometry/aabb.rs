@@ -4,7 +4,7 @@
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::rounding::{difference_down, difference_up};
+use crate::arithmetic::rounding::{difference_down, difference_up};
 
 /// A closed axis-aligned box `[min, max]` in scene-local f32 coordinates.
 ///

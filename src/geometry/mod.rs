@@ -6,7 +6,6 @@ mod box_block;
 mod convex_volume;
 mod plane;
 mod plane_tree;
-pub mod rounding;
 
 pub use aabb::Aabb;
 pub use box_block::{BoxBlock, BoxBlocks, LANES, LaneMask};

@@ -1,12 +1,14 @@
 //! Directed rounding from f64 to f32: the two functions that keep a bound a
 //! bound. They own no policy; who rounds which way is decided by the caller.
 
+use super::two_sum;
+
 /// The smallest f32 that is not below `x` (towards +infinity).
 ///
 /// Returns `+inf` above [`f32::MAX`] and NaN for NaN.
 ///
 /// ```
-/// use cullbench::geometry::rounding::{round_down, round_up};
+/// use cullbench::arithmetic::rounding::{round_down, round_up};
 /// assert_eq!(round_up(0.5), 0.5);
 /// assert!(f64::from(round_up(0.1)) > 0.1 && f64::from(round_down(0.1)) < 0.1);
 /// ```
@@ -37,11 +39,8 @@ pub fn difference_down(a: f64, b: f64) -> f32 {
 
 /// `a - b` rounded up to f32, true to the exact difference.
 pub fn difference_up(a: f64, b: f64) -> f32 {
-    let sum = a - b;
+    let (sum, lost) = two_sum(a, -b);
     let rounded = round_up(sum);
-    let virtual_b = a - sum;
-    let virtual_a = sum + virtual_b;
-    let lost = (a - virtual_a) + (virtual_b - b);
     if lost > 0.0 && f64::from(rounded) == sum {
         rounded.next_up()
     } else {
