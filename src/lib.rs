@@ -10,6 +10,7 @@
 //! - [`query`]: what a query asks ([`query::Region`]), where answers go
 //!   ([`query::Sink`]) and what is counted ([`query::Recorder`])
 //! - [`camera`]: eye, u, v, n; lenses; matrices; the planes of the view
+//! - [`oracle`]: the exact verdict about a box and a volume or camera
 //! - [`index`]: the contract [`index::RegionIndex`] and
 //!   [`index::FrustumQuery`], and the structures behind it
 //! - [`scene`]: generated and real worlds, and the regions in them
@@ -52,6 +53,7 @@ pub mod geometry;
 pub mod index;
 pub mod input;
 pub mod measure;
+pub mod oracle;
 pub mod path;
 pub mod query;
 pub mod report;

@@ -1,0 +1,239 @@
+//! The planes of a camera to 250 bits: camera parameters are exact reals here,
+//! and roots and tangents are carried far beyond what any tie could need.
+//! Nothing is shared with the derivations that are put to the test.
+
+use glam::DVec3;
+
+use super::Oracle;
+use super::certificates::HalfSpace;
+use super::number::{Number, Precision};
+use crate::arithmetic::Expansion;
+use crate::camera::{Camera, Lens};
+
+/// Where a camera stands, as the numbers that say so: all are exact.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Pose {
+    LookAt {
+        eye: DVec3,
+        look: DVec3,
+        up: DVec3,
+    },
+    Forward {
+        eye: DVec3,
+        forward: DVec3,
+        up: DVec3,
+    },
+}
+
+impl Pose {
+    /// A camera that keeps no look point: its frame's eye, direction and up.
+    pub fn of(camera: &Camera) -> Pose {
+        Pose::Forward {
+            eye: camera.frame.eye,
+            forward: camera.frame.forward(),
+            up: camera.frame.v(),
+        }
+    }
+}
+
+const PRECISION: Precision = Precision::CAMERA;
+
+/// Pi as a sum of doubles (true to 2^-330).
+const PI: [f64; 6] = [
+    3.141592653589793,
+    1.2246467991473532e-16,
+    -2.9947698097183397e-33,
+    1.1124542208633653e-49,
+    5.672231979640316e-66,
+    1.7449862161352486e-83,
+];
+
+fn times(a: &Expansion, b: &Expansion) -> Expansion {
+    (a * b).leading(PRECISION.terms() + 1)
+}
+
+type Vector = [Expansion; 3];
+
+fn dot(a: &Vector, b: &Vector) -> Expansion {
+    let products = (0..3).map(|k| times(&a[k], &b[k]));
+    products.fold(Expansion::ZERO, |sum, p| &sum + &p)
+}
+
+fn cross(a: &Vector, b: &Vector) -> Vector {
+    [(1, 2), (2, 0), (0, 1)]
+        .map(|(i, j)| (&times(&a[i], &b[j]) - &times(&a[j], &b[i])).leading(PRECISION.terms() + 1))
+}
+
+fn unit(v: &Vector) -> Vector {
+    let terms = PRECISION.terms() + 1;
+    let inverse = dot(v, v).leading(terms).sqrt(terms).reciprocal(terms);
+    [0, 1, 2].map(|k| times(&v[k], &inverse))
+}
+
+fn exact(v: DVec3) -> Vector {
+    v.to_array().map(Expansion::from)
+}
+
+/// `a - b`, exact.
+fn difference(a: DVec3, b: DVec3) -> Vector {
+    let (a, b) = (exact(a), exact(b));
+    [0, 1, 2].map(|k| &a[k] - &b[k])
+}
+
+/// The vector times a power of two that brings it near unit length, exactly:
+/// its square could overflow otherwise.
+fn near_unit(v: Vector) -> Vector {
+    let largest = v.iter().map(|c| c.estimate().abs()).fold(0.0, f64::max);
+    let exponent = libm::ilogb(largest);
+    v.map(|component| {
+        let mut scaled = Expansion::ZERO;
+        for &term in component.terms() {
+            scaled.grow(libm::ldexp(term, -exponent));
+        }
+        scaled
+    })
+}
+
+/// Sine and cosine of an angle in [0, pi/2]: Taylor series of a sixteenth of
+/// it, then four times the double-angle formulas.
+fn sine_and_cosine(angle: &Expansion) -> (Expansion, Expansion) {
+    let terms = PRECISION.terms() + 1;
+    let x = times(angle, &Expansion::from(1.0 / 16.0));
+    let square = times(&x, &x);
+    let mut sine = x.clone();
+    // 1 - cos: doubling it loses nothing, doubling the cosine would.
+    let mut versine = Expansion::ZERO;
+    let mut power = Expansion::from(1.0);
+    let mut odd = x;
+    for k in 1..40 {
+        let step = |p: &Expansion, divisor: f64| {
+            let inverse = Expansion::from(divisor).reciprocal(terms);
+            -&times(&times(p, &square), &inverse)
+        };
+        let even_order = f64::from(2 * k);
+        power = step(&power, (even_order - 1.0) * even_order);
+        odd = step(&odd, even_order * (even_order + 1.0));
+        versine = (&versine - &power).leading(terms);
+        sine = (&sine + &odd).leading(terms);
+        if odd.estimate().abs() < 1e-110 {
+            break;
+        }
+    }
+    let one = Expansion::from(1.0);
+    let two = Expansion::from(2.0);
+    for _ in 0..4 {
+        let cosine = &one - &versine;
+        let next = times(&two, &times(&sine, &sine));
+        sine = times(&two, &times(&sine, &cosine));
+        versine = next;
+    }
+    (sine, (&one - &versine).leading(terms))
+}
+
+impl Oracle {
+    /// Camera level: the view volume of a pose and a lens, in coordinates about
+    /// `origin`, as real numbers.
+    ///
+    /// `None` if pose and lens make no camera (see [`crate::camera::look_at`]
+    /// and [`Lens`] for the rules).
+    pub fn of_camera(pose: &Pose, lens: &Lens, origin: DVec3) -> Option<Oracle> {
+        let (eye, forward, up) = match *pose {
+            Pose::LookAt { eye, look, up } => (eye, difference(look, eye), up),
+            Pose::Forward { eye, forward, up } => (eye, exact(forward), up),
+        };
+        let is_zero = |v: &Vector| v.iter().all(|c| c.sign() == 0);
+        if is_zero(&forward) || up == DVec3::ZERO {
+            return None;
+        }
+        let forward = near_unit(forward);
+        let right = cross(&forward, &near_unit(exact(up)));
+        if is_zero(&right) {
+            return None;
+        }
+        let u = unit(&near_unit(right));
+        let back = unit(&forward).map(|c| -&c);
+        let v = cross(&back, &u);
+        let eye = difference(eye, origin);
+        let constraints = planes(&View { u, v, back, eye }, lens);
+        Some(Oracle::new(&constraints, PRECISION))
+    }
+}
+
+struct View {
+    u: Vector,
+    v: Vector,
+    back: Vector,
+    eye: Vector,
+}
+
+impl View {
+    /// The points x with `normal . (x - eye) + offset >= 0`.
+    fn half_space(&self, normal: &Vector, offset: &Expansion) -> HalfSpace {
+        let p = PRECISION;
+        // Each component is as large as the whole normal, as far as noise goes.
+        let size = normal.iter().map(|n| n.estimate().abs()).fold(0.0, f64::max);
+        let normal = normal.clone().map(|n| {
+            let value = n.leading(p.terms());
+            p.cleaned(Number { value, size })
+        });
+        let along = (0..3).map(|k| p.multiply(&normal[k], &Number::from(self.eye[k].clone())));
+        let d = along.fold(Number::from(offset.clone()), |d, part| {
+            p.subtract(&d, &part)
+        });
+        HalfSpace { normal, d }
+    }
+
+    /// The plane through the eye and an edge of the window at `offset` along
+    /// `axis`, `depth` ahead; `sign` is +1 for the lower edge.
+    fn side(&self, axis: &Vector, offset: &Expansion, depth: &Expansion, sign: f64) -> HalfSpace {
+        let sign = Expansion::from(sign);
+        let normal = [0, 1, 2].map(|k| {
+            let lean = &times(&axis[k], depth) + &times(&self.back[k], offset);
+            times(&sign, &lean)
+        });
+        self.half_space(&normal, &Expansion::ZERO)
+    }
+}
+
+fn planes(view: &View, lens: &Lens) -> Vec<HalfSpace> {
+    let number = |x: f64| Expansion::from(x);
+    let mut planes = Vec::with_capacity(6);
+    // Left, right, bottom and top edges of the window and how far ahead it is.
+    let (edges, depth) = match *lens {
+        Lens::Perspective {
+            fovy_deg, aspect, ..
+        } => {
+            let pi = PI
+                .iter()
+                .rev()
+                .fold(Expansion::ZERO, |pi, &term| &pi + &number(term));
+            let turn = number(360.0).reciprocal(PRECISION.terms() + 1);
+            let half = times(&times(&pi, &number(fovy_deg)), &turn);
+            let (sine, cosine) = sine_and_cosine(&half);
+            let wide = times(&sine, &number(aspect));
+            ([-&wide, wide, -&sine, sine], cosine)
+        }
+        Lens::OffAxis { window, near, .. } => (window.map(number), number(near)),
+        Lens::Orthographic { height, aspect, .. } => {
+            let half = number(height / 2.0);
+            let wide = times(&half, &number(aspect));
+            ([-&wide, wide, -&half, half], Expansion::ZERO)
+        }
+    };
+    let axes = [&view.u, &view.u, &view.v, &view.v];
+    for ((axis, edge), sign) in axes.into_iter().zip(&edges).zip([1.0, -1.0, 1.0, -1.0]) {
+        planes.push(if matches!(lens, Lens::Orthographic { .. }) {
+            let sign = number(sign);
+            let normal = axis.clone().map(|c| times(&sign, &c));
+            view.half_space(&normal, &-&times(&sign, edge))
+        } else {
+            view.side(axis, edge, &depth, sign)
+        });
+    }
+    let ahead = view.back.clone().map(|c| -&c);
+    planes.push(view.half_space(&ahead, &number(-lens.near())));
+    if let Some(far) = lens.far() {
+        planes.push(view.half_space(&view.back, &number(far)));
+    }
+    planes
+}

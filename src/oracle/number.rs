@@ -1,0 +1,142 @@
+//! Numbers of the oracle: exact, or precise to a stated number of terms with
+//! the size they had before anything cancelled, which tells a sign from noise.
+//! What the numbers mean is not known here.
+
+use crate::arithmetic::Expansion;
+
+/// How exactly to calculate.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) struct Precision {
+    /// Leading terms kept of every result.
+    terms: usize,
+    /// A number not above this part of its size is taken for zero.
+    tolerance: f64,
+}
+
+impl Precision {
+    /// No error at all: for planes that are exact objects.
+    pub const EXACT: Precision = Precision {
+        terms: usize::MAX,
+        tolerance: 0.0,
+    };
+
+    /// About 250 bits, of which 100 are kept as a guard: for planes that only
+    /// exist as real numbers (roots, tangents).
+    pub const CAMERA: Precision = Precision {
+        terms: 5,
+        tolerance: f64::from_bits((1023 - 150) << 52),
+    };
+
+    pub fn is_exact(self) -> bool {
+        self.tolerance == 0.0
+    }
+
+    /// The terms that calculations with roots and series should keep.
+    pub fn terms(self) -> usize {
+        self.terms
+    }
+
+    fn cut(self, value: Expansion) -> Expansion {
+        if value.terms().len() > self.terms {
+            value.leading(self.terms)
+        } else {
+            value
+        }
+    }
+
+    pub fn add(self, a: &Number, b: &Number) -> Number {
+        Number {
+            value: self.cut(&a.value + &b.value),
+            size: a.size + b.size,
+        }
+    }
+
+    pub fn subtract(self, a: &Number, b: &Number) -> Number {
+        self.add(a, &b.negated())
+    }
+
+    pub fn multiply(self, a: &Number, b: &Number) -> Number {
+        Number {
+            value: self.cut(&a.value * &b.value),
+            size: a.size * b.size,
+        }
+    }
+
+    /// `a*d - b*c`.
+    pub fn determinant(self, [a, b, c, d]: [&Number; 4]) -> Number {
+        self.subtract(&self.multiply(a, d), &self.multiply(b, c))
+    }
+
+    /// Whether a value cannot be told from zero, given its size.
+    pub fn is_noise(self, value: f64, size: f64) -> bool {
+        value.abs() <= self.tolerance * size
+    }
+
+    /// -1, 0 or 1; 0 also for what may be nothing but noise.
+    pub fn sign(self, a: &Number) -> i32 {
+        if self.is_noise(a.value.estimate(), a.size) {
+            0
+        } else {
+            a.value.sign()
+        }
+    }
+
+    /// The number, or a clean zero if it may be nothing but noise.
+    pub fn cleaned(self, a: Number) -> Number {
+        if self.sign(&a) == 0 {
+            Number {
+                value: Expansion::ZERO,
+                ..a
+            }
+        } else {
+            a
+        }
+    }
+}
+
+/// A value with its size: the sum of the magnitudes it came from.
+#[derive(Clone, Default, Debug)]
+pub(super) struct Number {
+    pub value: Expansion,
+    pub size: f64,
+}
+
+impl From<Expansion> for Number {
+    fn from(value: Expansion) -> Self {
+        let size = value.estimate().abs();
+        Number { value, size }
+    }
+}
+
+impl From<f32> for Number {
+    fn from(value: f32) -> Self {
+        Expansion::from(value).into()
+    }
+}
+
+impl From<f64> for Number {
+    fn from(value: f64) -> Self {
+        Expansion::from(value).into()
+    }
+}
+
+impl Number {
+    pub fn negated(&self) -> Number {
+        Number {
+            value: -&self.value,
+            size: self.size,
+        }
+    }
+
+    pub fn absolute(&self) -> Number {
+        if self.value.sign() < 0 {
+            self.negated()
+        } else {
+            self.clone()
+        }
+    }
+
+    pub fn estimate(&self) -> f64 {
+        self.value.estimate()
+    }
+}
