@@ -4,11 +4,11 @@
 use std::ops::ControlFlow;
 
 use cullbench::camera::PlaneOptions;
-use cullbench::geometry::{Aabb, ConvexVolume, PlaneTree};
+use cullbench::geometry::{Aabb, PlaneTree};
 use cullbench::index::{
     BuildError, DynIndex, FrustumQuery, LinearScalar, MemoryUsage, RegionIndex,
 };
-use cullbench::query::{Containment, ItemId, QueryCost, Recorder, Region, Sink};
+use cullbench::query::{Containment, ItemId, QueryCost, Recorder, Region, Sink, View};
 
 type Flow = ControlFlow<()>;
 const TILE: usize = 32;
@@ -74,7 +74,7 @@ impl RegionIndex for Tiles {
 }
 
 impl FrustumQuery for Tiles {
-    fn visible<S: Sink, R: Recorder>(&self, v: &ConvexVolume, sink: &mut S, r: &mut R) -> Flow {
+    fn visible<V: View, S: Sink, R: Recorder>(&self, v: &V, sink: &mut S, r: &mut R) -> Flow {
         self.query(v, sink, r)
     }
 }

@@ -11,7 +11,7 @@ use cullbench::index::{BACKENDS, BuildError, DynIndex, MemoryUsage, StructureSpe
 use cullbench::index::{Bsp, Bvh, FrustumQuery, Linear, LinearScalar, Octree, Quadtree};
 use cullbench::measure::Workload;
 use cullbench::path::{self, LensDefaults};
-use cullbench::query::{ItemId, Recorder, Sink};
+use cullbench::query::{ItemId, Recorder, Sink, View};
 use cullbench::scene;
 use cullbench::verify::Reference;
 use glam::Vec3;
@@ -49,13 +49,13 @@ impl<T: RegionIndex, const WHICH: usize> RegionIndex for Variant<T, WHICH> {
 }
 
 impl<T: FrustumQuery, const WHICH: usize> FrustumQuery for Variant<T, WHICH> {
-    fn visible<S: Sink, R: Recorder>(
+    fn visible<V: View, S: Sink, R: Recorder>(
         &self,
-        volume: &ConvexVolume,
+        view: &V,
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()> {
-        self.0.visible(volume, sink, recorder)
+        self.0.visible(view, sink, recorder)
     }
 }
 

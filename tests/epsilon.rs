@@ -11,6 +11,7 @@ use by_hand::{Kind, Setup, View};
 use cullbench::camera::{PlaneMethod, PlaneOptions, Surroundings};
 use cullbench::geometry::{Aabb, FrustumPlane};
 use cullbench::index::{BACKENDS, StructureSpec};
+use cullbench::query::View as _;
 use glam::DVec3;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -289,6 +290,60 @@ fn no_box_that_holds_a_visible_point_is_ever_dropped() {
     }
     // Not even half a rounding of each number is margin enough.
     assert!(dropped_at_half > 50, "{dropped_at_half}");
+}
+
+#[test]
+fn views_about_the_eye_drop_none_of_them_either() {
+    let mut dice = Dice::new(31);
+    let (mut bare, mut rounded_near_zero, mut boxes) = (0, 0, 0);
+    for offset in [0.0, 1e4, 1e6] {
+        for kind in KINDS {
+            for _ in 0..100 {
+                let scene = scene(&mut dice, kind, offset, 100);
+                let (camera, around) = (scene.setup.camera(), scene.surroundings());
+                let about = |c| camera.relative_volume(c, &around).unwrap();
+                let (safe, tight) = (about(8.0), about(0.0));
+                let wide = camera.wide_volume(&around).unwrap();
+                for b in &scene.boxes {
+                    assert!(safe.sees(b), "{b:?}; {:?}, {around:?}", scene.setup);
+                    bare += usize::from(!tight.sees(b));
+                    // f64 has no margin, but digits enough where the camera
+                    // is not far away.
+                    rounded_near_zero += usize::from(offset == 0.0 && !wide.sees(b));
+                }
+                boxes += scene.boxes.len();
+            }
+        }
+    }
+    assert!(bare * 100 > boxes, "too easy: {bare} of {boxes}");
+    assert_eq!(rounded_near_zero, 0);
+}
+
+#[test]
+fn about_the_eye_the_margin_does_not_grow_with_the_distance() {
+    let mut dice = Dice::new(37);
+    let mut camera = scene(&mut dice, "perspective", 0.0, 1).setup.camera();
+    let margin = |camera: &cullbench::camera::Camera, relative: bool| -> f64 {
+        let at = |c| -> Vec<f64> {
+            let around = Surroundings::default();
+            let options = PlaneOptions {
+                epsilon: c,
+                ..PlaneOptions::default()
+            };
+            let planes = match relative {
+                true => camera.relative_volume(c, &around).unwrap().planes().clone(),
+                false => camera.volume(&options, &around).unwrap(),
+            };
+            planes.planes().iter().map(|p| f64::from(p.d)).collect()
+        };
+        let (moved, bare) = (at(8.0), at(0.0));
+        let gaps = moved.iter().zip(bare).map(|(moved, bare)| moved - bare);
+        gaps.fold(0.0, f64::max)
+    };
+    camera.frame.eye = DVec3::splat(1e7 + 0.3);
+    let far = camera.lens.far().unwrap();
+    assert!(margin(&camera, true) < far * 2e-5);
+    assert!(margin(&camera, false) > 1.0);
 }
 
 #[test]

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::projection::{gribb_hartmann_f32, projection_f32, projection_f64, view_f32};
 use super::{Camera, CameraError, ClipSpace, Frame, Lens, gribb_hartmann};
 use crate::arithmetic::rounding::round_up;
-use crate::geometry::{ConvexVolume, FrustumPlane, Plane};
+use crate::geometry::{ConvexVolume, FrustumPlane, Plane, RelativeVolume, WidePlane, WideVolume};
 
 /// Where the planes come from.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug, Serialize, Deserialize)]
@@ -138,28 +138,90 @@ impl Camera {
     ) -> Result<ConvexVolume, CameraError> {
         let frame = self.frame.relative_to(around.origin);
         let mut planes = derive(&frame, &self.lens, options.method);
-        let reach = match self.lens.corners(&frame) {
-            Some(corners) => corners
-                .iter()
-                .fold(DVec3::ZERO, |reach, corner| reach.max(corner.abs())),
-            None => around.reach.as_dvec3(),
-        };
+        let reach = self.reach_of(&frame, around.reach.as_dvec3());
         if options.epsilon > 0.0 {
             for (_, plane) in &mut planes {
-                *plane = moved_outward(plane, reach, options.epsilon);
+                *plane = moved_outward(plane, reach, options.epsilon, 0.0);
             }
         }
         Ok(ConvexVolume::from_named_planes(&planes)?)
     }
+
+    /// The same planes in f64, from the frame and without a margin: what the
+    /// test can tell at best.
+    ///
+    /// # Errors
+    /// [`CameraError::Volume`] if a plane does not even fit f64.
+    pub fn wide_volume(&self, around: &Surroundings) -> Result<WideVolume, CameraError> {
+        let frame = self.frame.relative_to(around.origin);
+        let planes = from_frame_f64(&frame, &self.lens).into_iter();
+        let planes: Vec<WidePlane> = planes.map(|(_, plane)| plane).collect();
+        Ok(WideVolume::from_planes(&planes)?)
+    }
+
+    /// The view volume in coordinates relative to the eye: the local eye
+    /// rounded to f32 becomes their zero, what the rounding left goes into the
+    /// offsets in f64, and each plane is rounded to f32 once.
+    ///
+    /// With a positive epsilon c the planes are moved outward as in
+    /// [`Camera::volume`], with A_k the largest distance of the volume's
+    /// corners from the zero on axis k (of the scene, if the volume has no far
+    /// plane), not from the scene's own zero: that is what is gained far away.
+    /// Let u = 2^-24 and x a visible point of a box. `x_k - e_k` is rounded
+    /// once, its product with `n_k` once, and the product goes through at most
+    /// three sums: 5 roundings; the normal itself was rounded, a sixth. Each is
+    /// at most u of `|n_k|*A_k`; the offset was rounded and goes through one
+    /// sum, 2 of `|d|`. So c = 6 and a little covers all, and c = 8 does. Two
+    /// smaller things come on top: the subtraction of the scene's origin in
+    /// f64 (2^-53 of the local eye), and normals that underflow (2^-150 of
+    /// A_k).
+    ///
+    /// # Errors
+    /// [`CameraError::Volume`] if the eye or a plane does not fit f32.
+    pub fn relative_volume(
+        &self,
+        epsilon: f64,
+        around: &Surroundings,
+    ) -> Result<RelativeVolume, CameraError> {
+        let local = self.frame.relative_to(around.origin);
+        let eye = local.eye.as_vec3();
+        let zero = eye.as_dvec3();
+        // Exact: what is left is a number of f64.
+        let frame = local.relative_to(zero);
+        let mut planes = from_frame(&frame, &self.lens);
+        let reach = self.reach_of(&frame, around.reach.as_dvec3() + zero.abs());
+        if epsilon > 0.0 {
+            for (_, plane) in &mut planes {
+                let of_eye = plane.normal.as_dvec3().abs().dot(local.eye.abs());
+                let slack = of_eye * f64::EPSILON + reach.element_sum() * TINY;
+                *plane = moved_outward(plane, reach, epsilon, slack);
+            }
+        }
+        let planes = ConvexVolume::from_named_planes(&planes)?;
+        Ok(RelativeVolume::new(eye, planes)?)
+    }
+
+    /// The largest absolute coordinates of the volume's corners in a frame, or
+    /// of the scene if there is no far plane.
+    fn reach_of(&self, frame: &Frame, of_scene: DVec3) -> DVec3 {
+        match self.lens.corners(frame) {
+            Some(corners) => corners
+                .iter()
+                .fold(DVec3::ZERO, |reach, corner| reach.max(corner.abs())),
+            None => of_scene,
+        }
+    }
 }
 
-fn moved_outward(plane: &Plane, reach: DVec3, c: f64) -> Plane {
+/// Below half the smallest subnormal f32 times four: covers underflow.
+const TINY: f64 = f64::from_bits((1023 - 147) << 52);
+
+fn moved_outward(plane: &Plane, reach: DVec3, c: f64, slack: f64) -> Plane {
     const UNIT_ROUNDOFF: f64 = 1.0 / (1u64 << 24) as f64;
-    // Below half the smallest subnormal f32 times four: covers underflow.
-    const TINY: f64 = f64::from_bits((1023 - 147) << 52);
     let d = f64::from(plane.d);
     let size = plane.normal.as_dvec3().abs().dot(reach) + d.abs();
-    Plane::new(plane.normal, round_up(d + c * UNIT_ROUNDOFF * size + TINY))
+    let margin = c * UNIT_ROUNDOFF * size + TINY + slack;
+    Plane::new(plane.normal, round_up(d + margin))
 }
 
 type NamedPlanes = Vec<(FrustumPlane, Plane)>;
@@ -182,13 +244,13 @@ fn derive(frame: &Frame, lens: &Lens, method: PlaneMethod) -> NamedPlanes {
 /// The side planes pass through the eye along the window's edges (or, for an
 /// orthographic lens, stand beside it); near and far face each other.
 macro_rules! planes_from_frame {
-    ($name:ident, $float:ty, $vec:ty, $convert:expr, $plane:expr) => {
-        fn $name(frame: &Frame, lens: &Lens) -> NamedPlanes {
+    ($name:ident, $float:ty, $vec:ty, $convert:expr, $plane:ty) => {
+        fn $name(frame: &Frame, lens: &Lens) -> Vec<(FrustumPlane, $plane)> {
             let convert: fn(DVec3) -> $vec = $convert;
             let (u, v, n) = (convert(frame.u()), convert(frame.v()), convert(frame.n()));
             let eye = convert(frame.eye);
             let [left, right, bottom, top] = lens.window().map(|edge| edge as $float);
-            let to_plane: fn($vec, $float) -> Plane = $plane;
+            let to_plane = <$plane>::new;
             // The edge at `edge` along `axis`, seen from its inner side.
             let side = |axis: $vec, edge: $float| {
                 if lens.is_orthographic() {
@@ -216,11 +278,13 @@ macro_rules! planes_from_frame {
     };
 }
 
-planes_from_frame!(from_frame, f64, DVec3, |v| v, |normal, d| Plane::new(
-    normal.as_vec3(),
-    d as f32
-));
-planes_from_frame!(from_frame_f32, f32, Vec3, |v| v.as_vec3(), Plane::new);
+planes_from_frame!(from_frame_f64, f64, DVec3, |v| v, WidePlane);
+planes_from_frame!(from_frame_f32, f32, Vec3, |v| v.as_vec3(), Plane);
+
+fn from_frame(frame: &Frame, lens: &Lens) -> NamedPlanes {
+    let wide = from_frame_f64(frame, lens).into_iter();
+    wide.map(|(name, plane)| (name, plane.narrow())).collect()
+}
 
 fn from_matrix(frame: &Frame, lens: &Lens, clip: ClipSpace) -> NamedPlanes {
     let matrix = projection_f64(lens, clip) * frame.world_to_eye();

@@ -47,6 +47,19 @@ impl Aabb {
         )
     }
 
+    /// The box as seen from `eye`: each bound minus the eye's coordinate,
+    /// rounded to nearest and kept finite.
+    ///
+    /// Rounding is monotone and so is the clamp: a box within another stays
+    /// within it, bound by bound. (Without the clamp an overflow times a zero
+    /// of a normal would be a NaN, in an item but not in its node.)
+    #[inline(always)]
+    pub fn relative_to(&self, eye: Vec3) -> Aabb {
+        let (low, high) = (self.min - eye, self.max - eye);
+        let kept = |v: Vec3| Vec3::new(held(v.x), held(v.y), held(v.z));
+        Aabb::new(kept(low), kept(high))
+    }
+
     /// Whether the box holds no point at all (`min > max` somewhere).
     pub fn is_empty(&self) -> bool {
         !self.min.cmple(self.max).all()
@@ -112,6 +125,13 @@ impl Aabb {
         };
         Vec3::new(pick(0), pick(1), pick(2))
     }
+}
+
+/// An infinity becomes the largest number of its sign.
+#[inline(always)]
+pub(super) fn held(x: f32) -> f32 {
+    let x = if x < f32::MAX { x } else { f32::MAX };
+    if x > f32::MIN { x } else { f32::MIN }
 }
 
 #[cfg(test)]

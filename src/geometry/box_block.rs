@@ -4,7 +4,8 @@
 
 use glam::Vec3;
 
-use super::{Aabb, Plane};
+use super::aabb::held;
+use super::{Aabb, Ball, Plane, SphereMargin, WidePlane};
 
 /// Boxes of one block.
 pub const LANES: usize = 16;
@@ -70,18 +71,110 @@ impl BoxBlock {
     #[inline(always)]
     fn p_vertex_values(&self, plane: &Plane, values: &mut [f32; LANES]) {
         let n = plane.normal;
-        // The p-vertex row of an axis is the same for every box.
-        let row = |k: usize, n: f32| {
-            if n >= 0.0 {
-                &self.rows[k + 3]
-            } else {
-                &self.rows[k]
-            }
-        };
-        let (x, y, z) = (row(0, n.x), row(1, n.y), row(2, n.z));
+        let rows = self.far_rows(n.x >= 0.0, n.y >= 0.0, n.z >= 0.0);
+        Self::values(plane, rows, values);
+    }
+
+    #[inline(always)]
+    fn n_vertex_values(&self, plane: &Plane, values: &mut [f32; LANES]) {
+        let n = plane.normal;
+        let rows = self.far_rows(n.x < 0.0, n.y < 0.0, n.z < 0.0);
+        Self::values(plane, rows, values);
+    }
+
+    /// One row for each axis, of the upper bounds where `high`: the p-vertex
+    /// row of an axis is the same for every box.
+    #[inline(always)]
+    fn far_rows(&self, x: bool, y: bool, z: bool) -> [&[f32; LANES]; 3] {
+        let row = |k: usize, high: bool| &self.rows[if high { k + 3 } else { k }];
+        [row(0, x), row(1, y), row(2, z)]
+    }
+
+    #[inline(always)]
+    fn values(plane: &Plane, [x, y, z]: [&[f32; LANES]; 3], values: &mut [f32; LANES]) {
+        let n = plane.normal;
         for lane in 0..LANES {
             values[lane] = ((n.x * x[lane] + n.y * y[lane]) + n.z * z[lane]) + plane.d;
         }
+    }
+
+    /// The lanes that none of the f64 planes excludes: bit for bit
+    /// [`WidePlane::excludes`], lane by lane.
+    #[inline(always)]
+    pub fn admitted_by_wide<'p>(&self, planes: impl Iterator<Item = &'p WidePlane>) -> LaneMask {
+        let mut lowest = [f64::INFINITY; LANES];
+        for plane in planes {
+            let n = plane.normal;
+            let [x, y, z] = self.far_rows(n.x >= 0.0, n.y >= 0.0, n.z >= 0.0);
+            for lane in 0..LANES {
+                let [x, y, z] = [x, y, z].map(|row| f64::from(row[lane]));
+                let value = ((n.x * x + n.y * y) + n.z * z) + plane.d;
+                lowest[lane] = if value < lowest[lane] {
+                    value
+                } else {
+                    lowest[lane]
+                };
+            }
+        }
+        let mut below = [0; LANES];
+        for lane in 0..LANES {
+            below[lane] = if lowest[lane] < 0.0 {
+                LANE_BITS[lane]
+            } else {
+                0
+            };
+        }
+        !joined(&below)
+    }
+
+    /// The lanes whose sphere none of the planes drops: bit for bit
+    /// [`Spheres::drops`](super::Spheres::drops), lane by lane.
+    #[inline(always)]
+    pub fn admitted_as_spheres<'p>(
+        &self,
+        planes: impl Iterator<Item = (&'p Plane, &'p SphereMargin)>,
+    ) -> LaneMask {
+        // Row by row, like the block itself: centre x, y, z, radius, reach.
+        let mut balls = [[0.0; LANES]; 5];
+        for lane in 0..LANES {
+            let ball = Ball::in_cube(&self.get(lane));
+            let values = ball.centre.to_array().into_iter();
+            let values = values.chain([ball.radius, ball.reach]);
+            for (row, value) in balls.iter_mut().zip(values) {
+                row[lane] = value;
+            }
+        }
+        let [x, y, z, radius, reach] = balls;
+        let mut dropped = [0; LANES];
+        for (plane, margin) in planes {
+            let (mut far, mut near) = ([0.0; LANES], [0.0; LANES]);
+            self.p_vertex_values(plane, &mut far);
+            self.n_vertex_values(plane, &mut near);
+            for lane in 0..LANES {
+                let ball = Ball {
+                    centre: Vec3::new(x[lane], y[lane], z[lane]),
+                    radius: radius[lane],
+                    reach: reach[lane],
+                };
+                let value = margin.value_at(plane.normal, &ball);
+                let outside = (f32::MIN..0.0).contains(&value) & (near[lane] < 0.0);
+                let drops = outside | (far[lane] < 0.0);
+                dropped[lane] |= if drops { LANE_BITS[lane] } else { 0 };
+            }
+        }
+        !joined(&dropped)
+    }
+
+    /// The boxes as seen from `eye`: [`Aabb::relative_to`] lane by lane.
+    #[inline(always)]
+    pub fn relative_to(&self, eye: Vec3) -> BoxBlock {
+        let mut moved = *self;
+        for (k, row) in moved.rows.iter_mut().enumerate() {
+            for x in row {
+                *x = held(*x - eye[k % 3]);
+            }
+        }
+        moved
     }
 
     /// The lanes whose closed box holds the point.

@@ -5,7 +5,7 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::{Aabb, Plane};
+use super::{Aabb, Plane, WidePlane};
 
 /// Largest number of planes of one volume: one bit each in a [`PlaneMask`].
 pub const MAX_PLANES: usize = 32;
@@ -58,6 +58,10 @@ pub enum VolumeError {
     TooManyPlanes { count: usize },
     #[error("plane {index} is not finite: ({}, {}, {}, {})", plane.normal.x, plane.normal.y, plane.normal.z, plane.d)]
     NonFinitePlane { index: usize, plane: Plane },
+    #[error("plane {index} is not finite: ({}, {}, {}, {})", plane.normal.x, plane.normal.y, plane.normal.z, plane.d)]
+    NonFiniteWidePlane { index: usize, plane: WidePlane },
+    #[error("the eye is not finite in f32: {eye}")]
+    NonFiniteEye { eye: Vec3 },
 }
 
 /// The closed intersection of up to [`MAX_PLANES`] half-spaces.

@@ -6,9 +6,15 @@ mod box_block;
 mod convex_volume;
 mod plane;
 mod plane_tree;
+mod relative_volume;
+mod spheres;
+mod wide_volume;
 
 pub use aabb::Aabb;
 pub use box_block::{BoxBlock, BoxBlocks, LANES, LaneMask};
 pub use convex_volume::{ConvexVolume, FrustumPlane, MAX_PLANES, PlaneMask, VolumeError};
 pub use plane::Plane;
 pub use plane_tree::{PlaneTree, PlaneTreeNode};
+pub use relative_volume::RelativeVolume;
+pub use spheres::{Ball, SphereMargin, Spheres, sphere_cube};
+pub use wide_volume::{WidePlane, WideVolume};

@@ -1,6 +1,6 @@
 //! One object type for all structures, and the table they are listed in.
 //! Dispatch happens once per query, never per node: behind each method stands
-//! a traversal compiled for that structure, sink and recorder.
+//! a traversal compiled for that structure, view, sink and recorder.
 
 use glam::Vec3;
 use serde_json::{Map, Value};
@@ -10,16 +10,24 @@ use super::{
     RegionIndex,
 };
 use crate::geometry::{Aabb, ConvexVolume, PlaneTree};
-use crate::query::{ItemId, NoRecorder, QueryCost};
+use crate::query::{AnyView, ItemId, NoRecorder, QueryCost, Recorder};
 use crate::spec::{Spec, SpecError};
 
 /// A built structure of any kind. Answers are appended to `out`.
 pub trait DynIndex: Send + Sync {
     fn memory(&self) -> MemoryUsage;
-    /// The timed path: nothing is counted.
-    fn visible(&self, volume: &ConvexVolume, out: &mut Vec<ItemId>);
+    /// What a view of any kind sees. The timed path: nothing is counted.
+    fn see(&self, view: AnyView<'_>, out: &mut Vec<ItemId>);
     /// The same query with its cost added up.
-    fn visible_counted(&self, volume: &ConvexVolume, out: &mut Vec<ItemId>, cost: &mut QueryCost);
+    fn see_counted(&self, view: AnyView<'_>, out: &mut Vec<ItemId>, cost: &mut QueryCost);
+    /// What a convex volume sees: [`DynIndex::see`] with the usual view.
+    fn visible(&self, volume: &ConvexVolume, out: &mut Vec<ItemId>) {
+        self.see(volume.into(), out);
+    }
+    /// The same query with its cost added up.
+    fn visible_counted(&self, volume: &ConvexVolume, out: &mut Vec<ItemId>, cost: &mut QueryCost) {
+        self.see_counted(volume.into(), out, cost);
+    }
     /// The timed path: nothing is counted.
     fn locate(&self, p: Vec3, out: &mut Vec<ItemId>);
     /// The same search with its cost added up.
@@ -33,13 +41,12 @@ impl<T: FrustumQuery> DynIndex for T {
         RegionIndex::memory(self)
     }
 
-    fn visible(&self, volume: &ConvexVolume, out: &mut Vec<ItemId>) {
-        // A Vec never breaks off.
-        let _ = FrustumQuery::visible(self, volume, out, &mut NoRecorder);
+    fn see(&self, view: AnyView<'_>, out: &mut Vec<ItemId>) {
+        ask(self, view, out, &mut NoRecorder);
     }
 
-    fn visible_counted(&self, volume: &ConvexVolume, out: &mut Vec<ItemId>, cost: &mut QueryCost) {
-        let _ = FrustumQuery::visible(self, volume, out, cost);
+    fn see_counted(&self, view: AnyView<'_>, out: &mut Vec<ItemId>, cost: &mut QueryCost) {
+        ask(self, view, out, cost);
     }
 
     fn locate(&self, p: Vec3, out: &mut Vec<ItemId>) {
@@ -53,6 +60,22 @@ impl<T: FrustumQuery> DynIndex for T {
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
         RegionIndex::refit(self, items, moved)
     }
+}
+
+/// The one place that tells views apart: a traversal of its own for each.
+fn ask<T: FrustumQuery, R: Recorder>(
+    index: &T,
+    view: AnyView<'_>,
+    out: &mut Vec<ItemId>,
+    recorder: &mut R,
+) {
+    // A Vec never breaks off.
+    let _ = match view {
+        AnyView::Volume(view) => index.visible(view, out, recorder),
+        AnyView::Spheres(view) => index.visible(view, out, recorder),
+        AnyView::Wide(view) => index.visible(view, out, recorder),
+        AnyView::Relative(view) => index.visible(view, out, recorder),
+    };
 }
 
 type Build = fn(&[Aabb], Option<&PlaneTree>, &Value) -> Result<Box<dyn DynIndex>, BuildError>;

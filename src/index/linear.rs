@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 
 use super::tree::scan_blocks;
 use super::{BuildError, FrustumQuery, MemoryUsage, RegionIndex, indexable};
-use crate::geometry::{Aabb, BoxBlocks, ConvexVolume, PlaneTree};
-use crate::query::{ItemId, Recorder, Region, Sink};
+use crate::geometry::{Aabb, BoxBlocks, PlaneTree};
+use crate::query::{ItemId, Recorder, Region, Sink, View};
 
 /// A scan has nothing to choose.
 #[derive(Clone, Copy, Default, Debug, Serialize, Deserialize)]
@@ -71,13 +71,13 @@ impl RegionIndex for LinearScalar {
 }
 
 impl FrustumQuery for LinearScalar {
-    fn visible<S: Sink, R: Recorder>(
+    fn visible<V: View, S: Sink, R: Recorder>(
         &self,
-        volume: &ConvexVolume,
+        view: &V,
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()> {
-        self.scan(volume, sink, recorder)
+        self.scan(view, sink, recorder)
     }
 }
 
@@ -138,12 +138,12 @@ impl RegionIndex for Linear {
 }
 
 impl FrustumQuery for Linear {
-    fn visible<S: Sink, R: Recorder>(
+    fn visible<V: View, S: Sink, R: Recorder>(
         &self,
-        volume: &ConvexVolume,
+        view: &V,
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()> {
-        self.scan(volume, sink, recorder)
+        self.scan(view, sink, recorder)
     }
 }

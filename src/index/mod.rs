@@ -18,8 +18,8 @@ use glam::Vec3;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use crate::geometry::{Aabb, ConvexVolume, PlaneTree};
-use crate::query::{ItemId, Recorder, Sink};
+use crate::geometry::{Aabb, PlaneTree};
+use crate::query::{ItemId, Recorder, Sink, View};
 
 pub use bsp::{Bsp, BspBuilder, BspParams};
 pub use bvh::{Bvh, BvhLayout, BvhParams, BvhPreset};
@@ -105,14 +105,16 @@ pub trait RegionIndex: Sized + Send + Sync {
     }
 }
 
-/// A structure that finds what a convex volume sees.
+/// A structure that finds what a camera sees.
 pub trait FrustumQuery: RegionIndex {
-    /// Hands every item that the six-plane test (or as many planes as there
-    /// are) does not exclude to the sink: exactly the set
-    /// `{ i : volume.sees(items[i]) }`, bit for bit.
-    fn visible<S: Sink, R: Recorder>(
+    /// Hands every item that the view admits to the sink: exactly the set
+    /// `{ i : view.sees(items[i]) }`, bit for bit. For a
+    /// [`ConvexVolume`](crate::geometry::ConvexVolume) these are the items
+    /// that its planes (six of a frustum, or as many as there are) do not
+    /// exclude.
+    fn visible<V: View, S: Sink, R: Recorder>(
         &self,
-        volume: &ConvexVolume,
+        view: &V,
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()>;

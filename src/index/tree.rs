@@ -145,7 +145,7 @@ impl PackedTree {
     ///
     /// One walk along the nodes in memory order: a rejected subtree is jumped
     /// over, an accepted one is a single slice, and a straddling one leaves
-    /// its memo (for a frustum the mask of planes still open) for all nodes up
+    /// its memo (for a view the mask of planes still open) for all nodes up
     /// to its end.
     pub fn query<G: Region, S: Sink, R: Recorder>(
         &self,
@@ -310,13 +310,17 @@ pub(super) use searched_by_tree;
 macro_rules! seen_by_tree {
     ($structure:ty) => {
         impl $crate::index::FrustumQuery for $structure {
-            fn visible<S: $crate::query::Sink, R: $crate::query::Recorder>(
+            fn visible<
+                V: $crate::query::View,
+                S: $crate::query::Sink,
+                R: $crate::query::Recorder,
+            >(
                 &self,
-                volume: &$crate::geometry::ConvexVolume,
+                view: &V,
                 sink: &mut S,
                 recorder: &mut R,
             ) -> std::ops::ControlFlow<()> {
-                self.tree.query(volume, sink, recorder)
+                self.tree.query(view, sink, recorder)
             }
         }
     };

@@ -11,7 +11,7 @@ use super::clock::Stopwatch;
 use super::{Built, Counted, Status, Verdict, Workload};
 use crate::geometry::{Aabb, ConvexVolume};
 use crate::index::{DynIndex, MemoryUsage};
-use crate::query::{ItemId, QueryCost};
+use crate::query::{AnyView, ItemId, QueryCost};
 use crate::scene::{Dice, Regions, Scene};
 
 /// How long and how often to measure.
@@ -301,8 +301,8 @@ pub fn harness_overhead_ns() -> f64 {
         fn memory(&self) -> MemoryUsage {
             MemoryUsage::default()
         }
-        fn visible(&self, _: &ConvexVolume, _: &mut Vec<ItemId>) {}
-        fn visible_counted(&self, _: &ConvexVolume, _: &mut Vec<ItemId>, _: &mut QueryCost) {}
+        fn see(&self, _: AnyView<'_>, _: &mut Vec<ItemId>) {}
+        fn see_counted(&self, _: AnyView<'_>, _: &mut Vec<ItemId>, _: &mut QueryCost) {}
         fn locate(&self, _: Vec3, _: &mut Vec<ItemId>) {}
         fn locate_counted(&self, _: Vec3, _: &mut Vec<ItemId>, _: &mut QueryCost) {}
         fn refit(&mut self, _: &[Aabb], _: &[ItemId]) -> bool {

@@ -1,11 +1,11 @@
 //! Query regions and the verdict about a box: inside, straddling or outside,
-//! with the plane masks that a parent hands to its children. Traversal itself
-//! belongs to the structures.
+//! with the memo that a parent hands to its children. Views have a file of
+//! their own; traversal belongs to the structures.
 
 use glam::Vec3;
 
 use super::Recorder;
-use crate::geometry::{Aabb, BoxBlock, ConvexVolume, LaneMask, PlaneMask};
+use crate::geometry::{Aabb, BoxBlock, LaneMask};
 
 /// How a box lies to a region.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -18,10 +18,11 @@ pub enum Containment {
     Inside,
 }
 
-/// A query region: a convex volume, a box or a point.
+/// A query region: a camera's view (every [`View`](super::View)), a box or a
+/// point.
 ///
 /// The memo carries what a parent has already decided down to its children
-/// (for a convex volume the mask of open planes). An implementation must be
+/// (for a view the mask of open planes). An implementation must be
 /// monotone: if it calls a box `Outside` it must do so for every box within,
 /// and likewise for `Inside`.
 pub trait Region {
@@ -96,84 +97,10 @@ impl Region for Aabb {
     }
 }
 
-impl Region for ConvexVolume {
-    type Memo = PlaneMask;
-
-    #[inline]
-    fn start(&self) -> PlaneMask {
-        self.mask()
-    }
-
-    /// Tests only the planes left in `mask`. `bounds` must not be empty.
-    #[inline(always)]
-    fn classify<R: Recorder>(
-        &self,
-        bounds: &Aabb,
-        mask: PlaneMask,
-        recorder: &mut R,
-    ) -> (Containment, PlaneMask) {
-        let mut undecided = mask;
-        for index in Bits(mask) {
-            let plane = self.plane_of_bit(index);
-            recorder.planes_tested(1);
-            if plane.excludes(bounds) {
-                return (Containment::Outside, mask);
-            }
-            if plane.contains(bounds) {
-                undecided &= !(1 << index);
-            }
-        }
-        let verdict = if undecided == 0 {
-            Containment::Inside
-        } else {
-            Containment::Straddles
-        };
-        (verdict, undecided)
-    }
-
-    /// Half the work of [`Region::classify`]: an item has no children to hand
-    /// a mask to, so its n-vertices are never needed.
-    #[inline(always)]
-    fn admits<R: Recorder>(&self, item: &Aabb, mask: PlaneMask, recorder: &mut R) -> bool {
-        for index in Bits(mask) {
-            recorder.planes_tested(1);
-            if self.plane_of_bit(index).excludes(item) {
-                return false;
-            }
-        }
-        true
-    }
-    #[inline(always)]
-    fn admit_lanes(&self, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
-        block.admitted_by(Bits(mask).map(|index| self.plane_of_bit(index)))
-    }
-
-    fn planes_open(mask: PlaneMask) -> u32 {
-        mask.count_ones()
-    }
-}
-
-/// The bits that are set, lowest first.
-struct Bits(PlaneMask);
-
-impl Iterator for Bits {
-    type Item = u32;
-
-    #[inline(always)]
-    fn next(&mut self) -> Option<u32> {
-        if self.0 == 0 {
-            return None;
-        }
-        let index = self.0.trailing_zeros();
-        self.0 &= self.0 - 1;
-        Some(index)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Plane;
+    use crate::geometry::{ConvexVolume, Plane};
     use crate::query::NoRecorder;
 
     fn unit_cube() -> ConvexVolume {

@@ -2,6 +2,8 @@
 //! [`RegionIndex`] and [`FrustumQuery`]. [`conformance!`](crate::conformance)
 //! makes a test of each; an error says what differed and on which scene.
 
+mod views;
+
 use std::ops::ControlFlow;
 
 use glam::{DVec3, Vec3};
@@ -13,6 +15,8 @@ use crate::geometry::{Aabb, ConvexVolume, Plane};
 use crate::index::{BuildError, FrustumQuery, RegionIndex};
 use crate::query::{Containment, ItemId, NoRecorder, QueryCost, Region, Sink};
 use crate::scene::{self, Dice};
+
+pub use views::every_view_sees_what_the_scan_sees;
 
 /// Stamps one `#[test]` per property of the contract for a structure with its
 /// default parameters. The tests are named after the properties: two
@@ -34,6 +38,7 @@ macro_rules! conformance {
             reference_set_on_edge_scenes
             reference_set_on_random_cases
             reference_set_on_generated_scenes
+            every_view_sees_what_the_scan_sees
             region_search_is_the_closed_box_scan
             order_of_items_changes_nothing
             smaller_volume_sees_a_subset

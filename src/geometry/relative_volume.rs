@@ -1,0 +1,87 @@
+//! The plane test about a moving zero: boxes are taken relative to the eye
+//! before they meet the planes, as engines with large worlds do. Far from the
+//! scene's zero this keeps the digits that `n . x + d` would cancel.
+
+use glam::Vec3;
+
+use super::{Aabb, ConvexVolume, Plane, VolumeError};
+
+/// Planes in coordinates relative to an f32 eye.
+///
+/// A box is moved by [`Aabb::relative_to`] and then meets THE plane test:
+/// `((nx*(x-ex) + ny*(y-ey)) + nz*(z-ez)) + d` in f32, no fused multiply-add.
+#[derive(Clone, Debug)]
+pub struct RelativeVolume {
+    eye: Vec3,
+    planes: ConvexVolume,
+}
+
+impl RelativeVolume {
+    /// Planes that are already relative to `eye`.
+    ///
+    /// # Errors
+    /// An eye with a NaN or infinite coordinate.
+    pub fn new(eye: Vec3, planes: ConvexVolume) -> Result<Self, VolumeError> {
+        if !eye.is_finite() {
+            return Err(VolumeError::NonFiniteEye { eye });
+        }
+        Ok(RelativeVolume { eye, planes })
+    }
+
+    /// The planes of a volume about an eye: the offsets become `n . eye + d`,
+    /// computed in f64 and rounded once.
+    ///
+    /// # Errors
+    /// An eye or an offset beyond f32.
+    pub fn about(eye: Vec3, volume: &ConvexVolume) -> Result<Self, VolumeError> {
+        let moved = volume.planes().iter().map(|plane| {
+            let at_eye = plane.normal.as_dvec3().dot(eye.as_dvec3()) + f64::from(plane.d);
+            Plane::new(plane.normal, at_eye as f32)
+        });
+        let planes: Vec<Plane> = moved.collect();
+        RelativeVolume::new(eye, ConvexVolume::from_planes(&planes)?)
+    }
+
+    pub fn eye(&self) -> Vec3 {
+        self.eye
+    }
+
+    /// The planes about the eye.
+    pub fn planes(&self) -> &ConvexVolume {
+        &self.planes
+    }
+
+    /// A box as the planes see it.
+    #[inline(always)]
+    pub fn moved(&self, b: &Aabb) -> Aabb {
+        b.relative_to(self.eye)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn digits_that_a_far_zero_cancels_are_kept() {
+        // A plane through the eye, slanting: what lies a unit before it must
+        // be told from what lies a unit behind, at ten million.
+        let eye = Vec3::new(1e7, -1e7, 0.0);
+        let plane = Plane::new(Vec3::new(0.6, 0.8, 0.0), 0.0);
+        let about = ConvexVolume::from_planes(&[plane]).unwrap();
+        let relative = RelativeVolume::new(eye, about).unwrap();
+        let at = |x: f32| Aabb::new(eye + Vec3::X * x, eye + Vec3::X * x);
+        assert!(relative.planes().sees(&relative.moved(&at(1.0))));
+        assert!(!relative.planes().sees(&relative.moved(&at(-1.0))));
+    }
+
+    #[test]
+    fn an_eye_that_is_no_point_is_an_error() {
+        let all = ConvexVolume::from_planes(&[]).unwrap();
+        let eye = Vec3::new(0.0, f32::INFINITY, 0.0);
+        assert!(matches!(
+            RelativeVolume::new(eye, all),
+            Err(VolumeError::NonFiniteEye { .. })
+        ));
+    }
+}

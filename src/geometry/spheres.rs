@@ -1,0 +1,277 @@
+//! Culling by bounding spheres: the sphere of a box, the cube that stands for
+//! it in an index, and the planes with what the sphere test needs of them. It
+//! owns the margin that keeps the sphere test on the safe side of the box test.
+
+use glam::Vec3;
+
+use super::convex_volume::MAX_PLANES;
+use super::{Aabb, ConvexVolume, Plane};
+use crate::arithmetic::rounding::{difference_down, difference_up, round_up};
+
+/// The cube about a box's bounding sphere: what an index is built over when
+/// its items are to be tested as spheres.
+///
+/// The centre is the box's own, rounded; the radius reaches the farthest
+/// corner from there, rounded up; the cube's bounds are rounded outward. So the
+/// box lies in the sphere and the sphere in the cube, exactly. Bounds beyond
+/// f32 are cut off at its largest number, and [`Ball::in_cube`] then knows no
+/// radius. An empty box stays as it is, and so does one that is not finite,
+/// for the build to name.
+pub fn sphere_cube(b: &Aabb) -> Aabb {
+    if b.is_empty() || !b.is_finite() {
+        return *b;
+    }
+    let centre = b.centre();
+    let (c, min, max) = (centre.as_dvec3(), b.min.as_dvec3(), b.max.as_dvec3());
+    // A few roundings in f64, each of at most 2^-53.
+    let radius = (max - c).max(c - min).length() * (1.0 + 8.0 * f64::EPSILON);
+    let radius = f64::from(round_up(radius).min(f32::MAX));
+    let low = |k: usize| difference_down(c[k], radius).max(f32::MIN);
+    let high = |k: usize| difference_up(c[k], -radius).min(f32::MAX);
+    Aabb::new(
+        Vec3::new(low(0), low(1), low(2)),
+        Vec3::new(high(0), high(1), high(2)),
+    )
+}
+
+/// A sphere as it is read back from its cube.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Ball {
+    pub centre: Vec3,
+    /// Never below the radius that the cube was made with; infinite if the
+    /// cube was cut off at the end of f32.
+    pub radius: f32,
+    /// Largest absolute coordinate of the cube.
+    pub reach: f32,
+}
+
+impl Ball {
+    /// Half the sum and half the difference of the bounds. Each edge of the
+    /// cube is at least a diameter, so the shortest will do.
+    #[inline(always)]
+    pub fn in_cube(cube: &Aabb) -> Ball {
+        let (low, high) = (cube.min, cube.max);
+        let lesser = |a: f32, b: f32| if a < b { a } else { b };
+        let greater = |a: f32, b: f32| if a > b { a } else { b };
+        let half = |k: usize| high[k] * 0.5 - low[k] * 0.5;
+        let reach = |k: usize| greater(-low[k], high[k]);
+        let reach = greater(greater(reach(0), reach(1)), reach(2));
+        let radius = lesser(lesser(half(0), half(1)), half(2));
+        Ball {
+            centre: cube.centre(),
+            radius: if reach < f32::MAX {
+                radius
+            } else {
+                f32::INFINITY
+            },
+            reach,
+        }
+    }
+}
+
+/// What the sphere test knows of a plane besides its normal.
+#[derive(Clone, Copy, PartialEq, Default, Debug)]
+pub struct SphereMargin {
+    /// The normal's length, rounded up.
+    pub length: f32,
+    /// Margin per unit of [`Ball::reach`].
+    pub slope: f32,
+    /// The plane's offset with the rest of the margin.
+    pub d: f32,
+}
+
+impl SphereMargin {
+    /// Roundings of u = 2^-24 that the margin is good for, each of the sum of
+    /// magnitudes `|n|_1 * reach + |d|` (reach bounds every coordinate of the
+    /// box and the centre, and the radius): 4 in the box test that must not be
+    /// contradicted, 6 in the sphere's dot product, 3 in `radius * length`, 2
+    /// between the centre of the cube and that of the sphere; 15 in all.
+    const ROUNDINGS: f64 = 24.0;
+
+    fn of(plane: &Plane) -> SphereMargin {
+        const UNIT_ROUNDOFF: f64 = 1.0 / (1u64 << 24) as f64;
+        // Some times the smallest subnormal f32: products and halves that
+        // underflow.
+        const TINY: f64 = f64::from_bits((1023 - 145) << 52);
+        let normal = plane.normal.as_dvec3();
+        let size = normal.abs().element_sum();
+        let d = f64::from(plane.d);
+        let margin = Self::ROUNDINGS * UNIT_ROUNDOFF;
+        SphereMargin {
+            length: round_up(normal.length() * (1.0 + 4.0 * f64::EPSILON)),
+            slope: round_up(margin * size),
+            d: round_up(d + margin * d.abs() + TINY * (1.0 + size)),
+        }
+    }
+
+    /// The value of the sphere's farthest point, or a little more: the ball is
+    /// surely outside if it is a number below zero. An overflow on the way
+    /// ends in an infinity or a NaN, which is no such number.
+    #[inline(always)]
+    pub fn value_at(&self, normal: Vec3, ball: &Ball) -> f32 {
+        let c = ball.centre;
+        let dot = ((normal.x * c.x + normal.y * c.y) + normal.z * c.z) + self.d;
+        (dot + ball.radius * self.length) + ball.reach * self.slope
+    }
+}
+
+/// A volume that sees its items as spheres, given by [`sphere_cube`]s.
+///
+/// A plane drops an item if the cube's p-vertex evaluates below zero, or if
+/// the cube's n-vertex does and the sphere lies surely outside. The cube's
+/// corners take part so that no verdict about a node (over cubes, by the plane
+/// test) contradicts the verdict about an item in it, bit for bit:
+///
+/// - A node outside a plane has only cubes outside it (the plane test is
+///   monotone), and those are dropped by the first clause.
+/// - A node inside a plane has an n-vertex of at least zero; so have its
+///   cubes, and the p-vertex evaluates no lower: neither clause drops them.
+///
+/// And it loses nothing that [`ConvexVolume::sees`] with the same planes sees:
+/// the box lies in the cube, so where the cube's p-vertex evaluates below zero
+/// the box's does; and the sphere holds the box, so its farthest point lies at
+/// least as far along the normal as any of the box, and the margin covers
+/// every rounding of both tests (`SphereMargin::ROUNDINGS`).
+#[derive(Clone, Debug)]
+pub struct Spheres {
+    planes: ConvexVolume,
+    margins: [SphereMargin; MAX_PLANES],
+}
+
+impl Spheres {
+    /// The spheres' view through the planes of a volume.
+    pub fn new(planes: &ConvexVolume) -> Self {
+        let mut margins = [SphereMargin::default(); MAX_PLANES];
+        for (margin, plane) in margins.iter_mut().zip(planes.planes()) {
+            *margin = SphereMargin::of(plane);
+        }
+        Spheres {
+            planes: planes.clone(),
+            margins,
+        }
+    }
+
+    pub fn planes(&self) -> &ConvexVolume {
+        &self.planes
+    }
+
+    /// Plane `index` of a mask bit with its margin, without a check in the
+    /// inner loop.
+    #[inline(always)]
+    pub fn plane_of_bit(&self, index: u32) -> (&Plane, &SphereMargin) {
+        let margin = &self.margins[index as usize % MAX_PLANES];
+        (self.planes.plane_of_bit(index), margin)
+    }
+
+    /// Whether plane `index` has the item's sphere on its outer side.
+    #[inline(always)]
+    pub fn drops(&self, index: u32, cube: &Aabb) -> bool {
+        let (plane, margin) = self.plane_of_bit(index);
+        if plane.excludes(cube) {
+            return true;
+        }
+        let value = margin.value_at(plane.normal, &Ball::in_cube(cube));
+        // Not `!contains`: a NaN must not count as below zero.
+        plane.value_at(plane.n_vertex(cube)) < 0.0 && (f32::MIN..0.0).contains(&value)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn the_corner_of_a_cube_alone_is_not_enough() {
+        // Through the corner region of the cube, past the sphere.
+        let b = Aabb::new(Vec3::splat(-1.0), Vec3::splat(1.0));
+        let cube = sphere_cube(&b);
+        let radius = 3f32.sqrt();
+        assert!(cube.max.x >= radius && cube.max.x < radius * 1.000001);
+        let normal = Vec3::splat(1.0 / radius);
+        let at = |distance: f32| {
+            let plane = Plane::new(normal, -distance);
+            Spheres::new(&ConvexVolume::from_planes(&[plane]).unwrap())
+        };
+        assert!(!at(1.732).drops(0, &cube), "the sphere reaches 1.7320508");
+        assert!(at(1.733).drops(0, &cube));
+        assert!(!at(1.733).planes().planes()[0].excludes(&cube));
+    }
+
+    #[test]
+    fn boxes_at_the_end_of_f32_stay_finite_and_visible() {
+        let corner = Vec3::splat(f32::MAX);
+        for b in [
+            Aabb::new(-corner, corner),
+            Aabb::new(corner * 0.5, corner),
+            Aabb::new(corner, corner),
+        ] {
+            let cube = sphere_cube(&b);
+            assert!(cube.is_finite() && cube.contains(&b));
+            let plane = Plane::new(Vec3::X * 1e-3, -3.4e35);
+            let volume = ConvexVolume::from_planes(&[plane]).unwrap();
+            assert!(volume.sees(&b) && !Spheres::new(&volume).drops(0, &cube));
+        }
+        let empty = Aabb::new(Vec3::ONE, Vec3::ZERO);
+        assert_eq!(sphere_cube(&empty), empty);
+    }
+
+    /// Any size: a grid for ties, all exponents for the rest.
+    fn number() -> impl Strategy<Value = f32> {
+        prop_oneof![
+            (-8i8..8).prop_map(f32::from),
+            -1e3f32..1e3,
+            (0.5f32..1.0, -126i32..127).prop_map(|(m, e)| m * 2f32.powi(e)),
+            prop::num::f32::SUBNORMAL,
+            prop::num::f32::NORMAL,
+        ]
+    }
+
+    fn vector() -> impl Strategy<Value = Vec3> {
+        prop_oneof![
+            [number(), number(), number()],
+            [-1f32..1.0, -1f32..1.0, -1f32..1.0],
+        ]
+        .prop_map(Vec3::from_array)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(20_000))]
+
+        #[test]
+        fn a_sphere_never_loses_what_the_box_test_sees(
+            a in vector(), size in vector(), normal in vector(), scale in 0i32..24,
+            free in number(), ulps in -20i32..20, touching: bool,
+        ) {
+            // Down to far away and tiny: where rounding the cube matters.
+            let b = a + size * 2f32.powi(-scale);
+            prop_assume!(b.is_finite());
+            let b = Aabb::new(a.min(b), a.max(b));
+            let cube = sphere_cube(&b);
+            prop_assert!(cube.is_finite() && cube.contains(&b));
+            // A plane that the box's far corner touches by a few ulps.
+            let through = Plane::new(normal, 0.0);
+            let d = -through.value_at(through.p_vertex(&b));
+            let touches = f32::from_bits(d.to_bits().saturating_add_signed(ulps));
+            let d = if touching { touches } else { free };
+            prop_assume!(d.is_finite());
+            let volume = ConvexVolume::from_planes(&[Plane::new(normal, d)]).unwrap();
+            if volume.sees(&b) {
+                prop_assert!(!Spheres::new(&volume).drops(0, &cube));
+            }
+        }
+
+        #[test]
+        fn the_sphere_read_back_holds_the_box(a in vector(), size in vector()) {
+            let b = a + size;
+            prop_assume!(b.is_finite());
+            let b = Aabb::new(a.min(b), a.max(b));
+            let ball = Ball::in_cube(&sphere_cube(&b));
+            // The centre read back may be off by two roundings.
+            let off = 2.0 * f64::from(ball.reach) * 2f64.powi(-24) + 2f64.powi(-148);
+            let far = (0..8).map(|i| (b.corner(i) - b.centre()).as_dvec3().length());
+            let reach = f64::from(ball.radius) * (1.0 + 1e-6) + 2.0 * off;
+            prop_assert!(far.fold(0.0, f64::max) <= reach);
+        }
+    }
+}
