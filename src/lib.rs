@@ -10,6 +10,7 @@
 //! - [`query`]: what a query asks ([`query::Region`]), where answers go
 //!   ([`query::Sink`]) and what is counted ([`query::Recorder`])
 //! - [`camera`]: eye, u, v, n; lenses; matrices; the planes of the view
+//! - [`culling`]: culling tests and arithmetics: from a camera to a view
 //! - [`oracle`]: the exact verdict about a box and a volume or camera
 //! - [`index`]: the contract [`index::RegionIndex`] and
 //!   [`index::FrustumQuery`], and the structures behind it
@@ -49,6 +50,7 @@
 
 pub mod arithmetic;
 pub mod camera;
+pub mod culling;
 pub mod geometry;
 pub mod index;
 pub mod input;

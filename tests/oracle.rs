@@ -29,14 +29,36 @@ fn all_vectors() {
     for v in file["vectors"].as_array().unwrap() {
         let id = v["id"].as_str().unwrap();
         let set = |f: &str| -> BTreeSet<&str> {
-            v[f].as_array().into_iter().flatten().map(|s| s.as_str().unwrap()).collect()
+            v[f].as_array()
+                .into_iter()
+                .flatten()
+                .map(|s| s.as_str().unwrap())
+                .collect()
         };
-        let boxes: Vec<(&str, Aabb)> = v["boxes"].as_array().unwrap().iter().map(|b| {
-            (b["id"].as_str().unwrap(), Aabb::new(numbers(&b["lo"]).as_vec3(), numbers(&b["hi"]).as_vec3()))
-        }).filter(|(_, b)| b.is_finite()).collect();
-        let mut check = |level: &str, oracle: &Oracle, visible: BTreeSet<&str>, touch: BTreeSet<&str>| {
+        let boxes: Vec<(&str, Aabb)> = v["boxes"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|b| {
+                (
+                    b["id"].as_str().unwrap(),
+                    Aabb::new(numbers(&b["lo"]).as_vec3(), numbers(&b["hi"]).as_vec3()),
+                )
+            })
+            .filter(|(_, b)| b.is_finite())
+            .collect();
+        let mut check = |level: &str,
+                         oracle: &Oracle,
+                         visible: BTreeSet<&str>,
+                         touch: BTreeSet<&str>| {
             for (name, b) in &boxes {
-                let wanted = if touch.contains(name) { Verdict::Touch } else if visible.contains(name) { Verdict::In } else { Verdict::Out };
+                let wanted = if touch.contains(name) {
+                    Verdict::Touch
+                } else if visible.contains(name) {
+                    Verdict::In
+                } else {
+                    Verdict::Out
+                };
                 let found = oracle.judge(b);
                 let margin = &v[format!("margin_{level}")][name];
                 if found.verdict != wanted {
@@ -45,19 +67,53 @@ fn all_vectors() {
             }
         };
         if v.get("planes_f32_hex").is_some() {
-            let bits = |t: &Value| f32::from_bits(u32::from_str_radix(&t.as_str().unwrap()[2..], 16).unwrap());
-            let planes: Vec<Plane> = v["planes_f32_hex"].as_array().unwrap().iter().map(|r| Plane::new(Vec3::new(bits(&r[0]), bits(&r[1]), bits(&r[2])), bits(&r[3]))).collect();
+            let bits = |t: &Value| {
+                f32::from_bits(u32::from_str_radix(&t.as_str().unwrap()[2..], 16).unwrap())
+            };
+            let planes: Vec<Plane> = v["planes_f32_hex"]
+                .as_array()
+                .unwrap()
+                .iter()
+                .map(|r| {
+                    Plane::new(
+                        Vec3::new(bits(&r[0]), bits(&r[1]), bits(&r[2])),
+                        bits(&r[3]),
+                    )
+                })
+                .collect();
             if let Ok(volume) = ConvexVolume::from_planes(&planes) {
-                check("planes", &Oracle::of_volume(&volume), set("expected_visible_planes"), set("touch_planes"));
+                check(
+                    "planes",
+                    &Oracle::of_volume(&volume),
+                    set("expected_visible_planes"),
+                    set("touch_planes"),
+                );
             }
         }
         if v.get("expected_visible_camera").is_some() {
             let c = &v["camera"];
             let far = number(&c["far"]);
-            let Ok(lens) = Lens::perspective(number(&c["fovy_deg"]), number(&c["aspect"]), number(&c["near"]), far.is_finite().then_some(far)) else { println!("{id}: lens refused"); continue };
-            let pose = Pose::LookAt { eye: numbers(&c["eye"]), look: numbers(&c["look"]), up: numbers(&c["up"]) };
+            let Ok(lens) = Lens::perspective(
+                number(&c["fovy_deg"]),
+                number(&c["aspect"]),
+                number(&c["near"]),
+                far.is_finite().then_some(far),
+            ) else {
+                println!("{id}: lens refused");
+                continue;
+            };
+            let pose = Pose::LookAt {
+                eye: numbers(&c["eye"]),
+                look: numbers(&c["look"]),
+                up: numbers(&c["up"]),
+            };
             let oracle = Oracle::of_camera(&pose, &lens, DVec3::ZERO).unwrap();
-            check("camera", &oracle, set("expected_visible_camera"), set("touch_camera"));
+            check(
+                "camera",
+                &oracle,
+                set("expected_visible_camera"),
+                set("touch_camera"),
+            );
         }
     }
     assert!(failures.is_empty(), "{}", failures.join("\n"));

@@ -8,7 +8,9 @@ use serde::{Deserialize, Serialize};
 use super::projection::{gribb_hartmann_f32, projection_f32, projection_f64, view_f32};
 use super::{Camera, CameraError, ClipSpace, Frame, Lens, gribb_hartmann};
 use crate::arithmetic::rounding::round_up;
-use crate::geometry::{ConvexVolume, FrustumPlane, Plane, RelativeVolume, WidePlane, WideVolume};
+use crate::geometry::{
+    ConvexVolume, FrustumPlane, Plane, RelativeVolume, VolumeError, WidePlane, WideVolume,
+};
 
 /// Where the planes come from.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug, Serialize, Deserialize)]
@@ -136,15 +138,26 @@ impl Camera {
         options: &PlaneOptions,
         around: &Surroundings,
     ) -> Result<ConvexVolume, CameraError> {
+        self.volume_with(&[], options, around)
+    }
+
+    /// The view volume with further planes (scene-local, of unit length), each
+    /// rounded to f32 and moved outward like the six: their own errors must be
+    /// small against 2^-24.
+    ///
+    /// # Errors
+    /// As [`Camera::volume`]; more planes than a volume has.
+    pub fn volume_with(
+        &self,
+        more: &[WidePlane],
+        options: &PlaneOptions,
+        around: &Surroundings,
+    ) -> Result<ConvexVolume, CameraError> {
         let frame = self.frame.relative_to(around.origin);
-        let mut planes = derive(&frame, &self.lens, options.method);
+        let named = derive(&frame, &self.lens, options.method);
         let reach = self.reach_of(&frame, around.reach.as_dvec3());
-        if options.epsilon > 0.0 {
-            for (_, plane) in &mut planes {
-                *plane = moved_outward(plane, reach, options.epsilon, 0.0);
-            }
-        }
-        Ok(ConvexVolume::from_named_planes(&planes)?)
+        let moved = |plane: &Plane| moved_outward(plane, reach, options.epsilon, 0.0);
+        Ok(gathered(&named, more, options.epsilon, moved)?)
     }
 
     /// The same planes in f64, from the frame and without a margin: what the
@@ -183,21 +196,34 @@ impl Camera {
         epsilon: f64,
         around: &Surroundings,
     ) -> Result<RelativeVolume, CameraError> {
+        self.relative_volume_with(&[], epsilon, around)
+    }
+
+    /// The same with further planes, about the eye itself and of unit length:
+    /// see [`Camera::volume_with`].
+    ///
+    /// # Errors
+    /// As [`Camera::relative_volume`]; more planes than a volume has.
+    pub fn relative_volume_with(
+        &self,
+        more: &[WidePlane],
+        epsilon: f64,
+        around: &Surroundings,
+    ) -> Result<RelativeVolume, CameraError> {
         let local = self.frame.relative_to(around.origin);
         let eye = local.eye.as_vec3();
         let zero = eye.as_dvec3();
         // Exact: what is left is a number of f64.
         let frame = local.relative_to(zero);
-        let mut planes = from_frame(&frame, &self.lens);
+        let named = from_frame(&frame, &self.lens);
+        let more: Vec<WidePlane> = more.iter().map(|plane| plane.about(-frame.eye)).collect();
         let reach = self.reach_of(&frame, around.reach.as_dvec3() + zero.abs());
-        if epsilon > 0.0 {
-            for (_, plane) in &mut planes {
-                let of_eye = plane.normal.as_dvec3().abs().dot(local.eye.abs());
-                let slack = of_eye * f64::EPSILON + reach.element_sum() * TINY;
-                *plane = moved_outward(plane, reach, epsilon, slack);
-            }
-        }
-        let planes = ConvexVolume::from_named_planes(&planes)?;
+        let moved = |plane: &Plane| {
+            let of_eye = plane.normal.as_dvec3().abs().dot(local.eye.abs());
+            let slack = of_eye * f64::EPSILON + reach.element_sum() * TINY;
+            moved_outward(plane, reach, epsilon, slack)
+        };
+        let planes = gathered(&named, &more, epsilon, moved)?;
         Ok(RelativeVolume::new(eye, planes)?)
     }
 
@@ -211,6 +237,23 @@ impl Camera {
             None => of_scene,
         }
     }
+}
+
+/// Named planes and further ones as one volume, moved outward if there is an
+/// epsilon.
+fn gathered(
+    named: &[(FrustumPlane, Plane)],
+    more: &[WidePlane],
+    epsilon: f64,
+    moved: impl Fn(&Plane) -> Plane,
+) -> Result<ConvexVolume, VolumeError> {
+    let more = more.iter().map(|plane| (None, plane.narrow()));
+    let all = named
+        .iter()
+        .map(|&(name, plane)| (Some(name), plane))
+        .chain(more);
+    let all = all.map(|(name, plane)| (name, if epsilon > 0.0 { moved(&plane) } else { plane }));
+    ConvexVolume::from_labelled_planes(&all.collect::<Vec<_>>())
 }
 
 /// Below half the smallest subnormal f32 times four: covers underflow.

@@ -106,6 +106,16 @@ impl ConvexVolume {
         Self::collect(planes.iter().map(|&(name, plane)| (plane, Some(name))))
     }
 
+    /// Planes of which some have a name.
+    ///
+    /// # Errors
+    /// As [`ConvexVolume::from_planes`].
+    pub fn from_labelled_planes(
+        planes: &[(Option<FrustumPlane>, Plane)],
+    ) -> Result<Self, VolumeError> {
+        Self::collect(planes.iter().map(|&(name, plane)| (plane, name)))
+    }
+
     fn collect(
         planes: impl ExactSizeIterator<Item = (Plane, Option<FrustumPlane>)>,
     ) -> Result<Self, VolumeError> {

@@ -49,6 +49,11 @@ impl WidePlane {
         self.value_at(self.p_vertex(&Aabb::new(b.max, b.min))) >= 0.0
     }
 
+    /// The same plane in coordinates about another point.
+    pub fn about(&self, zero: DVec3) -> WidePlane {
+        WidePlane::new(self.normal, self.normal.dot(zero) + self.d)
+    }
+
     /// Rounded once to f32.
     pub fn narrow(&self) -> Plane {
         Plane::new(self.normal.as_vec3(), self.d as f32)

@@ -40,7 +40,7 @@ const PRECISION: Precision = Precision::CAMERA;
 
 /// Pi as a sum of doubles (true to 2^-330).
 const PI: [f64; 6] = [
-    3.141592653589793,
+    std::f64::consts::PI,
     1.2246467991473532e-16,
     -2.9947698097183397e-33,
     1.1124542208633653e-49,
@@ -171,7 +171,10 @@ impl View {
     fn half_space(&self, normal: &Vector, offset: &Expansion) -> HalfSpace {
         let p = PRECISION;
         // Each component is as large as the whole normal, as far as noise goes.
-        let size = normal.iter().map(|n| n.estimate().abs()).fold(0.0, f64::max);
+        let size = normal
+            .iter()
+            .map(|n| n.estimate().abs())
+            .fold(0.0, f64::max);
         let normal = normal.clone().map(|n| {
             let value = n.leading(p.terms());
             p.cleaned(Number { value, size })

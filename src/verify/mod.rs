@@ -6,6 +6,7 @@
 pub mod conformance;
 mod edges;
 mod random;
+mod truth;
 mod variants;
 
 use std::fmt;
@@ -17,6 +18,7 @@ use crate::query::ItemId;
 
 pub use edges::{edge_scenes, edge_volumes};
 pub use random::{RandomCase, VOLUME_KINDS};
+pub use truth::{ErrorCount, Truth};
 pub use variants::variants;
 
 /// The reference: each box against each plane with [`ConvexVolume::sees`], no

@@ -1,0 +1,144 @@
+//! Extended planes: what the six planes of a frustum leave undecided, as more
+//! planes. With them the p-vertex test becomes the full separating axis test.
+//! Selected in f64 for speed; whatever is selected is a safe plane, because it
+//! is a sum of given ones. The oracle has the theory and the exact version.
+//!
+//! All planes are about a point near the volume (the eye): about a zero far
+//! away the digits of small features would be lost.
+
+use glam::DVec3;
+
+use crate::geometry::{MAX_PLANES, WidePlane};
+
+/// Of faces of unit length: a sum shorter than this has lost too many digits
+/// to be a plane (1e-9 of it would be noise). Doing without is always safe.
+const CANCELLED: f64 = 1e-7;
+
+/// The volume's bounds along the axes: up to six planes, fewer where it has no
+/// bound.
+///
+/// Each is a sum of three faces, with positive weights, that leaves one axis
+/// of the normal. O(m^3) for m faces.
+pub fn bounds(faces: &[WidePlane]) -> Vec<WidePlane> {
+    /// Of a product of unit vectors.
+    const ROUNDING: f64 = 1e-14;
+    let mut tightest: [Option<f64>; 6] = [None; 6];
+    for (i, a) in faces.iter().enumerate() {
+        for (j, b) in faces.iter().enumerate().skip(i + 1) {
+            for c in &faces[j + 1..] {
+                let crossed = [
+                    b.normal.cross(c.normal),
+                    c.normal.cross(a.normal),
+                    a.normal.cross(b.normal),
+                ];
+                for axis in 0..3 {
+                    // Zero where two faces do already (an edge across the
+                    // axis), but for rounding.
+                    let clean = |w: f64| if w.abs() < ROUNDING { 0.0 } else { w };
+                    let weights = crossed.map(|w| clean(w[axis]));
+                    let sign = weights.iter().sum::<f64>().signum();
+                    if weights.iter().any(|w| w * sign < 0.0) {
+                        continue;
+                    }
+                    let sum = |of: &dyn Fn(&WidePlane) -> f64| {
+                        let parts = weights.iter().zip([a, b, c]);
+                        parts.map(|(w, plane)| w * sign * of(plane)).sum::<f64>()
+                    };
+                    let (n, d) = (sum(&|p| p.normal[axis]), sum(&|p| p.d));
+                    let offset = d / n.abs();
+                    if n.abs() > CANCELLED && offset.is_finite() {
+                        let slot = &mut tightest[2 * axis + usize::from(n < 0.0)];
+                        *slot = Some(slot.map_or(offset, |old| old.min(offset)));
+                    }
+                }
+            }
+        }
+    }
+    let directions = [DVec3::X, DVec3::Y, DVec3::Z]
+        .into_iter()
+        .flat_map(|axis| [axis, -axis]);
+    let found = directions.zip(tightest);
+    found
+        .filter_map(|(normal, d)| Some(WidePlane::new(normal, d?)))
+        .collect()
+}
+
+/// The silhouettes of the volume seen along the axes: up to eighteen planes
+/// for a frustum, through its edges and parallel to an axis.
+///
+/// Each is the sum of two faces that pull the axis both ways; only sums that
+/// touch the volume are kept, the tightest ones if there are too many for
+/// `room`. O(m^3) for the m faces' corners and O(m^2) sums.
+pub fn silhouettes(faces: &[WidePlane], room: usize) -> Vec<WidePlane> {
+    /// How near to a corner a sum must pass, as a share of the magnitudes
+    /// there: far above rounding, far below the gap of a sum that is idle.
+    const TIGHT: f64 = 1e-7;
+    let corners = corners(faces);
+    let mut found: Vec<(f64, WidePlane)> = Vec::new();
+    for (i, a) in faces.iter().enumerate() {
+        for b in &faces[i + 1..] {
+            for axis in 0..3 {
+                let (pull, against) = (a.normal[axis], b.normal[axis]);
+                if pull * against >= 0.0 {
+                    continue;
+                }
+                let mut normal = a.normal * against.abs() + b.normal * pull.abs();
+                normal[axis] = 0.0;
+                let length = normal.length();
+                let d = (a.d * against.abs() + b.d * pull.abs()) / length;
+                let plane = WidePlane::new(normal / length, d);
+                if length < CANCELLED {
+                    continue;
+                }
+                let gaps = corners.iter().map(|&corner| share(&plane, corner));
+                let gap = gaps.fold(f64::INFINITY, f64::min);
+                if plane.normal.is_finite() && d.is_finite() && gap <= TIGHT {
+                    found.push((gap, plane));
+                }
+            }
+        }
+    }
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    found.truncate(room);
+    found.into_iter().map(|(_, plane)| plane).collect()
+}
+
+/// What the exact test needs beside the faces: bounds and silhouettes.
+pub fn extended(faces: &[WidePlane]) -> Vec<WidePlane> {
+    let bounds = bounds(faces);
+    let room = MAX_PLANES.saturating_sub(faces.len() + bounds.len());
+    [bounds, silhouettes(faces, room)].concat()
+}
+
+/// The corners of a volume, to f64 rounding.
+fn corners(faces: &[WidePlane]) -> Vec<DVec3> {
+    /// How far outside rounding may put a corner.
+    const OUTSIDE: f64 = 1e-10;
+    let points = triples(faces).filter_map(meeting_point);
+    let within = |p: &DVec3| faces.iter().all(|face| share(face, *p) >= -OUTSIDE);
+    points.filter(within).collect()
+}
+
+/// A plane's value at a point as a share of the magnitudes it is the sum of.
+fn share(plane: &WidePlane, p: DVec3) -> f64 {
+    let size = (plane.normal * p).abs().element_sum() + plane.d.abs();
+    if size == 0.0 {
+        0.0
+    } else {
+        plane.value_at(p) / size
+    }
+}
+
+fn triples(faces: &[WidePlane]) -> impl Iterator<Item = [&WidePlane; 3]> {
+    let count = faces.len();
+    let pairs = (0..count).flat_map(move |i| (i + 1..count).map(move |j| (i, j)));
+    pairs.flat_map(move |(i, j)| (j + 1..count).map(move |l| [&faces[i], &faces[j], &faces[l]]))
+}
+
+/// Where three planes meet, by Cramer's rule.
+fn meeting_point([a, b, c]: [&WidePlane; 3]) -> Option<DVec3> {
+    let crossed = b.normal.cross(c.normal);
+    let sum = crossed * a.d + c.normal.cross(a.normal) * b.d + a.normal.cross(b.normal) * c.d;
+    let point = -sum / a.normal.dot(crossed);
+    point.is_finite().then_some(point)
+}

@@ -1,0 +1,368 @@
+//! Which culling test is asked, and how: from a camera to the view that every
+//! structure is asked with. It owns the table of tests and of arithmetics;
+//! traversal and kernels belong to `query` and `index`.
+
+mod extended;
+
+use std::borrow::Cow;
+
+use serde::{Deserialize, Serialize};
+
+use crate::camera::{Camera, CameraError, PlaneMethod, PlaneOptions, Surroundings};
+use crate::geometry::{
+    Aabb, ConvexVolume, RelativeVolume, Spheres, WidePlane, WideVolume, sphere_cube,
+};
+use crate::query::AnyView;
+
+pub use extended::{bounds, extended, silhouettes};
+
+/// How a box is tested against the volume.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Default, Debug, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum CullingTest {
+    Sphere,
+    #[default]
+    SixPlane,
+    SixBox,
+    Exact,
+}
+
+/// Every test with its name and what it is.
+pub const TESTS: [(CullingTest, &str, &str); 4] = [
+    (
+        CullingTest::Sphere,
+        "sphere",
+        "outside if one plane has the item's bounding sphere on its outer side",
+    ),
+    (
+        CullingTest::SixPlane,
+        "six-plane",
+        "outside if one plane has the whole box on its outer side (p-vertex)",
+    ),
+    (
+        CullingTest::SixBox,
+        "six-box",
+        "six-plane, and the box must meet the volume's own axis-parallel bounds",
+    ),
+    (
+        CullingTest::Exact,
+        "exact",
+        "six-box, and the volume's silhouettes along the axes: no box too many",
+    ),
+];
+
+impl CullingTest {
+    pub fn name(self) -> &'static str {
+        let row = TESTS.iter().find(|row| row.0 == self);
+        row.map_or("", |row| row.1)
+    }
+
+    pub fn named(name: &str) -> Option<CullingTest> {
+        TESTS.iter().find(|row| row.1 == name).map(|row| row.0)
+    }
+
+    /// Whether the test has planes beyond the volume's own.
+    fn is_extended(self) -> bool {
+        matches!(self, CullingTest::SixBox | CullingTest::Exact)
+    }
+
+    /// The items as an index for this test has to hold them: the boxes, or for
+    /// `sphere` the cubes about their bounding spheres.
+    pub fn items<'a>(self, items: &'a [Aabb]) -> Cow<'a, [Aabb]> {
+        match self {
+            CullingTest::Sphere => Cow::Owned(items.iter().map(sphere_cube).collect()),
+            _ => Cow::Borrowed(items),
+        }
+    }
+}
+
+/// In which numbers the test is carried out.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Default, Debug, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Arithmetic {
+    /// f32 planes in scene coordinates, by default moved outward by epsilon.
+    #[default]
+    F32,
+    /// f64 planes, as derived.
+    F64,
+    /// f32 planes about the eye; boxes are moved there first.
+    F32Relative,
+}
+
+/// Every arithmetic with its name and what it is.
+pub const ARITHMETICS: [(Arithmetic, &str, &str); 3] = [
+    (
+        Arithmetic::F32,
+        "f32",
+        "f32 planes in scene coordinates (default)",
+    ),
+    (Arithmetic::F64, "f64", "f64 planes, no epsilon"),
+    (
+        Arithmetic::F32Relative,
+        "f32-relative",
+        "f32 planes about the eye, boxes moved there first",
+    ),
+];
+
+impl Arithmetic {
+    pub fn name(self) -> &'static str {
+        let row = ARITHMETICS.iter().find(|row| row.0 == self);
+        row.map_or("", |row| row.1)
+    }
+
+    pub fn named(name: &str) -> Option<Arithmetic> {
+        ARITHMETICS
+            .iter()
+            .find(|row| row.1 == name)
+            .map(|row| row.0)
+    }
+}
+
+/// All choices together: one point of the error-against-time diagram.
+#[derive(Clone, Copy, PartialEq, Default, Debug)]
+pub struct Culling {
+    pub test: CullingTest,
+    pub arithmetic: Arithmetic,
+    pub planes: PlaneOptions,
+}
+
+/// Why there is no such view.
+#[derive(Clone, PartialEq, Debug, thiserror::Error)]
+pub enum CullingError {
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+    #[error(
+        "{arithmetic} planes come from the frame only, not from '{method}'; expected --planes frame"
+    )]
+    Method {
+        arithmetic: &'static str,
+        method: &'static str,
+    },
+    #[error("the sphere test is made in f32 scene coordinates; expected --arithmetic f32")]
+    Sphere,
+}
+
+/// A view made for one camera.
+#[derive(Clone, Debug)]
+pub enum CameraView {
+    Volume(ConvexVolume),
+    Spheres(Spheres),
+    Wide(WideVolume),
+    Relative(RelativeVolume),
+}
+
+impl CameraView {
+    pub fn as_any(&self) -> AnyView<'_> {
+        match self {
+            CameraView::Volume(view) => view.into(),
+            CameraView::Spheres(view) => view.into(),
+            CameraView::Wide(view) => view.into(),
+            CameraView::Relative(view) => view.into(),
+        }
+    }
+}
+
+impl Culling {
+    /// The view of a camera in a scene's local coordinates; the same view
+    /// serves every structure. O(m^3) for the m planes of the lens, a few
+    /// microseconds for `exact`.
+    ///
+    /// # Errors
+    /// Planes that do not fit f32; combinations that make no sense.
+    pub fn view(&self, camera: &Camera, around: &Surroundings) -> Result<CameraView, CullingError> {
+        if self.arithmetic != Arithmetic::F32 {
+            if self.planes.method != PlaneMethod::Frame {
+                return Err(CullingError::Method {
+                    arithmetic: self.arithmetic.name(),
+                    method: self.planes.method.name(),
+                });
+            }
+            if self.test == CullingTest::Sphere {
+                return Err(CullingError::Sphere);
+            }
+        }
+        let local_eye = camera.frame.eye - around.origin;
+        match self.arithmetic {
+            Arithmetic::F32 => self.in_f32(camera, around),
+            Arithmetic::F64 => {
+                let mut planes = camera.wide_volume(around)?.planes().to_vec();
+                let more = self.more(&faces_about_eye(camera)?);
+                planes.extend(more.iter().map(|plane| plane.about(-local_eye)));
+                let volume = WideVolume::from_planes(&planes).map_err(CameraError::from)?;
+                Ok(CameraView::Wide(volume))
+            }
+            Arithmetic::F32Relative => {
+                let more = self.more(&faces_about_eye(camera)?);
+                let epsilon = self.planes.epsilon;
+                let volume = camera.relative_volume_with(&more, epsilon, around)?;
+                Ok(CameraView::Relative(volume))
+            }
+        }
+    }
+
+    /// f32 planes in scene coordinates. Planes of the frame are extended in
+    /// f64, before they are rounded.
+    fn in_f32(&self, camera: &Camera, around: &Surroundings) -> Result<CameraView, CullingError> {
+        let local_eye = camera.frame.eye - around.origin;
+        let more = if self.test.is_extended() {
+            let faces = if self.planes.method == PlaneMethod::Frame {
+                faces_about_eye(camera)?
+            } else {
+                let bare = PlaneOptions {
+                    epsilon: 0.0,
+                    ..self.planes
+                };
+                let faces = camera.volume(&bare, around)?;
+                let wide = faces.planes().iter().map(WidePlane::from);
+                wide.map(|plane| plane.about(local_eye)).collect()
+            };
+            self.more(&faces)
+        } else {
+            Vec::new()
+        };
+        let more: Vec<WidePlane> = more.iter().map(|plane| plane.about(-local_eye)).collect();
+        let volume = camera.volume_with(&more, &self.planes, around)?;
+        Ok(match self.test {
+            CullingTest::Sphere => CameraView::Spheres(Spheres::new(&volume)),
+            _ => CameraView::Volume(volume),
+        })
+    }
+
+    /// What the test asks for beyond the faces.
+    fn more(&self, faces: &[WidePlane]) -> Vec<WidePlane> {
+        match self.test {
+            CullingTest::Sphere | CullingTest::SixPlane => Vec::new(),
+            CullingTest::SixBox => bounds(faces),
+            CullingTest::Exact => extended(faces),
+        }
+    }
+}
+
+fn faces_about_eye(camera: &Camera) -> Result<Vec<WidePlane>, CameraError> {
+    let around = Surroundings {
+        origin: camera.frame.eye,
+        ..Surroundings::default()
+    };
+    Ok(camera.wide_volume(&around)?.planes().to_vec())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{Frame, Lens};
+    use crate::oracle::{Oracle, Pose, Verdict};
+    use glam::{DVec3, Vec3};
+    use proptest::prelude::*;
+
+    prop_compose! {
+        fn a_camera()(
+            eye in [-50.0..50.0, -50.0..50.0, -50.0..50.0f64],
+            forward in [-1.0..1.0, -1.0..1.0, -1.0..1.0f64],
+            fovy in prop_oneof![Just(90.0), 0.01..179.0f64],
+            aspect in 0.1..10.0f64,
+            near in prop_oneof![Just(1e-4), Just(1.0), Just(40.0)],
+            kind in 0..4,
+        ) -> Option<Camera> {
+            let frame = Frame::looking_along(DVec3::from(eye), DVec3::from(forward), DVec3::Z).ok()?;
+            let far = Some(near + 60.0);
+            let lens = match kind {
+                0 => Lens::perspective(fovy, aspect, near, far),
+                1 => Lens::perspective(fovy, aspect, near, None),
+                2 => Lens::orthographic(30.0, aspect, -near, 60.0),
+                _ => Lens::off_axis([-near, near * 0.3, near * 0.1, near * aspect], near, far),
+            };
+            Some(Camera { frame, lens: lens.ok()? })
+        }
+    }
+
+    prop_compose! {
+        /// Near the volume, from specks to boxes much larger than it.
+        fn a_box()(
+            centre in [-90.0..90.0, -90.0..90.0, -90.0..90.0f32],
+            half in [0.0..1.0, 0.0..1.0, 0.0..1.0f32],
+            size in prop_oneof![Just(0.0f32), Just(1.0), Just(20.0), Just(300.0)],
+        ) -> Aabb {
+            Aabb::around(Vec3::from(centre), Vec3::from(half) * size)
+        }
+    }
+
+    const AROUND: Surroundings = Surroundings {
+        origin: DVec3::ZERO,
+        reach: Vec3::splat(400.0),
+    };
+
+    fn of(test: CullingTest, arithmetic: Arithmetic) -> Culling {
+        Culling {
+            test,
+            arithmetic,
+            ..Culling::default()
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 400, ..ProptestConfig::default() })]
+        #[test]
+        fn no_test_drops_what_the_camera_sees_and_exact_returns_nothing_else(
+            camera in a_camera(),
+            boxes in prop::collection::vec(a_box(), 40),
+        ) {
+            let Some(camera) = camera else { return Ok(()) };
+            let oracle = Oracle::of_camera(&Pose::of(&camera), &camera.lens, AROUND.origin).unwrap();
+            for (arithmetic, name, _) in ARITHMETICS {
+                let mut seen_by_coarser = [true; 40];
+                for test in [CullingTest::Sphere, CullingTest::SixPlane, CullingTest::SixBox, CullingTest::Exact] {
+                    let Ok(view) = of(test, arithmetic).view(&camera, &AROUND) else {
+                        prop_assert!(test == CullingTest::Sphere && arithmetic != Arithmetic::F32);
+                        continue;
+                    };
+                    let items = test.items(&boxes);
+                    for (i, (item, b)) in items.iter().zip(&boxes).enumerate() {
+                        let seen = view.as_any().sees(item);
+                        let depth = oracle.depth(b);
+                        if oracle.verdict(b) == Verdict::In && (arithmetic != Arithmetic::F64 || depth > 1e-9) {
+                            prop_assert!(seen, "{} {name} drops {b:?}, {depth} deep", test.name());
+                        }
+                        // Each test sees no more than the coarser one before.
+                        prop_assert!(!seen || seen_by_coarser[i], "{} {name}", test.name());
+                        seen_by_coarser[i] = seen;
+                        if test == CullingTest::Exact && seen {
+                            prop_assert!(depth > -1e-3, "{name} {b:?} {depth}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_frustum_has_at_most_thirty_extended_planes() {
+        let frame =
+            Frame::looking_along(DVec3::ZERO, DVec3::new(3.0, 2.0, -1.0), DVec3::Z).unwrap();
+        let lens = Lens::perspective(60.0, 1.5, 0.1, Some(100.0)).unwrap();
+        let camera = Camera { frame, lens };
+        let planes = |test| match of(test, Arithmetic::F32).view(&camera, &AROUND).unwrap() {
+            CameraView::Volume(volume) => volume.planes().len(),
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(planes(CullingTest::SixPlane), 6);
+        assert_eq!(planes(CullingTest::SixBox), 12);
+        let exact = planes(CullingTest::Exact);
+        assert!((24..=30).contains(&exact), "{exact}");
+    }
+
+    #[test]
+    fn combinations_that_make_no_sense_are_refused() {
+        let frame = Frame::looking_along(DVec3::ZERO, DVec3::X, DVec3::Z).unwrap();
+        let lens = Lens::perspective(60.0, 1.5, 0.1, Some(100.0)).unwrap();
+        let camera = Camera { frame, lens };
+        let sphere = of(CullingTest::Sphere, Arithmetic::F64);
+        assert!(matches!(
+            sphere.view(&camera, &AROUND),
+            Err(CullingError::Sphere)
+        ));
+        let mut matrix = of(CullingTest::SixPlane, Arithmetic::F32Relative);
+        matrix.planes.method = PlaneMethod::GhGlF32;
+        let error = matrix.view(&camera, &AROUND).unwrap_err();
+        assert!(error.to_string().contains("--planes frame"), "{error}");
+    }
+}
