@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use cullbench::camera::PlaneOptions;
+use cullbench::culling::Culling;
 use cullbench::geometry::BoxBlocks;
 use cullbench::index::{BACKENDS, StructureSpec};
 use cullbench::measure::{UPDATE_SHARES, Workload, move_share};
@@ -50,17 +51,17 @@ fn cull(c: &mut Criterion) {
     for (source, way) in WORKLOADS {
         let scene = load(source);
         let cameras = path::load(way, &scene, &Default::default()).expect(way);
-        let workload = Workload::new(&scene, &cameras, &PlaneOptions::default()).expect(way);
-        group.throughput(Throughput::Elements(workload.volumes.len() as u64));
+        let workload = Workload::new(&scene, &cameras, &Culling::default()).expect(way);
+        group.throughput(Throughput::Elements(workload.views.len() as u64));
         for backend in BACKENDS {
             let spec = StructureSpec::parse(backend.name).expect(backend.name);
             let index = spec.build(&scene.items).expect(backend.name);
             let mut out = Vec::new();
             group.bench_function(BenchmarkId::new(backend.name, source), |b| {
                 b.iter(|| {
-                    for volume in &workload.volumes {
+                    for view in &workload.views {
                         out.clear();
-                        index.visible(volume, &mut out);
+                        index.see(view.as_any(), &mut out);
                         black_box(&out);
                     }
                 });
@@ -76,7 +77,7 @@ fn locate(c: &mut Criterion) {
     for (source, way) in WORKLOADS {
         let scene = load(source);
         let cameras = path::load(way, &scene, &Default::default()).expect(way);
-        let workload = Workload::new(&scene, &cameras, &PlaneOptions::default()).expect(way);
+        let workload = Workload::new(&scene, &cameras, &Culling::default()).expect(way);
         group.throughput(Throughput::Elements(workload.points.len() as u64));
         for backend in BACKENDS {
             let spec = StructureSpec::parse(backend.name).expect(backend.name);
@@ -132,8 +133,9 @@ fn kernels(c: &mut Criterion) {
     group.sample_size(20);
     let scene = load("uniform:n=4096");
     let cameras = path::load("orbit:frames=1", &scene, &Default::default()).expect("orbit");
-    let workload = Workload::new(&scene, &cameras, &PlaneOptions::default()).expect("orbit");
-    let volume = &workload.volumes[0];
+    let options = PlaneOptions::default();
+    let volume = cameras.cameras[0].volume(&options, &scene.surroundings());
+    let volume = volume.expect("planes that fit f32");
     let mut blocks = BoxBlocks::with_capacity(scene.items.len());
     scene.items.iter().for_each(|b| blocks.push(b));
     group.throughput(Throughput::Elements(scene.items.len() as u64));

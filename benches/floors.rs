@@ -6,7 +6,7 @@
 use std::process::ExitCode;
 use std::time::Duration;
 
-use cullbench::camera::PlaneOptions;
+use cullbench::culling::{Culling, CullingTest};
 use cullbench::index::structures;
 use cullbench::measure::{
     Contender, Machine, Protocol, Status, Workload, harness_overhead_ns, measure_group,
@@ -100,14 +100,14 @@ fn main() -> ExitCode {
         };
         let scene = scene::load(&source, &Default::default()).expect(row.scene);
         let cameras = path::load(row.path, &scene, &Default::default()).expect(row.path);
-        let workload = Workload::new(&scene, &cameras, &PlaneOptions::default()).expect(row.path);
+        let workload = Workload::new(&scene, &cameras, &Culling::default()).expect(row.path);
         let specs = structures(&format!("{YARDSTICK},{}", row.structure)).expect(row.structure);
         let twin = specs[1].clone();
         let mut contenders: Vec<Contender> = specs
             .into_iter()
-            .map(|spec| Contender::build(spec, false, &scene))
+            .map(|spec| Contender::build(spec, false, &scene, CullingTest::SixPlane))
             .collect();
-        contenders.push(Contender::build(twin, true, &scene));
+        contenders.push(Contender::build(twin, true, &scene, CullingTest::SixPlane));
         let group = measure_group(&workload, &contenders, YARDSTICK, &protocol, &|| false)
             .expect("not stopped");
         let cell = &group.cells[1];

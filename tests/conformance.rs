@@ -4,7 +4,7 @@
 
 use std::ops::ControlFlow;
 
-use cullbench::camera::PlaneOptions;
+use cullbench::culling::Culling;
 use cullbench::geometry::{Aabb, ConvexVolume, Plane, PlaneTree};
 use cullbench::index::RegionIndex;
 use cullbench::index::{BACKENDS, BuildError, DynIndex, MemoryUsage, StructureSpec};
@@ -143,13 +143,13 @@ fn every_structure_returns_the_reference_set_on_every_scene_and_path() {
             "zoom:frames=4,far=inf",
         ] {
             let cameras = path::load(path, &scene, &LensDefaults::default()).expect(path);
-            let workload = Workload::new(&scene, &cameras, &PlaneOptions::default()).expect(path);
+            let workload = Workload::new(&scene, &cameras, &Culling::default()).expect(path);
             let mut reference = Reference::new(scene.items.len());
-            for volume in &workload.volumes {
-                reference.see(&scene.items, volume);
+            for view in &workload.views {
+                reference.see(&scene.items, view.as_any());
                 for (index, backend) in built.iter().zip(BACKENDS) {
                     let mut found = Vec::new();
-                    index.visible(volume, &mut found);
+                    index.see(view.as_any(), &mut found);
                     let difference = reference.compare(&found);
                     assert!(
                         difference.is_none(),
@@ -201,15 +201,15 @@ fn a_maps_own_tree_gives_the_reference_set() {
     let map = scene::load("freedm-map12", &Default::default()).expect("a sample");
     let spec = StructureSpec::parse("bsp:builder=import").expect("bsp");
     let cameras = path::load("teleport:frames=40", &map, &LensDefaults::default()).expect("a path");
-    let workload = Workload::new(&map, &cameras, &PlaneOptions::default()).expect("volumes");
+    let workload = Workload::new(&map, &cameras, &Culling::default()).expect("volumes");
     // The items, and the boxes of the regions that region search asks for.
     for items in [&map.items[..], map.regions.boxes(&map.items)] {
         let index = spec.build_with(items, map.own_tree.as_ref()).expect("bsp");
         let mut reference = Reference::new(items.len());
-        for volume in &workload.volumes {
-            reference.see(items, volume);
+        for view in &workload.views {
+            reference.see(items, view.as_any());
             let mut found = Vec::new();
-            index.visible(volume, &mut found);
+            index.see(view.as_any(), &mut found);
             assert!(reference.compare(&found).is_none());
         }
         for &p in &workload.points {

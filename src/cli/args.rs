@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use cullbench::camera::{DEFAULT_EPSILON, PLANE_METHODS, PlaneMethod, PlaneOptions};
+use cullbench::culling::{ARITHMETICS, Arithmetic, Culling, CullingTest, TESTS};
 use cullbench::path::LensDefaults;
 use cullbench::spec::SpecError;
 use glam::DVec3;
@@ -113,6 +114,9 @@ pub struct LensArgs {
     /// Factor c of the conservative epsilon; 0 leaves the planes as derived
     #[arg(long, value_name = "C", default_value_t = DEFAULT_EPSILON, allow_negative_numbers = true)]
     pub epsilon: f64,
+    /// Numbers the culling test is carried out in: f32, f64, f32-relative
+    #[arg(long, value_name = "NUMBERS", default_value = "f32")]
+    pub arithmetic: String,
 }
 
 impl LensArgs {
@@ -159,6 +163,21 @@ impl LensArgs {
     }
 }
 
+impl LensArgs {
+    /// The culling test of that name with everything else as asked for.
+    pub fn culling(&self, test: &str) -> Result<Culling, SpecError> {
+        Ok(Culling {
+            test: CullingTest::named(test)
+                .ok_or_else(|| SpecError::unknown("test", test, TESTS.iter().map(|t| t.1)))?,
+            arithmetic: Arithmetic::named(&self.arithmetic).ok_or_else(|| {
+                let known = ARITHMETICS.iter().map(|a| a.1);
+                SpecError::unknown("arithmetic", &self.arithmetic, known)
+            })?,
+            planes: self.plane_options()?,
+        })
+    }
+}
+
 #[derive(Args, Debug)]
 pub struct RunArgs {
     /// quick, standard or full: the scenes, paths and rounds
@@ -173,7 +192,7 @@ pub struct RunArgs {
     /// Structures, e.g. linear,bvh:leaf=4; may be repeated
     #[arg(long, value_name = "LIST", default_value = "all")]
     pub structure: Vec<String>,
-    /// The culling test
+    /// The culling test: sphere, six-plane, six-box or exact; may be repeated
     #[arg(long, value_name = "TEST", default_value = "six-plane")]
     pub test: Vec<String>,
     /// Seed of the order in which structures are measured
@@ -205,7 +224,7 @@ pub struct QueryArgs {
     /// Structures, e.g. linear,bvh:leaf=4
     #[arg(long, value_name = "LIST", default_value = "all")]
     pub structure: String,
-    /// The culling test
+    /// The culling test: sphere, six-plane, six-box or exact
     #[arg(long, default_value = "six-plane")]
     pub test: String,
     /// Print the visible ids as well
@@ -298,21 +317,6 @@ pub struct EnvArgs {
     pub format: TableFormat,
 }
 
-/// The culling tests there are.
-pub const TESTS: [(&str, &str); 1] = [(
-    "six-plane",
-    "outside if one plane has the whole box on its outer side (p-vertex)",
-)];
-
-/// The named test.
-pub fn test_named(name: &str) -> Result<&'static str, SpecError> {
-    let known = TESTS.iter().map(|t| t.0);
-    known
-        .clone()
-        .find(|t| *t == name)
-        .ok_or_else(|| SpecError::unknown("test", name, known))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -324,12 +328,15 @@ mod tests {
     }
 
     #[test]
-    fn every_plane_method_is_in_the_help() {
+    fn every_choice_of_a_culling_is_in_the_help() {
         let help = Cli::command()
             .find_subcommand_mut("query")
             .map(|c| c.render_long_help().to_string())
             .unwrap_or_default();
-        for (_, name, _) in PLANE_METHODS {
+        let methods = PLANE_METHODS.iter().map(|row| row.1);
+        let tests = TESTS.iter().map(|row| row.1);
+        let numbers = ARITHMETICS.iter().map(|row| row.1);
+        for name in methods.chain(tests).chain(numbers) {
             assert!(help.contains(name), "{name}");
         }
     }

@@ -5,8 +5,9 @@ use std::io::{self, Write};
 use comfy_table::ContentArrangement;
 use serde_json::{Map, Value, json};
 
-use super::args::{ListArgs, ListTopic, TESTS, TableFormat};
+use super::args::{ListArgs, ListTopic, TableFormat};
 use super::{Ending, text};
+use cullbench::culling::TESTS;
 use cullbench::index::{BACKENDS, StructureSpec};
 use cullbench::measure::METRICS;
 use cullbench::path::{PATH_PARAMS, PATHS};
@@ -125,7 +126,7 @@ fn rows(topic: ListTopic) -> anyhow::Result<(&'static str, String, Vec<Row>)> {
         ListTopic::Tests => (
             "tests",
             String::new(),
-            TESTS.iter().map(|(n, s)| plain(n, s)).collect(),
+            TESTS.iter().map(|(_, n, s)| plain(n, s)).collect(),
         ),
         ListTopic::Metrics => {
             let rows = METRICS.iter().map(|m| {

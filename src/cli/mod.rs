@@ -12,6 +12,7 @@ mod list;
 mod locate;
 mod query;
 mod run;
+mod run_table;
 mod scene;
 mod text;
 mod verify;

@@ -4,7 +4,7 @@ use std::io::{self, BufWriter, Write};
 
 use serde_json::{Map, Value, json};
 
-use super::args::{QueryArgs, RowFormat, test_named};
+use super::args::{QueryArgs, RowFormat};
 use super::compare_structures::{Answer, all_agree, ask_all, joined};
 use super::{Ending, load_scene, unread_is_fine};
 use cullbench::index::structures;
@@ -12,24 +12,28 @@ use cullbench::measure::Workload;
 use cullbench::path;
 
 pub fn query(args: &QueryArgs) -> anyhow::Result<Ending> {
-    let test = test_named(&args.test)?;
     let structures = structures(&args.structure)?;
-    let (defaults, options) = (args.lens.defaults()?, args.lens.plane_options()?);
+    let (defaults, culling) = (args.lens.defaults()?, args.lens.culling(&args.test)?);
     let scene = load_scene(&args.scene, &args.scene_args)?;
     let cameras = path::load(&args.cameras, &scene, &defaults)?;
-    let workload = Workload::new(&scene, &cameras, &options)?;
+    let workload = Workload::new(&scene, &cameras, &culling)?;
     let ask = |index: &dyn cullbench::index::DynIndex, camera: usize, out: &mut _, cost: &mut _| {
-        index.visible_counted(&workload.volumes[camera], out, cost);
+        index.see_counted(workload.views[camera].as_any(), out, cost);
     };
     let answers = ask_all(
         &structures,
         &scene,
-        &scene.items,
-        workload.volumes.len(),
+        &workload.items,
+        workload.views.len(),
         args.ids,
         ask,
     )?;
-    unread_is_fine(write(args, test, scene.items.len(), &answers))?;
+    unread_is_fine(write(
+        args,
+        culling.test.name(),
+        scene.items.len(),
+        &answers,
+    ))?;
     Ok(if all_agree(&answers, "camera") {
         Ending::Ok
     } else {

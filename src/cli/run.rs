@@ -8,12 +8,12 @@ use std::path::{Path, PathBuf};
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context, bail};
-use comfy_table::Table;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::args::{RunArgs, test_named};
+use super::args::RunArgs;
+use super::run_table::show_scene;
 use super::{Ending, interrupt, text, unread_is_fine};
-use cullbench::camera::PlaneOptions;
+use cullbench::culling::{Culling, CullingTest};
 use cullbench::index::{StructureSpec, structures};
 use cullbench::measure::{
     Contender, Machine, PathInfo, Protocol, SceneInfo, Source, Toolchain, Workload,
@@ -32,9 +32,9 @@ struct Plan {
     from_suite: bool,
     scenes: Vec<(String, Vec<String>)>,
     structures: Vec<StructureSpec>,
-    test: &'static str,
+    /// The culling tests with everything else as asked for.
+    cullings: Vec<Culling>,
     lens: LensDefaults,
-    planes: PlaneOptions,
     load: LoadOptions,
     caches: Vec<bool>,
 }
@@ -44,20 +44,23 @@ impl Plan {
         let suite = Suite::named(&args.suite).ok_or_else(|| {
             SpecError::unknown("suite", &args.suite, SUITES.iter().map(|s| s.name))
         })?;
-        let mut tests = args
-            .test
-            .iter()
-            .map(|t| test_named(t))
-            .collect::<Result<Vec<_>, _>>()?;
-        tests.dedup();
+        let tests = args.test.iter().flat_map(|t| t.split(','));
+        let mut cullings: Vec<Culling> = Vec::new();
+        for test in tests {
+            let culling = args.lens.culling(test)?;
+            culling.check()?;
+            if cullings.contains(&culling) {
+                bail!("test '{test}' is named twice");
+            }
+            cullings.push(culling);
+        }
         let plan = Plan {
             suite,
             from_suite: args.scene.is_empty() && args.path.is_empty(),
             scenes: scenes(args, suite),
             structures: structures(&args.structure.join(","))?,
-            test: tests.first().copied().unwrap_or("six-plane"),
+            cullings,
             lens: args.lens.defaults()?,
-            planes: args.lens.plane_options()?,
             load: LoadOptions {
                 skip_bad_items: args.scene_args.skip_bad_items,
             },
@@ -69,8 +72,14 @@ impl Plan {
         };
         plan.check_names()?;
         // A suite as it comes is known to be sound.
-        let as_it_comes =
-            plan.lens == LensDefaults::default() && plan.planes == PlaneOptions::default();
+        let as_it_comes = plan.lens == LensDefaults::default()
+            && plan.cullings.iter().all(|c| {
+                let test = c.test;
+                *c == Culling {
+                    test,
+                    ..Culling::default()
+                }
+            });
         if !(plan.from_suite && as_it_comes) {
             plan.check_inputs()?;
         }
@@ -98,10 +107,35 @@ impl Plan {
             let scene = scene::load(source, &self.load)?;
             for source in paths {
                 let path = path::load(source, &scene, &self.lens)?;
-                Workload::new(&scene, &path, &self.planes)?;
+                for culling in &self.cullings {
+                    Workload::new(&scene, &path, culling)?;
+                }
             }
         }
         Ok(())
+    }
+
+    /// Everything that is asked on a scene with these paths: tests over boxes
+    /// before those over spheres, so that structures are built twice at most.
+    fn questions(&self, paths: &[String]) -> Vec<Question> {
+        let mut questions = Vec::new();
+        let of_spheres = |c: &&Culling| c.test == CullingTest::Sphere;
+        let (spheres, boxes): (Vec<&Culling>, Vec<&Culling>) =
+            self.cullings.iter().partition(of_spheres);
+        for cullings in [boxes, spheres] {
+            for path in paths {
+                for &cold in &self.caches {
+                    let tests = cullings.iter().map(|c| c.test.name().to_owned());
+                    questions.extend(tests.map(|test| (path.clone(), cold, test)));
+                }
+            }
+        }
+        questions
+    }
+
+    fn culling(&self, test: &str) -> Culling {
+        let named = self.cullings.iter().find(|c| c.test.name() == test);
+        named.copied().unwrap_or_default()
     }
 
     fn groups(&self) -> usize {
@@ -110,6 +144,7 @@ impl Plan {
             .map(|(_, paths)| paths.len())
             .sum::<usize>()
             * self.caches.len()
+            * self.cullings.len()
     }
 }
 
@@ -142,43 +177,49 @@ pub fn run(args: &RunArgs) -> anyhow::Result<Ending> {
     let sweep = machine.cache_sweep_bytes();
     let mut interrupted = false;
     for (source, paths) in &plan.scenes {
-        let done: BTreeSet<(String, bool)> = finished(&report, source);
+        let done: BTreeSet<Question> = finished(&report, source);
         let mut shown = 0;
-        if paths.iter().any(|p| {
-            plan.caches
-                .iter()
-                .any(|&cold| !done.contains(&(p.clone(), cold)))
-        }) {
+        let questions = plan.questions(paths);
+        if questions.iter().any(|question| !done.contains(question)) {
             bar.set_message(format!("{source}: building"));
             let scene = scene::load(source, &plan.load)?;
             let info = SceneInfo::of(&scene);
             same_scene(&report, &info)?;
-            let contenders = contenders(&plan, &scene);
-            for (path, cold) in paths
-                .iter()
-                .flat_map(|p| plan.caches.iter().map(move |&c| (p, c)))
-            {
-                if done.contains(&(path.clone(), cold)) {
+            let mut entered: Option<(bool, Vec<Contender>)> = None;
+            for question in questions {
+                if done.contains(&question) {
                     bar.inc(1);
                     continue;
                 }
-                bar.set_message(format!("{source}, {path}"));
+                let (path, cold, test) = &question;
+                let culling = plan.culling(test);
+                bar.set_message(format!("{source}, {path}, {test}"));
+                // Built once for all tests over boxes, and anew for spheres.
+                let of_spheres = culling.test == CullingTest::Sphere;
+                if entered.as_ref().is_none_or(|(kind, _)| *kind != of_spheres) {
+                    // The old ones go first: memory for one set is enough.
+                    drop(entered.take());
+                    entered = Some((of_spheres, contenders(&plan, &scene, culling.test)));
+                }
+                let Some((_, contenders)) = &entered else {
+                    continue;
+                };
                 let protocol = Protocol {
                     min_rounds: plan.suite.min_rounds,
                     max_rounds: plan.suite.max_rounds,
                     budget: plan.suite.budget,
                     pass: plan.suite.pass,
-                    cold,
+                    cold: *cold,
                     seed: args.seed,
                     overhead_ns: report.noise.harness_overhead_ns,
                     cache_bytes: sweep,
                 };
-                let measured = measure(&plan, &scene, path, &contenders, &protocol)?;
+                let measured = measure(&plan, &culling, &scene, path, contenders, &protocol)?;
                 let Some((path, group)) = measured else {
                     interrupted = true;
                     break;
                 };
-                keep(&mut folder, &mut report, &plan, &info, &path, group)?;
+                keep(&mut folder, &mut report, test, &info, &path, group)?;
                 shown += 1;
                 bar.inc(1);
             }
@@ -293,9 +334,15 @@ fn same_experiment(report: &Report, plan: &Plan, args: &RunArgs) -> anyhow::Resu
                 labels(wanted)
             );
         }
-        if cell.path.planes != plan.planes.method.name() || cell.path.epsilon != plan.planes.epsilon
-        {
-            bail!("holds cells with other planes or epsilon; expected those asked for now");
+        let same = |c: &Culling| {
+            cell.path.planes == c.planes.method.name()
+                && cell.path.epsilon == c.planes.epsilon
+                && cell.path.arithmetic == c.arithmetic.name()
+        };
+        if !plan.cullings.iter().any(same) {
+            bail!(
+                "holds cells with other planes, epsilon or arithmetic; expected those asked for now"
+            );
         }
     }
     if report.run.seed != args.seed {
@@ -325,17 +372,20 @@ fn same_scene(report: &Report, now: &SceneInfo) -> anyhow::Result<()> {
     }
 }
 
-/// Paths of a scene that the report has already, with their cache state.
-fn finished(report: &Report, scene: &str) -> BTreeSet<(String, bool)> {
+/// A path, whether caches are cold, and the culling test.
+type Question = (String, bool, String);
+
+/// What the report has already of a scene.
+fn finished(report: &Report, scene: &str) -> BTreeSet<Question> {
     let cells = report.cells.iter().filter(|c| c.scene.name == scene);
     cells
-        .map(|c| (c.path.name.clone(), c.path.cache == "cold"))
+        .map(|c| (c.path.name.clone(), c.path.cache == "cold", c.test.clone()))
         .collect()
 }
 
 /// All structures, and the first proper one a second time: the twin whose
 /// ratio to itself is the noise floor.
-fn contenders(plan: &Plan, scene: &Scene) -> Vec<Contender> {
+fn contenders(plan: &Plan, scene: &Scene, test: CullingTest) -> Vec<Contender> {
     let proper = plan
         .structures
         .iter()
@@ -347,7 +397,7 @@ fn contenders(plan: &Plan, scene: &Scene) -> Vec<Contender> {
         .map(|s| (s, false))
         .chain(twin.map(|s| (s, true)));
     entered
-        .map(|(spec, is_twin)| Contender::build(spec.clone(), is_twin, scene))
+        .map(|(spec, is_twin)| Contender::build(spec.clone(), is_twin, scene, test))
         .collect()
 }
 
@@ -356,20 +406,15 @@ type Measured = (PathInfo, cullbench::measure::Group);
 /// `None` if interrupted.
 fn measure(
     plan: &Plan,
+    culling: &Culling,
     scene: &Scene,
     source: &str,
     contenders: &[Contender],
     protocol: &Protocol,
 ) -> anyhow::Result<Option<Measured>> {
     let path = path::load(source, scene, &plan.lens)?;
-    let workload = Workload::new(scene, &path, &plan.planes)?;
-    let info = PathInfo {
-        name: source.to_owned(),
-        camera_count: workload.volumes.len(),
-        cache: if protocol.cold { "cold" } else { "warm" }.to_owned(),
-        planes: plan.planes.method.name().to_owned(),
-        epsilon: plan.planes.epsilon,
-    };
+    let workload = Workload::new(scene, &path, culling)?;
+    let info = PathInfo::of(source, &workload, protocol.cold);
     let group = measure_group(&workload, contenders, "linear", protocol, &interrupt::asked);
     Ok(group.map(|group| (info, group)))
 }
@@ -378,7 +423,7 @@ fn measure(
 fn keep(
     folder: &mut RunFolder,
     report: &mut Report,
-    plan: &Plan,
+    test: &str,
     scene: &SceneInfo,
     path: &PathInfo,
     group: cullbench::measure::Group,
@@ -387,20 +432,20 @@ fn keep(
         let own = group.samples.iter().filter(|(l, _, _)| l == label);
         let samples: Vec<_> = own.map(|(_, task, sample)| (*task, *sample)).collect();
         folder.append(
-            [&scene.name, &path.name, &path.cache, label],
+            [&scene.name, &path.name, &path.cache, label, test],
             samples.iter(),
         )
     };
     if let Some(twin) = &group.twin {
         append(&format!("{}#twin", twin.structure))?;
-        report.noise.add(&scene.name, path, twin);
+        report.noise.add(&scene.name, path, test, twin);
     }
     for cell in group.cells {
         let samples = append(&cell.structure)?;
         let samples = (samples.rows > 0).then_some(samples);
         report
             .cells
-            .push(ReportCell::new(scene, path, plan.test, cell, samples));
+            .push(ReportCell::new(scene, path, test, cell, samples));
     }
     // A finished run that was asked for more goes on.
     report.run.finished_at = None;
@@ -414,130 +459,6 @@ fn progress(groups: u64) -> ProgressBar {
     let bar = ProgressBar::new(groups);
     bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
     bar
-}
-
-fn show_scene(report: &Report, scene: &str) -> io::Result<()> {
-    let cells: Vec<&ReportCell> = report
-        .cells
-        .iter()
-        .filter(|c| c.scene.name == scene)
-        .collect();
-    let Some(first) = cells.first() else {
-        return Ok(());
-    };
-    let mut table = text::table(
-        &[
-            "path / structure",
-            "cull rate",
-            "query median",
-            "p95",
-            "times linear [95 % interval]",
-            "build",
-            "B/item",
-            "locate",
-            "status",
-        ],
-        &[1, 2, 3, 4, 5, 6, 7],
-    );
-    let mut groups: Vec<&PathOf> = Vec::new();
-    let keys: Vec<PathOf> = cells.iter().map(|c| path_of(c)).collect();
-    for key in &keys {
-        if !groups.contains(&key) {
-            groups.push(key);
-        }
-    }
-    for group in groups {
-        let of_path = cells
-            .iter()
-            .filter(|c| path_of(c) == *group)
-            .copied()
-            .collect();
-        add_path(&mut table, of_path, report.noise.aa_floor.unwrap_or(0.0));
-    }
-    let mut out = io::stdout().lock();
-    writeln!(
-        out,
-        "\n{scene}: {} items, {} regions{}",
-        text::count(first.scene.total_count),
-        text::count(first.scene.region_count),
-        match first.scene.skipped_items {
-            0 => String::new(),
-            bad => format!(", {} bad items left out", text::count(bad)),
-        }
-    )?;
-    writeln!(out, "{table}")?;
-    for cell in cells.iter().filter(|c| c.reason.is_some()) {
-        let reason = cell.reason.as_deref().unwrap_or_default();
-        writeln!(
-            out,
-            "{} on {}: {}: {reason}",
-            cell.structure,
-            cell.path.name,
-            cell.status.name()
-        )?;
-    }
-    out.flush()
-}
-
-type PathOf = (String, String);
-
-fn path_of(cell: &ReportCell) -> PathOf {
-    (cell.path.name.clone(), cell.path.cache.clone())
-}
-
-/// The rows of one path, fastest first; what failed comes last, unranked.
-fn add_path(table: &mut Table, mut cells: Vec<&ReportCell>, floor: f64) {
-    let key = |c: &ReportCell| match c.status {
-        cullbench::measure::Status::Ok => c.value("query_ns").unwrap_or(f64::MAX),
-        _ => f64::INFINITY,
-    };
-    cells.sort_by(|a, b| key(a).total_cmp(&key(b)));
-    let Some(first) = cells.first() else { return };
-    let head = match first.path.cache.as_str() {
-        "warm" => first.path.name.clone(),
-        cache => format!("{} ({cache})", first.path.name),
-    };
-    let culled = cells.iter().find_map(|c| c.value("cull_rate"));
-    table.add_row([head, culled.map(text::percent).unwrap_or_default()]);
-    let (mut rank, mut leader) = (0, 0.0);
-    for (place, cell) in cells.iter().enumerate() {
-        let value =
-            |name: &str, show: fn(f64) -> String| cell.value(name).map(show).unwrap_or_default();
-        // Within the noise floor of the leader of its rank: a tie.
-        if rank == 0 || key(cell) > leader * (1.0 + floor) {
-            (rank, leader) = (place + 1, key(cell));
-        }
-        let number = if key(cell).is_finite() {
-            rank.to_string()
-        } else {
-            "-".to_owned()
-        };
-        let ratio = cell.metrics.get("ratio_to_linear").map(|m| {
-            let interval = m.lower.zip(m.upper).map(|(lower, upper)| {
-                format!(
-                    " [{}, {}]",
-                    text::significant(lower),
-                    text::significant(upper)
-                )
-            });
-            format!(
-                "{}{}",
-                text::significant(m.value),
-                interval.unwrap_or_default()
-            )
-        });
-        table.add_row([
-            format!("  {number} {}", cell.structure),
-            String::new(),
-            value("query_ns", text::time),
-            value("query_ns_p95", text::time),
-            ratio.unwrap_or_default(),
-            value("build_ms", |ms| text::time(ms * 1e6)),
-            value("memory_bytes_per_item", |b| format!("{b:.1}")),
-            value("locate_ns", text::time),
-            cell.status.name().to_owned(),
-        ]);
-    }
 }
 
 fn close(

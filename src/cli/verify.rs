@@ -11,9 +11,10 @@ use serde::Serialize;
 
 use super::args::{LensArgs, TableFormat, VerifyArgs};
 use super::{Ending, interrupt, load_scene, tell, text, unread_is_fine};
-use cullbench::camera::PlaneOptions;
+use cullbench::camera::{DEFAULT_EPSILON, PlaneMethod};
+use cullbench::culling::{ARITHMETICS, Arithmetic, CameraView, Culling, CullingTest, TESTS};
 use cullbench::index::{DynIndex, StructureSpec, structures};
-use cullbench::measure::{Contender, Workload, count_pass};
+use cullbench::measure::{Contender, Status, Workload, count_pass, judge};
 use cullbench::path::{self, CameraPath};
 use cullbench::scene::{self, FAMILIES, SAMPLES};
 use cullbench::verify::{
@@ -44,6 +45,8 @@ struct Outcome {
     checks: Vec<Check>,
 }
 
+/// Verdicts of the oracle for each scene and path.
+const MOST_JUDGED: usize = 60_000;
 /// Items of a generated scene when none is named.
 const ITEMS: usize = 5_000;
 const PATHS: [&str; 4] = [
@@ -57,7 +60,7 @@ const CASES: u64 = 20_000;
 pub fn verify(args: &VerifyArgs) -> anyhow::Result<Ending> {
     let structures = structures(&args.structure)?;
     let defaults = args.lens.defaults()?;
-    let planes = args.lens.plane_options()?;
+    let culling = args.lens.culling(CullingTest::SixPlane.name())?;
     let by_hand = !args.scene.is_empty() || !args.path.is_empty();
     let cases = args.cases.unwrap_or(if by_hand { 0 } else { CASES });
     // Random cases alone, if only they are asked for.
@@ -80,10 +83,14 @@ pub fn verify(args: &VerifyArgs) -> anyhow::Result<Ending> {
         }
         bar.set_message(source.clone());
         let scene = load_scene(source, &args.scene_args)?;
-        let contenders: Vec<Contender> = structures
-            .iter()
-            .map(|s| Contender::build(s.clone(), false, &scene))
-            .collect();
+        let contenders = |test: CullingTest| -> Vec<Contender> {
+            let specs = structures.iter().cloned();
+            specs
+                .map(|s| Contender::build(s, false, &scene, test))
+                .collect()
+        };
+        let over_boxes = contenders(CullingTest::SixPlane);
+        let over_cubes = contenders(CullingTest::Sphere);
         for path in paths(args, &scene) {
             if interrupt::asked() {
                 interrupted = true;
@@ -92,8 +99,15 @@ pub fn verify(args: &VerifyArgs) -> anyhow::Result<Ending> {
             let cameras = path::load(&path, &scene, &defaults)?;
             let again = reproduce(source, &path, &args.lens);
             let mut rows: Vec<Check> = Vec::new();
-            for (kind, workload) in workloads(&scene, &cameras, &planes)? {
-                let checked = check(&workload, &contenders, kind, &again);
+            for (kind, workload) in workloads(&scene, &cameras, &culling)? {
+                let contenders = match workload.culling.test {
+                    CullingTest::Sphere => &over_cubes,
+                    _ => &over_boxes,
+                };
+                let mut checked = check(&workload, contenders, &kind, &again);
+                if rows.is_empty() && is_safe(&culling) {
+                    judge_camera_level(&workload, &mut checked, &again);
+                }
                 if rows.is_empty() {
                     rows = checked;
                 } else {
@@ -152,8 +166,8 @@ fn paths(args: &VerifyArgs, scene: &scene::Scene) -> Vec<String> {
 fn reproduce(scene: &str, path: &str, lens: &LensArgs) -> String {
     let mut command = format!(
         "cullbench verify --scene '{scene}' --path '{path}' --planes {} --epsilon {} \
-         --fovy {} --aspect {}",
-        lens.planes, lens.epsilon, lens.fovy, lens.aspect
+         --arithmetic {} --fovy {} --aspect {}",
+        lens.planes, lens.epsilon, lens.arithmetic, lens.fovy, lens.aspect
     );
     if let Some(near) = lens.near {
         command += &format!(" --near {near}");
@@ -164,38 +178,81 @@ fn reproduce(scene: &str, path: &str, lens: &LensArgs) -> String {
     command
 }
 
-/// The queries of a path once for each kind of volume; the points to locate
-/// are asked once.
+/// The queries of a path once for each kind of volume, and once for each other
+/// culling test and arithmetic; the points to locate are asked once.
 fn workloads<'a>(
     scene: &'a scene::Scene,
     cameras: &CameraPath,
-    options: &PlaneOptions,
-) -> anyhow::Result<Vec<(&'static str, Workload<'a>)>> {
+    culling: &Culling,
+) -> anyhow::Result<Vec<(String, Workload<'a>)>> {
     let around = scene.surroundings();
-    let first = Workload::new(scene, cameras, options)?;
-    let mut all: Vec<(&str, Workload)> = VOLUME_KINDS
-        .into_iter()
-        .map(|kind| {
-            let (path, points) = (cameras.name.clone(), Vec::new());
-            (
-                kind,
-                Workload {
-                    scene,
-                    path,
-                    volumes: Vec::new(),
-                    points,
-                },
-            )
-        })
-        .collect();
+    let mut all = vec![(
+        format!("{} perspective", culling.arithmetic.name()),
+        Workload::new(scene, cameras, culling)?,
+    )];
+    // The first kind is the camera itself.
+    for kind in &VOLUME_KINDS[1..] {
+        let workload = Workload {
+            scene,
+            path: cameras.name.clone(),
+            culling: Culling::default(),
+            items: CullingTest::SixPlane.items(&scene.items),
+            cameras: Vec::new(),
+            views: Vec::new(),
+            points: Vec::new(),
+        };
+        all.push(((*kind).to_owned(), workload));
+    }
     for (i, camera) in cameras.cameras.iter().enumerate() {
-        let volumes = variants(camera, options, &around, i)?;
-        for ((_, workload), (_, volume)) in all.iter_mut().zip(volumes) {
-            workload.volumes.push(volume);
+        let volumes = variants(camera, &culling.planes, &around, i)?;
+        for ((_, workload), (_, volume)) in all.iter_mut().zip(volumes).skip(1) {
+            workload.views.push(CameraView::Volume(volume));
         }
     }
-    all[0].1 = first;
+    for other in other_cullings(culling) {
+        let mut workload = Workload::new(scene, cameras, &other)?;
+        workload.points.clear();
+        let kind = format!("{} {}", other.test.name(), other.arithmetic.name());
+        all.push((kind, workload));
+    }
     Ok(all)
+}
+
+/// Every test and arithmetic but the given one, as far as they go together.
+fn other_cullings(culling: &Culling) -> Vec<Culling> {
+    let tests = TESTS.iter().map(|row| row.0);
+    let all = tests.flat_map(|test| {
+        ARITHMETICS.iter().map(move |row| Culling {
+            test,
+            arithmetic: row.0,
+            ..*culling
+        })
+    });
+    all.filter(|other| other != culling && other.check().is_ok())
+        .collect()
+}
+
+/// Whether nothing that a camera sees may be missed.
+fn is_safe(culling: &Culling) -> bool {
+    culling.planes.method == PlaneMethod::Frame
+        && culling.planes.epsilon >= DEFAULT_EPSILON
+        && culling.arithmetic != Arithmetic::F64
+}
+
+/// Holds the answers, which are everyone's who agreed with the reference,
+/// against the exact truth about some of the cameras.
+fn judge_camera_level(workload: &Workload, checks: &mut [Check], again: &str) {
+    let errors = judge(workload, MOST_JUDGED).errors;
+    if errors.false_negatives + errors.touch_dropped == 0 {
+        return;
+    }
+    for check in checks.iter_mut().filter(|c| c.difference.is_none()) {
+        check.status = Status::Unsafe.name();
+        check.difference = Some(format!(
+            "camera level: {} visible items and {} touching ones are missed, the deepest by {:e}\n  again: {again}",
+            errors.false_negatives, errors.touch_dropped, errors.worst_miss
+        ));
+    }
 }
 
 impl Check {
@@ -217,7 +274,7 @@ fn check(workload: &Workload, contenders: &[Contender], kind: &str, again: &str)
         .collect();
     let mut counted = count_pass(workload, &built).into_iter();
     let scene = workload.scene;
-    let questions = workload.volumes.len() * scene.items.len()
+    let questions = workload.views.len() * scene.items.len()
         + workload.points.len() * scene.regions.boxes(&scene.items).len();
     let checks = contenders.iter().map(|contender| {
         let verdict = match &contender.built {
@@ -232,7 +289,7 @@ fn check(workload: &Workload, contenders: &[Contender], kind: &str, again: &str)
             scene: scene.name.clone(),
             path: workload.path.clone(),
             structure: contender.spec.label.clone(),
-            volumes: workload.volumes.len(),
+            volumes: workload.views.len(),
             verdicts: questions as u64,
             status,
             difference: reason.map(|reason| format!("{kind} volume, {reason}\n  again: {again}")),

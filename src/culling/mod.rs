@@ -170,17 +170,7 @@ impl Culling {
     /// # Errors
     /// Planes that do not fit f32; combinations that make no sense.
     pub fn view(&self, camera: &Camera, around: &Surroundings) -> Result<CameraView, CullingError> {
-        if self.arithmetic != Arithmetic::F32 {
-            if self.planes.method != PlaneMethod::Frame {
-                return Err(CullingError::Method {
-                    arithmetic: self.arithmetic.name(),
-                    method: self.planes.method.name(),
-                });
-            }
-            if self.test == CullingTest::Sphere {
-                return Err(CullingError::Sphere);
-            }
-        }
+        self.check()?;
         let local_eye = camera.frame.eye - around.origin;
         match self.arithmetic {
             Arithmetic::F32 => self.in_f32(camera, around),
@@ -198,6 +188,25 @@ impl Culling {
                 Ok(CameraView::Relative(volume))
             }
         }
+    }
+
+    /// Whether the choices go together.
+    ///
+    /// # Errors
+    /// Which of them do not.
+    pub fn check(&self) -> Result<(), CullingError> {
+        if self.arithmetic != Arithmetic::F32 {
+            if self.planes.method != PlaneMethod::Frame {
+                return Err(CullingError::Method {
+                    arithmetic: self.arithmetic.name(),
+                    method: self.planes.method.name(),
+                });
+            }
+            if self.test == CullingTest::Sphere {
+                return Err(CullingError::Sphere);
+            }
+        }
+        Ok(())
     }
 
     /// f32 planes in scene coordinates. Planes of the frame are extended in

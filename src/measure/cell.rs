@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::{
-    Built, Contender, Counted, Protocol, Sample, Status, Task, Timed, Verdict, Workload,
-    count_pass, timed_pass,
+    Built, Contender, Counted, Judged, Protocol, Sample, Status, Task, Timed, Verdict, Workload,
+    count_pass, judge, timed_pass,
 };
 use crate::scene::Scene;
 use crate::statistics::{Estimate, bootstrap_median, median, quantile, sorted};
@@ -44,6 +44,13 @@ metrics! {
     "planes_tested", "planes", "plane tests a query, of nodes and items, mean";
     "items_tested", "items", "item bounds tested a query, mean";
     "items_accepted_untested", "items", "items reported with a whole subtree, untested, a query, mean";
+    "excess", "1", "false positives / truly visible items, at camera level, of the judged queries";
+    "false_positive_count", "items", "returned though out at camera level, a judged query, mean";
+    "false_negative_count", "items", "in at camera level, but not returned, a judged query, mean";
+    "touch_dropped_count", "items", "touching at camera level, but not returned, a judged query, mean";
+    "worst_miss", "world units", "how deep the deepest false negative reaches into the view";
+    "undecided_count", "items", "too close to a tie for the truth itself (called a touch), a judged query, mean";
+    "judged_queries", "queries", "cameras of the path whose answers were judged against the exact truth";
     "build_ms", "ms", "CPU time of a build, median of up to three";
     "update_ms_0_1_percent", "ms", "CPU time of an update after 0.1 % of the items have moved (scenes of up to 2 million)";
     "update_ms", "ms", "as above, 1 % moved";
@@ -117,6 +124,22 @@ pub struct PathInfo {
     /// Where the planes come from, and the factor c of their epsilon.
     pub planes: String,
     pub epsilon: f64,
+    /// The numbers that the culling test is carried out in.
+    pub arithmetic: String,
+}
+
+impl PathInfo {
+    pub fn of(path: &str, workload: &Workload, cold: bool) -> PathInfo {
+        let culling = &workload.culling;
+        PathInfo {
+            name: path.to_owned(),
+            camera_count: workload.cameras.len(),
+            cache: if cold { "cold" } else { "warm" }.to_owned(),
+            planes: culling.planes.method.name().to_owned(),
+            epsilon: culling.planes.epsilon,
+            arithmetic: culling.arithmetic.name().to_owned(),
+        }
+    }
 }
 
 /// One structure on one scene and path.
@@ -126,6 +149,8 @@ pub struct Cell {
     pub params: Value,
     pub verdict: Verdict,
     pub metrics: BTreeMap<String, Metric>,
+    /// The errors behind the metrics, as totals.
+    pub judged: Option<Judged>,
 }
 
 /// The same structure measured twice: what a ratio of 1 looks like here.
@@ -143,7 +168,10 @@ pub struct Group {
     pub samples: Vec<(String, Task, Sample)>,
 }
 
-/// Counts, verifies and times all contenders; ratios are against the one named
+/// Verdicts of the oracle that a group may take: some 50 ns each.
+const MOST_JUDGED: usize = 400_000;
+
+/// Counts, verifies, judges and times all contenders; ratios are against the one named
 /// `yardstick`, if it is there. `None` if stopped.
 pub fn measure_group(
     workload: &Workload,
@@ -162,6 +190,18 @@ pub fn measure_group(
         entry.counted = counted.next();
         if let Some(counted) = &entry.counted {
             entry.verdict = counted.verdict.clone();
+        }
+    }
+    let judged = judge(workload, MOST_JUDGED);
+    for entry in entries.iter_mut().filter(|e| e.runs()) {
+        entry.judged = Some(judged);
+        let errors = &judged.errors;
+        if errors.false_negatives > 0 {
+            let reason = format!(
+                "{} of {} visible items are missed at camera level, the deepest by {:e}",
+                errors.false_negatives, errors.visible, errors.worst_miss
+            );
+            entry.verdict = Verdict::new(Status::Unsafe, reason);
         }
     }
     for task in [Task::Query, Task::Locate] {
@@ -218,6 +258,7 @@ struct Entry<'a> {
     contender: &'a Contender,
     verdict: Verdict,
     counted: Option<Counted>,
+    judged: Option<Judged>,
     query: Option<Timed>,
     locate: Option<Timed>,
 }
@@ -232,6 +273,7 @@ impl<'a> Entry<'a> {
             contender,
             verdict,
             counted: None,
+            judged: None,
             query: None,
             locate: None,
         }
@@ -268,6 +310,9 @@ impl<'a> Entry<'a> {
             if let Some(counted) = self.counted.as_ref().filter(|_| self.runs()) {
                 count_metrics(&mut metrics, counted, items);
             }
+            if let Some(judged) = &self.judged {
+                error_metrics(&mut metrics, judged);
+            }
         }
         if let (true, Some(query), Some(locate)) = (self.runs(), &self.query, &self.locate) {
             time_metrics(&mut metrics, query, locate);
@@ -280,6 +325,7 @@ impl<'a> Entry<'a> {
             params: self.contender.spec.params.clone(),
             verdict: self.verdict.clone(),
             metrics: metrics.0,
+            judged: self.judged,
         }
     }
 
@@ -332,6 +378,21 @@ fn count_metrics(metrics: &mut Metrics, counted: &Counted, items: usize) {
         counted.locate.found.iter().sum::<u64>() as f64,
         searches,
     );
+}
+
+fn error_metrics(metrics: &mut Metrics, judged: &Judged) {
+    let (errors, queries) = (&judged.errors, judged.judged_queries as f64);
+    metrics.set("judged_queries", queries);
+    metrics.maybe("excess", errors.excess());
+    for (name, count) in [
+        ("false_positive_count", errors.false_positives),
+        ("false_negative_count", errors.false_negatives),
+        ("touch_dropped_count", errors.touch_dropped),
+        ("undecided_count", errors.undecided),
+    ] {
+        metrics.ratio(name, count as f64, queries);
+    }
+    metrics.set("worst_miss", errors.worst_miss);
 }
 
 fn time_metrics(metrics: &mut Metrics, query: &Timed, locate: &Timed) {

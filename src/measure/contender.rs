@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use super::clock::Stopwatch;
 use super::{Status, Verdict};
+use crate::culling::CullingTest;
 use crate::geometry::Aabb;
 use crate::index::{BuildError, DynIndex, MemoryUsage, StructureSpec};
 use crate::query::ItemId;
@@ -24,7 +25,7 @@ pub struct Contender {
 
 pub struct Built {
     pub items: Box<dyn DynIndex>,
-    /// `None` where the regions are the items themselves.
+    /// `None` where the regions are the items as they are indexed.
     regions: Option<Box<dyn DynIndex>>,
     /// CPU time of one build over the items, median of all builds, ms.
     pub build_ms: f64,
@@ -51,9 +52,14 @@ const BUILDS: usize = 3;
 const BUILD_TIME: Duration = Duration::from_millis(300);
 
 impl Contender {
-    /// Builds the structure; a panic or a refusal becomes its verdict.
-    pub fn build(spec: StructureSpec, is_twin: bool, scene: &Scene) -> Contender {
-        let built = guarded(|| build(&spec, scene)).unwrap_or_else(Err);
+    /// Builds the structure over the items as a culling test has them; a panic or a refusal becomes its verdict.
+    pub fn build(
+        spec: StructureSpec,
+        is_twin: bool,
+        scene: &Scene,
+        test: CullingTest,
+    ) -> Contender {
+        let built = guarded(|| build(&spec, scene, test)).unwrap_or_else(Err);
         Contender {
             spec,
             is_twin,
@@ -70,7 +76,8 @@ impl Contender {
     }
 }
 
-fn build(spec: &StructureSpec, scene: &Scene) -> Result<Built, Verdict> {
+fn build(spec: &StructureSpec, scene: &Scene, test: CullingTest) -> Result<Built, Verdict> {
+    let items = test.items(&scene.items);
     let refused = |error| Verdict::new(Status::Refused, format!("{error}"));
     let (mut times, mut index) = (Vec::new(), None);
     let total = Stopwatch::start();
@@ -79,24 +86,24 @@ fn build(spec: &StructureSpec, scene: &Scene) -> Result<Built, Verdict> {
         drop(index.take());
         let watch = Stopwatch::start();
         index = Some(
-            spec.build_with(&scene.items, scene.own_tree.as_ref())
+            spec.build_with(&items, scene.own_tree.as_ref())
                 .map_err(refused)?,
         );
         times.push(watch.lap().cpu_ns / 1e6);
     }
     let mut update_ms = Vec::new();
     if let Some(spare) = index.take() {
-        update_ms = measure_updates(spec, scene, spare).map_err(refused)?;
+        update_ms = measure_updates(spec, scene, &items, spare).map_err(refused)?;
         index = Some(
-            spec.build_with(&scene.items, scene.own_tree.as_ref())
+            spec.build_with(&items, scene.own_tree.as_ref())
                 .map_err(refused)?,
         );
     }
-    let Some(items) = index else {
+    let Some(index) = index else {
         return Err(Verdict::new(Status::TimedOut, "no time left for a build"));
     };
     let boxes = scene.regions.boxes(&scene.items);
-    let regions = if std::ptr::eq(boxes, &scene.items[..]) {
+    let regions = if std::ptr::eq(boxes, &items[..]) {
         None
     } else {
         Some(
@@ -105,10 +112,10 @@ fn build(spec: &StructureSpec, scene: &Scene) -> Result<Built, Verdict> {
         )
     };
     Ok(Built {
-        memory: items.memory(),
+        memory: index.memory(),
         build_ms: median(&times).unwrap_or(f64::NAN),
         update_ms,
-        items,
+        items: index,
         regions,
     })
 }
@@ -118,12 +125,13 @@ fn build(spec: &StructureSpec, scene: &Scene) -> Result<Built, Verdict> {
 fn measure_updates(
     spec: &StructureSpec,
     scene: &Scene,
+    items: &[Aabb],
     mut index: Box<dyn DynIndex>,
 ) -> Result<Vec<f64>, BuildError> {
-    if scene.items.is_empty() || scene.items.len() > MOST_UPDATED {
+    if items.is_empty() || items.len() > MOST_UPDATED {
         return Ok(Vec::new());
     }
-    let mut items = scene.items.clone();
+    let mut items = items.to_vec();
     let mut times = Vec::with_capacity(UPDATE_SHARES.len());
     for share in UPDATE_SHARES {
         let moved = move_share(&mut items, share);

@@ -4,10 +4,14 @@
 
 use std::time::{Duration, Instant};
 
+use serde::{Deserialize, Serialize};
+
 use super::contender::guarded;
 use super::{Built, Status, Verdict, Workload};
 use crate::query::{ItemId, QueryCost};
-use crate::verify::{Difference, Reference, explain_containment, explain_visibility};
+use crate::verify::{
+    Difference, ErrorCount, Reference, Truth, explain_containment, explain_visibility,
+};
 
 /// What one contender answered and what it cost.
 #[derive(Clone, Debug)]
@@ -54,11 +58,12 @@ const PATIENCE: Duration = Duration::from_secs(120);
 pub fn count_pass(workload: &Workload, contenders: &[&Built]) -> Vec<Counted> {
     let mut all: Vec<Counted> = contenders.iter().map(|_| Counted::new()).collect();
     let mut spent = vec![Duration::ZERO; contenders.len()];
-    let items = &workload.scene.items;
+    let items = &workload.items;
     let mut out = Vec::new();
     let mut reference = Reference::new(items.len());
-    for (frame, volume) in workload.volumes.iter().enumerate() {
-        reference.see(items, volume);
+    for (frame, view) in workload.views.iter().enumerate() {
+        let view = view.as_any();
+        reference.see(items, view);
         for (i, contender) in contenders.iter().enumerate() {
             let counted = &mut all[i];
             if counted.verdict.status != Status::Ok {
@@ -67,7 +72,7 @@ pub fn count_pass(workload: &Workload, contenders: &[&Built]) -> Vec<Counted> {
             out.clear();
             let start = Instant::now();
             let cost = &mut counted.cost;
-            let asked = guarded(|| contender.items.visible_counted(volume, &mut out, cost));
+            let asked = guarded(|| contender.items.see_counted(view, &mut out, cost));
             let took = start.elapsed();
             spent[i] += took;
             counted.slowest = counted.slowest.max(took);
@@ -78,17 +83,15 @@ pub fn count_pass(workload: &Workload, contenders: &[&Built]) -> Vec<Counted> {
             let difference = reference.compare(&out);
             counted.verdict = verdict(asked, spent[i], difference, || {
                 let what = format!("camera {frame}: {difference}");
-                explained(what, difference, |id| {
-                    explain_visibility(&items[id], volume)
-                })
+                explained(what, difference, |id| explain_visibility(&items[id], view))
             });
         }
     }
     let regions = &workload.scene.regions;
-    let boxes = regions.boxes(items);
+    let boxes = regions.boxes(&workload.scene.items);
     let mut reference = Reference::new(boxes.len());
     for (n, &p) in workload.points.iter().enumerate() {
-        reference.expect(regions.holding(p, items).into_iter());
+        reference.expect(regions.holding(p, &workload.scene.items).into_iter());
         for (i, contender) in contenders.iter().enumerate() {
             let counted = &mut all[i];
             if counted.verdict.status != Status::Ok {
@@ -112,6 +115,39 @@ pub fn count_pass(workload: &Workload, contenders: &[&Built]) -> Vec<Counted> {
         note_scan(counted, items.len());
     }
     all
+}
+
+/// How the answers of a workload differ from the truth at camera level.
+#[derive(Clone, Copy, Default, PartialEq, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Judged {
+    /// Cameras that were judged, evenly spread over the path.
+    pub judged_queries: usize,
+    /// Sums over those.
+    #[serde(flatten)]
+    pub errors: ErrorCount,
+}
+
+/// Judges the reference's answers, which are everyone's who counted right.
+/// As many cameras as `most` verdicts allow, at least one.
+pub fn judge(workload: &Workload, most: usize) -> Judged {
+    let scene = workload.scene;
+    let count = workload.cameras.len();
+    let wanted = (most / scene.items.len().max(1)).clamp(1, 16).min(count);
+    let mut judged = Judged::default();
+    for n in 0..wanted {
+        let frame = n * count / wanted;
+        let camera = &workload.cameras[frame];
+        let Some(truth) = Truth::of_camera(camera, scene.origin, &scene.items) else {
+            continue;
+        };
+        let view = workload.views[frame].as_any();
+        let seen = workload.items.iter().zip(0..).filter(|(b, _)| view.sees(b));
+        let answer: Vec<ItemId> = seen.map(|(_, id)| id).collect();
+        judged.errors += truth.errors(&scene.items, &answer);
+        judged.judged_queries += 1;
+    }
+    judged
 }
 
 fn explained(

@@ -2,7 +2,7 @@
 //! counts nothing. It owns the protocol, the clocks and the metrics; what a
 //! structure does and how results are written are not its business.
 //!
-//! The road every measurement walks: [`Workload`] (scene, volumes, points) ->
+//! The road every measurement walks: [`Workload`] (scene, views, points) ->
 //! [`Contender`]s (built structures) -> [`count_pass`] -> [`timed_pass`] ->
 //! [`Cell`]s with named metrics.
 
@@ -21,10 +21,12 @@ pub use cell::{
 };
 pub use clock::{Lap, Stopwatch};
 pub use contender::{Built, Contender, UPDATE_SHARES, move_share};
-pub use count::{Counted, FrameCount, LocateCount, count_pass, id_sum};
+pub use count::{Counted, FrameCount, Judged, LocateCount, count_pass, id_sum, judge};
 pub use environment::{Machine, Source, Toolchain};
-pub use timing::{Protocol, Sample, Task, Timed, harness_overhead_ns, timed_pass};
-pub use workload::Workload;
+pub use timing::{
+    Ask, Competitor, Protocol, Sample, Task, Timed, harness_overhead_ns, timed_pass, timed_rounds,
+};
+pub use workload::{Workload, WorkloadError};
 
 /// What became of a cell. A gap is never silent.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]

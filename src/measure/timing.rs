@@ -2,17 +2,12 @@
 //! warmed up, several queries per clock reading where one is short, and the
 //! caches streamed over between queries when it is to be cold.
 
-use std::ops::Range;
 use std::time::{Duration, Instant};
-
-use glam::Vec3;
 
 use super::clock::Stopwatch;
 use super::{Built, Counted, Status, Verdict, Workload};
-use crate::geometry::{Aabb, ConvexVolume};
-use crate::index::{DynIndex, MemoryUsage};
-use crate::query::{AnyView, ItemId, QueryCost};
-use crate::scene::{Dice, Regions, Scene};
+use crate::query::ItemId;
+use crate::scene::Dice;
 
 /// How long and how often to measure.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -78,54 +73,61 @@ pub struct Timed {
     pub rounds: usize,
 }
 
-/// The queries of a task that are timed: places in the path.
-struct Queries<'a> {
-    task: Task,
-    workload: &'a Workload<'a>,
-    places: Vec<usize>,
+/// Answers query number n: appends ids to an empty output.
+pub type Ask<'a> = Box<dyn Fn(usize, &mut Vec<ItemId>) + 'a>;
+
+/// One that takes part in a timed pass: how it answers query `place`
+/// (appending to an empty output), and what it must return.
+pub struct Competitor<'a> {
+    pub ask: Ask<'a>,
+    /// Number of ids of every query.
+    pub expected: Vec<u64>,
+    /// Wall time of its slowest query so far: bounds the length of a pass.
+    pub slowest: Duration,
 }
 
-impl Queries<'_> {
-    /// Asks the queries of a range; the number of ids returned.
-    #[inline]
-    fn ask(&self, index: &dyn DynIndex, range: Range<usize>, out: &mut Vec<ItemId>) -> u64 {
-        let mut returned = 0;
-        for &place in &self.places[range] {
-            out.clear();
-            match self.task {
-                Task::Query => index.visible(&self.workload.volumes[place], out),
-                Task::Locate => {
-                    let p = self.workload.points[place];
-                    index.locate(p, out);
-                    self.workload.refine(p, out);
-                }
+impl<'a> Competitor<'a> {
+    /// A structure that counted right, asked a task of a workload.
+    fn of(task: Task, workload: &'a Workload, built: &'a Built, counted: &Counted) -> Self {
+        let ask: Ask = match task {
+            Task::Query => {
+                let index = built.items.as_ref();
+                Box::new(move |place, out| index.see(workload.views[place].as_any(), out))
             }
+            Task::Locate => {
+                let index = built.regions();
+                Box::new(move |place, out| {
+                    let p = workload.points[place];
+                    index.locate(p, out);
+                    workload.refine(p, out);
+                })
+            }
+        };
+        Competitor {
+            ask,
+            expected: match task {
+                Task::Query => counted.frames.iter().map(|f| f.visible).collect(),
+                Task::Locate => counted.locate.found.clone(),
+            },
+            slowest: counted.slowest,
+        }
+    }
+
+    /// Asks the queries of some places; the number of ids returned.
+    #[inline]
+    fn ask_all(&self, places: &[usize], out: &mut Vec<ItemId>) -> u64 {
+        let mut returned = 0;
+        for &place in places {
+            out.clear();
+            (self.ask)(place, out);
             returned += std::hint::black_box(&*out).len() as u64;
         }
         returned
     }
-
-    fn index<'b>(&self, built: &'b Built) -> &'b dyn DynIndex {
-        match self.task {
-            Task::Query => built.items.as_ref(),
-            Task::Locate => built.regions(),
-        }
-    }
-
-    fn expected(&self, counted: &Counted, range: Range<usize>) -> u64 {
-        let places = self.places[range].iter();
-        match self.task {
-            Task::Query => places.map(|&place| counted.frames[place].visible).sum(),
-            Task::Locate => places.map(|&place| counted.locate.found[place]).sum(),
-        }
-    }
 }
 
-/// Times all contenders that counted right. `stop` ends the pass early (its
-/// samples are then worthless and the result is `None`).
-///
-/// A sample whose number of ids differs from the count pass makes its
-/// contender `wrong`.
+/// Times all contenders that counted right on a task of the workload; see
+/// [`timed_rounds`].
 pub fn timed_pass(
     task: Task,
     workload: &Workload,
@@ -133,14 +135,28 @@ pub fn timed_pass(
     protocol: &Protocol,
     stop: &dyn Fn() -> bool,
 ) -> Option<Vec<Result<Timed, Verdict>>> {
-    let queries = Queries {
-        task,
-        workload,
-        places: places(workload, contenders, protocol),
-    };
-    let count = queries.places.len();
+    let competitors: Vec<Competitor> = contenders
+        .iter()
+        .map(|(built, counted)| Competitor::of(task, workload, built, counted))
+        .collect();
+    timed_rounds(workload.views.len(), &competitors, protocol, stop)
+}
+
+/// Times all competitors on `count` queries each. `stop` ends the pass early
+/// (its samples are then worthless and the result is `None`).
+///
+/// A sample whose number of ids differs from what was expected makes its
+/// competitor `wrong`.
+pub fn timed_rounds(
+    count: usize,
+    competitors: &[Competitor],
+    protocol: &Protocol,
+    stop: &dyn Fn() -> bool,
+) -> Option<Vec<Result<Timed, Verdict>>> {
+    let places = places(count, competitors, protocol);
+    let count = places.len();
     let mut results: Vec<Result<Timed, Verdict>> =
-        contenders.iter().map(|_| Ok(Timed::default())).collect();
+        competitors.iter().map(|_| Ok(Timed::default())).collect();
     if count == 0 {
         return Some(results);
     }
@@ -150,21 +166,16 @@ pub fn timed_pass(
     } else {
         0
     });
-    let mut batches = Vec::with_capacity(contenders.len());
-    for (built, _) in contenders {
+    let mut batches = Vec::with_capacity(competitors.len());
+    for competitor in competitors {
         batches.push(if protocol.cold {
             1
         } else {
-            batch_size(
-                &queries,
-                queries.index(built),
-                protocol.overhead_ns,
-                &mut out,
-            )
+            batch_size(competitor, &places, protocol.overhead_ns, &mut out)
         });
     }
     let mut dice = Dice::new(protocol.seed);
-    let mut order: Vec<usize> = (0..contenders.len()).collect();
+    let mut order: Vec<usize> = (0..competitors.len()).collect();
     let start = Instant::now();
     for round in 0..protocol.max_rounds {
         if round >= protocol.min_rounds && start.elapsed() > protocol.budget {
@@ -183,21 +194,20 @@ pub fn timed_pass(
             if stop() {
                 return None;
             }
-            let (built, counted) = contenders[c];
-            let index = queries.index(built);
+            let competitor = &competitors[c];
             let Ok(timed) = &mut results[c] else { continue };
             if !protocol.cold {
-                warm_up(&queries, index, batches[c], &mut out);
+                warm_up(competitor, &places, batches[c], &mut out);
             }
             let mut wrong = None;
             for first in (0..count).step_by(batches[c]) {
-                let range = first..(first + batches[c]).min(count);
+                let asked = &places[first..(first + batches[c]).min(count)];
                 sweep.over_caches();
                 let watch = Stopwatch::start();
-                let returned = queries.ask(index, range.clone(), &mut out);
+                let returned = competitor.ask_all(asked, &mut out);
                 let lap = watch.lap();
-                let asked = range.len() as f64;
-                let expected = queries.expected(counted, range.clone());
+                let queries = asked.len() as f64;
+                let expected: u64 = asked.iter().map(|&place| competitor.expected[place]).sum();
                 if returned != expected {
                     wrong = Some(format!(
                         "the timed pass returned {returned} ids from camera {first} on, the count pass {expected}"
@@ -206,10 +216,10 @@ pub fn timed_pass(
                 }
                 timed.samples.push(Sample {
                     round: round as u32,
-                    frame: queries.places[first] as u32,
-                    queries: range.len() as u32,
-                    cpu_ns: lap.cpu_ns / asked,
-                    wall_ns: lap.wall_ns / asked,
+                    frame: places[first] as u32,
+                    queries: asked.len() as u32,
+                    cpu_ns: lap.cpu_ns / queries,
+                    wall_ns: lap.wall_ns / queries,
                     returned,
                 });
             }
@@ -223,16 +233,11 @@ pub fn timed_pass(
 }
 
 /// The places along the path that are timed: all, or evenly thinned out so
-/// that the slowest contender keeps to the length of a pass.
-fn places(
-    workload: &Workload,
-    contenders: &[(&Built, &Counted)],
-    protocol: &Protocol,
-) -> Vec<usize> {
-    let count = workload.volumes.len();
-    let slowest = contenders
+/// that the slowest competitor keeps to the length of a pass.
+fn places(count: usize, competitors: &[Competitor], protocol: &Protocol) -> Vec<usize> {
+    let slowest = competitors
         .iter()
-        .map(|(_, c)| c.slowest)
+        .map(|c| c.slowest)
         .max()
         .unwrap_or_default();
     let whole = slowest.as_secs_f64() * count as f64;
@@ -247,16 +252,16 @@ fn places(
 
 /// The smallest power of two of queries that makes the harness negligible.
 fn batch_size(
-    queries: &Queries,
-    index: &dyn DynIndex,
+    competitor: &Competitor,
+    places: &[usize],
     overhead_ns: f64,
     out: &mut Vec<ItemId>,
 ) -> usize {
-    let count = queries.places.len();
+    let count = places.len();
     let watch = Stopwatch::start();
     let (mut asked, started) = (0, Instant::now());
     while asked < count && (asked < 4 || started.elapsed() < WARM_UP) {
-        queries.ask(index, asked..asked + 1, out);
+        competitor.ask_all(&places[asked..=asked], out);
         asked += 1;
     }
     let each = (watch.lap().cpu_ns / asked as f64).max(1.0);
@@ -266,10 +271,10 @@ fn batch_size(
         .min(count)
 }
 
-fn warm_up(queries: &Queries, index: &dyn DynIndex, batch: usize, out: &mut Vec<ItemId>) {
+fn warm_up(competitor: &Competitor, places: &[usize], batch: usize, out: &mut Vec<ItemId>) {
     let started = Instant::now();
-    for first in (0..queries.places.len()).step_by(batch) {
-        queries.ask(index, first..(first + batch).min(queries.places.len()), out);
+    for places in places.chunks(batch) {
+        competitor.ask_all(places, out);
         if started.elapsed() > WARM_UP {
             break;
         }
@@ -294,52 +299,18 @@ impl Sweep {
 }
 
 /// What the harness itself costs per clock reading: the very same loop over a
-/// structure that does nothing. Nanoseconds of thread CPU time, median.
+/// competitor that does nothing. Nanoseconds of thread CPU time, median.
 pub fn harness_overhead_ns() -> f64 {
-    struct Nothing;
-    impl DynIndex for Nothing {
-        fn memory(&self) -> MemoryUsage {
-            MemoryUsage::default()
-        }
-        fn see(&self, _: AnyView<'_>, _: &mut Vec<ItemId>) {}
-        fn see_counted(&self, _: AnyView<'_>, _: &mut Vec<ItemId>, _: &mut QueryCost) {}
-        fn locate(&self, _: Vec3, _: &mut Vec<ItemId>) {}
-        fn locate_counted(&self, _: Vec3, _: &mut Vec<ItemId>, _: &mut QueryCost) {}
-        fn refit(&mut self, _: &[Aabb], _: &[ItemId]) -> bool {
-            false
-        }
-    }
-    let Ok(volume) = ConvexVolume::from_planes(&[]) else {
-        return 0.0;
+    let nothing = Competitor {
+        ask: Box::new(|_, _| ()),
+        expected: vec![0],
+        slowest: Duration::ZERO,
     };
-    let scene = Scene {
-        name: String::new(),
-        origin: glam::DVec3::ZERO,
-        items: Vec::new(),
-        bounds: Aabb::EMPTY,
-        regions: Regions::Items,
-        labels: Vec::new(),
-        places: Vec::new(),
-        skipped_items: 0,
-        own_tree: None,
-    };
-    let workload = Workload {
-        scene: &scene,
-        path: String::new(),
-        volumes: vec![volume],
-        points: vec![Vec3::ZERO],
-    };
-    let queries = Queries {
-        task: Task::Query,
-        workload: &workload,
-        places: vec![0],
-    };
-    let index: Box<dyn DynIndex> = Box::new(Nothing);
     let mut out = Vec::new();
     let laps: Vec<f64> = (0..4096)
         .map(|_| {
             let watch = Stopwatch::start();
-            queries.ask(std::hint::black_box(index.as_ref()), 0..1, &mut out);
+            std::hint::black_box(&nothing).ask_all(&[0], &mut out);
             watch.lap().cpu_ns
         })
         .collect();
@@ -349,7 +320,7 @@ pub fn harness_overhead_ns() -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::PlaneOptions;
+    use crate::culling::{Culling, CullingTest};
     use crate::index::StructureSpec;
     use crate::measure::{Contender, count_pass};
     use crate::path::{self, LensDefaults};
@@ -372,12 +343,14 @@ mod tests {
     fn timed(protocol: Protocol, tamper: bool) -> Vec<Result<Timed, Verdict>> {
         let scene = scene::load("city:n=500", &Default::default()).unwrap();
         let path = path::load("orbit:frames=40", &scene, &LensDefaults::default()).unwrap();
-        let workload = Workload::new(&scene, &path, &PlaneOptions::default()).unwrap();
+        let workload = Workload::new(&scene, &path, &Culling::default()).unwrap();
         let built: Vec<Built> = ["linear", "bvh"]
             .iter()
             .map(|name| {
                 let spec = StructureSpec::parse(name).unwrap();
-                Contender::build(spec, false, &scene).built.unwrap()
+                Contender::build(spec, false, &scene, CullingTest::SixPlane)
+                    .built
+                    .unwrap()
             })
             .collect();
         let mut counted = count_pass(&workload, &built.iter().collect::<Vec<_>>());

@@ -1,11 +1,14 @@
-//! What is asked of every contender: the volumes of a camera path and the
-//! points to locate, made before the first clock starts and the same for all.
+//! What is asked of every contender: the views of a camera path and the points
+//! to locate, made before the first clock starts and the same for all.
+
+use std::borrow::Cow;
 
 use glam::Vec3;
 
-use crate::camera::PlaneOptions;
-use crate::geometry::ConvexVolume;
-use crate::path::{CameraPath, PathError};
+use crate::camera::Camera;
+use crate::culling::{CameraView, Culling, CullingError};
+use crate::geometry::Aabb;
+use crate::path::CameraPath;
 use crate::query::ItemId;
 use crate::scene::Scene;
 
@@ -13,24 +16,39 @@ use crate::scene::Scene;
 pub struct Workload<'a> {
     pub scene: &'a Scene,
     pub path: String,
-    pub volumes: Vec<ConvexVolume>,
+    pub culling: Culling,
+    /// The scene's items as the culling test has them indexed.
+    pub items: Cow<'a, [Aabb]>,
+    /// The cameras of the path; the truth is theirs.
+    pub cameras: Vec<Camera>,
+    pub views: Vec<CameraView>,
     /// The eyes of the path, to be located among the scene's regions.
     pub points: Vec<Vec3>,
 }
 
+/// A camera of a path that has no such view.
+#[derive(Clone, PartialEq, Debug, thiserror::Error)]
+#[error("path '{path}', camera {index}: {error}")]
+pub struct WorkloadError {
+    pub path: String,
+    pub index: usize,
+    pub error: CullingError,
+}
+
 impl<'a> Workload<'a> {
     /// # Errors
-    /// A camera whose planes do not fit f32; its place in the path is named.
+    /// A camera whose view cannot be made (its planes do not fit f32, or the
+    /// choices contradict each other); its place in the path is named.
     pub fn new(
         scene: &'a Scene,
         path: &CameraPath,
-        options: &PlaneOptions,
-    ) -> Result<Workload<'a>, PathError> {
+        culling: &Culling,
+    ) -> Result<Workload<'a>, WorkloadError> {
         let around = scene.surroundings();
-        let volumes = path.cameras.iter().enumerate().map(|(index, camera)| {
-            camera
-                .volume(options, &around)
-                .map_err(|error| PathError::Camera {
+        let views = path.cameras.iter().enumerate().map(|(index, camera)| {
+            culling
+                .view(camera, &around)
+                .map_err(|error| WorkloadError {
                     path: path.name.clone(),
                     index,
                     error,
@@ -40,10 +58,13 @@ impl<'a> Workload<'a> {
         Ok(Workload {
             scene,
             path: path.name.clone(),
-            volumes: volumes.collect::<Result<_, _>>()?,
+            culling: *culling,
+            items: culling.test.items(&scene.items),
+            views: views.collect::<Result<_, _>>()?,
             points: eyes
                 .map(|eye| scene.regions.local_point(eye, scene.origin))
                 .collect(),
+            cameras: path.cameras.clone(),
         })
     }
 

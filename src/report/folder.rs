@@ -14,11 +14,12 @@ use crate::measure::{METRICS, Sample, Task};
 const REPORT: &str = "report.json";
 const SUMMARY: &str = "summary.csv";
 const SAMPLES: &str = "samples.csv";
-const SAMPLE_COLUMNS: [&str; 11] = [
+const SAMPLE_COLUMNS: [&str; 12] = [
     "scene",
     "path",
     "cache",
     "structure",
+    "test",
     "task",
     "round",
     "frame",
@@ -223,7 +224,7 @@ impl RunFolder {
     /// What the file system says.
     pub fn append<'s>(
         &mut self,
-        cell: [&str; 4],
+        cell: [&str; 5],
         samples: impl Iterator<Item = &'s (Task, Sample)>,
     ) -> Result<SamplesRef, FolderError> {
         let (first_row, path) = (self.rows, self.path.join(SAMPLES));
@@ -279,6 +280,9 @@ fn write_summary(cells: &[ReportCell], out: &mut dyn Write) -> io::Result<()> {
         "cache",
         "structure",
         "test",
+        "arithmetic",
+        "planes",
+        "epsilon",
         "status",
         "reason",
         "total_count",
@@ -301,6 +305,9 @@ fn write_summary(cells: &[ReportCell], out: &mut dyn Write) -> io::Result<()> {
             cell.path.cache.clone(),
             cell.structure.clone(),
             cell.test.clone(),
+            cell.path.arithmetic.clone(),
+            cell.path.planes.clone(),
+            cell.path.epsilon.to_string(),
             cell.status.name().to_owned(),
             cell.reason.clone().unwrap_or_default(),
             cell.scene.total_count.to_string(),
@@ -340,14 +347,16 @@ mod tests {
         let temporary = tempfile::tempdir().unwrap();
         let path = temporary.path().join("new/run");
         let mut folder = RunFolder::create(&path).unwrap();
-        let cell = ["a scene, with commas", "orbit", "warm", "bvh"];
+        let cell = ["a scene, with commas", "orbit", "warm", "bvh", "exact"];
         let known = folder.append(cell, [sample(0), sample(1)].iter()).unwrap();
         assert_eq!((known.first_row, known.rows), (0, 2));
         let unknown = folder.append(cell, [sample(2)].iter()).unwrap();
         assert_eq!(unknown.first_row, 2);
         let text = fs::read_to_string(path.join(SAMPLES)).unwrap();
         assert_eq!(text.lines().count(), 4);
-        assert!(text.contains("\"a scene, with commas\",orbit,warm,bvh,query,0,3,2,10.5,11.0,7"));
+        assert!(
+            text.contains("\"a scene, with commas\",orbit,warm,bvh,exact,query,0,3,2,10.5,11.0,7")
+        );
         // No report yet: nothing to resume, and one error line.
         let error = RunFolder::resume(&path).err().unwrap().to_string();
         assert!(

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::measure::{
-    Cell, Machine, Metric, PathInfo, SceneInfo, Source, Status, Toolchain, TwinRatio,
+    Cell, Judged, Machine, Metric, PathInfo, SceneInfo, Source, Status, Toolchain, TwinRatio,
 };
 use crate::statistics::{geometric_mean, quantile, sorted};
 
@@ -65,6 +65,7 @@ pub struct TwinEntry {
     pub path: String,
     pub cache: String,
     pub structure: String,
+    pub test: String,
     pub ratio: f64,
     pub lower: f64,
     pub upper: f64,
@@ -81,6 +82,9 @@ pub struct ReportCell {
     pub status: Status,
     pub reason: Option<String>,
     pub metrics: BTreeMap<String, Metric>,
+    /// How the answers differ from the exact truth; null where nothing was
+    /// answered.
+    pub error: Option<Judged>,
     pub left_out: Vec<String>,
     pub samples_ref: Option<SamplesRef>,
 }
@@ -111,6 +115,7 @@ impl ReportCell {
             status: cell.verdict.status,
             reason: cell.verdict.reason,
             metrics: cell.metrics,
+            error: cell.judged,
             left_out: Vec::new(),
             samples_ref,
         }
@@ -124,12 +129,13 @@ impl ReportCell {
 
 impl Noise {
     /// Adds a twin and brings ratio and floor up to date.
-    pub fn add(&mut self, scene: &str, path: &PathInfo, twin: &TwinRatio) {
+    pub fn add(&mut self, scene: &str, path: &PathInfo, test: &str, twin: &TwinRatio) {
         self.twins.push(TwinEntry {
             scene: scene.to_owned(),
             path: path.name.clone(),
             cache: path.cache.clone(),
             structure: twin.structure.clone(),
+            test: test.to_owned(),
             ratio: twin.ratio.value,
             lower: twin.ratio.lower,
             upper: twin.ratio.upper,
@@ -156,6 +162,7 @@ mod tests {
             cache: "warm".into(),
             planes: "frame".into(),
             epsilon: 8.0,
+            arithmetic: "f32".into(),
         };
         for value in [1.02, 0.99] {
             let ratio = Estimate {
@@ -166,6 +173,7 @@ mod tests {
             noise.add(
                 "city",
                 &path,
+                "six-plane",
                 &TwinRatio {
                     structure: "bvh".into(),
                     ratio,

@@ -13,15 +13,15 @@ use std::fmt;
 
 use glam::Vec3;
 
-use crate::geometry::{Aabb, ConvexVolume};
-use crate::query::ItemId;
+use crate::geometry::Aabb;
+use crate::query::{AnyView, ItemId};
 
 pub use edges::{edge_scenes, edge_volumes};
 pub use random::{RandomCase, VOLUME_KINDS};
 pub use truth::{ErrorCount, Truth};
 pub use variants::variants;
 
-/// The reference: each box against each plane with [`ConvexVolume::sees`], no
+/// The reference: each box against each plane with [`AnyView::sees`], no
 /// structure, no mask, no early way out. O(items * planes) per volume.
 ///
 /// Reuses its memory from query to query.
@@ -76,8 +76,9 @@ impl Reference {
     }
 
     /// Computes the reference answer to a frustum query; its size.
-    pub fn see(&mut self, items: &[Aabb], volume: &ConvexVolume) -> usize {
-        let wanted = items.iter().zip(0..).filter(|(b, _)| volume.sees(b));
+    pub fn see<'v>(&mut self, items: &[Aabb], view: impl Into<AnyView<'v>>) -> usize {
+        let view = view.into();
+        let wanted = items.iter().zip(0..).filter(|(b, _)| view.sees(b));
         self.expect(wanted.map(|(_, id)| id))
     }
 
@@ -133,12 +134,17 @@ impl Reference {
 
 /// The verdict of a volume about one box in words: each plane that matters
 /// with the value of the box's p-vertex, so that a reader can check by hand.
-pub fn explain_visibility(b: &Aabb, volume: &ConvexVolume) -> String {
+pub fn explain_visibility<'v>(b: &Aabb, view: impl Into<AnyView<'v>>) -> String {
+    let view = view.into();
     let [low, high] = [b.min, b.max].map(|v| format!("({}, {}, {})", v.x, v.y, v.z));
     let bounds = format!("box {low} to {high}");
     if b.is_empty() {
         return format!("{bounds} is empty");
     }
+    let AnyView::Volume(volume) = view else {
+        let seen = if view.sees(b) { "" } else { "not " };
+        return format!("{bounds} is {seen}visible to {view:?}");
+    };
     let values = volume
         .planes()
         .iter()
@@ -181,7 +187,7 @@ pub fn explain_containment(b: &Aabb, p: Vec3) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Plane;
+    use crate::geometry::{ConvexVolume, Plane};
 
     #[test]
     fn each_kind_of_wrong_answer_is_told_apart() {

@@ -7,6 +7,7 @@ use crate::geometry::Aabb;
 use crate::oracle::{Oracle, Pose, Verdict};
 use crate::query::ItemId;
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 /// The verdict about every item of a scene, for one camera.
 pub struct Truth {
@@ -21,7 +22,8 @@ pub struct Truth {
 ///
 /// Visible is what is in or touches; a touch that is dropped is counted apart
 /// from a false negative.
-#[derive(Clone, Copy, Default, PartialEq, Debug)]
+#[derive(Clone, Copy, Default, PartialEq, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct ErrorCount {
     /// Items that are in or touch.
     pub visible: u64,
