@@ -26,14 +26,19 @@ pub struct Truth {
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct ErrorCount {
     /// Items that are in or touch.
+    #[serde(rename = "visible_count")]
     pub visible: u64,
     /// Items called a touch because the truth is not known more finely.
+    #[serde(rename = "undecided_count")]
     pub undecided: u64,
     /// In, but not returned.
+    #[serde(rename = "false_negative_count")]
     pub false_negatives: u64,
     /// Touching, but not returned.
+    #[serde(rename = "touch_dropped_count")]
     pub touch_dropped: u64,
     /// Out, but returned.
+    #[serde(rename = "false_positive_count")]
     pub false_positives: u64,
     /// How deep the deepest false negative reaches into the volume, world
     /// units; 0 if there is none.

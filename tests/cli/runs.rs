@@ -51,7 +51,8 @@ pub fn check_run(run: &Path) -> Value {
     let mut structures: BTreeMap<[&str; 3], Vec<&str>> = BTreeMap::new();
     let mut referred = 0;
     for (cell, row) in cells(&report).iter().zip(&summary) {
-        let fields = "scene path structure params test status reason metrics left_out samples_ref";
+        let fields =
+            "scene path structure params test status reason metrics error left_out samples_ref";
         assert_eq!(keys(cell), set(fields));
         let text = |value: &Value| value.as_str().expect("text").to_owned();
         assert_eq!(cell["status"], "ok", "{cell}");
@@ -65,6 +66,15 @@ pub fn check_run(run: &Path) -> Value {
         ] {
             assert_eq!(row[column], text(value), "{column}");
         }
+        let error = |name: &str| cell["error"][name].as_f64().expect(name);
+        assert!(error("judged_queries") >= 1.0, "{cell}");
+        assert_eq!(
+            error("false_negative_count") + error("touch_dropped_count"),
+            0.0
+        );
+        let excess = cell["metrics"]["excess"]["value"].as_f64().expect("excess");
+        let wanted = error("false_positive_count") / error("visible_count");
+        assert!((excess - wanted).abs() <= 1e-12, "{excess} {wanted}");
         let metrics = cell["metrics"].as_object().expect("an object");
         for name in set(METRICS) {
             assert_eq!(
