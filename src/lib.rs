@@ -18,6 +18,7 @@
 //! - [`path`]: ways through a scene
 //! - [`verify`]: the reference answer and how others differ from it
 //! - [`measure`]: count, verify, time; [`statistics`] makes figures of it
+//! - [`precision`]: error against run time, and the sweeps behind it
 //! - [`report`]: the files that other tools read; [`suite`]: what to run
 //! - [`spec`] and [`input`]: what users type and the files they bring
 //!
@@ -57,6 +58,7 @@ pub mod input;
 pub mod measure;
 pub mod oracle;
 pub mod path;
+pub mod precision;
 pub mod query;
 pub mod report;
 pub mod scene;

@@ -8,6 +8,7 @@ use cullbench::camera::{DEFAULT_EPSILON, PLANE_METHODS, PlaneMethod, PlaneOption
 use cullbench::culling::{ARITHMETICS, Arithmetic, Culling, CullingTest, TESTS};
 use cullbench::path::LensDefaults;
 use cullbench::spec::SpecError;
+use cullbench::suite::DEFAULT_PATH;
 use glam::DVec3;
 
 /// Which spatial index finds what a camera sees, and where the camera is:
@@ -41,6 +42,8 @@ pub enum Command {
     Locate(LocateArgs),
     /// Cross-check all structures against the reference scan
     Verify(VerifyArgs),
+    /// Error against run time: every test, arithmetic and derivation of the planes
+    Precision(PrecisionArgs),
     /// Look at or generate scenes
     #[command(subcommand)]
     Scene(SceneCommand),
@@ -108,6 +111,11 @@ pub struct LensArgs {
     /// Far plane for cameras without one, or inf [default: 1000 for recorded cameras, the scene for paths]
     #[arg(long, allow_negative_numbers = true)]
     pub far: Option<String>,
+}
+
+/// How a camera's view is made and tested.
+#[derive(Args, Debug)]
+pub struct CullingArgs {
     /// Where the planes come from: frame, frame-f32, gh-gl-f32, gh-gl-f64, gh-d3d-f32, gh-d3d-f64, gh-revz-f32, gh-revz-f64
     #[arg(long, value_name = "METHOD", default_value = "frame")]
     pub planes: String,
@@ -141,8 +149,10 @@ impl LensArgs {
             up: DVec3::Z,
         })
     }
+}
 
-    pub fn plane_options(&self) -> Result<PlaneOptions, SpecError> {
+impl CullingArgs {
+    fn plane_options(&self) -> Result<PlaneOptions, SpecError> {
         let method = PlaneMethod::named(&self.planes).ok_or_else(|| {
             SpecError::unknown(
                 "plane method",
@@ -161,9 +171,7 @@ impl LensArgs {
             epsilon: self.epsilon,
         })
     }
-}
 
-impl LensArgs {
     /// The culling test of that name with everything else as asked for.
     pub fn culling(&self, test: &str) -> Result<Culling, SpecError> {
         Ok(Culling {
@@ -211,6 +219,8 @@ pub struct RunArgs {
     pub scene_args: SceneArgs,
     #[command(flatten)]
     pub lens: LensArgs,
+    #[command(flatten)]
+    pub culling: CullingArgs,
 }
 
 #[derive(Args, Debug)]
@@ -236,6 +246,8 @@ pub struct QueryArgs {
     pub scene_args: SceneArgs,
     #[command(flatten)]
     pub lens: LensArgs,
+    #[command(flatten)]
+    pub culling: CullingArgs,
 }
 
 #[derive(Args, Debug)]
@@ -270,6 +282,36 @@ pub struct VerifyArgs {
     #[arg(long, value_name = "N")]
     pub cases: Option<u64>,
     /// Seed of the first case; case i has seed N + i
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    #[arg(long, value_enum, default_value = "table")]
+    pub format: TableFormat,
+    #[command(flatten)]
+    pub scene_args: SceneArgs,
+    #[command(flatten)]
+    pub lens: LensArgs,
+    #[command(flatten)]
+    pub culling: CullingArgs,
+}
+
+#[derive(Args, Debug)]
+pub struct PrecisionArgs {
+    /// A scene: boxes CSV, Doom WAD, built-in name or spec
+    #[arg(long)]
+    pub scene: String,
+    /// A camera path: a spec or a cameras CSV
+    #[arg(long, visible_alias = "cameras", value_name = "PATH", default_value = DEFAULT_PATH)]
+    pub path: String,
+    /// Structures, e.g. linear,bvh:leaf=4
+    #[arg(long, value_name = "LIST", default_value = "all")]
+    pub structure: String,
+    /// Cameras of the path to look at, evenly spread
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..))]
+    pub frames: u32,
+    /// Cubes for each size ratio of the size sweep; 0 leaves both sweeps out
+    #[arg(long, value_name = "N", default_value_t = 2_000_000)]
+    pub cubes: usize,
+    /// Seed of the sweeps and of the order in which points are measured
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
     #[arg(long, value_enum, default_value = "table")]

@@ -10,6 +10,7 @@ mod env;
 mod interrupt;
 mod list;
 mod locate;
+mod precision;
 mod query;
 mod run;
 mod run_table;
@@ -45,6 +46,7 @@ pub fn main() -> ExitCode {
         Command::Query(args) => query::query(&args),
         Command::Locate(args) => locate::locate(&args),
         Command::Verify(args) => verify::verify(&args),
+        Command::Precision(args) => precision::precision(&args),
         Command::Scene(SceneCommand::Info(args)) => scene::info(&args),
         Command::Scene(SceneCommand::Generate(args)) => scene::generate(&args),
         Command::Env(args) => env::env(&args),

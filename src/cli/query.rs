@@ -13,7 +13,7 @@ use cullbench::path;
 
 pub fn query(args: &QueryArgs) -> anyhow::Result<Ending> {
     let structures = structures(&args.structure)?;
-    let (defaults, culling) = (args.lens.defaults()?, args.lens.culling(&args.test)?);
+    let (defaults, culling) = (args.lens.defaults()?, args.culling.culling(&args.test)?);
     let scene = load_scene(&args.scene, &args.scene_args)?;
     let cameras = path::load(&args.cameras, &scene, &defaults)?;
     let workload = Workload::new(&scene, &cameras, &culling)?;

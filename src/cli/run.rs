@@ -47,7 +47,7 @@ impl Plan {
         let tests = args.test.iter().flat_map(|t| t.split(','));
         let mut cullings: Vec<Culling> = Vec::new();
         for test in tests {
-            let culling = args.lens.culling(test)?;
+            let culling = args.culling.culling(test)?;
             culling.check()?;
             if cullings.contains(&culling) {
                 bail!("test '{test}' is named twice");

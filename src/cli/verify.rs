@@ -9,7 +9,7 @@ use anyhow::bail;
 use indicatif::ProgressBar;
 use serde::Serialize;
 
-use super::args::{LensArgs, TableFormat, VerifyArgs};
+use super::args::{TableFormat, VerifyArgs};
 use super::{Ending, interrupt, load_scene, tell, text, unread_is_fine};
 use cullbench::camera::{DEFAULT_EPSILON, PlaneMethod};
 use cullbench::culling::{ARITHMETICS, Arithmetic, CameraView, Culling, CullingTest, TESTS};
@@ -60,7 +60,7 @@ const CASES: u64 = 20_000;
 pub fn verify(args: &VerifyArgs) -> anyhow::Result<Ending> {
     let structures = structures(&args.structure)?;
     let defaults = args.lens.defaults()?;
-    let culling = args.lens.culling(CullingTest::SixPlane.name())?;
+    let culling = args.culling.culling(CullingTest::SixPlane.name())?;
     let by_hand = !args.scene.is_empty() || !args.path.is_empty();
     let cases = args.cases.unwrap_or(if by_hand { 0 } else { CASES });
     // Random cases alone, if only they are asked for.
@@ -97,7 +97,7 @@ pub fn verify(args: &VerifyArgs) -> anyhow::Result<Ending> {
                 break;
             }
             let cameras = path::load(&path, &scene, &defaults)?;
-            let again = reproduce(source, &path, &args.lens);
+            let again = reproduce(source, &path, args);
             let mut rows: Vec<Check> = Vec::new();
             for (kind, workload) in workloads(&scene, &cameras, &culling)? {
                 let contenders = match workload.culling.test {
@@ -163,11 +163,12 @@ fn paths(args: &VerifyArgs, scene: &scene::Scene) -> Vec<String> {
 }
 
 /// The command that checks this scene and path alone.
-fn reproduce(scene: &str, path: &str, lens: &LensArgs) -> String {
+fn reproduce(scene: &str, path: &str, args: &VerifyArgs) -> String {
+    let (lens, culling) = (&args.lens, &args.culling);
     let mut command = format!(
         "cullbench verify --scene '{scene}' --path '{path}' --planes {} --epsilon {} \
          --arithmetic {} --fovy {} --aspect {}",
-        lens.planes, lens.epsilon, lens.arithmetic, lens.fovy, lens.aspect
+        culling.planes, culling.epsilon, culling.arithmetic, lens.fovy, lens.aspect
     );
     if let Some(near) = lens.near {
         command += &format!(" --near {near}");

@@ -337,7 +337,7 @@ impl<'a> Entry<'a> {
         metrics.estimate("locate_ratio_to_linear", both(&linear.locate, &self.locate));
         let cost = |e: &Entry| -> Option<(f64, f64)> {
             let built = e.contender.built.as_ref().ok()?;
-            let per_round = round_means(e.query.as_ref()?);
+            let per_round = e.query.as_ref()?.round_means();
             Some((built.build_ms * 1e6, median(&per_round)?))
         };
         if let (Some((build, query)), Some((linear_build, linear_query))) =
@@ -398,13 +398,7 @@ fn error_metrics(metrics: &mut Metrics, judged: &Judged) {
 fn time_metrics(metrics: &mut Metrics, query: &Timed, locate: &Timed) {
     let frames = frame_medians(query, |s| s.cpu_ns);
     let per_round: Vec<f64> = (0..query.rounds)
-        .filter_map(|round| {
-            median(
-                &round_samples(query, round)
-                    .map(|s| s.cpu_ns)
-                    .collect::<Vec<_>>(),
-            )
-        })
+        .filter_map(|round| median(&query.of_round(round).map(|s| s.cpu_ns).collect::<Vec<_>>()))
         .collect();
     let interval = bootstrap_median(&per_round, 1);
     if let (Some(middle), Some(interval)) = (quantile(&frames, 0.5), interval) {
@@ -435,7 +429,7 @@ fn time_metrics(metrics: &mut Metrics, query: &Timed, locate: &Timed) {
         .map(|s| s.cpu_ns * f64::from(s.queries))
         .sum();
     metrics.ratio("ns_per_visible", spent, returned as f64);
-    metrics.estimate("locate_ns", bootstrap_median(&round_means(locate), 1));
+    metrics.estimate("locate_ns", bootstrap_median(&locate.round_means(), 1));
 }
 
 /// Per clock reading along the path the median over the rounds, ascending.
@@ -455,32 +449,10 @@ fn frame_medians(timed: &Timed, value: impl Fn(&Sample) -> f64) -> Vec<f64> {
     )
 }
 
-fn round_samples(timed: &Timed, round: usize) -> impl Iterator<Item = &Sample> {
-    timed
-        .samples
-        .iter()
-        .filter(move |s| s.round as usize == round)
-}
-
-/// Mean CPU time of a query in each round.
-fn round_means(timed: &Timed) -> Vec<f64> {
-    (0..timed.rounds)
-        .map(|round| {
-            let (mut spent, mut queries) = (0.0, 0.0);
-            for s in round_samples(timed, round) {
-                spent += s.cpu_ns * f64::from(s.queries);
-                queries += f64::from(s.queries);
-            }
-            spent / queries
-        })
-        .filter(|mean| mean.is_finite())
-        .collect()
-}
-
 /// Time of `base` / time of `other`, round by round: both saw the same state
 /// of the machine.
 fn paired_ratio(base: &Timed, other: &Timed) -> Option<Estimate> {
-    let pairs = round_means(base).into_iter().zip(round_means(other));
+    let pairs = base.round_means().into_iter().zip(other.round_means());
     let ratios: Vec<f64> = pairs
         .map(|(b, o)| b / o)
         .filter(|r| r.is_finite())

@@ -73,6 +73,29 @@ pub struct Timed {
     pub rounds: usize,
 }
 
+impl Timed {
+    /// The samples of a round.
+    pub fn of_round(&self, round: usize) -> impl Iterator<Item = &Sample> {
+        let of_round = move |s: &&Sample| s.round as usize == round;
+        self.samples.iter().filter(of_round)
+    }
+
+    /// Mean CPU time of a query in each round, ns.
+    pub fn round_means(&self) -> Vec<f64> {
+        (0..self.rounds)
+            .map(|round| {
+                let (mut spent, mut queries) = (0.0, 0.0);
+                for s in self.of_round(round) {
+                    spent += s.cpu_ns * f64::from(s.queries);
+                    queries += f64::from(s.queries);
+                }
+                spent / queries
+            })
+            .filter(|mean| mean.is_finite())
+            .collect()
+    }
+}
+
 /// Answers query number n: appends ids to an empty output.
 pub type Ask<'a> = Box<dyn Fn(usize, &mut Vec<ItemId>) + 'a>;
 

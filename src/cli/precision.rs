@@ -1,0 +1,284 @@
+//! `cullbench precision`: the error-against-run-time table of a scene and
+//! path, and the sweeps over item size and world offset behind it.
+
+use std::io::{self, Write};
+use std::time::Duration;
+
+use indicatif::ProgressBar;
+use serde::Serialize;
+
+use super::args::{PrecisionArgs, TableFormat};
+use super::{Ending, interrupt, load_scene, text, unread_is_fine};
+use cullbench::index::structures;
+use cullbench::measure::{Machine, Protocol, Status, harness_overhead_ns};
+use cullbench::path;
+use cullbench::precision::{
+    OffsetRow, Point, Precision, SizeRow, measure_points, offset_sweep, size_sweep,
+};
+
+/// Everything that is printed.
+#[derive(Serialize)]
+struct Outcome {
+    #[serde(flatten)]
+    precision: Precision,
+    seed: u64,
+    size_sweep: Vec<SizeRow>,
+    offset_sweep: Vec<OffsetRow>,
+}
+
+/// Cameras of the sweep over offsets.
+const OFFSET_CAMERAS: usize = 60;
+
+pub fn precision(args: &PrecisionArgs) -> anyhow::Result<Ending> {
+    let structures = structures(&args.structure)?;
+    let defaults = args.lens.defaults()?;
+    let scene = load_scene(&args.scene, &args.scene_args)?;
+    let path = path::load(&args.path, &scene, &defaults)?;
+    interrupt::from_now_on_finish();
+    let bar = ProgressBar::new_spinner();
+    bar.enable_steady_tick(Duration::from_millis(200));
+    bar.set_message(format!("{}, {}: every point", args.scene, args.path));
+    let protocol = Protocol {
+        min_rounds: 5,
+        max_rounds: 15,
+        budget: Duration::from_secs(8),
+        pass: Duration::from_millis(200),
+        cold: false,
+        seed: args.seed,
+        overhead_ns: harness_overhead_ns(),
+        cache_bytes: Machine::capture().cache_sweep_bytes(),
+    };
+    let frames = args.frames as usize;
+    let measured = measure_points(
+        &scene,
+        &path,
+        &structures,
+        frames,
+        &protocol,
+        &interrupt::asked,
+    )?;
+    let Some(precision) = measured else {
+        return Ok(Ending::Interrupted);
+    };
+    let (mut sizes, mut offsets) = (Vec::new(), Vec::new());
+    if args.cubes > 0 {
+        bar.set_message("the sweep over sizes");
+        let Some(rows) = size_sweep(args.cubes, args.seed, &interrupt::asked)? else {
+            return Ok(Ending::Interrupted);
+        };
+        sizes = rows;
+        bar.set_message("the sweep over offsets");
+        offsets = offset_sweep(OFFSET_CAMERAS, args.seed);
+    }
+    bar.finish_and_clear();
+    let wrong = precision
+        .points
+        .iter()
+        .any(|p| matches!(p.status, Status::Wrong | Status::Panicked));
+    let outcome = Outcome {
+        precision,
+        seed: args.seed,
+        size_sweep: sizes,
+        offset_sweep: offsets,
+    };
+    unread_is_fine(match args.format {
+        TableFormat::Json => show_json(&outcome),
+        TableFormat::Table => show(&outcome),
+    })?;
+    Ok(if wrong {
+        Ending::WrongAnswer
+    } else {
+        Ending::Ok
+    })
+}
+
+fn show_json(outcome: &Outcome) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    writeln!(out, "{}", serde_json::to_string_pretty(outcome)?)?;
+    out.flush()
+}
+
+fn show(outcome: &Outcome) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    let p = &outcome.precision;
+    let visible = p.points.first().map_or(0, |point| point.errors.visible);
+    writeln!(
+        out,
+        "{}: {} items; {}: {} cameras, {} visible in all, {} rounds",
+        p.scene,
+        text::count(p.items),
+        p.path,
+        p.cameras,
+        text::count(visible as usize),
+        p.rounds
+    )?;
+    writeln!(out, "{}", points_table(&p.points))?;
+    writeln!(
+        out,
+        "* on the Pareto front: no other point is as good in every error and as fast. Times whose\n\
+         95 % intervals overlap count as equal. eps is the factor c of the conservative epsilon."
+    )?;
+    for point in p.points.iter().filter(|p| p.reason.is_some()) {
+        let reason = point.reason.as_deref().unwrap_or_default();
+        writeln!(out, "{}: {}: {reason}", named(point), point.status.name())?;
+    }
+    writeln!(out, "\nPareto front, fastest first:")?;
+    for &i in &p.front {
+        let point = &p.points[i];
+        writeln!(
+            out,
+            "  {}: {} at {} % excess, {} ppm missed",
+            named(point),
+            point.query_ns.map(text::time).unwrap_or_default(),
+            point.excess.map(as_percent).unwrap_or_default(),
+            point
+                .false_negative_ppm
+                .map(text::significant)
+                .unwrap_or_default(),
+        )?;
+    }
+    writeln!(
+        out,
+        "\nHow many cameras until the order of the points by time stands:"
+    )?;
+    let mut table = text::table(&["cameras", "pairs in final order", "CPU time"], &[0, 1, 2]);
+    for row in &p.stability {
+        table.add_row([
+            row.cameras.to_string(),
+            text::percent(row.pairs_in_order),
+            text::time(row.seconds * 1e9),
+        ]);
+    }
+    writeln!(out, "{table}")?;
+    if !outcome.size_sweep.is_empty() {
+        writeln!(
+            out,
+            "\nExcess (false positives / visible, %) by cube edge s / depth D of the frustum, fov 60, 16:9:"
+        )?;
+        writeln!(out, "{}", sizes_table(&outcome.size_sweep))?;
+        writeln!(
+            out,
+            "\nMissed visible items (ppm) of a world in f32 at an offset, six-plane test, nothing rebased:"
+        )?;
+        writeln!(out, "{}", offsets_table(&outcome.offset_sweep))?;
+    }
+    out.flush()
+}
+
+fn named(point: &Point) -> String {
+    format!(
+        "{} {} {} {} eps {}",
+        point.structure, point.test, point.arithmetic, point.planes, point.epsilon
+    )
+}
+
+/// A share in percent without the sign, three decimals.
+fn as_percent(share: f64) -> String {
+    format!("{:.3}", share * 100.0)
+}
+
+fn points_table(points: &[Point]) -> comfy_table::Table {
+    let mut table = text::table(
+        &[
+            "",
+            "structure",
+            "test",
+            "numbers",
+            "planes",
+            "eps",
+            "excess %",
+            "missed ppm",
+            "touches lost",
+            "worst miss",
+            "query [95 % interval]",
+            "ns/item",
+            "status",
+        ],
+        &[5, 6, 7, 8, 9, 10, 11],
+    );
+    for point in points {
+        let time = match (point.query_ns, point.query_ns_lower, point.query_ns_upper) {
+            (Some(ns), Some(lower), Some(upper)) => {
+                format!(
+                    "{} [{}, {}]",
+                    text::time(ns),
+                    text::time(lower),
+                    text::time(upper)
+                )
+            }
+            _ => String::new(),
+        };
+        let judged = point.status != Status::Refused;
+        let of = |value: String| if judged { value } else { String::new() };
+        table.add_row([
+            if point.on_front { "*" } else { "" }.to_owned(),
+            point.structure.clone(),
+            point.test.to_owned(),
+            point.arithmetic.to_owned(),
+            point.planes.to_owned(),
+            point.epsilon.to_string(),
+            point.excess.map(as_percent).unwrap_or_default(),
+            point
+                .false_negative_ppm
+                .map(text::significant)
+                .unwrap_or_default(),
+            of(point.errors.touch_dropped.to_string()),
+            of(text::significant(point.errors.worst_miss)),
+            time,
+            point.ns_per_item.map(text::significant).unwrap_or_default(),
+            point.status.name().to_owned(),
+        ]);
+    }
+    table
+}
+
+fn sizes_table(rows: &[SizeRow]) -> comfy_table::Table {
+    let tests = rows.first().map(|row| row.tests.iter().map(|t| t.test));
+    let mut header = vec!["s/D", "cubes", "visible"];
+    header.extend(tests.into_iter().flatten());
+    let right: Vec<usize> = (0..header.len()).collect();
+    let mut table = text::table(&header, &right);
+    for row in rows {
+        let mut cells = vec![
+            row.size_over_depth.to_string(),
+            text::count(row.cubes as usize),
+            text::count(row.visible as usize),
+        ];
+        cells.extend(row.tests.iter().map(|t| as_percent(t.excess)));
+        table.add_row(cells);
+    }
+    if let Some(row) = rows.iter().find(|row| row.size_over_depth == 0.3) {
+        let mut cells = vec!["ns/box".to_owned(), String::new(), String::new()];
+        cells.extend(row.tests.iter().map(|t| text::significant(t.ns_per_box)));
+        table.add_row(cells);
+    }
+    table
+}
+
+fn offsets_table(rows: &[OffsetRow]) -> comfy_table::Table {
+    let mut offsets: Vec<f64> = rows.iter().map(|row| row.offset).collect();
+    offsets.dedup();
+    let mut header = vec!["planes".to_owned(), "numbers".to_owned(), "eps".to_owned()];
+    header.extend(offsets.iter().map(|offset| format!("{offset:e}")));
+    let header: Vec<&str> = header.iter().map(String::as_str).collect();
+    let right: Vec<usize> = (2..header.len()).collect();
+    let mut table = text::table(&header, &right);
+    let kinds = rows.iter().filter(|row| row.offset == offsets[0]);
+    for kind in kinds {
+        let mut cells = vec![
+            kind.planes.to_owned(),
+            kind.arithmetic.to_owned(),
+            kind.epsilon.to_string(),
+        ];
+        let same = |row: &&OffsetRow| {
+            (row.planes, row.arithmetic, row.epsilon)
+                == (kind.planes, kind.arithmetic, kind.epsilon)
+        };
+        cells.extend(rows.iter().filter(same).map(|row| {
+            let ppm = row.false_negative_ppm.map(text::significant);
+            ppm.unwrap_or_else(|| "refused".to_owned())
+        }));
+        table.add_row(cells);
+    }
+    table
+}

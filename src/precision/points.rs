@@ -1,0 +1,416 @@
+//! The points of the diagram for one scene and path: every structure with
+//! every culling, checked, judged against the exact truth, and timed side by
+//! side; which of them are dominated, and how many frames it takes until their
+//! order stands.
+
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+use serde::{Serialize, Serializer};
+
+use crate::camera::{Camera, PLANE_METHODS, PlaneMethod, PlaneOptions};
+use crate::culling::{ARITHMETICS, Arithmetic, CameraView, Culling, CullingTest, TESTS};
+use crate::index::{BuildError, DynIndex, StructureSpec};
+use crate::measure::{Competitor, Protocol, Status, Timed, Verdict, timed_rounds};
+use crate::path::CameraPath;
+use crate::query::ItemId;
+use crate::scene::Scene;
+use crate::statistics::{Estimate, bootstrap_median, median};
+use crate::verify::{ErrorCount, Reference, Truth};
+
+/// One way to answer, with its error and its time.
+#[derive(Clone, Debug, Serialize)]
+pub struct Point {
+    pub structure: String,
+    pub test: &'static str,
+    pub arithmetic: &'static str,
+    pub planes: &'static str,
+    pub epsilon: f64,
+    #[serde(serialize_with = "by_name")]
+    pub status: Status,
+    pub reason: Option<String>,
+    /// False positives / visible items.
+    pub excess: Option<f64>,
+    pub false_negative_ppm: Option<f64>,
+    #[serde(flatten)]
+    pub errors: ErrorCount,
+    /// Mean over the cameras, median over the rounds, thread CPU time.
+    pub query_ns: Option<f64>,
+    pub query_ns_lower: Option<f64>,
+    pub query_ns_upper: Option<f64>,
+    pub ns_per_item: Option<f64>,
+    /// Index of a point that is no worse in anything and better in something.
+    pub dominated_by: Option<usize>,
+    pub on_front: bool,
+}
+
+fn by_name<S: Serializer>(status: &Status, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(status.name())
+}
+
+/// How well the order of all points by time, taken from a number of cameras,
+/// agrees with the order from all of them.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct StableAfter {
+    pub cameras: usize,
+    /// Share of pairs of points that come in the same order.
+    pub pairs_in_order: f64,
+    /// CPU time that measuring this many took, all points and rounds.
+    pub seconds: f64,
+}
+
+/// The diagram of a scene and path.
+#[derive(Clone, Debug, Serialize)]
+pub struct Precision {
+    pub scene: String,
+    pub path: String,
+    pub items: usize,
+    pub cameras: usize,
+    pub rounds: usize,
+    /// Fastest first; what could not be measured comes last.
+    pub points: Vec<Point>,
+    /// Indices of the points that nothing dominates, fastest first.
+    pub front: Vec<usize>,
+    pub stability: Vec<StableAfter>,
+}
+
+/// Every test with every arithmetic, with and without epsilon; every
+/// derivation of the planes for the six-plane test.
+fn cullings() -> Vec<Culling> {
+    let with = |epsilon: f64, method: PlaneMethod| PlaneOptions { method, epsilon };
+    let standard = PlaneOptions::default();
+    let mut all = Vec::new();
+    for (test, ..) in TESTS {
+        for (arithmetic, ..) in ARITHMETICS {
+            let epsilons: &[f64] = match arithmetic {
+                Arithmetic::F64 => &[0.0],
+                _ => &[0.0, standard.epsilon],
+            };
+            for &epsilon in epsilons {
+                let planes = with(epsilon, standard.method);
+                all.push(Culling {
+                    test,
+                    arithmetic,
+                    planes,
+                });
+            }
+        }
+    }
+    for (method, ..) in PLANE_METHODS {
+        if method != standard.method {
+            all.push(Culling {
+                planes: with(0.0, method),
+                ..Culling::default()
+            });
+        }
+    }
+    all.retain(|culling| culling.check().is_ok());
+    all
+}
+
+/// What one culling answers to every camera, and how wrong that is.
+struct Judged {
+    culling: Culling,
+    views: Vec<CameraView>,
+    answers: Vec<Vec<ItemId>>,
+    errors: ErrorCount,
+    refused: Option<String>,
+}
+
+impl Judged {
+    fn new(scene: &Scene, cameras: &[Camera], truths: &[Truth], culling: Culling) -> Judged {
+        let mut judged = Judged {
+            culling,
+            views: Vec::new(),
+            answers: Vec::new(),
+            errors: ErrorCount::default(),
+            refused: None,
+        };
+        let around = scene.surroundings();
+        let items = culling.test.items(&scene.items);
+        for (camera, truth) in cameras.iter().zip(truths) {
+            let view = match culling.view(camera, &around) {
+                Ok(view) => view,
+                Err(error) => {
+                    judged.refused = Some(error.to_string());
+                    return judged;
+                }
+            };
+            let seen = items.iter().zip(0..).filter(|(b, _)| view.as_any().sees(b));
+            let answer: Vec<ItemId> = seen.map(|(_, id)| id).collect();
+            judged.errors += truth.errors(&scene.items, &answer);
+            judged.views.push(view);
+            judged.answers.push(answer);
+        }
+        judged
+    }
+}
+
+/// A structure over the boxes and over the cubes of the sphere test.
+struct Indexes {
+    boxes: Box<dyn DynIndex>,
+    cubes: Box<dyn DynIndex>,
+}
+
+impl Indexes {
+    fn new(spec: &StructureSpec, scene: &Scene) -> Result<Indexes, BuildError> {
+        let over = |test: CullingTest| {
+            let items = test.items(&scene.items);
+            spec.build_with(&items, scene.own_tree.as_ref())
+        };
+        Ok(Indexes {
+            boxes: over(CullingTest::SixPlane)?,
+            cubes: over(CullingTest::Sphere)?,
+        })
+    }
+
+    fn of(&self, test: CullingTest) -> &dyn DynIndex {
+        match test {
+            CullingTest::Sphere => self.cubes.as_ref(),
+            _ => self.boxes.as_ref(),
+        }
+    }
+}
+
+/// The cameras that are looked at: at most `most`, evenly spread.
+fn cameras_of(path: &CameraPath, most: usize) -> Vec<Camera> {
+    let count = path.cameras.len();
+    let wanted = most.max(1).min(count);
+    let chosen = (0..wanted).map(|i| path.cameras[i * count / wanted]);
+    chosen.collect()
+}
+
+/// Measures all points; `None` if stopped.
+///
+/// Every answer is compared with the plain loop before it is timed, and the
+/// plain loop with the exact truth: O(cameras * items) verdicts of some 50 ns
+/// and as many plain tests for each culling.
+///
+/// # Errors
+/// A structure that refuses the scene.
+pub fn measure_points(
+    scene: &Scene,
+    path: &CameraPath,
+    structures: &[StructureSpec],
+    most_cameras: usize,
+    protocol: &Protocol,
+    stop: &dyn Fn() -> bool,
+) -> Result<Option<Precision>, BuildError> {
+    let cameras = cameras_of(path, most_cameras);
+    let truths = cameras.iter().filter_map(|camera| {
+        // A frame always makes a pose.
+        Truth::of_camera(camera, scene.origin, &scene.items)
+    });
+    let truths: Vec<Truth> = truths.collect();
+    let mut judged = Vec::new();
+    for culling in cullings() {
+        if stop() {
+            return Ok(None);
+        }
+        judged.push(Judged::new(scene, &cameras, &truths, culling));
+    }
+    drop(truths);
+    let mut indexes = Vec::with_capacity(structures.len());
+    for spec in structures {
+        indexes.push(Indexes::new(spec, scene)?);
+    }
+    let mut points = Vec::new();
+    // Which of the points are timed, in the order of the competitors.
+    let mut timed_points = Vec::new();
+    let mut competitors = Vec::new();
+    for (spec, indexes) in structures.iter().zip(&indexes) {
+        for judged in &judged {
+            let mut point = Point::new(spec, judged);
+            if judged.refused.is_none() {
+                let index = indexes.of(judged.culling.test);
+                match checked(index, judged, scene.items.len()) {
+                    Ok(slowest) => {
+                        timed_points.push(points.len());
+                        competitors.push(Competitor {
+                            ask: Box::new(|n, out| index.see(judged.views[n].as_any(), out)),
+                            expected: judged.answers.iter().map(|a| a.len() as u64).collect(),
+                            slowest,
+                        });
+                    }
+                    Err(wrong) => (point.status, point.reason) = (wrong.status, wrong.reason),
+                }
+            }
+            points.push(point);
+        }
+    }
+    let Some(timed) = timed_rounds(cameras.len(), &competitors, protocol, stop) else {
+        return Ok(None);
+    };
+    drop(competitors);
+    let mut rounds = 0;
+    let mut series = Vec::new();
+    for (&place, timed) in timed_points.iter().zip(&timed) {
+        match timed {
+            Ok(timed) => {
+                rounds = rounds.max(timed.rounds);
+                points[place].time(timed, scene.items.len());
+                series.push(timed);
+            }
+            Err(wrong) => {
+                points[place].status = wrong.status;
+                points[place].reason = wrong.reason.clone();
+            }
+        }
+    }
+    let stability = stability(&series, cameras.len());
+    points.sort_by(|a, b| {
+        let key = |p: &Point| p.query_ns.unwrap_or(f64::INFINITY);
+        key(a).total_cmp(&key(b))
+    });
+    mark_dominated(&mut points);
+    Ok(Some(Precision {
+        scene: scene.name.clone(),
+        path: path.name.clone(),
+        items: scene.items.len(),
+        cameras: cameras.len(),
+        rounds,
+        front: (0..points.len()).filter(|&i| points[i].on_front).collect(),
+        points,
+        stability,
+    }))
+}
+
+/// Asks every query once; the slowest one's wall time, or what was wrong.
+fn checked(index: &dyn DynIndex, judged: &Judged, items: usize) -> Result<Duration, Verdict> {
+    let mut reference = Reference::new(items);
+    let (mut out, mut slowest) = (Vec::new(), Duration::ZERO);
+    for (view, answer) in judged.views.iter().zip(&judged.answers) {
+        reference.expect(answer.iter().copied());
+        out.clear();
+        let start = Instant::now();
+        index.see(view.as_any(), &mut out);
+        slowest = slowest.max(start.elapsed());
+        let difference = reference.compare(&out);
+        if !difference.is_none() {
+            return Err(Verdict::new(Status::Wrong, difference.to_string()));
+        }
+    }
+    Ok(slowest)
+}
+
+impl Point {
+    fn new(spec: &StructureSpec, judged: &Judged) -> Point {
+        let (culling, errors) = (&judged.culling, judged.errors);
+        let refused = judged.refused.is_some();
+        Point {
+            structure: spec.label.clone(),
+            test: culling.test.name(),
+            arithmetic: culling.arithmetic.name(),
+            planes: culling.planes.method.name(),
+            epsilon: culling.planes.epsilon,
+            status: match refused {
+                true => Status::Refused,
+                false if errors.false_negatives > 0 => Status::Unsafe,
+                false => Status::Ok,
+            },
+            reason: judged.refused.clone(),
+            excess: errors.excess().filter(|_| !refused),
+            false_negative_ppm: errors.false_negative_ppm().filter(|_| !refused),
+            errors,
+            query_ns: None,
+            query_ns_lower: None,
+            query_ns_upper: None,
+            ns_per_item: None,
+            dominated_by: None,
+            on_front: false,
+        }
+    }
+
+    fn time(&mut self, timed: &Timed, items: usize) {
+        let Some(Estimate {
+            value,
+            lower,
+            upper,
+        }) = bootstrap_median(&timed.round_means(), 1)
+        else {
+            return;
+        };
+        self.query_ns = Some(value);
+        self.query_ns_lower = Some(lower);
+        self.query_ns_upper = Some(upper);
+        self.ns_per_item = (items > 0).then(|| value / items as f64);
+    }
+
+    /// No worse in any error and no slower, and better in one of them. Times
+    /// whose intervals overlap are equal: what noise decides is no advantage.
+    fn dominates(&self, other: &Point) -> bool {
+        let (Some(upper), Some(other_lower)) = (self.query_ns_upper, other.query_ns_lower) else {
+            return false;
+        };
+        let (Some(lower), Some(other_upper)) = (self.query_ns_lower, other.query_ns_upper) else {
+            return false;
+        };
+        let of = |p: &Point| {
+            let e = p.errors;
+            [e.false_negatives, e.touch_dropped, e.false_positives]
+        };
+        let (mine, others) = (of(self), of(other));
+        let no_worse = mine.iter().zip(&others).all(|(a, b)| a <= b);
+        let (faster, not_slower) = (upper < other_lower, lower <= other_upper);
+        no_worse && not_slower && (faster || mine != others)
+    }
+}
+
+fn mark_dominated(points: &mut [Point]) {
+    for i in 0..points.len() {
+        let better = (0..points.len()).find(|&k| points[k].dominates(&points[i]));
+        points[i].on_front = better.is_none() && points[i].query_ns.is_some();
+        points[i].dominated_by = better;
+    }
+}
+
+/// The order of the points by time from the first 1, 2, 4, .. cameras of an
+/// evenly spread order, against the order from all.
+fn stability(series: &[&Timed], cameras: usize) -> Vec<StableAfter> {
+    // Per point and camera: median over the rounds.
+    let by_camera: Vec<BTreeMap<u32, f64>> = series
+        .iter()
+        .map(|timed| {
+            let mut laps: BTreeMap<u32, Vec<f64>> = BTreeMap::new();
+            for sample in &timed.samples {
+                laps.entry(sample.frame).or_default().push(sample.cpu_ns);
+            }
+            let medians = laps
+                .into_iter()
+                .filter_map(|(c, ns)| Some((c, median(&ns)?)));
+            medians.collect()
+        })
+        .collect();
+    let spent = |of: &BTreeMap<u32, f64>, wanted: &dyn Fn(u32) -> bool| -> f64 {
+        of.iter()
+            .filter(|(c, _)| wanted(**c))
+            .map(|(_, ns)| ns)
+            .sum()
+    };
+    let all: Vec<f64> = by_camera.iter().map(|of| spent(of, &|_| true)).collect();
+    let rounds = series.iter().map(|t| t.rounds).max().unwrap_or(0);
+    let mut rows = Vec::new();
+    let mut count = 1;
+    while count < 2 * cameras {
+        let used = count.min(cameras);
+        let chosen = |camera: u32| (camera as usize * used) % cameras < used;
+        let some: Vec<f64> = by_camera.iter().map(|of| spent(of, &chosen)).collect();
+        let pairs = (0..all.len()).flat_map(|i| (i + 1..all.len()).map(move |k| (i, k)));
+        let (mut same, mut total) = (0u64, 0u64);
+        for (i, k) in pairs {
+            total += 1;
+            same += u64::from((some[i] < some[k]) == (all[i] < all[k]));
+        }
+        rows.push(StableAfter {
+            cameras: used,
+            pairs_in_order: if total == 0 {
+                1.0
+            } else {
+                same as f64 / total as f64
+            },
+            seconds: some.iter().sum::<f64>() * rounds as f64 / 1e9,
+        });
+        count *= 2;
+    }
+    rows
+}
