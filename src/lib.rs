@@ -19,6 +19,7 @@
 //! - [`verify`]: the reference answer and how others differ from it
 //! - [`measure`]: count, verify, time; [`statistics`] makes figures of it
 //! - [`precision`]: error against run time, and the sweeps behind it
+//! - [`drift`]: how methods of turning and chasing drift from the truth
 //! - [`report`]: the files that other tools read; [`suite`]: what to run
 //! - [`spec`] and [`input`]: what users type and the files they bring
 //!
@@ -52,6 +53,7 @@
 pub mod arithmetic;
 pub mod camera;
 pub mod culling;
+pub mod drift;
 pub mod geometry;
 pub mod index;
 pub mod input;

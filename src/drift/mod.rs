@@ -1,0 +1,348 @@
+//! Small errors that add up: frames that are turned step by step, eyes that
+//! are carried around, and a chase camera on a spring arm. It owns the methods
+//! and integrators that are compared, their exact references and what follows
+//! from the figures; how those look on a terminal is the program's business.
+
+mod exact;
+mod frames;
+mod orbit;
+mod oscillator;
+mod rotation;
+mod spring;
+mod stability;
+mod walk;
+
+use serde::Serialize;
+
+pub use frames::Turn;
+pub use orbit::{OrbitDrift, SWING_DEG};
+pub use rotation::{ORBIT_RADIUS, RotationDrift, TurnDrift};
+pub use spring::SpringError;
+pub use stability::StabilityLimit;
+
+use crate::statistics::{Tradeoff, dominated_by};
+use orbit::CARRIERS;
+use rotation::{Exact, METHODS, STEADY};
+use spring::{INTEGRATORS, STIFFNESSES};
+
+/// The most steps: beyond, an f32 frame overflows and a run takes hours.
+pub const MOST_STEPS: u64 = 1_000_000_000;
+
+/// Whole turns that are looked at, in steps of one degree.
+const TURNS: [u64; 2] = [1, 1000];
+
+/// Steps in one sample of the clock.
+const TIMED_STEPS: u64 = 20_000;
+
+/// What is asked.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct DriftOptions {
+    /// Up to how many steps.
+    pub steps: u64,
+    /// What a recommended method may be off after all of them: the angle in
+    /// radians, and the orthogonality.
+    pub tolerance_rad: f64,
+}
+
+/// A method or an integrator as a point of error against time.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Rated {
+    pub name: &'static str,
+    pub summary: &'static str,
+    /// What this toolkit's camera does.
+    pub is_default: bool,
+    /// A frame's or an eye's worst error after the most steps: the larger of
+    /// angle and orthogonality, or the distance by radius. An arm's largest
+    /// error over all stiffnesses. `None` where it has none that is finite.
+    pub error: Option<f64>,
+    /// Median thread CPU time.
+    pub ns_per_step: f64,
+    /// Good enough to be recommended.
+    pub qualifies: bool,
+    /// Another that is no worse in error or time and better in one.
+    pub dominated_by: Option<&'static str>,
+    /// Has an error, and nothing dominates it.
+    pub on_front: bool,
+}
+
+/// A choice, and why.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Recommendation {
+    /// `None` if nothing is good enough.
+    pub name: Option<&'static str>,
+    pub reason: String,
+}
+
+/// Everything `cullbench drift` finds.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct DriftReport {
+    pub steps: u64,
+    pub tolerance_rad: f64,
+    pub turn_per_step: Turn,
+    pub rotation: Vec<RotationDrift>,
+    pub one_degree_turns: Vec<TurnDrift>,
+    pub orbit: Vec<OrbitDrift>,
+    pub spring: Vec<SpringError>,
+    pub stability: Vec<StabilityLimit>,
+    pub rotation_methods: Vec<Rated>,
+    pub orbit_methods: Vec<Rated>,
+    pub integrators: Vec<Rated>,
+    pub recommended_rotation: Recommendation,
+    pub recommended_integrator: Recommendation,
+}
+
+/// Jobs that `progress` of [`measure`] is told of.
+pub fn jobs() -> usize {
+    METHODS.len() + CARRIERS.len() + 2
+}
+
+/// Powers of ten from a thousand on, and the most steps themselves.
+fn looks(most: u64) -> Vec<u64> {
+    let powers = (3..=18).map(|power| 10u64.pow(power));
+    let below = powers.take_while(|&power| power < most);
+    below.chain([most]).collect()
+}
+
+/// Measures everything; `progress` is told each job's name before it starts.
+pub fn measure(options: &DriftOptions, mut progress: impl FnMut(&str)) -> DriftReport {
+    let looks = looks(options.steps);
+    let exact = Exact::new(&looks);
+    let (mut rotation, mut one_degree_turns, mut orbit) = (Vec::new(), Vec::new(), Vec::new());
+    for method in METHODS {
+        progress(method.name);
+        rotation.extend(method.drift(&exact));
+        one_degree_turns.extend(method.turn_drift(&TURNS));
+    }
+    for carrier in CARRIERS {
+        progress(carrier.name);
+        orbit.extend(carrier.drift(&looks));
+    }
+    progress("spring arm");
+    let pairs = INTEGRATORS.iter().flat_map(|i| STIFFNESSES.map(|k| (i, k)));
+    let spring: Vec<SpringError> = pairs.map(|(i, k)| i.error(k)).collect();
+    let stability = stability::limits();
+    progress("clock");
+    let rotation_methods = rate_rotations(&rotation, options);
+    let orbit_methods = rate_orbits(&orbit, options.steps);
+    let integrators = rate_integrators(&spring);
+    DriftReport {
+        steps: options.steps,
+        tolerance_rad: options.tolerance_rad,
+        turn_per_step: STEADY,
+        recommended_rotation: cheapest(&rotation_methods, options),
+        recommended_integrator: best_product(&integrators),
+        rotation,
+        one_degree_turns,
+        orbit,
+        spring,
+        stability,
+        rotation_methods,
+        orbit_methods,
+        integrators,
+    }
+}
+
+fn rate_rotations(drifts: &[RotationDrift], options: &DriftOptions) -> Vec<Rated> {
+    let times = walk::ns_per_step(METHODS, TIMED_STEPS, |method| {
+        (method.walk)(&STEADY, &[TIMED_STEPS]);
+    });
+    let rated = METHODS.iter().zip(times).map(|(method, ns_per_step)| {
+        let last = |d: &&RotationDrift| d.method == method.name && d.steps == options.steps;
+        // NaN is no maximum to `max`: a frame that is lost has no error.
+        let error = drifts.iter().find(last).and_then(|d| {
+            let lost = d.angle_error_rad.is_nan() || d.orthogonality_error.is_nan();
+            (!lost).then(|| d.angle_error_rad.max(d.orthogonality_error))
+        });
+        Rated {
+            name: method.name,
+            summary: method.summary,
+            is_default: method.name == rotation::TOOLKIT,
+            error,
+            ns_per_step,
+            qualifies: error.is_some_and(|error| error < options.tolerance_rad),
+            dominated_by: None,
+            on_front: false,
+        }
+    });
+    with_front(rated.collect())
+}
+
+fn rate_orbits(drifts: &[OrbitDrift], steps: u64) -> Vec<Rated> {
+    let times = walk::ns_per_step(CARRIERS, TIMED_STEPS, |carrier| {
+        (carrier.walk)(&SWING_DEG, &[TIMED_STEPS]);
+    });
+    let rated = CARRIERS.iter().zip(times).map(|(carrier, ns_per_step)| {
+        let last = |d: &&OrbitDrift| d.method == carrier.name && d.steps == steps;
+        let error = drifts
+            .iter()
+            .find(last)
+            .map(|d| d.position_error / ORBIT_RADIUS);
+        Rated {
+            name: carrier.name,
+            summary: carrier.summary,
+            is_default: carrier.name == orbit::TOOLKIT,
+            error,
+            ns_per_step,
+            qualifies: error.is_some(),
+            dominated_by: None,
+            on_front: false,
+        }
+    });
+    with_front(rated.collect())
+}
+
+fn rate_integrators(errors: &[SpringError]) -> Vec<Rated> {
+    let rated = INTEGRATORS.iter().zip(spring::times());
+    let rated = rated.map(|(integrator, ns_per_step)| {
+        let own = errors.iter().filter(|e| e.integrator == integrator.name);
+        // None of them if one is missing.
+        let all: Option<Vec<f64>> = own.map(|e| e.rms_error).collect();
+        let error = all.map(|errors| errors.into_iter().fold(0.0, f64::max));
+        Rated {
+            name: integrator.name,
+            summary: integrator.summary,
+            is_default: false,
+            error,
+            ns_per_step,
+            qualifies: error.is_some(),
+            dominated_by: None,
+            on_front: false,
+        }
+    });
+    with_front(rated.collect())
+}
+
+/// Fills in who dominates whom. What has no error that is finite is left out:
+/// being the fastest does not put it on the front.
+fn with_front(mut rated: Vec<Rated>) -> Vec<Rated> {
+    let (mut names, mut points) = (Vec::new(), Vec::new());
+    for row in &rated {
+        if let Some(error) = row.error {
+            names.push(row.name);
+            points.push(Tradeoff {
+                error,
+                time: row.ns_per_step,
+            });
+        }
+    }
+    let with_error = rated.iter_mut().filter(|row| row.error.is_some());
+    for (row, by) in with_error.zip(dominated_by(&points)) {
+        row.dominated_by = by.map(|by| names[by]);
+        row.on_front = by.is_none();
+    }
+    rated
+}
+
+fn least(rated: &[Rated], of: impl Fn(&Rated) -> f64) -> Option<&Rated> {
+    let good = rated.iter().filter(|rated| rated.qualifies);
+    good.min_by(|a, b| of(a).total_cmp(&of(b)))
+}
+
+/// The cheapest of the methods that are good enough.
+fn cheapest(rated: &[Rated], options: &DriftOptions) -> Recommendation {
+    let rule = format!(
+        "angle and orthogonality below {:e} after {:e} steps",
+        options.tolerance_rad, options.steps as f64
+    );
+    let Some(best) = least(rated, |rated| rated.ns_per_step) else {
+        return Recommendation {
+            name: None,
+            reason: format!("no method keeps {rule}"),
+        };
+    };
+    Recommendation {
+        name: Some(best.name),
+        reason: format!(
+            "the cheapest of {} methods with {rule}",
+            rated.iter().filter(|rated| rated.qualifies).count()
+        ),
+    }
+}
+
+/// The least product of error and time among the stable.
+fn best_product(rated: &[Rated]) -> Recommendation {
+    let product = |rated: &Rated| rated.error.unwrap_or(f64::INFINITY) * rated.ns_per_step;
+    let Some(best) = least(rated, product) else {
+        return Recommendation {
+            name: None,
+            reason: "no integrator is stable at every stiffness".to_owned(),
+        };
+    };
+    Recommendation {
+        name: Some(best.name),
+        reason: format!(
+            "the least error times cost of {} integrators that are stable at every stiffness",
+            rated.iter().filter(|rated| rated.qualifies).count()
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rated(name: &'static str, error: Option<f64>, ns_per_step: f64, tolerance: f64) -> Rated {
+        Rated {
+            name,
+            summary: "",
+            is_default: false,
+            error,
+            ns_per_step,
+            qualifies: error.is_some_and(|error| error < tolerance),
+            dominated_by: None,
+            on_front: false,
+        }
+    }
+
+    /// Fast and rough, slow and precise, slower and no better, faster and lost.
+    fn four(tolerance: f64) -> Vec<Rated> {
+        with_front(vec![
+            rated("lost", None, 1.0, tolerance),
+            rated("rough", Some(1e-3), 5.0, tolerance),
+            rated("precise", Some(1e-12), 9.0, tolerance),
+            rated("slow", Some(1e-9), 30.0, tolerance),
+        ])
+    }
+
+    #[test]
+    fn the_cheapest_within_the_tolerance_is_recommended() {
+        let choose = |tolerance_rad| {
+            let steps = 1000;
+            let options = DriftOptions {
+                steps,
+                tolerance_rad,
+            };
+            cheapest(&four(tolerance_rad), &options)
+        };
+        assert_eq!(choose(1e-2).name, Some("rough"));
+        assert_eq!(choose(1e-6).name, Some("precise"));
+        assert!(choose(1e-6).reason.contains("of 2 methods"));
+        let none = choose(1e-15);
+        assert_eq!(none.name, None);
+        assert!(
+            none.reason.contains("below 1e-15 after 1e3 steps"),
+            "{none:?}"
+        );
+    }
+
+    #[test]
+    fn what_is_lost_is_neither_on_the_front_nor_recommended() {
+        let rated = four(1.0);
+        let dominated: Vec<_> = rated.iter().map(|r| (r.dominated_by, r.on_front)).collect();
+        let front = (None, true);
+        assert_eq!(
+            dominated,
+            [(None, false), front, front, (Some("precise"), false)]
+        );
+        assert_eq!(best_product(&rated).name, Some("precise"));
+        assert_eq!(best_product(&rated[..1]).name, None);
+    }
+
+    #[test]
+    fn figures_are_taken_at_powers_of_ten_and_at_the_end() {
+        assert_eq!(looks(7), [7]);
+        assert_eq!(looks(1000), [1000]);
+        assert_eq!(looks(20_000), [1000, 10_000, 20_000]);
+        assert_eq!(looks(100_000), [1000, 10_000, 100_000]);
+    }
+}

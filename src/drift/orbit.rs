@@ -1,0 +1,210 @@
+//! An eye that is itself carried around a point, as [`Frame::orbit`] carries
+//! it: how far off its circle and its place it gets. Frames are in `rotation`.
+
+use glam::{DMat3, DQuat, DVec3, Quat, Vec3};
+use serde::Serialize;
+
+use super::exact::Matrix;
+use super::rotation::ORBIT_RADIUS;
+use super::walk::{Walker, walk};
+use crate::arithmetic::Expansion;
+use crate::camera::{Frame, look_at};
+
+/// Degrees about the z axis through the centre, every step.
+pub const SWING_DEG: f64 = 0.7;
+
+const CENTRE: DVec3 = DVec3::new(5.0, -1.0, 2.0);
+
+/// One way to carry the eye.
+pub struct Carrier {
+    pub name: &'static str,
+    pub summary: &'static str,
+    /// The eye less the centre after each of the ascending numbers of steps.
+    pub walk: fn(&f64, &[u64]) -> Vec<DVec3>,
+}
+
+pub const CARRIERS: &[Carrier] = &[
+    Carrier {
+        name: "f32-carried",
+        summary: "the f32 eye turned about the centre each step",
+        walk: walk::<Single<false>>,
+    },
+    Carrier {
+        name: "f32-carried-radius",
+        summary: "the same, put back to its distance each step",
+        walk: walk::<Single<true>>,
+    },
+    Carrier {
+        name: "f64-carried",
+        summary: "the f64 eye and its axes turned each step, around and over: this toolkit's orbit",
+        walk: walk::<Toolkit>,
+    },
+    Carrier {
+        name: "f64-carried-radius",
+        summary: "the f64 eye alone, put back to its distance each step",
+        walk: walk::<Restored>,
+    },
+    Carrier {
+        name: "f64-angle",
+        summary: "the eye made anew from an f64 angle in degrees, whole turns taken off",
+        walk: walk::<Angle>,
+    },
+];
+
+/// What the toolkit's own orbit does.
+pub const TOOLKIT: &str = "f64-carried";
+
+/// An f32 eye; `RESTORED` says whether its distance is put right.
+struct Single<const RESTORED: bool>(Vec3);
+
+impl<const RESTORED: bool> Walker for Single<RESTORED> {
+    type Step = f64;
+    type Place = DVec3;
+
+    fn start() -> Self {
+        Single((CENTRE + DVec3::X * ORBIT_RADIUS).as_vec3())
+    }
+
+    fn step(&mut self, degrees: &f64) {
+        let half = *degrees as f32 * (std::f32::consts::PI / 180.0) / 2.0;
+        let turn = Quat::from_xyzw(0.0, 0.0, libm::sinf(half), libm::cosf(half));
+        let mut offset = turn * (self.0 - CENTRE.as_vec3());
+        if RESTORED {
+            offset = offset.normalize() * ORBIT_RADIUS as f32;
+        }
+        self.0 = CENTRE.as_vec3() + offset;
+    }
+
+    fn place(&self) -> DVec3 {
+        self.0.as_dvec3() - CENTRE
+    }
+}
+
+/// The camera of this toolkit.
+struct Toolkit(Frame);
+
+impl Walker for Toolkit {
+    type Step = f64;
+    type Place = DVec3;
+
+    fn start() -> Self {
+        let frame = look_at(CENTRE + DVec3::X * ORBIT_RADIUS, CENTRE, DVec3::Z);
+        Toolkit(frame.expect("two points and an up vector make a frame"))
+    }
+
+    fn step(&mut self, degrees: &f64) {
+        let turned = self.0.orbit(CENTRE, DVec3::Z, *degrees, 0.0);
+        turned.expect("the z axis is an axis");
+    }
+
+    fn place(&self) -> DVec3 {
+        self.0.eye - CENTRE
+    }
+}
+
+/// An f64 eye whose distance is put right.
+struct Restored(DVec3);
+
+impl Walker for Restored {
+    type Step = f64;
+    type Place = DVec3;
+
+    fn start() -> Self {
+        Restored(CENTRE + DVec3::X * ORBIT_RADIUS)
+    }
+
+    fn step(&mut self, degrees: &f64) {
+        let half = degrees * (std::f64::consts::PI / 180.0) / 2.0;
+        let turn = DQuat::from_xyzw(0.0, 0.0, libm::sin(half), libm::cos(half));
+        let offset = turn * (self.0 - CENTRE);
+        self.0 = CENTRE + offset.normalize() * ORBIT_RADIUS;
+    }
+
+    fn place(&self) -> DVec3 {
+        self.0 - CENTRE
+    }
+}
+
+/// No eye but its angle.
+struct Angle {
+    degrees: f64,
+    eye: DVec3,
+}
+
+impl Walker for Angle {
+    type Step = f64;
+    type Place = DVec3;
+
+    fn start() -> Self {
+        let (degrees, eye) = (0.0, CENTRE + DVec3::X * ORBIT_RADIUS);
+        Angle { degrees, eye }
+    }
+
+    fn step(&mut self, degrees: &f64) {
+        self.degrees = (self.degrees + degrees) % 360.0;
+        let angle = self.degrees.to_radians();
+        let direction = DVec3::new(libm::cos(angle), libm::sin(angle), 0.0);
+        self.eye = CENTRE + direction * ORBIT_RADIUS;
+    }
+
+    fn place(&self) -> DVec3 {
+        self.eye - CENTRE
+    }
+}
+
+/// How far a carried eye is off after so many steps, ten away from its centre.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct OrbitDrift {
+    pub method: &'static str,
+    pub steps: u64,
+    pub position_error: f64,
+    pub radius_error: f64,
+}
+
+impl Carrier {
+    pub fn drift(&self, steps: &[u64]) -> Vec<OrbitDrift> {
+        let reached = (self.walk)(&SWING_DEG, steps);
+        let rows = steps.iter().zip(reached);
+        rows.map(|(&steps, offset)| {
+            let degrees = Expansion::product(SWING_DEG, steps as f64);
+            let exact = Matrix::about(2, &degrees);
+            // Column u of the turn is where the unit vector x has gone.
+            let offset = DMat3::from_cols(offset / ORBIT_RADIUS, DVec3::ZERO, DVec3::ZERO);
+            let (position, longer) = Matrix::from(offset).column_error(&exact, 0);
+            OrbitDrift {
+                method: self.name,
+                steps,
+                position_error: ORBIT_RADIUS * position,
+                radius_error: (ORBIT_RADIUS * longer).abs(),
+            }
+        })
+        .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn single_precision_leaves_its_circle_and_a_restored_radius_does_not() {
+        let after = |name: &str, steps| {
+            let carrier = CARRIERS.iter().find(|c| c.name == name).expect(name);
+            carrier.drift(&[steps]).remove(0)
+        };
+        let worn = after("f32-carried", 100_000);
+        assert!((1e-3..0.1).contains(&worn.radius_error), "{worn:?}");
+        let kept = after("f32-carried-radius", 100_000);
+        assert!(kept.radius_error < 1e-5, "{kept:?}");
+        for name in [TOOLKIT, "f64-carried-radius", "f64-angle"] {
+            let off = after(name, 100_000);
+            assert!(off.radius_error < 1e-9, "{off:?}");
+            assert!(off.position_error < 1e-7, "{off:?}");
+        }
+        // All of them go the same way round.
+        for carrier in CARRIERS {
+            let off = carrier.drift(&[0, 100]).remove(1);
+            assert!(off.position_error < 1e-3, "{off:?}");
+        }
+    }
+}
