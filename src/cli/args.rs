@@ -9,6 +9,8 @@ use cullbench::culling::{ARITHMETICS, Arithmetic, Culling, CullingTest, TESTS};
 use cullbench::path::LensDefaults;
 use cullbench::spec::SpecError;
 use cullbench::suite::DEFAULT_PATH;
+use cullbench::drift::{DriftOptions, MOST_STEPS};
+use cullbench::spec::{SpecError, parse_number};
 use glam::DVec3;
 
 /// Which spatial index finds what a camera sees, and where the camera is:
@@ -44,6 +46,8 @@ pub enum Command {
     Verify(VerifyArgs),
     /// Error against run time: every test, arithmetic and derivation of the planes
     Precision(PrecisionArgs),
+    /// Compare how ways to turn, orbit and chase drift from the truth
+    Drift(DriftArgs),
     /// Look at or generate scenes
     #[command(subcommand)]
     Scene(SceneCommand),
@@ -320,6 +324,46 @@ pub struct PrecisionArgs {
     pub scene_args: SceneArgs,
     #[command(flatten)]
     pub lens: LensArgs,
+}
+
+#[derive(Args, Debug)]
+pub struct DriftArgs {
+    /// The most steps; figures are shown at 1e3, 1e4, ... and there
+    #[arg(long, value_name = "N", default_value = "1e7")]
+    pub steps: String,
+    /// What a recommended way to turn may be off after all steps
+    #[arg(
+        long,
+        value_name = "RAD",
+        default_value_t = 1e-6,
+        allow_negative_numbers = true
+    )]
+    pub tolerance: f64,
+    #[arg(long, value_enum, default_value = "table")]
+    pub format: TableFormat,
+}
+
+impl DriftArgs {
+    pub fn options(&self) -> Result<DriftOptions, SpecError> {
+        let steps = parse_number(&self.steps)
+            .filter(|n| n.fract() == 0.0 && (1.0..=MOST_STEPS as f64).contains(n));
+        let Some(steps) = steps else {
+            return Err(SpecError::new(format_args!(
+                "--steps is '{}'; expected a whole number from 1 to {MOST_STEPS:e}",
+                self.steps
+            )));
+        };
+        if !(self.tolerance > 0.0 && self.tolerance.is_finite()) {
+            return Err(SpecError::new(format_args!(
+                "--tolerance is {}; expected a number above 0",
+                self.tolerance
+            )));
+        }
+        Ok(DriftOptions {
+            steps: steps as u64,
+            tolerance_rad: self.tolerance,
+        })
+    }
 }
 
 #[derive(Subcommand, Debug)]

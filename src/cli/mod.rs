@@ -6,6 +6,7 @@
 
 mod args;
 mod compare_structures;
+mod drift;
 mod env;
 mod interrupt;
 mod list;
@@ -47,6 +48,7 @@ pub fn main() -> ExitCode {
         Command::Locate(args) => locate::locate(&args),
         Command::Verify(args) => verify::verify(&args),
         Command::Precision(args) => precision::precision(&args),
+        Command::Drift(args) => drift::drift(&args),
         Command::Scene(SceneCommand::Info(args)) => scene::info(&args),
         Command::Scene(SceneCommand::Generate(args)) => scene::generate(&args),
         Command::Env(args) => env::env(&args),
