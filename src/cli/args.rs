@@ -331,7 +331,7 @@ pub struct DriftArgs {
     /// The most steps; figures are shown at 1e3, 1e4, ... and there
     #[arg(long, value_name = "N", default_value = "1e7")]
     pub steps: String,
-    /// What a recommended way to turn may be off after all steps
+    /// What a recommended way to turn or orbit may be off after all steps
     #[arg(
         long,
         value_name = "RAD",

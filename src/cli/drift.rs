@@ -126,7 +126,7 @@ fn show_orbits(report: &DriftReport, out: &mut impl Write) -> io::Result<()> {
     let methods = names(&report.orbit_methods);
     writeln!(
         out,
-        "Orbits: an eye carried around by {SWING_DEG} degrees per step"
+        "Orbits: an eye carried around by {SWING_DEG:.3} degrees per step"
     )?;
     let measures: [Measure<drift::OrbitDrift>; 2] = [
         ("position off after", |d| d.position_error),
@@ -143,7 +143,7 @@ fn show_orbits(report: &DriftReport, out: &mut impl Write) -> io::Result<()> {
     }
     let title = format!("orbits after {:e} steps", report.steps as f64);
     show_rated(&title, "error / radius", &report.orbit_methods, out)?;
-    writeln!(out)
+    recommend("an orbit", &report.recommended_orbit, out)
 }
 
 fn show_springs(report: &DriftReport, out: &mut impl Write) -> io::Result<()> {

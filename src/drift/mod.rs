@@ -39,8 +39,8 @@ const TIMED_STEPS: u64 = 20_000;
 pub struct DriftOptions {
     /// Up to how many steps.
     pub steps: u64,
-    /// What a recommended method may be off after all of them: the angle in
-    /// radians, and the orthogonality.
+    /// What a recommended method may be off after all of them: a frame's angle
+    /// in radians and orthogonality, an eye's distance in radii.
     pub tolerance_rad: f64,
 }
 
@@ -52,7 +52,7 @@ pub struct Rated {
     /// What this toolkit's camera does.
     pub is_default: bool,
     /// A frame's or an eye's worst error after the most steps: the larger of
-    /// angle and orthogonality, or the distance by radius. An arm's largest
+    /// angle and orthogonality, or the distance in radii. An arm's largest
     /// error over all stiffnesses. `None` where it has none that is finite.
     pub error: Option<f64>,
     /// Median thread CPU time.
@@ -88,6 +88,7 @@ pub struct DriftReport {
     pub orbit_methods: Vec<Rated>,
     pub integrators: Vec<Rated>,
     pub recommended_rotation: Recommendation,
+    pub recommended_orbit: Recommendation,
     pub recommended_integrator: Recommendation,
 }
 
@@ -123,13 +124,14 @@ pub fn measure(options: &DriftOptions, mut progress: impl FnMut(&str)) -> DriftR
     let stability = stability::limits();
     progress("clock");
     let rotation_methods = rate_rotations(&rotation, options);
-    let orbit_methods = rate_orbits(&orbit, options.steps);
+    let orbit_methods = rate_orbits(&orbit, options);
     let integrators = rate_integrators(&spring);
     DriftReport {
         steps: options.steps,
         tolerance_rad: options.tolerance_rad,
         turn_per_step: STEADY,
         recommended_rotation: cheapest(&rotation_methods, options),
+        recommended_orbit: cheapest(&orbit_methods, options),
         recommended_integrator: best_product(&integrators),
         rotation,
         one_degree_turns,
@@ -167,12 +169,12 @@ fn rate_rotations(drifts: &[RotationDrift], options: &DriftOptions) -> Vec<Rated
     with_front(rated.collect())
 }
 
-fn rate_orbits(drifts: &[OrbitDrift], steps: u64) -> Vec<Rated> {
+fn rate_orbits(drifts: &[OrbitDrift], options: &DriftOptions) -> Vec<Rated> {
     let times = walk::ns_per_step(CARRIERS, TIMED_STEPS, |carrier| {
         (carrier.walk)(&SWING_DEG, &[TIMED_STEPS]);
     });
     let rated = CARRIERS.iter().zip(times).map(|(carrier, ns_per_step)| {
-        let last = |d: &&OrbitDrift| d.method == carrier.name && d.steps == steps;
+        let last = |d: &&OrbitDrift| d.method == carrier.name && d.steps == options.steps;
         let error = drifts
             .iter()
             .find(last)
@@ -183,7 +185,7 @@ fn rate_orbits(drifts: &[OrbitDrift], steps: u64) -> Vec<Rated> {
             is_default: carrier.name == orbit::TOOLKIT,
             error,
             ns_per_step,
-            qualifies: error.is_some(),
+            qualifies: error.is_some_and(|error| error < options.tolerance_rad),
             dominated_by: None,
             on_front: false,
         }
@@ -241,13 +243,13 @@ fn least(rated: &[Rated], of: impl Fn(&Rated) -> f64) -> Option<&Rated> {
 /// The cheapest of the methods that are good enough.
 fn cheapest(rated: &[Rated], options: &DriftOptions) -> Recommendation {
     let rule = format!(
-        "angle and orthogonality below {:e} after {:e} steps",
+        "an error below {:e} after {:e} steps",
         options.tolerance_rad, options.steps as f64
     );
     let Some(best) = least(rated, |rated| rated.ns_per_step) else {
         return Recommendation {
             name: None,
-            reason: format!("no method keeps {rule}"),
+            reason: format!("no method has {rule}"),
         };
     };
     Recommendation {

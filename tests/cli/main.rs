@@ -5,6 +5,7 @@
 #![cfg(feature = "cli")]
 
 mod bad_input;
+mod drift;
 mod listing;
 mod pipes;
 mod process;
