@@ -203,6 +203,10 @@ mod tests {
             assert!(off.radius_error < 1e-9, "{off:?}");
             assert!(off.position_error < 1e-7, "{off:?}");
         }
+        for name in ["f64-carried-radius", "f64-angle"] {
+            let kept = after(name, 100_000);
+            assert!(kept.radius_error < 1e-13, "{kept:?}");
+        }
         // All of them go the same way round.
         for carrier in CARRIERS {
             let off = carrier.drift(&[0, 100]).remove(1);
