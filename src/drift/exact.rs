@@ -340,7 +340,7 @@ mod tests {
         }
         // Stretching is no turning, and twenty per cent of it are no problem.
         let stretched = DMat3::from_diagonal(DVec3::new(1.2, 1.0, 0.9));
-        let turn = base.times(&Matrix::about(1, &degrees(0.3)));
+        let turn = base.times(&Matrix::about(0, &degrees(0.3)));
         let found = turn.times(&Matrix::from(stretched)).angle_to(&base);
         assert!((found.to_degrees() / 0.3 - 1.0).abs() < 1e-12, "{found}");
         let off = Matrix::from(stretched);
