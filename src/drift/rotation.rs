@@ -142,7 +142,7 @@ const fn angles<W: Walker<Step = Turn, Place = DMat3>>(
     }
 }
 
-/// How far one method is off after so many steps of [`STEADY`].
+/// How far one method is off after so many steps.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RotationDrift {
     pub method: &'static str,
@@ -156,7 +156,7 @@ pub struct RotationDrift {
     pub orbit_radius_error: f64,
 }
 
-/// How far a method is off after whole turns of [`ONE_DEGREE`] steps.
+/// How far a method is off after whole turns in steps of one degree.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct TurnDrift {
     pub method: &'static str,
