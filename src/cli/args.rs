@@ -6,11 +6,10 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use cullbench::camera::{DEFAULT_EPSILON, PLANE_METHODS, PlaneMethod, PlaneOptions};
 use cullbench::culling::{ARITHMETICS, Arithmetic, Culling, CullingTest, TESTS};
-use cullbench::path::LensDefaults;
-use cullbench::spec::SpecError;
-use cullbench::suite::DEFAULT_PATH;
 use cullbench::drift::{DriftOptions, MOST_STEPS};
+use cullbench::path::LensDefaults;
 use cullbench::spec::{SpecError, parse_number};
+use cullbench::suite::DEFAULT_PATH;
 use glam::DVec3;
 
 /// Which spatial index finds what a camera sees, and where the camera is:
