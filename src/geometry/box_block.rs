@@ -71,15 +71,10 @@ impl BoxBlock {
     #[inline(always)]
     fn p_vertex_values(&self, plane: &Plane, values: &mut [f32; LANES]) {
         let n = plane.normal;
-        let rows = self.far_rows(n.x >= 0.0, n.y >= 0.0, n.z >= 0.0);
-        Self::values(plane, rows, values);
-    }
-
-    #[inline(always)]
-    fn n_vertex_values(&self, plane: &Plane, values: &mut [f32; LANES]) {
-        let n = plane.normal;
-        let rows = self.far_rows(n.x < 0.0, n.y < 0.0, n.z < 0.0);
-        Self::values(plane, rows, values);
+        let [x, y, z] = self.far_rows(n.x >= 0.0, n.y >= 0.0, n.z >= 0.0);
+        for lane in 0..LANES {
+            values[lane] = ((n.x * x[lane] + n.y * y[lane]) + n.z * z[lane]) + plane.d;
+        }
     }
 
     /// One row for each axis, of the upper bounds where `high`: the p-vertex
@@ -88,14 +83,6 @@ impl BoxBlock {
     fn far_rows(&self, x: bool, y: bool, z: bool) -> [&[f32; LANES]; 3] {
         let row = |k: usize, high: bool| &self.rows[if high { k + 3 } else { k }];
         [row(0, x), row(1, y), row(2, z)]
-    }
-
-    #[inline(always)]
-    fn values(plane: &Plane, [x, y, z]: [&[f32; LANES]; 3], values: &mut [f32; LANES]) {
-        let n = plane.normal;
-        for lane in 0..LANES {
-            values[lane] = ((n.x * x[lane] + n.y * y[lane]) + n.z * z[lane]) + plane.d;
-        }
     }
 
     /// The lanes that none of the f64 planes excludes: bit for bit
@@ -147,9 +134,8 @@ impl BoxBlock {
         let [x, y, z, radius, reach] = balls;
         let mut dropped = [0; LANES];
         for (plane, margin) in planes {
-            let (mut far, mut near) = ([0.0; LANES], [0.0; LANES]);
+            let mut far = [0.0; LANES];
             self.p_vertex_values(plane, &mut far);
-            self.n_vertex_values(plane, &mut near);
             for lane in 0..LANES {
                 let ball = Ball {
                     centre: Vec3::new(x[lane], y[lane], z[lane]),
@@ -157,8 +143,7 @@ impl BoxBlock {
                     reach: reach[lane],
                 };
                 let value = margin.value_at(plane.normal, &ball);
-                let outside = (f32::MIN..0.0).contains(&value) & (near[lane] < 0.0);
-                let drops = outside | (far[lane] < 0.0);
+                let drops = (far[lane] < 0.0) | (f32::MIN..0.0).contains(&value);
                 dropped[lane] |= if drops { LANE_BITS[lane] } else { 0 };
             }
         }

@@ -308,6 +308,22 @@ mod tests {
         Ok(())
     }
 
+    #[test]
+    fn a_difference_beyond_f32_decides_the_same_in_node_and_item() {
+        // The x of the item relative to the eye overflows, the node's does not.
+        let item = Aabb::new(Vec3::splat(-3e38), Vec3::splat(-3e38));
+        let other = Aabb::new(Vec3::splat(-1.0), Vec3::ZERO);
+        let beside = Plane::new(Vec3::new(0.0, 1e-30, 0.0), -1.0);
+        for eye in [Vec3::X * 3e38, Vec3::X * -3e38] {
+            for sign in [1.0, -1.0] {
+                let items = [item, other].map(|b| Aabb::new(b.min * sign, b.max * sign));
+                let items = items.map(|b| Aabb::new(b.min.min(b.max), b.min.max(b.max)));
+                let volume = ConvexVolume::from_planes(&[beside]).unwrap();
+                check(&RelativeVolume::new(eye, volume).unwrap(), &items).unwrap();
+            }
+        }
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(4000))]
 
