@@ -152,7 +152,8 @@ fn kernels(c: &mut Criterion) {
         b.iter(|| {
             let blocks = black_box(&blocks).range(0, scene.items.len());
             let seen = blocks.map(|(_, lanes, block)| {
-                (block.admitted_by(volume.planes().iter()) & lanes).count_ones()
+                (block.admitted_by(volume.planes().iter().map(|p| (p, p.upper()))) & lanes)
+                    .count_ones()
             });
             seen.sum::<u32>()
         });

@@ -138,7 +138,8 @@ fn without(tree: &PackedTree, volume: &ConvexVolume, out: &mut Vec<ItemId>) {
                 }
                 let items = node.items();
                 for (start, lanes, block) in tree.boxes().range(items.start, items.end) {
-                    let planes = Bits(mask).map(|bit| volume.plane_of_bit(bit));
+                    let planes =
+                        Bits(mask).map(|bit| (volume.plane_of_bit(bit), volume.upper_of_bit(bit)));
                     let admitted = block.admitted_by(planes);
                     let mut admitted = u32::from(admitted & lanes);
                     while admitted != 0 {

@@ -7,6 +7,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use cullbench::camera::{DEFAULT_EPSILON, PLANE_METHODS, PlaneMethod, PlaneOptions};
 use cullbench::culling::{ARITHMETICS, Arithmetic, Culling, CullingTest, TESTS};
 use cullbench::drift::{DriftOptions, MOST_STEPS};
+use cullbench::kernel::Kernel;
 use cullbench::path::LensDefaults;
 use cullbench::spec::{SpecError, parse_number};
 use cullbench::suite::DEFAULT_PATH;
@@ -92,6 +93,31 @@ pub struct SceneArgs {
     /// Leave out items that are no finite box, and report their number
     #[arg(long)]
     pub skip_bad_items: bool,
+}
+
+/// How queries are computed; the answers are the same.
+#[derive(Args, Debug)]
+pub struct KernelArgs {
+    /// Instruction set: portable, avx2 or avx512 [default: the best of this machine]
+    #[arg(long = "kernel", value_name = "NAME")]
+    pub name: Option<String>,
+}
+
+impl KernelArgs {
+    /// Makes the choice for the whole process.
+    pub fn choose(&self) -> Result<(), SpecError> {
+        let Some(name) = self.name.as_deref() else {
+            return Ok(());
+        };
+        let Some(kernel) = Kernel::named(name) else {
+            let known = Kernel::ALL.iter().map(|kernel| kernel.name());
+            return Err(SpecError::unknown("kernel", name, known));
+        };
+        kernel.choose().map_err(|error| {
+            let here: Vec<_> = Kernel::available().map(Kernel::name).collect();
+            SpecError::new(format_args!("{error}; here are: {}", here.join(", ")))
+        })
+    }
 }
 
 /// Values for cameras that do not bring their own.
@@ -224,6 +250,8 @@ pub struct RunArgs {
     pub lens: LensArgs,
     #[command(flatten)]
     pub culling: CullingArgs,
+    #[command(flatten)]
+    pub kernel: KernelArgs,
 }
 
 #[derive(Args, Debug)]
@@ -251,6 +279,8 @@ pub struct QueryArgs {
     pub lens: LensArgs,
     #[command(flatten)]
     pub culling: CullingArgs,
+    #[command(flatten)]
+    pub kernel: KernelArgs,
 }
 
 #[derive(Args, Debug)]
@@ -268,6 +298,8 @@ pub struct LocateArgs {
     pub format: RowFormat,
     #[command(flatten)]
     pub scene_args: SceneArgs,
+    #[command(flatten)]
+    pub kernel: KernelArgs,
 }
 
 #[derive(Args, Debug)]
@@ -295,6 +327,8 @@ pub struct VerifyArgs {
     pub lens: LensArgs,
     #[command(flatten)]
     pub culling: CullingArgs,
+    #[command(flatten)]
+    pub kernel: KernelArgs,
 }
 
 #[derive(Args, Debug)]
@@ -323,6 +357,8 @@ pub struct PrecisionArgs {
     pub scene_args: SceneArgs,
     #[command(flatten)]
     pub lens: LensArgs,
+    #[command(flatten)]
+    pub kernel: KernelArgs,
 }
 
 #[derive(Args, Debug)]

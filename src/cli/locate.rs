@@ -15,6 +15,7 @@ use cullbench::path::read_points_csv;
 use glam::Vec3;
 
 pub fn locate(args: &LocateArgs) -> anyhow::Result<Ending> {
+    args.kernel.choose()?;
     let structures = structures(&args.structure)?;
     let scene = load_scene(&args.scene, &args.scene_args)?;
     let name = args.points.display().to_string();

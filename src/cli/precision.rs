@@ -30,6 +30,7 @@ struct Outcome {
 const OFFSET_CAMERAS: usize = 60;
 
 pub fn precision(args: &PrecisionArgs) -> anyhow::Result<Ending> {
+    args.kernel.choose()?;
     let structures = structures(&args.structure)?;
     let defaults = args.lens.defaults()?;
     let scene = load_scene(&args.scene, &args.scene_args)?;

@@ -12,6 +12,7 @@ use cullbench::measure::Workload;
 use cullbench::path;
 
 pub fn query(args: &QueryArgs) -> anyhow::Result<Ending> {
+    args.kernel.choose()?;
     let structures = structures(&args.structure)?;
     let (defaults, culling) = (args.lens.defaults()?, args.culling.culling(&args.test)?);
     let scene = load_scene(&args.scene, &args.scene_args)?;

@@ -15,6 +15,7 @@ use super::run_table::show_scene;
 use super::{Ending, interrupt, text, unread_is_fine};
 use cullbench::culling::{Culling, CullingTest};
 use cullbench::index::{StructureSpec, structures};
+use cullbench::kernel::Kernel;
 use cullbench::measure::{
     Contender, Machine, PathInfo, Protocol, SceneInfo, Source, Toolchain, Workload,
     harness_overhead_ns, measure_group,
@@ -168,6 +169,7 @@ fn scenes(args: &RunArgs, suite: &Suite) -> Vec<(String, Vec<String>)> {
 }
 
 pub fn run(args: &RunArgs) -> anyhow::Result<Ending> {
+    args.kernel.choose()?;
     let plan = Plan::new(args)?;
     let machine = Machine::capture();
     interrupt::from_now_on_finish();
@@ -349,6 +351,13 @@ fn same_experiment(report: &Report, plan: &Plan, args: &RunArgs) -> anyhow::Resu
         bail!(
             "was begun with --seed {}; expected the same now",
             report.run.seed
+        );
+    }
+    let kernel = Kernel::chosen().name();
+    if report.machine.instruction_set != kernel {
+        bail!(
+            "was begun with --kernel {}; expected the same now, not {kernel}",
+            report.machine.instruction_set
         );
     }
     let now = Toolchain::capture();

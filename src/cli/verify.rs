@@ -58,6 +58,7 @@ const PATHS: [&str; 4] = [
 const CASES: u64 = 20_000;
 
 pub fn verify(args: &VerifyArgs) -> anyhow::Result<Ending> {
+    args.kernel.choose()?;
     let structures = structures(&args.structure)?;
     let defaults = args.lens.defaults()?;
     let culling = args.culling.culling(CullingTest::SixPlane.name())?;

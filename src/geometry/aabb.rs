@@ -84,21 +84,25 @@ impl Aabb {
     }
 
     /// Whether the point lies in the closed box.
+    #[inline(always)]
     pub fn contains_point(&self, p: Vec3) -> bool {
         p.cmpge(self.min).all() && p.cmple(self.max).all()
     }
 
     /// Whether `other` lies wholly in the closed box.
+    #[inline(always)]
     pub fn contains(&self, other: &Aabb) -> bool {
         other.min.cmpge(self.min).all() && other.max.cmple(self.max).all()
     }
 
     /// Whether the two closed boxes share a point (touching counts).
+    #[inline(always)]
     pub fn intersects(&self, other: &Aabb) -> bool {
         self.min.cmple(other.max).all() && other.min.cmple(self.max).all()
     }
 
     /// Mid point. Halves before adding, so that huge bounds do not overflow.
+    #[inline(always)]
     pub fn centre(&self) -> Vec3 {
         self.min * 0.5 + self.max * 0.5
     }

@@ -5,7 +5,7 @@
 use glam::Vec3;
 
 use super::aabb::held;
-use super::{Aabb, Ball, Plane, SphereMargin, WidePlane};
+use super::{Aabb, Ball, Plane, SphereMargin, Upper, WidePlane};
 
 /// Boxes of one block.
 pub const LANES: usize = 16;
@@ -41,6 +41,7 @@ impl BoxBlock {
         }
     }
 
+    #[inline(always)]
     pub fn get(&self, lane: usize) -> Aabb {
         let row = |k: usize| self.rows[k][lane];
         Aabb::new(
@@ -53,14 +54,14 @@ impl BoxBlock {
     /// [`Plane::excludes`], lane by lane. Lanes without a box come out as they
     /// may.
     #[inline(always)]
-    pub fn admitted_by<'p>(&self, planes: impl Iterator<Item = &'p Plane>) -> LaneMask {
+    pub fn admitted_by<'p>(&self, planes: impl Iterator<Item = (&'p Plane, Upper)>) -> LaneMask {
         // The lowest value over all planes: below zero iff some plane's is. A
         // NaN (an overflow on both sides) excludes nothing, as in the scalar
         // test, because it compares false.
         let mut lowest = [f32::INFINITY; LANES];
-        for plane in planes {
+        for (plane, upper) in planes {
             let mut values = [0.0; LANES];
-            self.p_vertex_values(plane, &mut values);
+            self.p_vertex_values(plane, upper, &mut values);
             for (low, value) in lowest.iter_mut().zip(values) {
                 *low = if value < *low { value } else { *low };
             }
@@ -69,30 +70,33 @@ impl BoxBlock {
     }
 
     #[inline(always)]
-    fn p_vertex_values(&self, plane: &Plane, values: &mut [f32; LANES]) {
+    fn p_vertex_values(&self, plane: &Plane, upper: Upper, values: &mut [f32; LANES]) {
         let n = plane.normal;
-        let [x, y, z] = self.far_rows(n.x >= 0.0, n.y >= 0.0, n.z >= 0.0);
+        let [x, y, z] = self.far_rows(upper);
         for lane in 0..LANES {
             values[lane] = ((n.x * x[lane] + n.y * y[lane]) + n.z * z[lane]) + plane.d;
         }
     }
 
-    /// One row for each axis, of the upper bounds where `high`: the p-vertex
-    /// row of an axis is the same for every box.
+    /// The rows of the p-vertices: the same ones for every box, of the upper
+    /// bounds where `upper` says so.
     #[inline(always)]
-    fn far_rows(&self, x: bool, y: bool, z: bool) -> [&[f32; LANES]; 3] {
-        let row = |k: usize, high: bool| &self.rows[if high { k + 3 } else { k }];
-        [row(0, x), row(1, y), row(2, z)]
+    fn far_rows(&self, upper: Upper) -> [&[f32; LANES]; 3] {
+        let row = |k: usize| &self.rows[k + 3 * usize::from(upper[k])];
+        [row(0), row(1), row(2)]
     }
 
     /// The lanes that none of the f64 planes excludes: bit for bit
     /// [`WidePlane::excludes`], lane by lane.
     #[inline(always)]
-    pub fn admitted_by_wide<'p>(&self, planes: impl Iterator<Item = &'p WidePlane>) -> LaneMask {
+    pub fn admitted_by_wide<'p>(
+        &self,
+        planes: impl Iterator<Item = (&'p WidePlane, Upper)>,
+    ) -> LaneMask {
         let mut lowest = [f64::INFINITY; LANES];
-        for plane in planes {
+        for (plane, upper) in planes {
             let n = plane.normal;
-            let [x, y, z] = self.far_rows(n.x >= 0.0, n.y >= 0.0, n.z >= 0.0);
+            let [x, y, z] = self.far_rows(upper);
             for lane in 0..LANES {
                 let [x, y, z] = [x, y, z].map(|row| f64::from(row[lane]));
                 let value = ((n.x * x + n.y * y) + n.z * z) + plane.d;
@@ -119,7 +123,7 @@ impl BoxBlock {
     #[inline(always)]
     pub fn admitted_as_spheres<'p>(
         &self,
-        planes: impl Iterator<Item = (&'p Plane, &'p SphereMargin)>,
+        planes: impl Iterator<Item = (&'p Plane, Upper, &'p SphereMargin)>,
     ) -> LaneMask {
         // Row by row, like the block itself: centre x, y, z, radius, reach.
         let mut balls = [[0.0; LANES]; 5];
@@ -133,9 +137,9 @@ impl BoxBlock {
         }
         let [x, y, z, radius, reach] = balls;
         let mut dropped = [0; LANES];
-        for (plane, margin) in planes {
+        for (plane, upper, margin) in planes {
             let mut far = [0.0; LANES];
-            self.p_vertex_values(plane, &mut far);
+            self.p_vertex_values(plane, upper, &mut far);
             for lane in 0..LANES {
                 let ball = Ball {
                     centre: Vec3::new(x[lane], y[lane], z[lane]),
@@ -197,6 +201,10 @@ const LANE_BITS: [u32; LANES] = {
 
 #[inline(always)]
 fn below_zero(values: &[f32; LANES]) -> LaneMask {
+    // Most blocks are excluded whole: one look at the vector, not one a lane.
+    if values.iter().fold(true, |all, value| all & (*value < 0.0)) {
+        return LaneMask::MAX;
+    }
     let mut below = [0; LANES];
     for lane in 0..LANES {
         below[lane] = if values[lane] < 0.0 {
@@ -325,7 +333,7 @@ mod tests {
             let (first, end) = (boxes.len() / 3, boxes.len());
             let mut seen = 0;
             for (start, lanes, block) in blocks.range(first, end) {
-                let admitted = block.admitted_by(planes.iter());
+                let admitted = block.admitted_by(planes.iter().map(|p| (p, p.upper())));
                 for lane in (0..LANES).filter(|lane| lanes >> lane & 1 == 1) {
                     let b = &boxes[start + lane];
                     seen += 1;

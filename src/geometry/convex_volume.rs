@@ -5,7 +5,7 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::{Aabb, Plane, WidePlane};
+use super::{Aabb, Plane, Upper, WidePlane};
 
 /// Largest number of planes of one volume: one bit each in a [`PlaneMask`].
 pub const MAX_PLANES: usize = 32;
@@ -87,6 +87,8 @@ pub struct ConvexVolume {
     planes: [Plane; MAX_PLANES],
     names: [Option<FrustumPlane>; MAX_PLANES],
     count: usize,
+    mask: PlaneMask,
+    upper: [Upper; MAX_PLANES],
 }
 
 impl ConvexVolume {
@@ -127,6 +129,8 @@ impl ConvexVolume {
             planes: [Plane::new(Vec3::ZERO, 0.0); MAX_PLANES],
             names: [None; MAX_PLANES],
             count,
+            mask: 0,
+            upper: [[true; 3]; MAX_PLANES],
         };
         for (index, (plane, name)) in planes.enumerate() {
             if !plane.is_finite() {
@@ -134,6 +138,8 @@ impl ConvexVolume {
             }
             volume.planes[index] = plane;
             volume.names[index] = name;
+            volume.upper[index] = plane.upper();
+            volume.mask |= PlaneMask::from(!plane.is_trivial()) << index;
         }
         Ok(volume)
     }
@@ -147,6 +153,12 @@ impl ConvexVolume {
     #[inline(always)]
     pub fn plane_of_bit(&self, index: u32) -> &Plane {
         &self.planes[index as usize % MAX_PLANES]
+    }
+
+    /// [`Plane::upper`] of plane `index`, likewise.
+    #[inline(always)]
+    pub fn upper_of_bit(&self, index: u32) -> Upper {
+        self.upper[index as usize % MAX_PLANES]
     }
 
     /// The plane of that name, if the volume has one.
@@ -166,12 +178,9 @@ impl ConvexVolume {
     }
 
     /// Bits of the planes that constrain anything.
+    #[inline(always)]
     pub fn mask(&self) -> PlaneMask {
-        self.planes()
-            .iter()
-            .enumerate()
-            .filter(|(_, plane)| !plane.is_trivial())
-            .fold(0, |mask, (i, _)| mask | 1 << i)
+        self.mask
     }
 
     /// The six-plane box test: true unless one plane has the whole box on its

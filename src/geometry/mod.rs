@@ -13,7 +13,7 @@ mod wide_volume;
 pub use aabb::Aabb;
 pub use box_block::{BoxBlock, BoxBlocks, LANES, LaneMask};
 pub use convex_volume::{ConvexVolume, FrustumPlane, MAX_PLANES, PlaneMask, VolumeError};
-pub use plane::Plane;
+pub use plane::{Plane, Upper};
 pub use plane_tree::{PlaneTree, PlaneTreeNode};
 pub use relative_volume::RelativeVolume;
 pub use spheres::{Ball, SphereMargin, Spheres, sphere_cube};

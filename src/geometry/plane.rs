@@ -18,6 +18,9 @@ pub struct Plane {
     pub d: f32,
 }
 
+/// Which bound the p-vertex takes on each axis: the upper one?
+pub type Upper = [bool; 3];
+
 impl Plane {
     pub const fn new(normal: Vec3, d: f32) -> Self {
         Plane { normal, d }
@@ -51,6 +54,12 @@ impl Plane {
             pick(self.normal.y, b.min.y, b.max.y),
             pick(self.normal.z, b.min.z, b.max.z),
         )
+    }
+
+    /// The bounds that make up [`Plane::p_vertex`]. Kernels for many boxes ask
+    /// once a plane.
+    pub fn upper(&self) -> Upper {
+        self.normal.to_array().map(|n| n >= 0.0)
     }
 
     /// The corner of `b` nearest against the normal (the n-vertex).

@@ -42,11 +42,13 @@ impl RelativeVolume {
         RelativeVolume::new(eye, ConvexVolume::from_planes(&planes)?)
     }
 
+    #[inline(always)]
     pub fn eye(&self) -> Vec3 {
         self.eye
     }
 
     /// The planes about the eye.
+    #[inline(always)]
     pub fn planes(&self) -> &ConvexVolume {
         &self.planes
     }

@@ -156,6 +156,7 @@ impl Spheres {
         }
     }
 
+    #[inline(always)]
     pub fn planes(&self) -> &ConvexVolume {
         &self.planes
     }

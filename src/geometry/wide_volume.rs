@@ -5,7 +5,7 @@
 use glam::DVec3;
 
 use super::convex_volume::MAX_PLANES;
-use super::{Aabb, ConvexVolume, Plane, PlaneMask, VolumeError};
+use super::{Aabb, ConvexVolume, Plane, PlaneMask, Upper, VolumeError};
 
 /// A half-space in f64: the points `x` with `normal . x + d >= 0` (closed).
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -71,6 +71,8 @@ impl From<&Plane> for WidePlane {
 pub struct WideVolume {
     planes: [WidePlane; MAX_PLANES],
     count: usize,
+    mask: PlaneMask,
+    upper: [Upper; MAX_PLANES],
 }
 
 impl WideVolume {
@@ -84,12 +86,17 @@ impl WideVolume {
         let mut volume = WideVolume {
             planes: [WidePlane::new(DVec3::ZERO, 0.0); MAX_PLANES],
             count,
+            mask: 0,
+            upper: [[true; 3]; MAX_PLANES],
         };
         for (index, &plane) in planes.iter().enumerate() {
             if !(plane.normal.is_finite() && plane.d.is_finite()) {
                 return Err(VolumeError::NonFiniteWidePlane { index, plane });
             }
+            let trivial = plane.normal == DVec3::ZERO && plane.d >= 0.0;
             volume.planes[index] = plane;
+            volume.upper[index] = plane.normal.to_array().map(|n| n >= 0.0);
+            volume.mask |= PlaneMask::from(!trivial) << index;
         }
         Ok(volume)
     }
@@ -104,13 +111,16 @@ impl WideVolume {
         &self.planes[index as usize % MAX_PLANES]
     }
 
+    /// Which bounds the p-vertex of plane `index` takes, likewise.
+    #[inline(always)]
+    pub fn upper_of_bit(&self, index: u32) -> Upper {
+        self.upper[index as usize % MAX_PLANES]
+    }
+
     /// Bits of the planes that constrain anything.
+    #[inline(always)]
     pub fn mask(&self) -> PlaneMask {
-        let trivial = |p: &WidePlane| p.normal == DVec3::ZERO && p.d >= 0.0;
-        let planes = self.planes().iter().enumerate();
-        planes
-            .filter(|(_, plane)| !trivial(plane))
-            .fold(0, |mask, (i, _)| mask | 1 << i)
+        self.mask
     }
 }
 
@@ -124,6 +134,8 @@ impl From<&ConvexVolume> for WideVolume {
         WideVolume {
             planes,
             count: volume.planes().len(),
+            mask: volume.mask(),
+            upper: std::array::from_fn(|index| volume.upper_of_bit(index as u32)),
         }
     }
 }

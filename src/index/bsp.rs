@@ -47,6 +47,7 @@ impl Split {
 
     /// Position along the normal, by the plane test's own arithmetic: being
     /// monotone, it never puts a point of an item beyond the item's corner.
+    #[inline(always)]
     fn along(&self) -> Plane {
         Plane::new(self.normal, 0.0)
     }
@@ -384,6 +385,7 @@ impl RegionIndex for Bsp {
     }
 
     /// Descends by planes: one dot product a node, O(log n) on a tiling.
+    #[inline(always)]
     fn locate<S: Sink, R: Recorder>(
         &self,
         p: Vec3,

@@ -1,6 +1,6 @@
 //! One object type for all structures, and the table they are listed in.
 //! Dispatch happens once per query, never per node: behind each method stands
-//! a traversal compiled for that structure, view, sink and recorder.
+//! a traversal compiled for that structure, view, recorder and instruction set.
 
 use glam::Vec3;
 use serde_json::{Map, Value};
@@ -10,7 +10,8 @@ use super::{
     RegionIndex,
 };
 use crate::geometry::{Aabb, ConvexVolume, PlaneTree};
-use crate::query::{AnyView, ItemId, NoRecorder, QueryCost, Recorder};
+use crate::kernel::{Kernel, Work};
+use crate::query::{AnyView, ItemId, NoRecorder, QueryCost, Recorder, View};
 use crate::spec::{Spec, SpecError};
 
 /// A built structure of any kind. Answers are appended to `out`.
@@ -42,19 +43,19 @@ impl<T: FrustumQuery> DynIndex for T {
     }
 
     fn see(&self, view: AnyView<'_>, out: &mut Vec<ItemId>) {
-        ask(self, view, out, &mut NoRecorder);
+        see(self, view, out, &mut NoRecorder);
     }
 
     fn see_counted(&self, view: AnyView<'_>, out: &mut Vec<ItemId>, cost: &mut QueryCost) {
-        ask(self, view, out, cost);
+        see(self, view, out, cost);
     }
 
     fn locate(&self, p: Vec3, out: &mut Vec<ItemId>) {
-        let _ = RegionIndex::locate(self, p, out, &mut NoRecorder);
+        locate(self, p, out, &mut NoRecorder);
     }
 
     fn locate_counted(&self, p: Vec3, out: &mut Vec<ItemId>, cost: &mut QueryCost) {
-        let _ = RegionIndex::locate(self, p, out, cost);
+        locate(self, p, out, cost);
     }
 
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
@@ -62,20 +63,79 @@ impl<T: FrustumQuery> DynIndex for T {
     }
 }
 
-/// The one place that tells views apart: a traversal of its own for each.
-fn ask<T: FrustumQuery, R: Recorder>(
+/// A frustum query as the chosen kernel does it.
+struct See<'a, T, V, R> {
+    index: &'a T,
+    view: &'a V,
+    out: &'a mut Vec<ItemId>,
+    recorder: &'a mut R,
+}
+
+impl<T: FrustumQuery, V: View, R: Recorder> Work for See<'_, T, V, R> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        // A Vec never breaks off.
+        let _ = self.index.visible(self.view, self.out, self.recorder);
+    }
+}
+
+/// A region search as the chosen kernel does it.
+struct Locate<'a, T, R> {
+    index: &'a T,
+    p: Vec3,
+    out: &'a mut Vec<ItemId>,
+    recorder: &'a mut R,
+}
+
+impl<T: RegionIndex, R: Recorder> Work for Locate<'_, T, R> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let _ = self.index.locate(self.p, self.out, self.recorder);
+    }
+}
+
+/// The one place that tells views and kernels apart: a traversal of its own
+/// for each.
+fn see<T: FrustumQuery, R: Recorder>(
     index: &T,
     view: AnyView<'_>,
     out: &mut Vec<ItemId>,
     recorder: &mut R,
 ) {
-    // A Vec never breaks off.
-    let _ = match view {
-        AnyView::Volume(view) => index.visible(view, out, recorder),
-        AnyView::Spheres(view) => index.visible(view, out, recorder),
-        AnyView::Wide(view) => index.visible(view, out, recorder),
-        AnyView::Relative(view) => index.visible(view, out, recorder),
-    };
+    macro_rules! ask {
+        ($view:expr) => {
+            Kernel::chosen().run(See {
+                index,
+                view: $view,
+                out,
+                recorder,
+            })
+        };
+    }
+    match view {
+        AnyView::Volume(view) => ask!(view),
+        AnyView::Spheres(view) => ask!(view),
+        AnyView::Wide(view) => ask!(view),
+        AnyView::Relative(view) => ask!(view),
+    }
+}
+
+fn locate<T: RegionIndex, R: Recorder>(
+    index: &T,
+    p: Vec3,
+    out: &mut Vec<ItemId>,
+    recorder: &mut R,
+) {
+    Kernel::chosen().run(Locate {
+        index,
+        p,
+        out,
+        recorder,
+    });
 }
 
 type Build = fn(&[Aabb], Option<&PlaneTree>, &Value) -> Result<Box<dyn DynIndex>, BuildError>;

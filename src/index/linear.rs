@@ -25,6 +25,7 @@ pub struct LinearScalar {
 }
 
 impl LinearScalar {
+    #[inline(always)]
     fn scan<G: Region, S: Sink, R: Recorder>(
         &self,
         region: &G,
@@ -60,6 +61,7 @@ impl RegionIndex for LinearScalar {
         }
     }
 
+    #[inline(always)]
     fn locate<S: Sink, R: Recorder>(
         &self,
         p: Vec3,
@@ -71,6 +73,7 @@ impl RegionIndex for LinearScalar {
 }
 
 impl FrustumQuery for LinearScalar {
+    #[inline(always)]
     fn visible<V: View, S: Sink, R: Recorder>(
         &self,
         view: &V,
@@ -89,6 +92,7 @@ pub struct Linear {
 }
 
 impl Linear {
+    #[inline(always)]
     fn scan<G: Region, S: Sink, R: Recorder>(
         &self,
         region: &G,
@@ -127,6 +131,7 @@ impl RegionIndex for Linear {
         }
     }
 
+    #[inline(always)]
     fn locate<S: Sink, R: Recorder>(
         &self,
         p: Vec3,
@@ -138,6 +143,7 @@ impl RegionIndex for Linear {
 }
 
 impl FrustumQuery for Linear {
+    #[inline(always)]
     fn visible<V: View, S: Sink, R: Recorder>(
         &self,
         view: &V,

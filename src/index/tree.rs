@@ -26,11 +26,13 @@ pub struct TreeNode {
 
 impl TreeNode {
     /// The places of the subtree's items in tree order.
+    #[inline(always)]
     pub fn items(&self) -> Range<usize> {
         self.first as usize..(self.first + self.count) as usize
     }
 
     /// The node after this subtree in depth-first order.
+    #[inline(always)]
     pub fn after(&self) -> usize {
         self.after as usize
     }
@@ -108,6 +110,7 @@ impl TreeWriter {
 }
 
 impl PackedTree {
+    #[inline(always)]
     pub fn nodes(&self) -> &[TreeNode] {
         &self.nodes
     }
@@ -123,6 +126,7 @@ impl PackedTree {
     }
 
     /// Whether the node has no children.
+    #[inline(always)]
     pub fn is_leaf(&self, node: usize) -> bool {
         self.nodes[node].after() == node + 1
     }
@@ -147,6 +151,7 @@ impl PackedTree {
     /// over, an accepted one is a single slice, and a straddling one leaves
     /// its memo (for a view the mask of planes still open) for all nodes up
     /// to its end.
+    #[inline(always)]
     pub fn query<G: Region, S: Sink, R: Recorder>(
         &self,
         region: &G,
@@ -290,6 +295,7 @@ macro_rules! searched_by_tree {
             self.tree.memory()
         }
 
+        #[inline(always)]
         fn locate<S: $crate::query::Sink, R: $crate::query::Recorder>(
             &self,
             p: glam::Vec3,
@@ -310,6 +316,7 @@ pub(super) use searched_by_tree;
 macro_rules! seen_by_tree {
     ($structure:ty) => {
         impl $crate::index::FrustumQuery for $structure {
+            #[inline(always)]
             fn visible<
                 V: $crate::query::View,
                 S: $crate::query::Sink,
@@ -368,6 +375,7 @@ pub(super) struct Stack<M> {
 }
 
 impl<M: Copy> Stack<M> {
+    #[inline(always)]
     pub(super) fn new(root: (u32, M)) -> Self {
         Stack {
             near: [root; NEAR],

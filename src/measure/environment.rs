@@ -7,6 +7,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use sysinfo::{CpuRefreshKind, MemoryRefreshKind, RefreshKind, System};
 
+use crate::kernel::Kernel;
 use crate::scene::hex;
 
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
@@ -15,6 +16,8 @@ pub struct Machine {
     pub cpu: Option<String>,
     /// SIMD features that kernels may choose by.
     pub features: Vec<String>,
+    /// The kernel that queries ran by, of those this processor has.
+    pub instruction_set: String,
     pub cores: usize,
     /// Data and unified caches of the first core, innermost first.
     pub caches: Vec<Cache>,
@@ -66,6 +69,7 @@ impl Machine {
         Machine {
             cpu: brand.filter(|brand| !brand.is_empty()),
             features: simd_features(),
+            instruction_set: Kernel::chosen().name().to_owned(),
             cores: std::thread::available_parallelism().map_or(1, usize::from),
             caches: caches(Path::new("/sys/devices/system/cpu/cpu0/cache")),
             memory_bytes: system.map(|s| s.total_memory()),

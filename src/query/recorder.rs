@@ -48,19 +48,24 @@ impl QueryCost {
 }
 
 impl Recorder for QueryCost {
+    #[inline(always)]
     fn node_tested(&mut self) {
         self.nodes_tested += 1;
     }
+    #[inline(always)]
     fn planes_tested(&mut self, count: u32) {
         self.planes_tested += u64::from(count);
     }
+    #[inline(always)]
     fn items_tested(&mut self, count: u32) {
         self.items_tested += u64::from(count);
     }
+    #[inline(always)]
     fn subtree_accepted(&mut self, items: usize) {
         self.subtrees_accepted += 1;
         self.items_accepted_untested += items as u64;
     }
+    #[inline(always)]
     fn subtree_rejected(&mut self) {
         self.subtrees_rejected += 1;
     }

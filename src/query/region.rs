@@ -50,6 +50,7 @@ pub trait Region {
     fn admit_lanes(&self, block: &BoxBlock, memo: Self::Memo) -> LaneMask;
 
     /// How many planes a test with this memo evaluates.
+    #[inline(always)]
     fn planes_open(_memo: Self::Memo) -> u32 {
         0
     }
@@ -59,6 +60,7 @@ pub trait Region {
 impl Region for Vec3 {
     type Memo = ();
 
+    #[inline(always)]
     fn start(&self) {}
 
     #[inline(always)]
@@ -79,6 +81,7 @@ impl Region for Vec3 {
 impl Region for Aabb {
     type Memo = ();
 
+    #[inline(always)]
     fn start(&self) {}
 
     #[inline(always)]

@@ -12,7 +12,7 @@ pub trait Sink {
 
 /// Collects all ids, in the structure's own order.
 impl Sink for Vec<ItemId> {
-    #[inline]
+    #[inline(always)]
     fn accept(&mut self, ids: &[ItemId]) -> ControlFlow<()> {
         self.extend_from_slice(ids);
         ControlFlow::Continue(())
@@ -24,7 +24,7 @@ impl Sink for Vec<ItemId> {
 pub struct Count(pub u64);
 
 impl Sink for Count {
-    #[inline]
+    #[inline(always)]
     fn accept(&mut self, ids: &[ItemId]) -> ControlFlow<()> {
         self.0 += ids.len() as u64;
         ControlFlow::Continue(())
@@ -36,7 +36,7 @@ impl Sink for Count {
 pub struct First(pub Option<ItemId>);
 
 impl Sink for First {
-    #[inline]
+    #[inline(always)]
     fn accept(&mut self, ids: &[ItemId]) -> ControlFlow<()> {
         match ids.first() {
             Some(&id) => {

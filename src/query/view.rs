@@ -3,7 +3,8 @@
 //! of them share, and one type for any of them.
 
 use crate::geometry::{
-    Aabb, BoxBlock, ConvexVolume, LaneMask, PlaneMask, RelativeVolume, Spheres, WideVolume,
+    Aabb, BoxBlock, ConvexVolume, LaneMask, Plane, PlaneMask, RelativeVolume, Spheres, Upper,
+    WideVolume,
 };
 
 use super::{Containment, NoRecorder, Recorder, Region};
@@ -99,6 +100,7 @@ impl<V: View> Region for V {
         self.kept_lanes(block, mask)
     }
 
+    #[inline(always)]
     fn planes_open(mask: PlaneMask) -> u32 {
         mask.count_ones()
     }
@@ -121,7 +123,7 @@ impl View for ConvexVolume {
     }
     #[inline(always)]
     fn kept_lanes(&self, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
-        block.admitted_by(Bits(mask).map(|plane| self.plane_of_bit(plane)))
+        block.admitted_by(planes_of(self, mask))
     }
 }
 
@@ -147,7 +149,10 @@ impl View for Spheres {
     }
     #[inline(always)]
     fn kept_lanes(&self, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
-        block.admitted_as_spheres(Bits(mask).map(|plane| self.plane_of_bit(plane)))
+        block.admitted_as_spheres(Bits(mask).map(|index| {
+            let (plane, margin) = self.plane_of_bit(index);
+            (plane, self.planes().upper_of_bit(index), margin)
+        }))
     }
 }
 
@@ -168,7 +173,8 @@ impl View for WideVolume {
     }
     #[inline(always)]
     fn kept_lanes(&self, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
-        block.admitted_by_wide(Bits(mask).map(|plane| self.plane_of_bit(plane)))
+        let planes = Bits(mask).map(|plane| (self.plane_of_bit(plane), self.upper_of_bit(plane)));
+        block.admitted_by_wide(planes)
     }
 }
 
@@ -192,8 +198,8 @@ impl View for RelativeVolume {
     }
     #[inline(always)]
     fn kept_lanes(&self, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
-        let planes = Bits(mask).map(|plane| self.planes().plane_of_bit(plane));
-        block.relative_to(self.eye()).admitted_by(planes)
+        let moved = block.relative_to(self.eye());
+        moved.admitted_by(planes_of(self.planes(), mask))
     }
 }
 
@@ -230,6 +236,12 @@ macro_rules! any_view_of {
 }
 any_view_of!(Volume: ConvexVolume, Spheres: Spheres, Wide: WideVolume, Relative: RelativeVolume);
 
+/// The planes of a mask as the kernels for blocks take them.
+#[inline(always)]
+fn planes_of(volume: &ConvexVolume, mask: PlaneMask) -> impl Iterator<Item = (&Plane, Upper)> {
+    Bits(mask).map(|plane| (volume.plane_of_bit(plane), volume.upper_of_bit(plane)))
+}
+
 /// The bits that are set, lowest first.
 struct Bits(PlaneMask);
 
@@ -250,7 +262,7 @@ impl Iterator for Bits {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{BoxBlocks, Plane, sphere_cube};
+    use crate::geometry::{BoxBlocks, sphere_cube};
     use glam::Vec3;
     use proptest::prelude::*;
 

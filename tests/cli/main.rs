@@ -6,6 +6,7 @@
 
 mod bad_input;
 mod drift;
+mod kernels;
 mod listing;
 mod pipes;
 mod process;

@@ -1,0 +1,197 @@
+//! Instruction sets to choose from at run time: one source, compiled once for
+//! each of them, and the same answer bit for bit. The only module of the crate
+//! with unsafe code: a call that is sound because the processor was asked.
+//!
+//! No kernel contracts a product and a sum into a fused multiply-add: Rust
+//! never does so unasked, whatever the instruction set offers, and the plane
+//! test relies on it.
+#![allow(unsafe_code)]
+
+use std::fmt;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU8, Ordering};
+
+/// An instruction set that queries are compiled for.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+pub enum Kernel {
+    /// What the program was compiled for: SSE2 on x86-64, NEON on AArch64.
+    Portable,
+    /// 256-bit vectors and the bit instructions of the same generation.
+    Avx2,
+    /// 512-bit vectors: a block of sixteen boxes is one register a row.
+    Avx512,
+}
+
+/// A piece of work that [`Kernel::run`] compiles for each instruction set.
+///
+/// `run` and all that is hot in it must be `#[inline(always)]`: what stays a
+/// call of its own was compiled for the portable set.
+pub trait Work {
+    type Output;
+
+    fn run(self) -> Self::Output;
+}
+
+/// Why a kernel cannot be chosen.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[error("kernel '{kernel}' needs instructions that this processor does not have")]
+pub struct Unavailable {
+    pub kernel: Kernel,
+}
+
+/// The kernel that erased structures run by: its place in [`Kernel::ALL`] plus
+/// one, or 0 if nobody has chosen yet.
+static CHOSEN: AtomicU8 = AtomicU8::new(0);
+
+impl Kernel {
+    /// From the smallest instruction set to the largest.
+    pub const ALL: [Kernel; 3] = [Kernel::Portable, Kernel::Avx2, Kernel::Avx512];
+
+    pub const fn name(self) -> &'static str {
+        match self {
+            Kernel::Portable => "portable",
+            Kernel::Avx2 => "avx2",
+            Kernel::Avx512 => "avx512",
+        }
+    }
+
+    pub fn named(name: &str) -> Option<Kernel> {
+        Kernel::ALL.into_iter().find(|k| k.name() == name)
+    }
+
+    /// Whether this processor (and operating system) runs it. Asked once.
+    #[inline]
+    pub fn is_available(self) -> bool {
+        static AVAILABLE: OnceLock<[bool; 3]> = OnceLock::new();
+        AVAILABLE.get_or_init(|| Kernel::ALL.map(Kernel::detect))[self as usize]
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    fn detect(self) -> bool {
+        macro_rules! all {
+            ($($feature:tt),*) => { true $(&& std::arch::is_x86_feature_detected!($feature))* };
+        }
+        // The features of `avx2` and `avx512` below, each by name.
+        let avx2 = || all!("avx2", "bmi1", "bmi2", "lzcnt", "popcnt");
+        match self {
+            Kernel::Portable => true,
+            Kernel::Avx2 => avx2(),
+            Kernel::Avx512 => avx2() && all!("avx512f", "avx512vl", "avx512bw", "avx512dq"),
+        }
+    }
+
+    #[cfg(not(target_arch = "x86_64"))]
+    fn detect(self) -> bool {
+        self == Kernel::Portable
+    }
+
+    /// The kernels of this machine, [`Kernel::Portable`] first.
+    pub fn available() -> impl Iterator<Item = Kernel> {
+        Kernel::ALL
+            .into_iter()
+            .filter(|kernel| kernel.is_available())
+    }
+
+    /// The largest instruction set of this machine.
+    pub fn best() -> Kernel {
+        Kernel::available().last().unwrap_or(Kernel::Portable)
+    }
+
+    /// Makes this the kernel of the whole process, from the next query on.
+    ///
+    /// # Errors
+    /// The processor lacks it; nothing has changed then.
+    pub fn choose(self) -> Result<(), Unavailable> {
+        if !self.is_available() {
+            return Err(Unavailable { kernel: self });
+        }
+        CHOSEN.store(self as u8 + 1, Ordering::Relaxed);
+        Ok(())
+    }
+
+    /// The kernel of the process: the last one chosen, else the best.
+    #[inline]
+    pub fn chosen() -> Kernel {
+        match CHOSEN.load(Ordering::Relaxed) {
+            0 => Kernel::best(),
+            place => Kernel::ALL[usize::from(place - 1) % Kernel::ALL.len()],
+        }
+    }
+
+    /// Does the work with this instruction set, or with the portable one where
+    /// the processor lacks it. The result is the same either way.
+    #[inline]
+    pub fn run<W: Work>(self, work: W) -> W::Output {
+        #[cfg(target_arch = "x86_64")]
+        match self {
+            Kernel::Avx512 if self.is_available() => {
+                // SAFETY: `detect` has found every feature that `avx512` is
+                // compiled for on this processor.
+                return unsafe { avx512(work) };
+            }
+            Kernel::Avx2 if self.is_available() => {
+                // SAFETY: as above, for the features of `avx2`.
+                return unsafe { avx2(work) };
+            }
+            _ => {}
+        }
+        work.run()
+    }
+}
+
+impl fmt::Display for Kernel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+fn avx2<W: Work>(work: W) -> W::Output {
+    work.run()
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512vl,avx512bw,avx512dq,avx2,bmi1,bmi2,lzcnt,popcnt")]
+fn avx512<W: Work>(work: W) -> W::Output {
+    work.run()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_read_back_and_portable_is_everywhere() {
+        for kernel in Kernel::ALL {
+            assert_eq!(Kernel::named(kernel.name()), Some(kernel));
+        }
+        assert_eq!(Kernel::named("AVX2"), None);
+        assert_eq!(Kernel::available().next(), Some(Kernel::Portable));
+        assert!(Kernel::best().is_available());
+    }
+
+    /// Sixteen products and sums, which a fused multiply-add would round once.
+    struct MulAdd<'a>(&'a [f32; 16], &'a [f32; 16], &'a [f32; 16]);
+
+    impl Work for MulAdd<'_> {
+        type Output = [f32; 16];
+
+        #[inline(always)]
+        fn run(self) -> [f32; 16] {
+            std::array::from_fn(|lane| self.0[lane] * self.1[lane] + self.2[lane])
+        }
+    }
+
+    #[test]
+    fn no_kernel_fuses_a_product_and_a_sum() {
+        let x: [f32; 16] = std::array::from_fn(|i| 1.0 + (i + 1) as f32 * 2f32.powi(-12));
+        let minus_square = x.map(|x| -(x * x));
+        let fused = x[0].mul_add(x[0], minus_square[0]);
+        assert_ne!(fused, 0.0, "the premise: fused, something is left");
+        for kernel in Kernel::available() {
+            let (x, y) = (std::hint::black_box(x), std::hint::black_box(minus_square));
+            assert_eq!(kernel.run(MulAdd(&x, &x, &y)), [0.0; 16], "{kernel}");
+        }
+    }
+}

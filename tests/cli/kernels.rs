@@ -1,0 +1,79 @@
+//! `--kernel`: the same bytes whatever the instruction set, what reports say
+//! of it, and what is refused.
+
+use super::process::*;
+
+/// The kernels that this machine has, as `env` and the program tell.
+fn available() -> Vec<&'static str> {
+    let all = ["portable", "avx2", "avx512"];
+    let here = folder(&[]);
+    let takes = |name: &&str| {
+        let line = "query --scene helsinki --cameras orbit:frames=1 --structure linear --kernel";
+        cullbench(here.path(), &format!("{line} {name}")).code == Some(0)
+    };
+    all.into_iter().filter(takes).collect()
+}
+
+#[test]
+fn ids_are_the_same_bytes_from_every_kernel() {
+    let here = folder(&[]);
+    let kernels = available();
+    assert_eq!(kernels[0], "portable");
+    for (scene, cameras) in [
+        ("helsinki", "flythrough:frames=4"),
+        ("city:n=3000,seed=3", "teleport:frames=6"),
+        ("freedm-map12", "flythrough:frames=4"),
+    ] {
+        let line = format!("query --scene {scene} --cameras {cameras} --ids");
+        let wanted = works(here.path(), &line);
+        assert!(wanted.lines().count() > 20);
+        for kernel in &kernels {
+            let text = works(here.path(), &format!("{line} --kernel {kernel}"));
+            assert!(text == wanted, "{scene}, {kernel}");
+        }
+    }
+}
+
+#[test]
+fn a_kernel_that_is_none_is_refused_in_one_line() {
+    let here = folder(&[("p.csv", b"x,y,z\n1,2,3\n")]);
+    for command in [
+        "run --suite quick",
+        "query --scene helsinki --cameras orbit:frames=1",
+        "locate --scene freedm-map12 --points p.csv",
+        "verify --cases 1",
+    ] {
+        let done = cullbench(here.path(), &format!("{command} --kernel avx3"));
+        assert_refused(
+            &done,
+            "unknown kernel 'avx3' | did you mean 'avx2'",
+            command,
+        );
+    }
+    let kernels = available();
+    for missing in ["avx2", "avx512"] {
+        if !kernels.contains(&missing) {
+            let line = format!("verify --cases 1 --kernel {missing}");
+            let done = cullbench(here.path(), &line);
+            assert_refused(&done, &format!("'{missing}' | here are: portable"), &line);
+        }
+    }
+}
+
+#[test]
+fn a_report_says_which_kernel_and_goes_on_with_no_other() {
+    let here = folder(&[]);
+    let line = "run --scene uniform:n=50 --path orbit:frames=2 --structure linear --out o";
+    works(here.path(), &format!("{line} --kernel portable"));
+    let report = std::fs::read_to_string(here.path().join("o/report.json")).expect("a report");
+    assert_eq!(json(&report)["machine"]["instruction_set"], "portable");
+    works(here.path(), &format!("{line} --resume --kernel portable"));
+    let env = json(&works(here.path(), "env --format json"));
+    let best = env["machine"]["instruction_set"].as_str().expect("a name");
+    assert_eq!(Some(&best), available().last());
+    if best != "portable" {
+        let done = cullbench(here.path(), &format!("{line} --resume"));
+        let wanted = format!("--kernel portable | not {best}");
+        assert_refused(&done, &wanted, "another kernel");
+    }
+}
