@@ -112,6 +112,10 @@ pub trait FrustumQuery: RegionIndex {
     /// [`ConvexVolume`](crate::geometry::ConvexVolume) these are the items
     /// that its planes (six of a frustum, or as many as there are) do not
     /// exclude.
+    ///
+    /// Mark it and what it calls `#[inline(always)]`: [`DynIndex`] compiles it
+    /// for each [`Kernel`](crate::kernel::Kernel), and a call that stays a call
+    /// runs portable code.
     fn visible<V: View, S: Sink, R: Recorder>(
         &self,
         view: &V,
