@@ -1,0 +1,387 @@
+//! Planes level: verdicts against the linear program, on the random cases of
+//! the verification, on small whole numbers (where exact ties are frequent) and
+//! on the whole range of f32.
+
+use std::collections::BTreeSet;
+
+use cullbench::geometry::{Aabb, ConvexVolume, MAX_PLANES, Plane};
+use cullbench::oracle::{Oracle, Verdict};
+use cullbench::verify::{RandomCase, VOLUME_KINDS};
+use glam::Vec3;
+
+use crate::cases;
+use crate::draw::Dice;
+use crate::simplex;
+
+/// What a run met: cases by verdict, and how many of them no plane shows alone
+/// (edges against edges, corners, bounds).
+#[derive(Default, Debug)]
+struct Tally {
+    verdicts: [usize; 3],
+    combined: [usize; 3],
+    /// The numbers of planes met.
+    counts: BTreeSet<usize>,
+}
+
+impl Tally {
+    fn cases(&self) -> usize {
+        self.verdicts.iter().sum()
+    }
+
+    fn share(&self, verdict: Verdict) -> f64 {
+        self.verdicts[verdict as usize] as f64 / self.cases() as f64
+    }
+
+    fn combined_share(&self, verdict: Verdict) -> f64 {
+        self.combined[verdict as usize] as f64 / self.cases() as f64
+    }
+
+    fn check(&mut self, planes: &[Plane], boxes: &[Aabb], name: &dyn Fn() -> String) {
+        let volume = ConvexVolume::from_planes(planes).expect("finite planes");
+        let oracle = Oracle::of_volume(&volume);
+        let exact: Vec<simplex::ExactPlane> = planes.iter().map(simplex::exact).collect();
+        for b in boxes {
+            let wanted = simplex::verdict(&exact, b);
+            let found = oracle.judge(b);
+            assert!(
+                found.verdict == wanted && !found.undecided,
+                "{}: {found:?}, wanted {wanted:?}, for {b:?} and {planes:?}",
+                name()
+            );
+            self.verdicts[wanted as usize] += 1;
+            self.counts.insert(planes.len());
+            let alone = exact
+                .iter()
+                .any(|plane| simplex::verdict(std::slice::from_ref(plane), b) == wanted);
+            self.combined[wanted as usize] += usize::from(!alone);
+        }
+    }
+}
+
+#[test]
+fn random_cases_of_every_volume_kind() {
+    let mut tally = Tally::default();
+    let mut kinds = [0; VOLUME_KINDS.len()];
+    let wanted = cases(20_000);
+    for seed in 0.. {
+        let case = RandomCase::new(seed);
+        let boxes = &case.items[..case.items.len().min(12)];
+        tally.check(case.volume.planes(), boxes, &|| {
+            format!("seed {seed} ({})", VOLUME_KINDS[case.kind])
+        });
+        kinds[case.kind] += boxes.len();
+        if tally.cases() >= wanted {
+            break;
+        }
+    }
+    println!("random: {tally:?} of kinds {kinds:?}");
+    assert!(kinds.iter().all(|&n| n * 20 > wanted), "{kinds:?}");
+    assert!(tally.share(Verdict::In) > 0.1, "{tally:?}");
+    assert!(tally.share(Verdict::Out) > 0.1, "{tally:?}");
+}
+
+/// Mostly few planes, now and then up to the limit.
+fn plane_count(dice: &mut Dice) -> usize {
+    match dice.below(8) {
+        0..4 => 1 + dice.below(6),
+        4 | 5 => 4 + dice.below(5),
+        6 => 1 + dice.below(MAX_PLANES),
+        _ => MAX_PLANES,
+    }
+}
+
+/// A volume of small whole numbers and boxes that often share a grid point
+/// with its boundary.
+fn grid_case(dice: &mut Dice) -> (Vec<Plane>, Vec<Aabb>) {
+    let (planes, tips) = match dice.below(3) {
+        0 => grid_frustum(dice),
+        1 => grid_cone(dice),
+        _ => (grid_planes(dice), vec![dice.whole3(4)]),
+    };
+    let boxes = (0..4).map(|_| {
+        let tip = tips[dice.below(tips.len())];
+        let elsewhere = dice.whole3(9);
+        let near_tip = dice.chance(0.7);
+        let mut b = grid_box(dice, if near_tip { tip } else { elsewhere });
+        if dice.chance(0.02) {
+            (b.min, b.max) = (b.max, b.min);
+        }
+        b
+    });
+    let boxes = boxes.collect();
+    (planes, boxes)
+}
+
+/// A box that begins, ends or has its inside at `point`, axis by axis; some
+/// are flat, some points.
+fn grid_box(dice: &mut Dice, point: Vec3) -> Aabb {
+    let reach = |dice: &mut Dice| {
+        let unit = if dice.chance(0.5) { 1.0 } else { 0.5 };
+        dice.below(4) as f32 * unit
+    };
+    let (mut low, mut high) = (point, point);
+    for k in 0..3 {
+        let side = dice.below(5);
+        if side < 3 {
+            low[k] -= reach(dice);
+        }
+        if side == 0 || side > 2 {
+            high[k] += reach(dice);
+        }
+    }
+    Aabb::new(low, high)
+}
+
+/// Planes about a grid point; now and then one of nothing but zeros, or an
+/// empty volume.
+fn grid_planes(dice: &mut Dice) -> Vec<Plane> {
+    let count = plane_count(dice);
+    let centre = dice.whole3(3);
+    let plane = |_| {
+        let normal = dice.whole3(2);
+        let distance = match dice.below(60) {
+            0 => dice.whole(2),
+            1..8 => 0,
+            _ => 1 + dice.below(9) as i64,
+        };
+        Plane::new(normal, distance as f32 - normal.dot(centre))
+    };
+    (0..count).map(plane).collect()
+}
+
+/// Planes through one point, the tip of a cone (or wedge, or all there is).
+fn grid_cone(dice: &mut Dice) -> (Vec<Plane>, Vec<Vec3>) {
+    let tip = dice.whole3(5);
+    let axis = dice.whole3(3);
+    let count = if dice.chance(0.9) {
+        2 + dice.below(5)
+    } else {
+        plane_count(dice)
+    };
+    let plane = |_| {
+        let mut normal = dice.whole3(3);
+        if normal.dot(axis) < 0.0 && dice.chance(0.95) {
+            normal = -normal;
+        }
+        Plane::new(normal, -normal.dot(tip))
+    };
+    let planes = (0..count).map(plane).collect();
+    // A point on a ray of the cone, more often than not inside it.
+    (planes, vec![tip, tip, tip + axis])
+}
+
+/// Vector A02 with whole slopes, in any position and along any axis, and its
+/// corners; now and then with an infinite far plane or one side open.
+fn grid_frustum(dice: &mut Dice) -> (Vec<Plane>, Vec<Vec3>) {
+    let mut slope = || 1.0 + dice.below(2) as f32;
+    let (x, y) = (slope(), slope());
+    let near = 2.0;
+    let far = near + 2.0 + 2.0 * dice.below(4) as f32;
+    let eye = dice.whole3(3);
+    let turn = dice.below(3);
+    let turned = |n: Vec3| match turn {
+        0 => n,
+        1 => Vec3::new(n.y, n.z, n.x),
+        _ => Vec3::new(n.z, n.x, n.y),
+    };
+    let mut planes = vec![
+        (Vec3::new(x, 0.0, -1.0), 0.0),
+        (Vec3::new(-x, 0.0, -1.0), 0.0),
+        (Vec3::new(0.0, y, -1.0), 0.0),
+        (Vec3::new(0.0, -y, -1.0), 0.0),
+        (Vec3::new(0.0, 0.0, -1.0), -near),
+        (Vec3::new(0.0, 0.0, 1.0), far),
+    ];
+    match dice.below(6) {
+        0 => drop(planes.pop()),
+        1 => drop(planes.swap_remove(dice.below(4))),
+        _ => {}
+    }
+    let placed = planes.into_iter().map(|(normal, d)| {
+        let normal = turned(normal);
+        Plane::new(normal, d - normal.dot(eye))
+    });
+    let mut tips = vec![eye];
+    for depth in [near, far] {
+        for (left, bottom) in [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)] {
+            let corner = Vec3::new(left * depth / x, bottom * depth / y, -depth);
+            tips.push(eye + turned(corner));
+            tips.push(eye + turned(corner.with_x(0.0)));
+        }
+    }
+    (placed.collect(), tips)
+}
+
+#[test]
+fn small_whole_numbers_where_ties_are_frequent() {
+    let mut tally = Tally::default();
+    let wanted = cases(20_000);
+    for seed in 0.. {
+        let (planes, boxes) = grid_case(&mut Dice::new(seed));
+        tally.check(&planes, &boxes, &|| format!("seed {seed}"));
+        if tally.cases() >= wanted {
+            break;
+        }
+    }
+    println!("grid: {tally:?}");
+    assert!(tally.share(Verdict::Touch) > 0.1, "{tally:?}");
+    assert!(tally.combined_share(Verdict::Touch) > 0.02, "{tally:?}");
+    assert!(
+        (1..=MAX_PLANES).eq(tally.counts.iter().copied()),
+        "{tally:?}"
+    );
+}
+
+/// An f32 of any sign and mantissa, `2^low` to `2^high`.
+fn float(dice: &mut Dice, low: i32, high: i32) -> f32 {
+    let exponent = low + dice.below((high - low) as usize) as i32;
+    let mantissa = 1.0 + dice.unit();
+    let sign = if dice.chance(0.5) { 1.0 } else { -1.0 };
+    (sign * libm::ldexp(mantissa, exponent)) as f32
+}
+
+fn ordered(a: [f32; 3], b: [f32; 3]) -> Aabb {
+    let (a, b) = (Vec3::from_array(a), Vec3::from_array(b));
+    Aabb::new(a.min(b), a.max(b))
+}
+
+/// One step up or down, not off the finite numbers.
+fn nudged(x: f32, dice: &mut Dice) -> f32 {
+    let moved = if dice.chance(0.5) {
+        x.next_up()
+    } else {
+        x.next_down()
+    };
+    if moved.is_finite() { moved } else { x }
+}
+
+/// Any bit patterns at all.
+fn wild(dice: &mut Dice) -> (Vec<Plane>, Vec<Aabb>) {
+    let some = |dice: &mut Dice| match dice.below(8) {
+        0 => 0.0,
+        1 => f32::from_bits(dice.bits() as u32 & 0x8000_FFFF),
+        _ => dice.any_f32(),
+    };
+    let planes = (0..plane_count(dice).min(9))
+        .map(|_| Plane::new(Vec3::from_array([0; 3].map(|_| some(dice))), some(dice)))
+        .collect();
+    let boxes = (0..4).map(|_| ordered([0; 3].map(|_| some(dice)), [0; 3].map(|_| some(dice))));
+    (planes, boxes.collect())
+}
+
+/// Magnitudes mixed over some forty binary orders, all planes about one box.
+fn mixed(dice: &mut Dice) -> (Vec<Plane>, Vec<Aabb>) {
+    let scale = dice.below(160) as i32 - 90;
+    let point = |dice: &mut Dice| [0; 3].map(|_| float(dice, scale - 12, scale + 12));
+    let centre = point(dice);
+    let planes = (0..plane_count(dice))
+        .map(|_| {
+            let s = dice.below(60) as i32 - 30;
+            let normal = [0; 3].map(|_| float(dice, s - 20, s + 20));
+            let product = (0..3).fold(0.0, |sum, k| {
+                sum + f64::from(normal[k]) * f64::from(centre[k])
+            });
+            let d = -product * (1.0 - 0.2 * dice.unit());
+            let d = d.clamp(-f64::from(f32::MAX), f64::from(f32::MAX)) as f32;
+            Plane::new(Vec3::from_array(normal), d)
+        })
+        .collect();
+    let boxes = (0..4).map(|_| ordered(point(dice), centre));
+    (planes, boxes.collect())
+}
+
+/// Planes through points of a box with their offsets rounded: hair-fine misses
+/// and overlaps.
+fn near_ties(dice: &mut Dice) -> (Vec<Plane>, Vec<Aabb>) {
+    let scale = dice.below(60) as i32 - 30;
+    let point = |dice: &mut Dice| [0; 3].map(|_| float(dice, scale - 3, scale + 1));
+    let b = ordered(point(dice), point(dice));
+    // All through one point on an edge of the box, so that combinations of
+    // planes come as close as single ones.
+    let mut common = b.corner(dice.below(8));
+    let k = dice.below(3);
+    common[k] = b.min[k] + (b.max[k] - b.min[k]) * dice.unit() as f32;
+    let planes = (0..1 + dice.below(7))
+        .map(|_| {
+            let normal = [0; 3].map(|_| float(dice, -4, 4));
+            let product = (0..3).fold(0.0, |sum, k| {
+                sum + f64::from(normal[k]) * f64::from(common[k])
+            });
+            let mut d = -product as f32;
+            if dice.chance(0.3) {
+                d = nudged(d, dice);
+            }
+            Plane::new(Vec3::from_array(normal), d)
+        })
+        .collect();
+    (planes, vec![b])
+}
+
+/// A case of small whole numbers, stretched by powers of two axis by axis and
+/// plane by plane (ties stay ties), then one number moved by one step.
+fn stretched(dice: &mut Dice) -> (Vec<Plane>, Vec<Aabb>) {
+    let (planes, mut boxes) = grid_case(dice);
+    let axes = [0; 3].map(|_| dice.whole(55) as i32);
+    let scaled = |x: f32, exponent: i32| libm::ldexp(f64::from(x), exponent) as f32;
+    let mut planes: Vec<Plane> = planes
+        .iter()
+        .map(|plane| {
+            let s = dice.whole(55) as i32;
+            let normal = [0, 1, 2].map(|k| scaled(plane.normal[k], s - axes[k]));
+            Plane::new(Vec3::from_array(normal), scaled(plane.d, s))
+        })
+        .collect();
+    let stretch = |v: Vec3| Vec3::from_array([0, 1, 2].map(|k| scaled(v[k], axes[k])));
+    for b in &mut boxes {
+        *b = Aabb::new(stretch(b.min), stretch(b.max));
+    }
+    match dice.below(4) {
+        0 => {}
+        1 => {
+            let i = dice.below(planes.len());
+            planes[i].d = nudged(planes[i].d, dice);
+        }
+        2 => {
+            let (i, k) = (dice.below(planes.len()), dice.below(3));
+            planes[i].normal[k] = nudged(planes[i].normal[k], dice);
+        }
+        _ => {
+            for b in &mut boxes {
+                let k = dice.below(3);
+                let bound = if dice.chance(0.5) {
+                    &mut b.min[k]
+                } else {
+                    &mut b.max[k]
+                };
+                *bound = nudged(*bound, dice);
+            }
+        }
+    }
+    (planes, boxes)
+}
+
+#[test]
+fn the_whole_range_of_f32() {
+    type Maker = fn(&mut Dice) -> (Vec<Plane>, Vec<Aabb>);
+    let makers: [(&str, Maker); 4] = [
+        ("wild", wild),
+        ("mixed", mixed),
+        ("near ties", near_ties),
+        ("stretched", stretched),
+    ];
+    for (name, make) in makers {
+        let mut tally = Tally::default();
+        // The kinds weigh the same in a long run.
+        let wanted = cases(12_000) / makers.len();
+        for seed in 0.. {
+            let (planes, boxes) = make(&mut Dice::new(seed));
+            tally.check(&planes, &boxes, &|| format!("{name}, seed {seed}"));
+            if tally.cases() >= wanted {
+                break;
+            }
+        }
+        println!("{name}: {tally:?}");
+        assert!(tally.share(Verdict::Out) > 0.1, "{name}: {tally:?}");
+        assert!(tally.share(Verdict::In) > 0.05, "{name}: {tally:?}");
+    }
+}
