@@ -165,6 +165,22 @@ impl Expansion {
         if self.sign() < 0 { -&self } else { self }
     }
 
+    /// `self / divisor` to `count` terms, by long division; `divisor` is not
+    /// zero.
+    pub fn over(&self, divisor: f64, count: usize) -> Expansion {
+        let mut quotient = Expansion::ZERO;
+        let mut rest = self.clone();
+        // Every digit leaves a rest some 2^-50 of what was left.
+        for _ in 0..=count {
+            let digit = rest.estimate() / divisor;
+            quotient.grow(digit);
+            let (product, lost) = two_product(digit, divisor);
+            rest.grow(-lost);
+            rest.grow(-product);
+        }
+        quotient.leading(count)
+    }
+
     /// `1 / self` to `count` terms, by Newton's iteration; infinite for zero.
     pub fn reciprocal(&self, count: usize) -> Expansion {
         let two = Expansion::from(2.0);
@@ -282,6 +298,9 @@ mod tests {
             let tolerance = 2f64.powi(-50 * count as i32 + 4);
             let off = &(&x * &x.reciprocal(count)) - &one;
             prop_assert!(off.estimate().abs() <= tolerance, "{}", off.estimate());
+            let third = x.over(3.0, count);
+            let off = &(&(&third + &third) + &third) - &x;
+            prop_assert!(off.estimate().abs() <= tolerance * x.estimate(), "{}", off.estimate());
             let root = x.sqrt(count);
             let off = (&(&root * &root) - &x).estimate() / x.estimate();
             prop_assert!(off.abs() <= tolerance, "{off}");

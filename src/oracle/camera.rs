@@ -106,10 +106,7 @@ fn sine_and_cosine(angle: &Expansion) -> (Expansion, Expansion) {
     let mut power = Expansion::from(1.0);
     let mut odd = x;
     for k in 1..40 {
-        let step = |p: &Expansion, divisor: f64| {
-            let inverse = Expansion::from(divisor).reciprocal(terms);
-            -&times(&times(p, &square), &inverse)
-        };
+        let step = |p: &Expansion, divisor: f64| -&times(p, &square).over(divisor, terms);
         let even_order = f64::from(2 * k);
         power = step(&power, (even_order - 1.0) * even_order);
         odd = step(&odd, even_order * (even_order + 1.0));
@@ -210,8 +207,7 @@ fn planes(view: &View, lens: &Lens) -> Vec<HalfSpace> {
                 .iter()
                 .rev()
                 .fold(Expansion::ZERO, |pi, &term| &pi + &number(term));
-            let turn = number(360.0).reciprocal(PRECISION.terms() + 1);
-            let half = times(&times(&pi, &number(fovy_deg)), &turn);
+            let half = times(&pi, &number(fovy_deg)).over(360.0, PRECISION.terms() + 1);
             let (sine, cosine) = sine_and_cosine(&half);
             let wide = times(&sine, &number(aspect));
             ([-&wide, wide, -&sine, sine], cosine)

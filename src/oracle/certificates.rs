@@ -18,6 +18,7 @@
 //! value of zero is a touch.)
 
 use super::number::{Number, Precision};
+use super::rough::{RoughSpaces, may_agree};
 
 /// One constraint `normal . x + d >= 0`.
 #[derive(Clone, Debug)]
@@ -45,42 +46,51 @@ pub(super) struct Certificates {
     pub all: Vec<HalfSpace>,
 }
 
-/// All certificates of the half-spaces. O(m^4) for m of them; a few hundred
-/// exact sums for the six of a frustum.
+/// All certificates of the half-spaces that can be the tightest for some box.
+/// O(m^4) steps in f64 for m of them; exact sums only for what is kept and
+/// where rounding could matter.
 pub(super) fn certificates(given: &[HalfSpace], precision: Precision) -> Certificates {
-    let mut search = Search {
-        precision,
-        extent: Extent::Solid,
-        found: Vec::new(),
+    let empty = || Certificates {
+        extent: Extent::Empty,
+        faces: 0,
+        all: Vec::new(),
     };
     // A zero normal is no constraint, or one that nothing satisfies.
     let mut constraints = Vec::with_capacity(given.len());
     for constraint in given {
         let is_zero = constraint.normal.iter().all(|n| precision.sign(n) == 0);
         match (is_zero, precision.sign(&constraint.d)) {
-            (true, -1) => search.extent = Extent::Empty,
+            (true, -1) => return empty(),
             (true, _) => {}
             (false, _) => constraints.push(constraint.clone()),
         }
     }
-    let minors = Minors::new(&constraints, precision);
-    search.quadruples(&constraints, &minors);
-    if search.extent == Extent::Empty {
-        return Certificates {
-            extent: Extent::Empty,
-            faces: 0,
-            all: Vec::new(),
-        };
-    }
-    search.triples(&constraints, &minors);
+    let mut search = Search {
+        precision,
+        rough: RoughSpaces::new(&constraints),
+        constraints,
+        extent: Extent::Solid,
+        found: Vec::new(),
+    };
+    search.quadruples();
+    search.triples();
     keep_tightest(&mut search.found);
-    let mut all = constraints.clone();
-    all.append(&mut search.found);
-    search.pairs(&constraints);
+    let bounds = search.found.len();
+    search.pairs(true);
+    if search.extent == Extent::Flat {
+        // Without an interior there are no edges to speak of: keep all.
+        search.found.truncate(bounds);
+        search.pairs(false);
+    }
+    if search.extent == Extent::Empty {
+        return empty();
+    }
+    let faces = search.constraints.len();
+    let mut all = search.constraints;
     all.append(&mut search.found);
     Certificates {
         extent: search.extent,
-        faces: constraints.len(),
+        faces,
         all,
     }
 }
@@ -88,46 +98,41 @@ pub(super) fn certificates(given: &[HalfSpace], precision: Precision) -> Certifi
 /// The two other axes, in the order that makes a determinant of them.
 const OTHERS: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
 
-/// The 2 x 2 minors `n_i[a] n_j[b] - n_i[b] n_j[a]` of every pair, by the axis
-/// that is left out.
-struct Minors {
-    count: usize,
-    minors: Vec<[Number; 3]>,
-}
-
-impl Minors {
-    fn new(constraints: &[HalfSpace], precision: Precision) -> Minors {
-        let count = constraints.len();
-        let mut minors = Vec::with_capacity(count * count);
-        for i in constraints {
-            for j in constraints {
-                minors.push(OTHERS.map(|[a, b]| {
-                    let [n, m] = [&i.normal, &j.normal];
-                    precision.determinant([&n[a], &n[b], &m[a], &m[b]])
-                }));
-            }
-        }
-        Minors { count, minors }
-    }
-
-    fn of(&self, i: usize, j: usize) -> &[Number; 3] {
-        &self.minors[i * self.count + j]
-    }
-}
-
 struct Search {
     precision: Precision,
+    constraints: Vec<HalfSpace>,
+    rough: RoughSpaces,
     extent: Extent,
     found: Vec<HalfSpace>,
 }
 
 impl Search {
+    /// The 2 x 2 minor `n_i[a] n_j[b] - n_i[b] n_j[a]` without `axis`.
+    fn minor(&self, i: usize, j: usize, axis: usize) -> Number {
+        let [a, b] = OTHERS[axis];
+        let [n, m] = [i, j].map(|c| &self.constraints[c].normal);
+        self.precision.determinant([&n[a], &n[b], &m[a], &m[b]])
+    }
+
+    fn determinant(&self, i: usize, j: usize, l: usize) -> Number {
+        let p = self.precision;
+        let first = &self.constraints[i].normal;
+        let products = (0..3).map(|k| p.multiply(&first[k], &self.minor(j, l, k)));
+        products.reduce(|a, b| p.add(&a, &b)).unwrap_or_default()
+    }
+
     /// A combination of constraints: a certificate, or, if nothing is left of
     /// the normal, a verdict about the volume itself.
-    fn take(&mut self, parts: &[(&Number, &HalfSpace)], zero_axes: [bool; 3]) {
+    fn take<const N: usize>(
+        &mut self,
+        weights: &[Number; N],
+        parts: [usize; N],
+        zero_axes: [bool; 3],
+    ) {
         let p = self.precision;
+        let parts = parts.map(|c| &self.constraints[c]);
         let sum = |of: &dyn Fn(&HalfSpace) -> Number| {
-            let products = parts.iter().map(|(l, c)| p.multiply(l, &of(c)));
+            let products = (0..N).map(|k| p.multiply(&weights[k], &of(parts[k])));
             let total = products.reduce(|a, b| p.add(&a, &b)).unwrap_or_default();
             p.cleaned(total)
         };
@@ -151,102 +156,112 @@ impl Search {
         self.extent = self.extent.min(verdict);
     }
 
-    /// Two constraints that pull an axis both ways.
-    fn pairs(&mut self, constraints: &[HalfSpace]) {
-        for (i, first) in constraints.iter().enumerate() {
-            for second in &constraints[i + 1..] {
+    /// Two constraints that pull an axis both ways. Of a volume with an
+    /// interior only those that meet on it matter (`only_edges`): the boundary
+    /// of {p - b : p in P, b in B} has no other faces than a face of one and a
+    /// corner of the other, or an edge of each; where an edge of P takes part,
+    /// two planes through that edge make the certificate.
+    fn pairs(&mut self, only_edges: bool) {
+        let count = self.constraints.len();
+        for i in 0..count {
+            for j in i + 1..count {
+                if only_edges && self.rough.edge_misses(i, j) {
+                    continue;
+                }
                 for k in 0..3 {
-                    let (a, b) = (&first.normal[k], &second.normal[k]);
+                    let [a, b] = [i, j].map(|c| &self.constraints[c].normal[k]);
                     if self.precision.sign(a) * self.precision.sign(b) >= 0 {
                         continue;
                     }
                     let weights = [b.absolute(), a.absolute()];
                     let mut zero = [false; 3];
                     zero[k] = true;
-                    self.take(&[(&weights[0], first), (&weights[1], second)], zero);
+                    self.take(&weights, [i, j], zero);
                 }
             }
         }
     }
 
-    /// Three constraints whose normals leave one axis only.
-    fn triples(&mut self, constraints: &[HalfSpace], minors: &Minors) {
-        let count = constraints.len();
+    /// Three constraints whose normals leave one axis only. Of those that
+    /// bound the same direction the tightest says all.
+    fn triples(&mut self) {
+        let mut candidates = Vec::new();
+        let mut best = [f64::INFINITY; 6];
+        let count = self.constraints.len();
         for i in 0..count {
             for j in i + 1..count {
                 for l in j + 1..count {
                     for axis in 0..3 {
-                        let weights = [(j, l), (l, i), (i, j)].map(|(a, b)| &minors.of(a, b)[axis]);
-                        let Some(weights) = self.of_one_sign(weights) else {
+                        let triple = [i, j, l];
+                        if !may_agree(self.rough.weights_of_triple(triple, axis)) {
                             continue;
-                        };
-                        let mut zero = [true; 3];
-                        zero[axis] = false;
-                        let [a, b, c] = &weights;
-                        let parts = [
-                            (a, &constraints[i]),
-                            (b, &constraints[j]),
-                            (c, &constraints[l]),
-                        ];
-                        self.take(&parts, zero);
+                        }
+                        let bound = self.rough.bound(triple, axis);
+                        if let Some(bound) = &bound {
+                            let best = &mut best[bound.direction];
+                            if bound.low > *best {
+                                continue;
+                            }
+                            *best = best.min(bound.high);
+                        }
+                        candidates.push((triple, axis, bound));
                     }
                 }
+            }
+        }
+        for (triple, axis, bound) in candidates {
+            if bound.is_some_and(|b| b.low > best[b.direction]) {
+                continue;
+            }
+            let [i, j, l] = triple;
+            let weights = [(j, l), (l, i), (i, j)].map(|(a, b)| self.minor(a, b, axis));
+            if let Some(weights) = self.of_one_sign(weights) {
+                let mut zero = [true; 3];
+                zero[axis] = false;
+                self.take(&weights, triple, zero);
             }
         }
     }
 
     /// Four constraints that leave no axis at all.
-    fn quadruples(&mut self, constraints: &[HalfSpace], minors: &Minors) {
-        let count = constraints.len();
-        let p = self.precision;
-        let index = |i: usize, j: usize, l: usize| (i * count + j) * count + l;
-        let mut determinants = vec![Number::default(); count * count * count];
-        for i in 0..count {
-            for j in i + 1..count {
-                for l in j + 1..count {
-                    // Along the first normal.
-                    let minor = minors.of(j, l);
-                    let products = (0..3).map(|k| p.multiply(&constraints[i].normal[k], &minor[k]));
-                    let total = products.reduce(|a, b| p.add(&a, &b)).unwrap_or_default();
-                    determinants[index(i, j, l)] = total;
-                }
-            }
-        }
+    fn quadruples(&mut self) {
+        let count = self.constraints.len();
         for i in 0..count {
             for j in i + 1..count {
                 for l in j + 1..count {
                     for m in l + 1..count {
-                        let second = determinants[index(i, l, m)].negated();
-                        let fourth = determinants[index(i, j, l)].negated();
-                        let weights = [
-                            &determinants[index(j, l, m)],
-                            &second,
-                            &determinants[index(i, j, m)],
-                            &fourth,
-                        ];
-                        let Some(weights) = self.of_one_sign(weights) else {
-                            continue;
-                        };
-                        let [a, b, c, d] = &weights;
-                        let parts = [
-                            (a, &constraints[i]),
-                            (b, &constraints[j]),
-                            (c, &constraints[l]),
-                            (d, &constraints[m]),
-                        ];
-                        self.take(&parts, [true; 3]);
+                        match self.rough.quadruple([i, j, l, m]) {
+                            Some(1) => {}
+                            Some(_) => self.extent = Extent::Empty,
+                            None => self.quadruple([i, j, l, m]),
+                        }
+                        if self.extent == Extent::Empty {
+                            return;
+                        }
                     }
                 }
             }
         }
     }
 
+    fn quadruple(&mut self, [i, j, l, m]: [usize; 4]) {
+        let weights = [
+            self.determinant(j, l, m),
+            self.determinant(i, l, m).negated(),
+            self.determinant(i, j, m),
+            self.determinant(i, j, l).negated(),
+        ];
+        if let Some(weights) = self.of_one_sign(weights) {
+            self.take(&weights, [i, j, l, m], [true; 3]);
+        }
+    }
+
     /// The weights made positive, if all are strictly of one sign: where one is
     /// zero, fewer constraints say the same.
-    fn of_one_sign<const N: usize>(&self, weights: [&Number; N]) -> Option<[Number; N]> {
-        let sign = self.precision.sign(weights[0]);
+    fn of_one_sign<const N: usize>(&self, weights: [Number; N]) -> Option<[Number; N]> {
+        let sign = self.precision.sign(&weights[0]);
         let agree = sign != 0 && weights.iter().all(|w| self.precision.sign(w) == sign);
-        agree.then(|| weights.map(Number::absolute))
+        agree.then(|| weights.map(|w| w.absolute()))
     }
 }
 

@@ -1,0 +1,168 @@
+//! The value of a certificate at a box: in f64 with a proven bound of its
+//! error, and exactly. Which certificates there are, and what their signs mean
+//! together, is not known here.
+
+use super::certificates::HalfSpace;
+use super::number::Precision;
+use crate::arithmetic::{Expansion, two_sum, upper_half};
+use crate::geometry::Aabb;
+
+/// A certificate in f64, each coefficient rounded once.
+pub(super) struct Filter {
+    pub normal: [f64; 3],
+    d: f64,
+}
+
+/// A certificate in full.
+pub(super) struct Exact {
+    /// Axis and coefficient, split so that a product with an f32 is exact.
+    terms: Vec<(u8, f64)>,
+    d: Vec<f64>,
+    /// Magnitudes before cancellation, per axis and of d.
+    size: [f64; 4],
+}
+
+/// The filter errs by less than this part of its magnitude: three coefficients
+/// and an offset rounded once (2^-53 each), three products and three sums.
+const FILTER_ERROR: f64 = 16.0 * f64::EPSILON;
+
+/// The bounds of a box in f64.
+pub(super) struct Corners {
+    pub low: [f64; 3],
+    pub high: [f64; 3],
+}
+
+impl Corners {
+    #[inline]
+    pub fn of(b: &Aabb) -> Corners {
+        Corners {
+            low: b.min.as_dvec3().to_array(),
+            high: b.max.as_dvec3().to_array(),
+        }
+    }
+}
+
+impl Filter {
+    pub fn new(certificate: &HalfSpace) -> Filter {
+        Filter {
+            normal: [0, 1, 2].map(|k| certificate.normal[k].estimate()),
+            d: certificate.d.estimate(),
+        }
+    }
+
+    /// Value at the p-vertex and a bound of its error.
+    #[inline(always)]
+    pub fn at_p_vertex(&self, b: &Corners) -> (f64, f64) {
+        let corner = [0, 1, 2].map(|k| {
+            if self.normal[k] >= 0.0 {
+                b.high[k]
+            } else {
+                b.low[k]
+            }
+        });
+        self.at(corner)
+    }
+
+    #[inline(always)]
+    pub fn at(&self, point: [f64; 3]) -> (f64, f64) {
+        let [x, y, z] = [0, 1, 2].map(|k| self.normal[k] * point[k]);
+        let magnitude = x.abs() + y.abs() + z.abs() + self.d.abs();
+        (((x + y) + z) + self.d, FILTER_ERROR * magnitude)
+    }
+}
+
+impl Exact {
+    pub fn new(certificate: &HalfSpace) -> Exact {
+        let mut terms = Vec::new();
+        for (axis, n) in certificate.normal.iter().enumerate() {
+            for &term in n.value.terms() {
+                let upper = upper_half(term);
+                let halves = [upper, term - upper]
+                    .into_iter()
+                    .filter(|&half| half != 0.0);
+                terms.extend(halves.map(|half| (axis as u8, half)));
+            }
+        }
+        let [x, y, z] = [0, 1, 2].map(|k| certificate.normal[k].size);
+        Exact {
+            terms,
+            d: certificate.d.value.terms().to_vec(),
+            size: [x, y, z, certificate.d.size],
+        }
+    }
+
+    /// The sign of the value at the p-vertex.
+    pub fn sign_at_p_vertex(&self, b: &Aabb, precision: Precision) -> i32 {
+        // The sign of a coefficient is that of its largest, last term.
+        let mut corner = b.max;
+        for &(axis, term) in &self.terms {
+            let k = usize::from(axis);
+            corner[k] = if term >= 0.0 { b.max[k] } else { b.min[k] };
+        }
+        let products = || {
+            let of_corner = self
+                .terms
+                .iter()
+                .map(|&(axis, term)| term * f64::from(corner[usize::from(axis)]));
+            of_corner.chain(self.d.iter().copied())
+        };
+        // Most ties are between short numbers, whose sum loses nothing.
+        let (mut sum, mut lost) = (0.0, 0.0);
+        for product in products() {
+            let (next, error) = two_sum(sum, product);
+            sum = next;
+            lost += error.abs();
+        }
+        let mut value = sum;
+        let mut sign = if sum == 0.0 { 0 } else { sum.signum() as i32 };
+        if lost != 0.0 {
+            let mut total = Expansion::default();
+            products().for_each(|product| total.grow(product));
+            sign = total.sign();
+            value = total.estimate();
+        }
+        if !precision.is_exact() {
+            let at = corner.abs().as_dvec3();
+            let [x, y, z, d] = self.size;
+            let size = x * at.x + y * at.y + z * at.z + d;
+            if precision.is_noise(value, size) {
+                return 0;
+            }
+        }
+        sign
+    }
+}
+
+/// A point inside all faces: the mean of the corners. None without at least
+/// four corners; only a hint, so f64 will do.
+pub(super) fn inner_point(faces: &[Filter]) -> Option<[f64; 3]> {
+    let mut sum = [0.0; 3];
+    let mut count = 0.0;
+    for (i, a) in faces.iter().enumerate() {
+        for (j, b) in faces.iter().enumerate().skip(i + 1) {
+            for c in &faces[j + 1..] {
+                let Some(corner) = meeting_point([a, b, c]) else {
+                    continue;
+                };
+                let within = faces.iter().all(|face| {
+                    let (value, error) = face.at(corner);
+                    value >= -1e6 * error
+                });
+                if within {
+                    (0..3).for_each(|k| sum[k] += corner[k]);
+                    count += 1.0;
+                }
+            }
+        }
+    }
+    (count >= 4.0).then(|| sum.map(|s| s / count))
+}
+
+/// Where three planes meet, by Cramer's rule.
+fn meeting_point(planes: [&Filter; 3]) -> Option<[f64; 3]> {
+    let [a, b, c] = planes.map(|plane| glam::DVec3::from_array(plane.normal));
+    let determinant = a.dot(b.cross(c));
+    let sum = b.cross(c) * planes[0].d + c.cross(a) * planes[1].d + a.cross(b) * planes[2].d;
+    let point = -sum / determinant;
+    point.is_finite().then(|| point.to_array())
+}

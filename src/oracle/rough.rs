@@ -1,0 +1,328 @@
+//! The preparation's filter: minors and determinants of half-spaces in f64
+//! with a bound of their error, so that exact sums are only formed where
+//! rounding could matter. It owns what can be told for certain without them.
+
+use super::certificates::HalfSpace;
+
+/// A result in f64 errs by less than this part of its size. No sum below has
+/// a longer history than coefficients rounded twice, five products and six
+/// sums: some 12 units of epsilon.
+const ERROR: f64 = 32.0 * f64::EPSILON;
+
+/// What underflow may add; never near a product of at most eight f32 numbers
+/// that matters here (those of five are above 2^-745).
+const UNDERFLOW: f64 = 1e-290;
+
+/// A result with the sum of the magnitudes that it came from.
+#[derive(Clone, Copy, Default, Debug)]
+pub(super) struct Rough {
+    pub value: f64,
+    size: f64,
+}
+
+impl Rough {
+    fn of(value: f64) -> Rough {
+        Rough {
+            value,
+            size: value.abs(),
+        }
+    }
+
+    fn times(self, other: Rough) -> Rough {
+        Rough {
+            value: self.value * other.value,
+            size: self.size * other.size,
+        }
+    }
+
+    fn plus(self, other: Rough) -> Rough {
+        Rough {
+            value: self.value + other.value,
+            size: self.size + other.size,
+        }
+    }
+
+    fn negated(self) -> Rough {
+        Rough {
+            value: -self.value,
+            ..self
+        }
+    }
+
+    fn abs(self) -> Rough {
+        Rough {
+            value: self.value.abs(),
+            ..self
+        }
+    }
+
+    pub fn error(self) -> f64 {
+        ERROR * self.size + UNDERFLOW
+    }
+
+    /// The sign, if it is certain. Nothing but products with zero is zero.
+    pub fn sign(self) -> Option<i32> {
+        if self.size == 0.0 {
+            Some(0)
+        } else if self.value.abs() > self.error() {
+            Some(if self.value > 0.0 { 1 } else { -1 })
+        } else {
+            None
+        }
+    }
+}
+
+type Vector = [Rough; 3];
+
+fn dot(a: &Vector, b: &Vector) -> Rough {
+    let [x, y, z] = [0, 1, 2].map(|k| a[k].times(b[k]));
+    x.plus(y).plus(z)
+}
+
+fn cross(a: &Vector, b: &Vector) -> Vector {
+    [(1, 2), (2, 0), (0, 1)].map(|(i, j)| a[i].times(b[j]).plus(a[j].times(b[i]).negated()))
+}
+
+/// Whether weights could all be strictly of one sign.
+pub(super) fn may_agree<const N: usize>(weights: [Rough; N]) -> bool {
+    let signs = weights.map(Rough::sign);
+    let certain = |sign: i32| signs.contains(&Some(sign));
+    let hopeless = certain(0) || (certain(1) && certain(-1));
+    !hopeless
+}
+
+/// Whether weights are certainly all strictly of one sign.
+fn agree<const N: usize>(weights: [Rough; N]) -> bool {
+    let sign = weights[0].sign();
+    sign.is_some_and(|s| s != 0) && weights.iter().all(|w| w.sign() == sign)
+}
+
+/// What is known of a bound of the volume along an axis.
+pub(super) struct RoughBound {
+    /// Twice the axis, plus one if it looks down.
+    pub direction: usize,
+    /// The offset over the length of the normal lies between these.
+    pub low: f64,
+    pub high: f64,
+}
+
+/// Half-spaces in f64 with the cross products of all pairs of normals.
+pub(super) struct RoughSpaces {
+    normals: Vec<Vector>,
+    offsets: Vec<Rough>,
+    crosses: Vec<Vector>,
+    determinants: Vec<Rough>,
+}
+
+impl RoughSpaces {
+    pub fn new(constraints: &[HalfSpace]) -> RoughSpaces {
+        let normals: Vec<Vector> = constraints
+            .iter()
+            .map(|c| [0, 1, 2].map(|k| Rough::of(c.normal[k].estimate())))
+            .collect();
+        let count = normals.len();
+        let mut crosses = Vec::with_capacity(count * count);
+        for a in &normals {
+            crosses.extend(normals.iter().map(|b| cross(a, b)));
+        }
+        let mut determinants = vec![Rough::default(); count * count * count];
+        for i in 0..count {
+            for j in i + 1..count {
+                for l in j + 1..count {
+                    determinants[(i * count + j) * count + l] =
+                        dot(&normals[i], &crosses[j * count + l]);
+                }
+            }
+        }
+        RoughSpaces {
+            offsets: constraints
+                .iter()
+                .map(|c| Rough::of(c.d.estimate()))
+                .collect(),
+            normals,
+            crosses,
+            determinants,
+        }
+    }
+
+    fn count(&self) -> usize {
+        self.normals.len()
+    }
+
+    fn cross(&self, i: usize, j: usize) -> &Vector {
+        &self.crosses[i * self.count() + j]
+    }
+
+    /// Of three normals in ascending order.
+    fn determinant(&self, i: usize, j: usize, l: usize) -> Rough {
+        self.determinants[(i * self.count() + j) * self.count() + l]
+    }
+
+    /// The sign of the offset of a combination of four that leaves no normal,
+    /// if it is certain; positive also if there is no such combination.
+    pub fn quadruple(&self, [i, j, l, m]: [usize; 4]) -> Option<i32> {
+        let weights = [
+            self.determinant(j, l, m),
+            self.determinant(i, l, m).negated(),
+            self.determinant(i, j, m),
+            self.determinant(i, j, l).negated(),
+        ];
+        if !may_agree(weights) {
+            return Some(1);
+        }
+        if !agree(weights) {
+            return None;
+        }
+        let parts = [i, j, l, m].map(|c| self.offsets[c]);
+        let offset = (0..4).fold(Rough::default(), |sum, k| {
+            sum.plus(weights[k].abs().times(parts[k]))
+        });
+        offset.sign().filter(|&sign| sign != 0)
+    }
+
+    /// The weights of three constraints that leave one axis only.
+    pub fn weights_of_triple(&self, [i, j, l]: [usize; 3], axis: usize) -> [Rough; 3] {
+        [(j, l), (l, i), (i, j)].map(|(a, b)| self.cross(a, b)[axis])
+    }
+
+    /// Where a combination of three bounds the volume along an axis; `None` if
+    /// rounding hides too much of it.
+    pub fn bound(&self, triple: [usize; 3], axis: usize) -> Option<RoughBound> {
+        let weights = self.weights_of_triple(triple, axis);
+        let [i, j, l] = triple;
+        let determinant = self.determinant(i, j, l);
+        let length = determinant.value.abs();
+        // Twice: the division below asks for a margin of its own.
+        if !(length > 2.0 * determinant.error() && agree(weights)) {
+            return None;
+        }
+        let down = determinant.value < 0.0;
+        let flip = weights[0].value < 0.0;
+        let offset = (0..3).fold(Rough::default(), |sum, k| {
+            sum.plus(weights[k].abs().times(self.offsets[triple[k]]))
+        });
+        let ratio = offset.value / length;
+        let doubt = (offset.error() + ratio.abs() * determinant.error()) / length * 2.0
+            + ratio.abs() * ERROR;
+        Some(RoughBound {
+            direction: axis * 2 + usize::from(down != flip),
+            low: ratio - doubt,
+            high: ratio + doubt,
+        })
+    }
+
+    /// Whether the line in which two boundaries meet certainly misses the
+    /// volume. On the line, in homogeneous coordinates, every other constraint
+    /// is `a + t*b >= 0`.
+    pub fn edge_misses(&self, i: usize, j: usize) -> bool {
+        let along = self.cross(i, j);
+        let weight = dot(along, along);
+        if weight.sign() != Some(1) {
+            return false;
+        }
+        let (d, e) = (self.offsets[i], self.offsets[j]);
+        let (n, m) = (&self.normals[i], &self.normals[j]);
+        let lean = [0, 1, 2].map(|k| e.times(n[k]).plus(d.times(m[k]).negated()));
+        let base = cross(&lean, along);
+        let others = (0..self.count()).filter(|&c| c != i && c != j);
+        let on_line = others.map(|c| {
+            let normal = &self.normals[c];
+            let a = dot(normal, &base).plus(self.offsets[c].times(weight));
+            (a.value + a.error(), dot(normal, along))
+        });
+        /// Far above the rounding of the few steps below.
+        const SLACK: f64 = 1e-12;
+        let (mut from, mut to) = (f64::NEG_INFINITY, f64::INFINITY);
+        for (most, b) in on_line.clone() {
+            let (slope, error) = (b.value.abs(), b.error());
+            if !most.is_finite() || slope <= error {
+                continue;
+            }
+            // The weakest bound of t that the errors allow.
+            let reach = most
+                / if most >= 0.0 {
+                    slope - error
+                } else {
+                    slope + error
+                };
+            let reach = reach + reach.abs() * SLACK;
+            if b.value > 0.0 {
+                from = from.max(-reach);
+            } else {
+                to = to.min(reach);
+            }
+        }
+        // What hardly leans along the line must hold at both ends together.
+        let fails = |(most, b): (f64, Rough)| {
+            [from, to].into_iter().all(|t| {
+                let change = t * b.value;
+                let slack = SLACK * (most.abs() + change.abs()) + t.abs() * b.error();
+                most + change + slack < 0.0
+            })
+        };
+        from > to || on_line.clone().any(fails)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn spaces(planes: &[[f32; 4]]) -> RoughSpaces {
+        let constraints: Vec<HalfSpace> = planes
+            .iter()
+            .map(|&[x, y, z, d]| HalfSpace {
+                normal: [x, y, z].map(Into::into),
+                d: d.into(),
+            })
+            .collect();
+        RoughSpaces::new(&constraints)
+    }
+
+    #[test]
+    fn of_a_frustums_fifteen_pairs_the_twelve_edges_may_touch_it() {
+        let frustum = spaces(&[
+            [1.0, 0.0, -1.0, 0.0],
+            [-1.0, 0.0, -1.0, 0.0],
+            [0.0, 1.0, -1.0, 0.0],
+            [0.0, -1.0, -1.0, 0.0],
+            [0.0, 0.0, -1.0, -1.0],
+            [0.0, 0.0, 1.0, 8.0],
+        ]);
+        for i in 0..6 {
+            for j in i + 1..6 {
+                // Opposite sides meet in front of the near plane; near and far
+                // do not meet, and that is not for this filter to say.
+                let opposite = (i, j) == (0, 1) || (i, j) == (2, 3);
+                assert_eq!(frustum.edge_misses(i, j), opposite, "{i} {j}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_edge_that_touches_in_one_point_is_kept() {
+        // A pyramid; two of its faces that are not neighbours meet in its tip.
+        let mut pyramid = vec![
+            [1.0, 0.0, -1.0, 0.0],
+            [-1.0, 0.0, -1.0, 0.0],
+            [0.0, 1.0, -1.0, 0.0],
+            [0.0, -1.0, -1.0, 0.0],
+        ];
+        assert!(!spaces(&pyramid).edge_misses(0, 1));
+        // With its tip cut off by the least that f64 can tell for certain.
+        pyramid.push([0.0, 0.0, -1.0, -1e-12]);
+        assert!(spaces(&pyramid).edge_misses(0, 1));
+    }
+
+    #[test]
+    fn signs_are_only_told_where_rounding_cannot_matter() {
+        let rough = |value, size| Rough { value, size };
+        assert_eq!(rough(0.0, 0.0).sign(), Some(0));
+        assert_eq!(rough(1e-12, 1.0).sign(), Some(1));
+        assert_eq!(rough(-1e-15, 1.0).sign(), None);
+        assert_eq!(rough(0.0, 1.0).sign(), None);
+        assert!(may_agree([rough(1.0, 1.0), rough(0.0, 1.0)]));
+        assert!(!may_agree([rough(1.0, 1.0), rough(0.0, 0.0)]));
+        assert!(!may_agree([rough(1.0, 1.0), rough(-1.0, 1.0)]));
+    }
+}
