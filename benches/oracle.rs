@@ -23,7 +23,8 @@ struct Workload {
     name: &'static str,
     oracles: Vec<Oracle>,
     boxes: Vec<Aabb>,
-    floor: f64,
+    /// Verdicts per second; `None` where nothing is promised.
+    floor: Option<f64>,
 }
 
 /// A scene and the frusta of a flight through it, at both levels.
@@ -45,7 +46,7 @@ fn flight(names: [&'static str; 2], source: &str, only_test: bool) -> [Workload;
         name,
         oracles,
         boxes: scene.items.clone(),
-        floor: RANDOM_FLOOR,
+        floor: Some(RANDOM_FLOOR),
     };
     [
         workload(planes, of_planes.collect()),
@@ -67,27 +68,62 @@ fn integer_frustum(eye: Vec3, far: f32) -> ConvexVolume {
     ConvexVolume::from_planes(&placed).expect("finite planes")
 }
 
-/// Unit and larger boxes of a whole-number grid about small frusta.
+/// Boxes of a whole-number grid about the boundaries of small frusta.
 fn on_the_grid(only_test: bool) -> Workload {
-    let reach = if only_test { 4 } else { 14 };
+    let (near, far) = (1, if only_test { 3 } else { 12 });
     let mut boxes = Vec::new();
-    for x in -reach..reach {
-        for y in -reach..reach {
-            for z in -reach..2 {
-                let low = Vec3::new(x as f32, y as f32, z as f32);
-                let size = 1 + (x ^ y ^ z) & 1;
-                boxes.push(Aabb::new(low, low + size as f32));
+    for depth in near - 1..=far + 1 {
+        let width = depth + 1;
+        for x in -width..=width {
+            for y in -width..=width {
+                if x.abs().max(y.abs()) < depth - 1 && (near + 1..far).contains(&depth) {
+                    continue; // Well inside.
+                }
+                // A unit box that grows outward, as those of vector A02 do.
+                let near_corner = Vec3::new(x as f32, y as f32, -depth as f32);
+                let outward = Vec3::new((x as f32).signum(), (y as f32).signum(), 1.0);
+                let far_corner = near_corner + outward;
+                boxes.push(Aabb::new(
+                    near_corner.min(far_corner),
+                    near_corner.max(far_corner),
+                ));
             }
         }
     }
-    let eyes = [Vec3::ZERO, Vec3::X, Vec3::new(-2.0, 1.0, 0.0)];
+    let eyes = [Vec3::ZERO, Vec3::X, Vec3::new(-1.0, 1.0, 0.0)];
     Workload {
         name: "boxes on the grid of integer planes",
         oracles: eyes
-            .map(|eye| Oracle::of_volume(&integer_frustum(eye, 12.0)))
+            .map(|eye| Oracle::of_volume(&integer_frustum(eye, far as f32)))
             .into(),
         boxes,
-        floor: TIES_FLOOR,
+        floor: Some(TIES_FLOOR),
+    }
+}
+
+/// Boxes as large as the frustum itself about its boundary: hardly any is
+/// decided by a single plane or an inner point.
+fn straddling(only_test: bool) -> Workload {
+    let count = if only_test { 100 } else { 20_000 };
+    // The additive recurrence of the plastic number fills space evenly.
+    let unit = |i: usize, k: i32| (i as f64 * 0.819_172_513_396_164_4f64.powi(k)).fract() as f32;
+    let boxes = (0..count).map(|i| {
+        let point = |k: i32| Vec3::new(unit(i, k), unit(i, k + 1), unit(i, k + 2));
+        let low = (point(1) - 0.5) * 40.0;
+        Aabb::new(low, low + point(4) * 12.0)
+    });
+    let frustum = integer_frustum(Vec3::ZERO, 8.0);
+    let tilted = frustum.planes().iter().map(|plane| {
+        let turn = glam::Quat::from_rotation_y(0.7) * glam::Quat::from_rotation_x(-0.4);
+        Plane::new(turn * plane.normal, plane.d)
+    });
+    let tilted = ConvexVolume::from_planes(&tilted.collect::<Vec<_>>()).expect("finite planes");
+    let sees = |b: &Aabb| tilted.sees(b) && !tilted.planes().iter().all(|plane| plane.contains(b));
+    Workload {
+        name: "boxes that cross a frustum's planes",
+        oracles: vec![Oracle::of_volume(&tilted)],
+        boxes: boxes.filter(sees).collect(),
+        floor: None,
     }
 }
 
@@ -117,20 +153,21 @@ impl Workload {
             self.questions() as f64 / start.elapsed().as_secs_f64()
         });
         let speed = median(speeds);
-        let verdict = match (only_test, speed >= self.floor) {
-            (true, _) => "not judged",
-            (false, true) => "ok",
-            (false, false) => "MISSED",
+        let holds = self.floor.is_none_or(|floor| speed >= floor);
+        let verdict = match (only_test, self.floor, holds) {
+            (true, ..) => "not judged".to_owned(),
+            (_, None, _) => "nothing promised".to_owned(),
+            (_, Some(floor), true) => format!("promised {:.0}: ok", floor / 1e6),
+            (_, Some(floor), false) => format!("promised {:.0}: MISSED", floor / 1e6),
         };
         println!(
-            "{:<40} {:>6.1} million verdicts/s ({:.1} % in, {:.1} % touch), promised {}: {verdict}",
+            "{:<36} {:>6.1} million verdicts/s ({:.1} % in, {:.1} % touch), {verdict}",
             self.name,
             speed / 1e6,
             share(Verdict::In),
             share(Verdict::Touch),
-            self.floor / 1e6,
         );
-        only_test || speed >= self.floor
+        only_test || holds
     }
 }
 
@@ -177,6 +214,7 @@ fn main() -> ExitCode {
     );
     let mut workloads: Vec<Workload> = uniform.into_iter().chain(city).collect();
     workloads.push(on_the_grid(only_test));
+    workloads.push(straddling(only_test));
     let missed = workloads.iter().filter(|w| !w.run(only_test)).count();
 
     let scene = scene::load("uniform:n=1000", &Default::default()).expect("uniform");

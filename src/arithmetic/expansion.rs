@@ -99,11 +99,24 @@ impl Expansion {
         self.terms.iter().sum()
     }
 
+    /// Times `2^exponent`: exact, but for terms that leave the range of f64.
+    pub fn scaled(&self, exponent: i32) -> Expansion {
+        let scaled = self.terms.iter().map(|&term| libm::ldexp(term, exponent));
+        Expansion {
+            terms: scaled.filter(|&term| term != 0.0).collect(),
+        }
+    }
+
     /// Adds a double, exactly (GROW-EXPANSION with zeros left out).
     pub fn grow(&mut self, value: f64) {
+        // Terms below half an ulp of the value stay as they are.
+        const TWO_54: f64 = (1u64 << 54) as f64;
+        let untouched = |term: &f64| term.abs() * TWO_54 < value.abs();
+        let above = self.terms.iter().rev().position(untouched);
+        let start = above.map_or(0, |above| self.terms.len() - above);
         let mut carry = value;
-        let mut kept = 0;
-        for i in 0..self.terms.len() {
+        let mut kept = start;
+        for i in start..self.terms.len() {
             let (sum, lost) = two_sum(carry, self.terms[i]);
             if lost != 0.0 {
                 self.terms[kept] = lost;
@@ -241,10 +254,14 @@ impl Mul for &Expansion {
     type Output = Expansion;
 
     fn mul(self, other: &Expansion) -> Expansion {
-        let mut product = Expansion::default();
-        for &a in &self.terms {
-            for &b in &other.terms {
-                let (high, low) = two_product(a, b);
+        let (a, b) = (&self.terms, &other.terms);
+        let mut product = Expansion {
+            terms: Vec::with_capacity(2 * a.len() * b.len()),
+        };
+        // From small to large, as far as ranks tell: the sums stay short.
+        for rank in 0..(a.len() + b.len()).saturating_sub(1) {
+            for i in (rank + 1).saturating_sub(b.len())..a.len().min(rank + 1) {
+                let (high, low) = two_product(a[i], b[rank - i]);
                 product.grow(low);
                 product.grow(high);
             }

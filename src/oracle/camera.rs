@@ -80,18 +80,17 @@ fn difference(a: DVec3, b: DVec3) -> Vector {
     [0, 1, 2].map(|k| &a[k] - &b[k])
 }
 
-/// The vector times a power of two that brings it near unit length, exactly:
-/// its square could overflow otherwise.
-fn near_unit(v: Vector) -> Vector {
+/// The exponent of the largest component; `None` for the zero vector.
+fn exponent(v: &Vector) -> Option<i32> {
     let largest = v.iter().map(|c| c.estimate().abs()).fold(0.0, f64::max);
-    let exponent = libm::ilogb(largest);
-    v.map(|component| {
-        let mut scaled = Expansion::ZERO;
-        for &term in component.terms() {
-            scaled.grow(libm::ldexp(term, -exponent));
-        }
-        scaled
-    })
+    (largest > 0.0).then(|| libm::ilogb(largest))
+}
+
+/// The vector times a power of two that brings it near unit length: its square
+/// could overflow otherwise. `None` for the zero vector.
+fn near_unit(v: Vector) -> Option<Vector> {
+    let exponent = exponent(&v)?;
+    Some(v.map(|component| component.scaled(-exponent)))
 }
 
 /// Sine and cosine of an angle in [0, pi/2]: Taylor series of a sixteenth of
@@ -131,23 +130,35 @@ impl Oracle {
     /// Camera level: the view volume of a pose and a lens, in coordinates about
     /// `origin`, as real numbers.
     ///
-    /// `None` if pose and lens make no camera (see [`crate::camera::look_at`]
-    /// and [`Lens`] for the rules).
+    /// Every verdict is that about the real volume, or a touch marked as
+    /// undecided, where the two cannot be told apart: pose and lens count as
+    /// exact, lengths from 1e-60 to 1e60 and angles from 1e-12 degrees are
+    /// carried without loss. Some ten times the cost of
+    /// [`Oracle::of_volume`].
+    ///
+    /// `None` if pose and lens make no camera: a value that is not finite, no
+    /// direction of view, `up` zero or exactly parallel to it, a lens that its
+    /// constructor would refuse.
     pub fn of_camera(pose: &Pose, lens: &Lens, origin: DVec3) -> Option<Oracle> {
-        let (eye, forward, up) = match *pose {
-            Pose::LookAt { eye, look, up } => (eye, difference(look, eye), up),
-            Pose::Forward { eye, forward, up } => (eye, exact(forward), up),
+        let (eye, towards, up) = match *pose {
+            Pose::LookAt { eye, look, up } => (eye, look, up),
+            Pose::Forward { eye, forward, up } => (eye, forward, up),
         };
-        let is_zero = |v: &Vector| v.iter().all(|c| c.sign() == 0);
-        if is_zero(&forward) || up == DVec3::ZERO {
+        let finite = [eye, towards, up, origin].iter().all(|v| v.is_finite());
+        if !finite || lens.with_far(lens.far()).is_err() {
             return None;
         }
-        let forward = near_unit(forward);
-        let right = cross(&forward, &near_unit(exact(up)));
-        if is_zero(&right) {
-            return None;
-        }
-        let u = unit(&near_unit(right));
+        let forward = match pose {
+            // Quartered where the difference could overflow.
+            Pose::LookAt { .. } if towards.abs().max(eye.abs()).max_element() > 1e300 => {
+                difference(towards / 4.0, eye / 4.0)
+            }
+            Pose::LookAt { .. } => difference(towards, eye),
+            Pose::Forward { .. } => exact(towards),
+        };
+        let forward = near_unit(forward)?;
+        let right = near_unit(cross(&forward, &near_unit(exact(up))?))?;
+        let u = unit(&right);
         let back = unit(&forward).map(|c| -&c);
         let v = cross(&back, &u);
         let eye = difference(eye, origin);
@@ -167,19 +178,21 @@ impl View {
     /// The points x with `normal . (x - eye) + offset >= 0`.
     fn half_space(&self, normal: &Vector, offset: &Expansion) -> HalfSpace {
         let p = PRECISION;
+        // Products of three normals and an offset must stay within f64.
+        let exponent = exponent(normal).unwrap_or(0);
+        let normal = normal.clone().map(|n| n.scaled(-exponent));
+        let offset = offset.scaled(-exponent);
         // Each component is as large as the whole normal, as far as noise goes.
         let size = normal
             .iter()
             .map(|n| n.estimate().abs())
             .fold(0.0, f64::max);
-        let normal = normal.clone().map(|n| {
+        let normal = normal.map(|n| {
             let value = n.leading(p.terms());
             p.cleaned(Number { value, size })
         });
         let along = (0..3).map(|k| p.multiply(&normal[k], &Number::from(self.eye[k].clone())));
-        let d = along.fold(Number::from(offset.clone()), |d, part| {
-            p.subtract(&d, &part)
-        });
+        let d = along.fold(Number::from(offset), |d, part| p.subtract(&d, &part));
         HalfSpace { normal, d }
     }
 

@@ -68,6 +68,7 @@ pub(super) fn certificates(given: &[HalfSpace], precision: Precision) -> Certifi
     let mut search = Search {
         precision,
         rough: RoughSpaces::new(&constraints),
+        minors: vec![[None, None, None]; constraints.len() * constraints.len()],
         constraints,
         extent: Extent::Solid,
         found: Vec::new(),
@@ -102,22 +103,29 @@ struct Search {
     precision: Precision,
     constraints: Vec<HalfSpace>,
     rough: RoughSpaces,
+    /// Those that were asked for, by both constraints and the axis left out.
+    minors: Vec<[Option<Number>; 3]>,
     extent: Extent,
     found: Vec<HalfSpace>,
 }
 
 impl Search {
     /// The 2 x 2 minor `n_i[a] n_j[b] - n_i[b] n_j[a]` without `axis`.
-    fn minor(&self, i: usize, j: usize, axis: usize) -> Number {
-        let [a, b] = OTHERS[axis];
-        let [n, m] = [i, j].map(|c| &self.constraints[c].normal);
-        self.precision.determinant([&n[a], &n[b], &m[a], &m[b]])
+    fn minor(&mut self, i: usize, j: usize, axis: usize) -> Number {
+        let known = &mut self.minors[i * self.constraints.len() + j][axis];
+        let minor = known.get_or_insert_with(|| {
+            let [a, b] = OTHERS[axis];
+            let [n, m] = [i, j].map(|c| &self.constraints[c].normal);
+            self.precision.determinant([&n[a], &n[b], &m[a], &m[b]])
+        });
+        minor.clone()
     }
 
-    fn determinant(&self, i: usize, j: usize, l: usize) -> Number {
+    fn determinant(&mut self, i: usize, j: usize, l: usize) -> Number {
         let p = self.precision;
+        let minors = [0, 1, 2].map(|k| self.minor(j, l, k));
         let first = &self.constraints[i].normal;
-        let products = (0..3).map(|k| p.multiply(&first[k], &self.minor(j, l, k)));
+        let products = (0..3).map(|k| p.multiply(&first[k], &minors[k]));
         products.reduce(|a, b| p.add(&a, &b)).unwrap_or_default()
     }
 

@@ -1,1 +1,93 @@
-//! Camera level.
+//! What a depth means: boxes worked by hand, and the promise that no shorter
+//! move changes the verdict.
+
+use cullbench::geometry::{Aabb, ConvexVolume, Plane};
+use cullbench::oracle::{Oracle, Verdict};
+use cullbench::verify::RandomCase;
+use glam::{DVec3, Vec3};
+
+use crate::draw::Dice;
+
+fn oracle(planes: &[(Vec3, f32)]) -> Oracle {
+    let planes: Vec<Plane> = planes.iter().map(|&(n, d)| Plane::new(n, d)).collect();
+    Oracle::of_volume(&ConvexVolume::from_planes(&planes).expect("finite"))
+}
+
+#[test]
+fn depths_worked_by_hand() {
+    // The cube [0, 4]^3; lengths of normals do not matter.
+    let cube = oracle(&[
+        (Vec3::X * 2.0, 0.0),
+        (-Vec3::X, 4.0),
+        (Vec3::Y, 0.0),
+        (-Vec3::Y * 8.0, 32.0),
+        (Vec3::Z, 0.0),
+        (-Vec3::Z, 4.0),
+    ]);
+    let depth = |low: [f32; 3], high: [f32; 3]| {
+        cube.depth(&Aabb::new(Vec3::from_array(low), Vec3::from_array(high)))
+    };
+    assert_eq!(depth([5.0, 1.0, 1.0], [6.0, 2.0, 2.0]), -1.0);
+    assert_eq!(
+        depth([5.0, 7.0, 1.0], [6.0, 8.0, 2.0]),
+        -3.0,
+        "the widest gap"
+    );
+    assert_eq!(depth([4.0, 1.0, 1.0], [6.0, 2.0, 2.0]), 0.0);
+    assert_eq!(depth([3.5, 1.0, 1.0], [6.0, 2.0, 2.0]), 0.5);
+    assert_eq!(depth([1.0, 1.0, 1.0], [2.0, 2.0, 2.0]), 2.0);
+    assert_eq!(depth([-9.0, -9.0, -9.0], [8.5, 9.0, 9.0]), 8.5);
+    assert_eq!(depth([2.0, 2.0, 2.0], [1.0, 1.0, 1.0]), f64::NEG_INFINITY);
+
+    // |x| <= -z: a point beside a face, and a box that only its edge parts.
+    let wedge = oracle(&[(Vec3::new(1.0, 0.0, -1.0), 0.0), (-Vec3::X - Vec3::Z, 0.0)]);
+    let beside = Vec3::new(7.0, 0.0, -4.0);
+    let found = wedge.depth(&Aabb::new(beside, beside));
+    assert!((found + 3.0 / 2f64.sqrt()).abs() < 1e-12, "{found}");
+    let behind = Aabb::new(Vec3::new(-9.0, 0.0, 0.5), Vec3::new(9.0, 1.0, 2.0));
+    assert_eq!(wedge.depth(&behind), -0.5);
+    assert_eq!(oracle(&[]).depth(&behind), f64::INFINITY);
+    let nothing = oracle(&[(Vec3::X, -1.0), (-Vec3::X, -1.0)]);
+    assert_eq!(nothing.depth(&behind), f64::NEG_INFINITY);
+}
+
+#[test]
+fn no_move_shorter_than_the_depth_changes_the_verdict() {
+    let (mut ins, mut outs) = (0, 0);
+    for seed in 0..1500 {
+        let case = RandomCase::new(seed);
+        let oracle = Oracle::of_volume(&case.volume);
+        let mut dice = Dice::new(seed);
+        for b in case.items.iter().take(6) {
+            let verdict = oracle.verdict(b);
+            let depth = oracle.depth(b);
+            if b.is_empty() || !depth.is_finite() {
+                continue;
+            }
+            let reach = f64::from(b.reach().max_element());
+            // Within rounding of a tie the sign means nothing.
+            if depth.abs() <= 1e-5 * reach {
+                continue;
+            }
+            let wanted = if depth > 0.0 {
+                Verdict::In
+            } else {
+                Verdict::Out
+            };
+            assert_eq!(verdict, wanted, "seed {seed}: {depth} for {b:?}");
+            for _ in 0..8 {
+                let direction = DVec3::from_array([0; 3].map(|_| dice.between(-1.0, 1.0)));
+                let step = direction.normalize() * depth * 0.9;
+                let by = step.clamp_length_max(1e30).as_vec3();
+                let moved = Aabb::new(b.min + by, b.max + by);
+                assert_eq!(
+                    oracle.verdict(&moved),
+                    wanted,
+                    "seed {seed}: {depth}, {b:?} by {by}"
+                );
+            }
+            *(if depth > 0.0 { &mut ins } else { &mut outs }) += 1;
+        }
+    }
+    assert!(ins > 500 && outs > 1000, "{ins} in, {outs} out");
+}

@@ -1,5 +1,6 @@
 //! A small generator of its own for the oracle's cases.
 
+use cullbench::geometry::Aabb;
 use glam::Vec3;
 
 /// SplitMix64 (Steele, Lea and Flood 2014).
@@ -58,4 +59,24 @@ impl Dice {
             }
         }
     }
+}
+
+/// A box that begins, ends or has its inside at `point`, axis by axis; some
+/// are flat, some points.
+pub fn grid_box(dice: &mut Dice, point: Vec3) -> Aabb {
+    let reach = |dice: &mut Dice| {
+        let unit = if dice.chance(0.5) { 1.0 } else { 0.5 };
+        dice.below(4) as f32 * unit
+    };
+    let (mut low, mut high) = (point, point);
+    for k in 0..3 {
+        let side = dice.below(5);
+        if side < 3 {
+            low[k] -= reach(dice);
+        }
+        if side == 0 || side > 2 {
+            high[k] += reach(dice);
+        }
+    }
+    Aabb::new(low, high)
 }

@@ -10,7 +10,7 @@ use cullbench::verify::{RandomCase, VOLUME_KINDS};
 use glam::Vec3;
 
 use crate::cases;
-use crate::draw::Dice;
+use crate::draw::{Dice, grid_box};
 use crate::simplex;
 
 /// What a run met: cases by verdict, and how many of them no plane shows alone
@@ -110,26 +110,6 @@ fn grid_case(dice: &mut Dice) -> (Vec<Plane>, Vec<Aabb>) {
     });
     let boxes = boxes.collect();
     (planes, boxes)
-}
-
-/// A box that begins, ends or has its inside at `point`, axis by axis; some
-/// are flat, some points.
-fn grid_box(dice: &mut Dice, point: Vec3) -> Aabb {
-    let reach = |dice: &mut Dice| {
-        let unit = if dice.chance(0.5) { 1.0 } else { 0.5 };
-        dice.below(4) as f32 * unit
-    };
-    let (mut low, mut high) = (point, point);
-    for k in 0..3 {
-        let side = dice.below(5);
-        if side < 3 {
-            low[k] -= reach(dice);
-        }
-        if side == 0 || side > 2 {
-            high[k] += reach(dice);
-        }
-    }
-    Aabb::new(low, high)
 }
 
 /// Planes about a grid point; now and then one of nothing but zeros, or an

@@ -8,49 +8,7 @@ use cullbench::geometry::{Aabb, Plane};
 use cullbench::oracle::Verdict;
 use dashu_int::IBig;
 
-/// A number `mantissa * 2^exponent`.
-#[derive(Clone, Debug)]
-pub struct Dyadic {
-    pub mantissa: IBig,
-    pub exponent: i64,
-}
-
-impl From<f32> for Dyadic {
-    fn from(value: f32) -> Self {
-        assert!(value.is_finite());
-        let bits = value.to_bits();
-        let fraction = i64::from(bits & 0x7F_FFFF);
-        let (magnitude, exponent) = match i64::from(bits >> 23 & 0xFF) {
-            0 => (fraction, -149),
-            biased => (fraction | 0x80_0000, biased - 150),
-        };
-        let zeros = if magnitude == 0 {
-            0
-        } else {
-            i64::from(magnitude.trailing_zeros())
-        };
-        let odd = magnitude >> zeros;
-        Dyadic {
-            mantissa: IBig::from(if value < 0.0 { -odd } else { odd }),
-            exponent: exponent + zeros,
-        }
-    }
-}
-
-impl Dyadic {
-    fn is_zero(&self) -> bool {
-        self.mantissa == IBig::ZERO
-    }
-
-    /// The number in units of `2^unit`, which must divide it.
-    fn in_units(&self, unit: i64) -> IBig {
-        if self.is_zero() {
-            return IBig::ZERO;
-        }
-        let shift = usize::try_from(self.exponent - unit).expect("a unit that divides");
-        &self.mantissa << shift
-    }
-}
+use crate::wide::Dyadic;
 
 /// The finest unit that these numbers need.
 fn unit_of<'a>(numbers: impl IntoIterator<Item = &'a Dyadic>) -> i64 {
