@@ -70,7 +70,7 @@ fn integer_frustum(eye: Vec3, far: f32) -> ConvexVolume {
 
 /// Boxes of a whole-number grid about the boundaries of small frusta.
 fn on_the_grid(only_test: bool) -> Workload {
-    let (near, far) = (1, if only_test { 3 } else { 12 });
+    let (near, far): (i32, i32) = (1, if only_test { 3 } else { 12 });
     let mut boxes = Vec::new();
     for depth in near - 1..=far + 1 {
         let width = depth + 1;
