@@ -447,6 +447,34 @@ fn whole_number_cameras_whose_ties_are_exact() {
 }
 
 #[test]
+fn lengths_far_beyond_f32_make_the_same_camera() {
+    let b = |x: f32| Aabb::new(Vec3::new(x, -1.0, -4.0), Vec3::new(x + 1.0, 1.0, -3.0));
+    for length in [1e-250, 1e-80, 1.0, 1e80, 1e250] {
+        let pose = Pose::LookAt {
+            eye: DVec3::ZERO,
+            look: -DVec3::Z * length,
+            up: (DVec3::Y - DVec3::Z) * length,
+        };
+        let near = 1e-100 * length.max(1e-200).min(1e80);
+        let edge = 0.5 * near;
+        let off_axis = Lens::off_axis([-edge, edge, -edge, edge], near, None);
+        let oracle = Oracle::of_camera(&pose, &off_axis.expect("a lens"), DVec3::ZERO);
+        let oracle = oracle.expect("a camera");
+        let verdicts = [2.0, 2.0f32.next_up(), 1.5].map(|x| oracle.judge(&b(x)));
+        let wanted = [
+            (Verdict::Touch, true),
+            (Verdict::Out, false),
+            (Verdict::In, false),
+        ];
+        assert_eq!(
+            verdicts.map(|j| (j.verdict, j.undecided)),
+            wanted,
+            "{length}"
+        );
+    }
+}
+
+#[test]
 fn impossible_cameras_have_no_oracle() {
     let lens = Lens::perspective(60.0, 1.0, 1.0, None).expect("a lens");
     let of = |eye: DVec3, look: DVec3, up: DVec3| {
