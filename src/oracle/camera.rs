@@ -48,6 +48,11 @@ const PI: [f64; 6] = [
     1.7449862161352486e-83,
 ];
 
+fn pi() -> Expansion {
+    let terms = PI.iter().rev();
+    terms.fold(Expansion::ZERO, |pi, &term| &pi + &Expansion::from(term))
+}
+
 fn times(a: &Expansion, b: &Expansion) -> Expansion {
     (a * b).leading(PRECISION.terms() + 1)
 }
@@ -216,11 +221,7 @@ fn planes(view: &View, lens: &Lens) -> Vec<HalfSpace> {
         Lens::Perspective {
             fovy_deg, aspect, ..
         } => {
-            let pi = PI
-                .iter()
-                .rev()
-                .fold(Expansion::ZERO, |pi, &term| &pi + &number(term));
-            let half = times(&pi, &number(fovy_deg)).over(360.0, PRECISION.terms() + 1);
+            let half = times(&pi(), &number(fovy_deg)).over(360.0, PRECISION.terms() + 1);
             let (sine, cosine) = sine_and_cosine(&half);
             let wide = times(&sine, &number(aspect));
             ([-&wide, wide, -&sine, sine], cosine)
@@ -248,4 +249,27 @@ fn planes(view: &View, lens: &Lens) -> Vec<HalfSpace> {
         planes.push(view.half_space(&view.back, &number(far)));
     }
     planes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sines_of_known_angles_are_true_to_250_bits() {
+        let pi = pi();
+        for (divisor, sine_squared) in [(6.0, 0.25), (4.0, 0.5), (3.0, 0.75), (2.0, 1.0)] {
+            let (sine, cosine) = sine_and_cosine(&pi.over(divisor, PRECISION.terms() + 1));
+            let off = &times(&sine, &sine) - &Expansion::from(sine_squared);
+            assert!(
+                off.estimate().abs() < libm::exp2(-250.0),
+                "{divisor}: {off:?}"
+            );
+            let off = &times(&cosine, &cosine) - &Expansion::from(1.0 - sine_squared);
+            assert!(
+                off.estimate().abs() < libm::exp2(-250.0),
+                "{divisor}: {off:?}"
+            );
+        }
+    }
 }

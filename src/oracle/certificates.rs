@@ -294,3 +294,30 @@ fn keep_tightest(bounds: &mut Vec<HalfSpace>) {
         })
     });
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::arithmetic::Expansion;
+
+    #[test]
+    fn of_two_bounds_that_rounding_swaps_both_are_kept() {
+        let half_ulp = f64::EPSILON / 4.0;
+        let bound = |n: Expansion, d: Expansion| HalfSpace {
+            normal: [n.into(), Number::default(), Number::default()],
+            d: d.into(),
+        };
+        let one = Expansion::from(1.0);
+        let sum = |a: f64, b: f64| &Expansion::from(a) + &Expansion::from(b);
+        // 1 / (1 + 0.9 h) is less than 1 - 0.6 h, but in f64 it is 1 against
+        // 1 - h.
+        let tightest = bound(sum(1.0, 1.8 * half_ulp), one.clone());
+        let other = bound(one.clone(), sum(1.0 - 2.0 * half_ulp, 0.8 * half_ulp));
+        let loose = bound(one.clone(), sum(1.0, 1e-9));
+        let mut bounds = vec![loose, other.clone(), tightest.clone()];
+        keep_tightest(&mut bounds);
+        let offsets: Vec<f64> = bounds.iter().map(|b| b.d.estimate()).collect();
+        assert_eq!(offsets, [other.d.estimate(), 1.0]);
+        assert!(other.d.estimate() < 1.0 && tightest.normal[0].estimate() == 1.0);
+    }
+}

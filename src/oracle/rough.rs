@@ -267,6 +267,7 @@ impl RoughSpaces {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::arithmetic::Expansion;
 
     fn spaces(planes: &[[f32; 4]]) -> RoughSpaces {
         let constraints: Vec<HalfSpace> = planes
@@ -312,6 +313,51 @@ mod tests {
         // With its tip cut off by the least that f64 can tell for certain.
         pyramid.push([0.0, 0.0, -1.0, -1e-12]);
         assert!(spaces(&pyramid).edge_misses(0, 1));
+    }
+
+    /// Certain bounds hold the true ratio, however ill-conditioned.
+    #[test]
+    fn the_true_bound_lies_within_the_doubt() {
+        let mut state = 1u64;
+        let mut float = || {
+            state = state.wrapping_mul(0x5851_F42D_4C95_7F2D).wrapping_add(1);
+            (state >> 40) as f32 / (1 << 23) as f32 - 1.0
+        };
+        let (mut bounds, mut narrow) = (0, 0);
+        for case in 0..4000 {
+            let mut planes = [[0.0; 4]; 3].map(|p| p.map(|_: f32| float()));
+            if case % 2 == 0 {
+                // Nearly parallel planes: most digits of the minors cancel.
+                let tiny = float() * 1e-4;
+                planes[1] = planes[0].map(|x| -x + float() * tiny);
+            }
+            let spaces = spaces(&planes);
+            for axis in 0..3 {
+                let Some(bound) = spaces.bound([0, 1, 2], axis) else {
+                    continue;
+                };
+                let [a, b] = [(axis + 1) % 3, (axis + 2) % 3];
+                let exact = |x: f32| Expansion::from(x);
+                let mut n = Expansion::ZERO;
+                let mut d = Expansion::ZERO;
+                for (first, i, j) in [(0, 1, 2), (1, 2, 0), (2, 0, 1)] {
+                    let [p, q] = [&planes[i], &planes[j]];
+                    let weight = &Expansion::product(p[a].into(), q[b].into())
+                        - &Expansion::product(p[b].into(), q[a].into());
+                    let weight = weight.abs();
+                    n = &n + &(&weight * &exact(planes[first][axis]));
+                    d = &d + &(&weight * &exact(planes[first][3]));
+                }
+                assert_eq!(bound.direction, axis * 2 + usize::from(n.sign() < 0));
+                let n = n.abs();
+                let above = &d - &(&n * &Expansion::from(bound.low));
+                let below = &(&n * &Expansion::from(bound.high)) - &d;
+                assert!(above.sign() >= 0 && below.sign() >= 0, "{planes:?}");
+                bounds += 1;
+                narrow += u32::from(bound.high - bound.low < 1e-9);
+            }
+        }
+        assert!(bounds > 1000 && narrow * 3 > bounds, "{bounds}, {narrow}");
     }
 
     #[test]

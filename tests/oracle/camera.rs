@@ -475,6 +475,28 @@ fn lengths_far_beyond_f32_make_the_same_camera() {
 }
 
 #[test]
+fn what_is_2_to_the_minus_100_beside_a_tie_is_decided() {
+    let lens = Lens::perspective(90.0, 1.0, 1.0, Some(8.0)).expect("a lens");
+    let b = Aabb::new(Vec3::new(4.0, -1.0, -4.0), Vec3::new(5.0, 1.0, -3.0));
+    let judge = |x: f64| {
+        let pose = Pose::Forward {
+            eye: DVec3::X * x,
+            forward: -DVec3::Z,
+            up: DVec3::Y,
+        };
+        let oracle = Oracle::of_camera(&pose, &lens, DVec3::ZERO).expect("a camera");
+        let found = oracle.judge(&b);
+        (found.verdict, found.undecided)
+    };
+    let near = libm::exp2(-100.0);
+    assert_eq!(judge(near), (Verdict::In, false));
+    assert_eq!(judge(-near), (Verdict::Out, false));
+    for beyond in [-libm::exp2(-200.0), 0.0, libm::exp2(-200.0)] {
+        assert_eq!(judge(beyond), (Verdict::Touch, true));
+    }
+}
+
+#[test]
 fn impossible_cameras_have_no_oracle() {
     let lens = Lens::perspective(60.0, 1.0, 1.0, None).expect("a lens");
     let of = |eye: DVec3, look: DVec3, up: DVec3| {
