@@ -421,7 +421,7 @@ fn the_whole_range_of_f32() {
             }
         }
         println!("{name}: {tally:?}");
-        assert!(tally.share(Verdict::Out) > 0.1, "{name}: {tally:?}");
+        assert!(tally.share(Verdict::Out) > 0.04, "{name}: {tally:?}");
         let rest = tally.share(Verdict::In).max(tally.share(Verdict::Touch));
         assert!(rest > 0.1, "{name}: {tally:?}");
     }
