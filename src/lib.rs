@@ -18,6 +18,7 @@
 //! - [`scene`]: generated and real worlds, and the regions in them
 //! - [`path`]: ways through a scene
 //! - [`verify`]: the reference answer and how others differ from it
+//! - [`stress`]: test vectors and extremes with their declared outcome
 //! - [`measure`]: count, verify, time; [`statistics`] makes figures of it
 //! - [`precision`]: error against run time, and the sweeps behind it
 //! - [`drift`]: how methods of turning and chasing drift from the truth
@@ -69,5 +70,6 @@ pub mod report;
 pub mod scene;
 pub mod spec;
 pub mod statistics;
+pub mod stress;
 pub mod suite;
 pub mod verify;

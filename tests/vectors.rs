@@ -1,4 +1,4 @@
-//! The test vectors of `data/vectors.json`, whose answers come from exact
+//! The test vectors of `datasets/vectors.json`, whose answers come from exact
 //! rational arithmetic: at planes level the volume and every structure must
 //! give the recorded f32 answer bit for bit, at camera level the default
 //! pipeline must not drop anything that is visible. Point location and what
@@ -131,7 +131,7 @@ impl Vector {
 }
 
 fn vectors() -> Vec<Vector> {
-    let file: Value = serde_json::from_str(include_str!("data/vectors.json")).unwrap();
+    let file: Value = serde_json::from_str(include_str!("../datasets/vectors.json")).unwrap();
     assert_eq!(file["format"], 1);
     let vectors = file["vectors"].as_array().unwrap();
     assert_eq!(file["count"], vectors.len());

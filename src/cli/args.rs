@@ -48,6 +48,8 @@ pub enum Command {
     Precision(PrecisionArgs),
     /// Compare how ways to turn, orbit and chase drift from the truth
     Drift(DriftArgs),
+    /// Replay test vectors and generated extremes, each with its declared outcome
+    Stress(StressArgs),
     /// Look at or generate scenes
     #[command(subcommand)]
     Scene(SceneCommand),
@@ -399,6 +401,18 @@ impl DriftArgs {
             tolerance_rad: self.tolerance,
         })
     }
+}
+
+#[derive(Args, Debug)]
+pub struct StressArgs {
+    /// A file of test vectors instead of the built-in ones; may be repeated
+    #[arg(long, value_name = "FILE")]
+    pub vectors: Vec<PathBuf>,
+    /// Structures, e.g. linear,bvh:leaf=4
+    #[arg(long, value_name = "LIST", default_value = "all")]
+    pub structure: String,
+    #[arg(long, value_enum, default_value = "table")]
+    pub format: TableFormat,
 }
 
 #[derive(Subcommand, Debug)]

@@ -16,6 +16,7 @@ mod query;
 mod run;
 mod run_table;
 mod scene;
+mod stress;
 mod text;
 mod verify;
 
@@ -49,6 +50,7 @@ pub fn main() -> ExitCode {
         Command::Verify(args) => verify::verify(&args),
         Command::Precision(args) => precision::precision(&args),
         Command::Drift(args) => drift::drift(&args),
+        Command::Stress(args) => stress::stress(&args),
         Command::Scene(SceneCommand::Info(args)) => scene::info(&args),
         Command::Scene(SceneCommand::Generate(args)) => scene::generate(&args),
         Command::Env(args) => env::env(&args),

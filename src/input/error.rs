@@ -20,6 +20,14 @@ pub enum InputError {
         found: String,
         expected: String,
     },
+    /// A structured file, by the path of the value in it.
+    #[error("{file}, {place}: {found}; expected {expected}")]
+    Value {
+        file: String,
+        place: String,
+        found: String,
+        expected: String,
+    },
     /// A binary file.
     #[error("{file}, byte {offset}: {found}; expected {expected}")]
     Byte {

@@ -1,0 +1,133 @@
+//! `cullbench stress`: the test vectors and the generated extremes on every
+//! structure. Prints what passed in a line per category and everything that
+//! failed in full, or all rows as JSON.
+
+use std::io::{self, Write};
+use std::time::Instant;
+
+use anyhow::bail;
+use indicatif::ProgressBar;
+
+use super::args::{StressArgs, TableFormat};
+use super::{Ending, interrupt, tell, text, unread_is_fine};
+use cullbench::index::{StructureSpec, structures};
+use cullbench::stress::{Row, Section, Status, Vector, built_in, read_vectors_file, replay};
+
+pub fn stress(args: &StressArgs) -> anyhow::Result<Ending> {
+    let structures = structures(&args.structure)?;
+    let mut vectors = Vec::new();
+    for file in &args.vectors {
+        vectors.extend(read_vectors_file(file)?);
+    }
+    if args.vectors.is_empty() {
+        vectors = built_in()?;
+    }
+    if vectors.is_empty() {
+        bail!("nothing to do: no vector in the file; expected at least one");
+    }
+    interrupt::from_now_on_finish();
+    let started = Instant::now();
+    let bar = ProgressBar::new(vectors.len() as u64);
+    let mut sections = Vec::new();
+    let mut interrupted = false;
+    for vector in &vectors {
+        if interrupt::asked() {
+            interrupted = true;
+            break;
+        }
+        bar.set_message(vector.id.clone());
+        add_vector(&mut sections, vector, &structures);
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    unread_is_fine(match args.format {
+        TableFormat::Json => json(&sections),
+        TableFormat::Table => table(&sections, started.elapsed().as_secs_f64()),
+    })?;
+    if interrupted {
+        tell("interrupted: only what is shown was checked");
+    }
+    let failed = sections
+        .iter()
+        .any(|section| section.count(Status::Fail) > 0);
+    Ok(match (failed, interrupted) {
+        (true, _) => Ending::WrongAnswer,
+        (false, true) => Ending::Interrupted,
+        (false, false) => Ending::Ok,
+    })
+}
+
+/// The rows of a vector, under its category.
+fn add_vector(sections: &mut Vec<Section>, vector: &Vector, structures: &[StructureSpec]) {
+    let rows = replay(vector, structures);
+    let place = sections.iter().position(|s| s.name == vector.category);
+    let place = place.unwrap_or_else(|| {
+        sections.push(Section::new(&vector.category));
+        sections.len() - 1
+    });
+    let section = &mut sections[place];
+    section.cases += 1;
+    section.boxes += vector.boxes.len() as u64;
+    section.rows.extend(rows);
+}
+
+/// All rows as one array, a row per line.
+fn json(sections: &[Section]) -> io::Result<()> {
+    let mut out = io::BufWriter::new(io::stdout().lock());
+    let mut before = "[\n";
+    for row in sections.iter().flat_map(|section| &section.rows) {
+        write!(out, "{before}{}", serde_json::to_string(row)?)?;
+        before = ",\n";
+    }
+    if before == "[\n" {
+        write!(out, "[")?;
+    }
+    writeln!(out, "\n]")?;
+    out.flush()
+}
+
+fn table(sections: &[Section], seconds: f64) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    let header = [
+        "category", "cases", "boxes", "rows", "passed", "refused", "failed",
+    ];
+    let mut table = text::table(&header, &[1, 2, 3, 4, 5, 6]);
+    for section in sections {
+        table.add_row([
+            section.name.clone(),
+            text::count(section.cases as usize),
+            text::count(section.boxes as usize),
+            text::count(section.rows.len()),
+            text::count(section.count(Status::Pass)),
+            text::count(section.count(Status::Refused)),
+            text::count(section.count(Status::Fail)),
+        ]);
+    }
+    writeln!(out, "{table}")?;
+    let rows = || sections.iter().flat_map(|section| &section.rows);
+    for row in rows().filter(|row| row.status == Status::Fail) {
+        let Row {
+            id,
+            structure,
+            test,
+            expected,
+            got,
+            ..
+        } = row;
+        let level = row.level.name();
+        writeln!(
+            out,
+            "{id}, {level} level, {structure}, {test}:\n  expected {expected}\n  got {got}"
+        )?;
+    }
+    let count = |status| rows().filter(|row| row.status == status).count();
+    writeln!(
+        out,
+        "{} checks in {seconds:.1} s: {} passed, {} refused as they must be, {} failed",
+        text::count(rows().count()),
+        text::count(count(Status::Pass)),
+        text::count(count(Status::Refused)),
+        text::count(count(Status::Fail)),
+    )?;
+    Ok(())
+}

@@ -1,0 +1,129 @@
+//! The stiff and extreme suite: every test vector on every structure, at
+//! planes and at camera level. It owns the rows that come out and what counts
+//! as passed; what is typed and printed is the command line's.
+
+mod replay;
+mod vectors;
+
+use serde::Serialize;
+
+use crate::camera::Surroundings;
+use crate::geometry::Aabb;
+use glam::{DVec3, Vec3};
+
+pub use replay::{Replay, replay};
+pub use vectors::{
+    BUILT_IN, BUILT_IN_NAME, Names, Vector, VectorCamera, VectorPoint, built_in, read_vectors,
+    read_vectors_file,
+};
+
+/// What is taken to be exact: the planes, or the camera's numbers.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Level {
+    Planes,
+    Camera,
+}
+
+/// How a check came out.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Status {
+    Pass,
+    Fail,
+    /// Impossible, and refused as it must be.
+    Refused,
+}
+
+impl Level {
+    pub fn name(self) -> &'static str {
+        match self {
+            Level::Planes => "planes",
+            Level::Camera => "camera",
+        }
+    }
+}
+
+/// Names of boxes, or words.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+#[serde(untagged)]
+pub enum Said {
+    Names(Vec<String>),
+    Text(String),
+}
+
+impl From<&Names> for Said {
+    fn from(names: &Names) -> Said {
+        Said::Names(names.iter().cloned().collect())
+    }
+}
+
+impl From<String> for Said {
+    fn from(text: String) -> Said {
+        Said::Text(text)
+    }
+}
+
+impl From<&str> for Said {
+    fn from(text: &str) -> Said {
+        Said::Text(text.to_owned())
+    }
+}
+
+impl std::fmt::Display for Said {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Said::Names(names) => write!(f, "{{{}}}", names.join(", ")),
+            Said::Text(text) => f.write_str(text),
+        }
+    }
+}
+
+/// One check: a case asked of a structure with a culling test.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+pub struct Row {
+    /// A case, or a case and the box that went wrong.
+    pub id: String,
+    pub level: Level,
+    pub structure: String,
+    pub test: String,
+    pub status: Status,
+    pub expected: Said,
+    pub got: Said,
+}
+
+/// Checks that belong together: a category of vectors, a family of extremes.
+#[derive(Clone, Default, Debug)]
+pub struct Section {
+    pub name: String,
+    pub cases: u64,
+    /// Boxes asked about.
+    pub boxes: u64,
+    pub rows: Vec<Row>,
+}
+
+impl Section {
+    pub fn new(name: &str) -> Section {
+        Section {
+            name: name.to_owned(),
+            ..Section::default()
+        }
+    }
+
+    pub fn count(&self, status: Status) -> usize {
+        self.rows.iter().filter(|row| row.status == status).count()
+    }
+}
+
+/// What the planes must know of boxes about the scene origin zero.
+fn surroundings(items: &[Aabb]) -> Surroundings {
+    let bounds = Aabb::union_of(items);
+    Surroundings {
+        origin: DVec3::ZERO,
+        reach: if bounds.is_empty() {
+            Vec3::ZERO
+        } else {
+            bounds.reach()
+        },
+    }
+}

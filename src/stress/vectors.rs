@@ -1,0 +1,534 @@
+//! Reading test vectors: JSON with the answers that exact arithmetic gave. It
+//! owns the format and every way in which a file can be wrong; asking the
+//! vectors is the business of the files beside this one.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use glam::{DVec3, Vec3};
+use serde_json::{Map, Value};
+
+use crate::camera::{Camera, CameraError, Lens, look_at};
+use crate::geometry::{Aabb, Plane};
+use crate::input::InputError;
+
+/// Names of boxes; sorted, so that they print alike every time.
+pub type Names = BTreeSet<String>;
+
+/// The vectors that come with the program.
+pub const BUILT_IN: &str = include_str!("../../datasets/vectors.json");
+/// What messages call them.
+pub const BUILT_IN_NAME: &str = "datasets/vectors.json";
+
+/// One test vector. What a file does not state is absent; nothing is checked
+/// against what is absent.
+#[derive(Clone, Debug)]
+pub struct Vector {
+    pub id: String,
+    pub category: String,
+    /// Bit for bit.
+    pub planes: Option<Vec<Plane>>,
+    pub camera: Option<VectorCamera>,
+    pub boxes: Vec<(String, Aabb)>,
+    pub points: Vec<VectorPoint>,
+    /// Exact verdicts; what touches is among the visible.
+    pub visible_planes: Option<Names>,
+    pub touch_planes: Option<Names>,
+    pub visible_camera: Option<Names>,
+    pub touch_camera: Option<Names>,
+    /// What the f32 six-plane test returns; where a file does not say, what
+    /// the exact one does.
+    pub six_plane: Option<Names>,
+    pub camera_error: Option<String>,
+    pub planes_error: Option<String>,
+    pub rejected_at_load: Names,
+    pub empty_boxes: Names,
+}
+
+/// A camera as a file states it: it may be impossible.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct VectorCamera {
+    pub eye: DVec3,
+    pub look: DVec3,
+    pub up: DVec3,
+    pub fovy_deg: f64,
+    pub aspect: f64,
+    pub near: f64,
+    /// `None` is infinite.
+    pub far: Option<f64>,
+}
+
+/// A point and the boxes that hold it.
+#[derive(Clone, Debug)]
+pub struct VectorPoint {
+    pub id: String,
+    pub p: Vec3,
+    pub containing: Names,
+}
+
+impl VectorCamera {
+    /// # Errors
+    /// No such camera.
+    pub fn camera(&self) -> Result<Camera, CameraError> {
+        let frame = look_at(self.eye, self.look, self.up)?;
+        let lens = Lens::perspective(self.fovy_deg, self.aspect, self.near, self.far)?;
+        Ok(Camera { frame, lens })
+    }
+}
+
+impl Vector {
+    /// The boxes that a scene may hold, and their names.
+    pub fn sound_boxes(&self) -> (Vec<String>, Vec<Aabb>) {
+        let sound = self.boxes.iter();
+        sound
+            .filter(|(name, _)| !self.rejected_at_load.contains(name))
+            .cloned()
+            .unzip()
+    }
+}
+
+/// The vectors that come with the program.
+///
+/// # Errors
+/// None, unless the file in the source was broken; a test reads it.
+pub fn built_in() -> Result<Vec<Vector>, InputError> {
+    read_vectors(BUILT_IN.as_bytes(), BUILT_IN_NAME)
+}
+
+/// [`read_vectors`] from a file on disk.
+///
+/// # Errors
+/// A file that cannot be read, or is wrong.
+pub fn read_vectors_file(path: &Path) -> Result<Vec<Vector>, InputError> {
+    let bytes = std::fs::read(path).map_err(|source| InputError::Io {
+        path: path.to_owned(),
+        source,
+    })?;
+    read_vectors(&bytes, &path.display().to_string())
+}
+
+/// Reads a file of vectors: an object with the array `vectors`, or the array
+/// alone. Numbers may be given as the words NaN, Infinity (inf) and
+/// -Infinity (-inf); fields that are not known are left alone.
+///
+/// # Errors
+/// One line: the file, the vector and field, what was found and expected.
+pub fn read_vectors(bytes: &[u8], file: &str) -> Result<Vec<Vector>, InputError> {
+    // What some editors put in front of UTF-8.
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let json: Value = serde_json::from_slice(bytes).map_err(|error| {
+        let text = error.to_string();
+        let found = text.split(" at line ").next().unwrap_or_default();
+        InputError::Line {
+            file: file.to_owned(),
+            line: error.line() as u64,
+            found: format!("column {}: {}", error.column(), shown(found)),
+            expected: "JSON: an object with the array 'vectors'".into(),
+        }
+    })?;
+    let list = match &json {
+        Value::Array(list) => list,
+        Value::Object(object) => {
+            let top = At::new(file, "the top level".into());
+            let format = object.get("format").unwrap_or(&Value::Null);
+            if !(format.is_null() || format.as_f64() == Some(1.0)) {
+                return Err(top.wrong(&format!("format {}", of(format)), "format 1"));
+            }
+            let list = object.get("vectors").unwrap_or(&Value::Null);
+            let list = list.as_array();
+            list.ok_or_else(|| top.wrong("no array 'vectors'", "an array of vectors"))?
+        }
+        other => {
+            let top = At::new(file, "the top level".into());
+            return Err(top.wrong(&of(other), "an object with the array 'vectors'"));
+        }
+    };
+    let mut seen = Names::new();
+    let vectors = list.iter().enumerate().map(|(index, value)| {
+        let vector = vector(value, file, index)?;
+        if !seen.insert(vector.id.clone()) {
+            let at = At::new(file, format!("vector {index}"));
+            let found = format!("the id '{}' a second time", shown(&vector.id));
+            return Err(at.wrong(&found, "an id of its own"));
+        }
+        Ok(vector)
+    });
+    vectors.collect()
+}
+
+fn vector(value: &Value, file: &str, index: usize) -> Result<Vector, InputError> {
+    let at = At::new(file, format!("vector {index}"));
+    let object = at.object(value)?;
+    let id = at.child("id").name(at.required(object, "id")?)?;
+    let at = At::new(file, format!("vector {index} ({})", shown(&id)));
+    let optional = |field: &str| object.get(field).filter(|value| !value.is_null());
+    let names = |field: &str| -> Result<Option<Names>, InputError> {
+        let read = optional(field).map(|value| at.child(field).names(value));
+        read.transpose()
+    };
+    let error = |field: &str| match optional(field) {
+        None | Some(Value::Bool(false)) => Ok(None),
+        Some(Value::Bool(true)) => Ok(Some("an error".to_owned())),
+        Some(Value::String(text)) => Ok(Some(text.clone())),
+        Some(other) => Err(at.child(field).wrong(&of(other), "the error in words")),
+    };
+    let elements = |field: &str| match optional(field) {
+        None => Ok(Vec::new()),
+        Some(value) => at.child(field).elements(value),
+    };
+    let planes = match optional("planes_f32_hex") {
+        Some(rows) => Some(
+            at.child("planes_f32_hex")
+                .planes(rows, |at, value| at.bits(value))?,
+        ),
+        None => match optional("planes") {
+            Some(rows) => {
+                let at = at.child("planes");
+                Some(at.planes(rows, |at, value| Ok(at.number(value)? as f32))?)
+            }
+            None => None,
+        },
+    };
+    let camera = optional("camera").map(|value| at.child("camera").camera(value));
+    let mut boxes = Vec::new();
+    let mut seen = BTreeSet::new();
+    for (at, value) in elements("boxes")? {
+        let (name, b) = at.bounds(value)?;
+        if !seen.insert(name.clone()) {
+            let found = format!("the id '{}' a second time", shown(&name));
+            return Err(at.wrong(&found, "an id of its own"));
+        }
+        boxes.push((name, b));
+    }
+    let points = elements("points")?;
+    let points = points.iter().map(|(at, value)| at.point(value));
+    Ok(Vector {
+        category: match optional("category") {
+            None => "vector".to_owned(),
+            Some(value) => at.child("category").name(value)?,
+        },
+        planes,
+        camera: camera.transpose()?,
+        boxes,
+        points: points.collect::<Result<_, _>>()?,
+        visible_planes: names("expected_visible_planes")?,
+        touch_planes: names("touch_planes")?,
+        visible_camera: names("expected_visible_camera")?,
+        touch_camera: names("touch_camera")?,
+        six_plane: match names("observed_f32_pvertex_mul_add")? {
+            None => names("p_vertex_exact_visible")?,
+            some => some,
+        },
+        camera_error: error("expect_camera_error")?,
+        planes_error: error("expect_planes_error")?,
+        rejected_at_load: names("expect_rejected_at_load")?.unwrap_or_default(),
+        empty_boxes: names("expect_empty_boxes")?.unwrap_or_default(),
+        id,
+    })
+}
+
+/// A place in the file.
+struct At<'a> {
+    file: &'a str,
+    place: String,
+}
+
+impl<'a> At<'a> {
+    fn new(file: &'a str, place: String) -> At<'a> {
+        At { file, place }
+    }
+
+    fn child(&self, field: &str) -> At<'a> {
+        At::new(self.file, format!("{}, {field}", self.place))
+    }
+
+    fn wrong(&self, found: &str, expected: &str) -> InputError {
+        InputError::Value {
+            file: self.file.to_owned(),
+            place: self.place.clone(),
+            found: found.to_owned(),
+            expected: expected.to_owned(),
+        }
+    }
+
+    fn object<'v>(&self, value: &'v Value) -> Result<&'v Map<String, Value>, InputError> {
+        let object = value.as_object();
+        object.ok_or_else(|| self.wrong(&of(value), "an object"))
+    }
+
+    fn required<'v>(
+        &self,
+        object: &'v Map<String, Value>,
+        field: &str,
+    ) -> Result<&'v Value, InputError> {
+        let value = object.get(field);
+        value.ok_or_else(|| self.wrong(&format!("no '{field}'"), &format!("the field '{field}'")))
+    }
+
+    /// The elements of an array, each with its place.
+    fn elements<'v>(&self, value: &'v Value) -> Result<Vec<(At<'a>, &'v Value)>, InputError> {
+        let list = value.as_array();
+        let list = list.ok_or_else(|| self.wrong(&of(value), "an array"))?;
+        let place = |i: usize| At::new(self.file, format!("{}[{i}]", self.place));
+        Ok(list
+            .iter()
+            .enumerate()
+            .map(|(i, v)| (place(i), v))
+            .collect())
+    }
+
+    fn exactly<'v, const N: usize>(
+        &self,
+        value: &'v Value,
+        what: &str,
+    ) -> Result<[(At<'a>, &'v Value); N], InputError> {
+        let elements = self.elements(value)?;
+        let count = elements.len();
+        let wrong = || self.wrong(&format!("{count} elements"), what);
+        elements.try_into().map_err(|_| wrong())
+    }
+
+    /// A name: text, or a whole number taken as text.
+    fn name(&self, value: &Value) -> Result<String, InputError> {
+        match value {
+            Value::String(text) => Ok(text.clone()),
+            Value::Number(number) if number.is_u64() => Ok(number.to_string()),
+            other => Err(self.wrong(&of(other), "a name")),
+        }
+    }
+
+    fn names(&self, value: &Value) -> Result<Names, InputError> {
+        let elements = self.elements(value)?;
+        elements.iter().map(|(at, v)| at.name(v)).collect()
+    }
+
+    fn number(&self, value: &Value) -> Result<f64, InputError> {
+        const WORDS: [(&str, f64); 5] = [
+            ("nan", f64::NAN),
+            ("inf", f64::INFINITY),
+            ("infinity", f64::INFINITY),
+            ("-inf", f64::NEG_INFINITY),
+            ("-infinity", f64::NEG_INFINITY),
+        ];
+        let said = match value {
+            Value::String(text) => {
+                let row = WORDS.iter().find(|row| text.eq_ignore_ascii_case(row.0));
+                row.map(|row| row.1)
+            }
+            other => other.as_f64(),
+        };
+        said.ok_or_else(|| self.wrong(&of(value), "a number, NaN, Infinity or -Infinity"))
+    }
+
+    fn vector(&self, value: &Value) -> Result<DVec3, InputError> {
+        let [x, y, z] = self.exactly(value, "three numbers")?;
+        let number = |(at, value): (At, &Value)| at.number(value);
+        Ok(DVec3::new(number(x)?, number(y)?, number(z)?))
+    }
+
+    /// The bits of an f32 in hexadecimal: "0x3f800000".
+    fn bits(&self, value: &Value) -> Result<f32, InputError> {
+        let digits = value.as_str().map(|text| {
+            let bare = text.strip_prefix("0x").or_else(|| text.strip_prefix("0X"));
+            bare.unwrap_or(text)
+        });
+        let sound = digits.filter(|d| d.len() == 8 && d.bytes().all(|b| b.is_ascii_hexdigit()));
+        let bits = sound.and_then(|digits| u32::from_str_radix(digits, 16).ok());
+        let bits = bits.ok_or_else(|| {
+            let expected = "the 32 bits of an f32 such as \"0x3f800000\"";
+            self.wrong(&of(value), expected)
+        })?;
+        Ok(f32::from_bits(bits))
+    }
+
+    fn planes(
+        &self,
+        rows: &Value,
+        number: impl Fn(&At, &Value) -> Result<f32, InputError>,
+    ) -> Result<Vec<Plane>, InputError> {
+        let rows = self.elements(rows)?;
+        let planes = rows.iter().map(|(at, row)| {
+            let [x, y, z, d] = at.exactly(row, "four numbers: the normal and the offset")?;
+            let read = |(at, value): (At, &Value)| number(&at, value);
+            Ok(Plane::new(
+                Vec3::new(read(x)?, read(y)?, read(z)?),
+                read(d)?,
+            ))
+        });
+        planes.collect()
+    }
+
+    fn camera(&self, value: &Value) -> Result<VectorCamera, InputError> {
+        let object = self.object(value)?;
+        let vector = |field: &str| self.child(field).vector(self.required(object, field)?);
+        let number = |field: &str| self.child(field).number(self.required(object, field)?);
+        let far = match object.get("far") {
+            None | Some(Value::Null) => None,
+            Some(value) => Some(self.child("far").number(value)?),
+        };
+        Ok(VectorCamera {
+            eye: vector("eye")?,
+            look: vector("look")?,
+            up: vector("up")?,
+            fovy_deg: number("fovy_deg")?,
+            aspect: number("aspect")?,
+            near: number("near")?,
+            far: far.filter(|&far| far != f64::INFINITY),
+        })
+    }
+
+    /// Bounds are f32 numbers, and the nearest ones if they are not.
+    fn bounds(&self, value: &Value) -> Result<(String, Aabb), InputError> {
+        let object = self.object(value)?;
+        let name = self.child("id").name(self.required(object, "id")?)?;
+        let corner = |field: &str| self.child(field).vector(self.required(object, field)?);
+        let bounds = Aabb::new(corner("lo")?.as_vec3(), corner("hi")?.as_vec3());
+        Ok((name, bounds))
+    }
+
+    fn point(&self, value: &Value) -> Result<VectorPoint, InputError> {
+        let object = self.object(value)?;
+        let field = "expected_containing";
+        Ok(VectorPoint {
+            id: self.child("id").name(self.required(object, "id")?)?,
+            p: self
+                .child("p")
+                .vector(self.required(object, "p")?)?
+                .as_vec3(),
+            containing: self.child(field).names(self.required(object, field)?)?,
+        })
+    }
+}
+
+/// A value as messages quote it: short and on one line.
+fn of(value: &Value) -> String {
+    match value {
+        Value::Array(list) => format!("an array of {}", list.len()),
+        Value::Object(_) => "an object".to_owned(),
+        other => format!("'{}'", shown(&other.to_string())),
+    }
+}
+
+fn shown(text: &str) -> String {
+    const MOST: usize = 60;
+    let mut plain: String = text.chars().take(MOST).collect();
+    if plain.len() < text.len() {
+        plain.push_str("...");
+    }
+    plain.replace(char::is_control, " ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_built_in_vectors_can_be_read() {
+        let vectors = built_in().unwrap();
+        assert_eq!(vectors.len(), 55);
+        let boxes: usize = vectors.iter().map(|v| v.boxes.len()).sum();
+        assert_eq!(boxes, 688);
+        let infinite = vectors
+            .iter()
+            .filter_map(|v| v.camera)
+            .filter(|c| c.far.is_none());
+        assert_eq!(infinite.count(), 1);
+        let points: usize = vectors.iter().map(|v| v.points.len()).sum();
+        assert!(points >= 12);
+    }
+
+    #[test]
+    fn every_mistake_is_one_line_that_says_where() {
+        let boxed = |b: &str| format!(r#"[{{"id":"v","boxes":[{b}]}}]"#);
+        let with = |field: &str| format!(r#"[{{"id":"v",{field}}}]"#);
+        let cases = [
+            (String::new(), "f.json, line 1: column 0: EOF"),
+            (
+                "{\"vectors\":[}".into(),
+                "f.json, line 1: column 13: expected value",
+            ),
+            ("3".into(), "the top level: '3'; expected an object"),
+            ("{}".into(), "no array 'vectors'"),
+            (
+                r#"{"format":2,"vectors":[]}"#.into(),
+                "format '2'; expected format 1",
+            ),
+            ("[3]".into(), "vector 0: '3'; expected an object"),
+            ("[{}]".into(), "vector 0: no 'id'; expected the field 'id'"),
+            (
+                r#"[{"id":true}]"#.into(),
+                "vector 0, id: 'true'; expected a name",
+            ),
+            (
+                r#"[{"id":"v"},{"id":"v"}]"#.into(),
+                "vector 1: the id 'v' a second time",
+            ),
+            (
+                boxed(r#"{"id":"b","lo":[0,0,0]}"#),
+                "vector 0 (v), boxes[0]: no 'hi'",
+            ),
+            (
+                boxed(r#"{"id":"b","lo":[0,0],"hi":0}"#),
+                "boxes[0], lo: 2 elements; expected three",
+            ),
+            (
+                boxed(r#"{"id":"b","lo":[0,0,"x"],"hi":[1,1,1]}"#),
+                r#"boxes[0], lo[2]: '"x"'; expected a number, NaN, Infinity"#,
+            ),
+            (
+                boxed(
+                    r#"{"id":"b","lo":[0,0,0],"hi":[1,1,1]},{"id":"b","lo":[0,0,0],"hi":[1,1,1]}"#,
+                ),
+                "boxes[1]: the id 'b' a second time",
+            ),
+            (
+                with(r#""planes":[[1,2,3]]"#),
+                "planes[0]: 3 elements; expected four",
+            ),
+            (
+                with(r#""planes_f32_hex":[["0x3f80000","","",""]]"#),
+                "planes_f32_hex[0][0]: ",
+            ),
+            (with(r#""camera":{"eye":[0,0,0]}"#), "camera: no 'look'"),
+            (
+                with(r#""camera":[]"#),
+                "camera: an array of 0; expected an object",
+            ),
+            (
+                with(r#""expected_visible_planes":"all""#),
+                "expected_visible_planes: '\"all\"'",
+            ),
+            (with(r#""expect_camera_error":[1]"#), "the error in words"),
+            (
+                with(r#""points":[{"id":"p","p":[0,0,0]}]"#),
+                "points[0]: no 'expected_containing'",
+            ),
+        ];
+        for (text, wanted) in cases {
+            let error = read_vectors(text.as_bytes(), "f.json")
+                .unwrap_err()
+                .to_string();
+            assert!(
+                error.starts_with("f.json, ") && error.contains(wanted),
+                "{text}: {error}"
+            );
+            assert!(
+                error.contains("expected") && !error.contains('\n'),
+                "{error}"
+            );
+        }
+    }
+
+    #[test]
+    fn words_are_numbers_and_infinity_has_many_spellings() {
+        let text = r#"{"vectors":[{"id":7,"x":{},"camera":{"eye":[0,"-inf","NaN"],"look":[0,0,1],
+            "up":[0,1,0],"fovy_deg":60,"aspect":1,"near":1,"far":"Infinity"},"expect_camera_error":true,
+            "boxes":[{"id":0,"lo":["-Infinity",0,-0.0],"hi":[1e39,0.1,1]}]}]}"#;
+        let vectors = read_vectors(text.as_bytes(), "f.json").unwrap();
+        let camera = vectors[0].camera.unwrap();
+        assert!(camera.far.is_none() && camera.eye.y == f64::NEG_INFINITY);
+        assert!(camera.camera().is_err() && vectors[0].camera_error.is_some());
+        let (name, b) = &vectors[0].boxes[0];
+        assert_eq!((name.as_str(), b.max.x, b.max.y), ("0", f32::INFINITY, 0.1));
+    }
+}
