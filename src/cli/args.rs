@@ -405,12 +405,18 @@ impl DriftArgs {
 
 #[derive(Args, Debug)]
 pub struct StressArgs {
-    /// A file of test vectors instead of the built-in ones; may be repeated
+    /// A file of test vectors instead of what is built in; may be repeated
     #[arg(long, value_name = "FILE")]
     pub vectors: Vec<PathBuf>,
     /// Structures, e.g. linear,bvh:leaf=4
     #[arg(long, value_name = "LIST", default_value = "all")]
     pub structure: String,
+    /// Cases of each generated extreme, 0 for none [default: 106, ten million boxes; 0 with --vectors]
+    #[arg(long, value_name = "N")]
+    pub cases: Option<u64>,
+    /// Seed of the first case; case i has seed N + i
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
     #[arg(long, value_enum, default_value = "table")]
     pub format: TableFormat,
 }

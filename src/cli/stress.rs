@@ -11,6 +11,7 @@ use indicatif::ProgressBar;
 use super::args::{StressArgs, TableFormat};
 use super::{Ending, interrupt, tell, text, unread_is_fine};
 use cullbench::index::{StructureSpec, structures};
+use cullbench::stress::extremes::{DEFAULT_CASES, Extremes, Progress, Tally};
 use cullbench::stress::{Row, Section, Status, Vector, built_in, read_vectors_file, replay};
 
 pub fn stress(args: &StressArgs) -> anyhow::Result<Ending> {
@@ -27,7 +28,18 @@ pub fn stress(args: &StressArgs) -> anyhow::Result<Ending> {
     }
     interrupt::from_now_on_finish();
     let started = Instant::now();
-    let bar = ProgressBar::new(vectors.len() as u64);
+    let cases = match (args.cases, &args.vectors[..]) {
+        (Some(cases), _) => cases,
+        (None, []) => DEFAULT_CASES,
+        (None, _) => 0,
+    };
+    let extremes = Extremes {
+        structures: &structures,
+        seed: args.seed,
+        cases,
+        threads: std::thread::available_parallelism().map_or(1, |n| n.get().min(2)),
+    };
+    let bar = ProgressBar::new(vectors.len() as u64 + extremes.total());
     let mut sections = Vec::new();
     let mut interrupted = false;
     for vector in &vectors {
@@ -38,6 +50,10 @@ pub fn stress(args: &StressArgs) -> anyhow::Result<Ending> {
         bar.set_message(vector.id.clone());
         add_vector(&mut sections, vector, &structures);
         bar.inc(1);
+    }
+    if cases > 0 && !interrupted {
+        sections.extend(extremes.run(&Shown(&bar)));
+        interrupted = interrupt::asked();
     }
     bar.finish_and_clear();
     unread_is_fine(match args.format {
@@ -55,6 +71,22 @@ pub fn stress(args: &StressArgs) -> anyhow::Result<Ending> {
         (false, true) => Ending::Interrupted,
         (false, false) => Ending::Ok,
     })
+}
+
+/// Tells the progress bar; a Ctrl-C ends the run after the case at hand.
+struct Shown<'a>(&'a ProgressBar);
+
+impl Progress for Shown<'_> {
+    fn case_done(&self, family: &str) {
+        if self.0.message() != family {
+            self.0.set_message(family.to_owned());
+        }
+        self.0.inc(1);
+    }
+
+    fn stop(&self) -> bool {
+        interrupt::asked()
+    }
 }
 
 /// The rows of a vector, under its category.
@@ -118,6 +150,22 @@ fn table(sections: &[Section], seconds: f64) -> io::Result<()> {
         writeln!(
             out,
             "{id}, {level} level, {structure}, {test}:\n  expected {expected}\n  got {got}"
+        )?;
+    }
+    let mut tally = Tally::default();
+    sections.iter().for_each(|section| tally += section.tally);
+    if tally.boxes > 0 {
+        writeln!(
+            out,
+            "{} boxes judged at camera level: {} visible, {} of them touching ({} too close to \
+             tell); {} false negatives and {} dropped touches; {} were lost without the epsilon",
+            text::count(tally.boxes as usize),
+            text::count(tally.seen as usize),
+            text::count(tally.ties as usize),
+            text::count(tally.undecided as usize),
+            text::count(tally.false_negatives as usize),
+            text::count(tally.touch_dropped as usize),
+            text::count(tally.lost_bare as usize),
         )?;
     }
     let count = |status| rows().filter(|row| row.status == status).count();

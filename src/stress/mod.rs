@@ -2,6 +2,7 @@
 //! planes and at camera level. It owns the rows that come out and what counts
 //! as passed; what is typed and printed is the command line's.
 
+pub mod extremes;
 mod replay;
 mod vectors;
 
@@ -11,6 +12,7 @@ use crate::camera::Surroundings;
 use crate::geometry::Aabb;
 use glam::{DVec3, Vec3};
 
+use replay::slack;
 pub use replay::{Replay, replay};
 pub use vectors::{
     BUILT_IN, BUILT_IN_NAME, Names, Vector, VectorCamera, VectorPoint, built_in, read_vectors,
@@ -99,6 +101,8 @@ pub struct Section {
     pub cases: u64,
     /// Boxes asked about.
     pub boxes: u64,
+    /// What the oracle said of them (extremes at camera level).
+    pub tally: extremes::Tally,
     pub rows: Vec<Row>,
 }
 

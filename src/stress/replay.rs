@@ -463,7 +463,7 @@ impl Sheet<'_> {
 /// the volume, whose points near the camera are among its corners, so `|d|`
 /// is no more than the sum of A_k. 16 covers the sum of both; what is below
 /// f32 altogether is 2^-140 at most.
-fn slack(camera: &Camera, around: &Surroundings, b: &Aabb) -> f64 {
+pub(super) fn slack(camera: &Camera, around: &Surroundings, b: &Aabb) -> f64 {
     const UNIT_ROUNDOFF: f64 = 1.0 / (1u64 << 24) as f64;
     const TINY: f64 = f64::from_bits((1023 - 140) << 52);
     let near = camera.lens.near();

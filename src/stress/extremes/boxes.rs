@@ -1,0 +1,163 @@
+//! Boxes that make rounding as bad as it gets: each touches the view volume
+//! at a point of a face, an edge or a corner, and is then shifted by up to two
+//! ulps per axis. It owns shapes and places; what is visible is the oracle's
+//! to say.
+
+use glam::{DVec3, Vec3};
+
+use crate::camera::{Camera, Surroundings};
+use crate::geometry::Aabb;
+use crate::scene::Dice;
+
+/// What the boxes of a case look like.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Shapes {
+    /// Points, cubes, slivers, specks and boxes larger than the volume.
+    Mixed,
+    /// Lines and plates: zero on one or two axes, long on the others.
+    Needles,
+    /// A few boxes, many times each.
+    Coincident,
+    /// Sizes over six orders of magnitude side by side.
+    Ratio,
+    /// Bounds on a grid of integers that the camera is on as well.
+    Grid,
+}
+
+/// The hull of what a camera sees, in scene-local f64.
+struct Hull {
+    /// Near corners, then far ones; bit 0 is right, bit 1 top.
+    corners: [DVec3; 8],
+    /// Inward, in the order of the corners' bits: left, right, bottom, top,
+    /// near, far.
+    normals: [DVec3; 6],
+}
+
+/// An infinite volume is probed up to a depth of so many times near.
+const DEEP: f64 = 1e4;
+
+impl Hull {
+    fn of(camera: &Camera, around: &Surroundings) -> Option<Hull> {
+        let far = camera.lens.far().unwrap_or(camera.lens.near() * DEEP);
+        let lens = camera.lens.with_far(Some(far)).ok()?;
+        let frame = camera.frame.relative_to(around.origin);
+        let camera = Camera {
+            lens,
+            frame: camera.frame,
+        };
+        // Only as a hint where inside is.
+        let planes = camera.wide_volume(around).ok()?;
+        let normals: Vec<DVec3> = planes.planes().iter().map(|p| p.normal).collect();
+        Some(Hull {
+            corners: lens.corners(&frame)?,
+            normals: normals.try_into().ok()?,
+        })
+    }
+
+    fn at(&self, [s, t, w]: [f64; 3]) -> DVec3 {
+        let across = |i: usize| {
+            let [a, b, c, d] = [0, 1, 2, 3].map(|k| self.corners[i + k]);
+            a.lerp(b, s).lerp(c.lerp(d, s), t)
+        };
+        across(0).lerp(across(4), w)
+    }
+}
+
+/// `count` boxes about a camera's volume, in scene-local coordinates. One in
+/// 64 is inverted, and so empty. None if the lens has no corners.
+pub fn adversarial(
+    dice: &mut Dice,
+    camera: &Camera,
+    around: &Surroundings,
+    shapes: Shapes,
+    count: usize,
+) -> Option<Vec<Aabb>> {
+    let hull = Hull::of(camera, around)?;
+    let mut boxes: Vec<Aabb> = Vec::with_capacity(count);
+    for i in 0..count {
+        if shapes == Shapes::Coincident && i >= 16 {
+            let again = boxes[i % 16];
+            boxes.push(again);
+            continue;
+        }
+        let mut b = touching(dice, &hull, shapes);
+        if dice.below(64) == 0 {
+            b = Aabb::new(b.max, b.min);
+        }
+        boxes.push(b);
+    }
+    Some(boxes)
+}
+
+/// A box whose corner, edge or face meets the hull where it was aimed.
+fn touching(dice: &mut Dice, hull: &Hull, shapes: Shapes) -> Aabb {
+    // Anywhere between near and far, every order of magnitude alike.
+    let depth = libm::exp2(-dice.between(0.0, 14.0));
+    let mut at = [dice.unit(), dice.unit(), depth];
+    let mut faces: Vec<DVec3> = Vec::with_capacity(3);
+    let first = dice.below(3);
+    for step in 0..[1, 2, 2, 3][dice.below(4)] {
+        let axis = (first + step) % 3;
+        let high = dice.below(2);
+        at[axis] = high as f64;
+        faces.push(hull.normals[2 * axis + high]);
+    }
+    let (mut inward, mut both) = (faces.iter().sum::<DVec3>(), [false; 3]);
+    let axis = dice.below(3);
+    match faces[..] {
+        // An edge against an edge of the box along this axis.
+        [a, b, ..] if a[axis] * b[axis] < 0.0 && dice.below(2) == 0 => {
+            inward = a * b[axis].abs() + b * a[axis].abs();
+            both[axis] = true;
+        }
+        // A corner against a face of the box across this axis.
+        [_, _, _] if dice.below(2) == 0 => {
+            both = [0, 1, 2].map(|k| k != axis);
+        }
+        _ => {}
+    }
+    let mut p = hull.at(at);
+    if shapes == Shapes::Grid {
+        p = (p * 4.0).round() / 4.0;
+    }
+    let scale = (hull.at([0.5, 0.5, at[2]]) - hull.at([0.0, 0.0, at[2]])).length();
+    let (mut min, mut max) = (p.as_vec3(), p.as_vec3());
+    let sizes = sizes(dice, shapes, scale);
+    for k in 0..3 {
+        let ulps = dice.below(5) as i32 - 2;
+        let corner = shifted(p[k] as f32, ulps);
+        let (low, high) = (p[k] - sizes[k], p[k] + sizes[k]);
+        (min[k], max[k]) = if both[k] {
+            (low as f32, high as f32)
+        } else if inward[k] >= 0.0 {
+            ((low as f32).min(corner), corner)
+        } else {
+            (corner, (high as f32).max(corner))
+        };
+    }
+    let limit = Vec3::splat(f32::MAX);
+    Aabb::new(min.clamp(-limit, limit), max.clamp(-limit, limit))
+}
+
+/// Edge lengths for a volume that is `scale` wide where the box is.
+fn sizes(dice: &mut Dice, shapes: Shapes, scale: f64) -> [f64; 3] {
+    let edge = scale * libm::exp2(dice.between(-6.0, 0.0));
+    match shapes {
+        Shapes::Grid => [0, 1, 2].map(|_| dice.below(9) as f64 / 4.0),
+        Shapes::Ratio => [scale * [1e-3, 1e3][dice.below(2)]; 3],
+        Shapes::Needles => [0, 1, 2].map(|_| [0.0, edge * 64.0][dice.below(2)]),
+        Shapes::Mixed | Shapes::Coincident => match dice.below(6) {
+            0 => [0.0; 3],
+            1 => [0, 1, 2].map(|_| [0.0, edge][dice.below(2)]),
+            2 => [edge * 1e-5; 3],
+            3 => [0, 1, 2].map(|_| edge * 1e3 * dice.unit()),
+            4 => [0, 1, 2].map(|_| edge * dice.unit()),
+            _ => [edge; 3],
+        },
+    }
+}
+
+/// So many representable numbers up or down.
+fn shifted(x: f32, ulps: i32) -> f32 {
+    (0..ulps.abs()).fold(x, |x, _| if ulps > 0 { x.next_up() } else { x.next_down() })
+}

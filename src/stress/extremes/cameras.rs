@@ -1,0 +1,255 @@
+//! The cameras of the generated extremes: one family per way in which a
+//! camera or its boxes can be extreme. A row of the table is a family; its
+//! variants say how far it goes.
+
+use glam::DVec3;
+
+use super::boxes::Shapes;
+use crate::camera::{CameraError, Lens, PlaneMethod, PlaneOptions};
+use crate::oracle::Pose;
+use crate::scene::Dice;
+
+/// A camera to be built, as exact numbers.
+pub struct Setup {
+    pub pose: Pose,
+    pub lens: Lens,
+    pub origin: DVec3,
+    pub planes: PlaneOptions,
+    pub shapes: Shapes,
+}
+
+/// One way of being extreme.
+pub struct CameraFamily {
+    pub name: &'static str,
+    pub summary: &'static str,
+    pub variants: &'static [f64],
+    /// How a variant is named in ids.
+    pub label: fn(f64) -> String,
+    pub setup: fn(&mut Dice, f64) -> Result<Setup, CameraError>,
+}
+
+pub static CAMERA_FAMILIES: &[CameraFamily] = &[
+    CameraFamily {
+        name: "near-far",
+        summary: "far / near from 1e3 to 1e9, and infinite",
+        variants: &[1e3, 1e6, 1e9, f64::INFINITY],
+        label: plain,
+        setup: |dice, ratio| {
+            let mut draft = Draft::any(dice);
+            draft.depth(ratio);
+            draft.perspective()
+        },
+    },
+    CameraFamily {
+        name: "reversed-z",
+        summary: "the same with planes from a reversed-Z matrix in f64",
+        variants: &[1e3, 1e6, 1e9, f64::INFINITY],
+        label: plain,
+        setup: |dice, ratio| {
+            let mut draft = Draft::any(dice);
+            draft.depth(ratio);
+            draft.planes.method = PlaneMethod::GhRevzF64;
+            draft.perspective()
+        },
+    },
+    CameraFamily {
+        name: "fov",
+        summary: "vertical field of view from 1e-3 to 179.99 degrees",
+        variants: &[1e-3, 0.1, 1.0, 90.0, 170.0, 179.0, 179.99],
+        label: plain,
+        setup: |dice, fov| {
+            let mut draft = Draft::any(dice);
+            draft.fovy_deg = fov;
+            draft.perspective()
+        },
+    },
+    CameraFamily {
+        name: "aspect",
+        summary: "width / height from 1e-4 to 1e4",
+        variants: &[1e-4, 1e-2, 1e2, 1e4],
+        label: plain,
+        setup: |dice, aspect| {
+            let mut draft = Draft::any(dice);
+            draft.aspect = aspect;
+            draft.perspective()
+        },
+    },
+    CameraFamily {
+        name: "offset",
+        summary: "a camera 1e4 to 1e9 depths of 1 away from the scene's zero",
+        variants: &[1e4, 1e5, 1e6, 1e7, 1e8, 1e9],
+        label: plain,
+        setup: |dice, offset| {
+            let mut draft = Draft::any(dice);
+            draft.eye += dice.point().map(|c| (c - 0.5).signum() * offset);
+            draft.perspective()
+        },
+    },
+    CameraFamily {
+        name: "rebased",
+        summary: "the same in coordinates about a point near the camera",
+        variants: &[1e4, 1e5, 1e6, 1e7, 1e8, 1e9],
+        label: plain,
+        setup: |dice, offset| {
+            let mut draft = Draft::any(dice);
+            draft.eye += dice.point().map(|c| (c - 0.5).signum() * offset);
+            draft.origin = draft.eye.round();
+            draft.perspective()
+        },
+    },
+    CameraFamily {
+        name: "scale",
+        summary: "the whole scene scaled by 2^-140 to 2^120",
+        variants: &[-140.0, -126.0, -100.0, -60.0, 60.0, 100.0, 120.0],
+        label: |power| format!("2^{power}"),
+        setup: |dice, power| {
+            let mut draft = Draft::any(dice);
+            draft.scale(libm::exp2(power));
+            draft.perspective()
+        },
+    },
+    CameraFamily {
+        name: "size-ratio",
+        summary: "boxes 1e-3 and 1e3 times as wide as the view, side by side",
+        variants: &[1e6],
+        label: plain,
+        setup: |dice, _| Draft::any(dice).shaped(Shapes::Ratio).perspective(),
+    },
+    CameraFamily {
+        name: "coincident",
+        summary: "sixteen boxes, over and over",
+        variants: &[16.0],
+        label: plain,
+        setup: |dice, _| Draft::any(dice).shaped(Shapes::Coincident).perspective(),
+    },
+    CameraFamily {
+        name: "needles",
+        summary: "lines, plates and points without thickness",
+        variants: &[64.0],
+        label: plain,
+        setup: |dice, _| Draft::any(dice).shaped(Shapes::Needles).perspective(),
+    },
+    CameraFamily {
+        name: "ties",
+        summary: "a 90 degree camera on a grid of integers with its boxes: exact ties and one-ulp shifts",
+        variants: &[8.0, 64.0, 4096.0],
+        label: plain,
+        setup: |dice, far| {
+            let mut draft = Draft::any(dice).shaped(Shapes::Grid);
+            draft.eye = draft.eye.round();
+            draft.forward = [DVec3::X, -DVec3::Y, DVec3::Z][dice.below(3)];
+            draft.up = DVec3::new(draft.forward.z, draft.forward.x, draft.forward.y);
+            (draft.fovy_deg, draft.aspect) = (90.0, 1.0);
+            (draft.near, draft.far) = (1.0, Some(far));
+            draft.perspective()
+        },
+    },
+    CameraFamily {
+        name: "lens",
+        summary: "orthographic (0), off-axis (1) and off-axis without end (2)",
+        variants: &[0.0, 1.0, 2.0],
+        label: plain,
+        setup: |dice, kind| {
+            let draft = Draft::any(dice);
+            let half = draft.near * libm::tan(draft.fovy_deg.to_radians() / 2.0);
+            let shift = half * dice.between(-3.0, 3.0);
+            let window = [shift - half, shift + half, -half, half * draft.aspect];
+            let far = draft.far.unwrap_or(1.0);
+            let lens = match kind as u32 {
+                0 => Lens::orthographic(far * dice.unit().max(0.01), draft.aspect, -far, far),
+                1 => Lens::off_axis(window, draft.near, draft.far),
+                _ => Lens::off_axis(window, draft.near, None),
+            };
+            Ok(draft.with(lens?))
+        },
+    },
+];
+
+fn plain(value: f64) -> String {
+    match value {
+        v if v.is_infinite() => "inf".to_owned(),
+        v if (0.01..1000.0).contains(&v) => format!("{v}"),
+        v => format!("{v:e}"),
+    }
+}
+
+/// A camera that is still being described.
+struct Draft {
+    eye: DVec3,
+    forward: DVec3,
+    up: DVec3,
+    fovy_deg: f64,
+    aspect: f64,
+    near: f64,
+    far: Option<f64>,
+    origin: DVec3,
+    planes: PlaneOptions,
+    shapes: Shapes,
+}
+
+impl Draft {
+    /// Ordinary in every way: some 10 deep, within some 10 of zero; along an
+    /// axis one time in four.
+    fn any(dice: &mut Dice) -> Draft {
+        let (forward, up) = loop {
+            let (mut forward, up) = (dice.normal3(), dice.normal3());
+            if dice.below(4) == 0 {
+                forward = [DVec3::X, DVec3::Y, -DVec3::Z][dice.below(3)];
+            }
+            if forward.cross(up).length() > 0.01 * forward.length() * up.length() {
+                break (forward, up);
+            }
+        };
+        let far = libm::exp2(dice.between(1.0, 5.0));
+        Draft {
+            eye: (dice.point() - 0.5) * 20.0,
+            forward,
+            up,
+            fovy_deg: dice.between(20.0, 120.0),
+            aspect: dice.between(0.4, 2.5),
+            near: far / libm::exp2(dice.between(2.0, 8.0)),
+            far: Some(far),
+            origin: DVec3::ZERO,
+            planes: PlaneOptions::default(),
+            shapes: Shapes::Mixed,
+        }
+    }
+
+    fn shaped(mut self, shapes: Shapes) -> Draft {
+        self.shapes = shapes;
+        self
+    }
+
+    fn depth(&mut self, ratio: f64) {
+        match self.far {
+            Some(far) if ratio.is_finite() => self.near = far / ratio,
+            _ => self.far = None,
+        }
+    }
+
+    fn scale(&mut self, factor: f64) {
+        self.eye *= factor;
+        self.near *= factor;
+        self.far = self.far.map(|far| far * factor);
+    }
+
+    fn with(self, lens: Lens) -> Setup {
+        let pose = Pose::Forward {
+            eye: self.eye,
+            forward: self.forward,
+            up: self.up,
+        };
+        Setup {
+            pose,
+            lens,
+            origin: self.origin,
+            planes: self.planes,
+            shapes: self.shapes,
+        }
+    }
+
+    fn perspective(self) -> Result<Setup, CameraError> {
+        let lens = Lens::perspective(self.fovy_deg, self.aspect, self.near, self.far)?;
+        Ok(self.with(lens))
+    }
+}

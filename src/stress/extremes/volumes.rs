@@ -1,0 +1,245 @@
+//! Extremes at planes level: volumes without an end, with many planes and
+//! with no point at all; inverted, flat and coincident boxes; and numbers so
+//! small that flushing them to zero would change the answer.
+
+use glam::Vec3;
+
+use super::check::{Findings, SCALAR};
+use crate::geometry::{
+    Aabb, ConvexVolume, Plane, RelativeVolume, Spheres, WideVolume, sphere_cube,
+};
+use crate::index::StructureSpec;
+use crate::oracle::{Oracle, Verdict};
+use crate::query::{AnyView, ItemId};
+use crate::scene::{Dice, Regions};
+use crate::verify::{RandomCase, Reference, VOLUME_KINDS, explain_visibility};
+
+/// A volume and boxes, at planes level.
+pub struct PlanesCase {
+    pub items: Vec<Aabb>,
+    pub volume: ConvexVolume,
+    pub point: Vec3,
+    /// What kind of volume it is.
+    pub kind: &'static str,
+    /// Every operation of the plane test is exact: so must its answer be.
+    pub exact: bool,
+}
+
+/// A way to make cases at planes level.
+pub struct PlanesFamily {
+    pub name: &'static str,
+    pub summary: &'static str,
+    pub case: fn(u64) -> PlanesCase,
+    /// Cases for each case of a camera variant.
+    pub factor: u64,
+}
+
+pub static PLANES_FAMILIES: &[PlanesFamily] = &[
+    PlanesFamily {
+        name: "volumes",
+        summary: "every kind of volume (unbounded, empty, up to 31 planes) about flat, inverted and touching boxes",
+        case: |seed| {
+            let random = RandomCase::new(seed);
+            PlanesCase {
+                items: random.items,
+                volume: random.volume,
+                point: random.point,
+                kind: VOLUME_KINDS[random.kind],
+                exact: false,
+            }
+        },
+        factor: 20,
+    },
+    PlanesFamily {
+        name: "denormals",
+        summary: "planes and boxes of denormal numbers: nothing may be flushed to zero",
+        case: denormals,
+        factor: 2,
+    },
+];
+
+/// Normals of -1, 0 and 1, offsets and bounds of whole multiples of the least
+/// number: no operation rounds, and all of them work on denormals.
+fn denormals(seed: u64) -> PlanesCase {
+    let mut dice = Dice::new(seed ^ 0xDE_0A11);
+    let mut number = |most: usize| {
+        let magnitude = f32::from_bits(dice.below(most) as u32);
+        if dice.below(2) == 0 {
+            magnitude
+        } else {
+            -magnitude
+        }
+    };
+    // Below the least normal number, 2^23 units.
+    let mut vector = || Vec3::new(number(1 << 22), number(1 << 22), number(1 << 22));
+    let items = (0..200).map(|_| {
+        let (a, b) = (vector(), vector());
+        Aabb::new(a.min(b), a.max(b))
+    });
+    let mut items: Vec<Aabb> = items.collect();
+    items.extend(items.clone().iter().map(|b| Aabb::new(b.max, b.max)));
+    let mut planes = Vec::new();
+    for _ in 0..3 {
+        let mut sign = || [-1.0, 0.0, 1.0, 1.0f32][dice.below(4)];
+        let normal = Vec3::new(sign(), sign(), sign());
+        let d = f32::from_bits(dice.below(1 << 22) as u32);
+        planes.push(Plane::new(normal, if dice.below(3) == 0 { -d } else { d }));
+    }
+    let point = items[0].min;
+    // Finite numbers by construction; without planes everything is seen.
+    let volume = ConvexVolume::from_planes(&planes).or_else(|_| ConvexVolume::from_planes(&[]));
+    PlanesCase {
+        items,
+        volume: volume.unwrap_or_else(|_| unreachable!("no plane is no bad plane")),
+        point,
+        kind: "denormals",
+        exact: true,
+    }
+}
+
+/// The largest volume whose certificates are worth making: O(m^4).
+const MOST_PLANES: usize = 12;
+
+impl PlanesCase {
+    /// Puts the views and structures to the test.
+    pub fn check(&self, structures: &[StructureSpec]) -> Findings {
+        let mut found = Findings::default();
+        found.boxes = self.items.len() as u64;
+        self.scalar(&mut found);
+        let wide = WideVolume::from(&self.volume);
+        let spheres = Spheres::new(&self.volume);
+        let relative = RelativeVolume::about(self.point, &self.volume);
+        let cubes: Vec<Aabb> = self.items.iter().map(sphere_cube).collect();
+        let mut views: Vec<(&str, AnyView, &[Aabb])> = vec![
+            ("six-plane", (&self.volume).into(), &self.items),
+            ("six-plane f64", (&wide).into(), &self.items),
+            ("sphere", (&spheres).into(), &cubes),
+        ];
+        // Offsets about the point may be beyond f32.
+        if let Ok(relative) = &relative {
+            views.push(("six-plane f32-relative", relative.into(), &self.items));
+        }
+        let mut reference = Reference::new(self.items.len());
+        let mut answer = Vec::new();
+        for spec in structures {
+            let built = [spec.build(&self.items), spec.build(&cubes)];
+            let [Ok(boxes), Ok(spheres)] = &built else {
+                found.fault(&spec.label, "build", None, "built", "refused".to_owned());
+                continue;
+            };
+            for (name, view, items) in &views {
+                let index = if *name == "sphere" { spheres } else { boxes };
+                let wanted = items.iter().zip(0..).filter(|(b, _)| view.sees(b));
+                let count = reference.expect(wanted.map(|(_, id): (_, ItemId)| id));
+                answer.clear();
+                index.see(*view, &mut answer);
+                self.compare(
+                    &mut reference,
+                    &answer,
+                    count,
+                    &spec.label,
+                    name,
+                    &mut found,
+                );
+            }
+            let holding = Regions::Items.holding(self.point, &self.items);
+            let count = reference.expect(holding.into_iter());
+            answer.clear();
+            boxes.locate(self.point, &mut answer);
+            self.compare(
+                &mut reference,
+                &answer,
+                count,
+                &spec.label,
+                "locate",
+                &mut found,
+            );
+        }
+        found
+    }
+
+    fn compare(
+        &self,
+        reference: &mut Reference,
+        answer: &[ItemId],
+        count: usize,
+        structure: &str,
+        test: &str,
+        found: &mut Findings,
+    ) {
+        found.asked.push((structure.to_owned(), test.to_owned()));
+        let difference = reference.compare(answer);
+        if !difference.is_none() {
+            let item = difference.first.map(|id| id as usize);
+            let known = item.filter(|&item| item < self.items.len());
+            let expected = format!("the {count} items of the scalar loop");
+            found.fault(structure, test, known, &expected, difference.to_string());
+        }
+    }
+
+    /// The scalar loop against the oracle: without an epsilon it may drop what
+    /// is no deeper than the roundings of the test itself, and it must never
+    /// return what is wholly outside one plane by more.
+    fn scalar(&self, found: &mut Findings) {
+        found
+            .asked
+            .push((SCALAR.to_owned(), "six-plane".to_owned()));
+        if self.volume.planes().len() > MOST_PLANES {
+            return;
+        }
+        let oracle = Oracle::of_volume(&self.volume);
+        for (i, b) in self.items.iter().enumerate() {
+            let seen = self.volume.sees(b);
+            let verdict = oracle.verdict(b);
+            let (expected, wrong) = if self.exact {
+                let wanted = !b.is_empty() && self.no_plane_excludes(b);
+                ("the answer without any rounding", seen != wanted)
+            } else if seen {
+                ("no empty box", b.is_empty())
+            } else {
+                let deep = verdict != Verdict::Out && oracle.depth(b) > self.roundings(b);
+                ("nothing dropped but what rounding hides", deep)
+            };
+            if wrong {
+                let got = format!(
+                    "{}; the oracle: {verdict:?}",
+                    if seen { "seen" } else { "dropped" }
+                );
+                found.fault(SCALAR, "six-plane", Some(i), expected, got);
+                return;
+            }
+        }
+    }
+
+    /// The plane test in f64, which holds sums of denormals exactly.
+    fn no_plane_excludes(&self, b: &Aabb) -> bool {
+        let mut planes = self.volume.planes().iter();
+        planes.all(|plane| {
+            let corner = plane.p_vertex(b).as_dvec3();
+            plane.normal.as_dvec3().dot(corner) + f64::from(plane.d) >= 0.0
+        })
+    }
+
+    /// What evaluating a plane at the box may be wrong by, for unit length: 3
+    /// roundings of each product, one of the sum with d; 4 u of the magnitudes
+    /// and what underflows.
+    fn roundings(&self, b: &Aabb) -> f64 {
+        const UNIT_ROUNDOFF: f64 = 1.0 / (1u64 << 24) as f64;
+        const TINY: f64 = f64::from_bits((1023 - 147) << 52);
+        let reach = b.reach().as_dvec3();
+        let planes = self.volume.planes().iter();
+        let errors = planes
+            .filter(|plane| plane.normal != Vec3::ZERO)
+            .map(|plane| {
+                let normal = plane.normal.as_dvec3();
+                let size = normal.abs().dot(reach) + f64::from(plane.d).abs();
+                (4.0 * UNIT_ROUNDOFF * size + TINY) / normal.length()
+            });
+        errors.fold(0.0, f64::max)
+    }
+
+    /// The box with the plane that decides about it.
+    pub fn describe(&self, item: usize) -> String {
+        explain_visibility(&self.items[item], &self.volume)
+    }
+}
