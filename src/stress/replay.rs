@@ -395,6 +395,8 @@ impl Sheet<'_> {
 
     fn seen_by(&self, oracle: &Oracle) -> Names {
         let boxes = self.names.iter().zip(self.items);
+        // What is not finite is no box, and nothing is built with it.
+        let boxes = boxes.filter(|(_, b)| b.is_finite());
         let seen = boxes.filter(|(_, b)| oracle.verdict(b) != Verdict::Out);
         seen.map(|(name, _)| name.clone()).collect()
     }
@@ -404,7 +406,8 @@ impl Sheet<'_> {
         let Some(visible) = visible else { return };
         let got = self.seen_by(oracle);
         let mut wrong = Vec::new();
-        for (name, b) in self.names.iter().zip(self.items) {
+        let boxes = self.names.iter().zip(self.items);
+        for (name, b) in boxes.filter(|(_, b)| b.is_finite()) {
             let said = oracle.verdict(b);
             let touches = touch.as_ref().map(|names| names.contains(name));
             let wanted = match (visible.contains(name), touches) {

@@ -16,6 +16,7 @@ mod region_search;
 mod runs;
 #[cfg(unix)]
 mod signals;
+mod stress;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_cullbench");
 const BOXES: &str = "min_x,min_y,min_z,max_x,max_y,max_z";

@@ -1,8 +1,11 @@
 //! The library's readers, fed with damaged copies of good input and with
 //! plain noise: no panic, and every error is one line that says where.
 
+use cullbench::index::structures;
 use cullbench::path::{LensDefaults, read_cameras_csv, read_points_csv};
 use cullbench::scene::{WadMap, map_names, read_boxes_csv};
+
+use cullbench::stress::{read_vectors, replay};
 
 use super::process::*;
 use super::{BOXES, FULL_CAMERA};
@@ -110,6 +113,27 @@ fn damaged_points() {
     feed("points", b"x,y,z\n0,0,0\n-1.5,2e3,3\n4,5,6\n", |bytes| {
         let points = read_points_csv(bytes, "in.file").map_err(|e| e.to_string())?;
         assert!(!points.is_empty() && points.iter().all(|p| p.is_finite()));
+        Ok(())
+    });
+}
+
+/// What can be read can be asked, whatever it says.
+#[test]
+fn damaged_vectors() {
+    let good = r#"{"format": 1, "vectors": [{"id": "a", "category": "c", "camera": {"eye": [0, 0, 0],
+        "look": [0, 0, -1], "up": [0, 1, 0], "fovy_deg": 90, "aspect": 1.5, "near": 1, "far": "inf"},
+        "planes": [[1, 0, -1, 0], [0, 0, -1, -1e0]], "boxes": [
+        {"id": "x", "lo": [-1, -1, -4], "hi": [1, 1, -2]}, {"id": "y", "lo": ["NaN", 0, 0], "hi": [1, 1, 1]}],
+        "expect_rejected_at_load": ["y"], "expected_visible_planes": ["x"], "touch_planes": [],
+        "points": [{"id": "p", "p": [0, 0, -3], "expected_containing": ["x"]}]},
+        {"id": "b", "planes_f32_hex": [["0x3f800000", "0x00000000", "0xbf800000", "0xffc00000"]],
+        "expect_planes_error": "no plane", "boxes": []}]}"#;
+    feed("vectors", good.as_bytes(), |bytes| {
+        let vectors = read_vectors(bytes, "in.file").map_err(|e| e.to_string())?;
+        let linear = structures("linear").map_err(|e| e.to_string())?;
+        for vector in &vectors {
+            let _ = replay(vector, &linear);
+        }
         Ok(())
     });
 }

@@ -1,6 +1,6 @@
-//! Boxes that make rounding as bad as it gets: each touches the view volume
-//! at a point of a face, an edge or a corner, and is then shifted by up to two
-//! ulps per axis. It owns shapes and places; what is visible is the oracle's
+//! Boxes that make rounding as bad as it gets: most touch the view volume at a
+//! point of a face, an edge or a corner, and are then shifted by up to two
+//! ulps per axis; the rest lie about anywhere. It owns shapes and places; what is visible is the oracle's
 //! to say.
 
 use glam::{DVec3, Vec3};
@@ -80,7 +80,10 @@ pub fn adversarial(
             boxes.push(again);
             continue;
         }
-        let mut b = touching(dice, &hull, shapes);
+        let mut b = match dice.below(8) {
+            0 => astray(dice, &hull),
+            _ => touching(dice, &hull, shapes),
+        };
         if dice.below(64) == 0 {
             b = Aabb::new(b.max, b.min);
         }
@@ -137,6 +140,28 @@ fn touching(dice: &mut Dice, hull: &Hull, shapes: Shapes) -> Aabb {
     }
     let limit = Vec3::splat(f32::MAX);
     Aabb::new(min.clamp(-limit, limit), max.clamp(-limit, limit))
+}
+
+/// A box well inside, beside, behind or before the volume: a plane that is
+/// missing or far off shows here.
+fn astray(dice: &mut Dice, hull: &Hull) -> Aabb {
+    let wide = |dice: &mut Dice| dice.between(-0.5, 1.5);
+    let (s, t) = (wide(dice), wide(dice));
+    // The size of near against the depth of the volume.
+    let near = (hull.corners[0] - hull.corners[3]).length();
+    let far = (hull.corners[4] - hull.corners[7]).length();
+    let before = (near / (far - near).max(near)).min(1.0);
+    let w = match dice.below(3) {
+        0 => dice.unit(),
+        1 => 1.0 + dice.unit(),
+        _ => -dice.unit() * before,
+    };
+    let p = hull.at([s, t, w]);
+    let size = near * libm::exp2(dice.between(-8.0, 1.0));
+    let half = dice.point() * size;
+    let limit = DVec3::splat(f64::from(f32::MAX));
+    let [low, high] = [p - half, p + half].map(|corner| corner.clamp(-limit, limit));
+    Aabb::new(low.as_vec3(), high.as_vec3())
 }
 
 /// Edge lengths for a volume that is `scale` wide where the box is.

@@ -146,9 +146,9 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = &[
     },
     CameraFamily {
         name: "lens",
-        summary: "orthographic (0), off-axis (1) and off-axis without end (2)",
+        summary: "orthographic, off-axis, and off-axis without a far plane",
         variants: &[0.0, 1.0, 2.0],
-        label: plain,
+        label: |kind| ["orthographic", "off-axis", "off-axis inf"][kind as usize].to_owned(),
         setup: |dice, kind| {
             let draft = Draft::any(dice);
             let half = draft.near * libm::tan(draft.fovy_deg.to_radians() / 2.0);

@@ -17,7 +17,8 @@ use crate::index::StructureSpec;
 use crate::oracle::Pose;
 use crate::scene::Dice;
 
-pub use boxes::{Shapes, adversarial};
+pub use boxes::Shapes;
+use boxes::adversarial;
 pub use cameras::{CAMERA_FAMILIES, CameraFamily, Setup};
 pub use check::{Case, Drops, Fault, Findings, SCALAR, Tally};
 pub use refusals::refusals;
@@ -79,11 +80,7 @@ impl Extremes<'_> {
             let label = (family.label)(variant);
             let group = format!("{}/{label}", family.name);
             let case = |nth: u64, seed: u64| {
-                // Each seed means another camera in every variant.
-                let words = group.bytes().fold(seed, |hash, byte| {
-                    hash.rotate_left(9).wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ u64::from(byte)
-                });
-                let case = match camera_case(&mut Dice::new(words), family, variant) {
+                let case = match camera_case(family, variant, seed) {
                     Ok(case) => case,
                     Err(reason) => {
                         let mut findings = Findings::default();
@@ -212,11 +209,17 @@ impl Extremes<'_> {
     }
 }
 
-/// The case of a family's variant.
+/// The case of a family's variant and seed; the same on every machine.
 ///
 /// # Errors
 /// A camera that cannot be made, in words.
-pub fn camera_case(dice: &mut Dice, family: &CameraFamily, variant: f64) -> Result<Case, String> {
+pub fn camera_case(family: &CameraFamily, variant: f64, seed: u64) -> Result<Case, String> {
+    // Each seed means another camera in every variant.
+    let name = family.name.bytes().chain(variant.to_bits().to_le_bytes());
+    let words = name.fold(seed, |hash, byte| {
+        hash.rotate_left(9).wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ u64::from(byte)
+    });
+    let dice = &mut Dice::new(words);
     let setup = (family.setup)(dice, variant).map_err(|error| error.to_string())?;
     let frame = match setup.pose {
         Pose::Forward { eye, forward, up } => Frame::looking_along(eye, forward, up),

@@ -1,0 +1,254 @@
+//! Does `stress` catch what it is there for? Structures that are wrong in one
+//! way each, and planes without their margin, must fail a vector or a
+//! generated case, and the row must name it.
+
+use cullbench::camera::PlaneOptions;
+use cullbench::culling::{Culling, CullingTest};
+use cullbench::geometry::{Aabb, Plane};
+use cullbench::index::{Backend, BuildError, DynIndex, MemoryUsage, StructureSpec, indexable};
+use cullbench::query::{AnyView, ItemId, QueryCost};
+use cullbench::stress::extremes::{CAMERA_FAMILIES, Case, Findings, PLANES_FAMILIES, camera_case};
+use cullbench::stress::{Replay, Row, Status, built_in, replay};
+use glam::Vec3;
+use serde_json::Value;
+
+/// Whether a plane drops a box, in a way of its own.
+type Drops = fn(usize, &Plane, &Aabb) -> bool;
+
+/// A scan that asks a plane test of its own instead of THE plane test.
+struct Scan {
+    items: Vec<Aabb>,
+    ids: Vec<ItemId>,
+    drops: Drops,
+}
+
+impl DynIndex for Scan {
+    fn memory(&self) -> MemoryUsage {
+        MemoryUsage::default()
+    }
+
+    fn see(&self, view: AnyView<'_>, out: &mut Vec<ItemId>) {
+        let kept = self.ids.iter().filter(|&&id| {
+            let b = &self.items[id as usize];
+            match view {
+                AnyView::Volume(volume) => {
+                    let mut planes = volume.planes().iter().enumerate();
+                    !planes.any(|(i, plane)| (self.drops)(i, plane, b))
+                }
+                other => other.sees(b),
+            }
+        });
+        out.extend(kept);
+    }
+
+    fn see_counted(&self, view: AnyView<'_>, out: &mut Vec<ItemId>, _: &mut QueryCost) {
+        self.see(view, out);
+    }
+
+    fn locate(&self, p: Vec3, out: &mut Vec<ItemId>) {
+        let holding = |id: &&ItemId| self.items[**id as usize].contains_point(p);
+        out.extend(self.ids.iter().filter(holding));
+    }
+
+    fn locate_counted(&self, p: Vec3, out: &mut Vec<ItemId>, _: &mut QueryCost) {
+        self.locate(p, out);
+    }
+
+    fn refit(&mut self, _: &[Aabb], _: &[ItemId]) -> bool {
+        false
+    }
+}
+
+fn scan(items: &[Aabb], drops: Drops) -> Result<Box<dyn DynIndex>, BuildError> {
+    Ok(Box::new(Scan {
+        ids: indexable(items)?,
+        items: items.to_vec(),
+        drops,
+    }))
+}
+
+fn sound(_: usize, plane: &Plane, b: &Aabb) -> bool {
+    plane.excludes(b)
+}
+
+fn fused(_: usize, plane: &Plane, b: &Aabb) -> bool {
+    let (n, p) = (plane.normal, plane.p_vertex(b));
+    n.z.mul_add(p.z, n.y.mul_add(p.y, n.x * p.x)) + plane.d < 0.0
+}
+
+fn open(_: usize, plane: &Plane, b: &Aabb) -> bool {
+    plane.value_at(plane.p_vertex(b)) <= 0.0
+}
+
+fn swapped(index: usize, plane: &Plane, b: &Aabb) -> bool {
+    let n = plane.normal;
+    let mirrored = Plane::new(Vec3::new(-n.x, n.y, n.z), plane.d);
+    if index == 0 {
+        mirrored.excludes(b)
+    } else {
+        plane.excludes(b)
+    }
+}
+
+fn wrong_corner(_: usize, plane: &Plane, b: &Aabb) -> bool {
+    let mut p = plane.p_vertex(b);
+    p.y = plane.n_vertex(b).y;
+    plane.value_at(p) < 0.0
+}
+
+fn flushed(_: usize, plane: &Plane, b: &Aabb) -> bool {
+    let flush = |x: f32| if x.is_subnormal() { 0.0 } else { x };
+    let (n, p) = (plane.normal, plane.p_vertex(b));
+    let [x, y, z] = [0, 1, 2].map(|k| flush(flush(n[k]) * flush(p[k])));
+    flush(flush(flush(x + y) + z) + flush(plane.d)) < 0.0
+}
+
+macro_rules! backend {
+    ($drops:ident) => {
+        &Backend {
+            name: stringify!($drops),
+            summary: "for this test",
+            build: |items, _, _| scan(items, $drops),
+            params: |params| Ok(params.clone()),
+        }
+    };
+}
+
+static SOUND: &Backend = backend!(sound);
+/// Each with a vector that must catch it, if one can, and a family.
+static BROKEN: [(&Backend, &str, &str); 5] = [
+    (backend!(fused), "B01-ratio-1e3-gh", "near-far"),
+    (backend!(open), "A02-touch-integer-planes", "ties"),
+    (backend!(swapped), "A01-basic", "lens"),
+    (backend!(wrong_corner), "A02-touch-integer-planes", "fov"),
+    (backend!(flushed), "E08-ftz-false-negative", "denormals"),
+];
+
+fn spec(backend: &'static Backend) -> StructureSpec {
+    StructureSpec {
+        label: backend.name.to_owned(),
+        backend,
+        params: Value::Null,
+    }
+}
+
+fn failed(structure: &[StructureSpec]) -> Vec<Row> {
+    let vectors = built_in().expect("part of the repository");
+    let rows = vectors.iter().flat_map(|v| replay(v, structure));
+    rows.filter(|row| row.status == Status::Fail).collect()
+}
+
+/// A few cases of a family, at whatever level it is.
+fn findings(family: &str, structure: &[StructureSpec]) -> Vec<Findings> {
+    let mut found = Vec::new();
+    for family in CAMERA_FAMILIES.iter().filter(|f| f.name == family) {
+        for (seed, &variant) in family.variants.iter().enumerate() {
+            let case = camera_case(family, variant, seed as u64);
+            found.push(case.expect("a camera").check(structure, 2000));
+        }
+    }
+    for family in PLANES_FAMILIES.iter().filter(|f| f.name == family) {
+        found.extend((0..4).map(|seed| (family.case)(seed).check(structure)));
+    }
+    assert!(!found.is_empty(), "{family}");
+    found
+}
+
+#[test]
+fn a_sound_structure_passes() {
+    let structure = [spec(SOUND)];
+    assert_eq!(failed(&structure), []);
+    for (_, _, family) in BROKEN {
+        for found in findings(family, &structure) {
+            assert_eq!(found.faults, [], "{family}");
+        }
+    }
+}
+
+#[test]
+fn each_broken_structure_fails_a_vector_and_a_generated_case() {
+    for (backend, vector, family) in BROKEN {
+        let structure = [spec(backend)];
+        let rows = failed(&structure);
+        let named = |row: &&Row| {
+            row.id.starts_with(vector) && row.structure == backend.name && row.test == "six-plane"
+        };
+        assert!(
+            rows.iter().any(|row| named(&row)),
+            "{}: {rows:?}",
+            backend.name
+        );
+        let boxed = format!("{vector}/");
+        assert!(
+            rows.iter().any(|row| row.id.starts_with(&boxed)),
+            "{}",
+            backend.name
+        );
+        let found = findings(family, &structure);
+        let mut faults = found.iter().flat_map(|f| &f.faults);
+        let caught = faults.any(|f| f.structure == backend.name && f.item.is_some());
+        assert!(caught, "{} passes {family}", backend.name);
+    }
+}
+
+#[test]
+fn planes_without_a_margin_fail_vectors_and_every_family() {
+    let structure = [spec(SOUND)];
+    let bare = Replay {
+        structures: &structure,
+        planes: PlaneOptions {
+            epsilon: 0.0,
+            ..PlaneOptions::default()
+        },
+    };
+    let vectors = built_in().expect("part of the repository");
+    let rows = vectors.iter().flat_map(|v| bare.vector(v));
+    let failed: Vec<Row> = rows.filter(|row| row.status == Status::Fail).collect();
+    let boxes = failed
+        .iter()
+        .filter(|row| row.got.to_string().starts_with("dropped"));
+    assert!(boxes.count() > 5, "{failed:?}");
+    for family in CAMERA_FAMILIES {
+        let caught = family.variants.iter().any(|&variant| {
+            (0..30).any(|seed| {
+                let case = camera_case(family, variant, seed);
+                let mut case = case.expect("a camera");
+                case.planes.epsilon = 0.0;
+                let faults = case.check(&[], 0).faults;
+                faults.iter().any(|fault| fault.test == "six-plane")
+            })
+        });
+        assert!(caught, "{}", family.name);
+    }
+}
+
+/// What a wrong camera loses or gains is seen as well.
+#[test]
+fn a_view_that_is_a_little_off_drops_boxes() {
+    let family = &CAMERA_FAMILIES[0];
+    let case = |seed| camera_case(family, 1e3, seed).expect("a camera");
+    let view = |case: &Case, change: fn(&mut Case)| {
+        let mut other = camera_case(family, 1e3, 3).expect("a camera");
+        change(&mut other);
+        let culling = Culling {
+            test: CullingTest::SixPlane,
+            ..Culling::default()
+        };
+        let view = culling.view(&other.camera, &case.around).expect("planes");
+        let seen: Vec<bool> = case.items.iter().map(|b| view.as_any().sees(b)).collect();
+        case.drops(&seen)
+    };
+    let case = case(3);
+    let right = view(&case, |_| {});
+    assert_eq!((right.false_negatives, right.touch_dropped), (0, 0));
+    let turned = view(&case, |other| other.camera.frame.yaw(1e-3));
+    assert!(
+        turned.false_negatives > 10 && turned.deepest > 0.0,
+        "{turned:?}"
+    );
+    let nearer = view(&case, |other| {
+        let far = other.camera.lens.far().map(|far| far * 0.9999);
+        other.camera.lens = other.camera.lens.with_far(far).expect("a lens");
+    });
+    assert!(nearer.false_negatives > 0, "{nearer:?}");
+}
