@@ -419,6 +419,8 @@ pub struct StressArgs {
     pub seed: u64,
     #[arg(long, value_enum, default_value = "table")]
     pub format: TableFormat,
+    #[command(flatten)]
+    pub kernel: KernelArgs,
 }
 
 #[derive(Subcommand, Debug)]

@@ -11,11 +11,13 @@ use indicatif::ProgressBar;
 use super::args::{StressArgs, TableFormat};
 use super::{Ending, interrupt, tell, text, unread_is_fine};
 use cullbench::index::{StructureSpec, structures};
+use cullbench::kernel::Kernel;
 use cullbench::stress::extremes::{DEFAULT_CASES, Extremes, Progress, Tally};
 use cullbench::stress::{Row, Section, Status, Vector, built_in, read_vectors_file, replay};
 
 pub fn stress(args: &StressArgs) -> anyhow::Result<Ending> {
     let structures = structures(&args.structure)?;
+    args.kernel.choose()?;
     let mut vectors = Vec::new();
     for file in &args.vectors {
         vectors.extend(read_vectors_file(file)?);
@@ -39,26 +41,51 @@ pub fn stress(args: &StressArgs) -> anyhow::Result<Ending> {
         cases,
         threads: std::thread::available_parallelism().map_or(1, |n| n.get().min(2)),
     };
-    let bar = ProgressBar::new(vectors.len() as u64 + extremes.total());
+    // By every other instruction set of this machine too, but less of it.
+    let chosen = Kernel::chosen();
+    let all_kernels = args.kernel.name.is_none();
+    let others = || Kernel::available().filter(|&kernel| all_kernels && kernel != chosen);
     let mut sections = Vec::new();
-    let mut interrupted = false;
-    for vector in &vectors {
-        if interrupt::asked() {
-            interrupted = true;
-            break;
+    let mut by_others = 0;
+    let passes = others().map(|kernel| (kernel, cases.min(OF_OTHERS)));
+    let passes: Vec<(Kernel, u64)> = passes.chain([(chosen, cases)]).collect();
+    let vector_passes = (vectors.len() * passes.len()) as u64;
+    let case_passes = passes
+        .iter()
+        .map(|&(_, cases)| Extremes { cases, ..extremes }.total());
+    let bar = ProgressBar::new(vector_passes + case_passes.sum::<u64>());
+    for (kernel, cases) in passes {
+        kernel.choose()?;
+        let mut found = Vec::new();
+        for vector in vectors.iter().take_while(|_| !interrupt::asked()) {
+            bar.set_message(vector.id.clone());
+            add_vector(&mut found, vector, &structures);
+            bar.inc(1);
         }
-        bar.set_message(vector.id.clone());
-        add_vector(&mut sections, vector, &structures);
-        bar.inc(1);
+        if cases > 0 && !interrupt::asked() {
+            found.extend(Extremes { cases, ..extremes }.run(&Shown(&bar)));
+        }
+        if kernel != chosen {
+            by_others += found
+                .iter()
+                .map(|section| section.rows.len())
+                .sum::<usize>();
+            found = failures(found, kernel);
+        }
+        sections.extend(found);
     }
-    if cases > 0 && !interrupted {
-        sections.extend(extremes.run(&Shown(&bar)));
-        interrupted = interrupt::asked();
-    }
+    let interrupted = interrupt::asked();
     bar.finish_and_clear();
     unread_is_fine(match args.format {
         TableFormat::Json => json(&sections),
-        TableFormat::Table => table(&sections, started.elapsed().as_secs_f64()),
+        TableFormat::Table => {
+            let names: Vec<&str> = others().map(Kernel::name).collect();
+            let note = match by_others {
+                0 => String::new(),
+                count => format!("; {} more by {}", text::count(count), names.join(" and ")),
+            };
+            table(&sections, started.elapsed().as_secs_f64(), &note)
+        }
     })?;
     if interrupted {
         tell("interrupted: only what is shown was checked");
@@ -71,6 +98,23 @@ pub fn stress(args: &StressArgs) -> anyhow::Result<Ending> {
         (false, true) => Ending::Interrupted,
         (false, false) => Ending::Ok,
     })
+}
+
+/// Cases of each extreme by another instruction set than the chosen one.
+const OF_OTHERS: u64 = 2;
+
+/// What failed by another instruction set, under its name.
+fn failures(mut sections: Vec<Section>, kernel: Kernel) -> Vec<Section> {
+    for section in &mut sections {
+        section.rows.retain(|row| row.status == Status::Fail);
+        for row in &mut section.rows {
+            row.test = format!("{} by {kernel}", row.test);
+        }
+        section.name = format!("{} by {kernel}", section.name);
+        section.tally = Tally::default();
+    }
+    sections.retain(|section| !section.rows.is_empty());
+    sections
 }
 
 /// Tells the progress bar; a Ctrl-C ends the run after the case at hand.
@@ -118,7 +162,7 @@ fn json(sections: &[Section]) -> io::Result<()> {
     out.flush()
 }
 
-fn table(sections: &[Section], seconds: f64) -> io::Result<()> {
+fn table(sections: &[Section], seconds: f64, note: &str) -> io::Result<()> {
     let mut out = io::stdout().lock();
     let header = [
         "category", "cases", "boxes", "rows", "passed", "refused", "failed",
@@ -171,7 +215,7 @@ fn table(sections: &[Section], seconds: f64) -> io::Result<()> {
     let count = |status| rows().filter(|row| row.status == status).count();
     writeln!(
         out,
-        "{} checks in {seconds:.1} s: {} passed, {} refused as they must be, {} failed",
+        "{} checks in {seconds:.1} s: {} passed, {} refused as they must be, {} failed{note}",
         text::count(rows().count()),
         text::count(count(Status::Pass)),
         text::count(count(Status::Refused)),

@@ -253,11 +253,7 @@ fn a_wrong_answer_fails_and_names_the_box() {
         assert!(failed.iter().any(|row| right(&row)), "{named}: {failed:?}");
         let table = cullbench(folder.path(), "stress --vectors v.json");
         assert_eq!(table.code, Some(1), "{named}");
-        assert!(
-            table.out.contains(&format!("{named}")),
-            "{named}: {}",
-            table.out
-        );
+        assert!(table.out.contains(named), "{named}: {}", table.out);
         assert!(
             table.out.contains("expected") && table.out.contains("got"),
             "{named}"

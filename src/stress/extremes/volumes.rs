@@ -103,8 +103,10 @@ const MOST_PLANES: usize = 12;
 impl PlanesCase {
     /// Puts the views and structures to the test.
     pub fn check(&self, structures: &[StructureSpec]) -> Findings {
-        let mut found = Findings::default();
-        found.boxes = self.items.len() as u64;
+        let mut found = Findings {
+            boxes: self.items.len() as u64,
+            ..Findings::default()
+        };
         self.scalar(&mut found);
         let wide = WideVolume::from(&self.volume);
         let spheres = Spheres::new(&self.volume);
