@@ -192,6 +192,21 @@ impl Case {
             // ones: here structures that round otherwise show.
             let name = "six-plane epsilon 0";
             ask(&six, name, view, &seen[..share], &self.items, &mut found);
+            // A sphere holds its box: what the box test sees it must see too.
+            let bare = Culling {
+                test: CullingTest::Sphere,
+                ..bare
+            };
+            if let Ok(view) = bare.view(&self.camera, &self.around) {
+                let name = "sphere epsilon 0";
+                found.asked.push((SCALAR.to_owned(), name.to_owned()));
+                let boxes = seen.iter().zip(&cubes[..]);
+                let mut lost = boxes.map(|(seen, cube)| *seen && !view.as_any().sees(cube));
+                if let Some(item) = lost.position(|lost| lost) {
+                    let expected = "all that the six planes see";
+                    found.fault(SCALAR, name, Some(item), expected, "dropped".to_owned());
+                }
+            }
         }
         found
     }
