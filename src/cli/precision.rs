@@ -193,9 +193,10 @@ fn points_table(points: &[Point]) -> comfy_table::Table {
             "worst miss",
             "query [95 % interval]",
             "ns/item",
+            "B/item",
             "status",
         ],
-        &[5, 6, 7, 8, 9, 10, 11],
+        &[5, 6, 7, 8, 9, 10, 11, 12],
     );
     for point in points {
         let time = match (point.query_ns, point.query_ns_lower, point.query_ns_upper) {
@@ -227,6 +228,10 @@ fn points_table(points: &[Point]) -> comfy_table::Table {
             of(text::significant(point.errors.worst_miss)),
             time,
             point.ns_per_item.map(text::significant).unwrap_or_default(),
+            point
+                .memory_bytes_per_item
+                .map(|b| format!("{b:.1}"))
+                .unwrap_or_default(),
             point.status.name().to_owned(),
         ]);
     }

@@ -34,6 +34,12 @@ impl BoxBlock {
         ],
     };
 
+    /// Six rows of lanes, as [`BoxBlock`] keeps them.
+    #[inline(always)]
+    pub(super) fn from_rows(rows: [[f32; LANES]; 6]) -> BoxBlock {
+        BoxBlock { rows }
+    }
+
     pub fn set(&mut self, lane: usize, b: &Aabb) {
         let values = b.min.to_array().into_iter().chain(b.max.to_array());
         for (row, value) in self.rows.iter_mut().zip(values) {
@@ -285,15 +291,18 @@ impl BoxBlocks {
         self.blocks[blocks.clone()]
             .iter()
             .zip(blocks)
-            .map(move |(block, at)| {
-                let start = at * LANES;
-                let low = first.saturating_sub(start);
-                let high = (end - start).min(LANES);
-                // At least one lane belongs to the range, so 1 <= high.
-                let lanes = (LaneMask::MAX << low) & (LaneMask::MAX >> (LANES - high));
-                (start, lanes, block)
-            })
+            .map(move |(block, at)| (at * LANES, lanes_of(at, first, end), block))
     }
+}
+
+/// The lanes of block `at` that belong to the places `first..end`, of which
+/// there is at least one.
+#[inline(always)]
+pub fn lanes_of(at: usize, first: usize, end: usize) -> LaneMask {
+    let start = at * LANES;
+    let low = first.saturating_sub(start);
+    let high = (end - start).min(LANES);
+    (LaneMask::MAX << low) & (LaneMask::MAX >> (LANES - high))
 }
 
 #[cfg(test)]

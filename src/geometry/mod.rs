@@ -6,12 +6,13 @@ mod box_block;
 mod convex_volume;
 mod plane;
 mod plane_tree;
+pub mod quantised;
 mod relative_volume;
 mod spheres;
 mod wide_volume;
 
 pub use aabb::Aabb;
-pub use box_block::{BoxBlock, BoxBlocks, LANES, LaneMask};
+pub use box_block::{BoxBlock, BoxBlocks, LANES, LaneMask, lanes_of};
 pub use convex_volume::{ConvexVolume, FrustumPlane, MAX_PLANES, PlaneMask, VolumeError};
 pub use plane::{Plane, Upper};
 pub use plane_tree::{PlaneTree, PlaneTreeNode};

@@ -338,6 +338,13 @@ fn measure_reach(splits: &mut [Split], tree: &PackedTree, node: usize) {
     split.front_low = along.value_at(along.n_vertex(&front.bounds));
 }
 
+impl Bsp {
+    /// The tree without its planes.
+    pub(super) fn into_tree(self) -> PackedTree {
+        self.tree
+    }
+}
+
 impl RegionIndex for Bsp {
     const NAME: &'static str = "bsp";
     const SUMMARY: &'static str =

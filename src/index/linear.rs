@@ -99,16 +99,8 @@ impl Linear {
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()> {
-        let all = 0..self.ids.len();
-        scan_blocks(
-            &self.boxes,
-            &self.ids,
-            all,
-            region,
-            region.start(),
-            sink,
-            recorder,
-        )
+        let blocks = self.boxes.range(0, self.ids.len());
+        scan_blocks(blocks, &self.ids, region, region.start(), sink, recorder)
     }
 }
 

@@ -10,6 +10,7 @@ mod linear;
 mod octree;
 mod partition;
 mod quadtree;
+mod quantised;
 mod tree;
 
 use std::ops::ControlFlow;
@@ -28,6 +29,7 @@ pub use linear::{Linear, LinearScalar};
 pub use octree::{CellParams, Octree};
 pub use partition::{Part, Record, Splitter, build_top_down};
 pub use quadtree::Quadtree;
+pub use quantised::{GridScope, Quantised, QuantisedParams};
 pub use tree::{PackedTree, TreeNode, TreeWriter, scan_blocks};
 
 /// Why an index could not be built.

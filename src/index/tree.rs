@@ -3,9 +3,10 @@
 //! blocks of sixteen; one traversal with plane masks for every kind of region;
 //! refitting. How a tree comes to be is each structure's own business.
 
+use std::borrow::Borrow;
 use std::ops::{ControlFlow, Range};
 
-use crate::geometry::{Aabb, BoxBlocks};
+use crate::geometry::{Aabb, BoxBlock, BoxBlocks, LaneMask};
 use crate::query::{Containment, ItemId, Recorder, Region, Sink};
 
 use super::MemoryUsage;
@@ -125,6 +126,13 @@ impl PackedTree {
         &self.ids
     }
 
+    /// Gives up the item bounds: for a structure that keeps them in another
+    /// form and tests leaves through [`PackedTree::query_leaves`].
+    pub fn forget_boxes(&mut self) {
+        self.boxes = BoxBlocks::default();
+        self.place_of = Vec::new();
+    }
+
     /// Whether the node has no children.
     #[inline(always)]
     pub fn is_leaf(&self, node: usize) -> bool {
@@ -158,6 +166,22 @@ impl PackedTree {
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()> {
+        let test = |items, memo, sink: &mut S, recorder: &mut R| {
+            self.test_items(items, region, memo, sink, recorder)
+        };
+        self.query_leaves(region, sink, recorder, test)
+    }
+
+    /// [`PackedTree::query`] with the items of straddling leaves tested by the
+    /// caller, who may keep their bounds in another form.
+    #[inline(always)]
+    pub fn query_leaves<G: Region, S: Sink, R: Recorder>(
+        &self,
+        region: &G,
+        sink: &mut S,
+        recorder: &mut R,
+        test: impl Fn(Range<usize>, G::Memo, &mut S, &mut R) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
         let mut top = (self.nodes.len() as u32, region.start());
         // What lies below the innermost straddling node; its own root, never
         // taken off, ends with the walk.
@@ -182,7 +206,7 @@ impl PackedTree {
                 Containment::Straddles => {
                     at += 1;
                     if node.after == at {
-                        self.test_items(node.items(), region, memo, sink, recorder)?;
+                        test(node.items(), memo, sink, recorder)?;
                     } else {
                         below.push(top);
                         top = (node.after, memo);
@@ -203,7 +227,8 @@ impl PackedTree {
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()> {
-        scan_blocks(&self.boxes, &self.ids, items, region, memo, sink, recorder)
+        let blocks = self.boxes.range(items.start, items.end);
+        scan_blocks(blocks, &self.ids, region, memo, sink, recorder)
     }
 
     /// Takes over the new bounds of moved items without changing the tree's
@@ -334,23 +359,23 @@ macro_rules! seen_by_tree {
 }
 pub(super) use seen_by_tree;
 
-/// Tests a range of items in blocks and hands over runs of admitted ones: the
+/// Tests items in blocks (each with the place of its lane 0 and the lanes that
+/// count) and hands over runs of admitted ones: the
 /// leaf test of every tree and the whole of the linear scan.
 #[inline(always)]
-pub fn scan_blocks<G: Region, S: Sink, R: Recorder>(
-    boxes: &BoxBlocks,
+pub fn scan_blocks<B: Borrow<BoxBlock>, G: Region, S: Sink, R: Recorder>(
+    blocks: impl Iterator<Item = (usize, LaneMask, B)>,
     ids: &[ItemId],
-    items: Range<usize>,
     region: &G,
     memo: G::Memo,
     sink: &mut S,
     recorder: &mut R,
 ) -> ControlFlow<()> {
-    for (start, lanes, block) in boxes.range(items.start, items.end) {
+    for (start, lanes, block) in blocks {
         let tested = lanes.count_ones();
         recorder.items_tested(tested);
         recorder.planes_tested(tested * G::planes_open(memo));
-        let mut admitted = u32::from(region.admit_lanes(block, memo) & lanes);
+        let mut admitted = u32::from(region.admit_lanes(block.borrow(), memo) & lanes);
         while admitted != 0 {
             let from = admitted.trailing_zeros();
             let run = (!(admitted >> from)).trailing_zeros();

@@ -10,7 +10,11 @@ use serde::{Serialize, Serializer};
 
 use crate::camera::{Camera, PLANE_METHODS, PlaneMethod, PlaneOptions};
 use crate::culling::{ARITHMETICS, Arithmetic, CameraView, Culling, CullingTest, TESTS};
-use crate::index::{BuildError, DynIndex, StructureSpec};
+use crate::geometry::Aabb;
+use crate::index::{
+    BuildError, DynIndex, GridScope, MemoryUsage, Quantised, QuantisedParams, RegionIndex,
+    StructureSpec,
+};
 use crate::measure::{Competitor, Protocol, Status, Timed, Verdict, timed_rounds};
 use crate::path::CameraPath;
 use crate::query::ItemId;
@@ -39,6 +43,7 @@ pub struct Point {
     pub query_ns_lower: Option<f64>,
     pub query_ns_upper: Option<f64>,
     pub ns_per_item: Option<f64>,
+    pub memory_bytes_per_item: Option<f64>,
     /// Index of a point that is no worse in anything and better in something.
     pub dominated_by: Option<usize>,
     pub on_front: bool,
@@ -118,7 +123,24 @@ struct Judged {
 }
 
 impl Judged {
-    fn new(scene: &Scene, cameras: &[Camera], truths: &[Truth], culling: Culling) -> Judged {
+    fn refused(culling: Culling, error: &BuildError) -> Judged {
+        Judged {
+            culling,
+            views: Vec::new(),
+            answers: Vec::new(),
+            errors: ErrorCount::default(),
+            refused: Some(error.to_string()),
+        }
+    }
+
+    /// Answers from `items`, judged by the truth about the scene's own.
+    fn new(
+        scene: &Scene,
+        items: &[Aabb],
+        cameras: &[Camera],
+        truths: &[Truth],
+        culling: Culling,
+    ) -> Judged {
         let mut judged = Judged {
             culling,
             views: Vec::new(),
@@ -127,7 +149,6 @@ impl Judged {
             refused: None,
         };
         let around = scene.surroundings();
-        let items = culling.test.items(&scene.items);
         for (camera, truth) in cameras.iter().zip(truths) {
             let view = match culling.view(camera, &around) {
                 Ok(view) => view,
@@ -172,6 +193,53 @@ impl Indexes {
     }
 }
 
+/// The experiment with items in few bits: an index, or none if the scene does
+/// not fit.
+struct Stored {
+    label: String,
+    index: Option<Box<dyn DynIndex>>,
+    judged: Vec<Judged>,
+}
+
+/// u8 and u16 codes, on one grid or on one for each block, with the default
+/// view and with the exact test.
+fn quantised(scene: &Scene, cameras: &[Camera], truths: &[Truth]) -> Vec<Stored> {
+    let cullings = [CullingTest::SixPlane, CullingTest::Exact].map(|test| Culling {
+        test,
+        ..Culling::default()
+    });
+    let mut all = Vec::new();
+    for bits in [8, 16] {
+        for grid in [GridScope::World, GridScope::Block] {
+            let scope = match grid {
+                GridScope::World => "world",
+                GridScope::Block => "block",
+            };
+            let label = format!("{}:bits={bits},grid={scope}", Quantised::NAME);
+            let params = QuantisedParams { bits, grid };
+            let stored = match Quantised::build(&scene.items, None, &params) {
+                Ok(index) => {
+                    let items = index.decoded(scene.items.len());
+                    let judged = cullings
+                        .map(|culling| Judged::new(scene, &items, cameras, truths, culling));
+                    Stored {
+                        label,
+                        index: Some(Box::new(index)),
+                        judged: judged.into(),
+                    }
+                }
+                Err(error) => Stored {
+                    label,
+                    index: None,
+                    judged: cullings.map(|c| Judged::refused(c, &error)).into(),
+                },
+            };
+            all.push(stored);
+        }
+    }
+    all
+}
+
 /// The cameras that are looked at: at most `most`, evenly spread.
 fn cameras_of(path: &CameraPath, most: usize) -> Vec<Camera> {
     let count = path.cameras.len();
@@ -207,8 +275,10 @@ pub fn measure_points(
         if stop() {
             return Ok(None);
         }
-        judged.push(Judged::new(scene, &cameras, &truths, culling));
+        let items = culling.test.items(&scene.items);
+        judged.push(Judged::new(scene, &items, &cameras, &truths, culling));
     }
+    let quantised = quantised(scene, &cameras, &truths);
     drop(truths);
     let mut indexes = Vec::with_capacity(structures.len());
     for spec in structures {
@@ -220,10 +290,36 @@ pub fn measure_points(
     let mut competitors = Vec::new();
     for (spec, indexes) in structures.iter().zip(&indexes) {
         for judged in &judged {
-            let mut point = Point::new(spec, judged);
+            let index = indexes.of(judged.culling.test);
+            let mut point = Point::new(&spec.label, judged);
+            point.memory(index.memory(), scene.items.len());
             if judged.refused.is_none() {
-                let index = indexes.of(judged.culling.test);
                 match checked(index, judged, scene.items.len()) {
+                    Ok(slowest) => {
+                        timed_points.push(points.len());
+                        competitors.push(Competitor {
+                            ask: Box::new(|n, out| index.see(judged.views[n].as_any(), out)),
+                            expected: judged.answers.iter().map(|a| a.len() as u64).collect(),
+                            slowest,
+                        });
+                    }
+                    Err(wrong) => (point.status, point.reason) = (wrong.status, wrong.reason),
+                }
+            }
+            points.push(point);
+        }
+    }
+    for Stored {
+        label,
+        index,
+        judged,
+    } in &quantised
+    {
+        for judged in judged {
+            let mut point = Point::new(label, judged);
+            if let Some(index) = index {
+                point.memory(index.memory(), scene.items.len());
+                match checked(index.as_ref(), judged, scene.items.len()) {
                     Ok(slowest) => {
                         timed_points.push(points.len());
                         competitors.push(Competitor {
@@ -294,11 +390,11 @@ fn checked(index: &dyn DynIndex, judged: &Judged, items: usize) -> Result<Durati
 }
 
 impl Point {
-    fn new(spec: &StructureSpec, judged: &Judged) -> Point {
+    fn new(structure: &str, judged: &Judged) -> Point {
         let (culling, errors) = (&judged.culling, judged.errors);
         let refused = judged.refused.is_some();
         Point {
-            structure: spec.label.clone(),
+            structure: structure.to_owned(),
             test: culling.test.name(),
             arithmetic: culling.arithmetic.name(),
             planes: culling.planes.method.name(),
@@ -316,9 +412,14 @@ impl Point {
             query_ns_lower: None,
             query_ns_upper: None,
             ns_per_item: None,
+            memory_bytes_per_item: None,
             dominated_by: None,
             on_front: false,
         }
+    }
+
+    fn memory(&mut self, usage: MemoryUsage, items: usize) {
+        self.memory_bytes_per_item = (items > 0).then(|| usage.total() as f64 / items as f64);
     }
 
     fn time(&mut self, timed: &Timed, items: usize) {
