@@ -7,6 +7,7 @@
 //! default takes seconds (docs/NUMERICS.md has the figures of long runs).
 
 mod camera;
+mod camera_ties;
 mod depth;
 mod draw;
 mod planes;
