@@ -3,7 +3,10 @@
 //! as passed; what is typed and printed is the command line's.
 
 pub mod extremes;
+mod json;
+mod margin;
 mod replay;
+mod sheet;
 mod vectors;
 
 use serde::Serialize;
@@ -12,7 +15,7 @@ use crate::camera::Surroundings;
 use crate::geometry::Aabb;
 use glam::{DVec3, Vec3};
 
-use replay::slack;
+use margin::slack;
 pub use replay::{Replay, replay};
 pub use vectors::{
     BUILT_IN, BUILT_IN_NAME, Names, Vector, VectorCamera, VectorPoint, built_in, read_vectors,
