@@ -94,8 +94,9 @@ fn add_path(table: &mut Table, mut cells: Vec<&ReportCell>, floor: f64) {
         cache => format!("{}, {} ({cache})", first.path.name, first.test),
     };
     let of_any = |name: &str| cells.iter().find_map(|c| c.value(name));
-    let shown = |name: &str| of_any(name).map(text::percent).unwrap_or_default();
-    table.add_row([head, shown("cull_rate"), shown("excess")]);
+    let culled = of_any("cull_rate").map(text::percent);
+    let excess = of_any("excess").map(|share| format!("{:.3} %", share * 100.0));
+    table.add_row([head, culled.unwrap_or_default(), excess.unwrap_or_default()]);
     let (mut rank, mut leader) = (0, 0.0);
     for (place, cell) in cells.iter().enumerate() {
         let value =
