@@ -350,6 +350,9 @@ pub struct PrecisionArgs {
     /// Cubes for each size ratio of the size sweep; 0 leaves both sweeps out
     #[arg(long, value_name = "N", default_value_t = 2_000_000)]
     pub cubes: usize,
+    /// Draw excess against time as an SVG file too
+    #[arg(long, value_name = "FILE")]
+    pub svg: Option<PathBuf>,
     /// Seed of the sweeps and of the order in which points are measured
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,

@@ -12,6 +12,7 @@ mod interrupt;
 mod list;
 mod locate;
 mod precision;
+mod precision_diagram;
 mod query;
 mod run;
 mod run_table;

@@ -2,19 +2,22 @@
 //! path, and the sweeps over item size and world offset behind it.
 
 use std::io::{self, Write};
+use std::path::Path;
 use std::time::Duration;
 
+use anyhow::bail;
 use indicatif::ProgressBar;
 use serde::Serialize;
 
 use super::args::{PrecisionArgs, TableFormat};
-use super::{Ending, interrupt, load_scene, text, unread_is_fine};
+use super::{Ending, interrupt, load_scene, precision_diagram, text, unread_is_fine};
 use cullbench::index::structures;
 use cullbench::measure::{Machine, Protocol, Status, harness_overhead_ns};
 use cullbench::path;
 use cullbench::precision::{
     OffsetRow, Point, Precision, SizeRow, measure_points, offset_sweep, size_sweep,
 };
+use cullbench::report::write_atomically;
 
 /// Everything that is printed.
 #[derive(Serialize)]
@@ -31,6 +34,15 @@ const OFFSET_CAMERAS: usize = 60;
 
 pub fn precision(args: &PrecisionArgs) -> anyhow::Result<Ending> {
     args.kernel.choose()?;
+    // Before the work, not after it.
+    if let Some(folder) = args.svg.as_deref().and_then(Path::parent) {
+        if !folder.as_os_str().is_empty() && !folder.is_dir() {
+            bail!(
+                "{}: expected an existing folder for --svg",
+                folder.display()
+            );
+        }
+    }
     let structures = structures(&args.structure)?;
     let defaults = args.lens.defaults()?;
     let scene = load_scene(&args.scene, &args.scene_args)?;
@@ -72,6 +84,10 @@ pub fn precision(args: &PrecisionArgs) -> anyhow::Result<Ending> {
         offsets = offset_sweep(OFFSET_CAMERAS, args.seed);
     }
     bar.finish_and_clear();
+    if let Some(file) = &args.svg {
+        let svg = precision_diagram::draw(&precision)?;
+        write_atomically(file, |out| out.write_all(svg.as_bytes()))?;
+    }
     let wrong = precision
         .points
         .iter()

@@ -1,0 +1,117 @@
+//! The picture of `cullbench precision`: excess against time, one mark for each
+//! point, the Pareto front as a line. It draws what was measured and decides
+//! nothing.
+
+use std::collections::BTreeMap;
+
+use anyhow::anyhow;
+use plotters::prelude::*;
+
+use super::text;
+use cullbench::precision::{Point, Precision};
+
+const SIZE: (u32, u32) = (1000, 640);
+/// Percent that stand for no excess at all: a logarithmic axis has no zero.
+const NONE: f64 = 1e-4;
+
+/// Told apart also without colours of their own names: dark to light.
+const COLOURS: [RGBColor; 8] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(86, 180, 233),
+    RGBColor(230, 159, 0),
+    RGBColor(0, 0, 0),
+    RGBColor(120, 120, 120),
+];
+
+/// Time in microseconds and excess in percent, if the point has both.
+fn place(point: &Point) -> Option<(f64, f64)> {
+    Some((point.query_ns? / 1e3, (point.excess? * 100.0).max(NONE)))
+}
+
+/// The diagram as SVG.
+pub fn draw(precision: &Precision) -> anyhow::Result<String> {
+    let mut svg = String::new();
+    let drawn = draw_on(&mut svg, precision);
+    drawn.map_err(|error| anyhow!("the diagram cannot be drawn: {error}"))?;
+    Ok(svg)
+}
+
+fn draw_on(svg: &mut String, precision: &Precision) -> Result<(), Box<dyn std::error::Error>> {
+    let places: Vec<(f64, f64)> = precision.points.iter().filter_map(place).collect();
+    let range = |of: fn(&(f64, f64)) -> f64, low: f64, high: f64| {
+        let values = || places.iter().map(of);
+        let least = values().fold(low, f64::min);
+        let most = values().fold(high, f64::max);
+        (least / 1.5..most * 2.0).log_scale()
+    };
+    // One point at least, so that an empty diagram has axes as well.
+    let first = places.first().map_or(1.0, |p| p.0);
+    let (times, excesses) = (range(|p| p.0, first, first), range(|p| p.1, NONE, 1.0));
+    let root = SVGBackend::with_string(svg, SIZE).into_drawing_area();
+    root.fill(&WHITE)?;
+    let caption = format!(
+        "{}, {}: error against run time",
+        precision.scene, precision.path
+    );
+    let mut chart = ChartBuilder::on(&root)
+        .caption(caption, ("sans-serif", 18))
+        .margin(14)
+        .x_label_area_size(44)
+        .y_label_area_size(64)
+        .build_cartesian_2d(times, excesses)?;
+    chart
+        .configure_mesh()
+        .light_line_style(WHITE.mix(0.0))
+        .x_desc("time per query, us (thread CPU; left is better)")
+        .y_desc("excess, % of the visible (lower is better)")
+        .x_label_formatter(&|x| text::significant(*x))
+        .y_label_formatter(&|y| {
+            if *y <= NONE {
+                "0".to_owned()
+            } else {
+                text::significant(*y)
+            }
+        })
+        .draw()?;
+    let front: Vec<(f64, f64)> = precision
+        .front
+        .iter()
+        .filter_map(|&i| place(&precision.points[i]))
+        .collect();
+    chart
+        .draw_series(LineSeries::new(front, BLACK.mix(0.5)))?
+        .label("Pareto front")
+        .legend(|(x, y)| PathElement::new([(x, y), (x + 16, y)], BLACK.mix(0.5)));
+    let mut series: BTreeMap<&str, Vec<&Point>> = BTreeMap::new();
+    for point in &precision.points {
+        series.entry(&point.structure).or_default().push(point);
+    }
+    for (i, (structure, points)) in series.into_iter().enumerate() {
+        let colour = COLOURS[i % COLOURS.len()];
+        let (safe, unsafe_): (Vec<&Point>, Vec<&Point>) = points
+            .into_iter()
+            .partition(|p| p.errors.false_negatives == 0);
+        let marks = safe.into_iter().filter_map(|point| {
+            let size = if point.on_front { 6 } else { 4 };
+            Some(Circle::new(place(point)?, size, colour.filled()))
+        });
+        chart
+            .draw_series(marks)?
+            .label(structure)
+            .legend(move |(x, y)| Circle::new((x + 8, y), 4, colour.filled()));
+        // A cross misses something that is visible.
+        let crosses = unsafe_.into_iter().filter_map(place);
+        chart.draw_series(crosses.map(|at| Cross::new(at, 5, colour.stroke_width(2))))?;
+    }
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::UpperRight)
+        .background_style(WHITE.mix(0.8))
+        .border_style(BLACK.mix(0.3))
+        .draw()?;
+    root.present()?;
+    Ok(())
+}
