@@ -121,19 +121,21 @@ fn show(outcome: &Outcome) -> io::Result<()> {
     let visible = p.points.first().map_or(0, |point| point.errors.visible);
     writeln!(
         out,
-        "{}: {} items; {}: {} cameras, {} visible in all, {} rounds",
+        "{}: {} items; {}: {} cameras, {} visible in all, {} rounds; noise floor {}",
         p.scene,
         text::count(p.items),
         p.path,
         p.cameras,
         text::count(visible as usize),
-        p.rounds
+        p.rounds,
+        text::percent(p.noise_floor)
     )?;
     writeln!(out, "{}", points_table(&p.points))?;
     writeln!(
         out,
         "* on the Pareto front: no other point is as good in every error and as fast. Times whose\n\
-         95 % intervals overlap count as equal. eps is the factor c of the conservative epsilon."
+         95 % intervals come within the noise floor of each other (every structure is entered twice)\n\
+         count as equal. eps is the factor c of the conservative epsilon."
     )?;
     for point in p.points.iter().filter(|p| p.reason.is_some()) {
         let reason = point.reason.as_deref().unwrap_or_default();

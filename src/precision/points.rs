@@ -72,6 +72,9 @@ pub struct Precision {
     pub items: usize,
     pub cameras: usize,
     pub rounds: usize,
+    /// Largest |ratio - 1| of a structure entered twice with the default
+    /// culling: smaller differences of time are ties.
+    pub noise_floor: f64,
     /// Fastest first; what could not be measured comes last.
     pub points: Vec<Point>,
     /// Indices of the points that nothing dominates, fastest first.
@@ -297,11 +300,7 @@ pub fn measure_points(
                 match checked(index, judged, scene.items.len()) {
                     Ok(slowest) => {
                         timed_points.push(points.len());
-                        competitors.push(Competitor {
-                            ask: Box::new(|n, out| index.see(judged.views[n].as_any(), out)),
-                            expected: judged.answers.iter().map(|a| a.len() as u64).collect(),
-                            slowest,
-                        });
+                        competitors.push(competitor(index, judged, slowest));
                     }
                     Err(wrong) => (point.status, point.reason) = (wrong.status, wrong.reason),
                 }
@@ -322,11 +321,7 @@ pub fn measure_points(
                 match checked(index.as_ref(), judged, scene.items.len()) {
                     Ok(slowest) => {
                         timed_points.push(points.len());
-                        competitors.push(Competitor {
-                            ask: Box::new(|n, out| index.see(judged.views[n].as_any(), out)),
-                            expected: judged.answers.iter().map(|a| a.len() as u64).collect(),
-                            slowest,
-                        });
+                        competitors.push(competitor(index.as_ref(), judged, slowest));
                     }
                     Err(wrong) => (point.status, point.reason) = (wrong.status, wrong.reason),
                 }
@@ -334,10 +329,23 @@ pub fn measure_points(
             points.push(point);
         }
     }
-    let Some(timed) = timed_rounds(cameras.len(), &competitors, protocol, stop) else {
+    // The default culling of every structure once more: what equal work looks
+    // like in this run.
+    let mut twins = Vec::new();
+    for indexes in &indexes {
+        let standard = judged.iter().find(|j| j.culling == Culling::default());
+        if let Some(judged) = standard.filter(|j| j.refused.is_none()) {
+            let index = indexes.of(judged.culling.test);
+            twins.push(competitors.len());
+            competitors.push(competitor(index, judged, Duration::ZERO));
+        }
+    }
+    let Some(mut timed) = timed_rounds(cameras.len(), &competitors, protocol, stop) else {
         return Ok(None);
     };
+    let competitor_count = competitors.len();
     drop(competitors);
+    let twins = timed.split_off(competitor_count - twins.len());
     let mut rounds = 0;
     let mut series = Vec::new();
     for (&place, timed) in timed_points.iter().zip(&timed) {
@@ -354,21 +362,35 @@ pub fn measure_points(
         }
     }
     let stability = stability(&series, cameras.len());
+    let noise_floor = noise_floor(&points, &twins);
     points.sort_by(|a, b| {
         let key = |p: &Point| p.query_ns.unwrap_or(f64::INFINITY);
         key(a).total_cmp(&key(b))
     });
-    mark_dominated(&mut points);
+    mark_dominated(&mut points, noise_floor);
     Ok(Some(Precision {
         scene: scene.name.clone(),
         path: path.name.clone(),
         items: scene.items.len(),
         cameras: cameras.len(),
         rounds,
+        noise_floor,
         front: (0..points.len()).filter(|&i| points[i].on_front).collect(),
         points,
         stability,
     }))
+}
+
+fn competitor<'a>(
+    index: &'a dyn DynIndex,
+    judged: &'a Judged,
+    slowest: Duration,
+) -> Competitor<'a> {
+    Competitor {
+        ask: Box::new(move |n, out| index.see(judged.views[n].as_any(), out)),
+        expected: judged.answers.iter().map(|a| a.len() as u64).collect(),
+        slowest,
+    }
 }
 
 /// Asks every query once; the slowest one's wall time, or what was wrong.
@@ -438,8 +460,9 @@ impl Point {
     }
 
     /// No worse in any error and no slower, and better in one of them. Times
-    /// whose intervals overlap are equal: what noise decides is no advantage.
-    fn dominates(&self, other: &Point) -> bool {
+    /// whose intervals come within the noise floor of each other are equal:
+    /// what noise decides is no advantage.
+    fn dominates(&self, other: &Point, floor: f64) -> bool {
         let (Some(upper), Some(other_lower)) = (self.query_ns_upper, other.query_ns_lower) else {
             return false;
         };
@@ -452,14 +475,34 @@ impl Point {
         };
         let (mine, others) = (of(self), of(other));
         let no_worse = mine.iter().zip(&others).all(|(a, b)| a <= b);
-        let (faster, not_slower) = (upper < other_lower, lower <= other_upper);
+        let faster = upper * (1.0 + floor) < other_lower;
+        let not_slower = lower <= other_upper * (1.0 + floor);
         no_worse && not_slower && (faster || mine != others)
     }
 }
 
-fn mark_dominated(points: &mut [Point]) {
+/// How far apart a structure and its twin lie at most.
+fn noise_floor(points: &[Point], twins: &[Result<Timed, Verdict>]) -> f64 {
+    let standard = Culling::default();
+    let originals = points.iter().filter(|p| {
+        p.test == standard.test.name()
+            && p.arithmetic == standard.arithmetic.name()
+            && p.planes == standard.planes.method.name()
+            && p.epsilon == standard.planes.epsilon
+    });
+    let mut floor = 0.0f64;
+    for (original, twin) in originals.zip(twins) {
+        let again = twin.as_ref().ok().and_then(|t| median(&t.round_means()));
+        if let (Some(first), Some(again)) = (original.query_ns, again) {
+            floor = floor.max((again / first - 1.0).abs());
+        }
+    }
+    floor
+}
+
+fn mark_dominated(points: &mut [Point], floor: f64) {
     for i in 0..points.len() {
-        let better = (0..points.len()).find(|&k| points[k].dominates(&points[i]));
+        let better = (0..points.len()).find(|&k| points[k].dominates(&points[i], floor));
         points[i].on_front = better.is_none() && points[i].query_ns.is_some();
         points[i].dominated_by = better;
     }
