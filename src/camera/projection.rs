@@ -20,13 +20,14 @@ pub enum ClipSpace {
 
 /// The projection matrix in one precision. Everything that glam offers comes
 /// from glam; the infinite far planes that it lacks are the limit of its
-/// finite matrix.
+/// finite matrix. Only the cotangent is taken again: glam's sine and cosine
+/// are the platform's, and platforms round them differently.
 macro_rules! projection {
-    ($name:ident, $float:ty, $mat:ty, $glam:ident) => {
+    ($name:ident, $float:ty, $mat:ty, $glam:ident, $sin:path, $cos:path) => {
         /// The projection matrix of a lens.
         pub fn $name(lens: &Lens, clip: ClipSpace) -> $mat {
             use glam::$glam::rh::proj::{directx, opengl};
-            match *lens {
+            let mut matrix = match *lens {
                 Lens::Perspective {
                     fovy_deg,
                     aspect,
@@ -105,13 +106,23 @@ macro_rules! projection {
                     };
                     m
                 }
+            };
+            if let Lens::Perspective {
+                fovy_deg, aspect, ..
+            } = *lens
+            {
+                let half = 0.5 * fovy_deg.to_radians() as $float;
+                let cotangent = $cos(half) / $sin(half);
+                matrix.x_axis.x = cotangent / aspect as $float;
+                matrix.y_axis.y = cotangent;
             }
+            matrix
         }
     };
 }
 
-projection!(projection_f32, f32, Mat4, camera);
-projection!(projection_f64, f64, DMat4, dcamera);
+projection!(projection_f32, f32, Mat4, camera, libm::sinf, libm::cosf);
+projection!(projection_f64, f64, DMat4, dcamera, libm::sin, libm::cos);
 
 /// The six rows (normal, d) of a clip matrix as inward planes, in the order
 /// left, right, bottom, top, near, far; not normalised. A far plane at

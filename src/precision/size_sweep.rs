@@ -108,7 +108,7 @@ fn strewn(dice: &mut Dice, camera: &Camera, ratio: f64) -> Vec<Aabb> {
     // The sphere test returns the most: centres within the frustum whose
     // planes are all moved outward by the radius. In the camera's own frame
     // that is a truncated pyramid from -near + radius to far + radius.
-    let slope_y = (FOVY_DEG.to_radians() / 2.0).tan();
+    let slope_y = libm::tan(FOVY_DEG.to_radians() / 2.0);
     let slope_x = slope_y * ASPECT;
     let far = 1.0 + radius;
     // An outer plane lies radius / cos of the half angle beside the old one.

@@ -96,7 +96,7 @@ fn unit_hash(key: u64) -> f64 {
     let mut z = key.wrapping_add(0x9E37_79B9_7F4A_7C15);
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    (z ^ (z >> 31)) as f64 / 2f64.powi(64)
+    (z ^ (z >> 31)) as f64 / (1u128 << 64) as f64
 }
 
 #[cfg(test)]
