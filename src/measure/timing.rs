@@ -378,6 +378,11 @@ mod tests {
             .collect();
         let mut counted = count_pass(&workload, &built.iter().collect::<Vec<_>>());
         assert!(counted.iter().all(|c| c.verdict == Verdict::ok()));
+        // Not what a loaded machine needed: how much is thinned out follows
+        // from it.
+        for counted in &mut counted {
+            counted.slowest = Duration::from_micros(10);
+        }
         if tamper {
             counted[1].frames[20].visible += 1;
         }
@@ -398,6 +403,27 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_pass_that_would_take_too_long_is_thinned_out_for_all() {
+        let slow = |slowest: Duration| Competitor {
+            ask: Box::new(|_, _| ()),
+            expected: vec![0; 40],
+            slowest,
+        };
+        let places = |slowest: [u64; 2]| {
+            let competitors = slowest.map(|us| slow(Duration::from_micros(us)));
+            places(40, &competitors, &protocol())
+        };
+        // 50 ms for 40 queries: 1250 us each.
+        assert_eq!(places([10, 1250]), (0..40).collect::<Vec<_>>());
+        assert_eq!(places([10, 1251]), (0..40).step_by(2).collect::<Vec<_>>());
+        // However slow, a path is never fewer than eight views.
+        assert_eq!(
+            places([1_000_000, 10]),
+            (0..40).step_by(5).collect::<Vec<_>>()
+        );
     }
 
     #[test]
