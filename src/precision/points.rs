@@ -516,8 +516,15 @@ fn stability(series: &[&Timed], cameras: usize) -> Vec<StableAfter> {
         .iter()
         .map(|timed| {
             let mut laps: BTreeMap<u32, Vec<f64>> = BTreeMap::new();
-            for sample in &timed.samples {
-                laps.entry(sample.frame).or_default().push(sample.cpu_ns);
+            for (i, sample) in timed.samples.iter().enumerate() {
+                // A sample is the mean over its batch and stands for all
+                // cameras up to the next: points have batches of their own.
+                let next = timed.samples.get(i + 1);
+                let next = next.filter(|next| next.round == sample.round);
+                let end = next.map_or(cameras as u32, |next| next.frame);
+                for camera in sample.frame..end {
+                    laps.entry(camera).or_default().push(sample.cpu_ns);
+                }
             }
             let medians = laps
                 .into_iter()
@@ -557,4 +564,131 @@ fn stability(series: &[&Timed], cameras: usize) -> Vec<StableAfter> {
         count *= 2;
     }
     rows
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measure::Sample;
+
+    /// A point with false negatives, dropped touches and false positives, and
+    /// the interval of its time.
+    fn point(errors: [u64; 3], time: [f64; 2]) -> Point {
+        let [false_negatives, touch_dropped, false_positives] = errors;
+        Point {
+            structure: "linear".to_owned(),
+            test: "six-plane",
+            arithmetic: "f32",
+            planes: "frame",
+            epsilon: 0.0,
+            status: Status::Ok,
+            reason: None,
+            excess: None,
+            false_negative_ppm: None,
+            errors: ErrorCount {
+                false_negatives,
+                touch_dropped,
+                false_positives,
+                ..ErrorCount::default()
+            },
+            query_ns: Some((time[0] + time[1]) / 2.0),
+            query_ns_lower: Some(time[0]),
+            query_ns_upper: Some(time[1]),
+            ns_per_item: None,
+            dominated_by: None,
+            on_front: false,
+        }
+    }
+
+    #[test]
+    fn times_that_overlap_are_equal_and_errors_are_not_traded() {
+        let (none, some) = ([0, 0, 5], [0, 0, 9]);
+        let cases = [
+            // Equal errors: only what is clearly faster dominates.
+            (none, [1.0, 2.0], none, [3.0, 4.0], [true, false]),
+            (none, [1.0, 3.0], none, [2.0, 4.0], [false, false]),
+            (none, [1.0, 2.0], none, [2.0, 4.0], [false, false]),
+            // A tie in time is decided by the errors.
+            (none, [1.0, 3.0], some, [2.0, 4.0], [true, false]),
+            (none, [2.0, 4.0], some, [1.0, 3.0], [true, false]),
+            // Fewer errors for more time: both stay.
+            (none, [5.0, 6.0], some, [1.0, 2.0], [false, false]),
+            // One error more, another one fewer: both stay, however fast.
+            ([1, 0, 0], [1.0, 2.0], [0, 0, 9], [5.0, 6.0], [false, false]),
+            ([0, 1, 0], [1.0, 2.0], [0, 0, 9], [5.0, 6.0], [false, false]),
+            ([0, 1, 9], [5.0, 6.0], [0, 1, 8], [1.0, 2.0], [false, true]),
+        ];
+        for (errors_a, time_a, errors_b, time_b, wanted) in cases {
+            let (a, b) = (point(errors_a, time_a), point(errors_b, time_b));
+            let found = [a.dominates(&b), b.dominates(&a)];
+            assert_eq!(found, wanted, "{:?}", (errors_a, time_a, errors_b, time_b));
+        }
+    }
+
+    #[test]
+    fn the_front_is_what_nothing_dominates() {
+        let mut points = [
+            point([0, 0, 9], [1.0, 2.0]),
+            point([0, 0, 9], [1.5, 2.5]),
+            point([0, 0, 9], [3.0, 4.0]),
+            point([0, 0, 0], [5.0, 6.0]),
+            point([0, 0, 1], [5.0, 6.0]),
+            point([0, 0, 0], [0.0, 0.0]),
+        ];
+        // One that was never timed has no say and no place.
+        let untimed = &mut points[5];
+        (untimed.query_ns, untimed.query_ns_lower) = (None, None);
+        untimed.query_ns_upper = None;
+        mark_dominated(&mut points);
+        assert_eq!(
+            points.each_ref().map(|p| p.dominated_by),
+            [None, None, Some(0), None, Some(3), None]
+        );
+        assert_eq!(
+            points.each_ref().map(|p| p.on_front),
+            [true, true, false, true, false, false]
+        );
+    }
+
+    /// Two rounds; each number is the mean of a batch of so many cameras.
+    fn timed(batches: &[f64], queries: u32) -> Timed {
+        let sample = |round: u32, i: usize| Sample {
+            round,
+            frame: i as u32 * queries,
+            queries,
+            cpu_ns: batches[i],
+            wall_ns: batches[i],
+            returned: 0,
+        };
+        let all = (0..2).flat_map(|round| (0..batches.len()).map(move |i| sample(round, i)));
+        Timed {
+            samples: all.collect(),
+            rounds: 2,
+        }
+    }
+
+    #[test]
+    fn the_order_is_compared_with_the_one_from_all_cameras() {
+        // The first is slower from the first camera (0), even from two (0 and
+        // 2), and faster from all.
+        let (a, b) = (timed(&[10.0, 1.0, 1.0, 1.0], 1), timed(&[5.0; 4], 1));
+        let rows = stability(&[&a, &b], 4);
+        let shares: Vec<_> = rows.iter().map(|r| (r.cameras, r.pairs_in_order)).collect();
+        assert_eq!(shares, [(1, 0.0), (2, 0.0), (4, 1.0)]);
+        let spent: Vec<f64> = rows.iter().map(|r| (r.seconds * 1e9).round()).collect();
+        assert_eq!(spent, [30.0, 42.0, 66.0]);
+        // Not a power of two: the last row is all of them.
+        let c = timed(&[3.0, 2.0, 1.0], 1);
+        let counts: Vec<_> = stability(&[&c], 3).iter().map(|r| r.cameras).collect();
+        assert_eq!(counts, [1, 2, 3]);
+    }
+
+    #[test]
+    fn points_with_batches_of_their_own_are_compared_camera_by_camera() {
+        // All in one lap: the mean is 6 a camera, 24 in all, against 20.
+        let (batched, single) = (timed(&[6.0], 4), timed(&[5.0; 4], 1));
+        let rows = stability(&[&batched, &single], 4);
+        assert!(rows.iter().all(|r| r.pairs_in_order == 1.0), "{rows:?}");
+        assert_eq!((rows[2].seconds * 1e9).round(), 88.0);
+    }
 }

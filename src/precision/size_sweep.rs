@@ -101,25 +101,36 @@ fn random_camera(dice: &mut Dice) -> Result<Camera, CameraError> {
     }
 }
 
-/// Cubes whose centres are strewn evenly over a box about everything that any
-/// of the tests can return.
-fn strewn(dice: &mut Dice, camera: &Camera, ratio: f64) -> Vec<Aabb> {
+/// The corners of a box about the centres of all cubes that any of the tests
+/// can return, in the camera's own frame: across, up, depth.
+fn region(ratio: f64) -> [DVec3; 2] {
     let radius = ratio * 3f64.sqrt() / 2.0;
     // The sphere test returns the most: centres within the frustum whose
-    // planes are all moved outward by the radius. In the camera's own frame
-    // that is a truncated pyramid from -near + radius to far + radius.
+    // planes are all moved outward by the radius. That is a truncated pyramid
+    // from near - radius to far + radius.
     let slope_y = libm::tan(FOVY_DEG.to_radians() / 2.0);
     let slope_x = slope_y * ASPECT;
     let far = 1.0 + radius;
     // An outer plane lies radius / cos of the half angle beside the old one.
     let reach = |slope: f64| far * slope + radius * (1.0 + slope * slope).sqrt();
     let (x, y) = (reach(slope_x), reach(slope_y));
-    let half = Vec3::splat((ratio / 2.0) as f32);
+    [DVec3::new(-x, -y, NEAR - radius), DVec3::new(x, y, far)]
+}
+
+/// The cube with this centre in the camera's own frame.
+fn cube_at(camera: &Camera, ratio: f64, at: DVec3) -> Aabb {
     let frame = &camera.frame;
+    let centre = frame.u() * at.x + frame.v() * at.y - frame.n() * at.z;
+    Aabb::around(centre.as_vec3(), Vec3::splat((ratio / 2.0) as f32))
+}
+
+/// Cubes whose centres are strewn evenly over the region.
+fn strewn(dice: &mut Dice, camera: &Camera, ratio: f64) -> Vec<Aabb> {
+    let [low, high] = region(ratio);
     let cube = |dice: &mut Dice| {
-        let depth = dice.between(NEAR - radius, far);
-        let across = frame.u() * dice.between(-x, x) + frame.v() * dice.between(-y, y);
-        Aabb::around((across - frame.n() * depth).as_vec3(), half)
+        let depth = dice.between(low.z, high.z);
+        let (x, y) = (dice.between(low.x, high.x), dice.between(low.y, high.y));
+        cube_at(camera, ratio, DVec3::new(x, y, depth))
     };
     (0..BATCH).map(|_| cube(dice)).collect()
 }
@@ -128,7 +139,11 @@ impl Tally {
     fn add_frustum(&mut self, dice: &mut Dice, ratio: f64) -> Result<(), CameraError> {
         let camera = random_camera(dice)?;
         let cubes = strewn(dice, &camera, ratio);
-        let Some(oracle) = Oracle::of_camera(&Pose::of(&camera), &camera.lens, DVec3::ZERO) else {
+        self.add_cubes(&camera, &cubes)
+    }
+
+    fn add_cubes(&mut self, camera: &Camera, cubes: &[Aabb]) -> Result<(), CameraError> {
+        let Some(oracle) = Oracle::of_camera(&Pose::of(camera), &camera.lens, DVec3::ZERO) else {
             return Ok(());
         };
         let verdicts: Vec<Verdict> = cubes.iter().map(|cube| oracle.verdict(cube)).collect();
@@ -145,7 +160,7 @@ impl Tally {
         };
         let narrow = |more: &[WidePlane]| camera.volume_with(more, &bare, &around);
         let in_f64 = |more: Vec<WidePlane>| WideVolume::from_planes(&[faces, &more].concat());
-        let boxes = blocks(&cubes);
+        let boxes = blocks(cubes);
         let balls: Vec<Aabb> = cubes.iter().map(sphere_cube).collect();
         let spheres = Spheres::new(&narrow(&[])?);
         self.take(0, &spheres, &blocks(&balls), &verdicts);
@@ -194,4 +209,62 @@ fn blocks(boxes: &[Aabb]) -> BoxBlocks {
     let mut blocks = BoxBlocks::with_capacity(boxes.len());
     boxes.iter().for_each(|b| blocks.push(b));
     blocks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What lies beside the region would have to be counted if any test
+    /// returned it.
+    #[test]
+    fn nothing_beside_the_region_is_returned_by_any_test() {
+        let mut dice = Dice::new(5);
+        for ratio in SIZE_RATIOS {
+            let [low, high] = region(ratio);
+            let (mut beside, mut within) = (Tally::default(), Tally::default());
+            for _ in 0..8 {
+                let camera = random_camera(&mut dice).unwrap();
+                let mut cubes = Vec::new();
+                for _ in 0..2000 {
+                    let mut at = low + (high - low) * dice.point();
+                    // Just outside one of the six faces.
+                    let (axis, out) = (dice.below(3), 1e-3 * (high - low));
+                    at[axis] = match dice.below(2) {
+                        0 => low[axis] - out[axis],
+                        _ => high[axis] + out[axis],
+                    };
+                    cubes.push(cube_at(&camera, ratio, at));
+                }
+                beside.add_cubes(&camera, &cubes).unwrap();
+                within.add_frustum(&mut dice, ratio).unwrap();
+            }
+            assert_eq!((beside.cubes, beside.visible), (16_000, 0), "{ratio}");
+            assert_eq!(beside.extra, [0; TESTS.len()], "{ratio}");
+            // The other way round: cubes within are seen, and the f64 test
+            // with all planes makes no mistake.
+            assert!(within.visible > 0 && within.extra[0] > 0, "{ratio}");
+            let exact = TESTS.len() - 1;
+            assert_eq!(
+                (within.extra[exact], within.missed[exact]),
+                (0, 0),
+                "{ratio}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_same_seed_finds_the_same_errors() {
+        let errors = |seed: u64| -> Vec<(u64, Vec<u64>)> {
+            let rows = size_sweep(1, seed, &|| false).unwrap().unwrap();
+            let of = |row: &SizeRow| {
+                let all = row.tests.iter().map(|t| t.excess.to_bits());
+                (row.visible, all.collect())
+            };
+            rows.iter().map(of).collect()
+        };
+        assert_eq!(errors(3), errors(3));
+        assert_ne!(errors(3), errors(4));
+        assert_eq!(size_sweep(1, 1, &|| true), Ok(None));
+    }
 }
