@@ -5,10 +5,12 @@
 #![cfg(feature = "cli")]
 
 mod bad_input;
+mod cullings;
 mod drift;
 mod kernels;
 mod listing;
 mod pipes;
+mod precision;
 mod process;
 mod queries;
 mod readers;

@@ -1,0 +1,232 @@
+//! Culling tests and arithmetics from the command line: `query`, `run` and
+//! `verify` with every choice, what does not go together, and answers that are
+//! wrong at camera level though all structures agree about them.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde_json::Value;
+
+use super::process::*;
+use super::runs::{cells, report};
+use super::{BOXES, FULL_CAMERA};
+
+/// From the coarsest to the finest.
+const TESTS: [&str; 4] = ["sphere", "six-plane", "six-box", "exact"];
+
+/// A camera off zero with a right angle of view, and boxes whose corners lie
+/// exactly on its four sides: what the epsilon is for.
+fn with_ties() -> tempfile::TempDir {
+    let mut scene = format!("{BOXES}\n");
+    for i in 1..400 {
+        let depth = i as f64 * 0.37;
+        // To the precision of the file's numbers in f32: exact in binary.
+        let depth = (depth * 64.0).floor() / 64.0;
+        for (y, z) in [(depth, 0.0), (-depth, 0.0), (0.0, depth), (0.0, -depth)] {
+            let [x, y, z] = [1003.0 + depth, 205.0 + y, 77.0 + z];
+            let out = |v: f64, middle: f64| (v - middle).signum() * f64::from(v != middle) * 0.25;
+            let (dy, dz) = (out(y, 205.0), out(z, 77.0));
+            let span = |v: f64, d: f64| (v.min(v + d), v.max(v + d));
+            let ((ly, hy), (lz, hz)) = (span(y, dy), span(z, dz));
+            scene += &format!("{},{ly},{lz},{x},{hy},{hz}\n", x - 0.25);
+        }
+    }
+    let cameras = format!("{FULL_CAMERA}\n1003,205,77,1004,205,77,0,0,1,90,1,0.125,1000\n");
+    folder(&[("s.csv", scene.as_bytes()), ("c.csv", cameras.as_bytes())])
+}
+
+#[test]
+fn finer_tests_return_less_whatever_the_numbers() {
+    let here = folder(&[]);
+    let line = "query --scene uniform:n=1500,side=100,size=12 --cameras teleport:frames=5 --structure all --ids";
+    let structures = structure_names().len();
+    for arithmetic in ["f32", "f64", "f32-relative"] {
+        let mut coarser: BTreeMap<String, BTreeSet<u32>> = BTreeMap::new();
+        let mut total = Vec::new();
+        for test in TESTS {
+            let line = format!("{line} --test {test} --arithmetic {arithmetic}");
+            if test == "sphere" && arithmetic != "f32" {
+                let done = cullbench(here.path(), &line);
+                assert_refused(&done, "sphere | expected --arithmetic f32", &line);
+                continue;
+            }
+            let rows = rows(&works(here.path(), &line));
+            assert_eq!(rows.len(), 5 * structures);
+            let mut count = 0;
+            for row in rows {
+                assert_eq!(row["test"], test);
+                let ids = row["visible_ids"].split_whitespace();
+                let ids: BTreeSet<u32> = ids.map(|id| id.parse().expect("an id")).collect();
+                let key = format!("{} {}", row["camera"], row["structure"]);
+                count += ids.len();
+                if let Some(before) = coarser.insert(key, ids.clone()) {
+                    assert!(ids.is_subset(&before), "{test} {arithmetic}");
+                }
+            }
+            total.push(count);
+        }
+        assert!(
+            total.first() > total.last() && total.last() > Some(&0),
+            "{total:?}"
+        );
+    }
+}
+
+#[test]
+fn choices_that_do_not_go_together_are_refused() {
+    let here = with_good_files(&[]);
+    let scene = "--scene scene.csv --path orbit:frames=2";
+    for (choice, wanted) in [
+        (
+            "--arithmetic f64 --planes gh-gl-f64",
+            "gh-gl-f64 | expected --planes frame",
+        ),
+        (
+            "--arithmetic f32-relative --planes frame-f32",
+            "frame-f32 | expected --planes frame",
+        ),
+        (
+            "--arithmetic f63",
+            "unknown arithmetic 'f63' | did you mean 'f64'",
+        ),
+        ("--epsilon -1", "--epsilon is -1"),
+        ("--planes gh-gl-f16", "gh-gl-f16 | did you mean 'gh-gl-f"),
+    ] {
+        let commands = ["query", "verify", "run --out r"].map(|c| format!("{c} {scene} {choice}"));
+        all_refused(&here, &commands, wanted);
+    }
+    for (choice, wanted) in [
+        (
+            "--test spere",
+            "unknown test 'spere' | did you mean 'sphere'",
+        ),
+        (
+            "--test sphere --arithmetic f64",
+            "expected --arithmetic f32",
+        ),
+    ] {
+        let commands = ["query", "run --out r"].map(|c| format!("{c} {scene} {choice}"));
+        all_refused(&here, &commands, wanted);
+    }
+    let twice = [
+        format!("run --out r {scene} --test exact --test exact"),
+        format!("run --out r {scene} --test sphere,exact,sphere"),
+    ];
+    all_refused(&here, &twice, "is named twice");
+}
+
+#[test]
+fn a_run_has_a_cell_with_its_errors_for_every_test_and_goes_on_with_more() {
+    let here = folder(&[]);
+    let line = "run --scene city:n=400 --path orbit:frames=8 --structure linear,bvh --out r";
+    let more = format!("{line} --test sphere,exact --test six-plane");
+    works(here.path(), &format!("{line} --test six-plane"));
+    let run = here.path().join("r");
+    let first = report(&run);
+    assert_eq!(cells(&first).len(), 2);
+    works(here.path(), &format!("{more} --resume"));
+    let all = report(&run);
+    // What was measured before is left as it was.
+    assert_eq!(cells(&all)[..2], cells(&first)[..]);
+    let mut errors: BTreeMap<&str, Vec<&Value>> = BTreeMap::new();
+    for cell in cells(&all) {
+        assert_eq!(cell["status"], "ok", "{cell}");
+        let test = cell["test"].as_str().expect("a test");
+        errors.entry(test).or_default().push(&cell["error"]);
+    }
+    assert_eq!(
+        errors.keys().copied().collect::<Vec<_>>(),
+        ["exact", "six-plane", "sphere"]
+    );
+    let mut extra = Vec::new();
+    for (test, errors) in errors {
+        // One for each structure, the same in both.
+        assert!(
+            errors.len() == 2 && errors[0] == errors[1],
+            "{test}: {errors:?}"
+        );
+        let number = |name: &str| errors[0][name].as_u64().expect(name);
+        assert!(number("visible_count") > 0 && number("judged_queries") == 8);
+        assert_eq!(
+            number("false_negative_count") + number("touch_dropped_count"),
+            0
+        );
+        extra.push(number("false_positive_count"));
+    }
+    assert!(extra.is_sorted() && extra[0] < extra[2], "{extra:?}");
+    // Nothing is left to do, also in another order.
+    let before = contents(&run);
+    works(
+        here.path(),
+        &format!("{line} --test six-plane,exact,sphere --resume"),
+    );
+    assert!(contents(&run) == before);
+    // The same in one go.
+    works(here.path(), &more.replace("--out r", "--out whole"));
+    assert_eq!(cells(&report(&here.path().join("whole"))).len(), 6);
+}
+
+/// Every structure agrees, and all of them miss what the camera sees.
+#[test]
+fn answers_that_are_wrong_at_camera_level_are_unsafe() {
+    let here = folder(&[]);
+    let line = "run --scene uniform:n=3000 --path orbit:frames=8 --structure linear,bvh \
+                --near 1e-3 --far 900";
+    let done = cullbench(
+        here.path(),
+        &format!("{line} --out bad --planes gh-gl-f32 --epsilon 0"),
+    );
+    assert_eq!(
+        (done.code, done.err.as_str()),
+        (Some(1), ""),
+        "{}",
+        done.out
+    );
+    for cell in cells(&report(&here.path().join("bad"))) {
+        assert_eq!(cell["status"], "unsafe", "{cell}");
+        let missed = cell["error"]["false_negative_count"].as_u64();
+        assert!(missed > Some(0), "{cell}");
+        let reason = cell["reason"].as_str().unwrap_or_default();
+        assert!(reason.contains("missed at camera level"), "{cell}");
+        assert!(
+            reason.starts_with(&missed.unwrap_or(0).to_string()),
+            "{cell}"
+        );
+        // What is unsafe is not ranked.
+        assert!(cell["metrics"]["query_ns"].is_null(), "{cell}");
+    }
+    works(here.path(), &format!("{line} --out good"));
+}
+
+#[test]
+fn verify_asks_every_kind_of_volume_test_and_arithmetic() {
+    let here = folder(&[]);
+    let scene = "--scene rooms:n=300 --path flythrough:frames=4";
+    let told = works(here.path(), &format!("verify {scene} --format json"));
+    let told = json(&told);
+    let checks = told["checks"].as_array().expect("an array");
+    assert_eq!(checks.len(), structure_names().len());
+    for check in checks {
+        // Nine kinds of volume; four tests in f32, three in each of the others,
+        // one of which is the first kind again.
+        assert_eq!(check["volumes"], 4 * (9 + 10 - 1), "{check}");
+        assert_eq!(check["status"], "ok", "{check}");
+    }
+}
+
+/// With the epsilon nothing is lost that touches the view; without it much of
+/// this scene is, so that planes that lack it would not pass for safe.
+#[test]
+fn verify_holds_the_default_planes_to_the_camera() {
+    let here = with_ties();
+    let scene = "--scene s.csv --path c.csv";
+    let told = works(here.path(), &format!("verify {scene}"));
+    assert!(told.contains(", 0 mismatches"), "{told}");
+    let count = |choice: &str| -> usize {
+        let line = format!("query {scene} --structure linear {choice}");
+        rows(&works(here.path(), &line))[0]["visible_count"]
+            .parse()
+            .expect("a number")
+    };
+    assert_eq!(count(""), 4 * 399, "every box touches the view or is in it");
+    assert!(count("--epsilon 0") < 4 * 399, "{}", count("--epsilon 0"));
+}
