@@ -3,10 +3,15 @@
 //! points of that diagram and the two sweeps; the truth is the oracle's, the
 //! clock is `measure`'s.
 
+mod judged;
 mod offset_sweep;
+mod point;
 mod points;
 mod size_sweep;
+mod stability;
 
 pub use offset_sweep::{OFFSETS, OffsetRow, offset_sweep};
-pub use points::{Point, Precision, StableAfter, measure_points};
+pub use point::Point;
+pub use points::{Precision, measure_points};
 pub use size_sweep::{SIZE_RATIOS, SizeRow, size_sweep};
+pub use stability::StableAfter;

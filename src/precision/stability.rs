@@ -1,0 +1,126 @@
+//! How many cameras it takes until the order of the points by time stands: the
+//! sampling error of the diagram itself.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::measure::Timed;
+use crate::statistics::median;
+
+/// How well the order of all points by time, taken from a number of cameras,
+/// agrees with the order from all of them.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct StableAfter {
+    pub cameras: usize,
+    /// Share of pairs of points that come in the same order.
+    pub pairs_in_order: f64,
+    /// CPU time that measuring this many took, all points and rounds.
+    pub seconds: f64,
+}
+
+/// The order of the points by time from the first 1, 2, 4, .. cameras of an
+/// evenly spread order, against the order from all.
+pub(super) fn stability(series: &[&Timed], cameras: usize) -> Vec<StableAfter> {
+    // Per point and camera: median over the rounds.
+    let by_camera: Vec<BTreeMap<u32, f64>> = series
+        .iter()
+        .map(|timed| {
+            let mut laps: BTreeMap<u32, Vec<f64>> = BTreeMap::new();
+            for (i, sample) in timed.samples.iter().enumerate() {
+                // A sample is the mean over its batch and stands for all
+                // cameras up to the next: points have batches of their own.
+                let next = timed.samples.get(i + 1);
+                let next = next.filter(|next| next.round == sample.round);
+                let end = next.map_or(cameras as u32, |next| next.frame);
+                for camera in sample.frame..end {
+                    laps.entry(camera).or_default().push(sample.cpu_ns);
+                }
+            }
+            let medians = laps
+                .into_iter()
+                .filter_map(|(c, ns)| Some((c, median(&ns)?)));
+            medians.collect()
+        })
+        .collect();
+    let spent = |of: &BTreeMap<u32, f64>, wanted: &dyn Fn(u32) -> bool| -> f64 {
+        of.iter()
+            .filter(|(c, _)| wanted(**c))
+            .map(|(_, ns)| ns)
+            .sum()
+    };
+    let all: Vec<f64> = by_camera.iter().map(|of| spent(of, &|_| true)).collect();
+    let rounds = series.iter().map(|t| t.rounds).max().unwrap_or(0);
+    let mut rows = Vec::new();
+    let mut count = 1;
+    while count < 2 * cameras {
+        let used = count.min(cameras);
+        let chosen = |camera: u32| (camera as usize * used) % cameras < used;
+        let some: Vec<f64> = by_camera.iter().map(|of| spent(of, &chosen)).collect();
+        let pairs = (0..all.len()).flat_map(|i| (i + 1..all.len()).map(move |k| (i, k)));
+        let (mut same, mut total) = (0u64, 0u64);
+        for (i, k) in pairs {
+            total += 1;
+            same += u64::from((some[i] < some[k]) == (all[i] < all[k]));
+        }
+        rows.push(StableAfter {
+            cameras: used,
+            pairs_in_order: if total == 0 {
+                1.0
+            } else {
+                same as f64 / total as f64
+            },
+            seconds: some.iter().sum::<f64>() * rounds as f64 / 1e9,
+        });
+        count *= 2;
+    }
+    rows
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measure::Sample;
+
+    /// Two rounds; each number is the mean of a batch of so many cameras.
+    fn timed(batches: &[f64], queries: u32) -> Timed {
+        let sample = |round: u32, i: usize| Sample {
+            round,
+            frame: i as u32 * queries,
+            queries,
+            cpu_ns: batches[i],
+            wall_ns: batches[i],
+            returned: 0,
+        };
+        let all = (0..2).flat_map(|round| (0..batches.len()).map(move |i| sample(round, i)));
+        Timed {
+            samples: all.collect(),
+            rounds: 2,
+        }
+    }
+
+    #[test]
+    fn the_order_is_compared_with_the_one_from_all_cameras() {
+        // The first is slower from the first camera (0), even from two (0 and
+        // 2), and faster from all.
+        let (a, b) = (timed(&[10.0, 1.0, 1.0, 1.0], 1), timed(&[5.0; 4], 1));
+        let rows = stability(&[&a, &b], 4);
+        let shares: Vec<_> = rows.iter().map(|r| (r.cameras, r.pairs_in_order)).collect();
+        assert_eq!(shares, [(1, 0.0), (2, 0.0), (4, 1.0)]);
+        let spent: Vec<f64> = rows.iter().map(|r| (r.seconds * 1e9).round()).collect();
+        assert_eq!(spent, [30.0, 42.0, 66.0]);
+        // Not a power of two: the last row is all of them.
+        let c = timed(&[3.0, 2.0, 1.0], 1);
+        let counts: Vec<_> = stability(&[&c], 3).iter().map(|r| r.cameras).collect();
+        assert_eq!(counts, [1, 2, 3]);
+    }
+
+    #[test]
+    fn points_with_batches_of_their_own_are_compared_camera_by_camera() {
+        // All in one lap: the mean is 6 a camera, 24 in all, against 20.
+        let (batched, single) = (timed(&[6.0], 4), timed(&[5.0; 4], 1));
+        let rows = stability(&[&batched, &single], 4);
+        assert!(rows.iter().all(|r| r.pairs_in_order == 1.0), "{rows:?}");
+        assert_eq!((rows[2].seconds * 1e9).round(), 88.0);
+    }
+}
