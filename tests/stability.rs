@@ -7,16 +7,16 @@
 //! lines that it prints in place of [`PINNED`], and give the change a line in
 //! CHANGELOG.md, because it moves every published figure.
 
-use cullbench::camera::{Camera, PLANE_METHODS, PlaneOptions};
+use cullbench::camera::{PLANE_METHODS, PlaneOptions};
 use cullbench::culling::{ARITHMETICS, Arithmetic, CameraView, Culling, CullingTest, TESTS};
-use cullbench::geometry::{Aabb, ConvexVolume, PlaneTree};
+use cullbench::geometry::{Aabb, PlaneTree, WidePlane};
 use cullbench::index::{BACKENDS, DynIndex, StructureSpec};
 use cullbench::kernel::Kernel;
 use cullbench::measure::Workload;
 use cullbench::path::{self, LensDefaults};
 use cullbench::query::ItemId;
 use cullbench::scene::{self, FAMILIES, SAMPLES, Scene};
-use glam::DVec3;
+use cullbench::verify::points_on_faces;
 
 /// Items of a generated scene. Large enough for trees of several levels.
 const ITEMS: usize = 1200;
@@ -391,33 +391,6 @@ fn cullings() -> Vec<Culling> {
     all
 }
 
-/// Points on the faces of a volume, as near as f32 has them: what a rounding
-/// that is not the usual one would put on the other side. Before each face lie
-/// points all over the camera's view (the R3 sequence of Roberts 2018), which
-/// are then moved onto it.
-fn points_on_faces(camera: &Camera, origin: DVec3, volume: &ConvexVolume) -> Vec<Aabb> {
-    const STEP: DVec3 = DVec3::new(
-        0.819_172_513_396_164_4,
-        0.671_043_606_703_789_3,
-        0.549_700_477_901_970_3,
-    );
-    let (frame, near) = (&camera.frame, camera.lens.near());
-    let far = camera.lens.far().unwrap_or(near * 1000.0);
-    let mut points = Vec::new();
-    for plane in volume.planes() {
-        let (normal, d) = (plane.normal.as_dvec3(), f64::from(plane.d));
-        for i in 0..48 {
-            let share = (STEP * f64::from(i)).fract();
-            let depth = near + (far - near) * share.z;
-            let (x, y) = ((share.x * 2.0 - 1.0) * depth, (share.y - 0.5) * depth);
-            let at = frame.eye - origin + frame.u() * x + frame.v() * y - frame.n() * depth;
-            let on = (at - normal * (normal.dot(at) + d)).as_vec3();
-            points.push(Aabb::new(on, on));
-        }
-    }
-    points
-}
-
 /// The ids that every structure with every kernel gives, sorted.
 fn agreed(
     structures: &[Box<dyn DynIndex>],
@@ -502,7 +475,8 @@ fn digests(scene: &Scene, structures: &Structures, path: &str, found: &mut usize
         if let (Some(camera), [CameraView::Volume(view), ..]) =
             (path.cameras.first(), &workload.views[..])
         {
-            let points = points_on_faces(camera, scene.origin, view);
+            let faces: Vec<WidePlane> = view.planes().iter().map(WidePlane::from).collect();
+            let points = points_on_faces(camera, scene.origin, &faces);
             let ids = agreed(&over(&points, None), &what, |index, out| {
                 index.see(view.into(), out);
             });

@@ -1,9 +1,10 @@
-//! Scenes at the edge of what a structure may meet, and volumes that touch
-//! their boxes exactly where they can. Plain data; nothing is checked here.
+//! Scenes at the edge of what a structure may meet, volumes that touch their
+//! boxes exactly where they can, and points on the faces of a view. Plain data; nothing is checked here.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
-use crate::geometry::{Aabb, ConvexVolume, Plane};
+use crate::camera::Camera;
+use crate::geometry::{Aabb, ConvexVolume, Plane, WidePlane};
 
 fn cube(x: f32, y: f32, z: f32, half: f32) -> Aabb {
     Aabb::around(Vec3::new(x, y, z), Vec3::splat(half))
@@ -81,4 +82,31 @@ pub fn edge_volumes(items: &[Aabb]) -> Vec<ConvexVolume> {
     // Planes that overflow f32 are no volume.
     let volumes = sets.iter().map(|planes| ConvexVolume::from_planes(planes));
     volumes.filter_map(Result::ok).collect()
+}
+
+/// Points on the faces of a camera's view, as near as f32 has them: what a
+/// rounding that is not the usual one, or a missing epsilon, puts on the other
+/// side. For each face points all over the view (the R3 sequence of Roberts
+/// 2018), moved onto it; faces and points are about `origin`.
+pub fn points_on_faces(camera: &Camera, origin: DVec3, faces: &[WidePlane]) -> Vec<Aabb> {
+    const EACH: u32 = 48;
+    const STEP: DVec3 = DVec3::new(
+        0.819_172_513_396_164_4,
+        0.671_043_606_703_789_3,
+        0.549_700_477_901_970_3,
+    );
+    let (frame, near) = (&camera.frame, camera.lens.near());
+    let far = camera.lens.far().unwrap_or(near * 1000.0);
+    let mut points = Vec::new();
+    for face in faces {
+        for i in 0..EACH {
+            let share = (STEP * f64::from(i)).fract();
+            let depth = near + (far - near) * share.z;
+            let (x, y) = ((share.x * 2.0 - 1.0) * depth, (share.y - 0.5) * depth);
+            let at = frame.eye - origin + frame.u() * x + frame.v() * y - frame.n() * depth;
+            let on = (at - face.normal * (face.normal.dot(at) + face.d)).as_vec3();
+            points.push(Aabb::new(on, on));
+        }
+    }
+    points
 }

@@ -16,7 +16,7 @@ use glam::Vec3;
 use crate::geometry::Aabb;
 use crate::query::{AnyView, ItemId};
 
-pub use edges::{edge_scenes, edge_volumes};
+pub use edges::{edge_scenes, edge_volumes, points_on_faces};
 pub use random::{RandomCase, VOLUME_KINDS};
 pub use truth::{ErrorCount, Truth};
 pub use variants::variants;
