@@ -35,13 +35,14 @@ const OFFSET_CAMERAS: usize = 60;
 pub fn precision(args: &PrecisionArgs) -> anyhow::Result<Ending> {
     args.kernel.choose()?;
     // Before the work, not after it.
-    if let Some(folder) = args.svg.as_deref().and_then(Path::parent) {
-        if !folder.as_os_str().is_empty() && !folder.is_dir() {
-            bail!(
-                "{}: expected an existing folder for --svg",
-                folder.display()
-            );
-        }
+    if let Some(folder) = args.svg.as_deref().and_then(Path::parent)
+        && !folder.as_os_str().is_empty()
+        && !folder.is_dir()
+    {
+        bail!(
+            "{}: expected an existing folder for --svg",
+            folder.display()
+        );
     }
     let structures = structures(&args.structure)?;
     let defaults = args.lens.defaults()?;
