@@ -22,6 +22,9 @@ const CANCELLED: f64 = 1e-7;
 pub fn bounds(faces: &[WidePlane]) -> Vec<WidePlane> {
     /// Of a product of unit vectors.
     const ROUNDING: f64 = 1e-14;
+    /// What may be taken for rounding of a sum of length 1: one of the units
+    /// that the epsilon covers.
+    const UNIT: f64 = 1.0 / (1u64 << 24) as f64;
     /// The faces' own roundings (2^-53 of each of nine numbers) over the sum
     /// of them that is left. Axis planes need 2 of the 8 units of 2^-24 that
     /// the epsilon covers, and so 5 may go here. Views of up to 179.99 degrees
@@ -40,7 +43,9 @@ pub fn bounds(faces: &[WidePlane]) -> Vec<WidePlane> {
                     // Zero where two faces do already (an edge across the
                     // axis), but for rounding.
                     let clean = |w: f64| if w.abs() < ROUNDING { 0.0 } else { w };
-                    let weights = crossed.map(|w| clean(w[axis]));
+                    let given = crossed.map(|w| w[axis]);
+                    let weights = given.map(clean);
+                    let dropped: f64 = given.iter().zip(weights).map(|(w, c)| (w - c).abs()).sum();
                     let sign = weights.iter().sum::<f64>().signum();
                     if weights.iter().any(|w| w * sign < 0.0) {
                         continue;
@@ -51,7 +56,8 @@ pub fn bounds(faces: &[WidePlane]) -> Vec<WidePlane> {
                     };
                     let (n, d) = (sum(&|p| p.normal[axis]), sum(&|p| p.d));
                     let offset = d / n.abs();
-                    if n.abs() > CANCELLED && offset.is_finite() {
+                    let sound = n.abs() > CANCELLED && dropped <= UNIT * n.abs();
+                    if sound && offset.is_finite() {
                         let slot = &mut tightest[2 * axis + usize::from(n < 0.0)];
                         *slot = Some(slot.map_or(offset, |old| old.min(offset)));
                     }
