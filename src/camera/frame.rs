@@ -4,6 +4,7 @@
 use glam::{DMat3, DMat4, DVec3, DVec4};
 
 use super::{CameraError, finite};
+use crate::arithmetic::cross;
 
 /// Eye position and the unit vectors u (right), v (up) and n (backward: the
 /// camera looks along -n). Right-handed: `u x v = n`.
@@ -66,22 +67,6 @@ fn scaled(v: DVec3) -> Option<DVec3> {
     }
     let exponent = libm::ilogb(largest);
     Some(v.map(|component| libm::ldexp(component, -exponent)))
-}
-
-/// `a x b`, each component true to about an ulp however much cancels
-/// (Kahan's difference of products; Jeannerod, Louvet and Muller 2013,
-/// "Further analysis of Kahan's algorithm for the accurate computation of
-/// 2 x 2 determinants").
-fn cross(a: DVec3, b: DVec3) -> DVec3 {
-    fn difference(a: f64, b: f64, c: f64, d: f64) -> f64 {
-        let cd = c * d;
-        libm::fma(a, b, -cd) + libm::fma(-c, d, cd)
-    }
-    DVec3::new(
-        difference(a.y, b.z, a.z, b.y),
-        difference(a.z, b.x, a.x, b.z),
-        difference(a.x, b.y, a.y, b.x),
-    )
 }
 
 impl Frame {

@@ -8,11 +8,8 @@
 
 use glam::DVec3;
 
+use crate::arithmetic::cross;
 use crate::geometry::{MAX_PLANES, WidePlane};
-
-/// Of faces of unit length: a sum shorter than this has lost too many digits
-/// to be a plane (1e-9 of it would be noise). Doing without is always safe.
-const CANCELLED: f64 = 1e-7;
 
 /// The volume's bounds along the axes: up to six planes, fewer where it has no
 /// bound.
@@ -74,20 +71,6 @@ pub fn bounds(faces: &[WidePlane]) -> Vec<WidePlane> {
         .collect()
 }
 
-/// `a x b` true to about an ulp in each component, however nearly parallel
-/// they are (Kahan; Jeannerod, Louvet and Muller 2013).
-fn cross(a: DVec3, b: DVec3) -> DVec3 {
-    let difference = |a: f64, b: f64, c: f64, d: f64| {
-        let cd = c * d;
-        libm::fma(a, b, -cd) + libm::fma(-c, d, cd)
-    };
-    DVec3::new(
-        difference(a.y, b.z, a.z, b.y),
-        difference(a.z, b.x, a.x, b.z),
-        difference(a.x, b.y, a.y, b.x),
-    )
-}
-
 /// The silhouettes of the volume seen along the axes: up to eighteen planes
 /// for a frustum, through its edges and parallel to an axis.
 ///
@@ -95,6 +78,9 @@ fn cross(a: DVec3, b: DVec3) -> DVec3 {
 /// touch the volume are kept, the tightest ones if there are too many for
 /// `room`. O(m^3) for the m faces' corners and O(m^2) sums.
 pub fn silhouettes(faces: &[WidePlane], room: usize) -> Vec<WidePlane> {
+    /// Of faces of unit length: a sum shorter than this has lost too many digits
+    /// to be a plane (1e-9 of it would be noise). Doing without is always safe.
+    const CANCELLED: f64 = 1e-7;
     /// How near to a corner a sum must pass, as a share of the magnitudes
     /// there: far above rounding, far below the gap of a sum that is idle.
     const TIGHT: f64 = 1e-7;
