@@ -11,6 +11,7 @@ use cullbench::camera::PlaneOptions;
 use cullbench::culling::Culling;
 use cullbench::geometry::BoxBlocks;
 use cullbench::index::{BACKENDS, StructureSpec};
+use cullbench::kernel::BASELINE;
 use cullbench::measure::{UPDATE_SHARES, Workload, move_share};
 use cullbench::path;
 use cullbench::scene::{self, Scene};
@@ -152,8 +153,7 @@ fn kernels(c: &mut Criterion) {
         b.iter(|| {
             let blocks = black_box(&blocks).range(0, scene.items.len());
             let seen = blocks.map(|(_, lanes, block)| {
-                (block.admitted_by(volume.planes().iter().map(|p| (p, p.upper()))) & lanes)
-                    .count_ones()
+                (block.admitted_by(BASELINE, volume, volume.mask()) & lanes).count_ones()
             });
             seen.sum::<u32>()
         });

@@ -8,6 +8,7 @@ use std::hint::black_box;
 use cullbench::camera::PlaneOptions;
 use cullbench::geometry::{Aabb, ConvexVolume, PlaneMask};
 use cullbench::index::{PackedTree, Part, Record, Splitter, build_top_down, indexable};
+use cullbench::kernel::BASELINE;
 use cullbench::query::{ItemId, NoRecorder};
 use cullbench::{path, scene};
 
@@ -138,9 +139,7 @@ fn without(tree: &PackedTree, volume: &ConvexVolume, out: &mut Vec<ItemId>) {
                 }
                 let items = node.items();
                 for (start, lanes, block) in tree.boxes().range(items.start, items.end) {
-                    let planes =
-                        Bits(mask).map(|bit| (volume.plane_of_bit(bit), volume.upper_of_bit(bit)));
-                    let admitted = block.admitted_by(planes);
+                    let admitted = block.admitted_by(BASELINE, volume, mask);
                     let mut admitted = u32::from(admitted & lanes);
                     while admitted != 0 {
                         let from = admitted.trailing_zeros();
@@ -157,7 +156,7 @@ fn without(tree: &PackedTree, volume: &ConvexVolume, out: &mut Vec<ItemId>) {
 
 #[inline(never)]
 fn with(tree: &PackedTree, volume: &ConvexVolume, out: &mut Vec<ItemId>) {
-    let _ = tree.query(volume, out, &mut NoRecorder);
+    let _ = tree.query(BASELINE, volume, out, &mut NoRecorder);
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use cullbench::geometry::{Aabb, BoxBlock, LaneMask, PlaneMask, PlaneTree};
 use cullbench::index::{BuildError, FrustumQuery, MemoryUsage, RegionIndex, indexable};
+use cullbench::kernel::Isa;
 use cullbench::query::{Containment, ItemId, NoRecorder, Recorder, Region, Sink, View};
 use cullbench::verify::conformance::properties;
 use glam::Vec3;
@@ -105,8 +106,8 @@ impl<V: View> Region for Seen<'_, V> {
     fn admits<R: Recorder>(&self, b: &Aabb, memo: PlaneMask, recorder: &mut R) -> bool {
         self.0.admits(b, memo, recorder)
     }
-    fn admit_lanes(&self, block: &BoxBlock, memo: PlaneMask) -> LaneMask {
-        self.0.admit_lanes(block, memo)
+    fn admit_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, memo: PlaneMask) -> LaneMask {
+        self.0.admit_lanes(isa, block, memo)
     }
 }
 

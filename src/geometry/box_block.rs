@@ -5,13 +5,47 @@
 use glam::Vec3;
 
 use super::aabb::held;
-use super::{Aabb, Ball, Plane, SphereMargin, Upper, WidePlane};
+use super::{Aabb, Ball, ConvexVolume, Plane, PlaneMask, SphereMargin, Upper, WidePlane};
+use crate::kernel::{Isa, Plain, prefetch};
 
-/// Boxes of one block.
-pub const LANES: usize = 16;
+/// Boxes of one block, and one bit for each of them.
+pub use crate::kernel::{LANES, LaneMask};
 
-/// One bit per lane of a [`BoxBlock`].
-pub type LaneMask = u16;
+/// Does something for every bit of a mask, the lowest and the highest one
+/// first; for a single bit, twice. Most blocks below the top of a tree have one
+/// plane open or two, and nobody could predict which. A macro, because a
+/// closure that is called in several places may stay a call.
+macro_rules! for_each_plane {
+    ($mask:expr, $bit:ident, $test:block) => {{
+        let mask: PlaneMask = $mask;
+        if mask != 0 {
+            let $bit = mask.trailing_zeros();
+            $test
+            let $bit = mask.ilog2();
+            $test
+            let mut left = mask & (mask - 1) & !(1 << $bit);
+            while left != 0 {
+                let $bit = left.trailing_zeros();
+                $test
+                left &= left - 1;
+            }
+        }
+    }};
+}
+
+/// Some of the six rows of a [`BoxBlock`], one bit each.
+pub type RowMask = u8;
+
+/// All rows of a block.
+pub const ALL_ROWS: RowMask = 0b11_1111;
+
+/// The rows of one corner of every box: of the upper bounds where `upper` says
+/// so.
+pub(super) fn corner_rows(upper: Upper) -> RowMask {
+    (0..3).fold(0, |rows, axis| {
+        rows | 1 << (axis + 3 * usize::from(upper[axis]))
+    })
+}
 
 /// Sixteen boxes as six rows: min x, y, z, then max x, y, z. 384 bytes.
 ///
@@ -56,38 +90,92 @@ impl BoxBlock {
         )
     }
 
-    /// The lanes that none of the planes excludes: bit for bit
+    /// The union of the boxes; empty ones add nothing.
+    pub fn union(&self) -> Aabb {
+        let fold = |k: usize, pick: fn(f32, f32) -> f32| {
+            self.rows[k]
+                .iter()
+                .copied()
+                .reduce(pick)
+                .unwrap_or(f32::NAN)
+        };
+        let low = |k| fold(k, |a, b| if b < a { b } else { a });
+        let high = |k| fold(k, |a, b| if b > a { b } else { a });
+        Aabb::new(
+            Vec3::new(low(0), low(1), low(2)),
+            Vec3::new(high(3), high(4), high(5)),
+        )
+    }
+
+    /// Asks for the memory of some rows ahead of their use. Of each axis at
+    /// least one row must be wanted.
+    #[inline(always)]
+    pub fn prefetch(&self, rows: RowMask) {
+        for axis in 0..3 {
+            // Two hints an axis, both for the same row where only one is
+            // wanted: cheaper than a branch that nobody can predict.
+            let (low, high) = (rows >> axis & 1 == 1, rows >> (axis + 3) & 1 == 1);
+            prefetch(&self.rows[if low { axis } else { axis + 3 }]);
+            prefetch(&self.rows[if high { axis + 3 } else { axis }]);
+        }
+    }
+
+    /// Reads some rows and does nothing with them but what keeps the reads:
+    /// the bits of all lanes, joined.
+    #[inline(always)]
+    pub fn touch<I: Isa>(&self, isa: I, rows: RowMask) -> LaneMask {
+        let mut sum = isa.splat(0.0);
+        for (k, row) in self.rows.iter().enumerate() {
+            if rows >> k & 1 == 1 {
+                sum = isa.lower(sum, isa.load(row));
+            }
+        }
+        isa.below_zero(sum)
+    }
+
+    /// The lanes that none of the planes of a mask excludes: bit for bit
     /// [`Plane::excludes`], lane by lane. Lanes without a box come out as they
     /// may.
     #[inline(always)]
-    pub fn admitted_by<'p>(&self, planes: impl Iterator<Item = (&'p Plane, Upper)>) -> LaneMask {
+    pub fn admitted_by<I: Isa>(&self, isa: I, volume: &ConvexVolume, mask: PlaneMask) -> LaneMask {
         // The lowest value over all planes: below zero iff some plane's is. A
         // NaN (an overflow on both sides) excludes nothing, as in the scalar
         // test, because it compares false.
-        let mut lowest = [f32::INFINITY; LANES];
-        for (plane, upper) in planes {
-            let mut values = [0.0; LANES];
-            self.p_vertex_values(plane, upper, &mut values);
-            for (low, value) in lowest.iter_mut().zip(values) {
-                *low = if value < *low { value } else { *low };
-            }
-        }
-        !below_zero(&lowest)
+        let mut lowest = isa.splat(f32::INFINITY);
+        for_each_plane!(mask, bit, {
+            let (plane, upper) = (volume.plane_of_bit(bit), volume.upper_of_bit(bit));
+            let value = values_at(isa, plane, self.corner_rows(upper));
+            lowest = isa.lower(value, lowest);
+        });
+        !isa.below_zero(lowest)
     }
 
+    /// [`BoxBlock::admitted_by`] for nodes: also which planes stay open below
+    /// each lane. A lane's word is `mask` without the planes that hold the
+    /// whole box ([`Plane::contains`]).
     #[inline(always)]
-    fn p_vertex_values(&self, plane: &Plane, upper: Upper, values: &mut [f32; LANES]) {
-        let n = plane.normal;
-        let [x, y, z] = self.far_rows(upper);
-        for lane in 0..LANES {
-            values[lane] = ((n.x * x[lane] + n.y * y[lane]) + n.z * z[lane]) + plane.d;
-        }
+    pub fn sorted_by<I: Isa>(
+        &self,
+        isa: I,
+        volume: &ConvexVolume,
+        mask: PlaneMask,
+    ) -> (LaneMask, I::Words) {
+        let mut lowest = isa.splat(f32::INFINITY);
+        let mut open = isa.splat_word(mask);
+        for_each_plane!(mask, bit, {
+            let (plane, upper) = (volume.plane_of_bit(bit), volume.upper_of_bit(bit));
+            let farthest = values_at(isa, plane, self.corner_rows(upper));
+            lowest = isa.lower(farthest, lowest);
+            let nearest = values_at(isa, plane, self.corner_rows(upper.map(|up| !up)));
+            open = isa.without(open, nearest, 1 << bit);
+        });
+        (!isa.below_zero(lowest), open)
     }
 
-    /// The rows of the p-vertices: the same ones for every box, of the upper
-    /// bounds where `upper` says so.
+    /// The rows of one corner, the same one of every box: the upper bounds
+    /// where `upper` says so.
     #[inline(always)]
-    fn far_rows(&self, upper: Upper) -> [&[f32; LANES]; 3] {
+    fn corner_rows(&self, upper: Upper) -> [&[f32; LANES]; 3] {
         let row = |k: usize| &self.rows[k + 3 * usize::from(upper[k])];
         [row(0), row(1), row(2)]
     }
@@ -102,7 +190,7 @@ impl BoxBlock {
         let mut lowest = [f64::INFINITY; LANES];
         for (plane, upper) in planes {
             let n = plane.normal;
-            let [x, y, z] = self.far_rows(upper);
+            let [x, y, z] = self.corner_rows(upper);
             for lane in 0..LANES {
                 let [x, y, z] = [x, y, z].map(|row| f64::from(row[lane]));
                 let value = ((n.x * x + n.y * y) + n.z * z) + plane.d;
@@ -144,8 +232,7 @@ impl BoxBlock {
         let [x, y, z, radius, reach] = balls;
         let mut dropped = [0; LANES];
         for (plane, upper, margin) in planes {
-            let mut far = [0.0; LANES];
-            self.p_vertex_values(plane, upper, &mut far);
+            let far = values_at(Plain, plane, self.corner_rows(upper));
             for lane in 0..LANES {
                 let ball = Ball {
                     centre: Vec3::new(x[lane], y[lane], z[lane]),
@@ -205,21 +292,13 @@ const LANE_BITS: [u32; LANES] = {
     bits
 };
 
+/// [`Plane::value_at`] of sixteen corners, given as rows.
 #[inline(always)]
-fn below_zero(values: &[f32; LANES]) -> LaneMask {
-    // Most blocks are excluded whole: one look at the vector, not one a lane.
-    if values.iter().fold(true, |all, value| all & (*value < 0.0)) {
-        return LaneMask::MAX;
-    }
-    let mut below = [0; LANES];
-    for lane in 0..LANES {
-        below[lane] = if values[lane] < 0.0 {
-            LANE_BITS[lane]
-        } else {
-            0
-        };
-    }
-    joined(&below)
+fn values_at<I: Isa>(isa: I, plane: &Plane, [x, y, z]: [&[f32; LANES]; 3]) -> I::Floats {
+    let n = plane.normal;
+    let along = |n: f32, row: &[f32; LANES]| isa.mul(isa.splat(n), isa.load(row));
+    let sum = isa.add(isa.add(along(n.x, x), along(n.y, y)), along(n.z, z));
+    isa.add(sum, isa.splat(plane.d))
 }
 
 #[inline(always)]
@@ -308,6 +387,7 @@ pub fn lanes_of(at: usize, first: usize, end: usize) -> LaneMask {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::kernel::BASELINE;
     use proptest::prelude::*;
 
     /// Small integers (ties), anything normal (overflow), tiny, signed zero.
@@ -336,13 +416,14 @@ mod tests {
         ) {
             let planes: Vec<Plane> =
                 planes.into_iter().map(|(n, d)| Plane::new(Vec3::from_array(n), d)).collect();
+            let volume = ConvexVolume::from_planes(&planes).unwrap();
             let point = Vec3::from_array(point);
             let mut blocks = BoxBlocks::with_capacity(boxes.len());
             boxes.iter().for_each(|b| blocks.push(b));
             let (first, end) = (boxes.len() / 3, boxes.len());
             let mut seen = 0;
             for (start, lanes, block) in blocks.range(first, end) {
-                let admitted = block.admitted_by(planes.iter().map(|p| (p, p.upper())));
+                let admitted = block.admitted_by(BASELINE, &volume, volume.mask());
                 for lane in (0..LANES).filter(|lane| lanes >> lane & 1 == 1) {
                     let b = &boxes[start + lane];
                     seen += 1;

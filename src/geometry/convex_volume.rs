@@ -5,7 +5,8 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::{Aabb, Plane, Upper, WidePlane};
+use super::box_block::corner_rows;
+use super::{Aabb, Plane, RowMask, Upper, WidePlane};
 
 /// Largest number of planes of one volume: one bit each in a [`PlaneMask`].
 pub const MAX_PLANES: usize = 32;
@@ -89,6 +90,7 @@ pub struct ConvexVolume {
     count: usize,
     mask: PlaneMask,
     upper: [Upper; MAX_PLANES],
+    rows: [RowMask; MAX_PLANES],
 }
 
 impl ConvexVolume {
@@ -131,6 +133,7 @@ impl ConvexVolume {
             count,
             mask: 0,
             upper: [[true; 3]; MAX_PLANES],
+            rows: [0; MAX_PLANES],
         };
         for (index, (plane, name)) in planes.enumerate() {
             if !plane.is_finite() {
@@ -139,6 +142,7 @@ impl ConvexVolume {
             volume.planes[index] = plane;
             volume.names[index] = name;
             volume.upper[index] = plane.upper();
+            volume.rows[index] = corner_rows(plane.upper());
             volume.mask |= PlaneMask::from(!plane.is_trivial()) << index;
         }
         Ok(volume)
@@ -159,6 +163,13 @@ impl ConvexVolume {
     #[inline(always)]
     pub fn upper_of_bit(&self, index: u32) -> Upper {
         self.upper[index as usize % MAX_PLANES]
+    }
+
+    /// The rows of a [`BoxBlock`](super::BoxBlock) that a test of its boxes by
+    /// plane `index` reads, likewise.
+    #[inline(always)]
+    pub fn rows_of_bit(&self, index: u32) -> RowMask {
+        self.rows[index as usize % MAX_PLANES]
     }
 
     /// The plane of that name, if the volume has one.

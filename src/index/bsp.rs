@@ -11,6 +11,7 @@ use super::partition::{Part, Record, Splitter, build_top_down};
 use super::tree::{PackedTree, Stack, seen_by_tree};
 use super::{BuildError, MemoryUsage, RegionIndex, check_range, indexable};
 use crate::geometry::{Aabb, Plane, PlaneTree};
+use crate::kernel::BASELINE;
 use crate::query::{ItemId, Recorder, Sink};
 
 /// A binary space partition (Fuchs, Kedem and Naylor 1980, "On visible surface
@@ -407,7 +408,8 @@ impl RegionIndex for Bsp {
             while let Some(node) = nodes.get(at) {
                 recorder.node_tested();
                 if self.tree.is_leaf(at) {
-                    self.tree.test_items(node.items(), &p, (), sink, recorder)?;
+                    self.tree
+                        .test_items(BASELINE, node.items(), &p, (), sink, recorder)?;
                     break;
                 }
                 let split = &self.splits[at];

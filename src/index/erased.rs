@@ -7,10 +7,10 @@ use serde_json::{Map, Value};
 
 use super::{
     Bsp, BuildError, Bvh, FrustumQuery, Linear, LinearScalar, MemoryUsage, Octree, Quadtree,
-    RegionIndex,
+    RegionIndex, Wide,
 };
 use crate::geometry::{Aabb, ConvexVolume, PlaneTree};
-use crate::kernel::{Kernel, Work};
+use crate::kernel::{Isa, Kernel, Work};
 use crate::query::{AnyView, ItemId, NoRecorder, QueryCost, Recorder, View};
 use crate::spec::{Spec, SpecError};
 
@@ -75,9 +75,11 @@ impl<T: FrustumQuery, V: View, R: Recorder> Work for See<'_, T, V, R> {
     type Output = ();
 
     #[inline(always)]
-    fn run(self) {
+    fn run<I: Isa>(self, isa: I) {
         // A Vec never breaks off.
-        let _ = self.index.visible(self.view, self.out, self.recorder);
+        let _ = self
+            .index
+            .visible_by(isa, self.view, self.out, self.recorder);
     }
 }
 
@@ -93,7 +95,7 @@ impl<T: RegionIndex, R: Recorder> Work for Locate<'_, T, R> {
     type Output = ();
 
     #[inline(always)]
-    fn run(self) {
+    fn run<I: Isa>(self, _: I) {
         let _ = self.index.locate(self.p, self.out, self.recorder);
     }
 }
@@ -195,6 +197,7 @@ pub static BACKENDS: &[Backend] = &[
     Backend::of::<Octree>(),
     Backend::of::<Quadtree>(),
     Backend::of::<Bvh>(),
+    Backend::of::<Wide>(),
 ];
 
 /// A structure as asked for: a backend with its parameters.

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::tree::scan_blocks;
 use super::{BuildError, FrustumQuery, MemoryUsage, RegionIndex, indexable};
 use crate::geometry::{Aabb, BoxBlocks, PlaneTree};
+use crate::kernel::{BASELINE, Isa};
 use crate::query::{ItemId, Recorder, Region, Sink, View};
 
 /// A scan has nothing to choose.
@@ -93,14 +94,23 @@ pub struct Linear {
 
 impl Linear {
     #[inline(always)]
-    fn scan<G: Region, S: Sink, R: Recorder>(
+    fn scan<I: Isa, G: Region, S: Sink, R: Recorder>(
         &self,
+        isa: I,
         region: &G,
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()> {
         let blocks = self.boxes.range(0, self.ids.len());
-        scan_blocks(blocks, &self.ids, region, region.start(), sink, recorder)
+        scan_blocks(
+            isa,
+            blocks,
+            &self.ids,
+            region,
+            region.start(),
+            sink,
+            recorder,
+        )
     }
 }
 
@@ -130,7 +140,7 @@ impl RegionIndex for Linear {
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()> {
-        self.scan(&p, sink, recorder)
+        self.scan(BASELINE, &p, sink, recorder)
     }
 }
 
@@ -142,6 +152,17 @@ impl FrustumQuery for Linear {
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()> {
-        self.scan(view, sink, recorder)
+        self.visible_by(BASELINE, view, sink, recorder)
+    }
+
+    #[inline(always)]
+    fn visible_by<I: Isa, V: View, S: Sink, R: Recorder>(
+        &self,
+        isa: I,
+        view: &V,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        self.scan(isa, view, sink, recorder)
     }
 }

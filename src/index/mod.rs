@@ -2,6 +2,7 @@
 //! file beside this one and a row in [`BACKENDS`]; list, run, query, verify,
 //! benches and conformance tests pick it up from there.
 
+mod block_order;
 mod bsp;
 mod bvh;
 mod cells;
@@ -11,17 +12,21 @@ mod octree;
 mod partition;
 mod quadtree;
 mod quantised;
+mod replay;
 mod tree;
+mod wide;
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 
 use glam::Vec3;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::geometry::{Aabb, PlaneTree};
-use crate::query::{ItemId, Recorder, Sink, View};
+use crate::kernel::Isa;
+use crate::query::{ItemId, NoRecorder, Ranges, Recorder, Sink, View};
 
+pub use block_order::BlockOrder;
 pub use bsp::{Bsp, BspBuilder, BspParams};
 pub use bvh::{Bvh, BvhLayout, BvhParams, BvhPreset};
 pub use erased::{BACKENDS, Backend, DynIndex, StructureSpec, structures};
@@ -30,7 +35,9 @@ pub use octree::{CellParams, Octree};
 pub use partition::{Part, Record, Splitter, build_top_down};
 pub use quadtree::Quadtree;
 pub use quantised::{GridScope, Quantised, QuantisedParams};
+pub use replay::Trace;
 pub use tree::{PackedTree, TreeNode, TreeWriter, scan_blocks};
+pub use wide::{Wide, WideParams};
 
 /// Why an index could not be built.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
@@ -124,6 +131,35 @@ pub trait FrustumQuery: RegionIndex {
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()>;
+
+    /// [`FrustumQuery::visible`] with the vectors of an instruction set: what
+    /// [`DynIndex`] calls. A structure that has no use for them leaves it out.
+    #[inline(always)]
+    fn visible_by<I: Isa, V: View, S: Sink, R: Recorder>(
+        &self,
+        _: I,
+        view: &V,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        self.visible(view, sink, recorder)
+    }
+}
+
+/// A structure that keeps its items in an order of its own, and can answer with
+/// ranges of that order: for callers whose data lie in it too.
+pub trait TreeOrder: FrustumQuery {
+    /// Item ids in tree order.
+    fn ids(&self) -> &[ItemId];
+
+    /// [`FrustumQuery::visible`] as ranges of [`TreeOrder::ids`], appended to
+    /// `out`; together they hold each visible item once. Adjoining ranges that
+    /// follow each other are one.
+    #[inline(always)]
+    fn visible_ranges<V: View>(&self, view: &V, out: &mut Vec<Range<u32>>) {
+        // This sink never breaks off.
+        let _ = self.visible(view, &mut Ranges(out), &mut NoRecorder);
+    }
 }
 
 /// A parameter in its range, or the error that names both.

@@ -11,6 +11,7 @@ use super::tree::{PackedTree, scan_blocks};
 use super::{Bsp, BuildError, FrustumQuery, MemoryUsage, RegionIndex};
 use crate::geometry::quantised::{Code, CodeBlock, Grid};
 use crate::geometry::{Aabb, BoxBlock, LANES, LaneMask, PlaneTree, lanes_of};
+use crate::kernel::{BASELINE, Isa};
 use crate::query::{ItemId, Recorder, Region, Sink, View};
 
 /// What the codes count from.
@@ -99,17 +100,18 @@ impl Quantised {
     }
 
     #[inline(always)]
-    fn ask<G: Region, S: Sink, R: Recorder>(
+    fn ask<I: Isa, G: Region, S: Sink, R: Recorder>(
         &self,
+        isa: I,
         region: &G,
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()> {
         let test = |items: Range<usize>, memo, sink: &mut S, recorder: &mut R| {
             let blocks = self.blocks(items);
-            scan_blocks(blocks, self.tree.ids(), region, memo, sink, recorder)
+            scan_blocks(isa, blocks, self.tree.ids(), region, memo, sink, recorder)
         };
-        self.tree.query_leaves(region, sink, recorder, test)
+        self.tree.query_leaves(isa, region, sink, recorder, test)
     }
 }
 
@@ -176,7 +178,7 @@ impl RegionIndex for Quantised {
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()> {
-        self.ask(&p, sink, recorder)
+        self.ask(BASELINE, &p, sink, recorder)
     }
 }
 
@@ -188,7 +190,18 @@ impl FrustumQuery for Quantised {
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()> {
-        self.ask(view, sink, recorder)
+        self.visible_by(BASELINE, view, sink, recorder)
+    }
+
+    #[inline(always)]
+    fn visible_by<I: Isa, V: View, S: Sink, R: Recorder>(
+        &self,
+        isa: I,
+        view: &V,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        self.ask(isa, view, sink, recorder)
     }
 }
 

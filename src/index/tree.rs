@@ -7,6 +7,7 @@ use std::borrow::Borrow;
 use std::ops::{ControlFlow, Range};
 
 use crate::geometry::{Aabb, BoxBlock, BoxBlocks, LaneMask};
+use crate::kernel::Isa;
 use crate::query::{Containment, ItemId, Recorder, Region, Sink};
 
 use super::MemoryUsage;
@@ -160,23 +161,25 @@ impl PackedTree {
     /// its memo (for a view the mask of planes still open) for all nodes up
     /// to its end.
     #[inline(always)]
-    pub fn query<G: Region, S: Sink, R: Recorder>(
+    pub fn query<I: Isa, G: Region, S: Sink, R: Recorder>(
         &self,
+        isa: I,
         region: &G,
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()> {
         let test = |items, memo, sink: &mut S, recorder: &mut R| {
-            self.test_items(items, region, memo, sink, recorder)
+            self.test_items(isa, items, region, memo, sink, recorder)
         };
-        self.query_leaves(region, sink, recorder, test)
+        self.query_leaves(isa, region, sink, recorder, test)
     }
 
     /// [`PackedTree::query`] with the items of straddling leaves tested by the
     /// caller, who may keep their bounds in another form.
     #[inline(always)]
-    pub fn query_leaves<G: Region, S: Sink, R: Recorder>(
+    pub fn query_leaves<I: Isa, G: Region, S: Sink, R: Recorder>(
         &self,
+        isa: I,
         region: &G,
         sink: &mut S,
         recorder: &mut R,
@@ -200,7 +203,7 @@ impl PackedTree {
                 }
                 Containment::Inside => {
                     recorder.subtree_accepted(node.count as usize);
-                    sink.accept(&self.ids[node.items()])?;
+                    sink.accept_places(isa, &self.ids, node.items())?;
                     at = node.after;
                 }
                 Containment::Straddles => {
@@ -219,8 +222,9 @@ impl PackedTree {
 
     /// Tests items block by block and hands over runs of admitted ones.
     #[inline(always)]
-    pub fn test_items<G: Region, S: Sink, R: Recorder>(
+    pub fn test_items<I: Isa, G: Region, S: Sink, R: Recorder>(
         &self,
+        isa: I,
         items: Range<usize>,
         region: &G,
         memo: G::Memo,
@@ -228,7 +232,7 @@ impl PackedTree {
         recorder: &mut R,
     ) -> ControlFlow<()> {
         let blocks = self.boxes.range(items.start, items.end);
-        scan_blocks(blocks, &self.ids, region, memo, sink, recorder)
+        scan_blocks(isa, blocks, &self.ids, region, memo, sink, recorder)
     }
 
     /// Takes over the new bounds of moved items without changing the tree's
@@ -327,7 +331,8 @@ macro_rules! searched_by_tree {
             sink: &mut S,
             recorder: &mut R,
         ) -> std::ops::ControlFlow<()> {
-            self.tree.query(&p, sink, recorder)
+            self.tree
+                .query($crate::kernel::BASELINE, &p, sink, recorder)
         }
 
         fn refit(&mut self, items: &[Aabb], moved: &[$crate::query::ItemId]) -> bool {
@@ -352,7 +357,23 @@ macro_rules! seen_by_tree {
                 sink: &mut S,
                 recorder: &mut R,
             ) -> std::ops::ControlFlow<()> {
-                self.tree.query(view, sink, recorder)
+                self.visible_by($crate::kernel::BASELINE, view, sink, recorder)
+            }
+
+            #[inline(always)]
+            fn visible_by<
+                I: $crate::kernel::Isa,
+                V: $crate::query::View,
+                S: $crate::query::Sink,
+                R: $crate::query::Recorder,
+            >(
+                &self,
+                isa: I,
+                view: &V,
+                sink: &mut S,
+                recorder: &mut R,
+            ) -> std::ops::ControlFlow<()> {
+                self.tree.query(isa, view, sink, recorder)
             }
         }
     };
@@ -363,7 +384,8 @@ pub(super) use seen_by_tree;
 /// count) and hands over runs of admitted ones: the
 /// leaf test of every tree and the whole of the linear scan.
 #[inline(always)]
-pub fn scan_blocks<B: Borrow<BoxBlock>, G: Region, S: Sink, R: Recorder>(
+pub fn scan_blocks<I: Isa, B: Borrow<BoxBlock>, G: Region, S: Sink, R: Recorder>(
+    isa: I,
     blocks: impl Iterator<Item = (usize, LaneMask, B)>,
     ids: &[ItemId],
     region: &G,
@@ -375,13 +397,9 @@ pub fn scan_blocks<B: Borrow<BoxBlock>, G: Region, S: Sink, R: Recorder>(
         let tested = lanes.count_ones();
         recorder.items_tested(tested);
         recorder.planes_tested(tested * G::planes_open(memo));
-        let mut admitted = u32::from(region.admit_lanes(block.borrow(), memo) & lanes);
-        while admitted != 0 {
-            let from = admitted.trailing_zeros();
-            let run = (!(admitted >> from)).trailing_zeros();
-            let first = start + from as usize;
-            sink.accept(&ids[first..first + run as usize])?;
-            admitted &= !(((1 << run) - 1) << from);
+        let admitted = region.admit_lanes(isa, block.borrow(), memo) & lanes;
+        if admitted != 0 {
+            sink.accept_lanes(isa, ids, start, admitted)?;
         }
     }
     ControlFlow::Continue(())
@@ -432,6 +450,7 @@ impl<M: Copy> Stack<M> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::kernel::BASELINE;
     use crate::query::{Count, NoRecorder};
     use glam::Vec3;
 
@@ -465,11 +484,11 @@ mod tests {
         assert_eq!(tree.depth(), 100_001);
         let mut all = Count::default();
         let everything = Aabb::new(Vec3::splat(-1e9), Vec3::splat(1e9));
-        let _ = tree.query(&everything, &mut all, &mut NoRecorder);
+        let _ = tree.query(BASELINE, &everything, &mut all, &mut NoRecorder);
         assert_eq!(all.0, 100_000);
         for id in [0, 50_000, 99_999] {
             let mut found = Vec::new();
-            let _ = tree.query(&items[id].centre(), &mut found, &mut NoRecorder);
+            let _ = tree.query(BASELINE, &items[id].centre(), &mut found, &mut NoRecorder);
             assert_eq!(found, [id as ItemId]);
         }
     }

@@ -8,6 +8,7 @@ use serde::Serialize;
 use crate::camera::{Camera, CameraError, Frame, Lens, PlaneOptions, Surroundings};
 use crate::culling::{bounds, extended, silhouettes};
 use crate::geometry::{Aabb, BoxBlocks, MAX_PLANES, Spheres, WidePlane, WideVolume, sphere_cube};
+use crate::kernel::BASELINE;
 use crate::measure::Stopwatch;
 use crate::oracle::{Oracle, Pose, Verdict};
 use crate::query::{Region, View};
@@ -179,7 +180,7 @@ impl Tally {
         let watch = Stopwatch::start();
         let mask = view.start();
         for ((_, lanes, block), slot) in blocks.range(0, verdicts.len()).zip(&mut admitted) {
-            *slot = view.admit_lanes(block, mask) & lanes;
+            *slot = view.admit_lanes(BASELINE, block, mask) & lanes;
         }
         self.times[test].push(watch.lap().cpu_ns / verdicts.len() as f64);
         for (i, verdict) in verdicts.iter().enumerate() {

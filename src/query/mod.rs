@@ -9,7 +9,8 @@ mod view;
 
 pub use recorder::{NoRecorder, QueryCost, Recorder};
 pub use region::{Containment, Region};
-pub use sink::{Count, First, Sink};
+pub(crate) use sink::Ranges;
+pub use sink::{Count, First, Sink, runs};
 pub use view::{AnyView, View};
 
 /// An item's number: its zero-based place in the scene.

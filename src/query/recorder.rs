@@ -1,5 +1,6 @@
 //! What is counted while a query runs, and the recorder that counts nothing.
 
+use crate::geometry::RowMask;
 use serde::{Deserialize, Serialize};
 
 /// Counts what a query does. The calls of [`NoRecorder`] compile to nothing,
@@ -14,6 +15,10 @@ pub trait Recorder {
     /// Bounds of items were tested.
     #[inline(always)]
     fn items_tested(&mut self, _count: u32) {}
+    /// Rows of a block of bounds were read, by the block's place among all of
+    /// the structure's; only structures that can be replayed tell.
+    #[inline(always)]
+    fn block_read(&mut self, _block: usize, _rows: RowMask) {}
     /// A subtree was accepted whole: `items` ids that nobody tested.
     #[inline(always)]
     fn subtree_accepted(&mut self, _items: usize) {}

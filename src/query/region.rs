@@ -6,6 +6,7 @@ use glam::Vec3;
 
 use super::Recorder;
 use crate::geometry::{Aabb, BoxBlock, LaneMask};
+use crate::kernel::Isa;
 
 /// How a box lies to a region.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -47,7 +48,7 @@ pub trait Region {
 
     /// [`Region::admits`] for sixteen items at once, one bit each. Lanes that
     /// hold no item may come out either way.
-    fn admit_lanes(&self, block: &BoxBlock, memo: Self::Memo) -> LaneMask;
+    fn admit_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, memo: Self::Memo) -> LaneMask;
 
     /// How many planes a test with this memo evaluates.
     #[inline(always)]
@@ -72,7 +73,7 @@ impl Region for Vec3 {
         }
     }
     #[inline(always)]
-    fn admit_lanes(&self, block: &BoxBlock, _: ()) -> LaneMask {
+    fn admit_lanes<I: Isa>(&self, _: I, block: &BoxBlock, _: ()) -> LaneMask {
         block.holding(*self)
     }
 }
@@ -95,7 +96,7 @@ impl Region for Aabb {
         }
     }
     #[inline(always)]
-    fn admit_lanes(&self, block: &BoxBlock, _: ()) -> LaneMask {
+    fn admit_lanes<I: Isa>(&self, _: I, block: &BoxBlock, _: ()) -> LaneMask {
         block.meeting(self)
     }
 }

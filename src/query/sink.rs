@@ -1,20 +1,129 @@
 //! Where answers go: collect, count, or stop at the first one.
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 
 use super::ItemId;
+use crate::kernel::{Isa, LANES, LaneMask};
 
 /// Where answers go. A structure hands over slices: a subtree that is wholly
 /// inside is one call. Returning `Break` ends the query.
 pub trait Sink {
     fn accept(&mut self, ids: &[ItemId]) -> ControlFlow<()>;
+
+    /// The items at some places of a structure that keeps them in the order
+    /// of `ids`: `accept(&ids[places])`, for sinks that do without the ids.
+    #[inline(always)]
+    fn accept_places<I: Isa>(
+        &mut self,
+        _: I,
+        ids: &[ItemId],
+        places: Range<usize>,
+    ) -> ControlFlow<()> {
+        self.accept(&ids[places])
+    }
+
+    /// The items at the places `start + lane` of all lanes that are set, lowest
+    /// first: by default, run by run.
+    #[inline(always)]
+    fn accept_lanes<I: Isa>(
+        &mut self,
+        isa: I,
+        ids: &[ItemId],
+        start: usize,
+        lanes: LaneMask,
+    ) -> ControlFlow<()> {
+        for run in runs(lanes) {
+            self.accept_places(isa, ids, start + run.start..start + run.end)?;
+        }
+        ControlFlow::Continue(())
+    }
 }
+
+/// The runs of lanes that are set, lowest first.
+#[inline(always)]
+pub fn runs(lanes: LaneMask) -> impl Iterator<Item = Range<usize>> {
+    let mut left = u32::from(lanes);
+    std::iter::from_fn(move || {
+        if left == 0 {
+            return None;
+        }
+        let from = left.trailing_zeros();
+        let length = (!(left >> from)).trailing_zeros();
+        left &= !(((1 << length) - 1) << from);
+        Some(from as usize..(from + length) as usize)
+    })
+}
+
+/// Up to so many ids are copied block by block; more, as memory.
+const SHORT: usize = 16 * LANES;
 
 /// Collects all ids, in the structure's own order.
 impl Sink for Vec<ItemId> {
     #[inline(always)]
     fn accept(&mut self, ids: &[ItemId]) -> ControlFlow<()> {
         self.extend_from_slice(ids);
+        ControlFlow::Continue(())
+    }
+
+    /// Short runs without a call of memcpy, which costs more than they do.
+    #[inline(always)]
+    fn accept_places<I: Isa>(
+        &mut self,
+        isa: I,
+        ids: &[ItemId],
+        places: Range<usize>,
+    ) -> ControlFlow<()> {
+        let (blocks, rest) = ids[places.clone()].as_chunks();
+        if places.len() > SHORT || !rest.is_empty() {
+            return self.accept(&ids[places]);
+        }
+        for block in blocks {
+            isa.append(self, block, LaneMask::MAX);
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// All sixteen ids are read and the ones that count moved together.
+    #[inline(always)]
+    fn accept_lanes<I: Isa>(
+        &mut self,
+        isa: I,
+        ids: &[ItemId],
+        start: usize,
+        lanes: LaneMask,
+    ) -> ControlFlow<()> {
+        if let Some(block) = ids.get(start..).and_then(|ids| ids.first_chunk()) {
+            isa.append(self, block, lanes);
+            return ControlFlow::Continue(());
+        }
+        for run in runs(lanes) {
+            self.extend_from_slice(&ids[start + run.start..start + run.end]);
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+/// Where the answers lie in the structure's own order, without their ids;
+/// adjoining ranges are one. Only for structures that hand over places.
+pub(crate) struct Ranges<'a>(pub &'a mut Vec<Range<u32>>);
+
+impl Sink for Ranges<'_> {
+    fn accept(&mut self, _: &[ItemId]) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+
+    #[inline(always)]
+    fn accept_places<I: Isa>(
+        &mut self,
+        _: I,
+        _: &[ItemId],
+        places: Range<usize>,
+    ) -> ControlFlow<()> {
+        let (start, end) = (places.start as u32, places.end as u32);
+        match self.0.last_mut() {
+            Some(last) if last.end == start => last.end = end,
+            _ => self.0.push(start..end),
+        }
         ControlFlow::Continue(())
     }
 }

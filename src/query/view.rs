@@ -3,11 +3,12 @@
 //! of them share, and one type for any of them.
 
 use crate::geometry::{
-    Aabb, BoxBlock, ConvexVolume, LaneMask, Plane, PlaneMask, RelativeVolume, Spheres, Upper,
-    WideVolume,
+    ALL_ROWS, Aabb, BoxBlock, ConvexVolume, LANES, LaneMask, PlaneMask, RelativeVolume, RowMask,
+    Spheres, WideVolume,
 };
 
 use super::{Containment, NoRecorder, Recorder, Region};
+use crate::kernel::Isa;
 
 /// Up to 32 planes with a culling test of their own; every view is a
 /// [`Region`] whose memo is the mask of the planes that are still open.
@@ -39,7 +40,34 @@ pub trait View: Sized {
 
     /// The lanes that no plane of the mask drops: bit for bit
     /// [`View::drops`], lane by lane.
-    fn kept_lanes(&self, block: &BoxBlock, mask: PlaneMask) -> LaneMask;
+    fn kept_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask;
+
+    /// The rows of a block that [`View::kept_lanes`] reads, as far as it pays to
+    /// know: what is fetched ahead.
+    #[inline(always)]
+    fn rows_read(&self, _mask: PlaneMask) -> RowMask {
+        ALL_ROWS
+    }
+
+    /// Sixteen nodes at once: the lanes that no plane of the mask excludes, and
+    /// for each of them the planes that do not contain it, bit for bit
+    /// [`Region::classify`]. Lanes that are excluded have any word.
+    #[inline(always)]
+    fn sorted_lanes<I: Isa>(
+        &self,
+        isa: I,
+        block: &BoxBlock,
+        mask: PlaneMask,
+    ) -> (LaneMask, I::Words) {
+        let mut kept = 0;
+        let mut open = [mask; LANES];
+        for (lane, open) in open.iter_mut().enumerate() {
+            let (verdict, left) = self.classify(&block.get(lane), mask, &mut NoRecorder);
+            kept |= LaneMask::from(verdict != Containment::Outside) << lane;
+            *open = left;
+        }
+        (kept, isa.words(&open))
+    }
 
     /// Whether an item belongs to the answer: no plane drops it, and it is not
     /// empty. O(planes).
@@ -96,8 +124,8 @@ impl<V: View> Region for V {
     }
 
     #[inline(always)]
-    fn admit_lanes(&self, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
-        self.kept_lanes(block, mask)
+    fn admit_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
+        self.kept_lanes(isa, block, mask)
     }
 
     #[inline(always)]
@@ -122,8 +150,26 @@ impl View for ConvexVolume {
         self.plane_of_bit(plane).contains(bounds)
     }
     #[inline(always)]
-    fn kept_lanes(&self, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
-        block.admitted_by(planes_of(self, mask))
+    fn kept_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
+        block.admitted_by(isa, self, mask)
+    }
+    #[inline(always)]
+    fn rows_read(&self, mask: PlaneMask) -> RowMask {
+        // Two planes or fewer: the lowest and the highest bit. More read all.
+        let (lowest, highest) = (mask.trailing_zeros(), mask.checked_ilog2().unwrap_or(0));
+        if mask & !(1 << (lowest % 32)) & !(1 << highest) != 0 {
+            return ALL_ROWS;
+        }
+        self.rows_of_bit(lowest) | self.rows_of_bit(highest)
+    }
+    #[inline(always)]
+    fn sorted_lanes<I: Isa>(
+        &self,
+        isa: I,
+        block: &BoxBlock,
+        mask: PlaneMask,
+    ) -> (LaneMask, I::Words) {
+        block.sorted_by(isa, self, mask)
     }
 }
 
@@ -148,7 +194,7 @@ impl View for Spheres {
         self.drops(plane, item)
     }
     #[inline(always)]
-    fn kept_lanes(&self, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
+    fn kept_lanes<I: Isa>(&self, _: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
         block.admitted_as_spheres(Bits(mask).map(|index| {
             let (plane, margin) = self.plane_of_bit(index);
             (plane, self.planes().upper_of_bit(index), margin)
@@ -172,7 +218,7 @@ impl View for WideVolume {
         self.plane_of_bit(plane).contains(bounds)
     }
     #[inline(always)]
-    fn kept_lanes(&self, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
+    fn kept_lanes<I: Isa>(&self, _: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
         let planes = Bits(mask).map(|plane| (self.plane_of_bit(plane), self.upper_of_bit(plane)));
         block.admitted_by_wide(planes)
     }
@@ -197,9 +243,19 @@ impl View for RelativeVolume {
         planes.plane_of_bit(plane).contains(&self.moved(bounds))
     }
     #[inline(always)]
-    fn kept_lanes(&self, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
+    fn kept_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
         let moved = block.relative_to(self.eye());
-        moved.admitted_by(planes_of(self.planes(), mask))
+        moved.admitted_by(isa, self.planes(), mask)
+    }
+    #[inline(always)]
+    fn sorted_lanes<I: Isa>(
+        &self,
+        isa: I,
+        block: &BoxBlock,
+        mask: PlaneMask,
+    ) -> (LaneMask, I::Words) {
+        let moved = block.relative_to(self.eye());
+        moved.sorted_by(isa, self.planes(), mask)
     }
 }
 
@@ -236,12 +292,6 @@ macro_rules! any_view_of {
 }
 any_view_of!(Volume: ConvexVolume, Spheres: Spheres, Wide: WideVolume, Relative: RelativeVolume);
 
-/// The planes of a mask as the kernels for blocks take them.
-#[inline(always)]
-fn planes_of(volume: &ConvexVolume, mask: PlaneMask) -> impl Iterator<Item = (&Plane, Upper)> {
-    Bits(mask).map(|plane| (volume.plane_of_bit(plane), volume.upper_of_bit(plane)))
-}
-
 /// The bits that are set, lowest first.
 struct Bits(PlaneMask);
 
@@ -262,7 +312,8 @@ impl Iterator for Bits {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{BoxBlocks, sphere_cube};
+    use crate::geometry::{BoxBlocks, Plane, sphere_cube};
+    use crate::kernel::{BASELINE, Plain};
     use glam::Vec3;
     use proptest::prelude::*;
 
@@ -304,9 +355,17 @@ mod tests {
         let mut blocks = BoxBlocks::with_capacity(items.len());
         items.iter().for_each(|b| blocks.push(b));
         for (start, lanes, block) in blocks.range(0, items.len()) {
-            let (all, open) = (view.kept_lanes(block, mask), view.kept_lanes(block, left));
+            let (all, open) = (
+                view.kept_lanes(BASELINE, block, mask),
+                view.kept_lanes(BASELINE, block, left),
+            );
+            let (passed, words) = view.sorted_lanes(Plain, block, mask);
             for lane in (0..16).filter(|lane| lanes >> lane & 1 == 1) {
                 let item = &items[start + lane];
+                let (verdict_here, left_here) = view.classify(item, mask, &mut NoRecorder);
+                let outside = verdict_here == Containment::Outside;
+                prop_assert_eq!(passed >> lane & 1 == 0, outside);
+                prop_assert!(outside || words[lane] == left_here);
                 let seen = view.sees(item);
                 prop_assert_eq!(all >> lane & 1 == 1, seen, "lane {} of {:?}", lane, item);
                 if verdict != Containment::Outside {

@@ -7,9 +7,28 @@
 //! test relies on it.
 #![allow(unsafe_code)]
 
+mod isa;
+#[cfg(target_arch = "x86_64")]
+mod x86;
+
 use std::fmt;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU8, Ordering};
+
+pub use isa::{Isa, LANES, LaneMask, Plain};
+
+/// The instruction set that the program was compiled for, with no need to ask
+/// the processor.
+#[cfg(target_arch = "x86_64")]
+pub type Baseline = x86::Sse2;
+#[cfg(not(target_arch = "x86_64"))]
+pub type Baseline = Plain;
+
+/// What the program was compiled for, for callers without a [`Kernel`].
+#[cfg(target_arch = "x86_64")]
+pub const BASELINE: Baseline = x86::Sse2;
+#[cfg(not(target_arch = "x86_64"))]
+pub const BASELINE: Baseline = Plain;
 
 /// An instruction set that queries are compiled for.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
@@ -22,14 +41,15 @@ pub enum Kernel {
     Avx512,
 }
 
-/// A piece of work that [`Kernel::run`] compiles for each instruction set.
+/// A piece of work that [`Kernel::run`] compiles for each instruction set, whose
+/// vectors it is given as `isa`.
 ///
 /// `run` and all that is hot in it must be `#[inline(always)]`: what stays a
 /// call of its own was compiled for the portable set.
 pub trait Work {
     type Output;
 
-    fn run(self) -> Self::Output;
+    fn run<I: Isa>(self, isa: I) -> Self::Output;
 }
 
 /// Why a kernel cannot be chosen.
@@ -135,7 +155,7 @@ impl Kernel {
             }
             _ => {}
         }
-        work.run()
+        work.run(BASELINE)
     }
 }
 
@@ -162,13 +182,13 @@ pub fn prefetch<T>(place: &T) {
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
 fn avx2<W: Work>(work: W) -> W::Output {
-    work.run()
+    work.run(x86::Avx2::here())
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512vl,avx512bw,avx512dq,avx2,bmi1,bmi2,lzcnt,popcnt")]
 fn avx512<W: Work>(work: W) -> W::Output {
-    work.run()
+    work.run(x86::Avx512::here())
 }
 
 #[cfg(test)]
@@ -192,8 +212,13 @@ mod tests {
         type Output = [f32; 16];
 
         #[inline(always)]
-        fn run(self) -> [f32; 16] {
-            std::array::from_fn(|lane| self.0[lane] * self.1[lane] + self.2[lane])
+        fn run<I: Isa>(self, isa: I) -> [f32; 16] {
+            let product = isa.mul(isa.load(self.0), isa.load(self.1));
+            let sum = isa.to_array(isa.add(product, isa.load(self.2)));
+            let plain: [f32; 16] =
+                std::array::from_fn(|lane| self.0[lane] * self.1[lane] + self.2[lane]);
+            assert_eq!(sum.map(f32::to_bits), plain.map(f32::to_bits));
+            sum
         }
     }
 

@@ -1,0 +1,220 @@
+//! Orders items so that every run of 16^k of them, from a multiple of 16^k on,
+//! is a compact group: what an implicit tree of blocks is built on. By medians
+//! that fall on block boundaries, or by Morton codes, which is quicker to make
+//! and slower to ask.
+
+use serde::{Deserialize, Serialize};
+
+use crate::geometry::{Aabb, LANES};
+use crate::query::ItemId;
+
+/// How items are brought into order.
+#[derive(Clone, Copy, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum BlockOrder {
+    /// Halved at the median of the widest axis, again and again, always at a
+    /// multiple of the block size that the half is made of.
+    #[default]
+    Median,
+    /// Sorted along the Morton curve of the centres.
+    Morton,
+}
+
+/// A centre on its way into order, its coordinates as integers of the same
+/// order.
+#[derive(Clone, Copy)]
+struct Point {
+    at: [i32; 3],
+    id: ItemId,
+}
+
+/// The ids in block order. Deterministic. O(n log n).
+pub fn block_ordered(items: &[Aabb], mut ids: Vec<ItemId>, order: BlockOrder) -> Vec<ItemId> {
+    match order {
+        BlockOrder::Median => by_medians(items, &mut ids),
+        BlockOrder::Morton => by_morton(items, &mut ids),
+    }
+    ids
+}
+
+/// An integer that compares as the number does ([`f32::total_cmp`]).
+fn ordered(x: f32) -> i32 {
+    let bits = x.to_bits() as i32;
+    bits ^ (((bits >> 31) as u32) >> 1) as i32
+}
+
+/// The number again.
+fn number(key: i32) -> f32 {
+    f32::from_bits((key ^ (((key >> 31) as u32) >> 1) as i32) as u32)
+}
+
+fn by_medians(items: &[Aabb], ids: &mut [ItemId]) {
+    let point = |&id: &ItemId| Point {
+        at: items[id as usize].centre().to_array().map(ordered),
+        id,
+    };
+    let mut points: Vec<Point> = ids.iter().map(point).collect();
+    // The largest power of sixteen below the number of points.
+    let mut unit = LANES;
+    while unit * LANES < points.len() {
+        unit *= LANES;
+    }
+    let mut open = vec![(&mut points[..], unit)];
+    while let Some((group, mut unit)) = open.pop() {
+        while group.len() <= unit && unit > LANES {
+            unit /= LANES;
+        }
+        let units = group.len().div_ceil(unit);
+        if units <= 1 {
+            continue;
+        }
+        let middle = (units / 2) * unit;
+        let axis = widest_axis(group);
+        group.select_nth_unstable_by_key(middle, |point| point.at[axis]);
+        let (low, high) = group.split_at_mut(middle);
+        open.push((high, unit));
+        open.push((low, unit));
+    }
+    for (id, point) in ids.iter_mut().zip(&points) {
+        *id = point.id;
+    }
+}
+
+fn widest_axis(points: &[Point]) -> usize {
+    let (mut low, mut high) = ([i32::MAX; 3], [i32::MIN; 3]);
+    for point in points {
+        for axis in 0..3 {
+            low[axis] = low[axis].min(point.at[axis]);
+            high[axis] = high[axis].max(point.at[axis]);
+        }
+    }
+    let width = |axis: usize| number(high[axis]) - number(low[axis]);
+    let wider = |a: usize, b: usize| if width(b) > width(a) { b } else { a };
+    wider(wider(0, 1), 2)
+}
+
+/// Bits an axis of a Morton code.
+const BITS: u32 = 16;
+
+/// Morton codes (Morton 1966, "A computer oriented geodetic data base") of the
+/// centres within their own bounds, 16 bits an axis.
+fn by_morton(items: &[Aabb], ids: &mut [ItemId]) {
+    let centre = |id: ItemId| items[id as usize].centre();
+    let bounds = ids.iter().fold(Aabb::EMPTY, |bounds, &id| {
+        bounds.union(&Aabb::new(centre(id), centre(id)))
+    });
+    let cells = (1u32 << BITS) as f32;
+    // In halves, so that the width of a scene of all numbers stays finite.
+    let half = bounds.max * 0.5 - bounds.min * 0.5;
+    let code = |id: ItemId| {
+        let from = (centre(id) * 0.5 - bounds.min * 0.5) / half * cells;
+        // A width of zero gives NaN, which becomes zero, as does all below.
+        let cell = from.to_array().map(|x| (x as u64).min((1 << BITS) - 1));
+        spread(cell[0]) | spread(cell[1]) << 1 | spread(cell[2]) << 2
+    };
+    let keyed = ids.iter().map(|&id| (code(id), id)).collect();
+    for (id, (_, sorted)) in ids.iter_mut().zip(sorted_by_radix(keyed)) {
+        *id = sorted;
+    }
+}
+
+/// Sorts by code, equal ones in the order given: least significant digit
+/// first, twelve bits a digit (Knuth, TAOCP 3, 5.2.5). O(n).
+fn sorted_by_radix(mut from: Vec<(u64, ItemId)>) -> Vec<(u64, ItemId)> {
+    const DIGIT: u32 = 12;
+    let mut to = vec![(0, 0); from.len()];
+    for shift in (0..3 * BITS).step_by(DIGIT as usize) {
+        let digit = |code: u64| (code >> shift) as usize % (1 << DIGIT);
+        let mut starts = vec![0; 1 << DIGIT];
+        for &(code, _) in &from {
+            starts[digit(code)] += 1;
+        }
+        let mut next = 0;
+        for start in &mut starts {
+            next += std::mem::replace(start, next);
+        }
+        for &entry in &from {
+            let place = &mut starts[digit(entry.0)];
+            to[*place] = entry;
+            *place += 1;
+        }
+        std::mem::swap(&mut from, &mut to);
+    }
+    from
+}
+
+/// Two zero bits behind each of the low 16 bits.
+fn spread(x: u64) -> u64 {
+    let x = (x | x << 16) & 0x0000_0000_ff00_00ff;
+    let x = (x | x << 8) & 0x0000_00f0_0f00_f00f;
+    let x = (x | x << 4) & 0x0000_0c30_c30c_30c3;
+    (x | x << 2) & 0x0000_2492_4924_9249
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+
+    #[test]
+    fn codes_interleave_the_bits() {
+        for x in 0..1 << BITS {
+            let bits = (0..BITS).map(|i| (x >> i & 1) << (3 * i));
+            assert_eq!(spread(x), bits.sum::<u64>());
+        }
+    }
+
+    #[test]
+    fn keys_compare_as_the_numbers_do_and_come_back() {
+        let numbers = [f32::MIN, -1.0, -1e-45, -0.0, 0.0, 1e-45, 2.5, f32::MAX];
+        assert!(numbers.map(ordered).is_sorted());
+        for x in numbers {
+            assert_eq!(number(ordered(x)).to_bits(), x.to_bits());
+        }
+    }
+
+    /// A grid, shuffled; and what no order can be made of.
+    fn scenes() -> [Vec<Aabb>; 4] {
+        let at = |x: u32, y: u32, z: u32| {
+            Aabb::around(Vec3::new(x as f32, y as f32, z as f32), Vec3::splat(0.4))
+        };
+        let grid: Vec<Aabb> = (0..4096u32)
+            .map(|i| i.wrapping_mul(2_654_435_761) % 4096)
+            .map(|i| at(i % 16, i / 16 % 16, i / 256))
+            .collect();
+        let huge = [-3e38, 3e38].map(|x| Aabb::around(Vec3::splat(x), Vec3::ZERO));
+        let same = vec![at(1, 1, 1); 300];
+        [grid, same, huge.repeat(20), Vec::new()]
+    }
+
+    #[test]
+    fn every_order_holds_each_item_once() {
+        for order in [BlockOrder::Median, BlockOrder::Morton] {
+            for items in scenes() {
+                let ids: Vec<ItemId> = (0..items.len() as ItemId).collect();
+                let mut ordered = block_ordered(&items, ids.clone(), order);
+                ordered.sort_unstable();
+                assert_eq!(ordered, ids);
+            }
+        }
+    }
+
+    #[test]
+    fn blocks_of_a_grid_are_compact() {
+        let items = &scenes()[0];
+        let size = |ids: &[ItemId]| {
+            let union = ids
+                .iter()
+                .fold(Aabb::EMPTY, |all, &id| all.union(&items[id as usize]));
+            union.extent().element_product()
+        };
+        for order in [BlockOrder::Median, BlockOrder::Morton] {
+            let ids = block_ordered(items, (0..4096).collect(), order);
+            for block in [16, 256] {
+                // A perfect block of the grid is as many cells.
+                let worst = ids.chunks(block).map(size).fold(0.0, f32::max);
+                assert!(worst <= 1.01 * block as f32, "{order:?}: {worst}");
+            }
+        }
+    }
+}

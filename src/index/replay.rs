@@ -1,0 +1,133 @@
+//! Oracle replay: what a query of the wide tree read and copied, done again
+//! without a single decision. A bound that no traversal of the same blocks can
+//! beat; nobody answers queries with it.
+
+use std::ops::{ControlFlow, Range};
+
+use super::wide::Wide;
+use super::{FrustumQuery, TreeOrder};
+use crate::geometry::{BoxBlock, LaneMask, RowMask};
+use crate::kernel::{Isa, Kernel, Work, prefetch};
+use crate::query::{ItemId, Recorder, Sink, View};
+
+/// What one query read and handed over, in its own order.
+#[derive(Clone, Default, Debug)]
+pub struct Trace {
+    reads: Vec<(u32, RowMask)>,
+    runs: Vec<Range<u32>>,
+    /// What was handed over of the leaves, which are the last of the reads.
+    leaves: Vec<(u32, LaneMask)>,
+}
+
+struct Reads<'a>(&'a mut Vec<(u32, RowMask)>);
+
+impl Recorder for Reads<'_> {
+    fn block_read(&mut self, block: usize, rows: RowMask) {
+        self.0.push((block as u32, rows));
+    }
+}
+
+struct Hands<'a> {
+    runs: &'a mut Vec<Range<u32>>,
+    leaves: &'a mut Vec<(u32, LaneMask)>,
+}
+
+impl Sink for Hands<'_> {
+    fn accept(&mut self, _: &[ItemId]) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+    fn accept_places<I: Isa>(
+        &mut self,
+        _: I,
+        _: &[ItemId],
+        places: Range<usize>,
+    ) -> ControlFlow<()> {
+        self.runs.push(places.start as u32..places.end as u32);
+        ControlFlow::Continue(())
+    }
+    fn accept_lanes<I: Isa>(
+        &mut self,
+        _: I,
+        _: &[ItemId],
+        start: usize,
+        lanes: LaneMask,
+    ) -> ControlFlow<()> {
+        self.leaves.push((start as u32, lanes));
+        ControlFlow::Continue(())
+    }
+}
+
+impl Trace {
+    /// Records one query.
+    pub fn of<V: View>(tree: &Wide, view: &V) -> Trace {
+        let mut trace = Trace::default();
+        let mut hands = Hands {
+            runs: &mut trace.runs,
+            leaves: &mut trace.leaves,
+        };
+        // This sink never breaks off.
+        let _ = tree.visible(view, &mut hands, &mut Reads(&mut trace.reads));
+        trace
+    }
+
+    /// Reads what the query read and appends what it answered.
+    pub fn replay(&self, tree: &Wide, out: &mut Vec<ItemId>) {
+        Kernel::chosen().run(Again {
+            trace: self,
+            blocks: tree.blocks(),
+            ids: tree.ids(),
+            out,
+        });
+    }
+}
+
+struct Again<'a> {
+    trace: &'a Trace,
+    blocks: &'a [BoxBlock],
+    ids: &'a [ItemId],
+    out: &'a mut Vec<ItemId>,
+}
+
+/// As far ahead as the traversal itself asks for memory.
+const AHEAD: usize = super::wide::AHEAD;
+
+impl Work for Again<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) {
+        let Trace {
+            reads,
+            runs,
+            leaves,
+        } = self.trace;
+        let (above, below) = reads.split_at(reads.len() - leaves.len());
+        let fetch = |reads: &[(u32, RowMask)], i: usize| {
+            if let Some(&(block, rows)) = reads.get(i + AHEAD)
+                && let Some(block) = self.blocks.get(block as usize)
+            {
+                block.prefetch(rows);
+            }
+        };
+        let mut seen = 0;
+        for (i, &(block, rows)) in above.iter().enumerate() {
+            fetch(above, i);
+            seen |= self.blocks[block as usize].touch(isa, rows);
+        }
+        for run in runs {
+            let places = run.start as usize..run.end as usize;
+            let _ = self.out.accept_places(isa, self.ids, places);
+        }
+        for (i, (&(block, rows), &(start, lanes))) in below.iter().zip(leaves).enumerate() {
+            fetch(below, i);
+            if let Some(&(next, _)) = leaves.get(i + AHEAD)
+                && let Some(id) = self.ids.get(next as usize)
+            {
+                prefetch(id);
+            }
+            seen |= self.blocks[block as usize].touch(isa, rows);
+            let _ = self.out.accept_lanes(isa, self.ids, start as usize, lanes);
+        }
+        std::hint::black_box(seen);
+    }
+}

@@ -1,0 +1,432 @@
+//! The wide tree: sixteen children a node, no pointers, one block of 384 bytes
+//! for each node and each leaf. It owns the layout and the traversal, level by
+//! level; the order of the items is made next door (`block_order`), and the
+//! tests of a block are the view's.
+
+use std::cell::Cell;
+use std::ops::{ControlFlow, Range};
+
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use super::block_order::{BlockOrder, block_ordered};
+use super::{BuildError, FrustumQuery, MemoryUsage, RegionIndex, TreeOrder, indexable};
+use crate::geometry::{ALL_ROWS, Aabb, BoxBlock, LANES, LaneMask, PlaneMask, PlaneTree};
+use crate::kernel::{BASELINE, Isa, prefetch};
+use crate::query::{ItemId, Recorder, Region, Sink, View, runs};
+
+/// Parameters: `wide:order=median`.
+#[derive(Clone, Copy, Default, Debug, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct WideParams {
+    /// How items come into tree order: `median` or `morton`.
+    pub order: BlockOrder,
+}
+
+/// Levels of a tree over 2^32 items.
+const MOST_LEVELS: usize = 8;
+
+/// An implicit tree of sixteen-fold blocks over items in tree order.
+///
+/// Level 0 are the items themselves, sixteen a block; lane `l` of block `b` on
+/// level `k` bounds block `16 b + l` of level `k - 1`, and with it the items
+/// from `(16 b + l) 16^k` on. 25.6 bytes of blocks and 4 of id an item.
+#[derive(Default)]
+pub struct Wide {
+    blocks: Vec<BoxBlock>,
+    /// Item ids in tree order.
+    ids: Vec<ItemId>,
+    /// Lowest level first.
+    levels: Vec<Level>,
+    /// Place of each item in tree order, made when first needed.
+    place_of: Vec<u32>,
+}
+
+/// Where a level lies among the blocks.
+#[derive(Clone, Copy, Debug)]
+struct Level {
+    first: usize,
+    blocks: usize,
+    /// Boxes in these blocks; only the last block has lanes without one.
+    boxes: usize,
+}
+
+impl Level {
+    /// The lanes of a block that hold a box.
+    #[inline(always)]
+    fn lanes(&self, block: usize) -> LaneMask {
+        if block + 1 < self.blocks {
+            LaneMask::MAX
+        } else {
+            LaneMask::MAX >> (self.blocks * LANES - self.boxes)
+        }
+    }
+}
+
+/// Blocks of one level that are still to be looked at, each with the planes
+/// that its ancestors have left open.
+#[derive(Default)]
+struct Frontier {
+    /// Longer than what is used, so that sixteen lanes can always be stored.
+    blocks: Vec<u32>,
+    open: Vec<PlaneMask>,
+    used: usize,
+}
+
+impl Frontier {
+    /// Empties it and makes room for the children of so many blocks.
+    fn clear(&mut self, blocks: usize) {
+        self.used = 0;
+        let room = (blocks + 1) * LANES;
+        if self.blocks.len() < room {
+            self.blocks.resize(room, 0);
+            self.open.resize(room, 0);
+        }
+    }
+
+    /// Adds those lanes of a block, whose first has the number `first`.
+    #[inline(always)]
+    fn push<I: Isa>(&mut self, isa: I, first: u32, open: I::Words, lanes: LaneMask) {
+        let places = (
+            self.blocks[self.used..].first_chunk_mut(),
+            self.open[self.used..].first_chunk_mut(),
+        );
+        if let (Some(blocks), Some(masks)) = places {
+            isa.pack(blocks, isa.counting(first), lanes);
+            isa.pack(masks, open, lanes);
+            self.used += lanes.count_ones() as usize;
+        }
+    }
+
+    #[inline(always)]
+    fn entries(&self) -> (&[u32], &[PlaneMask]) {
+        (&self.blocks[..self.used], &self.open[..self.used])
+    }
+}
+
+/// The memory of a traversal: two frontiers, kept between queries.
+#[derive(Default)]
+struct Scratch {
+    here: Frontier,
+    below: Frontier,
+}
+
+thread_local! {
+    static SCRATCH: Cell<Option<Box<Scratch>>> = const { Cell::new(None) };
+}
+
+/// So many blocks ahead their memory is asked for: enough to hide a cache
+/// miss, and not so many that lines are gone before their turn.
+pub(super) const AHEAD: usize = 12;
+
+impl Wide {
+    fn over(items: &[Aabb], ids: Vec<ItemId>) -> Wide {
+        let mut tree = Wide {
+            ids,
+            ..Wide::default()
+        };
+        let count = tree.ids.len();
+        if count == 0 {
+            return tree;
+        }
+        let mut boxes = count;
+        loop {
+            let blocks = boxes.div_ceil(LANES);
+            let first = tree.levels.last().map_or(0, |l: &Level| l.first + l.blocks);
+            tree.levels.push(Level {
+                first,
+                blocks,
+                boxes,
+            });
+            if blocks == 1 {
+                break;
+            }
+            boxes = blocks;
+        }
+        let total = tree.levels.iter().map(|l| l.blocks).sum();
+        tree.blocks = Vec::with_capacity(total);
+        for ids in tree.ids.chunks(LANES) {
+            let mut block = BoxBlock::EMPTY;
+            for (lane, &id) in ids.iter().enumerate() {
+                block.set(lane, &items[id as usize]);
+            }
+            tree.blocks.push(block);
+        }
+        for level in 1..tree.levels.len() {
+            let below = tree.levels[level - 1];
+            for first in (0..below.blocks).step_by(LANES) {
+                let mut block = BoxBlock::EMPTY;
+                for (lane, child) in (first..below.blocks.min(first + LANES)).enumerate() {
+                    block.set(lane, &tree.blocks[below.first + child].union());
+                }
+                tree.blocks.push(block);
+            }
+        }
+        tree
+    }
+
+    /// Levels of blocks; 0 for no items.
+    pub fn depth(&self) -> usize {
+        self.levels.len()
+    }
+
+    /// All blocks, leaves first.
+    #[inline(always)]
+    pub(super) fn blocks(&self) -> &[BoxBlock] {
+        &self.blocks
+    }
+
+    #[inline(always)]
+    fn blocks_of(&self, level: &Level) -> &[BoxBlock] {
+        &self.blocks[level.first..level.first + level.blocks]
+    }
+
+    /// Hands every item that the view sees to the sink: level by level, runs of
+    /// items that are wholly inside first, then what is left of the leaves.
+    ///
+    /// A block at a time: its children are sorted into outside, inside and
+    /// undecided; what is undecided comes into the next level's frontier with
+    /// the planes that are left. Level by level, so that the blocks to come are
+    /// known and can be fetched ahead.
+    #[inline(always)]
+    fn search<I: Isa, V: View, S: Sink, R: Recorder>(
+        &self,
+        isa: I,
+        view: &V,
+        sink: &mut S,
+        recorder: &mut R,
+        scratch: &mut Scratch,
+    ) -> ControlFlow<()> {
+        let Scratch { here, below } = scratch;
+        let Some((leaves, inner)) = self.levels.split_first() else {
+            return ControlFlow::Continue(());
+        };
+        if view.mask() == 0 {
+            recorder.subtree_accepted(self.ids.len());
+            return sink.accept_places(isa, &self.ids, 0..self.ids.len());
+        }
+        here.clear(1);
+        here.push(isa, 0, isa.splat_word(view.mask()), 1);
+        for (height, level) in inner.iter().enumerate().rev() {
+            let (places, masks) = here.entries();
+            below.clear(places.len());
+            let blocks = self.blocks_of(level);
+            // Items below one lane.
+            let span = LANES << (height * LANES.ilog2() as usize);
+            let mut run = 0..0;
+            for (i, (&at, &mask)) in places.iter().zip(masks).enumerate() {
+                if let Some(&next) = places.get(i + AHEAD) {
+                    if let Some(block) = blocks.get(next as usize) {
+                        block.prefetch(ALL_ROWS);
+                    }
+                }
+                let at = at as usize;
+                let lanes = level.lanes(at);
+                count_nodes(recorder, lanes, mask);
+                recorder.block_read(level.first + at, ALL_ROWS);
+                let (kept, open) = view.sorted_lanes(isa, &blocks[at], mask);
+                let kept = kept & lanes;
+                let inside = isa.zeros(open) & kept;
+                let undecided = kept & !inside;
+                let first = at * LANES;
+                below.push(isa, first as u32, open, undecided);
+                for lanes in runs(inside) {
+                    let start = (first + lanes.start) * span;
+                    let end = ((first + lanes.end) * span).min(self.ids.len());
+                    if start == run.end {
+                        run.end = end;
+                    } else {
+                        self.hand_over(isa, run, sink, recorder)?;
+                        run = start..end;
+                    }
+                }
+            }
+            self.hand_over(isa, run, sink, recorder)?;
+            std::mem::swap(here, below);
+        }
+        let blocks = self.blocks_of(leaves);
+        let (places, masks) = here.entries();
+        for (i, (&at, &mask)) in places.iter().zip(masks).enumerate() {
+            if let (Some(&next), Some(&mask)) = (places.get(i + AHEAD), masks.get(i + AHEAD)) {
+                if let Some(block) = blocks.get(next as usize) {
+                    block.prefetch(view.rows_read(mask));
+                }
+                if let Some(id) = self.ids.get(next as usize * LANES) {
+                    prefetch(id);
+                }
+            }
+            let at = at as usize;
+            let lanes = leaves.lanes(at);
+            recorder.items_tested(lanes.count_ones());
+            recorder.planes_tested(lanes.count_ones() * mask.count_ones());
+            recorder.block_read(leaves.first + at, view.rows_read(mask));
+            let kept = view.kept_lanes(isa, &blocks[at], mask) & lanes;
+            sink.accept_lanes(isa, &self.ids, at * LANES, kept)?;
+        }
+        ControlFlow::Continue(())
+    }
+
+    #[inline(always)]
+    fn hand_over<I: Isa, S: Sink, R: Recorder>(
+        &self,
+        isa: I,
+        places: Range<usize>,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        if places.is_empty() {
+            return ControlFlow::Continue(());
+        }
+        recorder.subtree_accepted(places.len());
+        sink.accept_places(isa, &self.ids, places)
+    }
+
+    /// Bounds of the boxes of one block, as the lane above them holds them.
+    fn fit(&mut self, level: usize, block: usize) {
+        let bounds = self.blocks[self.levels[level].first + block].union();
+        let above = self.levels[level + 1].first + block / LANES;
+        self.blocks[above].set(block % LANES, &bounds);
+    }
+}
+
+/// Every lane with a box is a node that is classified.
+#[inline(always)]
+fn count_nodes<R: Recorder>(recorder: &mut R, lanes: LaneMask, mask: PlaneMask) {
+    for _ in 0..lanes.count_ones() {
+        recorder.node_tested();
+    }
+    recorder.planes_tested(lanes.count_ones() * mask.count_ones());
+}
+
+impl RegionIndex for Wide {
+    const NAME: &'static str = "wide";
+    const SUMMARY: &'static str =
+        "16-ary implicit tree of blocks, level by level with plane masks and prefetch";
+    type Params = WideParams;
+
+    /// O(n log n) by medians, O(n) but for the sort by Morton codes.
+    fn build(
+        items: &[Aabb],
+        _: Option<&PlaneTree>,
+        params: &WideParams,
+    ) -> Result<Self, BuildError> {
+        let ids = block_ordered(items, indexable(items)?, params.order);
+        Ok(Wide::over(items, ids))
+    }
+
+    fn memory(&self) -> MemoryUsage {
+        let leaves = self.levels.first().map_or(0, |l| l.blocks);
+        MemoryUsage {
+            node_bytes: (self.blocks.len() - leaves) * size_of::<BoxBlock>(),
+            item_bytes: leaves * size_of::<BoxBlock>()
+                + size_of_val(&self.ids[..])
+                + size_of_val(&self.place_of[..]),
+        }
+    }
+
+    #[inline(always)]
+    fn locate<S: Sink, R: Recorder>(
+        &self,
+        p: Vec3,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        // Depth first: at most one lane of each level is left open on a tiling.
+        let Some(top) = self.levels.len().checked_sub(1) else {
+            return ControlFlow::Continue(());
+        };
+        let mut open = [(0, 0); MOST_LEVELS];
+        let holding = |level: usize, block: usize, recorder: &mut R| {
+            let lanes = self.levels[level].lanes(block);
+            if level == 0 {
+                recorder.items_tested(lanes.count_ones());
+            } else {
+                count_nodes(recorder, lanes, 0);
+            }
+            p.admit_lanes(BASELINE, &self.blocks[self.levels[level].first + block], ()) & lanes
+        };
+        let mut level = top;
+        open[level] = (0, holding(level, 0, recorder));
+        loop {
+            let (block, left) = open[level];
+            if level == 0 {
+                sink.accept_lanes(BASELINE, &self.ids, block * LANES, left)?;
+            }
+            if level == 0 || left == 0 {
+                if level == top {
+                    return ControlFlow::Continue(());
+                }
+                level += 1;
+                continue;
+            }
+            open[level].1 &= left - 1;
+            level -= 1;
+            let child = block * LANES + left.trailing_zeros() as usize;
+            open[level] = (child, holding(level, child, recorder));
+        }
+    }
+
+    /// O(moved * depth).
+    fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
+        const ABSENT: u32 = u32::MAX;
+        if self.place_of.len() != items.len() {
+            self.place_of = vec![ABSENT; items.len()];
+            for (place, &id) in self.ids.iter().enumerate() {
+                self.place_of[id as usize] = place as u32;
+            }
+        }
+        let stays =
+            |&id: &ItemId| (self.place_of[id as usize] != ABSENT) == !items[id as usize].is_empty();
+        if !moved.iter().all(stays) {
+            return false;
+        }
+        let places = moved.iter().map(|&id| (id, self.place_of[id as usize]));
+        let mut touched: Vec<usize> = Vec::with_capacity(moved.len());
+        for (id, place) in places.filter(|&(_, place)| place != ABSENT) {
+            let place = place as usize;
+            self.blocks[place / LANES].set(place % LANES, &items[id as usize]);
+            touched.push(place / LANES);
+        }
+        for level in 0..self.levels.len().saturating_sub(1) {
+            touched.sort_unstable();
+            touched.dedup();
+            for block in &mut touched {
+                self.fit(level, *block);
+                *block /= LANES;
+            }
+        }
+        true
+    }
+}
+
+impl FrustumQuery for Wide {
+    #[inline(always)]
+    fn visible<V: View, S: Sink, R: Recorder>(
+        &self,
+        view: &V,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        self.visible_by(BASELINE, view, sink, recorder)
+    }
+
+    #[inline(always)]
+    fn visible_by<I: Isa, V: View, S: Sink, R: Recorder>(
+        &self,
+        isa: I,
+        view: &V,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        let mut scratch = SCRATCH.take().unwrap_or_default();
+        let flow = self.search(isa, view, sink, recorder, &mut scratch);
+        SCRATCH.set(Some(scratch));
+        flow
+    }
+}
+
+impl TreeOrder for Wide {
+    fn ids(&self) -> &[ItemId] {
+        &self.ids
+    }
+}

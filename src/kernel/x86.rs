@@ -1,0 +1,377 @@
+//! The vectors of x86-64: SSE2, which every such processor has, AVX2 and
+//! AVX-512. Unsafe because intrinsics are; sound because a value of each type
+//! only exists where its instructions do.
+
+use std::arch::x86_64::*;
+
+use super::isa::{Isa, LANES, LaneMask, Plain};
+
+/// Four 128-bit vectors. Part of x86-64.
+#[derive(Clone, Copy, Debug)]
+pub struct Sse2;
+
+/// Two 256-bit vectors, with the bit instructions of the same generation.
+#[derive(Clone, Copy, Debug)]
+pub struct Avx2(());
+
+/// One 512-bit vector.
+#[derive(Clone, Copy, Debug)]
+pub struct Avx512(());
+
+impl Avx2 {
+    /// Only for code that was compiled for these instructions.
+    #[inline]
+    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+    pub(super) fn here() -> Self {
+        Avx2(())
+    }
+}
+
+impl Avx512 {
+    /// Only for code that was compiled for these instructions.
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512vl,avx512bw,avx512dq,avx2,bmi1,bmi2,lzcnt,popcnt")]
+    pub(super) fn here() -> Self {
+        Avx512(())
+    }
+}
+
+/// Makes room for a whole vector behind the end, so that one may be stored
+/// whatever its number of lanes that count; the end.
+#[inline(always)]
+fn room(out: &mut Vec<u32>) -> *mut u32 {
+    out.reserve(LANES);
+    out.spare_capacity_mut().as_mut_ptr().cast()
+}
+
+/// Elementwise operations on an array of vectors.
+macro_rules! each {
+    ($count:literal, $op:expr) => {
+        std::array::from_fn::<_, $count, _>($op)
+    };
+}
+
+// SAFETY, of all blocks below: the receiver proves that the processor has the
+// instructions (see above). Loads and stores are unaligned ones within the
+// array, or within the room that `room` has made.
+
+impl Isa for Sse2 {
+    type Floats = [__m128; 4];
+    type Words = [__m128i; 4];
+
+    #[inline(always)]
+    fn load(self, row: &[f32; LANES]) -> [__m128; 4] {
+        each!(4, |i| unsafe { _mm_loadu_ps(row[4 * i..].as_ptr()) })
+    }
+    #[inline(always)]
+    fn to_array(self, floats: [__m128; 4]) -> [f32; LANES] {
+        let mut row = [0.0; LANES];
+        for (four, x) in row.chunks_exact_mut(4).zip(floats) {
+            unsafe { _mm_storeu_ps(four.as_mut_ptr(), x) };
+        }
+        row
+    }
+    #[inline(always)]
+    fn splat(self, x: f32) -> [__m128; 4] {
+        [unsafe { _mm_set1_ps(x) }; 4]
+    }
+    #[inline(always)]
+    fn add(self, a: [__m128; 4], b: [__m128; 4]) -> [__m128; 4] {
+        each!(4, |i| unsafe { _mm_add_ps(a[i], b[i]) })
+    }
+    #[inline(always)]
+    fn sub(self, a: [__m128; 4], b: [__m128; 4]) -> [__m128; 4] {
+        each!(4, |i| unsafe { _mm_sub_ps(a[i], b[i]) })
+    }
+    #[inline(always)]
+    fn mul(self, a: [__m128; 4], b: [__m128; 4]) -> [__m128; 4] {
+        each!(4, |i| unsafe { _mm_mul_ps(a[i], b[i]) })
+    }
+    #[inline(always)]
+    fn lower(self, a: [__m128; 4], b: [__m128; 4]) -> [__m128; 4] {
+        each!(4, |i| unsafe { _mm_min_ps(a[i], b[i]) })
+    }
+    #[inline(always)]
+    fn below_zero(self, a: [__m128; 4]) -> LaneMask {
+        let below = each!(4, |i| unsafe { _mm_cmplt_ps(a[i], _mm_setzero_ps()) });
+        signs_128(below)
+    }
+    #[inline(always)]
+    fn at_most(self, a: [__m128; 4], b: [__m128; 4]) -> LaneMask {
+        signs_128(each!(4, |i| unsafe { _mm_cmple_ps(a[i], b[i]) }))
+    }
+    #[inline(always)]
+    fn words(self, row: &[u32; LANES]) -> [__m128i; 4] {
+        each!(4, |i| unsafe {
+            _mm_loadu_si128(row[4 * i..].as_ptr().cast())
+        })
+    }
+    #[inline(always)]
+    fn splat_word(self, x: u32) -> [__m128i; 4] {
+        [unsafe { _mm_set1_epi32(x as i32) }; 4]
+    }
+    #[inline(always)]
+    fn counting(self, first: u32) -> [__m128i; 4] {
+        each!(4, |i| unsafe {
+            let from = _mm_set1_epi32(first.wrapping_add(4 * i as u32) as i32);
+            _mm_add_epi32(from, _mm_setr_epi32(0, 1, 2, 3))
+        })
+    }
+    #[inline(always)]
+    fn without(self, words: [__m128i; 4], values: [__m128; 4], bits: u32) -> [__m128i; 4] {
+        each!(4, |i| unsafe {
+            let inside = _mm_castps_si128(_mm_cmpge_ps(values[i], _mm_setzero_ps()));
+            _mm_andnot_si128(_mm_and_si128(inside, _mm_set1_epi32(bits as i32)), words[i])
+        })
+    }
+    #[inline(always)]
+    fn zeros(self, words: [__m128i; 4]) -> LaneMask {
+        signs_128(each!(4, |i| unsafe {
+            _mm_castsi128_ps(_mm_cmpeq_epi32(words[i], _mm_setzero_si128()))
+        }))
+    }
+    #[inline(always)]
+    fn pack(self, place: &mut [u32; LANES], words: [__m128i; 4], lanes: LaneMask) {
+        let mut row = [0; LANES];
+        for (four, x) in row.chunks_exact_mut(4).zip(words) {
+            unsafe { _mm_storeu_si128(four.as_mut_ptr().cast(), x) };
+        }
+        Plain.pack(place, row, lanes);
+    }
+    #[inline(always)]
+    fn append(self, out: &mut Vec<u32>, row: &[u32; LANES], lanes: LaneMask) {
+        let end = room(out);
+        let (mut left, mut count) = (lanes, 0);
+        while left != 0 {
+            // At most sixteen lanes, and as many places behind the end.
+            unsafe { *end.add(count) = row[left.trailing_zeros() as usize % LANES] };
+            count += 1;
+            left &= left - 1;
+        }
+        unsafe { out.set_len(out.len() + count) };
+    }
+}
+
+#[inline(always)]
+fn signs_128(x: [__m128; 4]) -> LaneMask {
+    let signs = x.map(|x| unsafe { _mm_movemask_ps(x) } as LaneMask);
+    signs[0] | signs[1] << 4 | signs[2] << 8 | signs[3] << 12
+}
+
+impl Isa for Avx2 {
+    type Floats = [__m256; 2];
+    type Words = [__m256i; 2];
+
+    #[inline(always)]
+    fn load(self, row: &[f32; LANES]) -> [__m256; 2] {
+        each!(2, |i| unsafe { _mm256_loadu_ps(row[8 * i..].as_ptr()) })
+    }
+    #[inline(always)]
+    fn to_array(self, floats: [__m256; 2]) -> [f32; LANES] {
+        let mut row = [0.0; LANES];
+        for (eight, x) in row.chunks_exact_mut(8).zip(floats) {
+            unsafe { _mm256_storeu_ps(eight.as_mut_ptr(), x) };
+        }
+        row
+    }
+    #[inline(always)]
+    fn splat(self, x: f32) -> [__m256; 2] {
+        [unsafe { _mm256_set1_ps(x) }; 2]
+    }
+    #[inline(always)]
+    fn add(self, a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
+        each!(2, |i| unsafe { _mm256_add_ps(a[i], b[i]) })
+    }
+    #[inline(always)]
+    fn sub(self, a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
+        each!(2, |i| unsafe { _mm256_sub_ps(a[i], b[i]) })
+    }
+    #[inline(always)]
+    fn mul(self, a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
+        each!(2, |i| unsafe { _mm256_mul_ps(a[i], b[i]) })
+    }
+    #[inline(always)]
+    fn lower(self, a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
+        each!(2, |i| unsafe { _mm256_min_ps(a[i], b[i]) })
+    }
+    #[inline(always)]
+    fn below_zero(self, a: [__m256; 2]) -> LaneMask {
+        signs_256(each!(2, |i| unsafe {
+            _mm256_cmp_ps::<_CMP_LT_OQ>(a[i], _mm256_setzero_ps())
+        }))
+    }
+    #[inline(always)]
+    fn at_most(self, a: [__m256; 2], b: [__m256; 2]) -> LaneMask {
+        signs_256(each!(2, |i| unsafe {
+            _mm256_cmp_ps::<_CMP_LE_OQ>(a[i], b[i])
+        }))
+    }
+    #[inline(always)]
+    fn words(self, row: &[u32; LANES]) -> [__m256i; 2] {
+        each!(2, |i| unsafe {
+            _mm256_loadu_si256(row[8 * i..].as_ptr().cast())
+        })
+    }
+    #[inline(always)]
+    fn splat_word(self, x: u32) -> [__m256i; 2] {
+        [unsafe { _mm256_set1_epi32(x as i32) }; 2]
+    }
+    #[inline(always)]
+    fn counting(self, first: u32) -> [__m256i; 2] {
+        each!(2, |i| unsafe {
+            let from = _mm256_set1_epi32(first.wrapping_add(8 * i as u32) as i32);
+            _mm256_add_epi32(from, _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7))
+        })
+    }
+    #[inline(always)]
+    fn without(self, words: [__m256i; 2], values: [__m256; 2], bits: u32) -> [__m256i; 2] {
+        each!(2, |i| unsafe {
+            let inside = _mm256_cmp_ps::<_CMP_GE_OQ>(values[i], _mm256_setzero_ps());
+            let bits =
+                _mm256_and_si256(_mm256_castps_si256(inside), _mm256_set1_epi32(bits as i32));
+            _mm256_andnot_si256(bits, words[i])
+        })
+    }
+    #[inline(always)]
+    fn zeros(self, words: [__m256i; 2]) -> LaneMask {
+        signs_256(each!(2, |i| unsafe {
+            _mm256_castsi256_ps(_mm256_cmpeq_epi32(words[i], _mm256_setzero_si256()))
+        }))
+    }
+    #[inline(always)]
+    fn pack(self, place: &mut [u32; LANES], words: [__m256i; 2], lanes: LaneMask) {
+        // The first store is whole, and what it leaves behind its lanes the
+        // second one covers; together they stay within sixteen places.
+        unsafe { store_packed_256(place.as_mut_ptr(), words, lanes) };
+    }
+    #[inline(always)]
+    fn append(self, out: &mut Vec<u32>, row: &[u32; LANES], lanes: LaneMask) {
+        // Room first: a register would not outlive the call that makes it.
+        let end = room(out);
+        unsafe {
+            store_packed_256(end, self.words(row), lanes);
+            out.set_len(out.len() + lanes.count_ones() as usize);
+        }
+    }
+}
+
+/// Stores the words of some lanes, moved together, and garbage behind them up
+/// to sixteen words in all.
+#[inline(always)]
+unsafe fn store_packed_256(place: *mut u32, words: [__m256i; 2], lanes: LaneMask) {
+    let (low, high) = (lanes & 0xff, lanes >> 8);
+    unsafe {
+        _mm256_storeu_si256(place.cast(), packed_256(words[0], low));
+        let behind = place.add(low.count_ones() as usize);
+        _mm256_storeu_si256(behind.cast(), packed_256(words[1], high));
+    }
+}
+
+#[inline(always)]
+fn signs_256(x: [__m256; 2]) -> LaneMask {
+    let signs = x.map(|x| unsafe { _mm256_movemask_ps(x) } as LaneMask);
+    signs[0] | signs[1] << 8
+}
+
+/// The words of eight lanes moved together.
+#[inline(always)]
+fn packed_256(words: __m256i, lanes: LaneMask) -> __m256i {
+    unsafe {
+        // A byte for each lane, those that count moved together, and widened
+        // to the indices of a permutation.
+        let bytes = _pdep_u64(u64::from(lanes), 0x0101_0101_0101_0101).wrapping_mul(0xff);
+        let order = _pext_u64(0x0706_0504_0302_0100, bytes);
+        let order = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(order as i64));
+        _mm256_permutevar8x32_epi32(words, order)
+    }
+}
+
+impl Isa for Avx512 {
+    type Floats = __m512;
+    type Words = __m512i;
+
+    #[inline(always)]
+    fn load(self, row: &[f32; LANES]) -> __m512 {
+        unsafe { _mm512_loadu_ps(row.as_ptr()) }
+    }
+    #[inline(always)]
+    fn to_array(self, floats: __m512) -> [f32; LANES] {
+        let mut row = [0.0; LANES];
+        unsafe { _mm512_storeu_ps(row.as_mut_ptr(), floats) };
+        row
+    }
+    #[inline(always)]
+    fn splat(self, x: f32) -> __m512 {
+        unsafe { _mm512_set1_ps(x) }
+    }
+    #[inline(always)]
+    fn add(self, a: __m512, b: __m512) -> __m512 {
+        unsafe { _mm512_add_ps(a, b) }
+    }
+    #[inline(always)]
+    fn sub(self, a: __m512, b: __m512) -> __m512 {
+        unsafe { _mm512_sub_ps(a, b) }
+    }
+    #[inline(always)]
+    fn mul(self, a: __m512, b: __m512) -> __m512 {
+        unsafe { _mm512_mul_ps(a, b) }
+    }
+    #[inline(always)]
+    fn lower(self, a: __m512, b: __m512) -> __m512 {
+        unsafe { _mm512_min_ps(a, b) }
+    }
+    #[inline(always)]
+    fn below_zero(self, a: __m512) -> LaneMask {
+        unsafe { _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, _mm512_setzero_ps()) }
+    }
+    #[inline(always)]
+    fn at_most(self, a: __m512, b: __m512) -> LaneMask {
+        unsafe { _mm512_cmp_ps_mask::<_CMP_LE_OQ>(a, b) }
+    }
+    #[inline(always)]
+    fn words(self, row: &[u32; LANES]) -> __m512i {
+        unsafe { _mm512_loadu_si512(row.as_ptr().cast()) }
+    }
+    #[inline(always)]
+    fn splat_word(self, x: u32) -> __m512i {
+        unsafe { _mm512_set1_epi32(x as i32) }
+    }
+    #[inline(always)]
+    fn counting(self, first: u32) -> __m512i {
+        unsafe {
+            let lanes = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+            _mm512_add_epi32(_mm512_set1_epi32(first as i32), lanes)
+        }
+    }
+    #[inline(always)]
+    fn without(self, words: __m512i, values: __m512, bits: u32) -> __m512i {
+        unsafe {
+            let inside = _mm512_cmp_ps_mask::<_CMP_GE_OQ>(values, _mm512_setzero_ps());
+            let bits = _mm512_set1_epi32(bits as i32);
+            _mm512_mask_andnot_epi32(words, inside, bits, words)
+        }
+    }
+    #[inline(always)]
+    fn zeros(self, words: __m512i) -> LaneMask {
+        unsafe { _mm512_testn_epi32_mask(words, words) }
+    }
+    #[inline(always)]
+    fn pack(self, place: &mut [u32; LANES], words: __m512i, lanes: LaneMask) {
+        // Packed in a register and stored whole: a masked store is slower, on
+        // some processors very much so.
+        unsafe {
+            let packed = _mm512_maskz_compress_epi32(lanes, words);
+            _mm512_storeu_si512(place.as_mut_ptr().cast(), packed);
+        }
+    }
+    #[inline(always)]
+    fn append(self, out: &mut Vec<u32>, row: &[u32; LANES], lanes: LaneMask) {
+        // Room first: a register would not outlive the call that makes it.
+        let end = room(out);
+        unsafe {
+            let packed = _mm512_maskz_compress_epi32(lanes, self.words(row));
+            _mm512_storeu_si512(end.cast(), packed);
+            out.set_len(out.len() + lanes.count_ones() as usize);
+        }
+    }
+}
