@@ -119,6 +119,9 @@ thread_local! {
 /// miss, and not so many that lines are gone before their turn.
 pub(super) const AHEAD: usize = 12;
 
+/// Blocks of items whose memory is asked for ahead while the tree is filled.
+const GATHERED_AHEAD: usize = 2;
+
 impl Wide {
     fn over(items: &[Aabb], ids: Vec<ItemId>) -> Wide {
         let mut tree = Wide {
@@ -145,7 +148,13 @@ impl Wide {
         }
         let total = tree.levels.iter().map(|l| l.blocks).sum();
         tree.blocks = Vec::with_capacity(total);
-        for ids in tree.ids.chunks(LANES) {
+        for (i, ids) in tree.ids.chunks(LANES).enumerate() {
+            // The items lie all over memory.
+            let ahead = (i + GATHERED_AHEAD) * LANES;
+            for &id in tree.ids.iter().skip(ahead).take(LANES) {
+                prefetch(&items[id as usize].min);
+                prefetch(&items[id as usize].max);
+            }
             let mut block = BoxBlock::EMPTY;
             for (lane, &id) in ids.iter().enumerate() {
                 block.set(lane, &items[id as usize]);
