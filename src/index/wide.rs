@@ -224,10 +224,10 @@ impl Wide {
             let span = LANES << (height * LANES.ilog2() as usize);
             let mut run = 0..0;
             for (i, (&at, &mask)) in places.iter().zip(masks).enumerate() {
-                if let Some(&next) = places.get(i + AHEAD) {
-                    if let Some(block) = blocks.get(next as usize) {
-                        block.prefetch(ALL_ROWS);
-                    }
+                if let Some(&next) = places.get(i + AHEAD)
+                    && let Some(block) = blocks.get(next as usize)
+                {
+                    block.prefetch(ALL_ROWS);
                 }
                 let at = at as usize;
                 let lanes = level.lanes(at);
@@ -385,7 +385,7 @@ impl RegionIndex for Wide {
             }
         }
         let stays =
-            |&id: &ItemId| (self.place_of[id as usize] != ABSENT) == !items[id as usize].is_empty();
+            |&id: &ItemId| (self.place_of[id as usize] == ABSENT) == items[id as usize].is_empty();
         if !moved.iter().all(stays) {
             return false;
         }
