@@ -153,7 +153,7 @@ fn kernels(c: &mut Criterion) {
         b.iter(|| {
             let blocks = black_box(&blocks).range(0, scene.items.len());
             let seen = blocks.map(|(_, lanes, block)| {
-                (block.admitted_by(BASELINE, volume, volume.mask()) & lanes).count_ones()
+                (block.admitted_by(BASELINE, &volume, volume.mask()) & lanes).count_ones()
             });
             seen.sum::<u32>()
         });
