@@ -9,7 +9,7 @@ use cullbench::camera::PlaneOptions;
 use cullbench::geometry::{Aabb, ConvexVolume, PlaneMask};
 use cullbench::index::{PackedTree, Part, Record, Splitter, build_top_down, indexable};
 use cullbench::kernel::BASELINE;
-use cullbench::query::{ItemId, NoRecorder};
+use cullbench::query::{ItemId, NoRecorder, Sink};
 use cullbench::{path, scene};
 
 /// The median along the widest axis: the plainest tree there is.
@@ -63,21 +63,6 @@ fn classify(volume: &ConvexVolume, bounds: &Aabb, mask: PlaneMask) -> (Verdict, 
         },
         undecided,
     )
-}
-
-/// The bits that are set, lowest first.
-struct Bits(PlaneMask);
-
-impl Iterator for Bits {
-    type Item = u32;
-
-    #[inline(always)]
-    fn next(&mut self) -> Option<u32> {
-        let index = self.0.trailing_zeros();
-        let any = self.0 != 0;
-        self.0 &= self.0.wrapping_sub(1);
-        any.then_some(index)
-    }
 }
 
 /// The traversal's stack: an array, then the heap.
@@ -140,13 +125,9 @@ fn without(tree: &PackedTree, volume: &ConvexVolume, out: &mut Vec<ItemId>) {
                 let items = node.items();
                 for (start, lanes, block) in tree.boxes().range(items.start, items.end) {
                     let admitted = block.admitted_by(BASELINE, volume, mask);
-                    let mut admitted = u32::from(admitted & lanes);
-                    while admitted != 0 {
-                        let from = admitted.trailing_zeros();
-                        let run = (!(admitted >> from)).trailing_zeros();
-                        let first = start + from as usize;
-                        out.extend_from_slice(&tree.ids()[first..first + run as usize]);
-                        admitted &= !(((1 << run) - 1) << from);
+                    if admitted & lanes != 0 {
+                        // A Vec never breaks off.
+                        let _ = out.accept_lanes(BASELINE, tree.ids(), start, admitted & lanes);
                     }
                 }
             }

@@ -186,8 +186,8 @@ fn memory_and_counters_fit_the_items() {
         let (mut out, mut cost) = (Vec::new(), Default::default());
         index.visible_counted(&nothing, &mut out, &mut cost);
         assert!(out.is_empty());
-        // A scan looks at everything, a tree once: at its root, or at all of
-        // the root's children, which lie in one block.
+        // A scan looks at everything; a tree at its root, or at all of the
+        // root's children, which lie in one block.
         let looks = match backend.name {
             "linear" | "linear-scalar" => 5000..=5000,
             "wide" => 1..=16,

@@ -4,9 +4,11 @@
 
 mod block_order;
 mod bsp;
+mod bundles;
 mod bvh;
 mod cells;
 mod erased;
+mod frontier;
 mod linear;
 mod octree;
 mod partition;

@@ -7,12 +7,13 @@ use std::ops::{ControlFlow, Range};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
+use super::bundles::Leaves;
 use super::tree::{PackedTree, scan_blocks};
 use super::{Bsp, BuildError, FrustumQuery, MemoryUsage, RegionIndex};
 use crate::geometry::quantised::{Code, CodeBlock, Grid};
-use crate::geometry::{Aabb, BoxBlock, LANES, LaneMask, PlaneTree, lanes_of};
+use crate::geometry::{Aabb, BoxBlock, LANES, LaneMask, PlaneMask, PlaneTree, lanes_of};
 use crate::kernel::{BASELINE, Isa};
-use crate::query::{ItemId, Recorder, Region, Sink, View};
+use crate::query::{ItemId, Recorder, Sink, View};
 
 /// What the codes count from.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
@@ -98,20 +99,30 @@ impl Quantised {
             (at * LANES, lanes, self.codes.decode(at, self.grid(at)))
         })
     }
+}
+
+/// Leaves whose bounds are decoded block by block.
+struct InCodes<'a, V> {
+    index: &'a Quantised,
+    view: &'a V,
+}
+
+impl<V: View> Leaves for InCodes<'_, V> {
+    /// Codes are few bytes, one after the other.
+    #[inline(always)]
+    fn fetch(&self, _: Range<usize>, _: PlaneMask) {}
 
     #[inline(always)]
-    fn ask<I: Isa, G: Region, S: Sink, R: Recorder>(
+    fn test<I: Isa, S: Sink, R: Recorder>(
         &self,
         isa: I,
-        region: &G,
+        items: Range<usize>,
+        mask: PlaneMask,
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()> {
-        let test = |items: Range<usize>, memo, sink: &mut S, recorder: &mut R| {
-            let blocks = self.blocks(items);
-            scan_blocks(isa, blocks, self.tree.ids(), region, memo, sink, recorder)
-        };
-        self.tree.query_leaves(isa, region, sink, recorder, test)
+        let (blocks, ids) = (self.index.blocks(items), self.index.tree.ids());
+        scan_blocks(isa, blocks, ids, self.view, mask, sink, recorder)
     }
 }
 
@@ -178,7 +189,11 @@ impl RegionIndex for Quantised {
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()> {
-        self.ask(BASELINE, &p, sink, recorder)
+        let test = |items: Range<usize>, memo, sink: &mut S, recorder: &mut R| {
+            let blocks = self.blocks(items);
+            scan_blocks(BASELINE, blocks, self.tree.ids(), &p, memo, sink, recorder)
+        };
+        self.tree.query_leaves(BASELINE, &p, sink, recorder, test)
     }
 }
 
@@ -201,7 +216,8 @@ impl FrustumQuery for Quantised {
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()> {
-        self.ask(isa, view, sink, recorder)
+        let leaves = InCodes { index: self, view };
+        self.tree.see_leaves(isa, view, &leaves, sink, recorder)
     }
 }
 

@@ -89,7 +89,7 @@ struct Again<'a> {
 }
 
 /// As far ahead as the traversal itself asks for memory.
-const AHEAD: usize = super::wide::AHEAD;
+const AHEAD: usize = super::frontier::AHEAD;
 
 impl Work for Again<'_> {
     type Output = ();

@@ -6,9 +6,10 @@
 use std::borrow::Borrow;
 use std::ops::{ControlFlow, Range};
 
-use crate::geometry::{Aabb, BoxBlock, BoxBlocks, LaneMask};
-use crate::kernel::Isa;
-use crate::query::{Containment, ItemId, Recorder, Region, Sink};
+use super::bundles::{Bundles, Leaves};
+use crate::geometry::{Aabb, BoxBlock, BoxBlocks, LaneMask, PlaneMask};
+use crate::kernel::{Isa, prefetch};
+use crate::query::{Containment, ItemId, Recorder, Region, Sink, View};
 
 use super::MemoryUsage;
 
@@ -48,6 +49,8 @@ pub struct PackedTree {
     boxes: BoxBlocks,
     ids: Vec<ItemId>,
     depth: usize,
+    /// The nodes again, as views traverse them.
+    bundles: Bundles,
     /// Place of each item in tree order, made when first needed.
     place_of: Vec<u32>,
 }
@@ -107,6 +110,7 @@ impl TreeWriter {
         self.tree.nodes.shrink_to_fit();
         self.tree.boxes.shrink_to_fit();
         self.tree.ids.shrink_to_fit();
+        self.tree.bundles = Bundles::of(&self.tree.nodes);
         self.tree
     }
 }
@@ -147,11 +151,57 @@ impl PackedTree {
 
     pub fn memory(&self) -> MemoryUsage {
         MemoryUsage {
-            node_bytes: size_of_val(&self.nodes[..]),
+            node_bytes: size_of_val(&self.nodes[..]) + self.bundles.bytes(),
             item_bytes: self.boxes.bytes()
                 + size_of_val(&self.ids[..])
                 + size_of_val(&self.place_of[..]),
         }
+    }
+
+    /// Hands every item that the view sees to the sink: accepted subtrees
+    /// first, level by level, then what is left of the leaves.
+    #[inline(always)]
+    pub fn see<I: Isa, V: View, S: Sink, R: Recorder>(
+        &self,
+        isa: I,
+        view: &V,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        let leaves = InBlocks { tree: self, view };
+        self.see_leaves(isa, view, &leaves, sink, recorder)
+    }
+
+    /// [`PackedTree::see`] with the items of straddling leaves fetched and
+    /// tested by the caller, who may keep their bounds in another form.
+    #[inline(always)]
+    pub fn see_leaves<I: Isa, V: View, L: Leaves, S: Sink, R: Recorder>(
+        &self,
+        isa: I,
+        view: &V,
+        leaves: &L,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        let Some(root) = self.nodes.first() else {
+            return ControlFlow::Continue(());
+        };
+        recorder.node_tested();
+        let (verdict, mask) = view.classify(&root.bounds, view.mask(), recorder);
+        match verdict {
+            Containment::Outside => {
+                recorder.subtree_rejected();
+                return ControlFlow::Continue(());
+            }
+            Containment::Inside => {
+                recorder.subtree_accepted(self.ids.len());
+                return sink.accept_places(isa, &self.ids, 0..self.ids.len());
+            }
+            Containment::Straddles => {}
+        }
+        let (nodes, ids) = (&self.nodes[..], &self.ids[..]);
+        self.bundles
+            .search(isa, view, mask, nodes, ids, leaves, sink, recorder)
     }
 
     /// Hands every item that the region admits to the sink, in tree order.
@@ -274,12 +324,17 @@ impl PackedTree {
                 }
             }
         }
+        let mut whole = true;
         for node in (0..self.nodes.len())
             .rev()
             .filter(|&node| all || dirty[node])
         {
             self.fit(node);
+            whole &= self.bundles.fit(node, &self.nodes[node].bounds);
             fitted(self, node);
+        }
+        if !whole {
+            self.bundles = Bundles::of(&self.nodes);
         }
         true
     }
@@ -313,6 +368,36 @@ impl PackedTree {
             child = self.nodes[child].after();
         }
         self.nodes[node].bounds = bounds;
+    }
+}
+
+/// The leaves of a tree that keeps its items' bounds in blocks.
+struct InBlocks<'a, V> {
+    tree: &'a PackedTree,
+    view: &'a V,
+}
+
+impl<V: View> Leaves for InBlocks<'_, V> {
+    #[inline(always)]
+    fn fetch(&self, items: Range<usize>, mask: PlaneMask) {
+        let rows = self.view.rows_read(mask);
+        for (start, _, block) in self.tree.boxes.range(items.start, items.end) {
+            block.prefetch(rows);
+            prefetch(&self.tree.ids[start]);
+        }
+    }
+
+    #[inline(always)]
+    fn test<I: Isa, S: Sink, R: Recorder>(
+        &self,
+        isa: I,
+        items: Range<usize>,
+        mask: PlaneMask,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        let (tree, view) = (self.tree, self.view);
+        tree.test_items(isa, items, view, mask, sink, recorder)
     }
 }
 
@@ -373,7 +458,7 @@ macro_rules! seen_by_tree {
                 sink: &mut S,
                 recorder: &mut R,
             ) -> std::ops::ControlFlow<()> {
-                self.tree.query(isa, view, sink, recorder)
+                self.tree.see(isa, view, sink, recorder)
             }
         }
     };

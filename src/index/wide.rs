@@ -4,14 +4,15 @@
 //! tests of a block are the view's.
 
 use std::cell::Cell;
-use std::ops::{ControlFlow, Range};
+use std::ops::ControlFlow;
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::block_order::{BlockOrder, block_ordered};
+use super::frontier::{AHEAD, Frontier, Merger};
 use super::{BuildError, FrustumQuery, MemoryUsage, RegionIndex, TreeOrder, indexable};
-use crate::geometry::{ALL_ROWS, Aabb, BoxBlock, LANES, LaneMask, PlaneMask, PlaneTree};
+use crate::geometry::{ALL_ROWS, Aabb, BoxBlock, LANES, LaneMask, PlaneTree};
 use crate::kernel::{BASELINE, Isa, prefetch};
 use crate::query::{ItemId, Recorder, Region, Sink, View, runs};
 
@@ -63,47 +64,6 @@ impl Level {
     }
 }
 
-/// Blocks of one level that are still to be looked at, each with the planes
-/// that its ancestors have left open.
-#[derive(Default)]
-struct Frontier {
-    /// Longer than what is used, so that sixteen lanes can always be stored.
-    blocks: Vec<u32>,
-    open: Vec<PlaneMask>,
-    used: usize,
-}
-
-impl Frontier {
-    /// Empties it and makes room for the children of so many blocks.
-    fn clear(&mut self, blocks: usize) {
-        self.used = 0;
-        let room = (blocks + 1) * LANES;
-        if self.blocks.len() < room {
-            self.blocks.resize(room, 0);
-            self.open.resize(room, 0);
-        }
-    }
-
-    /// Adds those lanes of a block, whose first has the number `first`.
-    #[inline(always)]
-    fn push<I: Isa>(&mut self, isa: I, first: u32, open: I::Words, lanes: LaneMask) {
-        let places = (
-            self.blocks[self.used..].first_chunk_mut(),
-            self.open[self.used..].first_chunk_mut(),
-        );
-        if let (Some(blocks), Some(masks)) = places {
-            isa.pack(blocks, isa.counting(first), lanes);
-            isa.pack(masks, open, lanes);
-            self.used += lanes.count_ones() as usize;
-        }
-    }
-
-    #[inline(always)]
-    fn entries(&self) -> (&[u32], &[PlaneMask]) {
-        (&self.blocks[..self.used], &self.open[..self.used])
-    }
-}
-
 /// The memory of a traversal: two frontiers, kept between queries.
 #[derive(Default)]
 struct Scratch {
@@ -114,10 +74,6 @@ struct Scratch {
 thread_local! {
     static SCRATCH: Cell<Option<Box<Scratch>>> = const { Cell::new(None) };
 }
-
-/// So many blocks ahead their memory is asked for: enough to hide a cache
-/// miss, and not so many that lines are gone before their turn.
-pub(super) const AHEAD: usize = 12;
 
 /// Blocks of items whose memory is asked for ahead while the tree is filled.
 const GATHERED_AHEAD: usize = 2;
@@ -215,14 +171,14 @@ impl Wide {
             return sink.accept_places(isa, &self.ids, 0..self.ids.len());
         }
         here.clear(1);
-        here.push(isa, 0, isa.splat_word(view.mask()), 1);
+        here.push(isa, isa.counting(0), isa.splat_word(view.mask()), 1);
         for (height, level) in inner.iter().enumerate().rev() {
             let (places, masks) = here.entries();
             below.clear(places.len());
             let blocks = self.blocks_of(level);
             // Items below one lane.
             let span = LANES << (height * LANES.ilog2() as usize);
-            let mut run = 0..0;
+            let mut run = Merger::default();
             for (i, (&at, &mask)) in places.iter().zip(masks).enumerate() {
                 if let Some(&next) = places.get(i + AHEAD)
                     && let Some(block) = blocks.get(next as usize)
@@ -231,26 +187,23 @@ impl Wide {
                 }
                 let at = at as usize;
                 let lanes = level.lanes(at);
-                count_nodes(recorder, lanes, mask);
+                recorder.nodes_tested(lanes.count_ones());
+                recorder.planes_tested(lanes.count_ones() * mask.count_ones());
                 recorder.block_read(level.first + at, ALL_ROWS);
                 let (kept, open) = view.sorted_lanes(isa, &blocks[at], mask);
                 let kept = kept & lanes;
+                recorder.subtrees_rejected((lanes & !kept).count_ones());
                 let inside = isa.zeros(open) & kept;
                 let undecided = kept & !inside;
                 let first = at * LANES;
-                below.push(isa, first as u32, open, undecided);
+                below.push(isa, isa.counting(first as u32), open, undecided);
                 for lanes in runs(inside) {
                     let start = (first + lanes.start) * span;
                     let end = ((first + lanes.end) * span).min(self.ids.len());
-                    if start == run.end {
-                        run.end = end;
-                    } else {
-                        self.hand_over(isa, run, sink, recorder)?;
-                        run = start..end;
-                    }
+                    run.add(isa, start..end, &self.ids, sink, recorder)?;
                 }
             }
-            self.hand_over(isa, run, sink, recorder)?;
+            run.finish(isa, &self.ids, sink, recorder)?;
             std::mem::swap(here, below);
         }
         let blocks = self.blocks_of(leaves);
@@ -275,36 +228,12 @@ impl Wide {
         ControlFlow::Continue(())
     }
 
-    #[inline(always)]
-    fn hand_over<I: Isa, S: Sink, R: Recorder>(
-        &self,
-        isa: I,
-        places: Range<usize>,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        if places.is_empty() {
-            return ControlFlow::Continue(());
-        }
-        recorder.subtree_accepted(places.len());
-        sink.accept_places(isa, &self.ids, places)
-    }
-
     /// Bounds of the boxes of one block, as the lane above them holds them.
     fn fit(&mut self, level: usize, block: usize) {
         let bounds = self.blocks[self.levels[level].first + block].union();
         let above = self.levels[level + 1].first + block / LANES;
         self.blocks[above].set(block % LANES, &bounds);
     }
-}
-
-/// Every lane with a box is a node that is classified.
-#[inline(always)]
-fn count_nodes<R: Recorder>(recorder: &mut R, lanes: LaneMask, mask: PlaneMask) {
-    for _ in 0..lanes.count_ones() {
-        recorder.node_tested();
-    }
-    recorder.planes_tested(lanes.count_ones() * mask.count_ones());
 }
 
 impl RegionIndex for Wide {
@@ -350,7 +279,7 @@ impl RegionIndex for Wide {
             if level == 0 {
                 recorder.items_tested(lanes.count_ones());
             } else {
-                count_nodes(recorder, lanes, 0);
+                recorder.nodes_tested(lanes.count_ones());
             }
             p.admit_lanes(BASELINE, &self.blocks[self.levels[level].first + block], ()) & lanes
         };

@@ -9,6 +9,13 @@ pub trait Recorder {
     /// A node's bounds were classified.
     #[inline(always)]
     fn node_tested(&mut self) {}
+    /// The bounds of so many nodes were classified.
+    #[inline(always)]
+    fn nodes_tested(&mut self, count: u32) {
+        for _ in 0..count {
+            self.node_tested();
+        }
+    }
     /// Planes were evaluated against nodes or items.
     #[inline(always)]
     fn planes_tested(&mut self, _count: u32) {}
@@ -25,6 +32,13 @@ pub trait Recorder {
     /// A subtree was rejected whole.
     #[inline(always)]
     fn subtree_rejected(&mut self) {}
+    /// So many subtrees were rejected whole.
+    #[inline(always)]
+    fn subtrees_rejected(&mut self, count: u32) {
+        for _ in 0..count {
+            self.subtree_rejected();
+        }
+    }
 }
 
 /// Records nothing.

@@ -1,0 +1,317 @@
+//! The nodes of a tree once more, sixteen a bundle: what views traverse, level
+//! by level, with one block test for sixteen nodes. It owns how nodes are
+//! bundled and that traversal; the nodes themselves are the tree's.
+
+use std::cell::Cell;
+use std::ops::{ControlFlow, Range};
+
+use super::frontier::{AHEAD, Frontier, Merger};
+use super::tree::TreeNode;
+use crate::geometry::{ALL_ROWS, Aabb, BoxBlock, LANES, LaneMask, PlaneMask};
+use crate::kernel::{Isa, prefetch};
+use crate::query::{ItemId, Recorder, Sink, View};
+
+/// Where the lanes of a bundle lead.
+#[derive(Clone, Copy)]
+#[repr(C, align(64))]
+struct Links {
+    /// The bundle of a lane's children; for a leaf, its node.
+    below: [u32; LANES],
+    first: [u32; LANES],
+    end: [u32; LANES],
+    /// Lanes that hold a node.
+    lanes: LaneMask,
+    /// Those of them that are leaves.
+    leaves: LaneMask,
+}
+
+/// A tree of bundles: the descendants of one node that are tested together, in
+/// tree order. 40 bytes a lane.
+#[derive(Default)]
+pub struct Bundles {
+    blocks: Vec<BoxBlock>,
+    links: Vec<Links>,
+    /// The lane of each node, counted over all bundles; or [`NOWHERE`].
+    lane_of: Vec<u32>,
+    /// Whether some lane stands for several siblings.
+    groups: bool,
+}
+
+/// Mark of a node whose children were bundled in its place.
+const NOWHERE: u32 = u32::MAX;
+
+/// What happens at a leaf that is not decided. A trait and no closure: what is
+/// hot must be inlined for each instruction set.
+pub trait Leaves {
+    /// Asks for the memory of items that are tested soon.
+    fn fetch(&self, items: Range<usize>, mask: PlaneMask);
+
+    /// Hands over those of the items that the planes of the mask admit.
+    fn test<I: Isa, S: Sink, R: Recorder>(
+        &self,
+        isa: I,
+        items: Range<usize>,
+        mask: PlaneMask,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()>;
+}
+
+/// The memory of a traversal, kept between queries.
+#[derive(Default)]
+struct Scratch {
+    here: Frontier,
+    below: Frontier,
+    leaves: Frontier,
+}
+
+thread_local! {
+    static SCRATCH: Cell<Option<Box<Scratch>>> = const { Cell::new(None) };
+}
+
+/// Siblings that become the lanes of one bundle, or several lanes' worth of
+/// them: a range of depth-first order with none of their ancestors.
+type Siblings = Vec<u32>;
+
+impl Bundles {
+    /// Bundles the nodes of a tree in depth-first order. Nodes are opened, the
+    /// one with the largest surface first, as long as their children fit: it
+    /// is the likeliest to straddle (Wald, Benthin and Boulos 2008, "Getting
+    /// rid of packets", p. 52). O(nodes).
+    pub fn of(nodes: &[TreeNode]) -> Bundles {
+        let mut bundles = Bundles {
+            lane_of: vec![NOWHERE; nodes.len()],
+            ..Bundles::default()
+        };
+        let is_leaf = |node: u32| nodes[node as usize].after() == node as usize + 1;
+        let children = |node: u32| {
+            let end = nodes[node as usize].after();
+            let mut child = node as usize + 1;
+            std::iter::from_fn(move || {
+                (child < end).then(|| {
+                    let this = child as u32;
+                    child = nodes[child].after();
+                    this
+                })
+            })
+        };
+        if nodes.is_empty() || is_leaf(0) {
+            return bundles;
+        }
+        // Breadth first, so that bundles of one level lie together.
+        let mut waiting = std::collections::VecDeque::from([children(0).collect::<Siblings>()]);
+        let mut promised = 1;
+        while let Some(siblings) = waiting.pop_front() {
+            let mut lanes: Vec<Siblings> = if siblings.len() > LANES {
+                let share = siblings.len().div_ceil(LANES);
+                siblings.chunks(share).map(<[u32]>::to_vec).collect()
+            } else {
+                siblings.into_iter().map(|node| vec![node]).collect()
+            };
+            let mut costs: Vec<f32> = lanes.iter().map(|lane| area(nodes, lane)).collect();
+            loop {
+                let fits = |lane: &Siblings| match lane[..] {
+                    [node] if !is_leaf(node) => lanes.len() + children(node).count() <= LANES + 1,
+                    _ => false,
+                };
+                let largest = (0..lanes.len())
+                    .filter(|&i| fits(&lanes[i]))
+                    .max_by(|&a, &b| costs[a].total_cmp(&costs[b]));
+                let Some(lane) = largest else { break };
+                let opened: Vec<Siblings> =
+                    children(lanes[lane][0]).map(|node| vec![node]).collect();
+                costs.splice(lane..=lane, opened.iter().map(|lane| area(nodes, lane)));
+                lanes.splice(lane..=lane, opened);
+            }
+            bundles.add(nodes, &lanes, &mut promised, |lane| match lane[..] {
+                [node] if is_leaf(node) => None,
+                [node] => {
+                    waiting.push_back(children(node).collect());
+                    Some(())
+                }
+                _ => {
+                    waiting.push_back(lane.clone());
+                    Some(())
+                }
+            });
+        }
+        bundles.blocks.shrink_to_fit();
+        bundles.links.shrink_to_fit();
+        bundles
+    }
+
+    /// Writes one bundle. `descend` queues the children of a lane, unless it is
+    /// a leaf; their bundle is the next one promised.
+    fn add(
+        &mut self,
+        nodes: &[TreeNode],
+        lanes: &[Siblings],
+        promised: &mut u32,
+        mut descend: impl FnMut(&Siblings) -> Option<()>,
+    ) {
+        let mut block = BoxBlock::EMPTY;
+        let mut links = Links {
+            below: [0; LANES],
+            first: [0; LANES],
+            end: [0; LANES],
+            lanes: 0,
+            leaves: 0,
+        };
+        for (lane, siblings) in lanes.iter().enumerate() {
+            block.set(lane, &bounds_of(nodes, siblings));
+            match siblings[..] {
+                [node] => {
+                    self.lane_of[node as usize] = (self.blocks.len() * LANES + lane) as u32;
+                }
+                _ => self.groups = true,
+            }
+            let (first, last) = (siblings[0] as usize, siblings[siblings.len() - 1] as usize);
+            links.first[lane] = nodes[first].items().start as u32;
+            links.end[lane] = nodes[last].items().end as u32;
+            links.lanes |= 1 << lane;
+            if descend(siblings).is_some() {
+                links.below[lane] = *promised;
+                *promised += 1;
+            } else {
+                links.below[lane] = siblings[0];
+                links.leaves |= 1 << lane;
+            }
+        }
+        self.blocks.push(block);
+        self.links.push(links);
+    }
+
+    /// Takes over a node's new bounds. False if the bundles must be made anew:
+    /// some lane stands for several siblings, whose union is nobody's bounds.
+    #[must_use]
+    pub fn fit(&mut self, node: usize, bounds: &Aabb) -> bool {
+        let lane = self.lane_of[node];
+        if lane != NOWHERE {
+            let lane = lane as usize;
+            self.blocks[lane / LANES].set(lane % LANES, bounds);
+        }
+        !self.groups
+    }
+
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.blocks[..])
+            + size_of_val(&self.links[..])
+            + size_of_val(&self.lane_of[..])
+    }
+
+    /// Hands over the items of accepted subtrees, and leaves the items of
+    /// undecided leaves to `test`, with the planes that are open there.
+    ///
+    /// `nodes` and `ids` are those of the tree, and its root straddles the
+    /// planes of `mask`.
+    #[inline(always)]
+    #[allow(clippy::too_many_arguments)]
+    pub fn search<I: Isa, V: View, L: Leaves, S: Sink, R: Recorder>(
+        &self,
+        isa: I,
+        view: &V,
+        mask: PlaneMask,
+        nodes: &[TreeNode],
+        ids: &[ItemId],
+        test: &L,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        let mut scratch = SCRATCH.take().unwrap_or_default();
+        let Scratch {
+            here,
+            below,
+            leaves,
+        } = &mut *scratch;
+        // The root's bundle; or the root itself, if it is a leaf.
+        let start = (isa.counting(0), isa.splat_word(mask));
+        here.clear(1);
+        leaves.clear(1);
+        here.push(
+            isa,
+            start.0,
+            start.1,
+            LaneMask::from(!self.blocks.is_empty()),
+        );
+        leaves.push(
+            isa,
+            start.0,
+            start.1,
+            LaneMask::from(self.blocks.is_empty()),
+        );
+        let mut flow = ControlFlow::Continue(());
+        'walk: while !here.entries().0.is_empty() {
+            let (places, masks) = here.entries();
+            below.clear(places.len());
+            leaves.make_room(places.len());
+            let mut run = Merger::default();
+            for (i, (&at, &mask)) in places.iter().zip(masks).enumerate() {
+                if let Some(&next) = places.get(i + AHEAD)
+                    && let Some(block) = self.blocks.get(next as usize)
+                {
+                    block.prefetch(ALL_ROWS);
+                    let links = &self.links[next as usize];
+                    prefetch(&links.below);
+                    prefetch(&links.lanes);
+                }
+                let links = &self.links[at as usize];
+                recorder.nodes_tested(links.lanes.count_ones());
+                recorder.planes_tested(links.lanes.count_ones() * mask.count_ones());
+                let (kept, open) = view.sorted_lanes(isa, &self.blocks[at as usize], mask);
+                let kept = kept & links.lanes;
+                recorder.subtrees_rejected((links.lanes & !kept).count_ones());
+                let inside = isa.zeros(open) & kept;
+                let undecided = kept & !inside;
+                let words = isa.words(&links.below);
+                below.push(isa, words, open, undecided & !links.leaves);
+                leaves.push(isa, words, open, undecided & links.leaves);
+                let mut left = inside;
+                while left != 0 {
+                    let lane = left.trailing_zeros() as usize % LANES;
+                    left &= left - 1;
+                    let places = links.first[lane] as usize..links.end[lane] as usize;
+                    flow = run.add(isa, places, ids, sink, recorder);
+                    if flow.is_break() {
+                        break 'walk;
+                    }
+                }
+            }
+            flow = run.finish(isa, ids, sink, recorder);
+            if flow.is_break() {
+                break;
+            }
+            std::mem::swap(here, below);
+        }
+        if flow.is_continue() {
+            let (places, masks) = leaves.entries();
+            for (i, (&leaf, &mask)) in places.iter().zip(masks).enumerate() {
+                if let (Some(&next), Some(&mask)) =
+                    (places.get(i + AHEAD / 2), masks.get(i + AHEAD / 2))
+                {
+                    test.fetch(nodes[next as usize].items(), mask);
+                }
+                if let Some(&later) = places.get(i + AHEAD) {
+                    prefetch(&nodes[later as usize]);
+                }
+                let items = nodes[leaf as usize].items();
+                flow = test.test(isa, items, mask, sink, recorder);
+                if flow.is_break() {
+                    break;
+                }
+            }
+        }
+        SCRATCH.set(Some(scratch));
+        flow
+    }
+}
+
+fn bounds_of(nodes: &[TreeNode], siblings: &[u32]) -> Aabb {
+    let bounds = siblings.iter().map(|&node| nodes[node as usize].bounds);
+    bounds.fold(Aabb::EMPTY, |all, b| all.union(&b))
+}
+
+/// Half the surface of what a lane bounds.
+fn area(nodes: &[TreeNode], siblings: &[u32]) -> f32 {
+    let e = bounds_of(nodes, siblings).extent();
+    e.x * e.y + e.y * e.z + e.z * e.x
+}

@@ -1,0 +1,99 @@
+//! What the traversals that go level by level share: the nodes that are still
+//! to be looked at, how far ahead their memory is asked for, and how accepted
+//! neighbours become one run. Which nodes there are is the trees' business.
+
+use std::ops::{ControlFlow, Range};
+
+use crate::geometry::{LANES, LaneMask, PlaneMask};
+use crate::kernel::Isa;
+use crate::query::{ItemId, Recorder, Sink};
+
+/// So many blocks ahead their memory is asked for: enough to hide a cache
+/// miss, and not so many that lines are gone before their turn.
+pub const AHEAD: usize = 12;
+
+/// Nodes that are still to be looked at, each with the planes that its
+/// ancestors have left open.
+#[derive(Default)]
+pub struct Frontier {
+    /// Longer than what is used, so that sixteen lanes can always be stored.
+    nodes: Vec<u32>,
+    open: Vec<PlaneMask>,
+    used: usize,
+}
+
+impl Frontier {
+    /// Empties it and makes room for the children of so many nodes.
+    pub fn clear(&mut self, parents: usize) {
+        self.used = 0;
+        self.make_room(parents);
+    }
+
+    /// Makes room for the children of so many nodes more.
+    pub fn make_room(&mut self, parents: usize) {
+        let room = self.used + (parents + 1) * LANES;
+        if self.nodes.len() < room {
+            self.nodes.resize(room, 0);
+            self.open.resize(room, 0);
+        }
+    }
+
+    /// Adds the nodes of those lanes. There must be room.
+    #[inline(always)]
+    pub fn push<I: Isa>(&mut self, isa: I, nodes: I::Words, open: I::Words, lanes: LaneMask) {
+        let places = (
+            self.nodes[self.used..].first_chunk_mut(),
+            self.open[self.used..].first_chunk_mut(),
+        );
+        debug_assert!(places.0.is_some(), "no room was made");
+        if let (Some(place), Some(masks)) = places {
+            isa.pack(place, nodes, lanes);
+            isa.pack(masks, open, lanes);
+            self.used += lanes.count_ones() as usize;
+        }
+    }
+
+    /// The nodes and their planes, in the order of arrival.
+    #[inline(always)]
+    pub fn entries(&self) -> (&[u32], &[PlaneMask]) {
+        (&self.nodes[..self.used], &self.open[..self.used])
+    }
+}
+
+/// Joins runs of items that follow each other before they are handed over.
+#[derive(Default)]
+pub struct Merger(Range<usize>);
+
+impl Merger {
+    #[inline(always)]
+    pub fn add<I: Isa, S: Sink, R: Recorder>(
+        &mut self,
+        isa: I,
+        places: Range<usize>,
+        ids: &[ItemId],
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        if places.start == self.0.end {
+            self.0.end = places.end;
+            return ControlFlow::Continue(());
+        }
+        let before = std::mem::replace(&mut self.0, places);
+        Merger(before).finish(isa, ids, sink, recorder)
+    }
+
+    #[inline(always)]
+    pub fn finish<I: Isa, S: Sink, R: Recorder>(
+        self,
+        isa: I,
+        ids: &[ItemId],
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        if self.0.is_empty() {
+            return ControlFlow::Continue(());
+        }
+        recorder.subtree_accepted(self.0.len());
+        sink.accept_places(isa, ids, self.0)
+    }
+}
