@@ -2,6 +2,7 @@
 //! file beside this one and a row in [`BACKENDS`]; list, run, query, verify,
 //! benches and conformance tests pick it up from there.
 
+mod batch;
 mod bsp;
 mod bvh;
 mod cells;
@@ -12,6 +13,7 @@ mod partition;
 mod quadtree;
 mod quantised;
 mod tree;
+mod treelets;
 
 use std::ops::ControlFlow;
 
@@ -20,7 +22,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::geometry::{Aabb, PlaneTree};
-use crate::query::{ItemId, Recorder, Sink, View};
+use crate::query::{ItemId, ManySink, NoRecorder, Recorder, Sink, View};
 
 pub use bsp::{Bsp, BspBuilder, BspParams};
 pub use bvh::{Bvh, BvhLayout, BvhParams, BvhPreset};
@@ -98,6 +100,24 @@ pub trait RegionIndex: Sized + Send + Sync {
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()>;
+
+    /// Region search for many points: for every point, in ascending order,
+    /// exactly what [`RegionIndex::locate`] hands over, in the same order, in
+    /// one slice. `Break` if the sink ended the batch.
+    ///
+    /// The default asks one point after the other; a structure that overlaps
+    /// the waits of several descents overrides it.
+    #[inline(always)]
+    fn locate_many<S: ManySink>(&self, points: &[Vec3], sink: &mut S) -> ControlFlow<()> {
+        let mut ids = Vec::new();
+        for (&p, point) in points.iter().zip(0..) {
+            ids.clear();
+            // A Vec never breaks off.
+            let _ = self.locate(p, &mut ids, &mut NoRecorder);
+            sink.accept(point, &ids)?;
+        }
+        ControlFlow::Continue(())
+    }
 
     /// Takes over the new bounds of `moved` items (`items` holds all bounds,
     /// the new ones included; they are finite) without building anew. False,

@@ -6,7 +6,10 @@
 use std::borrow::Borrow;
 use std::ops::{ControlFlow, Range};
 
+use glam::Vec3;
+
 use crate::geometry::{Aabb, BoxBlock, BoxBlocks, LaneMask};
+use crate::kernel::prefetch;
 use crate::query::{Containment, ItemId, Recorder, Region, Sink};
 
 use super::MemoryUsage;
@@ -217,6 +220,27 @@ impl PackedTree {
         ControlFlow::Continue(())
     }
 
+    /// Asks for some items, their bounds and ids, ahead of their use.
+    #[inline(always)]
+    pub fn prefetch_items(&self, items: Range<usize>) {
+        for (start, _, block) in self.boxes.range(items.start, items.end) {
+            block.rows().iter().for_each(prefetch);
+            prefetch(&self.ids[start]);
+        }
+    }
+
+    /// Appends the ids of those items whose closed box holds `p`.
+    #[inline(always)]
+    pub fn collect_holding(&self, items: Range<usize>, p: Vec3, ids: &mut Vec<ItemId>) {
+        for (start, lanes, block) in self.boxes.range(items.start, items.end) {
+            let mut held = block.holding(p) & lanes;
+            while held != 0 {
+                ids.push(self.ids[start + held.trailing_zeros() as usize]);
+                held &= held - 1;
+            }
+        }
+    }
+
     /// Tests items block by block and hands over runs of admitted ones.
     #[inline(always)]
     pub fn test_items<G: Region, S: Sink, R: Recorder>(
@@ -330,6 +354,15 @@ macro_rules! searched_by_tree {
             self.tree.query(&p, sink, recorder)
         }
 
+        #[inline(always)]
+        fn locate_many<S: $crate::query::ManySink>(
+            &self,
+            points: &[glam::Vec3],
+            sink: &mut S,
+        ) -> std::ops::ControlFlow<()> {
+            $crate::index::batch::locate_many(&self.tree, points, sink)
+        }
+
         fn refit(&mut self, items: &[Aabb], moved: &[$crate::query::ItemId]) -> bool {
             self.tree.refit(items, moved, |_, _| ())
         }
@@ -433,7 +466,6 @@ impl<M: Copy> Stack<M> {
 mod tests {
     use super::*;
     use crate::query::{Count, NoRecorder};
-    use glam::Vec3;
 
     /// A degenerate list of a tree: each node has one leaf and the rest.
     fn comb(items: &[Aabb]) -> PackedTree {
