@@ -8,7 +8,7 @@ use glam::Vec3;
 
 use super::tree::PackedTree;
 use crate::kernel::prefetch;
-use crate::query::{ItemId, ManySink};
+use crate::query::{ItemId, ManySink, NoRecorder};
 
 /// Points that go down together: enough to hide the waits, few enough for what
 /// they ask for to stay in the nearest caches.
@@ -56,14 +56,33 @@ pub fn answer<S: ManySink>(
     ControlFlow::Continue(())
 }
 
-/// [`super::RegionIndex::locate_many`] by the nodes' bounds, for every tree:
-/// each point of a group takes a step along the nodes in turn.
+/// Items from which on a tree's nodes and blocks are waited for: smaller ones
+/// stay in the caches, and steps in turn only cost (docs/adr/0009).
+const WAITS_FROM: usize = 1 << 18;
+
+/// [`super::RegionIndex::locate_many`] by the nodes' bounds, for every tree.
 #[inline(always)]
 pub fn locate_many<S: ManySink>(
     tree: &PackedTree,
     points: &[Vec3],
     sink: &mut S,
 ) -> ControlFlow<()> {
+    if tree.ids().len() >= WAITS_FROM {
+        return in_turn(tree, points, sink);
+    }
+    let mut ids = Vec::new();
+    for (p, point) in points.iter().zip(0..) {
+        ids.clear();
+        // A Vec never breaks off.
+        let _ = tree.query(p, &mut ids, &mut NoRecorder);
+        sink.accept(point, &ids)?;
+    }
+    ControlFlow::Continue(())
+}
+
+/// Each point of a group takes a step along the nodes in turn.
+#[inline(always)]
+fn in_turn<S: ManySink>(tree: &PackedTree, points: &[Vec3], sink: &mut S) -> ControlFlow<()> {
     let nodes = tree.nodes();
     let (mut leaves, mut ids) = (Vec::new(), Vec::new());
     let mut open: Vec<Descent> = Vec::with_capacity(GROUP);
@@ -103,4 +122,55 @@ pub fn locate_many<S: ManySink>(
         leaves.clear();
     }
     ControlFlow::Continue(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Aabb;
+    use crate::index::tree::TreeWriter;
+    use crate::query::Located;
+
+    /// Overlapping boxes in three levels.
+    fn tree() -> PackedTree {
+        let mut writer = TreeWriter::with_capacity(300);
+        let root = writer.open();
+        for branch in 0..10 {
+            let inner = writer.open();
+            for leaf in 0..3 {
+                let node = writer.open();
+                for item in 0..10 {
+                    let id = (branch * 3 + leaf) * 10 + item;
+                    let place = Vec3::new(branch as f32, leaf as f32, item as f32 * 0.3);
+                    writer.push(id, &Aabb::around(place, Vec3::splat(0.75)));
+                }
+                writer.close(node);
+            }
+            writer.close(inner);
+        }
+        writer.close(root);
+        writer.finish()
+    }
+
+    #[test]
+    fn points_that_take_turns_get_what_each_gets_alone() {
+        for tree in [tree(), PackedTree::default()] {
+            let mut points: Vec<Vec3> = (0..150u8)
+                .map(|i| {
+                    Vec3::new(
+                        f32::from(i % 25) * 0.5,
+                        f32::from(i % 7) * 0.5,
+                        f32::from(i % 11) * 0.4,
+                    )
+                })
+                .collect();
+            points[70].y = f32::NAN;
+            let (mut turns, mut alone) = (Located::default(), Located::default());
+            assert!(in_turn(&tree, &points, &mut turns).is_continue());
+            assert!(locate_many(&tree, &points, &mut alone).is_continue());
+            assert_eq!(turns, alone);
+            assert_eq!(turns.len(), points.len());
+            assert_eq!(turns.ids().is_empty(), tree.ids().is_empty());
+        }
+    }
 }

@@ -223,7 +223,7 @@ impl Treelets {
         self.height = self.height.max(depth);
         let branch = &branches[at];
         let is_leaf = branch.upper == 0;
-        let ends = lane >= AXES || (lane > 0 && branch.height as usize % LEVELS == 0);
+        let ends = lane >= AXES || (lane > 0 && (branch.height as usize).is_multiple_of(LEVELS));
         if !is_leaf && !ends {
             self.place(branch, (treelet * CHILDREN + lane) as Place);
             // Used from now on; measured later.

@@ -113,7 +113,7 @@ pub fn count_pass(workload: &Workload, contenders: &[&Built]) -> Vec<Counted> {
     }
     for (counted, contender) in all.iter_mut().zip(contenders) {
         if counted.verdict.status == Status::Ok {
-            counted.verdict = batch_verdict(workload, *contender);
+            counted.verdict = batch_verdict(workload, contender);
         }
     }
     for counted in &mut all {
