@@ -11,7 +11,7 @@ use cullbench::index::{BACKENDS, BuildError, DynIndex, MemoryUsage, StructureSpe
 use cullbench::index::{Bsp, Bvh, FrustumQuery, Linear, LinearScalar, Octree, Quadtree, Wide};
 use cullbench::measure::Workload;
 use cullbench::path::{self, LensDefaults};
-use cullbench::query::{ItemId, Recorder, Sink, View};
+use cullbench::query::{ItemId, ManySink, Recorder, Sink, View};
 use cullbench::scene;
 use cullbench::verify::Reference;
 use glam::Vec3;
@@ -41,6 +41,10 @@ impl<T: RegionIndex, const WHICH: usize> RegionIndex for Variant<T, WHICH> {
         recorder: &mut R,
     ) -> ControlFlow<()> {
         self.0.locate(p, sink, recorder)
+    }
+
+    fn locate_many<S: ManySink>(&self, points: &[Vec3], sink: &mut S) -> ControlFlow<()> {
+        self.0.locate_many(points, sink)
     }
 
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
@@ -83,6 +87,8 @@ const VARIANTS: &[&str] = &[
     "octree:loose=2,leaf=4",
     "octree:depth=3,leaf=1",
     "quadtree:loose=2",
+    "bsp:leaf=1",
+    "bsp:leaf=300",
     "bsp:builder=sah",
     "bsp:builder=oblique,leaf=3",
     "bsp:builder=auto,cut=4",
@@ -96,13 +102,15 @@ conforms! {
     octree_loose: Variant<Octree, 0>;
     octree_shallow: Variant<Octree, 1>;
     quadtree_loose: Variant<Quadtree, 2>;
-    bsp_sah: Variant<Bsp, 3>;
-    bsp_oblique: Variant<Bsp, 4>;
-    bsp_auto: Variant<Bsp, 5>;
-    bvh_fastest: Variant<Bvh, 6>;
-    bvh_large_leaves: Variant<Bvh, 7>;
-    bvh_slowest: Variant<Bvh, 8>;
-    wide_morton: Variant<Wide, 9>;
+    bsp_small_leaves: Variant<Bsp, 3>;
+    bsp_large_leaves: Variant<Bsp, 4>;
+    bsp_sah: Variant<Bsp, 5>;
+    bsp_oblique: Variant<Bsp, 6>;
+    bsp_auto: Variant<Bsp, 7>;
+    bvh_fastest: Variant<Bvh, 8>;
+    bvh_large_leaves: Variant<Bvh, 9>;
+    bvh_slowest: Variant<Bvh, 10>;
+    wide_morton: Variant<Wide, 11>;
 }
 
 #[test]

@@ -6,6 +6,7 @@ use std::io::{self, Write};
 use std::time::Instant;
 
 use anyhow::bail;
+use glam::Vec3;
 use indicatif::ProgressBar;
 use serde::Serialize;
 
@@ -16,6 +17,7 @@ use cullbench::culling::{ARITHMETICS, Arithmetic, CameraView, Culling, CullingTe
 use cullbench::index::{DynIndex, StructureSpec, structures};
 use cullbench::measure::{Contender, Status, Workload, count_pass, judge};
 use cullbench::path::{self, CameraPath};
+use cullbench::query::Located;
 use cullbench::scene::{self, FAMILIES, SAMPLES};
 use cullbench::verify::{
     ErrorCount, RandomCase, Reference, Truth, VOLUME_KINDS, explain_containment,
@@ -394,6 +396,14 @@ fn differ(
             .map(|b| explain_containment(b, case.point))
             .unwrap_or_default();
         return Some(format!("region search: {difference}: {why}"));
+    }
+    let nowhere = Vec3::new(case.point.x, f32::NAN, case.point.z);
+    let mut many = Located::default();
+    index.locate_many(&[case.point, nowhere, case.point], &mut many);
+    if !many.iter().eq([&out[..], &[], &out]) {
+        return Some(format!(
+            "region search: a batch of points is answered otherwise than one by one: {many:?}"
+        ));
     }
     None
 }

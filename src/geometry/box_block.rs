@@ -259,6 +259,12 @@ impl BoxBlock {
         moved
     }
 
+    /// The six rows, each a cache line.
+    #[inline(always)]
+    pub(crate) fn rows(&self) -> &[[f32; LANES]; 6] {
+        &self.rows
+    }
+
     /// The lanes whose closed box holds the point.
     #[inline(always)]
     pub fn holding(&self, p: Vec3) -> LaneMask {

@@ -7,12 +7,14 @@ use std::ops::ControlFlow;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
+use super::batch;
 use super::partition::{Part, Record, Splitter, build_top_down};
 use super::tree::{PackedTree, Stack, seen_by_tree};
+use super::treelets::{DESCENT_LEAF, Treelets};
 use super::{BuildError, MemoryUsage, RegionIndex, check_range, indexable};
 use crate::geometry::{Aabb, Plane, PlaneTree};
 use crate::kernel::BASELINE;
-use crate::query::{ItemId, Recorder, Sink};
+use crate::query::{ItemId, ManySink, Recorder, Sink};
 
 /// A binary space partition (Fuchs, Kedem and Naylor 1980, "On visible surface
 /// generation by a priori tree structures").
@@ -25,8 +27,15 @@ use crate::query::{ItemId, Recorder, Sink};
 /// overlap, it takes both sides where it must.
 pub struct Bsp {
     tree: PackedTree,
-    /// Per node; unused for leaves.
-    splits: Vec<Split>,
+    planes: Planes,
+}
+
+/// What region search goes down by.
+enum Planes {
+    /// Of any direction, one for each node; unused for leaves.
+    Any(Vec<Split>),
+    /// Axis-parallel ones over whole blocks.
+    Axes(Treelets),
 }
 
 /// The direction of a node's plane and how far its two sides reach along it.
@@ -100,6 +109,8 @@ struct PlaneSplitter<'a> {
     params: BspParams,
     imported: Option<&'a PlaneTree>,
     splits: Vec<Split>,
+    /// How many items come before the plane, for each division within a leaf.
+    parts: Vec<u32>,
 }
 
 /// What the splitter knows of a group: the imported node to divide it by.
@@ -145,7 +156,7 @@ impl Splitter for PlaneSplitter<'_> {
         };
         let (normal, back) = match chosen.filter(|(_, back)| (1..records.len()).contains(back)) {
             Some(chosen) => chosen,
-            None => by_median(records, widest_axis(records)),
+            None => between_layers(records),
         };
         self.keep(node, normal);
         parts.push(Part {
@@ -156,6 +167,17 @@ impl Splitter for PlaneSplitter<'_> {
             items: records.len() - back,
             cell: Some(None),
         });
+    }
+
+    fn arrange(&mut self, records: &mut [Record]) {
+        if self.params.builder != BspBuilder::Median || records.len() <= DESCENT_LEAF {
+            return;
+        }
+        let (_, back) = between_layers(records);
+        self.parts.push(back as u32);
+        let (back, front) = records.split_at_mut(back);
+        self.arrange(back);
+        self.arrange(front);
     }
 }
 
@@ -205,6 +227,38 @@ fn by_median(records: &mut [Record], normal: Vec3) -> (Vec3, usize) {
         a_at.total_cmp(&b_at).then(a.id.cmp(&b.id))
     });
     (normal, half)
+}
+
+/// The median along the widest axis, or beside it where it would part items of
+/// one centre: regions that tile space lie in layers, and a plane between two
+/// layers cuts none of them. Axis after axis, widest first; a side gets at
+/// least a quarter of the items, or else the layer is parted after all.
+fn between_layers(records: &mut [Record]) -> (Vec3, usize) {
+    let centres = centres(records);
+    let width = centres.max * 0.5 - centres.min * 0.5;
+    let mut axes = [0, 1, 2];
+    axes.sort_by(|&a, &b| width[b].total_cmp(&width[a]));
+    let (count, half) = (records.len(), records.len() / 2);
+    for axis in axes {
+        let at = |r: &Record| r.bounds.centre()[axis];
+        records.select_nth_unstable_by(half, |a, b| at(a).total_cmp(&at(b)).then(a.id.cmp(&b.id)));
+        let middle = at(&records[half]);
+        let below = records[..half].iter().filter(|r| at(r) < middle).count();
+        let above = half + records[half..].iter().filter(|r| at(r) <= middle).count();
+        let nearest = if half - below <= above - half {
+            below
+        } else {
+            above
+        };
+        if nearest.min(count - nearest) * 4 >= count {
+            let back = divide(records, |r| match nearest == below {
+                true => at(r) < middle,
+                false => at(r) <= middle,
+            });
+            return (AXES[axis], back);
+        }
+    }
+    by_median(records, AXES[axes[0]])
 }
 
 /// Bins per axis of the surface area heuristic.
@@ -374,21 +428,30 @@ impl RegionIndex for Bsp {
             params: *params,
             imported,
             splits: Vec::new(),
+            parts: Vec::new(),
         };
         let root = imported.and_then(|planes| planes.root);
         let tree = build_top_down(items, &ids, params.leaf as usize, root, &mut splitter);
+        if params.builder == BspBuilder::Median {
+            let planes = Planes::Axes(Treelets::over(&tree, splitter.parts));
+            return Ok(Bsp { tree, planes });
+        }
         let mut splits = splitter.splits;
         splits.resize(tree.nodes().len(), Split::NONE);
         splits.shrink_to_fit();
         for node in 0..splits.len() {
             measure_reach(&mut splits, &tree, node);
         }
-        Ok(Bsp { tree, splits })
+        let planes = Planes::Any(splits);
+        Ok(Bsp { tree, planes })
     }
 
     fn memory(&self) -> MemoryUsage {
         let mut memory = self.tree.memory();
-        memory.node_bytes += size_of_val(&self.splits[..]);
+        memory.node_bytes += match &self.planes {
+            Planes::Any(splits) => size_of_val(&splits[..]),
+            Planes::Axes(treelets) => treelets.bytes(),
+        };
         memory
     }
 
@@ -400,6 +463,10 @@ impl RegionIndex for Bsp {
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()> {
+        let splits = match &self.planes {
+            Planes::Any(splits) => splits,
+            Planes::Axes(treelets) => return treelets.locate(&self.tree, p, sink, recorder),
+        };
         let nodes = self.tree.nodes();
         let mut open = Stack::new((0, ()));
         while let Some((at, ())) = open.pop() {
@@ -412,7 +479,7 @@ impl RegionIndex for Bsp {
                         .test_items(BASELINE, node.items(), &p, (), sink, recorder)?;
                     break;
                 }
-                let split = &self.splits[at];
+                let split = &splits[at];
                 let value = split.along().value_at(p);
                 let front = nodes[at + 1].after();
                 // Not `<=`: a NaN (coordinates beyond f32) enters both sides.
@@ -432,10 +499,20 @@ impl RegionIndex for Bsp {
         ControlFlow::Continue(())
     }
 
+    #[inline(always)]
+    fn locate_many<S: ManySink>(&self, points: &[Vec3], sink: &mut S) -> ControlFlow<()> {
+        match &self.planes {
+            Planes::Any(_) => batch::locate_many(&self.tree, points, sink),
+            Planes::Axes(treelets) => treelets.locate_many(&self.tree, points, sink),
+        }
+    }
+
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        let splits = &mut self.splits;
-        self.tree
-            .refit(items, moved, |tree, node| measure_reach(splits, tree, node))
+        let planes = &mut self.planes;
+        self.tree.refit(items, moved, |tree, node| match planes {
+            Planes::Any(splits) => measure_reach(splits, tree, node),
+            Planes::Axes(treelets) => treelets.measure(tree, node),
+        })
     }
 }
 

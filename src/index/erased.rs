@@ -11,7 +11,7 @@ use super::{
 };
 use crate::geometry::{Aabb, ConvexVolume, PlaneTree};
 use crate::kernel::{Isa, Kernel, Work};
-use crate::query::{AnyView, ItemId, NoRecorder, QueryCost, Recorder, View};
+use crate::query::{AnyView, ItemId, Located, ManySink, NoRecorder, QueryCost, Recorder, View};
 use crate::spec::{Spec, SpecError};
 
 /// A built structure of any kind. Answers are appended to `out`.
@@ -33,6 +33,18 @@ pub trait DynIndex: Send + Sync {
     fn locate(&self, p: Vec3, out: &mut Vec<ItemId>);
     /// The same search with its cost added up.
     fn locate_counted(&self, p: Vec3, out: &mut Vec<ItemId>, cost: &mut QueryCost);
+    /// Searches for many points at once; `out` is cleared first. The timed
+    /// path.
+    fn locate_many(&self, points: &[Vec3], out: &mut Located) {
+        out.clear();
+        let mut ids = Vec::new();
+        for (&p, point) in points.iter().zip(0..) {
+            ids.clear();
+            self.locate(p, &mut ids);
+            // The collector never breaks off.
+            let _ = out.accept(point, &ids);
+        }
+    }
     /// See [`RegionIndex::refit`].
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool;
 }
@@ -56,6 +68,15 @@ impl<T: FrustumQuery> DynIndex for T {
 
     fn locate_counted(&self, p: Vec3, out: &mut Vec<ItemId>, cost: &mut QueryCost) {
         locate(self, p, out, cost);
+    }
+
+    fn locate_many(&self, points: &[Vec3], out: &mut Located) {
+        out.clear();
+        Kernel::chosen().run(LocateMany {
+            index: self,
+            points,
+            out,
+        });
     }
 
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
@@ -97,6 +118,23 @@ impl<T: RegionIndex, R: Recorder> Work for Locate<'_, T, R> {
     #[inline(always)]
     fn run<I: Isa>(self, _: I) {
         let _ = self.index.locate(self.p, self.out, self.recorder);
+    }
+}
+
+/// A batch of region searches as the chosen kernel does it.
+struct LocateMany<'a, T> {
+    index: &'a T,
+    points: &'a [Vec3],
+    out: &'a mut Located,
+}
+
+impl<T: RegionIndex> Work for LocateMany<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Isa>(self, _: I) {
+        // The collector never breaks off.
+        let _ = self.index.locate_many(self.points, self.out);
     }
 }
 

@@ -2,6 +2,7 @@
 //! file beside this one and a row in [`BACKENDS`]; list, run, query, verify,
 //! benches and conformance tests pick it up from there.
 
+mod batch;
 mod block_order;
 mod bsp;
 mod bundles;
@@ -16,6 +17,7 @@ mod quadtree;
 mod quantised;
 mod replay;
 mod tree;
+mod treelets;
 mod wide;
 
 use std::ops::{ControlFlow, Range};
@@ -26,7 +28,7 @@ use serde::de::DeserializeOwned;
 
 use crate::geometry::{Aabb, PlaneTree};
 use crate::kernel::Isa;
-use crate::query::{ItemId, NoRecorder, Ranges, Recorder, Sink, View};
+use crate::query::{ItemId, ManySink, NoRecorder, Ranges, Recorder, Sink, View};
 
 pub use block_order::BlockOrder;
 pub use bsp::{Bsp, BspBuilder, BspParams};
@@ -107,6 +109,24 @@ pub trait RegionIndex: Sized + Send + Sync {
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()>;
+
+    /// Region search for many points: for every point, in ascending order,
+    /// exactly what [`RegionIndex::locate`] hands over, in the same order, in
+    /// one slice. `Break` if the sink ended the batch.
+    ///
+    /// The default asks one point after the other; a structure that overlaps
+    /// the waits of several descents overrides it.
+    #[inline(always)]
+    fn locate_many<S: ManySink>(&self, points: &[Vec3], sink: &mut S) -> ControlFlow<()> {
+        let mut ids = Vec::new();
+        for (&p, point) in points.iter().zip(0..) {
+            ids.clear();
+            // A Vec never breaks off.
+            let _ = self.locate(p, &mut ids, &mut NoRecorder);
+            sink.accept(point, &ids)?;
+        }
+        ControlFlow::Continue(())
+    }
 
     /// Takes over the new bounds of `moved` items (`items` holds all bounds,
     /// the new ones included; they are finite) without building anew. False,

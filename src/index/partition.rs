@@ -39,6 +39,9 @@ pub trait Splitter {
         node: usize,
         parts: &mut Vec<Part<Self::Cell>>,
     );
+
+    /// Orders the items of a group that becomes a leaf.
+    fn arrange(&mut self, _records: &mut [Record]) {}
 }
 
 /// Builds a tree over the items `ids`, with at most `leaf` items a leaf.
@@ -90,6 +93,7 @@ pub fn build_top_down<S: Splitter>(
         let node = writer.open();
         open.push(Task::Leave(node));
         if count <= leaf {
+            splitter.arrange(group);
             for record in group.iter() {
                 writer.push(record.id, &record.bounds);
             }

@@ -6,6 +6,8 @@
 use std::borrow::Borrow;
 use std::ops::{ControlFlow, Range};
 
+use glam::Vec3;
+
 use super::bundles::{Bundles, Leaves};
 use crate::geometry::{Aabb, BoxBlock, BoxBlocks, LaneMask, PlaneMask};
 use crate::kernel::{Isa, prefetch};
@@ -270,6 +272,27 @@ impl PackedTree {
         ControlFlow::Continue(())
     }
 
+    /// Asks for some items, their bounds and ids, ahead of their use.
+    #[inline(always)]
+    pub fn prefetch_items(&self, items: Range<usize>) {
+        for (start, _, block) in self.boxes.range(items.start, items.end) {
+            block.rows().iter().for_each(prefetch);
+            prefetch(&self.ids[start]);
+        }
+    }
+
+    /// Appends the ids of those items whose closed box holds `p`.
+    #[inline(always)]
+    pub fn collect_holding(&self, items: Range<usize>, p: Vec3, ids: &mut Vec<ItemId>) {
+        for (start, lanes, block) in self.boxes.range(items.start, items.end) {
+            let mut held = block.holding(p) & lanes;
+            while held != 0 {
+                ids.push(self.ids[start + held.trailing_zeros() as usize]);
+                held &= held - 1;
+            }
+        }
+    }
+
     /// Tests items block by block and hands over runs of admitted ones.
     #[inline(always)]
     pub fn test_items<I: Isa, G: Region, S: Sink, R: Recorder>(
@@ -420,6 +443,15 @@ macro_rules! searched_by_tree {
                 .query($crate::kernel::BASELINE, &p, sink, recorder)
         }
 
+        #[inline(always)]
+        fn locate_many<S: $crate::query::ManySink>(
+            &self,
+            points: &[glam::Vec3],
+            sink: &mut S,
+        ) -> std::ops::ControlFlow<()> {
+            $crate::index::batch::locate_many(&self.tree, points, sink)
+        }
+
         fn refit(&mut self, items: &[Aabb], moved: &[$crate::query::ItemId]) -> bool {
             self.tree.refit(items, moved, |_, _| ())
         }
@@ -537,7 +569,6 @@ mod tests {
     use super::*;
     use crate::kernel::BASELINE;
     use crate::query::{Count, NoRecorder};
-    use glam::Vec3;
 
     /// A degenerate list of a tree: each node has one leaf and the rest.
     fn comb(items: &[Aabb]) -> PackedTree {

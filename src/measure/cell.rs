@@ -59,6 +59,7 @@ metrics! {
     "memory_bytes_per_item", "bytes", "nodes, item bounds and ids / items";
     "break_even_queries", "queries", "queries after which the build is repaid against linear; empty if never";
     "locate_ns", "ns", "thread CPU time of a region search at the eye, mean over the path, median over the rounds";
+    "locate_batched_ns", "ns", "thread CPU time of a region search when all points of the path are asked at once, a point; median over the rounds";
     "locate_ratio_to_linear", "1", "as ratio_to_linear, for region search";
     "comparisons", "bounds", "bounds looked at a region search, of nodes and items, mean";
     "regions_found", "regions", "regions that hold the eye, mean over the path";
@@ -204,15 +205,18 @@ pub fn measure_group(
             entry.verdict = Verdict::new(Status::Unsafe, reason);
         }
     }
-    for task in [Task::Query, Task::Locate] {
+    // Single and batched region search share their rounds.
+    for tasks in [&[Task::Query][..], &[Task::Locate, Task::LocateBatched]] {
         let places: Vec<usize> = (0..entries.len()).filter(|&i| entries[i].runs()).collect();
         let running: Vec<(&Built, &Counted)> =
             places.iter().filter_map(|&i| entries[i].passed()).collect();
-        let timed = timed_pass(task, workload, &running, protocol, stop)?;
-        for (i, result) in places.into_iter().zip(timed) {
-            match result {
-                Ok(timed) => entries[i].set(task, timed),
-                Err(verdict) => entries[i].verdict = verdict,
+        let timed = timed_pass(tasks, workload, &running, protocol, stop)?;
+        for (&task, timed) in tasks.iter().zip(timed) {
+            for (&i, result) in places.iter().zip(timed) {
+                match result {
+                    Ok(timed) => entries[i].set(task, timed),
+                    Err(verdict) => entries[i].verdict = verdict,
+                }
             }
         }
     }
@@ -239,7 +243,11 @@ pub fn measure_group(
     let samples = entries
         .iter()
         .flat_map(|e| {
-            let tasks = [(Task::Query, &e.query), (Task::Locate, &e.locate)];
+            let tasks = [
+                (Task::Query, &e.query),
+                (Task::Locate, &e.locate),
+                (Task::LocateBatched, &e.locate_batched),
+            ];
             tasks.into_iter().flat_map(move |(task, timed)| {
                 let samples = timed.iter().flat_map(|t| t.samples.iter());
                 samples.map(move |s| (e.contender.label(), task, *s))
@@ -261,6 +269,7 @@ struct Entry<'a> {
     judged: Option<Judged>,
     query: Option<Timed>,
     locate: Option<Timed>,
+    locate_batched: Option<Timed>,
 }
 
 impl<'a> Entry<'a> {
@@ -276,6 +285,7 @@ impl<'a> Entry<'a> {
             judged: None,
             query: None,
             locate: None,
+            locate_batched: None,
         }
     }
 
@@ -291,6 +301,7 @@ impl<'a> Entry<'a> {
         match task {
             Task::Query => self.query = Some(timed),
             Task::Locate => self.locate = Some(timed),
+            Task::LocateBatched => self.locate_batched = Some(timed),
         }
     }
 
@@ -316,6 +327,10 @@ impl<'a> Entry<'a> {
         }
         if let (true, Some(query), Some(locate)) = (self.runs(), &self.query, &self.locate) {
             time_metrics(&mut metrics, query, locate);
+            if let Some(batched) = &self.locate_batched {
+                let each = bootstrap_median(&batched.round_means(), 1);
+                metrics.estimate("locate_batched_ns", each);
+            }
             if let Some(linear) = yardstick.filter(|y| y.runs()) {
                 self.compare(&mut metrics, linear);
             }

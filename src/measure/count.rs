@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::contender::guarded;
 use super::{Built, Status, Verdict, Workload};
-use crate::query::{ItemId, QueryCost};
+use crate::query::{ItemId, Located, QueryCost};
 use crate::verify::{
     Difference, ErrorCount, Reference, Truth, explain_containment, explain_visibility,
 };
@@ -111,10 +111,34 @@ pub fn count_pass(workload: &Workload, contenders: &[&Built]) -> Vec<Counted> {
             });
         }
     }
+    for (counted, contender) in all.iter_mut().zip(contenders) {
+        if counted.verdict.status == Status::Ok {
+            counted.verdict = batch_verdict(workload, contender);
+        }
+    }
     for counted in &mut all {
         note_scan(counted, items.len());
     }
     all
+}
+
+/// Whether all points of the path asked at once get what each got alone, which
+/// has been compared with the reference.
+fn batch_verdict(workload: &Workload, contender: &Built) -> Verdict {
+    let (mut many, mut alone) = (Located::default(), Vec::new());
+    let index = contender.regions();
+    if let Err(panicked) = guarded(|| index.locate_many(&workload.points, &mut many)) {
+        return panicked;
+    }
+    for (n, &p) in workload.points.iter().enumerate() {
+        alone.clear();
+        index.locate(p, &mut alone);
+        if many.len() != workload.points.len() || many.of(n) != alone {
+            let reason = format!("point {n} of a batch is answered otherwise than alone");
+            return Verdict::new(Status::Wrong, reason);
+        }
+    }
+    Verdict::ok()
 }
 
 /// How the answers of a workload differ from the truth at camera level.

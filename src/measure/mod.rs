@@ -24,7 +24,8 @@ pub use contender::{Built, Contender, UPDATE_SHARES, move_share};
 pub use count::{Counted, FrameCount, Judged, LocateCount, count_pass, id_sum, judge};
 pub use environment::{Machine, Source, Toolchain};
 pub use timing::{
-    Ask, Competitor, Protocol, Sample, Task, Timed, harness_overhead_ns, timed_pass, timed_rounds,
+    Ask, AskMany, Competitor, Protocol, Sample, Task, Timed, harness_overhead_ns, timed_pass,
+    timed_rounds,
 };
 pub use workload::{Workload, WorkloadError};
 

@@ -2,11 +2,12 @@
 //! warmed up, several queries per clock reading where one is short, and the
 //! caches streamed over between queries when it is to be cold.
 
+use std::cell::RefCell;
 use std::time::{Duration, Instant};
 
 use super::clock::Stopwatch;
 use super::{Built, Counted, Status, Verdict, Workload};
-use crate::query::ItemId;
+use crate::query::{ItemId, Located};
 use crate::scene::Dice;
 
 /// How long and how often to measure.
@@ -42,6 +43,8 @@ pub enum Task {
     Query,
     /// Where is the camera?
     Locate,
+    /// Where are all the cameras of the path? Asked at once.
+    LocateBatched,
 }
 
 impl Task {
@@ -49,6 +52,7 @@ impl Task {
         match self {
             Task::Query => "query",
             Task::Locate => "locate",
+            Task::LocateBatched => "locate_batched",
         }
     }
 }
@@ -99,10 +103,15 @@ impl Timed {
 /// Answers query number n: appends ids to an empty output.
 pub type Ask<'a> = Box<dyn Fn(usize, &mut Vec<ItemId>) + 'a>;
 
+/// Answers several queries at once; the number of ids of them all.
+pub type AskMany<'a> = Box<dyn Fn(&[usize]) -> u64 + 'a>;
+
 /// One that takes part in a timed pass: how it answers query `place`
 /// (appending to an empty output), and what it must return.
 pub struct Competitor<'a> {
     pub ask: Ask<'a>,
+    /// Takes the place of `ask`, and a whole pass is one batch.
+    pub ask_many: Option<AskMany<'a>>,
     /// Number of ids of every query.
     pub expected: Vec<u64>,
     /// Wall time of its slowest query so far: bounds the length of a pass.
@@ -117,7 +126,7 @@ impl<'a> Competitor<'a> {
                 let index = built.items.as_ref();
                 Box::new(move |place, out| index.see(workload.views[place].as_any(), out))
             }
-            Task::Locate => {
+            Task::Locate | Task::LocateBatched => {
                 let index = built.regions();
                 Box::new(move |place, out| {
                     let p = workload.points[place];
@@ -126,11 +135,13 @@ impl<'a> Competitor<'a> {
                 })
             }
         };
+        let ask_many = (task == Task::LocateBatched).then(|| located_at_once(workload, built));
         Competitor {
             ask,
+            ask_many,
             expected: match task {
                 Task::Query => counted.frames.iter().map(|f| f.visible).collect(),
-                Task::Locate => counted.locate.found.clone(),
+                Task::Locate | Task::LocateBatched => counted.locate.found.clone(),
             },
             slowest: counted.slowest,
         }
@@ -139,6 +150,9 @@ impl<'a> Competitor<'a> {
     /// Asks the queries of some places; the number of ids returned.
     #[inline]
     fn ask_all(&self, places: &[usize], out: &mut Vec<ItemId>) -> u64 {
+        if let Some(ask_many) = &self.ask_many {
+            return ask_many(places);
+        }
         let mut returned = 0;
         for &place in places {
             out.clear();
@@ -149,20 +163,52 @@ impl<'a> Competitor<'a> {
     }
 }
 
-/// Times all contenders that counted right on a task of the workload; see
-/// [`timed_rounds`].
+/// Region search for several points of the path in one call. The memory for
+/// points and answers is kept from call to call.
+fn located_at_once<'a>(workload: &'a Workload, built: &'a Built) -> AskMany<'a> {
+    let index = built.regions();
+    let kept = RefCell::new((Vec::new(), Located::default(), Vec::new()));
+    Box::new(move |places| {
+        let (points, located, region) = &mut *kept.borrow_mut();
+        points.clear();
+        points.extend(places.iter().map(|&place| workload.points[place]));
+        index.locate_many(points, located);
+        if workload.scene.regions.are_boxes() {
+            return std::hint::black_box(&*located).ids().len() as u64;
+        }
+        let mut found = 0;
+        for (&p, ids) in points.iter().zip(located.iter()) {
+            region.clear();
+            region.extend_from_slice(ids);
+            workload.refine(p, region);
+            found += std::hint::black_box(&*region).len() as u64;
+        }
+        found
+    })
+}
+
+/// Times all contenders that counted right on some tasks of the workload, all
+/// in the same rounds; see [`timed_rounds`]. For each task what became of each
+/// contender.
 pub fn timed_pass(
-    task: Task,
+    tasks: &[Task],
     workload: &Workload,
     contenders: &[(&Built, &Counted)],
     protocol: &Protocol,
     stop: &dyn Fn() -> bool,
-) -> Option<Vec<Result<Timed, Verdict>>> {
-    let competitors: Vec<Competitor> = contenders
+) -> Option<Vec<Vec<Result<Timed, Verdict>>>> {
+    let mut competitors = Vec::with_capacity(tasks.len() * contenders.len());
+    for &task in tasks {
+        for &(built, counted) in contenders {
+            competitors.push(Competitor::of(task, workload, built, counted));
+        }
+    }
+    let timed = timed_rounds(workload.views.len(), &competitors, protocol, stop)?;
+    let mut timed = timed.into_iter();
+    let by_task = tasks
         .iter()
-        .map(|(built, counted)| Competitor::of(task, workload, built, counted))
-        .collect();
-    timed_rounds(workload.views.len(), &competitors, protocol, stop)
+        .map(|_| timed.by_ref().take(contenders.len()).collect());
+    Some(by_task.collect())
 }
 
 /// Times all competitors on `count` queries each. `stop` ends the pass early
@@ -191,7 +237,9 @@ pub fn timed_rounds(
     });
     let mut batches = Vec::with_capacity(competitors.len());
     for competitor in competitors {
-        batches.push(if protocol.cold {
+        batches.push(if competitor.ask_many.is_some() {
+            count
+        } else if protocol.cold {
             1
         } else {
             batch_size(competitor, &places, protocol.overhead_ns, &mut out)
@@ -326,6 +374,7 @@ impl Sweep {
 pub fn harness_overhead_ns() -> f64 {
     let nothing = Competitor {
         ask: Box::new(|_, _| ()),
+        ask_many: None,
         expected: vec![0],
         slowest: Duration::ZERO,
     };
@@ -387,7 +436,14 @@ mod tests {
             counted[1].frames[20].visible += 1;
         }
         let contenders: Vec<_> = built.iter().zip(&counted).collect();
-        timed_pass(Task::Query, &workload, &contenders, &protocol, &|| false).unwrap()
+        let tasks = [Task::Query, Task::LocateBatched];
+        let mut timed = timed_pass(&tasks, &workload, &contenders, &protocol, &|| false).unwrap();
+        // A pass of the second task is one batch.
+        for batched in timed.pop().unwrap() {
+            let batched = batched.unwrap();
+            assert_eq!(batched.samples.len(), batched.rounds);
+        }
+        timed.pop().unwrap()
     }
 
     #[test]
@@ -409,6 +465,7 @@ mod tests {
     fn a_pass_that_would_take_too_long_is_thinned_out_for_all() {
         let slow = |slowest: Duration| Competitor {
             ask: Box::new(|_, _| ()),
+            ask_many: None,
             expected: vec![0; 40],
             slowest,
         };

@@ -289,6 +289,7 @@ fn competitor<'a>(
 ) -> Competitor<'a> {
     Competitor {
         ask: Box::new(move |n, out| index.see(judged.views[n].as_any(), out)),
+        ask_many: None,
         expected: judged.answers.iter().map(|a| a.len() as u64).collect(),
         slowest,
     }

@@ -2,11 +2,13 @@
 //! asks about, where answers go (sinks) and what is counted on the way (recorders). No
 //! structure and no geometry of its own lives here.
 
+mod many;
 mod recorder;
 mod region;
 mod sink;
 mod view;
 
+pub use many::{Located, ManySink};
 pub use recorder::{NoRecorder, QueryCost, Recorder};
 pub use region::{Containment, Region};
 pub(crate) use sink::Ranges;

@@ -61,7 +61,11 @@ const SHORT: usize = 16 * LANES;
 impl Sink for Vec<ItemId> {
     #[inline(always)]
     fn accept(&mut self, ids: &[ItemId]) -> ControlFlow<()> {
-        self.extend_from_slice(ids);
+        match ids {
+            // Often, and a call to copy four bytes would cost more than they.
+            [id] => self.push(*id),
+            _ => self.extend_from_slice(ids),
+        }
         ControlFlow::Continue(())
     }
 

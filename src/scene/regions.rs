@@ -66,6 +66,12 @@ impl Regions {
         }
     }
 
+    /// Whether a region is the box that is indexed for it, so that
+    /// [`Regions::refine`] has nothing to do.
+    pub fn are_boxes(&self) -> bool {
+        !matches!(self, Regions::Bsp(_))
+    }
+
     /// The reference answer, by the plainest means there are: the map's own
     /// descent, or a look at every box. Ascending ids.
     pub fn holding(&self, p: Vec3, items: &[Aabb]) -> Vec<ItemId> {

@@ -21,7 +21,7 @@ pub fn cells(report: &Value) -> &Vec<Value> {
 /// Metrics that every cell of these scenes has.
 const METRICS: &str = "query_ns ns_per_visible visible_count cull_rate ratio_to_linear \
     nodes_tested items_tested build_ms memory_bytes_per_item \
-    locate_ns comparisons regions_found";
+    locate_ns locate_batched_ns comparisons regions_found";
 
 /// What holds for the files of every run, finished or not: the fields of the
 /// contract, every path with all structures, samples where the cells say.
@@ -99,7 +99,10 @@ pub fn check_run(run: &Path) -> Value {
                 assert_eq!(sample[column], row[column]);
             }
             let time: f64 = sample["cpu_ns"].parse().expect("a number");
-            assert!(time >= 0.0 && ["query", "locate"].contains(&sample["task"].as_str()));
+            assert!(
+                time >= 0.0
+                    && ["query", "locate", "locate_batched"].contains(&sample["task"].as_str())
+            );
         }
         referred += count;
     }

@@ -1,0 +1,488 @@
+//! Region search by axis-parallel planes alone: a k-d tree down to a few items
+//! a leaf, four levels to a node of three cache lines. It owns the planes and
+//! the descents of one point and of many; the items and the upper shape of the
+//! tree are the structure's.
+
+use std::ops::{ControlFlow, Range};
+
+use glam::Vec3;
+
+use super::batch::{Descent, GROUP, answer};
+use super::tree::PackedTree;
+use crate::geometry::{Aabb, LANES};
+use crate::kernel::prefetch;
+use crate::query::{ManySink, Recorder, Sink};
+
+/// Most items of a leaf of the descent: one or two blocks.
+pub const DESCENT_LEAF: usize = LANES;
+
+/// Levels of a binary tree that a treelet decides, and the subtrees below it.
+const LEVELS: usize = 4;
+const CHILDREN: usize = 1 << LEVELS;
+/// The lane that is no plane.
+const AXES: usize = CHILDREN - 1;
+
+/// Four levels of planes (a treelet: Aila and Karras 2010, "Architecture
+/// considerations for tracing incoherent rays"). Lane 0 is the root, lanes 1
+/// and 2 its children, and so on.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+struct Treelet {
+    /// Nothing on the lower side reaches above this. The last lane holds the
+    /// axes instead, two bits for each plane.
+    high: [f32; CHILDREN],
+    /// Nothing on the upper side reaches below this.
+    low: [f32; CHILDREN],
+    /// What lies below the last planes: a treelet, or [`LEAF`] and the number
+    /// of a leaf.
+    children: [u32; CHILDREN],
+}
+
+const LEAF: u32 = 1 << 31;
+
+impl Treelet {
+    /// All goes to the lower side, where a branch ends before the last level.
+    /// NaN compares false, so the upper side is never entered.
+    const UNUSED: Treelet = {
+        let mut high = [f32::INFINITY; CHILDREN];
+        high[AXES] = 0.0;
+        Treelet {
+            high,
+            low: [f32::NAN; CHILDREN],
+            children: [LEAF; CHILDREN],
+        }
+    };
+
+    fn is_unused(&self, lane: usize) -> bool {
+        self.low[lane].is_nan()
+    }
+
+    fn set(&mut self, lane: usize, axis: usize, high: f32, low: f32) {
+        let others = self.high[AXES].to_bits() & !(3 << (2 * lane));
+        self.high[AXES] = f32::from_bits(others | (axis as u32) << (2 * lane));
+        self.high[lane] = high;
+        self.low[lane] = low;
+    }
+
+    /// The children that may hold the point, one bit each. Both sides of a
+    /// plane are closed. None for a NaN.
+    #[inline(always)]
+    fn sides(&self, p: Vec3) -> u32 {
+        let axes = self.high[AXES].to_bits();
+        let mut sides = [0; CHILDREN];
+        // One loop of selects, so that it becomes one vector of sixteen lanes.
+        for lane in 0..CHILDREN {
+            let value = if axes & Y[lane] != 0 { p.y } else { p.x };
+            let value = if axes & Z[lane] != 0 { p.z } else { value };
+            let below = value <= self.high[lane];
+            let above = value >= self.low[lane];
+            let lower = if below { BITS[lane] } else { 0 };
+            let upper = if above { BITS[lane] << 16 } else { 0 };
+            sides[lane] = lower | upper;
+        }
+        let sides = sides.iter().fold(0, |all, side| all | side);
+        let (lower, upper) = (sides as usize, (sides >> 16) as usize);
+        let first = LOWER[lower & TOP] & UPPER[upper & TOP];
+        let last = SPREAD[lower >> TOP_PLANES & LAST] | SPREAD[upper >> TOP_PLANES & LAST] << 1;
+        u32::from(first & last)
+    }
+
+    #[inline(always)]
+    fn prefetch(&self) {
+        prefetch(&self.high);
+        prefetch(&self.low);
+        prefetch(&self.children);
+    }
+}
+
+/// By lane: the bit of its plane, and the bit among the axes that says y or z.
+const BITS: [u32; CHILDREN] = powers_of_two(1, 1);
+const Y: [u32; CHILDREN] = powers_of_two(1, 2);
+const Z: [u32; CHILDREN] = powers_of_two(2, 2);
+
+const fn powers_of_two(first: u32, step: usize) -> [u32; CHILDREN] {
+    let mut bits = [0; CHILDREN];
+    let mut lane = 0;
+    while lane < AXES {
+        bits[lane] = first << (step * lane);
+        lane += 1;
+    }
+    bits
+}
+
+/// Planes above the last level, and as a mask; the last level as a mask.
+const TOP_PLANES: usize = CHILDREN / 2 - 1;
+const TOP: usize = (1 << TOP_PLANES) - 1;
+const LAST: usize = (1 << (CHILDREN / 2)) - 1;
+
+/// For the planes above the last level whose lower (upper) side the point is
+/// on: the children that lie on the wrong side of none of those that have them
+/// on that side.
+static LOWER: [u16; TOP + 1] = reachable(0);
+static UPPER: [u16; TOP + 1] = reachable(1);
+
+const fn reachable(side: usize) -> [u16; TOP + 1] {
+    let mut table = [0; TOP + 1];
+    let mut planes = 0;
+    while planes < table.len() {
+        let mut child = 0;
+        while child < CHILDREN {
+            let mut open = true;
+            let mut depth = 0;
+            while depth < LEVELS - 1 {
+                // The plane at this depth on the way to the child, and the
+                // side that the way takes there.
+                let plane = (1 << depth) - 1 + (child >> (LEVELS - depth));
+                let turn = child >> (LEVELS - 1 - depth) & 1;
+                open &= turn != side || planes >> plane & 1 == 1;
+                depth += 1;
+            }
+            if open {
+                table[planes] |= 1 << child;
+            }
+            child += 1;
+        }
+        planes += 1;
+    }
+    table
+}
+
+/// The bits of a byte at the even places: the lower children of the planes of
+/// the last level.
+static SPREAD: [u16; LAST + 1] = {
+    let mut table = [0; LAST + 1];
+    let mut planes = 0;
+    while planes < table.len() {
+        let mut plane = 0;
+        while plane < CHILDREN / 2 {
+            table[planes] |= (planes as u16 >> plane & 1) << (2 * plane);
+            plane += 1;
+        }
+        planes += 1;
+    }
+    table
+};
+
+/// The planes over a binary tree.
+#[derive(Clone, Default, Debug)]
+pub struct Treelets {
+    treelets: Vec<Treelet>,
+    /// The first item of each leaf, and the end of the last one.
+    starts: Vec<u32>,
+    /// For each node of the tree its [`Place`].
+    places: Vec<Place>,
+    /// Most treelets on a way from the root to a leaf.
+    height: usize,
+}
+
+/// Where a plane or a leaf stands: sixteen times its treelet plus its lane, or
+/// [`LEAF`] and the number of a leaf.
+type Place = u32;
+
+/// The binary tree before it is cut into treelets, in depth-first order.
+struct Branch {
+    /// The branch of the upper side; 0 for a leaf.
+    upper: usize,
+    /// Levels of planes from here down to the deepest leaf.
+    height: u32,
+    /// First item.
+    first: u32,
+    /// The node of the structure's tree, if it has one.
+    node: Option<u32>,
+}
+
+impl Treelets {
+    /// The planes over a binary tree, continued below its leaves: `parts` says
+    /// how many items come before the plane, for each division of more than
+    /// [`DESCENT_LEAF`] items in depth-first order. O(n).
+    pub fn over(tree: &PackedTree, parts: impl IntoIterator<Item = u32>) -> Treelets {
+        let mut treelets = Treelets {
+            places: vec![LEAF; tree.nodes().len()],
+            ..Treelets::default()
+        };
+        if tree.nodes().is_empty() {
+            return treelets;
+        }
+        let mut branches = Vec::new();
+        grow(tree, 0, &mut parts.into_iter(), &mut branches);
+        treelets.treelets.push(Treelet::UNUSED);
+        treelets.cut(&branches, 0, 0, 0, 1);
+        treelets.starts.push(tree.ids().len() as u32);
+        treelets.treelets.shrink_to_fit();
+        treelets.starts.shrink_to_fit();
+        for node in (0..tree.nodes().len()).rev() {
+            treelets.measure(tree, node);
+        }
+        treelets
+    }
+
+    /// Puts a branch in a lane of a treelet, and all that is below it where it
+    /// belongs. A new treelet begins where four levels or a multiple of four
+    /// are left: those above the leaves are then full.
+    fn cut(&mut self, branches: &[Branch], at: usize, treelet: usize, lane: usize, depth: usize) {
+        self.height = self.height.max(depth);
+        let branch = &branches[at];
+        let is_leaf = branch.upper == 0;
+        let ends = lane >= AXES || (lane > 0 && (branch.height as usize).is_multiple_of(LEVELS));
+        if !is_leaf && !ends {
+            self.place(branch, (treelet * CHILDREN + lane) as Place);
+            // Used from now on; measured later.
+            self.treelets[treelet].low[lane] = f32::INFINITY;
+            self.cut(branches, at + 1, treelet, 2 * lane + 1, depth);
+            self.cut(branches, branch.upper, treelet, 2 * lane + 2, depth);
+            return;
+        }
+        let mut lane = lane;
+        while lane < AXES {
+            lane = 2 * lane + 1;
+        }
+        let child = lane - AXES;
+        if is_leaf {
+            let leaf = LEAF | self.starts.len() as u32;
+            self.treelets[treelet].children[child] = leaf;
+            self.starts.push(branch.first);
+            self.place(branch, leaf);
+        } else {
+            let below = self.treelets.len();
+            self.treelets[treelet].children[child] = below as u32;
+            self.treelets.push(Treelet::UNUSED);
+            self.cut(branches, at, below, 0, depth + 1);
+        }
+    }
+
+    fn place(&mut self, branch: &Branch, place: Place) {
+        if let Some(node) = branch.node {
+            self.places[node as usize] = place;
+        }
+    }
+
+    /// Takes the plane of a node, and those below it if it is a leaf, from the
+    /// tree's bounds.
+    pub fn measure(&mut self, tree: &PackedTree, node: usize) {
+        let place = self.places[node];
+        if tree.is_leaf(node) {
+            self.measure_below(tree, place);
+        } else {
+            let lower = &tree.nodes()[node + 1];
+            let upper = &tree.nodes()[lower.after()];
+            self.part(place, &lower.bounds, &upper.bounds);
+        }
+    }
+
+    /// Down to the leaves; the bounds of all items.
+    fn measure_below(&mut self, tree: &PackedTree, place: Place) -> Aabb {
+        if place & LEAF != 0 {
+            let bounds = self.items(place).map(|place| tree.boxes().get(place));
+            return bounds.fold(Aabb::EMPTY, |all, b| all.union(&b));
+        }
+        let lower = self.measure_below(tree, self.below(place, 0));
+        if self.treelets[place as usize / CHILDREN].is_unused(place as usize % CHILDREN) {
+            return lower;
+        }
+        let upper = self.measure_below(tree, self.below(place, 1));
+        self.part(place, &lower, &upper);
+        lower.union(&upper)
+    }
+
+    /// The place of the lower or the upper side of a plane.
+    fn below(&self, place: Place, side: usize) -> Place {
+        let (treelet, lane) = (place as usize / CHILDREN, place as usize % CHILDREN);
+        let lane = 2 * lane + 1 + side;
+        match lane.checked_sub(AXES) {
+            None => (treelet * CHILDREN + lane) as Place,
+            Some(child) => match self.treelets[treelet].children[child] {
+                leaf if leaf & LEAF != 0 => leaf,
+                below => below * CHILDREN as u32,
+            },
+        }
+    }
+
+    /// The plane between two parts: across the axis on which they share least
+    /// of their extent.
+    fn part(&mut self, place: Place, lower: &Aabb, upper: &Aabb) {
+        let shared = (lower.max - upper.min) / lower.union(upper).extent();
+        // A NaN (no extent, or one beyond f32) is as bad as all of it.
+        let shared = |axis: usize| match shared[axis] {
+            share if share < 1.0 => share,
+            _ => 1.0,
+        };
+        let best = (0..3).min_by(|&a, &b| shared(a).total_cmp(&shared(b)));
+        let axis = best.unwrap_or(0);
+        let (treelet, lane) = (place as usize / CHILDREN, place as usize % CHILDREN);
+        self.treelets[treelet].set(lane, axis, lower.max[axis], upper.min[axis]);
+    }
+
+    /// Heap bytes.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.treelets[..])
+            + size_of_val(&self.starts[..])
+            + size_of_val(&self.places[..])
+    }
+
+    /// The items of a leaf.
+    #[inline(always)]
+    fn items(&self, leaf: u32) -> Range<usize> {
+        let leaf = (leaf & !LEAF) as usize;
+        self.starts[leaf] as usize..self.starts[leaf + 1] as usize
+    }
+
+    /// Hands every item whose closed box holds `p` to the sink, in tree order.
+    #[inline(always)]
+    pub fn locate<S: Sink, R: Recorder>(
+        &self,
+        tree: &PackedTree,
+        p: Vec3,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        if self.treelets.is_empty() {
+            return ControlFlow::Continue(());
+        }
+        // The treelets above the present one with the children still to be
+        // entered.
+        let mut above = [(0, 0); MOST_HEIGHT];
+        let mut level = 0;
+        let (mut at, mut open) = (0, self.open(0, p, recorder));
+        loop {
+            if open == 0 {
+                if level == 0 {
+                    return ControlFlow::Continue(());
+                }
+                level -= 1;
+                (at, open) = above[level];
+                continue;
+            }
+            let child = self.treelets[at].children[open.trailing_zeros() as usize];
+            open &= open - 1;
+            if child & LEAF != 0 {
+                let items = self.items(child);
+                tree.prefetch_items(items.clone());
+                tree.test_items(items, &p, (), sink, recorder)?;
+            } else {
+                if open != 0 {
+                    above[level] = (at, open);
+                    level += 1;
+                }
+                at = child as usize;
+                open = self.open(at, p, recorder);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn open<R: Recorder>(&self, at: usize, p: Vec3, recorder: &mut R) -> u32 {
+        (0..AXES).for_each(|_| recorder.node_tested());
+        self.treelets[at].sides(p)
+    }
+
+    /// Searches for many points, a group of them level by level: the loads of
+    /// a level do not wait for each other.
+    #[inline(always)]
+    pub fn locate_many<S: ManySink>(
+        &self,
+        tree: &PackedTree,
+        points: &[Vec3],
+        sink: &mut S,
+    ) -> ControlFlow<()> {
+        let (mut now, mut next, mut ids) = (Vec::new(), Vec::new(), Vec::new());
+        for (group, first) in points.chunks(GROUP).zip((0..).step_by(GROUP)) {
+            now.clear();
+            if !self.treelets.is_empty() {
+                now.extend((0..group.len() as u32).map(|point| Descent { point, at: 0 }));
+            }
+            // Descents keep the order of their points, and those that have
+            // come to a leaf their place among the others.
+            for _ in 0..self.height {
+                next.clear();
+                for &Descent { point, at } in &now {
+                    if at & LEAF != 0 {
+                        next.push(Descent { point, at });
+                        continue;
+                    }
+                    let treelet = &self.treelets[at as usize];
+                    let mut open = treelet.sides(group[point as usize]);
+                    while open != 0 {
+                        let at = treelet.children[open.trailing_zeros() as usize];
+                        open &= open - 1;
+                        match at & LEAF {
+                            0 => self.treelets[at as usize].prefetch(),
+                            _ => prefetch(&self.starts[(at & !LEAF) as usize]),
+                        }
+                        next.push(Descent { point, at });
+                    }
+                }
+                std::mem::swap(&mut now, &mut next);
+            }
+            let items_of = |leaf| self.items(leaf);
+            answer(tree, group, first, &now, items_of, &mut ids, sink)?;
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+/// The structure's tree from a node down, continued below its leaves.
+fn grow(
+    tree: &PackedTree,
+    node: usize,
+    parts: &mut impl Iterator<Item = u32>,
+    branches: &mut Vec<Branch>,
+) -> u32 {
+    let at = branches.len();
+    let items = tree.nodes()[node].items();
+    branches.push(Branch {
+        upper: 0,
+        height: 0,
+        first: items.start as u32,
+        node: Some(node as u32),
+    });
+    let height = if tree.is_leaf(node) {
+        divide(items, at, parts, branches)
+    } else {
+        let lower = grow(tree, node + 1, parts, branches);
+        branches[at].upper = branches.len();
+        let upper = tree.nodes()[node + 1].after();
+        1 + lower.max(grow(tree, upper, parts, branches))
+    };
+    branches[at].height = height;
+    height
+}
+
+/// Divides the items of the branch `at`, a leaf so far; its height.
+fn divide(
+    items: Range<usize>,
+    at: usize,
+    parts: &mut impl Iterator<Item = u32>,
+    branches: &mut Vec<Branch>,
+) -> u32 {
+    let part = if items.len() > DESCENT_LEAF {
+        parts.next()
+    } else {
+        None
+    };
+    let Some(part) = part else { return 0 };
+    let middle = items.start + part as usize;
+    let mut height = 0;
+    for (side, items) in [items.start..middle, middle..items.end]
+        .into_iter()
+        .enumerate()
+    {
+        let child = branches.len();
+        branches.push(Branch {
+            upper: 0,
+            height: 0,
+            first: items.start as u32,
+            node: None,
+        });
+        if side == 1 {
+            branches[at].upper = child;
+        }
+        branches[child].height = divide(items, child, parts, branches);
+        height = height.max(1 + branches[child].height);
+    }
+    height
+}
+
+/// Treelets above each other: a division leaves a quarter of the items or more
+/// on either side, so there are at most 77 levels of planes over all ids, and
+/// of a treelet's at least one in two is passed.
+const MOST_HEIGHT: usize = 48;
