@@ -9,6 +9,8 @@ mod erased;
 mod linear;
 mod octree;
 mod partition;
+#[cfg(feature = "peers")]
+pub mod peers;
 mod quadtree;
 mod quantised;
 mod tree;
@@ -39,6 +41,12 @@ pub enum BuildError {
     NonFiniteItem { item: usize, bounds: Aabb },
     #[error("{count} items; expected at most {most}")]
     TooManyItems { count: usize, most: usize },
+    /// The structure could, but not in reasonable time or memory.
+    #[error("'{structure}' refuses these items: {reason}")]
+    Refused {
+        structure: &'static str,
+        reason: String,
+    },
     #[error("parameters of '{structure}': {reason}")]
     Params {
         structure: &'static str,

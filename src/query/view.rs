@@ -3,8 +3,8 @@
 //! of them share, and one type for any of them.
 
 use crate::geometry::{
-    Aabb, BoxBlock, ConvexVolume, LaneMask, Plane, PlaneMask, RelativeVolume, Spheres, Upper,
-    WideVolume,
+    Aabb, BoxBlock, ConvexVolume, LaneMask, Plane, PlaneMask, PlaneRows, RelativeVolume, Spheres,
+    Upper, WideVolume,
 };
 
 use super::{Containment, NoRecorder, Recorder, Region};
@@ -40,6 +40,13 @@ pub trait View: Sized {
     /// The lanes that no plane of the mask drops: bit for bit
     /// [`View::drops`], lane by lane.
     fn kept_lanes(&self, block: &BoxBlock, mask: PlaneMask) -> LaneMask;
+
+    /// The open planes side by side, where one box against all of them at once
+    /// is the whole test of nodes and of items; `None` where it is not.
+    #[inline(always)]
+    fn rows(&self) -> Option<PlaneRows> {
+        None
+    }
 
     /// Whether an item belongs to the answer: no plane drops it, and it is not
     /// empty. O(planes).
@@ -124,6 +131,9 @@ impl View for ConvexVolume {
     #[inline(always)]
     fn kept_lanes(&self, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
         block.admitted_by(planes_of(self, mask))
+    }
+    fn rows(&self) -> Option<PlaneRows> {
+        PlaneRows::collect(Bits(self.mask()).map(|plane| self.plane_of_bit(plane)))
     }
 }
 
