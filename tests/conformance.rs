@@ -99,7 +99,7 @@ peers! {
     peer_parry3d_accept: PeerParry3dAccept;
     peer_parry3d_ploc: PeerParry3dPloc;
     peer_rstar: PeerRstar;
-    peer_rstar_tuned: PeerRstarTuned;
+    peer_rstar_accept: PeerRstarAccept;
     peer_bvh: PeerBvh;
     peer_bvh_flat: PeerBvhFlat;
     peer_bvh_arena: PeerBvhArena;

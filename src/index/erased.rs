@@ -212,7 +212,7 @@ pub static BACKENDS: &[Backend] = &[
     #[cfg(feature = "peers")]
     Backend::of::<peers::PeerRstar>(),
     #[cfg(feature = "peers")]
-    Backend::of::<peers::PeerRstarTuned>(),
+    Backend::of::<peers::PeerRstarAccept>(),
     #[cfg(feature = "peers")]
     Backend::of::<peers::PeerBvh>(),
     #[cfg(feature = "peers")]

@@ -86,7 +86,7 @@ impl PeerBvhArena {
 /// scene would be inserted into a list.
 fn shuffled(count: usize) -> impl Iterator<Item = usize> {
     // A step that shares no factor with the count visits every place once.
-    let step = (count as u64 * 0x9E37_79B1 >> 32).max(1);
+    let step = ((count as u64 * 0x9E37_79B1) >> 32).max(1);
     let coprime = (step..).find(|&step| greatest_common_divisor(step, count as u64) <= 1);
     let step = coprime.unwrap_or(1);
     (0..count as u64).map(move |i| (i * step % count as u64) as usize)

@@ -106,7 +106,8 @@ fn corners_within(rows: &PlaneRows, half: Vec3, scene: &Aabb) -> Option<Aabb> {
 fn moved_outward(plane: &Plane, half: DVec3, reach: DVec3) -> Option<Option<Half>> {
     let (normal, d) = (plane.normal.as_dvec3(), f64::from(plane.d));
     let largest = normal.abs().dot(reach) + d.abs();
-    if !(largest < MOST) {
+    // All finite, so never a NaN.
+    if largest >= MOST {
         return None;
     }
     let length = normal.length();

@@ -30,7 +30,7 @@ pub use bvh_arena::PeerBvhArena;
 pub use kiddo::PeerKiddo;
 pub use obvhs::{PeerObvhs, PeerObvhsAabb, PeerObvhsTuned};
 pub use parry3d::{PeerParry3d, PeerParry3dAccept, PeerParry3dPloc};
-pub use rstar::{PeerRstar, PeerRstarTuned};
+pub use rstar::{PeerRstar, PeerRstarAccept};
 pub use uniform_grid::PeerUniformGrid;
 
 /// A peer has nothing to choose: its rows are its variants.
@@ -85,38 +85,64 @@ impl BoxTest for AtOnce {
     }
 }
 
-/// Any other view, plane by plane: right, and not meant to be fast.
-struct PlaneByPlane<'a, V>(&'a V);
+/// Any other view, plane by plane: right, and not meant to be fast. Behind a
+/// pointer, so that a peer's code is compiled for it once and not once a view.
+struct PlaneByPlane<'a>(&'a dyn Planes);
 
-impl<V: View> PlaneByPlane<'_, V> {
-    #[inline(always)]
-    fn any(&self, is_so: impl Fn(u32) -> bool) -> bool {
-        let mask = self.0.mask();
-        (0..crate::geometry::MAX_PLANES as u32).any(|plane| mask >> plane & 1 == 1 && is_so(plane))
+/// A view without its type.
+trait Planes {
+    fn exclude(&self, node: &Aabb) -> bool;
+    fn contain(&self, node: &Aabb) -> bool;
+    fn keep(&self, item: &Aabb) -> bool;
+    fn count(&self) -> u32;
+}
+
+impl<V: View> Planes for V {
+    fn exclude(&self, node: &Aabb) -> bool {
+        let mut mask = self.mask();
+        while mask != 0 {
+            if self.excludes(mask.trailing_zeros(), node) {
+                return true;
+            }
+            mask &= mask - 1;
+        }
+        false
+    }
+    fn contain(&self, node: &Aabb) -> bool {
+        let mut mask = self.mask();
+        while mask != 0 {
+            if !self.contains(mask.trailing_zeros(), node) {
+                return false;
+            }
+            mask &= mask - 1;
+        }
+        true
+    }
+    fn keep(&self, item: &Aabb) -> bool {
+        self.admits(item, self.mask(), &mut NoRecorder)
+    }
+    fn count(&self) -> u32 {
+        self.mask().count_ones()
     }
 }
 
-impl<V: View> BoxTest for PlaneByPlane<'_, V> {
+impl BoxTest for PlaneByPlane<'_> {
     const NODES_AS_ITEMS: bool = false;
 
-    #[inline(always)]
     fn rejects(&self, node: &Aabb) -> bool {
-        self.any(|plane| self.0.excludes(plane, node))
+        self.0.exclude(node)
     }
-    #[inline(always)]
     fn accepts(&self, node: &Aabb) -> bool {
-        !self.any(|plane| !self.0.contains(plane, node))
+        self.0.contain(node)
     }
-    #[inline(always)]
     fn admits(&self, item: &Aabb) -> bool {
-        self.0.admits(item, self.0.mask(), &mut NoRecorder)
+        self.0.keep(item)
     }
     fn centres(&self, _: Vec3, scene: &Aabb) -> Aabb {
         *scene
     }
-    #[inline(always)]
     fn planes(&self) -> u32 {
-        self.0.mask().count_ones()
+        self.0.count()
     }
 }
 

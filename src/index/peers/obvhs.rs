@@ -108,8 +108,7 @@ impl Tree {
     }
 
     /// The walk: pairs of children from a stack, as in the crate's own
-    /// `point_traverse`. A node that is accepted hands its subtree down
-    /// without further tests.
+    /// `point_traverse`.
     #[inline(always)]
     fn walk<T: BoxTest, S: Sink, R: Recorder>(
         &self,
@@ -131,16 +130,14 @@ impl Tree {
         }
         let mut open = Stack::new((root.first_index, ()));
         while let Some((first, ())) = open.pop() {
-            let pair = [&nodes[first as usize], &nodes[first as usize + 1]];
-            for node in pair {
-                if node.is_leaf() && node.prim_count == 1 {
-                    // The leaf's bounds are the item's.
-                    self.leaf(node, test, sink, &tally)?;
-                    continue;
-                }
-                tally.node(test);
-                if test.rejects(&bounds_of(node)) {
-                    continue;
+            for node in [&nodes[first as usize], &nodes[first as usize + 1]] {
+                // A leaf of one item has the item's bounds: no test of its own.
+                let single = node.prim_count == 1;
+                if !single {
+                    tally.node(test);
+                    if test.rejects(&bounds_of(node)) {
+                        continue;
+                    }
                 }
                 if node.is_leaf() {
                     self.leaf(node, test, sink, &tally)?;

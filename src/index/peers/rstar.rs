@@ -4,10 +4,7 @@
 use std::ops::ControlFlow;
 
 use glam::Vec3;
-use rstar::{
-    AABB, ParentNode, RStarInsertionStrategy, RTree, RTreeNode, RTreeObject, RTreeParams,
-    SelectionFunction,
-};
+use rstar::{AABB, ParentNode, RTree, RTreeNode, RTreeObject, SelectionFunction};
 
 use super::{BoxTest, Item, PeerParams, Tally, indexable, located_box_by_box, seen_box_by_box};
 use crate::geometry::{Aabb, PlaneTree};
@@ -51,17 +48,7 @@ impl<T: BoxTest, R: Recorder> SelectionFunction<Item> for Selected<'_, '_, T, R>
     }
 }
 
-/// Nodes of up to 16: fewer, larger ones than rstar's own 6.
-pub struct LargeNodes;
-
-impl RTreeParams for LargeNodes {
-    const MIN_SIZE: usize = 6;
-    const MAX_SIZE: usize = 16;
-    const REINSERTION_COUNT: usize = 4;
-    type DefaultInsertionStrategy = RStarInsertionStrategy;
-}
-
-fn memory<P: RTreeParams>(tree: &RTree<Item, P>) -> MemoryUsage {
+fn memory(tree: &RTree<Item>) -> MemoryUsage {
     fn places(node: &ParentNode<Item>) -> usize {
         let below = node.children().iter().map(|child| match child {
             RTreeNode::Leaf(_) => 0,
@@ -79,10 +66,73 @@ fn memory<P: RTreeParams>(tree: &RTree<Item, P>) -> MemoryUsage {
     }
 }
 
+/// `locate_with_selection_function`: its iterator over the items that the
+/// selection lets pass.
+#[inline(always)]
+fn select<T: BoxTest, S: Sink, R: Recorder>(
+    tree: &RTree<Item>,
+    test: &T,
+    sink: &mut S,
+    recorder: &mut R,
+) -> ControlFlow<()> {
+    let tally = Tally::new(recorder);
+    let selected = Selected {
+        test,
+        tally: &tally,
+    };
+    for item in tree.locate_with_selection_function(selected) {
+        sink.accept(std::slice::from_ref(&item.id))?;
+    }
+    ControlFlow::Continue(())
+}
+
+/// Its public nodes from the root on, as its iterator goes through them;
+/// a node that is accepted hands its subtree down without further tests.
+#[inline(always)]
+fn walk<T: BoxTest, S: Sink, R: Recorder>(
+    tree: &RTree<Item>,
+    test: &T,
+    sink: &mut S,
+    recorder: &mut R,
+) -> ControlFlow<()> {
+    let tally = Tally::new(recorder);
+    let root = tree.root();
+    tally.node(test);
+    if root.children().is_empty() || test.rejects(&bounds_of(&root.envelope())) {
+        return ControlFlow::Continue(());
+    }
+    let mut open = vec![(root, false)];
+    while let Some((parent, inside)) = open.pop() {
+        for child in parent.children() {
+            match child {
+                RTreeNode::Leaf(item) if inside => {
+                    tally.count(|recorder| recorder.subtree_accepted(1));
+                    sink.accept(std::slice::from_ref(&item.id))?;
+                }
+                RTreeNode::Leaf(item) => {
+                    tally.item(test);
+                    if test.admits(&item.bounds) {
+                        sink.accept(std::slice::from_ref(&item.id))?;
+                    }
+                }
+                RTreeNode::Parent(node) if inside => open.push((node, true)),
+                RTreeNode::Parent(node) => {
+                    tally.node(test);
+                    let bounds = bounds_of(&node.envelope());
+                    if !test.rejects(&bounds) {
+                        open.push((node, test.accepts(&bounds)));
+                    }
+                }
+            }
+        }
+    }
+    ControlFlow::Continue(())
+}
+
 macro_rules! peer {
-    ($(#[$doc:meta])* $peer:ident, $name:literal, $summary:literal, $params:ty) => {
+    ($(#[$doc:meta])* $peer:ident, $name:literal, $summary:literal, $search:ident) => {
         $(#[$doc])*
-        pub struct $peer(RTree<Item, $params>);
+        pub struct $peer(RTree<Item>);
 
         impl $peer {
             #[inline(always)]
@@ -92,12 +142,7 @@ macro_rules! peer {
                 sink: &mut S,
                 recorder: &mut R,
             ) -> ControlFlow<()> {
-                let tally = Tally::new(recorder);
-                let selected = Selected { test, tally: &tally };
-                for item in self.0.locate_with_selection_function(selected) {
-                    sink.accept(std::slice::from_ref(&item.id))?;
-                }
-                ControlFlow::Continue(())
+                $search(&self.0, test, sink, recorder)
             }
         }
 
@@ -111,7 +156,7 @@ macro_rules! peer {
                 _: Option<&PlaneTree>,
                 _: &PeerParams,
             ) -> Result<Self, BuildError> {
-                Ok($peer(RTree::bulk_load_with_params(indexable(items)?)))
+                Ok($peer(RTree::bulk_load(indexable(items)?)))
             }
 
             fn memory(&self) -> MemoryUsage {
@@ -126,17 +171,17 @@ macro_rules! peer {
 }
 
 peer!(
-    /// Its defaults: nodes of up to six.
+    /// Its own iterator.
     PeerRstar,
     "peer-rstar",
-    "crate rstar, bulk-loaded, nodes of 6, asked through a selection function",
-    rstar::DefaultParams
+    "crate rstar, bulk-loaded, asked through a selection function",
+    select
 );
 
 peer!(
-    /// Larger nodes.
-    PeerRstarTuned,
-    "peer-rstar-tuned",
-    "crate rstar, bulk-loaded, nodes of 16, asked through a selection function",
-    LargeNodes
+    /// Its nodes.
+    PeerRstarAccept,
+    "peer-rstar-accept",
+    "crate rstar, bulk-loaded, its nodes walked from the root, whole subtrees accepted",
+    walk
 );
