@@ -5,7 +5,8 @@
 use std::collections::BTreeMap;
 
 use cullbench::geometry::Aabb;
-use cullbench::index::{DynIndex, StructureSpec};
+use cullbench::index::{BuildError, DynIndex, StructureSpec};
+use cullbench::measure::{Verdict, guarded};
 use cullbench::query::{ItemId, QueryCost};
 use cullbench::scene::Scene;
 
@@ -32,13 +33,22 @@ pub fn ask_all(
     let mut answers: Vec<Vec<Answer>> = (0..questions).map(|_| Vec::new()).collect();
     let mut out = Vec::new();
     for spec in structures {
-        let index = spec
-            .build_with(boxes, scene.own_tree.as_ref())
-            .map_err(|error| anyhow::anyhow!("structure '{}': {error}", spec.label))?;
+        let failed = |why: String| anyhow::anyhow!("structure '{}': {why}", spec.label);
+        let panicked = |verdict: Verdict| failed(verdict.reason.unwrap_or_default());
+        let built = guarded(|| spec.build_with(boxes, scene.own_tree.as_ref()));
+        let index = match built.map_err(panicked)? {
+            Ok(index) => index,
+            // One of many: the others' answers are worth having.
+            Err(error @ BuildError::Refused { .. }) if structures.len() > 1 => {
+                super::tell(&format!("left out: {error}"));
+                continue;
+            }
+            Err(error) => return Err(failed(error.to_string())),
+        };
         for (question, row) in answers.iter_mut().enumerate() {
             out.clear();
             let mut cost = QueryCost::default();
-            ask(index.as_ref(), question, &mut out, &mut cost);
+            guarded(|| ask(index.as_ref(), question, &mut out, &mut cost)).map_err(panicked)?;
             if keep_ids {
                 out.sort_unstable();
             }
@@ -82,4 +92,61 @@ pub fn all_agree(answers: &[Answer], what: &str) -> bool {
 pub fn joined(ids: &[ItemId]) -> String {
     let texts: Vec<String> = ids.iter().map(ItemId::to_string).collect();
     texts.join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use cullbench::index::Backend;
+    use serde_json::Value;
+
+    static PANICS: Backend = Backend {
+        name: "panics",
+        summary: "",
+        build: |_, _, _| panic!("deep in a peer's code"),
+        params: |_| Ok(Value::Null),
+    };
+    static REFUSES: Backend = Backend {
+        name: "refuses",
+        summary: "",
+        build: |_, _, _| {
+            Err(BuildError::Refused {
+                structure: "refuses",
+                reason: "too many alike".to_owned(),
+            })
+        },
+        params: |_| Ok(Value::Null),
+    };
+
+    fn of(backend: &'static Backend) -> StructureSpec {
+        StructureSpec {
+            label: backend.name.to_owned(),
+            backend,
+            params: Value::Null,
+        }
+    }
+
+    fn asked(structures: &[StructureSpec], panics: bool) -> Result<Vec<Answer>, String> {
+        let scene = cullbench::scene::load("uniform:n=10", &Default::default()).expect("uniform");
+        let ask = |_: &dyn DynIndex, _, out: &mut Vec<ItemId>, _: &mut QueryCost| {
+            assert!(!panics, "deep in a peer's query");
+            out.push(7);
+        };
+        ask_all(structures, &scene, &scene.items, 2, true, ask).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_panic_is_one_line_and_a_refusal_leaves_the_others() {
+        let linear = StructureSpec::parse("linear").expect("linear");
+        let error = asked(&[linear.clone(), of(&PANICS)], false).err();
+        let wanted = "structure 'panics': panicked: deep in a peer's code";
+        assert_eq!(error.as_deref(), Some(wanted));
+        let error = asked(std::slice::from_ref(&linear), true).err();
+        let wanted = "structure 'linear': panicked: deep in a peer's query";
+        assert_eq!(error.as_deref(), Some(wanted));
+        let answers = asked(&[of(&REFUSES), linear], false).expect("linear answers");
+        assert!(answers.len() == 2 && answers.iter().all(|a| a.structure == "linear"));
+        let error = asked(&[of(&REFUSES)], false).err().unwrap_or_default();
+        assert!(error.contains("too many alike"), "{error}");
+    }
 }

@@ -14,8 +14,8 @@ use super::args::{TableFormat, VerifyArgs};
 use super::{Ending, interrupt, load_scene, tell, text, unread_is_fine};
 use cullbench::camera::{DEFAULT_EPSILON, PlaneMethod};
 use cullbench::culling::{ARITHMETICS, Arithmetic, CameraView, Culling, CullingTest, TESTS};
-use cullbench::index::{DynIndex, StructureSpec, structures};
-use cullbench::measure::{Contender, Status, Workload, count_pass, judge};
+use cullbench::index::{BuildError, DynIndex, StructureSpec, structures};
+use cullbench::measure::{Contender, Status, Workload, count_pass, guarded, judge};
 use cullbench::path::{self, CameraPath};
 use cullbench::query::Located;
 use cullbench::scene::{self, FAMILIES, SAMPLES};
@@ -354,12 +354,17 @@ fn random_cases(structures: &[StructureSpec], seed: u64, cases: u64) -> Vec<Chec
             if check.difference.is_some() {
                 continue;
             }
-            let difference = match spec.build(&case.items) {
+            let answered = guarded(|| match spec.build(&case.items) {
                 Ok(index) => differ(&case, index.as_ref(), &mut seen, &mut holding),
+                Err(BuildError::Refused { .. }) => None,
                 Err(error) => Some(error.to_string()),
+            });
+            let (status, difference) = match answered {
+                Ok(difference) => (Status::Wrong, difference),
+                Err(verdict) => (verdict.status, verdict.reason),
             };
             if let Some(difference) = difference {
-                check.status = "wrong";
+                check.status = status.name();
                 let kind = VOLUME_KINDS[case.kind];
                 check.difference = Some(format!(
                     "{kind} volume, {} items: {difference}\n  again: cullbench verify --cases 1 --seed {case_seed}",
@@ -454,4 +459,35 @@ fn show(outcome: &Outcome, format: TableFormat) -> io::Result<()> {
         outcome.mismatches
     )?;
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use cullbench::index::Backend;
+    use serde_json::Value;
+
+    static PANICS: Backend = Backend {
+        name: "panics",
+        summary: "",
+        build: |_, _, _| panic!("deep in a peer's code"),
+        params: |_| Ok(Value::Null),
+    };
+
+    #[test]
+    fn a_panic_in_a_random_case_is_its_status_and_says_how_to_see_it_again() {
+        let spec = StructureSpec {
+            label: "panics".to_owned(),
+            backend: &PANICS,
+            params: Value::Null,
+        };
+        let linear = StructureSpec::parse("linear").expect("linear");
+        let checks = random_cases(&[spec, linear], 5, 3);
+        assert_eq!([checks[0].status, checks[1].status], ["panicked", "ok"]);
+        let told = checks[0].difference.as_deref().unwrap_or_default();
+        assert!(
+            told.contains("deep in a peer's code") && told.contains("--seed 5"),
+            "{told}"
+        );
+    }
 }

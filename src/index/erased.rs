@@ -5,6 +5,8 @@
 use glam::Vec3;
 use serde_json::{Map, Value};
 
+#[cfg(feature = "peers")]
+use super::peers;
 use super::{
     Bsp, BuildError, Bvh, FrustumQuery, Linear, LinearScalar, MemoryUsage, Octree, Quadtree,
     RegionIndex, Wide,
@@ -236,6 +238,34 @@ pub static BACKENDS: &[Backend] = &[
     Backend::of::<Quadtree>(),
     Backend::of::<Bvh>(),
     Backend::of::<Wide>(),
+    #[cfg(feature = "peers")]
+    Backend::of::<peers::PeerObvhs>(),
+    #[cfg(feature = "peers")]
+    Backend::of::<peers::PeerObvhsTuned>(),
+    #[cfg(feature = "peers")]
+    Backend::of::<peers::PeerObvhsAabb>(),
+    #[cfg(feature = "peers")]
+    Backend::of::<peers::PeerParry3d>(),
+    #[cfg(feature = "peers")]
+    Backend::of::<peers::PeerParry3dAccept>(),
+    #[cfg(feature = "peers")]
+    Backend::of::<peers::PeerParry3dPloc>(),
+    #[cfg(feature = "peers")]
+    Backend::of::<peers::PeerRstar>(),
+    #[cfg(feature = "peers")]
+    Backend::of::<peers::PeerRstarAccept>(),
+    #[cfg(feature = "peers")]
+    Backend::of::<peers::PeerBvh>(),
+    #[cfg(feature = "peers")]
+    Backend::of::<peers::PeerBvhFlat>(),
+    #[cfg(feature = "peers")]
+    Backend::of::<peers::PeerBvhArena>(),
+    #[cfg(feature = "peers")]
+    Backend::of::<peers::PeerKiddo>(),
+    #[cfg(feature = "peers")]
+    Backend::of::<peers::PeerUniformGrid>(),
+    #[cfg(feature = "peers")]
+    Backend::of::<peers::PeerBevyStyle>(),
 ];
 
 /// A structure as asked for: a backend with its parameters.

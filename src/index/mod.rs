@@ -13,6 +13,8 @@ mod frontier;
 mod linear;
 mod octree;
 mod partition;
+#[cfg(feature = "peers")]
+pub mod peers;
 mod quadtree;
 mod quantised;
 mod replay;
@@ -50,6 +52,12 @@ pub enum BuildError {
     NonFiniteItem { item: usize, bounds: Aabb },
     #[error("{count} items; expected at most {most}")]
     TooManyItems { count: usize, most: usize },
+    /// The structure could, but not in reasonable time or memory.
+    #[error("'{structure}' refuses these items: {reason}")]
+    Refused {
+        structure: &'static str,
+        reason: String,
+    },
     #[error("parameters of '{structure}': {reason}")]
     Params {
         structure: &'static str,

@@ -10,7 +10,7 @@ use glam::Vec3;
 use super::batch::{Descent, GROUP, answer};
 use super::tree::PackedTree;
 use crate::geometry::{Aabb, LANES};
-use crate::kernel::prefetch;
+use crate::kernel::{BASELINE, prefetch};
 use crate::query::{ManySink, Recorder, Sink};
 
 /// Most items of a leaf of the descent: one or two blocks.
@@ -357,7 +357,7 @@ impl Treelets {
             if child & LEAF != 0 {
                 let items = self.items(child);
                 tree.prefetch_items(items.clone());
-                tree.test_items(items, &p, (), sink, recorder)?;
+                tree.test_items(BASELINE, items, &p, (), sink, recorder)?;
             } else {
                 if open != 0 {
                     above[level] = (at, open);

@@ -157,7 +157,7 @@ pub fn move_share(items: &mut [Aabb], share: f64) -> Vec<ItemId> {
 }
 
 /// Runs foreign code; a panic becomes a verdict with its message.
-pub(super) fn guarded<T>(work: impl FnOnce() -> T) -> Result<T, Verdict> {
+pub fn guarded<T>(work: impl FnOnce() -> T) -> Result<T, Verdict> {
     catch_unwind(AssertUnwindSafe(work)).map_err(|panic| {
         let text = panic
             .downcast_ref::<String>()

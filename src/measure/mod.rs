@@ -20,7 +20,7 @@ pub use cell::{
     Cell, Group, METRICS, Metric, MetricInfo, PathInfo, SceneInfo, TwinRatio, measure_group,
 };
 pub use clock::{Lap, Stopwatch};
-pub use contender::{Built, Contender, UPDATE_SHARES, move_share};
+pub use contender::{Built, Contender, UPDATE_SHARES, guarded, move_share};
 pub use count::{Counted, FrameCount, Judged, LocateCount, count_pass, id_sum, judge};
 pub use environment::{Machine, Source, Toolchain};
 pub use timing::{

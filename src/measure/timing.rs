@@ -6,6 +6,7 @@ use std::cell::RefCell;
 use std::time::{Duration, Instant};
 
 use super::clock::Stopwatch;
+use super::contender::guarded;
 use super::{Built, Counted, Status, Verdict, Workload};
 use crate::query::{ItemId, Located};
 use crate::scene::Dice;
@@ -242,7 +243,8 @@ pub fn timed_rounds(
         } else if protocol.cold {
             1
         } else {
-            batch_size(competitor, &places, protocol.overhead_ns, &mut out)
+            // A panic is its verdict when its pass comes.
+            guarded(|| batch_size(competitor, &places, protocol.overhead_ns, &mut out)).unwrap_or(1)
         });
     }
     let mut dice = Dice::new(protocol.seed);
@@ -267,36 +269,38 @@ pub fn timed_rounds(
             }
             let competitor = &competitors[c];
             let Ok(timed) = &mut results[c] else { continue };
-            if !protocol.cold {
-                warm_up(competitor, &places, batches[c], &mut out);
-            }
-            let mut wrong = None;
-            for first in (0..count).step_by(batches[c]) {
-                let asked = &places[first..(first + batches[c]).min(count)];
-                sweep.over_caches();
-                let watch = Stopwatch::start();
-                let returned = competitor.ask_all(asked, &mut out);
-                let lap = watch.lap();
-                let queries = asked.len() as f64;
-                let expected: u64 = asked.iter().map(|&place| competitor.expected[place]).sum();
-                if returned != expected {
-                    wrong = Some(format!(
-                        "the timed pass returned {returned} ids from camera {first} on, the count pass {expected}"
-                    ));
-                    break;
+            let pass = guarded(|| {
+                if !protocol.cold {
+                    warm_up(competitor, &places, batches[c], &mut out);
                 }
-                timed.samples.push(Sample {
-                    round: round as u32,
-                    frame: places[first] as u32,
-                    queries: asked.len() as u32,
-                    cpu_ns: lap.cpu_ns / queries,
-                    wall_ns: lap.wall_ns / queries,
-                    returned,
-                });
-            }
+                for first in (0..count).step_by(batches[c]) {
+                    let asked = &places[first..(first + batches[c]).min(count)];
+                    sweep.over_caches();
+                    let watch = Stopwatch::start();
+                    let returned = competitor.ask_all(asked, &mut out);
+                    let lap = watch.lap();
+                    let queries = asked.len() as f64;
+                    let expected: u64 = asked.iter().map(|&place| competitor.expected[place]).sum();
+                    if returned != expected {
+                        let reason = format!(
+                            "the timed pass returned {returned} ids from camera {first} on, the count pass {expected}"
+                        );
+                        return Err(Verdict::new(Status::Wrong, reason));
+                    }
+                    timed.samples.push(Sample {
+                        round: round as u32,
+                        frame: places[first] as u32,
+                        queries: asked.len() as u32,
+                        cpu_ns: lap.cpu_ns / queries,
+                        wall_ns: lap.wall_ns / queries,
+                        returned,
+                    });
+                }
+                Ok(())
+            });
             timed.rounds = round + 1;
-            if let Some(reason) = wrong {
-                results[c] = Err(Verdict::new(Status::Wrong, reason));
+            if let Err(verdict) = pass.and_then(|pass| pass) {
+                results[c] = Err(verdict);
             }
         }
     }
@@ -489,6 +493,26 @@ mod tests {
         assert!(results[0].is_ok());
         let verdict = results[1].as_ref().unwrap_err();
         assert_eq!(verdict.status, Status::Wrong);
+    }
+
+    #[test]
+    fn a_panic_is_the_verdict_of_its_competitor_alone() {
+        let competitor = |panics_at: usize| Competitor {
+            ask: Box::new(move |place, _| assert!(place < panics_at, "deep in a peer's code")),
+            ask_many: None,
+            expected: vec![0; 40],
+            slowest: Duration::ZERO,
+        };
+        // In the pass itself, and before it, when the batch size is found.
+        for panics_at in [39, 0] {
+            let competitors = [competitor(40), competitor(panics_at)];
+            let results = timed_rounds(40, &competitors, &protocol(), &|| false).unwrap();
+            assert_eq!(results[0].as_ref().unwrap().rounds, 3);
+            let verdict = results[1].as_ref().unwrap_err();
+            assert_eq!(verdict.status, Status::Panicked);
+            let reason = verdict.reason.as_deref().unwrap_or_default();
+            assert!(reason.contains("deep in a peer's code"), "{reason}");
+        }
     }
 
     #[test]

@@ -3,8 +3,8 @@
 //! of them share, and one type for any of them.
 
 use crate::geometry::{
-    ALL_ROWS, Aabb, BoxBlock, ConvexVolume, LANES, LaneMask, PlaneMask, RelativeVolume, RowMask,
-    Spheres, WideVolume,
+    ALL_ROWS, Aabb, BoxBlock, ConvexVolume, LANES, LaneMask, PlaneMask, PlaneRows, RelativeVolume,
+    RowMask, Spheres, WideVolume,
 };
 
 use super::{Containment, NoRecorder, Recorder, Region};
@@ -67,6 +67,13 @@ pub trait View: Sized {
             *open = left;
         }
         (kept, isa.words(&open))
+    }
+
+    /// The open planes side by side, where one box against all of them at once
+    /// is the whole test of nodes and of items; `None` where it is not.
+    #[inline(always)]
+    fn rows(&self) -> Option<PlaneRows> {
+        None
     }
 
     /// Whether an item belongs to the answer: no plane drops it, and it is not
@@ -170,6 +177,9 @@ impl View for ConvexVolume {
         mask: PlaneMask,
     ) -> (LaneMask, I::Words) {
         block.sorted_by(isa, self, mask)
+    }
+    fn rows(&self) -> Option<PlaneRows> {
+        PlaneRows::collect(Bits(self.mask()).map(|plane| self.plane_of_bit(plane)))
     }
 }
 

@@ -1,0 +1,132 @@
+//! Up to eight planes side by side: the layout in which one box is tested
+//! against all of them at once. Each lane computes what [`Plane::excludes`]
+//! and [`Plane::contains`] compute; which planes there are is the volume's
+//! business, and many boxes against one plane are the block kernels'.
+
+use super::{Aabb, Plane};
+
+/// Planes of one [`PlaneRows`].
+pub const ROW_LANES: usize = 8;
+
+type Row = [f32; ROW_LANES];
+
+/// The planes as four rows: normal x, y, z, then d. 128 bytes. Lanes without a
+/// plane hold zeros: no constraint.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(32))]
+pub struct PlaneRows {
+    rows: [Row; 4],
+    count: u32,
+}
+
+impl PlaneRows {
+    /// `None` for more than [`ROW_LANES`] planes.
+    pub fn collect<'p>(planes: impl Iterator<Item = &'p Plane>) -> Option<PlaneRows> {
+        let mut all = PlaneRows {
+            rows: [[0.0; ROW_LANES]; 4],
+            count: 0,
+        };
+        for plane in planes {
+            let lane = all.count as usize;
+            if lane == ROW_LANES {
+                return None;
+            }
+            let values = plane.normal.to_array().into_iter().chain([plane.d]);
+            for (row, value) in all.rows.iter_mut().zip(values) {
+                row[lane] = value;
+            }
+            all.count += 1;
+        }
+        Some(all)
+    }
+
+    /// How many planes there are.
+    #[inline(always)]
+    pub fn count(&self) -> u32 {
+        self.count
+    }
+
+    /// The planes, in the order in which they were collected.
+    pub fn planes(&self) -> impl Iterator<Item = Plane> {
+        let [x, y, z, d] = self.rows;
+        let plane = move |i: usize| Plane::new(glam::Vec3::new(x[i], y[i], z[i]), d[i]);
+        (0..self.count as usize).map(plane)
+    }
+
+    /// The values at the corners whose coordinate on each axis is the one that
+    /// `pick` takes of the two products.
+    ///
+    /// The p-vertex is found without asking for the normal's sign: rounding is
+    /// monotone, so the larger of `n * min` and `n * max` is `n` times its
+    /// coordinate, up to the sign of a zero, which no comparison sees.
+    #[inline(always)]
+    fn values(&self, b: &Aabb, pick: impl Fn(f32, f32) -> f32) -> Row {
+        let [nx, ny, nz, d] = &self.rows;
+        std::array::from_fn(|i| {
+            let x = pick(nx[i] * b.min.x, nx[i] * b.max.x);
+            let y = pick(ny[i] * b.min.y, ny[i] * b.max.y);
+            let z = pick(nz[i] * b.min.z, nz[i] * b.max.z);
+            ((x + y) + z) + d[i]
+        })
+    }
+
+    /// Whether any plane excludes the (finite) box.
+    #[inline(always)]
+    pub fn exclude(&self, b: &Aabb) -> bool {
+        let values = self.values(b, |p, q| if p > q { p } else { q });
+        values.iter().fold(false, |any, value| any | (*value < 0.0))
+    }
+
+    /// Whether every plane contains the (finite) box.
+    #[inline(always)]
+    pub fn contain(&self, b: &Aabb) -> bool {
+        let values = self.values(b, |p, q| if p < q { p } else { q });
+        values.iter().fold(true, |all, value| all & (*value >= 0.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+    use proptest::prelude::*;
+
+    fn number() -> impl Strategy<Value = f32> {
+        prop_oneof![
+            (-8i8..8).prop_map(f32::from),
+            (-8i8..8).prop_map(f32::from),
+            -9f32..9.0,
+            prop::num::f32::NORMAL,
+            prop::num::f32::SUBNORMAL,
+            Just(-0.0),
+        ]
+    }
+
+    fn vector() -> impl Strategy<Value = Vec3> {
+        [number(), number(), number()].prop_map(Vec3::from_array)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(4000))]
+        #[test]
+        fn all_at_once_is_each_by_itself(
+            a in vector(),
+            b in vector(),
+            planes in prop::collection::vec((vector(), number()), 0..=ROW_LANES),
+        ) {
+            let b = Aabb::new(a.min(b), a.max(b));
+            let planes: Vec<Plane> = planes.into_iter().map(|(n, d)| Plane::new(n, d)).collect();
+            let rows = PlaneRows::collect(planes.iter()).expect("eight at most");
+            prop_assert_eq!(rows.exclude(&b), planes.iter().any(|plane| plane.excludes(&b)));
+            prop_assert_eq!(rows.contain(&b), planes.iter().all(|plane| plane.contains(&b)));
+            prop_assert!(rows.planes().eq(planes));
+        }
+    }
+
+    #[test]
+    fn nine_planes_are_too_many() {
+        let planes = [Plane::new(Vec3::X, 0.0); ROW_LANES + 1];
+        assert!(PlaneRows::collect(planes[..ROW_LANES].iter()).is_some());
+        assert!(PlaneRows::collect(planes.iter()).is_none());
+    }
+}

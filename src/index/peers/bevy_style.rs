@@ -1,0 +1,88 @@
+//! The scan of a game engine, after the visibility system of Bevy: one record
+//! an entity with its flags and bounds, one test after the other, the flag set,
+//! the visible ones listed. A stand-in, not Bevy's own code: `bevy_camera`
+//! brings two hundred crates, and its test (centre and half-extents, a sphere
+//! first) rounds differently, so its answers could not be compared.
+
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::{BoxTest, Item, PeerParams, Tally, indexable, located_box_by_box, seen_box_by_box};
+use crate::geometry::{Aabb, PlaneTree};
+use crate::index::{BuildError, MemoryUsage, RegionIndex};
+use crate::query::{Recorder, Sink};
+
+/// What the system reads and writes of an entity.
+struct Entity {
+    item: Item,
+    /// Bits of the layers that it is drawn on.
+    layers: u32,
+    inherited_visibility: bool,
+    no_frustum_culling: bool,
+    /// Set by the last query: whether some view saw it.
+    view_visibility: AtomicBool,
+}
+
+/// All entities in the order of the scene.
+pub struct PeerBevyStyle {
+    entities: Vec<Entity>,
+}
+
+/// The layer of every view.
+const LAYER: u32 = 1;
+
+impl PeerBevyStyle {
+    #[inline(always)]
+    fn search<T: BoxTest, S: Sink, R: Recorder>(
+        &self,
+        test: &T,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        let tally = Tally::new(recorder);
+        for entity in &self.entities {
+            if !entity.inherited_visibility || entity.layers & LAYER == 0 {
+                continue;
+            }
+            tally.item(test);
+            let seen = entity.no_frustum_culling || test.admits(&entity.item.bounds);
+            entity.view_visibility.store(seen, Ordering::Relaxed);
+            if seen {
+                sink.accept(std::slice::from_ref(&entity.item.id))?;
+            }
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+impl RegionIndex for PeerBevyStyle {
+    const NAME: &'static str = "peer-bevy-style";
+    const SUMMARY: &'static str =
+        "a stand-in for Bevy's visibility system: flags and bounds of every entity, one by one";
+    type Params = PeerParams;
+
+    fn build(items: &[Aabb], _: Option<&PlaneTree>, _: &PeerParams) -> Result<Self, BuildError> {
+        let entity = |item| Entity {
+            item,
+            layers: LAYER,
+            inherited_visibility: true,
+            no_frustum_culling: false,
+            view_visibility: AtomicBool::new(false),
+        };
+        let items = indexable(items)?;
+        let mut entities = Vec::with_capacity(items.len());
+        entities.extend(items.into_iter().map(entity));
+        Ok(PeerBevyStyle { entities })
+    }
+
+    fn memory(&self) -> MemoryUsage {
+        MemoryUsage {
+            node_bytes: 0,
+            item_bytes: size_of_val(&self.entities[..]),
+        }
+    }
+
+    located_box_by_box!();
+}
+
+seen_box_by_box!(PeerBevyStyle);

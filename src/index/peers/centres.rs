@@ -1,0 +1,188 @@
+//! Where the centres of a view's items can be: the box that an index asks for
+//! which knows only boxes, balls or cells. Nothing that the six-plane test sees
+//! lies outside it; what lies in it is still tested.
+
+use glam::{DVec3, Vec3};
+
+use crate::geometry::{Aabb, Plane, PlaneRows, ROW_LANES};
+
+/// Share of the scene's size by which results are widened: far more than the
+/// rounding of the corners, far less than an item.
+const SLACK: f64 = 1e-5;
+/// Corners whose planes are nearer to parallel than this (as the determinant
+/// of their unit normals) cannot be trusted.
+const LEAST_DETERMINANT: f64 = 1e-9;
+/// Coordinates and plane values beyond this might overflow in f32, where the
+/// plane test then excludes nothing.
+const MOST: f64 = 1e37;
+
+/// The centres of the boxes that hold `p`.
+pub fn of_point(p: Vec3, half: Vec3, scene: &Aabb) -> Aabb {
+    let size = scene
+        .reach()
+        .as_dvec3()
+        .max_element()
+        .max(p.as_dvec3().abs().max_element());
+    widened(
+        p.as_dvec3() - half.as_dvec3(),
+        p.as_dvec3() + half.as_dvec3(),
+        size,
+    )
+}
+
+/// The centres of the boxes that no plane excludes.
+///
+/// A box that passes has `n . c + d + |n| . half >= 0` (the p-vertex, written
+/// about the centre) but for the rounding of the plane test, for every plane:
+/// its centre lies in the polyhedron of the planes moved outward. That one
+/// within the scene is bounded, and the bounds of its corners are its own.
+/// O(planes^4), some microseconds for a frustum.
+pub fn of_planes(rows: &PlaneRows, half: Vec3, scene: &Aabb) -> Aabb {
+    corners_within(rows, half, scene).unwrap_or(*scene)
+}
+
+/// A half-space in f64 with a unit normal.
+#[derive(Clone, Copy)]
+struct Half {
+    normal: DVec3,
+    d: f64,
+}
+
+/// `None` where the corners cannot be computed with confidence.
+fn corners_within(rows: &PlaneRows, half: Vec3, scene: &Aabb) -> Option<Aabb> {
+    let reach = scene.reach().as_dvec3();
+    let size = reach.max_element();
+    let mut halves = [Half {
+        normal: DVec3::ZERO,
+        d: 0.0,
+    }; ROW_LANES + 6];
+    let mut count = 0;
+    for plane in rows.planes() {
+        if let Some(moved) = moved_outward(&plane, half.as_dvec3(), reach)? {
+            halves[count] = moved;
+            count += 1;
+        }
+    }
+    for axis in DVec3::AXES {
+        halves[count] = Half {
+            normal: axis,
+            d: -axis.dot(scene.min.as_dvec3()),
+        };
+        halves[count + 1] = Half {
+            normal: -axis,
+            d: axis.dot(scene.max.as_dvec3()),
+        };
+        count += 2;
+    }
+    let halves = &halves[..count];
+    let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for (i, a) in halves.iter().enumerate() {
+        for (j, b) in halves[..i].iter().enumerate() {
+            let line = a.normal.cross(b.normal);
+            for c in &halves[..j] {
+                let determinant = line.dot(c.normal);
+                if determinant == 0.0 {
+                    continue;
+                }
+                if determinant.abs() < LEAST_DETERMINANT {
+                    return None;
+                }
+                let corner = (b.normal.cross(c.normal) * -a.d
+                    + c.normal.cross(a.normal) * -b.d
+                    + line * -c.d)
+                    / determinant;
+                let lies_in = |h: &Half| h.normal.dot(corner) + h.d >= -SLACK * size;
+                if halves.iter().all(lies_in) {
+                    (min, max) = (min.min(corner), max.max(corner));
+                }
+            }
+        }
+    }
+    Some(widened(min, max, size))
+}
+
+/// The plane that the centres obey, normalised; `None` within if it constrains
+/// nothing, `None` if it may overflow or can never be met.
+fn moved_outward(plane: &Plane, half: DVec3, reach: DVec3) -> Option<Option<Half>> {
+    let (normal, d) = (plane.normal.as_dvec3(), f64::from(plane.d));
+    let largest = normal.abs().dot(reach) + d.abs();
+    // All finite, so never a NaN.
+    if largest >= MOST {
+        return None;
+    }
+    let length = normal.length();
+    if length == 0.0 {
+        return if d >= 0.0 { Some(None) } else { None };
+    }
+    // Three products and three sums of f32 err by less than this.
+    let error = 1e-6 * largest + 1e-30;
+    let d = d + normal.abs().dot(half) + error;
+    Some(Some(Half {
+        normal: normal / length,
+        d: d / length,
+    }))
+}
+
+/// In f32 and wider by the slack.
+fn widened(min: DVec3, max: DVec3, size: f64) -> Aabb {
+    let slack = DVec3::splat(SLACK * size + f64::from(f32::MIN_POSITIVE));
+    Aabb::new((min - slack).as_vec3(), (max + slack).as_vec3())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn vector(size: f32) -> impl Strategy<Value = Vec3> {
+        [-size..size, -size..size, -size..size].prop_map(Vec3::from_array)
+    }
+
+    prop_compose! {
+        fn item()(at in vector(50.0), half in vector(9.0)) -> Aabb {
+            Aabb::around(at, half.abs())
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2000))]
+        #[test]
+        fn no_item_of_the_answer_has_its_centre_outside(
+            items in prop::collection::vec(item(), 1..40),
+            planes in prop::collection::vec((vector(1.0), vector(40.0)), 0..=ROW_LANES),
+            p in vector(50.0),
+        ) {
+            let planes: Vec<Plane> =
+                planes.into_iter().map(|(normal, point)| Plane::through(point, normal)).collect();
+            let rows = PlaneRows::collect(planes.iter()).expect("eight at most");
+            let scene = Aabb::union_of(&items);
+            let largest = items.iter().fold(Vec3::ZERO, |h, b| h.max(b.extent() * 0.5));
+            let seen_from = of_planes(&rows, largest, &scene);
+            let holding = of_point(p, largest, &scene);
+            for b in &items {
+                prop_assert!(rows.exclude(b) || seen_from.contains_point(b.centre()));
+                prop_assert!(!b.contains_point(p) || holding.contains_point(b.centre()));
+            }
+        }
+    }
+
+    /// A small frustum in a large scene is not answered with the whole scene.
+    #[test]
+    fn a_pyramid_is_bounded_by_its_corners() {
+        let planes = [
+            Plane::new(Vec3::new(1.0, 0.0, 1.0), 0.0),
+            Plane::new(Vec3::new(-1.0, 0.0, 1.0), 0.0),
+            Plane::new(Vec3::new(0.0, 1.0, 1.0), 0.0),
+            Plane::new(Vec3::new(0.0, -1.0, 1.0), 0.0),
+            Plane::new(Vec3::new(0.0, 0.0, -1.0), 10.0),
+        ];
+        let rows = PlaneRows::collect(planes.iter()).expect("five planes");
+        let scene = Aabb::around(Vec3::ZERO, Vec3::splat(1000.0));
+        let centres = of_planes(&rows, Vec3::splat(0.5), &scene);
+        let wanted = Aabb::new(Vec3::new(-11.5, -11.5, -1.0), Vec3::new(11.5, 11.5, 10.5));
+        let off = (centres.min - wanted.min)
+            .abs()
+            .max((centres.max - wanted.max).abs());
+        assert!(off.max_element() < 0.1, "{centres:?}");
+    }
+}

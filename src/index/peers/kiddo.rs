@@ -1,0 +1,112 @@
+//! The crate kiddo: a k-d tree of points. It holds the centres of the boxes
+//! and is asked for all of them within a distance (on the worst axis) that no
+//! item of the answer can exceed; what comes back is tested.
+
+use std::ops::ControlFlow;
+
+use glam::Vec3;
+use kiddo::{Chebyshev, ImmutableKdTree};
+
+use super::{
+    BoxTest, Item, PeerParams, Tally, half_of_largest, indexable, located_box_by_box,
+    seen_box_by_box,
+};
+use crate::geometry::{Aabb, PlaneTree};
+use crate::index::{BuildError, MemoryUsage, RegionIndex};
+use crate::query::{Recorder, Sink};
+
+/// Centres in a tree, items beside it.
+pub struct PeerKiddo {
+    /// `None` for no items.
+    tree: Option<ImmutableKdTree<f32, 3>>,
+    items: Vec<Item>,
+    scene: Aabb,
+    half: Vec3,
+}
+
+impl PeerKiddo {
+    #[inline(always)]
+    fn search<T: BoxTest, S: Sink, R: Recorder>(
+        &self,
+        test: &T,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        let Some(tree) = &self.tree else {
+            return ControlFlow::Continue(());
+        };
+        let tally = Tally::new(recorder);
+        tally.node(test);
+        if test.rejects(&self.scene) {
+            return ControlFlow::Continue(());
+        }
+        let centres = test.centres(self.half, &self.scene);
+        if centres.is_empty() {
+            return ControlFlow::Continue(());
+        }
+        let centre = centres.centre();
+        // A little more than half of it: the sum and the distances round.
+        let radius = ((centres.max - centre).max(centre - centres.min)).max_element() * 1.000_001;
+        let mut flow = ControlFlow::Continue(());
+        let query = centre.to_array();
+        let within = tree
+            .query(&query)
+            .within::<Chebyshev<f32>>(radius)
+            .unsorted();
+        // The visitor cannot end the search.
+        within.visit(|found| {
+            let item = &self.items[found.item as usize];
+            if flow.is_continue() {
+                tally.item(test);
+                if test.admits(&item.bounds) {
+                    flow = sink.accept(std::slice::from_ref(&item.id));
+                }
+            }
+        });
+        flow
+    }
+}
+
+impl RegionIndex for PeerKiddo {
+    const NAME: &'static str = "peer-kiddo";
+    const SUMMARY: &'static str =
+        "crate kiddo, a k-d tree of the boxes' centres, asked for those within reach";
+    type Params = PeerParams;
+
+    fn build(items: &[Aabb], _: Option<&PlaneTree>, _: &PeerParams) -> Result<Self, BuildError> {
+        let items = indexable(items)?;
+        let centres: Vec<[f32; 3]> = items
+            .iter()
+            .map(|item| item.bounds.centre().to_array())
+            .collect();
+        let tree = match items.is_empty() {
+            true => None,
+            false => Some(ImmutableKdTree::new_from_slice(&centres).map_err(|error| {
+                BuildError::Refused {
+                    structure: Self::NAME,
+                    reason: error.to_string(),
+                }
+            })?),
+        };
+        Ok(PeerKiddo {
+            tree,
+            scene: Aabb::union_of(items.iter().map(|item| &item.bounds)),
+            half: half_of_largest(&items),
+            items,
+        })
+    }
+
+    /// The crate does not tell: a centre and an id each, and about a stem for
+    /// every leaf of 32.
+    fn memory(&self) -> MemoryUsage {
+        let count = self.items.len();
+        MemoryUsage {
+            node_bytes: count.div_ceil(32) * 2 * size_of::<f32>() + count * 16,
+            item_bytes: size_of_val(&self.items[..]),
+        }
+    }
+
+    located_box_by_box!();
+}
+
+seen_box_by_box!(PeerKiddo);

@@ -1,0 +1,213 @@
+//! The crate parry3d's BVH: built from leaves by either of its strategies,
+//! asked through `leaves` with a test of its nodes, or through
+//! `traverse_indexed`, which lets whole subtrees be accepted.
+
+use std::ops::ControlFlow;
+
+use glam::Vec3;
+use parry3d::bounding_volume::Aabb as ParryAabb;
+use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhNode, TraversalAction};
+
+use super::{
+    BoxTest, PeerParams, Tally, indexable, located_box_by_box, refuse_stacks, seen_box_by_box,
+};
+use crate::geometry::{Aabb, PlaneTree};
+use crate::index::{BuildError, MemoryUsage, RegionIndex};
+use crate::query::{ItemId, Recorder, Sink};
+
+/// A box of this reach has an area that is still a number in f32.
+const LARGEST_FOR_PLOC: f32 = 1e18;
+
+/// A tree whose leaves are the places of items.
+struct Tree {
+    bvh: Bvh,
+    ids: Vec<ItemId>,
+}
+
+#[inline(always)]
+fn bounds_of(node: &BvhNode) -> Aabb {
+    let vector = |v: parry3d::math::Vector| Vec3::new(v.x, v.y, v.z);
+    Aabb::new(vector(node.mins()), vector(node.maxs()))
+}
+
+impl Tree {
+    fn build(
+        structure: &'static str,
+        items: &[Aabb],
+        strategy: BvhBuildStrategy,
+    ) -> Result<Tree, BuildError> {
+        let items = indexable(items)?;
+        let ploc = strategy == BvhBuildStrategy::Ploc;
+        if ploc {
+            refuse_stacks(structure, &items)?;
+        }
+        let scene = Aabb::union_of(items.iter().map(|item| &item.bounds));
+        // PLOC compares areas, and panics where they overflow.
+        let strategy = match ploc && scene.reach().max_element() > LARGEST_FOR_PLOC {
+            true => BvhBuildStrategy::Binned,
+            false => strategy,
+        };
+        let vector = |v: Vec3| parry3d::math::Vector::new(v.x, v.y, v.z);
+        let leaves = items
+            .iter()
+            .map(|item| ParryAabb::new(vector(item.bounds.min), vector(item.bounds.max)));
+        let leaves: Vec<ParryAabb> = leaves.collect();
+        Ok(Tree {
+            bvh: Bvh::from_leaves(strategy, &leaves),
+            ids: items.iter().map(|item| item.id).collect(),
+        })
+    }
+
+    fn memory(&self) -> MemoryUsage {
+        // Half of the nodes are the leaves.
+        let leaves = self.ids.len() * size_of::<BvhNode>();
+        MemoryUsage {
+            node_bytes: self.bvh.heap_memory_size().saturating_sub(leaves),
+            item_bytes: leaves + size_of_val(&self.ids[..]),
+        }
+    }
+
+    /// `leaves`: an iterator over the leaves that a test of nodes lets pass.
+    #[inline(always)]
+    fn leaves<T: BoxTest, S: Sink, R: Recorder>(
+        &self,
+        test: &T,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        let tally = Tally::new(recorder);
+        let passes = |node: &BvhNode| match node.is_leaf() {
+            true => {
+                tally.item(test);
+                test.admits(&bounds_of(node))
+            }
+            false => {
+                tally.node(test);
+                !test.rejects(&bounds_of(node))
+            }
+        };
+        for place in self.bvh.leaves(passes) {
+            sink.accept(&self.ids[place as usize..=place as usize])?;
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// `traverse_indexed`: a subtree that is accepted is gone through once
+    /// more, without tests.
+    #[inline(always)]
+    fn traverse<T: BoxTest, S: Sink, R: Recorder>(
+        &self,
+        test: &T,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        let tally = Tally::new(recorder);
+        let mut flow = ControlFlow::Continue(());
+        self.bvh.traverse_indexed(None, |node, at| {
+            if let Some(place) = node.leaf_data() {
+                tally.item(test);
+                if test.admits(&bounds_of(node)) {
+                    flow = sink.accept(&self.ids[place as usize..=place as usize]);
+                }
+                return match flow {
+                    ControlFlow::Continue(()) => TraversalAction::Continue,
+                    ControlFlow::Break(()) => TraversalAction::EarlyExit,
+                };
+            }
+            tally.node(test);
+            let bounds = bounds_of(node);
+            if test.rejects(&bounds) {
+                tally.count(R::subtree_rejected);
+                return TraversalAction::Prune;
+            }
+            if !test.accepts(&bounds) {
+                return TraversalAction::Continue;
+            }
+            let mut accepted = 0;
+            self.bvh.traverse_indexed(Some(at), |node, _| {
+                if let Some(place) = node.leaf_data() {
+                    accepted += 1;
+                    flow = sink.accept(&self.ids[place as usize..=place as usize]);
+                    if flow.is_break() {
+                        return TraversalAction::EarlyExit;
+                    }
+                }
+                TraversalAction::Continue
+            });
+            tally.count(|recorder| recorder.subtree_accepted(accepted));
+            match flow {
+                ControlFlow::Continue(()) => TraversalAction::Prune,
+                ControlFlow::Break(()) => TraversalAction::EarlyExit,
+            }
+        });
+        flow
+    }
+}
+
+macro_rules! peer {
+    ($(#[$doc:meta])* $peer:ident, $name:literal, $summary:literal, $strategy:ident, $search:ident) => {
+        $(#[$doc])*
+        pub struct $peer(Tree);
+
+        impl $peer {
+            #[inline(always)]
+            fn search<T: BoxTest, S: Sink, R: Recorder>(
+                &self,
+                test: &T,
+                sink: &mut S,
+                recorder: &mut R,
+            ) -> ControlFlow<()> {
+                self.0.$search(test, sink, recorder)
+            }
+        }
+
+        impl RegionIndex for $peer {
+            const NAME: &'static str = $name;
+            const SUMMARY: &'static str = $summary;
+            type Params = PeerParams;
+
+            fn build(
+                items: &[Aabb],
+                _: Option<&PlaneTree>,
+                _: &PeerParams,
+            ) -> Result<Self, BuildError> {
+                Tree::build(Self::NAME, items, BvhBuildStrategy::$strategy).map($peer)
+            }
+
+            fn memory(&self) -> MemoryUsage {
+                self.0.memory()
+            }
+
+            located_box_by_box!();
+        }
+
+        seen_box_by_box!($peer);
+    };
+}
+
+peer!(
+    /// Its default: binned build, `leaves`.
+    PeerParry3d,
+    "peer-parry3d",
+    "crate parry3d, binned build, asked through leaves",
+    Binned,
+    leaves
+);
+
+peer!(
+    /// The same tree; subtrees that are wholly inside are not tested further.
+    PeerParry3dAccept,
+    "peer-parry3d-accept",
+    "crate parry3d, binned build, asked through traverse_indexed, whole subtrees accepted",
+    Binned,
+    traverse
+);
+
+peer!(
+    /// Its other builder.
+    PeerParry3dPloc,
+    "peer-parry3d-ploc",
+    "crate parry3d, PLOC build, asked through traverse_indexed, whole subtrees accepted",
+    Ploc,
+    traverse
+);

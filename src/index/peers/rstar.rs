@@ -1,0 +1,187 @@
+//! The crate rstar: an R*-tree, bulk-loaded, asked through a selection
+//! function, either by its iterator or by a walk of its own over its nodes.
+
+use std::ops::ControlFlow;
+
+use glam::Vec3;
+use rstar::{AABB, ParentNode, RTree, RTreeNode, RTreeObject, SelectionFunction};
+
+use super::{BoxTest, Item, PeerParams, Tally, indexable, located_box_by_box, seen_box_by_box};
+use crate::geometry::{Aabb, PlaneTree};
+use crate::index::{BuildError, MemoryUsage, RegionIndex};
+use crate::query::{Recorder, Sink};
+
+impl RTreeObject for Item {
+    type Envelope = AABB<[f32; 3]>;
+
+    #[inline(always)]
+    fn envelope(&self) -> AABB<[f32; 3]> {
+        AABB::from_corners(self.bounds.min.to_array(), self.bounds.max.to_array())
+    }
+}
+
+#[inline(always)]
+fn bounds_of(envelope: &AABB<[f32; 3]>) -> Aabb {
+    Aabb::new(
+        Vec3::from_array(envelope.lower()),
+        Vec3::from_array(envelope.upper()),
+    )
+}
+
+/// A test as rstar takes it.
+struct Selected<'a, 'r, T, R> {
+    test: &'a T,
+    tally: &'a Tally<'r, R>,
+}
+
+impl<T: BoxTest, R: Recorder> SelectionFunction<Item> for Selected<'_, '_, T, R> {
+    #[inline(always)]
+    fn should_unpack_parent(&self, envelope: &AABB<[f32; 3]>) -> bool {
+        self.tally.node(self.test);
+        !self.test.rejects(&bounds_of(envelope))
+    }
+
+    #[inline(always)]
+    fn should_unpack_leaf(&self, item: &Item) -> bool {
+        self.tally.item(self.test);
+        self.test.admits(&item.bounds)
+    }
+}
+
+fn memory(tree: &RTree<Item>) -> MemoryUsage {
+    fn places(node: &ParentNode<Item>) -> usize {
+        let below = node.children().iter().map(|child| match child {
+            RTreeNode::Leaf(_) => 0,
+            RTreeNode::Parent(parent) => places(parent),
+        });
+        node.children().len() + below.sum::<usize>()
+    }
+    let (all, item_bytes) = (
+        places(tree.root()) * size_of::<RTreeNode<Item>>(),
+        tree.size() * size_of::<RTreeNode<Item>>(),
+    );
+    MemoryUsage {
+        node_bytes: all.saturating_sub(item_bytes),
+        item_bytes,
+    }
+}
+
+/// `locate_with_selection_function`: its iterator over the items that the
+/// selection lets pass.
+#[inline(always)]
+fn select<T: BoxTest, S: Sink, R: Recorder>(
+    tree: &RTree<Item>,
+    test: &T,
+    sink: &mut S,
+    recorder: &mut R,
+) -> ControlFlow<()> {
+    let tally = Tally::new(recorder);
+    let selected = Selected {
+        test,
+        tally: &tally,
+    };
+    for item in tree.locate_with_selection_function(selected) {
+        sink.accept(std::slice::from_ref(&item.id))?;
+    }
+    ControlFlow::Continue(())
+}
+
+/// Its public nodes from the root on, as its iterator goes through them;
+/// a node that is accepted hands its subtree down without further tests.
+#[inline(always)]
+fn walk<T: BoxTest, S: Sink, R: Recorder>(
+    tree: &RTree<Item>,
+    test: &T,
+    sink: &mut S,
+    recorder: &mut R,
+) -> ControlFlow<()> {
+    let tally = Tally::new(recorder);
+    let root = tree.root();
+    tally.node(test);
+    if root.children().is_empty() || test.rejects(&bounds_of(&root.envelope())) {
+        return ControlFlow::Continue(());
+    }
+    let mut open = vec![(root, false)];
+    while let Some((parent, inside)) = open.pop() {
+        for child in parent.children() {
+            match child {
+                RTreeNode::Leaf(item) if inside => {
+                    tally.count(|recorder| recorder.subtree_accepted(1));
+                    sink.accept(std::slice::from_ref(&item.id))?;
+                }
+                RTreeNode::Leaf(item) => {
+                    tally.item(test);
+                    if test.admits(&item.bounds) {
+                        sink.accept(std::slice::from_ref(&item.id))?;
+                    }
+                }
+                RTreeNode::Parent(node) if inside => open.push((node, true)),
+                RTreeNode::Parent(node) => {
+                    tally.node(test);
+                    let bounds = bounds_of(&node.envelope());
+                    if !test.rejects(&bounds) {
+                        open.push((node, test.accepts(&bounds)));
+                    }
+                }
+            }
+        }
+    }
+    ControlFlow::Continue(())
+}
+
+macro_rules! peer {
+    ($(#[$doc:meta])* $peer:ident, $name:literal, $summary:literal, $search:ident) => {
+        $(#[$doc])*
+        pub struct $peer(RTree<Item>);
+
+        impl $peer {
+            #[inline(always)]
+            fn search<T: BoxTest, S: Sink, R: Recorder>(
+                &self,
+                test: &T,
+                sink: &mut S,
+                recorder: &mut R,
+            ) -> ControlFlow<()> {
+                $search(&self.0, test, sink, recorder)
+            }
+        }
+
+        impl RegionIndex for $peer {
+            const NAME: &'static str = $name;
+            const SUMMARY: &'static str = $summary;
+            type Params = PeerParams;
+
+            fn build(
+                items: &[Aabb],
+                _: Option<&PlaneTree>,
+                _: &PeerParams,
+            ) -> Result<Self, BuildError> {
+                Ok($peer(RTree::bulk_load(indexable(items)?)))
+            }
+
+            fn memory(&self) -> MemoryUsage {
+                memory(&self.0)
+            }
+
+            located_box_by_box!();
+        }
+
+        seen_box_by_box!($peer);
+    };
+}
+
+peer!(
+    /// Its own iterator.
+    PeerRstar,
+    "peer-rstar",
+    "crate rstar, bulk-loaded, asked through a selection function",
+    select
+);
+
+peer!(
+    /// Its nodes.
+    PeerRstarAccept,
+    "peer-rstar-accept",
+    "crate rstar, bulk-loaded, its nodes walked from the root, whole subtrees accepted",
+    walk
+);

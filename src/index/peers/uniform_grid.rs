@@ -1,0 +1,213 @@
+//! A uniform grid as engines have it: equal cells over the scene, each item in
+//! the cell of its centre, cells with the exact bounds of what they hold. Our
+//! own file: the grids on the registry are hash maps for moving bodies. It
+//! visits the cells that the view's bounds reach.
+
+use std::ops::{ControlFlow, Range};
+
+use glam::{UVec3, Vec3};
+
+use super::{
+    BoxTest, Item, PeerParams, Tally, half_of_largest, indexable, located_box_by_box,
+    seen_box_by_box,
+};
+use crate::geometry::{Aabb, PlaneTree};
+use crate::index::{BuildError, MemoryUsage, RegionIndex};
+use crate::query::{ItemId, Recorder, Sink};
+
+/// Items of a cell, on average.
+const ITEMS_A_CELL: f64 = 8.0;
+/// Most cells along an axis.
+const MOST_CELLS: f64 = 1024.0;
+
+/// Cells in rows along x, items in the order of their cells.
+pub struct PeerUniformGrid {
+    /// Bounds of the centres: what the cells divide.
+    centres: Aabb,
+    counts: UVec3,
+    /// Exact union of each cell's items.
+    bounds: Vec<Aabb>,
+    /// Where each cell's items begin, and an end.
+    starts: Vec<u32>,
+    boxes: Vec<Aabb>,
+    ids: Vec<ItemId>,
+    scene: Aabb,
+    half: Vec3,
+}
+
+/// How many cells along each axis: nearly cubes, flat axes undivided.
+fn cells_for(extent: Vec3, items: usize) -> UVec3 {
+    let extent = extent.as_dvec3();
+    let mut flat = [false; 3];
+    let mut counts = [1.0; 3];
+    // An axis shorter than a cell drops out, and the others are cut finer.
+    for _ in 0..3 {
+        let open = (0..3).filter(|&axis| !flat[axis] && extent[axis] > 0.0);
+        let open: Vec<usize> = open.collect();
+        let volume: f64 = open.iter().map(|&axis| extent[axis]).product();
+        let wanted = (items as f64 / ITEMS_A_CELL).max(1.0);
+        let edge = (volume / wanted).powf(1.0 / open.len().max(1) as f64);
+        counts = [1.0; 3];
+        let mut changed = false;
+        for &axis in &open {
+            counts[axis] = (extent[axis] / edge).round().clamp(1.0, MOST_CELLS);
+            if extent[axis] < edge {
+                flat[axis] = true;
+                changed = true;
+            }
+        }
+        if !changed {
+            break;
+        }
+    }
+    let count = counts.map(|count| if count.is_finite() { count as u32 } else { 1 });
+    UVec3::from_array(count)
+}
+
+impl PeerUniformGrid {
+    /// The cell of a centre on an axis. Monotone: a larger coordinate never
+    /// lies in a lower cell.
+    #[inline(always)]
+    fn cell_on(&self, axis: usize, coordinate: f32) -> u32 {
+        let (low, high) = (self.centres.min[axis], self.centres.max[axis]);
+        let count = self.counts[axis];
+        if count == 1 {
+            return 0;
+        }
+        let share = (f64::from(coordinate) - f64::from(low)) / (f64::from(high) - f64::from(low));
+        ((share * f64::from(count)) as u32).min(count - 1)
+    }
+
+    fn cell_of(&self, centre: Vec3) -> usize {
+        let at = [0, 1, 2].map(|axis| self.cell_on(axis, centre[axis]) as usize);
+        self.row(at[1], at[2]).start + at[0]
+    }
+
+    /// The cells of a row along x.
+    #[inline(always)]
+    fn row(&self, y: usize, z: usize) -> Range<usize> {
+        let counts = self.counts.as_usizevec3();
+        let start = (z * counts.y + y) * counts.x;
+        start..start + counts.x
+    }
+
+    #[inline(always)]
+    fn search<T: BoxTest, S: Sink, R: Recorder>(
+        &self,
+        test: &T,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        let tally = Tally::new(recorder);
+        tally.node(test);
+        if self.ids.is_empty() || test.rejects(&self.scene) {
+            return ControlFlow::Continue(());
+        }
+        let asked = test.centres(self.half, &self.scene);
+        if asked.is_empty() {
+            return ControlFlow::Continue(());
+        }
+        let range = |axis: usize| {
+            let first = self.cell_on(axis, asked.min[axis]) as usize;
+            first..self.cell_on(axis, asked.max[axis]) as usize + 1
+        };
+        let (xs, ys, zs) = (range(0), range(1), range(2));
+        for z in zs {
+            for y in ys.clone() {
+                let row = self.row(y, z).start;
+                for cell in row + xs.start..row + xs.end {
+                    self.cell(cell, test, sink, &tally)?;
+                }
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
+    #[inline(always)]
+    fn cell<T: BoxTest, S: Sink, R: Recorder>(
+        &self,
+        cell: usize,
+        test: &T,
+        sink: &mut S,
+        tally: &Tally<'_, R>,
+    ) -> ControlFlow<()> {
+        let items = self.starts[cell] as usize..self.starts[cell + 1] as usize;
+        if items.is_empty() {
+            return ControlFlow::Continue(());
+        }
+        tally.node(test);
+        let bounds = &self.bounds[cell];
+        if test.rejects(bounds) {
+            tally.count(R::subtree_rejected);
+            return ControlFlow::Continue(());
+        }
+        if test.accepts(bounds) {
+            tally.count(|recorder| recorder.subtree_accepted(items.len()));
+            return sink.accept(&self.ids[items]);
+        }
+        for place in items {
+            tally.item(test);
+            if test.admits(&self.boxes[place]) {
+                sink.accept(&self.ids[place..=place])?;
+            }
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+impl RegionIndex for PeerUniformGrid {
+    const NAME: &'static str = "peer-uniform-grid";
+    const SUMMARY: &'static str =
+        "a uniform grid of our own: items in the cell of their centre, exact cell bounds";
+    type Params = PeerParams;
+
+    fn build(items: &[Aabb], _: Option<&PlaneTree>, _: &PeerParams) -> Result<Self, BuildError> {
+        let items: Vec<Item> = indexable(items)?;
+        let points = items.iter().map(|item| item.bounds.centre());
+        let centres = points.fold(Aabb::EMPTY, |all, c| all.union(&Aabb::new(c, c)));
+        let counts = match items.is_empty() {
+            true => UVec3::ONE,
+            false => cells_for(centres.extent(), items.len()),
+        };
+        let cells = counts.as_usizevec3().element_product();
+        let mut grid = PeerUniformGrid {
+            centres,
+            counts,
+            bounds: vec![Aabb::EMPTY; cells],
+            starts: vec![0; cells + 1],
+            boxes: vec![Aabb::EMPTY; items.len()],
+            ids: vec![0; items.len()],
+            scene: Aabb::union_of(items.iter().map(|item| &item.bounds)),
+            half: half_of_largest(&items),
+        };
+        // A counting sort by cell.
+        let cell_of = |item: &Item| grid.cell_of(item.bounds.centre());
+        let places: Vec<usize> = items.iter().map(cell_of).collect();
+        for &cell in &places {
+            grid.starts[cell + 1] += 1;
+        }
+        for cell in 0..cells {
+            grid.starts[cell + 1] += grid.starts[cell];
+        }
+        let mut next = grid.starts.clone();
+        for (item, &cell) in items.iter().zip(&places) {
+            let place = next[cell] as usize;
+            next[cell] += 1;
+            grid.boxes[place] = item.bounds;
+            grid.ids[place] = item.id;
+            grid.bounds[cell] = grid.bounds[cell].union(&item.bounds);
+        }
+        Ok(grid)
+    }
+
+    fn memory(&self) -> MemoryUsage {
+        MemoryUsage {
+            node_bytes: size_of_val(&self.bounds[..]) + size_of_val(&self.starts[..]),
+            item_bytes: size_of_val(&self.boxes[..]) + size_of_val(&self.ids[..]),
+        }
+    }
+
+    located_box_by_box!();
+}
+
+seen_box_by_box!(PeerUniformGrid);
