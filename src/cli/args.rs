@@ -243,9 +243,12 @@ pub struct RunArgs {
     /// Go on with the run in --out (or the newest unfinished one under results/)
     #[arg(long)]
     pub resume: bool,
-    /// Measure with cold caches as well
+    /// Measure with cold caches as well (the suite full does by itself)
     #[arg(long)]
     pub cold: bool,
+    /// Leave out the bounds: what reading all items and copying all answers would cost
+    #[arg(long)]
+    pub no_bounds: bool,
     #[command(flatten)]
     pub scene_args: SceneArgs,
     #[command(flatten)]

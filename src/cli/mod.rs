@@ -15,6 +15,8 @@ mod precision;
 mod precision_diagram;
 mod query;
 mod run;
+mod run_plan;
+mod run_resume;
 mod run_table;
 mod scene;
 mod stress;

@@ -1,6 +1,6 @@
 //! The timed pass: rounds in balanced random order over all contenders, each
-//! warmed up, several queries per clock reading where one is short, and the
-//! caches streamed over between queries when it is to be cold.
+//! warmed up, several queries per clock reading where one is short. When it is
+//! to be cold, the caches are streamed over before every camera's queries.
 
 use std::time::{Duration, Instant};
 
@@ -34,6 +34,8 @@ pub const MOST_OVERHEAD: f64 = 0.02;
 const WARM_UP: Duration = Duration::from_millis(20);
 /// Cold queries cost a sweep over memory each: fewer of them.
 const COLD_FRAMES: usize = 24;
+/// Room behind the answer that a structure may ask for while it writes it.
+const SLACK: usize = 64;
 
 /// Which of the two questions is asked.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -111,7 +113,12 @@ pub struct Competitor<'a> {
 
 impl<'a> Competitor<'a> {
     /// A structure that counted right, asked a task of a workload.
-    fn of(task: Task, workload: &'a Workload, built: &'a Built, counted: &Counted) -> Self {
+    pub(super) fn of(
+        task: Task,
+        workload: &'a Workload,
+        built: &'a Built,
+        counted: &Counted,
+    ) -> Self {
         let ask: Ask = match task {
             Task::Query => {
                 let index = built.items.as_ref();
@@ -149,22 +156,6 @@ impl<'a> Competitor<'a> {
     }
 }
 
-/// Times all contenders that counted right on a task of the workload; see
-/// [`timed_rounds`].
-pub fn timed_pass(
-    task: Task,
-    workload: &Workload,
-    contenders: &[(&Built, &Counted)],
-    protocol: &Protocol,
-    stop: &dyn Fn() -> bool,
-) -> Option<Vec<Result<Timed, Verdict>>> {
-    let competitors: Vec<Competitor> = contenders
-        .iter()
-        .map(|(built, counted)| Competitor::of(task, workload, built, counted))
-        .collect();
-    timed_rounds(workload.views.len(), &competitors, protocol, stop)
-}
-
 /// Times all competitors on `count` queries each. `stop` ends the pass early
 /// (its samples are then worthless and the result is `None`).
 ///
@@ -178,25 +169,25 @@ pub fn timed_rounds(
 ) -> Option<Vec<Result<Timed, Verdict>>> {
     let places = places(count, competitors, protocol);
     let count = places.len();
-    let mut results: Vec<Result<Timed, Verdict>> =
+    let results: Vec<Result<Timed, Verdict>> =
         competitors.iter().map(|_| Ok(Timed::default())).collect();
     if count == 0 {
         return Some(results);
     }
+    let mut pass = Pass {
+        places: &places,
+        competitors,
+        results,
+    };
     let mut out = Vec::new();
-    let mut sweep = Sweep::new(if protocol.cold {
-        protocol.cache_bytes
-    } else {
-        0
-    });
-    let mut batches = Vec::with_capacity(competitors.len());
-    for competitor in competitors {
-        batches.push(if protocol.cold {
-            1
-        } else {
-            batch_size(competitor, &places, protocol.overhead_ns, &mut out)
-        });
-    }
+    let batches: Vec<usize> = match protocol.cold {
+        true => Vec::new(),
+        false => competitors
+            .iter()
+            .map(|c| batch_size(c, &places, protocol.overhead_ns, &mut out))
+            .collect(),
+    };
+    let mut cold = protocol.cold.then(|| Cold::new(protocol, competitors));
     let mut dice = Dice::new(protocol.seed);
     let mut order: Vec<usize> = (0..competitors.len()).collect();
     let start = Instant::now();
@@ -213,46 +204,102 @@ pub fn timed_rounds(
         } else {
             order.rotate_left(1);
         }
-        for &c in &order {
-            if stop() {
-                return None;
-            }
-            let competitor = &competitors[c];
-            let Ok(timed) = &mut results[c] else { continue };
-            if !protocol.cold {
-                warm_up(competitor, &places, batches[c], &mut out);
-            }
-            let mut wrong = None;
-            for first in (0..count).step_by(batches[c]) {
-                let asked = &places[first..(first + batches[c]).min(count)];
-                sweep.over_caches();
-                let watch = Stopwatch::start();
-                let returned = competitor.ask_all(asked, &mut out);
-                let lap = watch.lap();
-                let queries = asked.len() as f64;
-                let expected: u64 = asked.iter().map(|&place| competitor.expected[place]).sum();
-                if returned != expected {
-                    wrong = Some(format!(
-                        "the timed pass returned {returned} ids from camera {first} on, the count pass {expected}"
-                    ));
-                    break;
+        if let Some(cold) = &mut cold {
+            for first in 0..count {
+                if stop() {
+                    return None;
                 }
-                timed.samples.push(Sample {
-                    round: round as u32,
-                    frame: places[first] as u32,
-                    queries: asked.len() as u32,
-                    cpu_ns: lap.cpu_ns / queries,
-                    wall_ns: lap.wall_ns / queries,
-                    returned,
-                });
+                cold.sweep.over_caches();
+                // Whoever is first after the sweep finds the view cold as well.
+                order.rotate_left(1);
+                for &c in &order {
+                    pass.time(c, round, first, 1, &mut cold.outs[c]);
+                }
             }
-            timed.rounds = round + 1;
-            if let Some(reason) = wrong {
-                results[c] = Err(Verdict::new(Status::Wrong, reason));
+        } else {
+            for &c in &order {
+                if stop() {
+                    return None;
+                }
+                if pass.results[c].is_err() {
+                    continue;
+                }
+                warm_up(&competitors[c], &places, batches[c], &mut out);
+                for first in (0..count).step_by(batches[c]) {
+                    pass.time(c, round, first, batches[c], &mut out);
+                }
             }
         }
     }
-    Some(results)
+    Some(pass.results)
+}
+
+/// What the rounds of a pass fill in.
+struct Pass<'p, 'a> {
+    places: &'p [usize],
+    competitors: &'p [Competitor<'a>],
+    results: Vec<Result<Timed, Verdict>>,
+}
+
+impl Pass<'_, '_> {
+    /// Times competitor `c` on a batch of places from the `first` on, unless it
+    /// has answered wrongly before.
+    fn time(&mut self, c: usize, round: usize, first: usize, batch: usize, out: &mut Vec<ItemId>) {
+        let competitor = &self.competitors[c];
+        let Ok(timed) = &mut self.results[c] else {
+            return;
+        };
+        let asked = &self.places[first..(first + batch).min(self.places.len())];
+        let watch = Stopwatch::start();
+        let returned = competitor.ask_all(asked, out);
+        let lap = watch.lap();
+        let queries = asked.len() as f64;
+        let expected: u64 = asked.iter().map(|&place| competitor.expected[place]).sum();
+        if returned != expected {
+            self.results[c] = Err(Verdict::new(
+                Status::Wrong,
+                format!(
+                    "the timed pass returned {returned} ids from camera {first} on, the count pass {expected}"
+                ),
+            ));
+            return;
+        }
+        timed.samples.push(Sample {
+            round: round as u32,
+            frame: asked[0] as u32,
+            queries: asked.len() as u32,
+            cpu_ns: lap.cpu_ns / queries,
+            wall_ns: lap.wall_ns / queries,
+            returned,
+        });
+        timed.rounds = round + 1;
+    }
+}
+
+/// What cold queries need. One sweep serves one query of every competitor: each
+/// has data of its own, which no other's query brings back, and its own output.
+struct Cold {
+    sweep: Sweep,
+    outs: Vec<Vec<ItemId>>,
+}
+
+impl Cold {
+    /// The outputs have their final size: a query that is asked once a sweep
+    /// must not pay for their growth.
+    fn new(protocol: &Protocol, competitors: &[Competitor]) -> Cold {
+        let most = |c: &Competitor| c.expected.iter().copied().max().unwrap_or(0) as usize;
+        Cold {
+            sweep: Sweep::new(protocol.cache_bytes),
+            outs: competitors
+                .iter()
+                .map(|c| {
+                    let mut out = vec![0; most(c) + SLACK];
+                    out.clear();
+                    out
+                })
+                .collect(),
+        }
+    }
 }
 
 /// The places along the path that are timed: all, or evenly thinned out so
@@ -387,7 +434,11 @@ mod tests {
             counted[1].frames[20].visible += 1;
         }
         let contenders: Vec<_> = built.iter().zip(&counted).collect();
-        timed_pass(Task::Query, &workload, &contenders, &protocol, &|| false).unwrap()
+        let competitors: Vec<Competitor> = contenders
+            .iter()
+            .map(|(built, counted)| Competitor::of(Task::Query, &workload, built, counted))
+            .collect();
+        timed_rounds(workload.views.len(), &competitors, &protocol, &|| false).unwrap()
     }
 
     #[test]

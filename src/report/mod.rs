@@ -4,6 +4,8 @@
 
 mod folder;
 mod model;
+mod ranking;
 
-pub use folder::{FolderError, RunFolder, write_atomically};
+pub use folder::{FolderError, RunFolder, read_report, write_atomically};
 pub use model::{Noise, Report, ReportCell, RunInfo, SCHEMA_VERSION, SamplesRef, TwinEntry};
+pub use ranking::{Comparison, Ranked, comparisons, times_as_fast};
