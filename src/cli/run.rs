@@ -11,7 +11,7 @@ use super::args::RunArgs;
 use super::run_plan::{Plan, Question};
 use super::run_resume::{finished, open, same_scene, utc_now};
 use super::run_table::show_scene;
-use super::{Ending, interrupt, text, unread_is_fine};
+use super::{Ending, interrupt, surface_tables, text, unread_is_fine};
 use cullbench::culling::CullingTest;
 use cullbench::measure::{
     BOUNDS, Contender, Group, Machine, PathInfo, Protocol, SceneInfo, Workload, measure_group,
@@ -97,6 +97,7 @@ pub fn run(args: &RunArgs) -> anyhow::Result<Ending> {
         report.run.finished_at = Some(utc_now());
         folder.save(&report)?;
     }
+    unread_is_fine(surface_tables::show(&report))?;
     unread_is_fine(close(&report, &folder, started, interrupted))?;
     let failed = report.cells.iter().any(|c| c.status.is_failure());
     Ok(match (interrupted, failed) {
