@@ -42,15 +42,13 @@ fn a_run_is_reported_as_markdown_as_pictures_and_as_a_page() {
     // Nobody asked other crates.
     assert!(!text.contains("times fastest peer"));
     let rows = text.lines().filter(|line| line.starts_with('|'));
-    let mut columns = 0;
     for (before, row) in text.lines().zip(text.lines().skip(1)) {
         let count = |line: &str| line.replace("\\|", "").matches('|').count();
         if before.starts_with('|') && row.starts_with('|') {
             assert_eq!(count(before), count(row), "{row}");
-            columns = count(row);
         }
     }
-    assert!(columns > 2 && rows.count() > 50);
+    assert!(rows.count() > 50);
 
     works(
         folder.path(),
@@ -111,13 +109,11 @@ fn figures_are_read_off_not_measured() {
     let text = works(folder.path(), "report run");
     // linear takes `items` ns and is 20 times as fast as the peer.
     assert!(text.contains("times fastest peer"), "{text}");
-    assert!(text.contains("peer-\\<b\\>\\|x"), "{text}");
+    assert!(text.contains("peer-\\<b>\\|x"), "{text}");
     assert!(text.contains("| linear | 1 | 300 ns |"), "{text}");
     assert!(text.contains("| 2,700 | bvh 10.0x |"), "{text}");
-    assert!(
-        text.contains("| bvh | ~ 900 |") || text.contains("| bvh | ~ 900"),
-        "{text}"
-    );
+    // Faster from 900 on: not known where only one size has that share.
+    assert!(text.contains("| bvh |  | ~ 900 |"), "{text}");
     let page = fs::read_to_string(folder.path().join("r.html")).expect("a page");
     assert!(page.contains("peer-&lt;b&gt;|x") && !page.contains("peer-<b>"));
 }
