@@ -108,7 +108,7 @@ fn main() -> ExitCode {
             .map(|spec| Contender::build(spec, false, &scene, CullingTest::SixPlane))
             .collect();
         contenders.push(Contender::build(twin, true, &scene, CullingTest::SixPlane));
-        let group = measure_group(&workload, &contenders, YARDSTICK, &protocol, &|| false)
+        let group = measure_group(&workload, &contenders, &[], YARDSTICK, &protocol, &|| false)
             .expect("not stopped");
         let cell = &group.cells[1];
         assert_eq!(cell.verdict.status, Status::Ok, "{:?}", cell.verdict);

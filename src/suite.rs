@@ -7,8 +7,7 @@ use std::time::Duration;
 pub struct Suite {
     pub name: &'static str,
     pub summary: &'static str,
-    /// Scene, then its paths.
-    pub plan: &'static [(&'static str, &'static [&'static str])],
+    pub plan: &'static [SuiteScene],
     pub min_rounds: usize,
     pub max_rounds: usize,
     /// Per scene, path and task; see `measure::Protocol`.
@@ -16,27 +15,68 @@ pub struct Suite {
     pub pass: Duration,
 }
 
+/// A scene of a suite with the ways through it.
+pub struct SuiteScene {
+    pub scene: &'static str,
+    pub paths: &'static [&'static str],
+    /// Measured with cold caches as well as with warm ones.
+    pub cold: bool,
+}
+
+const fn warm(scene: &'static str, paths: &'static [&'static str]) -> SuiteScene {
+    SuiteScene {
+        scene,
+        paths,
+        cold: false,
+    }
+}
+
+const fn warm_and_cold(scene: &'static str, paths: &'static [&'static str]) -> SuiteScene {
+    SuiteScene {
+        scene,
+        paths,
+        cold: true,
+    }
+}
+
+/// From a thousandth of the items to all of them, and further ways. Many views
+/// for small scenes, where a few would train the branch predictor.
+macro_rules! surface {
+    ($frames:literal $(, $more:expr)*) => {
+        &[
+            concat!("flythrough:frames=", $frames, ",visible=0.1%"),
+            concat!("flythrough:frames=", $frames, ",visible=2%"),
+            concat!("orbit:frames=", $frames, ",visible=20%"),
+            concat!("outside:frames=", $frames)
+            $(, $more)*
+        ]
+    };
+}
+
+/// The same number of visible items whatever the size of the scene.
+const FIXED_COUNT: &str = "flythrough:frames=256,visible=500";
+
 /// All suites. The first one is what `cullbench run` does by itself.
 pub static SUITES: &[Suite] = &[
     Suite {
         name: "quick",
         summary: "five generated worlds of 50k to 100k items and the four real ones; under a minute",
         plan: &[
-            (
+            warm(
                 "uniform:n=100000",
                 &["flythrough:visible=2%", "teleport:visible=0.1%"],
             ),
-            ("clustered:n=100000", &["flythrough:visible=2%"]),
-            ("city:n=100000", &["flythrough:visible=2%", "outside"]),
-            ("forest:n=100000", &["orbit"]),
-            ("rooms:n=50000", &["spin:frames=512"]),
-            ("freedm-map12", &["places"]),
-            ("freedm-map20", &["places", "flythrough:frames=512"]),
-            (
+            warm("clustered:n=100000", &["flythrough:visible=2%"]),
+            warm("city:n=100000", &["flythrough:visible=2%", "outside"]),
+            warm("forest:n=100000", &["orbit"]),
+            warm("rooms:n=50000", &["spin:frames=512"]),
+            warm("freedm-map12", &["places"]),
+            warm("freedm-map20", &["places", "flythrough:frames=512"]),
+            warm(
                 "helsinki",
                 &["flythrough:frames=512,visible=2%", "zoom:frames=512"],
             ),
-            ("us-counties", &["orbit:frames=512", "outside:frames=512"]),
+            warm("us-counties", &["orbit:frames=512", "outside:frames=512"]),
         ],
         min_rounds: 7,
         max_rounds: 21,
@@ -47,8 +87,8 @@ pub static SUITES: &[Suite] = &[
         name: "standard",
         summary: "as quick with a million items, more paths and more rounds; several minutes",
         plan: &[
-            ("uniform:n=10000", &["flythrough:frames=512,visible=2%"]),
-            (
+            warm("uniform:n=10000", &["flythrough:frames=512,visible=2%"]),
+            warm(
                 "uniform:n=1000000",
                 &[
                     "flythrough:visible=0.1%",
@@ -57,19 +97,19 @@ pub static SUITES: &[Suite] = &[
                     "outside",
                 ],
             ),
-            ("clustered:n=1000000", &["flythrough:visible=2%", "orbit"]),
-            (
+            warm("clustered:n=1000000", &["flythrough:visible=2%", "orbit"]),
+            warm(
                 "city:n=1000000",
                 &["flythrough:visible=2%", "spin", "outside"],
             ),
-            ("forest:n=1000000", &["flythrough:visible=2%", "orbit"]),
-            ("rooms:n=1000000", &["flythrough:visible=0.1%", "teleport"]),
-            ("freedm-map12", &["places", "teleport:frames=512"]),
-            (
+            warm("forest:n=1000000", &["flythrough:visible=2%", "orbit"]),
+            warm("rooms:n=1000000", &["flythrough:visible=0.1%", "teleport"]),
+            warm("freedm-map12", &["places", "teleport:frames=512"]),
+            warm(
                 "freedm-map20",
                 &["places", "flythrough:frames=512", "teleport:frames=512"],
             ),
-            (
+            warm(
                 "helsinki",
                 &[
                     "flythrough:frames=512,visible=2%",
@@ -78,7 +118,7 @@ pub static SUITES: &[Suite] = &[
                     "teleport:frames=512",
                 ],
             ),
-            (
+            warm(
                 "us-counties",
                 &[
                     "flythrough:frames=512",
@@ -94,96 +134,58 @@ pub static SUITES: &[Suite] = &[
     },
     Suite {
         name: "full",
-        summary: "as standard, from a thousand to ten million items; about an hour",
+        summary: "the crossover surface: three worlds from a thousand to a million items, 0.1 % to all of them visible, and the real ones, warm and cold; half an hour",
         plan: &[
-            (
-                "uniform:n=1000",
-                &["flythrough:frames=512,visible=2%", "outside:frames=512"],
-            ),
-            (
-                "uniform:n=10000",
-                &["flythrough:frames=512,visible=2%", "outside:frames=512"],
-            ),
-            (
-                "uniform:n=100000",
-                &[
-                    "flythrough:visible=0.1%",
-                    "flythrough:visible=2%",
-                    "orbit",
-                    "outside",
-                ],
-            ),
-            (
-                "uniform:n=1000000",
-                &[
-                    "flythrough:visible=0.1%",
-                    "flythrough:visible=2%",
-                    "orbit",
-                    "outside",
-                ],
-            ),
-            (
-                "uniform:n=10000000",
-                &[
-                    "flythrough:visible=0.1%",
-                    "flythrough:visible=2%",
-                    "outside:frames=32",
-                ],
-            ),
-            (
-                "clustered:n=1000000",
-                &["flythrough:visible=2%", "orbit", "teleport"],
-            ),
-            (
-                "city:n=1000000",
-                &[
-                    "flythrough:visible=0.1%",
-                    "flythrough:visible=2%",
-                    "spin",
-                    "outside",
-                ],
-            ),
-            ("city:n=10000000", &["flythrough:visible=2%"]),
-            (
-                "forest:n=1000000",
-                &["flythrough:visible=2%", "orbit", "zoom"],
-            ),
-            (
-                "rooms:n=1000000",
-                &["flythrough:visible=0.1%", "teleport", "spin"],
-            ),
-            (
+            warm_and_cold("uniform:n=1000", surface!(512)),
+            warm_and_cold("uniform:n=10000", surface!(512, FIXED_COUNT)),
+            warm_and_cold("uniform:n=100000", surface!(256, FIXED_COUNT)),
+            warm_and_cold("uniform:n=1000000", surface!(128, FIXED_COUNT)),
+            warm_and_cold("city:n=10000", surface!(512)),
+            warm_and_cold("city:n=100000", surface!(256)),
+            warm_and_cold("city:n=1000000", surface!(128)),
+            warm_and_cold("clustered:n=10000", surface!(512)),
+            warm_and_cold("clustered:n=100000", surface!(256)),
+            warm_and_cold("clustered:n=1000000", surface!(128)),
+            warm_and_cold(
                 "freedm-map12",
-                &["places", "flythrough:frames=512", "teleport:frames=512"],
-            ),
-            (
-                "freedm-map20",
-                &["places", "flythrough:frames=512", "teleport:frames=512"],
-            ),
-            (
-                "helsinki",
                 &[
+                    "places",
                     "flythrough:frames=512,visible=2%",
-                    "orbit:frames=512",
-                    "spin:frames=512",
-                    "zoom:frames=512",
-                    "teleport:frames=512",
                     "outside:frames=512",
                 ],
             ),
-            (
-                "us-counties",
+            warm_and_cold(
+                "freedm-map20",
                 &[
-                    "flythrough:frames=512",
-                    "orbit:frames=512",
+                    "places",
+                    "flythrough:frames=512,visible=2%",
                     "outside:frames=512",
                 ],
             ),
+            warm_and_cold(
+                "helsinki",
+                &["flythrough:frames=512,visible=2%", "orbit:frames=512"],
+            ),
+            warm_and_cold("us-counties", &["orbit:frames=512", "outside:frames=512"]),
         ],
-        min_rounds: 11,
-        max_rounds: 51,
-        budget: Duration::from_secs(10),
-        pass: Duration::from_secs(1),
+        min_rounds: 9,
+        max_rounds: 31,
+        budget: Duration::from_secs(3),
+        pass: Duration::from_millis(200),
+    },
+    Suite {
+        name: "growth",
+        summary: "a fixed number of visible items among ten thousand to ten million; choose structures, all of them need tens of gigabytes",
+        plan: &[
+            warm("uniform:n=10000", &[FIXED_COUNT]),
+            warm("uniform:n=100000", &[FIXED_COUNT]),
+            warm("uniform:n=1000000", &[FIXED_COUNT]),
+            warm("uniform:n=10000000", &[FIXED_COUNT]),
+        ],
+        min_rounds: 9,
+        max_rounds: 31,
+        budget: Duration::from_secs(3),
+        pass: Duration::from_millis(400),
     },
 ];
 
@@ -204,24 +206,24 @@ mod tests {
     use crate::spec::Spec;
 
     #[test]
-    fn every_suite_names_what_exists_and_has_the_real_scenes() {
+    fn every_suite_names_what_exists_and_all_but_growth_have_the_real_scenes() {
         for suite in SUITES {
-            for (scene, paths) in suite.plan {
-                let scene = Spec::parse(scene).unwrap();
+            for row in suite.plan {
+                let scene = Spec::parse(row.scene).unwrap();
                 let families = FAMILIES.iter().map(|f| f.name);
                 assert!(
                     families
                         .chain(SAMPLES.iter().map(|s| s.name))
                         .any(|n| n == scene.name())
                 );
-                for path in *paths {
+                for path in row.paths {
                     let path = Spec::parse(path).unwrap();
                     assert!(PATHS.iter().any(|p| p.name == path.name()));
                 }
             }
-            for sample in SAMPLES {
+            for sample in SAMPLES.iter().filter(|_| suite.name != "growth") {
                 assert!(
-                    suite.plan.iter().any(|(scene, _)| *scene == sample.name),
+                    suite.plan.iter().any(|row| row.scene == sample.name),
                     "{}",
                     suite.name
                 );

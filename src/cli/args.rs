@@ -38,6 +38,8 @@ pub enum Command {
     List(ListArgs),
     /// Measure structures on scenes along camera paths (the main job)
     Run(RunArgs),
+    /// Show what a run found: ranked tables, bounds, crossovers, growth
+    Report(ReportArgs),
     /// Answer frustum queries: what each structure sees from each camera
     Query(QueryArgs),
     /// Answer region searches: which regions hold each point
@@ -243,9 +245,12 @@ pub struct RunArgs {
     /// Go on with the run in --out (or the newest unfinished one under results/)
     #[arg(long)]
     pub resume: bool,
-    /// Measure with cold caches as well
+    /// Measure with cold caches as well (the suite full does by itself)
     #[arg(long)]
     pub cold: bool,
+    /// Leave out the bounds: what reading all items and copying all answers would cost
+    #[arg(long)]
+    pub no_bounds: bool,
     #[command(flatten)]
     pub scene_args: SceneArgs,
     #[command(flatten)]
@@ -254,6 +259,22 @@ pub struct RunArgs {
     pub culling: CullingArgs,
     #[command(flatten)]
     pub kernel: KernelArgs,
+}
+
+#[derive(Args, Debug)]
+pub struct ReportArgs {
+    /// report.json of a run, or the folder it is in
+    #[arg(value_name = "RUN.json")]
+    pub report: PathBuf,
+    /// Write Markdown to a file [default: to standard output]
+    #[arg(long, value_name = "FILE")]
+    pub markdown: Option<PathBuf>,
+    /// Write the crossover charts (time against items) into a folder
+    #[arg(long, value_name = "DIR")]
+    pub svg: Option<PathBuf>,
+    /// Write one self-contained page with the tables and charts
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
 }
 
 #[derive(Args, Debug)]

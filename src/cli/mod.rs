@@ -6,6 +6,7 @@
 
 mod args;
 mod compare_structures;
+mod document;
 mod drift;
 mod env;
 mod interrupt;
@@ -14,10 +15,15 @@ mod locate;
 mod precision;
 mod precision_diagram;
 mod query;
+mod report;
 mod run;
+mod run_plan;
+mod run_resume;
 mod run_table;
 mod scene;
 mod stress;
+mod surface_diagram;
+mod surface_tables;
 mod text;
 mod verify;
 
@@ -46,6 +52,7 @@ pub fn main() -> ExitCode {
     let ended = match cli.command {
         Command::List(args) => list::list(&args),
         Command::Run(args) => run::run(&args),
+        Command::Report(args) => report::report(&args),
         Command::Query(args) => query::query(&args),
         Command::Locate(args) => locate::locate(&args),
         Command::Verify(args) => verify::verify(&args),

@@ -15,7 +15,7 @@ const SIZE: (u32, u32) = (1000, 640);
 const NONE: f64 = 1e-4;
 
 /// Told apart also without colours of their own names: dark to light.
-const COLOURS: [RGBColor; 8] = [
+pub const COLOURS: [RGBColor; 8] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),

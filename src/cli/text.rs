@@ -2,6 +2,7 @@
 
 use comfy_table::presets::UTF8_BORDERS_ONLY;
 use comfy_table::{CellAlignment, ContentArrangement, Table};
+use cullbench::measure::Metric;
 
 /// A table with a header. Columns named in `right` hold numbers.
 pub fn table(header: &[&str], right: &[usize]) -> Table {
@@ -36,6 +37,20 @@ pub fn significant(value: f64) -> String {
     }
     let digits = 2 - value.abs().log10().floor() as i32;
     format!("{value:.*}", digits.clamp(0, 12) as usize)
+}
+
+/// A value with its interval: "4.04 [3.95, 4.16]"; nothing if there is none.
+pub fn estimate(metric: Option<&Metric>) -> String {
+    let Some(metric) = metric else {
+        return String::new();
+    };
+    let value = significant(metric.value);
+    match (metric.lower, metric.upper) {
+        (Some(lower), Some(upper)) => {
+            format!("{value} [{}, {}]", significant(lower), significant(upper))
+        }
+        _ => value,
+    }
 }
 
 /// A share as a percentage, never rounded up to 100.

@@ -1,69 +1,20 @@
 //! From passes to figures: the cells of a report with their named metrics,
-//! and the ratio of the twin that gives the run its noise floor. It owns the
-//! list of metrics; how they are written is the report's business.
+//! and the ratio of the twin that gives the run its noise floor. It owns how
+//! metrics are computed; how they are written is the report's business.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::bounds::{Bound, Material};
+use super::metrics::{Metric, Metrics};
 use super::{
-    Built, Contender, Counted, Judged, Protocol, Sample, Status, Task, Timed, Verdict, Workload,
-    count_pass, judge, timed_pass,
+    Built, Competitor, Contender, Counted, Judged, Protocol, Sample, Status, Task, Timed, Verdict,
+    Workload, count_pass, judge, timed_rounds,
 };
 use crate::scene::Scene;
 use crate::statistics::{Estimate, bootstrap_median, median, quantile, sorted};
-
-/// One metric of the list; the unit is part of its name where it has one.
-pub struct MetricInfo {
-    pub name: &'static str,
-    pub unit: &'static str,
-    pub summary: &'static str,
-}
-
-macro_rules! metrics {
-    ($($name:literal, $unit:literal, $summary:literal;)*) => {
-        /// All metrics of a cell, in the order of the columns.
-        pub static METRICS: &[MetricInfo] =
-            &[$(MetricInfo { name: $name, unit: $unit, summary: $summary }),*];
-    };
-}
-
-metrics! {
-    "visible_count", "items", "visible items a query, mean over the path";
-    "cull_rate", "1", "1 - visible/total, mean over the path";
-    "query_ns", "ns", "thread CPU time of a frustum query: median over the frames, each the median over the rounds; interval over the rounds";
-    "query_ns_p5", "ns", "5th percentile over the frames";
-    "query_ns_p95", "ns", "95th percentile over the frames";
-    "query_ns_p99", "ns", "99th percentile over the frames";
-    "query_ns_max", "ns", "slowest frame";
-    "query_wall_ns", "ns", "as query_ns, wall time";
-    "ns_per_visible", "ns", "CPU time of all queries / visible items of all queries";
-    "ratio_to_linear", "1", "time of linear / time of this structure, paired by round: above 1 is faster";
-    "nodes_tested", "nodes", "node bounds classified a query, mean";
-    "planes_tested", "planes", "plane tests a query, of nodes and items, mean";
-    "items_tested", "items", "item bounds tested a query, mean";
-    "items_accepted_untested", "items", "items reported with a whole subtree, untested, a query, mean";
-    "excess", "1", "false positives / truly visible items, at camera level, of the judged queries";
-    "false_positive_count", "items", "returned though out at camera level, a judged query, mean";
-    "false_negative_count", "items", "in at camera level, but not returned, a judged query, mean";
-    "touch_dropped_count", "items", "touching at camera level, but not returned, a judged query, mean";
-    "worst_miss", "world units", "how deep the deepest false negative reaches into the view";
-    "undecided_count", "items", "too close to a tie for the truth itself (called a touch), a judged query, mean";
-    "judged_queries", "queries", "cameras of the path whose answers were judged against the exact truth";
-    "build_ms", "ms", "CPU time of a build, median of up to three";
-    "update_ms_0_1_percent", "ms", "CPU time of an update after 0.1 % of the items have moved (scenes of up to 2 million)";
-    "update_ms", "ms", "as above, 1 % moved";
-    "update_ms_10_percent", "ms", "as above, 10 % moved";
-    "update_ms_100_percent", "ms", "as above, all moved";
-    "memory_bytes_per_item", "bytes", "nodes, item bounds and ids / items";
-    "break_even_queries", "queries", "queries after which the build is repaid against linear; empty if never";
-    "locate_ns", "ns", "thread CPU time of a region search at the eye, mean over the path, median over the rounds";
-    "locate_batched_ns", "ns", "thread CPU time of a region search when all points of the path are asked at once, a point; median over the rounds";
-    "locate_ratio_to_linear", "1", "as ratio_to_linear, for region search";
-    "comparisons", "bounds", "bounds looked at a region search, of nodes and items, mean";
-    "regions_found", "regions", "regions that hold the eye, mean over the path";
-}
 
 /// In the order of [`super::UPDATE_SHARES`].
 const UPDATE_METRICS: [&str; 4] = [
@@ -72,16 +23,6 @@ const UPDATE_METRICS: [&str; 4] = [
     "update_ms_10_percent",
     "update_ms_100_percent",
 ];
-
-/// A value, with its 95 % interval where it was sampled.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
-#[cfg_attr(test, derive(schemars::JsonSchema))]
-pub struct Metric {
-    pub value: f64,
-    pub lower: Option<f64>,
-    pub upper: Option<f64>,
-    pub unit: String,
-}
 
 /// The scene of a cell.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
@@ -164,6 +105,8 @@ pub struct TwinRatio {
 /// All cells of a scene and path, with their samples.
 pub struct Group {
     pub cells: Vec<Cell>,
+    /// The bounds that were measured beside them: no structures, never ranked.
+    pub bounds: Vec<Cell>,
     pub twin: Option<TwinRatio>,
     /// Label of the contender (a twin is told apart), task and sample.
     pub samples: Vec<(String, Task, Sample)>,
@@ -172,11 +115,13 @@ pub struct Group {
 /// Verdicts of the oracle that a group may take: some 50 ns each.
 const MOST_JUDGED: usize = 400_000;
 
-/// Counts, verifies, judges and times all contenders; ratios are against the one named
-/// `yardstick`, if it is there. `None` if stopped.
+/// Counts, verifies, judges and times all contenders, frustum queries beside
+/// the bounds; ratios are against the one named `yardstick`, if it is there.
+/// `None` if stopped.
 pub fn measure_group(
     workload: &Workload,
     contenders: &[Contender],
+    bounds: &[Bound],
     yardstick: &str,
     protocol: &Protocol,
     stop: &dyn Fn() -> bool,
@@ -205,20 +150,47 @@ pub fn measure_group(
             entry.verdict = Verdict::new(Status::Unsafe, reason);
         }
     }
+    let visible = visible_counts(&entries);
+    let material = Material {
+        workload,
+        contenders,
+        visible: &visible,
+    };
+    let mut limits: Vec<Limit> = Vec::new();
     // Single and batched region search share their rounds.
     for tasks in [&[Task::Query][..], &[Task::Locate, Task::LocateBatched]] {
         let places: Vec<usize> = (0..entries.len()).filter(|&i| entries[i].runs()).collect();
-        let running: Vec<(&Built, &Counted)> =
-            places.iter().filter_map(|&i| entries[i].passed()).collect();
-        let timed = timed_pass(tasks, workload, &running, protocol, stop)?;
-        for (&task, timed) in tasks.iter().zip(timed) {
-            for (&i, result) in places.iter().zip(timed) {
+        let mut competitors: Vec<Competitor> = Vec::new();
+        for &task in tasks {
+            let running = places.iter().filter_map(|&i| entries[i].passed());
+            competitors.extend(
+                running.map(|(built, counted)| Competitor::of(task, workload, built, counted)),
+            );
+        }
+        let mut made: Vec<&Bound> = Vec::new();
+        if tasks.contains(&Task::Query) && !visible.is_empty() {
+            for bound in bounds {
+                if let Some(competitor) = (bound.make)(&material) {
+                    competitors.push(competitor);
+                    made.push(bound);
+                }
+            }
+        }
+        let timed = timed_rounds(workload.views.len(), &competitors, protocol, stop)?;
+        let mut timed = timed.into_iter();
+        for &task in tasks {
+            for (&i, result) in places.iter().zip(timed.by_ref().take(places.len())) {
                 match result {
                     Ok(timed) => entries[i].set(task, timed),
                     Err(verdict) => entries[i].verdict = verdict,
                 }
             }
         }
+        limits.extend(
+            made.into_iter()
+                .zip(timed)
+                .map(|(bound, timed)| Limit { bound, timed }),
+        );
     }
     let yardstick = entries
         .iter()
@@ -238,8 +210,12 @@ pub fn measure_group(
     let cells = entries
         .iter()
         .filter(|e| !e.contender.is_twin)
-        .map(|e| e.cell(workload, yardstick))
+        .map(|e| e.cell(workload, yardstick, &limits))
         .collect();
+    let of_bounds = limits.iter().flat_map(|limit| {
+        let samples = limit.timed.iter().flat_map(|t| t.samples.iter());
+        samples.map(|s| (limit.bound.name.to_owned(), Task::Query, *s))
+    });
     let samples = entries
         .iter()
         .flat_map(|e| {
@@ -253,12 +229,50 @@ pub fn measure_group(
                 samples.map(move |s| (e.contender.label(), task, *s))
             })
         })
+        .chain(of_bounds)
         .collect();
     Some(Group {
         cells,
+        bounds: limits.iter().map(Limit::cell).collect(),
         twin,
         samples,
     })
+}
+
+/// Items that each camera sees, as everyone who passed has counted them; empty
+/// if nobody has.
+fn visible_counts(entries: &[Entry]) -> Vec<u64> {
+    let passed = entries.iter().find(|e| e.runs());
+    let counted = passed.and_then(|e| e.counted.as_ref());
+    let frames = counted.iter().flat_map(|c| &c.frames);
+    frames.map(|frame| frame.visible).collect()
+}
+
+/// A bound with what was timed.
+struct Limit<'a> {
+    bound: &'a Bound,
+    timed: Result<Timed, Verdict>,
+}
+
+impl Limit<'_> {
+    fn cell(&self) -> Cell {
+        let mut metrics = Metrics::default();
+        if let Ok(timed) = &self.timed {
+            time_metrics(&mut metrics, timed, &Timed::default());
+        }
+        Cell {
+            structure: self.bound.name.to_owned(),
+            params: Value::Null,
+            verdict: self
+                .timed
+                .as_ref()
+                .err()
+                .cloned()
+                .unwrap_or_else(Verdict::ok),
+            metrics: metrics.0,
+            judged: None,
+        }
+    }
 }
 
 /// A contender on its way through the passes.
@@ -305,7 +319,7 @@ impl<'a> Entry<'a> {
         }
     }
 
-    fn cell(&self, workload: &Workload, yardstick: Option<&Entry>) -> Cell {
+    fn cell(&self, workload: &Workload, yardstick: Option<&Entry>, limits: &[Limit]) -> Cell {
         let mut metrics = Metrics::default();
         if let Ok(built) = &self.contender.built {
             let items = workload.scene.items.len();
@@ -333,6 +347,11 @@ impl<'a> Entry<'a> {
             }
             if let Some(linear) = yardstick.filter(|y| y.runs()) {
                 self.compare(&mut metrics, linear);
+            }
+            for limit in limits {
+                if let Ok(timed) = &limit.timed {
+                    metrics.estimate(limit.bound.ratio, paired_ratio(query, timed));
+                }
             }
         }
         Cell {
@@ -473,46 +492,6 @@ fn paired_ratio(base: &Timed, other: &Timed) -> Option<Estimate> {
         .filter(|r| r.is_finite())
         .collect();
     bootstrap_median(&ratios, 2)
-}
-
-#[derive(Default)]
-struct Metrics(BTreeMap<String, Metric>);
-
-impl Metrics {
-    fn insert(&mut self, name: &str, value: f64, interval: Option<(f64, f64)>) {
-        let info = METRICS.iter().find(|m| m.name == name);
-        debug_assert!(info.is_some(), "{name} is not in the list of metrics");
-        // A missing value is absent, never 0 and never NaN.
-        if let Some(info) = info.filter(|_| value.is_finite()) {
-            let metric = Metric {
-                value,
-                lower: interval.map(|i| i.0),
-                upper: interval.map(|i| i.1),
-                unit: info.unit.to_owned(),
-            };
-            self.0.insert(name.to_owned(), metric);
-        }
-    }
-
-    fn set(&mut self, name: &str, value: f64) {
-        self.insert(name, value, None);
-    }
-
-    fn maybe(&mut self, name: &str, value: Option<f64>) {
-        if let Some(value) = value {
-            self.set(name, value);
-        }
-    }
-
-    fn ratio(&mut self, name: &str, sum: f64, count: f64) {
-        self.set(name, sum / count);
-    }
-
-    fn estimate(&mut self, name: &str, estimate: Option<Estimate>) {
-        if let Some(e) = estimate {
-            self.insert(name, e.value, Some((e.lower, e.upper)));
-        }
-    }
 }
 
 #[cfg(test)]

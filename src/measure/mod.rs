@@ -3,29 +3,31 @@
 //! structure does and how results are written are not its business.
 //!
 //! The road every measurement walks: [`Workload`] (scene, views, points) ->
-//! [`Contender`]s (built structures) -> [`count_pass`] -> [`timed_pass`] ->
-//! [`Cell`]s with named metrics.
+//! [`Contender`]s (built structures) -> [`count_pass`] -> [`timed_rounds`] ->
+//! [`Cell`]s with named metrics. [`BOUNDS`] take part in the timed rounds only.
 
+mod bounds;
 mod cell;
 mod clock;
 mod contender;
 mod count;
 mod environment;
+mod metrics;
+mod orders;
 mod timing;
 mod workload;
 
 use serde::{Deserialize, Serialize};
 
-pub use cell::{
-    Cell, Group, METRICS, Metric, MetricInfo, PathInfo, SceneInfo, TwinRatio, measure_group,
-};
+pub use bounds::{BOUNDS, Bound, Material};
+pub use cell::{Cell, Group, PathInfo, SceneInfo, TwinRatio, measure_group};
 pub use clock::{Lap, Stopwatch};
 pub use contender::{Built, Contender, UPDATE_SHARES, guarded, move_share};
 pub use count::{Counted, FrameCount, Judged, LocateCount, count_pass, id_sum, judge};
 pub use environment::{Machine, Source, Toolchain};
+pub use metrics::{METRICS, Metric, MetricInfo};
 pub use timing::{
-    Ask, AskMany, Competitor, Protocol, Sample, Task, Timed, harness_overhead_ns, timed_pass,
-    timed_rounds,
+    Ask, AskMany, Competitor, Protocol, Sample, Task, Timed, harness_overhead_ns, timed_rounds,
 };
 pub use workload::{Workload, WorkloadError};
 

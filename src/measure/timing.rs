@@ -1,15 +1,15 @@
 //! The timed pass: rounds in balanced random order over all contenders, each
-//! warmed up, several queries per clock reading where one is short, and the
-//! caches streamed over between queries when it is to be cold.
+//! warmed up, several queries per clock reading where one is short. When it is
+//! to be cold, the caches are streamed over before every camera's queries.
 
 use std::cell::RefCell;
 use std::time::{Duration, Instant};
 
 use super::clock::Stopwatch;
 use super::contender::guarded;
+use super::orders::Orders;
 use super::{Built, Counted, Status, Verdict, Workload};
 use crate::query::{ItemId, Located};
-use crate::scene::Dice;
 
 /// How long and how often to measure.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -36,6 +36,8 @@ pub const MOST_OVERHEAD: f64 = 0.02;
 const WARM_UP: Duration = Duration::from_millis(20);
 /// Cold queries cost a sweep over memory each: fewer of them.
 const COLD_FRAMES: usize = 24;
+/// Room behind the answer that a structure may ask for while it writes it.
+const SLACK: usize = 64;
 
 /// Which of the two questions is asked.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -121,7 +123,12 @@ pub struct Competitor<'a> {
 
 impl<'a> Competitor<'a> {
     /// A structure that counted right, asked a task of a workload.
-    fn of(task: Task, workload: &'a Workload, built: &'a Built, counted: &Counted) -> Self {
+    pub(super) fn of(
+        task: Task,
+        workload: &'a Workload,
+        built: &'a Built,
+        counted: &Counted,
+    ) -> Self {
         let ask: Ask = match task {
             Task::Query => {
                 let index = built.items.as_ref();
@@ -188,30 +195,6 @@ fn located_at_once<'a>(workload: &'a Workload, built: &'a Built) -> AskMany<'a> 
     })
 }
 
-/// Times all contenders that counted right on some tasks of the workload, all
-/// in the same rounds; see [`timed_rounds`]. For each task what became of each
-/// contender.
-pub fn timed_pass(
-    tasks: &[Task],
-    workload: &Workload,
-    contenders: &[(&Built, &Counted)],
-    protocol: &Protocol,
-    stop: &dyn Fn() -> bool,
-) -> Option<Vec<Vec<Result<Timed, Verdict>>>> {
-    let mut competitors = Vec::with_capacity(tasks.len() * contenders.len());
-    for &task in tasks {
-        for &(built, counted) in contenders {
-            competitors.push(Competitor::of(task, workload, built, counted));
-        }
-    }
-    let timed = timed_rounds(workload.views.len(), &competitors, protocol, stop)?;
-    let mut timed = timed.into_iter();
-    let by_task = tasks
-        .iter()
-        .map(|_| timed.by_ref().take(contenders.len()).collect());
-    Some(by_task.collect())
-}
-
 /// Times all competitors on `count` queries each. `stop` ends the pass early
 /// (its samples are then worthless and the result is `None`).
 ///
@@ -225,86 +208,146 @@ pub fn timed_rounds(
 ) -> Option<Vec<Result<Timed, Verdict>>> {
     let places = places(count, competitors, protocol);
     let count = places.len();
-    let mut results: Vec<Result<Timed, Verdict>> =
+    let results: Vec<Result<Timed, Verdict>> =
         competitors.iter().map(|_| Ok(Timed::default())).collect();
     if count == 0 {
         return Some(results);
     }
+    let mut pass = Pass {
+        places: &places,
+        competitors,
+        results,
+    };
     let mut out = Vec::new();
-    let mut sweep = Sweep::new(if protocol.cold {
-        protocol.cache_bytes
-    } else {
-        0
-    });
-    let mut batches = Vec::with_capacity(competitors.len());
-    for competitor in competitors {
-        batches.push(if competitor.ask_many.is_some() {
-            count
-        } else if protocol.cold {
-            1
-        } else {
+    let batches: Vec<usize> = competitors
+        .iter()
+        .map(|c| match (&c.ask_many, protocol.cold) {
+            (Some(_), _) => count,
+            (None, true) => 1,
             // A panic is its verdict when its pass comes.
-            guarded(|| batch_size(competitor, &places, protocol.overhead_ns, &mut out)).unwrap_or(1)
-        });
-    }
-    let mut dice = Dice::new(protocol.seed);
-    let mut order: Vec<usize> = (0..competitors.len()).collect();
+            (None, false) => {
+                guarded(|| batch_size(c, &places, protocol.overhead_ns, &mut out)).unwrap_or(1)
+            }
+        })
+        .collect();
+    let mut cold = protocol.cold.then(|| Cold::new(protocol, competitors));
+    let mut orders = Orders::new(competitors.len(), protocol.seed);
     let start = Instant::now();
     for round in 0..protocol.max_rounds {
         if round >= protocol.min_rounds && start.elapsed() > protocol.budget {
             break;
         }
-        // A Latin square in random order: within every block of rounds each
-        // contender takes every place once.
-        if round % order.len().max(1) == 0 {
-            for i in (1..order.len()).rev() {
-                order.swap(i, dice.below(i + 1));
+        if let Some(cold) = &mut cold {
+            for first in 0..count {
+                if stop() {
+                    return None;
+                }
+                cold.sweep.over_caches();
+                // Whoever is first after the sweep finds the view cold as well:
+                // a new order for each camera.
+                for c in orders.next() {
+                    let out = &mut cold.outs[c];
+                    // Points that are asked at once come once a round.
+                    if first % batches[c] == 0 {
+                        pass.guarded(c, |pass| pass.time(c, round, first, batches[c], out));
+                    }
+                }
             }
         } else {
-            order.rotate_left(1);
-        }
-        for &c in &order {
-            if stop() {
-                return None;
-            }
-            let competitor = &competitors[c];
-            let Ok(timed) = &mut results[c] else { continue };
-            let pass = guarded(|| {
-                if !protocol.cold {
+            for c in orders.next() {
+                if stop() {
+                    return None;
+                }
+                let competitor = &competitors[c];
+                pass.guarded(c, |pass| {
                     warm_up(competitor, &places, batches[c], &mut out);
-                }
-                for first in (0..count).step_by(batches[c]) {
-                    let asked = &places[first..(first + batches[c]).min(count)];
-                    sweep.over_caches();
-                    let watch = Stopwatch::start();
-                    let returned = competitor.ask_all(asked, &mut out);
-                    let lap = watch.lap();
-                    let queries = asked.len() as f64;
-                    let expected: u64 = asked.iter().map(|&place| competitor.expected[place]).sum();
-                    if returned != expected {
-                        let reason = format!(
-                            "the timed pass returned {returned} ids from camera {first} on, the count pass {expected}"
-                        );
-                        return Err(Verdict::new(Status::Wrong, reason));
+                    for first in (0..count).step_by(batches[c]) {
+                        pass.time(c, round, first, batches[c], &mut out);
                     }
-                    timed.samples.push(Sample {
-                        round: round as u32,
-                        frame: places[first] as u32,
-                        queries: asked.len() as u32,
-                        cpu_ns: lap.cpu_ns / queries,
-                        wall_ns: lap.wall_ns / queries,
-                        returned,
-                    });
-                }
-                Ok(())
-            });
-            timed.rounds = round + 1;
-            if let Err(verdict) = pass.and_then(|pass| pass) {
-                results[c] = Err(verdict);
+                });
             }
         }
     }
-    Some(results)
+    Some(pass.results)
+}
+
+/// What the rounds of a pass fill in.
+struct Pass<'p, 'a> {
+    places: &'p [usize],
+    competitors: &'p [Competitor<'a>],
+    results: Vec<Result<Timed, Verdict>>,
+}
+
+impl Pass<'_, '_> {
+    /// Does something for a competitor that has not failed yet; a panic on the
+    /// way is its verdict.
+    fn guarded(&mut self, c: usize, work: impl FnOnce(&mut Self)) {
+        if self.results[c].is_err() {
+            return;
+        }
+        if let Err(verdict) = guarded(|| work(self)) {
+            self.results[c] = Err(verdict);
+        }
+    }
+
+    /// Times competitor `c` on a batch of places from the `first` on, unless it
+    /// has answered wrongly before.
+    fn time(&mut self, c: usize, round: usize, first: usize, batch: usize, out: &mut Vec<ItemId>) {
+        let competitor = &self.competitors[c];
+        let Ok(timed) = &mut self.results[c] else {
+            return;
+        };
+        let asked = &self.places[first..(first + batch).min(self.places.len())];
+        let watch = Stopwatch::start();
+        let returned = competitor.ask_all(asked, out);
+        let lap = watch.lap();
+        let queries = asked.len() as f64;
+        let expected: u64 = asked.iter().map(|&place| competitor.expected[place]).sum();
+        if returned != expected {
+            self.results[c] = Err(Verdict::new(
+                Status::Wrong,
+                format!(
+                    "the timed pass returned {returned} ids from camera {first} on, the count pass {expected}"
+                ),
+            ));
+            return;
+        }
+        timed.samples.push(Sample {
+            round: round as u32,
+            frame: asked[0] as u32,
+            queries: asked.len() as u32,
+            cpu_ns: lap.cpu_ns / queries,
+            wall_ns: lap.wall_ns / queries,
+            returned,
+        });
+        timed.rounds = round + 1;
+    }
+}
+
+/// What cold queries need. One sweep serves one query of every competitor: each
+/// has data of its own, which no other's query brings back, and its own output.
+struct Cold {
+    sweep: Sweep,
+    outs: Vec<Vec<ItemId>>,
+}
+
+impl Cold {
+    /// The outputs have their final size: a query that is asked once a sweep
+    /// must not pay for their growth.
+    fn new(protocol: &Protocol, competitors: &[Competitor]) -> Cold {
+        let most = |c: &Competitor| c.expected.iter().copied().max().unwrap_or(0) as usize;
+        Cold {
+            sweep: Sweep::new(protocol.cache_bytes),
+            outs: competitors
+                .iter()
+                .map(|c| {
+                    let mut out = vec![0; most(c) + SLACK];
+                    out.clear();
+                    out
+                })
+                .collect(),
+        }
+    }
 }
 
 /// The places along the path that are timed: all, or evenly thinned out so
@@ -441,13 +484,23 @@ mod tests {
         }
         let contenders: Vec<_> = built.iter().zip(&counted).collect();
         let tasks = [Task::Query, Task::LocateBatched];
-        let mut timed = timed_pass(&tasks, &workload, &contenders, &protocol, &|| false).unwrap();
+        let competitors: Vec<Competitor> = tasks
+            .iter()
+            .flat_map(|&task| {
+                let contenders = contenders.iter();
+                let workload = &workload;
+                contenders
+                    .map(move |(built, counted)| Competitor::of(task, workload, built, counted))
+            })
+            .collect();
+        let count = workload.views.len();
+        let mut timed = timed_rounds(count, &competitors, &protocol, &|| false).unwrap();
         // A pass of the second task is one batch.
-        for batched in timed.pop().unwrap() {
+        for batched in timed.split_off(contenders.len()) {
             let batched = batched.unwrap();
             assert_eq!(batched.samples.len(), batched.rounds);
         }
-        timed.pop().unwrap()
+        timed
     }
 
     #[test]

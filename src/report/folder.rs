@@ -6,6 +6,7 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
+use serde::Deserialize;
 use tempfile::NamedTempFile;
 
 use super::{Report, ReportCell, SCHEMA_VERSION, SamplesRef};
@@ -111,6 +112,40 @@ fn temporary_beside(folder: &Path) -> io::Result<NamedTempFile> {
     builder.tempfile_in(folder)
 }
 
+/// Reads a report from its file, or from the folder of a run. Fields that it
+/// does not know are ignored.
+///
+/// # Errors
+/// What the file system says, not a report, or one of another schema version.
+pub fn read_report(path: &Path) -> Result<Report, FolderError> {
+    /// Read first: another version has other fields, and that is no damage.
+    #[derive(Deserialize)]
+    struct Versioned {
+        schema_version: u32,
+    }
+    let path = match path.is_dir() {
+        true => path.join(REPORT),
+        false => path.to_owned(),
+    };
+    let json = |source| FolderError::Json {
+        path: path.clone(),
+        source,
+    };
+    let text = fs::read_to_string(&path).map_err(|source| FolderError::Io {
+        path: path.clone(),
+        source,
+    })?;
+    match serde_json::from_str(&text).map_err(json)? {
+        Versioned { schema_version } if schema_version != SCHEMA_VERSION => {
+            Err(FolderError::Version {
+                path,
+                found: schema_version,
+            })
+        }
+        _ => serde_json::from_str(&text).map_err(json),
+    }
+}
+
 /// An open run.
 pub struct RunFolder {
     path: PathBuf,
@@ -154,7 +189,8 @@ impl RunFolder {
     /// samples than the report refers to.
     pub fn resume(path: &Path) -> Result<(RunFolder, Report), FolderError> {
         let report = Self::read(path)?;
-        let rows = report.cells.iter().filter_map(|c| c.samples_ref.as_ref());
+        let measured = report.cells.iter().chain(&report.bounds);
+        let rows = measured.filter_map(|c| c.samples_ref.as_ref());
         let rows = rows
             .map(|r| r.first_row.saturating_add(r.rows))
             .max()
@@ -199,19 +235,7 @@ impl RunFolder {
     /// # Errors
     /// As [`RunFolder::resume`].
     pub fn read(path: &Path) -> Result<Report, FolderError> {
-        let path = path.join(REPORT);
-        let text = fs::read_to_string(&path).map_err(|source| FolderError::Io {
-            path: path.clone(),
-            source,
-        })?;
-        let report: Report = serde_json::from_str(&text).map_err(|source| FolderError::Json {
-            path: path.clone(),
-            source,
-        })?;
-        match report.schema_version {
-            SCHEMA_VERSION => Ok(report),
-            found => Err(FolderError::Version { path, found }),
-        }
+        read_report(&path.join(REPORT))
     }
 
     pub fn path(&self) -> &Path {
@@ -289,7 +313,7 @@ fn write_summary(cells: &[ReportCell], out: &mut dyn Write) -> io::Result<()> {
     ]
     .map(str::to_owned)
     .into();
-    let intervals = ["query_ns", "ratio_to_linear"];
+    let intervals = ["query_ns", "ratio_to_linear", "times_read", "times_memcpy"];
     for metric in METRICS {
         header.push(metric.name.to_owned());
         if intervals.contains(&metric.name) {
@@ -363,6 +387,33 @@ mod tests {
             error.contains("report.json") && !error.contains('\n'),
             "{error}"
         );
+    }
+
+    #[test]
+    fn another_version_is_told_from_something_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let refused = |text: &[u8]| {
+            fs::write(folder.path().join(REPORT), text).unwrap();
+            // The folder or the file in it: the same.
+            let error = read_report(folder.path()).unwrap_err().to_string();
+            let again = read_report(&folder.path().join(REPORT)).unwrap_err();
+            assert_eq!(error, again.to_string());
+            assert!(!error.contains('\n'), "{error}");
+            error
+        };
+        for (text, wanted) in [
+            (
+                "{\"schema_version\": 2, \"cells\": 7}",
+                "version 2; expected 1",
+            ),
+            ("{\"schema_version\": 1}", "missing field `run`"),
+            ("{}", "missing field `schema_version`"),
+            ("[1, 2]", "expected the report of a run"),
+            ("", "expected the report of a run"),
+        ] {
+            assert!(refused(text.as_bytes()).contains(wanted), "{text}");
+        }
+        assert!(refused(&[0xFF; 9]).contains("UTF-8"));
     }
 
     #[test]

@@ -24,6 +24,10 @@ pub struct Report {
     pub source: Source,
     pub noise: Noise,
     pub cells: Vec<ReportCell>,
+    /// Physical limits measured in the same rounds as the cells of their scene
+    /// and path: no structures, never ranked, and therefore a list of their own.
+    #[serde(default)]
+    pub bounds: Vec<ReportCell>,
 }
 
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]

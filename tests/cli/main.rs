@@ -15,6 +15,7 @@ mod process;
 mod queries;
 mod readers;
 mod region_search;
+mod reports;
 mod runs;
 #[cfg(unix)]
 mod signals;

@@ -27,7 +27,7 @@ const METRICS: &str = "query_ns ns_per_visible visible_count cull_rate ratio_to_
 /// contract, every path with all structures, samples where the cells say.
 pub fn check_run(run: &Path) -> Value {
     let report = report(run);
-    let top = "schema_version run machine toolchain source noise cells";
+    let top = "schema_version run machine toolchain source noise cells bounds";
     assert_eq!(keys(&report), set(top));
     for (part, fields) in [
         ("run", "id started_at command seed suite"),
@@ -106,11 +106,13 @@ pub fn check_run(run: &Path) -> Value {
         }
         referred += count;
     }
-    // The rest are those of the twins.
-    let twins = samples
-        .iter()
-        .filter(|row| row["structure"].ends_with("#twin"));
-    assert_eq!(referred + twins.count(), samples.len());
+    // The rest are those of the twins and of the bounds.
+    let rest = samples.iter().filter(|row| {
+        let name = &row["structure"];
+        name.ends_with("#twin") || name.starts_with("bound-")
+    });
+    assert_eq!(referred + rest.count(), samples.len());
+    check_bounds(&report);
     let names: Vec<String> = structure_names();
     for (path, found) in structures {
         assert_eq!(found, names, "{path:?}");
@@ -121,6 +123,35 @@ pub fn check_run(run: &Path) -> Value {
         .collect();
     assert!(left.is_empty(), "{left:?}");
     report
+}
+
+/// Every path with all bounds, and every cell with its ratio to each of them;
+/// the ratio is paired by round, so it is near the quotient, not equal to it.
+fn check_bounds(report: &Value) {
+    let bounds = report["bounds"].as_array().expect("an array");
+    for cell in cells(report) {
+        for (name, metric) in [
+            ("bound-read", "times_read"),
+            ("bound-memcpy", "times_memcpy"),
+        ] {
+            let of_cell = |b: &&Value| {
+                b["structure"] == name && b["scene"] == cell["scene"] && b["path"] == cell["path"]
+            };
+            let found: Vec<_> = bounds.iter().filter(of_cell).collect();
+            let tests = cells(report).iter().filter(|c| {
+                ["scene", "path", "structure"]
+                    .iter()
+                    .all(|k| c[k] == cell[k])
+            });
+            assert_eq!(found.len(), tests.count(), "{name}");
+            let value = |of: &Value, metric: &str| of["metrics"][metric]["value"].as_f64();
+            let ratio = value(cell, metric).expect(metric);
+            let spent = value(cell, "query_ns").expect("query_ns");
+            let limit = value(found[0], "query_ns").expect("query_ns");
+            let rough = spent / limit;
+            assert!((0.1..10.0).contains(&(ratio / rough)), "{ratio} {rough}");
+        }
+    }
 }
 
 const TINY: &str = "run --scene uniform:n=200 --path orbit:frames=16 --out out/run";
@@ -158,8 +189,9 @@ fn a_run_leaves_a_complete_report_and_is_not_written_over() {
         "resuming a finished run changed files"
     );
     // Another experiment does not belong into this report.
-    let others: [(&str, &str); 3] = [
+    let others: [(&str, &str); 4] = [
         ("--seed 2", "--seed 1"),
+        ("--no-bounds", "holds bounds"),
         ("--structure linear", "expected linear"),
         ("--planes frame-f32", "other planes"),
     ];
@@ -176,6 +208,37 @@ fn a_run_leaves_a_complete_report_and_is_not_written_over() {
     let more = check_run(&run);
     assert_eq!(cells(&more)[..cells(&report).len()], cells(&report)[..]);
     assert_eq!(cells(&more).len(), 2 * cells(&report).len());
+}
+
+#[test]
+fn bounds_can_be_left_out_for_a_whole_run_only() {
+    let folder = folder(&[]);
+    let bare = format!("{TINY} --structure linear,bvh");
+    works(folder.path(), &format!("{bare} --no-bounds"));
+    let report = report(&folder.path().join("out/run"));
+    assert_eq!(report["bounds"].as_array().map(Vec::len), Some(0));
+    assert!(
+        cells(&report)
+            .iter()
+            .all(|c| c["metrics"]["times_read"].is_null())
+    );
+    let more = format!("{bare} --resume --path spin:frames=16");
+    let done = cullbench(folder.path(), &more);
+    assert_refused(&done, "out/run | with --no-bounds | expected", "bounds");
+    works(folder.path(), &format!("{more} --no-bounds"));
+}
+
+#[test]
+fn cold_runs_measure_both_states_and_every_answer() {
+    let folder = folder(&[]);
+    works(folder.path(), &format!("{TINY} --cold"));
+    let report = check_run(&folder.path().join("out/run"));
+    for cache in ["warm", "cold"] {
+        let of_state = cells(&report)
+            .iter()
+            .filter(|c| c["path"]["cache"] == cache);
+        assert_eq!(of_state.count(), structure_names().len());
+    }
 }
 
 #[test]

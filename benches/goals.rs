@@ -1,0 +1,373 @@
+//! How close to the physical limit, and how far ahead of other crates: the goals
+//! of this project, each judged in one run against the fastest structure of
+//! another crate whose answers are right, and against the bounds. Exits 3 if one
+//! is missed. Words after `--` choose rows by what their names contain;
+//! `-- --test` only checks, on a thousand items, that every row runs.
+
+use std::process::ExitCode;
+use std::time::Duration;
+
+use cullbench::culling::{Culling, CullingTest};
+use cullbench::index::{BACKENDS, Backend, StructureSpec};
+use cullbench::measure::{
+    BOUNDS, Cell, Contender, Group, Machine, Metric, Protocol, Status, Workload,
+    harness_overhead_ns, measure_group,
+};
+use cullbench::scene::Scene;
+use cullbench::{path, scene};
+
+/// A scene with the goals that hold on all ways through it.
+struct World {
+    scene: &'static str,
+    frames: usize,
+    cold: bool,
+    /// Time of `linear` / time of `bound-read`, at most, where nearly all of
+    /// both is reading.
+    scan: f64,
+    /// Structures that suit the scene: each at least as fast as any other crate.
+    ahead: &'static [&'static str],
+    ways: [Way; 4],
+}
+
+/// A way through it.
+struct Way {
+    path: &'static str,
+    /// Time of the fastest structure of another crate / time of the subject, at
+    /// least.
+    peers: f64,
+    /// Time of the subject / time of a bound, at most.
+    bound: Option<(&'static str, f64)>,
+}
+
+const fn way(path: &'static str, peers: f64, bound: Option<(&'static str, f64)>) -> Way {
+    Way { path, peers, bound }
+}
+
+const TINY: &str = "flythrough:visible=0.1%";
+const FEW: &str = "flythrough:visible=2%";
+const MANY: &str = "orbit:visible=20%";
+const ALL: &str = "outside";
+
+const COPY: Option<(&str, f64)> = Some(("times_memcpy", 1.2));
+const REPLAY: Option<(&str, f64)> = Some(("times_replay", 1.15));
+const REPLAY_TINY: Option<(&str, f64)> = Some(("times_replay", 2.0));
+
+const WORLDS: [World; 5] = [
+    World {
+        scene: "uniform:n=10000",
+        frames: 512,
+        cold: false,
+        scan: 2.5,
+        ahead: &[],
+        ways: [
+            way(TINY, 3.0, None),
+            way(FEW, 7.0, None),
+            way(MANY, 12.0, None),
+            way(ALL, 50.0, None),
+        ],
+    },
+    World {
+        scene: "uniform:n=100000",
+        frames: 256,
+        cold: false,
+        scan: 1.6,
+        ahead: &["bsp", "octree", "bvh"],
+        ways: [
+            way(TINY, 5.5, None),
+            way(FEW, 11.0, None),
+            way(MANY, 14.0, None),
+            way(ALL, 50.0, COPY),
+        ],
+    },
+    World {
+        scene: "uniform:n=1000000",
+        frames: 128,
+        cold: false,
+        scan: 1.8,
+        ahead: &["bsp", "octree", "bvh"],
+        ways: [
+            way(TINY, 10.0, REPLAY_TINY),
+            way(FEW, 20.0, REPLAY),
+            way(MANY, 33.0, REPLAY),
+            way(ALL, 65.0, COPY),
+        ],
+    },
+    World {
+        scene: "uniform:n=1000000",
+        frames: 128,
+        cold: true,
+        scan: 1.45,
+        ahead: &["bsp", "octree", "bvh"],
+        ways: [
+            way(TINY, 5.0, None),
+            way(FEW, 8.0, None),
+            way(MANY, 14.0, None),
+            way(ALL, 25.0, None),
+        ],
+    },
+    World {
+        scene: "city:n=1000000",
+        frames: 128,
+        cold: false,
+        scan: 1.8,
+        ahead: &["bsp", "octree", "quadtree", "bvh"],
+        ways: [
+            way(TINY, 10.0, REPLAY_TINY),
+            way(FEW, 20.0, REPLAY),
+            way(MANY, 55.0, REPLAY),
+            way(ALL, 65.0, COPY),
+        ],
+    },
+];
+
+/// Of the subject, in every world: CPU time of a build, and memory, an item.
+const MOST_BUILD_NS: f64 = 90.0;
+const MOST_BYTES: f64 = 30.0;
+
+const PEER_PREFIX: &str = "peer-";
+/// The structure that is to meet the goals, or who stands in for it.
+const SUBJECTS: [&str; 2] = ["wide", "bvh"];
+
+impl World {
+    fn row(&self, way: &Way) -> String {
+        let (name, rest) = way.path.split_once(':').unwrap_or((way.path, ""));
+        let cache = if self.cold { "cold" } else { "warm" };
+        format!("{}, {name}:frames={},{rest}", self.scene, self.frames)
+            .trim_end_matches(',')
+            .to_owned()
+            + ", "
+            + cache
+    }
+
+    fn path(&self, way: &Way) -> String {
+        let (name, rest) = way.path.split_once(':').unwrap_or((way.path, ""));
+        let frames = self.frames;
+        match rest {
+            "" => format!("{name}:frames={frames}"),
+            rest => format!("{name}:frames={frames},{rest}"),
+        }
+    }
+}
+
+/// What was judged, and how it came out.
+struct Judge {
+    only_test: bool,
+    missed: u32,
+    judged: u32,
+}
+
+/// Which side of the goal is good.
+#[derive(Clone, Copy, PartialEq)]
+enum Goal {
+    AtLeast(f64),
+    AtMost(f64),
+}
+
+impl Judge {
+    fn line(&mut self, what: &str, metric: &Metric, goal: Goal) {
+        let holds = match goal {
+            Goal::AtLeast(least) => metric.value >= least,
+            Goal::AtMost(most) => metric.value <= most,
+        };
+        let verdict = match (self.only_test, holds) {
+            (true, _) => "not judged",
+            (false, true) => "ok",
+            (false, false) => "MISSED",
+        };
+        self.judged += u32::from(!self.only_test);
+        self.missed += u32::from(!self.only_test && !holds);
+        let interval = match metric.lower.zip(metric.upper) {
+            Some((lower, upper)) => format!(" [{lower:.2}, {upper:.2}]"),
+            None => String::new(),
+        };
+        let wanted = match goal {
+            Goal::AtLeast(least) => format!(">= {least}"),
+            Goal::AtMost(most) => format!("<= {most}"),
+        };
+        println!(
+            "  {what}: {:.2}{interval}, goal {wanted}: {verdict}",
+            metric.value
+        );
+    }
+}
+
+/// Time of `base` / time of `other`, from the ratios of both to the yardstick.
+fn quotient(base: &Cell, other: &Cell) -> Option<Metric> {
+    let (base, other) = (ratio(base)?, ratio(other)?);
+    Some(Metric {
+        value: other.value / base.value,
+        // The extremes of both: no narrower than the truth.
+        lower: other.lower.zip(base.upper).map(|(o, b)| o / b),
+        upper: other.upper.zip(base.lower).map(|(o, b)| o / b),
+        unit: "1".to_owned(),
+    })
+}
+
+fn ratio(cell: &Cell) -> Option<&Metric> {
+    let sound = cell.verdict.status == Status::Ok;
+    cell.metrics.get("ratio_to_linear").filter(|_| sound)
+}
+
+fn contenders(names: &[&str], twin: &str, scene: &Scene) -> Vec<Contender> {
+    let entered = names
+        .iter()
+        .map(|name| (*name, false))
+        .chain([(twin, true)]);
+    entered
+        .map(|(name, is_twin)| {
+            let spec = StructureSpec::parse(name).expect(name);
+            Contender::build(spec, is_twin, scene, CullingTest::SixPlane)
+        })
+        .collect()
+}
+
+fn judge_row(judge: &mut Judge, world: &World, way: &Way, group: &Group, subject: &str) {
+    let cell = |name: &str| group.cells.iter().find(|c| c.structure == name);
+    let noise = group.twin.as_ref();
+    let noise = noise.map_or(f64::NAN, |t| (t.ratio.value - 1.0).abs() * 100.0);
+    println!(
+        "{} ({subject} entered twice differs by {noise:.1} %)",
+        world.row(way)
+    );
+    for c in &group.cells {
+        if c.verdict.status != Status::Ok {
+            let reason = c.verdict.reason.as_deref().unwrap_or_default();
+            println!("  {}: {}: {reason}", c.structure, c.verdict.status.name());
+        }
+    }
+    let Some(own) = cell(subject) else { return };
+    assert_eq!(own.verdict.status, Status::Ok, "{:?}", own.verdict);
+    let peers = group
+        .cells
+        .iter()
+        .filter(|c| c.structure.starts_with(PEER_PREFIX));
+    let fastest = peers.filter(|c| ratio(c).is_some()).max_by(|a, b| {
+        let of = |c: &Cell| ratio(c).map_or(0.0, |m| m.value);
+        of(a).total_cmp(&of(b))
+    });
+    if let Some(peer) = fastest {
+        let name = &peer.structure;
+        for (own, least) in [(Some(own), way.peers)]
+            .into_iter()
+            .chain(world.ahead.iter().map(|name| (cell(name), 1.0)))
+        {
+            if let Some(own) = own
+                && let Some(times) = quotient(peer, own)
+            {
+                judge.line(
+                    &format!("{name} / {}", own.structure),
+                    &times,
+                    Goal::AtLeast(least),
+                );
+            }
+        }
+    }
+    if let Some((metric, most)) = way.bound
+        && let Some(times) = own.metrics.get(metric)
+    {
+        judge.line(&format!("{subject}, {metric}"), times, Goal::AtMost(most));
+    }
+    // Where little is visible the scan does little but read.
+    if way.path == TINY
+        && let Some(times) = cell("linear").and_then(|c| c.metrics.get("times_read"))
+    {
+        judge.line("linear, times_read", times, Goal::AtMost(world.scan));
+    }
+}
+
+/// What is the same on all ways through a scene.
+fn judge_build(judge: &mut Judge, world: &World, contender: &Contender, items: usize) {
+    let (Ok(built), false) = (&contender.built, world.cold) else {
+        return;
+    };
+    let per_item = |sum: f64, unit: &str| Metric {
+        value: sum / items as f64,
+        lower: None,
+        upper: None,
+        unit: unit.to_owned(),
+    };
+    let name = &contender.spec.label;
+    println!("{}", world.scene);
+    let build = per_item(built.build_ms * 1e6, "ns");
+    judge.line(
+        &format!("{name}, build ns/item"),
+        &build,
+        Goal::AtMost(MOST_BUILD_NS),
+    );
+    let memory = per_item(built.memory.total() as f64, "bytes");
+    judge.line(
+        &format!("{name}, bytes/item"),
+        &memory,
+        Goal::AtMost(MOST_BYTES),
+    );
+}
+
+fn main() -> ExitCode {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let only_test = words.iter().any(|word| word == "--test");
+    let wanted: Vec<&String> = words.iter().filter(|w| !w.starts_with('-')).collect();
+    let chosen = |row: &str| wanted.is_empty() || wanted.iter().any(|w| row.contains(w.as_str()));
+    let exists = |name: &&str| Backend::named(name).is_some();
+    let subject = SUBJECTS.into_iter().find(exists).expect("bvh is built in");
+    if subject != SUBJECTS[0] {
+        println!(
+            "no structure '{}': '{subject}' is measured in its place",
+            SUBJECTS[0]
+        );
+    }
+    let peers = BACKENDS.iter().map(|b| b.name);
+    let peers: Vec<&str> = peers.filter(|name| name.starts_with(PEER_PREFIX)).collect();
+    if peers.is_empty() {
+        println!("no structures of other crates (feature `peers`): judged against the bounds only");
+    }
+    let protocol = Protocol {
+        min_rounds: if only_test { 1 } else { 9 },
+        max_rounds: if only_test { 1 } else { 25 },
+        budget: Duration::from_secs(if only_test { 0 } else { 8 }),
+        pass: Duration::from_millis(if only_test { 20 } else { 400 }),
+        cold: false,
+        seed: 1,
+        overhead_ns: harness_overhead_ns(),
+        cache_bytes: Machine::capture().cache_sweep_bytes(),
+    };
+    let mut judge = Judge {
+        only_test,
+        missed: 0,
+        judged: 0,
+    };
+    for world in &WORLDS {
+        let ways = world.ways.iter().filter(|way| chosen(&world.row(way)));
+        let ways: Vec<&Way> = ways.collect();
+        if ways.is_empty() {
+            continue;
+        }
+        let source = match (only_test, world.scene.split_once('=')) {
+            (true, Some((family, _))) => format!("{family}=1000"),
+            _ => world.scene.to_owned(),
+        };
+        let scene = scene::load(&source, &Default::default()).expect(world.scene);
+        let mut names = vec!["linear", subject];
+        if !peers.is_empty() {
+            names.extend(world.ahead.iter().filter(|name| **name != subject));
+            names.extend(&peers);
+        }
+        let contenders = contenders(&names, subject, &scene);
+        judge_build(&mut judge, world, &contenders[1], scene.items.len());
+        for way in ways {
+            let source = world.path(way);
+            let cameras = path::load(&source, &scene, &Default::default()).expect(way.path);
+            let workload = Workload::new(&scene, &cameras, &Culling::default()).expect(way.path);
+            let protocol = Protocol {
+                cold: world.cold,
+                ..protocol
+            };
+            let group = measure_group(&workload, &contenders, BOUNDS, subject, &protocol, &|| {
+                false
+            })
+            .expect("not stopped");
+            judge_row(&mut judge, world, way, &group, subject);
+        }
+    }
+    println!("{} judged, {} missed", judge.judged, judge.missed);
+    ExitCode::from(if judge.missed > 0 { 3 } else { 0 })
+}

@@ -1,0 +1,178 @@
+//! A document of headings, lines and tables, written as Markdown, as one HTML
+//! page or for a terminal. It owns the escaping of each and knows nothing of
+//! what the document says.
+
+use super::text;
+
+pub enum Block {
+    /// A heading of the first, second or third level.
+    Heading(u8, String),
+    Line(String),
+    Table(Rows),
+    /// A picture as SVG, which only HTML can hold.
+    Picture(String),
+}
+
+/// A table: columns named in `right` hold numbers.
+pub struct Rows {
+    pub header: Vec<String>,
+    pub right: Vec<usize>,
+    pub rows: Vec<Vec<String>>,
+}
+
+impl Rows {
+    /// The first column holds names, all others numbers.
+    pub fn of_numbers<'h>(header: impl IntoIterator<Item = &'h str>) -> Rows {
+        let header: Vec<String> = header.into_iter().map(str::to_owned).collect();
+        Rows {
+            right: (1..header.len()).collect(),
+            header,
+            rows: Vec::new(),
+        }
+    }
+
+    /// For a terminal.
+    pub fn terminal(&self) -> String {
+        let header: Vec<&str> = self.header.iter().map(String::as_str).collect();
+        let mut table = text::table(&header, &self.right);
+        for row in &self.rows {
+            table.add_row(row);
+        }
+        table.to_string()
+    }
+
+    fn markdown(&self) -> String {
+        let line = |cells: &[String]| {
+            let cells: Vec<String> = cells.iter().map(|cell| markdown(cell)).collect();
+            format!("| {} |\n", cells.join(" | "))
+        };
+        let rule = (0..self.header.len()).map(|column| match self.right.contains(&column) {
+            true => "---:|",
+            false => "---|",
+        });
+        let mut out = line(&self.header) + "|" + &rule.collect::<String>() + "\n";
+        for row in &self.rows {
+            out += &line(row);
+        }
+        out
+    }
+
+    fn html(&self) -> String {
+        let line = |tag: &str, cells: &[String]| {
+            let cells = cells.iter().enumerate().map(|(column, cell)| {
+                let class = match self.right.contains(&column) {
+                    true => " class=\"n\"",
+                    false => "",
+                };
+                format!("<{tag}{class}>{}</{tag}>", html(cell))
+            });
+            format!("<tr>{}</tr>\n", cells.collect::<String>())
+        };
+        let rows = self.rows.iter().map(|row| line("td", row));
+        format!(
+            "<table>\n<thead>{}</thead>\n<tbody>\n{}</tbody>\n</table>\n",
+            line("th", &self.header),
+            rows.collect::<String>()
+        )
+    }
+}
+
+/// What Markdown could take for its own within a line. A line break would end
+/// a table row.
+fn markdown(text: &str) -> String {
+    let mut out = String::new();
+    for c in text.chars() {
+        match c {
+            '\\' | '|' | '`' | '*' | '_' | '<' | '[' | '&' => {
+                out.push('\\');
+                out.push(c);
+            }
+            c if c.is_control() => out.push(' '),
+            c => out.push(c),
+        }
+    }
+    out
+}
+
+fn html(text: &str) -> String {
+    let mut out = String::new();
+    for c in text.chars() {
+        match c {
+            '&' => out += "&amp;",
+            '<' => out += "&lt;",
+            '>' => out += "&gt;",
+            '"' => out += "&quot;",
+            '\'' => out += "&#39;",
+            c if c.is_control() => out.push(' '),
+            c => out.push(c),
+        }
+    }
+    out
+}
+
+/// The whole as Markdown.
+pub fn to_markdown(blocks: &[Block]) -> String {
+    let parts = blocks.iter().filter_map(|block| match block {
+        Block::Heading(level, text) => {
+            let marks = "#".repeat(usize::from(*level));
+            Some(format!("{marks} {}\n", markdown(text)))
+        }
+        Block::Line(text) => Some(markdown(text) + "\n"),
+        Block::Table(rows) => Some(rows.markdown()),
+        Block::Picture(_) => None,
+    });
+    parts.collect::<Vec<_>>().join("\n")
+}
+
+const STYLE: &str = "body{font:15px/1.45 system-ui,sans-serif;max-width:75rem;margin:2rem auto;\
+padding:0 1rem}table{border-collapse:collapse;margin:1rem 0;display:block;overflow-x:auto}\
+th,td{padding:.2rem .6rem;border-bottom:1px solid #ddd;text-align:left;white-space:nowrap}\
+.n{text-align:right;font-variant-numeric:tabular-nums}svg{max-width:100%;height:auto}";
+
+/// The whole as one page that needs nothing else.
+pub fn to_html(title: &str, blocks: &[Block]) -> String {
+    let parts = blocks.iter().map(|block| match block {
+        Block::Heading(level, text) => format!("<h{level}>{}</h{level}>\n", html(text)),
+        Block::Line(text) => format!("<p>{}</p>\n", html(text)),
+        Block::Table(rows) => rows.html(),
+        Block::Picture(svg) => format!("<figure>{svg}</figure>\n"),
+    });
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head><meta charset=\"utf-8\"><title>{}</title>\
+         <style>{STYLE}</style></head>\n<body>\n{}</body>\n</html>\n",
+        html(title),
+        parts.collect::<String>()
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_stays_text_in_every_format() {
+        let nasty = "a|b<script>\n`c` & \"d\"";
+        let blocks = [
+            Block::Heading(2, nasty.to_owned()),
+            Block::Table(Rows {
+                header: vec!["x".into(), nasty.into()],
+                right: vec![1],
+                rows: vec![vec![nasty.into(), "1".into()]],
+            }),
+            Block::Picture("<svg></svg>".into()),
+        ];
+        let text = to_markdown(&blocks);
+        let plain = "a\\|b\\<script> \\`c\\` \\& \"d\"";
+        assert_eq!(
+            text,
+            format!("## {plain}\n\n| x | {plain} |\n|---|---:|\n| {plain} | 1 |\n")
+        );
+        let page = to_html(nasty, &blocks);
+        assert!(
+            !page.contains("<script>") && page.contains("<svg></svg>"),
+            "{page}"
+        );
+        let cell = "<td>a|b&lt;script&gt; `c` &amp; &quot;d&quot;</td><td class=\"n\">1</td>";
+        assert!(page.contains(cell), "{page}");
+    }
+}

@@ -1,0 +1,217 @@
+//! `cullbench report`: what a run found, as Markdown, as pictures, as one HTML
+//! page. Reads report.json and measures nothing.
+
+use std::fs;
+use std::io::{self, Write};
+use std::path::Path;
+
+use anyhow::Context;
+
+use super::args::ReportArgs;
+use super::document::{Block, Rows, to_html, to_markdown};
+use super::{Ending, surface_diagram, surface_tables, text};
+use cullbench::measure::Status;
+use cullbench::report::{
+    Comparison, Ranked, Report, ReportCell, comparisons, growths, read_report, surfaces,
+    times_as_fast, write_atomically,
+};
+
+pub fn report(args: &ReportArgs) -> anyhow::Result<Ending> {
+    let report = read_report(&args.report)?;
+    let pictures = match args.svg.is_some() || args.html.is_some() {
+        true => surface_diagram::pictures(&surfaces(comparisons(&report)))?,
+        false => Vec::new(),
+    };
+    let mut blocks = blocks(&report);
+    if let Some(path) = &args.markdown {
+        write(path, &to_markdown(&blocks))?;
+    }
+    if let Some(folder) = &args.svg {
+        fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+        for picture in &pictures {
+            write(&folder.join(format!("{}.svg", picture.name)), &picture.svg)?;
+        }
+    }
+    if let Some(path) = &args.html {
+        blocks.extend(pictures.into_iter().map(|p| Block::Picture(p.svg)));
+        write(path, &to_html(&title(&report), &blocks))?;
+    } else if args.markdown.is_none() && args.svg.is_none() {
+        io::stdout().write_all(to_markdown(&blocks).as_bytes())?;
+    }
+    Ok(Ending::Ok)
+}
+
+fn write(path: &Path, text: &str) -> anyhow::Result<()> {
+    Ok(write_atomically(path, |out| {
+        out.write_all(text.as_bytes())
+    })?)
+}
+
+fn title(report: &Report) -> String {
+    format!("cullbench run {}", report.run.id)
+}
+
+fn blocks(report: &Report) -> Vec<Block> {
+    let mut blocks = vec![Block::Heading(1, title(report))];
+    blocks.extend(about(report).into_iter().map(Block::Line));
+    let all = comparisons(report);
+    let mut scene = "";
+    for comparison in &all {
+        let about = comparison.about();
+        if about.scene.name != scene {
+            scene = &about.scene.name;
+            blocks.push(Block::Heading(2, scene.to_owned()));
+            blocks.push(Block::Line(format!(
+                "{} items, {} regions.",
+                text::count(about.scene.total_count),
+                text::count(about.scene.region_count)
+            )));
+        }
+        blocks.extend(of_comparison(comparison));
+    }
+    for surface in surfaces(all).iter().filter(|surface| surface.spans()) {
+        let heading = format!("Crossover: {}", surface_tables::title(surface));
+        blocks.push(Block::Heading(2, heading));
+        blocks.extend(surface_tables::of_surface(surface));
+    }
+    let growths = growths(report);
+    if !growths.is_empty() {
+        let heading = "Growth at a fixed number of visible items".to_owned();
+        blocks.push(Block::Heading(2, heading));
+        blocks.push(Block::Table(surface_tables::of_growths(&growths)));
+    }
+    blocks
+}
+
+fn known(text: &Option<String>) -> &str {
+    text.as_deref().unwrap_or("unknown")
+}
+
+/// Where the figures come from, a line for each thing to know.
+fn about(report: &Report) -> Vec<String> {
+    let (run, machine) = (&report.run, &report.machine);
+    let suite = run.suite.as_deref().unwrap_or("chosen by hand");
+    let unfinished = match run.finished_at {
+        Some(_) => "",
+        None => "; not finished",
+    };
+    let dirty = match report.source.dirty {
+        Some(true) => ", with changes of its own",
+        _ => "",
+    };
+    let noise = match (report.noise.aa_floor, report.noise.aa_ratio) {
+        (Some(floor), Some(ratio)) => format!(
+            "Noise floor {} (the same structure entered twice, mean ratio {ratio:.3}): \
+             structures closer than that share a rank.",
+            text::percent(floor)
+        ),
+        _ => "Noise floor unknown: no structure was measured twice.".to_owned(),
+    };
+    vec![
+        format!(
+            "{}, suite: {suite}, seed {}{unfinished}.",
+            run.started_at, run.seed
+        ),
+        format!("Command: {}", run.command),
+        format!(
+            "Machine: {}, {} cores, kernel {}, instruction set {}.",
+            known(&machine.cpu),
+            machine.cores,
+            known(&machine.kernel),
+            machine.instruction_set
+        ),
+        format!(
+            "Built with {}, profile {}, flags '{}', features '{}'; source {}{dirty}.",
+            known(&report.toolchain.rustc),
+            known(&report.toolchain.profile),
+            report.toolchain.flags,
+            report.toolchain.features.join(","),
+            known(&report.source.commit)
+        ),
+        noise,
+    ]
+}
+
+fn of_comparison(comparison: &Comparison) -> Vec<Block> {
+    let about = comparison.about();
+    let share = |metric: &str, what: &str| {
+        let value = comparison.of_any(metric)?;
+        Some(format!(", {} {what}", text::percent(value)))
+    };
+    let heading = format!(
+        "{}, {}, {}{}",
+        about.path.name,
+        about.path.cache,
+        about.test,
+        share("cull_rate", "culled").unwrap_or_default()
+    );
+    let peer = comparison.fastest_peer();
+    let mut header = vec![
+        "structure",
+        "rank",
+        "query median",
+        "p95",
+        "times linear [95 % interval]",
+    ];
+    if peer.is_some() {
+        header.push("times fastest peer");
+    }
+    header.extend([
+        "time / bound-read",
+        "time / bound-memcpy",
+        "build",
+        "B/item",
+    ]);
+    header.extend(["break-even queries", "locate", "status"]);
+    let mut rows = Rows::of_numbers(header);
+    for Ranked { rank, cell } in &comparison.ranked {
+        let rank = rank.map_or("-".to_owned(), |rank| rank.to_string());
+        rows.rows.push(row(cell, rank, peer));
+    }
+    for bound in &comparison.bounds {
+        let mut row = row(bound, "bound".to_owned(), peer);
+        // A bound has no ratio to itself.
+        for cell in &mut row[4..] {
+            cell.clear();
+        }
+        rows.rows.push(row);
+    }
+    let mut blocks = vec![Block::Heading(3, heading), Block::Table(rows)];
+    let told = comparison.ranked.iter().map(|r| r.cell);
+    for cell in told.filter(|c| c.reason.is_some()) {
+        let reason = cell.reason.as_deref().unwrap_or_default();
+        blocks.push(Block::Line(format!(
+            "{}: {}: {reason}",
+            cell.structure,
+            cell.status.name()
+        )));
+    }
+    blocks
+}
+
+fn row(cell: &ReportCell, rank: String, peer: Option<&ReportCell>) -> Vec<String> {
+    let value =
+        |name: &str, show: fn(f64) -> String| cell.value(name).map(show).unwrap_or_default();
+    let mut row = vec![
+        cell.structure.clone(),
+        rank,
+        value("query_ns", text::time),
+        value("query_ns_p95", text::time),
+        text::estimate(cell.metrics.get("ratio_to_linear")),
+    ];
+    if let Some(peer) = peer {
+        let sound = cell.status == Status::Ok;
+        let ratio = times_as_fast(peer, cell).filter(|_| sound);
+        row.push(ratio.map(text::significant).unwrap_or_default());
+    }
+    row.extend([
+        value("times_read", text::significant),
+        value("times_memcpy", text::significant),
+        value("build_ms", |ms| text::time(ms * 1e6)),
+        value("memory_bytes_per_item", |b| format!("{b:.1}")),
+        value("break_even_queries", |n| text::count(n as usize)),
+        value("locate_ns", text::time),
+        cell.status.name().to_owned(),
+    ]);
+    row
+}

@@ -1,0 +1,139 @@
+//! The pictures of a crossover surface: time against the number of items, both
+//! logarithmic, one line for each structure. It draws what was measured and
+//! decides nothing.
+
+use anyhow::anyhow;
+use plotters::prelude::*;
+
+use super::precision_diagram::COLOURS;
+use super::{surface_tables, text};
+use cullbench::report::Surface;
+
+const SIZE: (u32, u32) = (900, 560);
+
+/// A picture with a name that fits a file.
+pub struct Picture {
+    pub name: String,
+    pub svg: String,
+}
+
+/// One picture for each class of shares that has at least two sizes.
+pub fn pictures(surfaces: &[Surface]) -> anyhow::Result<Vec<Picture>> {
+    let mut pictures: Vec<Picture> = Vec::new();
+    for surface in surfaces {
+        for class in surface.classes() {
+            let curves: Vec<Curve> = surface
+                .structures()
+                .into_iter()
+                .map(|name| (name, surface.curve(name, class, "query_ns")))
+                .filter(|(_, points)| points.len() > 1)
+                .collect();
+            if curves.is_empty() {
+                continue;
+            }
+            let shown = surface_tables::class(class);
+            let caption = format!("{}: {shown} visible", surface_tables::title(surface));
+            let mut svg = String::new();
+            draw(&mut svg, &caption, &curves)
+                .map_err(|error| anyhow!("{caption} cannot be drawn: {error}"))?;
+            let words = [&surface.world, surface.cache, surface.test, &shown].join("-");
+            let name = slug(&words);
+            // Two worlds may look the same to a file system.
+            let taken = pictures
+                .iter()
+                .filter(|p| p.name.starts_with(&name))
+                .count();
+            let name = match taken {
+                0 => name,
+                more => format!("{name}-{}", more + 1),
+            };
+            pictures.push(Picture { name, svg });
+        }
+    }
+    Ok(pictures)
+}
+
+type Curve<'s> = (&'s str, Vec<(usize, f64)>);
+
+/// Letters, digits and points; a dash for anything else.
+fn slug(words: &str) -> String {
+    let plain = words.chars().map(|c| match c {
+        c if c.is_ascii_alphanumeric() || c == '.' => c,
+        _ => '-',
+    });
+    let name: String = plain.collect::<String>().replace("--", "-");
+    name.trim_matches(['-', '.']).to_owned()
+}
+
+fn draw(
+    svg: &mut String,
+    caption: &str,
+    curves: &[Curve],
+) -> Result<(), Box<dyn std::error::Error>> {
+    let points = || curves.iter().flat_map(|(_, points)| points.iter());
+    let range = |values: &mut dyn Iterator<Item = f64>| {
+        let (least, most) = values.fold((f64::MAX, 0.0f64), |(least, most), value| {
+            (least.min(value), most.max(value))
+        });
+        (least / 1.3..most * 1.3).log_scale()
+    };
+    let items = range(&mut points().map(|p| p.0 as f64));
+    let times = range(&mut points().map(|p| p.1));
+    let root = SVGBackend::with_string(svg, SIZE).into_drawing_area();
+    root.fill(&WHITE)?;
+    let mut chart = ChartBuilder::on(&root)
+        .caption(caption, ("sans-serif", 18))
+        .margin(14)
+        .x_label_area_size(44)
+        .y_label_area_size(72)
+        .build_cartesian_2d(items, times)?;
+    chart
+        .configure_mesh()
+        .light_line_style(WHITE.mix(0.0))
+        .x_desc("items")
+        .y_desc("median time per query (thread CPU)")
+        .x_label_formatter(&|n| text::count(n.round() as usize))
+        .y_label_formatter(&|ns| text::time(*ns))
+        .draw()?;
+    for (i, (structure, points)) in curves.iter().enumerate() {
+        let colour = COLOURS[i % COLOURS.len()];
+        // Colours come round again; marks then differ.
+        let hollow = i / COLOURS.len() % 2 == 1;
+        let points: Vec<(f64, f64)> = points.iter().map(|&(n, ns)| (n as f64, ns)).collect();
+        let line = LineSeries::new(points.iter().copied(), colour.stroke_width(2));
+        let mark = move |at: (i32, i32)| match hollow {
+            true => Circle::new(at, 4, colour.stroke_width(1)),
+            false => Circle::new(at, 4, colour.filled()),
+        };
+        chart
+            .draw_series(line)?
+            .label(*structure)
+            .legend(move |(x, y)| mark((x + 8, y)));
+        chart.draw_series(points.iter().map(|&at| match hollow {
+            true => Circle::new(at, 4, colour.stroke_width(1)),
+            false => Circle::new(at, 4, colour.filled()),
+        }))?;
+    }
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::UpperLeft)
+        .background_style(WHITE.mix(0.8))
+        .border_style(BLACK.mix(0.3))
+        .draw()?;
+    root.present()?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_fit_a_file() {
+        assert_eq!(
+            slug("city:seed=7-warm-six-plane-0.1 %"),
+            "city-seed-7-warm-six-plane-0.1"
+        );
+        assert_eq!(slug("../a/b.csv"), "a-b.csv");
+    }
+}

@@ -1,0 +1,219 @@
+//! The crossover tables: which structure wins where, from how many items on the
+//! linear scan is beaten, and how cost grows. For the end of `run` and for
+//! `report`; read off a report, nothing is measured.
+
+use std::io::{self, Write};
+
+use super::document::{Block, Rows};
+use super::text;
+use cullbench::report::{Crossing, Growth, Place, Report, Surface, comparisons, growths, surfaces};
+
+/// A class of shares: "0.1 %", "100 %".
+pub fn class(share: f64) -> String {
+    // At most two digits by its making; the rest is rounding.
+    let rounded = format!("{:.6}", share * 100.0);
+    let plain = rounded.trim_end_matches('0').trim_end_matches('.');
+    format!("{plain} %")
+}
+
+pub fn title(surface: &Surface) -> String {
+    format!("{}, {}, {}", surface.world, surface.cache, surface.test)
+}
+
+/// Rows are numbers of items, columns shares of them that are visible: who is
+/// fastest and how many times as fast as the linear scan.
+fn winners(surface: &Surface) -> Rows {
+    let classes = surface.classes();
+    let header = ["items \\ visible".to_owned()].into_iter();
+    let header: Vec<String> = header.chain(classes.iter().map(|c| class(*c))).collect();
+    let mut rows = Rows::of_numbers(header.iter().map(String::as_str));
+    for size in surface.sizes() {
+        let mut row = vec![text::count(size)];
+        for class in &classes {
+            let here = |p: &&Place| p.items == size && p.class == *class;
+            let told = surface.places.iter().filter(here).map(winner);
+            row.push(told.collect::<Vec<_>>().join("; "));
+        }
+        rows.rows.push(row);
+    }
+    rows
+}
+
+/// "wide = bvh 12.3x": ties share the place, the fastest comes first.
+fn winner(place: &Place) -> String {
+    let names: Vec<&str> = place
+        .comparison
+        .winners()
+        .map(|c| c.structure.as_str())
+        .collect();
+    let mut told = names.join(" = ");
+    let ratio = place.comparison.winners().next();
+    if let Some(ratio) = ratio.and_then(|c| c.value("ratio_to_linear"))
+        && !place.linear_wins()
+    {
+        told += &format!(" {}x", text::significant(ratio));
+    }
+    told
+}
+
+/// From how many items on each structure beats the linear scan.
+fn crossings(surface: &Surface) -> Option<Rows> {
+    let classes = surface.classes();
+    let header: Vec<String> = ["faster than linear from".to_owned()]
+        .into_iter()
+        .chain(classes.iter().map(|c| class(*c)))
+        .collect();
+    let mut rows = Rows::of_numbers(header.iter().map(String::as_str));
+    for structure in surface.structures() {
+        if structure.starts_with("linear") {
+            continue;
+        }
+        let told = classes.iter().map(|class| {
+            let crossing = surface.crossing(structure, *class);
+            match crossing {
+                None => String::new(),
+                Some(Crossing::Below(items)) => format!("<= {}", text::count(items)),
+                Some(Crossing::At(items)) => format!("~ {}", text::count(two_digits(items))),
+                Some(Crossing::Above(items)) => format!("> {}", text::count(items)),
+            }
+        });
+        let told: Vec<String> = told.collect();
+        if told.iter().any(|cell| !cell.is_empty()) {
+            let name = [structure.to_owned()].into_iter();
+            rows.rows.push(name.chain(told).collect());
+        }
+    }
+    (!rows.rows.is_empty()).then_some(rows)
+}
+
+/// An interpolated number is not known more finely.
+fn two_digits(items: f64) -> usize {
+    let unit = 10f64.powi((items.max(1.0).log10().floor() as i32 - 1).max(0));
+    ((items / unit).round() * unit) as usize
+}
+
+/// After how many queries each build is repaid against the linear scan.
+fn break_even(surface: &Surface) -> Option<Rows> {
+    let structures: Vec<&str> = surface
+        .structures()
+        .into_iter()
+        .filter(|name| !name.starts_with("linear"))
+        .collect();
+    let header = ["items, visible"]
+        .into_iter()
+        .chain(structures.iter().copied());
+    let mut rows = Rows::of_numbers(header);
+    for place in &surface.places {
+        let told = structures.iter().map(|structure| {
+            let cell = place.cell(structure);
+            match cell.map(|c| (c.value("break_even_queries"), c.value("ratio_to_linear"))) {
+                None => String::new(),
+                Some((Some(queries), _)) => text::count(queries as usize),
+                // Built no more dearly than the scan's own copy of the items.
+                Some((None, Some(ratio))) if ratio > 1.0 => "0".to_owned(),
+                Some(_) => "never".to_owned(),
+            }
+        });
+        let name = format!(
+            "{}, {}",
+            text::count(place.items),
+            text::percent(place.share)
+        );
+        rows.rows.push([name].into_iter().chain(told).collect());
+    }
+    (!structures.is_empty()).then_some(rows)
+}
+
+/// The tables of one surface.
+pub fn of_surface(surface: &Surface) -> Vec<Block> {
+    let mut blocks = vec![
+        Block::Line(
+            "The fastest (= for ties within the noise floor) and how many times as fast as the \
+             linear scan; no factor where a scan wins."
+                .to_owned(),
+        ),
+        Block::Table(winners(surface)),
+    ];
+    blocks.extend(crossings(surface).map(Block::Table));
+    if let Some(rows) = break_even(surface) {
+        blocks.push(Block::Line(
+            "Queries after which the build is repaid against the linear scan:".to_owned(),
+        ));
+        blocks.push(Block::Table(rows));
+    }
+    blocks
+}
+
+/// How cost grows at a fixed number of visible items.
+pub fn of_growths(growths: &[Growth]) -> Rows {
+    let mut rows = Rows {
+        header: [
+            "world, path, cache, test",
+            "structure",
+            "visible",
+            "items",
+            "query time ~ N^e, e =",
+        ]
+        .map(str::to_owned)
+        .into(),
+        right: vec![2, 3, 4],
+        rows: Vec::new(),
+    };
+    for growth in growths {
+        let sizes = growth.sizes.first().zip(growth.sizes.last());
+        let e = growth.exponent;
+        rows.rows.push(vec![
+            format!(
+                "{}, {}, {}, {}",
+                growth.world, growth.path, growth.cache, growth.test
+            ),
+            growth.structure.to_owned(),
+            text::count(growth.visible.round() as usize),
+            sizes.map_or(String::new(), |(least, most)| {
+                format!("{} - {}", text::count(*least), text::count(*most))
+            }),
+            format!("{:.2} [{:.2}, {:.2}]", e.value, e.lower, e.upper),
+        ]);
+    }
+    rows
+}
+
+/// At the end of a run, where there is anything to cross.
+pub fn show(report: &Report) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    for surface in surfaces(comparisons(report)) {
+        // A world of one size has its ranked tables; that is the surface.
+        if surface.sizes().len() < 2 {
+            continue;
+        }
+        writeln!(out, "\ncrossover surface: {}", title(&surface))?;
+        writeln!(out, "{}", winners(&surface).terminal())?;
+        if let Some(rows) = crossings(&surface) {
+            writeln!(out, "{}", rows.terminal())?;
+        }
+    }
+    let growths = growths(report);
+    if !growths.is_empty() {
+        writeln!(
+            out,
+            "\ngrowth at a fixed number of visible items [95 % interval]"
+        )?;
+        writeln!(out, "{}", of_growths(&growths).terminal())?;
+    }
+    out.flush()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_and_interpolated_sizes_are_rounded() {
+        let shares = [0.001, 0.02, 0.2, 1.0, 0.0005];
+        assert_eq!(
+            shares.map(class),
+            ["0.1 %", "2 %", "20 %", "100 %", "0.05 %"]
+        );
+        assert_eq!([1234.0, 7.2, 98_765.0].map(two_digits), [1200, 7, 99_000]);
+    }
+}

@@ -1,0 +1,212 @@
+//! Physical limits, measured beside the structures: what the memory alone would
+//! cost. A bound answers nothing and is never ranked; it takes part in the same
+//! rounds, so that a ratio to it is paired like any other. It owns the table of
+//! bounds and what each of them does.
+
+use std::time::Duration;
+
+use super::{Competitor, Contender, Workload};
+use crate::geometry::BoxBlocks;
+use crate::index::{RegionIndex, Trace, Wide};
+use crate::kernel::{Isa, Kernel, Work};
+use crate::query::{AnyView, ItemId};
+
+/// A row of the table of bounds.
+pub struct Bound {
+    pub name: &'static str,
+    pub summary: &'static str,
+    /// The metric that holds time of a structure / time of this bound.
+    pub ratio: &'static str,
+    /// Makes it, with its own copy of the data; `None` where it has nothing to
+    /// do or what it needs is not among the contenders.
+    pub make: for<'a> fn(&Material<'a>) -> Option<Competitor<'a>>,
+}
+
+/// What a bound is made from.
+#[derive(Clone, Copy)]
+pub struct Material<'a> {
+    pub workload: &'a Workload<'a>,
+    /// What was built on the scene, under the names they were asked for by.
+    pub contenders: &'a [Contender],
+    /// Items visible to each camera of the path, as everyone counted them.
+    pub visible: &'a [u64],
+}
+
+/// All bounds, in the order in which they are shown.
+pub static BOUNDS: &[Bound] = &[
+    Bound {
+        name: "bound-read",
+        summary: "reads the bounds of all items once, 24 bytes each, and decides nothing",
+        ratio: "times_read",
+        make: read,
+    },
+    Bound {
+        name: "bound-memcpy",
+        summary: "copies as many ids as are visible, 4 bytes each, in one piece",
+        ratio: "times_memcpy",
+        make: memcpy,
+    },
+    Bound {
+        name: "bound-replay",
+        summary: "reads the blocks and copies the ids that 'wide' does, and decides nothing",
+        ratio: "times_replay",
+        make: replay,
+    },
+];
+
+/// A pass over the blocks as the chosen kernel does it.
+struct Read<'a>(&'a BoxBlocks);
+
+impl Work for Read<'_> {
+    type Output = u32;
+
+    #[inline(always)]
+    fn run<I: Isa>(self, _: I) -> u32 {
+        self.0.xor_of_bits()
+    }
+}
+
+fn read<'a>(material: &Material<'a>) -> Option<Competitor<'a>> {
+    let items = &material.workload.items;
+    let mut blocks = BoxBlocks::with_capacity(items.len());
+    for b in items.iter().filter(|b| !b.is_empty()) {
+        blocks.push(b);
+    }
+    (!blocks.is_empty()).then(|| Competitor {
+        ask: Box::new(move |_, _| {
+            std::hint::black_box(Kernel::chosen().run(Read(&blocks)));
+        }),
+        ask_many: None,
+        expected: vec![0; material.visible.len()],
+        slowest: Duration::ZERO,
+    })
+}
+
+fn memcpy<'a>(material: &Material<'a>) -> Option<Competitor<'a>> {
+    let count = material.workload.items.len();
+    let ids: Vec<ItemId> = (0..count as ItemId).collect();
+    let lengths: Vec<usize> = material.visible.iter().map(|&v| v as usize).collect();
+    // Each query copies from another place, as answers do: always the first ids
+    // would be always the same few cache lines.
+    let start = |(place, &length): (usize, &usize)| match count.checked_sub(length) {
+        Some(room) => scattered(place) % (room + 1),
+        None => 0,
+    };
+    let starts: Vec<usize> = lengths.iter().enumerate().map(start).collect();
+    lengths
+        .iter()
+        .any(|&length| length > 0)
+        .then(|| Competitor {
+            expected: material.visible.to_vec(),
+            ask: Box::new(move |place, out| {
+                let start = starts[place];
+                out.extend_from_slice(&ids[start..start + lengths[place]]);
+            }),
+            ask_many: None,
+            slowest: Duration::ZERO,
+        })
+}
+
+/// Only beside `wide` itself. The tree is a copy of its own.
+fn replay<'a>(material: &Material<'a>) -> Option<Competitor<'a>> {
+    let wide = material
+        .contenders
+        .iter()
+        .find(|c| c.spec.backend.name == Wide::NAME && c.built.is_ok())?;
+    let params = serde_json::from_value(wide.spec.params.clone()).ok()?;
+    let tree = Wide::build(&material.workload.items, None, &params).ok()?;
+    let views = material.workload.views.iter();
+    let traces: Vec<Trace> = views
+        .map(|view| match view.as_any() {
+            AnyView::Volume(view) => Trace::of(&tree, view),
+            AnyView::Spheres(view) => Trace::of(&tree, view),
+            AnyView::Wide(view) => Trace::of(&tree, view),
+            AnyView::Relative(view) => Trace::of(&tree, view),
+        })
+        .collect();
+    Some(Competitor {
+        expected: material.visible.to_vec(),
+        ask: Box::new(move |place, out| traces[place].replay(&tree, out)),
+        ask_many: None,
+        slowest: Duration::ZERO,
+    })
+}
+
+/// Spreads consecutive places: multiples of 2^32 / golden ratio (Knuth, TAOCP
+/// vol. 3, sec. 6.4).
+fn scattered(place: usize) -> usize {
+    (place as u32).wrapping_mul(0x9E37_79B9) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::culling::{CameraView, Culling, CullingTest};
+    use crate::index::StructureSpec;
+    use crate::path::{self, LensDefaults};
+    use crate::scene;
+
+    #[test]
+    fn each_bound_does_its_work_on_every_query_and_has_a_metric() {
+        let scene = scene::load("uniform:n=300", &Default::default()).unwrap();
+        let path = path::load("orbit:frames=6", &scene, &LensDefaults::default()).unwrap();
+        let workload = Workload::new(&scene, &path, &Culling::default()).unwrap();
+        let spec = StructureSpec::parse("wide").unwrap();
+        let wide = Contender::build(spec, false, &scene, CullingTest::SixPlane);
+        let index = &wide.built.as_ref().unwrap().items;
+        let seen = |view: &CameraView| {
+            let mut ids = Vec::new();
+            index.see(view.as_any(), &mut ids);
+            ids.len() as u64
+        };
+        let visible: Vec<u64> = workload.views.iter().map(seen).collect();
+        assert!(visible.iter().any(|&v| v > 0));
+        let mut material = Material {
+            workload: &workload,
+            contenders: &[],
+            visible: &visible,
+        };
+        assert!(replay(&material).is_none(), "nothing to replay");
+        let contenders = [wide];
+        material.contenders = &contenders;
+        for bound in BOUNDS {
+            assert!(
+                crate::measure::METRICS
+                    .iter()
+                    .any(|m| m.name == bound.ratio),
+                "{}",
+                bound.name
+            );
+            let competitor = (bound.make)(&material).unwrap();
+            assert_eq!(competitor.expected.len(), visible.len());
+            for (place, &expected) in competitor.expected.iter().enumerate() {
+                let mut out = Vec::new();
+                (competitor.ask)(place, &mut out);
+                assert_eq!(out.len() as u64, expected, "{}", bound.name);
+            }
+        }
+        let copied = memcpy(&material).unwrap();
+        assert_eq!(copied.expected, visible);
+        // Two queries of different places do not copy the same ids.
+        let ids = |place| {
+            let mut out = Vec::new();
+            (copied.ask)(place, &mut out);
+            out
+        };
+        assert_ne!(ids(1), ids(5)[..1]);
+        assert!(ids(4).iter().copied().eq(0..300));
+    }
+
+    #[test]
+    fn what_has_nothing_to_do_is_left_out() {
+        let scene = scene::load("uniform:n=0", &Default::default()).unwrap();
+        let path = path::load("orbit:frames=2", &scene, &LensDefaults::default()).unwrap();
+        let workload = Workload::new(&scene, &path, &Culling::default()).unwrap();
+        let material = Material {
+            workload: &workload,
+            contenders: &[],
+            visible: &[0, 0],
+        };
+        assert!(BOUNDS.iter().all(|b| (b.make)(&material).is_none()));
+    }
+}

@@ -1,0 +1,113 @@
+//! The list of metrics, a measured value, and the map in which a cell collects
+//! its own. What each value is computed from is `cell`'s.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::statistics::Estimate;
+
+/// One metric of the list; the unit is part of its name where it has one.
+pub struct MetricInfo {
+    pub name: &'static str,
+    pub unit: &'static str,
+    pub summary: &'static str,
+}
+
+macro_rules! metrics {
+    ($($name:literal, $unit:literal, $summary:literal;)*) => {
+        /// All metrics of a cell, in the order of the columns.
+        pub static METRICS: &[MetricInfo] =
+            &[$(MetricInfo { name: $name, unit: $unit, summary: $summary }),*];
+    };
+}
+
+metrics! {
+    "visible_count", "items", "visible items a query, mean over the path";
+    "cull_rate", "1", "1 - visible/total, mean over the path";
+    "query_ns", "ns", "thread CPU time of a frustum query: median over the frames, each the median over the rounds; interval over the rounds";
+    "query_ns_p5", "ns", "5th percentile over the frames";
+    "query_ns_p95", "ns", "95th percentile over the frames";
+    "query_ns_p99", "ns", "99th percentile over the frames";
+    "query_ns_max", "ns", "slowest frame";
+    "query_wall_ns", "ns", "as query_ns, wall time";
+    "ns_per_visible", "ns", "CPU time of all queries / visible items of all queries";
+    "ratio_to_linear", "1", "time of linear / time of this structure, paired by round: above 1 is faster";
+    "times_read", "1", "time of this structure / time of reading all item bounds once (bound-read), paired by round: what a scan is above the memory's speed";
+    "times_memcpy", "1", "time of this structure / time of copying as many ids (bound-memcpy), paired by round: what an answer is above its own size";
+    "times_replay", "1", "time of this structure / time of a replay of what 'wide' reads and copies, paired by round; only beside wide";
+    "nodes_tested", "nodes", "node bounds classified a query, mean";
+    "planes_tested", "planes", "plane tests a query, of nodes and items, mean";
+    "items_tested", "items", "item bounds tested a query, mean";
+    "items_accepted_untested", "items", "items reported with a whole subtree, untested, a query, mean";
+    "excess", "1", "false positives / truly visible items, at camera level, of the judged queries";
+    "false_positive_count", "items", "returned though out at camera level, a judged query, mean";
+    "false_negative_count", "items", "in at camera level, but not returned, a judged query, mean";
+    "touch_dropped_count", "items", "touching at camera level, but not returned, a judged query, mean";
+    "worst_miss", "world units", "how deep the deepest false negative reaches into the view";
+    "undecided_count", "items", "too close to a tie for the truth itself (called a touch), a judged query, mean";
+    "judged_queries", "queries", "cameras of the path whose answers were judged against the exact truth";
+    "build_ms", "ms", "CPU time of a build, median of up to three";
+    "update_ms_0_1_percent", "ms", "CPU time of an update after 0.1 % of the items have moved (scenes of up to 2 million)";
+    "update_ms", "ms", "as above, 1 % moved";
+    "update_ms_10_percent", "ms", "as above, 10 % moved";
+    "update_ms_100_percent", "ms", "as above, all moved";
+    "memory_bytes_per_item", "bytes", "nodes, item bounds and ids / items";
+    "break_even_queries", "queries", "queries after which the build is repaid against linear; empty if never";
+    "locate_ns", "ns", "thread CPU time of a region search at the eye, mean over the path, median over the rounds";
+    "locate_batched_ns", "ns", "thread CPU time of a region search when all points of the path are asked at once, a point; median over the rounds";
+    "locate_ratio_to_linear", "1", "as ratio_to_linear, for region search";
+    "comparisons", "bounds", "bounds looked at a region search, of nodes and items, mean";
+    "regions_found", "regions", "regions that hold the eye, mean over the path";
+}
+
+/// A value, with its 95 % interval where it was sampled.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Metric {
+    pub value: f64,
+    pub lower: Option<f64>,
+    pub upper: Option<f64>,
+    pub unit: String,
+}
+
+/// The metrics of a cell while they are collected.
+#[derive(Default)]
+pub(super) struct Metrics(pub(super) BTreeMap<String, Metric>);
+
+impl Metrics {
+    fn insert(&mut self, name: &str, value: f64, interval: Option<(f64, f64)>) {
+        let info = METRICS.iter().find(|m| m.name == name);
+        debug_assert!(info.is_some(), "{name} is not in the list of metrics");
+        // A missing value is absent, never 0 and never NaN.
+        if let Some(info) = info.filter(|_| value.is_finite()) {
+            let metric = Metric {
+                value,
+                lower: interval.map(|i| i.0),
+                upper: interval.map(|i| i.1),
+                unit: info.unit.to_owned(),
+            };
+            self.0.insert(name.to_owned(), metric);
+        }
+    }
+
+    pub(super) fn set(&mut self, name: &str, value: f64) {
+        self.insert(name, value, None);
+    }
+
+    pub(super) fn maybe(&mut self, name: &str, value: Option<f64>) {
+        if let Some(value) = value {
+            self.set(name, value);
+        }
+    }
+
+    pub(super) fn ratio(&mut self, name: &str, sum: f64, count: f64) {
+        self.set(name, sum / count);
+    }
+
+    pub(super) fn estimate(&mut self, name: &str, estimate: Option<Estimate>) {
+        if let Some(e) = estimate {
+            self.insert(name, e.value, Some((e.lower, e.upper)));
+        }
+    }
+}
