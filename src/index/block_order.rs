@@ -4,12 +4,14 @@
 //! and slower to ask.
 
 use std::cmp::Ordering;
+use std::sync::{Mutex, PoisonError};
 
 use glam::{Vec3, Vec4};
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::{Aabb, LANES};
 use crate::query::ItemId;
+use crate::threads::share;
 
 /// How items are brought into order.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
@@ -44,16 +46,61 @@ impl Point {
     }
 }
 
-/// The ids in block order. Deterministic. O(n log n).
-pub fn block_ordered(items: &[Aabb], mut ids: Vec<ItemId>, order: BlockOrder) -> Vec<ItemId> {
+/// The ids in block order: the same whatever the number of threads.
+/// O(n log n). Morton codes are sorted on one thread.
+pub fn block_ordered(
+    items: &[Aabb],
+    mut ids: Vec<ItemId>,
+    order: BlockOrder,
+    threads: usize,
+) -> Vec<ItemId> {
     match order {
-        BlockOrder::Median => by_medians(items, &mut ids),
+        BlockOrder::Median => by_medians(items, &mut ids, threads),
         BlockOrder::Morton => by_morton(items, &mut ids),
     }
     ids
 }
 
-fn by_medians(items: &[Aabb], ids: &mut [ItemId]) {
+/// Points to be halved until they are single units; the unit is a power of
+/// sixteen.
+struct Group<'a> {
+    points: &'a mut [Point],
+    unit: usize,
+}
+
+impl<'a> Group<'a> {
+    /// Its two halves, each unit of the lower one below each of the higher
+    /// one on the widest axis; `None` for a single block.
+    #[inline(always)]
+    fn halved(mut self) -> Option<[Group<'a>; 2]> {
+        while self.points.len() <= self.unit && self.unit > LANES {
+            self.unit /= LANES;
+        }
+        let Group { points, unit } = self;
+        let units = points.len().div_ceil(unit);
+        if units <= 1 {
+            return None;
+        }
+        let middle = (units / 2) * unit;
+        let axis = widest_axis(points);
+        points.select_nth_unstable_by(middle, |a, b| order(a.on(axis), b.on(axis)));
+        let (low, high) = points.split_at_mut(middle);
+        Some([low, high].map(|points| Group { points, unit }))
+    }
+
+    /// Halves it down to single blocks, one half after the other.
+    fn put_in_order(self) {
+        let mut open = vec![self];
+        while let Some(group) = open.pop() {
+            open.extend(group.halved().into_iter().flatten());
+        }
+    }
+}
+
+/// Fewer points than this are not worth a thread.
+const SHARED_POINTS: usize = 1 << 14;
+
+fn by_medians(items: &[Aabb], ids: &mut [ItemId], threads: usize) {
     let point = |&id: &ItemId| Point::new(items[id as usize].centre(), id);
     let mut points: Vec<Point> = ids.iter().map(point).collect();
     // The largest power of sixteen below the number of points.
@@ -61,22 +108,29 @@ fn by_medians(items: &[Aabb], ids: &mut [ItemId]) {
     while unit * LANES < points.len() {
         unit *= LANES;
     }
-    let mut open = vec![(&mut points[..], unit)];
-    while let Some((group, mut unit)) = open.pop() {
-        while group.len() <= unit && unit > LANES {
-            unit /= LANES;
+    let mut open = vec![Group {
+        points: &mut points,
+        unit,
+    }];
+    // What becomes of a group depends on that group alone, so that it does not
+    // matter who halves it. First, round by round, as many groups as it takes
+    // for nobody to be idle in the end.
+    let enough = 4 * threads;
+    while threads > 1 && open.len() < enough {
+        if open.iter().all(|g| g.points.len() < SHARED_POINTS) {
+            break;
         }
-        let units = group.len().div_ceil(unit);
-        if units <= 1 {
-            continue;
-        }
-        let middle = (units / 2) * unit;
-        let axis = widest_axis(group);
-        group.select_nth_unstable_by(middle, |a, b| order(a.on(axis), b.on(axis)));
-        let (low, high) = group.split_at_mut(middle);
-        open.push((high, unit));
-        open.push((low, unit));
+        let halves = Mutex::new(Vec::with_capacity(2 * open.len()));
+        share(threads.min(open.len()), open.into_iter(), |group| {
+            if let Some(two) = group.halved() {
+                let mut halves = halves.lock().unwrap_or_else(PoisonError::into_inner);
+                halves.extend(two);
+            }
+        });
+        open = halves.into_inner().unwrap_or_else(PoisonError::into_inner);
     }
+    let threads = if open.len() < enough { 1 } else { threads };
+    share(threads, open.into_iter(), Group::put_in_order);
     for (id, point) in ids.iter_mut().zip(&points) {
         *id = point.id();
     }
@@ -198,7 +252,7 @@ mod tests {
         for order in [BlockOrder::Median, BlockOrder::Morton] {
             for items in scenes() {
                 let ids: Vec<ItemId> = (0..items.len() as ItemId).collect();
-                let mut ordered = block_ordered(&items, ids.clone(), order);
+                let mut ordered = block_ordered(&items, ids.clone(), order, 1);
                 ordered.sort_unstable();
                 assert_eq!(ordered, ids);
             }
@@ -215,7 +269,7 @@ mod tests {
             union.extent().element_product()
         };
         for order in [BlockOrder::Median, BlockOrder::Morton] {
-            let ids = block_ordered(items, (0..4096).collect(), order);
+            let ids = block_ordered(items, (0..4096).collect(), order, 1);
             for block in [16, 256] {
                 // A perfect block of the grid is as many cells.
                 let worst = ids.chunks(block).map(size).fold(0.0, f32::max);
