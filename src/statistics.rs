@@ -65,6 +65,32 @@ pub fn bootstrap_median(values: &[f64], seed: u64) -> Option<Estimate> {
     })
 }
 
+/// Slope of the least-squares line through the points `(x, y)` with its 95 %
+/// interval by Student's t (Draper and Smith 1998, "Applied Regression
+/// Analysis", sec. 1.4). `None` for fewer than three points, or all at one x.
+pub fn slope(points: &[(f64, f64)]) -> Option<Estimate> {
+    // Two-sided 95 % quantiles of t for 1, 2, ... degrees of freedom; beyond
+    // them the next smaller one: wider than need be, never narrower.
+    const T: [f64; 10] = [
+        12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228,
+    ];
+    let freedom = points.len().checked_sub(2).filter(|f| *f > 0)?;
+    let count = points.len() as f64;
+    let mean_x = points.iter().map(|p| p.0).sum::<f64>() / count;
+    let mean_y = points.iter().map(|p| p.1).sum::<f64>() / count;
+    let centred = || points.iter().map(|p| (p.0 - mean_x, p.1 - mean_y));
+    let spread: f64 = centred().map(|(x, _)| x * x).sum();
+    let value = centred().map(|(x, y)| x * y).sum::<f64>() / spread;
+    let residual: f64 = centred().map(|(x, y)| (y - value * x).powi(2)).sum();
+    let error = (residual / freedom as f64 / spread).sqrt();
+    let margin = T[(freedom - 1).min(T.len() - 1)] * error;
+    value.is_finite().then_some(Estimate {
+        value,
+        lower: value - margin,
+        upper: value + margin,
+    })
+}
+
 /// SplitMix64 (Steele, Lea and Flood 2014), reduced to `0..count`.
 fn next_below(state: &mut u64, count: usize) -> usize {
     *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
@@ -194,6 +220,25 @@ mod tests {
         }
         assert_eq!(quantile(&[], 0.5), None);
         assert_eq!(quantile(&[3.0], 0.99), Some(3.0));
+    }
+
+    #[test]
+    fn slopes_have_the_interval_of_students_t() {
+        // R: confint(lm(c(2.1, 3.9, 6.2, 7.8) ~ c(1, 2, 3, 4))): 1.94,
+        // standard error 0.0906, t(2) = 4.303.
+        let points = [(1.0, 2.1), (2.0, 3.9), (3.0, 6.2), (4.0, 7.8)];
+        let found = slope(&points).unwrap();
+        assert!((found.value - 1.94).abs() < 1e-9, "{found:?}");
+        assert!(
+            (found.upper - found.value - 0.3897).abs() < 1e-3,
+            "{found:?}"
+        );
+        assert!(
+            (found.value - found.lower - 0.3897).abs() < 1e-3,
+            "{found:?}"
+        );
+        assert_eq!(slope(&points[..2]), None);
+        assert_eq!(slope(&[(1.0, 2.0), (1.0, 3.0), (1.0, 4.0)]), None);
     }
 
     #[test]

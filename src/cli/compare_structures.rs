@@ -8,6 +8,7 @@ use cullbench::geometry::Aabb;
 use cullbench::index::{DynIndex, StructureSpec};
 use cullbench::query::{ItemId, QueryCost};
 use cullbench::scene::Scene;
+use cullbench::threads::{self, share};
 
 /// One structure's answer to one question.
 pub struct Answer {
@@ -27,30 +28,32 @@ pub fn ask_all(
     boxes: &[Aabb],
     questions: usize,
     keep_ids: bool,
-    ask: impl Fn(&dyn DynIndex, usize, &mut Vec<ItemId>, &mut QueryCost),
+    ask: impl Fn(&dyn DynIndex, usize, &mut Vec<ItemId>, &mut QueryCost) + Sync,
 ) -> anyhow::Result<Vec<Answer>> {
     let mut answers: Vec<Vec<Answer>> = (0..questions).map(|_| Vec::new()).collect();
-    let mut out = Vec::new();
     for spec in structures {
         let index = spec
             .build_with(boxes, scene.own_tree.as_ref())
             .map_err(|error| anyhow::anyhow!("structure '{}': {error}", spec.label))?;
-        for (question, row) in answers.iter_mut().enumerate() {
-            out.clear();
-            let mut cost = QueryCost::default();
-            ask(index.as_ref(), question, &mut out, &mut cost);
-            if keep_ids {
-                out.sort_unstable();
-            }
-            row.push(Answer {
-                question,
-                structure: spec.label.clone(),
-                count: out.len(),
-                id_sum: cullbench::measure::id_sum(&out),
-                ids: keep_ids.then(|| out.clone()),
-                cost,
-            });
-        }
+        share(
+            threads::chosen(),
+            answers.iter_mut().enumerate(),
+            |(question, row)| {
+                let (mut out, mut cost) = (Vec::new(), QueryCost::default());
+                ask(index.as_ref(), question, &mut out, &mut cost);
+                if keep_ids {
+                    out.sort_unstable();
+                }
+                row.push(Answer {
+                    question,
+                    structure: spec.label.clone(),
+                    count: out.len(),
+                    id_sum: cullbench::measure::id_sum(&out),
+                    ids: keep_ids.then_some(out),
+                    cost,
+                });
+            },
+        );
     }
     Ok(answers.into_iter().flatten().collect())
 }

@@ -149,10 +149,21 @@ fn order(a: f32, b: f32) -> Ordering {
 }
 
 fn widest_axis(points: &[Point]) -> usize {
-    let none = (Vec4::INFINITY, Vec4::NEG_INFINITY);
-    let (low, high) = points
-        .iter()
-        .fold(none, |(low, high), p| (low.min(p.0), high.max(p.0)));
+    // Four chains: one would wait for the last minimum at every point.
+    let (fours, rest) = points.as_chunks::<4>();
+    let (mut low, mut high) = ([Vec4::INFINITY; 4], [Vec4::NEG_INFINITY; 4]);
+    for four in fours {
+        for ((low, high), p) in low.iter_mut().zip(&mut high).zip(four) {
+            *low = low.min(p.0);
+            *high = high.max(p.0);
+        }
+    }
+    for p in rest {
+        low[0] = low[0].min(p.0);
+        high[0] = high[0].max(p.0);
+    }
+    let low = low[0].min(low[1]).min(low[2].min(low[3]));
+    let high = high[0].max(high[1]).max(high[2].max(high[3]));
     let width = high - low;
     let wider = |a: usize, b: usize| if width[b] > width[a] { b } else { a };
     wider(wider(0, 1), 2)
@@ -177,18 +188,29 @@ fn by_morton(items: &[Aabb], ids: &mut [ItemId]) {
         let cell = from.to_array().map(|x| (x as u64).min((1 << BITS) - 1));
         spread(cell[0]) | spread(cell[1]) << 1 | spread(cell[2]) << 2
     };
-    let keyed = ids.iter().map(|&id| (code(id), id)).collect();
-    for (id, (_, sorted)) in ids.iter_mut().zip(sorted_by_radix(keyed)) {
+    let keyed = ids.iter().map(|&id| ((code(id) >> LOW) as u32, id));
+    let mut sorted = sorted_by_radix(keyed.collect());
+    // Cells of the upper bits with more than a block of items: crowded corners
+    // of a scene, none in most.
+    for cell in sorted.chunk_by_mut(|a, b| a.0 == b.0) {
+        if cell.len() > LANES {
+            cell.sort_by_cached_key(|&(_, id)| code(id));
+        }
+    }
+    for (id, (_, sorted)) in ids.iter_mut().zip(sorted) {
         *id = sorted;
     }
 }
 
+/// Lower bits of a code, which the radix sort leaves out: what is left are 32,
+/// and an entry is 8 bytes.
+const LOW: u32 = 3 * BITS - u32::BITS;
+
 /// Sorts by code, equal ones in the order given: least significant digit
 /// first (Knuth, TAOCP 3, 5.2.5). O(n). Eight bits a digit: with more, the
 /// places that are written to no longer fit the first cache and its pages.
-fn sorted_by_radix(mut from: Vec<(u64, ItemId)>) -> Vec<(u64, ItemId)> {
-    const DIGITS: usize = 3 * BITS as usize / 8;
-    let mut starts = [[0; 256]; DIGITS];
+fn sorted_by_radix(mut from: Vec<(u32, ItemId)>) -> Vec<(u32, ItemId)> {
+    let mut starts = [[0; 256]; size_of::<u32>()];
     for (code, _) in &from {
         for (starts, digit) in starts.iter_mut().zip(code.to_le_bytes()) {
             starts[usize::from(digit)] += 1;

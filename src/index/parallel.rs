@@ -44,9 +44,10 @@ const PARTS: usize = 8;
 /// A query is split where its frontier has so many blocks.
 const ENOUGH_BLOCKS: usize = 128;
 
-/// A query that can have fewer answers than this stays whole: waking a thread
-/// takes longer than what it would save.
-const LEAST_ANSWERS: usize = 1 << 16;
+/// A query stays whole if fewer items than this are undecided where it would be
+/// split: waking a thread takes longer than what it would save. What is inside
+/// does not count: it is copied, and another thread's copy is copied again.
+const LEAST_UNDECIDED: usize = 1 << 16;
 
 type Job<'env> = Box<dyn FnOnce() -> Vec<ItemId> + Send + 'env>;
 
@@ -227,8 +228,12 @@ impl<V: View> Work for Split<'_, V> {
         let (blocks, open) = scratch.frontier();
         let certain: usize = inside.iter().map(ExactSizeIterator::len).sum();
         let span = LANES << (level * LANES.ilog2() as usize);
-        let possible = certain + blocks.len().saturating_mul(span);
-        let count = if possible < LEAST_ANSWERS { 1 } else { PARTS };
+        let undecided = blocks.len().saturating_mul(span);
+        let count = if undecided < LEAST_UNDECIDED {
+            1
+        } else {
+            PARTS
+        };
         let mut left = inside.into_iter();
         let mut next = 0..0;
         let mut parts = Vec::with_capacity(count);

@@ -10,6 +10,9 @@ use crate::scene::Scene;
 /// Most items and cameras that are looked at per step of the search.
 const MOST_ITEMS: usize = 8_000;
 const MOST_CAMERAS: usize = 128;
+/// Items of the sample that a camera sees at least, on average, at the cost of
+/// more items than that: a share of 0.02 % of eight thousand would be one or two.
+const LEAST_SEEN: f64 = 8.0;
 
 /// The cameras with far (and near, a thousandth of it) scaled alike so that
 /// on average `share` of the items is visible, within the sample's accuracy.
@@ -22,7 +25,8 @@ pub(super) fn to_visible_share(
     cameras: Vec<Camera>,
     share: f64,
 ) -> Result<Vec<Camera>, PathError> {
-    let items = every_nth(&scene.items, MOST_ITEMS);
+    let needed = (LEAST_SEEN / share).ceil() as usize;
+    let items = every_nth(&scene.items, MOST_ITEMS.max(needed));
     let sample = every_nth(&cameras, MOST_CAMERAS);
     let around = scene.surroundings();
     let visible = |scale: f64| -> Result<f64, PathError> {

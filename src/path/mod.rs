@@ -80,7 +80,7 @@ pub static PATHS: &[PathFamily] = &[
 /// Parameters that every generated path takes.
 pub const PATH_PARAMS: &str = "frames=256, seed=1, fovy=60 (degrees), aspect=1.778 (16:9), near=far/1000, \
      far=the scene's diagonal (or inf), visible (choose far so that this share of the items \
-     is visible on average, e.g. visible=2%)";
+     is visible on average, e.g. visible=2%, or this many of them, e.g. visible=2000)";
 
 /// A path that cannot be made or read.
 #[derive(Debug, thiserror::Error)]
@@ -246,7 +246,7 @@ impl Optics {
             None => defaults.near,
         };
         let visible = match spec.text("visible") {
-            Some(_) => Some(spec.number_between("visible", 0.0, 0.0, 1.0)?),
+            Some(text) => Some(visible_share(spec, &text, stage.scene.items.len())?),
             None => None,
         };
         Ok(Optics {
@@ -284,6 +284,23 @@ impl Optics {
             })
             .collect()
     }
+}
+
+/// `visible=2%` is a share of the items, `visible=2000` a count of them; 1 would
+/// be both and is neither.
+fn visible_share(spec: &mut Spec, text: &str, items: usize) -> Result<f64, SpecError> {
+    let value = spec.number("visible", 0.0)?;
+    if value > 0.0 && value < 1.0 {
+        return Ok(value);
+    }
+    // All of them cannot be calibrated for: there is a path for that.
+    if value > 1.0 && value.fract() == 0.0 && value < items as f64 {
+        return Ok(value / items as f64);
+    }
+    Err(SpecError::new(format_args!(
+        "visible={text}; expected a share between 0 and 1 (2%) or a count from 2 to {}",
+        items.saturating_sub(1)
+    )))
 }
 
 /// z, or y for a camera that looks straight up or down.
@@ -363,9 +380,21 @@ mod tests {
         for (source, wanted) in [
             ("flythrough:visible=2%", 0.02),
             ("teleport:frames=128,visible=0.05", 0.05),
+            ("flythrough:visible=1000", 0.05),
+            ("flythrough:visible=2k", 0.1),
         ] {
             let share = visible_share(&path(source, &scene), &scene);
             assert!((share / wanted - 1.0).abs() < 0.1, "{source}: {share}");
+        }
+    }
+
+    #[test]
+    fn a_count_is_met_in_scenes_of_any_size() {
+        for n in [5_000, 1_000_000] {
+            let scene = scene(&format!("uniform:n={n}"));
+            let path = path("flythrough:frames=32,visible=200", &scene);
+            let visible = visible_share(&path, &scene) * f64::from(n);
+            assert!((visible / 200.0 - 1.0).abs() < 0.15, "{n}: {visible}");
         }
     }
 
@@ -386,7 +415,11 @@ mod tests {
             ("orbit:frame=3", "did you mean 'frames'"),
             ("orbit:fovy=0", "field of view is 0"),
             ("orbit:near=5,far=5", "near < far"),
-            ("orbit:visible=2", "visible=2"),
+            ("orbit:visible=10", "visible=10; expected a share"),
+            ("orbit:visible=1", "count from 2 to 9"),
+            ("orbit:visible=100%", "visible=100%; expected"),
+            ("orbit:visible=2.5", "visible=2.5; expected"),
+            ("orbit:visible=-1", "visible=-1; expected"),
             ("nothing.csv", "No such file"),
             ("nothing.txt", "No such file"),
             ("no/where", "No such file"),
