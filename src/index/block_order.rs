@@ -299,4 +299,18 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn a_crowd_in_one_corner_is_ordered_by_the_lower_bits() {
+        // A far item makes the cells of the upper bits as large as the grid.
+        let mut items = scenes()[0].clone();
+        let far = Vec3::splat(f32::from(1u16 << 15));
+        items.push(Aabb::around(far, Vec3::splat(0.4)));
+        let ids = block_ordered(&items, (0..4097).collect(), BlockOrder::Morton, 1);
+        for block in ids[..4096].chunks(LANES) {
+            let boxes = block.iter().map(|&id| &items[id as usize]);
+            let size = Aabb::union_of(boxes).extent().element_product();
+            assert!(size <= 1.01 * LANES as f32, "{size}");
+        }
+    }
 }

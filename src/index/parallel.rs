@@ -149,11 +149,9 @@ impl<'env> Crew<'env> {
         };
         if parts.len() > 1 {
             let shared = Arc::new(view.clone());
-            let threads = self.threads();
             // From the end, so that what is left at last is the first share.
             for (i, worker) in self.workers.iter_mut().enumerate().rev() {
                 let share = parts.split_off(parts.len() * (i + 1) / (i + 2));
-                debug_assert!(i + 2 <= threads);
                 let (view, mut answer) = (Arc::clone(&shared), std::mem::take(&mut worker.spare));
                 let job = move || {
                     answer.clear();
