@@ -125,6 +125,9 @@ const MOST_BUILD_NS: f64 = 90.0;
 const MOST_BYTES: f64 = 30.0;
 
 const PEER_PREFIX: &str = "peer-";
+/// Nobody's crate, so no goal is set against it; it comes with the peers and
+/// its ratio is shown.
+const OWN_GRID: [&str; 1] = ["uniform-grid"];
 /// The structure that is to meet the goals, or who stands in for it.
 const SUBJECTS: [&str; 2] = ["wide", "bvh"];
 
@@ -262,6 +265,11 @@ fn judge_row(judge: &mut Judge, world: &World, way: &Way, group: &Group, subject
             }
         }
     }
+    for name in OWN_GRID {
+        if let Some(times) = cell(name).and_then(|grid| quotient(grid, own)) {
+            println!("  {name} (no crate) / {subject}: {:.2}", times.value);
+        }
+    }
     if let Some((metric, most)) = way.bound
         && let Some(times) = own.metrics.get(metric)
     {
@@ -350,6 +358,7 @@ fn main() -> ExitCode {
         if !peers.is_empty() {
             names.extend(world.ahead.iter().filter(|name| **name != subject));
             names.extend(&peers);
+            names.extend(OWN_GRID.iter().filter(exists));
         }
         let contenders = contenders(&names, subject, &scene);
         judge_build(&mut judge, world, &contenders[1], scene.items.len());

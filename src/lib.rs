@@ -6,6 +6,7 @@
 //! The story of the crate in the order of its modules:
 //!
 //! - [`kernel`]: instruction sets, chosen at run time
+//! - [`threads`]: how many may work at once, and how they share work out
 //! - [`arithmetic`]: directed rounding, exact sums and products
 //! - [`geometry`]: boxes, planes, convex volumes, and THE plane test
 //! - [`query`]: what a query asks ([`query::Region`]), where answers go
@@ -72,4 +73,5 @@ pub mod spec;
 pub mod statistics;
 pub mod stress;
 pub mod suite;
+pub mod threads;
 pub mod verify;

@@ -234,7 +234,7 @@ fn memory_and_counters_fit_the_items() {
         let looks = match backend.name {
             "linear-scalar" | "linear" | "peer-bevy-style" => 5000..=5000,
             "wide" => 1..=16,
-            name if name.starts_with("peer-") => 1..=2,
+            name if PEERS.contains(&name) => 1..=2,
             _ => 1..=1,
         };
         let compared = cost.comparisons();

@@ -11,6 +11,7 @@ use cullbench::kernel::Kernel;
 use cullbench::path::LensDefaults;
 use cullbench::spec::{SpecError, parse_number};
 use cullbench::suite::DEFAULT_PATH;
+use cullbench::threads::{self, MOST_THREADS};
 use glam::DVec3;
 
 /// Which spatial index finds what a camera sees, and where the camera is:
@@ -105,11 +106,15 @@ pub struct KernelArgs {
     /// Instruction set: portable, avx2 or avx512 [default: the best of this machine]
     #[arg(long = "kernel", value_name = "NAME")]
     pub name: Option<String>,
+    /// Threads that a build may use, and that query and locate share cameras and points among
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=MOST_THREADS as i64))]
+    pub threads: u16,
 }
 
 impl KernelArgs {
     /// Makes the choice for the whole process.
     pub fn choose(&self) -> Result<(), SpecError> {
+        threads::choose(usize::from(self.threads));
         let Some(name) = self.name.as_deref() else {
             return Ok(());
         };

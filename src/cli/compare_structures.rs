@@ -9,6 +9,7 @@ use cullbench::index::{BuildError, DynIndex, StructureSpec};
 use cullbench::measure::{Verdict, guarded};
 use cullbench::query::{ItemId, QueryCost};
 use cullbench::scene::Scene;
+use cullbench::threads::{self, share};
 
 /// One structure's answer to one question.
 pub struct Answer {
@@ -28,10 +29,9 @@ pub fn ask_all(
     boxes: &[Aabb],
     questions: usize,
     keep_ids: bool,
-    ask: impl Fn(&dyn DynIndex, usize, &mut Vec<ItemId>, &mut QueryCost),
+    ask: impl Fn(&dyn DynIndex, usize, &mut Vec<ItemId>, &mut QueryCost) + Sync,
 ) -> anyhow::Result<Vec<Answer>> {
     let mut answers: Vec<Vec<Answer>> = (0..questions).map(|_| Vec::new()).collect();
-    let mut out = Vec::new();
     for spec in structures {
         let failed = |why: String| anyhow::anyhow!("structure '{}': {why}", spec.label);
         let panicked = |verdict: Verdict| failed(verdict.reason.unwrap_or_default());
@@ -45,22 +45,28 @@ pub fn ask_all(
             }
             Err(error) => return Err(failed(error.to_string())),
         };
-        for (question, row) in answers.iter_mut().enumerate() {
-            out.clear();
-            let mut cost = QueryCost::default();
-            guarded(|| ask(index.as_ref(), question, &mut out, &mut cost)).map_err(panicked)?;
-            if keep_ids {
-                out.sort_unstable();
-            }
-            row.push(Answer {
-                question,
-                structure: spec.label.clone(),
-                count: out.len(),
-                id_sum: cullbench::measure::id_sum(&out),
-                ids: keep_ids.then(|| out.clone()),
-                cost,
-            });
-        }
+        let asked = guarded(|| {
+            share(
+                threads::chosen(),
+                answers.iter_mut().enumerate(),
+                |(question, row)| {
+                    let (mut out, mut cost) = (Vec::new(), QueryCost::default());
+                    ask(index.as_ref(), question, &mut out, &mut cost);
+                    if keep_ids {
+                        out.sort_unstable();
+                    }
+                    row.push(Answer {
+                        question,
+                        structure: spec.label.clone(),
+                        count: out.len(),
+                        id_sum: cullbench::measure::id_sum(&out),
+                        ids: keep_ids.then_some(out),
+                        cost,
+                    });
+                },
+            );
+        });
+        asked.map_err(panicked)?;
     }
     Ok(answers.into_iter().flatten().collect())
 }

@@ -36,15 +36,35 @@ macro_rules! for_each_plane {
 /// Some of the six rows of a [`BoxBlock`], one bit each.
 pub type RowMask = u8;
 
-/// All rows of a block.
+/// Rows of a block.
+pub const ROWS: usize = 6;
+
+/// All of them.
 pub const ALL_ROWS: RowMask = 0b11_1111;
 
-/// The rows of one corner of every box: of the upper bounds where `upper` says
-/// so.
-pub(super) fn corner_rows(upper: Upper) -> RowMask {
-    (0..3).fold(0, |rows, axis| {
-        rows | 1 << (axis + 3 * usize::from(upper[axis]))
-    })
+/// The rows of a block that hold the p-vertices of a plane, and those of the
+/// opposite corners, its n-vertices: the same ones for every box.
+#[derive(Clone, Copy, Debug)]
+pub struct Corner {
+    far: [u8; 3],
+    near: [u8; 3],
+}
+
+impl Corner {
+    /// Of the upper bounds where `upper` says so.
+    pub const fn of(upper: Upper) -> Corner {
+        let [x, y, z] = upper;
+        Corner {
+            far: [3 * x as u8, 1 + 3 * y as u8, 2 + 3 * z as u8],
+            near: [3 - 3 * x as u8, 4 - 3 * y as u8, 5 - 3 * z as u8],
+        }
+    }
+
+    /// The rows of the p-vertices as a set.
+    #[inline(always)]
+    pub fn rows(self) -> RowMask {
+        self.far.iter().fold(0, |rows, row| rows | 1 << row)
+    }
 }
 
 /// Sixteen boxes as six rows: min x, y, z, then max x, y, z. 384 bytes.
@@ -107,28 +127,35 @@ impl BoxBlock {
         )
     }
 
-    /// Asks for the memory of some rows ahead of their use. Of each axis at
-    /// least one row must be wanted.
+    /// Asks for the whole block's memory ahead of its use.
     #[inline(always)]
-    pub fn prefetch(&self, rows: RowMask) {
-        for axis in 0..3 {
-            // Two hints an axis, both for the same row where only one is
-            // wanted: cheaper than a branch that nobody can predict.
-            let (low, high) = (rows >> axis & 1 == 1, rows >> (axis + 3) & 1 == 1);
-            prefetch(&self.rows[if low { axis } else { axis + 3 }]);
-            prefetch(&self.rows[if high { axis + 3 } else { axis }]);
+    pub fn prefetch(&self) {
+        self.rows.iter().for_each(prefetch);
+    }
+
+    /// Asks for the rows of one corner.
+    #[inline(always)]
+    pub fn prefetch_corner(&self, corner: Corner) {
+        for row in corner.far {
+            self.prefetch_row(row.into());
         }
     }
 
-    /// Reads some rows and does nothing with them but what keeps the reads:
-    /// the bits of all lanes, joined.
+    /// Asks for one row; for none if there is no such row.
     #[inline(always)]
-    pub fn touch<I: Isa>(&self, isa: I, rows: RowMask) -> LaneMask {
+    pub fn prefetch_row(&self, row: usize) {
+        if let Some(row) = self.rows.get(row) {
+            prefetch(row);
+        }
+    }
+
+    /// Reads six rows, which may come twice, and does nothing with them but
+    /// what keeps the reads.
+    #[inline(always)]
+    pub fn touch<I: Isa>(&self, isa: I, rows: &[u8; ROWS]) -> LaneMask {
         let mut sum = isa.splat(0.0);
-        for (k, row) in self.rows.iter().enumerate() {
-            if rows >> k & 1 == 1 {
-                sum = isa.lower(sum, isa.load(row));
-            }
+        for &row in rows {
+            sum = isa.lower(sum, isa.load(&self.rows[usize::from(row)]));
         }
         isa.below_zero(sum)
     }
@@ -143,8 +170,8 @@ impl BoxBlock {
         // test, because it compares false.
         let mut lowest = isa.splat(f32::INFINITY);
         for_each_plane!(mask, bit, {
-            let (plane, upper) = (volume.plane_of_bit(bit), volume.upper_of_bit(bit));
-            let value = values_at(isa, plane, self.corner_rows(upper));
+            let (plane, corner) = (volume.plane_of_bit(bit), volume.corner_of_bit(bit));
+            let value = values_at(isa, plane, self.numbered_rows(corner.far));
             lowest = isa.lower(value, lowest);
         });
         !isa.below_zero(lowest)
@@ -163,13 +190,18 @@ impl BoxBlock {
         let mut lowest = isa.splat(f32::INFINITY);
         let mut open = isa.splat_word(mask);
         for_each_plane!(mask, bit, {
-            let (plane, upper) = (volume.plane_of_bit(bit), volume.upper_of_bit(bit));
-            let farthest = values_at(isa, plane, self.corner_rows(upper));
+            let (plane, corner) = (volume.plane_of_bit(bit), volume.corner_of_bit(bit));
+            let farthest = values_at(isa, plane, self.numbered_rows(corner.far));
             lowest = isa.lower(farthest, lowest);
-            let nearest = values_at(isa, plane, self.corner_rows(upper.map(|up| !up)));
+            let nearest = values_at(isa, plane, self.numbered_rows(corner.near));
             open = isa.without(open, nearest, 1 << bit);
         });
         (!isa.below_zero(lowest), open)
+    }
+
+    #[inline(always)]
+    fn numbered_rows(&self, rows: [u8; 3]) -> [&[f32; LANES]; 3] {
+        rows.map(|row| &self.rows[usize::from(row)])
     }
 
     /// The rows of one corner, the same one of every box: the upper bounds
@@ -257,12 +289,6 @@ impl BoxBlock {
             }
         }
         moved
-    }
-
-    /// The six rows, each a cache line.
-    #[inline(always)]
-    pub(crate) fn rows(&self) -> &[[f32; LANES]; 6] {
-        &self.rows
     }
 
     /// The lanes whose closed box holds the point.

@@ -5,8 +5,7 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::box_block::corner_rows;
-use super::{Aabb, Plane, RowMask, Upper, WidePlane};
+use super::{Aabb, Corner, Plane, Upper, WidePlane};
 
 /// Largest number of planes of one volume: one bit each in a [`PlaneMask`].
 pub const MAX_PLANES: usize = 32;
@@ -90,7 +89,7 @@ pub struct ConvexVolume {
     count: usize,
     mask: PlaneMask,
     upper: [Upper; MAX_PLANES],
-    rows: [RowMask; MAX_PLANES],
+    corners: [Corner; MAX_PLANES],
 }
 
 impl ConvexVolume {
@@ -133,7 +132,7 @@ impl ConvexVolume {
             count,
             mask: 0,
             upper: [[true; 3]; MAX_PLANES],
-            rows: [0; MAX_PLANES],
+            corners: [Corner::of([true; 3]); MAX_PLANES],
         };
         for (index, (plane, name)) in planes.enumerate() {
             if !plane.is_finite() {
@@ -142,7 +141,7 @@ impl ConvexVolume {
             volume.planes[index] = plane;
             volume.names[index] = name;
             volume.upper[index] = plane.upper();
-            volume.rows[index] = corner_rows(plane.upper());
+            volume.corners[index] = Corner::of(plane.upper());
             volume.mask |= PlaneMask::from(!plane.is_trivial()) << index;
         }
         Ok(volume)
@@ -159,17 +158,17 @@ impl ConvexVolume {
         &self.planes[index as usize % MAX_PLANES]
     }
 
+    /// The rows of a [`BoxBlock`](super::BoxBlock) that hold the p-vertices of
+    /// plane `index`, likewise.
+    #[inline(always)]
+    pub fn corner_of_bit(&self, index: u32) -> Corner {
+        self.corners[index as usize % MAX_PLANES]
+    }
+
     /// [`Plane::upper`] of plane `index`, likewise.
     #[inline(always)]
     pub fn upper_of_bit(&self, index: u32) -> Upper {
         self.upper[index as usize % MAX_PLANES]
-    }
-
-    /// The rows of a [`BoxBlock`](super::BoxBlock) that a test of its boxes by
-    /// plane `index` reads, likewise.
-    #[inline(always)]
-    pub fn rows_of_bit(&self, index: u32) -> RowMask {
-        self.rows[index as usize % MAX_PLANES]
     }
 
     /// The plane of that name, if the volume has one.

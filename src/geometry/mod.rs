@@ -13,7 +13,9 @@ mod spheres;
 mod wide_volume;
 
 pub use aabb::Aabb;
-pub use box_block::{ALL_ROWS, BoxBlock, BoxBlocks, LANES, LaneMask, RowMask, lanes_of};
+pub use box_block::{
+    ALL_ROWS, BoxBlock, BoxBlocks, Corner, LANES, LaneMask, ROWS, RowMask, lanes_of,
+};
 pub use convex_volume::{ConvexVolume, FrustumPlane, MAX_PLANES, PlaneMask, VolumeError};
 pub use plane::{Plane, Upper};
 pub use plane_rows::{PlaneRows, ROW_LANES};

@@ -4,12 +4,14 @@
 //! and slower to ask.
 
 use std::cmp::Ordering;
+use std::sync::{Mutex, PoisonError};
 
 use glam::{Vec3, Vec4};
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::{Aabb, LANES};
 use crate::query::ItemId;
+use crate::threads::share;
 
 /// How items are brought into order.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
@@ -44,16 +46,61 @@ impl Point {
     }
 }
 
-/// The ids in block order. Deterministic. O(n log n).
-pub fn block_ordered(items: &[Aabb], mut ids: Vec<ItemId>, order: BlockOrder) -> Vec<ItemId> {
+/// The ids in block order: the same whatever the number of threads.
+/// O(n log n). Morton codes are sorted on one thread.
+pub fn block_ordered(
+    items: &[Aabb],
+    mut ids: Vec<ItemId>,
+    order: BlockOrder,
+    threads: usize,
+) -> Vec<ItemId> {
     match order {
-        BlockOrder::Median => by_medians(items, &mut ids),
+        BlockOrder::Median => by_medians(items, &mut ids, threads),
         BlockOrder::Morton => by_morton(items, &mut ids),
     }
     ids
 }
 
-fn by_medians(items: &[Aabb], ids: &mut [ItemId]) {
+/// Points to be halved until they are single units; the unit is a power of
+/// sixteen.
+struct Group<'a> {
+    points: &'a mut [Point],
+    unit: usize,
+}
+
+impl<'a> Group<'a> {
+    /// Its two halves, each unit of the lower one below each of the higher
+    /// one on the widest axis; `None` for a single block.
+    #[inline(always)]
+    fn halved(mut self) -> Option<[Group<'a>; 2]> {
+        while self.points.len() <= self.unit && self.unit > LANES {
+            self.unit /= LANES;
+        }
+        let Group { points, unit } = self;
+        let units = points.len().div_ceil(unit);
+        if units <= 1 {
+            return None;
+        }
+        let middle = (units / 2) * unit;
+        let axis = widest_axis(points);
+        points.select_nth_unstable_by(middle, |a, b| order(a.on(axis), b.on(axis)));
+        let (low, high) = points.split_at_mut(middle);
+        Some([low, high].map(|points| Group { points, unit }))
+    }
+
+    /// Halves it down to single blocks, one half after the other.
+    fn put_in_order(self) {
+        let mut open = vec![self];
+        while let Some(group) = open.pop() {
+            open.extend(group.halved().into_iter().flatten());
+        }
+    }
+}
+
+/// Fewer points than this are not worth a thread.
+const SHARED_POINTS: usize = 1 << 14;
+
+fn by_medians(items: &[Aabb], ids: &mut [ItemId], threads: usize) {
     let point = |&id: &ItemId| Point::new(items[id as usize].centre(), id);
     let mut points: Vec<Point> = ids.iter().map(point).collect();
     // The largest power of sixteen below the number of points.
@@ -61,22 +108,29 @@ fn by_medians(items: &[Aabb], ids: &mut [ItemId]) {
     while unit * LANES < points.len() {
         unit *= LANES;
     }
-    let mut open = vec![(&mut points[..], unit)];
-    while let Some((group, mut unit)) = open.pop() {
-        while group.len() <= unit && unit > LANES {
-            unit /= LANES;
+    let mut open = vec![Group {
+        points: &mut points,
+        unit,
+    }];
+    // What becomes of a group depends on that group alone, so that it does not
+    // matter who halves it. First, round by round, as many groups as it takes
+    // for nobody to be idle in the end.
+    let enough = 4 * threads;
+    while threads > 1 && open.len() < enough {
+        if open.iter().all(|g| g.points.len() < SHARED_POINTS) {
+            break;
         }
-        let units = group.len().div_ceil(unit);
-        if units <= 1 {
-            continue;
-        }
-        let middle = (units / 2) * unit;
-        let axis = widest_axis(group);
-        group.select_nth_unstable_by(middle, |a, b| order(a.on(axis), b.on(axis)));
-        let (low, high) = group.split_at_mut(middle);
-        open.push((high, unit));
-        open.push((low, unit));
+        let halves = Mutex::new(Vec::with_capacity(2 * open.len()));
+        share(threads.min(open.len()), open.into_iter(), |group| {
+            if let Some(two) = group.halved() {
+                let mut halves = halves.lock().unwrap_or_else(PoisonError::into_inner);
+                halves.extend(two);
+            }
+        });
+        open = halves.into_inner().unwrap_or_else(PoisonError::into_inner);
     }
+    let threads = if open.len() < enough { 1 } else { threads };
+    share(threads, open.into_iter(), Group::put_in_order);
     for (id, point) in ids.iter_mut().zip(&points) {
         *id = point.id();
     }
@@ -95,10 +149,21 @@ fn order(a: f32, b: f32) -> Ordering {
 }
 
 fn widest_axis(points: &[Point]) -> usize {
-    let none = (Vec4::INFINITY, Vec4::NEG_INFINITY);
-    let (low, high) = points
-        .iter()
-        .fold(none, |(low, high), p| (low.min(p.0), high.max(p.0)));
+    // Four chains: one would wait for the last minimum at every point.
+    let (fours, rest) = points.as_chunks::<4>();
+    let (mut low, mut high) = ([Vec4::INFINITY; 4], [Vec4::NEG_INFINITY; 4]);
+    for four in fours {
+        for ((low, high), p) in low.iter_mut().zip(&mut high).zip(four) {
+            *low = low.min(p.0);
+            *high = high.max(p.0);
+        }
+    }
+    for p in rest {
+        low[0] = low[0].min(p.0);
+        high[0] = high[0].max(p.0);
+    }
+    let low = low[0].min(low[1]).min(low[2].min(low[3]));
+    let high = high[0].max(high[1]).max(high[2].max(high[3]));
     let width = high - low;
     let wider = |a: usize, b: usize| if width[b] > width[a] { b } else { a };
     wider(wider(0, 1), 2)
@@ -123,18 +188,29 @@ fn by_morton(items: &[Aabb], ids: &mut [ItemId]) {
         let cell = from.to_array().map(|x| (x as u64).min((1 << BITS) - 1));
         spread(cell[0]) | spread(cell[1]) << 1 | spread(cell[2]) << 2
     };
-    let keyed = ids.iter().map(|&id| (code(id), id)).collect();
-    for (id, (_, sorted)) in ids.iter_mut().zip(sorted_by_radix(keyed)) {
+    let keyed = ids.iter().map(|&id| ((code(id) >> LOW) as u32, id));
+    let mut sorted = sorted_by_radix(keyed.collect());
+    // Cells of the upper bits with more than a block of items: crowded corners
+    // of a scene, none in most.
+    for cell in sorted.chunk_by_mut(|a, b| a.0 == b.0) {
+        if cell.len() > LANES {
+            cell.sort_by_cached_key(|&(_, id)| code(id));
+        }
+    }
+    for (id, (_, sorted)) in ids.iter_mut().zip(sorted) {
         *id = sorted;
     }
 }
 
+/// Lower bits of a code, which the radix sort leaves out: what is left are 32,
+/// and an entry is 8 bytes.
+const LOW: u32 = 3 * BITS - u32::BITS;
+
 /// Sorts by code, equal ones in the order given: least significant digit
 /// first (Knuth, TAOCP 3, 5.2.5). O(n). Eight bits a digit: with more, the
 /// places that are written to no longer fit the first cache and its pages.
-fn sorted_by_radix(mut from: Vec<(u64, ItemId)>) -> Vec<(u64, ItemId)> {
-    const DIGITS: usize = 3 * BITS as usize / 8;
-    let mut starts = [[0; 256]; DIGITS];
+fn sorted_by_radix(mut from: Vec<(u32, ItemId)>) -> Vec<(u32, ItemId)> {
+    let mut starts = [[0; 256]; size_of::<u32>()];
     for (code, _) in &from {
         for (starts, digit) in starts.iter_mut().zip(code.to_le_bytes()) {
             starts[usize::from(digit)] += 1;
@@ -198,7 +274,7 @@ mod tests {
         for order in [BlockOrder::Median, BlockOrder::Morton] {
             for items in scenes() {
                 let ids: Vec<ItemId> = (0..items.len() as ItemId).collect();
-                let mut ordered = block_ordered(&items, ids.clone(), order);
+                let mut ordered = block_ordered(&items, ids.clone(), order, 1);
                 ordered.sort_unstable();
                 assert_eq!(ordered, ids);
             }
@@ -215,12 +291,26 @@ mod tests {
             union.extent().element_product()
         };
         for order in [BlockOrder::Median, BlockOrder::Morton] {
-            let ids = block_ordered(items, (0..4096).collect(), order);
+            let ids = block_ordered(items, (0..4096).collect(), order, 1);
             for block in [16, 256] {
                 // A perfect block of the grid is as many cells.
                 let worst = ids.chunks(block).map(size).fold(0.0, f32::max);
                 assert!(worst <= 1.01 * block as f32, "{order:?}: {worst}");
             }
+        }
+    }
+
+    #[test]
+    fn a_crowd_in_one_corner_is_ordered_by_the_lower_bits() {
+        // A far item makes the cells of the upper bits as large as the grid.
+        let mut items = scenes()[0].clone();
+        let far = Vec3::splat(f32::from(1u16 << 15));
+        items.push(Aabb::around(far, Vec3::splat(0.4)));
+        let ids = block_ordered(&items, (0..4097).collect(), BlockOrder::Morton, 1);
+        for block in ids[..4096].chunks(LANES) {
+            let boxes = block.iter().map(|&id| &items[id as usize]);
+            let size = Aabb::union_of(boxes).extent().element_product();
+            assert!(size <= 1.01 * LANES as f32, "{size}");
         }
     }
 }

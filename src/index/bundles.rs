@@ -7,7 +7,7 @@ use std::ops::{ControlFlow, Range};
 
 use super::frontier::{AHEAD, Frontier, Merger};
 use super::tree::TreeNode;
-use crate::geometry::{ALL_ROWS, Aabb, BoxBlock, LANES, LaneMask, PlaneMask};
+use crate::geometry::{Aabb, BoxBlock, LANES, LaneMask, PlaneMask};
 use crate::kernel::{Isa, prefetch};
 use crate::query::{ItemId, Recorder, Sink, View};
 
@@ -249,7 +249,7 @@ impl Bundles {
                 if let Some(&next) = places.get(i + AHEAD)
                     && let Some(block) = self.blocks.get(next as usize)
                 {
-                    block.prefetch(ALL_ROWS);
+                    block.prefetch();
                     let links = &self.links[next as usize];
                     prefetch(&links.below);
                     prefetch(&links.lanes);

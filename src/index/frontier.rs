@@ -53,6 +53,14 @@ impl Frontier {
         }
     }
 
+    /// Holds these nodes and no others.
+    pub fn resume(&mut self, nodes: &[u32], open: &[PlaneMask]) {
+        self.clear(nodes.len().div_ceil(LANES));
+        self.nodes[..nodes.len()].copy_from_slice(nodes);
+        self.open[..open.len()].copy_from_slice(open);
+        self.used = nodes.len();
+    }
+
     /// The nodes and their planes, in the order of arrival.
     #[inline(always)]
     pub fn entries(&self) -> (&[u32], &[PlaneMask]) {

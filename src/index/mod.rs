@@ -12,6 +12,7 @@ mod erased;
 mod frontier;
 mod linear;
 mod octree;
+mod parallel;
 mod partition;
 #[cfg(feature = "peers")]
 pub mod peers;
@@ -38,6 +39,7 @@ pub use bvh::{Bvh, BvhLayout, BvhParams, BvhPreset};
 pub use erased::{BACKENDS, Backend, DynIndex, StructureSpec, structures};
 pub use linear::{Linear, LinearScalar};
 pub use octree::{CellParams, Octree};
+pub use parallel::{Crew, see_each};
 pub use partition::{Part, Record, Splitter, build_top_down};
 pub use quadtree::Quadtree;
 pub use quantised::{GridScope, Quantised, QuantisedParams};
@@ -222,15 +224,24 @@ pub fn indexable(items: &[Aabb]) -> Result<Vec<ItemId>, BuildError> {
             most,
         });
     }
-    if let Some(item) = items.iter().position(|b| !b.is_finite()) {
+    // One look at each item: large scenes do not fit the cache.
+    let (mut count, mut all_finite) = (0, true);
+    for b in items {
+        count += usize::from(!b.is_empty());
+        all_finite &= b.is_finite();
+    }
+    if !all_finite && let Some(item) = items.iter().position(|b| !b.is_finite()) {
         return Err(BuildError::NonFiniteItem {
             item,
             bounds: items[item],
         });
     }
-    let sound = || items.iter().zip(0..).filter(|(b, _)| !b.is_empty());
-    // Counted first: a structure keeps this list, so no slack.
-    let mut ids = Vec::with_capacity(sound().count());
-    ids.extend(sound().map(|(_, id)| id));
+    if count == items.len() {
+        return Ok((0..count as ItemId).collect());
+    }
+    let sound = items.iter().zip(0..).filter(|(b, _)| !b.is_empty());
+    // A structure keeps this list, so no slack.
+    let mut ids = Vec::with_capacity(count);
+    ids.extend(sound.map(|(_, id)| id));
     Ok(ids)
 }

@@ -6,23 +6,27 @@ use std::ops::{ControlFlow, Range};
 
 use super::wide::Wide;
 use super::{FrustumQuery, TreeOrder};
-use crate::geometry::{BoxBlock, LaneMask, RowMask};
+use crate::geometry::{BoxBlock, LaneMask, ROWS, RowMask};
 use crate::kernel::{Isa, Kernel, Work, prefetch};
 use crate::query::{ItemId, Recorder, Sink, View};
 
 /// What one query read and handed over, in its own order.
 #[derive(Clone, Default, Debug)]
 pub struct Trace {
-    reads: Vec<(u32, RowMask)>,
+    /// Each block with its rows; if they are fewer than six, some come twice.
+    reads: Vec<(u32, [u8; ROWS])>,
     runs: Vec<Range<u32>>,
     /// What was handed over of the leaves, which are the last of the reads.
     leaves: Vec<(u32, LaneMask)>,
 }
 
-struct Reads<'a>(&'a mut Vec<(u32, RowMask)>);
+struct Reads<'a>(&'a mut Vec<(u32, [u8; ROWS])>);
 
 impl Recorder for Reads<'_> {
     fn block_read(&mut self, block: usize, rows: RowMask) {
+        let wanted = (0..ROWS as u8).filter(|row| rows >> row & 1 == 1);
+        let mut wanted = wanted.cycle();
+        let rows = std::array::from_fn(|_| wanted.next().unwrap_or(0));
         self.0.push((block as u32, rows));
     }
 }
@@ -102,30 +106,32 @@ impl Work for Again<'_> {
             leaves,
         } = self.trace;
         let (above, below) = reads.split_at(reads.len() - leaves.len());
-        let fetch = |reads: &[(u32, RowMask)], i: usize| {
-            if let Some(&(block, rows)) = reads.get(i + AHEAD)
-                && let Some(block) = self.blocks.get(block as usize)
+        let fetch = |reads: &[(u32, [u8; ROWS])], i: usize| {
+            if let Some((block, rows)) = reads.get(i + AHEAD)
+                && let Some(block) = self.blocks.get(*block as usize)
             {
-                block.prefetch(rows);
+                for &row in rows {
+                    block.prefetch_row(row.into());
+                }
             }
         };
         let mut seen = 0;
-        for (i, &(block, rows)) in above.iter().enumerate() {
+        for (i, (block, rows)) in above.iter().enumerate() {
             fetch(above, i);
-            seen |= self.blocks[block as usize].touch(isa, rows);
+            seen |= self.blocks[*block as usize].touch(isa, rows);
         }
         for run in runs {
             let places = run.start as usize..run.end as usize;
             let _ = self.out.accept_places(isa, self.ids, places);
         }
-        for (i, (&(block, rows), &(start, lanes))) in below.iter().zip(leaves).enumerate() {
+        for (i, ((block, rows), &(start, lanes))) in below.iter().zip(leaves).enumerate() {
             fetch(below, i);
             if let Some(&(next, _)) = leaves.get(i + AHEAD)
                 && let Some(id) = self.ids.get(next as usize)
             {
                 prefetch(id);
             }
-            seen |= self.blocks[block as usize].touch(isa, rows);
+            seen |= self.blocks[*block as usize].touch(isa, rows);
             let _ = self.out.accept_lanes(isa, self.ids, start as usize, lanes);
         }
         std::hint::black_box(seen);

@@ -276,7 +276,7 @@ impl PackedTree {
     #[inline(always)]
     pub fn prefetch_items(&self, items: Range<usize>) {
         for (start, _, block) in self.boxes.range(items.start, items.end) {
-            block.rows().iter().for_each(prefetch);
+            block.prefetch();
             prefetch(&self.ids[start]);
         }
     }
@@ -403,9 +403,8 @@ struct InBlocks<'a, V> {
 impl<V: View> Leaves for InBlocks<'_, V> {
     #[inline(always)]
     fn fetch(&self, items: Range<usize>, mask: PlaneMask) {
-        let rows = self.view.rows_read(mask);
         for (start, _, block) in self.tree.boxes.range(items.start, items.end) {
-            block.prefetch(rows);
+            self.view.prefetch(block, mask);
             prefetch(&self.tree.ids[start]);
         }
     }

@@ -4,7 +4,7 @@
 //! tests of a block are the view's.
 
 use std::cell::Cell;
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -12,9 +12,10 @@ use serde::{Deserialize, Serialize};
 use super::block_order::{BlockOrder, block_ordered};
 use super::frontier::{AHEAD, Frontier, Merger};
 use super::{BuildError, FrustumQuery, MemoryUsage, RegionIndex, TreeOrder, indexable};
-use crate::geometry::{ALL_ROWS, Aabb, BoxBlock, LANES, LaneMask, PlaneTree};
+use crate::geometry::{ALL_ROWS, Aabb, BoxBlock, LANES, LaneMask, PlaneMask, PlaneTree};
 use crate::kernel::{BASELINE, Isa, prefetch};
 use crate::query::{ItemId, Recorder, Region, Sink, View, runs};
+use crate::threads::{self, share};
 
 /// Parameters: `wide:order=median`.
 #[derive(Clone, Copy, Default, Debug, Serialize, Deserialize)]
@@ -66,9 +67,41 @@ impl Level {
 
 /// The memory of a traversal: two frontiers, kept between queries.
 #[derive(Default)]
-struct Scratch {
+pub(super) struct Scratch {
     here: Frontier,
     below: Frontier,
+}
+
+impl Scratch {
+    /// The root, with all planes open.
+    #[inline(always)]
+    pub(super) fn start<I: Isa, V: View>(&mut self, isa: I, view: &V) {
+        self.here.clear(1);
+        self.here
+            .push(isa, isa.counting(0), isa.splat_word(view.mask()), 1);
+    }
+
+    /// The blocks that are still to be looked at and their open planes.
+    pub(super) fn frontier(&self) -> (&[u32], &[PlaneMask]) {
+        self.here.entries()
+    }
+
+    /// Goes on from such blocks.
+    pub(super) fn resume(&mut self, blocks: &[u32], open: &[PlaneMask]) {
+        self.here.clear(blocks.len().div_ceil(LANES));
+        self.here.resume(blocks, open);
+    }
+
+    /// The memory that this thread keeps; give it back.
+    #[inline(always)]
+    pub(super) fn taken() -> Box<Scratch> {
+        SCRATCH.take().unwrap_or_default()
+    }
+
+    #[inline(always)]
+    pub(super) fn give_back(self: Box<Scratch>) {
+        SCRATCH.set(Some(self));
+    }
 }
 
 thread_local! {
@@ -78,8 +111,36 @@ thread_local! {
 /// Blocks of items whose memory is asked for ahead while the tree is filled.
 const GATHERED_AHEAD: usize = 2;
 
+/// Leaves that are filled in one go, by one thread: whole parents of parents.
+const SHARED_BLOCKS: usize = LANES * LANES;
+
+/// Fills consecutive leaves, the first of which is number `first`, with the
+/// boxes of their items.
+fn fill(items: &[Aabb], ids: &[ItemId], first: usize, leaves: &mut [BoxBlock]) {
+    let ids = &ids[first * LANES..];
+    for (i, (block, here)) in leaves.iter_mut().zip(ids.chunks(LANES)).enumerate() {
+        // The items lie all over memory.
+        for &id in ids.iter().skip((i + GATHERED_AHEAD) * LANES).take(LANES) {
+            prefetch(&items[id as usize].min);
+            prefetch(&items[id as usize].max);
+        }
+        for (lane, &id) in here.iter().enumerate() {
+            block.set(lane, &items[id as usize]);
+        }
+    }
+}
+
+/// Fills blocks with the bounds of the blocks below them.
+fn unite(children: &[BoxBlock], parents: &mut [BoxBlock]) {
+    for (parent, children) in parents.iter_mut().zip(children.chunks(LANES)) {
+        for (lane, child) in children.iter().enumerate() {
+            parent.set(lane, &child.union());
+        }
+    }
+}
+
 impl Wide {
-    fn over(items: &[Aabb], ids: Vec<ItemId>) -> Wide {
+    fn over(items: &[Aabb], ids: Vec<ItemId>, threads: usize) -> Wide {
         let mut tree = Wide {
             ids,
             ..Wide::default()
@@ -103,31 +164,43 @@ impl Wide {
             boxes = blocks;
         }
         let total = tree.levels.iter().map(|l| l.blocks).sum();
-        tree.blocks = Vec::with_capacity(total);
-        for (i, ids) in tree.ids.chunks(LANES).enumerate() {
-            // The items lie all over memory.
-            let ahead = (i + GATHERED_AHEAD) * LANES;
-            for &id in tree.ids.iter().skip(ahead).take(LANES) {
-                prefetch(&items[id as usize].min);
-                prefetch(&items[id as usize].max);
-            }
-            let mut block = BoxBlock::EMPTY;
-            for (lane, &id) in ids.iter().enumerate() {
-                block.set(lane, &items[id as usize]);
-            }
-            tree.blocks.push(block);
-        }
-        for level in 1..tree.levels.len() {
-            let below = tree.levels[level - 1];
-            for first in (0..below.blocks).step_by(LANES) {
-                let mut block = BoxBlock::EMPTY;
-                for (lane, child) in (first..below.blocks.min(first + LANES)).enumerate() {
-                    block.set(lane, &tree.blocks[below.first + child].union());
-                }
-                tree.blocks.push(block);
-            }
+        tree.blocks = vec![BoxBlock::EMPTY; total];
+        let (leaves, inner) = tree.blocks.split_at_mut(tree.levels[0].blocks);
+        // Blocks are united while they are still in the cache.
+        let parents = inner.chunks_mut(SHARED_BLOCKS / LANES);
+        let jobs = leaves
+            .chunks_mut(SHARED_BLOCKS)
+            .zip(parents.chain(std::iter::once(&mut [][..])));
+        share(threads, jobs.enumerate(), |(i, (leaves, parents))| {
+            fill(items, &tree.ids, i * SHARED_BLOCKS, leaves);
+            unite(leaves, parents);
+        });
+        for level in 2..tree.levels.len() {
+            let below = tree.levels[level - 1].first;
+            let (children, parents) =
+                tree.blocks[below..].split_at_mut(tree.levels[level - 1].blocks);
+            unite(children, parents);
         }
         tree
+    }
+
+    /// [`RegionIndex::build`] on so many threads: the very same structure.
+    ///
+    /// # Errors
+    /// As [`RegionIndex::build`].
+    pub fn build_on(
+        threads: usize,
+        items: &[Aabb],
+        params: &WideParams,
+    ) -> Result<Wide, BuildError> {
+        let ids = block_ordered(items, indexable(items)?, params.order, threads);
+        Ok(Wide::over(items, ids, threads))
+    }
+
+    /// Whether both are the same bit for bit: the ids, the blocks, the levels.
+    pub fn same_as(&self, other: &Wide) -> bool {
+        let depths = (self.depth(), other.depth());
+        depths.0 == depths.1 && self.ids == other.ids && self.blocks == other.blocks
     }
 
     /// Levels of blocks; 0 for no items.
@@ -162,17 +235,32 @@ impl Wide {
         recorder: &mut R,
         scratch: &mut Scratch,
     ) -> ControlFlow<()> {
-        let Scratch { here, below } = scratch;
-        let Some((leaves, inner)) = self.levels.split_first() else {
+        let Some(top) = self.levels.len().checked_sub(1) else {
             return ControlFlow::Continue(());
         };
         if view.mask() == 0 {
             recorder.subtree_accepted(self.ids.len());
             return sink.accept_places(isa, &self.ids, 0..self.ids.len());
         }
-        here.clear(1);
-        here.push(isa, isa.counting(0), isa.splat_word(view.mask()), 1);
-        for (height, level) in inner.iter().enumerate().rev() {
+        scratch.start(isa, view);
+        self.descend(isa, view, 0..top, sink, recorder, scratch)?;
+        self.search_leaves(isa, view, sink, recorder, scratch)
+    }
+
+    /// From the frontier on level `heights.end` to the one on `heights.start`.
+    #[inline(always)]
+    pub(super) fn descend<I: Isa, V: View, S: Sink, R: Recorder>(
+        &self,
+        isa: I,
+        view: &V,
+        heights: Range<usize>,
+        sink: &mut S,
+        recorder: &mut R,
+        scratch: &mut Scratch,
+    ) -> ControlFlow<()> {
+        let Scratch { here, below } = scratch;
+        for height in heights.rev() {
+            let level = &self.levels[height + 1];
             let (places, masks) = here.entries();
             below.clear(places.len());
             let blocks = self.blocks_of(level);
@@ -183,7 +271,7 @@ impl Wide {
                 if let Some(&next) = places.get(i + AHEAD)
                     && let Some(block) = blocks.get(next as usize)
                 {
-                    block.prefetch(ALL_ROWS);
+                    block.prefetch();
                 }
                 let at = at as usize;
                 let lanes = level.lanes(at);
@@ -206,12 +294,28 @@ impl Wide {
             run.finish(isa, &self.ids, sink, recorder)?;
             std::mem::swap(here, below);
         }
+        ControlFlow::Continue(())
+    }
+
+    /// The frontier on level 0.
+    #[inline(always)]
+    pub(super) fn search_leaves<I: Isa, V: View, S: Sink, R: Recorder>(
+        &self,
+        isa: I,
+        view: &V,
+        sink: &mut S,
+        recorder: &mut R,
+        scratch: &Scratch,
+    ) -> ControlFlow<()> {
+        let Some(leaves) = self.levels.first() else {
+            return ControlFlow::Continue(());
+        };
         let blocks = self.blocks_of(leaves);
-        let (places, masks) = here.entries();
+        let (places, masks) = scratch.here.entries();
         for (i, (&at, &mask)) in places.iter().zip(masks).enumerate() {
             if let (Some(&next), Some(&mask)) = (places.get(i + AHEAD), masks.get(i + AHEAD)) {
                 if let Some(block) = blocks.get(next as usize) {
-                    block.prefetch(view.rows_read(mask));
+                    view.prefetch(block, mask);
                 }
                 if let Some(id) = self.ids.get(next as usize * LANES) {
                     prefetch(id);
@@ -242,14 +346,14 @@ impl RegionIndex for Wide {
         "16-ary implicit tree of blocks, level by level with plane masks and prefetch";
     type Params = WideParams;
 
-    /// O(n log n) by medians, O(n) but for the sort by Morton codes.
+    /// O(n log n) by medians, O(n) but for the sort by Morton codes; on as many
+    /// threads as the process has [chosen](threads::choose).
     fn build(
         items: &[Aabb],
         _: Option<&PlaneTree>,
         params: &WideParams,
     ) -> Result<Self, BuildError> {
-        let ids = block_ordered(items, indexable(items)?, params.order);
-        Ok(Wide::over(items, ids))
+        Wide::build_on(threads::chosen(), items, params)
     }
 
     fn memory(&self) -> MemoryUsage {
@@ -356,9 +460,9 @@ impl FrustumQuery for Wide {
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()> {
-        let mut scratch = SCRATCH.take().unwrap_or_default();
+        let mut scratch = Scratch::taken();
         let flow = self.search(isa, view, sink, recorder, &mut scratch);
-        SCRATCH.set(Some(scratch));
+        scratch.give_back();
         flow
     }
 }

@@ -193,8 +193,7 @@ mod tests {
             (copied.ask)(place, &mut out);
             out
         };
-        assert_ne!(ids(1), ids(5)[..1]);
-        assert!(ids(4).iter().copied().eq(0..300));
+        assert_ne!(ids(1).first(), ids(5).first());
     }
 
     #[test]

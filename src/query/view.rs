@@ -42,11 +42,16 @@ pub trait View: Sized {
     /// [`View::drops`], lane by lane.
     fn kept_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask;
 
-    /// The rows of a block that [`View::kept_lanes`] reads, as far as it pays to
-    /// know: what is fetched ahead.
+    /// The rows of a block that [`View::kept_lanes`] reads.
     #[inline(always)]
     fn rows_read(&self, _mask: PlaneMask) -> RowMask {
         ALL_ROWS
+    }
+
+    /// Asks for the memory that [`View::kept_lanes`] reads ahead of it.
+    #[inline(always)]
+    fn prefetch(&self, block: &BoxBlock, _mask: PlaneMask) {
+        block.prefetch();
     }
 
     /// Sixteen nodes at once: the lanes that no plane of the mask excludes, and
@@ -162,12 +167,17 @@ impl View for ConvexVolume {
     }
     #[inline(always)]
     fn rows_read(&self, mask: PlaneMask) -> RowMask {
-        // Two planes or fewer: the lowest and the highest bit. More read all.
+        Bits(mask).fold(0, |rows, plane| rows | self.corner_of_bit(plane).rows())
+    }
+    #[inline(always)]
+    fn prefetch(&self, block: &BoxBlock, mask: PlaneMask) {
+        // Mostly one plane or two; more read nearly everything.
         let (lowest, highest) = (mask.trailing_zeros(), mask.checked_ilog2().unwrap_or(0));
-        if mask & !(1 << (lowest % 32)) & !(1 << highest) != 0 {
-            return ALL_ROWS;
+        block.prefetch_corner(self.corner_of_bit(lowest));
+        block.prefetch_corner(self.corner_of_bit(highest));
+        if mask & mask.wrapping_sub(1) & !(1 << highest) != 0 {
+            block.prefetch();
         }
-        self.rows_of_bit(lowest) | self.rows_of_bit(highest)
     }
     #[inline(always)]
     fn sorted_lanes<I: Isa>(

@@ -71,7 +71,7 @@ pub static FAMILIES: &[Family] = &[
     },
 ];
 
-/// Largest scene a spec may ask for: some 5 GB while it is made.
+/// Largest scene a spec may ask for: 7.2 GB while it is made, 2.4 GB then.
 const MOST_ITEMS: u64 = 100_000_000;
 
 impl Family {

@@ -1,4 +1,4 @@
-//! `--kernel`: the same bytes whatever the instruction set, what reports say
+//! `--kernel` and `--threads`: the same bytes whatever is chosen, what reports say
 //! of it, and what is refused.
 
 use super::process::*;
@@ -75,5 +75,26 @@ fn a_report_says_which_kernel_and_goes_on_with_no_other() {
         let done = cullbench(here.path(), &format!("{line} --resume"));
         let wanted = format!("--kernel portable | not {best}");
         assert_refused(&done, &wanted, "another kernel");
+    }
+}
+
+#[test]
+fn threads_change_no_byte_and_a_number_that_is_none_is_refused() {
+    let here = folder(&[("p.csv", b"x,y,z\n1,2,3\n100,-200,30\n")]);
+    for line in [
+        "query --scene city:n=40000 --cameras teleport:frames=7 --ids",
+        "query --scene helsinki --cameras orbit:frames=5 --test sphere --format json",
+        "locate --scene freedm-map12 --points p.csv",
+    ] {
+        let wanted = works(here.path(), line);
+        for threads in [1, 2, 5] {
+            let text = works(here.path(), &format!("{line} --threads {threads}"));
+            assert!(text == wanted, "{line}, {threads}");
+        }
+    }
+    for bad in ["0", "257", "-1", "two"] {
+        let line = format!("query --scene helsinki --cameras orbit:frames=1 --threads={bad}");
+        let done = cullbench(here.path(), &line);
+        assert_refused(&done, &format!("'{bad}' | --threads"), &line);
     }
 }

@@ -156,7 +156,7 @@ impl PeerUniformGrid {
 }
 
 impl RegionIndex for PeerUniformGrid {
-    const NAME: &'static str = "peer-uniform-grid";
+    const NAME: &'static str = "uniform-grid";
     const SUMMARY: &'static str =
         "a uniform grid of our own: items in the cell of their centre, exact cell bounds";
     type Params = PeerParams;
