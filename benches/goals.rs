@@ -358,7 +358,7 @@ fn main() -> ExitCode {
         if !peers.is_empty() {
             names.extend(world.ahead.iter().filter(|name| **name != subject));
             names.extend(&peers);
-            names.extend(OWN_GRID.iter().filter(exists));
+            names.extend(OWN_GRID.into_iter().filter(exists));
         }
         let contenders = contenders(&names, subject, &scene);
         judge_build(&mut judge, world, &contenders[1], scene.items.len());

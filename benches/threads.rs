@@ -72,6 +72,7 @@ fn builds(name: &str, items: &[Aabb], protocol: &Protocol) {
         ask: Box::new(move |_, out: &mut Vec<ItemId>| {
             out.extend(0..build(threads).depth() as ItemId);
         }) as Ask,
+        ask_many: None,
         expected: vec![depth],
         slowest,
     };
@@ -103,6 +104,7 @@ fn queries(name: &str, trees: &[Wide; 3], views: &[CameraView], protocol: &Proto
         ];
         let competitors = asks.map(|ask| Competitor {
             ask,
+            ask_many: None,
             expected: expected.clone(),
             slowest,
         });
@@ -127,6 +129,7 @@ fn queries(name: &str, trees: &[Wide; 3], views: &[CameraView], protocol: &Proto
                     .filter(|(list, n)| list.len() == **n as usize);
                 out.extend(right.map(|(_, &n)| n));
             }) as Ask,
+            ask_many: None,
             expected: vec![views.len() as u64],
             slowest: slowest * views.len() as u32,
         }

@@ -27,7 +27,11 @@ impl Orders {
     /// The next round's order.
     pub fn next(&mut self) -> Vec<usize> {
         let count = self.names.len();
-        let block = if count % 2 == 0 { count } else { 2 * count };
+        let block = if count.is_multiple_of(2) {
+            count
+        } else {
+            2 * count
+        };
         let turn = self.turn.checked_rem(block).unwrap_or(0);
         if turn == 0 {
             for i in (1..count).rev() {
