@@ -87,13 +87,15 @@ fn queries(name: &str, trees: &[Wide; 3], views: &[CameraView], protocol: &Proto
     scope(|scope| {
         let mut crew = Crew::new(scope, &trees[2], THREADS);
         for view in views {
-            (whole.clear(), split.clear());
+            whole.clear();
+            split.clear();
             let started = Instant::now();
             trees[0].see(view.as_any(), &mut whole);
             slowest = slowest.max(started.elapsed());
             crew.see(view.as_any(), &mut split);
             expected.push(whole.len() as u64);
-            (whole.sort_unstable(), split.sort_unstable());
+            whole.sort_unstable();
+            split.sort_unstable();
             assert!(whole == split, "{name}: another set on {THREADS} threads");
         }
         let crew = RefCell::new(crew);
