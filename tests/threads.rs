@@ -57,7 +57,7 @@ fn cases() -> Vec<(String, Vec<Aabb>, Vec<ConvexVolume>)> {
         let case = RandomCase::new(seed);
         (format!("random case {seed}"), case.items, vec![case.volume])
     });
-    let worlds = ["uniform:n=150001", "city:n=70000", "clustered:n=99999"].map(|source| {
+    let worlds = ["uniform:n=400001", "city:n=250000", "clustered:n=199999"].map(|source| {
         let scene = scene::load(source, &Default::default()).expect(source);
         let bounds = scene.bounds;
         let around = |share: f32| {
@@ -73,7 +73,7 @@ fn cases() -> Vec<(String, Vec<Aabb>, Vec<ConvexVolume>)> {
             });
             ConvexVolume::from_planes(&faces.collect::<Vec<_>>()).expect("finite planes")
         };
-        let mut volumes = [0.01, 0.1, 0.3, 0.45, 3.0].map(around).to_vec();
+        let mut volumes = [0.01, 0.1, 0.25, 0.3, 0.35, 0.4, 0.45, 3.0].map(around).to_vec();
         volumes.push(ConvexVolume::from_planes(&[]).expect("no planes"));
         (source.to_owned(), scene.items, volumes)
     });

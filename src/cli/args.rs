@@ -107,14 +107,27 @@ pub struct KernelArgs {
     #[arg(long = "kernel", value_name = "NAME")]
     pub name: Option<String>,
     /// Threads that a build may use, and that query and locate share cameras and points among
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=MOST_THREADS as i64))]
-    pub threads: u16,
+    #[arg(
+        long,
+        value_name = "N",
+        default_value = "1",
+        allow_negative_numbers = true
+    )]
+    pub threads: String,
 }
 
 impl KernelArgs {
     /// Makes the choice for the whole process.
     pub fn choose(&self) -> Result<(), SpecError> {
-        threads::choose(usize::from(self.threads));
+        match self.threads.parse() {
+            Ok(count @ 1..=MOST_THREADS) => threads::choose(count),
+            _ => {
+                return Err(SpecError::new(format_args!(
+                    "--threads is '{}'; expected a whole number from 1 to {MOST_THREADS}",
+                    self.threads
+                )));
+            }
+        }
         let Some(name) = self.name.as_deref() else {
             return Ok(());
         };

@@ -95,6 +95,6 @@ fn threads_change_no_byte_and_a_number_that_is_none_is_refused() {
     for bad in ["0", "257", "-1", "two"] {
         let line = format!("query --scene helsinki --cameras orbit:frames=1 --threads={bad}");
         let done = cullbench(here.path(), &line);
-        assert_refused(&done, &format!("'{bad}' | --threads"), &line);
+        assert_refused(&done, &format!("--threads is '{bad}'; expected"), &line);
     }
 }
