@@ -19,6 +19,13 @@ pub trait DynIndex: Send + Sync {
     fn memory(&self) -> MemoryUsage;
     /// What a view of any kind sees. The timed path: nothing is counted.
     fn see(&self, view: AnyView<'_>, out: &mut Vec<ItemId>);
+    /// What several views see, of any kinds and in any mixture: `out[i]` gets
+    /// exactly what [`DynIndex::see`] appends for `views[i]`, in the same
+    /// order. In one pass where that is quicker, else one after the other.
+    ///
+    /// # Panics
+    /// If there is not one list a view.
+    fn see_many(&self, views: &[AnyView<'_>], out: &mut [Vec<ItemId>]);
     /// The same query with its cost added up.
     fn see_counted(&self, view: AnyView<'_>, out: &mut Vec<ItemId>, cost: &mut QueryCost);
     /// What a convex volume sees: [`DynIndex::see`] with the usual view.
@@ -44,6 +51,15 @@ impl<T: FrustumQuery> DynIndex for T {
 
     fn see(&self, view: AnyView<'_>, out: &mut Vec<ItemId>) {
         see(self, view, out, &mut NoRecorder);
+    }
+
+    fn see_many(&self, views: &[AnyView<'_>], out: &mut [Vec<ItemId>]) {
+        assert_eq!(views.len(), out.len(), "one list a view");
+        if !self.see_together(views, out) {
+            for (view, out) in views.iter().zip(out) {
+                see(self, *view, out, &mut NoRecorder);
+            }
+        }
     }
 
     fn see_counted(&self, view: AnyView<'_>, out: &mut Vec<ItemId>, cost: &mut QueryCost) {

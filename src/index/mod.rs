@@ -8,6 +8,7 @@ mod bvh;
 mod cells;
 mod erased;
 mod linear;
+mod multi_view;
 mod octree;
 mod partition;
 mod quadtree;
@@ -24,7 +25,7 @@ use serde::de::DeserializeOwned;
 
 use crate::geometry::{Aabb, PlaneTree};
 use crate::kernel::Isa;
-use crate::query::{ItemId, NoRecorder, Ranges, Recorder, Sink, View};
+use crate::query::{AnyView, ItemId, NoRecorder, Ranges, Recorder, Sink, View};
 
 pub use block_order::BlockOrder;
 pub use bsp::{Bsp, BspBuilder, BspParams};
@@ -35,7 +36,7 @@ pub use octree::{CellParams, Octree};
 pub use partition::{Part, Record, Splitter, build_top_down};
 pub use quadtree::Quadtree;
 pub use quantised::{GridScope, Quantised, QuantisedParams};
-pub use replay::Trace;
+pub use replay::{Foreseen, Trace};
 pub use tree::{PackedTree, TreeNode, TreeWriter, scan_blocks};
 pub use wide::{Wide, WideParams};
 
@@ -143,6 +144,13 @@ pub trait FrustumQuery: RegionIndex {
         recorder: &mut R,
     ) -> ControlFlow<()> {
         self.visible(view, sink, recorder)
+    }
+
+    /// Answers several views in one pass, each into its own list, the very
+    /// lists of [`DynIndex::see`]. False, with nothing done, if separate
+    /// passes are no slower; the caller then makes them.
+    fn see_together(&self, _views: &[AnyView<'_>], _out: &mut [Vec<ItemId>]) -> bool {
+        false
     }
 }
 

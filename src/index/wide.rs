@@ -10,10 +10,10 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::block_order::{BlockOrder, block_ordered};
-use super::{BuildError, FrustumQuery, MemoryUsage, RegionIndex, TreeOrder, indexable};
+use super::{BuildError, FrustumQuery, MemoryUsage, RegionIndex, TreeOrder, indexable, multi_view};
 use crate::geometry::{ALL_ROWS, Aabb, BoxBlock, LANES, LaneMask, PlaneMask, PlaneTree};
 use crate::kernel::{BASELINE, Isa, prefetch};
-use crate::query::{ItemId, Recorder, Region, Sink, View, runs};
+use crate::query::{AnyView, ItemId, NoRecorder, Ranges, Recorder, Region, Sink, View, runs};
 
 /// Parameters: `wide:order=median`.
 #[derive(Clone, Copy, Default, Debug, Serialize, Deserialize)]
@@ -66,7 +66,7 @@ impl Level {
 /// Blocks of one level that are still to be looked at, each with the planes
 /// that its ancestors have left open.
 #[derive(Default)]
-struct Frontier {
+pub(super) struct Frontier {
     /// Longer than what is used, so that sixteen lanes can always be stored.
     blocks: Vec<u32>,
     open: Vec<PlaneMask>,
@@ -75,7 +75,7 @@ struct Frontier {
 
 impl Frontier {
     /// Empties it and makes room for the children of so many blocks.
-    fn clear(&mut self, blocks: usize) {
+    pub(super) fn clear(&mut self, blocks: usize) {
         self.used = 0;
         let room = (blocks + 1) * LANES;
         if self.blocks.len() < room {
@@ -84,9 +84,16 @@ impl Frontier {
         }
     }
 
+    /// The root alone, all planes of the mask open.
+    #[inline(always)]
+    pub(super) fn start<I: Isa>(&mut self, isa: I, mask: PlaneMask) {
+        self.clear(1);
+        self.push(isa, 0, isa.splat_word(mask), 1);
+    }
+
     /// Adds those lanes of a block, whose first has the number `first`.
     #[inline(always)]
-    fn push<I: Isa>(&mut self, isa: I, first: u32, open: I::Words, lanes: LaneMask) {
+    pub(super) fn push<I: Isa>(&mut self, isa: I, first: u32, open: I::Words, lanes: LaneMask) {
         let places = (
             self.blocks[self.used..].first_chunk_mut(),
             self.open[self.used..].first_chunk_mut(),
@@ -99,7 +106,7 @@ impl Frontier {
     }
 
     #[inline(always)]
-    fn entries(&self) -> (&[u32], &[PlaneMask]) {
+    pub(super) fn entries(&self) -> (&[u32], &[PlaneMask]) {
         (&self.blocks[..self.used], &self.open[..self.used])
     }
 }
@@ -185,9 +192,15 @@ impl Wide {
         &self.blocks
     }
 
+    /// A level for a traversal, leaves first.
     #[inline(always)]
-    fn blocks_of(&self, level: &Level) -> &[BoxBlock] {
-        &self.blocks[level.first..level.first + level.blocks]
+    pub(super) fn layer(&self, level: usize) -> Layer<'_> {
+        let place = self.levels[level];
+        Layer {
+            blocks: &self.blocks[place.first..place.first + place.blocks],
+            place,
+            span: 1 << (level * LANES.ilog2() as usize),
+        }
     }
 
     /// Hands every item that the view sees to the sink: level by level, runs of
@@ -207,87 +220,52 @@ impl Wide {
         scratch: &mut Scratch,
     ) -> ControlFlow<()> {
         let Scratch { here, below } = scratch;
-        let Some((leaves, inner)) = self.levels.split_first() else {
+        if self.levels.is_empty() {
             return ControlFlow::Continue(());
-        };
+        }
         if view.mask() == 0 {
             recorder.subtree_accepted(self.ids.len());
             return sink.accept_places(isa, &self.ids, 0..self.ids.len());
         }
-        here.clear(1);
-        here.push(isa, 0, isa.splat_word(view.mask()), 1);
-        for (height, level) in inner.iter().enumerate().rev() {
-            let (places, masks) = here.entries();
-            below.clear(places.len());
-            let blocks = self.blocks_of(level);
-            // Items below one lane.
-            let span = LANES << (height * LANES.ilog2() as usize);
+        here.start(isa, view.mask());
+        let mut pass = Pass {
+            tree: self,
+            isa,
+            view,
+            sink,
+            recorder,
+        };
+        for layer in (1..self.levels.len()).rev().map(|level| self.layer(level)) {
+            below.clear(here.used);
             let mut run = 0..0;
-            for (i, (&at, &mask)) in places.iter().zip(masks).enumerate() {
-                if let Some(&next) = places.get(i + AHEAD)
-                    && let Some(block) = blocks.get(next as usize)
-                {
-                    block.prefetch(ALL_ROWS);
-                }
-                let at = at as usize;
-                let lanes = level.lanes(at);
-                count_nodes(recorder, lanes, mask);
-                recorder.block_read(level.first + at, ALL_ROWS);
-                let (kept, open) = view.sorted_lanes(isa, &blocks[at], mask);
-                let kept = kept & lanes;
-                let inside = isa.zeros(open) & kept;
-                let undecided = kept & !inside;
-                let first = at * LANES;
-                below.push(isa, first as u32, open, undecided);
-                for lanes in runs(inside) {
-                    let start = (first + lanes.start) * span;
-                    let end = ((first + lanes.end) * span).min(self.ids.len());
-                    if start == run.end {
-                        run.end = end;
-                    } else {
-                        self.hand_over(isa, run, sink, recorder)?;
-                        run = start..end;
-                    }
-                }
-            }
-            self.hand_over(isa, run, sink, recorder)?;
+            pass.sort_level(&layer, here, below, &mut run)?;
+            pass.hand_over(run)?;
             std::mem::swap(here, below);
         }
-        let blocks = self.blocks_of(leaves);
-        let (places, masks) = here.entries();
-        for (i, (&at, &mask)) in places.iter().zip(masks).enumerate() {
-            if let (Some(&next), Some(&mask)) = (places.get(i + AHEAD), masks.get(i + AHEAD)) {
-                if let Some(block) = blocks.get(next as usize) {
-                    block.prefetch(view.rows_read(mask));
-                }
-                if let Some(id) = self.ids.get(next as usize * LANES) {
-                    prefetch(id);
-                }
-            }
-            let at = at as usize;
-            let lanes = leaves.lanes(at);
-            recorder.items_tested(lanes.count_ones());
-            recorder.planes_tested(lanes.count_ones() * mask.count_ones());
-            recorder.block_read(leaves.first + at, view.rows_read(mask));
-            let kept = view.kept_lanes(isa, &blocks[at], mask) & lanes;
-            sink.accept_lanes(isa, &self.ids, at * LANES, kept)?;
-        }
-        ControlFlow::Continue(())
+        pass.test_leaves(&self.layer(0), here)
     }
 
-    #[inline(always)]
-    fn hand_over<I: Isa, S: Sink, R: Recorder>(
-        &self,
-        isa: I,
-        places: Range<usize>,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        if places.is_empty() {
-            return ControlFlow::Continue(());
+    /// All of a query but its leaves: appends the runs that are wholly inside,
+    /// in their order, and leaves behind the leaves that are undecided.
+    pub(super) fn above_leaves<V: View>(&self, view: &V, runs: &mut Vec<Range<u32>>) -> Frontier {
+        let (mut here, mut below) = (Frontier::default(), Frontier::default());
+        here.start(BASELINE, view.mask());
+        let mut pass = Pass {
+            tree: self,
+            isa: BASELINE,
+            view,
+            sink: &mut Ranges(runs),
+            recorder: &mut NoRecorder,
+        };
+        for layer in (1..self.levels.len()).rev().map(|level| self.layer(level)) {
+            below.clear(here.used);
+            let mut run = 0..0;
+            // This sink never breaks off.
+            let _ = pass.sort_level(&layer, &here, &mut below, &mut run);
+            let _ = pass.hand_over(run);
+            std::mem::swap(&mut here, &mut below);
         }
-        recorder.subtree_accepted(places.len());
-        sink.accept_places(isa, &self.ids, places)
+        here
     }
 
     /// Bounds of the boxes of one block, as the lane above them holds them.
@@ -295,6 +273,155 @@ impl Wide {
         let bounds = self.blocks[self.levels[level].first + block].union();
         let above = self.levels[level + 1].first + block / LANES;
         self.blocks[above].set(block % LANES, &bounds);
+    }
+}
+
+/// One level as a traversal meets it.
+pub(super) struct Layer<'t> {
+    blocks: &'t [BoxBlock],
+    place: Level,
+    /// Items below one lane.
+    span: usize,
+}
+
+impl Layer<'_> {
+    #[inline(always)]
+    pub(super) fn block(&self, at: usize) -> (&BoxBlock, LaneMask) {
+        (&self.blocks[at], self.place.lanes(at))
+    }
+
+    /// The places of the items below some lanes of a block, run by run; there
+    /// are `count` items in all.
+    #[inline(always)]
+    pub(super) fn places_of(
+        &self,
+        at: usize,
+        lanes: LaneMask,
+        count: usize,
+    ) -> impl Iterator<Item = Range<usize>> {
+        let (first, span) = (at * LANES, self.span);
+        runs(lanes).map(move |run| {
+            let end = ((first + run.end) * span).min(count);
+            (first + run.start) * span..end
+        })
+    }
+
+    /// Asks for the memory of a block ahead of its turn.
+    #[inline(always)]
+    pub(super) fn fetch(&self, block: u32) {
+        if let Some(block) = self.blocks.get(block as usize) {
+            block.prefetch(ALL_ROWS);
+        }
+    }
+}
+
+/// A query on its way through the tree, block by block: what is done with a
+/// block, in whatever order they come.
+pub(super) struct Pass<'a, I, V, S, R> {
+    pub tree: &'a Wide,
+    pub isa: I,
+    pub view: &'a V,
+    pub sink: &'a mut S,
+    pub recorder: &'a mut R,
+}
+
+impl<I: Isa, V: View, S: Sink, R: Recorder> Pass<'_, I, V, S, R> {
+    /// [`Pass::sort_block`] for all blocks of a frontier.
+    #[inline(always)]
+    pub(super) fn sort_level(
+        &mut self,
+        layer: &Layer,
+        here: &Frontier,
+        below: &mut Frontier,
+        run: &mut Range<usize>,
+    ) -> ControlFlow<()> {
+        let (places, masks) = here.entries();
+        for (i, (&at, &mask)) in places.iter().zip(masks).enumerate() {
+            if let Some(&next) = places.get(i + AHEAD) {
+                layer.fetch(next);
+            }
+            self.sort_block(layer, (at, mask), below, run)?;
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// [`Pass::test_leaf`] for all leaves of a frontier.
+    #[inline(always)]
+    pub(super) fn test_leaves(&mut self, leaves: &Layer, here: &Frontier) -> ControlFlow<()> {
+        let (places, masks) = here.entries();
+        for (i, (&at, &mask)) in places.iter().zip(masks).enumerate() {
+            if let (Some(&next), Some(&mask)) = (places.get(i + AHEAD), masks.get(i + AHEAD)) {
+                self.fetch_leaf(leaves, next, mask);
+            }
+            self.test_leaf(leaves, (at, mask))?;
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Sorts the lanes of a block: what is undecided goes to the frontier
+    /// `below`, what is inside joins `run` or, if it cannot, takes its place.
+    #[inline(always)]
+    fn sort_block(
+        &mut self,
+        layer: &Layer,
+        (at, mask): (u32, PlaneMask),
+        below: &mut Frontier,
+        run: &mut Range<usize>,
+    ) -> ControlFlow<()> {
+        let at = at as usize;
+        let lanes = layer.place.lanes(at);
+        count_nodes(self.recorder, lanes, mask);
+        self.recorder.block_read(layer.place.first + at, ALL_ROWS);
+        let (kept, open) = self.view.sorted_lanes(self.isa, &layer.blocks[at], mask);
+        let kept = kept & lanes;
+        let inside = self.isa.zeros(open) & kept;
+        let undecided = kept & !inside;
+        let first = at * LANES;
+        below.push(self.isa, first as u32, open, undecided);
+        for places in layer.places_of(at, inside, self.tree.ids.len()) {
+            if places.start == run.end {
+                run.end = places.end;
+            } else {
+                self.hand_over(std::mem::replace(run, places))?;
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Hands over a run of items that are wholly inside.
+    #[inline(always)]
+    pub(super) fn hand_over(&mut self, places: Range<usize>) -> ControlFlow<()> {
+        if places.is_empty() {
+            return ControlFlow::Continue(());
+        }
+        self.recorder.subtree_accepted(places.len());
+        self.sink.accept_places(self.isa, &self.tree.ids, places)
+    }
+
+    /// Asks for what [`Pass::test_leaf`] will read.
+    #[inline(always)]
+    fn fetch_leaf(&self, leaves: &Layer, at: u32, mask: PlaneMask) {
+        if let Some(block) = leaves.blocks.get(at as usize) {
+            block.prefetch(self.view.rows_read(mask));
+        }
+        if let Some(id) = self.tree.ids.get(at as usize * LANES) {
+            prefetch(id);
+        }
+    }
+
+    /// Hands over the items of a leaf that no open plane drops.
+    #[inline(always)]
+    fn test_leaf(&mut self, leaves: &Layer, (at, mask): (u32, PlaneMask)) -> ControlFlow<()> {
+        let at = at as usize;
+        let lanes = leaves.place.lanes(at);
+        self.recorder.items_tested(lanes.count_ones());
+        let tests = lanes.count_ones() * mask.count_ones();
+        self.recorder.planes_tested(tests);
+        let rows = self.view.rows_read(mask);
+        self.recorder.block_read(leaves.place.first + at, rows);
+        let kept = self.view.kept_lanes(self.isa, &leaves.blocks[at], mask) & lanes;
+        let ids = &self.tree.ids;
+        self.sink.accept_lanes(self.isa, ids, at * LANES, kept)
     }
 }
 
@@ -431,6 +558,10 @@ impl FrustumQuery for Wide {
         let flow = self.search(isa, view, sink, recorder, &mut scratch);
         SCRATCH.set(Some(scratch));
         flow
+    }
+
+    fn see_together(&self, views: &[AnyView<'_>], out: &mut [Vec<ItemId>]) -> bool {
+        multi_view::pays(views) && self.see_in_one_pass(views, out)
     }
 }
 

@@ -6,12 +6,14 @@ mod recorder;
 mod region;
 mod sink;
 mod view;
+mod view_masks;
 
 pub use recorder::{NoRecorder, QueryCost, Recorder};
 pub use region::{Containment, Region};
 pub(crate) use sink::Ranges;
 pub use sink::{Count, First, Sink, runs};
 pub use view::{AnyView, View};
+pub use view_masks::ViewMasks;
 
 /// An item's number: its zero-based place in the scene.
 pub type ItemId = u32;
