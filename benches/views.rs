@@ -1,6 +1,6 @@
 //! Several views in one pass against one pass after the other, on the wide
-//! tree: separate passes, their twin (an A/A control), the shared pass, and what
-//! `see_many` makes of it, each over its own copy, interleaved and paired by the harness of `cullbench run`.
+//! tree: separate passes, their twin (an A/A control), and the shared pass, each
+//! over its own copy, interleaved and paired by the harness of `cullbench run`.
 //! Lists are compared before anything is timed. A word on the command line
 //! keeps only the rows that hold it; `-- --test` only checks that they run.
 
@@ -48,10 +48,6 @@ fn separately(index: &Wide, views: &[AnyView<'_>], out: &mut [Vec<ItemId>]) {
 
 fn together(index: &Wide, views: &[AnyView<'_>], out: &mut [Vec<ItemId>]) {
     assert!(index.see_in_one_pass(views, out), "too many normals");
-}
-
-fn chosen(index: &Wide, views: &[AnyView<'_>], out: &mut [Vec<ItemId>]) {
-    index.see_many(views, out);
 }
 
 /// What is asked at every place of a path, and the length of every answer.
@@ -127,8 +123,8 @@ fn main() -> ExitCode {
         overhead_ns: harness_overhead_ns(),
         cache_bytes: Machine::capture().cache_sweep_bytes(),
     };
-    println!("| scene | visible | views | us apart | apart / one pass | apart / see_many | A/A |");
-    println!("|---|---|---|---|---|---|---|");
+    println!("| scene | visible | views | us apart | apart / one pass | A/A |");
+    println!("|---|---|---|---|---|---|");
     for source in SCENES {
         for share in SHARES {
             let row = format!("{source} {share}");
@@ -144,7 +140,7 @@ fn main() -> ExitCode {
             let way = format!("flythrough:frames=64,visible={share}");
             let cameras = path::load(&way, &scene, &Default::default()).expect(&way);
             let build = || Wide::build(&scene.items, None, &Default::default());
-            let copies = [(); 4].map(|()| build().expect("finite items"));
+            let copies = [(); 3].map(|()| build().expect("finite items"));
             let near = cameras.cameras[0].lens.near();
             for (name, set) in sets(near) {
                 let around = scene.surroundings();
@@ -157,7 +153,7 @@ fn main() -> ExitCode {
                     views.iter().map(volume).collect()
                 });
                 let questions = Questions::new(volumes.collect(), &copies[0]);
-                let ways: [Way; 4] = [separately, separately, together, chosen];
+                let ways: [Way; 3] = [separately, separately, together];
                 let competitors: Vec<Competitor> = copies
                     .iter()
                     .zip(ways)
@@ -175,10 +171,10 @@ fn main() -> ExitCode {
                     bootstrap_median(&ratios, 1).expect("a round")
                 };
                 let us = bootstrap_median(&means[0], 1).expect("a round").value / 1e3;
-                let (twin, shared, chosen) = (ratio(1), ratio(2), ratio(3));
+                let (twin, shared) = (ratio(1), ratio(2));
                 println!(
-                    "| {source} | {share} | {name} | {us:.1} | {:.3} [{:.3}, {:.3}] | {:.3} | {:.3} |",
-                    shared.value, shared.lower, shared.upper, chosen.value, twin.value
+                    "| {source} | {share} | {name} | {us:.1} | {:.3} [{:.3}, {:.3}] | {:.3} |",
+                    shared.value, shared.lower, shared.upper, twin.value
                 );
             }
         }

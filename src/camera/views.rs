@@ -149,7 +149,6 @@ mod tests {
     }
 
     fn sees(set: &[ConvexVolume], b: &Aabb) -> usize {
-        use crate::query::View;
         set.iter().filter(|volume| volume.sees(b)).count()
     }
 

@@ -25,7 +25,7 @@ use serde::de::DeserializeOwned;
 
 use crate::geometry::{Aabb, PlaneTree};
 use crate::kernel::Isa;
-use crate::query::{AnyView, ItemId, NoRecorder, Ranges, Recorder, Sink, View};
+use crate::query::{ItemId, NoRecorder, Ranges, Recorder, Sink, View};
 
 pub use block_order::BlockOrder;
 pub use bsp::{Bsp, BspBuilder, BspParams};
@@ -144,13 +144,6 @@ pub trait FrustumQuery: RegionIndex {
         recorder: &mut R,
     ) -> ControlFlow<()> {
         self.visible(view, sink, recorder)
-    }
-
-    /// Answers several views in one pass, each into its own list, the very
-    /// lists of [`DynIndex::see`]. False, with nothing done, if separate
-    /// passes are no slower; the caller then makes them.
-    fn see_together(&self, _views: &[AnyView<'_>], _out: &mut [Vec<ItemId>]) -> bool {
-        false
     }
 }
 

@@ -351,13 +351,19 @@ impl Work for See<'_, '_> {
 }
 
 impl Wide {
-    /// [`Wide::visible_together`] by the chosen kernel, `out[i]` for
-    /// `views[i]`: in one pass whatever it costs; [`DynIndex::see_many`] is the
-    /// one that chooses. False, with nothing done, if a view is not a
-    /// [`ConvexVolume`], too.
+    /// [`Wide::visible_together`] by the chosen kernel: appends to `out[i]` what
+    /// `views[i]` sees. An option, not what [`DynIndex::see_many`] does: a pass
+    /// has its own costs, and only pairs of eyes have so much in common that it
+    /// is often the quicker one (docs/MULTI_VIEW.md has the figures).
+    ///
+    /// False, with nothing done, also if a view is not a [`ConvexVolume`].
+    ///
+    /// # Panics
+    /// If there is not one list a view.
     ///
     /// [`DynIndex::see_many`]: super::DynIndex::see_many
     pub fn see_in_one_pass(&self, views: &[AnyView<'_>], out: &mut [Vec<ItemId>]) -> bool {
+        assert_eq!(views.len(), out.len(), "one list a view");
         let mut asked = Vec::with_capacity(views.len());
         for (view, out) in views.iter().zip(out) {
             let AnyView::Volume(volume) = view else {
@@ -370,17 +376,4 @@ impl Wide {
             asked: &mut asked,
         })
     }
-}
-
-/// Whether one pass is worth its bookkeeping: for two volumes whose planes have
-/// the same normals, as two eyes side by side have. What is shared is the
-/// arithmetic of blocks about which both are undecided; cascades and the faces
-/// of a cube have few of them (docs/MULTI_VIEW.md).
-pub(super) fn pays(views: &[AnyView<'_>]) -> bool {
-    let [AnyView::Volume(one), AnyView::Volume(other)] = views else {
-        return false;
-    };
-    let pairs = one.planes().iter().zip(other.planes());
-    let mut pairs = pairs.map(|(a, b)| [a, b].map(|plane| plane.normal.to_array()));
-    one.planes().len() == other.planes().len() && pairs.all(|[a, b]| a == b)
 }

@@ -10,10 +10,10 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::block_order::{BlockOrder, block_ordered};
-use super::{BuildError, FrustumQuery, MemoryUsage, RegionIndex, TreeOrder, indexable, multi_view};
+use super::{BuildError, FrustumQuery, MemoryUsage, RegionIndex, TreeOrder, indexable};
 use crate::geometry::{ALL_ROWS, Aabb, BoxBlock, LANES, LaneMask, PlaneMask, PlaneTree};
 use crate::kernel::{BASELINE, Isa, prefetch};
-use crate::query::{AnyView, ItemId, NoRecorder, Ranges, Recorder, Region, Sink, View, runs};
+use crate::query::{ItemId, NoRecorder, Ranges, Recorder, Region, Sink, View, runs};
 
 /// Parameters: `wide:order=median`.
 #[derive(Clone, Copy, Default, Debug, Serialize, Deserialize)]
@@ -558,10 +558,6 @@ impl FrustumQuery for Wide {
         let flow = self.search(isa, view, sink, recorder, &mut scratch);
         SCRATCH.set(Some(scratch));
         flow
-    }
-
-    fn see_together(&self, views: &[AnyView<'_>], out: &mut [Vec<ItemId>]) -> bool {
-        multi_view::pays(views) && self.see_in_one_pass(views, out)
     }
 }
 
