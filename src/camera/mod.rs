@@ -7,11 +7,13 @@ mod frame;
 mod lens;
 mod planes;
 mod projection;
+mod views;
 
 pub use frame::{Frame, look_at};
 pub use lens::Lens;
 pub use planes::{DEFAULT_EPSILON, PLANE_METHODS, PlaneMethod, PlaneOptions, Surroundings};
 pub use projection::{ClipSpace, gribb_hartmann};
+pub use views::ViewSet;
 
 use crate::geometry::VolumeError;
 

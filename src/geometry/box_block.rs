@@ -204,6 +204,19 @@ impl BoxBlock {
         rows.map(|row| &self.rows[usize::from(row)])
     }
 
+    /// For planes of one normal that differ in d: what [`Plane::value_at`] adds
+    /// d to, at the p-vertex of every box.
+    #[inline(always)]
+    pub fn farthest<I: Isa>(&self, isa: I, normal: Vec3, upper: Upper) -> I::Floats {
+        sums_at(isa, normal, self.corner_rows(upper))
+    }
+
+    /// The same at the n-vertices.
+    #[inline(always)]
+    pub fn nearest<I: Isa>(&self, isa: I, normal: Vec3, upper: Upper) -> I::Floats {
+        sums_at(isa, normal, self.corner_rows(upper.map(|up| !up)))
+    }
+
     /// The rows of one corner, the same one of every box: the upper bounds
     /// where `upper` says so.
     #[inline(always)]
@@ -326,11 +339,15 @@ const LANE_BITS: [u32; LANES] = {
 
 /// [`Plane::value_at`] of sixteen corners, given as rows.
 #[inline(always)]
-fn values_at<I: Isa>(isa: I, plane: &Plane, [x, y, z]: [&[f32; LANES]; 3]) -> I::Floats {
-    let n = plane.normal;
+fn values_at<I: Isa>(isa: I, plane: &Plane, corners: [&[f32; LANES]; 3]) -> I::Floats {
+    isa.add(sums_at(isa, plane.normal, corners), isa.splat(plane.d))
+}
+
+/// The part of it that all planes of one normal have in common.
+#[inline(always)]
+fn sums_at<I: Isa>(isa: I, n: Vec3, [x, y, z]: [&[f32; LANES]; 3]) -> I::Floats {
     let along = |n: f32, row: &[f32; LANES]| isa.mul(isa.splat(n), isa.load(row));
-    let sum = isa.add(isa.add(along(n.x, x), along(n.y, y)), along(n.z, z));
-    isa.add(sum, isa.splat(plane.d))
+    isa.add(isa.add(along(n.x, x), along(n.y, y)), along(n.z, z))
 }
 
 #[inline(always)]

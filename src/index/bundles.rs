@@ -5,7 +5,7 @@
 use std::cell::Cell;
 use std::ops::{ControlFlow, Range};
 
-use super::frontier::{AHEAD, Frontier, Merger};
+use super::frontier::{AHEAD, Frontier, Merger, hand_over};
 use super::tree::TreeNode;
 use crate::geometry::{Aabb, BoxBlock, LANES, LaneMask, PlaneMask};
 use crate::kernel::{Isa, prefetch};
@@ -270,13 +270,15 @@ impl Bundles {
                     let lane = left.trailing_zeros() as usize % LANES;
                     left &= left - 1;
                     let places = links.first[lane] as usize..links.end[lane] as usize;
-                    flow = run.add(isa, places, ids, sink, recorder);
-                    if flow.is_break() {
-                        break 'walk;
+                    if let Some(ended) = run.join(places) {
+                        flow = hand_over(isa, ended, ids, sink, recorder);
+                        if flow.is_break() {
+                            break 'walk;
+                        }
                     }
                 }
             }
-            flow = run.finish(isa, ids, sink, recorder);
+            flow = hand_over(isa, run.take(), ids, sink, recorder);
             if flow.is_break() {
                 break;
             }

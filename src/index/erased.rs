@@ -21,6 +21,19 @@ pub trait DynIndex: Send + Sync {
     fn memory(&self) -> MemoryUsage;
     /// What a view of any kind sees. The timed path: nothing is counted.
     fn see(&self, view: AnyView<'_>, out: &mut Vec<ItemId>);
+    /// What several views see, of any kinds and in any mixture: `out[i]` gets
+    /// what [`DynIndex::see`] appends for `views[i]`. One query after the other,
+    /// because that is the quickest (docs/MULTI_VIEW.md), but for the pairs of
+    /// which [`Wide::see_in_one_pass`] says so.
+    ///
+    /// # Panics
+    /// If there is not one list a view.
+    fn see_many(&self, views: &[AnyView<'_>], out: &mut [Vec<ItemId>]) {
+        assert_eq!(views.len(), out.len(), "one list a view");
+        for (view, out) in views.iter().zip(out) {
+            self.see(*view, out);
+        }
+    }
     /// The same query with its cost added up.
     fn see_counted(&self, view: AnyView<'_>, out: &mut Vec<ItemId>, cost: &mut QueryCost);
     /// What a convex volume sees: [`DynIndex::see`] with the usual view.

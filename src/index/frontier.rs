@@ -38,6 +38,19 @@ impl Frontier {
         }
     }
 
+    /// Node 0 alone, with all planes of the mask open.
+    #[inline(always)]
+    pub fn start<I: Isa>(&mut self, isa: I, mask: PlaneMask) {
+        self.clear(1);
+        self.push(isa, isa.counting(0), isa.splat_word(mask), 1);
+    }
+
+    /// Number of nodes.
+    #[inline(always)]
+    pub fn len(&self) -> usize {
+        self.used
+    }
+
     /// Adds the nodes of those lanes. There must be room.
     #[inline(always)]
     pub fn push<I: Isa>(&mut self, isa: I, nodes: I::Words, open: I::Words, lanes: LaneMask) {
@@ -69,39 +82,39 @@ impl Frontier {
 }
 
 /// Joins runs of items that follow each other before they are handed over.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub struct Merger(Range<usize>);
 
 impl Merger {
+    /// Adds a run; the one before it, if it has ended.
     #[inline(always)]
-    pub fn add<I: Isa, S: Sink, R: Recorder>(
-        &mut self,
-        isa: I,
-        places: Range<usize>,
-        ids: &[ItemId],
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
+    pub fn join(&mut self, places: Range<usize>) -> Option<Range<usize>> {
         if places.start == self.0.end {
             self.0.end = places.end;
-            return ControlFlow::Continue(());
+            return None;
         }
-        let before = std::mem::replace(&mut self.0, places);
-        Merger(before).finish(isa, ids, sink, recorder)
+        Some(std::mem::replace(&mut self.0, places))
     }
 
+    /// The run at the end, which may be empty.
     #[inline(always)]
-    pub fn finish<I: Isa, S: Sink, R: Recorder>(
-        self,
-        isa: I,
-        ids: &[ItemId],
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        if self.0.is_empty() {
-            return ControlFlow::Continue(());
-        }
-        recorder.subtree_accepted(self.0.len());
-        sink.accept_places(isa, ids, self.0)
+    pub fn take(&mut self) -> Range<usize> {
+        std::mem::take(&mut self.0)
     }
+}
+
+/// Hands over a run of items that are wholly inside, unless it is empty.
+#[inline(always)]
+pub fn hand_over<I: Isa, S: Sink, R: Recorder>(
+    isa: I,
+    places: Range<usize>,
+    ids: &[ItemId],
+    sink: &mut S,
+    recorder: &mut R,
+) -> ControlFlow<()> {
+    if places.is_empty() {
+        return ControlFlow::Continue(());
+    }
+    recorder.subtree_accepted(places.len());
+    sink.accept_places(isa, ids, places)
 }

@@ -11,9 +11,11 @@ mod cells;
 mod erased;
 mod frontier;
 mod linear;
+mod multi_view;
 mod octree;
 mod parallel;
 mod partition;
+mod pass;
 #[cfg(feature = "peers")]
 pub mod peers;
 mod quadtree;
@@ -43,7 +45,7 @@ pub use parallel::{Crew, see_each};
 pub use partition::{Part, Record, Splitter, build_top_down};
 pub use quadtree::Quadtree;
 pub use quantised::{GridScope, Quantised, QuantisedParams};
-pub use replay::Trace;
+pub use replay::{Foreseen, Trace};
 pub use tree::{PackedTree, TreeNode, TreeWriter, scan_blocks};
 pub use wide::{Wide, WideParams};
 

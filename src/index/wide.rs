@@ -10,11 +10,12 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::block_order::{BlockOrder, block_ordered};
-use super::frontier::{AHEAD, Frontier, Merger};
+use super::frontier::{Frontier, Merger};
+use super::pass::{Layer, Pass};
 use super::{BuildError, FrustumQuery, MemoryUsage, RegionIndex, TreeOrder, indexable};
-use crate::geometry::{ALL_ROWS, Aabb, BoxBlock, LANES, LaneMask, PlaneMask, PlaneTree};
+use crate::geometry::{Aabb, BoxBlock, LANES, LaneMask, PlaneMask, PlaneTree};
 use crate::kernel::{BASELINE, Isa, prefetch};
-use crate::query::{ItemId, Recorder, Region, Sink, View, runs};
+use crate::query::{ItemId, NoRecorder, Ranges, Recorder, Region, Sink, View};
 use crate::threads::{self, share};
 
 /// Parameters: `wide:order=median`.
@@ -46,8 +47,8 @@ pub struct Wide {
 
 /// Where a level lies among the blocks.
 #[derive(Clone, Copy, Debug)]
-struct Level {
-    first: usize,
+pub(super) struct Level {
+    pub(super) first: usize,
     blocks: usize,
     /// Boxes in these blocks; only the last block has lanes without one.
     boxes: usize,
@@ -56,7 +57,7 @@ struct Level {
 impl Level {
     /// The lanes of a block that hold a box.
     #[inline(always)]
-    fn lanes(&self, block: usize) -> LaneMask {
+    pub(super) fn lanes(&self, block: usize) -> LaneMask {
         if block + 1 < self.blocks {
             LaneMask::MAX
         } else {
@@ -214,9 +215,15 @@ impl Wide {
         &self.blocks
     }
 
+    /// A level for a traversal, leaves first.
     #[inline(always)]
-    fn blocks_of(&self, level: &Level) -> &[BoxBlock] {
-        &self.blocks[level.first..level.first + level.blocks]
+    pub(super) fn layer(&self, level: usize) -> Layer<'_> {
+        let place = self.levels[level];
+        Layer {
+            blocks: &self.blocks[place.first..place.first + place.blocks],
+            place,
+            span: 1 << (level * LANES.ilog2() as usize),
+        }
     }
 
     /// Hands every item that the view sees to the sink: level by level, runs of
@@ -259,39 +266,18 @@ impl Wide {
         scratch: &mut Scratch,
     ) -> ControlFlow<()> {
         let Scratch { here, below } = scratch;
+        let mut pass = Pass {
+            tree: self,
+            isa,
+            view,
+            sink,
+            recorder,
+        };
         for height in heights.rev() {
-            let level = &self.levels[height + 1];
-            let (places, masks) = here.entries();
-            below.clear(places.len());
-            let blocks = self.blocks_of(level);
-            // Items below one lane.
-            let span = LANES << (height * LANES.ilog2() as usize);
+            below.clear(here.len());
             let mut run = Merger::default();
-            for (i, (&at, &mask)) in places.iter().zip(masks).enumerate() {
-                if let Some(&next) = places.get(i + AHEAD)
-                    && let Some(block) = blocks.get(next as usize)
-                {
-                    block.prefetch();
-                }
-                let at = at as usize;
-                let lanes = level.lanes(at);
-                recorder.nodes_tested(lanes.count_ones());
-                recorder.planes_tested(lanes.count_ones() * mask.count_ones());
-                recorder.block_read(level.first + at, ALL_ROWS);
-                let (kept, open) = view.sorted_lanes(isa, &blocks[at], mask);
-                let kept = kept & lanes;
-                recorder.subtrees_rejected((lanes & !kept).count_ones());
-                let inside = isa.zeros(open) & kept;
-                let undecided = kept & !inside;
-                let first = at * LANES;
-                below.push(isa, isa.counting(first as u32), open, undecided);
-                for lanes in runs(inside) {
-                    let start = (first + lanes.start) * span;
-                    let end = ((first + lanes.end) * span).min(self.ids.len());
-                    run.add(isa, start..end, &self.ids, sink, recorder)?;
-                }
-            }
-            run.finish(isa, &self.ids, sink, recorder)?;
+            pass.sort_level(&self.layer(height + 1), here, below, &mut run)?;
+            pass.hand_over(run.take())?;
             std::mem::swap(here, below);
         }
         ControlFlow::Continue(())
@@ -307,29 +293,30 @@ impl Wide {
         recorder: &mut R,
         scratch: &Scratch,
     ) -> ControlFlow<()> {
-        let Some(leaves) = self.levels.first() else {
+        if self.levels.is_empty() {
             return ControlFlow::Continue(());
-        };
-        let blocks = self.blocks_of(leaves);
-        let (places, masks) = scratch.here.entries();
-        for (i, (&at, &mask)) in places.iter().zip(masks).enumerate() {
-            if let (Some(&next), Some(&mask)) = (places.get(i + AHEAD), masks.get(i + AHEAD)) {
-                if let Some(block) = blocks.get(next as usize) {
-                    view.prefetch(block, mask);
-                }
-                if let Some(id) = self.ids.get(next as usize * LANES) {
-                    prefetch(id);
-                }
-            }
-            let at = at as usize;
-            let lanes = leaves.lanes(at);
-            recorder.items_tested(lanes.count_ones());
-            recorder.planes_tested(lanes.count_ones() * mask.count_ones());
-            recorder.block_read(leaves.first + at, view.rows_read(mask));
-            let kept = view.kept_lanes(isa, &blocks[at], mask) & lanes;
-            sink.accept_lanes(isa, &self.ids, at * LANES, kept)?;
         }
-        ControlFlow::Continue(())
+        let mut pass = Pass {
+            tree: self,
+            isa,
+            view,
+            sink,
+            recorder,
+        };
+        pass.test_leaves(&self.layer(0), &scratch.here)
+    }
+
+    /// All of a query but its leaves: appends the runs that are wholly inside,
+    /// in their order, and leaves behind the leaves that are undecided.
+    pub(super) fn above_leaves<V: View>(&self, view: &V, runs: &mut Vec<Range<u32>>) -> Frontier {
+        let mut scratch = Scratch::default();
+        if let Some(top) = self.levels.len().checked_sub(1) {
+            scratch.start(BASELINE, view);
+            let sink = &mut Ranges(runs);
+            // This sink never breaks off.
+            let _ = self.descend(BASELINE, view, 0..top, sink, &mut NoRecorder, &mut scratch);
+        }
+        scratch.here
     }
 
     /// Bounds of the boxes of one block, as the lane above them holds them.

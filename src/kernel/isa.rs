@@ -39,6 +39,8 @@ pub trait Isa: Copy {
     fn counting(self, first: u32) -> Self::Words;
     /// `words` without `bits` in the lanes where `values >= 0`.
     fn without(self, words: Self::Words, values: Self::Floats, bits: u32) -> Self::Words;
+    /// `words` with `bits` set in some lanes.
+    fn with(self, words: Self::Words, lanes: LaneMask, bits: u32) -> Self::Words;
     /// The lanes that are zero.
     fn zeros(self, words: Self::Words) -> LaneMask;
     /// Moves the words of `lanes` together, lowest first, to the start of
@@ -118,6 +120,10 @@ impl Isa for Plain {
         std::array::from_fn(|lane| words[lane] & !if values[lane] >= 0.0 { bits } else { 0 })
     }
     #[inline(always)]
+    fn with(self, words: [u32; LANES], lanes: LaneMask, bits: u32) -> [u32; LANES] {
+        std::array::from_fn(|lane| words[lane] | if lanes >> lane & 1 == 1 { bits } else { 0 })
+    }
+    #[inline(always)]
     fn zeros(self, words: [u32; LANES]) -> LaneMask {
         lanes_where(|lane| words[lane] == 0)
     }
@@ -169,7 +175,14 @@ mod tests {
             let bits = floats.map(|x| isa.to_array(x).map(canonical));
             let mut out: Vec<u32> = bits.as_flattened().to_vec();
             let words = isa.without(isa.words(self.words), a, 0b101);
-            for words in [words, isa.counting(self.words[0]), isa.splat_word(7)] {
+            let marked = isa.with(words, self.lanes, 1 << 31 | 2);
+            let all = [
+                words,
+                marked,
+                isa.counting(self.words[0]),
+                isa.splat_word(7),
+            ];
+            for words in all {
                 let mut place = [0; LANES];
                 isa.pack(&mut place, words, self.lanes);
                 out.extend_from_slice(&place[..self.lanes.count_ones() as usize]);

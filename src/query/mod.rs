@@ -7,6 +7,7 @@ mod recorder;
 mod region;
 mod sink;
 mod view;
+mod view_masks;
 
 pub use many::{Located, ManySink};
 pub use recorder::{NoRecorder, QueryCost, Recorder};
@@ -14,6 +15,7 @@ pub use region::{Containment, Region};
 pub(crate) use sink::Ranges;
 pub use sink::{Count, First, Sink, runs};
 pub use view::{AnyView, View};
+pub use view_masks::ViewMasks;
 
 /// An item's number: its zero-based place in the scene.
 pub type ItemId = u32;

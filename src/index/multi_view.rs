@@ -1,0 +1,377 @@
+//! Several volumes asked of the wide tree in one pass. Where two or more of
+//! them are undecided about a block, it is looked at once for all, and planes
+//! of one normal share their arithmetic; where only one is left, that one goes
+//! on alone, as in a query by itself (`wide`).
+
+use std::cell::Cell;
+use std::ops::{ControlFlow, Range};
+
+use glam::Vec3;
+
+use super::TreeOrder;
+use super::frontier::{AHEAD, Frontier, Merger};
+use super::pass::{Layer, Pass};
+use super::wide::Wide;
+use crate::geometry::{ConvexVolume, LANES, LaneMask, MAX_PLANES, Plane, PlaneMask, Upper};
+use crate::kernel::{Isa, Kernel, Work};
+use crate::query::{AnyView, ItemId, NoRecorder, Sink};
+
+/// Some of the volumes of a pass, one bit each.
+type ViewMask = u32;
+
+/// Volumes of one pass.
+const MOST_VIEWS: usize = ViewMask::BITS as usize;
+
+/// Volumes whose planes are numbered alike: planes of the same normal have the
+/// same number in all of them. Zeros of either sign are the same: neither they
+/// nor the corner they choose change a verdict.
+struct Bundle {
+    normals: [(Vec3, Upper); MAX_PLANES],
+    /// As they were given, but for the numbers and planes that decide nothing.
+    volumes: Vec<ConvexVolume>,
+}
+
+impl Bundle {
+    /// `None` if there are more normals than a mask has bits, or more volumes.
+    fn of<'v>(given: impl ExactSizeIterator<Item = &'v ConvexVolume>) -> Option<Bundle> {
+        if given.len() > MOST_VIEWS {
+            return None;
+        }
+        let trivial = Plane::new(Vec3::ZERO, 0.0);
+        let mut normals = [(Vec3::ZERO, [true; 3]); MAX_PLANES];
+        let mut known = 0;
+        let mut numbered = Vec::with_capacity(given.len());
+        for volume in given {
+            let mut planes = [trivial; MAX_PLANES];
+            let mut taken: PlaneMask = 0;
+            for plane in volume.planes().iter().filter(|plane| !plane.is_trivial()) {
+                let same =
+                    |number: &usize| taken >> number & 1 == 0 && normals[*number].0 == plane.normal;
+                let number = (0..known).find(same).unwrap_or(known);
+                if number == MAX_PLANES {
+                    return None;
+                }
+                if number == known {
+                    normals[known] = (plane.normal, plane.upper());
+                    known += 1;
+                }
+                taken |= 1 << number;
+                planes[number] = *plane;
+            }
+            let used = (PlaneMask::BITS - taken.leading_zeros()) as usize;
+            numbered.push(ConvexVolume::from_planes(&planes[..used]).ok()?);
+        }
+        Some(Bundle {
+            normals,
+            volumes: numbered,
+        })
+    }
+}
+
+/// Blocks of one level about which several volumes are undecided.
+#[derive(Default)]
+struct Shared {
+    /// With the planes that any of them has open.
+    frontier: Frontier,
+    views: Frontier,
+}
+
+/// What is kept between passes: frontiers of now and of the level below.
+#[derive(Default)]
+struct Walks {
+    shared: [Shared; 2],
+    /// Of each volume, blocks about which no other is undecided.
+    own: Vec<[Frontier; 2]>,
+    /// Of each volume, items inside that may still go on.
+    runs: Vec<Merger>,
+}
+
+thread_local! {
+    static WALKS: Cell<Option<Box<Walks>>> = const { Cell::new(None) };
+}
+
+/// The bits that are set, lowest first.
+#[inline(always)]
+fn bits(mut mask: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        if mask == 0 {
+            return None;
+        }
+        let bit = mask.trailing_zeros();
+        mask &= mask - 1;
+        Some(bit as usize % 32)
+    })
+}
+
+/// A pass on its way: who is asked, who still listens.
+struct Together<'p, 'a, I, S> {
+    tree: &'p Wide,
+    isa: I,
+    bundle: &'p Bundle,
+    sinks: &'p mut [(&'a ConvexVolume, &'a mut S)],
+    listening: ViewMask,
+}
+
+impl<I: Isa, S: Sink> Together<'_, '_, I, S> {
+    #[inline(always)]
+    fn hand_over(&mut self, view: usize, places: Range<usize>) {
+        if !places.is_empty() && self.listening >> view & 1 == 1 {
+            let (_, sink) = &mut self.sinks[view];
+            let flow = sink.accept_places(self.isa, self.tree.ids(), places);
+            self.note(view, flow);
+        }
+    }
+
+    /// A sink that breaks off is not called again.
+    #[inline(always)]
+    fn note(&mut self, view: usize, flow: ControlFlow<()>) {
+        if flow.is_break() {
+            self.listening &= !(1 << view);
+        }
+    }
+
+    /// One level: what several volumes share, then what each has to itself.
+    #[inline(always)]
+    fn sort_level(&mut self, layer: &Layer, walks: &mut Walks, now: usize) {
+        let isa = self.isa;
+        let Walks { shared, own, runs } = walks;
+        let [even, odd] = shared;
+        let (here, below) = if now == 0 { (even, odd) } else { (odd, even) };
+        let (places, masks) = here.frontier.entries();
+        let views = here.views.entries().1;
+        below.frontier.clear(places.len());
+        below.views.clear(places.len());
+        for frontiers in &mut own[..self.sinks.len()] {
+            let alone = frontiers[now].entries().0.len();
+            frontiers[1 - now].clear(places.len() + alone);
+        }
+        let zero = isa.splat(0.0);
+        let mut far = [zero; MAX_PLANES];
+        let mut near = [zero; MAX_PLANES];
+        for (i, (&at, &mask)) in places.iter().zip(masks).enumerate() {
+            if let Some(&next) = places.get(i + AHEAD) {
+                layer.fetch(next);
+            }
+            let (block, lanes) = layer.block(at as usize);
+            for plane in bits(mask) {
+                let (normal, upper) = self.bundle.normals[plane];
+                far[plane] = block.farthest(isa, normal, upper);
+                near[plane] = block.nearest(isa, normal, upper);
+            }
+            let (mut open, mut asking) = (isa.splat_word(0), isa.splat_word(0));
+            // Lanes about which one is undecided, and more than one.
+            let (mut once, mut twice) = (0, 0);
+            let mut undecided_by = [0; MOST_VIEWS];
+            let views = views[i] & self.listening;
+            for view in bits(views) {
+                let volume = &self.bundle.volumes[view];
+                let mask = mask & volume.mask();
+                let mut lowest = isa.splat(f32::INFINITY);
+                let mut straddled: LaneMask = 0;
+                let mut straddling = [0; MAX_PLANES];
+                for plane in bits(mask) {
+                    let d = isa.splat(volume.plane_of_bit(plane as u32).d);
+                    lowest = isa.lower(isa.add(far[plane], d), lowest);
+                    straddling[plane] = !isa.at_most(zero, isa.add(near[plane], d));
+                    straddled |= straddling[plane];
+                }
+                let kept = !isa.below_zero(lowest) & lanes;
+                let undecided = kept & straddled;
+                for bit in bits(mask) {
+                    let lanes = straddling[bit] & undecided;
+                    open = isa.with(open, lanes, 1 << bit);
+                }
+                asking = isa.with(asking, undecided, 1 << view);
+                undecided_by[view] = undecided;
+                twice |= once & undecided;
+                once |= undecided;
+                let inside = kept & !straddled;
+                for places in layer.places_of(at as usize, inside, self.tree.ids().len()) {
+                    if let Some(ended) = runs[view].join(places) {
+                        self.hand_over(view, ended);
+                    }
+                }
+            }
+            let nodes = isa.counting(at * LANES as u32);
+            below.frontier.push(isa, nodes, open, twice);
+            below.views.push(isa, nodes, asking, twice);
+            let alone = once & !twice;
+            if alone != 0 {
+                for view in bits(views) {
+                    own[view][1 - now].push(isa, nodes, open, undecided_by[view] & alone);
+                }
+            }
+        }
+        for (view, (frontiers, run)) in own.iter_mut().zip(runs).enumerate() {
+            let [even, odd] = frontiers;
+            let (here, below) = if now == 0 { (even, odd) } else { (odd, even) };
+            if self.listening >> view & 1 == 1 {
+                let mut pass = Pass {
+                    tree: self.tree,
+                    isa,
+                    view: &self.bundle.volumes[view],
+                    sink: &mut *self.sinks[view].1,
+                    recorder: &mut NoRecorder,
+                };
+                let mut flow = pass.sort_level(layer, here, below, run);
+                if flow.is_continue() {
+                    flow = pass.hand_over(run.take());
+                }
+                self.note(view, flow);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn test_leaves(&mut self, leaves: &Layer, walks: &Walks, now: usize) {
+        let isa = self.isa;
+        let here = &walks.shared[now];
+        let (places, masks) = here.frontier.entries();
+        let views = here.views.entries().1;
+        let mut far = [isa.splat(0.0); MAX_PLANES];
+        for (i, (&at, &mask)) in places.iter().zip(masks).enumerate() {
+            if let Some(&next) = places.get(i + AHEAD) {
+                leaves.fetch(next);
+                if let Some(id) = self.tree.ids().get(next as usize * LANES) {
+                    crate::kernel::prefetch(id);
+                }
+            }
+            let (block, lanes) = leaves.block(at as usize);
+            for plane in bits(mask) {
+                let (normal, upper) = self.bundle.normals[plane];
+                far[plane] = block.farthest(isa, normal, upper);
+            }
+            for view in bits(views[i] & self.listening) {
+                let volume = &self.bundle.volumes[view];
+                let mut lowest = isa.splat(f32::INFINITY);
+                for bit in bits(mask & volume.mask()) {
+                    let d = isa.splat(volume.plane_of_bit(bit as u32).d);
+                    lowest = isa.lower(isa.add(far[bit], d), lowest);
+                }
+                let kept = !isa.below_zero(lowest) & lanes;
+                let (_, sink) = &mut self.sinks[view];
+                let flow = sink.accept_lanes(isa, self.tree.ids(), at as usize * LANES, kept);
+                self.note(view, flow);
+            }
+        }
+        for view in bits(self.listening) {
+            let mut pass = Pass {
+                tree: self.tree,
+                isa,
+                view: &self.bundle.volumes[view],
+                sink: &mut *self.sinks[view].1,
+                recorder: &mut NoRecorder,
+            };
+            let flow = pass.test_leaves(leaves, &walks.own[view][now]);
+            self.note(view, flow);
+        }
+    }
+
+    #[inline(always)]
+    fn search(&mut self, walks: &mut Walks) {
+        let count = self.sinks.len();
+        if walks.own.len() < count {
+            walks.own.resize_with(count, Default::default);
+            walks.runs.resize(count, Merger::default());
+        }
+        for (frontiers, run) in walks.own.iter_mut().zip(&mut walks.runs) {
+            frontiers.iter_mut().for_each(|frontier| frontier.clear(0));
+            run.take();
+        }
+        let (mut open, mut asking) = (0, 0);
+        for view in 0..count {
+            let mask = self.bundle.volumes[view].mask();
+            if mask == 0 {
+                self.hand_over(view, 0..self.tree.ids().len());
+                self.listening &= !(1 << view);
+            } else {
+                open |= mask;
+                asking |= 1 << view;
+            }
+        }
+        walks.shared[0].frontier.start(self.isa, open);
+        walks.shared[0].views.start(self.isa, asking);
+        let mut now = 0;
+        for level in (1..self.tree.depth()).rev() {
+            self.sort_level(&self.tree.layer(level), walks, now);
+            now = 1 - now;
+        }
+        self.test_leaves(&self.tree.layer(0), walks, now);
+    }
+}
+
+impl Wide {
+    /// What several volumes see, in one pass: exactly the sets of as many
+    /// queries, each to its own sink. A sink's order is deterministic, but not
+    /// that of a query by itself. One that breaks off ends its own query only.
+    ///
+    /// False, with nothing done, for more than 32 volumes or more than 32
+    /// different normals.
+    #[inline(always)]
+    pub fn visible_together<'a, I: Isa, S: Sink>(
+        &self,
+        isa: I,
+        asked: &mut [(&'a ConvexVolume, &'a mut S)],
+    ) -> bool {
+        if self.depth() == 0 || asked.is_empty() {
+            return true;
+        }
+        let Some(bundle) = Bundle::of(asked.iter().map(|(volume, _)| *volume)) else {
+            return false;
+        };
+        let mut walks = WALKS.take().unwrap_or_default();
+        let mut pass = Together {
+            tree: self,
+            isa,
+            bundle: &bundle,
+            listening: ViewMask::MAX >> (MOST_VIEWS - asked.len()),
+            sinks: asked,
+        };
+        pass.search(&mut walks);
+        WALKS.set(Some(walks));
+        true
+    }
+}
+
+/// The pass as the chosen kernel does it.
+struct See<'t, 'a> {
+    tree: &'t Wide,
+    asked: &'t mut [(&'a ConvexVolume, &'a mut Vec<ItemId>)],
+}
+
+impl Work for See<'_, '_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) -> bool {
+        self.tree.visible_together(isa, self.asked)
+    }
+}
+
+impl Wide {
+    /// [`Wide::visible_together`] by the chosen kernel: appends to `out[i]` what
+    /// `views[i]` sees. An option, not what [`DynIndex::see_many`] does: a pass
+    /// has its own costs, and only pairs of eyes have so much in common that it
+    /// is often the quicker one (docs/MULTI_VIEW.md has the figures).
+    ///
+    /// False, with nothing done, also if a view is not a [`ConvexVolume`].
+    ///
+    /// # Panics
+    /// If there is not one list a view.
+    ///
+    /// [`DynIndex::see_many`]: super::DynIndex::see_many
+    pub fn see_in_one_pass(&self, views: &[AnyView<'_>], out: &mut [Vec<ItemId>]) -> bool {
+        assert_eq!(views.len(), out.len(), "one list a view");
+        let mut asked = Vec::with_capacity(views.len());
+        for (view, out) in views.iter().zip(out) {
+            let AnyView::Volume(volume) = view else {
+                return false;
+            };
+            asked.push((*volume, out));
+        }
+        Kernel::chosen().run(See {
+            tree: self,
+            asked: &mut asked,
+        })
+    }
+}
