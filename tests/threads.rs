@@ -73,7 +73,9 @@ fn cases() -> Vec<(String, Vec<Aabb>, Vec<ConvexVolume>)> {
             });
             ConvexVolume::from_planes(&faces.collect::<Vec<_>>()).expect("finite planes")
         };
-        let mut volumes = [0.01, 0.1, 0.25, 0.3, 0.35, 0.4, 0.45, 3.0].map(around).to_vec();
+        let mut volumes = [0.01, 0.1, 0.25, 0.3, 0.35, 0.4, 0.45, 3.0]
+            .map(around)
+            .to_vec();
         volumes.push(ConvexVolume::from_planes(&[]).expect("no planes"));
         (source.to_owned(), scene.items, volumes)
     });
