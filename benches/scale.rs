@@ -3,7 +3,8 @@
 //! peak of resident memory, query medians at five hundred visible items and at
 //! 2 %, and the exponent e of N^e at the fixed count. Every number of ids is
 //! compared with a scan. Words keep structures of these names and sizes of these
-//! numbers; `-- --test` only checks that everything runs. Exits 3 if a goal of `wide` is missed.
+//! numbers; `-- --test` only checks that everything runs. Exits 3 if a goal of
+//! `wide` is missed.
 
 use std::process::ExitCode;
 use std::time::Duration;

@@ -1,9 +1,10 @@
 //! One thread against two, by wall time: the build of the wide tree, one query
 //! split over a crew, and many cameras. Contenders are interleaved and paired
 //! by the harness of `cullbench run`; one thread is entered twice, which is the
-//! noise floor. Answers are compared before anything is timed. A word keeps the
-//! rows that hold it, `--large` adds ten million items, and `-- --test` only
-//! checks that every row runs.
+//! noise floor. Beside it stands the same ratio of the caller's CPU time: what is
+//! left to its own thread, also where no second core is free. Answers are compared
+//! before anything is timed. A word keeps the rows that hold it, `--large` adds
+//! ten million items, and `-- --test` only checks that every row runs.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -32,25 +33,33 @@ const PATHS: [&str; 6] = [
     "outside:frames=16",
 ];
 
-/// Wall time of every sample by round and frame.
-fn walls(timed: &Timed) -> BTreeMap<(u32, u32), f64> {
+/// Wall time and the caller's CPU time of every sample by round and frame.
+fn times(timed: &Timed) -> BTreeMap<(u32, u32), [f64; 2]> {
     let samples = timed.samples.iter();
-    samples.map(|s| ((s.round, s.frame), s.wall_ns)).collect()
+    samples
+        .map(|s| ((s.round, s.frame), [s.wall_ns, s.cpu_ns]))
+        .collect()
 }
 
-/// "one thread us, one / two, A/A" of the contenders one, its twin and two.
+/// "one thread us, one / two, A/A, one / two of the caller's CPU time" of the
+/// contenders one, its twin and two.
 fn row(name: &str, timed: &[Timed]) {
-    let [one, twin, two] = [0, 1, 2].map(|i| walls(&timed[i]));
-    let ratio = |other: &BTreeMap<(u32, u32), f64>| {
-        let pairs = one.iter().filter_map(|(key, a)| Some(a / other.get(key)?));
+    let [one, twin, two] = [0, 1, 2].map(|i| times(&timed[i]));
+    let ratio = |other: &BTreeMap<(u32, u32), [f64; 2]>, clock: usize| {
+        let pairs = one
+            .iter()
+            .filter_map(|(key, a)| Some(a[clock] / other.get(key)?[clock]));
         bootstrap_median(&pairs.collect::<Vec<_>>(), 1).expect("at least one sample")
     };
-    let (gain, noise) = (ratio(&two), ratio(&twin));
-    let us = median(&one.values().copied().collect::<Vec<_>>()).unwrap_or(f64::NAN) / 1e3;
-    println!(
-        "| {name} | {us:.1} | {:.2} [{:.2}, {:.2}] | {:.2} [{:.2}, {:.2}] |",
-        gain.value, gain.lower, gain.upper, noise.value, noise.lower, noise.upper
-    );
+    let (gain, noise, freed) = (ratio(&two, 0), ratio(&twin, 0), ratio(&two, 1));
+    let us = median(&one.values().map(|t| t[0]).collect::<Vec<_>>()).unwrap_or(f64::NAN) / 1e3;
+    let cells = [gain, noise, freed].map(|ratio| {
+        format!(
+            "{:.2} [{:.2}, {:.2}]",
+            ratio.value, ratio.lower, ratio.upper
+        )
+    });
+    println!("| {name} | {us:.1} | {} |", cells.join(" | "));
 }
 
 fn timed(count: usize, competitors: &[Competitor], protocol: &Protocol) -> Vec<Timed> {
@@ -160,8 +169,8 @@ fn main() {
     };
     let mut sources = vec!["uniform:n=100000", "uniform:n=1000000", "city:n=1000000"];
     sources.extend(large.then_some("uniform:n=10000000"));
-    println!("| wall time | one thread, us | one / {THREADS} threads | A/A |");
-    println!("|---|---|---|---|");
+    println!("| | one thread, us | one / {THREADS} threads | A/A | the caller's CPU time |");
+    println!("|---|---|---|---|---|");
     for source in sources {
         if !wanted.iter().all(|word| source.contains(word.as_str())) {
             continue;
