@@ -11,28 +11,6 @@ use crate::kernel::{Isa, Plain, prefetch};
 /// Boxes of one block, and one bit for each of them.
 pub use crate::kernel::{LANES, LaneMask};
 
-/// Does something for every bit of a mask, the lowest and the highest one
-/// first; for a single bit, twice. Most blocks below the top of a tree have one
-/// plane open or two, and nobody could predict which. A macro, because a
-/// closure that is called in several places may stay a call.
-macro_rules! for_each_plane {
-    ($mask:expr, $bit:ident, $test:block) => {{
-        let mask: PlaneMask = $mask;
-        if mask != 0 {
-            let $bit = mask.trailing_zeros();
-            $test
-            let $bit = mask.ilog2();
-            $test
-            let mut left = mask & (mask - 1) & !(1 << $bit);
-            while left != 0 {
-                let $bit = left.trailing_zeros();
-                $test
-                left &= left - 1;
-            }
-        }
-    }};
-}
-
 /// Some of the six rows of a [`BoxBlock`], one bit each.
 pub type RowMask = u8;
 
@@ -169,12 +147,47 @@ impl BoxBlock {
         // NaN (an overflow on both sides) excludes nothing, as in the scalar
         // test, because it compares false.
         let mut lowest = isa.splat(f32::INFINITY);
-        for_each_plane!(mask, bit, {
+        let mut left = mask;
+        while left != 0 {
+            let bit = left.trailing_zeros();
+            left &= left - 1;
             let (plane, corner) = (volume.plane_of_bit(bit), volume.corner_of_bit(bit));
             let value = values_at(isa, plane, self.numbered_rows(corner.far));
             lowest = isa.lower(value, lowest);
-        });
+        }
         !isa.below_zero(lowest)
+    }
+
+    /// [`BoxBlock::admitted_by`] for four blocks: each plane's numbers are made
+    /// ready once for all of them, which pays where all planes are open.
+    #[inline(always)]
+    pub fn four_admitted_by<I: Isa>(
+        isa: I,
+        blocks: &[BoxBlock; 4],
+        volume: &ConvexVolume,
+        mask: PlaneMask,
+    ) -> [LaneMask; 4] {
+        let mut lowest = [isa.splat(f32::INFINITY); 4];
+        let mut left = mask;
+        while left != 0 {
+            let bit = left.trailing_zeros();
+            left &= left - 1;
+            let (plane, corner) = (volume.plane_of_bit(bit), volume.corner_of_bit(bit));
+            let n = plane.normal.to_array().map(|n| isa.splat(n));
+            let d = isa.splat(plane.d);
+            for (block, lowest) in blocks.iter().zip(&mut lowest) {
+                let [x, y, z] = block.numbered_rows(corner.far);
+                let sum = isa.add(isa.mul(n[0], isa.load(x)), isa.mul(n[1], isa.load(y)));
+                let sum = isa.add(sum, isa.mul(n[2], isa.load(z)));
+                *lowest = isa.lower(isa.add(sum, d), *lowest);
+            }
+        }
+        [
+            !isa.below_zero(lowest[0]),
+            !isa.below_zero(lowest[1]),
+            !isa.below_zero(lowest[2]),
+            !isa.below_zero(lowest[3]),
+        ]
     }
 
     /// [`BoxBlock::admitted_by`] for nodes: also which planes stay open below
@@ -189,13 +202,16 @@ impl BoxBlock {
     ) -> (LaneMask, I::Words) {
         let mut lowest = isa.splat(f32::INFINITY);
         let mut open = isa.splat_word(mask);
-        for_each_plane!(mask, bit, {
+        let mut left = mask;
+        while left != 0 {
+            let bit = left.trailing_zeros();
+            left &= left - 1;
             let (plane, corner) = (volume.plane_of_bit(bit), volume.corner_of_bit(bit));
             let farthest = values_at(isa, plane, self.numbered_rows(corner.far));
             lowest = isa.lower(farthest, lowest);
             let nearest = values_at(isa, plane, self.numbered_rows(corner.near));
             open = isa.without(open, nearest, 1 << bit);
-        });
+        }
         (!isa.below_zero(lowest), open)
     }
 
@@ -425,6 +441,12 @@ impl BoxBlocks {
         lanes.iter().fold(0, |all, bits| all ^ bits)
     }
 
+    /// All blocks; the last one may have empty lanes.
+    #[inline(always)]
+    pub fn blocks(&self) -> &[BoxBlock] {
+        &self.blocks
+    }
+
     /// The blocks that hold the boxes `first..end`, each with the place of its
     /// lane 0 and the lanes that belong to the range.
     #[inline(always)]
@@ -491,6 +513,9 @@ mod tests {
             let mut seen = 0;
             for (start, lanes, block) in blocks.range(first, end) {
                 let admitted = block.admitted_by(BASELINE, &volume, volume.mask());
+                let four = [*block; 4];
+                let four = BoxBlock::four_admitted_by(BASELINE, &four, &volume, volume.mask());
+                prop_assert_eq!(four, [admitted; 4]);
                 for lane in (0..LANES).filter(|lane| lanes >> lane & 1 == 1) {
                     let b = &boxes[start + lane];
                     seen += 1;

@@ -11,6 +11,10 @@ use crate::geometry::{ALL_ROWS, BoxBlock, LANES, LaneMask, PlaneMask};
 use crate::kernel::{Isa, prefetch};
 use crate::query::{Recorder, Sink, View, runs};
 
+/// A level of so many blocks (192 KiB) is taken to lie in the cache nearest but
+/// one to the processor; asking ahead for it costs more than it gains.
+const NEAR: usize = 512;
+
 /// One level as a traversal meets it.
 pub struct Layer<'t> {
     pub blocks: &'t [BoxBlock],
@@ -44,7 +48,9 @@ impl Layer<'_> {
     /// Asks for the memory of a block ahead of its turn.
     #[inline(always)]
     pub fn fetch(&self, block: u32) {
-        if let Some(block) = self.blocks.get(block as usize) {
+        if self.blocks.len() > NEAR
+            && let Some(block) = self.blocks.get(block as usize)
+        {
             block.prefetch();
         }
     }
@@ -135,6 +141,9 @@ impl<I: Isa, V: View, S: Sink, R: Recorder> Pass<'_, I, V, S, R> {
     /// Asks for what [`Pass::test_leaf`] will read.
     #[inline(always)]
     fn fetch_leaf(&self, leaves: &Layer, at: u32, mask: PlaneMask) {
+        if leaves.blocks.len() <= NEAR {
+            return;
+        }
         if let Some(block) = leaves.blocks.get(at as usize) {
             self.view.prefetch(block, mask);
         }

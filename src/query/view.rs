@@ -42,6 +42,22 @@ pub trait View: Sized {
     /// [`View::drops`], lane by lane.
     fn kept_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask;
 
+    /// [`View::kept_lanes`] of four blocks.
+    #[inline(always)]
+    fn kept_of_four<I: Isa>(
+        &self,
+        isa: I,
+        blocks: &[BoxBlock; 4],
+        mask: PlaneMask,
+    ) -> [LaneMask; 4] {
+        [
+            self.kept_lanes(isa, &blocks[0], mask),
+            self.kept_lanes(isa, &blocks[1], mask),
+            self.kept_lanes(isa, &blocks[2], mask),
+            self.kept_lanes(isa, &blocks[3], mask),
+        ]
+    }
+
     /// The rows of a block that [`View::kept_lanes`] reads.
     #[inline(always)]
     fn rows_read(&self, _mask: PlaneMask) -> RowMask {
@@ -164,6 +180,15 @@ impl View for ConvexVolume {
     #[inline(always)]
     fn kept_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
         block.admitted_by(isa, self, mask)
+    }
+    #[inline(always)]
+    fn kept_of_four<I: Isa>(
+        &self,
+        isa: I,
+        blocks: &[BoxBlock; 4],
+        mask: PlaneMask,
+    ) -> [LaneMask; 4] {
+        BoxBlock::four_admitted_by(isa, blocks, self, mask)
     }
     #[inline(always)]
     fn rows_read(&self, mask: PlaneMask) -> RowMask {
