@@ -53,36 +53,46 @@ impl PlaneRows {
         (0..self.count as usize).map(plane)
     }
 
-    /// The values at the corners whose coordinate on each axis is the one that
-    /// `pick` takes of the two products.
+    /// The values at the p-vertices, or else at the n-vertices.
     ///
     /// The p-vertex is found without asking for the normal's sign: rounding is
     /// monotone, so the larger of `n * min` and `n * max` is `n` times its
     /// coordinate, up to the sign of a zero, which no comparison sees.
+    // Loops and no closures: what the compiler leaves a call is not compiled
+    // for the instruction set in use.
     #[inline(always)]
-    fn values(&self, b: &Aabb, pick: impl Fn(f32, f32) -> f32) -> Row {
+    fn values<const FAR: bool>(&self, b: &Aabb) -> Row {
         let [nx, ny, nz, d] = &self.rows;
-        std::array::from_fn(|i| {
-            let x = pick(nx[i] * b.min.x, nx[i] * b.max.x);
-            let y = pick(ny[i] * b.min.y, ny[i] * b.max.y);
-            let z = pick(nz[i] * b.min.z, nz[i] * b.max.z);
-            ((x + y) + z) + d[i]
-        })
+        let mut values = [0.0; ROW_LANES];
+        for i in 0..ROW_LANES {
+            let x = pick::<FAR>(nx[i] * b.min.x, nx[i] * b.max.x);
+            let y = pick::<FAR>(ny[i] * b.min.y, ny[i] * b.max.y);
+            let z = pick::<FAR>(nz[i] * b.min.z, nz[i] * b.max.z);
+            values[i] = ((x + y) + z) + d[i];
+        }
+        values
     }
 
     /// Whether any plane excludes the (finite) box.
     #[inline(always)]
     pub fn exclude(&self, b: &Aabb) -> bool {
-        let values = self.values(b, |p, q| if p > q { p } else { q });
+        let values = self.values::<true>(b);
         values.iter().fold(false, |any, value| any | (*value < 0.0))
     }
 
     /// Whether every plane contains the (finite) box.
     #[inline(always)]
     pub fn contain(&self, b: &Aabb) -> bool {
-        let values = self.values(b, |p, q| if p < q { p } else { q });
+        let values = self.values::<false>(b);
         values.iter().fold(true, |all, value| all & (*value >= 0.0))
     }
+}
+
+/// The larger of two numbers, or else the smaller.
+#[inline(always)]
+fn pick<const LARGER: bool>(p: f32, q: f32) -> f32 {
+    let first = if LARGER { p > q } else { p < q };
+    if first { p } else { q }
 }
 
 #[cfg(test)]
