@@ -8,12 +8,14 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use cullbench::culling::{Culling, CullingTest};
-use cullbench::index::{BACKENDS, Backend, StructureSpec};
+use cullbench::index::{BACKENDS, Backend, RegionIndex, StructureSpec, TreeOrder, Wide};
 use cullbench::measure::{
-    BOUNDS, Cell, Contender, Group, Machine, Metric, Protocol, Status, Workload,
+    BOUNDS, Cell, Contender, Group, Machine, Metric, Protocol, Status, Stopwatch, Workload,
     harness_overhead_ns, measure_group,
 };
+use cullbench::query::AnyView;
 use cullbench::scene::Scene;
+use cullbench::statistics::median;
 use cullbench::{path, scene};
 
 /// A scene with the goals that hold on all ways through it.
@@ -123,13 +125,16 @@ const WORLDS: [World; 5] = [
 /// Of the subject, in every world: CPU time of a build, and memory, an item.
 const MOST_BUILD_NS: f64 = 90.0;
 const MOST_BYTES: f64 = 30.0;
+/// Of `wide`, in every warm world where all is visible: CPU time of an answer in
+/// ranges.
+const MOST_RANGES_US: f64 = 0.1;
 
 const PEER_PREFIX: &str = "peer-";
 /// Nobody's crate, so no goal is set against it; it comes with the peers and
 /// its ratio is shown.
 const OWN_GRID: [&str; 1] = ["uniform-grid"];
-/// The structure that is to meet the goals, or who stands in for it.
-const SUBJECTS: [&str; 2] = ["wide", "bvh"];
+/// The structure that is to meet the goals.
+const SUBJECT: &str = Wide::NAME;
 
 impl World {
     fn row(&self, way: &Way) -> String {
@@ -224,12 +229,12 @@ fn contenders(names: &[&str], twin: &str, scene: &Scene) -> Vec<Contender> {
         .collect()
 }
 
-fn judge_row(judge: &mut Judge, world: &World, way: &Way, group: &Group, subject: &str) {
+fn judge_row(judge: &mut Judge, world: &World, way: &Way, group: &Group) {
     let cell = |name: &str| group.cells.iter().find(|c| c.structure == name);
     let noise = group.twin.as_ref();
     let noise = noise.map_or(f64::NAN, |t| (t.ratio.value - 1.0).abs() * 100.0);
     println!(
-        "{} ({subject} entered twice differs by {noise:.1} %)",
+        "{} ({SUBJECT} entered twice differs by {noise:.1} %)",
         world.row(way)
     );
     for c in &group.cells {
@@ -238,7 +243,7 @@ fn judge_row(judge: &mut Judge, world: &World, way: &Way, group: &Group, subject
             println!("  {}: {}: {reason}", c.structure, c.verdict.status.name());
         }
     }
-    let Some(own) = cell(subject) else { return };
+    let Some(own) = cell(SUBJECT) else { return };
     assert_eq!(own.verdict.status, Status::Ok, "{:?}", own.verdict);
     let peers = group
         .cells
@@ -267,13 +272,13 @@ fn judge_row(judge: &mut Judge, world: &World, way: &Way, group: &Group, subject
     }
     for name in OWN_GRID {
         if let Some(times) = cell(name).and_then(|grid| quotient(grid, own)) {
-            println!("  {name} (no crate) / {subject}: {:.2}", times.value);
+            println!("  {name} (no crate) / {SUBJECT}: {:.2}", times.value);
         }
     }
     if let Some((metric, most)) = way.bound
         && let Some(times) = own.metrics.get(metric)
     {
-        judge.line(&format!("{subject}, {metric}"), times, Goal::AtMost(most));
+        judge.line(&format!("{SUBJECT}, {metric}"), times, Goal::AtMost(most));
     }
     // Where little is visible the scan does little but read.
     if way.path == TINY
@@ -310,19 +315,41 @@ fn judge_build(judge: &mut Judge, world: &World, contender: &Contender, items: u
     );
 }
 
+/// Median time of `wide` answering in ranges, where everything is visible.
+fn judge_ranges(judge: &mut Judge, workload: &Workload) {
+    let tree = Wide::build(&workload.items, None, &Default::default()).expect("finite boxes");
+    let mut ranges = Vec::new();
+    let mut laps = Vec::new();
+    for _ in 0..64 {
+        let watch = Stopwatch::start();
+        for view in &workload.views {
+            if let AnyView::Volume(volume) = view.as_any() {
+                ranges.clear();
+                tree.visible_ranges(std::hint::black_box(volume), &mut ranges);
+                std::hint::black_box(&ranges);
+            }
+        }
+        laps.push(watch.lap().cpu_ns / 1e3 / workload.views.len() as f64);
+    }
+    let us = Metric {
+        value: median(&laps).unwrap_or(f64::NAN),
+        lower: None,
+        upper: None,
+        unit: "us".to_owned(),
+    };
+    judge.line(
+        "wide, answer in ranges, us",
+        &us,
+        Goal::AtMost(MOST_RANGES_US),
+    );
+}
+
 fn main() -> ExitCode {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let only_test = words.iter().any(|word| word == "--test");
     let wanted: Vec<&String> = words.iter().filter(|w| !w.starts_with('-')).collect();
     let chosen = |row: &str| wanted.is_empty() || wanted.iter().any(|w| row.contains(w.as_str()));
     let exists = |name: &&str| Backend::named(name).is_some();
-    let subject = SUBJECTS.into_iter().find(exists).expect("bvh is built in");
-    if subject != SUBJECTS[0] {
-        println!(
-            "no structure '{}': '{subject}' is measured in its place",
-            SUBJECTS[0]
-        );
-    }
     let peers = BACKENDS.iter().map(|b| b.name);
     let peers: Vec<&str> = peers.filter(|name| name.starts_with(PEER_PREFIX)).collect();
     if peers.is_empty() {
@@ -354,13 +381,13 @@ fn main() -> ExitCode {
             _ => world.scene.to_owned(),
         };
         let scene = scene::load(&source, &Default::default()).expect(world.scene);
-        let mut names = vec!["linear", subject];
+        let mut names = vec!["linear", SUBJECT];
         if !peers.is_empty() {
-            names.extend(world.ahead.iter().filter(|name| **name != subject));
+            names.extend(world.ahead);
             names.extend(&peers);
             names.extend(OWN_GRID.into_iter().filter(exists));
         }
-        let contenders = contenders(&names, subject, &scene);
+        let contenders = contenders(&names, SUBJECT, &scene);
         judge_build(&mut judge, world, &contenders[1], scene.items.len());
         for way in ways {
             let source = world.path(way);
@@ -370,11 +397,14 @@ fn main() -> ExitCode {
                 cold: world.cold,
                 ..protocol
             };
-            let group = measure_group(&workload, &contenders, BOUNDS, subject, &protocol, &|| {
+            let group = measure_group(&workload, &contenders, BOUNDS, SUBJECT, &protocol, &|| {
                 false
             })
             .expect("not stopped");
-            judge_row(&mut judge, world, way, &group, subject);
+            judge_row(&mut judge, world, way, &group);
+            if way.path == ALL && !world.cold {
+                judge_ranges(&mut judge, &workload);
+            }
         }
     }
     println!("{} judged, {} missed", judge.judged, judge.missed);

@@ -6,10 +6,10 @@ use std::cell::Cell;
 use std::ops::{ControlFlow, Range};
 
 use super::frontier::{AHEAD, Frontier, Merger, hand_over};
-use super::tree::TreeNode;
+use super::tree::{PackedTree, TreeNode};
 use crate::geometry::{Aabb, BoxBlock, LANES, LaneMask, PlaneMask};
 use crate::kernel::{Isa, prefetch};
-use crate::query::{ItemId, Recorder, Sink, View};
+use crate::query::{Recorder, Sink, View};
 
 /// Where the lanes of a bundle lead.
 #[derive(Clone, Copy)]
@@ -43,6 +43,9 @@ const NOWHERE: u32 = u32::MAX;
 /// What happens at a leaf that is not decided. A trait and no closure: what is
 /// hot must be inlined for each instruction set.
 pub trait Leaves {
+    /// The tree that the bundles are of.
+    fn tree(&self) -> &PackedTree;
+
     /// Asks for the memory of items that are tested soon.
     fn fetch(&self, items: Range<usize>, mask: PlaneMask);
 
@@ -202,21 +205,18 @@ impl Bundles {
     /// Hands over the items of accepted subtrees, and leaves the items of
     /// undecided leaves to `test`, with the planes that are open there.
     ///
-    /// `nodes` and `ids` are those of the tree, and its root straddles the
-    /// planes of `mask`.
+    /// The tree's root straddles the planes of `mask`.
     #[inline(always)]
-    #[allow(clippy::too_many_arguments)]
     pub fn search<I: Isa, V: View, L: Leaves, S: Sink, R: Recorder>(
         &self,
         isa: I,
         view: &V,
         mask: PlaneMask,
-        nodes: &[TreeNode],
-        ids: &[ItemId],
         test: &L,
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()> {
+        let (nodes, ids) = (test.tree().nodes(), test.tree().ids());
         let mut scratch = SCRATCH.take().unwrap_or_default();
         let Scratch {
             here,

@@ -2,6 +2,8 @@
 //! Dispatch happens once per query, never per node: behind each method stands
 //! a traversal compiled for that structure, view, recorder and instruction set.
 
+use std::ops::Range;
+
 use glam::Vec3;
 use serde_json::{Map, Value};
 
@@ -13,7 +15,9 @@ use super::{
 };
 use crate::geometry::{Aabb, ConvexVolume, PlaneTree};
 use crate::kernel::{Isa, Kernel, Work};
-use crate::query::{AnyView, ItemId, Located, ManySink, NoRecorder, QueryCost, Recorder, View};
+use crate::query::{
+    AnyView, ItemId, Located, ManySink, NoRecorder, QueryCost, Ranges, Recorder, View,
+};
 use crate::spec::{Spec, SpecError};
 
 /// A built structure of any kind. Answers are appended to `out`.
@@ -117,6 +121,31 @@ impl<T: FrustumQuery, V: View, R: Recorder> Work for See<'_, T, V, R> {
             .index
             .visible_by(isa, self.view, self.out, self.recorder);
     }
+}
+
+/// A frustum query for ranges as the chosen kernel does it.
+struct SeeRanges<'a, T, V> {
+    index: &'a T,
+    view: &'a V,
+    out: &'a mut Vec<Range<u32>>,
+}
+
+impl<T: FrustumQuery, V: View> Work for SeeRanges<'_, T, V> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) {
+        let mut sink = Ranges::onto(self.out);
+        // This sink never breaks off.
+        let _ = self
+            .index
+            .visible_by(isa, self.view, &mut sink, &mut NoRecorder);
+    }
+}
+
+/// [`TreeOrder::visible_ranges`](super::TreeOrder::visible_ranges).
+pub(super) fn see_ranges<T: FrustumQuery, V: View>(index: &T, view: &V, out: &mut Vec<Range<u32>>) {
+    Kernel::chosen().run(SeeRanges { index, view, out });
 }
 
 /// A region search as the chosen kernel does it.

@@ -7,7 +7,7 @@ use std::ops::ControlFlow;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::tree::scan_blocks;
+use super::tree::{scan_blocks, visible_on_baseline};
 use super::{BuildError, FrustumQuery, MemoryUsage, RegionIndex, indexable};
 use crate::geometry::{Aabb, BoxBlocks, LANES, PlaneTree, lanes_of};
 use crate::kernel::{BASELINE, Isa};
@@ -145,15 +145,7 @@ impl RegionIndex for Linear {
 }
 
 impl FrustumQuery for Linear {
-    #[inline(always)]
-    fn visible<V: View, S: Sink, R: Recorder>(
-        &self,
-        view: &V,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        self.visible_by(BASELINE, view, sink, recorder)
-    }
+    visible_on_baseline!();
 
     #[inline(always)]
     fn visible_by<I: Isa, V: View, S: Sink, R: Recorder>(

@@ -33,7 +33,7 @@ use serde::de::DeserializeOwned;
 
 use crate::geometry::{Aabb, PlaneTree};
 use crate::kernel::Isa;
-use crate::query::{ItemId, ManySink, NoRecorder, Ranges, Recorder, Sink, View};
+use crate::query::{ItemId, ManySink, NoRecorder, Recorder, Sink, View};
 
 pub use block_order::BlockOrder;
 pub use bsp::{Bsp, BspBuilder, BspParams};
@@ -188,11 +188,9 @@ pub trait TreeOrder: FrustumQuery {
 
     /// [`FrustumQuery::visible`] as ranges of [`TreeOrder::ids`], appended to
     /// `out`; together they hold each visible item once. Adjoining ranges that
-    /// follow each other are one.
-    #[inline(always)]
+    /// follow each other are one. By the chosen [`Kernel`](crate::kernel::Kernel).
     fn visible_ranges<V: View>(&self, view: &V, out: &mut Vec<Range<u32>>) {
-        // This sink never breaks off.
-        let _ = self.visible(view, &mut Ranges(out), &mut NoRecorder);
+        erased::see_ranges(self, view, out);
     }
 }
 

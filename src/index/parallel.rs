@@ -211,7 +211,7 @@ impl<V: View> Work for Split<'_, V> {
             scratch.start(isa, view);
         }
         while level > 0 && (1..ENOUGH_BLOCKS).contains(&scratch.frontier().0.len()) {
-            let mut ranges = Ranges(&mut inside);
+            let mut ranges = Ranges::onto(&mut inside);
             // This sink never breaks off.
             let _ = tree.descend(
                 isa,

@@ -8,7 +8,7 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::bundles::Leaves;
-use super::tree::{PackedTree, scan_blocks};
+use super::tree::{PackedTree, scan_blocks, visible_on_baseline};
 use super::{Bsp, BuildError, FrustumQuery, MemoryUsage, RegionIndex};
 use crate::geometry::quantised::{Code, CodeBlock, Grid};
 use crate::geometry::{Aabb, BoxBlock, LANES, LaneMask, PlaneMask, PlaneTree, lanes_of};
@@ -108,6 +108,11 @@ struct InCodes<'a, V> {
 }
 
 impl<V: View> Leaves for InCodes<'_, V> {
+    #[inline(always)]
+    fn tree(&self) -> &PackedTree {
+        &self.index.tree
+    }
+
     /// Codes are few bytes, one after the other.
     #[inline(always)]
     fn fetch(&self, _: Range<usize>, _: PlaneMask) {}
@@ -198,15 +203,7 @@ impl RegionIndex for Quantised {
 }
 
 impl FrustumQuery for Quantised {
-    #[inline(always)]
-    fn visible<V: View, S: Sink, R: Recorder>(
-        &self,
-        view: &V,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        self.visible_by(BASELINE, view, sink, recorder)
-    }
+    visible_on_baseline!();
 
     #[inline(always)]
     fn visible_by<I: Isa, V: View, S: Sink, R: Recorder>(

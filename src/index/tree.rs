@@ -201,9 +201,7 @@ impl PackedTree {
             }
             Containment::Straddles => {}
         }
-        let (nodes, ids) = (&self.nodes[..], &self.ids[..]);
-        self.bundles
-            .search(isa, view, mask, nodes, ids, leaves, sink, recorder)
+        self.bundles.search(isa, view, mask, leaves, sink, recorder)
     }
 
     /// Hands every item that the region admits to the sink, in tree order.
@@ -402,6 +400,11 @@ struct InBlocks<'a, V> {
 
 impl<V: View> Leaves for InBlocks<'_, V> {
     #[inline(always)]
+    fn tree(&self) -> &PackedTree {
+        self.tree
+    }
+
+    #[inline(always)]
     fn fetch(&self, items: Range<usize>, mask: PlaneMask) {
         for (start, _, block) in self.tree.boxes.range(items.start, items.end) {
             self.view.prefetch(block, mask);
@@ -458,23 +461,29 @@ macro_rules! searched_by_tree {
 }
 pub(super) use searched_by_tree;
 
-/// [`super::FrustumQuery`] for a structure that has a field `tree`.
+/// [`super::FrustumQuery::visible`] for a structure that has
+/// [`super::FrustumQuery::visible_by`].
+macro_rules! visible_on_baseline {
+    () => {
+        #[inline(always)]
+        fn visible<V: $crate::query::View, S: $crate::query::Sink, R: $crate::query::Recorder>(
+            &self,
+            view: &V,
+            sink: &mut S,
+            recorder: &mut R,
+        ) -> std::ops::ControlFlow<()> {
+            self.visible_by($crate::kernel::BASELINE, view, sink, recorder)
+        }
+    };
+}
+pub(super) use visible_on_baseline;
+
+/// [`super::FrustumQuery`] and [`super::TreeOrder`] for a structure that has a
+/// field `tree`.
 macro_rules! seen_by_tree {
     ($structure:ty) => {
         impl $crate::index::FrustumQuery for $structure {
-            #[inline(always)]
-            fn visible<
-                V: $crate::query::View,
-                S: $crate::query::Sink,
-                R: $crate::query::Recorder,
-            >(
-                &self,
-                view: &V,
-                sink: &mut S,
-                recorder: &mut R,
-            ) -> std::ops::ControlFlow<()> {
-                self.visible_by($crate::kernel::BASELINE, view, sink, recorder)
-            }
+            $crate::index::tree::visible_on_baseline!();
 
             #[inline(always)]
             fn visible_by<
@@ -490,6 +499,12 @@ macro_rules! seen_by_tree {
                 recorder: &mut R,
             ) -> std::ops::ControlFlow<()> {
                 self.tree.see(isa, view, sink, recorder)
+            }
+        }
+
+        impl $crate::index::TreeOrder for $structure {
+            fn ids(&self) -> &[$crate::query::ItemId] {
+                self.tree.ids()
             }
         }
     };

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::block_order::{BlockOrder, block_ordered};
 use super::frontier::{Frontier, Merger};
 use super::pass::{Layer, Pass};
+use super::tree::visible_on_baseline;
 use super::{BuildError, FrustumQuery, MemoryUsage, RegionIndex, TreeOrder, indexable};
 use crate::geometry::{Aabb, BoxBlock, LANES, LaneMask, PlaneMask, PlaneTree};
 use crate::kernel::{BASELINE, Isa, prefetch};
@@ -312,7 +313,7 @@ impl Wide {
         let mut scratch = Scratch::default();
         if let Some(top) = self.levels.len().checked_sub(1) {
             scratch.start(BASELINE, view);
-            let sink = &mut Ranges(runs);
+            let sink = &mut Ranges::onto(runs);
             // This sink never breaks off.
             let _ = self.descend(BASELINE, view, 0..top, sink, &mut NoRecorder, &mut scratch);
         }
@@ -429,15 +430,7 @@ impl RegionIndex for Wide {
 }
 
 impl FrustumQuery for Wide {
-    #[inline(always)]
-    fn visible<V: View, S: Sink, R: Recorder>(
-        &self,
-        view: &V,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        self.visible_by(BASELINE, view, sink, recorder)
-    }
+    visible_on_baseline!();
 
     #[inline(always)]
     fn visible_by<I: Isa, V: View, S: Sink, R: Recorder>(

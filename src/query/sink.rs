@@ -109,7 +109,20 @@ impl Sink for Vec<ItemId> {
 
 /// Where the answers lie in the structure's own order, without their ids;
 /// adjoining ranges are one. Only for structures that hand over places.
-pub(crate) struct Ranges<'a>(pub &'a mut Vec<Range<u32>>);
+pub(crate) struct Ranges<'a> {
+    out: &'a mut Vec<Range<u32>>,
+    /// Ranges before this one are somebody else's.
+    first: usize,
+}
+
+impl<'a> Ranges<'a> {
+    /// Appends to what is there.
+    #[inline(always)]
+    pub(crate) fn onto(out: &'a mut Vec<Range<u32>>) -> Self {
+        let first = out.len();
+        Ranges { out, first }
+    }
+}
 
 impl Sink for Ranges<'_> {
     fn accept(&mut self, _: &[ItemId]) -> ControlFlow<()> {
@@ -124,9 +137,9 @@ impl Sink for Ranges<'_> {
         places: Range<usize>,
     ) -> ControlFlow<()> {
         let (start, end) = (places.start as u32, places.end as u32);
-        match self.0.last_mut() {
+        match self.out[self.first..].last_mut() {
             Some(last) if last.end == start => last.end = end,
-            _ => self.0.push(start..end),
+            _ => self.out.push(start..end),
         }
         ControlFlow::Continue(())
     }
