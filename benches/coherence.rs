@@ -34,7 +34,7 @@ const ASKED: usize = 128;
 struct Reads(Vec<usize>);
 
 impl Recorder for Reads {
-    fn block_read(&mut self, block: usize, _: u8) {
+    fn block_read(&mut self, block: usize, _: impl FnOnce() -> u8) {
         self.0.push(block);
     }
 }

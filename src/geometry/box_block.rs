@@ -24,24 +24,85 @@ pub const ALL_ROWS: RowMask = 0b11_1111;
 /// opposite corners, its n-vertices: the same ones for every box.
 #[derive(Clone, Copy, Debug)]
 pub struct Corner {
-    far: [u8; 3],
-    near: [u8; 3],
+    /// Whether the p-vertex is at the upper bound, axis by axis. Booleans and no
+    /// numbers: a row of theirs needs no check.
+    upper: Upper,
 }
 
 impl Corner {
     /// Of the upper bounds where `upper` says so.
     pub const fn of(upper: Upper) -> Corner {
-        let [x, y, z] = upper;
-        Corner {
-            far: [3 * x as u8, 1 + 3 * y as u8, 2 + 3 * z as u8],
-            near: [3 - 3 * x as u8, 4 - 3 * y as u8, 5 - 3 * z as u8],
-        }
+        Corner { upper }
+    }
+
+    #[inline(always)]
+    fn far(self) -> [usize; 3] {
+        let [x, y, z] = self.upper;
+        [
+            3 * usize::from(x),
+            1 + 3 * usize::from(y),
+            2 + 3 * usize::from(z),
+        ]
+    }
+
+    #[inline(always)]
+    fn near(self) -> [usize; 3] {
+        let [x, y, z] = self.upper;
+        [
+            3 * usize::from(!x),
+            1 + 3 * usize::from(!y),
+            2 + 3 * usize::from(!z),
+        ]
     }
 
     /// The rows of the p-vertices as a set.
     #[inline(always)]
     pub fn rows(self) -> RowMask {
-        self.far.iter().fold(0, |rows, row| rows | 1 << row)
+        self.far().iter().fold(0, |rows, &row| rows | 1 << row)
+    }
+}
+
+/// One plane as the block kernel reads it, in vectors: for many blocks that only
+/// this plane is open for.
+#[derive(Clone, Copy)]
+pub struct Blade<I: Isa> {
+    normal: [I::Floats; 3],
+    d: I::Floats,
+    corner: Corner,
+}
+
+impl<I: Isa> Blade<I> {
+    #[inline(always)]
+    pub fn new(isa: I, plane: &Plane, corner: Corner) -> Self {
+        let [x, y, z] = plane.normal.to_array();
+        Blade {
+            normal: [isa.splat(x), isa.splat(y), isa.splat(z)],
+            d: isa.splat(plane.d),
+            corner,
+        }
+    }
+
+    /// The lanes that the plane does not exclude: bit for bit
+    /// [`BoxBlock::admitted_by`].
+    #[inline(always)]
+    pub fn admitted(&self, isa: I, block: &BoxBlock) -> LaneMask {
+        !isa.below_zero(self.values(isa, block))
+    }
+
+    /// [`Plane::value_at`] of the p-vertices.
+    #[inline(always)]
+    fn values(&self, isa: I, block: &BoxBlock) -> I::Floats {
+        let [a, b, c] = self.normal;
+        let [x, y, z] = block.numbered_rows(self.corner.far());
+        let sum = isa.add(isa.mul(a, isa.load(x)), isa.mul(b, isa.load(y)));
+        let sum = isa.add(sum, isa.mul(c, isa.load(z)));
+        isa.add(sum, self.d)
+    }
+
+    /// Asks for the rows that [`Blade::admitted`] reads.
+    #[inline(always)]
+    pub fn prefetch(&self, block: &BoxBlock) {
+        block.prefetch_corner(self.corner);
     }
 }
 
@@ -114,8 +175,8 @@ impl BoxBlock {
     /// Asks for the rows of one corner.
     #[inline(always)]
     pub fn prefetch_corner(&self, corner: Corner) {
-        for row in corner.far {
-            self.prefetch_row(row.into());
+        for row in corner.far() {
+            prefetch(&self.rows[row]);
         }
     }
 
@@ -152,7 +213,7 @@ impl BoxBlock {
             let bit = left.trailing_zeros();
             left &= left - 1;
             let (plane, corner) = (volume.plane_of_bit(bit), volume.corner_of_bit(bit));
-            let value = values_at(isa, plane, self.numbered_rows(corner.far));
+            let value = values_at(isa, plane, self.numbered_rows(corner.far()));
             lowest = isa.lower(value, lowest);
         }
         !isa.below_zero(lowest)
@@ -172,14 +233,9 @@ impl BoxBlock {
         while left != 0 {
             let bit = left.trailing_zeros();
             left &= left - 1;
-            let (plane, corner) = (volume.plane_of_bit(bit), volume.corner_of_bit(bit));
-            let n = plane.normal.to_array().map(|n| isa.splat(n));
-            let d = isa.splat(plane.d);
+            let blade = Blade::new(isa, volume.plane_of_bit(bit), volume.corner_of_bit(bit));
             for (block, lowest) in blocks.iter().zip(&mut lowest) {
-                let [x, y, z] = block.numbered_rows(corner.far);
-                let sum = isa.add(isa.mul(n[0], isa.load(x)), isa.mul(n[1], isa.load(y)));
-                let sum = isa.add(sum, isa.mul(n[2], isa.load(z)));
-                *lowest = isa.lower(isa.add(sum, d), *lowest);
+                *lowest = isa.lower(blade.values(isa, block), *lowest);
             }
         }
         [
@@ -207,17 +263,17 @@ impl BoxBlock {
             let bit = left.trailing_zeros();
             left &= left - 1;
             let (plane, corner) = (volume.plane_of_bit(bit), volume.corner_of_bit(bit));
-            let farthest = values_at(isa, plane, self.numbered_rows(corner.far));
+            let farthest = values_at(isa, plane, self.numbered_rows(corner.far()));
             lowest = isa.lower(farthest, lowest);
-            let nearest = values_at(isa, plane, self.numbered_rows(corner.near));
+            let nearest = values_at(isa, plane, self.numbered_rows(corner.near()));
             open = isa.without(open, nearest, 1 << bit);
         }
         (!isa.below_zero(lowest), open)
     }
 
     #[inline(always)]
-    fn numbered_rows(&self, rows: [u8; 3]) -> [&[f32; LANES]; 3] {
-        rows.map(|row| &self.rows[usize::from(row)])
+    fn numbered_rows(&self, [x, y, z]: [usize; 3]) -> [&[f32; LANES]; 3] {
+        [&self.rows[x], &self.rows[y], &self.rows[z]]
     }
 
     /// For planes of one normal that differ in d: what [`Plane::value_at`] adds

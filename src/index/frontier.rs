@@ -74,6 +74,18 @@ impl Frontier {
         self.used = nodes.len();
     }
 
+    /// Sixteen entries at a time, and which of them there are.
+    #[inline(always)]
+    pub fn rows(&self) -> impl Iterator<Item = (&[u32; LANES], &[PlaneMask; LANES], LaneMask)> {
+        let (nodes, open) = (self.nodes.as_chunks().0, self.open.as_chunks().0);
+        let used = self.used;
+        let rows = nodes.iter().zip(open).take(used.div_ceil(LANES));
+        rows.enumerate().map(move |(i, (nodes, open))| {
+            let missing = ((i + 1) * LANES).saturating_sub(used);
+            (nodes, open, LaneMask::MAX >> missing)
+        })
+    }
+
     /// The nodes and their planes, in the order of arrival.
     #[inline(always)]
     pub fn entries(&self) -> (&[u32], &[PlaneMask]) {

@@ -9,6 +9,7 @@ use std::ops::{ControlFlow, Range};
 use glam::Vec3;
 
 use super::TreeOrder;
+use super::by_plane::ByPlane;
 use super::frontier::{AHEAD, Frontier, Merger};
 use super::pass::{Layer, Pass};
 use super::wide::Wide;
@@ -84,6 +85,7 @@ struct Walks {
     own: Vec<[Frontier; 2]>,
     /// Of each volume, items inside that may still go on.
     runs: Vec<Merger>,
+    by_plane: ByPlane,
 }
 
 thread_local! {
@@ -134,7 +136,9 @@ impl<I: Isa, S: Sink> Together<'_, '_, I, S> {
     #[inline(always)]
     fn sort_level(&mut self, layer: &Layer, walks: &mut Walks, now: usize) {
         let isa = self.isa;
-        let Walks { shared, own, runs } = walks;
+        let Walks {
+            shared, own, runs, ..
+        } = walks;
         let [even, odd] = shared;
         let (here, below) = if now == 0 { (even, odd) } else { (odd, even) };
         let (places, masks) = here.frontier.entries();
@@ -223,7 +227,7 @@ impl<I: Isa, S: Sink> Together<'_, '_, I, S> {
     }
 
     #[inline(always)]
-    fn test_leaves(&mut self, leaves: &Layer, walks: &Walks, now: usize) {
+    fn test_leaves(&mut self, leaves: &Layer, walks: &mut Walks, now: usize) {
         let isa = self.isa;
         let here = &walks.shared[now];
         let (places, masks) = here.frontier.entries();
@@ -262,7 +266,7 @@ impl<I: Isa, S: Sink> Together<'_, '_, I, S> {
                 sink: &mut *self.sinks[view].1,
                 recorder: &mut NoRecorder,
             };
-            let flow = pass.test_leaves(leaves, &walks.own[view][now]);
+            let flow = pass.test_leaves(leaves, &walks.own[view][now], &mut walks.by_plane);
             self.note(view, flow);
         }
     }

@@ -293,7 +293,7 @@ impl<V: View> Work for SearchParts<'_, V> {
             scratch.resume(&part.blocks, &part.open);
             let heights = 0..part.level;
             let _ = tree.descend(isa, view, heights, out, &mut NoRecorder, &mut scratch);
-            let _ = tree.search_leaves(isa, view, out, &mut NoRecorder, &scratch);
+            let _ = tree.search_leaves(isa, view, out, &mut NoRecorder, &mut scratch);
         }
         scratch.give_back();
     }

@@ -5,15 +5,16 @@
 use std::ops::{ControlFlow, Range};
 
 use super::TreeOrder;
+use super::by_plane::ByPlane;
 use super::frontier::{AHEAD, Frontier, Merger, hand_over};
 use super::wide::{Level, Wide};
 use crate::geometry::{ALL_ROWS, BoxBlock, LANES, LaneMask, PlaneMask};
 use crate::kernel::{Isa, prefetch};
-use crate::query::{Recorder, Sink, View, runs};
+use crate::query::{ItemId, OnePlane, Recorder, Sink, Tests, View, runs};
 
 /// A level of so many blocks (192 KiB) is taken to lie in the cache nearest but
 /// one to the processor; asking ahead for it costs more than it gains.
-const NEAR: usize = 512;
+const NEAR: usize = 8192;
 
 /// One level as a traversal meets it.
 pub struct Layer<'t> {
@@ -86,17 +87,43 @@ impl<I: Isa, V: View, S: Sink, R: Recorder> Pass<'_, I, V, S, R> {
         ControlFlow::Continue(())
     }
 
-    /// [`Pass::test_leaf`] for all leaves of a frontier.
+    /// Hands over the items of all leaves of a frontier that no open plane
+    /// drops. Where there are many, those come first that one plane alone is
+    /// open for, plane by plane.
     #[inline(always)]
-    pub fn test_leaves(&mut self, leaves: &Layer, here: &Frontier) -> ControlFlow<()> {
-        let (places, masks) = here.entries();
-        for (i, (&at, &mask)) in places.iter().zip(masks).enumerate() {
-            if let (Some(&next), Some(&mask)) = (places.get(i + AHEAD), masks.get(i + AHEAD)) {
-                self.fetch_leaf(leaves, next, mask);
+    pub fn test_leaves(
+        &mut self,
+        leaves: &Layer,
+        here: &Frontier,
+        by_plane: &mut ByPlane,
+    ) -> ControlFlow<()> {
+        let mut rest = here;
+        if here.len() >= WORTH_PARTING {
+            by_plane.part(self.isa, here);
+            for (plane, places) in by_plane.lists() {
+                let tests = OfOnePlane {
+                    leaves,
+                    view: self.view,
+                    plane: self.view.one_plane(self.isa, plane),
+                    mask: 1 << plane,
+                    places,
+                    ids: self.tree.id_rows(),
+                    recorder: &mut *self.recorder,
+                };
+                self.sink
+                    .accept_tested(self.isa, self.tree.id_rows(), tests)?;
             }
-            self.test_leaf(leaves, (at, mask))?;
+            rest = &by_plane.rest;
         }
-        ControlFlow::Continue(())
+        let tests = OfAnyPlanes {
+            leaves,
+            view: self.view,
+            entries: rest.entries(),
+            recorder: &mut *self.recorder,
+            ids: self.tree.id_rows(),
+        };
+        self.sink
+            .accept_tested(self.isa, self.tree.id_rows(), tests)
     }
 
     /// Sorts the lanes of a block: what is undecided goes to the frontier
@@ -114,7 +141,8 @@ impl<I: Isa, V: View, S: Sink, R: Recorder> Pass<'_, I, V, S, R> {
         self.recorder.nodes_tested(lanes.count_ones());
         self.recorder
             .planes_tested(lanes.count_ones() * mask.count_ones());
-        self.recorder.block_read(layer.place.first + at, ALL_ROWS);
+        self.recorder
+            .block_read(layer.place.first + at, || ALL_ROWS);
         let (kept, open) = self.view.sorted_lanes(self.isa, &layer.blocks[at], mask);
         let kept = kept & lanes;
         self.recorder
@@ -137,33 +165,96 @@ impl<I: Isa, V: View, S: Sink, R: Recorder> Pass<'_, I, V, S, R> {
         let ids = self.tree.ids();
         hand_over(self.isa, places, ids, self.sink, self.recorder)
     }
+}
 
-    /// Asks for what [`Pass::test_leaf`] will read.
+/// So many leaves are worth parting by their planes.
+const WORTH_PARTING: usize = 48;
+
+/// What is counted where a leaf is tested.
+#[inline(always)]
+fn record<V: View, R: Recorder>(
+    recorder: &mut R,
+    view: &V,
+    leaves: &Layer,
+    (at, mask): (usize, PlaneMask),
+) {
+    let items = leaves.place.lanes(at).count_ones();
+    recorder.items_tested(items);
+    recorder.planes_tested(items * mask.count_ones());
+    recorder.block_read(leaves.place.first + at, || view.rows_read(mask));
+}
+
+/// Asks for the ids of a leaf.
+#[inline(always)]
+fn fetch_ids(ids: &[[ItemId; LANES]], leaf: u32) {
+    if let Some(row) = ids.get(leaf as usize) {
+        prefetch(row);
+    }
+}
+
+/// Leaves that one plane is open for.
+struct OfOnePlane<'a, 't, V, P, R> {
+    leaves: &'a Layer<'t>,
+    view: &'a V,
+    plane: P,
+    mask: PlaneMask,
+    places: &'a [u32],
+    ids: &'a [[ItemId; LANES]],
+    recorder: &'a mut R,
+}
+
+impl<I: Isa, V: View, P: OnePlane<I>, R: Recorder> Tests<I> for OfOnePlane<'_, '_, V, P, R> {
     #[inline(always)]
-    fn fetch_leaf(&self, leaves: &Layer, at: u32, mask: PlaneMask) {
-        if leaves.blocks.len() <= NEAR {
-            return;
-        }
-        if let Some(block) = leaves.blocks.get(at as usize) {
-            self.view.prefetch(block, mask);
-        }
-        if let Some(id) = self.tree.ids().get(at as usize * LANES) {
-            prefetch(id);
-        }
+    fn count(&self) -> usize {
+        self.places.len()
     }
 
-    /// Hands over the items of a leaf that no open plane drops.
     #[inline(always)]
-    fn test_leaf(&mut self, leaves: &Layer, (at, mask): (u32, PlaneMask)) -> ControlFlow<()> {
-        let at = at as usize;
-        let lanes = leaves.place.lanes(at);
-        self.recorder.items_tested(lanes.count_ones());
-        let tests = lanes.count_ones() * mask.count_ones();
-        self.recorder.planes_tested(tests);
-        let rows = self.view.rows_read(mask);
-        self.recorder.block_read(leaves.place.first + at, rows);
-        let kept = self.view.kept_lanes(self.isa, &leaves.blocks[at], mask) & lanes;
-        let ids = self.tree.ids();
-        self.sink.accept_lanes(self.isa, ids, at * LANES, kept)
+    fn test(&mut self, isa: I, i: usize) -> (usize, LaneMask) {
+        let blocks = self.leaves.blocks;
+        if blocks.len() > NEAR
+            && let Some(&next) = self.places.get(i + AHEAD)
+            && let Some(block) = blocks.get(next as usize)
+        {
+            self.plane.prefetch(block);
+            fetch_ids(self.ids, next);
+        }
+        let at = self.places[i] as usize;
+        record(self.recorder, self.view, self.leaves, (at, self.mask));
+        let kept = self.plane.kept(isa, &blocks[at]) & self.leaves.place.lanes(at);
+        (at, kept)
+    }
+}
+
+/// Leaves that different planes are open for.
+struct OfAnyPlanes<'a, 't, V, R> {
+    leaves: &'a Layer<'t>,
+    view: &'a V,
+    entries: (&'a [u32], &'a [PlaneMask]),
+    ids: &'a [[ItemId; LANES]],
+    recorder: &'a mut R,
+}
+
+impl<I: Isa, V: View, R: Recorder> Tests<I> for OfAnyPlanes<'_, '_, V, R> {
+    #[inline(always)]
+    fn count(&self) -> usize {
+        self.entries.0.len()
+    }
+
+    #[inline(always)]
+    fn test(&mut self, isa: I, i: usize) -> (usize, LaneMask) {
+        let blocks = self.leaves.blocks;
+        let (places, masks) = self.entries;
+        if blocks.len() > NEAR
+            && let (Some(&next), Some(&mask)) = (places.get(i + AHEAD), masks.get(i + AHEAD))
+            && let Some(block) = blocks.get(next as usize)
+        {
+            self.view.prefetch(block, mask);
+            fetch_ids(self.ids, next);
+        }
+        let (at, mask) = (places[i] as usize, masks[i]);
+        record(self.recorder, self.view, self.leaves, (at, mask));
+        let kept = self.view.kept_lanes(isa, &blocks[at], mask) & self.leaves.place.lanes(at);
+        (at, kept)
     }
 }

@@ -4,6 +4,7 @@
 
 use std::ops::{ControlFlow, Range};
 
+use super::by_plane::ByPlane;
 use super::frontier::{AHEAD, Frontier};
 use super::pass::Pass;
 use super::wide::Wide;
@@ -25,7 +26,8 @@ pub struct Trace {
 struct Reads<'a>(&'a mut Vec<(u32, [u8; ROWS])>);
 
 impl Recorder for Reads<'_> {
-    fn block_read(&mut self, block: usize, rows: RowMask) {
+    fn block_read(&mut self, block: usize, rows: impl FnOnce() -> RowMask) {
+        let rows = rows();
         let wanted = (0..ROWS as u8).filter(|row| rows >> row & 1 == 1);
         let mut wanted = wanted.cycle();
         let rows = std::array::from_fn(|_| wanted.next().unwrap_or(0));
@@ -142,7 +144,8 @@ impl<V: View> Work for Rest<'_, V> {
             // A Vec never breaks off.
             let _ = pass.hand_over(run.start as usize..run.end as usize);
         }
-        let _ = pass.test_leaves(&self.tree.layer(0), &self.foreseen.leaves);
+        let mut by_plane = ByPlane::default();
+        let _ = pass.test_leaves(&self.tree.layer(0), &self.foreseen.leaves, &mut by_plane);
     }
 }
 

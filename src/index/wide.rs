@@ -10,7 +10,9 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::block_order::{BlockOrder, block_ordered};
+use super::by_plane::ByPlane;
 use super::frontier::{Frontier, Merger};
+use super::id_rows::IdRows;
 use super::pass::{Layer, Pass};
 use super::tree::visible_on_baseline;
 use super::{BuildError, FrustumQuery, MemoryUsage, RegionIndex, TreeOrder, indexable};
@@ -39,7 +41,7 @@ const MOST_LEVELS: usize = 8;
 pub struct Wide {
     blocks: Vec<BoxBlock>,
     /// Item ids in tree order.
-    ids: Vec<ItemId>,
+    ids: IdRows,
     /// Lowest level first.
     levels: Vec<Level>,
     /// Place of each item in tree order, made when first needed.
@@ -67,11 +69,12 @@ impl Level {
     }
 }
 
-/// The memory of a traversal: two frontiers, kept between queries.
+/// The memory of a traversal: frontiers, kept between queries.
 #[derive(Default)]
 pub(super) struct Scratch {
     here: Frontier,
     below: Frontier,
+    by_plane: ByPlane,
 }
 
 impl Scratch {
@@ -142,9 +145,9 @@ fn unite(children: &[BoxBlock], parents: &mut [BoxBlock]) {
 }
 
 impl Wide {
-    fn over(items: &[Aabb], ids: Vec<ItemId>, threads: usize) -> Wide {
+    fn over(items: &[Aabb], ids: &[ItemId], threads: usize) -> Wide {
         let mut tree = Wide {
-            ids,
+            ids: ids.into(),
             ..Wide::default()
         };
         let count = tree.ids.len();
@@ -174,7 +177,7 @@ impl Wide {
             .chunks_mut(SHARED_BLOCKS)
             .zip(parents.chain(std::iter::once(&mut [][..])));
         share(threads, jobs.enumerate(), |(i, (leaves, parents))| {
-            fill(items, &tree.ids, i * SHARED_BLOCKS, leaves);
+            fill(items, ids, i * SHARED_BLOCKS, leaves);
             unite(leaves, parents);
         });
         for level in 2..tree.levels.len() {
@@ -196,7 +199,7 @@ impl Wide {
         params: &WideParams,
     ) -> Result<Wide, BuildError> {
         let ids = block_ordered(items, indexable(items)?, params.order, threads);
-        Ok(Wide::over(items, ids, threads))
+        Ok(Wide::over(items, &ids, threads))
     }
 
     /// Whether both are the same bit for bit: the ids, the blocks, the levels.
@@ -208,6 +211,12 @@ impl Wide {
     /// Levels of blocks; 0 for no items.
     pub fn depth(&self) -> usize {
         self.levels.len()
+    }
+
+    /// The ids of each leaf.
+    #[inline(always)]
+    pub(super) fn id_rows(&self) -> &[[ItemId; LANES]] {
+        self.ids.rows()
     }
 
     /// All blocks, leaves first.
@@ -266,7 +275,7 @@ impl Wide {
         recorder: &mut R,
         scratch: &mut Scratch,
     ) -> ControlFlow<()> {
-        let Scratch { here, below } = scratch;
+        let Scratch { here, below, .. } = scratch;
         let mut pass = Pass {
             tree: self,
             isa,
@@ -292,11 +301,12 @@ impl Wide {
         view: &V,
         sink: &mut S,
         recorder: &mut R,
-        scratch: &Scratch,
+        scratch: &mut Scratch,
     ) -> ControlFlow<()> {
         if self.levels.is_empty() {
             return ControlFlow::Continue(());
         }
+        let Scratch { here, by_plane, .. } = scratch;
         let mut pass = Pass {
             tree: self,
             isa,
@@ -304,7 +314,7 @@ impl Wide {
             sink,
             recorder,
         };
-        pass.test_leaves(&self.layer(0), &scratch.here)
+        pass.test_leaves(&self.layer(0), here, by_plane)
     }
 
     /// All of a query but its leaves: appends the runs that are wholly inside,
@@ -349,7 +359,7 @@ impl RegionIndex for Wide {
         MemoryUsage {
             node_bytes: (self.blocks.len() - leaves) * size_of::<BoxBlock>(),
             item_bytes: leaves * size_of::<BoxBlock>()
-                + size_of_val(&self.ids[..])
+                + self.ids.bytes()
                 + size_of_val(&self.place_of[..]),
         }
     }

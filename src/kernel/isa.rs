@@ -19,6 +19,13 @@ pub trait Isa: Copy {
     /// Sixteen u32.
     type Words: Copy;
 
+    /// Does the piece in a function of its own, compiled for these instructions:
+    /// a loop that is to keep its numbers in registers needs one.
+    #[inline(always)]
+    fn apart<P: Piece<Self>>(self, piece: P) -> P::Output {
+        piece.run(self)
+    }
+
     fn load(self, row: &[f32; LANES]) -> Self::Floats;
     fn to_array(self, floats: Self::Floats) -> [f32; LANES];
     fn splat(self, x: f32) -> Self::Floats;
@@ -43,11 +50,97 @@ pub trait Isa: Copy {
     fn with(self, words: Self::Words, lanes: LaneMask, bits: u32) -> Self::Words;
     /// The lanes that are zero.
     fn zeros(self, words: Self::Words) -> LaneMask;
+    /// The lanes that are `x`.
+    fn equal(self, words: Self::Words, x: u32) -> LaneMask;
     /// Moves the words of `lanes` together, lowest first, to the start of
     /// `place`; what the rest of it holds is nobody's business.
-    fn pack(self, place: &mut [u32; LANES], words: Self::Words, lanes: LaneMask);
+    #[inline(always)]
+    fn pack(self, place: &mut [u32; LANES], words: Self::Words, lanes: LaneMask) {
+        // SAFETY: sixteen words may be written.
+        unsafe { self.pack_to(place.as_mut_ptr(), words, lanes) };
+    }
+    /// [`Isa::pack`] to memory that may not have been written yet.
+    ///
+    /// # Safety
+    /// `place` is valid for writes of [`LANES`] words. As many words as there
+    /// are lanes are written for certain, the others may be.
+    unsafe fn pack_to(self, place: *mut u32, words: Self::Words, lanes: LaneMask);
+
     /// Appends the words of `lanes`, lowest first.
-    fn append(self, out: &mut Vec<u32>, row: &[u32; LANES], lanes: LaneMask);
+    #[inline(always)]
+    fn append(self, out: &mut Vec<u32>, row: &[u32; LANES], lanes: LaneMask) {
+        // Room first: a register would not outlive the call that makes it.
+        out.reserve(LANES);
+        let end = out.spare_capacity_mut().as_mut_ptr().cast();
+        // SAFETY: there is room for sixteen words; so many are written.
+        unsafe {
+            self.pack_to(end, self.words(row), lanes);
+            out.set_len(out.len() + lanes.count_ones() as usize);
+        }
+    }
+}
+
+/// A piece of a larger work: what [`Isa::apart`] does.
+pub trait Piece<I: Isa> {
+    type Output;
+
+    /// `#[inline(always)]`, as all that is hot in it.
+    fn run(self, isa: I) -> Self::Output;
+}
+
+/// Appends rows and some lanes of rows to a list that has room for all of them
+/// from the start, so that nothing is asked in between.
+pub struct Packer<'a> {
+    out: &'a mut Vec<u32>,
+    /// Where the next word goes; `room` words fit from there.
+    end: *mut u32,
+    room: usize,
+    added: usize,
+}
+
+impl<'a> Packer<'a> {
+    /// Room for so many words, and for the rest of a row behind them.
+    #[inline(always)]
+    pub fn onto(out: &'a mut Vec<u32>, words: usize) -> Self {
+        let room = words + LANES;
+        out.reserve(room);
+        Packer {
+            end: out.spare_capacity_mut().as_mut_ptr().cast(),
+            room,
+            added: 0,
+            out,
+        }
+    }
+
+    /// Appends the words of `lanes`, lowest first.
+    ///
+    /// # Panics
+    /// If no row fits any more, as in the others.
+    #[inline(always)]
+    pub fn push<I: Isa>(&mut self, isa: I, row: &[u32; LANES], lanes: LaneMask) {
+        assert!(self.room >= LANES, "more words than there is room for");
+        // SAFETY: a row fits.
+        unsafe { isa.pack_to(self.end, isa.words(row), lanes) };
+        self.skip(lanes.count_ones() as usize);
+    }
+
+    /// So many words have been written.
+    #[inline(always)]
+    fn skip(&mut self, count: usize) {
+        // SAFETY: no more than there was room for.
+        self.end = unsafe { self.end.add(count) };
+        self.room -= count;
+        self.added += count;
+    }
+}
+
+impl Drop for Packer<'_> {
+    #[inline(always)]
+    fn drop(&mut self) {
+        // SAFETY: so many words have been written behind the old end, and room
+        // for them was made.
+        unsafe { self.out.set_len(self.out.len() + self.added) };
+    }
 }
 
 /// Plain arrays, which the compiler turns into whatever vectors there are: for
@@ -128,19 +221,16 @@ impl Isa for Plain {
         lanes_where(|lane| words[lane] == 0)
     }
     #[inline(always)]
-    fn pack(self, place: &mut [u32; LANES], words: [u32; LANES], lanes: LaneMask) {
-        let (mut left, mut count) = (lanes, 0);
-        while left != 0 {
-            place[count] = words[left.trailing_zeros() as usize];
-            count += 1;
-            left &= left - 1;
-        }
+    fn equal(self, words: [u32; LANES], x: u32) -> LaneMask {
+        lanes_where(|lane| words[lane] == x)
     }
     #[inline(always)]
-    fn append(self, out: &mut Vec<u32>, row: &[u32; LANES], lanes: LaneMask) {
-        let mut left = lanes;
+    unsafe fn pack_to(self, place: *mut u32, words: [u32; LANES], lanes: LaneMask) {
+        let (mut left, mut count) = (lanes, 0);
         while left != 0 {
-            out.push(row[left.trailing_zeros() as usize]);
+            // SAFETY: there are at most sixteen lanes.
+            unsafe { *place.add(count) = words[left.trailing_zeros() as usize % LANES] };
+            count += 1;
             left &= left - 1;
         }
     }
@@ -161,7 +251,7 @@ mod tests {
     }
 
     impl Work for All<'_> {
-        type Output = (Vec<u32>, [LaneMask; 3]);
+        type Output = (Vec<u32>, [LaneMask; 4]);
 
         #[inline(always)]
         fn run<I: Isa>(self, isa: I) -> Self::Output {
@@ -189,7 +279,12 @@ mod tests {
             }
             isa.append(&mut out, self.words, self.lanes);
             isa.append(&mut out, self.words, !self.lanes);
-            let masks = [isa.below_zero(a), isa.at_most(a, b), isa.zeros(words)];
+            let masks = [
+                isa.below_zero(a),
+                isa.at_most(a, b),
+                isa.zeros(words),
+                isa.equal(words, 5),
+            ];
             (out, masks)
         }
     }

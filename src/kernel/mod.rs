@@ -15,7 +15,7 @@ use std::fmt;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU8, Ordering};
 
-pub use isa::{Isa, LANES, LaneMask, Plain};
+pub use isa::{Isa, LANES, LaneMask, Packer, Piece, Plain};
 
 /// The instruction set that the program was compiled for, with no need to ask
 /// the processor.

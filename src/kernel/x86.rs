@@ -4,7 +4,7 @@
 
 use std::arch::x86_64::*;
 
-use super::isa::{Isa, LANES, LaneMask, Plain};
+use super::isa::{Isa, LANES, LaneMask, Piece, Plain};
 
 /// Four 128-bit vectors. Part of x86-64.
 #[derive(Clone, Copy, Debug)]
@@ -36,12 +36,16 @@ impl Avx512 {
     }
 }
 
-/// Makes room for a whole vector behind the end, so that one may be stored
-/// whatever its number of lanes that count; the end.
-#[inline(always)]
-fn room(out: &mut Vec<u32>) -> *mut u32 {
-    out.reserve(LANES);
-    out.spare_capacity_mut().as_mut_ptr().cast()
+#[inline(never)]
+#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+fn apart_avx2<P: Piece<Avx2>>(isa: Avx2, piece: P) -> P::Output {
+    piece.run(isa)
+}
+
+#[inline(never)]
+#[target_feature(enable = "avx512f,avx512vl,avx512bw,avx512dq,avx2,bmi1,bmi2,lzcnt,popcnt")]
+fn apart_avx512<P: Piece<Avx512>>(isa: Avx512, piece: P) -> P::Output {
+    piece.run(isa)
 }
 
 /// Elementwise operations on an array of vectors.
@@ -140,24 +144,18 @@ impl Isa for Sse2 {
         }))
     }
     #[inline(always)]
-    fn pack(self, place: &mut [u32; LANES], words: [__m128i; 4], lanes: LaneMask) {
+    fn equal(self, words: [__m128i; 4], x: u32) -> LaneMask {
+        signs_128(each!(4, |i| unsafe {
+            _mm_castsi128_ps(_mm_cmpeq_epi32(words[i], _mm_set1_epi32(x as i32)))
+        }))
+    }
+    #[inline(always)]
+    unsafe fn pack_to(self, place: *mut u32, words: [__m128i; 4], lanes: LaneMask) {
         let mut row = [0; LANES];
         for (four, x) in row.chunks_exact_mut(4).zip(words) {
             unsafe { _mm_storeu_si128(four.as_mut_ptr().cast(), x) };
         }
-        Plain.pack(place, row, lanes);
-    }
-    #[inline(always)]
-    fn append(self, out: &mut Vec<u32>, row: &[u32; LANES], lanes: LaneMask) {
-        let end = room(out);
-        let (mut left, mut count) = (lanes, 0);
-        while left != 0 {
-            // At most sixteen lanes, and as many places behind the end.
-            unsafe { *end.add(count) = row[left.trailing_zeros() as usize % LANES] };
-            count += 1;
-            left &= left - 1;
-        }
-        unsafe { out.set_len(out.len() + count) };
+        unsafe { Plain.pack_to(place, row, lanes) };
     }
 }
 
@@ -171,6 +169,10 @@ impl Isa for Avx2 {
     type Floats = [__m256; 2];
     type Words = [__m256i; 2];
 
+    #[inline(always)]
+    fn apart<P: Piece<Self>>(self, piece: P) -> P::Output {
+        unsafe { apart_avx2(self, piece) }
+    }
     #[inline(always)]
     fn load(self, row: &[f32; LANES]) -> [__m256; 2] {
         each!(2, |i| unsafe { _mm256_loadu_ps(row[8 * i..].as_ptr()) })
@@ -258,31 +260,21 @@ impl Isa for Avx2 {
         }))
     }
     #[inline(always)]
-    fn pack(self, place: &mut [u32; LANES], words: [__m256i; 2], lanes: LaneMask) {
-        // The first store is whole, and what it leaves behind its lanes the
-        // second one covers; together they stay within sixteen places.
-        unsafe { store_packed_256(place.as_mut_ptr(), words, lanes) };
+    fn equal(self, words: [__m256i; 2], x: u32) -> LaneMask {
+        signs_256(each!(2, |i| unsafe {
+            _mm256_castsi256_ps(_mm256_cmpeq_epi32(words[i], _mm256_set1_epi32(x as i32)))
+        }))
     }
     #[inline(always)]
-    fn append(self, out: &mut Vec<u32>, row: &[u32; LANES], lanes: LaneMask) {
-        // Room first: a register would not outlive the call that makes it.
-        let end = room(out);
+    unsafe fn pack_to(self, place: *mut u32, words: [__m256i; 2], lanes: LaneMask) {
+        // The first store is whole, and what it leaves behind its lanes the
+        // second one covers; together they stay within sixteen places.
+        let (low, high) = (lanes & 0xff, lanes >> 8);
         unsafe {
-            store_packed_256(end, self.words(row), lanes);
-            out.set_len(out.len() + lanes.count_ones() as usize);
+            _mm256_storeu_si256(place.cast(), packed_256(words[0], low));
+            let behind = place.add(low.count_ones() as usize);
+            _mm256_storeu_si256(behind.cast(), packed_256(words[1], high));
         }
-    }
-}
-
-/// Stores the words of some lanes, moved together, and garbage behind them up
-/// to sixteen words in all.
-#[inline(always)]
-unsafe fn store_packed_256(place: *mut u32, words: [__m256i; 2], lanes: LaneMask) {
-    let (low, high) = (lanes & 0xff, lanes >> 8);
-    unsafe {
-        _mm256_storeu_si256(place.cast(), packed_256(words[0], low));
-        let behind = place.add(low.count_ones() as usize);
-        _mm256_storeu_si256(behind.cast(), packed_256(words[1], high));
     }
 }
 
@@ -309,6 +301,10 @@ impl Isa for Avx512 {
     type Floats = __m512;
     type Words = __m512i;
 
+    #[inline(always)]
+    fn apart<P: Piece<Self>>(self, piece: P) -> P::Output {
+        unsafe { apart_avx512(self, piece) }
+    }
     #[inline(always)]
     fn load(self, row: &[f32; LANES]) -> __m512 {
         unsafe { _mm512_loadu_ps(row.as_ptr()) }
@@ -379,22 +375,16 @@ impl Isa for Avx512 {
         unsafe { _mm512_testn_epi32_mask(words, words) }
     }
     #[inline(always)]
-    fn pack(self, place: &mut [u32; LANES], words: __m512i, lanes: LaneMask) {
+    fn equal(self, words: __m512i, x: u32) -> LaneMask {
+        unsafe { _mm512_cmpeq_epi32_mask(words, _mm512_set1_epi32(x as i32)) }
+    }
+    #[inline(always)]
+    unsafe fn pack_to(self, place: *mut u32, words: __m512i, lanes: LaneMask) {
         // Packed in a register and stored whole: a masked store is slower, on
         // some processors very much so.
         unsafe {
             let packed = _mm512_maskz_compress_epi32(lanes, words);
-            _mm512_storeu_si512(place.as_mut_ptr().cast(), packed);
-        }
-    }
-    #[inline(always)]
-    fn append(self, out: &mut Vec<u32>, row: &[u32; LANES], lanes: LaneMask) {
-        // Room first: a register would not outlive the call that makes it.
-        let end = room(out);
-        unsafe {
-            let packed = _mm512_maskz_compress_epi32(lanes, self.words(row));
-            _mm512_storeu_si512(end.cast(), packed);
-            out.set_len(out.len() + lanes.count_ones() as usize);
+            _mm512_storeu_si512(place.cast(), packed);
         }
     }
 }

@@ -25,7 +25,7 @@ pub trait Recorder {
     /// Rows of a block of bounds were read, by the block's place among all of
     /// the structure's; only structures that can be replayed tell.
     #[inline(always)]
-    fn block_read(&mut self, _block: usize, _rows: RowMask) {}
+    fn block_read(&mut self, _block: usize, _rows: impl FnOnce() -> RowMask) {}
     /// A subtree was accepted whole: `items` ids that nobody tested.
     #[inline(always)]
     fn subtree_accepted(&mut self, _items: usize) {}

@@ -3,7 +3,7 @@
 use std::ops::{ControlFlow, Range};
 
 use super::ItemId;
-use crate::kernel::{Isa, LANES, LaneMask};
+use crate::kernel::{Isa, LANES, LaneMask, Packer, Piece};
 
 /// Where answers go. A structure hands over slices: a subtree that is wholly
 /// inside is one call. Returning `Break` ends the query.
@@ -37,6 +37,29 @@ pub trait Sink {
         }
         ControlFlow::Continue(())
     }
+
+    /// What many blocks of items are found to hold, one block after the other;
+    /// `ids` are those of each block.
+    #[inline(always)]
+    fn accept_tested<I: Isa, T: Tests<I>>(
+        &mut self,
+        isa: I,
+        ids: &[[ItemId; LANES]],
+        mut tests: T,
+    ) -> ControlFlow<()> {
+        for i in 0..tests.count() {
+            let (block, lanes) = tests.test(isa, i);
+            self.accept_lanes(isa, ids.as_flattened(), block * LANES, lanes)?;
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+/// Blocks of items that are tested when their turn comes.
+pub trait Tests<I: Isa> {
+    fn count(&self) -> usize;
+    /// The number of the i-th block, and its lanes that are answers.
+    fn test(&mut self, isa: I, i: usize) -> (usize, LaneMask);
 }
 
 /// The runs of lanes that are set, lowest first.
@@ -104,6 +127,44 @@ impl Sink for Vec<ItemId> {
             self.extend_from_slice(&ids[start + run.start..start + run.end]);
         }
         ControlFlow::Continue(())
+    }
+
+    /// Room is made for all blocks at once.
+    #[inline(always)]
+    fn accept_tested<I: Isa, T: Tests<I>>(
+        &mut self,
+        isa: I,
+        ids: &[[ItemId; LANES]],
+        tests: T,
+    ) -> ControlFlow<()> {
+        isa.apart(Gather {
+            out: self,
+            ids,
+            tests,
+        });
+        ControlFlow::Continue(())
+    }
+}
+
+/// The loop that most of a query is spent in.
+struct Gather<'a, T> {
+    out: &'a mut Vec<ItemId>,
+    ids: &'a [[ItemId; LANES]],
+    tests: T,
+}
+
+impl<I: Isa, T: Tests<I>> Piece<I> for Gather<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self, isa: I) {
+        let mut tests = self.tests;
+        let count = tests.count();
+        let mut packer = Packer::onto(self.out, count * LANES);
+        for i in 0..count {
+            let (block, lanes) = tests.test(isa, i);
+            packer.push(isa, &self.ids[block], lanes);
+        }
     }
 }
 

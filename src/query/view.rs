@@ -3,8 +3,8 @@
 //! of them share, and one type for any of them.
 
 use crate::geometry::{
-    ALL_ROWS, Aabb, BoxBlock, ConvexVolume, LANES, LaneMask, PlaneMask, PlaneRows, RelativeVolume,
-    RowMask, Spheres, WideVolume,
+    ALL_ROWS, Aabb, Blade, BoxBlock, ConvexVolume, LANES, LaneMask, PlaneMask, PlaneRows,
+    RelativeVolume, RowMask, Spheres, WideVolume,
 };
 
 use super::{Containment, NoRecorder, Recorder, Region};
@@ -41,6 +41,15 @@ pub trait View: Sized {
     /// The lanes that no plane of the mask drops: bit for bit
     /// [`View::drops`], lane by lane.
     fn kept_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask;
+
+    /// One plane by itself, made ready for many blocks.
+    type OnePlane<'v, I: Isa>: OnePlane<I>
+    where
+        Self: 'v;
+
+    /// The plane of that bit, made ready: [`View::kept_lanes`] with this bit for
+    /// a mask.
+    fn one_plane<I: Isa>(&self, isa: I, plane: u32) -> Self::OnePlane<'_, I>;
 
     /// [`View::kept_lanes`] of four blocks.
     #[inline(always)]
@@ -102,6 +111,58 @@ pub trait View: Sized {
     fn sees(&self, item: &Aabb) -> bool {
         !item.is_empty() && self.admits(item, self.mask(), &mut NoRecorder)
     }
+}
+
+/// A plane of a view, made ready for many blocks that no other plane is open
+/// for.
+pub trait OnePlane<I: Isa> {
+    /// [`View::kept_lanes`].
+    fn kept(&self, isa: I, block: &BoxBlock) -> LaneMask;
+
+    /// Asks for the memory that this reads ahead of it.
+    fn prefetch(&self, block: &BoxBlock);
+}
+
+impl<I: Isa> OnePlane<I> for Blade<I> {
+    #[inline(always)]
+    fn kept(&self, isa: I, block: &BoxBlock) -> LaneMask {
+        self.admitted(isa, block)
+    }
+    #[inline(always)]
+    fn prefetch(&self, block: &BoxBlock) {
+        self.prefetch(block);
+    }
+}
+
+/// A plane of a view for which nothing can be made ready.
+pub struct AsEver<'v, V> {
+    view: &'v V,
+    mask: PlaneMask,
+}
+
+impl<I: Isa, V: View> OnePlane<I> for AsEver<'_, V> {
+    #[inline(always)]
+    fn kept(&self, isa: I, block: &BoxBlock) -> LaneMask {
+        self.view.kept_lanes(isa, block, self.mask)
+    }
+    #[inline(always)]
+    fn prefetch(&self, block: &BoxBlock) {
+        self.view.prefetch(block, self.mask);
+    }
+}
+
+macro_rules! one_plane_as_ever {
+    () => {
+        type OnePlane<'v, I: Isa> = AsEver<'v, Self>;
+
+        #[inline(always)]
+        fn one_plane<I: Isa>(&self, _: I, plane: u32) -> AsEver<'_, Self> {
+            AsEver {
+                view: self,
+                mask: 1 << plane,
+            }
+        }
+    };
 }
 
 impl<V: View> Region for V {
@@ -181,6 +242,12 @@ impl View for ConvexVolume {
     fn kept_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
         block.admitted_by(isa, self, mask)
     }
+    type OnePlane<'v, I: Isa> = Blade<I>;
+
+    #[inline(always)]
+    fn one_plane<I: Isa>(&self, isa: I, plane: u32) -> Blade<I> {
+        Blade::new(isa, self.plane_of_bit(plane), self.corner_of_bit(plane))
+    }
     #[inline(always)]
     fn kept_of_four<I: Isa>(
         &self,
@@ -222,6 +289,8 @@ impl View for ConvexVolume {
 /// Nodes get the plane test, items that and their spheres'; monotone because
 /// the cube's corners have a say in both: see [`Spheres`].
 impl View for Spheres {
+    one_plane_as_ever!();
+
     #[inline(always)]
     fn mask(&self) -> PlaneMask {
         self.planes().mask()
@@ -250,6 +319,8 @@ impl View for Spheres {
 /// The plane test in f64. Monotone as in f32: promoting is exact, and every
 /// operation rounds to nearest.
 impl View for WideVolume {
+    one_plane_as_ever!();
+
     #[inline(always)]
     fn mask(&self) -> PlaneMask {
         self.mask()
@@ -273,6 +344,8 @@ impl View for WideVolume {
 /// is ([`Aabb::relative_to`]): a box within another is moved to a box within
 /// the other one moved, and there the plane test is monotone.
 impl View for RelativeVolume {
+    one_plane_as_ever!();
+
     #[inline(always)]
     fn mask(&self) -> PlaneMask {
         self.planes().mask()

@@ -1,0 +1,73 @@
+//! Item ids in tree order, sixteen a cache line: the ids of one block of boxes
+//! are read with one access to memory. It owns the layout; which ids, and in
+//! which order, is the structures' business.
+
+use std::ops::Deref;
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::geometry::LANES;
+use crate::query::ItemId;
+
+#[derive(Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C, align(64))]
+struct Line([ItemId; LANES]);
+
+/// Ids, the last line of which is filled up with zeros.
+#[derive(Clone, Default, PartialEq)]
+pub struct IdRows {
+    lines: Vec<Line>,
+    len: usize,
+}
+
+impl From<&[ItemId]> for IdRows {
+    /// O(ids).
+    fn from(ids: &[ItemId]) -> Self {
+        let mut lines = vec![Line::zeroed(); ids.len().div_ceil(LANES)];
+        bytemuck::cast_slice_mut(&mut lines)[..ids.len()].copy_from_slice(ids);
+        IdRows {
+            lines,
+            len: ids.len(),
+        }
+    }
+}
+
+impl IdRows {
+    /// Sixteen ids at a time; behind the last id come zeros.
+    #[inline(always)]
+    pub fn rows(&self) -> &[[ItemId; LANES]] {
+        bytemuck::cast_slice(&self.lines)
+    }
+
+    /// Heap bytes.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.lines[..])
+    }
+}
+
+impl Deref for IdRows {
+    type Target = [ItemId];
+
+    #[inline(always)]
+    fn deref(&self) -> &[ItemId] {
+        &bytemuck::cast_slice(&self.lines)[..self.len]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_hold_the_ids_and_begin_cache_lines() {
+        for len in [0, 1, 15, 16, 17, 40] {
+            let ids: Vec<ItemId> = (7..7 + len).collect();
+            let rows = IdRows::from(&ids[..]);
+            assert_eq!(rows[..], ids);
+            assert_eq!(rows.rows().len(), ids.len().div_ceil(LANES));
+            assert!(rows.rows().as_flattened().starts_with(&ids));
+            assert_eq!(rows.rows().as_ptr().align_offset(64), 0);
+            assert_eq!(rows.bytes(), rows.rows().len() * 64);
+        }
+    }
+}
