@@ -518,6 +518,31 @@ mod tests {
         }
     }
 
+    /// On a map each answer is refined by its own point.
+    #[test]
+    fn points_asked_at_once_get_their_own_answers() {
+        let scene = scene::load("freedm-map12", &Default::default()).unwrap();
+        let path = path::load("orbit:frames=12", &scene, &LensDefaults::default()).unwrap();
+        let workload = Workload::new(&scene, &path, &Culling::default()).unwrap();
+        let spec = StructureSpec::parse("bsp").unwrap();
+        let built = Contender::build(spec, false, &scene, CullingTest::SixPlane).built;
+        let built = built.unwrap();
+        let alone: Vec<u64> = (0..workload.points.len())
+            .map(|place| {
+                let mut out = Vec::new();
+                built.regions().locate(workload.points[place], &mut out);
+                workload.refine(workload.points[place], &mut out);
+                out.len() as u64
+            })
+            .collect();
+        assert!(alone.iter().sum::<u64>() > 0, "{alone:?}");
+        let ask_many = located_at_once(&workload, &built);
+        for places in [(0..alone.len()).collect(), vec![7], vec![], vec![9, 2]] {
+            let wanted: u64 = places.iter().map(|&place: &usize| alone[place]).sum();
+            assert_eq!(ask_many(&places), wanted, "{places:?}");
+        }
+    }
+
     #[test]
     fn a_pass_that_would_take_too_long_is_thinned_out_for_all() {
         let slow = |slowest: Duration| Competitor {

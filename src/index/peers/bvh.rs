@@ -74,9 +74,9 @@ fn shapes(items: &[Aabb]) -> Result<Vec<Shape>, BuildError> {
         .collect())
 }
 
-/// The crate's tree. Where areas overflow or vanish (coordinates beyond 1e18,
-/// points in a row) it finds no cheapest split and leaves both children with
-/// empty boxes, in which nothing would be found: these are fitted anew.
+/// The crate's tree. Where areas overflow (coordinates beyond 1e18) it finds no
+/// cheapest split and leaves both children with empty boxes, in which nothing
+/// would be found: these are fitted anew.
 fn tree_over(shapes: &mut [Shape]) -> Bvh<f32, 3> {
     let mut tree = Bvh::build(shapes);
     let is_empty = |b: &CrateAabb<f32, 3>| bounds_of(b).is_empty();
@@ -211,10 +211,10 @@ mod tests {
     use crate::index::FrustumQuery;
     use crate::query::NoRecorder;
 
-    /// Without the mending nothing is found here: no box has an area.
+    /// Without the mending nothing is found here: every area overflows.
     #[test]
-    fn points_in_a_row_are_found() {
-        let point = |i: u16| Vec3::new(f32::from(i), 0.0, 0.0);
+    fn points_too_far_apart_for_an_area_are_found() {
+        let point = |i: u16| Vec3::splat(f32::from(i)) * 1e20;
         let items: Vec<Aabb> = (0..100).map(|i| Aabb::new(point(i), point(i))).collect();
         let all = crate::geometry::ConvexVolume::from_planes(&[]).expect("no planes");
         let tree = PeerBvh::build(&items, None, &PeerParams {}).expect("sound items");
