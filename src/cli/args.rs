@@ -408,7 +408,12 @@ pub struct PrecisionArgs {
 #[derive(Args, Debug)]
 pub struct DriftArgs {
     /// The most steps; figures are shown at 1e3, 1e4, ... and there
-    #[arg(long, value_name = "N", default_value = "1e7")]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value = "1e7",
+        allow_negative_numbers = true
+    )]
     pub steps: String,
     /// What a recommended way to turn or orbit may be off after all steps
     #[arg(
