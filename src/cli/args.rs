@@ -4,15 +4,11 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use cullbench::camera::{DEFAULT_EPSILON, PLANE_METHODS, PlaneMethod, PlaneOptions};
-use cullbench::culling::{ARITHMETICS, Arithmetic, Culling, CullingTest, TESTS};
 use cullbench::drift::{DriftOptions, MOST_STEPS};
-use cullbench::kernel::Kernel;
-use cullbench::path::LensDefaults;
 use cullbench::spec::{SpecError, parse_number};
 use cullbench::suite::DEFAULT_PATH;
-use cullbench::threads::{self, MOST_THREADS};
-use glam::DVec3;
+
+use super::shared_args::{CullingArgs, KernelArgs, LensArgs, SceneArgs};
 
 /// Which spatial index finds what a camera sees, and where the camera is:
 /// how fast, and is the answer right?
@@ -91,150 +87,6 @@ pub struct ListArgs {
     pub topic: Option<ListTopic>,
     #[arg(long, value_enum, default_value = "table")]
     pub format: TableFormat,
-}
-
-#[derive(Args, Debug)]
-pub struct SceneArgs {
-    /// Leave out items that are no finite box, and report their number
-    #[arg(long)]
-    pub skip_bad_items: bool,
-}
-
-/// How queries are computed; the answers are the same.
-#[derive(Args, Debug)]
-pub struct KernelArgs {
-    /// Instruction set: portable, avx2 or avx512 [default: the best of this machine]
-    #[arg(long = "kernel", value_name = "NAME")]
-    pub name: Option<String>,
-    /// Threads that a build may use, and that query and locate share cameras and points among
-    #[arg(
-        long,
-        value_name = "N",
-        default_value = "1",
-        allow_negative_numbers = true
-    )]
-    pub threads: String,
-}
-
-impl KernelArgs {
-    /// Makes the choice for the whole process.
-    pub fn choose(&self) -> Result<(), SpecError> {
-        match self.threads.parse() {
-            Ok(count @ 1..=MOST_THREADS) => threads::choose(count),
-            _ => {
-                return Err(SpecError::new(format_args!(
-                    "--threads is '{}'; expected a whole number from 1 to {MOST_THREADS}",
-                    self.threads
-                )));
-            }
-        }
-        let Some(name) = self.name.as_deref() else {
-            return Ok(());
-        };
-        let Some(kernel) = Kernel::named(name) else {
-            let known = Kernel::ALL.iter().map(|kernel| kernel.name());
-            return Err(SpecError::unknown("kernel", name, known));
-        };
-        kernel.choose().map_err(|error| {
-            let here: Vec<_> = Kernel::available().map(Kernel::name).collect();
-            SpecError::new(format_args!("{error}; here are: {}", here.join(", ")))
-        })
-    }
-}
-
-/// Values for cameras that do not bring their own.
-#[derive(Args, Debug)]
-pub struct LensArgs {
-    /// Vertical field of view in degrees for cameras without one
-    #[arg(
-        long,
-        value_name = "DEG",
-        default_value_t = 60.0,
-        allow_negative_numbers = true
-    )]
-    pub fovy: f64,
-    /// Width / height for cameras without one
-    #[arg(long, default_value_t = 16.0 / 9.0, allow_negative_numbers = true)]
-    pub aspect: f64,
-    /// Near plane for cameras without one [default: 0.1 for recorded cameras, far/1000 for paths]
-    #[arg(long, allow_negative_numbers = true)]
-    pub near: Option<f64>,
-    /// Far plane for cameras without one, or inf [default: 1000 for recorded cameras, the scene for paths]
-    #[arg(long, allow_negative_numbers = true)]
-    pub far: Option<String>,
-}
-
-/// How a camera's view is made and tested.
-#[derive(Args, Debug)]
-pub struct CullingArgs {
-    /// Where the planes come from: frame, frame-f32, gh-gl-f32, gh-gl-f64, gh-d3d-f32, gh-d3d-f64, gh-revz-f32, gh-revz-f64
-    #[arg(long, value_name = "METHOD", default_value = "frame")]
-    pub planes: String,
-    /// Factor c of the conservative epsilon; 0 leaves the planes as derived
-    #[arg(long, value_name = "C", default_value_t = DEFAULT_EPSILON, allow_negative_numbers = true)]
-    pub epsilon: f64,
-    /// Numbers the culling test is carried out in: f32, f64, f32-relative
-    #[arg(long, value_name = "NUMBERS", default_value = "f32")]
-    pub arithmetic: String,
-}
-
-impl LensArgs {
-    pub fn defaults(&self) -> Result<LensDefaults, SpecError> {
-        let far = match self.far.as_deref() {
-            None => None,
-            Some(text) if text.eq_ignore_ascii_case("inf") => Some(None),
-            Some(text) => match text.parse::<f64>() {
-                Ok(far) if far.is_finite() => Some(Some(far)),
-                _ => {
-                    return Err(SpecError::new(format_args!(
-                        "--far is '{text}'; expected a finite number or inf"
-                    )));
-                }
-            },
-        };
-        Ok(LensDefaults {
-            fovy_deg: self.fovy,
-            aspect: self.aspect,
-            near: self.near,
-            far,
-            up: DVec3::Z,
-        })
-    }
-}
-
-impl CullingArgs {
-    fn plane_options(&self) -> Result<PlaneOptions, SpecError> {
-        let method = PlaneMethod::named(&self.planes).ok_or_else(|| {
-            SpecError::unknown(
-                "plane method",
-                &self.planes,
-                PLANE_METHODS.iter().map(|row| row.1),
-            )
-        })?;
-        if !(self.epsilon >= 0.0 && self.epsilon.is_finite()) {
-            return Err(SpecError::new(format_args!(
-                "--epsilon is {}; expected a number of at least 0",
-                self.epsilon
-            )));
-        }
-        Ok(PlaneOptions {
-            method,
-            epsilon: self.epsilon,
-        })
-    }
-
-    /// The culling test of that name with everything else as asked for.
-    pub fn culling(&self, test: &str) -> Result<Culling, SpecError> {
-        Ok(Culling {
-            test: CullingTest::named(test)
-                .ok_or_else(|| SpecError::unknown("test", test, TESTS.iter().map(|t| t.1)))?,
-            arithmetic: Arithmetic::named(&self.arithmetic).ok_or_else(|| {
-                let known = ARITHMETICS.iter().map(|a| a.1);
-                SpecError::unknown("arithmetic", &self.arithmetic, known)
-            })?,
-            planes: self.plane_options()?,
-        })
-    }
 }
 
 #[derive(Args, Debug)]
@@ -408,7 +260,12 @@ pub struct PrecisionArgs {
 #[derive(Args, Debug)]
 pub struct DriftArgs {
     /// The most steps; figures are shown at 1e3, 1e4, ... and there
-    #[arg(long, value_name = "N", default_value = "1e7")]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value = "1e7",
+        allow_negative_numbers = true
+    )]
     pub steps: String,
     /// What a recommended way to turn or orbit may be off after all steps
     #[arg(
@@ -506,6 +363,8 @@ pub struct EnvArgs {
 mod tests {
     use super::*;
     use clap::CommandFactory;
+    use cullbench::camera::PLANE_METHODS;
+    use cullbench::culling::{ARITHMETICS, TESTS};
 
     #[test]
     fn the_command_line_is_consistent() {

@@ -21,6 +21,7 @@ mod run_plan;
 mod run_resume;
 mod run_table;
 mod scene;
+mod shared_args;
 mod stress;
 mod surface_diagram;
 mod surface_tables;
@@ -35,6 +36,7 @@ use clap::{CommandFactory, Parser};
 use cullbench::scene::{LoadOptions, Scene};
 
 use args::{Cli, Command, SceneCommand};
+use shared_args::SceneArgs;
 
 /// How a command ended that did not fail.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -86,7 +88,7 @@ fn tell(line: &str) {
 }
 
 /// Loads a scene and says so if some of it was left out.
-fn load_scene(source: &str, args: &args::SceneArgs) -> anyhow::Result<Scene> {
+fn load_scene(source: &str, args: &SceneArgs) -> anyhow::Result<Scene> {
     let options = LoadOptions {
         skip_bad_items: args.skip_bad_items,
     };

@@ -9,7 +9,7 @@ use anyhow::Context;
 
 use super::args::ReportArgs;
 use super::document::{Block, Rows, to_html, to_markdown};
-use super::{Ending, surface_diagram, surface_tables, text};
+use super::{Ending, surface_diagram, surface_tables, tell, text};
 use cullbench::measure::Status;
 use cullbench::report::{
     Comparison, Ranked, Report, ReportCell, comparisons, growths, read_report, surfaces,
@@ -30,6 +30,13 @@ pub fn report(args: &ReportArgs) -> anyhow::Result<Ending> {
         fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
         for picture in &pictures {
             write(&folder.join(format!("{}.svg", picture.name)), &picture.svg)?;
+        }
+        if pictures.is_empty() {
+            tell(&format!(
+                "note: no chart in {}; a chart needs a structure that was measured on two sizes \
+                 of a scene",
+                folder.display()
+            ));
         }
     }
     if let Some(path) = &args.html {

@@ -9,7 +9,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::args::RunArgs;
 use super::run_plan::{Plan, Question};
-use super::run_resume::{finished, open, same_scene, utc_now};
+use super::run_resume::{finished, open, utc_now};
 use super::run_table::show_scene;
 use super::{Ending, interrupt, surface_tables, text, unread_is_fine};
 use cullbench::culling::CullingTest;
@@ -40,7 +40,6 @@ pub fn run(args: &RunArgs) -> anyhow::Result<Ending> {
             bar.set_message(format!("{source}: building"));
             let scene = scene::load(source, &plan.load)?;
             let info = SceneInfo::of(&scene);
-            same_scene(&report, &info)?;
             let mut entered: Option<(bool, Vec<Contender>)> = None;
             for question in questions {
                 if done.contains(&question) {

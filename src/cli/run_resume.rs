@@ -12,9 +12,10 @@ use super::args::RunArgs;
 use super::run_plan::{Plan, Question};
 use cullbench::culling::Culling;
 use cullbench::kernel::Kernel;
-use cullbench::measure::{Machine, SceneInfo, Source, Status, Toolchain, harness_overhead_ns};
+use cullbench::measure::{Machine, Source, Status, Toolchain, harness_overhead_ns};
+use cullbench::path;
 use cullbench::report::{Noise, Report, ReportCell, RunFolder, RunInfo, SCHEMA_VERSION};
-use cullbench::scene::GENERATOR_NAME;
+use cullbench::scene::{self, GENERATOR_NAME};
 
 /// A new folder with an empty report, or the one to go on with.
 pub fn open(args: &RunArgs, plan: &Plan, machine: &Machine) -> anyhow::Result<(RunFolder, Report)> {
@@ -24,7 +25,9 @@ pub fn open(args: &RunArgs, plan: &Plan, machine: &Machine) -> anyhow::Result<(R
             None => newest_unfinished(Path::new("results"))?,
         };
         let (folder, report) = RunFolder::resume(&path)?;
-        same_experiment(&report, plan, args).with_context(|| path.display().to_string())?;
+        same_experiment(&report, plan, args)
+            .and_then(|()| same_inputs(&report, plan))
+            .with_context(|| path.display().to_string())?;
         return Ok((folder, report));
     }
     let now = utc_now();
@@ -143,18 +146,41 @@ fn same_experiment(report: &Report, plan: &Plan, args: &RunArgs) -> anyhow::Resu
     Ok(())
 }
 
-/// A file may have changed since its first cells were measured.
-pub fn same_scene(report: &Report, now: &SceneInfo) -> anyhow::Result<()> {
-    let of_scene = |c: &&ReportCell| c.scene.name == now.name;
-    match report.cells.iter().find(of_scene) {
-        Some(cell) if cell.scene.digest != now.digest => bail!(
-            "scene '{}' has changed: its digest is {}; expected {} as in the cells measured before",
-            now.name,
-            now.digest,
-            cell.scene.digest
-        ),
-        _ => Ok(()),
+/// A file may have changed since its first cells were measured, and the lens
+/// of cameras that bring none: what the report has of the scenes and paths that
+/// are asked for now must be of the very same items and cameras.
+fn same_inputs(report: &Report, plan: &Plan) -> anyhow::Result<()> {
+    for planned in &plan.scenes {
+        let of_scene = |c: &&ReportCell| c.scene.name == planned.source;
+        let Some(before) = report.cells.iter().find(of_scene) else {
+            continue;
+        };
+        let scene = scene::load(&planned.source, &plan.load)?;
+        let (was, is) = (&before.scene.digest, scene.digest());
+        if *was != is {
+            bail!(
+                "scene '{}' has changed: its digest is {is}; expected {was} as in the cells \
+                 measured before",
+                planned.source
+            );
+        }
+        for source in &planned.paths {
+            let cells = report.cells.iter().filter(of_scene);
+            let mut of_path = cells.filter(|c| c.path.name == *source);
+            // Older reports do not tell.
+            let Some(was) = of_path.find_map(|c| c.path.digest.as_ref()) else {
+                continue;
+            };
+            let is = path::digest(&path::load(source, &scene, &plan.lens)?.cameras);
+            if *was != is {
+                bail!(
+                    "path '{source}' has other cameras: their digest is {is}; expected {was} as \
+                     in the cells measured before"
+                );
+            }
+        }
     }
+    Ok(())
 }
 
 /// What the report has already of a scene.

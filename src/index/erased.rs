@@ -310,6 +310,11 @@ pub static BACKENDS: &[Backend] = &[
     Backend::of::<peers::PeerBevyStyle>(),
 ];
 
+/// Whether a build with the feature `peers` has, or may have, such a row.
+fn left_out(name: &str) -> bool {
+    !cfg!(feature = "peers") && (name.starts_with("peer-") || name == "uniform-grid")
+}
+
 /// A structure as asked for: a backend with its parameters.
 #[derive(Clone)]
 pub struct StructureSpec {
@@ -327,6 +332,13 @@ impl StructureSpec {
     pub fn parse(text: &str) -> Result<StructureSpec, SpecError> {
         let spec = Spec::parse(text)?;
         let Some(backend) = Backend::named(spec.name()) else {
+            if left_out(spec.name()) {
+                return Err(SpecError::new(format_args!(
+                    "structure '{}' is not in this build; expected one made with `cargo build \
+                     --features peers`",
+                    spec.name()
+                )));
+            }
             let known = BACKENDS.iter().map(|b| b.name);
             return Err(SpecError::unknown("structure", spec.name(), known));
         };

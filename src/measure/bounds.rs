@@ -6,7 +6,7 @@
 use std::time::Duration;
 
 use super::{Competitor, Contender, Workload};
-use crate::geometry::BoxBlocks;
+use crate::geometry::{Aabb, BoxBlocks};
 use crate::index::{RegionIndex, Trace, Wide};
 use crate::kernel::{Isa, Kernel, Work};
 use crate::query::{AnyView, ItemId};
@@ -67,11 +67,7 @@ impl Work for Read<'_> {
 }
 
 fn read<'a>(material: &Material<'a>) -> Option<Competitor<'a>> {
-    let items = &material.workload.items;
-    let mut blocks = BoxBlocks::with_capacity(items.len());
-    for b in items.iter().filter(|b| !b.is_empty()) {
-        blocks.push(b);
-    }
+    let blocks = blocks_of(&material.workload.items);
     (!blocks.is_empty()).then(|| Competitor {
         ask: Box::new(move |_, _| {
             std::hint::black_box(Kernel::chosen().run(Read(&blocks)));
@@ -80,6 +76,15 @@ fn read<'a>(material: &Material<'a>) -> Option<Competitor<'a>> {
         expected: vec![0; material.visible.len()],
         slowest: Duration::ZERO,
     })
+}
+
+/// All items that have a box, as the structures store them.
+fn blocks_of(items: &[Aabb]) -> BoxBlocks {
+    let mut blocks = BoxBlocks::with_capacity(items.len());
+    for b in items.iter().filter(|b| !b.is_empty()) {
+        blocks.push(b);
+    }
+    blocks
 }
 
 fn memcpy<'a>(material: &Material<'a>) -> Option<Competitor<'a>> {
@@ -194,6 +199,23 @@ mod tests {
             out
         };
         assert_ne!(ids(1).first(), ids(5).first());
+    }
+
+    /// What the bound computes is thrown away; here it is looked at.
+    #[test]
+    fn the_read_bound_reads_the_bounds_of_every_item() {
+        // Whole blocks only: the lanes behind the last item are no item's.
+        let scene = scene::load("uniform:n=320", &Default::default()).unwrap();
+        let bits = |b: &Aabb| [b.min, b.max].map(|corner| corner.to_array().map(f32::to_bits));
+        let all = scene.items.iter().flat_map(bits).flatten();
+        let wanted = all.fold(0, |all, bits| all ^ bits);
+        assert_ne!(wanted, 0);
+        let blocks = blocks_of(&scene.items);
+        for kernel in Kernel::available() {
+            assert_eq!(kernel.run(Read(&blocks)), wanted, "{}", kernel.name());
+        }
+        let inverted = [Aabb::EMPTY, scene.items[0]];
+        assert_eq!(blocks_of(&inverted).len(), 1);
     }
 
     #[test]

@@ -13,6 +13,7 @@ use super::{
     Built, Competitor, Contender, Counted, Judged, Protocol, Sample, Status, Task, Timed, Verdict,
     Workload, count_pass, judge, timed_rounds,
 };
+use crate::path;
 use crate::scene::Scene;
 use crate::statistics::{Estimate, bootstrap_median, median, quantile, sorted};
 
@@ -68,6 +69,9 @@ pub struct PathInfo {
     pub epsilon: f64,
     /// The numbers that the culling test is carried out in.
     pub arithmetic: String,
+    /// SHA-256 over the cameras' frames and lenses; null in older reports.
+    #[serde(default)]
+    pub digest: Option<String>,
 }
 
 impl PathInfo {
@@ -80,6 +84,7 @@ impl PathInfo {
             planes: culling.planes.method.name().to_owned(),
             epsilon: culling.planes.epsilon,
             arithmetic: culling.arithmetic.name().to_owned(),
+            digest: Some(path::digest(&workload.cameras)),
         }
     }
 }

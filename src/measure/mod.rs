@@ -9,6 +9,8 @@
 mod bounds;
 mod cell;
 mod clock;
+mod cold;
+mod competitor;
 mod contender;
 mod count;
 mod environment;
@@ -22,13 +24,12 @@ use serde::{Deserialize, Serialize};
 pub use bounds::{BOUNDS, Bound, Material};
 pub use cell::{Cell, Group, PathInfo, SceneInfo, TwinRatio, measure_group};
 pub use clock::{Lap, Stopwatch};
+pub use competitor::{Ask, AskMany, Competitor, Task};
 pub use contender::{Built, Contender, UPDATE_SHARES, guarded, move_share};
 pub use count::{Counted, FrameCount, Judged, LocateCount, count_pass, id_sum, judge};
 pub use environment::{Machine, Source, Toolchain};
 pub use metrics::{METRICS, Metric, MetricInfo};
-pub use timing::{
-    Ask, AskMany, Competitor, Protocol, Sample, Task, Timed, harness_overhead_ns, timed_rounds,
-};
+pub use timing::{Protocol, Sample, Timed, harness_overhead_ns, timed_rounds};
 pub use workload::{Workload, WorkloadError};
 
 /// What became of a cell. A gap is never silent.

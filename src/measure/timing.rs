@@ -2,14 +2,15 @@
 //! warmed up, several queries per clock reading where one is short. When it is
 //! to be cold, the caches are streamed over before every camera's queries.
 
-use std::cell::RefCell;
 use std::time::{Duration, Instant};
 
 use super::clock::Stopwatch;
+use super::cold::Cold;
+use super::competitor::Competitor;
 use super::contender::guarded;
 use super::orders::Orders;
-use super::{Built, Counted, Status, Verdict, Workload};
-use crate::query::{ItemId, Located};
+use super::{Status, Verdict};
+use crate::query::ItemId;
 
 /// How long and how often to measure.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -36,29 +37,6 @@ pub const MOST_OVERHEAD: f64 = 0.02;
 const WARM_UP: Duration = Duration::from_millis(20);
 /// Cold queries cost a sweep over memory each: fewer of them.
 const COLD_FRAMES: usize = 24;
-/// Room behind the answer that a structure may ask for while it writes it.
-const SLACK: usize = 64;
-
-/// Which of the two questions is asked.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Task {
-    /// What does the camera see?
-    Query,
-    /// Where is the camera?
-    Locate,
-    /// Where are all the cameras of the path? Asked at once.
-    LocateBatched,
-}
-
-impl Task {
-    pub fn name(self) -> &'static str {
-        match self {
-            Task::Query => "query",
-            Task::Locate => "locate",
-            Task::LocateBatched => "locate_batched",
-        }
-    }
-}
 
 /// One clock reading: `queries` consecutive queries from `frame` on.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -101,98 +79,6 @@ impl Timed {
             .filter(|mean| mean.is_finite())
             .collect()
     }
-}
-
-/// Answers query number n: appends ids to an empty output.
-pub type Ask<'a> = Box<dyn Fn(usize, &mut Vec<ItemId>) + 'a>;
-
-/// Answers several queries at once; the number of ids of them all.
-pub type AskMany<'a> = Box<dyn Fn(&[usize]) -> u64 + 'a>;
-
-/// One that takes part in a timed pass: how it answers query `place`
-/// (appending to an empty output), and what it must return.
-pub struct Competitor<'a> {
-    pub ask: Ask<'a>,
-    /// Takes the place of `ask`, and a whole pass is one batch.
-    pub ask_many: Option<AskMany<'a>>,
-    /// Number of ids of every query.
-    pub expected: Vec<u64>,
-    /// Wall time of its slowest query so far: bounds the length of a pass.
-    pub slowest: Duration,
-}
-
-impl<'a> Competitor<'a> {
-    /// A structure that counted right, asked a task of a workload.
-    pub(super) fn of(
-        task: Task,
-        workload: &'a Workload,
-        built: &'a Built,
-        counted: &Counted,
-    ) -> Self {
-        let ask: Ask = match task {
-            Task::Query => {
-                let index = built.items.as_ref();
-                Box::new(move |place, out| index.see(workload.views[place].as_any(), out))
-            }
-            Task::Locate | Task::LocateBatched => {
-                let index = built.regions();
-                Box::new(move |place, out| {
-                    let p = workload.points[place];
-                    index.locate(p, out);
-                    workload.refine(p, out);
-                })
-            }
-        };
-        let ask_many = (task == Task::LocateBatched).then(|| located_at_once(workload, built));
-        Competitor {
-            ask,
-            ask_many,
-            expected: match task {
-                Task::Query => counted.frames.iter().map(|f| f.visible).collect(),
-                Task::Locate | Task::LocateBatched => counted.locate.found.clone(),
-            },
-            slowest: counted.slowest,
-        }
-    }
-
-    /// Asks the queries of some places; the number of ids returned.
-    #[inline]
-    fn ask_all(&self, places: &[usize], out: &mut Vec<ItemId>) -> u64 {
-        if let Some(ask_many) = &self.ask_many {
-            return ask_many(places);
-        }
-        let mut returned = 0;
-        for &place in places {
-            out.clear();
-            (self.ask)(place, out);
-            returned += std::hint::black_box(&*out).len() as u64;
-        }
-        returned
-    }
-}
-
-/// Region search for several points of the path in one call. The memory for
-/// points and answers is kept from call to call.
-fn located_at_once<'a>(workload: &'a Workload, built: &'a Built) -> AskMany<'a> {
-    let index = built.regions();
-    let kept = RefCell::new((Vec::new(), Located::default(), Vec::new()));
-    Box::new(move |places| {
-        let (points, located, region) = &mut *kept.borrow_mut();
-        points.clear();
-        points.extend(places.iter().map(|&place| workload.points[place]));
-        index.locate_many(points, located);
-        if workload.scene.regions.are_boxes() {
-            return std::hint::black_box(&*located).ids().len() as u64;
-        }
-        let mut found = 0;
-        for (&p, ids) in points.iter().zip(located.iter()) {
-            region.clear();
-            region.extend_from_slice(ids);
-            workload.refine(p, region);
-            found += std::hint::black_box(&*region).len() as u64;
-        }
-        found
-    })
 }
 
 /// Times all competitors on `count` queries each. `stop` ends the pass early
@@ -324,32 +210,6 @@ impl Pass<'_, '_> {
     }
 }
 
-/// What cold queries need. One sweep serves one query of every competitor: each
-/// has data of its own, which no other's query brings back, and its own output.
-struct Cold {
-    sweep: Sweep,
-    outs: Vec<Vec<ItemId>>,
-}
-
-impl Cold {
-    /// The outputs have their final size: a query that is asked once a sweep
-    /// must not pay for their growth.
-    fn new(protocol: &Protocol, competitors: &[Competitor]) -> Cold {
-        let most = |c: &Competitor| c.expected.iter().copied().max().unwrap_or(0) as usize;
-        Cold {
-            sweep: Sweep::new(protocol.cache_bytes),
-            outs: competitors
-                .iter()
-                .map(|c| {
-                    let mut out = vec![0; most(c) + SLACK];
-                    out.clear();
-                    out
-                })
-                .collect(),
-        }
-    }
-}
-
 /// The places along the path that are timed: all, or evenly thinned out so
 /// that the slowest competitor keeps to the length of a pass.
 fn places(count: usize, competitors: &[Competitor], protocol: &Protocol) -> Vec<usize> {
@@ -399,23 +259,6 @@ fn warm_up(competitor: &Competitor, places: &[usize], batch: usize, out: &mut Ve
     }
 }
 
-/// Something larger than the last cache, to be read between cold queries.
-struct Sweep(Vec<u64>);
-
-impl Sweep {
-    fn new(bytes: usize) -> Self {
-        Sweep(vec![1; bytes / size_of::<u64>()])
-    }
-
-    fn over_caches(&mut self) {
-        // Written, not only read: shared zero pages would stay in one line.
-        for line in self.0.chunks_mut(8) {
-            line[0] = line[0].wrapping_add(1);
-        }
-        std::hint::black_box(&self.0);
-    }
-}
-
 /// What the harness itself costs per clock reading: the very same loop over a
 /// competitor that does nothing. Nanoseconds of thread CPU time, median.
 pub fn harness_overhead_ns() -> f64 {
@@ -441,7 +284,8 @@ mod tests {
     use super::*;
     use crate::culling::{Culling, CullingTest};
     use crate::index::StructureSpec;
-    use crate::measure::{Contender, count_pass};
+    use crate::measure::competitor::Task;
+    use crate::measure::{Built, Contender, Workload, count_pass};
     use crate::path::{self, LensDefaults};
     use crate::scene;
 

@@ -18,7 +18,7 @@ use glam::DVec3;
 
 use crate::camera::{Camera, CameraError, Frame, Lens, Surroundings};
 use crate::input::InputError;
-use crate::scene::{Dice, Scene, WorldBox};
+use crate::scene::{self, Dice, Scene, WorldBox};
 use crate::spec::{Spec, SpecError};
 
 pub use recorded::{LensDefaults, read_cameras_csv, read_points_csv};
@@ -29,6 +29,42 @@ pub struct CameraPath {
     /// As it was asked for: a file or a spec such as `orbit:frames=512`.
     pub name: String,
     pub cameras: Vec<Camera>,
+}
+
+/// SHA-256 over frames and lenses: two paths with the same digest ask the same
+/// questions about a scene. O(n).
+pub fn digest(cameras: &[Camera]) -> String {
+    let mut hash = hmac_sha256::Hash::new();
+    let mut add = |value: f64| hash.update(value.to_bits().to_le_bytes());
+    // No far plane is an infinite one, which no lens can have otherwise.
+    let far = |far: Option<f64>| far.unwrap_or(f64::INFINITY);
+    for Camera { frame, lens } in cameras {
+        for axis in [frame.eye, frame.u(), frame.v(), frame.n()] {
+            axis.to_array().into_iter().for_each(&mut add);
+        }
+        // The kind of the lens first.
+        let lens: &[f64] = match *lens {
+            Lens::Perspective {
+                fovy_deg,
+                aspect,
+                near,
+                far: end,
+            } => &[0.0, fovy_deg, aspect, near, far(end)],
+            Lens::Orthographic {
+                height,
+                aspect,
+                near,
+                far,
+            } => &[1.0, height, aspect, near, far],
+            Lens::OffAxis {
+                window: [left, right, bottom, top],
+                near,
+                far: end,
+            } => &[2.0, left, right, bottom, top, near, far(end)],
+        };
+        lens.iter().copied().for_each(&mut add);
+    }
+    scene::hex(&hash.finalize())
 }
 
 /// A kind of path.
@@ -316,7 +352,6 @@ fn up_for(forward: DVec3) -> DVec3 {
 mod tests {
     use super::*;
     use crate::camera::PlaneOptions;
-    use crate::scene;
 
     fn scene(source: &str) -> Scene {
         scene::load(source, &Default::default()).unwrap()
@@ -333,6 +368,37 @@ mod tests {
             scene.items.iter().filter(|b| volume.sees(b)).count()
         });
         visible.sum::<usize>() as f64 / (path.cameras.len() * scene.items.len()) as f64
+    }
+
+    #[test]
+    fn the_digest_tells_cameras_apart() {
+        let scene = scene("city:n=100");
+        let cameras = path("orbit:frames=3", &scene).cameras;
+        assert_eq!(digest(&cameras), digest(&cameras.clone()));
+        let mut digests = vec![digest(&cameras), digest(&cameras[1..])];
+        let turned = {
+            let mut turned = cameras.clone();
+            turned.swap(0, 1);
+            turned
+        };
+        digests.push(digest(&turned));
+        let window = [-1.0, 1.0, -1.0, 1.0];
+        for lens in [
+            Lens::perspective(50.0, 1.5, 0.1, Some(9.0)),
+            Lens::perspective(50.0, 1.5, 0.1, Some(9.5)),
+            Lens::perspective(50.0, 1.5, 0.1, None),
+            Lens::perspective(50.0, 1.5, 0.2, None),
+            Lens::orthographic(50.0, 1.5, 0.1, 9.0),
+            Lens::off_axis(window, 0.1, Some(9.0)),
+            Lens::off_axis(window, 0.1, None),
+        ] {
+            let mut other = cameras.clone();
+            other[2].lens = lens.unwrap();
+            digests.push(digest(&other));
+        }
+        for (i, one) in digests.iter().enumerate() {
+            assert!(one.len() == 64 && !digests[..i].contains(one), "{i}");
+        }
     }
 
     #[test]

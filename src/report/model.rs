@@ -167,6 +167,7 @@ mod tests {
             planes: "frame".into(),
             epsilon: 8.0,
             arithmetic: "f32".into(),
+            digest: None,
         };
         for value in [1.02, 0.99] {
             let ratio = Estimate {

@@ -165,6 +165,11 @@ pub(super) mod tests {
         assert_eq!(winners, ["a", "peer-x"]);
         let peer = comparison.fastest_peer().unwrap();
         assert_eq!(peer.structure, "peer-x");
+        let failed = Comparison {
+            ranked: super::ranked(cells[2..3].iter().collect(), 0.05),
+            bounds: Vec::new(),
+        };
+        assert!(failed.fastest_peer().is_none() && failed.winners().next().is_none());
         assert_eq!(
             times_as_fast(peer, &cells[0]),
             Some((1000.0 / 100.0) / (1000.0 / 104.0))

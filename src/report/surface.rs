@@ -245,6 +245,22 @@ mod tests {
     }
 
     #[test]
+    fn linear_is_overtaken_for_good_where_it_is_overtaken_last() {
+        let times = [
+            (1_000, 2000.0),
+            (10_000, 500.0),
+            (100_000, 2000.0),
+            (1_000_000, 500.0),
+        ];
+        let places = times.map(|(items, ns)| comparison(items, 0.02, &[("bvh", ns)]));
+        let surfaces = surfaces(places.into_iter().collect());
+        let Some(Crossing::At(items)) = surfaces[0].crossing("bvh", 0.02) else {
+            panic!("no crossing");
+        };
+        assert!((items / 316_227.766_017 - 1.0).abs() < 1e-9, "{items}");
+    }
+
+    #[test]
     fn classes_are_the_nearest_steps_and_worlds_lose_their_size_only() {
         for (share, class) in [
             (0.0011, 0.001),

@@ -275,6 +275,22 @@ fn points_that_are_none_are_refused() {
     all_refused(&folder, &locate("folder.csv"), "folder.csv: Is a dir");
 }
 
+/// A structure of docs/PEERS.md is no misspelt one.
+#[cfg(not(feature = "peers"))]
+#[test]
+fn structures_of_another_build_are_refused_with_the_feature_they_need() {
+    let folder = with_good_files(&[]);
+    for name in ["peer-rstar", "uniform-grid", "peer-unheard-of"] {
+        let commands = [
+            format!("query --scene scene.csv --cameras cameras.csv --structure {name}"),
+            format!("run --scene scene.csv --structure linear,{name} --out new/run"),
+            format!("verify --cases 1 --structure {name}"),
+        ];
+        let wanted = format!("'{name}' | not in this build | expected | --features peers");
+        all_refused(&folder, &commands, &wanted);
+    }
+}
+
 #[test]
 fn options_that_name_nothing_are_refused_with_the_nearest_name() {
     let cases: [(&str, &str); 16] = [

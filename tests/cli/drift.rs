@@ -317,6 +317,9 @@ fn what_cannot_be_drifted_is_refused() {
         let typed = if steps == "''" { "" } else { steps };
         let wanted = format!("--steps is '{typed}' | expected a whole number from 1 to 1e9");
         all_refused(&folder, &[format!("drift --steps={steps}")], &wanted);
+        if !typed.is_empty() {
+            all_refused(&folder, &[format!("drift --steps {steps}")], &wanted);
+        }
     }
     for tolerance in ["0", "-1e-6", "nan", "inf"] {
         let wanted = "--tolerance is | expected a number above 0";

@@ -74,6 +74,22 @@ fn a_run_is_reported_as_markdown_as_pictures_and_as_a_page() {
     );
 }
 
+#[test]
+fn a_run_of_one_size_has_no_chart_and_says_so() {
+    let folder = folder(&[]);
+    let run = "run --scene uniform:n=300 --path orbit:frames=8 --structure linear,bvh --out run";
+    works(folder.path(), run);
+    let done = cullbench(folder.path(), "report run --svg charts");
+    assert_eq!((done.code, done.out.as_str()), (Some(0), ""));
+    assert_eq!(done.err.lines().count(), 1, "{}", done.err);
+    assert!(
+        done.err.starts_with("note: no chart in charts;"),
+        "{}",
+        done.err
+    );
+    assert!(contents(&folder.path().join("charts")).is_empty());
+}
+
 /// The crossover of a report whose figures are known.
 #[test]
 fn figures_are_read_off_not_measured() {

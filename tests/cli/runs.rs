@@ -7,8 +7,8 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::BOXES;
 use super::process::*;
+use super::{BOXES, EYE_LOOK};
 
 pub fn report(run: &Path) -> Value {
     json(&fs::read_to_string(run.join("report.json")).expect("a report"))
@@ -301,4 +301,52 @@ fn a_scene_that_changes_between_stop_and_resume_is_noticed() {
         &[resume],
         "scene 'scene.csv' has changed | expected",
     );
+}
+
+#[test]
+fn cameras_that_change_between_stop_and_resume_are_noticed() {
+    let folder = with_good_files(&[]);
+    let of_file = "run --scene scene.csv --path cameras.csv --structure linear,bvh --out r";
+    works(folder.path(), of_file);
+    let spin = "run --scene scene.csv --path spin:frames=4 --structure linear,bvh --out s";
+    works(folder.path(), spin);
+    let more = "--path orbit:frames=4 --resume";
+    // The first has nothing left to do, and is refused all the same.
+    let commands = [
+        format!("{of_file} --resume --fovy 40"),
+        format!("{of_file} {more} --far 50"),
+    ];
+    all_refused(
+        &folder,
+        &commands,
+        "path 'cameras.csv' has other cameras | expected",
+    );
+    let commands = [format!("{spin} {more} --near 0.5")];
+    all_refused(
+        &folder,
+        &commands,
+        "path 'spin:frames=4' has other cameras | expected",
+    );
+    let cameras = folder.path().join("cameras.csv");
+    let before = fs::read(&cameras).expect("cameras");
+    fs::write(&cameras, format!("{EYE_LOOK}\n-9,0.5,0.5,0,0.5,0.25\n")).expect("writable");
+    let commands = [format!("{of_file} {more}")];
+    all_refused(
+        &folder,
+        &commands,
+        "path 'cameras.csv' has other cameras | expected",
+    );
+    fs::write(&cameras, before).expect("writable");
+    works(folder.path(), &format!("{of_file} {more}"));
+    // A report from before there was a digest is taken as it is.
+    let report = folder.path().join("s/report.json");
+    let mut old = json(&fs::read_to_string(&report).expect("a report"));
+    for cell in old["cells"].as_array_mut().expect("cells") {
+        cell["path"]
+            .as_object_mut()
+            .expect("a path")
+            .remove("digest");
+    }
+    fs::write(&report, old.to_string()).expect("writable");
+    works(folder.path(), &format!("{spin} {more}"));
 }

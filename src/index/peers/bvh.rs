@@ -74,21 +74,39 @@ fn shapes(items: &[Aabb]) -> Result<Vec<Shape>, BuildError> {
         .collect())
 }
 
-/// The crate's tree. Where areas overflow or vanish (coordinates beyond 1e18,
-/// points in a row) it finds no cheapest split and leaves both children with
-/// empty boxes, in which nothing would be found: these are fitted anew.
+/// Boxes of this reach have areas that are still numbers in f32.
+const LARGEST: f32 = 1e18;
+
+/// The crate's tree. Where areas overflow its builder finds no cheapest split
+/// and leaves both children with empty boxes, in which nothing would be found;
+/// where widths do, it panics. It is given such a scene made smaller, and the
+/// nodes are then fitted to the true boxes.
 fn tree_over(shapes: &mut [Shape]) -> Bvh<f32, 3> {
-    let mut tree = Bvh::build(shapes);
-    let is_empty = |b: &CrateAabb<f32, 3>| bounds_of(b).is_empty();
-    let broken = |node: &BvhNode<f32, 3>| match node {
-        BvhNode::Node {
-            child_l_aabb,
-            child_r_aabb,
-            ..
-        } => is_empty(child_l_aabb) || is_empty(child_r_aabb),
-        BvhNode::Leaf { .. } => false,
+    let scene = Aabb::union_of(shapes.iter().map(|shape| &shape.item.bounds));
+    let too_large = !shapes.is_empty() && scene.reach().max_element() > LARGEST;
+    let mut tree = match too_large {
+        false => Bvh::build(shapes),
+        true => {
+            let smaller = |shape: &Shape| {
+                let b = shape.item.bounds;
+                let bounds = Aabb::new(b.min / LARGEST, b.max / LARGEST);
+                Shape {
+                    item: Item {
+                        bounds,
+                        ..shape.item
+                    },
+                    ..*shape
+                }
+            };
+            let mut all: Vec<Shape> = shapes.iter().map(smaller).collect();
+            let tree = Bvh::build(&mut all);
+            for (shape, placed) in shapes.iter_mut().zip(&all) {
+                shape.node = placed.node;
+            }
+            tree
+        }
     };
-    if tree.nodes.iter().any(broken) {
+    if too_large {
         let mut fitted = vec![CrateAabb::empty(); tree.nodes.len()];
         // Children come after their parent.
         for at in (0..tree.nodes.len()).rev() {
@@ -211,10 +229,17 @@ mod tests {
     use crate::index::FrustumQuery;
     use crate::query::NoRecorder;
 
-    /// Without the mending nothing is found here: no box has an area.
+    /// Left to the crate, nothing is found where areas overflow, and where
+    /// widths do there is no tree.
     #[test]
-    fn points_in_a_row_are_found() {
-        let point = |i: u16| Vec3::new(f32::from(i), 0.0, 0.0);
+    fn points_without_an_area_or_too_far_apart_for_one_are_found() {
+        found(|i| Vec3::X * f32::from(i));
+        for step in [1e20, 6.8e36] {
+            found(|i| (Vec3::splat(f32::from(i)) - 50.0) * step);
+        }
+    }
+
+    fn found(point: impl Fn(u16) -> Vec3) {
         let items: Vec<Aabb> = (0..100).map(|i| Aabb::new(point(i), point(i))).collect();
         let all = crate::geometry::ConvexVolume::from_planes(&[]).expect("no planes");
         let tree = PeerBvh::build(&items, None, &PeerParams {}).expect("sound items");

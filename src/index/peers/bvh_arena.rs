@@ -148,6 +148,7 @@ seen_box_by_box!(PeerBvhArena);
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::query::NoRecorder;
 
     #[test]
     fn every_place_comes_once_and_neighbours_lie_apart() {
@@ -173,5 +174,16 @@ mod tests {
             matches!(error, Some(BuildError::Refused { .. })),
             "{error:?}"
         );
+    }
+
+    /// In the scene's own order each of these would go below the last one.
+    #[test]
+    fn a_sorted_scene_does_not_become_a_list() {
+        let item = |i: u16| Aabb::around(Vec3::X * (f32::from(i) * 2.0), Vec3::splat(0.5));
+        let items: Vec<Aabb> = (0..6000).map(item).collect();
+        let tree = PeerBvhArena::build(&items, None, &PeerParams {}).expect("a tree");
+        let mut found = Vec::new();
+        let _ = tree.locate(Vec3::X * 8000.0, &mut found, &mut NoRecorder);
+        assert_eq!(found, [4000]);
     }
 }

@@ -59,10 +59,12 @@ impl Tree {
     }
 
     fn memory(&self) -> MemoryUsage {
+        // The crate counts the place of a leaf as a number; it keeps an Option.
+        let uncounted = self.ids.len() * (size_of::<Option<usize>>() - size_of::<usize>());
         // Half of the nodes are the leaves.
         let leaves = self.ids.len() * size_of::<BvhNode>();
         MemoryUsage {
-            node_bytes: self.bvh.heap_memory_size().saturating_sub(leaves),
+            node_bytes: (self.bvh.heap_memory_size() + uncounted).saturating_sub(leaves),
             item_bytes: leaves + size_of_val(&self.ids[..]),
         }
     }

@@ -1,0 +1,53 @@
+//! What cold queries need: something to stream over the caches with, and
+//! outputs that do not grow while they are timed. When to sweep is the timed
+//! pass's business.
+
+use super::competitor::Competitor;
+use super::timing::Protocol;
+use crate::query::ItemId;
+
+/// Room behind the answer that a structure may ask for while it writes it.
+const SLACK: usize = 64;
+
+/// What cold queries need. One sweep serves one query of every competitor: each
+/// has data of its own, which no other's query brings back, and its own output.
+pub(super) struct Cold {
+    pub(super) sweep: Sweep,
+    pub(super) outs: Vec<Vec<ItemId>>,
+}
+
+impl Cold {
+    /// The outputs have their final size: a query that is asked once a sweep
+    /// must not pay for their growth.
+    pub(super) fn new(protocol: &Protocol, competitors: &[Competitor]) -> Cold {
+        let most = |c: &Competitor| c.expected.iter().copied().max().unwrap_or(0) as usize;
+        Cold {
+            sweep: Sweep::new(protocol.cache_bytes),
+            outs: competitors
+                .iter()
+                .map(|c| {
+                    let mut out = vec![0; most(c) + SLACK];
+                    out.clear();
+                    out
+                })
+                .collect(),
+        }
+    }
+}
+
+/// Something larger than the last cache, to be read between cold queries.
+pub(super) struct Sweep(Vec<u64>);
+
+impl Sweep {
+    fn new(bytes: usize) -> Self {
+        Sweep(vec![1; bytes / size_of::<u64>()])
+    }
+
+    pub(super) fn over_caches(&mut self) {
+        // Written, not only read: shared zero pages would stay in one line.
+        for line in self.0.chunks_mut(8) {
+            line[0] = line[0].wrapping_add(1);
+        }
+        std::hint::black_box(&self.0);
+    }
+}
