@@ -62,47 +62,85 @@ impl Corner {
     }
 }
 
-/// One plane as the block kernel reads it, in vectors: for many blocks that only
-/// this plane is open for.
+/// One plane as the block kernels read it, in vectors, for many blocks.
+///
+/// A corner is outside if `(n.x x + n.y y + n.z z) + d < 0`. Here it is if the
+/// sum in brackets is below `-d`, which is the same bit for bit: a rounded sum
+/// of two numbers has the sign of the exact one, and is zero only where that is.
 #[derive(Clone, Copy)]
 pub struct Blade<I: Isa> {
     normal: [I::Floats; 3],
-    d: I::Floats,
+    least: I::Floats,
     corner: Corner,
 }
 
 impl<I: Isa> Blade<I> {
     #[inline(always)]
-    pub fn new(isa: I, plane: &Plane, corner: Corner) -> Self {
-        let [x, y, z] = plane.normal.to_array();
+    pub fn new(isa: I, volume: &ConvexVolume, bit: u32) -> Self {
+        let [x, y, z] = volume.plane_of_bit(bit).normal.to_array();
         Blade {
             normal: [isa.splat(x), isa.splat(y), isa.splat(z)],
-            d: isa.splat(plane.d),
-            corner,
+            least: isa.splat(volume.least_of_bit(bit)),
+            corner: volume.corner_of_bit(bit),
         }
     }
 
-    /// The lanes that the plane does not exclude: bit for bit
-    /// [`BoxBlock::admitted_by`].
+    /// Those of the lanes that the plane does not exclude.
     #[inline(always)]
-    pub fn admitted(&self, isa: I, block: &BoxBlock) -> LaneMask {
-        !isa.below_zero(self.values(isa, block))
-    }
-
-    /// [`Plane::value_at`] of the p-vertices.
-    #[inline(always)]
-    fn values(&self, isa: I, block: &BoxBlock) -> I::Floats {
+    fn keep(&self, isa: I, kept: I::Kept, block: &BoxBlock) -> I::Kept {
         let [a, b, c] = self.normal;
         let [x, y, z] = block.numbered_rows(self.corner.far());
         let sum = isa.add(isa.mul(a, isa.load(x)), isa.mul(b, isa.load(y)));
         let sum = isa.add(sum, isa.mul(c, isa.load(z)));
-        isa.add(sum, self.d)
+        isa.keep(kept, sum, self.least)
+    }
+
+    /// [`BoxBlock::admitted_by`] for this plane alone.
+    #[inline(always)]
+    pub fn admitted(&self, isa: I, block: &BoxBlock) -> LaneMask {
+        isa.kept(self.keep(isa, isa.keep_all(), block))
     }
 
     /// Asks for the rows that [`Blade::admitted`] reads.
     #[inline(always)]
     pub fn prefetch(&self, block: &BoxBlock) {
         block.prefetch_corner(self.corner);
+    }
+}
+
+/// Planes of [`Blades`]: those of a frustum.
+pub const MOST_BLADES: usize = 6;
+
+/// The planes of a volume, all of them made ready for many blocks.
+#[derive(Clone, Copy)]
+pub struct Blades<I: Isa>([Blade<I>; MOST_BLADES]);
+
+impl<I: Isa> Blades<I> {
+    /// The planes of a mask; `None` if they are too many.
+    #[inline(always)]
+    pub fn new(isa: I, volume: &ConvexVolume, mask: PlaneMask) -> Option<Self> {
+        // Where there are fewer, the first one is tested again; a volume
+        // without any has a plane that excludes nothing in its place.
+        let first = Blade::new(isa, volume, mask.trailing_zeros());
+        let mut blades = [first; MOST_BLADES];
+        let mut left = mask;
+        for blade in &mut blades {
+            if left != 0 {
+                *blade = Blade::new(isa, volume, left.trailing_zeros());
+                left &= left - 1;
+            }
+        }
+        (left == 0).then_some(Blades(blades))
+    }
+
+    /// [`BoxBlock::admitted_by`] for these planes.
+    #[inline(always)]
+    pub fn admitted(&self, isa: I, block: &BoxBlock) -> LaneMask {
+        let mut kept = isa.keep_all();
+        for blade in &self.0 {
+            kept = blade.keep(isa, kept, block);
+        }
+        isa.kept(kept)
     }
 }
 
@@ -204,23 +242,18 @@ impl BoxBlock {
     /// may.
     #[inline(always)]
     pub fn admitted_by<I: Isa>(&self, isa: I, volume: &ConvexVolume, mask: PlaneMask) -> LaneMask {
-        // The lowest value over all planes: below zero iff some plane's is. A
-        // NaN (an overflow on both sides) excludes nothing, as in the scalar
-        // test, because it compares false.
-        let mut lowest = isa.splat(f32::INFINITY);
+        let mut kept = isa.keep_all();
         let mut left = mask;
         while left != 0 {
-            let bit = left.trailing_zeros();
+            kept = Blade::new(isa, volume, left.trailing_zeros()).keep(isa, kept, self);
             left &= left - 1;
-            let (plane, corner) = (volume.plane_of_bit(bit), volume.corner_of_bit(bit));
-            let value = values_at(isa, plane, self.numbered_rows(corner.far()));
-            lowest = isa.lower(value, lowest);
         }
-        !isa.below_zero(lowest)
+        isa.kept(kept)
     }
 
     /// [`BoxBlock::admitted_by`] for four blocks: each plane's numbers are made
-    /// ready once for all of them, which pays where all planes are open.
+    /// ready once for all of them, which pays where all planes are open and
+    /// registers are too few to keep them ([`Blades`]).
     #[inline(always)]
     pub fn four_admitted_by<I: Isa>(
         isa: I,
@@ -228,21 +261,20 @@ impl BoxBlock {
         volume: &ConvexVolume,
         mask: PlaneMask,
     ) -> [LaneMask; 4] {
-        let mut lowest = [isa.splat(f32::INFINITY); 4];
+        let mut kept = [isa.keep_all(); 4];
         let mut left = mask;
         while left != 0 {
-            let bit = left.trailing_zeros();
+            let blade = Blade::new(isa, volume, left.trailing_zeros());
             left &= left - 1;
-            let blade = Blade::new(isa, volume.plane_of_bit(bit), volume.corner_of_bit(bit));
-            for (block, lowest) in blocks.iter().zip(&mut lowest) {
-                *lowest = isa.lower(blade.values(isa, block), *lowest);
+            for (kept, block) in kept.iter_mut().zip(blocks) {
+                *kept = blade.keep(isa, *kept, block);
             }
         }
         [
-            !isa.below_zero(lowest[0]),
-            !isa.below_zero(lowest[1]),
-            !isa.below_zero(lowest[2]),
-            !isa.below_zero(lowest[3]),
+            isa.kept(kept[0]),
+            isa.kept(kept[1]),
+            isa.kept(kept[2]),
+            isa.kept(kept[3]),
         ]
     }
 
@@ -256,19 +288,19 @@ impl BoxBlock {
         volume: &ConvexVolume,
         mask: PlaneMask,
     ) -> (LaneMask, I::Words) {
-        let mut lowest = isa.splat(f32::INFINITY);
+        let mut kept = isa.keep_all();
         let mut open = isa.splat_word(mask);
         let mut left = mask;
         while left != 0 {
             let bit = left.trailing_zeros();
             left &= left - 1;
-            let (plane, corner) = (volume.plane_of_bit(bit), volume.corner_of_bit(bit));
-            let farthest = values_at(isa, plane, self.numbered_rows(corner.far()));
-            lowest = isa.lower(farthest, lowest);
-            let nearest = values_at(isa, plane, self.numbered_rows(corner.near()));
-            open = isa.without(open, nearest, 1 << bit);
+            let blade = Blade::new(isa, volume, bit);
+            kept = blade.keep(isa, kept, self);
+            let near = self.numbered_rows(blade.corner.near());
+            let nearest = sums_at(isa, volume.plane_of_bit(bit).normal, near);
+            open = isa.without(open, nearest, blade.least, 1 << bit);
         }
-        (!isa.below_zero(lowest), open)
+        (isa.kept(kept), open)
     }
 
     #[inline(always)]
@@ -572,6 +604,11 @@ mod tests {
                 let four = [*block; 4];
                 let four = BoxBlock::four_admitted_by(BASELINE, &four, &volume, volume.mask());
                 prop_assert_eq!(four, [admitted; 4]);
+                let ready = Blades::new(BASELINE, &volume, volume.mask());
+                prop_assert_eq!(ready.is_some(), volume.mask().count_ones() <= 6);
+                if let Some(ready) = ready {
+                    prop_assert_eq!(ready.admitted(BASELINE, block), admitted);
+                }
                 for lane in (0..LANES).filter(|lane| lanes >> lane & 1 == 1) {
                     let b = &boxes[start + lane];
                     seen += 1;

@@ -90,6 +90,8 @@ pub struct ConvexVolume {
     mask: PlaneMask,
     upper: [Upper; MAX_PLANES],
     corners: [Corner; MAX_PLANES],
+    /// What `n * p` must not be below: `-d`.
+    least: [f32; MAX_PLANES],
 }
 
 impl ConvexVolume {
@@ -133,6 +135,7 @@ impl ConvexVolume {
             mask: 0,
             upper: [[true; 3]; MAX_PLANES],
             corners: [Corner::of([true; 3]); MAX_PLANES],
+            least: [0.0; MAX_PLANES],
         };
         for (index, (plane, name)) in planes.enumerate() {
             if !plane.is_finite() {
@@ -142,6 +145,7 @@ impl ConvexVolume {
             volume.names[index] = name;
             volume.upper[index] = plane.upper();
             volume.corners[index] = Corner::of(plane.upper());
+            volume.least[index] = -plane.d;
             volume.mask |= PlaneMask::from(!plane.is_trivial()) << index;
         }
         Ok(volume)
@@ -163,6 +167,12 @@ impl ConvexVolume {
     #[inline(always)]
     pub fn corner_of_bit(&self, index: u32) -> Corner {
         self.corners[index as usize % MAX_PLANES]
+    }
+
+    /// `-d` of plane `index`, likewise.
+    #[inline(always)]
+    pub fn least_of_bit(&self, index: u32) -> f32 {
+        self.least[index as usize % MAX_PLANES]
     }
 
     /// [`Plane::upper`] of plane `index`, likewise.

@@ -14,7 +14,7 @@ mod wide_volume;
 
 pub use aabb::Aabb;
 pub use box_block::{
-    ALL_ROWS, Blade, BoxBlock, BoxBlocks, Corner, LANES, LaneMask, ROWS, RowMask, lanes_of,
+    ALL_ROWS, Blade, Blades, BoxBlock, BoxBlocks, Corner, LANES, LaneMask, ROWS, RowMask, lanes_of,
 };
 pub use convex_volume::{ConvexVolume, FrustumPlane, MAX_PLANES, PlaneMask, VolumeError};
 pub use plane::{Plane, Upper};

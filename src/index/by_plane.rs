@@ -28,13 +28,13 @@ impl ByPlane {
         for (nodes, open, lanes) in frontier.rows() {
             let (nodes, open) = (isa.words(nodes), isa.words(open));
             let mut rest = lanes;
-            for plane in 0..LISTED {
+            for (plane, (list, used)) in self.lists.iter_mut().zip(&mut used).enumerate() {
                 let alone = isa.equal(open, 1 << plane) & lanes;
                 rest &= !alone;
-                if let Some(place) = self.lists[plane][used[plane]..].first_chunk_mut() {
+                if let Some(place) = list[*used..].first_chunk_mut() {
                     isa.pack(place, nodes, alone);
                 }
-                used[plane] += alone.count_ones() as usize;
+                *used += alone.count_ones() as usize;
             }
             self.rest.push(isa, nodes, open, rest);
         }

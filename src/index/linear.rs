@@ -7,11 +7,12 @@ use std::ops::ControlFlow;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
+use super::id_rows::IdRows;
 use super::tree::{scan_blocks, visible_on_baseline};
 use super::{BuildError, FrustumQuery, MemoryUsage, RegionIndex, indexable};
-use crate::geometry::{Aabb, BoxBlocks, LANES, PlaneTree, lanes_of};
+use crate::geometry::{Aabb, BoxBlock, BoxBlocks, LANES, LaneMask, PlaneMask, PlaneTree, lanes_of};
 use crate::kernel::{BASELINE, Isa};
-use crate::query::{ItemId, Recorder, Region, Sink, View};
+use crate::query::{AsEver, ItemId, Planes, Recorder, Region, Sink, Tests, View};
 
 /// A scan has nothing to choose.
 #[derive(Clone, Copy, Default, Debug, Serialize, Deserialize)]
@@ -89,7 +90,7 @@ impl FrustumQuery for LinearScalar {
 /// way out. O(n) per query, with a constant several times smaller.
 pub struct Linear {
     boxes: BoxBlocks,
-    ids: Vec<ItemId>,
+    ids: IdRows,
 }
 
 impl Linear {
@@ -114,6 +115,34 @@ impl Linear {
     }
 }
 
+impl Linear {
+    #[inline(always)]
+    fn scan_all<I: Isa, P: Planes<I>, S: Sink, R: Recorder>(
+        &self,
+        isa: I,
+        mask: PlaneMask,
+        planes: P,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        let blocks = self.boxes.blocks().chunks(TOGETHER);
+        let mut items = self.ids.len();
+        for (blocks, ids) in blocks.zip(self.ids.rows().chunks(TOGETHER)) {
+            let tests = AllOf {
+                blocks,
+                planes,
+                items,
+                open: mask.count_ones(),
+                recorder: &mut *recorder,
+                four: [0; 4],
+            };
+            sink.accept_tested(isa, ids, tests)?;
+            items -= items.min(TOGETHER * LANES);
+        }
+        ControlFlow::Continue(())
+    }
+}
+
 impl RegionIndex for Linear {
     const NAME: &'static str = "linear";
     const SUMMARY: &'static str = "scan over blocks of sixteen boxes, O(n)";
@@ -123,13 +152,14 @@ impl RegionIndex for Linear {
         let ids = indexable(items)?;
         let mut boxes = BoxBlocks::with_capacity(ids.len());
         ids.iter().for_each(|&id| boxes.push(&items[id as usize]));
+        let ids = ids[..].into();
         Ok(Linear { boxes, ids })
     }
 
     fn memory(&self) -> MemoryUsage {
         MemoryUsage {
             node_bytes: 0,
-            item_bytes: self.boxes.bytes() + size_of_val(&self.ids[..]),
+            item_bytes: self.boxes.bytes() + self.ids.bytes(),
         }
     }
 
@@ -155,25 +185,60 @@ impl FrustumQuery for Linear {
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()> {
-        // Four blocks at a time: with all planes open it is the making ready of
-        // the planes' numbers that costs, not the boxes.
-        let (fours, rest) = self.boxes.blocks().as_chunks();
-        let (mask, count) = (view.mask(), self.ids.len());
-        let planes = mask.count_ones();
-        for (four, blocks) in fours.iter().enumerate() {
-            let first = 4 * four;
-            let kept = view.kept_of_four(isa, blocks, mask);
-            for (i, kept) in kept.into_iter().enumerate() {
-                let lanes = lanes_of(first + i, 0, count);
-                recorder.items_tested(lanes.count_ones());
-                recorder.planes_tested(lanes.count_ones() * planes);
-                if kept & lanes != 0 {
-                    sink.accept_lanes(isa, &self.ids, (first + i) * LANES, kept & lanes)?;
-                }
-            }
+        if I::MANY_REGISTERS
+            && let Some(planes) = view.all_planes(isa)
+        {
+            return self.scan_all(isa, view.mask(), planes, sink, recorder);
         }
-        let first = self.boxes.len().div_ceil(LANES) - rest.len();
-        let rest = self.boxes.range(first * LANES, count);
-        scan_blocks(isa, rest, &self.ids, view, mask, sink, recorder)
+        self.scan_all(isa, view.mask(), AsEver::all(view), sink, recorder)
+    }
+}
+
+/// Blocks that are handed over together: room for all of their items is made
+/// ahead, 64 KiB.
+const TOGETHER: usize = 1024;
+
+/// Consecutive blocks, all planes open.
+struct AllOf<'a, P, R> {
+    blocks: &'a [BoxBlock],
+    planes: P,
+    /// In these blocks and behind them.
+    items: usize,
+    open: u32,
+    recorder: &'a mut R,
+    /// What is found out about the next few blocks together.
+    four: [LaneMask; 4],
+}
+
+impl<I: Isa, P: Planes<I>, R: Recorder> Tests<I> for AllOf<'_, P, R> {
+    const SPARSE: bool = true;
+
+    #[inline(always)]
+    fn count(&self) -> usize {
+        self.blocks.len()
+    }
+
+    #[inline(always)]
+    fn test(&mut self, isa: I, i: usize) -> (usize, LaneMask) {
+        let lanes = lanes_of(i, 0, self.items);
+        self.recorder.items_tested(lanes.count_ones());
+        let tests = lanes.count_ones() * self.open;
+        self.recorder.planes_tested(tests);
+        if !P::IN_FOURS {
+            return (i, self.planes.kept(isa, &self.blocks[i]) & lanes);
+        }
+        if i.is_multiple_of(4) {
+            self.four = match self.blocks[i..].first_chunk() {
+                Some(blocks) => self.planes.kept_of_four(isa, blocks),
+                None => {
+                    let mut four = [0; 4];
+                    for (kept, block) in four.iter_mut().zip(&self.blocks[i..]) {
+                        *kept = self.planes.kept(isa, block);
+                    }
+                    four
+                }
+            };
+        }
+        (i, self.four[i % 4] & lanes)
     }
 }

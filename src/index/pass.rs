@@ -10,7 +10,7 @@ use super::frontier::{AHEAD, Frontier, Merger, hand_over};
 use super::wide::{Level, Wide};
 use crate::geometry::{ALL_ROWS, BoxBlock, LANES, LaneMask, PlaneMask};
 use crate::kernel::{Isa, prefetch};
-use crate::query::{ItemId, OnePlane, Recorder, Sink, Tests, View, runs};
+use crate::query::{ItemId, Planes, Recorder, Sink, Tests, View, runs};
 
 /// A level of so many blocks (192 KiB) is taken to lie in the cache nearest but
 /// one to the processor; asking ahead for it costs more than it gains.
@@ -203,7 +203,9 @@ struct OfOnePlane<'a, 't, V, P, R> {
     recorder: &'a mut R,
 }
 
-impl<I: Isa, V: View, P: OnePlane<I>, R: Recorder> Tests<I> for OfOnePlane<'_, '_, V, P, R> {
+impl<I: Isa, V: View, P: Planes<I>, R: Recorder> Tests<I> for OfOnePlane<'_, '_, V, P, R> {
+    const SPARSE: bool = false;
+
     #[inline(always)]
     fn count(&self) -> usize {
         self.places.len()
@@ -236,6 +238,8 @@ struct OfAnyPlanes<'a, 't, V, R> {
 }
 
 impl<I: Isa, V: View, R: Recorder> Tests<I> for OfAnyPlanes<'_, '_, V, R> {
+    const SPARSE: bool = false;
+
     #[inline(always)]
     fn count(&self) -> usize {
         self.entries.0.len()

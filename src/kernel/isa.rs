@@ -14,10 +14,15 @@ pub type LaneMask = u16;
 /// written in them comes out bit for bit the same on every instruction set. A
 /// value of such a type is the proof that the processor has it.
 pub trait Isa: Copy {
+    /// Whether there are registers for the numbers of six planes and a block.
+    const MANY_REGISTERS: bool = false;
+
     /// Sixteen f32.
     type Floats: Copy;
     /// Sixteen u32.
     type Words: Copy;
+    /// Some of sixteen lanes, as comparisons leave them.
+    type Kept: Copy;
 
     /// Does the piece in a function of its own, compiled for these instructions:
     /// a loop that is to keep its numbers in registers needs one.
@@ -37,6 +42,11 @@ pub trait Isa: Copy {
     fn lower(self, a: Self::Floats, b: Self::Floats) -> Self::Floats;
     /// The lanes where `a < 0`.
     fn below_zero(self, a: Self::Floats) -> LaneMask;
+    /// All lanes.
+    fn keep_all(self) -> Self::Kept;
+    /// Those of the lanes where not `values < least`: a NaN stays.
+    fn keep(self, kept: Self::Kept, values: Self::Floats, least: Self::Floats) -> Self::Kept;
+    fn kept(self, kept: Self::Kept) -> LaneMask;
     /// The lanes where `a <= b`.
     fn at_most(self, a: Self::Floats, b: Self::Floats) -> LaneMask;
 
@@ -44,8 +54,14 @@ pub trait Isa: Copy {
     fn splat_word(self, x: u32) -> Self::Words;
     /// `first`, `first + 1` and so on.
     fn counting(self, first: u32) -> Self::Words;
-    /// `words` without `bits` in the lanes where `values >= 0`.
-    fn without(self, words: Self::Words, values: Self::Floats, bits: u32) -> Self::Words;
+    /// `words` without `bits` in the lanes where `values >= least`.
+    fn without(
+        self,
+        words: Self::Words,
+        values: Self::Floats,
+        least: Self::Floats,
+        bits: u32,
+    ) -> Self::Words;
     /// `words` with `bits` set in some lanes.
     fn with(self, words: Self::Words, lanes: LaneMask, bits: u32) -> Self::Words;
     /// The lanes that are zero.
@@ -159,6 +175,8 @@ fn lanes_where(holds: impl Fn(usize) -> bool) -> LaneMask {
 impl Isa for Plain {
     type Floats = [f32; LANES];
     type Words = [u32; LANES];
+    /// All bits where a lane is dropped.
+    type Kept = [u32; LANES];
 
     #[inline(always)]
     fn load(self, row: &[f32; LANES]) -> [f32; LANES] {
@@ -193,6 +211,18 @@ impl Isa for Plain {
         lanes_where(|lane| a[lane] < 0.0)
     }
     #[inline(always)]
+    fn keep_all(self) -> [u32; LANES] {
+        [0; LANES]
+    }
+    #[inline(always)]
+    fn keep(self, kept: [u32; LANES], values: [f32; LANES], least: [f32; LANES]) -> [u32; LANES] {
+        std::array::from_fn(|lane| kept[lane] | if values[lane] < least[lane] { !0 } else { 0 })
+    }
+    #[inline(always)]
+    fn kept(self, kept: [u32; LANES]) -> LaneMask {
+        lanes_where(|lane| kept[lane] == 0)
+    }
+    #[inline(always)]
     fn at_most(self, a: [f32; LANES], b: [f32; LANES]) -> LaneMask {
         lanes_where(|lane| a[lane] <= b[lane])
     }
@@ -209,8 +239,17 @@ impl Isa for Plain {
         std::array::from_fn(|lane| first.wrapping_add(lane as u32))
     }
     #[inline(always)]
-    fn without(self, words: [u32; LANES], values: [f32; LANES], bits: u32) -> [u32; LANES] {
-        std::array::from_fn(|lane| words[lane] & !if values[lane] >= 0.0 { bits } else { 0 })
+    fn without(
+        self,
+        words: [u32; LANES],
+        values: [f32; LANES],
+        least: [f32; LANES],
+        bits: u32,
+    ) -> [u32; LANES] {
+        std::array::from_fn(|lane| {
+            let inside = values[lane] >= least[lane];
+            words[lane] & !if inside { bits } else { 0 }
+        })
     }
     #[inline(always)]
     fn with(self, words: [u32; LANES], lanes: LaneMask, bits: u32) -> [u32; LANES] {
@@ -251,7 +290,7 @@ mod tests {
     }
 
     impl Work for All<'_> {
-        type Output = (Vec<u32>, [LaneMask; 4]);
+        type Output = (Vec<u32>, [LaneMask; 5]);
 
         #[inline(always)]
         fn run<I: Isa>(self, isa: I) -> Self::Output {
@@ -264,7 +303,7 @@ mod tests {
             ];
             let bits = floats.map(|x| isa.to_array(x).map(canonical));
             let mut out: Vec<u32> = bits.as_flattened().to_vec();
-            let words = isa.without(isa.words(self.words), a, 0b101);
+            let words = isa.without(isa.words(self.words), a, b, 0b101);
             let marked = isa.with(words, self.lanes, 1 << 31 | 2);
             let all = [
                 words,
@@ -284,6 +323,7 @@ mod tests {
                 isa.at_most(a, b),
                 isa.zeros(words),
                 isa.equal(words, 5),
+                isa.kept(isa.keep(isa.keep(isa.keep_all(), a, b), b, isa.splat(0.0))),
             ];
             (out, masks)
         }

@@ -62,6 +62,8 @@ macro_rules! each {
 impl Isa for Sse2 {
     type Floats = [__m128; 4];
     type Words = [__m128i; 4];
+    /// All bits where a lane is dropped.
+    type Kept = [__m128; 4];
 
     #[inline(always)]
     fn load(self, row: &[f32; LANES]) -> [__m128; 4] {
@@ -101,6 +103,20 @@ impl Isa for Sse2 {
         signs_128(below)
     }
     #[inline(always)]
+    fn keep_all(self) -> [__m128; 4] {
+        self.splat(0.0)
+    }
+    #[inline(always)]
+    fn keep(self, kept: [__m128; 4], values: [__m128; 4], least: [__m128; 4]) -> [__m128; 4] {
+        each!(4, |i| unsafe {
+            _mm_or_ps(kept[i], _mm_cmplt_ps(values[i], least[i]))
+        })
+    }
+    #[inline(always)]
+    fn kept(self, kept: [__m128; 4]) -> LaneMask {
+        !signs_128(kept)
+    }
+    #[inline(always)]
     fn at_most(self, a: [__m128; 4], b: [__m128; 4]) -> LaneMask {
         signs_128(each!(4, |i| unsafe { _mm_cmple_ps(a[i], b[i]) }))
     }
@@ -122,9 +138,15 @@ impl Isa for Sse2 {
         })
     }
     #[inline(always)]
-    fn without(self, words: [__m128i; 4], values: [__m128; 4], bits: u32) -> [__m128i; 4] {
+    fn without(
+        self,
+        words: [__m128i; 4],
+        values: [__m128; 4],
+        least: [__m128; 4],
+        bits: u32,
+    ) -> [__m128i; 4] {
         each!(4, |i| unsafe {
-            let inside = _mm_castps_si128(_mm_cmpge_ps(values[i], _mm_setzero_ps()));
+            let inside = _mm_castps_si128(_mm_cmpge_ps(values[i], least[i]));
             _mm_andnot_si128(_mm_and_si128(inside, _mm_set1_epi32(bits as i32)), words[i])
         })
     }
@@ -168,6 +190,8 @@ fn signs_128(x: [__m128; 4]) -> LaneMask {
 impl Isa for Avx2 {
     type Floats = [__m256; 2];
     type Words = [__m256i; 2];
+    /// All bits where a lane is dropped.
+    type Kept = [__m256; 2];
 
     #[inline(always)]
     fn apart<P: Piece<Self>>(self, piece: P) -> P::Output {
@@ -212,6 +236,21 @@ impl Isa for Avx2 {
         }))
     }
     #[inline(always)]
+    fn keep_all(self) -> [__m256; 2] {
+        self.splat(0.0)
+    }
+    #[inline(always)]
+    fn keep(self, kept: [__m256; 2], values: [__m256; 2], least: [__m256; 2]) -> [__m256; 2] {
+        each!(2, |i| unsafe {
+            let dropped = _mm256_cmp_ps::<_CMP_LT_OQ>(values[i], least[i]);
+            _mm256_or_ps(kept[i], dropped)
+        })
+    }
+    #[inline(always)]
+    fn kept(self, kept: [__m256; 2]) -> LaneMask {
+        !signs_256(kept)
+    }
+    #[inline(always)]
     fn at_most(self, a: [__m256; 2], b: [__m256; 2]) -> LaneMask {
         signs_256(each!(2, |i| unsafe {
             _mm256_cmp_ps::<_CMP_LE_OQ>(a[i], b[i])
@@ -235,9 +274,15 @@ impl Isa for Avx2 {
         })
     }
     #[inline(always)]
-    fn without(self, words: [__m256i; 2], values: [__m256; 2], bits: u32) -> [__m256i; 2] {
+    fn without(
+        self,
+        words: [__m256i; 2],
+        values: [__m256; 2],
+        least: [__m256; 2],
+        bits: u32,
+    ) -> [__m256i; 2] {
         each!(2, |i| unsafe {
-            let inside = _mm256_cmp_ps::<_CMP_GE_OQ>(values[i], _mm256_setzero_ps());
+            let inside = _mm256_cmp_ps::<_CMP_GE_OQ>(values[i], least[i]);
             let bits =
                 _mm256_and_si256(_mm256_castps_si256(inside), _mm256_set1_epi32(bits as i32));
             _mm256_andnot_si256(bits, words[i])
@@ -298,8 +343,11 @@ fn packed_256(words: __m256i, lanes: LaneMask) -> __m256i {
 }
 
 impl Isa for Avx512 {
+    const MANY_REGISTERS: bool = true;
+
     type Floats = __m512;
     type Words = __m512i;
+    type Kept = LaneMask;
 
     #[inline(always)]
     fn apart<P: Piece<Self>>(self, piece: P) -> P::Output {
@@ -340,6 +388,18 @@ impl Isa for Avx512 {
         unsafe { _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, _mm512_setzero_ps()) }
     }
     #[inline(always)]
+    fn keep_all(self) -> LaneMask {
+        LaneMask::MAX
+    }
+    #[inline(always)]
+    fn keep(self, kept: LaneMask, values: __m512, least: __m512) -> LaneMask {
+        unsafe { _mm512_mask_cmp_ps_mask::<_CMP_NLT_UQ>(kept, values, least) }
+    }
+    #[inline(always)]
+    fn kept(self, kept: LaneMask) -> LaneMask {
+        kept
+    }
+    #[inline(always)]
     fn at_most(self, a: __m512, b: __m512) -> LaneMask {
         unsafe { _mm512_cmp_ps_mask::<_CMP_LE_OQ>(a, b) }
     }
@@ -359,9 +419,9 @@ impl Isa for Avx512 {
         }
     }
     #[inline(always)]
-    fn without(self, words: __m512i, values: __m512, bits: u32) -> __m512i {
+    fn without(self, words: __m512i, values: __m512, least: __m512, bits: u32) -> __m512i {
         unsafe {
-            let inside = _mm512_cmp_ps_mask::<_CMP_GE_OQ>(values, _mm512_setzero_ps());
+            let inside = _mm512_cmp_ps_mask::<_CMP_GE_OQ>(values, least);
             let bits = _mm512_set1_epi32(bits as i32);
             _mm512_mask_andnot_epi32(words, inside, bits, words)
         }

@@ -14,7 +14,7 @@ pub use recorder::{NoRecorder, QueryCost, Recorder};
 pub use region::{Containment, Region};
 pub(crate) use sink::Ranges;
 pub use sink::{Count, First, Sink, Tests, runs};
-pub use view::{AnyView, OnePlane, View};
+pub use view::{AnyView, AsEver, Planes, View};
 pub use view_masks::ViewMasks;
 
 /// An item's number: its zero-based place in the scene.

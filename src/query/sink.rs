@@ -57,6 +57,10 @@ pub trait Sink {
 
 /// Blocks of items that are tested when their turn comes.
 pub trait Tests<I: Isa> {
+    /// Whether most blocks are expected to hold no answer at all: then the ids
+    /// of those are not read.
+    const SPARSE: bool;
+
     fn count(&self) -> usize;
     /// The number of the i-th block, and its lanes that are answers.
     fn test(&mut self, isa: I, i: usize) -> (usize, LaneMask);
@@ -161,12 +165,45 @@ impl<I: Isa, T: Tests<I>> Piece<I> for Gather<'_, T> {
         let mut tests = self.tests;
         let count = tests.count();
         let mut packer = Packer::onto(self.out, count * LANES);
-        for i in 0..count {
-            let (block, lanes) = tests.test(isa, i);
-            packer.push(isa, &self.ids[block], lanes);
+        if !T::SPARSE {
+            for i in 0..count {
+                let (block, lanes) = tests.test(isa, i);
+                packer.push(isa, &self.ids[block], lanes);
+            }
+            return;
+        }
+        // Test first, and go only where there is something: which blocks those
+        // are cannot be foretold, so nothing is asked in between.
+        let mut held = [0; TESTED_AHEAD];
+        let mut blocks = [0; TESTED_AHEAD];
+        let mut hits = [0; TESTED_AHEAD + LANES];
+        for first in (0..count).step_by(TESTED_AHEAD) {
+            let tested = TESTED_AHEAD.min(count - first);
+            for i in 0..tested {
+                let (block, lanes) = tests.test(isa, first + i);
+                held[i] = u32::from(lanes);
+                blocks[i] = block;
+            }
+            held[tested..].fill(0);
+            let mut found = 0;
+            for (i, row) in held.as_chunks().0.iter().enumerate() {
+                let some = !isa.zeros(isa.words(row));
+                if let Some(place) = hits[found..].first_chunk_mut() {
+                    isa.pack(place, isa.counting((i * LANES) as u32), some);
+                }
+                found += some.count_ones() as usize;
+            }
+            for &i in &hits[..found] {
+                let (block, lanes) = (blocks[i as usize], held[i as usize]);
+                packer.push(isa, &self.ids[block], lanes as LaneMask);
+            }
         }
     }
 }
+
+/// Blocks that are tested before the first of them is handed over, where most
+/// hold nothing.
+const TESTED_AHEAD: usize = 16 * LANES;
 
 /// Where the answers lie in the structure's own order, without their ids;
 /// adjoining ranges are one. Only for structures that hand over places.

@@ -3,7 +3,7 @@
 //! of them share, and one type for any of them.
 
 use crate::geometry::{
-    ALL_ROWS, Aabb, Blade, BoxBlock, ConvexVolume, LANES, LaneMask, PlaneMask, PlaneRows,
+    ALL_ROWS, Aabb, Blade, Blades, BoxBlock, ConvexVolume, LANES, LaneMask, PlaneMask, PlaneRows,
     RelativeVolume, RowMask, Spheres, WideVolume,
 };
 
@@ -43,7 +43,7 @@ pub trait View: Sized {
     fn kept_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask;
 
     /// One plane by itself, made ready for many blocks.
-    type OnePlane<'v, I: Isa>: OnePlane<I>
+    type OnePlane<'v, I: Isa>: Planes<I>
     where
         Self: 'v;
 
@@ -56,16 +56,25 @@ pub trait View: Sized {
     fn kept_of_four<I: Isa>(
         &self,
         isa: I,
-        blocks: &[BoxBlock; 4],
+        [a, b, c, d]: &[BoxBlock; 4],
         mask: PlaneMask,
     ) -> [LaneMask; 4] {
         [
-            self.kept_lanes(isa, &blocks[0], mask),
-            self.kept_lanes(isa, &blocks[1], mask),
-            self.kept_lanes(isa, &blocks[2], mask),
-            self.kept_lanes(isa, &blocks[3], mask),
+            self.kept_lanes(isa, a, mask),
+            self.kept_lanes(isa, b, mask),
+            self.kept_lanes(isa, c, mask),
+            self.kept_lanes(isa, d, mask),
         ]
     }
+
+    /// All planes, made ready for many blocks.
+    type AllPlanes<'v, I: Isa>: Planes<I>
+    where
+        Self: 'v;
+
+    /// All planes, made ready: [`View::kept_lanes`] with [`View::mask`]. `None`
+    /// if they are too many.
+    fn all_planes<I: Isa>(&self, isa: I) -> Option<Self::AllPlanes<'_, I>>;
 
     /// The rows of a block that [`View::kept_lanes`] reads.
     #[inline(always)]
@@ -113,17 +122,33 @@ pub trait View: Sized {
     }
 }
 
-/// A plane of a view, made ready for many blocks that no other plane is open
+/// Planes of a view, made ready for many blocks that no other plane is open
 /// for.
-pub trait OnePlane<I: Isa> {
+pub trait Planes<I: Isa>: Copy {
     /// [`View::kept_lanes`].
     fn kept(&self, isa: I, block: &BoxBlock) -> LaneMask;
+
+    /// Whether four blocks at once are quicker than each by itself.
+    const IN_FOURS: bool;
+
+    /// [`View::kept_of_four`].
+    #[inline(always)]
+    fn kept_of_four(&self, isa: I, [a, b, c, d]: &[BoxBlock; 4]) -> [LaneMask; 4] {
+        [
+            self.kept(isa, a),
+            self.kept(isa, b),
+            self.kept(isa, c),
+            self.kept(isa, d),
+        ]
+    }
 
     /// Asks for the memory that this reads ahead of it.
     fn prefetch(&self, block: &BoxBlock);
 }
 
-impl<I: Isa> OnePlane<I> for Blade<I> {
+impl<I: Isa> Planes<I> for Blade<I> {
+    const IN_FOURS: bool = false;
+
     #[inline(always)]
     fn kept(&self, isa: I, block: &BoxBlock) -> LaneMask {
         self.admitted(isa, block)
@@ -134,13 +159,36 @@ impl<I: Isa> OnePlane<I> for Blade<I> {
     }
 }
 
-/// A plane of a view for which nothing can be made ready.
+/// Planes of a view for which nothing can be made ready.
 pub struct AsEver<'v, V> {
     view: &'v V,
     mask: PlaneMask,
 }
 
-impl<I: Isa, V: View> OnePlane<I> for AsEver<'_, V> {
+impl<V> Clone for AsEver<'_, V> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<V> Copy for AsEver<'_, V> {}
+
+impl<'v, V: View> AsEver<'v, V> {
+    /// All planes of the view.
+    #[inline(always)]
+    pub fn all(view: &'v V) -> Self {
+        let mask = view.mask();
+        AsEver { view, mask }
+    }
+}
+
+impl<I: Isa, V: View> Planes<I> for AsEver<'_, V> {
+    const IN_FOURS: bool = true;
+
+    #[inline(always)]
+    fn kept_of_four(&self, isa: I, blocks: &[BoxBlock; 4]) -> [LaneMask; 4] {
+        self.view.kept_of_four(isa, blocks, self.mask)
+    }
     #[inline(always)]
     fn kept(&self, isa: I, block: &BoxBlock) -> LaneMask {
         self.view.kept_lanes(isa, block, self.mask)
@@ -151,9 +199,23 @@ impl<I: Isa, V: View> OnePlane<I> for AsEver<'_, V> {
     }
 }
 
-macro_rules! one_plane_as_ever {
+impl<I: Isa> Planes<I> for Blades<I> {
+    const IN_FOURS: bool = false;
+
+    #[inline(always)]
+    fn kept(&self, isa: I, block: &BoxBlock) -> LaneMask {
+        self.admitted(isa, block)
+    }
+    #[inline(always)]
+    fn prefetch(&self, block: &BoxBlock) {
+        block.prefetch();
+    }
+}
+
+macro_rules! planes_as_ever {
     () => {
         type OnePlane<'v, I: Isa> = AsEver<'v, Self>;
+        type AllPlanes<'v, I: Isa> = AsEver<'v, Self>;
 
         #[inline(always)]
         fn one_plane<I: Isa>(&self, _: I, plane: u32) -> AsEver<'_, Self> {
@@ -161,6 +223,10 @@ macro_rules! one_plane_as_ever {
                 view: self,
                 mask: 1 << plane,
             }
+        }
+        #[inline(always)]
+        fn all_planes<I: Isa>(&self, _: I) -> Option<AsEver<'_, Self>> {
+            Some(AsEver::all(self))
         }
     };
 }
@@ -242,12 +308,6 @@ impl View for ConvexVolume {
     fn kept_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
         block.admitted_by(isa, self, mask)
     }
-    type OnePlane<'v, I: Isa> = Blade<I>;
-
-    #[inline(always)]
-    fn one_plane<I: Isa>(&self, isa: I, plane: u32) -> Blade<I> {
-        Blade::new(isa, self.plane_of_bit(plane), self.corner_of_bit(plane))
-    }
     #[inline(always)]
     fn kept_of_four<I: Isa>(
         &self,
@@ -256,6 +316,18 @@ impl View for ConvexVolume {
         mask: PlaneMask,
     ) -> [LaneMask; 4] {
         BoxBlock::four_admitted_by(isa, blocks, self, mask)
+    }
+
+    type OnePlane<'v, I: Isa> = Blade<I>;
+    type AllPlanes<'v, I: Isa> = Blades<I>;
+
+    #[inline(always)]
+    fn one_plane<I: Isa>(&self, isa: I, plane: u32) -> Blade<I> {
+        Blade::new(isa, self, plane)
+    }
+    #[inline(always)]
+    fn all_planes<I: Isa>(&self, isa: I) -> Option<Blades<I>> {
+        Blades::new(isa, self, self.mask())
     }
     #[inline(always)]
     fn rows_read(&self, mask: PlaneMask) -> RowMask {
@@ -289,7 +361,7 @@ impl View for ConvexVolume {
 /// Nodes get the plane test, items that and their spheres'; monotone because
 /// the cube's corners have a say in both: see [`Spheres`].
 impl View for Spheres {
-    one_plane_as_ever!();
+    planes_as_ever!();
 
     #[inline(always)]
     fn mask(&self) -> PlaneMask {
@@ -319,7 +391,7 @@ impl View for Spheres {
 /// The plane test in f64. Monotone as in f32: promoting is exact, and every
 /// operation rounds to nearest.
 impl View for WideVolume {
-    one_plane_as_ever!();
+    planes_as_ever!();
 
     #[inline(always)]
     fn mask(&self) -> PlaneMask {
@@ -344,7 +416,7 @@ impl View for WideVolume {
 /// is ([`Aabb::relative_to`]): a box within another is moved to a box within
 /// the other one moved, and there the plane test is monotone.
 impl View for RelativeVolume {
-    one_plane_as_ever!();
+    planes_as_ever!();
 
     #[inline(always)]
     fn mask(&self) -> PlaneMask {
