@@ -12,8 +12,8 @@ use crate::geometry::{ALL_ROWS, BoxBlock, LANES, LaneMask, PlaneMask};
 use crate::kernel::{Isa, prefetch};
 use crate::query::{ItemId, Planes, Recorder, Sink, Tests, View, runs};
 
-/// A level of so many blocks (192 KiB) is taken to lie in the cache nearest but
-/// one to the processor; asking ahead for it costs more than it gains.
+/// A level of so many blocks (3 MiB) is taken to lie in the caches nearest to
+/// the processor, where asking ahead costs more than it gains.
 const NEAR: usize = 8192;
 
 /// One level as a traversal meets it.
