@@ -203,7 +203,10 @@ impl Tiling {
         recorder.nodes_tested(AXES as u32 * steps);
         match at {
             ON_PLANE => treelets.locate(tree, p, sink, recorder),
-            _ if at & UNSURE == 0 => sink.accept(&[at & REST]),
+            _ if at & UNSURE == 0 => {
+                recorder.subtree_accepted(1);
+                sink.accept(&[at & REST])
+            }
             _ => {
                 recorder.items_tested(1);
                 let place = (at & REST) as usize;
