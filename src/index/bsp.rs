@@ -9,11 +9,12 @@ use serde::{Deserialize, Serialize};
 
 use super::batch;
 use super::partition::{Part, Record, Splitter, build_top_down};
+use super::tiling::Tiling;
 use super::tree::{PackedTree, Stack, seen_by_tree};
 use super::treelets::{DESCENT_LEAF, Treelets};
 use super::{BuildError, MemoryUsage, RegionIndex, check_range, indexable};
 use crate::geometry::{Aabb, Plane, PlaneTree};
-use crate::kernel::BASELINE;
+use crate::kernel::{BASELINE, Isa};
 use crate::query::{ItemId, ManySink, Recorder, Sink};
 
 /// A binary space partition (Fuchs, Kedem and Naylor 1980, "On visible surface
@@ -34,8 +35,12 @@ pub struct Bsp {
 enum Planes {
     /// Of any direction, one for each node; unused for leaves.
     Any(Vec<Split>),
-    /// Axis-parallel ones over whole blocks.
-    Axes(Treelets),
+    /// Axis-parallel ones.
+    Axes {
+        treelets: Treelets,
+        /// Beside them, where the planes cut no item. Gone once items have moved.
+        tiling: Option<Tiling>,
+    },
 }
 
 /// The direction of a node's plane and how far its two sides reach along it.
@@ -109,8 +114,11 @@ struct PlaneSplitter<'a> {
     params: BspParams,
     imported: Option<&'a PlaneTree>,
     splits: Vec<Split>,
-    /// How many items come before the plane, for each division within a leaf.
+    /// How many items come before the plane, for each division within a leaf of
+    /// more than [`DESCENT_LEAF`] items.
     parts: Vec<u32>,
+    /// The same for those of fewer, as long as no plane has cut an item.
+    fine: Option<Vec<u32>>,
 }
 
 /// What the splitter knows of a group: the imported node to divide it by.
@@ -170,12 +178,29 @@ impl Splitter for PlaneSplitter<'_> {
     }
 
     fn arrange(&mut self, records: &mut [Record]) {
-        if self.params.builder != BspBuilder::Median || records.len() <= DESCENT_LEAF {
+        let large = records.len() > DESCENT_LEAF;
+        if self.params.builder != BspBuilder::Median
+            || records.len() < 2
+            || !(large || self.fine.is_some())
+        {
             return;
         }
         let (_, back) = between_layers(records);
-        self.parts.push(back as u32);
+        if large {
+            self.parts.push(back as u32);
+        }
         let (back, front) = records.split_at_mut(back);
+        if let Some(fine) = &mut self.fine {
+            let [lower, upper] = [&*back, &*front].map(|side| {
+                let boxes = side.iter().map(|r| &r.bounds);
+                Aabb::union_of(boxes)
+            });
+            if !lower.max.cmple(upper.min).any() {
+                self.fine = None;
+            } else if !large {
+                fine.push(back.len() as u32);
+            }
+        }
         self.arrange(back);
         self.arrange(front);
     }
@@ -232,30 +257,46 @@ fn by_median(records: &mut [Record], normal: Vec3) -> (Vec3, usize) {
 /// The median along the widest axis, or beside it where it would part items of
 /// one centre: regions that tile space lie in layers, and a plane between two
 /// layers cuts none of them. Axis after axis, widest first; a side gets at
-/// least a quarter of the items, or else the layer is parted after all.
+/// least a quarter of the items (of few, at least one), or else the layer is
+/// parted after all.
 fn between_layers(records: &mut [Record]) -> (Vec3, usize) {
     let centres = centres(records);
     let width = centres.max * 0.5 - centres.min * 0.5;
     let mut axes = [0, 1, 2];
     axes.sort_by(|&a, &b| width[b].total_cmp(&width[a]));
     let (count, half) = (records.len(), records.len() / 2);
-    for axis in axes {
-        let at = |r: &Record| r.bounds.centre()[axis];
-        records.select_nth_unstable_by(half, |a, b| at(a).total_cmp(&at(b)).then(a.id.cmp(&b.id)));
-        let middle = at(&records[half]);
-        let below = records[..half].iter().filter(|r| at(r) < middle).count();
-        let above = half + records[half..].iter().filter(|r| at(r) <= middle).count();
-        let nearest = if half - below <= above - half {
-            below
-        } else {
-            above
-        };
-        if nearest.min(count - nearest) * 4 >= count {
-            let back = divide(records, |r| match nearest == below {
-                true => at(r) < middle,
-                false => at(r) <= middle,
-            });
-            return (AXES[axis], back);
+    // Few items may part as they can: their depth has a bound of its own.
+    let least = if count <= DESCENT_LEAF {
+        1
+    } else {
+        count.div_ceil(4)
+    };
+    for least in [count.div_ceil(4), least] {
+        for axis in axes {
+            let at = |r: &Record| r.bounds.centre()[axis];
+            records
+                .select_nth_unstable_by(half, |a, b| at(a).total_cmp(&at(b)).then(a.id.cmp(&b.id)));
+            let middle = at(&records[half]);
+            let below = records[..half].iter().filter(|r| at(r) < middle).count();
+            let above = half + records[half..].iter().filter(|r| at(r) <= middle).count();
+            let nearest = if half - below <= above - half {
+                below
+            } else {
+                above
+            };
+            // The other edge of the layer may be that of the group.
+            let nearest = match nearest {
+                0 => above,
+                all if all == count => below,
+                inner => inner,
+            };
+            if nearest.min(count - nearest) >= least {
+                let back = divide(records, |r| match nearest == below {
+                    true => at(r) < middle,
+                    false => at(r) <= middle,
+                });
+                return (AXES[axis], back);
+            }
         }
     }
     by_median(records, AXES[axes[0]])
@@ -394,6 +435,14 @@ fn measure_reach(splits: &mut [Split], tree: &PackedTree, node: usize) {
 }
 
 impl Bsp {
+    #[cfg(test)]
+    pub(super) fn tiling(&self) -> Option<&Tiling> {
+        match &self.planes {
+            Planes::Axes { tiling, .. } => tiling.as_ref(),
+            Planes::Any(_) => None,
+        }
+    }
+
     /// The tree without its planes.
     pub(super) fn into_tree(self) -> PackedTree {
         self.tree
@@ -429,11 +478,15 @@ impl RegionIndex for Bsp {
             imported,
             splits: Vec::new(),
             parts: Vec::new(),
+            fine: Some(Vec::new()),
         };
         let root = imported.and_then(|planes| planes.root);
         let tree = build_top_down(items, &ids, params.leaf as usize, root, &mut splitter);
         if params.builder == BspBuilder::Median {
-            let planes = Planes::Axes(Treelets::over(&tree, splitter.parts));
+            let (parts, fine) = (splitter.parts, splitter.fine);
+            let tiling = fine.and_then(|fine| Tiling::over(&tree, &parts, &fine));
+            let treelets = Treelets::over(&tree, parts);
+            let planes = Planes::Axes { treelets, tiling };
             return Ok(Bsp { tree, planes });
         }
         let mut splits = splitter.splits;
@@ -450,7 +503,9 @@ impl RegionIndex for Bsp {
         let mut memory = self.tree.memory();
         memory.node_bytes += match &self.planes {
             Planes::Any(splits) => size_of_val(&splits[..]),
-            Planes::Axes(treelets) => treelets.bytes(),
+            Planes::Axes { treelets, tiling } => {
+                treelets.bytes() + tiling.as_ref().map_or(0, Tiling::bytes)
+            }
         };
         memory
     }
@@ -463,9 +518,25 @@ impl RegionIndex for Bsp {
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()> {
+        self.locate_by(BASELINE, p, sink, recorder)
+    }
+
+    #[inline(always)]
+    fn locate_by<I: Isa, S: Sink, R: Recorder>(
+        &self,
+        isa: I,
+        p: Vec3,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
         let splits = match &self.planes {
             Planes::Any(splits) => splits,
-            Planes::Axes(treelets) => return treelets.locate(&self.tree, p, sink, recorder),
+            Planes::Axes { treelets, tiling } => {
+                return match tiling {
+                    Some(tiling) => tiling.locate(isa, &self.tree, treelets, p, sink, recorder),
+                    None => treelets.locate(&self.tree, p, sink, recorder),
+                };
+            }
         };
         let nodes = self.tree.nodes();
         let mut open = Stack::new((0, ()));
@@ -501,18 +572,35 @@ impl RegionIndex for Bsp {
 
     #[inline(always)]
     fn locate_many<S: ManySink>(&self, points: &[Vec3], sink: &mut S) -> ControlFlow<()> {
+        self.locate_many_by(BASELINE, points, sink)
+    }
+
+    #[inline(always)]
+    fn locate_many_by<I: Isa, S: ManySink>(
+        &self,
+        isa: I,
+        points: &[Vec3],
+        sink: &mut S,
+    ) -> ControlFlow<()> {
         match &self.planes {
             Planes::Any(_) => batch::locate_many(&self.tree, points, sink),
-            Planes::Axes(treelets) => treelets.locate_many(&self.tree, points, sink),
+            Planes::Axes { treelets, tiling } => match tiling {
+                Some(tiling) => tiling.locate_many(isa, &self.tree, treelets, points, sink),
+                None => treelets.locate_many(&self.tree, points, sink),
+            },
         }
     }
 
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
         let planes = &mut self.planes;
-        self.tree.refit(items, moved, |tree, node| match planes {
+        let refitted = self.tree.refit(items, moved, |tree, node| match planes {
             Planes::Any(splits) => measure_reach(splits, tree, node),
-            Planes::Axes(treelets) => treelets.measure(tree, node),
-        })
+            Planes::Axes { treelets, .. } => treelets.measure(tree, node),
+        });
+        if let (true, Planes::Axes { tiling, .. }) = (refitted, &mut self.planes) {
+            *tiling = None;
+        }
+        refitted
     }
 }
 

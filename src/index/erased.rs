@@ -160,8 +160,9 @@ impl<T: RegionIndex, R: Recorder> Work for Locate<'_, T, R> {
     type Output = ();
 
     #[inline(always)]
-    fn run<I: Isa>(self, _: I) {
-        let _ = self.index.locate(self.p, self.out, self.recorder);
+    fn run<I: Isa>(self, isa: I) {
+        // A Vec never breaks off.
+        let _ = self.index.locate_by(isa, self.p, self.out, self.recorder);
     }
 }
 
@@ -176,9 +177,9 @@ impl<T: RegionIndex> Work for LocateMany<'_, T> {
     type Output = ();
 
     #[inline(always)]
-    fn run<I: Isa>(self, _: I) {
+    fn run<I: Isa>(self, isa: I) {
         // The collector never breaks off.
-        let _ = self.index.locate_many(self.points, self.out);
+        let _ = self.index.locate_many_by(isa, self.points, self.out);
     }
 }
 

@@ -23,6 +23,7 @@ pub mod peers;
 mod quadtree;
 mod quantised;
 mod replay;
+mod tiling;
 mod tree;
 mod treelets;
 mod wide;
@@ -140,6 +141,30 @@ pub trait RegionIndex: Sized + Send + Sync {
             sink.accept(point, &ids)?;
         }
         ControlFlow::Continue(())
+    }
+
+    /// [`RegionIndex::locate`] with the vectors of an instruction set: what
+    /// [`DynIndex`] calls. A structure that has no use for them leaves it out.
+    #[inline(always)]
+    fn locate_by<I: Isa, S: Sink, R: Recorder>(
+        &self,
+        _: I,
+        p: Vec3,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        self.locate(p, sink, recorder)
+    }
+
+    /// [`RegionIndex::locate_many`] likewise.
+    #[inline(always)]
+    fn locate_many_by<I: Isa, S: ManySink>(
+        &self,
+        _: I,
+        points: &[Vec3],
+        sink: &mut S,
+    ) -> ControlFlow<()> {
+        self.locate_many(points, sink)
     }
 
     /// Takes over the new bounds of `moved` items (`items` holds all bounds,

@@ -124,11 +124,13 @@ impl PackedTree {
     }
 
     /// Item bounds in tree order.
+    #[inline(always)]
     pub fn boxes(&self) -> &BoxBlocks {
         &self.boxes
     }
 
     /// Item ids in tree order.
+    #[inline(always)]
     pub fn ids(&self) -> &[ItemId] {
         &self.ids
     }

@@ -17,10 +17,10 @@ use crate::query::{ManySink, Recorder, Sink};
 pub const DESCENT_LEAF: usize = LANES;
 
 /// Levels of a binary tree that a treelet decides, and the subtrees below it.
-const LEVELS: usize = 4;
-const CHILDREN: usize = 1 << LEVELS;
+pub const LEVELS: usize = 4;
+pub const CHILDREN: usize = 1 << LEVELS;
 /// The lane that is no plane.
-const AXES: usize = CHILDREN - 1;
+pub const AXES: usize = CHILDREN - 1;
 
 /// Four levels of planes (a treelet: Aila and Karras 2010, "Architecture
 /// considerations for tracing incoherent rays"). Lane 0 is the root, lanes 1
@@ -111,7 +111,7 @@ const fn powers_of_two(first: u32, step: usize) -> [u32; CHILDREN] {
 }
 
 /// Planes above the last level, and as a mask; the last level as a mask.
-const TOP_PLANES: usize = CHILDREN / 2 - 1;
+pub const TOP_PLANES: usize = CHILDREN / 2 - 1;
 const TOP: usize = (1 << TOP_PLANES) - 1;
 const LAST: usize = (1 << (CHILDREN / 2)) - 1;
 
@@ -180,15 +180,24 @@ pub struct Treelets {
 type Place = u32;
 
 /// The binary tree before it is cut into treelets, in depth-first order.
-struct Branch {
+pub struct Branch {
     /// The branch of the upper side; 0 for a leaf.
-    upper: usize,
+    pub upper: usize,
     /// Levels of planes from here down to the deepest leaf.
     height: u32,
-    /// First item.
-    first: u32,
+    /// Places of its items.
+    pub items: Range<u32>,
     /// The node of the structure's tree, if it has one.
     node: Option<u32>,
+}
+
+impl Branch {
+    /// Whether it begins a treelet of its own instead of taking this lane: where
+    /// four levels or a multiple of four are left, so that those above the
+    /// leaves are full.
+    pub fn ends(&self, lane: usize) -> bool {
+        lane >= AXES || (lane > 0 && (self.height as usize).is_multiple_of(LEVELS))
+    }
 }
 
 impl Treelets {
@@ -204,7 +213,14 @@ impl Treelets {
             return treelets;
         }
         let mut branches = Vec::new();
-        grow(tree, 0, &mut parts.into_iter(), &mut branches);
+        let mut parts = parts.into_iter();
+        grow(tree, 0, &mut branches, &mut |items| {
+            if items > DESCENT_LEAF {
+                parts.next()
+            } else {
+                None
+            }
+        });
         treelets.treelets.push(Treelet::UNUSED);
         treelets.cut(&branches, 0, 0, 0, 1);
         treelets.starts.push(tree.ids().len() as u32);
@@ -217,14 +233,12 @@ impl Treelets {
     }
 
     /// Puts a branch in a lane of a treelet, and all that is below it where it
-    /// belongs. A new treelet begins where four levels or a multiple of four
-    /// are left: those above the leaves are then full.
+    /// belongs.
     fn cut(&mut self, branches: &[Branch], at: usize, treelet: usize, lane: usize, depth: usize) {
         self.height = self.height.max(depth);
         let branch = &branches[at];
         let is_leaf = branch.upper == 0;
-        let ends = lane >= AXES || (lane > 0 && (branch.height as usize).is_multiple_of(LEVELS));
-        if !is_leaf && !ends {
+        if !is_leaf && !branch.ends(lane) {
             self.place(branch, (treelet * CHILDREN + lane) as Place);
             // Used from now on; measured later.
             self.treelets[treelet].low[lane] = f32::INFINITY;
@@ -240,7 +254,7 @@ impl Treelets {
         if is_leaf {
             let leaf = LEAF | self.starts.len() as u32;
             self.treelets[treelet].children[child] = leaf;
-            self.starts.push(branch.first);
+            self.starts.push(branch.items.start);
             self.place(branch, leaf);
         } else {
             let below = self.treelets.len();
@@ -297,17 +311,8 @@ impl Treelets {
         }
     }
 
-    /// The plane between two parts: across the axis on which they share least
-    /// of their extent.
     fn part(&mut self, place: Place, lower: &Aabb, upper: &Aabb) {
-        let shared = (lower.max - upper.min) / lower.union(upper).extent();
-        // A NaN (no extent, or one beyond f32) is as bad as all of it.
-        let shared = |axis: usize| match shared[axis] {
-            share if share < 1.0 => share,
-            _ => 1.0,
-        };
-        let best = (0..3).min_by(|&a, &b| shared(a).total_cmp(&shared(b)));
-        let axis = best.unwrap_or(0);
+        let axis = parting_axis(lower, upper);
         let (treelet, lane) = (place as usize / CHILDREN, place as usize % CHILDREN);
         self.treelets[treelet].set(lane, axis, lower.max[axis], upper.min[axis]);
     }
@@ -420,28 +425,44 @@ impl Treelets {
     }
 }
 
-/// The structure's tree from a node down, continued below its leaves.
-fn grow(
+/// The axis of the plane between two parts: on which they share least of their
+/// extent.
+pub fn parting_axis(lower: &Aabb, upper: &Aabb) -> usize {
+    let shared = (lower.max - upper.min) / lower.union(upper).extent();
+    // A NaN (no extent, or one beyond f32) is as bad as all of it.
+    let shared = |axis: usize| match shared[axis] {
+        share if share < 1.0 => share,
+        _ => 1.0,
+    };
+    let best = (0..3).min_by(|&a, &b| shared(a).total_cmp(&shared(b)));
+    best.unwrap_or(0)
+}
+
+/// The structure's tree from a node down, continued below its leaves: `parts`
+/// says of a number of items how many come before the plane, if there is one,
+/// in depth-first order.
+pub fn grow(
     tree: &PackedTree,
     node: usize,
-    parts: &mut impl Iterator<Item = u32>,
     branches: &mut Vec<Branch>,
+    parts: &mut impl FnMut(usize) -> Option<u32>,
 ) -> u32 {
     let at = branches.len();
     let items = tree.nodes()[node].items();
+    let items = items.start as u32..items.end as u32;
     branches.push(Branch {
         upper: 0,
         height: 0,
-        first: items.start as u32,
+        items: items.clone(),
         node: Some(node as u32),
     });
     let height = if tree.is_leaf(node) {
-        divide(items, at, parts, branches)
+        divide(items, at, branches, parts)
     } else {
-        let lower = grow(tree, node + 1, parts, branches);
+        let lower = grow(tree, node + 1, branches, parts);
         branches[at].upper = branches.len();
         let upper = tree.nodes()[node + 1].after();
-        1 + lower.max(grow(tree, upper, parts, branches))
+        1 + lower.max(grow(tree, upper, branches, parts))
     };
     branches[at].height = height;
     height
@@ -449,18 +470,15 @@ fn grow(
 
 /// Divides the items of the branch `at`, a leaf so far; its height.
 fn divide(
-    items: Range<usize>,
+    items: Range<u32>,
     at: usize,
-    parts: &mut impl Iterator<Item = u32>,
     branches: &mut Vec<Branch>,
+    parts: &mut impl FnMut(usize) -> Option<u32>,
 ) -> u32 {
-    let part = if items.len() > DESCENT_LEAF {
-        parts.next()
-    } else {
-        None
+    let Some(part) = parts(items.len()) else {
+        return 0;
     };
-    let Some(part) = part else { return 0 };
-    let middle = items.start + part as usize;
+    let middle = items.start + part;
     let mut height = 0;
     for (side, items) in [items.start..middle, middle..items.end]
         .into_iter()
@@ -470,13 +488,13 @@ fn divide(
         branches.push(Branch {
             upper: 0,
             height: 0,
-            first: items.start as u32,
+            items: items.clone(),
             node: None,
         });
         if side == 1 {
             branches[at].upper = child;
         }
-        branches[child].height = divide(items, child, parts, branches);
+        branches[child].height = divide(items, child, branches, parts);
         height = height.max(1 + branches[child].height);
     }
     height

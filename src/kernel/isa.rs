@@ -34,6 +34,9 @@ pub trait Isa: Copy {
     fn load(self, row: &[f32; LANES]) -> Self::Floats;
     fn to_array(self, floats: Self::Floats) -> [f32; LANES];
     fn splat(self, x: f32) -> Self::Floats;
+    /// Of four numbers, for each lane the one that its two bits of `picks` say,
+    /// lane 0 the lowest bits.
+    fn pick(self, from: &[f32; 4], picks: u32) -> Self::Floats;
     fn add(self, a: Self::Floats, b: Self::Floats) -> Self::Floats;
     fn sub(self, a: Self::Floats, b: Self::Floats) -> Self::Floats;
     fn mul(self, a: Self::Floats, b: Self::Floats) -> Self::Floats;
@@ -191,6 +194,10 @@ impl Isa for Plain {
         [x; LANES]
     }
     #[inline(always)]
+    fn pick(self, from: &[f32; 4], picks: u32) -> [f32; LANES] {
+        std::array::from_fn(|lane| from[(picks >> (2 * lane) & 3) as usize])
+    }
+    #[inline(always)]
     fn add(self, a: [f32; LANES], b: [f32; LANES]) -> [f32; LANES] {
         std::array::from_fn(|lane| a[lane] + b[lane])
     }
@@ -300,6 +307,7 @@ mod tests {
                 isa.sub(a, b),
                 isa.mul(a, isa.splat(self.b[3])),
                 isa.lower(a, b),
+                isa.pick(&std::array::from_fn(|i| self.a[i]), self.b[5].to_bits()),
             ];
             let bits = floats.map(|x| isa.to_array(x).map(canonical));
             let mut out: Vec<u32> = bits.as_flattened().to_vec();

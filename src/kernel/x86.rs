@@ -82,6 +82,19 @@ impl Isa for Sse2 {
         [unsafe { _mm_set1_ps(x) }; 4]
     }
     #[inline(always)]
+    fn pick(self, from: &[f32; 4], picks: u32) -> [__m128; 4] {
+        each!(4, |i| unsafe {
+            // The two bits of a lane, each as a mask.
+            let here = _mm_set1_epi32((picks >> (8 * i)) as i32);
+            let mask = |bits| _mm_castsi128_ps(_mm_cmpeq_epi32(_mm_and_si128(here, bits), bits));
+            let odd = mask(_mm_setr_epi32(1, 4, 16, 64));
+            let late = mask(_mm_setr_epi32(2, 8, 32, 128));
+            let either = |mask, yes, no| _mm_or_ps(_mm_and_ps(mask, yes), _mm_andnot_ps(mask, no));
+            let [a, b, c, d] = from.map(|x| _mm_set1_ps(x));
+            either(late, either(odd, d, c), either(odd, b, a))
+        })
+    }
+    #[inline(always)]
     fn add(self, a: [__m128; 4], b: [__m128; 4]) -> [__m128; 4] {
         each!(4, |i| unsafe { _mm_add_ps(a[i], b[i]) })
     }
@@ -212,6 +225,17 @@ impl Isa for Avx2 {
     #[inline(always)]
     fn splat(self, x: f32) -> [__m256; 2] {
         [unsafe { _mm256_set1_ps(x) }; 2]
+    }
+    #[inline(always)]
+    fn pick(self, from: &[f32; 4], picks: u32) -> [__m256; 2] {
+        each!(2, |i| unsafe {
+            let four = _mm_loadu_ps(from.as_ptr());
+            let four = _mm256_set_m128(four, four);
+            let picks = _mm256_set1_epi32((picks >> (16 * i)) as i32);
+            let shifts = _mm256_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14);
+            // Only the two lowest bits of a lane count.
+            _mm256_permutevar_ps(four, _mm256_srlv_epi32(picks, shifts))
+        })
     }
     #[inline(always)]
     fn add(self, a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
@@ -366,6 +390,17 @@ impl Isa for Avx512 {
     #[inline(always)]
     fn splat(self, x: f32) -> __m512 {
         unsafe { _mm512_set1_ps(x) }
+    }
+    #[inline(always)]
+    fn pick(self, from: &[f32; 4], picks: u32) -> __m512 {
+        unsafe {
+            let four = _mm512_broadcast_f32x4(_mm_loadu_ps(from.as_ptr()));
+            let lanes =
+                _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+            // Only the two lowest bits of a lane count.
+            let picks = _mm512_srlv_epi32(_mm512_set1_epi32(picks as i32), lanes);
+            _mm512_permutevar_ps(four, picks)
+        }
     }
     #[inline(always)]
     fn add(self, a: __m512, b: __m512) -> __m512 {
