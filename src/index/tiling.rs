@@ -388,7 +388,8 @@ impl Cut<'_> {
         let axis = parting_axis(lower, upper);
         let plane = lower.max[axis];
         // Not so for a NaN either.
-        if !(plane <= upper.min[axis]) {
+        let beside = plane <= upper.min[axis];
+        if !beside {
             return None;
         }
         self.planes[lane] = plane;
