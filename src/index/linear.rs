@@ -94,28 +94,7 @@ pub struct Linear {
 }
 
 impl Linear {
-    #[inline(always)]
-    fn scan<I: Isa, G: Region, S: Sink, R: Recorder>(
-        &self,
-        isa: I,
-        region: &G,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        let blocks = self.boxes.range(0, self.ids.len());
-        scan_blocks(
-            isa,
-            blocks,
-            &self.ids,
-            region,
-            region.start(),
-            sink,
-            recorder,
-        )
-    }
-}
-
-impl Linear {
+    /// All planes of a mask, made ready, against every block.
     #[inline(always)]
     fn scan_all<I: Isa, P: Planes<I>, S: Sink, R: Recorder>(
         &self,
@@ -170,7 +149,8 @@ impl RegionIndex for Linear {
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()> {
-        self.scan(BASELINE, &p, sink, recorder)
+        let blocks = self.boxes.range(0, self.ids.len());
+        scan_blocks(BASELINE, blocks, &self.ids, &p, (), sink, recorder)
     }
 }
 

@@ -134,7 +134,7 @@ impl<'a> Packer<'a> {
     /// Appends the words of `lanes`, lowest first.
     ///
     /// # Panics
-    /// If no row fits any more, as in the others.
+    /// If no row fits any more.
     #[inline(always)]
     pub fn push<I: Isa>(&mut self, isa: I, row: &[u32; LANES], lanes: LaneMask) {
         assert!(self.room >= LANES, "more words than there is room for");
