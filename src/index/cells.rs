@@ -31,6 +31,8 @@ impl Cell {
 /// Splits cells in the middle of each of `axes`.
 pub struct CellSplitter<'a> {
     axes: &'a [usize],
+    /// What becomes of cells that are too high for their width.
+    columns: Option<Columns>,
     /// Cells are split at most this often on the way from the root.
     depth: u32,
     /// An item stays where it is once it is larger than this many edges of
@@ -52,10 +54,18 @@ impl<'a> CellSplitter<'a> {
         };
         CellSplitter {
             axes,
+            columns: None,
             depth,
             reach,
             sorted: Vec::new(),
         }
+    }
+
+    /// With cells that are high and narrow cut across `axis`, which is none
+    /// of those split, in parts of no more than `leaf` items.
+    pub fn with_columns(mut self, axis: usize, leaf: usize) -> Self {
+        self.columns = Some(Columns { axis, leaf });
+        self
     }
 
     /// Which child cell an item goes to; the number of cells for an item that
@@ -89,6 +99,54 @@ impl<'a> CellSplitter<'a> {
     }
 }
 
+/// How a column, a cell with much above each other, is cut into storeys.
+///
+/// Cells that leave one axis alone become ever narrower columns over the full
+/// height of the world. Where that is high, a leaf is a thin needle that half
+/// of all views graze. So a cell is split on only while a cube of its width
+/// would hold more than some leaves; then its items are sorted by height and
+/// stacked, the same number in each storey.
+struct Columns {
+    axis: usize,
+    leaf: usize,
+}
+
+/// A cell is a column once a cube of its width would hold fewer than this
+/// many leaves. A split makes that number eight times less, so storeys come
+/// out between a third as high as they are wide and three times as high.
+const LEAVES_OF_A_CUBE: f32 = 3.0;
+
+/// Most storeys of one node: one test of sixteen.
+const STOREYS: usize = 16;
+
+impl Columns {
+    /// Whether the items of the cell are to be stacked. O(items).
+    fn is_column(&self, cell: &Cell, records: &[Record]) -> bool {
+        let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
+        for record in records {
+            let at = record.bounds.centre()[self.axis];
+            (low, high) = (low.min(at), high.max(at));
+        }
+        // Divided first: the product with the number of items may overflow.
+        let most = LEAVES_OF_A_CUBE * self.leaf as f32 / records.len() as f32;
+        cell.half <= (high * 0.5 - low * 0.5) * most
+    }
+
+    /// Sorts the items by height and divides them evenly.
+    fn stack(&self, records: &mut [Record], cell: Cell, parts: &mut Vec<Part<Cell>>) {
+        let height = |record: &Record| record.bounds.centre()[self.axis];
+        records.sort_unstable_by(|a, b| height(a).total_cmp(&height(b)).then(a.id.cmp(&b.id)));
+        let storeys = records.len().div_ceil(self.leaf).min(STOREYS);
+        let place = |storey| records.len() * storey / storeys;
+        for storey in 0..storeys {
+            parts.push(Part {
+                items: place(storey + 1) - place(storey),
+                cell: Some(cell),
+            });
+        }
+    }
+}
+
 impl Splitter for CellSplitter<'_> {
     type Cell = Cell;
 
@@ -101,6 +159,11 @@ impl Splitter for CellSplitter<'_> {
     ) {
         let cells = 1 << self.axes.len();
         while cell.level < self.depth {
+            if let Some(columns) = &self.columns
+                && columns.is_column(&cell, records)
+            {
+                return columns.stack(records, cell, parts);
+            }
             // At most eight cells, and one place for items that stay.
             let mut counts = [0; 9];
             for record in records.iter() {

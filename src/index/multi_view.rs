@@ -152,10 +152,11 @@ impl<I: Isa, S: Sink> Together<'_, '_, I, S> {
         let zero = isa.splat(0.0);
         let mut far = [zero; MAX_PLANES];
         let mut near = [zero; MAX_PLANES];
+        for i in layer.fetched_first() {
+            layer.fetch(places, i);
+        }
         for (i, (&at, &mask)) in places.iter().zip(masks).enumerate() {
-            if let Some(&next) = places.get(i + AHEAD) {
-                layer.fetch(next);
-            }
+            layer.fetch(places, i + AHEAD);
             let (block, lanes) = layer.block(at as usize);
             for plane in bits(mask) {
                 let (normal, upper) = self.bundle.normals[plane];
@@ -233,12 +234,15 @@ impl<I: Isa, S: Sink> Together<'_, '_, I, S> {
         let (places, masks) = here.frontier.entries();
         let views = here.views.entries().1;
         let mut far = [isa.splat(0.0); MAX_PLANES];
+        for i in leaves.fetched_first() {
+            leaves.fetch(places, i);
+        }
         for (i, (&at, &mask)) in places.iter().zip(masks).enumerate() {
-            if let Some(&next) = places.get(i + AHEAD) {
-                leaves.fetch(next);
-                if let Some(id) = self.tree.ids().get(next as usize * LANES) {
-                    crate::kernel::prefetch(id);
-                }
+            leaves.fetch(places, i + AHEAD);
+            if let Some(&next) = places.get(i + AHEAD)
+                && let Some(row) = self.tree.id_rows().get(next as usize)
+            {
+                crate::kernel::prefetch(row);
             }
             let (block, lanes) = leaves.block(at as usize);
             for plane in bits(mask) {

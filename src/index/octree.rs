@@ -55,12 +55,16 @@ impl CellParams {
         items: &[Aabb],
         ids: &[ItemId],
         axes: &[usize],
+        column: Option<usize>,
     ) -> Result<PackedTree, BuildError> {
         check_range(structure, "leaf", self.leaf.into(), 1.0, 4096.0)?;
         check_range(structure, "depth", self.depth.into(), 0.0, 64.0)?;
         check_range(structure, "loose", self.loose.into(), 1.0, 16.0)?;
         let bounds = Aabb::union_of(items);
         let mut splitter = CellSplitter::new(axes, self.depth, self.loose);
+        if let Some(axis) = column {
+            splitter = splitter.with_columns(axis, self.leaf as usize);
+        }
         let root = Cell::root(&bounds);
         Ok(build_top_down(
             items,
@@ -83,7 +87,7 @@ impl RegionIndex for Octree {
         params: &CellParams,
     ) -> Result<Self, BuildError> {
         let ids = indexable(items)?;
-        let tree = params.build(Self::NAME, items, &ids, &[0, 1, 2])?;
+        let tree = params.build(Self::NAME, items, &ids, &[0, 1, 2], None)?;
         Ok(Octree { tree })
     }
 

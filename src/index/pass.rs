@@ -12,9 +12,9 @@ use crate::geometry::{ALL_ROWS, BoxBlock, LANES, LaneMask, PlaneMask};
 use crate::kernel::{Isa, prefetch};
 use crate::query::{ItemId, Planes, Recorder, Sink, Tests, View, runs};
 
-/// A level of so many blocks (3 MiB) is taken to lie in the caches nearest to
+/// A tree of so many blocks (3 MiB) is taken to lie in the caches nearest to
 /// the processor, where asking ahead costs more than it gains.
-const NEAR: usize = 8192;
+pub const NEAR: usize = 8192;
 
 /// One level as a traversal meets it.
 pub struct Layer<'t> {
@@ -22,6 +22,8 @@ pub struct Layer<'t> {
     pub place: Level,
     /// Items below one lane.
     pub span: usize,
+    /// Whether memory is to be asked for ahead: not in trees that are near.
+    pub far: bool,
 }
 
 impl Layer<'_> {
@@ -46,14 +48,23 @@ impl Layer<'_> {
         })
     }
 
-    /// Asks for the memory of a block ahead of its turn.
+    /// Asks for the memory of an entry of the frontier ahead of its turn, if
+    /// there is such an entry.
     #[inline(always)]
-    pub fn fetch(&self, block: u32) {
-        if self.blocks.len() > NEAR
-            && let Some(block) = self.blocks.get(block as usize)
+    pub fn fetch(&self, places: &[u32], i: usize) {
+        if self.far
+            && let Some(&place) = places.get(i)
+            && let Some(block) = self.blocks.get(place as usize)
         {
             block.prefetch();
         }
+    }
+
+    /// The entries of a list that are to be fetched before it is begun: none is
+    /// ahead of them that could do it, and of a small view they are most.
+    #[inline(always)]
+    pub fn fetched_first(&self) -> Range<usize> {
+        0..if self.far { AHEAD } else { 0 }
     }
 }
 
@@ -78,10 +89,11 @@ impl<I: Isa, V: View, S: Sink, R: Recorder> Pass<'_, I, V, S, R> {
         run: &mut Merger,
     ) -> ControlFlow<()> {
         let (places, masks) = here.entries();
+        for i in layer.fetched_first() {
+            layer.fetch(places, i);
+        }
         for (i, (&at, &mask)) in places.iter().zip(masks).enumerate() {
-            if let Some(&next) = places.get(i + AHEAD) {
-                layer.fetch(next);
-            }
+            layer.fetch(places, i + AHEAD);
             self.sort_block(layer, (at, mask), below, run)?;
         }
         ControlFlow::Continue(())
@@ -110,6 +122,9 @@ impl<I: Isa, V: View, S: Sink, R: Recorder> Pass<'_, I, V, S, R> {
                     ids: self.tree.id_rows(),
                     recorder: &mut *self.recorder,
                 };
+                for i in leaves.fetched_first() {
+                    tests.fetch(i);
+                }
                 self.sink
                     .accept_tested(self.isa, self.tree.id_rows(), tests)?;
             }
@@ -122,6 +137,9 @@ impl<I: Isa, V: View, S: Sink, R: Recorder> Pass<'_, I, V, S, R> {
             recorder: &mut *self.recorder,
             ids: self.tree.id_rows(),
         };
+        for i in leaves.fetched_first() {
+            tests.fetch(i);
+        }
         self.sink
             .accept_tested(self.isa, self.tree.id_rows(), tests)
     }
@@ -203,6 +221,22 @@ struct OfOnePlane<'a, 't, V, P, R> {
     recorder: &'a mut R,
 }
 
+impl<V: View, P, R: Recorder> OfOnePlane<'_, '_, V, P, R> {
+    /// Asks for the memory of a leaf of the list ahead of its turn.
+    #[inline(always)]
+    fn fetch<I: Isa>(&self, i: usize)
+    where
+        P: Planes<I>,
+    {
+        if let Some(&leaf) = self.places.get(i)
+            && let Some(block) = self.leaves.blocks.get(leaf as usize)
+        {
+            self.plane.prefetch(block);
+            fetch_ids(self.ids, leaf);
+        }
+    }
+}
+
 impl<I: Isa, V: View, P: Planes<I>, R: Recorder> Tests<I> for OfOnePlane<'_, '_, V, P, R> {
     const SPARSE: bool = false;
 
@@ -213,17 +247,12 @@ impl<I: Isa, V: View, P: Planes<I>, R: Recorder> Tests<I> for OfOnePlane<'_, '_,
 
     #[inline(always)]
     fn test(&mut self, isa: I, i: usize) -> (usize, LaneMask) {
-        let blocks = self.leaves.blocks;
-        if blocks.len() > NEAR
-            && let Some(&next) = self.places.get(i + AHEAD)
-            && let Some(block) = blocks.get(next as usize)
-        {
-            self.plane.prefetch(block);
-            fetch_ids(self.ids, next);
+        if self.leaves.far {
+            self.fetch(i + AHEAD);
         }
         let at = self.places[i] as usize;
         record(self.recorder, self.view, self.leaves, (at, self.mask));
-        let kept = self.plane.kept(isa, &blocks[at]) & self.leaves.place.lanes(at);
+        let kept = self.plane.kept(isa, &self.leaves.blocks[at]) & self.leaves.place.lanes(at);
         (at, kept)
     }
 }
@@ -237,6 +266,20 @@ struct OfAnyPlanes<'a, 't, V, R> {
     recorder: &'a mut R,
 }
 
+impl<V: View, R: Recorder> OfAnyPlanes<'_, '_, V, R> {
+    /// Asks for the memory of a leaf of the list ahead of its turn.
+    #[inline(always)]
+    fn fetch(&self, i: usize) {
+        let (places, masks) = self.entries;
+        if let (Some(&leaf), Some(&mask)) = (places.get(i), masks.get(i))
+            && let Some(block) = self.leaves.blocks.get(leaf as usize)
+        {
+            self.view.prefetch(block, mask);
+            fetch_ids(self.ids, leaf);
+        }
+    }
+}
+
 impl<I: Isa, V: View, R: Recorder> Tests<I> for OfAnyPlanes<'_, '_, V, R> {
     const SPARSE: bool = false;
 
@@ -247,18 +290,14 @@ impl<I: Isa, V: View, R: Recorder> Tests<I> for OfAnyPlanes<'_, '_, V, R> {
 
     #[inline(always)]
     fn test(&mut self, isa: I, i: usize) -> (usize, LaneMask) {
-        let blocks = self.leaves.blocks;
-        let (places, masks) = self.entries;
-        if blocks.len() > NEAR
-            && let (Some(&next), Some(&mask)) = (places.get(i + AHEAD), masks.get(i + AHEAD))
-            && let Some(block) = blocks.get(next as usize)
-        {
-            self.view.prefetch(block, mask);
-            fetch_ids(self.ids, next);
+        if self.leaves.far {
+            self.fetch(i + AHEAD);
         }
+        let (places, masks) = self.entries;
         let (at, mask) = (places[i] as usize, masks[i]);
         record(self.recorder, self.view, self.leaves, (at, mask));
-        let kept = self.view.kept_lanes(isa, &blocks[at], mask) & self.leaves.place.lanes(at);
+        let kept =
+            self.view.kept_lanes(isa, &self.leaves.blocks[at], mask) & self.leaves.place.lanes(at);
         (at, kept)
     }
 }

@@ -13,17 +13,20 @@ use crate::geometry::{BoxBlock, LaneMask, ROWS, RowMask};
 use crate::kernel::{Isa, Kernel, Work, prefetch};
 use crate::query::{ItemId, NoRecorder, Recorder, Sink, View};
 
+/// A block with those of its rows that were read; if they are fewer than six,
+/// some come twice.
+type Read = (u32, [u8; ROWS]);
+
 /// What one query read and handed over, in its own order.
 #[derive(Clone, Default, Debug)]
 pub struct Trace {
-    /// Each block with its rows; if they are fewer than six, some come twice.
-    reads: Vec<(u32, [u8; ROWS])>,
+    reads: Vec<Read>,
     runs: Vec<Range<u32>>,
     /// What was handed over of the leaves, which are the last of the reads.
     leaves: Vec<(u32, LaneMask)>,
 }
 
-struct Reads<'a>(&'a mut Vec<(u32, [u8; ROWS])>);
+struct Reads<'a>(&'a mut Vec<Read>);
 
 impl Recorder for Reads<'_> {
     fn block_read(&mut self, block: usize, rows: impl FnOnce() -> RowMask) {
@@ -156,6 +159,18 @@ struct Again<'a> {
     out: &'a mut Vec<ItemId>,
 }
 
+/// Asks for what one read will want, if there is such a read.
+#[inline(always)]
+fn fetch(blocks: &[BoxBlock], reads: &[Read], i: usize) {
+    if let Some((block, rows)) = reads.get(i)
+        && let Some(block) = blocks.get(*block as usize)
+    {
+        for &row in rows {
+            block.prefetch_row(row.into());
+        }
+    }
+}
+
 impl Work for Again<'_> {
     type Output = ();
 
@@ -167,26 +182,19 @@ impl Work for Again<'_> {
             leaves,
         } = self.trace;
         let (above, below) = reads.split_at(reads.len() - leaves.len());
-        let fetch = |reads: &[(u32, [u8; ROWS])], i: usize| {
-            if let Some((block, rows)) = reads.get(i + AHEAD)
-                && let Some(block) = self.blocks.get(*block as usize)
-            {
-                for &row in rows {
-                    block.prefetch_row(row.into());
-                }
-            }
-        };
         let mut seen = 0;
+        (0..AHEAD).for_each(|i| fetch(self.blocks, above, i));
         for (i, (block, rows)) in above.iter().enumerate() {
-            fetch(above, i);
+            fetch(self.blocks, above, i + AHEAD);
             seen |= self.blocks[*block as usize].touch(isa, rows);
         }
         for run in runs {
             let places = run.start as usize..run.end as usize;
             let _ = self.out.accept_places(isa, self.ids, places);
         }
+        (0..AHEAD).for_each(|i| fetch(self.blocks, below, i));
         for (i, ((block, rows), &(start, lanes))) in below.iter().zip(leaves).enumerate() {
-            fetch(below, i);
+            fetch(self.blocks, below, i + AHEAD);
             if let Some(&(next, _)) = leaves.get(i + AHEAD)
                 && let Some(id) = self.ids.get(next as usize)
             {
