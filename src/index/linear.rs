@@ -222,3 +222,39 @@ impl<I: Isa, P: Planes<I>, R: Recorder> Tests<I> for AllOf<'_, P, R> {
         (i, self.four[i % 4] & lanes)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{ConvexVolume, Plane};
+    use crate::index::DynIndex;
+    use crate::query::QueryCost;
+
+    #[test]
+    fn lanes_behind_the_last_item_are_dropped_however_many_blocks_there_are() {
+        // A plane across an axis keeps the empty box, where its sum is a NaN.
+        let slab = [Plane::new(Vec3::X, -2.0), Plane::new(-Vec3::X, 40.0)];
+        let volumes = [&slab[..], &[]].map(|planes| ConvexVolume::from_planes(planes).unwrap());
+        let together = TOGETHER * LANES;
+        for count in [
+            0,
+            17,
+            together - 1,
+            together,
+            together + 5,
+            2 * together + 21,
+        ] {
+            let low = (0..count).map(|i| Vec3::X * (i % 100) as f32);
+            let items: Vec<Aabb> = low.map(|low| Aabb::new(low, low + Vec3::ONE)).collect();
+            let scan = Linear::build(&items, None, &LinearParams::default()).unwrap();
+            for volume in &volumes {
+                let (mut found, mut cost) = (Vec::new(), QueryCost::default());
+                DynIndex::see_counted(&scan, volume.into(), &mut found, &mut cost);
+                let seen = items.iter().zip(0..).filter(|(b, _)| volume.sees(b));
+                let seen: Vec<ItemId> = seen.map(|(_, id)| id).collect();
+                assert!(found == seen, "{count}: {} of {}", found.len(), seen.len());
+                assert_eq!(cost.items_tested, count as u64);
+            }
+        }
+    }
+}

@@ -467,6 +467,12 @@ mod tests {
             assert_eq!(found, [id]);
         }
         assert_eq!(cost.items_tested, 0);
+        // Groups in which every point has its one item, the last one not full.
+        let centres: Vec<Vec3> = items.iter().map(Aabb::centre).collect();
+        assert!(centres.len() > 2 * GROUP && !centres.len().is_multiple_of(GROUP));
+        let mut many = Located::default();
+        DynIndex::locate_many(&bsp, &centres, &mut many);
+        assert!(many.len() == items.len() && many.iter().zip(0..).all(|(found, id)| found == [id]));
         answers_are_right(&bsp, &items);
     }
 

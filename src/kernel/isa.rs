@@ -346,6 +346,29 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_packer_has_room_for_the_last_row_whole() {
+        let mut out = vec![1];
+        let row: [u32; LANES] = std::array::from_fn(|lane| lane as u32);
+        let mut packer = Packer::onto(&mut out, LANES + 2);
+        packer.push(Plain, &row, LaneMask::MAX);
+        packer.push(Plain, &row, 0b10_0100);
+        drop(packer);
+        assert_eq!(out[..3], [1, 0, 1]);
+        assert_eq!(out[LANES..], [15, 2, 5]);
+    }
+
+    #[test]
+    #[should_panic(expected = "more words than there is room for")]
+    fn a_packer_that_is_full_takes_nothing_more() {
+        // Memory enough, so that it is the packer that refuses.
+        let mut out = Vec::with_capacity(4 * LANES);
+        let mut packer = Packer::onto(&mut out, LANES);
+        for _ in 0..3 {
+            packer.push(Plain, &[7; LANES], LaneMask::MAX);
+        }
+    }
+
     proptest! {
         #[test]
         fn every_instruction_set_does_the_same(
