@@ -5,7 +5,7 @@
 use std::cell::Cell;
 use std::ops::{ControlFlow, Range};
 
-use super::frontier::{AHEAD, Frontier, Merger, hand_over};
+use super::frontier::{AHEAD, Frontier, Merger, first_ahead, hand_over, is_far};
 use super::tree::{PackedTree, TreeNode};
 use crate::geometry::{Aabb, BoxBlock, LANES, LaneMask, PlaneMask};
 use crate::kernel::{Isa, prefetch};
@@ -196,6 +196,20 @@ impl Bundles {
         !self.groups
     }
 
+    /// Asks for the memory of an entry of the frontier ahead of its turn, if
+    /// there is such an entry.
+    #[inline(always)]
+    fn fetch(&self, places: &[u32], i: usize) {
+        if let Some(&next) = places.get(i)
+            && let Some(block) = self.blocks.get(next as usize)
+        {
+            block.prefetch();
+            let links = &self.links[next as usize];
+            prefetch(&links.below);
+            prefetch(&links.lanes);
+        }
+    }
+
     pub fn bytes(&self) -> usize {
         size_of_val(&self.blocks[..])
             + size_of_val(&self.links[..])
@@ -217,6 +231,7 @@ impl Bundles {
         recorder: &mut R,
     ) -> ControlFlow<()> {
         let (nodes, ids) = (test.tree().nodes(), test.tree().ids());
+        let far = is_far(ids.len());
         let mut scratch = SCRATCH.take().unwrap_or_default();
         let Scratch {
             here,
@@ -245,14 +260,12 @@ impl Bundles {
             below.clear(places.len());
             leaves.make_room(places.len());
             let mut run = Merger::default();
+            for i in first_ahead(far) {
+                self.fetch(places, i);
+            }
             for (i, (&at, &mask)) in places.iter().zip(masks).enumerate() {
-                if let Some(&next) = places.get(i + AHEAD)
-                    && let Some(block) = self.blocks.get(next as usize)
-                {
-                    block.prefetch();
-                    let links = &self.links[next as usize];
-                    prefetch(&links.below);
-                    prefetch(&links.lanes);
+                if far {
+                    self.fetch(places, i + AHEAD);
                 }
                 let links = &self.links[at as usize];
                 recorder.nodes_tested(links.lanes.count_ones());
@@ -286,14 +299,16 @@ impl Bundles {
         }
         if flow.is_continue() {
             let (places, masks) = leaves.entries();
+            for i in first_ahead(far) {
+                fetch_leaf(nodes, places, i);
+            }
+            for i in first_ahead(far).take(AHEAD / 2) {
+                fetch_items(test, places, masks, i);
+            }
             for (i, (&leaf, &mask)) in places.iter().zip(masks).enumerate() {
-                if let (Some(&next), Some(&mask)) =
-                    (places.get(i + AHEAD / 2), masks.get(i + AHEAD / 2))
-                {
-                    test.fetch(nodes[next as usize].items(), mask);
-                }
-                if let Some(&later) = places.get(i + AHEAD) {
-                    prefetch(&nodes[later as usize]);
+                if far {
+                    fetch_items(test, places, masks, i + AHEAD / 2);
+                    fetch_leaf(nodes, places, i + AHEAD);
                 }
                 let items = nodes[leaf as usize].items();
                 flow = test.test(isa, items, mask, sink, recorder);
@@ -304,6 +319,22 @@ impl Bundles {
         }
         SCRATCH.set(Some(scratch));
         flow
+    }
+}
+
+/// Asks for the node of a leaf, if there is such an entry.
+#[inline(always)]
+fn fetch_leaf(nodes: &[TreeNode], places: &[u32], i: usize) {
+    if let Some(&leaf) = places.get(i) {
+        prefetch(&nodes[leaf as usize]);
+    }
+}
+
+/// Asks for the items of a leaf, whose node has arrived by now.
+#[inline(always)]
+fn fetch_items<L: Leaves>(test: &L, places: &[u32], masks: &[PlaneMask], i: usize) {
+    if let (Some(&leaf), Some(&mask)) = (places.get(i), masks.get(i)) {
+        test.fetch(test.tree().nodes()[leaf as usize].items(), mask);
     }
 }
 

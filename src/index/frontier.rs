@@ -12,6 +12,22 @@ use crate::query::{ItemId, Recorder, Sink};
 /// miss, and not so many that lines are gone before their turn.
 pub const AHEAD: usize = 12;
 
+/// A tree over so many items (3 MiB of blocks) is taken to lie in the caches
+/// nearest to the processor, where asking ahead costs more than it gains.
+const NEAR: usize = 131_072;
+
+/// Whether a tree over so many items is to be asked for ahead.
+pub fn is_far(items: usize) -> bool {
+    items > NEAR
+}
+
+/// The entries of a list that are to be fetched before it is begun: none is
+/// ahead of them that could do it, and of a small view they are most.
+#[inline(always)]
+pub fn first_ahead(far: bool) -> Range<usize> {
+    0..if far { AHEAD } else { 0 }
+}
+
 /// Nodes that are still to be looked at, each with the planes that its
 /// ancestors have left open.
 #[derive(Default)]

@@ -10,7 +10,7 @@ use glam::Vec3;
 
 use super::TreeOrder;
 use super::by_plane::ByPlane;
-use super::frontier::{AHEAD, Frontier, Merger};
+use super::frontier::{AHEAD, Frontier, Merger, first_ahead};
 use super::pass::{Layer, Pass};
 use super::wide::Wide;
 use crate::geometry::{ConvexVolume, LANES, LaneMask, MAX_PLANES, Plane, PlaneMask, Upper};
@@ -152,7 +152,7 @@ impl<I: Isa, S: Sink> Together<'_, '_, I, S> {
         let zero = isa.splat(0.0);
         let mut far = [zero; MAX_PLANES];
         let mut near = [zero; MAX_PLANES];
-        for i in layer.fetched_first() {
+        for i in first_ahead(layer.far) {
             layer.fetch(places, i);
         }
         for (i, (&at, &mask)) in places.iter().zip(masks).enumerate() {
@@ -234,7 +234,7 @@ impl<I: Isa, S: Sink> Together<'_, '_, I, S> {
         let (places, masks) = here.frontier.entries();
         let views = here.views.entries().1;
         let mut far = [isa.splat(0.0); MAX_PLANES];
-        for i in leaves.fetched_first() {
+        for i in first_ahead(leaves.far) {
             leaves.fetch(places, i);
         }
         for (i, (&at, &mask)) in places.iter().zip(masks).enumerate() {

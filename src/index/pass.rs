@@ -6,15 +6,11 @@ use std::ops::{ControlFlow, Range};
 
 use super::TreeOrder;
 use super::by_plane::ByPlane;
-use super::frontier::{AHEAD, Frontier, Merger, hand_over};
+use super::frontier::{AHEAD, Frontier, Merger, first_ahead, hand_over};
 use super::wide::{Level, Wide};
 use crate::geometry::{ALL_ROWS, BoxBlock, LANES, LaneMask, PlaneMask};
 use crate::kernel::{Isa, prefetch};
 use crate::query::{ItemId, Planes, Recorder, Sink, Tests, View, runs};
-
-/// A tree of so many blocks (3 MiB) is taken to lie in the caches nearest to
-/// the processor, where asking ahead costs more than it gains.
-pub const NEAR: usize = 8192;
 
 /// One level as a traversal meets it.
 pub struct Layer<'t> {
@@ -59,13 +55,6 @@ impl Layer<'_> {
             block.prefetch();
         }
     }
-
-    /// The entries of a list that are to be fetched before it is begun: none is
-    /// ahead of them that could do it, and of a small view they are most.
-    #[inline(always)]
-    pub fn fetched_first(&self) -> Range<usize> {
-        0..if self.far { AHEAD } else { 0 }
-    }
 }
 
 /// A query on its way through the tree, block by block: what is done with a
@@ -89,7 +78,7 @@ impl<I: Isa, V: View, S: Sink, R: Recorder> Pass<'_, I, V, S, R> {
         run: &mut Merger,
     ) -> ControlFlow<()> {
         let (places, masks) = here.entries();
-        for i in layer.fetched_first() {
+        for i in first_ahead(layer.far) {
             layer.fetch(places, i);
         }
         for (i, (&at, &mask)) in places.iter().zip(masks).enumerate() {
@@ -122,7 +111,7 @@ impl<I: Isa, V: View, S: Sink, R: Recorder> Pass<'_, I, V, S, R> {
                     ids: self.tree.id_rows(),
                     recorder: &mut *self.recorder,
                 };
-                for i in leaves.fetched_first() {
+                for i in first_ahead(leaves.far) {
                     tests.fetch(i);
                 }
                 self.sink
@@ -137,7 +126,7 @@ impl<I: Isa, V: View, S: Sink, R: Recorder> Pass<'_, I, V, S, R> {
             recorder: &mut *self.recorder,
             ids: self.tree.id_rows(),
         };
-        for i in leaves.fetched_first() {
+        for i in first_ahead(leaves.far) {
             tests.fetch(i);
         }
         self.sink

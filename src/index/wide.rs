@@ -11,9 +11,9 @@ use serde::{Deserialize, Serialize};
 
 use super::block_order::{BlockOrder, block_ordered};
 use super::by_plane::ByPlane;
-use super::frontier::{Frontier, Merger};
+use super::frontier::{Frontier, Merger, is_far};
 use super::id_rows::IdRows;
-use super::pass::{Layer, NEAR, Pass};
+use super::pass::{Layer, Pass};
 use super::tree::visible_on_baseline;
 use super::{BuildError, FrustumQuery, MemoryUsage, RegionIndex, TreeOrder, indexable};
 use crate::geometry::{Aabb, BoxBlock, LANES, LaneMask, PlaneMask, PlaneTree};
@@ -233,7 +233,7 @@ impl Wide {
             blocks: &self.blocks[place.first..place.first + place.blocks],
             place,
             span: 1 << (level * LANES.ilog2() as usize),
-            far: self.blocks.len() > NEAR,
+            far: is_far(self.ids.len()),
         }
     }
 
