@@ -40,7 +40,8 @@ const fn warm_and_cold(scene: &'static str, paths: &'static [&'static str]) -> S
 }
 
 /// From a thousandth of the items to all of them, and further ways. Many views
-/// for small scenes, where a few would train the branch predictor.
+/// for small scenes, where a few would train the branch predictor; few for large
+/// ones, of which every query has branches enough and a scan takes milliseconds.
 macro_rules! surface {
     ($frames:literal $(, $more:expr)*) => {
         &[
@@ -137,15 +138,24 @@ pub static SUITES: &[Suite] = &[
         summary: "the crossover surface: three worlds from a thousand to a million items, 0.1 % to all of them visible, and the real ones, warm and cold; half an hour, with the structures of other crates far more than one",
         plan: &[
             warm_and_cold("uniform:n=1000", surface!(512)),
-            warm_and_cold("uniform:n=10000", surface!(512, FIXED_COUNT)),
-            warm_and_cold("uniform:n=100000", surface!(256, FIXED_COUNT)),
-            warm_and_cold("uniform:n=1000000", surface!(128, FIXED_COUNT)),
+            warm_and_cold(
+                "uniform:n=10000",
+                surface!(512, "flythrough:frames=512,visible=500"),
+            ),
+            warm_and_cold(
+                "uniform:n=100000",
+                surface!(256, "flythrough:frames=256,visible=500"),
+            ),
+            warm_and_cold(
+                "uniform:n=1000000",
+                surface!(64, "flythrough:frames=64,visible=500"),
+            ),
             warm_and_cold("city:n=10000", surface!(512)),
             warm_and_cold("city:n=100000", surface!(256)),
-            warm_and_cold("city:n=1000000", surface!(128)),
+            warm_and_cold("city:n=1000000", surface!(64)),
             warm_and_cold("clustered:n=10000", surface!(512)),
             warm_and_cold("clustered:n=100000", surface!(256)),
-            warm_and_cold("clustered:n=1000000", surface!(128)),
+            warm_and_cold("clustered:n=1000000", surface!(64)),
             warm_and_cold(
                 "freedm-map12",
                 &[
