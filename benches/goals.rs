@@ -55,6 +55,19 @@ const COPY: Option<(&str, f64)> = Some(("times_memcpy", 1.2));
 const REPLAY: Option<(&str, f64)> = Some(("times_replay", 1.15));
 const REPLAY_TINY: Option<(&str, f64)> = Some(("times_replay", 2.0));
 
+const OF_TEN_THOUSAND: [Way; 4] = [
+    way(TINY, 3.0, None),
+    way(FEW, 7.0, None),
+    way(MANY, 12.0, None),
+    way(ALL, 50.0, None),
+];
+const OF_A_MILLION: [Way; 4] = [
+    way(TINY, 10.0, REPLAY_TINY),
+    way(FEW, 20.0, REPLAY),
+    way(MANY, 33.0, REPLAY),
+    way(ALL, 65.0, COPY),
+];
+
 /// The trees that are judged beside the subject.
 const TREES: [&str; 4] = ["bsp", "octree", "quadtree", "bvh"];
 /// Time of the fastest structure of another crate / time of any tree, at least,
@@ -68,12 +81,7 @@ const WORLDS: [World; 9] = [
         cold: false,
         scan: 2.5,
         ahead: &[],
-        ways: &[
-            way(TINY, 3.0, None),
-            way(FEW, 7.0, None),
-            way(MANY, 12.0, None),
-            way(ALL, 50.0, None),
-        ],
+        ways: &OF_TEN_THOUSAND,
     },
     World {
         scene: "uniform:n=100000",
@@ -94,12 +102,7 @@ const WORLDS: [World; 9] = [
         cold: false,
         scan: 1.8,
         ahead: &TREES,
-        ways: &[
-            way(TINY, 10.0, REPLAY_TINY),
-            way(FEW, 20.0, REPLAY),
-            way(MANY, 33.0, REPLAY),
-            way(ALL, 65.0, COPY),
-        ],
+        ways: &OF_A_MILLION,
     },
     World {
         scene: "uniform:n=1000000",
@@ -134,12 +137,7 @@ const WORLDS: [World; 9] = [
         cold: false,
         scan: 1.8,
         ahead: &["bsp", "octree", "bvh"],
-        ways: &[
-            way(TINY, 10.0, REPLAY_TINY),
-            way(FEW, 20.0, REPLAY),
-            way(MANY, 33.0, REPLAY),
-            way(ALL, 65.0, COPY),
-        ],
+        ways: &OF_A_MILLION,
     },
     // Eleven thousand buildings: the goals of ten thousand boxes.
     World {
@@ -148,12 +146,7 @@ const WORLDS: [World; 9] = [
         cold: false,
         scan: 2.5,
         ahead: &[],
-        ways: &[
-            way(TINY, 3.0, None),
-            way(FEW, 7.0, None),
-            way(MANY, 12.0, None),
-            way(ALL, 50.0, None),
-        ],
+        ways: &OF_TEN_THOUSAND,
     },
     // Three thousand and fewer: no goal but to be ahead.
     World {

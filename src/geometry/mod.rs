@@ -2,6 +2,9 @@
 //! structure shares. Nothing here knows what an index, a camera or a file is.
 
 mod aabb;
+#[cfg(test)]
+pub mod arbitrary;
+mod blade;
 mod box_block;
 mod convex_volume;
 mod plane;
@@ -13,9 +16,8 @@ mod spheres;
 mod wide_volume;
 
 pub use aabb::Aabb;
-pub use box_block::{
-    ALL_ROWS, Blade, Blades, BoxBlock, BoxBlocks, Corner, LANES, LaneMask, ROWS, RowMask, lanes_of,
-};
+pub use blade::{Blade, Blades, Corner};
+pub use box_block::{ALL_ROWS, BoxBlock, BoxBlocks, LANES, LaneMask, ROWS, RowMask, lanes_of};
 pub use convex_volume::{ConvexVolume, FrustumPlane, MAX_PLANES, PlaneMask, VolumeError};
 pub use plane::{Plane, Upper};
 pub use plane_rows::{PlaneRows, ROW_LANES};

@@ -97,24 +97,9 @@ fn pick<const LARGER: bool>(p: f32, q: f32) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::arbitrary::{number, vector};
     use super::*;
-    use glam::Vec3;
     use proptest::prelude::*;
-
-    fn number() -> impl Strategy<Value = f32> {
-        prop_oneof![
-            (-8i8..8).prop_map(f32::from),
-            (-8i8..8).prop_map(f32::from),
-            -9f32..9.0,
-            prop::num::f32::NORMAL,
-            prop::num::f32::SUBNORMAL,
-            Just(-0.0),
-        ]
-    }
-
-    fn vector() -> impl Strategy<Value = Vec3> {
-        [number(), number(), number()].prop_map(Vec3::from_array)
-    }
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(4000))]

@@ -1,6 +1,6 @@
 //! The BSP tree: planes of any orientation divide the items, and region search
-//! goes down by the planes alone. It owns the builders that choose planes and
-//! the import of a map's own tree.
+//! goes down by the planes alone. It owns the import of a map's own tree; which
+//! planes the builders choose is `plane_choice`'s.
 
 use std::ops::ControlFlow;
 
@@ -8,9 +8,14 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::batch;
+use super::by_tree::seen_by_tree;
 use super::partition::{Part, Record, Splitter, build_top_down};
+use super::plane_choice::{
+    between_layers, by_own_planes, by_principal_axis, by_surface_area, divide,
+};
+use super::stack::Stack;
 use super::tiling::Tiling;
-use super::tree::{PackedTree, Stack, seen_by_tree};
+use super::tree::PackedTree;
 use super::treelets::{DESCENT_LEAF, Treelets};
 use super::{BuildError, MemoryUsage, RegionIndex, check_range, indexable};
 use crate::geometry::{Aabb, Plane, PlaneTree};
@@ -213,211 +218,6 @@ impl PlaneSplitter<'_> {
         }
         self.splits[node].normal = normal;
     }
-}
-
-/// Moves the records that belong to the back to the front of the slice,
-/// keeping nothing else in order; how many they are. O(n).
-fn divide(records: &mut [Record], to_back: impl Fn(&Record) -> bool) -> usize {
-    let mut back = 0;
-    for i in 0..records.len() {
-        if to_back(&records[i]) {
-            records.swap(back, i);
-            back += 1;
-        }
-    }
-    back
-}
-
-fn centres(records: &[Record]) -> Aabb {
-    let boxes = records.iter().map(|r| r.bounds.centre());
-    boxes.fold(Aabb::EMPTY, |all, c| all.union(&Aabb::new(c, c)))
-}
-
-const AXES: [Vec3; 3] = [Vec3::X, Vec3::Y, Vec3::Z];
-
-fn widest_axis(records: &[Record]) -> Vec3 {
-    let centres = centres(records);
-    let width = centres.max * 0.5 - centres.min * 0.5;
-    let widest = (0..3).max_by(|&a, &b| width[a].total_cmp(&width[b]));
-    AXES[widest.unwrap_or(0)]
-}
-
-/// Halves the records along a direction; ties by id, so that the same items
-/// always give the same tree.
-fn by_median(records: &mut [Record], normal: Vec3) -> (Vec3, usize) {
-    let half = records.len() / 2;
-    let along = Plane::new(normal, 0.0);
-    records.select_nth_unstable_by(half, |a, b| {
-        let [a_at, b_at] = [a, b].map(|r| along.value_at(r.bounds.centre()));
-        a_at.total_cmp(&b_at).then(a.id.cmp(&b.id))
-    });
-    (normal, half)
-}
-
-/// The median along the widest axis, or beside it where it would part items of
-/// one centre: regions that tile space lie in layers, and a plane between two
-/// layers cuts none of them. Axis after axis, widest first; a side gets at
-/// least a quarter of the items (of few, at least one), or else the layer is
-/// parted after all.
-fn between_layers(records: &mut [Record]) -> (Vec3, usize) {
-    let centres = centres(records);
-    let width = centres.max * 0.5 - centres.min * 0.5;
-    let mut axes = [0, 1, 2];
-    axes.sort_by(|&a, &b| width[b].total_cmp(&width[a]));
-    let (count, half) = (records.len(), records.len() / 2);
-    // Few items may part as they can: their depth has a bound of its own.
-    let least = if count <= DESCENT_LEAF {
-        1
-    } else {
-        count.div_ceil(4)
-    };
-    for least in [count.div_ceil(4), least] {
-        for axis in axes {
-            let at = |r: &Record| r.bounds.centre()[axis];
-            records
-                .select_nth_unstable_by(half, |a, b| at(a).total_cmp(&at(b)).then(a.id.cmp(&b.id)));
-            let middle = at(&records[half]);
-            let below = records[..half].iter().filter(|r| at(r) < middle).count();
-            let above = half + records[half..].iter().filter(|r| at(r) <= middle).count();
-            let nearest = if half - below <= above - half {
-                below
-            } else {
-                above
-            };
-            // The other edge of the layer may be that of the group.
-            let nearest = match nearest {
-                0 => above,
-                all if all == count => below,
-                inner => inner,
-            };
-            if nearest.min(count - nearest) >= least {
-                let back = divide(records, |r| match nearest == below {
-                    true => at(r) < middle,
-                    false => at(r) <= middle,
-                });
-                return (AXES[axis], back);
-            }
-        }
-    }
-    by_median(records, AXES[axes[0]])
-}
-
-/// Bins per axis of the surface area heuristic.
-const BINS: usize = 16;
-
-/// The best of 15 planes on each axis by area times count, both sides; `None`
-/// if all centres coincide.
-fn by_surface_area(records: &mut [Record]) -> Option<(Vec3, usize)> {
-    let centres = centres(records);
-    let low = centres.min;
-    let width = centres.max - low;
-    // Beyond f32's range, or no width at all: bins would be NaN.
-    let scale = Vec3::splat(BINS as f32 * 0.999) / width;
-    let usable: Vec<usize> = (0..3)
-        .filter(|&k| scale[k].is_finite() && scale[k] > 0.0)
-        .collect();
-    let bin = |r: &Record, k: usize| {
-        (((r.bounds.centre()[k] - low[k]) * scale[k]) as usize).min(BINS - 1)
-    };
-    let mut bins = [[(Aabb::EMPTY, 0usize); BINS]; 3];
-    for record in records.iter() {
-        for &k in &usable {
-            let (bounds, count) = &mut bins[k][bin(record, k)];
-            *bounds = bounds.union(&record.bounds);
-            *count += 1;
-        }
-    }
-    let mut best: Option<(f32, usize, usize)> = None;
-    for &k in &usable {
-        let mut right = [0.0; BINS];
-        let (mut bounds, mut count) = (Aabb::EMPTY, 0);
-        for i in (1..BINS).rev() {
-            bounds = bounds.union(&bins[k][i].0);
-            count += bins[k][i].1;
-            right[i] = half_area(&bounds) * count as f32;
-        }
-        let (mut bounds, mut count) = (Aabb::EMPTY, 0);
-        for i in 1..BINS {
-            bounds = bounds.union(&bins[k][i - 1].0);
-            count += bins[k][i - 1].1;
-            let cost = half_area(&bounds) * count as f32 + right[i];
-            if best.is_none_or(|(lowest, _, _)| cost < lowest) && count > 0 && count < records.len()
-            {
-                best = Some((cost, k, i));
-            }
-        }
-    }
-    let (_, k, split) = best?;
-    let back = divide(records, |r| bin(r, k) < split);
-    Some((AXES[k], back))
-}
-
-fn half_area(b: &Aabb) -> f32 {
-    let e = b.extent().max(Vec3::ZERO);
-    e.x * e.y + e.y * e.z + e.z * e.x
-}
-
-/// The median across the principal axis of the centres: the dominant
-/// eigenvector of their covariance, by power iteration in f64.
-fn by_principal_axis(records: &mut [Record]) -> Option<(Vec3, usize)> {
-    let centres = centres(records);
-    let middle = centres.centre().as_dvec3();
-    let width = (centres.max.as_dvec3() - centres.min.as_dvec3()).max_element();
-    if width == 0.0 || !width.is_finite() {
-        return None;
-    }
-    let mut covariance = glam::DMat3::ZERO;
-    for record in records.iter() {
-        let d = (record.bounds.centre().as_dvec3() - middle) / width;
-        covariance += glam::DMat3::from_cols(d * d.x, d * d.y, d * d.z);
-    }
-    let mut axis = widest_axis(records).as_dvec3() + glam::DVec3::new(1e-3, 2e-3, 3e-3);
-    for _ in 0..16 {
-        axis = (covariance * axis).try_normalize()?;
-    }
-    Some(by_median(records, axis.as_vec3()))
-}
-
-/// Planes that `auto` looks at per node, and items it judges them by.
-const CANDIDATES: usize = 24;
-const JUDGES: usize = 128;
-
-/// Of the faces of some of the boxes, and of diagonals through their corners,
-/// the plane with the least imbalance plus cut items.
-fn by_own_planes(records: &mut [Record], cut: f32) -> Option<(Vec3, usize)> {
-    let step = records.len().div_ceil(CANDIDATES / 8).max(1);
-    let diagonals = [Vec3::new(1.0, 1.0, 0.0), Vec3::new(1.0, -1.0, 0.0)];
-    let candidates = records.iter().step_by(step).flat_map(|r| {
-        let faces = AXES
-            .into_iter()
-            .flat_map(|n| [(n, r.bounds.min), (n, r.bounds.max)]);
-        let corners = diagonals.into_iter().map(|n| (n, r.bounds.centre()));
-        faces
-            .chain(corners)
-            .map(|(normal, at)| Plane::through(at, normal))
-            .collect::<Vec<_>>()
-    });
-    let judges = records.len().div_ceil(JUDGES).max(1);
-    let mut best: Option<(f32, Plane)> = None;
-    for plane in candidates {
-        let (mut balance, mut cuts) = (0i32, 0u32);
-        for record in records.iter().step_by(judges) {
-            balance += if plane.contains_point(record.bounds.centre()) {
-                1
-            } else {
-                -1
-            };
-            let crosses = !plane.excludes(&record.bounds) && !plane.contains(&record.bounds);
-            cuts += u32::from(crosses);
-        }
-        let cost = balance.unsigned_abs() as f32 + cut * cuts as f32;
-        if best.is_none_or(|(lowest, _)| cost < lowest) {
-            best = Some((cost, plane));
-        }
-    }
-    let (_, plane) = best?;
-    let back = divide(records, |r| !plane.contains_point(r.bounds.centre()));
-    Some((plane.normal, back))
 }
 
 /// How far the two sides of a node reach along its normal, from the bounds of

@@ -13,7 +13,8 @@ use obvhs::cwbvh::builder::build_cwbvh;
 use obvhs::{Boundable, BvhBuildParams};
 use serde::{Deserialize, Serialize};
 
-use super::tree::{PackedTree, TreeWriter, searched_by_tree, seen_by_tree};
+use super::by_tree::{searched_by_tree, seen_by_tree};
+use super::tree::{PackedTree, TreeWriter};
 use super::{BuildError, RegionIndex, check_range, indexable};
 use crate::geometry::{Aabb, PlaneTree};
 use crate::query::ItemId;

@@ -7,8 +7,9 @@ use std::ops::ControlFlow;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
+use super::by_tree::visible_on_baseline;
 use super::id_rows::IdRows;
-use super::tree::{scan_blocks, visible_on_baseline};
+use super::tree::scan_blocks;
 use super::{BuildError, FrustumQuery, MemoryUsage, RegionIndex, indexable};
 use crate::geometry::{Aabb, BoxBlock, BoxBlocks, LANES, LaneMask, PlaneMask, PlaneTree, lanes_of};
 use crate::kernel::{BASELINE, Isa};

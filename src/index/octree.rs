@@ -2,9 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::by_tree::{searched_by_tree, seen_by_tree};
 use super::cells::{Cell, CellSplitter};
 use super::partition::build_top_down;
-use super::tree::{PackedTree, searched_by_tree, seen_by_tree};
+use super::tree::PackedTree;
 use super::{BuildError, RegionIndex, check_range, indexable};
 use crate::geometry::{Aabb, PlaneTree};
 use crate::query::ItemId;

@@ -2,8 +2,9 @@
 //! cities and maps, which are flat; where a scene is not, the cells' items are
 //! stacked along the third axis.
 
+use super::by_tree::{searched_by_tree, seen_by_tree};
 use super::octree::CellParams;
-use super::tree::{PackedTree, searched_by_tree, seen_by_tree};
+use super::tree::PackedTree;
 use super::{BuildError, RegionIndex, indexable};
 use crate::geometry::{Aabb, PlaneTree};
 

@@ -8,7 +8,8 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::bundles::Leaves;
-use super::tree::{PackedTree, scan_blocks, visible_on_baseline};
+use super::by_tree::visible_on_baseline;
+use super::tree::{PackedTree, scan_blocks};
 use super::{Bsp, BuildError, FrustumQuery, MemoryUsage, RegionIndex};
 use crate::geometry::quantised::{Code, CodeBlock, Grid};
 use crate::geometry::{Aabb, BoxBlock, LANES, LaneMask, PlaneMask, PlaneTree, lanes_of};

@@ -9,6 +9,7 @@ use std::ops::{ControlFlow, Range};
 use glam::Vec3;
 
 use super::bundles::{Bundles, Leaves};
+use super::stack::Stack;
 use crate::geometry::{Aabb, BoxBlock, BoxBlocks, LaneMask, PlaneMask};
 use crate::kernel::{Isa, prefetch};
 use crate::query::{Containment, ItemId, Recorder, Region, Sink, View};
@@ -428,91 +429,6 @@ impl<V: View> Leaves for InBlocks<'_, V> {
     }
 }
 
-/// What a structure that is nothing but a tree (in a field `tree`) leaves to it
-/// of [`super::RegionIndex`].
-macro_rules! searched_by_tree {
-    () => {
-        fn memory(&self) -> $crate::index::MemoryUsage {
-            self.tree.memory()
-        }
-
-        #[inline(always)]
-        fn locate<S: $crate::query::Sink, R: $crate::query::Recorder>(
-            &self,
-            p: glam::Vec3,
-            sink: &mut S,
-            recorder: &mut R,
-        ) -> std::ops::ControlFlow<()> {
-            self.tree
-                .query($crate::kernel::BASELINE, &p, sink, recorder)
-        }
-
-        #[inline(always)]
-        fn locate_many<S: $crate::query::ManySink>(
-            &self,
-            points: &[glam::Vec3],
-            sink: &mut S,
-        ) -> std::ops::ControlFlow<()> {
-            $crate::index::batch::locate_many(&self.tree, points, sink)
-        }
-
-        fn refit(&mut self, items: &[Aabb], moved: &[$crate::query::ItemId]) -> bool {
-            self.tree.refit(items, moved, |_, _| ())
-        }
-    };
-}
-pub(super) use searched_by_tree;
-
-/// [`super::FrustumQuery::visible`] for a structure that has
-/// [`super::FrustumQuery::visible_by`].
-macro_rules! visible_on_baseline {
-    () => {
-        #[inline(always)]
-        fn visible<V: $crate::query::View, S: $crate::query::Sink, R: $crate::query::Recorder>(
-            &self,
-            view: &V,
-            sink: &mut S,
-            recorder: &mut R,
-        ) -> std::ops::ControlFlow<()> {
-            self.visible_by($crate::kernel::BASELINE, view, sink, recorder)
-        }
-    };
-}
-pub(super) use visible_on_baseline;
-
-/// [`super::FrustumQuery`] and [`super::TreeOrder`] for a structure that has a
-/// field `tree`.
-macro_rules! seen_by_tree {
-    ($structure:ty) => {
-        impl $crate::index::FrustumQuery for $structure {
-            $crate::index::tree::visible_on_baseline!();
-
-            #[inline(always)]
-            fn visible_by<
-                I: $crate::kernel::Isa,
-                V: $crate::query::View,
-                S: $crate::query::Sink,
-                R: $crate::query::Recorder,
-            >(
-                &self,
-                isa: I,
-                view: &V,
-                sink: &mut S,
-                recorder: &mut R,
-            ) -> std::ops::ControlFlow<()> {
-                self.tree.see(isa, view, sink, recorder)
-            }
-        }
-
-        impl $crate::index::TreeOrder for $structure {
-            fn ids(&self) -> &[$crate::query::ItemId] {
-                self.tree.ids()
-            }
-        }
-    };
-}
-pub(super) use seen_by_tree;
-
 /// Tests items in blocks (each with the place of its lane 0 and the lanes that
 /// count) and hands over runs of admitted ones: the
 /// leaf test of every tree and the whole of the linear scan.
@@ -536,48 +452,6 @@ pub fn scan_blocks<I: Isa, B: Borrow<BoxBlock>, G: Region, S: Sink, R: Recorder>
         }
     }
     ControlFlow::Continue(())
-}
-
-/// Open subtrees kept without the heap: enough for any balanced tree.
-const NEAR: usize = 64;
-
-/// Nodes with what is known of them, such as the ends and memos of the
-/// straddling nodes above the present one.
-pub(super) struct Stack<M> {
-    near: [(u32, M); NEAR],
-    used: usize,
-    /// Deeper levels of degenerate trees.
-    far: Vec<(u32, M)>,
-}
-
-impl<M: Copy> Stack<M> {
-    #[inline(always)]
-    pub(super) fn new(root: (u32, M)) -> Self {
-        Stack {
-            near: [root; NEAR],
-            used: 1,
-            far: Vec::new(),
-        }
-    }
-
-    #[inline(always)]
-    pub(super) fn pop(&mut self) -> Option<(u32, M)> {
-        if let Some(top) = self.far.pop() {
-            return Some(top);
-        }
-        self.used = self.used.checked_sub(1)?;
-        Some(self.near[self.used])
-    }
-
-    #[inline(always)]
-    pub(super) fn push(&mut self, entry: (u32, M)) {
-        if let Some(slot) = self.near.get_mut(self.used) {
-            *slot = entry;
-            self.used += 1;
-        } else {
-            self.far.push(entry);
-        }
-    }
 }
 
 #[cfg(test)]

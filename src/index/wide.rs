@@ -11,10 +11,10 @@ use serde::{Deserialize, Serialize};
 
 use super::block_order::{BlockOrder, block_ordered};
 use super::by_plane::ByPlane;
+use super::by_tree::visible_on_baseline;
 use super::frontier::{Frontier, Merger, is_far};
 use super::id_rows::IdRows;
 use super::pass::{Layer, Pass};
-use super::tree::visible_on_baseline;
 use super::{BuildError, FrustumQuery, MemoryUsage, RegionIndex, TreeOrder, indexable};
 use crate::geometry::{Aabb, BoxBlock, LANES, LaneMask, PlaneMask, PlaneTree};
 use crate::kernel::{BASELINE, Isa, prefetch};

@@ -3,6 +3,7 @@
 //! structure and no geometry of its own lives here.
 
 mod many;
+mod planes;
 mod recorder;
 mod region;
 mod sink;
@@ -10,11 +11,12 @@ mod view;
 mod view_masks;
 
 pub use many::{Located, ManySink};
+pub use planes::{AsEver, Planes};
 pub use recorder::{NoRecorder, QueryCost, Recorder};
 pub use region::{Containment, Region};
 pub(crate) use sink::Ranges;
 pub use sink::{Count, First, Sink, Tests, runs};
-pub use view::{AnyView, AsEver, Planes, View};
+pub use view::{AnyView, View};
 pub use view_masks::ViewMasks;
 
 /// An item's number: its zero-based place in the scene.

@@ -7,7 +7,8 @@ use crate::geometry::{
     RelativeVolume, RowMask, Spheres, WideVolume,
 };
 
-use super::{Containment, NoRecorder, Recorder, Region};
+use super::planes::planes_as_ever;
+use super::{AsEver, Containment, NoRecorder, Planes, Recorder, Region};
 use crate::kernel::Isa;
 
 /// Up to 32 planes with a culling test of their own; every view is a
@@ -120,115 +121,6 @@ pub trait View: Sized {
     fn sees(&self, item: &Aabb) -> bool {
         !item.is_empty() && self.admits(item, self.mask(), &mut NoRecorder)
     }
-}
-
-/// Planes of a view, made ready for many blocks that no other plane is open
-/// for.
-pub trait Planes<I: Isa>: Copy {
-    /// [`View::kept_lanes`].
-    fn kept(&self, isa: I, block: &BoxBlock) -> LaneMask;
-
-    /// Whether four blocks at once are quicker than each by itself.
-    const IN_FOURS: bool;
-
-    /// [`View::kept_of_four`].
-    #[inline(always)]
-    fn kept_of_four(&self, isa: I, [a, b, c, d]: &[BoxBlock; 4]) -> [LaneMask; 4] {
-        [
-            self.kept(isa, a),
-            self.kept(isa, b),
-            self.kept(isa, c),
-            self.kept(isa, d),
-        ]
-    }
-
-    /// Asks for the memory that this reads ahead of it.
-    fn prefetch(&self, block: &BoxBlock);
-}
-
-impl<I: Isa> Planes<I> for Blade<I> {
-    const IN_FOURS: bool = false;
-
-    #[inline(always)]
-    fn kept(&self, isa: I, block: &BoxBlock) -> LaneMask {
-        self.admitted(isa, block)
-    }
-    #[inline(always)]
-    fn prefetch(&self, block: &BoxBlock) {
-        self.prefetch(block);
-    }
-}
-
-/// Planes of a view for which nothing can be made ready.
-pub struct AsEver<'v, V> {
-    view: &'v V,
-    mask: PlaneMask,
-}
-
-impl<V> Clone for AsEver<'_, V> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<V> Copy for AsEver<'_, V> {}
-
-impl<'v, V: View> AsEver<'v, V> {
-    /// All planes of the view.
-    #[inline(always)]
-    pub fn all(view: &'v V) -> Self {
-        let mask = view.mask();
-        AsEver { view, mask }
-    }
-}
-
-impl<I: Isa, V: View> Planes<I> for AsEver<'_, V> {
-    const IN_FOURS: bool = true;
-
-    #[inline(always)]
-    fn kept_of_four(&self, isa: I, blocks: &[BoxBlock; 4]) -> [LaneMask; 4] {
-        self.view.kept_of_four(isa, blocks, self.mask)
-    }
-    #[inline(always)]
-    fn kept(&self, isa: I, block: &BoxBlock) -> LaneMask {
-        self.view.kept_lanes(isa, block, self.mask)
-    }
-    #[inline(always)]
-    fn prefetch(&self, block: &BoxBlock) {
-        self.view.prefetch(block, self.mask);
-    }
-}
-
-impl<I: Isa> Planes<I> for Blades<I> {
-    const IN_FOURS: bool = false;
-
-    #[inline(always)]
-    fn kept(&self, isa: I, block: &BoxBlock) -> LaneMask {
-        self.admitted(isa, block)
-    }
-    #[inline(always)]
-    fn prefetch(&self, block: &BoxBlock) {
-        block.prefetch();
-    }
-}
-
-macro_rules! planes_as_ever {
-    () => {
-        type OnePlane<'v, I: Isa> = AsEver<'v, Self>;
-        type AllPlanes<'v, I: Isa> = AsEver<'v, Self>;
-
-        #[inline(always)]
-        fn one_plane<I: Isa>(&self, _: I, plane: u32) -> AsEver<'_, Self> {
-            AsEver {
-                view: self,
-                mask: 1 << plane,
-            }
-        }
-        #[inline(always)]
-        fn all_planes<I: Isa>(&self, _: I) -> Option<AsEver<'_, Self>> {
-            Some(AsEver::all(self))
-        }
-    };
 }
 
 impl<V: View> Region for V {
@@ -502,32 +394,11 @@ impl Iterator for Bits {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::arbitrary::{any_box, number, vector};
     use crate::geometry::{BoxBlocks, Plane, sphere_cube};
     use crate::kernel::{BASELINE, Plain};
     use glam::Vec3;
     use proptest::prelude::*;
-
-    /// Small integers (ties), ordinary numbers, and all exponents (overflow).
-    fn number() -> impl Strategy<Value = f32> {
-        prop_oneof![
-            (-8i8..8).prop_map(f32::from),
-            (-8i8..8).prop_map(f32::from),
-            -9f32..9.0,
-            prop::num::f32::NORMAL,
-            prop::num::f32::SUBNORMAL,
-            Just(-0.0),
-        ]
-    }
-
-    fn vector() -> impl Strategy<Value = Vec3> {
-        [number(), number(), number()].prop_map(Vec3::from_array)
-    }
-
-    prop_compose! {
-        fn any_box()(a in vector(), b in vector()) -> Aabb {
-            Aabb::new(a.min(b), a.max(b))
-        }
-    }
 
     /// What every view owes: monotone plane by plane, lanes like the scalar
     /// test, and verdicts about a node that fit all of its items.

@@ -17,7 +17,7 @@ use super::{
     seen_box_by_box,
 };
 use crate::geometry::{Aabb, PlaneTree};
-use crate::index::tree::Stack;
+use crate::index::stack::Stack;
 use crate::index::{BuildError, MemoryUsage, RegionIndex};
 use crate::query::{ItemId, Recorder, Sink};
 
