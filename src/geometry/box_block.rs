@@ -440,6 +440,7 @@ pub fn lanes_of(at: usize, first: usize, end: usize) -> LaneMask {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Blades;
     use super::super::arbitrary::{any_box, number};
     use super::*;
     use crate::kernel::BASELINE;

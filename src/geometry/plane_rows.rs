@@ -99,6 +99,7 @@ fn pick<const LARGER: bool>(p: f32, q: f32) -> f32 {
 mod tests {
     use super::super::arbitrary::{number, vector};
     use super::*;
+    use glam::Vec3;
     use proptest::prelude::*;
 
     proptest! {
