@@ -135,7 +135,7 @@ pub static SUITES: &[Suite] = &[
     },
     Suite {
         name: "full",
-        summary: "the crossover surface: three worlds from a thousand to a million items, 0.1 % to all of them visible, and the real ones, warm and cold; half an hour, with the structures of other crates far more than one",
+        summary: "the crossover surface: three worlds from a thousand to a million items, 0.1 % to all of them visible, and the real ones, warm and cold; less than half an hour, with the structures of other crates less than one",
         plan: &[
             warm_and_cold("uniform:n=1000", surface!(512)),
             warm_and_cold(
