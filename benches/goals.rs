@@ -130,13 +130,12 @@ const WORLDS: [World; 9] = [
             way(ALL, 65.0, COPY),
         ],
     },
-    // Its crowds are as high as wide: no scene for a quadtree.
     World {
         scene: "clustered:n=1000000",
         frames: 128,
         cold: false,
         scan: 1.8,
-        ahead: &["bsp", "octree", "bvh"],
+        ahead: &TREES,
         ways: &OF_A_MILLION,
     },
     // Eleven thousand buildings: the goals of ten thousand boxes.

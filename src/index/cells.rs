@@ -102,8 +102,8 @@ impl<'a> CellSplitter<'a> {
 /// How a column, a cell with much above each other, is cut into storeys.
 ///
 /// Cells that leave one axis alone become ever narrower columns over the full
-/// height of the world. Where that is high, a leaf is a thin needle that half
-/// of all views graze. So a cell is split on only while a cube of its width
+/// height of the world. Where that is high, a leaf is a thin needle, and even a
+/// small view grazes many. So a cell is split on only while a cube of its width
 /// would hold more than some leaves; then its items are sorted by height and
 /// stacked, the same number in each storey.
 struct Columns {
