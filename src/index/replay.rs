@@ -147,8 +147,11 @@ impl<V: View> Work for Rest<'_, V> {
             // A Vec never breaks off.
             let _ = pass.hand_over(run.start as usize..run.end as usize);
         }
-        let mut by_plane = ByPlane::default();
-        let _ = pass.test_leaves(&self.tree.layer(0), &self.foreseen.leaves, &mut by_plane);
+        // A tree without items has no level of leaves either.
+        if self.foreseen.leaves() > 0 {
+            let mut by_plane = ByPlane::default();
+            let _ = pass.test_leaves(&self.tree.layer(0), &self.foreseen.leaves, &mut by_plane);
+        }
     }
 }
 

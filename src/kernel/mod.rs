@@ -8,7 +8,7 @@
 #![allow(unsafe_code)]
 
 mod isa;
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", not(miri)))]
 mod x86;
 
 use std::fmt;
@@ -18,16 +18,16 @@ use std::sync::atomic::{AtomicU8, Ordering};
 pub use isa::{Isa, LANES, LaneMask, Packer, Piece, Plain};
 
 /// The instruction set that the program was compiled for, with no need to ask
-/// the processor.
-#[cfg(target_arch = "x86_64")]
+/// the processor. Miri is given plain arrays: an interpreter has no vectors.
+#[cfg(all(target_arch = "x86_64", not(miri)))]
 pub type Baseline = x86::Sse2;
-#[cfg(not(target_arch = "x86_64"))]
+#[cfg(any(not(target_arch = "x86_64"), miri))]
 pub type Baseline = Plain;
 
 /// What the program was compiled for, for callers without a [`Kernel`].
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", not(miri)))]
 pub const BASELINE: Baseline = x86::Sse2;
-#[cfg(not(target_arch = "x86_64"))]
+#[cfg(any(not(target_arch = "x86_64"), miri))]
 pub const BASELINE: Baseline = Plain;
 
 /// An instruction set that queries are compiled for.
@@ -86,7 +86,7 @@ impl Kernel {
         AVAILABLE.get_or_init(|| Kernel::ALL.map(Kernel::detect))[self as usize]
     }
 
-    #[cfg(target_arch = "x86_64")]
+    #[cfg(all(target_arch = "x86_64", not(miri)))]
     fn detect(self) -> bool {
         macro_rules! all {
             ($($feature:tt),*) => { true $(&& std::arch::is_x86_feature_detected!($feature))* };
@@ -100,7 +100,7 @@ impl Kernel {
         }
     }
 
-    #[cfg(not(target_arch = "x86_64"))]
+    #[cfg(any(not(target_arch = "x86_64"), miri))]
     fn detect(self) -> bool {
         self == Kernel::Portable
     }
@@ -142,7 +142,7 @@ impl Kernel {
     /// the processor lacks it. The result is the same either way.
     #[inline]
     pub fn run<W: Work>(self, work: W) -> W::Output {
-        #[cfg(target_arch = "x86_64")]
+        #[cfg(all(target_arch = "x86_64", not(miri)))]
         match self {
             Kernel::Avx512 if self.is_available() => {
                 // SAFETY: `detect` has found every feature that `avx512` is
@@ -169,23 +169,23 @@ impl fmt::Display for Kernel {
 /// it changes no value, and where there is no such instruction nothing is done.
 #[inline(always)]
 pub fn prefetch<T>(place: &T) {
-    #[cfg(target_arch = "x86_64")]
+    #[cfg(all(target_arch = "x86_64", not(miri)))]
     {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
         // SAFETY: SSE is part of every x86-64, and a prefetch never faults.
         unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(place).cast()) };
     }
-    #[cfg(not(target_arch = "x86_64"))]
+    #[cfg(any(not(target_arch = "x86_64"), miri))]
     let _ = place;
 }
 
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", not(miri)))]
 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
 fn avx2<W: Work>(work: W) -> W::Output {
     work.run(x86::Avx2::here())
 }
 
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", not(miri)))]
 #[target_feature(enable = "avx512f,avx512vl,avx512bw,avx512dq,avx2,bmi1,bmi2,lzcnt,popcnt")]
 fn avx512<W: Work>(work: W) -> W::Output {
     work.run(x86::Avx512::here())

@@ -1,0 +1,207 @@
+//! The portable path on all kinds of small scenes, without a file, a thread or
+//! an instruction that an interpreter lacks: `scripts/check-miri.sh` runs this
+//! under Miri, where plain arrays are the vectors. Under `cargo test` it is a
+//! differential test like others, with more cases.
+
+use std::ops::Range;
+
+use cullbench::geometry::{Aabb, ConvexVolume, Spheres, WideVolume, sphere_cube};
+use cullbench::index::{
+    BlockOrder, Bsp, Bvh, Foreseen, FrustumQuery, Linear, Octree, Quadtree, RegionIndex, Trace,
+    TreeOrder, Wide, WideParams,
+};
+use cullbench::kernel::{BASELINE, Isa, LANES, Packer};
+use cullbench::query::{AnyView, ItemId, Located, NoRecorder, View};
+use cullbench::verify::{RandomCase, edge_scenes, edge_volumes};
+use glam::Vec3;
+
+/// Cases, and the most items of one: an interpreter is a thousand times slower.
+const SEEDS: u64 = if cfg!(miri) { 12 } else { 400 };
+const MOST_ITEMS: usize = if cfg!(miri) { 70 } else { 600 };
+
+fn those(items: &[Aabb], holds: impl Fn(&Aabb) -> bool) -> Vec<ItemId> {
+    let all = items.iter().zip(0..);
+    all.filter(|(b, _)| !b.is_empty() && holds(b))
+        .map(|(_, id)| id)
+        .collect()
+}
+
+/// Takes off what was there before and sorts the rest.
+fn sorted_rest(mut ids: Vec<ItemId>, before: usize) -> Vec<ItemId> {
+    assert!(ids[..before].iter().all(|&id| id == ItemId::MAX), "changed");
+    ids.drain(..before);
+    ids.sort_unstable();
+    ids
+}
+
+fn sees<T: FrustumQuery, V: View>(index: &T, view: &V, before: usize, wanted: &[ItemId]) {
+    // No spare room, and a start at any place of a cache line.
+    let mut ids = vec![ItemId::MAX; before];
+    let _ = index.visible(view, &mut ids, &mut NoRecorder);
+    assert_eq!(sorted_rest(ids, before), wanted, "{}", T::NAME);
+}
+
+fn queries<T: FrustumQuery>(items: &[Aabb], volumes: &[ConvexVolume], points: &[Vec3]) -> T {
+    let index = T::build(items, None, &Default::default()).expect(T::NAME);
+    for (i, volume) in volumes.iter().enumerate() {
+        let wanted = those(items, |b| volume.sees(b));
+        sees(&index, volume, i, &wanted);
+        let relative = WideVolume::from(volume);
+        let wanted = those(items, |b| relative.sees(b));
+        sees(&index, &relative, i, &wanted);
+    }
+    let mut all = Located::default();
+    let _ = index.locate_many(points, &mut all);
+    let mut from = 0;
+    for (&p, &end) in points.iter().zip(all.ends()) {
+        let wanted = those(items, |b| b.contains_point(p));
+        let mut ids = Vec::new();
+        let _ = index.locate(p, &mut ids, &mut NoRecorder);
+        assert_eq!(sorted_rest(ids, 0), wanted, "{}", T::NAME);
+        let batched = all.ids()[from..end].to_vec();
+        assert_eq!(sorted_rest(batched, 0), wanted, "{}", T::NAME);
+        from = end;
+    }
+    index
+}
+
+fn ranges<T: TreeOrder>(index: &T, items: &[Aabb], volumes: &[ConvexVolume]) {
+    for volume in volumes {
+        let mut ranges: Vec<Range<u32>> = Vec::new();
+        index.visible_ranges(volume, &mut ranges);
+        let of = |range: &Range<u32>| range.start as usize..range.end as usize;
+        let held: Vec<ItemId> = ranges
+            .iter()
+            .flat_map(|r| &index.ids()[of(r)])
+            .copied()
+            .collect();
+        let wanted = those(items, |b| volume.sees(b));
+        assert_eq!(sorted_rest(held, 0), wanted, "{}", T::NAME);
+    }
+}
+
+/// What only the wide tree does: other orders, replays, many views at once.
+fn wide(tree: &Wide, items: &[Aabb], volumes: &[ConvexVolume]) {
+    let params = WideParams {
+        order: BlockOrder::Morton,
+    };
+    let morton = Wide::build(items, None, &params).expect("finite");
+    let views: Vec<AnyView> = volumes.iter().map(AnyView::from).collect();
+    let mut lists = vec![Vec::new(); views.len()];
+    let in_one_pass = tree.see_in_one_pass(&views, &mut lists);
+    for (i, (volume, list)) in volumes.iter().zip(lists).enumerate() {
+        let wanted = those(items, |b| volume.sees(b));
+        sees(&morton, volume, i, &wanted);
+        if in_one_pass {
+            assert_eq!(sorted_rest(list, 0), wanted, "one pass");
+        }
+        let (mut again, mut foreseen) = (Vec::new(), Vec::new());
+        Trace::of(tree, volume).replay(tree, &mut again);
+        assert_eq!(sorted_rest(again, 0), wanted, "replay");
+        Foreseen::of(tree, volume).answer(tree, volume, &mut foreseen);
+        assert_eq!(sorted_rest(foreseen, 0), wanted, "foreseen");
+    }
+}
+
+/// Cubes about spheres, which is what a view of spheres asks about.
+fn spheres<T: FrustumQuery>(items: &[Aabb], volumes: &[ConvexVolume]) {
+    let cubes: Vec<Aabb> = items.iter().map(sphere_cube).collect();
+    let index = T::build(&cubes, None, &Default::default()).expect(T::NAME);
+    for volume in volumes {
+        let view = Spheres::new(volume);
+        sees(&index, &view, 0, &those(&cubes, |b| view.sees(b)));
+    }
+}
+
+fn every_structure(items: &[Aabb], volumes: &[ConvexVolume], points: &[Vec3]) {
+    queries::<Linear>(items, volumes, points);
+    spheres::<Linear>(items, volumes);
+    macro_rules! trees {
+        ($($tree:ty),*) => { $(
+            let index = queries::<$tree>(items, volumes, points);
+            ranges(&index, items, volumes);
+            spheres::<$tree>(items, volumes);
+        )* };
+    }
+    trees!(Bsp, Octree, Quadtree, Bvh, Wide);
+    let tree = Wide::build(items, None, &WideParams::default()).expect("finite");
+    wide(&tree, items, volumes);
+}
+
+/// Numbers of items about a block, a level of blocks and none.
+fn sizes(most: usize) -> impl Iterator<Item = usize> {
+    let sizes = [0, 1, 2, 15, 16, 17, 31, 32, 33, 255, 256, 257, 273];
+    sizes.into_iter().filter(move |&size| size <= most)
+}
+
+pub fn random_cases() {
+    for seed in 0..SEEDS {
+        let case = RandomCase::new(seed);
+        let items = &case.items[..case.items.len().min(MOST_ITEMS)];
+        let volumes = [case.volume.clone(), RandomCase::new(seed + 1000).volume];
+        every_structure(items, &volumes, &[case.point, Vec3::ZERO]);
+    }
+}
+
+pub fn sizes_about_a_block() {
+    let row = |i: usize| Aabb::around(Vec3::new(i as f32, 0.0, 0.0), Vec3::splat(0.25));
+    for size in sizes(if cfg!(miri) { 33 } else { 273 }) {
+        let items: Vec<Aabb> = (0..size).map(row).collect();
+        // All of space, nothing, and half of the row.
+        let volumes = edge_volumes(&items);
+        let volumes: Vec<ConvexVolume> = volumes.into_iter().take(4).collect();
+        every_structure(&items, &volumes, &[Vec3::ZERO, Vec3::splat(9.0)]);
+    }
+}
+
+pub fn scenes_at_the_edge() {
+    for (_, mut items) in edge_scenes() {
+        items.truncate(if cfg!(miri) { 20 } else { 300 });
+        let volumes = edge_volumes(&items);
+        let step = if cfg!(miri) { 9 } else { 3 };
+        let volumes: Vec<ConvexVolume> = volumes.into_iter().step_by(step).collect();
+        every_structure(&items, &volumes, &[Vec3::ZERO, Vec3::ONE]);
+    }
+}
+
+/// Rows and parts of rows into lists of all lengths: exactly the room that was
+/// asked for is used, with every mask that has one run of lanes.
+pub fn rows_into_any_place() {
+    let row: [u32; LANES] = std::array::from_fn(|lane| 100 + lane as u32);
+    for before in 0..=LANES {
+        for (from, to) in (0..=LANES).flat_map(|to| (0..=to).map(move |from| (from, to))) {
+            let lanes = ((1_u32 << to) - (1_u32 << from)) as u16;
+            let wanted: Vec<u32> = vec![7; before];
+            let mut wanted: Vec<u32> = [wanted, row[from..to].to_vec(), row.to_vec()].concat();
+            let mut out = vec![7; before];
+            let mut packer = Packer::onto(&mut out, LANES + to - from);
+            packer.push(BASELINE, &row, lanes);
+            packer.push(BASELINE, &row, u16::MAX);
+            drop(packer);
+            assert_eq!(out, wanted);
+            BASELINE.append(&mut out, &row, lanes);
+            wanted.extend_from_slice(&row[from..to]);
+            assert_eq!(out, wanted);
+        }
+    }
+}
+
+#[test]
+fn random_cases_are_right() {
+    random_cases();
+}
+
+#[test]
+fn sizes_about_a_block_are_right() {
+    sizes_about_a_block();
+}
+
+#[test]
+fn scenes_at_the_edge_are_right() {
+    scenes_at_the_edge();
+}
+
+#[test]
+fn rows_go_into_any_place() {
+    rows_into_any_place();
+}
