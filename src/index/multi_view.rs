@@ -1,8 +1,10 @@
 //! Several volumes asked of the wide tree in one pass. Where two or more of
-//! them are undecided about a block, it is looked at once for all, and planes
-//! of one normal share their arithmetic; where only one is left, that one goes
-//! on alone, as in a query by itself (`wide`).
+//! them are undecided about an inner block, it is looked at once for all, and
+//! planes of one normal share their arithmetic; where only one is left, that one
+//! goes on alone, and every one tests its leaves alone, as in a query by itself
+//! (`wide`).
 
+use std::borrow::Cow;
 use std::cell::Cell;
 use std::ops::{ControlFlow, Range};
 
@@ -26,26 +28,30 @@ const MOST_VIEWS: usize = ViewMask::BITS as usize;
 /// Volumes whose planes are numbered alike: planes of the same normal have the
 /// same number in all of them. Zeros of either sign are the same: neither they
 /// nor the corner they choose change a verdict.
-struct Bundle {
+struct Bundle<'v> {
     normals: [(Vec3, Upper); MAX_PLANES],
     /// As they were given, but for the numbers and planes that decide nothing.
-    volumes: Vec<ConvexVolume>,
+    volumes: Vec<Cow<'v, ConvexVolume>>,
 }
 
-impl Bundle {
+impl<'v> Bundle<'v> {
     /// `None` if there are more normals than a mask has bits, or more volumes.
-    fn of<'v>(given: impl ExactSizeIterator<Item = &'v ConvexVolume>) -> Option<Bundle> {
+    fn of(given: impl ExactSizeIterator<Item = &'v ConvexVolume>) -> Option<Self> {
         if given.len() > MOST_VIEWS {
             return None;
         }
-        let trivial = Plane::new(Vec3::ZERO, 0.0);
         let mut normals = [(Vec3::ZERO, [true; 3]); MAX_PLANES];
         let mut known = 0;
-        let mut numbered = Vec::with_capacity(given.len());
+        let mut volumes = Vec::with_capacity(given.len());
         for volume in given {
-            let mut planes = [trivial; MAX_PLANES];
-            let mut taken: PlaneMask = 0;
-            for plane in volume.planes().iter().filter(|plane| !plane.is_trivial()) {
+            // Of each plane, its number.
+            let mut numbers = [0; MAX_PLANES];
+            let (mut taken, mut as_given): (PlaneMask, bool) = (0, true);
+            for (place, plane) in volume.planes().iter().enumerate() {
+                if plane.is_trivial() {
+                    as_given = false;
+                    continue;
+                }
                 let same =
                     |number: &usize| taken >> number & 1 == 0 && normals[*number].0 == plane.normal;
                 let number = (0..known).find(same).unwrap_or(known);
@@ -57,16 +63,29 @@ impl Bundle {
                     known += 1;
                 }
                 taken |= 1 << number;
-                planes[number] = *plane;
+                as_given &= number == place;
+                numbers[place] = number;
             }
-            let used = (PlaneMask::BITS - taken.leading_zeros()) as usize;
-            numbered.push(ConvexVolume::from_planes(&planes[..used]).ok()?);
+            // Eyes and cascades have their planes in the same order already.
+            volumes.push(match as_given {
+                true => Cow::Borrowed(volume),
+                false => Cow::Owned(renumbered(volume, &numbers, taken)?),
+            });
         }
-        Some(Bundle {
-            normals,
-            volumes: numbered,
-        })
+        Some(Bundle { normals, volumes })
     }
+}
+
+/// The volume with its planes at those places; between them, planes that decide
+/// nothing.
+fn renumbered(volume: &ConvexVolume, numbers: &[usize], taken: PlaneMask) -> Option<ConvexVolume> {
+    let mut planes = [Plane::new(Vec3::ZERO, 0.0); MAX_PLANES];
+    let numbered = volume.planes().iter().zip(numbers);
+    for (plane, &number) in numbered.filter(|(plane, _)| !plane.is_trivial()) {
+        planes[number] = *plane;
+    }
+    let used = (PlaneMask::BITS - taken.leading_zeros()) as usize;
+    ConvexVolume::from_planes(&planes[..used]).ok()
 }
 
 /// Blocks of one level about which several volumes are undecided.
@@ -77,7 +96,8 @@ struct Shared {
     views: Frontier,
 }
 
-/// What is kept between passes: frontiers of now and of the level below.
+/// What is kept between passes: frontiers of now and of the level below. Shared
+/// ones are of inner blocks.
 #[derive(Default)]
 struct Walks {
     shared: [Shared; 2],
@@ -109,7 +129,7 @@ fn bits(mut mask: u32) -> impl Iterator<Item = usize> {
 struct Together<'p, 'a, I, S> {
     tree: &'p Wide,
     isa: I,
-    bundle: &'p Bundle,
+    bundle: &'p Bundle<'p>,
     sinks: &'p mut [(&'a ConvexVolume, &'a mut S)],
     listening: ViewMask,
 }
@@ -133,8 +153,9 @@ impl<I: Isa, S: Sink> Together<'_, '_, I, S> {
     }
 
     /// One level: what several volumes share, then what each has to itself.
+    /// Leaves are nobody's to share: each volume tests them plane by plane.
     #[inline(always)]
-    fn sort_level(&mut self, layer: &Layer, walks: &mut Walks, now: usize) {
+    fn sort_level(&mut self, layer: &Layer, walks: &mut Walks, now: usize, above_leaves: bool) {
         let isa = self.isa;
         let Walks {
             shared, own, runs, ..
@@ -163,6 +184,7 @@ impl<I: Isa, S: Sink> Together<'_, '_, I, S> {
                 far[plane] = block.farthest(isa, normal, upper);
                 near[plane] = block.nearest(isa, normal, upper);
             }
+            let nodes = isa.counting(at * LANES as u32);
             let (mut open, mut asking) = (isa.splat_word(0), isa.splat_word(0));
             // Lanes about which one is undecided, and more than one.
             let (mut once, mut twice) = (0, 0);
@@ -182,14 +204,21 @@ impl<I: Isa, S: Sink> Together<'_, '_, I, S> {
                 }
                 let kept = !isa.below_zero(lowest) & lanes;
                 let undecided = kept & straddled;
+                if above_leaves {
+                    open = isa.splat_word(0);
+                }
                 for bit in bits(mask) {
                     let lanes = straddling[bit] & undecided;
                     open = isa.with(open, lanes, 1 << bit);
                 }
-                asking = isa.with(asking, undecided, 1 << view);
-                undecided_by[view] = undecided;
-                twice |= once & undecided;
-                once |= undecided;
+                if above_leaves {
+                    own[view][1 - now].push(isa, nodes, open, undecided);
+                } else {
+                    asking = isa.with(asking, undecided, 1 << view);
+                    undecided_by[view] = undecided;
+                    twice |= once & undecided;
+                    once |= undecided;
+                }
                 let inside = kept & !straddled;
                 for places in layer.places_of(at as usize, inside, self.tree.ids().len()) {
                     if let Some(ended) = runs[view].join(places) {
@@ -197,7 +226,6 @@ impl<I: Isa, S: Sink> Together<'_, '_, I, S> {
                     }
                 }
             }
-            let nodes = isa.counting(at * LANES as u32);
             below.frontier.push(isa, nodes, open, twice);
             below.views.push(isa, nodes, asking, twice);
             let alone = once & !twice;
@@ -214,7 +242,7 @@ impl<I: Isa, S: Sink> Together<'_, '_, I, S> {
                 let mut pass = Pass {
                     tree: self.tree,
                     isa,
-                    view: &self.bundle.volumes[view],
+                    view: self.bundle.volumes[view].as_ref(),
                     sink: &mut *self.sinks[view].1,
                     recorder: &mut NoRecorder,
                 };
@@ -230,43 +258,11 @@ impl<I: Isa, S: Sink> Together<'_, '_, I, S> {
     #[inline(always)]
     fn test_leaves(&mut self, leaves: &Layer, walks: &mut Walks, now: usize) {
         let isa = self.isa;
-        let here = &walks.shared[now];
-        let (places, masks) = here.frontier.entries();
-        let views = here.views.entries().1;
-        let mut far = [isa.splat(0.0); MAX_PLANES];
-        for i in first_ahead(leaves.far) {
-            leaves.fetch(places, i);
-        }
-        for (i, (&at, &mask)) in places.iter().zip(masks).enumerate() {
-            leaves.fetch(places, i + AHEAD);
-            if let Some(&next) = places.get(i + AHEAD)
-                && let Some(row) = self.tree.id_rows().get(next as usize)
-            {
-                crate::kernel::prefetch(row);
-            }
-            let (block, lanes) = leaves.block(at as usize);
-            for plane in bits(mask) {
-                let (normal, upper) = self.bundle.normals[plane];
-                far[plane] = block.farthest(isa, normal, upper);
-            }
-            for view in bits(views[i] & self.listening) {
-                let volume = &self.bundle.volumes[view];
-                let mut lowest = isa.splat(f32::INFINITY);
-                for bit in bits(mask & volume.mask()) {
-                    let d = isa.splat(volume.plane_of_bit(bit as u32).d);
-                    lowest = isa.lower(isa.add(far[bit], d), lowest);
-                }
-                let kept = !isa.below_zero(lowest) & lanes;
-                let (_, sink) = &mut self.sinks[view];
-                let flow = sink.accept_lanes(isa, self.tree.ids(), at as usize * LANES, kept);
-                self.note(view, flow);
-            }
-        }
         for view in bits(self.listening) {
             let mut pass = Pass {
                 tree: self.tree,
                 isa,
-                view: &self.bundle.volumes[view],
+                view: self.bundle.volumes[view].as_ref(),
                 sink: &mut *self.sinks[view].1,
                 recorder: &mut NoRecorder,
             };
@@ -286,22 +282,31 @@ impl<I: Isa, S: Sink> Together<'_, '_, I, S> {
             frontiers.iter_mut().for_each(|frontier| frontier.clear(0));
             run.take();
         }
+        let isa = self.isa;
+        // One volume has nobody to share with, and the root may be a leaf.
+        let shares = count > 1 && self.tree.depth() > 1;
         let (mut open, mut asking) = (0, 0);
         for view in 0..count {
             let mask = self.bundle.volumes[view].mask();
             if mask == 0 {
                 self.hand_over(view, 0..self.tree.ids().len());
                 self.listening &= !(1 << view);
-            } else {
+            } else if shares {
                 open |= mask;
                 asking |= 1 << view;
+            } else {
+                walks.own[view][0].start(isa, mask);
             }
         }
-        walks.shared[0].frontier.start(self.isa, open);
-        walks.shared[0].views.start(self.isa, asking);
+        walks.shared[0].frontier.clear(0);
+        walks.shared[0].views.clear(0);
+        if shares {
+            walks.shared[0].frontier.start(isa, open);
+            walks.shared[0].views.start(isa, asking);
+        }
         let mut now = 0;
         for level in (1..self.tree.depth()).rev() {
-            self.sort_level(&self.tree.layer(level), walks, now);
+            self.sort_level(&self.tree.layer(level), walks, now, level == 1);
             now = 1 - now;
         }
         self.test_leaves(&self.tree.layer(0), walks, now);
