@@ -157,12 +157,14 @@ impl BoxBlock {
 
     /// [`BoxBlock::admitted_by`] for nodes: also which planes stay open below
     /// each lane. A lane's word is `mask` without the planes that hold the
-    /// whole box ([`Plane::contains`]).
+    /// whole box ([`Plane::contains`]); those of `inner`, which differ from the
+    /// volume's in `d` at most.
     #[inline(always)]
     pub fn sorted_by<I: Isa>(
         &self,
         isa: I,
         volume: &ConvexVolume,
+        inner: &ConvexVolume,
         mask: PlaneMask,
     ) -> (LaneMask, I::Words) {
         let mut kept = isa.keep_all();
@@ -175,7 +177,8 @@ impl BoxBlock {
             kept = blade.keep(isa, kept, self);
             let near = self.numbered_rows(blade.corner.near());
             let nearest = sums_at(isa, volume.plane_of_bit(bit).normal, near);
-            open = isa.without(open, nearest, blade.least, 1 << bit);
+            let least = isa.splat(inner.least_of_bit(bit));
+            open = isa.without(open, nearest, least, 1 << bit);
         }
         (isa.kept(kept), open)
     }

@@ -14,10 +14,10 @@ use super::TreeOrder;
 use super::by_plane::ByPlane;
 use super::frontier::{AHEAD, Frontier, Merger, first_ahead};
 use super::pass::{Layer, Pass};
-use super::wide::Wide;
+use super::wide::{Scratch, Wide};
 use crate::geometry::{ConvexVolume, LANES, LaneMask, MAX_PLANES, Plane, PlaneMask, Upper};
 use crate::kernel::{Isa, Kernel, Work};
-use crate::query::{AnyView, ItemId, NoRecorder, Sink};
+use crate::query::{AnyView, ItemId, NoRecorder, Shell, Sink};
 
 /// Some of the volumes of a pass, one bit each.
 type ViewMask = u32;
@@ -171,8 +171,7 @@ impl<I: Isa, S: Sink> Together<'_, '_, I, S> {
             frontiers[1 - now].clear(places.len() + alone);
         }
         let zero = isa.splat(0.0);
-        let mut far = [zero; MAX_PLANES];
-        let mut near = [zero; MAX_PLANES];
+        let (mut far, mut near) = ([zero; MAX_PLANES], [zero; MAX_PLANES]);
         for i in first_ahead(layer.far) {
             layer.fetch(places, i);
         }
@@ -313,7 +312,81 @@ impl<I: Isa, S: Sink> Together<'_, '_, I, S> {
     }
 }
 
+/// Hands everything to all sinks that still listen.
+struct All<'s, 'a, S> {
+    sinks: &'s mut [(&'a ConvexVolume, &'a mut S)],
+    listening: ViewMask,
+}
+
+impl<S: Sink> All<'_, '_, S> {
+    /// A sink that breaks off is not called again; the last one ends it all.
+    #[inline(always)]
+    fn note(&mut self, view: usize, flow: ControlFlow<()>) {
+        if flow.is_break() {
+            self.listening &= !(1 << view);
+        }
+    }
+
+    #[inline(always)]
+    fn flow(&self) -> ControlFlow<()> {
+        match self.listening {
+            0 => ControlFlow::Break(()),
+            _ => ControlFlow::Continue(()),
+        }
+    }
+}
+
+impl<S: Sink> Sink for All<'_, '_, S> {
+    #[inline(always)]
+    fn accept(&mut self, ids: &[ItemId]) -> ControlFlow<()> {
+        for view in bits(self.listening) {
+            let flow = self.sinks[view].1.accept(ids);
+            self.note(view, flow);
+        }
+        self.flow()
+    }
+    #[inline(always)]
+    fn accept_places<I: Isa>(
+        &mut self,
+        isa: I,
+        ids: &[ItemId],
+        places: Range<usize>,
+    ) -> ControlFlow<()> {
+        for view in bits(self.listening) {
+            let flow = self.sinks[view].1.accept_places(isa, ids, places.clone());
+            self.note(view, flow);
+        }
+        self.flow()
+    }
+}
+
 impl Wide {
+    /// Volumes that are nearly the same: one way down for all of them, and each
+    /// tests the leaves that are left.
+    #[inline(always)]
+    fn visible_alike<'a, I: Isa, S: Sink>(
+        &self,
+        isa: I,
+        shell: &Shell,
+        asked: &mut [(&'a ConvexVolume, &'a mut S)],
+    ) {
+        let mut scratch = Scratch::taken();
+        scratch.start(isa, shell);
+        let listening = ViewMask::MAX >> (MOST_VIEWS - asked.len());
+        let mut all = All {
+            sinks: &mut *asked,
+            listening,
+        };
+        let top = self.depth() - 1;
+        // It ends early only if nobody listens any more.
+        let _ = self.descend(isa, shell, 0..top, &mut all, &mut NoRecorder, &mut scratch);
+        for view in bits(all.listening) {
+            let (volume, sink) = &mut asked[view];
+            let _ = self.search_leaves(isa, *volume, *sink, &mut NoRecorder, &mut scratch);
+        }
+        scratch.give_back();
+    }
+
     /// What several volumes see, in one pass: exactly the sets of as many
     /// queries, each to its own sink. A sink's order is deterministic, but not
     /// that of a query by itself. One that breaks off ends its own query only.
@@ -327,6 +400,12 @@ impl Wide {
         asked: &mut [(&'a ConvexVolume, &'a mut S)],
     ) -> bool {
         if self.depth() == 0 || asked.is_empty() {
+            return true;
+        }
+        if asked.len() <= MOST_VIEWS
+            && let Some(shell) = Shell::about(asked.iter().map(|(volume, _)| *volume))
+        {
+            self.visible_alike(isa, &shell, asked);
             return true;
         }
         let Some(bundle) = Bundle::of(asked.iter().map(|(volume, _)| *volume)) else {
