@@ -1,5 +1,5 @@
-//! Several views in one pass against one pass after the other, on the wide
-//! tree: separate passes, their twin (an A/A control), and the shared pass, each
+//! Several views asked for together against one after the other, on the wide
+//! tree: separate queries, their twin (an A/A control), and `see_many`, each
 //! over its own copy, interleaved and paired by the harness of `cullbench run`.
 //! Lists are compared before anything is timed. A word on the command line
 //! keeps only the rows that hold it; `-- --test` only checks that they run.
@@ -47,7 +47,7 @@ fn separately(index: &Wide, views: &[AnyView<'_>], out: &mut [Vec<ItemId>]) {
 }
 
 fn together(index: &Wide, views: &[AnyView<'_>], out: &mut [Vec<ItemId>]) {
-    assert!(index.see_in_one_pass(views, out), "too many normals");
+    index.see_many(views, out);
 }
 
 /// What is asked at every place of a path, and the length of every answer.

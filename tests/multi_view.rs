@@ -38,7 +38,7 @@ fn one_pass(name: &str, items: &[Aabb], volumes: &[ConvexVolume]) -> usize {
     for kernel in Kernel::available() {
         kernel.choose().expect("available");
         let mut lists = vec![Vec::new(); views.len()];
-        assert!(tree.see_in_one_pass(&views, &mut lists), "{name}");
+        tree.see_many(&views, &mut lists);
         ids += check(&format!("{name}, {kernel}"), items, &views, &lists);
         let first = first.get_or_insert_with(|| lists.clone());
         assert!(*first == lists, "{name}: {kernel} has another order");
@@ -163,7 +163,7 @@ fn a_sink_that_breaks_off_ends_its_own_query_only() {
             ids: Vec::new(),
         });
         let mut asked: Vec<_> = volumes.iter().zip(&mut sinks).collect();
-        assert!(tree.visible_together(BASELINE, &mut asked));
+        tree.visible_together(BASELINE, &mut asked);
         assert_eq!(sinks[1].ids.len(), count(&volumes[1]));
         for (sink, volume) in sinks.iter().zip(&volumes) {
             assert!(
@@ -177,42 +177,64 @@ fn a_sink_that_breaks_off_ends_its_own_query_only() {
 }
 
 #[test]
-fn what_does_not_fit_one_pass_is_left_alone() {
+fn many_views_and_none_are_no_trouble() {
     let items = [Aabb::around(Vec3::ZERO, Vec3::ONE)];
     let tree = wide(&items);
     let all = ConvexVolume::from_planes(&[]).expect("no plane");
-    let many: Vec<ConvexVolume> = (0..33)
+    // More that are alike than one mask has bits, and more normals.
+    let many: Vec<ConvexVolume> = (0..70)
         .map(|i| ConvexVolume::from_planes(&[Plane::new(Vec3::X, i as f32)]).expect("a plane"))
         .collect();
     let normals: Vec<Plane> = (0..33)
-        .map(|i| Plane::new(Vec3::new(1.0, i as f32, 0.0), 9.0))
+        .map(|i| Plane::new(Vec3::new(1.0, i as f32, 0.0), 99.0))
         .collect();
-    let halves = normals
+    let halves: Vec<ConvexVolume> = normals
         .chunks(17)
-        .map(|p| ConvexVolume::from_planes(p).expect("planes"));
+        .map(|p| ConvexVolume::from_planes(p).expect("planes"))
+        .collect();
     let finer = WideVolume::from(&all);
-    let halves: Vec<ConvexVolume> = halves.collect();
-    let refused: [Vec<AnyView>; 3] = [
+    let asked: [Vec<AnyView>; 4] = [
         many.iter().map(AnyView::from).collect(),
         halves.iter().map(AnyView::from).collect(),
-        vec![(&all).into(), (&finer).into()],
+        vec![(&all).into(), (&finer).into(), (&all).into()],
+        vec![],
     ];
-    for views in refused {
+    for views in asked {
         let mut lists = vec![Vec::new(); views.len()];
-        assert!(!tree.see_in_one_pass(&views, &mut lists));
-        assert!(lists.iter().all(Vec::is_empty), "nothing done");
         tree.see_many(&views, &mut lists);
         assert!(lists.iter().all(|list| *list == [0]));
+        let mut lists = vec![Vec::new(); views.len()];
+        wide(&[]).see_many(&views, &mut lists);
+        assert!(lists.iter().all(Vec::is_empty));
     }
-    // 32 of each are taken; no view and no item are no trouble.
-    let (views, mut lists): (Vec<AnyView>, _) = (
-        many[..32].iter().map(AnyView::from).collect(),
-        vec![vec![]; 32],
-    );
-    assert!(tree.see_in_one_pass(&views, &mut lists));
-    assert!(lists.iter().all(|list| *list == [0]));
-    assert!(tree.see_in_one_pass(&[], &mut []));
-    let mut lists = vec![Vec::new(); 2];
-    assert!(wide(&[]).see_in_one_pass(&views[..2], &mut lists));
-    assert!(lists.iter().all(Vec::is_empty));
+}
+
+/// A tree of several levels, volumes about the edge of "nearly the same": between
+/// two planes, a third one that is moved, in both directions; or all three.
+#[test]
+fn volumes_about_as_near_as_can_share() {
+    let scene = scene::load("uniform:n=5000", &Default::default()).expect("uniform");
+    let b = scene.bounds;
+    let at = |share: f32| b.min.x + share * b.extent().x;
+    let volume = |moved: f32, slab: f32| {
+        let (n, side) = (Vec3::new(1.0, 0.3, 0.0) * 2.0, Vec3::new(0.2, -1.0, 0.4));
+        let planes = [
+            Plane::new(n, -n.x * at(0.2 + slab)),
+            Plane::new(-n, n.x * at(0.9 + slab)),
+            Plane::new(side, side.length() * moved - side.dot(b.centre())),
+        ];
+        ConvexVolume::from_planes(&planes).expect("finite")
+    };
+    for apart in [0.0, 1e-7, 0.01, 0.05, 0.16, 0.17, 0.18, 0.7] {
+        let by = apart * b.extent().x;
+        for slab in [0.0, apart] {
+            let volumes = [
+                volume(0.0, 0.0),
+                volume(by, slab),
+                volume(-0.5 * by, -slab),
+                volume(by, 0.0),
+            ];
+            one_pass(&format!("{apart} apart"), &scene.items, &volumes);
+        }
+    }
 }

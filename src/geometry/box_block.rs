@@ -6,7 +6,9 @@ use glam::Vec3;
 
 use super::aabb::held;
 use super::blade::{Blade, Corner};
-use super::{Aabb, Ball, ConvexVolume, Plane, PlaneMask, SphereMargin, Upper, WidePlane};
+use super::{
+    Aabb, Ball, ConvexVolume, MAX_PLANES, Plane, PlaneMask, SphereMargin, Upper, WidePlane,
+};
 use crate::kernel::{Isa, Plain, prefetch};
 
 /// Boxes of one block, and one bit for each of them.
@@ -157,14 +159,14 @@ impl BoxBlock {
 
     /// [`BoxBlock::admitted_by`] for nodes: also which planes stay open below
     /// each lane. A lane's word is `mask` without the planes that hold the
-    /// whole box ([`Plane::contains`]); those of `inner`, which differ from the
-    /// volume's in `d` at most.
+    /// whole box ([`Plane::contains`]), had they the `d` whose negatives are
+    /// `least`: the volume's own, or others.
     #[inline(always)]
     pub fn sorted_by<I: Isa>(
         &self,
         isa: I,
         volume: &ConvexVolume,
-        inner: &ConvexVolume,
+        least: &[f32; MAX_PLANES],
         mask: PlaneMask,
     ) -> (LaneMask, I::Words) {
         let mut kept = isa.keep_all();
@@ -177,7 +179,7 @@ impl BoxBlock {
             kept = blade.keep(isa, kept, self);
             let near = self.numbered_rows(blade.corner.near());
             let nearest = sums_at(isa, volume.plane_of_bit(bit).normal, near);
-            let least = isa.splat(inner.least_of_bit(bit));
+            let least = isa.splat(least[bit as usize % MAX_PLANES]);
             open = isa.without(open, nearest, least, 1 << bit);
         }
         (isa.kept(kept), open)
@@ -186,19 +188,6 @@ impl BoxBlock {
     #[inline(always)]
     pub(super) fn numbered_rows(&self, [x, y, z]: [usize; 3]) -> [&[f32; LANES]; 3] {
         [&self.rows[x], &self.rows[y], &self.rows[z]]
-    }
-
-    /// For planes of one normal that differ in d: what [`Plane::value_at`] adds
-    /// d to, at the p-vertex of every box.
-    #[inline(always)]
-    pub fn farthest<I: Isa>(&self, isa: I, normal: Vec3, upper: Upper) -> I::Floats {
-        sums_at(isa, normal, self.corner_rows(upper))
-    }
-
-    /// The same at the n-vertices.
-    #[inline(always)]
-    pub fn nearest<I: Isa>(&self, isa: I, normal: Vec3, upper: Upper) -> I::Floats {
-        sums_at(isa, normal, self.corner_rows(upper.map(|up| !up)))
     }
 
     /// The rows of one corner, the same one of every box: the upper bounds

@@ -26,9 +26,9 @@ pub trait DynIndex: Send + Sync {
     /// What a view of any kind sees. The timed path: nothing is counted.
     fn see(&self, view: AnyView<'_>, out: &mut Vec<ItemId>);
     /// What several views see, of any kinds and in any mixture: `out[i]` gets
-    /// what [`DynIndex::see`] appends for `views[i]`. One query after the other,
-    /// because that is the quickest (docs/MULTI_VIEW.md), but for the pairs of
-    /// which [`Wide::see_in_one_pass`] says so.
+    /// what [`DynIndex::see`] appends for `views[i]`, perhaps in another order.
+    /// One query after the other, because that is the quickest, but for views
+    /// that are nearly the same on the wide tree (docs/MULTI_VIEW.md).
     ///
     /// # Panics
     /// If there is not one list a view.
@@ -75,6 +75,11 @@ impl<T: FrustumQuery> DynIndex for T {
 
     fn see(&self, view: AnyView<'_>, out: &mut Vec<ItemId>) {
         see(self, view, out, &mut NoRecorder);
+    }
+
+    fn see_many(&self, views: &[AnyView<'_>], out: &mut [Vec<ItemId>]) {
+        assert_eq!(views.len(), out.len(), "one list a view");
+        self.visible_many(views, out);
     }
 
     fn see_counted(&self, view: AnyView<'_>, out: &mut Vec<ItemId>, cost: &mut QueryCost) {
@@ -185,7 +190,7 @@ impl<T: RegionIndex> Work for LocateMany<'_, T> {
 
 /// The one place that tells views and kernels apart: a traversal of its own
 /// for each.
-fn see<T: FrustumQuery, R: Recorder>(
+pub(super) fn see<T: FrustumQuery, R: Recorder>(
     index: &T,
     view: AnyView<'_>,
     out: &mut Vec<ItemId>,

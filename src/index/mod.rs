@@ -39,7 +39,7 @@ use serde::de::DeserializeOwned;
 
 use crate::geometry::{Aabb, PlaneTree};
 use crate::kernel::Isa;
-use crate::query::{ItemId, ManySink, NoRecorder, Recorder, Sink, View};
+use crate::query::{AnyView, ItemId, ManySink, NoRecorder, Recorder, Sink, View};
 
 pub use block_order::BlockOrder;
 pub use bsp::{Bsp, BspBuilder, BspParams};
@@ -207,6 +207,13 @@ pub trait FrustumQuery: RegionIndex {
         recorder: &mut R,
     ) -> ControlFlow<()> {
         self.visible(view, sink, recorder)
+    }
+
+    /// What [`DynIndex::see_many`] does: by default, one query after the other.
+    fn visible_many(&self, views: &[AnyView<'_>], out: &mut [Vec<ItemId>]) {
+        for (view, out) in views.iter().zip(out) {
+            erased::see(self, *view, out, &mut NoRecorder);
+        }
     }
 }
 

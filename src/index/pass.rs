@@ -23,11 +23,6 @@ pub struct Layer<'t> {
 }
 
 impl Layer<'_> {
-    #[inline(always)]
-    pub fn block(&self, at: usize) -> (&BoxBlock, LaneMask) {
-        (&self.blocks[at], self.place.lanes(at))
-    }
-
     /// The places of the items below some lanes of a block, run by run; there
     /// are `count` items in all.
     #[inline(always)]

@@ -14,11 +14,12 @@ use super::by_plane::ByPlane;
 use super::by_tree::visible_on_baseline;
 use super::frontier::{Frontier, Merger, is_far};
 use super::id_rows::IdRows;
+use super::multi_view::see_together;
 use super::pass::{Layer, Pass};
 use super::{BuildError, FrustumQuery, MemoryUsage, RegionIndex, TreeOrder, indexable};
 use crate::geometry::{Aabb, BoxBlock, LANES, LaneMask, PlaneMask, PlaneTree};
 use crate::kernel::{BASELINE, Isa, prefetch};
-use crate::query::{ItemId, NoRecorder, Ranges, Recorder, Region, Sink, View};
+use crate::query::{AnyView, ItemId, NoRecorder, Ranges, Recorder, Region, Sink, View};
 use crate::threads::{self, share};
 
 /// Parameters: `wide:order=median`.
@@ -81,9 +82,7 @@ impl Scratch {
     /// The root, with all planes open.
     #[inline(always)]
     pub(super) fn start<I: Isa, V: View>(&mut self, isa: I, view: &V) {
-        self.here.clear(1);
-        self.here
-            .push(isa, isa.counting(0), isa.splat_word(view.mask()), 1);
+        self.here.start(isa, view.mask());
     }
 
     /// The blocks that are still to be looked at and their open planes.
@@ -455,6 +454,10 @@ impl FrustumQuery for Wide {
         let flow = self.search(isa, view, sink, recorder, &mut scratch);
         scratch.give_back();
         flow
+    }
+
+    fn visible_many(&self, views: &[AnyView<'_>], out: &mut [Vec<ItemId>]) {
+        see_together(self, views, out);
     }
 }
 

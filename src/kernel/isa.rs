@@ -65,8 +65,6 @@ pub trait Isa: Copy {
         least: Self::Floats,
         bits: u32,
     ) -> Self::Words;
-    /// `words` with `bits` set in some lanes.
-    fn with(self, words: Self::Words, lanes: LaneMask, bits: u32) -> Self::Words;
     /// The lanes that are zero.
     fn zeros(self, words: Self::Words) -> LaneMask;
     /// The lanes that are `x`.
@@ -259,10 +257,6 @@ impl Isa for Plain {
         })
     }
     #[inline(always)]
-    fn with(self, words: [u32; LANES], lanes: LaneMask, bits: u32) -> [u32; LANES] {
-        std::array::from_fn(|lane| words[lane] | if lanes >> lane & 1 == 1 { bits } else { 0 })
-    }
-    #[inline(always)]
     fn zeros(self, words: [u32; LANES]) -> LaneMask {
         lanes_where(|lane| words[lane] == 0)
     }
@@ -312,13 +306,7 @@ mod tests {
             let bits = floats.map(|x| isa.to_array(x).map(canonical));
             let mut out: Vec<u32> = bits.as_flattened().to_vec();
             let words = isa.without(isa.words(self.words), a, b, 0b101);
-            let marked = isa.with(words, self.lanes, 1 << 31 | 2);
-            let all = [
-                words,
-                marked,
-                isa.counting(self.words[0]),
-                isa.splat_word(7),
-            ];
+            let all = [words, isa.counting(self.words[0]), isa.splat_word(7)];
             for words in all {
                 let mut place = [0; LANES];
                 isa.pack(&mut place, words, self.lanes);

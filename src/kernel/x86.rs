@@ -164,15 +164,6 @@ impl Isa for Sse2 {
         })
     }
     #[inline(always)]
-    fn with(self, words: [__m128i; 4], lanes: LaneMask, bits: u32) -> [__m128i; 4] {
-        each!(4, |i| unsafe {
-            let here = _mm_set1_epi32(i32::from(lanes >> (4 * i)));
-            let of_lane = _mm_setr_epi32(1, 2, 4, 8);
-            let chosen = _mm_cmpeq_epi32(_mm_and_si128(here, of_lane), of_lane);
-            _mm_or_si128(words[i], _mm_and_si128(chosen, _mm_set1_epi32(bits as i32)))
-        })
-    }
-    #[inline(always)]
     fn zeros(self, words: [__m128i; 4]) -> LaneMask {
         signs_128(each!(4, |i| unsafe {
             _mm_castsi128_ps(_mm_cmpeq_epi32(words[i], _mm_setzero_si128()))
@@ -313,16 +304,6 @@ impl Isa for Avx2 {
         })
     }
     #[inline(always)]
-    fn with(self, words: [__m256i; 2], lanes: LaneMask, bits: u32) -> [__m256i; 2] {
-        each!(2, |i| unsafe {
-            let here = _mm256_set1_epi32(i32::from(lanes >> (8 * i)));
-            let of_lane = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
-            let chosen = _mm256_cmpeq_epi32(_mm256_and_si256(here, of_lane), of_lane);
-            let bits = _mm256_set1_epi32(bits as i32);
-            _mm256_or_si256(words[i], _mm256_and_si256(chosen, bits))
-        })
-    }
-    #[inline(always)]
     fn zeros(self, words: [__m256i; 2]) -> LaneMask {
         signs_256(each!(2, |i| unsafe {
             _mm256_castsi256_ps(_mm256_cmpeq_epi32(words[i], _mm256_setzero_si256()))
@@ -460,10 +441,6 @@ impl Isa for Avx512 {
             let bits = _mm512_set1_epi32(bits as i32);
             _mm512_mask_andnot_epi32(words, inside, bits, words)
         }
-    }
-    #[inline(always)]
-    fn with(self, words: __m512i, lanes: LaneMask, bits: u32) -> __m512i {
-        unsafe { _mm512_mask_or_epi32(words, lanes, words, _mm512_set1_epi32(bits as i32)) }
     }
     #[inline(always)]
     fn zeros(self, words: __m512i) -> LaneMask {
