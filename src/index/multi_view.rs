@@ -74,11 +74,15 @@ impl<S: Sink> Sink for All<'_, '_, S> {
 }
 
 /// How many volumes from the first one on are nearly the same, and the shell
-/// about them.
-fn alike<S>(asked: &[(&ConvexVolume, &mut S)]) -> Option<(usize, Shell)> {
-    let most = asked.len().min(MOST_ALIKE);
-    let shells = (2..=most).map_while(|count| {
-        let volumes = asked[..count].iter().map(|(volume, _)| *volume);
+/// about them; there are `most` at most.
+#[inline(always)]
+fn alike<'v>(
+    most: usize,
+    volume: impl Fn(usize) -> Option<&'v ConvexVolume>,
+) -> Option<(usize, Shell)> {
+    let shells = (2..=most.min(MOST_ALIKE)).map_while(|count| {
+        let volumes = (0..count).map_while(&volume);
+        volume(count - 1)?;
         Some((count, Shell::about(volumes)?))
     });
     shells.last()
@@ -97,7 +101,7 @@ impl Wide {
         mut asked: &mut [(&'a ConvexVolume, &'a mut S)],
     ) {
         while !asked.is_empty() {
-            let (count, shell) = match alike(asked) {
+            let (count, shell) = match alike(asked.len(), |i| Some(asked[i].0)) {
                 Some((count, shell)) => (count, Some(shell)),
                 None => (1, None),
             };
@@ -142,34 +146,44 @@ impl Wide {
     }
 }
 
-/// The pass as the chosen kernel does it.
-struct See<'t, 'a> {
+/// A group as the chosen kernel answers it.
+struct SeeAlike<'t, 'a> {
     tree: &'t Wide,
+    shell: &'t Shell,
     asked: &'t mut [(&'a ConvexVolume, &'a mut Vec<ItemId>)],
 }
 
-impl Work for See<'_, '_> {
+impl Work for SeeAlike<'_, '_> {
     type Output = ();
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) {
-        self.tree.visible_together(isa, self.asked);
+        self.tree.visible_alike(isa, self.shell, self.asked);
     }
 }
 
-/// Volumes by [`Wide::visible_together`], by the chosen kernel; other views each by
-/// itself.
+/// As [`Wide::visible_together`], by the chosen kernel and with views of all
+/// kinds: those that share nothing by the very queries that they are alone.
 pub(super) fn see_together(tree: &Wide, views: &[AnyView<'_>], out: &mut [Vec<ItemId>]) {
-    if let ([view], [out]) = (views, &mut *out) {
-        return erased::see(tree, *view, out, &mut NoRecorder);
-    }
-    let mut asked = Vec::with_capacity(views.len());
-    for (view, out) in views.iter().zip(out) {
-        match view {
-            AnyView::Volume(volume) => asked.push((*volume, out)),
-            other => erased::see(tree, *other, out, &mut NoRecorder),
+    let (mut views, mut out) = (views, out);
+    while let ([view, ..], [list, ..]) = (views, &mut *out) {
+        let volume = |i: usize| match views.get(i) {
+            Some(AnyView::Volume(volume)) => Some(*volume),
+            _ => None,
+        };
+        let mut count = 1;
+        if let Some((alike, shell)) = alike(views.len(), volume) {
+            count = alike;
+            let mut asked: Vec<_> = (0..alike).map_while(volume).zip(out.iter_mut()).collect();
+            Kernel::chosen().run(SeeAlike {
+                tree,
+                shell: &shell,
+                asked: &mut asked,
+            });
+        } else {
+            erased::see(tree, *view, list, &mut NoRecorder);
         }
+        views = &views[count..];
+        out = &mut out[count..];
     }
-    let asked = &mut asked;
-    Kernel::chosen().run(See { tree, asked });
 }
