@@ -193,7 +193,8 @@ fn many_views_and_none_are_no_trouble() {
         .map(|p| ConvexVolume::from_planes(p).expect("planes"))
         .collect();
     let finer = WideVolume::from(&all);
-    let asked: [Vec<AnyView>; 4] = [
+    let asked: [Vec<AnyView>; 5] = [
+        vec![(&all).into(), (&all).into(), (&many[0]).into()],
         many.iter().map(AnyView::from).collect(),
         halves.iter().map(AnyView::from).collect(),
         vec![(&all).into(), (&finer).into(), (&all).into()],
