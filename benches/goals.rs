@@ -315,7 +315,7 @@ fn heat(entered: Vec<Contender>, workload: &Workload) -> (Vec<Contender>, Vec<Co
         match time.map(|time| time / fastest) {
             Some(times) if times > FAR_BEHIND => {
                 println!(
-                    "  {}: {times:.0} x the fastest crate in the heat",
+                    "  {}: left out, {times:.0} x the fastest crate in the heat",
                     contender.spec.label
                 );
                 out.push(contender);

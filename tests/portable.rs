@@ -46,9 +46,9 @@ fn queries<T: FrustumQuery>(items: &[Aabb], volumes: &[ConvexVolume], points: &[
     for (i, volume) in volumes.iter().enumerate() {
         let wanted = those(items, |b| volume.sees(b));
         sees(&index, volume, i, &wanted);
-        let relative = WideVolume::from(volume);
-        let wanted = those(items, |b| relative.sees(b));
-        sees(&index, &relative, i, &wanted);
+        let finer = WideVolume::from(volume);
+        let wanted = those(items, |b| finer.sees(b));
+        sees(&index, &finer, i, &wanted);
     }
     let mut all = Located::default();
     let _ = index.locate_many(points, &mut all);
@@ -126,22 +126,38 @@ fn every_structure(items: &[Aabb], volumes: &[ConvexVolume], points: &[Vec3]) {
     wide(&tree, items, volumes);
 }
 
+/// The volume with one plane a little farther out.
+fn beside(volume: &ConvexVolume) -> ConvexVolume {
+    let mut planes = volume.planes().to_vec();
+    if let Some(plane) = planes.first_mut() {
+        plane.d += plane.d.abs() * 1e-3;
+    }
+    ConvexVolume::from_planes(&planes).expect("finite")
+}
+
 /// Numbers of items about a block, a level of blocks and none.
 fn sizes(most: usize) -> impl Iterator<Item = usize> {
     let sizes = [0, 1, 2, 15, 16, 17, 31, 32, 33, 255, 256, 257, 273];
     sizes.into_iter().filter(move |&size| size <= most)
 }
 
-pub fn random_cases() {
+#[test]
+fn random_cases_are_right() {
     for seed in 0..SEEDS {
         let case = RandomCase::new(seed);
         let items = &case.items[..case.items.len().min(MOST_ITEMS)];
-        let volumes = [case.volume.clone(), RandomCase::new(seed + 1000).volume];
+        // With its neighbour, which goes down the wide tree together with it.
+        let volumes = [
+            beside(&case.volume),
+            case.volume,
+            RandomCase::new(seed + 1000).volume,
+        ];
         every_structure(items, &volumes, &[case.point, Vec3::ZERO]);
     }
 }
 
-pub fn sizes_about_a_block() {
+#[test]
+fn sizes_about_a_block_are_right() {
     let row = |i: usize| Aabb::around(Vec3::new(i as f32, 0.0, 0.0), Vec3::splat(0.25));
     for size in sizes(if cfg!(miri) { 33 } else { 273 }) {
         let items: Vec<Aabb> = (0..size).map(row).collect();
@@ -152,7 +168,8 @@ pub fn sizes_about_a_block() {
     }
 }
 
-pub fn scenes_at_the_edge() {
+#[test]
+fn scenes_at_the_edge_are_right() {
     for (_, mut items) in edge_scenes() {
         items.truncate(if cfg!(miri) { 20 } else { 300 });
         let volumes = edge_volumes(&items);
@@ -164,13 +181,13 @@ pub fn scenes_at_the_edge() {
 
 /// Rows and parts of rows into lists of all lengths: exactly the room that was
 /// asked for is used, with every mask that has one run of lanes.
-pub fn rows_into_any_place() {
+#[test]
+fn rows_go_into_any_place() {
     let row: [u32; LANES] = std::array::from_fn(|lane| 100 + lane as u32);
     for before in 0..=LANES {
         for (from, to) in (0..=LANES).flat_map(|to| (0..=to).map(move |from| (from, to))) {
             let lanes = ((1_u32 << to) - (1_u32 << from)) as u16;
-            let wanted: Vec<u32> = vec![7; before];
-            let mut wanted: Vec<u32> = [wanted, row[from..to].to_vec(), row.to_vec()].concat();
+            let mut wanted: Vec<u32> = [&vec![7; before], &row[from..to], &row].concat();
             let mut out = vec![7; before];
             let mut packer = Packer::onto(&mut out, LANES + to - from);
             packer.push(BASELINE, &row, lanes);
@@ -182,24 +199,4 @@ pub fn rows_into_any_place() {
             assert_eq!(out, wanted);
         }
     }
-}
-
-#[test]
-fn random_cases_are_right() {
-    random_cases();
-}
-
-#[test]
-fn sizes_about_a_block_are_right() {
-    sizes_about_a_block();
-}
-
-#[test]
-fn scenes_at_the_edge_are_right() {
-    scenes_at_the_edge();
-}
-
-#[test]
-fn rows_go_into_any_place() {
-    rows_into_any_place();
 }
