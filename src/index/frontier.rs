@@ -109,6 +109,42 @@ impl Frontier {
     }
 }
 
+/// Nodes for which no plane is open any more.
+#[derive(Default)]
+pub struct NodeList {
+    /// Longer than what is used, so that sixteen lanes can always be stored.
+    nodes: Vec<u32>,
+    used: usize,
+}
+
+impl NodeList {
+    /// Empties it and makes room for the children of so many nodes.
+    pub fn clear(&mut self, parents: usize) {
+        self.used = 0;
+        let room = (parents + 1) * LANES;
+        if self.nodes.len() < room {
+            self.nodes.resize(room, 0);
+        }
+    }
+
+    /// Adds the nodes of those lanes. There must be room.
+    #[inline(always)]
+    pub fn push<I: Isa>(&mut self, isa: I, nodes: I::Words, lanes: LaneMask) {
+        let place = self.nodes[self.used..].first_chunk_mut();
+        debug_assert!(place.is_some(), "no room was made");
+        if let Some(place) = place {
+            isa.pack(place, nodes, lanes);
+            self.used += lanes.count_ones() as usize;
+        }
+    }
+
+    /// The nodes, in the order of arrival.
+    #[inline(always)]
+    pub fn entries(&self) -> &[u32] {
+        &self.nodes[..self.used]
+    }
+}
+
 /// Joins runs of items that follow each other before they are handed over.
 #[derive(Clone, Default)]
 pub struct Merger(Range<usize>);

@@ -6,7 +6,7 @@ use std::ops::{ControlFlow, Range};
 
 use super::TreeOrder;
 use super::by_plane::ByPlane;
-use super::frontier::{AHEAD, Frontier, Merger, first_ahead, hand_over};
+use super::frontier::{AHEAD, Frontier, Merger, NodeList, first_ahead, hand_over};
 use super::wide::{Level, Wide};
 use crate::geometry::{ALL_ROWS, BoxBlock, LANES, LaneMask, PlaneMask};
 use crate::kernel::{Isa, prefetch};
@@ -83,6 +83,44 @@ impl<I: Isa, V: View, S: Sink, R: Recorder> Pass<'_, I, V, S, R> {
         ControlFlow::Continue(())
     }
 
+    /// [`Pass::sort_level`] for the level above the leaves: those that are wholly
+    /// inside are gathered in `whole` and handed over behind it, a row of ids each,
+    /// which are on their way by then. Where their runs end could not be foretold,
+    /// so nobody asks.
+    #[inline(always)]
+    pub fn sort_last_level(
+        &mut self,
+        layer: &Layer,
+        leaves: &Layer,
+        here: &Frontier,
+        below: &mut Frontier,
+        whole: &mut NodeList,
+    ) -> ControlFlow<()> {
+        let (places, masks) = here.entries();
+        for i in first_ahead(layer.far) {
+            layer.fetch(places, i);
+        }
+        for (i, (&at, &mask)) in places.iter().zip(masks).enumerate() {
+            layer.fetch(places, i + AHEAD);
+            let inside = self.sort_lanes(layer, (at, mask), below);
+            whole.push(self.isa, self.isa.counting(at * LANES as u32), inside);
+        }
+        if whole.entries().is_empty() {
+            return ControlFlow::Continue(());
+        }
+        let tests = Whole {
+            leaves,
+            places: whole.entries(),
+            ids: self.tree.id_rows(),
+            recorder: &mut *self.recorder,
+        };
+        for i in first_ahead(leaves.far) {
+            tests.fetch(i);
+        }
+        self.sink
+            .accept_tested(self.isa, self.tree.id_rows(), tests)
+    }
+
     /// Hands over the items of all leaves of a frontier that no open plane
     /// drops. Where there are many, those come first that one plane alone is
     /// open for, plane by plane.
@@ -134,10 +172,28 @@ impl<I: Isa, V: View, S: Sink, R: Recorder> Pass<'_, I, V, S, R> {
     fn sort_block(
         &mut self,
         layer: &Layer,
-        (at, mask): (u32, PlaneMask),
+        entry: (u32, PlaneMask),
         below: &mut Frontier,
         run: &mut Merger,
     ) -> ControlFlow<()> {
+        let inside = self.sort_lanes(layer, entry, below);
+        for places in layer.places_of(entry.0 as usize, inside, self.tree.ids().len()) {
+            if let Some(ended) = run.join(places) {
+                self.hand_over(ended)?;
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Sorts the lanes of a block: what is undecided goes to the frontier
+    /// `below`; the lanes that are inside.
+    #[inline(always)]
+    fn sort_lanes(
+        &mut self,
+        layer: &Layer,
+        (at, mask): (u32, PlaneMask),
+        below: &mut Frontier,
+    ) -> LaneMask {
         let at = at as usize;
         let lanes = layer.place.lanes(at);
         self.recorder.nodes_tested(lanes.count_ones());
@@ -153,12 +209,7 @@ impl<I: Isa, V: View, S: Sink, R: Recorder> Pass<'_, I, V, S, R> {
         let undecided = kept & !inside;
         let first = at * LANES;
         below.push(self.isa, self.isa.counting(first as u32), open, undecided);
-        for places in layer.places_of(at, inside, self.tree.ids().len()) {
-            if let Some(ended) = run.join(places) {
-                self.hand_over(ended)?;
-            }
-        }
-        ControlFlow::Continue(())
+        inside
     }
 
     /// Hands over a run of items that are wholly inside.
@@ -191,6 +242,44 @@ fn record<V: View, R: Recorder>(
 fn fetch_ids(ids: &[[ItemId; LANES]], leaf: u32) {
     if let Some(row) = ids.get(leaf as usize) {
         prefetch(row);
+    }
+}
+
+/// Leaves that are wholly inside: nothing of theirs is tested.
+struct Whole<'a, 't, R> {
+    leaves: &'a Layer<'t>,
+    places: &'a [u32],
+    ids: &'a [[ItemId; LANES]],
+    recorder: &'a mut R,
+}
+
+impl<R> Whole<'_, '_, R> {
+    /// Asks for the ids of a leaf of the list ahead of its turn.
+    #[inline(always)]
+    fn fetch(&self, i: usize) {
+        if let Some(&leaf) = self.places.get(i) {
+            fetch_ids(self.ids, leaf);
+        }
+    }
+}
+
+impl<I: Isa, R: Recorder> Tests<I> for Whole<'_, '_, R> {
+    const SPARSE: bool = false;
+
+    #[inline(always)]
+    fn count(&self) -> usize {
+        self.places.len()
+    }
+
+    #[inline(always)]
+    fn test(&mut self, _: I, i: usize) -> (usize, LaneMask) {
+        if self.leaves.far {
+            self.fetch(i + AHEAD);
+        }
+        let at = self.places[i] as usize;
+        let lanes = self.leaves.place.lanes(at);
+        self.recorder.subtree_accepted(lanes.count_ones() as usize);
+        (at, lanes)
     }
 }
 

@@ -9,9 +9,9 @@ use super::frontier::{AHEAD, Frontier};
 use super::pass::Pass;
 use super::wide::Wide;
 use super::{FrustumQuery, TreeOrder};
-use crate::geometry::{BoxBlock, LaneMask, ROWS, RowMask};
+use crate::geometry::{BoxBlock, LANES, LaneMask, ROWS, RowMask};
 use crate::kernel::{Isa, Kernel, Work, prefetch};
-use crate::query::{ItemId, NoRecorder, Recorder, Sink, View};
+use crate::query::{ItemId, NoRecorder, Recorder, Sink, Tests, View};
 
 /// A block with those of its rows that were read; if they are fewer than six,
 /// some come twice.
@@ -22,8 +22,10 @@ type Read = (u32, [u8; ROWS]);
 pub struct Trace {
     reads: Vec<Read>,
     runs: Vec<Range<u32>>,
-    /// What was handed over of the leaves, which are the last of the reads.
+    /// What was handed over of the leaves: of so many that were wholly inside, then
+    /// of those that were tested, which are the last of the reads.
     leaves: Vec<(u32, LaneMask)>,
+    whole: usize,
 }
 
 struct Reads<'a>(&'a mut Vec<Read>);
@@ -78,6 +80,9 @@ impl Trace {
         };
         // This sink never breaks off.
         let _ = tree.visible(view, &mut hands, &mut Reads(&mut trace.reads));
+        let leaves = tree.id_rows().len();
+        let tested = trace.reads.iter().filter(|read| (read.0 as usize) < leaves);
+        trace.whole = trace.leaves.len() - tested.count();
         trace
     }
 
@@ -87,6 +92,7 @@ impl Trace {
             trace: self,
             blocks: tree.blocks(),
             ids: tree.ids(),
+            id_rows: tree.id_rows(),
             out,
         });
     }
@@ -159,6 +165,7 @@ struct Again<'a> {
     trace: &'a Trace,
     blocks: &'a [BoxBlock],
     ids: &'a [ItemId],
+    id_rows: &'a [[ItemId; LANES]],
     out: &'a mut Vec<ItemId>,
 }
 
@@ -183,9 +190,11 @@ impl Work for Again<'_> {
             reads,
             runs,
             leaves,
+            whole,
         } = self.trace;
-        let (above, below) = reads.split_at(reads.len() - leaves.len());
-        let mut seen = 0;
+        let (whole, tested) = leaves.split_at(*whole);
+        let (above, below) = reads.split_at(reads.len() - tested.len());
+        let mut seen: LaneMask = 0;
         (0..AHEAD).for_each(|i| fetch(self.blocks, above, i));
         for (i, (block, rows)) in above.iter().enumerate() {
             fetch(self.blocks, above, i + AHEAD);
@@ -195,17 +204,58 @@ impl Work for Again<'_> {
             let places = run.start as usize..run.end as usize;
             let _ = self.out.accept_places(isa, self.ids, places);
         }
-        (0..AHEAD).for_each(|i| fetch(self.blocks, below, i));
-        for (i, ((block, rows), &(start, lanes))) in below.iter().zip(leaves).enumerate() {
-            fetch(self.blocks, below, i + AHEAD);
-            if let Some(&(next, _)) = leaves.get(i + AHEAD)
-                && let Some(id) = self.ids.get(next as usize)
-            {
-                prefetch(id);
-            }
-            seen |= self.blocks[*block as usize].touch(isa, rows);
-            let _ = self.out.accept_lanes(isa, self.ids, start as usize, lanes);
+        for (reads, leaves) in [(&[][..], whole), (below, tested)] {
+            let tests = Known {
+                blocks: self.blocks,
+                reads,
+                leaves,
+                id_rows: self.id_rows,
+                seen: &mut seen,
+            };
+            (0..AHEAD).for_each(|i| tests.fetch(i));
+            let _ = self.out.accept_tested(isa, self.id_rows, tests);
         }
         std::hint::black_box(seen);
+    }
+}
+
+/// Leaves of which it is known what they hold, read all the same if they have
+/// been.
+struct Known<'a> {
+    blocks: &'a [BoxBlock],
+    reads: &'a [Read],
+    leaves: &'a [(u32, LaneMask)],
+    id_rows: &'a [[ItemId; LANES]],
+    seen: &'a mut LaneMask,
+}
+
+impl Known<'_> {
+    #[inline(always)]
+    fn fetch(&self, i: usize) {
+        fetch(self.blocks, self.reads, i);
+        if let Some(&(next, _)) = self.leaves.get(i)
+            && let Some(row) = self.id_rows.get(next as usize / LANES)
+        {
+            prefetch(row);
+        }
+    }
+}
+
+impl<I: Isa> Tests<I> for Known<'_> {
+    const SPARSE: bool = false;
+
+    #[inline(always)]
+    fn count(&self) -> usize {
+        self.leaves.len()
+    }
+
+    #[inline(always)]
+    fn test(&mut self, isa: I, i: usize) -> (usize, LaneMask) {
+        self.fetch(i + AHEAD);
+        if let Some((block, rows)) = self.reads.get(i) {
+            *self.seen |= self.blocks[*block as usize].touch(isa, rows);
+        }
+        let (start, lanes) = self.leaves[i];
+        (start as usize / LANES, lanes)
     }
 }

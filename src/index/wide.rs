@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::block_order::{BlockOrder, block_ordered};
 use super::by_plane::ByPlane;
 use super::by_tree::visible_on_baseline;
-use super::frontier::{Frontier, Merger, is_far};
+use super::frontier::{Frontier, Merger, NodeList, is_far};
 use super::id_rows::IdRows;
 use super::multi_view::see_together;
 use super::pass::{Layer, Pass};
@@ -75,6 +75,7 @@ impl Level {
 pub(super) struct Scratch {
     here: Frontier,
     below: Frontier,
+    whole: NodeList,
     by_plane: ByPlane,
 }
 
@@ -275,7 +276,9 @@ impl Wide {
         recorder: &mut R,
         scratch: &mut Scratch,
     ) -> ControlFlow<()> {
-        let Scratch { here, below, .. } = scratch;
+        let Scratch {
+            here, below, whole, ..
+        } = scratch;
         let mut pass = Pass {
             tree: self,
             isa,
@@ -285,9 +288,15 @@ impl Wide {
         };
         for height in heights.rev() {
             below.clear(here.len());
-            let mut run = Merger::default();
-            pass.sort_level(&self.layer(height + 1), here, below, &mut run)?;
-            pass.hand_over(run.take())?;
+            let layer = self.layer(height + 1);
+            if height == 0 {
+                whole.clear(here.len());
+                pass.sort_last_level(&layer, &self.layer(0), here, below, whole)?;
+            } else {
+                let mut run = Merger::default();
+                pass.sort_level(&layer, here, below, &mut run)?;
+                pass.hand_over(run.take())?;
+            }
             std::mem::swap(here, below);
         }
         ControlFlow::Continue(())
