@@ -150,7 +150,7 @@ impl Sink for Few {
 
 #[test]
 fn a_sink_that_breaks_off_ends_its_own_query_only() {
-    let scene = scene::load("uniform:n=5000", &Default::default()).expect("uniform");
+    let scene = scene::load("uniform:n=60000", &Default::default()).expect("uniform");
     let tree = wide(&scene.items);
     let plane = |x: f32| Plane::new(Vec3::new(1.0, 0.1, 0.2), -x);
     let middle = scene.bounds.centre().x;
@@ -210,11 +210,12 @@ fn many_views_and_none_are_no_trouble() {
     }
 }
 
-/// A tree of several levels, volumes about the edge of "nearly the same": between
-/// two planes, a third one that is moved, in both directions; or all three.
+/// A tree of several levels in which hundreds of leaves are wholly inside, volumes
+/// about the edge of "nearly the same": between two planes, a third one that is
+/// moved, in both directions; or all three; or one that is turned.
 #[test]
 fn volumes_about_as_near_as_can_share() {
-    let scene = scene::load("uniform:n=5000", &Default::default()).expect("uniform");
+    let scene = scene::load("uniform:n=60000", &Default::default()).expect("uniform");
     let b = scene.bounds;
     let at = |share: f32| b.min.x + share * b.extent().x;
     let volume = |moved: f32, slab: f32| {
@@ -238,4 +239,9 @@ fn volumes_about_as_near_as_can_share() {
             one_pass(&format!("{apart} apart"), &scene.items, &volumes);
         }
     }
+    let here = volume(0.0, 0.0);
+    let mut turned = here.planes().to_vec();
+    turned[2].normal += Vec3::new(0.0, 0.0, 0.3);
+    let turned = ConvexVolume::from_planes(&turned).expect("finite");
+    one_pass("turned", &scene.items, &[here, turned]);
 }

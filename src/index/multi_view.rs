@@ -8,8 +8,8 @@ use std::ops::{ControlFlow, Range};
 use super::wide::{Scratch, Wide};
 use super::{FrustumQuery, erased};
 use crate::geometry::ConvexVolume;
-use crate::kernel::{Isa, Kernel, Work};
-use crate::query::{AnyView, ItemId, NoRecorder, Shell, Sink};
+use crate::kernel::{Isa, Kernel, LANES, LaneMask, Work};
+use crate::query::{AnyView, ItemId, NoRecorder, Shell, Sink, Tests};
 
 /// Volumes of one shell: bits of a mask.
 const MOST_ALIKE: usize = u32::BITS as usize;
@@ -70,6 +70,48 @@ impl<S: Sink> Sink for All<'_, '_, S> {
             self.note(view, flow);
         }
         self.flow()
+    }
+    /// What is found in some blocks is handed to each sink in turn.
+    #[inline(always)]
+    fn accept_tested<I: Isa, T: Tests<I>>(
+        &mut self,
+        isa: I,
+        ids: &[[ItemId; LANES]],
+        mut tests: T,
+    ) -> ControlFlow<()> {
+        let mut found = [(0, 0); FOUND_TOGETHER];
+        let count = tests.count();
+        for first in (0..count).step_by(FOUND_TOGETHER) {
+            let found = &mut found[..FOUND_TOGETHER.min(count - first)];
+            for (i, place) in found.iter_mut().enumerate() {
+                *place = tests.test(isa, first + i);
+            }
+            for view in bits(self.listening) {
+                let flow = self.sinks[view].1.accept_tested(isa, ids, Found(found));
+                self.note(view, flow);
+            }
+            self.flow()?;
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+/// Blocks that are tested before the first sink gets any of them.
+const FOUND_TOGETHER: usize = 128;
+
+/// Blocks of which it is known what they hold.
+struct Found<'a>(&'a [(usize, LaneMask)]);
+
+impl<I: Isa> Tests<I> for Found<'_> {
+    const SPARSE: bool = false;
+
+    #[inline(always)]
+    fn count(&self) -> usize {
+        self.0.len()
+    }
+    #[inline(always)]
+    fn test(&mut self, _: I, i: usize) -> (usize, LaneMask) {
+        self.0[i]
     }
 }
 

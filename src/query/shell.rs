@@ -23,31 +23,33 @@ const MOST_APART: f32 = 0.25;
 impl Shell {
     /// `None` for fewer than two volumes, for others than described, and where
     /// they have too little in common for it to pay. O(volumes * planes).
-    pub fn about<'v>(mut volumes: impl Iterator<Item = &'v ConvexVolume>) -> Option<Shell> {
+    pub fn about<'v>(mut volumes: impl Iterator<Item = &'v ConvexVolume> + Clone) -> Option<Shell> {
         let first = volumes.next()?.planes();
+        let moved = moved(first, volumes.clone())?;
+        let facing = |i: usize, j: usize| face_each_other(&first[i], &first[j]);
+        // Cascades have their sides in common, but nothing between near and far: seen
+        // before anything is worked out, for they are many, and from the last planes
+        // on, where a frustum has these two.
+        let mut from_last = bits_from_last(moved).enumerate();
+        if from_last.any(|(n, i)| bits_from_last(moved).skip(n + 1).any(|j| facing(i, j))) {
+            return None;
+        }
         let count = first.len();
         let (mut farthest_out, mut farthest_in) = ([0.0; MAX_PLANES], [0.0; MAX_PLANES]);
-        for (plane, d) in first.iter().zip(&mut farthest_out) {
-            *d = plane.d;
-        }
-        farthest_in[..count].copy_from_slice(&farthest_out[..count]);
-        let mut alone = true;
-        for volume in volumes {
-            if volume.planes().len() != count {
-                return None;
-            }
-            for (i, plane) in volume.planes().iter().enumerate() {
-                if plane.normal != first[i].normal {
-                    return None;
-                }
-                farthest_out[i] = plane.d.max(farthest_out[i]);
-                farthest_in[i] = plane.d.min(farthest_in[i]);
-            }
-            alone = false;
+        for (i, plane) in first.iter().enumerate() {
+            let all = volumes.clone().map(|volume| volume.planes()[i].d);
+            (farthest_out[i], farthest_in[i]) = all.fold((plane.d, plane.d), |(out, inside), d| {
+                (d.max(out), d.min(inside))
+            });
         }
         let (out, inside) = (&farthest_out[..count], &farthest_in[..count]);
-        let without_normal = |plane: &Plane| plane.normal == glam::Vec3::ZERO;
-        if alone || first.iter().any(without_normal) || !nearly_the_same(first, out, inside) {
+        let length = |i: usize| first[i].normal.length();
+        let apart = (0..count).map(|i| (out[i] - inside[i]) / length(i));
+        let apart = apart.fold(0.0, f32::max);
+        let between = |(i, j)| inside[i] / length(i) + inside[j] / length(j);
+        let pairs = (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j)));
+        let mut facing = pairs.filter(|&(i, j)| facing(i, j));
+        if !facing.all(|pair| apart <= MOST_APART * between(pair)) {
             return None;
         }
         let at = |(plane, d): (&Plane, &f32)| Plane::new(plane.normal, *d);
@@ -62,30 +64,41 @@ impl Shell {
     }
 }
 
-/// Whether planes of such normals, farthest out and farthest in, have nearly
-/// everything between them in common.
-fn nearly_the_same(normals: &[Plane], out: &[f32], inside: &[f32]) -> bool {
-    let opposite = |a: &Plane, b: &Plane| {
-        let (dot, lengths) = (
-            a.normal.dot(b.normal),
-            a.normal.length_squared() * b.normal.length_squared(),
-        );
-        dot < 0.0 && dot * dot > 0.998 * lengths
-    };
-    // Cascades have their sides in common, but nothing between near and far:
-    // seen before anything is worked out, for they are many.
-    let moved = || (0..normals.len()).filter(|&i| out[i] > inside[i]);
-    if moved().any(|i| moved().any(|j| opposite(&normals[i], &normals[j]))) {
-        return false;
+/// The planes whose `d` is not the same in all volumes; `None` if there is only
+/// one volume, or one with other normals, or a plane without one.
+fn moved<'v>(first: &[Plane], others: impl Iterator<Item = &'v ConvexVolume>) -> Option<PlaneMask> {
+    let (mut moved, mut alone) = (0, true);
+    for volume in others {
+        alone = false;
+        let planes = volume.planes();
+        let same = |(a, b): (&Plane, &Plane)| a.normal == b.normal;
+        if planes.len() != first.len() || !first.iter().zip(planes).all(same) {
+            return None;
+        }
+        for (i, (a, b)) in first.iter().zip(planes).enumerate() {
+            moved |= PlaneMask::from(a.d != b.d) << i;
+        }
     }
-    let length = |i: usize| normals[i].normal.length();
-    let apart = moved().map(|i| (out[i] - inside[i]) / length(i));
-    let apart = apart.fold(0.0, f32::max);
-    (0..normals.len()).all(|i| {
-        (i + 1..normals.len())
-            .filter(|&j| opposite(&normals[i], &normals[j]))
-            .all(|j| apart <= MOST_APART * (inside[i] / length(i) + inside[j] / length(j)))
+    let normals = first.iter().all(|plane| plane.normal != glam::Vec3::ZERO);
+    (!alone && normals).then_some(moved)
+}
+
+/// The bits that are set, highest first.
+fn bits_from_last(mut mask: PlaneMask) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let bit = mask.checked_ilog2()?;
+        mask ^= 1 << bit;
+        Some(bit as usize)
     })
+}
+
+/// Whether the inner sides of two planes face each other, or nearly so.
+fn face_each_other(a: &Plane, b: &Plane) -> bool {
+    let (dot, lengths) = (
+        a.normal.dot(b.normal),
+        a.normal.length_squared() * b.normal.length_squared(),
+    );
+    dot < 0.0 && dot * dot > 0.998 * lengths
 }
 
 impl View for Shell {
