@@ -165,7 +165,7 @@ impl<I: Isa, T: Tests<I>> Piece<I> for Gather<'_, T> {
         let mut tests = self.tests;
         let count = tests.count();
         let mut packer = Packer::onto(self.out, count * LANES);
-        if !T::SPARSE {
+        if !T::SPARSE || count <= FEW {
             for i in 0..count {
                 let (block, lanes) = tests.test(isa, i);
                 packer.push(isa, &self.ids[block], lanes);
@@ -186,7 +186,8 @@ impl<I: Isa, T: Tests<I>> Piece<I> for Gather<'_, T> {
             }
             held[tested..].fill(0);
             let mut found = 0;
-            for (i, row) in held.as_chunks().0.iter().enumerate() {
+            let rows = &held.as_chunks().0[..tested.div_ceil(LANES)];
+            for (i, row) in rows.iter().enumerate() {
                 let some = !isa.zeros(isa.words(row));
                 if let Some(place) = hits[found..].first_chunk_mut() {
                     isa.pack(place, isa.counting((i * LANES) as u32), some);
@@ -204,6 +205,10 @@ impl<I: Isa, T: Tests<I>> Piece<I> for Gather<'_, T> {
 /// Blocks that are tested before the first of them is handed over, where most
 /// hold nothing.
 const TESTED_AHEAD: usize = 16 * LANES;
+
+/// So few blocks are handed over as they come: making room for what is tested
+/// ahead would cost more than going everywhere.
+const FEW: usize = 48;
 
 /// Where the answers lie in the structure's own order, without their ids;
 /// adjoining ranges are one. Only for structures that hand over places.
