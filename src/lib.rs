@@ -54,6 +54,7 @@
 // Denied, not forbidden: one module may, and says so itself.
 #![deny(unsafe_code)]
 
+pub mod advise;
 pub mod arithmetic;
 pub mod camera;
 pub mod culling;

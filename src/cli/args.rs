@@ -45,6 +45,8 @@ pub enum Command {
     Verify(VerifyArgs),
     /// Error against run time: every test, arithmetic and derivation of the planes
     Precision(PrecisionArgs),
+    /// Advise: which structure, which test and what to leave out, with the evidence
+    Advise(AdviseArgs),
     /// Compare how ways to turn, orbit and chase drift from the truth
     Drift(DriftArgs),
     /// Replay test vectors and generated extremes, each with its declared outcome
@@ -245,6 +247,62 @@ pub struct PrecisionArgs {
     #[arg(long, value_name = "FILE")]
     pub svg: Option<PathBuf>,
     /// Seed of the sweeps and of the order in which points are measured
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    #[arg(long, value_enum, default_value = "table")]
+    pub format: TableFormat,
+    #[command(flatten)]
+    pub scene_args: SceneArgs,
+    #[command(flatten)]
+    pub lens: LensArgs,
+    #[command(flatten)]
+    pub kernel: KernelArgs,
+}
+
+#[derive(Args, Debug)]
+pub struct AdviseArgs {
+    /// A scene: boxes CSV, Doom WAD, built-in name or spec
+    #[arg(long)]
+    pub scene: String,
+    /// A camera path: a spec or a cameras CSV
+    #[arg(long, visible_alias = "cameras", value_name = "PATH", default_value = DEFAULT_PATH)]
+    pub path: String,
+    /// Structures to choose from, e.g. linear,bvh:leaf=4
+    #[arg(long, value_name = "LIST", default_value = "all")]
+    pub structure: String,
+    /// What drawing an item costs that cannot be seen
+    #[arg(
+        long,
+        value_name = "NS",
+        default_value_t = 1000.0,
+        allow_negative_numbers = true
+    )]
+    pub draw_ns: f64,
+    /// What rounding may move planes by, in depths of the view, and drift a frame, in radians
+    #[arg(
+        long,
+        value_name = "SHARE",
+        default_value_t = 1e-5,
+        allow_negative_numbers = true
+    )]
+    pub tolerance: f64,
+    /// Share of the items that move between two updates
+    #[arg(
+        long,
+        value_name = "SHARE",
+        default_value = "1%",
+        allow_negative_numbers = true
+    )]
+    pub moved: String,
+    /// Queries between two updates
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 1.0,
+        allow_negative_numbers = true
+    )]
+    pub queries_per_update: f64,
+    /// Seed of the order in which things are measured
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
     #[arg(long, value_enum, default_value = "table")]

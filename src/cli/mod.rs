@@ -4,6 +4,7 @@
 //! Exit codes: 0 ok; 1 a wrong answer or a failed verification; 2 usage or bad
 //! input; 130 interrupted.
 
+mod advise;
 mod args;
 mod compare_structures;
 mod document;
@@ -59,6 +60,7 @@ pub fn main() -> ExitCode {
         Command::Locate(args) => locate::locate(&args),
         Command::Verify(args) => verify::verify(&args),
         Command::Precision(args) => precision::precision(&args),
+        Command::Advise(args) => advise::advise(&args),
         Command::Drift(args) => drift::drift(&args),
         Command::Stress(args) => stress::stress(&args),
         Command::Scene(SceneCommand::Info(args)) => scene::info(&args),

@@ -144,6 +144,14 @@ pub fn measure(options: &DriftOptions, mut progress: impl FnMut(&str)) -> DriftR
     }
 }
 
+/// How the ways to turn a frame fare after so many steps: what [`measure`] says
+/// of them, by themselves.
+pub fn rotations(options: &DriftOptions) -> Vec<Rated> {
+    let exact = Exact::new(&[options.steps]);
+    let drifts: Vec<_> = METHODS.iter().flat_map(|m| m.drift(&exact)).collect();
+    rate_rotations(&drifts, options)
+}
+
 fn rate_rotations(drifts: &[RotationDrift], options: &DriftOptions) -> Vec<Rated> {
     let times = walk::ns_per_step(METHODS, TIMED_STEPS, |method| {
         (method.walk)(&STEADY, &[TIMED_STEPS]);

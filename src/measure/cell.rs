@@ -489,8 +489,8 @@ fn frame_medians(timed: &Timed, value: impl Fn(&Sample) -> f64) -> Vec<f64> {
 }
 
 /// Time of `base` / time of `other`, round by round: both saw the same state
-/// of the machine.
-fn paired_ratio(base: &Timed, other: &Timed) -> Option<Estimate> {
+/// of the machine. `None` without rounds.
+pub fn paired_ratio(base: &Timed, other: &Timed) -> Option<Estimate> {
     let pairs = base.round_means().into_iter().zip(other.round_means());
     let ratios: Vec<f64> = pairs
         .map(|(b, o)| b / o)

@@ -22,7 +22,7 @@ mod workload;
 use serde::{Deserialize, Serialize};
 
 pub use bounds::{BOUNDS, Bound, Material};
-pub use cell::{Cell, Group, PathInfo, SceneInfo, TwinRatio, measure_group};
+pub use cell::{Cell, Group, PathInfo, SceneInfo, TwinRatio, measure_group, paired_ratio};
 pub use clock::{Lap, Stopwatch};
 pub use competitor::{Ask, AskMany, Competitor, Task};
 pub use contender::{Built, Contender, UPDATE_SHARES, guarded, move_share};

@@ -4,6 +4,7 @@
 //! the library; only `readers` calls the library, with damaged input.
 #![cfg(feature = "cli")]
 
+mod advise;
 mod bad_input;
 mod cullings;
 mod drift;

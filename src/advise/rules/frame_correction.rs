@@ -1,0 +1,59 @@
+//! Correcting a camera's frame: axes in f32 that are turned and never
+//! straightened drift by some 2e-8 a step. Whoever makes the frame anew for each
+//! camera, or takes few steps, does not need it. Checked by walking.
+
+use super::super::AdviseError;
+use super::super::case::Case;
+use super::super::omission::{By, Draft, LeftOutIf, Omission};
+use crate::drift::{DriftOptions, Rated, rotations};
+
+pub(super) const NAME: &str = "frame-correction";
+
+/// What an f32 frame drifts by a step: docs/NUMERICS.md.
+const DRIFT: f64 = 2e-8;
+/// "Much less than the tolerance" is this share of it.
+const MUCH_LESS: f64 = 0.1;
+const KEPT: &str = "f32-polar-100";
+const LEFT_OUT: &str = "f32";
+
+pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> {
+    let omission = Omission::new(
+        NAME,
+        "correcting an f32 camera frame between steps",
+        "drift after all steps of the path, radians",
+        LeftOutIf::AtMost,
+        By::Rule,
+    );
+    let tolerance = case.options.tolerance;
+    let steps = case.workload.cameras.len() as u64;
+    let rated = rotations(&DriftOptions {
+        steps,
+        tolerance_rad: tolerance,
+    });
+    let of = |name: &str| -> Option<&Rated> { rated.iter().find(|r| r.name == name) };
+    let (Some(kept), Some(left_out)) = (of(KEPT), of(LEFT_OUT)) else {
+        return Ok(omission.because("no such method").draft(Vec::new()));
+    };
+    let walked = |rated: &Rated| match rated.error {
+        Some(error) => format!("{error:.1e}"),
+        None => "lost".to_owned(),
+    };
+    let mut omission = omission
+        .compares(steps as f64 * DRIFT, tolerance * MUCH_LESS)
+        .because(format!(
+            "{steps} steps of {DRIFT:.0e}; walked: {} uncorrected at {:.0} ns a step, {} with a Newton step \
+             to the polar factor every 100 at {:.0} ns; within {tolerance:.0e} for some {:.0} steps",
+            walked(left_out),
+            left_out.ns_per_step,
+            walked(kept),
+            kept.ns_per_step,
+            tolerance * MUCH_LESS / DRIFT
+        ));
+    omission.saving = Some(1.0 - left_out.ns_per_step / kept.ns_per_step);
+    // What was walked outweighs the estimate.
+    if let Some(error) = left_out.error {
+        omission.confirmed = omission.predicted.map(|said| said == (error <= tolerance));
+        omission.predicted = Some(error <= tolerance);
+    }
+    Ok(omission.draft(Vec::new()))
+}

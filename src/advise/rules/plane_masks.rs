@@ -1,0 +1,200 @@
+//! Plane tests below a node that a plane contains: the mask of open planes that
+//! a node hands to its children leaves them out. Forced off by a view whose
+//! nodes never close a plane (unless they close all of them).
+
+use std::rc::Rc;
+
+use super::super::AdviseError;
+use super::super::case::Case;
+use super::super::omission::{By, Draft, Forced, LeftOutIf, Omission, Way};
+use crate::geometry::{Aabb, Blade, Blades, BoxBlock, ConvexVolume, LANES, LaneMask, PlaneMask};
+use crate::index::{FrustumQuery, RegionIndex, Wide};
+use crate::kernel::{Isa, Kernel, Work};
+use crate::query::{ItemId, NoRecorder, QueryCost, Recorder, View};
+
+pub(super) const NAME: &str = "plane-masks";
+
+/// Share of the plane tests that has to go: a small tree saves a few percent,
+/// and carrying masks is not free.
+const THRESHOLD: f64 = 0.1;
+/// Cameras whose plane tests are counted.
+const COUNTED: usize = 64;
+
+pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> {
+    let omission = Omission::new(
+        NAME,
+        "tests of planes that a node above is inside of (by masks)",
+        "share of the plane tests that masks save",
+        LeftOutIf::AtLeast,
+        By::Time,
+    );
+    let scene = case.scene();
+    let tree = Wide::build(&scene.items, scene.own_tree.as_ref(), &Default::default())?;
+    let tree = Rc::new(tree);
+    let volumes: Rc<Vec<ConvexVolume>> = Rc::new(case.volumes().cloned().collect());
+    let step = volumes.len().div_ceil(COUNTED).max(1);
+    let (mut with, mut without) = (QueryCost::default(), QueryCost::default());
+    let mut out = Vec::new();
+    for volume in volumes.iter().step_by(step) {
+        out.clear();
+        see(&tree, volume, &mut out, &mut with);
+        out.clear();
+        see(&tree, &Unmasked(volume), &mut out, &mut without);
+    }
+    let [fewer, all] = [with, without].map(|cost| cost.planes_tested);
+    let omission = match all {
+        0 => omission.because("no plane is ever tested"),
+        _ => omission
+            .compares(1.0 - fewer as f64 / all as f64, THRESHOLD)
+            .because(format!("{fewer} plane tests with masks, {all} without")),
+    };
+    let other = (tree.clone(), volumes.clone());
+    let forced = Forced {
+        on: Wide::NAME.to_owned(),
+        kept: Way::Other(Box::new(move |n, out| {
+            see(&other.0, &Unmasked(&other.1[n]), out, &mut NoRecorder);
+        })),
+        left_out: Way::Other(Box::new(move |n, out| {
+            see(&tree, &volumes[n], out, &mut NoRecorder);
+        })),
+        same: true,
+        judged: true,
+    };
+    Ok(omission.draft(vec![forced]))
+}
+
+/// A query with a view of one's own, by the chosen kernel.
+struct See<'a, V, R> {
+    tree: &'a Wide,
+    view: &'a V,
+    out: &'a mut Vec<ItemId>,
+    recorder: &'a mut R,
+}
+
+impl<V: View, R: Recorder> Work for See<'_, V, R> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) {
+        // A Vec never breaks off.
+        let _ = self
+            .tree
+            .visible_by(isa, self.view, self.out, self.recorder);
+    }
+}
+
+fn see<V: View, R: Recorder>(tree: &Wide, view: &V, out: &mut Vec<ItemId>, recorder: &mut R) {
+    Kernel::chosen().run(See {
+        tree,
+        view,
+        out,
+        recorder,
+    });
+}
+
+/// The six-plane view with every plane open wherever one is.
+struct Unmasked<'a>(&'a ConvexVolume);
+
+impl View for Unmasked<'_> {
+    type OnePlane<'v, I: Isa>
+        = Blade<I>
+    where
+        Self: 'v;
+    type AllPlanes<'v, I: Isa>
+        = Blades<I>
+    where
+        Self: 'v;
+
+    #[inline(always)]
+    fn mask(&self) -> PlaneMask {
+        self.0.mask()
+    }
+    #[inline(always)]
+    fn excludes(&self, plane: u32, bounds: &Aabb) -> bool {
+        self.0.excludes(plane, bounds)
+    }
+    #[inline(always)]
+    fn contains(&self, plane: u32, bounds: &Aabb) -> bool {
+        self.0.contains(plane, bounds)
+    }
+    #[inline(always)]
+    fn kept_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
+        self.0.kept_lanes(isa, block, mask)
+    }
+    #[inline(always)]
+    fn kept_of_four<I: Isa>(
+        &self,
+        isa: I,
+        blocks: &[BoxBlock; 4],
+        mask: PlaneMask,
+    ) -> [LaneMask; 4] {
+        self.0.kept_of_four(isa, blocks, mask)
+    }
+    #[inline(always)]
+    fn one_plane<I: Isa>(&self, isa: I, plane: u32) -> Blade<I> {
+        self.0.one_plane(isa, plane)
+    }
+    #[inline(always)]
+    fn all_planes<I: Isa>(&self, isa: I) -> Option<Blades<I>> {
+        self.0.all_planes(isa)
+    }
+    #[inline(always)]
+    fn prefetch(&self, block: &BoxBlock, mask: PlaneMask) {
+        self.0.prefetch(block, mask);
+    }
+    #[inline(always)]
+    fn sorted_lanes<I: Isa>(
+        &self,
+        isa: I,
+        block: &BoxBlock,
+        mask: PlaneMask,
+    ) -> (LaneMask, I::Words) {
+        let (kept, words) = self.0.sorted_lanes(isa, block, mask);
+        let inside = isa.zeros(words);
+        let open: [PlaneMask; LANES] = std::array::from_fn(|lane| match inside >> lane & 1 {
+            0 => mask,
+            _ => 0,
+        });
+        (kept, isa.words(&open))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Plane;
+    use glam::Vec3;
+
+    #[test]
+    fn without_masks_the_answer_is_the_same_and_costs_more_tests() {
+        let corner = |i: u32| Vec3::new((i % 40) as f32, (i / 40 % 40) as f32, (i / 1600) as f32);
+        let items: Vec<Aabb> = (0..16_000)
+            .map(|i| Aabb::new(corner(i), corner(i) + 0.5))
+            .collect();
+        let planes = [Vec3::X, Vec3::Y, -Vec3::X, -Vec3::Y].map(|normal| {
+            Plane::new(
+                normal,
+                if normal.max_element() > 0.0 {
+                    -10.2
+                } else {
+                    30.7
+                },
+            )
+        });
+        let volume = ConvexVolume::from_planes(&planes).unwrap();
+        let tree = Wide::build(&items, None, &Default::default()).unwrap();
+        let ask = |masked: bool| {
+            let (mut out, mut cost) = (Vec::new(), QueryCost::default());
+            match masked {
+                true => see(&tree, &volume, &mut out, &mut cost),
+                false => see(&tree, &Unmasked(&volume), &mut out, &mut cost),
+            }
+            out.sort_unstable();
+            (out, cost.planes_tested, cost.subtrees_accepted)
+        };
+        let ((with, fewer, accepted), (without, all, also)) = (ask(true), ask(false));
+        assert!(!with.is_empty() && with == without);
+        assert_eq!(accepted, also, "what is inside is accepted either way");
+        assert!(fewer * 3 < all * 2, "{fewer} of {all}");
+    }
+}

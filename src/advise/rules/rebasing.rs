@@ -1,0 +1,75 @@
+//! Moving the scene to a zero of its own: near the world's zero f32 has digits
+//! enough without. Forced on by moving the scene to its centre where it was not
+//! moved, forced off by leaving it where the world has it.
+
+use glam::DVec3;
+
+use super::super::AdviseError;
+use super::super::case::{Case, asked};
+use super::super::omission::{By, Draft, Forced, LeftOutIf, Omission, Way};
+use crate::culling::Culling;
+use crate::measure::Workload;
+use crate::scene::{Scene, WorldBox};
+
+pub(super) const NAME: &str = "rebasing";
+
+pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> {
+    let omission = Omission::new(
+        NAME,
+        "moving the scene to a zero of its own",
+        "margin for rounding in world coordinates / depth of the view",
+        LeftOutIf::AtMost,
+        By::Rule,
+    );
+    let scene = case.scene();
+    let is_moved = scene.origin != DVec3::ZERO;
+    let elsewhere = if is_moved {
+        DVec3::ZERO
+    } else {
+        let bounds = scene.world_bounds();
+        bounds.min / 2.0 + bounds.max / 2.0
+    };
+    let other = match about(scene, elsewhere) {
+        Ok(other) => other,
+        Err(error) => return Ok(omission.because(error).draft(Vec::new())),
+    };
+    let views = match Workload::new(&other, case.path, &Culling::default()) {
+        Ok(workload) => workload.views,
+        Err(error) => return Ok(omission.because(error.to_string()).draft(Vec::new())),
+    };
+    let at_zero = if is_moved { &other } else { scene };
+    let moved = if is_moved { scene } else { &other };
+    let (margin, better) = (case.margin(at_zero), case.margin(moved));
+    let omission = omission.compares(margin, case.options.tolerance).because(format!(
+        "{margin:.1e} of the depth about the world's zero, {better:.1e} about ({}, {}, {}); this scene {}",
+        moved.origin.x,
+        moved.origin.y,
+        moved.origin.z,
+        if is_moved { "is moved" } else { "stays where it is" }
+    ));
+    let index = case.spec.build(&other.items)?;
+    let (here, there) = (Way::Base, Way::Other(asked(index, views)));
+    let (kept, left_out) = match is_moved {
+        true => (here, there),
+        false => (there, here),
+    };
+    let forced = Forced {
+        on: case.spec.label.clone(),
+        kept,
+        left_out,
+        same: false,
+        judged: true,
+    };
+    Ok(omission.draft(vec![forced]))
+}
+
+/// The scene's boxes about another origin, rounded outward once more.
+fn about(scene: &Scene, origin: DVec3) -> Result<Scene, String> {
+    let at_home = |corner: glam::Vec3| scene.origin + corner.as_dvec3();
+    let boxes = scene.items.iter().map(|item| WorldBox {
+        min: at_home(item.min),
+        max: at_home(item.max),
+    });
+    let boxes: Vec<WorldBox> = boxes.collect();
+    Scene::about(scene.name.clone(), &boxes, origin).map_err(|error| error.to_string())
+}

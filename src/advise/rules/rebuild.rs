@@ -1,0 +1,64 @@
+//! Building anew after items have moved: a refit keeps the tree and is quicker,
+//! but what it leaves answers more slowly. Weighed for a share of items that
+//! move and a number of queries between two updates.
+
+use super::super::AdviseError;
+use super::super::case::{Case, asked};
+use super::super::omission::{By, Draft, Forced, LeftOutIf, Omission, Way};
+use crate::measure::{Stopwatch, move_share};
+
+pub(super) const NAME: &str = "rebuild";
+
+pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> {
+    let omission = Omission::new(
+        NAME,
+        "building anew after items have moved",
+        "what queries on the refitted tree cost more until the next update, ns",
+        LeftOutIf::AtMost,
+        By::Rule,
+    );
+    let scene = case.scene();
+    let own_tree = scene.own_tree.as_ref();
+    let mut items = scene.items.clone();
+    let moved = move_share(&mut items, case.options.moved);
+    let mut refitted = case.spec.build_with(&scene.items, own_tree)?;
+    // Some structures make room for refits at the first one.
+    let can = refitted.refit(&scene.items, &moved);
+    let watch = Stopwatch::start();
+    if !can || !refitted.refit(&items, &moved) {
+        let why = format!("'{}' cannot be refitted", case.spec.label);
+        return Ok(omission.because(why).draft(Vec::new()));
+    }
+    let refit_ns = watch.lap().cpu_ns;
+    let watch = Stopwatch::start();
+    let rebuilt = case.spec.build_with(&items, own_tree)?;
+    let rebuild_ns = watch.lap().cpu_ns;
+    let views = || case.workload.views.clone();
+    let forced = Forced {
+        on: format!("{}, queries after an update", case.spec.label),
+        kept: Way::Other(asked(rebuilt, views())),
+        left_out: Way::Other(asked(refitted, views())),
+        same: true,
+        // Moved items are not the scene's.
+        judged: false,
+    };
+    let queries = case.options.queries_per_update;
+    let (share, count) = (case.options.moved, moved.len());
+    Ok(omission.draft(vec![forced]).finished_by(move |omission| {
+        let Some(check) = omission.checks.first() else {
+            return;
+        };
+        let slower = queries * (check.left_out_ns - check.kept_ns);
+        let kept = rebuild_ns + queries * check.kept_ns;
+        let left_out = refit_ns + queries * check.left_out_ns;
+        omission.reason = format!(
+            "{count} items moved by their own size ({} %), {queries} queries an update: refit {:.0} us, \
+             rebuild {:.0} us",
+            share * 100.0,
+            refit_ns / 1e3,
+            rebuild_ns / 1e3
+        );
+        omission.weigh(slower, rebuild_ns - refit_ns);
+        omission.saving = Some(1.0 - left_out / kept).filter(|saving| saving.is_finite());
+    }))
+}

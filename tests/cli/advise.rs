@@ -1,0 +1,291 @@
+//! `advise`: the fields of its JSON, every rule once with both sides checked,
+//! statistics against plain expectations, options that turn a decision, and
+//! refusals. Where the clock decides, no decision is judged.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::sync::OnceLock;
+
+use serde_json::Value;
+
+use super::BOXES;
+use super::process::*;
+
+const SMALL: &str =
+    "advise --scene uniform:n=900 --path orbit:frames=6 --structure linear,wide,bvh";
+const RULES: &str = "needless-planes plane-masks no-index six-planes third-dimension rebasing \
+     rebuild f64-kernel frame-correction";
+
+fn advice(folder: &Path, line: &str) -> Value {
+    json(&works(folder, &format!("{line} --format json")))
+}
+
+/// The outcome of [`SMALL`], made once for all tests here.
+fn small() -> &'static Value {
+    static OUTCOME: OnceLock<Value> = OnceLock::new();
+    OUTCOME.get_or_init(|| advice(Path::new("."), SMALL))
+}
+
+fn array<'a>(of: &'a Value, name: &str) -> &'a Vec<Value> {
+    of[name].as_array().expect(name)
+}
+
+fn number(of: &Value, name: &str) -> f64 {
+    of[name]
+        .as_f64()
+        .unwrap_or_else(|| panic!("{name} in {of}"))
+}
+
+fn rule<'a>(advice: &'a Value, name: &str) -> &'a Value {
+    let mut rules = array(advice, "omissions").iter();
+    rules.find(|o| o["rule"] == name).expect(name)
+}
+
+#[test]
+fn json_has_the_documented_fields() {
+    let top = "scene path items cameras options noise_floor structure test omissions";
+    let options = "draw_ns tolerance moved queries_per_update";
+    let structure = "name ties region_search noise_floor rows";
+    let times = "query_ns query_ns_lower query_ns_upper";
+    let structure_row = format!(
+        "structure status reason {times} ratio_to_linear build_ms memory_bytes_per_item \
+         break_even_queries locate_ns"
+    );
+    let test = "name ties structure rows";
+    let test_row =
+        format!("test {times} excess false_negative_ppm false_positives_per_query total_ns");
+    let omission = "rule left_out statistic_name statistic threshold left_out_if predicted saving \
+         decision confirmed reason checks";
+    let check = "on kept_ns left_out_ns ratio ratio_lower ratio_upper same_answers same_expected \
+         kept_excess left_out_excess kept_false_negative_ppm left_out_false_negative_ppm";
+    let told = include_str!("../../docs/METHODOLOGY.md");
+    let documented = |fields: &str| {
+        for field in set(fields) {
+            assert!(told.contains(&format!("`{field}`")), "{field}");
+        }
+    };
+    let advice = small();
+    let one = |value: &Value, fields: &str| {
+        assert_eq!(keys(value), set(fields));
+        documented(fields);
+    };
+    one(advice, top);
+    one(&advice["options"], options);
+    one(&advice["structure"], structure);
+    one(&advice["test"], test);
+    for (rows, fields) in [
+        (array(&advice["structure"], "rows"), structure_row.as_str()),
+        (array(&advice["test"], "rows"), test_row.as_str()),
+        (array(advice, "omissions"), omission),
+    ] {
+        assert!(!rows.is_empty());
+        rows.iter().for_each(|row| one(row, fields));
+    }
+    for omission in array(advice, "omissions") {
+        array(omission, "checks")
+            .iter()
+            .for_each(|row| one(row, check));
+    }
+    assert_eq!(
+        (number(advice, "items"), number(advice, "cameras")),
+        (900.0, 6.0)
+    );
+}
+
+#[test]
+fn every_rule_is_there_once_with_both_sides_checked() {
+    let omissions = array(small(), "omissions");
+    let names: Vec<&str> = omissions
+        .iter()
+        .filter_map(|o| o["rule"].as_str())
+        .collect();
+    assert_eq!(names.len(), set(RULES).len());
+    assert_eq!(names.iter().copied().collect::<BTreeSet<_>>(), set(RULES));
+    let told = include_str!("../../docs/METHODOLOGY.md");
+    for omission in omissions {
+        let name = omission["rule"].as_str().expect("a name");
+        assert!(told.contains(&format!("\n| {name} |")), "{name}");
+        let (statistic, threshold) = (number(omission, "statistic"), number(omission, "threshold"));
+        let wanted = match omission["left_out_if"].as_str() {
+            Some("at_most") => statistic <= threshold,
+            Some("at_least") => statistic >= threshold,
+            other => panic!("{other:?}"),
+        };
+        // A frame is walked, and the walk outweighs the estimate.
+        if name != "frame-correction" {
+            assert_eq!(omission["predicted"], wanted, "{omission}");
+            assert!(!array(omission, "checks").is_empty(), "{omission}");
+        }
+        assert!(number(omission, "saving") < 1.0);
+        assert!(
+            ["leave_out", "keep"]
+                .map(Value::from)
+                .contains(&omission["decision"])
+        );
+        for check in array(omission, "checks") {
+            assert!(number(check, "kept_ns") > 0.0 && number(check, "left_out_ns") > 0.0);
+            assert!(number(check, "ratio_lower") <= number(check, "ratio_upper"));
+            if check["same_expected"] == true {
+                assert_eq!(check["same_answers"], true, "{omission}");
+                assert_eq!(check["kept_excess"], check["left_out_excess"], "{omission}");
+            }
+            if name != "rebuild" {
+                for side in ["kept", "left_out"] {
+                    let missed = number(check, &format!("{side}_false_negative_ppm"));
+                    assert_eq!(missed, 0.0, "{omission}");
+                }
+            }
+        }
+    }
+    let expected = |name: &str| {
+        let checks = array(rule(small(), name), "checks");
+        checks.iter().all(|check| check["same_expected"] == true)
+    };
+    for name in "needless-planes plane-masks no-index third-dimension rebuild".split(' ') {
+        assert!(expected(name), "{name}");
+    }
+}
+
+#[test]
+fn tests_and_structures_have_their_rows() {
+    let structure = &small()["structure"];
+    let rows = array(structure, "rows");
+    let names: BTreeSet<&str> = rows
+        .iter()
+        .filter_map(|r| r["structure"].as_str())
+        .collect();
+    assert_eq!(names, set("linear wide bvh"));
+    assert_eq!(structure["name"], rows[0]["structure"]);
+    let times: Vec<f64> = rows.iter().map(|row| number(row, "query_ns")).collect();
+    assert!(times.is_sorted(), "{times:?}");
+    let rows = array(&small()["test"], "rows");
+    let names: Vec<&str> = rows.iter().filter_map(|r| r["test"].as_str()).collect();
+    assert_eq!(names, ["sphere", "six-plane", "six-box", "exact"]);
+    let excess: Vec<f64> = rows.iter().map(|row| number(row, "excess")).collect();
+    assert!(
+        excess.is_sorted_by(|a, b| a >= b) && excess[3] == 0.0,
+        "{excess:?}"
+    );
+    for row in rows {
+        assert_eq!(number(row, "false_negative_ppm"), 0.0);
+        let drawn = number(row, "false_positives_per_query") * 1000.0;
+        let total = number(row, "query_ns") + drawn;
+        assert!((number(row, "total_ns") - total).abs() < 1e-6 * total);
+    }
+}
+
+#[test]
+fn planes_that_hold_the_scene_are_counted() {
+    // From far away and looking on, the scene is inside of near, far and the sides.
+    let cameras = "eye_x,eye_y,eye_z,look_x,look_y,look_z,near,far\n\
+         -90,0,0,0,0,0,1,500\n-90,0,0,-200,0,0,1,500\n";
+    let scene = format!("{BOXES}\n-1,-1,-1,1,1,1\n3,3,3,4,4,4\n");
+    let folder = folder(&[("s.csv", scene.as_bytes()), ("c.csv", cameras.as_bytes())]);
+    let advice = advice(folder.path(), "advise --scene s.csv --path c.csv");
+    let planes = rule(&advice, "needless-planes");
+    // All six of the first camera; of the second, which looks away, only the
+    // far plane and the sides that open towards the scene as well.
+    let reason = planes["reason"].as_str().expect("a reason");
+    assert!(reason.contains("of 12 planes"), "{reason}");
+    assert!(number(planes, "statistic") >= 7.0 / 12.0, "{planes}");
+    assert!(number(planes, "statistic") < 1.0, "{planes}");
+    assert_eq!(planes["predicted"], true);
+}
+
+#[test]
+fn far_scenes_are_moved_and_flat_ones_known() {
+    let near = format!("{BOXES}\n0,0,0,1,1,1\n5,0,0,6,1,1\n");
+    let far = near
+        .replace("\n0,", "\n1000000,")
+        .replace("\n5,0,0,6", "\n1000005,0,0,1000006");
+    let far = far.replace("0,0,1,1,1", "0,0,1000001,1,1");
+    let folder = folder(&[("near.csv", near.as_bytes()), ("far.csv", far.as_bytes())]);
+    let of = |scene: &str| {
+        let line = format!("advise --scene {scene} --path orbit:frames=3 --structure linear,wide");
+        advice(folder.path(), &line)
+    };
+    let (near, far) = (of("near.csv"), of("far.csv"));
+    assert_eq!(rule(&near, "rebasing")["decision"], "leave_out");
+    let rebasing = rule(&far, "rebasing");
+    assert_eq!(rebasing["decision"], "keep");
+    assert!(number(rebasing, "statistic") > 1e4 * number(rule(&near, "rebasing"), "statistic"));
+    let check = &array(rebasing, "checks")[0];
+    assert!(
+        number(check, "left_out_excess") > number(check, "kept_excess"),
+        "{check}"
+    );
+    // Moved, the scene is as good as the near one.
+    let f64s = [&near, &far].map(|advice| number(rule(advice, "f64-kernel"), "statistic"));
+    assert!((f64s[0] / f64s[1]).ln().abs() < 1.0, "{f64s:?}");
+    let flat = advice(
+        Path::new("."),
+        "advise --scene us-counties --path orbit:frames=2 --structure linear,wide",
+    );
+    assert_eq!(rule(&flat, "third-dimension")["predicted"], true);
+    assert_eq!(number(rule(&flat, "third-dimension"), "statistic"), 0.0);
+    assert_eq!(rule(small(), "third-dimension")["predicted"], false);
+}
+
+#[test]
+fn options_turn_the_decisions_that_are_theirs() {
+    // Items as large as the view is deep, so that six planes let many through.
+    let of = |more: &str| {
+        let line =
+            "advise --scene forest:n=400 --path orbit:frames=4 --structure linear,wide --far 200";
+        advice(Path::new("."), &format!("{line} {more}"))
+    };
+    let dear = of("--draw-ns 1e12 --tolerance 1e-9");
+    assert_eq!(rule(&dear, "six-planes")["decision"], "keep");
+    assert_eq!(dear["test"]["name"], "exact");
+    assert_eq!(rule(&dear, "f64-kernel")["decision"], "keep");
+    assert_eq!(rule(&dear, "frame-correction")["decision"], "keep");
+    let cheap = of("--draw-ns 0 --tolerance 1e-2 --moved 100% --queries-per-update 0");
+    assert_eq!(number(rule(&cheap, "six-planes"), "statistic"), 0.0);
+    assert_eq!(rule(&cheap, "f64-kernel")["decision"], "leave_out");
+    assert_eq!(rule(&cheap, "frame-correction")["decision"], "leave_out");
+    assert_eq!(number(rule(&cheap, "rebuild"), "statistic"), 0.0);
+    let moved = rule(&cheap, "rebuild")["reason"]
+        .as_str()
+        .expect("a reason");
+    assert!(moved.contains("400 items moved"), "{moved}");
+}
+
+#[test]
+fn the_table_ends_with_the_advice() {
+    let table = works(Path::new("."), SMALL);
+    assert!(!table.contains('\u{1b}'), "{table}");
+    let (_, advice) = table.split_once("\nAdvice:\n").expect("the advice");
+    for part in [
+        "  structure: ",
+        "  region search: ",
+        "  test: ",
+        "  leave out: ",
+    ] {
+        assert!(advice.contains(part), "{part}: {advice}");
+    }
+    for name in set(RULES) {
+        assert!(table.contains(&format!("\n  {name}: ")), "{name}");
+    }
+}
+
+#[test]
+fn mistakes_are_one_line() {
+    let folder = with_good_files(&[]);
+    let line = "advise --scene scene.csv --path cameras.csv";
+    for (more, wanted) in [
+        ("--structure bhv", "bhv | did you mean 'bvh'"),
+        ("--draw-ns -1", "--draw-ns is -1 | at least 0"),
+        ("--draw-ns nan", "--draw-ns is NaN"),
+        ("--tolerance 0", "--tolerance is 0 | above 0"),
+        ("--queries-per-update inf", "--queries-per-update is inf"),
+        ("--moved 0", "--moved is '0' | above 0"),
+        ("--moved 101%", "--moved is '101%' | at most 100%"),
+        ("--moved some", "--moved is 'some'"),
+        ("--fovy 0", "field of view is 0"),
+    ] {
+        all_refused(&folder, &[format!("{line} {more}")], wanted);
+    }
+    let nothing = "advise --scene uniform:n=0 --path cameras.csv";
+    all_refused(&folder, &[nothing], "uniform:n=0 | no items");
+    all_refused(&folder, &["advise --scene nothing.csv"], "nothing.csv");
+}
