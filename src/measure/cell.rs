@@ -4,7 +4,6 @@
 
 use std::collections::BTreeMap;
 
-use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::bounds::{Bound, Material};
@@ -13,8 +12,6 @@ use super::{
     Built, Competitor, Contender, Counted, Judged, Protocol, Sample, Status, Task, Timed, Verdict,
     Workload, count_pass, judge, timed_rounds,
 };
-use crate::path;
-use crate::scene::Scene;
 use crate::statistics::{Estimate, bootstrap_median, median, quantile, sorted};
 
 /// In the order of [`super::UPDATE_SHARES`].
@@ -24,70 +21,6 @@ const UPDATE_METRICS: [&str; 4] = [
     "update_ms_10_percent",
     "update_ms_100_percent",
 ];
-
-/// The scene of a cell.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
-#[cfg_attr(test, derive(schemars::JsonSchema))]
-pub struct SceneInfo {
-    pub name: String,
-    pub total_count: usize,
-    pub region_count: usize,
-    pub origin: [f64; 3],
-    pub bounds_min: [f64; 3],
-    pub bounds_max: [f64; 3],
-    pub skipped_items: usize,
-    /// SHA-256 over origin and item bounds.
-    pub digest: String,
-}
-
-impl SceneInfo {
-    pub fn of(scene: &Scene) -> SceneInfo {
-        let bounds = scene.world_bounds();
-        SceneInfo {
-            name: scene.name.clone(),
-            total_count: scene.items.len(),
-            region_count: scene.regions.boxes(&scene.items).len(),
-            origin: scene.origin.to_array(),
-            bounds_min: bounds.min.to_array(),
-            bounds_max: bounds.max.to_array(),
-            skipped_items: scene.skipped_items,
-            digest: scene.digest(),
-        }
-    }
-}
-
-/// The queries of a cell.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
-#[cfg_attr(test, derive(schemars::JsonSchema))]
-pub struct PathInfo {
-    pub name: String,
-    pub camera_count: usize,
-    /// "warm" or "cold".
-    pub cache: String,
-    /// Where the planes come from, and the factor c of their epsilon.
-    pub planes: String,
-    pub epsilon: f64,
-    /// The numbers that the culling test is carried out in.
-    pub arithmetic: String,
-    /// SHA-256 over the cameras' frames and lenses; null in older reports.
-    #[serde(default)]
-    pub digest: Option<String>,
-}
-
-impl PathInfo {
-    pub fn of(path: &str, workload: &Workload, cold: bool) -> PathInfo {
-        let culling = &workload.culling;
-        PathInfo {
-            name: path.to_owned(),
-            camera_count: workload.cameras.len(),
-            cache: if cold { "cold" } else { "warm" }.to_owned(),
-            planes: culling.planes.method.name().to_owned(),
-            epsilon: culling.planes.epsilon,
-            arithmetic: culling.arithmetic.name().to_owned(),
-            digest: Some(path::digest(&workload.cameras)),
-        }
-    }
-}
 
 /// One structure on one scene and path.
 #[derive(Clone, PartialEq, Debug)]

@@ -16,19 +16,21 @@ mod count;
 mod environment;
 mod metrics;
 mod orders;
+mod question;
 mod timing;
 mod workload;
 
 use serde::{Deserialize, Serialize};
 
 pub use bounds::{BOUNDS, Bound, Material};
-pub use cell::{Cell, Group, PathInfo, SceneInfo, TwinRatio, measure_group, paired_ratio};
+pub use cell::{Cell, Group, TwinRatio, measure_group, paired_ratio};
 pub use clock::{Lap, Stopwatch};
 pub use competitor::{Ask, AskMany, Competitor, Task};
 pub use contender::{Built, Contender, UPDATE_SHARES, guarded, move_share};
 pub use count::{Counted, FrameCount, Judged, LocateCount, count_pass, id_sum, judge};
 pub use environment::{Machine, Source, Toolchain};
 pub use metrics::{METRICS, Metric, MetricInfo};
+pub use question::{PathInfo, SceneInfo};
 pub use timing::{Protocol, Sample, Timed, harness_overhead_ns, timed_rounds};
 pub use workload::{Workload, WorkloadError};
 
