@@ -63,6 +63,7 @@ pub fn main() -> ExitCode {
         Command::Stress(args) => stress::stress(&args),
         Command::Scene(SceneCommand::Info(args)) => scene::info(&args),
         Command::Scene(SceneCommand::Generate(args)) => scene::generate(&args),
+        Command::Scene(SceneCommand::Convert(args)) => scene::convert(&args),
         Command::Env(args) => env::env(&args),
         Command::Completions { shell } => completions(shell),
         Command::Man => man(),
