@@ -2,9 +2,10 @@
 //! command. It owns exit codes, progress and tables, and no arithmetic.
 //!
 //! Exit codes: 0 ok; 1 a wrong answer or a failed verification; 2 usage or bad
-//! input; 130 interrupted.
+//! input; 3 a regression, in `compare`; 130 interrupted.
 
 mod args;
+mod compare;
 mod compare_structures;
 mod document;
 mod drift;
@@ -44,6 +45,8 @@ pub enum Ending {
     Ok,
     /// A structure answered wrongly: exit code 1.
     WrongAnswer,
+    /// Slower than before, or no answer any more: exit code 3.
+    Regression,
     /// Stopped by Ctrl-C: exit code 130.
     Interrupted,
 }
@@ -55,6 +58,7 @@ pub fn main() -> ExitCode {
         Command::List(args) => list::list(&args),
         Command::Run(args) => run::run(&args),
         Command::Report(args) => report::report(&args),
+        Command::Compare(args) => compare::compare(&args),
         Command::Query(args) => query::query(&args),
         Command::Locate(args) => locate::locate(&args),
         Command::Verify(args) => verify::verify(&args),
@@ -71,6 +75,7 @@ pub fn main() -> ExitCode {
     match ended {
         Ok(Ending::Ok) => ExitCode::SUCCESS,
         Ok(Ending::WrongAnswer) => ExitCode::from(1),
+        Ok(Ending::Regression) => ExitCode::from(3),
         Ok(Ending::Interrupted) => ExitCode::from(130),
         // Nobody reads on: not our failure.
         Err(error) if error.chain().any(is_broken_pipe) => ExitCode::SUCCESS,

@@ -5,6 +5,7 @@
 #![cfg(feature = "cli")]
 
 mod bad_input;
+mod compare;
 mod converting;
 mod cullings;
 mod drift;
