@@ -132,6 +132,23 @@ mod tests {
     }
 
     #[test]
+    fn another_origin_is_taken_once() {
+        let b = |low: f64, high: f64| WorldBox::new(DVec3::splat(low), DVec3::splat(high));
+        // A map's own zero, far away.
+        let far = [b(1e7 + 0.1, 1e7 + 1.7), b(1e7 + 3.3, 1e7 + 3.3)];
+        let map = Scene::about("map", &far, DVec3::ZERO).unwrap();
+        let read = there_and_back(map.clone());
+        assert!(read.origin.x > 9e6 && holds(&read, &map));
+        // Rounded outward, these are a power of two wide.
+        for shift in 0..64 {
+            let low = 1e7 + 0.3 + 16.0 * f64::from(shift);
+            let wide = [b(low, low + 1.0), b(low + 5.0, low + 1_023.999_99)];
+            let scene = Scene::from_boxes("wide", &wide).unwrap();
+            assert!(holds(&there_and_back(scene.clone()), &scene), "{shift}");
+        }
+    }
+
+    #[test]
     fn what_the_reader_does_not_take_is_refused() {
         let scene = load("uniform:n=3,offset=1e39", &LoadOptions::default()).unwrap();
         let error = scene.settled().unwrap_err().to_string();
