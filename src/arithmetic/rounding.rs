@@ -48,6 +48,19 @@ pub fn difference_up(a: f64, b: f64) -> f32 {
     }
 }
 
+/// `a + b` rounded down to f64, true to the exact sum.
+pub fn sum_down(a: f64, b: f64) -> f64 {
+    // Not -sum_up(-a, -b): that would turn a zero into -0.
+    let (sum, lost) = two_sum(a, b);
+    if lost < 0.0 { sum.next_down() } else { sum }
+}
+
+/// `a + b` rounded up to f64, true to the exact sum.
+pub fn sum_up(a: f64, b: f64) -> f64 {
+    let (sum, lost) = two_sum(a, b);
+    if lost > 0.0 { sum.next_up() } else { sum }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -61,6 +74,15 @@ mod tests {
         assert!(difference_down(a, b) < 1.0);
         assert_eq!(difference_up(a, b), 1.0);
         assert!(difference_up(a, -b) > 1.0);
+    }
+
+    #[test]
+    fn a_sum_moves_outward_only_where_f64_cannot_hold_it() {
+        let (a, b) = (2f64.powi(30), 2f64.powi(-60));
+        assert_eq!((sum_down(a, b), sum_up(a, b)), (a, a.next_up()));
+        assert_eq!((sum_down(a, -b), sum_up(a, -b)), (a.next_down(), a));
+        assert_eq!((sum_down(a, 0.5), sum_up(a, 0.5)), (a + 0.5, a + 0.5));
+        assert!(sum_down(a, -a).is_sign_positive());
     }
 
     proptest! {

@@ -25,9 +25,11 @@ Examples:
   cullbench run --scene my.csv --path my_cameras.csv   your scene, your cameras
   cullbench query --scene city:n=100000 --cameras orbit:frames=8 --structure all
   cullbench locate --scene freedm-map12 --points points.csv --structure bvh
+  cullbench compare old/report.json new/report.json    what has become slower since
 
 Scenes and paths are files or specs such as city:n=100000,seed=7; `cullbench list` names them all.
-Exit codes: 0 ok, 1 a wrong answer or failed verification, 2 usage or bad input, 130 interrupted.";
+Exit codes: 0 ok, 1 a wrong answer or failed verification, 2 usage or bad input,
+3 a regression (compare), 130 interrupted.";
 
 #[derive(Subcommand, Debug)]
 pub enum Command {
@@ -37,6 +39,8 @@ pub enum Command {
     Run(RunArgs),
     /// Show what a run found: ranked tables, bounds, crossovers, growth
     Report(ReportArgs),
+    /// Hold a run against an older one: what has become slower, faster or wrong
+    Compare(CompareArgs),
     /// Answer frustum queries: what each structure sees from each camera
     Query(QueryArgs),
     /// Answer region searches: which regions hold each point
@@ -51,7 +55,7 @@ pub enum Command {
     Drift(DriftArgs),
     /// Replay test vectors and generated extremes, each with its declared outcome
     Stress(StressArgs),
-    /// Look at or generate scenes
+    /// Look at, generate or convert scenes
     #[command(subcommand)]
     Scene(SceneCommand),
     /// Show the machine, toolchain and source that reports record
@@ -147,6 +151,43 @@ pub struct ReportArgs {
     /// Write one self-contained page with the tables and charts
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
+}
+
+const COMPARE_HELP: &str = "\
+Examples:
+  cullbench compare results/before results/after
+  cullbench compare old.json new.json --threshold 10% --metric query_ns,build_ms
+  cullbench compare ours.json theirs.json --metric times_read    another machine
+
+A figure counts as changed beyond the threshold or the larger noise floor of the two runs,
+whichever is more. What was not asked the same question is listed and not judged by its time.
+Exit codes: 0 no regression, 1 a wrong answer in NEW, 2 usage or bad input, 3 slower or lost.";
+
+#[derive(Args, Debug)]
+#[command(after_help = COMPARE_HELP)]
+pub struct CompareArgs {
+    /// report.json of the older run, or the folder it is in
+    #[arg(value_name = "OLD.json")]
+    pub old: PathBuf,
+    /// report.json of the newer run, or the folder it is in
+    #[arg(value_name = "NEW.json")]
+    pub new: PathBuf,
+    /// Smaller changes are ties, such as 5% or 0.05
+    #[arg(
+        long,
+        value_name = "SHARE",
+        default_value = "5%",
+        allow_hyphen_values = true
+    )]
+    pub threshold: String,
+    /// The metrics to judge by, e.g. query_ns,build_ms; may be repeated
+    #[arg(long, value_name = "LIST", default_value = "query_ns")]
+    pub metric: Vec<String>,
+    /// Show ties as well
+    #[arg(long)]
+    pub all: bool,
+    #[arg(long, value_enum, default_value = "table")]
+    pub format: TableFormat,
 }
 
 #[derive(Args, Debug)]
@@ -386,6 +427,8 @@ pub enum SceneCommand {
     Info(SceneInfoArgs),
     /// Write a scene as boxes CSV
     Generate(SceneGenerateArgs),
+    /// Write any scene as a file that every command reads
+    Convert(SceneConvertArgs),
 }
 
 #[derive(Args, Debug)]
@@ -407,6 +450,41 @@ pub struct SceneGenerateArgs {
     /// The file to write [default: standard output]
     #[arg(long, short, value_name = "FILE")]
     pub out: Option<PathBuf>,
+    #[command(flatten)]
+    pub scene_args: SceneArgs,
+}
+
+/// What a scene can be converted to.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum, Debug)]
+pub enum SceneFormat {
+    Csv,
+}
+
+const CONVERT_HELP: &str = "\
+Examples:
+  cullbench scene convert maps.wad#MAP07 --out map07.csv
+  cullbench scene convert helsinki city.csv
+  cullbench scene convert city:n=1000 | head
+
+Boxes CSV is in world coordinates, in the order of the ids and with all labels; it is read back
+with the same items, and converting it again gives the same bytes. Regions, camera places and a
+map's own tree stay behind.";
+
+#[derive(Args, Debug)]
+#[command(after_help = CONVERT_HELP)]
+pub struct SceneConvertArgs {
+    /// A scene: boxes CSV, Doom WAD, built-in name or spec
+    #[arg(value_name = "INPUT")]
+    pub scene: String,
+    /// The file to write [default: standard output]
+    #[arg(value_name = "OUTPUT")]
+    pub output: Option<PathBuf>,
+    /// The same
+    #[arg(long, short, value_name = "FILE", conflicts_with = "output")]
+    pub out: Option<PathBuf>,
+    /// The format [default: by the extension]
+    #[arg(long, value_enum)]
+    pub to: Option<SceneFormat>,
     #[command(flatten)]
     pub scene_args: SceneArgs,
 }

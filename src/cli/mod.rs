@@ -2,10 +2,11 @@
 //! command. It owns exit codes, progress and tables, and no arithmetic.
 //!
 //! Exit codes: 0 ok; 1 a wrong answer or a failed verification; 2 usage or bad
-//! input; 130 interrupted.
+//! input; 3 a regression, in `compare`; 130 interrupted.
 
 mod advise;
 mod args;
+mod compare;
 mod compare_structures;
 mod document;
 mod drift;
@@ -45,6 +46,8 @@ pub enum Ending {
     Ok,
     /// A structure answered wrongly: exit code 1.
     WrongAnswer,
+    /// Slower than before, or no answer any more: exit code 3.
+    Regression,
     /// Stopped by Ctrl-C: exit code 130.
     Interrupted,
 }
@@ -56,6 +59,7 @@ pub fn main() -> ExitCode {
         Command::List(args) => list::list(&args),
         Command::Run(args) => run::run(&args),
         Command::Report(args) => report::report(&args),
+        Command::Compare(args) => compare::compare(&args),
         Command::Query(args) => query::query(&args),
         Command::Locate(args) => locate::locate(&args),
         Command::Verify(args) => verify::verify(&args),
@@ -65,6 +69,7 @@ pub fn main() -> ExitCode {
         Command::Stress(args) => stress::stress(&args),
         Command::Scene(SceneCommand::Info(args)) => scene::info(&args),
         Command::Scene(SceneCommand::Generate(args)) => scene::generate(&args),
+        Command::Scene(SceneCommand::Convert(args)) => scene::convert(&args),
         Command::Env(args) => env::env(&args),
         Command::Completions { shell } => completions(shell),
         Command::Man => man(),
@@ -72,6 +77,7 @@ pub fn main() -> ExitCode {
     match ended {
         Ok(Ending::Ok) => ExitCode::SUCCESS,
         Ok(Ending::WrongAnswer) => ExitCode::from(1),
+        Ok(Ending::Regression) => ExitCode::from(3),
         Ok(Ending::Interrupted) => ExitCode::from(130),
         // Nobody reads on: not our failure.
         Err(error) if error.chain().any(is_broken_pipe) => ExitCode::SUCCESS,

@@ -1,14 +1,17 @@
-//! `cullbench scene`: looking at scenes and writing generated ones.
+//! `cullbench scene`: looking at scenes, and writing generated ones and those
+//! of other formats as boxes.
 
 use std::io::{self, BufWriter, Write};
+use std::path::Path;
 
 use serde_json::json;
 
-use super::args::{SceneGenerateArgs, SceneInfoArgs, TableFormat};
+use super::args::{SceneConvertArgs, SceneFormat, SceneGenerateArgs, SceneInfoArgs, TableFormat};
 use super::{Ending, interrupt, load_scene, tell, text};
 use cullbench::measure::SceneInfo;
 use cullbench::report::write_atomically;
 use cullbench::scene::{Regions, Scene, write_boxes_csv};
+use cullbench::spec::SpecError;
 use cullbench::statistics::{quantile, sorted};
 
 pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
@@ -77,7 +80,7 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
         let mut shown: Vec<String> = counts
             .iter()
             .take(8)
-            .map(|(label, count)| format!("{} {}", plain(label), text::count(*count)))
+            .map(|(label, count)| format!("{} {}", text::plain(label), text::count(*count)))
             .collect();
         if counts.len() > shown.len() {
             shown.push(format!(
@@ -85,16 +88,14 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
                 text::count(counts.len() - shown.len())
             ));
         }
-        table.add_row([format!("label {}", plain(&labels.column)), shown.join(", ")]);
+        table.add_row([
+            format!("label {}", text::plain(&labels.column)),
+            shown.join(", "),
+        ]);
     }
     table.add_row(["digest (SHA-256)", &info.digest]);
     writeln!(out, "{table}")?;
     Ok(Ending::Ok)
-}
-
-/// Text of a file as a terminal may have it: no control characters.
-fn plain(text: &str) -> String {
-    text.replace(char::is_control, " ")
 }
 
 /// Smallest, median and largest longest edge of the items.
@@ -109,7 +110,63 @@ fn sizes(scene: &Scene) -> [Option<f64>; 3] {
 
 pub fn generate(args: &SceneGenerateArgs) -> anyhow::Result<Ending> {
     let scene = load_scene(&args.scene, &args.scene_args)?;
-    match &args.out {
+    write(scene.settled()?, args.out.as_deref())
+}
+
+pub fn convert(args: &SceneConvertArgs) -> anyhow::Result<Ending> {
+    let out = args.output.as_deref().or(args.out.as_deref());
+    let SceneFormat::Csv = args.to.map_or_else(|| format_of(out), Ok)?;
+    let scene = load_scene(&args.scene, &args.scene_args)?;
+    let (origin, lost) = (scene.origin, left_behind(&scene));
+    let kept = scene.settled()?;
+    if !lost.is_empty() {
+        tell(&format!(
+            "note: {} left behind; boxes CSV holds boxes and labels",
+            lost.join(", ")
+        ));
+    }
+    if kept.origin != origin {
+        tell(&format!(
+            "note: it will be read back about {}, not about {origin}",
+            kept.origin
+        ));
+    }
+    write(kept, out)
+}
+
+/// By the extension; what has none (a pipe, a terminal) gets boxes as well.
+fn format_of(out: Option<&Path>) -> Result<SceneFormat, SpecError> {
+    match out.and_then(Path::extension) {
+        Some(extension) if !extension.eq_ignore_ascii_case("csv") => {
+            Err(SpecError::new(format_args!(
+                "{}: a scene cannot be written as '.{}'; expected .csv, or --to csv",
+                out.unwrap_or(Path::new("")).display(),
+                extension.display()
+            )))
+        }
+        _ => Ok(SceneFormat::Csv),
+    }
+}
+
+/// What is in a scene and cannot be in a boxes file.
+fn left_behind(scene: &Scene) -> Vec<String> {
+    let mut lost = Vec::new();
+    if !matches!(scene.regions, Regions::Items) {
+        let count = scene.regions.boxes(&scene.items).len();
+        lost.push(format!("{} regions", text::count(count)));
+    }
+    if !scene.places.is_empty() {
+        let count = scene.places.len();
+        lost.push(format!("{} camera places", text::count(count)));
+    }
+    if scene.own_tree.is_some() {
+        lost.push("the map's own tree".to_owned());
+    }
+    lost
+}
+
+fn write(scene: Scene, out: Option<&Path>) -> anyhow::Result<Ending> {
+    match out {
         Some(path) => {
             interrupt::from_now_on_finish();
             let written =

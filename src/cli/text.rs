@@ -75,6 +75,11 @@ pub fn count(value: usize) -> String {
     grouped
 }
 
+/// Text of a file as a terminal may have it: no control characters.
+pub fn plain(text: &str) -> String {
+    text.replace(char::is_control, " ")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -4,7 +4,7 @@
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-use crate::arithmetic::rounding::{difference_down, difference_up};
+use crate::arithmetic::rounding::{difference_down, difference_up, sum_down, sum_up};
 
 /// A closed axis-aligned box `[min, max]` in scene-local f32 coordinates.
 ///
@@ -44,6 +44,18 @@ impl Aabb {
         Aabb::new(
             Vec3::new(down(0), down(1), down(2)),
             Vec3::new(up(0), up(1), up(2)),
+        )
+    }
+
+    /// Both corners in the world, where `origin` is the box's zero: rounded
+    /// outward too, in the rare case that f64 cannot hold the sum.
+    pub fn in_world(&self, origin: DVec3) -> (DVec3, DVec3) {
+        let (min, max) = (self.min.as_dvec3(), self.max.as_dvec3());
+        let down = |axis: usize| sum_down(origin[axis], min[axis]);
+        let up = |axis: usize| sum_up(origin[axis], max[axis]);
+        (
+            DVec3::new(down(0), down(1), down(2)),
+            DVec3::new(up(0), up(1), up(2)),
         )
     }
 

@@ -92,7 +92,8 @@ pub fn read_boxes_csv(
 }
 
 /// Writes a scene's boxes in world coordinates, with its labels as further
-/// columns. Numbers are written so that reading them back gives the same f64.
+/// columns. Numbers are written so that reading them back gives the same f64;
+/// [`Scene::settled`] makes a scene what is then read.
 pub fn write_boxes_csv(scene: &Scene, output: impl Write) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(output);
     let labels = scene.labels.iter().map(|l| l.column.as_str());
@@ -100,10 +101,9 @@ pub fn write_boxes_csv(scene: &Scene, output: impl Write) -> io::Result<()> {
     let mut record = csv::ByteRecord::new();
     for (item, b) in scene.items.iter().enumerate() {
         record.clear();
-        for corner in [b.min, b.max] {
-            for value in (scene.origin + corner.as_dvec3()).to_array() {
-                record.push_field(value.to_string().as_bytes());
-            }
+        let (min, max) = b.in_world(scene.origin);
+        for value in min.to_array().into_iter().chain(max.to_array()) {
+            record.push_field(value.to_string().as_bytes());
         }
         for label in &scene.labels {
             record.push_field(label.get(item).as_bytes());

@@ -12,6 +12,7 @@ mod labels;
 mod regions;
 mod rooms;
 mod samples;
+mod settled;
 mod source;
 mod uniform;
 mod wad;
@@ -162,10 +163,7 @@ pub(crate) fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 
-/// Zero on every axis where moving the boxes would gain less than two bits:
-/// their coordinates then stay as written and exact ties stay ties. Otherwise
-/// the centre, rounded to a power of two near the width, so that round
-/// coordinates stay round.
+/// The origin that suits the boxes, by the finite ones.
 fn choose_origin(boxes: &[WorldBox]) -> DVec3 {
     let finite = boxes
         .iter()
@@ -173,6 +171,14 @@ fn choose_origin(boxes: &[WorldBox]) -> DVec3 {
     let (low, high) = finite.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), b| {
         (low.min(b.min), high.max(b.max))
     });
+    origin_between(low, high)
+}
+
+/// Zero on every axis where moving the boxes would gain less than two bits:
+/// their coordinates then stay as written and exact ties stay ties. Otherwise
+/// the centre, rounded to a power of two near the width, so that round
+/// coordinates stay round.
+fn origin_between(low: DVec3, high: DVec3) -> DVec3 {
     let axis = |k: usize| {
         let (width, centre) = (high[k] - low[k], low[k] / 2.0 + high[k] / 2.0);
         // An empty scene's width is -inf and its centre NaN.

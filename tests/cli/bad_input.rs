@@ -7,7 +7,7 @@ use super::process::*;
 use super::{BOXES, FULL_CAMERA};
 
 /// Every command that reads a scene.
-fn commands_with_scene(scene: &str) -> [String; 8] {
+fn commands_with_scene(scene: &str) -> [String; 10] {
     [
         format!("query --scene {scene} --cameras cameras.csv"),
         format!("locate --scene {scene} --points points.csv"),
@@ -16,6 +16,8 @@ fn commands_with_scene(scene: &str) -> [String; 8] {
         format!("scene generate {scene}"),
         format!("scene generate {scene} --out new.csv"),
         format!("scene generate {scene} --out kept.csv"),
+        format!("scene convert {scene}"),
+        format!("scene convert {scene} kept.csv"),
         format!("run --scene {scene} --path orbit:frames=4 --out new/run"),
     ]
 }

@@ -110,7 +110,7 @@ fn every_command_has_help() {
     let here = Path::new(".");
     let top = works(here, "--help");
     let commands = commands_of(&top);
-    for name in set("run query locate verify drift list scene env completions man") {
+    for name in set("run compare query locate verify drift list scene env completions man") {
         assert!(commands.contains(&name), "{name}: {commands:?}");
     }
     for command in commands {

@@ -6,6 +6,8 @@
 
 mod advise;
 mod bad_input;
+mod compare;
+mod converting;
 mod cullings;
 mod drift;
 mod kernels;

@@ -59,7 +59,10 @@ fn a_reader_who_leaves_early_is_no_error() {
         "verify --scene scene.csv --path orbit:frames=2 --format json",
         "scene info scene.csv",
         "scene generate uniform:n=20000",
+        "scene convert uniform:n=20000",
         "run --scene uniform:n=50 --scene city:n=50 --path orbit:frames=8 --out run",
+        "compare run run",
+        "compare run run --format json",
     ];
     for line in commands {
         let done = cut_off(folder.path(), line, 0);

@@ -1,0 +1,115 @@
+//! `scene convert`: the same answers from the file as from what it was made of,
+//! the same bytes the second time, and outputs it does not know.
+
+use std::fs;
+use std::path::Path;
+
+use super::BOXES;
+use super::process::*;
+
+/// Converts and lets nothing but notes be said; the bytes of the file.
+fn convert(folder: &Path, line: &str, file: &str) -> (String, String) {
+    let done = cullbench(folder, &format!("scene convert {line}"));
+    assert_eq!(
+        (done.code, done.out.as_str()),
+        (Some(0), ""),
+        "{line}: {done:?}"
+    );
+    let text = fs::read_to_string(folder.join(file)).expect("written");
+    (text, done.err)
+}
+
+/// What is seen, by both columns that tell answers apart.
+fn seen(folder: &Path, scene: &str) -> Vec<[String; 3]> {
+    let line = format!("query --scene {scene} --cameras cameras.csv --structure linear,bvh");
+    let rows = rows(&works(folder, &line));
+    let columns = ["total_count", "visible_count", "visible_id_sum"];
+    rows.iter()
+        .map(|row| columns.map(|c| row[c].clone()))
+        .collect()
+}
+
+#[test]
+fn a_converted_scene_gives_the_same_answers_and_the_same_bytes_again() {
+    let far = "kind,min_x,min_y,min_z,max_x,max_y,max_z,note\n\
+         hut,500000.1,6700000.7,-0.3,500012.4,6700009.9,8.25,\"a, b\"\n\
+         ,500100.01,6700200.02,0,500100.01,6700300.3,0.1,\n\
+         tower,499990.5,6699999.125,1e-7,500000.5,6700009.3,90.75,\"x\ny\"\n";
+    let cameras = "eye_x,eye_y,eye_z,look_x,look_y,look_z,near,far\n\
+        499900,6699900,50,500050,6700150,5,1,5000\n\
+        500,500,500,0,0,0,1,5000\n\
+        1000,-4000,200,1000,-3000,0,1,9000\n\
+        24.94,60.17,400,300,300,0,1,9000\n\
+        -98,20,30,-98,40,0,0.1,300\n";
+    let map = map12();
+    let folder = folder(&[
+        ("far.csv", far.as_bytes()),
+        ("cameras.csv", cameras.as_bytes()),
+        ("map.wad", &map),
+    ]);
+    let sources = "far.csv map.wad map.wad#MAP12 helsinki us-counties rooms:n=300 \
+        uniform:n=300,offset=1e6 city:n=300,seed=9";
+    let mut counts = Vec::new();
+    for source in sources.split_whitespace() {
+        let (once, told) = convert(folder.path(), &format!("{source} --out one.csv"), "one.csv");
+        assert!(told.contains("one.csv: "), "{told}");
+        let is_plain = !source.contains("wad") && !source.contains("rooms");
+        assert_eq!(told.starts_with("note: "), !is_plain, "{source}: {told}");
+        let (twice, _) = convert(folder.path(), "one.csv two.csv", "two.csv");
+        assert!(once == twice, "{source}");
+        let from_source = seen(folder.path(), source);
+        assert_eq!(from_source, seen(folder.path(), "one.csv"), "{source}");
+        counts.extend(from_source.into_iter().map(|row| row[1].clone()));
+        // To a terminal, and from `generate`: the same.
+        let printed = cullbench(folder.path(), &format!("scene convert {source}"));
+        assert_eq!((printed.code, printed.out), (Some(0), once));
+    }
+    assert!(counts.iter().any(|count| count != "0"), "nothing is seen");
+    let (text, _) = convert(folder.path(), "far.csv one.csv", "one.csv");
+    assert!(text.starts_with(&format!("{BOXES},kind,note\n")), "{text}");
+    assert_eq!(text.matches("hut,\"a, b\"\n").count(), 1, "{text}");
+    assert!(text.ends_with(",tower,\"x\ny\"\n"), "{text}");
+}
+
+#[test]
+fn a_scene_can_be_converted_onto_itself() {
+    let text = format!("{BOXES},kind\n0.5,1,2,3,4,5,a\n7,7,7,8,8,8.25,b\n");
+    let folder = folder(&[("s.csv", text.as_bytes())]);
+    let (again, _) = convert(folder.path(), "s.csv s.csv", "s.csv");
+    assert_eq!(again, text);
+    let (other, _) = convert(folder.path(), "s.csv -o S.CSV", "S.CSV");
+    assert_eq!(other, text);
+    // No extension, and one that the format is named for.
+    convert(folder.path(), "s.csv boxes", "boxes");
+    convert(folder.path(), "s.csv boxes.txt --to csv", "boxes.txt");
+}
+
+#[test]
+fn what_cannot_be_converted_leaves_no_trace() {
+    let folder = with_good_files(&[("bad.csv", b"a,b\n1,2\n"), ("half.wad", b"PWAD\x01")]);
+    let into_wad = "map.wad: a scene cannot be written as '.wad' | expected .csv";
+    let beyond = "item 0 | beyond | 3.4 | expected";
+    for (line, wanted) in [
+        ("scene.csv map.wad", into_wad),
+        ("scene.csv --out map.wad", into_wad),
+        (
+            "missing.csv new.json",
+            "new.json: a scene cannot be written as '.json'",
+        ),
+        ("missing.csv new.csv", "missing.csv: No such file"),
+        ("bad.csv kept.csv", "bad.csv, line 1 | no column 'min_x'"),
+        ("half.wad kept.csv", "half.wad"),
+        ("unifrom kept.csv", "did you mean 'uniform'"),
+        ("scene.csv no/where.csv", "no/where.csv: No such file"),
+        ("scene.csv folder.csv", "folder.csv: Is a directory"),
+        ("uniform:n=2,offset=1e39 new.csv", beyond),
+    ] {
+        all_refused(&folder, &[format!("scene convert {line}")], wanted);
+    }
+    let generate = "scene generate uniform:n=2,offset=1e39";
+    all_refused(&folder, &[generate], beyond);
+    // clap's own: one place to write to.
+    let both = cullbench(folder.path(), "scene convert scene.csv a.csv --out b.csv");
+    assert_eq!((both.code, both.out.as_str()), (Some(2), ""));
+    assert!(both.err.contains("cannot be used with"), "{}", both.err);
+}
