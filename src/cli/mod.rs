@@ -23,6 +23,7 @@ mod run_plan;
 mod run_resume;
 mod run_table;
 mod scene;
+mod scene_args;
 mod shared_args;
 mod stress;
 mod surface_diagram;
@@ -37,7 +38,8 @@ use std::process::ExitCode;
 use clap::{CommandFactory, Parser};
 use cullbench::scene::{LoadOptions, Scene};
 
-use args::{Cli, Command, SceneCommand};
+use args::{Cli, Command};
+use scene_args::SceneCommand;
 use shared_args::SceneArgs;
 
 /// How a command ended that did not fail.

@@ -6,7 +6,8 @@ use std::path::Path;
 
 use serde_json::json;
 
-use super::args::{SceneConvertArgs, SceneFormat, SceneGenerateArgs, SceneInfoArgs, TableFormat};
+use super::args::TableFormat;
+use super::scene_args::{SceneConvertArgs, SceneFormat, SceneGenerateArgs, SceneInfoArgs};
 use super::{Ending, interrupt, load_scene, tell, text};
 use cullbench::measure::SceneInfo;
 use cullbench::report::write_atomically;

@@ -1,0 +1,77 @@
+//! What can be typed behind `cullbench scene`. Values are checked where they are
+//! used, like those of all [commands](super::args).
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand, ValueEnum};
+
+use super::args::TableFormat;
+use super::shared_args::SceneArgs;
+
+#[derive(Subcommand, Debug)]
+pub enum SceneCommand {
+    /// Show what is in a scene
+    Info(SceneInfoArgs),
+    /// Write a scene as boxes CSV
+    Generate(SceneGenerateArgs),
+    /// Write any scene as a file that every command reads
+    Convert(SceneConvertArgs),
+}
+
+#[derive(Args, Debug)]
+pub struct SceneInfoArgs {
+    /// A scene: boxes CSV, Doom WAD, built-in name or spec
+    #[arg(value_name = "SCENE")]
+    pub scene: String,
+    #[arg(long, value_enum, default_value = "table")]
+    pub format: TableFormat,
+    #[command(flatten)]
+    pub scene_args: SceneArgs,
+}
+
+#[derive(Args, Debug)]
+pub struct SceneGenerateArgs {
+    /// A spec such as city:n=100000,seed=7, or any other scene
+    #[arg(value_name = "SCENE")]
+    pub scene: String,
+    /// The file to write [default: standard output]
+    #[arg(long, short, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    #[command(flatten)]
+    pub scene_args: SceneArgs,
+}
+
+/// What a scene can be converted to.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum, Debug)]
+pub enum SceneFormat {
+    Csv,
+}
+
+const CONVERT_HELP: &str = "\
+Examples:
+  cullbench scene convert maps.wad#MAP07 --out map07.csv
+  cullbench scene convert helsinki city.csv
+  cullbench scene convert city:n=1000 | head
+
+Boxes CSV is in world coordinates, in the order of the ids and with all labels; it is read back
+with the same items, and converting it again gives the same bytes. Regions, camera places and a
+map's own tree stay behind.";
+
+#[derive(Args, Debug)]
+#[command(after_help = CONVERT_HELP)]
+pub struct SceneConvertArgs {
+    /// A scene: boxes CSV, Doom WAD, built-in name or spec
+    #[arg(value_name = "INPUT")]
+    pub scene: String,
+    /// The file to write [default: standard output]
+    #[arg(value_name = "OUTPUT")]
+    pub output: Option<PathBuf>,
+    /// The same
+    #[arg(long, short, value_name = "FILE", conflicts_with = "output")]
+    pub out: Option<PathBuf>,
+    /// The format [default: by the extension]
+    #[arg(long, value_enum)]
+    pub to: Option<SceneFormat>,
+    #[command(flatten)]
+    pub scene_args: SceneArgs,
+}
