@@ -42,7 +42,7 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
         .compares(steps as f64 * DRIFT, tolerance * MUCH_LESS)
         .because(format!(
             "{steps} steps of {DRIFT:.0e}; walked: {} uncorrected at {:.0} ns a step, {} with a Newton step \
-             to the polar factor every 100 at {:.0} ns; within {tolerance:.0e} for some {:.0} steps",
+             to the polar factor every 100 at {:.0} ns; a tenth of {tolerance:.0e} is used up after some {:.0} steps",
             walked(left_out),
             left_out.ns_per_step,
             walked(kept),
