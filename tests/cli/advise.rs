@@ -26,16 +26,6 @@ fn small() -> &'static Value {
     OUTCOME.get_or_init(|| advice(Path::new("."), SMALL))
 }
 
-fn array<'a>(of: &'a Value, name: &str) -> &'a Vec<Value> {
-    of[name].as_array().expect(name)
-}
-
-fn number(of: &Value, name: &str) -> f64 {
-    of[name]
-        .as_f64()
-        .unwrap_or_else(|| panic!("{name} in {of}"))
-}
-
 fn rule<'a>(advice: &'a Value, name: &str) -> &'a Value {
     let mut rules = array(advice, "omissions").iter();
     rules.find(|o| o["rule"] == name).expect(name)

@@ -29,16 +29,6 @@ fn small() -> &'static Value {
     OUTCOME.get_or_init(|| json(&works(Path::new("."), SMALL)))
 }
 
-fn array<'a>(of: &'a Value, name: &str) -> &'a Vec<Value> {
-    of[name].as_array().expect(name)
-}
-
-fn number(of: &Value, name: &str) -> f64 {
-    of[name]
-        .as_f64()
-        .unwrap_or_else(|| panic!("{name} in {of}"))
-}
-
 /// What makes a culling: test, arithmetic, planes, epsilon.
 fn culling(point: &Value) -> String {
     let of = |name: &str| point[name].to_string();

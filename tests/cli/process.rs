@@ -117,6 +117,18 @@ pub fn json(text: &str) -> Value {
     serde_json::from_str(text).expect("JSON")
 }
 
+/// A field that is an array.
+pub fn array<'a>(of: &'a Value, name: &str) -> &'a Vec<Value> {
+    of[name].as_array().expect(name)
+}
+
+/// A field that is a number.
+pub fn number(of: &Value, name: &str) -> f64 {
+    of[name]
+        .as_f64()
+        .unwrap_or_else(|| panic!("{name} in {of}"))
+}
+
 pub fn keys(object: &Value) -> BTreeSet<&str> {
     let object = object.as_object().expect("an object");
     object.keys().map(String::as_str).collect()
