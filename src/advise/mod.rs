@@ -55,6 +55,8 @@ pub struct Advice {
     pub scene: String,
     pub path: String,
     pub items: usize,
+    /// Bad items that were left out on request.
+    pub skipped_items: usize,
     pub cameras: usize,
     pub options: AdviseOptions,
     /// How far apart a structure and its twin lie at most: smaller differences
@@ -152,6 +154,7 @@ pub fn advise(
         scene: scene.name.clone(),
         path: path.name.clone(),
         items: scene.items.len(),
+        skipped_items: scene.skipped_items,
         cameras: path.cameras.len(),
         options: *options,
         noise_floor,

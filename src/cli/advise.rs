@@ -176,7 +176,7 @@ fn show_advice(out: &mut impl Write, advice: &Advice) -> io::Result<()> {
         let of = advice.omissions.iter().filter(|o| o.decision == decision);
         let named: Vec<&str> = of.map(|omission| omission.left_out).collect();
         if !named.is_empty() {
-            writeln!(out, "  {}: {}", decision.name(), named.join("; "))?;
+            writeln!(out, "  {}:\n    {}", decision.name(), named.join("\n    "))?;
         }
     }
     Ok(())

@@ -26,6 +26,7 @@ Examples:
   cullbench run --scene my.csv --path my_cameras.csv   your scene, your cameras
   cullbench query --scene city:n=100000 --cameras orbit:frames=8 --structure all
   cullbench locate --scene freedm-map12 --points points.csv --structure bvh
+  cullbench advise --scene my.csv                      what your scene needs and what it can do without
   cullbench compare old/report.json new/report.json    what has become slower since
 
 Scenes and paths are files or specs such as city:n=100000,seed=7; `cullbench list` names them all.

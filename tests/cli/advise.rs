@@ -33,7 +33,7 @@ fn rule<'a>(advice: &'a Value, name: &str) -> &'a Value {
 
 #[test]
 fn json_has_the_documented_fields() {
-    let top = "scene path items cameras options noise_floor structure test omissions";
+    let top = "scene path items skipped_items cameras options noise_floor structure test omissions";
     let options = "draw_ns tolerance moved queries_per_update";
     let structure = "name ties region_search noise_floor rows";
     let times = "query_ns query_ns_lower query_ns_upper";
@@ -241,6 +241,22 @@ fn options_turn_the_decisions_that_are_theirs() {
 }
 
 #[test]
+fn bad_items_that_are_left_out_are_in_the_result() {
+    let scene = format!("{BOXES}\n0,0,0,1,1,1\n9,0,0,1,1,1\n5,0,0,6,1,1\n");
+    let folder = folder(&[("s.csv", scene.as_bytes())]);
+    let line = "advise --scene s.csv --path orbit:frames=2 --structure linear,wide";
+    all_refused(&folder, &[line], "s.csv");
+    let done = cullbench(
+        folder.path(),
+        &format!("{line} --skip-bad-items --format json"),
+    );
+    assert_eq!(done.code, Some(0), "{done:?}");
+    let advice = json(&done.out);
+    let counts = ["skipped_items", "items"].map(|name| number(&advice, name));
+    assert_eq!(counts, [1.0, 2.0]);
+}
+
+#[test]
 fn the_table_ends_with_the_advice() {
     let table = works(Path::new("."), SMALL);
     assert!(!table.contains('\u{1b}'), "{table}");
@@ -249,7 +265,7 @@ fn the_table_ends_with_the_advice() {
         "  structure: ",
         "  region search: ",
         "  test: ",
-        "  leave out: ",
+        "  leave out:\n    ",
     ] {
         assert!(advice.contains(part), "{part}: {advice}");
     }
