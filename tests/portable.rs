@@ -10,7 +10,7 @@ use cullbench::index::{
     BlockOrder, Bsp, Bvh, DynIndex, Foreseen, FrustumQuery, Linear, Octree, Quadtree, RegionIndex,
     Trace, TreeOrder, Wide, WideParams,
 };
-use cullbench::kernel::{BASELINE, Isa, LANES, Packer};
+use cullbench::kernel::{BASELINE, Isa, LANES, LaneMask, Pack};
 use cullbench::query::{AnyView, ItemId, Located, NoRecorder, View};
 use cullbench::verify::{RandomCase, edge_scenes, edge_volumes};
 use glam::Vec3;
@@ -179,6 +179,13 @@ fn scenes_at_the_edge_are_right() {
     }
 }
 
+fn packed<I: Isa>(isa: I, out: &mut Vec<u32>, words: usize, rows: &[([u32; LANES], LaneMask)]) {
+    let mut packer = I::Packer::onto(out, words);
+    for (row, lanes) in rows {
+        packer.push(isa, row, *lanes);
+    }
+}
+
 /// Rows and parts of rows into lists of all lengths: exactly the room that was
 /// asked for is used, with every mask that has one run of lanes.
 #[test]
@@ -186,13 +193,11 @@ fn rows_go_into_any_place() {
     let row: [u32; LANES] = std::array::from_fn(|lane| 100 + lane as u32);
     for before in 0..=LANES {
         for (from, to) in (0..=LANES).flat_map(|to| (0..=to).map(move |from| (from, to))) {
-            let lanes = ((1_u32 << to) - (1_u32 << from)) as u16;
+            let lanes = ((1_u32 << to) - (1_u32 << from)) as LaneMask;
             let mut wanted: Vec<u32> = [&vec![7; before], &row[from..to], &row].concat();
             let mut out = vec![7; before];
-            let mut packer = Packer::onto(&mut out, LANES + to - from);
-            packer.push(BASELINE, &row, lanes);
-            packer.push(BASELINE, &row, u16::MAX);
-            drop(packer);
+            let rows = [(row, lanes), (row, LaneMask::MAX)];
+            packed(BASELINE, &mut out, LANES + to - from, &rows);
             assert_eq!(out, wanted);
             BASELINE.append(&mut out, &row, lanes);
             wanted.extend_from_slice(&row[from..to]);

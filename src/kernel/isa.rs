@@ -1,6 +1,6 @@
 //! Sixteen lanes at a time: the few vector operations that the block kernels
-//! are written in, and the instruction set that has them as plain arrays. Which
-//! one runs is chosen next door; what the lanes mean is the callers' business.
+//! are written in. Who has them and which one runs is chosen next door; what the
+//! lanes mean is the callers' business.
 
 /// Lanes of a vector: the boxes of one block.
 pub const LANES: usize = 16;
@@ -23,6 +23,8 @@ pub trait Isa: Copy {
     type Words: Copy;
     /// Some of sixteen lanes, as comparisons leave them.
     type Kept: Copy;
+    /// Appends row after row.
+    type Packer<'a>: Pack<'a, Self>;
 
     /// Does the piece in a function of its own, compiled for these instructions:
     /// a loop that is to keep its numbers in registers needs one.
@@ -71,30 +73,9 @@ pub trait Isa: Copy {
     fn equal(self, words: Self::Words, x: u32) -> LaneMask;
     /// Moves the words of `lanes` together, lowest first, to the start of
     /// `place`; what the rest of it holds is nobody's business.
-    #[inline(always)]
-    fn pack(self, place: &mut [u32; LANES], words: Self::Words, lanes: LaneMask) {
-        // SAFETY: sixteen words may be written.
-        unsafe { self.pack_to(place.as_mut_ptr(), words, lanes) };
-    }
-    /// [`Isa::pack`] to memory that may not have been written yet.
-    ///
-    /// # Safety
-    /// `place` is valid for writes of [`LANES`] words. As many words as there
-    /// are lanes are written for certain, the others may be.
-    unsafe fn pack_to(self, place: *mut u32, words: Self::Words, lanes: LaneMask);
-
+    fn pack(self, place: &mut [u32; LANES], words: Self::Words, lanes: LaneMask);
     /// Appends the words of `lanes`, lowest first.
-    #[inline(always)]
-    fn append(self, out: &mut Vec<u32>, row: &[u32; LANES], lanes: LaneMask) {
-        // Room first: a register would not outlive the call that makes it.
-        out.reserve(LANES);
-        let end = out.spare_capacity_mut().as_mut_ptr().cast();
-        // SAFETY: there is room for sixteen words; so many are written.
-        unsafe {
-            self.pack_to(end, self.words(row), lanes);
-            out.set_len(out.len() + lanes.count_ones() as usize);
-        }
-    }
+    fn append(self, out: &mut Vec<u32>, row: &[u32; LANES], lanes: LaneMask);
 }
 
 /// A piece of a larger work: what [`Isa::apart`] does.
@@ -106,181 +87,25 @@ pub trait Piece<I: Isa> {
 }
 
 /// Appends rows and some lanes of rows to a list that has room for all of them
-/// from the start, so that nothing is asked in between.
-pub struct Packer<'a> {
-    out: &'a mut Vec<u32>,
-    /// Where the next word goes; `room` words fit from there.
-    end: *mut u32,
-    room: usize,
-    added: usize,
-}
-
-impl<'a> Packer<'a> {
+/// from the start, so that nothing is asked in between. The list is as long as
+/// it should be once the packer is dropped.
+pub trait Pack<'a, I: Isa> {
     /// Room for so many words, and for the rest of a row behind them.
-    #[inline(always)]
-    pub fn onto(out: &'a mut Vec<u32>, words: usize) -> Self {
-        let room = words + LANES;
-        out.reserve(room);
-        Packer {
-            end: out.spare_capacity_mut().as_mut_ptr().cast(),
-            room,
-            added: 0,
-            out,
-        }
-    }
+    fn onto(out: &'a mut Vec<u32>, words: usize) -> Self;
 
     /// Appends the words of `lanes`, lowest first.
     ///
     /// # Panics
     /// If no row fits any more.
-    #[inline(always)]
-    pub fn push<I: Isa>(&mut self, isa: I, row: &[u32; LANES], lanes: LaneMask) {
-        assert!(self.room >= LANES, "more words than there is room for");
-        // SAFETY: a row fits.
-        unsafe { isa.pack_to(self.end, isa.words(row), lanes) };
-        self.skip(lanes.count_ones() as usize);
-    }
-
-    /// So many words have been written.
-    #[inline(always)]
-    fn skip(&mut self, count: usize) {
-        // SAFETY: no more than there was room for.
-        self.end = unsafe { self.end.add(count) };
-        self.room -= count;
-        self.added += count;
-    }
-}
-
-impl Drop for Packer<'_> {
-    #[inline(always)]
-    fn drop(&mut self) {
-        // SAFETY: so many words have been written behind the old end, and room
-        // for them was made.
-        unsafe { self.out.set_len(self.out.len() + self.added) };
-    }
-}
-
-/// Plain arrays, which the compiler turns into whatever vectors there are: for
-/// processors without a file of their own here, and for Miri.
-#[derive(Clone, Copy, Debug)]
-pub struct Plain;
-
-#[inline(always)]
-fn lanes_where(holds: impl Fn(usize) -> bool) -> LaneMask {
-    // A bit as wide as a float: a comparison then selects among them without
-    // leaving the vector.
-    let bits: [u32; LANES] = std::array::from_fn(|lane| u32::from(holds(lane)) << lane);
-    bits.iter().fold(0, |all, bit| all | bit) as LaneMask
-}
-
-impl Isa for Plain {
-    type Floats = [f32; LANES];
-    type Words = [u32; LANES];
-    /// All bits where a lane is dropped.
-    type Kept = [u32; LANES];
-
-    #[inline(always)]
-    fn load(self, row: &[f32; LANES]) -> [f32; LANES] {
-        *row
-    }
-    #[inline(always)]
-    fn to_array(self, floats: [f32; LANES]) -> [f32; LANES] {
-        floats
-    }
-    #[inline(always)]
-    fn splat(self, x: f32) -> [f32; LANES] {
-        [x; LANES]
-    }
-    #[inline(always)]
-    fn pick(self, from: &[f32; 4], picks: u32) -> [f32; LANES] {
-        std::array::from_fn(|lane| from[(picks >> (2 * lane) & 3) as usize])
-    }
-    #[inline(always)]
-    fn add(self, a: [f32; LANES], b: [f32; LANES]) -> [f32; LANES] {
-        std::array::from_fn(|lane| a[lane] + b[lane])
-    }
-    #[inline(always)]
-    fn sub(self, a: [f32; LANES], b: [f32; LANES]) -> [f32; LANES] {
-        std::array::from_fn(|lane| a[lane] - b[lane])
-    }
-    #[inline(always)]
-    fn mul(self, a: [f32; LANES], b: [f32; LANES]) -> [f32; LANES] {
-        std::array::from_fn(|lane| a[lane] * b[lane])
-    }
-    #[inline(always)]
-    fn lower(self, a: [f32; LANES], b: [f32; LANES]) -> [f32; LANES] {
-        std::array::from_fn(|lane| if a[lane] < b[lane] { a[lane] } else { b[lane] })
-    }
-    #[inline(always)]
-    fn below_zero(self, a: [f32; LANES]) -> LaneMask {
-        lanes_where(|lane| a[lane] < 0.0)
-    }
-    #[inline(always)]
-    fn keep_all(self) -> [u32; LANES] {
-        [0; LANES]
-    }
-    #[inline(always)]
-    fn keep(self, kept: [u32; LANES], values: [f32; LANES], least: [f32; LANES]) -> [u32; LANES] {
-        std::array::from_fn(|lane| kept[lane] | if values[lane] < least[lane] { !0 } else { 0 })
-    }
-    #[inline(always)]
-    fn kept(self, kept: [u32; LANES]) -> LaneMask {
-        lanes_where(|lane| kept[lane] == 0)
-    }
-    #[inline(always)]
-    fn at_most(self, a: [f32; LANES], b: [f32; LANES]) -> LaneMask {
-        lanes_where(|lane| a[lane] <= b[lane])
-    }
-    #[inline(always)]
-    fn words(self, row: &[u32; LANES]) -> [u32; LANES] {
-        *row
-    }
-    #[inline(always)]
-    fn splat_word(self, x: u32) -> [u32; LANES] {
-        [x; LANES]
-    }
-    #[inline(always)]
-    fn counting(self, first: u32) -> [u32; LANES] {
-        std::array::from_fn(|lane| first.wrapping_add(lane as u32))
-    }
-    #[inline(always)]
-    fn without(
-        self,
-        words: [u32; LANES],
-        values: [f32; LANES],
-        least: [f32; LANES],
-        bits: u32,
-    ) -> [u32; LANES] {
-        std::array::from_fn(|lane| {
-            let inside = values[lane] >= least[lane];
-            words[lane] & !if inside { bits } else { 0 }
-        })
-    }
-    #[inline(always)]
-    fn zeros(self, words: [u32; LANES]) -> LaneMask {
-        lanes_where(|lane| words[lane] == 0)
-    }
-    #[inline(always)]
-    fn equal(self, words: [u32; LANES], x: u32) -> LaneMask {
-        lanes_where(|lane| words[lane] == x)
-    }
-    #[inline(always)]
-    unsafe fn pack_to(self, place: *mut u32, words: [u32; LANES], lanes: LaneMask) {
-        let (mut left, mut count) = (lanes, 0);
-        while left != 0 {
-            // SAFETY: there are at most sixteen lanes.
-            unsafe { *place.add(count) = words[left.trailing_zeros() as usize % LANES] };
-            count += 1;
-            left &= left - 1;
-        }
-    }
+    fn push(&mut self, isa: I, row: &[u32; LANES], lanes: LaneMask);
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kernel::{Kernel, Work};
+    use crate::kernel::{Kernel, Plain, Work};
     use proptest::prelude::*;
+    use std::panic::{AssertUnwindSafe, catch_unwind};
 
     /// Every operation on the same lanes, as bits.
     struct All<'a> {
@@ -334,26 +159,50 @@ mod tests {
         }
     }
 
-    #[test]
-    fn a_packer_has_room_for_the_last_row_whole() {
-        let mut out = vec![1];
-        let row: [u32; LANES] = std::array::from_fn(|lane| lane as u32);
-        let mut packer = Packer::onto(&mut out, LANES + 2);
-        packer.push(Plain, &row, LaneMask::MAX);
-        packer.push(Plain, &row, 0b10_0100);
-        drop(packer);
-        assert_eq!(out[..3], [1, 0, 1]);
-        assert_eq!(out[LANES..], [15, 2, 5]);
+    /// Room for so many words, and then these rows and lanes of rows.
+    struct Packed<'a>(&'a mut Vec<u32>, usize, &'a [([u32; LANES], LaneMask)]);
+
+    impl Work for Packed<'_> {
+        type Output = ();
+
+        #[inline(always)]
+        fn run<I: Isa>(self, isa: I) {
+            let mut packer = I::Packer::onto(self.0, self.1);
+            for (row, lanes) in self.2 {
+                packer.push(isa, row, *lanes);
+            }
+        }
+    }
+
+    /// What each instruction set packs behind a 1, and whether it panicked.
+    fn packed(words: usize, rows: &[([u32; LANES], LaneMask)]) -> Vec<(Vec<u32>, bool)> {
+        let pack = |run: &dyn Fn(Packed)| {
+            // Memory enough, so that it is the packer that refuses.
+            let mut out = Vec::with_capacity(8 * LANES);
+            out.push(1);
+            let work = Packed(&mut out, words, rows);
+            let ended = catch_unwind(AssertUnwindSafe(|| run(work)));
+            (out, ended.is_err())
+        };
+        let kernels = Kernel::available().map(|kernel| pack(&|work| kernel.run(work)));
+        kernels.chain([pack(&|work| work.run(Plain))]).collect()
     }
 
     #[test]
-    #[should_panic(expected = "more words than there is room for")]
-    fn a_packer_that_is_full_takes_nothing_more() {
-        // Memory enough, so that it is the packer that refuses.
-        let mut out = Vec::with_capacity(4 * LANES);
-        let mut packer = Packer::onto(&mut out, LANES);
-        for _ in 0..3 {
-            packer.push(Plain, &[7; LANES], LaneMask::MAX);
+    fn a_packer_has_room_for_the_last_row_whole() {
+        let row = std::array::from_fn(|lane| lane as u32);
+        for (out, panicked) in packed(LANES + 2, &[(row, LaneMask::MAX), (row, 0b10_0100)]) {
+            assert!(!panicked);
+            assert_eq!(out[..3], [1, 0, 1]);
+            assert_eq!(out[LANES..], [15, 2, 5]);
+        }
+    }
+
+    #[test]
+    fn a_packer_that_is_full_takes_nothing_more_and_keeps_what_it_has() {
+        for (out, panicked) in packed(LANES, &[([7; LANES], LaneMask::MAX); 3]) {
+            assert!(panicked);
+            assert_eq!(out[1..], [7; 2 * LANES]);
         }
     }
 

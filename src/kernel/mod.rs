@@ -1,34 +1,30 @@
 //! Instruction sets to choose from at run time: one source, compiled once for
-//! each of them, and the same answer bit for bit. The only module of the crate
-//! with unsafe code: a call that is sound because the processor was asked.
+//! each of them, and the same answer bit for bit. Unsafe code is in the folder
+//! `x86` and nowhere else in the crate; where plain arrays are the vectors (other
+//! architectures, interpreters, `--cfg plain_vectors`) it is left out, and the
+//! compiler forbids any.
 //!
 //! No kernel contracts a product and a sum into a fused multiply-add: Rust
 //! never does so unasked, whatever the instruction set offers, and the plane
 //! test relies on it.
-#![allow(unsafe_code)]
 
 mod isa;
-#[cfg(all(target_arch = "x86_64", not(miri)))]
-mod x86;
+mod plain;
+
+#[cfg(not(all(target_arch = "x86_64", not(any(miri, plain_vectors)))))]
+#[path = "arrays.rs"]
+mod machine;
+#[cfg(all(target_arch = "x86_64", not(any(miri, plain_vectors))))]
+#[path = "x86/mod.rs"]
+mod machine;
 
 use std::fmt;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU8, Ordering};
 
-pub use isa::{Isa, LANES, LaneMask, Packer, Piece, Plain};
-
-/// The instruction set that the program was compiled for, with no need to ask
-/// the processor. Miri is given plain arrays: an interpreter has no vectors.
-#[cfg(all(target_arch = "x86_64", not(miri)))]
-pub type Baseline = x86::Sse2;
-#[cfg(any(not(target_arch = "x86_64"), miri))]
-pub type Baseline = Plain;
-
-/// What the program was compiled for, for callers without a [`Kernel`].
-#[cfg(all(target_arch = "x86_64", not(miri)))]
-pub const BASELINE: Baseline = x86::Sse2;
-#[cfg(any(not(target_arch = "x86_64"), miri))]
-pub const BASELINE: Baseline = Plain;
+pub use isa::{Isa, LANES, LaneMask, Pack, Piece};
+pub use machine::{BASELINE, Baseline};
+pub use plain::Plain;
 
 /// An instruction set that queries are compiled for.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
@@ -83,26 +79,7 @@ impl Kernel {
     #[inline]
     pub fn is_available(self) -> bool {
         static AVAILABLE: OnceLock<[bool; 3]> = OnceLock::new();
-        AVAILABLE.get_or_init(|| Kernel::ALL.map(Kernel::detect))[self as usize]
-    }
-
-    #[cfg(all(target_arch = "x86_64", not(miri)))]
-    fn detect(self) -> bool {
-        macro_rules! all {
-            ($($feature:tt),*) => { true $(&& std::arch::is_x86_feature_detected!($feature))* };
-        }
-        // The features of `avx2` and `avx512` below, each by name.
-        let avx2 = || all!("avx2", "bmi1", "bmi2", "lzcnt", "popcnt");
-        match self {
-            Kernel::Portable => true,
-            Kernel::Avx2 => avx2(),
-            Kernel::Avx512 => avx2() && all!("avx512f", "avx512vl", "avx512bw", "avx512dq"),
-        }
-    }
-
-    #[cfg(any(not(target_arch = "x86_64"), miri))]
-    fn detect(self) -> bool {
-        self == Kernel::Portable
+        AVAILABLE.get_or_init(|| Kernel::ALL.map(machine::detect))[self as usize]
     }
 
     /// The kernels of this machine, [`Kernel::Portable`] first.
@@ -142,20 +119,7 @@ impl Kernel {
     /// the processor lacks it. The result is the same either way.
     #[inline]
     pub fn run<W: Work>(self, work: W) -> W::Output {
-        #[cfg(all(target_arch = "x86_64", not(miri)))]
-        match self {
-            Kernel::Avx512 if self.is_available() => {
-                // SAFETY: `detect` has found every feature that `avx512` is
-                // compiled for on this processor.
-                return unsafe { avx512(work) };
-            }
-            Kernel::Avx2 if self.is_available() => {
-                // SAFETY: as above, for the features of `avx2`.
-                return unsafe { avx2(work) };
-            }
-            _ => {}
-        }
-        work.run(BASELINE)
+        machine::run(self, work)
     }
 }
 
@@ -169,26 +133,7 @@ impl fmt::Display for Kernel {
 /// it changes no value, and where there is no such instruction nothing is done.
 #[inline(always)]
 pub fn prefetch<T>(place: &T) {
-    #[cfg(all(target_arch = "x86_64", not(miri)))]
-    {
-        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-        // SAFETY: SSE is part of every x86-64, and a prefetch never faults.
-        unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(place).cast()) };
-    }
-    #[cfg(any(not(target_arch = "x86_64"), miri))]
-    let _ = place;
-}
-
-#[cfg(all(target_arch = "x86_64", not(miri)))]
-#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-fn avx2<W: Work>(work: W) -> W::Output {
-    work.run(x86::Avx2::here())
-}
-
-#[cfg(all(target_arch = "x86_64", not(miri)))]
-#[target_feature(enable = "avx512f,avx512vl,avx512bw,avx512dq,avx2,bmi1,bmi2,lzcnt,popcnt")]
-fn avx512<W: Work>(work: W) -> W::Output {
-    work.run(x86::Avx512::here())
+    machine::prefetch(place);
 }
 
 #[cfg(test)]

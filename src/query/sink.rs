@@ -3,7 +3,7 @@
 use std::ops::{ControlFlow, Range};
 
 use super::ItemId;
-use crate::kernel::{Isa, LANES, LaneMask, Packer, Piece};
+use crate::kernel::{Isa, LANES, LaneMask, Pack, Piece};
 
 /// Where answers go. A structure hands over slices: a subtree that is wholly
 /// inside is one call. Returning `Break` ends the query.
@@ -164,7 +164,7 @@ impl<I: Isa, T: Tests<I>> Piece<I> for Gather<'_, T> {
     fn run(self, isa: I) {
         let mut tests = self.tests;
         let count = tests.count();
-        let mut packer = Packer::onto(self.out, count * LANES);
+        let mut packer = I::Packer::onto(self.out, count * LANES);
         if !T::SPARSE || count <= FEW {
             for i in 0..count {
                 let (block, lanes) = tests.test(isa, i);

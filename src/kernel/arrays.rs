@@ -1,0 +1,24 @@
+//! What any machine has: the portable kernel alone, its vectors plain arrays.
+
+use super::plain::Plain;
+use super::{Kernel, Work};
+
+/// The instruction set that the program was compiled for, with no need to ask
+/// the processor.
+pub type Baseline = Plain;
+pub const BASELINE: Baseline = Plain;
+
+/// Whether this processor runs the kernel.
+pub fn detect(kernel: Kernel) -> bool {
+    kernel == Kernel::Portable
+}
+
+/// Does the work with the portable kernel.
+#[inline]
+pub fn run<W: Work>(_: Kernel, work: W) -> W::Output {
+    work.run(BASELINE)
+}
+
+/// There is no instruction to ask with.
+#[inline(always)]
+pub fn prefetch<T>(_: &T) {}

@@ -1,0 +1,148 @@
+//! Sixteen lanes as plain arrays, which the compiler turns into whatever vectors
+//! there are: for processors without a folder of their own here, for
+//! interpreters, and for the tests of the others. No unsafe code.
+
+use super::isa::{Isa, LANES, LaneMask, Pack};
+
+/// Plain arrays.
+#[derive(Clone, Copy, Debug)]
+pub struct Plain;
+
+#[inline(always)]
+fn lanes_where(holds: impl Fn(usize) -> bool) -> LaneMask {
+    // A bit as wide as a float: a comparison then selects among them without
+    // leaving the vector.
+    let bits: [u32; LANES] = std::array::from_fn(|lane| u32::from(holds(lane)) << lane);
+    bits.iter().fold(0, |all, bit| all | bit) as LaneMask
+}
+
+impl Isa for Plain {
+    type Floats = [f32; LANES];
+    type Words = [u32; LANES];
+    /// All bits where a lane is dropped.
+    type Kept = [u32; LANES];
+    type Packer<'a> = PlainPacker<'a>;
+
+    #[inline(always)]
+    fn load(self, row: &[f32; LANES]) -> [f32; LANES] {
+        *row
+    }
+    #[inline(always)]
+    fn to_array(self, floats: [f32; LANES]) -> [f32; LANES] {
+        floats
+    }
+    #[inline(always)]
+    fn splat(self, x: f32) -> [f32; LANES] {
+        [x; LANES]
+    }
+    #[inline(always)]
+    fn pick(self, from: &[f32; 4], picks: u32) -> [f32; LANES] {
+        std::array::from_fn(|lane| from[(picks >> (2 * lane) & 3) as usize])
+    }
+    #[inline(always)]
+    fn add(self, a: [f32; LANES], b: [f32; LANES]) -> [f32; LANES] {
+        std::array::from_fn(|lane| a[lane] + b[lane])
+    }
+    #[inline(always)]
+    fn sub(self, a: [f32; LANES], b: [f32; LANES]) -> [f32; LANES] {
+        std::array::from_fn(|lane| a[lane] - b[lane])
+    }
+    #[inline(always)]
+    fn mul(self, a: [f32; LANES], b: [f32; LANES]) -> [f32; LANES] {
+        std::array::from_fn(|lane| a[lane] * b[lane])
+    }
+    #[inline(always)]
+    fn lower(self, a: [f32; LANES], b: [f32; LANES]) -> [f32; LANES] {
+        std::array::from_fn(|lane| if a[lane] < b[lane] { a[lane] } else { b[lane] })
+    }
+    #[inline(always)]
+    fn below_zero(self, a: [f32; LANES]) -> LaneMask {
+        lanes_where(|lane| a[lane] < 0.0)
+    }
+    #[inline(always)]
+    fn keep_all(self) -> [u32; LANES] {
+        [0; LANES]
+    }
+    #[inline(always)]
+    fn keep(self, kept: [u32; LANES], values: [f32; LANES], least: [f32; LANES]) -> [u32; LANES] {
+        std::array::from_fn(|lane| kept[lane] | if values[lane] < least[lane] { !0 } else { 0 })
+    }
+    #[inline(always)]
+    fn kept(self, kept: [u32; LANES]) -> LaneMask {
+        lanes_where(|lane| kept[lane] == 0)
+    }
+    #[inline(always)]
+    fn at_most(self, a: [f32; LANES], b: [f32; LANES]) -> LaneMask {
+        lanes_where(|lane| a[lane] <= b[lane])
+    }
+    #[inline(always)]
+    fn words(self, row: &[u32; LANES]) -> [u32; LANES] {
+        *row
+    }
+    #[inline(always)]
+    fn splat_word(self, x: u32) -> [u32; LANES] {
+        [x; LANES]
+    }
+    #[inline(always)]
+    fn counting(self, first: u32) -> [u32; LANES] {
+        std::array::from_fn(|lane| first.wrapping_add(lane as u32))
+    }
+    #[inline(always)]
+    fn without(
+        self,
+        words: [u32; LANES],
+        values: [f32; LANES],
+        least: [f32; LANES],
+        bits: u32,
+    ) -> [u32; LANES] {
+        std::array::from_fn(|lane| {
+            let inside = values[lane] >= least[lane];
+            words[lane] & !if inside { bits } else { 0 }
+        })
+    }
+    #[inline(always)]
+    fn zeros(self, words: [u32; LANES]) -> LaneMask {
+        lanes_where(|lane| words[lane] == 0)
+    }
+    #[inline(always)]
+    fn equal(self, words: [u32; LANES], x: u32) -> LaneMask {
+        lanes_where(|lane| words[lane] == x)
+    }
+    #[inline(always)]
+    fn pack(self, place: &mut [u32; LANES], words: [u32; LANES], lanes: LaneMask) {
+        let mut left = lanes;
+        for to in place.iter_mut().take(lanes.count_ones() as usize) {
+            *to = words[left.trailing_zeros() as usize % LANES];
+            left &= left - 1;
+        }
+    }
+    #[inline(always)]
+    fn append(self, out: &mut Vec<u32>, row: &[u32; LANES], lanes: LaneMask) {
+        let mut place = [0; LANES];
+        self.pack(&mut place, *row, lanes);
+        out.extend_from_slice(&place[..lanes.count_ones() as usize]);
+    }
+}
+
+/// A list that knows how much was announced.
+#[derive(Debug)]
+pub struct PlainPacker<'a> {
+    out: &'a mut Vec<u32>,
+    room: usize,
+}
+
+impl<'a> Pack<'a, Plain> for PlainPacker<'a> {
+    #[inline(always)]
+    fn onto(out: &'a mut Vec<u32>, words: usize) -> Self {
+        let room = words + LANES;
+        out.reserve(room);
+        PlainPacker { out, room }
+    }
+
+    #[inline(always)]
+    fn push(&mut self, isa: Plain, row: &[u32; LANES], lanes: LaneMask) {
+        assert!(self.room >= LANES, "more words than there is room for");
+        isa.append(self.out, row, lanes);
+        self.room -= lanes.count_ones() as usize;
+    }
+}

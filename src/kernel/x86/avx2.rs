@@ -1,0 +1,200 @@
+//! Two 256-bit vectors, with the bit instructions of the same generation.
+
+use std::arch::x86_64::*;
+
+use super::each;
+use super::packer::{self, PackTo, Packer};
+use crate::kernel::isa::{Isa, LANES, LaneMask, Piece};
+
+/// A value is the proof that the processor has AVX2, BMI1, BMI2, LZCNT and POPCNT.
+#[derive(Clone, Copy, Debug)]
+pub struct Avx2(());
+
+impl Avx2 {
+    /// Only for code that was compiled for these instructions.
+    #[inline]
+    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+    pub(super) fn here() -> Self {
+        Avx2(())
+    }
+}
+
+#[inline(never)]
+#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+fn apart<P: Piece<Avx2>>(isa: Avx2, piece: P) -> P::Output {
+    piece.run(isa)
+}
+
+// SAFETY, of all blocks below: the receiver proves that the processor has the
+// instructions.
+// Loads and stores are unaligned ones within their arrays.
+
+impl Isa for Avx2 {
+    type Floats = [__m256; 2];
+    type Words = [__m256i; 2];
+    /// All bits where a lane is dropped.
+    type Kept = [__m256; 2];
+    type Packer<'a> = Packer<'a>;
+
+    #[inline(always)]
+    fn apart<P: Piece<Self>>(self, piece: P) -> P::Output {
+        unsafe { apart(self, piece) }
+    }
+    #[inline(always)]
+    fn load(self, row: &[f32; LANES]) -> [__m256; 2] {
+        each!(2, |i| unsafe { _mm256_loadu_ps(row[8 * i..].as_ptr()) })
+    }
+    #[inline(always)]
+    fn to_array(self, floats: [__m256; 2]) -> [f32; LANES] {
+        let mut row = [0.0; LANES];
+        for (eight, x) in row.chunks_exact_mut(8).zip(floats) {
+            unsafe { _mm256_storeu_ps(eight.as_mut_ptr(), x) };
+        }
+        row
+    }
+    #[inline(always)]
+    fn splat(self, x: f32) -> [__m256; 2] {
+        [unsafe { _mm256_set1_ps(x) }; 2]
+    }
+    #[inline(always)]
+    fn pick(self, from: &[f32; 4], picks: u32) -> [__m256; 2] {
+        each!(2, |i| unsafe {
+            let four = _mm_loadu_ps(from.as_ptr());
+            let four = _mm256_set_m128(four, four);
+            let picks = _mm256_set1_epi32((picks >> (16 * i)) as i32);
+            let shifts = _mm256_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14);
+            // Only the two lowest bits of a lane count.
+            _mm256_permutevar_ps(four, _mm256_srlv_epi32(picks, shifts))
+        })
+    }
+    #[inline(always)]
+    fn add(self, a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
+        each!(2, |i| unsafe { _mm256_add_ps(a[i], b[i]) })
+    }
+    #[inline(always)]
+    fn sub(self, a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
+        each!(2, |i| unsafe { _mm256_sub_ps(a[i], b[i]) })
+    }
+    #[inline(always)]
+    fn mul(self, a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
+        each!(2, |i| unsafe { _mm256_mul_ps(a[i], b[i]) })
+    }
+    #[inline(always)]
+    fn lower(self, a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
+        each!(2, |i| unsafe { _mm256_min_ps(a[i], b[i]) })
+    }
+    #[inline(always)]
+    fn below_zero(self, a: [__m256; 2]) -> LaneMask {
+        signs_256(each!(2, |i| unsafe {
+            _mm256_cmp_ps::<_CMP_LT_OQ>(a[i], _mm256_setzero_ps())
+        }))
+    }
+    #[inline(always)]
+    fn keep_all(self) -> [__m256; 2] {
+        self.splat(0.0)
+    }
+    #[inline(always)]
+    fn keep(self, kept: [__m256; 2], values: [__m256; 2], least: [__m256; 2]) -> [__m256; 2] {
+        each!(2, |i| unsafe {
+            let dropped = _mm256_cmp_ps::<_CMP_LT_OQ>(values[i], least[i]);
+            _mm256_or_ps(kept[i], dropped)
+        })
+    }
+    #[inline(always)]
+    fn kept(self, kept: [__m256; 2]) -> LaneMask {
+        !signs_256(kept)
+    }
+    #[inline(always)]
+    fn at_most(self, a: [__m256; 2], b: [__m256; 2]) -> LaneMask {
+        signs_256(each!(2, |i| unsafe {
+            _mm256_cmp_ps::<_CMP_LE_OQ>(a[i], b[i])
+        }))
+    }
+    #[inline(always)]
+    fn words(self, row: &[u32; LANES]) -> [__m256i; 2] {
+        each!(2, |i| unsafe {
+            _mm256_loadu_si256(row[8 * i..].as_ptr().cast())
+        })
+    }
+    #[inline(always)]
+    fn splat_word(self, x: u32) -> [__m256i; 2] {
+        [unsafe { _mm256_set1_epi32(x as i32) }; 2]
+    }
+    #[inline(always)]
+    fn counting(self, first: u32) -> [__m256i; 2] {
+        each!(2, |i| unsafe {
+            let from = _mm256_set1_epi32(first.wrapping_add(8 * i as u32) as i32);
+            _mm256_add_epi32(from, _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7))
+        })
+    }
+    #[inline(always)]
+    fn without(
+        self,
+        words: [__m256i; 2],
+        values: [__m256; 2],
+        least: [__m256; 2],
+        bits: u32,
+    ) -> [__m256i; 2] {
+        each!(2, |i| unsafe {
+            let inside = _mm256_cmp_ps::<_CMP_GE_OQ>(values[i], least[i]);
+            let bits =
+                _mm256_and_si256(_mm256_castps_si256(inside), _mm256_set1_epi32(bits as i32));
+            _mm256_andnot_si256(bits, words[i])
+        })
+    }
+    #[inline(always)]
+    fn zeros(self, words: [__m256i; 2]) -> LaneMask {
+        signs_256(each!(2, |i| unsafe {
+            _mm256_castsi256_ps(_mm256_cmpeq_epi32(words[i], _mm256_setzero_si256()))
+        }))
+    }
+    #[inline(always)]
+    fn equal(self, words: [__m256i; 2], x: u32) -> LaneMask {
+        signs_256(each!(2, |i| unsafe {
+            _mm256_castsi256_ps(_mm256_cmpeq_epi32(words[i], _mm256_set1_epi32(x as i32)))
+        }))
+    }
+    #[inline(always)]
+    fn pack(self, place: &mut [u32; LANES], words: [__m256i; 2], lanes: LaneMask) {
+        // SAFETY: sixteen words may be written.
+        unsafe { self.pack_to(place.as_mut_ptr(), words, lanes) };
+    }
+    #[inline(always)]
+    fn append(self, out: &mut Vec<u32>, row: &[u32; LANES], lanes: LaneMask) {
+        packer::append(self, out, row, lanes);
+    }
+}
+
+// SAFETY: as many words as there are lanes are written, and never more than a row.
+unsafe impl PackTo for Avx2 {
+    #[inline(always)]
+    unsafe fn pack_to(self, place: *mut u32, words: [__m256i; 2], lanes: LaneMask) {
+        // The first store is whole, and what it leaves behind its lanes the
+        // second one covers; together they stay within sixteen places.
+        let (low, high) = (lanes & 0xff, lanes >> 8);
+        unsafe {
+            _mm256_storeu_si256(place.cast(), packed_256(words[0], low));
+            let behind = place.add(low.count_ones() as usize);
+            _mm256_storeu_si256(behind.cast(), packed_256(words[1], high));
+        }
+    }
+}
+
+#[inline(always)]
+fn signs_256(x: [__m256; 2]) -> LaneMask {
+    let signs = x.map(|x| unsafe { _mm256_movemask_ps(x) } as LaneMask);
+    signs[0] | signs[1] << 8
+}
+
+/// The words of eight lanes moved together.
+#[inline(always)]
+fn packed_256(words: __m256i, lanes: LaneMask) -> __m256i {
+    unsafe {
+        // A byte for each lane, those that count moved together, and widened
+        // to the indices of a permutation.
+        let bytes = _pdep_u64(u64::from(lanes), 0x0101_0101_0101_0101).wrapping_mul(0xff);
+        let order = _pext_u64(0x0706_0504_0302_0100, bytes);
+        let order = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(order as i64));
+        _mm256_permutevar8x32_epi32(words, order)
+    }
+}

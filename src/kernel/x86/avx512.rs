@@ -1,0 +1,158 @@
+//! One 512-bit vector: a row of a block is one register.
+
+use std::arch::x86_64::*;
+
+use super::packer::{self, PackTo, Packer};
+use crate::kernel::isa::{Isa, LANES, LaneMask, Piece};
+
+/// A value is the proof that the processor has AVX-512 (F, VL, BW, DQ) and all
+/// that AVX2 stands for here.
+#[derive(Clone, Copy, Debug)]
+pub struct Avx512(());
+
+impl Avx512 {
+    /// Only for code that was compiled for these instructions.
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512vl,avx512bw,avx512dq,avx2,bmi1,bmi2,lzcnt,popcnt")]
+    pub(super) fn here() -> Self {
+        Avx512(())
+    }
+}
+
+#[inline(never)]
+#[target_feature(enable = "avx512f,avx512vl,avx512bw,avx512dq,avx2,bmi1,bmi2,lzcnt,popcnt")]
+fn apart<P: Piece<Avx512>>(isa: Avx512, piece: P) -> P::Output {
+    piece.run(isa)
+}
+
+// SAFETY, of all blocks below: the receiver proves that the processor has the
+// instructions.
+// Loads and stores are unaligned ones within their arrays.
+
+impl Isa for Avx512 {
+    const MANY_REGISTERS: bool = true;
+
+    type Floats = __m512;
+    type Words = __m512i;
+    type Kept = LaneMask;
+    type Packer<'a> = Packer<'a>;
+
+    #[inline(always)]
+    fn apart<P: Piece<Self>>(self, piece: P) -> P::Output {
+        unsafe { apart(self, piece) }
+    }
+    #[inline(always)]
+    fn load(self, row: &[f32; LANES]) -> __m512 {
+        unsafe { _mm512_loadu_ps(row.as_ptr()) }
+    }
+    #[inline(always)]
+    fn to_array(self, floats: __m512) -> [f32; LANES] {
+        let mut row = [0.0; LANES];
+        unsafe { _mm512_storeu_ps(row.as_mut_ptr(), floats) };
+        row
+    }
+    #[inline(always)]
+    fn splat(self, x: f32) -> __m512 {
+        unsafe { _mm512_set1_ps(x) }
+    }
+    #[inline(always)]
+    fn pick(self, from: &[f32; 4], picks: u32) -> __m512 {
+        unsafe {
+            let four = _mm512_broadcast_f32x4(_mm_loadu_ps(from.as_ptr()));
+            let lanes =
+                _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+            // Only the two lowest bits of a lane count.
+            let picks = _mm512_srlv_epi32(_mm512_set1_epi32(picks as i32), lanes);
+            _mm512_permutevar_ps(four, picks)
+        }
+    }
+    #[inline(always)]
+    fn add(self, a: __m512, b: __m512) -> __m512 {
+        unsafe { _mm512_add_ps(a, b) }
+    }
+    #[inline(always)]
+    fn sub(self, a: __m512, b: __m512) -> __m512 {
+        unsafe { _mm512_sub_ps(a, b) }
+    }
+    #[inline(always)]
+    fn mul(self, a: __m512, b: __m512) -> __m512 {
+        unsafe { _mm512_mul_ps(a, b) }
+    }
+    #[inline(always)]
+    fn lower(self, a: __m512, b: __m512) -> __m512 {
+        unsafe { _mm512_min_ps(a, b) }
+    }
+    #[inline(always)]
+    fn below_zero(self, a: __m512) -> LaneMask {
+        unsafe { _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, _mm512_setzero_ps()) }
+    }
+    #[inline(always)]
+    fn keep_all(self) -> LaneMask {
+        LaneMask::MAX
+    }
+    #[inline(always)]
+    fn keep(self, kept: LaneMask, values: __m512, least: __m512) -> LaneMask {
+        unsafe { _mm512_mask_cmp_ps_mask::<_CMP_NLT_UQ>(kept, values, least) }
+    }
+    #[inline(always)]
+    fn kept(self, kept: LaneMask) -> LaneMask {
+        kept
+    }
+    #[inline(always)]
+    fn at_most(self, a: __m512, b: __m512) -> LaneMask {
+        unsafe { _mm512_cmp_ps_mask::<_CMP_LE_OQ>(a, b) }
+    }
+    #[inline(always)]
+    fn words(self, row: &[u32; LANES]) -> __m512i {
+        unsafe { _mm512_loadu_si512(row.as_ptr().cast()) }
+    }
+    #[inline(always)]
+    fn splat_word(self, x: u32) -> __m512i {
+        unsafe { _mm512_set1_epi32(x as i32) }
+    }
+    #[inline(always)]
+    fn counting(self, first: u32) -> __m512i {
+        unsafe {
+            let lanes = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+            _mm512_add_epi32(_mm512_set1_epi32(first as i32), lanes)
+        }
+    }
+    #[inline(always)]
+    fn without(self, words: __m512i, values: __m512, least: __m512, bits: u32) -> __m512i {
+        unsafe {
+            let inside = _mm512_cmp_ps_mask::<_CMP_GE_OQ>(values, least);
+            let bits = _mm512_set1_epi32(bits as i32);
+            _mm512_mask_andnot_epi32(words, inside, bits, words)
+        }
+    }
+    #[inline(always)]
+    fn zeros(self, words: __m512i) -> LaneMask {
+        unsafe { _mm512_testn_epi32_mask(words, words) }
+    }
+    #[inline(always)]
+    fn equal(self, words: __m512i, x: u32) -> LaneMask {
+        unsafe { _mm512_cmpeq_epi32_mask(words, _mm512_set1_epi32(x as i32)) }
+    }
+    #[inline(always)]
+    fn pack(self, place: &mut [u32; LANES], words: __m512i, lanes: LaneMask) {
+        // SAFETY: sixteen words may be written.
+        unsafe { self.pack_to(place.as_mut_ptr(), words, lanes) };
+    }
+    #[inline(always)]
+    fn append(self, out: &mut Vec<u32>, row: &[u32; LANES], lanes: LaneMask) {
+        packer::append(self, out, row, lanes);
+    }
+}
+
+// SAFETY: as many words as there are lanes are written, and never more than a row.
+unsafe impl PackTo for Avx512 {
+    #[inline(always)]
+    unsafe fn pack_to(self, place: *mut u32, words: __m512i, lanes: LaneMask) {
+        // Packed in a register and stored whole: a masked store is slower, on
+        // some processors very much so.
+        unsafe {
+            let packed = _mm512_maskz_compress_epi32(lanes, words);
+            _mm512_storeu_si512(place.cast(), packed);
+        }
+    }
+}

@@ -1,0 +1,75 @@
+//! What x86-64 has: SSE2 everywhere, AVX2 and AVX-512 where the processor says
+//! so. The only folder of the crate with unsafe code. Intrinsics are unsafe; they
+//! are sound because a value of each set's type only exists where its
+//! instructions do.
+#![allow(unsafe_code)]
+
+mod avx2;
+mod avx512;
+mod packer;
+mod sse2;
+
+use super::{Kernel, Work};
+
+/// The instruction set that the program was compiled for, with no need to ask
+/// the processor.
+pub type Baseline = sse2::Sse2;
+pub const BASELINE: Baseline = sse2::Sse2;
+
+/// Whether this processor (and operating system) runs the kernel.
+pub fn detect(kernel: Kernel) -> bool {
+    macro_rules! all {
+        ($($feature:tt),*) => { true $(&& std::arch::is_x86_feature_detected!($feature))* };
+    }
+    // The features of `avx2` and `avx512` below, each by name.
+    let avx2 = || all!("avx2", "bmi1", "bmi2", "lzcnt", "popcnt");
+    match kernel {
+        Kernel::Portable => true,
+        Kernel::Avx2 => avx2(),
+        Kernel::Avx512 => avx2() && all!("avx512f", "avx512vl", "avx512bw", "avx512dq"),
+    }
+}
+
+/// Does the work with this instruction set, or with the portable one where the
+/// processor lacks it.
+#[inline]
+pub fn run<W: Work>(kernel: Kernel, work: W) -> W::Output {
+    match kernel {
+        Kernel::Avx512 if kernel.is_available() => {
+            // SAFETY: `detect` has found every feature that `avx512` is
+            // compiled for on this processor.
+            unsafe { avx512(work) }
+        }
+        Kernel::Avx2 if kernel.is_available() => {
+            // SAFETY: as above, for the features of `avx2`.
+            unsafe { avx2(work) }
+        }
+        _ => work.run(BASELINE),
+    }
+}
+
+#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+fn avx2<W: Work>(work: W) -> W::Output {
+    work.run(avx2::Avx2::here())
+}
+
+#[target_feature(enable = "avx512f,avx512vl,avx512bw,avx512dq,avx2,bmi1,bmi2,lzcnt,popcnt")]
+fn avx512<W: Work>(work: W) -> W::Output {
+    work.run(avx512::Avx512::here())
+}
+
+/// Asks for the cache line at the start of `place`.
+#[inline(always)]
+pub fn prefetch<T>(place: &T) {
+    use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+    // SAFETY: SSE is part of every x86-64, and a prefetch never faults.
+    unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(place).cast()) };
+}
+
+/// Elementwise operations on an array of vectors.
+macro_rules! each {
+    ($count:literal, $op:expr) => {
+        std::array::from_fn::<_, $count, _>($op)
+    };
+}
+use each;

@@ -1,0 +1,75 @@
+//! Appending to a list through its spare memory: a row is stored whole, whatever
+//! of it counts, and the list's length is set once.
+
+use crate::kernel::isa::{Isa, LANES, LaneMask, Pack};
+
+/// Instructions that pack words to memory that may not have been written yet.
+///
+/// # Safety
+/// [`PackTo::pack_to`] writes the words of all lanes, and nothing behind the
+/// sixteenth place.
+pub unsafe trait PackTo: Isa {
+    /// Moves the words of `lanes` together, lowest first, to `place`.
+    ///
+    /// # Safety
+    /// `place` is valid for writes of [`LANES`] words.
+    unsafe fn pack_to(self, place: *mut u32, words: Self::Words, lanes: LaneMask);
+}
+
+/// [`Isa::append`], by a store of the whole row.
+#[inline(always)]
+pub fn append<I: PackTo>(isa: I, out: &mut Vec<u32>, row: &[u32; LANES], lanes: LaneMask) {
+    // Room first: a register would not outlive the call that makes it.
+    out.reserve(LANES);
+    let end = out.spare_capacity_mut().as_mut_ptr().cast();
+    // SAFETY: there is room for sixteen words; so many are written.
+    unsafe {
+        isa.pack_to(end, isa.words(row), lanes);
+        out.set_len(out.len() + lanes.count_ones() as usize);
+    }
+}
+
+/// The memory behind a list.
+pub struct Packer<'a> {
+    out: &'a mut Vec<u32>,
+    /// Where the next word goes; `room` words fit from there.
+    end: *mut u32,
+    room: usize,
+    added: usize,
+}
+
+impl<'a, I: PackTo> Pack<'a, I> for Packer<'a> {
+    #[inline(always)]
+    fn onto(out: &'a mut Vec<u32>, words: usize) -> Self {
+        let room = words + LANES;
+        out.reserve(room);
+        Packer {
+            end: out.spare_capacity_mut().as_mut_ptr().cast(),
+            room,
+            added: 0,
+            out,
+        }
+    }
+
+    #[inline(always)]
+    fn push(&mut self, isa: I, row: &[u32; LANES], lanes: LaneMask) {
+        assert!(self.room >= LANES, "more words than there is room for");
+        let count = lanes.count_ones() as usize;
+        // SAFETY: a row fits, and `count` is at most a row.
+        self.end = unsafe {
+            isa.pack_to(self.end, isa.words(row), lanes);
+            self.end.add(count)
+        };
+        self.room -= count;
+        self.added += count;
+    }
+}
+
+impl Drop for Packer<'_> {
+    #[inline(always)]
+    fn drop(&mut self) {
+        // SAFETY: so many words have been written behind the old end, and room
+        // for them was made.
+        unsafe { self.out.set_len(self.out.len() + self.added) };
+    }
+}

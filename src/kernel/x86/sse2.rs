@@ -1,0 +1,166 @@
+//! Four 128-bit vectors, which every x86-64 processor has: the portable kernel
+//! of this architecture.
+
+use std::arch::x86_64::*;
+
+use super::each;
+use super::packer::{self, PackTo, Packer};
+use crate::kernel::isa::{Isa, LANES, LaneMask};
+
+/// Part of x86-64.
+#[derive(Clone, Copy, Debug)]
+pub struct Sse2;
+
+// SAFETY, of all blocks below: SSE2 is part of every x86-64.
+// Loads and stores are unaligned ones within their arrays.
+
+impl Isa for Sse2 {
+    type Floats = [__m128; 4];
+    type Words = [__m128i; 4];
+    /// All bits where a lane is dropped.
+    type Kept = [__m128; 4];
+    type Packer<'a> = Packer<'a>;
+
+    #[inline(always)]
+    fn load(self, row: &[f32; LANES]) -> [__m128; 4] {
+        each!(4, |i| unsafe { _mm_loadu_ps(row[4 * i..].as_ptr()) })
+    }
+    #[inline(always)]
+    fn to_array(self, floats: [__m128; 4]) -> [f32; LANES] {
+        let mut row = [0.0; LANES];
+        for (four, x) in row.chunks_exact_mut(4).zip(floats) {
+            unsafe { _mm_storeu_ps(four.as_mut_ptr(), x) };
+        }
+        row
+    }
+    #[inline(always)]
+    fn splat(self, x: f32) -> [__m128; 4] {
+        [unsafe { _mm_set1_ps(x) }; 4]
+    }
+    #[inline(always)]
+    fn pick(self, from: &[f32; 4], picks: u32) -> [__m128; 4] {
+        each!(4, |i| unsafe {
+            // The two bits of a lane, each as a mask.
+            let here = _mm_set1_epi32((picks >> (8 * i)) as i32);
+            let mask = |bits| _mm_castsi128_ps(_mm_cmpeq_epi32(_mm_and_si128(here, bits), bits));
+            let odd = mask(_mm_setr_epi32(1, 4, 16, 64));
+            let late = mask(_mm_setr_epi32(2, 8, 32, 128));
+            let either = |mask, yes, no| _mm_or_ps(_mm_and_ps(mask, yes), _mm_andnot_ps(mask, no));
+            let [a, b, c, d] = from.map(|x| _mm_set1_ps(x));
+            either(late, either(odd, d, c), either(odd, b, a))
+        })
+    }
+    #[inline(always)]
+    fn add(self, a: [__m128; 4], b: [__m128; 4]) -> [__m128; 4] {
+        each!(4, |i| unsafe { _mm_add_ps(a[i], b[i]) })
+    }
+    #[inline(always)]
+    fn sub(self, a: [__m128; 4], b: [__m128; 4]) -> [__m128; 4] {
+        each!(4, |i| unsafe { _mm_sub_ps(a[i], b[i]) })
+    }
+    #[inline(always)]
+    fn mul(self, a: [__m128; 4], b: [__m128; 4]) -> [__m128; 4] {
+        each!(4, |i| unsafe { _mm_mul_ps(a[i], b[i]) })
+    }
+    #[inline(always)]
+    fn lower(self, a: [__m128; 4], b: [__m128; 4]) -> [__m128; 4] {
+        each!(4, |i| unsafe { _mm_min_ps(a[i], b[i]) })
+    }
+    #[inline(always)]
+    fn below_zero(self, a: [__m128; 4]) -> LaneMask {
+        let below = each!(4, |i| unsafe { _mm_cmplt_ps(a[i], _mm_setzero_ps()) });
+        signs_128(below)
+    }
+    #[inline(always)]
+    fn keep_all(self) -> [__m128; 4] {
+        self.splat(0.0)
+    }
+    #[inline(always)]
+    fn keep(self, kept: [__m128; 4], values: [__m128; 4], least: [__m128; 4]) -> [__m128; 4] {
+        each!(4, |i| unsafe {
+            _mm_or_ps(kept[i], _mm_cmplt_ps(values[i], least[i]))
+        })
+    }
+    #[inline(always)]
+    fn kept(self, kept: [__m128; 4]) -> LaneMask {
+        !signs_128(kept)
+    }
+    #[inline(always)]
+    fn at_most(self, a: [__m128; 4], b: [__m128; 4]) -> LaneMask {
+        signs_128(each!(4, |i| unsafe { _mm_cmple_ps(a[i], b[i]) }))
+    }
+    #[inline(always)]
+    fn words(self, row: &[u32; LANES]) -> [__m128i; 4] {
+        each!(4, |i| unsafe {
+            _mm_loadu_si128(row[4 * i..].as_ptr().cast())
+        })
+    }
+    #[inline(always)]
+    fn splat_word(self, x: u32) -> [__m128i; 4] {
+        [unsafe { _mm_set1_epi32(x as i32) }; 4]
+    }
+    #[inline(always)]
+    fn counting(self, first: u32) -> [__m128i; 4] {
+        each!(4, |i| unsafe {
+            let from = _mm_set1_epi32(first.wrapping_add(4 * i as u32) as i32);
+            _mm_add_epi32(from, _mm_setr_epi32(0, 1, 2, 3))
+        })
+    }
+    #[inline(always)]
+    fn without(
+        self,
+        words: [__m128i; 4],
+        values: [__m128; 4],
+        least: [__m128; 4],
+        bits: u32,
+    ) -> [__m128i; 4] {
+        each!(4, |i| unsafe {
+            let inside = _mm_castps_si128(_mm_cmpge_ps(values[i], least[i]));
+            _mm_andnot_si128(_mm_and_si128(inside, _mm_set1_epi32(bits as i32)), words[i])
+        })
+    }
+    #[inline(always)]
+    fn zeros(self, words: [__m128i; 4]) -> LaneMask {
+        signs_128(each!(4, |i| unsafe {
+            _mm_castsi128_ps(_mm_cmpeq_epi32(words[i], _mm_setzero_si128()))
+        }))
+    }
+    #[inline(always)]
+    fn equal(self, words: [__m128i; 4], x: u32) -> LaneMask {
+        signs_128(each!(4, |i| unsafe {
+            _mm_castsi128_ps(_mm_cmpeq_epi32(words[i], _mm_set1_epi32(x as i32)))
+        }))
+    }
+    #[inline(always)]
+    fn pack(self, place: &mut [u32; LANES], words: [__m128i; 4], lanes: LaneMask) {
+        // SAFETY: sixteen words may be written.
+        unsafe { self.pack_to(place.as_mut_ptr(), words, lanes) };
+    }
+    #[inline(always)]
+    fn append(self, out: &mut Vec<u32>, row: &[u32; LANES], lanes: LaneMask) {
+        packer::append(self, out, row, lanes);
+    }
+}
+
+// SAFETY: as many words as there are lanes are written, and never more than a row.
+unsafe impl PackTo for Sse2 {
+    #[inline(always)]
+    unsafe fn pack_to(self, place: *mut u32, words: [__m128i; 4], lanes: LaneMask) {
+        let mut row = [0; LANES];
+        for (four, x) in row.chunks_exact_mut(4).zip(words) {
+            unsafe { _mm_storeu_si128(four.as_mut_ptr().cast(), x) };
+        }
+        let (mut left, mut count) = (lanes, 0);
+        while left != 0 {
+            unsafe { *place.add(count) = row[left.trailing_zeros() as usize % LANES] };
+            count += 1;
+            left &= left - 1;
+        }
+    }
+}
+
+#[inline(always)]
+fn signs_128(x: [__m128; 4]) -> LaneMask {
+    let signs = x.map(|x| unsafe { _mm_movemask_ps(x) } as LaneMask);
+    signs[0] | signs[1] << 4 | signs[2] << 8 | signs[3] << 12
+}
