@@ -10,7 +10,8 @@ use crate::geometry::{Aabb, Plane, PlaneRows, ROW_LANES};
 /// rounding of the corners, far less than an item.
 const SLACK: f64 = 1e-5;
 /// Corners whose planes are nearer to parallel than this (as the determinant
-/// of their unit normals) cannot be trusted.
+/// of their unit normals) cannot be trusted: what they err by is some 1e-15 of the
+/// scene's size over that, a tenth of the [`SLACK`] here.
 const LEAST_DETERMINANT: f64 = 1e-9;
 /// Coordinates and plane values beyond this might overflow in f32, where the
 /// plane test then excludes nothing.
@@ -41,6 +42,9 @@ pub fn of_planes(rows: &PlaneRows, half: Vec3, scene: &Aabb) -> Aabb {
     corners_within(rows, half, scene).unwrap_or(*scene)
 }
 
+/// The planes of a view and the faces of the scene.
+const MOST_HALVES: usize = ROW_LANES + 6;
+
 /// A half-space in f64 with a unit normal.
 #[derive(Clone, Copy)]
 struct Half {
@@ -55,7 +59,7 @@ fn corners_within(rows: &PlaneRows, half: Vec3, scene: &Aabb) -> Option<Aabb> {
     let mut halves = [Half {
         normal: DVec3::ZERO,
         d: 0.0,
-    }; ROW_LANES + 6];
+    }; MOST_HALVES];
     let mut count = 0;
     for plane in rows.planes() {
         if let Some(moved) = moved_outward(&plane, half.as_dvec3(), reach)? {
@@ -75,22 +79,31 @@ fn corners_within(rows: &PlaneRows, half: Vec3, scene: &Aabb) -> Option<Aabb> {
         count += 2;
     }
     let halves = &halves[..count];
+    let mut crossed = [[DVec3::ZERO; MOST_HALVES]; MOST_HALVES];
+    for (i, a) in halves.iter().enumerate() {
+        for (j, b) in halves[..i].iter().enumerate() {
+            crossed[i][j] = a.normal.cross(b.normal);
+        }
+    }
     let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for (i, a) in halves.iter().enumerate() {
         for (j, b) in halves[..i].iter().enumerate() {
-            let line = a.normal.cross(b.normal);
-            for c in &halves[..j] {
+            let line = crossed[i][j];
+            for (k, c) in halves[..j].iter().enumerate() {
                 let determinant = line.dot(c.normal);
                 if determinant == 0.0 {
+                    continue;
+                }
+                let scaled = crossed[i][k] * b.d - crossed[j][k] * a.d - line * c.d;
+                // Outside the scene without a doubt, as where the near plane
+                // meets the far one, which rounding left not quite parallel.
+                if scaled.abs().max_element() > 2.0 * size * (determinant.abs() + 1e-12) {
                     continue;
                 }
                 if determinant.abs() < LEAST_DETERMINANT {
                     return None;
                 }
-                let corner = (b.normal.cross(c.normal) * -a.d
-                    + c.normal.cross(a.normal) * -b.d
-                    + line * -c.d)
-                    / determinant;
+                let corner = scaled / determinant;
                 let lies_in = |h: &Half| h.normal.dot(corner) + h.d >= -SLACK * size;
                 if halves.iter().all(lies_in) {
                     (min, max) = (min.min(corner), max.max(corner));
@@ -149,11 +162,20 @@ mod tests {
         #[test]
         fn no_item_of_the_answer_has_its_centre_outside(
             items in prop::collection::vec(item(), 1..40),
-            planes in prop::collection::vec((vector(1.0), vector(40.0)), 0..=ROW_LANES),
+            planes in prop::collection::vec((vector(1.0), vector(40.0)), 0..=ROW_LANES / 2),
+            // For each a second one, nearly parallel to it or to its other side.
+            seconds in prop::collection::vec(
+                (any::<bool>(), -9i32..-3, vector(1.0), vector(40.0)),
+                0..=ROW_LANES / 2,
+            ),
             p in vector(50.0),
         ) {
-            let planes: Vec<Plane> =
-                planes.into_iter().map(|(normal, point)| Plane::through(point, normal)).collect();
+            let seconds = planes.iter().zip(seconds).map(|((normal, _), (same, by, off, point))| {
+                let normal = if same { *normal } else { -*normal };
+                (normal + off * 10f32.powi(by), point)
+            });
+            let planes: Vec<Plane> = planes.iter().copied().chain(seconds)
+                .map(|(normal, point)| Plane::through(point, normal)).collect();
             let rows = PlaneRows::collect(planes.iter()).expect("eight at most");
             let scene = Aabb::union_of(&items);
             let largest = items.iter().fold(Vec3::ZERO, |h, b| h.max(b.extent() * 0.5));
@@ -184,5 +206,27 @@ mod tests {
             .abs()
             .max((centres.max - wanted.max).abs());
         assert!(off.max_element() < 0.1, "{centres:?}");
+    }
+
+    /// Turned anyhow, so that rounding leaves the near plane and the far one not
+    /// quite parallel: they meet far outside, and that corner says nothing.
+    #[test]
+    fn a_frustum_is_bounded_however_it_is_turned() {
+        let scene = Aabb::around(Vec3::ZERO, Vec3::splat(1000.0));
+        for i in 0..500 {
+            let turn =
+                glam::Quat::from_axis_angle(Vec3::new(0.3, -0.5, 0.8).normalize(), 0.37 * i as f32)
+                    * glam::Quat::from_rotation_x(0.11 * i as f32);
+            let sides = [Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y].map(|side| side - Vec3::Z);
+            let sides = sides.map(|inward| Plane::through(Vec3::ZERO, turn * inward));
+            let ahead = turn * -Vec3::Z;
+            let near = Plane::through(ahead, ahead);
+            let far = Plane::through(ahead * 10.0, turn * Vec3::Z);
+            let planes = sides.iter().chain([&near, &far]);
+            let rows = PlaneRows::collect(planes).expect("six planes");
+            let centres = of_planes(&rows, Vec3::splat(0.5), &scene);
+            // From corner to corner of the far side, moved outward.
+            assert!(centres.extent().max_element() < 36.0, "{i}: {centres:?}");
+        }
     }
 }
