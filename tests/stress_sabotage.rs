@@ -124,6 +124,22 @@ static BROKEN: [(&Backend, &str, &str); 5] = [
     (backend!(flushed), "E08-ftz-false-negative", "denormals"),
 ];
 
+/// Another crate's code may end the thread that it runs on.
+static PANICKING: [&Backend; 2] = [
+    &Backend {
+        name: "panics-while-building",
+        summary: "for this test",
+        build: |_, _, _| panic!("deep in a crate"),
+        params: |params| Ok(params.clone()),
+    },
+    &Backend {
+        name: "panics-while-asked",
+        summary: "for this test",
+        build: |items, _, _| scan(items, |_, _, _| panic!("deep in a crate")),
+        params: |params| Ok(params.clone()),
+    },
+];
+
 fn spec(backend: &'static Backend) -> StructureSpec {
     StructureSpec {
         label: backend.name.to_owned(),
@@ -188,6 +204,31 @@ fn each_broken_structure_fails_a_vector_and_a_generated_case() {
         let mut faults = found.iter().flat_map(|f| &f.faults);
         let caught = faults.any(|f| f.structure == backend.name && f.item.is_some());
         assert!(caught, "{} passes {family}", backend.name);
+    }
+}
+
+#[test]
+fn a_panic_is_a_failure_of_that_structure_alone() {
+    for backend in PANICKING {
+        let structures = [spec(backend), spec(SOUND)];
+        let rows = failed(&structures);
+        let told = |text: &str| text == "panicked: deep in a crate";
+        assert!(rows.len() > 5, "{}: {rows:?}", backend.name);
+        for row in rows {
+            assert_eq!(row.structure, backend.name, "{row:?}");
+            assert!(told(&row.got.to_string()), "{row:?}");
+        }
+        for family in ["near-far", PLANES_FAMILIES[0].name] {
+            let faults: Vec<_> = findings(family, &structures)
+                .into_iter()
+                .flat_map(|f| f.faults)
+                .collect();
+            assert!(!faults.is_empty(), "{} passes {family}", backend.name);
+            for fault in faults {
+                assert_eq!(fault.structure, backend.name, "{family}: {fault:?}");
+                assert!(told(&fault.got), "{family}: {fault:?}");
+            }
+        }
     }
 }
 

@@ -35,8 +35,7 @@ pub fn ask_all(
     for spec in structures {
         let failed = |why: String| anyhow::anyhow!("structure '{}': {why}", spec.label);
         let panicked = |verdict: Verdict| failed(verdict.reason.unwrap_or_default());
-        let built = guarded(|| spec.build_with(boxes, scene.own_tree.as_ref()));
-        let index = match built.map_err(panicked)? {
+        let index = match spec.build_with(boxes, scene.own_tree.as_ref()) {
             Ok(index) => index,
             // One of many: the others' answers are worth having.
             Err(error @ BuildError::Refused { .. }) if structures.len() > 1 => {

@@ -354,14 +354,18 @@ fn random_cases(structures: &[StructureSpec], seed: u64, cases: u64) -> Vec<Chec
             if check.difference.is_some() {
                 continue;
             }
-            let answered = guarded(|| match spec.build(&case.items) {
-                Ok(index) => differ(&case, index.as_ref(), &mut seen, &mut holding),
-                Err(BuildError::Refused { .. }) => None,
-                Err(error) => Some(error.to_string()),
-            });
-            let (status, difference) = match answered {
-                Ok(difference) => (Status::Wrong, difference),
-                Err(verdict) => (verdict.status, verdict.reason),
+            let (status, difference) = match spec.build(&case.items) {
+                Ok(index) => {
+                    match guarded(|| differ(&case, index.as_ref(), &mut seen, &mut holding)) {
+                        Ok(difference) => (Status::Wrong, difference),
+                        Err(verdict) => (verdict.status, verdict.reason),
+                    }
+                }
+                Err(BuildError::Refused { .. }) => (Status::Ok, None),
+                Err(error @ BuildError::Panicked { .. }) => {
+                    (Status::Panicked, Some(error.to_string()))
+                }
+                Err(error) => (Status::Wrong, Some(error.to_string())),
             };
             if let Some(difference) = difference {
                 check.status = status.name();

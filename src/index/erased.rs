@@ -11,7 +11,7 @@ use serde_json::{Map, Value};
 use super::peers;
 use super::{
     Bsp, BuildError, Bvh, FrustumQuery, Linear, LinearScalar, MemoryUsage, Octree, Quadtree,
-    RegionIndex, Wide,
+    RegionIndex, Wide, caught,
 };
 use crate::geometry::{Aabb, ConvexVolume, PlaneTree};
 use crate::kernel::{Isa, Kernel, Work};
@@ -384,7 +384,8 @@ impl StructureSpec {
         items: &[Aabb],
         own_tree: Option<&PlaneTree>,
     ) -> Result<Box<dyn DynIndex>, BuildError> {
-        (self.backend.build)(items, own_tree, &self.params)
+        let build = || (self.backend.build)(items, own_tree, &self.params);
+        caught(build).unwrap_or_else(|message| Err(BuildError::Panicked { message }))
     }
 
     /// Brings an index up to date after items have moved: by refitting where

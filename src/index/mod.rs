@@ -11,6 +11,7 @@ mod by_plane;
 mod by_tree;
 mod cells;
 mod erased;
+mod foreign;
 mod frontier;
 mod id_rows;
 mod linear;
@@ -45,6 +46,7 @@ pub use block_order::BlockOrder;
 pub use bsp::{Bsp, BspBuilder, BspParams};
 pub use bvh::{Bvh, BvhLayout, BvhParams, BvhPreset};
 pub use erased::{BACKENDS, Backend, DynIndex, StructureSpec, structures};
+pub use foreign::caught;
 pub use linear::{Linear, LinearScalar};
 pub use octree::{CellParams, Octree};
 pub use parallel::{Crew, see_each};
@@ -68,6 +70,9 @@ pub enum BuildError {
         structure: &'static str,
         reason: String,
     },
+    /// The structure's own code did.
+    #[error("panicked: {message}")]
+    Panicked { message: String },
     #[error("parameters of '{structure}': {reason}")]
     Params {
         structure: &'static str,

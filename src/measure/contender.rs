@@ -2,14 +2,13 @@
 //! data so that nobody is warmed by a neighbour. It owns the timing of the
 //! build and the net under panics.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
 
 use super::clock::Stopwatch;
 use super::{Status, Verdict};
 use crate::culling::CullingTest;
 use crate::geometry::Aabb;
-use crate::index::{BuildError, DynIndex, MemoryUsage, StructureSpec};
+use crate::index::{BuildError, DynIndex, MemoryUsage, StructureSpec, caught};
 use crate::query::ItemId;
 use crate::scene::Scene;
 use crate::statistics::median;
@@ -80,7 +79,6 @@ impl Contender {
 
 fn build(spec: &StructureSpec, scene: &Scene, test: CullingTest) -> Result<Built, Verdict> {
     let items = test.items(&scene.items);
-    let refused = |error| Verdict::new(Status::Refused, format!("{error}"));
     let (mut times, mut index) = (Vec::new(), None);
     let total = Stopwatch::start();
     while times.len() < BUILDS && total.lap().wall_ns < BUILD_TIME.as_nanos() as f64 {
@@ -89,7 +87,7 @@ fn build(spec: &StructureSpec, scene: &Scene, test: CullingTest) -> Result<Built
         let watch = Stopwatch::start();
         index = Some(
             spec.build_with(&items, scene.own_tree.as_ref())
-                .map_err(refused)?,
+                .map_err(not_built)?,
         );
         // This thread's CPU time says nothing about what others did for it.
         let lap = watch.lap();
@@ -98,10 +96,10 @@ fn build(spec: &StructureSpec, scene: &Scene, test: CullingTest) -> Result<Built
     }
     let mut update_ms = Vec::new();
     if let Some(spare) = index.take() {
-        update_ms = measure_updates(spec, scene, &items, spare).map_err(refused)?;
+        update_ms = measure_updates(spec, scene, &items, spare).map_err(not_built)?;
         index = Some(
             spec.build_with(&items, scene.own_tree.as_ref())
-                .map_err(refused)?,
+                .map_err(not_built)?,
         );
     }
     let Some(index) = index else {
@@ -113,7 +111,7 @@ fn build(spec: &StructureSpec, scene: &Scene, test: CullingTest) -> Result<Built
     } else {
         Some(
             spec.build_with(boxes, scene.own_tree.as_ref())
-                .map_err(refused)?,
+                .map_err(not_built)?,
         )
     };
     Ok(Built {
@@ -163,12 +161,14 @@ pub fn move_share(items: &mut [Aabb], share: f64) -> Vec<ItemId> {
 
 /// Runs foreign code; a panic becomes a verdict with its message.
 pub fn guarded<T>(work: impl FnOnce() -> T) -> Result<T, Verdict> {
-    catch_unwind(AssertUnwindSafe(work)).map_err(|panic| {
-        let text = panic
-            .downcast_ref::<String>()
-            .map(String::as_str)
-            .or_else(|| panic.downcast_ref::<&str>().copied())
-            .unwrap_or("no message");
-        Verdict::new(Status::Panicked, format!("panicked: {text}"))
-    })
+    caught(work).map_err(|text| Verdict::new(Status::Panicked, format!("panicked: {text}")))
+}
+
+/// Why there is nothing to ask.
+fn not_built(error: BuildError) -> Verdict {
+    let status = match error {
+        BuildError::Panicked { .. } => Status::Panicked,
+        _ => Status::Refused,
+    };
+    Verdict::new(status, error.to_string())
 }

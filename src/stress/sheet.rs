@@ -8,7 +8,7 @@ use super::{Level, Names, Row, Said, Status, Vector};
 use crate::camera::{Camera, Surroundings};
 use crate::culling::CullingTest;
 use crate::geometry::{Aabb, ConvexVolume};
-use crate::index::{BuildError, DynIndex};
+use crate::index::{BuildError, DynIndex, caught};
 use crate::oracle::{Oracle, Verdict};
 use crate::query::{AnyView, ItemId, QueryCost};
 use crate::verify::explain_visibility;
@@ -70,12 +70,12 @@ impl Sheet<'_> {
     ) -> Result<Vec<String>, String> {
         let index = built.as_ref().map_err(BuildError::to_string)?;
         let (mut plain, mut counted) = (Vec::new(), Vec::new());
-        ask(index.as_ref(), None, &mut plain);
-        ask(
-            index.as_ref(),
-            Some(&mut QueryCost::default()),
-            &mut counted,
-        );
+        caught(|| {
+            ask(index.as_ref(), None, &mut plain);
+            let cost = &mut QueryCost::default();
+            ask(index.as_ref(), Some(cost), &mut counted);
+        })
+        .map_err(|text| format!("panicked: {text}"))?;
         if plain != counted {
             return Err(format!(
                 "counting changes the answer: {plain:?}, {counted:?}"

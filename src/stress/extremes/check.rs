@@ -7,7 +7,7 @@ use glam::DVec3;
 use crate::camera::{Camera, PlaneMethod, PlaneOptions, Surroundings};
 use crate::culling::{ARITHMETICS, Arithmetic, Culling, CullingTest, TESTS};
 use crate::geometry::Aabb;
-use crate::index::{DynIndex, StructureSpec};
+use crate::index::{DynIndex, StructureSpec, caught};
 use crate::oracle::{Judgement, Oracle, Pose, Verdict};
 use crate::query::{AnyView, ItemId};
 use crate::stress::slack;
@@ -329,7 +329,10 @@ fn ask(
     for (structure, index) in built {
         found.asked.push(((*structure).to_owned(), name.to_owned()));
         answer.clear();
-        index.see(view, &mut answer);
+        if let Err(text) = caught(|| index.see(view, &mut answer)) {
+            found.panicked(structure, name, &text);
+            continue;
+        }
         let difference = reference.compare(&answer);
         if !difference.is_none() {
             let item = difference.first.map(|id| id as usize);
@@ -341,6 +344,17 @@ fn ask(
 }
 
 impl Findings {
+    /// A structure ended in place of answering.
+    pub fn panicked(&mut self, structure: &str, test: &str, text: &str) {
+        self.fault(
+            structure,
+            test,
+            None,
+            "an answer",
+            format!("panicked: {text}"),
+        );
+    }
+
     pub fn fault(
         &mut self,
         structure: &str,

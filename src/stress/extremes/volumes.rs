@@ -8,7 +8,7 @@ use super::check::{Findings, SCALAR};
 use crate::geometry::{
     Aabb, ConvexVolume, Plane, RelativeVolume, Spheres, WideVolume, sphere_cube,
 };
-use crate::index::StructureSpec;
+use crate::index::{StructureSpec, caught};
 use crate::oracle::{Oracle, Verdict};
 use crate::query::{AnyView, ItemId};
 use crate::scene::{Dice, Regions};
@@ -125,16 +125,22 @@ impl PlanesCase {
         let mut answer = Vec::new();
         for spec in structures {
             let built = [spec.build(&self.items), spec.build(&cubes)];
-            let [Ok(boxes), Ok(spheres)] = &built else {
-                found.fault(&spec.label, "build", None, "built", "refused".to_owned());
-                continue;
+            let [boxes, spheres] = match &built {
+                [Ok(boxes), Ok(spheres)] => [boxes, spheres],
+                [Err(error), _] | [_, Err(error)] => {
+                    found.fault(&spec.label, "build", None, "built", error.to_string());
+                    continue;
+                }
             };
             for (name, view, items) in &views {
                 let index = if *name == "sphere" { spheres } else { boxes };
                 let wanted = items.iter().zip(0..).filter(|(b, _)| view.sees(b));
                 let count = reference.expect(wanted.map(|(_, id): (_, ItemId)| id));
                 answer.clear();
-                index.see(*view, &mut answer);
+                if let Err(text) = caught(|| index.see(*view, &mut answer)) {
+                    found.panicked(&spec.label, name, &text);
+                    continue;
+                }
                 self.compare(
                     &mut reference,
                     &answer,
@@ -147,7 +153,10 @@ impl PlanesCase {
             let holding = Regions::Items.holding(self.point, &self.items);
             let count = reference.expect(holding.into_iter());
             answer.clear();
-            boxes.locate(self.point, &mut answer);
+            if let Err(text) = caught(|| boxes.locate(self.point, &mut answer)) {
+                found.panicked(&spec.label, "locate", &text);
+                continue;
+            }
             self.compare(
                 &mut reference,
                 &answer,
