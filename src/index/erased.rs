@@ -372,13 +372,13 @@ impl StructureSpec {
     /// Builds over boxes that bring no partition of their own.
     ///
     /// # Errors
-    /// As [`RegionIndex::build`].
+    /// As [`StructureSpec::build_with`].
     pub fn build(&self, items: &[Aabb]) -> Result<Box<dyn DynIndex>, BuildError> {
         self.build_with(items, None)
     }
 
     /// # Errors
-    /// As [`RegionIndex::build`].
+    /// As [`RegionIndex::build`]; a panic of the structure's code.
     pub fn build_with(
         &self,
         items: &[Aabb],
