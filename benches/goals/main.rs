@@ -3,17 +3,17 @@
 //! another crate whose answers are right, and against the bounds. Exits 3 if one
 //! is missed. Where that is a stand-in for a crate, the fastest crate proper is
 //! judged as well. Crates far behind the fastest in a heat are left out of a row, for
-//! time. What is to be reached stands in `table`. Words after `--` choose rows by what their names contain; `-- --test`
-//! only checks, on a thousand items, that every row runs.
+//! time. What is to be reached stands in `table`. Words after `--` choose rows by what
+//! their names contain; `-- --test` only checks, on a thousand items, that every row
+//! runs.
 
 mod table;
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 use std::time::Duration;
 
 use cullbench::culling::{Culling, CullingTest};
-use cullbench::index::{BACKENDS, Backend, RegionIndex, StructureSpec, TreeOrder, Wide};
+use cullbench::index::{BACKENDS, Backend, RegionIndex, StructureSpec, TreeOrder, Wide, caught};
 use cullbench::measure::{
     BOUNDS, Cell, Contender, Group, Machine, Metric, Protocol, Status, Stopwatch, Workload,
     harness_overhead_ns, measure_group,
@@ -160,7 +160,7 @@ fn heat(entered: Vec<Contender>, workload: &Workload) -> (Vec<Contender>, Vec<Co
             }
             watch.lap().cpu_ns
         };
-        let laps = catch_unwind(AssertUnwindSafe(|| [lap(), lap()]));
+        let laps = caught(|| [lap(), lap()]);
         laps.ok().map(|[_, second]| second)
     };
     let of_peers = |c: &Contender| is_peer(&c.spec.label).then(|| time(c)).flatten();
