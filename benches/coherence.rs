@@ -6,17 +6,13 @@
 
 use std::ops::ControlFlow;
 use std::process::ExitCode;
-use std::time::Duration;
 
 use cullbench::camera::PlaneOptions;
 use cullbench::geometry::{ConvexVolume, LaneMask};
 use cullbench::index::{DynIndex, Foreseen, FrustumQuery, RegionIndex, Wide};
 use cullbench::kernel::Isa;
-use cullbench::measure::{
-    Ask, Competitor, Machine, Protocol, Timed, harness_overhead_ns, timed_rounds,
-};
+use cullbench::measure::{Ask, Competitor, Machine, Protocol, Timed, paired_ratio, timed_rounds};
 use cullbench::query::{ItemId, QueryCost, Recorder, Sink};
-use cullbench::statistics::bootstrap_median;
 use cullbench::{path, scene};
 
 const SCENES: [&str; 3] = ["uniform:n=100000", "uniform:n=1000000", "city:n=1000000"];
@@ -100,13 +96,11 @@ fn main() -> ExitCode {
     let only_test = words.iter().any(|word| word == "--test");
     let cold = words.iter().any(|word| word == "--cold");
     let protocol = Protocol {
-        min_rounds: if only_test { 1 } else { 9 },
-        max_rounds: if only_test { 1 } else { 45 },
-        budget: Duration::from_secs(if only_test { 0 } else { 3 }),
-        pass: Duration::from_millis(if only_test { 20 } else { 100 }),
+        rounds: if only_test { [1, 1] } else { [9, 45] },
+        task_ns: 1e9,
+        cameras: if only_test { 8 } else { ASKED },
         cold,
         seed: 1,
-        overhead_ns: harness_overhead_ns(),
         cache_bytes: Machine::capture().cache_sweep_bytes(),
     };
     println!(
@@ -162,20 +156,16 @@ fn main() -> ExitCode {
                     ask,
                     ask_many: None,
                     expected: expected.clone(),
-                    slowest: Duration::from_micros(100),
+                    least_ns: None,
                 });
                 let timed = timed_rounds(volumes.len(), &competitors, &protocol, &|| false);
-                let means: Vec<Vec<f64>> = timed
+                let timed: Vec<Timed> = timed
                     .expect("not stopped")
-                    .iter()
-                    .map(|timed| timed.as_ref().map(Timed::round_means).expect("right ids"))
+                    .into_iter()
+                    .map(|timed| timed.expect("right ids"))
                     .collect();
-                let ratio = |other: usize| {
-                    let rounds = means[0].iter().zip(&means[other]);
-                    let ratios: Vec<f64> = rounds.map(|(whole, other)| whole / other).collect();
-                    bootstrap_median(&ratios, 1).expect("a round")
-                };
-                let us = bootstrap_median(&means[0], 1).expect("a round").value / 1e3;
+                let ratio = |other: usize| paired_ratio(&timed[0], &timed[other]).expect("a round");
+                let us = timed[0].ns().expect("a round") / 1e3;
                 let (twin, gain) = (ratio(1), ratio(2));
                 let leaves: Vec<usize> = foreseen.iter().map(Foreseen::leaves).collect();
                 let seen = portrait(&copies[0], &volumes, &leaves);

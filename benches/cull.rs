@@ -10,7 +10,7 @@ use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, 
 use cullbench::camera::PlaneOptions;
 use cullbench::culling::Culling;
 use cullbench::geometry::BoxBlocks;
-use cullbench::index::{BACKENDS, StructureSpec};
+use cullbench::index::{Registry, StructureSpec};
 use cullbench::kernel::BASELINE;
 use cullbench::measure::{UPDATE_SHARES, Workload, move_share};
 use cullbench::path;
@@ -35,10 +35,10 @@ fn build(c: &mut Criterion) {
     for (source, _) in WORKLOADS {
         let scene = load(source);
         group.throughput(Throughput::Elements(scene.items.len() as u64));
-        for backend in BACKENDS {
-            let spec = StructureSpec::parse(backend.name).expect(backend.name);
-            group.bench_function(BenchmarkId::new(backend.name, source), |b| {
-                b.iter(|| spec.build(black_box(&scene.items)).expect(backend.name));
+        for row in Registry::builtin().rows() {
+            let spec = StructureSpec::parse(row.info.name).expect(row.info.name);
+            group.bench_function(BenchmarkId::new(row.info.name, source), |b| {
+                b.iter(|| spec.build(black_box(&scene.items)).expect(row.info.name));
             });
         }
     }
@@ -54,11 +54,11 @@ fn cull(c: &mut Criterion) {
         let cameras = path::load(way, &scene, &Default::default()).expect(way);
         let workload = Workload::new(&scene, &cameras, &Culling::default()).expect(way);
         group.throughput(Throughput::Elements(workload.views.len() as u64));
-        for backend in BACKENDS {
-            let spec = StructureSpec::parse(backend.name).expect(backend.name);
-            let index = spec.build(&scene.items).expect(backend.name);
+        for row in Registry::builtin().rows() {
+            let spec = StructureSpec::parse(row.info.name).expect(row.info.name);
+            let index = spec.build(&scene.items).expect(row.info.name);
             let mut out = Vec::new();
-            group.bench_function(BenchmarkId::new(backend.name, source), |b| {
+            group.bench_function(BenchmarkId::new(row.info.name, source), |b| {
                 b.iter(|| {
                     for view in &workload.views {
                         out.clear();
@@ -80,17 +80,17 @@ fn locate(c: &mut Criterion) {
         let cameras = path::load(way, &scene, &Default::default()).expect(way);
         let workload = Workload::new(&scene, &cameras, &Culling::default()).expect(way);
         group.throughput(Throughput::Elements(workload.points.len() as u64));
-        for backend in BACKENDS {
-            let spec = StructureSpec::parse(backend.name).expect(backend.name);
+        for row in Registry::builtin().rows() {
+            let spec = StructureSpec::parse(row.info.name).expect(row.info.name);
             let boxes = scene.regions.boxes(&scene.items);
-            let index = spec.build(boxes).expect(backend.name);
+            let index = spec.build(boxes).expect(row.info.name);
             let mut out = Vec::new();
-            group.bench_function(BenchmarkId::new(backend.name, source), |b| {
+            group.bench_function(BenchmarkId::new(row.info.name, source), |b| {
                 b.iter(|| {
-                    for &p in &workload.points {
+                    for (place, &p) in workload.points.iter().enumerate() {
                         out.clear();
                         index.locate(p, &mut out);
-                        workload.refine(p, &mut out);
+                        workload.refine(place, &mut out);
                         black_box(&out);
                     }
                 });
@@ -106,18 +106,18 @@ fn update(c: &mut Criterion) {
     group.sample_size(10);
     for source in ["uniform:n=100000", "city:n=100000"] {
         let scene = load(source);
-        for backend in BACKENDS {
-            let spec = StructureSpec::parse(backend.name).expect(backend.name);
+        for row in Registry::builtin().rows() {
+            let spec = StructureSpec::parse(row.info.name).expect(row.info.name);
             for share in UPDATE_SHARES {
                 let mut items = scene.items.clone();
                 let moved = move_share(&mut items, share);
                 let name = format!("{source}/{}%", share * 100.0);
-                group.bench_function(BenchmarkId::new(backend.name, name), |b| {
+                group.bench_function(BenchmarkId::new(row.info.name, name), |b| {
                     b.iter_batched_ref(
-                        || spec.build(&scene.items).expect(backend.name),
+                        || spec.build(&scene.items).expect(row.info.name),
                         |index| {
                             spec.update(index, &items, None, &moved)
-                                .expect(backend.name)
+                                .expect(row.info.name)
                         },
                         BatchSize::PerIteration,
                     );

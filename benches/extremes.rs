@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use cullbench::geometry::Aabb;
-use cullbench::index::{BACKENDS, StructureSpec};
+use cullbench::index::{Registry, StructureSpec};
 use cullbench::scene;
 use glam::Vec3;
 
@@ -77,12 +77,16 @@ fn main() -> ExitCode {
         .items;
     let mut missed = 0;
     let chosen = |name: &str| wanted.as_deref().is_none_or(|w| w == name);
-    for backend in BACKENDS.iter().filter(|b| chosen(b.name)) {
-        let spec = StructureSpec::parse(backend.name).expect(backend.name);
+    for row in Registry::builtin()
+        .rows()
+        .iter()
+        .filter(|row| chosen(row.info.name))
+    {
+        let spec = StructureSpec::parse(row.info.name).expect(row.info.name);
         let base = build_time(&spec, &uniform);
         println!(
             "{}: uniform {:.0} ns an item",
-            backend.name,
+            row.info.name,
             base / n as f64 * 1e9
         );
         for (name, shape) in SHAPES {

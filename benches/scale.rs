@@ -1,6 +1,6 @@
 //! How builds, memory and queries grow from ten thousand to ten million boxes,
 //! and with `--huge` to a hundred million: build time and bytes an item, the
-//! peak of resident memory, query medians at five hundred visible items and at
+//! peak of resident memory, query times at five hundred visible items and at
 //! 2 %, and the exponent e of N^e at the fixed count. Every number of ids is
 //! compared with a scan. Words keep structures of these names and sizes of these
 //! numbers; `-- --test` only checks that everything runs. Exits 3 if a goal of
@@ -12,8 +12,7 @@ use std::time::Duration;
 use cullbench::culling::Culling;
 use cullbench::index::StructureSpec;
 use cullbench::measure::{
-    Ask, Competitor, Machine, Protocol, Stopwatch, Timed, Workload, harness_overhead_ns,
-    timed_rounds,
+    Ask, Competitor, Machine, Protocol, Stopwatch, Timed, Workload, cameras_within, timed_rounds,
 };
 use cullbench::query::AnyView;
 use cullbench::statistics::{median, slope};
@@ -87,13 +86,11 @@ fn main() -> ExitCode {
         .filter(|w| !w.starts_with('-') && number(w).is_none())
         .collect();
     let protocol = Protocol {
-        min_rounds: if only_test { 1 } else { 9 },
-        max_rounds: if only_test { 1 } else { 45 },
-        budget: Duration::from_secs(if only_test { 0 } else { 3 }),
-        pass: Duration::from_millis(if only_test { 20 } else { 100 }),
+        rounds: if only_test { [1, 1] } else { [9, 45] },
+        task_ns: 3e9,
+        cameras: 0,
         cold: false,
         seed: 1,
-        overhead_ns: harness_overhead_ns(),
         cache_bytes: Machine::capture().cache_sweep_bytes(),
     };
     let sizes: &[usize] = match (only_test, huge) {
@@ -150,15 +147,18 @@ fn main() -> ExitCode {
                     ask,
                     ask_many: None,
                     expected: expected[which].clone(),
-                    slowest: Duration::from_nanos(n as u64),
+                    least_ns: None,
+                };
+                let protocol = Protocol {
+                    cameras: if only_test { 8 } else { cameras_within(1e9, n) },
+                    ..protocol
                 };
                 let timed = timed_rounds(workload.views.len(), &[competitor], &protocol, &|| false);
                 let timed: Timed = timed
                     .expect("not stopped")
                     .remove(0)
                     .expect("as many ids as a scan finds");
-                let ns: Vec<f64> = timed.samples.iter().map(|s| s.cpu_ns).collect();
-                let ns = median(&ns).unwrap_or(f64::NAN);
+                let ns = timed.ns().unwrap_or(f64::NAN);
                 let count = expected[which].iter().sum::<u64>() / expected[which].len() as u64;
                 cells += &format!(" {count} | {:.2} |", ns / 1e3);
                 if which == 0 && n <= 10_000_000 {

@@ -6,16 +6,12 @@
 
 use std::cell::RefCell;
 use std::process::ExitCode;
-use std::time::{Duration, Instant};
 
 use cullbench::camera::{PlaneOptions, ViewSet};
 use cullbench::geometry::ConvexVolume;
 use cullbench::index::{DynIndex, RegionIndex, Wide};
-use cullbench::measure::{
-    Ask, Competitor, Machine, Protocol, Timed, harness_overhead_ns, timed_rounds,
-};
+use cullbench::measure::{Ask, Competitor, Machine, Protocol, Timed, paired_ratio, timed_rounds};
 use cullbench::query::{AnyView, ItemId};
-use cullbench::statistics::bootstrap_median;
 use cullbench::{path, scene};
 
 const SCENES: [&str; 4] = [
@@ -54,19 +50,16 @@ fn together(index: &Wide, views: &[AnyView<'_>], out: &mut [Vec<ItemId>]) {
 struct Questions {
     volumes: Vec<Vec<ConvexVolume>>,
     lengths: Vec<Vec<usize>>,
-    slowest: Duration,
 }
 
 impl Questions {
     /// Asks both ways once; the lists must be the same, in the same order.
     fn new(volumes: Vec<Vec<ConvexVolume>>, index: &Wide) -> Questions {
-        let (mut lengths, mut slowest) = (Vec::new(), Duration::ZERO);
+        let mut lengths = Vec::new();
         for volumes in &volumes {
             let views: Vec<AnyView> = volumes.iter().map(AnyView::from).collect();
             let (mut one, mut other) = (vec![Vec::new(); views.len()], vec![vec![]; views.len()]);
-            let started = Instant::now();
             separately(index, &views, &mut one);
-            slowest = slowest.max(started.elapsed());
             together(index, &views, &mut other);
             lengths.push(one.iter().map(Vec::len).collect());
             one.iter_mut()
@@ -74,11 +67,7 @@ impl Questions {
                 .for_each(|ids| ids.sort_unstable());
             assert!(one == other, "one pass gives other sets");
         }
-        Questions {
-            volumes,
-            lengths,
-            slowest,
-        }
+        Questions { volumes, lengths }
     }
 
     /// The number of "ids" of a sample is the number of lists that are as long
@@ -104,7 +93,7 @@ impl Questions {
             ask,
             ask_many: None,
             expected: self.lengths.iter().map(|l| l.len() as u64).collect(),
-            slowest: self.slowest,
+            least_ns: None,
         }
     }
 }
@@ -115,13 +104,11 @@ fn main() -> ExitCode {
     let cold = words.iter().any(|word| word == "--cold");
     let wanted: Vec<&String> = words.iter().filter(|w| !w.starts_with('-')).collect();
     let protocol = Protocol {
-        min_rounds: if only_test { 1 } else { 9 },
-        max_rounds: if only_test { 1 } else { 45 },
-        budget: Duration::from_secs(if only_test { 0 } else { 3 }),
-        pass: Duration::from_millis(if only_test { 20 } else { 100 }),
+        rounds: if only_test { [1, 1] } else { [9, 45] },
+        task_ns: 1e9,
+        cameras: if only_test { 8 } else { 64 },
         cold,
         seed: 1,
-        overhead_ns: harness_overhead_ns(),
         cache_bytes: Machine::capture().cache_sweep_bytes(),
     };
     println!("| scene | visible | views | us apart | apart / one pass | A/A |");
@@ -161,17 +148,13 @@ fn main() -> ExitCode {
                     .map(|(index, way)| questions.competitor(index, way))
                     .collect();
                 let timed = timed_rounds(cameras.cameras.len(), &competitors, &protocol, &|| false);
-                let means: Vec<Vec<f64>> = timed
+                let timed: Vec<Timed> = timed
                     .expect("not stopped")
-                    .iter()
-                    .map(|timed| timed.as_ref().map(Timed::round_means).expect("right lists"))
+                    .into_iter()
+                    .map(|timed| timed.expect("right lists"))
                     .collect();
-                let ratio = |other: usize| {
-                    let rounds = means[0].iter().zip(&means[other]);
-                    let ratios: Vec<f64> = rounds.map(|(apart, other)| apart / other).collect();
-                    bootstrap_median(&ratios, 1).expect("a round")
-                };
-                let us = bootstrap_median(&means[0], 1).expect("a round").value / 1e3;
+                let ratio = |other: usize| paired_ratio(&timed[0], &timed[other]).expect("a round");
+                let us = timed[0].ns().expect("a round") / 1e3;
                 let (twin, shared) = (ratio(1), ratio(2));
                 println!(
                     "| {source} | {share} | {name} | {us:.1} | {:.3} [{:.3}, {:.3}] | {:.3} |",

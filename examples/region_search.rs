@@ -4,7 +4,7 @@
 //! Prints Markdown.
 
 use cullbench::geometry::Aabb;
-use cullbench::index::{BACKENDS, StructureSpec};
+use cullbench::index::{Registry, StructureSpec};
 use cullbench::query::QueryCost;
 use glam::Vec3;
 
@@ -65,8 +65,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         println!("\n### {title}\n");
         println!("| structure | 1,000 | 10,648 | 97,336 | 1,000,000 | growth exponent |");
         println!("|---|--:|--:|--:|--:|--:|");
-        for backend in BACKENDS {
-            let spec = StructureSpec::parse(backend.name)?;
+        for row in Registry::builtin().rows() {
+            let spec = StructureSpec::parse(row.info.name)?;
             let mut counts = Vec::new();
             for side in SIZES {
                 let boxes = regions(side);
@@ -88,7 +88,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let cells: Vec<String> = counts.iter().map(|(_, c)| format!("{c:.1}")).collect();
             println!(
                 "| `{}` | {} | {:.2} |",
-                backend.name,
+                row.info.name,
                 cells.join(" | "),
                 exponent(&counts)
             );

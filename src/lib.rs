@@ -15,7 +15,8 @@
 //! - [`culling`]: culling tests and arithmetics: from a camera to a view
 //! - [`oracle`]: the exact verdict about a box and a volume or camera
 //! - [`index`]: the contract [`index::RegionIndex`] and
-//!   [`index::FrustumQuery`], and the structures behind it
+//!   [`index::FrustumQuery`], the structures behind it, and the
+//!   [`index::Registry`] that yours joins
 //! - [`scene`]: generated and real worlds, and the regions in them
 //! - [`path`]: ways through a scene
 //! - [`verify`]: the reference answer and how others differ from it
@@ -25,6 +26,7 @@
 //! - [`drift`]: how methods of turning and chasing drift from the truth
 //! - [`report`]: the files that other tools read; [`suite`]: what to run
 //! - [`spec`] and [`input`]: what users type and the files they bring
+//! - `cli` (feature `cli`): the command line over any registry
 //!
 //! ```
 //! use cullbench::camera::PlaneOptions;
@@ -62,6 +64,8 @@
 pub mod advise;
 pub mod arithmetic;
 pub mod camera;
+#[cfg(feature = "cli")]
+pub mod cli;
 pub mod culling;
 pub mod drift;
 pub mod geometry;
@@ -75,6 +79,7 @@ pub mod precision;
 pub mod query;
 pub mod report;
 pub mod scene;
+pub mod shown;
 pub mod spec;
 pub mod statistics;
 pub mod stress;

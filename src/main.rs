@@ -1,10 +1,11 @@
-//! The `cullbench` program. Everything is in `cli`; the library never depends
-//! on it.
-
-mod cli;
+//! The `cullbench` program: the command line of the library over the
+//! structures of this build.
 
 use std::process::ExitCode;
 
+use cullbench::cli;
+use cullbench::index::Registry;
+
 fn main() -> ExitCode {
-    cli::main()
+    cli::main_with(Registry::builtin())
 }

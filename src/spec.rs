@@ -177,7 +177,9 @@ impl Spec {
         };
         // Plain digits first: a 64-bit seed does not fit an f64.
         let exact = text.replace('_', "").parse::<u64>().ok();
+        // No part of anything: 200 % are not two items.
         let rounded = parse_number(&text)
+            .filter(|_| !text.ends_with('%'))
             .filter(|v| v.fract() == 0.0 && (0.0..9e15).contains(v))
             .map(|v| v as u64);
         exact
@@ -267,6 +269,9 @@ mod tests {
                 .contains("n=many")
         );
         assert_eq!(spec.whole("seed", 1, u64::MAX).unwrap(), u64::MAX);
+        let mut percents = Spec::parse("city:n=200%").unwrap();
+        let error = percents.whole("n", 1, 10).unwrap_err().to_string();
+        assert!(error.contains("n=200% is not a whole number"), "{error}");
         assert!(spec.number_between("x", 1.0, 0.0, 2.0).is_err());
         assert!(Spec::parse("city:n").is_err());
         assert!(Spec::parse("city:n=1,n=2").is_err());

@@ -1,18 +1,14 @@
 //! The suites of the main job: which scenes, which ways through them, how
 //! long. A table and nothing else.
 
-use std::time::Duration;
+use crate::measure::Effort;
 
 /// A named set of scenes and paths with the time to spend on them.
 pub struct Suite {
     pub name: &'static str,
     pub summary: &'static str,
     pub plan: &'static [SuiteScene],
-    pub min_rounds: usize,
-    pub max_rounds: usize,
-    /// Per scene, path and task; see `measure::Protocol`.
-    pub budget: Duration,
-    pub pass: Duration,
+    pub effort: Effort,
 }
 
 /// A scene of a suite with the ways through it.
@@ -65,12 +61,18 @@ pub static SUITES: &[Suite] = &[
         plan: &[
             warm(
                 "uniform:n=100000",
-                &["flythrough:visible=2%", "teleport:visible=0.1%"],
+                &[
+                    "flythrough:frames=128,visible=2%",
+                    "teleport:frames=128,visible=0.1%",
+                ],
             ),
-            warm("clustered:n=100000", &["flythrough:visible=2%"]),
-            warm("city:n=100000", &["flythrough:visible=2%", "outside"]),
-            warm("forest:n=100000", &["orbit"]),
-            warm("rooms:n=50000", &["spin:frames=512"]),
+            warm("clustered:n=100000", &["flythrough:frames=128,visible=2%"]),
+            warm(
+                "city:n=100000",
+                &["flythrough:frames=128,visible=2%", "outside:frames=128"],
+            ),
+            warm("forest:n=100000", &["orbit:frames=128"]),
+            warm("rooms:n=50000", &["spin:frames=256"]),
             warm("freedm-map12", &["places"]),
             warm("freedm-map20", &["places", "flythrough:frames=512"]),
             warm(
@@ -79,10 +81,13 @@ pub static SUITES: &[Suite] = &[
             ),
             warm("us-counties", &["orbit:frames=512", "outside:frames=512"]),
         ],
-        min_rounds: 7,
-        max_rounds: 21,
-        budget: Duration::from_millis(700),
-        pass: Duration::from_millis(100),
+        effort: Effort {
+            processes: 10,
+            rounds: [3, 40],
+            task_ns: 6e6,
+            pass_ns: 12e6,
+            locate: true,
+        },
     },
     Suite {
         name: "standard",
@@ -128,10 +133,13 @@ pub static SUITES: &[Suite] = &[
                 ],
             ),
         ],
-        min_rounds: 9,
-        max_rounds: 31,
-        budget: Duration::from_secs(3),
-        pass: Duration::from_millis(400),
+        effort: Effort {
+            processes: 12,
+            rounds: [3, 60],
+            task_ns: 60e6,
+            pass_ns: 100e6,
+            locate: true,
+        },
     },
     Suite {
         name: "full",
@@ -178,10 +186,29 @@ pub static SUITES: &[Suite] = &[
             ),
             warm_and_cold("us-counties", &["orbit:frames=512", "outside:frames=512"]),
         ],
-        min_rounds: 9,
-        max_rounds: 31,
-        budget: Duration::from_secs(3),
-        pass: Duration::from_millis(200),
+        effort: Effort {
+            processes: 10,
+            rounds: [3, 40],
+            task_ns: 40e6,
+            pass_ns: 100e6,
+            locate: true,
+        },
+    },
+    Suite {
+        name: "compare",
+        summary: "what `compare --against` runs: a real scene and two generated ones, frustum queries only; a minute and a half by itself",
+        plan: &[
+            warm("helsinki", &["flythrough:frames=128,visible=2%"]),
+            warm("city:n=20000", &["flythrough:frames=128,visible=2%"]),
+            warm("uniform:n=100000", &["flythrough:frames=64,visible=2%"]),
+        ],
+        effort: Effort {
+            processes: 10,
+            rounds: [12, 80],
+            task_ns: 80e6,
+            pass_ns: 40e6,
+            locate: false,
+        },
     },
     Suite {
         name: "growth",
@@ -192,10 +219,13 @@ pub static SUITES: &[Suite] = &[
             warm("uniform:n=1000000", &[FIXED_COUNT]),
             warm("uniform:n=10000000", &[FIXED_COUNT]),
         ],
-        min_rounds: 9,
-        max_rounds: 31,
-        budget: Duration::from_secs(3),
-        pass: Duration::from_millis(400),
+        effort: Effort {
+            processes: 10,
+            rounds: [3, 40],
+            task_ns: 60e6,
+            pass_ns: 200e6,
+            locate: true,
+        },
     },
 ];
 
@@ -216,7 +246,9 @@ mod tests {
     use crate::spec::Spec;
 
     #[test]
-    fn every_suite_names_what_exists_and_all_but_growth_have_the_real_scenes() {
+    fn every_suite_names_what_exists_and_those_that_rank_have_the_real_scenes() {
+        // One is about growth, one about a change between two programs.
+        let ranks = |name: &str| !["growth", "compare"].contains(&name);
         for suite in SUITES {
             for row in suite.plan {
                 let scene = Spec::parse(row.scene).unwrap();
@@ -231,7 +263,7 @@ mod tests {
                     assert!(PATHS.iter().any(|p| p.name == path.name()));
                 }
             }
-            for sample in SAMPLES.iter().filter(|_| suite.name != "growth") {
+            for sample in SAMPLES.iter().filter(|_| ranks(suite.name)) {
                 assert!(
                     suite.plan.iter().any(|row| row.scene == sample.name),
                     "{}",

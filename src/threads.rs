@@ -1,25 +1,40 @@
-//! How many threads may share a piece of work, and how they share it out. One
-//! unless told otherwise: what is measured runs on one thread. What a job is
+//! How many threads may share a piece of work, and how they share it out. What is
+//! measured is asked on one thread. What a job is
 //! and in which order results are put together is the callers' business.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::thread::{Builder, scope};
-
-static CHOSEN: AtomicUsize = AtomicUsize::new(1);
 
 /// Most threads that can be asked for: beyond it the system may give none.
 pub const MOST_THREADS: usize = 256;
 
-/// Makes this the number of threads of the process, from the next build on:
-/// at least 1, at most [`MOST_THREADS`].
-pub fn choose(count: usize) {
-    CHOSEN.store(count.clamp(1, MOST_THREADS), Ordering::Relaxed);
+/// The threads that a build may use, as a value that knows whether anybody asked.
+#[derive(Debug)]
+pub struct Pool {
+    threads: usize,
+    asked: AtomicBool,
 }
 
-/// Threads that a build may use: the last number chosen, else 1.
-pub fn chosen() -> usize {
-    CHOSEN.load(Ordering::Relaxed)
+impl Pool {
+    /// So many: at least 1, at most [`MOST_THREADS`].
+    pub fn new(threads: usize) -> Pool {
+        Pool {
+            threads: threads.clamp(1, MOST_THREADS),
+            asked: AtomicBool::new(false),
+        }
+    }
+
+    /// How many there are to [`share`] work among.
+    pub fn threads(&self) -> usize {
+        self.asked.store(true, Ordering::Relaxed);
+        self.threads
+    }
+
+    /// Whether [`Pool::threads`] was called: a build that never does is on one.
+    pub fn was_asked(&self) -> bool {
+        self.asked.load(Ordering::Relaxed)
+    }
 }
 
 /// Does every job, on so many threads of which this is one: whoever is free

@@ -6,13 +6,14 @@ use std::ops::ControlFlow;
 
 use cullbench::culling::Culling;
 use cullbench::geometry::{Aabb, ConvexVolume, Plane, PlaneTree};
-use cullbench::index::RegionIndex;
-use cullbench::index::{BACKENDS, BuildError, DynIndex, MemoryUsage, StructureSpec};
 use cullbench::index::{Bsp, Bvh, FrustumQuery, Linear, LinearScalar, Octree, Quadtree, Wide};
+use cullbench::index::{BuildError, DynIndex, MemoryUsage, Registry, StructureSpec};
+use cullbench::index::{Info, Kind, RegionIndex};
 use cullbench::measure::Workload;
 use cullbench::path::{self, LensDefaults};
 use cullbench::query::{ItemId, ManySink, Recorder, Sink, View};
 use cullbench::scene;
+use cullbench::threads::Pool;
 use cullbench::verify::Reference;
 use glam::Vec3;
 
@@ -20,14 +21,22 @@ use glam::Vec3;
 struct Variant<T, const WHICH: usize>(T);
 
 impl<T: RegionIndex, const WHICH: usize> RegionIndex for Variant<T, WHICH> {
-    const NAME: &'static str = VARIANTS[WHICH];
-    const SUMMARY: &'static str = T::SUMMARY;
+    const INFO: Info = T::INFO.named(VARIANTS[WHICH]);
     type Params = ();
 
     fn build(items: &[Aabb], own: Option<&PlaneTree>, _: &()) -> Result<Self, BuildError> {
-        let spec = StructureSpec::parse(Self::NAME).expect(Self::NAME);
-        let params = serde_json::from_value(spec.params).expect(Self::NAME);
-        T::build(items, own, &params).map(Variant)
+        Self::build_by(&Pool::new(1), items, own, &())
+    }
+
+    fn build_by(
+        pool: &Pool,
+        items: &[Aabb],
+        own: Option<&PlaneTree>,
+        _: &(),
+    ) -> Result<Self, BuildError> {
+        let spec = StructureSpec::parse(Self::INFO.name).expect(Self::INFO.name);
+        let params = serde_json::from_value(spec.params).expect(Self::INFO.name);
+        T::build_by(pool, items, own, &params).map(Variant)
     }
 
     fn memory(&self) -> MemoryUsage {
@@ -61,6 +70,10 @@ impl<T: FrustumQuery, const WHICH: usize> FrustumQuery for Variant<T, WHICH> {
     ) -> ControlFlow<()> {
         self.0.visible(view, sink, recorder)
     }
+
+    fn tree_order(&self) -> Option<&[ItemId]> {
+        self.0.tree_order()
+    }
 }
 
 /// Puts structures through the suite, each in a module of its own.
@@ -91,7 +104,7 @@ macro_rules! peers {
 
         conforms! { $($module: $peer;)* }
 
-        const PEERS: &[&str] = &[$($peer::NAME),*];
+        const PEERS: &[&str] = &[$($peer::INFO.name),*];
     };
 }
 
@@ -149,16 +162,17 @@ conforms! {
 #[test]
 fn the_suite_has_every_structure_of_the_table() {
     let own = [
-        LinearScalar::NAME,
-        Linear::NAME,
-        Bsp::NAME,
-        Octree::NAME,
-        Quadtree::NAME,
-        Bvh::NAME,
-        Wide::NAME,
+        LinearScalar::INFO.name,
+        Linear::INFO.name,
+        Bsp::INFO.name,
+        Octree::INFO.name,
+        Quadtree::INFO.name,
+        Bvh::INFO.name,
+        Wide::INFO.name,
     ];
     let here: Vec<_> = own.iter().chain(PEERS).copied().collect();
-    let table: Vec<_> = BACKENDS.iter().map(|b| b.name).collect();
+    let registry = Registry::builtin();
+    let table: Vec<_> = registry.rows().iter().map(|row| row.info.name).collect();
     assert_eq!(here, table, "a structure without a line above");
 }
 
@@ -173,13 +187,15 @@ fn every_structure_returns_the_reference_set_on_every_scene_and_path() {
     let samples = scene::SAMPLES.iter().map(|s| s.name.to_owned());
     for source in families.chain(samples) {
         let scene = scene::load(&source, &Default::default()).expect(&source);
-        let built: Vec<_> = BACKENDS
+        let built: Vec<_> = Registry::builtin()
+            .rows()
             .iter()
-            .map(|b| build(b.name, &scene.items))
+            .map(|b| build(b.info.name, &scene.items))
             .collect();
-        let regions: Vec<_> = BACKENDS
+        let regions: Vec<_> = Registry::builtin()
+            .rows()
             .iter()
-            .map(|b| build(b.name, scene.regions.boxes(&scene.items)))
+            .map(|b| build(b.info.name, scene.regions.boxes(&scene.items)))
             .collect();
         for path in [
             "orbit:frames=6",
@@ -193,25 +209,25 @@ fn every_structure_returns_the_reference_set_on_every_scene_and_path() {
             let mut reference = Reference::new(scene.items.len());
             for view in &workload.views {
                 reference.see(&scene.items, view.as_any());
-                for (index, backend) in built.iter().zip(BACKENDS) {
+                for (index, row) in built.iter().zip(Registry::builtin().rows()) {
                     let mut found = Vec::new();
                     index.see(view.as_any(), &mut found);
                     let difference = reference.compare(&found);
                     assert!(
                         difference.is_none(),
                         "{} on {source}, {path}: {difference}",
-                        backend.name
+                        row.info.name
                     );
                 }
             }
-            for &p in &workload.points {
-                let wanted = scene.regions.holding(p, &scene.items);
-                for (index, backend) in regions.iter().zip(BACKENDS) {
+            for sought in &workload.sought {
+                let (p, wanted) = (sought.local, scene.holding(sought));
+                for (index, row) in regions.iter().zip(Registry::builtin().rows()) {
                     let mut found = Vec::new();
                     index.locate(p, &mut found);
-                    scene.regions.refine(p, &mut found);
+                    scene.refine(sought, &mut found);
                     found.sort_unstable();
-                    assert_eq!(found, wanted, "{} on {source} at {p}", backend.name);
+                    assert_eq!(found, wanted, "{} on {source} at {p}", row.info.name);
                 }
             }
         }
@@ -222,23 +238,23 @@ fn every_structure_returns_the_reference_set_on_every_scene_and_path() {
 fn memory_and_counters_fit_the_items() {
     let scene = scene::load("uniform:n=5000", &Default::default()).expect("uniform");
     let nothing = ConvexVolume::from_planes(&[Plane::new(Vec3::X, -1e9)]).expect("a plane");
-    for backend in BACKENDS {
-        let index = build(backend.name, &scene.items);
-        assert!(index.memory().item_bytes >= 5000 * 28, "{}", backend.name);
+    for row in Registry::builtin().rows() {
+        let index = build(row.info.name, &scene.items);
+        assert!(index.memory().item_bytes >= 5000 * 28, "{}", row.info.name);
         let (mut out, mut cost) = (Vec::new(), Default::default());
         index.visible_counted(&nothing, &mut out, &mut cost);
         assert!(out.is_empty());
         // A scan looks at everything; a tree at its root, or at all of the
         // root's children, which lie in one block. Some peers keep no box of
         // the whole scene, but two of its halves.
-        let looks = match backend.name {
-            "linear-scalar" | "linear" | "peer-bevy-style" => 5000..=5000,
+        let looks = match row.info.name {
+            _ if row.info.kind == Kind::Scan => 5000..=5000,
             "wide" => 1..=16,
             name if PEERS.contains(&name) => 1..=2,
             _ => 1..=1,
         };
         let compared = cost.comparisons();
-        assert!(looks.contains(&compared), "{}: {compared}", backend.name);
+        assert!(looks.contains(&compared), "{}: {compared}", row.info.name);
     }
 }
 

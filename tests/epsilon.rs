@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use by_hand::{Kind, Setup, View};
 use cullbench::camera::{PlaneMethod, PlaneOptions, Surroundings};
 use cullbench::geometry::{Aabb, FrustumPlane};
-use cullbench::index::{BACKENDS, StructureSpec};
+use cullbench::index::{Registry, StructureSpec};
 use cullbench::query::View as _;
 use glam::DVec3;
 use rand::{RngExt, SeedableRng};
@@ -355,17 +355,25 @@ fn structures_drop_none_of_them_either() {
             let camera = scene.setup.camera();
             let volume = camera.volume(&PlaneOptions::default(), &scene.surroundings());
             let volume = volume.unwrap();
-            for backend in BACKENDS {
-                let spec = StructureSpec::parse(backend.name).unwrap();
+            for row in Registry::builtin().rows() {
+                let spec = StructureSpec::parse(row.info.name).unwrap();
                 let structure = spec.build(&scene.boxes).unwrap();
                 let mut found = Vec::new();
                 structure.visible(&volume, &mut found);
                 found.sort_unstable();
                 let all: Vec<u32> = (0..scene.boxes.len() as u32).collect();
-                assert_eq!(found, all, "{}, {:?}", backend.name, scene.setup);
+                assert_eq!(found, all, "{}, {:?}", row.info.name, scene.setup);
             }
         }
     }
+}
+
+/// Near corners and far ones; none of these without a far plane.
+fn corners(view: &View) -> ([DVec3; 4], Vec<DVec3>) {
+    let all = view.corners(view.far.unwrap_or(2.0 * view.near));
+    let (near, far) = all.split_at(4);
+    let far = if view.far.is_some() { far } else { &[] };
+    (near.try_into().expect("four corners"), far.to_vec())
 }
 
 #[test]
@@ -382,14 +390,13 @@ fn planes_move_outward_by_the_documented_margin_and_no_more() {
                     ..scene.setup
                 }
                 .view();
-                // Of the volume if it is bounded, else of the scene.
-                let reach = match view.far {
-                    Some(far) => view
-                        .corners(far)
-                        .iter()
-                        .fold(DVec3::ZERO, |reach, corner| reach.max(corner.abs())),
-                    None => around.reach.as_dvec3(),
-                };
+                // Of volume and scene, whichever is smaller.
+                let (near, far) = corners(&view);
+                let all = near.iter().chain(&far).map(|corner| corner.abs());
+                let mut reach = around.reach.as_dvec3();
+                if view.far.is_some() {
+                    reach = reach.min(all.fold(DVec3::ZERO, DVec3::max));
+                }
                 let camera = scene.setup.camera();
                 for c in [1.0, 8.0, 1000.0] {
                     let planes = |epsilon| {
@@ -398,14 +405,28 @@ fn planes_move_outward_by_the_documented_margin_and_no_more() {
                         camera.volume(&options, &around).unwrap()
                     };
                     let (bare, moved) = (planes(0.0), planes(c));
-                    for (bare, moved) in bare.planes().iter().zip(moved.planes()) {
+                    for (i, (bare, moved)) in bare.planes().iter().zip(moved.planes()).enumerate() {
                         assert_eq!(bare.normal, moved.normal);
                         let d = f64::from(bare.d);
-                        let size = bare.normal.as_dvec3().abs().dot(reach) + d.abs();
-                        let wanted = d + c * 2f64.powi(-24) * size + 2f64.powi(-147);
+                        let n = bare.normal.as_dvec3().abs();
+                        let most =
+                            |of: &[DVec3]| of.iter().map(|x| n.dot(x.abs())).fold(0.0, f64::max);
+                        // At the corners that the plane can misjudge: near and
+                        // far plane only their own.
+                        let own = match (i, view.far) {
+                            (4, _) => most(&near),
+                            (5, _) => most(&far),
+                            (_, Some(_)) => most(&near).max(most(&far)),
+                            (_, None) => f64::INFINITY,
+                        };
+                        let size = own.min(n.dot(reach)) + d.abs();
+                        let derived = view.eye.abs() + reach;
+                        let depth = view.near.abs() + view.far.unwrap_or(view.near).abs();
+                        let derived = 2f64.powi(-49) * (derived.element_sum() + depth);
+                        let wanted = d + c * 2f64.powi(-24) * size + 2f64.powi(-147) + derived;
                         // Rounded up, once; the corners of the two cameras
                         // differ in the last bits of f64.
-                        let slack = 1e-12 * (size + d.abs());
+                        let slack = 1e-12 * (size + d.abs() + derived);
                         let found = f64::from(moved.d);
                         let before = f64::from(moved.d.next_down());
                         assert!(

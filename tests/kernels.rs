@@ -1,11 +1,16 @@
 //! Every instruction set gives the same answer: the same ids in the same
-//! order and the same counts, from every structure, for every view. A process
-//! of its own with one test, because the kernel is chosen for the process.
+//! order and the same counts, from every structure, for every view; and the one
+//! that a spec names is the one that runs.
 
-use cullbench::geometry::{Aabb, RelativeVolume, Spheres, WideVolume, sphere_cube};
-use cullbench::index::{BACKENDS, DynIndex, StructureSpec};
-use cullbench::kernel::Kernel;
-use cullbench::query::{AnyView, ItemId, QueryCost};
+use std::ops::ControlFlow;
+
+use cullbench::geometry::{Aabb, PlaneTree, RelativeVolume, Spheres, WideVolume, sphere_cube};
+use cullbench::index::{
+    BuildError, DynIndex, Execution, FrustumQuery, Info, Kind, MemoryUsage, Origin, RegionIndex,
+    Registry, StructureSpec,
+};
+use cullbench::kernel::{Isa, Kernel};
+use cullbench::query::{AnyView, ItemId, Located, ManySink, QueryCost, Recorder, Sink, View};
 use cullbench::verify::RandomCase;
 use glam::Vec3;
 
@@ -36,9 +41,11 @@ impl Said {
     }
 }
 
-fn ask(structure: &str, case: &RandomCase) -> Said {
+fn ask(structure: &str, kernel: Kernel, case: &RandomCase) -> Said {
     let build = |items: &[Aabb]| {
         let spec = StructureSpec::parse(structure).expect(structure);
+        let threads = 1;
+        let spec = spec.by(Execution { kernel, threads });
         spec.build(items).expect(structure)
     };
     let cubes: Vec<Aabb> = case.items.iter().map(sphere_cube).collect();
@@ -57,28 +64,116 @@ fn ask(structure: &str, case: &RandomCase) -> Said {
 
 #[test]
 fn every_kernel_gives_the_same_ids_in_the_same_order_and_the_same_counts() {
-    assert_eq!(Kernel::chosen(), Kernel::best(), "unless told otherwise");
+    let unless_told_otherwise = Execution::default().kernel;
+    assert_eq!(unless_told_otherwise, Kernel::best());
     let (mut answers, mut items) = (0, 0);
     for seed in 0..200 {
         let case = RandomCase::new(seed);
-        for backend in BACKENDS {
-            Kernel::Portable.choose().expect("always there");
-            let wanted = ask(backend.name, &case);
+        for row in Registry::builtin().rows() {
+            let wanted = ask(row.info.name, Kernel::Portable, &case);
             for kernel in Kernel::available() {
-                kernel.choose().expect("available");
-                assert_eq!(Kernel::chosen(), kernel);
-                let said = ask(backend.name, &case);
-                assert_eq!(said, wanted, "{}, {kernel}, case {seed}", backend.name);
+                let said = ask(row.info.name, kernel, &case);
+                assert_eq!(said, wanted, "{}, {kernel}, case {seed}", row.info.name);
             }
             answers += wanted.ids.len();
             items += wanted.ids.iter().map(Vec::len).sum::<usize>();
         }
     }
     assert!(answers > 5000 && items > 100_000, "{answers}, {items}");
-    // One that is not there is refused and changes nothing.
-    for kernel in Kernel::ALL.into_iter().filter(|k| !k.is_available()) {
-        let before = Kernel::chosen();
-        assert!(kernel.choose().is_err());
-        assert_eq!(Kernel::chosen(), before);
+    // One that is not there is refused.
+    for kernel in Kernel::ALL {
+        assert_eq!(kernel.checked().is_ok(), kernel.is_available());
+    }
+}
+
+/// Answers every question with the place of the instruction set that it is
+/// compiled for, in [`Kernel::ALL`].
+struct TellsKernel;
+
+fn told<I: Isa>(sink: &mut impl Sink) -> ControlFlow<()> {
+    let name = std::any::type_name::<I>();
+    let is = |kernel: &Kernel| name.to_lowercase().ends_with(kernel.name());
+    let place = Kernel::ALL.iter().position(is).unwrap_or_default();
+    sink.accept(&[place as ItemId])
+}
+
+impl RegionIndex for TellsKernel {
+    const INFO: Info = Info::new("tells-kernel", "for this test", Kind::Scan, Origin::Ours);
+    type Params = ();
+
+    fn build(_: &[Aabb], _: Option<&PlaneTree>, _: &()) -> Result<Self, BuildError> {
+        Ok(TellsKernel)
+    }
+    fn memory(&self) -> MemoryUsage {
+        MemoryUsage::default()
+    }
+    fn locate<S: Sink, R: Recorder>(&self, _: Vec3, _: &mut S, _: &mut R) -> ControlFlow<()> {
+        unreachable!("a kernel is always given")
+    }
+    fn locate_by<I: Isa, S: Sink, R: Recorder>(
+        &self,
+        _: I,
+        _: Vec3,
+        sink: &mut S,
+        _: &mut R,
+    ) -> ControlFlow<()> {
+        told::<I>(sink)
+    }
+    fn locate_many_by<I: Isa, S: ManySink>(
+        &self,
+        _: I,
+        _: &[Vec3],
+        sink: &mut S,
+    ) -> ControlFlow<()> {
+        let mut ids = Vec::new();
+        let _ = told::<I>(&mut ids);
+        sink.accept(0, &ids)
+    }
+}
+
+impl FrustumQuery for TellsKernel {
+    fn visible<V: View, S: Sink, R: Recorder>(
+        &self,
+        _: &V,
+        _: &mut S,
+        _: &mut R,
+    ) -> ControlFlow<()> {
+        unreachable!("a kernel is always given")
+    }
+    fn visible_by<I: Isa, V: View, S: Sink, R: Recorder>(
+        &self,
+        _: I,
+        _: &V,
+        sink: &mut S,
+        _: &mut R,
+    ) -> ControlFlow<()> {
+        told::<I>(sink)
+    }
+}
+
+/// Two specs side by side keep to their own kernels, whatever the other does.
+#[test]
+fn a_structure_is_asked_by_the_kernel_of_its_spec() {
+    let row = Registry::empty().with::<TellsKernel>();
+    let spec = row.structure("tells-kernel").expect("registered");
+    let built = Kernel::available().map(|kernel| {
+        let by = Execution { kernel, threads: 1 };
+        (kernel, spec.clone().by(by).build(&[]).expect("no items"))
+    });
+    let built: Vec<_> = built.collect();
+    let volume = RandomCase::new(1).volume;
+    for (kernel, index) in built.iter().rev().chain(&built) {
+        let mut told = [const { Vec::new() }; 6];
+        let [seen, counted, located, located_counted, many, batched] = &mut told;
+        let cost = &mut QueryCost::default();
+        index.visible(&volume, seen);
+        index.visible_counted(&volume, counted, cost);
+        index.locate(Vec3::ZERO, located);
+        index.locate_counted(Vec3::ZERO, located_counted, cost);
+        index.see_many(&[(&volume).into()], std::slice::from_mut(many));
+        let mut all = Located::default();
+        index.locate_many(&[Vec3::ZERO], &mut all);
+        batched.extend(all.iter().flatten());
+        assert_eq!(told, [(); 6].map(|()| vec![*kernel as ItemId]), "{kernel}");
     }
 }

@@ -33,8 +33,7 @@ fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// Top-level modules named after `prefix` ("crate::", "cullbench::"),
-/// including those of a brace list directly behind it. Comments do not count.
+/// Top-level modules named after `prefix` ("crate::"). Comments do not count.
 fn imports(text: &str, prefix: &str) -> BTreeSet<String> {
     let code: String = text
         .lines()
@@ -80,13 +79,7 @@ fn modules_import_only_what_the_table_allows() {
             .unwrap_or_else(|| panic!("`{module}` has no row in docs/ARCHITECTURE.md"));
         modules_seen.insert(module.clone());
         let text = fs::read_to_string(&file).expect("readable source");
-        // The program imports the library by its name.
-        let prefix = if module == "cli" {
-            "cullbench::"
-        } else {
-            "crate::"
-        };
-        for used in imports(&text, prefix) {
+        for used in imports(&text, "crate::") {
             assert!(
                 used == module || allowed.contains(&used),
                 "{} imports `{used}`, which the row of `{module}` does not allow",

@@ -5,7 +5,7 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use cullbench::index::{BACKENDS, DynIndex, StructureSpec};
+use cullbench::index::{DynIndex, Registry, StructureSpec};
 use cullbench::scene;
 
 /// The system's allocator, with a count of the bytes that are in use.
@@ -34,14 +34,14 @@ fn memory_is_within_five_percent_of_what_is_kept() {
     let mut off = Vec::new();
     for source in ["uniform:n=20000", "city:n=20000", "us-counties"] {
         let scene = scene::load(source, &Default::default()).expect(source);
-        for backend in BACKENDS {
-            let spec = StructureSpec::parse(backend.name).expect(backend.name);
+        for row in Registry::builtin().rows() {
+            let spec = StructureSpec::parse(row.info.name).expect(row.info.name);
             let before = IN_USE.load(Ordering::Relaxed);
-            let index: Box<dyn DynIndex> = spec.build(&scene.items).expect(backend.name);
+            let index: Box<dyn DynIndex> = spec.build(&scene.items).expect(row.info.name);
             let kept = (IN_USE.load(Ordering::Relaxed) - before) as f64;
             let told = index.memory().total() as f64;
             if (told / kept - 1.0).abs() >= 0.05 {
-                let name = backend.name;
+                let name = row.info.name;
                 off.push(format!(
                     "{name} on {source}: memory() says {told}, the allocator {kept}"
                 ));

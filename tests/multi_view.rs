@@ -7,7 +7,7 @@ use std::ops::ControlFlow;
 
 use cullbench::camera::{PlaneOptions, ViewSet};
 use cullbench::geometry::{Aabb, ConvexVolume, Plane, RelativeVolume, Spheres, WideVolume};
-use cullbench::index::{BACKENDS, DynIndex, RegionIndex, StructureSpec, Wide};
+use cullbench::index::{DynIndex, Execution, RegionIndex, Registry, StructureSpec, Wide};
 use cullbench::kernel::{BASELINE, Kernel};
 use cullbench::query::{AnyView, ItemId, Sink};
 use cullbench::verify::{RandomCase, Reference, edge_scenes, edge_volumes};
@@ -31,12 +31,13 @@ fn check(name: &str, items: &[Aabb], views: &[AnyView<'_>], lists: &[Vec<ItemId>
 
 /// One pass over volumes, by every kernel: right, and the same lists.
 fn one_pass(name: &str, items: &[Aabb], volumes: &[ConvexVolume]) -> usize {
-    let tree = wide(items);
+    let spec = StructureSpec::parse("wide").expect("wide");
     let views: Vec<AnyView> = volumes.iter().map(AnyView::from).collect();
     let mut first: Option<Vec<Vec<ItemId>>> = None;
     let mut ids = 0;
     for kernel in Kernel::available() {
-        kernel.choose().expect("available");
+        let by = Execution { kernel, threads: 1 };
+        let tree = spec.clone().by(by).build(items).expect("sound items");
         let mut lists = vec![Vec::new(); views.len()];
         tree.see_many(&views, &mut lists);
         ids += check(&format!("{name}, {kernel}"), items, &views, &lists);
@@ -108,7 +109,6 @@ fn one_pass_gives_the_sets_of_separate_queries() {
 /// `see_many` of every structure with a mixture of views.
 fn views_of_all_kinds() {
     for kernel in Kernel::available() {
-        kernel.choose().expect("available");
         for seed in 0..60 {
             let case = RandomCase::new(seed);
             let (volume, moved) = (&case.volume, beside(&case.volume, 0.125));
@@ -118,12 +118,15 @@ fn views_of_all_kinds() {
             views.extend(relative.as_ref().map(AnyView::from));
             // Spheres on boxes as they are: a view like any other.
             views.push((&spheres).into());
-            for backend in BACKENDS {
-                let spec = StructureSpec::parse(backend.name).expect(backend.name);
-                let index = spec.build(&case.items).expect(backend.name);
+            for row in Registry::builtin().rows() {
+                let spec = StructureSpec::parse(row.info.name).expect(row.info.name);
+                let index = spec
+                    .by(Execution { kernel, threads: 1 })
+                    .build(&case.items)
+                    .expect(row.info.name);
                 let mut lists = vec![Vec::new(); views.len()];
                 index.see_many(&views, &mut lists);
-                let name = format!("{}, {kernel}, case {seed}", backend.name);
+                let name = format!("{}, {kernel}, case {seed}", row.info.name);
                 check(&name, &case.items, &views, &lists);
             }
         }

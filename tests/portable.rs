@@ -38,11 +38,11 @@ fn sees<T: FrustumQuery, V: View>(index: &T, view: &V, before: usize, wanted: &[
     // No spare room, and a start at any place of a cache line.
     let mut ids = vec![ItemId::MAX; before];
     let _ = index.visible(view, &mut ids, &mut NoRecorder);
-    assert_eq!(sorted_rest(ids, before), wanted, "{}", T::NAME);
+    assert_eq!(sorted_rest(ids, before), wanted, "{}", T::INFO.name);
 }
 
 fn queries<T: FrustumQuery>(items: &[Aabb], volumes: &[ConvexVolume], points: &[Vec3]) -> T {
-    let index = T::build(items, None, &Default::default()).expect(T::NAME);
+    let index = T::build(items, None, &Default::default()).expect(T::INFO.name);
     for (i, volume) in volumes.iter().enumerate() {
         let wanted = those(items, |b| volume.sees(b));
         sees(&index, volume, i, &wanted);
@@ -57,9 +57,9 @@ fn queries<T: FrustumQuery>(items: &[Aabb], volumes: &[ConvexVolume], points: &[
         let wanted = those(items, |b| b.contains_point(p));
         let mut ids = Vec::new();
         let _ = index.locate(p, &mut ids, &mut NoRecorder);
-        assert_eq!(sorted_rest(ids, 0), wanted, "{}", T::NAME);
+        assert_eq!(sorted_rest(ids, 0), wanted, "{}", T::INFO.name);
         let batched = all.ids()[from..end].to_vec();
-        assert_eq!(sorted_rest(batched, 0), wanted, "{}", T::NAME);
+        assert_eq!(sorted_rest(batched, 0), wanted, "{}", T::INFO.name);
         from = end;
     }
     index
@@ -76,7 +76,7 @@ fn ranges<T: TreeOrder>(index: &T, items: &[Aabb], volumes: &[ConvexVolume]) {
             .copied()
             .collect();
         let wanted = those(items, |b| volume.sees(b));
-        assert_eq!(sorted_rest(held, 0), wanted, "{}", T::NAME);
+        assert_eq!(sorted_rest(held, 0), wanted, "{}", T::INFO.name);
     }
 }
 
@@ -104,7 +104,7 @@ fn wide(tree: &Wide, items: &[Aabb], volumes: &[ConvexVolume]) {
 /// Cubes about spheres, which is what a view of spheres asks about.
 fn spheres<T: FrustumQuery>(items: &[Aabb], volumes: &[ConvexVolume]) {
     let cubes: Vec<Aabb> = items.iter().map(sphere_cube).collect();
-    let index = T::build(&cubes, None, &Default::default()).expect(T::NAME);
+    let index = T::build(&cubes, None, &Default::default()).expect(T::INFO.name);
     for volume in volumes {
         let view = Spheres::new(volume);
         sees(&index, &view, 0, &those(&cubes, |b| view.sees(b)));

@@ -7,9 +7,12 @@ use std::ops::{ControlFlow, Range};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use cullbench::geometry::{Aabb, BoxBlock, LaneMask, PlaneMask, PlaneTree};
-use cullbench::index::{BuildError, FrustumQuery, MemoryUsage, RegionIndex, indexable};
+use cullbench::index::{
+    BuildError, FrustumQuery, Info, Kind, MemoryUsage, Origin, RegionIndex, indexable,
+};
 use cullbench::kernel::Isa;
 use cullbench::query::{Containment, ItemId, NoRecorder, Recorder, Region, Sink, View};
+use cullbench::threads::Pool;
 use cullbench::verify::conformance::properties;
 use glam::Vec3;
 
@@ -37,6 +40,25 @@ const COUNTS_NO_ITEMS: Fault = 17;
 const EVERY_OTHER_BUILD_DIFFERS: Fault = 18;
 const COUNTED_QUERY_DIFFERS: Fault = 19;
 const ITEMS_ARE_TESTED_LIKE_NODES: Fault = 20;
+
+const CLAIMS_TO_REFIT: Fault = 21;
+const REFITS_UNDECLARED: Fault = 22;
+const CLAIMS_RANGES: Fault = 23;
+const SLICES_FOR_RANGES: Fault = 24;
+const CLAIMS_THREADS: Fault = 25;
+const THREADS_CHANGE_IT: Fault = 26;
+
+/// What the tree says of itself; some faults are lies.
+const fn declared(fault: Fault) -> Info {
+    let summary = "a binary tree along x, broken on request";
+    let toy = Info::new("toy", summary, Kind::Tree, Origin::Ours);
+    match fault {
+        REFITS_UNDECLARED => toy,
+        CLAIMS_THREADS | THREADS_CHANGE_IT => toy.refits().threaded_build(),
+        CLAIMS_RANGES | SLICES_FOR_RANGES => toy.refits().ranges(),
+        _ => toy.refits(),
+    }
+}
 
 /// Which way the next build of [`EVERY_OTHER_BUILD_DIFFERS`] goes.
 static TURN: AtomicBool = AtomicBool::new(false);
@@ -247,8 +269,7 @@ impl<const FAULT: Fault> Toy<FAULT> {
 }
 
 impl<const FAULT: Fault> RegionIndex for Toy<FAULT> {
-    const NAME: &'static str = "toy";
-    const SUMMARY: &'static str = "a binary tree along x, broken on request";
+    const INFO: Info = declared(FAULT);
     type Params = ();
 
     fn build(items: &[Aabb], _: Option<&PlaneTree>, _: &()) -> Result<Self, BuildError> {
@@ -280,6 +301,19 @@ impl<const FAULT: Fault> RegionIndex for Toy<FAULT> {
         Ok(Toy { ids, boxes, root })
     }
 
+    fn build_by(
+        pool: &Pool,
+        items: &[Aabb],
+        _: Option<&PlaneTree>,
+        _: &(),
+    ) -> Result<Self, BuildError> {
+        let mut toy = Self::build(items, None, &())?;
+        if FAULT == THREADS_CHANGE_IT && pool.threads() > 1 {
+            toy.root = None;
+        }
+        Ok(toy)
+    }
+
     fn memory(&self) -> MemoryUsage {
         MemoryUsage::default()
     }
@@ -296,6 +330,9 @@ impl<const FAULT: Fault> RegionIndex for Toy<FAULT> {
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
         let stays = |id: &&ItemId| self.ids.contains(id) != items[**id as usize].is_empty();
         let stay = moved.iter().filter(stays).count();
+        if FAULT == CLAIMS_TO_REFIT {
+            return false;
+        }
         if FAULT == REFUSES_REFIT_HALFWAY {
             self.boxes = self.ids.iter().map(|&id| items[id as usize]).collect();
             return false;
@@ -325,6 +362,10 @@ impl<const FAULT: Fault> FrustumQuery for Toy<FAULT> {
         recorder: &mut R,
     ) -> ControlFlow<()> {
         self.query(&Seen(view), sink, recorder)
+    }
+
+    fn tree_order(&self) -> Option<&[ItemId]> {
+        (FAULT == SLICES_FOR_RANGES).then_some(&self.ids)
     }
 }
 
@@ -369,6 +410,12 @@ fn every_fault_is_caught_and_every_property_catches_one() {
         COUNTS_NO_ITEMS: "counters_are_plausible";
         EVERY_OTHER_BUILD_DIFFERS: "building_again_gives_the_same_structure";
         COUNTED_QUERY_DIFFERS: "counters_are_plausible", "every_view_sees_what_the_scan_sees";
+        CLAIMS_TO_REFIT: "declared_capabilities_are_true";
+        REFITS_UNDECLARED: "declared_capabilities_are_true";
+        CLAIMS_RANGES: "declared_capabilities_are_true";
+        SLICES_FOR_RANGES: "declared_capabilities_are_true";
+        CLAIMS_THREADS: "declared_capabilities_are_true";
+        THREADS_CHANGE_IT: "declared_capabilities_are_true";
         ITEMS_ARE_TESTED_LIKE_NODES: "every_view_sees_what_the_scan_sees";
     };
     let mut useful = BTreeSet::new();

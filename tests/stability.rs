@@ -10,7 +10,7 @@
 use cullbench::camera::{PLANE_METHODS, PlaneOptions};
 use cullbench::culling::{ARITHMETICS, Arithmetic, CameraView, Culling, CullingTest, TESTS};
 use cullbench::geometry::{Aabb, PlaneTree, WidePlane};
-use cullbench::index::{BACKENDS, DynIndex, StructureSpec};
+use cullbench::index::{DynIndex, Execution, Registry};
 use cullbench::kernel::Kernel;
 use cullbench::measure::Workload;
 use cullbench::path::{self, LensDefaults};
@@ -35,316 +35,325 @@ const PINNED: &[[&str; 4]] = &[
     [
         "uniform:n=1200,seed=7",
         "orbit:frames=3",
-        "22e56858b6612f22",
-        "695395e2513b064e",
+        "1686639a44fa57cd",
+        "a498638734bd5313",
     ],
     [
         "uniform:n=1200,seed=7",
         "flythrough:frames=5,visible=2%",
-        "2a1f8adee228da11",
-        "7805588c6cecf20d",
+        "e8c0abdae0a3542f",
+        "d4aed843e1c28476",
     ],
     [
         "uniform:n=1200,seed=7",
         "zoom:frames=4",
-        "9d38454c0bda6faf",
-        "25c0884311ec650e",
+        "757ace6922d7b54f",
+        "25786aaec9aaf6c9",
     ],
     [
         "uniform:n=1200,seed=7",
         "teleport:frames=5,seed=3",
-        "9ab8cd90307d9f5c",
-        "cce59eba58aa9bb0",
+        "2e3f05ff5f39cd56",
+        "43f66e049fc267b3",
     ],
     [
         "uniform:n=1200,seed=7",
         "spin:frames=3,far=inf",
-        "522aca159d1461f1",
-        "b5916814e5489860",
+        "b3a0482a881af39d",
+        "a32d9797c26597bf",
     ],
     [
         "clustered:n=1200,seed=7",
         "orbit:frames=3",
-        "76f44af35e5ab063",
-        "9faa011ad3b0772f",
+        "3c831623a20596f6",
+        "9d4f70f05bd4bcd0",
     ],
     [
         "clustered:n=1200,seed=7",
         "flythrough:frames=5,visible=2%",
-        "45ada1e6ca1991d6",
-        "382c7ec786c4a6a5",
+        "658b0b051a3b4693",
+        "2193a0e181ced604",
     ],
     [
         "clustered:n=1200,seed=7",
         "zoom:frames=4",
-        "82d5753cf15ff736",
-        "44364b23dc93e63c",
+        "e83506393386fb20",
+        "da75cedbe5f053f2",
     ],
     [
         "clustered:n=1200,seed=7",
         "teleport:frames=5,seed=3",
-        "0e5aaa4c5a97a069",
-        "49f2f2f5099ddae5",
+        "d7318d43715b30fa",
+        "4e87c4a900e545d9",
     ],
     [
         "clustered:n=1200,seed=7",
         "spin:frames=3,far=inf",
-        "fa33d32b78528a24",
-        "3da94c71c5e2b08c",
+        "a21efbab64f62ce8",
+        "97fc4ef0da1d9dc3",
     ],
     [
         "city:n=1200,seed=7",
         "orbit:frames=3",
-        "39d9b1ff0e6b7034",
-        "7d69173598b7fc88",
+        "528fb86288622d63",
+        "6363aaf5ae2e3e9d",
     ],
     [
         "city:n=1200,seed=7",
         "flythrough:frames=5,visible=2%",
-        "b070505bf8b16a01",
-        "012c0fff9a32f190",
+        "681010d62ff04315",
+        "615694947a8d0505",
     ],
     [
         "city:n=1200,seed=7",
         "zoom:frames=4",
-        "f26bccc91c9839cc",
-        "969b43269c6c661c",
+        "7ade444b153791f2",
+        "842644c62cdac0e6",
     ],
     [
         "city:n=1200,seed=7",
         "teleport:frames=5,seed=3",
-        "2986423762645daf",
-        "370bfe28b09f0a62",
+        "a810be22a65d04dc",
+        "71b3d0293b3eaf63",
     ],
     [
         "city:n=1200,seed=7",
         "spin:frames=3,far=inf",
-        "6dd5078a476279dc",
-        "31540ee5954acacc",
+        "954b3a4248dee338",
+        "7b4f39a2e356789c",
     ],
     [
         "forest:n=1200,seed=7",
         "orbit:frames=3",
-        "2981bccbac1cb395",
-        "84d429e1a661439b",
+        "88bba08395a26a1e",
+        "ee056803c42ff573",
     ],
     [
         "forest:n=1200,seed=7",
         "flythrough:frames=5,visible=2%",
-        "ac91129e891abb02",
-        "4bff8cce000e67cf",
+        "dc84a665e39a4ca6",
+        "5c36faa6e052da6e",
     ],
     [
         "forest:n=1200,seed=7",
         "zoom:frames=4",
-        "ee5d01b2eede7285",
-        "85df56179a38854b",
+        "2729941382d6c973",
+        "4a6e213928f26ceb",
     ],
     [
         "forest:n=1200,seed=7",
         "teleport:frames=5,seed=3",
-        "f64ac26a2801fcc4",
-        "eb375fc1c33ef0a0",
+        "647544c3cdf14a40",
+        "a59046f329efc1bb",
     ],
     [
         "forest:n=1200,seed=7",
         "spin:frames=3,far=inf",
-        "b4b9a0776b70ec84",
-        "259c3534e4a2e9a5",
+        "5501ecbbb10c4b7a",
+        "a4201715435d8d57",
     ],
     [
         "rooms:n=1200,seed=7",
         "orbit:frames=3",
-        "de740cfbb1512cb9",
-        "503073c6a4a6a902",
+        "cfaca2d869ae34b3",
+        "865f266001e0082e",
     ],
     [
         "rooms:n=1200,seed=7",
         "flythrough:frames=5,visible=2%",
-        "5a04d1eebf541521",
-        "bc800c8fdae18cab",
+        "c57a6d44890b18ee",
+        "1fde509fdb0b93c0",
     ],
     [
         "rooms:n=1200,seed=7",
         "zoom:frames=4",
-        "1cc27ddeafd72004",
-        "5d6b62db78fc7c4c",
+        "3e343eff0b061b32",
+        "1a1a1c0007225726",
     ],
     [
         "rooms:n=1200,seed=7",
         "teleport:frames=5,seed=3",
-        "f2e00f12e3e75540",
-        "a1be2ee6fdba4c5b",
+        "38cecc5557e54aa8",
+        "d43b53be8809df65",
     ],
     [
         "rooms:n=1200,seed=7",
         "spin:frames=3,far=inf",
-        "f8c3f8e377448309",
-        "4e12d8a468781b75",
+        "ced2f0ac48a52438",
+        "dc2d4dd42c7360d0",
     ],
     [
         "city:n=1200,seed=7,offset=1e7",
         "orbit:frames=3",
-        "96e575cf9f60d9fe",
-        "afea342089185705",
+        "42f7b21b9ea5f294",
+        "f35a982cc68860e9",
     ],
     [
         "city:n=1200,seed=7,offset=1e7",
         "flythrough:frames=5,visible=2%",
-        "e8ff85cc4c3d8c18",
-        "3bf394d7f77d389b",
+        "87f423f742b5b954",
+        "5bd6d1886f8b745f",
     ],
     [
         "city:n=1200,seed=7,offset=1e7",
         "zoom:frames=4",
-        "3f65d66e9380efd0",
-        "fbb17e9767dc2dfd",
+        "3643181631dc3e58",
+        "aa1846cdf197950e",
     ],
     [
         "city:n=1200,seed=7,offset=1e7",
         "teleport:frames=5,seed=3",
-        "7f635ca352999523",
-        "d6e0560ed94c8aa0",
+        "1584a04e8f915c57",
+        "0fa592ccb564e0a8",
     ],
     [
         "city:n=1200,seed=7,offset=1e7",
         "spin:frames=3,far=inf",
-        "9b2d543f26e56ac2",
-        "c2666eb6f5cf4d72",
+        "058d1997c514c0d9",
+        "d642685fdd997055",
     ],
     [
         "freedm-map12",
         "orbit:frames=3",
-        "e0cfe03cfec7a2ab",
-        "8066a32039afaca2",
+        "4d6c48da6190c04f",
+        "081a443d8672cbad",
     ],
     [
         "freedm-map12",
         "flythrough:frames=5,visible=2%",
-        "c6cb5204340c327b",
+        "d698fa31767dc555",
         "c78fb6e1b2ffe807",
     ],
     [
         "freedm-map12",
         "zoom:frames=4",
-        "de6317a92005ef5a",
-        "3fa88f1583b6f90f",
+        "672ca2ecac0b7193",
+        "215812640fbfd05c",
     ],
     [
         "freedm-map12",
         "teleport:frames=5,seed=3",
-        "e7061e939fb470fc",
-        "5ce1fade00dd1dde",
+        "fa748269035c0cca",
+        "b83366d12803bcab",
     ],
     [
         "freedm-map12",
         "spin:frames=3,far=inf",
-        "11e72ae0f45ce2a3",
-        "546c013198d86f23",
+        "4063461aa64871c7",
+        "ca39b972070411ba",
     ],
     [
         "freedm-map20",
         "orbit:frames=3",
-        "4fad6c35ec0b37f2",
-        "4666c4e00c934465",
+        "5cb996d8c66942fe",
+        "16d12385d633d6bc",
     ],
     [
         "freedm-map20",
         "flythrough:frames=5,visible=2%",
-        "4eaa922a2a733774",
-        "b38282b853d455a1",
+        "cad5e71ab7c72fd0",
+        "1b9bfde7a6396d6c",
     ],
     [
         "freedm-map20",
         "zoom:frames=4",
-        "d8e477fd6d339c2c",
-        "3506a10360953464",
+        "3d8679818cc90901",
+        "7d4fe740c4a044e0",
     ],
     [
         "freedm-map20",
         "teleport:frames=5,seed=3",
-        "e33854d1aafbcb49",
-        "a9a0c529577e6d91",
+        "33c5f95602008b9b",
+        "abed6c499c4503ff",
     ],
     [
         "freedm-map20",
         "spin:frames=3,far=inf",
-        "95cc2891376aedab",
-        "a6e5a05ce94bd7d7",
+        "6fb2df386743faf2",
+        "0bed7bd6c75c702f",
     ],
     [
         "helsinki",
         "orbit:frames=3",
-        "98a0acdac0edbb00",
-        "ee73c9c72e13f2e5",
+        "aba448ae2f95553a",
+        "549d1f28d0f6b9df",
     ],
     [
         "helsinki",
         "flythrough:frames=5,visible=2%",
-        "a18316943632a230",
-        "17e745f2c8ecb954",
+        "65356cdaa9b90f25",
+        "2faa5fa59eebd5bf",
     ],
     [
         "helsinki",
         "zoom:frames=4",
-        "e26cfd5551b36580",
-        "560928d66d3bcd32",
+        "709c8ac5de8330a9",
+        "2c00ee330b729000",
     ],
     [
         "helsinki",
         "teleport:frames=5,seed=3",
-        "4e298e493f1f8c13",
-        "cd08b20f57bbb3e3",
+        "60fbf293c97a523e",
+        "57ce99b3cf38ca43",
     ],
     [
         "helsinki",
         "spin:frames=3,far=inf",
-        "dbd7e661980a21a6",
-        "b2d556b60759fe56",
+        "4ae89e30012c706d",
+        "12a6e7965cea38b8",
     ],
     [
         "us-counties",
         "orbit:frames=3",
-        "38e85fe036a99749",
-        "adbd2fa9b9c339c7",
+        "220c591ff3cccb87",
+        "534ef734b0402cac",
     ],
     [
         "us-counties",
         "flythrough:frames=5,visible=2%",
-        "70eb38244399479e",
-        "a1cad2c1fa1b48d0",
+        "a801453d498606cc",
+        "8c4859781e8e3d28",
     ],
     [
         "us-counties",
         "zoom:frames=4",
-        "c544536eeef1af39",
-        "4d095a87801ab693",
+        "e26d4b21257395c2",
+        "400871b778807e7e",
     ],
     [
         "us-counties",
         "teleport:frames=5,seed=3",
-        "7f356e328982f28e",
-        "8b0997da6f2383c5",
+        "f813a630806ac99f",
+        "f5714c6461a19721",
     ],
     [
         "us-counties",
         "spin:frames=3,far=inf",
-        "23d3dba764d67d4c",
-        "3d45273810656407",
+        "12363cb6083c04c7",
+        "32c9008789788bec",
     ],
 ];
 
 /// Every structure over the boxes and over the cubes of the sphere test.
 struct Structures {
-    boxes: Vec<Box<dyn DynIndex>>,
-    cubes: Vec<Box<dyn DynIndex>>,
-    regions: Vec<Box<dyn DynIndex>>,
+    boxes: Vec<Named>,
+    cubes: Vec<Named>,
+    regions: Vec<Named>,
 }
 
-fn over(items: &[Aabb], own_tree: Option<&PlaneTree>) -> Vec<Box<dyn DynIndex>> {
-    let all = BACKENDS.iter().map(|backend| {
-        let spec = StructureSpec::parse(backend.name).expect(backend.name);
-        spec.build_with(items, own_tree).expect(backend.name)
+/// A structure that is asked by one of the kernels, with the names of both.
+type Named = (String, Box<dyn DynIndex>);
+
+fn over(items: &[Aabb], own_tree: Option<&PlaneTree>) -> Vec<Named> {
+    let registry = Registry::builtin();
+    let all = Kernel::available().flat_map(|kernel| {
+        let specs = registry.structures("all").expect("all").into_iter();
+        specs.map(move |spec| {
+            let spec = spec.by(Execution { kernel, threads: 1 });
+            let what = format!("{}, {kernel}", spec.label);
+            let built = spec.build_with(items, own_tree).expect(&what);
+            (what, built)
+        })
     });
     all.collect()
 }
@@ -359,7 +368,7 @@ impl Structures {
         }
     }
 
-    fn of(&self, test: CullingTest) -> &[Box<dyn DynIndex>] {
+    fn of(&self, test: CullingTest) -> &[Named] {
         match test {
             CullingTest::Sphere => &self.cubes,
             _ => &self.boxes,
@@ -393,20 +402,17 @@ fn cullings() -> Vec<Culling> {
 
 /// The ids that every structure with every kernel gives, sorted.
 fn agreed(
-    structures: &[Box<dyn DynIndex>],
+    structures: &[Named],
     what: &str,
     ask: impl Fn(&dyn DynIndex, &mut Vec<ItemId>),
 ) -> Vec<ItemId> {
     let mut wanted: Option<Vec<ItemId>> = None;
-    for kernel in Kernel::available() {
-        kernel.choose().expect("available");
-        for (backend, index) in BACKENDS.iter().zip(structures) {
-            let mut ids = Vec::new();
-            ask(index.as_ref(), &mut ids);
-            ids.sort_unstable();
-            let wanted = wanted.get_or_insert_with(|| ids.clone());
-            assert!(ids == *wanted, "{what}: {}, {kernel}", backend.name);
-        }
+    for (name, index) in structures {
+        let mut ids = Vec::new();
+        ask(index.as_ref(), &mut ids);
+        ids.sort_unstable();
+        let wanted = wanted.get_or_insert_with(|| ids.clone());
+        assert!(ids == *wanted, "{what}: {name}");
     }
     wanted.unwrap_or_default()
 }
@@ -485,11 +491,11 @@ fn digests(scene: &Scene, structures: &Structures, path: &str, found: &mut usize
         }
         // The points are the same for every culling.
         if culling == Culling::default() {
-            for &p in &workload.points {
+            for (n, &p) in workload.points.iter().enumerate() {
                 let what = format!("{}, {}, region search", scene.name, path.name);
                 let ids = agreed(&structures.regions, &what, |index, out| {
                     index.locate(p, out);
-                    workload.refine(p, out);
+                    workload.refine(n, out);
                 });
                 *found += ids.len();
                 answered.take(&ids);

@@ -5,7 +5,10 @@
 use cullbench::camera::PlaneOptions;
 use cullbench::culling::{Culling, CullingTest};
 use cullbench::geometry::{Aabb, Plane};
-use cullbench::index::{Backend, BuildError, DynIndex, MemoryUsage, StructureSpec, indexable};
+use cullbench::index::{
+    BuildError, DynIndex, Info, Kind, MemoryUsage, Origin, Row as Structure, StructureSpec,
+    indexable,
+};
 use cullbench::query::{AnyView, ItemId, QueryCost};
 use cullbench::stress::extremes::{CAMERA_FAMILIES, Case, Findings, PLANES_FAMILIES, camera_case};
 use cullbench::stress::{Replay, Row, Status, built_in, replay};
@@ -103,48 +106,50 @@ fn flushed(_: usize, plane: &Plane, b: &Aabb) -> bool {
     flush(flush(flush(x + y) + z) + flush(plane.d)) < 0.0
 }
 
-macro_rules! backend {
+const fn info(name: &'static str) -> Info {
+    Info::new(name, "for this test", Kind::Scan, Origin::Ours)
+}
+
+macro_rules! scan {
     ($drops:ident) => {
-        &Backend {
-            name: stringify!($drops),
-            summary: "for this test",
-            build: |items, _, _| scan(items, $drops),
+        Structure {
+            info: info(stringify!($drops)),
+            build: |_, items, _, _| scan(items, $drops),
             params: |params| Ok(params.clone()),
         }
     };
 }
 
-static SOUND: &Backend = backend!(sound);
+const SOUND: Structure = scan!(sound);
 /// Each with a vector that must catch it, if one can, and a family.
-static BROKEN: [(&Backend, &str, &str); 5] = [
-    (backend!(fused), "B01-ratio-1e3-gh", "near-far"),
-    (backend!(open), "A02-touch-integer-planes", "ties"),
-    (backend!(swapped), "A01-basic", "lens"),
-    (backend!(wrong_corner), "A02-touch-integer-planes", "fov"),
-    (backend!(flushed), "E08-ftz-false-negative", "denormals"),
+const BROKEN: [(Structure, &str, &str); 5] = [
+    (scan!(fused), "B01-ratio-1e3-gh", "near-far"),
+    (scan!(open), "A02-touch-integer-planes", "ties"),
+    (scan!(swapped), "A01-basic", "lens"),
+    (scan!(wrong_corner), "A02-touch-integer-planes", "fov"),
+    (scan!(flushed), "E08-ftz-false-negative", "denormals"),
 ];
 
 /// Another crate's code may end the thread that it runs on.
-static PANICKING: [&Backend; 2] = [
-    &Backend {
-        name: "panics-while-building",
-        summary: "for this test",
-        build: |_, _, _| panic!("deep in a crate"),
+const PANICKING: [Structure; 2] = [
+    Structure {
+        info: info("panics-while-building"),
+        build: |_, _, _, _| panic!("deep in a crate"),
         params: |params| Ok(params.clone()),
     },
-    &Backend {
-        name: "panics-while-asked",
-        summary: "for this test",
-        build: |items, _, _| scan(items, |_, _, _| panic!("deep in a crate")),
+    Structure {
+        info: info("panics-while-asked"),
+        build: |_, items, _, _| scan(items, |_, _, _| panic!("deep in a crate")),
         params: |params| Ok(params.clone()),
     },
 ];
 
-fn spec(backend: &'static Backend) -> StructureSpec {
+fn spec(row: Structure) -> StructureSpec {
     StructureSpec {
-        label: backend.name.to_owned(),
-        backend,
+        label: row.info.name.to_owned(),
+        row,
         params: Value::Null,
+        execution: Default::default(),
     }
 }
 
@@ -183,39 +188,41 @@ fn a_sound_structure_passes() {
 
 #[test]
 fn each_broken_structure_fails_a_vector_and_a_generated_case() {
-    for (backend, vector, family) in BROKEN {
-        let structure = [spec(backend)];
+    for (broken, vector, family) in BROKEN {
+        let structure = [spec(broken)];
         let rows = failed(&structure);
         let named = |row: &&Row| {
-            row.id.starts_with(vector) && row.structure == backend.name && row.test == "six-plane"
+            row.id.starts_with(vector)
+                && row.structure == broken.info.name
+                && row.test == "six-plane"
         };
         assert!(
             rows.iter().any(|row| named(&row)),
             "{}: {rows:?}",
-            backend.name
+            broken.info.name
         );
         let boxed = format!("{vector}/");
         assert!(
             rows.iter().any(|row| row.id.starts_with(&boxed)),
             "{}",
-            backend.name
+            broken.info.name
         );
         let found = findings(family, &structure);
         let mut faults = found.iter().flat_map(|f| &f.faults);
-        let caught = faults.any(|f| f.structure == backend.name && f.item.is_some());
-        assert!(caught, "{} passes {family}", backend.name);
+        let caught = faults.any(|f| f.structure == broken.info.name && f.item.is_some());
+        assert!(caught, "{} passes {family}", broken.info.name);
     }
 }
 
 #[test]
 fn a_panic_is_a_failure_of_that_structure_alone() {
-    for backend in PANICKING {
-        let structures = [spec(backend), spec(SOUND)];
+    for broken in PANICKING {
+        let structures = [spec(broken), spec(SOUND)];
         let rows = failed(&structures);
         let told = |text: &str| text == "panicked: deep in a crate";
-        assert!(rows.len() > 5, "{}: {rows:?}", backend.name);
+        assert!(rows.len() > 5, "{}: {rows:?}", broken.info.name);
         for row in rows {
-            assert_eq!(row.structure, backend.name, "{row:?}");
+            assert_eq!(row.structure, broken.info.name, "{row:?}");
             assert!(told(&row.got.to_string()), "{row:?}");
         }
         for family in ["near-far", PLANES_FAMILIES[0].name] {
@@ -223,9 +230,9 @@ fn a_panic_is_a_failure_of_that_structure_alone() {
                 .into_iter()
                 .flat_map(|f| f.faults)
                 .collect();
-            assert!(!faults.is_empty(), "{} passes {family}", backend.name);
+            assert!(!faults.is_empty(), "{} passes {family}", broken.info.name);
             for fault in faults {
-                assert_eq!(fault.structure, backend.name, "{family}: {fault:?}");
+                assert_eq!(fault.structure, broken.info.name, "{family}: {fault:?}");
                 assert!(told(&fault.got), "{family}: {fault:?}");
             }
         }

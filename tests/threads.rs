@@ -5,7 +5,7 @@ use std::thread::scope;
 
 use cullbench::geometry::{Aabb, ConvexVolume, RelativeVolume, Spheres, WideVolume, sphere_cube};
 use cullbench::index::{
-    BACKENDS, BlockOrder, Crew, DynIndex, StructureSpec, TreeOrder, Wide, WideParams, see_each,
+    BlockOrder, Crew, DynIndex, Registry, StructureSpec, TreeOrder, Wide, WideParams, see_each,
 };
 use cullbench::query::{AnyView, ItemId};
 use cullbench::scene;
@@ -155,12 +155,12 @@ fn many_cameras_are_answered_each_in_its_place() {
     for (name, items, volumes) in cases() {
         let views: Vec<Views> = volumes.iter().map(|v| Views::new(v, Vec3::ONE)).collect();
         let views: Vec<AnyView> = views.iter().flat_map(Views::of_items).collect();
-        for backend in BACKENDS {
-            if items.len() > 50_000 && backend.name != "wide" {
+        for row in Registry::builtin().rows() {
+            if items.len() > 50_000 && row.info.name != "wide" {
                 continue;
             }
-            let spec = StructureSpec::parse(backend.name).expect(backend.name);
-            let index = spec.build(&items).expect(backend.name);
+            let spec = StructureSpec::parse(row.info.name).expect(row.info.name);
+            let index = spec.build(&items).expect(row.info.name);
             let one_by_one: Vec<Vec<ItemId>> = views
                 .iter()
                 .map(|&view| {
@@ -173,7 +173,7 @@ fn many_cameras_are_answered_each_in_its_place() {
             let mut out = vec![vec![7]; views.len() + 3];
             for threads in THREADS {
                 see_each(&*index, &views, threads, &mut out);
-                assert_eq!(out, one_by_one, "{} on {name}, {threads}", backend.name);
+                assert_eq!(out, one_by_one, "{} on {name}, {threads}", row.info.name);
             }
         }
     }

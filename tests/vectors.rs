@@ -11,7 +11,7 @@ use std::collections::BTreeSet;
 use by_hand::{Kind, Setup};
 use cullbench::camera::{Camera, CameraError, Lens, PlaneOptions, Surroundings, look_at};
 use cullbench::geometry::{Aabb, ConvexVolume, Plane, VolumeError};
-use cullbench::index::{BACKENDS, BuildError, DynIndex, StructureSpec};
+use cullbench::index::{BuildError, DynIndex, Execution, Registry, StructureSpec};
 use cullbench::kernel::Kernel;
 use cullbench::query::{ItemId, QueryCost};
 use glam::{DVec3, Vec3};
@@ -138,12 +138,13 @@ fn vectors() -> Vec<Vector> {
     vectors.iter().cloned().map(Vector).collect()
 }
 
-fn structures(items: &[Aabb]) -> Vec<(&'static str, Box<dyn DynIndex>)> {
-    let named = BACKENDS.iter().map(|b| b.name);
+fn structures(kernel: Kernel, items: &[Aabb]) -> Vec<(&'static str, Box<dyn DynIndex>)> {
+    let registry = Registry::builtin();
+    let named = registry.rows().iter().map(|row| row.info.name);
     named
         .map(|name| {
             let spec = StructureSpec::parse(name).unwrap();
-            let built = spec.build(items);
+            let built = spec.by(Execution { kernel, threads: 1 }).build(items);
             (name, built.unwrap_or_else(|e| panic!("{name}: {e}")))
         })
         .collect()
@@ -172,6 +173,7 @@ fn check_equal(what: &str, found: &BTreeSet<String>, wanted: &BTreeSet<String>) 
 
 /// Asks the volume box by box and every structure, counted and not.
 fn answers(
+    kernel: Kernel,
     id: &str,
     names: &[String],
     items: &[Aabb],
@@ -181,7 +183,7 @@ fn answers(
     let seen = items.iter().zip(names).filter(|(b, _)| volume.sees(b));
     let seen = seen.map(|(_, name)| name.clone()).collect();
     all.push((format!("{id}, ConvexVolume::sees"), seen));
-    for (name, structure) in structures(items) {
+    for (name, structure) in structures(kernel, items) {
         let what = format!("{id}, {name}");
         let (mut plain, mut counted) = (Vec::new(), Vec::new());
         structure.visible(volume, &mut plain);
@@ -212,8 +214,7 @@ fn given_planes_see_exactly_the_recorded_boxes() {
         // Some of the vectors come out otherwise where products and sums are
         // fused, as an instruction set might offer to.
         for kernel in Kernel::available() {
-            kernel.choose().unwrap();
-            for (what, found) in answers(id, &names, &items, &volume) {
+            for (what, found) in answers(kernel, id, &names, &items, &volume) {
                 check_equal(&format!("{what}, {kernel}"), &found, &wanted);
                 asked += 1;
             }
@@ -221,7 +222,7 @@ fn given_planes_see_exactly_the_recorded_boxes() {
     }
     let kernels = Kernel::available().count();
     assert!(
-        asked >= 48 * kernels * (1 + BACKENDS.len()),
+        asked >= 48 * kernels * (1 + Registry::builtin().rows().len()),
         "only {asked} answers"
     );
 }
@@ -262,9 +263,9 @@ fn bounds_that_are_not_finite_are_refused_by_name() {
             }
         }
         for (scene, wanted) in &scenes {
-            for backend in BACKENDS {
-                let what = format!("{}, {}, {scene:?}", vector.id(), backend.name);
-                let spec = StructureSpec::parse(backend.name).unwrap();
+            for row in Registry::builtin().rows() {
+                let what = format!("{}, {}, {scene:?}", vector.id(), row.info.name);
+                let spec = StructureSpec::parse(row.info.name).unwrap();
                 let Some(error) = spec.build(scene).err() else {
                     panic!("{what}: built");
                 };
@@ -278,7 +279,7 @@ fn bounds_that_are_not_finite_are_refused_by_name() {
             }
         }
     }
-    assert!(refused >= 3 * BACKENDS.len());
+    assert!(refused >= 3 * Registry::builtin().rows().len());
 }
 
 #[test]
@@ -290,12 +291,12 @@ fn empty_boxes_are_never_returned() {
         let everything = ConvexVolume::from_planes(&[]).unwrap();
         let given = ConvexVolume::from_planes(&vector.planes()).unwrap();
         for volume in [everything, given] {
-            for (what, found) in answers(vector.id(), &names, &items, &volume) {
+            for (what, found) in answers(Kernel::best(), vector.id(), &names, &items, &volume) {
                 assert!(found.is_disjoint(&empty), "{what} returns {found:?}");
                 met += 1;
             }
         }
-        for (name, structure) in structures(&items) {
+        for (name, structure) in structures(Kernel::best(), &items) {
             for b in items.iter().filter(|b| b.is_empty()) {
                 let mut ids = Vec::new();
                 structure.locate(b.centre(), &mut ids);
@@ -352,7 +353,7 @@ fn the_default_pipeline_drops_nothing_that_the_camera_sees() {
         };
         let volume = camera.volume(&PlaneOptions::default(), &around);
         let volume = volume.unwrap_or_else(|error| panic!("{id}: {error}"));
-        for (what, found) in answers(id, &names, &items, &volume) {
+        for (what, found) in answers(Kernel::best(), id, &names, &items, &volume) {
             let dropped: Vec<_> = wanted.difference(&found).collect();
             assert!(dropped.is_empty(), "{what} drops {dropped:?}");
             // More may come, but not what lies far beyond a plane.
@@ -376,7 +377,7 @@ fn points_are_located_in_the_closed_boxes() {
     let mut located = 0;
     for vector in vectors().iter().filter(|v| v.has("points")) {
         let (names, items) = split(vector.sound_boxes());
-        let structures = structures(&items);
+        let structures = structures(Kernel::best(), &items);
         for point in vector.0["points"].as_array().unwrap() {
             let p = exact_f32(&point["p"]);
             let wanted = strings(&point["expected_containing"]);
@@ -391,5 +392,8 @@ fn points_are_located_in_the_closed_boxes() {
             }
         }
     }
-    assert!(located >= 12 * BACKENDS.len(), "only {located} points");
+    assert!(
+        located >= 12 * Registry::builtin().rows().len(),
+        "only {located} points"
+    );
 }

@@ -10,13 +10,14 @@
 mod table;
 
 use std::process::ExitCode;
-use std::time::Duration;
 
 use cullbench::culling::{Culling, CullingTest};
-use cullbench::index::{BACKENDS, Backend, RegionIndex, StructureSpec, TreeOrder, Wide, caught};
+use cullbench::index::{
+    Info, Kind, Origin, RegionIndex, Registry, StructureSpec, TreeOrder, Wide, caught,
+};
 use cullbench::measure::{
     BOUNDS, Cell, Contender, Group, Machine, Metric, Protocol, Status, Stopwatch, Workload,
-    harness_overhead_ns, measure_group,
+    cameras_within, measure_group,
 };
 use cullbench::query::AnyView;
 use cullbench::scene::Scene;
@@ -26,20 +27,13 @@ use table::{
     ALL, LEAST_OF_TREES, MOST_BUILD_NS, MOST_BYTES, MOST_RANGES_US, TINY, TREES, WORLDS, Way, World,
 };
 
-const PEER_PREFIX: &str = "peer-";
-/// Peers that are written here after somebody's code, since the crate itself
-/// cannot be compared.
-const STAND_INS: [&str; 1] = ["peer-bevy-style"];
 /// Of a row: views that the heat before it asks about.
 const HEAT_VIEWS: usize = 4;
 /// Time of a crate / time of the fastest crate proper, in the heat, from which on
 /// it is left out of the row: no noise makes up for that.
 const FAR_BEHIND: f64 = 4.0;
-/// Nobody's crate, so no goal is set against it; it comes with the peers and
-/// its ratio is shown.
-const OWN_GRID: [&str; 1] = ["uniform-grid"];
 /// The structure that is to meet the goals.
-const SUBJECT: &str = Wide::NAME;
+const SUBJECT: &str = Wide::INFO.name;
 
 impl World {
     fn row(&self, way: &Way) -> String {
@@ -105,21 +99,21 @@ impl Judge {
     }
 }
 
-/// Time of `base` / time of `other`, from the ratios of both to the yardstick.
+/// Time of `base` / time of `other`, without an interval: this is one process.
 fn quotient(base: &Cell, other: &Cell) -> Option<Metric> {
-    let (base, other) = (ratio(base)?, ratio(other)?);
     Some(Metric {
-        value: other.value / base.value,
-        // The extremes of both: no narrower than the truth.
-        lower: other.lower.zip(base.upper).map(|(o, b)| o / b),
-        upper: other.upper.zip(base.lower).map(|(o, b)| o / b),
+        value: query_ns(base)? / query_ns(other)?,
+        lower: None,
+        upper: None,
         unit: "1".to_owned(),
     })
 }
 
-fn ratio(cell: &Cell) -> Option<&Metric> {
+/// Of a structure whose answers are right.
+fn query_ns(cell: &Cell) -> Option<f64> {
     let sound = cell.verdict.status == Status::Ok;
-    cell.metrics.get("ratio_to_linear").filter(|_| sound)
+    let time = cell.metrics.get("query_ns").filter(|_| sound);
+    time.map(|time| time.value)
 }
 
 fn contenders(names: &[&str], twin: &str, scene: &Scene) -> Vec<Contender> {
@@ -135,12 +129,14 @@ fn contenders(names: &[&str], twin: &str, scene: &Scene) -> Vec<Contender> {
         .collect()
 }
 
-fn is_peer(name: &str) -> bool {
-    name.starts_with(PEER_PREFIX)
+fn is_peer(info: &Info) -> bool {
+    !info.origin.is_ours()
 }
 
-fn is_crate(name: &str) -> bool {
-    is_peer(name) && !STAND_INS.contains(&name)
+/// Nobody's crate, so no goal is set against it; it comes with the peers and
+/// its ratio is shown.
+fn is_own_grid<Name>(kind: Kind, origin: &Origin<Name>) -> bool {
+    origin.is_ours() && kind == Kind::Grid
 }
 
 /// Those that stay in a row, and those that are left out of it: peers far
@@ -163,10 +159,10 @@ fn heat(entered: Vec<Contender>, workload: &Workload) -> (Vec<Contender>, Vec<Co
         let laps = caught(|| [lap(), lap()]);
         laps.ok().map(|[_, second]| second)
     };
-    let of_peers = |c: &Contender| is_peer(&c.spec.label).then(|| time(c)).flatten();
+    let of_peers = |c: &Contender| is_peer(c.spec.info()).then(|| time(c)).flatten();
     let times: Vec<Option<f64>> = entered.iter().map(of_peers).collect();
     let timed = entered.iter().zip(&times);
-    let of_crates = timed.filter(|(c, _)| is_crate(&c.spec.label));
+    let of_crates = timed.filter(|(c, _)| c.spec.info().origin.is_crate());
     let fastest = of_crates
         .filter_map(|(_, time)| *time)
         .fold(f64::INFINITY, f64::min);
@@ -189,7 +185,7 @@ fn heat(entered: Vec<Contender>, workload: &Workload) -> (Vec<Contender>, Vec<Co
 fn judge_row(judge: &mut Judge, world: &World, way: &Way, group: &Group) {
     let cell = |name: &str| group.cells.iter().find(|c| c.structure == name);
     let noise = group.twin.as_ref();
-    let noise = noise.map_or(f64::NAN, |t| (t.ratio.value - 1.0).abs() * 100.0);
+    let noise = noise.map_or(f64::NAN, |(_, ratio)| (ratio.value - 1.0).abs() * 100.0);
     println!("  {SUBJECT} entered twice differs by {noise:.1} %");
     for c in &group.cells {
         if c.verdict.status != Status::Ok {
@@ -199,14 +195,16 @@ fn judge_row(judge: &mut Judge, world: &World, way: &Way, group: &Group) {
     }
     let Some(own) = cell(SUBJECT) else { return };
     assert_eq!(own.verdict.status, Status::Ok, "{:?}", own.verdict);
-    let fastest = |among: fn(&str) -> bool| {
-        let cells = group.cells.iter().filter(|c| among(&c.structure));
-        cells.filter(|c| ratio(c).is_some()).max_by(|a, b| {
-            let of = |c: &Cell| ratio(c).map_or(0.0, |m| m.value);
-            of(a).total_cmp(&of(b))
-        })
+    let fastest = |among: fn(&Origin) -> bool| {
+        let declared = |c: &&Cell| c.declared.as_ref().is_some_and(|(_, origin)| among(origin));
+        let timed = |c| Some((c, query_ns(c)?));
+        let cells = group.cells.iter().filter(declared).filter_map(timed);
+        cells.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(c, _)| c)
     };
-    let (peer, proper) = (fastest(is_peer), fastest(is_crate));
+    let (peer, proper) = (
+        fastest(|origin| !origin.is_ours()),
+        fastest(Origin::is_crate),
+    );
     let trees = TREES.map(|name| {
         let suited = world.ahead.contains(&name);
         (name, if suited { 1.0 } else { LEAST_OF_TREES })
@@ -228,8 +226,13 @@ fn judge_row(judge: &mut Judge, world: &World, way: &Way, group: &Group) {
     {
         ahead(proper, SUBJECT, way.peers);
     }
-    for name in OWN_GRID {
-        if let Some(times) = cell(name).and_then(|grid| quotient(grid, own)) {
+    let is_grid = |c: &&Cell| {
+        let declared = c.declared.as_ref();
+        declared.is_some_and(|(kind, origin)| is_own_grid(*kind, origin))
+    };
+    for grid in group.cells.iter().filter(is_grid) {
+        if let Some(times) = quotient(grid, own) {
+            let name = &grid.structure;
             println!("  {name} (no crate) / {SUBJECT}: {:.2}", times.value);
         }
     }
@@ -307,20 +310,21 @@ fn main() -> ExitCode {
     let only_test = words.iter().any(|word| word == "--test");
     let wanted: Vec<&String> = words.iter().filter(|w| !w.starts_with('-')).collect();
     let chosen = |row: &str| wanted.is_empty() || wanted.iter().any(|w| row.contains(w.as_str()));
-    let exists = |name: &&str| Backend::named(name).is_some();
-    let peers = BACKENDS.iter().map(|b| b.name);
-    let peers: Vec<&str> = peers.filter(|name| name.starts_with(PEER_PREFIX)).collect();
+    let registry = Registry::builtin();
+    let named = |is_one: fn(&Info) -> bool| -> Vec<&str> {
+        let infos = registry.rows().iter().map(|row| row.info);
+        infos.filter(is_one).map(|info| info.name).collect()
+    };
+    let peers = named(is_peer);
     if peers.is_empty() {
         println!("no structures of other crates (feature `peers`): judged against the bounds only");
     }
     let protocol = Protocol {
-        min_rounds: if only_test { 1 } else { 9 },
-        max_rounds: if only_test { 1 } else { 25 },
-        budget: Duration::from_secs(if only_test { 0 } else { 8 }),
-        pass: Duration::from_millis(if only_test { 20 } else { 400 }),
+        rounds: if only_test { [1, 1] } else { [9, 25] },
+        task_ns: 4e8,
+        cameras: 0,
         cold: false,
         seed: 1,
-        overhead_ns: harness_overhead_ns(),
         cache_bytes: Machine::capture().cache_sweep_bytes(),
     };
     let mut judge = Judge {
@@ -343,7 +347,7 @@ fn main() -> ExitCode {
         if !peers.is_empty() {
             names.extend(TREES);
             names.extend(&peers);
-            names.extend(OWN_GRID.into_iter().filter(exists));
+            names.extend(named(|info| is_own_grid(info.kind, &info.origin)));
         }
         let mut contenders = contenders(&names, SUBJECT, &scene);
         judge_build(&mut judge, world, &contenders[1], scene.items.len());
@@ -353,12 +357,16 @@ fn main() -> ExitCode {
             let workload = Workload::new(&scene, &cameras, &Culling::default()).expect(way.path);
             let protocol = Protocol {
                 cold: world.cold,
+                cameras: match only_test {
+                    true => 8,
+                    false => cameras_within(4e8, scene.items.len()),
+                },
                 ..protocol
             };
             println!("{}", world.row(way));
             let (stay, out) = heat(contenders, &workload);
-            let group = measure_group(&workload, &stay, BOUNDS, SUBJECT, &protocol, &|| false)
-                .expect("not stopped");
+            let group =
+                measure_group(&workload, &stay, BOUNDS, &protocol, &|| false).expect("not stopped");
             judge_row(&mut judge, world, way, &group);
             contenders = stay.into_iter().chain(out).collect();
             if way.path == ALL && !world.cold {

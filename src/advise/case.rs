@@ -44,7 +44,7 @@ impl<'a> Case<'a> {
         let wanted = most.min(cameras.len());
         let frames = (0..wanted).map(|n| n * cameras.len() / wanted);
         let truths = frames.filter_map(|frame| {
-            let truth = Truth::of_camera(&cameras[frame], scene.origin, &scene.items)?;
+            let truth = Truth::of_scene(&cameras[frame], scene)?;
             Some((frame, truth))
         });
         Ok(Case {

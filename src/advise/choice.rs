@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::case::{Case, asked};
 use super::trials::{Times, Trials};
 use crate::culling::{Culling, CullingTest, TESTS};
-use crate::index::{BuildError, StructureSpec};
+use crate::index::{BuildError, Execution, Kind, StructureSpec};
 use crate::measure::{Cell, Group, Metric};
 
 /// Which structure, and all that took part.
@@ -19,6 +19,8 @@ pub struct StructureChoice {
     pub ties: Vec<String>,
     /// The fastest for region search.
     pub region_search: Option<String>,
+    /// Others within the noise floor of it.
+    pub region_search_ties: Vec<String>,
     pub noise_floor: f64,
     /// Fastest first; what failed comes last.
     pub rows: Vec<StructureRow>,
@@ -34,7 +36,7 @@ pub struct StructureRow {
     pub query_ns_lower: Option<f64>,
     pub query_ns_upper: Option<f64>,
     /// Time of `linear` / time of this; above 1 is faster.
-    pub ratio_to_linear: Option<f64>,
+    pub speedup: Option<f64>,
     pub build_ms: Option<f64>,
     pub memory_bytes_per_item: Option<f64>,
     /// Queries after which the build is repaid against `linear`.
@@ -42,11 +44,6 @@ pub struct StructureRow {
     pub locate_ns: Option<f64>,
     #[serde(skip)]
     pub(super) is_failure: bool,
-}
-
-/// Whether a structure looks at everything.
-pub(super) fn is_scan(name: &str) -> bool {
-    name.starts_with("linear") || name == "peer-bevy-style"
 }
 
 impl StructureRow {
@@ -60,7 +57,7 @@ impl StructureRow {
             query_ns: value("query_ns"),
             query_ns_lower: metric("query_ns").and_then(|m| m.lower),
             query_ns_upper: metric("query_ns").and_then(|m| m.upper),
-            ratio_to_linear: value("ratio_to_linear"),
+            speedup: value("speedup"),
             build_ms: value("build_ms"),
             memory_bytes_per_item: value("memory_bytes_per_item"),
             break_even_queries: value("break_even_queries"),
@@ -75,54 +72,64 @@ impl StructureChoice {
         let mut rows: Vec<StructureRow> = group.cells.iter().map(StructureRow::of).collect();
         let time = |row: &StructureRow| row.query_ns.unwrap_or(f64::INFINITY);
         rows.sort_by(|a, b| time(a).total_cmp(&time(b)));
-        let twin = group.twin.as_ref().map(|twin| twin.ratio);
-        let noise_floor = twin.map_or(0.0, |ratio| (ratio.value - 1.0).abs());
+        let twin = group.twin.as_ref().map(|twin| twin.1.value);
+        let noise_floor = twin.map_or(0.0, |ratio| (ratio - 1.0).abs());
         let fastest = rows.first().filter(|row| row.query_ns.is_some());
         let most = fastest.map_or(0.0, |row| time(row) * (1.0 + noise_floor));
         let near = rows.iter().skip(1).filter(|row| time(row) <= most);
-        let located = rows.iter().filter(|row| row.locate_ns.is_some());
-        let least = located.min_by(|a, b| {
-            let of = |row: &StructureRow| row.locate_ns.unwrap_or(f64::INFINITY);
-            of(a).total_cmp(&of(b))
-        });
+        let mut located = fastest_located(&rows, noise_floor).into_iter();
         StructureChoice {
             name: fastest.map(|row| row.structure.clone()),
             ties: near.map(|row| row.structure.clone()).collect(),
-            region_search: least.map(|row| row.structure.clone()),
+            region_search: located.next(),
+            region_search_ties: located.collect(),
             noise_floor,
             rows,
         }
     }
 
-    /// The fastest tree, or `wide` if there was none: what rules are forced on.
+    /// The fastest tree or grid, or `wide` if there was none: what rules are forced on.
     pub(super) fn tree(&self, structures: &[StructureSpec]) -> Result<StructureSpec, BuildError> {
-        self.fastest(structures, |name| !is_scan(name), "wide")
+        self.fastest(structures, |kind| kind != Kind::Scan, "wide")
     }
 
     /// The fastest scan, or `linear` if there was none.
     pub(super) fn scan(&self, structures: &[StructureSpec]) -> Result<StructureSpec, BuildError> {
-        self.fastest(structures, is_scan, "linear")
+        self.fastest(structures, |kind| kind == Kind::Scan, "linear")
     }
 
     fn fastest(
         &self,
         structures: &[StructureSpec],
-        is_one: impl Fn(&str) -> bool,
+        is_one: impl Fn(Kind) -> bool,
         otherwise: &'static str,
     ) -> Result<StructureSpec, BuildError> {
         let of_row = |row: &StructureRow| structures.iter().find(|s| s.label == row.structure);
         let timed = self.rows.iter().filter(|row| row.query_ns.is_some());
-        let found = timed.filter_map(of_row).find(|s| is_one(s.backend.name));
-        found.cloned().map_or_else(|| named(otherwise), Ok)
+        let found = timed.filter_map(of_row).find(|s| is_one(s.info().kind));
+        let execution = structures.first().map(|spec| spec.execution);
+        let default = || named(otherwise, execution.unwrap_or_default());
+        found.cloned().map_or_else(default, Ok)
     }
 }
 
-/// A structure of the table with its default parameters.
-pub(super) fn named(name: &'static str) -> Result<StructureSpec, BuildError> {
-    StructureSpec::parse(name).map_err(|error| BuildError::Params {
+/// The fastest for region search and what ties with it, fastest first.
+fn fastest_located(rows: &[StructureRow], floor: f64) -> Vec<String> {
+    let timed = rows.iter().filter_map(|row| Some((row.locate_ns?, row)));
+    let mut timed: Vec<(f64, &StructureRow)> = timed.collect();
+    timed.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let most = timed.first().map_or(0.0, |least| least.0 * (1.0 + floor));
+    let near = timed.iter().take_while(|(ns, _)| *ns <= most);
+    near.map(|(_, row)| row.structure.clone()).collect()
+}
+
+/// A structure of this crate with its default parameters.
+pub(super) fn named(name: &'static str, execution: Execution) -> Result<StructureSpec, BuildError> {
+    let spec = StructureSpec::parse(name).map_err(|error| BuildError::Params {
         structure: name,
         reason: error.to_string(),
-    })
+    })?;
+    Ok(spec.by(execution))
 }
 
 /// Which culling test, and all that took part, on the fastest tree.
@@ -243,6 +250,7 @@ const SIMPLEST_FIRST: [CullingTest; 4] = [
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::index::Registry;
 
     fn row(test: &'static str, query: f64, drawn: f64) -> TestRow {
         TestRow {
@@ -255,6 +263,33 @@ mod tests {
             false_positives_per_query: Some(drawn),
             total_ns: Some(query + drawn),
         }
+    }
+
+    #[test]
+    fn region_search_within_the_noise_is_a_tie() {
+        let located = |structure: &str, locate_ns| StructureRow {
+            structure: structure.to_owned(),
+            status: "ok",
+            reason: None,
+            query_ns: None,
+            query_ns_lower: None,
+            query_ns_upper: None,
+            speedup: None,
+            build_ms: None,
+            memory_bytes_per_item: None,
+            break_even_queries: None,
+            locate_ns,
+            is_failure: false,
+        };
+        let rows = [
+            located("bvh", Some(104.0)),
+            located("octree", None),
+            located("wide", Some(100.0)),
+            located("linear", Some(111.0)),
+        ];
+        assert_eq!(fastest_located(&rows, 0.05), ["wide", "bvh"]);
+        assert_eq!(fastest_located(&rows, 0.01), ["wide"]);
+        assert!(fastest_located(&rows[1..2], 0.05).is_empty());
     }
 
     #[test]
@@ -284,12 +319,36 @@ mod tests {
 
     #[test]
     fn scans_are_told_from_trees() {
-        assert!(
-            ["linear", "linear-scalar", "peer-bevy-style"]
-                .into_iter()
-                .all(is_scan)
-        );
-        assert!(!is_scan("wide") && !is_scan("peer-bvh"));
-        assert_eq!(named("wide").unwrap().label, "wide");
+        let mut choice = StructureChoice {
+            name: None,
+            ties: Vec::new(),
+            region_search_ties: Vec::new(),
+            region_search: None,
+            noise_floor: 0.0,
+            rows: Vec::new(),
+        };
+        let structures = Registry::builtin()
+            .structures("octree,linear-scalar")
+            .unwrap();
+        let label = |found: Result<StructureSpec, BuildError>| found.unwrap().label;
+        assert_eq!(label(choice.tree(&structures)), "wide");
+        assert_eq!(label(choice.scan(&structures)), "linear");
+        let row = |name: &str| StructureRow {
+            structure: name.to_owned(),
+            status: "ok",
+            reason: None,
+            query_ns: Some(1.0),
+            query_ns_lower: None,
+            query_ns_upper: None,
+            speedup: None,
+            build_ms: None,
+            memory_bytes_per_item: None,
+            break_even_queries: None,
+            locate_ns: None,
+            is_failure: false,
+        };
+        choice.rows = vec![row("linear-scalar"), row("octree")];
+        assert_eq!(label(choice.tree(&structures)), "octree");
+        assert_eq!(label(choice.scan(&structures)), "linear-scalar");
     }
 }

@@ -15,7 +15,7 @@ pub use choice::{StructureChoice, StructureRow, TestChoice, TestRow};
 pub use omission::{Check, Decision, LeftOutIf, Omission};
 
 use crate::culling::Culling;
-use crate::index::{BuildError, StructureSpec};
+use crate::index::{BuildError, Kind, StructureSpec};
 use crate::measure::{Contender, Protocol, Workload, WorkloadError, measure_group};
 use crate::path::CameraPath;
 use crate::scene::Scene;
@@ -121,7 +121,7 @@ pub fn advise(
     let workload = Workload::new(scene, path, &culling)?;
     progress("every structure");
     let contenders = entered(structures, scene, &culling);
-    let Some(group) = measure_group(&workload, &contenders, &[], "linear", protocol, stop) else {
+    let Some(group) = measure_group(&workload, &contenders, &[], protocol, stop) else {
         return Ok(None);
     };
     drop(contenders);
@@ -147,7 +147,9 @@ pub fn advise(
     let test = TestChoice::of(&case, &tests, &timed, noise_floor);
     let settled = drafts.into_iter().zip(places).map(|(draft, places)| {
         let checks = places.iter().map(|place| timed.check(place)).collect();
-        draft.settled(checks, noise_floor)
+        let mut omission = draft.settled(checks, noise_floor);
+        rules::follow_test(&mut omission, &test);
+        omission
     });
     let omissions = settled.collect();
     Ok(Some(Advice {
@@ -166,7 +168,7 @@ pub fn advise(
 
 /// All structures, and the first that is no scan once more: the twin.
 fn entered(structures: &[StructureSpec], scene: &Scene, culling: &Culling) -> Vec<Contender> {
-    let proper = structures.iter().find(|s| !choice::is_scan(s.backend.name));
+    let proper = structures.iter().find(|s| s.info().kind != Kind::Scan);
     let twin = proper.or(structures.first());
     let once = structures.iter().map(|spec| (spec, false));
     let entries = once.chain(twin.map(|spec| (spec, true)));

@@ -24,8 +24,9 @@ pub struct Omission {
     /// Share of the time that leaving it out saves; negative where it costs.
     pub saving: Option<f64>,
     pub decision: Decision,
-    /// Whether the clock says what the rule said; null for a tie, and where the
-    /// clock has no say.
+    /// Whether the clock, or for the axes beyond six planes the test that is
+    /// taken, says what the rule said; null for a tie, and where neither has a
+    /// say.
     pub confirmed: Option<bool>,
     pub reason: String,
     /// With the rule forced off and on; the first one decides.

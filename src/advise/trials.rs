@@ -2,14 +2,12 @@
 //! to be compared and judged, then timed side by side in the same rounds. What
 //! the figures mean is decided elsewhere.
 
-use std::time::{Duration, Instant};
-
 use super::case::Case;
 use super::omission::{Check, Draft, Forced, Way};
 use crate::measure::{Ask, Competitor, Timed, Verdict, paired_ratio, timed_rounds};
 use crate::query::ItemId;
 use crate::statistics::{Estimate, bootstrap_median};
-use crate::verify::{ErrorCount, Reference};
+use crate::verify::{ErrorCount, Trial};
 
 /// The place of [`Way::Base`]; its twin comes last.
 const BASE: usize = 0;
@@ -24,7 +22,6 @@ pub(super) struct Trials<'c> {
 struct Answered {
     counts: Vec<u64>,
     errors: Option<ErrorCount>,
-    slowest: Duration,
 }
 
 /// A check that waits for its times.
@@ -53,15 +50,12 @@ impl<'c> Trials<'c> {
         let mut answered = Answered {
             counts: Vec::with_capacity(case.workload.views.len()),
             errors: judged.then(ErrorCount::default),
-            slowest: Duration::ZERO,
         };
         let mut truths = case.truths.iter().peekable();
         let mut out: Vec<ItemId> = Vec::new();
         for frame in 0..case.workload.views.len() {
             out.clear();
-            let start = Instant::now();
             ask(frame, &mut out);
-            answered.slowest = answered.slowest.max(start.elapsed());
             answered.counts.push(out.len() as u64);
             if let (Some(errors), Some((_, truth))) = (
                 &mut answered.errors,
@@ -106,15 +100,13 @@ impl<'c> Trials<'c> {
     }
 
     fn same_answers(&self, a: usize, b: usize) -> bool {
-        let mut reference = Reference::new(self.case.scene().items.len());
-        let (mut first, mut second) = (Vec::new(), Vec::new());
+        let mut trial = Trial::new(self.case.scene().items.len());
+        let mut first = Vec::new();
         (0..self.case.workload.views.len()).all(|frame| {
             first.clear();
-            second.clear();
             (self.asks[a])(frame, &mut first);
-            (self.asks[b])(frame, &mut second);
-            reference.expect(first.iter().copied());
-            reference.compare(&second).is_none()
+            trial.expect(first.iter().copied());
+            trial.ask(|out| (self.asks[b])(frame, out)).is_ok()
         })
     }
 
@@ -131,7 +123,7 @@ impl<'c> Trials<'c> {
             ask,
             ask_many: None,
             expected: answered[place].counts.clone(),
-            slowest: answered[place].slowest,
+            least_ns: None,
         });
         let competitors: Vec<Competitor> = competitors.collect();
         let count = case.workload.views.len();
@@ -170,7 +162,10 @@ impl Times {
 
     /// Time of a query of the way at that place.
     pub fn query(&self, place: usize) -> Option<Estimate> {
-        bootstrap_median(&self.timed[place].as_ref().ok()?.round_means(), 1)
+        bootstrap_median(
+            &self.timed[place].as_ref().ok()?.round_means(|s| s.cpu_ns),
+            1,
+        )
     }
 
     pub fn errors(&self, place: usize) -> Option<ErrorCount> {

@@ -83,6 +83,7 @@ impl Frame {
     }
 
     fn rotated(&mut self) {
+        self.written = None;
         self.rotations += 1;
         if self.rotations >= CORRECT_EVERY {
             self.orthonormalise();

@@ -3,8 +3,7 @@
 
 use glam::{DMat3, DMat4, DVec3, DVec4};
 
-use super::{CameraError, finite};
-use crate::arithmetic::cross;
+use super::{CameraError, Pose};
 
 /// Eye position and the unit vectors u (right), v (up) and n (backward: the
 /// camera looks along -n). Right-handed: `u x v = n`.
@@ -19,32 +18,23 @@ pub struct Frame {
     pub(super) n: DVec3,
     /// Rotations since the last correction, see `controls`.
     pub(super) rotations: u32,
+    /// What the frame was made of, until it is turned.
+    pub(super) written: Option<Pose>,
 }
 
 /// The frame that looks from `eye` to `look` with `up` upward:
 /// `n = (eye - look)/|eye - look|`, `u = (up x n)/|up x n|`, `v = n x u`.
 ///
-/// Vectors are scaled before they are squared, so lengths from 1e-300 to
-/// 1e300 work.
+/// The difference and the cross product are exact: the axes are true to some
+/// units of 2^-53 however near `up` is to the direction of view and `look` to
+/// the eye. Vectors are scaled before they are squared, so lengths from 1e-300
+/// to 1e300 work.
 ///
 /// # Errors
 /// A value that is not finite, `eye == look`, `up` zero or parallel to the
-/// direction of view.
+/// direction of view, or within 9e-16 rad of it.
 pub fn look_at(eye: DVec3, look: DVec3, up: DVec3) -> Result<Frame, CameraError> {
-    check_finite(["look x", "look y", "look z"], look)?;
-    check_finite(["eye x", "eye y", "eye z"], eye)?;
-    // Halved first: the difference of two finite values may overflow.
-    Frame::looking_along(eye, look / 2.0 - eye / 2.0, up).map_err(|error| match error {
-        CameraError::ForwardIsZero => CameraError::EyeIsLook,
-        other => other,
-    })
-}
-
-fn check_finite(names: [&'static str; 3], v: DVec3) -> Result<(), CameraError> {
-    for (name, value) in names.into_iter().zip(v.to_array()) {
-        finite(name, value)?;
-    }
-    Ok(())
+    Pose::LookAt { eye, look, up }.frame()
 }
 
 /// The unit vector along `v`, whatever its length; `None` for zero.
@@ -58,47 +48,38 @@ pub(super) fn unit(v: DVec3) -> Option<DVec3> {
     Some(scaled / scaled.length())
 }
 
-/// The vector times a power of two that brings its largest component to
-/// [1, 2): unlike [`unit`], without any rounding. `None` for zero.
-fn scaled(v: DVec3) -> Option<DVec3> {
-    let largest = v.abs().max_element();
-    if largest == 0.0 {
-        return None;
-    }
-    let exponent = libm::ilogb(largest);
-    Some(v.map(|component| libm::ldexp(component, -exponent)))
-}
-
 impl Frame {
     /// The frame at `eye` that looks along `forward`.
     ///
     /// # Errors
     /// As [`look_at`], but for `forward` zero.
     pub fn looking_along(eye: DVec3, forward: DVec3, up: DVec3) -> Result<Frame, CameraError> {
-        check_finite(["eye x", "eye y", "eye z"], eye)?;
-        check_finite(["forward x", "forward y", "forward z"], forward)?;
-        check_finite(["up x", "up y", "up z"], up)?;
-        let forward = scaled(forward).ok_or(CameraError::ForwardIsZero)?;
-        let up = scaled(up).ok_or(CameraError::UpParallel)?;
-        let n = -unit(forward).ok_or(CameraError::ForwardIsZero)?;
-        // up x n, but for its length. Of vectors not yet rounded to unit
-        // length: nearly parallel, their rounding would be all that is left.
-        let across = cross(forward, up);
-        let parallel = 4.0 * f64::EPSILON * forward.length() * up.length();
-        if across.abs().max_element() <= parallel {
-            return Err(CameraError::UpParallel);
-        }
-        let u = unit(across).ok_or(CameraError::UpParallel)?;
+        Pose::Forward { eye, forward, up }.frame()
+    }
+
+    /// The frame of a pose from two of its axes, which are true but for their
+    /// rounding.
+    pub(super) fn of_axes(pose: Pose, u: DVec3, n: DVec3) -> Frame {
         let mut frame = Frame {
-            eye,
+            eye: pose.eye(),
             u,
             v: n.cross(u),
             n,
             rotations: 0,
+            written: None,
         };
         // The last digit or two of orthogonality.
         frame.orthonormalise();
-        Ok(frame)
+        frame.written = Some(pose);
+        frame
+    }
+
+    /// This frame with the axes of another, as if they had been made of what is
+    /// written here: wrong on purpose, so that tests can see who notices.
+    #[doc(hidden)]
+    pub fn with_axes_of(self, other: &Frame) -> Frame {
+        let (u, v, n) = (other.u, other.v, other.n);
+        Frame { u, v, n, ..self }
     }
 
     /// Right.
@@ -158,6 +139,7 @@ impl Frame {
         let x = x * (DMat3::from_diagonal(DVec3::splat(3.0)) - x.transpose() * x) * 0.5;
         (self.u, self.v, self.n) = (x.x_axis, x.y_axis, x.z_axis);
         self.rotations = 0;
+        self.written = None;
     }
 }
 

@@ -149,7 +149,7 @@ impl Lens {
             Lens::Perspective {
                 fovy_deg, aspect, ..
             } => {
-                let y = libm::tan(fovy_deg.to_radians() / 2.0);
+                let y = slope(fovy_deg);
                 [-y * aspect, y * aspect, -y, y]
             }
             Lens::Orthographic { height, aspect, .. } => {
@@ -168,16 +168,31 @@ impl Lens {
     /// first; `None` if the far plane is infinite.
     pub fn corners(&self, frame: &Frame) -> Option<[DVec3; 8]> {
         let far = self.far()?;
-        let [left, right, bottom, top] = self.window();
         let mut corners = [DVec3::ZERO; 8];
-        for (i, corner) in corners.iter_mut().enumerate() {
-            let depth = if i < 4 { self.near() } else { far };
-            let reach = if self.is_orthographic() { 1.0 } else { depth };
+        corners[..4].copy_from_slice(&self.corners_at(frame, self.near()));
+        corners[4..].copy_from_slice(&self.corners_at(frame, far));
+        Some(corners)
+    }
+
+    /// The four corners of what is seen at a depth: bit 0 is right, bit 1 top.
+    pub(super) fn corners_at(&self, frame: &Frame, depth: f64) -> [DVec3; 4] {
+        let [left, right, bottom, top] = self.window();
+        let reach = if self.is_orthographic() { 1.0 } else { depth };
+        [0, 1, 2, 3].map(|i| {
             let x = reach * if i & 1 == 0 { left } else { right };
             let y = reach * if i & 2 == 0 { bottom } else { top };
-            *corner = frame.eye + frame.u * x + frame.v * y - frame.n * depth;
-        }
-        Some(corners)
+            frame.eye + frame.u * x + frame.v * y - frame.n * depth
+        })
+    }
+}
+
+/// The tangent of half an angle in degrees, true to some units of 2^-53 up to
+/// 180 degrees: near there what is missing is small, and its difference exact.
+fn slope(degrees: f64) -> f64 {
+    if degrees <= 90.0 {
+        libm::tan(degrees.to_radians() / 2.0)
+    } else {
+        1.0 / libm::tan((180.0 - degrees).to_radians() / 2.0)
     }
 }
 
@@ -215,6 +230,17 @@ fn check_window(name: &'static str, low: f64, high: f64) -> Result<(), CameraErr
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn slopes_keep_their_digits_up_to_180_degrees() {
+        // 180 less 2^-40 degrees: the tangent is 2 / (2^-40 pi/180) but for a
+        // part of 1e-27.
+        let missing = libm::exp2(-40.0);
+        let true_slope = 2.0 / (missing * (std::f64::consts::PI / 180.0));
+        let off = slope(180.0 - missing) / true_slope - 1.0;
+        assert!(off.abs() < 1e-15, "{off:e}");
+        assert!((slope(120.0) / 3f64.sqrt() - 1.0).abs() < 4e-16);
+    }
 
     #[test]
     fn impossible_lenses_are_typed_errors() {

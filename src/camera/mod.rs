@@ -5,13 +5,17 @@
 mod controls;
 mod frame;
 mod lens;
+mod margin;
 mod planes;
+mod pose;
 mod projection;
 mod views;
 
 pub use frame::{Frame, look_at};
 pub use lens::Lens;
+pub(crate) use margin::check_sums;
 pub use planes::{DEFAULT_EPSILON, PLANE_METHODS, PlaneMethod, PlaneOptions, Surroundings};
+pub use pose::Pose;
 pub use projection::{ClipSpace, gribb_hartmann};
 pub use views::ViewSet;
 
@@ -56,6 +60,10 @@ pub enum CameraError {
         "up is zero or parallel to the direction of view; expected an up vector that is neither"
     )]
     UpParallel,
+    #[error(
+        "up is {sine:e} rad from the direction of view or its opposite; expected more than 8.9e-16"
+    )]
+    UpNearlyParallel { sine: f64 },
     #[error("the vertical field of view is {fovy_deg} degrees; expected 0 < fov < 180")]
     FieldOfView { fovy_deg: f64 },
     #[error("the aspect ratio is {aspect}; expected a number above 0")]
@@ -76,6 +84,10 @@ pub enum CameraError {
     Axis,
     #[error("the view volume does not fit f32: {0}; expected planes within its range")]
     Volume(#[from] VolumeError),
+    #[error(
+        "sums of the plane test reach {largest:e} in scene coordinates; expected at most 1.7e38, half of what f32 holds"
+    )]
+    Sums { largest: f64 },
 }
 
 pub(crate) fn finite(name: &'static str, value: f64) -> Result<f64, CameraError> {

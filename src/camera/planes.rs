@@ -5,9 +5,9 @@
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
+use super::margin::{Margin, TINY, check_sums};
 use super::projection::{gribb_hartmann_f32, projection_f32, projection_f64, view_f32};
 use super::{Camera, CameraError, ClipSpace, Frame, Lens, gribb_hartmann};
-use crate::arithmetic::rounding::round_up;
 use crate::geometry::{
     ConvexVolume, FrustumPlane, Plane, RelativeVolume, VolumeError, WidePlane, WideVolume,
 };
@@ -114,8 +114,10 @@ impl Default for PlaneOptions {
 pub struct Surroundings {
     /// World position of the scene's local zero.
     pub origin: DVec3,
-    /// Largest absolute local coordinate of any item, per axis; bounds the
-    /// epsilon of a volume without a far plane.
+    /// Largest absolute local coordinate of any item, per axis. It bounds the
+    /// epsilon and the sums of the plane test: items beyond it are promised
+    /// nothing. Zero is "not known": the epsilon is then the volume's own (and
+    /// too small without a far plane), and no sum is watched for items.
     pub reach: Vec3,
 }
 
@@ -123,16 +125,17 @@ impl Camera {
     /// The view volume in scene-local f32 coordinates.
     ///
     /// With a positive epsilon c each plane is moved outward to
-    /// `d' = round_up(d + c*u*(sum |n_k|*A_k + |d|) + 2^-147)`, u = 2^-24,
-    /// A_k the largest absolute coordinate k of the volume's corners (of the
-    /// scene, if the volume has no far plane). Why that is enough: a box that
-    /// meets the volume holds a point x of it, and the p-vertex evaluates no
-    /// lower than x does (rounding is monotone); evaluating at x errs by less
-    /// than the margin.
+    /// `d' = round_up(d + c*u*(sum |n_k|*x_k + |d|) + ...)`, u = 2^-24, where x
+    /// is the worst point that is visible and near enough to this very plane.
+    /// Why that is enough: a box that meets the volume holds a point x of it,
+    /// and the p-vertex evaluates no lower than x does (rounding is monotone);
+    /// evaluating at x errs by less than the margin. docs/NUMERICS.md has the
+    /// proof.
     ///
     /// # Errors
     /// [`CameraError::Volume`] if a plane does not fit f32 (or the chosen
-    /// method loses it).
+    /// method loses it); [`CameraError::Sums`] if a sum of the plane test could
+    /// overflow within the surroundings' reach.
     pub fn volume(
         &self,
         options: &PlaneOptions,
@@ -155,9 +158,13 @@ impl Camera {
     ) -> Result<ConvexVolume, CameraError> {
         let frame = self.frame.relative_to(around.origin);
         let named = derive(&frame, &self.lens, options.method);
-        let reach = self.reach_of(&frame, around.reach.as_dvec3());
-        let moved = |plane: &Plane| moved_outward(plane, reach, options.epsilon, 0.0);
-        Ok(gathered(&named, more, options.epsilon, moved)?)
+        let of_scene = around.reach.as_dvec3();
+        let of_frame = options.method == PlaneMethod::Frame;
+        let margin = Margin::new(&frame, &self.lens, of_scene, options.epsilon, of_frame);
+        let moved = |name, plane: &Plane| margin.moved(name, plane, 0.0);
+        let volume = gathered(&named, more, options.epsilon, moved)?;
+        check_sums(&volume, of_scene)?;
+        Ok(volume)
     }
 
     /// The same planes in f64, from the frame and without a margin: what the
@@ -177,17 +184,15 @@ impl Camera {
     /// offsets in f64, and each plane is rounded to f32 once.
     ///
     /// With a positive epsilon c the planes are moved outward as in
-    /// [`Camera::volume`], with A_k the largest distance of the volume's
-    /// corners from the zero on axis k (of the scene, if the volume has no far
-    /// plane), not from the scene's own zero: that is what is gained far away.
-    /// Let u = 2^-24 and x a visible point of a box. `x_k - e_k` is rounded
-    /// once, its product with `n_k` once, and the product goes through at most
-    /// three sums: 5 roundings; the normal itself was rounded, a sixth. Each is
-    /// at most u of `|n_k|*A_k`; the offset was rounded and goes through one
-    /// sum, 2 of `|d|`. So c = 6 and a little covers all, and c = 8 does. Two
-    /// smaller things come on top: the subtraction of the scene's origin in
-    /// f64 (2^-53 of the local eye), and normals that underflow (2^-150 of
-    /// A_k).
+    /// [`Camera::volume`], with coordinates about the eye, not about the
+    /// scene's own zero: that is what is gained far away. Let u = 2^-24 and x a
+    /// visible point of a box. `x_k - e_k` is rounded once, its product with
+    /// `n_k` once, and the product goes through at most three sums: 5
+    /// roundings; the normal itself was rounded, a sixth. Each is at most u of
+    /// `|n_k| |x_k|`; the offset was rounded and goes through one sum, 2 of
+    /// `|d|`. So c = 6 and a little covers all, and c = 8 does. Two smaller
+    /// things come on top: the subtraction of the scene's origin in f64 (2^-53
+    /// of the local eye), and normals that underflow (2^-150 of x).
     ///
     /// # Errors
     /// [`CameraError::Volume`] if the eye or a plane does not fit f32.
@@ -217,25 +222,20 @@ impl Camera {
         let frame = local.relative_to(zero);
         let named = from_frame(&frame, &self.lens);
         let more: Vec<WidePlane> = more.iter().map(|plane| plane.about(-frame.eye)).collect();
-        let reach = self.reach_of(&frame, around.reach.as_dvec3() + zero.abs());
-        let moved = |plane: &Plane| {
-            let of_eye = plane.normal.as_dvec3().abs().dot(local.eye.abs());
-            let slack = of_eye * f64::EPSILON + reach.element_sum() * TINY;
-            moved_outward(plane, reach, epsilon, slack)
+        let reach = around.reach.as_dvec3();
+        let is_unknown = around.reach == Vec3::ZERO && self.lens.far().is_some();
+        let of_scene = if is_unknown {
+            DVec3::ZERO
+        } else {
+            reach + zero.abs()
         };
+        let margin = Margin::new(&frame, &self.lens, of_scene, epsilon, true);
+        let of_eye = local.eye.abs().element_sum() * f64::EPSILON;
+        let slack = of_eye + margin.reach.element_sum() * TINY;
+        let moved = |name, plane: &Plane| margin.moved(name, plane, slack);
         let planes = gathered(&named, &more, epsilon, moved)?;
+        check_sums(&planes, reach + zero.abs())?;
         Ok(RelativeVolume::new(eye, planes)?)
-    }
-
-    /// The largest absolute coordinates of the volume's corners in a frame, or
-    /// of the scene if there is no far plane.
-    fn reach_of(&self, frame: &Frame, of_scene: DVec3) -> DVec3 {
-        match self.lens.corners(frame) {
-            Some(corners) => corners
-                .iter()
-                .fold(DVec3::ZERO, |reach, corner| reach.max(corner.abs())),
-            None => of_scene,
-        }
     }
 }
 
@@ -245,26 +245,24 @@ fn gathered(
     named: &[(FrustumPlane, Plane)],
     more: &[WidePlane],
     epsilon: f64,
-    moved: impl Fn(&Plane) -> Plane,
+    moved: impl Fn(Option<FrustumPlane>, &Plane) -> Plane,
 ) -> Result<ConvexVolume, VolumeError> {
     let more = more.iter().map(|plane| (None, plane.narrow()));
     let all = named
         .iter()
         .map(|&(name, plane)| (Some(name), plane))
         .chain(more);
-    let all = all.map(|(name, plane)| (name, if epsilon > 0.0 { moved(&plane) } else { plane }));
+    let all = all.map(|(name, plane)| {
+        (
+            name,
+            if epsilon > 0.0 {
+                moved(name, &plane)
+            } else {
+                plane
+            },
+        )
+    });
     ConvexVolume::from_labelled_planes(&all.collect::<Vec<_>>())
-}
-
-/// Below half the smallest subnormal f32 times four: covers underflow.
-const TINY: f64 = f64::from_bits((1023 - 147) << 52);
-
-fn moved_outward(plane: &Plane, reach: DVec3, c: f64, slack: f64) -> Plane {
-    const UNIT_ROUNDOFF: f64 = 1.0 / (1u64 << 24) as f64;
-    let d = f64::from(plane.d);
-    let size = plane.normal.as_dvec3().abs().dot(reach) + d.abs();
-    let margin = c * UNIT_ROUNDOFF * size + TINY + slack;
-    Plane::new(plane.normal, round_up(d + margin))
 }
 
 type NamedPlanes = Vec<(FrustumPlane, Plane)>;

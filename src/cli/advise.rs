@@ -10,18 +10,17 @@ use indicatif::ProgressBar;
 
 use super::args::{AdviseArgs, TableFormat};
 use super::{Ending, interrupt, load_scene, text, unread_is_fine};
-use cullbench::advise::{
+use crate::advise::{
     Advice, AdviseOptions, Check, Decision, LeftOutIf, Omission, StructureChoice, TestChoice,
     advise as advice_for,
 };
-use cullbench::index::structures;
-use cullbench::measure::{Machine, Protocol, harness_overhead_ns};
-use cullbench::path;
+use crate::index::Registry;
+use crate::measure::{Machine, Protocol, cameras_within};
+use crate::path;
 
-pub fn advise(args: &AdviseArgs) -> anyhow::Result<Ending> {
-    args.kernel.choose()?;
+pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> {
     let options = options(args)?;
-    let structures = structures(&args.structure)?;
+    let structures = args.kernel.structures(registry, &args.structure)?;
     let defaults = args.lens.defaults()?;
     let scene = load_scene(&args.scene, &args.scene_args)?;
     let path = path::load(&args.path, &scene, &defaults)?;
@@ -29,13 +28,11 @@ pub fn advise(args: &AdviseArgs) -> anyhow::Result<Ending> {
     let bar = ProgressBar::new_spinner();
     bar.enable_steady_tick(Duration::from_millis(200));
     let protocol = Protocol {
-        min_rounds: 5,
-        max_rounds: 25,
-        budget: Duration::from_secs(4),
-        pass: Duration::from_millis(100),
+        rounds: [5, 25],
+        task_ns: 150e6,
+        cameras: cameras_within(100e6, scene.items.len()),
         cold: false,
         seed: args.seed,
-        overhead_ns: harness_overhead_ns(),
         cache_bytes: Machine::capture().cache_sweep_bytes(),
     };
     let advice = advice_for(
@@ -45,7 +42,10 @@ pub fn advise(args: &AdviseArgs) -> anyhow::Result<Ending> {
         &options,
         &protocol,
         &interrupt::asked,
-        &|next| bar.set_message(format!("{}, {}: {next}", args.scene, args.path)),
+        &|next| {
+            let job = format!("{}, {}: {next}", args.scene, args.path);
+            bar.set_message(text::plain(&job));
+        },
     )?;
     bar.finish_and_clear();
     let Some(advice) = advice else {
@@ -97,14 +97,14 @@ fn show_json(advice: &Advice) -> io::Result<()> {
 }
 
 fn show(advice: &Advice) -> io::Result<()> {
-    let mut out = io::stdout().lock();
+    let mut out = text::terminal();
     writeln!(
         out,
-        "{}: {} items; {}: {} cameras; noise floor {}",
-        advice.scene,
-        text::count(advice.items),
-        advice.path,
-        text::count(advice.cameras),
+        "{}: {}; {}: {}; noise floor {}",
+        text::plain(&advice.scene),
+        text::counted(advice.items, "item"),
+        text::plain(&advice.path),
+        text::counted(advice.cameras, "camera"),
         text::percent(advice.noise_floor)
     )?;
     writeln!(out, "\nStructures, all answers checked:")?;
@@ -150,13 +150,13 @@ fn show_advice(out: &mut impl Write, advice: &Advice) -> io::Result<()> {
         return writeln!(out, "  no structure answered right");
     };
     let row = choice.rows.first();
-    let times = row.and_then(|row| row.ratio_to_linear);
+    let times = row.and_then(|row| row.speedup);
     let times = times.map(|times| format!(", {} x linear", text::significant(times)));
     let repaid = row.and_then(|row| row.break_even_queries);
     let repaid = repaid.map(|n| {
         format!(
-            "; its build is repaid after {} queries",
-            text::count(n as usize)
+            "; its build is repaid after {}",
+            text::counted(n as usize, "query")
         )
     });
     writeln!(
@@ -167,7 +167,11 @@ fn show_advice(out: &mut impl Write, advice: &Advice) -> io::Result<()> {
         repaid.unwrap_or_default()
     )?;
     if let Some(name) = &choice.region_search {
-        writeln!(out, "  region search: {name}")?;
+        writeln!(
+            out,
+            "  region search: {name}{}",
+            ties(&choice.region_search_ties)
+        )?;
     }
     if let Some(test) = advice.test.name {
         writeln!(out, "  test: {test}{}", ties(&advice.test.ties))?;
@@ -190,7 +194,7 @@ fn ties<S: AsRef<str>>(names: &[S]) -> String {
     }
 }
 
-fn structure_table(choice: &StructureChoice) -> comfy_table::Table {
+fn structure_table(choice: &StructureChoice) -> text::Table {
     let header = [
         "structure",
         "query median [95 % interval]",
@@ -207,7 +211,7 @@ fn structure_table(choice: &StructureChoice) -> comfy_table::Table {
         table.add_row([
             row.structure.clone(),
             interval(row.query_ns, row.query_ns_lower, row.query_ns_upper),
-            show(row.ratio_to_linear, text::significant),
+            show(row.speedup, text::significant),
             show(row.build_ms, |ms| text::time(ms * 1e6)),
             show(row.memory_bytes_per_item, |bytes| format!("{bytes:.1}")),
             show(row.break_even_queries, |n| text::count(n as usize)),
@@ -230,7 +234,7 @@ fn interval(value: Option<f64>, lower: Option<f64>, upper: Option<f64>) -> Strin
     }
 }
 
-fn test_table(choice: &TestChoice) -> comfy_table::Table {
+fn test_table(choice: &TestChoice) -> text::Table {
     let header = [
         "",
         "test",
@@ -261,7 +265,7 @@ fn test_table(choice: &TestChoice) -> comfy_table::Table {
     table
 }
 
-fn omission_table(omissions: &[Omission]) -> comfy_table::Table {
+fn omission_table(omissions: &[Omission]) -> text::Table {
     let header = [
         "rule",
         "advice",

@@ -3,10 +3,10 @@
 
 use std::path::PathBuf;
 
+use crate::drift::{DriftOptions, MOST_STEPS};
+use crate::spec::{SpecError, parse_number};
+use crate::suite::DEFAULT_PATH;
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use cullbench::drift::{DriftOptions, MOST_STEPS};
-use cullbench::spec::{SpecError, parse_number};
-use cullbench::suite::DEFAULT_PATH;
 
 use super::scene_args::SceneCommand;
 use super::shared_args::{CullingArgs, KernelArgs, LensArgs, SceneArgs};
@@ -39,6 +39,8 @@ pub enum Command {
     List(ListArgs),
     /// Measure structures on scenes along camera paths (the main job)
     Run(RunArgs),
+    /// Join the shards of a plan (run --shard) into one run
+    Merge(MergeArgs),
     /// Show what a run found: ranked tables, bounds, crossovers, growth
     Report(ReportArgs),
     /// Hold a run against an older one: what has become slower, faster or wrong
@@ -62,6 +64,9 @@ pub enum Command {
     Scene(SceneCommand),
     /// Show the machine, toolchain and source that reports record
     Env(EnvArgs),
+    /// Measure one share of a run (started by `run` and `compare` themselves)
+    #[command(hide = true)]
+    Worker,
     /// Print shell completions
     Completions { shell: clap_complete::Shell },
     /// Print the manual page (roff)
@@ -97,19 +102,20 @@ pub struct ListArgs {
     pub format: TableFormat,
 }
 
+/// What is measured: the same for `run` and `compare --against`.
 #[derive(Args, Debug)]
-pub struct RunArgs {
-    /// quick, standard or full: the scenes, paths and rounds
-    #[arg(long, default_value = "quick")]
-    pub suite: String,
+pub struct WhatArgs {
+    /// The scenes, paths and rounds: quick, standard, full, compare or growth [default: quick; compare --against: compare]
+    #[arg(long, value_name = "SUITE")]
+    pub suite: Option<String>,
     /// A scene (file or spec) instead of the suite's; may be repeated
     #[arg(long, value_name = "SCENE")]
     pub scene: Vec<String>,
     /// A camera path (spec or cameras CSV) instead of the suite's; may be repeated
     #[arg(long, visible_alias = "cameras", value_name = "PATH")]
     pub path: Vec<String>,
-    /// Structures, e.g. linear,bvh:leaf=4; may be repeated
-    #[arg(long, value_name = "LIST", default_value = "all")]
+    /// Structures, e.g. linear,bvh:leaf=4; may be repeated [default: all; compare --against: all but linear-scalar]
+    #[arg(long, value_name = "LIST")]
     pub structure: Vec<String>,
     /// The culling test: sphere, six-plane, six-box or exact; may be repeated
     #[arg(long, value_name = "TEST", default_value = "six-plane")]
@@ -117,18 +123,15 @@ pub struct RunArgs {
     /// Seed of the order in which structures are measured
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Folder for report.json, summary.csv and samples.csv [default: a new one under results/]
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
-    /// Go on with the run in --out (or the newest unfinished one under results/)
-    #[arg(long)]
-    pub resume: bool,
     /// Measure with cold caches as well (the suite full does by itself)
     #[arg(long)]
     pub cold: bool,
-    /// Leave out the bounds: what reading all items and copying all answers would cost
+    /// Leave out the lower bounds: what reading all items and copying all answers would cost
     #[arg(long)]
     pub no_bounds: bool,
+    /// Seconds of silence after which a structure has timed out
+    #[arg(long, value_name = "SECONDS", default_value_t = 300, value_parser = clap::value_parser!(u64).range(1..))]
+    pub timeout: u64,
     #[command(flatten)]
     pub scene_args: SceneArgs,
     #[command(flatten)]
@@ -137,6 +140,50 @@ pub struct RunArgs {
     pub culling: CullingArgs,
     #[command(flatten)]
     pub kernel: KernelArgs,
+}
+
+#[derive(Args, Debug)]
+pub struct RunArgs {
+    #[command(flatten)]
+    pub what: WhatArgs,
+    /// Folder for report.json, summary.csv, samples.csv and stream.jsonl [default: a new one under results/]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Continue the run in --out (or the newest unfinished one under results/) with its own options
+    #[arg(long)]
+    pub resume: bool,
+    /// Processes to spread the rounds over; ten or more give intervals [default: the suite's]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub processes: Option<u32>,
+    /// Print the cells as JSON lines instead of measuring them
+    #[arg(long)]
+    pub plan: bool,
+    /// Measure share i of n of the plan only; `merge` joins the reports
+    #[arg(long, value_name = "i/n")]
+    pub shard: Option<String>,
+}
+
+const MERGE_HELP: &str = "\
+Example:
+  cullbench run --shard 1/2 --out part1        here, or on a machine of the same kind
+  cullbench run --shard 2/2 --out part2
+  cullbench merge part1 part2 --out whole
+
+Shards of one plan by one build of the program on machines of one kind belong together; anything
+else is refused by name, as are a cell in two shards and a shard that is missing.";
+
+#[derive(Args, Debug)]
+#[command(after_help = MERGE_HELP)]
+pub struct MergeArgs {
+    /// Folders of finished shards
+    #[arg(value_name = "RUN", required = true)]
+    pub runs: Vec<PathBuf>,
+    /// A new folder for report.json, summary.csv, samples.csv and stream.jsonl
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Join what is there, though other parts of the plan are missing
+    #[arg(long)]
+    pub partial: bool,
 }
 
 #[derive(Args, Debug)]
@@ -159,22 +206,28 @@ const COMPARE_HELP: &str = "\
 Examples:
   cullbench compare results/before results/after
   cullbench compare old.json new.json --threshold 10% --metric query_ns,build_ms
-  cullbench compare ours.json theirs.json --metric times_read    another machine
+  cullbench compare old.json new.json --markdown > changes.md
 
-A figure counts as changed beyond the threshold or the larger noise floor of the two runs,
-whichever is more. What was not asked the same question is listed and not judged by its time.
+Two reports: each structure relative to the others of its scene and path, process by process;
+what moved all of them at once is one line. A report of one process is inconclusive. A finer
+answer: compare --against BINARY, which runs both programs in turns.
 Exit codes: 0 no regression, 1 a wrong answer in NEW, 2 usage or bad input, 3 slower or lost.";
 
 #[derive(Args, Debug)]
 #[command(after_help = COMPARE_HELP)]
 pub struct CompareArgs {
     /// report.json of the older run, or the folder it is in
-    #[arg(value_name = "OLD.json")]
-    pub old: PathBuf,
+    #[arg(value_name = "OLD.json", required_unless_present = "against")]
+    pub old: Option<PathBuf>,
     /// report.json of the newer run, or the folder it is in
-    #[arg(value_name = "NEW.json")]
-    pub new: PathBuf,
-    /// Smaller changes are ties, such as 5% or 0.05
+    #[arg(value_name = "NEW.json", required_unless_present = "against")]
+    pub new: Option<PathBuf>,
+    /// Run another build of this program against this one instead: OLD is that binary, NEW is this
+    #[arg(long, value_name = "BINARY", conflicts_with_all = ["old", "new"])]
+    pub against: Option<PathBuf>,
+    #[command(flatten)]
+    pub what: WhatArgs,
+    /// Changes within it are the same, if that is proven; such as 5% or 0.05
     #[arg(
         long,
         value_name = "SHARE",
@@ -182,14 +235,17 @@ pub struct CompareArgs {
         allow_hyphen_values = true
     )]
     pub threshold: String,
-    /// The metrics to judge by, e.g. query_ns,build_ms; may be repeated
+    /// The metrics to judge by, of query_ns, locate_ns, locate_batched_ns, build_ms; may be repeated
     #[arg(long, value_name = "LIST", default_value = "query_ns")]
     pub metric: Vec<String>,
-    /// Show ties as well
+    /// Show what stayed the same as well
     #[arg(long)]
     pub all: bool,
     #[arg(long, value_enum, default_value = "table")]
     pub format: TableFormat,
+    /// Print Markdown, for a pull request
+    #[arg(long, conflicts_with = "format")]
+    pub markdown: bool,
 }
 
 #[derive(Args, Debug)]
@@ -383,6 +439,7 @@ pub struct DriftArgs {
 impl DriftArgs {
     pub fn options(&self) -> Result<DriftOptions, SpecError> {
         let steps = parse_number(&self.steps)
+            .filter(|_| !self.steps.trim_end().ends_with('%'))
             .filter(|n| n.fract() == 0.0 && (1.0..=MOST_STEPS as f64).contains(n));
         let Some(steps) = steps else {
             return Err(SpecError::new(format_args!(
@@ -411,7 +468,7 @@ pub struct StressArgs {
     /// Structures, e.g. linear,bvh:leaf=4
     #[arg(long, value_name = "LIST", default_value = "all")]
     pub structure: String,
-    /// Cases of each generated extreme, 0 for none [default: 106, ten million boxes; 0 with --vectors]
+    /// Cases of each generated extreme, 0 for none [default: 66, ten million boxes; 0 with --vectors]
     #[arg(long, value_name = "N")]
     pub cases: Option<u64>,
     /// Seed of the first case; case i has seed N + i
@@ -432,9 +489,9 @@ pub struct EnvArgs {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::PLANE_METHODS;
+    use crate::culling::{ARITHMETICS, TESTS};
     use clap::CommandFactory;
-    use cullbench::camera::PLANE_METHODS;
-    use cullbench::culling::{ARITHMETICS, TESTS};
 
     #[test]
     fn the_command_line_is_consistent() {

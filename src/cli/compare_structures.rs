@@ -4,12 +4,12 @@
 
 use std::collections::BTreeMap;
 
-use cullbench::geometry::Aabb;
-use cullbench::index::{BuildError, DynIndex, StructureSpec};
-use cullbench::measure::{Verdict, guarded};
-use cullbench::query::{ItemId, QueryCost};
-use cullbench::scene::Scene;
-use cullbench::threads::{self, share};
+use crate::geometry::Aabb;
+use crate::index::{BuildError, DynIndex, StructureSpec};
+use crate::measure::{Verdict, guarded};
+use crate::query::{ItemId, QueryCost};
+use crate::scene::Scene;
+use crate::threads::share;
 
 /// One structure's answer to one question.
 pub struct Answer {
@@ -46,7 +46,7 @@ pub fn ask_all(
         };
         let asked = guarded(|| {
             share(
-                threads::chosen(),
+                spec.execution.threads,
                 answers.iter_mut().enumerate(),
                 |(question, row)| {
                     let (mut out, mut cost) = (Vec::new(), QueryCost::default());
@@ -58,7 +58,7 @@ pub fn ask_all(
                         question,
                         structure: spec.label.clone(),
                         count: out.len(),
-                        id_sum: cullbench::measure::id_sum(&out),
+                        id_sum: crate::measure::id_sum(&out),
                         ids: keep_ids.then_some(out),
                         cost,
                     });
@@ -79,13 +79,13 @@ pub fn all_agree(answers: &[Answer], what: &str) -> bool {
         if (base.count, base.id_sum) != (answer.count, answer.id_sum) {
             agree = false;
             super::tell(&format!(
-                "error: {what} {}: {} finds {} ids with sum {}, {} finds {} with sum {}",
+                "error: {what} {}: {} finds {} with sum {}, {} finds {} with sum {}",
                 answer.question,
                 base.structure,
-                base.count,
+                super::text::counted(base.count, "id"),
                 base.id_sum,
                 answer.structure,
-                answer.count,
+                super::text::counted(answer.count, "id"),
                 answer.id_sum
             ));
         }
@@ -102,19 +102,17 @@ pub fn joined(ids: &[ItemId]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use cullbench::index::Backend;
+    use crate::index::{LinearScalar, RegionIndex, Row};
     use serde_json::Value;
 
-    static PANICS: Backend = Backend {
-        name: "panics",
-        summary: "",
-        build: |_, _, _| panic!("deep in a peer's code"),
+    const PANICS: Row = Row {
+        info: LinearScalar::INFO.named("panics"),
+        build: |_, _, _, _| panic!("deep in a peer's code"),
         params: |_| Ok(Value::Null),
     };
-    static REFUSES: Backend = Backend {
-        name: "refuses",
-        summary: "",
-        build: |_, _, _| {
+    const REFUSES: Row = Row {
+        info: LinearScalar::INFO.named("refuses"),
+        build: |_, _, _, _| {
             Err(BuildError::Refused {
                 structure: "refuses",
                 reason: "too many alike".to_owned(),
@@ -123,16 +121,17 @@ mod tests {
         params: |_| Ok(Value::Null),
     };
 
-    fn of(backend: &'static Backend) -> StructureSpec {
+    fn of(row: Row) -> StructureSpec {
         StructureSpec {
-            label: backend.name.to_owned(),
-            backend,
+            label: row.info.name.to_owned(),
+            row,
             params: Value::Null,
+            execution: Default::default(),
         }
     }
 
     fn asked(structures: &[StructureSpec], panics: bool) -> Result<Vec<Answer>, String> {
-        let scene = cullbench::scene::load("uniform:n=10", &Default::default()).expect("uniform");
+        let scene = crate::scene::load("uniform:n=10", &Default::default()).expect("uniform");
         let ask = |_: &dyn DynIndex, _, out: &mut Vec<ItemId>, _: &mut QueryCost| {
             assert!(!panics, "deep in a peer's query");
             out.push(7);
@@ -143,15 +142,15 @@ mod tests {
     #[test]
     fn a_panic_is_one_line_and_a_refusal_leaves_the_others() {
         let linear = StructureSpec::parse("linear").expect("linear");
-        let error = asked(&[linear.clone(), of(&PANICS)], false).err();
+        let error = asked(&[linear.clone(), of(PANICS)], false).err();
         let wanted = "structure 'panics': panicked: deep in a peer's code";
         assert_eq!(error.as_deref(), Some(wanted));
         let error = asked(std::slice::from_ref(&linear), true).err();
         let wanted = "structure 'linear': panicked: deep in a peer's query";
         assert_eq!(error.as_deref(), Some(wanted));
-        let answers = asked(&[of(&REFUSES), linear], false).expect("linear answers");
+        let answers = asked(&[of(REFUSES), linear], false).expect("linear answers");
         assert!(answers.len() == 2 && answers.iter().all(|a| a.structure == "linear"));
-        let error = asked(&[of(&REFUSES)], false).err().unwrap_or_default();
+        let error = asked(&[of(REFUSES)], false).err().unwrap_or_default();
         assert!(error.contains("too many alike"), "{error}");
     }
 }

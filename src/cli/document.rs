@@ -81,13 +81,12 @@ impl Rows {
 /// a table row.
 fn markdown(text: &str) -> String {
     let mut out = String::new();
-    for c in text.chars() {
+    for c in text::plain(text).chars() {
         match c {
             '\\' | '|' | '`' | '*' | '_' | '<' | '[' | '&' => {
                 out.push('\\');
                 out.push(c);
             }
-            c if c.is_control() => out.push(' '),
             c => out.push(c),
         }
     }
@@ -96,14 +95,13 @@ fn markdown(text: &str) -> String {
 
 fn html(text: &str) -> String {
     let mut out = String::new();
-    for c in text.chars() {
+    for c in text::plain(text).chars() {
         match c {
             '&' => out += "&amp;",
             '<' => out += "&lt;",
             '>' => out += "&gt;",
             '"' => out += "&quot;",
             '\'' => out += "&#39;",
-            c if c.is_control() => out.push(' '),
             c => out.push(c),
         }
     }
@@ -151,7 +149,7 @@ mod tests {
 
     #[test]
     fn text_stays_text_in_every_format() {
-        let nasty = "a|b<script>\n`c` & \"d\"";
+        let nasty = "a|b<script>\n`c` & \"d\"\u{202e}";
         let blocks = [
             Block::Heading(2, nasty.to_owned()),
             Block::Table(Rows {
@@ -162,7 +160,7 @@ mod tests {
             Block::Picture("<svg></svg>".into()),
         ];
         let text = to_markdown(&blocks);
-        let plain = "a\\|b\\<script> \\`c\\` \\& \"d\"";
+        let plain = "a\\|b\\<script> \\`c\\` \\& \"d\"\\\\u{202e}";
         assert_eq!(
             text,
             format!("## {plain}\n\n| x | {plain} |\n|---|---:|\n| {plain} | 1 |\n")
@@ -172,7 +170,8 @@ mod tests {
             !page.contains("<script>") && page.contains("<svg></svg>"),
             "{page}"
         );
-        let cell = "<td>a|b&lt;script&gt; `c` &amp; &quot;d&quot;</td><td class=\"n\">1</td>";
+        let cell =
+            "<td>a|b&lt;script&gt; `c` &amp; &quot;d&quot;\\u{202e}</td><td class=\"n\">1</td>";
         assert!(page.contains(cell), "{page}");
     }
 }

@@ -4,12 +4,11 @@
 use std::collections::BTreeSet;
 use std::io::{self, Write};
 
-use comfy_table::ContentArrangement;
 use indicatif::ProgressBar;
 
 use super::args::{DriftArgs, TableFormat};
 use super::{Ending, text, unread_is_fine};
-use cullbench::drift::{self, DriftReport, ORBIT_RADIUS, Rated, Recommendation, SWING_DEG};
+use crate::drift::{self, DriftReport, ORBIT_RADIUS, Rated, Recommendation, SWING_DEG};
 
 /// Long summaries wrap at this width.
 const WIDTH: u16 = 110;
@@ -37,7 +36,7 @@ fn grid(
     columns: &[String],
     rows: &[&str],
     cell: impl Fn(&str, usize) -> String,
-) -> comfy_table::Table {
+) -> text::Table {
     let mut header = vec![corner];
     header.extend(columns.iter().map(String::as_str));
     let right: Vec<usize> = (1..header.len()).collect();
@@ -106,7 +105,10 @@ fn show_rotations(report: &DriftReport, out: &mut impl Write) -> io::Result<()> 
     )?;
     let turns: BTreeSet<u64> = report.one_degree_turns.iter().map(|d| d.turns).collect();
     let title = "in steps of 1 degree: angle off in rad after";
-    let columns: Vec<String> = turns.iter().map(|n| format!("{n} turn(s)")).collect();
+    let columns: Vec<String> = turns
+        .iter()
+        .map(|n| text::counted(*n as usize, "turn"))
+        .collect();
     let table = grid(title, &columns, &methods, |method, column| {
         let own = report
             .one_degree_turns
@@ -206,9 +208,7 @@ fn left(share: f64) -> String {
 fn show_rated(title: &str, error: &str, rated: &[Rated], out: &mut impl Write) -> io::Result<()> {
     let header = [title, error, "ns/step", "good", "dominated by", ""];
     let mut table = text::table(&header, &[1, 2]);
-    table
-        .set_content_arrangement(ContentArrangement::Dynamic)
-        .set_width(WIDTH);
+    table.fit(WIDTH);
     for row in rated {
         let name = match row.is_default {
             true => format!("{} (default)", row.name),

@@ -6,14 +6,13 @@ use serde_json::{Value, json};
 
 use super::args::{EnvArgs, TableFormat};
 use super::{Ending, text};
-use cullbench::measure::{Machine, Source, Toolchain, harness_overhead_ns};
+use crate::measure::{Machine, Source, Toolchain};
 
 pub fn env(args: &EnvArgs) -> anyhow::Result<Ending> {
     let facts = json!({
         "machine": Machine::capture(),
         "toolchain": Toolchain::capture(),
         "source": Source::capture(),
-        "harness_overhead_ns": harness_overhead_ns(),
     });
     let mut out = io::stdout().lock();
     match args.format {

@@ -17,6 +17,13 @@ pub fn asked() -> bool {
     ASKED.load(Ordering::Relaxed)
 }
 
+/// For a worker: a terminal sends Ctrl-C to the whole group, and it is the
+/// parent that decides what becomes of its workers.
+pub fn leave_to_the_parent() {
+    // Without it a worker ends early, and its parent is about to end it.
+    let _ = ctrlc::set_handler(|| ());
+}
+
 pub fn install() {
     let handler = || {
         if ASKED.swap(true, Ordering::Relaxed) || !TO_FINISH.load(Ordering::Relaxed) {

@@ -2,25 +2,24 @@
 
 use std::io::{self, Write};
 
-use comfy_table::ContentArrangement;
 use serde_json::{Map, Value, json};
 
 use super::args::{ListArgs, ListTopic, TableFormat};
 use super::{Ending, text};
-use cullbench::culling::TESTS;
-use cullbench::index::{BACKENDS, StructureSpec};
-use cullbench::measure::METRICS;
-use cullbench::path::{PATH_PARAMS, PATHS};
-use cullbench::scene::{FAMILIES, SAMPLES};
-use cullbench::suite::SUITES;
+use crate::culling::TESTS;
+use crate::index::Registry;
+use crate::measure::METRICS;
+use crate::path::{PATH_PARAMS, PATHS};
+use crate::scene::{FAMILIES, SAMPLES};
+use crate::suite::SUITES;
 
 /// Long summaries wrap at this width.
 const LIST_WIDTH: u16 = 110;
 
 /// Name, further columns by name, summary.
-type Row = (String, Vec<(&'static str, String)>, String);
+type Row = (String, Vec<(&'static str, Value)>, String);
 
-pub fn list(args: &ListArgs) -> anyhow::Result<Ending> {
+pub fn list(registry: &Registry, args: &ListArgs) -> anyhow::Result<Ending> {
     let topics = match args.topic {
         Some(topic) => vec![topic],
         None => vec![
@@ -34,7 +33,7 @@ pub fn list(args: &ListArgs) -> anyhow::Result<Ending> {
     let mut out = io::stdout().lock();
     let mut all = Map::new();
     for topic in &topics {
-        let (name, note, rows) = rows(*topic)?;
+        let (name, note, rows) = rows(registry, *topic)?;
         match args.format {
             TableFormat::Json => {
                 all.insert(name.to_owned(), rows.into_iter().map(as_json).collect());
@@ -44,11 +43,9 @@ pub fn list(args: &ListArgs) -> anyhow::Result<Ending> {
                 header.extend(rows.first().iter().flat_map(|r| r.1.iter().map(|c| c.0)));
                 header.push("");
                 let mut table = text::table(&header, &[]);
-                table
-                    .set_content_arrangement(ContentArrangement::Dynamic)
-                    .set_width(LIST_WIDTH);
+                table.fit(LIST_WIDTH);
                 for (name, columns, summary) in rows {
-                    let columns = columns.into_iter().map(|(_, value)| value);
+                    let columns = columns.into_iter().map(|(_, value)| told(&value));
                     table.add_row([name].into_iter().chain(columns).chain([summary]));
                 }
                 writeln!(out, "{table}")?;
@@ -69,22 +66,37 @@ pub fn list(args: &ListArgs) -> anyhow::Result<Ending> {
     Ok(Ending::Ok)
 }
 
+/// A column's value as a table shows it.
+fn told(value: &Value) -> String {
+    match value {
+        Value::String(text) => text.clone(),
+        Value::Array(words) => words.iter().map(told).collect::<Vec<_>>().join(", "),
+        other => other.to_string(),
+    }
+}
+
 fn as_json((name, columns, summary): Row) -> Value {
     let mut row = json!({ "name": name, "summary": summary });
     for (column, value) in columns {
-        row[column] = Value::from(value);
+        row[column] = value;
     }
     row
 }
 
-fn rows(topic: ListTopic) -> anyhow::Result<(&'static str, String, Vec<Row>)> {
+fn rows(registry: &Registry, topic: ListTopic) -> anyhow::Result<(&'static str, String, Vec<Row>)> {
     let plain = |name: &str, summary: &str| (name.to_owned(), Vec::new(), summary.to_owned());
     Ok(match topic {
         ListTopic::Structures => {
-            let rows = BACKENDS.iter().map(|b| {
-                let params = StructureSpec::parse(b.name)?.params.to_string();
-                let params = vec![("params", params)];
-                Ok((b.name.to_owned(), params, b.summary.to_owned()))
+            let rows = registry.rows().iter().map(|row| {
+                let info = row.info;
+                let params = registry.structure(info.name)?.params;
+                let columns = vec![
+                    ("kind", info.kind.name().into()),
+                    ("origin", info.origin.to_string().into()),
+                    ("capabilities", info.capabilities.names().into()),
+                    ("params", params.to_string().into()),
+                ];
+                Ok((info.name.to_owned(), columns, info.summary.to_owned()))
             });
             let note = "Parameters follow the name: bvh:leaf=4,preset=medium";
             (
@@ -98,12 +110,12 @@ fn rows(topic: ListTopic) -> anyhow::Result<(&'static str, String, Vec<Row>)> {
                 let params = format!("n=100000, seed=1, offset=0, {}", f.params);
                 (
                     f.name.to_owned(),
-                    vec![("params", params)],
+                    vec![("params", params.into())],
                     f.summary.to_owned(),
                 )
             });
             let samples = SAMPLES.iter().map(|s| {
-                let licence = vec![("params", format!("real; {}", s.licence))];
+                let licence = vec![("params", format!("real; {}", s.licence).into())];
                 (s.name.to_owned(), licence, s.summary.to_owned())
             });
             let suites: Vec<String> = SUITES
@@ -132,7 +144,7 @@ fn rows(topic: ListTopic) -> anyhow::Result<(&'static str, String, Vec<Row>)> {
             let rows = METRICS.iter().map(|m| {
                 (
                     m.name.to_owned(),
-                    vec![("unit", m.unit.to_owned())],
+                    vec![("unit", m.unit.into())],
                     m.summary.to_owned(),
                 )
             });

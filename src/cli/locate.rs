@@ -10,26 +10,24 @@ use super::args::{LocateArgs, RowFormat};
 use super::compare_structures::{Answer, all_agree, ask_all, joined};
 use super::query::with_ids;
 use super::{Ending, load_scene, unread_is_fine};
-use cullbench::index::structures;
-use cullbench::path::read_points_csv;
-use glam::Vec3;
+use crate::index::Registry;
+use crate::path::read_points_csv;
+use crate::scene::Sought;
 
-pub fn locate(args: &LocateArgs) -> anyhow::Result<Ending> {
-    args.kernel.choose()?;
-    let structures = structures(&args.structure)?;
+pub fn locate(registry: &Registry, args: &LocateArgs) -> anyhow::Result<Ending> {
+    let structures = args.kernel.structures(registry, &args.structure)?;
     let scene = load_scene(&args.scene, &args.scene_args)?;
     let name = args.points.display().to_string();
     let file = File::open(&args.points).with_context(|| name.clone())?;
-    let points: Vec<Vec3> = read_points_csv(file, &name)?
+    let points: Vec<Sought> = read_points_csv(file, &name)?
         .into_iter()
-        .map(|p| scene.regions.local_point(p, scene.origin))
+        .map(|p| scene.sought(p))
         .collect();
     let boxes = scene.regions.boxes(&scene.items);
-    let ask =
-        |index: &dyn cullbench::index::DynIndex, point: usize, out: &mut Vec<_>, cost: &mut _| {
-            index.locate_counted(points[point], out, cost);
-            scene.regions.refine(points[point], out);
-        };
+    let ask = |index: &dyn crate::index::DynIndex, point: usize, out: &mut Vec<_>, cost: &mut _| {
+        index.locate_counted(points[point].local, out, cost);
+        scene.refine(&points[point], out);
+    };
     let answers = ask_all(&structures, &scene, boxes, points.len(), true, ask)?;
     unread_is_fine(write(args, &answers))?;
     Ok(if all_agree(&answers, "point") {

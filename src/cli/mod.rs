@@ -1,27 +1,38 @@
 //! The command line: from what was typed to a validated plan to one file per
 //! command. It owns exit codes, progress and tables, and no arithmetic.
 //!
+//! It is a function of a [`Registry`]: [`main_with`] is the whole of the
+//! `cullbench` program, and of anybody's who adds a structure of their own.
+//!
 //! Exit codes: 0 ok; 1 a wrong answer or a failed verification; 2 usage or bad
 //! input; 3 a regression, in `compare`; 130 interrupted.
 
 mod advise;
+mod against;
+mod against_table;
 mod args;
 mod compare;
 mod compare_structures;
+mod compare_table;
 mod document;
 mod drift;
 mod env;
 mod interrupt;
 mod list;
 mod locate;
+mod log_axis;
+mod merge;
 mod precision;
 mod precision_diagram;
+mod processes;
 mod query;
 mod report;
 mod run;
 mod run_plan;
 mod run_resume;
 mod run_table;
+#[cfg(test)]
+mod same_truth;
 mod scene;
 mod scene_args;
 mod shared_args;
@@ -29,14 +40,17 @@ mod stress;
 mod surface_diagram;
 mod surface_tables;
 mod text;
+mod usage;
 mod verify;
+mod worker;
 
 use std::error::Error;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
+use crate::index::Registry;
+use crate::scene::{LoadOptions, Scene};
 use clap::{CommandFactory, Parser};
-use cullbench::scene::{LoadOptions, Scene};
 
 use args::{Cli, Command};
 use scene_args::SceneCommand;
@@ -54,29 +68,34 @@ pub enum Ending {
     Interrupted,
 }
 
-pub fn main() -> ExitCode {
-    let cli = Cli::parse();
-    interrupt::install();
-    let ended = match cli.command {
-        Command::List(args) => list::list(&args),
-        Command::Run(args) => run::run(&args),
-        Command::Report(args) => report::report(&args),
-        Command::Compare(args) => compare::compare(&args),
-        Command::Query(args) => query::query(&args),
-        Command::Locate(args) => locate::locate(&args),
-        Command::Verify(args) => verify::verify(&args),
-        Command::Precision(args) => precision::precision(&args),
-        Command::Advise(args) => advise::advise(&args),
-        Command::Drift(args) => drift::drift(&args),
-        Command::Stress(args) => stress::stress(&args),
-        Command::Scene(SceneCommand::Info(args)) => scene::info(&args),
-        Command::Scene(SceneCommand::Generate(args)) => scene::generate(&args),
-        Command::Scene(SceneCommand::Convert(args)) => scene::convert(&args),
-        Command::Env(args) => env::env(&args),
-        Command::Completions { shell } => completions(shell),
-        Command::Man => man(),
+/// A program that does what its arguments say with the structures of a
+/// registry; its exit code. To be called once, from `main`: it reads the
+/// process's arguments and takes over Ctrl-C.
+///
+/// ```no_run
+/// use cullbench::index::Registry;
+///
+/// fn main() -> std::process::ExitCode {
+///     // Registry::builtin().with::<MyTree>() adds yours.
+///     cullbench::cli::main_with(Registry::builtin())
+/// }
+/// ```
+pub fn main_with(registry: Registry) -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => match usage::one_line(&error) {
+            Some(line) => {
+                tell(&format!("error: {line}"));
+                return ExitCode::from(2);
+            }
+            None => error.exit(),
+        },
     };
-    match ended {
+    match cli.command {
+        Command::Worker => interrupt::leave_to_the_parent(),
+        _ => interrupt::install(),
+    }
+    match dispatch(&registry, cli.command) {
         Ok(Ending::Ok) => ExitCode::SUCCESS,
         Ok(Ending::WrongAnswer) => ExitCode::from(1),
         Ok(Ending::Regression) => ExitCode::from(3),
@@ -90,23 +109,49 @@ pub fn main() -> ExitCode {
     }
 }
 
+/// The one place from which commands are called.
+fn dispatch(registry: &Registry, command: Command) -> anyhow::Result<Ending> {
+    match command {
+        Command::List(args) => list::list(registry, &args),
+        Command::Run(args) => run::run(registry, &args),
+        Command::Merge(args) => merge::merge(&args),
+        Command::Report(args) => report::report(registry, &args),
+        Command::Compare(args) => compare::compare(registry, &args),
+        Command::Query(args) => query::query(registry, &args),
+        Command::Locate(args) => locate::locate(registry, &args),
+        Command::Verify(args) => verify::verify(registry, &args),
+        Command::Precision(args) => precision::precision(registry, &args),
+        Command::Advise(args) => advise::advise(registry, &args),
+        Command::Drift(args) => drift::drift(&args),
+        Command::Stress(args) => stress::stress(registry, &args),
+        Command::Scene(SceneCommand::Info(args)) => scene::info(&args),
+        Command::Scene(SceneCommand::Generate(args)) => scene::generate(&args),
+        Command::Scene(SceneCommand::Convert(args)) => scene::convert(&args),
+        Command::Env(args) => env::env(&args),
+        Command::Worker => worker::worker(registry),
+        Command::Completions { shell } => completions(shell),
+        Command::Man => man(),
+    }
+}
+
 /// One line on stderr, whatever is in the text. Unlike `eprintln!` it does
 /// not panic when nobody can be told.
 fn tell(line: &str) {
-    let plain = line.replace(char::is_control, " ");
-    let _ = writeln!(io::stderr(), "{plain}");
+    let _ = writeln!(io::stderr(), "{}", text::plain(line));
 }
 
 /// Loads a scene and says so if some of it was left out.
 fn load_scene(source: &str, args: &SceneArgs) -> anyhow::Result<Scene> {
     let options = LoadOptions {
         skip_bad_items: args.skip_bad_items,
+        structures: 0,
     };
-    let scene = cullbench::scene::load(source, &options)?;
+    let scene = crate::scene::load(source, &options)?;
     if scene.skipped_items > 0 {
         tell(&format!(
-            "note: {} bad item(s) left out of {}",
-            scene.skipped_items, scene.name
+            "note: {} left out of {}",
+            text::counted(scene.skipped_items, "bad item"),
+            scene.name
         ));
     }
     Ok(scene)

@@ -11,13 +11,14 @@ use serde::Serialize;
 
 use super::args::{PrecisionArgs, TableFormat};
 use super::{Ending, interrupt, load_scene, precision_diagram, text, unread_is_fine};
-use cullbench::index::structures;
-use cullbench::measure::{Machine, Protocol, Status, harness_overhead_ns};
-use cullbench::path;
-use cullbench::precision::{
+use crate::index::Registry;
+use crate::measure::{Machine, Protocol, Status};
+use crate::path;
+use crate::precision::{
     OffsetRow, Point, Precision, SizeRow, measure_points, offset_sweep, size_sweep,
 };
-use cullbench::report::write_atomically;
+use crate::report::write_atomically;
+use crate::verify::ErrorCount;
 
 /// Everything that is printed.
 #[derive(Serialize)]
@@ -32,8 +33,7 @@ struct Outcome {
 /// Cameras of the sweep over offsets.
 const OFFSET_CAMERAS: usize = 60;
 
-pub fn precision(args: &PrecisionArgs) -> anyhow::Result<Ending> {
-    args.kernel.choose()?;
+pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<Ending> {
     // Before the work, not after it.
     if let Some(folder) = args.svg.as_deref().and_then(Path::parent)
         && !folder.as_os_str().is_empty()
@@ -44,22 +44,26 @@ pub fn precision(args: &PrecisionArgs) -> anyhow::Result<Ending> {
             folder.display()
         );
     }
-    let structures = structures(&args.structure)?;
+    let structures = args.kernel.structures(registry, &args.structure)?;
     let defaults = args.lens.defaults()?;
     let scene = load_scene(&args.scene, &args.scene_args)?;
+    if scene.items.is_empty() {
+        bail!("scene '{}' has no items; expected at least one", scene.name);
+    }
     let path = path::load(&args.path, &scene, &defaults)?;
     interrupt::from_now_on_finish();
     let bar = ProgressBar::new_spinner();
     bar.enable_steady_tick(Duration::from_millis(200));
-    bar.set_message(format!("{}, {}: every point", args.scene, args.path));
+    bar.set_message(text::plain(&format!(
+        "{}, {}: every point",
+        args.scene, args.path
+    )));
     let protocol = Protocol {
-        min_rounds: 5,
-        max_rounds: 15,
-        budget: Duration::from_secs(8),
-        pass: Duration::from_millis(200),
+        rounds: [5, 15],
+        task_ns: 150e6,
+        cameras: usize::MAX,
         cold: false,
         seed: args.seed,
-        overhead_ns: harness_overhead_ns(),
         cache_bytes: Machine::capture().cache_sweep_bytes(),
     };
     let frames = args.frames as usize;
@@ -117,18 +121,18 @@ fn show_json(outcome: &Outcome) -> io::Result<()> {
 }
 
 fn show(outcome: &Outcome) -> io::Result<()> {
-    let mut out = io::stdout().lock();
+    let mut out = text::terminal();
     let p = &outcome.precision;
     let visible = p.points.first().map_or(0, |point| point.errors.visible);
     writeln!(
         out,
-        "{}: {} items; {}: {} cameras, {} visible in all, {} rounds; noise floor {}",
-        p.scene,
-        text::count(p.items),
-        p.path,
-        p.cameras,
+        "{}: {}; {}: {}, {} visible in all, {}; noise floor {}",
+        text::plain(&p.scene),
+        text::counted(p.items, "item"),
+        text::plain(&p.path),
+        text::counted(p.cameras, "camera"),
         text::count(visible as usize),
-        p.rounds,
+        text::counted(p.rounds, "round"),
         text::percent(p.noise_floor)
     )?;
     writeln!(out, "{}", points_table(&p.points))?;
@@ -197,7 +201,13 @@ fn as_percent(share: f64) -> String {
     format!("{:.3}", share * 100.0)
 }
 
-fn points_table(points: &[Point]) -> comfy_table::Table {
+/// What is returned too much: items by storage, by planes and by the test.
+fn by_source(errors: &ErrorCount) -> String {
+    let by_test = errors.false_positives - errors.by_storage - errors.by_planes;
+    format!("{}/{}/{by_test}", errors.by_storage, errors.by_planes)
+}
+
+fn points_table(points: &[Point]) -> text::Table {
     let mut table = text::table(
         &[
             "",
@@ -207,6 +217,7 @@ fn points_table(points: &[Point]) -> comfy_table::Table {
             "planes",
             "eps",
             "excess %",
+            "by storage/planes/test",
             "missed ppm",
             "touches lost",
             "worst miss",
@@ -215,7 +226,7 @@ fn points_table(points: &[Point]) -> comfy_table::Table {
             "B/item",
             "status",
         ],
-        &[5, 6, 7, 8, 9, 10, 11, 12],
+        &[5, 6, 7, 8, 9, 10, 11, 12, 13],
     );
     for point in points {
         let time = match (point.query_ns, point.query_ns_lower, point.query_ns_upper) {
@@ -239,6 +250,7 @@ fn points_table(points: &[Point]) -> comfy_table::Table {
             point.planes.to_owned(),
             point.epsilon.to_string(),
             point.excess.map(as_percent).unwrap_or_default(),
+            of(by_source(&point.errors)),
             point
                 .false_negative_ppm
                 .map(text::significant)
@@ -257,7 +269,7 @@ fn points_table(points: &[Point]) -> comfy_table::Table {
     table
 }
 
-fn sizes_table(rows: &[SizeRow]) -> comfy_table::Table {
+fn sizes_table(rows: &[SizeRow]) -> text::Table {
     let tests = rows.first().map(|row| row.tests.iter().map(|t| t.test));
     let mut header = vec!["s/D", "cubes", "visible"];
     header.extend(tests.into_iter().flatten());
@@ -280,7 +292,7 @@ fn sizes_table(rows: &[SizeRow]) -> comfy_table::Table {
     table
 }
 
-fn offsets_table(rows: &[OffsetRow]) -> comfy_table::Table {
+fn offsets_table(rows: &[OffsetRow]) -> text::Table {
     let mut offsets: Vec<f64> = rows.iter().map(|row| row.offset).collect();
     offsets.dedup();
     let mut header = vec!["planes".to_owned(), "numbers".to_owned(), "eps".to_owned()];

@@ -7,8 +7,9 @@ use std::collections::BTreeMap;
 use anyhow::anyhow;
 use plotters::prelude::*;
 
+use super::log_axis::{around, is_drawn, left_out};
 use super::text;
-use cullbench::precision::{Point, Precision};
+use crate::precision::{Point, Precision};
 
 const SIZE: (u32, u32) = (1000, 640);
 /// Percent that stand for no excess at all: a logarithmic axis has no zero.
@@ -28,7 +29,8 @@ pub const COLOURS: [RGBColor; 8] = [
 
 /// Time in microseconds and excess in percent, if the point has both.
 fn place(point: &Point) -> Option<(f64, f64)> {
-    Some((point.query_ns? / 1e3, (point.excess? * 100.0).max(NONE)))
+    let place = (point.query_ns? / 1e3, (point.excess? * 100.0).max(NONE));
+    (is_drawn(place.0) && is_drawn(place.1)).then_some(place)
 }
 
 /// The diagram as SVG.
@@ -36,24 +38,22 @@ pub fn draw(precision: &Precision) -> anyhow::Result<String> {
     let mut svg = String::new();
     let drawn = draw_on(&mut svg, precision);
     drawn.map_err(|error| anyhow!("the diagram cannot be drawn: {error}"))?;
-    Ok(svg)
+    Ok(text::lines(&svg))
 }
 
 fn draw_on(svg: &mut String, precision: &Precision) -> Result<(), Box<dyn std::error::Error>> {
     let places: Vec<(f64, f64)> = precision.points.iter().filter_map(place).collect();
-    let range = |of: fn(&(f64, f64)) -> f64, low: f64, high: f64| {
-        let values = || places.iter().map(of);
-        let least = values().fold(low, f64::min);
-        let most = values().fold(high, f64::max);
-        (least / 1.5..most * 2.0).log_scale()
-    };
-    // One point at least, so that an empty diagram has axes as well.
-    let first = places.first().map_or(1.0, |p| p.0);
-    let (times, excesses) = (range(|p| p.0, first, first), range(|p| p.1, NONE, 1.0));
+    let measured = precision.points.iter();
+    let measured = measured.filter(|point| point.query_ns.is_some() && point.excess.is_some());
+    let beyond = left_out(measured.count() - places.len());
+    let times = around(places.iter().map(|p| p.0), 1.5, 2.0).log_scale();
+    // From nothing to a hundredth at least.
+    let excesses = places.iter().map(|p| p.1).chain([NONE, 1.0]);
+    let excesses = around(excesses, 1.5, 2.0).log_scale();
     let root = SVGBackend::with_string(svg, SIZE).into_drawing_area();
     root.fill(&WHITE)?;
     let caption = format!(
-        "{}, {}: error against run time",
+        "{}, {}: error against run time{beyond}",
         precision.scene, precision.path
     );
     let mut chart = ChartBuilder::on(&root)

@@ -7,18 +7,17 @@ use serde_json::{Map, Value, json};
 use super::args::{QueryArgs, RowFormat};
 use super::compare_structures::{Answer, all_agree, ask_all, joined};
 use super::{Ending, load_scene, unread_is_fine};
-use cullbench::index::structures;
-use cullbench::measure::Workload;
-use cullbench::path;
+use crate::index::Registry;
+use crate::measure::Workload;
+use crate::path;
 
-pub fn query(args: &QueryArgs) -> anyhow::Result<Ending> {
-    args.kernel.choose()?;
-    let structures = structures(&args.structure)?;
+pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
+    let structures = args.kernel.structures(registry, &args.structure)?;
     let (defaults, culling) = (args.lens.defaults()?, args.culling.culling(&args.test)?);
     let scene = load_scene(&args.scene, &args.scene_args)?;
     let cameras = path::load(&args.cameras, &scene, &defaults)?;
     let workload = Workload::new(&scene, &cameras, &culling)?;
-    let ask = |index: &dyn cullbench::index::DynIndex, camera: usize, out: &mut _, cost: &mut _| {
+    let ask = |index: &dyn crate::index::DynIndex, camera: usize, out: &mut _, cost: &mut _| {
         index.see_counted(workload.views[camera].as_any(), out, cost);
     };
     let answers = ask_all(

@@ -10,14 +10,16 @@ use anyhow::Context;
 use super::args::ReportArgs;
 use super::document::{Block, Rows, to_html, to_markdown};
 use super::{Ending, surface_diagram, surface_tables, tell, text};
-use cullbench::measure::Status;
-use cullbench::report::{
+use crate::index::Registry;
+use crate::measure::Status;
+use crate::report::{
     Comparison, Ranked, Report, ReportCell, comparisons, growths, read_report, surfaces,
     times_as_fast, write_atomically,
 };
 
-pub fn report(args: &ReportArgs) -> anyhow::Result<Ending> {
-    let report = read_report(&args.report)?;
+pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> {
+    let mut report = read_report(&args.report)?;
+    declare(&mut report, registry);
     let pictures = match args.svg.is_some() || args.html.is_some() {
         true => surface_diagram::pictures(&surfaces(comparisons(&report)))?,
         false => Vec::new(),
@@ -48,6 +50,18 @@ pub fn report(args: &ReportArgs) -> anyhow::Result<Ending> {
     Ok(Ending::Ok)
 }
 
+/// Older reports do not say what their structures are: the registry does, where
+/// it has one of the very same name.
+fn declare(report: &mut Report, registry: &Registry) {
+    for cell in &mut report.cells {
+        let name = cell.structure.split(':').next().unwrap_or_default();
+        if let (None, Some(row)) = (cell.kind, registry.named(name)) {
+            cell.kind = Some(row.info.kind);
+            cell.origin = Some(row.info.origin.owned());
+        }
+    }
+}
+
 fn write(path: &Path, text: &str) -> anyhow::Result<()> {
     Ok(write_atomically(path, |out| {
         out.write_all(text.as_bytes())
@@ -69,9 +83,13 @@ fn blocks(report: &Report) -> Vec<Block> {
             scene = &about.scene.name;
             blocks.push(Block::Heading(2, scene.to_owned()));
             blocks.push(Block::Line(format!(
-                "{} items, {} regions.",
-                text::count(about.scene.total_count),
-                text::count(about.scene.region_count)
+                "{}, {}{}.",
+                text::counted(about.scene.total_count, "item"),
+                text::counted(about.scene.region_count, "region"),
+                match about.scene.total_count {
+                    0 => "; nothing is ranked",
+                    _ => "",
+                }
             )));
         }
         blocks.extend(of_comparison(comparison));
@@ -103,27 +121,19 @@ fn about(report: &Report) -> Vec<String> {
         None => "; not finished",
     };
     let dirty = match report.source.dirty {
-        Some(true) => ", with changes of its own",
+        Some(true) => " with a dirty working tree",
         _ => "",
     };
-    let noise = match (report.noise.aa_floor, report.noise.aa_ratio) {
-        (Some(floor), Some(ratio)) => format!(
-            "Noise floor {} (the same structure entered twice, mean ratio {ratio:.3}): \
-             structures closer than that share a rank.",
-            text::percent(floor)
-        ),
-        _ => "Noise floor unknown: no structure was measured twice.".to_owned(),
-    };
-    vec![
+    let mut lines = vec![
         format!(
             "{}, suite: {suite}, seed {}{unfinished}.",
             run.started_at, run.seed
         ),
         format!("Command: {}", run.command),
         format!(
-            "Machine: {}, {} cores, kernel {}, instruction set {}.",
+            "Machine: {}, {}, kernel {}, instruction set {}.",
             known(&machine.cpu),
-            machine.cores,
+            text::counted(machine.cores, "core"),
             known(&machine.kernel),
             machine.instruction_set
         ),
@@ -135,8 +145,10 @@ fn about(report: &Report) -> Vec<String> {
             report.toolchain.features.join(","),
             known(&report.source.commit)
         ),
-        noise,
-    ]
+        format!("{}.", text::conclusion(report)),
+    ];
+    lines.extend(report.noise.warnings.iter().cloned());
+    lines
 }
 
 fn of_comparison(comparison: &Comparison) -> Vec<Block> {
@@ -156,19 +168,14 @@ fn of_comparison(comparison: &Comparison) -> Vec<Block> {
     let mut header = vec![
         "structure",
         "rank",
-        "query median",
+        "query [95 %]",
         "p95",
-        "times linear [95 % interval]",
+        "speed-up vs linear [95 %]",
     ];
     if peer.is_some() {
-        header.push("times fastest peer");
+        header.push("speed-up vs fastest peer");
     }
-    header.extend([
-        "time / bound-read",
-        "time / bound-memcpy",
-        "build",
-        "B/item",
-    ]);
+    header.extend(["of lower bound: read", "copy", "build", "bytes per item"]);
     header.extend(["break-even queries", "locate", "status"]);
     let mut rows = Rows::of_numbers(header);
     for Ranked { rank, cell } in &comparison.ranked {
@@ -176,14 +183,19 @@ fn of_comparison(comparison: &Comparison) -> Vec<Block> {
         rows.rows.push(row(cell, rank, peer));
     }
     for bound in &comparison.bounds {
-        let mut row = row(bound, "bound".to_owned(), peer);
-        // A bound has no ratio to itself.
+        let mut row = row(bound, "lower bound".to_owned(), peer);
+        // A lower bound has no ratio to itself.
         for cell in &mut row[4..] {
             cell.clear();
         }
         rows.rows.push(row);
     }
-    let mut blocks = vec![Block::Heading(3, heading), Block::Table(rows)];
+    let basis = format!("{}.", text::basis(comparison));
+    let mut blocks = vec![
+        Block::Heading(3, heading),
+        Block::Line(basis),
+        Block::Table(rows),
+    ];
     let told = comparison.ranked.iter().map(|r| r.cell);
     for cell in told.filter(|c| c.reason.is_some()) {
         let reason = cell.reason.as_deref().unwrap_or_default();
@@ -202,9 +214,9 @@ fn row(cell: &ReportCell, rank: String, peer: Option<&ReportCell>) -> Vec<String
     let mut row = vec![
         cell.structure.clone(),
         rank,
-        value("query_ns", text::time),
+        text::time_estimate(cell.metrics.get("query_ns")),
         value("query_ns_p95", text::time),
-        text::estimate(cell.metrics.get("ratio_to_linear")),
+        text::estimate(cell.metrics.get("speedup")),
     ];
     if let Some(peer) = peer {
         let sound = cell.status == Status::Ok;

@@ -1,213 +1,364 @@
-//! `cullbench run`, the main job: plan, measure scene by scene, keep every
-//! finished cell on disk, show a ranked table per scene.
+//! `cullbench run`, the main job: plan, measure scene by scene in processes of
+//! its own, keep every finished part on disk, show a ranked table per scene.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::io::{self, Write};
-use std::time::Instant;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
 
+use anyhow::{Context, bail};
 use indicatif::{ProgressBar, ProgressStyle};
+use tempfile::NamedTempFile;
 
 use super::args::RunArgs;
-use super::run_plan::{Plan, Question};
-use super::run_resume::{finished, open, utc_now};
+use super::processes::{Ended, see_through};
+use super::run_plan::{RunPlan, plan};
+use super::run_resume::{create, go_on, resume, utc_now};
 use super::run_table::show_scene;
+use super::worker::{PROTOCOL, Request, processors};
 use super::{Ending, interrupt, surface_tables, text, unread_is_fine};
-use cullbench::culling::CullingTest;
-use cullbench::measure::{
-    BOUNDS, Contender, Group, Machine, PathInfo, Protocol, SceneInfo, Workload, measure_group,
+use crate::index::Registry;
+use crate::input;
+use crate::measure::{
+    GroupKey, Machine, Part, PathInfo, PlannedScene, SceneInfo, Share, SubjectPart, Verdict,
 };
-use cullbench::path;
-use cullbench::report::{Report, ReportCell, RunFolder};
-use cullbench::scene::{self, Scene};
+use crate::report::{Line, Report, RunFolder, Stream, temporary_in};
 
-pub fn run(args: &RunArgs) -> anyhow::Result<Ending> {
-    args.kernel.choose()?;
-    let plan = Plan::new(args)?;
-    let machine = Machine::capture();
+pub fn run(registry: &Registry, args: &RunArgs) -> anyhow::Result<Ending> {
+    if args.plan {
+        return print_plan(registry, args);
+    }
+    if args.resume {
+        let (folder, stream, begun) = resume(args)?;
+        let plan = plan(registry, &begun)?;
+        plan.check_goes_on(&stream)
+            .with_context(|| folder.path().display().to_string())?;
+        interrupt::from_now_on_finish();
+        let folder = go_on(folder, &stream)?;
+        return Run::new(args, plan, folder, stream)?.all();
+    }
+    let plan = plan(registry, args)?;
+    plan.check_inputs()?;
+    if plan.plan.scenes.is_empty() {
+        bail!("nothing to do: this shard has no scene; expected at most as many shards as paths");
+    }
     interrupt::from_now_on_finish();
-    let (mut folder, mut report) = open(args, &plan, &machine)?;
-    let started = Instant::now();
-    let bar = progress(plan.groups());
-    let sweep = machine.cache_sweep_bytes();
-    let mut interrupted = false;
-    let bounds = if args.no_bounds { &[] } else { BOUNDS };
-    for planned in &plan.scenes {
-        let source = &planned.source;
-        let done: BTreeSet<Question> = finished(&report, source);
-        let mut shown = 0;
-        let questions = plan.questions(planned);
-        if questions.iter().any(|question| !done.contains(question)) {
-            bar.set_message(format!("{source}: building"));
-            let scene = scene::load(source, &plan.load)?;
-            let info = SceneInfo::of(&scene);
-            let mut entered: Option<(bool, Vec<Contender>)> = None;
-            for question in questions {
-                if done.contains(&question) {
-                    bar.inc(1);
-                    continue;
+    let (folder, stream) = create(
+        args,
+        &plan,
+        &Machine::capture().by(args.what.kernel.execution()?.kernel),
+    )?;
+    Run::new(args, plan, folder, stream)?.all()
+}
+
+/// The cells as JSON lines, nothing measured.
+fn print_plan(registry: &Registry, args: &RunArgs) -> anyhow::Result<Ending> {
+    let plan = plan(registry, args)?;
+    let mut out = io::stdout().lock();
+    for cell in plan.plan.cells() {
+        writeln!(out, "{}", serde_json::to_string(&cell)?)?;
+    }
+    out.flush()?;
+    Ok(Ending::Ok)
+}
+
+/// A run on its way.
+struct Run {
+    plan: RunPlan,
+    folder: RunFolder,
+    stream: Stream,
+    program: PathBuf,
+    patience: Duration,
+    cpus: Vec<usize>,
+    /// Bytes of pipes, for workers to read: in the run's folder, where what a
+    /// killed run leaves is taken away by the next.
+    spooled: BTreeMap<String, PathBuf>,
+    spool: Vec<NamedTempFile>,
+    bar: ProgressBar,
+    started: Instant,
+}
+
+/// How a scene ended.
+enum SceneEnd {
+    Done,
+    Stopped,
+}
+
+impl Run {
+    fn new(
+        args: &RunArgs,
+        plan: RunPlan,
+        folder: RunFolder,
+        stream: Stream,
+    ) -> anyhow::Result<Run> {
+        let (mut spool, mut spooled) = (Vec::new(), BTreeMap::new());
+        for (source, bytes) in input::pipes() {
+            let mut file = temporary_in(folder.path())?;
+            file.write_all(&bytes)?;
+            spooled.insert(source, std::path::absolute(file.path())?);
+            spool.push(file);
+        }
+        let groups = plan.plan.groups().len() as u64;
+        Ok(Run {
+            bar: progress(groups * u64::from(plan.plan.effort.processes)),
+            program: std::env::current_exe().context("this program cannot be found again")?,
+            patience: Duration::from_secs(args.what.timeout),
+            cpus: processors(),
+            spooled,
+            spool,
+            started: Instant::now(),
+            plan,
+            folder,
+            stream,
+        })
+    }
+
+    fn all(mut self) -> anyhow::Result<Ending> {
+        let (mut stopped, mut unshown) = (false, None);
+        for scene in 0..self.plan.plan.scenes.len() {
+            let end = match self.scene(scene) {
+                Ok(end) => end,
+                Err(error) => {
+                    self.bar.finish_and_clear();
+                    self.close_early();
+                    return Err(error);
                 }
-                let (path, cold, test) = &question;
-                let culling = plan.culling(test);
-                bar.set_message(format!("{source}, {path}, {test}"));
-                // Built once for all tests over boxes, and anew for spheres.
-                let of_spheres = culling.test == CullingTest::Sphere;
-                if entered.as_ref().is_none_or(|(kind, _)| *kind != of_spheres) {
-                    // The old ones go first: memory for one set is enough.
-                    drop(entered.take());
-                    entered = Some((of_spheres, contenders(&plan, &scene, culling.test)));
-                }
-                let Some((_, contenders)) = &entered else {
-                    continue;
-                };
-                let protocol = Protocol {
-                    min_rounds: plan.suite.min_rounds,
-                    max_rounds: plan.suite.max_rounds,
-                    budget: plan.suite.budget,
-                    pass: plan.suite.pass,
-                    cold: *cold,
-                    seed: args.seed,
-                    overhead_ns: report.noise.harness_overhead_ns,
-                    cache_bytes: sweep,
-                };
-                let way = path::load(path, &scene, &plan.lens)?;
-                let workload = Workload::new(&scene, &way, &culling)?;
-                let asked = interrupt::asked;
-                let group =
-                    measure_group(&workload, contenders, bounds, "linear", &protocol, &asked);
-                let Some(group) = group else {
-                    interrupted = true;
-                    break;
-                };
-                let path = PathInfo::of(path, &workload, *cold);
-                keep(&mut folder, &mut report, test, &info, &path, group)?;
-                shown += 1;
-                bar.inc(1);
+            };
+            let source = &self.plan.plan.scenes[scene].source;
+            let report = self.stream.report_of(|key| key.scene == *source);
+            // A table that cannot be shown is no reason to stop measuring.
+            let shown = self
+                .bar
+                .suspend(|| unread_is_fine(show_scene(&report, source)));
+            unshown = unshown.or(shown.err());
+            if matches!(end, SceneEnd::Stopped) {
+                stopped = true;
+                break;
             }
         }
-        if shown > 0 || !done.is_empty() {
-            bar.suspend(|| unread_is_fine(show_scene(&report, source)))?;
+        self.bar.finish_and_clear();
+        if self.stream.parts.is_empty() {
+            drop(self.spool);
+            self.folder.discard();
+            return Ok(Ending::Interrupted);
         }
-        if interrupted {
-            break;
+        if !stopped && self.stream.finished_at.is_none() {
+            let at = utc_now();
+            self.folder.append(&Line::Finished { at: at.clone() })?;
+            self.stream.finished_at = Some(at);
+        }
+        let report = self.stream.report();
+        self.folder.save(&report)?;
+        if let Some(error) = unshown {
+            return Err(error.into());
+        }
+        unread_is_fine(surface_tables::show(&report))?;
+        unread_is_fine(self.close(&report, stopped))?;
+        let failed = report.cells.iter().any(|c| c.status.is_failure());
+        Ok(match (stopped, failed) {
+            (true, _) => Ending::Interrupted,
+            (false, true) => Ending::WrongAnswer,
+            (false, false) => Ending::Ok,
+        })
+    }
+
+    /// After an error: what was measured stays, and no empty folder.
+    fn close_early(self) {
+        match self.stream.parts.is_empty() {
+            true => {
+                drop(self.spool);
+                self.folder.discard();
+            }
+            false => drop(self.folder.save(&self.stream.report())),
         }
     }
-    bar.finish_and_clear();
-    if !interrupted && report.run.finished_at.is_none() {
-        report.run.finished_at = Some(utc_now());
-        folder.save(&report)?;
+
+    /// All processes of a scene.
+    fn scene(&mut self, scene: usize) -> anyhow::Result<SceneEnd> {
+        let planned = self.plan.plan.scenes[scene].clone();
+        let questions = self.plan.plan.questions(&planned);
+        let keys: Vec<GroupKey> = questions
+            .iter()
+            .map(|question| self.plan.plan.key(&planned, question))
+            .collect();
+        let mut failed = BTreeMap::new();
+        for process in 0..self.plan.plan.effort.processes {
+            loop {
+                if interrupt::asked() {
+                    return Ok(SceneEnd::Stopped);
+                }
+                let share = self.share(&keys, process, &failed);
+                if !share.wanted.contains(&true) {
+                    self.bar.inc(0);
+                    break;
+                }
+                match self.worker(scene, share)? {
+                    Ended::Done => break,
+                    Ended::Stopped => return Ok(SceneEnd::Stopped),
+                    Ended::Failed(reason) => bail!("{reason}"),
+                    Ended::Died(Some(structure), verdict) if !failed.contains_key(&structure) => {
+                        failed.insert(structure, verdict);
+                    }
+                    // Not any structure's doing, as far as one can tell.
+                    Ended::Died(_, verdict) => {
+                        self.fail_all(&planned, &keys, process, &verdict)?;
+                        break;
+                    }
+                }
+            }
+        }
+        Ok(SceneEnd::Done)
     }
-    unread_is_fine(surface_tables::show(&report))?;
-    unread_is_fine(close(&report, &folder, started, interrupted))?;
-    let failed = report.cells.iter().any(|c| c.status.is_failure());
-    Ok(match (interrupted, failed) {
-        (true, _) => Ending::Interrupted,
-        (false, true) => Ending::WrongAnswer,
-        (false, false) => Ending::Ok,
-    })
-}
 
-/// All structures, and the first proper one a second time: the twin whose
-/// ratio to itself is the noise floor.
-fn contenders(plan: &Plan, scene: &Scene, test: CullingTest) -> Vec<Contender> {
-    let proper = plan
-        .structures
-        .iter()
-        .find(|s| !s.backend.name.starts_with("linear"));
-    let twin = proper.or(plan.structures.first());
-    let entered = plan
-        .structures
-        .iter()
-        .map(|s| (s, false))
-        .chain(twin.map(|s| (s, true)));
-    entered
-        .map(|(spec, is_twin)| Contender::build(spec.clone(), is_twin, scene, test))
-        .collect()
-}
+    fn share(&self, keys: &[GroupKey], process: u32, failed: &BTreeMap<String, Verdict>) -> Share {
+        let known = |key: &GroupKey| {
+            let first = self.stream.of_group(key);
+            first.first().and_then(|kept| kept.part.known.clone())
+        };
+        Share {
+            plan_only: false,
+            process,
+            known: keys
+                .iter()
+                .map(|key| known(key).filter(|_| process > 0))
+                .collect(),
+            wanted: keys
+                .iter()
+                .map(|key| !self.stream.has(key, process))
+                .collect(),
+            failed: failed.clone(),
+        }
+    }
 
-/// Puts a finished group on disk.
-fn keep(
-    folder: &mut RunFolder,
-    report: &mut Report,
-    test: &str,
-    scene: &SceneInfo,
-    path: &PathInfo,
-    group: Group,
-) -> anyhow::Result<()> {
-    let mut append = |label: &str| {
-        let own = group.samples.iter().filter(|(l, _, _)| l == label);
-        let samples: Vec<_> = own.map(|(_, task, sample)| (*task, *sample)).collect();
-        folder.append(
-            [&scene.name, &path.name, &path.cache, label, test],
-            samples.iter(),
+    fn worker(&mut self, scene: usize, share: Share) -> anyhow::Result<Ended> {
+        let process = share.process;
+        let request = Request {
+            protocol: PROTOCOL,
+            args: self.stream.header.args.clone(),
+            spooled: self.spooled.clone(),
+            scene,
+            cpu: match self.cpus.len() {
+                0 => None,
+                count => Some(self.cpus[process as usize % count]),
+            },
+            samples: true,
+            share,
+        };
+        let source = self.plan.plan.scenes[scene].source.clone();
+        let processes = self.plan.plan.effort.processes;
+        let Run {
+            bar,
+            folder,
+            stream,
+            ..
+        } = self;
+        let mut keep = |part: Part, samples: Vec<_>| {
+            stream.parts.push(folder.keep(part, &samples)?);
+            bar.inc(1);
+            Ok(())
+        };
+        let step = |step: &str| {
+            let at = format!("{source}, process {} of {processes}: {step}", process + 1);
+            bar.set_message(text::plain(&at));
+        };
+        see_through(
+            &self.program,
+            &request,
+            self.patience,
+            &mut keep,
+            &step,
+            &interrupt::asked,
         )
-    };
-    if let Some(twin) = &group.twin {
-        append(&format!("{}#twin", twin.structure))?;
-        report.noise.add(&scene.name, path, test, twin);
     }
-    for cell in group.cells {
-        let samples = append(&cell.structure)?;
-        let samples = (samples.rows > 0).then_some(samples);
-        report
+
+    /// Every cell of what is still wanted gets this verdict.
+    fn fail_all(
+        &mut self,
+        planned: &PlannedScene,
+        keys: &[GroupKey],
+        process: u32,
+        verdict: &Verdict,
+    ) -> anyhow::Result<()> {
+        for key in keys {
+            if self.stream.has(key, process) {
+                continue;
+            }
+            let before = self
+                .stream
+                .of_group(key)
+                .first()
+                .map(|kept| kept.part.clone());
+            let structures = &self.plan.plan.structures;
+            let subject = |spec: &crate::index::StructureSpec| SubjectPart {
+                label: spec.label.clone(),
+                params: spec.params.clone(),
+                kind: spec.row.info.kind,
+                origin: spec.row.info.origin.owned(),
+                verdict: verdict.clone(),
+                build_ms: None,
+                memory_bytes: None,
+                update_ms: Vec::new(),
+                refitted_ln: None,
+                counts: BTreeMap::new(),
+            };
+            let part = Part {
+                key: key.clone(),
+                process,
+                scene: before.as_ref().map_or_else(
+                    || SceneInfo::unknown(&planned.source),
+                    |part| part.scene.clone(),
+                ),
+                path: before
+                    .as_ref()
+                    .map_or_else(|| PathInfo::unknown(key), |part| part.path.clone()),
+                known: None,
+                judged: None,
+                subjects: structures.iter().map(subject).collect(),
+                bounds: Vec::new(),
+                tasks: Vec::new(),
+            };
+            self.stream.parts.push(self.folder.keep(part, &[])?);
+            self.bar.inc(1);
+        }
+        Ok(())
+    }
+
+    fn close(&self, report: &Report, stopped: bool) -> io::Result<()> {
+        let failed = report
             .cells
-            .push(ReportCell::new(scene, path, test, cell, samples));
-    }
-    for bound in group.bounds {
-        let samples = append(&bound.structure)?;
-        let samples = (samples.rows > 0).then_some(samples);
-        report
-            .bounds
-            .push(ReportCell::new(scene, path, test, bound, samples));
-    }
-    // A finished run that was asked for more goes on.
-    report.run.finished_at = None;
-    folder.save(report)?;
-    Ok(())
-}
-
-fn progress(groups: u64) -> ProgressBar {
-    // Drawn on stderr, and only if that is a terminal.
-    let style = ProgressStyle::with_template("{bar:24} {pos}/{len}  {elapsed}  {msg}");
-    let bar = ProgressBar::new(groups);
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    bar
-}
-
-fn close(
-    report: &Report,
-    folder: &RunFolder,
-    started: Instant,
-    interrupted: bool,
-) -> io::Result<()> {
-    let failed = report
-        .cells
-        .iter()
-        .filter(|c| c.status.is_failure())
-        .count();
-    let mut out = io::stdout().lock();
-    let noise = match (report.noise.aa_floor, report.noise.aa_ratio) {
-        (Some(floor), Some(ratio)) => format!(
-            "noise floor {} (the same structure entered twice, mean ratio {ratio:.3}); smaller differences are ties",
-            text::percent(floor)
-        ),
-        _ => "noise floor unknown: no structure was measured twice".to_owned(),
-    };
-    writeln!(
-        out,
-        "\n{} cells in {:.1} s, {failed} wrong; {noise}",
-        report.cells.len(),
-        started.elapsed().as_secs_f64()
-    )?;
-    writeln!(
-        out,
-        "{}/{{report.json, summary.csv, samples.csv}}",
-        folder.path().display()
-    )?;
-    if interrupted {
+            .iter()
+            .filter(|c| c.status.is_failure())
+            .count();
+        let mut out = io::stdout().lock();
         writeln!(
             out,
-            "interrupted: finished cells are kept; --resume goes on"
+            "\n{} in {:.1} s, {failed} wrong; {}",
+            text::counted(report.cells.len(), "cell"),
+            self.started.elapsed().as_secs_f64(),
+            text::conclusion(report)
         )?;
+        for warning in &report.noise.warnings {
+            writeln!(out, "warning: {warning}")?;
+        }
+        writeln!(
+            out,
+            "{}/{{report.json, summary.csv, samples.csv, stream.jsonl}}",
+            text::plain(&self.folder.path().display().to_string())
+        )?;
+        if stopped {
+            writeln!(
+                out,
+                "interrupted: finished cells were saved; continue with --resume"
+            )?;
+        }
+        out.flush()
     }
-    out.flush()
+}
+
+fn progress(parts: u64) -> ProgressBar {
+    // Drawn on stderr, and only if that is a terminal.
+    let style = ProgressStyle::with_template("{bar:24} {pos}/{len}  {elapsed}  {msg}");
+    let bar = ProgressBar::new(parts);
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar
 }

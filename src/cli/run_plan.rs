@@ -3,149 +3,206 @@
 
 use anyhow::bail;
 
-use super::args::RunArgs;
-use cullbench::culling::{Culling, CullingTest};
-use cullbench::index::{StructureSpec, structures};
-use cullbench::measure::Workload;
-use cullbench::path::{self, LensDefaults};
-use cullbench::scene::{self, LoadOptions};
-use cullbench::spec::SpecError;
-use cullbench::suite::{DEFAULT_PATH, SUITES, Suite};
+use super::args::{RunArgs, WhatArgs};
+use crate::culling::Culling;
+use crate::index::Registry;
+use crate::measure::{GroupKey, Plan, PlannedScene, Workload};
+use crate::path::{self, CameraPath, LensDefaults};
+use crate::report::{KeptPart, Stream};
+use crate::scene::{self, LoadOptions, Scene};
+use crate::spec::SpecError;
+use crate::suite::{DEFAULT_PATH, SUITES, Suite};
 
-/// What is to be done, checked as far as possible before anything runs.
-pub struct Plan {
+/// A plan with where it comes from.
+pub struct RunPlan {
+    pub plan: Plan,
     pub suite: &'static Suite,
     /// Whether scenes and paths are the suite's own.
     pub from_suite: bool,
-    pub scenes: Vec<PlannedScene>,
-    pub structures: Vec<StructureSpec>,
-    /// The culling tests with everything else as asked for.
-    pub cullings: Vec<Culling>,
-    pub lens: LensDefaults,
-    pub load: LoadOptions,
+    /// Of a shard: the groups of the whole plan.
+    pub whole: Vec<GroupKey>,
 }
 
-/// A scene with the ways through it.
-pub struct PlannedScene {
-    pub source: String,
-    pub paths: Vec<String>,
-    /// Whether caches are cold: the states to measure.
-    caches: &'static [bool],
+/// The plan that arguments stand for; scenes and paths are not looked at yet.
+pub fn plan(registry: &Registry, args: &RunArgs) -> anyhow::Result<RunPlan> {
+    let mut planned = plan_of(registry, &args.what, SUITES[0].name, "all")?;
+    if let Some(processes) = args.processes {
+        planned.plan.effort.processes = processes;
+    }
+    if let Some(text) = &args.shard {
+        let (i, n) = shard(text)?;
+        planned.whole = planned.plan.groups();
+        planned.plan = planned.plan.shard(i, n);
+    }
+    Ok(planned)
 }
 
-const WARM: &[bool] = &[false];
-const WARM_AND_COLD: &[bool] = &[false, true];
-
-impl Plan {
-    pub fn new(args: &RunArgs) -> anyhow::Result<Plan> {
-        let suite = Suite::named(&args.suite).ok_or_else(|| {
-            SpecError::unknown("suite", &args.suite, SUITES.iter().map(|s| s.name))
-        })?;
-        let tests = args.test.iter().flat_map(|t| t.split(','));
-        let mut cullings: Vec<Culling> = Vec::new();
-        for test in tests {
-            let culling = args.culling.culling(test)?;
-            culling.check()?;
-            if cullings.contains(&culling) {
-                bail!("test '{test}' is named twice");
-            }
-            cullings.push(culling);
+/// The same of what `run` and `compare --against` have in common, with the suite
+/// and the structures that are meant where none are named.
+pub fn plan_of(
+    registry: &Registry,
+    args: &WhatArgs,
+    default_suite: &str,
+    default_structures: &str,
+) -> anyhow::Result<RunPlan> {
+    let name = args.suite.as_deref().unwrap_or(default_suite);
+    let suite = Suite::named(name)
+        .ok_or_else(|| SpecError::unknown("suite", name, SUITES.iter().map(|s| s.name)))?;
+    let structures = match args.structure.is_empty() {
+        true => default_structures.to_owned(),
+        false => args.structure.join(","),
+    };
+    let mut cullings: Vec<Culling> = Vec::new();
+    for test in args.test.iter().flat_map(|t| t.split(',')) {
+        let culling = args.culling.culling(test)?;
+        culling.check()?;
+        if cullings.contains(&culling) {
+            bail!("test '{test}' is named twice");
         }
-        let plan = Plan {
-            suite,
-            from_suite: args.scene.is_empty() && args.path.is_empty(),
-            scenes: scenes(args, suite),
-            structures: structures(&args.structure.join(","))?,
-            cullings,
-            lens: args.lens.defaults()?,
-            load: LoadOptions {
-                skip_bad_items: args.scene_args.skip_bad_items,
-            },
-        };
-        plan.check_names()?;
-        // A suite as it comes is known to be sound.
-        let as_it_comes = plan.lens == LensDefaults::default()
-            && plan.cullings.iter().all(|c| {
+        cullings.push(culling);
+    }
+    let structures = args.kernel.structures(registry, &structures)?;
+    let plan = Plan {
+        scenes: scenes(args, suite),
+        cullings,
+        lens: args.lens.defaults()?,
+        load: LoadOptions {
+            skip_bad_items: args.scene_args.skip_bad_items,
+            structures: structures.len() as u64,
+        },
+        structures,
+        effort: suite.effort,
+        bounds: !args.no_bounds,
+        seed: args.seed,
+    };
+    check_names(&plan)?;
+    Ok(RunPlan {
+        plan,
+        suite,
+        from_suite: args.scene.is_empty() && args.path.is_empty(),
+        whole: Vec::new(),
+    })
+}
+
+/// "2/4": the second of four shares.
+fn shard(text: &str) -> Result<(usize, usize), SpecError> {
+    let numbers = text.split_once('/');
+    let numbers = numbers.and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
+    match numbers {
+        Some((i, n)) if 1 <= i && i <= n => Ok((i, n)),
+        _ => Err(SpecError::new(format_args!(
+            "--shard is '{text}'; expected i/n with i from 1 to n, such as 2/4"
+        ))),
+    }
+}
+
+/// A cell is found by its names: each may come once.
+fn check_names(plan: &Plan) -> anyhow::Result<()> {
+    for (i, PlannedScene { source, paths, .. }) in plan.scenes.iter().enumerate() {
+        if plan.scenes[..i].iter().any(|other| other.source == *source) {
+            bail!("scene '{source}' is named twice");
+        }
+        for (k, path) in paths.iter().enumerate() {
+            if paths[..k].contains(path) {
+                bail!("path '{path}' is named twice");
+            }
+        }
+    }
+    Ok(())
+}
+
+impl RunPlan {
+    /// Reads every input: a mistake in the last file should not show after an
+    /// hour. A suite as it comes is known to be sound.
+    pub fn check_inputs(&self) -> anyhow::Result<()> {
+        for scene in &self.plan.scenes {
+            scene::check_fits(&scene.source, &self.plan.load)?;
+        }
+        self.check_scenes(&|_, _| Ok(()))
+    }
+
+    /// Whether the plan of a run that was begun is still the same, and asks the
+    /// same: files may have changed since.
+    pub fn check_goes_on(&self, begun: &Stream) -> anyhow::Result<()> {
+        let structures = self.plan.structures.iter().map(|s| &s.label);
+        if self.plan.groups() != begun.header.groups || !structures.eq(&begun.header.structures) {
+            bail!("holds the run of another plan; expected the recorded one: begin a new run");
+        }
+        self.check_scenes(&|scene, asked| {
+            let of_scene = |kept: &&KeptPart| kept.part.key.scene == scene.name;
+            let mut parts = begun.parts.iter().filter(of_scene).map(|kept| &kept.part);
+            match asked {
+                None => {
+                    let known = parts.find(|part| !part.scene.digest.is_empty());
+                    let before = known.map(|part| part.scene.digest.clone());
+                    same_digest("scene", &scene.name, before, || scene.digest())
+                }
+                Some((name, path)) => {
+                    let mut known = parts.filter(|part| part.key.path == name);
+                    let before = known.find_map(|part| part.path.digest.clone());
+                    same_digest("path", name, before, || path::digest(&path.cameras))
+                }
+            }
+        })
+    }
+
+    /// Loads every scene and then every path of it, with a look at each.
+    fn check_scenes(&self, look: Look) -> anyhow::Result<()> {
+        let as_it_comes = self.plan.lens == LensDefaults::default()
+            && self.plan.cullings.iter().all(|c| {
                 let test = c.test;
                 *c == Culling {
                     test,
                     ..Culling::default()
                 }
             });
-        if !(plan.from_suite && as_it_comes) {
-            plan.check_inputs()?;
+        if self.from_suite && as_it_comes {
+            return Ok(());
         }
-        Ok(plan)
-    }
-
-    /// A cell is found by its names: each may come once.
-    fn check_names(&self) -> anyhow::Result<()> {
-        for (i, PlannedScene { source, paths, .. }) in self.scenes.iter().enumerate() {
-            if self.scenes[..i].iter().any(|other| other.source == *source) {
-                bail!("scene '{source}' is named twice");
-            }
-            for (k, path) in paths.iter().enumerate() {
-                if paths[..k].contains(path) {
-                    bail!("path '{path}' is named twice");
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// A mistake in the last file should not show after an hour.
-    fn check_inputs(&self) -> anyhow::Result<()> {
-        for PlannedScene { source, paths, .. } in &self.scenes {
-            let scene = scene::load(source, &self.load)?;
+        for PlannedScene { source, paths, .. } in &self.plan.scenes {
+            let scene = scene::load(source, &self.plan.load)?;
+            look(&scene, None)?;
             for source in paths {
-                let path = path::load(source, &scene, &self.lens)?;
-                for culling in &self.cullings {
+                let path = path::load(source, &scene, &self.plan.lens)?;
+                look(&scene, Some((source, &path)))?;
+                for culling in &self.plan.cullings {
                     Workload::new(&scene, &path, culling)?;
                 }
             }
         }
         Ok(())
     }
+}
 
-    /// Everything that is asked on a scene: tests over boxes
-    /// before those over spheres, so that structures are built twice at most.
-    pub fn questions(&self, scene: &PlannedScene) -> Vec<Question> {
-        let mut questions = Vec::new();
-        let of_spheres = |c: &&Culling| c.test == CullingTest::Sphere;
-        let (spheres, boxes): (Vec<&Culling>, Vec<&Culling>) =
-            self.cullings.iter().partition(of_spheres);
-        for cullings in [boxes, spheres] {
-            for path in &scene.paths {
-                for &cold in scene.caches {
-                    let tests = cullings.iter().map(|c| c.test.name().to_owned());
-                    questions.extend(tests.map(|test| (path.clone(), cold, test)));
-                }
-            }
-        }
-        questions
-    }
+/// Told of a scene, and then of each of its paths with its name.
+type Look<'l> = &'l dyn Fn(&Scene, Option<(&str, &CameraPath)>) -> anyhow::Result<()>;
 
-    pub fn culling(&self, test: &str) -> Culling {
-        let named = self.cullings.iter().find(|c| c.test.name() == test);
-        named.copied().unwrap_or_default()
-    }
-
-    /// How many questions there are on all scenes.
-    pub fn groups(&self) -> u64 {
-        let of_scene = |scene: &PlannedScene| scene.paths.len() * scene.caches.len();
-        let ways: usize = self.scenes.iter().map(of_scene).sum();
-        (ways * self.cullings.len()) as u64
+fn same_digest(
+    what: &str,
+    name: &str,
+    before: Option<String>,
+    now: impl Fn() -> String,
+) -> anyhow::Result<()> {
+    let short = |digest: &str| digest.chars().take(12).collect::<String>();
+    match before.map(|before| (before, now())) {
+        Some((before, now)) if before != now => bail!(
+            "{what} '{name}' has changed since the run was begun: its digest was {} and is {}; \
+             expected the same: begin a new run",
+            short(&before),
+            short(&now)
+        ),
+        _ => Ok(()),
     }
 }
 
-fn scenes(args: &RunArgs, suite: &Suite) -> Vec<PlannedScene> {
+fn scenes(args: &WhatArgs, suite: &Suite) -> Vec<PlannedScene> {
     let scene = |source: &str, paths: &[&str], cold: bool| PlannedScene {
         source: source.to_owned(),
         paths: match args.path.is_empty() {
             true => paths.iter().map(|&p| p.to_owned()).collect(),
             false => args.path.clone(),
         },
-        caches: if cold { WARM_AND_COLD } else { WARM },
+        caches: if cold { vec![false, true] } else { vec![false] },
     };
     if args.scene.is_empty() {
         let rows = suite.plan.iter();
@@ -158,6 +215,3 @@ fn scenes(args: &RunArgs, suite: &Suite) -> Vec<PlannedScene> {
         .map(|source| scene(source, &[DEFAULT_PATH], args.cold))
         .collect()
 }
-
-/// A path, whether caches are cold, and the culling test.
-pub type Question = (String, bool, String);

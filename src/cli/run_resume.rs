@@ -1,76 +1,245 @@
-//! Where a run is kept: a new folder, or an unfinished one to go on with, if it
-//! holds the very experiment that is asked for now.
+//! Where a run is kept: a new folder, or an unfinished one to continue, with the
+//! options and the plan it was begun with, on the same machine by the same program.
 
-use std::collections::BTreeSet;
+use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context, bail};
+use clap::parser::ValueSource;
+use clap::{ArgMatches, CommandFactory, Parser};
 
-use super::args::RunArgs;
-use super::run_plan::{Plan, Question};
-use cullbench::culling::Culling;
-use cullbench::kernel::Kernel;
-use cullbench::measure::{Machine, Source, Status, Toolchain, harness_overhead_ns};
-use cullbench::path;
-use cullbench::report::{Noise, Report, ReportCell, RunFolder, RunInfo, SCHEMA_VERSION};
-use cullbench::scene::{self, GENERATOR_NAME};
+use super::args::{Cli, Command, RunArgs};
+use super::run_plan::RunPlan;
+use super::{tell, text};
+use crate::measure::{Machine, Source, Toolchain};
+use crate::report::{
+    Difference, Header, RunFolder, RunInfo, SCHEMA_VERSION, StoppedRun, Stream, dated, read_report,
+    read_stream, utc,
+};
+use crate::scene::{self, GENERATOR_NAME};
 
-/// A new folder with an empty report, or the one to go on with.
-pub fn open(args: &RunArgs, plan: &Plan, machine: &Machine) -> anyhow::Result<(RunFolder, Report)> {
-    if args.resume {
-        let path = match &args.out {
-            Some(path) => path.clone(),
-            None => newest_unfinished(Path::new("results"))?,
-        };
-        let (folder, report) = RunFolder::resume(&path)?;
-        same_experiment(&report, plan, args)
-            .and_then(|()| same_inputs(&report, plan))
-            .with_context(|| path.display().to_string())?;
-        return Ok((folder, report));
+/// Makes the folder of a new run.
+pub fn create(
+    args: &RunArgs,
+    plan: &RunPlan,
+    machine: &Machine,
+) -> anyhow::Result<(RunFolder, Stream)> {
+    let clock = SystemTime::now();
+    let now = utc(clock);
+    if clock != dated(clock) {
+        tell(&format!(
+            "note: the system's clock is out of range; the run is dated {now}; expected a year \
+             from 1970 to 9999"
+        ));
     }
-    let now = utc_now();
-    let nanos = SystemTime::now().duration_since(UNIX_EPOCH)?.subsec_nanos();
+    let nanos = nanos(clock);
     let id = format!("{:04x}", (nanos ^ std::process::id()) & 0xFFFF);
     let stamp: String = now.chars().filter(|c| !matches!(c, '-' | ':')).collect();
     let path = match &args.out {
         Some(path) => path.clone(),
         None => PathBuf::from(format!("results/{stamp}-{}-{id}", machine.slug())),
     };
-    let report = Report {
+    let typed = typed_args()?;
+    let header = Header {
         schema_version: SCHEMA_VERSION,
         run: RunInfo {
             id: format!("{stamp}-{id}"),
             started_at: now,
             finished_at: None,
-            command: std::env::args_os()
-                .skip(1)
-                .fold("cullbench".to_owned(), |all, arg| {
-                    all + " " + &arg.to_string_lossy()
-                }),
-            seed: args.seed,
+            command: ["cullbench".to_owned()]
+                .into_iter()
+                .chain(typed.iter().cloned())
+                .collect::<Vec<_>>()
+                .join(" "),
+            seed: args.what.seed,
             suite: plan.from_suite.then(|| plan.suite.name.to_owned()),
             generator: GENERATOR_NAME.to_owned(),
+            processes: plan.plan.effort.processes,
+            shard: args.shard.clone(),
         },
+        args: typed,
         machine: machine.clone(),
         toolchain: Toolchain::capture(),
         source: Source::capture(),
-        noise: Noise {
-            harness_overhead_ns: harness_overhead_ns(),
-            ..Noise::default()
-        },
-        cells: Vec::new(),
-        bounds: Vec::new(),
+        groups: plan.plan.groups(),
+        whole: plan.whole.clone(),
+        structures: plan
+            .plan
+            .structures
+            .iter()
+            .map(|s| s.label.clone())
+            .collect(),
+        binary: binary_digest(),
     };
-    let folder = RunFolder::create(&path)?;
-    folder.save(&report)?;
-    Ok((folder, report))
+    let folder = RunFolder::create(&path, &header)?;
+    let stream = Stream {
+        header,
+        parts: Vec::new(),
+        finished_at: None,
+    };
+    Ok((folder, stream))
+}
+
+/// The arguments behind the program's name, to be read again by a worker.
+pub fn typed_args() -> anyhow::Result<Vec<String>> {
+    let typed = std::env::args_os().skip(1).map(OsString::into_string);
+    typed
+        .collect::<Result<_, _>>()
+        .map_err(|bad| anyhow::anyhow!("argument {bad:?} is no UTF-8; expected text"))
+}
+
+/// SHA-256 of the program that runs; `None` if it cannot be read.
+fn binary_digest() -> Option<String> {
+    let bytes = fs::read(std::env::current_exe().ok()?).ok()?;
+    Some(scene::hex(&hmac_sha256::Hash::hash(&bytes)))
+}
+
+/// Opens the run to continue; the options it was begun with. Nothing is written.
+pub fn resume(args: &RunArgs) -> anyhow::Result<(StoppedRun, Stream, RunArgs)> {
+    let path = match &args.out {
+        Some(path) => path.clone(),
+        None => newest_unfinished(Path::new("results"))?,
+    };
+    let (folder, stream) = StoppedRun::open(&path)?;
+    let begun = same_options(&stream.header.args).with_context(|| path.display().to_string())?;
+    same_place(&stream.header, &begun).with_context(|| path.display().to_string())?;
+    Ok((folder, stream, begun))
+}
+
+/// Goes on with a run that may.
+pub fn go_on(stopped: StoppedRun, stream: &Stream) -> anyhow::Result<RunFolder> {
+    if stopped.lost() > 0 {
+        tell(&format!(
+            "note: {}: samples.csv was cut short; {} measured again",
+            stopped.path().display(),
+            text::counted(stopped.lost(), "part")
+        ));
+    }
+    Ok(stopped.go_on(stream)?)
+}
+
+/// Options that say how to continue, and not what is measured.
+const NOT_OF_THE_PLAN: [&str; 3] = ["resume", "out", "timeout"];
+
+/// The recorded options, if those typed now say nothing else.
+fn same_options(recorded: &[String]) -> anyhow::Result<RunArgs> {
+    let before = RunOptions::recorded(recorded)?;
+    let now = RunOptions::of(std::env::args_os())?;
+    for (id, name) in RunOptions::all() {
+        let typed = now.0.value_source(&id) == Some(ValueSource::CommandLine);
+        if !typed || NOT_OF_THE_PLAN.contains(&id.as_str()) || before.values(&id) == now.values(&id)
+        {
+            continue;
+        }
+        bail!(
+            "--{name} is '{}', and the run was begun {}; expected the same or none: \
+             --resume continues with the recorded options",
+            now.values(&id).join(" "),
+            before.told(&id)
+        );
+    }
+    match Cli::try_parse_from(program().chain(recorded.to_vec()))?.command {
+        Command::Run(args) => Ok(args),
+        _ => bail!("no run was recorded there; expected the folder of a run"),
+    }
+}
+
+/// Whether two runs were begun with the same options, but for those that say
+/// where to and which share.
+pub fn same_recorded(one: &[String], other: &[String]) -> anyhow::Result<()> {
+    let (one, other) = (RunOptions::recorded(one)?, RunOptions::recorded(other)?);
+    for (id, name) in RunOptions::all() {
+        let of_all = id != "shard" && !NOT_OF_THE_PLAN.contains(&id.as_str());
+        if of_all && one.values(&id) != other.values(&id) {
+            bail!(
+                "was begun {} for --{name}, and the first shard {}; expected the same options",
+                other.told(&id),
+                one.told(&id)
+            );
+        }
+    }
+    Ok(())
+}
+
+fn program() -> std::iter::Once<String> {
+    std::iter::once("cullbench".to_owned())
+}
+
+/// The options of a `run`, as they were typed.
+struct RunOptions(ArgMatches);
+
+impl RunOptions {
+    fn recorded(args: &[String]) -> anyhow::Result<RunOptions> {
+        RunOptions::of(program().chain(args.to_vec()))
+    }
+
+    fn of(
+        line: impl IntoIterator<Item = impl Into<OsString> + Clone>,
+    ) -> anyhow::Result<RunOptions> {
+        let matches = Cli::command().try_get_matches_from(line)?;
+        let run = matches.subcommand_matches("run").cloned();
+        let run = run.context("no run was recorded there; expected the folder of a run")?;
+        Ok(RunOptions(run))
+    }
+
+    /// Every option, with the name that is typed.
+    fn all() -> Vec<(String, String)> {
+        let command = Cli::command();
+        let arguments = command
+            .find_subcommand("run")
+            .map(clap::Command::get_arguments);
+        let named = arguments.into_iter().flatten().map(|arg| {
+            let id = arg.get_id().as_str();
+            (id.to_owned(), arg.get_long().unwrap_or(id).to_owned())
+        });
+        named.collect()
+    }
+
+    fn values(&self, id: &str) -> Vec<String> {
+        let raw = self.0.try_get_raw(id).ok().flatten().into_iter().flatten();
+        raw.map(|value| value.to_string_lossy().into_owned())
+            .collect()
+    }
+
+    fn told(&self, id: &str) -> String {
+        match self.values(id).join(" ") {
+            none if none.is_empty() => "without it".to_owned(),
+            value => format!("with '{value}'"),
+        }
+    }
+}
+
+/// Times of another machine or program do not belong into one report.
+fn same_place(header: &Header, begun: &RunArgs) -> anyhow::Result<()> {
+    let here = Header {
+        schema_version: SCHEMA_VERSION,
+        machine: Machine::capture().by(begun.what.kernel.execution()?.kernel),
+        toolchain: Toolchain::capture(),
+        source: Source::capture(),
+        binary: binary_digest(),
+        ..header.clone()
+    };
+    match header.differs_in_place(&here) {
+        Some(Difference { what, before, here }) => {
+            bail!("the {what} was '{before}' and is '{here}'; expected the same: begin a new run")
+        }
+        None => Ok(()),
+    }
 }
 
 /// RFC 3339 in UTC, to the second.
 pub fn utc_now() -> String {
-    humantime::format_rfc3339_seconds(SystemTime::now()).to_string()
+    utc(SystemTime::now())
+}
+
+/// What tells two runs of the same second apart.
+fn nanos(clock: SystemTime) -> u32 {
+    let since = clock.duration_since(UNIX_EPOCH);
+    since
+        .unwrap_or_else(|before| before.duration())
+        .subsec_nanos()
 }
 
 fn newest_unfinished(results: &Path) -> anyhow::Result<PathBuf> {
@@ -79,11 +248,14 @@ fn newest_unfinished(results: &Path) -> anyhow::Result<PathBuf> {
         .filter_map(|entry| Some(entry.ok()?.path()))
         .collect();
     folders.sort();
-    let unfinished = folders
-        .into_iter()
-        .rev()
-        .find(|path| RunFolder::read(path).is_ok_and(|report| report.run.finished_at.is_none()));
-    unfinished.with_context(|| {
+    // Killed at the very end, a run lacks nothing but its report.
+    let unfinished = |path: &PathBuf| {
+        let is_run = read_stream(&path.join("stream.jsonl")).is_ok();
+        let report = read_report(&path.join("report.json"));
+        is_run && report.map_or(true, |report| report.run.finished_at.is_none())
+    };
+    let found = folders.into_iter().rev().find(unfinished);
+    found.with_context(|| {
         format!(
             "no unfinished run in {}; expected one to resume",
             results.display()
@@ -91,102 +263,30 @@ fn newest_unfinished(results: &Path) -> anyhow::Result<PathBuf> {
     })
 }
 
-/// Cells of two different experiments do not belong into one report.
-fn same_experiment(report: &Report, plan: &Plan, args: &RunArgs) -> anyhow::Result<()> {
-    let labels = |all: BTreeSet<&str>| all.into_iter().collect::<Vec<_>>().join(", ");
-    let wanted: BTreeSet<&str> = plan.structures.iter().map(|s| s.label.as_str()).collect();
-    for cell in &report.cells {
-        let found: BTreeSet<&str> = report
-            .cells
-            .iter()
-            .filter(|c| c.scene.name == cell.scene.name && c.path.name == cell.path.name)
-            .map(|c| c.structure.as_str())
-            .collect();
-        if found != wanted {
-            bail!(
-                "holds cells of {}; expected {} as asked for now",
-                labels(found),
-                labels(wanted)
-            );
-        }
-        let same = |c: &Culling| {
-            cell.path.planes == c.planes.method.name()
-                && cell.path.epsilon == c.planes.epsilon
-                && cell.path.arithmetic == c.arithmetic.name()
-        };
-        if !plan.cullings.iter().any(same) {
-            bail!(
-                "holds cells with other planes, epsilon or arithmetic; expected those asked for now"
-            );
-        }
-    }
-    let answered = report.cells.iter().any(|c| c.status == Status::Ok);
-    match (report.bounds.is_empty(), args.no_bounds) {
-        (false, true) => bail!("holds bounds; expected them to be asked for now as well"),
-        (true, false) if answered => bail!("was begun with --no-bounds; expected the same now"),
-        _ => {}
-    }
-    if report.run.seed != args.seed {
-        bail!(
-            "was begun with --seed {}; expected the same now",
-            report.run.seed
-        );
-    }
-    let kernel = Kernel::chosen().name();
-    if report.machine.instruction_set != kernel {
-        bail!(
-            "was begun with --kernel {}; expected the same now, not {kernel}",
-            report.machine.instruction_set
-        );
-    }
-    let now = Toolchain::capture();
-    if report.toolchain != now || report.source.commit != Source::capture().commit {
-        bail!("was begun by another build of cullbench; expected the same one");
-    }
-    Ok(())
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Duration;
 
-/// A file may have changed since its first cells were measured, and the lens
-/// of cameras that bring none: what the report has of the scenes and paths that
-/// are asked for now must be of the very same items and cameras.
-fn same_inputs(report: &Report, plan: &Plan) -> anyhow::Result<()> {
-    for planned in &plan.scenes {
-        let of_scene = |c: &&ReportCell| c.scene.name == planned.source;
-        let Some(before) = report.cells.iter().find(of_scene) else {
-            continue;
+    #[test]
+    fn any_clock_dates_a_run() {
+        let at = |seconds: i64| match u64::try_from(seconds) {
+            Ok(after) => UNIX_EPOCH + Duration::from_secs(after),
+            Err(_) => UNIX_EPOCH - Duration::from_secs(seconds.unsigned_abs()),
         };
-        let scene = scene::load(&planned.source, &plan.load)?;
-        let (was, is) = (&before.scene.digest, scene.digest());
-        if *was != is {
-            bail!(
-                "scene '{}' has changed: its digest is {is}; expected {was} as in the cells \
-                 measured before",
-                planned.source
-            );
+        for (seconds, wanted) in [
+            (-1, "1970-01-01T00:00:00Z"),
+            (-99_999_999_999, "1970-01-01T00:00:00Z"),
+            (0, "1970-01-01T00:00:00Z"),
+            (1_700_000_000, "2023-11-14T22:13:20Z"),
+            (253_402_300_799, "9999-12-31T23:59:59Z"),
+            (253_402_300_800, "9999-12-31T23:59:59Z"),
+            (9_000_000_000_000, "9999-12-31T23:59:59Z"),
+        ] {
+            assert_eq!(utc(at(seconds)), wanted, "{seconds}");
         }
-        for source in &planned.paths {
-            let cells = report.cells.iter().filter(of_scene);
-            let mut of_path = cells.filter(|c| c.path.name == *source);
-            // Older reports do not tell.
-            let Some(was) = of_path.find_map(|c| c.path.digest.as_ref()) else {
-                continue;
-            };
-            let is = path::digest(&path::load(source, &scene, &plan.lens)?.cameras);
-            if *was != is {
-                bail!(
-                    "path '{source}' has other cameras: their digest is {is}; expected {was} as \
-                     in the cells measured before"
-                );
-            }
-        }
+        let half = Duration::from_millis(500);
+        assert_eq!(nanos(UNIX_EPOCH - half), 500_000_000);
+        assert_eq!(nanos(UNIX_EPOCH + half), 500_000_000);
     }
-    Ok(())
-}
-
-/// What the report has already of a scene.
-pub fn finished(report: &Report, scene: &str) -> BTreeSet<Question> {
-    let cells = report.cells.iter().filter(|c| c.scene.name == scene);
-    cells
-        .map(|c| (c.path.name.clone(), c.path.cache == "cold", c.test.clone()))
-        .collect()
 }

@@ -3,10 +3,8 @@
 
 use std::io::{self, Write};
 
-use comfy_table::Table;
-
 use super::text;
-use cullbench::report::{Comparison, Ranked, Report, ReportCell, comparisons};
+use crate::report::{Comparison, Ranked, Report, ReportCell, comparisons};
 
 /// One block of rows for each path, cache state and culling test.
 pub fn show_scene(report: &Report, scene: &str) -> io::Result<()> {
@@ -18,15 +16,15 @@ pub fn show_scene(report: &Report, scene: &str) -> io::Result<()> {
     let mut table = text::table(
         &[
             "path / structure",
-            "cull rate",
-            "excess",
-            "query median",
+            "culled",
+            "false positives",
+            "query [95 %]",
             "p95",
-            "times linear [95 % interval]",
-            "/ read",
-            "/ copy",
+            "speed-up vs linear [95 %]",
+            "of lower bound: read",
+            "copy",
             "build",
-            "B/item",
+            "bytes per item",
             "locate",
             "status",
         ],
@@ -35,17 +33,25 @@ pub fn show_scene(report: &Report, scene: &str) -> io::Result<()> {
     for comparison in &all {
         add_path(&mut table, comparison);
     }
-    let mut out = io::stdout().lock();
+    let mut out = text::terminal();
     writeln!(
         out,
-        "\n{scene}: {} items, {} regions{}",
-        text::count(first.scene.total_count),
-        text::count(first.scene.region_count),
+        "\n{}: {}, {}{}{}",
+        text::plain(scene),
+        text::counted(first.scene.total_count, "item"),
+        text::counted(first.scene.region_count, "region"),
         match first.scene.skipped_items {
             0 => String::new(),
-            bad => format!(", {} bad items left out", text::count(bad)),
+            bad => format!(", {} left out", text::counted(bad, "bad item")),
+        },
+        match first.scene.total_count {
+            0 => "; nothing is ranked",
+            _ => "",
         }
     )?;
+    for line in heads(&all) {
+        writeln!(out, "{}", text::plain(&line))?;
+    }
     writeln!(out, "{table}")?;
     let shown = all.iter().flat_map(|c| {
         let cells = c.ranked.iter().map(|r| r.cell);
@@ -55,27 +61,49 @@ pub fn show_scene(report: &Report, scene: &str) -> io::Result<()> {
         let reason = cell.reason.as_deref().unwrap_or_default();
         writeln!(
             out,
-            "{} on {}: {}: {reason}",
-            cell.structure,
-            cell.path.name,
-            cell.status.name()
+            "{}",
+            text::plain(&format!(
+                "{} on {}: {}: {reason}",
+                cell.structure,
+                cell.path.name,
+                cell.status.name()
+            ))
         )?;
     }
     out.flush()
 }
 
-/// The rows of one path, fastest first; what failed comes last, unranked, and
-/// then the bounds.
-fn add_path(table: &mut Table, comparison: &Comparison) {
+/// What the times rest on: one line where it is the same for all paths.
+fn heads(all: &[Comparison]) -> Vec<String> {
+    let lines: Vec<String> = all.iter().map(text::basis).collect();
+    if lines.windows(2).all(|two| two[0] == two[1]) {
+        return lines.into_iter().take(1).collect();
+    }
+    let named = all.iter().zip(lines);
+    named
+        .map(|(one, line)| format!("{}: {line}", path(one)))
+        .collect()
+}
+
+fn path(comparison: &Comparison) -> String {
     let about = comparison.about();
-    let head = match about.path.cache.as_str() {
+    match about.path.cache.as_str() {
         "warm" => format!("{}, {}", about.path.name, about.test),
         cache => format!("{}, {} ({cache})", about.path.name, about.test),
-    };
+    }
+}
+
+/// The rows of one path, fastest first; what failed comes last, unranked, and
+/// then the lower bounds.
+fn add_path(table: &mut text::Table, comparison: &Comparison) {
     let culled = comparison.of_any("cull_rate").map(text::percent);
     let excess = comparison.of_any("excess");
     let excess = excess.map(|share| format!("{:.3} %", share * 100.0));
-    table.add_row([head, culled.unwrap_or_default(), excess.unwrap_or_default()]);
+    table.add_row([
+        path(comparison),
+        culled.unwrap_or_default(),
+        excess.unwrap_or_default(),
+    ]);
     for Ranked { rank, cell } in &comparison.ranked {
         let rank = rank.map_or("-".to_owned(), |rank| rank.to_string());
         table.add_row(row(&format!("{rank} {}", cell.structure), cell));
@@ -92,9 +120,9 @@ fn row(name: &str, cell: &ReportCell) -> [String; 12] {
         format!("  {name}"),
         String::new(),
         String::new(),
-        value("query_ns", text::time),
+        text::time_estimate(cell.metrics.get("query_ns")),
         value("query_ns_p95", text::time),
-        text::estimate(cell.metrics.get("ratio_to_linear")),
+        text::estimate(cell.metrics.get("speedup")),
         value("times_read", text::significant),
         value("times_memcpy", text::significant),
         value("build_ms", |ms| text::time(ms * 1e6)),

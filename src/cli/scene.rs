@@ -9,11 +9,11 @@ use serde_json::json;
 use super::args::TableFormat;
 use super::scene_args::{SceneConvertArgs, SceneFormat, SceneGenerateArgs, SceneInfoArgs};
 use super::{Ending, interrupt, load_scene, tell, text};
-use cullbench::measure::SceneInfo;
-use cullbench::report::write_atomically;
-use cullbench::scene::{Regions, Scene, write_boxes_csv};
-use cullbench::spec::SpecError;
-use cullbench::statistics::{quantile, sorted};
+use crate::measure::SceneInfo;
+use crate::report::write_atomically;
+use crate::scene::{Regions, Scene, write_boxes_csv};
+use crate::spec::SpecError;
+use crate::statistics::{quantile, sorted};
 
 pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
     let scene = load_scene(&args.scene, &args.scene_args)?;
@@ -81,7 +81,7 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
         let mut shown: Vec<String> = counts
             .iter()
             .take(8)
-            .map(|(label, count)| format!("{} {}", text::plain(label), text::count(*count)))
+            .map(|(label, count)| format!("{label} {}", text::count(*count)))
             .collect();
         if counts.len() > shown.len() {
             shown.push(format!(
@@ -89,10 +89,7 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
                 text::count(counts.len() - shown.len())
             ));
         }
-        table.add_row([
-            format!("label {}", text::plain(&labels.column)),
-            shown.join(", "),
-        ]);
+        table.add_row([format!("label {}", labels.column), shown.join(", ")]);
     }
     table.add_row(["digest (SHA-256)", &info.digest]);
     writeln!(out, "{table}")?;
@@ -154,11 +151,11 @@ fn left_behind(scene: &Scene) -> Vec<String> {
     let mut lost = Vec::new();
     if !matches!(scene.regions, Regions::Items) {
         let count = scene.regions.boxes(&scene.items).len();
-        lost.push(format!("{} regions", text::count(count)));
+        lost.push(text::counted(count, "region"));
     }
     if !scene.places.is_empty() {
         let count = scene.places.len();
-        lost.push(format!("{} camera places", text::count(count)));
+        lost.push(text::counted(count, "camera place"));
     }
     if scene.own_tree.is_some() {
         lost.push("the map's own tree".to_owned());
@@ -177,9 +174,9 @@ fn write(scene: Scene, out: Option<&Path>) -> anyhow::Result<Ending> {
             }
             written?;
             tell(&format!(
-                "{}: {} items",
+                "{}: {}",
                 path.display(),
-                text::count(scene.items.len())
+                text::counted(scene.items.len(), "item")
             ));
         }
         None => {

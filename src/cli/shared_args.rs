@@ -2,13 +2,14 @@
 //! how a view is made and tested, how queries are computed. Values are checked
 //! where they are used.
 
+use crate::camera::{DEFAULT_EPSILON, PLANE_METHODS, PlaneMethod, PlaneOptions};
+use crate::culling::{ARITHMETICS, Arithmetic, Culling, CullingTest, TESTS};
+use crate::index::{Execution, Registry, StructureSpec};
+use crate::kernel::Kernel;
+use crate::path::LensDefaults;
+use crate::spec::SpecError;
+use crate::threads::MOST_THREADS;
 use clap::Args;
-use cullbench::camera::{DEFAULT_EPSILON, PLANE_METHODS, PlaneMethod, PlaneOptions};
-use cullbench::culling::{ARITHMETICS, Arithmetic, Culling, CullingTest, TESTS};
-use cullbench::kernel::Kernel;
-use cullbench::path::LensDefaults;
-use cullbench::spec::SpecError;
-use cullbench::threads::{self, MOST_THREADS};
 use glam::DVec3;
 
 #[derive(Args, Debug)]
@@ -35,28 +36,42 @@ pub struct KernelArgs {
 }
 
 impl KernelArgs {
-    /// Makes the choice for the whole process.
-    pub fn choose(&self) -> Result<(), SpecError> {
-        match self.threads.parse() {
-            Ok(count @ 1..=MOST_THREADS) => threads::choose(count),
+    /// The structures of a list, to be built and asked in this way.
+    pub fn structures(
+        &self,
+        registry: &Registry,
+        list: &str,
+    ) -> Result<Vec<StructureSpec>, SpecError> {
+        let execution = self.execution()?;
+        let specs = registry.structures(list)?.into_iter();
+        Ok(specs.map(|spec| spec.by(execution)).collect())
+    }
+
+    pub fn execution(&self) -> Result<Execution, SpecError> {
+        let threads = match self.threads.parse() {
+            Ok(count @ 1..=MOST_THREADS) => count,
             _ => {
                 return Err(SpecError::new(format_args!(
                     "--threads is '{}'; expected a whole number from 1 to {MOST_THREADS}",
                     self.threads
                 )));
             }
-        }
+        };
         let Some(name) = self.name.as_deref() else {
-            return Ok(());
+            return Ok(Execution {
+                threads,
+                ..Execution::default()
+            });
         };
         let Some(kernel) = Kernel::named(name) else {
             let known = Kernel::ALL.iter().map(|kernel| kernel.name());
             return Err(SpecError::unknown("kernel", name, known));
         };
-        kernel.choose().map_err(|error| {
+        let kernel = kernel.checked().map_err(|error| {
             let here: Vec<_> = Kernel::available().map(Kernel::name).collect();
             SpecError::new(format_args!("{error}; here are: {}", here.join(", ")))
-        })
+        })?;
+        Ok(Execution { kernel, threads })
     }
 }
 

@@ -10,14 +10,13 @@ use indicatif::ProgressBar;
 
 use super::args::{StressArgs, TableFormat};
 use super::{Ending, interrupt, tell, text, unread_is_fine};
-use cullbench::index::{StructureSpec, structures};
-use cullbench::kernel::Kernel;
-use cullbench::stress::extremes::{DEFAULT_CASES, Extremes, Progress, Tally};
-use cullbench::stress::{Row, Section, Status, Vector, built_in, read_vectors_file, replay};
+use crate::index::{Execution, Registry, StructureSpec};
+use crate::kernel::Kernel;
+use crate::stress::extremes::{DEFAULT_CASES, Extremes, Progress, Tally};
+use crate::stress::{Row, Section, Status, Vector, built_in, read_vectors_file, replay};
 
-pub fn stress(args: &StressArgs) -> anyhow::Result<Ending> {
-    let structures = structures(&args.structure)?;
-    args.kernel.choose()?;
+pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> {
+    let structures = args.kernel.structures(registry, &args.structure)?;
     let mut vectors = Vec::new();
     for file in &args.vectors {
         vectors.extend(read_vectors_file(file)?);
@@ -42,7 +41,7 @@ pub fn stress(args: &StressArgs) -> anyhow::Result<Ending> {
         threads: std::thread::available_parallelism().map_or(1, |n| n.get().min(2)),
     };
     // By every other instruction set of this machine too, but less of it.
-    let chosen = Kernel::chosen();
+    let chosen = args.kernel.execution()?.kernel;
     let all_kernels = args.kernel.name.is_none();
     let others = || Kernel::available().filter(|&kernel| all_kernels && kernel != chosen);
     let mut sections = Vec::new();
@@ -55,15 +54,27 @@ pub fn stress(args: &StressArgs) -> anyhow::Result<Ending> {
         .map(|&(_, cases)| Extremes { cases, ..extremes }.total());
     let bar = ProgressBar::new(vector_passes + case_passes.sum::<u64>());
     for (kernel, cases) in passes {
-        kernel.choose()?;
+        let by_kernel = |spec: &StructureSpec| {
+            let execution = Execution {
+                kernel,
+                ..spec.execution
+            };
+            spec.clone().by(execution)
+        };
+        let structures: Vec<StructureSpec> = structures.iter().map(by_kernel).collect();
         let mut found = Vec::new();
         for vector in vectors.iter().take_while(|_| !interrupt::asked()) {
-            bar.set_message(vector.id.clone());
+            bar.set_message(text::plain(&vector.id));
             add_vector(&mut found, vector, &structures);
             bar.inc(1);
         }
         if cases > 0 && !interrupt::asked() {
-            found.extend(Extremes { cases, ..extremes }.run(&Shown(&bar)));
+            let extremes = Extremes {
+                structures: &structures,
+                cases,
+                ..extremes
+            };
+            found.extend(extremes.run(&Shown(&bar)));
         }
         if kernel != chosen {
             by_others += found
@@ -163,7 +174,7 @@ fn json(sections: &[Section]) -> io::Result<()> {
 }
 
 fn table(sections: &[Section], seconds: f64, note: &str) -> io::Result<()> {
-    let mut out = io::stdout().lock();
+    let mut out = text::terminal();
     let header = [
         "category", "cases", "boxes", "rows", "passed", "refused", "failed",
     ];
@@ -193,7 +204,8 @@ fn table(sections: &[Section], seconds: f64, note: &str) -> io::Result<()> {
         let level = row.level.name();
         writeln!(
             out,
-            "{id}, {level} level, {structure}, {test}:\n  expected {expected}\n  got {got}"
+            "{}, {level} level, {structure}, {test}:\n  expected {expected}\n  got {got}",
+            text::plain(id)
         )?;
     }
     let mut tally = Tally::default();
@@ -201,22 +213,24 @@ fn table(sections: &[Section], seconds: f64, note: &str) -> io::Result<()> {
     if tally.boxes > 0 {
         writeln!(
             out,
-            "{} boxes judged at camera level: {} visible, {} of them touching ({} too close to \
-             tell); {} false negatives and {} dropped touches; {} were lost without the epsilon",
-            text::count(tally.boxes as usize),
+            "{} judged at camera level: {} visible, {} of them touching ({} too close to \
+             tell); {} and {}; lost without the epsilon: {}; refused because sums could \
+             overflow: {}",
+            text::counted(tally.boxes as usize, "box"),
             text::count(tally.seen as usize),
             text::count(tally.ties as usize),
             text::count(tally.undecided as usize),
-            text::count(tally.false_negatives as usize),
-            text::count(tally.touch_dropped as usize),
+            text::counted(tally.false_negatives as usize, "false negative"),
+            text::counted(tally.touch_dropped as usize, "dropped touch"),
             text::count(tally.lost_bare as usize),
+            text::count(tally.refused as usize),
         )?;
     }
     let count = |status| rows().filter(|row| row.status == status).count();
     writeln!(
         out,
-        "{} checks in {seconds:.1} s: {} passed, {} refused as they must be, {} failed{note}",
-        text::count(rows().count()),
+        "{} in {seconds:.1} s: {} passed, {} refused as they must be, {} failed{note}",
+        text::counted(rows().count(), "check"),
         text::count(count(Status::Pass)),
         text::count(count(Status::Refused)),
         text::count(count(Status::Fail)),

@@ -5,9 +5,10 @@
 use anyhow::anyhow;
 use plotters::prelude::*;
 
+use super::log_axis::{around, is_drawn, left_out};
 use super::precision_diagram::COLOURS;
 use super::{surface_tables, text};
-use cullbench::report::Surface;
+use crate::report::{Place, Surface};
 
 const SIZE: (u32, u32) = (900, 560);
 
@@ -22,17 +23,29 @@ pub fn pictures(surfaces: &[Surface]) -> anyhow::Result<Vec<Picture>> {
     let mut pictures: Vec<Picture> = Vec::new();
     for surface in surfaces {
         for class in surface.classes() {
+            let mut beyond = 0;
             let curves: Vec<Curve> = surface
                 .structures()
                 .into_iter()
-                .map(|name| (name, surface.curve(name, class, "query_ns")))
+                .map(|name| {
+                    let mut points = surface.curve(name, class, "query_ns");
+                    let all = points.len();
+                    points.retain(|&(items, ns)| is_drawn(items as f64) && is_drawn(ns));
+                    beyond += all - points.len();
+                    (name, points)
+                })
                 .filter(|(_, points)| points.len() > 1)
                 .collect();
             if curves.is_empty() {
                 continue;
             }
             let shown = surface_tables::class(class);
-            let caption = format!("{}: {shown} visible", surface_tables::title(surface));
+            let caption = format!(
+                "{}: {shown} visible{}{}",
+                surface_tables::title(surface),
+                measured(surface, class),
+                left_out(beyond)
+            );
             let mut svg = String::new();
             draw(&mut svg, &caption, &curves)
                 .map_err(|error| anyhow!("{caption} cannot be drawn: {error}"))?;
@@ -47,6 +60,7 @@ pub fn pictures(surfaces: &[Surface]) -> anyhow::Result<Vec<Picture>> {
                 0 => name,
                 more => format!("{name}-{}", more + 1),
             };
+            let svg = text::lines(&svg);
             pictures.push(Picture { name, svg });
         }
     }
@@ -54,6 +68,22 @@ pub fn pictures(surfaces: &[Surface]) -> anyhow::Result<Vec<Picture>> {
 }
 
 type Curve<'s> = (&'s str, Vec<(usize, f64)>);
+
+/// The shares that a class stands for, where it does not say it by itself.
+fn measured(surface: &Surface, class: f64) -> String {
+    let here = || surface.places.iter().filter(|place| place.class == class);
+    if !here().any(Place::is_off_class) {
+        return String::new();
+    }
+    let shares = || here().map(|place| place.share);
+    let least = shares().fold(f64::INFINITY, f64::min);
+    let most = shares().fold(0.0, f64::max);
+    format!(
+        " (measured: {} to {})",
+        text::percent(least),
+        text::percent(most)
+    )
+}
 
 /// Letters, digits and points; a dash for anything else.
 fn slug(words: &str) -> String {
@@ -71,14 +101,8 @@ fn draw(
     curves: &[Curve],
 ) -> Result<(), Box<dyn std::error::Error>> {
     let points = || curves.iter().flat_map(|(_, points)| points.iter());
-    let range = |values: &mut dyn Iterator<Item = f64>| {
-        let (least, most) = values.fold((f64::MAX, 0.0f64), |(least, most), value| {
-            (least.min(value), most.max(value))
-        });
-        (least / 1.3..most * 1.3).log_scale()
-    };
-    let items = range(&mut points().map(|p| p.0 as f64));
-    let times = range(&mut points().map(|p| p.1));
+    let items = around(points().map(|p| p.0 as f64), 1.3, 1.3).log_scale();
+    let times = around(points().map(|p| p.1), 1.3, 1.3).log_scale();
     let root = SVGBackend::with_string(svg, SIZE).into_drawing_area();
     root.fill(&WHITE)?;
     let mut chart = ChartBuilder::on(&root)
@@ -91,7 +115,7 @@ fn draw(
         .configure_mesh()
         .light_line_style(WHITE.mix(0.0))
         .x_desc("items")
-        .y_desc("median time per query (thread CPU)")
+        .y_desc("mean time per query (thread CPU)")
         .x_label_formatter(&|n| text::count(n.round() as usize))
         .y_label_formatter(&|ns| text::time(*ns))
         .draw()?;

@@ -6,7 +6,7 @@ use std::io::{self, Write};
 
 use super::document::{Block, Rows};
 use super::text;
-use cullbench::report::{Crossing, Growth, Place, Report, Surface, comparisons, growths, surfaces};
+use crate::report::{Crossing, Growth, Place, Report, Surface, comparisons, growths, surfaces};
 
 /// A class of shares: "0.1 %", "100 %".
 pub fn class(share: f64) -> String {
@@ -21,7 +21,7 @@ pub fn title(surface: &Surface) -> String {
 }
 
 /// Rows are numbers of items, columns shares of them that are visible: who is
-/// fastest and how many times as fast as the linear scan.
+/// fastest, and its speed-up vs linear.
 fn winners(surface: &Surface) -> Rows {
     let classes = surface.classes();
     let header = ["items \\ visible".to_owned()].into_iter();
@@ -39,7 +39,7 @@ fn winners(surface: &Surface) -> Rows {
     rows
 }
 
-/// "wide = bvh 12.3x": ties share the place, the fastest comes first.
+/// "wide = bvh: 12.3 (at 34.70 %)": those of one rank share the place, the fastest comes first.
 fn winner(place: &Place) -> String {
     let names: Vec<&str> = place
         .comparison
@@ -48,10 +48,13 @@ fn winner(place: &Place) -> String {
         .collect();
     let mut told = names.join(" = ");
     let ratio = place.comparison.winners().next();
-    if let Some(ratio) = ratio.and_then(|c| c.value("ratio_to_linear"))
-        && !place.linear_wins()
+    if let Some(ratio) = ratio.and_then(|c| c.value("speedup"))
+        && !place.scan_wins()
     {
-        told += &format!(" {}x", text::significant(ratio));
+        told += &format!(": {}", text::significant(ratio));
+    }
+    if place.is_off_class() {
+        told += &format!(" (at {})", text::percent(place.share));
     }
     told
 }
@@ -64,10 +67,7 @@ fn crossings(surface: &Surface) -> Option<Rows> {
         .chain(classes.iter().map(|c| class(*c)))
         .collect();
     let mut rows = Rows::of_numbers(header.iter().map(String::as_str));
-    for structure in surface.structures() {
-        if structure.starts_with("linear") {
-            continue;
-        }
+    for structure in surface.no_scans() {
         let told = classes.iter().map(|class| {
             let crossing = surface.crossing(structure, *class);
             match crossing {
@@ -94,11 +94,7 @@ fn two_digits(items: f64) -> usize {
 
 /// After how many queries each build is repaid against the linear scan.
 fn break_even(surface: &Surface) -> Option<Rows> {
-    let structures: Vec<&str> = surface
-        .structures()
-        .into_iter()
-        .filter(|name| !name.starts_with("linear"))
-        .collect();
+    let structures = surface.no_scans();
     let header = ["items, visible"]
         .into_iter()
         .chain(structures.iter().copied());
@@ -106,7 +102,7 @@ fn break_even(surface: &Surface) -> Option<Rows> {
     for place in &surface.places {
         let told = structures.iter().map(|structure| {
             let cell = place.cell(structure);
-            match cell.map(|c| (c.value("break_even_queries"), c.value("ratio_to_linear"))) {
+            match cell.map(|c| (c.value("break_even_queries"), c.value("speedup"))) {
                 None => String::new(),
                 Some((Some(queries), _)) => text::count(queries as usize),
                 // Built no more dearly than the scan's own copy of the items.
@@ -128,8 +124,9 @@ fn break_even(surface: &Surface) -> Option<Rows> {
 pub fn of_surface(surface: &Surface) -> Vec<Block> {
     let mut blocks = vec![
         Block::Line(
-            "The fastest (= for ties within the noise floor) and how many times as fast as the \
-             linear scan; no factor where a scan wins."
+            "The fastest (= where no test tells them apart) and its speed-up vs linear; none \
+             where a scan wins. Shares stand under the nearest of 1, 1.5, 2, \
+             3, 5, 7, 10, ... percent; (at ...) where that is more than a tenth off."
                 .to_owned(),
         ),
         Block::Table(winners(surface)),
@@ -180,13 +177,14 @@ pub fn of_growths(growths: &[Growth]) -> Rows {
 
 /// At the end of a run, where there is anything to cross.
 pub fn show(report: &Report) -> io::Result<()> {
-    let mut out = io::stdout().lock();
+    let mut out = text::terminal();
     for surface in surfaces(comparisons(report)) {
         // A world of one size has its ranked tables; that is the surface.
         if surface.sizes().len() < 2 {
             continue;
         }
-        writeln!(out, "\ncrossover surface: {}", title(&surface))?;
+        let title = text::plain(&title(&surface));
+        writeln!(out, "\ncrossover surface: {title}")?;
         writeln!(out, "{}", winners(&surface).terminal())?;
         if let Some(rows) = crossings(&surface) {
             writeln!(out, "{}", rows.terminal())?;

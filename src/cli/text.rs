@@ -1,56 +1,157 @@
 //! How figures and tables look on a terminal.
 
+use std::fmt;
+use std::io::{self, StdoutLock, Write};
+
+use crate::measure::Metric;
+use crate::report::{Comparison, Report, ReportCell};
+pub use crate::shown::{count, counted, lines, plain};
 use comfy_table::presets::UTF8_BORDERS_ONLY;
-use comfy_table::{CellAlignment, ContentArrangement, Table};
-use cullbench::measure::Metric;
+use comfy_table::{CellAlignment, ContentArrangement};
+
+/// A table whose cells may come from anywhere.
+pub struct Table(comfy_table::Table);
 
 /// A table with a header. Columns named in `right` hold numbers.
 pub fn table(header: &[&str], right: &[usize]) -> Table {
-    let mut table = Table::new();
+    let mut table = comfy_table::Table::new();
     table
         .load_style(UTF8_BORDERS_ONLY)
         .set_content_arrangement(ContentArrangement::Disabled)
-        .set_header(header.iter().copied());
+        .set_header(header.iter().map(|name| plain(name)));
     for &column in right {
         if let Some(column) = table.column_mut(column) {
             column.set_cell_alignment(CellAlignment::Right);
         }
     }
-    table
+    Table(table)
+}
+
+impl Table {
+    pub fn add_row(&mut self, row: impl IntoIterator<Item = impl AsRef<str>>) {
+        self.0
+            .add_row(row.into_iter().map(|cell| plain(cell.as_ref())));
+    }
+
+    /// Breaks long cells into lines so that the table is no wider.
+    pub fn fit(&mut self, width: u16) {
+        let arranged = ContentArrangement::Dynamic;
+        self.0.set_content_arrangement(arranged).set_width(width);
+    }
+}
+
+impl fmt::Display for Table {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+/// What the times of a report rest on, in one sentence.
+pub fn conclusion(report: &Report) -> String {
+    let processes = report.cells.iter().map(|c| c.times.processes);
+    let least = processes.filter(|p| *p > 0).min().unwrap_or(0);
+    if least < 3 {
+        let processes = counted(least.max(1), "process");
+        return format!(
+            "{processes}: times without intervals, ranks by their order alone (--processes 10 \
+             gives intervals)"
+        );
+    }
+    let twins: Vec<bool> = report
+        .noise
+        .twins
+        .iter()
+        .filter_map(|t| t.holds_one())
+        .collect();
+    let held = twins.iter().filter(|holds| **holds).count();
+    let few = match least {
+        ..10 => "; fewer than ten make wide intervals",
+        _ => "",
+    };
+    format!(
+        "95 % intervals over {least} processes{few}; a structure entered twice agreed with itself in \
+         {held} of {}",
+        counted(twins.len(), "comparison")
+    )
 }
 
 /// Nanoseconds with three significant digits and a fitting unit.
 pub fn time(ns: f64) -> String {
-    let (value, unit) = match ns {
-        n if n < 1e3 => (n, "ns"),
-        n if n < 1e6 => (n / 1e3, "us"),
-        n if n < 1e9 => (n / 1e6, "ms"),
-        n => (n / 1e9, "s"),
-    };
-    format!("{} {unit}", significant(value))
+    let (size, name) = unit(ns);
+    format!("{} {name}", significant(ns / size))
 }
 
-/// Three significant digits, no exponent: 0.0123, 1.23, 12.3, 123, 12345.
+/// The unit that fits a time, in ns.
+fn unit(ns: f64) -> (f64, &'static str) {
+    match ns {
+        n if n < 1e3 => (1.0, "ns"),
+        n if n < 1e6 => (1e3, "us"),
+        n if n < 1e9 => (1e6, "ms"),
+        _ => (1e9, "s"),
+    }
+}
+
+/// Three significant digits: 0.0123, 1.23, 12.3, 123, 12345; an exponent only
+/// where the number would be longer than anything measured.
 pub fn significant(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();
+    }
+    if !(1e-9..1e15).contains(&value.abs()) {
+        return format!("{value:.2e}");
     }
     let digits = 2 - value.abs().log10().floor() as i32;
     format!("{value:.*}", digits.clamp(0, 12) as usize)
 }
 
-/// A value with its interval: "4.04 [3.95, 4.16]"; nothing if there is none.
+/// A value with its 95 % interval: "4.04 [3.95, 4.16]"; nothing if there is none.
 pub fn estimate(metric: Option<&Metric>) -> String {
     let Some(metric) = metric else {
         return String::new();
     };
-    let value = significant(metric.value);
+    significant(metric.value) + &interval(metric, 1.0)
+}
+
+/// A time with its 95 % interval in the same unit: "1.81 us [1.75, 1.90]".
+pub fn time_estimate(metric: Option<&Metric>) -> String {
+    let Some(metric) = metric else {
+        return String::new();
+    };
+    time(metric.value) + &interval(metric, unit(metric.value).0)
+}
+
+fn interval(metric: &Metric, unit: f64) -> String {
     match (metric.lower, metric.upper) {
         (Some(lower), Some(upper)) => {
-            format!("{value} [{}, {}]", significant(lower), significant(upper))
+            let [lower, upper] = [lower, upper].map(|end| significant(end / unit));
+            format!(" [{lower}, {upper}]")
         }
-        _ => value,
+        _ => String::new(),
     }
+}
+
+/// What the times of a table rest on: "10 processes, 100 rounds each; 64 cameras
+/// timed, 128 checked, 8 judged against the oracle".
+pub fn basis(comparison: &Comparison) -> String {
+    if comparison.range(|_| 0).is_none() {
+        return "no times".to_owned();
+    }
+    let of = |number: fn(&ReportCell) -> usize, one: &str| {
+        let (least, most) = comparison.range(number).unwrap_or_default();
+        match least == most {
+            true => counted(most, one),
+            false => format!("{} to {}", count(least), counted(most, one)),
+        }
+    };
+    let judged = comparison.of_any("judged_queries").unwrap_or(0.0) as usize;
+    format!(
+        "{}, {} each; {} timed, {} checked, {} judged against the oracle",
+        of(|cell| cell.times.processes, "process"),
+        of(|cell| cell.times.rounds, "round"),
+        of(|cell| cell.times.cameras_timed, "camera"),
+        of(|cell| cell.times.cameras_checked, "camera"),
+        counted(judged, "camera")
+    )
 }
 
 /// A share as a percentage, never rounded up to 100.
@@ -62,22 +163,25 @@ pub fn percent(share: f64) -> String {
     format!("{rounded} %")
 }
 
-/// Whole numbers in groups of three.
-pub fn count(value: usize) -> String {
-    let digits = value.to_string();
-    let mut grouped = String::new();
-    for (i, digit) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            grouped.push(',');
-        }
-        grouped.push(digit);
-    }
-    grouped
+/// Standard output for people: what came from outside steers no terminal,
+/// wherever it stands in a line.
+pub fn terminal() -> Terminal<StdoutLock<'static>> {
+    Terminal(io::stdout().lock())
 }
 
-/// Text of a file as a terminal may have it: no control characters.
-pub fn plain(text: &str) -> String {
-    text.replace(char::is_control, " ")
+/// Text on its way to a terminal.
+pub struct Terminal<W>(W);
+
+impl<W: Write> Write for Terminal<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let text = String::from_utf8_lossy(bytes);
+        self.0.write_all(lines(&text).as_bytes())?;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.0.flush()
+    }
 }
 
 #[cfg(test)]
@@ -98,14 +202,43 @@ mod tests {
         }
         assert_eq!(significant(0.012_34), "0.0123");
         assert_eq!(significant(12_345.6), "12346");
+        assert_eq!(
+            [1e308, -1e15, 5e-324, 1e-9].map(significant),
+            ["1.00e308", "-1.00e15", "4.94e-324", "0.00000000100"]
+        );
         assert_eq!(percent(0.999_99), ">99.99 %");
         assert_eq!(
             (percent(1.0), percent(0.98)),
             ("100.00 %".into(), "98.00 %".into())
         );
-        assert_eq!(
-            [count(7), count(1234), count(1_234_567)],
-            ["7", "1,234", "1,234,567"]
-        );
+    }
+
+    #[test]
+    fn an_interval_is_in_the_unit_of_its_value() {
+        let metric = Metric {
+            value: 1810.0,
+            lower: Some(990.0),
+            upper: Some(1_900_000.0),
+            unit: "ns".to_owned(),
+        };
+        assert_eq!(time_estimate(Some(&metric)), "1.81 us [0.990, 1900]");
+        assert_eq!(estimate(Some(&metric)), "1810 [990, 1900000]");
+        let bare = Metric {
+            lower: None,
+            ..metric
+        };
+        assert_eq!(time_estimate(Some(&bare)), "1.81 us");
+        assert_eq!(time_estimate(None), "");
+    }
+
+    #[test]
+    fn tables_and_lines_hold_no_escapes() {
+        let mut table = table(&["a\u{1b}b"], &[]);
+        table.add_row(["two\nlines\u{202e}"]);
+        let shown = table.to_string();
+        assert!(shown.contains("a\\u{1b}b") && shown.contains("two lines\\u{202e}"));
+        let mut out = Terminal(Vec::new());
+        write!(out, "\u{1b}[2J\n{}\n", 7.0).unwrap();
+        assert_eq!(out.0, b"\\u{1b}[2J\n7\n");
     }
 }

@@ -12,21 +12,21 @@ use serde::Serialize;
 
 use super::args::{TableFormat, VerifyArgs};
 use super::{Ending, interrupt, load_scene, tell, text, unread_is_fine};
-use cullbench::camera::{DEFAULT_EPSILON, PlaneMethod};
-use cullbench::culling::{ARITHMETICS, Arithmetic, CameraView, Culling, CullingTest, TESTS};
-use cullbench::index::{BuildError, DynIndex, StructureSpec, structures};
-use cullbench::measure::{Contender, Status, Workload, count_pass, guarded, judge};
-use cullbench::path::{self, CameraPath};
-use cullbench::query::Located;
-use cullbench::scene::{self, FAMILIES, SAMPLES};
-use cullbench::verify::{
-    ErrorCount, RandomCase, Reference, Truth, VOLUME_KINDS, explain_containment,
-    explain_visibility, points_on_faces, variants,
+use crate::camera::{DEFAULT_EPSILON, PlaneMethod};
+use crate::culling::{ARITHMETICS, Arithmetic, CameraView, Culling, CullingTest, TESTS};
+use crate::index::{BuildError, DynIndex, Registry, StructureSpec};
+use crate::measure::{Contender, Status, Workload, count_pass, guarded, judge};
+use crate::path::{self, CameraPath};
+use crate::query::Located;
+use crate::scene::{self, FAMILIES, SAMPLES};
+use crate::verify::{
+    ErrorCount, RandomCase, Trial, Truth, VOLUME_KINDS, explain_containment, explain_visibility,
+    points_on_faces, variants,
 };
 
 /// One structure on one scene and path (or on all random cases).
 #[derive(Serialize)]
-struct Check {
+pub(super) struct Check {
     scene: String,
     path: String,
     structure: String,
@@ -34,7 +34,7 @@ struct Check {
     verdicts: u64,
     status: &'static str,
     /// The first difference and the command that shows it again.
-    difference: Option<String>,
+    pub(super) difference: Option<String>,
 }
 
 #[derive(Serialize)]
@@ -60,9 +60,8 @@ const PATHS: [&str; 4] = [
 ];
 const CASES: u64 = 20_000;
 
-pub fn verify(args: &VerifyArgs) -> anyhow::Result<Ending> {
-    args.kernel.choose()?;
-    let structures = structures(&args.structure)?;
+pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> {
+    let structures = args.kernel.structures(registry, &args.structure)?;
     let defaults = args.lens.defaults()?;
     let culling = args.culling.culling(CullingTest::SixPlane.name())?;
     let by_hand = !args.scene.is_empty() || !args.path.is_empty();
@@ -85,7 +84,7 @@ pub fn verify(args: &VerifyArgs) -> anyhow::Result<Ending> {
         if interrupted {
             break;
         }
-        bar.set_message(source.clone());
+        bar.set_message(text::plain(source));
         let scene = load_scene(source, &args.scene_args)?;
         let contenders = |test: CullingTest| -> Vec<Contender> {
             let specs = structures.iter().cloned();
@@ -125,7 +124,7 @@ pub fn verify(args: &VerifyArgs) -> anyhow::Result<Ending> {
         bar.inc(1);
     }
     if cases > 0 && !interrupted {
-        bar.set_message(format!("{cases} random cases"));
+        bar.set_message(text::counted(cases as usize, "random case"));
         let checked = random_cases(&structures, args.seed, cases);
         interrupted = checked.first().is_some_and(|c| (c.volumes as u64) < cases);
         checks.extend(checked);
@@ -205,6 +204,8 @@ fn workloads<'a>(
             cameras: Vec::new(),
             views: Vec::new(),
             points: Vec::new(),
+            lens_scale: None,
+            sought: Vec::new(),
         };
         all.push(((*kind).to_owned(), workload));
     }
@@ -246,7 +247,7 @@ fn is_safe(culling: &Culling) -> bool {
 
 /// Holds the answers, which are everyone's who agreed with the reference,
 /// against the exact truth about some of the cameras.
-fn judge_camera_level(workload: &Workload, checks: &mut [Check], again: &str) {
+pub(super) fn judge_camera_level(workload: &Workload, checks: &mut [Check], again: &str) {
     let mut errors = judge(workload, MOST_JUDGED).errors;
     errors += on_the_faces(workload);
     if errors.false_negatives + errors.touch_dropped == 0 {
@@ -262,8 +263,8 @@ fn judge_camera_level(workload: &Workload, checks: &mut [Check], again: &str) {
 }
 
 /// How the views differ from the truth about points on their own faces: few
-/// scenes have boxes so near. Without a far plane the scene bounds what the
-/// epsilon is for, and these points may lie beyond it.
+/// scenes have boxes so near. The scene bounds what the epsilon is for, so
+/// points beyond it are left out; without a far plane all are.
 fn on_the_faces(workload: &Workload) -> ErrorCount {
     let around = workload.scene.surroundings();
     let mut errors = ErrorCount::default();
@@ -271,7 +272,8 @@ fn on_the_faces(workload: &Workload) -> ErrorCount {
         let (Some(_), Ok(volume)) = (camera.lens.far(), camera.wide_volume(&around)) else {
             continue;
         };
-        let points = points_on_faces(camera, around.origin, volume.planes());
+        let mut points = points_on_faces(camera, around.origin, volume.planes());
+        points.retain(|point| point.reach().cmple(around.reach).all());
         if let Some(truth) = Truth::of_camera(camera, around.origin, &points) {
             let seen = points.iter().zip(0..);
             let seen = seen.filter(|(p, _)| view.as_any().sees(p));
@@ -294,12 +296,17 @@ impl Check {
     }
 }
 
-fn check(workload: &Workload, contenders: &[Contender], kind: &str, again: &str) -> Vec<Check> {
+pub(super) fn check(
+    workload: &Workload,
+    contenders: &[Contender],
+    kind: &str,
+    again: &str,
+) -> Vec<Check> {
     let built: Vec<_> = contenders
         .iter()
-        .filter_map(|c| c.built.as_ref().ok())
+        .filter_map(|c| Some((c.label(), c.built.as_ref().ok()?)))
         .collect();
-    let mut counted = count_pass(workload, &built).into_iter();
+    let mut counted = count_pass(workload, &built, &|_, _| ()).into_iter();
     let scene = workload.scene;
     let questions = workload.views.len() * scene.items.len()
         + workload.points.len() * scene.regions.boxes(&scene.items).len();
@@ -330,7 +337,7 @@ fn random_cases(structures: &[StructureSpec], seed: u64, cases: u64) -> Vec<Chec
         .iter()
         .map(|s| Check {
             scene: "random".to_owned(),
-            path: format!("{cases} cases from seed {seed}"),
+            path: format!("{} from seed {seed}", text::counted(cases as usize, "case")),
             structure: s.label.clone(),
             volumes: 0,
             verdicts: 0,
@@ -343,11 +350,10 @@ fn random_cases(structures: &[StructureSpec], seed: u64, cases: u64) -> Vec<Chec
             break;
         }
         let case = RandomCase::new(case_seed);
-        let mut seen = Reference::new(case.items.len());
+        let mut seen = Trial::new(case.items.len());
         seen.see(&case.items, &case.volume);
-        let mut holding = Reference::new(case.items.len());
-        let regions = scene::Regions::Items.holding(case.point, &case.items);
-        holding.expect(regions.into_iter());
+        let mut holding = Trial::new(case.items.len());
+        holding.expect(scene::Regions::Items.holding(case.point, &case.items));
         for (spec, check) in structures.iter().zip(&mut checks) {
             check.volumes += 1;
             check.verdicts += 2 * case.items.len() as u64;
@@ -357,7 +363,8 @@ fn random_cases(structures: &[StructureSpec], seed: u64, cases: u64) -> Vec<Chec
             let (status, difference) = match spec.build(&case.items) {
                 Ok(index) => {
                     match guarded(|| differ(&case, index.as_ref(), &mut seen, &mut holding)) {
-                        Ok(difference) => (Status::Wrong, difference),
+                        Ok(Ok(())) => (Status::Ok, None),
+                        Ok(Err((status, difference))) => (status, Some(difference)),
                         Err(verdict) => (verdict.status, verdict.reason),
                     }
                 }
@@ -371,8 +378,8 @@ fn random_cases(structures: &[StructureSpec], seed: u64, cases: u64) -> Vec<Chec
                 check.status = status.name();
                 let kind = VOLUME_KINDS[case.kind];
                 check.difference = Some(format!(
-                    "{kind} volume, {} items: {difference}\n  again: cullbench verify --cases 1 --seed {case_seed}",
-                    case.items.len()
+                    "{kind} volume, {}: {difference}\n  again: cullbench verify --cases 1 --seed {case_seed}",
+                    text::counted(case.items.len(), "item")
                 ));
             }
         }
@@ -383,38 +390,30 @@ fn random_cases(structures: &[StructureSpec], seed: u64, cases: u64) -> Vec<Chec
 fn differ(
     case: &RandomCase,
     index: &dyn DynIndex,
-    seen: &mut Reference,
-    holding: &mut Reference,
-) -> Option<String> {
-    let mut out = Vec::new();
-    index.visible(&case.volume, &mut out);
-    let difference = seen.compare(&out);
-    if !difference.is_none() {
-        let item = difference.first.and_then(|id| case.items.get(id as usize));
-        let why = item
-            .map(|b| explain_visibility(b, &case.volume))
-            .unwrap_or_default();
-        return Some(format!("{difference}: {why}"));
-    }
-    out.clear();
-    index.locate(case.point, &mut out);
-    let difference = holding.compare(&out);
-    if !difference.is_none() {
-        let item = difference.first.and_then(|id| case.items.get(id as usize));
-        let why = item
-            .map(|b| explain_containment(b, case.point))
-            .unwrap_or_default();
-        return Some(format!("region search: {difference}: {why}"));
-    }
+    seen: &mut Trial,
+    holding: &mut Trial,
+) -> Result<(), (Status, String)> {
+    let item = |id: usize| case.items.get(id);
+    seen.ask(|out| index.visible(&case.volume, out))
+        .map_err(|fault| {
+            let why = fault.explained(|id| Some(explain_visibility(item(id)?, &case.volume)));
+            (Status::of(&fault), why)
+        })?;
+    let asked = holding.ask(|out| index.locate(case.point, out));
+    let out = asked.map_err(|fault| {
+        let why = fault.explained(|id| Some(explain_containment(item(id)?, case.point)));
+        (Status::of(&fault), format!("region search: {why}"))
+    })?;
     let nowhere = Vec3::new(case.point.x, f32::NAN, case.point.z);
     let mut many = Located::default();
     index.locate_many(&[case.point, nowhere, case.point], &mut many);
-    if !many.iter().eq([&out[..], &[], &out]) {
-        return Some(format!(
+    if !many.iter().eq([out, &[], out]) {
+        let why = format!(
             "region search: a batch of points is answered otherwise than one by one: {many:?}"
-        ));
+        );
+        return Err((Status::Wrong, why));
     }
-    None
+    Ok(())
 }
 
 fn show(outcome: &Outcome, format: TableFormat) -> io::Result<()> {
@@ -449,18 +448,22 @@ fn show(outcome: &Outcome, format: TableFormat) -> io::Result<()> {
         if let Some(difference) = &check.difference {
             writeln!(
                 out,
-                "{} on {}, {}:\n  {difference}",
-                check.structure, check.scene, check.path
+                "{}:\n  {}",
+                text::plain(&format!(
+                    "{} on {}, {}",
+                    check.structure, check.scene, check.path
+                )),
+                text::lines(difference)
             )?;
         }
     }
     writeln!(
         out,
-        "{} verdicts in {:.1} s ({:.1} million/s), {} mismatches",
-        text::count(outcome.verdicts as usize),
+        "{} in {:.1} s ({:.1} million/s), {}",
+        text::counted(outcome.verdicts as usize, "verdict"),
         outcome.seconds,
         outcome.verdicts as f64 / outcome.seconds / 1e6,
-        outcome.mismatches
+        text::counted(outcome.mismatches, "mismatch")
     )?;
     Ok(())
 }
@@ -468,13 +471,12 @@ fn show(outcome: &Outcome, format: TableFormat) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use cullbench::index::Backend;
+    use crate::index::{LinearScalar, RegionIndex, Row};
     use serde_json::Value;
 
-    static PANICS: Backend = Backend {
-        name: "panics",
-        summary: "",
-        build: |_, _, _| panic!("deep in a peer's code"),
+    const PANICS: Row = Row {
+        info: LinearScalar::INFO.named("panics"),
+        build: |_, _, _, _| panic!("deep in a peer's code"),
         params: |_| Ok(Value::Null),
     };
 
@@ -482,8 +484,9 @@ mod tests {
     fn a_panic_in_a_random_case_is_its_status_and_says_how_to_see_it_again() {
         let spec = StructureSpec {
             label: "panics".to_owned(),
-            backend: &PANICS,
+            row: PANICS,
             params: Value::Null,
+            execution: Default::default(),
         };
         let linear = StructureSpec::parse("linear").expect("linear");
         let checks = random_cases(&[spec, linear], 5, 3);

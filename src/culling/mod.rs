@@ -8,7 +8,7 @@ use std::borrow::Cow;
 
 use serde::{Deserialize, Serialize};
 
-use crate::camera::{Camera, CameraError, PlaneMethod, PlaneOptions, Surroundings};
+use crate::camera::{Camera, CameraError, PlaneMethod, PlaneOptions, Surroundings, check_sums};
 use crate::geometry::{
     Aabb, ConvexVolume, RelativeVolume, Spheres, WidePlane, WideVolume, sphere_cube,
 };
@@ -232,7 +232,12 @@ impl Culling {
         let more: Vec<WidePlane> = more.iter().map(|plane| plane.about(-local_eye)).collect();
         let volume = camera.volume_with(&more, &self.planes, around)?;
         Ok(match self.test {
-            CullingTest::Sphere => CameraView::Spheres(Spheres::new(&volume)),
+            CullingTest::Sphere => {
+                // The cubes about the items' spheres are what is indexed.
+                let reach = around.reach.as_dvec3();
+                check_sums(&volume, reach + reach.length())?;
+                CameraView::Spheres(Spheres::new(&volume))
+            }
             _ => CameraView::Volume(volume),
         })
     }

@@ -17,7 +17,7 @@ use super::stack::Stack;
 use super::tiling::Tiling;
 use super::tree::PackedTree;
 use super::treelets::{DESCENT_LEAF, Treelets};
-use super::{BuildError, MemoryUsage, RegionIndex, check_range, indexable};
+use super::{BuildError, Info, Kind, MemoryUsage, Origin, RegionIndex, check_range, indexable};
 use crate::geometry::{Aabb, Plane, PlaneTree};
 use crate::kernel::{BASELINE, Isa};
 use crate::query::{ItemId, ManySink, Recorder, Sink};
@@ -250,9 +250,14 @@ impl Bsp {
 }
 
 impl RegionIndex for Bsp {
-    const NAME: &'static str = "bsp";
-    const SUMMARY: &'static str =
-        "binary space partition by planes of any orientation; region search by plane descent";
+    const INFO: Info = Info::new(
+        "bsp",
+        "binary space partition by planes of any orientation; region search by plane descent",
+        Kind::Tree,
+        Origin::Ours,
+    )
+    .refits()
+    .ranges();
     type Params = BspParams;
 
     fn build(
@@ -260,12 +265,12 @@ impl RegionIndex for Bsp {
         own_tree: Option<&PlaneTree>,
         params: &BspParams,
     ) -> Result<Self, BuildError> {
-        check_range(Self::NAME, "leaf", params.leaf.into(), 1.0, 4096.0)?;
-        check_range(Self::NAME, "cut", params.cut.into(), 0.0, 1000.0)?;
+        check_range(Self::INFO.name, "leaf", params.leaf.into(), 1.0, 4096.0)?;
+        check_range(Self::INFO.name, "cut", params.cut.into(), 0.0, 1000.0)?;
         let imported = match (params.builder, own_tree) {
             (BspBuilder::Import, None) => {
                 return Err(BuildError::Params {
-                    structure: Self::NAME,
+                    structure: Self::INFO.name,
                     reason: "builder=import, but the scene has no tree of its own".to_owned(),
                 });
             }

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use super::by_tree::{searched_by_tree, seen_by_tree};
 use super::tree::{PackedTree, TreeWriter};
-use super::{BuildError, RegionIndex, check_range, indexable};
+use super::{BuildError, Info, Kind, Origin, RegionIndex, check_range, indexable};
 use crate::geometry::{Aabb, PlaneTree};
 use crate::query::ItemId;
 
@@ -313,9 +313,14 @@ fn relaid(items: &[Aabb], stacks: &Stacks, owners: Option<&[u32]>, built: &Topol
 }
 
 impl RegionIndex for Bvh {
-    const NAME: &'static str = "bvh";
-    const SUMMARY: &'static str =
-        "bounding volume hierarchy (crate obvhs), items re-laid in tree order, plane masks";
+    const INFO: Info = Info::new(
+        "bvh",
+        "bounding volume hierarchy (crate obvhs), items re-laid in tree order, plane masks",
+        Kind::Tree,
+        Origin::Ours,
+    )
+    .refits()
+    .ranges();
     type Params = BvhParams;
 
     fn build(
@@ -323,15 +328,21 @@ impl RegionIndex for Bvh {
         _: Option<&PlaneTree>,
         params: &BvhParams,
     ) -> Result<Self, BuildError> {
-        check_range(Self::NAME, "leaf", params.leaf.into(), 1.0, 255.0)?;
-        check_range(Self::NAME, "collapse", params.collapse.into(), 0.0, 1000.0)?;
+        check_range(Self::INFO.name, "leaf", params.leaf.into(), 1.0, 255.0)?;
+        check_range(
+            Self::INFO.name,
+            "collapse",
+            params.collapse.into(),
+            0.0,
+            1000.0,
+        )?;
         let mut config = BvhBuildParams {
             max_prims_per_leaf: params.leaf,
             collapse_traversal_cost: params.collapse,
             ..params.preset.params()
         };
         if let Some(share) = params.reinsertion {
-            check_range(Self::NAME, "reinsertion", share.into(), 0.0, 100.0)?;
+            check_range(Self::INFO.name, "reinsertion", share.into(), 0.0, 100.0)?;
             config.reinsertion_batch_ratio = share;
         }
         let stacks = Stacks::of(items, indexable(items)?);

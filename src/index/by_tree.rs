@@ -76,6 +76,10 @@ macro_rules! seen_by_tree {
             ) -> std::ops::ControlFlow<()> {
                 self.tree.see(isa, view, sink, recorder)
             }
+
+            fn tree_order(&self) -> Option<&[$crate::query::ItemId]> {
+                Some(self.tree.ids())
+            }
         }
 
         impl $crate::index::TreeOrder for $structure {

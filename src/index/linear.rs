@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::by_tree::visible_on_baseline;
 use super::id_rows::IdRows;
 use super::tree::scan_blocks;
-use super::{BuildError, FrustumQuery, MemoryUsage, RegionIndex, indexable};
+use super::{BuildError, FrustumQuery, Info, Kind, MemoryUsage, Origin, RegionIndex, indexable};
 use crate::geometry::{Aabb, BoxBlock, BoxBlocks, LANES, LaneMask, PlaneMask, PlaneTree, lanes_of};
 use crate::kernel::{BASELINE, Isa};
 use crate::query::{AsEver, ItemId, Planes, Recorder, Region, Sink, Tests, View};
@@ -47,8 +47,12 @@ impl LinearScalar {
 }
 
 impl RegionIndex for LinearScalar {
-    const NAME: &'static str = "linear-scalar";
-    const SUMMARY: &'static str = "the textbook loop over all boxes, O(n): the yardstick";
+    const INFO: Info = Info::new(
+        "linear-scalar",
+        "the textbook loop over all boxes, O(n): the yardstick",
+        Kind::Scan,
+        Origin::Ours,
+    );
     type Params = LinearParams;
 
     fn build(items: &[Aabb], _: Option<&PlaneTree>, _: &LinearParams) -> Result<Self, BuildError> {
@@ -124,8 +128,12 @@ impl Linear {
 }
 
 impl RegionIndex for Linear {
-    const NAME: &'static str = "linear";
-    const SUMMARY: &'static str = "scan over blocks of sixteen boxes, O(n)";
+    const INFO: Info = Info::new(
+        "linear",
+        "scan over blocks of sixteen boxes, O(n)",
+        Kind::Scan,
+        Origin::Ours,
+    );
     type Params = LinearParams;
 
     fn build(items: &[Aabb], _: Option<&PlaneTree>, _: &LinearParams) -> Result<Self, BuildError> {

@@ -1,6 +1,7 @@
-//! The contract of a structure, and the table of all of them. Adding one is a
-//! file beside this one and a row in [`BACKENDS`]; list, run, query, verify,
-//! benches and conformance tests pick it up from there.
+//! The contract of a structure, and the registry of all of them. Adding one is
+//! a file beside this one and a row in [`Registry::builtin`], or in a crate of
+//! one's own [`Registry::with`]; list, run, query, verify, benches and
+//! conformance tests pick it up from there.
 
 mod batch;
 mod block_order;
@@ -11,9 +12,11 @@ mod by_plane;
 mod by_tree;
 mod cells;
 mod erased;
+mod execution;
 mod foreign;
 mod frontier;
 mod id_rows;
+mod info;
 mod linear;
 mod multi_view;
 mod octree;
@@ -25,6 +28,7 @@ pub mod peers;
 mod plane_choice;
 mod quadtree;
 mod quantised;
+mod registry;
 mod replay;
 mod stack;
 mod tiling;
@@ -39,20 +43,24 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::geometry::{Aabb, PlaneTree};
-use crate::kernel::Isa;
+use crate::kernel::{Isa, Kernel};
 use crate::query::{AnyView, ItemId, ManySink, NoRecorder, Recorder, Sink, View};
+use crate::threads::Pool;
 
 pub use block_order::BlockOrder;
 pub use bsp::{Bsp, BspBuilder, BspParams};
 pub use bvh::{Bvh, BvhLayout, BvhParams, BvhPreset};
-pub use erased::{BACKENDS, Backend, DynIndex, StructureSpec, structures};
+pub use erased::DynIndex;
+pub use execution::{By, Execution};
 pub use foreign::caught;
+pub use info::{Capabilities, Info, Kind, Origin};
 pub use linear::{Linear, LinearScalar};
 pub use octree::{CellParams, Octree};
 pub use parallel::{Crew, see_each};
 pub use partition::{Part, Record, Splitter, build_top_down};
 pub use quadtree::Quadtree;
 pub use quantised::{GridScope, Quantised, QuantisedParams};
+pub use registry::{Registry, Row, StructureSpec};
 pub use replay::{Foreseen, Trace};
 pub use tree::{PackedTree, TreeNode, TreeWriter, scan_blocks};
 pub use wide::{Wide, WideParams};
@@ -100,10 +108,9 @@ impl MemoryUsage {
 /// is an item that no query ever returns. The order of answers is the
 /// structure's own, but each id comes at most once.
 pub trait RegionIndex: Sized + Send + Sync {
-    /// As typed on the command line.
-    const NAME: &'static str;
-    /// One line for `cullbench list`; says so if the layout is special.
-    const SUMMARY: &'static str;
+    /// Its name and what it declares of itself. The conformance suite checks
+    /// what can be checked.
+    const INFO: Info;
     /// Build parameters, `name:key=value` on the command line.
     type Params: Default + Serialize + DeserializeOwned;
 
@@ -121,6 +128,22 @@ pub trait RegionIndex: Sized + Send + Sync {
         own_tree: Option<&PlaneTree>,
         params: &Self::Params,
     ) -> Result<Self, BuildError>;
+
+    /// [`RegionIndex::build`] with the threads of a pool: what
+    /// [`StructureSpec`] calls. The structure is the same whatever their
+    /// number. One that knows no threads leaves it out; one that does declares
+    /// [`Capabilities::threaded_build`].
+    ///
+    /// # Errors
+    /// As [`RegionIndex::build`].
+    fn build_by(
+        _: &Pool,
+        items: &[Aabb],
+        own_tree: Option<&PlaneTree>,
+        params: &Self::Params,
+    ) -> Result<Self, BuildError> {
+        Self::build(items, own_tree, params)
+    }
 
     fn memory(&self) -> MemoryUsage;
 
@@ -178,6 +201,8 @@ pub trait RegionIndex: Sized + Send + Sync {
     /// Takes over the new bounds of `moved` items (`items` holds all bounds,
     /// the new ones included; they are finite) without building anew. False,
     /// with the structure unchanged, if it cannot; the caller then rebuilds.
+    /// A structure that declares [`Capabilities::refits`] declines only where
+    /// an item becomes or ceases to be empty; one that does not, always.
     fn refit(&mut self, _items: &[Aabb], _moved: &[ItemId]) -> bool {
         false
     }
@@ -192,7 +217,7 @@ pub trait FrustumQuery: RegionIndex {
     /// exclude.
     ///
     /// Mark it and what it calls `#[inline(always)]`: [`DynIndex`] compiles it
-    /// for each [`Kernel`](crate::kernel::Kernel), and a call that stays a call
+    /// for each [`Kernel`], and a call that stays a call
     /// runs portable code.
     fn visible<V: View, S: Sink, R: Recorder>(
         &self,
@@ -214,10 +239,17 @@ pub trait FrustumQuery: RegionIndex {
         self.visible(view, sink, recorder)
     }
 
+    /// Item ids in the structure's own order, if it keeps them in one that its
+    /// answers can be ranges of: [`Capabilities::ranges`]. Such a structure is
+    /// a [`TreeOrder`] as well.
+    fn tree_order(&self) -> Option<&[ItemId]> {
+        None
+    }
+
     /// What [`DynIndex::see_many`] does: by default, one query after the other.
-    fn visible_many(&self, views: &[AnyView<'_>], out: &mut [Vec<ItemId>]) {
+    fn visible_many(&self, kernel: Kernel, views: &[AnyView<'_>], out: &mut [Vec<ItemId>]) {
         for (view, out) in views.iter().zip(out) {
-            erased::see(self, *view, out, &mut NoRecorder);
+            erased::see(kernel, self, *view, out, &mut NoRecorder);
         }
     }
 }
@@ -230,9 +262,14 @@ pub trait TreeOrder: FrustumQuery {
 
     /// [`FrustumQuery::visible`] as ranges of [`TreeOrder::ids`], appended to
     /// `out`; together they hold each visible item once. Adjoining ranges that
-    /// follow each other are one. By the chosen [`Kernel`](crate::kernel::Kernel).
+    /// follow each other are one. By the best [`Kernel`] of this machine.
     fn visible_ranges<V: View>(&self, view: &V, out: &mut Vec<Range<u32>>) {
-        erased::see_ranges(self, view, out);
+        self.visible_ranges_by(Kernel::best(), view, out);
+    }
+
+    /// [`TreeOrder::visible_ranges`] by a kernel.
+    fn visible_ranges_by<V: View>(&self, kernel: Kernel, view: &V, out: &mut Vec<Range<u32>>) {
+        erased::see_ranges(kernel, self, view, out);
     }
 }
 

@@ -188,7 +188,7 @@ impl Wide {
     }
 }
 
-/// A group as the chosen kernel answers it.
+/// A group as a kernel answers it.
 struct SeeAlike<'t, 'a> {
     tree: &'t Wide,
     shell: &'t Shell,
@@ -204,9 +204,14 @@ impl Work for SeeAlike<'_, '_> {
     }
 }
 
-/// As [`Wide::visible_together`], by the chosen kernel and with views of all
+/// As [`Wide::visible_together`], by a kernel and with views of all
 /// kinds: those that share nothing by the very queries that they are alone.
-pub(super) fn see_together(tree: &Wide, views: &[AnyView<'_>], out: &mut [Vec<ItemId>]) {
+pub(super) fn see_together(
+    kernel: Kernel,
+    tree: &Wide,
+    views: &[AnyView<'_>],
+    out: &mut [Vec<ItemId>],
+) {
     let (mut views, mut out) = (views, out);
     while let ([view, ..], [list, ..]) = (views, &mut *out) {
         let volume = |i: usize| match views.get(i) {
@@ -217,13 +222,13 @@ pub(super) fn see_together(tree: &Wide, views: &[AnyView<'_>], out: &mut [Vec<It
         if let Some((alike, shell)) = alike(views.len(), volume) {
             count = alike;
             let mut asked: Vec<_> = (0..alike).map_while(volume).zip(out.iter_mut()).collect();
-            Kernel::chosen().run(SeeAlike {
+            kernel.run(SeeAlike {
                 tree,
                 shell: &shell,
                 asked: &mut asked,
             });
         } else {
-            erased::see(tree, *view, list, &mut NoRecorder);
+            erased::see(kernel, tree, *view, list, &mut NoRecorder);
         }
         views = &views[count..];
         out = &mut out[count..];

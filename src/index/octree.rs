@@ -6,7 +6,7 @@ use super::by_tree::{searched_by_tree, seen_by_tree};
 use super::cells::{Cell, CellSplitter};
 use super::partition::build_top_down;
 use super::tree::PackedTree;
-use super::{BuildError, RegionIndex, check_range, indexable};
+use super::{BuildError, Info, Kind, Origin, RegionIndex, check_range, indexable};
 use crate::geometry::{Aabb, PlaneTree};
 use crate::query::ItemId;
 
@@ -78,8 +78,14 @@ impl CellParams {
 }
 
 impl RegionIndex for Octree {
-    const NAME: &'static str = "octree";
-    const SUMMARY: &'static str = "octree with fitted nodes; loose=2 for the loose variant";
+    const INFO: Info = Info::new(
+        "octree",
+        "octree with fitted nodes; loose=2 for the loose variant",
+        Kind::Tree,
+        Origin::Ours,
+    )
+    .refits()
+    .ranges();
     type Params = CellParams;
 
     fn build(
@@ -88,7 +94,7 @@ impl RegionIndex for Octree {
         params: &CellParams,
     ) -> Result<Self, BuildError> {
         let ids = indexable(items)?;
-        let tree = params.build(Self::NAME, items, &ids, &[0, 1, 2], None)?;
+        let tree = params.build(Self::INFO.name, items, &ids, &[0, 1, 2], None)?;
         Ok(Octree { tree })
     }
 

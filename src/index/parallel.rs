@@ -74,6 +74,7 @@ type Job<'env> = Box<dyn FnOnce() -> Vec<ItemId> + Send + 'env>;
 /// ```
 pub struct Crew<'env> {
     tree: &'env Wide,
+    kernel: Kernel,
     workers: Vec<Worker<'env>>,
 }
 
@@ -111,7 +112,16 @@ impl<'env> Crew<'env> {
             })
         };
         let workers = (1..threads.min(PARTS)).map_while(hire).collect();
-        Crew { tree, workers }
+        Crew {
+            tree,
+            kernel: Kernel::best(),
+            workers,
+        }
+    }
+
+    /// The same crew, asking by another kernel than the best.
+    pub fn by(self, kernel: Kernel) -> Self {
+        Crew { kernel, ..self }
     }
 
     /// Threads that queries are split among, the caller's included.
@@ -137,7 +147,7 @@ impl<'env> Crew<'env> {
     where
         V: View + Clone + Send + Sync + 'env,
     {
-        let (tree, kernel) = (self.tree, Kernel::chosen());
+        let (tree, kernel) = (self.tree, self.kernel);
         let mut parts = kernel.run(Split { tree, view });
         let search = move |view: &V, parts: Vec<Part>, out: &mut Vec<ItemId>| {
             kernel.run(SearchParts {

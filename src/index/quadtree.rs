@@ -5,7 +5,7 @@
 use super::by_tree::{searched_by_tree, seen_by_tree};
 use super::octree::CellParams;
 use super::tree::PackedTree;
-use super::{BuildError, RegionIndex, indexable};
+use super::{BuildError, Info, Kind, Origin, RegionIndex, indexable};
 use crate::geometry::{Aabb, PlaneTree};
 
 /// A quadtree (Finkel and Bentley 1974) with fitted three-dimensional node
@@ -29,9 +29,14 @@ fn widest_axes(bounds: &Aabb) -> [usize; 2] {
 }
 
 impl RegionIndex for Quadtree {
-    const NAME: &'static str = "quadtree";
-    const SUMMARY: &'static str =
-        "quadtree over the two widest axes, high cells in storeys; loose=2 for the loose variant";
+    const INFO: Info = Info::new(
+        "quadtree",
+        "quadtree over the two widest axes, high cells in storeys; loose=2 for the loose variant",
+        Kind::Tree,
+        Origin::Ours,
+    )
+    .refits()
+    .ranges();
     type Params = CellParams;
 
     fn build(
@@ -42,7 +47,7 @@ impl RegionIndex for Quadtree {
         let ids = indexable(items)?;
         let axes = widest_axes(&Aabb::union_of(items));
         let height = 3 - axes[0] - axes[1];
-        let tree = params.build(Self::NAME, items, &ids, &axes, Some(height))?;
+        let tree = params.build(Self::INFO.name, items, &ids, &axes, Some(height))?;
         Ok(Quadtree { tree })
     }
 

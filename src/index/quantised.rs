@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::bundles::Leaves;
 use super::by_tree::visible_on_baseline;
 use super::tree::{PackedTree, scan_blocks};
-use super::{Bsp, BuildError, FrustumQuery, MemoryUsage, RegionIndex};
+use super::{Bsp, BuildError, FrustumQuery, Info, Kind, MemoryUsage, Origin, RegionIndex};
 use crate::geometry::quantised::{Code, CodeBlock, Grid};
 use crate::geometry::{Aabb, BoxBlock, LANES, LaneMask, PlaneMask, PlaneTree, lanes_of};
 use crate::kernel::{BASELINE, Isa};
@@ -133,8 +133,12 @@ impl<V: View> Leaves for InCodes<'_, V> {
 }
 
 impl RegionIndex for Quantised {
-    const NAME: &'static str = "quantised";
-    const SUMMARY: &'static str = "experiment: the bsp tree with items stored as u8 or u16";
+    const INFO: Info = Info::new(
+        "quantised",
+        "experiment: the bsp tree with items stored as u8 or u16",
+        Kind::Tree,
+        Origin::Ours,
+    );
     type Params = QuantisedParams;
 
     fn build(
@@ -143,7 +147,7 @@ impl RegionIndex for Quantised {
         params: &QuantisedParams,
     ) -> Result<Self, BuildError> {
         let refused = |reason: &str| BuildError::Params {
-            structure: Self::NAME,
+            structure: Self::INFO.name,
             reason: reason.to_owned(),
         };
         let most = match params.bits {

@@ -88,7 +88,7 @@ impl Trace {
 
     /// Reads what the query read and appends what it answered.
     pub fn replay(&self, tree: &Wide, out: &mut Vec<ItemId>) {
-        Kernel::chosen().run(Again {
+        Kernel::best().run(Again {
             trace: self,
             blocks: tree.blocks(),
             ids: tree.ids(),
@@ -121,7 +121,7 @@ impl Foreseen {
 
     /// Appends the answer, leaves tested as ever.
     pub fn answer<V: View>(&self, tree: &Wide, view: &V, out: &mut Vec<ItemId>) {
-        Kernel::chosen().run(Rest {
+        Kernel::best().run(Rest {
             foreseen: self,
             tree,
             view,

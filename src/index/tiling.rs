@@ -405,7 +405,8 @@ impl Cut<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::index::{Bsp, BspParams, DynIndex, RegionIndex};
+    use crate::index::erased::{locate, locate_many};
+    use crate::index::{Bsp, BspParams, RegionIndex};
     use crate::kernel::Kernel;
     use crate::query::{ItemId, Located, QueryCost};
 
@@ -437,22 +438,19 @@ mod tests {
 
     fn answers_are_right(bsp: &Bsp, items: &[Aabb]) {
         let points = points(items);
-        let kernel = Kernel::chosen();
-        for other in Kernel::available() {
-            other.choose().unwrap();
+        for kernel in Kernel::available() {
             let (mut many, mut alone) = (Located::default(), Vec::new());
-            DynIndex::locate_many(bsp, &points, &mut many);
+            locate_many(kernel, bsp, &points, &mut many);
             for (&p, found) in points.iter().zip(many.iter()) {
                 alone.clear();
-                DynIndex::locate(bsp, p, &mut alone);
-                assert_eq!(found, alone, "{p} {other}");
+                locate(kernel, bsp, p, &mut alone, &mut NoRecorder);
+                assert_eq!(found, alone, "{p} {kernel}");
                 alone.sort();
                 let holding = items.iter().zip(0..).filter(|(b, _)| b.contains_point(p));
                 let holding: Vec<ItemId> = holding.map(|(_, id)| id).collect();
-                assert_eq!(alone, holding, "{p} {other}");
+                assert_eq!(alone, holding, "{p} {kernel}");
             }
         }
-        kernel.choose().unwrap();
     }
 
     #[test]
@@ -471,7 +469,7 @@ mod tests {
         let centres: Vec<Vec3> = items.iter().map(Aabb::centre).collect();
         assert!(centres.len() > 2 * GROUP && !centres.len().is_multiple_of(GROUP));
         let mut many = Located::default();
-        DynIndex::locate_many(&bsp, &centres, &mut many);
+        locate_many(Kernel::best(), &bsp, &centres, &mut many);
         assert!(many.len() == items.len() && many.iter().zip(0..).all(|(found, id)| found == [id]));
         answers_are_right(&bsp, &items);
     }

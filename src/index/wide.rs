@@ -16,11 +16,13 @@ use super::frontier::{Frontier, Merger, NodeList, is_far};
 use super::id_rows::IdRows;
 use super::multi_view::see_together;
 use super::pass::{Layer, Pass};
-use super::{BuildError, FrustumQuery, MemoryUsage, RegionIndex, TreeOrder, indexable};
+use super::{
+    BuildError, FrustumQuery, Info, Kind, MemoryUsage, Origin, RegionIndex, TreeOrder, indexable,
+};
 use crate::geometry::{Aabb, BoxBlock, LANES, LaneMask, PlaneMask, PlaneTree};
-use crate::kernel::{BASELINE, Isa, prefetch};
+use crate::kernel::{BASELINE, Isa, Kernel, prefetch};
 use crate::query::{AnyView, ItemId, NoRecorder, Ranges, Recorder, Region, Sink, View};
-use crate::threads::{self, share};
+use crate::threads::{Pool, share};
 
 /// Parameters: `wide:order=median`.
 #[derive(Clone, Copy, Default, Debug, Serialize, Deserialize)]
@@ -348,19 +350,33 @@ impl Wide {
 }
 
 impl RegionIndex for Wide {
-    const NAME: &'static str = "wide";
-    const SUMMARY: &'static str =
-        "16-ary implicit tree of blocks, level by level with plane masks and prefetch";
+    const INFO: Info = Info::new(
+        "wide",
+        "16-ary implicit tree of blocks, level by level with plane masks and prefetch",
+        Kind::Tree,
+        Origin::Ours,
+    )
+    .refits()
+    .ranges()
+    .threaded_build();
     type Params = WideParams;
 
-    /// O(n log n) by medians, O(n) but for the sort by Morton codes; on as many
-    /// threads as the process has [chosen](threads::choose).
+    /// O(n log n) by medians, O(n) but for the sort by Morton codes.
     fn build(
         items: &[Aabb],
         _: Option<&PlaneTree>,
         params: &WideParams,
     ) -> Result<Self, BuildError> {
-        Wide::build_on(threads::chosen(), items, params)
+        Wide::build_on(1, items, params)
+    }
+
+    fn build_by(
+        pool: &Pool,
+        items: &[Aabb],
+        _: Option<&PlaneTree>,
+        params: &WideParams,
+    ) -> Result<Self, BuildError> {
+        Wide::build_on(pool.threads(), items, params)
     }
 
     fn memory(&self) -> MemoryUsage {
@@ -465,8 +481,12 @@ impl FrustumQuery for Wide {
         flow
     }
 
-    fn visible_many(&self, views: &[AnyView<'_>], out: &mut [Vec<ItemId>]) {
-        see_together(self, views, out);
+    fn tree_order(&self) -> Option<&[ItemId]> {
+        Some(&self.ids)
+    }
+
+    fn visible_many(&self, kernel: Kernel, views: &[AnyView<'_>], out: &mut [Vec<ItemId>]) {
+        see_together(kernel, self, views, out);
     }
 }
 

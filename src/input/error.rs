@@ -38,11 +38,25 @@ pub enum InputError {
     },
     /// Several items of a file are bad; the first is named.
     #[error(
-        "{first} ({count} bad item(s) in all; --skip-bad-items leaves them out and reports the count)"
+        "{first} ({count} bad items in all; --skip-bad-items leaves them out and reports the count)"
     )]
     BadItems {
         first: Box<InputError>,
         count: usize,
+    },
+    /// A scene that would not fit into memory; sizes in bytes.
+    #[error(
+        "{scene}: needs about {}{}, {} are free; expected a smaller n{}",
+        gigabytes(*needed),
+        if *structures > 0 { format!(" with {structures} structures") } else { String::new() },
+        gigabytes(*available),
+        if *structures > 1 { " or fewer structures" } else { "" }
+    )]
+    TooLarge {
+        scene: String,
+        structures: u64,
+        needed: u64,
+        available: u64,
     },
     #[error("scene '{scene}', item {item}: {reason}")]
     BadItem {
@@ -52,4 +66,8 @@ pub enum InputError {
     },
     #[error("{0}")]
     Spec(#[from] SpecError),
+}
+
+fn gigabytes(bytes: u64) -> String {
+    format!("{:.1} GB", bytes as f64 / 1e9)
 }

@@ -1,8 +1,10 @@
-//! Reading what users give: the error that names the place, and CSV tables
-//! with a header. The formats themselves belong to `scene` and `path`.
+//! Reading what users give: the error that names the place, files and pipes, and
+//! CSV tables with a header. The formats themselves belong to `scene` and `path`.
 
 mod error;
+mod file;
 mod table;
 
 pub use error::InputError;
+pub use file::{is_readable, pipes, read_file, stand_in};
 pub use table::{Row, TableReader};

@@ -2,10 +2,11 @@
 //! file, line and column. It owns the mechanics that the box, camera and point
 //! readers share; what the columns mean is theirs.
 
-use std::collections::VecDeque;
+use std::collections::{HashSet, VecDeque};
 use std::io::{self, Read};
 
 use super::InputError;
+use crate::shown::{counted, plain};
 
 /// A CSV file with its header read.
 pub struct TableReader<R> {
@@ -56,8 +57,9 @@ impl<R: Read> TableReader<R> {
         if header.iter().all(String::is_empty) {
             return Err(complain("an empty file".into(), "a header line"));
         }
-        for (i, name) in header.iter().enumerate() {
-            if !name.is_empty() && header[..i].contains(name) {
+        let mut seen = HashSet::with_capacity(header.len());
+        for name in header.iter().filter(|name| !name.is_empty()) {
+            if !seen.insert(name.as_str()) {
                 let found = format!("column '{}' twice", shortened(name));
                 return Err(complain(found, "each column once"));
             }
@@ -115,7 +117,7 @@ impl<R: Read> TableReader<R> {
                     Ok(row)
                 } else {
                     Err(row.error(
-                        format!("{found} fields"),
+                        counted(found, "field"),
                         format!("{wanted}, as in the header"),
                     ))
                 })
@@ -204,11 +206,7 @@ impl<R: Read> Read for LineCounter<R> {
 
 /// Long or multi-line text cut down to what fits an error line.
 fn shortened(text: &str) -> String {
-    let mut short: String = text
-        .chars()
-        .map(|c| if c.is_control() { ' ' } else { c })
-        .take(60)
-        .collect();
+    let mut short: String = plain(text).chars().take(60).collect();
     if text.chars().count() > 60 {
         short.push_str("...");
     }

@@ -20,7 +20,6 @@ mod machine;
 
 use std::fmt;
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicU8, Ordering};
 
 pub use isa::{Isa, LANES, LaneMask, Pack, Piece};
 pub use machine::{BASELINE, Baseline};
@@ -48,16 +47,12 @@ pub trait Work {
     fn run<I: Isa>(self, isa: I) -> Self::Output;
 }
 
-/// Why a kernel cannot be chosen.
+/// Why a kernel cannot be had.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("kernel '{kernel}' needs instructions that this processor does not have")]
 pub struct Unavailable {
     pub kernel: Kernel,
 }
-
-/// The kernel that erased structures run by: its place in [`Kernel::ALL`] plus
-/// one, or 0 if nobody has chosen yet.
-static CHOSEN: AtomicU8 = AtomicU8::new(0);
 
 impl Kernel {
     /// From the smallest instruction set to the largest.
@@ -94,24 +89,14 @@ impl Kernel {
         Kernel::available().last().unwrap_or(Kernel::Portable)
     }
 
-    /// Makes this the kernel of the whole process, from the next query on.
+    /// Itself, if this machine runs it.
     ///
     /// # Errors
-    /// The processor lacks it; nothing has changed then.
-    pub fn choose(self) -> Result<(), Unavailable> {
-        if !self.is_available() {
-            return Err(Unavailable { kernel: self });
-        }
-        CHOSEN.store(self as u8 + 1, Ordering::Relaxed);
-        Ok(())
-    }
-
-    /// The kernel of the process: the last one chosen, else the best.
-    #[inline]
-    pub fn chosen() -> Kernel {
-        match CHOSEN.load(Ordering::Relaxed) {
-            0 => Kernel::best(),
-            place => Kernel::ALL[usize::from(place - 1) % Kernel::ALL.len()],
+    /// The processor lacks it.
+    pub fn checked(self) -> Result<Kernel, Unavailable> {
+        match self.is_available() {
+            true => Ok(self),
+            false => Err(Unavailable { kernel: self }),
         }
     }
 

@@ -3,8 +3,6 @@
 //! rounds, so that a ratio to it is paired like any other. It owns the table of
 //! bounds and what each of them does.
 
-use std::time::Duration;
-
 use super::{Competitor, Contender, Workload};
 use crate::geometry::{Aabb, BoxBlocks};
 use crate::index::{RegionIndex, Trace, Wide};
@@ -32,6 +30,14 @@ pub struct Material<'a> {
     pub visible: &'a [u64],
 }
 
+impl Material<'_> {
+    /// The kernel that the contenders are asked by.
+    fn kernel(&self) -> Kernel {
+        let first = self.contenders.first();
+        first.map_or_else(Kernel::best, |c| c.spec.execution.kernel)
+    }
+}
+
 /// All bounds, in the order in which they are shown.
 pub static BOUNDS: &[Bound] = &[
     Bound {
@@ -54,7 +60,7 @@ pub static BOUNDS: &[Bound] = &[
     },
 ];
 
-/// A pass over the blocks as the chosen kernel does it.
+/// A pass over the blocks as a kernel does it.
 struct Read<'a>(&'a BoxBlocks);
 
 impl Work for Read<'_> {
@@ -68,13 +74,14 @@ impl Work for Read<'_> {
 
 fn read<'a>(material: &Material<'a>) -> Option<Competitor<'a>> {
     let blocks = blocks_of(&material.workload.items);
+    let kernel = material.kernel();
     (!blocks.is_empty()).then(|| Competitor {
         ask: Box::new(move |_, _| {
-            std::hint::black_box(Kernel::chosen().run(Read(&blocks)));
+            std::hint::black_box(kernel.run(Read(&blocks)));
         }),
         ask_many: None,
         expected: vec![0; material.visible.len()],
-        slowest: Duration::ZERO,
+        least_ns: None,
     })
 }
 
@@ -108,7 +115,7 @@ fn memcpy<'a>(material: &Material<'a>) -> Option<Competitor<'a>> {
                 out.extend_from_slice(&ids[start..start + lengths[place]]);
             }),
             ask_many: None,
-            slowest: Duration::ZERO,
+            least_ns: None,
         })
 }
 
@@ -117,7 +124,7 @@ fn replay<'a>(material: &Material<'a>) -> Option<Competitor<'a>> {
     let wide = material
         .contenders
         .iter()
-        .find(|c| c.spec.backend.name == Wide::NAME && c.built.is_ok())?;
+        .find(|c| c.spec.row.info.name == Wide::INFO.name && c.built.is_ok())?;
     let params = serde_json::from_value(wide.spec.params.clone()).ok()?;
     let tree = Wide::build(&material.workload.items, None, &params).ok()?;
     let views = material.workload.views.iter();
@@ -133,7 +140,7 @@ fn replay<'a>(material: &Material<'a>) -> Option<Competitor<'a>> {
         expected: material.visible.to_vec(),
         ask: Box::new(move |place, out| traces[place].replay(&tree, out)),
         ask_many: None,
-        slowest: Duration::ZERO,
+        least_ns: None,
     })
 }
 

@@ -3,7 +3,7 @@
 //! pass's business.
 
 use super::competitor::Competitor;
-use super::timing::Protocol;
+use super::schedule::Protocol;
 use crate::query::ItemId;
 
 /// Room behind the answer that a structure may ask for while it writes it.

@@ -1,14 +1,16 @@
 //! Those that take part in a timed pass: the questions there are, and how a
 //! structure answers them. Clocks and rounds are the pass's own.
 
-use std::cell::RefCell;
-use std::time::Duration;
+use std::cell::{Cell, RefCell};
 
-use super::{Built, Counted, Workload};
+use serde::{Deserialize, Serialize};
+
+use super::{Answer, Built, Workload};
 use crate::query::{ItemId, Located};
 
 /// Which of the two questions is asked.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Task {
     /// What does the camera see?
     Query,
@@ -32,7 +34,7 @@ impl Task {
 pub type Ask<'a> = Box<dyn Fn(usize, &mut Vec<ItemId>) + 'a>;
 
 /// Answers several queries at once; the number of ids of them all.
-pub type AskMany<'a> = Box<dyn Fn(&[usize]) -> u64 + 'a>;
+pub type AskMany<'a> = Box<dyn Fn(&[u32]) -> u64 + 'a>;
 
 /// One that takes part in a timed pass: how it answers query `place`
 /// (appending to an empty output), and what it must return.
@@ -42,29 +44,37 @@ pub struct Competitor<'a> {
     pub ask_many: Option<AskMany<'a>>,
     /// Number of ids of every query.
     pub expected: Vec<u64>,
-    /// Wall time of its slowest query so far: bounds the length of a pass.
-    pub slowest: Duration,
+    /// What a query surely takes, ns, from what was counted: the same in every
+    /// run. `None` where nothing was counted.
+    pub least_ns: Option<f64>,
 }
 
 impl<'a> Competitor<'a> {
     /// A structure that counted right, asked a task of a workload.
     pub(super) fn of(
         task: Task,
+        label: &str,
         workload: &'a Workload,
         built: &'a Built,
-        counted: &Counted,
+        answers: &[Answer],
+        least_ns: Option<f64>,
     ) -> Self {
         let ask: Ask = match task {
             Task::Query => {
                 let index = built.items.as_ref();
-                Box::new(move |place, out| index.see(workload.views[place].as_any(), out))
+                let ask = move |place: usize, out: &mut Vec<ItemId>| {
+                    index.see(workload.views[place].as_any(), out);
+                };
+                match slowed(label) {
+                    Some(every) => twice_in(every, ask),
+                    None => Box::new(ask),
+                }
             }
             Task::Locate | Task::LocateBatched => {
                 let index = built.regions();
                 Box::new(move |place, out| {
-                    let p = workload.points[place];
-                    index.locate(p, out);
-                    workload.refine(p, out);
+                    index.locate(workload.points[place], out);
+                    workload.refine(place, out);
                 })
             }
         };
@@ -72,28 +82,45 @@ impl<'a> Competitor<'a> {
         Competitor {
             ask,
             ask_many,
-            expected: match task {
-                Task::Query => counted.frames.iter().map(|f| f.visible).collect(),
-                Task::Locate | Task::LocateBatched => counted.locate.found.clone(),
-            },
-            slowest: counted.slowest,
+            expected: answers.iter().map(|a| a.count).collect(),
+            least_ns,
         }
     }
 
     /// Asks the queries of some places; the number of ids returned.
     #[inline]
-    pub(super) fn ask_all(&self, places: &[usize], out: &mut Vec<ItemId>) -> u64 {
+    pub(super) fn ask_all(&self, places: &[u32], out: &mut Vec<ItemId>) -> u64 {
         if let Some(ask_many) = &self.ask_many {
             return ask_many(places);
         }
         let mut returned = 0;
         for &place in places {
             out.clear();
-            (self.ask)(place, out);
+            (self.ask)(place as usize, out);
             returned += std::hint::black_box(&*out).len() as u64;
         }
         returned
     }
+}
+
+/// `CULLBENCH_SLOWED=octree:20` makes a build whose octree answers every 20th
+/// query twice, 5 % more work: scripts/check-compare.sh shows with it that
+/// `compare --against` finds such a change.
+fn slowed(label: &str) -> Option<usize> {
+    let (name, every) = option_env!("CULLBENCH_SLOWED")?.split_once(':')?;
+    every.parse().ok().filter(|_| name == label)
+}
+
+fn twice_in<'a>(every: usize, ask: impl Fn(usize, &mut Vec<ItemId>) + 'a) -> Ask<'a> {
+    let asked = Cell::new(0_usize);
+    Box::new(move |place, out| {
+        asked.set(asked.get() + 1);
+        if asked.get().is_multiple_of(every) {
+            ask(place, out);
+            out.clear();
+        }
+        ask(place, out);
+    })
 }
 
 /// Region search for several points of the path in one call. The memory for
@@ -104,16 +131,17 @@ fn located_at_once<'a>(workload: &'a Workload, built: &'a Built) -> AskMany<'a> 
     Box::new(move |places| {
         let (points, located, region) = &mut *kept.borrow_mut();
         points.clear();
-        points.extend(places.iter().map(|&place| workload.points[place]));
+        points.extend(places.iter().map(|&place| workload.points[place as usize]));
         index.locate_many(points, located);
-        if workload.scene.regions.are_boxes() {
+        let refined = |&place: &u32| workload.scene.is_refined(&workload.sought[place as usize]);
+        if !places.iter().any(refined) {
             return std::hint::black_box(&*located).ids().len() as u64;
         }
         let mut found = 0;
-        for (&p, ids) in points.iter().zip(located.iter()) {
+        for (&place, ids) in places.iter().zip(located.iter()) {
             region.clear();
             region.extend_from_slice(ids);
-            workload.refine(p, region);
+            workload.refine(place as usize, region);
             found += std::hint::black_box(&*region).len() as u64;
         }
         found
@@ -142,14 +170,22 @@ mod tests {
             .map(|place| {
                 let mut out = Vec::new();
                 built.regions().locate(workload.points[place], &mut out);
-                workload.refine(workload.points[place], &mut out);
+                workload.refine(place, &mut out);
                 out.len() as u64
             })
             .collect();
         assert!(alone.iter().sum::<u64>() > 0, "{alone:?}");
         let ask_many = located_at_once(&workload, &built);
-        for places in [(0..alone.len()).collect(), vec![7], vec![], vec![9, 2]] {
-            let wanted: u64 = places.iter().map(|&place: &usize| alone[place]).sum();
+        for places in [
+            (0..alone.len() as u32).collect(),
+            vec![7],
+            vec![],
+            vec![9, 2],
+        ] {
+            let wanted: u64 = places
+                .iter()
+                .map(|&place: &u32| alone[place as usize])
+                .sum();
             assert_eq!(ask_many(&places), wanted, "{places:?}");
         }
     }

@@ -2,17 +2,12 @@
 //! data so that nobody is warmed by a neighbour. It owns the timing of the
 //! build and the net under panics.
 
-use std::time::Duration;
-
 use super::clock::Stopwatch;
+use super::update::measure_updates;
 use super::{Status, Verdict};
 use crate::culling::CullingTest;
-use crate::geometry::Aabb;
 use crate::index::{BuildError, DynIndex, MemoryUsage, StructureSpec, caught};
-use crate::query::ItemId;
 use crate::scene::Scene;
-use crate::statistics::median;
-use crate::threads;
 
 /// A structure with its two indexes: over the items (what does the camera
 /// see) and over the regions (where is the camera).
@@ -27,11 +22,11 @@ pub struct Built {
     pub items: Box<dyn DynIndex>,
     /// `None` where the regions are the items as they are indexed.
     regions: Option<Box<dyn DynIndex>>,
-    /// CPU time of one build over the items, median of all builds, ms; wall time
+    /// CPU time of one build over the items, ms; wall time
     /// where builds have several threads.
     pub build_ms: f64,
     pub memory: MemoryUsage,
-    /// CPU time of an update, ms, for each of [`UPDATE_SHARES`]; empty for
+    /// CPU time of an update, ms, for each of [`super::UPDATE_SHARES`]; empty for
     /// scenes too large to be moved in passing.
     pub update_ms: Vec<f64>,
 }
@@ -43,14 +38,11 @@ impl Built {
     }
 }
 
-/// Shares of the items that move in the updates that are measured.
-pub const UPDATE_SHARES: [f64; 4] = [0.001, 0.01, 0.1, 1.0];
-/// Largest scene whose updates are measured: they need a second copy of it.
-const MOST_UPDATED: usize = 2_000_000;
+/// Ending of a twin's label.
+pub(super) const TWIN: &str = "#twin";
 
-/// Builds are repeated this often, or until they have taken this long.
-const BUILDS: usize = 3;
-const BUILD_TIME: Duration = Duration::from_millis(300);
+/// Builds shorter than this are made twice, and the second one counts.
+const AGAIN_BELOW_MS: f64 = 50.0;
 
 impl Contender {
     /// Builds the structure over the items as a culling test has them; a panic or a refusal becomes its verdict.
@@ -68,10 +60,27 @@ impl Contender {
         }
     }
 
+    /// Measures updates as well, on another index that is then thrown away.
+    pub fn with_updates(mut self, scene: &Scene, test: CullingTest) -> Contender {
+        let updates = |spec: &StructureSpec| {
+            let items = test.items(&scene.items);
+            let spare = spec.build_with(&items, scene.own_tree.as_ref())?;
+            measure_updates(spec, scene, &items, spare)
+        };
+        if let Ok(built) = &mut self.built {
+            match guarded(|| updates(&self.spec)) {
+                Ok(Ok(update_ms)) => built.update_ms = update_ms,
+                Ok(Err(error)) => self.built = Err(not_built(error)),
+                Err(panicked) => self.built = Err(panicked),
+            }
+        }
+        self
+    }
+
     /// The name in samples: a twin is told apart.
     pub fn label(&self) -> String {
         match self.is_twin {
-            true => format!("{}#twin", self.spec.label),
+            true => format!("{}{TWIN}", self.spec.label),
             false => self.spec.label.clone(),
         }
     }
@@ -79,32 +88,22 @@ impl Contender {
 
 fn build(spec: &StructureSpec, scene: &Scene, test: CullingTest) -> Result<Built, Verdict> {
     let items = test.items(&scene.items);
-    let (mut times, mut index) = (Vec::new(), None);
-    let total = Stopwatch::start();
-    while times.len() < BUILDS && total.lap().wall_ns < BUILD_TIME.as_nanos() as f64 {
-        // Never two at once: a large scene would not fit twice.
-        drop(index.take());
+    let build = || {
         let watch = Stopwatch::start();
-        index = Some(
-            spec.build_with(&items, scene.own_tree.as_ref())
-                .map_err(not_built)?,
-        );
+        let built = spec.build_with(&items, scene.own_tree.as_ref());
         // This thread's CPU time says nothing about what others did for it.
         let lap = watch.lap();
-        let alone = threads::chosen() == 1;
-        times.push(if alone { lap.cpu_ns } else { lap.wall_ns } / 1e6);
-    }
-    let mut update_ms = Vec::new();
-    if let Some(spare) = index.take() {
-        update_ms = measure_updates(spec, scene, &items, spare).map_err(not_built)?;
-        index = Some(
-            spec.build_with(&items, scene.own_tree.as_ref())
-                .map_err(not_built)?,
-        );
-    }
-    let Some(index) = index else {
-        return Err(Verdict::new(Status::TimedOut, "no time left for a build"));
+        let alone = spec.execution.threads <= 1;
+        let ms = if alone { lap.cpu_ns } else { lap.wall_ns } / 1e6;
+        built.map(|index| (index, ms)).map_err(not_built)
     };
+    let (mut index, mut build_ms) = build()?;
+    if build_ms < AGAIN_BELOW_MS {
+        // The first one has paid for memory that nobody had touched. Never two
+        // at once: a large scene would not fit twice.
+        drop(index);
+        (index, build_ms) = build()?;
+    }
     let boxes = scene.regions.boxes(&scene.items);
     let regions = if std::ptr::eq(boxes, &items[..]) {
         None
@@ -116,47 +115,11 @@ fn build(spec: &StructureSpec, scene: &Scene, test: CullingTest) -> Result<Built
     };
     Ok(Built {
         memory: index.memory(),
-        build_ms: median(&times).unwrap_or(f64::NAN),
-        update_ms,
+        build_ms,
+        update_ms: Vec::new(),
         items: index,
         regions,
     })
-}
-
-/// Moves a share of the items by their own size and times bringing the index
-/// up to date; once for each share, on an index that is then thrown away.
-fn measure_updates(
-    spec: &StructureSpec,
-    scene: &Scene,
-    items: &[Aabb],
-    mut index: Box<dyn DynIndex>,
-) -> Result<Vec<f64>, BuildError> {
-    if items.is_empty() || items.len() > MOST_UPDATED {
-        return Ok(Vec::new());
-    }
-    let mut items = items.to_vec();
-    let mut times = Vec::with_capacity(UPDATE_SHARES.len());
-    for share in UPDATE_SHARES {
-        let moved = move_share(&mut items, share);
-        let watch = Stopwatch::start();
-        spec.update(&mut index, &items, scene.own_tree.as_ref(), &moved)?;
-        times.push(watch.lap().cpu_ns / 1e6);
-    }
-    Ok(times)
-}
-
-/// Moves evenly spread items by their own extent; which ones.
-pub fn move_share(items: &mut [Aabb], share: f64) -> Vec<ItemId> {
-    let count = ((items.len() as f64 * share).round() as usize).clamp(1, items.len());
-    let moved: Vec<ItemId> = (0..count)
-        .map(|i| (i * items.len() / count) as ItemId)
-        .collect();
-    for &id in &moved {
-        let b = &mut items[id as usize];
-        let step = b.extent();
-        *b = Aabb::new(b.min + step, b.max + step);
-    }
-    moved
 }
 
 /// Runs foreign code; a panic becomes a verdict with its message.

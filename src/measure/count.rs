@@ -7,35 +7,47 @@ use std::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
 
 use super::contender::guarded;
-use super::{Built, Status, Verdict, Workload};
+use super::group::Notice;
+use super::{Built, Status, Task, Verdict, Workload};
+use crate::culling::CullingTest;
 use crate::query::{ItemId, Located, QueryCost};
-use crate::verify::{
-    Difference, ErrorCount, Reference, Truth, explain_containment, explain_visibility,
-};
+use crate::verify::{ErrorCount, Fault, Trial, Truth, explain_containment, explain_visibility};
 
 /// What one contender answered and what it cost.
 #[derive(Clone, Debug)]
 pub struct Counted {
     pub verdict: Verdict,
-    pub frames: Vec<FrameCount>,
+    /// The frustum query of each camera.
+    pub frames: Vec<Answer>,
     pub cost: QueryCost,
-    pub locate: LocateCount,
-    /// Largest wall time of one counted query: bounds the timed pass.
-    pub slowest: Duration,
+    /// The region search of each eye.
+    pub located: Vec<Answer>,
+    pub locate_cost: QueryCost,
 }
 
-/// One frustum query.
-#[derive(Clone, Copy, Default, PartialEq, Eq, Debug)]
-pub struct FrameCount {
-    pub visible: u64,
-    pub id_sum: u64,
+/// A set of ids, so far as two answers are compared by it.
+#[derive(Clone, Copy, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Answer {
+    pub count: u64,
+    /// Sum over the ids of a hash of each: the order does not matter.
+    pub digest: u64,
 }
 
-/// All region searches of a path.
-#[derive(Clone, Default, Debug)]
-pub struct LocateCount {
-    pub found: Vec<u64>,
-    pub cost: QueryCost,
+impl Answer {
+    pub fn of(ids: &[ItemId]) -> Answer {
+        /// SplitMix64's finaliser (Steele, Lea and Flood 2014).
+        fn mixed(id: ItemId) -> u64 {
+            let mut z = u64::from(id).wrapping_add(0x9E37_79B9_7F4A_7C15);
+            z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+            z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+            z ^ (z >> 31)
+        }
+        Answer {
+            count: ids.len() as u64,
+            digest: ids.iter().fold(0, |all, &id| all.wrapping_add(mixed(id))),
+        }
+    }
 }
 
 impl Counted {
@@ -44,9 +56,19 @@ impl Counted {
             verdict: Verdict::ok(),
             frames: Vec::new(),
             cost: QueryCost::default(),
-            locate: LocateCount::default(),
-            slowest: Duration::ZERO,
+            located: Vec::new(),
+            locate_cost: QueryCost::default(),
         }
+    }
+
+    /// What a query of this task surely takes, ns: from counters alone, and so
+    /// the same in every run. Far below the real time of most structures.
+    pub(super) fn least_ns(&self, task: Task) -> f64 {
+        let (cost, queries) = match task {
+            Task::Query => (&self.cost, self.frames.len()),
+            Task::Locate | Task::LocateBatched => (&self.locate_cost, self.located.len()),
+        };
+        20.0 + 0.1 * cost.comparisons() as f64 / queries.max(1) as f64
     }
 }
 
@@ -55,63 +77,62 @@ const PATIENCE: Duration = Duration::from_secs(120);
 
 /// Counts and verifies. One reference serves all contenders of a frame; a
 /// contender that fails once is asked no more.
-pub fn count_pass(workload: &Workload, contenders: &[&Built]) -> Vec<Counted> {
+pub fn count_pass(
+    workload: &Workload,
+    contenders: &[(String, &Built)],
+    notice: Notice,
+) -> Vec<Counted> {
     let mut all: Vec<Counted> = contenders.iter().map(|_| Counted::new()).collect();
     let mut spent = vec![Duration::ZERO; contenders.len()];
     let items = &workload.items;
-    let mut out = Vec::new();
-    let mut reference = Reference::new(items.len());
+    let mut trial = Trial::new(items.len());
     for (frame, view) in workload.views.iter().enumerate() {
         let view = view.as_any();
-        reference.see(items, view);
-        for (i, contender) in contenders.iter().enumerate() {
+        trial.see(items, view);
+        for (i, (label, contender)) in contenders.iter().enumerate() {
             let counted = &mut all[i];
             if counted.verdict.status != Status::Ok {
                 continue;
             }
-            out.clear();
+            notice(Some(label), "counting");
             let start = Instant::now();
             let cost = &mut counted.cost;
-            let asked = guarded(|| contender.items.see_counted(view, &mut out, cost));
-            let took = start.elapsed();
-            spent[i] += took;
-            counted.slowest = counted.slowest.max(took);
-            counted.frames.push(FrameCount {
-                visible: out.len() as u64,
-                id_sum: id_sum(&out),
-            });
-            let difference = reference.compare(&out);
-            counted.verdict = verdict(asked, spent[i], difference, || {
-                let what = format!("camera {frame}: {difference}");
-                explained(what, difference, |id| explain_visibility(&items[id], view))
-            });
+            let asked = trial.ask(|out| contender.items.see_counted(view, out, cost));
+            spent[i] += start.elapsed();
+            counted.verdict = verdict(
+                asked.map(drop),
+                spent[i],
+                &format!("camera {frame}"),
+                |id| explain_visibility(&items[id], view),
+            );
+            counted.frames.push(Answer::of(trial.answer()));
         }
     }
     let regions = &workload.scene.regions;
     let boxes = regions.boxes(&workload.scene.items);
-    let mut reference = Reference::new(boxes.len());
+    let mut trial = Trial::new(boxes.len());
     for (n, &p) in workload.points.iter().enumerate() {
-        reference.expect(regions.holding(p, &workload.scene.items).into_iter());
-        for (i, contender) in contenders.iter().enumerate() {
+        trial.expect(workload.scene.holding(&workload.sought[n]));
+        for (i, (label, contender)) in contenders.iter().enumerate() {
             let counted = &mut all[i];
             if counted.verdict.status != Status::Ok {
                 continue;
             }
-            out.clear();
+            notice(Some(label), "counting");
             let start = Instant::now();
-            let cost = &mut counted.locate.cost;
-            let asked = guarded(|| contender.regions().locate_counted(p, &mut out, cost));
-            spent[i] += start.elapsed();
-            workload.refine(p, &mut out);
-            counted.locate.found.push(out.len() as u64);
-            let difference = reference.compare(&out);
-            counted.verdict = verdict(asked, spent[i], difference, || {
-                let what = format!("point {n}: {difference}");
-                explained(what, difference, |id| explain_containment(&boxes[id], p))
+            let cost = &mut counted.locate_cost;
+            let asked = trial.ask(|out| {
+                contender.regions().locate_counted(p, out, cost);
+                workload.refine(n, out);
             });
+            spent[i] += start.elapsed();
+            counted.verdict = verdict(asked.map(drop), spent[i], &format!("point {n}"), |id| {
+                explain_containment(&boxes[id], p)
+            });
+            counted.located.push(Answer::of(trial.answer()));
         }
     }
-    for (counted, contender) in all.iter_mut().zip(contenders) {
+    for (counted, (_, contender)) in all.iter_mut().zip(contenders) {
         if counted.verdict.status == Status::Ok {
             counted.verdict = batch_verdict(workload, contender);
         }
@@ -162,58 +183,53 @@ pub fn judge(workload: &Workload, most: usize) -> Judged {
     for n in 0..wanted {
         let frame = n * count / wanted;
         let camera = &workload.cameras[frame];
-        let Some(truth) = Truth::of_camera(camera, scene.origin, &scene.items) else {
+        let Some(truth) = Truth::of_scene(camera, scene) else {
             continue;
         };
         let view = workload.views[frame].as_any();
         let seen = workload.items.iter().zip(0..).filter(|(b, _)| view.sees(b));
         let answer: Vec<ItemId> = seen.map(|(_, id)| id).collect();
-        judged.errors += truth.errors(&scene.items, &answer);
+        let errors = truth.errors(&scene.items, &answer);
+        judged.errors += match workload.culling.test {
+            CullingTest::Sphere => errors.of_spheres(),
+            CullingTest::Exact => errors.of_exact_test(),
+            CullingTest::SixPlane | CullingTest::SixBox => errors,
+        };
         judged.judged_queries += 1;
     }
     judged
 }
 
-fn explained(
-    what: String,
-    difference: Difference,
-    explain: impl FnOnce(usize) -> String,
-) -> String {
-    match difference.first {
-        Some(id) => format!("{what}: {}", explain(id as usize)),
-        None => what,
-    }
-}
-
+/// What an answer makes of a structure. A false negative is worse than anything
+/// that is returned too much.
 fn verdict(
-    asked: Result<(), Verdict>,
+    asked: Result<(), Fault>,
     spent: Duration,
-    difference: Difference,
-    explain: impl FnOnce() -> String,
+    question: &str,
+    explain: impl FnOnce(usize) -> String,
 ) -> Verdict {
-    if let Err(panicked) = asked {
-        return panicked;
+    match asked {
+        Err(fault) => {
+            let status = Status::of(&fault);
+            let told = fault.explained(|id| Some(explain(id)));
+            match status {
+                Status::Panicked => Verdict::new(status, told),
+                _ => Verdict::new(status, format!("{question}: {told}")),
+            }
+        }
+        Ok(()) if spent > PATIENCE => {
+            let reason = format!("the count pass took longer than {} s", PATIENCE.as_secs());
+            Verdict::new(Status::TimedOut, reason)
+        }
+        Ok(()) => Verdict::ok(),
     }
-    if !difference.is_none() {
-        let status = if difference.missing > 0 {
-            Status::Unsafe
-        } else {
-            Status::Wrong
-        };
-        return Verdict::new(status, explain());
-    }
-    if spent > PATIENCE {
-        let reason = format!("the count pass took longer than {} s", PATIENCE.as_secs());
-        return Verdict::new(Status::TimedOut, reason);
-    }
-    Verdict::ok()
 }
 
 /// Counters must fit the structure: something that calls itself a structure
 /// but looks at (almost) every item for a sliver of the scene is reported.
 fn note_scan(counted: &mut Counted, items: usize) {
     let queries = counted.frames.len().max(1) as u64;
-    let visible: u64 = counted.frames.iter().map(|f| f.visible).sum();
+    let visible: u64 = counted.frames.iter().map(|f| f.count).sum();
     let sliver = visible * 1000 <= queries * items as u64;
     let compared = counted.cost.comparisons() / queries;
     if counted.verdict.status == Status::Ok

@@ -58,6 +58,7 @@ pub struct Source {
 }
 
 impl Machine {
+    /// This machine, with the best kernel that it runs.
     pub fn capture() -> Machine {
         let wanted = RefreshKind::nothing()
             .with_cpu(CpuRefreshKind::nothing())
@@ -69,13 +70,21 @@ impl Machine {
         Machine {
             cpu: brand.filter(|brand| !brand.is_empty()),
             features: simd_features(),
-            instruction_set: Kernel::chosen().name().to_owned(),
+            instruction_set: Kernel::best().name().to_owned(),
             cores: std::thread::available_parallelism().map_or(1, usize::from),
             caches: caches(Path::new("/sys/devices/system/cpu/cpu0/cache")),
             memory_bytes: system.map(|s| s.total_memory()),
             os: System::long_os_version().ok(),
             kernel: System::kernel_version().ok(),
             load: System::load_average().ok().map(|load| load.one),
+        }
+    }
+
+    /// The same machine, asked by that kernel.
+    pub fn by(self, kernel: Kernel) -> Machine {
+        Machine {
+            instruction_set: kernel.name().to_owned(),
+            ..self
         }
     }
 

@@ -25,17 +25,17 @@ macro_rules! metrics {
 metrics! {
     "visible_count", "items", "visible items a query, mean over the path";
     "cull_rate", "1", "1 - visible/total, mean over the path";
-    "query_ns", "ns", "thread CPU time of a frustum query: median over the frames, each the median over the rounds; interval over the rounds";
-    "query_ns_p5", "ns", "5th percentile over the frames";
-    "query_ns_p95", "ns", "95th percentile over the frames";
-    "query_ns_p99", "ns", "99th percentile over the frames";
-    "query_ns_max", "ns", "slowest frame";
+    "query_ns", "ns", "thread CPU time per frustum query, mean over the timed cameras: trimmed mean over the processes, each the interquartile mean over its rounds; interval over the processes";
+    "query_ns_p5", "ns", "5th percentile over groups of cameras that are the same for all structures; absent below twenty groups";
+    "query_ns_p95", "ns", "95th percentile over groups of cameras that are the same for all structures; absent below twenty groups";
+    "query_ns_p99", "ns", "99th percentile over groups of cameras that are the same for all structures; absent below twenty groups";
+    "query_ns_max", "ns", "slowest group of cameras";
     "query_wall_ns", "ns", "as query_ns, wall time";
     "ns_per_visible", "ns", "CPU time of all queries / visible items of all queries";
-    "ratio_to_linear", "1", "time of linear / time of this structure, paired by round: above 1 is faster";
-    "times_read", "1", "time of this structure / time of reading all item bounds once (bound-read), paired by round: what a scan is above the memory's speed";
-    "times_memcpy", "1", "time of this structure / time of copying as many ids (bound-memcpy), paired by round: what an answer is above its own size";
-    "times_replay", "1", "time of this structure / time of a replay of what 'wide' reads and copies, paired by round; only beside wide";
+    "speedup", "1", "time of linear / time of this structure: above 1 is faster; the ratio of the two query_ns";
+    "times_read", "1", "time of this structure / time of reading all item bounds once (bound-read): what a scan is above the memory's speed";
+    "times_memcpy", "1", "time of this structure / time of copying as many ids (bound-memcpy): what an answer is above its own size";
+    "times_replay", "1", "time of this structure / time of a replay of what 'wide' reads and copies; only beside wide";
     "nodes_tested", "nodes", "node bounds classified a query, mean";
     "planes_tested", "planes", "plane tests a query, of nodes and items, mean";
     "items_tested", "items", "item bounds tested a query, mean";
@@ -47,16 +47,17 @@ metrics! {
     "worst_miss", "world units", "how deep the deepest false negative reaches into the view";
     "undecided_count", "items", "too close to a tie for the truth itself (called a touch), a judged query, mean";
     "judged_queries", "queries", "cameras of the path whose answers were judged against the exact truth";
-    "build_ms", "ms", "CPU time of a build, median of up to three";
+    "build_ms", "ms", "CPU time of a build; wall time with --threads above 1";
     "update_ms_0_1_percent", "ms", "CPU time of an update after 0.1 % of the items have moved (scenes of up to 2 million)";
     "update_ms", "ms", "as above, 1 % moved";
     "update_ms_10_percent", "ms", "as above, 10 % moved";
     "update_ms_100_percent", "ms", "as above, all moved";
+    "refitted_over_rebuilt", "1", "query time after 32 updates of 1 % each / query time on a fresh build of the same boxes, for structures that refit";
     "memory_bytes_per_item", "bytes", "nodes, item bounds and ids / items";
     "break_even_queries", "queries", "queries after which the build is repaid against linear; empty if never";
-    "locate_ns", "ns", "thread CPU time of a region search at the eye, mean over the path, median over the rounds";
-    "locate_batched_ns", "ns", "thread CPU time of a region search when all points of the path are asked at once, a point; median over the rounds";
-    "locate_ratio_to_linear", "1", "as ratio_to_linear, for region search";
+    "locate_ns", "ns", "thread CPU time of a region search at the eye, mean over the timed cameras; as query_ns";
+    "locate_batched_ns", "ns", "thread CPU time of a region search when all points of the path are asked at once, per point; as query_ns";
+    "locate_speedup", "1", "as speedup, for region search";
     "comparisons", "bounds", "bounds looked at a region search, of nodes and items, mean";
     "regions_found", "regions", "regions that hold the eye, mean over the path";
 }
@@ -105,9 +106,15 @@ impl Metrics {
         self.set(name, sum / count);
     }
 
+    pub(super) fn interval(&mut self, name: &str, value: f64, interval: Option<(f64, f64)>) {
+        self.insert(name, value, interval);
+    }
+
+    /// An interval that is not known is NaN on both sides, and absent here.
     pub(super) fn estimate(&mut self, name: &str, estimate: Option<Estimate>) {
         if let Some(e) = estimate {
-            self.insert(name, e.value, Some((e.lower, e.upper)));
+            let interval = Some((e.lower, e.upper)).filter(|i| i.0.is_finite());
+            self.insert(name, e.value, interval);
         }
     }
 }

@@ -7,31 +7,43 @@
 //! [`Cell`]s with named metrics. [`BOUNDS`] take part in the timed rounds only.
 
 mod bounds;
-mod cell;
 mod clock;
 mod cold;
 mod competitor;
 mod contender;
 mod count;
 mod environment;
+mod experiment;
+mod group;
 mod metrics;
 mod orders;
+mod part;
 mod question;
+mod results;
+mod schedule;
 mod timing;
+mod update;
 mod workload;
 
 use serde::{Deserialize, Serialize};
 
+use crate::verify::Fault;
+
 pub use bounds::{BOUNDS, Bound, Material};
-pub use cell::{Cell, Group, TwinRatio, measure_group, paired_ratio};
 pub use clock::{Lap, Stopwatch};
 pub use competitor::{Ask, AskMany, Competitor, Task};
-pub use contender::{Built, Contender, UPDATE_SHARES, guarded, move_share};
-pub use count::{Counted, FrameCount, Judged, LocateCount, count_pass, id_sum, judge};
+pub use contender::{Built, Contender, guarded};
+pub use count::{Answer, Counted, Judged, count_pass, id_sum, judge};
 pub use environment::{Machine, Source, Toolchain};
+pub use experiment::{Effort, ExperimentError, Plan, PlannedScene, Question, Share, measure_scene};
+pub use group::{GroupPlan, Notice, measure_part};
 pub use metrics::{METRICS, Metric, MetricInfo};
+pub use part::{CellKey, GroupKey, Known, NamedSchedule, Part, SubjectPart, TaskPart, TaskSamples};
 pub use question::{PathInfo, SceneInfo};
-pub use timing::{Protocol, Sample, Timed, harness_overhead_ns, timed_rounds};
+pub use results::{Cell, CellTimes, Group, YARDSTICK, measure_group};
+pub use schedule::{CLOCK_NS, Protocol, Schedule, TaskPlan, cameras_within};
+pub use timing::{Sample, Timed, paired_ratio, timed, timed_rounds};
+pub use update::{UPDATE_SHARES, move_share};
 pub use workload::{Workload, WorkloadError};
 
 /// What became of a cell. A gap is never silent.
@@ -68,6 +80,16 @@ impl Status {
         }
     }
 
+    /// What a wrong answer makes of a structure: a false negative is worse than
+    /// anything that is returned too much.
+    pub fn of(fault: &Fault) -> Status {
+        match fault {
+            Fault::Panicked(_) => Status::Panicked,
+            Fault::Differs(difference) if difference.missing > 0 => Status::Unsafe,
+            Fault::Differs(_) => Status::Wrong,
+        }
+    }
+
     /// Whether this means a wrong answer (exit code 1).
     pub fn is_failure(self) -> bool {
         matches!(self, Status::Wrong | Status::Unsafe | Status::Panicked)
@@ -75,7 +97,7 @@ impl Status {
 }
 
 /// A status with its reason.
-#[derive(Clone, PartialEq, Eq, Debug)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub struct Verdict {
     pub status: Status,
     pub reason: Option<String>,

@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Workload;
+use super::{GroupKey, Workload};
 use crate::path;
 use crate::scene::Scene;
 
@@ -23,6 +23,20 @@ pub struct SceneInfo {
 }
 
 impl SceneInfo {
+    /// Of a scene that could not be looked at.
+    pub fn unknown(name: &str) -> SceneInfo {
+        SceneInfo {
+            name: name.to_owned(),
+            total_count: 0,
+            region_count: 0,
+            origin: [0.0; 3],
+            bounds_min: [0.0; 3],
+            bounds_max: [0.0; 3],
+            skipped_items: 0,
+            digest: String::new(),
+        }
+    }
+
     pub fn of(scene: &Scene) -> SceneInfo {
         let bounds = scene.world_bounds();
         SceneInfo {
@@ -57,6 +71,19 @@ pub struct PathInfo {
 }
 
 impl PathInfo {
+    /// Of a path that could not be looked at.
+    pub fn unknown(key: &GroupKey) -> PathInfo {
+        PathInfo {
+            name: key.path.clone(),
+            camera_count: 0,
+            cache: key.cache.clone(),
+            planes: key.planes.clone(),
+            epsilon: key.epsilon,
+            arithmetic: key.arithmetic.clone(),
+            digest: None,
+        }
+    }
+
     pub fn of(path: &str, workload: &Workload, cold: bool) -> PathInfo {
         let culling = &workload.culling;
         PathInfo {

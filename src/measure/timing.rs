@@ -1,45 +1,28 @@
-//! The timed pass: rounds in balanced random order over all contenders, each
-//! warmed up, several queries per clock reading where one is short. When it is
-//! to be cold, the caches are streamed over before every camera's queries.
+//! The timed pass: rounds in balanced random order over all tasks, each warmed
+//! up, several queries per clock reading where one is short. When it is to be
+//! cold, the caches are streamed over before every camera's queries. What is
+//! timed and how often is the [`Schedule`]'s.
 
+use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
+
+use serde::{Deserialize, Serialize};
 
 use super::clock::Stopwatch;
 use super::cold::Cold;
 use super::competitor::Competitor;
 use super::contender::guarded;
 use super::orders::Orders;
+use super::schedule::{Protocol, Schedule};
 use super::{Status, Verdict};
 use crate::query::ItemId;
+use crate::statistics::{Estimate, bootstrap_median, interquartile_mean};
 
-/// How long and how often to measure.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Protocol {
-    pub min_rounds: usize,
-    pub max_rounds: usize,
-    /// After `min_rounds`, no new round begins past this time.
-    pub budget: Duration,
-    /// Longest a single pass of the slowest contender may take; frames are
-    /// thinned out evenly to keep to it.
-    pub pass: Duration,
-    /// Stream over the caches before every query.
-    pub cold: bool,
-    pub seed: u64,
-    /// Cost of one clock reading and its loop, from [`harness_overhead_ns`].
-    pub overhead_ns: f64,
-    /// Bytes to stream over for a cold query.
-    pub cache_bytes: usize,
-}
+/// Longest warm-up before each pass of a task.
+const WARM_UP: Duration = Duration::from_millis(2);
 
-/// Queries are batched until the harness takes at most this share of a lap.
-pub const MOST_OVERHEAD: f64 = 0.02;
-/// Longest warm-up before each contender's pass.
-const WARM_UP: Duration = Duration::from_millis(20);
-/// Cold queries cost a sweep over memory each: fewer of them.
-const COLD_FRAMES: usize = 24;
-
-/// One clock reading: `queries` consecutive queries from `frame` on.
-#[derive(Clone, Copy, PartialEq, Debug)]
+/// One clock reading: `queries` consecutive timed cameras from `frame` on.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Sample {
     pub round: u32,
     pub frame: u32,
@@ -51,361 +34,293 @@ pub struct Sample {
     pub returned: u64,
 }
 
-/// The samples of one contender, rounds in order, frames in order.
+/// The samples of one task, rounds in order, cameras in order.
 #[derive(Clone, Default, Debug)]
 pub struct Timed {
     pub samples: Vec<Sample>,
+    /// Rounds in which the task took part.
     pub rounds: usize,
 }
 
 impl Timed {
-    /// The samples of a round.
-    pub fn of_round(&self, round: usize) -> impl Iterator<Item = &Sample> {
-        let of_round = move |s: &&Sample| s.round as usize == round;
-        self.samples.iter().filter(of_round)
-    }
-
-    /// Mean CPU time of a query in each round, ns.
-    pub fn round_means(&self) -> Vec<f64> {
-        (0..self.rounds)
+    /// Mean time per query of each round the task took part in, over all timed
+    /// cameras, by one of the clocks; ns.
+    pub fn round_means(&self, clock: impl Fn(&Sample) -> f64) -> Vec<f64> {
+        let rounds = self.samples.chunk_by(|a, b| a.round == b.round);
+        rounds
             .map(|round| {
-                let (mut spent, mut queries) = (0.0, 0.0);
-                for s in self.of_round(round) {
-                    spent += s.cpu_ns * f64::from(s.queries);
-                    queries += f64::from(s.queries);
-                }
+                let queries: f64 = round.iter().map(|s| f64::from(s.queries)).sum();
+                let spent: f64 = round.iter().map(|s| clock(s) * f64::from(s.queries)).sum();
                 spent / queries
             })
-            .filter(|mean| mean.is_finite())
+            .filter(|mean| mean.is_finite() && *mean > 0.0)
             .collect()
+    }
+
+    /// The time of this task in this process: interquartile mean over the rounds
+    /// of the logarithm of CPU ns per query. `None` without rounds.
+    pub fn ln_ns(&self) -> Option<f64> {
+        let means = self.round_means(|s| s.cpu_ns);
+        interquartile_mean(&means.iter().map(|ns| ns.ln()).collect::<Vec<_>>())
+    }
+
+    /// [`Timed::ln_ns`] as a time, ns.
+    pub fn ns(&self) -> Option<f64> {
+        self.ln_ns().map(f64::exp)
+    }
+
+    /// Time of this task / time of `other`, in one process: no interval.
+    pub fn over(&self, other: &Timed) -> Option<f64> {
+        Some((self.ln_ns()? - other.ln_ns()?).exp())
     }
 }
 
-/// Times all competitors on `count` queries each. `stop` ends the pass early
-/// (its samples are then worthless and the result is `None`).
-///
-/// A sample whose number of ids differs from what was expected makes its
-/// competitor `wrong`.
+/// Time of `base` / time of `other` in one process, with a bootstrap interval
+/// over the rounds that both took part in. `None` without such rounds.
+pub fn paired_ratio(base: &Timed, other: &Timed) -> Option<Estimate> {
+    let means = |timed: &Timed| -> BTreeMap<u32, f64> {
+        let rounds = timed.samples.chunk_by(|a, b| a.round == b.round);
+        let numbers = rounds.map(|round| round[0].round);
+        numbers.zip(timed.round_means(|s| s.cpu_ns)).collect()
+    };
+    let (base, other) = (means(base), means(other));
+    let both = base.iter().filter_map(|(n, b)| Some(b / other.get(n)?));
+    bootstrap_median(&both.filter(|r| r.is_finite()).collect::<Vec<_>>(), 2)
+}
+
+/// Plans and times a pass over `count` cameras: [`Schedule::new`], [`timed`].
 pub fn timed_rounds(
     count: usize,
-    competitors: &[Competitor],
+    tasks: &[Competitor],
     protocol: &Protocol,
     stop: &dyn Fn() -> bool,
 ) -> Option<Vec<Result<Timed, Verdict>>> {
-    let places = places(count, competitors, protocol);
-    let count = places.len();
-    let results: Vec<Result<Timed, Verdict>> =
-        competitors.iter().map(|_| Ok(Timed::default())).collect();
-    if count == 0 {
-        return Some(results);
-    }
+    timed(
+        tasks,
+        &Schedule::new(count, tasks, protocol),
+        protocol,
+        stop,
+    )
+}
+
+/// Times the tasks as the schedule has it. `stop` ends the pass early (its
+/// samples are then worthless and the result is `None`).
+///
+/// A sample whose number of ids differs from what was expected makes its task
+/// `wrong`; a panic on the way is the result of its task alone.
+///
+/// # Panics
+/// If the schedule is not one of so many tasks.
+pub fn timed(
+    tasks: &[Competitor],
+    schedule: &Schedule,
+    protocol: &Protocol,
+    stop: &dyn Fn() -> bool,
+) -> Option<Vec<Result<Timed, Verdict>>> {
+    assert_eq!(tasks.len(), schedule.tasks.len(), "a plan for each task");
     let mut pass = Pass {
-        places: &places,
-        competitors,
-        results,
+        cameras: &schedule.cameras,
+        tasks,
+        results: tasks.iter().map(|_| Ok(Timed::default())).collect(),
     };
+    if schedule.cameras.is_empty() {
+        return Some(pass.results);
+    }
+    let mut cold = schedule.cold.then(|| Cold::new(protocol, tasks));
+    let mut orders = Orders::new(tasks.len(), protocol.seed);
     let mut out = Vec::new();
-    let batches: Vec<usize> = competitors
-        .iter()
-        .map(|c| match (&c.ask_many, protocol.cold) {
-            (Some(_), _) => count,
-            (None, true) => 1,
-            // A panic is its verdict when its pass comes.
-            (None, false) => {
-                guarded(|| batch_size(c, &places, protocol.overhead_ns, &mut out)).unwrap_or(1)
-            }
-        })
-        .collect();
-    let mut cold = protocol.cold.then(|| Cold::new(protocol, competitors));
-    let mut orders = Orders::new(competitors.len(), protocol.seed);
-    let start = Instant::now();
-    for round in 0..protocol.max_rounds {
-        if round >= protocol.min_rounds && start.elapsed() > protocol.budget {
-            break;
-        }
+    for round in 0..schedule.rounds {
+        let takes_part = |task: usize| round % schedule.tasks[task].every == 0;
+        let batch = |task: usize| schedule.tasks[task].batch as usize;
         if let Some(cold) = &mut cold {
-            for first in 0..count {
+            for first in 0..schedule.cameras.len() {
                 if stop() {
                     return None;
                 }
                 cold.sweep.over_caches();
                 // Whoever is first after the sweep finds the view cold as well:
                 // a new order for each camera.
-                for c in orders.next() {
-                    let out = &mut cold.outs[c];
+                for task in orders.next().into_iter().filter(|&task| takes_part(task)) {
+                    let out = &mut cold.outs[task];
                     // Points that are asked at once come once a round.
-                    if first % batches[c] == 0 {
-                        pass.guarded(c, |pass| pass.time(c, round, first, batches[c], out));
+                    if first % batch(task) == 0 {
+                        pass.guarded(task, |pass| pass.time(task, round, first, batch(task), out));
                     }
                 }
             }
         } else {
-            for c in orders.next() {
+            for task in orders.next().into_iter().filter(|&task| takes_part(task)) {
                 if stop() {
                     return None;
                 }
-                let competitor = &competitors[c];
-                pass.guarded(c, |pass| {
-                    warm_up(competitor, &places, batches[c], &mut out);
-                    for first in (0..count).step_by(batches[c]) {
-                        pass.time(c, round, first, batches[c], &mut out);
+                pass.guarded(task, |pass| {
+                    warm_up(&tasks[task], &schedule.cameras, batch(task), &mut out);
+                    for first in (0..schedule.cameras.len()).step_by(batch(task)) {
+                        pass.time(task, round, first, batch(task), &mut out);
                     }
                 });
             }
         }
+    }
+    for timed in pass.results.iter_mut().flatten() {
+        timed.rounds = timed.samples.chunk_by(|a, b| a.round == b.round).count();
     }
     Some(pass.results)
 }
 
 /// What the rounds of a pass fill in.
 struct Pass<'p, 'a> {
-    places: &'p [usize],
-    competitors: &'p [Competitor<'a>],
+    cameras: &'p [u32],
+    tasks: &'p [Competitor<'a>],
     results: Vec<Result<Timed, Verdict>>,
 }
 
 impl Pass<'_, '_> {
-    /// Does something for a competitor that has not failed yet; a panic on the
-    /// way is its verdict.
-    fn guarded(&mut self, c: usize, work: impl FnOnce(&mut Self)) {
-        if self.results[c].is_err() {
+    /// Does something for a task that has not failed yet; a panic on the way is
+    /// its result.
+    fn guarded(&mut self, task: usize, work: impl FnOnce(&mut Self)) {
+        if self.results[task].is_err() {
             return;
         }
         if let Err(verdict) = guarded(|| work(self)) {
-            self.results[c] = Err(verdict);
+            self.results[task] = Err(verdict);
         }
     }
 
-    /// Times competitor `c` on a batch of places from the `first` on, unless it
-    /// has answered wrongly before.
-    fn time(&mut self, c: usize, round: usize, first: usize, batch: usize, out: &mut Vec<ItemId>) {
-        let competitor = &self.competitors[c];
-        let Ok(timed) = &mut self.results[c] else {
+    /// Times a batch of cameras from the `first` on, unless the task has
+    /// answered wrongly before.
+    fn time(&mut self, task: usize, round: u32, first: usize, batch: usize, out: &mut Vec<ItemId>) {
+        let Ok(timed) = &mut self.results[task] else {
             return;
         };
-        let asked = &self.places[first..(first + batch).min(self.places.len())];
+        let own = &self.tasks[task];
+        let asked = &self.cameras[first..(first + batch).min(self.cameras.len())];
         let watch = Stopwatch::start();
-        let returned = competitor.ask_all(asked, out);
+        let returned = own.ask_all(asked, out);
         let lap = watch.lap();
         let queries = asked.len() as f64;
-        let expected: u64 = asked.iter().map(|&place| competitor.expected[place]).sum();
+        let expected: u64 = asked.iter().map(|&c| own.expected[c as usize]).sum();
         if returned != expected {
-            self.results[c] = Err(Verdict::new(
-                Status::Wrong,
-                format!(
-                    "the timed pass returned {returned} ids from camera {first} on, the count pass {expected}"
-                ),
-            ));
+            let reason = format!(
+                "the timed pass returned {returned} ids from camera {} on, the count pass \
+                 {expected}",
+                asked[0]
+            );
+            self.results[task] = Err(Verdict::new(Status::Wrong, reason));
             return;
         }
         timed.samples.push(Sample {
-            round: round as u32,
-            frame: asked[0] as u32,
+            round,
+            frame: asked[0],
             queries: asked.len() as u32,
             cpu_ns: lap.cpu_ns / queries,
             wall_ns: lap.wall_ns / queries,
             returned,
         });
-        timed.rounds = round + 1;
     }
 }
 
-/// The places along the path that are timed: all, or evenly thinned out so
-/// that the slowest competitor keeps to the length of a pass.
-fn places(count: usize, competitors: &[Competitor], protocol: &Protocol) -> Vec<usize> {
-    let slowest = competitors
-        .iter()
-        .map(|c| c.slowest)
-        .max()
-        .unwrap_or_default();
-    let whole = slowest.as_secs_f64() * count as f64;
-    let mut stride = (whole / protocol.pass.as_secs_f64()).ceil().max(1.0) as usize;
-    if protocol.cold {
-        stride = stride.max(count.div_ceil(COLD_FRAMES));
-    }
-    // Never so few that a path is one view.
-    let stride = stride.min((count / 8).max(1));
-    (0..count).step_by(stride).collect()
-}
-
-/// The smallest power of two of queries that makes the harness negligible.
-fn batch_size(
-    competitor: &Competitor,
-    places: &[usize],
-    overhead_ns: f64,
-    out: &mut Vec<ItemId>,
-) -> usize {
-    let count = places.len();
-    let watch = Stopwatch::start();
-    let (mut asked, started) = (0, Instant::now());
-    while asked < count && (asked < 4 || started.elapsed() < WARM_UP) {
-        competitor.ask_all(&places[asked..=asked], out);
-        asked += 1;
-    }
-    let each = (watch.lap().cpu_ns / asked as f64).max(1.0);
-    let needed = overhead_ns / (MOST_OVERHEAD * each);
-    (needed.ceil().max(1.0) as usize)
-        .next_power_of_two()
-        .min(count)
-}
-
-fn warm_up(competitor: &Competitor, places: &[usize], batch: usize, out: &mut Vec<ItemId>) {
+fn warm_up(task: &Competitor, cameras: &[u32], batch: usize, out: &mut Vec<ItemId>) {
     let started = Instant::now();
-    for places in places.chunks(batch) {
-        competitor.ask_all(places, out);
+    for cameras in cameras.chunks(batch) {
+        task.ask_all(cameras, out);
         if started.elapsed() > WARM_UP {
             break;
         }
     }
 }
 
-/// What the harness itself costs per clock reading: the very same loop over a
-/// competitor that does nothing. Nanoseconds of thread CPU time, median.
-pub fn harness_overhead_ns() -> f64 {
-    let nothing = Competitor {
-        ask: Box::new(|_, _| ()),
-        ask_many: None,
-        expected: vec![0],
-        slowest: Duration::ZERO,
-    };
-    let mut out = Vec::new();
-    let laps: Vec<f64> = (0..4096)
-        .map(|_| {
-            let watch = Stopwatch::start();
-            std::hint::black_box(&nothing).ask_all(&[0], &mut out);
-            watch.lap().cpu_ns
-        })
-        .collect();
-    crate::statistics::median(&laps).unwrap_or(0.0)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::culling::{Culling, CullingTest};
-    use crate::index::StructureSpec;
-    use crate::measure::competitor::Task;
-    use crate::measure::{Built, Contender, Workload, count_pass};
-    use crate::path::{self, LensDefaults};
-    use crate::scene;
 
     fn protocol() -> Protocol {
         Protocol {
-            min_rounds: 3,
-            max_rounds: 3,
-            budget: Duration::ZERO,
-            pass: Duration::from_millis(50),
+            rounds: [3, 3],
+            task_ns: 1e5,
+            cameras: 40,
             cold: false,
             seed: 1,
-            overhead_ns: 200.0,
             cache_bytes: 1 << 20,
         }
     }
 
-    /// Runs `check` on the timed pass of both structures over a small scene.
-    fn timed(protocol: Protocol, tamper: bool) -> Vec<Result<Timed, Verdict>> {
-        let scene = scene::load("city:n=500", &Default::default()).unwrap();
-        let path = path::load("orbit:frames=40", &scene, &LensDefaults::default()).unwrap();
-        let workload = Workload::new(&scene, &path, &Culling::default()).unwrap();
-        let built: Vec<Built> = ["linear", "bvh"]
-            .iter()
-            .map(|name| {
-                let spec = StructureSpec::parse(name).unwrap();
-                Contender::build(spec, false, &scene, CullingTest::SixPlane)
-                    .built
-                    .unwrap()
-            })
-            .collect();
-        let mut counted = count_pass(&workload, &built.iter().collect::<Vec<_>>());
-        assert!(counted.iter().all(|c| c.verdict == Verdict::ok()));
-        // Not what a loaded machine needed: how much is thinned out follows
-        // from it.
-        for counted in &mut counted {
-            counted.slowest = Duration::from_micros(10);
+    /// Returns as many ids as the camera has by `count`.
+    fn task<'a>(count: impl Fn(usize) -> u64 + 'a, expected: Vec<u64>) -> Competitor<'a> {
+        Competitor {
+            ask: Box::new(move |camera, out| out.extend((0..count(camera)).map(|id| id as ItemId))),
+            ask_many: None,
+            expected,
+            least_ns: Some(1e4),
         }
-        if tamper {
-            counted[1].frames[20].visible += 1;
-        }
-        let contenders: Vec<_> = built.iter().zip(&counted).collect();
-        let tasks = [Task::Query, Task::LocateBatched];
-        let competitors: Vec<Competitor> = tasks
-            .iter()
-            .flat_map(|&task| {
-                let contenders = contenders.iter();
-                let workload = &workload;
-                contenders
-                    .map(move |(built, counted)| Competitor::of(task, workload, built, counted))
-            })
-            .collect();
-        let count = workload.views.len();
-        let mut timed = timed_rounds(count, &competitors, &protocol, &|| false).unwrap();
-        // A pass of the second task is one batch.
-        for batched in timed.split_off(contenders.len()) {
-            let batched = batched.unwrap();
-            assert_eq!(batched.samples.len(), batched.rounds);
-        }
-        timed
     }
 
     #[test]
-    fn every_round_covers_every_frame_once() {
+    fn every_round_covers_every_timed_camera_once() {
         for cold in [false, true] {
-            for timed in timed(Protocol { cold, ..protocol() }, false) {
+            let all = [
+                task(|c| c as u64, (0..40).collect()),
+                task(|_| 0, vec![0; 40]),
+            ];
+            let protocol = Protocol { cold, ..protocol() };
+            for timed in timed_rounds(40, &all, &protocol, &|| false).unwrap() {
                 let timed = timed.unwrap();
                 assert_eq!(timed.rounds, 3);
                 for round in 0..3 {
                     let samples = timed.samples.iter().filter(|s| s.round == round);
                     let asked: u32 = samples.map(|s| s.queries).sum();
-                    assert_eq!(asked, if cold { 20 } else { 40 });
+                    assert_eq!(asked, if cold { 24 } else { 40 });
                 }
+                assert_eq!(timed.round_means(|s| s.cpu_ns).len(), 3);
             }
         }
     }
 
     #[test]
-    fn a_pass_that_would_take_too_long_is_thinned_out_for_all() {
-        let slow = |slowest: Duration| Competitor {
-            ask: Box::new(|_, _| ()),
-            ask_many: None,
-            expected: vec![0; 40],
-            slowest,
+    fn points_that_are_asked_at_once_are_one_batch() {
+        let many = Competitor {
+            ask_many: Some(Box::new(|cameras| cameras.len() as u64)),
+            ..task(|_| 1, vec![1; 40])
         };
-        let places = |slowest: [u64; 2]| {
-            let competitors = slowest.map(|us| slow(Duration::from_micros(us)));
-            places(40, &competitors, &protocol())
-        };
-        // 50 ms for 40 queries: 1250 us each.
-        assert_eq!(places([10, 1250]), (0..40).collect::<Vec<_>>());
-        assert_eq!(places([10, 1251]), (0..40).step_by(2).collect::<Vec<_>>());
-        // However slow, a path is never fewer than eight views.
-        assert_eq!(
-            places([1_000_000, 10]),
-            (0..40).step_by(5).collect::<Vec<_>>()
-        );
+        let timed = timed_rounds(40, &[many], &protocol(), &|| false).unwrap();
+        let timed = timed.into_iter().next().unwrap().unwrap();
+        assert_eq!((timed.samples.len(), timed.samples[0].queries), (3, 40));
+    }
+
+    #[test]
+    fn a_task_with_a_stride_takes_part_in_its_rounds_alone() {
+        let all = [task(|_| 0, vec![0; 40]), task(|_| 0, vec![0; 40])];
+        let mut schedule = Schedule::new(40, &all, &protocol());
+        schedule.rounds = 6;
+        schedule.tasks[1].every = 3;
+        let found = timed(&all, &schedule, &protocol(), &|| false).unwrap();
+        let rounds = |i: usize| found[i].as_ref().unwrap().rounds;
+        assert_eq!((rounds(0), rounds(1)), (6, 2));
     }
 
     #[test]
     fn a_sample_that_disagrees_with_the_count_pass_is_wrong() {
-        let results = timed(protocol(), true);
-        assert!(results[0].is_ok());
-        let verdict = results[1].as_ref().unwrap_err();
-        assert_eq!(verdict.status, Status::Wrong);
+        let mut expected: Vec<u64> = (0..40).collect();
+        let right = task(|c| c as u64, expected.clone());
+        expected[20] += 1;
+        let all = [right, task(|c| c as u64, expected)];
+        let found = timed_rounds(40, &all, &protocol(), &|| false).unwrap();
+        assert!(found[0].is_ok());
+        assert_eq!(found[1].as_ref().unwrap_err().status, Status::Wrong);
     }
 
     #[test]
-    fn a_panic_is_the_verdict_of_its_competitor_alone() {
-        let competitor = |panics_at: usize| Competitor {
-            ask: Box::new(move |place, _| assert!(place < panics_at, "deep in a peer's code")),
-            ask_many: None,
-            expected: vec![0; 40],
-            slowest: Duration::ZERO,
+    fn a_panic_is_the_result_of_its_task_alone() {
+        let panics = |at: usize| Competitor {
+            ask: Box::new(move |camera, _| assert!(camera < at, "deep in a peer's code")),
+            ..task(|_| 0, vec![0; 40])
         };
-        // In the pass itself, and before it, when the batch size is found.
-        for panics_at in [39, 0] {
-            let competitors = [competitor(40), competitor(panics_at)];
-            let results = timed_rounds(40, &competitors, &protocol(), &|| false).unwrap();
-            assert_eq!(results[0].as_ref().unwrap().rounds, 3);
-            let verdict = results[1].as_ref().unwrap_err();
+        // In the pass itself, and before it, when its cost is found.
+        for at in [39, 0] {
+            let all = [panics(40), panics(at)];
+            let found = timed_rounds(40, &all, &protocol(), &|| false).unwrap();
+            assert_eq!(found[0].as_ref().unwrap().rounds, 3);
+            let verdict = found[1].as_ref().unwrap_err();
             assert_eq!(verdict.status, Status::Panicked);
             let reason = verdict.reason.as_deref().unwrap_or_default();
             assert!(reason.contains("deep in a peer's code"), "{reason}");
@@ -413,27 +328,34 @@ mod tests {
     }
 
     #[test]
-    fn short_queries_are_batched_until_the_harness_is_negligible() {
-        let dear = Protocol {
-            overhead_ns: 1e6,
-            ..protocol()
+    fn the_time_of_a_process_is_the_interquartile_mean_over_its_rounds() {
+        let sample = |round: u32, queries: u32, cpu_ns: f64| Sample {
+            round,
+            frame: 0,
+            queries,
+            cpu_ns,
+            wall_ns: 0.0,
+            returned: 0,
         };
-        let samples = &timed(dear, false)[1].as_ref().unwrap().samples.clone();
-        assert!(
-            samples.iter().all(|s| s.queries == 40),
-            "one lap for the whole pass"
-        );
-        let free = Protocol {
-            overhead_ns: 0.0,
-            ..protocol()
-        };
-        let samples = &timed(free, false)[1].as_ref().unwrap().samples.clone();
-        assert!(samples.iter().all(|s| s.queries == 1));
+        // Rounds of 100 (by one sample of 1 query and one of 3), and outliers.
+        let samples = vec![
+            sample(0, 1, 40.0),
+            sample(0, 3, 120.0),
+            sample(2, 4, 100.0),
+            sample(4, 4, 100.0),
+            sample(6, 4, 1e9),
+        ];
+        let timed = Timed { samples, rounds: 4 };
+        assert_eq!(timed.round_means(|s| s.cpu_ns)[0], 100.0);
+        let ns = timed.ns().unwrap();
+        assert!((ns - 100.0).abs() < 1e-9, "{ns}");
+        assert_eq!(timed.over(&timed), Some(1.0));
+        assert_eq!(Timed::default().ns(), None);
     }
 
     #[test]
-    fn the_overhead_is_a_clock_reading() {
-        let overhead = harness_overhead_ns();
-        assert!(overhead > 0.0 && overhead < 100_000.0, "{overhead}");
+    fn a_pass_that_is_stopped_has_no_samples() {
+        let all = [task(|_| 0, vec![0; 40])];
+        assert!(timed_rounds(40, &all, &protocol(), &|| true).is_none());
     }
 }

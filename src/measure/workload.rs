@@ -10,7 +10,7 @@ use crate::culling::{CameraView, Culling, CullingError};
 use crate::geometry::Aabb;
 use crate::path::CameraPath;
 use crate::query::ItemId;
-use crate::scene::Scene;
+use crate::scene::{Scene, Sought};
 
 /// A scene with the queries along one path.
 pub struct Workload<'a> {
@@ -22,8 +22,12 @@ pub struct Workload<'a> {
     /// The cameras of the path; the truth is theirs.
     pub cameras: Vec<Camera>,
     pub views: Vec<CameraView>,
-    /// The eyes of the path, to be located among the scene's regions.
+    /// Scale of the lens where the path was asked for by its visible share.
+    pub lens_scale: Option<f64>,
+    /// The eyes of the path, to be located among the scene's regions: as
+    /// structures are asked for them, and as they are.
     pub points: Vec<Vec3>,
+    pub sought: Vec<Sought>,
 }
 
 /// A camera of a path that has no such view.
@@ -55,23 +59,24 @@ impl<'a> Workload<'a> {
                 })
         });
         let eyes = path.cameras.iter().map(|camera| camera.frame.eye);
+        let sought: Vec<Sought> = eyes.map(|eye| scene.sought(eye)).collect();
         Ok(Workload {
             scene,
             path: path.name.clone(),
             culling: *culling,
             items: culling.test.items(&scene.items),
             views: views.collect::<Result<_, _>>()?,
-            points: eyes
-                .map(|eye| scene.regions.local_point(eye, scene.origin))
-                .collect(),
+            points: sought.iter().map(|point| point.local).collect(),
+            sought,
             cameras: path.cameras.clone(),
+            lens_scale: path.lens_scale,
         })
     }
 
-    /// Region search as every contender is asked to do it: the index finds
-    /// boxes, the scene's regions decide. Appends to `out`, which must be
-    /// empty.
-    pub fn refine(&self, p: Vec3, out: &mut Vec<ItemId>) {
-        self.scene.regions.refine(p, out);
+    /// Region search as every contender is asked to do it: for the point of a
+    /// place the index finds boxes, the scene's regions decide, exactly.
+    #[inline]
+    pub fn refine(&self, place: usize, out: &mut Vec<ItemId>) {
+        self.scene.refine(&self.sought[place], out);
     }
 }

@@ -8,33 +8,7 @@ use super::Oracle;
 use super::certificates::HalfSpace;
 use super::number::{Number, Precision};
 use crate::arithmetic::Expansion;
-use crate::camera::{Camera, Lens};
-
-/// Where a camera stands, as the numbers that say so: all are exact.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub enum Pose {
-    LookAt {
-        eye: DVec3,
-        look: DVec3,
-        up: DVec3,
-    },
-    Forward {
-        eye: DVec3,
-        forward: DVec3,
-        up: DVec3,
-    },
-}
-
-impl Pose {
-    /// A camera that keeps no look point: its frame's eye, direction and up.
-    pub fn of(camera: &Camera) -> Pose {
-        Pose::Forward {
-            eye: camera.frame.eye,
-            forward: camera.frame.forward(),
-            up: camera.frame.v(),
-        }
-    }
-}
+use crate::camera::{Lens, Pose};
 
 const PRECISION: Precision = Precision::CAMERA;
 

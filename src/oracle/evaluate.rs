@@ -4,7 +4,7 @@
 
 use super::certificates::HalfSpace;
 use super::number::Precision;
-use crate::arithmetic::{Expansion, two_sum, upper_half};
+use crate::arithmetic::{Expansion, two_product, two_sum, upper_half};
 use crate::geometry::Aabb;
 
 /// A certificate in f64, each coefficient rounded once.
@@ -30,6 +30,8 @@ const FILTER_ERROR: f64 = 16.0 * f64::EPSILON;
 pub(super) struct Corners {
     pub low: [f64; 3],
     pub high: [f64; 3],
+    /// Whether all of them are numbers of f32, whose products are short.
+    pub is_narrow: bool,
 }
 
 impl Corners {
@@ -38,7 +40,12 @@ impl Corners {
         Corners {
             low: b.min.as_dvec3().to_array(),
             high: b.max.as_dvec3().to_array(),
+            is_narrow: true,
         }
+    }
+
+    pub fn is_empty(&self) -> bool {
+        !(0..3).all(|k| self.low[k] <= self.high[k])
     }
 }
 
@@ -92,39 +99,47 @@ impl Exact {
     }
 
     /// The sign of the value at the p-vertex.
-    pub fn sign_at_p_vertex(&self, b: &Aabb, precision: Precision) -> i32 {
+    pub fn sign_at_p_vertex(&self, b: &Corners, precision: Precision) -> i32 {
         // The sign of a coefficient is that of its largest, last term.
-        let mut corner = b.max;
+        let mut corner = b.high;
         for &(axis, term) in &self.terms {
             let k = usize::from(axis);
-            corner[k] = if term >= 0.0 { b.max[k] } else { b.min[k] };
+            corner[k] = if term >= 0.0 { b.high[k] } else { b.low[k] };
         }
         let products = || {
             let of_corner = self
                 .terms
                 .iter()
-                .map(|&(axis, term)| term * f64::from(corner[usize::from(axis)]));
+                .map(|&(axis, term)| term * corner[usize::from(axis)]);
             of_corner.chain(self.d.iter().copied())
         };
         // Most ties are between short numbers, whose sum loses nothing.
         let (mut sum, mut lost) = (0.0, 0.0);
-        for product in products() {
+        for product in products().filter(|_| b.is_narrow) {
             let (next, error) = two_sum(sum, product);
             sum = next;
             lost += error.abs();
         }
         let mut value = sum;
         let mut sign = if sum == 0.0 { 0 } else { sum.signum() as i32 };
-        if lost != 0.0 {
+        if lost != 0.0 || !b.is_narrow {
             let mut total = Expansion::default();
-            products().for_each(|product| total.grow(product));
+            if b.is_narrow {
+                products().for_each(|product| total.grow(product));
+            } else {
+                for &(axis, term) in &self.terms {
+                    let (product, rest) = two_product(term, corner[usize::from(axis)]);
+                    total.grow(rest);
+                    total.grow(product);
+                }
+                self.d.iter().for_each(|&d| total.grow(d));
+            }
             sign = total.sign();
             value = total.estimate();
         }
         if !precision.is_exact() {
-            let at = corner.abs().as_dvec3();
             let [x, y, z, d] = self.size;
-            let size = x * at.x + y * at.y + z * at.z + d;
+            let size = x * corner[0].abs() + y * corner[1].abs() + z * corner[2].abs() + d;
             if precision.is_noise(value, size) {
                 return 0;
             }

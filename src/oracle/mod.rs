@@ -13,9 +13,10 @@ mod rough;
 use crate::geometry::{Aabb, ConvexVolume};
 use certificates::{Certificates, Extent, HalfSpace, certificates};
 use evaluate::{Corners, Exact, Filter, inner_point};
+use glam::DVec3;
 use number::Precision;
 
-pub use camera::Pose;
+pub use crate::camera::Pose;
 
 /// How a closed box lies to a closed volume.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
@@ -107,27 +108,35 @@ impl Oracle {
 
     /// The verdict, and whether it is proved; at planes level it always is.
     pub fn judge(&self, b: &Aabb) -> Judgement {
+        self.judge_corners(&Corners::of(b))
+    }
+
+    /// The same about a box in f64, between finite corners of at most 1e60.
+    pub fn judge_wide(&self, min: DVec3, max: DVec3) -> Judgement {
+        self.judge_corners(&wide(min, max))
+    }
+
+    fn judge_corners(&self, corners: &Corners) -> Judgement {
         let proved = |verdict| Judgement {
             verdict,
             undecided: false,
         };
-        if b.is_empty() || self.extent == Extent::Empty {
+        if corners.is_empty() || self.extent == Extent::Empty {
             return proved(Verdict::Out);
         }
-        let corners = Corners::of(b);
         let mut least = if self.extent == Extent::Flat { 0 } else { 1 };
         for (i, certificate) in self.filter.iter().enumerate() {
-            if i == self.faces && least > 0 && self.witnessed(&corners) {
+            if i == self.faces && least > 0 && self.witnessed(corners) {
                 return proved(Verdict::In);
             }
-            let (value, error) = certificate.at_p_vertex(&corners);
+            let (value, error) = certificate.at_p_vertex(corners);
             if value > error {
                 continue;
             }
             if value < -error {
                 return proved(Verdict::Out);
             }
-            match self.exact[i].sign_at_p_vertex(b, self.precision) {
+            match self.exact[i].sign_at_p_vertex(corners, self.precision) {
                 -1 => return proved(Verdict::Out),
                 sign => least = least.min(sign),
             }
@@ -168,14 +177,30 @@ impl Oracle {
     /// # Ok::<(), cullbench::geometry::VolumeError>(())
     /// ```
     pub fn depth(&self, b: &Aabb) -> f64 {
-        if b.is_empty() || self.extent == Extent::Empty {
+        self.depth_of_corners(&Corners::of(b))
+    }
+
+    /// The same of a box in f64.
+    pub fn depth_wide(&self, min: DVec3, max: DVec3) -> f64 {
+        self.depth_of_corners(&wide(min, max))
+    }
+
+    /// Whether one of the volume's own planes has the whole box on its outer
+    /// side, to f64 rounding: what a six-plane test without any error tells.
+    pub fn faces_exclude(&self, b: &Aabb) -> bool {
+        let corners = Corners::of(b);
+        let mut faces = self.filter[..self.faces].iter();
+        self.extent == Extent::Empty || faces.any(|face| face.at_p_vertex(&corners).0 < 0.0)
+    }
+
+    fn depth_of_corners(&self, corners: &Corners) -> f64 {
+        if corners.is_empty() || self.extent == Extent::Empty {
             return f64::NEG_INFINITY;
         }
-        let corners = Corners::of(b);
         let depths = self.filter.iter().map(|certificate| {
             let [x, y, z] = certificate.normal;
             let length = (x * x + y * y + z * z).sqrt();
-            certificate.at_p_vertex(&corners).0 / length
+            certificate.at_p_vertex(corners).0 / length
         });
         depths.fold(f64::INFINITY, f64::min)
     }
@@ -193,5 +218,13 @@ impl Oracle {
                 value > error
             })
         })
+    }
+}
+
+fn wide(min: DVec3, max: DVec3) -> Corners {
+    Corners {
+        low: min.to_array(),
+        high: max.to_array(),
+        is_narrow: false,
     }
 }

@@ -14,20 +14,20 @@ const MOST_CAMERAS: usize = 128;
 /// more items than that: a share of 0.02 % of eight thousand would be one or two.
 const LEAST_SEEN: f64 = 8.0;
 
-/// The cameras with far (and near, a thousandth of it) scaled alike so that
-/// on average `share` of the items is visible, within the sample's accuracy.
+/// The scale of far (and near, a thousandth of it) at which on average `share`
+/// of the items is visible, within the sample's accuracy.
 ///
 /// # Errors
 /// A share that even four times the present far plane does not reach.
-pub(super) fn to_visible_share(
+pub(super) fn for_visible_share(
     path: &str,
     scene: &Scene,
-    cameras: Vec<Camera>,
+    cameras: &[Camera],
     share: f64,
-) -> Result<Vec<Camera>, PathError> {
+) -> Result<f64, PathError> {
     let needed = (LEAST_SEEN / share).ceil() as usize;
     let items = every_nth(&scene.items, MOST_ITEMS.max(needed));
-    let sample = every_nth(&cameras, MOST_CAMERAS);
+    let sample = every_nth(cameras, MOST_CAMERAS);
     let around = scene.surroundings();
     let visible = |scale: f64| -> Result<f64, PathError> {
         let mut seen = 0;
@@ -56,7 +56,12 @@ pub(super) fn to_visible_share(
             high = middle;
         }
     }
-    let scaled = cameras.iter().map(|camera| rescaled(camera, high));
+    Ok(high)
+}
+
+/// The cameras with far and near scaled alike.
+pub(super) fn scaled(path: &str, cameras: &[Camera], scale: f64) -> Result<Vec<Camera>, PathError> {
+    let scaled = cameras.iter().map(|camera| rescaled(camera, scale));
     scaled
         .collect::<Result<_, _>>()
         .map_err(|e| unfit(path, &e))

@@ -17,7 +17,7 @@ use std::path::Path;
 use glam::DVec3;
 
 use crate::camera::{Camera, CameraError, Frame, Lens, Surroundings};
-use crate::input::InputError;
+use crate::input::{InputError, is_readable, read_file};
 use crate::scene::{self, Dice, Scene, WorldBox};
 use crate::spec::{Spec, SpecError};
 
@@ -29,6 +29,8 @@ pub struct CameraPath {
     /// As it was asked for: a file or a spec such as `orbit:frames=512`.
     pub name: String,
     pub cameras: Vec<Camera>,
+    /// Scale of far and near that `visible=` has found.
+    pub lens_scale: Option<f64>,
 }
 
 /// SHA-256 over frames and lenses: two paths with the same digest ask the same
@@ -213,14 +215,25 @@ impl Scene {
 /// # Errors
 /// One line that names what was found and what was expected.
 pub fn load(source: &str, scene: &Scene, defaults: &LensDefaults) -> Result<CameraPath, PathError> {
+    load_scaled(source, scene, defaults, None)
+}
+
+/// [`load`] with the scale of the lens that an earlier load of this path has
+/// found ([`CameraPath::lens_scale`]), which is then not looked for again.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_scaled(
+    source: &str,
+    scene: &Scene,
+    defaults: &LensDefaults,
+    scale: Option<f64>,
+) -> Result<CameraPath, PathError> {
     // A name has neither a slash nor a dot before its parameters.
     let name = source.split(':').next().unwrap_or_default();
-    if Path::new(source).is_file() || source.ends_with(".csv") || name.contains(['/', '\\', '.']) {
-        let file = std::fs::File::open(source).map_err(|error| InputError::Io {
-            path: source.into(),
-            source: error,
-        })?;
-        return read_cameras_csv(file, source, defaults);
+    let file = Path::new(source);
+    if is_readable(file) || source.ends_with(".csv") || name.contains(['/', '\\', '.']) {
+        return read_cameras_csv(&read_file(file)?[..], source, defaults);
     }
     let mut spec = Spec::parse(source)?;
     let Some(family) = PATHS.iter().find(|p| p.name == spec.name()) else {
@@ -243,13 +256,20 @@ pub fn load(source: &str, scene: &Scene, defaults: &LensDefaults) -> Result<Came
             reason: "no camera in it; expected at least one".to_owned(),
         });
     }
-    let cameras = match optics.visible {
-        Some(share) => calibrate::to_visible_share(source, scene, cameras, share)?,
-        None => cameras,
+    let lens_scale = match (optics.visible, scale) {
+        (Some(_), Some(scale)) => Some(scale),
+        (Some(share), None) => Some(calibrate::for_visible_share(
+            source, scene, &cameras, share,
+        )?),
+        (None, _) => None,
     };
     Ok(CameraPath {
         name: source.to_owned(),
-        cameras,
+        cameras: match lens_scale {
+            Some(scale) => calibrate::scaled(source, &cameras, scale)?,
+            None => cameras,
+        },
+        lens_scale,
     })
 }
 
@@ -281,6 +301,13 @@ impl Optics {
             Some(_) => Some(spec.number("near", 0.0)?),
             None => defaults.near,
         };
+        // A near plane that follows from it would be named in its place.
+        if let Some(far) = far.filter(|far| near.is_none() && far / 1000.0 <= 0.0) {
+            return Err(SpecError::new(format_args!(
+                "in '{}': far is {far:?}; expected a number above 0 (or inf)",
+                spec.name()
+            )));
+        }
         let visible = match spec.text("visible") {
             Some(text) => Some(visible_share(spec, &text, stage.scene.items.len())?),
             None => None,
@@ -329,8 +356,9 @@ fn visible_share(spec: &mut Spec, text: &str, items: usize) -> Result<f64, SpecE
     if value > 0.0 && value < 1.0 {
         return Ok(value);
     }
-    // All of them cannot be calibrated for: there is a path for that.
-    if value > 1.0 && value.fract() == 0.0 && value < items as f64 {
+    // 200 % are a share that is none, not two items. All of them cannot be
+    // calibrated for: there is a path for that.
+    if !text.ends_with('%') && value > 1.0 && value.fract() == 0.0 && value < items as f64 {
         return Ok(value / items as f64);
     }
     Err(SpecError::new(format_args!(
@@ -484,6 +512,8 @@ mod tests {
             ("orbit:visible=10", "visible=10; expected a share"),
             ("orbit:visible=1", "count from 2 to 9"),
             ("orbit:visible=100%", "visible=100%; expected"),
+            ("orbit:visible=200%", "visible=200%; expected a share"),
+            ("orbit:visible=0%", "visible=0%; expected a share"),
             ("orbit:visible=2.5", "visible=2.5; expected"),
             ("orbit:visible=-1", "visible=-1; expected"),
             ("nothing.csv", "No such file"),

@@ -124,6 +124,7 @@ pub fn read_cameras_csv(
         .into());
     }
     Ok(CameraPath {
+        lens_scale: None,
         name: file.to_owned(),
         cameras,
     })

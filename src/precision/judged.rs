@@ -2,7 +2,7 @@
 //! is. No structure and no clock.
 
 use crate::camera::Camera;
-use crate::culling::{CameraView, Culling};
+use crate::culling::{CameraView, Culling, CullingTest};
 use crate::geometry::Aabb;
 use crate::index::BuildError;
 use crate::query::ItemId;
@@ -55,10 +55,19 @@ impl Judged {
             };
             let seen = items.iter().zip(0..).filter(|(b, _)| view.as_any().sees(b));
             let answer: Vec<ItemId> = seen.map(|(_, id)| id).collect();
-            judged.errors += truth.errors(&scene.items, &answer);
+            judged.errors += blamed(culling.test, truth.errors(&scene.items, &answer));
             judged.views.push(view);
             judged.answers.push(answer);
         }
         judged
+    }
+}
+
+/// Errors with the excess put down to planes or to the test.
+fn blamed(test: CullingTest, errors: ErrorCount) -> ErrorCount {
+    match test {
+        CullingTest::Sphere => errors.of_spheres(),
+        CullingTest::Exact => errors.of_exact_test(),
+        CullingTest::SixPlane | CullingTest::SixBox => errors,
     }
 }

@@ -79,7 +79,7 @@ impl Point {
             value,
             lower,
             upper,
-        }) = bootstrap_median(&timed.round_means(), 1)
+        }) = bootstrap_median(&timed.round_means(|s| s.cpu_ns), 1)
         else {
             return;
         };
@@ -122,7 +122,10 @@ pub(super) fn noise_floor(points: &[Point], twins: &[Result<Timed, Verdict>]) ->
     });
     let mut floor = 0.0f64;
     for (original, twin) in originals.zip(twins) {
-        let again = twin.as_ref().ok().and_then(|t| median(&t.round_means()));
+        let again = twin
+            .as_ref()
+            .ok()
+            .and_then(|t| median(&t.round_means(|s| s.cpu_ns)));
         if let (Some(first), Some(again)) = (original.query_ns, again) {
             floor = floor.max((again / first - 1.0).abs());
         }

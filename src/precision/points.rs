@@ -2,8 +2,6 @@
 //! with every culling, checked, judged against the exact truth, and timed side
 //! by side.
 
-use std::time::{Duration, Instant};
-
 use serde::Serialize;
 
 use super::judged::Judged;
@@ -12,12 +10,13 @@ use super::stability::{StableAfter, stability};
 use crate::camera::{Camera, PLANE_METHODS, PlaneMethod, PlaneOptions};
 use crate::culling::{ARITHMETICS, Arithmetic, Culling, CullingTest, TESTS};
 use crate::index::{
-    BuildError, DynIndex, GridScope, Quantised, QuantisedParams, RegionIndex, StructureSpec,
+    BuildError, By, DynIndex, GridScope, Quantised, QuantisedParams, RegionIndex, StructureSpec,
 };
+use crate::kernel::Kernel;
 use crate::measure::{Competitor, Protocol, Status, Verdict, timed_rounds};
 use crate::path::CameraPath;
 use crate::scene::Scene;
-use crate::verify::{Reference, Truth};
+use crate::verify::{Trial, Truth};
 
 /// The diagram of a scene and path.
 #[derive(Clone, Debug, Serialize)]
@@ -107,7 +106,7 @@ struct Stored {
 
 /// u8 and u16 codes, on one grid or on one for each block, with the default
 /// view and with the exact test.
-fn quantised(scene: &Scene, cameras: &[Camera], truths: &[Truth]) -> Vec<Stored> {
+fn quantised(kernel: Kernel, scene: &Scene, cameras: &[Camera], truths: &[Truth]) -> Vec<Stored> {
     let cullings = [CullingTest::SixPlane, CullingTest::Exact].map(|test| Culling {
         test,
         ..Culling::default()
@@ -119,7 +118,7 @@ fn quantised(scene: &Scene, cameras: &[Camera], truths: &[Truth]) -> Vec<Stored>
                 GridScope::World => "world",
                 GridScope::Block => "block",
             };
-            let label = format!("{}:bits={bits},grid={scope}", Quantised::NAME);
+            let label = format!("{}:bits={bits},grid={scope}", Quantised::INFO.name);
             let params = QuantisedParams { bits, grid };
             let stored = match Quantised::build(&scene.items, None, &params) {
                 Ok(index) => {
@@ -128,7 +127,7 @@ fn quantised(scene: &Scene, cameras: &[Camera], truths: &[Truth]) -> Vec<Stored>
                         .map(|culling| Judged::new(scene, &items, cameras, truths, culling));
                     Stored {
                         label,
-                        index: Some(Box::new(index)),
+                        index: Some(Box::new(By { index, kernel })),
                         judged: judged.into(),
                     }
                 }
@@ -171,7 +170,7 @@ pub fn measure_points(
     let cameras = cameras_of(path, most_cameras);
     let truths = cameras.iter().filter_map(|camera| {
         // A frame always makes a pose.
-        Truth::of_camera(camera, scene.origin, &scene.items)
+        Truth::of_scene(camera, scene)
     });
     let truths: Vec<Truth> = truths.collect();
     let mut judged = Vec::new();
@@ -182,7 +181,9 @@ pub fn measure_points(
         let items = culling.test.items(&scene.items);
         judged.push(Judged::new(scene, &items, &cameras, &truths, culling));
     }
-    let quantised = quantised(scene, &cameras, &truths);
+    let specs = structures.first().map(|spec| spec.execution);
+    let kernel = specs.unwrap_or_default().kernel;
+    let quantised = quantised(kernel, scene, &cameras, &truths);
     drop(truths);
     let mut indexes = Vec::with_capacity(structures.len());
     for spec in structures {
@@ -199,9 +200,9 @@ pub fn measure_points(
             point.memory(index.memory(), scene.items.len());
             if judged.refused.is_none() {
                 match checked(index, judged, scene.items.len()) {
-                    Ok(slowest) => {
+                    Ok(()) => {
                         timed_points.push(points.len());
-                        competitors.push(competitor(index, judged, slowest));
+                        competitors.push(competitor(index, judged));
                     }
                     Err(wrong) => (point.status, point.reason) = (wrong.status, wrong.reason),
                 }
@@ -220,9 +221,9 @@ pub fn measure_points(
             if let Some(index) = index {
                 point.memory(index.memory(), scene.items.len());
                 match checked(index.as_ref(), judged, scene.items.len()) {
-                    Ok(slowest) => {
+                    Ok(()) => {
                         timed_points.push(points.len());
-                        competitors.push(competitor(index.as_ref(), judged, slowest));
+                        competitors.push(competitor(index.as_ref(), judged));
                     }
                     Err(wrong) => (point.status, point.reason) = (wrong.status, wrong.reason),
                 }
@@ -238,7 +239,7 @@ pub fn measure_points(
         if let Some(judged) = standard.filter(|j| j.refused.is_none()) {
             let index = indexes.of(judged.culling.test);
             twins.push(competitors.len());
-            competitors.push(competitor(index, judged, Duration::ZERO));
+            competitors.push(competitor(index, judged));
         }
     }
     let Some(mut timed) = timed_rounds(cameras.len(), &competitors, protocol, stop) else {
@@ -282,33 +283,23 @@ pub fn measure_points(
     }))
 }
 
-fn competitor<'a>(
-    index: &'a dyn DynIndex,
-    judged: &'a Judged,
-    slowest: Duration,
-) -> Competitor<'a> {
+fn competitor<'a>(index: &'a dyn DynIndex, judged: &'a Judged) -> Competitor<'a> {
     Competitor {
         ask: Box::new(move |n, out| index.see(judged.views[n].as_any(), out)),
         ask_many: None,
         expected: judged.answers.iter().map(|a| a.len() as u64).collect(),
-        slowest,
+        least_ns: None,
     }
 }
 
-/// Asks every query once; the slowest one's wall time, or what was wrong.
-fn checked(index: &dyn DynIndex, judged: &Judged, items: usize) -> Result<Duration, Verdict> {
-    let mut reference = Reference::new(items);
-    let (mut out, mut slowest) = (Vec::new(), Duration::ZERO);
+/// Asks every query once; what was wrong, if anything.
+fn checked(index: &dyn DynIndex, judged: &Judged, items: usize) -> Result<(), Verdict> {
+    let mut trial = Trial::new(items);
     for (view, answer) in judged.views.iter().zip(&judged.answers) {
-        reference.expect(answer.iter().copied());
-        out.clear();
-        let start = Instant::now();
-        index.see(view.as_any(), &mut out);
-        slowest = slowest.max(start.elapsed());
-        let difference = reference.compare(&out);
-        if !difference.is_none() {
-            return Err(Verdict::new(Status::Wrong, difference.to_string()));
-        }
+        trial.expect(answer.iter().copied());
+        trial
+            .ask(|out| index.see(view.as_any(), out))
+            .map_err(|fault| Verdict::new(Status::of(&fault), fault.explained(|_| None)))?;
     }
-    Ok(slowest)
+    Ok(())
 }

@@ -1,178 +1,313 @@
-//! One report held against an older one: every cell that both have with what
-//! became of it, those that only one has, means, and how the machine itself has
-//! drifted. It reads no file, prints nothing and measures nothing.
+//! One report compared with an older one. Every cell is judged by its times
+//! relative to the other structures of its group, process by process: what moves
+//! a whole process, and most of what tells two days apart, drops out.
 
-use serde::Serialize;
+use std::collections::BTreeMap;
 
-use super::judging::{Bar, Change, Outcome, Tracked, as_a_whole, asked_otherwise, is_sound};
-use super::matching::{CellName, matched};
+use super::judging::{Changes, CommonShift, JudgedRow, Lone, Outcome, work_changes};
+use super::matching::{Pair, asked_otherwise, matched, timed_otherwise};
 use super::{Report, ReportCell};
-use crate::measure::Status;
-use crate::statistics::geometric_mean;
+use crate::measure::{CellKey, GroupKey, Status, Verdict};
+use crate::statistics::{Change, Judgement, judge_unpaired, median, trimmed_mean};
 
-/// A cell that the other report does not have.
-#[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct Lone<'r> {
-    #[serde(flatten)]
-    pub cell: CellName<'r>,
-    pub status: Status,
-    pub reason: Option<&'r str>,
-}
+/// Fewer other structures cannot tell which of them moved: the median of three
+/// stays where it is when one of them moves, that of two does not.
+const LEAST_OTHERS: usize = 3;
+/// Fewer processes have no interval.
+const LEAST_PROCESSES: usize = 3;
 
-fn lone(cell: &ReportCell) -> Lone<'_> {
-    Lone {
-        cell: CellName::of(cell),
-        status: cell.status,
-        reason: cell.reason.as_deref(),
-    }
-}
-
-/// The geometric mean of a structure's ratios over all cells with figures.
-#[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct MeanRatio<'r> {
-    pub structure: &'r str,
-    pub metric: &'static str,
-    pub ratio: f64,
-    pub cells: usize,
-}
-
-/// How much longer the physical limits took: the machine and not the code.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-pub struct Drift {
-    pub ratio: f64,
-    pub bounds: usize,
-}
-
-/// Two reports held against each other.
-#[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct Changes<'r> {
-    pub threshold: f64,
-    pub bars: Vec<Bar>,
-    pub cells_in_common: usize,
-    /// Worst first, ties included.
-    pub changes: Vec<Change<'r>>,
-    pub only_in_old: Vec<Lone<'r>>,
-    pub only_in_new: Vec<Lone<'r>>,
-    /// What became slower first.
-    pub structures: Vec<MeanRatio<'r>>,
-    pub machine_drift: Option<Drift>,
-}
-
-/// Holds a report against an older one. A difference counts from the
-/// threshold on (0.05 is 5 %), or from the larger noise floor.
-pub fn changes<'r>(
-    old: &'r Report,
-    new: &'r Report,
-    threshold: f64,
-    metrics: &[&'static Tracked],
-) -> Changes<'r> {
+/// Compares a report with an older one by these metrics of
+/// [`JUDGED_METRICS`](super::JUDGED_METRICS). `threshold` 0.05 is 5 %.
+///
+/// Per process, ln(time) of a structure minus the median of the other
+/// structures that both reports have in the group, each about its mean in the
+/// old report; old and new by [`judge_unpaired`], with Holm's correction over the cells of a metric. What
+/// moved everything at once is [`Changes::common_shift`].
+pub fn changes(old: &Report, new: &Report, threshold: f64, metrics: &[&'static str]) -> Changes {
     let matched = matched(&old.cells, &new.cells);
-    let of_metric = |metric: &&'static Tracked| Bar::of(metric, threshold, old, new);
-    let bars: Vec<Bar> = metrics.iter().map(of_metric).collect();
-    let mut changes = Vec::new();
-    for &pair in &matched.pairs {
-        match as_a_whole(pair) {
-            Some(change) => changes.push(change),
-            None => changes.extend(bars.iter().map(|bar| Change::by_metric(pair, bar))),
-        }
-    }
-    let structures = mean_ratios(&changes);
-    changes.sort_by(Change::order);
-    Changes {
+    let mut found = Changes {
         threshold,
-        bars,
         cells_in_common: matched.pairs.len(),
-        changes,
         only_in_old: matched.only_old.into_iter().map(lone).collect(),
         only_in_new: matched.only_new.into_iter().map(lone).collect(),
-        structures,
-        machine_drift: machine_drift(old, new),
-    }
-}
-
-fn mean_ratios<'r>(changes: &[Change<'r>]) -> Vec<MeanRatio<'r>> {
-    // In the order they were measured, so that equal means keep it.
-    let mut rows: Vec<(&str, &'static str, Vec<f64>)> = Vec::new();
-    for change in changes {
-        let (Some(metric), Some(ratio)) = (change.metric, change.ratio) else {
-            continue;
-        };
-        let structure = change.cell.structure;
-        match rows.iter_mut().find(|r| (r.0, r.1) == (structure, metric)) {
-            Some(row) => row.2.push(ratio),
-            None => rows.push((structure, metric, vec![ratio])),
+        ..Changes::default()
+    };
+    let mut comparable = Vec::new();
+    for &pair in &matched.pairs {
+        let is_asked_alike = asked_otherwise(pair).is_none();
+        if is_asked_alike {
+            let counts = |cell: &ReportCell| -> BTreeMap<String, f64> {
+                let metrics = cell.metrics.iter();
+                metrics.map(|(name, m)| (name.clone(), m.value)).collect()
+            };
+            let (was, is) = (counts(pair.0), counts(pair.1));
+            found
+                .work_changed
+                .extend(work_changes(&pair.0.key(), &was, &is));
+        }
+        match as_a_whole(pair) {
+            Some(row) => found.rows.push(row),
+            None => comparable.push(pair),
         }
     }
-    let means = rows.into_iter().filter_map(|(structure, metric, ratios)| {
-        Some(MeanRatio {
-            structure,
-            metric,
-            ratio: geometric_mean(&ratios)?,
-            cells: ratios.len(),
-        })
-    });
-    let mut means: Vec<MeanRatio> = means.collect();
-    means.sort_by(|a, b| b.ratio.total_cmp(&a.ratio));
-    means
+    for metric in metrics {
+        found.rows.extend(by_metric(&comparable, metric, threshold));
+    }
+    found.common_shift = common_shift(&comparable);
+    found.rows.sort_by(JudgedRow::order);
+    found
 }
 
-fn machine_drift(old: &Report, new: &Report) -> Option<Drift> {
-    let pairs = matched(&old.bounds, &new.bounds).pairs;
-    let same = pairs.into_iter().filter(|p| asked_otherwise(*p).is_none());
-    let ratios: Vec<f64> = same
-        .filter_map(|(old, new)| Some(new.value("query_ns")? / old.value("query_ns")?))
-        .filter(|ratio| is_sound(*ratio))
+fn lone(cell: &ReportCell) -> Lone {
+    Lone {
+        cell: cell.key(),
+        status: cell.status,
+        reason: cell.reason.clone(),
+    }
+}
+
+/// What became of a pair by its statuses and questions alone; `None` if times
+/// are to decide.
+fn as_a_whole(pair: Pair) -> Option<JudgedRow> {
+    let (old, new) = pair;
+    let verdict = |cell: &ReportCell| Verdict {
+        status: cell.status,
+        reason: cell.reason.clone(),
+    };
+    let by_status = JudgedRow::of_statuses(new.key(), &verdict(old), &verdict(new));
+    // Wrong is wrong, whatever the question was.
+    let is_broken = by_status.as_ref().map(|row| row.outcome) == Some(Outcome::Broken);
+    let different = |reason: String| JudgedRow {
+        old_status: old.status,
+        new_status: new.status,
+        ..JudgedRow::unjudged(new.key(), Outcome::Different, Some(reason))
+    };
+    match asked_otherwise(pair) {
+        Some(reason) if !is_broken => Some(different(reason)),
+        _ if by_status.is_some() => by_status,
+        _ => answered_otherwise(pair).map(different),
+    }
+}
+
+/// Right answers to one question have the same length.
+fn answered_otherwise((old, new): Pair) -> Option<String> {
+    let counts = old.value("visible_count").zip(new.value("visible_count"));
+    let (was, is) = counts.filter(|(was, is)| was != is)?;
+    Some(format!("visible_count {was} and {is}"))
+}
+
+/// ln(time) in each process, old and new.
+type Logs = [Vec<f64>; 2];
+
+/// ln(time) about its mean in the old report: what is left is how the processes
+/// differ, and how new differs from old. Medians over structures are taken of
+/// this; a median of the times as they are is one structure's, and another's as
+/// soon as one of them has moved past it.
+fn centred(logs: &Logs) -> Logs {
+    let old = &logs[0];
+    let mean = trimmed_mean(old).map(|found| found.mean);
+    let mean = mean.or_else(|| median(old)).unwrap_or_default();
+    [0, 1].map(|side| logs[side].iter().map(|ln| ln - mean).collect())
+}
+
+/// Only what is above zero is a time.
+fn is_sound(value: f64) -> bool {
+    value.is_finite() && value > 0.0
+}
+
+fn logs((old, new): Pair, metric: &str) -> Option<Logs> {
+    let of = |cell: &ReportCell| {
+        // Nothing is slower or faster among no items.
+        let has_items = cell.scene.total_count > 0;
+        let times = cell.times.by_process.get(metric).filter(|_| has_items)?;
+        let sound = !times.is_empty() && times.iter().all(|time| is_sound(*time));
+        sound.then(|| times.iter().map(|time| time.ln()).collect::<Vec<f64>>())
+    };
+    Some([of(old)?, of(new)?])
+}
+
+/// A cell on its way to a verdict.
+struct Candidate {
+    key: CellKey,
+    logs: Logs,
+    centred: Logs,
+}
+
+/// The rows of one metric, in the order of the pairs.
+fn by_metric(pairs: &[Pair], metric: &'static str, threshold: f64) -> Vec<JudgedRow> {
+    let mut rows = Vec::new();
+    let mut candidates: Vec<(usize, Candidate)> = Vec::new();
+    for &pair in pairs {
+        let value = |cell: &ReportCell| cell.value(metric);
+        let values = (value(pair.0), value(pair.1));
+        let sound = |value: Option<f64>| value.is_some_and(is_sound);
+        let key = pair.1.key();
+        let mut row = JudgedRow::by_times(key.clone(), metric, values, None, [0; 2]);
+        match logs(pair, metric).filter(|_| sound(values.0) && sound(values.1)) {
+            None => row.reason = Some(why_unmeasured(values)),
+            Some(logs) => {
+                row.processes = [logs[0].len(), logs[1].len()];
+                // A build is not of cameras.
+                match timed_otherwise(pair).filter(|_| metric != "build_ms") {
+                    Some(reason) => {
+                        (row.outcome, row.reason) = (Outcome::Different, Some(reason));
+                    }
+                    None => candidates.push((
+                        rows.len(),
+                        Candidate {
+                            key,
+                            centred: centred(&logs),
+                            logs,
+                        },
+                    )),
+                }
+            }
+        }
+        rows.push(row);
+    }
+    let relative: Vec<Option<Logs>> = candidates
+        .iter()
+        .map(|(_, own)| relative(own, candidates.iter().map(|(_, other)| other)))
         .collect();
-    Some(Drift {
-        ratio: geometric_mean(&ratios)?,
-        bounds: ratios.len(),
+    let [was, is] = [0, 1].map(|side| -> Vec<Vec<f64>> {
+        let known = relative.iter().flatten();
+        known.map(|logs| logs[side].clone()).collect()
+    });
+    let mut judged = judge_unpaired(&was, &is, threshold).into_iter();
+    for ((at, _), relative) in candidates.iter().zip(&relative) {
+        let row = &mut rows[*at];
+        let judgement = relative.as_ref().and_then(|_| judged.next().flatten());
+        row.reason = why_inconclusive(relative.is_some(), row.processes);
+        row.judgement = judgement.or_else(|| by_values(row));
+        row.outcome = row
+            .judgement
+            .map_or(Outcome::Unmeasured, |j| j.change.into());
+    }
+    rows
+}
+
+/// ln(time) less what moved the median of the others, process by process;
+/// `None` with too few others.
+fn relative<'c>(own: &Candidate, all: impl Iterator<Item = &'c Candidate>) -> Option<Logs> {
+    let others: Vec<&Candidate> = all
+        .filter(|other| {
+            other.key.group == own.key.group
+                && other.key.structure != own.key.structure
+                && [0, 1]
+                    .iter()
+                    .all(|&s| other.logs[s].len() == own.logs[s].len())
+        })
+        .collect();
+    if others.len() < LEAST_OTHERS {
+        return None;
+    }
+    let side = |side: usize| -> Vec<f64> {
+        let own = own.logs[side].iter().enumerate();
+        own.filter_map(|(process, ln)| {
+            let others: Vec<f64> = others.iter().map(|o| o.centred[side][process]).collect();
+            Some(ln - median(&others)?)
+        })
+        .collect()
+    };
+    Some([side(0), side(1)])
+}
+
+/// The quotient of the two values, which decides nothing.
+fn by_values(row: &JudgedRow) -> Option<Judgement> {
+    Some(Judgement {
+        change: Change::Inconclusive,
+        ratio: Some(row.new? / row.old?).filter(|ratio| is_sound(*ratio))?,
+        lower: None,
+        upper: None,
+        resolution: None,
+        more_pairs: None,
+        pairs: row.processes[0].min(row.processes[1]),
     })
 }
 
-impl Changes<'_> {
-    pub fn count(&self, outcome: Outcome) -> usize {
-        let rows = self.changes.iter();
-        rows.filter(|change| change.outcome == outcome).count()
-    }
-
-    /// Whether NEW holds a wrong answer, with or without a partner in OLD.
-    pub fn is_wrong(&self) -> bool {
-        let paired = self.changes.iter().map(|change| change.new_status);
-        let alone = self.only_in_new.iter().map(|cell| cell.status);
-        paired.chain(alone).any(Status::is_failure)
-    }
-
-    /// Whether a right answer takes longer or is not given any more.
-    pub fn is_regression(&self) -> bool {
-        self.count(Outcome::Slower) + self.count(Outcome::Lost) > 0
-    }
-
-    /// The largest ratio, and whose it is.
-    pub fn worst(&self) -> Option<(f64, &Change<'_>)> {
-        let judged = self.changes.iter().filter_map(|c| Some((c.ratio?, c)));
-        judged.max_by(|a, b| a.0.total_cmp(&b.0))
-    }
-
-    /// Why there is nothing to go by, if there is nothing.
-    pub fn why_nothing_was_judged(&self) -> Option<&Change<'_>> {
-        let unjudged = |c: &&Change| matches!(c.outcome, Outcome::Different | Outcome::Unmeasured);
-        let first = self.changes.first().filter(unjudged)?;
-        (self.changes.iter().all(|c| unjudged(&c)) && !self.is_wrong()).then_some(first)
+fn why_unmeasured(values: (Option<f64>, Option<f64>)) -> String {
+    match values {
+        (None, None) => "in neither report".to_owned(),
+        (Some(_), None) => "only in OLD".to_owned(),
+        (None, Some(_)) => "only in NEW".to_owned(),
+        (Some(old), Some(new)) if is_sound(old) && is_sound(new) => {
+            "no time of each process".to_owned()
+        }
+        (Some(old), Some(new)) => format!("{old} and {new} have no ratio"),
     }
 }
 
+fn why_inconclusive(has_others: bool, processes: [usize; 2]) -> Option<String> {
+    if processes[0].min(processes[1]) < LEAST_PROCESSES {
+        return Some("under three processes on a side".to_owned());
+    }
+    let reason = "under three other structures in both reports to compare with";
+    (!has_others).then(|| reason.to_owned())
+}
+
+/// Per process, the mean over the groups of the median over the structures, by
+/// the first metric; `None` without a cell that both have timed.
+fn common_shift(pairs: &[Pair]) -> Option<CommonShift> {
+    let mut groups: Vec<(GroupKey, Vec<Logs>)> = Vec::new();
+    for &pair in pairs {
+        let is_ok = pair.0.status == Status::Ok && timed_otherwise(pair).is_none();
+        let Some(logs) = logs(pair, super::JUDGED_METRICS[0]).filter(|_| is_ok) else {
+            continue;
+        };
+        let group = pair.1.key().group;
+        match groups.iter_mut().find(|found| found.0 == group) {
+            Some(found) => found.1.push(centred(&logs)),
+            None => groups.push((group, vec![centred(&logs)])),
+        }
+    }
+    // What is not there in every process is paired with nothing.
+    let all = || groups.iter().flat_map(|group| &group.1);
+    let counts = [0, 1].map(|side| all().map(|logs| logs[side].len()).max().unwrap_or(0));
+    let is_whole = |logs: &&Logs| [0, 1].iter().all(|&s| logs[s].len() == counts[s]);
+    let whole: Vec<Vec<&Logs>> = groups
+        .iter()
+        .map(|group| group.1.iter().filter(is_whole).collect::<Vec<_>>())
+        .filter(|cells| !cells.is_empty())
+        .collect();
+    let of = |side: usize| -> Vec<f64> {
+        let process = |process: usize| -> f64 {
+            let medians = whole.iter().filter_map(|cells| {
+                median(
+                    &cells
+                        .iter()
+                        .map(|logs| logs[side][process])
+                        .collect::<Vec<_>>(),
+                )
+            });
+            medians.sum::<f64>() / whole.len() as f64
+        };
+        (0..counts[side]).map(process).collect()
+    };
+    let found = judge_unpaired(&[of(0)], &[of(1)], 0.0)[0]?;
+    Some(CommonShift {
+        ratio: found.ratio,
+        lower: found.lower,
+        upper: found.upper,
+        cells: whole.iter().map(Vec::len).sum(),
+    })
+}
+
 #[cfg(test)]
-pub(super) mod tests {
-    use super::super::judging::Decider;
+mod tests {
     use super::super::ranking::tests::cell;
     use super::super::settings;
     use super::*;
     use serde_json::json;
 
-    /// A report of these cells, with a noise floor.
-    pub fn report(floor: Option<f64>, cells: Vec<ReportCell>) -> Report {
+    const QUERY: &[&str] = &["query_ns"];
+    const NAMES: [&str; 5] = ["a", "b", "c", "d", "e"];
+    /// Far apart, so that no median over them is one of its neighbours'.
+    const LEVELS: [f64; 5] = [50.0, 100.0, 130.0, 150.0, 900.0];
+
+    /// A report of these cells.
+    fn report(cells: Vec<ReportCell>) -> Report {
         let report = json!({
-            "schema_version": 1,
+            "schema_version": 2,
             "run": { "id": "r", "started_at": "", "finished_at": "", "command": "", "seed": 1,
                 "suite": null, "generator": "" },
             "machine": { "cpu": "a", "features": [], "instruction_set": "avx2", "cores": 2,
@@ -180,92 +315,134 @@ pub(super) mod tests {
             "toolchain": { "rustc": "1", "target": null, "flags": "", "profile": null,
                 "opt_level": null, "features": [], "lock_digest": "" },
             "source": { "version": "0", "commit": null, "dirty": null },
-            "noise": { "harness_overhead_ns": 0.0, "aa_ratio": null, "aa_floor": floor,
-                "twins": [] },
+            "noise": { "aa_ratio": null, "twins": [] },
             "cells": [], "bounds": [],
         });
         let report: Report = serde_json::from_value(report).unwrap();
         Report { cells, ..report }
     }
 
-    fn by(names: &[&str]) -> Vec<&'static Tracked> {
-        names.iter().map(|n| Tracked::named(n).unwrap()).collect()
+    /// A cell with a time in each process: the machine's speed, common to all
+    /// cells, and a little of its own.
+    fn timed(name: &str, ns: f64, processes: usize, day: f64) -> ReportCell {
+        let mut timed = cell("s", 10, "p", name, ns);
+        let own = name.bytes().map(usize::from).sum::<usize>();
+        let times = (0..processes).map(|process| {
+            let machine = 1.0 + 0.2 * ((process * 7 % 5) as f64 / 4.0 - 0.5);
+            let noise = 1.0 + 0.01 * (((process + own) * 3 % 7) as f64 / 6.0 - 0.5);
+            ns * machine * noise * day
+        });
+        timed
+            .times
+            .by_process
+            .insert("query_ns".to_owned(), times.collect());
+        timed.times.processes = processes;
+        timed.times.cameras_timed = 8;
+        timed.times.batch = 4;
+        timed
     }
 
-    /// Cells of one scene and path with these times.
-    fn timed(times: &[(&str, f64)]) -> Vec<ReportCell> {
-        let cells = times.iter();
-        cells
-            .map(|(name, ns)| cell("s", 10, "p", name, *ns))
+    fn all(processes: usize, day: f64) -> Report {
+        let cells = NAMES.iter().zip(LEVELS);
+        report(
+            cells
+                .map(|(name, ns)| timed(name, ns, processes, day))
+                .collect(),
+        )
+    }
+
+    fn outcomes(changes: &Changes) -> Vec<(&str, Outcome)> {
+        let rows = changes.rows.iter();
+        rows.map(|row| (row.cell.structure.as_str(), row.outcome))
             .collect()
     }
 
-    fn outcomes<'c>(changes: &'c Changes) -> Vec<(&'c str, Outcome)> {
-        let rows = changes.changes.iter();
-        rows.map(|c| (c.cell.structure, c.outcome)).collect()
+    #[test]
+    fn one_structure_that_moved_is_found_whatever_the_day_was_like() {
+        for (factor, wanted) in [(1.3, Outcome::Slower), (0.7, Outcome::Faster)] {
+            let (old, mut new) = (all(10, 1.0), all(12, 1.5));
+            new.cells[1] = timed("b", 100.0 * factor, 12, 1.5);
+            let found = changes(&old, &new, 0.05, QUERY);
+            let row = found
+                .rows
+                .iter()
+                .find(|row| row.cell.structure == "b")
+                .unwrap();
+            assert_eq!((row.outcome, row.processes), (wanted, [10, 12]));
+            let judged = row.judgement.unwrap();
+            assert!((judged.ratio / factor - 1.0).abs() < 0.01, "{judged:?}");
+            assert_eq!(found.count(Outcome::Same), 4, "{:?}", outcomes(&found));
+            assert_eq!(found.is_regression(), wanted == Outcome::Slower);
+            // What moved all of them is said of all of them.
+            let shift = found.common_shift.unwrap();
+            assert!(shift.lower < Some(1.5) && Some(1.5) < shift.upper);
+            assert_eq!(shift.cells, 5);
+        }
     }
 
     #[test]
-    fn the_worst_comes_first_and_the_bar_is_a_ratio_either_way() {
-        let names = ["a", "b", "c", "d", "e", "f"];
-        let old = report(None, timed(&names.map(|name| (name, 100.0))));
-        // 1 / 1.25 is 0.8: a quarter more undoes a fifth less.
-        let times = [110.0, 125.0, 80.0, 79.0, 126.0, 300.0];
-        let pairs: Vec<_> = names.into_iter().zip(times).collect();
-        let new = report(None, timed(&pairs));
-        let found = changes(&old, &new, 0.25, &by(&["query_ns"]));
-        let wanted = [
-            ("f", Outcome::Slower),
-            ("e", Outcome::Slower),
-            ("d", Outcome::Faster),
-            ("b", Outcome::Tie),
-            ("a", Outcome::Tie),
-            ("c", Outcome::Tie),
-        ];
-        assert_eq!(outcomes(&found), wanted);
-        assert_eq!(found.worst().map(|(ratio, _)| ratio), Some(3.0));
-        assert_eq!(found.structures[0].structure, "f");
-        assert!(found.is_regression() && !found.is_wrong());
-        let all_fine = changes(&old, &old, 0.0, &by(&["query_ns"]));
-        assert_eq!(all_fine.count(Outcome::Tie), 6);
-        assert!(!all_fine.is_regression());
+    fn one_process_and_few_others_are_inconclusive() {
+        for (was, is) in [(1, 1), (1, 10), (10, 2)] {
+            let (old, mut new) = (all(was, 1.0), all(is, 1.0));
+            new.cells[1] = timed("b", 500.0, is, 1.0);
+            let found = changes(&old, &new, 0.05, QUERY);
+            assert_eq!(found.count(Outcome::Inconclusive), 5, "{was} {is}");
+            let b = found.rows.iter().find(|r| r.cell.structure == "b").unwrap();
+            assert!(b.reason.as_ref().unwrap().contains("under three processes"));
+            assert!(!found.is_regression());
+        }
+        // Two of three structures: which of them moved is not known.
+        let (mut old, mut new) = (all(10, 1.0), all(10, 1.0));
+        new.cells[1] = timed("b", 500.0, 10, 1.0);
+        for report in [&mut old, &mut new] {
+            report.cells.truncate(3);
+        }
+        let found = changes(&old, &new, 0.05, QUERY);
+        assert_eq!(found.count(Outcome::Inconclusive), 3);
+        // Worst first, by the quotient of the values.
+        let first = &found.rows[0];
+        assert_eq!(first.judgement.unwrap().ratio, 5.0);
+        assert!(first.reason.as_ref().unwrap().contains("under three other"));
     }
 
     #[test]
-    fn the_bar_is_the_largest_of_three_but_for_what_is_counted() {
-        let bars = |old: Option<f64>, new: Option<f64>| {
-            let (old, new) = (report(old, Vec::new()), report(new, Vec::new()));
-            let metrics = by(&["query_ns", "memory_bytes_per_item"]);
-            let bars = changes(&old, &new, 0.05, &metrics).bars;
-            assert_eq!(
-                (bars[1].bar, bars[1].decided_by),
-                (0.05, Decider::Threshold)
-            );
-            (bars[0].bar, bars[0].decided_by)
-        };
-        assert_eq!(bars(None, None), (0.05, Decider::Threshold));
-        assert_eq!(bars(Some(0.01), Some(-3.0)), (0.05, Decider::Threshold));
-        assert_eq!(bars(Some(0.2), Some(0.1)), (0.2, Decider::OldNoiseFloor));
-        assert_eq!(bars(Some(0.1), Some(0.2)), (0.2, Decider::NewNoiseFloor));
+    fn other_cameras_or_batches_are_another_measurement() {
+        for change in [
+            (|cell| cell.times.cameras_timed = 128) as fn(&mut ReportCell),
+            |cell| cell.times.batch = 8,
+            |cell| cell.scene.digest.push('x'),
+            |cell| cell.path.camera_count += 1,
+        ] {
+            let (old, mut new) = (all(10, 1.0), all(10, 1.0));
+            new.cells[1] = timed("b", 500.0, 10, 1.0);
+            change(&mut new.cells[1]);
+            let found = changes(&old, &new, 0.05, QUERY);
+            assert_eq!(found.rows[0].outcome, Outcome::Different);
+            assert_eq!(found.count(Outcome::Same), 4);
+            new.cells.iter_mut().skip(2).for_each(change);
+            change(&mut new.cells[0]);
+            let found = changes(&old, &new, 0.05, QUERY);
+            assert!(found.why_nothing_was_judged().is_some());
+        }
     }
 
     #[test]
     fn statuses_and_questions_go_before_times() {
         let of = |old: Status, new: Status, asked_the_same: bool| {
-            let [mut was, mut is] = [100.0, 900.0].map(|ns| cell("s", 10, "p", "a", ns));
-            (was.status, is.status) = (old, new);
+            let (mut was, mut is) = (all(10, 1.0), all(10, 1.0));
+            is.cells[1] = timed("b", 900.0, 10, 1.0);
+            (was.cells[1].status, is.cells[1].status) = (old, new);
             if !asked_the_same {
-                is.scene.digest = "other".to_owned();
+                is.cells[1].scene.digest = "other".to_owned();
             }
-            let (old, new) = (report(None, vec![was]), report(None, vec![is]));
-            let found = changes(&old, &new, 0.05, &by(&["query_ns", "query_ns_p95"]));
-            let first = found.changes[0].outcome;
-            (
-                first,
-                found.changes.len(),
-                found.is_wrong(),
-                found.is_regression(),
-            )
+            let found = changes(&was, &is, 0.05, &["query_ns", "build_ms"]);
+            let rows: Vec<_> = found
+                .rows
+                .iter()
+                .filter(|r| r.cell.structure == "b")
+                .collect();
+            let row = (rows[0].outcome, rows.len());
+            (row.0, row.1, found.is_wrong(), found.is_regression())
         };
         use Status::{LeftOut, Ok, Panicked, Refused, Wrong};
         for (old, new, same, wanted) in [
@@ -294,39 +471,50 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn only_what_a_metric_is_of_is_judged_by_it() {
-        let mut old = report(None, timed(&[("a", 100.0), ("b", 100.0), ("c", 100.0)]));
+    fn counters_are_compared_exactly_and_judge_nothing() {
+        let (mut old, mut new) = (all(10, 1.0), all(10, 1.0));
+        for (report, planes) in [(&mut old, 100.0), (&mut new, 100.001)] {
+            for (name, value) in [("planes_tested", planes), ("items_tested", 7.0)] {
+                let mut metric = report.cells[1].metrics["query_ns"].clone();
+                metric.value = value;
+                report.cells[1].metrics.insert(name.to_owned(), metric);
+            }
+        }
+        let found = changes(&old, &new, 0.05, QUERY);
+        let work = &found.work_changed;
+        assert_eq!((work.len(), work[0].counter), (1, "planes_tested"));
+        assert_eq!((work[0].old, work[0].new), (100.0, 100.001));
+        assert_eq!(found.count(Outcome::Same), 5);
+        // Of another scene they are another question's.
+        new.cells[1].scene.digest.push('x');
+        assert!(changes(&old, &new, 0.05, QUERY).work_changed.is_empty());
+    }
+
+    #[test]
+    fn only_what_has_times_is_judged() {
+        let (mut old, mut new) = (all(10, 1.0), all(10, 1.0));
         old.cells[1].metrics.get_mut("query_ns").unwrap().value = f64::NAN;
-        let mut new = old.clone();
         new.cells[2].metrics.clear();
-        let found = changes(&old, &new, 0.05, &by(&["query_ns", "locate_ns"]));
-        assert_eq!(found.count(Outcome::Unmeasured), 5);
-        assert_eq!(found.count(Outcome::Tie), 1);
+        let found = changes(&old, &new, 0.05, &["query_ns", "locate_ns"]);
+        assert_eq!(found.count(Outcome::Unmeasured), 7);
+        // Three are left, with two others each.
+        assert_eq!(found.count(Outcome::Inconclusive), 3);
         // What neither side ever had is no news.
-        assert_eq!(found.changes.iter().filter(|c| c.is_news()).count(), 2);
+        let news = found.rows.iter().filter(|row| row.is_news());
+        assert_eq!(news.count(), 5);
         assert!(found.why_nothing_was_judged().is_none());
-        let found = changes(&old, &new, 0.05, &by(&["locate_ns"]));
+        let found = changes(&old, &new, 0.05, &["locate_ns"]);
         assert!(found.why_nothing_was_judged().is_some());
     }
 
     #[test]
-    fn the_machine_is_told_from_the_code() {
-        let [mut old, mut new] = [100.0, 110.0].map(|ns| {
-            let mut report = report(None, timed(&[("a", ns)]));
-            report.bounds = timed(&[("bound-read", 2.0 * ns), ("bound-memcpy", ns)]);
-            report
-        });
-        new.bounds[0].scene.digest = "other".to_owned();
-        let drift = changes(&old, &new, 0.05, &by(&["query_ns"])).machine_drift;
-        let drift = drift.unwrap();
-        assert!(drift.bounds == 1 && (drift.ratio - 1.1).abs() < 1e-12);
+    fn facts_of_machine_and_build_that_differ_are_named() {
+        let (old, mut new) = (all(3, 1.0), all(3, 1.0));
         assert!(settings(&old, &new).is_empty());
         new.machine.cpu = None;
         new.toolchain.flags = "-O".to_owned();
         let found = settings(&old, &new);
         let found: Vec<_> = found.iter().map(|s| (s.what, s.is_machine)).collect();
         assert_eq!(found, [("cpu", true), ("flags", false)]);
-        old.bounds.clear();
-        assert_eq!(changes(&old, &new, 0.0, &[]).machine_drift, None);
     }
 }

@@ -1,27 +1,35 @@
-//! The folder of a run: report.json, summary.csv and samples.csv, brought up
-//! to date after every scene and path. Files are written beside their place
-//! and renamed into it, so that a reader or a crash never meets half a file.
+//! The folder of a run: stream.jsonl and samples.csv, appended to as the run
+//! goes on, and report.json and summary.csv, made of them at its end. Those are
+//! written beside their place and renamed into it, so that a reader or a crash
+//! never meets half a file.
 
+use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use serde::Deserialize;
-use tempfile::NamedTempFile;
+use tempfile::{NamedTempFile, TempDir};
 
-use super::{Report, ReportCell, SCHEMA_VERSION, SamplesRef};
-use crate::measure::{METRICS, Sample, Task};
+use super::reading::read_stream;
+use super::stream::{Header, KeptPart, Line, Stream};
+use super::{Report, ReportCell, SCHEMA_VERSION};
+use crate::measure::{METRICS, Part, TaskSamples};
+use crate::shown::field;
 
-const REPORT: &str = "report.json";
-const SUMMARY: &str = "summary.csv";
-const SAMPLES: &str = "samples.csv";
-const SAMPLE_COLUMNS: [&str; 12] = [
+pub(super) const REPORT: &str = "report.json";
+pub(super) const SUMMARY: &str = "summary.csv";
+pub(super) const SAMPLES: &str = "samples.csv";
+pub(super) const STREAM: &str = "stream.jsonl";
+/// How names of half-written files begin and end.
+const TEMPORARY: (&str, &str) = (".cullbench-", ".tmp");
+const SAMPLE_COLUMNS: [&str; 13] = [
     "scene",
     "path",
     "cache",
     "structure",
     "test",
     "task",
+    "process",
     "round",
     "frame",
     "queries",
@@ -34,21 +42,26 @@ const SAMPLE_COLUMNS: [&str; 12] = [
 pub enum FolderError {
     #[error("{}: {source}", path.display())]
     Io { path: PathBuf, source: io::Error },
-    #[error("{}: {source}; expected the report of a run", path.display())]
+    /// `place` is a line with a column, and the path of the value there.
+    #[error("{}, {place}: {found}; expected the report of a run{wanted}", path.display())]
     Json {
         path: PathBuf,
-        source: serde_json::Error,
+        place: String,
+        found: String,
+        wanted: String,
     },
     #[error("{}: schema version {found}; expected {SCHEMA_VERSION}", path.display())]
     Version { path: PathBuf, found: u32 },
-    #[error("{}: {found} rows; expected {rows} that report.json refers to", path.display())]
-    Samples {
-        path: PathBuf,
-        found: u64,
-        rows: u64,
-    },
-    #[error("{} already holds a run; expected an empty or new folder (--resume goes on with it)", path.display())]
+    #[error("{} already holds a run; expected an empty or new folder (continue it with --resume)", path.display())]
     Taken { path: PathBuf },
+    #[error("{}: another run is writing here; expected a folder of its own for each run", path.display())]
+    Locked { path: PathBuf },
+    #[error("{}, line {line}: {reason}; expected the stream of a run", path.display())]
+    Line {
+        path: PathBuf,
+        line: usize,
+        reason: String,
+    },
 }
 
 /// Writes a file whole or not at all. A link stays one, and its target is
@@ -81,7 +94,7 @@ pub fn write_atomically(
         };
         // A missing folder is reported by its own name, not by a temporary one.
         fs::metadata(folder)?;
-        let mut file = temporary_beside(folder)?;
+        let mut file = temporary_in(folder)?;
         {
             let mut buffered = BufWriter::new(&mut file);
             write(&mut buffered)?;
@@ -99,11 +112,16 @@ pub fn write_atomically(
     })
 }
 
-/// Temporary files are private by themselves; results are meant to be read,
-/// as far as the user's umask lets them.
-fn temporary_beside(folder: &Path) -> io::Result<NamedTempFile> {
+/// A file that is gone when this process ends well, and that the next run in
+/// the folder takes away if it does not.
+///
+/// # Errors
+/// What the file system says.
+pub fn temporary_in(folder: &Path) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".cullbench-").suffix(".tmp");
+    // Private by themselves; results are meant to be read, as far as the user's
+    // umask lets them.
+    builder.prefix(TEMPORARY.0).suffix(TEMPORARY.1);
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
@@ -112,45 +130,13 @@ fn temporary_beside(folder: &Path) -> io::Result<NamedTempFile> {
     builder.tempfile_in(folder)
 }
 
-/// Reads a report from its file, or from the folder of a run. Fields that it
-/// does not know are ignored.
-///
-/// # Errors
-/// What the file system says, not a report, or one of another schema version.
-pub fn read_report(path: &Path) -> Result<Report, FolderError> {
-    /// Read first: another version has other fields, and that is no damage.
-    #[derive(Deserialize)]
-    struct Versioned {
-        schema_version: u32,
-    }
-    let path = match path.is_dir() {
-        true => path.join(REPORT),
-        false => path.to_owned(),
-    };
-    let json = |source| FolderError::Json {
-        path: path.clone(),
-        source,
-    };
-    let text = fs::read_to_string(&path).map_err(|source| FolderError::Io {
-        path: path.clone(),
-        source,
-    })?;
-    match serde_json::from_str(&text).map_err(json)? {
-        Versioned { schema_version } if schema_version != SCHEMA_VERSION => {
-            Err(FolderError::Version {
-                path,
-                found: schema_version,
-            })
-        }
-        _ => serde_json::from_str(&text).map_err(json),
-    }
-}
-
-/// An open run.
+/// The folder of a run that is being measured, locked against others.
 pub struct RunFolder {
     path: PathBuf,
+    /// Locked for as long as it is open.
+    stream: File,
     samples: File,
-    rows: u64,
+    samples_end: u64,
 }
 
 impl RunFolder {
@@ -158,141 +144,319 @@ impl RunFolder {
     ///
     /// # Errors
     /// [`FolderError::Taken`] if it holds a file of a run already.
-    pub fn create(path: &Path) -> Result<RunFolder, FolderError> {
+    pub fn create(path: &Path, header: &Header) -> Result<RunFolder, FolderError> {
         let io = |source| FolderError::Io {
             path: path.to_owned(),
             source,
         };
         fs::create_dir_all(path).map_err(io)?;
-        if [REPORT, SUMMARY, SAMPLES]
-            .iter()
-            .any(|f| path.join(f).exists())
-        {
-            return Err(FolderError::Taken {
-                path: path.to_owned(),
-            });
-        }
-        let mut samples = File::create(path.join(SAMPLES)).map_err(io)?;
-        writeln!(samples, "{}", SAMPLE_COLUMNS.join(",")).map_err(io)?;
-        Ok(RunFolder {
-            path: path.to_owned(),
-            samples,
-            rows: 0,
-        })
-    }
-
-    /// Opens the folder of a run that was stopped, with its report. Samples
-    /// that no cell refers to (the stop came in between) are cut off.
-    ///
-    /// # Errors
-    /// No report, not a report, one of another schema version, or fewer
-    /// samples than the report refers to.
-    pub fn resume(path: &Path) -> Result<(RunFolder, Report), FolderError> {
-        let report = Self::read(path)?;
-        let measured = report.cells.iter().chain(&report.bounds);
-        let rows = measured.filter_map(|c| c.samples_ref.as_ref());
-        let rows = rows
-            .map(|r| r.first_row.saturating_add(r.rows))
-            .max()
-            .unwrap_or(0);
-        let file = path.join(SAMPLES);
-        let io = |source| FolderError::Io {
-            path: file.clone(),
-            source,
+        refuse_taken(path)?;
+        // There is no stream without its first line: it gets its name with it.
+        let begin = || -> io::Result<NamedTempFile> {
+            let mut stream = temporary_in(path)?;
+            let mut text = serde_json::to_vec(&Line::Run(Box::new(header.clone())))?;
+            text.push(b'\n');
+            stream.write_all(&text)?;
+            stream.as_file().try_lock()?;
+            Ok(stream)
         };
-        let text = fs::read(&file).map_err(io)?;
-        let (mut length, mut found) = (0, 0);
-        for line in text.split_inclusive(|b| *b == b'\n') {
-            if found > rows {
-                break;
+        let file = path.join(STREAM);
+        let stream = match begin().map_err(io)?.persist_noclobber(&file) {
+            Ok(stream) => stream,
+            Err(error) if error.error.kind() == io::ErrorKind::AlreadyExists => {
+                return Err(FolderError::Taken {
+                    path: path.to_owned(),
+                });
             }
-            length += line.len() as u64;
-            found += 1;
-        }
-        if found <= rows {
-            let found = found.saturating_sub(1);
-            return Err(FolderError::Samples {
-                path: file,
-                found,
-                rows,
-            });
-        }
-        let mut samples = OpenOptions::new().write(true).open(&file).map_err(io)?;
-        samples.set_len(length).map_err(io)?;
-        samples.seek(SeekFrom::End(0)).map_err(io)?;
-        Ok((
-            RunFolder {
-                path: path.to_owned(),
-                samples,
-                rows,
-            },
-            report,
-        ))
+            Err(error) => return Err(io(error.error)),
+        };
+        let mut folder = RunFolder {
+            path: path.to_owned(),
+            stream,
+            samples: open(&path.join(SAMPLES))?,
+            samples_end: 0,
+        };
+        folder.begin_samples()?;
+        folder.sweep();
+        Ok(folder)
     }
 
-    /// Reads the report of a run from its folder.
-    ///
-    /// # Errors
-    /// As [`RunFolder::resume`].
-    pub fn read(path: &Path) -> Result<Report, FolderError> {
-        read_report(&path.join(REPORT))
+    /// No samples yet: the names of the columns.
+    fn begin_samples(&mut self) -> Result<(), FolderError> {
+        let columns = columns();
+        let mut write = || {
+            self.samples.set_len(0)?;
+            self.samples.write_all(columns.as_bytes())
+        };
+        write().map_err(|source| FolderError::Io {
+            path: self.path.join(SAMPLES),
+            source,
+        })?;
+        self.samples_end = columns.len() as u64;
+        Ok(())
+    }
+
+    /// Takes away what killed processes have left half written.
+    fn sweep(&self) {
+        let entries = fs::read_dir(&self.path).into_iter().flatten().flatten();
+        for entry in entries {
+            let name = entry.file_name();
+            let name = name.to_string_lossy();
+            if name.starts_with(TEMPORARY.0) && name.ends_with(TEMPORARY.1) {
+                let path = entry.path();
+                let _ = match path.is_dir() {
+                    true => fs::remove_dir_all(path),
+                    false => fs::remove_file(path),
+                };
+            }
+        }
     }
 
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Appends the samples of one contender; where they are.
+    /// Appends a line, whole or not at all as far as a reader can tell.
     ///
     /// # Errors
     /// What the file system says.
-    pub fn append<'s>(
-        &mut self,
-        cell: [&str; 5],
-        samples: impl Iterator<Item = &'s (Task, Sample)>,
-    ) -> Result<SamplesRef, FolderError> {
-        let (first_row, path) = (self.rows, self.path.join(SAMPLES));
-        let write = || -> Result<(), csv::Error> {
-            let mut rows = csv::Writer::from_writer(&mut self.samples);
-            for (task, s) in samples {
-                let numbers = [
-                    s.round.to_string(),
-                    s.frame.to_string(),
-                    s.queries.to_string(),
-                    format!("{:.1}", s.cpu_ns),
-                    format!("{:.1}", s.wall_ns),
-                    s.returned.to_string(),
-                ];
-                let names = cell.into_iter().chain([task.name()]);
-                rows.write_record(names.chain(numbers.iter().map(String::as_str)))?;
-                self.rows += 1;
-            }
-            Ok(rows.flush()?)
+    pub fn append(&mut self, line: &Line) -> Result<(), FolderError> {
+        let write = || -> io::Result<()> {
+            let mut text = serde_json::to_vec(line)?;
+            text.push(b'\n');
+            (&self.stream).write_all(&text)
         };
-        write().map_err(|error| FolderError::Io {
-            path,
-            source: error.into(),
-        })?;
-        Ok(SamplesRef {
-            file: SAMPLES.to_owned(),
-            first_row,
-            rows: self.rows - first_row,
+        write().map_err(|source| FolderError::Io {
+            path: self.path.join(STREAM),
+            source,
         })
     }
 
-    /// Writes report.json and summary.csv as they now are.
+    /// Appends a part: its samples first, then the line that refers to them.
+    ///
+    /// # Errors
+    /// What the file system says.
+    pub fn keep(&mut self, part: Part, samples: &[TaskSamples]) -> Result<KeptPart, FolderError> {
+        let key = &part.key;
+        let process = part.process.to_string();
+        let mut rows = BTreeMap::new();
+        let mut write = || -> Result<Vec<u8>, csv::Error> {
+            let mut csv = csv::Writer::from_writer(Vec::new());
+            for (label, task, samples) in samples {
+                for s in samples {
+                    let names =
+                        [&key.scene, &key.path, &key.cache, label, &key.test].map(|n| field(n));
+                    let numbers = [
+                        process.clone(),
+                        s.round.to_string(),
+                        s.frame.to_string(),
+                        s.queries.to_string(),
+                        format!("{:.1}", s.cpu_ns),
+                        format!("{:.1}", s.wall_ns),
+                        s.returned.to_string(),
+                    ];
+                    let names = names.iter().map(AsRef::as_ref).chain([task.name()]);
+                    csv.write_record(names.chain(numbers.iter().map(String::as_str)))?;
+                    *rows.entry(label.clone()).or_insert(0) += 1;
+                }
+            }
+            Ok(csv.into_inner().map_err(csv::IntoInnerError::into_error)?)
+        };
+        let io = |source| FolderError::Io {
+            path: self.path.join(SAMPLES),
+            source,
+        };
+        let text = write().map_err(|error| io(error.into()))?;
+        self.samples.write_all(&text).map_err(io)?;
+        self.samples_end += text.len() as u64;
+        let kept = KeptPart {
+            part,
+            rows,
+            samples_end: self.samples_end,
+        };
+        self.append(&Line::Part(Box::new(kept.clone())))?;
+        Ok(kept)
+    }
+
+    /// Writes report.json and summary.csv of what the stream holds.
     ///
     /// # Errors
     /// What the file system says.
     pub fn save(&self, report: &Report) -> Result<(), FolderError> {
-        write_atomically(&self.path.join(SUMMARY), |out| {
-            write_summary(&report.cells, out)
-        })?;
-        write_atomically(&self.path.join(REPORT), |out| {
-            serde_json::to_writer_pretty(&mut *out, report)?;
-            writeln!(out)
-        })
+        save_report(&self.path, report)
     }
+
+    /// Takes the folder away again: for a run that ended before its first part.
+    pub fn discard(self) {
+        for name in [STREAM, SAMPLES] {
+            let _ = fs::remove_file(self.path.join(name));
+        }
+        // Only if nothing else is in it.
+        let _ = fs::remove_dir(&self.path);
+    }
+}
+
+/// The folder of a run that was stopped: locked, and as it was left.
+pub struct StoppedRun {
+    path: PathBuf,
+    stream: File,
+    /// Of the stream, as far as it is whole and has its samples.
+    length: u64,
+    lost: usize,
+}
+
+impl StoppedRun {
+    /// Opens it, with what its stream holds. Half a line at its end is none, and
+    /// parts whose samples are gone are to be measured again.
+    ///
+    /// # Errors
+    /// No stream, not a stream, another schema version, or another process at
+    /// work in it.
+    pub fn open(path: &Path) -> Result<(StoppedRun, Stream), FolderError> {
+        let file = path.join(STREAM);
+        let io = |source| FolderError::Io {
+            path: file.clone(),
+            source,
+        };
+        let opened = OpenOptions::new().read(true).append(true).open(&file);
+        let lock = opened.map_err(io)?;
+        match lock.try_lock() {
+            Ok(()) => {}
+            Err(fs::TryLockError::WouldBlock) => {
+                return Err(FolderError::Locked {
+                    path: path.to_owned(),
+                });
+            }
+            Err(fs::TryLockError::Error(source)) => return Err(io(source)),
+        }
+        let (mut stream, length) = read_stream(&file)?;
+        let mut stopped = StoppedRun {
+            path: path.to_owned(),
+            stream: lock,
+            length,
+            lost: 0,
+        };
+        let samples = fs::metadata(path.join(SAMPLES)).map_or(0, |found| found.len());
+        let mut parts = stream.parts.iter();
+        if let Some(kept) = parts.position(|kept| kept.samples_end > samples) {
+            stopped.lost = stream.parts.len() - kept;
+            stream.parts.truncate(kept);
+            stream.finished_at = None;
+            // The header and as many lines as there are parts.
+            stopped.length = length_of_lines(&file, 1 + kept).map_err(io)?;
+        }
+        Ok((stopped, stream))
+    }
+
+    /// Parts that are to be measured again: samples.csv was shorter than the
+    /// stream says.
+    pub fn lost(&self) -> usize {
+        self.lost
+    }
+
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Cuts off what is not whole, to be appended to.
+    ///
+    /// # Errors
+    /// What the file system says.
+    pub fn go_on(self, stream: &Stream) -> Result<RunFolder, FolderError> {
+        let mut folder = RunFolder {
+            samples: open(&self.path.join(SAMPLES))?,
+            path: self.path,
+            stream: self.stream,
+            samples_end: 0,
+        };
+        let io = |source| FolderError::Io {
+            path: folder.path.clone(),
+            source,
+        };
+        folder.stream.set_len(self.length).map_err(io)?;
+        match stream.parts.last() {
+            Some(kept) => {
+                folder.samples.set_len(kept.samples_end).map_err(io)?;
+                folder.samples_end = kept.samples_end;
+            }
+            None => folder.begin_samples()?,
+        }
+        folder.sweep();
+        Ok(folder)
+    }
+}
+
+/// The first line of samples.csv.
+pub(super) fn columns() -> String {
+    SAMPLE_COLUMNS.join(",") + "\n"
+}
+
+/// Where the samples of the first part begin.
+pub(super) fn samples_begin() -> u64 {
+    columns().len() as u64
+}
+
+/// A folder for files that are not whole yet.
+pub(super) fn temporary_folder_in(folder: &Path) -> io::Result<TempDir> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(TEMPORARY.0).suffix(TEMPORARY.1);
+    builder.tempdir_in(folder)
+}
+
+/// Refuses a folder that holds a file of a run.
+///
+/// # Errors
+/// [`FolderError::Taken`].
+pub(super) fn refuse_taken(path: &Path) -> Result<(), FolderError> {
+    let files = [REPORT, SUMMARY, SAMPLES, STREAM];
+    match files.iter().any(|file| path.join(file).exists()) {
+        true => Err(FolderError::Taken {
+            path: path.to_owned(),
+        }),
+        false => Ok(()),
+    }
+}
+
+/// To append to; made if it is not there.
+fn open(file: &Path) -> Result<File, FolderError> {
+    let opened = OpenOptions::new()
+        .read(true)
+        .append(true)
+        .create(true)
+        .open(file);
+    opened.map_err(|source| FolderError::Io {
+        path: file.to_owned(),
+        source,
+    })
+}
+
+/// Bytes of the first lines of a file that are not empty.
+fn length_of_lines(file: &Path, lines: usize) -> io::Result<u64> {
+    let bytes = fs::read(file)?;
+    let all = bytes.split_inclusive(|b| *b == b'\n');
+    let (mut found, mut length) = (0, 0);
+    for line in all {
+        if found == lines {
+            break;
+        }
+        found += usize::from(line != b"\n");
+        length += line.len() as u64;
+    }
+    Ok(length)
+}
+
+/// Writes report.json and summary.csv into a folder.
+///
+/// # Errors
+/// What the file system says.
+pub fn save_report(folder: &Path, report: &Report) -> Result<(), FolderError> {
+    write_atomically(&folder.join(SUMMARY), |out| {
+        write_summary(&report.cells, out)
+    })?;
+    write_atomically(&folder.join(REPORT), |out| {
+        serde_json::to_writer_pretty(&mut *out, report)?;
+        writeln!(out)
+    })
 }
 
 /// One tidy row per cell; a metric that was not measured is an empty field.
@@ -309,11 +473,23 @@ fn write_summary(cells: &[ReportCell], out: &mut dyn Write) -> io::Result<()> {
         "epsilon",
         "status",
         "reason",
+        "rank",
+        "processes",
+        "rounds",
+        "cameras_timed",
+        "cameras_checked",
         "total_count",
     ]
     .map(str::to_owned)
     .into();
-    let intervals = ["query_ns", "ratio_to_linear", "times_read", "times_memcpy"];
+    let intervals = [
+        "query_ns",
+        "speedup",
+        "times_read",
+        "times_memcpy",
+        "locate_ns",
+        "build_ms",
+    ];
     for metric in METRICS {
         header.push(metric.name.to_owned());
         if intervals.contains(&metric.name) {
@@ -324,16 +500,21 @@ fn write_summary(cells: &[ReportCell], out: &mut dyn Write) -> io::Result<()> {
     csv.write_record(&header)?;
     for cell in cells {
         let mut row = vec![
-            cell.scene.name.clone(),
-            cell.path.name.clone(),
+            field(&cell.scene.name).into_owned(),
+            field(&cell.path.name).into_owned(),
             cell.path.cache.clone(),
-            cell.structure.clone(),
+            field(&cell.structure).into_owned(),
             cell.test.clone(),
             cell.path.arithmetic.clone(),
             cell.path.planes.clone(),
             cell.path.epsilon.to_string(),
             cell.status.name().to_owned(),
-            cell.reason.clone().unwrap_or_default(),
+            field(cell.reason.as_deref().unwrap_or_default()).into_owned(),
+            cell.rank.map_or(String::new(), |rank| rank.to_string()),
+            cell.times.processes.to_string(),
+            cell.times.rounds.to_string(),
+            cell.times.cameras_timed.to_string(),
+            cell.times.cameras_checked.to_string(),
             cell.scene.total_count.to_string(),
         ];
         let text = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
@@ -353,68 +534,6 @@ fn write_summary(cells: &[ReportCell], out: &mut dyn Write) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn sample(round: u32) -> (Task, Sample) {
-        let sample = Sample {
-            round,
-            frame: 3,
-            queries: 2,
-            cpu_ns: 10.5,
-            wall_ns: 11.0,
-            returned: 7,
-        };
-        (Task::Query, sample)
-    }
-
-    #[test]
-    fn samples_are_appended_and_cut_back_to_what_the_report_knows() {
-        let temporary = tempfile::tempdir().unwrap();
-        let path = temporary.path().join("new/run");
-        let mut folder = RunFolder::create(&path).unwrap();
-        let cell = ["a scene, with commas", "orbit", "warm", "bvh", "exact"];
-        let known = folder.append(cell, [sample(0), sample(1)].iter()).unwrap();
-        assert_eq!((known.first_row, known.rows), (0, 2));
-        let unknown = folder.append(cell, [sample(2)].iter()).unwrap();
-        assert_eq!(unknown.first_row, 2);
-        let text = fs::read_to_string(path.join(SAMPLES)).unwrap();
-        assert_eq!(text.lines().count(), 4);
-        assert!(
-            text.contains("\"a scene, with commas\",orbit,warm,bvh,exact,query,0,3,2,10.5,11.0,7")
-        );
-        // No report yet: nothing to resume, and one error line.
-        let error = RunFolder::resume(&path).err().unwrap().to_string();
-        assert!(
-            error.contains("report.json") && !error.contains('\n'),
-            "{error}"
-        );
-    }
-
-    #[test]
-    fn another_version_is_told_from_something_else() {
-        let folder = tempfile::tempdir().unwrap();
-        let refused = |text: &[u8]| {
-            fs::write(folder.path().join(REPORT), text).unwrap();
-            // The folder or the file in it: the same.
-            let error = read_report(folder.path()).unwrap_err().to_string();
-            let again = read_report(&folder.path().join(REPORT)).unwrap_err();
-            assert_eq!(error, again.to_string());
-            assert!(!error.contains('\n'), "{error}");
-            error
-        };
-        for (text, wanted) in [
-            (
-                "{\"schema_version\": 2, \"cells\": 7}",
-                "version 2; expected 1",
-            ),
-            ("{\"schema_version\": 1}", "missing field `run`"),
-            ("{}", "missing field `schema_version`"),
-            ("[1, 2]", "expected the report of a run"),
-            ("", "expected the report of a run"),
-        ] {
-            assert!(refused(text.as_bytes()).contains(wanted), "{text}");
-        }
-        assert!(refused(&[0xFF; 9]).contains("UTF-8"));
-    }
 
     #[test]
     fn a_failed_write_leaves_the_old_file_and_no_rubbish() {

@@ -1,55 +1,31 @@
-//! What became of one cell from one report to another: by its status, by
-//! whether it was asked the same, and by a metric and the bar for it. It owns
-//! the list of metrics that may judge; which cells belong together is `matching`'s.
+//! What became of one cell from an old measurement to a new one: two reports,
+//! or two programs that ran in turns. The one row type of both, the metrics
+//! that may be judged, and the counters that are compared exactly.
 
 use std::cmp::Ordering;
+use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::matching::{CellName, Pair};
-use super::{Report, ReportCell};
-use crate::measure::Status;
+use crate::measure::{CellKey, Status, Verdict};
+use crate::statistics::{Change, Judgement};
 
-/// A metric that two runs can be held against each other by: less is better.
-#[derive(PartialEq, Debug)]
-pub struct Tracked {
-    pub name: &'static str,
-    /// Counted and not timed: noise has no part in it.
-    pub is_exact: bool,
-}
+/// The metrics with a value per process, which a judgement needs; less is
+/// better. The first is the one that structures are ranked by.
+pub static JUDGED_METRICS: &[&str] = &["query_ns", "locate_ns", "locate_batched_ns", "build_ms"];
 
-const fn timed(name: &'static str) -> Tracked {
-    Tracked {
-        name,
-        is_exact: false,
-    }
-}
-
-/// All such metrics; the first is the one that structures are ranked by.
-pub static TRACKED: &[Tracked] = &[
-    timed("query_ns"),
-    timed("query_ns_p95"),
-    timed("query_ns_p99"),
-    timed("query_wall_ns"),
-    timed("ns_per_visible"),
-    timed("times_read"),
-    timed("times_memcpy"),
-    timed("times_replay"),
-    timed("build_ms"),
-    timed("update_ms"),
-    Tracked {
-        name: "memory_bytes_per_item",
-        is_exact: true,
-    },
-    timed("locate_ns"),
-    timed("locate_batched_ns"),
+/// Counters that do not depend on the machine or the moment: any difference is
+/// a change of the program.
+pub static COUNTERS: &[&str] = &[
+    "visible_count",
+    "nodes_tested",
+    "planes_tested",
+    "items_tested",
+    "items_accepted_untested",
+    "comparisons",
+    "regions_found",
+    "memory_bytes_per_item",
 ];
-
-impl Tracked {
-    pub fn named(name: &str) -> Option<&'static Tracked> {
-        TRACKED.iter().find(|metric| metric.name == name)
-    }
-}
 
 /// What became of a cell, worst first.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize)]
@@ -60,19 +36,21 @@ pub enum Outcome {
     /// Was right and is not answered any more.
     Lost,
     Slower,
-    /// Not asked the same question: not judged.
+    /// Not the same question: not judged.
     Different,
-    /// No sound figure on one side at least: not judged.
+    /// No time above zero on one side at least: not judged.
     Unmeasured,
     FailedInBoth,
     /// Was not right and is.
     Gained,
+    /// Neither a change nor its absence is proven.
+    Inconclusive,
     Faster,
-    Tie,
+    Same,
 }
 
 impl Outcome {
-    pub const ALL: [Outcome; 9] = [
+    pub const ALL: [Outcome; 10] = [
         Outcome::Broken,
         Outcome::Lost,
         Outcome::Slower,
@@ -80,8 +58,9 @@ impl Outcome {
         Outcome::Unmeasured,
         Outcome::FailedInBoth,
         Outcome::Gained,
+        Outcome::Inconclusive,
         Outcome::Faster,
-        Outcome::Tie,
+        Outcome::Same,
     ];
 
     /// As JSON has it.
@@ -94,152 +73,122 @@ impl Outcome {
             Outcome::Unmeasured => "unmeasured",
             Outcome::FailedInBoth => "failed_in_both",
             Outcome::Gained => "gained",
+            Outcome::Inconclusive => "inconclusive",
             Outcome::Faster => "faster",
-            Outcome::Tie => "tie",
+            Outcome::Same => "same",
         }
     }
 
-    /// Both sides had a figure, and the ratio decided.
+    /// By statuses alone; `None` where both are ok and times decide.
+    pub fn of_statuses(old: Status, new: Status) -> Option<Outcome> {
+        match (old == Status::Ok, new == Status::Ok) {
+            (true, true) => None,
+            (true, false) if new.is_failure() => Some(Outcome::Broken),
+            (true, false) => Some(Outcome::Lost),
+            (false, true) => Some(Outcome::Gained),
+            // Never asked, and so no failure.
+            (false, false) if old == Status::LeftOut && new == old => Some(Outcome::Unmeasured),
+            (false, false) => Some(Outcome::FailedInBoth),
+        }
+    }
+
+    /// Whether the statistics decided.
     pub fn is_judged(self) -> bool {
-        matches!(self, Outcome::Slower | Outcome::Faster | Outcome::Tie)
+        matches!(
+            self,
+            Outcome::Slower | Outcome::Faster | Outcome::Same | Outcome::Inconclusive
+        )
     }
 }
 
-/// A metric's value in one report, with its 95 % interval where it has one.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-pub struct Figure {
-    pub value: f64,
-    pub lower: Option<f64>,
-    pub upper: Option<f64>,
-}
-
-fn figure(cell: &ReportCell, metric: &str) -> Option<Figure> {
-    cell.metrics.get(metric).map(|found| Figure {
-        value: found.value,
-        lower: found.lower,
-        upper: found.upper,
-    })
-}
-
-/// Only what is above zero can be divided by, or be a time.
-pub(super) fn is_sound(value: f64) -> bool {
-    value.is_finite() && value > 0.0
-}
-
-/// From where on a difference counts.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-pub struct Bar {
-    pub metric: &'static str,
-    /// Slower above 1 + bar, faster below 1 / (1 + bar).
-    pub bar: f64,
-    pub decided_by: Decider,
-}
-
-/// What was larger: the threshold, or what a run cannot tell apart.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Decider {
-    Threshold,
-    OldNoiseFloor,
-    NewNoiseFloor,
-}
-
-impl Bar {
-    pub(super) fn of(metric: &Tracked, threshold: f64, old: &Report, new: &Report) -> Bar {
-        let mut bar = Bar {
-            metric: metric.name,
-            bar: threshold,
-            decided_by: Decider::Threshold,
-        };
-        let floors = [(old, Decider::OldNoiseFloor), (new, Decider::NewNoiseFloor)];
-        for (report, decider) in floors {
-            let floor = report.noise.aa_floor.unwrap_or(0.0);
-            if floor > bar.bar && !metric.is_exact {
-                (bar.bar, bar.decided_by) = (floor, decider);
-            }
-        }
-        bar
-    }
-
-    fn outcome(&self, ratio: f64) -> Outcome {
-        let most = 1.0 + self.bar;
-        match ratio {
-            r if r > most => Outcome::Slower,
-            r if r < 1.0 / most => Outcome::Faster,
-            _ => Outcome::Tie,
+impl From<Change> for Outcome {
+    fn from(change: Change) -> Outcome {
+        match change {
+            Change::Slower => Outcome::Slower,
+            Change::Faster => Outcome::Faster,
+            Change::Same => Outcome::Same,
+            Change::Inconclusive => Outcome::Inconclusive,
         }
     }
 }
 
-/// What became of one cell by one metric, or of the cell as a whole.
+/// A cell of a comparison, by one metric or as a whole.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct Change<'r> {
-    #[serde(rename = "status")]
+pub struct JudgedRow {
+    #[serde(rename = "verdict")]
     pub outcome: Outcome,
     #[serde(flatten)]
-    pub cell: CellName<'r>,
-    /// None where no metric was looked at.
+    pub cell: CellKey,
+    /// `None` where the cell failed or was not the same question.
     pub metric: Option<&'static str>,
-    /// new / old: above 1 is slower.
-    pub ratio: Option<f64>,
-    pub old: Option<Figure>,
-    pub new: Option<Figure>,
-    pub bar: Option<f64>,
+    /// The shown value on each side, in the unit of the metric.
+    pub old: Option<f64>,
+    pub new: Option<f64>,
+    /// Change, interval and resolution; `None` where nothing was judged.
+    pub judgement: Option<Judgement>,
+    /// Processes with a time on each side; of pairs: the same number twice.
+    pub processes: [usize; 2],
     pub old_status: Status,
     pub new_status: Status,
+    /// Why the verdict is what it is, where the figures do not say it.
     pub reason: Option<String>,
 }
 
-impl<'r> Change<'r> {
-    /// Of the cell as a whole.
-    fn of_cell((old, new): Pair<'r>, outcome: Outcome, reason: Option<String>) -> Change<'r> {
-        Change {
-            outcome,
-            cell: CellName::of(new),
-            metric: None,
-            ratio: None,
-            old: None,
-            new: None,
-            bar: None,
+impl JudgedRow {
+    /// A cell that is not right on both sides; `None` if it is.
+    pub fn of_statuses(cell: CellKey, old: &Verdict, new: &Verdict) -> Option<JudgedRow> {
+        let outcome = Outcome::of_statuses(old.status, new.status)?;
+        let reason = match outcome {
+            Outcome::Gained => old.reason.clone(),
+            _ => new.reason.clone(),
+        };
+        Some(JudgedRow {
             old_status: old.status,
             new_status: new.status,
+            ..JudgedRow::unjudged(cell, outcome, reason)
+        })
+    }
+
+    /// A cell that is right on both sides, and yet not judged by times.
+    pub fn unjudged(cell: CellKey, outcome: Outcome, reason: Option<String>) -> JudgedRow {
+        JudgedRow {
+            outcome,
+            cell,
+            metric: None,
+            old: None,
+            new: None,
+            judgement: None,
+            processes: [0; 2],
+            old_status: Status::Ok,
+            new_status: Status::Ok,
             reason,
         }
     }
 
-    pub(super) fn by_metric(pair: Pair<'r>, bar: &Bar) -> Change<'r> {
-        let (old, new) = (figure(pair.0, bar.metric), figure(pair.1, bar.metric));
-        let ratio = match (old, new) {
-            (Some(old), Some(new)) if is_sound(old.value) && is_sound(new.value) => {
-                Some(new.value / old.value).filter(|ratio| is_sound(*ratio))
-            }
-            _ => None,
-        };
-        let reason = match (ratio, old, new) {
-            (Some(_), ..) => None,
-            (None, None, None) => Some("in neither report".to_owned()),
-            (None, Some(_), None) => Some("only in OLD".to_owned()),
-            (None, None, Some(_)) => Some("only in NEW".to_owned()),
-            (None, Some(old), Some(new)) => {
-                Some(format!("{} and {} have no ratio", old.value, new.value))
-            }
-        };
-        let outcome = ratio.map_or(Outcome::Unmeasured, |ratio| bar.outcome(ratio));
-        Change {
-            metric: Some(bar.metric),
-            ratio,
+    /// A cell by its times: old and new as shown, the verdict of the statistics.
+    pub fn by_times(
+        cell: CellKey,
+        metric: &'static str,
+        (old, new): (Option<f64>, Option<f64>),
+        judgement: Option<Judgement>,
+        processes: [usize; 2],
+    ) -> JudgedRow {
+        let outcome = judgement.map_or(Outcome::Unmeasured, |found| found.change.into());
+        JudgedRow {
+            metric: Some(metric),
             old,
             new,
-            bar: Some(bar.bar),
-            ..Change::of_cell(pair, outcome, reason)
+            judgement,
+            processes,
+            ..JudgedRow::unjudged(cell, outcome, None)
         }
     }
 
-    /// Whether somebody who asks for changes wants to see it: no tie, no metric
-    /// that neither side ever had, no refusal as before.
+    /// Whether the row is worth reading: not the same as before, not a metric
+    /// that neither side ever had, not a failure as before.
     pub fn is_news(&self) -> bool {
         match self.outcome {
-            Outcome::Tie => false,
+            Outcome::Same => false,
             Outcome::Unmeasured => self.old.is_some() || self.new.is_some(),
             Outcome::FailedInBoth => {
                 self.new_status.is_failure() || self.old_status != self.new_status
@@ -249,8 +198,8 @@ impl<'r> Change<'r> {
     }
 
     /// Worst first; among the faster ones the one that gained most.
-    pub(super) fn order(&self, other: &Change) -> Ordering {
-        let ratio = |change: &Change| change.ratio.unwrap_or(1.0);
+    pub fn order(&self, other: &JudgedRow) -> Ordering {
+        let ratio = |row: &JudgedRow| row.judgement.map_or(1.0, |found| found.ratio);
         let by_ratio = match self.outcome {
             Outcome::Faster => ratio(self).total_cmp(&ratio(other)),
             _ => ratio(other).total_cmp(&ratio(self)),
@@ -259,54 +208,102 @@ impl<'r> Change<'r> {
     }
 }
 
-/// Why the two answers do not belong to one question, if they do not.
-pub(super) fn asked_otherwise((old, new): Pair) -> Option<String> {
-    let digests = |what: &str, old: &str, new: &str| {
-        let short = |digest: &str| digest.chars().take(8).collect::<String>();
-        (old != new).then(|| format!("{what}: digest {} and {}", short(old), short(new)))
-    };
-    if let Some(reason) = digests("other items", &old.scene.digest, &new.scene.digest) {
-        return Some(reason);
-    }
-    let cameras = (old.path.camera_count, new.path.camera_count);
-    if cameras.0 != cameras.1 {
-        return Some(format!("{} cameras and {}", cameras.0, cameras.1));
-    }
-    // Older reports do not know theirs.
-    let (was, is) = (old.path.digest.as_ref(), new.path.digest.as_ref());
-    was.zip(is)
-        .and_then(|(was, is)| digests("other cameras", was, is))
+/// A counter that is not what it was.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct WorkChange {
+    #[serde(flatten)]
+    pub cell: CellKey,
+    pub counter: &'static str,
+    pub old: f64,
+    pub new: f64,
 }
 
-/// As many items a query, where both say so: right answers to one question
-/// have the same length.
-fn answered_otherwise((old, new): Pair) -> Option<String> {
-    let counts = old.value("visible_count").zip(new.value("visible_count"));
-    let (was, is) = counts.filter(|(was, is)| was != is)?;
-    Some(format!("visible_count {was} and {is}"))
+/// The counters of a cell that differ, of those that both sides have.
+pub fn work_changes(
+    cell: &CellKey,
+    old: &BTreeMap<String, f64>,
+    new: &BTreeMap<String, f64>,
+) -> Vec<WorkChange> {
+    let counters = COUNTERS.iter().filter_map(|&counter| {
+        let (&old, &new) = (old.get(counter)?, new.get(counter)?);
+        (old != new).then(|| WorkChange {
+            cell: cell.clone(),
+            counter,
+            old,
+            new,
+        })
+    });
+    counters.collect()
 }
 
-/// What became of a pair by its statuses and questions alone; none if it is
-/// to be judged by its figures.
-pub(super) fn as_a_whole(pair: Pair<'_>) -> Option<Change<'_>> {
-    let (old, new) = pair;
-    let (was_ok, is_ok) = (old.status == Status::Ok, new.status == Status::Ok);
-    let of_cell = |outcome, reason| Some(Change::of_cell(pair, outcome, reason));
-    // Wrong is wrong, whatever was asked.
-    if was_ok && new.status.is_failure() {
-        return of_cell(Outcome::Broken, new.reason.clone());
+/// A cell that the other report does not have.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Lone {
+    #[serde(flatten)]
+    pub cell: CellKey,
+    pub status: Status,
+    pub reason: Option<String>,
+}
+
+/// What moved all structures at once: the machine, or the program as a whole.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct CommonShift {
+    /// new / old: above 1 is slower.
+    pub ratio: f64,
+    /// 95 % interval; `None` below three processes a side.
+    pub lower: Option<f64>,
+    pub upper: Option<f64>,
+    /// Cells it is made of.
+    pub cells: usize,
+}
+
+/// A comparison: every cell with its verdict, and what else is to be said.
+#[derive(Clone, Default, PartialEq, Debug, Serialize)]
+pub struct Changes {
+    /// 0.05 is 5 %: how finely "same" is to be shown.
+    pub threshold: f64,
+    pub cells_in_common: usize,
+    /// Worst first.
+    pub rows: Vec<JudgedRow>,
+    /// Differences of what was counted: exact, and no verdict.
+    pub work_changed: Vec<WorkChange>,
+    pub only_in_old: Vec<Lone>,
+    pub only_in_new: Vec<Lone>,
+    /// Of two reports; `None` for programs that ran in turns, which share it.
+    pub common_shift: Option<CommonShift>,
+}
+
+impl Changes {
+    pub fn count(&self, outcome: Outcome) -> usize {
+        let rows = self.rows.iter();
+        rows.filter(|row| row.outcome == outcome).count()
     }
-    if let Some(reason) = asked_otherwise(pair) {
-        return of_cell(Outcome::Different, Some(reason));
+
+    /// Whether NEW holds a wrong answer, with or without a partner in OLD.
+    pub fn is_wrong(&self) -> bool {
+        let paired = self.rows.iter().map(|row| row.new_status);
+        let alone = self.only_in_new.iter().map(|cell| cell.status);
+        paired.chain(alone).any(Status::is_failure)
     }
-    match (was_ok, is_ok) {
-        (true, false) => of_cell(Outcome::Lost, new.reason.clone()),
-        (false, true) => of_cell(Outcome::Gained, old.reason.clone()),
-        (false, false) => of_cell(Outcome::FailedInBoth, new.reason.clone()),
-        (true, true) => {
-            let reason = answered_otherwise(pair)?;
-            of_cell(Outcome::Different, Some(reason))
-        }
+
+    /// Whether a right answer takes longer or is not given any more.
+    pub fn is_regression(&self) -> bool {
+        self.count(Outcome::Slower) + self.count(Outcome::Lost) > 0
+    }
+
+    /// The first row, if no row at all could be judged.
+    pub fn why_nothing_was_judged(&self) -> Option<&JudgedRow> {
+        let unjudged =
+            |row: &&JudgedRow| matches!(row.outcome, Outcome::Different | Outcome::Unmeasured);
+        let first = self.rows.first().filter(unjudged)?;
+        (self.rows.iter().all(|row| unjudged(&row)) && !self.is_wrong()).then_some(first)
+    }
+
+    /// More processes or pairs that would decide all inconclusive cells, as far
+    /// as it is known: the most that one of them needs.
+    pub fn more_pairs(&self) -> Option<usize> {
+        let judged = self.rows.iter().filter_map(|row| row.judgement);
+        judged.filter_map(|found| found.more_pairs).max()
     }
 }
 
@@ -316,11 +313,9 @@ mod tests {
     use crate::measure::METRICS;
 
     #[test]
-    fn every_tracked_metric_is_one_of_the_list() {
-        for metric in TRACKED {
-            let known = METRICS.iter().any(|info| info.name == metric.name);
-            assert!(known, "{}", metric.name);
-            assert_eq!(Tracked::named(metric.name), Some(metric));
+    fn every_metric_and_counter_is_one_of_the_list() {
+        for name in JUDGED_METRICS.iter().chain(COUNTERS) {
+            assert!(METRICS.iter().any(|info| info.name == *name), "{name}");
         }
     }
 
@@ -329,6 +324,15 @@ mod tests {
         assert!(Outcome::ALL.is_sorted());
         for outcome in Outcome::ALL {
             assert_eq!(serde_json::to_value(outcome).unwrap(), outcome.name());
+        }
+        for change in [
+            Change::Slower,
+            Change::Faster,
+            Change::Same,
+            Change::Inconclusive,
+        ] {
+            assert_eq!(Outcome::from(change).name(), change.name());
+            assert!(Outcome::from(change).is_judged());
         }
     }
 }

@@ -1,40 +1,9 @@
-//! Which cells of two reports belong together. It owns the name of a cell and
-//! nothing that is said about it.
+//! Which cells of two reports belong together, by their whole key, and
+//! whether they asked and timed the same.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use serde::Serialize;
-
 use super::ReportCell;
-
-/// What a cell is found by in another report.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-pub struct CellName<'r> {
-    pub scene: &'r str,
-    pub path: &'r str,
-    pub cache: &'r str,
-    pub test: &'r str,
-    pub arithmetic: &'r str,
-    pub planes: &'r str,
-    pub epsilon: f64,
-    pub structure: &'r str,
-}
-
-impl CellName<'_> {
-    pub(super) fn of(cell: &ReportCell) -> CellName<'_> {
-        let path = &cell.path;
-        CellName {
-            scene: &cell.scene.name,
-            path: &path.name,
-            cache: &path.cache,
-            test: &cell.test,
-            arithmetic: &path.arithmetic,
-            planes: &path.planes,
-            epsilon: path.epsilon,
-            structure: &cell.structure,
-        }
-    }
-}
 
 /// The name in an order, and how many cells of that name come before it: a
 /// report that holds a cell twice loses none of them.
@@ -43,18 +12,18 @@ type Key<'r> = ([&'r str; 7], u64, usize);
 fn keyed(cells: &[ReportCell]) -> Vec<(Key<'_>, &ReportCell)> {
     let mut seen = BTreeMap::new();
     let keys = cells.iter().map(|cell| {
-        let n = CellName::of(cell);
+        let path = &cell.path;
         let texts = [
-            n.scene,
-            n.path,
-            n.cache,
-            n.test,
-            n.arithmetic,
-            n.planes,
-            n.structure,
+            cell.scene.name.as_str(),
+            &path.name,
+            &path.cache,
+            &cell.test,
+            &path.arithmetic,
+            &path.planes,
+            &cell.structure,
         ];
         // Zero has two signs and one meaning.
-        let epsilon = (n.epsilon + 0.0).to_bits();
+        let epsilon = (path.epsilon + 0.0).to_bits();
         let before = seen.entry((texts, epsilon)).or_insert(0);
         *before += 1;
         ((texts, epsilon, *before), cell)
@@ -89,6 +58,36 @@ pub(super) fn matched<'r>(old: &'r [ReportCell], new: &'r [ReportCell]) -> Match
         only_old,
         only_new: only_new.map(|(_, cell)| cell).collect(),
     }
+}
+
+/// Why the two cells are not the same question, if they are not.
+pub(super) fn asked_otherwise((old, new): Pair) -> Option<String> {
+    let digests = |what: &str, old: &str, new: &str| {
+        let short = |digest: &str| digest.chars().take(8).collect::<String>();
+        (old != new).then(|| format!("{what}: digest {} and {}", short(old), short(new)))
+    };
+    if let Some(reason) = digests("other items", &old.scene.digest, &new.scene.digest) {
+        return Some(reason);
+    }
+    let cameras = (old.path.camera_count, new.path.camera_count);
+    if cameras.0 != cameras.1 {
+        return Some(format!("{} cameras and {}", cameras.0, cameras.1));
+    }
+    // A report may not know its cameras.
+    let (was, is) = (old.path.digest.as_ref(), new.path.digest.as_ref());
+    was.zip(is)
+        .and_then(|(was, is)| digests("other cameras", was, is))
+}
+
+/// Why the times are not of the same work, if they are not: the mean over other
+/// cameras, or of shorter batches, is another figure.
+pub(super) fn timed_otherwise((old, new): Pair) -> Option<String> {
+    let (was, is) = (&old.times, &new.times);
+    if was.cameras_timed != is.cameras_timed {
+        let (was, is) = (was.cameras_timed, is.cameras_timed);
+        return Some(format!("{was} cameras timed and {is}"));
+    }
+    (was.batch != is.batch).then(|| format!("batches of {} and {} queries", was.batch, is.batch))
 }
 
 #[cfg(test)]

@@ -7,17 +7,25 @@ mod folder;
 mod growth;
 mod judging;
 mod matching;
+mod merge;
 mod model;
 mod ranking;
+mod reading;
 mod setting;
+mod stream;
 mod surface;
 
-pub use changes::{Changes, Drift, Lone, MeanRatio, changes};
-pub use folder::{FolderError, RunFolder, read_report, write_atomically};
+pub use changes::changes;
+pub use folder::{FolderError, RunFolder, StoppedRun, save_report, temporary_in, write_atomically};
 pub use growth::{Growth, growths};
-pub use judging::{Bar, Change, Decider, Figure, Outcome, TRACKED, Tracked};
-pub use matching::CellName;
+pub use judging::{
+    COUNTERS, Changes, CommonShift, JUDGED_METRICS, JudgedRow, Lone, Outcome, WorkChange,
+    work_changes,
+};
+pub use merge::{MergeError, Merged, merge};
 pub use model::{Noise, Report, ReportCell, RunInfo, SCHEMA_VERSION, SamplesRef, TwinEntry};
 pub use ranking::{Comparison, Ranked, comparisons, times_as_fast};
+pub use reading::{read_report, read_stream};
 pub use setting::{Setting, settings};
+pub use stream::{Difference, Header, KeptPart, Line, Stream, dated, run_here, utc};
 pub use surface::{Crossing, Place, Surface, surfaces};

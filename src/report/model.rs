@@ -6,13 +6,15 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use crate::index::{Kind, Origin};
 use crate::measure::{
-    Cell, Judged, Machine, Metric, PathInfo, SceneInfo, Source, Status, Toolchain, TwinRatio,
+    Cell, CellKey, CellTimes, GroupKey, Judged, Machine, Metric, PathInfo, SceneInfo, Source,
+    Status, Toolchain,
 };
-use crate::statistics::{geometric_mean, quantile, sorted};
+use crate::statistics::geometric_mean;
 
 /// Raised when a field changes its meaning or goes away.
-pub const SCHEMA_VERSION: u32 = 1;
+pub const SCHEMA_VERSION: u32 = 2;
 
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
@@ -24,8 +26,8 @@ pub struct Report {
     pub source: Source,
     pub noise: Noise,
     pub cells: Vec<ReportCell>,
-    /// Physical limits measured in the same rounds as the cells of their scene
-    /// and path: no structures, never ranked, and therefore a list of their own.
+    /// Lower bounds, measured in the same rounds as the cells of their scene and
+    /// path: no structures, never ranked, and therefore a list of their own.
     #[serde(default)]
     pub bounds: Vec<ReportCell>,
 }
@@ -44,22 +46,30 @@ pub struct RunInfo {
     pub suite: Option<String>,
     /// The generator behind generated scenes and paths.
     pub generator: String,
+    /// Processes that the rounds were spread over, as planned.
+    #[serde(default = "one")]
+    pub processes: u32,
+    /// `i/n` where only a share of the plan was run.
+    #[serde(default)]
+    pub shard: Option<String>,
+}
+
+fn one() -> u32 {
+    1
 }
 
 /// How far apart two measurements of the same thing lie in this run.
 #[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Noise {
-    /// Cost of a clock reading with its loop; queries are batched until this
-    /// is at most 2 % of a sample.
-    pub harness_overhead_ns: f64,
     /// Geometric mean of all twin ratios: 1 unless the order is unfair.
     pub aa_ratio: Option<f64>,
-    /// The noise floor: 95th percentile of |ratio - 1|. Smaller differences
-    /// are ties.
-    pub aa_floor: Option<f64>,
-    /// The twin ratio of each scene and path.
+    /// The twin ratio of each scene and path: a check that its interval holds 1.
+    /// Nothing is derived from it.
     pub twins: Vec<TwinEntry>,
+    /// What made the times noisy, as far as the run noticed, with advice.
+    #[serde(default)]
+    pub warnings: Vec<String>,
 }
 
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
@@ -71,8 +81,17 @@ pub struct TwinEntry {
     pub structure: String,
     pub test: String,
     pub ratio: f64,
-    pub lower: f64,
-    pub upper: f64,
+    #[serde(default)]
+    pub lower: Option<f64>,
+    #[serde(default)]
+    pub upper: Option<f64>,
+}
+
+impl TwinEntry {
+    /// Whether the interval holds 1; `None` without one.
+    pub fn holds_one(&self) -> Option<bool> {
+        Some(self.lower? <= 1.0 && 1.0 <= self.upper?)
+    }
 }
 
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
@@ -81,24 +100,36 @@ pub struct ReportCell {
     pub scene: SceneInfo,
     pub path: PathInfo,
     pub structure: String,
+    /// As the structure declares; null for a bound and in older reports.
+    #[serde(default)]
+    pub kind: Option<Kind>,
+    /// Likewise.
+    #[serde(default)]
+    pub origin: Option<Origin>,
     pub params: Value,
     pub test: String,
     pub status: Status,
     pub reason: Option<String>,
+    /// Fastest first; cells that no test tells apart share a rank. Null where
+    /// there is no time.
+    #[serde(default)]
+    pub rank: Option<usize>,
+    #[serde(default)]
+    pub times: CellTimes,
     pub metrics: BTreeMap<String, Metric>,
     /// How the answers differ from the exact truth; null where nothing was
     /// answered.
     pub error: Option<Judged>,
+    /// What was not measured of an ok cell, each with its reason.
     pub left_out: Vec<String>,
     pub samples_ref: Option<SamplesRef>,
 }
 
-/// The cell's rows in samples.csv: zero-based, the header not counted.
+/// The cell's rows in samples.csv: those that have its names.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct SamplesRef {
     pub file: String,
-    pub first_row: u64,
     pub rows: u64,
 }
 
@@ -114,15 +145,32 @@ impl ReportCell {
             scene: scene.clone(),
             path: path.clone(),
             structure: cell.structure,
+            kind: cell.declared.as_ref().map(|d| d.0),
+            origin: cell.declared.map(|d| d.1),
+            rank: cell.rank,
+            times: cell.times,
             params: cell.params,
             test: test.to_owned(),
             status: cell.verdict.status,
             reason: cell.verdict.reason,
             metrics: cell.metrics,
             error: cell.judged,
-            left_out: Vec::new(),
+            left_out: cell.left_out,
             samples_ref,
         }
+    }
+
+    /// What the cell is found by in another report.
+    pub fn key(&self) -> CellKey {
+        CellKey {
+            group: GroupKey::new(&self.scene.name, &self.path, &self.test),
+            structure: self.structure.clone(),
+        }
+    }
+
+    /// Whether the structure looks at every item, as far as it is known.
+    pub fn is_scan(&self) -> bool {
+        self.kind == Some(Kind::Scan)
     }
 
     /// A metric's value, if the cell has it.
@@ -132,62 +180,27 @@ impl ReportCell {
 }
 
 impl Noise {
-    /// Adds a twin and brings ratio and floor up to date.
-    pub fn add(&mut self, scene: &str, path: &PathInfo, test: &str, twin: &TwinRatio) {
+    /// Adds a twin and brings the mean ratio up to date.
+    pub fn add(&mut self, scene: &str, path: &PathInfo, test: &str, twin: &(String, Metric)) {
+        let (structure, ratio) = twin;
         self.twins.push(TwinEntry {
             scene: scene.to_owned(),
             path: path.name.clone(),
             cache: path.cache.clone(),
-            structure: twin.structure.clone(),
+            structure: structure.clone(),
             test: test.to_owned(),
-            ratio: twin.ratio.value,
-            lower: twin.ratio.lower,
-            upper: twin.ratio.upper,
+            ratio: ratio.value,
+            lower: ratio.lower,
+            upper: ratio.upper,
         });
         let ratios: Vec<f64> = self.twins.iter().map(|t| t.ratio).collect();
         self.aa_ratio = geometric_mean(&ratios);
-        let spread = ratios.iter().map(|r| (r - 1.0).abs()).collect();
-        self.aa_floor = quantile(&sorted(spread), 0.95);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::statistics::Estimate;
-
-    #[test]
-    fn the_noise_floor_is_the_spread_of_the_twins() {
-        let mut noise = Noise::default();
-        assert_eq!(noise.aa_floor, None);
-        let path = PathInfo {
-            name: "orbit".into(),
-            camera_count: 1,
-            cache: "warm".into(),
-            planes: "frame".into(),
-            epsilon: 8.0,
-            arithmetic: "f32".into(),
-            digest: None,
-        };
-        for value in [1.02, 0.99] {
-            let ratio = Estimate {
-                value,
-                lower: value,
-                upper: value,
-            };
-            noise.add(
-                "city",
-                &path,
-                "six-plane",
-                &TwinRatio {
-                    structure: "bvh".into(),
-                    ratio,
-                },
-            );
-        }
-        assert!((noise.aa_ratio.unwrap() - (1.02f64 * 0.99).sqrt()).abs() < 1e-12);
-        assert!((noise.aa_floor.unwrap() - 0.0195).abs() < 1e-9);
-    }
 
     /// `UPDATE_SCHEMA=1 cargo test schema` writes the file anew.
     #[test]

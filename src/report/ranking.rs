@@ -1,11 +1,8 @@
-//! Reading a report: which cells were asked the same, in which order they come
-//! and what counts as a tie. It owns no format and measures nothing.
+//! Reading a report: which cells were asked the same, and in which order they
+//! come. Ranks are the run's own; nothing here decides a tie.
 
 use super::{Report, ReportCell};
 use crate::measure::Status;
-
-/// Structures of other crates are named so.
-const PEER_PREFIX: &str = "peer-";
 
 /// Cells of one scene, path, cache state and culling test.
 pub struct Comparison<'r> {
@@ -37,44 +34,41 @@ pub fn comparisons(report: &Report) -> Vec<Comparison<'_>> {
             keys.push(key(cell));
         }
     }
-    let floor = report.noise.aa_floor.unwrap_or(0.0);
     keys.into_iter()
         .map(|wanted| {
             let same = |cell: &&ReportCell| key(cell) == wanted;
             Comparison {
-                ranked: ranked(report.cells.iter().filter(same).collect(), floor),
+                ranked: ranked(report.cells.iter().filter(same).collect()),
                 bounds: report.bounds.iter().filter(same).collect(),
             }
         })
         .collect()
 }
 
-/// Time by which a cell is ranked.
+/// Time by which a cell is ranked. Nothing is found faster among no items.
 fn time(cell: &ReportCell) -> Option<f64> {
     let time = cell.value("query_ns").filter(|ns| ns.is_finite());
+    let time = time.filter(|_| cell.scene.total_count > 0);
     time.filter(|_| cell.status == Status::Ok)
 }
 
-/// Within the noise floor of the leader of its rank: a tie.
-fn ranked(mut cells: Vec<&ReportCell>, floor: f64) -> Vec<Ranked<'_>> {
-    let order = |cell: &ReportCell| time(cell).unwrap_or(f64::INFINITY);
-    cells.sort_by(|a, b| order(a).total_cmp(&order(b)));
-    let (mut rank, mut leader) = (0, 0.0);
-    let places = cells.into_iter().zip(1..);
-    places
-        .map(|(cell, place)| {
-            let spent = time(cell);
-            if let Some(spent) = spent
-                && (rank == 0 || spent > leader * (1.0 + floor))
-            {
-                (rank, leader) = (place, spent);
-            }
-            Ranked {
-                rank: spent.map(|_| rank),
-                cell,
-            }
-        })
-        .collect()
+/// By the rank the run has given them, the faster first within a rank; what has
+/// none comes last.
+fn ranked(cells: Vec<&ReportCell>) -> Vec<Ranked<'_>> {
+    let cells = cells.into_iter().map(|cell| Ranked {
+        rank: cell.rank.filter(|_| time(cell).is_some()),
+        cell,
+    });
+    let mut ranked: Vec<Ranked> = cells.collect();
+    let order = |ranked: &Ranked| {
+        let time = time(ranked.cell).unwrap_or(f64::INFINITY);
+        (ranked.rank.unwrap_or(usize::MAX), time)
+    };
+    ranked.sort_by(|a, b| {
+        let (a, b) = (order(a), order(b));
+        a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+    });
+    ranked
 }
 
 impl<'r> Comparison<'r> {
@@ -89,11 +83,24 @@ impl<'r> Comparison<'r> {
         first.map(|r| r.cell)
     }
 
-    /// The fastest structure of another crate whose answers are right.
+    /// The fastest structure that is not this crate's own and whose answers are
+    /// right.
     pub fn fastest_peer(&self) -> Option<&'r ReportCell> {
         let sound = self.ranked.iter().filter(|r| r.rank.is_some());
         let mut cells = sound.map(|r| r.cell);
-        cells.find(|cell| cell.structure.starts_with(PEER_PREFIX))
+        cells.find(|cell| cell.origin.as_ref().is_some_and(|origin| !origin.is_ours()))
+    }
+
+    /// The fewest and the most of a number, over the cells that were timed.
+    pub fn range(&self, of: impl Fn(&ReportCell) -> usize) -> Option<(usize, usize)> {
+        let cells = self.ranked.iter().map(|r| r.cell);
+        let timed = || {
+            cells
+                .clone()
+                .filter(|cell| cell.times.processes > 0)
+                .map(&of)
+        };
+        Some((timed().min()?, timed().max()?))
     }
 
     /// A metric that is the same in all cells, from the first that has it.
@@ -102,20 +109,19 @@ impl<'r> Comparison<'r> {
     }
 }
 
-/// Time of `base` / time of `cell`: how many times as fast the cell is. From
-/// their ratios to linear where both have one, because those are paired.
+/// Time of `base` / time of `cell`, the ratio of the two shown values: how many
+/// times as fast the cell is.
 pub fn times_as_fast(base: &ReportCell, cell: &ReportCell) -> Option<f64> {
-    let quotient = |metric: &str| Some((base.value(metric)?, cell.value(metric)?));
-    let paired = quotient("ratio_to_linear").map(|(base, cell)| cell / base);
-    paired.or_else(|| quotient("query_ns").map(|(base, cell)| base / cell))
+    Some(base.value("query_ns")? / cell.value("query_ns")?)
 }
 
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::index::Origin;
     use serde_json::json;
 
-    /// A cell with a time, and a ratio to a linear scan of 1000 ns.
+    /// A cell of a tree of our own with a time, and a ratio to a linear scan of 1000 ns.
     pub fn cell(scene: &str, items: usize, path: &str, structure: &str, ns: f64) -> ReportCell {
         let metric = |value: f64| json!({ "value": value, "unit": "" });
         let cell = json!({
@@ -124,27 +130,41 @@ pub(super) mod tests {
                 "bounds_max": [1.0, 1.0, 1.0], "skipped_items": 0, "digest": "" },
             "path": { "name": path, "camera_count": 8, "cache": "warm", "planes": "frame",
                 "epsilon": 8.0, "arithmetic": "f32" },
-            "structure": structure, "params": {}, "test": "six-plane", "status": "ok",
+            "structure": structure, "kind": "tree", "origin": "ours", "params": {}, "test": "six-plane", "status": "ok",
             "reason": null, "error": null, "left_out": [], "samples_ref": null,
-            "metrics": { "query_ns": metric(ns), "ratio_to_linear": metric(1000.0 / ns) },
+            "metrics": { "query_ns": metric(ns), "speedup": metric(1000.0 / ns) },
         });
         serde_json::from_value(cell).unwrap()
     }
 
     #[test]
-    fn ties_share_a_rank_and_what_failed_has_none() {
-        let times = [
-            ("a", 100.0),
-            ("peer-x", 104.0),
-            ("peer-y", 90.0),
-            ("b", 111.0),
-            ("c", 5.0),
+    fn ranks_are_the_runs_own_and_what_failed_has_none() {
+        // "a" and "peer-x" share a rank, whatever their times say.
+        let rows = [
+            ("peer-x", 104.0, Some(1)),
+            ("a", 100.0, Some(1)),
+            ("peer-y", 90.0, Some(1)),
+            ("b", 101.0, Some(3)),
+            ("c", 5.0, None),
         ];
-        let mut cells = times.map(|(name, ns)| cell("s", 10, "p", name, ns));
+        let mut cells = rows.map(|(name, ns, rank)| {
+            let mut cell = cell("s", 10, "p", name, ns);
+            cell.rank = rank;
+            cell
+        });
+        for peer in [0, 2] {
+            cells[peer].origin = Some(Origin::Crate("theirs".to_owned()));
+        }
         cells[4].status = Status::Wrong;
         cells[2].status = Status::Unsafe;
-        let ranked = ranked(cells.iter().collect(), 0.05);
-        let found: Vec<_> = ranked
+        let of = |cells: &'static [ReportCell]| Comparison {
+            ranked: ranked(cells.iter().collect()),
+            bounds: Vec::new(),
+        };
+        let cells: &'static [ReportCell] = Box::leak(Box::new(cells));
+        let comparison = of(cells);
+        let found: Vec<_> = comparison
+            .ranked
             .iter()
             .map(|r| (r.cell.structure.as_str(), r.rank))
             .collect();
@@ -157,22 +177,12 @@ pub(super) mod tests {
             ("c", None),
         ];
         assert_eq!(found, wanted);
-        let comparison = Comparison {
-            ranked,
-            bounds: Vec::new(),
-        };
         let winners: Vec<_> = comparison.winners().map(|c| c.structure.as_str()).collect();
         assert_eq!(winners, ["a", "peer-x"]);
         let peer = comparison.fastest_peer().unwrap();
         assert_eq!(peer.structure, "peer-x");
-        let failed = Comparison {
-            ranked: super::ranked(cells[2..3].iter().collect(), 0.05),
-            bounds: Vec::new(),
-        };
+        let failed = of(&cells[2..3]);
         assert!(failed.fastest_peer().is_none() && failed.winners().next().is_none());
-        assert_eq!(
-            times_as_fast(peer, &cells[0]),
-            Some((1000.0 / 100.0) / (1000.0 / 104.0))
-        );
+        assert_eq!(times_as_fast(peer, &cells[1]), Some(104.0 / 100.0));
     }
 }

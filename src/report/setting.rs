@@ -1,6 +1,5 @@
-//! Where and by what two reports were measured, as far as they differ: the
-//! facts that move times without any change of the code. It owns the choice of
-//! those facts; what each of them is, the report's model says.
+//! Facts of machine and toolchain that differ between two reports: they move
+//! times without any change of the code.
 
 use serde::Serialize;
 
@@ -9,15 +8,17 @@ use super::Report;
 /// A fact that differs.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct Setting {
+    /// "machine" or "toolchain".
+    pub of: &'static str,
     pub what: &'static str,
     pub old: String,
     pub new: String,
-    /// Of the machine: times of different machines do not compare.
+    /// Whether it is another machine: absolute times do not compare.
     pub is_machine: bool,
 }
 
-/// Name, whether it is the machine's, and the fact itself.
-type Fact = (&'static str, bool, String);
+/// Whose, name, whether it tells two machines apart, and the fact itself.
+type Fact = (&'static str, &'static str, bool, String);
 
 fn facts(report: &Report) -> Vec<Fact> {
     let (machine, tools) = (&report.machine, &report.toolchain);
@@ -27,27 +28,38 @@ fn facts(report: &Report) -> Vec<Fact> {
         .map(|cache| format!("L{} {} KiB", cache.level, cache.bytes >> 10))
         .collect();
     vec![
-        ("cpu", true, known(&machine.cpu)),
-        ("cores", true, machine.cores.to_string()),
-        ("caches", true, caches.join(" ")),
-        ("instruction set", true, machine.instruction_set.clone()),
-        ("kernel", false, known(&machine.kernel)),
-        ("rustc", false, known(&tools.rustc)),
-        ("target", false, known(&tools.target)),
-        ("flags", false, tools.flags.clone()),
-        ("profile", false, known(&tools.profile)),
-        ("opt-level", false, known(&tools.opt_level)),
-        ("features", false, tools.features.join(",")),
-        ("dependencies", false, tools.lock_digest.clone()),
+        ("machine", "cpu", true, known(&machine.cpu)),
+        ("machine", "cores", true, machine.cores.to_string()),
+        ("machine", "caches", true, caches.join(" ")),
+        (
+            "machine",
+            "instruction set",
+            true,
+            machine.instruction_set.clone(),
+        ),
+        ("machine", "os kernel", false, known(&machine.kernel)),
+        ("toolchain", "rustc", false, known(&tools.rustc)),
+        ("toolchain", "target", false, known(&tools.target)),
+        ("toolchain", "flags", false, tools.flags.clone()),
+        ("toolchain", "profile", false, known(&tools.profile)),
+        ("toolchain", "opt-level", false, known(&tools.opt_level)),
+        ("toolchain", "features", false, tools.features.join(",")),
+        (
+            "toolchain",
+            "dependencies",
+            false,
+            tools.lock_digest.clone(),
+        ),
     ]
 }
 
 /// What differs, in the order of the report.
 pub fn settings(old: &Report, new: &Report) -> Vec<Setting> {
     let pairs = facts(old).into_iter().zip(facts(new));
-    let differing = pairs.filter(|(old, new)| old.2 != new.2);
+    let differing = pairs.filter(|(old, new)| old.3 != new.3);
     differing
-        .map(|((what, is_machine, old), (.., new))| Setting {
+        .map(|((of, what, is_machine, old), (.., new))| Setting {
+            of,
             what,
             old,
             new,

@@ -3,9 +3,7 @@
 //! faster than the linear scan. Read off a report; nothing is measured.
 
 use super::{Comparison, ReportCell};
-
-/// The scans that any structure has to beat.
-const SCANS: [&str; 2] = ["linear", "linear-scalar"];
+use crate::measure::YARDSTICK;
 
 /// One world of several sizes, with one cache state and culling test.
 pub struct Surface<'r> {
@@ -22,7 +20,8 @@ pub struct Place<'r> {
     pub items: usize,
     /// Visible items / items, as measured.
     pub share: f64,
-    /// The same to the nearest of 1, 2, 5, 10, ... percent and parts of it.
+    /// The same to the nearest of 1, 1.5, 2, 3, 5, 7, 10, ... percent and parts
+    /// of it: never further than a factor of 1.3.
     pub class: f64,
     pub comparison: Comparison<'r>,
 }
@@ -53,10 +52,10 @@ pub fn world_of(scene: &str) -> String {
     }
 }
 
-/// The nearest of ..., 0.01, 0.02, 0.05, 0.1, ..., 1 by its logarithm.
+/// The nearest of ..., 0.1, 0.15, 0.2, 0.3, 0.5, 0.7, 1 by its logarithm.
 fn class_of(share: f64) -> f64 {
     let decade = 10f64.powi(share.log10().floor() as i32);
-    let steps = [1.0, 2.0, 5.0, 10.0].map(|step| step * decade);
+    let steps = [1.0, 1.5, 2.0, 3.0, 5.0, 7.0, 10.0].map(|step| step * decade);
     let far = |step: f64| (step / share).ln().abs();
     let nearest = steps.into_iter().min_by(|a, b| far(*a).total_cmp(&far(*b)));
     nearest.unwrap_or(share).min(1.0)
@@ -74,7 +73,7 @@ pub fn surfaces(comparisons: Vec<Comparison<'_>>) -> Vec<Surface<'_>> {
         };
         let share = 1.0 - culled;
         // Nothing is visible: no place on a logarithmic axis.
-        if share <= 0.0 {
+        if share.is_nan() || share <= 0.0 {
             continue;
         }
         let (cache, test) = (about.path.cache.as_str(), about.test.as_str());
@@ -106,10 +105,15 @@ pub fn surfaces(comparisons: Vec<Comparison<'_>>) -> Vec<Surface<'_>> {
 }
 
 impl<'r> Place<'r> {
-    /// Whether a linear scan is the fastest, or ties with it.
-    pub fn linear_wins(&self) -> bool {
-        let mut winners = self.comparison.winners();
-        winners.any(|cell| SCANS.contains(&cell.structure.as_str()))
+    /// Whether the class alone would say something else than was measured: more
+    /// than a tenth off.
+    pub fn is_off_class(&self) -> bool {
+        !(0.9..=1.1).contains(&(self.share / self.class))
+    }
+
+    /// Whether a scan is the fastest, or ties with it.
+    pub fn scan_wins(&self) -> bool {
+        self.comparison.winners().any(ReportCell::is_scan)
     }
 
     /// The sound cell of a structure.
@@ -143,11 +147,21 @@ impl Surface<'_> {
 
     /// All structures that are sound somewhere, in the order they first appear.
     pub fn structures(&self) -> Vec<&str> {
+        self.names(|_| true)
+    }
+
+    /// Those of them that have something to repay: all but the scans.
+    pub fn no_scans(&self) -> Vec<&str> {
+        self.names(|cell| !cell.is_scan())
+    }
+
+    fn names(&self, is_one: impl Fn(&ReportCell) -> bool) -> Vec<&str> {
         let mut names: Vec<&str> = Vec::new();
         for place in &self.places {
-            for ranked in place.comparison.ranked.iter().filter(|r| r.rank.is_some()) {
-                if !names.contains(&ranked.cell.structure.as_str()) {
-                    names.push(&ranked.cell.structure);
+            let sound = place.comparison.ranked.iter().filter(|r| r.rank.is_some());
+            for cell in sound.map(|r| r.cell).filter(|cell| is_one(cell)) {
+                if !names.contains(&cell.structure.as_str()) {
+                    names.push(&cell.structure);
                 }
             }
         }
@@ -169,23 +183,44 @@ impl Surface<'_> {
     }
 
     /// Where a structure becomes faster than the linear scan for good; `None` if
-    /// it is known at one size only.
+    /// it is known at one size only. It is faster where it ranks before linear;
+    /// in between, the logarithms of the speed-ups are interpolated.
     pub fn crossing(&self, structure: &str, class: f64) -> Option<Crossing> {
-        let curve = self.curve(structure, class, "ratio_to_linear");
+        let curve = self.curve(structure, class, "speedup");
+        let faster: Vec<bool> = curve
+            .iter()
+            .map(|point| self.is_faster(structure, class, point.0))
+            .collect();
         let (first, last) = (curve.first()?, curve.last()?);
         if curve.len() < 2 {
             return None;
         }
-        if last.1 <= 1.0 {
-            return Some(Crossing::Above(last.0));
-        }
-        let Some(slower) = curve.iter().rposition(|point| point.1 <= 1.0) else {
+        let Some(slower) = faster.iter().rposition(|is_faster| !is_faster) else {
             return Some(Crossing::Below(first.0));
         };
+        if slower + 1 == curve.len() {
+            return Some(Crossing::Above(last.0));
+        }
         let [(n0, r0), (n1, r1)] = [curve[slower], curve[slower + 1]];
-        let (n0, n1) = ((n0 as f64).ln(), (n1 as f64).ln());
         let along = -r0.ln() / (r1.ln() - r0.ln());
+        // Faster by its time already, but not by its rank: from where it is both.
+        if !(0.0..=1.0).contains(&along) {
+            return Some(Crossing::At(n1 as f64));
+        }
+        let (n0, n1) = ((n0 as f64).ln(), (n1 as f64).ln());
         Some(Crossing::At((n0 + along * (n1 - n0)).exp()))
+    }
+
+    /// Whether it ranks before linear in the first path of that size and class.
+    fn is_faster(&self, structure: &str, class: f64, items: usize) -> bool {
+        let here = |place: &&Place| place.class == class && place.items == items;
+        let mut places = self.places.iter().filter(here);
+        let place = places.find(|place| place.cell(structure).is_some());
+        let rank = |name: &str| place?.cell(name)?.rank;
+        match (rank(structure), rank(YARDSTICK)) {
+            (Some(own), Some(linear)) => own < linear,
+            _ => false,
+        }
     }
 }
 
@@ -193,6 +228,7 @@ impl Surface<'_> {
 mod tests {
     use super::super::ranking::tests::cell;
     use super::*;
+    use crate::index::Kind;
     use crate::report::ranking::Ranked;
 
     /// Structures with their times where so many items are visible of `items`.
@@ -203,6 +239,12 @@ mod tests {
             let mut culled = cell.metrics["query_ns"].clone();
             culled.value = 1.0 - share;
             cell.metrics.insert("cull_rate".to_owned(), culled);
+            cell.kind = Some(if name == "linear" {
+                Kind::Scan
+            } else {
+                Kind::Tree
+            });
+            cell.rank = Some(rank);
             Ranked {
                 rank: Some(rank),
                 cell: Box::leak(Box::new(cell)),
@@ -229,7 +271,7 @@ mod tests {
         assert_eq!(surface.world, "uniform:seed=3");
         assert_eq!(surface.sizes(), [1_000, 100_000]);
         assert_eq!(surface.classes(), [0.02, 1.0]);
-        let linear: Vec<bool> = surface.places.iter().map(Place::linear_wins).collect();
+        let linear: Vec<bool> = surface.places.iter().map(Place::scan_wins).collect();
         assert_eq!(linear, [true, false, false, false]);
         // From a tenth to tenfold: half way by the logarithm.
         let Some(Crossing::At(items)) = surface.crossing("bvh", 0.02) else {
@@ -252,7 +294,11 @@ mod tests {
             (100_000, 2000.0),
             (1_000_000, 500.0),
         ];
-        let places = times.map(|(items, ns)| comparison(items, 0.02, &[("bvh", ns)]));
+        let places = times.map(|(items, ns)| {
+            let mut rows = [("bvh", ns), ("linear", 1000.0)];
+            rows.sort_by(|a, b| f64::total_cmp(&a.1, &b.1));
+            comparison(items, 0.02, &rows)
+        });
         let surfaces = surfaces(places.into_iter().collect());
         let Some(Crossing::At(items)) = surfaces[0].crossing("bvh", 0.02) else {
             panic!("no crossing");
@@ -261,15 +307,43 @@ mod tests {
     }
 
     #[test]
+    fn a_tie_is_no_crossing() {
+        let tied = |items: usize, ns: f64| {
+            let mut tied = comparison(items, 0.02, &[("bvh", ns), ("linear", 1000.0)]);
+            let mut linear = tied.ranked[1].cell.clone();
+            linear.rank = Some(1);
+            tied.ranked[1].cell = Box::leak(Box::new(linear));
+            tied
+        };
+        let crossing = |places: Vec<Comparison<'static>>| {
+            let surfaces = surfaces(places);
+            surfaces[0].crossing("bvh", 0.02)
+        };
+        let clear = || comparison(10_000, 0.02, &[("bvh", 100.0), ("linear", 1000.0)]);
+        // Faster by the clock at 1,000 items, but not told apart.
+        let found = crossing(vec![tied(1_000, 950.0), clear()]);
+        assert_eq!(found, Some(Crossing::At(10_000.0)));
+        let found = crossing(vec![tied(1_000, 950.0), tied(10_000, 900.0)]);
+        assert_eq!(found, Some(Crossing::Above(10_000)));
+    }
+
+    #[test]
     fn classes_are_the_nearest_steps_and_worlds_lose_their_size_only() {
         for (share, class) in [
             (0.0011, 0.001),
             (0.0195, 0.02),
-            (0.16, 0.2),
-            (0.8, 1.0),
+            (0.16, 0.15),
+            (0.347, 0.3),
+            (0.8, 0.7),
             (0.98, 1.0),
         ] {
             assert!((class_of(share) / class - 1.0).abs() < 1e-9, "{share}");
+        }
+        // As far as is said, over six powers of ten.
+        for step in 0..6000 {
+            let share = 10f64.powf(-f64::from(step) / 1000.0);
+            let off = class_of(share) / share;
+            assert!((1.0 / 1.3..=1.3).contains(&off), "{share}: {off}");
         }
         for (scene, world) in [
             ("city:n=1000", "city"),

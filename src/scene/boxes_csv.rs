@@ -8,6 +8,7 @@ use glam::DVec3;
 
 use super::{Labels, Scene, WorldBox};
 use crate::input::{InputError, TableReader};
+use crate::shown::{field, from_field};
 
 const BOUNDS: [&str; 6] = ["min_x", "min_y", "min_z", "max_x", "max_y", "max_z"];
 
@@ -33,7 +34,7 @@ pub fn read_boxes_csv(
         .iter()
         .enumerate()
         .filter(|(i, _)| !columns.contains(i))
-        .map(|(i, name)| (i, Labels::new(name)))
+        .map(|(i, name)| (i, Labels::new(from_field(name))))
         .collect();
     let (mut boxes, mut first_bad, mut bad) = (Vec::new(), None, 0);
     while let Some(row) = table.next_row() {
@@ -64,7 +65,7 @@ pub fn read_boxes_csv(
                 }
             }
             for (column, label) in &mut labels {
-                label.push(row.text(*column));
+                label.push(from_field(row.text(*column)));
             }
             Ok(b)
         });
@@ -96,8 +97,13 @@ pub fn read_boxes_csv(
 /// [`Scene::settled`] makes a scene what is then read.
 pub fn write_boxes_csv(scene: &Scene, output: impl Write) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(output);
-    let labels = scene.labels.iter().map(|l| l.column.as_str());
-    csv.write_record(BOUNDS.into_iter().chain(labels))?;
+    for bound in BOUNDS {
+        csv.write_field(bound)?;
+    }
+    for label in &scene.labels {
+        csv.write_field(field(&label.column).as_ref())?;
+    }
+    csv.write_record(None::<&[u8]>)?;
     let mut record = csv::ByteRecord::new();
     for (item, b) in scene.items.iter().enumerate() {
         record.clear();
@@ -106,7 +112,7 @@ pub fn write_boxes_csv(scene: &Scene, output: impl Write) -> io::Result<()> {
             record.push_field(value.to_string().as_bytes());
         }
         for label in &scene.labels {
-            record.push_field(label.get(item).as_bytes());
+            record.push_field(field(label.get(item)).as_bytes());
         }
         csv.write_byte_record(&record)?;
     }
@@ -176,7 +182,7 @@ mod tests {
                     0,0,0,1,1,1,a\n0,0,0,-1,1,1,b\n0,0,0,nan,1,1,c\n2,2,2,3,3,3,d\n";
         let error = read(text).unwrap_err().to_string();
         assert!(
-            error.contains("2 bad item(s)") && error.contains("line 3"),
+            error.contains("2 bad items") && error.contains("line 3"),
             "{error}"
         );
         let scene = read_boxes_csv(text.as_bytes(), "b.csv", true).unwrap();

@@ -71,8 +71,8 @@ pub static FAMILIES: &[Family] = &[
     },
 ];
 
-/// Largest scene a spec may ask for: 7.2 GB while it is made, 2.4 GB then.
-const MOST_ITEMS: u64 = 100_000_000;
+/// Largest scene a spec may ask for: 12 GB while it is made, 7.2 GB then.
+pub(super) const MOST_ITEMS: u64 = 100_000_000;
 
 impl Family {
     pub fn named(name: &str) -> Option<&'static Family> {

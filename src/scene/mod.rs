@@ -9,6 +9,8 @@ mod clustered;
 mod forest;
 mod generate;
 mod labels;
+mod memory;
+mod originals;
 mod regions;
 mod rooms;
 mod samples;
@@ -26,9 +28,11 @@ pub use boxes_csv::{read_boxes_csv, write_boxes_csv};
 pub(crate) use generate::Dice;
 pub use generate::{FAMILIES, Family, GENERATOR_NAME};
 pub use labels::Labels;
+pub use memory::{fits, needed_bytes};
+pub use originals::{Originals, Sought};
 pub use regions::{BspNode, BspRegions, Portal, Regions, Tiling};
 pub use samples::{SAMPLES, Sample};
-pub use source::{LoadOptions, load};
+pub use source::{LoadOptions, check_fits, load};
 pub use wad::{WadMap, map_names};
 
 /// A box in world coordinates, as a file or a generator states it.
@@ -71,6 +75,8 @@ pub struct Scene {
     pub origin: DVec3,
     /// Item bounds, rounded outward about the origin; the id is the index.
     pub items: Vec<Aabb>,
+    /// The items as they were written, where f32 holds any of them otherwise.
+    pub originals: Originals,
     /// Union of the items, local.
     pub bounds: Aabb,
     pub regions: Regions,
@@ -119,6 +125,7 @@ impl Scene {
             .collect::<Result<Vec<_>, _>>()?;
         Ok(Scene {
             bounds: Aabb::union_of(&items),
+            originals: Originals::of(boxes, &items, origin),
             name,
             origin,
             items,

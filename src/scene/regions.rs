@@ -4,6 +4,8 @@
 
 use glam::{DVec2, DVec3, Vec3};
 
+use super::Originals;
+
 use crate::geometry::{Aabb, Plane, PlaneTree, PlaneTreeNode};
 use crate::query::ItemId;
 
@@ -25,6 +27,8 @@ pub enum Regions {
 #[derive(Clone, Default, Debug)]
 pub struct Tiling {
     pub boxes: Vec<Aabb>,
+    /// The boxes as they were made, where f32 holds any of them otherwise.
+    pub originals: Originals,
     pub portals: Vec<Portal>,
 }
 
@@ -46,44 +50,12 @@ impl Regions {
         }
     }
 
-    /// The scene-local point to search for. A planar BSP ignores the height.
-    pub fn local_point(&self, world: DVec3, origin: DVec3) -> Vec3 {
-        let p = (world - origin).as_vec3();
-        match self {
-            Regions::Bsp(_) => p.with_z(0.0),
-            _ => p,
-        }
-    }
-
-    /// Keeps of the boxes that hold `p` the regions that hold it.
-    pub fn refine(&self, p: Vec3, found: &mut Vec<ItemId>) {
-        if let Regions::Bsp(bsp) = self {
-            if !bsp.extent.contains_point(p) {
-                found.clear();
-            }
-            let at = DVec2::new(p.x.into(), p.y.into());
-            found.retain(|&region| bsp.holds(region, at));
-        }
-    }
-
-    /// Whether a region is the box that is indexed for it, so that
-    /// [`Regions::refine`] has nothing to do.
-    pub fn are_boxes(&self) -> bool {
-        !matches!(self, Regions::Bsp(_))
-    }
-
-    /// The reference answer, by the plainest means there are: the map's own
-    /// descent, or a look at every box. Ascending ids.
+    /// The boxes that hold a local point, by a look at each of them: what an
+    /// index must find. Ascending ids.
     pub fn holding(&self, p: Vec3, items: &[Aabb]) -> Vec<ItemId> {
-        if let Regions::Bsp(bsp) = self {
-            let at = DVec2::new(p.x.into(), p.y.into());
-            return bsp.descend(at).into_iter().collect();
-        }
         let boxes = self.boxes(items).iter().zip(0..);
-        boxes
-            .filter(|(b, _)| b.contains_point(p))
-            .map(|(_, id)| id)
-            .collect()
+        let holding = boxes.filter(|(b, _)| b.contains_point(p));
+        holding.map(|(_, id)| id).collect()
     }
 
     pub fn kind(&self) -> &'static str {
@@ -250,8 +222,7 @@ impl BspRegions {
     /// The leaf that holds the point, by the map's own descent from the root;
     /// `None` outside the map's coordinate space. O(depth).
     pub fn descend(&self, p: DVec2) -> Option<ItemId> {
-        let flat = p.as_vec2().extend(0.0);
-        if !self.extent.contains_point(flat) {
+        if !self.covers(p) {
             return None;
         }
         let mut at = self.root;
@@ -264,6 +235,12 @@ impl BspRegions {
                 }
             }
         }
+    }
+
+    /// Whether the point lies in the map's coordinate space.
+    pub fn covers(&self, p: DVec2) -> bool {
+        let (low, high) = (self.extent.min.as_dvec3(), self.extent.max.as_dvec3());
+        p.cmpge(low.truncate()).all() && p.cmple(high.truncate()).all()
     }
 
     /// Whether the leaf holds the point: the same side tests, walked from the

@@ -5,7 +5,7 @@
 use glam::DVec3;
 
 use super::generate::{Dice, World};
-use super::{Portal, Tiling, WorldBox};
+use super::{Originals, Portal, Tiling, WorldBox};
 use crate::geometry::Aabb;
 use crate::query::ItemId;
 use crate::spec::{Spec, SpecError};
@@ -37,8 +37,10 @@ impl Plan {
 
     pub fn tiling(&self, origin: DVec3) -> Tiling {
         let local = |b: &WorldBox| Aabb::rounded_outward(b.min, b.max, origin);
+        let boxes: Vec<Aabb> = self.rooms.iter().map(local).collect();
         Tiling {
-            boxes: self.rooms.iter().map(local).collect(),
+            originals: Originals::of(&self.rooms, &boxes, origin),
+            boxes,
             portals: self
                 .doors
                 .iter()

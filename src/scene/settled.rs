@@ -4,7 +4,7 @@
 
 use glam::DVec3;
 
-use super::{Regions, Scene, origin_between};
+use super::{Originals, Regions, Scene, origin_between};
 use crate::geometry::Aabb;
 use crate::input::InputError;
 
@@ -28,6 +28,8 @@ impl Scene {
             regions: Regions::Items,
             places: Vec::new(),
             own_tree: None,
+            // What is written are the boxes as they are stored.
+            originals: Originals::default(),
             ..self
         };
         for _ in 0..MOST_PASSES {

@@ -4,8 +4,8 @@
 use std::fs;
 use std::path::Path;
 
-use super::{FAMILIES, Family, SAMPLES, Sample, Scene, WadMap, boxes_csv};
-use crate::input::InputError;
+use super::{FAMILIES, Family, SAMPLES, Sample, Scene, WadMap, boxes_csv, memory};
+use crate::input::{InputError, is_readable, read_file};
 use crate::spec::{Spec, SpecError, nearest};
 
 /// How to read a scene.
@@ -13,6 +13,8 @@ use crate::spec::{Spec, SpecError, nearest};
 pub struct LoadOptions {
     /// Leave out rows that are no finite box, and count them.
     pub skip_bad_items: bool,
+    /// Structures that will be built over the scene: they need memory as well.
+    pub structures: u64,
 }
 
 /// Loads `freedm-map12`, `city:n=100000,seed=7`, `boxes.csv`, `map.wad` or
@@ -25,11 +27,8 @@ pub fn load(source: &str, options: &LoadOptions) -> Result<Scene, InputError> {
         Some((file, map)) if !Path::new(source).exists() => (file, Some(map)),
         _ => (source, None),
     };
-    if Path::new(file).is_file() {
-        let bytes = fs::read(file).map_err(|error| InputError::Io {
-            path: file.into(),
-            source: error,
-        })?;
+    if is_readable(Path::new(file)) {
+        let bytes = read_file(Path::new(file))?;
         return match map {
             Some(map) => WadMap::read(&bytes, file, Some(map))?.into_scene(source),
             None => parse_bytes(&bytes, file, source, options),
@@ -39,6 +38,7 @@ pub fn load(source: &str, options: &LoadOptions) -> Result<Scene, InputError> {
     if !looks_like_a_file {
         let spec = Spec::parse(source)?;
         if let Some(family) = Family::named(spec.name()) {
+            memory::fits_here(source, &spec, options.structures)?;
             return family.generate(source, spec);
         }
         if let Some(sample) = Sample::named(spec.name()) {
@@ -54,6 +54,20 @@ pub fn load(source: &str, options: &LoadOptions) -> Result<Scene, InputError> {
             Err(error) => error,
         },
     })
+}
+
+/// Whether a scene will fit into memory, as far as its name says; nothing is
+/// loaded.
+///
+/// # Errors
+/// [`InputError::TooLarge`].
+pub fn check_fits(source: &str, options: &LoadOptions) -> Result<(), InputError> {
+    match Spec::parse(source) {
+        Ok(spec) if Family::named(spec.name()).is_some() && !is_readable(Path::new(source)) => {
+            memory::fits_here(source, &spec, options.structures)
+        }
+        _ => Ok(()),
+    }
 }
 
 /// A WAD by its magic, anything else as boxes CSV.

@@ -13,12 +13,16 @@ use crate::geometry::Aabb;
 /// of the larger of A_k and the box's reach, and of `|d|`. The plane touches
 /// the volume, whose points near the camera are among its corners, so `|d|`
 /// is no more than the sum of A_k. 16 covers the sum of both; what is below
-/// f32 altogether is 2^-140 at most. A view so wide that its sides are all
+/// f32 altogether is 2^-140 at most. An eye far away from all that it sees
+/// costs 2^-49 of its coordinates and depths, by the derivation in f64 and by
+/// the margin for it; for planes that are sums of others four times that is
+/// allowed. A view so wide that its sides are all
 /// but parallel leaves f64 no digits for its bounds; what the exact test then
 /// returns is not judged.
 pub fn slack(camera: &Camera, around: &Surroundings, b: &Aabb) -> f64 {
     const UNIT_ROUNDOFF: f64 = 1.0 / (1u64 << 24) as f64;
     const TINY: f64 = f64::from_bits((1023 - 140) << 52);
+    const DERIVED: f64 = 1.0 / (1u64 << 47) as f64;
     const CANCELLED: f64 = 2e-9;
     if openness(&camera.lens) < CANCELLED {
         return f64::INFINITY;
@@ -33,7 +37,11 @@ pub fn slack(camera: &Camera, around: &Surroundings, b: &Aabb) -> f64 {
             reach.max(corner.abs())
         });
     let size = reach.max(b.reach().as_dvec3()).element_sum() + reach.element_sum();
-    16.0 * UNIT_ROUNDOFF * size + TINY
+    let eye = camera.frame.eye;
+    let far_away = (eye.abs() + (eye - around.origin).abs()).element_sum()
+        + near.abs()
+        + camera.lens.far().unwrap_or(near).abs();
+    16.0 * UNIT_ROUNDOFF * size + DERIVED * far_away + TINY
 }
 
 /// The determinant of near's, a side's and the bottom's or top's normals: what

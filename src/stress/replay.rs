@@ -176,12 +176,12 @@ impl Replay<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::index::structures;
+    use crate::index::Registry;
     use crate::stress::built_in;
 
     #[test]
     fn the_built_in_vectors_pass_on_every_structure() {
-        let structures = structures("all").unwrap();
+        let structures = Registry::builtin().structures("all").unwrap();
         let (mut rows, mut refused) = (0, 0);
         for vector in built_in().unwrap() {
             for row in replay(&vector, &structures) {
@@ -198,7 +198,7 @@ mod tests {
 
     #[test]
     fn without_the_epsilon_vectors_fail_at_camera_level() {
-        let structures = structures("linear").unwrap();
+        let structures = Registry::builtin().structures("linear").unwrap();
         let replay = Replay {
             structures: &structures,
             planes: PlaneOptions {
@@ -215,5 +215,29 @@ mod tests {
             .filter(failed)
             .find(|r| r.level == Level::Planes);
         assert!(planes.is_none(), "{planes:?}");
+    }
+
+    #[test]
+    fn the_six_plane_test_without_rounding_is_judged_beside_the_one_in_f32() {
+        let structures = Registry::builtin().structures("linear").unwrap();
+        let named = |rows: &[Row]| -> Vec<Status> {
+            let exact = rows.iter().filter(|row| row.test == "six-plane exact");
+            exact.map(|row| row.status).collect()
+        };
+        let mut differ = 0;
+        for mut vector in built_in().unwrap() {
+            let Some(exact) = vector.six_plane_exact.clone() else {
+                continue;
+            };
+            differ += u32::from(vector.six_plane.as_ref() != Some(&exact));
+            let passed = named(&replay(&vector, &structures));
+            assert!(passed.iter().all(|&status| status == Status::Pass));
+            if passed.is_empty() {
+                continue;
+            }
+            vector.six_plane_exact = Some(Names::from(["nobody".to_owned()]));
+            assert_eq!(named(&replay(&vector, &structures)), [Status::Fail]);
+        }
+        assert_eq!(differ, 6, "vectors whose f32 answer is another one");
     }
 }

@@ -5,13 +5,15 @@
 use super::margin::slack;
 use super::replay::Built;
 use super::{Level, Names, Row, Said, Status, Vector};
+use crate::arithmetic::Expansion;
 use crate::camera::{Camera, Surroundings};
 use crate::culling::CullingTest;
-use crate::geometry::{Aabb, ConvexVolume};
+use crate::geometry::{Aabb, ConvexVolume, Plane};
 use crate::index::{BuildError, DynIndex, caught};
 use crate::oracle::{Oracle, Verdict};
 use crate::query::{AnyView, ItemId, QueryCost};
 use crate::verify::explain_visibility;
+use glam::Vec3;
 
 /// The name that the oracle's own rows have in place of a structure.
 const ORACLE: &str = "oracle";
@@ -142,8 +144,25 @@ impl Sheet<'_> {
                 self.offending(spec, CullingTest::SixPlane.name(), name, &wanted, got);
             }
         }
+        self.without_rounding(&volume);
         let oracle = Oracle::of_volume(&volume);
         self.verdicts(&oracle, &vector.visible_planes, &vector.touch_planes);
+    }
+
+    /// What the file says of the six-plane test in real numbers, beside what it
+    /// says of f32.
+    fn without_rounding(&mut self, volume: &ConvexVolume) {
+        let Some(wanted) = &self.vector.six_plane_exact else {
+            return;
+        };
+        let boxes = self.names.iter().zip(self.items);
+        let seen = boxes.filter(|(_, b)| {
+            let excluded = |plane: &Plane| value_at(plane, plane.p_vertex(b)).sign() < 0;
+            !b.is_empty() && !volume.planes().iter().any(excluded)
+        });
+        let seen: Names = seen.map(|(name, _)| name.clone()).collect();
+        let got = Ok(seen.iter().cloned().collect());
+        self.answered(ORACLE, "six-plane exact", seen == *wanted, wanted, &got);
     }
 
     /// The row of an answer; empty boxes must not be in it.
@@ -293,4 +312,15 @@ impl Sheet<'_> {
             }
         }
     }
+}
+
+/// A plane's value at a point without any rounding: f64 holds the products.
+fn value_at(plane: &Plane, p: Vec3) -> Expansion {
+    let products = plane.normal.as_dvec3() * p.as_dvec3();
+    let mut value = Expansion::from(plane.d);
+    products
+        .to_array()
+        .into_iter()
+        .for_each(|part| value.grow(part));
+    value
 }

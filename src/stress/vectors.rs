@@ -41,6 +41,8 @@ pub struct Vector {
     /// What the f32 six-plane test returns; where a file does not say, what
     /// the exact one does.
     pub six_plane: Option<Names>,
+    /// What the six-plane test returns without any rounding.
+    pub six_plane_exact: Option<Names>,
     pub camera_error: Option<String>,
     pub planes_error: Option<String>,
     pub rejected_at_load: Names,
@@ -221,6 +223,7 @@ fn vector(value: &Value, file: &str, index: usize) -> Result<Vector, InputError>
             None => names("p_vertex_exact_visible")?,
             some => some,
         },
+        six_plane_exact: names("p_vertex_exact_visible")?,
         camera_error: error("expect_camera_error")?,
         planes_error: error("expect_planes_error")?,
         rejected_at_load: names("expect_rejected_at_load")?.unwrap_or_default(),

@@ -6,6 +6,7 @@
 pub mod conformance;
 mod edges;
 mod random;
+mod trial;
 mod truth;
 mod variants;
 
@@ -18,6 +19,7 @@ use crate::query::{AnyView, ItemId};
 
 pub use edges::{edge_scenes, edge_volumes, points_on_faces};
 pub use random::{RandomCase, VOLUME_KINDS};
+pub use trial::{Fault, Trial};
 pub use truth::{ErrorCount, Truth};
 pub use variants::variants;
 

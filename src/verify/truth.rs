@@ -4,14 +4,19 @@
 
 use crate::camera::Camera;
 use crate::geometry::Aabb;
-use crate::oracle::{Oracle, Pose, Verdict};
+use crate::oracle::{Judgement, Oracle, Pose, Verdict};
 use crate::query::ItemId;
+use crate::scene::{Originals, Scene};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 /// The verdict about every item of a scene, for one camera.
 pub struct Truth {
+    /// About the items as they are stored.
     oracle: Oracle,
+    /// About the boxes as they were written, in the world, where the two
+    /// differ.
+    written: Option<(Oracle, Originals)>,
     verdicts: Vec<Verdict>,
     /// Items that touch, or come nearer than the truth is known.
     undecided: u64,
@@ -40,6 +45,14 @@ pub struct ErrorCount {
     /// Out, but returned.
     #[serde(rename = "false_positive_count")]
     pub false_positives: u64,
+    /// Of the false positives those whose stored box, which is rounded outward
+    /// to f32, is truly visible.
+    #[serde(rename = "excess_by_storage_count", default)]
+    pub by_storage: u64,
+    /// Of the others those that the camera's planes would drop by the six-plane
+    /// test if they were neither rounded nor moved. The rest is the test's own.
+    #[serde(rename = "excess_by_planes_count", default)]
+    pub by_planes: u64,
     /// How deep the deepest false negative reaches into the volume, world
     /// units; 0 if there is none.
     pub worst_miss: f64,
@@ -51,6 +64,23 @@ impl ErrorCount {
     /// False positives per visible item; `None` if nothing is visible.
     pub fn excess(&self) -> Option<f64> {
         (self.visible > 0).then(|| self.false_positives as f64 / self.visible as f64)
+    }
+
+    /// The same for a test of spheres: what boxes would have told is its own.
+    pub fn of_spheres(self) -> ErrorCount {
+        ErrorCount {
+            by_planes: 0,
+            ..self
+        }
+    }
+
+    /// The same for a test that tells all there is to tell: what it returns too
+    /// much of the stored boxes is its planes'.
+    pub fn of_exact_test(self) -> ErrorCount {
+        ErrorCount {
+            by_planes: self.false_positives - self.by_storage,
+            ..self
+        }
     }
 
     /// False negatives in a million visible items.
@@ -66,6 +96,8 @@ impl std::ops::AddAssign for ErrorCount {
         self.false_negatives += other.false_negatives;
         self.touch_dropped += other.touch_dropped;
         self.false_positives += other.false_positives;
+        self.by_storage += other.by_storage;
+        self.by_planes += other.by_planes;
         self.worst_miss = self.worst_miss.max(other.worst_miss);
         self.worst_excess = self.worst_excess.max(other.worst_excess);
     }
@@ -79,11 +111,30 @@ impl Truth {
         Some(Truth::new(oracle, items))
     }
 
+    /// Camera level, about the boxes of a scene as they were written. O(items).
+    /// `None` if the pose makes no frame.
+    pub fn of_scene(camera: &Camera, scene: &Scene) -> Option<Truth> {
+        let of = |origin| Oracle::of_camera(&Pose::of(camera), &camera.lens, origin);
+        let stored = of(scene.origin)?;
+        let Some(boxes) = scene.originals.boxes() else {
+            return Some(Truth::new(stored, &scene.items));
+        };
+        let world = of(DVec3::ZERO)?;
+        let judgements = boxes.iter().map(|b| world.judge_wide(b.min, b.max));
+        let mut truth = Truth::of_judgements(stored, judgements);
+        truth.written = Some((world, scene.originals.clone()));
+        Some(truth)
+    }
+
     /// The truth as an oracle has it.
     pub fn new(oracle: Oracle, items: &[Aabb]) -> Truth {
+        let judgements: Vec<Judgement> = items.iter().map(|item| oracle.judge(item)).collect();
+        Truth::of_judgements(oracle, judgements.into_iter())
+    }
+
+    fn of_judgements(oracle: Oracle, judgements: impl Iterator<Item = Judgement>) -> Truth {
         let (mut undecided, mut visible) = (0, 0);
-        let verdicts = items.iter().map(|item| {
-            let judgement = oracle.judge(item);
+        let verdicts = judgements.map(|judgement| {
             undecided += u64::from(judgement.undecided);
             visible += u64::from(judgement.verdict != Verdict::Out);
             judgement.verdict
@@ -91,8 +142,19 @@ impl Truth {
         Truth {
             verdicts: verdicts.collect(),
             oracle,
+            written: None,
             undecided,
             visible,
+        }
+    }
+
+    /// How deep item `id` reaches into the volume, as it was written.
+    fn depth(&self, id: usize, item: &Aabb) -> f64 {
+        let written = self.written.as_ref();
+        let b = written.and_then(|(world, boxes)| Some((world, boxes.boxes()?.get(id)?)));
+        match b {
+            Some((world, b)) => world.depth_wide(b.min, b.max),
+            None => self.oracle.depth(item),
         }
     }
 
@@ -112,16 +174,22 @@ impl Truth {
         for &id in answer {
             returned[id as usize] = true;
         }
-        for ((verdict, returned), item) in self.verdicts.iter().zip(returned).zip(items) {
+        let answers = self.verdicts.iter().zip(returned).zip(items);
+        for (id, ((verdict, returned), item)) in answers.enumerate() {
             match (verdict, returned) {
                 (Verdict::In, false) => {
                     count.false_negatives += 1;
-                    count.worst_miss = count.worst_miss.max(self.oracle.depth(item));
+                    count.worst_miss = count.worst_miss.max(self.depth(id, item));
                 }
                 (Verdict::Touch, false) => count.touch_dropped += 1,
                 (Verdict::Out, true) => {
                     count.false_positives += 1;
-                    count.worst_excess = count.worst_excess.max(-self.oracle.depth(item));
+                    count.worst_excess = count.worst_excess.max(-self.depth(id, item));
+                    if self.written.is_some() && self.oracle.verdict(item) != Verdict::Out {
+                        count.by_storage += 1;
+                    } else if self.oracle.faces_exclude(item) {
+                        count.by_planes += 1;
+                    }
                 }
                 _ => {}
             }
@@ -133,7 +201,9 @@ impl Truth {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::{Lens, look_at};
     use crate::geometry::{ConvexVolume, Plane};
+    use crate::scene::WorldBox;
     use glam::Vec3;
 
     #[test]
@@ -157,6 +227,37 @@ mod tests {
         assert_eq!(poor.false_negatives, 1);
         assert_eq!((poor.touch_dropped, poor.false_positives), (1, 2));
         assert_eq!((poor.worst_miss, poor.worst_excess), (6.0, 4.0));
+        // This volume's only plane drops both.
+        assert_eq!((poor.by_storage, poor.by_planes), (0, 2));
         assert!((poor.false_negative_ppm().unwrap() - 1e6 / 3.0).abs() < 1e-6);
+    }
+
+    /// Boxes of some metres beside a camera 1e11 m away from zero, where f32
+    /// has steps of 8 km: stored they are visible, written they are not.
+    #[test]
+    fn storage_is_an_error_of_its_own() {
+        let far_away = DVec3::new(1e11, 0.0, 0.0);
+        let beside = |y: f64| {
+            let at = far_away + DVec3::new(5.0, y, 0.3);
+            WorldBox::new(at, at + 0.7)
+        };
+        let boxes = [beside(-40.1), beside(30.2), beside(0.1)];
+        let scene = Scene::about("far", &boxes, DVec3::ZERO).unwrap();
+        let camera = Camera {
+            frame: look_at(far_away, far_away + DVec3::X, DVec3::Z).unwrap(),
+            lens: Lens::perspective(60.0, 1.0, 1.0, Some(100.0)).unwrap(),
+        };
+        let truth = Truth::of_scene(&camera, &scene).unwrap();
+        assert_eq!(truth.verdicts(), [Verdict::Out, Verdict::Out, Verdict::In]);
+        let all = truth.errors(&scene.items, &[0, 1, 2]);
+        assert_eq!((all.visible, all.false_positives), (1, 2));
+        assert_eq!((all.by_storage, all.by_planes), (2, 0));
+        assert!(
+            all.worst_excess > 20.0 && all.worst_excess < 60.0,
+            "{all:?}"
+        );
+        // By the stored boxes all three are visible: that is not the truth.
+        let stored = Truth::of_camera(&camera, scene.origin, &scene.items).unwrap();
+        assert_eq!(stored.errors(&scene.items, &[0, 1, 2]).false_positives, 0);
     }
 }

@@ -1,6 +1,7 @@
-//! `compare`: what it calls slower, faster, broken, lost or different, its exit
-//! codes, its JSON, and what it refuses. All reports here come from one run
-//! over a tiny scene; every change in them is made by hand.
+//! `compare OLD NEW`: what it calls slower, faster, same, inconclusive, broken,
+//! lost or different, its exit codes, its JSON and Markdown, and what it refuses.
+//! All reports here come from one run over a tiny scene, with times of ten
+//! processes that are made up; every change in them is made by hand.
 
 use std::fs;
 use std::path::Path;
@@ -11,20 +12,36 @@ use tempfile::TempDir;
 
 use super::process::*;
 
-/// The run, made once.
+/// The run, made once: five structures on two paths.
 fn measured() -> &'static Value {
     static REPORT: OnceLock<Value> = OnceLock::new();
     REPORT.get_or_init(|| {
         let folder = folder(&[]);
         let run = "run --scene uniform:n=300 --path orbit:frames=8 --path outside:frames=8 \
-            --structure linear-scalar,linear,bvh --out run";
+            --structure linear-scalar,linear,bvh,octree,bsp --processes 1 --out run";
         works(folder.path(), run);
         let text = fs::read_to_string(folder.path().join("run/report.json"));
         let mut report = json(&text.expect("a report"));
-        // So small a scene is all noise; these figures are to be exact.
-        report["noise"]["aa_floor"] = json!(0.02);
+        for (cell, own) in cells(&mut report).iter_mut().zip(0..) {
+            cell["times"]["processes"] = json!(10);
+            for metric in ["query_ns", "locate_ns", "locate_batched_ns", "build_ms"] {
+                let value = cell["metrics"][metric]["value"].as_f64().expect(metric);
+                cell["times"]["by_process"][metric] = json!(ten(value, own));
+            }
+        }
         report
     })
+}
+
+/// Times of ten processes: a fifth by the machine, for all cells alike, and one
+/// percent of a cell's own.
+fn ten(value: f64, own: usize) -> Vec<f64> {
+    let time = |process: usize| {
+        let machine = 1.0 + 0.2 * ((process * 7 % 5) as f64 / 4.0 - 0.5);
+        let noise = 1.0 + 0.01 * (((process + own) * 3 % 7) as f64 / 6.0 - 0.5);
+        value * machine * noise
+    };
+    (0..10).map(time).collect()
 }
 
 fn cells(report: &mut Value) -> &mut Vec<Value> {
@@ -38,11 +55,17 @@ fn bvh(report: &mut Value) -> &mut Value {
     cells(report).iter_mut().find(is_it).expect("a cell of bvh")
 }
 
-/// Multiplies a figure and its interval.
+/// Multiplies a figure, its interval, and the times of its processes.
 fn scale(cell: &mut Value, metric: &str, factor: f64) {
+    let scaled = |value: &Value| value.as_f64().map(|value| json!(value * factor));
     for part in ["value", "lower", "upper"] {
-        if let Some(value) = cell["metrics"][metric][part].as_f64() {
-            cell["metrics"][metric][part] = json!(value * factor);
+        if let Some(value) = scaled(&cell["metrics"][metric][part]) {
+            cell["metrics"][metric][part] = value;
+        }
+    }
+    if let Some(times) = cell["times"]["by_process"][metric].as_array_mut() {
+        for time in times {
+            *time = scaled(time).expect("a number");
         }
     }
 }
@@ -74,24 +97,37 @@ fn last_line(text: &str) -> &str {
     text.lines().last().unwrap_or_default()
 }
 
+/// Rows of the table with this verdict.
+fn rows(text: &str, verdict: &str) -> usize {
+    let rows = text.lines().filter(|line| line.starts_with('│'));
+    let verdict = format!("   {verdict} ");
+    rows.filter(|row| row.contains(&verdict)).count()
+}
+
+fn row_with<'t>(text: &'t str, part: &str) -> &'t str {
+    let mut rows = text.lines().filter(|line| line.starts_with('│'));
+    let row = rows.find(|line| line.contains(part));
+    row.unwrap_or_else(|| panic!("no row with '{part}' in:\n{text}"))
+}
+
 #[test]
-fn a_report_and_itself_have_nothing_but_ties() {
+fn a_report_and_itself_are_the_same() {
     let folder = with_change(|_| ());
     let text = compare(folder.path(), "", 0);
-    let verdict = "0 slower, 0 faster, 6 ties of 6 cells; worst 1.00 (";
-    assert!(last_line(&text).starts_with(verdict), "{text}");
-    assert!(
-        text.contains("bar  query_ns: 5.00 % (the threshold)"),
-        "{text}"
-    );
-    assert!(
-        text.contains("noise floor 2.00 %") && text.contains("bounds"),
-        "{text}"
-    );
-    // Ties are counted; --all shows them.
-    assert_eq!(text.matches("│ tie").count(), 0, "{text}");
+    let verdict = "0 slower, 0 inconclusive, 0 faster, 10 same of 10 cells";
+    assert_eq!(last_line(&text), verdict, "{text}");
+    for wanted in [
+        "10 processes vs 10 processes, threshold 5.00 %",
+        "the machine or the program as a whole: NEW takes 100.0 % [",
+        "of OLD (10 cells); this comparison cannot tell which",
+    ] {
+        assert!(text.contains(wanted), "no '{wanted}' in:\n{text}");
+    }
+    // What stayed the same is counted; --all shows it.
+    assert_eq!(rows(&text, "same"), 0, "{text}");
     let all = compare(folder.path(), "--all", 0);
-    assert_eq!(all.matches("│ tie").count(), 6, "{all}");
+    assert_eq!(rows(&all, "same"), 10, "{all}");
+    assert_eq!(all.matches("10 vs 10 ").count(), 10, "{all}");
     // The folder is as good as the file in it, and every metric is known.
     fs::create_dir(folder.path().join("run")).expect("writable");
     fs::copy(
@@ -100,92 +136,130 @@ fn a_report_and_itself_have_nothing_but_ties() {
     )
     .expect("writable");
     works(folder.path(), "compare run old.json --threshold 0");
-    let metrics = "query_ns,query_ns_p95,query_ns_p99 --metric query_wall_ns,ns_per_visible \
-        --metric times_read,times_memcpy,times_replay,build_ms,update_ms \
-        --metric memory_bytes_per_item,locate_ns,locate_batched_ns";
+    let metrics = "query_ns,locate_ns --metric locate_batched_ns,build_ms";
     let many = compare(folder.path(), &format!("--metric {metrics}"), 0);
-    assert!(last_line(&many).contains("78 figures of 6 cells"), "{many}");
-    // No wide, no replay: in neither report, so counted and not shown.
-    assert!(last_line(&many).contains("6 unmeasured"), "{many}");
-    assert!(!many.contains("in neither report"), "{many}");
+    let verdict = "40 same of 40 figures of 10 cells";
+    assert!(last_line(&many).ends_with(verdict), "{many}");
 }
 
 #[test]
 fn twice_the_time_is_slower_and_half_of_it_faster() {
     let slower = with_change(|new| scale(bvh(new), "query_ns", 2.0));
     let text = compare(slower.path(), "", 3);
-    let row = text
-        .lines()
-        .find(|line| line.contains("slower"))
-        .expect("a row");
+    let row = row_with(&text, "slower");
     for part in [
         "uniform:n=300",
         "orbit:frames=8, six-plane",
         "bvh",
         "query_ns",
-        " 2.00 ",
+        "+100.0 % [+",
+        "10 vs 10",
     ] {
         assert!(row.contains(part), "no '{part}' in: {row}");
     }
-    let verdict = "1 slower, 0 faster, 5 ties of 6 cells; worst 2.00 (bvh on uniform:n=300, orbit";
-    assert!(last_line(&text).starts_with(verdict), "{text}");
-    // Over both of its cells: the square root of two.
-    let mean = text
-        .lines()
-        .find(|line| line.contains("1.41"))
-        .expect("a mean");
-    assert!(mean.contains("bvh"), "{mean}");
+    let verdict = "1 slower, 0 inconclusive, 0 faster, 9 same of 10 cells";
+    assert_eq!(last_line(&text), verdict, "{text}");
     // By another metric nothing has happened.
-    compare(slower.path(), "--metric build_ms,memory_bytes_per_item", 0);
+    compare(slower.path(), "--metric build_ms", 0);
     compare(slower.path(), "--metric build_ms,query_ns", 3);
-    // The bar is the user's.
-    compare(slower.path(), "--threshold 150%", 0);
-    compare(slower.path(), "--threshold 99%", 3);
+    // The threshold says how finely "same" is shown; a proven loss stays one.
+    compare(slower.path(), "--threshold 150%", 3);
     let faster = with_change(|new| scale(bvh(new), "query_ns", 0.5));
     let text = compare(faster.path(), "", 0);
-    assert!(
-        last_line(&text).starts_with("0 slower, 1 faster, 5 ties"),
-        "{text}"
-    );
-    assert!(
-        text.contains("│ faster") && text.contains(" 0.500 "),
-        "{text}"
-    );
+    let verdict = "0 slower, 0 inconclusive, 1 faster, 9 same of 10 cells";
+    assert_eq!(last_line(&text), verdict, "{text}");
+    assert!(row_with(&text, "faster").contains(" -50.0 % [-"), "{text}");
+    let finer = compare(faster.path(), "--threshold 0.01%", 0);
+    assert!(last_line(&finer).contains(" 9 inconclusive"), "{finer}");
 }
 
 #[test]
-fn the_larger_of_threshold_and_noise_floors_is_the_bar() {
-    let slower_by = |factor: f64, old: Value, new: Value| {
-        let folder = with_change(|report| {
-            scale(bvh(report), "query_ns", factor);
-            scale(bvh(report), "memory_bytes_per_item", factor);
-            report["noise"]["aa_floor"] = new;
-        });
-        let mut report = measured().clone();
-        report["noise"]["aa_floor"] = old;
-        fs::write(folder.path().join("old.json"), report.to_string()).expect("writable");
-        folder
-    };
-    let floor_of_new = slower_by(1.15, json!(0.02), json!(0.2));
-    let text = compare(floor_of_new.path(), "", 0);
+fn what_moves_everything_is_one_line_and_no_verdict() {
+    let folder = with_change(|new| {
+        let all = cells(new).iter_mut();
+        all.for_each(|cell| scale(cell, "query_ns", 1.5));
+        scale(bvh(new), "query_ns", 1.2);
+    });
+    let text = compare(folder.path(), "", 3);
+    assert!(text.contains("NEW takes 150."), "{text}");
     assert!(
-        text.contains("20.00 % (noise floor of NEW; threshold 5.00 %)"),
+        last_line(&text).starts_with("1 slower, 0 inconclusive"),
         "{text}"
     );
-    let floor_of_old = slower_by(1.15, json!(0.2), json!(0.1));
-    let text = compare(floor_of_old.path(), "", 0);
+    assert!(row_with(&text, "slower").contains(" +20."), "{text}");
+}
+
+#[test]
+fn one_process_and_few_structures_are_inconclusive() {
+    let one = with_change(|new| {
+        scale(bvh(new), "query_ns", 3.0);
+        for cell in cells(new) {
+            let first = cell["times"]["by_process"]["query_ns"][0].clone();
+            cell["times"]["by_process"]["query_ns"] = json!([first]);
+            cell["times"]["processes"] = json!(1);
+        }
+    });
+    let text = compare(one.path(), "", 0);
+    for wanted in [
+        "0 slower, 10 inconclusive",
+        "10 processes vs 1 process,",
+        "10 inconclusive cells: ",
+        "(run --processes 20)",
+        "compare --against BINARY",
+        "under three processes on a side",
+    ] {
+        assert!(text.contains(wanted), "no '{wanted}' in:\n{text}");
+    }
+    let few = with_change(|new| {
+        scale(bvh(new), "query_ns", 3.0);
+        cells(new).retain(|cell| cell["structure"] == "bvh" || cell["structure"] == "linear");
+    });
+    let text = compare(few.path(), "", 0);
     assert!(
-        text.contains("20.00 % (noise floor of OLD; threshold 5.00 %)"),
+        last_line(&text).starts_with("0 slower, 4 inconclusive"),
         "{text}"
     );
-    // Noise has no part in bytes, and none of the smaller floor counts.
-    compare(floor_of_old.path(), "--metric memory_bytes_per_item", 3);
-    let small_floors = slower_by(1.15, json!(0.02), json!(0.14));
-    compare(small_floors.path(), "", 3);
-    let unknown = slower_by(1.04, json!(null), json!(null));
-    let text = compare(unknown.path(), "", 0);
-    assert!(text.contains("note: OLD knows no noise floor"), "{text}");
-    compare(unknown.path(), "--threshold 3%", 3);
+    assert!(text.contains("under three other structures"), "{text}");
+}
+
+#[test]
+fn counters_are_compared_exactly() {
+    let folder = with_change(|new| {
+        let metrics = &mut bvh(new)["metrics"];
+        metrics["planes_tested"]["value"] = json!(1e6);
+        let bytes = metrics["memory_bytes_per_item"]["value"].as_f64();
+        metrics["memory_bytes_per_item"]["value"] = json!(2.0 * bytes.expect("bytes"));
+    });
+    let text = compare(folder.path(), "", 0);
+    let name = "work changed: bvh on uniform:n=300, orbit:frames=8, six-plane: ";
+    let lines: Vec<&str> = text
+        .lines()
+        .filter_map(|line| line.strip_prefix(name))
+        .collect();
+    assert_eq!(lines.len(), 2, "{text}");
+    assert!(lines[0].starts_with("planes_tested ") && lines[0].contains(" to 1000000 (+"));
+    assert!(lines[1].starts_with("memory_bytes_per_item ") && lines[1].ends_with("(+100.0 %)"));
+    assert!(last_line(&text).ends_with("10 same of 10 cells"), "{text}");
+}
+
+#[test]
+fn markdown_holds_the_table() {
+    let folder = with_change(|new| scale(bvh(new), "query_ns", 2.0));
+    let text = compare(folder.path(), "--markdown", 3);
+    let row = text
+        .lines()
+        .find(|line| line.starts_with("| uniform:n=300 |"));
+    let row = row.expect("a row");
+    assert!(
+        row.contains("| bvh | query\\_ns |") && row.contains("| slower |"),
+        "{row}"
+    );
+    assert!(last_line(&text).starts_with("1 slower"), "{text}");
+    all_refused(
+        &folder,
+        &[format!("{COMPARE} --markdown --format json")],
+        "--markdown | --format",
+    );
 }
 
 #[test]
@@ -203,7 +277,7 @@ fn statuses_go_before_times() {
         });
         let text = compare(broken.path(), "", 1);
         assert!(
-            text.contains("│ broken") && text.contains("a reason"),
+            rows(&text, "broken") == 1 && text.contains("a reason"),
             "{text}"
         );
         assert!(
@@ -213,7 +287,7 @@ fn statuses_go_before_times() {
         // It was wrong already, or nobody has asked it before.
         let twice = with_change(|new| status(bvh(new), name));
         fs::copy(twice.path().join("new.json"), twice.path().join("old.json")).expect("writable");
-        assert!(compare(twice.path(), "", 1).contains("│ failed in both"));
+        assert_eq!(rows(&compare(twice.path(), "", 1), "failed in both"), 1);
         let alone = with_change(|new| {
             status(bvh(new), name);
             bvh(new)["structure"] = json!("newest");
@@ -234,16 +308,24 @@ fn statuses_go_before_times() {
         fs::rename(&old, lost.path().join("kept")).expect("writable");
         fs::rename(&new, &old).expect("writable");
         fs::rename(lost.path().join("kept"), &new).expect("writable");
-        assert!(compare(lost.path(), "", 0).contains("│ gained"));
+        assert_eq!(rows(&compare(lost.path(), "", 0), "gained"), 1);
         fs::copy(&old, &new).expect("writable");
-        assert!(last_line(&compare(lost.path(), "", 0)).contains("1 failed in both"));
+        // What is asked of neither has not failed.
+        let both = match name {
+            "left_out" => "1 unmeasured",
+            _ => "1 failed in both",
+        };
+        assert!(
+            last_line(&compare(lost.path(), "", 0)).contains(both),
+            "{name}"
+        );
     }
 }
 
 #[test]
 fn another_question_is_not_judged_by_its_time() {
     type Row = (fn(&mut Value), &'static str);
-    let changes: [Row; 4] = [
+    let changes: [Row; 6] = [
         (|cell| cell["scene"]["digest"] = json!("0"), "other items"),
         (|cell| cell["path"]["digest"] = json!("0"), "other cameras"),
         (
@@ -254,6 +336,14 @@ fn another_question_is_not_judged_by_its_time() {
             |cell| cell["metrics"]["visible_count"]["value"] = json!(1e6),
             "visible_count",
         ),
+        (
+            |cell| cell["times"]["cameras_timed"] = json!(9),
+            "8 cameras timed and 9",
+        ),
+        (
+            |cell| cell["times"]["batch"] = json!(1 << 20),
+            "and 1048576 queries",
+        ),
     ];
     for (change, reason) in changes {
         let folder = with_change(|new| {
@@ -262,37 +352,35 @@ fn another_question_is_not_judged_by_its_time() {
         });
         let text = compare(folder.path(), "", 0);
         assert!(
-            text.contains("│ different") && text.contains(reason),
+            rows(&text, "different") == 1 && text.contains(reason),
             "{text}"
         );
-        assert!(last_line(&text).contains("5 ties of 6 cells"), "{text}");
+        assert!(last_line(&text).contains("9 same of 10 cells"), "{text}");
         // All of them: nothing is left that could say "no regression".
         let all = with_change(|new| cells(new).iter_mut().for_each(change));
-        let wanted = format!("nothing can be judged | 6 were not asked the same | {reason}");
+        let wanted = format!("nothing can be judged | 10 not the same question | {reason}");
         all_refused(&all, &[COMPARE], &wanted);
     }
     // An older report does not know its cameras.
     let older = with_change(|new| bvh(new)["path"]["digest"] = json!(null));
-    assert!(last_line(&compare(older.path(), "", 0)).contains("6 ties"));
+    assert!(last_line(&compare(older.path(), "", 0)).contains("10 same"));
 }
 
 #[test]
 fn figures_that_no_ratio_can_be_taken_of_are_counted() {
     let with_value =
         |value: f64| with_change(|new| bvh(new)["metrics"]["query_ns"]["value"] = json!(value));
-    for value in [0.0, -5.0, 1e-323] {
+    for value in [0.0, -5.0] {
         let text = compare(with_value(value).path(), "", 0);
-        let verdict = "0 slower, 1 unmeasured, 0 faster, 5 ties of 6 cells";
+        let verdict = "0 slower, 1 unmeasured, 0 inconclusive, 0 faster, 9 same of 10 cells";
         assert!(last_line(&text).starts_with(verdict), "{text}");
-        let row = text.lines().find(|line| line.contains("│ unmeasured"));
+        let row = text.lines().find(|line| line.contains("   unmeasured "));
         let row = row.expect("a row");
         assert!(
             row.contains("bvh") && row.contains("have no ratio"),
             "{row}"
         );
     }
-    // A time, however long.
-    compare(with_value(1e308).path(), "", 3);
     let null = with_change(|new| bvh(new)["metrics"]["query_ns"]["value"] = json!(null));
     all_refused(&null, &[COMPARE], "new.json | null | expected");
     let gone = with_change(|new| {
@@ -304,10 +392,22 @@ fn figures_that_no_ratio_can_be_taken_of_are_counted() {
         text.contains("only in OLD") && text.contains("unmeasured"),
         "{text}"
     );
+    // In neither report: counted, not shown, and no success alone.
+    let mut neither = measured().clone();
+    for cell in cells(&mut neither) {
+        let metrics = cell["metrics"].as_object_mut().expect("an object");
+        metrics.remove("locate_ns");
+    }
+    for file in ["old.json", "new.json"] {
+        fs::write(gone.path().join(file), neither.to_string()).expect("writable");
+    }
+    let text = compare(gone.path(), "--metric query_ns,locate_ns", 0);
+    assert!(last_line(&text).contains("10 unmeasured"), "{text}");
+    assert!(!text.contains("in neither report"), "{text}");
     all_refused(
         &gone,
-        &[format!("{COMPARE} --metric times_replay")],
-        "nothing can be judged | 6 lack a figure | in neither report",
+        &[format!("{COMPARE} --metric locate_ns")],
+        "nothing can be judged | 10 without a figure | in neither report",
     );
 }
 
@@ -318,98 +418,99 @@ fn cells_of_one_side_and_other_settings_are_said() {
         new["machine"]["cpu"] = json!("Another");
         new["toolchain"]["flags"] = json!("-C target-cpu=native");
         new["run"]["finished_at"] = json!(null);
-        for bound in new["bounds"].as_array_mut().expect("an array") {
-            scale(bound, "query_ns", 1.5);
-        }
+        new["source"]["dirty"] = json!(true);
     });
     let text = compare(folder.path(), "", 0);
     for wanted in [
-        "only in OLD: 1 cells (bvh on uniform:n=300, orbit:frames=8, six-plane)",
-        "only in NEW: 1 cells (bvh:leaf=2 on",
-        "note: cpu differs:",
+        "only in OLD: 1 cell (bvh on uniform:n=300, orbit:frames=8, six-plane)",
+        "only in NEW: 1 cell (bvh:leaf=2 on",
+        "note: machine differs: cpu '",
         "note: different machines:",
-        "--metric times_read",
-        "note: flags differs: '' and '-C target-cpu=native'",
-        "4 bounds (reading, copying) take 1.50 times as long in NEW",
+        "note: toolchain differs: flags '' and '-C target-cpu=native'",
+        "note: NEW was built from a dirty working tree",
         "note: NEW is a run that was not finished",
     ] {
         assert!(text.contains(wanted), "no '{wanted}' in:\n{text}");
     }
-    assert!(last_line(&text).contains("5 ties of 5 cells"), "{text}");
+    assert!(last_line(&text).contains("9 same of 9 cells"), "{text}");
     // A cell that a report holds twice is two cells.
     let twice = with_change(|new| {
         let copy = bvh(new).clone();
         cells(new).push(copy);
     });
-    assert!(compare(twice.path(), "", 0).contains("only in NEW: 1 cells (bvh on"));
+    assert!(compare(twice.path(), "", 0).contains("only in NEW: 1 cell (bvh on"));
 }
 
 #[test]
 fn json_says_the_same_with_types() {
     let folder = with_change(|new| {
         scale(bvh(new), "query_ns", 2.0);
-        let gone = cells(new).remove(0);
-        assert_eq!(gone["structure"], "linear-scalar");
+        bvh(new)["metrics"]["planes_tested"]["value"] = json!(1e6);
+        let last = cells(new).pop().expect("a cell");
+        assert_eq!(last["structure"], "bsp");
     });
     let done = json(&compare(folder.path(), "--format json", 3));
-    let fields = "old new verdict counts notes settings threshold bars cells_in_common changes \
-        only_in_old only_in_new structures machine_drift";
+    let fields = "old new verdict counts head notes settings advice threshold cells_in_common rows \
+        work_changed only_in_old only_in_new common_shift";
     assert_eq!(keys(&done), set(fields));
     assert_eq!(done["verdict"], "regression");
-    let head = "id started_at command version commit dirty noise_floor cells";
+    let head = "id started_at command version commit dirty cells";
     assert_eq!(keys(&done["old"]), set(head));
     assert_eq!(
         (&done["old"]["cells"], &done["new"]["cells"]),
-        (&json!(6), &json!(5))
+        (&json!(10), &json!(9))
     );
-    let bar = json!({ "metric": "query_ns", "bar": 0.05, "decided_by": "threshold" });
-    assert_eq!(done["bars"], json!([bar]));
-    let outcomes = "broken lost slower different unmeasured failed_in_both gained faster tie";
+    assert_eq!(done["advice"], json!(null));
+    let outcomes = "broken lost slower different unmeasured failed_in_both gained inconclusive \
+        faster same";
     assert_eq!(keys(&done["counts"]), set(outcomes));
     assert_eq!(
-        (&done["counts"]["slower"], &done["counts"]["tie"]),
-        (&json!(1), &json!(4))
+        (&done["counts"]["slower"], &done["counts"]["same"]),
+        (&json!(1), &json!(8))
     );
-    let changes = done["changes"].as_array().expect("an array");
-    assert_eq!(changes.len(), 5);
-    let row = "status scene path cache test arithmetic planes epsilon structure metric ratio old \
-        new bar old_status new_status reason";
-    assert!(changes.iter().all(|change| keys(change) == set(row)));
-    let worst = &changes[0];
+    let rows = done["rows"].as_array().expect("an array");
+    assert_eq!(rows.len(), 9);
+    let row = "verdict scene path cache test arithmetic planes epsilon structure metric old new \
+        judgement processes old_status new_status reason";
+    assert!(rows.iter().all(|one| keys(one) == set(row)));
+    let worst = &rows[0];
     assert_eq!(
-        (&worst["status"], &worst["structure"]),
+        (&worst["verdict"], &worst["structure"]),
         (&json!("slower"), &json!("bvh"))
     );
+    let judged = &worst["judgement"];
+    let figures = "change ratio lower upper resolution more_pairs pairs";
+    assert_eq!(keys(judged), set(figures));
+    let figure = |name: &str| judged[name].as_f64().expect(name);
+    assert!((figure("ratio") - 2.0).abs() < 1e-9, "{judged}");
+    assert!(figure("lower") < 2.0 && 2.0 < figure("upper"), "{judged}");
     assert_eq!(
-        (&worst["ratio"], &worst["bar"]),
-        (&json!(2.0), &json!(0.05))
+        (&judged["pairs"], &worst["processes"]),
+        (&json!(10), &json!([10, 10]))
     );
-    let (old, new) = (&worst["old"], &worst["new"]);
-    assert_eq!(keys(old), set("value lower upper"));
-    for part in ["value", "lower", "upper"] {
-        let [old, new] = [old, new].map(|side| side[part].as_f64().expect(part));
-        assert_eq!(new, 2.0 * old, "{part}");
-    }
+    let [old, new] = ["old", "new"].map(|side| worst[side].as_f64().expect(side));
+    assert_eq!(new, 2.0 * old);
+    let work = &done["work_changed"][0];
+    assert_eq!(
+        (&work["structure"], &work["counter"], &work["new"]),
+        (&json!("bvh"), &json!("planes_tested"), &json!(1e6))
+    );
     let lone = &done["only_in_old"][0];
     assert_eq!(
         (&lone["structure"], &lone["status"]),
-        (&json!("linear-scalar"), &json!("ok"))
+        (&json!("bsp"), &json!("ok"))
     );
     assert_eq!(done["only_in_new"], json!([]));
-    let mean = &done["structures"][0];
-    assert_eq!(
-        (&mean["structure"], &mean["cells"]),
-        (&json!("bvh"), &json!(2))
-    );
-    let drift = json!({ "ratio": 1.0, "bounds": 4 });
-    assert_eq!(done["machine_drift"], drift);
+    let shift = &done["common_shift"];
+    assert_eq!(keys(shift), set("ratio lower upper cells"));
+    assert_eq!(shift["cells"], json!(9));
     let same = json(&works(
         folder.path(),
         "compare old.json old.json --format json",
     ));
     assert_eq!(
-        (&same["verdict"], &same["counts"]["tie"]),
-        (&json!("ok"), &json!(6))
+        (&same["verdict"], &same["counts"]["same"]),
+        (&json!("ok"), &json!(10))
     );
 }
 

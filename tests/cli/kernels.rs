@@ -72,8 +72,8 @@ fn a_report_says_which_kernel_and_goes_on_with_no_other() {
     let best = env["machine"]["instruction_set"].as_str().expect("a name");
     assert_eq!(Some(&best), available().last());
     if best != "portable" {
-        let done = cullbench(here.path(), &format!("{line} --resume"));
-        let wanted = format!("--kernel portable | not {best}");
+        let done = cullbench(here.path(), &format!("{line} --resume --kernel {best}"));
+        let wanted = format!("--kernel is '{best}' | with 'portable' | expected");
         assert_refused(&done, &wanted, "another kernel");
     }
 }

@@ -32,7 +32,7 @@ fn json_outputs_are_json() {
         assert!(!rows.is_empty() && rows.iter().all(|row| row["summary"].is_string()));
     }
     let env = ask("env");
-    let facts = set("machine toolchain source harness_overhead_ns");
+    let facts = set("machine toolchain source");
     assert_eq!(keys(&env), facts);
     let verify = ask("verify --scene scene.csv --path orbit:frames=4 --cases 50");
     assert_eq!(verify["ok"], true);

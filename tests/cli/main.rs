@@ -10,6 +10,7 @@ mod compare;
 mod converting;
 mod cullings;
 mod drift;
+mod foreign_text;
 mod kernels;
 mod listing;
 mod pipes;
@@ -19,7 +20,9 @@ mod queries;
 mod readers;
 mod region_search;
 mod reports;
+mod resume;
 mod runs;
+mod shards;
 #[cfg(unix)]
 mod signals;
 mod stress;

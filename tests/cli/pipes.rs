@@ -157,3 +157,56 @@ fn links_and_pipes_are_written_to_and_not_replaced() {
     assert!(pipe.file_type().is_fifo());
     assert_eq!(reader.join().expect("no panic"), written);
 }
+
+/// Runs a command that reads standard input by its name.
+#[cfg(unix)]
+fn fed(folder: &Path, line: &str, input: &[u8]) -> Done {
+    let output = assert_cmd::Command::from_std(command(folder, line))
+        .write_stdin(input)
+        .output()
+        .expect("the program starts");
+    Done {
+        code: output.status.code(),
+        out: String::from_utf8(output.stdout).expect("UTF-8"),
+        err: String::from_utf8(output.stderr).expect("UTF-8"),
+    }
+}
+
+/// Some commands look at their inputs twice, which a pipe does not allow.
+#[cfg(unix)]
+#[test]
+fn scenes_and_cameras_come_from_pipes() {
+    let folder = with_good_files(&[("map.wad", &map12())]);
+    let bytes = |name: &str| std::fs::read(folder.path().join(name)).expect(name);
+    let run = "--path orbit:frames=2 --structure linear,bvh --no-bounds --out";
+    for (line, input, wanted) in [
+        ("scene info /dev/stdin", "scene.csv", "items"),
+        ("scene info /dev/stdin", "map.wad", "items"),
+        (
+            "query --scene /dev/stdin --cameras cameras.csv --structure linear",
+            "scene.csv",
+            "0,linear,six-plane,2,2,1,",
+        ),
+        (
+            &format!("run --scene /dev/stdin {run} one"),
+            "scene.csv",
+            "bvh",
+        ),
+        (
+            "run --scene scene.csv --scene uniform:n=9 --path /dev/stdin --structure linear \
+             --no-bounds --out two",
+            "cameras.csv",
+            "linear",
+        ),
+    ] {
+        let done = fed(folder.path(), line, &bytes(input));
+        assert_eq!((done.code, done.err.as_str()), (Some(0), ""), "{line}");
+        assert!(done.out.contains(wanted), "{line}: {}", done.out);
+    }
+    let none = fed(folder.path(), "scene info /dev/stdin", b"");
+    assert_refused(
+        &none,
+        "/dev/stdin, line 1 | an empty file | expected",
+        "none",
+    );
+}

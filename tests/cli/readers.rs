@@ -1,7 +1,7 @@
 //! The library's readers, fed with damaged copies of good input and with
 //! plain noise: no panic, and every error is one line that says where.
 
-use cullbench::index::structures;
+use cullbench::index::Registry;
 use cullbench::path::{LensDefaults, read_cameras_csv, read_points_csv};
 use cullbench::scene::{WadMap, map_names, read_boxes_csv};
 
@@ -130,7 +130,9 @@ fn damaged_vectors() {
         "expect_planes_error": "no plane", "boxes": []}]}"#;
     feed("vectors", good.as_bytes(), |bytes| {
         let vectors = read_vectors(bytes, "in.file").map_err(|e| e.to_string())?;
-        let linear = structures("linear").map_err(|e| e.to_string())?;
+        let linear = Registry::builtin()
+            .structures("linear")
+            .map_err(|e| e.to_string())?;
         for vector in &vectors {
             let _ = replay(vector, &linear);
         }

@@ -10,7 +10,7 @@ use super::process::*;
 /// A run over three sizes, with a fixed count and a share, small and quick.
 const RUN: &str = "run --scene uniform:n=300 --scene uniform:n=900 --scene uniform:n=2700 \
     --path orbit:frames=8,visible=30 --path orbit:frames=8,visible=2% --path outside:frames=8 \
-    --structure linear-scalar,linear,bvh --out run";
+    --structure linear-scalar,linear,bvh --processes 3 --out run";
 
 #[test]
 fn a_run_is_reported_as_markdown_as_pictures_and_as_a_page() {
@@ -28,8 +28,8 @@ fn a_run_is_reported_as_markdown_as_pictures_and_as_a_page() {
         "# cullbench run ",
         "## uniform:n=2700",
         "### outside:frames=8, warm, six-plane",
-        "| bound-read | bound |",
-        "| bound-memcpy | bound |",
+        "| bound-read | lower bound |",
+        "| bound-memcpy | lower bound |",
         "## Crossover: uniform, warm, six-plane",
         "| items \\\\ visible |",
         "| 100 % |",
@@ -40,7 +40,7 @@ fn a_run_is_reported_as_markdown_as_pictures_and_as_a_page() {
         assert!(text.contains(wanted), "no '{wanted}' in:\n{text}");
     }
     // Nobody asked other crates.
-    assert!(!text.contains("times fastest peer"));
+    assert!(!text.contains("speed-up vs fastest peer"));
     let rows = text.lines().filter(|line| line.starts_with('|'));
     for (before, row) in text.lines().zip(text.lines().skip(1)) {
         let count = |line: &str| line.replace("\\|", "").matches('|').count();
@@ -74,6 +74,101 @@ fn a_run_is_reported_as_markdown_as_pictures_and_as_a_page() {
     );
 }
 
+/// One estimator: every value in its interval, every ratio the ratio of the two
+/// values, and the ranks of the report in every table.
+#[test]
+fn values_ratios_and_ranks_are_the_same_everywhere() {
+    let folder = folder(&[]);
+    let run = "run --scene city:n=300 --path orbit:frames=8 --path outside:frames=8 \
+        --structure linear-scalar,linear,bvh,octree,bsp,wide --processes 4 --out run";
+    let screen = works(folder.path(), run);
+    let markdown = works(folder.path(), "report run");
+    works(folder.path(), "report run --html r.html");
+    let page = fs::read_to_string(folder.path().join("r.html")).expect("a page");
+    let text = fs::read_to_string(folder.path().join("run/report.json")).expect("a report");
+    let report = json(&text);
+    let list = |name: &str| report[name].as_array().expect("an array").clone();
+    let value = |cell: &Value, metric: &str| cell["metrics"][metric]["value"].as_f64();
+    let cells = list("cells");
+    type Row = (u64, f64, String);
+    let mut ranked: Vec<(String, Vec<Row>)> = Vec::new();
+    for cell in &cells {
+        let (path, name) = (cell["path"]["name"].as_str(), cell["structure"].as_str());
+        let (path, name) = (
+            path.expect("text").to_owned(),
+            name.expect("text").to_owned(),
+        );
+        let mut intervals = 0;
+        for (metric, found) in cell["metrics"].as_object().expect("metrics") {
+            let part = |part: &str| found[part].as_f64();
+            if let (Some(lower), Some(upper)) = (part("lower"), part("upper")) {
+                let value = part("value").expect("a value");
+                assert!(lower <= value && value <= upper, "{name} {metric}: {found}");
+                intervals += 1;
+            }
+        }
+        assert!(intervals >= 5, "{name}: {intervals}");
+        let of = |list: &[Value], structure: &str| {
+            let same = |c: &&Value| c["path"]["name"] == *path && c["structure"] == structure;
+            value(list.iter().find(same).expect(structure), "query_ns").expect("a time")
+        };
+        let ns = of(&cells, &name);
+        for (metric, ratio) in [
+            ("speedup", of(&cells, "linear") / ns),
+            ("times_read", ns / of(&list("bounds"), "bound-read")),
+            ("times_memcpy", ns / of(&list("bounds"), "bound-memcpy")),
+        ] {
+            let shown = value(cell, metric).expect(metric);
+            assert!(
+                (shown / ratio - 1.0).abs() < 1e-9,
+                "{name} {metric}: {shown} {ratio}"
+            );
+        }
+        let rank = cell["rank"].as_u64().expect("a rank");
+        match ranked.iter_mut().find(|found| found.0 == path) {
+            Some(found) => found.1.push((rank, ns, name)),
+            None => ranked.push((path, vec![(rank, ns, name)])),
+        }
+    }
+    let mut wanted: Vec<(u64, String)> = Vec::new();
+    for (_, rows) in &mut ranked {
+        rows.sort_by(|a, b| a.1.total_cmp(&b.1));
+        // The order of the ranks is the order of the values.
+        assert!(rows.is_sorted_by_key(|row| row.0), "{rows:?}");
+        wanted.extend(rows.iter().map(|row| (row.0, row.2.clone())));
+    }
+    let parsed = |rank: &str, name: &str| Some((rank.parse().ok()?, name.to_owned()));
+    let of_screen = screen.lines().filter_map(|line| {
+        let mut words = line.strip_prefix('│')?.split_whitespace();
+        parsed(words.next()?, words.next()?)
+    });
+    let of_markdown = markdown.lines().filter_map(|line| {
+        let mut cells = line.strip_prefix("| ")?.split(" | ");
+        let name = cells.next()?;
+        parsed(cells.next()?, name)
+    });
+    let of_page = page.lines().filter_map(|line| {
+        let (name, row) = line
+            .strip_prefix("<tr><td>")?
+            .split_once("</td><td class=\"n\">")?;
+        parsed(row.split_once("</td>")?.0, name)
+    });
+    let told: [(&str, Vec<(u64, String)>); 3] = [
+        ("screen", of_screen.collect()),
+        ("Markdown", of_markdown.collect()),
+        ("page", of_page.collect()),
+    ];
+    for (place, told) in told {
+        // What follows are the tables of crossovers.
+        assert!(told.len() >= wanted.len(), "{place}: {told:?}");
+        assert_eq!(told[..wanted.len()], wanted[..], "{place}");
+    }
+    for text in [&screen, &markdown, &page] {
+        assert!(text.contains("4 processes, "), "{text}");
+        assert!(text.contains("cameras judged against the oracle"), "{text}");
+    }
+}
+
 #[test]
 fn a_run_of_one_size_has_no_chart_and_says_so() {
     let folder = folder(&[]);
@@ -99,7 +194,6 @@ fn figures_are_read_off_not_measured() {
     let mut report = json(&fs::read_to_string(&path).expect("a report"));
     // A structure of another crate, and a field of a later version.
     report["later"] = json!({ "x": [1] });
-    report["noise"]["aa_floor"] = json!(0.01);
     for cell in report["cells"].as_array_mut().expect("an array") {
         cell["later"] = json!(1);
         let structure = cell["structure"].as_str().expect("text").to_owned();
@@ -113,10 +207,18 @@ fn figures_are_read_off_not_measured() {
         let set = |cell: &mut Value, name: &str, value: f64| {
             cell["metrics"][name] = json!({ "value": value, "unit": "1" });
         };
-        set(cell, "ratio_to_linear", ratio);
+        set(cell, "speedup", ratio);
+        cell["rank"] = json!(match structure.as_str() {
+            "linear-scalar" => 3,
+            "bvh" if ratio > 1.0 => 1,
+            "bvh" => 2,
+            _ if items > 900.0 => 2,
+            _ => 1,
+        });
         set(cell, "query_ns", items / ratio);
         if structure == "linear-scalar" {
             cell["structure"] = json!("peer-<b>|x");
+            (cell["kind"], cell["origin"]) = (json!("tree"), json!({ "crate": "b" }));
         }
     }
     fs::write(&path, report.to_string()).expect("writable");
@@ -124,14 +226,117 @@ fn figures_are_read_off_not_measured() {
     assert_eq!(text, "");
     let text = works(folder.path(), "report run");
     // linear takes `items` ns and is 20 times as fast as the peer.
-    assert!(text.contains("times fastest peer"), "{text}");
+    assert!(text.contains("speed-up vs fastest peer"), "{text}");
     assert!(text.contains("peer-\\<b>\\|x"), "{text}");
     assert!(text.contains("| linear | 1 | 300 ns |"), "{text}");
-    assert!(text.contains("| 2,700 | bvh 10.0x |"), "{text}");
+    assert!(text.contains("| 2,700 | bvh: 10.0 (at 1.11 %) |"), "{text}");
     // Faster from 900 on: not known where only one size has that share.
     assert!(text.contains("| bvh |  | ~ 900 |"), "{text}");
     let page = fs::read_to_string(folder.path().join("r.html")).expect("a page");
     assert!(page.contains("peer-&lt;b&gt;|x") && !page.contains("peer-<b>"));
+}
+
+/// A third of the items is not half of them.
+#[test]
+fn shares_stand_where_they_belong() {
+    let folder = folder(&[]);
+    works(folder.path(), RUN);
+    let path = folder.path().join("run/report.json");
+    let mut report = json(&fs::read_to_string(&path).expect("a report"));
+    for cell in report["cells"].as_array_mut().expect("an array") {
+        cell["metrics"]["cull_rate"]["value"] = json!(1.0 - 0.347);
+    }
+    fs::write(&path, report.to_string()).expect("writable");
+    let text = works(folder.path(), "report run");
+    let (_, table) = text.split_once("| items \\\\ visible |").expect("a table");
+    let (head, rows) = table.split_once('\n').expect("rows");
+    assert_eq!(head, " 30 % |", "{text}");
+    let rows: Vec<&str> = rows.lines().skip(1).take(3).collect();
+    assert!(
+        rows.iter().all(|row| row.contains("(at 34.70 %)")),
+        "{rows:?}"
+    );
+    works(folder.path(), "report run --svg charts");
+    for (name, svg) in contents(&folder.path().join("charts")) {
+        let svg = String::from_utf8(svg.expect("a file")).expect("UTF-8");
+        assert!(svg.contains("(measured: 34.70 % to 34.70 %)"), "{name}");
+    }
+}
+
+/// Every figure of a report that JSON can hold, on a logarithmic axis as well.
+#[test]
+fn figures_beyond_any_axis_end_and_are_left_out() {
+    let folder = folder(&[]);
+    works(folder.path(), RUN);
+    let path = folder.path().join("run/report.json");
+    let report = json(&fs::read_to_string(&path).expect("a report"));
+    for extreme in [1e308, f64::MAX, 5e-324, 1e-310, 0.0, -1.0] {
+        let mut report = report.clone();
+        for cell in report["cells"].as_array_mut().expect("an array") {
+            if cell["scene"]["total_count"] == 2700 {
+                for metric in cell["metrics"]
+                    .as_object_mut()
+                    .expect("metrics")
+                    .values_mut()
+                {
+                    metric["value"] = json!(extreme);
+                }
+                let nearly_all = json!({ "value": 0.5, "unit": "1" });
+                cell["metrics"]["cull_rate"] = nearly_all;
+            }
+            if cell["structure"] == "bvh" {
+                cell["metrics"]["query_ns"]["value"] = json!(extreme);
+            }
+        }
+        fs::write(&path, report.to_string()).expect("writable");
+        let text = works(folder.path(), "report run --svg charts --html page.html");
+        assert_eq!(text, "");
+        works(folder.path(), "report run");
+        works(folder.path(), "compare run run --all");
+        let page = fs::read_to_string(folder.path().join("page.html")).expect("a page");
+        assert!(page.len() < 1_000_000, "{extreme}: {} bytes", page.len());
+        if extreme > 0.0 {
+            assert!(page.contains("beyond the axis left out"), "{extreme}");
+        }
+    }
+    // No number of JSON: refused with its place.
+    for (number, wanted) in [
+        ("1e999", "out of range"),
+        ("NaN", "expected"),
+        ("null", "null"),
+    ] {
+        let text = report.to_string();
+        let at = text.find("\"value\":").expect("a value") + 8;
+        let end = at + text[at..].find([',', '}']).expect("its end");
+        let bad = format!("{}{number}{}", &text[..at], &text[end..]);
+        fs::write(folder.path().join("bad.json"), bad).expect("writable");
+        let wanted = format!("bad.json, line 1, column | bounds | {wanted}");
+        all_refused(&folder, &["report bad.json --svg new"], &wanted);
+    }
+}
+
+/// Reports from before structures declared what they are: the registry knows
+/// those that it has.
+#[test]
+fn reports_that_do_not_say_what_a_structure_is_read_as_before() {
+    let folder = folder(&[]);
+    let line = "run --scene uniform:n=300 --scene uniform:n=900 --path orbit:frames=4 \
+        --structure linear,bvh --no-bounds --out run";
+    works(folder.path(), line);
+    let told = works(folder.path(), "report run");
+    let text = fs::read_to_string(folder.path().join("run/report.json")).expect("a report");
+    let mut report = json(&text);
+    for cell in report["cells"].as_array_mut().expect("cells") {
+        let cell = cell.as_object_mut().expect("a cell");
+        assert!(cell.remove("kind").is_some() && cell.remove("origin").is_some());
+    }
+    fs::write(folder.path().join("old.json"), report.to_string()).expect("writable");
+    assert_eq!(works(folder.path(), "report old.json"), told);
+    // The scan has nothing to repay: no column of its own.
+    assert!(
+        !told.contains("| linear | <=") && !told.contains("| linear | >"),
+        "{told}"
+    );
 }
 
 #[test]
@@ -140,8 +345,18 @@ fn what_is_no_report_is_refused() {
         ("empty.json", b""),
         ("other.json", b"{\"a\": 1}"),
         ("later.json", b"{\"schema_version\": 7}"),
-        ("half.json", b"{\"schema_version\": 1, \"run\": {"),
+        ("half.json", b"{\"schema_version\": 2, \"run\": {"),
         ("noise.json", &[0xFF; 64]),
+        (
+            "latin.json",
+            b"{\n  \"schema_version\": 2, \"x\": \"\xe4\"}",
+        ),
+        ("more.json", b"{\"schema_version\": 2} {}"),
+        ("text.json", b"{\n\"schema_version\": \"one\"}"),
+        (
+            "deep.json",
+            b"{\"schema_version\": 2,\n\"run\": {\"id\": \"a\", \"started_at\": 7}}",
+        ),
     ]);
     fs::create_dir(folder.path().join("nothing")).expect("writable");
     for (file, wanted) in [
@@ -152,9 +367,30 @@ fn what_is_no_report_is_refused() {
             "other.json",
             "schema_version | expected the report of a run",
         ),
-        ("later.json", "schema version 7 | expected 1"),
+        ("later.json", "schema version 7 | expected 2"),
         ("half.json", "half.json | expected the report of a run"),
-        ("noise.json", "noise.json | UTF-8"),
+        (
+            "noise.json",
+            "noise.json, line 1, column 1: byte 0xff | UTF-8 | expected",
+        ),
+        (
+            "latin.json",
+            "line 2, column 30: byte 0xe4 | UTF-8 | expected",
+        ),
+        (
+            "more.json",
+            "more.json, line 1, column 23: trailing characters",
+        ),
+        (
+            "text.json",
+            "line 2, column 23, schema_version: invalid type: string \"one\"; expected the report \
+             of a run, here u32",
+        ),
+        (
+            "deep.json",
+            "deep.json, line 2, column 34, run.started_at: invalid type: integer `7`; expected \
+             the report of a run, here a string",
+        ),
     ] {
         let lines = [
             format!("report {file}"),

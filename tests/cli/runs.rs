@@ -7,8 +7,8 @@ use std::path::Path;
 
 use serde_json::Value;
 
+use super::BOXES;
 use super::process::*;
-use super::{BOXES, EYE_LOOK};
 
 pub fn report(run: &Path) -> Value {
     json(&fs::read_to_string(run.join("report.json")).expect("a report"))
@@ -19,7 +19,7 @@ pub fn cells(report: &Value) -> &Vec<Value> {
 }
 
 /// Metrics that every cell of these scenes has.
-const METRICS: &str = "query_ns ns_per_visible visible_count cull_rate ratio_to_linear \
+const METRICS: &str = "query_ns ns_per_visible visible_count cull_rate speedup \
     nodes_tested items_tested build_ms memory_bytes_per_item \
     locate_ns locate_batched_ns comparisons regions_found";
 
@@ -49,10 +49,10 @@ pub fn check_run(run: &Path) -> Value {
     let samples = rows(&fs::read_to_string(run.join("samples.csv")).expect("samples.csv"));
     assert_eq!(summary.len(), cells(&report).len());
     let mut structures: BTreeMap<[&str; 3], Vec<&str>> = BTreeMap::new();
-    let mut referred = 0;
+    let mut referred = 0u64;
     for (cell, row) in cells(&report).iter().zip(&summary) {
-        let fields =
-            "scene path structure params test status reason metrics error left_out samples_ref";
+        let fields = "scene path structure kind origin params test status reason rank times metrics error \
+            left_out samples_ref";
         assert_eq!(keys(cell), set(fields));
         let text = |value: &Value| value.as_str().expect("text").to_owned();
         assert_eq!(cell["status"], "ok", "{cell}");
@@ -92,18 +92,22 @@ pub fn check_run(run: &Path) -> Value {
             .push(&row["structure"]);
         let place = &cell["samples_ref"];
         assert_eq!(place["file"], "samples.csv");
-        let [first, count] = ["first_row", "rows"].map(|k| place[k].as_u64().expect(k) as usize);
-        assert!(count > 0);
-        for sample in &samples[first..first + count] {
-            for column in ["scene", "path", "cache", "structure"] {
-                assert_eq!(sample[column], row[column]);
-            }
+        // The rows that have the cell's names.
+        let own = samples.iter().filter(|sample| {
+            let names = ["scene", "path", "cache", "structure", "test"];
+            names.iter().all(|name| sample[*name] == row[*name])
+        });
+        let mut count = 0;
+        for sample in own {
             let time: f64 = sample["cpu_ns"].parse().expect("a number");
             assert!(
                 time >= 0.0
                     && ["query", "locate", "locate_batched"].contains(&sample["task"].as_str())
             );
+            count += 1;
         }
+        assert!(count > 0);
+        assert_eq!(place["rows"].as_u64(), Some(count));
         referred += count;
     }
     // The rest are those of the twins and of the bounds.
@@ -111,7 +115,7 @@ pub fn check_run(run: &Path) -> Value {
         let name = &row["structure"];
         name.ends_with("#twin") || name.starts_with("bound-")
     });
-    assert_eq!(referred + rest.count(), samples.len());
+    assert_eq!(referred as usize + rest.count(), samples.len());
     check_bounds(&report);
     let names: Vec<String> = structure_names();
     for (path, found) in structures {
@@ -189,29 +193,22 @@ fn a_run_leaves_a_complete_report_and_is_not_written_over() {
         "resuming a finished run changed files"
     );
     // Another experiment does not belong into this report.
-    let others: [(&str, &str); 4] = [
-        ("--seed 2", "--seed 1"),
-        ("--no-bounds", "holds bounds"),
-        ("--structure linear", "expected linear"),
-        ("--planes frame-f32", "other planes"),
+    let others = [
+        ("--seed 2", "--seed is '2'"),
+        ("--no-bounds", "--no-bounds is"),
+        ("--structure linear", "--structure is 'linear'"),
+        ("--planes frame-f32", "--planes is 'frame-f32'"),
+        ("--path spin:frames=16", "spin:frames=16"),
     ];
     for (other, wanted) in others {
         let done = cullbench(folder.path(), &format!("{TINY} --resume {other}"));
         assert_refused(&done, &format!("out/run | {wanted} | expected"), wanted);
         assert!(contents(&run) == before, "{other:?} changed files");
     }
-    // More of the same one does.
-    works(
-        folder.path(),
-        &format!("{TINY} --resume --path spin:frames=16"),
-    );
-    let more = check_run(&run);
-    assert_eq!(cells(&more)[..cells(&report).len()], cells(&report)[..]);
-    assert_eq!(cells(&more).len(), 2 * cells(&report).len());
 }
 
 #[test]
-fn bounds_can_be_left_out_for_a_whole_run_only() {
+fn bounds_can_be_left_out_of_a_run() {
     let folder = folder(&[]);
     let bare = format!("{TINY} --structure linear,bvh");
     works(folder.path(), &format!("{bare} --no-bounds"));
@@ -222,10 +219,8 @@ fn bounds_can_be_left_out_for_a_whole_run_only() {
             .iter()
             .all(|c| c["metrics"]["times_read"].is_null())
     );
-    let more = format!("{bare} --resume --path spin:frames=16");
-    let done = cullbench(folder.path(), &more);
-    assert_refused(&done, "out/run | with --no-bounds | expected", "bounds");
-    works(folder.path(), &format!("{more} --no-bounds"));
+    // What was recorded is continued with.
+    works(folder.path(), &format!("{bare} --resume"));
 }
 
 #[test]
@@ -242,111 +237,55 @@ fn cold_runs_measure_both_states_and_every_answer() {
 }
 
 #[test]
-fn damaged_runs_are_not_resumed() {
-    let folder = folder(&[]);
-    works(folder.path(), TINY);
-    let run = folder.path().join("out/run");
-    let whole = fs::read_to_string(run.join("report.json")).expect("a report");
-    let samples = fs::read(run.join("samples.csv")).expect("samples");
-    let swap = |from: &str, to: &str| {
-        assert!(whole.contains(from), "{from}");
-        whole.replace(from, to).into_bytes()
-    };
-    let damages: [(&str, Vec<u8>, &str); 7] = [
-        ("report.json", vec![], "report.json"),
-        (
-            "report.json",
-            whole.as_bytes()[..whole.len() / 2].to_vec(),
-            "expected the report of a run",
-        ),
-        ("report.json", vec![0xFF; 64], "report.json"),
-        (
-            "report.json",
-            swap("\"schema_version\": 1", "\"schema_version\": 9"),
-            "schema version 9; expected 1",
-        ),
-        (
-            "report.json",
-            swap("\"rows\": ", "\"rows\": 1844674407370955"),
-            "report.json refers to",
-        ),
-        (
-            "samples.csv",
-            samples[..samples.len() / 2].to_vec(),
-            "samples.csv",
-        ),
-        ("samples.csv", vec![], "samples.csv: 0 rows; expected"),
-    ];
-    for (file, bytes, wanted) in damages {
-        fs::write(run.join("report.json"), &whole).expect("writable");
-        fs::write(run.join("samples.csv"), &samples).expect("writable");
-        fs::write(run.join(file), bytes).expect("writable");
-        let before = contents(&run);
-        let done = cullbench(folder.path(), &format!("{TINY} --resume"));
-        assert_refused(&done, &format!("out/run/ | {wanted}"), wanted);
-        assert!(contents(&run) == before, "{wanted}");
-    }
-}
-
-#[test]
-fn a_scene_that_changes_between_stop_and_resume_is_noticed() {
-    let folder = with_good_files(&[]);
-    let run = "run --scene scene.csv --path orbit:frames=4 --out r";
-    works(folder.path(), run);
-    let other = format!("{BOXES}\n0,0,0,1,1,2\n");
-    fs::write(folder.path().join("scene.csv"), other).expect("writable");
-    let resume = format!("{run} --path spin:frames=4 --resume");
+fn a_scene_without_items_ranks_nothing_and_counts_are_words() {
+    let none = format!("{BOXES}\n");
+    let one = format!("{BOXES}\n0,0,0,1,1,1\n");
+    let folder = folder(&[("none.csv", none.as_bytes()), ("one.csv", one.as_bytes())]);
+    let run = "--path outside:frames=1 --no-bounds --out";
+    let table = works(
+        folder.path(),
+        &format!("run --scene none.csv --structure linear,bvh {run} none"),
+    );
+    assert!(
+        table.contains("none.csv: no items, no regions; nothing is ranked"),
+        "{table}"
+    );
+    assert!(
+        table.contains("- linear") && table.contains("- bvh"),
+        "{table}"
+    );
+    assert!(
+        !table.contains("1 linear") && !table.contains("1 bvh"),
+        "{table}"
+    );
+    let text = works(folder.path(), "report none");
+    assert!(
+        text.contains("no items, no regions; nothing is ranked."),
+        "{text}"
+    );
+    assert!(
+        text.contains("| linear | - |") && text.contains("| bvh | - |"),
+        "{text}"
+    );
     all_refused(
         &folder,
-        &[resume],
-        "scene 'scene.csv' has changed | expected",
+        &["compare none none"],
+        "nothing can be judged: of 2 cells in common",
     );
-}
-
-#[test]
-fn cameras_that_change_between_stop_and_resume_are_noticed() {
-    let folder = with_good_files(&[]);
-    let of_file = "run --scene scene.csv --path cameras.csv --structure linear,bvh --out r";
-    works(folder.path(), of_file);
-    let spin = "run --scene scene.csv --path spin:frames=4 --structure linear,bvh --out s";
-    works(folder.path(), spin);
-    let more = "--path orbit:frames=4 --resume";
-    // The first has nothing left to do, and is refused all the same.
-    let commands = [
-        format!("{of_file} --resume --fovy 40"),
-        format!("{of_file} {more} --far 50"),
-    ];
+    let precision = "precision --scene none.csv --path outside:frames=1";
     all_refused(
         &folder,
-        &commands,
-        "path 'cameras.csv' has other cameras | expected",
+        &[precision],
+        "none.csv | no items | expected at least one",
     );
-    let commands = [format!("{spin} {more} --near 0.5")];
-    all_refused(
-        &folder,
-        &commands,
-        "path 'spin:frames=4' has other cameras | expected",
+    let table = works(
+        folder.path(),
+        &format!("run --scene one.csv --structure linear {run} one"),
     );
-    let cameras = folder.path().join("cameras.csv");
-    let before = fs::read(&cameras).expect("cameras");
-    fs::write(&cameras, format!("{EYE_LOOK}\n-9,0.5,0.5,0,0.5,0.25\n")).expect("writable");
-    let commands = [format!("{of_file} {more}")];
-    all_refused(
-        &folder,
-        &commands,
-        "path 'cameras.csv' has other cameras | expected",
-    );
-    fs::write(&cameras, before).expect("writable");
-    works(folder.path(), &format!("{of_file} {more}"));
-    // A report from before there was a digest is taken as it is.
-    let report = folder.path().join("s/report.json");
-    let mut old = json(&fs::read_to_string(&report).expect("a report"));
-    for cell in old["cells"].as_array_mut().expect("cells") {
-        cell["path"]
-            .as_object_mut()
-            .expect("a path")
-            .remove("digest");
-    }
-    fs::write(&report, old.to_string()).expect("writable");
-    works(folder.path(), &format!("{spin} {more}"));
+    assert!(table.contains("one.csv: 1 item, 1 region\n"), "{table}");
+    assert!(table.contains("\n1 cell in "), "{table}");
+    let compared = works(folder.path(), "compare one one");
+    assert!(compared.contains(", 1 cell\n"), "{compared}");
+    let verdict = "0 slower, 1 inconclusive, 0 faster, 0 same of 1 cell\n";
+    assert!(compared.ends_with(verdict), "{compared}");
 }

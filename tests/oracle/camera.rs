@@ -1,8 +1,9 @@
 //! Camera level: random cameras of every lens against planes derived here, by
 //! other formulas and with 640 bits.
 
-use cullbench::camera::Lens;
-use cullbench::geometry::Aabb;
+use cullbench::camera::{Camera, CameraError, Lens, Surroundings};
+use cullbench::culling::{Arithmetic, CameraView, Culling, CullingError, TESTS};
+use cullbench::geometry::{Aabb, sphere_cube};
 use cullbench::oracle::{Oracle, Pose, Verdict};
 use glam::DVec3;
 
@@ -145,6 +146,40 @@ fn minus(a: &Vector, b: &Vector) -> Vector {
     along(a, b, &Dyadic::from(-1.0))
 }
 
+/// The default culling and the one about the eye, with every test: what loses
+/// nothing. None where a view is refused because its sums could overflow.
+fn safe_views(pose: &Pose, lens: Lens, origin: DVec3, boxes: &[Aabb]) -> Vec<CameraView> {
+    let Ok(frame) = pose.frame() else {
+        return Vec::new();
+    };
+    let around = Surroundings {
+        origin,
+        reach: Aabb::union_of(boxes).reach(),
+    };
+    let mut views = Vec::new();
+    for arithmetic in [Arithmetic::F32, Arithmetic::F32Relative] {
+        for (test, ..) in TESTS {
+            let culling = Culling {
+                test,
+                arithmetic,
+                ..Culling::default()
+            };
+            if culling.check().is_err() {
+                continue;
+            }
+            match culling.view(&Camera { frame, lens }, &around) {
+                Ok(view) => views.push(view),
+                Err(CullingError::Camera(CameraError::Sums { .. })) => {}
+                Err(error) => {
+                    let size = frame.eye.abs().max_element() + lens.far().unwrap_or(0.0);
+                    assert!(size > 1e37, "{error}: {pose:?}, {lens:?}");
+                }
+            }
+        }
+    }
+    views
+}
+
 /// The planes moved outward by `2^exponent` of the magnitudes that meet at the
 /// box, inward if `inward`; to 400 bits.
 fn moved(planes: &[ExactPlane], b: &Aabb, exponent: i64, inward: bool) -> Vec<ExactPlane> {
@@ -182,12 +217,12 @@ fn lens(kind: usize, dice: &mut Dice) -> Lens {
     let near = dice.magnitude(-3.0, 3.0);
     let far = near * (1.0 + dice.magnitude(-3.0, 9.0));
     let aspect = match dice.below(3) {
-        0 => dice.magnitude(-4.0, 4.0),
+        0 => dice.magnitude(-8.0, 8.0),
         _ => dice.between(0.3, 3.0),
     };
     let fovy = match dice.below(6) {
-        0 => 1e-3,
-        1 => 179.99,
+        0 => dice.magnitude(-9.0, -3.0),
+        1 => 180.0 - dice.magnitude(-7.0, -2.0),
         2 => dice.magnitude(-3.0, 0.0),
         _ => dice.between(1.0, 175.0),
     };
@@ -231,7 +266,7 @@ fn pose(dice: &mut Dice) -> (Pose, DVec3) {
     };
     let offset = match dice.below(3) {
         0 => 0.0,
-        1 => dice.magnitude(0.0, 9.0),
+        1 => dice.magnitude(0.0, 15.0),
         _ => dice.magnitude(-3.0, 3.0),
     };
     let eye = direction(dice) * offset;
@@ -241,8 +276,17 @@ fn pose(dice: &mut Dice) -> (Pose, DVec3) {
     } else {
         DVec3::ZERO
     };
-    let forward = any(dice) * dice.magnitude(-30.0, 30.0);
-    let up = any(dice) * dice.magnitude(-5.0, 5.0);
+    let mut forward = any(dice) * dice.magnitude(-30.0, 30.0);
+    if dice.chance(0.2) {
+        // Look is the eye's neighbour, or nearly so.
+        forward = any(dice) * (offset * dice.magnitude(-15.5, -6.0));
+    }
+    let mut up = any(dice) * dice.magnitude(-5.0, 5.0);
+    if dice.chance(0.4) {
+        // All but parallel to the view.
+        up = forward.normalize() + any(dice) * dice.magnitude(-15.0, -6.0);
+        up *= if dice.chance(0.5) { 1.0 } else { -3.3e4 };
+    }
     let look = eye + forward;
     let pose = if dice.chance(0.5) && look != eye {
         Pose::LookAt { eye, look, up }
@@ -255,7 +299,7 @@ fn pose(dice: &mut Dice) -> (Pose, DVec3) {
 #[test]
 fn random_cameras_of_every_lens() {
     const BOXES: usize = 8;
-    let (mut verdicts, mut undecided) = ([0; 3], 0);
+    let (mut verdicts, mut undecided, mut views) = ([0; 3], 0, 0);
     for seed in 0..(cases(3000) / BOXES) as u64 {
         let mut dice = Dice::new(seed);
         let kind = seed as usize % LENSES.len();
@@ -266,6 +310,8 @@ fn random_cameras_of_every_lens() {
         };
         let view = View::new(&pose, lens, origin);
         let planes = view.planes();
+        let mut boxes = Vec::with_capacity(BOXES);
+        let mut seen = Vec::with_capacity(BOXES);
         for _ in 0..BOXES {
             let (a, b) = (view.point(&mut dice), view.point(&mut dice));
             let share = if dice.chance(0.15) {
@@ -279,6 +325,8 @@ fn random_cameras_of_every_lens() {
                 continue;
             }
             let found = oracle.judge(&b);
+            let wide = oracle.judge_wide(b.min.as_dvec3(), b.max.as_dvec3());
+            assert_eq!(wide, found, "the same box, by other products");
             let name = || {
                 format!(
                     "seed {seed} ({}): {found:?} for {b:?}, {pose:?}, {lens:?}",
@@ -299,8 +347,26 @@ fn random_cameras_of_every_lens() {
                 undecided += 1;
             }
             verdicts[found.verdict as usize] += 1;
+            boxes.push(b);
+            seen.push(found.verdict != Verdict::Out);
+        }
+        for made in safe_views(&pose, lens, origin, &boxes) {
+            views += 1;
+            for (b, seen) in boxes.iter().zip(&seen) {
+                let cube = sphere_cube(b);
+                let b = match made {
+                    CameraView::Spheres(_) => &cube,
+                    _ => b,
+                };
+                let kept = made.as_any().sees(b);
+                assert!(
+                    kept || !seen,
+                    "seed {seed}: {b:?}, {pose:?}, {lens:?}, {made:?}"
+                );
+            }
         }
     }
+    assert!(views > 4 * cases(3000) / BOXES, "{views} views");
     println!("random cameras: {verdicts:?}, {undecided} undecided");
     let all: usize = verdicts.iter().sum();
     assert!(
@@ -334,4 +400,103 @@ fn impossible_cameras_have_no_oracle() {
         up: DVec3::Z,
     };
     assert!(Oracle::of_camera(&pose, &unchecked, DVec3::ZERO).is_none());
+}
+
+#[test]
+fn an_up_all_but_parallel_to_the_view_loses_nothing() {
+    let lens = Lens::perspective(60.0, 1.5, 0.5, Some(200.0)).expect("a lens");
+    let eye = DVec3::new(0.1, 0.7, -0.3);
+    let look = eye + 0.937 * DVec3::new(1.1, 2.3, 0.7);
+    let across = DVec3::new(2.3, -1.1, 0.0).normalize();
+    let mut lost_of_rounded = Vec::new();
+    for angle in [1e-9, 1e-11, 1e-14] {
+        let up = look - eye + across * (angle * (look - eye).length());
+        let pose = Pose::LookAt { eye, look, up };
+        let view = View::new(&pose, lens, DVec3::ZERO);
+        let vec = |v: &Vector| DVec3::from_array([0, 1, 2].map(|k| v[k].to_f64()));
+        let (right, up_axis, forward) = (vec(&view.right), vec(&view.up), vec(&view.forward));
+        let [left, _, bottom, top] = view.window().map(|edge| edge.to_f64());
+        // A hair within the left side, as near as f32 has it.
+        let points: Vec<Aabb> = (1..1000)
+            .map(|i| {
+                let (depth, share) = (f64::from(i) * 0.199 + 0.5, f64::from(i % 7) / 8.0 + 0.06);
+                let upward = bottom + (top - bottom) * share;
+                let lean = right * (left * (1.0 - 1e-9)) + up_axis * upward + forward;
+                let p = (eye + lean * depth).as_vec3();
+                Aabb::new(p, p)
+            })
+            .collect();
+        let oracle = Oracle::of_camera(&pose, &lens, DVec3::ZERO).expect("a camera");
+        let planes = view.planes();
+        let visible: Vec<&Aabb> = points
+            .iter()
+            .filter(|b| oracle.verdict(b) == Verdict::In)
+            .collect();
+        assert!(visible.len() > 300, "{}", visible.len());
+        for b in visible.iter().step_by(50) {
+            assert_eq!(robust(&planes, b, -140), Some(Verdict::In), "{b:?}");
+        }
+        for made in safe_views(&pose, lens, DVec3::ZERO, &points) {
+            let sees = |b: &Aabb| match made {
+                CameraView::Spheres(_) => made.as_any().sees(&sphere_cube(b)),
+                _ => made.as_any().sees(b),
+            };
+            let lost = visible.iter().filter(|b| !sees(b)).count();
+            assert_eq!(lost, 0, "at {angle:e}: {made:?}");
+        }
+        // What a difference that is rounded first makes of the same numbers.
+        let rounded = Pose::Forward {
+            eye,
+            forward: look - eye,
+            up,
+        };
+        let rounded = &safe_views(&rounded, lens, DVec3::ZERO, &points)[1];
+        let lost = visible.iter().filter(|b| !rounded.as_any().sees(b));
+        lost_of_rounded.push(lost.count());
+    }
+    assert!(
+        lost_of_rounded[1] > 0 && lost_of_rounded[2] > 100,
+        "{lost_of_rounded:?}"
+    );
+}
+
+#[test]
+fn sums_that_overflow_are_refused_and_would_have_lost_something() {
+    let pose = Pose::Forward {
+        eye: DVec3::ZERO,
+        forward: DVec3::new(0.65, 0.65, -0.39),
+        up: DVec3::Z,
+    };
+    for (size, fits) in [(6e37, true), (3e38, false)] {
+        let lens = Lens::perspective(150.0, 1.5, 1.0, Some(size)).expect("a lens");
+        let frame = pose.frame().expect("a frame");
+        let camera = Camera { frame, lens };
+        let p = DVec3::splat(size).as_vec3();
+        let corner = Aabb::new(p, p);
+        let oracle = Oracle::of_camera(&pose, &lens, DVec3::ZERO).expect("a camera");
+        assert_eq!(oracle.verdict(&corner), Verdict::In);
+        let told = |reach| Surroundings {
+            origin: DVec3::ZERO,
+            reach,
+        };
+        let volume = camera.volume(&Default::default(), &told(p));
+        let relative = camera.relative_volume(8.0, &told(p));
+        if fits {
+            assert!(volume.is_ok_and(|volume| volume.sees(&corner)));
+            assert!(relative.is_ok_and(|v| v.planes().sees(&v.moved(&corner))));
+            continue;
+        }
+        for error in [volume.map(|_| ()), relative.map(|_| ())] {
+            let error = error.expect_err("a refusal");
+            assert!(matches!(error, CameraError::Sums { .. }), "{error}");
+            let line = error.to_string();
+            assert!(line.contains("e38") && line.contains("expected") && !line.contains('\n'));
+        }
+        // Of the far plane x and y alone are beyond f32; z would bring it back.
+        let wide = camera.wide_volume(&told(p)).expect("planes in f64");
+        assert!(wide.planes().iter().all(|plane| !plane.excludes(&corner)));
+        let narrow = wide.planes().iter().map(|plane| plane.narrow());
+        let mut narrow = narrow.filter(|plane| plane.excludes(&corner));
+        assert!(narrow.next().is_some(), "the premise");
+    }
 }

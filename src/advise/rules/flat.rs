@@ -11,7 +11,8 @@ use crate::geometry::Aabb;
 pub(super) const NAME: &str = "third-dimension";
 
 pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> {
-    let (octree, quadtree) = (named("octree")?, named("quadtree")?);
+    let by = case.spec.execution;
+    let (octree, quadtree) = (named("octree", by)?, named("quadtree", by)?);
     let leaf = quadtree.params["leaf"].as_f64().unwrap_or(f64::NAN);
     let scene = case.scene();
     let [height, widths @ ..] = sorted_extents(&scene.bounds);

@@ -12,6 +12,8 @@ mod rebasing;
 mod rebuild;
 mod six_planes;
 
+pub(super) use six_planes::follow as follow_test;
+
 use super::AdviseError;
 use super::case::Case;
 use super::omission::Draft;

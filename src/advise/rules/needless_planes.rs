@@ -10,6 +10,7 @@ use crate::culling::CameraView;
 use crate::geometry::{Aabb, ConvexVolume, FrustumPlane};
 use crate::index::DynIndex;
 use crate::query::View;
+use crate::shown::counted;
 
 pub(super) const NAME: &str = "needless-planes";
 
@@ -37,7 +38,9 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
     let share = needless as f64 / all.max(1) as f64;
     let cameras = case.workload.views.len();
     let omission = omission.compares(share, THRESHOLD).because(format!(
-        "the whole scene is inside of {needless} of {all} planes, and of the far plane for {far} of {cameras} cameras"
+        "the whole scene is inside of {needless} of {}, and of the far plane for {far} of {}",
+        counted(all, "plane"),
+        counted(cameras, "camera")
     ));
     let fewer = Rc::new(fewer);
     let scan: Rc<dyn DynIndex> = Rc::from(case.scan.build(&case.scene().items)?);

@@ -8,7 +8,6 @@ use super::super::omission::{By, Draft, Forced, LeftOutIf, Omission, Way};
 use crate::geometry::Aabb;
 use crate::index::StructureSpec;
 use crate::measure::{Competitor, Protocol, paired_ratio, timed_rounds};
-use std::time::Duration;
 
 pub(super) const NAME: &str = "no-index";
 
@@ -65,10 +64,8 @@ fn crossover(
 ) -> Result<Vec<(usize, f64)>, AdviseError> {
     let items = &case.scene().items;
     let protocol = Protocol {
-        min_rounds: 5,
-        max_rounds: 9,
-        budget: Duration::from_millis(150),
-        pass: Duration::from_millis(20),
+        rounds: [5, 9],
+        task_ns: 75e6,
         ..case.protocol
     };
     let mut parts = Vec::new();
@@ -104,7 +101,7 @@ fn ratio_on(
             expected: counts.collect(),
             ask: Box::new(move |n, out| index.see(views[n].as_any(), out)),
             ask_many: None,
-            slowest: Duration::ZERO,
+            least_ns: None,
         });
     }
     let count = case.workload.views.len();

@@ -29,6 +29,7 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
         By::Time,
     );
     let scene = case.scene();
+    let kernel = case.spec.execution.kernel;
     let tree = Wide::build(&scene.items, scene.own_tree.as_ref(), &Default::default())?;
     let tree = Rc::new(tree);
     let volumes: Rc<Vec<ConvexVolume>> = Rc::new(case.volumes().cloned().collect());
@@ -37,9 +38,9 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
     let mut out = Vec::new();
     for volume in volumes.iter().step_by(step) {
         out.clear();
-        see(&tree, volume, &mut out, &mut with);
+        see(kernel, &tree, volume, &mut out, &mut with);
         out.clear();
-        see(&tree, &Unmasked(volume), &mut out, &mut without);
+        see(kernel, &tree, &Unmasked(volume), &mut out, &mut without);
     }
     let [fewer, all] = [with, without].map(|cost| cost.planes_tested);
     let omission = match all {
@@ -50,12 +51,18 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
     };
     let other = (tree.clone(), volumes.clone());
     let forced = Forced {
-        on: Wide::NAME.to_owned(),
+        on: Wide::INFO.name.to_owned(),
         kept: Way::Other(Box::new(move |n, out| {
-            see(&other.0, &Unmasked(&other.1[n]), out, &mut NoRecorder);
+            see(
+                kernel,
+                &other.0,
+                &Unmasked(&other.1[n]),
+                out,
+                &mut NoRecorder,
+            );
         })),
         left_out: Way::Other(Box::new(move |n, out| {
-            see(&tree, &volumes[n], out, &mut NoRecorder);
+            see(kernel, &tree, &volumes[n], out, &mut NoRecorder);
         })),
         same: true,
         judged: true,
@@ -63,7 +70,7 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
     Ok(omission.draft(vec![forced]))
 }
 
-/// A query with a view of one's own, by the chosen kernel.
+/// A query with a view of one's own, by a kernel.
 struct See<'a, V, R> {
     tree: &'a Wide,
     view: &'a V,
@@ -83,8 +90,14 @@ impl<V: View, R: Recorder> Work for See<'_, V, R> {
     }
 }
 
-fn see<V: View, R: Recorder>(tree: &Wide, view: &V, out: &mut Vec<ItemId>, recorder: &mut R) {
-    Kernel::chosen().run(See {
+fn see<V: View, R: Recorder>(
+    kernel: Kernel,
+    tree: &Wide,
+    view: &V,
+    out: &mut Vec<ItemId>,
+    recorder: &mut R,
+) {
+    kernel.run(See {
         tree,
         view,
         out,
@@ -186,8 +199,14 @@ mod tests {
         let ask = |masked: bool| {
             let (mut out, mut cost) = (Vec::new(), QueryCost::default());
             match masked {
-                true => see(&tree, &volume, &mut out, &mut cost),
-                false => see(&tree, &Unmasked(&volume), &mut out, &mut cost),
+                true => see(Kernel::best(), &tree, &volume, &mut out, &mut cost),
+                false => see(
+                    Kernel::best(),
+                    &tree,
+                    &Unmasked(&volume),
+                    &mut out,
+                    &mut cost,
+                ),
             }
             out.sort_unstable();
             (out, cost.planes_tested, cost.subtrees_accepted)

@@ -4,7 +4,8 @@
 
 use super::super::AdviseError;
 use super::super::case::{Case, asked};
-use super::super::omission::{By, Draft, Forced, LeftOutIf, Omission, Way};
+use super::super::choice::TestChoice;
+use super::super::omission::{By, Decision, Draft, Forced, LeftOutIf, Omission, Way};
 use crate::culling::{Culling, CullingTest};
 
 pub(super) const NAME: &str = "six-planes";
@@ -60,6 +61,31 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
     }))
 }
 
+/// The test that is taken has these axes or has not: one decision, said once.
+/// The rule's own side is then what it predicted.
+pub(in crate::advise) fn follow(omission: &mut Omission, choice: &TestChoice) {
+    let applies = omission.rule == NAME && omission.decision != Decision::NotApplicable;
+    let Some(taken) = choice.name.filter(|_| applies) else {
+        return;
+    };
+    let with_axes = |name: &str| {
+        let tests = [CullingTest::SixBox, CullingTest::Exact];
+        tests.iter().any(|test| test.name() == name)
+    };
+    let kept = with_axes(taken);
+    let is_tie = choice.ties.iter().any(|name| with_axes(name) != kept);
+    omission.decision = match kept {
+        true => Decision::Keep,
+        false => Decision::LeaveOut,
+    };
+    let predicted = omission.predicted.filter(|_| !is_tie);
+    omission.confirmed = predicted.map(|left_out| left_out != kept);
+    omission.reason += &match is_tie {
+        true => format!("; a tie, {taken} is the simplest"),
+        false => format!("; {taken} is the test taken"),
+    };
+}
+
 /// `4 (s/D)^2` for the mean square of the items' edges s and the mean depth D
 /// of the views: docs/NUMERICS.md.
 fn predicted_excess(case: &Case) -> f64 {
@@ -71,4 +97,43 @@ fn predicted_excess(case: &Case) -> f64 {
     let cameras = case.workload.cameras.len();
     let depth = (0..cameras).map(|frame| case.depth(frame)).sum::<f64>() / cameras as f64;
     4.0 * square / (depth * depth)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_test_taken_decides_about_the_axes() {
+        let tests = ["six-plane", "six-box", "exact", "sphere"];
+        for predicted in [true, false] {
+            for (taken, ties, decision, confirmed) in [
+                (tests[0], vec![], Decision::LeaveOut, Some(predicted)),
+                (tests[3], vec![], Decision::LeaveOut, Some(predicted)),
+                (tests[1], vec![], Decision::Keep, Some(!predicted)),
+                (tests[2], vec![tests[1]], Decision::Keep, Some(!predicted)),
+                (tests[0], vec![tests[2]], Decision::LeaveOut, None),
+                (tests[1], vec![tests[3]], Decision::Keep, None),
+            ] {
+                let rule = Omission::new(NAME, "x", "y", LeftOutIf::AtMost, By::Rule);
+                let rule = rule.compares(if predicted { 0.5 } else { 2.0 }, 1.0);
+                let mut omission = rule.draft(Vec::new()).settled(Vec::new(), 0.0);
+                let mut choice = TestChoice {
+                    name: Some(taken),
+                    ties,
+                    structure: "wide".to_owned(),
+                    rows: Vec::new(),
+                };
+                follow(&mut omission, &choice);
+                let found = (omission.decision, omission.confirmed);
+                assert_eq!(found, (decision, confirmed), "{taken} {:?}", choice.ties);
+                assert!(omission.reason.contains(taken), "{}", omission.reason);
+                // Nothing could be judged: the rule decides.
+                choice.name = None;
+                let before = omission.decision;
+                follow(&mut omission, &choice);
+                assert_eq!(omission.decision, before);
+            }
+        }
+    }
 }

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::{BoxTest, Item, PeerParams, Tally, indexable, located_box_by_box, seen_box_by_box};
 use crate::geometry::{Aabb, PlaneTree};
-use crate::index::{BuildError, MemoryUsage, RegionIndex};
+use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin, RegionIndex};
 use crate::query::{Recorder, Sink};
 
 /// What the system reads and writes of an entity.
@@ -56,9 +56,12 @@ impl PeerBevyStyle {
 }
 
 impl RegionIndex for PeerBevyStyle {
-    const NAME: &'static str = "peer-bevy-style";
-    const SUMMARY: &'static str =
-        "a stand-in for Bevy's visibility system: flags and bounds of every entity, one by one";
+    const INFO: Info = Info::new(
+        "peer-bevy-style",
+        "a stand-in for Bevy's visibility system: flags and bounds of every entity, one by one",
+        Kind::Scan,
+        Origin::StandIn("Bevy"),
+    );
     type Params = PeerParams;
 
     fn build(items: &[Aabb], _: Option<&PlaneTree>, _: &PeerParams) -> Result<Self, BuildError> {

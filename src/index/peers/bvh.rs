@@ -12,7 +12,7 @@ use nalgebra::Point3;
 
 use super::{BoxTest, Item, PeerParams, Tally, indexable, located_box_by_box, seen_box_by_box};
 use crate::geometry::{Aabb, PlaneTree};
-use crate::index::{BuildError, MemoryUsage, RegionIndex};
+use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin, RegionIndex};
 use crate::query::{Recorder, Sink};
 
 /// An item that the crate tells where it put it.
@@ -158,8 +158,7 @@ macro_rules! peer {
         }
 
         impl RegionIndex for $peer {
-            const NAME: &'static str = $name;
-            const SUMMARY: &'static str = $summary;
+            const INFO: Info = Info::new($name, $summary, Kind::Tree, Origin::Crate("bvh"));
             type Params = PeerParams;
 
             fn build(

@@ -13,7 +13,7 @@ use super::{
     seen_box_by_box,
 };
 use crate::geometry::{Aabb, PlaneTree};
-use crate::index::{BuildError, MemoryUsage, RegionIndex};
+use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin, RegionIndex};
 use crate::query::{Recorder, Sink};
 
 thread_local! {
@@ -45,8 +45,9 @@ impl BoundingVolume for Volume {
 }
 
 /// Insertion recurses; deeper than this it would overflow the stack of a
-/// thread before long, and has been quadratic for a while.
-const DEEPEST: u32 = 4096;
+/// thread before long, and in a build without optimisation before 4096 levels;
+/// it has been quadratic for a while.
+const DEEPEST: u32 = 1024;
 /// Merges on each level of an insertion: one a side and one on the way back.
 const MERGES_A_LEVEL: u32 = 3;
 
@@ -100,9 +101,12 @@ fn greatest_common_divisor(a: u64, b: u64) -> u64 {
 }
 
 impl RegionIndex for PeerBvhArena {
-    const NAME: &'static str = "peer-bvh-arena";
-    const SUMMARY: &'static str =
-        "crate bvh-arena, insertion only, asked for what overlaps the view's bounds";
+    const INFO: Info = Info::new(
+        "peer-bvh-arena",
+        "crate bvh-arena, insertion only, asked for what overlaps the view's bounds",
+        Kind::Tree,
+        Origin::Crate("bvh-arena"),
+    );
     type Params = PeerParams;
 
     fn build(items: &[Aabb], _: Option<&PlaneTree>, _: &PeerParams) -> Result<Self, BuildError> {
@@ -114,7 +118,7 @@ impl RegionIndex for PeerBvhArena {
             tree.insert(item, Volume(item.bounds));
             if MERGES.get() > DEEPEST * MERGES_A_LEVEL {
                 return Err(BuildError::Refused {
-                    structure: Self::NAME,
+                    structure: Self::INFO.name,
                     reason: format!(
                         "insertion has become a list of {DEEPEST} levels: too many items share \
                          their place"

@@ -12,7 +12,7 @@ use super::{
     seen_box_by_box,
 };
 use crate::geometry::{Aabb, PlaneTree};
-use crate::index::{BuildError, MemoryUsage, RegionIndex};
+use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin, RegionIndex};
 use crate::query::{Recorder, Sink};
 
 /// Centres in a tree, items beside it.
@@ -68,9 +68,12 @@ impl PeerKiddo {
 }
 
 impl RegionIndex for PeerKiddo {
-    const NAME: &'static str = "peer-kiddo";
-    const SUMMARY: &'static str =
-        "crate kiddo, a k-d tree of the boxes' centres, asked for those within reach";
+    const INFO: Info = Info::new(
+        "peer-kiddo",
+        "crate kiddo, a k-d tree of the boxes' centres, asked for those within reach",
+        Kind::Tree,
+        Origin::Crate("kiddo"),
+    );
     type Params = PeerParams;
 
     fn build(items: &[Aabb], _: Option<&PlaneTree>, _: &PeerParams) -> Result<Self, BuildError> {
@@ -83,7 +86,7 @@ impl RegionIndex for PeerKiddo {
             true => None,
             false => Some(ImmutableKdTree::new_from_slice(&centres).map_err(|error| {
                 BuildError::Refused {
-                    structure: Self::NAME,
+                    structure: Self::INFO.name,
                     reason: error.to_string(),
                 }
             })?),

@@ -18,7 +18,7 @@ use super::{
 };
 use crate::geometry::{Aabb, PlaneTree};
 use crate::index::stack::Stack;
-use crate::index::{BuildError, MemoryUsage, RegionIndex};
+use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin, RegionIndex};
 use crate::query::{ItemId, Recorder, Sink};
 
 /// A tree of obvhs with the items in the order of its primitives.
@@ -195,8 +195,7 @@ macro_rules! peer {
         }
 
         impl RegionIndex for $peer {
-            const NAME: &'static str = $name;
-            const SUMMARY: &'static str = $summary;
+            const INFO: Info = Info::new($name, $summary, Kind::Tree, Origin::Crate("obvhs"));
             type Params = PeerParams;
 
             fn build(
@@ -204,7 +203,7 @@ macro_rules! peer {
                 _: Option<&PlaneTree>,
                 _: &PeerParams,
             ) -> Result<Self, BuildError> {
-                Tree::build(Self::NAME, items, $params).map($peer)
+                Tree::build(Self::INFO.name, items, $params).map($peer)
             }
 
             fn memory(&self) -> MemoryUsage {

@@ -12,7 +12,7 @@ use super::{
     BoxTest, PeerParams, Tally, indexable, located_box_by_box, refuse_stacks, seen_box_by_box,
 };
 use crate::geometry::{Aabb, PlaneTree};
-use crate::index::{BuildError, MemoryUsage, RegionIndex};
+use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin, RegionIndex};
 use crate::query::{ItemId, Recorder, Sink};
 
 /// A box of this reach has an area that is still a number in f32.
@@ -164,8 +164,7 @@ macro_rules! peer {
         }
 
         impl RegionIndex for $peer {
-            const NAME: &'static str = $name;
-            const SUMMARY: &'static str = $summary;
+            const INFO: Info = Info::new($name, $summary, Kind::Tree, Origin::Crate("parry3d"));
             type Params = PeerParams;
 
             fn build(
@@ -173,7 +172,7 @@ macro_rules! peer {
                 _: Option<&PlaneTree>,
                 _: &PeerParams,
             ) -> Result<Self, BuildError> {
-                Tree::build(Self::NAME, items, BvhBuildStrategy::$strategy).map($peer)
+                Tree::build(Self::INFO.name, items, BvhBuildStrategy::$strategy).map($peer)
             }
 
             fn memory(&self) -> MemoryUsage {

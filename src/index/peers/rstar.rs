@@ -8,7 +8,7 @@ use rstar::{AABB, ParentNode, RTree, RTreeNode, RTreeObject, SelectionFunction};
 
 use super::{BoxTest, Item, PeerParams, Tally, indexable, located_box_by_box, seen_box_by_box};
 use crate::geometry::{Aabb, PlaneTree};
-use crate::index::{BuildError, MemoryUsage, RegionIndex};
+use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin, RegionIndex};
 use crate::query::{Recorder, Sink};
 
 impl RTreeObject for Item {
@@ -147,8 +147,7 @@ macro_rules! peer {
         }
 
         impl RegionIndex for $peer {
-            const NAME: &'static str = $name;
-            const SUMMARY: &'static str = $summary;
+            const INFO: Info = Info::new($name, $summary, Kind::Tree, Origin::Crate("rstar"));
             type Params = PeerParams;
 
             fn build(

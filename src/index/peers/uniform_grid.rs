@@ -12,7 +12,7 @@ use super::{
     seen_box_by_box,
 };
 use crate::geometry::{Aabb, PlaneTree};
-use crate::index::{BuildError, MemoryUsage, RegionIndex};
+use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin, RegionIndex};
 use crate::query::{ItemId, Recorder, Sink};
 
 /// Items of a cell, on average.
@@ -156,9 +156,12 @@ impl PeerUniformGrid {
 }
 
 impl RegionIndex for PeerUniformGrid {
-    const NAME: &'static str = "uniform-grid";
-    const SUMMARY: &'static str =
-        "a uniform grid of our own: items in the cell of their centre, exact cell bounds";
+    const INFO: Info = Info::new(
+        "uniform-grid",
+        "a uniform grid of our own: items in the cell of their centre, exact cell bounds",
+        Kind::Grid,
+        Origin::Ours,
+    );
     type Params = PeerParams;
 
     fn build(items: &[Aabb], _: Option<&PlaneTree>, _: &PeerParams) -> Result<Self, BuildError> {

@@ -54,8 +54,18 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = &[
     },
     CameraFamily {
         name: "fov",
-        summary: "vertical field of view from 1e-3 to 179.99 degrees",
-        variants: &[1e-3, 0.1, 1.0, 90.0, 170.0, 179.0, 179.99],
+        summary: "vertical field of view from 1e-9 to 179.9999999 degrees",
+        variants: &[
+            1e-9,
+            1e-6,
+            1e-3,
+            1.0,
+            90.0,
+            170.0,
+            179.99,
+            179.99999,
+            179.9999999,
+        ],
         label: plain,
         setup: |dice, fov| {
             let mut draft = Draft::any(dice);
@@ -65,8 +75,8 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = &[
     },
     CameraFamily {
         name: "aspect",
-        summary: "width / height from 1e-4 to 1e4",
-        variants: &[1e-4, 1e-2, 1e2, 1e4],
+        summary: "width / height from 1e-8 to 1e8",
+        variants: &[1e-8, 1e-4, 1e-2, 1e2, 1e4, 1e8],
         label: plain,
         setup: |dice, aspect| {
             let mut draft = Draft::any(dice);
@@ -76,8 +86,8 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = &[
     },
     CameraFamily {
         name: "offset",
-        summary: "a camera 1e4 to 1e9 depths of 1 away from the scene's zero",
-        variants: &[1e4, 1e5, 1e6, 1e7, 1e8, 1e9],
+        summary: "a camera 1e4 to 1e15 depths of 1 away from the scene's zero",
+        variants: &[1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e12, 1e15],
         label: plain,
         setup: |dice, offset| {
             let mut draft = Draft::any(dice);
@@ -88,7 +98,7 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = &[
     CameraFamily {
         name: "rebased",
         summary: "the same in coordinates about a point near the camera",
-        variants: &[1e4, 1e5, 1e6, 1e7, 1e8, 1e9],
+        variants: &[1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e12, 1e15],
         label: plain,
         setup: |dice, offset| {
             let mut draft = Draft::any(dice);
@@ -98,9 +108,61 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = &[
         },
     },
     CameraFamily {
+        name: "condition",
+        summary: "up within 1e-6 to 1e-15 rad of the direction of view",
+        variants: &[1e-6, 1e-9, 1e-11, 1e-13, 1e-14, 1e-15],
+        label: plain,
+        setup: |dice, angle| {
+            let mut draft = Draft::any(dice);
+            draft.to_look = dice.below(2) == 0;
+            let (forward, across) = (draft.forward, draft.up);
+            loop {
+                // Along the view as f64 has it, and hardly away from it.
+                let length = libm::exp2(dice.between(-4.0, 4.0));
+                let across = across * (angle * forward.length() / across.length());
+                draft.up = (forward + across * dice.between(0.9, 1.5)) * length;
+                if draft.pose().frame().is_ok() {
+                    break draft.perspective();
+                }
+            }
+        },
+    },
+    CameraFamily {
+        name: "near-look",
+        summary: "eye and look 1e-6 to 1e-15 of their coordinates apart",
+        variants: &[1e-6, 1e-9, 1e-12, 1e-15],
+        label: plain,
+        setup: |dice, share| loop {
+            let mut draft = Draft::any(dice);
+            draft.to_look = true;
+            let size = draft.eye.abs().max_element();
+            draft.forward *= 4.0 * share * size / draft.forward.length();
+            if draft.pose().frame().is_ok() {
+                break draft.perspective();
+            }
+        },
+    },
+    CameraFamily {
+        name: "shell",
+        summary: "a volume about zero, seen from 1e3 to 1e15 depths away",
+        variants: &[1e3, 1e6, 1e9, 1e12, 1e15],
+        label: plain,
+        setup: |dice, distance| {
+            let mut draft = Draft::any(dice);
+            let half = draft.far.unwrap_or(1.0) / 2.0;
+            let distance = distance * half;
+            draft.eye = draft.forward.normalize() * -distance;
+            draft.fovy_deg = (half / distance).to_degrees();
+            (draft.near, draft.far) = (distance - half, Some(distance + half));
+            draft.perspective()
+        },
+    },
+    CameraFamily {
         name: "scale",
-        summary: "the whole scene scaled by 2^-140 to 2^120",
-        variants: &[-140.0, -126.0, -100.0, -60.0, 60.0, 100.0, 120.0],
+        summary: "the whole scene scaled by 2^-148 to 2^127; what may overflow may be refused",
+        variants: &[
+            -148.0, -140.0, -126.0, -100.0, -60.0, 60.0, 100.0, 120.0, 122.0, 124.0, 127.0,
+        ],
         label: |power| format!("2^{power}"),
         setup: |dice, power| {
             let mut draft = Draft::any(dice);
@@ -185,6 +247,8 @@ struct Draft {
     origin: DVec3,
     planes: PlaneOptions,
     shapes: Shapes,
+    /// Whether the pose names a point to look at.
+    to_look: bool,
 }
 
 impl Draft {
@@ -212,6 +276,7 @@ impl Draft {
             origin: DVec3::ZERO,
             planes: PlaneOptions::default(),
             shapes: Shapes::Mixed,
+            to_look: false,
         }
     }
 
@@ -233,14 +298,19 @@ impl Draft {
         self.far = self.far.map(|far| far * factor);
     }
 
+    fn pose(&self) -> Pose {
+        let (eye, forward, up) = (self.eye, self.forward, self.up);
+        if self.to_look {
+            let look = eye + forward;
+            Pose::LookAt { eye, look, up }
+        } else {
+            Pose::Forward { eye, forward, up }
+        }
+    }
+
     fn with(self, lens: Lens) -> Setup {
-        let pose = Pose::Forward {
-            eye: self.eye,
-            forward: self.forward,
-            up: self.up,
-        };
         Setup {
-            pose,
+            pose: self.pose(),
             lens,
             origin: self.origin,
             planes: self.planes,

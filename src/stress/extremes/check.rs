@@ -4,14 +4,14 @@
 
 use glam::DVec3;
 
-use crate::camera::{Camera, PlaneMethod, PlaneOptions, Surroundings};
-use crate::culling::{ARITHMETICS, Arithmetic, Culling, CullingTest, TESTS};
+use crate::camera::{Camera, CameraError, PlaneMethod, PlaneOptions, Surroundings};
+use crate::culling::{ARITHMETICS, Arithmetic, Culling, CullingError, CullingTest, TESTS};
 use crate::geometry::Aabb;
-use crate::index::{DynIndex, StructureSpec, caught};
+use crate::index::{DynIndex, StructureSpec};
 use crate::oracle::{Judgement, Oracle, Pose, Verdict};
 use crate::query::{AnyView, ItemId};
 use crate::stress::slack;
-use crate::verify::Reference;
+use crate::verify::{self, Trial};
 
 /// The rows of the scalar loop have this in place of a structure.
 pub const SCALAR: &str = "scalar";
@@ -51,6 +51,8 @@ pub struct Tally {
     pub undecided: u64,
     pub false_negatives: u64,
     pub touch_dropped: u64,
+    /// Views that were refused because their sums could overflow.
+    pub refused: u64,
     /// What the six planes would lose without their epsilon.
     pub lost_bare: u64,
 }
@@ -63,6 +65,7 @@ impl std::ops::AddAssign for Tally {
         self.undecided += other.undecided;
         self.false_negatives += other.false_negatives;
         self.touch_dropped += other.touch_dropped;
+        self.refused += other.refused;
         self.lost_bare += other.lost_bare;
     }
 }
@@ -161,6 +164,15 @@ impl Case {
                 };
                 let view = match culling.view(&self.camera, &self.around) {
                     Ok(view) => view,
+                    // Declared: what could overflow is refused in one line.
+                    Err(CullingError::Camera(CameraError::Sums { .. })) => {
+                        found.tally.refused += 1;
+                        continue;
+                    }
+                    Err(CullingError::Camera(CameraError::Volume(_))) if self.size() > HUGE => {
+                        found.tally.refused += 1;
+                        continue;
+                    }
                     Err(error) => {
                         found.fault(SCALAR, &name, None, "a view", error.to_string());
                         continue;
@@ -313,6 +325,9 @@ impl Case {
 /// and the test itself rounds seven times: 2^-48 is twice all of that.
 const F64_MARGIN: f64 = 1.0 / (1u64 << 48) as f64;
 
+/// Planes of volumes this large may not fit f32.
+const HUGE: f64 = 1e38;
+
 /// Every structure must return exactly what the scalar loop does.
 fn ask(
     built: &[(&str, Box<dyn DynIndex>)],
@@ -322,28 +337,39 @@ fn ask(
     items: &[Aabb],
     found: &mut Findings,
 ) {
-    let mut reference = Reference::new(seen.len());
+    let mut trial = Trial::new(seen.len());
     let wanted = seen.iter().zip(0..).filter(|(seen, _)| **seen);
-    let count = reference.expect(wanted.map(|(_, id): (_, ItemId)| id));
-    let mut answer = Vec::new();
+    trial.expect(wanted.map(|(_, id): (_, ItemId)| id));
     for (structure, index) in built {
-        found.asked.push(((*structure).to_owned(), name.to_owned()));
-        answer.clear();
-        if let Err(text) = caught(|| index.see(view, &mut answer)) {
-            found.panicked(structure, name, &text);
-            continue;
-        }
-        let difference = reference.compare(&answer);
-        if !difference.is_none() {
-            let item = difference.first.map(|id| id as usize);
-            let known = item.filter(|&item| item < items.len());
-            let expected = format!("the {count} items of the scalar loop");
-            found.fault(structure, name, known, &expected, difference.to_string());
-        }
+        found.tried(&mut trial, structure, name, items.len(), |out| {
+            index.see(view, out);
+        });
     }
 }
 
 impl Findings {
+    /// Puts a question of the scalar loop to a structure.
+    pub fn tried(
+        &mut self,
+        trial: &mut Trial,
+        structure: &str,
+        test: &str,
+        items: usize,
+        ask: impl FnOnce(&mut Vec<ItemId>),
+    ) {
+        self.asked.push((structure.to_owned(), test.to_owned()));
+        match trial.ask(ask).map(drop) {
+            Ok(()) => {}
+            Err(verify::Fault::Panicked(text)) => self.panicked(structure, test, &text),
+            Err(verify::Fault::Differs(difference)) => {
+                let item = difference.first.map(|id| id as usize);
+                let known = item.filter(|&item| item < items);
+                let expected = format!("the {} items of the scalar loop", trial.expected());
+                self.fault(structure, test, known, &expected, difference.to_string());
+            }
+        }
+    }
+
     /// A structure ended in place of answering.
     pub fn panicked(&mut self, structure: &str, test: &str, text: &str) {
         self.fault(

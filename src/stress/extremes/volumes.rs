@@ -8,11 +8,11 @@ use super::check::{Findings, SCALAR};
 use crate::geometry::{
     Aabb, ConvexVolume, Plane, RelativeVolume, Spheres, WideVolume, sphere_cube,
 };
-use crate::index::{StructureSpec, caught};
+use crate::index::StructureSpec;
 use crate::oracle::{Oracle, Verdict};
 use crate::query::{AnyView, ItemId};
 use crate::scene::{Dice, Regions};
-use crate::verify::{RandomCase, Reference, VOLUME_KINDS, explain_visibility};
+use crate::verify::{RandomCase, Trial, VOLUME_KINDS, explain_visibility};
 
 /// A volume and boxes, at planes level.
 pub struct PlanesCase {
@@ -121,8 +121,7 @@ impl PlanesCase {
         if let Ok(relative) = &relative {
             views.push(("six-plane f32-relative", relative.into(), &self.items));
         }
-        let mut reference = Reference::new(self.items.len());
-        let mut answer = Vec::new();
+        let mut trial = Trial::new(self.items.len());
         for spec in structures {
             let built = [spec.build(&self.items), spec.build(&cubes)];
             let [boxes, spheres] = match &built {
@@ -135,57 +134,17 @@ impl PlanesCase {
             for (name, view, items) in &views {
                 let index = if *name == "sphere" { spheres } else { boxes };
                 let wanted = items.iter().zip(0..).filter(|(b, _)| view.sees(b));
-                let count = reference.expect(wanted.map(|(_, id): (_, ItemId)| id));
-                answer.clear();
-                if let Err(text) = caught(|| index.see(*view, &mut answer)) {
-                    found.panicked(&spec.label, name, &text);
-                    continue;
-                }
-                self.compare(
-                    &mut reference,
-                    &answer,
-                    count,
-                    &spec.label,
-                    name,
-                    &mut found,
-                );
+                trial.expect(wanted.map(|(_, id): (_, ItemId)| id));
+                found.tried(&mut trial, &spec.label, name, self.items.len(), |out| {
+                    index.see(*view, out);
+                });
             }
-            let holding = Regions::Items.holding(self.point, &self.items);
-            let count = reference.expect(holding.into_iter());
-            answer.clear();
-            if let Err(text) = caught(|| boxes.locate(self.point, &mut answer)) {
-                found.panicked(&spec.label, "locate", &text);
-                continue;
-            }
-            self.compare(
-                &mut reference,
-                &answer,
-                count,
-                &spec.label,
-                "locate",
-                &mut found,
-            );
+            trial.expect(Regions::Items.holding(self.point, &self.items));
+            found.tried(&mut trial, &spec.label, "locate", self.items.len(), |out| {
+                boxes.locate(self.point, out);
+            });
         }
         found
-    }
-
-    fn compare(
-        &self,
-        reference: &mut Reference,
-        answer: &[ItemId],
-        count: usize,
-        structure: &str,
-        test: &str,
-        found: &mut Findings,
-    ) {
-        found.asked.push((structure.to_owned(), test.to_owned()));
-        let difference = reference.compare(answer);
-        if !difference.is_none() {
-            let item = difference.first.map(|id| id as usize);
-            let known = item.filter(|&item| item < self.items.len());
-            let expected = format!("the {count} items of the scalar loop");
-            found.fault(structure, test, known, &expected, difference.to_string());
-        }
     }
 
     /// The scalar loop against the oracle: without an epsilon it may drop what

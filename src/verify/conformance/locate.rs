@@ -59,7 +59,7 @@ pub fn many_points_are_answered_as_one_by_one<T: FrustumQuery>() -> Result<(), S
                 let answered = many.len();
                 format!(
                     "{} on '{}': {answered} of {} points answered, {flow:?}",
-                    T::NAME,
+                    T::INFO.name,
                     questions.scene,
                     points.len()
                 )
@@ -72,7 +72,7 @@ pub fn many_points_are_answered_as_one_by_one<T: FrustumQuery>() -> Result<(), S
                 ensure(right, || {
                     format!(
                         "{} on '{}', {p} among {} points: {difference}; {found:?}, alone {:?}",
-                        T::NAME,
+                        T::INFO.name,
                         questions.scene,
                         points.len(),
                         located(&index, p)
@@ -89,7 +89,7 @@ pub fn many_points_are_answered_as_one_by_one<T: FrustumQuery>() -> Result<(), S
             ensure(flow.is_break() && sink.next == sink.points, || {
                 format!(
                     "{} on '{}': stopped after {} points, got {} and {flow:?}",
-                    T::NAME,
+                    T::INFO.name,
                     questions.scene,
                     sink.points,
                     sink.next

@@ -3,6 +3,7 @@
 //! [`conformance!`](crate::conformance)
 //! makes a test of each; an error says what differed and on which scene.
 
+mod declared;
 mod locate;
 mod questions;
 mod refit;
@@ -20,6 +21,7 @@ use crate::scene::Dice;
 
 use questions::{Questions, build, ensure, generated_scenes, located, points, seen, sorted};
 
+pub use declared::declared_capabilities_are_true;
 pub use locate::many_points_are_answered_as_one_by_one;
 pub use locate::region_search_is_the_closed_box_scan;
 pub use refit::items_that_come_and_go_are_followed;
@@ -59,6 +61,7 @@ macro_rules! conformance {
             counters_are_plausible
             refit_equals_a_fresh_build
             items_that_come_and_go_are_followed
+            declared_capabilities_are_true
         }
     };
     (@tests $structure:ty: $($property:ident)*) => {$(
@@ -146,7 +149,7 @@ pub fn order_of_items_changes_nothing<T: FrustumQuery>() -> Result<(), String> {
             ensure(known && found == wanted, || {
                 format!(
                     "{} on '{scene}': {} ids in one order, {} others in another",
-                    T::NAME,
+                    T::INFO.name,
                     wanted.len(),
                     found.len()
                 )
@@ -171,7 +174,7 @@ pub fn smaller_volume_sees_a_subset<T: FrustumQuery>() -> Result<(), String> {
         ensure(lost.is_none(), || {
             format!(
                 "{} on '{scene}': item {lost:?} is seen by the smaller volume only",
-                T::NAME
+                T::INFO.name
             )
         })?;
     }
@@ -210,7 +213,7 @@ pub fn inside_means_all_and_outside_none<T: FrustumQuery>() -> Result<(), String
             ensure(right, || {
                 format!(
                     "{} on '{scene}': the scene is {verdict:?}, yet {found} of {sound} are seen",
-                    T::NAME
+                    T::INFO.name
                 )
             })?;
         }
@@ -258,13 +261,13 @@ pub fn each_id_comes_once<T: FrustumQuery>() -> Result<(), String> {
             ensure(wrong.is_none(), || {
                 format!(
                     "{} on '{scene}': id {wrong:?} comes twice or is none",
-                    T::NAME
+                    T::INFO.name
                 )
             })?;
             ensure(handed == collected && flow.is_continue(), || {
                 format!(
                     "{} on '{scene}': two sinks got different ids, or {flow:?}",
-                    T::NAME
+                    T::INFO.name
                 )
             })?;
         }
@@ -282,7 +285,7 @@ pub fn building_again_gives_the_same_structure<T: FrustumQuery>() -> Result<(), 
         ensure(same, || {
             format!(
                 "{} on '{}': built twice, answered differently",
-                T::NAME,
+                T::INFO.name,
                 questions.scene
             )
         })?;
@@ -317,7 +320,7 @@ pub fn bad_items_are_refused_and_named<T: FrustumQuery>() -> Result<(), String> 
                 ensure(named, || {
                     format!(
                         "{}: {value} in coordinate {coordinate} of item {item}: {error:?}",
-                        T::NAME
+                        T::INFO.name
                     )
                 })?;
             }
@@ -380,14 +383,14 @@ pub fn a_sink_that_breaks_is_not_called_again<T: FrustumQuery>() -> Result<(), S
                 ensure(right, || {
                     format!(
                         "{} on '{scene}': broke at call {call}, got {} and {flow:?}",
-                        T::NAME,
+                        T::INFO.name,
                         sink.calls
                     )
                 })?;
             }
         }
     }
-    ensure(broken > 0, || format!("{}: nothing to break", T::NAME))
+    ensure(broken > 0, || format!("{}: nothing to break", T::INFO.name))
 }
 
 /// A counted query gives the same ids; every answer was either tested or
@@ -407,7 +410,7 @@ pub fn counters_are_plausible<T: FrustumQuery>() -> Result<(), String> {
             ensure(right, || {
                 format!(
                     "{} on '{}': {} ids, {} when counted, {planes} planes: {cost:?}",
-                    T::NAME,
+                    T::INFO.name,
                     questions.scene,
                     plain.len(),
                     ids.len()

@@ -14,7 +14,7 @@ use crate::scene;
 
 pub(super) fn build<T: RegionIndex>(scene: &str, items: &[Aabb]) -> Result<T, String> {
     T::build(items, None, &T::Params::default())
-        .map_err(|error| format!("{} on '{scene}': {error}", T::NAME))
+        .map_err(|error| format!("{} on '{scene}': {error}", T::INFO.name))
 }
 
 /// The answer in the structure's own order.
@@ -81,7 +81,7 @@ impl Questions {
                 let why = first.map_or(String::new(), |b| explain_visibility(b, volume));
                 format!(
                     "{} on '{}', volume {i}: {difference}; {why}",
-                    T::NAME,
+                    T::INFO.name,
                     self.scene
                 )
             })?;
@@ -104,7 +104,7 @@ impl Questions {
                 let why = first.map_or(String::new(), |b| explain_containment(b, p));
                 format!(
                     "{} on '{}', point {p}: {difference}; {why}",
-                    T::NAME,
+                    T::INFO.name,
                     self.scene
                 )
             })?;

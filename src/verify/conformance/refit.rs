@@ -18,7 +18,7 @@ fn update<T: FrustumQuery>(
     ensure(before == questions.answers(index), || {
         format!(
             "{} on '{}': refit refused, but changed the structure",
-            T::NAME,
+            T::INFO.name,
             questions.scene
         )
     })?;

@@ -77,7 +77,7 @@ fn right<T: FrustumQuery, V: View>(
         format!(
             "{} on '{scene}', {kind}: {difference} (box and whether it is seen: {seen:?}); \
              {} ids when counted, {cost:?}",
-            T::NAME,
+            T::INFO.name,
             counted.len()
         )
     })

@@ -1,14 +1,17 @@
-//! How to write a structure: the whole contract, on tiles of items in slabs along x.
-//! `cargo test --example write_a_backend` puts it through the conformance suite.
+//! Your crate enters the benchmark: the whole contract of a structure, on tiles of items
+//! in slabs along x, and `main_with`, which gives it every command of the program:
+//! `cargo run --release --example enter_your_crate -- run --structure linear,bvh,tiles`
+//! (or list, verify, query, report, compare). `cargo test --example enter_your_crate`
+//! puts it through the conformance suite.
 
 use std::ops::ControlFlow;
+use std::process::ExitCode;
 
-use cullbench::camera::PlaneOptions;
 use cullbench::geometry::{Aabb, PlaneTree};
 use cullbench::index::{
-    BuildError, DynIndex, FrustumQuery, LinearScalar, MemoryUsage, RegionIndex,
+    BuildError, FrustumQuery, Info, Kind, MemoryUsage, Origin, RegionIndex, Registry,
 };
-use cullbench::query::{Containment, ItemId, QueryCost, Recorder, Region, Sink, View};
+use cullbench::query::{Containment, ItemId, Recorder, Region, Sink, View};
 
 type Flow = ControlFlow<()>;
 const TILE: usize = 32;
@@ -45,8 +48,13 @@ impl Tiles {
 }
 
 impl RegionIndex for Tiles {
-    const NAME: &'static str = "tiles";
-    const SUMMARY: &'static str = "tiles of 32 items in slabs along x";
+    /// Declared, and held to: a structure that can `refit` adds `.refits()`.
+    const INFO: Info = Info::new(
+        "tiles",
+        "tiles of 32 items in slabs along x",
+        Kind::Grid,
+        Origin::Crate("enter_your_crate"), // yours: env!("CARGO_PKG_NAME")
+    );
     type Params = (); // or a serde struct: `tiles:key=value`
 
     fn build(items: &[Aabb], _: Option<&PlaneTree>, _: &()) -> Result<Self, BuildError> {
@@ -79,20 +87,9 @@ impl FrustumQuery for Tiles {
     }
 }
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let city = cullbench::scene::load("city:n=50000,seed=7", &Default::default())?;
-    let orbit = cullbench::path::load("orbit:frames=32", &city, &Default::default())?;
-    let tiles = Tiles::build(&city.items, None, &())?;
-    let scan = LinearScalar::build(&city.items, None, &Default::default())?;
-    for (name, index) in [("tiles", &tiles as &dyn DynIndex), ("linear-scalar", &scan)] {
-        let (mut seen, mut cost) = (vec![], QueryCost::default());
-        for camera in &orbit.cameras {
-            let volume = camera.volume(&PlaneOptions::default(), &city.surroundings())?;
-            index.visible_counted(&volume, &mut seen, &mut cost);
-        }
-        println!("{name}: {} seen, {cost:?}", seen.len());
-    }
-    Ok(())
+/// Public for the project's own test; a crate of yours needs no `pub`.
+pub fn main() -> ExitCode {
+    cullbench::cli::main_with(Registry::builtin().with::<Tiles>())
 }
 
 #[cfg(test)]

@@ -1,0 +1,141 @@
+//! The conservative epsilon: how far a plane must be moved outward so that no
+//! visible box is lost, and how large its sums may grow. Where planes come from
+//! is in `planes`; the proof is in docs/NUMERICS.md.
+
+use glam::DVec3;
+
+use super::{CameraError, Frame, Lens};
+use crate::arithmetic::rounding::round_up;
+use crate::geometry::{ConvexVolume, FrustumPlane, Plane};
+
+/// u of f32.
+const UNIT_ROUNDOFF: f64 = 1.0 / (1u64 << 24) as f64;
+
+/// Below half the smallest subnormal f32 times four: covers underflow.
+pub(super) const TINY: f64 = f64::from_bits((1023 - 147) << 52);
+
+/// The derivation in f64: each component of an axis is true to 4 units of
+/// 2^-53, a normal to 8, and the offset is a sum of products with the eye. 16
+/// units of what they are multiplied with cover all of it.
+const DERIVED: f64 = 1.0 / (1u64 << 49) as f64;
+
+/// Sums of the plane test must stay below this: half the largest f32, because
+/// a node's bounds may be wider than its items'.
+const LARGEST: f64 = (f32::MAX / 2.0) as f64;
+
+/// What the margins of one volume's planes depend on.
+pub(super) struct Margin {
+    c: f64,
+    /// Largest absolute coordinates of the points that can be visible: those of
+    /// the volume and of the scene, whichever are smaller.
+    pub(super) reach: DVec3,
+    /// Near corners, then far ones; without a far plane near ones only.
+    near: [DVec3; 4],
+    far: Option<[DVec3; 4]>,
+    /// How far the near plane's and the far plane's inner sides lie apart.
+    depth: f64,
+    /// The near corners' rays at unit depth, if there is no far plane.
+    rays: [DVec3; 4],
+    derived: f64,
+    /// Whether the near and the far plane are known as exactly as from a frame.
+    of_frame: bool,
+}
+
+impl Margin {
+    /// `of_scene` is the scene's reach in the coordinates of the frame, zero if
+    /// it is not known.
+    pub(super) fn new(
+        frame: &Frame,
+        lens: &Lens,
+        of_scene: DVec3,
+        c: f64,
+        of_frame: bool,
+    ) -> Margin {
+        let at_depth = |depth| lens.corners_at(frame, depth);
+        let near = at_depth(lens.near());
+        let far = lens.far().map(at_depth);
+        let mut reach = of_scene;
+        if let Some(far) = &far {
+            let all = near.iter().chain(far);
+            reach = all.fold(DVec3::ZERO, |reach, corner| reach.max(corner.abs()));
+            if of_scene != DVec3::ZERO {
+                reach = reach.min(of_scene);
+            }
+        }
+        let deepest = lens.far().unwrap_or(lens.near()).abs() + lens.near().abs();
+        let coordinates = reach + frame.eye.abs();
+        Margin {
+            c,
+            reach,
+            near,
+            far,
+            depth: lens.far().map_or(f64::INFINITY, |far| far - lens.near()),
+            rays: lens.corners_at(&frame.relative_to(frame.eye), 1.0),
+            derived: DERIVED * (coordinates.element_sum() + deepest),
+            of_frame,
+        }
+    }
+
+    /// The plane moved outward: far enough for every visible box, whatever
+    /// rounding does to it.
+    pub(super) fn moved(&self, name: Option<FrustumPlane>, plane: &Plane, slack: f64) -> Plane {
+        let d = f64::from(plane.d);
+        let error = self.c * UNIT_ROUNDOFF * self.size(name, plane);
+        Plane::new(
+            plane.normal,
+            round_up(d + (error + TINY + self.derived + slack)),
+        )
+    }
+
+    /// The largest sum of magnitudes at a visible point that the plane could
+    /// misjudge.
+    ///
+    /// The error at x is at most c*u times its sum of magnitudes, which is
+    /// convex in x; its distance from the plane is linear. Their difference is
+    /// therefore largest at a corner, and corners across the volume are too far
+    /// away to matter.
+    fn size(&self, name: Option<FrustumPlane>, plane: &Plane) -> f64 {
+        let n = plane.normal.as_dvec3().abs();
+        let d = f64::from(plane.d).abs();
+        let along = |x: DVec3| n.dot(x.abs());
+        let largest = |of: &[DVec3; 4]| of.iter().map(|&x| along(x)).fold(0.0, f64::max);
+        let loose = n.dot(self.reach) + d;
+        let unit = self.c * UNIT_ROUNDOFF;
+        let Some(far) = &self.far else {
+            // Along each ray the distance must grow faster than the error.
+            let outruns = unit * largest(&self.rays) < 0.5;
+            return match name {
+                Some(FrustumPlane::Near) if self.of_frame && outruns => {
+                    loose.min(largest(&self.near) + d)
+                }
+                _ => loose,
+            };
+        };
+        // Half of the depth leaves room for its own rounding.
+        let across = self.depth * 0.5 / unit;
+        let (near, far) = (largest(&self.near), largest(far));
+        let own = match name {
+            Some(FrustumPlane::Near) if self.of_frame => near.max(far - across),
+            Some(FrustumPlane::Far) if self.of_frame => far.max(near - across),
+            _ => near.max(far),
+        };
+        loose.min(own + d)
+    }
+}
+
+/// Whether no sum of the plane test can overflow for boxes within `reach`.
+///
+/// # Errors
+/// The largest sum there may be, if not.
+pub(crate) fn check_sums(volume: &ConvexVolume, reach: DVec3) -> Result<(), CameraError> {
+    let sums = volume
+        .planes()
+        .iter()
+        .map(|plane| plane.normal.as_dvec3().abs().dot(reach) + f64::from(plane.d).abs());
+    let largest = sums.fold(0.0, f64::max);
+    if largest <= LARGEST {
+        Ok(())
+    } else {
+        Err(CameraError::Sums { largest })
+    }
+}

@@ -1,0 +1,182 @@
+//! The command behind `compare --against`: options, progress, the table.
+
+use std::fs;
+use std::path::Path;
+use std::time::Duration;
+
+use anyhow::{Context, bail};
+use clap::CommandFactory;
+use clap::parser::ValueSource;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::json;
+
+use super::against::{Against, Duel, Pairs};
+use super::args::{Cli, CompareArgs};
+use super::compare_table::{Basis, CompareTable, Side};
+use super::{Ending, interrupt, run_plan, text, unread_is_fine};
+use crate::index::Registry;
+use crate::measure::{CellKey, Machine, Status, Verdict};
+use crate::report::{Changes, JudgedRow, Lone, work_changes};
+use crate::scene;
+
+const SUITE: &str = "compare";
+/// What is compared where nothing is named: the plain loop over all items takes
+/// most of the time and says least.
+const STRUCTURES: &str = "linear,bsp,octree,quadtree,bvh,wide";
+
+/// Changes below this are not looked for: two builds of one source differ as much
+/// by where their code lies.
+const LEAST_THRESHOLD: f64 = 0.01;
+
+pub fn compare_against(
+    registry: &Registry,
+    args: &CompareArgs,
+    binary: &Path,
+    threshold: f64,
+) -> anyhow::Result<Ending> {
+    if threshold < LEAST_THRESHOLD {
+        bail!(
+            "--threshold is {}; expected at least {}: two builds of one source differ by as much",
+            text::percent(threshold),
+            text::percent(LEAST_THRESHOLD)
+        );
+    }
+    let new = std::env::current_exe().context("this program cannot be found again")?;
+    let sides = [side(binary)?, side(&new)?];
+    let plan = run_plan::plan_of(registry, &args.what, SUITE, STRUCTURES)?;
+    plan.check_inputs()?;
+    interrupt::from_now_on_finish();
+    let bar = ProgressBar::new(0);
+    let style = ProgressStyle::with_template("{bar:24} {pos}/{len} pairs  {elapsed}  {msg}");
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let duel = Duel {
+        args: arguments()?,
+        plan: &plan,
+        old: binary.to_owned(),
+        threshold,
+        pairs: Pairs::of(threshold),
+        patience: Duration::from_secs(args.what.timeout),
+        progress: &|done, most, step| {
+            bar.set_length(most as u64);
+            bar.set_position(done as u64);
+            bar.set_message(step.to_owned());
+        },
+    };
+    let found = duel.run();
+    bar.finish_and_clear();
+    let Some(found) = found? else {
+        return Ok(Ending::Interrupted);
+    };
+    let load = Machine::capture();
+    let busy = load.load.filter(|l| *l > 0.5 * load.cores as f64);
+    let mut notes: Vec<String> = Vec::new();
+    notes.extend(busy.map(|busy| {
+        format!(
+            "the machine was busy (load average {busy:.1} on {} cores): both sides suffered \
+             alike, and it took more pairs",
+            load.cores
+        )
+    }));
+    let [old, new] = sides;
+    let table = CompareTable {
+        old,
+        new,
+        basis: Basis::Pairs,
+        head: format!(
+            "{} × {} rounds × {} cameras in {:.0} s",
+            text::counted(found.pairs, "pair"),
+            found.rounds,
+            found.cameras,
+            found.seconds
+        ),
+        notes,
+        settings: Vec::new(),
+        changes: changes(&found, threshold),
+    };
+    unread_is_fine(table.show(args))?;
+    Ok(table.ending())
+}
+
+/// A program as one side of the comparison.
+fn side(program: &Path) -> anyhow::Result<Side> {
+    let bytes = fs::read(program).with_context(|| program.display().to_string())?;
+    let digest = scene::hex(&hmac_sha256::Hash::hash(&bytes));
+    let short: String = digest.chars().take(12).collect();
+    Ok(Side {
+        line: format!("{}, digest {short}", program.display()),
+        json: json!({ "program": program.display().to_string(), "digest": digest }),
+    })
+}
+
+fn changes(found: &Against, threshold: f64) -> Changes {
+    let mut changes = Changes {
+        threshold,
+        ..Changes::default()
+    };
+    for cell in &found.cells {
+        let key = CellKey {
+            group: cell.group.clone(),
+            structure: cell.structure.clone(),
+        };
+        let [old, new] = &cell.verdicts;
+        let lone = |verdict: &Verdict| Lone {
+            cell: key.clone(),
+            status: verdict.status,
+            reason: verdict.reason.clone(),
+        };
+        match (old.status, new.status) {
+            (Status::LeftOut, Status::LeftOut) => continue,
+            (Status::LeftOut, _) => {
+                changes.only_in_new.push(lone(new));
+                continue;
+            }
+            _ => {}
+        }
+        changes.cells_in_common += 1;
+        changes
+            .work_changed
+            .extend(work_changes(&key, &cell.counts[0], &cell.counts[1]));
+        let row = JudgedRow::of_statuses(key.clone(), old, new).unwrap_or_else(|| {
+            let [old, new] = cell.shown();
+            let pairs = cell.ln_ns.each_ref().map(Vec::len);
+            JudgedRow::by_times(key, "query_ns", (old, new), cell.judgement, pairs)
+        });
+        changes.rows.push(row);
+    }
+    changes.rows.sort_by(JudgedRow::order);
+    changes
+}
+
+/// The arguments of `run` that ask for the same.
+fn arguments() -> anyhow::Result<Vec<String>> {
+    let matches = Cli::command().try_get_matches_from(std::env::args_os())?;
+    let mut typed = vec!["run".to_owned()];
+    let Some(matches) = matches.subcommand_matches("compare") else {
+        return Ok(typed);
+    };
+    let command = Cli::command();
+    let run = command.find_subcommand("run");
+    for arg in run.into_iter().flat_map(|run| run.get_arguments()) {
+        let id = arg.get_id().as_str();
+        let known = matches.try_contains_id(id).unwrap_or(false);
+        if !known || matches.value_source(id) != Some(ValueSource::CommandLine) {
+            continue;
+        }
+        let name = arg.get_long().unwrap_or(id);
+        let values: Vec<_> = matches.get_raw(id).into_iter().flatten().collect();
+        match arg.get_action().takes_values() {
+            true => typed.extend(
+                values
+                    .iter()
+                    .map(|value| format!("--{name}={}", value.to_string_lossy())),
+            ),
+            false => typed.push(format!("--{name}")),
+        }
+    }
+    for (option, value) in [("suite", SUITE), ("structure", STRUCTURES)] {
+        if matches.value_source(option) != Some(ValueSource::CommandLine) {
+            typed.push(format!("--{option}={value}"));
+        }
+    }
+    Ok(typed)
+}

@@ -1,0 +1,368 @@
+//! How a comparison is shown, of two reports and of two programs alike: one
+//! table of verdicts, as a terminal table, as Markdown or as JSON. What the
+//! verdicts are is decided in `report` and `statistics`.
+
+use std::io::{self, Write};
+
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use super::args::{CompareArgs, TableFormat};
+use super::document::{Block, Rows, to_markdown};
+use super::{Ending, text};
+use crate::measure::{CellKey, METRICS};
+use crate::report::{Changes, CommonShift, JudgedRow, Lone, Outcome, Setting, WorkChange};
+
+/// So many counters are listed; `--all` lists every one.
+const LISTED: usize = 20;
+
+/// What OLD or NEW is.
+pub struct Side {
+    pub line: String,
+    pub json: Value,
+}
+
+/// What the times of both sides come from.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Basis {
+    /// Two stored reports: times relative to the other structures.
+    Reports,
+    /// Pairs of processes in turns: times as they are.
+    Pairs,
+}
+
+/// A comparison with everything that is said about it.
+pub struct CompareTable {
+    pub old: Side,
+    pub new: Side,
+    pub basis: Basis,
+    /// "14 pairs × 100 rounds × 128 cameras", "10 vs 10 processes".
+    pub head: String,
+    /// What to know before the figures, a line each.
+    pub notes: Vec<String>,
+    pub settings: Vec<Setting>,
+    pub changes: Changes,
+}
+
+impl CompareTable {
+    /// 1 for a wrong answer, otherwise 3 for slower or lost.
+    pub fn ending(&self) -> Ending {
+        match (self.changes.is_wrong(), self.changes.is_regression()) {
+            (true, _) => Ending::WrongAnswer,
+            (false, true) => Ending::Regression,
+            (false, false) => Ending::Ok,
+        }
+    }
+
+    /// On standard output, in the format that was asked for.
+    pub fn show(&self, args: &CompareArgs) -> io::Result<()> {
+        if args.markdown {
+            let markdown = to_markdown(&self.blocks(args.all));
+            return io::stdout().lock().write_all(markdown.as_bytes());
+        }
+        match args.format {
+            TableFormat::Json => self.json(),
+            TableFormat::Table => self.terminal(args.all),
+        }
+    }
+
+    fn json(&self) -> io::Result<()> {
+        #[derive(Serialize)]
+        struct Document<'c> {
+            old: &'c Value,
+            new: &'c Value,
+            verdict: &'static str,
+            counts: Value,
+            head: &'c str,
+            notes: &'c [String],
+            settings: &'c [Setting],
+            advice: Option<String>,
+            #[serde(flatten)]
+            changes: &'c Changes,
+        }
+        let changes = &self.changes;
+        let counts = Outcome::ALL.map(|o| (o.name().to_owned(), json!(changes.count(o))));
+        let document = Document {
+            old: &self.old.json,
+            new: &self.new.json,
+            verdict: match self.ending() {
+                Ending::WrongAnswer => "wrong_answer",
+                Ending::Regression => "regression",
+                _ => "ok",
+            },
+            counts: Value::Object(counts.into_iter().collect()),
+            head: &self.head,
+            notes: &self.notes,
+            settings: &self.settings,
+            advice: self.advice(),
+            changes,
+        };
+        let mut out = io::stdout().lock();
+        writeln!(out, "{}", serde_json::to_string_pretty(&document)?)
+    }
+
+    fn terminal(&self, all: bool) -> io::Result<()> {
+        let mut out = text::terminal();
+        for block in self.blocks(all) {
+            match block {
+                Block::Line(line) | Block::Heading(_, line) => {
+                    writeln!(out, "{}", text::plain(&line))?;
+                }
+                Block::Table(rows) => writeln!(out, "{}", rows.terminal())?,
+                Block::Picture(_) => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// The whole, in the order in which it is read.
+    fn blocks(&self, all: bool) -> Vec<Block> {
+        let changes = &self.changes;
+        let mut lines = vec![
+            format!("OLD  {}", self.old.line),
+            format!("NEW  {}", self.new.line),
+            format!(
+                "{}, threshold {}",
+                self.head,
+                text::percent(changes.threshold)
+            ),
+        ];
+        lines.extend(self.notes.iter().map(|note| format!("note: {note}")));
+        lines.extend(changes.common_shift.map(shift_line));
+        let mut blocks: Vec<Block> = lines.drain(..).map(Block::Line).collect();
+        let shown = changes.rows.iter().filter(|row| all || row.is_news());
+        let rows: Vec<&JudgedRow> = shown.collect();
+        if !rows.is_empty() {
+            blocks.push(Block::Table(self.table(&rows)));
+        }
+        let listed = if all { usize::MAX } else { LISTED };
+        lines.extend(changes.work_changed.iter().take(listed).map(work_line));
+        let more = changes.work_changed.len().saturating_sub(listed);
+        if more > 0 {
+            let more = text::counted(more, "further counter");
+            lines.push(format!("work changed: {more} (--all lists them)"));
+        }
+        lines.extend(lone_lines("OLD", &changes.only_in_old));
+        lines.extend(lone_lines("NEW", &changes.only_in_new));
+        lines.extend(self.advice());
+        lines.push(counts_line(changes));
+        blocks.extend(lines.into_iter().map(Block::Line));
+        blocks
+    }
+
+    fn table(&self, rows: &[&JudgedRow]) -> Rows {
+        let (change, processes) = match self.basis {
+            Basis::Reports => ("change vs the others [95 %]", "processes"),
+            Basis::Pairs => ("change [95 %]", "pairs"),
+        };
+        let header = [
+            "scene",
+            "path, test",
+            "structure",
+            "metric",
+            "old",
+            "new",
+            change,
+            "resolves",
+            processes,
+            "verdict",
+            "why",
+        ];
+        let cells = rows.iter().map(|row| {
+            let metric = row.metric.unwrap_or_default();
+            let figure = |value: Option<f64>| value.map_or(String::new(), |v| shown(metric, v));
+            let judged = row.judgement.as_ref();
+            let resolution = judged.and_then(|found| found.resolution);
+            vec![
+                row.cell.group.scene.clone(),
+                question(&row.cell),
+                row.cell.structure.clone(),
+                metric.to_owned(),
+                figure(row.old),
+                figure(row.new),
+                judged.map_or(String::new(), |j| change_of(j.ratio, j.lower.zip(j.upper))),
+                resolution.map_or(String::new(), |r| format!("{:.1} %", r * 100.0)),
+                match (self.basis, row.processes) {
+                    (_, [0, 0]) => String::new(),
+                    (Basis::Pairs, [pairs, _]) => pairs.to_string(),
+                    (Basis::Reports, [old, new]) => format!("{old} vs {new}"),
+                },
+                row.outcome.name().replace('_', " "),
+                reason(row),
+            ]
+        });
+        Rows {
+            rows: cells.collect(),
+            header: header.map(str::to_owned).into(),
+            right: vec![4, 5, 6, 7, 8],
+        }
+    }
+
+    /// What would decide the cells that are inconclusive, if there are any.
+    fn advice(&self) -> Option<String> {
+        let undecided = self.changes.count(Outcome::Inconclusive);
+        if undecided == 0 {
+            return None;
+        }
+        let cells = text::counted(undecided, "inconclusive cell");
+        let more = self.changes.more_pairs();
+        Some(match (self.basis, more) {
+            (Basis::Reports, Some(more)) => format!(
+                "{cells}: about {} more in each run (run --processes) would decide, or compare \
+                 --against BINARY, which runs both programs in turns",
+                text::counted(more, "process")
+            ),
+            (Basis::Reports, None) => format!(
+                "{cells}: runs with more processes (run --processes 20) may decide, or compare \
+                 --against BINARY, which runs both programs in turns"
+            ),
+            (Basis::Pairs, Some(more)) => {
+                format!(
+                    "{cells}: about {} would decide",
+                    text::counted(more, "more pair")
+                )
+            }
+            (Basis::Pairs, None) => format!("{cells}: more pairs would not decide"),
+        })
+    }
+}
+
+/// A cell by its name in a sentence.
+pub fn name(cell: &CellKey) -> String {
+    format!(
+        "{} on {}, {}",
+        cell.structure,
+        cell.group.scene,
+        question(cell)
+    )
+}
+
+/// All of a cell's key that is no default, but for scene and structure.
+fn question(cell: &CellKey) -> String {
+    let group = &cell.group;
+    let cold = match group.cache.as_str() {
+        "warm" => String::new(),
+        cache => format!(" ({cache})"),
+    };
+    format!("{}, {}{cold}", group.path, group.test)
+}
+
+/// "+6.8 % [+5.2, +8.4]" of a ratio new / old.
+pub fn change_of(ratio: f64, interval: Option<(f64, f64)>) -> String {
+    let change = |ratio: f64| match (ratio - 1.0) * 100.0 {
+        percent if percent.abs() < 1e6 => format!("{percent:+.1}"),
+        percent => format!("{percent:+.2e}"),
+    };
+    match interval {
+        Some((lower, upper)) => {
+            format!("{} % [{}, {}]", change(ratio), change(lower), change(upper))
+        }
+        None => format!("{} %", change(ratio)),
+    }
+}
+
+/// What moved everything, which no cell's verdict says.
+fn shift_line(shift: CommonShift) -> String {
+    let percent = |ratio: f64| format!("{:.1}", ratio * 100.0);
+    let interval = match shift.lower.zip(shift.upper) {
+        Some((lower, upper)) => format!(" [{}, {}]", percent(lower), percent(upper)),
+        None => String::new(),
+    };
+    format!(
+        "the machine or the program as a whole: NEW takes {} %{interval} of OLD ({}); this \
+         comparison cannot tell which",
+        percent(shift.ratio),
+        text::counted(shift.cells, "cell")
+    )
+}
+
+/// "work changed: bvh on city, ...: items_tested 1200 to 1111 (-7.4 %)".
+fn work_line(work: &WorkChange) -> String {
+    let short = |value: f64| (value * 1e3).round() / 1e3;
+    let (old, new) = match (short(work.old), short(work.new)) {
+        (old, new) if old != new => (old, new),
+        _ => (work.old, work.new),
+    };
+    let much = match work.old != 0.0 {
+        true => format!(" ({})", change_of(work.new / work.old, None)),
+        false => String::new(),
+    };
+    format!(
+        "work changed: {}: {} {old} to {new}{much}",
+        name(&work.cell),
+        work.counter
+    )
+}
+
+/// Why a row is what it is, where the figures do not say it.
+pub fn reason(row: &JudgedRow) -> String {
+    let statuses = (row.old_status, row.new_status);
+    let became = match statuses.0 == statuses.1 {
+        true if row.outcome == Outcome::FailedInBoth => statuses.1.name().to_owned(),
+        true => String::new(),
+        false => format!("{} to {}", statuses.0.name(), statuses.1.name()),
+    };
+    let why = row.reason.as_deref().unwrap_or_default();
+    let parts = [became.as_str(), why];
+    let told: Vec<&str> = parts.into_iter().filter(|part| !part.is_empty()).collect();
+    told.join(", ")
+}
+
+/// A figure with the unit of its metric.
+fn shown(metric: &str, value: f64) -> String {
+    let info = METRICS.iter().find(|info| info.name == metric);
+    match info.map(|info| info.unit) {
+        Some("ns") => text::time(value),
+        Some("ms") => text::time(value * 1e6),
+        _ => text::significant(value),
+    }
+}
+
+/// How many cells only one side has; each that is wrong by its name.
+fn lone_lines(side: &str, cells: &[Lone]) -> Vec<String> {
+    let Some(first) = cells.first() else {
+        return Vec::new();
+    };
+    let more = if cells.len() == 1 { "" } else { ", ..." };
+    let mut lines = vec![format!(
+        "only in {side}: {} ({}{more})",
+        text::counted(cells.len(), "cell"),
+        name(&first.cell)
+    )];
+    for cell in cells.iter().filter(|cell| cell.status.is_failure()) {
+        let why = cell.reason.as_ref().map(|reason| format!(": {reason}"));
+        lines.push(format!(
+            "only in {side}: {}: {}{}",
+            name(&cell.cell),
+            cell.status.name(),
+            why.unwrap_or_default()
+        ));
+    }
+    lines
+}
+
+/// "2 slower, 3 inconclusive, 1 faster, 92 same of 98 cells".
+fn counts_line(changes: &Changes) -> String {
+    let counts = Outcome::ALL.into_iter().filter_map(|outcome| {
+        let count = changes.count(outcome);
+        // The four verdicts are said in any case.
+        let is_said = count > 0 || outcome.is_judged();
+        is_said.then(|| {
+            format!(
+                "{} {}",
+                text::count(count),
+                outcome.name().replace('_', " ")
+            )
+        })
+    });
+    let counts: Vec<String> = counts.collect();
+    let rows = match (changes.rows.len(), changes.cells_in_common) {
+        (rows, cells) if rows == cells => text::counted(cells, "cell"),
+        (rows, cells) => format!(
+            "{} of {}",
+            text::counted(rows, "figure"),
+            text::counted(cells, "cell")
+        ),
+    };
+    format!("{} of {rows}", counts.join(", "))
+}

@@ -1,0 +1,76 @@
+//! `cullbench merge`: the shards of a plan become one run, with the files of one.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use anyhow::Context;
+
+use super::args::MergeArgs;
+use super::run_resume::same_recorded;
+use super::{Ending, surface_tables, tell, text, unread_is_fine};
+use crate::report::{Stream, merge as join, read_stream};
+
+pub fn merge(args: &MergeArgs) -> anyhow::Result<Ending> {
+    let recorded =
+        |path: &Path| -> anyhow::Result<Stream> { Ok(read_stream(&path.join("stream.jsonl"))?.0) };
+    let first = recorded(&args.runs[0])?.header.args;
+    for path in &args.runs[1..] {
+        let other = recorded(path)?.header.args;
+        same_recorded(&first, &other).with_context(|| path.display().to_string())?;
+    }
+    let merged = join(&args.runs, &without_place(&first), args.partial)?;
+    merged.write(&args.out)?;
+    if !merged.missing.is_empty() {
+        tell(&format!("note: no shard has {}", merged.missing_named()));
+    }
+    let report = merged.stream.report();
+    unread_is_fine(surface_tables::show(&report))?;
+    unread_is_fine(close(args, report.cells.len()))?;
+    let failed = report.cells.iter().any(|c| c.status.is_failure());
+    Ok(match failed {
+        true => Ending::WrongAnswer,
+        false => Ending::Ok,
+    })
+}
+
+fn close(args: &MergeArgs, cells: usize) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    writeln!(
+        out,
+        "{} of {}\n{}/{{report.json, summary.csv, samples.csv, stream.jsonl}}",
+        text::counted(cells, "cell"),
+        text::counted(args.runs.len(), "shard"),
+        text::plain(&args.out.display().to_string())
+    )?;
+    out.flush()
+}
+
+/// The options but for those that say which shard, and where to.
+fn without_place(args: &[String]) -> Vec<String> {
+    let mut kept = Vec::new();
+    let mut left = args.iter();
+    while let Some(arg) = left.next() {
+        match arg.as_str() {
+            "--shard" | "--out" => drop(left.next()),
+            joined if joined.starts_with("--shard=") || joined.starts_with("--out=") => {}
+            _ => kept.push(arg.clone()),
+        }
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_merged_run_is_of_no_shard_and_no_place() {
+        let args = |line: &str| -> Vec<String> { line.split(' ').map(str::to_owned).collect() };
+        for line in [
+            "run --shard 1/2 --seed 3 --out a",
+            "run --out=a --seed 3 --shard=1/2",
+        ] {
+            assert_eq!(without_place(&args(line)), args("run --seed 3"), "{line}");
+        }
+    }
+}

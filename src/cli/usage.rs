@@ -1,0 +1,61 @@
+//! Errors of the command line on one line: clap tells them in several, with a
+//! tip and the usage. It owns how those become what was found and expected.
+
+use std::error::Error;
+use std::num::{ParseFloatError, ParseIntError};
+
+use clap::error::ErrorKind;
+
+/// The error on one line; `None` for what is no error but text that was asked
+/// for, or the help for want of a command.
+pub fn one_line(error: &clap::Error) -> Option<String> {
+    use ErrorKind::{
+        DisplayHelp, DisplayHelpOnMissingArgumentOrSubcommand as NoCommand, DisplayVersion,
+    };
+    if matches!(error.kind(), DisplayHelp | NoCommand | DisplayVersion) {
+        return None;
+    }
+    let text = error.render().to_string();
+    let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
+    let first = lines.next().unwrap_or_default();
+    let mut found = first.strip_prefix("error: ").unwrap_or(first).to_owned();
+    let mut expected = None;
+    // What a parser says of a number does not say what it wanted.
+    if let Some(source) = error.source() {
+        expected = match (source.is::<ParseIntError>(), source.is::<ParseFloatError>()) {
+            (true, _) => Some("; expected a whole number of at least 0".to_owned()),
+            (_, true) => Some("; expected a number".to_owned()),
+            _ => None,
+        };
+        if expected.is_some() {
+            found = found.replace(&format!(": {source}"), "");
+        }
+    }
+    let mut missing = Vec::new();
+    let mut usage = None;
+    for line in lines {
+        let tip = line.strip_prefix("tip: ");
+        let similar = tip.filter(|tip| tip.contains("similar"));
+        let values = line.strip_prefix("[possible values: ");
+        if let Some((_, names)) = similar.and_then(|tip| tip.split_once(": ")) {
+            expected.get_or_insert(format!("; did you mean {names}?"));
+        } else if let Some(tip) = tip {
+            expected.get_or_insert(format!("; {tip}"));
+        } else if let Some(values) = values {
+            expected = Some(format!(
+                "; expected one of {}",
+                values.trim_end_matches(']')
+            ));
+        } else if let Some(line) = line.strip_prefix("Usage: ") {
+            usage = Some(line.to_owned());
+        } else if !line.starts_with("For more information") && usage.is_none() {
+            missing.push(line.to_owned());
+        }
+    }
+    if !missing.is_empty() {
+        found = format!("{found} {}", missing.join(", "));
+    }
+    let usage = usage.map(|usage| format!("; expected {usage}"));
+    let help = "; --help tells what can be given".to_owned();
+    Some(found + &expected.or(usage).unwrap_or(help))
+}

@@ -1,0 +1,191 @@
+//! The child's side of a run: `cullbench worker`, not shown in the help. It reads
+//! one request, measures one process's share of one scene, and writes what it
+//! does and finds, a JSON line each, to standard output.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::io::{self, BufRead, Write};
+use std::path::PathBuf;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use clap::Parser;
+use serde::{Deserialize, Serialize};
+
+use super::Ending;
+use super::args::{Cli, Command};
+use super::run_plan;
+use crate::index::Registry;
+use crate::measure::{Part, Share, TaskSamples, measure_scene};
+
+/// Raised when requests or messages change: programs of different versions do
+/// not understand each other.
+pub const PROTOCOL: u32 = 1;
+
+/// What a worker is to do.
+#[derive(Clone, Serialize, Deserialize)]
+pub struct Request {
+    pub protocol: u32,
+    /// The arguments of `run`, from which the plan follows.
+    pub args: Vec<String>,
+    /// Files that stand for pipes that only the parent can read.
+    pub spooled: BTreeMap<String, PathBuf>,
+    /// Index of the scene in the plan.
+    pub scene: usize,
+    pub share: Share,
+    /// The processor to stay on.
+    pub cpu: Option<usize>,
+    /// Whether samples are wanted beside the parts.
+    pub samples: bool,
+}
+
+/// A line from a worker.
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Message {
+    /// The first line.
+    Ready {
+        protocol: u32,
+    },
+    /// What comes next, and of which structure.
+    Doing {
+        structure: Option<String>,
+        step: String,
+    },
+    Part(Box<Part>, Vec<TaskSamples>),
+    /// The scene or a path cannot be had.
+    Failed(String),
+    /// The share is done.
+    Done,
+}
+
+/// Exit code of a worker whose parent is gone.
+const ORPHANED: i32 = 130;
+/// How often a worker that is timing says so.
+const HEARTBEAT: Duration = Duration::from_secs(1);
+
+pub fn worker(registry: &Registry) -> anyhow::Result<Ending> {
+    send(&Message::Ready { protocol: PROTOCOL })?;
+    let mut line = String::new();
+    io::stdin().lock().read_line(&mut line)?;
+    let request: Request = serde_json::from_str(&line)?;
+    end_with_the_parent();
+    match answer(registry, &request) {
+        Ok(()) => send(&Message::Done)?,
+        Err(error) => send(&Message::Failed(super::told_once(&error)))?,
+    }
+    Ok(Ending::Ok)
+}
+
+fn answer(registry: &Registry, request: &Request) -> anyhow::Result<()> {
+    if request.protocol != PROTOCOL {
+        anyhow::bail!(
+            "protocol {} was asked for; expected {PROTOCOL}: the two programs are of different \
+             versions",
+            request.protocol
+        );
+    }
+    stay_on(request.cpu);
+    for (source, file) in &request.spooled {
+        crate::input::stand_in(source, file)?;
+    }
+    let typed = ["cullbench".to_owned()]
+        .into_iter()
+        .chain(request.args.clone());
+    let Command::Run(args) = Cli::try_parse_from(typed)?.command else {
+        anyhow::bail!("not a run");
+    };
+    let plan = run_plan::plan(registry, &args)?;
+    let planned = &plan.plan.scenes[request.scene];
+    let failed = RefCell::new(None);
+    let keep_error = |result: io::Result<()>| {
+        if let Err(error) = result {
+            failed.borrow_mut().get_or_insert(error);
+        }
+    };
+    let told = RefCell::new((Instant::now(), String::new()));
+    let notice = |structure: Option<&str>, step: &str| {
+        let now = format!("{} {step}", structure.unwrap_or_default());
+        let mut told = told.borrow_mut();
+        if told.1 != now {
+            *told = (Instant::now(), now);
+            keep_error(send(&Message::Doing {
+                structure: structure.map(str::to_owned),
+                step: step.to_owned(),
+            }));
+        }
+    };
+    let stop = || {
+        let mut told = told.borrow_mut();
+        if told.0.elapsed() > HEARTBEAT {
+            told.0 = Instant::now();
+            keep_error(send(&Message::Doing {
+                structure: None,
+                step: "timing".to_owned(),
+            }));
+        }
+        // Nobody listens any more.
+        failed.borrow().is_some()
+    };
+    let mut keep = |part: Part, samples: Vec<TaskSamples>| {
+        let samples = if request.samples { samples } else { Vec::new() };
+        keep_error(send(&Message::Part(Box::new(part), samples)));
+    };
+    measure_scene(
+        &plan.plan,
+        planned,
+        &request.share,
+        &mut keep,
+        &notice,
+        &stop,
+    )?;
+    match failed.into_inner() {
+        Some(error) => Err(error.into()),
+        None => Ok(()),
+    }
+}
+
+/// Nothing more is ever said on standard input: its end is that of the parent,
+/// however it came about, and so of this process, whatever it is at.
+fn end_with_the_parent() {
+    thread::spawn(|| {
+        let _ = io::copy(&mut io::stdin().lock(), &mut io::sink());
+        std::process::exit(ORPHANED);
+    });
+    // A process that is held does not see the end of its input.
+    #[cfg(target_os = "linux")]
+    let _ = rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::KILL));
+}
+
+fn send(message: &Message) -> io::Result<()> {
+    let mut text = serde_json::to_vec(message)?;
+    text.push(b'\n');
+    let mut out = io::stdout().lock();
+    out.write_all(&text)?;
+    out.flush()
+}
+
+/// Keeps this process on one processor, where the system can: it does not move
+/// in the middle of a round.
+fn stay_on(cpu: Option<usize>) {
+    #[cfg(target_os = "linux")]
+    if let Some(cpu) = cpu {
+        let mut set = rustix::thread::CpuSet::new();
+        set.set(cpu);
+        // A processor that is not ours is no reason not to measure.
+        let _ = rustix::thread::sched_setaffinity(None, &set);
+    }
+    #[cfg(not(target_os = "linux"))]
+    let _ = cpu;
+}
+
+/// The processors that this process may run on; empty where that is not known.
+pub fn processors() -> Vec<usize> {
+    #[cfg(target_os = "linux")]
+    if let Ok(set) = rustix::thread::sched_getaffinity(None) {
+        return (0..rustix::thread::CpuSet::MAX_CPU)
+            .filter(|&cpu| set.is_set(cpu))
+            .collect();
+    }
+    Vec::new()
+}

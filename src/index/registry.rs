@@ -1,0 +1,430 @@
+//! The structures there are: a registry of rows, one per structure, each made
+//! from what the structure declares. It is a value: a crate of somebody else
+//! adds its own with [`Registry::with`] and hands it on, to
+//! `cli::main_with` for example.
+
+use serde_json::{Map, Value};
+
+#[cfg(feature = "peers")]
+use super::peers;
+use super::{
+    Bsp, BuildError, Bvh, By, DynIndex, Execution, FrustumQuery, Info, Linear, LinearScalar,
+    Octree, Quadtree, RegionIndex, Wide, caught,
+};
+use crate::geometry::{Aabb, PlaneTree};
+use crate::query::ItemId;
+use crate::spec::{Spec, SpecError};
+use crate::threads::Pool;
+
+type Build =
+    fn(Execution, &[Aabb], Option<&PlaneTree>, &Value) -> Result<Box<dyn DynIndex>, BuildError>;
+
+/// A row of a registry: a structure without its type.
+#[derive(Clone, Copy, Debug)]
+pub struct Row {
+    pub info: Info,
+    /// Builds from parameters as JSON (missing ones take their defaults) what
+    /// is asked by that kernel.
+    pub build: Build,
+    /// All parameters of a request, defaults filled in.
+    pub params: fn(&Value) -> Result<Value, BuildError>,
+}
+
+impl Row {
+    /// The row of a structure, from what it declares.
+    pub const fn of<T: FrustumQuery + 'static>() -> Row {
+        fn typed<T: RegionIndex>(params: &Value) -> Result<T::Params, BuildError> {
+            // Nothing given is no object for parameters that are `()`.
+            let nothing = params.as_object().is_some_and(Map::is_empty);
+            if nothing && let Ok(none) = serde_json::from_value(Value::Null) {
+                return Ok(none);
+            }
+            serde_json::from_value(params.clone()).map_err(|error| BuildError::Params {
+                structure: T::INFO.name,
+                reason: match culprit::<T>(params) {
+                    Some(pair) => format!("{pair}: {error}"),
+                    None => error.to_string(),
+                },
+            })
+        }
+        /// The one pair that cannot be read; serde's message lacks its name.
+        fn culprit<T: RegionIndex>(params: &Value) -> Option<String> {
+            let bad = params.as_object()?.iter().find(|(key, value)| {
+                let alone = Map::from_iter([((*key).clone(), (*value).clone())]);
+                serde_json::from_value::<T::Params>(Value::Object(alone)).is_err()
+            });
+            bad.map(|(key, value)| format!("{key}={value}"))
+        }
+        Row {
+            info: T::INFO,
+            build: |execution, items, own_tree, params| {
+                let (pool, kernel) = (Pool::new(execution.threads), execution.kernel);
+                let index = T::build_by(&pool, items, own_tree, &typed::<T>(params)?)?;
+                Ok(Box::new(By { index, kernel }))
+            },
+            params: |params| {
+                let filled = typed::<T>(params)?;
+                Ok(serde_json::to_value(filled).unwrap_or_default())
+            },
+        }
+    }
+}
+
+/// Structures by name, in the order of the help.
+///
+/// ```
+/// use cullbench::index::{Registry, Wide};
+/// let structures = Registry::empty().with::<Wide>().structures("wide:order=morton")?;
+/// assert_eq!(structures[0].row.info.name, "wide");
+/// # Ok::<(), cullbench::spec::SpecError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Registry {
+    rows: Vec<Row>,
+}
+
+/// The structures of the feature `peers`, for the hint that a build lacks it.
+const PEERS: [&str; 14] = [
+    "peer-obvhs",
+    "peer-obvhs-tuned",
+    "peer-obvhs-aabb",
+    "peer-parry3d",
+    "peer-parry3d-accept",
+    "peer-parry3d-ploc",
+    "peer-rstar",
+    "peer-rstar-accept",
+    "peer-bvh",
+    "peer-bvh-flat",
+    "peer-bvh-arena",
+    "peer-kiddo",
+    "uniform-grid",
+    "peer-bevy-style",
+];
+
+impl Registry {
+    /// No structure yet.
+    pub const fn empty() -> Registry {
+        Registry { rows: Vec::new() }
+    }
+
+    /// All structures of this build: the crate's own and, with the feature
+    /// `peers`, those of other crates.
+    pub fn builtin() -> Registry {
+        let own = Registry::empty()
+            .with::<LinearScalar>()
+            .with::<Linear>()
+            .with::<Bsp>()
+            .with::<Octree>()
+            .with::<Quadtree>()
+            .with::<Bvh>()
+            .with::<Wide>();
+        #[cfg(feature = "peers")]
+        let own = own
+            .with::<peers::PeerObvhs>()
+            .with::<peers::PeerObvhsTuned>()
+            .with::<peers::PeerObvhsAabb>()
+            .with::<peers::PeerParry3d>()
+            .with::<peers::PeerParry3dAccept>()
+            .with::<peers::PeerParry3dPloc>()
+            .with::<peers::PeerRstar>()
+            .with::<peers::PeerRstarAccept>()
+            .with::<peers::PeerBvh>()
+            .with::<peers::PeerBvhFlat>()
+            .with::<peers::PeerBvhArena>()
+            .with::<peers::PeerKiddo>()
+            .with::<peers::PeerUniformGrid>()
+            .with::<peers::PeerBevyStyle>();
+        own
+    }
+
+    /// The same with one structure more.
+    ///
+    /// # Panics
+    /// If there is one of that name already, or the name cannot be typed: that
+    /// is a mistake of the program, and the message names it.
+    pub fn with<T: FrustumQuery + 'static>(self) -> Registry {
+        self.with_row(Row::of::<T>())
+    }
+
+    /// The same with a row made by hand.
+    ///
+    /// # Panics
+    /// As [`Registry::with`].
+    pub fn with_row(mut self, row: Row) -> Registry {
+        let name = row.info.name;
+        let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+        assert!(
+            name.starts_with(|c: char| c.is_ascii_alphanumeric())
+                && name.chars().all(is_plain)
+                && name != "all",
+            "structure '{name}' cannot be typed; expected a name of letters, digits, '-', '_' \
+             and '.' other than 'all'"
+        );
+        assert!(
+            self.named(name).is_none(),
+            "structure '{name}' is in the registry already; expected another Info::name"
+        );
+        self.rows.push(row);
+        self
+    }
+
+    /// In the order in which they were added.
+    pub fn rows(&self) -> &[Row] {
+        &self.rows
+    }
+
+    pub fn named(&self, name: &str) -> Option<&Row> {
+        self.rows.iter().find(|row| row.info.name == name)
+    }
+
+    /// One structure with its parameters: `bvh` or `bvh:leaf=4`.
+    ///
+    /// # Errors
+    /// An unknown structure (with the nearest name), an unknown or bad
+    /// parameter, or one out of range.
+    pub fn structure(&self, text: &str) -> Result<StructureSpec, SpecError> {
+        let spec = Spec::parse(text)?;
+        let Some(&row) = self.named(spec.name()) else {
+            if PEERS.contains(&spec.name()) {
+                return Err(SpecError::new(format_args!(
+                    "structure '{}' is not in this build; expected one made with `cargo build \
+                     --features peers`",
+                    spec.name()
+                )));
+            }
+            let known = self.rows.iter().map(|row| row.info.name);
+            return Err(SpecError::unknown("structure", spec.name(), known));
+        };
+        let given: Map<String, Value> = spec
+            .given()
+            .map(|(key, value)| {
+                // Numbers and booleans as such, anything else as text.
+                let parsed = serde_json::from_str(value);
+                (
+                    key.to_owned(),
+                    parsed.unwrap_or_else(|_| Value::from(value)),
+                )
+            })
+            .collect();
+        let params = (row.params)(&Value::Object(given)).map_err(SpecError::new)?;
+        // Ranges are the build's to check: let it see no items.
+        let execution = Execution::default();
+        (row.build)(execution, &[], Some(&PlaneTree::default()), &params)
+            .map_err(SpecError::new)?;
+        Ok(StructureSpec {
+            label: text.to_owned(),
+            row,
+            params,
+            execution,
+        })
+    }
+
+    /// The structures of a comma-separated list, or of `all`.
+    ///
+    /// # Errors
+    /// As [`Registry::structure`]; an empty list, a structure named twice.
+    pub fn structures(&self, list: &str) -> Result<Vec<StructureSpec>, SpecError> {
+        let mut chosen: Vec<StructureSpec> = Vec::new();
+        for text in Spec::split_list(list) {
+            let more = match text.as_str() {
+                "all" => self
+                    .rows
+                    .iter()
+                    .map(|row| self.structure(row.info.name))
+                    .collect::<Result<_, _>>()?,
+                _ => vec![self.structure(&text)?],
+            };
+            for spec in more {
+                if chosen.iter().any(|c| c.label == spec.label) {
+                    return Err(SpecError::new(format_args!(
+                        "structure '{}' is named twice",
+                        spec.label
+                    )));
+                }
+                chosen.push(spec);
+            }
+        }
+        if chosen.is_empty() {
+            return Err(SpecError::new(
+                "no structure is named; expected 'all' or a list such as linear,bvh",
+            ));
+        }
+        Ok(chosen)
+    }
+}
+
+/// A structure as asked for: its row with parameters.
+#[derive(Clone, Debug)]
+pub struct StructureSpec {
+    /// As typed: `bvh` or `bvh:leaf=4`.
+    pub label: String,
+    pub row: Row,
+    /// Complete, defaults filled in.
+    pub params: Value,
+    /// How it is built and asked: the best kernel and one thread unless
+    /// [`StructureSpec::by`] says otherwise.
+    pub execution: Execution,
+}
+
+impl StructureSpec {
+    /// A structure of the built-in registry; [`Registry::structure`] finds
+    /// those of others.
+    ///
+    /// # Errors
+    /// As [`Registry::structure`].
+    pub fn parse(text: &str) -> Result<StructureSpec, SpecError> {
+        Registry::builtin().structure(text)
+    }
+
+    /// The same structure, built and asked in another way.
+    pub fn by(self, execution: Execution) -> StructureSpec {
+        StructureSpec { execution, ..self }
+    }
+
+    /// What the structure declares.
+    pub fn info(&self) -> &Info {
+        &self.row.info
+    }
+
+    /// Builds over boxes that bring no partition of their own.
+    ///
+    /// # Errors
+    /// As [`StructureSpec::build_with`].
+    pub fn build(&self, items: &[Aabb]) -> Result<Box<dyn DynIndex>, BuildError> {
+        self.build_with(items, None)
+    }
+
+    /// # Errors
+    /// As [`RegionIndex::build`]; a panic of the structure's code.
+    pub fn build_with(
+        &self,
+        items: &[Aabb],
+        own_tree: Option<&PlaneTree>,
+    ) -> Result<Box<dyn DynIndex>, BuildError> {
+        let build = || (self.row.build)(self.execution, items, own_tree, &self.params);
+        caught(build).unwrap_or_else(|message| Err(BuildError::Panicked { message }))
+    }
+
+    /// Brings an index up to date after items have moved: by refitting where
+    /// the structure can, else by building it anew. True for a refit.
+    ///
+    /// # Errors
+    /// A moved item with a NaN or infinite bound; the index is unchanged.
+    pub fn update(
+        &self,
+        index: &mut Box<dyn DynIndex>,
+        items: &[Aabb],
+        own_tree: Option<&PlaneTree>,
+        moved: &[ItemId],
+    ) -> Result<bool, BuildError> {
+        if let Some(&id) = moved.iter().find(|&&id| !items[id as usize].is_finite()) {
+            let item = id as usize;
+            return Err(BuildError::NonFiniteItem {
+                item,
+                bounds: items[item],
+            });
+        }
+        if index.refit(items, moved) {
+            return Ok(true);
+        }
+        *index = self.build_with(items, own_tree)?;
+        Ok(false)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+
+    #[test]
+    fn structures_are_found_with_their_parameters() {
+        let registry = Registry::builtin();
+        let all = registry.structures("all").unwrap();
+        assert_eq!(all.len(), registry.rows().len());
+        let two = registry
+            .structures("bvh:leaf=4,preset=medium,linear")
+            .unwrap();
+        assert_eq!(two[0].params["leaf"], 4);
+        assert_eq!(two[0].params["preset"], "medium");
+        assert_eq!(two[1].label, "linear");
+    }
+
+    #[test]
+    fn mistakes_are_named() {
+        for (text, wanted) in [
+            ("bhv", "did you mean 'bvh'"),
+            ("bvh:leav=4", "unknown field `leav`"),
+            ("bvh:leaf=many", "leaf"),
+            ("bvh:leaf=0", "leaf=0; expected 1 to 255"),
+            ("bvh:preset=best", "unknown variant `best`"),
+            ("bvh,bvh", "named twice"),
+            ("", "no structure"),
+            ("linear:leaf=3", "unknown field `leaf`"),
+        ] {
+            let error = Registry::builtin()
+                .structures(text)
+                .err()
+                .map(|e| e.to_string())
+                .unwrap_or_default();
+            assert!(error.contains(wanted), "{text}: {error}");
+        }
+    }
+
+    #[test]
+    fn items_that_cannot_be_indexed_are_named() {
+        let sound = Aabb::around(Vec3::ZERO, Vec3::ONE);
+        let nan = Aabb::new(Vec3::splat(f32::NAN), Vec3::ONE);
+        for spec in Registry::builtin().structures("all").unwrap() {
+            let error = spec.build(&[sound, nan]).err();
+            assert!(matches!(
+                error,
+                Some(BuildError::NonFiniteItem { item: 1, .. })
+            ));
+        }
+    }
+
+    #[test]
+    fn a_registry_has_what_was_added_and_nothing_else() {
+        let registry = Registry::empty().with::<Wide>();
+        assert_eq!(registry.structures("all").unwrap().len(), 1);
+        let error = registry.structure("bvh").unwrap_err().to_string();
+        assert!(error.contains("(known: wide)"), "{error}");
+    }
+
+    #[test]
+    #[should_panic(expected = "structure 'wide' is in the registry already")]
+    fn a_name_comes_once() {
+        let _ = Registry::builtin().with::<Wide>();
+    }
+
+    #[test]
+    fn names_that_cannot_be_typed_are_refused() {
+        for name in ["", "all", "a:b", "a,b", "a b", "a=b", "-a"] {
+            let row = Row {
+                info: Wide::INFO.named(name),
+                ..Row::of::<Wide>()
+            };
+            let refused = caught(|| Registry::empty().with_row(row)).unwrap_err();
+            assert!(refused.contains("cannot be typed"), "{name}: {refused}");
+        }
+    }
+
+    /// The hint names exactly what the feature brings.
+    #[test]
+    fn the_names_of_the_peers_are_those_of_their_rows() {
+        let own = 7;
+        let peers: Vec<_> = Registry::builtin().rows()[own..]
+            .iter()
+            .map(|row| row.info.name)
+            .collect();
+        assert_eq!(
+            peers,
+            if cfg!(feature = "peers") {
+                &PEERS[..]
+            } else {
+                &[]
+            }
+        );
+    }
+}

@@ -1,0 +1,445 @@
+//! An experiment: a plan of scenes, paths, cache states, culling tests and
+//! structures, and one process's way through it. The plan is the same for all
+//! processes.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::bounds::BOUNDS;
+use super::group::{GroupPlan, Notice, measure_part};
+use super::part::{CellKey, GroupKey, Known, Part, TaskSamples};
+use super::schedule::cameras_within;
+use super::update::refitted_ln;
+use super::{
+    Contender, Machine, PathInfo, Protocol, SceneInfo, Status, Verdict, Workload, WorkloadError,
+};
+use crate::culling::{Culling, CullingTest};
+use crate::index::{Kind, StructureSpec};
+use crate::input::InputError;
+use crate::path::{self, LensDefaults, PathError};
+use crate::scene::{self, LoadOptions, Scene};
+
+/// Updates are measured in every so many-th process: they cost several builds.
+const UPDATES_EVERY: u32 = 3;
+
+/// How much is measured.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Effort {
+    /// Processes that the rounds are spread over; an interval needs ten.
+    pub processes: u32,
+    /// Rounds of a task in one process, at least and at most.
+    pub rounds: [usize; 2],
+    /// CPU time of a task in one process, ns.
+    pub task_ns: f64,
+    /// The timed cameras are as many as a plain loop over all items answers in
+    /// this time, ns.
+    pub pass_ns: f64,
+    /// Whether region search is timed beside frustum queries.
+    pub locate: bool,
+}
+
+/// A scene with the ways through it.
+#[derive(Clone, PartialEq, Debug)]
+pub struct PlannedScene {
+    pub source: String,
+    pub paths: Vec<String>,
+    /// Whether caches are cold: the states to measure.
+    pub caches: Vec<bool>,
+}
+
+/// What is to be measured: data, complete before anything runs.
+#[derive(Clone)]
+pub struct Plan {
+    pub scenes: Vec<PlannedScene>,
+    pub structures: Vec<StructureSpec>,
+    pub cullings: Vec<Culling>,
+    pub lens: LensDefaults,
+    pub load: LoadOptions,
+    pub effort: Effort,
+    /// Whether lower bounds are measured beside the structures.
+    pub bounds: bool,
+    pub seed: u64,
+}
+
+/// A path, whether caches are cold, and the culling.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Question {
+    pub path: String,
+    pub cold: bool,
+    pub culling: Culling,
+}
+
+impl Plan {
+    /// Everything that is asked on a scene: tests over boxes before those over
+    /// spheres, so that structures are built twice at most.
+    pub fn questions(&self, scene: &PlannedScene) -> Vec<Question> {
+        let of_spheres = |c: &&Culling| c.test == CullingTest::Sphere;
+        let (spheres, boxes): (Vec<&Culling>, Vec<&Culling>) =
+            self.cullings.iter().partition(of_spheres);
+        let mut questions = Vec::new();
+        for cullings in [boxes, spheres] {
+            for path in &scene.paths {
+                for &cold in &scene.caches {
+                    questions.extend(cullings.iter().map(|&&culling| Question {
+                        path: path.clone(),
+                        cold,
+                        culling,
+                    }));
+                }
+            }
+        }
+        questions
+    }
+
+    pub fn key(&self, scene: &PlannedScene, question: &Question) -> GroupKey {
+        let Question {
+            path,
+            cold,
+            culling,
+        } = question;
+        GroupKey {
+            scene: scene.source.clone(),
+            path: path.clone(),
+            cache: if *cold { "cold" } else { "warm" }.to_owned(),
+            test: culling.test.name().to_owned(),
+            arithmetic: culling.arithmetic.name().to_owned(),
+            planes: culling.planes.method.name().to_owned(),
+            epsilon: culling.planes.epsilon,
+        }
+    }
+
+    /// All groups of cells that are compared with each other, in the order in
+    /// which they are measured.
+    pub fn groups(&self) -> Vec<GroupKey> {
+        let of_scene = |scene| {
+            let questions = self.questions(scene).into_iter();
+            questions.map(move |question| self.key(scene, &question))
+        };
+        self.scenes.iter().flat_map(of_scene).collect()
+    }
+
+    /// All cells.
+    pub fn cells(&self) -> Vec<CellKey> {
+        let cells_of = |group: GroupKey| {
+            self.structures.iter().map(move |spec| CellKey {
+                group: group.clone(),
+                structure: spec.label.clone(),
+            })
+        };
+        self.groups().into_iter().flat_map(cells_of).collect()
+    }
+
+    /// Share `i` of `n` (from 1): every n-th pair of scene and path, with all
+    /// structures, cache states and tests of it together.
+    pub fn shard(mut self, i: usize, n: usize) -> Plan {
+        let mut pair = 0;
+        for scene in &mut self.scenes {
+            scene.paths.retain(|_| {
+                pair += 1;
+                (pair - 1) % n == i - 1
+            });
+        }
+        self.scenes.retain(|scene| !scene.paths.is_empty());
+        self
+    }
+
+    /// All structures, and the first that is no scan a second time.
+    fn contenders(
+        &self,
+        scene: &Scene,
+        test: CullingTest,
+        share: &Share,
+        notice: Notice,
+    ) -> Vec<Contender> {
+        let proper = self
+            .structures
+            .iter()
+            .find(|s| s.row.info.kind != Kind::Scan);
+        let twin = proper.or(self.structures.first());
+        let once = self.structures.iter().map(|s| (s, false));
+        // What has ended a process would end this one too, as a twin as well.
+        let twin = twin.filter(|spec| !share.failed.contains_key(&spec.label));
+        once.chain(twin.map(|s| (s, true)))
+            .map(|(spec, is_twin)| {
+                if let Some(verdict) = share.failed.get(&spec.label) {
+                    return Contender {
+                        spec: spec.clone(),
+                        is_twin,
+                        built: Err(verdict.clone()),
+                    };
+                }
+                notice(Some(&spec.label), "building");
+                let built = Contender::build(spec.clone(), is_twin, scene, test);
+                let updates = share.process.is_multiple_of(UPDATES_EVERY) && self.effort.locate;
+                match updates && !is_twin {
+                    true => built.with_updates(scene, test),
+                    false => built,
+                }
+            })
+            .collect()
+    }
+}
+
+/// Why a scene could not be measured.
+#[derive(Debug, thiserror::Error)]
+pub enum ExperimentError {
+    #[error(transparent)]
+    Scene(#[from] InputError),
+    #[error(transparent)]
+    Path(#[from] PathError),
+    #[error(transparent)]
+    Workload(#[from] WorkloadError),
+    #[error(transparent)]
+    Spec(#[from] crate::spec::SpecError),
+}
+
+/// One process's share of one scene.
+#[derive(Clone, Default, Debug, Serialize, Deserialize)]
+pub struct Share {
+    pub process: u32,
+    /// By question: what the first process found; `None` where this is the
+    /// first process.
+    pub known: Vec<Option<Known>>,
+    /// By question: whether it is to be measured.
+    pub wanted: Vec<bool>,
+    /// Whether to count, check and plan only.
+    pub plan_only: bool,
+    /// Structures that have ended a process before, with what became of them.
+    pub failed: BTreeMap<String, Verdict>,
+}
+
+impl Share {
+    /// The whole of a scene with so many questions, in the first process.
+    pub fn first(questions: usize) -> Share {
+        Share {
+            known: vec![None; questions],
+            wanted: vec![true; questions],
+            ..Share::default()
+        }
+    }
+}
+
+/// Measures one process's share of one scene; each part is handed over as soon
+/// as it is there. False if stopped.
+///
+/// # Errors
+/// A scene or a path that cannot be read or made, a camera without a view.
+pub fn measure_scene(
+    plan: &Plan,
+    planned: &PlannedScene,
+    share: &Share,
+    keep: &mut dyn FnMut(Part, Vec<TaskSamples>),
+    notice: Notice,
+    stop: &dyn Fn() -> bool,
+) -> Result<bool, ExperimentError> {
+    notice(None, "loading the scene");
+    let scene = scene::load(&planned.source, &plan.load)?;
+    let info = SceneInfo::of(&scene);
+    let sweep = Machine::capture().cache_sweep_bytes();
+    let mut built: Option<(bool, Vec<Contender>)> = None;
+    let mut first = true;
+    for (n, question) in plan.questions(planned).into_iter().enumerate() {
+        if !share.wanted[n] {
+            continue;
+        }
+        let known = share.known[n].as_ref();
+        // Built once for all tests over boxes, and anew for spheres.
+        let of_spheres = question.culling.test == CullingTest::Sphere;
+        if built.as_ref().is_none_or(|(kind, _)| *kind != of_spheres) {
+            // The old ones go first: memory for one set is enough.
+            drop(built.take());
+            let all = plan.contenders(&scene, question.culling.test, share, notice);
+            built = Some((of_spheres, all));
+        }
+        let Some((_, contenders)) = &built else {
+            continue;
+        };
+        notice(None, &question.path);
+        let scale = known.and_then(|known| known.lens_scale);
+        let way = path::load_scaled(&question.path, &scene, &plan.lens, scale)?;
+        let workload = Workload::new(&scene, &way, &question.culling)?;
+        let group = GroupPlan {
+            scene: &info,
+            path: PathInfo::of(&question.path, &workload, question.cold),
+            process: share.process,
+            protocol: Protocol {
+                rounds: plan.effort.rounds,
+                task_ns: plan.effort.task_ns,
+                cameras: cameras_within(plan.effort.pass_ns, scene.items.len()),
+                cold: question.cold,
+                // Other orders in each process.
+                seed: plan.seed.wrapping_add(u64::from(share.process)),
+                cache_bytes: sweep,
+            },
+            bounds: if plan.bounds { BOUNDS } else { &[] },
+            known,
+            plan_only: share.plan_only,
+            locate: plan.effort.locate,
+        };
+        let protocol = group.protocol;
+        let Some((mut part, samples)) = measure_part(&workload, contenders, group, notice, stop)
+        else {
+            return Ok(false);
+        };
+        // Once for each scene; a comparison of programs looks at queries alone.
+        if first && plan.effort.locate && !share.plan_only {
+            for subject in &mut part.subjects {
+                let spec = plan.structures.iter().find(|s| s.label == subject.label);
+                if let Some(spec) = spec.filter(|_| subject.verdict.status == Status::Ok) {
+                    notice(Some(&spec.label), "refitting");
+                    subject.refitted_ln = refitted_ln(spec, &workload, &protocol);
+                }
+            }
+        }
+        first = false;
+        keep(part, samples);
+    }
+    Ok(true)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Group;
+    use super::*;
+    use crate::index::Registry;
+
+    fn planned(source: &str, paths: &[&str], caches: &[bool]) -> PlannedScene {
+        PlannedScene {
+            source: source.to_owned(),
+            paths: paths.iter().map(|&path| path.to_owned()).collect(),
+            caches: caches.to_vec(),
+        }
+    }
+
+    fn plan() -> Plan {
+        let sphere = Culling {
+            test: CullingTest::Sphere,
+            ..Culling::default()
+        };
+        Plan {
+            scenes: vec![
+                planned("city:n=100", &["orbit:frames=8", "spin"], &[false, true]),
+                planned("uniform:n=50", &["outside:frames=4"], &[false]),
+                planned("city:n=200", &["orbit:frames=8", "spin", "zoom"], &[true]),
+            ],
+            structures: Registry::builtin().structures("linear,bvh,octree").unwrap(),
+            cullings: vec![sphere, Culling::default()],
+            lens: LensDefaults::default(),
+            load: LoadOptions::default(),
+            effort: Effort {
+                processes: 1,
+                rounds: [1, 1],
+                task_ns: 1e4,
+                pass_ns: 1e4,
+                locate: false,
+            },
+            bounds: false,
+            seed: 1,
+        }
+    }
+
+    #[test]
+    fn shards_are_the_plan_and_leave_what_is_compared_together() {
+        let whole = plan();
+        let cells = whole.cells();
+        // (2 paths x 2 caches + 1 + 3 paths) x 2 tests x 3 structures.
+        assert_eq!(cells.len(), 8 * 2 * 3);
+        for n in 1..=8 {
+            let shards: Vec<Vec<CellKey>> =
+                (1..=n).map(|i| whole.clone().shard(i, n).cells()).collect();
+            let of_pair = |cell: &CellKey, other: &CellKey| {
+                (&cell.group.scene, &cell.group.path) == (&other.group.scene, &other.group.path)
+            };
+            for cell in &cells {
+                let holding = shards.iter().filter(|shard| shard.contains(cell));
+                let holding: Vec<_> = holding.collect();
+                assert_eq!(holding.len(), 1, "{cell:?} in {n} shards");
+                let together = cells.iter().filter(|other| of_pair(cell, other));
+                assert!(together.clone().all(|other| holding[0].contains(other)));
+            }
+            let sum: usize = shards.iter().map(Vec::len).sum();
+            assert_eq!(sum, cells.len(), "nothing twice in {n} shards");
+        }
+        // Six pairs: the seventh of seven shards has nothing to do.
+        assert!(whole.clone().shard(7, 7).scenes.is_empty());
+    }
+
+    #[test]
+    fn keys_are_told_apart_and_structures_built_twice_at_most() {
+        let plan = plan();
+        let cells = plan.cells();
+        for (n, cell) in cells.iter().enumerate() {
+            assert!(!cells[..n].contains(cell), "{cell:?} comes twice");
+        }
+        for scene in &plan.scenes {
+            let questions = plan.questions(scene);
+            let mut spheres = questions
+                .iter()
+                .map(|q| q.culling.test == CullingTest::Sphere);
+            let first = spheres.position(|is_sphere| is_sphere);
+            assert!(first.is_some_and(|first| first > 0));
+            assert!(spheres.all(|is_sphere| is_sphere), "boxes after spheres");
+        }
+    }
+
+    #[test]
+    fn one_process_has_the_cells_of_the_plan_in_its_order() {
+        let plan = plan();
+        let mut groups = Vec::new();
+        let all_of = |planned: &PlannedScene| Share::first(plan.questions(planned).len());
+        for planned in &plan.scenes {
+            let mut keep = |part: Part, _| groups.push((part.key.clone(), Group::of(&[part])));
+            let share = all_of(planned);
+            let done = measure_scene(&plan, planned, &share, &mut keep, &|_, _| (), &|| false);
+            assert!(done.unwrap());
+        }
+        let found = groups.iter().flat_map(|(key, group)| {
+            group.cells.iter().map(|cell| CellKey {
+                group: key.clone(),
+                structure: cell.structure.clone(),
+            })
+        });
+        assert!(found.eq(plan.cells()));
+        for (_, group) in &groups {
+            assert!(group.twin.as_ref().is_some_and(|(label, _)| label == "bvh"));
+            for cell in &group.cells {
+                assert_eq!(cell.verdict.status, super::super::Status::Ok);
+            }
+        }
+        let (first, mut keep) = (&plan.scenes[0], |_, _| {
+            panic!("stopped before the first part")
+        });
+        let stopped = measure_scene(&plan, first, &all_of(first), &mut keep, &|_, _| (), &|| {
+            true
+        });
+        assert!(!stopped.unwrap());
+    }
+
+    #[test]
+    fn what_has_ended_a_process_is_not_built_again() {
+        let mut plan = plan();
+        plan.scenes.truncate(1);
+        let verdict = Verdict::new(super::super::Status::OutOfMemory, "while building");
+        let mut share = Share::first(plan.questions(&plan.scenes[0]).len());
+        share.failed.insert("bvh".to_owned(), verdict.clone());
+        let building = std::cell::RefCell::new(Vec::new());
+        let notice = |structure: Option<&str>, step: &str| {
+            if let (Some(structure), "building") = (structure, step) {
+                building.borrow_mut().push(structure.to_owned());
+            }
+        };
+        let mut parts = Vec::new();
+        let mut keep = |part: Part, _| parts.push(part);
+        let done = measure_scene(&plan, &plan.scenes[0], &share, &mut keep, &notice, &|| {
+            false
+        });
+        assert!(done.unwrap());
+        assert!(!building.borrow().contains(&"bvh".to_owned()));
+        for part in &parts {
+            let own = part.subjects.iter().find(|s| s.label == "bvh");
+            assert_eq!(own.map(|s| &s.verdict), Some(&verdict));
+            assert!(part.tasks.iter().all(|t| !t.label.starts_with("bvh")));
+        }
+    }
+}

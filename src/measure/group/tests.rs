@@ -1,0 +1,146 @@
+//! One process after the first: what it compares, and what it keeps to.
+
+use super::*;
+use crate::culling::{Culling, CullingTest};
+use crate::index::Registry;
+use crate::path;
+use crate::scene::{self, Scene};
+
+fn protocol() -> Protocol {
+    Protocol {
+        rounds: [2, 2],
+        task_ns: 1e5,
+        cameras: 8,
+        cold: false,
+        seed: 1,
+        cache_bytes: 1 << 20,
+    }
+}
+
+fn scene() -> Scene {
+    scene::load("city:n=300", &Default::default()).expect("a scene")
+}
+
+fn workload(scene: &Scene) -> Workload<'_> {
+    let way = path::load("orbit:frames=8", scene, &Default::default()).expect("a path");
+    Workload::new(scene, &way, &Culling::default()).expect("a workload")
+}
+
+fn contenders(names: &str, scene: &Scene) -> Vec<Contender> {
+    let specs = Registry::builtin().structures(names).expect("structures");
+    let build = |spec| Contender::build(spec, false, scene, CullingTest::SixPlane);
+    specs.into_iter().map(build).collect()
+}
+
+fn measured(names: &str, process: u32, known: Option<&Known>, plan_only: bool) -> Part {
+    let scene = scene();
+    let (workload, contenders) = (workload(&scene), contenders(names, &scene));
+    let info = SceneInfo::of(&scene);
+    let plan = GroupPlan {
+        scene: &info,
+        path: PathInfo::of("orbit:frames=8", &workload, false),
+        process,
+        protocol: protocol(),
+        bounds: &[],
+        known,
+        plan_only,
+        locate: true,
+    };
+    let part = measure_part(&workload, &contenders, plan, &|_, _| (), &|| false);
+    part.expect("not stopped").0
+}
+
+fn statuses(part: &Part) -> Vec<(&str, Status)> {
+    let subjects = part.subjects.iter();
+    subjects
+        .map(|s| (s.label.as_str(), s.verdict.status))
+        .collect()
+}
+
+#[test]
+fn a_later_process_keeps_to_the_plan_of_the_first() {
+    let first = measured("linear,bvh", 0, None, false);
+    let known = first.known.as_ref().expect("the first process plans");
+    assert_eq!(known.visible.len(), 8);
+    assert!(first.contradictions(known).is_empty());
+    let second = measured("linear,bvh", 1, Some(known), false);
+    assert_eq!(second.known, None);
+    assert_eq!(
+        statuses(&second),
+        [("linear", Status::Ok), ("bvh", Status::Ok)]
+    );
+    assert!(second.contradictions(known).is_empty());
+    let names = |part: &Part| -> Vec<(String, Task)> {
+        let tasks = part.tasks.iter();
+        tasks.map(|t| (t.label.clone(), t.task)).collect()
+    };
+    assert_eq!(names(&first), names(&second));
+    // What was counted is counted once.
+    assert!(!first.subjects[1].counts.is_empty() && second.subjects[1].counts.is_empty());
+}
+
+#[test]
+fn a_process_that_only_plans_times_nothing() {
+    let part = measured("linear,bvh", 0, None, true);
+    assert!(part.tasks.is_empty());
+    let known = part.known.expect("a plan");
+    assert_eq!(known.query.map(|plan| plan.names.len()), Some(2));
+    assert_eq!(known.locate.map(|plan| plan.names.len()), Some(4));
+}
+
+#[test]
+fn an_answer_of_another_digest_is_wrong() {
+    let first = measured("linear,bvh", 0, None, true);
+    let known = first.known.expect("a plan");
+    let of = |change: &dyn Fn(&mut Known)| {
+        let mut stale = known.clone();
+        change(&mut stale);
+        let part = measured("linear,bvh", 1, Some(&stale), false);
+        let reason = part.subjects[1].verdict.reason.clone().unwrap_or_default();
+        let all_wrong = part
+            .subjects
+            .iter()
+            .all(|s| s.verdict.status == Status::Wrong);
+        assert!(all_wrong, "{:?}", statuses(&part));
+        assert!(part.tasks.is_empty(), "what is wrong is not timed");
+        reason
+    };
+    let reason = of(&|known| known.visible[5].digest ^= 1);
+    assert!(reason.starts_with("camera 5: "), "{reason}");
+    let reason = of(&|known| known.visible[3].count += 1);
+    assert!(reason.starts_with("camera 3: "), "{reason}");
+    let reason = of(&|known| known.located[2].digest ^= 1);
+    assert!(reason.starts_with("point 2: "), "{reason}");
+    // Answers for fewer cameras than there are.
+    let reason = of(&|known| known.visible.truncate(6));
+    assert!(reason.contains("8 cameras"), "{reason}");
+}
+
+#[test]
+fn what_has_no_plan_is_not_timed_and_the_rest_keeps_its_own() {
+    let first = measured("linear,octree,bvh", 0, None, true);
+    let mut known = first.known.expect("a plan");
+    let plan = known.query.as_mut().expect("queries are timed");
+    for (batch, task) in (1..).zip(&mut plan.schedule.tasks) {
+        task.batch = batch;
+    }
+    plan.names.remove(1);
+    plan.schedule.tasks.remove(1);
+    let part = measured("linear,octree,bvh", 1, Some(&known), false);
+    let queries = part.tasks.iter().filter(|t| t.task == Task::Query);
+    let labels: Vec<&str> = queries.map(|t| t.label.as_str()).collect();
+    assert_eq!(labels, ["linear", "bvh"]);
+    // The plan names what is not here: a structure that ended a process.
+    let part = measured("bvh", 2, Some(&known), false);
+    let queries = part.tasks.iter().filter(|t| t.task == Task::Query);
+    assert_eq!(queries.count(), 1);
+    assert!(part.contradictions(&known).is_empty());
+    let scene = scene();
+    let (workload, contenders) = (workload(&scene), contenders("bvh", &scene));
+    let entries: Vec<Entry> = contenders.iter().map(Entry::new).collect();
+    let answers = [known.visible.clone(), known.located.clone()];
+    let mut entered = enter(&workload, &contenders, &entries, &[Task::Query], &answers);
+    let schedule = entered.schedule(known.query.as_ref(), 8, &protocol());
+    let batches: Vec<u32> = schedule.tasks.iter().map(|t| t.batch).collect();
+    assert_eq!(batches, [3], "its own, not the one in its place");
+}

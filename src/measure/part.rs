@@ -1,0 +1,189 @@
+//! What one process found out about one group of cells: plain data that goes
+//! from process to process and into the stream of a run. What is made of the
+//! parts of all processes is `results`' to say.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::index::{Kind, Origin};
+
+use super::{Answer, Judged, PathInfo, Sample, SceneInfo, Schedule, Status, Task, Verdict};
+
+/// What is common to the cells that are compared with each other.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct GroupKey {
+    pub scene: String,
+    pub path: String,
+    /// "warm" or "cold".
+    pub cache: String,
+    pub test: String,
+    pub arithmetic: String,
+    pub planes: String,
+    pub epsilon: f64,
+}
+
+impl GroupKey {
+    pub fn new(scene: &str, path: &PathInfo, test: &str) -> GroupKey {
+        GroupKey {
+            scene: scene.to_owned(),
+            path: path.name.clone(),
+            cache: path.cache.clone(),
+            test: test.to_owned(),
+            arithmetic: path.arithmetic.clone(),
+            planes: path.planes.clone(),
+            epsilon: path.epsilon,
+        }
+    }
+}
+
+/// A cell: a structure in a group.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct CellKey {
+    #[serde(flatten)]
+    pub group: GroupKey,
+    pub structure: String,
+}
+
+/// What the first process counted and planned; the others keep to it.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct Known {
+    /// Of every camera: what every structure that is right answers. Empty if
+    /// the process is to count for itself.
+    pub visible: Vec<Answer>,
+    /// Of every eye.
+    pub located: Vec<Answer>,
+    /// Of frustum queries, bounds last, and of region searches. `None` where
+    /// nothing is timed.
+    pub query: Option<NamedSchedule>,
+    pub locate: Option<NamedSchedule>,
+    /// Scale of the lens where the path was asked for by its visible share.
+    pub lens_scale: Option<f64>,
+}
+
+/// A schedule with the names of its tasks.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct NamedSchedule {
+    pub names: Vec<(String, Task)>,
+    pub schedule: Schedule,
+}
+
+/// A structure in one process.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct SubjectPart {
+    /// As asked for, `bvh:leaf=4`; the twin of one ends in `#twin`.
+    pub label: String,
+    pub params: Value,
+    pub kind: Kind,
+    pub origin: Origin,
+    #[serde(flatten)]
+    pub verdict: Verdict,
+    /// Whether builds share threads: wall time then, else CPU time.
+    pub build_ms: Option<f64>,
+    pub memory_bytes: Option<u64>,
+    /// In the order of [`super::UPDATE_SHARES`].
+    pub update_ms: Vec<f64>,
+    /// ln of (query time after many refits / on a fresh build of the same boxes).
+    pub refitted_ln: Option<f64>,
+    /// Means per query of what the count pass counted; the first process only.
+    pub counts: BTreeMap<String, f64>,
+}
+
+/// What was timed of one task in one process.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct TaskPart {
+    /// Of a structure or of a lower bound.
+    pub label: String,
+    pub task: Task,
+    #[serde(flatten)]
+    pub verdict: Verdict,
+    /// Mean CPU ns per query over all timed cameras, for each round.
+    pub rounds_ns: Vec<f64>,
+    /// ln of the wall ns per query: interquartile mean over the rounds.
+    pub wall_ln_ns: Option<f64>,
+    /// CPU ns per query of groups of cameras that are the same for all tasks,
+    /// median over the rounds; empty below twenty of them.
+    pub tail_ns: Vec<f64>,
+    /// Ids returned by all queries, and CPU ns spent on them.
+    pub returned: u64,
+    pub spent_ns: f64,
+}
+
+/// One process, one group.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct Part {
+    pub key: GroupKey,
+    pub process: u32,
+    pub scene: SceneInfo,
+    pub path: PathInfo,
+    pub known: Option<Known>,
+    /// How the answers differ from the exact truth; the first process only.
+    pub judged: Option<Judged>,
+    pub subjects: Vec<SubjectPart>,
+    /// Names of the lower bounds among the tasks.
+    pub bounds: Vec<String>,
+    pub tasks: Vec<TaskPart>,
+}
+
+impl Part {
+    /// What in the timed pass is not what the plan asks for, by label: a task
+    /// that is not planned or not in its place, rounds too many, samples missing
+    /// or counted twice. Answers are known, so the ids of a whole pass are too.
+    pub fn contradictions(&self, known: &Known) -> Vec<(&str, Verdict)> {
+        let mut found = Vec::new();
+        let passes = [
+            (&known.query, &known.visible),
+            (&known.locate, &known.located),
+        ];
+        for (pass, (plan, answers)) in passes.into_iter().enumerate() {
+            let Some(NamedSchedule { names, schedule }) = plan else {
+                continue;
+            };
+            let cameras = schedule.cameras.iter();
+            let one_round: Option<u64> = cameras
+                .map(|&camera| answers.get(camera as usize).map(|answer| answer.count))
+                .sum();
+            let mut planned = names.iter().zip(&schedule.tasks);
+            let own = self.tasks.iter();
+            for task in own.filter(|t| (t.task == Task::Query) == (pass == 0)) {
+                let mut wrong = |reason: String| {
+                    let verdict = Verdict::new(Status::Wrong, reason);
+                    found.push((task.label.as_str(), verdict));
+                };
+                let (process, name) = (self.process, task.task.name());
+                let Some((_, plan)) = planned
+                    .find(|((label, planned), _)| *label == task.label && *planned == task.task)
+                else {
+                    wrong(format!(
+                        "process {process}, {name}: not in its place in the plan of the first process"
+                    ));
+                    break;
+                };
+                let rounds = schedule.rounds.div_ceil(plan.every.max(1));
+                let wanted = one_round.map(|ids| ids * u64::from(rounds));
+                let is_bound = self.bounds.contains(&task.label);
+                if task.verdict.status != Status::Ok {
+                    continue;
+                }
+                if task.rounds_ns.len() > rounds as usize {
+                    let found = task.rounds_ns.len();
+                    wrong(format!(
+                        "process {process}, {name}: {found} rounds; the plan has {rounds}"
+                    ));
+                } else if !is_bound && wanted != Some(task.returned) {
+                    let wanted = wanted.map_or("other cameras".to_owned(), |ids| ids.to_string());
+                    wrong(format!(
+                        "process {process}, {name}: {} ids in all its samples; the plan asks for \
+                         {wanted}",
+                        task.returned
+                    ));
+                }
+            }
+        }
+        found
+    }
+}
+
+/// The samples of one task of a part.
+pub type TaskSamples = (String, Task, Vec<Sample>);

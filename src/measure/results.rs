@@ -1,0 +1,517 @@
+//! From the parts of all processes to the cells of a report: every value, its
+//! interval, every ratio and every rank come from the same quantities, the
+//! logarithms of time of each structure in each process, by the estimators of
+//! [`crate::statistics`].
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::bounds::{BOUNDS, Bound};
+use super::contender::TWIN;
+use super::group::{GroupPlan, LEAST_TAIL, measure_part};
+use super::metrics::{Metric, Metrics};
+use super::part::{Known, Part, SubjectPart, TaskPart};
+use super::update::MOST_UPDATED;
+use super::{
+    Contender, Judged, PathInfo, Protocol, SceneInfo, Status, Task, UPDATE_SHARES, Verdict,
+    Workload,
+};
+use crate::index::{Kind, Origin};
+use crate::statistics::{
+    Estimate, interquartile_mean, median, one_run, quantile, ranks, sorted, trimmed_mean,
+};
+
+/// In the order of [`UPDATE_SHARES`].
+const UPDATE_METRICS: [&str; UPDATE_SHARES.len()] = [
+    "update_ms_0_1_percent",
+    "update_ms",
+    "update_ms_10_percent",
+    "update_ms_100_percent",
+];
+
+/// The structure that speed-ups refer to.
+pub const YARDSTICK: &str = "linear";
+/// Level at which two structures are told apart.
+const RANK_ALPHA: f64 = 0.05;
+
+/// One structure in one group.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Cell {
+    pub structure: String,
+    /// As the structure declares; `None` for a lower bound.
+    pub declared: Option<(Kind, Origin)>,
+    pub params: Value,
+    pub verdict: Verdict,
+    /// Fastest first; structures that no test tells apart share a rank. `None`
+    /// where there is no time.
+    pub rank: Option<usize>,
+    pub metrics: BTreeMap<String, Metric>,
+    pub times: CellTimes,
+    /// The errors behind the metrics, as totals.
+    pub judged: Option<Judged>,
+    /// What was not measured of it, and why.
+    pub left_out: Vec<String>,
+}
+
+/// What the times of a cell rest on.
+#[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct CellTimes {
+    /// Processes that were timed; an interval needs three or more.
+    pub processes: usize,
+    /// Rounds in each process.
+    pub rounds: usize,
+    pub cameras_timed: usize,
+    /// Cameras whose answers were compared with the reference.
+    pub cameras_checked: usize,
+    /// Queries per clock reading.
+    pub batch: usize,
+    /// By metric: the time in each process, ns.
+    pub by_process: BTreeMap<String, Vec<f64>>,
+}
+
+/// All cells of a group, with what was measured beside them.
+pub struct Group {
+    pub cells: Vec<Cell>,
+    /// Lower bounds: no structures, never ranked.
+    pub bounds: Vec<Cell>,
+    /// Structure and ratio of the one that was entered twice: 1 is to lie in
+    /// the interval.
+    pub twin: Option<(String, Metric)>,
+}
+
+/// Measures a group in this process alone: values and ranks by order, without
+/// intervals. `None` if stopped.
+pub fn measure_group(
+    workload: &Workload,
+    contenders: &[Contender],
+    bounds: &[Bound],
+    protocol: &Protocol,
+    stop: &dyn Fn() -> bool,
+) -> Option<Group> {
+    let scene = SceneInfo::of(workload.scene);
+    let plan = GroupPlan {
+        path: PathInfo::of(&workload.path, workload, protocol.cold),
+        scene: &scene,
+        process: 0,
+        protocol: *protocol,
+        bounds,
+        known: None,
+        plan_only: false,
+        locate: true,
+    };
+    let (part, _) = measure_part(workload, contenders, plan, &|_, _| (), stop)?;
+    Some(Group::of(&[part]))
+}
+
+/// ln ns per query in each process, by label and task.
+type Logs<'p> = BTreeMap<(&'p str, Task), Vec<f64>>;
+
+impl Group {
+    /// Of the parts of one group, one for each process, the first process first.
+    ///
+    /// # Panics
+    /// Without parts.
+    pub fn of(parts: &[Part]) -> Group {
+        let facts = Facts::of(parts);
+        let first = &parts[0];
+        let mut cells: Vec<Cell> = first
+            .subjects
+            .iter()
+            .filter(|s| !s.label.ends_with(TWIN))
+            .map(|subject| facts.cell(subject))
+            .collect();
+        facts.rank(&mut cells);
+        Group {
+            bounds: first.bounds.iter().map(|name| facts.bound(name)).collect(),
+            twin: facts.twin(),
+            cells,
+        }
+    }
+}
+
+/// The parts of a group in the form that cells are read off.
+struct Facts<'p> {
+    parts: &'p [Part],
+    /// Structures whose timed pass is not what the plan asks for.
+    contradictions: Vec<(&'p str, Verdict)>,
+    logs: Logs<'p>,
+    /// ln ns of the yardstick for each task, or of the first structure that has
+    /// times where there is no yardstick.
+    reference: BTreeMap<Task, &'p str>,
+    has_yardstick: bool,
+}
+
+impl<'p> Facts<'p> {
+    fn of(parts: &'p [Part]) -> Facts<'p> {
+        let mut logs: Logs = BTreeMap::new();
+        for task in parts.iter().flat_map(|part| &part.tasks) {
+            let rounds: Vec<f64> = task.rounds_ns.iter().map(|ns| ns.ln()).collect();
+            if let (Some(ln_ns), Status::Ok) = (interquartile_mean(&rounds), task.verdict.status) {
+                logs.entry((&task.label, task.task))
+                    .or_default()
+                    .push(ln_ns);
+            }
+        }
+        // What is not there in every process is paired with nothing.
+        let processes = logs.values().map(Vec::len).max().unwrap_or(0);
+        logs.retain(|_, own| own.len() == processes);
+        let known = parts.iter().find_map(|part| part.known.as_ref());
+        let contradictions = known.map_or_else(Vec::new, |known| {
+            let of_part = |part: &'p Part| part.contradictions(known);
+            parts.iter().flat_map(of_part).collect()
+        });
+        let mut facts = Facts {
+            parts,
+            contradictions,
+            logs,
+            reference: BTreeMap::new(),
+            has_yardstick: false,
+        };
+        let right = |label: &str| facts.verdict(label).status == Status::Ok;
+        let labels = parts[0].subjects.iter().map(|s| s.label.as_str());
+        let has_yardstick = right(YARDSTICK) && facts.logs.contains_key(&(YARDSTICK, Task::Query));
+        let reference = match has_yardstick {
+            true => Some(YARDSTICK),
+            false => labels
+                .filter(|label| right(label))
+                .find(|label| facts.logs.contains_key(&(*label, Task::Query))),
+        };
+        let tasks = [Task::Query, Task::Locate, Task::LocateBatched];
+        let reference = reference
+            .iter()
+            .flat_map(|label| tasks.map(|task| (task, *label)));
+        facts.reference = reference.collect();
+        facts.has_yardstick = has_yardstick;
+        facts
+    }
+
+    fn log<'s>(&'s self, label: &'s str, task: Task) -> Option<&'s [f64]> {
+        self.logs.get(&(label, task)).map(Vec::as_slice)
+    }
+
+    fn reference(&self, task: Task) -> Option<&[f64]> {
+        self.log(self.reference.get(&task)?, task)
+    }
+
+    /// What became of a structure over all processes: the first that failed.
+    fn verdict(&self, label: &str) -> Verdict {
+        let subjects = self.parts.iter().flat_map(|part| &part.subjects);
+        let own = subjects.filter(|s| s.label == label).map(|s| &s.verdict);
+        let tasks = self.parts.iter().flat_map(|part| &part.tasks);
+        let timed = tasks.filter(|t| t.label == label).map(|t| &t.verdict);
+        let contradictions = self.contradictions.iter();
+        let contradicted = contradictions.filter(|c| c.0 == label).map(|c| &c.1);
+        let mut all = own.chain(timed).chain(contradicted);
+        let first = all.clone().next().cloned().unwrap_or_else(Verdict::ok);
+        all.find(|v| v.status != Status::Ok)
+            .cloned()
+            .unwrap_or(first)
+    }
+
+    fn subjects(&self, label: &str) -> impl Iterator<Item = &'p SubjectPart> {
+        let all = self.parts.iter().flat_map(|part| &part.subjects);
+        all.filter(move |s| s.label == label)
+    }
+
+    fn tasks(&self, label: &str, task: Task) -> impl Iterator<Item = &'p TaskPart> {
+        let all = self.parts.iter().flat_map(|part| &part.tasks);
+        all.filter(move |t| t.label == label && t.task == task)
+    }
+
+    fn known(&self) -> Option<&'p Known> {
+        self.parts.iter().find_map(|part| part.known.as_ref())
+    }
+
+    fn cell(&self, subject: &SubjectPart) -> Cell {
+        let label = subject.label.as_str();
+        let verdict = self.verdict(label);
+        let right = verdict.status == Status::Ok;
+        let judged = self.parts[0]
+            .judged
+            .filter(|_| right || verdict.status == Status::Unsafe);
+        let mut metrics = Metrics::default();
+        self.build_metrics(&mut metrics, label);
+        for (name, &mean) in subject.counts.iter().filter(|_| right) {
+            metrics.set(name, mean);
+        }
+        if let Some(judged) = &judged {
+            error_metrics(&mut metrics, judged);
+        }
+        if right {
+            self.time_metrics(&mut metrics, label);
+            self.break_even(&mut metrics, label);
+            for bound in BOUNDS {
+                metrics.estimate(bound.ratio, self.ratio(label, bound.name));
+            }
+        }
+        Cell {
+            structure: label.to_owned(),
+            declared: Some((subject.kind, subject.origin.clone())),
+            params: subject.params.clone(),
+            rank: None,
+            times: self.times(label),
+            metrics: metrics.0,
+            judged,
+            left_out: if right {
+                self.left_out(label)
+            } else {
+                Vec::new()
+            },
+            verdict,
+        }
+    }
+
+    fn bound(&self, name: &str) -> Cell {
+        let mut metrics = Metrics::default();
+        self.time_metrics(&mut metrics, name);
+        Cell {
+            structure: name.to_owned(),
+            declared: None,
+            params: Value::Null,
+            verdict: self.verdict(name),
+            rank: None,
+            times: self.times(name),
+            metrics: metrics.0,
+            judged: None,
+            left_out: Vec::new(),
+        }
+    }
+
+    /// Metrics that an ok cell has elsewhere and not here.
+    fn left_out(&self, label: &str) -> Vec<String> {
+        let mut left_out = Vec::new();
+        let items = self.parts[0].scene.total_count;
+        if items > MOST_UPDATED {
+            left_out.push(format!(
+                "update_ms: scenes of more than {MOST_UPDATED} items are not moved"
+            ));
+        }
+        if self.log(label, Task::Locate).is_none() {
+            left_out.push("locate_ns: this suite times frustum queries only".to_owned());
+        }
+        let mut queries = self.tasks(label, Task::Query);
+        if queries.any(|task| task.tail_ns.len() < LEAST_TAIL) {
+            left_out.push(format!(
+                "query_ns_p95: fewer than {LEAST_TAIL} comparable groups of cameras"
+            ));
+        }
+        left_out
+    }
+
+    fn times(&self, label: &str) -> CellTimes {
+        let known = self.known();
+        let named = known.and_then(|known| known.query.as_ref());
+        let plan = named.and_then(|named| {
+            let place = named
+                .names
+                .iter()
+                .position(|(l, task)| l == label && *task == Task::Query)?;
+            Some((named.schedule.tasks[place], &named.schedule))
+        });
+        let mut by_process = BTreeMap::new();
+        for (metric, task) in [
+            ("query_ns", Task::Query),
+            ("locate_ns", Task::Locate),
+            ("locate_batched_ns", Task::LocateBatched),
+        ] {
+            if let Some(own) = self.log(label, task) {
+                by_process.insert(metric.to_owned(), own.iter().map(|x| x.exp()).collect());
+            }
+        }
+        let builds: Vec<f64> = self.subjects(label).filter_map(|s| s.build_ms).collect();
+        if !builds.is_empty() {
+            by_process.insert("build_ms".to_owned(), builds);
+        }
+        let rounds = self
+            .tasks(label, Task::Query)
+            .map(|t| t.rounds_ns.len())
+            .min();
+        CellTimes {
+            processes: self.log(label, Task::Query).map_or(0, <[f64]>::len),
+            rounds: rounds.unwrap_or(0),
+            cameras_timed: plan.map_or(0, |(_, schedule)| schedule.cameras.len()),
+            cameras_checked: known.map_or(0, |known| known.visible.len()),
+            batch: plan.map_or(0, |(task, _)| task.batch as usize),
+            by_process,
+        }
+    }
+
+    fn build_metrics(&self, metrics: &mut Metrics, label: &str) {
+        let ln = |values: Vec<f64>| -> Vec<f64> {
+            let positive = values.into_iter().filter(|v| *v > 0.0);
+            positive.map(f64::ln).collect()
+        };
+        let over = |values: Vec<f64>| {
+            let logs = ln(values);
+            shown(&logs, &logs)
+        };
+        let builds = self.subjects(label).filter_map(|s| s.build_ms).collect();
+        metrics.estimate("build_ms", over(builds));
+        for (share, name) in UPDATE_METRICS.into_iter().enumerate() {
+            let updates = self
+                .subjects(label)
+                .filter_map(|s| s.update_ms.get(share).copied());
+            metrics.estimate(name, over(updates.collect()));
+        }
+        let worn: Vec<f64> = self.subjects(label).filter_map(|s| s.refitted_ln).collect();
+        metrics.estimate("refitted_over_rebuilt", shown(&worn, &worn));
+        let items = self.parts[0].scene.total_count as f64;
+        let bytes = self.subjects(label).find_map(|s| s.memory_bytes);
+        if let Some(bytes) = bytes {
+            metrics.ratio("memory_bytes_per_item", bytes as f64, items);
+        }
+    }
+
+    fn time_metrics(&self, metrics: &mut Metrics, label: &str) {
+        for (task, time, speedup) in [
+            (Task::Query, "query_ns", Some("speedup")),
+            (Task::Locate, "locate_ns", Some("locate_speedup")),
+            (Task::LocateBatched, "locate_batched_ns", None),
+        ] {
+            let (Some(own), Some(reference)) = (self.log(label, task), self.reference(task)) else {
+                continue;
+            };
+            let Some(shown) = one_run(reference, own) else {
+                continue;
+            };
+            metrics.interval(time, shown.value, shown.lower.zip(shown.upper));
+            if let (Some(speedup), true) = (speedup, self.has_yardstick) {
+                let interval = shown.speedup_lower.zip(shown.speedup_upper);
+                metrics.interval(speedup, shown.speedup, interval);
+            }
+        }
+        let queries = || self.tasks(label, Task::Query);
+        let wall: Vec<f64> = queries().filter_map(|t| t.wall_ln_ns).collect();
+        metrics.estimate("query_wall_ns", shown(&wall, &wall));
+        let returned: u64 = queries().map(|t| t.returned).sum();
+        metrics.ratio(
+            "ns_per_visible",
+            queries().map(|t| t.spent_ns).sum(),
+            returned as f64,
+        );
+        let tails: Vec<&Vec<f64>> = queries().map(|t| &t.tail_ns).collect();
+        let groups = tails.iter().map(|t| t.len()).min().unwrap_or(0);
+        if groups >= LEAST_TAIL {
+            let of_group = |g: usize| median(&tails.iter().map(|t| t[g]).collect::<Vec<_>>());
+            let all = sorted((0..groups).filter_map(of_group).collect());
+            for (name, q) in [
+                ("query_ns_p5", 0.05),
+                ("query_ns_p95", 0.95),
+                ("query_ns_p99", 0.99),
+                ("query_ns_max", 1.0),
+            ] {
+                metrics.maybe(name, quantile(&all, q));
+            }
+        }
+    }
+
+    /// Queries after which a build is repaid against the yardstick, from the
+    /// times that are shown.
+    fn break_even(&self, metrics: &mut Metrics, label: &str) {
+        if !self.has_yardstick {
+            return;
+        }
+        let cost = |label: &str| -> Option<(f64, f64)> {
+            let reference = self.reference(Task::Query)?;
+            let query = one_run(reference, self.log(label, Task::Query)?)?.value;
+            let mut built = Metrics::default();
+            self.build_metrics(&mut built, label);
+            Some((built.0.get("build_ms")?.value * 1e6, query))
+        };
+        if let (Some((build, query)), Some((linear_build, linear_query))) =
+            (cost(label), cost(YARDSTICK))
+        {
+            let (price, gain) = (build - linear_build, linear_query - query);
+            if gain > 0.0 && price > 0.0 {
+                metrics.set("break_even_queries", (price / gain).ceil());
+            }
+        }
+    }
+
+    /// Time of `label` / time of `other`: the ratio of the two shown values.
+    fn ratio(&self, label: &str, other: &str) -> Option<Estimate> {
+        let reference = self.reference(Task::Query)?;
+        let (own, base) = (self.log(label, Task::Query)?, self.log(other, Task::Query)?);
+        let value = one_run(reference, own)?.value / one_run(reference, base)?.value;
+        let differences: Vec<f64> = own.iter().zip(base).map(|(a, b)| a - b).collect();
+        Some(match trimmed_mean(&differences) {
+            Some(found) => {
+                let (lower, upper) = found.interval(0.95);
+                Estimate {
+                    value,
+                    lower: value * (lower - found.mean).exp(),
+                    upper: value * (upper - found.mean).exp(),
+                }
+            }
+            None => Estimate {
+                value,
+                lower: f64::NAN,
+                upper: f64::NAN,
+            },
+        })
+    }
+
+    fn twin(&self) -> Option<(String, Metric)> {
+        let mut labels = self.parts[0].subjects.iter().map(|s| s.label.as_str());
+        let twin = labels.find(|label| label.ends_with(TWIN))?;
+        let original = twin.strip_suffix(TWIN)?;
+        let ratio = self.ratio(twin, original)?;
+        let interval = |bound: f64| Some(bound).filter(|b| b.is_finite());
+        let metric = Metric {
+            value: ratio.value,
+            lower: interval(ratio.lower),
+            upper: interval(ratio.upper),
+            unit: "1".to_owned(),
+        };
+        Some((original.to_owned(), metric))
+    }
+
+    fn rank(&self, cells: &mut [Cell]) {
+        let Some(reference) = self.reference(Task::Query) else {
+            return;
+        };
+        let mut ranked = Vec::new();
+        let mut values = Vec::new();
+        for (i, cell) in cells.iter().enumerate() {
+            let own = self.log(&cell.structure, Task::Query);
+            if let (Some(own), Status::Ok) = (own, cell.verdict.status) {
+                ranked.push(i);
+                values.push(own.iter().zip(reference).map(|(own, r)| own - r).collect());
+            }
+        }
+        for (i, placed) in ranked.into_iter().zip(ranks(&values, RANK_ALPHA)) {
+            cells[i].rank = Some(placed.rank);
+        }
+    }
+}
+
+/// A value over processes from its logarithms.
+fn shown(reference: &[f64], own: &[f64]) -> Option<Estimate> {
+    let found = one_run(reference, own)?;
+    Some(Estimate {
+        value: found.value,
+        lower: found.lower.unwrap_or(f64::NAN),
+        upper: found.upper.unwrap_or(f64::NAN),
+    })
+}
+
+fn error_metrics(metrics: &mut Metrics, judged: &Judged) {
+    let (errors, queries) = (&judged.errors, judged.judged_queries as f64);
+    metrics.set("judged_queries", queries);
+    metrics.maybe("excess", errors.excess());
+    for (name, count) in [
+        ("false_positive_count", errors.false_positives),
+        ("false_negative_count", errors.false_negatives),
+        ("touch_dropped_count", errors.touch_dropped),
+        ("undecided_count", errors.undecided),
+    ] {
+        metrics.ratio(name, count as f64, queries);
+    }
+    metrics.set("worst_miss", errors.worst_miss);
+}
+
+#[cfg(test)]
+mod tests;

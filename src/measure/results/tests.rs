@@ -1,0 +1,317 @@
+//! Cells from parts that were made by hand: what is shown of them.
+
+use serde_json::json;
+
+use super::super::{Answer, GroupKey, NamedSchedule, Schedule, TaskPlan};
+use super::*;
+
+/// Time per query of a task in each process, ns.
+type Times<'t> = (&'t str, Task, &'t [f64]);
+
+/// Cameras, ids per answer and rounds of every schedule here.
+const CAMERAS: u64 = 4;
+const IDS: u64 = 5;
+const ROUNDS: u64 = 3;
+
+fn subject(label: &str, build_ms: f64) -> SubjectPart {
+    SubjectPart {
+        label: label.to_owned(),
+        params: Value::Null,
+        kind: Kind::Tree,
+        origin: Origin::Ours,
+        verdict: Verdict::ok(),
+        build_ms: Some(build_ms),
+        memory_bytes: Some(4000),
+        update_ms: Vec::new(),
+        refitted_ln: None,
+        counts: BTreeMap::new(),
+    }
+}
+
+/// A part of each process; builds take 1 ms for `linear`, 2 ms for all others.
+fn parts(times: &[Times]) -> Vec<Part> {
+    let mut labels: Vec<&str> = times.iter().map(|(label, ..)| *label).collect();
+    labels.dedup();
+    let answer = Answer {
+        count: IDS,
+        digest: 7,
+    };
+    let schedule = |of: fn(Task) -> bool| {
+        let names: Vec<(String, Task)> = times
+            .iter()
+            .filter(|(_, task, _)| of(*task))
+            .map(|(label, task, _)| ((*label).to_owned(), *task))
+            .collect();
+        let tasks = names.iter().map(|_| TaskPlan { batch: 2, every: 1 });
+        Some(NamedSchedule {
+            schedule: Schedule {
+                cameras: (0..CAMERAS as u32).collect(),
+                rounds: ROUNDS as u32,
+                cold: false,
+                tasks: tasks.collect(),
+            },
+            names,
+        })
+    };
+    let known = Known {
+        visible: vec![answer; CAMERAS as usize],
+        located: vec![answer; CAMERAS as usize],
+        query: schedule(|task| task == Task::Query),
+        locate: schedule(|task| task != Task::Query),
+        lens_scale: None,
+    };
+    let key = GroupKey {
+        scene: "s".to_owned(),
+        path: "p".to_owned(),
+        cache: "warm".to_owned(),
+        test: "six-plane".to_owned(),
+        arithmetic: "f32".to_owned(),
+        planes: "frame".to_owned(),
+        epsilon: 8.0,
+    };
+    let processes = times[0].2.len();
+    let part = |process: usize| Part {
+        scene: SceneInfo {
+            total_count: 1000,
+            ..SceneInfo::unknown("s")
+        },
+        path: PathInfo::unknown(&key),
+        key: key.clone(),
+        process: process as u32,
+        known: Some(known.clone()).filter(|_| process == 0),
+        judged: None,
+        subjects: labels
+            .iter()
+            .map(|label| subject(label, if *label == YARDSTICK { 1.0 } else { 2.0 }))
+            .collect(),
+        bounds: Vec::new(),
+        tasks: times
+            .iter()
+            .map(|(label, task, ns)| TaskPart {
+                label: (*label).to_owned(),
+                task: *task,
+                verdict: Verdict::ok(),
+                rounds_ns: vec![ns[process]; ROUNDS as usize],
+                wall_ln_ns: Some(ns[process].ln()),
+                tail_ns: Vec::new(),
+                returned: ROUNDS * CAMERAS * IDS,
+                spent_ns: ns[process] * (ROUNDS * CAMERAS) as f64,
+            })
+            .collect(),
+    };
+    (0..processes).map(part).collect()
+}
+
+/// Times of twelve processes on a machine of two speeds: `factor` times those
+/// of the yardstick, with a scatter of its own.
+fn times(factor: f64, salt: u64) -> Vec<f64> {
+    let process = |n: u64| {
+        let machine = if n.is_multiple_of(3) { 1.3 } else { 1.0 };
+        let mixed = (n * 31 + salt).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        let own = ((mixed >> 33) % 11) as f64 - 5.0;
+        1000.0 * factor * machine * (1.0 + 0.002 * own)
+    };
+    (0..12).map(process).collect()
+}
+
+#[test]
+fn values_lie_in_their_intervals_and_ratios_are_those_of_the_shown_values() {
+    let (linear, fast, slow, same) = (times(1.0, 1), times(0.2, 2), times(3.0, 3), times(0.2, 4));
+    let group = Group::of(&parts(&[
+        ("linear", Task::Query, &linear),
+        ("fast", Task::Query, &fast),
+        ("slow", Task::Query, &slow),
+        ("same", Task::Query, &same),
+    ]));
+    let value = |cell: &Cell, metric: &str| cell.metrics[metric].value;
+    for cell in &group.cells {
+        for (name, metric) in &cell.metrics {
+            let Some((lower, upper)) = metric.lower.zip(metric.upper) else {
+                continue;
+            };
+            let held = lower <= metric.value && metric.value <= upper;
+            assert!(held, "{}: {name} {metric:?}", cell.structure);
+        }
+        let has_interval = cell.metrics["query_ns"].lower.is_some();
+        assert!(has_interval, "{}", cell.structure);
+        let of_shown = value(&group.cells[0], "query_ns") / value(cell, "query_ns");
+        let found = value(cell, "speedup");
+        assert!((found / of_shown - 1.0).abs() < 1e-12, "{found} {of_shown}");
+        assert_eq!((cell.times.processes, cell.times.rounds), (12, 3));
+        assert_eq!((cell.times.cameras_timed, cell.times.batch), (4, 2));
+    }
+    // The machine's speeds are in the time, and not in the ratio.
+    let fast = &group.cells[1].metrics["speedup"];
+    assert!((fast.value - 5.0).abs() < 0.05, "{fast:?}");
+    assert!(fast.upper.unwrap() / fast.lower.unwrap() < 1.03, "{fast:?}");
+}
+
+#[test]
+fn ranks_are_shared_by_what_no_test_tells_apart() {
+    let (linear, fast, same, slow) = (times(1.0, 1), times(0.2, 2), times(0.2, 4), times(0.3, 3));
+    let group = Group::of(&parts(&[
+        ("linear", Task::Query, &linear),
+        ("slow", Task::Query, &slow),
+        ("fast", Task::Query, &fast),
+        ("same", Task::Query, &same),
+    ]));
+    let ranks: Vec<_> = group.cells.iter().map(|cell| cell.rank).collect();
+    assert_eq!(ranks, [Some(4), Some(3), Some(1), Some(1)]);
+}
+
+#[test]
+fn one_process_has_values_and_no_intervals() {
+    let group = Group::of(&parts(&[
+        ("linear", Task::Query, &[1000.0]),
+        ("fast", Task::Query, &[250.0]),
+    ]));
+    let fast = &group.cells[1];
+    for name in ["query_ns", "speedup", "build_ms", "query_wall_ns"] {
+        let metric = &fast.metrics[name];
+        assert_eq!((metric.lower, metric.upper), (None, None), "{name}");
+    }
+    assert!((fast.metrics["query_ns"].value - 250.0).abs() < 1e-9);
+    assert!((fast.metrics["speedup"].value - 4.0).abs() < 1e-12);
+}
+
+#[test]
+fn the_twin_is_no_cell_and_its_interval_holds_one() {
+    let (linear, fast, again) = (times(1.0, 1), times(0.2, 2), times(0.2, 4));
+    let group = Group::of(&parts(&[
+        ("linear", Task::Query, &linear),
+        ("fast", Task::Query, &fast),
+        ("fast#twin", Task::Query, &again),
+    ]));
+    assert_eq!(group.cells.len(), 2);
+    let (label, ratio) = group.twin.unwrap();
+    assert_eq!(label, "fast");
+    assert!(ratio.lower.unwrap() <= 1.0 && 1.0 <= ratio.upper.unwrap());
+    assert!((ratio.value - 1.0).abs() < 0.01, "{ratio:?}");
+}
+
+#[test]
+fn what_failed_in_one_process_is_not_ok_and_has_no_time() {
+    let (linear, fast) = (times(1.0, 1), times(0.2, 2));
+    let sound = parts(&[
+        ("linear", Task::Query, &linear),
+        ("fast", Task::Query, &fast),
+    ]);
+    let failed = Verdict::new(Status::OutOfMemory, "killed while timing");
+    let (mut as_subject, mut as_task) = (sound.clone(), sound);
+    as_subject[7].subjects[1].verdict = failed.clone();
+    as_subject[7].tasks.pop();
+    as_task[7].tasks[1].verdict = failed.clone();
+    as_task[7].tasks[1].rounds_ns.clear();
+    for parts in [as_subject, as_task] {
+        let group = Group::of(&parts);
+        let [linear, fast] = &group.cells[..] else {
+            panic!("two cells");
+        };
+        assert_eq!(fast.verdict, failed);
+        assert_eq!((fast.rank, linear.rank), (None, Some(1)));
+        assert!(!fast.metrics.contains_key("query_ns"));
+        assert_eq!(linear.times.processes, 12);
+    }
+}
+
+#[test]
+fn a_build_breaks_even_by_the_times_that_are_shown() {
+    let (linear, fast) = (times(1.0, 1), times(0.2, 2));
+    let group = Group::of(&parts(&[
+        ("linear", Task::Query, &linear),
+        ("fast", Task::Query, &fast),
+    ]));
+    let [linear, fast] = &group.cells[..] else {
+        panic!("two cells");
+    };
+    let value = |cell: &Cell, metric: &str| cell.metrics[metric].value;
+    let price = (value(fast, "build_ms") - value(linear, "build_ms")) * 1e6;
+    let gain = value(linear, "query_ns") - value(fast, "query_ns");
+    assert_eq!(value(fast, "break_even_queries"), (price / gain).ceil());
+    assert!(!linear.metrics.contains_key("break_even_queries"));
+}
+
+#[test]
+fn a_tail_is_read_off_twenty_groups_and_not_fewer() {
+    let linear = times(1.0, 1);
+    for groups in [19, 20] {
+        let mut parts = parts(&[("linear", Task::Query, &linear)]);
+        for part in &mut parts {
+            part.tasks[0].tail_ns = (1..=groups).map(f64::from).collect();
+        }
+        let metrics = &Group::of(&parts).cells[0].metrics;
+        for name in ["query_ns_p5", "query_ns_p95", "query_ns_p99"] {
+            assert_eq!(metrics.contains_key(name), groups == 20, "{name}");
+        }
+        let slowest = metrics.get("query_ns_max").map(|m| m.value);
+        assert_eq!(slowest, (groups == 20).then_some(20.0));
+    }
+}
+
+#[test]
+fn without_the_yardstick_there_are_times_and_ranks_but_no_speed_ups() {
+    let (bvh, octree) = (times(1.0, 1), times(2.0, 2));
+    let group = Group::of(&parts(&[
+        ("octree", Task::Query, &octree),
+        ("bvh", Task::Query, &bvh),
+    ]));
+    let ranks: Vec<_> = group.cells.iter().map(|cell| cell.rank).collect();
+    assert_eq!(ranks, [Some(2), Some(1)]);
+    for cell in &group.cells {
+        assert!(cell.metrics.contains_key("query_ns"));
+        for absent in ["speedup", "break_even_queries"] {
+            assert!(!cell.metrics.contains_key(absent), "{absent}");
+        }
+    }
+}
+
+#[test]
+fn a_pass_that_is_not_the_plan_s_makes_its_structure_wrong() {
+    let (linear, fast) = (times(1.0, 1), times(0.2, 2));
+    let sound = parts(&[
+        ("linear", Task::Query, &linear),
+        ("linear", Task::Locate, &linear),
+        ("fast", Task::Query, &fast),
+        ("fast", Task::Locate, &fast),
+    ]);
+    let statuses = |change: &dyn Fn(&mut Part)| {
+        let mut parts = sound.clone();
+        change(&mut parts[5]);
+        let group = Group::of(&parts);
+        let found = group.cells.iter().map(|cell| cell.verdict.status);
+        found.collect::<Vec<_>>()
+    };
+    let (ok, wrong) = (Status::Ok, Status::Wrong);
+    assert_eq!(statuses(&|_| ()), [ok, ok]);
+    // A sample is dropped, or comes twice.
+    assert_eq!(statuses(&|part| part.tasks[2].returned -= IDS), [ok, wrong]);
+    assert_eq!(statuses(&|part| part.tasks[1].returned += IDS), [wrong, ok]);
+    assert_eq!(
+        statuses(&|part| part.tasks[0].rounds_ns.push(900.0)),
+        [wrong, ok]
+    );
+    // Times of the one under the name of the other.
+    let swapped = statuses(&|part| {
+        part.tasks[0].label = "fast".to_owned();
+        part.tasks[2].label = "linear".to_owned();
+    });
+    assert!(swapped.contains(&wrong), "{swapped:?}");
+    // A bound's answer is its own business; its name and rounds are not.
+    let bound = statuses(&|part| {
+        part.bounds.push("fast".to_owned());
+        part.tasks[2].returned = 1;
+        part.tasks[3].returned = 1;
+    });
+    assert_eq!(bound, [ok, ok]);
+}
+
+/// Reports keep what cells rest on.
+#[test]
+fn times_of_cells_survive_json() {
+    let linear = times(1.0, 1);
+    let group = Group::of(&parts(&[("linear", Task::Query, &linear)]));
+    let times = &group.cells[0].times;
+    let back: CellTimes = serde_json::from_value(json!(times)).unwrap();
+    assert_eq!(&back, times);
+    assert_eq!(back.by_process["query_ns"].len(), 12);
+}

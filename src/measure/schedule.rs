@@ -1,0 +1,243 @@
+//! What the timed pass does, fixed before it begins: which cameras are timed, how
+//! many queries share a clock reading, how often each task takes part. The same
+//! for all processes of a run and for both sides of a comparison.
+
+use serde::{Deserialize, Serialize};
+
+use super::clock::Stopwatch;
+use super::competitor::Competitor;
+use super::contender::guarded;
+use crate::query::ItemId;
+use crate::statistics::median;
+
+/// How much is to be measured.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Protocol {
+    /// Rounds of a task, at least and at most.
+    pub rounds: [usize; 2],
+    /// CPU time of a task in one process, warm-up included, ns: decides on the
+    /// number of rounds between those bounds.
+    pub task_ns: f64,
+    /// Most cameras that are timed, evenly spread over the path.
+    pub cameras: usize,
+    /// Stream over the caches before every query.
+    pub cold: bool,
+    /// Decides on the order of the tasks in each round.
+    pub seed: u64,
+    /// Bytes to stream over for a cold query.
+    pub cache_bytes: usize,
+}
+
+/// A clock reading with its loop costs at most this, ns; a lap is made long
+/// enough for it. On Linux reading a thread's CPU time is a system call.
+pub const CLOCK_NS: f64 = 650.0;
+/// Largest share of a lap that the clock may take.
+pub const MOST_OVERHEAD: f64 = 0.01;
+/// Cold queries cost a sweep over memory each: fewer cameras.
+const COLD_CAMERAS: usize = 24;
+/// Never so few that a path is one view.
+const LEAST_CAMERAS: usize = 8;
+/// Queries that a cost is measured by where it is not counted.
+const PILOT: usize = 24;
+
+/// The plan of one timed pass.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Schedule {
+    /// Cameras of the path that are timed, by their index.
+    pub cameras: Vec<u32>,
+    pub rounds: u32,
+    pub cold: bool,
+    /// In the order of the tasks.
+    pub tasks: Vec<TaskPlan>,
+}
+
+/// How one task takes part.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct TaskPlan {
+    /// Queries per clock reading.
+    pub batch: u32,
+    /// Takes part in every so many-th round: slow tasks in fewer.
+    pub every: u32,
+}
+
+impl Protocol {
+    /// The cameras that are timed, of so many.
+    pub fn cameras_of(&self, count: usize) -> Vec<u32> {
+        let most = match self.cold {
+            true => self.cameras.min(COLD_CAMERAS),
+            false => self.cameras,
+        };
+        let wanted = most.max(LEAST_CAMERAS).min(count);
+        (0..wanted).map(|k| (k * count / wanted) as u32).collect()
+    }
+}
+
+/// Most cameras of which a plain loop over so many items takes no longer than
+/// `pass_ns`. It depends on the question alone, so that every run of one
+/// command times the same cameras.
+pub fn cameras_within(pass_ns: f64, items: usize) -> usize {
+    /// Time of a box in the plain loop, ns.
+    const BOX_NS: f64 = 5.0;
+    (pass_ns / (BOX_NS * items.max(1) as f64)) as usize
+}
+
+impl Schedule {
+    /// Plans a pass over `count` cameras. Queries per clock reading follow from
+    /// what was counted, and are the same in every run; where a task does not
+    /// know its cost, from the median of a few queries.
+    pub fn new(count: usize, tasks: &[Competitor], protocol: &Protocol) -> Schedule {
+        let cameras = protocol.cameras_of(count);
+        let timed = cameras.len().max(1);
+        let mut out = Vec::new();
+        let [least, most] = protocol.rounds;
+        let plans: Vec<(u32, usize)> = tasks
+            .iter()
+            .map(|task| {
+                // A panic is the task's own result when its pass comes.
+                let pilot = guarded(|| pilot(task, &cameras, &mut out)).unwrap_or(1.0);
+                let batch = match (&task.ask_many, protocol.cold) {
+                    (Some(_), _) => timed,
+                    (None, true) => 1,
+                    (None, false) => batch(task.least_ns.unwrap_or(pilot), timed),
+                };
+                let pass = 2.0 * (pilot * timed as f64).max(1.0);
+                let rounds = match protocol.cold {
+                    true => least,
+                    false => ((protocol.task_ns / pass) as usize).clamp(least, most.max(least)),
+                };
+                (batch as u32, rounds.max(1))
+            })
+            .collect();
+        let rounds = plans.iter().map(|p| p.1).max().unwrap_or(0);
+        Schedule {
+            cameras,
+            rounds: rounds as u32,
+            cold: protocol.cold,
+            tasks: plans
+                .into_iter()
+                .map(|(batch, own)| TaskPlan {
+                    batch,
+                    every: (rounds / own).max(1) as u32,
+                })
+                .collect(),
+        }
+    }
+
+    /// The plan for the tasks `kept` of the ones it was made for.
+    pub fn of_tasks(&self, kept: &[usize]) -> Schedule {
+        Schedule {
+            tasks: kept.iter().map(|&i| self.tasks[i]).collect(),
+            ..self.clone()
+        }
+    }
+}
+
+/// Median CPU time of a query, ns.
+fn pilot(task: &Competitor, cameras: &[u32], out: &mut Vec<ItemId>) -> f64 {
+    let some = cameras.len().min(PILOT);
+    let mut asked: Vec<u32> = (0..some)
+        .map(|k| cameras[k * cameras.len() / some])
+        .collect();
+    if task.ask_many.is_some() {
+        asked = cameras.to_vec();
+        let watch = Stopwatch::start();
+        task.ask_all(&asked, out);
+        return watch.lap().cpu_ns / asked.len().max(1) as f64;
+    }
+    // Twice: the first time fills caches and grows the output.
+    let mut laps = Vec::new();
+    for turn in 0..2 {
+        for camera in &asked {
+            let watch = Stopwatch::start();
+            task.ask_all(std::slice::from_ref(camera), out);
+            if turn == 1 {
+                laps.push(watch.lap().cpu_ns);
+            }
+        }
+    }
+    let middle = median(&laps).unwrap_or(1.0);
+    (middle - CLOCK_NS).max(middle / 8.0).max(1.0)
+}
+
+/// The smallest power of two of queries that makes the clock negligible.
+fn batch(query_ns: f64, cameras: usize) -> usize {
+    let needed = CLOCK_NS / (MOST_OVERHEAD * query_ns.max(1.0));
+    (needed.ceil().max(1.0) as usize)
+        .next_power_of_two()
+        .min(cameras)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn protocol() -> Protocol {
+        Protocol {
+            rounds: [3, 40],
+            task_ns: 1e6,
+            cameras: 40,
+            cold: false,
+            seed: 1,
+            cache_bytes: 0,
+        }
+    }
+
+    #[test]
+    fn cameras_follow_from_the_question_alone() {
+        assert_eq!(cameras_within(25e6, 100_000), 50);
+        assert_eq!(protocol().cameras_of(40), (0..40).collect::<Vec<_>>());
+        assert_eq!(protocol().cameras_of(120)[..3], [0, 3, 6]);
+        // However large the scene, a path is never fewer than eight views.
+        let few = Protocol {
+            cameras: 0,
+            ..protocol()
+        };
+        assert_eq!(few.cameras_of(40).len(), 8);
+        assert_eq!(few.cameras_of(3), [0, 1, 2]);
+        let cold = Protocol {
+            cold: true,
+            cameras: 500,
+            ..protocol()
+        };
+        assert_eq!(cold.cameras_of(1000).len(), COLD_CAMERAS);
+        assert_eq!(cold.cameras_of(0).len(), 0);
+    }
+
+    #[test]
+    fn laps_are_long_enough_for_the_clock() {
+        for ns in [1.0, 80.0, 1000.0, 1e5] {
+            let batch = batch(ns, usize::MAX) as f64;
+            assert!(CLOCK_NS <= MOST_OVERHEAD * batch * ns, "{ns}");
+            assert!(batch == 1.0 || CLOCK_NS > MOST_OVERHEAD * batch / 2.0 * ns);
+        }
+        assert_eq!(batch(1.0, 40), 40);
+    }
+
+    #[test]
+    fn slow_tasks_take_part_in_fewer_rounds() {
+        let spin = |ns: u64| Competitor {
+            ask: Box::new(move |_, _| {
+                let watch = Stopwatch::start();
+                while watch.lap().cpu_ns < ns as f64 {}
+            }),
+            ask_many: None,
+            expected: vec![0; 40],
+            least_ns: Some(1e5),
+        };
+        let tasks = [spin(1_000), spin(300_000)];
+        // Room for forty rounds of the first, however slow its clock is.
+        let protocol = Protocol {
+            task_ns: 1e8,
+            ..protocol()
+        };
+        let schedule = Schedule::new(40, &tasks, &protocol);
+        assert_eq!(schedule.tasks[0].batch, 1);
+        assert_eq!(schedule.tasks[0].every, 1);
+        assert!(schedule.tasks[1].every >= 2, "{schedule:?}");
+        assert!(schedule.rounds / schedule.tasks[1].every >= 3);
+        let second = schedule.of_tasks(&[1]);
+        assert_eq!(second.tasks, [schedule.tasks[1]]);
+    }
+}

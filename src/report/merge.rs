@@ -1,0 +1,308 @@
+//! Joining the shards of one plan into the run that they are together: what
+//! must not be mixed is refused by name, and the groups come in the order of
+//! the whole plan.
+
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+use super::folder::{self, FolderError, REPORT, SAMPLES, STREAM, SUMMARY, save_report};
+use super::reading::read_stream;
+use super::stream::{Difference, Header, KeptPart, Line, Stream};
+use crate::measure::GroupKey;
+
+/// Why runs are not shards of one plan.
+#[derive(Debug, thiserror::Error)]
+pub enum MergeError {
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    #[error("{}: the run is not finished; expected a finished one (run --resume --out {})", path.display(), path.display())]
+    Unfinished { path: PathBuf },
+    #[error("{}: the {} is '{}', and '{}' in {}; expected the same in all shards", path.display(), difference.what, difference.here, difference.before, first.display())]
+    Differs {
+        path: PathBuf,
+        first: PathBuf,
+        difference: Difference,
+    },
+    #[error("{}: a shard of another plan than {}; expected the same scenes, paths and tests", path.display(), first.display())]
+    Plan { path: PathBuf, first: PathBuf },
+    #[error("{}: {pair} is in {} as well; expected every cell in one shard", path.display(), first.display())]
+    Twice {
+        path: PathBuf,
+        first: PathBuf,
+        pair: String,
+    },
+    #[error("{}: scene '{scene}' is another one than in {}; expected the same file", path.display(), first.display())]
+    Scene {
+        path: PathBuf,
+        first: PathBuf,
+        scene: String,
+    },
+    #[error("{}: {found} bytes; expected {wanted} that stream.jsonl refers to", path.display())]
+    Samples {
+        path: PathBuf,
+        found: u64,
+        wanted: u64,
+    },
+    #[error("no shard has {missing}; expected all of the plan (--partial joins what is there)")]
+    Missing { missing: String },
+}
+
+/// Shards that belong together, joined but not written.
+pub struct Merged {
+    pub stream: Stream,
+    /// The groups of the plan that no shard has.
+    pub missing: Vec<GroupKey>,
+    /// By part: the file its samples are in, and where.
+    samples: Vec<(PathBuf, [u64; 2])>,
+}
+
+/// Joins the folders of shards. `args` are the options that the shards have in
+/// common; what they are is the caller's to compare.
+///
+/// # Errors
+/// An unfinished shard; another seed, suite, structure, machine, build or
+/// source; a cell in two shards; without `partial` a group in none.
+pub fn merge(folders: &[PathBuf], args: &[String], partial: bool) -> Result<Merged, MergeError> {
+    let mut shards = Vec::new();
+    for path in folders {
+        let (stream, _) = read_stream(&path.join(STREAM))?;
+        if !stream.is_finished() {
+            return Err(MergeError::Unfinished { path: path.clone() });
+        }
+        shards.push((path, stream));
+    }
+    let (first, begin) = &shards[0];
+    for (n, (path, stream)) in shards.iter().enumerate() {
+        belongs(&begin.header, &stream.header, path, first)?;
+        for (before, other) in &shards[..n] {
+            apart(stream, other, path, before)?;
+        }
+    }
+    let whole = begin.header.whole().to_vec();
+    let has = |key: &&GroupKey| shards.iter().any(|(_, s)| s.header.groups.contains(key));
+    let missing: Vec<GroupKey> = whole.iter().filter(|key| !has(key)).cloned().collect();
+    if !missing.is_empty() && !partial {
+        let missing = pairs(&missing);
+        return Err(MergeError::Missing { missing });
+    }
+    let mut parts = Vec::new();
+    for (path, stream) in &shards {
+        let mut from = folder::samples_begin();
+        let file = path.join(SAMPLES);
+        for kept in &stream.parts {
+            parts.push((kept, (file.clone(), [from, kept.samples_end])));
+            from = kept.samples_end;
+        }
+        let found = fs::metadata(&file).map_err(|source| FolderError::Io {
+            path: file.clone(),
+            source,
+        })?;
+        if found.len() < from {
+            return Err(MergeError::Samples {
+                path: file,
+                found: found.len(),
+                wanted: from,
+            });
+        }
+    }
+    // As one run would have measured them: scene by scene, process by process.
+    let place = |key: &GroupKey| whole.iter().position(|other| other == key);
+    let scene = |key: &GroupKey| whole.iter().position(|other| other.scene == key.scene);
+    parts.sort_by_key(|(kept, _)| {
+        let part = &kept.part;
+        (scene(&part.key), part.process, place(&part.key))
+    });
+    let mut end = folder::samples_begin();
+    let (mut kept, mut samples) = (Vec::new(), Vec::new());
+    for (part, (file, range)) in parts {
+        end += range[1] - range[0];
+        kept.push(KeptPart {
+            samples_end: end,
+            ..part.clone()
+        });
+        samples.push((file, range));
+    }
+    let headers: Vec<&Stream> = shards.iter().map(|(_, stream)| stream).collect();
+    Ok(Merged {
+        stream: Stream {
+            header: joined(&headers, args, !missing.is_empty()),
+            parts: kept,
+            finished_at: headers.iter().filter_map(|s| s.finished_at.clone()).max(),
+        },
+        missing,
+        samples,
+    })
+}
+
+impl Merged {
+    /// The scenes and paths that no shard has, a few of them by name.
+    pub fn missing_named(&self) -> String {
+        pairs(&self.missing)
+    }
+
+    /// Writes the four files of a run into a folder that holds none: beside
+    /// their place first, so that an error leaves nothing.
+    ///
+    /// # Errors
+    /// [`FolderError::Taken`]; what the file system says.
+    pub fn write(&self, out: &Path) -> Result<(), FolderError> {
+        let io = |source| FolderError::Io {
+            path: out.to_owned(),
+            source,
+        };
+        folder::refuse_taken(out)?;
+        let is_new = !out.exists();
+        let parent = match out.parent() {
+            Some(parent) if is_new && !parent.as_os_str().is_empty() => parent,
+            _ if is_new => Path::new("."),
+            _ => out,
+        };
+        fs::create_dir_all(parent).map_err(io)?;
+        let beside = folder::temporary_folder_in(parent).map_err(io)?;
+        self.write_samples(&beside.path().join(SAMPLES))
+            .and_then(|()| self.write_stream(&beside.path().join(STREAM)))
+            .map_err(io)?;
+        save_report(beside.path(), &self.stream.report())?;
+        if is_new {
+            fs::create_dir(out).map_err(io)?;
+        }
+        // The stream last: with it there is a run.
+        for name in [SAMPLES, SUMMARY, REPORT, STREAM] {
+            if let Err(error) = fs::rename(beside.path().join(name), out.join(name)) {
+                for name in [SAMPLES, SUMMARY, REPORT] {
+                    let _ = fs::remove_file(out.join(name));
+                }
+                return Err(io(error));
+            }
+        }
+        Ok(())
+    }
+
+    fn write_samples(&self, path: &Path) -> io::Result<()> {
+        let mut out = BufWriter::new(File::create_new(path)?);
+        out.write_all(folder::columns().as_bytes())?;
+        for (file, [from, to]) in &self.samples {
+            let mut file = File::open(file)?;
+            file.seek(SeekFrom::Start(*from))?;
+            io::copy(&mut file.take(to - from), &mut out)?;
+        }
+        out.flush()
+    }
+
+    fn write_stream(&self, path: &Path) -> io::Result<()> {
+        let mut out = BufWriter::new(File::create_new(path)?);
+        let mut line = |line: &Line| -> io::Result<()> {
+            serde_json::to_writer(&mut out, line)?;
+            out.write_all(b"\n")
+        };
+        line(&Line::Run(Box::new(self.stream.header.clone())))?;
+        for kept in &self.stream.parts {
+            line(&Line::Part(Box::new(kept.clone())))?;
+        }
+        if let Some(at) = self.stream.finished_at.clone() {
+            line(&Line::Finished { at })?;
+        }
+        out.flush()
+    }
+}
+
+/// Whether a shard is one of the same plan, from the same machine and build.
+fn belongs(begin: &Header, own: &Header, path: &Path, first: &Path) -> Result<(), MergeError> {
+    let difference = begin.differs_in_plan(own);
+    if let Some(difference) = difference.or_else(|| begin.differs_in_place(own)) {
+        return Err(MergeError::Differs {
+            path: path.to_owned(),
+            first: first.to_owned(),
+            difference,
+        });
+    }
+    match begin.whole() == own.whole() {
+        true => Ok(()),
+        false => Err(MergeError::Plan {
+            path: path.to_owned(),
+            first: first.to_owned(),
+        }),
+    }
+}
+
+/// Whether two shards have no cell in common, and the same scene under a name.
+fn apart(own: &Stream, other: &Stream, path: &Path, first: &Path) -> Result<(), MergeError> {
+    let mut groups = own.header.groups.iter();
+    if let Some(key) = groups.find(|key| other.header.groups.contains(key)) {
+        return Err(MergeError::Twice {
+            path: path.to_owned(),
+            first: first.to_owned(),
+            pair: pairs(std::slice::from_ref(key)),
+        });
+    }
+    let scenes = |stream: &'_ Stream| -> Vec<(String, String)> {
+        let parts = stream.parts.iter().map(|kept| &kept.part);
+        // One that could not be looked at has no digest.
+        let known = parts.filter(|part| !part.scene.digest.is_empty());
+        known
+            .map(|part| (part.key.scene.clone(), part.scene.digest.clone()))
+            .collect()
+    };
+    let before = scenes(other);
+    let differs = |(name, digest): &(String, String)| {
+        let mut same = before.iter().filter(|(other, _)| other == name);
+        same.any(|(_, other)| other != digest)
+    };
+    match scenes(own).into_iter().find(differs) {
+        Some((scene, _)) => Err(MergeError::Scene {
+            path: path.to_owned(),
+            first: first.to_owned(),
+            scene,
+        }),
+        None => Ok(()),
+    }
+}
+
+/// Scenes with paths, a few of them by name.
+fn pairs(groups: &[GroupKey]) -> String {
+    const NAMED: usize = 4;
+    let mut named: Vec<String> = Vec::new();
+    for key in groups {
+        let pair = format!("{} along {}", key.scene, key.path);
+        if !named.contains(&pair) {
+            named.push(pair);
+        }
+    }
+    let more = named.len().saturating_sub(NAMED);
+    named.truncate(NAMED);
+    let named = named.join(", ");
+    match more {
+        0 => named,
+        more => format!("{named} and {more} more"),
+    }
+}
+
+/// The header of the run that the shards are together.
+fn joined(shards: &[&Stream], args: &[String], is_partial: bool) -> Header {
+    let headers = || shards.iter().map(|stream| &stream.header);
+    let mut header = shards[0].header.clone();
+    let loads = headers().filter_map(|h| h.machine.load);
+    header.machine.load = loads.reduce(f64::max);
+    let begun = headers().map(|h| &h.run.started_at).min();
+    let begun = begun.cloned().unwrap_or_default();
+    header.run.started_at = begun;
+    header.run.id = format!("{}-of-{}", header.run.id, shards.len());
+    header.run.command = ["cullbench"]
+        .into_iter()
+        .chain(args.iter().map(String::as_str))
+        .collect::<Vec<_>>()
+        .join(" ");
+    header.args = args.to_vec();
+    let whole = header.whole().to_vec();
+    let has = |key: &&GroupKey| headers().any(|h| h.groups.contains(key));
+    header.groups = whole.iter().filter(has).cloned().collect();
+    header.run.shard = None;
+    header.whole = Vec::new();
+    if is_partial {
+        let shards: Vec<&str> = headers().filter_map(|h| h.run.shard.as_deref()).collect();
+        header.run.shard = Some(shards.join("+"));
+        header.whole = whole;
+    }
+    header
+}

@@ -1,0 +1,363 @@
+//! The stream of a run: one JSON line for each part as soon as it is measured,
+//! appended and never rewritten, and the report that is made of them. Whatever
+//! ends a run, the lines that are there are whole but for the last.
+
+use std::collections::BTreeMap;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+use serde::{Deserialize, Serialize};
+
+use super::{Noise, Report, ReportCell, RunInfo, SCHEMA_VERSION, SamplesRef};
+use crate::measure::{
+    ExperimentError, Group, GroupKey, Machine, Part, Plan, Share, Source, Toolchain, measure_scene,
+};
+use crate::scene::GENERATOR_NAME;
+use crate::statistics::two_speeds;
+
+/// A line of stream.jsonl.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(tag = "line", rename_all = "snake_case")]
+pub enum Line {
+    /// The first line: everything about the run but its cells.
+    Run(Box<Header>),
+    /// What one process found out about one group of cells.
+    Part(Box<KeptPart>),
+    /// All parts of the plan are there.
+    Finished { at: String },
+}
+
+/// Where, by what and with which options a run was begun.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct Header {
+    pub schema_version: u32,
+    pub run: RunInfo,
+    /// The arguments of `run`, to go on with.
+    pub args: Vec<String>,
+    pub machine: Machine,
+    pub toolchain: Toolchain,
+    pub source: Source,
+    /// The groups of the plan, in order; of a shard its own.
+    pub groups: Vec<GroupKey>,
+    /// Of a shard: the groups of the whole plan, in order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub whole: Vec<GroupKey>,
+    /// The structures of the plan, as asked for.
+    pub structures: Vec<String>,
+    /// SHA-256 of the program.
+    pub binary: Option<String>,
+}
+
+/// What two runs must have in common for their times to belong together, and
+/// what one and the other have.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Difference {
+    pub what: &'static str,
+    pub before: String,
+    pub here: String,
+}
+
+/// What it is called, and what a run has of it.
+type Fact = (&'static str, fn(&Header) -> Option<String>);
+
+impl Header {
+    /// The first thing that tells machine, build or program of two runs apart.
+    pub fn differs_in_place(&self, other: &Header) -> Option<Difference> {
+        const FACTS: [Fact; 17] = [
+            ("schema version", |h| Some(h.schema_version.to_string())),
+            ("processor", |h| h.machine.cpu.clone()),
+            ("number of cores", |h| Some(h.machine.cores.to_string())),
+            ("instruction set", |h| {
+                Some(h.machine.instruction_set.clone())
+            }),
+            ("list of processor features", |h| {
+                Some(h.machine.features.join(","))
+            }),
+            ("system", |h| h.machine.os.clone()),
+            ("kernel of the system", |h| h.machine.kernel.clone()),
+            ("version", |h| Some(h.source.version.clone())),
+            ("commit", |h| h.source.commit.clone()),
+            ("state of the source (dirty)", |h| {
+                h.source.dirty.map(|dirty| dirty.to_string())
+            }),
+            ("compiler", |h| h.toolchain.rustc.clone()),
+            ("target", |h| h.toolchain.target.clone()),
+            ("compiler flags", |h| Some(h.toolchain.flags.clone())),
+            ("profile", |h| {
+                let profile = h.toolchain.profile.clone()?;
+                let level = h.toolchain.opt_level.clone().unwrap_or_default();
+                Some(format!("{profile}, level {level}"))
+            }),
+            ("list of features", |h| Some(h.toolchain.features.join(","))),
+            ("digest of Cargo.lock", |h| {
+                Some(short(&h.toolchain.lock_digest))
+            }),
+            ("digest of the program", |h| h.binary.as_deref().map(short)),
+        ];
+        self.differs_in(other, &FACTS)
+    }
+
+    /// The first thing that tells the plans of two runs apart, but for which
+    /// shard each of them is.
+    pub fn differs_in_plan(&self, other: &Header) -> Option<Difference> {
+        const FACTS: [Fact; 5] = [
+            ("seed", |h| Some(h.run.seed.to_string())),
+            ("suite", |h| h.run.suite.clone()),
+            ("generator", |h| Some(h.run.generator.clone())),
+            ("number of processes", |h| Some(h.run.processes.to_string())),
+            ("list of structures", |h| Some(h.structures.join(","))),
+        ];
+        self.differs_in(other, &FACTS)
+    }
+
+    fn differs_in(&self, other: &Header, facts: &[Fact]) -> Option<Difference> {
+        let shown = |value: Option<String>| value.unwrap_or_else(|| "unknown".to_owned());
+        facts.iter().find_map(|(what, of)| {
+            let (before, here) = (of(self), of(other));
+            (before != here).then(|| Difference {
+                what,
+                before: shown(before),
+                here: shown(here),
+            })
+        })
+    }
+
+    /// The groups of the whole plan, in order.
+    pub fn whole(&self) -> &[GroupKey] {
+        match self.whole.is_empty() {
+            true => &self.groups,
+            false => &self.whole,
+        }
+    }
+}
+
+/// As much of a digest as tells two of them apart for a reader.
+fn short(digest: &str) -> String {
+    digest.chars().take(12).collect()
+}
+
+/// A part with what samples.csv holds up to its end.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct KeptPart {
+    pub part: Part,
+    /// Rows of each structure or bound.
+    pub rows: BTreeMap<String, u64>,
+    /// Length of samples.csv after them, bytes.
+    pub samples_end: u64,
+}
+
+/// Everything that a stream holds.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Stream {
+    pub header: Header,
+    pub parts: Vec<KeptPart>,
+    pub finished_at: Option<String>,
+}
+
+impl Stream {
+    /// Whether every process has measured every group.
+    pub fn is_finished(&self) -> bool {
+        let processes = self.header.run.processes;
+        let mut all = self.header.groups.iter();
+        self.finished_at.is_some() && all.all(|key| (0..processes).all(|p| self.has(key, p)))
+    }
+
+    /// Whether that process has measured that group.
+    pub fn has(&self, key: &GroupKey, process: u32) -> bool {
+        let mut parts = self.parts.iter().map(|kept| &kept.part);
+        parts.any(|part| part.key == *key && part.process == process)
+    }
+
+    /// The parts of a group, the first process first.
+    pub fn of_group(&self, key: &GroupKey) -> Vec<&KeptPart> {
+        let mut parts: Vec<&KeptPart> = self
+            .parts
+            .iter()
+            .filter(|kept| kept.part.key == *key)
+            .collect();
+        parts.sort_by_key(|kept| kept.part.process);
+        parts
+    }
+
+    /// The report of what is there: every group that the first process has
+    /// finished.
+    pub fn report(&self) -> Report {
+        self.report_of(|_| true)
+    }
+
+    /// The same of some of the groups.
+    pub fn report_of(&self, wanted: impl Fn(&GroupKey) -> bool) -> Report {
+        let header = &self.header;
+        let mut run = header.run.clone();
+        run.finished_at.clone_from(&self.finished_at);
+        let mut report = Report {
+            schema_version: SCHEMA_VERSION,
+            run,
+            machine: header.machine.clone(),
+            toolchain: header.toolchain.clone(),
+            source: header.source.clone(),
+            noise: Noise::default(),
+            cells: Vec::new(),
+            bounds: Vec::new(),
+        };
+        let mut speeds = (0, 0);
+        for key in header.groups.iter().filter(|key| wanted(key)) {
+            let kept = self.of_group(key);
+            let parts: Vec<Part> = kept.iter().map(|kept| kept.part.clone()).collect();
+            let Some(first) = parts.first().filter(|part| part.process == 0) else {
+                continue;
+            };
+            let group = Group::of(&parts);
+            if let Some(twin) = &group.twin {
+                report.noise.add(&key.scene, &first.path, &key.test, twin);
+            }
+            let rows = |label: &str| {
+                let rows: u64 = kept.iter().filter_map(|kept| kept.rows.get(label)).sum();
+                (rows > 0).then(|| SamplesRef {
+                    file: super::folder::SAMPLES.to_owned(),
+                    rows,
+                })
+            };
+            let cell = |cell: crate::measure::Cell| {
+                let rows = rows(&cell.structure);
+                ReportCell::new(&first.scene, &first.path, &key.test, cell, rows)
+            };
+            report.cells.extend(group.cells.into_iter().map(cell));
+            report.bounds.extend(group.bounds.into_iter().map(cell));
+            for task in parts.iter().flat_map(|part| &part.tasks) {
+                speeds.1 += 1;
+                speeds.0 += usize::from(two_speeds(&task.rounds_ns).is_some());
+            }
+        }
+        report.noise.warnings = warnings(&report, speeds);
+        report
+    }
+}
+
+/// Runs a whole plan in this process and reports it: times without intervals, for
+/// those need several processes. `None` if stopped.
+///
+/// # Errors
+/// As [`measure_scene`].
+///
+/// ```
+/// use cullbench::index::Registry;
+/// use cullbench::measure::{Effort, Plan, PlannedScene};
+/// use cullbench::report::run_here;
+///
+/// let plan = Plan {
+///     scenes: vec![PlannedScene {
+///         source: "city:n=500".to_owned(),
+///         paths: vec!["orbit:frames=8".to_owned()],
+///         caches: vec![false],
+///     }],
+///     structures: Registry::builtin().structures("linear,bvh")?,
+///     cullings: vec![Default::default()],
+///     lens: Default::default(),
+///     load: Default::default(),
+///     effort: Effort { processes: 1, rounds: [3, 3], task_ns: 1e5, pass_ns: 1e6, locate: true },
+///     bounds: false,
+///     seed: 1,
+/// };
+/// let report = run_here(&plan, &|| false)?.expect("not stopped");
+/// assert_eq!(report.cells[1].structure, "bvh");
+/// assert!(report.cells[1].value("query_ns") > Some(0.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn run_here(plan: &Plan, stop: &dyn Fn() -> bool) -> Result<Option<Report>, ExperimentError> {
+    let started_at = utc(SystemTime::now());
+    let mut stream = Stream {
+        header: Header {
+            schema_version: SCHEMA_VERSION,
+            run: RunInfo {
+                id: started_at.clone(),
+                started_at,
+                finished_at: None,
+                command: String::new(),
+                seed: plan.seed,
+                suite: None,
+                generator: GENERATOR_NAME.to_owned(),
+                processes: 1,
+                shard: None,
+            },
+            args: Vec::new(),
+            machine: Machine::capture(),
+            toolchain: Toolchain::capture(),
+            source: Source::capture(),
+            groups: plan.groups(),
+            whole: Vec::new(),
+            structures: plan.structures.iter().map(|s| s.label.clone()).collect(),
+            binary: None,
+        },
+        parts: Vec::new(),
+        finished_at: None,
+    };
+    for planned in &plan.scenes {
+        let share = Share::first(plan.questions(planned).len());
+        let mut keep = |part: Part, _| {
+            stream.parts.push(KeptPart {
+                part,
+                rows: BTreeMap::new(),
+                samples_end: 0,
+            });
+        };
+        if !measure_scene(plan, planned, &share, &mut keep, &|_, _| (), stop)? {
+            return Ok(None);
+        }
+    }
+    stream.finished_at = Some(utc(SystemTime::now()));
+    Ok(Some(stream.report()))
+}
+
+/// RFC 3339 in UTC, to the second. A clock out of range gives the nearest time
+/// that a report can be dated with: it is no reason not to measure.
+pub fn utc(clock: SystemTime) -> String {
+    humantime::format_rfc3339_seconds(dated(clock)).to_string()
+}
+
+/// The nearest time of a year of four digits that is not before the epoch.
+pub fn dated(clock: SystemTime) -> SystemTime {
+    // 9999-12-31T23:59:59Z.
+    let last = UNIX_EPOCH + Duration::from_secs(253_402_300_799);
+    clock.clamp(UNIX_EPOCH, last)
+}
+
+/// What made times noisy, with what to do about it.
+fn warnings(report: &Report, (two_speeds, tasks): (usize, usize)) -> Vec<String> {
+    /// Processes that already run on a core, from which on it is called busy.
+    const BUSY: f64 = 0.5;
+    let mut warnings = Vec::new();
+    let machine = &report.machine;
+    if let Some(load) = machine
+        .load
+        .filter(|load| *load > BUSY * machine.cores as f64)
+    {
+        warnings.push(format!(
+            "the machine was busy when the run began (load average {load:.1} on {} cores): close \
+             other programs, or wait, and run again",
+            machine.cores
+        ));
+    }
+    if two_speeds * 10 > tasks {
+        warnings.push(format!(
+            "{two_speeds} of {tasks} timed tasks ran at two speeds (a shared core or a changing \
+             clock frequency): ratios within a run allow for it, absolute times do not; fix the \
+             frequency, or run on a machine of your own"
+        ));
+    }
+    let twins = report
+        .noise
+        .twins
+        .iter()
+        .filter_map(super::TwinEntry::holds_one);
+    let (missed, all) = twins.fold((0, 0), |(missed, all), holds| {
+        (missed + usize::from(!holds), all + 1)
+    });
+    // One in twenty misses by chance; of so many, this many are no chance.
+    if missed > 1 + all / 8 {
+        warnings.push(format!(
+            "of {all} structures that were entered twice, {missed} differ from themselves: the \
+             intervals of this run are too narrow; raise --processes"
+        ));
+    }
+    warnings
+}

@@ -1,0 +1,183 @@
+//! How what came from outside is shown: text without anything that a terminal,
+//! a picture or a page would obey, and counts with the word they count. It owns
+//! which characters are harmless, for every output there is.
+
+use std::borrow::Cow;
+
+/// Text on one line: line breaks and tabs are spaces, and what would steer the
+/// reader's terminal, turn the direction of the text or be no XML stands there
+/// as its number, `\u{1b}`.
+///
+/// ```
+/// use cullbench::shown::plain;
+/// assert_eq!(plain("a\tb\u{1b}[31m"), "a b\\u{1b}[31m");
+/// ```
+pub fn plain(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '\n' | '\r' | '\t' | '\u{b}' | '\u{c}' | '\u{85}' | '\u{2028}' | '\u{2029}' => {
+                out.push(' ');
+            }
+            c if is_harmful(c) => out.extend(c.escape_unicode()),
+            c => out.push(c),
+        }
+    }
+    out
+}
+
+/// The same for text of several lines: line feeds stay.
+pub fn lines(text: &str) -> String {
+    let plain: Vec<String> = text.split('\n').map(plain).collect();
+    plain.join("\n")
+}
+
+/// Control characters, marks and overrides of the direction, characters without
+/// a width, tags, and what XML does not allow at all.
+fn is_harmful(c: char) -> bool {
+    c.is_control()
+        || matches!(c,
+            '\u{61c}' | '\u{200b}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}'
+            | '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{fff9}'..='\u{fffb}'
+            | '\u{e0000}'..='\u{e007f}')
+        || u32::from(c) & 0xFFFE == 0xFFFE
+}
+
+/// A text as a field of CSV. Spreadsheets take what begins with `=`, `+`, `-` or
+/// `@` for a formula and carry it out; an apostrophe in front marks it as text.
+/// Numbers stay as they are. [`from_field`] is the way back.
+pub fn field(text: &str) -> Cow<'_, str> {
+    match is_formula(text) {
+        true => format!("'{text}").into(),
+        false => text.into(),
+    }
+}
+
+/// The text of a field that [`field`] may have marked.
+pub fn from_field(field: &str) -> &str {
+    let marked = field.strip_prefix('\'');
+    marked.filter(|text| is_formula(text)).unwrap_or(field)
+}
+
+fn is_formula(text: &str) -> bool {
+    // A spreadsheet drops white space before it looks.
+    let begins = text.trim_start().starts_with(['=', '+', '-', '@']);
+    begins && !text.parse::<f64>().is_ok_and(f64::is_finite)
+}
+
+/// Whole numbers in groups of three.
+pub fn count(value: usize) -> String {
+    let digits = value.to_string();
+    let mut grouped = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            grouped.push(',');
+        }
+        grouped.push(digit);
+    }
+    grouped
+}
+
+/// "1 cell", "1,234 cells", "no queries".
+///
+/// ```
+/// use cullbench::shown::counted;
+/// let told = [0, 1, 2000].map(|n| counted(n, "query"));
+/// assert_eq!(told, ["no queries", "1 query", "2,000 queries"]);
+/// ```
+pub fn counted(value: usize, one: &str) -> String {
+    match value {
+        0 => format!("no {}", plural(one)),
+        1 => format!("1 {one}"),
+        more => format!("{} {}", count(more), plural(one)),
+    }
+}
+
+/// Regular words only.
+fn plural(one: &str) -> String {
+    let stem = one.strip_suffix('y');
+    let stem = stem.filter(|stem| !stem.ends_with(['a', 'e', 'i', 'o', 'u']));
+    match stem {
+        Some(stem) => format!("{stem}ies"),
+        None if one.ends_with(['x', 's']) || one.ends_with("ch") => format!("{one}es"),
+        None => format!("{one}s"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_shown_steers_a_terminal_or_ends_a_page() {
+        for (text, wanted) in [
+            (
+                "plain \u{e4}\u{3b1}\u{1f600}",
+                "plain \u{e4}\u{3b1}\u{1f600}",
+            ),
+            ("\u{1b}]0;title\u{7}", "\\u{1b}]0;title\\u{7}"),
+            ("\u{9b}31m", "\\u{9b}31m"),
+            ("a\r\nb\u{2028}c", "a  b c"),
+            ("exe\u{202e}vsc.\u{2069}", "exe\\u{202e}vsc.\\u{2069}"),
+            (
+                "\0\u{7f}\u{fffe}\u{10ffff}",
+                "\\u{0}\\u{7f}\\u{fffe}\\u{10ffff}",
+            ),
+            ("\u{feff}a\u{200b}", "\\u{feff}a\\u{200b}"),
+        ] {
+            assert_eq!(plain(text), wanted);
+            // Shown twice is shown once.
+            assert_eq!(plain(&plain(text)), wanted);
+        }
+        assert_eq!(lines("a\n\u{1b}b\r\n"), "a\n\\u{1b}b \n");
+    }
+
+    #[test]
+    fn every_character_of_xml_is_legal() {
+        let all: String = (char::MIN..=char::MAX).collect();
+        for c in plain(&all).chars() {
+            let legal = matches!(c, ' '..='\u{d7ff}' | '\u{e000}'..='\u{fffd}' | '\u{10000}'..);
+            assert!(legal, "{c:?}");
+        }
+    }
+
+    #[test]
+    fn formulas_are_marked_as_text_and_read_back() {
+        for text in [
+            "=1+1",
+            "+cmd|' /C calc'!A0",
+            "-2+3",
+            "@SUM(A1)",
+            "\t=1",
+            "-",
+            "-inf",
+        ] {
+            assert_eq!(field(text), format!("'{text}"));
+            assert_eq!(from_field(&field(text)), text);
+        }
+        for text in [
+            "", "city:n=3", "-3.5", "+7", "-1e9", "'", "'a'", "a=b", "''=1",
+        ] {
+            assert_eq!(field(text), text);
+            assert_eq!(from_field(text), text);
+        }
+    }
+
+    #[test]
+    fn words_agree_with_their_numbers() {
+        for (one, many) in [
+            ("box", "boxes"),
+            ("query", "queries"),
+            ("way", "ways"),
+            ("cell", "cells"),
+        ] {
+            assert_eq!(counted(1, one), format!("1 {one}"));
+            assert_eq!(counted(7, one), format!("7 {many}"));
+            assert_eq!(counted(0, one), format!("no {many}"));
+        }
+        assert_eq!(
+            [count(7), count(1234), count(1_234_567)],
+            ["7", "1,234", "1,234,567"]
+        );
+    }
+}

@@ -1,0 +1,287 @@
+//! The verdict of a comparison: slower, faster, same or inconclusive.
+
+use serde::{Deserialize, Serialize};
+
+use super::trimmed::kept;
+use super::{Trimmed, holm, moderate, student, trimmed_mean};
+
+/// Error rate of each direction over all cells of a comparison. Half of what is
+/// promised (5 %): it leaves room for what the model does not know.
+const ALPHA: f64 = 0.025;
+
+/// Changes of up to 1 % are not called one: two builds of the same code differ
+/// as much by where the linker puts it (Mytkowicz et al. 2009).
+const FLOOR: f64 = 0.01;
+
+/// Quantile of the 95 % interval's ends.
+const INTERVAL: f64 = 0.975;
+
+/// Quantile of the 90 % interval's ends: each is a one-sided test of 5 %.
+const EQUIVALENCE: f64 = 0.95;
+
+/// 95 % quantile of the normal distribution: the power that a resolution has.
+const POWER: f64 = 1.645;
+
+/// Beyond so many pairs the answer to "how many more?" is: none would do.
+const MOST_PAIRS: usize = 10_000;
+
+/// How the new times stand to the old.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Change {
+    Slower,
+    Faster,
+    Same,
+    Inconclusive,
+}
+
+impl Change {
+    /// The word in tables and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Change::Slower => "slower",
+            Change::Faster => "faster",
+            Change::Same => "same",
+            Change::Inconclusive => "inconclusive",
+        }
+    }
+}
+
+/// The verdict on one cell, with the figures it rests on.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+pub struct Judgement {
+    pub change: Change,
+    /// New time / old time: above 1 is slower.
+    pub ratio: f64,
+    /// 95 % interval of the ratio, which it always holds; `None` below three
+    /// pairs.
+    pub lower: Option<f64>,
+    pub upper: Option<f64>,
+    /// The smallest change (0.05 is 5 %) that 95 % of such comparisons find.
+    pub resolution: Option<f64>,
+    /// For an inconclusive cell: about how many more pairs would decide it.
+    pub more_pairs: Option<usize>,
+    /// Pairs of processes; of two reports: processes of the smaller.
+    pub pairs: usize,
+}
+
+/// Judges the cells of a comparison of two binaries. Per cell: ln(new / old) of
+/// each pair of processes; `threshold` 0.05 is 5 %. `None` for a cell with under
+/// three pairs, or with a value that is not finite.
+///
+/// The estimate of a cell is the 20 % trimmed mean of its differences, its
+/// standard error is moderated over the cells. In this order a cell is
+///
+/// 1. slower or faster, if it is significant in one-sided tests of 2.5 % with
+///    Holm's correction over the judged cells (each direction by itself), and
+///    if the change is over 1 %;
+/// 2. same, if the 90 % interval lies within ± ln(1 + threshold): two one-sided
+///    tests (Schuirmann 1987);
+/// 3. inconclusive.
+///
+/// The order matters for a change that is proven, but within the threshold (+2 %
+/// with a threshold of 5 %): it is slower. The threshold says how finely "same"
+/// is to be shown, so it rules how many pairs are run; it is no licence for a
+/// proven loss, which a series of 2 % steps would turn into any loss at all. Who
+/// wants to tolerate it compares `lower` with a tolerance.
+pub fn judge(differences: &[Vec<f64>], threshold: f64) -> Vec<Option<Judgement>> {
+    judge_estimates(
+        differences.iter().map(|d| trimmed_mean(d)).collect(),
+        threshold,
+    )
+}
+
+/// Judges estimates of ln(new / old); a cell without one stays without verdict.
+pub(super) fn judge_estimates(
+    estimates: Vec<Option<Trimmed>>,
+    threshold: f64,
+) -> Vec<Option<Judgement>> {
+    let mut cells: Vec<Trimmed> = estimates.iter().flatten().copied().collect();
+    moderate(&mut cells);
+    let above: Vec<f64> = cells.iter().map(|cell| cell.p_above(0.0)).collect();
+    let below: Vec<f64> = cells.iter().map(|cell| cell.p_below(0.0)).collect();
+    let (slower, faster) = (holm(&above, ALPHA), holm(&below, ALPHA));
+    let tests = cells.len();
+    let mut judged = cells
+        .iter()
+        .zip(slower)
+        .zip(faster)
+        .map(|((cell, slower), faster)| {
+            let change = if slower && beyond_floor(cell) {
+                Change::Slower
+            } else if faster && beyond_floor(cell) {
+                Change::Faster
+            } else if is_same(cell, threshold) {
+                Change::Same
+            } else {
+                Change::Inconclusive
+            };
+            judgement(cell, change, tests, threshold)
+        });
+    estimates
+        .iter()
+        .map(|estimate| estimate.and_then(|_| judged.next()))
+        .collect()
+}
+
+fn judgement(cell: &Trimmed, change: Change, tests: usize, threshold: f64) -> Judgement {
+    let margin = cell.margin(INTERVAL);
+    let undecided = change == Change::Inconclusive;
+    Judgement {
+        change,
+        ratio: cell.mean.exp(),
+        lower: Some((cell.mean - margin).exp()),
+        upper: Some((cell.mean + margin).exp()),
+        resolution: Some(resolution(cell, tests)),
+        more_pairs: if undecided {
+            more_pairs(cell, tests, threshold)
+        } else {
+            None
+        },
+        pairs: cell.count,
+    }
+}
+
+fn beyond_floor(cell: &Trimmed) -> bool {
+    cell.mean.exp_m1().abs() > FLOOR
+}
+
+/// Two one-sided tests of 5 % each.
+fn is_same(cell: &Trimmed, threshold: f64) -> bool {
+    cell.mean.abs() + cell.margin(EQUIVALENCE) <= threshold.ln_1p()
+}
+
+/// The change that is found with 95 % power at the strictest step of Holm's
+/// procedure: exp((t(1 - 0.05/m, df) + 1.645) se) - 1.
+fn resolution(cell: &Trimmed, tests: usize) -> f64 {
+    let t = student::quantile(1.0 - 2.0 * ALPHA / tests as f64, cell.df);
+    ((t + POWER) * cell.standard_error).exp_m1()
+}
+
+/// How many more pairs would prove the change that was found, or would prove it
+/// small enough: whichever comes first, if mean and spread stay as they are.
+fn more_pairs(cell: &Trimmed, tests: usize, threshold: f64) -> Option<usize> {
+    let decides = |count: usize| {
+        let shrunk = cell.standard_error * (cell.count as f64 / count as f64).sqrt();
+        let future = Trimmed {
+            standard_error: shrunk,
+            df: cell.df + kept(count) - kept(cell.count),
+            count,
+            ..*cell
+        };
+        let proven = future.margin(1.0 - ALPHA / tests as f64) < future.mean.abs();
+        (proven && beyond_floor(&future)) || is_same(&future, threshold)
+    };
+    // More pairs never make it worse but for a step of the cut: halving is
+    // exact enough for an "about".
+    let (mut without, mut with) = (cell.count, MOST_PAIRS);
+    if !decides(with) {
+        return None;
+    }
+    while with - without > 1 {
+        let middle = without.midpoint(with);
+        if decides(middle) {
+            with = middle;
+        } else {
+            without = middle;
+        }
+    }
+    Some(with - cell.count)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Ten pairs about `centre`, their standard error `spread` * 1.190238.
+    fn cell(centre: f64, spread: f64) -> Vec<f64> {
+        (0..10)
+            .map(|i| centre + spread * (f64::from(i) - 4.5))
+            .collect()
+    }
+
+    fn one(values: Vec<f64>, threshold: f64) -> Judgement {
+        judge(&[values], threshold)[0].unwrap()
+    }
+
+    #[test]
+    fn the_four_verdicts() {
+        let change = |centre, spread| one(cell(centre, spread), 0.05).change;
+        assert_eq!(change(0.06, 0.005), Change::Slower);
+        assert_eq!(change(-0.06, 0.005), Change::Faster);
+        // Proven, over 1 %, within the threshold: still slower.
+        assert_eq!(change(0.02, 0.005), Change::Slower);
+        // Proven, but under 1 %.
+        assert_eq!(change(0.009, 0.001), Change::Same);
+        assert_eq!(change(0.0, 0.01), Change::Same);
+        assert_eq!(change(0.03, 0.02), Change::Inconclusive);
+        assert_eq!(judge(&[vec![0.0; 2], vec![]], 0.05), [None, None]);
+        assert_eq!(Change::Inconclusive.name(), "inconclusive");
+        let json = serde_json::to_string(&Change::Slower).unwrap();
+        assert_eq!(json, format!("\"{}\"", Change::Slower.name()));
+    }
+
+    #[test]
+    fn the_figures_are_those_of_the_formulas() {
+        let found = one(cell(0.03, 0.02), 0.05);
+        let se: f64 = 0.02 * 1.190_238;
+        let near = |found: f64, wanted: f64| {
+            assert!((found - wanted).abs() < 1e-6, "{found}, not {wanted}");
+        };
+        near(found.ratio, 0.03f64.exp());
+        near(found.lower.unwrap(), (0.03 - 2.570_582 * se).exp());
+        near(found.upper.unwrap(), (0.03 + 2.570_582 * se).exp());
+        // One cell: t(0.95, 5) = 2.015048.
+        near(
+            found.resolution.unwrap(),
+            ((2.015_048 + 1.645) * se).exp_m1(),
+        );
+        assert_eq!(found.pairs, 10);
+    }
+
+    #[test]
+    fn as_many_more_pairs_as_advised_decide() {
+        for (centre, spread) in [(0.03, 0.02), (0.0, 0.03), (0.06, 0.05), (0.045, 0.02)] {
+            let before = Trimmed {
+                mean: centre,
+                ..trimmed_mean(&cell(centre, spread)).unwrap()
+            };
+            let more = more_pairs(&before, 1, 0.05).unwrap();
+            // The same pairs again and again: mean and spread stay.
+            let repeated = |count: usize| {
+                let values: Vec<f64> = cell(centre, spread).repeat(1 + count / 10);
+                one(values, 0.05).change
+            };
+            assert_ne!(repeated(more * 6 / 5 + 10), Change::Inconclusive, "{more}");
+            assert_eq!(repeated(more * 2 / 3), Change::Inconclusive, "{more}");
+        }
+        // Too small to be called a change, too large to be called the same.
+        assert_eq!(one(cell(0.008, 0.02), 0.005).more_pairs, None);
+        assert_eq!(one(cell(0.06, 0.005), 0.05).more_pairs, None);
+    }
+
+    proptest! {
+        #[test]
+        fn verdicts_are_symmetric_and_hold_their_ratio(
+            cells in prop::collection::vec((-0.1..0.1f64, 0.0..0.05f64), 1..9)
+        ) {
+            let cells: Vec<Vec<f64>> = cells.iter().map(|c| cell(c.0, c.1)).collect();
+            let swapped: Vec<Vec<f64>> = cells
+                .iter()
+                .map(|cell| cell.iter().map(|d| -d).collect())
+                .collect();
+            for (a, b) in judge(&cells, 0.05).iter().zip(judge(&swapped, 0.05)) {
+                let (a, b) = (a.unwrap(), b.unwrap());
+                prop_assert!(a.lower.unwrap() <= a.ratio && a.ratio <= a.upper.unwrap());
+                prop_assert!((a.lower.unwrap() * b.upper.unwrap() - 1.0).abs() < 1e-9);
+                let mirrored = match a.change {
+                    Change::Slower => Change::Faster,
+                    Change::Faster => Change::Slower,
+                    other => other,
+                };
+                prop_assert_eq!(b.change, mirrored);
+            }
+        }
+    }
+}

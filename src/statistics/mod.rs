@@ -1,0 +1,32 @@
+//! The statistics of a report: quantiles, intervals, tests, verdicts, ranks.
+//! Pure functions of numbers; each names its source. Nothing else in the crate
+//! computes an interval.
+
+mod bootstrap;
+mod front;
+mod holm;
+mod judgement;
+mod means;
+mod one_run;
+mod quantiles;
+mod ranking;
+#[cfg(test)]
+mod simulation;
+mod slope;
+mod speeds;
+mod student;
+mod trimmed;
+mod unpaired;
+
+pub use bootstrap::{Estimate, bootstrap_median};
+pub use front::{Tradeoff, dominated_by};
+pub use holm::holm;
+pub use judgement::{Change, Judgement, judge};
+pub use means::{geometric_mean, interquartile_mean};
+pub use one_run::{Shown, one_run};
+pub use quantiles::{median, quantile, sorted};
+pub use ranking::{Placed, ranks};
+pub use slope::slope;
+pub use speeds::two_speeds;
+pub use trimmed::{Trimmed, moderate, trimmed_mean};
+pub use unpaired::judge_unpaired;

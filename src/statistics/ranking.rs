@@ -1,0 +1,107 @@
+//! Ranks of structures that ran in the same processes.
+
+use serde::{Deserialize, Serialize};
+
+use super::trimmed::{centre, paired_difference};
+
+/// The rank of one structure.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct Placed {
+    /// 1 is the fastest; two that share rank 1 are followed by rank 3.
+    pub rank: usize,
+    /// Whether another structure has the same rank.
+    pub tie: bool,
+}
+
+/// Ranks structures by their trimmed means, smallest first. Per structure: one
+/// value per process, all from the same processes, paired by index.
+///
+/// A structure shares the rank of the fastest of that rank unless Yuen's paired
+/// test over the processes tells the two apart (two-sided, `alpha`). Under three
+/// processes nothing can be tested, and each has a rank of its own by order.
+/// Equal means are ordered by index, a structure with no values or with one
+/// that is not finite comes last: the ranks are the same for the same input.
+pub fn ranks(values: &[Vec<f64>], alpha: f64) -> Vec<Placed> {
+    let means: Vec<f64> = values
+        .iter()
+        .map(|values| centre(values).unwrap_or(f64::INFINITY))
+        .collect();
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|&a, &b| means[a].total_cmp(&means[b]));
+    let mut placed = vec![
+        Placed {
+            rank: 0,
+            tie: false
+        };
+        values.len()
+    ];
+    let mut leader: Option<(usize, usize)> = None;
+    for (position, &i) in order.iter().enumerate() {
+        match leader {
+            Some((first, rank)) if !told_apart(&values[first], &values[i], alpha) => {
+                placed[i] = Placed { rank, tie: true };
+                placed[first].tie = true;
+            }
+            _ => {
+                placed[i].rank = position + 1;
+                leader = Some((i, position + 1));
+            }
+        }
+    }
+    placed
+}
+
+fn told_apart(leader: &[f64], other: &[f64], alpha: f64) -> bool {
+    match paired_difference(leader, other) {
+        Some(difference) => difference.p_above(0.0) <= alpha / 2.0,
+        None => true,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn found(values: &[Vec<f64>]) -> Vec<(usize, bool)> {
+        let pairs = ranks(values, 0.05).into_iter();
+        pairs.map(|placed| (placed.rank, placed.tie)).collect()
+    }
+
+    #[test]
+    fn ranks_are_shared_unless_the_processes_tell_them_apart() {
+        // Processes differ far more than the structures within them.
+        let base: Vec<f64> = (0..10).map(|p| f64::from(p * p)).collect();
+        let noisy = |shift: f64, swing: f64| -> Vec<f64> {
+            let swing = |p: usize| if p.is_multiple_of(2) { swing } else { -swing };
+            let values = base.iter().enumerate();
+            values.map(|(p, b)| b + shift + swing(p)).collect()
+        };
+        let values = [noisy(0.5, 0.0), base.clone(), noisy(0.01, 0.3)];
+        assert_eq!(found(&values), [(3, false), (1, true), (1, true)]);
+        // One process: by order. A structure that did not run comes last.
+        let values = [vec![2.0], vec![1.0], vec![], vec![1.0]];
+        let wanted = [(3, false), (1, false), (4, false), (2, false)];
+        assert_eq!(found(&values), wanted);
+        assert_eq!(found(&[]), []);
+    }
+
+    proptest! {
+        #[test]
+        fn ranks_are_total_and_keep_the_order(
+            rows in prop::collection::vec(prop::collection::vec(-3.0..3.0f64, 6), 1..9)
+        ) {
+            let placed = ranks(&rows, 0.05);
+            let means: Vec<f64> = rows.iter().map(|row| centre(row).unwrap()).collect();
+            for (i, a) in placed.iter().enumerate() {
+                let before = placed.iter().filter(|b| b.rank < a.rank).count();
+                prop_assert_eq!(a.rank, before + 1);
+                let sharing = placed.iter().filter(|b| b.rank == a.rank).count();
+                prop_assert_eq!(a.tie, sharing > 1);
+                for (k, b) in placed.iter().enumerate() {
+                    prop_assert!(a.rank >= b.rank || means[i] <= means[k]);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! A trial: one question with its right answer, put to one structure after
+//! another. It guards against panics, compares with the reference, and names the
+//! first item that differs. `run`, `verify`, `precision`, `advise` and `stress`
+//! ask in no other way.
+
+use super::{Difference, Reference};
+use crate::geometry::Aabb;
+use crate::index::caught;
+use crate::query::{AnyView, ItemId};
+
+/// What is wrong with an answer.
+#[derive(Clone, PartialEq, Debug)]
+pub enum Fault {
+    /// The structure panicked; its message.
+    Panicked(String),
+    /// The answer is not the reference's.
+    Differs(Difference),
+}
+
+/// One question at a time; the memory serves all of them.
+pub struct Trial {
+    reference: Reference,
+    answer: Vec<ItemId>,
+    expected: usize,
+}
+
+impl Trial {
+    /// For questions about so many items.
+    pub fn new(items: usize) -> Trial {
+        Trial {
+            reference: Reference::new(items),
+            answer: Vec::new(),
+            expected: 0,
+        }
+    }
+
+    /// The question what a view sees, answered by the reference scan. O(items).
+    pub fn see<'v>(&mut self, items: &[Aabb], view: impl Into<AnyView<'v>>) {
+        self.expected = self.reference.see(items, view);
+    }
+
+    /// A question whose right answer is known.
+    pub fn expect(&mut self, right: impl IntoIterator<Item = ItemId>) {
+        self.expected = self.reference.expect(right.into_iter());
+    }
+
+    /// Number of items of the right answer.
+    pub fn expected(&self) -> usize {
+        self.expected
+    }
+
+    /// Puts the question to a structure, which appends its answer to an empty
+    /// list. O(answer) if it is right.
+    ///
+    /// # Errors
+    /// A panic, or how the answer differs.
+    pub fn ask(&mut self, ask: impl FnOnce(&mut Vec<ItemId>)) -> Result<&[ItemId], Fault> {
+        self.answer.clear();
+        caught(|| ask(&mut self.answer)).map_err(Fault::Panicked)?;
+        let difference = self.reference.compare(&self.answer);
+        match difference.is_none() {
+            true => Ok(&self.answer),
+            false => Err(Fault::Differs(difference)),
+        }
+    }
+
+    /// What was answered last, right or wrong.
+    pub fn answer(&self) -> &[ItemId] {
+        &self.answer
+    }
+}
+
+impl Fault {
+    /// The fault in words; `explain` says why an item is in the right answer or
+    /// not.
+    pub fn explained(&self, explain: impl FnOnce(usize) -> Option<String>) -> String {
+        match self {
+            Fault::Panicked(message) => format!("panicked: {message}"),
+            Fault::Differs(difference) => {
+                let why = difference.first.and_then(|id| explain(id as usize));
+                match why {
+                    Some(why) => format!("{difference}: {why}"),
+                    None => difference.to_string(),
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn right_wrong_and_panicking_answers_are_told_apart() {
+        let mut trial = Trial::new(5);
+        trial.expect([1, 3]);
+        assert_eq!(trial.expected(), 2);
+        assert_eq!(trial.ask(|out| out.extend([3, 1])), Ok(&[3, 1][..]));
+        let missed = trial.ask(|out| out.push(1)).unwrap_err();
+        assert!(
+            missed
+                .explained(|id| Some(format!("item {id}!")))
+                .ends_with("item 3!")
+        );
+        let Fault::Differs(difference) = missed else {
+            panic!("{missed:?}");
+        };
+        assert_eq!((difference.missing, difference.extra), (1, 0));
+        let panicked = trial.ask(|_| panic!("deep in a peer's code"));
+        assert_eq!(
+            panicked,
+            Err(Fault::Panicked("deep in a peer's code".to_owned()))
+        );
+        // One that failed leaves nothing behind for the next.
+        assert!(trial.ask(|out| out.extend([1, 3])).is_ok());
+    }
+}

@@ -1,0 +1,246 @@
+//! `run --shard` and `merge`: the shards of a plan are together what one run of
+//! it is, and what is no shard of it is refused by name.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+
+use super::process::*;
+use super::runs::{cells, report};
+
+const PLAN: &str = "run --scene city:n=300 --scene uniform:n=200 --path orbit:frames=4 \
+    --path spin:frames=4 --structure linear,bvh --processes 2 --no-bounds";
+
+/// What cells are asked and what they answer: all but times.
+fn answers(run: &Path) -> Vec<Value> {
+    let of_cell = |cell: &Value| {
+        let counted = [
+            "visible_count",
+            "cull_rate",
+            "excess",
+            "nodes_tested",
+            "regions_found",
+        ];
+        let counted = counted.map(|name| cell["metrics"][name]["value"].clone());
+        let named = [
+            "scene",
+            "path",
+            "structure",
+            "test",
+            "status",
+            "error",
+            "left_out",
+        ];
+        Value::from_iter(
+            named
+                .map(|name| cell[name].clone())
+                .into_iter()
+                .chain(counted),
+        )
+    };
+    cells(&report(run)).iter().map(of_cell).collect()
+}
+
+/// What the processes saw and found, camera by camera, and where samples end.
+fn streamed(run: &Path) -> Vec<(Value, Value)> {
+    let text = fs::read_to_string(run.join("stream.jsonl")).expect("a stream");
+    let parts = text.lines().map(json).filter(|line| line["line"] == "part");
+    parts
+        .map(|line| {
+            (
+                line["part"]["key"].clone(),
+                line["part"]["known"]["visible"].clone(),
+            )
+        })
+        .collect()
+}
+
+#[test]
+fn shards_together_are_the_run_of_the_whole_plan() {
+    let folder = folder(&[]);
+    let at = |name: &str| folder.path().join(name);
+    works(folder.path(), &format!("{PLAN} --out whole"));
+    for i in 1..=3 {
+        works(
+            folder.path(),
+            &format!("{PLAN} --shard {i}/3 --out part{i}"),
+        );
+    }
+    // In any order.
+    let told = works(folder.path(), "merge part3 part1 part2 --out merged");
+    assert!(told.contains("8 cells of 3 shards"), "{told}");
+    assert_eq!(answers(&at("merged")), answers(&at("whole")));
+    assert_eq!(streamed(&at("merged")), streamed(&at("whole")));
+    let names = |run: &str| {
+        let mut names: Vec<_> = fs::read_dir(at(run)).expect("readable").collect();
+        names.sort_by_key(|entry| entry.as_ref().expect("readable").file_name());
+        let names = names
+            .into_iter()
+            .map(|entry| entry.expect("readable").file_name());
+        names.collect::<Vec<_>>()
+    };
+    assert_eq!(names("merged"), names("whole"));
+
+    // Every cell has the samples of its shard, digit by digit.
+    let samples = |run: &str| fs::read_to_string(at(run).join("samples.csv")).expect("samples");
+    let sorted = |runs: &[&str]| {
+        let mut lines: Vec<String> = Vec::new();
+        for run in runs {
+            lines.extend(samples(run).lines().skip(1).map(str::to_owned));
+        }
+        lines.sort();
+        lines
+    };
+    assert_eq!(sorted(&["merged"]), sorted(&["part1", "part2", "part3"]));
+    let all = rows(&samples("merged"));
+    for cell in cells(&report(&at("merged"))) {
+        let own = all.iter().filter(|row| {
+            row["scene"] == cell["scene"]["name"].as_str().expect("a name")
+                && row["path"] == cell["path"]["name"].as_str().expect("a name")
+                && row["structure"] == cell["structure"].as_str().expect("a name")
+        });
+        assert_eq!(own.count() as f64, number(&cell["samples_ref"], "rows"));
+    }
+    let merged = report(&at("merged"));
+    assert_eq!(merged["run"]["shard"], Value::Null);
+    assert!(merged["run"]["finished_at"].is_string());
+    // It is a run like any other, and a finished one.
+    let before = contents(&at("merged"));
+    works(folder.path(), "run --resume --out merged");
+    assert!(contents(&at("merged")) == before, "resuming changed files");
+    works(folder.path(), "report merged");
+}
+
+#[test]
+fn a_part_of_the_shards_is_joined_on_request_only() {
+    let folder = folder(&[]);
+    for i in [1, 3, 4] {
+        works(
+            folder.path(),
+            &format!("{PLAN} --shard {i}/4 --out part{i}"),
+        );
+    }
+    let missing = "no shard has city:n=300 along spin:frames=4 | --partial";
+    all_refused(&folder, &["merge part1 part3 part4 --out merged"], missing);
+    let done = cullbench(
+        folder.path(),
+        "merge part1 part3 part4 --partial --out some",
+    );
+    assert_eq!(done.code, Some(0), "{done:?}");
+    assert_eq!(
+        done.err,
+        "note: no shard has city:n=300 along spin:frames=4\n"
+    );
+    let some = report(&folder.path().join("some"));
+    assert_eq!(cells(&some).len(), 6);
+    assert_eq!(some["run"]["shard"], "1/4+3/4+4/4");
+    // What was joined so far can be joined further.
+    works(folder.path(), &format!("{PLAN} --shard 2/4 --out part2"));
+    works(folder.path(), "merge part2 some --out all");
+    works(folder.path(), &format!("{PLAN} --out whole"));
+    let at = |name: &str| folder.path().join(name);
+    assert_eq!(answers(&at("all")), answers(&at("whole")));
+}
+
+/// Changes the first line of a stream.
+pub fn edit_header(run: &Path, edit: impl FnOnce(&mut Value)) {
+    let file = run.join("stream.jsonl");
+    let text = fs::read_to_string(&file).expect("a stream");
+    let (first, rest) = text.split_once('\n').expect("lines");
+    let mut header = json(first);
+    edit(&mut header);
+    fs::write(&file, format!("{header}\n{rest}")).expect("writable");
+}
+
+#[test]
+fn what_must_not_be_mixed_is_refused_by_name() {
+    let folder = folder(&[]);
+    for i in [1, 2] {
+        works(
+            folder.path(),
+            &format!("{PLAN} --shard {i}/2 --out part{i}"),
+        );
+    }
+    let refused = |wanted: &str| all_refused(&folder, &["merge part1 part2 --out merged"], wanted);
+    let part2 = folder.path().join("part2");
+    let kept = fs::read(part2.join("stream.jsonl")).expect("a stream");
+    let restore = || fs::write(part2.join("stream.jsonl"), &kept).expect("writable");
+    for (place, value, wanted) in [
+        ("/run/seed", Value::from(9), "part2 | seed is '9'"),
+        ("/run/suite", "quick".into(), "suite is 'quick'"),
+        ("/run/processes", 1.into(), "number of processes is '1'"),
+        (
+            "/structures/1",
+            "bsp".into(),
+            "list of structures is 'linear,bsp'",
+        ),
+        ("/machine/cpu", "Another".into(), "processor is 'Another'"),
+        ("/machine/cores", 99.into(), "number of cores is '99'"),
+        ("/machine/os", "Plan 9".into(), "system is 'Plan 9'"),
+        (
+            "/machine/instruction_set",
+            "mmx".into(),
+            "instruction set is 'mmx'",
+        ),
+        (
+            "/toolchain/rustc",
+            "rustc 1.0".into(),
+            "compiler is 'rustc 1.0'",
+        ),
+        ("/source/commit", "abc".into(), "commit is 'abc'"),
+        ("/source/dirty", Value::Null, "dirty | 'unknown'"),
+        ("/binary", "00".into(), "digest of the program is '00'"),
+        ("/schema_version", 1.into(), "schema version 1; expected"),
+        ("/whole/0/path", "zoom".into(), "a shard of another plan"),
+        ("/args/6", "zoom".into(), "part2 | --path"),
+    ] {
+        edit_header(&part2, |header| {
+            *header.pointer_mut(place).expect(place) = value;
+        });
+        refused(wanted);
+        restore();
+    }
+    // The same name, another scene.
+    let text = String::from_utf8(kept.clone()).expect("UTF-8");
+    let digest = json(text.lines().nth(1).expect("a part"));
+    let digest = digest["part"]["scene"]["digest"]
+        .as_str()
+        .expect("a digest");
+    let other = text.replace(digest, "0123");
+    fs::write(part2.join("stream.jsonl"), other).expect("writable");
+    refused("scene 'city:n=300' is another one than in part1");
+    restore();
+    // Stopped, or with a part that is not there.
+    let cut = |lines: usize| {
+        let kept: Vec<&str> = text.lines().take(lines).collect();
+        fs::write(part2.join("stream.jsonl"), kept.join("\n") + "\n").expect("writable");
+    };
+    cut(text.lines().count() - 1);
+    refused("part2 | not finished | run --resume --out part2");
+    cut(2);
+    refused("part2 | not finished");
+    restore();
+    let samples = fs::read(part2.join("samples.csv")).expect("samples");
+    fs::write(part2.join("samples.csv"), &samples[..samples.len() - 1]).expect("writable");
+    refused("part2/samples.csv | bytes; expected");
+    fs::write(part2.join("samples.csv"), &samples).expect("writable");
+
+    let twice = ["merge part1 part2 part1 --out merged"];
+    all_refused(
+        &folder,
+        &twice,
+        "part1: city:n=300 along orbit:frames=4 is in part1 as well",
+    );
+    all_refused(
+        &folder,
+        &["merge part1 part2 --out part1"],
+        "already holds a run",
+    );
+    all_refused(
+        &folder,
+        &["merge part1 nowhere --out merged"],
+        "nowhere/stream.jsonl",
+    );
+    works(folder.path(), "merge part1 part2 --out merged");
+}

@@ -1,0 +1,273 @@
+//! Does the road of a measurement notice when it is broken itself? A wrong
+//! reference, a swallowed panic, a dropped sample, swapped labels, a stale
+//! digest: each on its own, beside the same road unbroken.
+
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use cullbench::culling::{Culling, CullingTest};
+use cullbench::geometry::{Aabb, PlaneTree};
+use cullbench::index::{
+    BuildError, FrustumQuery, Info, Kind, MemoryUsage, Origin, RegionIndex, Registry, indexable,
+};
+use cullbench::measure::{
+    Contender, GroupPlan, Known, Part, PathInfo, Protocol, SceneInfo, Status, Task, Workload,
+    measure_group, measure_part,
+};
+use cullbench::path;
+use cullbench::query::{ItemId, Recorder, Region, Sink, View};
+use cullbench::scene::{self, Scene};
+
+const CAMERAS: u32 = 16;
+
+/// A scan that misbehaves from its so-many-th query on.
+struct Faulty<const FAULT: u8> {
+    ids: Vec<ItemId>,
+    boxes: Vec<Aabb>,
+    queries: AtomicU32,
+}
+
+const SOUND: u8 = 0;
+/// Panics in the timed pass.
+const PANICS_LATER: u8 = 1;
+/// Panics there, catches it itself and returns what it has.
+const SWALLOWS_ITS_PANIC: u8 = 2;
+
+const NAMES: [&str; 3] = ["sound", "panics-later", "swallows-its-panic"];
+
+impl<const FAULT: u8> Faulty<FAULT> {
+    fn query<G: Region>(
+        &self,
+        region: &G,
+        last: usize,
+        sink: &mut impl Sink,
+        recorder: &mut impl Recorder,
+    ) -> ControlFlow<()> {
+        recorder.items_tested(self.ids.len() as u32);
+        for i in 0..last {
+            if region.admits(&self.boxes[i], region.start(), recorder) {
+                sink.accept(&self.ids[i..=i])?;
+            }
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+impl<const FAULT: u8> RegionIndex for Faulty<FAULT> {
+    const INFO: Info = Info::new(
+        NAMES[FAULT as usize],
+        "a scan, broken on request",
+        Kind::Scan,
+        Origin::Ours,
+    );
+    type Params = ();
+
+    fn build(items: &[Aabb], _: Option<&PlaneTree>, (): &()) -> Result<Self, BuildError> {
+        let ids = indexable(items)?;
+        Ok(Faulty {
+            boxes: ids.iter().map(|&id| items[id as usize]).collect(),
+            ids,
+            queries: AtomicU32::new(0),
+        })
+    }
+
+    fn memory(&self) -> MemoryUsage {
+        MemoryUsage {
+            node_bytes: 0,
+            item_bytes: size_of_val(&self.boxes[..]) + size_of_val(&self.ids[..]),
+        }
+    }
+
+    fn locate<S: Sink, R: Recorder>(
+        &self,
+        p: glam::Vec3,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        self.query(&p, self.ids.len(), sink, recorder)
+    }
+}
+
+impl<const FAULT: u8> FrustumQuery for Faulty<FAULT> {
+    fn visible<V: View, S: Sink, R: Recorder>(
+        &self,
+        view: &V,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        let query = self.queries.fetch_add(1, Ordering::Relaxed);
+        // The count pass asks every camera once.
+        let is_timed = query >= CAMERAS;
+        let work = || -> usize {
+            assert!(FAULT == SOUND || !is_timed, "deep in the structure");
+            self.ids.len()
+        };
+        let last = match FAULT {
+            SWALLOWS_ITS_PANIC => std::panic::catch_unwind(work).unwrap_or(self.ids.len() / 2),
+            _ => work(),
+        };
+        self.query(view, last, sink, recorder)
+    }
+}
+
+fn scene() -> Scene {
+    scene::load("city:n=400", &Default::default()).expect("a scene")
+}
+
+fn workload(scene: &Scene) -> Workload<'_> {
+    let source = format!("orbit:frames={CAMERAS}");
+    let way = path::load(&source, scene, &Default::default()).expect("a path");
+    Workload::new(scene, &way, &Culling::default()).expect("a workload")
+}
+
+fn contenders(names: &str, scene: &Scene) -> Vec<Contender> {
+    let registry = Registry::builtin()
+        .with::<Faulty<SOUND>>()
+        .with::<Faulty<PANICS_LATER>>()
+        .with::<Faulty<SWALLOWS_ITS_PANIC>>();
+    let specs = registry.structures(names).expect("structures");
+    let build = |spec| Contender::build(spec, false, scene, CullingTest::SixPlane);
+    specs.into_iter().map(build).collect()
+}
+
+fn protocol() -> Protocol {
+    Protocol {
+        rounds: [2, 2],
+        task_ns: 1e5,
+        cameras: CAMERAS as usize,
+        cold: false,
+        seed: 1,
+        cache_bytes: 1 << 20,
+    }
+}
+
+fn statuses(workload: &Workload, contenders: &[Contender]) -> Vec<Status> {
+    let group = measure_group(workload, contenders, &[], &protocol(), &|| false);
+    let cells = group.expect("not stopped").cells;
+    for cell in &cells {
+        let is_ok = cell.verdict.status == Status::Ok;
+        assert_eq!(cell.rank.is_some(), is_ok, "{cell:?}");
+        assert_eq!(cell.metrics.contains_key("query_ns"), is_ok, "{cell:?}");
+    }
+    cells.iter().map(|cell| cell.verdict.status).collect()
+}
+
+/// What one process hands over.
+fn part(process: u32, known: Option<&Known>) -> Part {
+    let scene = scene();
+    let (workload, contenders) = (workload(&scene), contenders("linear,bvh,octree", &scene));
+    let info = SceneInfo::of(&scene);
+    let plan = GroupPlan {
+        scene: &info,
+        path: PathInfo::of("orbit", &workload, false),
+        process,
+        protocol: protocol(),
+        bounds: &[],
+        known,
+        plan_only: false,
+        locate: true,
+    };
+    let measured = measure_part(&workload, &contenders, plan, &|_, _| (), &|| false);
+    measured.expect("not stopped").0
+}
+
+fn of_parts(parts: &[Part]) -> Vec<Status> {
+    let cells = cullbench::measure::Group::of(parts).cells;
+    cells.iter().map(|cell| cell.verdict.status).collect()
+}
+
+#[test]
+fn the_unbroken_road_is_ok() {
+    let scene = scene();
+    let found = statuses(&workload(&scene), &contenders("linear,sound", &scene));
+    assert_eq!(found, [Status::Ok; 2]);
+}
+
+#[test]
+fn a_panic_in_the_timed_pass_is_told_and_one_that_is_swallowed_is_wrong() {
+    let scene = scene();
+    let names = "linear,panics-later,swallows-its-panic";
+    let found = statuses(&workload(&scene), &contenders(names, &scene));
+    assert_eq!(found, [Status::Ok, Status::Panicked, Status::Wrong]);
+}
+
+/// Reference and structures agree, because both are asked with views of cameras
+/// that look elsewhere: only the truth of the cameras themselves can tell.
+#[test]
+fn a_reference_that_is_wrong_together_with_all_structures_is_unsafe() {
+    let scene = scene();
+    let contenders = contenders("linear,bvh", &scene);
+    let mut wrong = workload(&scene);
+    wrong.views.rotate_left(CAMERAS as usize / 2);
+    assert_eq!(statuses(&wrong, &contenders), [Status::Unsafe; 2]);
+}
+
+/// The reference scans other boxes than the structures were built over.
+#[test]
+fn a_reference_over_other_items_disagrees_with_every_structure() {
+    let scene = scene();
+    let contenders = contenders("linear,bvh", &scene);
+    let mut wrong = workload(&scene);
+    wrong.items.to_mut().rotate_left(1);
+    let found = statuses(&wrong, &contenders);
+    assert!(!found.contains(&Status::Ok), "{found:?}");
+}
+
+#[test]
+fn a_dropped_sample_is_wrong() {
+    let mut parts = [part(0, None)];
+    assert_eq!(of_parts(&parts), [Status::Ok; 3]);
+    let known = parts[0].known.clone().expect("a plan");
+    let task = parts[0].tasks.iter_mut().find(|t| t.label == "bvh");
+    // One batch of one round, of a camera that sees something.
+    let camera = known.visible.iter().map(|answer| answer.count);
+    task.expect("bvh is timed").returned -= camera.max().expect("a camera");
+    assert_eq!(of_parts(&parts), [Status::Ok, Status::Wrong, Status::Ok]);
+}
+
+#[test]
+fn swapped_labels_are_wrong() {
+    let first = part(0, None);
+    let second = part(1, first.known.as_ref());
+    let mut parts = [first, second];
+    assert_eq!(of_parts(&parts), [Status::Ok; 3]);
+    let sound = parts.clone();
+    // Each pair of structures, each task; and a task for another.
+    for task in [Task::Query, Task::Locate] {
+        for (one, other) in [("linear", "bvh"), ("bvh", "octree"), ("octree", "linear")] {
+            parts = sound.clone();
+            for own in parts[1].tasks.iter_mut().filter(|t| t.task == task) {
+                own.label = match own.label.as_str() {
+                    label if label == one => other.to_owned(),
+                    label if label == other => one.to_owned(),
+                    label => label.to_owned(),
+                };
+            }
+            let found = of_parts(&parts);
+            assert!(found.contains(&Status::Wrong), "{one} {other}: {found:?}");
+        }
+    }
+    parts = sound;
+    for own in parts[1].tasks.iter_mut().filter(|t| t.label == "bvh") {
+        own.task = match own.task {
+            Task::Query => Task::Locate,
+            Task::Locate => Task::Query,
+            Task::LocateBatched => Task::LocateBatched,
+        };
+    }
+    assert_eq!(of_parts(&parts)[1], Status::Wrong);
+}
+
+#[test]
+fn a_stale_digest_is_wrong() {
+    let first = part(0, None);
+    let mut known = first.known.clone().expect("a plan");
+    assert_eq!(
+        of_parts(&[first.clone(), part(1, Some(&known))]),
+        [Status::Ok; 3]
+    );
+    // As many ids as before, and others.
+    known.visible[CAMERAS as usize - 1].digest ^= 1;
+    let found = of_parts(&[first, part(1, Some(&known))]);
+    assert_eq!(found, [Status::Wrong; 3]);
+}

@@ -1,0 +1,360 @@
+//! Every status of a report happens: structures that allocate without end, hang,
+//! abort or panic fail their own rows and nobody else's. This file is the
+//! program and its test in one (`harness = false`): with [`CHILD`] set it is
+//! `cullbench` with those structures, else it starts itself.
+
+use std::env;
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::process::{Command, ExitCode, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use cullbench::geometry::{Aabb, PlaneTree};
+use cullbench::index::{
+    BuildError, FrustumQuery, Info, Kind, MemoryUsage, Origin, RegionIndex, Registry,
+};
+use cullbench::query::{ItemId, Recorder, Region, Sink, View};
+use serde_json::{Value, json};
+
+/// Set for the processes that are the program.
+const CHILD: &str = "CULLBENCH_TEST_STATUSES_CHILD";
+
+type Flow = ControlFlow<()>;
+
+/// What a structure does where it should build or answer.
+trait Mishap: Send + Sync + 'static {
+    const NAME: &'static str;
+    fn at_build() {}
+    fn at_query() {}
+}
+
+/// A scan with a mishap.
+struct Broken<M> {
+    boxes: Vec<Aabb>,
+    mishap: std::marker::PhantomData<M>,
+}
+
+impl<M: Mishap> Broken<M> {
+    fn query<G: Region>(&self, region: &G, sink: &mut impl Sink, r: &mut impl Recorder) -> Flow {
+        let start = region.start();
+        r.items_tested(self.boxes.len() as u32);
+        for (id, item) in (0..).zip(&self.boxes) {
+            if !item.is_empty() && region.admits(item, start, r) {
+                sink.accept(&[id as ItemId])?;
+            }
+        }
+        Flow::Continue(())
+    }
+}
+
+impl<M: Mishap> RegionIndex for Broken<M> {
+    const INFO: Info = Info::new(
+        M::NAME,
+        "a scan with a mishap",
+        Kind::Grid,
+        Origin::Crate("test"),
+    );
+    type Params = ();
+
+    fn build(items: &[Aabb], _: Option<&PlaneTree>, (): &()) -> Result<Self, BuildError> {
+        // Parameters are tried on no items.
+        if !items.is_empty() {
+            M::at_build();
+        }
+        Ok(Broken {
+            boxes: items.to_vec(),
+            mishap: std::marker::PhantomData,
+        })
+    }
+    fn memory(&self) -> MemoryUsage {
+        MemoryUsage {
+            node_bytes: 0,
+            item_bytes: size_of_val(&self.boxes[..]),
+        }
+    }
+    fn locate<S: Sink, R: Recorder>(&self, p: glam::Vec3, sink: &mut S, r: &mut R) -> Flow {
+        self.query(&p, sink, r)
+    }
+}
+
+impl<M: Mishap> FrustumQuery for Broken<M> {
+    fn visible<V: View, S: Sink, R: Recorder>(&self, v: &V, sink: &mut S, r: &mut R) -> Flow {
+        M::at_query();
+        self.query(v, sink, r)
+    }
+}
+
+fn for_ever() {
+    loop {
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}
+
+macro_rules! mishaps {
+    ($($kind:ident $name:literal $step:ident $what:expr;)*) => {
+        $(struct $kind;
+        impl Mishap for $kind {
+            const NAME: &'static str = $name;
+            fn $step() {
+                $what
+            }
+        })*
+        fn registry() -> Registry {
+            Registry::builtin()$(.with::<Broken<$kind>>())*
+        }
+    };
+}
+
+mishaps! {
+    // Of memory there is not that much anywhere.
+    Greedy "greedy" at_build drop(std::hint::black_box(Vec::<u8>::with_capacity(1 << 46)));
+    // As much as a limit forbids and a machine has.
+    Hungry "hungry" at_build drop(std::hint::black_box(vec![1_u8; 3 << 30]));
+    HangsBuilding "hangs-building" at_build for_ever();
+    HangsAsked "hangs-asked" at_query for_ever();
+    Aborts "aborts" at_query std::process::abort();
+    Panics "panics" at_query panic!("no such luck");
+}
+
+const RUN: &str = "run --scene city:n=300 --path orbit:frames=4 --path spin:frames=4 \
+    --processes 2 --no-bounds --timeout 60 --structure linear,bvh,";
+
+fn program(folder: &Path) -> Command {
+    let mut command = Command::new(env::current_exe().expect("this test"));
+    command.env(CHILD, "1").current_dir(folder);
+    // Writing one takes seconds.
+    command.env_remove("RUST_BACKTRACE");
+    command
+}
+
+fn cells(folder: &Path, run: &str) -> Vec<Value> {
+    let file = folder.join(run).join("report.json");
+    let text = std::fs::read_to_string(file).expect("a report");
+    let report: Value = serde_json::from_str(&text).expect("JSON");
+    report["cells"].as_array().expect("cells").clone()
+}
+
+/// The rows of `structure` have that status with that reason, all others are ok.
+fn assert_alone(cells: &[Value], structure: &str, status: &str, reason: &str) {
+    assert_eq!(cells.len(), 6, "{structure}");
+    for cell in cells {
+        let told = cell["reason"].as_str().unwrap_or_default();
+        match cell["structure"] == structure {
+            true => {
+                assert_eq!(cell["status"], status, "{cell}");
+                assert!(told.contains(reason), "{structure}: {told}");
+            }
+            false => {
+                assert_eq!(cell["status"], "ok", "{structure}: {cell}");
+                assert_eq!(cell["times"]["processes"], 2, "{structure}: {cell}");
+            }
+        }
+    }
+}
+
+fn each_mishap_fails_its_own_rows() {
+    for (structure, status, reason, code) in [
+        (
+            "greedy",
+            "out_of_memory",
+            "building: memory allocation of 70368744177664 bytes",
+            0,
+        ),
+        (
+            "hangs-building",
+            "timed_out",
+            "building took longer than 2 s",
+            0,
+        ),
+        ("hangs-asked", "timed_out", "took longer than 2 s", 0),
+        ("aborts", "panicked", "ended by signal 6 while", 1),
+        ("panics", "panicked", "no such luck", 1),
+    ] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut line = format!("{RUN}{structure} --out r");
+        if status == "timed_out" {
+            line = line.replace("--timeout 60", "--timeout 2");
+        }
+        let done = program(folder.path())
+            .args(line.split_whitespace())
+            .output();
+        let done = done.expect("started");
+        let error = String::from_utf8_lossy(&done.stderr);
+        assert_eq!(
+            (done.status.code(), &*error),
+            (Some(code), ""),
+            "{structure}"
+        );
+        assert_alone(&cells(folder.path(), "r"), structure, status, reason);
+    }
+}
+
+/// A limit of the shell stands for a machine with less memory.
+#[cfg(unix)]
+fn a_limit_is_a_lack_of_memory() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut command = Command::new("sh");
+    command
+        .args(["-c", "ulimit -v 2000000; exec \"$0\" \"$@\""])
+        .arg(env::current_exe().expect("this test"));
+    let line = format!("{RUN}hungry --out r");
+    let done = command
+        .args(line.split_whitespace())
+        .env(CHILD, "1")
+        .env_remove("RUST_BACKTRACE")
+        .current_dir(folder.path())
+        .output()
+        .expect("started");
+    let error = String::from_utf8_lossy(&done.stderr);
+    assert_eq!((done.status.code(), &*error), (Some(0), ""));
+    let cells = cells(folder.path(), "r");
+    assert_alone(
+        &cells,
+        "hungry",
+        "out_of_memory",
+        "memory allocation of 3221225472 bytes",
+    );
+}
+
+/// Ctrl-C, as `kill` sends it.
+#[cfg(unix)]
+fn ctrl_c_is_answered_at_once_in_the_middle_of_a_build() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut line = RUN.replace("--timeout 60", "--timeout 600");
+    line = line.replace("--scene", "--scene city:n=200 --scene");
+    let line = format!("{line}hangs-building --out r");
+    // The first scene is done without that structure; then it hangs.
+    let started = |line: &str| {
+        let mut command = program(folder.path());
+        command.args(line.split_whitespace());
+        let child = command
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn();
+        child.expect("started")
+    };
+    let interrupted = |child: std::process::Child| -> (Output, Duration) {
+        let id = child.id().to_string();
+        let sent = Command::new("kill").args(["-INT", &id]).status();
+        assert!(sent.expect("kill").success());
+        let begin = Instant::now();
+        let output = child.wait_with_output().expect("a child");
+        (output, begin.elapsed())
+    };
+    let child = started(&line);
+    std::thread::sleep(Duration::from_millis(1500));
+    let (output, took) = interrupted(child);
+    assert_eq!(output.status.code(), Some(130));
+    assert!(output.stderr.is_empty());
+    assert!(took < Duration::from_secs(1), "{took:?}");
+    // Nothing was finished: nothing is left.
+    assert!(!folder.path().join("r").exists());
+
+    // With a finished scene: it is kept.
+    let two = "run --scene city:n=300 --path orbit:frames=4 --processes 2 --no-bounds \
+        --timeout 600 --structure linear,hangs-late --out r";
+    let child = started(two);
+    let stream = folder.path().join("r/stream.jsonl");
+    let begin = Instant::now();
+    let lines = || std::fs::read_to_string(&stream).map_or(0, |text| text.lines().count());
+    while lines() < 2 {
+        assert!(begin.elapsed() < Duration::from_secs(30), "no first part");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    std::thread::sleep(Duration::from_millis(300));
+    let (output, took) = interrupted(child);
+    assert_eq!(output.status.code(), Some(130));
+    assert!(took < Duration::from_secs(1), "{took:?}");
+    assert_eq!(cells(folder.path(), "r").len(), 2);
+    assert_eq!(lines(), 2);
+}
+
+/// Hangs in every build but those of the first process.
+struct HangsLate;
+impl Mishap for HangsLate {
+    const NAME: &'static str = "hangs-late";
+    fn at_build() {
+        let first = Path::new("first-process");
+        let id = std::process::id().to_string();
+        match std::fs::read_to_string(first) {
+            Ok(other) if other != id => for_ever(),
+            _ => std::fs::write(first, id).expect("writable"),
+        }
+    }
+}
+
+fn a_scene_without_items_is_left_out() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let line = "run --scene city:n=0 --path outside:frames=2 --processes 2 --structure linear,bvh \
+        --out r";
+    let done = program(folder.path())
+        .args(line.split_whitespace())
+        .output();
+    assert_eq!(done.expect("started").status.code(), Some(0));
+    let cells = cells(folder.path(), "r");
+    assert_eq!(cells.len(), 2);
+    for cell in cells {
+        assert_eq!(
+            (&cell["status"], &cell["rank"]),
+            (&json!("left_out"), &Value::Null)
+        );
+        let reason = cell["reason"].as_str().expect("a reason");
+        assert!(reason.contains("no items"), "{reason}");
+    }
+    let line = "run --suite compare --scene city:n=50 --path orbit:frames=2 --processes 1 \
+        --structure linear --out s";
+    let done = program(folder.path())
+        .args(line.split_whitespace())
+        .output();
+    assert_eq!(done.expect("started").status.code(), Some(0));
+    let cell = &self::cells(folder.path(), "s")[0];
+    let left_out = cell["left_out"].as_array().expect("a list").iter();
+    let left_out: Vec<&str> = left_out.filter_map(Value::as_str).collect();
+    assert_eq!(
+        left_out,
+        [
+            "locate_ns: this suite times frustum queries only",
+            "query_ns_p95: fewer than 20 comparable groups of cameras"
+        ]
+    );
+}
+
+fn what_does_not_fit_is_refused_before_it_is_made() {
+    let refused = |items, structures, available| {
+        let result = cullbench::scene::fits("uniform:n=9", items, structures, available);
+        result.err().map(|error| error.to_string())
+    };
+    let gigabyte = 1_000_000_000;
+    let told = refused(100_000_000, 0, Some(8 * gigabyte)).expect("refused");
+    let wanted = "uniform:n=9: needs about 12.0 GB, 8.0 GB are free; expected a smaller n";
+    assert_eq!(told, wanted);
+    // Structures count, and the line says how many.
+    assert_eq!(refused(100_000_000, 0, Some(13 * gigabyte)), None);
+    let told = refused(100_000_000, 8, Some(13 * gigabyte)).expect("refused");
+    assert!(
+        told.contains("45.6 GB with 8 structures, 13.0 GB are free"),
+        "{told}"
+    );
+    assert_eq!(refused(1000, 8, Some(gigabyte)), None);
+    // To the byte, and without overflow.
+    assert_eq!(refused(10, 0, Some(1200)), None);
+    assert!(refused(10, 0, Some(1199)).is_some());
+    assert!(refused(u64::MAX, 3, Some(u64::MAX - 1)).is_some());
+    assert_eq!(refused(u64::MAX, 3, None), None);
+}
+
+fn main() -> ExitCode {
+    if env::var_os(CHILD).is_some() {
+        return cullbench::cli::main_with(registry().with::<Broken<HangsLate>>());
+    }
+    what_does_not_fit_is_refused_before_it_is_made();
+    a_scene_without_items_is_left_out();
+    each_mishap_fails_its_own_rows();
+    #[cfg(unix)]
+    {
+        a_limit_is_a_lack_of_memory();
+        ctrl_c_is_answered_at_once_in_the_middle_of_a_build();
+    }
+    println!("statuses: out_of_memory, timed_out, panicked, left_out; Ctrl-C; what fits");
+    ExitCode::SUCCESS
+}
