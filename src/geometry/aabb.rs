@@ -125,8 +125,11 @@ impl Aabb {
     }
 
     /// Largest absolute coordinate on each axis: how far from the local
-    /// origin anything in the box can be.
+    /// origin anything in the box can be; zero for an empty box.
     pub fn reach(&self) -> Vec3 {
+        if self.is_empty() {
+            return Vec3::ZERO;
+        }
         self.min.abs().max(self.max.abs())
     }
 
@@ -162,7 +165,10 @@ mod tests {
         let inverted = Aabb::new(Vec3::ONE, Vec3::ZERO);
         assert!(inverted.is_empty() && !unit.is_empty());
         assert_eq!(Aabb::union_of(&[unit, inverted]), unit);
-        assert!(Aabb::union_of(&[]).is_empty());
+        let nothing = Aabb::union_of(&[inverted]);
+        assert!(nothing.is_empty() && Aabb::union_of(&[]).is_empty());
+        // What no box reaches must not make planes' sums infinite.
+        assert_eq!(nothing.reach(), Vec3::ZERO);
     }
 
     #[test]

@@ -200,11 +200,7 @@ impl Scene {
     pub fn surroundings(&self) -> Surroundings {
         Surroundings {
             origin: self.origin,
-            reach: if self.bounds.is_empty() {
-                glam::Vec3::ZERO
-            } else {
-                self.bounds.reach()
-            },
+            reach: self.bounds.reach(),
         }
     }
 }

@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use crate::camera::Surroundings;
 use crate::geometry::Aabb;
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
 use margin::slack;
 pub use replay::{Replay, replay};
@@ -124,13 +124,8 @@ impl Section {
 
 /// What the planes must know of boxes about the scene origin zero.
 fn surroundings(items: &[Aabb]) -> Surroundings {
-    let bounds = Aabb::union_of(items);
     Surroundings {
         origin: DVec3::ZERO,
-        reach: if bounds.is_empty() {
-            Vec3::ZERO
-        } else {
-            bounds.reach()
-        },
+        reach: Aabb::union_of(items).reach(),
     }
 }

@@ -175,10 +175,9 @@ fn camera_volume(dice: &mut Dice, kind: usize, scale: f64, items: &[Aabb]) -> Op
             Lens::off_axis(window, near, Some(far))
         }
     };
-    let reach = Aabb::union_of(items).reach();
     let around = Surroundings {
         origin: DVec3::ZERO,
-        reach: if items.is_empty() { Vec3::ZERO } else { reach },
+        reach: Aabb::union_of(items).reach(),
     };
     let epsilon = if dice.unit() < 0.5 {
         0.0
