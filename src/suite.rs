@@ -86,7 +86,7 @@ pub static SUITES: &[Suite] = &[
             rounds: [3, 40],
             task_ns: 6e6,
             pass_ns: 12e6,
-            locate: true,
+            beside: true,
         },
     },
     Suite {
@@ -138,7 +138,7 @@ pub static SUITES: &[Suite] = &[
             rounds: [3, 60],
             task_ns: 60e6,
             pass_ns: 100e6,
-            locate: true,
+            beside: true,
         },
     },
     Suite {
@@ -191,7 +191,7 @@ pub static SUITES: &[Suite] = &[
             rounds: [3, 40],
             task_ns: 40e6,
             pass_ns: 100e6,
-            locate: true,
+            beside: true,
         },
     },
     Suite {
@@ -207,7 +207,7 @@ pub static SUITES: &[Suite] = &[
             rounds: [12, 80],
             task_ns: 80e6,
             pass_ns: 40e6,
-            locate: false,
+            beside: false,
         },
     },
     Suite {
@@ -224,7 +224,7 @@ pub static SUITES: &[Suite] = &[
             rounds: [3, 40],
             task_ns: 60e6,
             pass_ns: 200e6,
-            locate: true,
+            beside: true,
         },
     },
 ];

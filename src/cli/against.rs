@@ -17,7 +17,7 @@ use super::processes::{Ended, Said, Worker, see_through};
 use super::run_plan::RunPlan;
 use super::worker::{PROTOCOL, Request, processors};
 use crate::measure::{GroupKey, Known, Part, Share, Status, Task, Verdict};
-use crate::statistics::{Judgement, interquartile_mean, judge, trimmed_mean};
+use crate::statistics::{Judgement, interquartile_mean, judge, resolved, trimmed_mean};
 
 /// How long one of a pair runs before the other takes its turn: well below the
 /// time in which a shared machine changes its speed.
@@ -110,7 +110,7 @@ impl Duel<'_> {
                     Side::New => self.nothing(scene),
                     Side::Old => self.known(scene, &schedules, None),
                 };
-                let request = self.request(scene, 0, known, true, cpu);
+                let request = self.request(scene, 0, known, true, cpu, 0);
                 let own = &mut seen[side as usize];
                 let ended = see_through(
                     program,
@@ -163,16 +163,12 @@ impl Duel<'_> {
                 .filter(|&i| cells[i].is_timed() && differences[i].len() >= 3)
                 .collect();
             let of_judged: Vec<Vec<f64>> = judged.iter().map(|&i| differences[i].clone()).collect();
-            for (&i, judgement) in judged.iter().zip(judge(&of_judged, self.threshold)) {
+            let judgements = judge(&of_judged, self.threshold);
+            let enough = resolved(&judgements, self.threshold);
+            for (&i, judgement) in judged.iter().zip(judgements) {
                 cells[i].judgement = judgement;
             }
-            let resolved = judged.iter().all(|&i| {
-                let found = cells[i].judgement.as_ref().and_then(|j| j.resolution);
-                found.is_some_and(|resolution| resolution <= self.threshold)
-            });
-            // On precision, never on significance: stopping at the first
-            // significant difference would find one where there is none.
-            if resolved || pairs >= self.pairs.most {
+            if enough || pairs >= self.pairs.most {
                 let [_, new] = seen;
                 let query = new
                     .parts
@@ -228,6 +224,7 @@ impl Duel<'_> {
         known: Vec<Option<Known>>,
         plan_only: bool,
         cpu: Option<usize>,
+        layout: u64,
     ) -> Request {
         Request {
             protocol: PROTOCOL,
@@ -243,6 +240,7 @@ impl Duel<'_> {
             },
             cpu,
             samples: false,
+            layout,
         }
     }
 
@@ -256,17 +254,18 @@ impl Duel<'_> {
         cpu: Option<usize>,
         rng: &mut Pcg64,
     ) -> anyhow::Result<Option<[Vec<Part>; 2]>> {
-        let start = |side: usize| {
-            let known = self.known(scene, &seen[1], Some(&seen[side]));
-            Worker::start(
-                programs[side],
-                &self.request(scene, pair, known, false, cpu),
-            )
-        };
-        let mut workers = [Some(start(0)?), Some(start(1)?)];
         let mut parts = [Vec::new(), Vec::new()];
-        // Old, new, new, old, ...: whoever begins.
+        // Which of the two is started first, and gets the first memory, is drawn
+        // anew for every pair, and apart from it whose turn is first: old, new,
+        // new, old, ...
+        let first: usize = rng.random_range(0..2);
         let begins: usize = rng.random_range(0..2);
+        let mut workers = [None, None];
+        for side in [first, 1 - first] {
+            let known = self.known(scene, &seen[1], Some(&seen[side]));
+            let request = self.request(scene, pair, known, false, cpu, rng.random());
+            workers[side] = Some(Worker::start(programs[side], &request)?);
+        }
         let mut turn = 0;
         hold(&workers, 1 - begins);
         while workers.iter().any(Option::is_some) {

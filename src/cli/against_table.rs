@@ -62,12 +62,13 @@ pub fn compare_against(
             bar.set_message(step.to_owned());
         },
     };
+    // Before it begins: afterwards the load is its own.
+    let load = Machine::capture();
     let found = duel.run();
     bar.finish_and_clear();
     let Some(found) = found? else {
         return Ok(Ending::Interrupted);
     };
-    let load = Machine::capture();
     let busy = load.load.filter(|l| *l > 0.5 * load.cores as f64);
     let mut notes: Vec<String> = Vec::new();
     notes.extend(busy.map(|busy| {
@@ -139,7 +140,10 @@ fn changes(found: &Against, threshold: f64) -> Changes {
         let row = JudgedRow::of_statuses(key.clone(), old, new).unwrap_or_else(|| {
             let [old, new] = cell.shown();
             let pairs = cell.ln_ns.each_ref().map(Vec::len);
-            JudgedRow::by_times(key, "query_ns", (old, new), cell.judgement, pairs)
+            JudgedRow {
+                pairs_ln_ns: Some(cell.ln_ns.clone()),
+                ..JudgedRow::by_times(key, "query_ns", (old, new), cell.judgement, pairs)
+            }
         });
         changes.rows.push(row);
     }

@@ -242,6 +242,7 @@ impl Run {
                 count => Some(self.cpus[process as usize % count]),
             },
             samples: true,
+            layout: u64::from(process),
             share,
         };
         let source = self.plan.plan.scenes[scene].source.clone();

@@ -10,6 +10,8 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use clap::Parser;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 
 use super::Ending;
@@ -20,7 +22,7 @@ use crate::measure::{Part, Share, TaskSamples, measure_scene};
 
 /// Raised when requests or messages change: programs of different versions do
 /// not understand each other.
-pub const PROTOCOL: u32 = 1;
+pub const PROTOCOL: u32 = 2;
 
 /// What a worker is to do.
 #[derive(Clone, Serialize, Deserialize)]
@@ -37,6 +39,8 @@ pub struct Request {
     pub cpu: Option<usize>,
     /// Whether samples are wanted beside the parts.
     pub samples: bool,
+    /// Decides on where its memory lies: another number for every process.
+    pub layout: u64,
 }
 
 /// A line from a worker.
@@ -86,6 +90,7 @@ fn answer(registry: &Registry, request: &Request) -> anyhow::Result<()> {
         );
     }
     stay_on(request.cpu);
+    let _held = vary_layout(request.layout);
     for (source, file) in &request.spooled {
         crate::input::stand_in(source, file)?;
     }
@@ -177,6 +182,24 @@ fn stay_on(cpu: Option<usize>) {
     }
     #[cfg(not(target_os = "linux"))]
     let _ = cpu;
+}
+
+/// Takes memory and gives some of it back, so that what is built lies elsewhere
+/// in every process. Without it a system hands the pages of the last process to
+/// the next one: the pairs of a comparison would all compare the same two
+/// layouts, and differ by some percent for nothing.
+fn vary_layout(seed: u64) -> Vec<Vec<u8>> {
+    let mut rng = Pcg64::seed_from_u64(seed);
+    let mut held = Vec::new();
+    let mut given_back = Vec::new();
+    for _ in 0..rng.random_range(16..64) {
+        let block = vec![1; rng.random_range(1..256) * 1024];
+        match rng.random() {
+            true => held.push(block),
+            false => given_back.push(block),
+        }
+    }
+    held
 }
 
 /// The processors that this process may run on; empty where that is not known.

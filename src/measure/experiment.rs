@@ -35,8 +35,9 @@ pub struct Effort {
     /// The timed cameras are as many as a plain loop over all items answers in
     /// this time, ns.
     pub pass_ns: f64,
-    /// Whether region search is timed beside frustum queries.
-    pub locate: bool,
+    /// Whether region search, updates, a twin and lower bounds are measured
+    /// beside frustum queries.
+    pub beside: bool,
 }
 
 /// A scene with the ways through it.
@@ -159,7 +160,8 @@ impl Plan {
         let twin = proper.or(self.structures.first());
         let once = self.structures.iter().map(|s| (s, false));
         // What has ended a process would end this one too, as a twin as well.
-        let twin = twin.filter(|spec| !share.failed.contains_key(&spec.label));
+        let twin =
+            twin.filter(|spec| self.effort.beside && !share.failed.contains_key(&spec.label));
         once.chain(twin.map(|s| (s, true)))
             .map(|(spec, is_twin)| {
                 if let Some(verdict) = share.failed.get(&spec.label) {
@@ -171,7 +173,7 @@ impl Plan {
                 }
                 notice(Some(&spec.label), "building");
                 let built = Contender::build(spec.clone(), is_twin, scene, test);
-                let updates = share.process.is_multiple_of(UPDATES_EVERY) && self.effort.locate;
+                let updates = share.process.is_multiple_of(UPDATES_EVERY) && self.effort.beside;
                 match updates && !is_twin {
                     true => built.with_updates(scene, test),
                     false => built,
@@ -272,10 +274,14 @@ pub fn measure_scene(
                 seed: plan.seed.wrapping_add(u64::from(share.process)),
                 cache_bytes: sweep,
             },
-            bounds: if plan.bounds { BOUNDS } else { &[] },
+            bounds: if plan.bounds && plan.effort.beside {
+                BOUNDS
+            } else {
+                &[]
+            },
             known,
             plan_only: share.plan_only,
-            locate: plan.effort.locate,
+            locate: plan.effort.beside,
         };
         let protocol = group.protocol;
         let Some((mut part, samples)) = measure_part(&workload, contenders, group, notice, stop)
@@ -283,7 +289,7 @@ pub fn measure_scene(
             return Ok(false);
         };
         // Once for each scene; a comparison of programs looks at queries alone.
-        if first && plan.effort.locate && !share.plan_only {
+        if first && plan.effort.beside && !share.plan_only {
             for subject in &mut part.subjects {
                 let spec = plan.structures.iter().find(|s| s.label == subject.label);
                 if let Some(spec) = spec.filter(|_| subject.verdict.status == Status::Ok) {
@@ -332,7 +338,7 @@ mod tests {
                 rounds: [1, 1],
                 task_ns: 1e4,
                 pass_ns: 1e4,
-                locate: false,
+                beside: true,
             },
             bounds: false,
             seed: 1,

@@ -132,6 +132,10 @@ pub struct JudgedRow {
     pub new_status: Status,
     /// Why the verdict is what it is, where the figures do not say it.
     pub reason: Option<String>,
+    /// What was judged, where pairs of processes were: ln ns per query of each,
+    /// old and new.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pairs_ln_ns: Option<[Vec<f64>; 2]>,
 }
 
 impl JudgedRow {
@@ -162,6 +166,7 @@ impl JudgedRow {
             old_status: Status::Ok,
             new_status: Status::Ok,
             reason,
+            pairs_ln_ns: None,
         }
     }
 

@@ -254,7 +254,7 @@ impl Stream {
 ///     cullings: vec![Default::default()],
 ///     lens: Default::default(),
 ///     load: Default::default(),
-///     effort: Effort { processes: 1, rounds: [3, 3], task_ns: 1e5, pass_ns: 1e6, locate: true },
+///     effort: Effort { processes: 1, rounds: [3, 3], task_ns: 1e5, pass_ns: 1e6, beside: true },
 ///     bounds: false,
 ///     seed: 1,
 /// };

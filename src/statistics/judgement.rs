@@ -10,7 +10,8 @@ use super::{Trimmed, holm, moderate, student, trimmed_mean};
 const ALPHA: f64 = 0.025;
 
 /// Changes of up to 1 % are not called one: two builds of the same code differ
-/// as much by where the linker puts it (Mytkowicz et al. 2009).
+/// as much by where the linker puts it (Mytkowicz et al. 2009), and two processes
+/// by where their memory lies. What is proven is that a change is larger.
 const FLOOR: f64 = 0.01;
 
 /// Quantile of the 95 % interval's ends.
@@ -72,14 +73,14 @@ pub struct Judgement {
 /// The estimate of a cell is the 20 % trimmed mean of its differences, its
 /// standard error is moderated over the cells. In this order a cell is
 ///
-/// 1. slower or faster, if it is significant in one-sided tests of 2.5 % with
-///    Holm's correction over the judged cells (each direction by itself), and
-///    if the change is over 1 %;
+/// 1. slower or faster, if its change is over 1 %, significant in one-sided tests
+///    of 2.5 % with Holm's correction over the judged cells (each direction by
+///    itself);
 /// 2. same, if the 90 % interval lies within ± ln(1 + threshold): two one-sided
 ///    tests (Schuirmann 1987);
 /// 3. inconclusive.
 ///
-/// The order matters for a change that is proven, but within the threshold (+2 %
+/// The order matters for a change that is proven, but within the threshold (+3 %
 /// with a threshold of 5 %): it is slower. The threshold says how finely "same"
 /// is to be shown, so it rules how many pairs are run; it is no licence for a
 /// proven loss, which a series of 2 % steps would turn into any loss at all. Who
@@ -91,6 +92,14 @@ pub fn judge(differences: &[Vec<f64>], threshold: f64) -> Vec<Option<Judgement>>
     )
 }
 
+/// Whether every judged cell is known finely enough: the rule by which a
+/// comparison stops. On precision, never on significance: stopping at the first
+/// significant difference would find one where there is none.
+pub fn resolved(judged: &[Option<Judgement>], threshold: f64) -> bool {
+    let mut resolutions = judged.iter().map(|j| j.as_ref().and_then(|j| j.resolution));
+    resolutions.all(|found| found.is_some_and(|resolution| resolution <= threshold))
+}
+
 /// Judges estimates of ln(new / old); a cell without one stays without verdict.
 pub(super) fn judge_estimates(
     estimates: Vec<Option<Trimmed>>,
@@ -98,8 +107,9 @@ pub(super) fn judge_estimates(
 ) -> Vec<Option<Judgement>> {
     let mut cells: Vec<Trimmed> = estimates.iter().flatten().copied().collect();
     moderate(&mut cells);
-    let above: Vec<f64> = cells.iter().map(|cell| cell.p_above(0.0)).collect();
-    let below: Vec<f64> = cells.iter().map(|cell| cell.p_below(0.0)).collect();
+    let floor = FLOOR.ln_1p();
+    let above: Vec<f64> = cells.iter().map(|cell| cell.p_above(floor)).collect();
+    let below: Vec<f64> = cells.iter().map(|cell| cell.p_below(-floor)).collect();
     let (slower, faster) = (holm(&above, ALPHA), holm(&below, ALPHA));
     let tests = cells.len();
     let mut judged = cells
@@ -107,9 +117,9 @@ pub(super) fn judge_estimates(
         .zip(slower)
         .zip(faster)
         .map(|((cell, slower), faster)| {
-            let change = if slower && beyond_floor(cell) {
+            let change = if slower {
                 Change::Slower
-            } else if faster && beyond_floor(cell) {
+            } else if faster {
                 Change::Faster
             } else if is_same(cell, threshold) {
                 Change::Same
@@ -142,20 +152,16 @@ fn judgement(cell: &Trimmed, change: Change, tests: usize, threshold: f64) -> Ju
     }
 }
 
-fn beyond_floor(cell: &Trimmed) -> bool {
-    cell.mean.exp_m1().abs() > FLOOR
-}
-
 /// Two one-sided tests of 5 % each.
 fn is_same(cell: &Trimmed, threshold: f64) -> bool {
     cell.mean.abs() + cell.margin(EQUIVALENCE) <= threshold.ln_1p()
 }
 
 /// The change that is found with 95 % power at the strictest step of Holm's
-/// procedure: exp((t(1 - 0.05/m, df) + 1.645) se) - 1.
+/// procedure: exp(ln 1.01 + (t(1 - 0.05/m, df) + 1.645) se) - 1.
 fn resolution(cell: &Trimmed, tests: usize) -> f64 {
     let t = student::quantile(1.0 - 2.0 * ALPHA / tests as f64, cell.df);
-    ((t + POWER) * cell.standard_error).exp_m1()
+    (FLOOR.ln_1p() + (t + POWER) * cell.standard_error).exp_m1()
 }
 
 /// How many more pairs would prove the change that was found, or would prove it
@@ -169,8 +175,8 @@ fn more_pairs(cell: &Trimmed, tests: usize, threshold: f64) -> Option<usize> {
             count,
             ..*cell
         };
-        let proven = future.margin(1.0 - ALPHA / tests as f64) < future.mean.abs();
-        (proven && beyond_floor(&future)) || is_same(&future, threshold)
+        let margin = future.margin(1.0 - ALPHA / tests as f64);
+        margin + FLOOR.ln_1p() < future.mean.abs() || is_same(&future, threshold)
     };
     // More pairs never make it worse but for a step of the cut: halving is
     // exact enough for an "about".
@@ -210,8 +216,10 @@ mod tests {
         let change = |centre, spread| one(cell(centre, spread), 0.05).change;
         assert_eq!(change(0.06, 0.005), Change::Slower);
         assert_eq!(change(-0.06, 0.005), Change::Faster);
-        // Proven, over 1 %, within the threshold: still slower.
-        assert_eq!(change(0.02, 0.005), Change::Slower);
+        // Proven to be over 1 %, within the threshold: still slower.
+        assert_eq!(change(0.03, 0.005), Change::Slower);
+        // Proven, but perhaps by under 1 %.
+        assert_eq!(change(0.02, 0.005), Change::Same);
         // Proven, but under 1 %.
         assert_eq!(change(0.009, 0.001), Change::Same);
         assert_eq!(change(0.0, 0.01), Change::Same);
@@ -235,7 +243,7 @@ mod tests {
         // One cell: t(0.95, 5) = 2.015048.
         near(
             found.resolution.unwrap(),
-            ((2.015_048 + 1.645) * se).exp_m1(),
+            (0.01f64.ln_1p() + (2.015_048 + 1.645) * se).exp_m1(),
         );
         assert_eq!(found.pairs, 10);
     }

@@ -21,7 +21,7 @@ mod unpaired;
 pub use bootstrap::{Estimate, bootstrap_median};
 pub use front::{Tradeoff, dominated_by};
 pub use holm::holm;
-pub use judgement::{Change, Judgement, judge};
+pub use judgement::{Change, Judgement, judge, resolved};
 pub use means::{geometric_mean, interquartile_mean};
 pub use one_run::{Shown, one_run};
 pub use quantiles::{median, quantile, sorted};
