@@ -22,7 +22,7 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> 
     let options = options(args)?;
     let structures = args.kernel.structures(registry, &args.structure)?;
     let defaults = args.lens.defaults()?;
-    let scene = load_scene(&args.scene, &args.scene_args)?;
+    let scene = load_scene(&args.scene, &args.scene_args, structures.len())?;
     let path = path::load(&args.path, &scene, &defaults)?;
     interrupt::from_now_on_finish();
     let bar = ProgressBar::new_spinner();

@@ -6,17 +6,17 @@ use std::collections::BTreeMap;
 
 use crate::geometry::Aabb;
 use crate::index::{BuildError, DynIndex, StructureSpec};
-use crate::measure::{Verdict, guarded};
+use crate::measure::{Answer, Verdict, guarded};
 use crate::query::{ItemId, QueryCost};
 use crate::scene::Scene;
 use crate::threads::share;
 
 /// One structure's answer to one question.
-pub struct Answer {
+pub struct Row {
     pub question: usize,
     pub structure: String,
     pub ids: Option<Vec<ItemId>>,
-    pub count: usize,
+    pub answer: Answer,
     pub id_sum: u64,
     pub cost: QueryCost,
 }
@@ -30,8 +30,8 @@ pub fn ask_all(
     questions: usize,
     keep_ids: bool,
     ask: impl Fn(&dyn DynIndex, usize, &mut Vec<ItemId>, &mut QueryCost) + Sync,
-) -> anyhow::Result<Vec<Answer>> {
-    let mut answers: Vec<Vec<Answer>> = (0..questions).map(|_| Vec::new()).collect();
+) -> anyhow::Result<Vec<Row>> {
+    let mut answers: Vec<Vec<Row>> = (0..questions).map(|_| Vec::new()).collect();
     for spec in structures {
         let failed = |why: String| anyhow::anyhow!("structure '{}': {why}", spec.label);
         let panicked = |verdict: Verdict| failed(verdict.reason.unwrap_or_default());
@@ -54,10 +54,10 @@ pub fn ask_all(
                     if keep_ids {
                         out.sort_unstable();
                     }
-                    row.push(Answer {
+                    row.push(Row {
                         question,
                         structure: spec.label.clone(),
-                        count: out.len(),
+                        answer: Answer::of(&out),
                         id_sum: crate::measure::id_sum(&out),
                         ids: keep_ids.then_some(out),
                         cost,
@@ -71,22 +71,26 @@ pub fn ask_all(
 }
 
 /// Says which questions were answered differently; true if none was.
-pub fn all_agree(answers: &[Answer], what: &str) -> bool {
-    let mut first: BTreeMap<usize, &Answer> = BTreeMap::new();
+pub fn all_agree(rows: &[Row], what: &str) -> bool {
+    let mut first: BTreeMap<usize, &Row> = BTreeMap::new();
     let mut agree = true;
-    for answer in answers {
-        let base = first.entry(answer.question).or_insert(answer);
-        if (base.count, base.id_sum) != (answer.count, answer.id_sum) {
+    for row in rows {
+        let base = first.entry(row.question).or_insert(row);
+        if base.answer != row.answer {
             agree = false;
+            let told = |row: &Row| {
+                let ids = super::text::counted(row.answer.count as usize, "id");
+                format!("{} finds {ids} with sum {}", row.structure, row.id_sum)
+            };
             super::tell(&format!(
-                "error: {what} {}: {} finds {} with sum {}, {} finds {} with sum {}",
-                answer.question,
-                base.structure,
-                super::text::counted(base.count, "id"),
-                base.id_sum,
-                answer.structure,
-                super::text::counted(answer.count, "id"),
-                answer.id_sum
+                "error: {what} {}: {}, {}{}",
+                row.question,
+                told(base),
+                told(row),
+                match (base.answer.count, base.id_sum) == (row.answer.count, row.id_sum) {
+                    true => ", but other ids",
+                    false => "",
+                }
             ));
         }
     }
@@ -102,15 +106,15 @@ pub fn joined(ids: &[ItemId]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::index::{LinearScalar, RegionIndex, Row};
+    use crate::index::{self, LinearScalar, RegionIndex};
     use serde_json::Value;
 
-    const PANICS: Row = Row {
+    const PANICS: index::Row = index::Row {
         info: LinearScalar::INFO.named("panics"),
         build: |_, _, _, _| panic!("deep in a peer's code"),
         params: |_| Ok(Value::Null),
     };
-    const REFUSES: Row = Row {
+    const REFUSES: index::Row = index::Row {
         info: LinearScalar::INFO.named("refuses"),
         build: |_, _, _, _| {
             Err(BuildError::Refused {
@@ -121,7 +125,7 @@ mod tests {
         params: |_| Ok(Value::Null),
     };
 
-    fn of(row: Row) -> StructureSpec {
+    fn of(row: index::Row) -> StructureSpec {
         StructureSpec {
             label: row.info.name.to_owned(),
             row,
@@ -130,13 +134,27 @@ mod tests {
         }
     }
 
-    fn asked(structures: &[StructureSpec], panics: bool) -> Result<Vec<Answer>, String> {
+    fn asked(structures: &[StructureSpec], panics: bool) -> Result<Vec<Row>, String> {
         let scene = crate::scene::load("uniform:n=10", &Default::default()).expect("uniform");
         let ask = |_: &dyn DynIndex, _, out: &mut Vec<ItemId>, _: &mut QueryCost| {
             assert!(!panics, "deep in a peer's query");
             out.push(7);
         };
         ask_all(structures, &scene, &scene.items, 2, true, ask).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn other_ids_of_the_same_sum_are_noticed() {
+        let row = |ids: &[ItemId]| Row {
+            question: 0,
+            structure: "any".to_owned(),
+            ids: None,
+            answer: Answer::of(ids),
+            id_sum: crate::measure::id_sum(ids),
+            cost: QueryCost::default(),
+        };
+        assert!(all_agree(&[row(&[1, 4]), row(&[4, 1])], "camera"));
+        assert!(!all_agree(&[row(&[1, 4]), row(&[2, 3])], "camera"));
     }
 
     #[test]

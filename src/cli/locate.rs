@@ -7,7 +7,7 @@ use anyhow::Context;
 use serde_json::{Value, json};
 
 use super::args::{LocateArgs, RowFormat};
-use super::compare_structures::{Answer, all_agree, ask_all, joined};
+use super::compare_structures::{Row, all_agree, ask_all, joined};
 use super::query::with_ids;
 use super::{Ending, load_scene, unread_is_fine};
 use crate::index::Registry;
@@ -16,7 +16,7 @@ use crate::scene::Sought;
 
 pub fn locate(registry: &Registry, args: &LocateArgs) -> anyhow::Result<Ending> {
     let structures = args.kernel.structures(registry, &args.structure)?;
-    let scene = load_scene(&args.scene, &args.scene_args)?;
+    let scene = load_scene(&args.scene, &args.scene_args, 1)?;
     let name = args.points.display().to_string();
     let file = File::open(&args.points).with_context(|| name.clone())?;
     let points: Vec<Sought> = read_points_csv(file, &name)?
@@ -37,7 +37,7 @@ pub fn locate(registry: &Registry, args: &LocateArgs) -> anyhow::Result<Ending> 
     })
 }
 
-fn write(args: &LocateArgs, answers: &[Answer]) -> io::Result<()> {
+fn write(args: &LocateArgs, answers: &[Row]) -> io::Result<()> {
     let mut out = BufWriter::new(io::stdout().lock());
     match args.format {
         RowFormat::Csv => {
@@ -54,7 +54,7 @@ fn write(args: &LocateArgs, answers: &[Answer]) -> io::Result<()> {
                 csv.write_record([
                     a.question.to_string(),
                     a.structure.clone(),
-                    a.count.to_string(),
+                    a.answer.count.to_string(),
                     a.id_sum.to_string(),
                     a.ids.as_deref().map(joined).unwrap_or_default(),
                     a.cost.nodes_tested.to_string(),
@@ -69,7 +69,7 @@ fn write(args: &LocateArgs, answers: &[Answer]) -> io::Result<()> {
                     let row = json!({
                         "point": a.question,
                         "structure": a.structure,
-                        "region_count": a.count,
+                        "region_count": a.answer.count,
                         "region_id_sum": a.id_sum,
                         "nodes_tested": a.cost.nodes_tested,
                     });

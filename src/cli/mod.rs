@@ -140,11 +140,12 @@ fn tell(line: &str) {
     let _ = writeln!(io::stderr(), "{}", text::plain(line));
 }
 
-/// Loads a scene and says so if some of it was left out.
-fn load_scene(source: &str, args: &SceneArgs) -> anyhow::Result<Scene> {
+/// Loads a scene that so many structures are to be held over at once, and says so
+/// if some of it was left out.
+fn load_scene(source: &str, args: &SceneArgs, structures: usize) -> anyhow::Result<Scene> {
     let options = LoadOptions {
         skip_bad_items: args.skip_bad_items,
-        structures: 0,
+        structures: structures as u64,
     };
     let scene = crate::scene::load(source, &options)?;
     if scene.skipped_items > 0 {

@@ -46,7 +46,7 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
     }
     let structures = args.kernel.structures(registry, &args.structure)?;
     let defaults = args.lens.defaults()?;
-    let scene = load_scene(&args.scene, &args.scene_args)?;
+    let scene = load_scene(&args.scene, &args.scene_args, 2 * structures.len())?;
     if scene.items.is_empty() {
         bail!("scene '{}' has no items; expected at least one", scene.name);
     }

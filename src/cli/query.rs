@@ -5,7 +5,7 @@ use std::io::{self, BufWriter, Write};
 use serde_json::{Map, Value, json};
 
 use super::args::{QueryArgs, RowFormat};
-use super::compare_structures::{Answer, all_agree, ask_all, joined};
+use super::compare_structures::{Row, all_agree, ask_all, joined};
 use super::{Ending, load_scene, unread_is_fine};
 use crate::index::Registry;
 use crate::measure::Workload;
@@ -14,7 +14,7 @@ use crate::path;
 pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
     let structures = args.kernel.structures(registry, &args.structure)?;
     let (defaults, culling) = (args.lens.defaults()?, args.culling.culling(&args.test)?);
-    let scene = load_scene(&args.scene, &args.scene_args)?;
+    let scene = load_scene(&args.scene, &args.scene_args, 1)?;
     let cameras = path::load(&args.cameras, &scene, &defaults)?;
     let workload = Workload::new(&scene, &cameras, &culling)?;
     let ask = |index: &dyn crate::index::DynIndex, camera: usize, out: &mut _, cost: &mut _| {
@@ -41,7 +41,7 @@ pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
     })
 }
 
-fn write(args: &QueryArgs, test: &str, total: usize, answers: &[Answer]) -> io::Result<()> {
+fn write(args: &QueryArgs, test: &str, total: usize, answers: &[Row]) -> io::Result<()> {
     let mut out = BufWriter::new(io::stdout().lock());
     match args.format {
         RowFormat::Csv => {
@@ -64,7 +64,7 @@ fn write(args: &QueryArgs, test: &str, total: usize, answers: &[Answer]) -> io::
                     a.structure.clone(),
                     test.to_owned(),
                     total.to_string(),
-                    a.count.to_string(),
+                    a.answer.count.to_string(),
                     a.id_sum.to_string(),
                     a.cost.nodes_tested.to_string(),
                     a.cost.items_tested.to_string(),
@@ -83,7 +83,7 @@ fn write(args: &QueryArgs, test: &str, total: usize, answers: &[Answer]) -> io::
                         "structure": a.structure,
                         "test": test,
                         "total_count": total,
-                        "visible_count": a.count,
+                        "visible_count": a.answer.count,
                         "visible_id_sum": a.id_sum,
                         "nodes_tested": a.cost.nodes_tested,
                         "items_tested": a.cost.items_tested,
@@ -99,7 +99,7 @@ fn write(args: &QueryArgs, test: &str, total: usize, answers: &[Answer]) -> io::
 }
 
 /// The row with the answer's ids as an array, if they were kept.
-pub fn with_ids(row: Value, name: &str, answer: &Answer) -> Value {
+pub fn with_ids(row: Value, name: &str, answer: &Row) -> Value {
     let mut row: Map<String, Value> = row.as_object().cloned().unwrap_or_default();
     if let Some(ids) = &answer.ids {
         row.insert(name.to_owned(), json!(ids));

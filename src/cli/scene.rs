@@ -16,7 +16,7 @@ use crate::spec::SpecError;
 use crate::statistics::{quantile, sorted};
 
 pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
-    let scene = load_scene(&args.scene, &args.scene_args)?;
+    let scene = load_scene(&args.scene, &args.scene_args, 0)?;
     let info = SceneInfo::of(&scene);
     let sizes = sizes(&scene);
     let portals = match &scene.regions {
@@ -107,14 +107,14 @@ fn sizes(scene: &Scene) -> [Option<f64>; 3] {
 }
 
 pub fn generate(args: &SceneGenerateArgs) -> anyhow::Result<Ending> {
-    let scene = load_scene(&args.scene, &args.scene_args)?;
+    let scene = load_scene(&args.scene, &args.scene_args, 0)?;
     write(scene.settled()?, args.out.as_deref())
 }
 
 pub fn convert(args: &SceneConvertArgs) -> anyhow::Result<Ending> {
     let out = args.output.as_deref().or(args.out.as_deref());
     let SceneFormat::Csv = args.to.map_or_else(|| format_of(out), Ok)?;
-    let scene = load_scene(&args.scene, &args.scene_args)?;
+    let scene = load_scene(&args.scene, &args.scene_args, 0)?;
     let (origin, lost) = (scene.origin, left_behind(&scene));
     let kept = scene.settled()?;
     if !lost.is_empty() {

@@ -85,7 +85,7 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
             break;
         }
         bar.set_message(text::plain(source));
-        let scene = load_scene(source, &args.scene_args)?;
+        let scene = load_scene(source, &args.scene_args, 2 * structures.len())?;
         let contenders = |test: CullingTest| -> Vec<Contender> {
             let specs = structures.iter().cloned();
             specs
