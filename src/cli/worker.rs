@@ -129,7 +129,7 @@ fn answer(registry: &Registry, request: &Request) -> anyhow::Result<()> {
                 step: "timing".to_owned(),
             }));
         }
-        // Nobody listens any more.
+        // The parent is gone.
         failed.borrow().is_some()
     };
     let mut keep = |part: Part, samples: Vec<TaskSamples>| {

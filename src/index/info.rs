@@ -44,7 +44,7 @@ pub enum Kind {
 #[serde(rename_all = "kebab-case")]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub enum Origin<Name = String> {
-    /// This crate's, whoever built the tree.
+    /// This crate's, even where another crate built the tree.
     Ours,
     /// The crate of that name.
     Crate(Name),

@@ -1,7 +1,6 @@
 //! The structures there are: a registry of rows, one per structure, each made
-//! from what the structure declares. It is a value: a crate of somebody else
-//! adds its own with [`Registry::with`] and hands it on, to
-//! `cli::main_with` for example.
+//! from what the structure declares. It is a value: another crate adds its
+//! own with [`Registry::with`] and hands it on, to `cli::main_with` for example.
 
 use serde_json::{Map, Value};
 
