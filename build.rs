@@ -16,6 +16,8 @@ fn main() {
     let changes = output(
         "git",
         &[
+            // A refreshed index would make the next build compile all anew.
+            "--no-optional-locks",
             "status",
             "--porcelain",
             "--",
@@ -46,11 +48,10 @@ fn main() {
             value.unwrap_or_default()
         );
     }
-    // Anything that a commit or an edit touches; missing paths are skipped,
+    // What a commit or an edit touches; missing paths are skipped,
     // because cargo would otherwise rerun this script every time.
     for path in [
         ".git/HEAD",
-        ".git/index",
         ".git/refs/heads",
         "src",
         "Cargo.toml",
