@@ -53,9 +53,10 @@ Examples:
   cullbench scene convert helsinki city.csv
   cullbench scene convert city:n=1000 | head
 
-Boxes CSV is in world coordinates, in the order of the ids and with all labels; it is read back
-with the same items, and converting it again gives the same bytes. Regions, camera places and a
-map's own tree stay behind.";
+Boxes CSV is in world coordinates, in the order of the ids and with all labels. Bounds are written
+in f64, as they came in and not as f32 holds them: the file asks the same questions, and
+converting it again gives the same bytes. Regions, camera places and a map's own tree stay
+behind.";
 
 #[derive(Args, Debug)]
 #[command(after_help = CONVERT_HELP)]

@@ -92,9 +92,9 @@ pub fn read_boxes_csv(
     Ok(scene)
 }
 
-/// Writes a scene's boxes in world coordinates, with its labels as further
-/// columns. Numbers are written so that reading them back gives the same f64;
-/// [`Scene::settled`] makes a scene what is then read.
+/// Writes a scene's boxes as they were written, in world coordinates, with its
+/// labels as further columns. Numbers are written so that reading them back gives
+/// the same f64; [`Scene::settled`] makes a scene what is then read.
 pub fn write_boxes_csv(scene: &Scene, output: impl Write) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(output);
     for bound in BOUNDS {
@@ -105,10 +105,9 @@ pub fn write_boxes_csv(scene: &Scene, output: impl Write) -> io::Result<()> {
     }
     csv.write_record(None::<&[u8]>)?;
     let mut record = csv::ByteRecord::new();
-    for (item, b) in scene.items.iter().enumerate() {
+    for (item, b) in scene.written().enumerate() {
         record.clear();
-        let (min, max) = b.in_world(scene.origin);
-        for value in min.to_array().into_iter().chain(max.to_array()) {
+        for value in b.min.to_array().into_iter().chain(b.max.to_array()) {
             record.push_field(value.to_string().as_bytes());
         }
         for label in &scene.labels {
@@ -197,6 +196,10 @@ mod tests {
         let scene = read(text).unwrap();
         let mut bytes = Vec::new();
         write_boxes_csv(&scene, &mut bytes).unwrap();
+        assert_eq!(
+            String::from_utf8(bytes.clone()).unwrap(),
+            text.replace("1e7", "10000000")
+        );
         let again = read_boxes_csv(&bytes[..], "b.csv", false).unwrap();
         assert_eq!(
             (scene.digest(), "a,b"),

@@ -95,7 +95,7 @@ impl Scene {
     /// [`InputError::BadItem`] for the first box that is not finite, inverted
     /// or too large for f32.
     pub fn from_boxes(name: impl Into<String>, boxes: &[WorldBox]) -> Result<Scene, InputError> {
-        let origin = choose_origin(boxes);
+        let origin = choose_origin(boxes.iter().copied());
         Scene::about(name, boxes, origin)
     }
 
@@ -171,10 +171,8 @@ pub(crate) fn hex(bytes: &[u8]) -> String {
 }
 
 /// The origin that suits the boxes, by the finite ones.
-fn choose_origin(boxes: &[WorldBox]) -> DVec3 {
-    let finite = boxes
-        .iter()
-        .filter(|b| b.min.is_finite() && b.max.is_finite());
+fn choose_origin(boxes: impl Iterator<Item = WorldBox>) -> DVec3 {
+    let finite = boxes.filter(|b| b.min.is_finite() && b.max.is_finite());
     let (low, high) = finite.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), b| {
         (low.min(b.min), high.max(b.max))
     });

@@ -71,6 +71,57 @@ fn a_converted_scene_gives_the_same_answers_and_the_same_bytes_again() {
     assert!(text.ends_with(",tower,\"x\ny\"\n"), "{text}");
 }
 
+/// What `query`, `locate` and `verify` tell of `boxes.csv` in a folder.
+fn told(folder: &Path) -> [String; 3] {
+    let query = "query --scene boxes.csv --cameras cameras.csv --structure linear,bvh --ids";
+    let locate = "locate --scene boxes.csv --points points.csv --structure linear,bvh";
+    let verify = "verify --scene boxes.csv --path cameras.csv --structure bvh --cases 0";
+    let mut verified = json(&works(folder, &format!("{verify} --format json")));
+    verified["seconds"] = 0.into();
+    [
+        works(folder, query),
+        works(folder, locate),
+        verified.to_string(),
+    ]
+}
+
+/// Tenths near zero, and astronomical distances where f32 has steps of 8 and
+/// f64 of 1.5e-8.
+#[test]
+fn boxes_that_f32_cannot_hold_are_written_as_they_were() {
+    let boxes = format!(
+        "{BOXES},kind\n\
+         0.1,0.2,0.3,0.7,0.8,0.9,tenths\n\
+         149597870.7,0.1,-0.3,149597871.1,0.30000000000000004,0.3,far\n\
+         149597871.1,0.1,-0.3,149597871.10000002,0.7,0.3,next\n\
+         -149597870.7,-1e-300,-0.3,149597870.7,5e-324,0.3,wide\n"
+    );
+    let cameras = "eye_x,eye_y,eye_z,forward_x,forward_y,forward_z,near,far\n\
+        149597860.7,0.1,0,1,0,0,0.1,100\n\
+        -5,0.5,0.5,1,0,0,0.1,100\n";
+    // Within what f32 makes of a box, on its face, within it.
+    let points = "x,y,z\n149597870.6,0.2,0\n149597871.1,0.2,0\n149597870.9,0.2,0\n\
+        0.09999999999999999,0.5,0.5\n0.1,0.5,0.5\n";
+    let asked = [
+        ("cameras.csv", cameras.as_bytes()),
+        ("points.csv", points.as_bytes()),
+        ("boxes.csv", boxes.as_bytes()),
+    ];
+    let folder = folder(&asked);
+    let before = told(folder.path());
+    assert!(before[1].contains("\n1,bvh,2,3,1 2,"), "{}", before[1]);
+    let info = "scene info boxes.csv";
+    let info_before = works(folder.path(), info);
+    let (once, _) = convert(folder.path(), "boxes.csv once.csv", "once.csv");
+    let decimals = "149597870.7,0.1,-0.3,149597871.1,0.30000000000000004,0.3,far\n";
+    assert!(once.contains(decimals), "{once}");
+    let (twice, _) = convert(folder.path(), "once.csv boxes.csv", "boxes.csv");
+    assert_eq!(once, twice);
+    assert_ne!(twice, boxes, "not converted");
+    assert_eq!(told(folder.path()), before);
+    assert_eq!(works(folder.path(), info), info_before);
+}
+
 #[test]
 fn a_scene_can_be_converted_onto_itself() {
     let text = format!("{BOXES},kind\n0.5,1,2,3,4,5,a\n7,7,7,8,8,8.25,b\n");
