@@ -282,9 +282,8 @@ pub struct LocateArgs {
     /// A scene: boxes CSV, Doom WAD, built-in name or spec
     #[arg(long)]
     pub scene: String,
-    /// Points CSV: x,y,z
-    #[arg(long)]
-    pub points: PathBuf,
+    #[command(flatten)]
+    pub sought: SoughtArgs,
     /// Structures, e.g. linear,bvh:leaf=4
     #[arg(long, value_name = "LIST", default_value = "all")]
     pub structure: String,
@@ -294,6 +293,18 @@ pub struct LocateArgs {
     pub scene_args: SceneArgs,
     #[command(flatten)]
     pub kernel: KernelArgs,
+}
+
+/// What is searched for: one of the two.
+#[derive(Args, Debug)]
+#[group(required = true, multiple = false)]
+pub struct SoughtArgs {
+    /// Points CSV: x,y,z; the regions that hold each point
+    #[arg(long, value_name = "FILE")]
+    pub points: Option<PathBuf>,
+    /// Boxes CSV; the items that overlap each box (closed bounds)
+    #[arg(long, value_name = "FILE")]
+    pub boxes: Option<PathBuf>,
 }
 
 #[derive(Args, Debug)]

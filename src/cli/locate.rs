@@ -1,7 +1,8 @@
-//! `cullbench locate`: one row per point and structure.
+//! `cullbench locate`: one row per point, or box, and structure.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
+use std::path::Path;
 
 use anyhow::Context;
 use serde_json::{Value, json};
@@ -10,40 +11,65 @@ use super::args::{LocateArgs, RowFormat};
 use super::compare_structures::{Row, all_agree, ask_all, joined};
 use super::query::with_ids;
 use super::{Ending, load_scene, unread_is_fine};
-use crate::index::Registry;
+use crate::index::{DynIndex, Registry, StructureSpec};
 use crate::path::read_points_csv;
-use crate::scene::Sought;
+use crate::scene::{Scene, Sought, SoughtBox, read_boxes_csv};
 
 pub fn locate(registry: &Registry, args: &LocateArgs) -> anyhow::Result<Ending> {
     let structures = args.kernel.structures(registry, &args.structure)?;
     let scene = load_scene(&args.scene, &args.scene_args, 1)?;
-    let name = args.points.display().to_string();
-    let file = File::open(&args.points).with_context(|| name.clone())?;
-    let points: Vec<Sought> = read_points_csv(file, &name)?
-        .into_iter()
-        .map(|p| scene.sought(p))
-        .collect();
-    let boxes = scene.regions.boxes(&scene.items);
-    let ask = |index: &dyn crate::index::DynIndex, point: usize, out: &mut Vec<_>, cost: &mut _| {
-        index.locate_counted(points[point].local, out, cost);
-        scene.refine(&points[point], out);
+    let (what, answers) = match (&args.sought.points, &args.sought.boxes) {
+        (Some(file), _) => ("point", by_points(&scene, &structures, file)?),
+        (_, Some(file)) => ("box", by_boxes(&scene, &structures, file)?),
+        // The argument parser has refused that.
+        (None, None) => ("point", Vec::new()),
     };
-    let answers = ask_all(&structures, &scene, boxes, points.len(), true, ask)?;
-    unread_is_fine(write(args, &answers))?;
-    Ok(if all_agree(&answers, "point") {
+    unread_is_fine(write(args, what, &answers))?;
+    Ok(if all_agree(&answers, what) {
         Ending::Ok
     } else {
         Ending::WrongAnswer
     })
 }
 
-fn write(args: &LocateArgs, answers: &[Row]) -> io::Result<()> {
+/// The regions that hold each point.
+fn by_points(scene: &Scene, structures: &[StructureSpec], file: &Path) -> anyhow::Result<Vec<Row>> {
+    let (input, name) = open(file)?;
+    let points = read_points_csv(input, &name)?.into_iter();
+    let points: Vec<Sought> = points.map(|p| scene.sought(p)).collect();
+    let boxes = scene.regions.boxes(&scene.items);
+    let ask = |index: &dyn DynIndex, point: usize, out: &mut Vec<_>, cost: &mut _| {
+        index.locate_counted(points[point].local, out, cost);
+        scene.refine(&points[point], out);
+    };
+    ask_all(structures, scene, boxes, points.len(), true, ask)
+}
+
+/// The items that overlap each box.
+fn by_boxes(scene: &Scene, structures: &[StructureSpec], file: &Path) -> anyhow::Result<Vec<Row>> {
+    let (input, name) = open(file)?;
+    let read = read_boxes_csv(input, &name, false)?;
+    let boxes: Vec<SoughtBox> = read.written().map(|b| scene.sought_box(b)).collect();
+    let ask = |index: &dyn DynIndex, n: usize, out: &mut Vec<_>, cost: &mut _| {
+        index.visible_counted(&boxes[n].volume, out, cost);
+        scene.refine_overlapping(&boxes[n], out);
+    };
+    ask_all(structures, scene, &scene.items, boxes.len(), true, ask)
+}
+
+fn open(file: &Path) -> anyhow::Result<(File, String)> {
+    let name = file.display().to_string();
+    let input = File::open(file).with_context(|| name.clone())?;
+    Ok((input, name))
+}
+
+fn write(args: &LocateArgs, what: &str, answers: &[Row]) -> io::Result<()> {
     let mut out = BufWriter::new(io::stdout().lock());
     match args.format {
         RowFormat::Csv => {
             let mut csv = csv::Writer::from_writer(&mut out);
             csv.write_record([
-                "point",
+                what,
                 "structure",
                 "region_count",
                 "region_id_sum",
@@ -67,7 +93,7 @@ fn write(args: &LocateArgs, answers: &[Row]) -> io::Result<()> {
                 .iter()
                 .map(|a| {
                     let row = json!({
-                        "point": a.question,
+                        what: a.question,
                         "structure": a.structure,
                         "region_count": a.answer.count,
                         "region_id_sum": a.id_sum,

@@ -14,6 +14,7 @@ use super::args::{TableFormat, VerifyArgs};
 use super::{Ending, interrupt, load_scene, tell, text, unread_is_fine};
 use crate::camera::{DEFAULT_EPSILON, PlaneMethod};
 use crate::culling::{ARITHMETICS, Arithmetic, CameraView, Culling, CullingTest, TESTS};
+use crate::geometry::ConvexVolume;
 use crate::index::{BuildError, DynIndex, Registry, StructureSpec};
 use crate::measure::{Contender, Status, Workload, count_pass, guarded, judge};
 use crate::path::{self, CameraPath};
@@ -354,20 +355,21 @@ fn random_cases(structures: &[StructureSpec], seed: u64, cases: u64) -> Vec<Chec
         seen.see(&case.items, &case.volume);
         let mut holding = Trial::new(case.items.len());
         holding.expect(scene::Regions::Items.holding(case.point, &case.items));
+        let mut overlapping = Trial::new(case.items.len());
+        overlapping.expect(case.overlapping());
+        let mut trials = [seen, holding, overlapping];
         for (spec, check) in structures.iter().zip(&mut checks) {
             check.volumes += 1;
-            check.verdicts += 2 * case.items.len() as u64;
+            check.verdicts += 3 * case.items.len() as u64;
             if check.difference.is_some() {
                 continue;
             }
             let (status, difference) = match spec.build(&case.items) {
-                Ok(index) => {
-                    match guarded(|| differ(&case, index.as_ref(), &mut seen, &mut holding)) {
-                        Ok(Ok(())) => (Status::Ok, None),
-                        Ok(Err((status, difference))) => (status, Some(difference)),
-                        Err(verdict) => (verdict.status, verdict.reason),
-                    }
-                }
+                Ok(index) => match guarded(|| differ(&case, index.as_ref(), &mut trials)) {
+                    Ok(Ok(())) => (Status::Ok, None),
+                    Ok(Err((status, difference))) => (status, Some(difference)),
+                    Err(verdict) => (verdict.status, verdict.reason),
+                },
                 Err(BuildError::Refused { .. }) => (Status::Ok, None),
                 Err(error @ BuildError::Panicked { .. }) => {
                     (Status::Panicked, Some(error.to_string()))
@@ -390,8 +392,7 @@ fn random_cases(structures: &[StructureSpec], seed: u64, cases: u64) -> Vec<Chec
 fn differ(
     case: &RandomCase,
     index: &dyn DynIndex,
-    seen: &mut Trial,
-    holding: &mut Trial,
+    [seen, holding, overlapping]: &mut [Trial; 3],
 ) -> Result<(), (Status, String)> {
     let item = |id: usize| case.items.get(id);
     seen.ask(|out| index.visible(&case.volume, out))
@@ -413,7 +414,12 @@ fn differ(
         );
         return Err((Status::Wrong, why));
     }
-    Ok(())
+    let volume = ConvexVolume::of_box(&case.region);
+    let asked = overlapping.ask(|out| index.visible(&volume, out));
+    asked.map(|_| ()).map_err(|fault| {
+        let why = fault.explained(|id| Some(format!("{:?} by {:?}", item(id)?, case.region)));
+        (Status::of(&fault), format!("search by a box: {why}"))
+    })
 }
 
 fn show(outcome: &Outcome, format: TableFormat) -> io::Result<()> {

@@ -5,6 +5,7 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
+use super::aabb::held;
 use super::{Aabb, Corner, Plane, Upper, WidePlane};
 
 /// Largest number of planes of one volume: one bit each in a [`PlaneMask`].
@@ -101,6 +102,23 @@ impl ConvexVolume {
     /// More than 32 planes, or a plane with a NaN or infinite number.
     pub fn from_planes(planes: &[Plane]) -> Result<Self, VolumeError> {
         Self::collect(planes.iter().map(|&plane| (plane, None)))
+    }
+
+    /// A box as six planes: the items that no plane excludes are exactly those that
+    /// overlap it (closed bounds), because a plane along an axis evaluates to a
+    /// difference of two numbers, whose sign no rounding changes. Infinite bounds
+    /// count as the largest number.
+    pub fn of_box(b: &Aabb) -> Self {
+        let planes = (0..3).flat_map(|axis| {
+            let normal = Vec3::AXES[axis];
+            let (low, high) = (held(b.min[axis]), held(b.max[axis]));
+            [Plane::new(normal, -low), Plane::new(-normal, high)]
+        });
+        let planes: Vec<Plane> = planes.collect();
+        match Self::from_planes(&planes) {
+            Ok(volume) => volume,
+            Err(error) => unreachable!("six finite planes: {error}"),
+        }
     }
 
     /// A view frustum: named planes, `Far` left out when it is infinite.

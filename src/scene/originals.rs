@@ -51,7 +51,7 @@ pub struct Sought {
 }
 
 /// The sign of `(p - origin) - bound`, exactly: -1, 0 or 1.
-fn side(p: f64, origin: f64, bound: f32) -> i32 {
+pub(super) fn side(p: f64, origin: f64, bound: f32) -> i32 {
     let (difference, lost) = two_sum(p, -origin);
     let bound = f64::from(bound);
     // The rounded difference is on the true one's side of any double.

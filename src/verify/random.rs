@@ -1,11 +1,12 @@
 //! Random differential cases: small scenes made to be unpleasant (touching
-//! faces, repeated and flat boxes, wild sizes) and volumes of every kind. A
+//! faces, repeated and flat boxes, wild sizes) and volumes of every kind, a point and a box. A
 //! case is its seed, so that any failure is one number.
 
 use glam::{DVec3, Vec3};
 
 use crate::camera::{Camera, Frame, Lens, PlaneOptions, Surroundings};
 use crate::geometry::{Aabb, ConvexVolume, Plane};
+use crate::query::ItemId;
 use crate::scene::Dice;
 
 /// The volumes that cases are drawn from.
@@ -28,6 +29,8 @@ pub struct RandomCase {
     /// Index into [`VOLUME_KINDS`].
     pub kind: usize,
     pub point: Vec3,
+    /// To be searched by: the items that overlap it.
+    pub region: Aabb,
 }
 
 impl RandomCase {
@@ -56,7 +59,17 @@ impl RandomCase {
             volume,
             kind,
             point,
+            region: item(&mut dice, scale),
         }
+    }
+}
+
+impl RandomCase {
+    /// The items that overlap the region, by the six comparisons.
+    pub fn overlapping(&self) -> impl Iterator<Item = ItemId> {
+        let items = (0..).zip(&self.items);
+        let found = items.filter(|(_, b)| !b.is_empty() && self.region.intersects(b));
+        found.map(|(id, _)| id)
     }
 }
 

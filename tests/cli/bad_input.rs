@@ -285,6 +285,17 @@ fn points_that_are_none_are_refused() {
     let folder = with_good_files(&[]);
     all_refused(&folder, &locate("missing.csv"), "missing.csv: No such");
     all_refused(&folder, &locate("folder.csv"), "folder.csv: Is a dir");
+    // Points or boxes, one of them; boxes are read as a scene's are.
+    let locate = |sought| [format!("locate --scene scene.csv {sought}")];
+    all_refused(&folder, &locate(""), "--points <FILE>|--boxes <FILE>");
+    let both = "--points points.csv --boxes scene.csv";
+    all_refused(&folder, &locate(both), "--points | --boxes");
+    let folder = with_good_files(&[("bad.csv", b"min_x,min_y\n1,2\n")]);
+    all_refused(
+        &folder,
+        &locate("--boxes bad.csv"),
+        "bad.csv, | no column 'min_z'",
+    );
 }
 
 /// A structure of docs/PEERS.md is no misspelt one.

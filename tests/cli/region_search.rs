@@ -90,29 +90,38 @@ impl Node {
     }
 }
 
-const LOCATE: &str = "point,structure,region_count,region_id_sum,region_ids,nodes_tested";
+const LOCATE: &str = ",structure,region_count,region_id_sum,region_ids,nodes_tested";
+
+fn check_locate(folder: &TempDir, scene: &str, points: &[([f64; 3], Vec<usize>)]) {
+    check_search(folder, scene, ["point", "--points", "x,y,z"], points);
+}
 
 /// Runs `locate` and checks that every structure gives the wanted ids.
-fn check_locate(folder: &TempDir, scene: &str, points: &[([f64; 3], Vec<usize>)]) {
-    let lines: Vec<String> = points
+fn check_search<const N: usize>(
+    folder: &TempDir,
+    scene: &str,
+    [column, option, header]: [&str; 3],
+    sought: &[([f64; N], Vec<usize>)],
+) {
+    let lines: Vec<String> = sought
         .iter()
         .map(|(p, _)| p.map(|c| c.to_string()).join(","))
         .collect();
-    let text = format!("x,y,z\n{}\n", lines.join("\n"));
-    fs::write(folder.path().join("points.csv"), text).expect("writable");
-    let line = format!("locate --scene {scene} --points points.csv");
+    let text = format!("{header}\n{}\n", lines.join("\n"));
+    fs::write(folder.path().join("sought.csv"), text).expect("writable");
+    let line = format!("locate --scene {scene} {option} sought.csv");
     let out = works(folder.path(), &line);
-    assert_eq!(out.lines().next(), Some(LOCATE));
+    assert_eq!(out.lines().next(), Some(format!("{column}{LOCATE}").as_str()));
     let (rows, names) = (rows(&out), structure_names());
-    assert_eq!(rows.len(), points.len() * names.len());
+    assert_eq!(rows.len(), sought.len() * names.len());
     let objects = json(&works(folder.path(), &format!("{line} --format json")));
     for (i, row) in rows.iter().enumerate() {
-        let (point, name) = (i / names.len(), &names[i % names.len()]);
-        let (at, wanted) = &points[point];
+        let (question, name) = (i / names.len(), &names[i % names.len()]);
+        let (at, wanted) = &sought[question];
         let what = format!("{scene}: {name} at {at:?}");
         assert_eq!(
-            (&row["point"], &row["structure"]),
-            (&point.to_string(), name)
+            (&row[column], &row["structure"]),
+            (&question.to_string(), name)
         );
         let ids: Vec<String> = wanted.iter().map(usize::to_string).collect();
         assert_eq!(row["region_ids"], ids.join(" "), "{what}");
@@ -210,4 +219,52 @@ fn boxes_are_closed_and_share_their_faces() {
         "boxes.csv",
         &points,
     );
+}
+
+#[test]
+fn a_box_finds_what_it_touches_and_nothing_an_ulp_away() {
+    let mut random = Random(5);
+    let mut any = || -> [i64; 6] {
+        let (low, size) = (
+            [0; 3].map(|_| random.between(-9, 9)),
+            [0; 3].map(|_| random.between(0, 4)),
+        );
+        [0, 1, 2, 3, 4, 5].map(|k| {
+            if k < 3 {
+                low[k]
+            } else {
+                low[k - 3] + size[k - 3]
+            }
+        })
+    };
+    let items: Vec<[i64; 6]> = (0..200).map(|_| any()).collect();
+    // Tenths, far from zero: f32 holds none of them.
+    let tenths = |v: i64| 1e8 + v as f64 / 10.0;
+    let lines = items
+        .iter()
+        .map(|b| b.map(|v| tenths(v).to_string()).join(","));
+    let scene = format!("{BOXES}\n{}\n", lines.collect::<Vec<_>>().join("\n"));
+    let mut sought = Vec::new();
+    for _ in 0..100 {
+        let b = any();
+        let found = |apart: i64| -> Vec<usize> {
+            let overlaps = |item: &[i64; 6]| {
+                (0..3).all(|k| item[k] + apart <= b[k + 3] && b[k] + apart <= item[k + 3])
+            };
+            (0..items.len()).filter(|&i| overlaps(&items[i])).collect()
+        };
+        let bounds = b.map(tenths);
+        sought.push((bounds, found(0)));
+        if (0..3).all(|k| b[k] < b[k + 3]) {
+            // An ulp smaller on all sides: what only touched is beside it.
+            let smaller = [0, 1, 2, 3, 4, 5].map(|k| match k {
+                0..3 => bounds[k].next_up(),
+                _ => bounds[k].next_down(),
+            });
+            sought.push((smaller, found(1)));
+        }
+    }
+    assert!(sought.iter().filter(|s| s.1.len() > 1).count() > 50);
+    let folder = folder(&[("boxes.csv", scene.as_bytes())]);
+    check_search(&folder, "boxes.csv", ["box", "--boxes", BOXES], &sought);
 }

@@ -1,0 +1,133 @@
+//! Boxes to search by: which items overlap a box, exactly. It owns the comparison
+//! of boxes as they were written; searching is the indexes' business.
+
+use super::originals::side;
+use super::{Scene, WorldBox};
+use crate::geometry::{Aabb, ConvexVolume};
+use crate::query::ItemId;
+
+/// A box to search by: as it was written, and as indexes are asked.
+#[derive(Clone, Debug)]
+pub struct SoughtBox {
+    pub world: WorldBox,
+    /// The planes of the smallest f32 box that holds it. Indexes may find too
+    /// many items by it, never too few.
+    pub volume: ConvexVolume,
+}
+
+impl Scene {
+    /// A box of the world as this scene's indexes are asked for it.
+    pub fn sought_box(&self, world: WorldBox) -> SoughtBox {
+        let local = Aabb::rounded_outward(world.min, world.max, self.origin);
+        SoughtBox {
+            volume: ConvexVolume::of_box(&local),
+            world,
+        }
+    }
+
+    /// Keeps of what an index found the items that overlap the box exactly:
+    /// closed boxes that have a point in common.
+    pub fn refine_overlapping(&self, sought: &SoughtBox, found: &mut Vec<ItemId>) {
+        found.retain(|&id| self.overlaps(id, &sought.world));
+    }
+
+    /// The reference answer: an exact look at every item. Ascending ids.
+    pub fn overlapping(&self, sought: &SoughtBox) -> Vec<ItemId> {
+        let all = 0..self.items.len() as ItemId;
+        all.filter(|&id| self.overlaps(id, &sought.world)).collect()
+    }
+
+    fn overlaps(&self, id: ItemId, by: &WorldBox) -> bool {
+        let id = id as usize;
+        if let Some(boxes) = self.originals.boxes() {
+            let b = &boxes[id];
+            return b.min.cmple(b.max).all()
+                && b.min.cmple(by.max).all()
+                && b.max.cmpge(by.min).all();
+        }
+        let b = &self.items[id];
+        !b.is_empty()
+            && (0..3).all(|k| {
+                let origin = self.origin[k];
+                side(by.max[k], origin, b.min[k]) >= 0 && side(by.min[k], origin, b.max[k]) <= 0
+            })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::index::Registry;
+    use crate::scene::Dice;
+    use glam::DVec3;
+
+    /// A number on a coarse grid, half of the time moved by an ulp: ties in f64,
+    /// and none in f32.
+    fn coordinate(dice: &mut Dice, offset: f64) -> f64 {
+        let x = offset + f64::from(dice.below(9) as u32) * 0.1;
+        match dice.below(4) {
+            0 => x.next_up(),
+            1 => x.next_down(),
+            _ => x,
+        }
+    }
+
+    fn any_box(dice: &mut Dice, offset: f64) -> WorldBox {
+        let mut corner = || DVec3::from_array([0; 3].map(|_| coordinate(dice, offset)));
+        let (a, b) = (corner(), corner());
+        WorldBox::new(a.min(b), a.max(b))
+    }
+
+    #[test]
+    fn every_structure_finds_what_overlaps_as_written() {
+        let structures = Registry::builtin().structures("all").expect("all");
+        let mut dice = Dice::new(3);
+        let (mut refined, mut visible) = (0, 0);
+        for offset in [0.0, 1e6, -4e9] {
+            let boxes: Vec<WorldBox> = (0..300).map(|_| any_box(&mut dice, offset)).collect();
+            let scene = Scene::from_boxes("any", &boxes).expect("sound boxes");
+            let indexes = structures.iter().map(|spec| spec.build(&scene.items));
+            let indexes: Vec<_> = indexes.collect::<Result<_, _>>().expect("builds");
+            for _ in 0..200 {
+                let sought = scene.sought_box(any_box(&mut dice, offset));
+                // As written: by the six comparisons, in f64.
+                let wanted = (0..).zip(&boxes).filter(|(_, b)| {
+                    (0..3)
+                        .all(|k| b.min[k] <= sought.world.max[k] && sought.world.min[k] <= b.max[k])
+                });
+                let wanted: Vec<ItemId> = wanted.map(|(id, _)| id).collect();
+                assert_eq!(scene.overlapping(&sought), wanted);
+                visible += wanted.len();
+                for index in &indexes {
+                    let mut found = Vec::new();
+                    index.visible(&sought.volume, &mut found);
+                    refined += found.len() - wanted.len();
+                    scene.refine_overlapping(&sought, &mut found);
+                    found.sort_unstable();
+                    assert_eq!(found, wanted);
+                }
+            }
+        }
+        // There was something to find, and something to take away again.
+        assert!(visible > 10_000 && refined > 1000, "{visible} {refined}");
+    }
+
+    #[test]
+    fn boxes_beyond_f32_are_searched_by_what_lies_within() {
+        let unit = WorldBox::new(DVec3::ZERO, DVec3::ONE);
+        let scene = Scene::from_boxes("one", &[unit]).expect("a box");
+        let found = |min: f64, max: f64| {
+            let by = WorldBox::new(DVec3::splat(min), DVec3::splat(max));
+            let sought = scene.sought_box(by);
+            assert_eq!(scene.overlapping(&sought).len(), {
+                let mut found = scene.items.iter().filter(|b| sought.volume.sees(b));
+                found.by_ref().count()
+            });
+            scene.overlapping(&sought).len()
+        };
+        assert_eq!(found(-1e300, 1e300), 1);
+        assert_eq!(found(1.0, 1e300), 1);
+        assert_eq!(found(1e299, 1e300), 0);
+        assert_eq!(found(-1e300, -1e299), 0);
+    }
+}
