@@ -64,3 +64,55 @@ fn every_structure_finds_what_f64_says_where_f32_cannot_tell() {
     }
     assert!(wrong_in_f32 > 1000, "{wrong_in_f32}");
 }
+
+/// Boxes whose faces meet, or pass by each other by one ulp of f64.
+#[test]
+fn every_structure_finds_what_overlaps_a_box_as_written() {
+    let structures = Registry::builtin().structures("all").expect("structures");
+    let mut state = 3u64;
+    let mut below = |n: u64| {
+        state = state.wrapping_mul(0x5851_F42D_4C95_7F2D).wrapping_add(1);
+        (state >> 33) % n
+    };
+    let (mut visible, mut refined) = (0, 0);
+    for offset in [0.0, 1e6, -4e9] {
+        let mut any = || {
+            let mut corner = || {
+                DVec3::from_array([0; 3].map(|_| {
+                    let x = offset + below(9) as f64 * 0.1;
+                    [x.next_up(), x.next_down(), x, x][below(4) as usize]
+                }))
+            };
+            let (a, b) = (corner(), corner());
+            WorldBox::new(a.min(b), a.max(b))
+        };
+        let boxes: Vec<WorldBox> = (0..300).map(|_| any()).collect();
+        let scene = Scene::from_boxes("any", &boxes).expect("a scene");
+        let indexes = structures.iter().map(|spec| spec.build(&scene.items));
+        let indexes: Vec<_> = indexes.filter_map(Result::ok).collect();
+        assert!(indexes.len() > 5);
+        for _ in 0..100 {
+            let sought = scene.sought_box(any());
+            let by = &sought.world;
+            let overlaps = |b: &WorldBox| {
+                (0..3).all(|k| {
+                    units(b.min[k]) <= units(by.max[k]) && units(by.min[k]) <= units(b.max[k])
+                })
+            };
+            let wanted = boxes.iter().zip(0..).filter(|(b, _)| overlaps(b));
+            let wanted: Vec<ItemId> = wanted.map(|(_, id)| id).collect();
+            assert_eq!(scene.overlapping(&sought), wanted);
+            visible += wanted.len();
+            for index in &indexes {
+                let mut found = Vec::new();
+                index.visible(&sought.volume, &mut found);
+                refined += found.len() - wanted.len();
+                scene.refine_overlapping(&sought, &mut found);
+                found.sort_unstable();
+                assert_eq!(found, wanted);
+            }
+        }
+    }
+    // There was something to find, and something to take away again.
+    assert!(visible > 5000 && refined > 1000, "{visible} {refined}");
+}

@@ -57,60 +57,7 @@ impl Scene {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::index::Registry;
-    use crate::scene::Dice;
     use glam::DVec3;
-
-    /// A number on a coarse grid, half of the time moved by an ulp: ties in f64,
-    /// and none in f32.
-    fn coordinate(dice: &mut Dice, offset: f64) -> f64 {
-        let x = offset + f64::from(dice.below(9) as u32) * 0.1;
-        match dice.below(4) {
-            0 => x.next_up(),
-            1 => x.next_down(),
-            _ => x,
-        }
-    }
-
-    fn any_box(dice: &mut Dice, offset: f64) -> WorldBox {
-        let mut corner = || DVec3::from_array([0; 3].map(|_| coordinate(dice, offset)));
-        let (a, b) = (corner(), corner());
-        WorldBox::new(a.min(b), a.max(b))
-    }
-
-    #[test]
-    fn every_structure_finds_what_overlaps_as_written() {
-        let structures = Registry::builtin().structures("all").expect("all");
-        let mut dice = Dice::new(3);
-        let (mut refined, mut visible) = (0, 0);
-        for offset in [0.0, 1e6, -4e9] {
-            let boxes: Vec<WorldBox> = (0..300).map(|_| any_box(&mut dice, offset)).collect();
-            let scene = Scene::from_boxes("any", &boxes).expect("sound boxes");
-            let indexes = structures.iter().map(|spec| spec.build(&scene.items));
-            let indexes: Vec<_> = indexes.collect::<Result<_, _>>().expect("builds");
-            for _ in 0..200 {
-                let sought = scene.sought_box(any_box(&mut dice, offset));
-                // As written: by the six comparisons, in f64.
-                let wanted = (0..).zip(&boxes).filter(|(_, b)| {
-                    (0..3)
-                        .all(|k| b.min[k] <= sought.world.max[k] && sought.world.min[k] <= b.max[k])
-                });
-                let wanted: Vec<ItemId> = wanted.map(|(id, _)| id).collect();
-                assert_eq!(scene.overlapping(&sought), wanted);
-                visible += wanted.len();
-                for index in &indexes {
-                    let mut found = Vec::new();
-                    index.visible(&sought.volume, &mut found);
-                    refined += found.len() - wanted.len();
-                    scene.refine_overlapping(&sought, &mut found);
-                    found.sort_unstable();
-                    assert_eq!(found, wanted);
-                }
-            }
-        }
-        // There was something to find, and something to take away again.
-        assert!(visible > 10_000 && refined > 1000, "{visible} {refined}");
-    }
 
     #[test]
     fn boxes_beyond_f32_are_searched_by_what_lies_within() {

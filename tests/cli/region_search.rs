@@ -111,7 +111,10 @@ fn check_search<const N: usize>(
     fs::write(folder.path().join("sought.csv"), text).expect("writable");
     let line = format!("locate --scene {scene} {option} sought.csv");
     let out = works(folder.path(), &line);
-    assert_eq!(out.lines().next(), Some(format!("{column}{LOCATE}").as_str()));
+    assert_eq!(
+        out.lines().next(),
+        Some(format!("{column}{LOCATE}").as_str())
+    );
     let (rows, names) = (rows(&out), structure_names());
     assert_eq!(rows.len(), sought.len() * names.len());
     let objects = json(&works(folder.path(), &format!("{line} --format json")));
