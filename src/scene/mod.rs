@@ -260,9 +260,11 @@ mod tests {
         let held = scene(0.0, low.items[0].max.x.into());
         assert_eq!(low.items, held.items);
         assert!(![low.digest(), high.digest()].contains(&held.digest()));
-        // Its digest is that of origin and bounds alone: 24 + 12 + 12 bytes.
-        let mut bytes = vec![0; 36];
-        bytes.extend([held.items[0].max.x; 3].map(f32::to_le_bytes).concat());
+        // Its digest is that of origin and bounds alone.
+        let mut bytes = vec![0; 24];
+        for corner in [held.items[0].min, held.items[0].max] {
+            bytes.extend(corner.to_array().map(f32::to_le_bytes).concat());
+        }
         assert_eq!(held.digest(), hex(&hmac_sha256::Hash::hash(&bytes)));
     }
 }
