@@ -191,11 +191,9 @@ fn of_comparison(comparison: &Comparison) -> Vec<Block> {
         rows.rows.push(row);
     }
     let basis = format!("{}.", text::basis(comparison));
-    let mut blocks = vec![
-        Block::Heading(3, heading),
-        Block::Line(basis),
-        Block::Table(rows),
-    ];
+    let mut blocks = vec![Block::Heading(3, heading), Block::Line(basis)];
+    blocks.extend(false_positives(comparison).map(Block::Line));
+    blocks.push(Block::Table(rows));
     let told = comparison.ranked.iter().map(|r| r.cell);
     for cell in told.filter(|c| c.reason.is_some()) {
         let reason = cell.reason.as_deref().unwrap_or_default();
@@ -206,6 +204,20 @@ fn of_comparison(comparison: &Comparison) -> Vec<Block> {
         )));
     }
     blocks
+}
+
+/// How many there are, and whose they are if not all are the culling test's.
+fn false_positives(comparison: &Comparison) -> Option<String> {
+    let share = text::false_positives(comparison);
+    let sources = text::by_source(comparison);
+    let sources = sources.map(|items| format!("{items} items {}", text::BY_SOURCE));
+    let told = match (share, sources) {
+        (None, None) => return None,
+        (None, Some(sources)) => format!("{sources}; nothing is visible"),
+        (Some(share), None) => format!("{share} of the visible items"),
+        (Some(share), Some(sources)) => format!("{share} of the visible items; {sources}"),
+    };
+    Some(format!("False positives: {told}."))
 }
 
 fn row(cell: &ReportCell, rank: String, peer: Option<&ReportCell>) -> Vec<String> {

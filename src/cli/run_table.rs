@@ -13,25 +13,14 @@ pub fn show_scene(report: &Report, scene: &str) -> io::Result<()> {
     let Some(first) = all.first().map(Comparison::about) else {
         return Ok(());
     };
-    let mut table = text::table(
-        &[
-            "path / structure",
-            "culled",
-            "false positives",
-            "query [95 %]",
-            "p95",
-            "speed-up vs linear [95 %]",
-            "of lower bound: read",
-            "copy",
-            "build",
-            "bytes per item",
-            "locate",
-            "status",
-        ],
-        &[1, 2, 3, 4, 5, 6, 7, 8, 9, 10],
-    );
+    let sources = all.iter().any(|c| text::by_source(c).is_some());
+    let mut header = vec!["path / structure", "culled", "false positives"];
+    header.extend(sources.then_some(text::BY_SOURCE));
+    header.extend(OF_STRUCTURES);
+    let right: Vec<usize> = (1..header.len() - 1).collect();
+    let mut table = text::table(&header, &right);
     for comparison in &all {
-        add_path(&mut table, comparison);
+        add_path(&mut table, comparison, header.len());
     }
     let mut out = text::terminal();
     writeln!(
@@ -95,31 +84,41 @@ fn path(comparison: &Comparison) -> String {
 
 /// The rows of one path, fastest first; what failed comes last, unranked, and
 /// then the lower bounds.
-fn add_path(table: &mut text::Table, comparison: &Comparison) {
+fn add_path(table: &mut text::Table, comparison: &Comparison, columns: usize) {
     let culled = comparison.of_any("cull_rate").map(text::percent);
-    let excess = comparison.of_any("excess");
-    let excess = excess.map(|share| format!("{:.3} %", share * 100.0));
-    table.add_row([
-        path(comparison),
-        culled.unwrap_or_default(),
-        excess.unwrap_or_default(),
-    ]);
+    let of_path = [
+        Some(path(comparison)),
+        culled,
+        text::false_positives(comparison),
+        text::by_source(comparison),
+    ];
+    table.add_row(of_path.map(Option::unwrap_or_default));
     for Ranked { rank, cell } in &comparison.ranked {
         let rank = rank.map_or("-".to_owned(), |rank| rank.to_string());
-        table.add_row(row(&format!("{rank} {}", cell.structure), cell));
+        table.add_row(row(format!("  {rank} {}", cell.structure), cell, columns));
     }
     for bound in &comparison.bounds {
-        table.add_row(row(&format!("  {}", bound.structure), bound));
+        table.add_row(row(format!("    {}", bound.structure), bound, columns));
     }
 }
 
-fn row(name: &str, cell: &ReportCell) -> [String; 12] {
+/// What a structure has a figure for; the columns before it are its path's.
+const OF_STRUCTURES: [&str; 9] = [
+    "query [95 %]",
+    "p95",
+    "speed-up vs linear [95 %]",
+    "of lower bound: read",
+    "copy",
+    "build",
+    "bytes per item",
+    "locate",
+    "status",
+];
+
+fn row(name: String, cell: &ReportCell, columns: usize) -> Vec<String> {
     let value =
         |name: &str, show: fn(f64) -> String| cell.value(name).map(show).unwrap_or_default();
-    [
-        format!("  {name}"),
-        String::new(),
-        String::new(),
+    let figures = [
         text::time_estimate(cell.metrics.get("query_ns")),
         value("query_ns_p95", text::time),
         text::estimate(cell.metrics.get("speedup")),
@@ -129,5 +128,9 @@ fn row(name: &str, cell: &ReportCell) -> [String; 12] {
         value("memory_bytes_per_item", |b| format!("{b:.1}")),
         value("locate_ns", text::time),
         cell.status.name().to_owned(),
-    ]
+    ];
+    let mut row = vec![name];
+    row.resize(columns - figures.len(), String::new());
+    row.extend(figures);
+    row
 }

@@ -154,6 +154,24 @@ pub fn basis(comparison: &Comparison) -> String {
     )
 }
 
+/// False positives of the truly visible items: "0.083 %".
+pub fn false_positives(comparison: &Comparison) -> Option<String> {
+    let share = comparison.of_any("excess")?;
+    Some(format!("{:.3} %", share * 100.0))
+}
+
+/// Where they come from, as items of all judged cameras: "12/0/80". Nothing if
+/// all are the culling test's own.
+pub fn by_source(comparison: &Comparison) -> Option<String> {
+    let errors = &comparison.judged()?.errors;
+    let others = errors.by_storage > 0 || errors.by_planes > 0;
+    let sources = [errors.by_storage, errors.by_planes, errors.by_test()];
+    others.then(|| sources.map(|items| items.to_string()).join("/"))
+}
+
+/// What stands over the figures of [`by_source`].
+pub const BY_SOURCE: &str = "by storage/planes/test";
+
 /// A share as a percentage, never rounded up to 100.
 pub fn percent(share: f64) -> String {
     let rounded = format!("{:.2}", share * 100.0);

@@ -2,7 +2,7 @@
 //! come. Ranks are the run's own; nothing here decides a tie.
 
 use super::{Report, ReportCell};
-use crate::measure::Status;
+use crate::measure::{Judged, Status};
 
 /// Cells of one scene, path, cache state and culling test.
 pub struct Comparison<'r> {
@@ -101,6 +101,11 @@ impl<'r> Comparison<'r> {
                 .map(&of)
         };
         Some((timed().min()?, timed().max()?))
+    }
+
+    /// How the answers differ from the truth: all that are right do alike.
+    pub fn judged(&self) -> Option<&'r Judged> {
+        self.ranked.iter().find_map(|r| r.cell.error.as_ref())
     }
 
     /// A metric that is the same in all cells, from the first that has it.

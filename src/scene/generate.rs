@@ -192,11 +192,11 @@ mod tests {
             })
             .collect();
         let published = [
-            ("uniform", "6e496c75c0c8539c"),
-            ("clustered", "6889a887e28a9de3"),
-            ("city", "023a1af6a01737dc"),
-            ("forest", "804ec45de682b582"),
-            ("rooms", "539912803cdf76de"),
+            ("uniform", "f30dfca29618a16f"),
+            ("clustered", "cfe41ee908f30321"),
+            ("city", "9b14e0b3e2a55b23"),
+            ("forest", "e53a5ff1901693e7"),
+            ("rooms", "7e58616b5720c7e6"),
         ];
         let published: Vec<_> = published
             .map(|(name, digest)| (name, digest.to_owned()))

@@ -151,8 +151,10 @@ impl Scene {
         )
     }
 
-    /// SHA-256 over origin and item bounds: two scenes with the same digest
-    /// ask the same questions of every structure. O(n).
+    /// SHA-256 over origin and item bounds, and over the boxes as they were
+    /// written where f32 holds them otherwise: two scenes with the same digest
+    /// ask the same questions of every structure, and the answers are judged by
+    /// the same truth. O(n).
     pub fn digest(&self) -> String {
         let mut hash = hmac_sha256::Hash::new();
         for value in self.origin.to_array() {
@@ -161,6 +163,14 @@ impl Scene {
         for item in &self.items {
             for value in item.min.to_array().into_iter().chain(item.max.to_array()) {
                 hash.update(value.to_bits().to_le_bytes());
+            }
+        }
+        if let Some(boxes) = self.originals.boxes() {
+            hash.update("as written");
+            for b in boxes {
+                for value in b.min.to_array().into_iter().chain(b.max.to_array()) {
+                    hash.update(value.to_bits().to_le_bytes());
+                }
             }
         }
         hex(&hash.finalize())
@@ -241,5 +251,22 @@ mod tests {
     fn the_digest_tells_scenes_apart() {
         assert_eq!(scene(0.0, 1.0).digest(), scene(0.0, 1.0).digest());
         assert_ne!(scene(0.0, 1.0).digest(), scene(0.0, 2.0).digest());
+    }
+
+    #[test]
+    fn boxes_that_f32_holds_alike_are_other_questions_if_they_were_written_otherwise() {
+        let (low, high) = (scene(0.0, 0.1), scene(0.0, 0.1f64.next_up()));
+        assert_eq!((low.origin, &low.items), (high.origin, &high.items));
+        assert_ne!(low.digest(), high.digest());
+        // What f32 holds is a third one.
+        let held = scene(0.0, low.items[0].max.x.into());
+        assert_eq!(low.items, held.items);
+        assert!(![low.digest(), high.digest()].contains(&held.digest()));
+        // Its digest is that of origin and bounds alone.
+        let mut bytes = vec![0; 24];
+        for corner in [held.items[0].min, held.items[0].max] {
+            bytes.extend(corner.to_array().map(f32::to_le_bytes).concat());
+        }
+        assert_eq!(held.digest(), hex(&hmac_sha256::Hash::hash(&bytes)));
     }
 }

@@ -66,6 +66,12 @@ impl ErrorCount {
         (self.visible > 0).then(|| self.false_positives as f64 / self.visible as f64)
     }
 
+    /// False positives that are neither the storage's nor the planes'.
+    pub fn by_test(&self) -> u64 {
+        let others = self.by_storage.saturating_add(self.by_planes);
+        self.false_positives.saturating_sub(others)
+    }
+
     /// The same for a test of spheres: what boxes would have told is its own.
     pub fn of_spheres(self) -> ErrorCount {
         ErrorCount {
@@ -228,7 +234,7 @@ mod tests {
         assert_eq!((poor.touch_dropped, poor.false_positives), (1, 2));
         assert_eq!((poor.worst_miss, poor.worst_excess), (6.0, 4.0));
         // This volume's only plane drops both.
-        assert_eq!((poor.by_storage, poor.by_planes), (0, 2));
+        assert_eq!((poor.by_storage, poor.by_planes, poor.by_test()), (0, 2, 0));
         assert!((poor.false_negative_ppm().unwrap() - 1e6 / 3.0).abs() < 1e-6);
     }
 

@@ -289,3 +289,60 @@ fn a_scene_without_items_ranks_nothing_and_counts_are_words() {
     let verdict = "0 slower, 1 inconclusive, 0 faster, 0 same of 1 cell\n";
     assert!(compared.ends_with(verdict), "{compared}");
 }
+
+/// Beside the camera, where f32 has steps of 8 km: stored they are seen, written
+/// they are not.
+#[test]
+fn what_storage_returns_too_much_is_told_only_where_there_is_any() {
+    let far = format!(
+        "{BOXES}\n100000000005,-40,0,100000000006,-39,1\n\
+         100000000005,30,0,100000000006,31,1\n100000000005,0,0,100000000006,1,1\n\
+         0,0,0,1,1,1\n"
+    );
+    let near = format!("{BOXES}\n0,0,0,1,1,1\n");
+    let camera = |x: u64| {
+        format!(
+            "eye_x,eye_y,eye_z,forward_x,forward_y,forward_z,near,far\n{x},0.5,0.5,1,0,0,1,100\n"
+        )
+    };
+    let (beside, before, away) = (
+        camera(100_000_000_000),
+        "eye_x,eye_y,eye_z,forward_x,forward_y,forward_z,near,far\n-3,0.5,0.5,1,0,0,1,100\n",
+        camera(100_000_000_007),
+    );
+    let folder = folder(&[
+        ("far.csv", far.as_bytes()),
+        ("near.csv", near.as_bytes()),
+        ("beside.csv", beside.as_bytes()),
+        ("before.csv", before.as_bytes()),
+        ("away.csv", away.as_bytes()),
+    ]);
+    let run = |scene: &str, path: &str, out: &str| {
+        let line = format!("run --scene {scene} --path {path} --structure linear --no-bounds");
+        let table = works(folder.path(), &format!("{line} --processes 1 --out {out}"));
+        (table, works(folder.path(), &format!("report {out}")))
+    };
+    let (table, text) = run("far.csv", "beside.csv", "one");
+    assert!(
+        table.contains(" false positives   by storage/planes/test "),
+        "{table}"
+    );
+    assert!(
+        table.contains(" 200.000 % ") && table.contains(" 2/0/0 "),
+        "{table}"
+    );
+    let wanted =
+        "False positives: 200.000 % of the visible items; 2/0/0 items by storage/planes/test.\n";
+    assert!(text.contains(wanted), "{text}");
+    // Nothing is visible, and something is returned.
+    let (table, text) = run("far.csv", "away.csv", "two");
+    assert!(table.contains(" 3/0/0 "), "{table}");
+    let wanted = "False positives: 3/0/0 items by storage/planes/test; nothing is visible.\n";
+    assert!(text.contains(wanted), "{text}");
+    let (table, text) = run("near.csv", "before.csv", "three");
+    assert!(!table.contains("by storage"), "{table}");
+    assert!(
+        text.contains("False positives: 0.000 % of the visible items.\n"),
+        "{text}"
+    );
+}
