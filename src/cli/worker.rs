@@ -1,6 +1,6 @@
-//! The child's side of a run: `cullbench worker`, not shown in the help. It reads
-//! one request, measures one process's share of one scene, and writes what it
-//! does and finds, a JSON line each, to standard output.
+//! The child's side of what is measured over processes: `cullbench worker`, not
+//! shown in the help. It reads one request, does one process's share of a job, and
+//! writes what it does and finds, a JSON line each, to standard output.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -16,31 +16,55 @@ use serde::{Deserialize, Serialize};
 
 use super::Ending;
 use super::args::{Cli, Command};
-use super::run_plan;
+use super::{advise, precision, run_plan};
+use crate::advise::TrialPlan;
 use crate::index::Registry;
-use crate::measure::{Part, Share, TaskSamples, measure_scene};
+use crate::measure::{Part, Plan, ProcessTimes, Share, TaskSamples, measure_scene};
+use crate::precision::PointPlan;
 
 /// Raised when requests or messages change: programs of different versions do
 /// not understand each other.
-pub const PROTOCOL: u32 = 2;
+pub const PROTOCOL: u32 = 3;
 
 /// What a worker is to do.
 #[derive(Clone, Serialize, Deserialize)]
 pub struct Request {
     pub protocol: u32,
-    /// The arguments of `run`, from which the plan follows.
+    /// The arguments of the command, from which all else follows.
     pub args: Vec<String>,
     /// Files that stand for pipes that only the parent can read.
     pub spooled: BTreeMap<String, PathBuf>,
-    /// Index of the scene in the plan.
-    pub scene: usize,
-    pub share: Share,
+    pub job: Job,
     /// The processor to stay on.
     pub cpu: Option<usize>,
-    /// Whether samples are wanted beside the parts.
-    pub samples: bool,
     /// Decides on where its memory lies: another number for every process.
     pub layout: u64,
+}
+
+/// One process's share of what a command measures.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Job {
+    /// Structures on a scene, by its index in the plan (`run`, `compare`,
+    /// `advise`).
+    Scene {
+        scene: usize,
+        share: Share,
+        /// Whether samples are wanted beside the parts.
+        samples: bool,
+    },
+    /// Both sides of every rule (`advise`).
+    Trials(TrialPlan, Timing),
+    /// All points (`precision`).
+    Points(PointPlan, Timing),
+}
+
+/// What a process is to know beside its plan.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+pub struct Timing {
+    pub process: u32,
+    /// Scale of the lens where the path was asked for by its visible share.
+    pub lens_scale: Option<f64>,
 }
 
 /// A line from a worker.
@@ -57,6 +81,7 @@ pub enum Message {
         step: String,
     },
     Part(Box<Part>, Vec<TaskSamples>),
+    Times(ProcessTimes),
     /// The scene or a path cannot be had.
     Failed(String),
     /// The share is done.
@@ -97,58 +122,105 @@ fn answer(registry: &Registry, request: &Request) -> anyhow::Result<()> {
     let typed = ["cullbench".to_owned()]
         .into_iter()
         .chain(request.args.clone());
-    let Command::Run(args) = Cli::try_parse_from(typed)?.command else {
-        anyhow::bail!("not a run");
-    };
-    let plan = run_plan::plan(registry, &args)?;
-    let planned = &plan.plan.scenes[request.scene];
-    let failed = RefCell::new(None);
-    let keep_error = |result: io::Result<()>| {
-        if let Err(error) = result {
-            failed.borrow_mut().get_or_insert(error);
+    let here = Here::default();
+    match (&request.job, Cli::try_parse_from(typed)?.command) {
+        (Job::Scene { .. }, Command::Run(args)) => {
+            here.scene(&run_plan::plan(registry, &args)?.plan, &request.job)?;
         }
-    };
-    let told = RefCell::new((Instant::now(), String::new()));
-    let notice = |structure: Option<&str>, step: &str| {
-        let now = format!("{} {step}", structure.unwrap_or_default());
-        let mut told = told.borrow_mut();
-        if told.1 != now {
-            *told = (Instant::now(), now);
-            keep_error(send(&Message::Doing {
-                structure: structure.map(str::to_owned),
-                step: step.to_owned(),
-            }));
+        (Job::Scene { .. }, Command::Advise(args)) => {
+            here.scene(&advise::plan(registry, &args)?, &request.job)?;
         }
-    };
-    let stop = || {
-        let mut told = told.borrow_mut();
-        if told.0.elapsed() > HEARTBEAT {
-            told.0 = Instant::now();
-            keep_error(send(&Message::Doing {
-                structure: None,
-                step: "timing".to_owned(),
-            }));
+        (Job::Trials(plan, timing), Command::Advise(args)) => {
+            here.times(&|stop| advise::time(registry, &args, plan, timing, stop))?;
         }
-        // Nobody listens any more.
-        failed.borrow().is_some()
-    };
-    let mut keep = |part: Part, samples: Vec<TaskSamples>| {
-        let samples = if request.samples { samples } else { Vec::new() };
-        keep_error(send(&Message::Part(Box::new(part), samples)));
-    };
-    measure_scene(
-        &plan.plan,
-        planned,
-        &request.share,
-        &mut keep,
-        &notice,
-        &stop,
-    )?;
-    match failed.into_inner() {
+        (Job::Points(plan, timing), Command::Precision(args)) => {
+            here.times(&|stop| precision::time(registry, &args, plan, timing, stop))?;
+        }
+        _ => anyhow::bail!("a job of another command"),
+    }
+    match here.failed.into_inner() {
         Some(error) => Err(error.into()),
         None => Ok(()),
     }
 }
+
+/// What is told to the parent, and whether it listens.
+struct Here {
+    failed: RefCell<Option<io::Error>>,
+    told: RefCell<(Instant, String)>,
+}
+
+impl Default for Here {
+    fn default() -> Here {
+        Here {
+            failed: RefCell::new(None),
+            told: RefCell::new((Instant::now(), String::new())),
+        }
+    }
+}
+
+impl Here {
+    fn tell(&self, message: &Message) {
+        if let Err(error) = send(message) {
+            self.failed.borrow_mut().get_or_insert(error);
+        }
+    }
+
+    fn notice(&self, structure: Option<&str>, step: &str) {
+        let now = format!("{} {step}", structure.unwrap_or_default());
+        if self.told.borrow().1 == now {
+            return;
+        }
+        *self.told.borrow_mut() = (Instant::now(), now);
+        self.tell(&Message::Doing {
+            structure: structure.map(str::to_owned),
+            step: step.to_owned(),
+        });
+    }
+
+    /// Asked now and then while something is timed.
+    fn stop(&self) -> bool {
+        if self.told.borrow().0.elapsed() > HEARTBEAT {
+            self.told.borrow_mut().0 = Instant::now();
+            self.tell(&Message::Doing {
+                structure: None,
+                step: "timing".to_owned(),
+            });
+        }
+        // Nobody listens any more.
+        self.failed.borrow().is_some()
+    }
+
+    fn scene(&self, plan: &Plan, job: &Job) -> anyhow::Result<()> {
+        let Job::Scene {
+            scene,
+            share,
+            samples: wanted,
+        } = job
+        else {
+            return Ok(());
+        };
+        let mut keep = |part: Part, samples: Vec<TaskSamples>| {
+            let samples = if *wanted { samples } else { Vec::new() };
+            self.tell(&Message::Part(Box::new(part), samples));
+        };
+        let notice = |structure: Option<&str>, step: &str| self.notice(structure, step);
+        let planned = &plan.scenes[*scene];
+        measure_scene(plan, planned, share, &mut keep, &notice, &|| self.stop())?;
+        Ok(())
+    }
+
+    fn times(&self, time: TimeAll) -> anyhow::Result<()> {
+        self.notice(None, "timing");
+        if let Some(times) = time(&|| self.stop())? {
+            self.tell(&Message::Times(times));
+        }
+        Ok(())
+    }
+}
+
+/// Times everything unless it is stopped.
+type TimeAll<'t> = &'t dyn Fn(&dyn Fn() -> bool) -> anyhow::Result<Option<ProcessTimes>>;
 
 /// Nothing more is ever said on standard input: its end is that of the parent,
 /// however it came about, and so of this process, whatever it is at.

@@ -1,8 +1,8 @@
 //! What a culling answers to every camera by the plain loop, and how wrong that
 //! is. No structure and no clock.
 
-use crate::camera::Camera;
-use crate::culling::{CameraView, Culling, CullingTest};
+use super::points::Views;
+use crate::culling::{Culling, CullingTest};
 use crate::geometry::Aabb;
 use crate::index::BuildError;
 use crate::query::ItemId;
@@ -12,7 +12,6 @@ use crate::verify::{ErrorCount, Truth};
 /// What one culling answers to every camera, and how wrong that is.
 pub(super) struct Judged {
     pub culling: Culling,
-    pub views: Vec<CameraView>,
     pub answers: Vec<Vec<ItemId>>,
     pub errors: ErrorCount,
     pub refused: Option<String>,
@@ -22,7 +21,6 @@ impl Judged {
     pub fn refused(culling: Culling, error: &BuildError) -> Judged {
         Judged {
             culling,
-            views: Vec::new(),
             answers: Vec::new(),
             errors: ErrorCount::default(),
             refused: Some(error.to_string()),
@@ -30,36 +28,26 @@ impl Judged {
     }
 
     /// Answers from `items`, judged by the truth about the scene's own.
-    pub fn new(
-        scene: &Scene,
-        items: &[Aabb],
-        cameras: &[Camera],
-        truths: &[Truth],
-        culling: Culling,
-    ) -> Judged {
-        let mut judged = Judged {
-            culling,
-            views: Vec::new(),
-            answers: Vec::new(),
-            errors: ErrorCount::default(),
-            refused: None,
-        };
-        let around = scene.surroundings();
-        for (camera, truth) in cameras.iter().zip(truths) {
-            let view = match culling.view(camera, &around) {
-                Ok(view) => view,
-                Err(error) => {
-                    judged.refused = Some(error.to_string());
-                    return judged;
-                }
-            };
+    pub fn new(scene: &Scene, items: &[Aabb], views: &Views, truths: &[Truth]) -> Judged {
+        let culling = views.culling;
+        let mut errors = ErrorCount::default();
+        let judged = views.views.iter().zip(truths).map(|(view, truth)| {
             let seen = items.iter().zip(0..).filter(|(b, _)| view.as_any().sees(b));
             let answer: Vec<ItemId> = seen.map(|(_, id)| id).collect();
-            judged.errors += blamed(culling.test, truth.errors(&scene.items, &answer));
-            judged.views.push(view);
-            judged.answers.push(answer);
+            errors += blamed(culling.test, truth.errors(&scene.items, &answer));
+            answer
+        });
+        Judged {
+            answers: judged.collect(),
+            culling,
+            errors,
+            refused: views.refused.clone(),
         }
-        judged
+    }
+
+    /// Ids of every answer.
+    pub fn counts(&self) -> Vec<u64> {
+        self.answers.iter().map(|a| a.len() as u64).collect()
     }
 }
 

@@ -35,7 +35,7 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
     };
     let draw_ns = case.options.draw_ns;
     let predicted = predicted_excess(case);
-    Ok(omission.draft(vec![forced]).finished_by(move |omission| {
+    Ok(omission.draft(vec![forced]).finished_by(move |omission, _| {
         let Some(check) = omission.checks.first() else {
             return;
         };
