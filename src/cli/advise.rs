@@ -10,9 +10,9 @@ use tempfile::NamedTempFile;
 
 use super::args::{AdviseArgs, TableFormat};
 use super::processes::{Said, Workers};
+use super::protocol::{Job, Timing};
 use super::run::progress;
 use super::run_resume::typed_args;
-use super::worker::{Job, Timing};
 use super::{Ending, interrupt, load_scene, text, unread_is_fine};
 use crate::advise::{
     self, Advice, AdviseInput, AdviseOptions, Check, Decision, LeftOutIf, Omission,

@@ -13,9 +13,9 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use super::interrupt;
-use super::processes::{Ended, Said, Worker, see_through};
+use super::processes::{Ended, Said, Worker, processors, see_through};
+use super::protocol::{Job, PROTOCOL, Request};
 use super::run_plan::RunPlan;
-use super::worker::{Job, PROTOCOL, Request, processors};
 use crate::measure::{GroupKey, Known, Part, Share, Status, Task, Verdict};
 use crate::statistics::{Judgement, interquartile_mean, judge, resolved, trimmed_mean};
 

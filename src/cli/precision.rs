@@ -11,9 +11,9 @@ use tempfile::NamedTempFile;
 
 use super::args::{PrecisionArgs, TableFormat};
 use super::processes::Workers;
+use super::protocol::{Job, Timing};
 use super::run::progress;
 use super::run_resume::typed_args;
-use super::worker::{Job, Timing};
 use super::{Ending, interrupt, load_scene, precision_diagram, text, unread_is_fine};
 use crate::index::Registry;
 use crate::measure::{ProcessTimes, Protocol, Status};

@@ -13,7 +13,7 @@ use anyhow::{Context, bail};
 use tempfile::NamedTempFile;
 
 use super::interrupt;
-use super::worker::{Job, Message, PROTOCOL, Request, processors};
+use super::protocol::{Job, Message, PROTOCOL, Request};
 use crate::input;
 use crate::measure::{Part, ProcessTimes, Status, TaskSamples, Verdict};
 
@@ -369,4 +369,15 @@ impl Workers {
         }
         Ok(Some(all))
     }
+}
+
+/// The processors that this process may run on; empty where that is not known.
+pub fn processors() -> Vec<usize> {
+    #[cfg(target_os = "linux")]
+    if let Ok(set) = rustix::thread::sched_getaffinity(None) {
+        return (0..rustix::thread::CpuSet::MAX_CPU)
+            .filter(|&cpu| set.is_set(cpu))
+            .collect();
+    }
+    Vec::new()
 }

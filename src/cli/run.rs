@@ -10,10 +10,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::args::RunArgs;
 use super::processes::{Ended, Said, Workers};
+use super::protocol::Job;
 use super::run_plan::{RunPlan, plan};
 use super::run_resume::{create, go_on, resume, utc_now};
 use super::run_table::show_scene;
-use super::worker::Job;
 use super::{Ending, interrupt, surface_tables, text, unread_is_fine};
 use crate::index::Registry;
 use crate::measure::{

@@ -3,90 +3,20 @@
 //! writes what it does and finds, a JSON line each, to standard output.
 
 use std::cell::RefCell;
-use std::collections::BTreeMap;
 use std::io::{self, BufRead, Write};
-use std::path::PathBuf;
 use std::thread;
 use std::time::{Duration, Instant};
 
 use clap::Parser;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use serde::{Deserialize, Serialize};
 
 use super::Ending;
 use super::args::{Cli, Command};
+use super::protocol::{Job, Message, PROTOCOL, Request};
 use super::{advise, precision, run_plan};
-use crate::advise::TrialPlan;
 use crate::index::Registry;
-use crate::measure::{Part, Plan, ProcessTimes, Share, TaskSamples, measure_scene};
-use crate::precision::PointPlan;
-
-/// Raised when requests or messages change: programs of different versions do
-/// not understand each other.
-pub const PROTOCOL: u32 = 3;
-
-/// What a worker is to do.
-#[derive(Clone, Serialize, Deserialize)]
-pub struct Request {
-    pub protocol: u32,
-    /// The arguments of the command, from which all else follows.
-    pub args: Vec<String>,
-    /// Files that stand for pipes that only the parent can read.
-    pub spooled: BTreeMap<String, PathBuf>,
-    pub job: Job,
-    /// The processor to stay on.
-    pub cpu: Option<usize>,
-    /// Decides on where its memory lies: another number for every process.
-    pub layout: u64,
-}
-
-/// One process's share of what a command measures.
-#[derive(Clone, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Job {
-    /// Structures on a scene, by its index in the plan (`run`, `compare`,
-    /// `advise`).
-    Scene {
-        scene: usize,
-        share: Share,
-        /// Whether samples are wanted beside the parts.
-        samples: bool,
-    },
-    /// Both sides of every rule (`advise`).
-    Trials(TrialPlan, Timing),
-    /// All points (`precision`).
-    Points(PointPlan, Timing),
-}
-
-/// What a process is to know beside its plan.
-#[derive(Clone, Copy, Serialize, Deserialize)]
-pub struct Timing {
-    pub process: u32,
-    /// Scale of the lens where the path was asked for by its visible share.
-    pub lens_scale: Option<f64>,
-}
-
-/// A line from a worker.
-#[derive(Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Message {
-    /// The first line.
-    Ready {
-        protocol: u32,
-    },
-    /// What comes next, and of which structure.
-    Doing {
-        structure: Option<String>,
-        step: String,
-    },
-    Part(Box<Part>, Vec<TaskSamples>),
-    Times(ProcessTimes),
-    /// The scene or a path cannot be had.
-    Failed(String),
-    /// The share is done.
-    Done,
-}
+use crate::measure::{Part, Plan, ProcessTimes, TaskSamples, measure_scene};
 
 /// Exit code of a worker whose parent is gone.
 const ORPHANED: i32 = 130;
@@ -272,15 +202,4 @@ fn vary_layout(seed: u64) -> Vec<Vec<u8>> {
         }
     }
     held
-}
-
-/// The processors that this process may run on; empty where that is not known.
-pub fn processors() -> Vec<usize> {
-    #[cfg(target_os = "linux")]
-    if let Ok(set) = rustix::thread::sched_getaffinity(None) {
-        return (0..rustix::thread::CpuSet::MAX_CPU)
-            .filter(|&cpu| set.is_set(cpu))
-            .collect();
-    }
-    Vec::new()
 }

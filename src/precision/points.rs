@@ -4,12 +4,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::judged::Judged;
+use super::judged::{Judged, Truths};
 use super::point::{Point, mark_dominated};
 use super::stability::{StableAfter, by_camera, stability};
 use crate::camera::{Camera, PLANE_METHODS, PlaneMethod, PlaneOptions};
-use crate::culling::{ARITHMETICS, Arithmetic, CameraView, Culling, CullingTest, TESTS};
-use crate::geometry::Aabb;
+use crate::culling::{ARITHMETICS, Arithmetic, Culling, CullingTest, TESTS};
 use crate::index::{
     BuildError, By, DynIndex, GridScope, Quantised, QuantisedParams, RegionIndex, StructureSpec,
 };
@@ -77,37 +76,6 @@ fn cullings() -> Vec<Culling> {
     all
 }
 
-/// A culling with its views, up to the first camera that has none.
-pub(super) struct Views {
-    pub culling: Culling,
-    pub views: Vec<CameraView>,
-    pub refused: Option<String>,
-}
-
-impl Views {
-    fn new(scene: &Scene, cameras: &[Camera], culling: Culling) -> Views {
-        let around = scene.surroundings();
-        let mut views = Vec::with_capacity(cameras.len());
-        for camera in cameras {
-            match culling.view(camera, &around) {
-                Ok(view) => views.push(view),
-                Err(error) => {
-                    return Views {
-                        culling,
-                        views,
-                        refused: Some(error.to_string()),
-                    };
-                }
-            }
-        }
-        Views {
-            culling,
-            views,
-            refused: None,
-        }
-    }
-}
-
 /// A structure over the boxes and over the cubes of the sphere test.
 struct Indexes {
     boxes: Box<dyn DynIndex>,
@@ -138,11 +106,17 @@ impl Indexes {
 /// not fit.
 struct Stored {
     label: String,
-    index: Result<By<Quantised>, BuildError>,
+    index: Option<Box<dyn DynIndex>>,
+    judged: Vec<Judged>,
 }
 
-/// u8 and u16 codes, on one grid or on one for each block.
-fn quantised(kernel: Kernel, scene: &Scene) -> Vec<Stored> {
+/// u8 and u16 codes, on one grid or on one for each block, with the default
+/// view and with the exact test.
+fn quantised(kernel: Kernel, scene: &Scene, cameras: &[Camera], truths: Truths) -> Vec<Stored> {
+    let cullings = [CullingTest::SixPlane, CullingTest::Exact].map(|test| Culling {
+        test,
+        ..Culling::default()
+    });
     let mut all = Vec::new();
     for bits in [8, 16] {
         for grid in [GridScope::World, GridScope::Block] {
@@ -150,12 +124,26 @@ fn quantised(kernel: Kernel, scene: &Scene) -> Vec<Stored> {
                 GridScope::World => "world",
                 GridScope::Block => "block",
             };
+            let label = format!("{}:bits={bits},grid={scope}", Quantised::INFO.name);
             let params = QuantisedParams { bits, grid };
-            let index = Quantised::build(&scene.items, None, &params);
-            all.push(Stored {
-                label: format!("{}:bits={bits},grid={scope}", Quantised::INFO.name),
-                index: index.map(|index| By { index, kernel }),
-            });
+            let stored = match Quantised::build(&scene.items, None, &params) {
+                Ok(index) => {
+                    let items = index.decoded(scene.items.len());
+                    let judged = cullings
+                        .map(|culling| Judged::new(scene, &items, cameras, truths, culling));
+                    Stored {
+                        label,
+                        index: Some(Box::new(By { index, kernel })),
+                        judged: judged.into(),
+                    }
+                }
+                Err(error) => Stored {
+                    label,
+                    index: None,
+                    judged: cullings.map(|c| Judged::refused(c, &error)).into(),
+                },
+            };
+            all.push(stored);
         }
     }
     all
@@ -163,8 +151,7 @@ fn quantised(kernel: Kernel, scene: &Scene) -> Vec<Stored> {
 
 /// Everything that points are made of, the same in every process.
 struct Built<'a> {
-    cameras: Vec<Camera>,
-    views: Vec<Views>,
+    judged: Vec<Judged>,
     structures: Vec<(&'a str, Indexes)>,
     stored: Vec<Stored>,
 }
@@ -172,90 +159,62 @@ struct Built<'a> {
 /// One way to answer: a structure with a culling.
 struct Way<'b> {
     structure: &'b str,
-    views: &'b Views,
-    /// What is indexed, if it can be.
-    index: Result<&'b dyn DynIndex, &'b BuildError>,
-    /// What its answers are to be.
-    of: Answers,
-}
-
-/// The plain loop over the scene's items by so manieth culling, or over those of
-/// a quantised index.
-#[derive(Clone, Copy, PartialEq)]
-enum Answers {
-    Scene(usize),
-    Stored(usize),
+    index: Option<&'b dyn DynIndex>,
+    judged: &'b Judged,
 }
 
 impl<'a> Built<'a> {
     fn new(
-        scene: &Scene,
-        path: &CameraPath,
-        structures: &'a [StructureSpec],
-        most_cameras: usize,
+        input: &PrecisionInput<'a>,
+        cameras: &[Camera],
+        truths: Truths,
     ) -> Result<Built<'a>, BuildError> {
-        let cameras = cameras_of(path, most_cameras);
-        let views = cullings().into_iter();
-        let specs = structures.first().map(|spec| spec.execution);
+        let (scene, structures) = (input.scene, input.structures);
+        let judged = cullings().into_iter().map(|culling| {
+            let items = culling.test.items(&scene.items);
+            Judged::new(scene, &items, cameras, truths, culling)
+        });
+        let execution = structures.first().map(|spec| spec.execution);
         let indexed = structures
             .iter()
             .map(|spec| Ok((spec.label.as_str(), Indexes::new(spec, scene)?)));
         Ok(Built {
-            views: views.map(|c| Views::new(scene, &cameras, c)).collect(),
+            judged: judged.collect(),
             structures: indexed.collect::<Result<_, BuildError>>()?,
-            stored: quantised(specs.unwrap_or_default().kernel, scene),
-            cameras,
+            stored: quantised(execution.unwrap_or_default().kernel, scene, cameras, truths),
         })
     }
 
-    /// All points in their order, with the default view and with the exact test
-    /// for items in few bits.
+    /// All points in their order.
     fn ways(&self) -> Vec<Way<'_>> {
-        let mut ways = Vec::new();
-        for (structure, indexes) in &self.structures {
-            for (i, views) in self.views.iter().enumerate() {
-                ways.push(Way {
-                    structure,
-                    views,
-                    index: Ok(indexes.of(views.culling.test)),
-                    of: Answers::Scene(i),
-                });
-            }
-        }
-        for (i, stored) in self.stored.iter().enumerate() {
-            for test in [CullingTest::SixPlane, CullingTest::Exact] {
-                let culling = Culling {
-                    test,
-                    ..Culling::default()
-                };
-                let views = self.views.iter().filter(|views| views.culling == culling);
-                ways.extend(views.map(|views| Way {
-                    structure: &stored.label,
-                    views,
-                    index: stored.index.as_ref().map(|index| index as &dyn DynIndex),
-                    of: Answers::Stored(i),
-                }));
-            }
-        }
-        ways
+        let of_structures = self.structures.iter().flat_map(|(structure, indexes)| {
+            self.judged.iter().map(|judged| Way {
+                structure,
+                index: Some(indexes.of(judged.culling.test)),
+                judged,
+            })
+        });
+        let of_stored = self.stored.iter().flat_map(|stored| {
+            stored.judged.iter().map(|judged| Way {
+                structure: &stored.label,
+                index: stored.index.as_deref(),
+                judged,
+            })
+        });
+        of_structures.chain(of_stored).collect()
     }
 }
 
-impl Way<'_> {
-    fn is_default(&self) -> bool {
-        self.views.culling == Culling::default()
-    }
-
-    /// Ready to be timed.
-    fn competitor(&self, expected: &[u64]) -> Competitor<'_> {
-        let views = &self.views.views;
+impl<'b> Way<'b> {
+    fn competitor(&self, expected: Vec<u64>) -> Competitor<'b> {
+        let (index, views) = (self.index, &self.judged.views);
         Competitor {
-            ask: match self.index {
-                Ok(index) => Box::new(move |n, out| index.see(views[n].as_any(), out)),
-                Err(_) => Box::new(|_, _| ()),
+            ask: match index {
+                Some(index) => Box::new(move |n, out| index.see(views[n].as_any(), out)),
+                None => Box::new(|_, _| ()),
             },
             ask_many: None,
-            expected: expected.to_vec(),
+            expected,
             least_ns: None,
         }
     }
@@ -328,15 +287,12 @@ pub fn prepare(
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<Prepared>, BuildError> {
     let scene = input.scene;
-    let built = Built::new(scene, input.path, input.structures, input.most_cameras)?;
-    let cameras = built.cameras.iter();
+    let cameras = cameras_of(input.path, input.most_cameras);
+    let truths = cameras.iter();
     // A frame always makes a pose.
-    let truths: Vec<Truth> = cameras.filter_map(|c| Truth::of_scene(c, scene)).collect();
-    let mut judge = Judge {
-        scene,
-        truths,
-        judged: Vec::new(),
-    };
+    let truths: Vec<Truth> = truths.filter_map(|c| Truth::of_scene(c, scene)).collect();
+    let built = Built::new(input, &cameras, Some(&truths))?;
+    drop(truths);
     let ways = built.ways();
     let (mut points, mut timed, mut competitors) = (Vec::new(), Vec::new(), Vec::new());
     let mut twin = None;
@@ -344,31 +300,31 @@ pub fn prepare(
         if stop() {
             return Ok(None);
         }
-        let judged = judge.judged(&built, way);
+        let judged = way.judged;
         let mut point = Point::new(way.structure, judged);
-        if let Ok(index) = way.index {
+        if let Some(index) = way.index {
             point.memory(index.memory(), scene.items.len());
-            if judged.refused.is_none() {
-                match checked(index, &way.views.views, judged, scene.items.len()) {
-                    Ok(()) => {
-                        if twin.is_none() && way.is_default() {
-                            twin = Some(timed.len());
-                        }
-                        timed.push(points.len());
-                        competitors.push(way.competitor(&judged.counts()));
+            let has_views = judged.refused.is_none();
+            match has_views.then(|| checked(index, judged, scene.items.len())) {
+                None => {}
+                Some(Ok(())) => {
+                    if judged.culling == Culling::default() {
+                        twin.get_or_insert(timed.len());
                     }
-                    Err(wrong) => (point.status, point.reason) = (wrong.status, wrong.reason),
+                    timed.push(points.len());
+                    competitors.push(way.competitor(judged.counts()));
                 }
+                Some(Err(wrong)) => (point.status, point.reason) = (wrong.status, wrong.reason),
             }
         }
         points.push(point);
     }
     if let Some(original) = twin {
-        let expected = competitors[original].expected.clone();
-        competitors.push(ways[timed[original]].competitor(&expected));
+        let way = &ways[timed[original]];
+        competitors.push(way.competitor(way.judged.counts()));
         timed.push(timed[original]);
     }
-    let cameras = built.cameras.len();
+    let cameras = cameras.len();
     let schedule = Schedule::new(cameras, &competitors, input.protocol);
     Ok(Some(Prepared {
         precision: Precision {
@@ -404,21 +360,17 @@ pub fn time(
     plan: &PointPlan,
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<ProcessTimes>, BuildError> {
-    let built = Built::new(
-        input.scene,
-        input.path,
-        input.structures,
-        input.most_cameras,
-    )?;
+    let cameras = cameras_of(input.path, input.most_cameras);
+    let built = Built::new(input, &cameras, None)?;
     let ways = built.ways();
     let planned = plan.timed.iter().zip(&plan.expected);
     let competitors: Vec<Competitor> = planned
-        .map(|(&point, expected)| ways[point].competitor(expected))
+        .map(|(&point, expected)| ways[point].competitor(expected.clone()))
         .collect();
     let timed = timed(&competitors, &plan.schedule, input.protocol, stop);
     Ok(timed.map(|timed| {
         let by_camera = timed.iter().map(|timed| match timed {
-            Ok(timed) => by_camera(timed, built.cameras.len()),
+            Ok(timed) => by_camera(timed, cameras.len()),
             Err(_) => Vec::new(),
         });
         ProcessTimes {
@@ -460,49 +412,10 @@ impl Prepared {
     }
 }
 
-/// What is right, found once for all structures.
-struct Judge<'a> {
-    scene: &'a Scene,
-    truths: Vec<Truth>,
-    judged: Vec<((Answers, CullingTest), Judged)>,
-}
-
-impl Judge<'_> {
-    fn judged(&mut self, built: &Built, way: &Way) -> &Judged {
-        let key = (way.of, way.views.culling.test);
-        let known = self.judged.iter().position(|(known, _)| *known == key);
-        let place = known.unwrap_or_else(|| {
-            let judged = match (way.of, way.index) {
-                (_, Err(error)) => Judged::refused(way.views.culling, error),
-                (Answers::Scene(_), _) => {
-                    self.judge(&way.views.culling.test.items(&self.scene.items), way)
-                }
-                (Answers::Stored(i), _) => {
-                    let index = built.stored[i].index.as_ref().ok();
-                    let items = index.map(|by| by.index.decoded(self.scene.items.len()));
-                    self.judge(&items.unwrap_or_default(), way)
-                }
-            };
-            self.judged.push((key, judged));
-            self.judged.len() - 1
-        });
-        &self.judged[place].1
-    }
-
-    fn judge(&self, items: &[Aabb], way: &Way) -> Judged {
-        Judged::new(self.scene, items, way.views, &self.truths)
-    }
-}
-
 /// Asks every query once; what was wrong, if anything.
-fn checked(
-    index: &dyn DynIndex,
-    views: &[CameraView],
-    judged: &Judged,
-    items: usize,
-) -> Result<(), Verdict> {
+fn checked(index: &dyn DynIndex, judged: &Judged, items: usize) -> Result<(), Verdict> {
     let mut trial = Trial::new(items);
-    for (view, answer) in views.iter().zip(&judged.answers) {
+    for (view, answer) in judged.views.iter().zip(&judged.answers) {
         trial.expect(answer.iter().copied());
         trial
             .ask(|out| index.see(view.as_any(), out))

@@ -101,6 +101,7 @@ fn predicted_excess(case: &Case) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::super::omission::Aside;
     use super::*;
 
     #[test]
@@ -117,7 +118,7 @@ mod tests {
             ] {
                 let rule = Omission::new(NAME, "x", "y", LeftOutIf::AtMost, By::Rule);
                 let rule = rule.compares(if predicted { 0.5 } else { 2.0 }, 1.0);
-                let mut omission = rule.draft(Vec::new()).settled(Vec::new(), 0.0);
+                let mut omission = rule.settled(Vec::new(), &Aside::default(), None);
                 let mut choice = TestChoice {
                     name: Some(taken),
                     ties,
