@@ -11,7 +11,7 @@ use cullbench::camera::PlaneOptions;
 use cullbench::geometry::{ConvexVolume, LaneMask};
 use cullbench::index::{DynIndex, Foreseen, FrustumQuery, RegionIndex, Wide};
 use cullbench::kernel::Isa;
-use cullbench::measure::{Ask, Competitor, Machine, Protocol, Timed, paired_ratio, timed_rounds};
+use cullbench::measure::{Ask, Competitor, Machine, Protocol, Timed, timed_rounds};
 use cullbench::query::{ItemId, QueryCost, Recorder, Sink};
 use cullbench::{path, scene};
 
@@ -164,21 +164,14 @@ fn main() -> ExitCode {
                     .into_iter()
                     .map(|timed| timed.expect("right ids"))
                     .collect();
-                let ratio = |other: usize| paired_ratio(&timed[0], &timed[other]).expect("a round");
+                let ratio = |other: usize| timed[0].over(&timed[other]).expect("a round");
                 let us = timed[0].ns().expect("a round") / 1e3;
                 let (twin, gain) = (ratio(1), ratio(2));
                 let leaves: Vec<usize> = foreseen.iter().map(Foreseen::leaves).collect();
                 let seen = portrait(&copies[0], &volumes, &leaves);
                 println!(
-                    "| {source} | {share} | {pace} | {us:.1} | {:.3} [{:.3}, {:.3}] | {:.3} | {:.2} | {:.2} | {:.2} | {:.2} |",
-                    gain.value,
-                    gain.lower,
-                    gain.upper,
-                    twin.value,
-                    seen.planes_per_box,
-                    seen.leaves,
-                    seen.in_vain,
-                    seen.again
+                    "| {source} | {share} | {pace} | {us:.1} | {:.3} | {:.3} | {:.2} | {:.2} | {:.2} | {:.2} |",
+                    gain, twin, seen.planes_per_box, seen.leaves, seen.in_vain, seen.again
                 );
             }
         }

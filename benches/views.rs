@@ -10,7 +10,7 @@ use std::process::ExitCode;
 use cullbench::camera::{PlaneOptions, ViewSet};
 use cullbench::geometry::ConvexVolume;
 use cullbench::index::{DynIndex, RegionIndex, Wide};
-use cullbench::measure::{Ask, Competitor, Machine, Protocol, Timed, paired_ratio, timed_rounds};
+use cullbench::measure::{Ask, Competitor, Machine, Protocol, Timed, timed_rounds};
 use cullbench::query::{AnyView, ItemId};
 use cullbench::{path, scene};
 
@@ -153,12 +153,12 @@ fn main() -> ExitCode {
                     .into_iter()
                     .map(|timed| timed.expect("right lists"))
                     .collect();
-                let ratio = |other: usize| paired_ratio(&timed[0], &timed[other]).expect("a round");
+                let ratio = |other: usize| timed[0].over(&timed[other]).expect("a round");
                 let us = timed[0].ns().expect("a round") / 1e3;
                 let (twin, shared) = (ratio(1), ratio(2));
                 println!(
-                    "| {source} | {share} | {name} | {us:.1} | {:.3} [{:.3}, {:.3}] | {:.3} |",
-                    shared.value, shared.lower, shared.upper, twin.value
+                    "| {source} | {share} | {name} | {us:.1} | {:.3} | {:.3} |",
+                    shared, twin
                 );
             }
         }

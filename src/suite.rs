@@ -1,7 +1,7 @@
 //! The suites of the main job: which scenes, which ways through them, how
 //! long. A table and nothing else.
 
-use crate::measure::Effort;
+use crate::measure::{Beside, Effort};
 
 /// A named set of scenes and paths with the time to spend on them.
 pub struct Suite {
@@ -86,7 +86,7 @@ pub static SUITES: &[Suite] = &[
             rounds: [3, 40],
             task_ns: 6e6,
             pass_ns: 12e6,
-            beside: true,
+            beside: Beside::All,
         },
     },
     Suite {
@@ -138,7 +138,7 @@ pub static SUITES: &[Suite] = &[
             rounds: [3, 60],
             task_ns: 60e6,
             pass_ns: 100e6,
-            beside: true,
+            beside: Beside::All,
         },
     },
     Suite {
@@ -191,7 +191,7 @@ pub static SUITES: &[Suite] = &[
             rounds: [3, 40],
             task_ns: 40e6,
             pass_ns: 100e6,
-            beside: true,
+            beside: Beside::All,
         },
     },
     Suite {
@@ -207,7 +207,7 @@ pub static SUITES: &[Suite] = &[
             rounds: [12, 80],
             task_ns: 80e6,
             pass_ns: 40e6,
-            beside: false,
+            beside: Beside::Nothing,
         },
     },
     Suite {
@@ -224,7 +224,7 @@ pub static SUITES: &[Suite] = &[
             rounds: [3, 40],
             task_ns: 60e6,
             pass_ns: 200e6,
-            beside: true,
+            beside: Beside::All,
         },
     },
 ];

@@ -1,12 +1,12 @@
 //! What every rule looks at: scene, cameras, the fastest tree built over the
-//! items, and the truth about some of the cameras. It decides nothing.
+//! items, and on request the truth about some of the cameras. It decides nothing.
 
 use super::AdviseOptions;
 use crate::camera::PlaneOptions;
 use crate::culling::{CameraView, Culling, CullingTest};
 use crate::geometry::ConvexVolume;
 use crate::index::{BuildError, DynIndex, StructureSpec};
-use crate::measure::{Ask, Protocol, Workload, WorkloadError};
+use crate::measure::{Ask, Workload, WorkloadError};
 use crate::path::CameraPath;
 use crate::scene::Scene;
 use crate::verify::Truth;
@@ -25,9 +25,6 @@ pub(super) struct Case<'a> {
     /// The fastest scan.
     pub scan: StructureSpec,
     pub options: AdviseOptions,
-    pub protocol: Protocol,
-    /// Cameras of the path with the truth about them, evenly spread.
-    pub truths: Vec<(usize, Truth)>,
 }
 
 impl<'a> Case<'a> {
@@ -36,27 +33,29 @@ impl<'a> Case<'a> {
         path: &'a CameraPath,
         [spec, scan]: [StructureSpec; 2],
         options: &AdviseOptions,
-        protocol: &Protocol,
     ) -> Result<Case<'a>, BuildError> {
         let scene = workload.scene;
-        let cameras = &workload.cameras;
-        let most = (MOST_JUDGED / scene.items.len().max(1)).clamp(1, MOST_TRUTHS);
-        let wanted = most.min(cameras.len());
-        let frames = (0..wanted).map(|n| n * cameras.len() / wanted);
-        let truths = frames.filter_map(|frame| {
-            let truth = Truth::of_scene(&cameras[frame], scene)?;
-            Some((frame, truth))
-        });
         Ok(Case {
-            truths: truths.collect(),
             index: spec.build_with(&scene.items, scene.own_tree.as_ref())?,
             workload,
             path,
             spec,
             scan,
             options: *options,
-            protocol: *protocol,
         })
+    }
+
+    /// Cameras of the path with the truth about them, evenly spread.
+    pub fn truths(&self) -> Vec<(usize, Truth)> {
+        let cameras = &self.workload.cameras;
+        let most = (MOST_JUDGED / self.scene().items.len().max(1)).clamp(1, MOST_TRUTHS);
+        let wanted = most.min(cameras.len());
+        let frames = (0..wanted).map(|n| n * cameras.len() / wanted);
+        let judged = frames.filter_map(|frame| {
+            let truth = Truth::of_scene(&cameras[frame], self.scene())?;
+            Some((frame, truth))
+        });
+        judged.collect()
     }
 
     pub fn scene(&self) -> &'a Scene {

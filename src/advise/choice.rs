@@ -5,23 +5,23 @@
 use serde::Serialize;
 
 use super::case::{Case, asked};
-use super::trials::{Times, Trials};
+use super::trials::{Answered, Trials};
 use crate::culling::{Culling, CullingTest, TESTS};
 use crate::index::{BuildError, Execution, Kind, StructureSpec};
-use crate::measure::{Cell, Group, Metric};
+use crate::measure::{Cell, Group, Metric, OverProcesses};
+use crate::statistics::{ALPHA, is_less};
 
 /// Which structure, and all that took part.
 #[derive(Clone, Debug, Serialize)]
 pub struct StructureChoice {
     /// The fastest that answered right; null if none did.
     pub name: Option<String>,
-    /// Others within the noise floor of it.
+    /// Others that the processes do not tell from it.
     pub ties: Vec<String>,
     /// The fastest for region search.
     pub region_search: Option<String>,
-    /// Others within the noise floor of it.
+    /// Others that the processes do not tell from it.
     pub region_search_ties: Vec<String>,
-    pub noise_floor: f64,
     /// Fastest first; what failed comes last.
     pub rows: Vec<StructureRow>,
 }
@@ -68,34 +68,37 @@ impl StructureRow {
 }
 
 impl StructureChoice {
-    pub(super) fn of(group: &Group) -> StructureChoice {
+    /// From what a run measures of all structures on one scene and path.
+    pub fn of(group: &Group) -> StructureChoice {
         let mut rows: Vec<StructureRow> = group.cells.iter().map(StructureRow::of).collect();
-        let time = |row: &StructureRow| row.query_ns.unwrap_or(f64::INFINITY);
-        rows.sort_by(|a, b| time(a).total_cmp(&time(b)));
-        let twin = group.twin.as_ref().map(|twin| twin.1.value);
-        let noise_floor = twin.map_or(0.0, |ratio| (ratio - 1.0).abs());
-        let fastest = rows.first().filter(|row| row.query_ns.is_some());
-        let most = fastest.map_or(0.0, |row| time(row) * (1.0 + noise_floor));
-        let near = rows.iter().skip(1).filter(|row| time(row) <= most);
-        let mut located = fastest_located(&rows, noise_floor).into_iter();
+        rows.sort_by(|a, b| or_last(a.query_ns).total_cmp(&or_last(b.query_ns)));
+        let rank = |row: &StructureRow| {
+            let mut cells = group.cells.iter();
+            cells.find(|cell| cell.structure == row.structure)?.rank
+        };
+        let located = |row: &StructureRow| {
+            let mut ranks = group.located.iter();
+            Some(ranks.find(|(structure, _)| *structure == row.structure)?.1)
+        };
+        let mut first = first_ranked(&rows, rank, |row| row.query_ns).into_iter();
+        let mut first_located = first_ranked(&rows, located, |row| row.locate_ns).into_iter();
         StructureChoice {
-            name: fastest.map(|row| row.structure.clone()),
-            ties: near.map(|row| row.structure.clone()).collect(),
-            region_search: located.next(),
-            region_search_ties: located.collect(),
-            noise_floor,
+            name: first.next(),
+            ties: first.collect(),
+            region_search: first_located.next(),
+            region_search_ties: first_located.collect(),
             rows,
         }
     }
 
     /// The fastest tree or grid, or `wide` if there was none: what rules are forced on.
     pub(super) fn tree(&self, structures: &[StructureSpec]) -> Result<StructureSpec, BuildError> {
-        self.fastest(structures, |kind| kind != Kind::Scan, "wide")
+        self.fastest(structures, |kind| kind != Kind::Scan, TREE)
     }
 
     /// The fastest scan, or `linear` if there was none.
     pub(super) fn scan(&self, structures: &[StructureSpec]) -> Result<StructureSpec, BuildError> {
-        self.fastest(structures, |kind| kind == Kind::Scan, "linear")
+        self.fastest(structures, |kind| kind == Kind::Scan, SCAN)
     }
 
     fn fastest(
@@ -107,21 +110,49 @@ impl StructureChoice {
         let of_row = |row: &StructureRow| structures.iter().find(|s| s.label == row.structure);
         let timed = self.rows.iter().filter(|row| row.query_ns.is_some());
         let found = timed.filter_map(of_row).find(|s| is_one(s.info().kind));
-        let execution = structures.first().map(|spec| spec.execution);
-        let default = || named(otherwise, execution.unwrap_or_default());
-        found.cloned().map_or_else(default, Ok)
+        found.map_or_else(
+            || named(otherwise, execution(structures)),
+            |s| Ok(s.clone()),
+        )
     }
 }
 
-/// The fastest for region search and what ties with it, fastest first.
-fn fastest_located(rows: &[StructureRow], floor: f64) -> Vec<String> {
-    let timed = rows.iter().filter_map(|row| Some((row.locate_ns?, row)));
-    let mut timed: Vec<(f64, &StructureRow)> = timed.collect();
-    timed.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let most = timed.first().map_or(0.0, |least| least.0 * (1.0 + floor));
-    let near = timed.iter().take_while(|(ns, _)| *ns <= most);
-    near.map(|(_, row)| row.structure.clone()).collect()
+/// The structures of the first rank, fastest first.
+fn first_ranked(
+    rows: &[StructureRow],
+    rank: impl Fn(&StructureRow) -> Option<usize>,
+    time: impl Fn(&StructureRow) -> Option<f64>,
+) -> Vec<String> {
+    let mut first: Vec<&StructureRow> = rows.iter().filter(|row| rank(row) == Some(1)).collect();
+    first.sort_by(|a, b| or_last(time(a)).total_cmp(&or_last(time(b))));
+    first.iter().map(|row| row.structure.clone()).collect()
 }
+
+/// What has no time comes last.
+fn or_last(time: Option<f64>) -> f64 {
+    time.unwrap_or(f64::INFINITY)
+}
+
+/// The structure that a plan names: one of the list, or of this crate.
+pub(super) fn planned(
+    structures: &[StructureSpec],
+    label: &str,
+) -> Result<StructureSpec, BuildError> {
+    let found = structures.iter().find(|spec| spec.label == label);
+    let otherwise = || match label == SCAN {
+        true => named(SCAN, execution(structures)),
+        false => named(TREE, execution(structures)),
+    };
+    found.map_or_else(otherwise, |spec| Ok(spec.clone()))
+}
+
+fn execution(structures: &[StructureSpec]) -> Execution {
+    structures.first().map(|s| s.execution).unwrap_or_default()
+}
+
+/// What rules are forced on where the list has no tree, no scan.
+const TREE: &str = "wide";
+const SCAN: &str = "linear";
 
 /// A structure of this crate with its default parameters.
 pub(super) fn named(name: &'static str, execution: Execution) -> Result<StructureSpec, BuildError> {
@@ -135,10 +166,10 @@ pub(super) fn named(name: &'static str, execution: Execution) -> Result<Structur
 /// Which culling test, and all that took part, on the fastest tree.
 #[derive(Clone, Debug, Serialize)]
 pub struct TestChoice {
-    /// The one with the least total, or the simplest of those that come within
-    /// the noise of it; null if nothing could be judged.
+    /// The one with the least total, or the simplest of those that the processes
+    /// do not tell from it; null if nothing could be judged.
     pub name: Option<&'static str>,
-    /// Others within the noise.
+    /// The others of those.
     pub ties: Vec<&'static str>,
     pub structure: String,
     pub rows: Vec<TestRow>,
@@ -158,6 +189,9 @@ pub struct TestRow {
     /// A query and the drawing of what it lets through though it cannot be
     /// seen.
     pub total_ns: Option<f64>,
+    /// The query's time in each process, ns.
+    #[serde(skip)]
+    by_process: Vec<f64>,
 }
 
 /// A test with its place in the trials.
@@ -187,54 +221,75 @@ pub(super) fn enter_tests<'c>(
 }
 
 impl TestChoice {
-    pub(super) fn of(case: &Case, tests: &[EnteredTest], times: &Times, floor: f64) -> TestChoice {
-        let rows: Vec<TestRow> = tests
-            .iter()
-            .map(|entered| {
-                let query = times.query(entered.place);
-                let errors = times.errors(entered.place);
-                let judged = times.judged as f64;
-                let extra = errors.map(|e| e.false_positives as f64 / judged);
-                let extra = extra.filter(|extra| extra.is_finite());
-                let drawn = extra.map(|extra| extra * case.options.draw_ns);
-                TestRow {
-                    test: entered.test.name(),
-                    query_ns: query.map(|q| q.value),
-                    query_ns_lower: query.map(|q| q.lower),
-                    query_ns_upper: query.map(|q| q.upper),
-                    excess: errors.and_then(|e| e.excess()),
-                    false_negative_ppm: errors.and_then(|e| e.false_negative_ppm()),
-                    false_positives_per_query: extra,
-                    total_ns: query.zip(drawn).map(|(query, drawn)| query.value + drawn),
-                }
-            })
-            .collect();
-        let near = near_the_least(&rows, floor);
+    /// Before any test is timed.
+    pub(super) fn untimed(structure: &str) -> TestChoice {
+        TestChoice {
+            name: None,
+            ties: Vec::new(),
+            structure: structure.to_owned(),
+            rows: Vec::new(),
+        }
+    }
+
+    pub(super) fn of(
+        structure: &str,
+        draw_ns: f64,
+        tests: &[EnteredTest],
+        answered: &Answered,
+        times: &OverProcesses,
+    ) -> TestChoice {
+        let judged = answered.judged as f64;
+        let rows = tests.iter().map(|&EnteredTest { test, place }| {
+            let query = times.ns(place);
+            let errors = answered.errors(place);
+            let extra = errors.map(|e| e.false_positives as f64 / judged);
+            let extra = extra.filter(|extra| extra.is_finite());
+            let drawn = extra.map(|extra| extra * draw_ns);
+            TestRow {
+                test: test.name(),
+                query_ns: query.map(|q| q.value),
+                query_ns_lower: query.map(|q| q.lower).filter(|ns| ns.is_finite()),
+                query_ns_upper: query.map(|q| q.upper).filter(|ns| ns.is_finite()),
+                excess: errors.and_then(|e| e.excess()),
+                false_negative_ppm: errors.and_then(|e| e.false_negative_ppm()),
+                false_positives_per_query: extra,
+                total_ns: query.zip(drawn).map(|(query, drawn)| query.value + drawn),
+                by_process: times.ln_ns(place).iter().map(|ln_ns| ln_ns.exp()).collect(),
+            }
+        });
+        let rows: Vec<TestRow> = rows.collect();
+        let near = near_the_least(&rows);
         TestChoice {
             name: near.first().copied(),
             ties: near.iter().skip(1).copied().collect(),
-            structure: case.spec.label.clone(),
+            structure: structure.to_owned(),
             rows,
         }
     }
 }
 
-/// The tests whose total is within the noise of the least, simplest first. One
-/// that misses anything is none of them.
-fn near_the_least(rows: &[TestRow], floor: f64) -> Vec<&'static str> {
-    let sound = |row: &&TestRow| row.false_negative_ppm.is_none_or(|ppm| ppm == 0.0);
-    // The total at an end of the query's interval.
-    let at = |row: &TestRow, end: Option<f64>| Some(row.total_ns? - row.query_ns? + end?);
-    let sound: Vec<&TestRow> = rows.iter().filter(sound).collect();
-    let most = sound
+/// The tests whose total the processes do not tell from the least, simplest
+/// first. One that misses anything is none of them.
+fn near_the_least(rows: &[TestRow]) -> Vec<&'static str> {
+    let is_sound = |row: &&TestRow| row.false_negative_ppm.is_none_or(|ppm| ppm == 0.0);
+    let totals = |row: &TestRow| -> Vec<f64> {
+        let drawn = row.total_ns.zip(row.query_ns).map(|(total, ns)| total - ns);
+        let both = row.by_process.iter().zip(drawn.iter().cycle());
+        both.map(|(ns, drawn)| (ns + drawn).ln()).collect()
+    };
+    let sound = rows
         .iter()
-        .filter_map(|row| at(row, row.query_ns_upper))
-        .fold(f64::INFINITY, f64::min);
-    let mut near: Vec<&'static str> = sound
-        .iter()
-        .filter(|row| at(row, row.query_ns_lower).is_some_and(|low| low <= most * (1.0 + floor)))
-        .map(|row| row.test)
-        .collect();
+        .filter(is_sound)
+        .filter(|row| row.total_ns.is_some());
+    let least = sound
+        .clone()
+        .min_by(|a, b| or_last(a.total_ns).total_cmp(&or_last(b.total_ns)));
+    let Some(least) = least else {
+        return Vec::new();
+    };
+    let is_near =
+        |row: &&TestRow| row.test == least.test || !is_less(&totals(least), &totals(row), ALPHA);
+    let mut near: Vec<&'static str> = sound.filter(is_near).map(|row| row.test).collect();
     near.sort_by_key(|name| SIMPLEST_FIRST.iter().position(|test| test.name() == *name));
     near
 }
@@ -252,26 +307,28 @@ mod tests {
     use super::*;
     use crate::index::Registry;
 
+    /// A query of about 100 ns in ten processes, each a little off.
     fn row(test: &'static str, query: f64, drawn: f64) -> TestRow {
+        let off = |n: usize| 1.0 + 0.01 * ((n * test.len()) % 7) as f64 - 0.03;
         TestRow {
             test,
             query_ns: Some(query),
-            query_ns_lower: Some(query * 0.9),
-            query_ns_upper: Some(query * 1.1),
+            query_ns_lower: None,
+            query_ns_upper: None,
             excess: None,
             false_negative_ppm: Some(0.0),
             false_positives_per_query: Some(drawn),
             total_ns: Some(query + drawn),
+            by_process: (0..10).map(|n| query * off(n)).collect(),
         }
     }
 
-    #[test]
-    fn region_search_within_the_noise_is_a_tie() {
-        let located = |structure: &str, locate_ns| StructureRow {
+    fn structure(structure: &str, query_ns: Option<f64>, locate_ns: Option<f64>) -> StructureRow {
+        StructureRow {
             structure: structure.to_owned(),
             status: "ok",
             reason: None,
-            query_ns: None,
+            query_ns,
             query_ns_lower: None,
             query_ns_upper: None,
             speedup: None,
@@ -280,41 +337,53 @@ mod tests {
             break_even_queries: None,
             locate_ns,
             is_failure: false,
-        };
-        let rows = [
-            located("bvh", Some(104.0)),
-            located("octree", None),
-            located("wide", Some(100.0)),
-            located("linear", Some(111.0)),
-        ];
-        assert_eq!(fastest_located(&rows, 0.05), ["wide", "bvh"]);
-        assert_eq!(fastest_located(&rows, 0.01), ["wide"]);
-        assert!(fastest_located(&rows[1..2], 0.05).is_empty());
+        }
     }
 
     #[test]
-    fn the_simplest_test_within_the_noise_is_taken() {
-        let of = |rows: &[TestRow]| near_the_least(rows, 0.05);
+    fn all_of_the_first_rank_tie_with_the_fastest() {
+        let rows = [
+            structure("bvh", Some(1.0), Some(104.0)),
+            structure("octree", Some(2.0), None),
+            structure("wide", Some(3.0), Some(100.0)),
+            structure("linear", Some(4.0), Some(111.0)),
+        ];
+        let rank = |row: &StructureRow| Some(if row.locate_ns? < 110.0 { 1 } else { 3 });
+        assert_eq!(
+            first_ranked(&rows, rank, |row| row.locate_ns),
+            ["wide", "bvh"]
+        );
+        assert!(first_ranked(&rows[1..2], rank, |row| row.locate_ns).is_empty());
+    }
+
+    #[test]
+    fn the_simplest_test_of_those_not_told_apart_is_taken() {
         let dear = row("sphere", 900.0, 5000.0);
         // A tie, and the simplest is not the least.
         let tie = [
             dear.clone(),
             row("exact", 100.0, 0.0),
-            row("six-plane", 105.0, 5.0),
+            row("six-plane", 99.9, 0.5),
         ];
-        assert_eq!(of(&tie), ["six-plane", "exact"]);
+        assert_eq!(near_the_least(&tie), ["six-plane", "exact"]);
+        // One process tells nothing apart: the least is taken.
+        let alone = tie.clone().map(|mut row| {
+            row.by_process.truncate(1);
+            row
+        });
+        assert_eq!(near_the_least(&alone), ["exact"]);
         // What is drawn counts.
         let clear = [
             dear.clone(),
             row("six-plane", 90.0, 500.0),
             row("six-box", 100.0, 2.0),
         ];
-        assert_eq!(of(&clear), ["six-box"]);
+        assert_eq!(near_the_least(&clear), ["six-box"]);
         // What misses something is out of the question.
         let mut blind = row("six-plane", 1.0, 0.0);
         blind.false_negative_ppm = Some(0.1);
-        assert_eq!(of(&[dear, blind]), ["sphere"]);
-        assert!(of(&[]).is_empty());
+        assert_eq!(near_the_least(&[dear, blind]), ["sphere"]);
+        assert!(near_the_least(&[]).is_empty());
     }
 
     #[test]
@@ -324,7 +393,6 @@ mod tests {
             ties: Vec::new(),
             region_search_ties: Vec::new(),
             region_search: None,
-            noise_floor: 0.0,
             rows: Vec::new(),
         };
         let structures = Registry::builtin()
@@ -333,22 +401,13 @@ mod tests {
         let label = |found: Result<StructureSpec, BuildError>| found.unwrap().label;
         assert_eq!(label(choice.tree(&structures)), "wide");
         assert_eq!(label(choice.scan(&structures)), "linear");
-        let row = |name: &str| StructureRow {
-            structure: name.to_owned(),
-            status: "ok",
-            reason: None,
-            query_ns: Some(1.0),
-            query_ns_lower: None,
-            query_ns_upper: None,
-            speedup: None,
-            build_ms: None,
-            memory_bytes_per_item: None,
-            break_even_queries: None,
-            locate_ns: None,
-            is_failure: false,
-        };
+        let row = |name: &str| structure(name, Some(1.0), None);
         choice.rows = vec![row("linear-scalar"), row("octree")];
         assert_eq!(label(choice.tree(&structures)), "octree");
         assert_eq!(label(choice.scan(&structures)), "linear-scalar");
+        // A plan names what was found, also what the list does not hold.
+        for name in ["octree", "linear-scalar", "wide", "linear"] {
+            assert_eq!(label(planned(&structures, name)), name);
+        }
     }
 }

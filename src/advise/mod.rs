@@ -9,20 +9,26 @@ mod omission;
 mod rules;
 mod trials;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 pub use choice::{StructureChoice, StructureRow, TestChoice, TestRow};
 pub use omission::{Check, Decision, LeftOutIf, Omission};
 
 use crate::culling::Culling;
-use crate::index::{BuildError, Kind, StructureSpec};
-use crate::measure::{Contender, Protocol, Workload, WorkloadError, measure_group};
+use crate::index::{BuildError, StructureSpec};
+use crate::measure::{
+    Contender, OverProcesses, ProcessTimes, Protocol, Schedule, Workload, WorkloadError,
+    measure_group, timed,
+};
 use crate::path::CameraPath;
 use crate::scene::Scene;
+use crate::statistics::Estimate;
 
 use case::Case;
+use choice::EnteredTest;
+use omission::Draft;
 use rules::RULES;
-use trials::Trials;
+use trials::{Answered, BASE, Entered, Trials};
 
 /// What the advice depends on beside scene and path.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
@@ -59,9 +65,11 @@ pub struct Advice {
     pub skipped_items: usize,
     pub cameras: usize,
     pub options: AdviseOptions,
-    /// How far apart a structure and its twin lie at most: smaller differences
-    /// of time are ties.
-    pub noise_floor: f64,
+    /// Processes that were timed; an interval needs three or more.
+    pub processes: usize,
+    /// Time of the tree that rules are forced on, entered a second time, / time of
+    /// itself: a check whose interval is to hold 1.
+    pub twin: Option<Estimate>,
     pub structure: StructureChoice,
     pub test: TestChoice,
     pub omissions: Vec<Omission>,
@@ -88,91 +96,251 @@ pub enum AdviseError {
     Workload(#[from] WorkloadError),
     #[error(transparent)]
     Build(#[from] BuildError),
+    #[error(
+        "{found} ways to answer; the plan has {planned}: the scene or the cameras have changed \
+         on the way"
+    )]
+    OtherPlan { found: usize, planned: usize },
 }
 
-/// Measures what the advice rests on; `None` if stopped. `progress` is told
-/// what comes next.
-///
-/// Every structure is verified and timed as a run does it; then every rule is
-/// forced on and off on the fastest tree, side by side in the same rounds, and
-/// both sides are compared with each other and with the exact truth.
+/// What all processes time: the plan is the same for each.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct TrialPlan {
+    /// The tree and the scan that rules are forced on.
+    structures: [String; 2],
+    schedule: Schedule,
+    /// By way and camera: ids.
+    expected: Vec<Vec<u64>>,
+}
+
+/// Both sides of every rule, asked, compared and judged, but not timed.
+pub struct Prepared {
+    pub plan: TrialPlan,
+    tests: Vec<EnteredTest>,
+    rules: Vec<Entered>,
+    twin: usize,
+    answered: Answered,
+    /// All but what follows from times.
+    advice: Advice,
+}
+
+/// What advice is given about, and how it is measured.
+#[derive(Clone, Copy)]
+pub struct AdviseInput<'a> {
+    pub scene: &'a Scene,
+    pub path: &'a CameraPath,
+    /// To choose from.
+    pub structures: &'a [StructureSpec],
+    pub options: &'a AdviseOptions,
+    pub protocol: &'a Protocol,
+}
+
+impl AdviseInput<'_> {
+    /// Whether there is anything to give advice about.
+    ///
+    /// # Errors
+    /// No items, no cameras.
+    pub fn check(&self) -> Result<(), AdviseError> {
+        if self.scene.items.is_empty() {
+            let scene = self.scene.name.clone();
+            return Err(AdviseError::NoItems { scene });
+        }
+        if self.path.cameras.is_empty() {
+            let path = self.path.name.clone();
+            return Err(AdviseError::NoCameras { path });
+        }
+        Ok(())
+    }
+}
+
+/// Measures what the advice rests on in this process alone: times without
+/// intervals. `None` if stopped; `progress` is told what comes next. With more
+/// processes: [`prepare`], [`time`] in each of them, [`Prepared::conclude`].
 ///
 /// # Errors
 /// Nothing to look at, a camera without a view, a scene that the structures of
 /// the rules refuse.
 pub fn advise(
-    scene: &Scene,
-    path: &CameraPath,
-    structures: &[StructureSpec],
-    options: &AdviseOptions,
-    protocol: &Protocol,
+    input: &AdviseInput,
     stop: &dyn Fn() -> bool,
     progress: &dyn Fn(&str),
 ) -> Result<Option<Advice>, AdviseError> {
-    if scene.items.is_empty() {
-        let scene = scene.name.clone();
-        return Err(AdviseError::NoItems { scene });
-    }
-    if path.cameras.is_empty() {
-        let path = path.name.clone();
-        return Err(AdviseError::NoCameras { path });
-    }
-    let culling = Culling::default();
-    let workload = Workload::new(scene, path, &culling)?;
+    input.check()?;
+    let (culling, scene) = (Culling::default(), input.scene);
+    let workload = Workload::new(scene, input.path, &culling)?;
     progress("every structure");
-    let contenders = entered(structures, scene, &culling);
-    let Some(group) = measure_group(&workload, &contenders, &[], protocol, stop) else {
+    let specs = input.structures.iter().cloned();
+    let contenders: Vec<Contender> = specs
+        .map(|spec| Contender::build(spec, false, scene, culling.test))
+        .collect();
+    let Some(group) = measure_group(&workload, &contenders, &[], input.protocol, stop) else {
         return Ok(None);
     };
-    drop(contenders);
-    let structure = StructureChoice::of(&group);
-    let specs = [structure.tree(structures)?, structure.scan(structures)?];
-    let case = Case::new(&workload, path, specs, options, protocol)?;
-    let mut trials = Trials::new(&case);
-    let mut drafts = Vec::with_capacity(RULES.len());
-    for rule in RULES {
-        if stop() {
-            return Ok(None);
-        }
-        progress(rule.name);
-        drafts.push((rule.prepare)(&case)?);
-    }
-    let tests = choice::enter_tests(&case, &mut trials)?;
-    let places: Vec<_> = drafts.iter_mut().map(|draft| trials.enter(draft)).collect();
+    drop((contenders, workload));
+    let choice = StructureChoice::of(&group);
+    let Some(prepared) = prepare(input, choice, stop, progress)? else {
+        return Ok(None);
+    };
     progress("every rule forced on and off");
-    let Some(timed) = trials.timed(stop) else {
+    let times = time(input, &prepared.plan, stop)?;
+    Ok(times.map(|times| prepared.conclude(&[times])))
+}
+
+/// Forces every rule on and off on the fastest tree, compares both sides with
+/// each other and with the exact truth, and plans how they are timed. `None` if
+/// stopped.
+///
+/// # Errors
+/// As [`advise`].
+pub fn prepare(
+    input: &AdviseInput,
+    structure: StructureChoice,
+    stop: &dyn Fn() -> bool,
+    progress: &dyn Fn(&str),
+) -> Result<Option<Prepared>, AdviseError> {
+    let AdviseInput {
+        scene,
+        path,
+        structures,
+        options,
+        protocol,
+    } = *input;
+    let workload = Workload::new(scene, path, &Culling::default())?;
+    let specs = [structure.tree(structures)?, structure.scan(structures)?];
+    let labels = specs.each_ref().map(|spec| spec.label.clone());
+    let case = Case::new(&workload, path, specs, options)?;
+    let Some(mut all) = Ways::enter(&case, stop, progress)? else {
         return Ok(None);
     };
-    let noise_floor = timed.noise_floor().max(structure.noise_floor);
-    let test = TestChoice::of(&case, &tests, &timed, noise_floor);
-    let settled = drafts.into_iter().zip(places).map(|(draft, places)| {
-        let checks = places.iter().map(|place| timed.check(place)).collect();
-        let mut omission = draft.settled(checks, noise_floor);
-        rules::follow_test(&mut omission, &test);
-        omission
-    });
-    let omissions = settled.collect();
-    Ok(Some(Advice {
-        scene: scene.name.clone(),
-        path: path.name.clone(),
-        items: scene.items.len(),
-        skipped_items: scene.skipped_items,
-        cameras: path.cameras.len(),
-        options: *options,
-        noise_floor,
-        structure,
-        test,
-        omissions,
+    progress("answers, checked");
+    let answered = all.trials.answered();
+    for rule in &mut all.rules {
+        all.trials.compare(rule);
+    }
+    let cameras = path.cameras.len();
+    let competitors = all.trials.competitors(&answered.counts);
+    Ok(Some(Prepared {
+        plan: TrialPlan {
+            structures: labels,
+            schedule: Schedule::new(cameras, &competitors, protocol),
+            expected: answered.counts.clone(),
+        },
+        advice: Advice {
+            scene: scene.name.clone(),
+            path: path.name.clone(),
+            items: scene.items.len(),
+            skipped_items: scene.skipped_items,
+            cameras,
+            options: *options,
+            processes: 0,
+            twin: None,
+            test: TestChoice::untimed(&case.spec.label),
+            structure,
+            omissions: Vec::new(),
+        },
+        tests: all.tests,
+        rules: all.rules,
+        twin: all.twin,
+        answered,
     }))
 }
 
-/// All structures, and the first that is no scan once more: the twin.
-fn entered(structures: &[StructureSpec], scene: &Scene, culling: &Culling) -> Vec<Contender> {
-    let proper = structures.iter().find(|s| s.info().kind != Kind::Scan);
-    let twin = proper.or(structures.first());
-    let once = structures.iter().map(|spec| (spec, false));
-    let entries = once.chain(twin.map(|spec| (spec, true)));
-    entries
-        .map(|(spec, is_twin)| Contender::build(spec.clone(), is_twin, scene, culling.test))
-        .collect()
+/// Times in this process what was planned; `None` if stopped.
+///
+/// # Errors
+/// As [`advise`]; another scene than the one that was planned for.
+pub fn time(
+    input: &AdviseInput,
+    plan: &TrialPlan,
+    stop: &dyn Fn() -> bool,
+) -> Result<Option<ProcessTimes>, AdviseError> {
+    let AdviseInput {
+        scene,
+        path,
+        structures,
+        options,
+        protocol,
+    } = *input;
+    let workload = Workload::new(scene, path, &Culling::default())?;
+    let [tree, scan] = &plan.structures;
+    let specs = [
+        choice::planned(structures, tree)?,
+        choice::planned(structures, scan)?,
+    ];
+    let case = Case::new(&workload, path, specs, options)?;
+    let Some(all) = Ways::enter(&case, stop, &|_| ())? else {
+        return Ok(None);
+    };
+    let (found, planned) = (all.trials.len(), plan.expected.len());
+    let cameras = plan.expected.iter().map(Vec::len);
+    if found != planned || cameras.min() != Some(path.cameras.len()) {
+        return Err(AdviseError::OtherPlan { found, planned });
+    }
+    let competitors = all.trials.competitors(&plan.expected);
+    let timed = timed(&competitors, &plan.schedule, protocol, stop);
+    Ok(timed.map(|timed| ProcessTimes {
+        once_ns: all.once_ns,
+        ..ProcessTimes::of(&timed)
+    }))
+}
+
+impl Prepared {
+    /// What follows from the times of all processes.
+    pub fn conclude(self, processes: &[ProcessTimes]) -> Advice {
+        let times = OverProcesses::of(processes);
+        let mut advice = self.advice;
+        advice.processes = processes.len();
+        advice.twin = times.ratio(self.twin, BASE);
+        let structure = std::mem::take(&mut advice.test.structure);
+        let draw_ns = advice.options.draw_ns;
+        advice.test = TestChoice::of(&structure, draw_ns, &self.tests, &self.answered, &times);
+        let settled = self.rules.into_iter().map(|rule| {
+            let mut omission = rule.settled(&self.answered, &times);
+            rules::follow_test(&mut omission, &advice.test);
+            omission
+        });
+        advice.omissions = settled.collect();
+        advice
+    }
+}
+
+/// Everything that is asked, in the order that all processes enter it.
+struct Ways<'c> {
+    trials: Trials<'c>,
+    tests: Vec<EnteredTest>,
+    rules: Vec<Entered>,
+    twin: usize,
+    once_ns: Vec<f64>,
+}
+
+impl<'c> Ways<'c> {
+    /// `None` if stopped.
+    fn enter(
+        case: &'c Case<'c>,
+        stop: &dyn Fn() -> bool,
+        progress: &dyn Fn(&str),
+    ) -> Result<Option<Self>, AdviseError> {
+        let mut drafts: Vec<Draft<'c>> = Vec::with_capacity(RULES.len());
+        for rule in RULES {
+            if stop() {
+                return Ok(None);
+            }
+            progress(rule.name);
+            drafts.push((rule.prepare)(case)?);
+        }
+        let mut trials = Trials::new(case);
+        let tests = choice::enter_tests(case, &mut trials)?;
+        let mut once_ns = Vec::new();
+        let drafts = drafts.into_iter();
+        let rules = drafts
+            .map(|draft| trials.enter(draft, &mut once_ns))
+            .collect();
+        Ok(Some(Ways {
+            twin: trials.add_base(),
+            trials,
+            tests,
+            rules,
+            once_ns,
+        }))
+    }
 }

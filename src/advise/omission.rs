@@ -76,11 +76,11 @@ pub(super) enum By {
 pub struct Check {
     /// What was asked, or done.
     pub on: String,
-    /// Mean over the cameras, median over the rounds, thread CPU time.
+    /// Mean over the cameras, thread CPU time, over the processes as in a run.
     pub kept_ns: f64,
     pub left_out_ns: f64,
-    /// Time with it / time without, paired by round: above 1, leaving out is
-    /// faster. Interval of 95 %.
+    /// Time with it / time without: above 1, leaving out is faster. With its 95 %
+    /// interval over the processes; NaN where there is none.
     pub ratio: f64,
     pub ratio_lower: f64,
     pub ratio_upper: f64,
@@ -98,6 +98,10 @@ pub struct Check {
     pub(super) errors: Option<[ErrorCount; 2]>,
     #[serde(skip)]
     pub(super) judged: usize,
+    /// Whether leaving out is faster; `None` if the processes do not tell the two
+    /// sides apart.
+    #[serde(skip)]
+    pub(super) pays: Option<bool>,
 }
 
 impl Check {
@@ -110,14 +114,6 @@ impl Check {
     fn loses(&self) -> bool {
         self.errors
             .is_some_and(|[kept, left]| left.false_negatives > kept.false_negatives)
-    }
-
-    /// What the clock says of leaving out, beyond the noise: `None` is a tie.
-    fn pays(&self, floor: f64) -> Option<bool> {
-        if self.ratio_lower > 1.0 + floor {
-            return Some(true);
-        }
-        (self.ratio_upper * (1.0 + floor) < 1.0).then_some(false)
     }
 
     /// False positives a query more when it is left out, mean.
@@ -147,15 +143,27 @@ pub(super) struct Forced<'c> {
     pub judged: bool,
 }
 
-/// Completes an omission from its checks.
-pub(super) type Finish<'c> = Box<dyn FnOnce(&mut Omission) + 'c>;
+/// Times of a rule beside its checks, over the processes.
+#[derive(Default)]
+pub(super) struct Aside {
+    /// Of [`Draft::pairs`]: time of the first / time of the second.
+    pub ratios: Vec<f64>,
+    /// Of [`Draft::once_ns`].
+    pub once_ns: Vec<f64>,
+}
+
+/// Completes an omission from its checks and from what was timed beside them.
+pub(super) type Finish = Box<dyn FnOnce(&mut Omission, &Aside)>;
 
 /// An omission before the clock.
 pub(super) struct Draft<'c> {
     pub omission: Omission,
-    /// Taken when it is entered into the trials.
     pub forced: Vec<Forced<'c>>,
-    pub finish: Option<Finish<'c>>,
+    /// Further ways that are compared, two by two.
+    pub pairs: Vec<[Way<'c>; 2]>,
+    /// CPU time of what is done once: taken by every process while it prepares.
+    pub once_ns: Vec<f64>,
+    pub finish: Option<Finish>,
 }
 
 impl Omission {
@@ -207,43 +215,51 @@ impl Omission {
         Draft {
             omission: self,
             forced,
+            pairs: Vec::new(),
+            once_ns: Vec::new(),
             finish: None,
         }
     }
 }
 
-impl<'c> Draft<'c> {
-    pub(super) fn finished_by(mut self, finish: impl FnOnce(&mut Omission) + 'c) -> Self {
+impl Draft<'_> {
+    pub(super) fn finished_by(
+        mut self,
+        finish: impl FnOnce(&mut Omission, &Aside) + 'static,
+    ) -> Self {
         self.finish = Some(Box::new(finish));
         self
-    }
-
-    /// What follows from the rule and from what was measured.
-    pub(super) fn settled(self, checks: Vec<Check>, floor: f64) -> Omission {
-        let mut omission = self.omission;
-        omission.checks = checks;
-        if let Some(check) = omission.checks.first() {
-            omission.saving = Some(1.0 - 1.0 / check.ratio).filter(|saving| saving.is_finite());
-        }
-        if let Some(finish) = self.finish {
-            finish(&mut omission);
-        }
-        omission.decide(floor);
-        omission
     }
 }
 
 impl Omission {
-    fn decide(&mut self, floor: f64) {
+    /// What follows from the rule and from what was measured.
+    pub(super) fn settled(
+        mut self,
+        checks: Vec<Check>,
+        aside: &Aside,
+        finish: Option<Finish>,
+    ) -> Omission {
+        self.checks = checks;
+        if let Some(check) = self.checks.first() {
+            self.saving = Some(1.0 - 1.0 / check.ratio).filter(|saving| saving.is_finite());
+        }
+        if let Some(finish) = finish {
+            finish(&mut self, aside);
+        }
+        self.decide();
+        self
+    }
+
+    fn decide(&mut self) {
         let Some(predicted) = self.predicted else {
             return;
         };
         let mut leave_out = predicted;
         if let Some(check) = self.checks.first() {
-            let pays = check.pays(floor);
             if self.by == By::Time {
-                self.confirmed = pays.map(|pays| pays == predicted);
-                leave_out = pays.unwrap_or(predicted);
+                self.confirmed = check.pays.map(|pays| pays == predicted);
+                leave_out = check.pays.unwrap_or(predicted);
             }
             if check.loses() || check.is_wrong() {
                 leave_out = false;
@@ -259,18 +275,18 @@ impl Omission {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
     use super::*;
 
-    /// Ten queries' worth of a check with such an interval of its ratio.
-    pub fn check([ratio_lower, ratio, ratio_upper]: [f64; 3]) -> Check {
+    /// A check with such a ratio, and what the clock says of leaving out.
+    fn check(ratio: f64, pays: Option<bool>) -> Check {
         Check {
             on: "wide".to_owned(),
             kept_ns: ratio * 100.0,
             left_out_ns: 100.0,
             ratio,
-            ratio_lower,
-            ratio_upper,
+            ratio_lower: f64::NAN,
+            ratio_upper: f64::NAN,
             same_answers: true,
             same_expected: true,
             kept_excess: None,
@@ -279,39 +295,36 @@ pub(super) mod tests {
             left_out_false_negative_ppm: None,
             errors: None,
             judged: 10,
+            pays,
         }
     }
 
     fn settled(by: By, statistic: f64, check: Check) -> Omission {
         let rule = Omission::new("rule", "something", "its size", LeftOutIf::AtMost, by);
-        let draft = rule.compares(statistic, 1.0).draft(Vec::new());
-        draft.settled(vec![check], 0.1)
+        let rule = rule.compares(statistic, 1.0);
+        rule.settled(vec![check], &Aside::default(), None)
     }
 
     #[test]
-    fn the_clock_decides_beyond_the_noise_and_the_rule_within() {
-        let (faster, slower) = ([1.2, 1.5, 1.8], [0.5, 0.6, 0.8]);
-        let ties = [[1.05, 1.2, 1.4], [0.7, 0.9, 0.95], [0.8, 1.0, 1.3]];
+    fn the_clock_decides_where_it_can_and_the_rule_where_it_cannot() {
         let (small, large) = (0.5, 2.0);
-        let of = |statistic, interval| {
-            let omission = settled(By::Time, statistic, check(interval));
+        let of = |statistic, pays| {
+            let omission = settled(By::Time, statistic, check(1.2, pays));
             (omission.decision, omission.confirmed)
         };
-        assert_eq!(of(small, faster), (Decision::LeaveOut, Some(true)));
-        assert_eq!(of(large, faster), (Decision::LeaveOut, Some(false)));
-        assert_eq!(of(small, slower), (Decision::Keep, Some(false)));
-        assert_eq!(of(large, slower), (Decision::Keep, Some(true)));
-        for tie in ties {
-            assert_eq!(of(small, tie), (Decision::LeaveOut, None), "{tie:?}");
-            assert_eq!(of(large, tie), (Decision::Keep, None), "{tie:?}");
-        }
+        assert_eq!(of(small, Some(true)), (Decision::LeaveOut, Some(true)));
+        assert_eq!(of(large, Some(true)), (Decision::LeaveOut, Some(false)));
+        assert_eq!(of(small, Some(false)), (Decision::Keep, Some(false)));
+        assert_eq!(of(large, Some(false)), (Decision::Keep, Some(true)));
+        assert_eq!(of(small, None), (Decision::LeaveOut, None));
+        assert_eq!(of(large, None), (Decision::Keep, None));
     }
 
     #[test]
     fn where_more_than_time_differs_the_rule_decides() {
         for (statistic, wanted) in [(0.5, Decision::LeaveOut), (2.0, Decision::Keep)] {
-            for interval in [[1.2, 1.5, 1.8], [0.5, 0.6, 0.8]] {
-                let omission = settled(By::Rule, statistic, check(interval));
+            for pays in [true, false] {
+                let omission = settled(By::Rule, statistic, check(1.5, Some(pays)));
                 assert_eq!((omission.decision, omission.confirmed), (wanted, None));
             }
         }
@@ -323,9 +336,9 @@ pub(super) mod tests {
             false_negatives,
             ..ErrorCount::default()
         };
-        let mut blind = check([5.0, 6.0, 7.0]);
+        let mut blind = check(6.0, Some(true));
         blind.errors = Some([count(1), count(2)]);
-        let mut other = check([5.0, 6.0, 7.0]);
+        let mut other = check(6.0, Some(true));
         other.same_answers = false;
         for check in [blind, other] {
             for by in [By::Time, By::Rule] {
@@ -334,7 +347,7 @@ pub(super) mod tests {
                 assert!(omission.reason.contains("missed"));
             }
         }
-        let mut equally_blind = check([5.0, 6.0, 7.0]);
+        let mut equally_blind = check(6.0, Some(true));
         equally_blind.errors = Some([count(2), count(2)]);
         let omission = settled(By::Time, 0.5, equally_blind);
         assert_eq!(omission.decision, Decision::LeaveOut);
@@ -343,7 +356,7 @@ pub(super) mod tests {
     #[test]
     fn a_rule_without_a_statistic_says_nothing() {
         let rule = Omission::new("rule", "x", "y", LeftOutIf::AtLeast, By::Time);
-        let omission = rule.draft(Vec::new()).settled(Vec::new(), 0.0);
+        let omission = rule.settled(Vec::new(), &Aside::default(), None);
         assert_eq!(omission.decision, Decision::NotApplicable);
         assert_eq!((omission.predicted, omission.saving), (None, None));
         // An infinite threshold is none that can be written, but compares.
@@ -354,7 +367,7 @@ pub(super) mod tests {
 
     #[test]
     fn the_saving_is_the_share_of_the_time() {
-        let omission = settled(By::Time, 0.5, check([3.9, 4.0, 4.1]));
+        let omission = settled(By::Time, 0.5, check(4.0, Some(true)));
         assert_eq!(omission.saving, Some(0.75));
     }
 }

@@ -1,36 +1,50 @@
-//! All ways to answer that the rules and the choice of a test need, asked once
-//! to be compared and judged, then timed side by side in the same rounds. What
-//! the figures mean is decided elsewhere.
+//! All ways to answer that the rules and the choice of a test need. They are
+//! entered in the same order in every process; asked, compared and judged in one,
+//! timed side by side in all. What the figures mean is decided elsewhere.
 
 use super::case::Case;
-use super::omission::{Check, Draft, Forced, Way};
-use crate::measure::{Ask, Competitor, Timed, Verdict, paired_ratio, timed_rounds};
+use super::omission::{Aside, Check, Draft, Finish, Omission, Way};
+use crate::measure::{Ask, Competitor, OverProcesses};
 use crate::query::ItemId;
-use crate::statistics::{Estimate, bootstrap_median};
+use crate::statistics::Estimate;
 use crate::verify::{ErrorCount, Trial};
 
-/// The place of [`Way::Base`]; its twin comes last.
-const BASE: usize = 0;
+/// The place of [`Way::Base`].
+pub(super) const BASE: usize = 0;
 
 pub(super) struct Trials<'c> {
     case: &'c Case<'c>,
     asks: Vec<Ask<'c>>,
-    answered: Vec<Answered>,
+    /// By place: whether the truth judges it.
+    judged: Vec<bool>,
 }
 
-/// What one way has answered.
-struct Answered {
-    counts: Vec<u64>,
-    errors: Option<ErrorCount>,
+/// A rule whose ways are entered, waiting for its times.
+pub(super) struct Entered {
+    omission: Omission,
+    checks: Vec<Place>,
+    pairs: Vec<[usize; 2]>,
+    /// Where its [`Draft::once_ns`] are among those of all rules.
+    once: std::ops::Range<usize>,
+    finish: Option<Finish>,
 }
 
-/// A check that waits for its times.
-pub(super) struct Place {
+/// The places of the two sides of a check.
+struct Place {
     on: String,
     kept: usize,
     left_out: usize,
-    same: bool,
+    same_expected: bool,
     same_answers: bool,
+}
+
+/// What all ways have answered.
+pub(super) struct Answered {
+    /// By place and camera: ids.
+    pub counts: Vec<Vec<u64>>,
+    errors: Vec<Option<ErrorCount>>,
+    /// Cameras behind the errors.
+    pub judged: usize,
 }
 
 impl<'c> Trials<'c> {
@@ -38,34 +52,25 @@ impl<'c> Trials<'c> {
         let mut trials = Trials {
             case,
             asks: Vec::new(),
-            answered: Vec::new(),
+            judged: Vec::new(),
         };
-        trials.add(base(case), true);
+        trials.add_base();
         trials
     }
 
-    /// Asks every camera once; the place of the way.
+    /// What all else is compared with, or that once more; its place.
+    pub fn add_base(&mut self) -> usize {
+        let (index, views) = (self.case.index.as_ref(), &self.case.workload.views);
+        self.add(
+            Box::new(move |n, out| index.see(views[n].as_any(), out)),
+            true,
+        )
+    }
+
+    /// The place of the way.
     pub fn add(&mut self, ask: Ask<'c>, judged: bool) -> usize {
-        let case = self.case;
-        let mut answered = Answered {
-            counts: Vec::with_capacity(case.workload.views.len()),
-            errors: judged.then(ErrorCount::default),
-        };
-        let mut truths = case.truths.iter().peekable();
-        let mut out: Vec<ItemId> = Vec::new();
-        for frame in 0..case.workload.views.len() {
-            out.clear();
-            ask(frame, &mut out);
-            answered.counts.push(out.len() as u64);
-            if let (Some(errors), Some((_, truth))) = (
-                &mut answered.errors,
-                truths.next_if(|(judged, _)| *judged == frame),
-            ) {
-                *errors += truth.errors(&case.scene().items, &out);
-            }
-        }
         self.asks.push(ask);
-        self.answered.push(answered);
+        self.judged.push(judged);
         self.asks.len() - 1
     }
 
@@ -76,134 +81,140 @@ impl<'c> Trials<'c> {
         }
     }
 
-    /// Enters both sides of every check of a rule.
-    pub fn enter(&mut self, draft: &mut Draft<'c>) -> Vec<Place> {
-        let forced = std::mem::take(&mut draft.forced);
-        let entered = forced.into_iter().map(|forced| {
-            let Forced {
-                on,
-                kept,
-                left_out,
-                same,
-                judged,
-            } = forced;
-            let (kept, left_out) = (self.place(kept, judged), self.place(left_out, judged));
-            Place {
-                same_answers: self.same_answers(kept, left_out),
-                on,
-                kept,
-                left_out,
-                same,
-            }
+    /// Enters all ways of a rule; `once_ns` are those of the rules before.
+    pub fn enter(&mut self, draft: Draft<'c>, once_ns: &mut Vec<f64>) -> Entered {
+        let checks = draft.forced.into_iter().map(|forced| Place {
+            on: forced.on,
+            kept: self.place(forced.kept, forced.judged),
+            left_out: self.place(forced.left_out, forced.judged),
+            same_expected: forced.same,
+            same_answers: false,
         });
-        entered.collect()
+        let checks = checks.collect();
+        let pairs = draft.pairs.into_iter();
+        let first = once_ns.len();
+        once_ns.extend(draft.once_ns);
+        Entered {
+            omission: draft.omission,
+            checks,
+            pairs: pairs
+                .map(|pair| pair.map(|way| self.place(way, false)))
+                .collect(),
+            once: first..once_ns.len(),
+            finish: draft.finish,
+        }
+    }
+
+    /// Asks every camera once, and judges.
+    pub fn answered(&self) -> Answered {
+        let cameras = self.case.workload.views.len();
+        let truths = self.case.truths();
+        let mut answered = Answered {
+            counts: Vec::with_capacity(self.asks.len()),
+            errors: Vec::with_capacity(self.asks.len()),
+            judged: truths.len(),
+        };
+        let mut out: Vec<ItemId> = Vec::new();
+        for (ask, &judged) in self.asks.iter().zip(&self.judged) {
+            let mut errors = judged.then(ErrorCount::default);
+            let mut truths = truths.iter().peekable();
+            let counts = (0..cameras).map(|camera| {
+                out.clear();
+                ask(camera, &mut out);
+                let truth = truths.next_if(|(judged, _)| *judged == camera);
+                if let (Some(errors), Some((_, truth))) = (&mut errors, truth) {
+                    *errors += truth.errors(&self.case.scene().items, &out);
+                }
+                out.len() as u64
+            });
+            answered.counts.push(counts.collect());
+            answered.errors.push(errors);
+        }
+        answered
+    }
+
+    /// Finds out which sides of a rule answer the same.
+    pub fn compare(&self, entered: &mut Entered) {
+        for check in &mut entered.checks {
+            check.same_answers = self.same_answers(check.kept, check.left_out);
+        }
     }
 
     fn same_answers(&self, a: usize, b: usize) -> bool {
         let mut trial = Trial::new(self.case.scene().items.len());
         let mut first = Vec::new();
-        (0..self.case.workload.views.len()).all(|frame| {
+        (0..self.case.workload.views.len()).all(|camera| {
             first.clear();
-            (self.asks[a])(frame, &mut first);
+            (self.asks[a])(camera, &mut first);
             trial.expect(first.iter().copied());
-            trial.ask(|out| (self.asks[b])(frame, out)).is_ok()
+            trial.ask(|out| (self.asks[b])(camera, out)).is_ok()
         })
     }
 
-    /// Times everything; `None` if stopped.
-    pub fn timed(self, stop: &dyn Fn() -> bool) -> Option<Times> {
-        let Trials {
-            case,
-            mut asks,
-            answered,
-        } = self;
-        asks.push(base(case));
-        let places = (0..answered.len()).chain([BASE]);
-        let competitors = asks.into_iter().zip(places).map(|(ask, place)| Competitor {
+    /// All ways, ready to be timed.
+    pub fn competitors(self, counts: &[Vec<u64>]) -> Vec<Competitor<'c>> {
+        let asks = self.asks.into_iter().zip(counts);
+        let competitor = |(ask, counts): (Ask<'c>, &Vec<u64>)| Competitor {
             ask,
             ask_many: None,
-            expected: answered[place].counts.clone(),
+            expected: counts.clone(),
             least_ns: None,
-        });
-        let competitors: Vec<Competitor> = competitors.collect();
-        let count = case.workload.views.len();
-        let mut timed = timed_rounds(count, &competitors, &case.protocol, stop)?;
-        let twin = timed.pop();
-        Some(Times {
-            timed,
-            twin,
-            errors: answered.iter().map(|a| a.errors).collect(),
-            judged: case.truths.len(),
-        })
+        };
+        asks.map(competitor).collect()
+    }
+
+    pub fn len(&self) -> usize {
+        self.asks.len()
     }
 }
 
-fn base<'c>(case: &'c Case<'c>) -> Ask<'c> {
-    let (index, views) = (case.index.as_ref(), &case.workload.views);
-    Box::new(move |n, out| index.see(views[n].as_any(), out))
+impl Entered {
+    /// What follows from the times.
+    pub fn settled(self, answered: &Answered, times: &OverProcesses) -> Omission {
+        let ratio = |[a, b]: &[usize; 2]| times.ratio(*a, *b).map_or(f64::NAN, |r| r.value);
+        let aside = Aside {
+            ratios: self.pairs.iter().map(ratio).collect(),
+            once_ns: self.once.map(|i| times.once_ns(i)).collect(),
+        };
+        let checks = self.checks.into_iter();
+        let checks = checks.map(|check| check.timed(answered, times)).collect();
+        self.omission.settled(checks, &aside, self.finish)
+    }
 }
 
-/// What the clock said.
-pub(super) struct Times {
-    timed: Vec<Result<Timed, Verdict>>,
-    twin: Option<Result<Timed, Verdict>>,
-    errors: Vec<Option<ErrorCount>>,
-    /// Cameras behind the errors.
-    pub judged: usize,
-}
-
-impl Times {
-    /// How far the interval of the twin's ratio reaches from 1.
-    pub fn noise_floor(&self) -> f64 {
-        let twin = self.twin.as_ref().and_then(|twin| twin.as_ref().ok());
-        let ratio = twin.and_then(|twin| paired_ratio(self.timed[BASE].as_ref().ok()?, twin));
-        ratio.map_or(0.0, |r| (r.upper - 1.0).abs().max((r.lower - 1.0).abs()))
-    }
-
-    /// Time of a query of the way at that place.
-    pub fn query(&self, place: usize) -> Option<Estimate> {
-        bootstrap_median(
-            &self.timed[place].as_ref().ok()?.round_means(|s| s.cpu_ns),
-            1,
-        )
-    }
-
-    pub fn errors(&self, place: usize) -> Option<ErrorCount> {
-        self.errors[place]
-    }
-
+impl Place {
     /// NaN where something could not be timed: a panic on the way.
-    pub fn check(&self, place: &Place) -> Check {
-        let of = |side: usize| self.query(side).map_or(f64::NAN, |e| e.value);
-        let sides = [place.kept, place.left_out];
-        let ratio = match sides.map(|side| self.timed[side].as_ref().ok()) {
-            [Some(kept), Some(left_out)] => paired_ratio(kept, left_out),
-            _ => None,
-        };
-        let nothing = Estimate {
-            value: f64::NAN,
-            lower: f64::NAN,
-            upper: f64::NAN,
-        };
-        let ratio = ratio.unwrap_or(nothing);
-        let [kept, left_out] = sides.map(|side| self.errors[side]);
+    fn timed(self, answered: &Answered, times: &OverProcesses) -> Check {
+        let of = |side: usize| times.ns(side).map_or(f64::NAN, |found| found.value);
+        let ratio = times.ratio(self.kept, self.left_out);
+        let ratio = |part: fn(&Estimate) -> f64| ratio.as_ref().map_or(f64::NAN, part);
+        let [kept, left_out] = [self.kept, self.left_out].map(|side| answered.errors[side]);
         let excess = |errors: Option<ErrorCount>| errors.and_then(|e| e.excess());
         let missed = |errors: Option<ErrorCount>| errors.and_then(|e| e.false_negative_ppm());
+        let faster = times.is_faster(self.left_out, self.kept);
+        let slower = times.is_faster(self.kept, self.left_out);
         Check {
-            on: place.on.clone(),
-            kept_ns: of(place.kept),
-            left_out_ns: of(place.left_out),
-            ratio: ratio.value,
-            ratio_lower: ratio.lower,
-            ratio_upper: ratio.upper,
-            same_answers: place.same_answers,
-            same_expected: place.same,
+            kept_ns: of(self.kept),
+            left_out_ns: of(self.left_out),
+            ratio: ratio(|r| r.value),
+            ratio_lower: ratio(|r| r.lower),
+            ratio_upper: ratio(|r| r.upper),
+            same_answers: self.same_answers,
+            same_expected: self.same_expected,
             kept_excess: excess(kept),
             left_out_excess: excess(left_out),
             kept_false_negative_ppm: missed(kept),
             left_out_false_negative_ppm: missed(left_out),
             errors: kept.zip(left_out).map(|(kept, left)| [kept, left]),
-            judged: self.judged,
+            judged: answered.judged,
+            pays: (faster || slower).then_some(faster),
+            on: self.on,
         }
+    }
+}
+
+impl Answered {
+    pub fn errors(&self, place: usize) -> Option<ErrorCount> {
+        self.errors[place]
     }
 }

@@ -6,51 +6,93 @@ use std::io::{self, Write};
 use std::time::Duration;
 
 use anyhow::bail;
-use indicatif::ProgressBar;
+use tempfile::NamedTempFile;
 
 use super::args::{AdviseArgs, TableFormat};
+use super::processes::{Said, Workers};
+use super::protocol::{Job, Timing};
+use super::run::progress;
+use super::run_resume::typed_args;
 use super::{Ending, interrupt, load_scene, text, unread_is_fine};
 use crate::advise::{
-    Advice, AdviseOptions, Check, Decision, LeftOutIf, Omission, StructureChoice, TestChoice,
-    advise as advice_for,
+    self, Advice, AdviseInput, AdviseOptions, Check, Decision, LeftOutIf, Omission,
+    StructureChoice, TestChoice, TrialPlan,
 };
+use crate::culling::Culling;
 use crate::index::Registry;
-use crate::measure::{Machine, Protocol, cameras_within};
+use crate::measure::{
+    Effort, Group, Part, Plan, PlannedScene, ProcessTimes, Protocol, Share, cameras_within,
+};
 use crate::path;
+use crate::scene::{self, LoadOptions};
+use crate::statistics::Estimate;
+
+/// Rounds of a task, if one process has them all.
+const ROUNDS: [usize; 2] = [5, 25];
 
 pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> {
     let options = options(args)?;
-    let structures = args.kernel.structures(registry, &args.structure)?;
-    let defaults = args.lens.defaults()?;
-    let scene = load_scene(&args.scene, &args.scene_args, structures.len())?;
-    let path = path::load(&args.path, &scene, &defaults)?;
-    interrupt::from_now_on_finish();
-    let bar = ProgressBar::new_spinner();
-    bar.enable_steady_tick(Duration::from_millis(200));
-    let protocol = Protocol {
-        rounds: [5, 25],
-        task_ns: 150e6,
-        cameras: cameras_within(100e6, scene.items.len()),
-        cold: false,
-        seed: args.seed,
-        cache_bytes: Machine::capture().cache_sweep_bytes(),
+    let plan = plan(registry, args)?;
+    let scene = load_scene(&args.scene, &args.scene_args, plan.structures.len())?;
+    let path = path::load(&args.path, &scene, &plan.lens)?;
+    let protocol = protocol(args, &plan.effort, 0, scene.items.len());
+    let input = AdviseInput {
+        scene: &scene,
+        path: &path,
+        structures: &plan.structures,
+        options: &options,
+        protocol: &protocol,
     };
-    let advice = advice_for(
-        &scene,
-        &path,
-        &structures,
-        &options,
-        &protocol,
-        &interrupt::asked,
-        &|next| {
-            let job = format!("{}, {}: {next}", args.scene, args.path);
-            bar.set_message(text::plain(&job));
-        },
-    )?;
-    bar.finish_and_clear();
-    let Some(advice) = advice else {
+    input.check()?;
+    interrupt::from_now_on_finish();
+    let workers = Workers::new(typed_args()?, Duration::MAX, &NamedTempFile::new)?;
+    let processes = plan.effort.processes;
+    let bar = progress(2 * u64::from(processes));
+    let job = |next: &str| {
+        let job = format!("{}, {}: {next}", args.scene, args.path);
+        bar.set_message(text::plain(&job));
+    };
+    let mut parts: Vec<Part> = Vec::new();
+    for process in 0..processes {
+        let share = Share {
+            process,
+            known: vec![parts.first().and_then(|first| first.known.clone())],
+            ..Share::first(1)
+        };
+        let scene = Job::Scene {
+            scene: 0,
+            share,
+            samples: false,
+        };
+        let Some(found) = workers.found(process, scene, &job)? else {
+            return Ok(Ending::Interrupted);
+        };
+        parts.extend(found.into_iter().filter_map(|said| match said {
+            Said::Part(part, _) => Some(*part),
+            _ => None,
+        }));
+        bar.inc(1);
+    }
+    let choice = StructureChoice::of(&Group::of(&parts));
+    let Some(prepared) = advise::prepare(&input, choice, &interrupt::asked, &job)? else {
         return Ok(Ending::Interrupted);
     };
+    let trials = |process| {
+        let timing = Timing {
+            process,
+            lens_scale: path.lens_scale,
+        };
+        Job::Trials(prepared.plan.clone(), timing)
+    };
+    let step = |process: u32, _: &str| {
+        bar.set_position(u64::from(processes + process));
+        job("every rule forced on and off");
+    };
+    let Some(times) = workers.times(processes, trials, &step)? else {
+        return Ok(Ending::Interrupted);
+    };
+    bar.finish_and_clear();
+    let advice = prepared.conclude(&times);
     unread_is_fine(match args.format {
         TableFormat::Json => show_json(&advice),
         TableFormat::Table => show(&advice),
@@ -59,6 +101,53 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> 
         true => Ending::WrongAnswer,
         false => Ending::Ok,
     })
+}
+
+/// How structures are measured before rules are: as a run does it.
+pub fn plan(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Plan> {
+    Ok(Plan {
+        scenes: vec![PlannedScene {
+            source: args.scene.clone(),
+            paths: vec![args.path.clone()],
+            caches: vec![false],
+        }],
+        structures: args.kernel.structures(registry, &args.structure)?,
+        cullings: vec![Culling::default()],
+        lens: args.lens.defaults()?,
+        load: LoadOptions {
+            skip_bad_items: args.scene_args.skip_bad_items,
+            structures: 0,
+        },
+        effort: args.spread.effort(ROUNDS),
+        bounds: false,
+        seed: args.spread.seed,
+    })
+}
+
+fn protocol(args: &AdviseArgs, effort: &Effort, process: u32, items: usize) -> Protocol {
+    let cameras = cameras_within(effort.pass_ns, items);
+    args.spread.protocol(effort, process, cameras)
+}
+
+/// One process's share of the trials.
+pub fn time(
+    registry: &Registry,
+    args: &AdviseArgs,
+    trials: &TrialPlan,
+    timing: &Timing,
+    stop: &dyn Fn() -> bool,
+) -> anyhow::Result<Option<ProcessTimes>> {
+    let plan = plan(registry, args)?;
+    let scene = scene::load(&args.scene, &plan.load)?;
+    let path = path::load_scaled(&args.path, &scene, &plan.lens, timing.lens_scale)?;
+    let input = AdviseInput {
+        scene: &scene,
+        path: &path,
+        structures: &plan.structures,
+        options: &options(args)?,
+        protocol: &protocol(args, &plan.effort, timing.process, scene.items.len()),
+    };
+    Ok(advise::time(&input, trials, stop)?)
 }
 
 /// The options, each in its range.
@@ -100,12 +189,12 @@ fn show(advice: &Advice) -> io::Result<()> {
     let mut out = text::terminal();
     writeln!(
         out,
-        "{}: {}; {}: {}; noise floor {}",
+        "{}: {}; {}: {}; {}",
         text::plain(&advice.scene),
         text::counted(advice.items, "item"),
         text::plain(&advice.path),
         text::counted(advice.cameras, "camera"),
-        text::percent(advice.noise_floor)
+        text::over(advice.processes, advice.twin.as_ref())
     )?;
     writeln!(out, "\nStructures, all answers checked:")?;
     writeln!(out, "{}", structure_table(&advice.structure))?;
@@ -125,7 +214,8 @@ fn show(advice: &Advice) -> io::Result<()> {
     writeln!(
         out,
         "A rule leaves out on its side of the threshold; where both sides answer the same, the clock\n\
-         decides beyond the noise floor. Kept / left out above 1: leaving out is faster."
+         decides if a paired test over the processes tells them apart. Kept / left out above 1:\n\
+         leaving out is faster."
     )?;
     for omission in &advice.omissions {
         let contradicted = match omission.confirmed {
@@ -197,7 +287,7 @@ fn ties<S: AsRef<str>>(names: &[S]) -> String {
 fn structure_table(choice: &StructureChoice) -> text::Table {
     let header = [
         "structure",
-        "query median [95 % interval]",
+        "query [95 % interval]",
         "times linear",
         "build",
         "B/item",
@@ -210,7 +300,7 @@ fn structure_table(choice: &StructureChoice) -> text::Table {
         let show = |value: Option<f64>, how: fn(f64) -> String| value.map(how).unwrap_or_default();
         table.add_row([
             row.structure.clone(),
-            interval(row.query_ns, row.query_ns_lower, row.query_ns_upper),
+            text::time_within(row.query_ns, [row.query_ns_lower, row.query_ns_upper]),
             show(row.speedup, text::significant),
             show(row.build_ms, |ms| text::time(ms * 1e6)),
             show(row.memory_bytes_per_item, |bytes| format!("{bytes:.1}")),
@@ -220,18 +310,6 @@ fn structure_table(choice: &StructureChoice) -> text::Table {
         ]);
     }
     table
-}
-
-fn interval(value: Option<f64>, lower: Option<f64>, upper: Option<f64>) -> String {
-    match (value, lower, upper) {
-        (Some(value), Some(lower), Some(upper)) => format!(
-            "{} [{}, {}]",
-            text::time(value),
-            text::time(lower),
-            text::time(upper)
-        ),
-        _ => String::new(),
-    }
 }
 
 fn test_table(choice: &TestChoice) -> text::Table {
@@ -255,7 +333,7 @@ fn test_table(choice: &TestChoice) -> text::Table {
             }
             .to_owned(),
             row.test.to_owned(),
-            interval(row.query_ns, row.query_ns_lower, row.query_ns_upper),
+            text::time_within(row.query_ns, [row.query_ns_lower, row.query_ns_upper]),
             show(row.excess, |share| format!("{:.3}", share * 100.0)),
             show(row.false_negative_ppm, text::significant),
             show(row.false_positives_per_query, text::significant),
@@ -320,12 +398,11 @@ fn check_cells(check: &Check) -> [String; 6] {
         check.on.clone(),
         text::time(check.kept_ns),
         text::time(check.left_out_ns),
-        format!(
-            "{} [{}, {}]",
-            text::significant(check.ratio),
-            text::significant(check.ratio_lower),
-            text::significant(check.ratio_upper)
-        ),
+        text::within(&Estimate {
+            value: check.ratio,
+            lower: check.ratio_lower,
+            upper: check.ratio_upper,
+        }),
         both.map(|(kept, left_out)| format!("{kept} / {left_out}"))
             .unwrap_or_default(),
         match (check.same_answers, check.is_wrong(), missed) {

@@ -13,9 +13,9 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use super::interrupt;
-use super::processes::{Ended, Said, Worker, see_through};
+use super::processes::{Ended, Said, Worker, processors, see_through};
+use super::protocol::{Job, PROTOCOL, Request};
 use super::run_plan::RunPlan;
-use super::worker::{PROTOCOL, Request, processors};
 use crate::measure::{GroupKey, Known, Part, Share, Status, Task, Verdict};
 use crate::statistics::{Judgement, interquartile_mean, judge, resolved, trimmed_mean};
 
@@ -116,12 +116,13 @@ impl Duel<'_> {
                     program,
                     &request,
                     self.patience,
-                    &mut |part, _| {
-                        own.parts.push(part);
+                    &mut |said| {
+                        if let Said::Part(part, _) = said {
+                            own.parts.push(*part);
+                        }
                         Ok(())
                     },
                     &|_| (),
-                    &interrupt::asked,
                 )?;
                 match ended {
                     Ended::Done => {}
@@ -230,16 +231,18 @@ impl Duel<'_> {
             protocol: PROTOCOL,
             args: self.args.clone(),
             spooled: BTreeMap::new(),
-            scene,
-            share: Share {
-                process: pair,
-                wanted: vec![true; known.len()],
-                known,
-                failed: BTreeMap::new(),
-                plan_only,
+            job: Job::Scene {
+                scene,
+                share: Share {
+                    process: pair,
+                    wanted: vec![true; known.len()],
+                    known,
+                    failed: BTreeMap::new(),
+                    plan_only,
+                },
+                samples: false,
             },
             cpu,
-            samples: false,
             layout,
         }
     }
@@ -288,7 +291,7 @@ impl Duel<'_> {
             while let Some(worker) = &mut workers[side] {
                 match worker.listen(Duration::ZERO)? {
                     Said::Part(part, _) => parts[side].push(*part),
-                    Said::Step(_) => {}
+                    Said::Step(_) | Said::Times(_) => {}
                     Said::Nothing => break,
                     Said::Done => workers[side] = None,
                     Said::Failed(reason) => bail!("{}: {reason}", programs[side].display()),

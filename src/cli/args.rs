@@ -9,7 +9,7 @@ use crate::suite::DEFAULT_PATH;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::scene_args::SceneCommand;
-use super::shared_args::{CullingArgs, KernelArgs, LensArgs, SceneArgs};
+use super::shared_args::{CullingArgs, KernelArgs, LensArgs, SceneArgs, SpreadArgs};
 
 /// Which spatial index finds what a camera sees, and where the camera is:
 /// how fast, and is the answer right?
@@ -356,9 +356,8 @@ pub struct PrecisionArgs {
     /// Draw excess against time as an SVG file too
     #[arg(long, value_name = "FILE")]
     pub svg: Option<PathBuf>,
-    /// Seed of the sweeps and of the order in which points are measured
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    pub seed: u64,
+    #[command(flatten)]
+    pub spread: SpreadArgs,
     #[arg(long, value_enum, default_value = "table")]
     pub format: TableFormat,
     #[command(flatten)]
@@ -412,9 +411,8 @@ pub struct AdviseArgs {
         allow_negative_numbers = true
     )]
     pub queries_per_update: f64,
-    /// Seed of the order in which things are measured
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    pub seed: u64,
+    #[command(flatten)]
+    pub spread: SpreadArgs,
     #[arg(long, value_enum, default_value = "table")]
     pub format: TableFormat,
     #[command(flatten)]

@@ -25,6 +25,7 @@ mod merge;
 mod precision;
 mod precision_diagram;
 mod processes;
+mod protocol;
 mod query;
 mod report;
 mod run;

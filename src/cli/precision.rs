@@ -6,18 +6,23 @@ use std::path::Path;
 use std::time::Duration;
 
 use anyhow::bail;
-use indicatif::ProgressBar;
 use serde::Serialize;
+use tempfile::NamedTempFile;
 
 use super::args::{PrecisionArgs, TableFormat};
+use super::processes::Workers;
+use super::protocol::{Job, Timing};
+use super::run::progress;
+use super::run_resume::typed_args;
 use super::{Ending, interrupt, load_scene, precision_diagram, text, unread_is_fine};
 use crate::index::Registry;
-use crate::measure::{Machine, Protocol, Status};
+use crate::measure::{ProcessTimes, Protocol, Status};
 use crate::path;
 use crate::precision::{
-    OffsetRow, Point, Precision, SizeRow, measure_points, offset_sweep, size_sweep,
+    self, OffsetRow, Point, PointPlan, Precision, PrecisionInput, SizeRow, offset_sweep, size_sweep,
 };
 use crate::report::write_atomically;
+use crate::scene::{self, LoadOptions};
 use crate::verify::ErrorCount;
 
 /// Everything that is printed.
@@ -30,6 +35,8 @@ struct Outcome {
     offset_sweep: Vec<OffsetRow>,
 }
 
+/// Rounds of a point, if one process has them all.
+const ROUNDS: [usize; 2] = [5, 15];
 /// Cameras of the sweep over offsets.
 const OFFSET_CAMERAS: usize = 60;
 
@@ -52,41 +59,48 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
     }
     let path = path::load(&args.path, &scene, &defaults)?;
     interrupt::from_now_on_finish();
-    let bar = ProgressBar::new_spinner();
-    bar.enable_steady_tick(Duration::from_millis(200));
-    bar.set_message(text::plain(&format!(
-        "{}, {}: every point",
-        args.scene, args.path
-    )));
-    let protocol = Protocol {
-        rounds: [5, 15],
-        task_ns: 150e6,
-        cameras: usize::MAX,
-        cold: false,
-        seed: args.seed,
-        cache_bytes: Machine::capture().cache_sweep_bytes(),
+    let workers = Workers::new(typed_args()?, Duration::MAX, &NamedTempFile::new)?;
+    let bar = progress(u64::from(args.spread.processes));
+    let job = |next: &str| {
+        let job = format!("{}, {}: {next}", args.scene, args.path);
+        bar.set_message(text::plain(&job));
     };
-    let frames = args.frames as usize;
-    let measured = measure_points(
-        &scene,
-        &path,
-        &structures,
-        frames,
-        &protocol,
-        &interrupt::asked,
-    )?;
-    let Some(precision) = measured else {
+    job("every point, checked");
+    let protocol = protocol(args, 0);
+    let input = PrecisionInput {
+        scene: &scene,
+        path: &path,
+        structures: &structures,
+        most_cameras: args.frames as usize,
+        protocol: &protocol,
+    };
+    let Some(prepared) = precision::prepare(&input, &interrupt::asked)? else {
         return Ok(Ending::Interrupted);
     };
+    let points = |process| {
+        let timing = Timing {
+            process,
+            lens_scale: path.lens_scale,
+        };
+        Job::Points(prepared.plan.clone(), timing)
+    };
+    let step = |process: u32, _: &str| {
+        bar.set_position(process.into());
+        job("every point, timed");
+    };
+    let Some(times) = workers.times(args.spread.processes, points, &step)? else {
+        return Ok(Ending::Interrupted);
+    };
+    let precision = prepared.conclude(&times);
     let (mut sizes, mut offsets) = (Vec::new(), Vec::new());
     if args.cubes > 0 {
-        bar.set_message("the sweep over sizes");
-        let Some(rows) = size_sweep(args.cubes, args.seed, &interrupt::asked)? else {
+        job("the sweep over sizes");
+        let Some(rows) = size_sweep(args.cubes, args.spread.seed, &interrupt::asked)? else {
             return Ok(Ending::Interrupted);
         };
         sizes = rows;
-        bar.set_message("the sweep over offsets");
-        offsets = offset_sweep(OFFSET_CAMERAS, args.seed);
+        job("the sweep over offsets");
+        offsets = offset_sweep(OFFSET_CAMERAS, args.spread.seed);
     }
     bar.finish_and_clear();
     if let Some(file) = &args.svg {
@@ -99,7 +113,7 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
         .any(|p| matches!(p.status, Status::Wrong | Status::Panicked));
     let outcome = Outcome {
         precision,
-        seed: args.seed,
+        seed: args.spread.seed,
         size_sweep: sizes,
         offset_sweep: offsets,
     };
@@ -114,6 +128,36 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
     })
 }
 
+/// Of one of the processes, all cameras.
+fn protocol(args: &PrecisionArgs, process: u32) -> Protocol {
+    let effort = args.spread.effort(ROUNDS);
+    args.spread.protocol(&effort, process, usize::MAX)
+}
+
+/// One process's share of the points.
+pub fn time(
+    registry: &Registry,
+    args: &PrecisionArgs,
+    plan: &PointPlan,
+    timing: &Timing,
+    stop: &dyn Fn() -> bool,
+) -> anyhow::Result<Option<ProcessTimes>> {
+    let load = LoadOptions {
+        skip_bad_items: args.scene_args.skip_bad_items,
+        structures: 0,
+    };
+    let scene = scene::load(&args.scene, &load)?;
+    let lens = args.lens.defaults()?;
+    let input = PrecisionInput {
+        scene: &scene,
+        path: &path::load_scaled(&args.path, &scene, &lens, timing.lens_scale)?,
+        structures: &args.kernel.structures(registry, &args.structure)?,
+        most_cameras: args.frames as usize,
+        protocol: &protocol(args, timing.process),
+    };
+    Ok(precision::time(&input, plan, stop)?)
+}
+
 fn show_json(outcome: &Outcome) -> io::Result<()> {
     let mut out = io::stdout().lock();
     writeln!(out, "{}", serde_json::to_string_pretty(outcome)?)?;
@@ -126,21 +170,21 @@ fn show(outcome: &Outcome) -> io::Result<()> {
     let visible = p.points.first().map_or(0, |point| point.errors.visible);
     writeln!(
         out,
-        "{}: {}; {}: {}, {} visible in all, {}; noise floor {}",
+        "{}: {}; {}: {}, {} visible in all; {}; {} in each",
         text::plain(&p.scene),
         text::counted(p.items, "item"),
         text::plain(&p.path),
         text::counted(p.cameras, "camera"),
         text::count(visible as usize),
-        text::counted(p.rounds, "round"),
-        text::percent(p.noise_floor)
+        text::over(p.processes, p.twin.as_ref()),
+        text::counted(p.rounds, "round")
     )?;
     writeln!(out, "{}", points_table(&p.points))?;
     writeln!(
         out,
-        "* on the Pareto front: no other point is as good in every error and as fast. Times whose\n\
-         95 % intervals come within the noise floor of each other (every structure is entered twice)\n\
-         count as equal. eps is the factor c of the conservative epsilon."
+        "* on the Pareto front: no other point is as good in every error and as fast. Times that a\n\
+         paired test over the processes does not tell apart count as equal. eps is the factor c of\n\
+         the conservative epsilon."
     )?;
     for point in p.points.iter().filter(|p| p.reason.is_some()) {
         let reason = point.reason.as_deref().unwrap_or_default();
@@ -229,17 +273,8 @@ fn points_table(points: &[Point]) -> text::Table {
         &[5, 6, 7, 8, 9, 10, 11, 12, 13],
     );
     for point in points {
-        let time = match (point.query_ns, point.query_ns_lower, point.query_ns_upper) {
-            (Some(ns), Some(lower), Some(upper)) => {
-                format!(
-                    "{} [{}, {}]",
-                    text::time(ns),
-                    text::time(lower),
-                    text::time(upper)
-                )
-            }
-            _ => String::new(),
-        };
+        let interval = [point.query_ns_lower, point.query_ns_upper];
+        let time = text::time_within(point.query_ns, interval);
         let judged = point.status != Status::Refused;
         let of = |value: String| if judged { value } else { String::new() };
         table.add_row([

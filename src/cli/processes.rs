@@ -1,17 +1,21 @@
 //! The parent's side of a run: starting a worker, reading what it says, and
 //! telling what has ended it: memory, time, a signal, or the user.
 
-use std::io::{BufRead, BufReader, Read, Write};
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::io::{self, BufRead, BufReader, Read, Write};
+use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
+use tempfile::NamedTempFile;
 
-use super::worker::{Message, PROTOCOL, Request};
-use crate::measure::{Part, Status, TaskSamples, Verdict};
+use super::interrupt;
+use super::protocol::{Job, Message, PROTOCOL, Request};
+use crate::input;
+use crate::measure::{Part, ProcessTimes, Status, TaskSamples, Verdict};
 
 /// Longest wait before looking whether the user wants to stop.
 const GLANCE: Duration = Duration::from_millis(20);
@@ -32,6 +36,7 @@ pub struct Worker {
 /// What a worker has said.
 pub enum Said {
     Part(Box<Part>, Vec<TaskSamples>),
+    Times(ProcessTimes),
     /// It does something else now.
     Step(String),
     Done,
@@ -125,6 +130,7 @@ impl Worker {
                 Said::Step(said)
             }
             Message::Part(part, samples) => Said::Part(part, samples),
+            Message::Times(times) => Said::Times(times),
             Message::Failed(reason) => Said::Failed(reason),
             Message::Done => Said::Done,
         })
@@ -220,17 +226,16 @@ pub fn see_through(
     program: &Path,
     request: &Request,
     patience: Duration,
-    keep: &mut dyn FnMut(Part, Vec<TaskSamples>) -> anyhow::Result<()>,
+    keep: &mut dyn FnMut(Said) -> anyhow::Result<()>,
     step: &dyn Fn(&str),
-    stop: &dyn Fn() -> bool,
 ) -> anyhow::Result<Ended> {
     let mut worker = Worker::start(program, request)?;
     loop {
-        if stop() {
+        if interrupt::asked() {
             return Ok(Ended::Stopped);
         }
         match worker.listen(GLANCE)? {
-            Said::Part(part, samples) => keep(*part, samples)?,
+            found @ (Said::Part(..) | Said::Times(_)) => keep(found)?,
             Said::Step(text) => step(&text),
             Said::Done => return Ok(Ended::Done),
             Said::Failed(reason) => return Ok(Ended::Failed(reason)),
@@ -244,4 +249,135 @@ pub fn see_through(
             Said::Nothing => {}
         }
     }
+}
+
+/// This program, with what all its workers are given.
+pub struct Workers {
+    program: PathBuf,
+    args: Vec<String>,
+    patience: Duration,
+    cpus: Vec<usize>,
+    /// Bytes of pipes, for workers to read.
+    spooled: BTreeMap<String, PathBuf>,
+    _spool: Vec<NamedTempFile>,
+}
+
+impl Workers {
+    /// `temporary` makes the files that stand for pipes.
+    ///
+    /// # Errors
+    /// Such a file cannot be written.
+    pub fn new(
+        args: Vec<String>,
+        patience: Duration,
+        temporary: &dyn Fn() -> io::Result<NamedTempFile>,
+    ) -> anyhow::Result<Workers> {
+        let (mut spool, mut spooled) = (Vec::new(), BTreeMap::new());
+        for (source, bytes) in input::pipes() {
+            let mut file = temporary()?;
+            file.write_all(&bytes)?;
+            spooled.insert(source, std::path::absolute(file.path())?);
+            spool.push(file);
+        }
+        Ok(Workers {
+            program: std::env::current_exe().context("this program cannot be found again")?,
+            args,
+            patience,
+            cpus: processors(),
+            spooled,
+            _spool: spool,
+        })
+    }
+
+    /// Sees a job through in a process of its own, on the next processor.
+    ///
+    /// # Errors
+    /// As [`see_through`].
+    pub fn see_through(
+        &self,
+        process: u32,
+        job: Job,
+        keep: &mut dyn FnMut(Said) -> anyhow::Result<()>,
+        step: &dyn Fn(&str),
+    ) -> anyhow::Result<Ended> {
+        let request = Request {
+            protocol: PROTOCOL,
+            args: self.args.clone(),
+            spooled: self.spooled.clone(),
+            cpu: match self.cpus.len() {
+                0 => None,
+                count => Some(self.cpus[process as usize % count]),
+            },
+            layout: u64::from(process),
+            job,
+        };
+        see_through(&self.program, &request, self.patience, keep, step)
+    }
+
+    /// What a job finds that cannot do without any process; `None` if the user
+    /// wants to stop.
+    ///
+    /// # Errors
+    /// As [`see_through`]; a process that does not finish.
+    pub fn found(
+        &self,
+        process: u32,
+        job: Job,
+        step: &dyn Fn(&str),
+    ) -> anyhow::Result<Option<Vec<Said>>> {
+        let mut found = Vec::new();
+        let mut keep = |said| {
+            found.push(said);
+            Ok(())
+        };
+        match self.see_through(process, job, &mut keep, step)? {
+            Ended::Done => Ok(Some(found)),
+            Ended::Stopped => Ok(None),
+            Ended::Failed(reason) => bail!("{reason}"),
+            Ended::Died(structure, verdict) => bail!(
+                "process {}: {}{}; expected one that finishes",
+                process + 1,
+                structure
+                    .map(|structure| format!("{structure}: "))
+                    .unwrap_or_default(),
+                verdict.reason.unwrap_or_default()
+            ),
+        }
+    }
+
+    /// What every process times; `None` if the user wants to stop.
+    ///
+    /// # Errors
+    /// As [`Workers::found`].
+    pub fn times(
+        &self,
+        processes: u32,
+        job: impl Fn(u32) -> Job,
+        step: &dyn Fn(u32, &str),
+    ) -> anyhow::Result<Option<Vec<ProcessTimes>>> {
+        let mut all = Vec::new();
+        for process in 0..processes {
+            let Some(found) = self.found(process, job(process), &|text| step(process, text))?
+            else {
+                return Ok(None);
+            };
+            let times = found.into_iter().filter_map(|said| match said {
+                Said::Times(times) => Some(times),
+                _ => None,
+            });
+            all.extend(times);
+        }
+        Ok(Some(all))
+    }
+}
+
+/// The processors that this process may run on; empty where that is not known.
+pub fn processors() -> Vec<usize> {
+    #[cfg(target_os = "linux")]
+    if let Ok(set) = rustix::thread::sched_getaffinity(None) {
+        return (0..rustix::thread::CpuSet::MAX_CPU)
+            .filter(|&cpu| set.is_set(cpu))
+            .collect();
+    }
+    Vec::new()
 }

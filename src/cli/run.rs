@@ -3,22 +3,19 @@
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
-use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
 use indicatif::{ProgressBar, ProgressStyle};
-use tempfile::NamedTempFile;
 
 use super::args::RunArgs;
-use super::processes::{Ended, see_through};
+use super::processes::{Ended, Said, Workers};
+use super::protocol::Job;
 use super::run_plan::{RunPlan, plan};
 use super::run_resume::{create, go_on, resume, utc_now};
 use super::run_table::show_scene;
-use super::worker::{PROTOCOL, Request, processors};
 use super::{Ending, interrupt, surface_tables, text, unread_is_fine};
 use crate::index::Registry;
-use crate::input;
 use crate::measure::{
     GroupKey, Machine, Part, PathInfo, PlannedScene, SceneInfo, Share, SubjectPart, Verdict,
 };
@@ -67,13 +64,7 @@ struct Run {
     plan: RunPlan,
     folder: RunFolder,
     stream: Stream,
-    program: PathBuf,
-    patience: Duration,
-    cpus: Vec<usize>,
-    /// Bytes of pipes, for workers to read: in the run's folder, where what a
-    /// killed run leaves is taken away by the next.
-    spooled: BTreeMap<String, PathBuf>,
-    spool: Vec<NamedTempFile>,
+    workers: Workers,
     bar: ProgressBar,
     started: Instant,
 }
@@ -91,21 +82,16 @@ impl Run {
         folder: RunFolder,
         stream: Stream,
     ) -> anyhow::Result<Run> {
-        let (mut spool, mut spooled) = (Vec::new(), BTreeMap::new());
-        for (source, bytes) in input::pipes() {
-            let mut file = temporary_in(folder.path())?;
-            file.write_all(&bytes)?;
-            spooled.insert(source, std::path::absolute(file.path())?);
-            spool.push(file);
-        }
         let groups = plan.plan.groups().len() as u64;
         Ok(Run {
             bar: progress(groups * u64::from(plan.plan.effort.processes)),
-            program: std::env::current_exe().context("this program cannot be found again")?,
-            patience: Duration::from_secs(args.what.timeout),
-            cpus: processors(),
-            spooled,
-            spool,
+            // Files in the run's folder: what a killed run leaves is taken away by
+            // the next.
+            workers: Workers::new(
+                stream.header.args.clone(),
+                Duration::from_secs(args.what.timeout),
+                &|| temporary_in(folder.path()),
+            )?,
             started: Instant::now(),
             plan,
             folder,
@@ -138,7 +124,7 @@ impl Run {
         }
         self.bar.finish_and_clear();
         if self.stream.parts.is_empty() {
-            drop(self.spool);
+            drop(self.workers);
             self.folder.discard();
             return Ok(Ending::Interrupted);
         }
@@ -166,7 +152,7 @@ impl Run {
     fn close_early(self) {
         match self.stream.parts.is_empty() {
             true => {
-                drop(self.spool);
+                drop(self.workers);
                 self.folder.discard();
             }
             false => drop(self.folder.save(&self.stream.report())),
@@ -232,18 +218,10 @@ impl Run {
 
     fn worker(&mut self, scene: usize, share: Share) -> anyhow::Result<Ended> {
         let process = share.process;
-        let request = Request {
-            protocol: PROTOCOL,
-            args: self.stream.header.args.clone(),
-            spooled: self.spooled.clone(),
+        let job = Job::Scene {
             scene,
-            cpu: match self.cpus.len() {
-                0 => None,
-                count => Some(self.cpus[process as usize % count]),
-            },
-            samples: true,
-            layout: u64::from(process),
             share,
+            samples: true,
         };
         let source = self.plan.plan.scenes[scene].source.clone();
         let processes = self.plan.plan.effort.processes;
@@ -251,25 +229,21 @@ impl Run {
             bar,
             folder,
             stream,
+            workers,
             ..
         } = self;
-        let mut keep = |part: Part, samples: Vec<_>| {
-            stream.parts.push(folder.keep(part, &samples)?);
-            bar.inc(1);
+        let mut keep = |said| {
+            if let Said::Part(part, samples) = said {
+                stream.parts.push(folder.keep(*part, &samples)?);
+                bar.inc(1);
+            }
             Ok(())
         };
         let step = |step: &str| {
             let at = format!("{source}, process {} of {processes}: {step}", process + 1);
             bar.set_message(text::plain(&at));
         };
-        see_through(
-            &self.program,
-            &request,
-            self.patience,
-            &mut keep,
-            &step,
-            &interrupt::asked,
-        )
+        workers.see_through(process, job, &mut keep, &step)
     }
 
     /// Every cell of what is still wanted gets this verdict.
@@ -356,7 +330,8 @@ impl Run {
     }
 }
 
-fn progress(parts: u64) -> ProgressBar {
+/// A bar of so many parts.
+pub fn progress(parts: u64) -> ProgressBar {
     // Drawn on stderr, and only if that is a terminal.
     let style = ProgressStyle::with_template("{bar:24} {pos}/{len}  {elapsed}  {msg}");
     let bar = ProgressBar::new(parts);

@@ -8,7 +8,7 @@ use crate::culling::Culling;
 use crate::index::Registry;
 use crate::measure::{Contender, Protocol, Workload, judge};
 use crate::path::CameraPath;
-use crate::precision::measure_points;
+use crate::precision::{PrecisionInput, measure_points};
 use crate::scene::{Scene, WorldBox};
 use crate::stress::extremes::Case;
 use glam::DVec3;
@@ -78,7 +78,14 @@ fn missed(camera: Camera) -> [bool; 4] {
         seed: 1,
         cache_bytes: 0,
     };
-    let measured = measure_points(&scene, &path, &structures, 1, &protocol, &|| false);
+    let input = PrecisionInput {
+        scene: &scene,
+        path: &path,
+        structures: &structures,
+        most_cameras: 1,
+        protocol: &protocol,
+    };
+    let measured = measure_points(&input, &|| false);
     let measured = measured.expect("no refusal").expect("not stopped");
     let by_precision = measured.points.iter().any(|point| {
         let is_default = point.test == "six-plane"

@@ -6,6 +6,7 @@ use crate::camera::{DEFAULT_EPSILON, PLANE_METHODS, PlaneMethod, PlaneOptions};
 use crate::culling::{ARITHMETICS, Arithmetic, Culling, CullingTest, TESTS};
 use crate::index::{Execution, Registry, StructureSpec};
 use crate::kernel::Kernel;
+use crate::measure::{Beside, Effort, Machine, Protocol};
 use crate::path::LensDefaults;
 use crate::spec::SpecError;
 use crate::threads::MOST_THREADS;
@@ -74,6 +75,55 @@ impl KernelArgs {
         Ok(Execution { kernel, threads })
     }
 }
+
+/// How times are spread over processes, for a study of one scene and path.
+#[derive(Args, Debug)]
+pub struct SpreadArgs {
+    /// Processes to spread the rounds over; ten or more give intervals, one gives values alone
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub processes: u32,
+    /// Seed of whatever is drawn at random, also of the order in which things are measured
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+}
+
+impl SpreadArgs {
+    /// How much of a study that takes so many rounds by itself is one process's.
+    pub fn effort(&self, rounds: [usize; 2]) -> Effort {
+        let processes = self.processes as usize;
+        let [least, most] = rounds;
+        Effort {
+            processes: self.processes,
+            rounds: [
+                (least / processes).max(LEAST_ROUNDS),
+                (2 * most / processes).clamp(LEAST_ROUNDS, most),
+            ],
+            task_ns: TASK_NS / f64::from(self.processes),
+            pass_ns: PASS_NS,
+            beside: Beside::RegionSearch,
+        }
+    }
+
+    /// The protocol of one of the processes, for so many items.
+    pub fn protocol(&self, effort: &Effort, process: u32, cameras: usize) -> Protocol {
+        Protocol {
+            rounds: effort.rounds,
+            task_ns: effort.task_ns,
+            cameras,
+            cold: false,
+            // Other orders in each process.
+            seed: self.seed.wrapping_add(u64::from(process)),
+            cache_bytes: Machine::capture().cache_sweep_bytes(),
+        }
+    }
+}
+
+/// Fewest rounds of a process: of fewer no mean leaves out a disturbed one.
+const LEAST_ROUNDS: usize = 3;
+/// CPU time of a task in all processes, ns.
+const TASK_NS: f64 = 150e6;
+/// Time of a plain loop over all items by all timed cameras, ns.
+const PASS_NS: f64 = 20e6;
 
 /// Values for cameras that do not bring their own.
 #[derive(Args, Debug)]

@@ -6,6 +6,7 @@ use std::io::{self, StdoutLock, Write};
 use crate::measure::Metric;
 use crate::report::{Comparison, Report, ReportCell};
 pub use crate::shown::{count, counted, lines, plain};
+use crate::statistics::Estimate;
 use comfy_table::presets::UTF8_BORDERS_ONLY;
 use comfy_table::{CellAlignment, ContentArrangement};
 
@@ -106,27 +107,46 @@ pub fn significant(value: f64) -> String {
 
 /// A value with its 95 % interval: "4.04 [3.95, 4.16]"; nothing if there is none.
 pub fn estimate(metric: Option<&Metric>) -> String {
-    let Some(metric) = metric else {
-        return String::new();
-    };
-    significant(metric.value) + &interval(metric, 1.0)
+    let shown = |m: &Metric| significant(m.value) + &interval([m.lower, m.upper], 1.0);
+    metric.map(shown).unwrap_or_default()
+}
+
+/// The same of one whose interval may be NaN.
+pub fn within(found: &Estimate) -> String {
+    let ends = [found.lower, found.upper].map(|end| Some(end).filter(|end| end.is_finite()));
+    significant(found.value) + &interval(ends, 1.0)
 }
 
 /// A time with its 95 % interval in the same unit: "1.81 us [1.75, 1.90]".
 pub fn time_estimate(metric: Option<&Metric>) -> String {
-    let Some(metric) = metric else {
-        return String::new();
-    };
-    time(metric.value) + &interval(metric, unit(metric.value).0)
+    metric.map_or_else(String::new, |m| {
+        time_within(Some(m.value), [m.lower, m.upper])
+    })
 }
 
-fn interval(metric: &Metric, unit: f64) -> String {
-    match (metric.lower, metric.upper) {
-        (Some(lower), Some(upper)) => {
+/// The same of a time in ns; nothing if there is none.
+pub fn time_within(ns: Option<f64>, ends: [Option<f64>; 2]) -> String {
+    let shown = |ns: f64| time(ns) + &interval(ends, unit(ns).0);
+    ns.map(shown).unwrap_or_default()
+}
+
+fn interval(ends: [Option<f64>; 2], unit: f64) -> String {
+    match ends {
+        [Some(lower), Some(upper)] => {
             let [lower, upper] = [lower, upper].map(|end| significant(end / unit));
             format!(" [{lower}, {upper}]")
         }
         _ => String::new(),
+    }
+}
+
+/// What the times of a study rest on, with the ratio of one thing that was entered
+/// twice: "10 processes (a twin took 1.00 [0.99, 1.01] times as long)".
+pub fn over(processes: usize, twin: Option<&Estimate>) -> String {
+    let count = counted(processes, "process");
+    match twin.filter(|twin| twin.lower.is_finite()) {
+        Some(twin) => format!("{count} (a twin took {} times as long)", within(twin)),
+        None => format!("{count}: times without intervals, no ties (--processes 10 gives both)"),
     }
 }
 

@@ -1,67 +1,22 @@
-//! The child's side of a run: `cullbench worker`, not shown in the help. It reads
-//! one request, measures one process's share of one scene, and writes what it
-//! does and finds, a JSON line each, to standard output.
+//! The child's side of what is measured over processes: `cullbench worker`, not
+//! shown in the help. It reads one request, does one process's share of a job, and
+//! writes what it does and finds, a JSON line each, to standard output.
 
 use std::cell::RefCell;
-use std::collections::BTreeMap;
 use std::io::{self, BufRead, Write};
-use std::path::PathBuf;
 use std::thread;
 use std::time::{Duration, Instant};
 
 use clap::Parser;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use serde::{Deserialize, Serialize};
 
 use super::Ending;
 use super::args::{Cli, Command};
-use super::run_plan;
+use super::protocol::{Job, Message, PROTOCOL, Request};
+use super::{advise, precision, run_plan};
 use crate::index::Registry;
-use crate::measure::{Part, Share, TaskSamples, measure_scene};
-
-/// Raised when requests or messages change: programs of different versions do
-/// not understand each other.
-pub const PROTOCOL: u32 = 2;
-
-/// What a worker is to do.
-#[derive(Clone, Serialize, Deserialize)]
-pub struct Request {
-    pub protocol: u32,
-    /// The arguments of `run`, from which the plan follows.
-    pub args: Vec<String>,
-    /// Files that stand for pipes that only the parent can read.
-    pub spooled: BTreeMap<String, PathBuf>,
-    /// Index of the scene in the plan.
-    pub scene: usize,
-    pub share: Share,
-    /// The processor to stay on.
-    pub cpu: Option<usize>,
-    /// Whether samples are wanted beside the parts.
-    pub samples: bool,
-    /// Decides on where its memory lies: another number for every process.
-    pub layout: u64,
-}
-
-/// A line from a worker.
-#[derive(Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Message {
-    /// The first line.
-    Ready {
-        protocol: u32,
-    },
-    /// What comes next, and of which structure.
-    Doing {
-        structure: Option<String>,
-        step: String,
-    },
-    Part(Box<Part>, Vec<TaskSamples>),
-    /// The scene or a path cannot be had.
-    Failed(String),
-    /// The share is done.
-    Done,
-}
+use crate::measure::{Part, Plan, ProcessTimes, TaskSamples, measure_scene};
 
 /// Exit code of a worker whose parent is gone.
 const ORPHANED: i32 = 130;
@@ -97,58 +52,105 @@ fn answer(registry: &Registry, request: &Request) -> anyhow::Result<()> {
     let typed = ["cullbench".to_owned()]
         .into_iter()
         .chain(request.args.clone());
-    let Command::Run(args) = Cli::try_parse_from(typed)?.command else {
-        anyhow::bail!("not a run");
-    };
-    let plan = run_plan::plan(registry, &args)?;
-    let planned = &plan.plan.scenes[request.scene];
-    let failed = RefCell::new(None);
-    let keep_error = |result: io::Result<()>| {
-        if let Err(error) = result {
-            failed.borrow_mut().get_or_insert(error);
+    let here = Here::default();
+    match (&request.job, Cli::try_parse_from(typed)?.command) {
+        (Job::Scene { .. }, Command::Run(args)) => {
+            here.scene(&run_plan::plan(registry, &args)?.plan, &request.job)?;
         }
-    };
-    let told = RefCell::new((Instant::now(), String::new()));
-    let notice = |structure: Option<&str>, step: &str| {
-        let now = format!("{} {step}", structure.unwrap_or_default());
-        let mut told = told.borrow_mut();
-        if told.1 != now {
-            *told = (Instant::now(), now);
-            keep_error(send(&Message::Doing {
-                structure: structure.map(str::to_owned),
-                step: step.to_owned(),
-            }));
+        (Job::Scene { .. }, Command::Advise(args)) => {
+            here.scene(&advise::plan(registry, &args)?, &request.job)?;
         }
-    };
-    let stop = || {
-        let mut told = told.borrow_mut();
-        if told.0.elapsed() > HEARTBEAT {
-            told.0 = Instant::now();
-            keep_error(send(&Message::Doing {
-                structure: None,
-                step: "timing".to_owned(),
-            }));
+        (Job::Trials(plan, timing), Command::Advise(args)) => {
+            here.times(&|stop| advise::time(registry, &args, plan, timing, stop))?;
         }
-        // The parent is gone.
-        failed.borrow().is_some()
-    };
-    let mut keep = |part: Part, samples: Vec<TaskSamples>| {
-        let samples = if request.samples { samples } else { Vec::new() };
-        keep_error(send(&Message::Part(Box::new(part), samples)));
-    };
-    measure_scene(
-        &plan.plan,
-        planned,
-        &request.share,
-        &mut keep,
-        &notice,
-        &stop,
-    )?;
-    match failed.into_inner() {
+        (Job::Points(plan, timing), Command::Precision(args)) => {
+            here.times(&|stop| precision::time(registry, &args, plan, timing, stop))?;
+        }
+        _ => anyhow::bail!("a job of another command"),
+    }
+    match here.failed.into_inner() {
         Some(error) => Err(error.into()),
         None => Ok(()),
     }
 }
+
+/// What is told to the parent, and whether it listens.
+struct Here {
+    failed: RefCell<Option<io::Error>>,
+    told: RefCell<(Instant, String)>,
+}
+
+impl Default for Here {
+    fn default() -> Here {
+        Here {
+            failed: RefCell::new(None),
+            told: RefCell::new((Instant::now(), String::new())),
+        }
+    }
+}
+
+impl Here {
+    fn tell(&self, message: &Message) {
+        if let Err(error) = send(message) {
+            self.failed.borrow_mut().get_or_insert(error);
+        }
+    }
+
+    fn notice(&self, structure: Option<&str>, step: &str) {
+        let now = format!("{} {step}", structure.unwrap_or_default());
+        if self.told.borrow().1 == now {
+            return;
+        }
+        *self.told.borrow_mut() = (Instant::now(), now);
+        self.tell(&Message::Doing {
+            structure: structure.map(str::to_owned),
+            step: step.to_owned(),
+        });
+    }
+
+    /// Asked now and then while something is timed.
+    fn stop(&self) -> bool {
+        if self.told.borrow().0.elapsed() > HEARTBEAT {
+            self.told.borrow_mut().0 = Instant::now();
+            self.tell(&Message::Doing {
+                structure: None,
+                step: "timing".to_owned(),
+            });
+        }
+        // The parent is gone.
+        self.failed.borrow().is_some()
+    }
+
+    fn scene(&self, plan: &Plan, job: &Job) -> anyhow::Result<()> {
+        let Job::Scene {
+            scene,
+            share,
+            samples: wanted,
+        } = job
+        else {
+            return Ok(());
+        };
+        let mut keep = |part: Part, samples: Vec<TaskSamples>| {
+            let samples = if *wanted { samples } else { Vec::new() };
+            self.tell(&Message::Part(Box::new(part), samples));
+        };
+        let notice = |structure: Option<&str>, step: &str| self.notice(structure, step);
+        let planned = &plan.scenes[*scene];
+        measure_scene(plan, planned, share, &mut keep, &notice, &|| self.stop())?;
+        Ok(())
+    }
+
+    fn times(&self, time: TimeAll) -> anyhow::Result<()> {
+        self.notice(None, "timing");
+        if let Some(times) = time(&|| self.stop())? {
+            self.tell(&Message::Times(times));
+        }
+        Ok(())
+    }
+}
+
+/// Times everything unless it is stopped.
+type TimeAll<'t> = &'t dyn Fn(&dyn Fn() -> bool) -> anyhow::Result<Option<ProcessTimes>>;
 
 /// Nothing more is ever said on standard input: its end is that of the parent,
 /// however it came about, and so of this process, whatever it is at.
@@ -200,15 +202,4 @@ fn vary_layout(seed: u64) -> Vec<Vec<u8>> {
         }
     }
     held
-}
-
-/// The processors that this process may run on; empty where that is not known.
-pub fn processors() -> Vec<usize> {
-    #[cfg(target_os = "linux")]
-    if let Ok(set) = rustix::thread::sched_getaffinity(None) {
-        return (0..rustix::thread::CpuSet::MAX_CPU)
-            .filter(|&cpu| set.is_set(cpu))
-            .collect();
-    }
-    Vec::new()
 }

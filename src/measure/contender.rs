@@ -13,7 +13,7 @@ use crate::scene::Scene;
 /// see) and over the regions (where is the camera).
 pub struct Contender {
     pub spec: StructureSpec,
-    /// Entered a second time, for the run's noise floor only.
+    /// Entered a second time, as a check: it must be as fast as the first.
     pub is_twin: bool,
     pub built: Result<Built, Verdict>,
 }

@@ -35,9 +35,16 @@ pub struct Effort {
     /// The timed cameras are as many as a plain loop over all items answers in
     /// this time, ns.
     pub pass_ns: f64,
-    /// Whether region search, updates, a twin and lower bounds are measured
-    /// beside frustum queries.
-    pub beside: bool,
+    pub beside: Beside,
+}
+
+/// What is measured beside frustum queries.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Beside {
+    Nothing,
+    RegionSearch,
+    /// Region search, updates, a twin and lower bounds.
+    All,
 }
 
 /// A scene with the ways through it.
@@ -131,6 +138,10 @@ impl Plan {
         self.groups().into_iter().flat_map(cells_of).collect()
     }
 
+    fn has_all(&self) -> bool {
+        self.effort.beside == Beside::All
+    }
+
     /// Share `i` of `n` (from 1): every n-th pair of scene and path, with all
     /// structures, cache states and tests of it together.
     pub fn shard(mut self, i: usize, n: usize) -> Plan {
@@ -160,8 +171,7 @@ impl Plan {
         let twin = proper.or(self.structures.first());
         let once = self.structures.iter().map(|s| (s, false));
         // What has ended a process would end this one too, as a twin as well.
-        let twin =
-            twin.filter(|spec| self.effort.beside && !share.failed.contains_key(&spec.label));
+        let twin = twin.filter(|spec| self.has_all() && !share.failed.contains_key(&spec.label));
         once.chain(twin.map(|s| (s, true)))
             .map(|(spec, is_twin)| {
                 if let Some(verdict) = share.failed.get(&spec.label) {
@@ -173,7 +183,7 @@ impl Plan {
                 }
                 notice(Some(&spec.label), "building");
                 let built = Contender::build(spec.clone(), is_twin, scene, test);
-                let updates = share.process.is_multiple_of(UPDATES_EVERY) && self.effort.beside;
+                let updates = share.process.is_multiple_of(UPDATES_EVERY) && self.has_all();
                 match updates && !is_twin {
                     true => built.with_updates(scene, test),
                     false => built,
@@ -274,14 +284,14 @@ pub fn measure_scene(
                 seed: plan.seed.wrapping_add(u64::from(share.process)),
                 cache_bytes: sweep,
             },
-            bounds: if plan.bounds && plan.effort.beside {
+            bounds: if plan.bounds && plan.has_all() {
                 BOUNDS
             } else {
                 &[]
             },
             known,
             plan_only: share.plan_only,
-            locate: plan.effort.beside,
+            locate: plan.effort.beside != Beside::Nothing,
         };
         let protocol = group.protocol;
         let Some((mut part, samples)) = measure_part(&workload, contenders, group, notice, stop)
@@ -289,7 +299,7 @@ pub fn measure_scene(
             return Ok(false);
         };
         // Once for each scene; a comparison of programs looks at queries alone.
-        if first && plan.effort.beside && !share.plan_only {
+        if first && plan.has_all() && !share.plan_only {
             for subject in &mut part.subjects {
                 let spec = plan.structures.iter().find(|s| s.label == subject.label);
                 if let Some(spec) = spec.filter(|_| subject.verdict.status == Status::Ok) {
@@ -338,7 +348,7 @@ mod tests {
                 rounds: [1, 1],
                 task_ns: 1e4,
                 pass_ns: 1e4,
-                beside: true,
+                beside: Beside::All,
             },
             bounds: false,
             seed: 1,

@@ -17,6 +17,7 @@ mod experiment;
 mod group;
 mod metrics;
 mod orders;
+mod over_processes;
 mod part;
 mod question;
 mod results;
@@ -35,14 +36,17 @@ pub use competitor::{Ask, AskMany, Competitor, Task};
 pub use contender::{Built, Contender, guarded};
 pub use count::{Answer, Counted, Judged, count_pass, id_sum, judge};
 pub use environment::{Machine, Source, Toolchain};
-pub use experiment::{Effort, ExperimentError, Plan, PlannedScene, Question, Share, measure_scene};
+pub use experiment::{
+    Beside, Effort, ExperimentError, Plan, PlannedScene, Question, Share, measure_scene,
+};
 pub use group::{GroupPlan, Notice, measure_part};
 pub use metrics::{METRICS, Metric, MetricInfo};
+pub use over_processes::{OverProcesses, ProcessTimes};
 pub use part::{CellKey, GroupKey, Known, NamedSchedule, Part, SubjectPart, TaskPart, TaskSamples};
 pub use question::{PathInfo, SceneInfo};
 pub use results::{Cell, CellTimes, Group, YARDSTICK, measure_group};
 pub use schedule::{CLOCK_NS, Protocol, Schedule, TaskPlan, cameras_within};
-pub use timing::{Sample, Timed, paired_ratio, timed, timed_rounds};
+pub use timing::{Sample, Timed, timed, timed_rounds};
 pub use update::{UPDATE_SHARES, move_share};
 pub use workload::{Workload, WorkloadError};
 

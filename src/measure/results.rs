@@ -20,7 +20,7 @@ use super::{
 };
 use crate::index::{Kind, Origin};
 use crate::statistics::{
-    Estimate, interquartile_mean, median, one_run, quantile, ranks, sorted, trimmed_mean,
+    ALPHA, Estimate, interquartile_mean, median, one_run, quantile, ranks, ratio, sorted,
 };
 
 /// In the order of [`UPDATE_SHARES`].
@@ -33,8 +33,6 @@ const UPDATE_METRICS: [&str; UPDATE_SHARES.len()] = [
 
 /// The structure that speed-ups refer to.
 pub const YARDSTICK: &str = "linear";
-/// Level at which two structures are told apart.
-const RANK_ALPHA: f64 = 0.05;
 
 /// One structure in one group.
 #[derive(Clone, PartialEq, Debug)]
@@ -80,6 +78,8 @@ pub struct Group {
     /// Structure and ratio of the one that was entered twice: 1 is to lie in
     /// the interval.
     pub twin: Option<(String, Metric)>,
+    /// The ranks of structures by their times of region search.
+    pub located: Vec<(String, usize)>,
 }
 
 /// Measures a group in this process alone: values and ranks by order, without
@@ -123,10 +123,16 @@ impl Group {
             .filter(|s| !s.label.ends_with(TWIN))
             .map(|subject| facts.cell(subject))
             .collect();
-        facts.rank(&mut cells);
+        for (i, rank) in facts.ranks(&cells, Task::Query) {
+            cells[i].rank = Some(rank);
+        }
+        let located = facts.ranks(&cells, Task::Locate).into_iter();
         Group {
             bounds: first.bounds.iter().map(|name| facts.bound(name)).collect(),
             twin: facts.twin(),
+            located: located
+                .map(|(i, rank)| (cells[i].structure.clone(), rank))
+                .collect(),
             cells,
         }
     }
@@ -435,23 +441,7 @@ impl<'p> Facts<'p> {
     fn ratio(&self, label: &str, other: &str) -> Option<Estimate> {
         let reference = self.reference(Task::Query)?;
         let (own, base) = (self.log(label, Task::Query)?, self.log(other, Task::Query)?);
-        let value = one_run(reference, own)?.value / one_run(reference, base)?.value;
-        let differences: Vec<f64> = own.iter().zip(base).map(|(a, b)| a - b).collect();
-        Some(match trimmed_mean(&differences) {
-            Some(found) => {
-                let (lower, upper) = found.interval(0.95);
-                Estimate {
-                    value,
-                    lower: value * (lower - found.mean).exp(),
-                    upper: value * (upper - found.mean).exp(),
-                }
-            }
-            None => Estimate {
-                value,
-                lower: f64::NAN,
-                upper: f64::NAN,
-            },
-        })
+        ratio(reference, own, base)
     }
 
     fn twin(&self) -> Option<(String, Metric)> {
@@ -469,27 +459,27 @@ impl<'p> Facts<'p> {
         Some((original.to_owned(), metric))
     }
 
-    fn rank(&self, cells: &mut [Cell]) {
-        let Some(reference) = self.reference(Task::Query) else {
-            return;
+    /// The ranks of those cells that have times of a task.
+    fn ranks(&self, cells: &[Cell], task: Task) -> Vec<(usize, usize)> {
+        let Some(reference) = self.reference(task) else {
+            return Vec::new();
         };
         let mut ranked = Vec::new();
         let mut values = Vec::new();
         for (i, cell) in cells.iter().enumerate() {
-            let own = self.log(&cell.structure, Task::Query);
+            let own = self.log(&cell.structure, task);
             if let (Some(own), Status::Ok) = (own, cell.verdict.status) {
                 ranked.push(i);
                 values.push(own.iter().zip(reference).map(|(own, r)| own - r).collect());
             }
         }
-        for (i, placed) in ranked.into_iter().zip(ranks(&values, RANK_ALPHA)) {
-            cells[i].rank = Some(placed.rank);
-        }
+        let ranks = ranks(&values, ALPHA).into_iter().map(|placed| placed.rank);
+        ranked.into_iter().zip(ranks).collect()
     }
 }
 
 /// A value over processes from its logarithms.
-fn shown(reference: &[f64], own: &[f64]) -> Option<Estimate> {
+pub(super) fn shown(reference: &[f64], own: &[f64]) -> Option<Estimate> {
     let found = one_run(reference, own)?;
     Some(Estimate {
         value: found.value,

@@ -3,7 +3,6 @@
 //! cold, the caches are streamed over before every camera's queries. What is
 //! timed and how often is the [`Schedule`]'s.
 
-use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
@@ -16,7 +15,7 @@ use super::orders::Orders;
 use super::schedule::{Protocol, Schedule};
 use super::{Status, Verdict};
 use crate::query::ItemId;
-use crate::statistics::{Estimate, bootstrap_median, interquartile_mean};
+use crate::statistics::interquartile_mean;
 
 /// Longest warm-up before each pass of a task.
 const WARM_UP: Duration = Duration::from_millis(2);
@@ -73,19 +72,6 @@ impl Timed {
     pub fn over(&self, other: &Timed) -> Option<f64> {
         Some((self.ln_ns()? - other.ln_ns()?).exp())
     }
-}
-
-/// Time of `base` / time of `other` in one process, with a bootstrap interval
-/// over the rounds that both took part in. `None` without such rounds.
-pub fn paired_ratio(base: &Timed, other: &Timed) -> Option<Estimate> {
-    let means = |timed: &Timed| -> BTreeMap<u32, f64> {
-        let rounds = timed.samples.chunk_by(|a, b| a.round == b.round);
-        let numbers = rounds.map(|round| round[0].round);
-        numbers.zip(timed.round_means(|s| s.cpu_ns)).collect()
-    };
-    let (base, other) = (means(base), means(other));
-    let both = base.iter().filter_map(|(n, b)| Some(b / other.get(n)?));
-    bootstrap_median(&both.filter(|r| r.is_finite()).collect::<Vec<_>>(), 2)
 }
 
 /// Plans and times a pass over `count` cameras: [`Schedule::new`], [`timed`].

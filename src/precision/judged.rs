@@ -9,6 +9,9 @@ use crate::query::ItemId;
 use crate::scene::Scene;
 use crate::verify::{ErrorCount, Truth};
 
+/// The truth about each camera, where answers are to be judged.
+pub(super) type Truths<'t> = Option<&'t [Truth]>;
+
 /// What one culling answers to every camera, and how wrong that is.
 pub(super) struct Judged {
     pub culling: Culling,
@@ -29,12 +32,13 @@ impl Judged {
         }
     }
 
-    /// Answers from `items`, judged by the truth about the scene's own.
+    /// Answers from `items`, judged by the truth about the scene's own; the views
+    /// alone where there is none.
     pub fn new(
         scene: &Scene,
         items: &[Aabb],
         cameras: &[Camera],
-        truths: &[Truth],
+        truths: Truths,
         culling: Culling,
     ) -> Judged {
         let mut judged = Judged {
@@ -45,7 +49,7 @@ impl Judged {
             refused: None,
         };
         let around = scene.surroundings();
-        for (camera, truth) in cameras.iter().zip(truths) {
+        for (i, camera) in cameras.iter().enumerate() {
             let view = match culling.view(camera, &around) {
                 Ok(view) => view,
                 Err(error) => {
@@ -53,13 +57,22 @@ impl Judged {
                     return judged;
                 }
             };
+            judged.views.push(view);
+            let truth = truths.and_then(|truths| truths.get(i));
+            let (Some(truth), Some(view)) = (truth, judged.views.last()) else {
+                continue;
+            };
             let seen = items.iter().zip(0..).filter(|(b, _)| view.as_any().sees(b));
             let answer: Vec<ItemId> = seen.map(|(_, id)| id).collect();
             judged.errors += blamed(culling.test, truth.errors(&scene.items, &answer));
-            judged.views.push(view);
             judged.answers.push(answer);
         }
         judged
+    }
+
+    /// Ids of every answer.
+    pub fn counts(&self) -> Vec<u64> {
+        self.answers.iter().map(|a| a.len() as u64).collect()
     }
 }
 

@@ -12,6 +12,6 @@ mod stability;
 
 pub use offset_sweep::{OFFSETS, OffsetRow, offset_sweep};
 pub use point::Point;
-pub use points::{Precision, measure_points};
+pub use points::{PointPlan, Precision, PrecisionInput, Prepared, measure_points, prepare, time};
 pub use size_sweep::{SIZE_RATIOS, SizeRow, size_sweep};
 pub use stability::StableAfter;

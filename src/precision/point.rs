@@ -4,10 +4,8 @@
 use serde::{Serialize, Serializer};
 
 use super::judged::Judged;
-use crate::culling::Culling;
 use crate::index::MemoryUsage;
-use crate::measure::{Status, Timed, Verdict};
-use crate::statistics::{Estimate, bootstrap_median, median};
+use crate::measure::{OverProcesses, Status};
 use crate::verify::ErrorCount;
 
 /// One way to answer, with its error and its time.
@@ -26,7 +24,7 @@ pub struct Point {
     pub false_negative_ppm: Option<f64>,
     #[serde(flatten)]
     pub errors: ErrorCount,
-    /// Mean over the cameras, median over the rounds, thread CPU time.
+    /// Mean over the cameras, thread CPU time, over the processes as in a run.
     pub query_ns: Option<f64>,
     pub query_ns_lower: Option<f64>,
     pub query_ns_upper: Option<f64>,
@@ -35,6 +33,9 @@ pub struct Point {
     /// Index of a point that is no worse in anything and better in something.
     pub dominated_by: Option<usize>,
     pub on_front: bool,
+    /// Its place among the tasks that were timed, if it has a time.
+    #[serde(skip)]
+    pub(super) task: Option<usize>,
 }
 
 fn by_name<S: Serializer>(status: &Status, serializer: S) -> Result<S::Ok, S::Error> {
@@ -67,6 +68,7 @@ impl Point {
             memory_bytes_per_item: None,
             dominated_by: None,
             on_front: false,
+            task: None,
         }
     }
 
@@ -74,29 +76,25 @@ impl Point {
         self.memory_bytes_per_item = (items > 0).then(|| usage.total() as f64 / items as f64);
     }
 
-    pub(super) fn time(&mut self, timed: &Timed, items: usize) {
-        let Some(Estimate {
-            value,
-            lower,
-            upper,
-        }) = bootstrap_median(&timed.round_means(|s| s.cpu_ns), 1)
-        else {
+    /// Takes over the time of a task, or why it has none.
+    pub(super) fn time(&mut self, times: &OverProcesses, task: usize, items: usize) {
+        if let Some(wrong) = times.failure(task) {
+            (self.status, self.reason) = (wrong.status, wrong.reason.clone());
+        }
+        let Some(found) = times.ns(task) else {
             return;
         };
-        self.query_ns = Some(value);
-        self.query_ns_lower = Some(lower);
-        self.query_ns_upper = Some(upper);
-        self.ns_per_item = (items > 0).then(|| value / items as f64);
+        self.task = Some(task);
+        self.query_ns = Some(found.value);
+        self.query_ns_lower = Some(found.lower).filter(|ns| ns.is_finite());
+        self.query_ns_upper = Some(found.upper).filter(|ns| ns.is_finite());
+        self.ns_per_item = (items > 0).then(|| found.value / items as f64);
     }
 
-    /// No worse in any error and no slower, and better in one of them. Times
-    /// whose intervals come within the noise floor of each other are equal:
-    /// what noise decides is no advantage.
-    pub(super) fn dominates(&self, other: &Point, floor: f64) -> bool {
-        let (Some(upper), Some(other_lower)) = (self.query_ns_upper, other.query_ns_lower) else {
-            return false;
-        };
-        let (Some(lower), Some(other_upper)) = (self.query_ns_lower, other.query_ns_upper) else {
+    /// No worse in any error and no slower, and better in one of them. Times that
+    /// the processes do not tell apart are equal.
+    fn dominates(&self, other: &Point, is_faster: IsFaster) -> bool {
+        let (Some(task), Some(others_task)) = (self.task, other.task) else {
             return false;
         };
         let of = |p: &Point| {
@@ -105,38 +103,19 @@ impl Point {
         };
         let (mine, others) = (of(self), of(other));
         let no_worse = mine.iter().zip(&others).all(|(a, b)| a <= b);
-        let faster = upper * (1.0 + floor) < other_lower;
-        let not_slower = lower <= other_upper * (1.0 + floor);
-        no_worse && not_slower && (faster || mine != others)
+        no_worse
+            && !is_faster(others_task, task)
+            && (mine != others || is_faster(task, others_task))
     }
 }
 
-/// How far apart a structure and its twin lie at most.
-pub(super) fn noise_floor(points: &[Point], twins: &[Result<Timed, Verdict>]) -> f64 {
-    let standard = Culling::default();
-    let originals = points.iter().filter(|p| {
-        p.test == standard.test.name()
-            && p.arithmetic == standard.arithmetic.name()
-            && p.planes == standard.planes.method.name()
-            && p.epsilon == standard.planes.epsilon
-    });
-    let mut floor = 0.0f64;
-    for (original, twin) in originals.zip(twins) {
-        let again = twin
-            .as_ref()
-            .ok()
-            .and_then(|t| median(&t.round_means(|s| s.cpu_ns)));
-        if let (Some(first), Some(again)) = (original.query_ns, again) {
-            floor = floor.max((again / first - 1.0).abs());
-        }
-    }
-    floor
-}
+/// Whether a timed task is faster than another.
+type IsFaster<'f> = &'f dyn Fn(usize, usize) -> bool;
 
-pub(super) fn mark_dominated(points: &mut [Point], floor: f64) {
+pub(super) fn mark_dominated(points: &mut [Point], is_faster: IsFaster) {
     for i in 0..points.len() {
-        let better = (0..points.len()).find(|&k| points[k].dominates(&points[i], floor));
-        points[i].on_front = better.is_none() && points[i].query_ns.is_some();
+        let better = (0..points.len()).find(|&k| points[k].dominates(&points[i], is_faster));
+        points[i].on_front = better.is_none() && points[i].task.is_some();
         points[i].dominated_by = better;
     }
 }
@@ -146,8 +125,8 @@ mod tests {
     use super::*;
 
     /// A point with false negatives, dropped touches and false positives, and
-    /// the interval of its time.
-    fn point(errors: [u64; 3], time: [f64; 2]) -> Point {
+    /// its place among the times.
+    fn point(errors: [u64; 3], task: Option<usize>) -> Point {
         let [false_negatives, touch_dropped, false_positives] = errors;
         Point {
             structure: "linear".to_owned(),
@@ -165,37 +144,42 @@ mod tests {
                 false_positives,
                 ..ErrorCount::default()
             },
-            query_ns: Some((time[0] + time[1]) / 2.0),
-            query_ns_lower: Some(time[0]),
-            query_ns_upper: Some(time[1]),
+            query_ns: None,
+            query_ns_lower: None,
+            query_ns_upper: None,
             ns_per_item: None,
             memory_bytes_per_item: None,
             dominated_by: None,
             on_front: false,
+            task,
         }
     }
 
+    /// Times in steps of ten are told apart, those within a step are not.
+    fn is_faster(a: usize, b: usize) -> bool {
+        a / 10 < b / 10
+    }
+
     #[test]
-    fn times_that_overlap_are_equal_and_errors_are_not_traded() {
+    fn times_not_told_apart_are_equal_and_errors_are_not_traded() {
         let (none, some) = ([0, 0, 5], [0, 0, 9]);
         let cases = [
-            // Equal errors: only what is clearly faster dominates.
-            (none, [1.0, 2.0], none, [3.0, 4.0], [true, false]),
-            (none, [1.0, 3.0], none, [2.0, 4.0], [false, false]),
-            (none, [1.0, 2.0], none, [2.0, 4.0], [false, false]),
+            // Equal errors: only what is faster dominates.
+            (none, 10, none, 20, [true, false]),
+            (none, 10, none, 11, [false, false]),
             // A tie in time is decided by the errors.
-            (none, [1.0, 3.0], some, [2.0, 4.0], [true, false]),
-            (none, [2.0, 4.0], some, [1.0, 3.0], [true, false]),
+            (none, 10, some, 11, [true, false]),
+            (none, 11, some, 10, [true, false]),
             // Fewer errors for more time: both stay.
-            (none, [5.0, 6.0], some, [1.0, 2.0], [false, false]),
+            (none, 20, some, 10, [false, false]),
             // One error more, another one fewer: both stay, however fast.
-            ([1, 0, 0], [1.0, 2.0], [0, 0, 9], [5.0, 6.0], [false, false]),
-            ([0, 1, 0], [1.0, 2.0], [0, 0, 9], [5.0, 6.0], [false, false]),
-            ([0, 1, 9], [5.0, 6.0], [0, 1, 8], [1.0, 2.0], [false, true]),
+            ([1, 0, 0], 10, [0, 0, 9], 50, [false, false]),
+            ([0, 1, 0], 10, [0, 0, 9], 50, [false, false]),
+            ([0, 1, 9], 50, [0, 1, 8], 10, [false, true]),
         ];
         for (errors_a, time_a, errors_b, time_b, wanted) in cases {
-            let (a, b) = (point(errors_a, time_a), point(errors_b, time_b));
-            let found = [a.dominates(&b, 0.0), b.dominates(&a, 0.0)];
+            let (a, b) = (point(errors_a, Some(time_a)), point(errors_b, Some(time_b)));
+            let found = [a.dominates(&b, &is_faster), b.dominates(&a, &is_faster)];
             assert_eq!(found, wanted, "{:?}", (errors_a, time_a, errors_b, time_b));
         }
     }
@@ -203,18 +187,15 @@ mod tests {
     #[test]
     fn the_front_is_what_nothing_dominates() {
         let mut points = [
-            point([0, 0, 9], [1.0, 2.0]),
-            point([0, 0, 9], [1.5, 2.5]),
-            point([0, 0, 9], [3.0, 4.0]),
-            point([0, 0, 0], [5.0, 6.0]),
-            point([0, 0, 1], [5.0, 6.0]),
-            point([0, 0, 0], [0.0, 0.0]),
+            point([0, 0, 9], Some(10)),
+            point([0, 0, 9], Some(15)),
+            point([0, 0, 9], Some(30)),
+            point([0, 0, 0], Some(50)),
+            point([0, 0, 1], Some(50)),
+            // One that was never timed has no say and no place.
+            point([0, 0, 0], None),
         ];
-        // One that was never timed has no say and no place.
-        let untimed = &mut points[5];
-        (untimed.query_ns, untimed.query_ns_lower) = (None, None);
-        untimed.query_ns_upper = None;
-        mark_dominated(&mut points, 0.0);
+        mark_dominated(&mut points, &is_faster);
         assert_eq!(
             points.each_ref().map(|p| p.dominated_by),
             [None, None, Some(0), None, Some(3), None]
@@ -223,14 +204,5 @@ mod tests {
             points.each_ref().map(|p| p.on_front),
             [true, true, false, true, false, false]
         );
-    }
-
-    #[test]
-    fn what_lies_within_the_noise_floor_is_no_faster() {
-        let (a, b) = (point([0; 3], [1.0, 2.0]), point([0; 3], [2.2, 4.0]));
-        assert!(a.dominates(&b, 0.05) && !a.dominates(&b, 0.15));
-        // And not slower either: fewer errors win.
-        let dear = point([0, 0, 1], [1.0, 2.0]);
-        assert!(!b.dominates(&dear, 0.05) && b.dominates(&dear, 0.15));
     }
 }

@@ -2,20 +2,23 @@
 //! with every culling, checked, judged against the exact truth, and timed side
 //! by side.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-use super::judged::Judged;
-use super::point::{Point, mark_dominated, noise_floor};
-use super::stability::{StableAfter, stability};
+use super::judged::{Judged, Truths};
+use super::point::{Point, mark_dominated};
+use super::stability::{StableAfter, by_camera, stability};
 use crate::camera::{Camera, PLANE_METHODS, PlaneMethod, PlaneOptions};
 use crate::culling::{ARITHMETICS, Arithmetic, Culling, CullingTest, TESTS};
 use crate::index::{
     BuildError, By, DynIndex, GridScope, Quantised, QuantisedParams, RegionIndex, StructureSpec,
 };
 use crate::kernel::Kernel;
-use crate::measure::{Competitor, Protocol, Status, Verdict, timed_rounds};
+use crate::measure::{
+    Competitor, OverProcesses, ProcessTimes, Protocol, Schedule, Status, Verdict, timed,
+};
 use crate::path::CameraPath;
 use crate::scene::Scene;
+use crate::statistics::Estimate;
 use crate::verify::{Trial, Truth};
 
 /// The diagram of a scene and path.
@@ -25,10 +28,13 @@ pub struct Precision {
     pub path: String,
     pub items: usize,
     pub cameras: usize,
+    /// Processes that were timed; an interval needs three or more.
+    pub processes: usize,
+    /// In each process.
     pub rounds: usize,
-    /// Largest |ratio - 1| of a structure entered twice with the default
-    /// culling: smaller differences of time are ties.
-    pub noise_floor: f64,
+    /// Time of the first structure with the default culling, entered a second
+    /// time, / time of itself: a check whose interval is to hold 1.
+    pub twin: Option<Estimate>,
     /// Fastest first; what could not be measured comes last.
     pub points: Vec<Point>,
     /// Indices of the points that nothing dominates, fastest first.
@@ -106,7 +112,7 @@ struct Stored {
 
 /// u8 and u16 codes, on one grid or on one for each block, with the default
 /// view and with the exact test.
-fn quantised(kernel: Kernel, scene: &Scene, cameras: &[Camera], truths: &[Truth]) -> Vec<Stored> {
+fn quantised(kernel: Kernel, scene: &Scene, cameras: &[Camera], truths: Truths) -> Vec<Stored> {
     let cullings = [CullingTest::SixPlane, CullingTest::Exact].map(|test| Culling {
         test,
         ..Culling::default()
@@ -143,6 +149,77 @@ fn quantised(kernel: Kernel, scene: &Scene, cameras: &[Camera], truths: &[Truth]
     all
 }
 
+/// Everything that points are made of, the same in every process.
+struct Built<'a> {
+    judged: Vec<Judged>,
+    structures: Vec<(&'a str, Indexes)>,
+    stored: Vec<Stored>,
+}
+
+/// One way to answer: a structure with a culling.
+struct Way<'b> {
+    structure: &'b str,
+    index: Option<&'b dyn DynIndex>,
+    judged: &'b Judged,
+}
+
+impl<'a> Built<'a> {
+    fn new(
+        input: &PrecisionInput<'a>,
+        cameras: &[Camera],
+        truths: Truths,
+    ) -> Result<Built<'a>, BuildError> {
+        let (scene, structures) = (input.scene, input.structures);
+        let judged = cullings().into_iter().map(|culling| {
+            let items = culling.test.items(&scene.items);
+            Judged::new(scene, &items, cameras, truths, culling)
+        });
+        let execution = structures.first().map(|spec| spec.execution);
+        let indexed = structures
+            .iter()
+            .map(|spec| Ok((spec.label.as_str(), Indexes::new(spec, scene)?)));
+        Ok(Built {
+            judged: judged.collect(),
+            structures: indexed.collect::<Result<_, BuildError>>()?,
+            stored: quantised(execution.unwrap_or_default().kernel, scene, cameras, truths),
+        })
+    }
+
+    /// All points in their order.
+    fn ways(&self) -> Vec<Way<'_>> {
+        let of_structures = self.structures.iter().flat_map(|(structure, indexes)| {
+            self.judged.iter().map(|judged| Way {
+                structure,
+                index: Some(indexes.of(judged.culling.test)),
+                judged,
+            })
+        });
+        let of_stored = self.stored.iter().flat_map(|stored| {
+            stored.judged.iter().map(|judged| Way {
+                structure: &stored.label,
+                index: stored.index.as_deref(),
+                judged,
+            })
+        });
+        of_structures.chain(of_stored).collect()
+    }
+}
+
+impl<'b> Way<'b> {
+    fn competitor(&self, expected: Vec<u64>) -> Competitor<'b> {
+        let (index, views) = (self.index, &self.judged.views);
+        Competitor {
+            ask: match index {
+                Some(index) => Box::new(move |n, out| index.see(views[n].as_any(), out)),
+                None => Box::new(|_, _| ()),
+            },
+            ask_many: None,
+            expected,
+            least_ns: None,
+        }
+    }
+}
+
 /// The cameras that are looked at: at most `most`, evenly spread.
 fn cameras_of(path: &CameraPath, most: usize) -> Vec<Camera> {
     let count = path.cameras.len();
@@ -151,7 +228,53 @@ fn cameras_of(path: &CameraPath, most: usize) -> Vec<Camera> {
     chosen.collect()
 }
 
-/// Measures all points; `None` if stopped.
+/// What all processes time: the plan is the same for each.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct PointPlan {
+    /// Places of the points that are timed; the twin, where there is one, last.
+    timed: Vec<usize>,
+    schedule: Schedule,
+    /// By timed point and camera: ids.
+    expected: Vec<Vec<u64>>,
+}
+
+/// All points, checked and judged, but not timed.
+pub struct Prepared {
+    pub plan: PointPlan,
+    /// Place of the twin's original among those that are timed.
+    twin: Option<usize>,
+    precision: Precision,
+}
+
+/// What a diagram is drawn of.
+#[derive(Clone, Copy)]
+pub struct PrecisionInput<'a> {
+    pub scene: &'a Scene,
+    pub path: &'a CameraPath,
+    pub structures: &'a [StructureSpec],
+    /// Of the path, evenly spread.
+    pub most_cameras: usize,
+    pub protocol: &'a Protocol,
+}
+
+/// Measures all points in this process alone: times without intervals. `None` if
+/// stopped. With more processes: [`prepare`], [`time`] in each of them,
+/// [`Prepared::conclude`].
+///
+/// # Errors
+/// A structure that refuses the scene.
+pub fn measure_points(
+    input: &PrecisionInput,
+    stop: &dyn Fn() -> bool,
+) -> Result<Option<Precision>, BuildError> {
+    let Some(prepared) = prepare(input, stop)? else {
+        return Ok(None);
+    };
+    let times = time(input, &prepared.plan, stop)?;
+    Ok(times.map(|times| prepared.conclude(&[times])))
+}
+
+/// Checks and judges all points, and plans how they are timed; `None` if stopped.
 ///
 /// Every answer is compared with the plain loop before it is timed, and the
 /// plain loop with the exact truth: O(cameras * items) verdicts of some 50 ns
@@ -159,136 +282,133 @@ fn cameras_of(path: &CameraPath, most: usize) -> Vec<Camera> {
 ///
 /// # Errors
 /// A structure that refuses the scene.
-pub fn measure_points(
-    scene: &Scene,
-    path: &CameraPath,
-    structures: &[StructureSpec],
-    most_cameras: usize,
-    protocol: &Protocol,
+pub fn prepare(
+    input: &PrecisionInput,
     stop: &dyn Fn() -> bool,
-) -> Result<Option<Precision>, BuildError> {
-    let cameras = cameras_of(path, most_cameras);
-    let truths = cameras.iter().filter_map(|camera| {
-        // A frame always makes a pose.
-        Truth::of_scene(camera, scene)
-    });
-    let truths: Vec<Truth> = truths.collect();
-    let mut judged = Vec::new();
-    for culling in cullings() {
+) -> Result<Option<Prepared>, BuildError> {
+    let scene = input.scene;
+    let cameras = cameras_of(input.path, input.most_cameras);
+    let truths = cameras.iter();
+    // A frame always makes a pose.
+    let truths: Vec<Truth> = truths.filter_map(|c| Truth::of_scene(c, scene)).collect();
+    let built = Built::new(input, &cameras, Some(&truths))?;
+    drop(truths);
+    let ways = built.ways();
+    let (mut points, mut timed, mut competitors) = (Vec::new(), Vec::new(), Vec::new());
+    let mut twin = None;
+    for way in &ways {
         if stop() {
             return Ok(None);
         }
-        let items = culling.test.items(&scene.items);
-        judged.push(Judged::new(scene, &items, &cameras, &truths, culling));
-    }
-    let specs = structures.first().map(|spec| spec.execution);
-    let kernel = specs.unwrap_or_default().kernel;
-    let quantised = quantised(kernel, scene, &cameras, &truths);
-    drop(truths);
-    let mut indexes = Vec::with_capacity(structures.len());
-    for spec in structures {
-        indexes.push(Indexes::new(spec, scene)?);
-    }
-    let mut points = Vec::new();
-    // Which of the points are timed, in the order of the competitors.
-    let mut timed_points = Vec::new();
-    let mut competitors = Vec::new();
-    for (spec, indexes) in structures.iter().zip(&indexes) {
-        for judged in &judged {
-            let index = indexes.of(judged.culling.test);
-            let mut point = Point::new(&spec.label, judged);
+        let judged = way.judged;
+        let mut point = Point::new(way.structure, judged);
+        if let Some(index) = way.index {
             point.memory(index.memory(), scene.items.len());
-            if judged.refused.is_none() {
-                match checked(index, judged, scene.items.len()) {
-                    Ok(()) => {
-                        timed_points.push(points.len());
-                        competitors.push(competitor(index, judged));
+            let has_views = judged.refused.is_none();
+            match has_views.then(|| checked(index, judged, scene.items.len())) {
+                None => {}
+                Some(Ok(())) => {
+                    if judged.culling == Culling::default() {
+                        twin.get_or_insert(timed.len());
                     }
-                    Err(wrong) => (point.status, point.reason) = (wrong.status, wrong.reason),
+                    timed.push(points.len());
+                    competitors.push(way.competitor(judged.counts()));
                 }
-            }
-            points.push(point);
-        }
-    }
-    for Stored {
-        label,
-        index,
-        judged,
-    } in &quantised
-    {
-        for judged in judged {
-            let mut point = Point::new(label, judged);
-            if let Some(index) = index {
-                point.memory(index.memory(), scene.items.len());
-                match checked(index.as_ref(), judged, scene.items.len()) {
-                    Ok(()) => {
-                        timed_points.push(points.len());
-                        competitors.push(competitor(index.as_ref(), judged));
-                    }
-                    Err(wrong) => (point.status, point.reason) = (wrong.status, wrong.reason),
-                }
-            }
-            points.push(point);
-        }
-    }
-    // The default culling of every structure once more: what equal work looks
-    // like in this run.
-    let mut twins = Vec::new();
-    for indexes in &indexes {
-        let standard = judged.iter().find(|j| j.culling == Culling::default());
-        if let Some(judged) = standard.filter(|j| j.refused.is_none()) {
-            let index = indexes.of(judged.culling.test);
-            twins.push(competitors.len());
-            competitors.push(competitor(index, judged));
-        }
-    }
-    let Some(mut timed) = timed_rounds(cameras.len(), &competitors, protocol, stop) else {
-        return Ok(None);
-    };
-    let competitor_count = competitors.len();
-    drop(competitors);
-    let twins = timed.split_off(competitor_count - twins.len());
-    let mut rounds = 0;
-    let mut series = Vec::new();
-    for (&place, timed) in timed_points.iter().zip(&timed) {
-        match timed {
-            Ok(timed) => {
-                rounds = rounds.max(timed.rounds);
-                points[place].time(timed, scene.items.len());
-                series.push(timed);
-            }
-            Err(wrong) => {
-                points[place].status = wrong.status;
-                points[place].reason = wrong.reason.clone();
+                Some(Err(wrong)) => (point.status, point.reason) = (wrong.status, wrong.reason),
             }
         }
+        points.push(point);
     }
-    let stability = stability(&series, cameras.len());
-    let noise_floor = noise_floor(&points, &twins);
-    points.sort_by(|a, b| {
-        let key = |p: &Point| p.query_ns.unwrap_or(f64::INFINITY);
-        key(a).total_cmp(&key(b))
-    });
-    mark_dominated(&mut points, noise_floor);
-    Ok(Some(Precision {
-        scene: scene.name.clone(),
-        path: path.name.clone(),
-        items: scene.items.len(),
-        cameras: cameras.len(),
-        rounds,
-        noise_floor,
-        front: (0..points.len()).filter(|&i| points[i].on_front).collect(),
-        points,
-        stability,
+    if let Some(original) = twin {
+        let way = &ways[timed[original]];
+        competitors.push(way.competitor(way.judged.counts()));
+        timed.push(timed[original]);
+    }
+    let cameras = cameras.len();
+    let schedule = Schedule::new(cameras, &competitors, input.protocol);
+    Ok(Some(Prepared {
+        precision: Precision {
+            scene: scene.name.clone(),
+            path: input.path.name.clone(),
+            items: scene.items.len(),
+            cameras,
+            processes: 0,
+            rounds: schedule.rounds as usize,
+            twin: None,
+            points,
+            front: Vec::new(),
+            stability: Vec::new(),
+        },
+        plan: PointPlan {
+            timed,
+            schedule,
+            expected: competitors.into_iter().map(|c| c.expected).collect(),
+        },
+        twin,
     }))
 }
 
-fn competitor<'a>(index: &'a dyn DynIndex, judged: &'a Judged) -> Competitor<'a> {
-    Competitor {
-        ask: Box::new(move |n, out| index.see(judged.views[n].as_any(), out)),
-        ask_many: None,
-        expected: judged.answers.iter().map(|a| a.len() as u64).collect(),
-        least_ns: None,
+/// Times in this process what was planned; `None` if stopped.
+///
+/// # Errors
+/// A structure that refuses the scene.
+///
+/// # Panics
+/// If the scene is not the one that was planned for.
+pub fn time(
+    input: &PrecisionInput,
+    plan: &PointPlan,
+    stop: &dyn Fn() -> bool,
+) -> Result<Option<ProcessTimes>, BuildError> {
+    let cameras = cameras_of(input.path, input.most_cameras);
+    let built = Built::new(input, &cameras, None)?;
+    let ways = built.ways();
+    let planned = plan.timed.iter().zip(&plan.expected);
+    let competitors: Vec<Competitor> = planned
+        .map(|(&point, expected)| ways[point].competitor(expected.clone()))
+        .collect();
+    let timed = timed(&competitors, &plan.schedule, input.protocol, stop);
+    Ok(timed.map(|timed| {
+        let by_camera = timed.iter().map(|timed| match timed {
+            Ok(timed) => by_camera(timed, cameras.len()),
+            Err(_) => Vec::new(),
+        });
+        ProcessTimes {
+            by_camera: by_camera.collect(),
+            ..ProcessTimes::of(&timed)
+        }
+    }))
+}
+
+impl Prepared {
+    /// The diagram from the times of all processes.
+    pub fn conclude(self, processes: &[ProcessTimes]) -> Precision {
+        let Prepared {
+            mut precision,
+            mut plan,
+            twin,
+        } = self;
+        let times = OverProcesses::of(processes);
+        if let Some(original) = twin {
+            plan.timed.pop();
+            precision.twin = times.ratio(plan.timed.len(), original);
+        }
+        let points = &mut precision.points;
+        for (task, &point) in plan.timed.iter().enumerate() {
+            points[point].time(&times, task, precision.items);
+        }
+        let timed: Vec<usize> = (0..plan.timed.len())
+            .filter(|&task| times.failure(task).is_none())
+            .collect();
+        precision.stability = stability(&timed, processes, precision.cameras, precision.rounds);
+        points.sort_by(|a, b| {
+            let key = |p: &Point| p.query_ns.unwrap_or(f64::INFINITY);
+            key(a).total_cmp(&key(b))
+        });
+        mark_dominated(points, &|a, b| times.is_faster(a, b));
+        precision.front = (0..points.len()).filter(|&i| points[i].on_front).collect();
+        precision.processes = processes.len();
+        precision
     }
 }
 

@@ -1,11 +1,9 @@
 //! How many cameras it takes until the order of the points by time stands: the
 //! sampling error of the diagram itself.
 
-use std::collections::BTreeMap;
-
 use serde::Serialize;
 
-use crate::measure::Timed;
+use crate::measure::{ProcessTimes, Timed};
 use crate::statistics::median;
 
 /// How well the order of all points by time, taken from a number of cameras,
@@ -15,48 +13,47 @@ pub struct StableAfter {
     pub cameras: usize,
     /// Share of pairs of points that come in the same order.
     pub pairs_in_order: f64,
-    /// CPU time that measuring this many took, all points and rounds.
+    /// CPU time that measuring this many took, all points, rounds and processes.
     pub seconds: f64,
 }
 
+/// CPU ns of every camera, median over the rounds. A sample is the mean over its
+/// batch and stands for all cameras up to the next: points have batches of their
+/// own.
+pub(super) fn by_camera(timed: &Timed, cameras: usize) -> Vec<f64> {
+    let mut laps = vec![Vec::new(); cameras];
+    for (i, sample) in timed.samples.iter().enumerate() {
+        let next = timed.samples.get(i + 1);
+        let next = next.filter(|next| next.round == sample.round);
+        let end = next.map_or(cameras, |next| next.frame as usize);
+        for camera in &mut laps[sample.frame as usize..end] {
+            camera.push(sample.cpu_ns);
+        }
+    }
+    laps.iter().map(|ns| median(ns).unwrap_or(0.0)).collect()
+}
+
 /// The order of the points by time from the first 1, 2, 4, .. cameras of an
-/// evenly spread order, against the order from all.
-pub(super) fn stability(series: &[&Timed], cameras: usize) -> Vec<StableAfter> {
-    // Per point and camera: median over the rounds.
-    let by_camera: Vec<BTreeMap<u32, f64>> = series
-        .iter()
-        .map(|timed| {
-            let mut laps: BTreeMap<u32, Vec<f64>> = BTreeMap::new();
-            for (i, sample) in timed.samples.iter().enumerate() {
-                // A sample is the mean over its batch and stands for all
-                // cameras up to the next: points have batches of their own.
-                let next = timed.samples.get(i + 1);
-                let next = next.filter(|next| next.round == sample.round);
-                let end = next.map_or(cameras as u32, |next| next.frame);
-                for camera in sample.frame..end {
-                    laps.entry(camera).or_default().push(sample.cpu_ns);
-                }
-            }
-            let medians = laps
-                .into_iter()
-                .filter_map(|(c, ns)| Some((c, median(&ns)?)));
-            medians.collect()
-        })
-        .collect();
-    let spent = |of: &BTreeMap<u32, f64>, wanted: &dyn Fn(u32) -> bool| -> f64 {
-        of.iter()
-            .filter(|(c, _)| wanted(**c))
-            .map(|(_, ns)| ns)
-            .sum()
+/// evenly spread order, against the order from all; times are sums over the
+/// processes.
+pub(super) fn stability(
+    tasks: &[usize],
+    processes: &[ProcessTimes],
+    cameras: usize,
+    rounds: usize,
+) -> Vec<StableAfter> {
+    let spent = |task: usize, wanted: &dyn Fn(usize) -> bool| -> f64 {
+        let own = processes.iter().map(|process| &process.by_camera[task]);
+        let wanted = own.flat_map(|own| own.iter().enumerate().filter(|(c, _)| wanted(*c)));
+        wanted.map(|(_, ns)| ns).sum()
     };
-    let all: Vec<f64> = by_camera.iter().map(|of| spent(of, &|_| true)).collect();
-    let rounds = series.iter().map(|t| t.rounds).max().unwrap_or(0);
+    let all: Vec<f64> = tasks.iter().map(|&task| spent(task, &|_| true)).collect();
     let mut rows = Vec::new();
     let mut count = 1;
     while count < 2 * cameras {
         let used = count.min(cameras);
-        let chosen = |camera: u32| (camera as usize * used) % cameras < used;
-        let some: Vec<f64> = by_camera.iter().map(|of| spent(of, &chosen)).collect();
+        let chosen = |camera: usize| (camera * used) % cameras < used;
+        let some: Vec<f64> = tasks.iter().map(|&task| spent(task, &chosen)).collect();
         let pairs = (0..all.len()).flat_map(|i| (i + 1..all.len()).map(move |k| (i, k)));
         let (mut same, mut total) = (0u64, 0u64);
         for (i, k) in pairs {
@@ -99,19 +96,30 @@ mod tests {
         }
     }
 
+    /// In one process.
+    fn rows(series: &[&Timed], cameras: usize) -> Vec<StableAfter> {
+        let by_camera = series.iter().map(|timed| by_camera(timed, cameras));
+        let process = ProcessTimes {
+            by_camera: by_camera.collect(),
+            ..ProcessTimes::default()
+        };
+        let tasks: Vec<usize> = (0..series.len()).collect();
+        stability(&tasks, &[process], cameras, 2)
+    }
+
     #[test]
     fn the_order_is_compared_with_the_one_from_all_cameras() {
         // The first is slower from the first camera (0), even from two (0 and
         // 2), and faster from all.
         let (a, b) = (timed(&[10.0, 1.0, 1.0, 1.0], 1), timed(&[5.0; 4], 1));
-        let rows = stability(&[&a, &b], 4);
+        let rows = rows(&[&a, &b], 4);
         let shares: Vec<_> = rows.iter().map(|r| (r.cameras, r.pairs_in_order)).collect();
         assert_eq!(shares, [(1, 0.0), (2, 0.0), (4, 1.0)]);
         let spent: Vec<f64> = rows.iter().map(|r| (r.seconds * 1e9).round()).collect();
         assert_eq!(spent, [30.0, 42.0, 66.0]);
         // Not a power of two: the last row is all of them.
         let c = timed(&[3.0, 2.0, 1.0], 1);
-        let counts: Vec<_> = stability(&[&c], 3).iter().map(|r| r.cameras).collect();
+        let counts: Vec<_> = self::rows(&[&c], 3).iter().map(|r| r.cameras).collect();
         assert_eq!(counts, [1, 2, 3]);
     }
 
@@ -119,7 +127,7 @@ mod tests {
     fn points_with_batches_of_their_own_are_compared_camera_by_camera() {
         // All in one lap: the mean is 6 a camera, 24 in all, against 20.
         let (batched, single) = (timed(&[6.0], 4), timed(&[5.0; 4], 1));
-        let rows = stability(&[&batched, &single], 4);
+        let rows = rows(&[&batched, &single], 4);
         assert!(rows.iter().all(|r| r.pairs_in_order == 1.0), "{rows:?}");
         assert_eq!((rows[2].seconds * 1e9).round(), 88.0);
     }

@@ -241,7 +241,7 @@ impl Stream {
 ///
 /// ```
 /// use cullbench::index::Registry;
-/// use cullbench::measure::{Effort, Plan, PlannedScene};
+/// use cullbench::measure::{Beside, Effort, Plan, PlannedScene};
 /// use cullbench::report::run_here;
 ///
 /// let plan = Plan {
@@ -254,7 +254,7 @@ impl Stream {
 ///     cullings: vec![Default::default()],
 ///     lens: Default::default(),
 ///     load: Default::default(),
-///     effort: Effort { processes: 1, rounds: [3, 3], task_ns: 1e5, pass_ns: 1e6, beside: true },
+///     effort: Effort { processes: 1, rounds: [3, 3], task_ns: 1e5, pass_ns: 1e6, beside: Beside::All },
 ///     bounds: false,
 ///     seed: 1,
 /// };

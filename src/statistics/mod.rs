@@ -2,7 +2,6 @@
 //! Pure functions of numbers; each names its source. Nothing else in the crate
 //! computes an interval.
 
-mod bootstrap;
 mod front;
 mod holm;
 mod judgement;
@@ -18,14 +17,13 @@ mod student;
 mod trimmed;
 mod unpaired;
 
-pub use bootstrap::{Estimate, bootstrap_median};
 pub use front::{Tradeoff, dominated_by};
 pub use holm::holm;
 pub use judgement::{Change, Judgement, judge, resolved};
 pub use means::{geometric_mean, interquartile_mean};
-pub use one_run::{Shown, one_run};
+pub use one_run::{Estimate, Shown, one_run, ratio};
 pub use quantiles::{median, quantile, sorted};
-pub use ranking::{Placed, ranks};
+pub use ranking::{ALPHA, Placed, is_less, ranks};
 pub use slope::slope;
 pub use speeds::two_speeds;
 pub use trimmed::{Trimmed, moderate, trimmed_mean};

@@ -1,10 +1,20 @@
 //! What a run shows of one structure: its time, and its speed-up.
 
+use serde::Serialize;
+
 use super::trimmed::centre;
 use super::{Trimmed, trimmed_mean};
 
 /// Level of the intervals shown.
 const LEVEL: f64 = 0.95;
+
+/// A value with its 95 % interval; NaN on both sides where it has none.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct Estimate {
+    pub value: f64,
+    pub lower: f64,
+    pub upper: f64,
+}
 
 /// A structure's time and its speed-up over the reference, each with its 95 %
 /// interval; no intervals below three processes.
@@ -48,6 +58,19 @@ pub fn one_run(reference: &[f64], own: &[f64]) -> Option<Shown> {
         speedup: (-r).exp(),
         speedup_lower: ratio.map(|(_, slowest)| (-slowest).exp()),
         speedup_upper: ratio.map(|(fastest, _)| (-fastest).exp()),
+    })
+}
+
+/// Time of `own` / time of `other`: the ratio of the two values that [`one_run`]
+/// shows beside the same `reference`. `None` as there.
+pub fn ratio(reference: &[f64], own: &[f64], other: &[f64]) -> Option<Estimate> {
+    let value = one_run(reference, own)?.value / one_run(reference, other)?.value;
+    let differences: Vec<f64> = own.iter().zip(other).map(|(a, b)| a - b).collect();
+    let margin = estimate(&differences).map_or(f64::NAN, |found| found.margin(0.5 + LEVEL / 2.0));
+    Some(Estimate {
+        value,
+        lower: value * (-margin).exp(),
+        upper: value * margin.exp(),
     })
 }
 

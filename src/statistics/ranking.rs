@@ -4,6 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use super::trimmed::{centre, paired_difference};
 
+/// Level at which two are told apart.
+pub const ALPHA: f64 = 0.05;
+
 /// The rank of one structure.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub struct Placed {
@@ -51,6 +54,13 @@ pub fn ranks(values: &[Vec<f64>], alpha: f64) -> Vec<Placed> {
     placed
 }
 
+/// Whether a paired test over the processes finds `a` less than `b` (Yuen's,
+/// two-sided, `alpha`); under three processes, whether it is by the trimmed mean.
+pub fn is_less(a: &[f64], b: &[f64], alpha: f64) -> bool {
+    let means = centre(a).zip(centre(b));
+    means.is_some_and(|(a, b)| a < b) && told_apart(a, b, alpha)
+}
+
 fn told_apart(leader: &[f64], other: &[f64], alpha: f64) -> bool {
     match paired_difference(leader, other) {
         Some(difference) => difference.p_above(0.0) <= alpha / 2.0,
@@ -84,6 +94,18 @@ mod tests {
         let wanted = [(3, false), (1, false), (4, false), (2, false)];
         assert_eq!(found(&values), wanted);
         assert_eq!(found(&[]), []);
+    }
+
+    #[test]
+    fn less_is_what_a_test_finds_and_order_where_none_is_possible() {
+        let level = |shift: f64| vec![shift, shift + 0.1, shift - 0.1, shift];
+        assert!(is_less(&level(1.0), &level(2.0), 0.05));
+        assert!(!is_less(&level(2.0), &level(1.0), 0.05));
+        // The same on the mean, and in every process another order.
+        let swinging = [1.4, 0.7, 0.8, 1.2];
+        assert!(!is_less(&level(1.0), &swinging, 0.05) && !is_less(&swinging, &level(1.0), 0.05));
+        assert!(is_less(&[1.0], &[1.1], 0.05) && !is_less(&[1.0], &[1.0], 0.05));
+        assert!(!is_less(&[], &[1.0], 0.05) && !is_less(&[1.0], &[], 0.05));
     }
 
     proptest! {

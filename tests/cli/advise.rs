@@ -26,6 +26,17 @@ fn small() -> &'static Value {
     OUTCOME.get_or_init(|| advice(Path::new("."), SMALL))
 }
 
+/// The ratio is that of the two times shown, within its interval.
+fn assert_ratio(row: &Value, [ratio, time, other]: &[&str; 3]) {
+    let shown = number(row, time) / number(row, other);
+    assert!((number(row, ratio) / shown - 1.0).abs() < 1e-9, "{row}");
+    let ends = ["lower", "upper"].map(|end| number(row, &format!("{ratio}_{end}")));
+    assert!(
+        ends[0] <= shown * (1.0 + 1e-9) && shown <= ends[1] * (1.0 + 1e-9),
+        "{row}"
+    );
+}
+
 fn rule<'a>(advice: &'a Value, name: &str) -> &'a Value {
     let mut rules = array(advice, "omissions").iter();
     rules.find(|o| o["rule"] == name).expect(name)
@@ -33,9 +44,10 @@ fn rule<'a>(advice: &'a Value, name: &str) -> &'a Value {
 
 #[test]
 fn json_has_the_documented_fields() {
-    let top = "scene path items skipped_items cameras options noise_floor structure test omissions";
+    let top =
+        "scene path items skipped_items cameras options processes twin structure test omissions";
     let options = "draw_ns tolerance moved queries_per_update";
-    let structure = "name ties region_search region_search_ties noise_floor rows";
+    let structure = "name ties region_search region_search_ties rows";
     let times = "query_ns query_ns_lower query_ns_upper";
     let structure_row = format!(
         "structure status reason {times} speedup build_ms memory_bytes_per_item \
@@ -61,6 +73,7 @@ fn json_has_the_documented_fields() {
     };
     one(advice, top);
     one(&advice["options"], options);
+    one(&advice["twin"], "value lower upper");
     one(&advice["structure"], structure);
     one(&advice["test"], test);
     for (rows, fields) in [
@@ -114,7 +127,7 @@ fn every_rule_is_there_once_with_both_sides_checked() {
         );
         for check in array(omission, "checks") {
             assert!(number(check, "kept_ns") > 0.0 && number(check, "left_out_ns") > 0.0);
-            assert!(number(check, "ratio_lower") <= number(check, "ratio_upper"));
+            assert_ratio(check, &["ratio", "kept_ns", "left_out_ns"]);
             if check["same_expected"] == true {
                 assert_eq!(check["same_answers"], true, "{omission}");
                 assert_eq!(check["kept_excess"], check["left_out_excess"], "{omission}");
@@ -162,6 +175,54 @@ fn tests_and_structures_have_their_rows() {
         let total = number(row, "query_ns") + drawn;
         assert!((number(row, "total_ns") - total).abs() < 1e-6 * total);
     }
+}
+
+#[test]
+fn one_process_gives_the_same_answers_without_intervals_or_ties() {
+    let one = advice(Path::new("."), &format!("{SMALL} --processes 1"));
+    assert_eq!(
+        (number(small(), "processes"), number(&one, "processes")),
+        (10.0, 1.0)
+    );
+    for name in ["ties", "region_search_ties"] {
+        assert!(array(&one["structure"], name).is_empty(), "{name}");
+    }
+    assert!(array(&one["test"], "ties").is_empty());
+    let both = |name: &str| {
+        let rows = [small(), &one].map(|advice| array(advice, name));
+        rows[0].iter().zip(rows[1])
+    };
+    let has_interval = |row: &Value, time: &str| {
+        let ends = ["lower", "upper"].map(|end| row[format!("{time}_{end}")].is_number());
+        assert_eq!(ends[0], ends[1]);
+        ends[0]
+    };
+    for (many, one) in both("omissions") {
+        assert_eq!(many["rule"], one["rule"]);
+        for (many, one) in array(many, "checks").iter().zip(array(one, "checks")) {
+            assert!(
+                has_interval(many, "ratio") && !has_interval(one, "ratio"),
+                "{one}"
+            );
+            for field in set("on same_answers same_expected kept_excess left_out_excess") {
+                assert_eq!(many[field], one[field], "{field}");
+            }
+        }
+    }
+    for name in ["structure", "test"] {
+        for (advice, wanted) in [(small(), true), (&one, false)] {
+            let mut rows = array(&advice[name], "rows").iter();
+            assert!(
+                rows.all(|row| has_interval(row, "query_ns") == wanted),
+                "{name}"
+            );
+        }
+    }
+    let told = works(Path::new("."), &format!("{SMALL} --processes 1"));
+    assert!(
+        told.contains("1 process: times without intervals"),
+        "{told}"
+    );
 }
 
 #[test]
@@ -297,6 +358,7 @@ fn mistakes_are_one_line() {
         ("--moved 0", "--moved is '0' | above 0"),
         ("--moved 101%", "--moved is '101%' | at most 100%"),
         ("--moved some", "--moved is 'some'"),
+        ("--processes 0", "0 | --processes"),
         ("--fovy 0", "field of view is 0"),
     ] {
         all_refused(&folder, &[format!("{line} {more}")], wanted);

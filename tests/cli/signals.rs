@@ -108,6 +108,8 @@ fn ctrl_c_ends_commands_that_keep_nothing() {
         "query --scene uniform:n=2000000 --cameras orbit:frames=1000",
         "scene generate uniform:n=2000000",
         "scene generate uniform:n=2000000 --out kept.csv",
+        "advise --scene uniform:n=3000 --processes 1000",
+        "precision --scene uniform:n=300 --cubes 0 --processes 1000",
     ];
     for line in commands {
         let child = start(folder.path(), line);

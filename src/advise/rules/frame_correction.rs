@@ -38,22 +38,25 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
         Some(error) => format!("{error:.1e}"),
         None => "lost".to_owned(),
     };
-    let mut omission = omission
-        .compares(steps as f64 * DRIFT, tolerance * MUCH_LESS)
-        .because(format!(
-            "{steps} steps of {DRIFT:.0e}; walked: {} uncorrected at {:.0} ns a step, {} with a Newton step \
-             to the polar factor every 100 at {:.0} ns; a tenth of {tolerance:.0e} is used up after some {:.0} steps",
-            walked(left_out),
-            left_out.ns_per_step,
-            walked(kept),
-            kept.ns_per_step,
-            tolerance * MUCH_LESS / DRIFT
-        ));
-    omission.saving = Some(1.0 - left_out.ns_per_step / kept.ns_per_step);
+    let (kept_error, left_out_error) = (walked(kept), walked(left_out));
+    let mut omission = omission.compares(steps as f64 * DRIFT, tolerance * MUCH_LESS);
     // What was walked outweighs the estimate.
     if let Some(error) = left_out.error {
         omission.confirmed = omission.predicted.map(|said| said == (error <= tolerance));
         omission.predicted = Some(error <= tolerance);
     }
-    Ok(omission.draft(Vec::new()))
+    let mut draft = omission.draft(Vec::new());
+    draft.once_ns = vec![left_out.ns_per_step, kept.ns_per_step];
+    Ok(draft.finished_by(move |omission, aside| {
+        let [left_out_ns, kept_ns] = aside.once_ns[..] else {
+            return;
+        };
+        omission.reason = format!(
+            "{steps} steps of {DRIFT:.0e}; walked: {left_out_error} uncorrected at {left_out_ns:.0} ns a step, \
+             {kept_error} with a Newton step to the polar factor every 100 at {kept_ns:.0} ns; a tenth of \
+             {tolerance:.0e} is used up after some {:.0} steps",
+            tolerance * MUCH_LESS / DRIFT
+        );
+        omission.saving = Some(1.0 - left_out_ns / kept_ns);
+    }))
 }

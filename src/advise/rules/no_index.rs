@@ -1,22 +1,20 @@
 //! The index itself: below some number of items a scan is as fast. The
 //! crossover is measured on evenly spread parts of the scene, by the path's own
-//! cameras.
+//! cameras, side by side with everything else.
+
+use std::rc::Rc;
 
 use super::super::AdviseError;
 use super::super::case::Case;
 use super::super::omission::{By, Draft, Forced, LeftOutIf, Omission, Way};
 use crate::geometry::Aabb;
-use crate::index::StructureSpec;
-use crate::measure::{Competitor, Protocol, paired_ratio, timed_rounds};
+use crate::index::DynIndex;
 
 pub(super) const NAME: &str = "no-index";
 
-/// The smallest part that is looked at.
+/// The smallest part that is looked at, and the largest beside the whole.
 const LEAST: usize = 32;
-/// Time of the scan / time of the tree at which no larger part is looked at, if
-/// it has so many items: for fewer the ratio goes up and down.
-const CLEAR: f64 = 2.0;
-const MANY: usize = 4096;
+const MOST: usize = 16_384;
 
 pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> {
     let omission = Omission::new(
@@ -28,88 +26,51 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
     );
     let (scan, tree) = (&case.scan, &case.spec);
     let items = &case.scene().items;
-    let parts = crossover(case, scan, tree)?;
-    let crossing = items_at(&parts);
-    let told: Vec<String> = parts
-        .iter()
-        .map(|(count, ratio)| format!("{ratio:.2} at {count}"))
-        .collect();
-    let omission = omission
-        .compares(items.len() as f64, crossing)
-        .because(format!(
-            "time of {} / {} on parts of the scene: {}",
-            scan.label,
-            tree.label,
-            told.join(", ")
-        ));
-    let index = scan.build(items)?;
+    let whole: Rc<dyn DynIndex> = Rc::from(scan.build(items)?);
     let forced = Forced {
         on: format!("{} against {}", tree.label, scan.label),
         kept: Way::Base,
-        left_out: Way::Other(Box::new(move |n, out| {
-            index.see(case.workload.views[n].as_any(), out);
-        })),
+        left_out: asked(case, whole.clone()),
         same: true,
         judged: true,
     };
-    Ok(omission.draft(vec![forced]))
-}
-
-/// Time of the scan / time of the tree on growing parts of the scene, up to
-/// where the tree is clearly ahead.
-fn crossover(
-    case: &Case,
-    scan: &StructureSpec,
-    tree: &StructureSpec,
-) -> Result<Vec<(usize, f64)>, AdviseError> {
-    let items = &case.scene().items;
-    let protocol = Protocol {
-        rounds: [5, 9],
-        task_ns: 75e6,
-        ..case.protocol
-    };
-    let mut parts = Vec::new();
-    let mut count = LEAST.min(items.len());
-    loop {
+    let mut counts = Vec::new();
+    let mut pairs = Vec::new();
+    for count in parts_of(items.len()) {
         let part: Vec<Aabb> = (0..count).map(|i| items[i * items.len() / count]).collect();
-        let ratio = ratio_on(case, &part, [scan, tree], &protocol)?;
-        parts.extend(ratio.map(|ratio| (count, ratio)));
-        if count == items.len() || (count >= MANY && ratio.is_none_or(|ratio| ratio > CLEAR)) {
-            return Ok(parts);
-        }
-        count = (2 * count).min(items.len());
+        let both = [Rc::from(scan.build(&part)?), Rc::from(tree.build(&part)?)];
+        pairs.push(both.map(|index| asked(case, index)));
+        counts.push(count);
     }
+    pairs.push([asked(case, whole), Way::Base]);
+    counts.push(items.len());
+    let names = format!("{} / {}", scan.label, tree.label);
+    let mut draft = omission.draft(vec![forced]);
+    draft.pairs = pairs;
+    Ok(draft.finished_by(move |omission, aside| {
+        let ratios = aside.ratios.iter().copied();
+        let parts = counts.iter().copied().zip(ratios);
+        let parts: Vec<(usize, f64)> = parts.filter(|(_, ratio)| ratio.is_finite()).collect();
+        let told: Vec<String> = parts
+            .iter()
+            .map(|(count, ratio)| format!("{ratio:.2} at {count}"))
+            .collect();
+        omission.reason = format!("time of {names} on parts of the scene: {}", told.join(", "));
+        let all = counts.last().copied().unwrap_or(0);
+        omission.weigh(all as f64, items_at(&parts));
+    }))
 }
 
-fn ratio_on(
-    case: &Case,
-    part: &[Aabb],
-    specs: [&StructureSpec; 2],
-    protocol: &Protocol,
-) -> Result<Option<f64>, AdviseError> {
-    let mut competitors = Vec::with_capacity(2);
-    for spec in specs {
-        let index = spec.build(part)?;
-        let views = &case.workload.views;
-        let mut out = Vec::new();
-        let counts = views.iter().map(|view| {
-            out.clear();
-            index.see(view.as_any(), &mut out);
-            out.len() as u64
-        });
-        competitors.push(Competitor {
-            expected: counts.collect(),
-            ask: Box::new(move |n, out| index.see(views[n].as_any(), out)),
-            ask_many: None,
-            least_ns: None,
-        });
-    }
-    let count = case.workload.views.len();
-    let timed = timed_rounds(count, &competitors, protocol, &|| false);
-    Ok(match timed.as_deref() {
-        Some([Ok(scan), Ok(tree)]) => paired_ratio(scan, tree).map(|ratio| ratio.value),
-        _ => None,
-    })
+/// An index over items of its own, asked by the path's cameras.
+fn asked<'c>(case: &'c Case<'c>, index: Rc<dyn DynIndex>) -> Way<'c> {
+    let views = &case.workload.views;
+    Way::Other(Box::new(move |n, out| index.see(views[n].as_any(), out)))
+}
+
+/// Doubled from the smallest, all fewer than `items`.
+fn parts_of(items: usize) -> impl Iterator<Item = usize> {
+    let doubled = std::iter::successors(Some(LEAST), |count| Some(2 * count));
+    doubled.take_while(move |&count| count < items && count <= MOST)
 }
 
 /// Where the ratio crosses 1 for good: between the last part on which the scan
@@ -131,6 +92,14 @@ fn items_at(parts: &[(usize, f64)]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn parts_are_doubled_below_the_whole() {
+        let parts = |items| parts_of(items).collect::<Vec<_>>();
+        assert!(parts(32).is_empty());
+        assert_eq!(parts(129), [32, 64, 128]);
+        assert_eq!(parts(1 << 24).last(), Some(&MOST));
+    }
 
     #[test]
     fn the_crossing_lies_between_the_parts_about_it() {

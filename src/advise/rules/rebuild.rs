@@ -44,8 +44,11 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
     };
     let queries = case.options.queries_per_update;
     let (share, count) = (case.options.moved, moved.len());
-    Ok(omission.draft(vec![forced]).finished_by(move |omission| {
-        let Some(check) = omission.checks.first() else {
+    let mut draft = omission.draft(vec![forced]);
+    draft.once_ns = vec![refit_ns, rebuild_ns];
+    Ok(draft.finished_by(move |omission, aside| {
+        let (Some(check), &[refit_ns, rebuild_ns]) = (omission.checks.first(), &aside.once_ns[..])
+        else {
             return;
         };
         let slower = queries * (check.left_out_ns - check.kept_ns);

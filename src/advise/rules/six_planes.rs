@@ -35,7 +35,7 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
     };
     let draw_ns = case.options.draw_ns;
     let predicted = predicted_excess(case);
-    Ok(omission.draft(vec![forced]).finished_by(move |omission| {
+    Ok(omission.draft(vec![forced]).finished_by(move |omission, _| {
         let Some(check) = omission.checks.first() else {
             return;
         };
@@ -101,6 +101,7 @@ fn predicted_excess(case: &Case) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::super::omission::Aside;
     use super::*;
 
     #[test]
@@ -117,7 +118,7 @@ mod tests {
             ] {
                 let rule = Omission::new(NAME, "x", "y", LeftOutIf::AtMost, By::Rule);
                 let rule = rule.compares(if predicted { 0.5 } else { 2.0 }, 1.0);
-                let mut omission = rule.draft(Vec::new()).settled(Vec::new(), 0.0);
+                let mut omission = rule.settled(Vec::new(), &Aside::default(), None);
                 let mut choice = TestChoice {
                     name: Some(taken),
                     ties,

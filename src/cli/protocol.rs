@@ -1,0 +1,78 @@
+//! What a command and its workers say to each other: one request, and lines of
+//! JSON in answer. [`processes`](super::processes) is the parent's side of it,
+//! [`worker`](super::worker) the child's.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+use crate::advise::TrialPlan;
+use crate::measure::{Part, ProcessTimes, Share, TaskSamples};
+use crate::precision::PointPlan;
+
+/// Raised when requests or messages change: programs of different versions do
+/// not understand each other.
+pub const PROTOCOL: u32 = 3;
+
+/// What a worker is to do.
+#[derive(Clone, Serialize, Deserialize)]
+pub struct Request {
+    pub protocol: u32,
+    /// The arguments of the command, from which all else follows.
+    pub args: Vec<String>,
+    /// Files that stand for pipes that only the parent can read.
+    pub spooled: BTreeMap<String, PathBuf>,
+    pub job: Job,
+    /// The processor to stay on.
+    pub cpu: Option<usize>,
+    /// Decides on where its memory lies: another number for every process.
+    pub layout: u64,
+}
+
+/// One process's share of what a command measures.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Job {
+    /// Structures on a scene, by its index in the plan (`run`, `compare`,
+    /// `advise`).
+    Scene {
+        scene: usize,
+        share: Share,
+        /// Whether samples are wanted beside the parts.
+        samples: bool,
+    },
+    /// Both sides of every rule (`advise`).
+    Trials(TrialPlan, Timing),
+    /// All points (`precision`).
+    Points(PointPlan, Timing),
+}
+
+/// What a process is to know beside its plan.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+pub struct Timing {
+    pub process: u32,
+    /// Scale of the lens where the path was asked for by its visible share.
+    pub lens_scale: Option<f64>,
+}
+
+/// A line from a worker.
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Message {
+    /// The first line.
+    Ready {
+        protocol: u32,
+    },
+    /// What comes next, and of which structure.
+    Doing {
+        structure: Option<String>,
+        step: String,
+    },
+    Part(Box<Part>, Vec<TaskSamples>),
+    Times(ProcessTimes),
+    /// The scene or a path cannot be had.
+    Failed(String),
+    /// The share is done.
+    Done,
+}

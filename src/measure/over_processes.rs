@@ -1,0 +1,176 @@
+//! The times of tasks in one process, and over several: values, ratios and who
+//! is faster, by the estimators of a run.
+
+use serde::{Deserialize, Serialize};
+
+use super::results::shown;
+use super::{Timed, Verdict};
+use crate::statistics::{ALPHA, Estimate, is_less, ratio};
+
+/// What one process timed of the tasks of a schedule: plain data that goes from
+/// process to process.
+#[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
+pub struct ProcessTimes {
+    /// By task: ln of the CPU ns per query; nothing where no camera is timed.
+    pub ln_ns: Vec<Result<Option<f64>, Verdict>>,
+    /// CPU ns of what is done once and not in rounds, where there is such.
+    pub once_ns: Vec<f64>,
+    /// By task and camera: median CPU ns over the rounds, where it is wanted.
+    pub by_camera: Vec<Vec<f64>>,
+}
+
+impl ProcessTimes {
+    pub fn of(timed: &[Result<Timed, Verdict>]) -> ProcessTimes {
+        let ln_ns = timed.iter().map(|timed| match timed {
+            Ok(timed) => Ok(timed.ln_ns()),
+            Err(verdict) => Err(verdict.clone()),
+        });
+        ProcessTimes {
+            ln_ns: ln_ns.collect(),
+            ..ProcessTimes::default()
+        }
+    }
+}
+
+/// The times of the same tasks in several processes.
+pub struct OverProcesses {
+    /// By task, ln ns in each process: empty without times, or the verdict of
+    /// the first process in which it failed.
+    logs: Vec<Result<Vec<f64>, Verdict>>,
+    /// The first task with times: what slows it slows all.
+    reference: Vec<f64>,
+    /// Of what is done once, by process.
+    once: Vec<Vec<f64>>,
+}
+
+impl OverProcesses {
+    /// # Panics
+    /// If the processes have not timed the same tasks.
+    pub fn of(processes: &[ProcessTimes]) -> OverProcesses {
+        let tasks = processes.first().map_or(0, |first| first.ln_ns.len());
+        let of_task = |task: usize| {
+            let found = processes.iter().map(|p| p.ln_ns[task].clone());
+            let logs: Result<Option<Vec<f64>>, Verdict> = found.collect();
+            logs.map(Option::unwrap_or_default)
+        };
+        let logs: Vec<_> = (0..tasks).map(of_task).collect();
+        let timed = logs.iter().flatten().find(|own| !own.is_empty());
+        let once = processes.first().map_or(0, |first| first.once_ns.len());
+        // Below the resolution of a clock there may be 0.
+        let ln = |process: &ProcessTimes, i: usize| process.once_ns[i].max(1.0).ln();
+        OverProcesses {
+            reference: timed.cloned().unwrap_or_default(),
+            logs,
+            once: (0..once)
+                .map(|i| processes.iter().map(|process| ln(process, i)).collect())
+                .collect(),
+        }
+    }
+
+    /// Why a task has no times.
+    pub fn failure(&self, task: usize) -> Option<&Verdict> {
+        self.logs[task].as_ref().err()
+    }
+
+    fn own(&self, task: usize) -> &[f64] {
+        self.logs[task].as_deref().unwrap_or_default()
+    }
+
+    /// Time of a query of a task, ns.
+    pub fn ns(&self, task: usize) -> Option<Estimate> {
+        shown(&self.reference, self.own(task))
+    }
+
+    /// ln of the time of a task in each process, ns, all brought to the speed that
+    /// [`Self::ns`] shows; empty without times.
+    pub fn ln_ns(&self, task: usize) -> Vec<f64> {
+        let speed = shown(&self.reference, &self.reference);
+        let speed = speed.map_or(f64::NAN, |found| found.value.ln());
+        let both = self.own(task).iter().zip(&self.reference);
+        both.map(|(own, reference)| own - reference + speed)
+            .collect()
+    }
+
+    /// Time of what is done once, ns.
+    pub fn once_ns(&self, i: usize) -> f64 {
+        shown(&self.once[i], &self.once[i]).map_or(f64::NAN, |found| found.value)
+    }
+
+    /// Time of `task` / time of `other`: the ratio of the two that [`Self::ns`]
+    /// gives.
+    pub fn ratio(&self, task: usize, other: usize) -> Option<Estimate> {
+        ratio(&self.reference, self.own(task), self.own(other))
+    }
+
+    /// Whether the processes show a task to be faster than another.
+    pub fn is_faster(&self, task: usize, other: usize) -> bool {
+        is_less(&self.ln_ns(task), &self.ln_ns(other), ALPHA)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Status;
+    use super::*;
+
+    fn process(ln_ns: [f64; 3], once: f64) -> ProcessTimes {
+        ProcessTimes {
+            ln_ns: ln_ns.map(|ln_ns| Ok(Some(ln_ns))).into(),
+            once_ns: vec![once],
+            by_camera: Vec::new(),
+        }
+    }
+
+    /// Processes on a machine of two speeds; the third task is as fast as the
+    /// second on the mean.
+    fn processes() -> Vec<ProcessTimes> {
+        let one = |n: usize| {
+            let speed = 5.0 + if n.is_multiple_of(3) { 0.6 } else { 0.0 };
+            let swing = if n.is_multiple_of(2) { 0.02 } else { -0.02 };
+            process(
+                [speed, speed + 0.1 + swing / 4.0, speed + 0.1 - swing],
+                100.0,
+            )
+        };
+        (0..10).map(one).collect()
+    }
+
+    #[test]
+    fn ratios_are_those_of_the_shown_times_and_ties_are_left() {
+        let times = OverProcesses::of(&processes());
+        let [a, b, c] = [0, 1, 2].map(|task| times.ns(task).unwrap());
+        let ratio = times.ratio(1, 0).unwrap();
+        assert!((ratio.value - b.value / a.value).abs() < 1e-12);
+        // The speeds of the machine are in the times and not in the ratio.
+        assert!(a.upper / a.lower > 1.4 && ratio.upper / ratio.lower < 1.02);
+        assert!(ratio.lower < 0.1f64.exp() && 0.1f64.exp() < ratio.upper);
+        assert!(c.lower <= c.value && c.value <= c.upper);
+        assert!(times.is_faster(0, 1) && !times.is_faster(1, 0));
+        assert!(!times.is_faster(1, 2) && !times.is_faster(2, 1));
+        assert!((times.once_ns(0) - 100.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn one_process_has_values_without_intervals_and_no_ties() {
+        let times = OverProcesses::of(&processes()[..1]);
+        let found = times.ns(1).unwrap();
+        assert!(found.value > 0.0 && found.lower.is_nan() && found.upper.is_nan());
+        assert!(times.ratio(1, 0).unwrap().lower.is_nan());
+        assert!(times.is_faster(2, 1) && !times.is_faster(1, 2));
+    }
+
+    #[test]
+    fn what_fails_in_one_process_has_no_time_in_any() {
+        let mut processes = processes();
+        processes[4].ln_ns[1] = Err(Verdict::new(Status::Wrong, "one id too many"));
+        processes[2].ln_ns[2] = Ok(None);
+        let times = OverProcesses::of(&processes);
+        assert_eq!(times.failure(1).unwrap().status, Status::Wrong);
+        assert_eq!(
+            (times.ns(1), times.ns(2), times.failure(2)),
+            (None, None, None)
+        );
+        assert!(times.ns(0).is_some() && times.ratio(1, 0).is_none());
+        assert!(!times.is_faster(0, 1) && !times.is_faster(1, 0));
+    }
+}
