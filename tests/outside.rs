@@ -81,12 +81,15 @@ fn main() -> ExitCode {
     assert_eq!(cell["origin"], json!({ "crate": "enter_your_crate" }));
     assert!(works("report run").contains("tiles"));
     assert!(works("compare run run").contains("cells"));
-    let advised = works("advise --scene city:n=300 --path orbit:frames=2 --structure linear,tiles");
+    let advised = works(
+        "advise --scene city:n=300 --path orbit:frames=2 --structure linear,tiles --processes 1",
+    );
     assert!(advised.contains("tiles"), "{advised}");
     let stressed = works("stress --structure tiles --cases 1");
     assert!(!stressed.is_empty());
-    let precise =
-        works("precision --scene city:n=300 --path orbit:frames=2 --structure tiles --cubes 200");
+    let precise = works(
+        "precision --scene city:n=300 --path orbit:frames=2 --structure tiles --cubes 200 --processes 1",
+    );
     assert!(precise.contains("tiles"), "{precise}");
     println!(
         "outside: list, verify, query, locate, run, report, compare, advise, stress, precision"

@@ -12,7 +12,7 @@ use serde_json::Value;
 use super::process::*;
 
 const SMALL: &str = "precision --scene city:n=2000 --path orbit:frames=4 --cubes 40000 \
-     --structure linear,bvh --format json";
+     --structure linear,bvh --processes 4 --format json";
 const ERRORS: [&str; 9] = [
     "visible_count",
     "undecided_count",
@@ -54,7 +54,7 @@ fn json_has_the_documented_fields() {
     );
     assert_eq!(number(outcome, "seed"), 1.0);
     assert!(number(outcome, "rounds") >= 3.0);
-    assert_eq!(number(outcome, "processes"), 10.0);
+    assert_eq!(number(outcome, "processes"), 4.0);
     assert_eq!(keys(&outcome["twin"]), set("value lower upper"));
     let errors = ERRORS.join(" ");
     let point = format!(
@@ -227,7 +227,9 @@ fn rows_are_sorted_and_dominance_is_what_it_says() {
 fn one_process_gives_the_same_errors_without_intervals_or_ties() {
     let one = json(&works(
         Path::new("."),
-        &SMALL.replace("--cubes 40000", "--cubes 0 --processes 1"),
+        &SMALL
+            .replace("--cubes 40000", "--cubes 0")
+            .replace("--processes 4", "--processes 1"),
     ));
     assert_eq!(number(&one, "processes"), 1.0);
     let errors = |outcome: &Value| -> BTreeMap<String, String> {
@@ -339,7 +341,8 @@ fn far_from_zero_f32_matrices_lose_what_the_frame_keeps() {
 
 #[test]
 fn sweeps_can_be_left_out_and_points_refused() {
-    let line = "precision --scene uniform:n=200 --path orbit:frames=2 --structure linear --cubes 0";
+    let line = "precision --scene uniform:n=200 --path orbit:frames=2 --structure linear --cubes 0 \
+         --processes 1";
     let lens = "--near 1e-6 --far 1000";
     let outcome = json(&works(
         Path::new("."),
