@@ -8,11 +8,13 @@ import sys
 
 folder = sys.argv[1]
 for side in ("same", "slowed"):
-    runs = [json.load(open(name)) for name in sorted(glob.glob(f"{folder}/{side}-*.json"))]
-    rows = [[row for row in run["rows"] if row["judgement"]] for run in runs]
-    seconds = sorted(float(re.search(r"in (\d+) s", run["head"]).group(1)) for run in runs)
+    # One that is still running has written nothing yet.
+    texts = [open(name).read() for name in sorted(glob.glob(f"{folder}/{side}-*.json"))]
+    runs = [json.loads(text) for text in texts if text]
     if not runs:
         continue
+    rows = [[row for row in run["rows"] if row["judgement"]] for run in runs]
+    seconds = sorted(float(re.search(r"in (\d+) s", run["head"]).group(1)) for run in runs)
     print(f"{side}: {len(runs)} comparisons of {len(rows[0])} cells, "
           f"median {seconds[len(seconds) // 2]:.0f} s, longest {seconds[-1]:.0f} s")
 
