@@ -1,5 +1,5 @@
-//! The parent's side of a run: starting a worker, reading what it says, and
-//! telling what has ended it: memory, time, a signal, or the user.
+//! The parent's side of what is measured over processes: starting a worker, reading
+//! what it says, and telling what has ended it: memory, time, a signal, or the user.
 
 use std::collections::BTreeMap;
 use std::io::{self, BufRead, BufReader, Read, Write};

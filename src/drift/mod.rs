@@ -22,7 +22,7 @@ pub use stability::StabilityLimit;
 
 use crate::statistics::{Tradeoff, dominated_by};
 use orbit::CARRIERS;
-use rotation::{Exact, METHODS, STEADY};
+use rotation::{Exact, METHODS, Method, STEADY};
 use spring::{INTEGRATORS, STIFFNESSES};
 
 /// The most steps: beyond, an f32 frame overflows and a run takes hours.
@@ -123,7 +123,8 @@ pub fn measure(options: &DriftOptions, mut progress: impl FnMut(&str)) -> DriftR
     let spring: Vec<SpringError> = pairs.map(|(i, k)| i.error(k)).collect();
     let stability = stability::limits();
     progress("clock");
-    let rotation_methods = rate_rotations(&rotation, options);
+    let methods: Vec<&Method> = METHODS.iter().collect();
+    let rotation_methods = rate_rotations(&methods, &rotation, options);
     let orbit_methods = rate_orbits(&orbit, options);
     let integrators = rate_integrators(&spring);
     DriftReport {
@@ -144,19 +145,25 @@ pub fn measure(options: &DriftOptions, mut progress: impl FnMut(&str)) -> DriftR
     }
 }
 
-/// How the ways to turn a frame fare after so many steps: what [`measure`] says
+/// How some ways to turn a frame fare after so many steps: what [`measure`] says
 /// of them, by themselves.
-pub fn rotations(options: &DriftOptions) -> Vec<Rated> {
+pub fn rotations(names: &[&str], options: &DriftOptions) -> Vec<Rated> {
     let exact = Exact::new(&[options.steps]);
-    let drifts: Vec<_> = METHODS.iter().flat_map(|m| m.drift(&exact)).collect();
-    rate_rotations(&drifts, options)
+    let named = METHODS.iter().filter(|method| names.contains(&method.name));
+    let methods: Vec<&Method> = named.collect();
+    let drifts: Vec<_> = methods.iter().flat_map(|m| m.drift(&exact)).collect();
+    rate_rotations(&methods, &drifts, options)
 }
 
-fn rate_rotations(drifts: &[RotationDrift], options: &DriftOptions) -> Vec<Rated> {
-    let times = walk::ns_per_step(METHODS, TIMED_STEPS, |method| {
+fn rate_rotations(
+    methods: &[&Method],
+    drifts: &[RotationDrift],
+    options: &DriftOptions,
+) -> Vec<Rated> {
+    let times = walk::ns_per_step(methods, TIMED_STEPS, |method| {
         (method.walk)(&STEADY, &[TIMED_STEPS]);
     });
-    let rated = METHODS.iter().zip(times).map(|(method, ns_per_step)| {
+    let rated = methods.iter().zip(times).map(|(method, ns_per_step)| {
         let last = |d: &&RotationDrift| d.method == method.name && d.steps == options.steps;
         // NaN is no maximum to `max`: a frame that is lost has no error.
         let error = drifts.iter().find(last).and_then(|d| {

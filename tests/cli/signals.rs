@@ -119,6 +119,36 @@ fn ctrl_c_ends_commands_that_keep_nothing() {
     }
 }
 
+/// Whose workers are found where Linux lists them.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_worker_that_is_killed_is_told_in_one_line() {
+    for line in [
+        "advise --scene uniform:n=3000 --processes 1000",
+        "precision --scene uniform:n=300 --cubes 0 --processes 1000",
+    ] {
+        let mut child = start(Path::new("."), line);
+        let listed = format!("/proc/{0}/task/{0}/children", child.id());
+        wait_until("no worker could be killed", || {
+            let workers = fs::read_to_string(&listed).unwrap_or_default();
+            if let Some(worker) = workers.split_whitespace().next() {
+                let killed = Command::new("kill").args(["-KILL", worker]).status();
+                assert!(killed.is_ok(), "{line}");
+            }
+            child.try_wait().expect("a child").is_some()
+        });
+        let output = child.wait_with_output().expect("a child");
+        let err = String::from_utf8(output.stderr).expect("UTF-8");
+        assert_eq!(output.status.code(), Some(2), "{line}: {err}");
+        assert_eq!(err.lines().count(), 1, "{line}: {err}");
+        let told = "expected one that finishes";
+        assert!(
+            err.starts_with("error: process ") && err.contains(told),
+            "{line}: {err}"
+        );
+    }
+}
+
 #[test]
 fn ctrl_c_while_a_file_is_written_leaves_the_old_one() {
     let folder = folder(&[("kept.csv", b"kept")]);

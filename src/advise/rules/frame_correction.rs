@@ -26,10 +26,11 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
     );
     let tolerance = case.options.tolerance;
     let steps = case.workload.cameras.len() as u64;
-    let rated = rotations(&DriftOptions {
+    let options = DriftOptions {
         steps,
         tolerance_rad: tolerance,
-    });
+    };
+    let rated = rotations(&[KEPT, LEFT_OUT], &options);
     let of = |name: &str| -> Option<&Rated> { rated.iter().find(|r| r.name == name) };
     let (Some(kept), Some(left_out)) = (of(KEPT), of(LEFT_OUT)) else {
         return Ok(omission.because("no such method").draft(Vec::new()));
