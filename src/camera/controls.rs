@@ -133,6 +133,9 @@ impl Lens {
                 let window = [l / factor, r / factor, b / factor, t / factor];
                 Lens::off_axis(window, near, far)
             }
+            Lens::Matrix(_) => Err(CameraError::MatrixFixed {
+                what: "a field of view",
+            }),
         }
     }
 }

@@ -1,10 +1,10 @@
-//! Lenses: perspective, orthographic and off-axis, each with a finite or (but
+//! Lenses: perspective, orthographic, off-axis and matrices, each with a finite or (but
 //! for orthographic) infinite far plane. It owns their validation and the
 //! corners of what they see.
 
 use glam::DVec3;
 
-use super::{CameraError, Frame, finite};
+use super::{CameraError, Frame, ViewProjection, finite};
 
 /// What the camera's lens takes in. Lengths are world units. Use the checked
 /// constructors; the planes of an unchecked lens may be nonsense.
@@ -32,6 +32,11 @@ pub enum Lens {
         near: f64,
         far: Option<f64>,
     },
+    /// The whole camera as a matrix, see [`Camera::of_matrix`]; the frame says
+    /// nothing about what is visible.
+    ///
+    /// [`Camera::of_matrix`]: super::Camera::of_matrix
+    Matrix(ViewProjection),
 }
 
 impl Lens {
@@ -97,6 +102,7 @@ impl Lens {
             Lens::Perspective { near, .. }
             | Lens::Orthographic { near, .. }
             | Lens::OffAxis { near, .. } => near,
+            Lens::Matrix(matrix) => matrix.near(),
         }
     }
 
@@ -105,6 +111,7 @@ impl Lens {
         match *self {
             Lens::Perspective { far, .. } | Lens::OffAxis { far, .. } => far,
             Lens::Orthographic { far, .. } => Some(far),
+            Lens::Matrix(matrix) => matrix.far(),
         }
     }
 
@@ -121,7 +128,7 @@ impl Lens {
     ///
     /// # Errors
     /// near >= far, near not above 0 but for an orthographic lens, which also
-    /// needs a far plane; a value that is not finite.
+    /// needs a far plane; a value that is not finite; a matrix.
     pub fn with_depth(&self, near: f64, far: Option<f64>) -> Result<Lens, CameraError> {
         match *self {
             Lens::Perspective {
@@ -139,11 +146,15 @@ impl Lens {
             Lens::Orthographic { height, aspect, .. } => {
                 Lens::orthographic(height, aspect, near, far.unwrap_or(f64::INFINITY))
             }
+            Lens::Matrix(_) => Err(CameraError::MatrixFixed {
+                what: "near and far planes",
+            }),
         }
     }
 
     /// Left, right, bottom and top: slopes (offset per unit of depth) for a
-    /// lens with a centre, plain offsets for an orthographic one.
+    /// lens with a centre, plain offsets for an orthographic one. A matrix need
+    /// not have any: its planes and corners are its own.
     pub(super) fn window(&self) -> [f64; 4] {
         match *self {
             Lens::Perspective {
@@ -157,6 +168,7 @@ impl Lens {
                 [-y * aspect, y * aspect, -y, y]
             }
             Lens::OffAxis { window, near, .. } => window.map(|offset| offset / near),
+            Lens::Matrix(_) => [f64::NAN; 4],
         }
     }
 
@@ -167,6 +179,9 @@ impl Lens {
     /// The eight corners of the view volume in the frame's world, near ones
     /// first; `None` if the far plane is infinite.
     pub fn corners(&self, frame: &Frame) -> Option<[DVec3; 8]> {
+        if let Lens::Matrix(matrix) = self {
+            return matrix.corners_about(&[]);
+        }
         let far = self.far()?;
         let mut corners = [DVec3::ZERO; 8];
         corners[..4].copy_from_slice(&self.corners_at(frame, self.near()));

@@ -54,14 +54,7 @@ impl Margin {
         let at_depth = |depth| lens.corners_at(frame, depth);
         let near = at_depth(lens.near());
         let far = lens.far().map(at_depth);
-        let mut reach = of_scene;
-        if let Some(far) = &far {
-            let all = near.iter().chain(far);
-            reach = all.fold(DVec3::ZERO, |reach, corner| reach.max(corner.abs()));
-            if of_scene != DVec3::ZERO {
-                reach = reach.min(of_scene);
-            }
-        }
+        let reach = reach(&near, far.as_ref(), of_scene);
         let deepest = lens.far().unwrap_or(lens.near()).abs() + lens.near().abs();
         let coordinates = reach + frame.eye.abs();
         Margin {
@@ -73,6 +66,29 @@ impl Margin {
             rays: lens.corners_at(&frame.relative_to(frame.eye), 1.0),
             derived: DERIVED * (coordinates.element_sum() + deepest),
             of_frame,
+        }
+    }
+
+    /// The same for a matrix with these corners, `None` if what is visible has no
+    /// end; the eye is in the coordinates of `of_scene`.
+    pub(super) fn of_matrix(
+        corners: Option<[DVec3; 8]>,
+        eye: DVec3,
+        of_scene: DVec3,
+        c: f64,
+    ) -> Margin {
+        let half = |of: usize| std::array::from_fn(|i| corners.map_or(DVec3::ZERO, |c| c[of + i]));
+        let (near, far) = (half(0), corners.map(|_| half(4)));
+        let reach = reach(&near, far.as_ref(), of_scene);
+        Margin {
+            c,
+            reach,
+            near,
+            far,
+            depth: f64::INFINITY,
+            rays: [DVec3::ZERO; 4],
+            derived: DERIVED * (reach + eye.abs()).element_sum(),
+            of_frame: false,
         }
     }
 
@@ -120,6 +136,17 @@ impl Margin {
             _ => near.max(far),
         };
         loose.min(own + d)
+    }
+}
+
+/// Largest absolute coordinates of the points that can be visible.
+fn reach(near: &[DVec3; 4], far: Option<&[DVec3; 4]>, of_scene: DVec3) -> DVec3 {
+    let Some(far) = far else { return of_scene };
+    let all = near.iter().chain(far);
+    let of_volume = all.fold(DVec3::ZERO, |reach, corner| reach.max(corner.abs()));
+    match of_scene {
+        DVec3::ZERO => of_volume,
+        of_scene => of_volume.min(of_scene),
     }
 }
 

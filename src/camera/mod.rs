@@ -6,6 +6,7 @@ mod controls;
 mod frame;
 mod lens;
 mod margin;
+mod matrix;
 mod planes;
 mod pose;
 mod projection;
@@ -14,6 +15,7 @@ mod views;
 pub use frame::{Frame, look_at};
 pub use lens::Lens;
 pub(crate) use margin::check_sums;
+pub use matrix::{MATRIX_CONVENTIONS, MATRIX_ENTRIES, MatrixConvention, ViewProjection};
 pub use planes::{DEFAULT_EPSILON, PLANE_METHODS, PlaneMethod, PlaneOptions, Surroundings};
 pub use pose::Pose;
 pub use projection::{ClipSpace, gribb_hartmann};
@@ -78,6 +80,22 @@ pub enum CameraError {
         low: f64,
         high: f64,
     },
+    #[error("the matrix has {name} = {value:e}; expected 0 or a size from 1e-60 to 1e60")]
+    MatrixEntry { name: &'static str, value: f64 },
+    #[error("the matrix is singular; expected one that has an inverse")]
+    MatrixSingular,
+    #[error("the matrix has no eye (is it orthographic?); expected a perspective one")]
+    MatrixWithoutEye,
+    #[error(
+        "the matrix sees nothing, no point has w > 0 within its clip volume; expected another sign or --matrix-convention"
+    )]
+    MatrixSeesNothing,
+    #[error(
+        "the camera is a matrix, which has {what} of its own; expected an eye and a lens for another"
+    )]
+    MatrixFixed { what: &'static str },
+    #[error("the camera is a matrix, which has planes of its own; expected --planes frame")]
+    MatrixMethod,
     #[error("the zoom factor is {factor}; expected a number above 0")]
     Zoom { factor: f64 },
     #[error("the axis of the orbit is zero or not finite; expected a direction")]

@@ -16,7 +16,8 @@ use crate::geometry::{
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PlaneMethod {
-    /// Frame and lens in f64, each plane rounded once.
+    /// Frame and lens in f64, each plane rounded once; of a camera that is a
+    /// matrix, its rows.
     #[default]
     Frame,
     /// The same formulas with every operation in f32.
@@ -156,11 +157,10 @@ impl Camera {
         options: &PlaneOptions,
         around: &Surroundings,
     ) -> Result<ConvexVolume, CameraError> {
-        let frame = self.frame.relative_to(around.origin);
-        let named = derive(&frame, &self.lens, options.method);
         let of_scene = around.reach.as_dvec3();
-        let of_frame = options.method == PlaneMethod::Frame;
-        let margin = Margin::new(&frame, &self.lens, of_scene, options.epsilon, of_frame);
+        let zero = [around.origin];
+        let named = self.derive(&zero, options.method)?;
+        let margin = self.margin(&zero, of_scene, options);
         let moved = |name, plane: &Plane| margin.moved(name, plane, 0.0);
         let volume = gathered(&named, more, options.epsilon, moved)?;
         check_sums(&volume, of_scene)?;
@@ -173,8 +173,7 @@ impl Camera {
     /// # Errors
     /// [`CameraError::Volume`] if a plane does not even fit f64.
     pub fn wide_volume(&self, around: &Surroundings) -> Result<WideVolume, CameraError> {
-        let frame = self.frame.relative_to(around.origin);
-        let planes = from_frame_f64(&frame, &self.lens).into_iter();
+        let planes = self.planes_f64(&[around.origin]).into_iter();
         let planes: Vec<WidePlane> = planes.map(|(_, plane)| plane).collect();
         Ok(WideVolume::from_planes(&planes)?)
     }
@@ -219,9 +218,10 @@ impl Camera {
         let eye = local.eye.as_vec3();
         let zero = eye.as_dvec3();
         // Exact: what is left is a number of f64.
-        let frame = local.relative_to(zero);
-        let named = from_frame(&frame, &self.lens);
-        let more: Vec<WidePlane> = more.iter().map(|plane| plane.about(-frame.eye)).collect();
+        let left = local.eye - zero;
+        let about = [around.origin, zero];
+        let named = self.derive(&about, PlaneMethod::Frame)?;
+        let more: Vec<WidePlane> = more.iter().map(|plane| plane.about(-left)).collect();
         let reach = around.reach.as_dvec3();
         let is_unknown = around.reach == Vec3::ZERO && self.lens.far().is_some();
         let of_scene = if is_unknown {
@@ -229,13 +229,57 @@ impl Camera {
         } else {
             reach + zero.abs()
         };
-        let margin = Margin::new(&frame, &self.lens, of_scene, epsilon, true);
+        let options = PlaneOptions {
+            epsilon,
+            ..PlaneOptions::default()
+        };
+        let margin = self.margin(&about, of_scene, &options);
         let of_eye = local.eye.abs().element_sum() * f64::EPSILON;
         let slack = of_eye + margin.reach.element_sum() * TINY;
         let moved = |name, plane: &Plane| margin.moved(name, plane, slack);
         let planes = gathered(&named, &more, epsilon, moved)?;
         check_sums(&planes, reach + zero.abs())?;
         Ok(RelativeVolume::new(eye, planes)?)
+    }
+}
+
+impl Camera {
+    /// The frame about the sum of some points, one after the other.
+    fn frame_about(&self, zero: &[DVec3]) -> Frame {
+        let frame = self.frame;
+        zero.iter()
+            .fold(frame, |frame, &zero| frame.relative_to(zero))
+    }
+
+    fn planes_f64(&self, zero: &[DVec3]) -> Vec<(FrustumPlane, WidePlane)> {
+        match &self.lens {
+            Lens::Matrix(matrix) => matrix.planes_about(zero),
+            lens => from_frame_f64(&self.frame_about(zero), lens),
+        }
+    }
+
+    fn margin(&self, zero: &[DVec3], of_scene: DVec3, options: &PlaneOptions) -> Margin {
+        let frame = self.frame_about(zero);
+        let c = options.epsilon;
+        match &self.lens {
+            Lens::Matrix(matrix) => {
+                Margin::of_matrix(matrix.corners_about(zero), frame.eye, of_scene, c)
+            }
+            lens => {
+                let of_frame = options.method == PlaneMethod::Frame;
+                Margin::new(&frame, lens, of_scene, c, of_frame)
+            }
+        }
+    }
+
+    fn derive(&self, zero: &[DVec3], method: PlaneMethod) -> Result<NamedPlanes, CameraError> {
+        match &self.lens {
+            Lens::Matrix(matrix) if method == PlaneMethod::Frame => {
+                Ok(narrow(matrix.planes_about(zero)))
+            }
+            Lens::Matrix(_) => Err(CameraError::MatrixMethod),
+            lens => Ok(derive(&self.frame_about(zero), lens, method)),
+        }
     }
 }
 
@@ -323,7 +367,11 @@ planes_from_frame!(from_frame_f64, f64, DVec3, |v| v, WidePlane);
 planes_from_frame!(from_frame_f32, f32, Vec3, |v| v.as_vec3(), Plane);
 
 fn from_frame(frame: &Frame, lens: &Lens) -> NamedPlanes {
-    let wide = from_frame_f64(frame, lens).into_iter();
+    narrow(from_frame_f64(frame, lens))
+}
+
+fn narrow(wide: Vec<(FrustumPlane, WidePlane)>) -> NamedPlanes {
+    let wide = wide.into_iter();
     wide.map(|(name, plane)| (name, plane.narrow())).collect()
 }
 

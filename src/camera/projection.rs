@@ -24,7 +24,8 @@ pub enum ClipSpace {
 /// are the platform's, and platforms round them differently.
 macro_rules! projection {
     ($name:ident, $float:ty, $mat:ty, $glam:ident, $sin:path, $cos:path) => {
-        /// The projection matrix of a lens.
+        /// The projection matrix of a lens; not a number for a matrix, which is
+        /// no projection without a view.
         pub fn $name(lens: &Lens, clip: ClipSpace) -> $mat {
             use glam::$glam::rh::proj::{directx, opengl};
             let mut matrix = match *lens {
@@ -106,6 +107,7 @@ macro_rules! projection {
                     };
                     m
                 }
+                Lens::Matrix(_) => return <$mat>::NAN,
             };
             if let Lens::Perspective {
                 fovy_deg, aspect, ..

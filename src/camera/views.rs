@@ -49,6 +49,9 @@ impl ViewSet {
 /// The left and the right eye.
 fn stereo(camera: &Camera, distance: f64) -> Result<[Camera; 2], CameraError> {
     super::finite("the distance of the eyes", distance)?;
+    if let Lens::Matrix(_) = camera.lens {
+        return Err(CameraError::MatrixFixed { what: "an eye" });
+    }
     Ok([-0.5, 0.5].map(|side| Camera {
         frame: Frame {
             eye: camera.frame.eye + camera.frame.u() * (side * distance),

@@ -131,7 +131,7 @@ fn rows(registry: &Registry, topic: ListTopic) -> anyhow::Result<(&'static str, 
         ListTopic::Paths => (
             "paths",
             format!(
-                "Parameters of every path: {PATH_PARAMS}.\nA path is also a file: a cameras CSV."
+                "Parameters of every path: {PATH_PARAMS}.\nA path is also a file: a cameras CSV (eye_x.. and look_x.. or forward_x.., or matrices m00..m33)."
             ),
             PATHS.iter().map(|p| plain(p.name, p.summary)).collect(),
         ),

@@ -2,7 +2,9 @@
 //! how a view is made and tested, how queries are computed. Values are checked
 //! where they are used.
 
-use crate::camera::{DEFAULT_EPSILON, PLANE_METHODS, PlaneMethod, PlaneOptions};
+use crate::camera::{
+    DEFAULT_EPSILON, MATRIX_CONVENTIONS, MatrixConvention, PLANE_METHODS, PlaneMethod, PlaneOptions,
+};
 use crate::culling::{ARITHMETICS, Arithmetic, Culling, CullingTest, TESTS};
 use crate::index::{Execution, Registry, StructureSpec};
 use crate::kernel::Kernel;
@@ -145,6 +147,9 @@ pub struct LensArgs {
     /// Far plane for cameras without one, or inf [default: 1000 for recorded cameras, the scene for paths]
     #[arg(long, allow_negative_numbers = true)]
     pub far: Option<String>,
+    /// How cameras that are matrices (columns m00 to m33: row, column) are read: column-gl or column-d3d (clip = M x, depth -1..1 or 0..1), row-gl or row-d3d (clip = x M); reversed depth and infinite far as they come
+    #[arg(long, value_name = "NAME")]
+    pub matrix_convention: Option<String>,
 }
 
 impl LensArgs {
@@ -161,7 +166,13 @@ impl LensArgs {
                 }
             },
         };
+        let matrix = self.matrix_convention.as_deref().map(|name| {
+            let known = MATRIX_CONVENTIONS.iter().map(|row| row.1);
+            MatrixConvention::named(name)
+                .ok_or_else(|| SpecError::unknown("matrix convention", name, known))
+        });
         Ok(LensDefaults {
+            matrix: matrix.transpose()?,
             fovy_deg: self.fovy,
             aspect: self.aspect,
             near: self.near,

@@ -86,17 +86,25 @@ impl<R: Read> TableReader<R> {
     pub fn columns<const N: usize>(&self, names: &[&str; N]) -> Result<[usize; N], InputError> {
         let mut places = [0; N];
         for (place, name) in places.iter_mut().zip(names) {
-            *place = self.column(name).ok_or_else(|| InputError::Line {
-                file: self.file.clone(),
-                line: self.header_line,
-                found: format!(
+            *place = self.column(name).ok_or_else(|| {
+                let found = format!(
                     "no column '{name}' in '{}'",
                     shortened(&self.header.join(","))
-                ),
-                expected: format!("a header with {}", names.join(",")),
+                );
+                self.error(found, format!("a header with {}", names.join(",")))
             })?;
         }
         Ok(places)
+    }
+
+    /// What is wrong with the header.
+    pub fn error(&self, found: String, expected: String) -> InputError {
+        InputError::Line {
+            file: self.file.clone(),
+            line: self.header_line,
+            found,
+            expected,
+        }
     }
 
     /// The next row; `None` at the end of the file.

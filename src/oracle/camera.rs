@@ -8,7 +8,7 @@ use super::Oracle;
 use super::certificates::HalfSpace;
 use super::number::{Number, Precision};
 use crate::arithmetic::Expansion;
-use crate::camera::{Lens, Pose};
+use crate::camera::{Lens, Pose, ViewProjection};
 
 const PRECISION: Precision = Precision::CAMERA;
 
@@ -112,13 +112,20 @@ impl Oracle {
     /// Every verdict is that about the real volume, or a touch marked as
     /// undecided, where the two cannot be told apart: pose and lens count as
     /// exact, lengths from 1e-60 to 1e60 and angles from 1e-12 degrees are
-    /// carried without loss. Some ten times the cost of
+    /// carried without loss. A matrix is the volume alone, and its planes are
+    /// carried without any error. Some ten times the cost of
     /// [`Oracle::of_volume`].
     ///
     /// `None` if pose and lens make no camera: a value that is not finite, no
     /// direction of view, `up` zero or exactly parallel to it, a lens that its
     /// constructor would refuse.
     pub fn of_camera(pose: &Pose, lens: &Lens, origin: DVec3) -> Option<Oracle> {
+        if let Lens::Matrix(matrix) = lens {
+            let constraints = planes_of_matrix(matrix, origin);
+            return origin
+                .is_finite()
+                .then(|| Oracle::new(&constraints, PRECISION));
+        }
         let (eye, towards, up) = match *pose {
             Pose::LookAt { eye, look, up } => (eye, look, up),
             Pose::Forward { eye, forward, up } => (eye, forward, up),
@@ -201,6 +208,8 @@ fn planes(view: &View, lens: &Lens) -> Vec<HalfSpace> {
             ([-&wide, wide, -&sine, sine], cosine)
         }
         Lens::OffAxis { window, near, .. } => (window.map(number), number(near)),
+        // Has planes of its own, see `planes_of_matrix`.
+        Lens::Matrix(_) => return planes,
         Lens::Orthographic { height, aspect, .. } => {
             let half = number(height / 2.0);
             let wide = times(&half, &number(aspect));
@@ -223,6 +232,36 @@ fn planes(view: &View, lens: &Lens) -> Vec<HalfSpace> {
         planes.push(view.half_space(&view.back, &number(far)));
     }
     planes
+}
+
+/// The rows' sums and differences (Gribb and Hartmann 2001) about `origin`, each
+/// times a power of two. All of it is exact. One without a normal and above zero
+/// (an infinite far plane) bounds nothing.
+fn planes_of_matrix(matrix: &ViewProjection, origin: DVec3) -> Vec<HalfSpace> {
+    let [x, y, z, w] = matrix.rows();
+    let row = |signs: [f64; 2], parts: [&[f64; 4]; 2]| {
+        let part = |k: usize, i: usize| Expansion::from(signs[i] * parts[i][k]);
+        [0, 1, 2, 3].map(|k| &part(k, 0) + &part(k, 1))
+    };
+    let own = if matrix.is_from_zero() { 0.0 } else { 1.0 };
+    let rows = [
+        row([1.0, 1.0], [w, x]),
+        row([1.0, -1.0], [w, x]),
+        row([1.0, 1.0], [w, y]),
+        row([1.0, -1.0], [w, y]),
+        row([own, 1.0], [w, z]),
+        row([1.0, -1.0], [w, z]),
+    ];
+    let about = rows.map(|[a, b, c, d]| {
+        let along = [&a, &b, &c].into_iter().zip(origin.to_array());
+        let d = along.fold(d, |d, (n, at)| &d + &(n * &Expansion::from(at)));
+        let exponent = exponent(&[a.clone(), b.clone(), c.clone()]).unwrap_or(0);
+        HalfSpace {
+            normal: [a, b, c].map(|n| Number::from(n.scaled(-exponent))),
+            d: Number::from(d.scaled(-exponent)),
+        }
+    });
+    about.into()
 }
 
 #[cfg(test)]

@@ -45,26 +45,30 @@ pub fn digest(cameras: &[Camera]) -> String {
             axis.to_array().into_iter().for_each(&mut add);
         }
         // The kind of the lens first.
-        let lens: &[f64] = match *lens {
+        let lens = match *lens {
             Lens::Perspective {
                 fovy_deg,
                 aspect,
                 near,
                 far: end,
-            } => &[0.0, fovy_deg, aspect, near, far(end)],
+            } => vec![0.0, fovy_deg, aspect, near, far(end)],
             Lens::Orthographic {
                 height,
                 aspect,
                 near,
                 far,
-            } => &[1.0, height, aspect, near, far],
+            } => vec![1.0, height, aspect, near, far],
             Lens::OffAxis {
                 window: [left, right, bottom, top],
                 near,
                 far: end,
-            } => &[2.0, left, right, bottom, top, near, far(end)],
+            } => vec![2.0, left, right, bottom, top, near, far(end)],
+            Lens::Matrix(matrix) => {
+                let kind = if matrix.is_from_zero() { 4.0 } else { 3.0 };
+                [vec![kind], matrix.rows().concat()].concat()
+            }
         };
-        lens.iter().copied().for_each(&mut add);
+        lens.into_iter().for_each(&mut add);
     }
     scene::hex(&hash.finalize())
 }

@@ -6,7 +6,9 @@ use std::io::Read;
 use glam::DVec3;
 
 use super::{CameraPath, PathError};
-use crate::camera::{Camera, CameraError, Frame, Lens, look_at};
+use crate::camera::{
+    Camera, CameraError, Frame, Lens, MATRIX_CONVENTIONS, MATRIX_ENTRIES, MatrixConvention, look_at,
+};
 use crate::input::{InputError, Row, TableReader};
 
 /// Lens values for columns that a file does not have, and for generated
@@ -19,6 +21,8 @@ pub struct LensDefaults {
     /// `Some(None)` is an infinite far plane.
     pub far: Option<Option<f64>>,
     pub up: DVec3,
+    /// How files are to be read whose cameras are matrices.
+    pub matrix: Option<MatrixConvention>,
 }
 
 impl Default for LensDefaults {
@@ -29,6 +33,7 @@ impl Default for LensDefaults {
             near: None,
             far: None,
             up: DVec3::Z,
+            matrix: None,
         }
     }
 }
@@ -39,17 +44,104 @@ const FAR: f64 = 1000.0;
 
 /// Reads a cameras CSV: `eye_x,eye_y,eye_z`, then `look_*` or `forward_*`,
 /// and any of `up_*`, `fovy_deg`, `aspect`, `near`, `far` (empty or `inf` =
-/// infinite). Columns in any order; unknown ones are ignored.
+/// infinite). Or view-projection matrices: `m00,m01,..,m33` (row, column) and
+/// nothing of the others. Columns in any order; unknown ones are ignored.
 ///
 /// # Errors
 /// The line of the first value that is no number or makes no camera; a file
-/// without cameras.
+/// without cameras; matrices without a convention, or beside an eye or a lens.
 pub fn read_cameras_csv(
     input: impl Read,
     file: &str,
     defaults: &LensDefaults,
 ) -> Result<CameraPath, PathError> {
-    let mut table = TableReader::open(input, file)?;
+    let table = TableReader::open(input, file)?;
+    let is_matrix = MATRIX_ENTRIES.iter().any(|m| table.column(m).is_some());
+    let cameras = if is_matrix {
+        matrices(table, defaults.matrix)?
+    } else {
+        eyes(table, defaults)?
+    };
+    if cameras.is_empty() {
+        return Err(InputError::Line {
+            file: file.to_owned(),
+            line: 2,
+            found: "no camera".to_owned(),
+            expected: "at least one row after the header".to_owned(),
+        }
+        .into());
+    }
+    Ok(CameraPath {
+        lens_scale: None,
+        name: file.to_owned(),
+        cameras,
+    })
+}
+
+/// The camera's own message says what was expected.
+fn refused(row: &Row, error: &CameraError) -> InputError {
+    let message = error.to_string();
+    let (found, expected) = message
+        .split_once("; expected ")
+        .unwrap_or((&message, "a camera"));
+    row.error(found.to_owned(), expected.to_owned())
+}
+
+/// Columns that say what a matrix says already.
+const OF_EYES: [&str; 16] = [
+    "eye_x",
+    "eye_y",
+    "eye_z",
+    "look_x",
+    "look_y",
+    "look_z",
+    "forward_x",
+    "forward_y",
+    "forward_z",
+    "up_x",
+    "up_y",
+    "up_z",
+    "fovy_deg",
+    "aspect",
+    "near",
+    "far",
+];
+
+fn matrices(
+    mut table: TableReader<impl Read>,
+    convention: Option<MatrixConvention>,
+) -> Result<Vec<Camera>, InputError> {
+    let columns = table.columns(&MATRIX_ENTRIES)?;
+    if let Some(other) = OF_EYES.iter().find(|name| table.column(name).is_some()) {
+        return Err(table.error(
+            format!("columns of a matrix and '{other}'"),
+            "m00 to m33 alone, or an eye and a lens".to_owned(),
+        ));
+    }
+    let convention = convention.ok_or_else(|| {
+        let known = MATRIX_CONVENTIONS.map(|row| row.1).join(", ");
+        table.error(
+            "matrices, but not how to read them".to_owned(),
+            format!("--matrix-convention with one of {known}"),
+        )
+    })?;
+    let mut cameras = Vec::new();
+    while let Some(row) = table.next_row() {
+        let row = row?;
+        let mut entries = [[0.0; 4]; 4];
+        for (entry, &column) in entries.as_flattened_mut().iter_mut().zip(&columns) {
+            *entry = row.finite_number(column)?;
+        }
+        let camera = Camera::of_matrix(entries, convention);
+        cameras.push(camera.map_err(|error| refused(&row, &error))?);
+    }
+    Ok(cameras)
+}
+
+fn eyes(
+    mut table: TableReader<impl Read>,
+    defaults: &LensDefaults,
+) -> Result<Vec<Camera>, InputError> {
     let eye = table.columns(&["eye_x", "eye_y", "eye_z"])?;
     let by_forward = table.column("forward_x").is_some() && table.column("look_x").is_none();
     let target = if by_forward {
@@ -105,29 +197,9 @@ pub fn read_cameras_csv(
                 lens: Lens::perspective(fovy, aspect, near, far)?,
             })
         };
-        // The camera's own message says what was expected.
-        cameras.push(camera().map_err(|error| {
-            let message = error.to_string();
-            let (found, expected) = message
-                .split_once("; expected ")
-                .unwrap_or((&message, "a camera"));
-            row.error(found.to_owned(), expected.to_owned())
-        })?);
+        cameras.push(camera().map_err(|error| refused(&row, &error))?);
     }
-    if cameras.is_empty() {
-        return Err(InputError::Line {
-            file: file.to_owned(),
-            line: 2,
-            found: "no camera".to_owned(),
-            expected: "at least one row after the header".to_owned(),
-        }
-        .into());
-    }
-    Ok(CameraPath {
-        lens_scale: None,
-        name: file.to_owned(),
-        cameras,
-    })
+    Ok(cameras)
 }
 
 /// Reads a points CSV with the columns `x,y,z`.

@@ -58,7 +58,8 @@ fn openness(lens: &Lens) -> f64 {
             let [left, right, bottom, top] = window.map(|edge| edge.abs() / near);
             [left.max(right), bottom.max(top)]
         }
-        Lens::Orthographic { .. } => [0.0; 2],
+        // Matrices are not drawn here.
+        Lens::Orthographic { .. } | Lens::Matrix(_) => [0.0; 2],
     };
     slopes.map(|s| 1.0 / libm::hypot(1.0, s)).iter().product()
 }

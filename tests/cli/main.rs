@@ -13,6 +13,7 @@ mod drift;
 mod foreign_text;
 mod kernels;
 mod listing;
+mod matrices;
 mod pipes;
 mod precision;
 mod process;

@@ -1,6 +1,7 @@
 //! The library's readers, fed with damaged copies of good input and with
 //! plain noise: no panic, and every error is one line that says where.
 
+use cullbench::camera::MATRIX_CONVENTIONS;
 use cullbench::index::Registry;
 use cullbench::path::{LensDefaults, read_cameras_csv, read_points_csv};
 use cullbench::scene::{WadMap, map_names, read_boxes_csv};
@@ -105,6 +106,28 @@ fn damaged_cameras() {
         let path = path.map_err(|e| e.to_string())?;
         assert!(!path.cameras.is_empty());
         Ok(())
+    });
+}
+
+#[test]
+fn damaged_matrices() {
+    let names: Vec<String> = (0..16).map(|i| format!("m{}{}", i / 4, i % 4)).collect();
+    let rows = "1,0,0,-2,0,0,1,-1,0,1.25,0,-6,0,1,0,-3\n1,0,0,-2,0,0,1,-1,0,0,0,1,0,1,0,-3\n";
+    let good = format!("{}\n{rows}", names.join(","));
+    feed("matrices", good.as_bytes(), |bytes| {
+        let mut first = None;
+        for (convention, ..) in MATRIX_CONVENTIONS {
+            let defaults = LensDefaults {
+                matrix: Some(convention),
+                ..LensDefaults::default()
+            };
+            let path = read_cameras_csv(bytes, "in.file", &defaults);
+            for camera in path.iter().flat_map(|path| &path.cameras) {
+                let _ = camera.volume(&Default::default(), &Default::default());
+            }
+            first.get_or_insert(path.map(|_| ()).map_err(|e| e.to_string()));
+        }
+        first.unwrap_or(Ok(()))
     });
 }
 

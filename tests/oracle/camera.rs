@@ -13,7 +13,7 @@ use crate::simplex::{self, ExactPlane};
 use crate::wide::{Dyadic, Vector, along, cross, dot, pi, tangent, unit, vector};
 
 /// A camera with all that the expected planes are made from.
-struct View {
+pub struct View {
     eye: Vector,
     forward: Vector,
     right: Vector,
@@ -22,7 +22,7 @@ struct View {
 }
 
 impl View {
-    fn new(pose: &Pose, lens: Lens, origin: DVec3) -> View {
+    pub fn new(pose: &Pose, lens: Lens, origin: DVec3) -> View {
         let (eye, forward, up) = match *pose {
             Pose::LookAt { eye, look, up } => (eye, minus(&vector(look), &vector(eye)), up),
             Pose::Forward { eye, forward, up } => (eye, vector(forward), up),
@@ -62,6 +62,7 @@ impl View {
             Lens::OffAxis { window, near, .. } => {
                 window.map(|edge| Dyadic::from(edge).over(&Dyadic::from(near)))
             }
+            Lens::Matrix(_) => unreachable!("put to the proof in `matrices`"),
         }
     }
 
@@ -113,7 +114,7 @@ impl View {
     }
 
     /// A point near the view's boundary, more often than not; in f64.
-    fn point(&self, dice: &mut Dice) -> DVec3 {
+    pub fn point(&self, dice: &mut Dice) -> DVec3 {
         let near = self.lens.near();
         let depth = match (self.lens, self.lens.far()) {
             (Lens::Orthographic { far, .. }, _) => dice.between(near, far),
@@ -149,9 +150,13 @@ fn minus(a: &Vector, b: &Vector) -> Vector {
 /// The default culling and the one about the eye, with every test: what loses
 /// nothing. None where a view is refused because its sums could overflow.
 fn safe_views(pose: &Pose, lens: Lens, origin: DVec3, boxes: &[Aabb]) -> Vec<CameraView> {
-    let Ok(frame) = pose.frame() else {
-        return Vec::new();
-    };
+    let frame = pose.frame();
+    frame.map_or(Vec::new(), |frame| {
+        safe_views_of(&Camera { frame, lens }, origin, boxes)
+    })
+}
+
+pub fn safe_views_of(camera: &Camera, origin: DVec3, boxes: &[Aabb]) -> Vec<CameraView> {
     let around = Surroundings {
         origin,
         reach: Aabb::union_of(boxes).reach(),
@@ -167,12 +172,13 @@ fn safe_views(pose: &Pose, lens: Lens, origin: DVec3, boxes: &[Aabb]) -> Vec<Cam
             if culling.check().is_err() {
                 continue;
             }
-            match culling.view(&Camera { frame, lens }, &around) {
+            match culling.view(camera, &around) {
                 Ok(view) => views.push(view),
                 Err(CullingError::Camera(CameraError::Sums { .. })) => {}
                 Err(error) => {
-                    let size = frame.eye.abs().max_element() + lens.far().unwrap_or(0.0);
-                    assert!(size > 1e37, "{error}: {pose:?}, {lens:?}");
+                    let size = camera.frame.eye.abs().max_element();
+                    let size = size + camera.lens.far().unwrap_or(0.0);
+                    assert!(size > 1e37, "{error}: {camera:?}");
                 }
             }
         }
@@ -195,7 +201,7 @@ fn moved(planes: &[ExactPlane], b: &Aabb, exponent: i64, inward: bool) -> Vec<Ex
 }
 
 /// The verdict if it stands however the planes err by `2^exponent`.
-fn robust(planes: &[ExactPlane], b: &Aabb, exponent: i64) -> Option<Verdict> {
+pub fn robust(planes: &[ExactPlane], b: &Aabb, exponent: i64) -> Option<Verdict> {
     let outer = simplex::verdict(&moved(planes, b, exponent, false), b);
     if outer == Verdict::Out {
         return Some(outer);
@@ -204,7 +210,7 @@ fn robust(planes: &[ExactPlane], b: &Aabb, exponent: i64) -> Option<Verdict> {
     (inner == Verdict::In).then_some(inner)
 }
 
-const LENSES: [&str; 5] = [
+pub const LENSES: [&str; 5] = [
     "perspective",
     "infinite far",
     "off-axis",
@@ -213,7 +219,7 @@ const LENSES: [&str; 5] = [
 ];
 
 /// Angles, aspects and depths to the ends of what is usable.
-fn lens(kind: usize, dice: &mut Dice) -> Lens {
+pub fn lens(kind: usize, dice: &mut Dice) -> Lens {
     let near = dice.magnitude(-3.0, 3.0);
     let far = near * (1.0 + dice.magnitude(-3.0, 9.0));
     let aspect = match dice.below(3) {
@@ -249,7 +255,7 @@ fn lens(kind: usize, dice: &mut Dice) -> Lens {
 }
 
 /// A pose and the origin of the boxes' coordinates.
-fn pose(dice: &mut Dice) -> (Pose, DVec3) {
+pub fn pose(dice: &mut Dice) -> (Pose, DVec3) {
     let direction = |dice: &mut Dice| loop {
         let v = DVec3::from_array([0; 3].map(|_| dice.between(-1.0, 1.0)));
         if v.length() > 0.1 {

@@ -10,6 +10,7 @@ mod camera;
 mod camera_ties;
 mod depth;
 mod draw;
+mod matrices;
 mod planes;
 mod simplex;
 mod vectors;

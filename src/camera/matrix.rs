@@ -1,0 +1,326 @@
+//! A camera as an engine gives it: a view-projection matrix and its convention.
+//! The numbers of the matrix are the truth; planes, corners and the eye follow
+//! from them in exact arithmetic and are rounded once.
+
+use glam::DVec3;
+
+use super::{Camera, CameraError, Lens, Pose};
+use crate::arithmetic::Expansion;
+use crate::geometry::{FrustumPlane, WidePlane};
+
+/// How a matrix is to be read. Reversed depth needs no name: what is visible is
+/// the same, and the plane before the eye is the near one.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum MatrixConvention {
+    ColumnGl,
+    ColumnD3d,
+    RowGl,
+    RowD3d,
+}
+
+/// Every convention with its name and what it is.
+pub const MATRIX_CONVENTIONS: [(MatrixConvention, &str, &str); 4] = [
+    (
+        MatrixConvention::ColumnGl,
+        "column-gl",
+        "clip = M x, depth -1 to 1 (OpenGL)",
+    ),
+    (
+        MatrixConvention::ColumnD3d,
+        "column-d3d",
+        "clip = M x, depth 0 to 1 or 1 to 0 (Vulkan, Metal, WebGPU)",
+    ),
+    (
+        MatrixConvention::RowGl,
+        "row-gl",
+        "clip = x M, depth -1 to 1",
+    ),
+    (
+        MatrixConvention::RowD3d,
+        "row-d3d",
+        "clip = x M, depth 0 to 1 or 1 to 0 (Direct3D)",
+    ),
+];
+
+impl MatrixConvention {
+    pub fn name(self) -> &'static str {
+        let row = MATRIX_CONVENTIONS.iter().find(|row| row.0 == self);
+        row.map_or("", |row| row.1)
+    }
+
+    pub fn named(name: &str) -> Option<MatrixConvention> {
+        let row = MATRIX_CONVENTIONS.iter().find(|row| row.1 == name);
+        row.map(|row| row.0)
+    }
+}
+
+/// The names of the entries: row, then column, as they are written down.
+pub const MATRIX_ENTRIES: [&str; 16] = [
+    "m00", "m01", "m02", "m03", "m10", "m11", "m12", "m13", "m20", "m21", "m22", "m23", "m30",
+    "m31", "m32", "m33",
+];
+
+/// Products of four entries of these sizes neither overflow nor lose a digit.
+const SIZES: std::ops::RangeInclusive<f64> = 1e-60..=1e60;
+
+/// A plane that is farther away than this is no plane in f32. Leaving one out
+/// returns more, never less.
+const FARTHEST: f64 = (f32::MAX / 2.0) as f64;
+
+/// Four numbers: a plane (normal and offset), or a point in homogeneous
+/// coordinates.
+type Four = [Expansion; 4];
+
+/// A view-projection matrix that has an eye.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct ViewProjection {
+    /// For column vectors: clip = rows * (x, y, z, 1).
+    rows: [[f64; 4]; 4],
+    /// Depth from 0 to w instead of from -w.
+    from_zero: bool,
+    /// Whether depth is larger at the near plane.
+    is_reversed: bool,
+    /// Rounded.
+    eye: DVec3,
+    /// Distances of the eye from the near and the far plane, rounded: a scale.
+    near: f64,
+    far: Option<f64>,
+}
+
+impl ViewProjection {
+    /// # Errors
+    /// An entry that is not finite, or neither zero nor of a size from 1e-60 to
+    /// 1e60; a singular matrix; an orthographic one, which has no eye; one whose
+    /// clip volume is empty.
+    pub fn new(
+        entries: [[f64; 4]; 4],
+        convention: MatrixConvention,
+    ) -> Result<ViewProjection, CameraError> {
+        for (&name, value) in MATRIX_ENTRIES.iter().zip(entries.concat()) {
+            super::finite(name, value)?;
+            if value != 0.0 && !SIZES.contains(&value.abs()) {
+                return Err(CameraError::MatrixEntry { name, value });
+            }
+        }
+        let transposed = [0, 1, 2, 3].map(|i| entries.map(|row| row[i]));
+        let mut matrix = ViewProjection {
+            rows: match convention {
+                MatrixConvention::ColumnGl | MatrixConvention::ColumnD3d => entries,
+                MatrixConvention::RowGl | MatrixConvention::RowD3d => transposed,
+            },
+            from_zero: match convention {
+                MatrixConvention::ColumnGl | MatrixConvention::RowGl => false,
+                MatrixConvention::ColumnD3d | MatrixConvention::RowD3d => true,
+            },
+            is_reversed: false,
+            eye: DVec3::ZERO,
+            near: 0.0,
+            far: None,
+        };
+        let inverse = matrix.inverse().ok_or(CameraError::MatrixSingular)?;
+        (matrix.eye, matrix.is_reversed) = eye(&inverse)?;
+        let ahead = matrix
+            .clip_corners()
+            .map(|c| unprojected(&inverse, c)[3].sign());
+        if ahead.iter().all(|&sign| sign <= 0) {
+            return Err(CameraError::MatrixSeesNothing);
+        }
+        let is_bounded = ahead.iter().all(|&sign| sign > 0);
+        for (name, plane) in matrix.planes_about(&[matrix.eye]) {
+            match name {
+                FrustumPlane::Near => matrix.near = plane.d.abs(),
+                FrustumPlane::Far if is_bounded => matrix.far = Some(plane.d.abs()),
+                _ => {}
+            }
+        }
+        Ok(matrix)
+    }
+
+    /// The rows for column vectors: clip = rows * (x, y, z, 1).
+    pub fn rows(&self) -> &[[f64; 4]; 4] {
+        &self.rows
+    }
+
+    /// Whether depth begins at 0, and not at -w.
+    pub fn is_from_zero(&self) -> bool {
+        self.from_zero
+    }
+
+    pub fn near(&self) -> f64 {
+        self.near
+    }
+
+    /// `None` if what is visible has no end.
+    pub fn far(&self) -> Option<f64> {
+        self.far
+    }
+
+    /// The planes in f64 about the sum of some points, of unit length: sums and
+    /// offsets are exact before they are rounded, so every number of a plane is
+    /// true to 3 units of 2^-53 of itself, but for a factor that all share.
+    ///
+    /// A row whose normal is zero is no plane (an infinite far plane), and
+    /// neither is one that lies farther away than f32 has numbers.
+    pub(super) fn planes_about(&self, zero: &[DVec3]) -> Vec<(FrustumPlane, WidePlane)> {
+        let [x, y, z, w] = self.exact_rows();
+        let sum = |a: &Four, b: &Four| [0, 1, 2, 3].map(|k| &a[k] + &b[k]);
+        let difference = |a: &Four, b: &Four| [0, 1, 2, 3].map(|k| &a[k] - &b[k]);
+        let low = if self.from_zero {
+            z.clone()
+        } else {
+            sum(&w, &z)
+        };
+        let (at_low, at_high) = match self.is_reversed {
+            false => (FrustumPlane::Near, FrustumPlane::Far),
+            true => (FrustumPlane::Far, FrustumPlane::Near),
+        };
+        let faces = [
+            (FrustumPlane::Left, sum(&w, &x)),
+            (FrustumPlane::Right, difference(&w, &x)),
+            (FrustumPlane::Bottom, sum(&w, &y)),
+            (FrustumPlane::Top, difference(&w, &y)),
+            (at_low, low),
+            (at_high, difference(&w, &z)),
+        ];
+        let planes = faces.iter().filter_map(|(name, face)| {
+            let plane = plane_about(face, zero)?;
+            (plane.d < FARTHEST).then_some((*name, plane))
+        });
+        planes.collect()
+    }
+
+    /// The corners of the clip volume about the sum of some points, true to some
+    /// units of 2^-53 of each coordinate; `None` if it has no end.
+    pub(super) fn corners_about(&self, zero: &[DVec3]) -> Option<[DVec3; 8]> {
+        let inverse = self.inverse()?;
+        let mut corners = [DVec3::ZERO; 8];
+        for (corner, clip) in corners.iter_mut().zip(self.clip_corners()) {
+            *corner = about(&unprojected(&inverse, clip), zero)?;
+        }
+        Some(corners)
+    }
+
+    fn exact_rows(&self) -> [Four; 4] {
+        self.rows.map(|row| row.map(Expansion::from))
+    }
+
+    /// Left or right, bottom or top, each at both ends of depth.
+    fn clip_corners(&self) -> [[f64; 4]; 8] {
+        let lowest = if self.from_zero { 0.0 } else { -1.0 };
+        let side = |i: usize, bit: usize| if i & bit == 0 { -1.0 } else { 1.0 };
+        std::array::from_fn(|i| {
+            let depth = if i & 4 == 0 { lowest } else { 1.0 };
+            [side(i, 1), side(i, 2), depth, 1.0]
+        })
+    }
+
+    /// The inverse but for a positive factor; `None` if there is none.
+    fn inverse(&self) -> Option<[Four; 4]> {
+        let rows = self.exact_rows();
+        let cofactor = |i: usize, j: usize| {
+            let minor = minor(&rows, i, j);
+            if (i + j).is_multiple_of(2) {
+                minor
+            } else {
+                -&minor
+            }
+        };
+        let adjugate: [Four; 4] = std::array::from_fn(|i| std::array::from_fn(|j| cofactor(j, i)));
+        let first = (0..4).map(|i| &adjugate[i][0] * &rows[0][i]);
+        let determinant = first.fold(Expansion::ZERO, |sum, part| &sum + &part);
+        match determinant.sign() {
+            0 => None,
+            1 => Some(adjugate),
+            _ => Some(adjugate.map(|row| row.map(|entry| -&entry))),
+        }
+    }
+}
+
+/// The point that the projection takes to x = y = w = 0, rounded, and whether z
+/// is positive there: depth is then reversed, near has the larger one.
+fn eye(inverse: &[Four; 4]) -> Result<(DVec3, bool), CameraError> {
+    let eye = unprojected(inverse, [0.0, 0.0, 1.0, 0.0]);
+    let is_reversed = eye[3].sign() > 0;
+    // The same point, with a positive last coordinate.
+    let eye = if is_reversed { eye } else { eye.map(|e| -&e) };
+    let eye = about(&eye, &[]).filter(|eye| eye.is_finite());
+    Ok((eye.ok_or(CameraError::MatrixWithoutEye)?, is_reversed))
+}
+
+/// The determinant of what is left without a row and a column.
+fn minor(rows: &[Four; 4], row: usize, column: usize) -> Expansion {
+    let [a, b, c] = [0, 1, 2].map(|i| &rows[i + usize::from(i >= row)]);
+    let [i, j, k] = [0, 1, 2].map(|i| i + usize::from(i >= column));
+    let pair = |i: usize, j: usize| &(&b[i] * &c[j]) - &(&b[j] * &c[i]);
+    let (first, second, third) = (
+        &a[i] * &pair(j, k),
+        &a[j] * &pair(i, k),
+        &a[k] * &pair(i, j),
+    );
+    &(&first - &second) + &third
+}
+
+/// The inverse times a point of clip space.
+fn unprojected(inverse: &[Four; 4], clip: [f64; 4]) -> Four {
+    [0, 1, 2, 3].map(|i| {
+        let parts = inverse[i].iter().zip(clip).filter(|(_, c)| *c != 0.0);
+        let parts = parts.map(|(entry, c)| entry * &Expansion::from(c));
+        parts.fold(Expansion::ZERO, |sum, part| &sum + &part)
+    })
+}
+
+/// A point in homogeneous coordinates as a point about the sum of others;
+/// `None` if it is at infinity or beyond.
+fn about(point: &Four, zero: &[DVec3]) -> Option<DVec3> {
+    let [.., scale] = point;
+    if scale.sign() <= 0 {
+        return None;
+    }
+    let coordinate = |k: usize| {
+        let shift = |sum: Expansion, zero: &DVec3| &sum - &(scale * &Expansion::from(zero[k]));
+        zero.iter().fold(point[k].clone(), shift).estimate() / scale.estimate()
+    };
+    Some(DVec3::new(coordinate(0), coordinate(1), coordinate(2)))
+}
+
+/// A plane about the sum of some points, of unit length; `None` without a
+/// normal.
+fn plane_about(face: &Four, zero: &[DVec3]) -> Option<WidePlane> {
+    let [x, y, z, d] = face;
+    let mut offset = d.clone();
+    for zero in zero {
+        for (n, at) in [x, y, z].into_iter().zip(zero.to_array()) {
+            offset = &offset + &(n * &Expansion::from(at));
+        }
+    }
+    let largest = [x, y, z].map(|n| n.estimate().abs());
+    let largest = largest.into_iter().fold(0.0, f64::max);
+    let exponent = (largest > 0.0).then(|| libm::ilogb(largest))?;
+    // Near 1, so that no square overflows.
+    let [x, y, z, d] = [x, y, z, &offset].map(|n| n.scaled(-exponent).estimate());
+    let normal = DVec3::new(x, y, z);
+    let length = normal.length();
+    Some(WidePlane::new(normal / length, d / length))
+}
+
+impl Camera {
+    /// The camera that a matrix is. Its lens is the matrix; its frame only says
+    /// where the eye is and which way it looks, and turning or moving it changes
+    /// nothing that is visible.
+    ///
+    /// # Errors
+    /// As [`ViewProjection::new`].
+    pub fn of_matrix(
+        entries: [[f64; 4]; 4],
+        convention: MatrixConvention,
+    ) -> Result<Camera, CameraError> {
+        let matrix = ViewProjection::new(entries, convention)?;
+        let [_, up, _, forward] = matrix.rows.map(|[x, y, z, _]| DVec3::new(x, y, z));
+        let eye = matrix.eye;
+        let frame = Pose::Forward { eye, forward, up }.frame()?;
+        Ok(Camera {
+            frame,
+            lens: Lens::Matrix(matrix),
+        })
+    }
+}

@@ -1,0 +1,220 @@
+//! Cameras that are matrices: what a camera of the same numbers sees, under
+//! every name, by every command, and what is refused.
+
+use std::path::Path;
+
+use super::process::*;
+use super::{BOXES, EYE_LOOK};
+
+const ENTRIES: &str = "m00,m01,m02,m03,m10,m11,m12,m13,m20,m21,m22,m23,m30,m31,m32,m33";
+
+/// From (2, 3, 1) along +y with z up, 90 degrees, from 1 to 9 ahead: x to the
+/// right, z upward.
+const EYE: &str = "2,3,1,2,4,1,90,1,1,9";
+/// Depth -1 to 1: z = (10 (y - 3) - 18)/8.
+const GL: [[f64; 4]; 4] = [
+    [1.0, 0.0, 0.0, -2.0],
+    [0.0, 0.0, 1.0, -1.0],
+    [0.0, 1.25, 0.0, -6.0],
+    [0.0, 1.0, 0.0, -3.0],
+];
+/// Depth 0 to 1: z = 9/8 (y - 4).
+const D3D: [f64; 4] = [0.0, 1.125, 0.0, -4.5];
+/// Depth 1 to 0: z = (12 - y)/8.
+const REVERSED: [f64; 4] = [0.0, -0.125, 0.0, 1.5];
+
+fn row(m: [[f64; 4]; 4], by_columns: bool) -> String {
+    let entry = |i: usize| {
+        let (row, column) = (i / 4, i % 4);
+        if by_columns {
+            m[column][row]
+        } else {
+            m[row][column]
+        }
+    };
+    let entries: Vec<String> = (0..16).map(|i| entry(i).to_string()).collect();
+    entries.join(",")
+}
+
+fn with_depth(depth: [f64; 4]) -> [[f64; 4]; 4] {
+    let [x, y, _, w] = GL;
+    [x, y, depth, w]
+}
+
+fn boxes() -> String {
+    let mut random = Random(3);
+    let mut text = format!("{BOXES}\n");
+    for _ in 0..500 {
+        let low = [(); 3].map(|()| random.between(-60, 80));
+        let high = low.map(|low| low + random.between(0, 9));
+        let all: Vec<String> = low
+            .into_iter()
+            .chain(high)
+            .map(|v| (v as f64 / 4.0).to_string())
+            .collect();
+        text += &format!("{}\n", all.join(","));
+    }
+    text
+}
+
+fn seen(folder: &Path, cameras: &str) -> Vec<[String; 2]> {
+    let mut all = Vec::new();
+    for test in ["sphere", "six-plane", "exact"] {
+        let line = format!(
+            "query --scene boxes.csv --cameras {cameras} --structure linear,bvh --ids --test {test}"
+        );
+        let rows = rows(&works(folder, &line));
+        all.extend(
+            rows.iter()
+                .map(|row| ["structure", "visible_ids"].map(|c| row[c].clone())),
+        );
+    }
+    all
+}
+
+#[test]
+fn a_matrix_sees_what_its_camera_sees_under_every_name() {
+    let eye = format!("{EYE_LOOK},fovy_deg,aspect,near,far\n{EYE}\n");
+    let cases = [
+        ("column-gl", row(GL, false)),
+        ("column-d3d", row(with_depth(D3D), false)),
+        ("column-d3d", row(with_depth(REVERSED), false)),
+        ("row-gl", row(GL, true)),
+        ("row-d3d", row(with_depth(D3D), true)),
+        ("row-d3d", row(with_depth(REVERSED), true)),
+    ];
+    let folder = folder(&[
+        ("boxes.csv", boxes().as_bytes()),
+        ("eye.csv", eye.as_bytes()),
+    ]);
+    let wanted = seen(folder.path(), "eye.csv");
+    assert!(
+        wanted.iter().all(|row| row[1].split(' ').count() > 10),
+        "{wanted:?}"
+    );
+    for (name, row) in &cases {
+        let text = format!("time_s,{ENTRIES}\n0,{row}\n");
+        std::fs::write(folder.path().join("matrix.csv"), text).expect("writable");
+        let cameras = format!("matrix.csv --matrix-convention {name}");
+        assert_eq!(seen(folder.path(), &cameras), wanted, "{name}");
+        // By its transpose it is another camera, or none.
+        let (kind, depth) = name.split_once('-').expect("two words");
+        let other = if kind == "row" { "column" } else { "row" };
+        let line = format!(
+            "query --scene boxes.csv --cameras matrix.csv --structure linear --ids \
+             --matrix-convention {other}-{depth}"
+        );
+        let done = cullbench(folder.path(), &line);
+        assert!(
+            done.code == Some(2) || !done.out.contains(&wanted[2][1]),
+            "{name}: {done:?}"
+        );
+    }
+}
+
+#[test]
+fn every_command_takes_matrices() {
+    // Without an end, and one more.
+    let endless = row(with_depth([0.0, 0.0, 0.0, 1.0]), false);
+    let matrices = format!("{ENTRIES}\n{}\n{endless}\n", row(with_depth(D3D), false));
+    let folder = folder(&[
+        ("boxes.csv", boxes().as_bytes()),
+        ("m.csv", matrices.as_bytes()),
+    ]);
+    let on = "--scene boxes.csv --path m.csv --matrix-convention column-d3d";
+    let run = works(
+        folder.path(),
+        &format!("run {on} --structure linear,bvh --processes 2 --out run"),
+    );
+    assert!(run.contains("0 wrong"), "{run}");
+    let verified = works(
+        folder.path(),
+        &format!("verify {on} --cases 0 --structure bvh"),
+    );
+    assert!(
+        verified.contains("no mismatches") || verified.contains("0 mismatches"),
+        "{verified}"
+    );
+    let precision = json(&works(
+        folder.path(),
+        &format!("precision {on} --structure linear --cubes 0 --format json"),
+    ));
+    for point in array(&precision, "points") {
+        let by_frame = point["planes"] == "frame";
+        assert_eq!(point["status"] == "refused", !by_frame, "{point}");
+        let is_safe = by_frame && number(point, "epsilon") > 0.0;
+        assert!(!is_safe || point["false_negative_count"] == 0, "{point}");
+    }
+}
+
+#[test]
+fn matrices_that_are_no_cameras_are_refused_in_one_line() {
+    let good = row(GL, false);
+    let cases: [(String, &str, &str); 9] = [
+        (
+            format!("{ENTRIES}\n{good}\n"),
+            "",
+            "line 1 | not how to read them | --matrix-convention with one of column-gl, column-d3d, row-gl, row-d3d",
+        ),
+        (
+            format!("{}\n{good}\n", ENTRIES.replace("m21", "m44")),
+            "row-gl",
+            "line 1 | no column 'm21'",
+        ),
+        (
+            format!("{ENTRIES},near\n{good},1\n"),
+            "row-gl",
+            "line 1 | columns of a matrix and 'near' | expected",
+        ),
+        (
+            format!("{ENTRIES},eye_x,eye_y,eye_z\n{good},1,1,1\n"),
+            "row-gl",
+            "line 1 | columns of a matrix and 'eye_x' | expected",
+        ),
+        (
+            format!("{ENTRIES}\n{good}\n{}\n", good.replacen("1,0", "inf,0", 1)),
+            "column-gl",
+            "line 3 | m00 'inf' | a finite number",
+        ),
+        (
+            format!("{ENTRIES}\n{}1\n", "1,".repeat(15)),
+            "column-gl",
+            "line 2 | the matrix is singular | expected",
+        ),
+        (
+            format!("{ENTRIES}\n1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1\n"),
+            "column-d3d",
+            "line 2 | no eye | expected a perspective one",
+        ),
+        (
+            format!("{ENTRIES}\n{}\n", good.replacen('1', "1e70", 1)),
+            "column-gl",
+            "line 2 | m00 = 1e70 | 1e-60",
+        ),
+        (format!("{ENTRIES}\n"), "column-gl", "no camera"),
+    ];
+    let folder = with_good_files(&[]);
+    for (text, name, wanted) in &cases {
+        std::fs::write(folder.path().join("m.csv"), text).expect("writable");
+        let option = if name.is_empty() {
+            String::new()
+        } else {
+            format!("--matrix-convention {name}")
+        };
+        let line = format!("query --scene scene.csv --cameras m.csv --structure linear {option}");
+        all_refused(&folder, &[line], &format!("m.csv | {wanted}"));
+    }
+    std::fs::write(folder.path().join("m.csv"), &cases[0].0).expect("writable");
+    let query = "query --scene scene.csv --cameras m.csv --structure linear --matrix-convention";
+    all_refused(
+        &folder,
+        &[format!("{query} column")],
+        "unknown matrix convention 'column' | column-gl",
+    );
+    let planes = format!("{query} column-gl --planes gh-gl-f32");
+    all_refused(
+        &folder,
+        &[planes],
+        "camera 0 | planes of its own | expected --planes frame",
+    );
+}
