@@ -21,7 +21,7 @@ use crate::path::{self, LensDefaults, PathError};
 use crate::scene::{self, LoadOptions, Scene};
 
 /// Updates are measured in every so many-th process: they cost several builds.
-const UPDATES_EVERY: u32 = 3;
+const UPDATES_EVERY: u32 = 4;
 
 /// How much is measured.
 #[derive(Clone, Copy, PartialEq, Debug)]
