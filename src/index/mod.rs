@@ -249,7 +249,7 @@ pub trait FrustumQuery: RegionIndex {
     /// What [`DynIndex::see_many`] does: by default, one query after the other.
     fn visible_many(&self, kernel: Kernel, views: &[AnyView<'_>], out: &mut [Vec<ItemId>]) {
         for (view, out) in views.iter().zip(out) {
-            erased::see(kernel, self, *view, out, &mut NoRecorder);
+            erased::see(kernel, self, *view, out);
         }
     }
 }

@@ -228,7 +228,7 @@ pub(super) fn see_together(
                 asked: &mut asked,
             });
         } else {
-            erased::see(kernel, tree, *view, list, &mut NoRecorder);
+            erased::see(kernel, tree, *view, list);
         }
         views = &views[count..];
         out = &mut out[count..];
