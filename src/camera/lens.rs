@@ -118,36 +118,25 @@ impl Lens {
     /// The same lens with another far plane.
     ///
     /// # Errors
-    /// near >= far, or no far plane for an orthographic lens.
+    /// near >= far, no far plane for an orthographic lens, a value that is not
+    /// finite, a matrix.
     pub fn with_far(&self, far: Option<f64>) -> Result<Lens, CameraError> {
-        self.with_depth(self.near(), far)
-    }
-
-    /// The same angles (or, orthographic, the same height) between other
-    /// planes near and far.
-    ///
-    /// # Errors
-    /// near >= far, near not above 0 but for an orthographic lens, which also
-    /// needs a far plane; a value that is not finite; a matrix.
-    pub fn with_depth(&self, near: f64, far: Option<f64>) -> Result<Lens, CameraError> {
         match *self {
             Lens::Perspective {
-                fovy_deg, aspect, ..
-            } => Lens::perspective(fovy_deg, aspect, near, far),
-            Lens::OffAxis {
-                window,
-                near: measured_at,
+                fovy_deg,
+                aspect,
+                near,
                 ..
-            } => {
-                // Exactly 1 where near stays.
-                let scale = near / measured_at;
-                Lens::off_axis(window.map(|edge| edge * scale), near, far)
-            }
-            Lens::Orthographic { height, aspect, .. } => {
-                Lens::orthographic(height, aspect, near, far.unwrap_or(f64::INFINITY))
-            }
+            } => Lens::perspective(fovy_deg, aspect, near, far),
+            Lens::OffAxis { window, near, .. } => Lens::off_axis(window, near, far),
+            Lens::Orthographic {
+                height,
+                aspect,
+                near,
+                ..
+            } => Lens::orthographic(height, aspect, near, far.unwrap_or(f64::INFINITY)),
             Lens::Matrix(_) => Err(CameraError::MatrixFixed {
-                what: "near and far planes",
+                what: "a far plane",
             }),
         }
     }

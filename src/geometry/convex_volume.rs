@@ -193,12 +193,6 @@ impl ConvexVolume {
         self.least[index as usize % MAX_PLANES]
     }
 
-    /// [`ConvexVolume::least_of_bit`] of all planes.
-    #[inline(always)]
-    pub fn least(&self) -> &[f32; MAX_PLANES] {
-        &self.least
-    }
-
     /// [`Plane::upper`] of plane `index`, likewise.
     #[inline(always)]
     pub fn upper_of_bit(&self, index: u32) -> Upper {

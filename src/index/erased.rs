@@ -18,19 +18,6 @@ pub trait DynIndex: Send + Sync {
     fn memory(&self) -> MemoryUsage;
     /// What a view of any kind sees. The timed path: nothing is counted.
     fn see(&self, view: AnyView<'_>, out: &mut Vec<ItemId>);
-    /// What several views see, of any kinds and in any mixture: `out[i]` gets
-    /// what [`DynIndex::see`] appends for `views[i]`, perhaps in another order.
-    /// One query after the other, because that is the quickest, but for views
-    /// that are nearly the same on the wide tree (docs/MULTI_VIEW.md).
-    ///
-    /// # Panics
-    /// If there is not one list a view.
-    fn see_many(&self, views: &[AnyView<'_>], out: &mut [Vec<ItemId>]) {
-        assert_eq!(views.len(), out.len(), "one list a view");
-        for (view, out) in views.iter().zip(out) {
-            self.see(*view, out);
-        }
-    }
     /// The same query with its cost added up.
     fn see_counted(&self, view: AnyView<'_>, out: &mut Vec<ItemId>, cost: &mut QueryCost);
     /// What a convex volume sees: [`DynIndex::see`] with the usual view.
@@ -70,11 +57,6 @@ macro_rules! asked {
 
         fn see(&$this, view: AnyView<'_>, out: &mut Vec<ItemId>) {
             see($kernel, &$index, view, out, &mut NoRecorder);
-        }
-
-        fn see_many(&$this, views: &[AnyView<'_>], out: &mut [Vec<ItemId>]) {
-            assert_eq!(views.len(), out.len(), "one list a view");
-            FrustumQuery::visible_many(&$index, $kernel, views, out);
         }
 
         fn see_counted(&$this, view: AnyView<'_>, out: &mut Vec<ItemId>, cost: &mut QueryCost) {
@@ -195,7 +177,7 @@ impl<T: RegionIndex> Work for LocateMany<'_, T> {
 
 /// The one place that tells views and kernels apart: a traversal of its own
 /// for each.
-pub(super) fn see<T: FrustumQuery, R: Recorder>(
+fn see<T: FrustumQuery, R: Recorder>(
     kernel: Kernel,
     index: &T,
     view: AnyView<'_>,

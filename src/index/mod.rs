@@ -18,7 +18,6 @@ mod frontier;
 mod id_rows;
 mod info;
 mod linear;
-mod multi_view;
 mod octree;
 mod parallel;
 mod partition;
@@ -44,7 +43,7 @@ use serde::de::DeserializeOwned;
 
 use crate::geometry::{Aabb, PlaneTree};
 use crate::kernel::{Isa, Kernel};
-use crate::query::{AnyView, ItemId, ManySink, NoRecorder, Recorder, Sink, View};
+use crate::query::{ItemId, ManySink, NoRecorder, Recorder, Sink, View};
 use crate::threads::Pool;
 
 pub use block_order::BlockOrder;
@@ -244,13 +243,6 @@ pub trait FrustumQuery: RegionIndex {
     /// a [`TreeOrder`] as well.
     fn tree_order(&self) -> Option<&[ItemId]> {
         None
-    }
-
-    /// What [`DynIndex::see_many`] does: by default, one query after the other.
-    fn visible_many(&self, kernel: Kernel, views: &[AnyView<'_>], out: &mut [Vec<ItemId>]) {
-        for (view, out) in views.iter().zip(out) {
-            erased::see(kernel, self, *view, out, &mut NoRecorder);
-        }
     }
 }
 

@@ -14,14 +14,13 @@ use super::by_plane::ByPlane;
 use super::by_tree::visible_on_baseline;
 use super::frontier::{Frontier, Merger, NodeList, is_far};
 use super::id_rows::IdRows;
-use super::multi_view::see_together;
 use super::pass::{Layer, Pass};
 use super::{
     BuildError, FrustumQuery, Info, Kind, MemoryUsage, Origin, RegionIndex, TreeOrder, indexable,
 };
 use crate::geometry::{Aabb, BoxBlock, LANES, LaneMask, PlaneMask, PlaneTree};
-use crate::kernel::{BASELINE, Isa, Kernel, prefetch};
-use crate::query::{AnyView, ItemId, NoRecorder, Ranges, Recorder, Region, Sink, View};
+use crate::kernel::{BASELINE, Isa, prefetch};
+use crate::query::{ItemId, NoRecorder, Ranges, Recorder, Region, Sink, View};
 use crate::threads::{Pool, share};
 
 /// Parameters: `wide:order=median`.
@@ -483,10 +482,6 @@ impl FrustumQuery for Wide {
 
     fn tree_order(&self) -> Option<&[ItemId]> {
         Some(&self.ids)
-    }
-
-    fn visible_many(&self, kernel: Kernel, views: &[AnyView<'_>], out: &mut [Vec<ItemId>]) {
-        see_together(kernel, self, views, out);
     }
 }
 
