@@ -7,8 +7,8 @@ use std::ops::Range;
 
 use cullbench::geometry::{Aabb, ConvexVolume, Spheres, WideVolume, sphere_cube};
 use cullbench::index::{
-    BlockOrder, Bsp, Bvh, Foreseen, FrustumQuery, Linear, Octree, Quadtree, RegionIndex, Trace,
-    TreeOrder, Wide, WideParams,
+    BlockOrder, Bsp, Bvh, FrustumQuery, Linear, Octree, Quadtree, RegionIndex, Trace, TreeOrder,
+    Wide, WideParams,
 };
 use cullbench::kernel::{BASELINE, Isa, LANES, LaneMask, Pack};
 use cullbench::query::{ItemId, Located, NoRecorder, View};
@@ -89,11 +89,9 @@ fn wide(tree: &Wide, items: &[Aabb], volumes: &[ConvexVolume]) {
     for (i, volume) in volumes.iter().enumerate() {
         let wanted = those(items, |b| volume.sees(b));
         sees(&morton, volume, i, &wanted);
-        let (mut again, mut foreseen) = (Vec::new(), Vec::new());
+        let mut again = Vec::new();
         Trace::of(tree, volume).replay(tree, &mut again);
         assert_eq!(sorted_rest(again, 0), wanted, "replay");
-        Foreseen::of(tree, volume).answer(tree, volume, &mut foreseen);
-        assert_eq!(sorted_rest(foreseen, 0), wanted, "foreseen");
     }
 }
 

@@ -60,7 +60,7 @@ pub use partition::{Part, Record, Splitter, build_top_down};
 pub use quadtree::Quadtree;
 pub use quantised::{GridScope, Quantised, QuantisedParams};
 pub use registry::{Registry, Row, StructureSpec};
-pub use replay::{Foreseen, Trace};
+pub use replay::Trace;
 pub use tree::{PackedTree, TreeNode, TreeWriter, scan_blocks};
 pub use wide::{Wide, WideParams};
 

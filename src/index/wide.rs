@@ -20,7 +20,7 @@ use super::{
 };
 use crate::geometry::{Aabb, BoxBlock, LANES, LaneMask, PlaneMask, PlaneTree};
 use crate::kernel::{BASELINE, Isa, prefetch};
-use crate::query::{ItemId, NoRecorder, Ranges, Recorder, Region, Sink, View};
+use crate::query::{ItemId, Recorder, Region, Sink, View};
 use crate::threads::{Pool, share};
 
 /// Parameters: `wide:order=median`.
@@ -325,19 +325,6 @@ impl Wide {
             recorder,
         };
         pass.test_leaves(&self.layer(0), here, by_plane)
-    }
-
-    /// All of a query but its leaves: appends the runs that are wholly inside,
-    /// in their order, and leaves behind the leaves that are undecided.
-    pub(super) fn above_leaves<V: View>(&self, view: &V, runs: &mut Vec<Range<u32>>) -> Frontier {
-        let mut scratch = Scratch::default();
-        if let Some(top) = self.levels.len().checked_sub(1) {
-            scratch.start(BASELINE, view);
-            let sink = &mut Ranges::onto(runs);
-            // This sink never breaks off.
-            let _ = self.descend(BASELINE, view, 0..top, sink, &mut NoRecorder, &mut scratch);
-        }
-        scratch.here
     }
 
     /// Bounds of the boxes of one block, as the lane above them holds them.
