@@ -44,7 +44,7 @@ impl BoxBlock {
 
     /// Six rows of lanes, as [`BoxBlock`] keeps them.
     #[inline(always)]
-    pub(super) fn from_rows(rows: [[f32; LANES]; 6]) -> BoxBlock {
+    pub(crate) fn from_rows(rows: [[f32; LANES]; 6]) -> BoxBlock {
         BoxBlock { rows }
     }
 
