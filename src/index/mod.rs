@@ -48,7 +48,7 @@ use crate::threads::Pool;
 pub use block_order::BlockOrder;
 pub use bsp::{Bsp, BspBuilder, BspParams};
 pub(crate) use bundles::Leaves;
-pub use bvh::{Bvh, BvhLayout, BvhParams, BvhPreset};
+pub use bvh::{Bvh, BvhParams, BvhPreset};
 pub use erased::DynIndex;
 pub use execution::{By, Execution};
 pub use foreign::caught;

@@ -316,7 +316,7 @@ fn structures_of_another_build_are_refused_with_the_feature_they_need() {
 
 #[test]
 fn options_that_name_nothing_are_refused_with_the_nearest_name() {
-    let cases: [(&str, &str); 16] = [
+    let cases: [(&str, &str); 17] = [
         (
             "--structure bhv",
             "unknown structure 'bhv' | did you mean 'bvh' | linear",
@@ -327,6 +327,7 @@ fn options_that_name_nothing_are_refused_with_the_nearest_name() {
         ("--structure bvh:leaf=many", "leaf | many"),
         ("--structure bvh:leaf=0", "leaf=0 | expected 1 to"),
         ("--structure bvh:leave=4", "`leave` | `leaf`"),
+        ("--structure bvh:layout=cwbvh", "`layout` | `preset` or `leaf`"),
         ("--structure linear:leaf=4", "linear | `leaf`"),
         (
             "--test six-plain",
