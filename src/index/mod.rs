@@ -19,7 +19,6 @@ mod id_rows;
 mod info;
 mod linear;
 mod octree;
-mod parallel;
 mod partition;
 mod pass;
 #[cfg(feature = "peers")]
@@ -55,7 +54,6 @@ pub use foreign::caught;
 pub use info::{Capabilities, Info, Kind, Origin};
 pub use linear::{Linear, LinearScalar};
 pub use octree::{CellParams, Octree};
-pub use parallel::{Crew, see_each};
 pub use partition::{Part, Record, Splitter, build_top_down};
 pub use quadtree::Quadtree;
 pub use registry::{Registry, Row, StructureSpec};

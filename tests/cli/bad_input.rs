@@ -327,7 +327,10 @@ fn options_that_name_nothing_are_refused_with_the_nearest_name() {
         ("--structure bvh:leaf=many", "leaf | many"),
         ("--structure bvh:leaf=0", "leaf=0 | expected 1 to"),
         ("--structure bvh:leave=4", "`leave` | `leaf`"),
-        ("--structure bvh:layout=cwbvh", "`layout` | `preset` or `leaf`"),
+        (
+            "--structure bvh:layout=cwbvh",
+            "`layout` | `preset` or `leaf`",
+        ),
         ("--structure linear:leaf=4", "linear | `leaf`"),
         (
             "--test six-plain",
