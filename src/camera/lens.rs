@@ -248,7 +248,16 @@ mod tests {
 
     #[test]
     fn impossible_lenses_are_typed_errors() {
-        for fovy_deg in [0.0, 180.0, -10.0, 400.0, f64::NAN] {
+        for fovy_deg in [
+            0.0,
+            -0.0,
+            -1.0,
+            180.0,
+            180.00001,
+            400.0,
+            f64::NAN,
+            f64::INFINITY,
+        ] {
             let lens = Lens::perspective(fovy_deg, 1.0, 1.0, None);
             assert!(
                 matches!(lens, Err(CameraError::FieldOfView { .. })),
@@ -260,17 +269,31 @@ mod tests {
             assert!(matches!(lens, Err(CameraError::Aspect { .. })), "{aspect}");
         }
         let near = |near, far| Lens::perspective(60.0, 1.0, near, far);
-        assert!(matches!(near(0.0, None), Err(CameraError::Near { .. })));
-        assert!(matches!(
-            near(8.0, Some(8.0)),
-            Err(CameraError::NearFar { .. })
-        ));
-        assert!(matches!(
-            near(1.0, Some(f64::NAN)),
-            Err(CameraError::NotFinite { .. })
-        ));
+        for at in [0.0, -0.0, -1.0, -1e-300] {
+            for lens in [near(at, Some(9.0)), near(at, None)] {
+                assert!(matches!(lens, Err(CameraError::Near { .. })), "{at}");
+            }
+        }
+        for (at, far) in [(8.0, 8.0), (8.0, 4.0), (1e-300, 0.0), (1.0, -9.0)] {
+            let lens = near(at, Some(far));
+            assert!(
+                matches!(lens, Err(CameraError::NearFar { .. })),
+                "{at} {far}"
+            );
+        }
+        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            for lens in [near(bad, None), near(1.0, Some(bad))] {
+                assert!(matches!(lens, Err(CameraError::NotFinite { .. })), "{bad}");
+            }
+        }
         assert!(Lens::orthographic(0.0, 1.0, 0.0, 1.0).is_err());
         assert!(Lens::orthographic(1.0, 1.0, 1.0, 1.0).is_err());
-        assert!(Lens::off_axis([1.0, 1.0, 0.0, 1.0], 1.0, None).is_err());
+        for window in [[1.0, 1.0, 0.0, 1.0], [0.0, 1.0, 1.0, 0.0]] {
+            let lens = Lens::off_axis(window, 1.0, None);
+            assert!(
+                matches!(lens, Err(CameraError::Window { .. })),
+                "{window:?}"
+            );
+        }
     }
 }

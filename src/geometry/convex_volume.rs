@@ -252,13 +252,21 @@ mod tests {
 
     #[test]
     fn bad_planes_are_typed_errors() {
-        let nan = Plane::new(Vec3::new(f32::NAN, 0.0, 0.0), 0.0);
+        let sound = Plane::new(Vec3::X, 1.0);
+        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            for place in 0..4 {
+                let mut numbers = [1.0, 2.0, 3.0, 4.0];
+                numbers[place] = bad;
+                let [x, y, z, d] = numbers;
+                let planes = [sound, Plane::new(Vec3::new(x, y, z), d), sound];
+                assert!(matches!(
+                    ConvexVolume::from_planes(&planes),
+                    Err(VolumeError::NonFinitePlane { index: 1, .. })
+                ));
+            }
+        }
         assert!(matches!(
-            ConvexVolume::from_planes(&[Plane::new(Vec3::X, 0.0), nan]),
-            Err(VolumeError::NonFinitePlane { index: 1, .. })
-        ));
-        assert!(matches!(
-            ConvexVolume::from_planes(&[Plane::new(Vec3::X, 0.0); 33]),
+            ConvexVolume::from_planes(&[sound; 33]),
             Err(VolumeError::TooManyPlanes { count: 33 })
         ));
     }
