@@ -121,14 +121,6 @@ impl ConvexVolume {
         }
     }
 
-    /// A view frustum: named planes, `Far` left out when it is infinite.
-    ///
-    /// # Errors
-    /// As [`ConvexVolume::from_planes`].
-    pub fn from_named_planes(planes: &[(FrustumPlane, Plane)]) -> Result<Self, VolumeError> {
-        Self::collect(planes.iter().map(|&(name, plane)| (plane, Some(name))))
-    }
-
     /// Planes of which some have a name.
     ///
     /// # Errors
