@@ -57,10 +57,6 @@ impl CullingTest {
         row.map_or("", |row| row.1)
     }
 
-    pub fn named(name: &str) -> Option<CullingTest> {
-        TESTS.iter().find(|row| row.1 == name).map(|row| row.0)
-    }
-
     /// Whether the test has planes beyond the volume's own.
     fn is_extended(self) -> bool {
         matches!(self, CullingTest::SixBox | CullingTest::Exact)
@@ -108,13 +104,6 @@ impl Arithmetic {
     pub fn name(self) -> &'static str {
         let row = ARITHMETICS.iter().find(|row| row.0 == self);
         row.map_or("", |row| row.1)
-    }
-
-    pub fn named(name: &str) -> Option<Arithmetic> {
-        ARITHMETICS
-            .iter()
-            .find(|row| row.1 == name)
-            .map(|row| row.0)
     }
 }
 
