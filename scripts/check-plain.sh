@@ -7,4 +7,4 @@ cd "$(dirname "$0")/.."
 export RUSTFLAGS="--cfg plain_vectors"
 cargo test --no-default-features --target-dir target/plain "$@" \
     --lib --test portable --test conformance --test kernels --test ranges \
-    --test multi_view --test stability --test threads
+    --test stability --test threads

@@ -163,14 +163,13 @@ fn a_structure_is_asked_by_the_kernel_of_its_spec() {
     let built: Vec<_> = built.collect();
     let volume = RandomCase::new(1).volume;
     for (kernel, index) in built.iter().rev().chain(&built) {
-        let mut told = [const { Vec::new() }; 6];
-        let [seen, counted, located, located_counted, many, batched] = &mut told;
+        let mut told = [const { Vec::new() }; 5];
+        let [seen, counted, located, located_counted, batched] = &mut told;
         let cost = &mut QueryCost::default();
         index.visible(&volume, seen);
         index.visible_counted(&volume, counted, cost);
         index.locate(Vec3::ZERO, located);
         index.locate_counted(Vec3::ZERO, located_counted, cost);
-        index.see_many(&[(&volume).into()], std::slice::from_mut(many));
         let mut all = Located::default();
         index.locate_many(&[Vec3::ZERO], &mut all);
         batched.extend(all.iter().flatten());

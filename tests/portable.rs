@@ -7,11 +7,11 @@ use std::ops::Range;
 
 use cullbench::geometry::{Aabb, ConvexVolume, Spheres, WideVolume, sphere_cube};
 use cullbench::index::{
-    BlockOrder, Bsp, Bvh, DynIndex, Foreseen, FrustumQuery, Linear, Octree, Quadtree, RegionIndex,
-    Trace, TreeOrder, Wide, WideParams,
+    BlockOrder, Bsp, Bvh, FrustumQuery, Linear, Octree, Quadtree, RegionIndex, Trace, TreeOrder,
+    Wide, WideParams,
 };
 use cullbench::kernel::{BASELINE, Isa, LANES, LaneMask, Pack};
-use cullbench::query::{AnyView, ItemId, Located, NoRecorder, View};
+use cullbench::query::{ItemId, Located, NoRecorder, View};
 use cullbench::verify::{RandomCase, edge_scenes, edge_volumes};
 use glam::Vec3;
 
@@ -80,24 +80,18 @@ fn ranges<T: TreeOrder>(index: &T, items: &[Aabb], volumes: &[ConvexVolume]) {
     }
 }
 
-/// What only the wide tree does: other orders, replays, many views at once.
+/// What only the wide tree does: other orders, replays.
 fn wide(tree: &Wide, items: &[Aabb], volumes: &[ConvexVolume]) {
     let params = WideParams {
         order: BlockOrder::Morton,
     };
     let morton = Wide::build(items, None, &params).expect("finite");
-    let views: Vec<AnyView> = volumes.iter().map(AnyView::from).collect();
-    let mut lists = vec![Vec::new(); views.len()];
-    tree.see_many(&views, &mut lists);
-    for (i, (volume, list)) in volumes.iter().zip(lists).enumerate() {
+    for (i, volume) in volumes.iter().enumerate() {
         let wanted = those(items, |b| volume.sees(b));
         sees(&morton, volume, i, &wanted);
-        assert_eq!(sorted_rest(list, 0), wanted, "many views");
-        let (mut again, mut foreseen) = (Vec::new(), Vec::new());
+        let mut again = Vec::new();
         Trace::of(tree, volume).replay(tree, &mut again);
         assert_eq!(sorted_rest(again, 0), wanted, "replay");
-        Foreseen::of(tree, volume).answer(tree, volume, &mut foreseen);
-        assert_eq!(sorted_rest(foreseen, 0), wanted, "foreseen");
     }
 }
 

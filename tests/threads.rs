@@ -1,46 +1,13 @@
-//! Threads change nothing but the time: the same tree, the same sets, the same
-//! order, on every edge scene and for every kind of view.
+//! Threads change nothing but the time: the same tree, the same answers in the
+//! same order, on every edge scene.
 
-use std::thread::scope;
-
-use cullbench::geometry::{Aabb, ConvexVolume, RelativeVolume, Spheres, WideVolume, sphere_cube};
-use cullbench::index::{
-    BlockOrder, Crew, DynIndex, Registry, StructureSpec, TreeOrder, Wide, WideParams, see_each,
-};
-use cullbench::query::{AnyView, ItemId};
+use cullbench::geometry::{Aabb, ConvexVolume};
+use cullbench::index::{BlockOrder, TreeOrder, Wide, WideParams};
 use cullbench::scene;
-use cullbench::verify::{RandomCase, Reference, edge_scenes, edge_volumes};
+use cullbench::verify::{RandomCase, edge_scenes, edge_volumes};
 use glam::Vec3;
 
 const THREADS: std::ops::RangeInclusive<usize> = 1..=5;
-
-/// A volume as every kind of view.
-struct Views {
-    volume: ConvexVolume,
-    spheres: Spheres,
-    wide: WideVolume,
-    relative: Option<RelativeVolume>,
-}
-
-impl Views {
-    fn new(volume: &ConvexVolume, eye: Vec3) -> Views {
-        Views {
-            volume: volume.clone(),
-            spheres: Spheres::new(volume),
-            wide: WideVolume::from(volume),
-            relative: RelativeVolume::about(eye, volume).ok(),
-        }
-    }
-
-    /// Those for the items themselves, and the one for their spheres' cubes.
-    fn of_items(&self) -> Vec<AnyView<'_>> {
-        let relative = self.relative.iter().map(AnyView::from);
-        [(&self.volume).into(), (&self.wide).into()]
-            .into_iter()
-            .chain(relative)
-            .collect()
-    }
-}
 
 fn built(threads: usize, items: &[Aabb], order: BlockOrder) -> Wide {
     Wide::build_on(threads, items, &WideParams { order }).expect("finite items")
@@ -83,51 +50,6 @@ fn cases() -> Vec<(String, Vec<Aabb>, Vec<ConvexVolume>)> {
 }
 
 #[test]
-fn a_query_on_a_crew_gives_the_reference_set_in_one_order() {
-    let mut reordered = 0;
-    for (name, items, volumes) in cases() {
-        let cubes: Vec<Aabb> = items.iter().map(sphere_cube).collect();
-        let trees = [&items, &cubes].map(|items| built(1, items, BlockOrder::Median));
-        let mut reference = Reference::new(items.len());
-        // The answers of one thread; those of more are held to them.
-        let mut wanted: Vec<Vec<ItemId>> = Vec::new();
-        for threads in THREADS {
-            scope(|scope| {
-                let mut crews = trees.each_ref().map(|tree| Crew::new(scope, tree, threads));
-                assert_eq!(crews[0].threads(), threads);
-                let mut place = 0;
-                for (i, volume) in volumes.iter().enumerate() {
-                    let eye = items.first().map_or(Vec3::ONE, |b| b.max);
-                    let views = Views::new(volume, eye);
-                    let of_items = views.of_items().into_iter().map(|view| (0, view));
-                    for (which, view) in of_items.chain([(1, (&views.spheres).into())]) {
-                        let mut found = vec![ItemId::MAX];
-                        crews[which].see(view, &mut found);
-                        assert_eq!(found.remove(0), ItemId::MAX, "appended");
-                        if threads == 1 {
-                            reference.see([&items, &cubes][which], view);
-                            let difference = reference.compare(&found);
-                            assert!(
-                                difference.is_none(),
-                                "{name}, volume {i}, {view:?}: {difference}"
-                            );
-                            let mut whole = Vec::new();
-                            trees[which].see(view, &mut whole);
-                            reordered += usize::from(whole != found);
-                            wanted.push(found);
-                        } else {
-                            assert_eq!(found, wanted[place], "{name}, volume {i}, {threads}");
-                        }
-                        place += 1;
-                    }
-                }
-            });
-        }
-    }
-    assert!(reordered >= 10, "only {reordered} queries were split");
-}
-
-#[test]
 fn a_tree_that_several_threads_have_built_is_the_tree_of_one() {
     let mut large = 0;
     for (name, items, volumes) in cases() {
@@ -148,33 +70,4 @@ fn a_tree_that_several_threads_have_built_is_the_tree_of_one() {
         large += usize::from(items.len() > 50_000);
     }
     assert_eq!(large, 3);
-}
-
-#[test]
-fn many_cameras_are_answered_each_in_its_place() {
-    for (name, items, volumes) in cases() {
-        let views: Vec<Views> = volumes.iter().map(|v| Views::new(v, Vec3::ONE)).collect();
-        let views: Vec<AnyView> = views.iter().flat_map(Views::of_items).collect();
-        for row in Registry::builtin().rows() {
-            if items.len() > 50_000 && row.info.name != "wide" {
-                continue;
-            }
-            let spec = StructureSpec::parse(row.info.name).expect(row.info.name);
-            let index = spec.build(&items).expect(row.info.name);
-            let one_by_one: Vec<Vec<ItemId>> = views
-                .iter()
-                .map(|&view| {
-                    let mut out = Vec::new();
-                    index.see(view, &mut out);
-                    out
-                })
-                .collect();
-            // What is left of a former call must not matter.
-            let mut out = vec![vec![7]; views.len() + 3];
-            for threads in THREADS {
-                see_each(&*index, &views, threads, &mut out);
-                assert_eq!(out, one_by_one, "{} on {name}, {threads}", row.info.name);
-            }
-        }
-    }
 }

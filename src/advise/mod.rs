@@ -17,8 +17,7 @@ pub use omission::{Check, Decision, LeftOutIf, Omission};
 use crate::culling::Culling;
 use crate::index::{BuildError, StructureSpec};
 use crate::measure::{
-    Contender, OverProcesses, ProcessTimes, Protocol, Schedule, Workload, WorkloadError,
-    measure_group, timed,
+    OverProcesses, ProcessTimes, Protocol, Schedule, Workload, WorkloadError, timed,
 };
 use crate::path::CameraPath;
 use crate::scene::Scene;
@@ -153,45 +152,13 @@ impl AdviseInput<'_> {
     }
 }
 
-/// Measures what the advice rests on in this process alone: times without
-/// intervals. `None` if stopped; `progress` is told what comes next. With more
-/// processes: [`prepare`], [`time`] in each of them, [`Prepared::conclude`].
-///
-/// # Errors
-/// Nothing to look at, a camera without a view, a scene that the structures of
-/// the rules refuse.
-pub fn advise(
-    input: &AdviseInput,
-    stop: &dyn Fn() -> bool,
-    progress: &dyn Fn(&str),
-) -> Result<Option<Advice>, AdviseError> {
-    input.check()?;
-    let (culling, scene) = (Culling::default(), input.scene);
-    let workload = Workload::new(scene, input.path, &culling)?;
-    progress("every structure");
-    let specs = input.structures.iter().cloned();
-    let contenders: Vec<Contender> = specs
-        .map(|spec| Contender::build(spec, false, scene, culling.test))
-        .collect();
-    let Some(group) = measure_group(&workload, &contenders, &[], input.protocol, stop) else {
-        return Ok(None);
-    };
-    drop((contenders, workload));
-    let choice = StructureChoice::of(&group);
-    let Some(prepared) = prepare(input, choice, stop, progress)? else {
-        return Ok(None);
-    };
-    progress("every rule forced on and off");
-    let times = time(input, &prepared.plan, stop)?;
-    Ok(times.map(|times| prepared.conclude(&[times])))
-}
-
 /// Forces every rule on and off on the fastest tree, compares both sides with
 /// each other and with the exact truth, and plans how they are timed. `None` if
 /// stopped.
 ///
 /// # Errors
-/// As [`advise`].
+/// Nothing to look at, a camera without a view, a scene that the structures of
+/// the rules refuse.
 pub fn prepare(
     input: &AdviseInput,
     structure: StructureChoice,
@@ -248,7 +215,7 @@ pub fn prepare(
 /// Times in this process what was planned; `None` if stopped.
 ///
 /// # Errors
-/// As [`advise`]; another scene than the one that was planned for.
+/// As [`prepare`]; another scene than the one that was planned for.
 pub fn time(
     input: &AdviseInput,
     plan: &TrialPlan,

@@ -175,15 +175,34 @@ mod tests {
             Frame::looking_along(o, o, y),
             Err(CameraError::ForwardIsZero)
         );
-        assert_eq!(look_at(o, -y, y), Err(CameraError::UpParallel));
         assert_eq!(look_at(o, y, o), Err(CameraError::UpParallel));
         let odd = DVec3::new(1.0, 2.0, 2.0);
         assert_eq!(look_at(o, odd, odd * 0.1), Err(CameraError::UpParallel));
-        assert!(matches!(
-            look_at(DVec3::new(f64::NAN, 0.0, 0.0), o, y),
-            Err(CameraError::NotFinite { name: "eye x", .. })
-        ));
-        assert!(look_at(o, o, DVec3::INFINITY).is_err());
+        for length in [1.0, 1e-300, 1e300] {
+            let same = DVec3::splat(length);
+            assert_eq!(look_at(same, same, y), Err(CameraError::EyeIsLook));
+            for (look, up) in [(y, y), (-y, y), (odd, -odd)] {
+                let error = look_at(o, look * length, up);
+                assert_eq!(error, Err(CameraError::UpParallel), "{look} {length:e}");
+            }
+        }
+        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            for axis in 0..3 {
+                let mut broken = DVec3::ONE;
+                broken[axis] = bad;
+                let attempts = [
+                    ("eye", broken, -y, y),
+                    ("look", o, broken, y),
+                    ("up", o, -y, broken),
+                ];
+                for (named, eye, look, up) in attempts {
+                    let Err(CameraError::NotFinite { name, .. }) = look_at(eye, look, up) else {
+                        panic!("{named} {broken}");
+                    };
+                    assert_eq!(name, format!("{named} {}", ["x", "y", "z"][axis]));
+                }
+            }
+        }
     }
 
     #[test]

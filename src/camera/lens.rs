@@ -118,36 +118,25 @@ impl Lens {
     /// The same lens with another far plane.
     ///
     /// # Errors
-    /// near >= far, or no far plane for an orthographic lens.
+    /// near >= far, no far plane for an orthographic lens, a value that is not
+    /// finite, a matrix.
     pub fn with_far(&self, far: Option<f64>) -> Result<Lens, CameraError> {
-        self.with_depth(self.near(), far)
-    }
-
-    /// The same angles (or, orthographic, the same height) between other
-    /// planes near and far.
-    ///
-    /// # Errors
-    /// near >= far, near not above 0 but for an orthographic lens, which also
-    /// needs a far plane; a value that is not finite; a matrix.
-    pub fn with_depth(&self, near: f64, far: Option<f64>) -> Result<Lens, CameraError> {
         match *self {
             Lens::Perspective {
-                fovy_deg, aspect, ..
-            } => Lens::perspective(fovy_deg, aspect, near, far),
-            Lens::OffAxis {
-                window,
-                near: measured_at,
+                fovy_deg,
+                aspect,
+                near,
                 ..
-            } => {
-                // Exactly 1 where near stays.
-                let scale = near / measured_at;
-                Lens::off_axis(window.map(|edge| edge * scale), near, far)
-            }
-            Lens::Orthographic { height, aspect, .. } => {
-                Lens::orthographic(height, aspect, near, far.unwrap_or(f64::INFINITY))
-            }
+            } => Lens::perspective(fovy_deg, aspect, near, far),
+            Lens::OffAxis { window, near, .. } => Lens::off_axis(window, near, far),
+            Lens::Orthographic {
+                height,
+                aspect,
+                near,
+                ..
+            } => Lens::orthographic(height, aspect, near, far.unwrap_or(f64::INFINITY)),
             Lens::Matrix(_) => Err(CameraError::MatrixFixed {
-                what: "near and far planes",
+                what: "a far plane",
             }),
         }
     }
@@ -259,7 +248,16 @@ mod tests {
 
     #[test]
     fn impossible_lenses_are_typed_errors() {
-        for fovy_deg in [0.0, 180.0, -10.0, 400.0, f64::NAN] {
+        for fovy_deg in [
+            0.0,
+            -0.0,
+            -1.0,
+            180.0,
+            180.00001,
+            400.0,
+            f64::NAN,
+            f64::INFINITY,
+        ] {
             let lens = Lens::perspective(fovy_deg, 1.0, 1.0, None);
             assert!(
                 matches!(lens, Err(CameraError::FieldOfView { .. })),
@@ -271,17 +269,31 @@ mod tests {
             assert!(matches!(lens, Err(CameraError::Aspect { .. })), "{aspect}");
         }
         let near = |near, far| Lens::perspective(60.0, 1.0, near, far);
-        assert!(matches!(near(0.0, None), Err(CameraError::Near { .. })));
-        assert!(matches!(
-            near(8.0, Some(8.0)),
-            Err(CameraError::NearFar { .. })
-        ));
-        assert!(matches!(
-            near(1.0, Some(f64::NAN)),
-            Err(CameraError::NotFinite { .. })
-        ));
+        for at in [0.0, -0.0, -1.0, -1e-300] {
+            for lens in [near(at, Some(9.0)), near(at, None)] {
+                assert!(matches!(lens, Err(CameraError::Near { .. })), "{at}");
+            }
+        }
+        for (at, far) in [(8.0, 8.0), (8.0, 4.0), (1e-300, 0.0), (1.0, -9.0)] {
+            let lens = near(at, Some(far));
+            assert!(
+                matches!(lens, Err(CameraError::NearFar { .. })),
+                "{at} {far}"
+            );
+        }
+        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            for lens in [near(bad, None), near(1.0, Some(bad))] {
+                assert!(matches!(lens, Err(CameraError::NotFinite { .. })), "{bad}");
+            }
+        }
         assert!(Lens::orthographic(0.0, 1.0, 0.0, 1.0).is_err());
         assert!(Lens::orthographic(1.0, 1.0, 1.0, 1.0).is_err());
-        assert!(Lens::off_axis([1.0, 1.0, 0.0, 1.0], 1.0, None).is_err());
+        for window in [[1.0, 1.0, 0.0, 1.0], [0.0, 1.0, 1.0, 0.0]] {
+            let lens = Lens::off_axis(window, 1.0, None);
+            assert!(
+                matches!(lens, Err(CameraError::Window { .. })),
+                "{window:?}"
+            );
+        }
     }
 }

@@ -47,11 +47,6 @@ impl MatrixConvention {
         let row = MATRIX_CONVENTIONS.iter().find(|row| row.0 == self);
         row.map_or("", |row| row.1)
     }
-
-    pub fn named(name: &str) -> Option<MatrixConvention> {
-        let row = MATRIX_CONVENTIONS.iter().find(|row| row.1 == name);
-        row.map(|row| row.0)
-    }
 }
 
 /// The names of the entries: row, then column, as they are written down.

@@ -10,7 +10,6 @@ mod matrix;
 mod planes;
 mod pose;
 mod projection;
-mod views;
 
 pub use frame::{Frame, look_at};
 pub use lens::Lens;
@@ -19,7 +18,6 @@ pub use matrix::{MATRIX_CONVENTIONS, MATRIX_ENTRIES, MatrixConvention, ViewProje
 pub use planes::{DEFAULT_EPSILON, PLANE_METHODS, PlaneMethod, PlaneOptions, Surroundings};
 pub use pose::Pose;
 pub use projection::{ClipSpace, gribb_hartmann};
-pub use views::ViewSet;
 
 use crate::geometry::VolumeError;
 

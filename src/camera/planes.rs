@@ -79,13 +79,6 @@ impl PlaneMethod {
         let row = PLANE_METHODS.iter().find(|row| row.0 == self);
         row.map_or("", |row| row.1)
     }
-
-    pub fn named(name: &str) -> Option<PlaneMethod> {
-        PLANE_METHODS
-            .iter()
-            .find(|row| row.1 == name)
-            .map(|row| row.0)
-    }
 }
 
 /// The factor c of the conservative epsilon that covers the rounding of the

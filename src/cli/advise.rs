@@ -5,7 +5,6 @@
 use std::io::{self, Write};
 use std::time::Duration;
 
-use anyhow::bail;
 use tempfile::NamedTempFile;
 
 use super::args::{AdviseArgs, TableFormat};
@@ -31,7 +30,7 @@ use crate::statistics::Estimate;
 const ROUNDS: [usize; 2] = [5, 25];
 
 pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> {
-    let options = options(args)?;
+    let options = options(args);
     let plan = plan(registry, args)?;
     let scene = load_scene(&args.scene, &args.scene_args, plan.structures.len())?;
     let path = path::load(&args.path, &scene, &plan.lens)?;
@@ -144,38 +143,18 @@ pub fn time(
         scene: &scene,
         path: &path,
         structures: &plan.structures,
-        options: &options(args)?,
+        options: &options(args),
         protocol: &protocol(args, &plan.effort, timing.process, scene.items.len()),
     };
     Ok(advise::time(&input, trials, stop)?)
 }
 
-/// The options, each in its range.
-fn options(args: &AdviseArgs) -> anyhow::Result<AdviseOptions> {
-    for (name, value, least) in [
-        ("--draw-ns", args.draw_ns, 0.0),
-        ("--tolerance", args.tolerance, f64::MIN_POSITIVE),
-        ("--queries-per-update", args.queries_per_update, 0.0),
-    ] {
-        if !(value.is_finite() && value >= least) {
-            let wanted = if least > 0.0 { "above" } else { "of at least" };
-            bail!("{name} is {value}; expected a number {wanted} 0");
-        }
-    }
-    let percent = args.moved.strip_suffix('%');
-    let number = percent.unwrap_or(&args.moved).trim().parse::<f64>();
-    let share = number.map(|n| if percent.is_some() { n / 100.0 } else { n });
-    match share {
-        Ok(moved) if moved > 0.0 && moved <= 1.0 => Ok(AdviseOptions {
-            draw_ns: args.draw_ns,
-            tolerance: args.tolerance,
-            moved,
-            queries_per_update: args.queries_per_update,
-        }),
-        _ => bail!(
-            "--moved is '{}'; expected a share such as 1% or 0.01, above 0 and at most 100%",
-            args.moved
-        ),
+fn options(args: &AdviseArgs) -> AdviseOptions {
+    AdviseOptions {
+        draw_ns: args.draw_ns,
+        tolerance: args.tolerance,
+        moved: args.moved,
+        queries_per_update: args.queries_per_update,
     }
 }
 

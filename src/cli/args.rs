@@ -1,15 +1,14 @@
-//! What can be typed. Values are checked where they are used, so that every
-//! message can say what was found and what was expected.
+//! What can be typed. A value that can be judged by itself is by its parser
+//! ([`values`]), any other where it is used.
 
 use std::path::PathBuf;
 
-use crate::drift::{DriftOptions, MOST_STEPS};
-use crate::spec::{SpecError, parse_number};
 use crate::suite::DEFAULT_PATH;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::scene_args::SceneCommand;
 use super::shared_args::{CullingArgs, KernelArgs, LensArgs, SceneArgs, SpreadArgs};
+use super::values;
 
 /// Which spatial index finds what a camera sees, and where the camera is:
 /// how fast, and is the answer right?
@@ -243,9 +242,10 @@ pub struct CompareArgs {
         long,
         value_name = "SHARE",
         default_value = "5%",
+        value_parser = values::threshold,
         allow_hyphen_values = true
     )]
-    pub threshold: String,
+    pub threshold: f64,
     /// The metrics to judge by, of query_ns, locate_ns, locate_batched_ns, build_ms; may be repeated
     #[arg(long, value_name = "LIST", default_value = "query_ns")]
     pub metric: Vec<String>,
@@ -395,6 +395,7 @@ pub struct AdviseArgs {
         long,
         value_name = "NS",
         default_value_t = 1000.0,
+        value_parser = values::at_least_zero,
         allow_negative_numbers = true
     )]
     pub draw_ns: f64,
@@ -403,6 +404,7 @@ pub struct AdviseArgs {
         long,
         value_name = "SHARE",
         default_value_t = 1e-5,
+        value_parser = values::above_zero,
         allow_negative_numbers = true
     )]
     pub tolerance: f64,
@@ -411,14 +413,16 @@ pub struct AdviseArgs {
         long,
         value_name = "SHARE",
         default_value = "1%",
+        value_parser = values::share,
         allow_negative_numbers = true
     )]
-    pub moved: String,
+    pub moved: f64,
     /// Queries between two updates
     #[arg(
         long,
         value_name = "N",
         default_value_t = 1.0,
+        value_parser = values::at_least_zero,
         allow_negative_numbers = true
     )]
     pub queries_per_update: f64,
@@ -441,43 +445,21 @@ pub struct DriftArgs {
         long,
         value_name = "N",
         default_value = "1e7",
+        value_parser = values::steps,
         allow_negative_numbers = true
     )]
-    pub steps: String,
+    pub steps: u64,
     /// What a recommended way to turn or orbit may be off after all steps
     #[arg(
         long,
         value_name = "RAD",
         default_value_t = 1e-6,
+        value_parser = values::above_zero,
         allow_negative_numbers = true
     )]
     pub tolerance: f64,
     #[arg(long, value_enum, default_value = "table")]
     pub format: TableFormat,
-}
-
-impl DriftArgs {
-    pub fn options(&self) -> Result<DriftOptions, SpecError> {
-        let steps = parse_number(&self.steps)
-            .filter(|_| !self.steps.trim_end().ends_with('%'))
-            .filter(|n| n.fract() == 0.0 && (1.0..=MOST_STEPS as f64).contains(n));
-        let Some(steps) = steps else {
-            return Err(SpecError::new(format_args!(
-                "--steps is '{}'; expected a whole number from 1 to {MOST_STEPS:e}",
-                self.steps
-            )));
-        };
-        if !(self.tolerance > 0.0 && self.tolerance.is_finite()) {
-            return Err(SpecError::new(format_args!(
-                "--tolerance is {}; expected a number above 0",
-                self.tolerance
-            )));
-        }
-        Ok(DriftOptions {
-            steps: steps as u64,
-            tolerance_rad: self.tolerance,
-        })
-    }
 }
 
 #[derive(Args, Debug)]

@@ -13,10 +13,10 @@ use crate::measure::Status;
 use crate::report::{
     Changes, JUDGED_METRICS, Lone, Outcome, Report, Setting, changes, read_report, settings,
 };
-use crate::spec::{SpecError, parse_number};
+use crate::spec::SpecError;
 
 pub fn compare(registry: &Registry, args: &CompareArgs) -> anyhow::Result<Ending> {
-    let threshold = threshold(&args.threshold)?;
+    let threshold = args.threshold;
     if let Some(binary) = &args.against {
         return super::against_table::compare_against(registry, args, binary, threshold);
     }
@@ -52,22 +52,6 @@ pub fn compare(registry: &Registry, args: &CompareArgs) -> anyhow::Result<Ending
     };
     unread_is_fine(table.show(args))?;
     Ok(table.ending())
-}
-
-/// "5%", "5 %" or "0.05". A bare 5 could be meant as either, and as 500 % it
-/// would let everything pass.
-fn threshold(typed: &str) -> Result<f64, SpecError> {
-    let typed = typed.trim();
-    let share = match typed.strip_suffix('%') {
-        Some(percents) => parse_number(&format!("{}%", percents.trim_end())),
-        None => parse_number(typed).filter(|share| *share < 1.0),
-    };
-    share.filter(|share| *share >= 0.0).ok_or_else(|| {
-        SpecError::new(format_args!(
-            "--threshold is '{typed}'; expected a percentage such as 5% or a share from 0 to 1 \
-             such as 0.05"
-        ))
-    })
 }
 
 /// The metrics of all lists, each once.
@@ -186,28 +170,6 @@ fn head_line(report: &Report) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn thresholds_are_shares_and_nothing_else() {
-        for (typed, share) in [
-            ("5%", 0.05),
-            ("5 %", 0.05),
-            (" 0.05 ", 0.05),
-            ("0", 0.0),
-            ("0%", 0.0),
-            ("150%", 1.5),
-        ] {
-            assert_eq!(threshold(typed), Ok(share), "{typed}");
-        }
-        let bad = "nan NaN% -5% -0.1 inf inf% 1e999 5 1.5 5k five % 5%% - --all";
-        for typed in bad.split(' ').chain(["", "5 5%"]) {
-            let error = threshold(typed).expect_err(typed).to_string();
-            assert!(
-                error.contains("expected") && error.contains(typed),
-                "{error}"
-            );
-        }
-    }
 
     #[test]
     fn metrics_are_named_once_and_only_those_that_less_is_better_of() {

@@ -1,9 +1,13 @@
 //! What `query` and `locate` share: asking one structure after another (a
-//! large scene does not fit in memory several times), and noticing when they
-//! disagree.
+//! large scene does not fit in memory several times), noticing when they
+//! disagree, and writing the answers down.
 
 use std::collections::BTreeMap;
+use std::io::{self, BufWriter, Write};
 
+use serde_json::{Map, Value};
+
+use super::args::RowFormat;
 use crate::geometry::Aabb;
 use crate::index::{BuildError, DynIndex, StructureSpec};
 use crate::measure::{Answer, Verdict, guarded};
@@ -97,17 +101,48 @@ pub fn all_agree(rows: &[Row], what: &str) -> bool {
     agree
 }
 
-/// Ids as the CSV columns hold them: ascending, separated by spaces.
-pub fn joined(ids: &[ItemId]) -> String {
-    let texts: Vec<String> = ids.iter().map(ItemId::to_string).collect();
-    texts.join(" ")
+/// The answers as CSV or JSON, with a value for each column.
+pub fn write(
+    format: RowFormat,
+    columns: &[&str],
+    answers: &[Row],
+    row: impl Fn(&Row) -> Vec<Value>,
+) -> io::Result<()> {
+    let mut out = BufWriter::new(io::stdout().lock());
+    let rows = answers.iter().map(row);
+    match format {
+        RowFormat::Csv => {
+            let mut csv = csv::Writer::from_writer(&mut out);
+            csv.write_record(columns)?;
+            for row in rows {
+                csv.write_record(row.iter().map(cell))?;
+            }
+            csv.flush()?;
+        }
+        RowFormat::Json => {
+            let names = || columns.iter().map(|&name| name.to_owned());
+            let rows: Vec<Map<String, Value>> =
+                rows.map(|row| names().zip(row).collect()).collect();
+            serde_json::to_writer_pretty(&mut out, &rows)?;
+            writeln!(out)?;
+        }
+    }
+    out.flush()
+}
+
+/// A value as CSV holds it: ids separated by spaces.
+fn cell(value: &Value) -> String {
+    match value {
+        Value::String(text) => text.clone(),
+        Value::Array(ids) => ids.iter().map(cell).collect::<Vec<_>>().join(" "),
+        other => other.to_string(),
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::index::{self, LinearScalar, RegionIndex};
-    use serde_json::Value;
 
     const PANICS: index::Row = index::Row {
         info: LinearScalar::INFO.named("panics"),

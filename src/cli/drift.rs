@@ -8,13 +8,18 @@ use indicatif::ProgressBar;
 
 use super::args::{DriftArgs, TableFormat};
 use super::{Ending, text, unread_is_fine};
-use crate::drift::{self, DriftReport, ORBIT_RADIUS, Rated, Recommendation, SWING_DEG};
+use crate::drift::{
+    self, DriftOptions, DriftReport, ORBIT_RADIUS, Rated, Recommendation, SWING_DEG,
+};
 
 /// Long summaries wrap at this width.
 const WIDTH: u16 = 110;
 
 pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
-    let options = args.options()?;
+    let options = DriftOptions {
+        steps: args.steps,
+        tolerance_rad: args.tolerance,
+    };
     let bar = ProgressBar::new(drift::jobs() as u64);
     let report = drift::measure(&options, |job| {
         bar.set_message(job.to_owned());

@@ -1,15 +1,13 @@
 //! `cullbench locate`: one row per point, or box, and structure.
 
 use std::fs::File;
-use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use anyhow::Context;
-use serde_json::{Value, json};
+use serde_json::json;
 
-use super::args::{LocateArgs, RowFormat};
-use super::compare_structures::{Row, all_agree, ask_all, joined};
-use super::query::with_ids;
+use super::args::LocateArgs;
+use super::compare_structures::{Row, all_agree, ask_all, write};
 use super::{Ending, load_scene, unread_is_fine};
 use crate::index::{DynIndex, Registry, StructureSpec};
 use crate::path::read_points_csv;
@@ -24,7 +22,24 @@ pub fn locate(registry: &Registry, args: &LocateArgs) -> anyhow::Result<Ending> 
         // The argument parser has refused that.
         (None, None) => ("point", Vec::new()),
     };
-    unread_is_fine(write(args, what, &answers))?;
+    let columns = [
+        what,
+        "structure",
+        "region_count",
+        "region_id_sum",
+        "region_ids",
+        "nodes_tested",
+    ];
+    unread_is_fine(write(args.format, &columns, &answers, |a| {
+        vec![
+            json!(a.question),
+            json!(a.structure),
+            json!(a.answer.count),
+            json!(a.id_sum),
+            json!(a.ids),
+            json!(a.cost.nodes_tested),
+        ]
+    }))?;
     Ok(if all_agree(&answers, what) {
         Ending::Ok
     } else {
@@ -65,50 +80,4 @@ fn open(file: &Path) -> anyhow::Result<(File, String)> {
     let name = file.display().to_string();
     let input = File::open(file).with_context(|| name.clone())?;
     Ok((input, name))
-}
-
-fn write(args: &LocateArgs, what: &str, answers: &[Row]) -> io::Result<()> {
-    let mut out = BufWriter::new(io::stdout().lock());
-    match args.format {
-        RowFormat::Csv => {
-            let mut csv = csv::Writer::from_writer(&mut out);
-            csv.write_record([
-                what,
-                "structure",
-                "region_count",
-                "region_id_sum",
-                "region_ids",
-                "nodes_tested",
-            ])?;
-            for a in answers {
-                csv.write_record([
-                    a.question.to_string(),
-                    a.structure.clone(),
-                    a.answer.count.to_string(),
-                    a.id_sum.to_string(),
-                    a.ids.as_deref().map(joined).unwrap_or_default(),
-                    a.cost.nodes_tested.to_string(),
-                ])?;
-            }
-            csv.flush()?;
-        }
-        RowFormat::Json => {
-            let rows: Vec<Value> = answers
-                .iter()
-                .map(|a| {
-                    let row = json!({
-                        what: a.question,
-                        "structure": a.structure,
-                        "region_count": a.answer.count,
-                        "region_id_sum": a.id_sum,
-                        "nodes_tested": a.cost.nodes_tested,
-                    });
-                    with_ids(row, "region_ids", a)
-                })
-                .collect();
-            serde_json::to_writer_pretty(&mut out, &rows)?;
-            writeln!(out)?;
-        }
-    }
-    out.flush()
 }

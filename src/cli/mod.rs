@@ -42,6 +42,7 @@ mod surface_diagram;
 mod surface_tables;
 mod text;
 mod usage;
+mod values;
 mod verify;
 mod worker;
 

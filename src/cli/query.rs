@@ -1,11 +1,9 @@
 //! `cullbench query`: one row per camera and structure.
 
-use std::io::{self, BufWriter, Write};
+use serde_json::json;
 
-use serde_json::{Map, Value, json};
-
-use super::args::{QueryArgs, RowFormat};
-use super::compare_structures::{Row, all_agree, ask_all, joined};
+use super::args::QueryArgs;
+use super::compare_structures::{all_agree, ask_all, write};
 use super::{Ending, load_scene, unread_is_fine};
 use crate::index::Registry;
 use crate::measure::Workload;
@@ -31,81 +29,35 @@ pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
         args.ids,
         ask,
     )?;
-    unread_is_fine(write(
-        args,
-        culling.test.name(),
-        scene.items.len(),
-        &answers,
-    ))?;
+    let mut columns = vec![
+        "camera",
+        "structure",
+        "test",
+        "total_count",
+        "visible_count",
+        "visible_id_sum",
+        "nodes_tested",
+        "items_tested",
+    ];
+    columns.extend(args.ids.then_some("visible_ids"));
+    let (test, total) = (culling.test.name(), scene.items.len());
+    unread_is_fine(write(args.format, &columns, &answers, |a| {
+        let mut row = vec![
+            json!(a.question),
+            json!(a.structure),
+            json!(test),
+            json!(total),
+            json!(a.answer.count),
+            json!(a.id_sum),
+            json!(a.cost.nodes_tested),
+            json!(a.cost.items_tested),
+        ];
+        row.extend(a.ids.as_ref().map(|ids| json!(ids)));
+        row
+    }))?;
     Ok(if all_agree(&answers, "camera") {
         Ending::Ok
     } else {
         Ending::WrongAnswer
     })
-}
-
-fn write(args: &QueryArgs, test: &str, total: usize, answers: &[Row]) -> io::Result<()> {
-    let mut out = BufWriter::new(io::stdout().lock());
-    match args.format {
-        RowFormat::Csv => {
-            let mut csv = csv::Writer::from_writer(&mut out);
-            let mut header = vec![
-                "camera",
-                "structure",
-                "test",
-                "total_count",
-                "visible_count",
-                "visible_id_sum",
-                "nodes_tested",
-                "items_tested",
-            ];
-            header.extend(args.ids.then_some("visible_ids"));
-            csv.write_record(header)?;
-            for a in answers {
-                let mut row = vec![
-                    a.question.to_string(),
-                    a.structure.clone(),
-                    test.to_owned(),
-                    total.to_string(),
-                    a.answer.count.to_string(),
-                    a.id_sum.to_string(),
-                    a.cost.nodes_tested.to_string(),
-                    a.cost.items_tested.to_string(),
-                ];
-                row.extend(a.ids.as_deref().map(joined));
-                csv.write_record(&row)?;
-            }
-            csv.flush()?;
-        }
-        RowFormat::Json => {
-            let rows: Vec<Value> = answers
-                .iter()
-                .map(|a| {
-                    let row = json!({
-                        "camera": a.question,
-                        "structure": a.structure,
-                        "test": test,
-                        "total_count": total,
-                        "visible_count": a.answer.count,
-                        "visible_id_sum": a.id_sum,
-                        "nodes_tested": a.cost.nodes_tested,
-                        "items_tested": a.cost.items_tested,
-                    });
-                    with_ids(row, "visible_ids", a)
-                })
-                .collect();
-            serde_json::to_writer_pretty(&mut out, &rows)?;
-            writeln!(out)?;
-        }
-    }
-    out.flush()
-}
-
-/// The row with the answer's ids as an array, if they were kept.
-pub fn with_ids(row: Value, name: &str, answer: &Row) -> Value {
-    let mut row: Map<String, Value> = row.as_object().cloned().unwrap_or_default();
-    if let Some(ids) = &answer.ids {
-        row.insert(name.to_owned(), json!(ids));
-    }
-    Value::Object(row)
 }

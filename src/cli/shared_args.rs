@@ -1,17 +1,14 @@
 //! Options that several commands take: how scenes are read, what cameras lack,
-//! how a view is made and tested, how queries are computed. Values are checked
-//! where they are used.
+//! how a view is made and tested, how queries are computed.
 
-use crate::camera::{
-    DEFAULT_EPSILON, MATRIX_CONVENTIONS, MatrixConvention, PLANE_METHODS, PlaneMethod, PlaneOptions,
-};
-use crate::culling::{ARITHMETICS, Arithmetic, Culling, CullingTest, TESTS};
+use super::values;
+use crate::camera::{DEFAULT_EPSILON, PlaneMethod, PlaneOptions};
+use crate::culling::{Arithmetic, Culling};
 use crate::index::{Execution, Registry, StructureSpec};
 use crate::kernel::Kernel;
 use crate::measure::{Beside, Effort, Machine, Protocol};
 use crate::path::LensDefaults;
 use crate::spec::SpecError;
-use crate::threads::MOST_THREADS;
 use clap::Args;
 use glam::DVec3;
 
@@ -26,16 +23,11 @@ pub struct SceneArgs {
 #[derive(Args, Debug)]
 pub struct KernelArgs {
     /// Instruction set: portable, avx2 or avx512 [default: the best of this machine]
-    #[arg(long = "kernel", value_name = "NAME")]
-    pub name: Option<String>,
+    #[arg(long = "kernel", value_name = "NAME", value_parser = values::kernel)]
+    pub name: Option<Kernel>,
     /// Threads that a build may use, and that query and locate share cameras and points among
-    #[arg(
-        long,
-        value_name = "N",
-        default_value = "1",
-        allow_negative_numbers = true
-    )]
-    pub threads: String,
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = values::threads, allow_negative_numbers = true)]
+    pub threads: usize,
 }
 
 impl KernelArgs {
@@ -50,31 +42,17 @@ impl KernelArgs {
         Ok(specs.map(|spec| spec.by(execution)).collect())
     }
 
+    /// Fails where this machine lacks the instruction set.
     pub fn execution(&self) -> Result<Execution, SpecError> {
-        let threads = match self.threads.parse() {
-            Ok(count @ 1..=MOST_THREADS) => count,
-            _ => {
-                return Err(SpecError::new(format_args!(
-                    "--threads is '{}'; expected a whole number from 1 to {MOST_THREADS}",
-                    self.threads
-                )));
-            }
-        };
-        let Some(name) = self.name.as_deref() else {
-            return Ok(Execution {
-                threads,
-                ..Execution::default()
-            });
-        };
-        let Some(kernel) = Kernel::named(name) else {
-            let known = Kernel::ALL.iter().map(|kernel| kernel.name());
-            return Err(SpecError::unknown("kernel", name, known));
-        };
+        let kernel = self.name.unwrap_or_else(Kernel::best);
         let kernel = kernel.checked().map_err(|error| {
             let here: Vec<_> = Kernel::available().map(Kernel::name).collect();
             SpecError::new(format_args!("{error}; here are: {}", here.join(", ")))
         })?;
-        Ok(Execution { kernel, threads })
+        Ok(Execution {
+            kernel,
+            threads: self.threads,
+        })
     }
 }
 
@@ -145,8 +123,8 @@ pub struct LensArgs {
     #[arg(long, allow_negative_numbers = true)]
     pub near: Option<f64>,
     /// Far plane for cameras without one, or inf [default: 1000 for recorded cameras, the scene for paths]
-    #[arg(long, allow_negative_numbers = true)]
-    pub far: Option<String>,
+    #[arg(long, value_parser = values::far, allow_negative_numbers = true)]
+    pub far: Option<f64>,
     /// How cameras that are matrices (columns m00 to m33: row, column) are read: column-gl or column-d3d (clip = M x, depth -1..1 or 0..1), row-gl or row-d3d (clip = x M); reversed depth and infinite far as they come
     #[arg(long, value_name = "NAME")]
     pub matrix_convention: Option<String>,
@@ -154,29 +132,13 @@ pub struct LensArgs {
 
 impl LensArgs {
     pub fn defaults(&self) -> Result<LensDefaults, SpecError> {
-        let far = match self.far.as_deref() {
-            None => None,
-            Some(text) if text.eq_ignore_ascii_case("inf") => Some(None),
-            Some(text) => match text.parse::<f64>() {
-                Ok(far) if far.is_finite() => Some(Some(far)),
-                _ => {
-                    return Err(SpecError::new(format_args!(
-                        "--far is '{text}'; expected a finite number or inf"
-                    )));
-                }
-            },
-        };
-        let matrix = self.matrix_convention.as_deref().map(|name| {
-            let known = MATRIX_CONVENTIONS.iter().map(|row| row.1);
-            MatrixConvention::named(name)
-                .ok_or_else(|| SpecError::unknown("matrix convention", name, known))
-        });
+        let matrix = self.matrix_convention.as_deref();
         Ok(LensDefaults {
-            matrix: matrix.transpose()?,
+            matrix: matrix.map(values::matrix_convention).transpose()?,
             fovy_deg: self.fovy,
             aspect: self.aspect,
             near: self.near,
-            far,
+            far: self.far.map(|far| Some(far).filter(|far| far.is_finite())),
             up: DVec3::Z,
         })
     }
@@ -186,47 +148,26 @@ impl LensArgs {
 #[derive(Args, Debug)]
 pub struct CullingArgs {
     /// Where the planes come from: frame, frame-f32, gh-gl-f32, gh-gl-f64, gh-d3d-f32, gh-d3d-f64, gh-revz-f32, gh-revz-f64
-    #[arg(long, value_name = "METHOD", default_value = "frame")]
-    pub planes: String,
+    #[arg(long, value_name = "METHOD", default_value = "frame", value_parser = values::plane_method)]
+    pub planes: PlaneMethod,
     /// Factor c of the conservative epsilon; 0 leaves the planes as derived
-    #[arg(long, value_name = "C", default_value_t = DEFAULT_EPSILON, allow_negative_numbers = true)]
+    #[arg(long, value_name = "C", default_value_t = DEFAULT_EPSILON, value_parser = values::at_least_zero, allow_negative_numbers = true)]
     pub epsilon: f64,
     /// Numbers the culling test is carried out in: f32, f64, f32-relative
-    #[arg(long, value_name = "NUMBERS", default_value = "f32")]
-    pub arithmetic: String,
+    #[arg(long, value_name = "NUMBERS", default_value = "f32", value_parser = values::arithmetic)]
+    pub arithmetic: Arithmetic,
 }
 
 impl CullingArgs {
-    fn plane_options(&self) -> Result<PlaneOptions, SpecError> {
-        let method = PlaneMethod::named(&self.planes).ok_or_else(|| {
-            SpecError::unknown(
-                "plane method",
-                &self.planes,
-                PLANE_METHODS.iter().map(|row| row.1),
-            )
-        })?;
-        if !(self.epsilon >= 0.0 && self.epsilon.is_finite()) {
-            return Err(SpecError::new(format_args!(
-                "--epsilon is {}; expected a number of at least 0",
-                self.epsilon
-            )));
-        }
-        Ok(PlaneOptions {
-            method,
-            epsilon: self.epsilon,
-        })
-    }
-
     /// The culling test of that name with everything else as asked for.
     pub fn culling(&self, test: &str) -> Result<Culling, SpecError> {
         Ok(Culling {
-            test: CullingTest::named(test)
-                .ok_or_else(|| SpecError::unknown("test", test, TESTS.iter().map(|t| t.1)))?,
-            arithmetic: Arithmetic::named(&self.arithmetic).ok_or_else(|| {
-                let known = ARITHMETICS.iter().map(|a| a.1);
-                SpecError::unknown("arithmetic", &self.arithmetic, known)
-            })?,
-            planes: self.plane_options()?,
+            test: values::culling_test(test)?,
+            arithmetic: self.arithmetic,
+            planes: PlaneOptions {
+                method: self.planes,
+                epsilon: self.epsilon,
+            },
         })
     }
 }

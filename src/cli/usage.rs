@@ -4,7 +4,27 @@
 use std::error::Error;
 use std::num::{ParseFloatError, ParseIntError};
 
-use clap::error::ErrorKind;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+
+use crate::spec::SpecError;
+
+/// What one of our own parsers says of a value.
+fn value(error: &clap::Error) -> Option<String> {
+    let said = error.source()?.downcast_ref::<SpecError>()?.to_string();
+    let told = |kind| match error.get(kind) {
+        Some(ContextValue::String(text)) => text.as_str(),
+        _ => "",
+    };
+    let (option, found) = (
+        told(ContextKind::InvalidArg),
+        told(ContextKind::InvalidValue),
+    );
+    let option = option.split(' ').next().unwrap_or_default();
+    Some(match said.starts_with("expected") {
+        true => format!("{option} is '{found}'; {said}"),
+        false => said,
+    })
+}
 
 /// The error on one line; `None` for what is no error but text that was asked
 /// for, or the help for want of a command.
@@ -14,6 +34,9 @@ pub fn one_line(error: &clap::Error) -> Option<String> {
     };
     if matches!(error.kind(), DisplayHelp | NoCommand | DisplayVersion) {
         return None;
+    }
+    if let Some(line) = value(error) {
+        return Some(line);
     }
     let text = error.render().to_string();
     let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty());

@@ -172,12 +172,16 @@ fn reproduce(scene: &str, path: &str, args: &VerifyArgs) -> String {
     let mut command = format!(
         "cullbench verify --scene '{scene}' --path '{path}' --planes {} --epsilon {} \
          --arithmetic {} --fovy {} --aspect {}",
-        culling.planes, culling.epsilon, culling.arithmetic, lens.fovy, lens.aspect
+        culling.planes.name(),
+        culling.epsilon,
+        culling.arithmetic.name(),
+        lens.fovy,
+        lens.aspect
     );
     if let Some(near) = lens.near {
         command += &format!(" --near {near}");
     }
-    if let Some(far) = &lens.far {
+    if let Some(far) = lens.far {
         command += &format!(" --far {far}");
     }
     command

@@ -57,10 +57,6 @@ impl CullingTest {
         row.map_or("", |row| row.1)
     }
 
-    pub fn named(name: &str) -> Option<CullingTest> {
-        TESTS.iter().find(|row| row.1 == name).map(|row| row.0)
-    }
-
     /// Whether the test has planes beyond the volume's own.
     fn is_extended(self) -> bool {
         matches!(self, CullingTest::SixBox | CullingTest::Exact)
@@ -108,13 +104,6 @@ impl Arithmetic {
     pub fn name(self) -> &'static str {
         let row = ARITHMETICS.iter().find(|row| row.0 == self);
         row.map_or("", |row| row.1)
-    }
-
-    pub fn named(name: &str) -> Option<Arithmetic> {
-        ARITHMETICS
-            .iter()
-            .find(|row| row.1 == name)
-            .map(|row| row.0)
     }
 }
 
@@ -300,14 +289,38 @@ mod tests {
         let frame = Frame::looking_along(DVec3::ZERO, DVec3::X, DVec3::Z).unwrap();
         let lens = Lens::perspective(60.0, 1.5, 0.1, Some(100.0)).unwrap();
         let camera = Camera { frame, lens };
-        let sphere = of(CullingTest::Sphere, Arithmetic::F64);
-        assert!(matches!(
-            sphere.view(&camera, &AROUND),
-            Err(CullingError::Sphere)
-        ));
-        let mut matrix = of(CullingTest::SixPlane, Arithmetic::F32Relative);
-        matrix.planes.method = PlaneMethod::GhGlF32;
-        let error = matrix.view(&camera, &AROUND).unwrap_err();
-        assert!(error.to_string().contains("--planes frame"), "{error}");
+        for arithmetic in [Arithmetic::F64, Arithmetic::F32Relative] {
+            let sphere = of(CullingTest::Sphere, arithmetic);
+            assert!(matches!(
+                sphere.view(&camera, &AROUND),
+                Err(CullingError::Sphere)
+            ));
+            let mut matrix = of(CullingTest::SixPlane, arithmetic);
+            matrix.planes.method = PlaneMethod::GhGlF32;
+            let error = matrix.view(&camera, &AROUND).unwrap_err();
+            assert!(error.to_string().contains("--planes frame"), "{error}");
+        }
+    }
+
+    #[test]
+    fn cameras_whose_planes_f32_cannot_hold_are_refused() {
+        let frame = Frame::looking_along(DVec3::ZERO, -DVec3::Z, DVec3::Y).unwrap();
+        let lens = Lens::perspective(60.0, 1.5, 1.0, Some(9.0)).unwrap();
+        for power in [130.0, 200.0, 1000.0] {
+            let beyond = libm::exp2(power);
+            let mut away = Camera { frame, lens };
+            away.frame.eye.z = beyond;
+            let lens = lens.with_far(Some(beyond)).unwrap();
+            for camera in [away, Camera { frame, lens }] {
+                for (test, name, _) in TESTS {
+                    let view = of(test, Arithmetic::F32).view(&camera, &Surroundings::default());
+                    let error = view.err();
+                    assert!(
+                        matches!(error, Some(CullingError::Camera(CameraError::Volume(_)))),
+                        "{name} 2^{power}: {error:?}"
+                    );
+                }
+            }
+        }
     }
 }

@@ -6,9 +6,7 @@ use glam::Vec3;
 
 use super::aabb::held;
 use super::blade::{Blade, Corner};
-use super::{
-    Aabb, Ball, ConvexVolume, MAX_PLANES, Plane, PlaneMask, SphereMargin, Upper, WidePlane,
-};
+use super::{Aabb, Ball, ConvexVolume, Plane, PlaneMask, SphereMargin, Upper, WidePlane};
 use crate::kernel::{Isa, Plain, prefetch};
 
 /// Boxes of one block, and one bit for each of them.
@@ -46,7 +44,7 @@ impl BoxBlock {
 
     /// Six rows of lanes, as [`BoxBlock`] keeps them.
     #[inline(always)]
-    pub(super) fn from_rows(rows: [[f32; LANES]; 6]) -> BoxBlock {
+    pub(crate) fn from_rows(rows: [[f32; LANES]; 6]) -> BoxBlock {
         BoxBlock { rows }
     }
 
@@ -159,14 +157,12 @@ impl BoxBlock {
 
     /// [`BoxBlock::admitted_by`] for nodes: also which planes stay open below
     /// each lane. A lane's word is `mask` without the planes that hold the
-    /// whole box ([`Plane::contains`]), had they the `d` whose negatives are
-    /// `least`: the volume's own, or others.
+    /// whole box ([`Plane::contains`]).
     #[inline(always)]
     pub fn sorted_by<I: Isa>(
         &self,
         isa: I,
         volume: &ConvexVolume,
-        least: &[f32; MAX_PLANES],
         mask: PlaneMask,
     ) -> (LaneMask, I::Words) {
         let mut kept = isa.keep_all();
@@ -179,7 +175,7 @@ impl BoxBlock {
             kept = blade.keep(isa, kept, self);
             let near = self.numbered_rows(blade.corner.near());
             let nearest = sums_at(isa, volume.plane_of_bit(bit).normal, near);
-            let least = isa.splat(least[bit as usize % MAX_PLANES]);
+            let least = isa.splat(volume.least_of_bit(bit));
             open = isa.without(open, nearest, least, 1 << bit);
         }
         (isa.kept(kept), open)

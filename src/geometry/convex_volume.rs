@@ -121,14 +121,6 @@ impl ConvexVolume {
         }
     }
 
-    /// A view frustum: named planes, `Far` left out when it is infinite.
-    ///
-    /// # Errors
-    /// As [`ConvexVolume::from_planes`].
-    pub fn from_named_planes(planes: &[(FrustumPlane, Plane)]) -> Result<Self, VolumeError> {
-        Self::collect(planes.iter().map(|&(name, plane)| (plane, Some(name))))
-    }
-
     /// Planes of which some have a name.
     ///
     /// # Errors
@@ -193,12 +185,6 @@ impl ConvexVolume {
         self.least[index as usize % MAX_PLANES]
     }
 
-    /// [`ConvexVolume::least_of_bit`] of all planes.
-    #[inline(always)]
-    pub fn least(&self) -> &[f32; MAX_PLANES] {
-        &self.least
-    }
-
     /// [`Plane::upper`] of plane `index`, likewise.
     #[inline(always)]
     pub fn upper_of_bit(&self, index: u32) -> Upper {
@@ -258,13 +244,21 @@ mod tests {
 
     #[test]
     fn bad_planes_are_typed_errors() {
-        let nan = Plane::new(Vec3::new(f32::NAN, 0.0, 0.0), 0.0);
+        let sound = Plane::new(Vec3::X, 1.0);
+        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            for place in 0..4 {
+                let mut numbers = [1.0, 2.0, 3.0, 4.0];
+                numbers[place] = bad;
+                let [x, y, z, d] = numbers;
+                let planes = [sound, Plane::new(Vec3::new(x, y, z), d), sound];
+                assert!(matches!(
+                    ConvexVolume::from_planes(&planes),
+                    Err(VolumeError::NonFinitePlane { index: 1, .. })
+                ));
+            }
+        }
         assert!(matches!(
-            ConvexVolume::from_planes(&[Plane::new(Vec3::X, 0.0), nan]),
-            Err(VolumeError::NonFinitePlane { index: 1, .. })
-        ));
-        assert!(matches!(
-            ConvexVolume::from_planes(&[Plane::new(Vec3::X, 0.0); 33]),
+            ConvexVolume::from_planes(&[sound; 33]),
             Err(VolumeError::TooManyPlanes { count: 33 })
         ));
     }

@@ -10,7 +10,6 @@ mod convex_volume;
 mod plane;
 mod plane_rows;
 mod plane_tree;
-pub mod quantised;
 mod relative_volume;
 mod spheres;
 mod wide_volume;

@@ -244,7 +244,7 @@ impl Bsp {
     }
 
     /// The tree without its planes.
-    pub(super) fn into_tree(self) -> PackedTree {
+    pub(crate) fn into_tree(self) -> PackedTree {
         self.tree
     }
 }

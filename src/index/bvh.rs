@@ -3,13 +3,10 @@
 //! is one slice. obvhs has no frustum traversal of its own; ours is shared.
 
 use std::borrow::Cow;
-use std::ops::Range;
 use std::time::Duration;
 
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
-use obvhs::cwbvh::CwBvh;
-use obvhs::cwbvh::builder::build_cwbvh;
 use obvhs::{Boundable, BvhBuildParams};
 use serde::{Deserialize, Serialize};
 
@@ -34,26 +31,6 @@ pub struct BvhParams {
     pub preset: BvhPreset,
     /// Most items of a leaf (1 to 255).
     pub leaf: u32,
-    /// Cost of a node against that of an item, by which leaves are put
-    /// together (0 to 1000): items are tested sixteen at a time, so it pays to
-    /// fill leaves more than obvhs's own 3 does.
-    pub collapse: f32,
-    /// Share of the nodes that are considered for reinsertion (0 to 100; more
-    /// than 1 goes over them several times); the preset's own if left out.
-    pub reinsertion: Option<f32>,
-    /// obvhs's binary tree, or its wide one with up to eight children and at
-    /// most three items a leaf.
-    pub layout: BvhLayout,
-    /// Offer boxes much larger than the average to the builder in pieces.
-    pub pre_split: bool,
-}
-
-/// Which of obvhs's trees the topology comes from.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum BvhLayout {
-    Bvh2,
-    CwBvh,
 }
 
 impl Default for BvhParams {
@@ -61,13 +38,14 @@ impl Default for BvhParams {
         BvhParams {
             preset: BvhPreset::VeryFast,
             leaf: 32,
-            collapse: 30.0,
-            reinsertion: None,
-            layout: BvhLayout::Bvh2,
-            pre_split: false,
         }
     }
 }
+
+/// Cost of a node against that of an item, by which leaves are put together:
+/// items are tested sixteen at a time, so it pays to fill leaves more than
+/// obvhs's own 3 does.
+const COLLAPSE_COST: f32 = 30.0;
 
 /// The presets of obvhs by their own names.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
@@ -185,127 +163,33 @@ fn scale_for(items: &[Aabb]) -> f32 {
     libm::ldexpf(1.0, (-exponent).clamp(-126, 126))
 }
 
-/// Cuts boxes much larger than the average in halves, again and again, so
-/// that the builder can part a large item's ends; the owner of each piece. The
-/// threshold is that of obvhs's own preset for triangles.
-fn pre_split(boxes: &[Aabb]) -> (Vec<Aabb>, Vec<u32>) {
-    const MOST_PIECES: usize = 8;
-    let half_area = |b: &Aabb| {
-        let e = b.extent();
-        e.x * e.y + e.y * e.z + e.z * e.x
-    };
-    let average = boxes.iter().map(|b| f64::from(half_area(b))).sum::<f64>() / boxes.len() as f64;
-    let (mut pieces, mut owners) = (
-        Vec::with_capacity(boxes.len()),
-        Vec::with_capacity(boxes.len()),
-    );
-    for (b, owner) in boxes.iter().zip(0..) {
-        let first = pieces.len();
-        pieces.push(*b);
-        let mut at = first;
-        while at < pieces.len() && pieces.len() - first < MOST_PIECES {
-            let piece = pieces[at];
-            if f64::from(half_area(&piece)) <= 4.0 * average {
-                at += 1;
-                continue;
-            }
-            let extent = piece.extent();
-            let axis = (0..3)
-                .max_by(|&a, &b| extent[a].total_cmp(&extent[b]))
-                .unwrap_or(0);
-            let middle = piece.centre()[axis];
-            pieces[at].max[axis] = middle;
-            let mut rest = piece;
-            rest.min[axis] = middle;
-            pieces.push(rest);
-        }
-        owners.resize(pieces.len(), owner);
-    }
-    (pieces, owners)
-}
-
-/// A tree of obvhs, whichever of its two kinds.
-enum Topology {
-    Binary(Bvh2),
-    Wide(CwBvh),
-}
-
-/// A part of it: a node, or the primitives of a leaf.
-enum Branch {
-    Node(u32),
-    Leaf(Range<usize>),
-}
-
-impl Topology {
-    fn primitives(&self) -> &[u32] {
-        match self {
-            Topology::Binary(tree) => &tree.primitive_indices,
-            Topology::Wide(tree) => &tree.primitive_indices,
-        }
-    }
-
-    /// The branches of a node, last one first.
-    fn branches(&self, node: u32) -> Vec<Branch> {
-        match self {
-            Topology::Binary(tree) => {
-                let node = &tree.nodes[node as usize];
-                let first = node.first_index;
-                if node.is_leaf() {
-                    vec![Branch::Leaf(
-                        first as usize..(first + node.prim_count) as usize,
-                    )]
-                } else {
-                    vec![Branch::Node(first + 1), Branch::Node(first)]
-                }
-            }
-            Topology::Wide(tree) => {
-                let node = &tree.nodes[node as usize];
-                let children = (0..8).rev().filter(|&child| !node.is_child_empty(child));
-                let branch = |child| {
-                    if !node.is_leaf(child) {
-                        return Branch::Node(node.child_node_index(child));
-                    }
-                    let (first, count) = node.child_primitives(child);
-                    Branch::Leaf(first as usize..(first + count) as usize)
-                };
-                children.map(branch).collect()
-            }
-        }
-    }
-}
-
-/// Lays the items out in depth-first order. An item that comes again (its box
-/// was split) is kept once. Iterative, so that a degenerate tree cannot
-/// overflow the stack. O(n).
-fn relaid(items: &[Aabb], stacks: &Stacks, owners: Option<&[u32]>, built: &Topology) -> PackedTree {
+/// Lays the items out in depth-first order. Iterative, so that a degenerate
+/// tree cannot overflow the stack. O(n).
+fn relaid(items: &[Aabb], stacks: &Stacks, built: &Bvh2) -> PackedTree {
     enum Task {
-        Enter(Branch),
+        Enter(u32),
         Leave(usize),
     }
-    let primitives = built.primitives();
-    let owner = |place: u32| owners.map_or(place, |owners| owners[place as usize]);
     let mut writer = TreeWriter::with_capacity(stacks.members.len());
-    let mut placed = vec![false; items.len()];
-    let mut open = vec![Task::Enter(Branch::Node(0))];
+    let mut open = vec![Task::Enter(0)];
     while let Some(task) = open.pop() {
         match task {
             Task::Leave(node) => writer.close(node),
-            Task::Enter(branch) => {
+            Task::Enter(node) => {
                 open.push(Task::Leave(writer.open()));
-                let mut branches = match branch {
-                    Branch::Node(node) => built.branches(node),
-                    leaf => vec![leaf],
-                };
-                if let [Branch::Leaf(range)] = &branches[..] {
-                    let here = primitives[range.clone()].iter();
-                    for &id in here.flat_map(|&place| stacks.get(owner(place))) {
-                        if !std::mem::replace(&mut placed[id as usize], true) {
-                            writer.push(id, &items[id as usize]);
-                        }
+                let node = &built.nodes[node as usize];
+                let first = node.first_index;
+                if node.is_leaf() {
+                    let here = first as usize..(first + node.prim_count) as usize;
+                    let stacks = built.primitive_indices[here]
+                        .iter()
+                        .map(|&at| stacks.get(at));
+                    for &id in stacks.flatten() {
+                        writer.push(id, &items[id as usize]);
                     }
-                    branches.clear();
+                } else {
+                    open.extend([Task::Enter(first + 1), Task::Enter(first)]);
                 }
-                open.extend(branches.into_iter().map(Task::Enter));
             }
         }
     }
@@ -329,22 +213,11 @@ impl RegionIndex for Bvh {
         params: &BvhParams,
     ) -> Result<Self, BuildError> {
         check_range(Self::INFO.name, "leaf", params.leaf.into(), 1.0, 255.0)?;
-        check_range(
-            Self::INFO.name,
-            "collapse",
-            params.collapse.into(),
-            0.0,
-            1000.0,
-        )?;
-        let mut config = BvhBuildParams {
+        let config = BvhBuildParams {
             max_prims_per_leaf: params.leaf,
-            collapse_traversal_cost: params.collapse,
+            collapse_traversal_cost: COLLAPSE_COST,
             ..params.preset.params()
         };
-        if let Some(share) = params.reinsertion {
-            check_range(Self::INFO.name, "reinsertion", share.into(), 0.0, 100.0)?;
-            config.reinsertion_batch_ratio = share;
-        }
         let stacks = Stacks::of(items, indexable(items)?);
         let boxes = stacks.boxes(items);
         if boxes.is_empty() || stacks.members.is_empty() {
@@ -352,21 +225,10 @@ impl RegionIndex for Bvh {
                 tree: PackedTree::default(),
             });
         }
-        let (pieces, owners) = match params.pre_split {
-            true => {
-                let (pieces, owners) = pre_split(&boxes);
-                (Cow::Owned(pieces), Some(owners))
-            }
-            false => (boxes, None),
-        };
-        let mut time = Duration::default();
-        let built = match params.layout {
-            BvhLayout::Bvh2 => Topology::Binary(build_bvh2(&pieces, config, &mut time)),
-            BvhLayout::CwBvh => Topology::Wide(build_cwbvh(&pieces, config, &mut time)),
-        };
-        drop(pieces);
+        let built = build_bvh2(&boxes, config, &mut Duration::default());
+        drop(boxes);
         Ok(Bvh {
-            tree: relaid(items, &stacks, owners.as_deref(), &built),
+            tree: relaid(items, &stacks, &built),
         })
     }
 

@@ -16,19 +16,6 @@ pub trait DynIndex: Send + Sync {
     fn memory(&self) -> MemoryUsage;
     /// What a view of any kind sees. The timed path: nothing is counted.
     fn see(&self, view: AnyView<'_>, out: &mut Vec<ItemId>);
-    /// What several views see, of any kinds and in any mixture: `out[i]` gets
-    /// what [`DynIndex::see`] appends for `views[i]`, perhaps in another order.
-    /// One query after the other, because that is the quickest, but for views
-    /// that are nearly the same on the wide tree (docs/MULTI_VIEW.md).
-    ///
-    /// # Panics
-    /// If there is not one list a view.
-    fn see_many(&self, views: &[AnyView<'_>], out: &mut [Vec<ItemId>]) {
-        assert_eq!(views.len(), out.len(), "one list a view");
-        for (view, out) in views.iter().zip(out) {
-            self.see(*view, out);
-        }
-    }
     /// The same query with its cost added up, by the portable instruction set
     /// whatever the kernel is: cost and answer are the same by all of them, and
     /// what is timed is to be asked for its answer itself.
@@ -71,11 +58,6 @@ macro_rules! asked {
 
         fn see(&$this, view: AnyView<'_>, out: &mut Vec<ItemId>) {
             see($kernel, &$index, view, out);
-        }
-
-        fn see_many(&$this, views: &[AnyView<'_>], out: &mut [Vec<ItemId>]) {
-            assert_eq!(views.len(), out.len(), "one list a view");
-            FrustumQuery::visible_many(&$index, $kernel, views, out);
         }
 
         fn see_counted(&$this, view: AnyView<'_>, out: &mut Vec<ItemId>, cost: &mut QueryCost) {
@@ -194,12 +176,7 @@ impl<T: RegionIndex> Work for LocateMany<'_, T> {
 }
 
 /// A traversal of its own for each view and kernel.
-pub(super) fn see<T: FrustumQuery>(
-    kernel: Kernel,
-    index: &T,
-    view: AnyView<'_>,
-    out: &mut Vec<ItemId>,
-) {
+fn see<T: FrustumQuery>(kernel: Kernel, index: &T, view: AnyView<'_>, out: &mut Vec<ItemId>) {
     match view {
         AnyView::Volume(view) => kernel.run(See { index, view, out }),
         AnyView::Spheres(view) => kernel.run(See { index, view, out }),

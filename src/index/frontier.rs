@@ -82,14 +82,6 @@ impl Frontier {
         }
     }
 
-    /// Holds these nodes and no others.
-    pub fn resume(&mut self, nodes: &[u32], open: &[PlaneMask]) {
-        self.clear(nodes.len().div_ceil(LANES));
-        self.nodes[..nodes.len()].copy_from_slice(nodes);
-        self.open[..open.len()].copy_from_slice(open);
-        self.used = nodes.len();
-    }
-
     /// Sixteen entries at a time, and which of them there are.
     #[inline(always)]
     pub fn rows(&self) -> impl Iterator<Item = (&[u32; LANES], &[PlaneMask; LANES], LaneMask)> {

@@ -18,16 +18,13 @@ mod frontier;
 mod id_rows;
 mod info;
 mod linear;
-mod multi_view;
 mod octree;
-mod parallel;
 mod partition;
 mod pass;
 #[cfg(feature = "peers")]
 pub mod peers;
 mod plane_choice;
 mod quadtree;
-mod quantised;
 mod registry;
 mod replay;
 mod stack;
@@ -44,24 +41,23 @@ use serde::de::DeserializeOwned;
 
 use crate::geometry::{Aabb, PlaneTree};
 use crate::kernel::{Isa, Kernel};
-use crate::query::{AnyView, ItemId, ManySink, NoRecorder, Recorder, Sink, View};
+use crate::query::{ItemId, ManySink, NoRecorder, Recorder, Sink, View};
 use crate::threads::Pool;
 
 pub use block_order::BlockOrder;
 pub use bsp::{Bsp, BspBuilder, BspParams};
-pub use bvh::{Bvh, BvhLayout, BvhParams, BvhPreset};
+pub(crate) use bundles::Leaves;
+pub use bvh::{Bvh, BvhParams, BvhPreset};
 pub use erased::DynIndex;
 pub use execution::{By, Execution};
 pub use foreign::caught;
 pub use info::{Capabilities, Info, Kind, Origin};
 pub use linear::{Linear, LinearScalar};
 pub use octree::{CellParams, Octree};
-pub use parallel::{Crew, see_each};
 pub use partition::{Part, Record, Splitter, build_top_down};
 pub use quadtree::Quadtree;
-pub use quantised::{GridScope, Quantised, QuantisedParams};
 pub use registry::{Registry, Row, StructureSpec};
-pub use replay::{Foreseen, Trace};
+pub use replay::Trace;
 pub use tree::{PackedTree, TreeNode, TreeWriter, scan_blocks};
 pub use wide::{Wide, WideParams};
 
@@ -244,13 +240,6 @@ pub trait FrustumQuery: RegionIndex {
     /// a [`TreeOrder`] as well.
     fn tree_order(&self) -> Option<&[ItemId]> {
         None
-    }
-
-    /// What [`DynIndex::see_many`] does: by default, one query after the other.
-    fn visible_many(&self, kernel: Kernel, views: &[AnyView<'_>], out: &mut [Vec<ItemId>]) {
-        for (view, out) in views.iter().zip(out) {
-            erased::see(kernel, self, *view, out);
-        }
     }
 }
 

@@ -4,14 +4,12 @@
 
 use std::ops::{ControlFlow, Range};
 
-use super::by_plane::ByPlane;
-use super::frontier::{AHEAD, Frontier};
-use super::pass::Pass;
+use super::frontier::AHEAD;
 use super::wide::Wide;
 use super::{FrustumQuery, TreeOrder};
 use crate::geometry::{BoxBlock, LANES, LaneMask, ROWS, RowMask};
 use crate::kernel::{Isa, Kernel, Work, prefetch};
-use crate::query::{ItemId, NoRecorder, Recorder, Sink, Tests, View};
+use crate::query::{ItemId, Recorder, Sink, Tests, View};
 
 /// A block with those of its rows that were read; if they are fewer than six,
 /// some come twice.
@@ -95,69 +93,6 @@ impl Trace {
             id_rows: tree.id_rows(),
             out,
         });
-    }
-}
-
-/// A query of which everything above the leaves is known beforehand, at no
-/// cost: what reuse between frames could gain at the very most. Right for the
-/// view that it was made from only; nobody answers queries with it.
-#[derive(Default)]
-pub struct Foreseen {
-    runs: Vec<Range<u32>>,
-    leaves: Frontier,
-}
-
-impl Foreseen {
-    pub fn of<V: View>(tree: &Wide, view: &V) -> Foreseen {
-        let mut foreseen = Foreseen::default();
-        foreseen.leaves = tree.above_leaves(view, &mut foreseen.runs);
-        foreseen
-    }
-
-    /// Leaves that are still to be tested.
-    pub fn leaves(&self) -> usize {
-        self.leaves.entries().0.len()
-    }
-
-    /// Appends the answer, leaves tested as ever.
-    pub fn answer<V: View>(&self, tree: &Wide, view: &V, out: &mut Vec<ItemId>) {
-        Kernel::best().run(Rest {
-            foreseen: self,
-            tree,
-            view,
-            out,
-        });
-    }
-}
-
-struct Rest<'a, V> {
-    foreseen: &'a Foreseen,
-    tree: &'a Wide,
-    view: &'a V,
-    out: &'a mut Vec<ItemId>,
-}
-
-impl<V: View> Work for Rest<'_, V> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<I: Isa>(self, isa: I) {
-        let mut pass = Pass {
-            tree: self.tree,
-            isa,
-            view: self.view,
-            sink: self.out,
-            recorder: &mut NoRecorder,
-        };
-        for run in &self.foreseen.runs {
-            // A Vec never breaks off.
-            let _ = pass.hand_over(run.start as usize..run.end as usize);
-        }
-        // A tree without items has no level of leaves either.
-        if self.foreseen.leaves() > 0 {
-            let mut by_plane = ByPlane::default();
-            let _ = pass.test_leaves(&self.tree.layer(0), &self.foreseen.leaves, &mut by_plane);
-        }
     }
 }
 

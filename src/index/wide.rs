@@ -4,7 +4,7 @@
 //! tests of a block are the view's.
 
 use std::cell::Cell;
-use std::ops::{ControlFlow, Range};
+use std::ops::ControlFlow;
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -14,14 +14,13 @@ use super::by_plane::ByPlane;
 use super::by_tree::visible_on_baseline;
 use super::frontier::{Frontier, Merger, NodeList, is_far};
 use super::id_rows::IdRows;
-use super::multi_view::see_together;
 use super::pass::{Layer, Pass};
 use super::{
     BuildError, FrustumQuery, Info, Kind, MemoryUsage, Origin, RegionIndex, TreeOrder, indexable,
 };
-use crate::geometry::{Aabb, BoxBlock, LANES, LaneMask, PlaneMask, PlaneTree};
-use crate::kernel::{BASELINE, Isa, Kernel, prefetch};
-use crate::query::{AnyView, ItemId, NoRecorder, Ranges, Recorder, Region, Sink, View};
+use crate::geometry::{Aabb, BoxBlock, LANES, LaneMask, PlaneTree};
+use crate::kernel::{BASELINE, Isa, prefetch};
+use crate::query::{ItemId, Recorder, Region, Sink, View};
 use crate::threads::{Pool, share};
 
 /// Parameters: `wide:order=median`.
@@ -74,41 +73,11 @@ impl Level {
 
 /// The memory of a traversal: frontiers, kept between queries.
 #[derive(Default)]
-pub(super) struct Scratch {
+struct Scratch {
     here: Frontier,
     below: Frontier,
     whole: NodeList,
     by_plane: ByPlane,
-}
-
-impl Scratch {
-    /// The root, with all planes open.
-    #[inline(always)]
-    pub(super) fn start<I: Isa, V: View>(&mut self, isa: I, view: &V) {
-        self.here.start(isa, view.mask());
-    }
-
-    /// The blocks that are still to be looked at and their open planes.
-    pub(super) fn frontier(&self) -> (&[u32], &[PlaneMask]) {
-        self.here.entries()
-    }
-
-    /// Goes on from such blocks.
-    pub(super) fn resume(&mut self, blocks: &[u32], open: &[PlaneMask]) {
-        self.here.clear(blocks.len().div_ceil(LANES));
-        self.here.resume(blocks, open);
-    }
-
-    /// The memory that this thread keeps; give it back.
-    #[inline(always)]
-    pub(super) fn taken() -> Box<Scratch> {
-        SCRATCH.take().unwrap_or_default()
-    }
-
-    #[inline(always)]
-    pub(super) fn give_back(self: Box<Scratch>) {
-        SCRATCH.set(Some(self));
-    }
 }
 
 thread_local! {
@@ -262,25 +231,13 @@ impl Wide {
             recorder.subtree_accepted(self.ids.len());
             return sink.accept_places(isa, &self.ids, 0..self.ids.len());
         }
-        scratch.start(isa, view);
-        self.descend(isa, view, 0..top, sink, recorder, scratch)?;
-        self.search_leaves(isa, view, sink, recorder, scratch)
-    }
-
-    /// From the frontier on level `heights.end` to the one on `heights.start`.
-    #[inline(always)]
-    pub(super) fn descend<I: Isa, V: View, S: Sink, R: Recorder>(
-        &self,
-        isa: I,
-        view: &V,
-        heights: Range<usize>,
-        sink: &mut S,
-        recorder: &mut R,
-        scratch: &mut Scratch,
-    ) -> ControlFlow<()> {
         let Scratch {
-            here, below, whole, ..
+            here,
+            below,
+            whole,
+            by_plane,
         } = scratch;
+        here.start(isa, view.mask());
         let mut pass = Pass {
             tree: self,
             isa,
@@ -288,7 +245,7 @@ impl Wide {
             sink,
             recorder,
         };
-        for height in heights.rev() {
+        for height in (0..top).rev() {
             below.clear(here.len());
             let layer = self.layer(height + 1);
             if height == 0 {
@@ -301,44 +258,7 @@ impl Wide {
             }
             std::mem::swap(here, below);
         }
-        ControlFlow::Continue(())
-    }
-
-    /// The frontier on level 0.
-    #[inline(always)]
-    pub(super) fn search_leaves<I: Isa, V: View, S: Sink, R: Recorder>(
-        &self,
-        isa: I,
-        view: &V,
-        sink: &mut S,
-        recorder: &mut R,
-        scratch: &mut Scratch,
-    ) -> ControlFlow<()> {
-        if self.levels.is_empty() {
-            return ControlFlow::Continue(());
-        }
-        let Scratch { here, by_plane, .. } = scratch;
-        let mut pass = Pass {
-            tree: self,
-            isa,
-            view,
-            sink,
-            recorder,
-        };
         pass.test_leaves(&self.layer(0), here, by_plane)
-    }
-
-    /// All of a query but its leaves: appends the runs that are wholly inside,
-    /// in their order, and leaves behind the leaves that are undecided.
-    pub(super) fn above_leaves<V: View>(&self, view: &V, runs: &mut Vec<Range<u32>>) -> Frontier {
-        let mut scratch = Scratch::default();
-        if let Some(top) = self.levels.len().checked_sub(1) {
-            scratch.start(BASELINE, view);
-            let sink = &mut Ranges::onto(runs);
-            // This sink never breaks off.
-            let _ = self.descend(BASELINE, view, 0..top, sink, &mut NoRecorder, &mut scratch);
-        }
-        scratch.here
     }
 
     /// Bounds of the boxes of one block, as the lane above them holds them.
@@ -475,18 +395,14 @@ impl FrustumQuery for Wide {
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()> {
-        let mut scratch = Scratch::taken();
+        let mut scratch = SCRATCH.take().unwrap_or_default();
         let flow = self.search(isa, view, sink, recorder, &mut scratch);
-        scratch.give_back();
+        SCRATCH.set(Some(scratch));
         flow
     }
 
     fn tree_order(&self) -> Option<&[ItemId]> {
         Some(&self.ids)
-    }
-
-    fn visible_many(&self, kernel: Kernel, views: &[AnyView<'_>], out: &mut [Vec<ItemId>]) {
-        see_together(kernel, self, views, out);
     }
 }
 

@@ -40,7 +40,6 @@ pub trait Isa: Copy {
     /// lane 0 the lowest bits.
     fn pick(self, from: &[f32; 4], picks: u32) -> Self::Floats;
     fn add(self, a: Self::Floats, b: Self::Floats) -> Self::Floats;
-    fn sub(self, a: Self::Floats, b: Self::Floats) -> Self::Floats;
     fn mul(self, a: Self::Floats, b: Self::Floats) -> Self::Floats;
     /// `a` where `a < b`, else `b`: of a NaN and a number in this order, the
     /// number.
@@ -123,7 +122,6 @@ mod tests {
             let (a, b) = (isa.load(self.a), isa.load(self.b));
             let floats = [
                 isa.add(a, b),
-                isa.sub(a, b),
                 isa.mul(a, isa.splat(self.b[3])),
                 isa.lower(a, b),
                 isa.pick(&std::array::from_fn(|i| self.a[i]), self.b[5].to_bits()),

@@ -66,10 +66,6 @@ impl Kernel {
         }
     }
 
-    pub fn named(name: &str) -> Option<Kernel> {
-        Kernel::ALL.into_iter().find(|k| k.name() == name)
-    }
-
     /// Whether this processor (and operating system) runs it. Asked once.
     #[inline]
     pub fn is_available(self) -> bool {
@@ -126,11 +122,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_read_back_and_portable_is_everywhere() {
-        for kernel in Kernel::ALL {
-            assert_eq!(Kernel::named(kernel.name()), Some(kernel));
-        }
-        assert_eq!(Kernel::named("AVX2"), None);
+    fn portable_is_everywhere() {
         assert_eq!(Kernel::available().next(), Some(Kernel::Portable));
         assert!(Kernel::best().is_available());
     }

@@ -44,10 +44,6 @@ impl Isa for Plain {
         std::array::from_fn(|lane| a[lane] + b[lane])
     }
     #[inline(always)]
-    fn sub(self, a: [f32; LANES], b: [f32; LANES]) -> [f32; LANES] {
-        std::array::from_fn(|lane| a[lane] - b[lane])
-    }
-    #[inline(always)]
     fn mul(self, a: [f32; LANES], b: [f32; LANES]) -> [f32; LANES] {
         std::array::from_fn(|lane| a[lane] * b[lane])
     }

@@ -7,6 +7,7 @@ mod judged;
 mod offset_sweep;
 mod point;
 mod points;
+mod quantised;
 mod size_sweep;
 mod stability;
 

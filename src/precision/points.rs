@@ -6,12 +6,11 @@ use serde::{Deserialize, Serialize};
 
 use super::judged::{Judged, Truths};
 use super::point::{Point, mark_dominated};
+use super::quantised::{Code, GridScope, Quantised};
 use super::stability::{StableAfter, by_camera, stability};
 use crate::camera::{Camera, PLANE_METHODS, PlaneMethod, PlaneOptions};
 use crate::culling::{ARITHMETICS, Arithmetic, Culling, CullingTest, TESTS};
-use crate::index::{
-    BuildError, By, DynIndex, GridScope, Quantised, QuantisedParams, RegionIndex, StructureSpec,
-};
+use crate::index::{BuildError, By, DynIndex, RegionIndex, StructureSpec};
 use crate::kernel::Kernel;
 use crate::measure::{
     Competitor, OverProcesses, ProcessTimes, Protocol, Schedule, Status, Verdict, timed,
@@ -113,40 +112,42 @@ struct Stored {
 /// u8 and u16 codes, on one grid or on one for each block, with the default
 /// view and with the exact test.
 fn quantised(kernel: Kernel, scene: &Scene, cameras: &[Camera], truths: Truths) -> Vec<Stored> {
+    let scopes = [(GridScope::World, "world"), (GridScope::Block, "block")];
+    let bytes = scopes.map(|scope| stored::<u8>(scope, kernel, scene, cameras, truths));
+    let words = scopes.map(|scope| stored::<u16>(scope, kernel, scene, cameras, truths));
+    bytes.into_iter().chain(words).collect()
+}
+
+fn stored<C: Code>(
+    (scope, name): (GridScope, &str),
+    kernel: Kernel,
+    scene: &Scene,
+    cameras: &[Camera],
+    truths: Truths,
+) -> Stored {
     let cullings = [CullingTest::SixPlane, CullingTest::Exact].map(|test| Culling {
         test,
         ..Culling::default()
     });
-    let mut all = Vec::new();
-    for bits in [8, 16] {
-        for grid in [GridScope::World, GridScope::Block] {
-            let scope = match grid {
-                GridScope::World => "world",
-                GridScope::Block => "block",
-            };
-            let label = format!("{}:bits={bits},grid={scope}", Quantised::INFO.name);
-            let params = QuantisedParams { bits, grid };
-            let stored = match Quantised::build(&scene.items, None, &params) {
-                Ok(index) => {
-                    let items = index.decoded(scene.items.len());
-                    let judged = cullings
-                        .map(|culling| Judged::new(scene, &items, cameras, truths, culling));
-                    Stored {
-                        label,
-                        index: Some(Box::new(By { index, kernel })),
-                        judged: judged.into(),
-                    }
-                }
-                Err(error) => Stored {
-                    label,
-                    index: None,
-                    judged: cullings.map(|c| Judged::refused(c, &error)).into(),
-                },
-            };
-            all.push(stored);
+    let structure = Quantised::<C>::INFO.name;
+    let label = format!("{structure}:bits={},grid={name}", 8 * size_of::<C>());
+    match Quantised::<C>::build(&scene.items, None, &scope) {
+        Ok(index) => {
+            let items = index.decoded(scene.items.len());
+            let judged =
+                cullings.map(|culling| Judged::new(scene, &items, cameras, truths, culling));
+            Stored {
+                label,
+                index: Some(Box::new(By { index, kernel })),
+                judged: judged.into(),
+            }
         }
+        Err(error) => Stored {
+            label,
+            index: None,
+            judged: cullings.map(|c| Judged::refused(c, &error)).into(),
+        },
     }
-    all
 }
 
 /// Everything that points are made of, the same in every process.

@@ -6,20 +6,16 @@ mod many;
 mod planes;
 mod recorder;
 mod region;
-mod shell;
 mod sink;
 mod view;
-mod view_masks;
 
 pub use many::{Located, ManySink};
 pub use planes::{AsEver, Planes};
 pub use recorder::{NoRecorder, QueryCost, Recorder};
 pub use region::{Containment, Region};
-pub(crate) use shell::Shell;
 pub(crate) use sink::Ranges;
 pub use sink::{Count, First, Sink, Tests, runs};
 pub use view::{AnyView, View};
-pub use view_masks::ViewMasks;
 
 /// An item's number: its zero-based place in the scene.
 pub type ItemId = u32;

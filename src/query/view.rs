@@ -242,7 +242,7 @@ impl View for ConvexVolume {
         block: &BoxBlock,
         mask: PlaneMask,
     ) -> (LaneMask, I::Words) {
-        block.sorted_by(isa, self, self.least(), mask)
+        block.sorted_by(isa, self, mask)
     }
     fn rows(&self) -> Option<PlaneRows> {
         PlaneRows::collect(Bits(self.mask()).map(|plane| self.plane_of_bit(plane)))
@@ -337,7 +337,7 @@ impl View for RelativeVolume {
         mask: PlaneMask,
     ) -> (LaneMask, I::Words) {
         let moved = block.relative_to(self.eye());
-        moved.sorted_by(isa, self.planes(), self.planes().least(), mask)
+        moved.sorted_by(isa, self.planes(), mask)
     }
 }
 

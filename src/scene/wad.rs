@@ -21,7 +21,6 @@ const LUMPS: [&str; 8] = [
 /// One map of a WAD file, decoded and cross-checked.
 #[derive(Clone, Debug)]
 pub struct WadMap {
-    pub name: String,
     pub things: Vec<Thing>,
     lines: Vec<WorldBox>,
     /// Floor height under each BSP leaf.
@@ -324,7 +323,6 @@ impl<'a> Wad<'a> {
         let bsp = BspRegions::new(tree, root, leaves.len(), LOW, HIGH)
             .map_err(|found| self.error(nodes.lump.offset, found, "a BSP tree"))?;
         Ok(WadMap {
-            name: name.to_owned(),
             things: (0..things.len())
                 .map(|i| Thing {
                     x: things.int(i, 0),

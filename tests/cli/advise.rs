@@ -361,10 +361,10 @@ fn mistakes_are_one_line() {
     let line = "advise --scene scene.csv --path cameras.csv";
     for (more, wanted) in [
         ("--structure bhv", "bhv | did you mean 'bvh'"),
-        ("--draw-ns -1", "--draw-ns is -1 | at least 0"),
-        ("--draw-ns nan", "--draw-ns is NaN"),
-        ("--tolerance 0", "--tolerance is 0 | above 0"),
-        ("--queries-per-update inf", "--queries-per-update is inf"),
+        ("--draw-ns -1", "--draw-ns is '-1' | at least 0"),
+        ("--draw-ns nan", "--draw-ns is 'nan'"),
+        ("--tolerance 0", "--tolerance is '0' | above 0"),
+        ("--queries-per-update inf", "--queries-per-update is 'inf'"),
         ("--moved 0", "--moved is '0' | above 0"),
         ("--moved 101%", "--moved is '101%' | at most 100%"),
         ("--moved some", "--moved is 'some'"),

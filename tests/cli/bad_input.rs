@@ -316,7 +316,7 @@ fn structures_of_another_build_are_refused_with_the_feature_they_need() {
 
 #[test]
 fn options_that_name_nothing_are_refused_with_the_nearest_name() {
-    let cases: [(&str, &str); 16] = [
+    let cases: [(&str, &str); 17] = [
         (
             "--structure bhv",
             "unknown structure 'bhv' | did you mean 'bvh' | linear",
@@ -327,6 +327,10 @@ fn options_that_name_nothing_are_refused_with_the_nearest_name() {
         ("--structure bvh:leaf=many", "leaf | many"),
         ("--structure bvh:leaf=0", "leaf=0 | expected 1 to"),
         ("--structure bvh:leave=4", "`leave` | `leaf`"),
+        (
+            "--structure bvh:layout=cwbvh",
+            "`layout` | `preset` or `leaf`",
+        ),
         ("--structure linear:leaf=4", "linear | `leaf`"),
         (
             "--test six-plain",
@@ -336,8 +340,8 @@ fn options_that_name_nothing_are_refused_with_the_nearest_name() {
             "--planes frame-f16",
             "unknown plane method | did you mean 'frame-f",
         ),
-        ("--epsilon -1", "--epsilon is -1 | expected"),
-        ("--epsilon nan", "--epsilon is NaN | expected"),
+        ("--epsilon -1", "--epsilon is '-1'; expected"),
+        ("--epsilon nan", "--epsilon is 'nan'; expected"),
         ("--far away", "--far is 'away' | expected"),
         ("--fovy 0", "0 degrees | 0 < fov < 180"),
         ("--near 0", "near is 0 | expected"),

@@ -88,7 +88,7 @@ fn choices_that_do_not_go_together_are_refused() {
             "--arithmetic f63",
             "unknown arithmetic 'f63' | did you mean 'f64'",
         ),
-        ("--epsilon -1", "--epsilon is -1"),
+        ("--epsilon -1", "--epsilon is '-1'"),
         ("--planes gh-gl-f16", "gh-gl-f16 | did you mean 'gh-gl-f"),
     ] {
         let commands = ["query", "verify", "run --out r"].map(|c| format!("{c} {scene} {choice}"));

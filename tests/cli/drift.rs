@@ -322,7 +322,7 @@ fn what_cannot_be_drifted_is_refused() {
         }
     }
     for tolerance in ["0", "-1e-6", "nan", "inf"] {
-        let wanted = "--tolerance is | expected a number above 0";
+        let wanted = "--tolerance is ' | expected a number above 0";
         all_refused(&folder, &[format!("drift --tolerance={tolerance}")], wanted);
     }
 }

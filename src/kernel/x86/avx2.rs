@@ -72,10 +72,6 @@ impl Isa for Avx2 {
         each!(2, |i| unsafe { _mm256_add_ps(a[i], b[i]) })
     }
     #[inline(always)]
-    fn sub(self, a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
-        each!(2, |i| unsafe { _mm256_sub_ps(a[i], b[i]) })
-    }
-    #[inline(always)]
     fn mul(self, a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
         each!(2, |i| unsafe { _mm256_mul_ps(a[i], b[i]) })
     }

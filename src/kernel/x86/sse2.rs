@@ -55,10 +55,6 @@ impl Isa for Sse2 {
         each!(4, |i| unsafe { _mm_add_ps(a[i], b[i]) })
     }
     #[inline(always)]
-    fn sub(self, a: [__m128; 4], b: [__m128; 4]) -> [__m128; 4] {
-        each!(4, |i| unsafe { _mm_sub_ps(a[i], b[i]) })
-    }
-    #[inline(always)]
     fn mul(self, a: [__m128; 4], b: [__m128; 4]) -> [__m128; 4] {
         each!(4, |i| unsafe { _mm_mul_ps(a[i], b[i]) })
     }

@@ -21,7 +21,6 @@ pub struct Setup {
 /// One way of being extreme.
 pub struct CameraFamily {
     pub name: &'static str,
-    pub summary: &'static str,
     pub variants: &'static [f64],
     /// How a variant is named in ids.
     pub label: fn(f64) -> String,
@@ -31,7 +30,7 @@ pub struct CameraFamily {
 pub static CAMERA_FAMILIES: &[CameraFamily] = &[
     CameraFamily {
         name: "near-far",
-        summary: "far / near from 1e3 to 1e9, and infinite",
+        // Far / near from 1e3 to 1e9, and infinite.
         variants: &[1e3, 1e6, 1e9, f64::INFINITY],
         label: plain,
         setup: |dice, ratio| {
@@ -42,7 +41,7 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = &[
     },
     CameraFamily {
         name: "reversed-z",
-        summary: "the same with planes from a reversed-Z matrix in f64",
+        // The same with planes from a reversed-Z matrix in f64.
         variants: &[1e3, 1e6, 1e9, f64::INFINITY],
         label: plain,
         setup: |dice, ratio| {
@@ -54,7 +53,7 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = &[
     },
     CameraFamily {
         name: "fov",
-        summary: "vertical field of view from 1e-9 to 179.9999999 degrees",
+        // Vertical field of view from 1e-9 to 179.9999999 degrees.
         variants: &[
             1e-9,
             1e-6,
@@ -75,7 +74,7 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = &[
     },
     CameraFamily {
         name: "aspect",
-        summary: "width / height from 1e-8 to 1e8",
+        // Width / height from 1e-8 to 1e8.
         variants: &[1e-8, 1e-4, 1e-2, 1e2, 1e4, 1e8],
         label: plain,
         setup: |dice, aspect| {
@@ -86,7 +85,7 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = &[
     },
     CameraFamily {
         name: "offset",
-        summary: "a camera 1e4 to 1e15 depths of 1 away from the scene's zero",
+        // A camera 1e4 to 1e15 depths of 1 away from the scene's zero.
         variants: &[1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e12, 1e15],
         label: plain,
         setup: |dice, offset| {
@@ -97,7 +96,7 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = &[
     },
     CameraFamily {
         name: "rebased",
-        summary: "the same in coordinates about a point near the camera",
+        // The same in coordinates about a point near the camera.
         variants: &[1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e12, 1e15],
         label: plain,
         setup: |dice, offset| {
@@ -109,7 +108,7 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = &[
     },
     CameraFamily {
         name: "condition",
-        summary: "up within 1e-6 to 1e-15 rad of the direction of view",
+        // Up within 1e-6 to 1e-15 rad of the direction of view.
         variants: &[1e-6, 1e-9, 1e-11, 1e-13, 1e-14, 1e-15],
         label: plain,
         setup: |dice, angle| {
@@ -129,7 +128,7 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = &[
     },
     CameraFamily {
         name: "near-look",
-        summary: "eye and look 1e-6 to 1e-15 of their coordinates apart",
+        // Eye and look 1e-6 to 1e-15 of their coordinates apart.
         variants: &[1e-6, 1e-9, 1e-12, 1e-15],
         label: plain,
         setup: |dice, share| loop {
@@ -144,7 +143,7 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = &[
     },
     CameraFamily {
         name: "shell",
-        summary: "a volume about zero, seen from 1e3 to 1e15 depths away",
+        // A volume about zero, seen from 1e3 to 1e15 depths away.
         variants: &[1e3, 1e6, 1e9, 1e12, 1e15],
         label: plain,
         setup: |dice, distance| {
@@ -159,7 +158,7 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = &[
     },
     CameraFamily {
         name: "scale",
-        summary: "the whole scene scaled by 2^-148 to 2^127; what may overflow may be refused",
+        // The whole scene scaled by 2^-148 to 2^127; what may overflow may be refused.
         variants: &[
             -148.0, -140.0, -126.0, -100.0, -60.0, 60.0, 100.0, 120.0, 122.0, 124.0, 127.0,
         ],
@@ -172,28 +171,28 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = &[
     },
     CameraFamily {
         name: "size-ratio",
-        summary: "boxes 1e-3 and 1e3 times as wide as the view, side by side",
+        // Boxes 1e-3 and 1e3 times as wide as the view, side by side.
         variants: &[1e6],
         label: plain,
         setup: |dice, _| Draft::any(dice).shaped(Shapes::Ratio).perspective(),
     },
     CameraFamily {
         name: "coincident",
-        summary: "sixteen boxes, over and over",
+        // Sixteen boxes, over and over.
         variants: &[16.0],
         label: plain,
         setup: |dice, _| Draft::any(dice).shaped(Shapes::Coincident).perspective(),
     },
     CameraFamily {
         name: "needles",
-        summary: "lines, plates and points without thickness",
+        // Lines, plates and points without thickness.
         variants: &[64.0],
         label: plain,
         setup: |dice, _| Draft::any(dice).shaped(Shapes::Needles).perspective(),
     },
     CameraFamily {
         name: "ties",
-        summary: "a 90 degree camera on a grid of integers with its boxes: exact ties and one-ulp shifts",
+        // A 90 degree camera on a grid of integers with its boxes: exact ties and one-ulp shifts.
         variants: &[8.0, 64.0, 4096.0],
         label: plain,
         setup: |dice, far| {
@@ -208,7 +207,7 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = &[
     },
     CameraFamily {
         name: "lens",
-        summary: "orthographic, off-axis, and off-axis without a far plane",
+        // Orthographic, off-axis, and off-axis without a far plane.
         variants: &[0.0, 1.0, 2.0],
         label: |kind| ["orthographic", "off-axis", "off-axis inf"][kind as usize].to_owned(),
         setup: |dice, kind| {

@@ -1,11 +1,10 @@
 //! Generated extremes: families of seeded cases with their outcome declared,
 //! and the loop that runs them. Each file beside this one owns one part:
-//! cameras, boxes, what counts as a fault, bare planes, refusals.
+//! cameras, boxes, what counts as a fault, bare planes.
 
 mod boxes;
 mod cameras;
 mod check;
-mod refusals;
 mod volumes;
 
 use std::collections::BTreeMap;
@@ -20,7 +19,6 @@ pub use boxes::Shapes;
 use boxes::adversarial;
 pub use cameras::{CAMERA_FAMILIES, CameraFamily, Setup};
 pub use check::{Case, Drops, Fault, Findings, SCALAR, Tally};
-pub use refusals::refusals;
 pub use volumes::{PLANES_FAMILIES, PlanesCase, PlanesFamily};
 
 /// Cases of each variant that make ten million boxes at camera level.
@@ -43,9 +41,6 @@ pub const BOXES: usize = 2048;
 const ALL_EVERY: u64 = 16;
 const FEW: usize = 256;
 
-/// In place of a structure where all of them are concerned.
-const ALL_STRUCTURES: &str = "all";
-
 /// How the run goes on: told of each case, asked whether to stop.
 pub trait Progress: Sync {
     fn case_done(&self, family: &str);
@@ -60,9 +55,9 @@ impl Extremes<'_> {
         (variants as u64 + at_planes) * self.cases
     }
 
-    /// All families, a section each, and what must be refused.
+    /// All families, a section each.
     pub fn run(&self, progress: &dyn Progress) -> Vec<Section> {
-        let mut sections = vec![refusals(self.structures)];
+        let mut sections = Vec::new();
         for family in PLANES_FAMILIES {
             sections.push(self.planes_family(family, progress));
         }
@@ -330,7 +325,7 @@ mod tests {
             assert!(failed.is_none(), "{failed:?}");
         }
         // Otherwise the boxes were too easy and the zeros above mean nothing.
-        let cameras = &sections[1 + PLANES_FAMILIES.len()..];
+        let cameras = &sections[PLANES_FAMILIES.len()..];
         let mut off = Vec::new();
         for section in cameras {
             let Tally { boxes, seen, .. } = section.tally;

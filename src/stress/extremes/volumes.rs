@@ -28,7 +28,6 @@ pub struct PlanesCase {
 /// A way to make cases at planes level.
 pub struct PlanesFamily {
     pub name: &'static str,
-    pub summary: &'static str,
     pub case: fn(u64) -> PlanesCase,
     /// Cases for each case of a camera variant.
     pub factor: u64,
@@ -37,7 +36,8 @@ pub struct PlanesFamily {
 pub static PLANES_FAMILIES: &[PlanesFamily] = &[
     PlanesFamily {
         name: "volumes",
-        summary: "every kind of volume (unbounded, empty, up to 31 planes) about flat, inverted and touching boxes",
+        // Every kind of volume (unbounded, empty, up to 31 planes) about flat, inverted
+        // and touching boxes.
         case: |seed| {
             let random = RandomCase::new(seed);
             PlanesCase {
@@ -52,7 +52,7 @@ pub static PLANES_FAMILIES: &[PlanesFamily] = &[
     },
     PlanesFamily {
         name: "denormals",
-        summary: "planes and boxes of denormal numbers: nothing may be flushed to zero",
+        // Planes and boxes of denormal numbers: nothing may be flushed to zero.
         case: denormals,
         factor: 2,
     },

@@ -1,0 +1,135 @@
+//! What the value of an option may be: the parsers that the argument parser
+//! calls. An error says what was expected; the parser says where and what it found
+//! ([`usage`](super::usage)).
+
+use crate::camera::{MATRIX_CONVENTIONS, MatrixConvention, PLANE_METHODS, PlaneMethod};
+use crate::culling::{ARITHMETICS, Arithmetic, CullingTest, TESTS};
+use crate::drift::MOST_STEPS;
+use crate::kernel::Kernel;
+use crate::spec::{SpecError, parse_number};
+use crate::threads::MOST_THREADS;
+
+fn expected<T>(value: Option<T>, what: impl std::fmt::Display) -> Result<T, SpecError> {
+    value.ok_or_else(|| SpecError::new(format_args!("expected {what}")))
+}
+
+/// A finite number.
+fn number(text: &str) -> Option<f64> {
+    text.parse().ok().filter(|n: &f64| n.is_finite())
+}
+
+pub fn at_least_zero(text: &str) -> Result<f64, SpecError> {
+    let sound = number(text).filter(|n| *n >= 0.0);
+    expected(sound, "a number of at least 0")
+}
+
+pub fn above_zero(text: &str) -> Result<f64, SpecError> {
+    let sound = number(text).filter(|n| *n > 0.0);
+    expected(sound, "a number above 0")
+}
+
+/// A far plane; `inf` is none.
+pub fn far(text: &str) -> Result<f64, SpecError> {
+    let endless = text.eq_ignore_ascii_case("inf").then_some(f64::INFINITY);
+    expected(endless.or_else(|| number(text)), "a finite number or inf")
+}
+
+/// A share that is not nothing: `1%` or `0.01`.
+pub fn share(text: &str) -> Result<f64, SpecError> {
+    let share = match text.strip_suffix('%') {
+        Some(percent) => number(percent.trim()).map(|n| n / 100.0),
+        None => number(text.trim()),
+    };
+    let share = share.filter(|share| *share > 0.0 && *share <= 1.0);
+    expected(
+        share,
+        "a share such as 1% or 0.01, above 0 and at most 100%",
+    )
+}
+
+/// "5%", "5 %" or "0.05". A bare 5 could be meant as either, and as 500 % it
+/// would let everything pass.
+pub fn threshold(typed: &str) -> Result<f64, SpecError> {
+    let typed = typed.trim();
+    let share = match typed.strip_suffix('%') {
+        Some(percents) => parse_number(&format!("{}%", percents.trim_end())),
+        None => parse_number(typed).filter(|share| *share < 1.0),
+    };
+    let what = "a percentage such as 5% or a share from 0 to 1 such as 0.05";
+    expected(share.filter(|share| *share >= 0.0), what)
+}
+
+/// `1e7` or `10M`.
+pub fn steps(text: &str) -> Result<u64, SpecError> {
+    let steps = parse_number(text)
+        .filter(|_| !text.trim_end().ends_with('%'))
+        .filter(|n| n.fract() == 0.0 && (1.0..=MOST_STEPS as f64).contains(n));
+    let what = format_args!("a whole number from 1 to {MOST_STEPS:e}");
+    expected(steps, what).map(|steps| steps as u64)
+}
+
+pub fn threads(text: &str) -> Result<usize, SpecError> {
+    let count = text.parse().ok();
+    let count = count.filter(|count| (1..=MOST_THREADS).contains(count));
+    let what = format_args!("a whole number from 1 to {MOST_THREADS}");
+    expected(count, what)
+}
+
+pub fn kernel(name: &str) -> Result<Kernel, SpecError> {
+    let known = Kernel::ALL.map(|kernel| (kernel, kernel.name(), ""));
+    choice("kernel", &known, name)
+}
+
+pub fn plane_method(name: &str) -> Result<PlaneMethod, SpecError> {
+    choice("plane method", &PLANE_METHODS, name)
+}
+
+pub fn arithmetic(name: &str) -> Result<Arithmetic, SpecError> {
+    choice("arithmetic", &ARITHMETICS, name)
+}
+
+pub fn matrix_convention(name: &str) -> Result<MatrixConvention, SpecError> {
+    choice("matrix convention", &MATRIX_CONVENTIONS, name)
+}
+
+pub fn culling_test(name: &str) -> Result<CullingTest, SpecError> {
+    choice("test", &TESTS, name)
+}
+
+/// The value of that name, of a table of values, names and summaries.
+fn choice<T: Copy>(
+    what: &str,
+    table: &[(T, &'static str, &'static str)],
+    name: &str,
+) -> Result<T, SpecError> {
+    let row = table.iter().find(|row| row.1 == name);
+    row.map(|row| row.0)
+        .ok_or_else(|| SpecError::unknown(what, name, table.iter().map(|row| row.1)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thresholds_are_shares_and_nothing_else() {
+        for (typed, share) in [
+            ("5%", 0.05),
+            ("5 %", 0.05),
+            (" 0.05 ", 0.05),
+            ("0", 0.0),
+            ("0%", 0.0),
+            ("150%", 1.5),
+        ] {
+            assert_eq!(threshold(typed), Ok(share), "{typed}");
+        }
+        let bad = "nan NaN% -5% -0.1 inf inf% 1e999 5 1.5 5k five % 5%% - --all";
+        for typed in bad.split(' ').chain(["", "5 5%"]) {
+            let error = threshold(typed).expect_err(typed).to_string();
+            assert!(
+                error.starts_with("expected a percentage"),
+                "{typed}: {error}"
+            );
+        }
+    }
+}
