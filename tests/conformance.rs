@@ -6,9 +6,10 @@ use std::ops::ControlFlow;
 
 use cullbench::culling::Culling;
 use cullbench::geometry::{Aabb, ConvexVolume, Plane, PlaneTree};
-use cullbench::index::{Bsp, Bvh, FrustumQuery, Linear, LinearScalar, Octree, Quadtree, Wide};
+use cullbench::index::{Bsp, Bvh, FrustumQuery, Linear, LinearScalar, Octree, Quadtree};
+use cullbench::index::{BspTextbook, BvhTextbook, OctreeTextbook, QuadtreeTextbook};
 use cullbench::index::{BuildError, DynIndex, MemoryUsage, Registry, StructureSpec};
-use cullbench::index::{Info, Kind, RegionIndex};
+use cullbench::index::{Info, Kind, RegionIndex, UniformGrid, Wide};
 use cullbench::measure::Workload;
 use cullbench::path::{self, LensDefaults};
 use cullbench::query::{ItemId, ManySink, Recorder, Sink, View};
@@ -94,6 +95,11 @@ conforms! {
     quadtree: Quadtree;
     bvh: Bvh;
     wide: Wide;
+    uniform_grid: UniformGrid;
+    bsp_textbook: BspTextbook;
+    octree_textbook: OctreeTextbook;
+    quadtree_textbook: QuadtreeTextbook;
+    bvh_textbook: BvhTextbook;
 }
 
 /// The peers and their modules: tests and names from one list.
@@ -122,7 +128,6 @@ peers! {
     peer_bvh_flat: PeerBvhFlat;
     peer_bvh_arena: PeerBvhArena;
     peer_kiddo: PeerKiddo;
-    peer_uniform_grid: PeerUniformGrid;
     peer_bevy_style: PeerBevyStyle;
 }
 
@@ -142,6 +147,10 @@ const VARIANTS: &[&str] = &[
     "bvh:preset=medium,leaf=255",
     "bvh:preset=very-slow",
     "wide:order=morton",
+    "bsp-textbook:leaf=1,depth=256",
+    "octree-textbook:leaf=1,depth=3",
+    "quadtree-textbook:leaf=1,depth=256",
+    "bvh-textbook:leaf=1,depth=2",
 ];
 
 conforms! {
@@ -157,6 +166,10 @@ conforms! {
     bvh_large_leaves: Variant<Bvh, 9>;
     bvh_slowest: Variant<Bvh, 10>;
     wide_morton: Variant<Wide, 11>;
+    bsp_textbook_deep: Variant<BspTextbook, 12>;
+    octree_textbook_shallow: Variant<OctreeTextbook, 13>;
+    quadtree_textbook_deep: Variant<QuadtreeTextbook, 14>;
+    bvh_textbook_shallow: Variant<BvhTextbook, 15>;
 }
 
 #[test]
@@ -169,6 +182,11 @@ fn the_suite_has_every_structure_of_the_table() {
         Quadtree::INFO.name,
         Bvh::INFO.name,
         Wide::INFO.name,
+        UniformGrid::INFO.name,
+        BspTextbook::INFO.name,
+        OctreeTextbook::INFO.name,
+        QuadtreeTextbook::INFO.name,
+        BvhTextbook::INFO.name,
     ];
     let here: Vec<_> = own.iter().chain(PEERS).copied().collect();
     let registry = Registry::builtin();

@@ -7,8 +7,9 @@ use serde_json::{Map, Value};
 #[cfg(feature = "peers")]
 use super::peers;
 use super::{
-    Bsp, BuildError, Bvh, By, DynIndex, Execution, FrustumQuery, Info, Linear, LinearScalar,
-    Octree, Quadtree, RegionIndex, Wide, caught,
+    Bsp, BspTextbook, BuildError, Bvh, BvhTextbook, By, DynIndex, Execution, FrustumQuery, Info,
+    Linear, LinearScalar, Octree, OctreeTextbook, Quadtree, QuadtreeTextbook, RegionIndex,
+    UniformGrid, Wide, caught,
 };
 use crate::geometry::{Aabb, PlaneTree};
 use crate::query::ItemId;
@@ -83,7 +84,7 @@ pub struct Registry {
 }
 
 /// The structures of the feature `peers`, for the hint that a build lacks it.
-const PEERS: [&str; 14] = [
+const PEERS: [&str; 13] = [
     "peer-obvhs",
     "peer-obvhs-tuned",
     "peer-obvhs-aabb",
@@ -96,7 +97,6 @@ const PEERS: [&str; 14] = [
     "peer-bvh-flat",
     "peer-bvh-arena",
     "peer-kiddo",
-    "uniform-grid",
     "peer-bevy-style",
 ];
 
@@ -116,7 +116,12 @@ impl Registry {
             .with::<Octree>()
             .with::<Quadtree>()
             .with::<Bvh>()
-            .with::<Wide>();
+            .with::<Wide>()
+            .with::<UniformGrid>()
+            .with::<BspTextbook>()
+            .with::<OctreeTextbook>()
+            .with::<QuadtreeTextbook>()
+            .with::<BvhTextbook>();
         #[cfg(feature = "peers")]
         let own = own
             .with::<peers::PeerObvhs>()
@@ -131,7 +136,6 @@ impl Registry {
             .with::<peers::PeerBvhFlat>()
             .with::<peers::PeerBvhArena>()
             .with::<peers::PeerKiddo>()
-            .with::<peers::PeerUniformGrid>()
             .with::<peers::PeerBevyStyle>();
         own
     }
@@ -412,7 +416,7 @@ mod tests {
     /// The hint names exactly what the feature brings.
     #[test]
     fn the_names_of_the_peers_are_those_of_their_rows() {
-        let own = 7;
+        let own = 12;
         let peers: Vec<_> = Registry::builtin().rows()[own..]
             .iter()
             .map(|row| row.info.name)
