@@ -12,7 +12,7 @@ use cullbench::index::{BuildError, DynIndex, MemoryUsage, Registry, StructureSpe
 use cullbench::index::{Info, Kind, RegionIndex, UniformGrid, Wide};
 use cullbench::measure::Workload;
 use cullbench::path::{self, LensDefaults};
-use cullbench::query::{ItemId, ManySink, Recorder, Sink, View};
+use cullbench::query::{AnyView, ItemId, ManySink, Recorder, Sink, View};
 use cullbench::scene;
 use cullbench::threads::Pool;
 use cullbench::verify::Reference;
@@ -142,7 +142,7 @@ const VARIANTS: &[&str] = &[
     "bsp:leaf=300",
     "bsp:builder=sah",
     "bsp:builder=oblique,leaf=3",
-    "bsp:builder=auto,cut=4",
+    "bsp:builder=faces,cut=4",
     "bvh:preset=fastest,leaf=1",
     "bvh:preset=medium,leaf=255",
     "bvh:preset=very-slow",
@@ -161,7 +161,7 @@ conforms! {
     bsp_large_leaves: Variant<Bsp, 4>;
     bsp_sah: Variant<Bsp, 5>;
     bsp_oblique: Variant<Bsp, 6>;
-    bsp_auto: Variant<Bsp, 7>;
+    bsp_faces: Variant<Bsp, 7>;
     bvh_fastest: Variant<Bvh, 8>;
     bvh_large_leaves: Variant<Bvh, 9>;
     bvh_slowest: Variant<Bvh, 10>;
@@ -279,25 +279,45 @@ fn memory_and_counters_fit_the_items() {
 #[test]
 fn a_maps_own_tree_gives_the_reference_set() {
     let map = scene::load("freedm-map12", &Default::default()).expect("a sample");
-    let spec = StructureSpec::parse("bsp:builder=import").expect("bsp");
     let cameras = path::load("teleport:frames=40", &map, &LensDefaults::default()).expect("a path");
     let workload = Workload::new(&map, &cameras, &Culling::default()).expect("volumes");
-    // The items, and the boxes of the regions that region search asks for.
-    for items in [&map.items[..], map.regions.boxes(&map.items)] {
-        let index = spec.build_with(items, map.own_tree.as_ref()).expect("bsp");
-        let mut reference = Reference::new(items.len());
-        for view in &workload.views {
-            reference.see(items, view.as_any());
-            let mut found = Vec::new();
-            index.see(view.as_any(), &mut found);
-            assert!(reference.compare(&found).is_none());
-        }
-        for &p in &workload.points {
-            let holding = items.iter().zip(0..).filter(|(b, _)| b.contains_point(p));
-            reference.expect(holding.map(|(_, id)| id));
-            let mut found = Vec::new();
-            index.locate(p, &mut found);
-            assert!(reference.compare(&found).is_none());
+    for name in ["bsp", "bsp:builder=import", "bsp-textbook"] {
+        let spec = StructureSpec::parse(name).expect(name);
+        // The items, and the boxes of the regions that region search asks for.
+        for items in [&map.items[..], map.regions.boxes(&map.items)] {
+            let index = spec.build_with(items, map.own_tree.as_ref()).expect(name);
+            let mut reference = Reference::new(items.len());
+            for view in &workload.views {
+                reference.see(items, view.as_any());
+                let mut found = Vec::new();
+                index.see(view.as_any(), &mut found);
+                assert!(reference.compare(&found).is_none(), "{name}");
+            }
+            for &p in &workload.points {
+                let holding = items.iter().zip(0..).filter(|(b, _)| b.contains_point(p));
+                reference.expect(holding.map(|(_, id)| id));
+                let mut found = Vec::new();
+                index.locate(p, &mut found);
+                assert!(reference.compare(&found).is_none(), "{name}");
+            }
         }
     }
+}
+
+/// The order in which all items are seen tells which planes it was.
+#[test]
+fn bsp_takes_a_maps_own_planes_by_default_and_the_median_elsewhere() {
+    let map = scene::load("freedm-map12", &Default::default()).expect("a sample");
+    let order = |name: &str, own: Option<&PlaneTree>| {
+        let spec = StructureSpec::parse(name).expect(name);
+        let index = spec.build_with(&map.items, own).expect(name);
+        let everything = ConvexVolume::from_planes(&[]).expect("no plane");
+        let mut seen = Vec::new();
+        index.see(AnyView::Volume(&everything), &mut seen);
+        seen
+    };
+    let own = map.own_tree.as_ref();
+    assert_eq!(order("bsp", own), order("bsp:builder=import", own));
+    assert_eq!(order("bsp", None), order("bsp:builder=median", own));
+    assert_ne!(order("bsp", own), order("bsp", None));
 }

@@ -172,7 +172,7 @@ pub fn by_principal_axis(records: &mut [Record]) -> Option<(Vec3, usize)> {
     Some(by_median(records, axis.as_vec3()))
 }
 
-/// Planes that `auto` looks at per node, and items it judges them by.
+/// Planes that `faces` looks at per node, and items it judges them by.
 const CANDIDATES: usize = 24;
 const JUDGES: usize = 128;
 

@@ -16,6 +16,10 @@ use crate::query::ItemId;
 use crate::spec::{Spec, SpecError};
 use crate::threads::Pool;
 
+/// The words of a list for all structures, and for all but the textbook forms.
+const ALL: &str = "all";
+const DEFAULT: &str = "default";
+
 type Build =
     fn(Execution, &[Aabb], Option<&PlaneTree>, &Value) -> Result<Box<dyn DynIndex>, BuildError>;
 
@@ -159,9 +163,9 @@ impl Registry {
         assert!(
             name.starts_with(|c: char| c.is_ascii_alphanumeric())
                 && name.chars().all(is_plain)
-                && name != "all",
+                && ![ALL, DEFAULT].contains(&name),
             "structure '{name}' cannot be typed; expected a name of letters, digits, '-', '_' \
-             and '.' other than 'all'"
+             and '.' other than '{ALL}' and '{DEFAULT}'"
         );
         assert!(
             self.named(name).is_none(),
@@ -222,7 +226,14 @@ impl Registry {
         })
     }
 
-    /// The structures of a comma-separated list, or of `all`.
+    /// Those with their default parameters whose declaration is meant.
+    fn specs(&self, is_meant: fn(&Info) -> bool) -> Result<Vec<StructureSpec>, SpecError> {
+        let meant = self.rows.iter().filter(|row| is_meant(&row.info));
+        meant.map(|row| self.structure(row.info.name)).collect()
+    }
+
+    /// The structures of a comma-separated list, in which `all` are all of them and
+    /// `default` those that are no textbook form ([`Info::textbook`]).
     ///
     /// # Errors
     /// As [`Registry::structure`]; an empty list, a structure named twice.
@@ -230,11 +241,8 @@ impl Registry {
         let mut chosen: Vec<StructureSpec> = Vec::new();
         for text in Spec::split_list(list) {
             let more = match text.as_str() {
-                "all" => self
-                    .rows
-                    .iter()
-                    .map(|row| self.structure(row.info.name))
-                    .collect::<Result<_, _>>()?,
+                ALL => self.specs(|_| true)?,
+                DEFAULT => self.specs(|info| !info.textbook)?,
                 _ => vec![self.structure(&text)?],
             };
             for spec in more {
@@ -249,7 +257,7 @@ impl Registry {
         }
         if chosen.is_empty() {
             return Err(SpecError::new(
-                "no structure is named; expected 'all' or a list such as linear,bvh",
+                "no structure is named; expected 'all', 'default' or a list such as linear,bvh",
             ));
         }
         Ok(chosen)
@@ -345,6 +353,9 @@ mod tests {
         let registry = Registry::builtin();
         let all = registry.structures("all").unwrap();
         assert_eq!(all.len(), registry.rows().len());
+        let named = registry.structures("default,octree-textbook").unwrap();
+        assert_eq!(named.iter().filter(|s| s.info().textbook).count(), 1);
+        assert_eq!(named.len(), all.len() - 3);
         let two = registry
             .structures("bvh:leaf=4,preset=medium,linear")
             .unwrap();
@@ -403,7 +414,7 @@ mod tests {
 
     #[test]
     fn names_that_cannot_be_typed_are_refused() {
-        for name in ["", "all", "a:b", "a,b", "a b", "a=b", "-a"] {
+        for name in ["", "all", "default", "a:b", "a,b", "a b", "a=b", "-a"] {
             let row = Row {
                 info: Wide::INFO.named(name),
                 ..Row::of::<Wide>()

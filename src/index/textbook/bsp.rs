@@ -168,7 +168,8 @@ impl RegionIndex for BspTextbook {
         "the lectures' BSP tree: the map's own planes or faces of items, cut items kept at the plane's node",
         Kind::Tree,
         Origin::Ours,
-    );
+    )
+    .textbook();
     type Params = TextbookParams;
 
     fn build(

@@ -109,7 +109,8 @@ impl RegionIndex for BvhTextbook {
         "bounding volume hierarchy (crate obvhs) by its own nodes, one at a time, by recursion",
         Kind::Tree,
         Origin::Ours,
-    );
+    )
+    .textbook();
     type Params = TextbookParams;
 
     fn build(

@@ -119,7 +119,8 @@ impl RegionIndex for OctreeTextbook {
         "the lectures' octree: child pointers, recursion, items at the smallest cell that holds them",
         Kind::Tree,
         Origin::Ours,
-    );
+    )
+    .textbook();
     type Params = TextbookParams;
 
     fn build(

@@ -30,7 +30,8 @@ impl RegionIndex for QuadtreeTextbook {
         "the lectures' quadtree: child pointers, recursion, items at the smallest column that holds them",
         Kind::Tree,
         Origin::Ours,
-    );
+    )
+    .textbook();
     type Params = TextbookParams;
 
     fn build(
