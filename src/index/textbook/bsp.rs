@@ -165,7 +165,7 @@ impl BspTextbook {
 impl RegionIndex for BspTextbook {
     const INFO: Info = Info::new(
         "bsp-textbook",
-        "the lectures' BSP tree: the map's own planes or faces of items, cut items kept at the plane's node",
+        "lecture form: the map's own planes or item faces, cut items at their plane",
         Kind::Tree,
         Origin::Ours,
     )

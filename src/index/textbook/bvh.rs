@@ -62,9 +62,9 @@ impl BvhTextbook {
         Some(At { tree: self, node })
     }
 
-    /// Lays the items of a subtree out in its order; their union. The deepest level
-    /// that is allowed keeps all that is below it: among items that lie alike
-    /// obvhs's trees may be as deep as they have items.
+    /// Lays the items of a subtree out in its order and fits its nodes; its bounds.
+    /// The deepest level that is allowed keeps all that is below it: of items that
+    /// lie alike obvhs makes trees as deep as they have items.
     fn settle(&mut self, at: u32, levels: u32, stacks: &[&[Record]], order: &[u32]) -> Aabb {
         let node = self.nodes[at as usize];
         if levels > 0 && !node.is_leaf() {
@@ -73,17 +73,8 @@ impl BvhTextbook {
             return self.bound(at, first.union(&second));
         }
         let first = self.items.ids.len();
-        let mut open = vec![node];
-        while let Some(node) = open.pop() {
-            let (from, count) = (node.first_index as usize, node.prim_count as usize);
-            if !node.is_leaf() {
-                open.extend(&self.nodes[from..from + 2]);
-                continue;
-            }
-            for record in order[from..from + count]
-                .iter()
-                .flat_map(|&i| stacks[i as usize])
-            {
+        for &stack in &self.places(node, order) {
+            for record in stacks[stack as usize] {
                 self.items.boxes.push(record.bounds);
                 self.items.ids.push(record.id);
             }
@@ -93,6 +84,19 @@ impl BvhTextbook {
         leaf.prim_count = (self.items.ids.len() - first) as u32;
         let bounds = Aabb::union_of(&self.items.boxes[first..]);
         self.bound(at, bounds)
+    }
+
+    /// What obvhs has in the leaves of a subtree, whose depth has no bound.
+    fn places(&self, node: Bvh2Node, order: &[u32]) -> Vec<u32> {
+        let (mut places, mut open) = (Vec::new(), vec![node]);
+        while let Some(node) = open.pop() {
+            let (first, count) = (node.first_index as usize, node.prim_count as usize);
+            match node.is_leaf() {
+                true => places.extend(&order[first..first + count]),
+                false => open.extend(&self.nodes[first..first + 2]),
+            }
+        }
+        places
     }
 
     /// Exact unions, whatever the builder has rounded.
@@ -106,7 +110,7 @@ impl BvhTextbook {
 impl RegionIndex for BvhTextbook {
     const INFO: Info = Info::new(
         "bvh-textbook",
-        "bounding volume hierarchy (crate obvhs) by its own nodes, one at a time, by recursion",
+        "lecture form: the nodes of crate obvhs, one at a time",
         Kind::Tree,
         Origin::Ours,
     )
@@ -132,7 +136,14 @@ impl RegionIndex for BvhTextbook {
         let key = |r: &Record| [r.bounds.min, r.bounds.max].map(|c| c.to_array().map(f32::to_bits));
         records.sort_unstable_by_key(|r| (key(r), r.id));
         let stacks: Vec<&[Record]> = records.chunk_by(|a, b| key(a) == key(b)).collect();
-        let boxes: Vec<Aabb> = stacks.iter().map(|stack| stack[0].bounds).collect();
+        // At unit size: it compares areas, which must not overflow.
+        let reach = Aabb::union_of(items).reach().max_element();
+        let scale = reach.recip().min(f32::MAX);
+        let scaled = |b: &Aabb| Aabb::new(b.min * scale, b.max * scale);
+        let boxes: Vec<Aabb> = stacks
+            .iter()
+            .map(|stack| scaled(&stack[0].bounds))
+            .collect();
         let config = BvhBuildParams {
             max_prims_per_leaf: params.leaf.min(255),
             ..BvhBuildParams::medium_build()

@@ -116,7 +116,7 @@ impl OctreeTextbook {
 impl RegionIndex for OctreeTextbook {
     const INFO: Info = Info::new(
         "octree-textbook",
-        "the lectures' octree: child pointers, recursion, items at the smallest cell that holds them",
+        "lecture form: items at the smallest cell that holds them",
         Kind::Tree,
         Origin::Ours,
     )

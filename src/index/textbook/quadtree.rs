@@ -27,7 +27,7 @@ impl QuadtreeTextbook {
 impl RegionIndex for QuadtreeTextbook {
     const INFO: Info = Info::new(
         "quadtree-textbook",
-        "the lectures' quadtree: child pointers, recursion, items at the smallest column that holds them",
+        "lecture form: items at the smallest column that holds them",
         Kind::Tree,
         Origin::Ours,
     )
