@@ -49,10 +49,17 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! Features: `cli` (default) is the `cullbench` program and `cli::main_with`, with
+//! everything from clap downwards; without it the structures, scenes, oracle and
+//! measurements are left. `peers` adds structures of other crates behind the same
+//! traits.
+//!
 //! Conventions: everything is right-handed; z is up in scenes; bounds are
 //! closed, so touching counts as visible; plane normals point inward; angles
 //! are degrees; items are numbered by their place in the scene.
 
+// docs.rs says of each item which feature it needs.
+#![cfg_attr(docsrs, feature(doc_cfg))]
 // Denied, not forbidden, where there are vectors: one folder may, and says so
 // itself. With plain arrays there is none.
 #![deny(unsafe_code)]
