@@ -55,12 +55,14 @@ impl Sides {
         }
         Sides { plane, of, cut }
     }
+}
 
-    /// How many items a search has to look at that takes the fuller side.
-    fn cost(&self) -> usize {
-        let [front, back] = &self.of;
-        front.len().max(back.len()) + self.cut.len()
-    }
+/// What a plane spares a search that takes its fuller side: as many items as lie
+/// wholly on the other.
+fn spared(plane: &Plane, records: &[Record]) -> usize {
+    let front = records.iter().filter(|r| plane.contains(&r.bounds));
+    let back = records.iter().filter(|r| plane.excludes(&r.bounds));
+    front.count().min(back.count())
 }
 
 /// Where planes come from.
@@ -74,24 +76,22 @@ const OFFER: usize = 8;
 const JUDGES: usize = 128;
 
 impl Planes<'_> {
-    /// How some items are divided, with the own nodes that go on on either side;
-    /// `at` is the own node that is next. Own planes with everything on one side are
-    /// passed by. `None` if no plane that is looked at parts the items.
+    /// How some items are divided, and by which of the map's nodes in front and
+    /// behind; `at` is the one that is next. Those of its planes with everything on
+    /// one side are passed by. `None` if no plane that is looked at parts the items.
     fn sides(&self, records: &[Record], mut at: Option<u32>) -> Option<(Sides, [Option<u32>; 2])> {
         while let Some(own) = at.and_then(|at| self.own?.nodes.get(at as usize)) {
             let sides = Sides::of(own.plane, records);
             match sides.of.iter().position(|side| side.len() == records.len()) {
                 Some(side) => at = own.children[side],
-                None if sides.cut.len() == records.len() => return None,
+                None if sides.cut.len() == records.len() => break,
                 None => return Some((sides, own.children)),
             }
         }
         let step = records.len().div_ceil(JUDGES);
         let judges: Vec<Record> = records.iter().step_by(step).copied().collect();
-        let offered = planes_of(records, OFFER);
-        let best = offered.min_by_key(|&plane| Sides::of(plane, &judges).cost())?;
-        let sides = Sides::of(best, records);
-        (sides.cost() < records.len()).then_some((sides, [None; 2]))
+        let best = planes_of(records, OFFER).max_by_key(|plane| spared(plane, &judges))?;
+        (spared(&best, records) > 0).then(|| (Sides::of(best, records), [None; 2]))
     }
 
     fn divided(&self, records: &[Record], at: Option<u32>, level: u32) -> Box<Split> {
