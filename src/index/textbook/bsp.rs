@@ -41,28 +41,38 @@ struct Sides {
     cut: Vec<Record>,
 }
 
+/// In front of a plane (0), behind it (1), or cut by it. Touching is not cut: walls
+/// that lie in a plane are on its sides.
+fn side_of(plane: &Plane, b: &Aabb) -> Option<usize> {
+    if plane.contains(b) {
+        return Some(0);
+    }
+    (plane.value_at(plane.p_vertex(b)) <= 0.0).then_some(1)
+}
+
 impl Sides {
     fn of(plane: Plane, records: &[Record]) -> Sides {
         let (mut of, mut cut) = ([const { Vec::new() }; 2], Vec::new());
         for &record in records {
-            if plane.contains(&record.bounds) {
-                of[0].push(record);
-            } else if plane.excludes(&record.bounds) {
-                of[1].push(record);
-            } else {
-                cut.push(record);
+            match side_of(&plane, &record.bounds) {
+                Some(side) => of[side].push(record),
+                None => cut.push(record),
             }
         }
         Sides { plane, of, cut }
     }
 }
 
-/// What a plane spares a search that takes its fuller side: as many items as lie
-/// wholly on the other.
-fn spared(plane: &Plane, records: &[Record]) -> usize {
-    let front = records.iter().filter(|r| plane.contains(&r.bounds));
-    let back = records.iter().filter(|r| plane.excludes(&r.bounds));
-    front.count().min(back.count())
+/// How badly a plane divides: first what its emptier side lacks to a quarter of the
+/// items, then the items it cuts, since every search that comes by looks at them.
+fn demerit(plane: &Plane, records: &[Record]) -> (usize, usize) {
+    let mut sides = [0, 0];
+    for side in records.iter().filter_map(|r| side_of(plane, &r.bounds)) {
+        sides[side] += 1;
+    }
+    let [front, back] = sides;
+    let lacking = (records.len() / 4).saturating_sub(front.min(back));
+    (lacking, records.len() - front - back)
 }
 
 /// Where planes come from.
@@ -72,8 +82,8 @@ struct Planes<'a> {
 }
 
 /// Items that planes are taken from, and items that they are judged by, at a node.
-const OFFER: usize = 8;
-const JUDGES: usize = 128;
+const OFFER: usize = 4;
+const JUDGES: usize = 512;
 
 impl Planes<'_> {
     /// How some items are divided, and by which of the map's nodes in front and
@@ -90,8 +100,10 @@ impl Planes<'_> {
         }
         let step = records.len().div_ceil(JUDGES);
         let judges: Vec<Record> = records.iter().step_by(step).copied().collect();
-        let best = planes_of(records, OFFER).max_by_key(|plane| spared(plane, &judges))?;
-        (spared(&best, records) > 0).then(|| (Sides::of(best, records), [None; 2]))
+        let best = planes_of(records, OFFER).min_by_key(|plane| demerit(plane, &judges))?;
+        let sides = Sides::of(best, records);
+        let parts = sides.of.iter().all(|side| !side.is_empty());
+        parts.then_some((sides, [None; 2]))
     }
 
     fn divided(&self, records: &[Record], at: Option<u32>, level: u32) -> Box<Split> {
@@ -134,8 +146,8 @@ impl Split {
             return ControlFlow::Continue(());
         };
         let value = plane.value_at(p);
-        // A NaN (coordinates beyond f32) is on neither side.
-        for (side, is_there) in self.sides.iter().zip([value >= 0.0, value < 0.0]) {
+        // On the plane, both; a NaN (coordinates beyond f32) is on neither.
+        for (side, is_there) in self.sides.iter().zip([value >= 0.0, value <= 0.0]) {
             if let (Some(side), true) = (side, is_there) {
                 side.search(p, sink, recorder)?;
             }
