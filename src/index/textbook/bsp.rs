@@ -41,26 +41,38 @@ struct Sides {
     cut: Vec<Record>,
 }
 
+/// In front of a plane (0), behind it (1), or cut by it. Touching is not cut: walls
+/// that lie in a plane are on its sides.
+fn side_of(plane: &Plane, b: &Aabb) -> Option<usize> {
+    if plane.contains(b) {
+        return Some(0);
+    }
+    (plane.value_at(plane.p_vertex(b)) <= 0.0).then_some(1)
+}
+
 impl Sides {
     fn of(plane: Plane, records: &[Record]) -> Sides {
         let (mut of, mut cut) = ([const { Vec::new() }; 2], Vec::new());
         for &record in records {
-            if plane.contains(&record.bounds) {
-                of[0].push(record);
-            } else if plane.excludes(&record.bounds) {
-                of[1].push(record);
-            } else {
-                cut.push(record);
+            match side_of(&plane, &record.bounds) {
+                Some(side) => of[side].push(record),
+                None => cut.push(record),
             }
         }
         Sides { plane, of, cut }
     }
+}
 
-    /// How many items a search has to look at that takes the fuller side.
-    fn cost(&self) -> usize {
-        let [front, back] = &self.of;
-        front.len().max(back.len()) + self.cut.len()
+/// How badly a plane divides: first what its emptier side lacks to a quarter of the
+/// items, then the items it cuts, since every search that comes by looks at them.
+fn demerit(plane: &Plane, records: &[Record]) -> (usize, usize) {
+    let mut sides = [0, 0];
+    for side in records.iter().filter_map(|r| side_of(plane, &r.bounds)) {
+        sides[side] += 1;
     }
+    let [front, back] = sides;
+    let lacking = (records.len() / 4).saturating_sub(front.min(back));
+    (lacking, records.len() - front - back)
 }
 
 /// Where planes come from.
@@ -70,28 +82,28 @@ struct Planes<'a> {
 }
 
 /// Items that planes are taken from, and items that they are judged by, at a node.
-const OFFER: usize = 8;
-const JUDGES: usize = 128;
+const OFFER: usize = 4;
+const JUDGES: usize = 512;
 
 impl Planes<'_> {
-    /// How some items are divided, with the own nodes that go on on either side;
-    /// `at` is the own node that is next. Own planes with everything on one side are
-    /// passed by. `None` if no plane that is looked at parts the items.
+    /// How some items are divided, and by which of the map's nodes in front and
+    /// behind; `at` is the one that is next. Those of its planes with everything on
+    /// one side are passed by. `None` if no plane that is looked at parts the items.
     fn sides(&self, records: &[Record], mut at: Option<u32>) -> Option<(Sides, [Option<u32>; 2])> {
         while let Some(own) = at.and_then(|at| self.own?.nodes.get(at as usize)) {
             let sides = Sides::of(own.plane, records);
             match sides.of.iter().position(|side| side.len() == records.len()) {
                 Some(side) => at = own.children[side],
-                None if sides.cut.len() == records.len() => return None,
+                None if sides.cut.len() == records.len() => break,
                 None => return Some((sides, own.children)),
             }
         }
         let step = records.len().div_ceil(JUDGES);
         let judges: Vec<Record> = records.iter().step_by(step).copied().collect();
-        let offered = planes_of(records, OFFER);
-        let best = offered.min_by_key(|&plane| Sides::of(plane, &judges).cost())?;
+        let best = planes_of(records, OFFER).min_by_key(|plane| demerit(plane, &judges))?;
         let sides = Sides::of(best, records);
-        (sides.cost() < records.len()).then_some((sides, [None; 2]))
+        let parts = sides.of.iter().all(|side| !side.is_empty());
+        parts.then_some((sides, [None; 2]))
     }
 
     fn divided(&self, records: &[Record], at: Option<u32>, level: u32) -> Box<Split> {
@@ -134,8 +146,8 @@ impl Split {
             return ControlFlow::Continue(());
         };
         let value = plane.value_at(p);
-        // A NaN (coordinates beyond f32) is on neither side.
-        for (side, is_there) in self.sides.iter().zip([value >= 0.0, value < 0.0]) {
+        // On the plane, both; a NaN (coordinates beyond f32) is on neither.
+        for (side, is_there) in self.sides.iter().zip([value >= 0.0, value <= 0.0]) {
             if let (Some(side), true) = (side, is_there) {
                 side.search(p, sink, recorder)?;
             }
