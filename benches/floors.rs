@@ -124,7 +124,7 @@ fn harness_overhead(only_test: bool) -> u32 {
         }];
         let schedule = Schedule::new(workload.views.len(), &tasks, &protocol);
         let by_harness = || {
-            let passes = timed(&tasks, &schedule, &protocol, &|| false).expect("not stopped");
+            let passes = timed(&tasks, &schedule, &protocol, &|_| false).expect("not stopped");
             passes[0]
                 .as_ref()
                 .expect("right answers")

@@ -9,6 +9,8 @@ pub struct Suite {
     pub summary: &'static str,
     pub plan: &'static [SuiteScene],
     pub effort: Effort,
+    /// The list of structures where none are named.
+    pub structures: &'static str,
 }
 
 /// A scene of a suite with the ways through it.
@@ -88,6 +90,7 @@ pub static SUITES: &[Suite] = &[
             pass_ns: 8e6,
             beside: Beside::All,
         },
+        structures: "default",
     },
     Suite {
         name: "standard",
@@ -140,6 +143,7 @@ pub static SUITES: &[Suite] = &[
             pass_ns: 100e6,
             beside: Beside::All,
         },
+        structures: "all",
     },
     Suite {
         name: "full",
@@ -193,6 +197,7 @@ pub static SUITES: &[Suite] = &[
             pass_ns: 100e6,
             beside: Beside::All,
         },
+        structures: "all",
     },
     Suite {
         name: "compare",
@@ -209,6 +214,7 @@ pub static SUITES: &[Suite] = &[
             pass_ns: 40e6,
             beside: Beside::Nothing,
         },
+        structures: "default",
     },
     Suite {
         name: "growth",
@@ -226,6 +232,7 @@ pub static SUITES: &[Suite] = &[
             pass_ns: 200e6,
             beside: Beside::All,
         },
+        structures: "default",
     },
 ];
 

@@ -6,12 +6,13 @@ use std::ops::ControlFlow;
 
 use cullbench::culling::Culling;
 use cullbench::geometry::{Aabb, ConvexVolume, Plane, PlaneTree};
-use cullbench::index::{Bsp, Bvh, FrustumQuery, Linear, LinearScalar, Octree, Quadtree, Wide};
+use cullbench::index::{Bsp, Bvh, FrustumQuery, Linear, LinearScalar, Octree, Quadtree};
+use cullbench::index::{BspTextbook, BvhTextbook, OctreeTextbook, QuadtreeTextbook};
 use cullbench::index::{BuildError, DynIndex, MemoryUsage, Registry, StructureSpec};
-use cullbench::index::{Info, Kind, RegionIndex};
+use cullbench::index::{Info, Kind, RegionIndex, UniformGrid, Wide};
 use cullbench::measure::Workload;
 use cullbench::path::{self, LensDefaults};
-use cullbench::query::{ItemId, ManySink, Recorder, Sink, View};
+use cullbench::query::{AnyView, ItemId, ManySink, Recorder, Sink, View};
 use cullbench::scene;
 use cullbench::threads::Pool;
 use cullbench::verify::Reference;
@@ -94,6 +95,11 @@ conforms! {
     quadtree: Quadtree;
     bvh: Bvh;
     wide: Wide;
+    uniform_grid: UniformGrid;
+    bsp_textbook: BspTextbook;
+    octree_textbook: OctreeTextbook;
+    quadtree_textbook: QuadtreeTextbook;
+    bvh_textbook: BvhTextbook;
 }
 
 /// The peers and their modules: tests and names from one list.
@@ -122,7 +128,6 @@ peers! {
     peer_bvh_flat: PeerBvhFlat;
     peer_bvh_arena: PeerBvhArena;
     peer_kiddo: PeerKiddo;
-    peer_uniform_grid: PeerUniformGrid;
     peer_bevy_style: PeerBevyStyle;
 }
 
@@ -137,11 +142,15 @@ const VARIANTS: &[&str] = &[
     "bsp:leaf=300",
     "bsp:builder=sah",
     "bsp:builder=oblique,leaf=3",
-    "bsp:builder=auto,cut=4",
+    "bsp:builder=faces,cut=4",
     "bvh:preset=fastest,leaf=1",
     "bvh:preset=medium,leaf=255",
     "bvh:preset=very-slow",
     "wide:order=morton",
+    "bsp-textbook:leaf=1,depth=256",
+    "octree-textbook:leaf=1,depth=3",
+    "quadtree-textbook:leaf=1,depth=256",
+    "bvh-textbook:leaf=1,depth=2",
 ];
 
 conforms! {
@@ -152,11 +161,15 @@ conforms! {
     bsp_large_leaves: Variant<Bsp, 4>;
     bsp_sah: Variant<Bsp, 5>;
     bsp_oblique: Variant<Bsp, 6>;
-    bsp_auto: Variant<Bsp, 7>;
+    bsp_faces: Variant<Bsp, 7>;
     bvh_fastest: Variant<Bvh, 8>;
     bvh_large_leaves: Variant<Bvh, 9>;
     bvh_slowest: Variant<Bvh, 10>;
     wide_morton: Variant<Wide, 11>;
+    bsp_textbook_deep: Variant<BspTextbook, 12>;
+    octree_textbook_shallow: Variant<OctreeTextbook, 13>;
+    quadtree_textbook_deep: Variant<QuadtreeTextbook, 14>;
+    bvh_textbook_shallow: Variant<BvhTextbook, 15>;
 }
 
 #[test]
@@ -169,6 +182,11 @@ fn the_suite_has_every_structure_of_the_table() {
         Quadtree::INFO.name,
         Bvh::INFO.name,
         Wide::INFO.name,
+        UniformGrid::INFO.name,
+        BspTextbook::INFO.name,
+        OctreeTextbook::INFO.name,
+        QuadtreeTextbook::INFO.name,
+        BvhTextbook::INFO.name,
     ];
     let here: Vec<_> = own.iter().chain(PEERS).copied().collect();
     let registry = Registry::builtin();
@@ -261,25 +279,45 @@ fn memory_and_counters_fit_the_items() {
 #[test]
 fn a_maps_own_tree_gives_the_reference_set() {
     let map = scene::load("freedm-map12", &Default::default()).expect("a sample");
-    let spec = StructureSpec::parse("bsp:builder=import").expect("bsp");
     let cameras = path::load("teleport:frames=40", &map, &LensDefaults::default()).expect("a path");
     let workload = Workload::new(&map, &cameras, &Culling::default()).expect("volumes");
-    // The items, and the boxes of the regions that region search asks for.
-    for items in [&map.items[..], map.regions.boxes(&map.items)] {
-        let index = spec.build_with(items, map.own_tree.as_ref()).expect("bsp");
-        let mut reference = Reference::new(items.len());
-        for view in &workload.views {
-            reference.see(items, view.as_any());
-            let mut found = Vec::new();
-            index.see(view.as_any(), &mut found);
-            assert!(reference.compare(&found).is_none());
-        }
-        for &p in &workload.points {
-            let holding = items.iter().zip(0..).filter(|(b, _)| b.contains_point(p));
-            reference.expect(holding.map(|(_, id)| id));
-            let mut found = Vec::new();
-            index.locate(p, &mut found);
-            assert!(reference.compare(&found).is_none());
+    for name in ["bsp", "bsp:builder=import", "bsp-textbook"] {
+        let spec = StructureSpec::parse(name).expect(name);
+        // The items, and the boxes of the regions that region search asks for.
+        for items in [&map.items[..], map.regions.boxes(&map.items)] {
+            let index = spec.build_with(items, map.own_tree.as_ref()).expect(name);
+            let mut reference = Reference::new(items.len());
+            for view in &workload.views {
+                reference.see(items, view.as_any());
+                let mut found = Vec::new();
+                index.see(view.as_any(), &mut found);
+                assert!(reference.compare(&found).is_none(), "{name}");
+            }
+            for &p in &workload.points {
+                let holding = items.iter().zip(0..).filter(|(b, _)| b.contains_point(p));
+                reference.expect(holding.map(|(_, id)| id));
+                let mut found = Vec::new();
+                index.locate(p, &mut found);
+                assert!(reference.compare(&found).is_none(), "{name}");
+            }
         }
     }
+}
+
+/// The order in which all items are seen tells which planes it was.
+#[test]
+fn bsp_takes_a_maps_own_planes_by_default_and_the_median_elsewhere() {
+    let map = scene::load("freedm-map12", &Default::default()).expect("a sample");
+    let order = |name: &str, own: Option<&PlaneTree>| {
+        let spec = StructureSpec::parse(name).expect(name);
+        let index = spec.build_with(&map.items, own).expect(name);
+        let everything = ConvexVolume::from_planes(&[]).expect("no plane");
+        let mut seen = Vec::new();
+        index.see(AnyView::Volume(&everything), &mut seen);
+        seen
+    };
+    let own = map.own_tree.as_ref();
+    assert_eq!(order("bsp", own), order("bsp:builder=import", own));
+    assert_eq!(order("bsp", None), order("bsp:builder=median", own));
+    assert_ne!(order("bsp", own), order("bsp", None));
 }

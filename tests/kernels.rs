@@ -173,6 +173,12 @@ fn a_structure_is_asked_by_the_kernel_of_its_spec() {
         let mut all = Located::default();
         index.locate_many(&[Vec3::ZERO], &mut all);
         batched.extend(all.iter().flatten());
-        assert_eq!(told, [(); 5].map(|()| vec![*kernel as ItemId]), "{kernel}");
+        // What is counted is counted by the portable one.
+        let by = |i| match i {
+            1 | 3 => Kernel::Portable,
+            _ => *kernel,
+        };
+        let wanted = std::array::from_fn(|i| vec![by(i) as ItemId]);
+        assert_eq!(told, wanted, "{kernel}");
     }
 }

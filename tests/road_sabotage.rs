@@ -32,8 +32,15 @@ const SOUND: u8 = 0;
 const PANICS_LATER: u8 = 1;
 /// Panics there, catches it itself and returns what it has.
 const SWALLOWS_ITS_PANIC: u8 = 2;
+/// Answers less where nothing is counted, which is what is timed.
+const RIGHT_WHEN_COUNTED: u8 = 3;
 
-const NAMES: [&str; 3] = ["sound", "panics-later", "swallows-its-panic"];
+const NAMES: [&str; 4] = [
+    "sound",
+    "panics-later",
+    "swallows-its-panic",
+    "right-when-counted",
+];
 
 impl<const FAULT: u8> Faulty<FAULT> {
     fn query<G: Region>(
@@ -96,13 +103,15 @@ impl<const FAULT: u8> FrustumQuery for Faulty<FAULT> {
         recorder: &mut R,
     ) -> ControlFlow<()> {
         let query = self.queries.fetch_add(1, Ordering::Relaxed);
-        // The count pass asks every camera once.
-        let is_timed = query >= CAMERAS;
+        // The count pass asks every camera twice.
+        let is_timed = query >= 2 * CAMERAS;
         let work = || -> usize {
-            assert!(FAULT == SOUND || !is_timed, "deep in the structure");
+            let panics = FAULT == PANICS_LATER || FAULT == SWALLOWS_ITS_PANIC;
+            assert!(!panics || !is_timed, "deep in the structure");
             self.ids.len()
         };
         let last = match FAULT {
+            RIGHT_WHEN_COUNTED if size_of::<R>() == 0 => self.ids.len() / 2,
             SWALLOWS_ITS_PANIC => std::panic::catch_unwind(work).unwrap_or(self.ids.len() / 2),
             _ => work(),
         };
@@ -124,7 +133,8 @@ fn contenders(names: &str, scene: &Scene) -> Vec<Contender> {
     let registry = Registry::builtin()
         .with::<Faulty<SOUND>>()
         .with::<Faulty<PANICS_LATER>>()
-        .with::<Faulty<SWALLOWS_ITS_PANIC>>();
+        .with::<Faulty<SWALLOWS_ITS_PANIC>>()
+        .with::<Faulty<RIGHT_WHEN_COUNTED>>();
     let specs = registry.structures(names).expect("structures");
     let build = |spec| Contender::build(spec, false, scene, CullingTest::SixPlane);
     specs.into_iter().map(build).collect()
@@ -189,6 +199,14 @@ fn a_panic_in_the_timed_pass_is_told_and_one_that_is_swallowed_is_wrong() {
     let names = "linear,panics-later,swallows-its-panic";
     let found = statuses(&workload(&scene), &contenders(names, &scene));
     assert_eq!(found, [Status::Ok, Status::Panicked, Status::Wrong]);
+}
+
+#[test]
+fn what_is_timed_is_what_is_checked() {
+    let scene = scene();
+    let names = "linear,right-when-counted";
+    let found = statuses(&workload(&scene), &contenders(names, &scene));
+    assert_eq!(found, [Status::Ok, Status::Unsafe]);
 }
 
 /// Reference and structures agree, because both are asked with views of cameras

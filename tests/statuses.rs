@@ -4,9 +4,12 @@
 //! `cullbench` with those structures, else it starts itself.
 
 use std::env;
+use std::fs::OpenOptions;
+use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::process::{Command, ExitCode, Output, Stdio};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use cullbench::geometry::{Aabb, PlaneTree};
@@ -90,6 +93,14 @@ fn for_ever() {
     }
 }
 
+static ASKED: AtomicUsize = AtomicUsize::new(0);
+
+/// A line in a file for every build that was tried.
+fn note_try() {
+    let tried = OpenOptions::new().create(true).append(true).open("tried");
+    writeln!(tried.expect("writable"), "{}", std::process::id()).expect("written");
+}
+
 macro_rules! mishaps {
     ($($kind:ident $name:literal $step:ident $what:expr;)*) => {
         $(struct $kind;
@@ -110,8 +121,15 @@ mishaps! {
     Greedy "greedy" at_build drop(std::hint::black_box(Vec::<u8>::with_capacity(1 << 46)));
     // As much as a limit forbids and a machine has.
     Hungry "hungry" at_build drop(std::hint::black_box(vec![1_u8; 3 << 30]));
-    HangsBuilding "hangs-building" at_build for_ever();
+    HangsBuilding "hangs-building" at_build {
+        note_try();
+        for_ever();
+    };
     HangsAsked "hangs-asked" at_query for_ever();
+    // Not before it is timed: to count and to compare takes a few dozen.
+    HangsTimed "hangs-timed" at_query if ASKED.fetch_add(1, Ordering::Relaxed) > 60 {
+        for_ever();
+    };
     Aborts "aborts" at_query std::process::abort();
     Panics "panics" at_query panic!("no such luck");
 }
@@ -167,6 +185,7 @@ fn each_mishap_fails_its_own_rows() {
             0,
         ),
         ("hangs-asked", "timed_out", "took longer than 2 s", 0),
+        ("hangs-timed", "timed_out", "timing took longer than 2 s", 0),
         ("aborts", "panicked", "ended by signal 6 while", 1),
         ("panics", "panicked", "no such luck", 1),
     ] {
@@ -283,6 +302,35 @@ impl Mishap for HangsLate {
     }
 }
 
+/// What has ended a process is not given another `--timeout` by `--resume`.
+fn a_resumed_run_does_not_try_again_what_has_ended_a_process() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let line = "run --scene city:n=300 --path orbit:frames=4 --processes 60 --no-bounds \
+        --timeout 2 --structure linear,hangs-building --out r";
+    let run = |more: &[&str]| {
+        let mut command = program(folder.path());
+        command.args(line.split_whitespace()).args(more);
+        command.stdout(Stdio::null());
+        command.spawn().expect("started")
+    };
+    let lines = |file: &str| {
+        let text = std::fs::read_to_string(folder.path().join(file));
+        text.map_or(0, |text| text.lines().count())
+    };
+    let mut child = run(&[]);
+    let begin = Instant::now();
+    while lines("r/stream.jsonl") < 3 {
+        assert!(begin.elapsed() < Duration::from_secs(60), "no part");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    child.kill().expect("killed");
+    child.wait().expect("ended");
+    assert!(lines("r/stream.jsonl") < 61, "it was too fast");
+    let done = run(&["--resume"]).wait().expect("ended");
+    assert_eq!((done.code(), lines("r/stream.jsonl")), (Some(0), 62));
+    assert_eq!(lines("tried"), 1);
+}
+
 fn a_scene_without_items_is_left_out() {
     let folder = tempfile::tempdir().expect("a folder");
     let line = "run --scene city:n=0 --path outside:frames=2 --processes 2 --structure linear,bvh \
@@ -354,6 +402,7 @@ fn main() -> ExitCode {
     {
         a_limit_is_a_lack_of_memory();
         ctrl_c_is_answered_at_once_in_the_middle_of_a_build();
+        a_resumed_run_does_not_try_again_what_has_ended_a_process();
     }
     println!("statuses: out_of_memory, timed_out, panicked, left_out; Ctrl-C; what fits");
     ExitCode::SUCCESS

@@ -244,7 +244,7 @@ pub fn time(
         return Err(AdviseError::OtherPlan { found, planned });
     }
     let competitors = all.trials.competitors(&plan.expected);
-    let timed = timed(&competitors, &plan.schedule, protocol, stop);
+    let timed = timed(&competitors, &plan.schedule, protocol, &|_| stop());
     Ok(timed.map(|timed| ProcessTimes {
         once_ns: all.once_ns,
         ..ProcessTimes::of(&timed)

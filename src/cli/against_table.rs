@@ -43,7 +43,7 @@ pub fn compare_against(
     }
     let new = std::env::current_exe().context("this program cannot be found again")?;
     let sides = [side(binary)?, side(&new)?];
-    let plan = run_plan::plan_of(registry, &args.what, SUITE, STRUCTURES)?;
+    let plan = run_plan::plan_of(registry, &args.what, SUITE, Some(STRUCTURES))?;
     plan.check_inputs()?;
     interrupt::from_now_on_finish();
     let bar = ProgressBar::new(0);

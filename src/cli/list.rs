@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 use super::args::{ListArgs, ListTopic, TableFormat};
 use super::{Ending, print_json, text};
 use crate::culling::TESTS;
-use crate::index::Registry;
+use crate::index::{Info, Registry};
 use crate::measure::METRICS;
 use crate::path::{PATH_PARAMS, PATHS};
 use crate::scene::{FAMILIES, SAMPLES};
@@ -66,6 +66,15 @@ pub fn list(registry: &Registry, args: &ListArgs) -> anyhow::Result<Ending> {
     Ok(Ending::Ok)
 }
 
+/// Whether a run times it where no structure is named.
+fn timed(info: &Info) -> &'static str {
+    if info.textbook {
+        "if named"
+    } else {
+        "by default"
+    }
+}
+
 /// A column's value as a table shows it.
 fn told(value: &Value) -> String {
     match value {
@@ -94,11 +103,12 @@ fn rows(registry: &Registry, topic: ListTopic) -> anyhow::Result<(&'static str, 
                     ("kind", info.kind.name().into()),
                     ("origin", info.origin.to_string().into()),
                     ("capabilities", info.capabilities.names().into()),
+                    ("timed", timed(&info).into()),
                     ("params", params.to_string().into()),
                 ];
                 Ok((info.name.to_owned(), columns, info.summary.to_owned()))
             });
-            let note = "Parameters follow the name: bvh:leaf=4,preset=medium";
+            let note = "Parameters follow the name: bvh:leaf=4,preset=medium\nLists of structures: all, default (what is timed by default) or names with commas between";
             (
                 "structures",
                 note.to_owned(),

@@ -55,6 +55,8 @@ fn by_points(scene: &Scene, structures: &[StructureSpec], file: &Path) -> anyhow
     let boxes = scene.regions.boxes(&scene.items);
     let ask = |index: &dyn DynIndex, point: usize, out: &mut Vec<_>, cost: &mut _| {
         index.locate_counted(points[point].local, out, cost);
+        out.clear();
+        index.locate(points[point].local, out);
         scene.refine(&points[point], out);
     };
     ask_all(structures, scene, boxes, points.len(), true, ask)
@@ -67,6 +69,8 @@ fn by_boxes(scene: &Scene, structures: &[StructureSpec], file: &Path) -> anyhow:
     let boxes: Vec<SoughtBox> = read.written().map(|b| scene.sought_box(b)).collect();
     let ask = |index: &dyn DynIndex, n: usize, out: &mut Vec<_>, cost: &mut _| {
         index.visible_counted(&boxes[n].volume, out, cost);
+        out.clear();
+        index.visible(&boxes[n].volume, out);
         scene.refine_overlapping(&boxes[n], out);
     };
     ask_all(structures, scene, &scene.items, boxes.len(), true, ask)

@@ -16,7 +16,10 @@ pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
     let cameras = path::load(&args.cameras, &scene, &defaults)?;
     let workload = Workload::new(&scene, &cameras, &culling)?;
     let ask = |index: &dyn crate::index::DynIndex, camera: usize, out: &mut _, cost: &mut _| {
-        index.see_counted(workload.views[camera].as_any(), out, cost);
+        let view = workload.views[camera].as_any();
+        index.see_counted(view, out, cost);
+        out.clear();
+        index.see(view, out);
     };
     let answers = ask_all(
         &structures,

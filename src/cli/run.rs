@@ -167,7 +167,7 @@ impl Run {
             .iter()
             .map(|question| self.plan.plan.key(&planned, question))
             .collect();
-        let mut failed = BTreeMap::new();
+        let mut failed = self.failed_before(&planned.source);
         for process in 0..self.plan.plan.effort.processes {
             loop {
                 if interrupt::asked() {
@@ -187,13 +187,21 @@ impl Run {
                     }
                     // Not any structure's doing, as far as one can tell.
                     Ended::Died(_, verdict) => {
-                        self.fail_all(&planned, &keys, process, &verdict)?;
+                        self.fail_all(&planned, &failed, &keys, process, &verdict)?;
                         break;
                     }
                 }
             }
         }
         Ok(SceneEnd::Done)
+    }
+
+    /// Structures that have ended a process on this scene, if the run was begun
+    /// before.
+    fn failed_before(&self, scene: &str) -> BTreeMap<String, Verdict> {
+        let parts = self.stream.parts.iter().map(|kept| &kept.part);
+        let of_scene = parts.filter(|part| part.key.scene == scene);
+        of_scene.flat_map(|part| part.failed.clone()).collect()
     }
 
     fn share(&self, keys: &[GroupKey], process: u32, failed: &BTreeMap<String, Verdict>) -> Share {
@@ -250,6 +258,7 @@ impl Run {
     fn fail_all(
         &mut self,
         planned: &PlannedScene,
+        failed: &BTreeMap<String, Verdict>,
         keys: &[GroupKey],
         process: u32,
         verdict: &Verdict,
@@ -289,6 +298,7 @@ impl Run {
                 known: None,
                 judged: None,
                 subjects: structures.iter().map(subject).collect(),
+                failed: failed.clone(),
                 bounds: Vec::new(),
                 tasks: Vec::new(),
             };

@@ -25,7 +25,7 @@ pub struct RunPlan {
 
 /// The plan that arguments stand for; scenes and paths are not looked at yet.
 pub fn plan(registry: &Registry, args: &RunArgs) -> anyhow::Result<RunPlan> {
-    let mut planned = plan_of(registry, &args.what, SUITES[0].name, "all")?;
+    let mut planned = plan_of(registry, &args.what, SUITES[0].name, None)?;
     if let Some(processes) = args.processes {
         planned.plan.effort.processes = processes;
     }
@@ -38,18 +38,18 @@ pub fn plan(registry: &Registry, args: &RunArgs) -> anyhow::Result<RunPlan> {
 }
 
 /// The same of what `run` and `compare --against` have in common, with the suite
-/// and the structures that are meant where none are named.
+/// that is meant where none is named, and structures other than the suite's.
 pub fn plan_of(
     registry: &Registry,
     args: &WhatArgs,
     default_suite: &str,
-    default_structures: &str,
+    default_structures: Option<&str>,
 ) -> anyhow::Result<RunPlan> {
     let name = args.suite.as_deref().unwrap_or(default_suite);
     let suite = Suite::named(name)
         .ok_or_else(|| SpecError::unknown("suite", name, SUITES.iter().map(|s| s.name)))?;
     let structures = match args.structure.is_empty() {
-        true => default_structures.to_owned(),
+        true => default_structures.unwrap_or(suite.structures).to_owned(),
         false => args.structure.join(","),
     };
     let mut cullings: Vec<Culling> = Vec::new();

@@ -1,136 +1,155 @@
-//! The ranked table of a scene that `cullbench run` shows when it is done with
-//! it. Reads a report; measures nothing.
+//! The ranked tables of a scene that `cullbench run` shows when it is done with
+//! it, narrow enough for a terminal of a hundred columns. Reads a report; measures
+//! nothing.
 
 use std::io::{self, Write};
 
 use super::text;
 use crate::report::{Comparison, Ranked, Report, ReportCell, comparisons};
 
-/// One block of rows for each path, cache state and culling test.
+/// What a build costs, then a table for each path, cache state and culling test.
 pub fn show_scene(report: &Report, scene: &str) -> io::Result<()> {
     let mut all = comparisons(report);
     all.retain(|c| c.about().scene.name == scene);
-    let Some(first) = all.first().map(Comparison::about) else {
+    let Some(first) = all.first() else {
         return Ok(());
     };
-    let sources = all.iter().any(|c| text::by_source(c).is_some());
-    let mut header = vec!["path / structure", "culled", "false positives"];
-    header.extend(sources.then_some(text::BY_SOURCE));
-    header.extend(OF_STRUCTURES);
-    let right: Vec<usize> = (1..header.len() - 1).collect();
-    let mut table = text::table(&header, &right);
-    for comparison in &all {
-        add_path(&mut table, comparison, header.len());
-    }
+    let about = &first.about().scene;
     let mut out = text::terminal();
     writeln!(
         out,
         "\n{}: {}, {}{}{}",
         text::plain(scene),
-        text::counted(first.scene.total_count, "item"),
-        text::counted(first.scene.region_count, "region"),
-        match first.scene.skipped_items {
+        text::counted(about.total_count, "item"),
+        text::counted(about.region_count, "region"),
+        match about.skipped_items {
             0 => String::new(),
             bad => format!(", {} left out", text::counted(bad, "bad item")),
         },
-        match first.scene.total_count {
+        match about.total_count {
             0 => "; nothing is ranked",
             _ => "",
         }
     )?;
-    for line in heads(&all) {
-        writeln!(out, "{}", text::plain(&line))?;
+    for comparison in &all {
+        for line in heads(comparison) {
+            writeln!(out, "{}", text::plain(&line))?;
+        }
+        let bounds = comparison.bounds.iter().map(|cell| (String::new(), *cell));
+        write!(out, "{}", table(QUERIES, ranked(comparison).chain(bounds)))?;
+        for line in reasons(comparison) {
+            writeln!(out, "{}", text::plain(&line))?;
+        }
     }
-    writeln!(out, "{table}")?;
-    let shown = all.iter().flat_map(|c| {
-        let cells = c.ranked.iter().map(|r| r.cell);
-        cells.chain(c.bounds.iter().copied())
-    });
-    for cell in shown.filter(|c| c.reason.is_some()) {
-        let reason = cell.reason.as_deref().unwrap_or_default();
-        writeln!(
-            out,
-            "{}",
-            text::plain(&format!(
-                "{} on {}: {}: {reason}",
-                cell.structure,
-                cell.path.name,
-                cell.status.name()
-            ))
-        )?;
-    }
+    let unranked = ranked(first).map(|(_, cell)| (String::new(), cell));
+    write!(out, "{}", table(BUILDS, unranked))?;
     out.flush()
 }
 
-/// What the times rest on: one line where it is the same for all paths.
-fn heads(all: &[Comparison]) -> Vec<String> {
-    let lines: Vec<String> = all.iter().map(text::basis).collect();
-    if lines.windows(2).all(|two| two[0] == two[1]) {
-        return lines.into_iter().take(1).collect();
-    }
-    let named = all.iter().zip(lines);
-    named
-        .map(|(one, line)| format!("{}: {line}", path(one)))
-        .collect()
-}
-
-fn path(comparison: &Comparison) -> String {
+/// What is asked, how right the answers are, and what the times rest on.
+fn heads(comparison: &Comparison) -> [String; 2] {
     let about = comparison.about();
-    match about.path.cache.as_str() {
-        "warm" => format!("{}, {}", about.path.name, about.test),
-        cache => format!("{}, {} ({cache})", about.path.name, about.test),
+    let mut head = format!("{}, {}", about.path.name, about.test);
+    if about.path.cache != "warm" {
+        head += &format!(" ({})", about.path.cache);
     }
+    if let Some(culled) = comparison.of_any("cull_rate") {
+        head += &format!(": {} culled", text::percent(culled));
+    }
+    let sources = text::by_source(comparison);
+    let sources = sources.map(|items| format!("{items} {}", text::BY_SOURCE));
+    match (text::false_positives(comparison), sources) {
+        (Some(share), None) => head += &format!(", {share} false positives"),
+        (Some(share), Some(items)) => head += &format!(", {share} false positives ({items})"),
+        (None, Some(items)) => head += &format!(", false positives {items}"),
+        (None, None) => {}
+    }
+    [head, text::basis(comparison)]
 }
 
-/// The rows of one path, fastest first; what failed comes last, unranked, and
-/// then the lower bounds.
-fn add_path(table: &mut text::Table, comparison: &Comparison, columns: usize) {
-    let culled = comparison.of_any("cull_rate").map(text::percent);
-    let of_path = [
-        Some(path(comparison)),
-        culled,
-        text::false_positives(comparison),
-        text::by_source(comparison),
-    ];
-    table.add_row(of_path.map(Option::unwrap_or_default));
-    for Ranked { rank, cell } in &comparison.ranked {
-        let rank = rank.map_or("-".to_owned(), |rank| rank.to_string());
-        table.add_row(row(format!("  {rank} {}", cell.structure), cell, columns));
-    }
-    for bound in &comparison.bounds {
-        table.add_row(row(format!("    {}", bound.structure), bound, columns));
-    }
+/// The cells of structures with their ranks: fastest first, and last, unranked,
+/// what failed.
+fn ranked<'r>(comparison: &Comparison<'r>) -> impl Iterator<Item = (String, &'r ReportCell)> {
+    let ranked = comparison.ranked.iter();
+    ranked.map(|Ranked { rank, cell }| (rank.map_or("-".to_owned(), |n| n.to_string()), *cell))
 }
 
-/// What a structure has a figure for; the columns before it are its path's.
-const OF_STRUCTURES: [&str; 9] = [
-    "query [95 %]",
-    "p95",
-    "speed-up vs linear [95 %]",
-    "of lower bound: read",
-    "copy",
-    "build",
-    "bytes per item",
-    "locate",
-    "status",
+/// A column: what is over it, and its figure of a cell.
+type Column = (&'static str, fn(&ReportCell) -> String);
+
+/// Of the queries of a path. What has no time has its status in its place.
+const QUERIES: &[Column] = &[
+    ("query [95 %]", |cell| match cell.metrics.get("query_ns") {
+        None => cell.status.name().to_owned(),
+        found => text::time_estimate(found),
+    }),
+    ("p95", |cell| of(cell, "query_ns_p95", text::time)),
+    ("speed-up [95 %]", |cell| {
+        text::estimate(cell.metrics.get("speedup"))
+    }),
+    ("/ read", |cell| of(cell, "times_read", text::significant)),
+    ("locate", |cell| of(cell, "locate_ns", text::time)),
 ];
 
-fn row(name: String, cell: &ReportCell, columns: usize) -> Vec<String> {
-    let value =
-        |name: &str, show: fn(f64) -> String| cell.value(name).map(show).unwrap_or_default();
-    let figures = [
-        text::time_estimate(cell.metrics.get("query_ns")),
-        value("query_ns_p95", text::time),
-        text::estimate(cell.metrics.get("speedup")),
-        value("times_read", text::significant),
-        value("times_memcpy", text::significant),
-        value("build_ms", |ms| text::time(ms * 1e6)),
-        value("memory_bytes_per_item", |b| format!("{b:.1}")),
-        value("locate_ns", text::time),
-        cell.status.name().to_owned(),
-    ];
-    let mut row = vec![name];
-    row.resize(columns - figures.len(), String::new());
-    row.extend(figures);
-    row
+/// Of a structure on a scene.
+const BUILDS: &[Column] = &[
+    ("build", |cell| {
+        of(cell, "build_ms", |ms| text::time(ms * 1e6))
+    }),
+    ("update of 1 %", |cell| {
+        of(cell, "update_ms", |ms| text::time(ms * 1e6))
+    }),
+    ("query after 32", |cell| {
+        of(cell, "refitted_over_rebuilt", |ratio| {
+            format!("x {}", text::significant(ratio))
+        })
+    }),
+    ("bytes per item", |cell| {
+        of(cell, "memory_bytes_per_item", |bytes| format!("{bytes:.1}"))
+    }),
+];
+
+fn of(cell: &ReportCell, metric: &str, show: fn(f64) -> String) -> String {
+    cell.value(metric).map(show).unwrap_or_default()
+}
+
+/// A row a cell; columns without any figure are left out, and so is a table of
+/// nothing else.
+fn table<'r>(columns: &[Column], cells: impl Iterator<Item = (String, &'r ReportCell)>) -> String {
+    let rows: Vec<Vec<String>> = cells
+        .map(|(rank, cell)| {
+            let figures = columns.iter().map(|(_, figure)| figure(cell));
+            let name = format!("{rank:>2} {}", cell.structure);
+            [name].into_iter().chain(figures).collect()
+        })
+        .collect();
+    let header = ["structure"].into_iter().chain(columns.iter().map(|c| c.0));
+    let kept: Vec<(usize, &str)> = header
+        .enumerate()
+        .filter(|(column, _)| rows.iter().any(|row| !row[*column].is_empty()))
+        .collect();
+    if kept.len() < 2 {
+        return String::new();
+    }
+    let header: Vec<&str> = kept.iter().map(|(_, name)| *name).collect();
+    let right: Vec<usize> = (1..header.len()).collect();
+    let mut table = text::table(&header, &right);
+    for row in &rows {
+        table.add_row(kept.iter().map(|(column, _)| &row[*column]));
+    }
+    format!("{table}\n")
+}
+
+/// Why cells are not ok.
+fn reasons<'c>(comparison: &'c Comparison) -> impl Iterator<Item = String> + 'c {
+    let ranked = comparison.ranked.iter().map(|ranked| ranked.cell);
+    let cells = ranked.chain(comparison.bounds.iter().copied());
+    cells.filter_map(|cell| {
+        let reason = cell.reason.as_deref()?;
+        let (structure, path) = (&cell.structure, &cell.path.name);
+        Some(format!(
+            "{structure} on {path}: {}: {reason}",
+            cell.status.name()
+        ))
+    })
 }

@@ -151,26 +151,30 @@ pub fn over(processes: usize, twin: Option<&Estimate>) -> String {
 }
 
 /// What the times of a table rest on: "10 processes, 100 rounds each; 64 cameras
-/// timed, 128 checked, 8 judged against the oracle".
+/// timed, 128 checked, 8 judged by the oracle".
 pub fn basis(comparison: &Comparison) -> String {
     if comparison.range(|_| 0).is_none() {
         return "no times".to_owned();
     }
     let of = |number: fn(&ReportCell) -> usize, one: &str| {
         let (least, most) = comparison.range(number).unwrap_or_default();
+        let most_shown = match one {
+            "" => count(most),
+            one => counted(most, one),
+        };
         match least == most {
-            true => counted(most, one),
-            false => format!("{} to {}", count(least), counted(most, one)),
+            true => most_shown,
+            false => format!("{} to {most_shown}", count(least)),
         }
     };
     let judged = comparison.of_any("judged_queries").unwrap_or(0.0) as usize;
     format!(
-        "{}, {} each; {} timed, {} checked, {} judged against the oracle",
+        "{}, {} each; {} timed, {} checked, {} judged by the oracle",
         of(|cell| cell.times.processes, "process"),
         of(|cell| cell.times.rounds, "round"),
         of(|cell| cell.times.cameras_timed, "camera"),
-        of(|cell| cell.times.cameras_checked, "camera"),
-        counted(judged, "camera")
+        of(|cell| cell.times.cameras_checked, ""),
+        count(judged)
     )
 }
 

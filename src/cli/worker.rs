@@ -4,8 +4,10 @@
 
 use std::cell::RefCell;
 use std::io::{self, BufRead, Write};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use clap::Parser;
 use rand::{RngExt, SeedableRng};
@@ -16,11 +18,11 @@ use super::args::{Cli, Command};
 use super::protocol::{Job, Message, PROTOCOL, Request};
 use super::{advise, precision, run_plan};
 use crate::index::Registry;
-use crate::measure::{Part, Plan, ProcessTimes, TaskSamples, measure_scene};
+use crate::measure::{Part, Plan, ProcessTimes, TIMING, TaskSamples, measure_scene};
 
 /// Exit code of a worker whose parent is gone.
 const ORPHANED: i32 = 130;
-/// How often a worker that is timing says so.
+/// How often a worker that is timing says so, and what.
 const HEARTBEAT: Duration = Duration::from_secs(1);
 
 pub fn worker(registry: &Registry) -> anyhow::Result<Ending> {
@@ -44,6 +46,9 @@ fn answer(registry: &Registry, request: &Request) -> anyhow::Result<()> {
             request.protocol
         );
     }
+    let here = Here::default();
+    // Before the processor is chosen: it may wake up on another one.
+    here.at.clone().tell_of_turns();
     stay_on(request.cpu);
     let _held = vary_layout(request.layout);
     for (source, file) in &request.spooled {
@@ -52,7 +57,6 @@ fn answer(registry: &Registry, request: &Request) -> anyhow::Result<()> {
     let typed = ["cullbench".to_owned()]
         .into_iter()
         .chain(request.args.clone());
-    let here = Here::default();
     match (&request.job, Cli::try_parse_from(typed)?.command) {
         (Job::Scene { .. }, Command::Run(args)) => {
             here.scene(&run_plan::plan(registry, &args)?.plan, &request.job)?;
@@ -74,19 +78,54 @@ fn answer(registry: &Registry, request: &Request) -> anyhow::Result<()> {
     }
 }
 
-/// What is told to the parent, and whether it listens.
-struct Here {
-    failed: RefCell<Option<io::Error>>,
-    told: RefCell<(Instant, String)>,
+/// What the process is at. Turns of a timed pass are too short to be told one by
+/// one: a thread of its own tells every second whose turn it is, as long as turns
+/// come and go. Then silence means a turn that does not end, and the parent knows
+/// whose.
+#[derive(Default)]
+struct At {
+    turns: AtomicU64,
+    doing: Mutex<(Option<String>, String)>,
 }
 
-impl Default for Here {
-    fn default() -> Here {
-        Here {
-            failed: RefCell::new(None),
-            told: RefCell::new((Instant::now(), String::new())),
+impl At {
+    /// Whether this is something else than before.
+    fn set(&self, structure: Option<&str>, step: &str) -> bool {
+        let mut doing = self.doing.lock().unwrap_or_else(PoisonError::into_inner);
+        if doing.0.as_deref() == structure && doing.1 == step {
+            return false;
         }
+        *doing = (structure.map(str::to_owned), step.to_owned());
+        true
     }
+
+    fn message(&self) -> Message {
+        let doing = self.doing.lock().unwrap_or_else(PoisonError::into_inner);
+        let (structure, step) = doing.clone();
+        Message::Doing { structure, step }
+    }
+
+    fn tell_of_turns(self: Arc<Self>) {
+        thread::spawn(move || {
+            let mut told = 0;
+            loop {
+                thread::sleep(HEARTBEAT);
+                let turns = self.turns.load(Ordering::Relaxed);
+                // The main thread sees for itself that nobody listens.
+                if turns != told && send(&self.message()).is_err() {
+                    return;
+                }
+                told = turns;
+            }
+        });
+    }
+}
+
+/// What is told to the parent, and whether it listens.
+#[derive(Default)]
+struct Here {
+    failed: RefCell<Option<io::Error>>,
+    at: Arc<At>,
 }
 
 impl Here {
@@ -97,26 +136,14 @@ impl Here {
     }
 
     fn notice(&self, structure: Option<&str>, step: &str) {
-        let now = format!("{} {step}", structure.unwrap_or_default());
-        if self.told.borrow().1 == now {
-            return;
+        if self.at.set(structure, step) && step != TIMING {
+            self.tell(&self.at.message());
         }
-        *self.told.borrow_mut() = (Instant::now(), now);
-        self.tell(&Message::Doing {
-            structure: structure.map(str::to_owned),
-            step: step.to_owned(),
-        });
     }
 
-    /// Asked now and then while something is timed.
+    /// Asked before every turn of a timed pass, and now and then elsewhere.
     fn stop(&self) -> bool {
-        if self.told.borrow().0.elapsed() > HEARTBEAT {
-            self.told.borrow_mut().0 = Instant::now();
-            self.tell(&Message::Doing {
-                structure: None,
-                step: "timing".to_owned(),
-            });
-        }
+        self.at.turns.fetch_add(1, Ordering::Relaxed);
         // The parent is gone.
         self.failed.borrow().is_some()
     }
@@ -141,7 +168,7 @@ impl Here {
     }
 
     fn times(&self, time: TimeAll) -> anyhow::Result<()> {
-        self.notice(None, "timing");
+        self.notice(None, TIMING);
         if let Some(times) = time(&|| self.stop())? {
             self.tell(&Message::Times(times));
         }

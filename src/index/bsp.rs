@@ -77,6 +77,8 @@ impl Split {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum BspBuilder {
+    /// `import` where the scene brings a tree of its own, else `median`.
+    Auto,
     /// Axis-parallel planes by the surface area heuristic, 16 bins (Wald 2007,
     /// "On fast construction of SAH-based bounding volume hierarchies").
     Sah,
@@ -85,22 +87,22 @@ pub enum BspBuilder {
     /// The median across the direction of largest spread (principal axis of
     /// the centres): planes of any orientation.
     Oblique,
-    /// Auto-partition: of the planes that the scene's own boxes and diagonals
-    /// offer, the one that balances best for the fewest cut items.
-    Auto,
+    /// Auto-partition: of the planes that the items' faces and diagonals offer,
+    /// the one that balances best for the fewest cut items.
+    Faces,
     /// The map's own tree (a Doom WAD has one); what its branches leave
     /// together is divided by `sah`.
     Import,
 }
 
-/// Parameters: `bsp:builder=auto,leaf=32,cut=2`.
+/// Parameters: `bsp:builder=faces,leaf=32,cut=2`.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct BspParams {
     pub builder: BspBuilder,
     /// Most items of a leaf (1 to 4096).
     pub leaf: u32,
-    /// For `auto`: how many items of imbalance one cut item counts as (0 to
+    /// For `faces`: how many items of imbalance one cut item counts as (0 to
     /// 1000).
     pub cut: f32,
 }
@@ -108,15 +110,39 @@ pub struct BspParams {
 impl Default for BspParams {
     fn default() -> Self {
         BspParams {
-            builder: BspBuilder::Median,
+            builder: BspBuilder::Auto,
             leaf: 32,
             cut: 1.0,
         }
     }
 }
 
+impl BspParams {
+    /// The builder that is meant, with the tree that it goes by.
+    fn chosen<'a>(
+        &self,
+        own_tree: Option<&'a PlaneTree>,
+    ) -> Result<(BspBuilder, Option<&'a PlaneTree>), BuildError> {
+        Ok(match self.builder {
+            BspBuilder::Auto => match own_tree.filter(|own| own.root.is_some()) {
+                Some(own) => (BspBuilder::Import, Some(own)),
+                None => (BspBuilder::Median, None),
+            },
+            BspBuilder::Import if own_tree.is_none() => {
+                return Err(BuildError::Params {
+                    structure: Bsp::INFO.name,
+                    reason: "builder=import, but the scene has no tree of its own".to_owned(),
+                });
+            }
+            BspBuilder::Import => (BspBuilder::Import, own_tree),
+            builder => (builder, None),
+        })
+    }
+}
+
 struct PlaneSplitter<'a> {
-    params: BspParams,
+    builder: BspBuilder,
+    cut: f32,
     imported: Option<&'a PlaneTree>,
     splits: Vec<Split>,
     /// How many items come before the plane, for each division within a leaf of
@@ -161,11 +187,11 @@ impl Splitter for PlaneSplitter<'_> {
             });
             return;
         }
-        let chosen = match self.params.builder {
+        let chosen = match self.builder {
             BspBuilder::Sah | BspBuilder::Import => by_surface_area(records),
-            BspBuilder::Median => None,
+            BspBuilder::Auto | BspBuilder::Median => None,
             BspBuilder::Oblique => by_principal_axis(records),
-            BspBuilder::Auto => by_own_planes(records, self.params.cut),
+            BspBuilder::Faces => by_own_planes(records, self.cut),
         };
         let (normal, back) = match chosen.filter(|(_, back)| (1..records.len()).contains(back)) {
             Some(chosen) => chosen,
@@ -184,7 +210,7 @@ impl Splitter for PlaneSplitter<'_> {
 
     fn arrange(&mut self, records: &mut [Record]) {
         let large = records.len() > DESCENT_LEAF;
-        if self.params.builder != BspBuilder::Median
+        if self.builder != BspBuilder::Median
             || records.len() < 2
             || !(large || self.fine.is_some())
         {
@@ -267,19 +293,11 @@ impl RegionIndex for Bsp {
     ) -> Result<Self, BuildError> {
         check_range(Self::INFO.name, "leaf", params.leaf.into(), 1.0, 4096.0)?;
         check_range(Self::INFO.name, "cut", params.cut.into(), 0.0, 1000.0)?;
-        let imported = match (params.builder, own_tree) {
-            (BspBuilder::Import, None) => {
-                return Err(BuildError::Params {
-                    structure: Self::INFO.name,
-                    reason: "builder=import, but the scene has no tree of its own".to_owned(),
-                });
-            }
-            (BspBuilder::Import, own) => own,
-            _ => None,
-        };
+        let (builder, imported) = params.chosen(own_tree)?;
         let ids = indexable(items)?;
         let mut splitter = PlaneSplitter {
-            params: *params,
+            builder,
+            cut: params.cut,
             imported,
             splits: Vec::new(),
             parts: Vec::new(),
@@ -287,7 +305,7 @@ impl RegionIndex for Bsp {
         };
         let root = imported.and_then(|planes| planes.root);
         let tree = build_top_down(items, &ids, params.leaf as usize, root, &mut splitter);
-        if params.builder == BspBuilder::Median {
+        if builder == BspBuilder::Median {
             let (parts, fine) = (splitter.parts, splitter.fine);
             let tiling = fine.and_then(|fine| Tiling::over(&tree, &parts, &fine));
             let treelets = Treelets::over(&tree, parts);

@@ -8,17 +8,17 @@ use glam::Vec3;
 
 use super::{By, FrustumQuery, MemoryUsage, RegionIndex};
 use crate::geometry::{Aabb, ConvexVolume};
-use crate::kernel::{Isa, Kernel, Work};
-use crate::query::{
-    AnyView, ItemId, Located, ManySink, NoRecorder, QueryCost, Ranges, Recorder, View,
-};
+use crate::kernel::{BASELINE, Isa, Kernel, Work};
+use crate::query::{AnyView, ItemId, Located, ManySink, NoRecorder, QueryCost, Ranges, View};
 
 /// A built structure of any kind. Answers are appended to `out`.
 pub trait DynIndex: Send + Sync {
     fn memory(&self) -> MemoryUsage;
     /// What a view of any kind sees. The timed path: nothing is counted.
     fn see(&self, view: AnyView<'_>, out: &mut Vec<ItemId>);
-    /// The same query with its cost added up.
+    /// The same query with its cost added up, by the portable instruction set
+    /// whatever the kernel is: cost and answer are the same by all of them, and
+    /// what is timed is to be asked for its answer itself.
     fn see_counted(&self, view: AnyView<'_>, out: &mut Vec<ItemId>, cost: &mut QueryCost);
     /// What a convex volume sees: [`DynIndex::see`] with the usual view.
     fn visible(&self, volume: &ConvexVolume, out: &mut Vec<ItemId>) {
@@ -30,7 +30,8 @@ pub trait DynIndex: Send + Sync {
     }
     /// The timed path: nothing is counted.
     fn locate(&self, p: Vec3, out: &mut Vec<ItemId>);
-    /// The same search with its cost added up.
+    /// The same search with its cost added up, as [`DynIndex::see_counted`] does
+    /// it.
     fn locate_counted(&self, p: Vec3, out: &mut Vec<ItemId>, cost: &mut QueryCost);
     /// Searches for many points at once; `out` is cleared first. The timed
     /// path.
@@ -56,19 +57,20 @@ macro_rules! asked {
         }
 
         fn see(&$this, view: AnyView<'_>, out: &mut Vec<ItemId>) {
-            see($kernel, &$index, view, out, &mut NoRecorder);
+            see($kernel, &$index, view, out);
         }
 
         fn see_counted(&$this, view: AnyView<'_>, out: &mut Vec<ItemId>, cost: &mut QueryCost) {
-            see($kernel, &$index, view, out, cost);
+            see_counted(&$index, view, out, cost);
         }
 
         fn locate(&$this, p: Vec3, out: &mut Vec<ItemId>) {
-            locate($kernel, &$index, p, out, &mut NoRecorder);
+            locate($kernel, &$index, p, out);
         }
 
         fn locate_counted(&$this, p: Vec3, out: &mut Vec<ItemId>, cost: &mut QueryCost) {
-            locate($kernel, &$index, p, out, cost);
+            // A Vec never breaks off.
+            let _ = $index.locate_by(BASELINE, p, out, cost);
         }
 
         fn locate_many(&$this, points: &[Vec3], out: &mut Located) {
@@ -91,14 +93,13 @@ impl<T: FrustumQuery> DynIndex for By<T> {
 }
 
 /// A frustum query as a kernel does it.
-struct See<'a, T, V, R> {
+struct See<'a, T, V> {
     index: &'a T,
     view: &'a V,
     out: &'a mut Vec<ItemId>,
-    recorder: &'a mut R,
 }
 
-impl<T: FrustumQuery, V: View, R: Recorder> Work for See<'_, T, V, R> {
+impl<T: FrustumQuery, V: View> Work for See<'_, T, V> {
     type Output = ();
 
     #[inline(always)]
@@ -106,7 +107,7 @@ impl<T: FrustumQuery, V: View, R: Recorder> Work for See<'_, T, V, R> {
         // A Vec never breaks off.
         let _ = self
             .index
-            .visible_by(isa, self.view, self.out, self.recorder);
+            .visible_by(isa, self.view, self.out, &mut NoRecorder);
     }
 }
 
@@ -141,20 +142,19 @@ pub(super) fn see_ranges<T: FrustumQuery, V: View>(
 }
 
 /// A region search as a kernel does it.
-struct Locate<'a, T, R> {
+struct Locate<'a, T> {
     index: &'a T,
     p: Vec3,
     out: &'a mut Vec<ItemId>,
-    recorder: &'a mut R,
 }
 
-impl<T: RegionIndex, R: Recorder> Work for Locate<'_, T, R> {
+impl<T: RegionIndex> Work for Locate<'_, T> {
     type Output = ();
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) {
         // A Vec never breaks off.
-        let _ = self.index.locate_by(isa, self.p, self.out, self.recorder);
+        let _ = self.index.locate_by(isa, self.p, self.out, &mut NoRecorder);
     }
 }
 
@@ -175,46 +175,34 @@ impl<T: RegionIndex> Work for LocateMany<'_, T> {
     }
 }
 
-/// The one place that tells views and kernels apart: a traversal of its own
-/// for each.
-fn see<T: FrustumQuery, R: Recorder>(
-    kernel: Kernel,
-    index: &T,
-    view: AnyView<'_>,
-    out: &mut Vec<ItemId>,
-    recorder: &mut R,
-) {
-    macro_rules! ask {
-        ($view:expr) => {
-            kernel.run(See {
-                index,
-                view: $view,
-                out,
-                recorder,
-            })
-        };
-    }
+/// A traversal of its own for each view and kernel.
+fn see<T: FrustumQuery>(kernel: Kernel, index: &T, view: AnyView<'_>, out: &mut Vec<ItemId>) {
     match view {
-        AnyView::Volume(view) => ask!(view),
-        AnyView::Spheres(view) => ask!(view),
-        AnyView::Wide(view) => ask!(view),
-        AnyView::Relative(view) => ask!(view),
+        AnyView::Volume(view) => kernel.run(See { index, view, out }),
+        AnyView::Spheres(view) => kernel.run(See { index, view, out }),
+        AnyView::Wide(view) => kernel.run(See { index, view, out }),
+        AnyView::Relative(view) => kernel.run(See { index, view, out }),
     }
 }
 
-pub(super) fn locate<T: RegionIndex, R: Recorder>(
-    kernel: Kernel,
+/// A traversal of its own for each view.
+fn see_counted<T: FrustumQuery>(
     index: &T,
-    p: Vec3,
+    view: AnyView<'_>,
     out: &mut Vec<ItemId>,
-    recorder: &mut R,
+    cost: &mut QueryCost,
 ) {
-    kernel.run(Locate {
-        index,
-        p,
-        out,
-        recorder,
-    });
+    // A Vec never breaks off.
+    let _ = match view {
+        AnyView::Volume(view) => index.visible_by(BASELINE, view, out, cost),
+        AnyView::Spheres(view) => index.visible_by(BASELINE, view, out, cost),
+        AnyView::Wide(view) => index.visible_by(BASELINE, view, out, cost),
+        AnyView::Relative(view) => index.visible_by(BASELINE, view, out, cost),
+    };
+}
+
+pub(super) fn locate<T: RegionIndex>(kernel: Kernel, index: &T, p: Vec3, out: &mut Vec<ItemId>) {
+    kernel.run(Locate { index, p, out });
 }
 
 pub(super) fn locate_many<T: RegionIndex>(

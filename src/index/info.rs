@@ -24,6 +24,9 @@ pub struct Info {
     pub kind: Kind,
     pub origin: Origin<&'static str>,
     pub capabilities: Capabilities,
+    /// The form that lectures show, kept to be read beside the others: timed where
+    /// it is named, or all are, and no part of the list `default`.
+    pub textbook: bool,
 }
 
 /// How a structure goes about a query.
@@ -85,6 +88,7 @@ impl Info {
                 ranges: false,
                 threaded_build: false,
             },
+            textbook: false,
         }
     }
 
@@ -103,6 +107,12 @@ impl Info {
     /// Declares [`Capabilities::threaded_build`].
     pub const fn threaded_build(mut self) -> Info {
         self.capabilities.threaded_build = true;
+        self
+    }
+
+    /// Declares [`Info::textbook`].
+    pub const fn textbook(mut self) -> Info {
+        self.textbook = true;
         self
     }
 

@@ -172,25 +172,29 @@ pub fn by_principal_axis(records: &mut [Record]) -> Option<(Vec3, usize)> {
     Some(by_median(records, axis.as_vec3()))
 }
 
-/// Planes that `auto` looks at per node, and items it judges them by.
+/// Planes that `faces` looks at per node, and items it judges them by.
 const CANDIDATES: usize = 24;
 const JUDGES: usize = 128;
 
-/// Of the faces of some of the boxes, and of diagonals through their corners,
-/// the plane with the least imbalance plus cut items.
-pub fn by_own_planes(records: &mut [Record], cut: f32) -> Option<(Vec3, usize)> {
-    let step = records.len().div_ceil(CANDIDATES / 8).max(1);
-    let diagonals = [Vec3::new(1.0, 1.0, 0.0), Vec3::new(1.0, -1.0, 0.0)];
-    let candidates = records.iter().step_by(step).flat_map(|r| {
+/// The faces of so many of the boxes, and two diagonals through the centre of
+/// each: eight planes a box.
+pub fn planes_of(records: &[Record], boxes: usize) -> impl Iterator<Item = Plane> {
+    let step = records.len().div_ceil(boxes).max(1);
+    records.iter().step_by(step).flat_map(|r| {
+        let diagonals = [Vec3::new(1.0, 1.0, 0.0), Vec3::new(1.0, -1.0, 0.0)];
         let faces = AXES
             .into_iter()
             .flat_map(|n| [(n, r.bounds.min), (n, r.bounds.max)]);
-        let corners = diagonals.into_iter().map(|n| (n, r.bounds.centre()));
-        faces
-            .chain(corners)
-            .map(|(normal, at)| Plane::through(at, normal))
-            .collect::<Vec<_>>()
-    });
+        let diagonals = diagonals.into_iter().map(|n| (n, r.bounds.centre()));
+        let through = |(normal, at)| Plane::through(at, normal);
+        faces.chain(diagonals).map(through).collect::<Vec<_>>()
+    })
+}
+
+/// Of the [`planes_of`] some of the boxes,
+/// the plane with the least imbalance plus cut items.
+pub fn by_own_planes(records: &mut [Record], cut: f32) -> Option<(Vec3, usize)> {
+    let candidates = planes_of(records, CANDIDATES / 8);
     let judges = records.len().div_ceil(JUDGES).max(1);
     let mut best: Option<(f32, Plane)> = None;
     for plane in candidates {

@@ -18,7 +18,7 @@ pub struct Quadtree {
 }
 
 /// The two axes in which the bounds are widest, ascending.
-fn widest_axes(bounds: &Aabb) -> [usize; 2] {
+pub(super) fn widest_axes(bounds: &Aabb) -> [usize; 2] {
     let width = bounds.max * 0.5 - bounds.min * 0.5;
     let narrowest = (0..3).rev().min_by(|&a, &b| width[a].total_cmp(&width[b]));
     match narrowest {

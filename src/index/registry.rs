@@ -7,13 +7,18 @@ use serde_json::{Map, Value};
 #[cfg(feature = "peers")]
 use super::peers;
 use super::{
-    Bsp, BuildError, Bvh, By, DynIndex, Execution, FrustumQuery, Info, Linear, LinearScalar,
-    Octree, Quadtree, RegionIndex, Wide, caught,
+    Bsp, BspTextbook, BuildError, Bvh, BvhTextbook, By, DynIndex, Execution, FrustumQuery, Info,
+    Linear, LinearScalar, Octree, OctreeTextbook, Quadtree, QuadtreeTextbook, RegionIndex,
+    UniformGrid, Wide, caught,
 };
 use crate::geometry::{Aabb, PlaneTree};
 use crate::query::ItemId;
 use crate::spec::{Spec, SpecError};
 use crate::threads::Pool;
+
+/// The words of a list for all structures, and for all but the textbook forms.
+const ALL: &str = "all";
+const DEFAULT: &str = "default";
 
 type Build =
     fn(Execution, &[Aabb], Option<&PlaneTree>, &Value) -> Result<Box<dyn DynIndex>, BuildError>;
@@ -83,7 +88,7 @@ pub struct Registry {
 }
 
 /// The structures of the feature `peers`, for the hint that a build lacks it.
-const PEERS: [&str; 14] = [
+const PEERS: [&str; 13] = [
     "peer-obvhs",
     "peer-obvhs-tuned",
     "peer-obvhs-aabb",
@@ -96,7 +101,6 @@ const PEERS: [&str; 14] = [
     "peer-bvh-flat",
     "peer-bvh-arena",
     "peer-kiddo",
-    "uniform-grid",
     "peer-bevy-style",
 ];
 
@@ -116,7 +120,12 @@ impl Registry {
             .with::<Octree>()
             .with::<Quadtree>()
             .with::<Bvh>()
-            .with::<Wide>();
+            .with::<Wide>()
+            .with::<UniformGrid>()
+            .with::<BspTextbook>()
+            .with::<OctreeTextbook>()
+            .with::<QuadtreeTextbook>()
+            .with::<BvhTextbook>();
         #[cfg(feature = "peers")]
         let own = own
             .with::<peers::PeerObvhs>()
@@ -131,7 +140,6 @@ impl Registry {
             .with::<peers::PeerBvhFlat>()
             .with::<peers::PeerBvhArena>()
             .with::<peers::PeerKiddo>()
-            .with::<peers::PeerUniformGrid>()
             .with::<peers::PeerBevyStyle>();
         own
     }
@@ -155,9 +163,9 @@ impl Registry {
         assert!(
             name.starts_with(|c: char| c.is_ascii_alphanumeric())
                 && name.chars().all(is_plain)
-                && name != "all",
+                && ![ALL, DEFAULT].contains(&name),
             "structure '{name}' cannot be typed; expected a name of letters, digits, '-', '_' \
-             and '.' other than 'all'"
+             and '.' other than '{ALL}' and '{DEFAULT}'"
         );
         assert!(
             self.named(name).is_none(),
@@ -218,7 +226,14 @@ impl Registry {
         })
     }
 
-    /// The structures of a comma-separated list, or of `all`.
+    /// Those with their default parameters whose declaration is meant.
+    fn specs(&self, is_meant: fn(&Info) -> bool) -> Result<Vec<StructureSpec>, SpecError> {
+        let meant = self.rows.iter().filter(|row| is_meant(&row.info));
+        meant.map(|row| self.structure(row.info.name)).collect()
+    }
+
+    /// The structures of a comma-separated list, in which `all` are all of them and
+    /// `default` those that are no textbook form ([`Info::textbook`]).
     ///
     /// # Errors
     /// As [`Registry::structure`]; an empty list, a structure named twice.
@@ -226,11 +241,8 @@ impl Registry {
         let mut chosen: Vec<StructureSpec> = Vec::new();
         for text in Spec::split_list(list) {
             let more = match text.as_str() {
-                "all" => self
-                    .rows
-                    .iter()
-                    .map(|row| self.structure(row.info.name))
-                    .collect::<Result<_, _>>()?,
+                ALL => self.specs(|_| true)?,
+                DEFAULT => self.specs(|info| !info.textbook)?,
                 _ => vec![self.structure(&text)?],
             };
             for spec in more {
@@ -245,7 +257,7 @@ impl Registry {
         }
         if chosen.is_empty() {
             return Err(SpecError::new(
-                "no structure is named; expected 'all' or a list such as linear,bvh",
+                "no structure is named; expected 'all', 'default' or a list such as linear,bvh",
             ));
         }
         Ok(chosen)
@@ -341,6 +353,9 @@ mod tests {
         let registry = Registry::builtin();
         let all = registry.structures("all").unwrap();
         assert_eq!(all.len(), registry.rows().len());
+        let named = registry.structures("default,octree-textbook").unwrap();
+        assert_eq!(named.iter().filter(|s| s.info().textbook).count(), 1);
+        assert_eq!(named.len(), all.len() - 3);
         let two = registry
             .structures("bvh:leaf=4,preset=medium,linear")
             .unwrap();
@@ -399,7 +414,7 @@ mod tests {
 
     #[test]
     fn names_that_cannot_be_typed_are_refused() {
-        for name in ["", "all", "a:b", "a,b", "a b", "a=b", "-a"] {
+        for name in ["", "all", "default", "a:b", "a,b", "a b", "a=b", "-a"] {
             let row = Row {
                 info: Wide::INFO.named(name),
                 ..Row::of::<Wide>()
@@ -412,7 +427,7 @@ mod tests {
     /// The hint names exactly what the feature brings.
     #[test]
     fn the_names_of_the_peers_are_those_of_their_rows() {
-        let own = 7;
+        let own = 12;
         let peers: Vec<_> = Registry::builtin().rows()[own..]
             .iter()
             .map(|row| row.info.name)

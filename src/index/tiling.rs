@@ -443,7 +443,7 @@ mod tests {
             locate_many(kernel, bsp, &points, &mut many);
             for (&p, found) in points.iter().zip(many.iter()) {
                 alone.clear();
-                locate(kernel, bsp, p, &mut alone, &mut NoRecorder);
+                locate(kernel, bsp, p, &mut alone);
                 assert_eq!(found, alone, "{p} {kernel}");
                 alone.sort();
                 let holding = items.iter().zip(0..).filter(|(b, _)| b.contains_point(p));

@@ -20,7 +20,8 @@ use crate::input::InputError;
 use crate::path::{self, LensDefaults, PathError};
 use crate::scene::{self, LoadOptions, Scene};
 
-/// Updates are measured in every so many-th process: they cost several builds.
+/// Updates and what many of them do to queries are measured in every so many-th
+/// process: they cost many builds.
 const UPDATES_EVERY: u32 = 4;
 
 /// How much is measured.
@@ -142,6 +143,10 @@ impl Plan {
         self.effort.beside == Beside::All
     }
 
+    fn has_updates(&self, share: &Share) -> bool {
+        share.process.is_multiple_of(UPDATES_EVERY) && self.has_all() && !share.plan_only
+    }
+
     /// Share `i` of `n` (from 1): every n-th pair of scene and path, with all
     /// structures, cache states and tests of it together.
     pub fn shard(mut self, i: usize, n: usize) -> Plan {
@@ -183,8 +188,7 @@ impl Plan {
                 }
                 notice(Some(&spec.label), "building");
                 let built = Contender::build(spec.clone(), is_twin, scene, test);
-                let updates = share.process.is_multiple_of(UPDATES_EVERY) && self.has_all();
-                match updates && !is_twin {
+                match self.has_updates(share) && !is_twin {
                     true => built.with_updates(scene, test),
                     false => built,
                 }
@@ -299,7 +303,7 @@ pub fn measure_scene(
             return Ok(false);
         };
         // Once for each scene; a comparison of programs looks at queries alone.
-        if first && plan.has_all() && !share.plan_only {
+        if first && plan.has_updates(share) {
             for subject in &mut part.subjects {
                 let spec = plan.structures.iter().find(|s| s.label == subject.label);
                 if let Some(spec) = spec.filter(|_| subject.verdict.status == Status::Ok) {
@@ -309,6 +313,7 @@ pub fn measure_scene(
             }
         }
         first = false;
+        part.failed.clone_from(&share.failed);
         keep(part, samples);
     }
     Ok(true)

@@ -5,6 +5,7 @@
 use std::collections::BTreeMap;
 
 use super::bounds::{Bound, Material};
+use super::contender::TWIN;
 use super::count::{Counted, count_pass, judge};
 use super::part::{GroupKey, Known, NamedSchedule, Part, SubjectPart, TaskPart, TaskSamples};
 use super::{
@@ -20,6 +21,9 @@ pub(super) const LEAST_TAIL: usize = 20;
 
 /// Time of a task of region search / time of a frustum query's.
 const LOCATE_SHARE: f64 = 1.0 / 3.0;
+
+/// The step that is told at every turn of a timed pass.
+pub const TIMING: &str = "timing";
 
 /// Who is told what the process is about to do: the structure (none for the
 /// harness's own work) and the step.
@@ -80,6 +84,7 @@ pub fn measure_part(
         known: None,
         judged,
         subjects: Vec::new(),
+        failed: BTreeMap::new(),
         bounds: Vec::new(),
         tasks: Vec::new(),
     };
@@ -115,10 +120,15 @@ pub fn measure_part(
             ..plan.protocol
         };
         let schedule = entered.schedule(given, workload.views.len(), &protocol);
-        notice(None, "timing");
+        let labels = entered.names.iter().map(|(label, _)| label);
+        let structures: Vec<_> = labels.map(|l| structure_of(l, &part.bounds)).collect();
+        let turn = |task: usize| {
+            notice(structures[task], TIMING);
+            stop()
+        };
         let timed = match plan.plan_only {
             true => Vec::new(),
-            false => timed(&entered.tasks, &schedule, &plan.protocol, stop)?,
+            false => timed(&entered.tasks, &schedule, &plan.protocol, &turn)?,
         };
         let largest = schedule.tasks.iter().map(|t| t.batch).max().unwrap_or(1) as usize;
         for ((label, task), result) in entered.names.iter().zip(timed) {
@@ -158,6 +168,12 @@ pub fn measure_part(
     }
     part.subjects = entries.iter().map(|e| e.part(workload)).collect();
     Some((part, samples))
+}
+
+/// The structure whose task this is: a twin's original, no bound's.
+fn structure_of<'l>(label: &'l str, bounds: &[String]) -> Option<&'l str> {
+    let is_bound = bounds.iter().any(|bound| bound == label);
+    (!is_bound).then(|| label.strip_suffix(TWIN).unwrap_or(label))
 }
 
 /// Tasks of one timed pass with their names.

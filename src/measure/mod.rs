@@ -39,7 +39,7 @@ pub use environment::{Machine, Source, Toolchain};
 pub use experiment::{
     Beside, Effort, ExperimentError, Plan, PlannedScene, Question, Share, measure_scene,
 };
-pub use group::{GroupPlan, Notice, measure_part};
+pub use group::{GroupPlan, Notice, TIMING, measure_part};
 pub use metrics::{METRICS, Metric, MetricInfo};
 pub use over_processes::{OverProcesses, ProcessTimes};
 pub use part::{CellKey, GroupKey, Known, NamedSchedule, Part, SubjectPart, TaskPart, TaskSamples};

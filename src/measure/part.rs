@@ -121,6 +121,10 @@ pub struct Part {
     /// How the answers differ from the exact truth; the first process only.
     pub judged: Option<Judged>,
     pub subjects: Vec<SubjectPart>,
+    /// Structures that had ended a process on this scene before: they are not
+    /// tried again, by a run that is resumed neither.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub failed: BTreeMap<String, Verdict>,
     /// Names of the lower bounds among the tasks.
     pub bounds: Vec<String>,
     pub tasks: Vec<TaskPart>,

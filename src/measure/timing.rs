@@ -85,12 +85,14 @@ pub fn timed_rounds(
         tasks,
         &Schedule::new(count, tasks, protocol),
         protocol,
-        stop,
+        &|_| stop(),
     )
 }
 
-/// Times the tasks as the schedule has it. `stop` ends the pass early (its
-/// samples are then worthless and the result is `None`).
+/// Times the tasks as the schedule has it. `turn` is told before each turn of a
+/// task which one it is
+/// and ends the pass early if it says so: its samples are then worthless and the
+/// result is `None`.
 ///
 /// A sample whose number of ids differs from what was expected makes its task
 /// `wrong`; a panic on the way is the result of its task alone.
@@ -101,7 +103,7 @@ pub fn timed(
     tasks: &[Competitor],
     schedule: &Schedule,
     protocol: &Protocol,
-    stop: &dyn Fn() -> bool,
+    turn: &dyn Fn(usize) -> bool,
 ) -> Option<Vec<Result<Timed, Verdict>>> {
     assert_eq!(tasks.len(), schedule.tasks.len(), "a plan for each task");
     let mut pass = Pass {
@@ -120,13 +122,13 @@ pub fn timed(
         let batch = |task: usize| schedule.tasks[task].batch as usize;
         if let Some(cold) = &mut cold {
             for first in 0..schedule.cameras.len() {
-                if stop() {
-                    return None;
-                }
                 cold.sweep.over_caches();
                 // Whoever is first after the sweep finds the view cold as well:
                 // a new order for each camera.
                 for task in orders.next().into_iter().filter(|&task| takes_part(task)) {
+                    if turn(task) {
+                        return None;
+                    }
                     let out = &mut cold.outs[task];
                     // Points that are asked at once come once a round.
                     if first % batch(task) == 0 {
@@ -136,7 +138,7 @@ pub fn timed(
             }
         } else {
             for task in orders.next().into_iter().filter(|&task| takes_part(task)) {
-                if stop() {
+                if turn(task) {
                     return None;
                 }
                 pass.guarded(task, |pass| {
@@ -281,7 +283,7 @@ mod tests {
         let mut schedule = Schedule::new(40, &all, &protocol());
         schedule.rounds = 6;
         schedule.tasks[1].every = 3;
-        let found = timed(&all, &schedule, &protocol(), &|| false).unwrap();
+        let found = timed(&all, &schedule, &protocol(), &|_| false).unwrap();
         let rounds = |i: usize| found[i].as_ref().unwrap().rounds;
         assert_eq!((rounds(0), rounds(1)), (6, 2));
     }

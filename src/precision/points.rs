@@ -368,7 +368,7 @@ pub fn time(
     let competitors: Vec<Competitor> = planned
         .map(|(&point, expected)| ways[point].competitor(expected.clone()))
         .collect();
-    let timed = timed(&competitors, &plan.schedule, input.protocol, stop);
+    let timed = timed(&competitors, &plan.schedule, input.protocol, &|_| stop());
     Ok(timed.map(|timed| {
         let by_camera = timed.iter().map(|timed| match timed {
             Ok(timed) => by_camera(timed, cameras.len()),

@@ -303,7 +303,7 @@ fn points_that_are_none_are_refused() {
 #[test]
 fn structures_of_another_build_are_refused_with_the_feature_they_need() {
     let folder = with_good_files(&[]);
-    for name in ["peer-rstar", "uniform-grid", "peer-bevy-style"] {
+    for name in ["peer-rstar", "peer-obvhs", "peer-bevy-style"] {
         let commands = [
             format!("query --scene scene.csv --cameras cameras.csv --structure {name}"),
             format!("run --scene scene.csv --structure linear,{name} --out new/run"),

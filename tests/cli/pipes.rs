@@ -70,7 +70,7 @@ fn a_reader_who_leaves_early_is_no_error() {
     }
     // The figures are on disk, whether or not somebody reads the table.
     let report = check_run(&folder.path().join("run"));
-    assert_eq!(cells(&report).len(), 2 * structure_names().len());
+    assert_eq!(cells(&report).len(), 2 * timed_names().len());
     assert!(report["run"]["finished_at"].is_string());
     // `| head -1`, with far more to come than a pipe holds.
     for (line, first) in [

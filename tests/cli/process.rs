@@ -140,10 +140,20 @@ pub fn set(names: &str) -> BTreeSet<&str> {
 
 /// The names of all structures, as the program lists them.
 pub fn structure_names() -> Vec<String> {
+    names_of_structures(|_| true)
+}
+
+/// Those that a run of the quick suite takes by itself.
+pub fn timed_names() -> Vec<String> {
+    names_of_structures(|row| row["timed"] == "by default")
+}
+
+fn names_of_structures(is_meant: fn(&Value) -> bool) -> Vec<String> {
     let list = works(Path::new("."), "list structures --format json");
     let list = json(&list);
     let rows = list.as_array().expect("an array").iter();
     let names: Vec<String> = rows
+        .filter(|row| is_meant(row))
         .map(|row| row["name"].as_str().expect("a name").to_owned())
         .collect();
     let scan = "linear".to_owned();

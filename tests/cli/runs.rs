@@ -1,7 +1,7 @@
 //! `run`: the files of a run against the contract, runs that must not be
 //! written over, and what may and may not be resumed.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
@@ -117,7 +117,7 @@ pub fn check_run(run: &Path) -> Value {
     });
     assert_eq!(referred as usize + rest.count(), samples.len());
     check_bounds(&report);
-    let names: Vec<String> = structure_names();
+    let names: Vec<String> = timed_names();
     for (path, found) in structures {
         assert_eq!(found, names, "{path:?}");
     }
@@ -170,7 +170,7 @@ fn a_run_leaves_a_complete_report_and_is_not_written_over() {
         table.contains("uniform:n=200: 200 items") && table.contains("report.json"),
         "{table}"
     );
-    assert_eq!(cells(&report).len(), structure_names().len());
+    assert_eq!(cells(&report).len(), timed_names().len());
     assert_eq!(
         (&report["run"]["suite"], &report["run"]["seed"]),
         (&Value::Null, &1.into())
@@ -232,7 +232,7 @@ fn cold_runs_measure_both_states_and_every_answer() {
         let of_state = cells(&report)
             .iter()
             .filter(|c| c["path"]["cache"] == cache);
-        assert_eq!(of_state.count(), structure_names().len());
+        assert_eq!(of_state.count(), timed_names().len());
     }
 }
 
@@ -323,20 +323,15 @@ fn what_storage_returns_too_much_is_told_only_where_there_is_any() {
         (table, works(folder.path(), &format!("report {out}")))
     };
     let (table, text) = run("far.csv", "beside.csv", "one");
-    assert!(
-        table.contains(" false positives   by storage/planes/test "),
-        "{table}"
-    );
-    assert!(
-        table.contains(" 200.000 % ") && table.contains(" 2/0/0 "),
-        "{table}"
-    );
+    let wanted = ", 200.000 % false positives (2/0/0 by storage/planes/test)\n";
+    assert!(table.contains(wanted), "{table}");
     let wanted =
         "False positives: 200.000 % of the visible items; 2/0/0 items by storage/planes/test.\n";
     assert!(text.contains(wanted), "{text}");
     // Nothing is visible, and something is returned.
     let (table, text) = run("far.csv", "away.csv", "two");
-    assert!(table.contains(" 3/0/0 "), "{table}");
+    let wanted = ", false positives 3/0/0 by storage/planes/test\n";
+    assert!(table.contains(wanted), "{table}");
     let wanted = "False positives: 3/0/0 items by storage/planes/test; nothing is visible.\n";
     assert!(text.contains(wanted), "{text}");
     let (table, text) = run("near.csv", "before.csv", "three");
@@ -345,4 +340,26 @@ fn what_storage_returns_too_much_is_told_only_where_there_is_any() {
         text.contains("False positives: 0.000 % of the visible items.\n"),
         "{text}"
     );
+}
+
+#[test]
+fn textbook_forms_are_timed_where_they_are_named_and_by_the_larger_suites() {
+    let planned = |options: &str| -> BTreeSet<String> {
+        let plan = works(Path::new("."), &format!("run --plan {options}"));
+        let of_line = |line: &str| json(line)["structure"].as_str().expect("a name").to_owned();
+        plan.lines().map(of_line).collect()
+    };
+    let all: BTreeSet<String> = structure_names().into_iter().collect();
+    let timed: BTreeSet<String> = timed_names().into_iter().collect();
+    let name = "octree-textbook";
+    assert!(!timed.contains(name) && timed.contains("uniform-grid"));
+    for options in ["", "--scene uniform:n=9", "--suite growth"] {
+        assert_eq!(planned(options), timed, "{options}");
+    }
+    for options in ["--suite standard", "--suite full", "--structure all"] {
+        assert_eq!(planned(options), all, "{options}");
+    }
+    let mut named = timed;
+    named.insert(name.to_owned());
+    assert_eq!(planned(&format!("--structure default,{name}")), named);
 }

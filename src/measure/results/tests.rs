@@ -84,6 +84,7 @@ fn parts(times: &[Times]) -> Vec<Part> {
             .iter()
             .map(|label| subject(label, if *label == YARDSTICK { 1.0 } else { 2.0 }))
             .collect(),
+        failed: BTreeMap::new(),
         bounds: Vec::new(),
         tasks: times
             .iter()

@@ -6,13 +6,13 @@
 use std::ops::{ControlFlow, Range};
 
 use glam::{UVec3, Vec3};
+use serde::{Deserialize, Serialize};
 
-use super::{
-    BoxTest, Item, PeerParams, Tally, half_of_largest, indexable, located_box_by_box,
-    seen_box_by_box,
+use super::box_by_box::{
+    BoxTest, Item, Tally, half_of_largest, indexable, located_box_by_box, seen_box_by_box,
 };
+use super::{BuildError, Info, Kind, MemoryUsage, Origin, RegionIndex};
 use crate::geometry::{Aabb, PlaneTree};
-use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin, RegionIndex};
 use crate::query::{ItemId, Recorder, Sink};
 
 /// Items of a cell, on average.
@@ -20,8 +20,14 @@ const ITEMS_A_CELL: f64 = 8.0;
 /// Most cells along an axis.
 const MOST_CELLS: f64 = 1024.0;
 
-/// Cells in rows along x, items in the order of their cells.
-pub struct PeerUniformGrid {
+/// The grid chooses its cells by itself.
+#[derive(Clone, Copy, Default, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GridParams {}
+
+/// A uniform grid (Bentley and Friedman 1979, "Data structures for range
+/// searching"): cells in rows along x, items in the order of their cells.
+pub struct UniformGrid {
     /// Bounds of the centres: what the cells divide.
     centres: Aabb,
     counts: UVec3,
@@ -64,7 +70,7 @@ fn cells_for(extent: Vec3, items: usize) -> UVec3 {
     UVec3::from_array(count)
 }
 
-impl PeerUniformGrid {
+impl UniformGrid {
     /// The cell of a centre on an axis. Monotone: a larger coordinate never
     /// lies in a lower cell.
     #[inline(always)]
@@ -155,16 +161,16 @@ impl PeerUniformGrid {
     }
 }
 
-impl RegionIndex for PeerUniformGrid {
+impl RegionIndex for UniformGrid {
     const INFO: Info = Info::new(
         "uniform-grid",
-        "a uniform grid of our own: items in the cell of their centre, exact cell bounds",
+        "uniform grid: items in the cell of their centre, exact cell bounds",
         Kind::Grid,
         Origin::Ours,
     );
-    type Params = PeerParams;
+    type Params = GridParams;
 
-    fn build(items: &[Aabb], _: Option<&PlaneTree>, _: &PeerParams) -> Result<Self, BuildError> {
+    fn build(items: &[Aabb], _: Option<&PlaneTree>, _: &GridParams) -> Result<Self, BuildError> {
         let items: Vec<Item> = indexable(items)?;
         let points = items.iter().map(|item| item.bounds.centre());
         let centres = points.fold(Aabb::EMPTY, |all, c| all.union(&Aabb::new(c, c)));
@@ -173,7 +179,7 @@ impl RegionIndex for PeerUniformGrid {
             false => cells_for(centres.extent(), items.len()),
         };
         let cells = counts.as_usizevec3().element_product();
-        let mut grid = PeerUniformGrid {
+        let mut grid = UniformGrid {
             centres,
             counts,
             bounds: vec![Aabb::EMPTY; cells],
@@ -213,4 +219,4 @@ impl RegionIndex for PeerUniformGrid {
     located_box_by_box!();
 }
 
-seen_box_by_box!(PeerUniformGrid);
+seen_box_by_box!(UniformGrid);

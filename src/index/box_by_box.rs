@@ -1,0 +1,251 @@
+//! One box at a time: the test that the uniform grid and the structures of other
+//! crates get, made once per query, and what they share beside it. Those that
+//! go by planes and memos have [`Region`].
+
+use std::cell::RefCell;
+
+use glam::Vec3;
+
+use super::{BuildError, centres};
+use crate::geometry::{Aabb, PlaneRows};
+use crate::query::{ItemId, NoRecorder, Recorder, Region, View};
+
+/// A question, asked of one box at a time. Boxes are finite and not empty.
+pub trait BoxTest {
+    /// Whether `admits` is `!rejects`.
+    #[cfg_attr(not(feature = "peers"), expect(dead_code))]
+    const NODES_AS_ITEMS: bool;
+    /// No item within this box belongs to the answer.
+    fn rejects(&self, node: &Aabb) -> bool;
+    /// Every item within this box belongs to the answer.
+    fn accepts(&self, node: &Aabb) -> bool;
+    /// This item belongs to the answer.
+    fn admits(&self, item: &Aabb) -> bool;
+    /// Where the centre of an item of the answer can be, if no item is larger
+    /// than `half` either way from its centre and all lie in `scene`.
+    fn centres(&self, half: Vec3, scene: &Aabb) -> Aabb;
+    /// How many planes a test looks at.
+    fn planes(&self) -> u32 {
+        0
+    }
+}
+
+/// A view with THE plane test in f32 and at most eight planes, all of them at
+/// once. Nodes and items are tested alike.
+pub struct AtOnce(pub PlaneRows);
+
+impl BoxTest for AtOnce {
+    const NODES_AS_ITEMS: bool = true;
+
+    #[inline(always)]
+    fn rejects(&self, node: &Aabb) -> bool {
+        self.0.exclude(node)
+    }
+    #[inline(always)]
+    fn accepts(&self, node: &Aabb) -> bool {
+        self.0.contain(node)
+    }
+    #[inline(always)]
+    fn admits(&self, item: &Aabb) -> bool {
+        !self.0.exclude(item)
+    }
+    fn centres(&self, half: Vec3, scene: &Aabb) -> Aabb {
+        centres::of_planes(&self.0, half, scene)
+    }
+    #[inline(always)]
+    fn planes(&self) -> u32 {
+        self.0.count()
+    }
+}
+
+/// Any other view, plane by plane: right, and not meant to be fast. Behind a
+/// pointer, so that a walk is compiled for it once and not once a view.
+pub struct PlaneByPlane<'a>(pub &'a dyn Planes);
+
+/// A view without its type.
+pub trait Planes {
+    fn exclude(&self, node: &Aabb) -> bool;
+    fn contain(&self, node: &Aabb) -> bool;
+    fn keep(&self, item: &Aabb) -> bool;
+    fn count(&self) -> u32;
+}
+
+impl<V: View> Planes for V {
+    fn exclude(&self, node: &Aabb) -> bool {
+        let mut mask = self.mask();
+        while mask != 0 {
+            if self.excludes(mask.trailing_zeros(), node) {
+                return true;
+            }
+            mask &= mask - 1;
+        }
+        false
+    }
+    fn contain(&self, node: &Aabb) -> bool {
+        let mut mask = self.mask();
+        while mask != 0 {
+            if !self.contains(mask.trailing_zeros(), node) {
+                return false;
+            }
+            mask &= mask - 1;
+        }
+        true
+    }
+    fn keep(&self, item: &Aabb) -> bool {
+        self.admits(item, self.mask(), &mut NoRecorder)
+    }
+    fn count(&self) -> u32 {
+        self.mask().count_ones()
+    }
+}
+
+impl BoxTest for PlaneByPlane<'_> {
+    const NODES_AS_ITEMS: bool = false;
+
+    fn rejects(&self, node: &Aabb) -> bool {
+        self.0.exclude(node)
+    }
+    fn accepts(&self, node: &Aabb) -> bool {
+        self.0.contain(node)
+    }
+    fn admits(&self, item: &Aabb) -> bool {
+        self.0.keep(item)
+    }
+    fn centres(&self, _: Vec3, scene: &Aabb) -> Aabb {
+        *scene
+    }
+    fn planes(&self) -> u32 {
+        self.0.count()
+    }
+}
+
+/// Region search: the boxes that hold a point.
+pub struct Holding(pub Vec3);
+
+impl BoxTest for Holding {
+    const NODES_AS_ITEMS: bool = true;
+
+    #[inline(always)]
+    fn rejects(&self, node: &Aabb) -> bool {
+        !node.contains_point(self.0)
+    }
+    #[inline(always)]
+    fn accepts(&self, _: &Aabb) -> bool {
+        false
+    }
+    #[inline(always)]
+    fn admits(&self, item: &Aabb) -> bool {
+        item.contains_point(self.0)
+    }
+    fn centres(&self, half: Vec3, scene: &Aabb) -> Aabb {
+        centres::of_point(self.0, half, scene)
+    }
+}
+
+/// A recorder that several closures of a foreign call can reach. The counts of
+/// a recorder without a state are dropped, and nothing is borrowed.
+pub struct Tally<'a, R>(RefCell<&'a mut R>);
+
+impl<'a, R: Recorder> Tally<'a, R> {
+    #[inline(always)]
+    pub fn new(recorder: &'a mut R) -> Self {
+        Tally(RefCell::new(recorder))
+    }
+
+    #[inline(always)]
+    pub fn count(&self, note: impl FnOnce(&mut R)) {
+        if size_of::<R>() != 0 {
+            note(&mut self.0.borrow_mut());
+        }
+    }
+
+    #[inline(always)]
+    pub fn node(&self, test: &impl BoxTest) {
+        self.count(|recorder| {
+            recorder.node_tested();
+            recorder.planes_tested(test.planes());
+        });
+    }
+
+    #[inline(always)]
+    pub fn item(&self, test: &impl BoxTest) {
+        self.count(|recorder| {
+            recorder.items_tested(1);
+            recorder.planes_tested(test.planes());
+        });
+    }
+}
+
+/// An item as these structures keep it: exact bounds and its id. 28 bytes.
+#[derive(Clone, Copy, Debug)]
+pub struct Item {
+    pub bounds: Aabb,
+    pub id: ItemId,
+}
+
+/// The items that a structure has to hold, with their bounds.
+///
+/// # Errors
+/// As [`super::indexable`].
+pub fn indexable(items: &[Aabb]) -> Result<Vec<Item>, BuildError> {
+    let ids = super::indexable(items)?;
+    let item = |id: ItemId| Item {
+        bounds: items[id as usize],
+        id,
+    };
+    Ok(ids.into_iter().map(item).collect())
+}
+
+/// Half the size of the largest item, axis by axis.
+pub fn half_of_largest(items: &[Item]) -> Vec3 {
+    let halves = items.iter().map(|item| item.bounds.extent() * 0.5);
+    halves.fold(Vec3::ZERO, Vec3::max)
+}
+
+/// [`crate::index::FrustumQuery`] of a structure with a method `search` (a
+/// [`BoxTest`], a sink, a recorder).
+macro_rules! seen_box_by_box {
+    ($structure:ty) => {
+        impl $crate::index::FrustumQuery for $structure {
+            #[inline(always)]
+            fn visible<
+                V: $crate::query::View,
+                S: $crate::query::Sink,
+                R: $crate::query::Recorder,
+            >(
+                &self,
+                view: &V,
+                sink: &mut S,
+                recorder: &mut R,
+            ) -> std::ops::ControlFlow<()> {
+                match view.rows() {
+                    Some(rows) => {
+                        self.search(&$crate::index::box_by_box::AtOnce(rows), sink, recorder)
+                    }
+                    None => self.search(
+                        &$crate::index::box_by_box::PlaneByPlane(view),
+                        sink,
+                        recorder,
+                    ),
+                }
+            }
+        }
+    };
+}
+pub(super) use seen_box_by_box;
+
+/// Region search of such a structure.
+macro_rules! located_box_by_box {
+    () => {
+        #[inline(always)]
+        fn locate<S: $crate::query::Sink, R: $crate::query::Recorder>(
+            &self,
+            p: glam::Vec3,
+            sink: &mut S,
+            recorder: &mut R,
+        ) -> std::ops::ControlFlow<()> {
+            self.search(&$crate::index::box_by_box::Holding(p), sink, recorder)
+        }
+    };
+}
+pub(super) use located_box_by_box;

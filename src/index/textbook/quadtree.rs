@@ -1,0 +1,58 @@
+//! The textbook quadtree: a square cut in the middle of the two axes in which the
+//! scene is widest, every item at the smallest cell that wholly holds it. The
+//! cells are columns through the whole scene.
+
+use super::octree::{Cell, root_cell};
+use super::{TextbookParams, located_by_walk, memory_of, records, seen_by_walk};
+use crate::geometry::{Aabb, PlaneTree};
+use crate::index::quadtree::widest_axes;
+use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin, RegionIndex};
+
+/// A quadtree (Finkel and Bentley 1974, "Quad trees: a data structure for
+/// retrieval on composite keys") as the lecture on visibility means it (slides
+/// "Visibility", "Region search"), over boxes: as in
+/// [`OctreeTextbook`](super::OctreeTextbook) an item lies with the smallest cell
+/// that holds it. O(log n + answers) per query where the scene is flat and items
+/// are small against their cells; nothing is culled by height.
+pub struct QuadtreeTextbook {
+    root: Option<Box<Cell<4>>>,
+}
+
+impl QuadtreeTextbook {
+    fn root(&self) -> Option<&Cell<4>> {
+        self.root.as_deref()
+    }
+}
+
+impl RegionIndex for QuadtreeTextbook {
+    const INFO: Info = Info::new(
+        "quadtree-textbook",
+        "lecture form: items at the smallest column that holds them",
+        Kind::Tree,
+        Origin::Ours,
+    )
+    .textbook();
+    type Params = TextbookParams;
+
+    fn build(
+        items: &[Aabb],
+        _: Option<&PlaneTree>,
+        params: &TextbookParams,
+    ) -> Result<Self, BuildError> {
+        params.check(Self::INFO.name)?;
+        let records = records(items)?;
+        let scene = Aabb::union_of(items);
+        let axes = widest_axes(&scene);
+        let cell = root_cell(&scene, &axes);
+        let root = (!records.is_empty()).then(|| Cell::divided(cell, &axes, records, params, 0));
+        Ok(QuadtreeTextbook { root })
+    }
+
+    fn memory(&self) -> MemoryUsage {
+        memory_of(self.root(), size_of::<Cell<4>>())
+    }
+
+    located_by_walk!();
+}
+
+seen_by_walk!(QuadtreeTextbook);
