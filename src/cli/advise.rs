@@ -12,7 +12,7 @@ use super::processes::{Said, Workers};
 use super::protocol::{Job, Timing};
 use super::run::progress;
 use super::run_resume::typed_args;
-use super::{Ending, interrupt, load_scene, text, unread_is_fine};
+use super::{Ending, interrupt, load_scene, print_json, text, unread_is_fine};
 use crate::advise::{
     self, Advice, AdviseInput, AdviseOptions, Check, Decision, LeftOutIf, Omission,
     StructureChoice, TestChoice, TrialPlan,
@@ -93,7 +93,7 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> 
     bar.finish_and_clear();
     let advice = prepared.conclude(&times);
     unread_is_fine(match args.format {
-        TableFormat::Json => show_json(&advice),
+        TableFormat::Json => print_json(&advice),
         TableFormat::Table => show(&advice),
     })?;
     Ok(match advice.found_wrong_answers() {
@@ -156,12 +156,6 @@ fn options(args: &AdviseArgs) -> AdviseOptions {
         moved: args.moved,
         queries_per_update: args.queries_per_update,
     }
-}
-
-fn show_json(advice: &Advice) -> io::Result<()> {
-    let mut out = io::stdout().lock();
-    writeln!(out, "{}", serde_json::to_string_pretty(advice)?)?;
-    out.flush()
 }
 
 fn show(advice: &Advice) -> io::Result<()> {

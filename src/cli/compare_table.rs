@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use super::args::{CompareArgs, TableFormat};
 use super::document::{Block, Rows, to_markdown};
-use super::{Ending, text};
+use super::{Ending, print_json, text};
 use crate::measure::{CellKey, METRICS};
 use crate::report::{Changes, CommonShift, JudgedRow, Lone, Outcome, Setting, WorkChange};
 
@@ -97,8 +97,7 @@ impl CompareTable {
             advice: self.advice(),
             changes,
         };
-        let mut out = io::stdout().lock();
-        writeln!(out, "{}", serde_json::to_string_pretty(&document)?)
+        print_json(&document)
     }
 
     fn terminal(&self, all: bool) -> io::Result<()> {

@@ -7,7 +7,7 @@ use std::io::{self, Write};
 use indicatif::ProgressBar;
 
 use super::args::{DriftArgs, TableFormat};
-use super::{Ending, text, unread_is_fine};
+use super::{Ending, print_json, text, unread_is_fine};
 use crate::drift::{
     self, DriftOptions, DriftReport, ORBIT_RADIUS, Rated, Recommendation, SWING_DEG,
 };
@@ -26,10 +26,9 @@ pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
         bar.inc(1);
     });
     bar.finish_and_clear();
-    let mut out = io::stdout().lock();
     unread_is_fine(match args.format {
-        TableFormat::Json => writeln!(out, "{}", serde_json::to_string_pretty(&report)?),
-        TableFormat::Table => show(&report, &mut out),
+        TableFormat::Json => print_json(&report),
+        TableFormat::Table => show(&report, &mut io::stdout().lock()),
     })?;
     Ok(Ending::Ok)
 }

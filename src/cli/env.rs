@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use serde_json::{Value, json};
 
 use super::args::{EnvArgs, TableFormat};
-use super::{Ending, text};
+use super::{Ending, print_json, text};
 use crate::measure::{Machine, Source, Toolchain};
 
 pub fn env(args: &EnvArgs) -> anyhow::Result<Ending> {
@@ -14,9 +14,8 @@ pub fn env(args: &EnvArgs) -> anyhow::Result<Ending> {
         "toolchain": Toolchain::capture(),
         "source": Source::capture(),
     });
-    let mut out = io::stdout().lock();
     match args.format {
-        TableFormat::Json => writeln!(out, "{}", serde_json::to_string_pretty(&facts)?)?,
+        TableFormat::Json => print_json(&facts)?,
         TableFormat::Table => {
             let mut table = text::table(&["fact", "value"], &[]);
             for (group, facts) in facts.as_object().into_iter().flatten() {
@@ -31,7 +30,7 @@ pub fn env(args: &EnvArgs) -> anyhow::Result<Ending> {
                     }
                 }
             }
-            writeln!(out, "{table}")?;
+            writeln!(io::stdout(), "{table}")?;
         }
     }
     Ok(Ending::Ok)

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use serde_json::{Map, Value, json};
 
 use super::args::{ListArgs, ListTopic, TableFormat};
-use super::{Ending, text};
+use super::{Ending, print_json, text};
 use crate::culling::TESTS;
 use crate::index::{Info, Registry};
 use crate::measure::METRICS;
@@ -61,7 +61,7 @@ pub fn list(registry: &Registry, args: &ListArgs) -> anyhow::Result<Ending> {
             Some(_) => all.into_iter().next().map(|(_, v)| v).unwrap_or_default(),
             None => Value::Object(all),
         };
-        writeln!(out, "{}", serde_json::to_string_pretty(&value)?)?;
+        print_json(&value)?;
     }
     Ok(Ending::Ok)
 }

@@ -53,6 +53,7 @@ use std::process::ExitCode;
 use crate::index::Registry;
 use crate::scene::{LoadOptions, Scene};
 use clap::{CommandFactory, Parser};
+use serde::Serialize;
 
 use args::{Cli, Command};
 use scene_args::SceneCommand;
@@ -158,6 +159,13 @@ fn load_scene(source: &str, args: &SceneArgs, structures: usize) -> anyhow::Resu
         ));
     }
     Ok(scene)
+}
+
+/// One JSON document on standard output, indented.
+fn print_json(document: &impl Serialize) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    writeln!(out, "{}", serde_json::to_string_pretty(document)?)?;
+    out.flush()
 }
 
 /// For output that comes after the work: a reader who leaves early changes

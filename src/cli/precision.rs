@@ -14,7 +14,7 @@ use super::processes::Workers;
 use super::protocol::{Job, Timing};
 use super::run::progress;
 use super::run_resume::typed_args;
-use super::{Ending, interrupt, load_scene, precision_diagram, text, unread_is_fine};
+use super::{Ending, interrupt, load_scene, precision_diagram, print_json, text, unread_is_fine};
 use crate::index::Registry;
 use crate::measure::{ProcessTimes, Protocol, Status};
 use crate::path;
@@ -118,7 +118,7 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
         offset_sweep: offsets,
     };
     unread_is_fine(match args.format {
-        TableFormat::Json => show_json(&outcome),
+        TableFormat::Json => print_json(&outcome),
         TableFormat::Table => show(&outcome),
     })?;
     Ok(if wrong {
@@ -156,12 +156,6 @@ pub fn time(
         protocol: &protocol(args, timing.process),
     };
     Ok(precision::time(&input, plan, stop)?)
-}
-
-fn show_json(outcome: &Outcome) -> io::Result<()> {
-    let mut out = io::stdout().lock();
-    writeln!(out, "{}", serde_json::to_string_pretty(outcome)?)?;
-    out.flush()
 }
 
 fn show(outcome: &Outcome) -> io::Result<()> {

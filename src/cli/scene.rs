@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::args::TableFormat;
 use super::scene_args::{SceneConvertArgs, SceneFormat, SceneGenerateArgs, SceneInfoArgs};
-use super::{Ending, interrupt, load_scene, tell, text};
+use super::{Ending, interrupt, load_scene, print_json, tell, text};
 use crate::measure::SceneInfo;
 use crate::report::write_atomically;
 use crate::scene::{Regions, Scene, write_boxes_csv};
@@ -23,7 +23,6 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
         Regions::Tiling(tiling) => tiling.portals.len(),
         _ => 0,
     };
-    let mut out = io::stdout().lock();
     if args.format == TableFormat::Json {
         let mut value = serde_json::to_value(&info)?;
         value["region_kind"] = json!(scene.regions.kind());
@@ -36,7 +35,7 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
         for labels in &scene.labels {
             value["labels"][&labels.column] = labels.histogram().into_iter().collect();
         }
-        writeln!(out, "{}", serde_json::to_string_pretty(&value)?)?;
+        print_json(&value)?;
         return Ok(Ending::Ok);
     }
     let mut table = text::table(&["scene", &info.name], &[]);
@@ -92,7 +91,7 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
         table.add_row([format!("label {}", labels.column), shown.join(", ")]);
     }
     table.add_row(["digest (SHA-256)", &info.digest]);
-    writeln!(out, "{table}")?;
+    writeln!(io::stdout(), "{table}")?;
     Ok(Ending::Ok)
 }
 

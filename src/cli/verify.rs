@@ -11,7 +11,7 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 
 use super::args::{TableFormat, VerifyArgs};
-use super::{Ending, interrupt, load_scene, tell, text, unread_is_fine};
+use super::{Ending, interrupt, load_scene, print_json, tell, text, unread_is_fine};
 use crate::camera::{DEFAULT_EPSILON, PlaneMethod};
 use crate::culling::{ARITHMETICS, Arithmetic, CameraView, Culling, CullingTest, TESTS};
 use crate::geometry::ConvexVolume;
@@ -427,11 +427,10 @@ fn differ(
 }
 
 fn show(outcome: &Outcome, format: TableFormat) -> io::Result<()> {
-    let mut out = io::stdout().lock();
     if format == TableFormat::Json {
-        writeln!(out, "{}", serde_json::to_string_pretty(outcome)?)?;
-        return Ok(());
+        return print_json(outcome);
     }
+    let mut out = io::stdout().lock();
     let mut table = text::table(
         &[
             "scene",

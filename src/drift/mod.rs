@@ -65,6 +65,27 @@ pub struct Rated {
     pub on_front: bool,
 }
 
+impl Rated {
+    /// Good enough if it has an error at all; nothing is compared yet.
+    fn new(
+        name: &'static str,
+        summary: &'static str,
+        error: Option<f64>,
+        ns_per_step: f64,
+    ) -> Rated {
+        Rated {
+            name,
+            summary,
+            is_default: false,
+            error,
+            ns_per_step,
+            qualifies: error.is_some(),
+            dominated_by: None,
+            on_front: false,
+        }
+    }
+}
+
 /// A choice, and why.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Recommendation {
@@ -171,14 +192,9 @@ fn rate_rotations(
             (!lost).then(|| d.angle_error_rad.max(d.orthogonality_error))
         });
         Rated {
-            name: method.name,
-            summary: method.summary,
             is_default: method.name == rotation::TOOLKIT,
-            error,
-            ns_per_step,
             qualifies: error.is_some_and(|error| error < options.tolerance_rad),
-            dominated_by: None,
-            on_front: false,
+            ..Rated::new(method.name, method.summary, error, ns_per_step)
         }
     });
     with_front(rated.collect())
@@ -195,14 +211,9 @@ fn rate_orbits(drifts: &[OrbitDrift], options: &DriftOptions) -> Vec<Rated> {
             .find(last)
             .map(|d| d.position_error / ORBIT_RADIUS);
         Rated {
-            name: carrier.name,
-            summary: carrier.summary,
             is_default: carrier.name == orbit::TOOLKIT,
-            error,
-            ns_per_step,
             qualifies: error.is_some_and(|error| error < options.tolerance_rad),
-            dominated_by: None,
-            on_front: false,
+            ..Rated::new(carrier.name, carrier.summary, error, ns_per_step)
         }
     });
     with_front(rated.collect())
@@ -215,16 +226,7 @@ fn rate_integrators(errors: &[SpringError]) -> Vec<Rated> {
         // None of them if one is missing.
         let all: Option<Vec<f64>> = own.map(|e| e.rms_error).collect();
         let error = all.map(|errors| errors.into_iter().fold(0.0, f64::max));
-        Rated {
-            name: integrator.name,
-            summary: integrator.summary,
-            is_default: false,
-            error,
-            ns_per_step,
-            qualifies: error.is_some(),
-            dominated_by: None,
-            on_front: false,
-        }
+        Rated::new(integrator.name, integrator.summary, error, ns_per_step)
     });
     with_front(rated.collect())
 }

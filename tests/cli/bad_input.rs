@@ -394,7 +394,7 @@ fn usage_errors_are_one_line_that_says_what_was_expected() {
         ),
         (
             "advise --scene scene.csv --path orbit --draw-ns x",
-            "'x' for '--draw-ns <NS>'; expected a number",
+            "--draw-ns is 'x'; expected a number",
         ),
         ("query", "--scene <SCENE>, --cameras <CAMERAS> | expected"),
         ("query --scene scene.csv", "--cameras <CAMERAS> | expected"),

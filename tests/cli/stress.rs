@@ -84,8 +84,6 @@ fn extremes_are_generated_from_a_seed() {
         let of = |row: &&Value| row["id"].as_str().expect("an id").starts_with(family);
         assert!(rows.iter().any(|row| of(&row)), "{family}");
     }
-    let refused = rows.iter().filter(|row| row["status"] == "refused");
-    assert!(refused.count() > 150);
     let table = works(Path::new("."), "stress --cases 1 --structure linear");
     let boxes = "151,552 boxes judged at camera level";
     assert!(

@@ -60,3 +60,51 @@ fn refuse_stacks(structure: &'static str, items: &[Item]) -> Result<(), BuildErr
         _ => Ok(()),
     }
 }
+
+/// A peer that is one way to ask the file's own `Tree` (`build`, `memory`): name,
+/// summary, crate, the last argument of `build`, the method that searches.
+macro_rules! peer_of_tree {
+    ($(#[$doc:meta])* $peer:ident, $name:literal, $summary:literal, $crate_name:literal, $how:expr, $search:ident) => {
+        $(#[$doc])*
+        pub struct $peer(Tree);
+
+        impl $peer {
+            #[inline(always)]
+            fn search<T: super::BoxTest, S: $crate::query::Sink, R: $crate::query::Recorder>(
+                &self,
+                test: &T,
+                sink: &mut S,
+                recorder: &mut R,
+            ) -> std::ops::ControlFlow<()> {
+                self.0.$search(test, sink, recorder)
+            }
+        }
+
+        impl $crate::index::RegionIndex for $peer {
+            const INFO: $crate::index::Info = $crate::index::Info::new(
+                $name,
+                $summary,
+                $crate::index::Kind::Tree,
+                $crate::index::Origin::Crate($crate_name),
+            );
+            type Params = super::PeerParams;
+
+            fn build(
+                items: &[$crate::geometry::Aabb],
+                _: Option<&$crate::geometry::PlaneTree>,
+                _: &super::PeerParams,
+            ) -> Result<Self, $crate::index::BuildError> {
+                Tree::build(Self::INFO.name, items, $how).map($peer)
+            }
+
+            fn memory(&self) -> $crate::index::MemoryUsage {
+                self.0.memory()
+            }
+
+            super::located_box_by_box!();
+        }
+
+        super::seen_box_by_box!($peer);
+    };
+}
+use peer_of_tree;

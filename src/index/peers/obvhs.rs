@@ -12,13 +12,10 @@ use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 use obvhs::bvh2::node::Bvh2Node;
 
-use super::{
-    BoxTest, PeerParams, Tally, half_of_largest, indexable, located_box_by_box, refuse_stacks,
-    seen_box_by_box,
-};
-use crate::geometry::{Aabb, PlaneTree};
+use super::{BoxTest, Tally, half_of_largest, indexable, peer_of_tree, refuse_stacks};
+use crate::geometry::Aabb;
 use crate::index::stack::Stack;
-use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin, RegionIndex};
+use crate::index::{BuildError, MemoryUsage};
 use crate::query::{ItemId, Recorder, Sink};
 
 /// A tree of obvhs with the items in the order of its primitives.
@@ -177,60 +174,22 @@ impl Tree {
     }
 }
 
-macro_rules! peer {
-    ($(#[$doc:meta])* $peer:ident, $name:literal, $summary:literal, $params:expr, $search:ident) => {
-        $(#[$doc])*
-        pub struct $peer(Tree);
-
-        impl $peer {
-            #[inline(always)]
-            fn search<T: BoxTest, S: Sink, R: Recorder>(
-                &self,
-                test: &T,
-                sink: &mut S,
-                recorder: &mut R,
-            ) -> ControlFlow<()> {
-                self.0.$search(test, sink, recorder)
-            }
-        }
-
-        impl RegionIndex for $peer {
-            const INFO: Info = Info::new($name, $summary, Kind::Tree, Origin::Crate("obvhs"));
-            type Params = PeerParams;
-
-            fn build(
-                items: &[Aabb],
-                _: Option<&PlaneTree>,
-                _: &PeerParams,
-            ) -> Result<Self, BuildError> {
-                Tree::build(Self::INFO.name, items, $params).map($peer)
-            }
-
-            fn memory(&self) -> MemoryUsage {
-                self.0.memory()
-            }
-
-            located_box_by_box!();
-        }
-
-        seen_box_by_box!($peer);
-    };
-}
-
-peer!(
+peer_of_tree!(
     /// obvhs as it comes: the middle preset, its public nodes walked.
     PeerObvhs,
     "peer-obvhs",
     "crate obvhs, medium build, its own nodes walked",
+    "obvhs",
     BvhBuildParams::medium_build(),
     walk
 );
 
-peer!(
+peer_of_tree!(
     /// The preset that was fastest for views: one item a leaf.
     PeerObvhsTuned,
     "peer-obvhs-tuned",
     "crate obvhs, very slow build, one item a leaf, nodes in stack order, walked",
+    "obvhs",
     BvhBuildParams {
         max_prims_per_leaf: 1,
         pre_split: false,
@@ -239,11 +198,12 @@ peer!(
     walk
 );
 
-peer!(
+peer_of_tree!(
     /// The crate's own `aabb_traverse`, asked with the bounds of the view.
     PeerObvhsAabb,
     "peer-obvhs-aabb",
     "crate obvhs, as tuned: aabb_traverse with the view's bounds, then the items' test",
+    "obvhs",
     BvhBuildParams {
         max_prims_per_leaf: 1,
         pre_split: false,

@@ -8,11 +8,9 @@ use glam::Vec3;
 use parry3d::bounding_volume::Aabb as ParryAabb;
 use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhNode, TraversalAction};
 
-use super::{
-    BoxTest, PeerParams, Tally, indexable, located_box_by_box, refuse_stacks, seen_box_by_box,
-};
-use crate::geometry::{Aabb, PlaneTree};
-use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin, RegionIndex};
+use super::{BoxTest, Tally, indexable, peer_of_tree, refuse_stacks};
+use crate::geometry::Aabb;
+use crate::index::{BuildError, MemoryUsage};
 use crate::query::{ItemId, Recorder, Sink};
 
 /// A box of this reach has an area that is still a number in f32.
@@ -146,69 +144,32 @@ impl Tree {
     }
 }
 
-macro_rules! peer {
-    ($(#[$doc:meta])* $peer:ident, $name:literal, $summary:literal, $strategy:ident, $search:ident) => {
-        $(#[$doc])*
-        pub struct $peer(Tree);
-
-        impl $peer {
-            #[inline(always)]
-            fn search<T: BoxTest, S: Sink, R: Recorder>(
-                &self,
-                test: &T,
-                sink: &mut S,
-                recorder: &mut R,
-            ) -> ControlFlow<()> {
-                self.0.$search(test, sink, recorder)
-            }
-        }
-
-        impl RegionIndex for $peer {
-            const INFO: Info = Info::new($name, $summary, Kind::Tree, Origin::Crate("parry3d"));
-            type Params = PeerParams;
-
-            fn build(
-                items: &[Aabb],
-                _: Option<&PlaneTree>,
-                _: &PeerParams,
-            ) -> Result<Self, BuildError> {
-                Tree::build(Self::INFO.name, items, BvhBuildStrategy::$strategy).map($peer)
-            }
-
-            fn memory(&self) -> MemoryUsage {
-                self.0.memory()
-            }
-
-            located_box_by_box!();
-        }
-
-        seen_box_by_box!($peer);
-    };
-}
-
-peer!(
+peer_of_tree!(
     /// Its default: binned build, `leaves`.
     PeerParry3d,
     "peer-parry3d",
     "crate parry3d, binned build, asked through leaves",
-    Binned,
+    "parry3d",
+    BvhBuildStrategy::Binned,
     leaves
 );
 
-peer!(
+peer_of_tree!(
     /// The same tree; subtrees that are wholly inside are not tested further.
     PeerParry3dAccept,
     "peer-parry3d-accept",
     "crate parry3d, binned build, asked through traverse_indexed, whole subtrees accepted",
-    Binned,
+    "parry3d",
+    BvhBuildStrategy::Binned,
     traverse
 );
 
-peer!(
+peer_of_tree!(
     /// Its other builder.
     PeerParry3dPloc,
     "peer-parry3d-ploc",
     "crate parry3d, PLOC build, asked through traverse_indexed, whole subtrees accepted",
-    Ploc,
+    "parry3d",
+    BvhBuildStrategy::Ploc,
     traverse
 );
