@@ -61,6 +61,9 @@
     forbid(unsafe_code)
 )]
 
+#[macro_use]
+mod named;
+
 pub mod advise;
 pub mod arithmetic;
 pub mod camera;

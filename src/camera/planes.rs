@@ -12,72 +12,23 @@ use crate::geometry::{
     ConvexVolume, FrustumPlane, Plane, RelativeVolume, VolumeError, WidePlane, WideVolume,
 };
 
-/// Where the planes come from.
-#[derive(Clone, Copy, PartialEq, Eq, Default, Debug, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum PlaneMethod {
-    /// Frame and lens in f64, each plane rounded once; of a camera that is a
-    /// matrix, its rows.
-    #[default]
-    Frame,
-    /// The same formulas with every operation in f32.
-    FrameF32,
-    GhGlF32,
-    GhGlF64,
-    GhD3dF32,
-    GhD3dF64,
-    GhRevzF32,
-    GhRevzF64,
-}
-
-/// Every method with its name and what it is.
-pub const PLANE_METHODS: [(PlaneMethod, &str, &str); 8] = [
-    (
-        PlaneMethod::Frame,
-        "frame",
-        "from the camera's frame in f64, rounded once (default)",
-    ),
-    (
-        PlaneMethod::FrameF32,
-        "frame-f32",
-        "from the frame, every operation in f32",
-    ),
-    (
-        PlaneMethod::GhGlF32,
-        "gh-gl-f32",
-        "Gribb-Hartmann from an f32 OpenGL matrix",
-    ),
-    (
-        PlaneMethod::GhGlF64,
-        "gh-gl-f64",
-        "Gribb-Hartmann from an f64 OpenGL matrix",
-    ),
-    (
-        PlaneMethod::GhD3dF32,
-        "gh-d3d-f32",
-        "Gribb-Hartmann from an f32 D3D/Vulkan matrix",
-    ),
-    (
-        PlaneMethod::GhD3dF64,
-        "gh-d3d-f64",
-        "Gribb-Hartmann from an f64 D3D/Vulkan matrix",
-    ),
-    (
-        PlaneMethod::GhRevzF32,
-        "gh-revz-f32",
-        "Gribb-Hartmann from an f32 reversed-Z matrix",
-    ),
-    (
-        PlaneMethod::GhRevzF64,
-        "gh-revz-f64",
-        "Gribb-Hartmann from an f64 reversed-Z matrix",
-    ),
-];
-
-impl PlaneMethod {
-    pub fn name(self) -> &'static str {
-        let row = PLANE_METHODS.iter().find(|row| row.0 == self);
-        row.map_or("", |row| row.1)
+named! {
+    /// Where the planes come from.
+    #[derive(Clone, Copy, PartialEq, Eq, Default, Debug, Serialize, Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum PlaneMethod, PLANE_METHODS {
+        /// Frame and lens in f64, each plane rounded once; of a camera that is a
+        /// matrix, its rows.
+        #[default]
+        Frame = "frame", "from the camera's frame in f64, rounded once (default)";
+        /// The same formulas with every operation in f32.
+        FrameF32 = "frame-f32", "from the frame, every operation in f32";
+        GhGlF32 = "gh-gl-f32", "Gribb-Hartmann from an f32 OpenGL matrix";
+        GhGlF64 = "gh-gl-f64", "Gribb-Hartmann from an f64 OpenGL matrix";
+        GhD3dF32 = "gh-d3d-f32", "Gribb-Hartmann from an f32 D3D/Vulkan matrix";
+        GhD3dF64 = "gh-d3d-f64", "Gribb-Hartmann from an f64 D3D/Vulkan matrix";
+        GhRevzF32 = "gh-revz-f32", "Gribb-Hartmann from an f32 reversed-Z matrix";
+        GhRevzF64 = "gh-revz-f64", "Gribb-Hartmann from an f64 reversed-Z matrix";
     }
 }
 
