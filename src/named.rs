@@ -1,4 +1,5 @@
-//! Enums whose values have names for people and files: one table a type.
+//! Tables in the source: enums whose values have names for people and files, and
+//! rows of structs. It owns how such a table is written down.
 
 /// Declares an enum with its names: `ALL` in this order, and `name`. With the name of
 /// a table behind the enum's, each name is followed by what it stands for, and the
@@ -37,5 +38,15 @@ macro_rules! named {
         /// Every value with its name and what it is.
         $vis const $TABLE: [($Enum, &str, &str); $Enum::ALL.len()] =
             [$(($Enum::$value, $name, $what)),+];
+    };
+}
+
+/// A table of structs, the names of the fields written once.
+macro_rules! rows {
+    (@row $Row:ident { $($field:ident),+ } $($value:expr),+) => {
+        $Row { $($field: $value),+ }
+    };
+    ($Row:ident $fields:tt $($($value:expr),+;)+) => {
+        &[$(rows!(@row $Row $fields $($value),+)),+]
     };
 }

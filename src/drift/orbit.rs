@@ -25,33 +25,14 @@ pub struct Carrier {
     pub walk: Walk<f64, DVec3>,
 }
 
-pub const CARRIERS: &[Carrier] = &[
-    Carrier {
-        name: "f32-carried",
-        summary: "the f32 eye turned about the centre each step",
-        walk: single::<false>,
-    },
-    Carrier {
-        name: "f32-carried-radius",
-        summary: "the same, put back to its distance each step",
-        walk: single::<true>,
-    },
-    Carrier {
-        name: "f64-carried",
-        summary: "the f64 eye and its axes turned each step, around and over: this toolkit's orbit",
-        walk: toolkit,
-    },
-    Carrier {
-        name: "f64-carried-radius",
-        summary: "the f64 eye alone, put back to its distance each step",
-        walk: restored,
-    },
-    Carrier {
-        name: "f64-angle",
-        summary: "the eye made anew from an f64 angle in degrees, whole turns taken off",
-        walk: angle,
-    },
-];
+pub const CARRIERS: &[Carrier] = rows! { Carrier { name, summary, walk }
+    "f32-carried", "the f32 eye turned about the centre each step", single::<false>;
+    "f32-carried-radius", "the same, put back to its distance each step", single::<true>;
+    TOOLKIT, "the f64 eye and its axes turned each step, around and over: this toolkit's orbit",
+        toolkit;
+    "f64-carried-radius", "the f64 eye alone, put back to its distance each step", restored;
+    "f64-angle", "the eye made anew from an f64 angle in degrees, whole turns taken off", angle;
+};
 
 /// What the toolkit's own orbit does.
 pub const TOOLKIT: &str = "f64-carried";

@@ -69,36 +69,30 @@ pub struct Method {
 /// What the toolkit's own camera does.
 pub const TOOLKIT: &str = "f64-polar-100";
 
-/// Rows of [`METHODS`]: what the steps add up to, name, summary and walk.
-macro_rules! methods {
-    ($($sum:ident $name:expr, $summary:literal, $walk:expr;)*) => {
-        &[$(Method { name: $name, summary: $summary, sum: Sum::$sum, walk: $walk }),*]
-    };
-}
-
-pub const METHODS: &[Method] = methods! {
-    Turns "f32", "f32 axes, turned and never corrected", single::frame::<NONE>;
-    Turns "f32-gram-schmidt", "f32 axes, Gram-Schmidt after each step",
-        single::frame::<GRAM_SCHMIDT>;
-    Turns "f32-polar-100", "f32 axes, a Newton step to the polar factor after 100 rotations",
-        single::frame::<POLAR>;
-    Turns "f32-quaternion", "f32 quaternion, normalised after each step", single::quaternion;
-    Angles "f32-radians", "f32 angles summed in radians, axes made anew by sine and cosine",
-        single::angles::<RADIANS>;
-    Angles "f32-degrees", "the same in degrees", single::angles::<DEGREES>;
-    Angles "f32-degrees-wrapped", "the same in degrees, whole turns taken off",
-        single::angles::<WRAPPED>;
-    Turns "f64", "f64 axes, turned and never corrected", double::frame::<NONE>;
-    Turns "f64-gram-schmidt", "f64 axes, Gram-Schmidt after each step",
-        double::frame::<GRAM_SCHMIDT>;
-    Turns TOOLKIT,
+pub const METHODS: &[Method] = rows! { Method { name, summary, sum, walk }
+    "f32", "f32 axes, turned and never corrected", Sum::Turns, single::frame::<NONE>;
+    "f32-gram-schmidt", "f32 axes, Gram-Schmidt after each step",
+        Sum::Turns, single::frame::<GRAM_SCHMIDT>;
+    "f32-polar-100", "f32 axes, a Newton step to the polar factor after 100 rotations",
+        Sum::Turns, single::frame::<POLAR>;
+    "f32-quaternion", "f32 quaternion, normalised after each step", Sum::Turns, single::quaternion;
+    "f32-radians", "f32 angles summed in radians, axes made anew by sine and cosine",
+        Sum::Angles, single::angles::<RADIANS>;
+    "f32-degrees", "the same in degrees", Sum::Angles, single::angles::<DEGREES>;
+    "f32-degrees-wrapped", "the same in degrees, whole turns taken off",
+        Sum::Angles, single::angles::<WRAPPED>;
+    "f64", "f64 axes, turned and never corrected", Sum::Turns, double::frame::<NONE>;
+    "f64-gram-schmidt", "f64 axes, Gram-Schmidt after each step",
+        Sum::Turns, double::frame::<GRAM_SCHMIDT>;
+    TOOLKIT,
         "f64 axes, a Newton step to the polar factor after 100 rotations: this toolkit's camera",
-        toolkit;
-    Turns "f64-quaternion", "f64 quaternion, normalised after each step", double::quaternion;
-    Angles "f64-radians", "f64 angles summed in radians", double::angles::<RADIANS>;
-    Angles "f64-degrees-wrapped", "f64 angles summed in degrees, whole turns taken off",
-        double::angles::<WRAPPED>;
-    Turns "f64-lecture", "this toolkit's camera with the lecture's 3.142/180 for pi/180", lecture;
+        Sum::Turns, toolkit;
+    "f64-quaternion", "f64 quaternion, normalised after each step", Sum::Turns, double::quaternion;
+    "f64-radians", "f64 angles summed in radians", Sum::Angles, double::angles::<RADIANS>;
+    "f64-degrees-wrapped", "f64 angles summed in degrees, whole turns taken off",
+        Sum::Angles, double::angles::<WRAPPED>;
+    "f64-lecture", "this toolkit's camera with the lecture's 3.142/180 for pi/180",
+        Sum::Turns, lecture;
 };
 
 /// How far one method is off after so many steps.
