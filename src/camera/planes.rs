@@ -6,8 +6,8 @@ use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::margin::{Margin, TINY, check_sums};
-use super::projection::{gribb_hartmann_f32, projection_f32, projection_f64, view_f32};
-use super::{Camera, CameraError, ClipSpace, Frame, Lens, gribb_hartmann};
+use super::projection::{double, single};
+use super::{Camera, CameraError, ClipSpace, Frame, Lens};
 use crate::geometry::{
     ConvexVolume, FrustumPlane, Plane, RelativeVolume, VolumeError, WidePlane, WideVolume,
 };
@@ -256,18 +256,21 @@ fn gathered(
 type NamedPlanes = Vec<(FrustumPlane, Plane)>;
 
 fn derive(frame: &Frame, lens: &Lens, method: PlaneMethod) -> NamedPlanes {
-    let matrix = |clip: ClipSpace| from_matrix(frame, lens, clip);
-    let matrix_f32 = |clip: ClipSpace| from_matrix_f32(frame, lens, clip);
-    match method {
-        PlaneMethod::Frame => from_frame(frame, lens),
-        PlaneMethod::FrameF32 => from_frame_f32(frame, lens),
-        PlaneMethod::GhGlF32 => matrix_f32(ClipSpace::OpenGl),
-        PlaneMethod::GhGlF64 => matrix(ClipSpace::OpenGl),
-        PlaneMethod::GhD3dF32 => matrix_f32(ClipSpace::D3d),
-        PlaneMethod::GhD3dF64 => matrix(ClipSpace::D3d),
-        PlaneMethod::GhRevzF32 => matrix_f32(ClipSpace::ReversedZ),
-        PlaneMethod::GhRevzF64 => matrix(ClipSpace::ReversedZ),
-    }
+    use ClipSpace::{D3d, OpenGl, ReversedZ};
+    let rows = match method {
+        PlaneMethod::Frame => return narrow(from_frame_f64(frame, lens)),
+        PlaneMethod::FrameF32 => return from_frame_f32(frame, lens),
+        PlaneMethod::GhGlF32 => single::planes(frame, lens, OpenGl),
+        PlaneMethod::GhGlF64 => double::planes(frame, lens, OpenGl),
+        PlaneMethod::GhD3dF32 => single::planes(frame, lens, D3d),
+        PlaneMethod::GhD3dF64 => double::planes(frame, lens, D3d),
+        PlaneMethod::GhRevzF32 => single::planes(frame, lens, ReversedZ),
+        PlaneMethod::GhRevzF64 => double::planes(frame, lens, ReversedZ),
+    };
+    // An infinite far plane is the absence of `far`, whatever its row holds.
+    let count = if lens.far().is_some() { 6 } else { 5 };
+    let named = FrustumPlane::ALL.into_iter().zip(rows);
+    named.take(count).collect()
 }
 
 /// The side planes pass through the eye along the window's edges (or, for an
@@ -310,47 +313,7 @@ macro_rules! planes_from_frame {
 planes_from_frame!(from_frame_f64, f64, DVec3, |v| v, WidePlane);
 planes_from_frame!(from_frame_f32, f32, Vec3, |v| v.as_vec3(), Plane);
 
-fn from_frame(frame: &Frame, lens: &Lens) -> NamedPlanes {
-    narrow(from_frame_f64(frame, lens))
-}
-
 fn narrow(wide: Vec<(FrustumPlane, WidePlane)>) -> NamedPlanes {
     let wide = wide.into_iter();
     wide.map(|(name, plane)| (name, plane.narrow())).collect()
-}
-
-fn from_matrix(frame: &Frame, lens: &Lens, clip: ClipSpace) -> NamedPlanes {
-    let matrix = projection_f64(lens, clip) * frame.world_to_eye();
-    let rows = gribb_hartmann(&matrix, clip);
-    named(
-        lens,
-        rows.map(|row| {
-            let normal = row.truncate();
-            let length = normal.length();
-            Plane::new((normal / length).as_vec3(), (row.w / length) as f32)
-        }),
-    )
-}
-
-fn from_matrix_f32(frame: &Frame, lens: &Lens, clip: ClipSpace) -> NamedPlanes {
-    let matrix = projection_f32(lens, clip) * view_f32(frame);
-    let rows = gribb_hartmann_f32(&matrix, clip);
-    named(
-        lens,
-        rows.map(|row| {
-            let normal = row.truncate();
-            let length = normal.length();
-            Plane::new(normal / length, row.w / length)
-        }),
-    )
-}
-
-/// An infinite far plane is the absence of `far`, whatever its row holds.
-fn named(lens: &Lens, rows: [Plane; 6]) -> NamedPlanes {
-    let count = if lens.far().is_some() { 6 } else { 5 };
-    FrustumPlane::ALL
-        .into_iter()
-        .zip(rows)
-        .take(count)
-        .collect()
 }
