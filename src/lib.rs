@@ -68,6 +68,9 @@
     forbid(unsafe_code)
 )]
 
+#[macro_use]
+mod named;
+
 pub mod advise;
 pub mod arithmetic;
 pub mod camera;

@@ -21,20 +21,11 @@ pub struct SuiteScene {
     pub cold: bool,
 }
 
-const fn warm(scene: &'static str, paths: &'static [&'static str]) -> SuiteScene {
-    SuiteScene {
-        scene,
-        paths,
-        cold: false,
-    }
-}
-
-const fn warm_and_cold(scene: &'static str, paths: &'static [&'static str]) -> SuiteScene {
-    SuiteScene {
-        scene,
-        paths,
-        cold: true,
-    }
+/// Scenes with the ways through them, each of them cold as well or not.
+macro_rules! scenes {
+    (cold: $cold:literal; $($scene:literal $paths:expr;)+) => {
+        &[$(SuiteScene { scene: $scene, paths: &$paths, cold: $cold }),+]
+    };
 }
 
 /// From a thousandth of the items to all of them, and further ways. Many views
@@ -42,7 +33,7 @@ const fn warm_and_cold(scene: &'static str, paths: &'static [&'static str]) -> S
 /// ones, of which every query has branches enough and a scan takes milliseconds.
 macro_rules! surface {
     ($frames:literal $(, $more:expr)*) => {
-        &[
+        [
             concat!("flythrough:frames=", $frames, ",visible=0.1%"),
             concat!("flythrough:frames=", $frames, ",visible=2%"),
             concat!("orbit:frames=", $frames, ",visible=20%"),
@@ -60,29 +51,17 @@ pub static SUITES: &[Suite] = &[
     Suite {
         name: "quick",
         summary: "five generated worlds of 50k to 100k items and the four real ones; a little over a minute",
-        plan: &[
-            warm(
-                "uniform:n=100000",
-                &[
-                    "flythrough:frames=128,visible=2%",
-                    "teleport:frames=128,visible=0.1%",
-                ],
-            ),
-            warm("clustered:n=100000", &["flythrough:frames=128,visible=2%"]),
-            warm(
-                "city:n=100000",
-                &["flythrough:frames=128,visible=2%", "outside:frames=128"],
-            ),
-            warm("forest:n=100000", &["orbit:frames=128"]),
-            warm("rooms:n=50000", &["spin:frames=256"]),
-            warm("freedm-map12", &["places"]),
-            warm("freedm-map20", &["places", "flythrough:frames=512"]),
-            warm(
-                "helsinki",
-                &["flythrough:frames=512,visible=2%", "zoom:frames=512"],
-            ),
-            warm("us-counties", &["orbit:frames=512", "outside:frames=512"]),
-        ],
+        plan: scenes! { cold: false;
+            "uniform:n=100000" ["flythrough:frames=128,visible=2%", "teleport:frames=128,visible=0.1%"];
+            "clustered:n=100000" ["flythrough:frames=128,visible=2%"];
+            "city:n=100000" ["flythrough:frames=128,visible=2%", "outside:frames=128"];
+            "forest:n=100000" ["orbit:frames=128"];
+            "rooms:n=50000" ["spin:frames=256"];
+            "freedm-map12" ["places"];
+            "freedm-map20" ["places", "flythrough:frames=512"];
+            "helsinki" ["flythrough:frames=512,visible=2%", "zoom:frames=512"];
+            "us-counties" ["orbit:frames=512", "outside:frames=512"];
+        },
         effort: Effort {
             processes: 10,
             rounds: [3, 40],
@@ -95,47 +74,19 @@ pub static SUITES: &[Suite] = &[
     Suite {
         name: "standard",
         summary: "as quick with a million items, more paths and more rounds; several minutes",
-        plan: &[
-            warm("uniform:n=10000", &["flythrough:frames=512,visible=2%"]),
-            warm(
-                "uniform:n=1000000",
-                &[
-                    "flythrough:visible=0.1%",
-                    "flythrough:visible=2%",
-                    "orbit",
-                    "outside",
-                ],
-            ),
-            warm("clustered:n=1000000", &["flythrough:visible=2%", "orbit"]),
-            warm(
-                "city:n=1000000",
-                &["flythrough:visible=2%", "spin", "outside"],
-            ),
-            warm("forest:n=1000000", &["flythrough:visible=2%", "orbit"]),
-            warm("rooms:n=1000000", &["flythrough:visible=0.1%", "teleport"]),
-            warm("freedm-map12", &["places", "teleport:frames=512"]),
-            warm(
-                "freedm-map20",
-                &["places", "flythrough:frames=512", "teleport:frames=512"],
-            ),
-            warm(
-                "helsinki",
-                &[
-                    "flythrough:frames=512,visible=2%",
-                    "orbit:frames=512",
-                    "zoom:frames=512",
-                    "teleport:frames=512",
-                ],
-            ),
-            warm(
-                "us-counties",
-                &[
-                    "flythrough:frames=512",
-                    "orbit:frames=512",
-                    "outside:frames=512",
-                ],
-            ),
-        ],
+        plan: scenes! { cold: false;
+            "uniform:n=10000" ["flythrough:frames=512,visible=2%"];
+            "uniform:n=1000000" ["flythrough:visible=0.1%", "flythrough:visible=2%", "orbit", "outside"];
+            "clustered:n=1000000" ["flythrough:visible=2%", "orbit"];
+            "city:n=1000000" ["flythrough:visible=2%", "spin", "outside"];
+            "forest:n=1000000" ["flythrough:visible=2%", "orbit"];
+            "rooms:n=1000000" ["flythrough:visible=0.1%", "teleport"];
+            "freedm-map12" ["places", "teleport:frames=512"];
+            "freedm-map20" ["places", "flythrough:frames=512", "teleport:frames=512"];
+            "helsinki" ["flythrough:frames=512,visible=2%", "orbit:frames=512", "zoom:frames=512",
+                "teleport:frames=512"];
+            "us-counties" ["flythrough:frames=512", "orbit:frames=512", "outside:frames=512"];
+        },
         effort: Effort {
             processes: 12,
             rounds: [3, 60],
@@ -148,48 +99,22 @@ pub static SUITES: &[Suite] = &[
     Suite {
         name: "full",
         summary: "the crossover surface: three worlds from a thousand to a million items, 0.1 % to all of them visible, and the real ones, warm and cold; less than half an hour, with the structures of other crates less than one",
-        plan: &[
-            warm_and_cold("uniform:n=1000", surface!(512)),
-            warm_and_cold(
-                "uniform:n=10000",
-                surface!(512, "flythrough:frames=512,visible=500"),
-            ),
-            warm_and_cold(
-                "uniform:n=100000",
-                surface!(256, "flythrough:frames=256,visible=500"),
-            ),
-            warm_and_cold(
-                "uniform:n=1000000",
-                surface!(64, "flythrough:frames=64,visible=500"),
-            ),
-            warm_and_cold("city:n=10000", surface!(512)),
-            warm_and_cold("city:n=100000", surface!(256)),
-            warm_and_cold("city:n=1000000", surface!(64)),
-            warm_and_cold("clustered:n=10000", surface!(512)),
-            warm_and_cold("clustered:n=100000", surface!(256)),
-            warm_and_cold("clustered:n=1000000", surface!(64)),
-            warm_and_cold(
-                "freedm-map12",
-                &[
-                    "places",
-                    "flythrough:frames=512,visible=2%",
-                    "outside:frames=512",
-                ],
-            ),
-            warm_and_cold(
-                "freedm-map20",
-                &[
-                    "places",
-                    "flythrough:frames=512,visible=2%",
-                    "outside:frames=512",
-                ],
-            ),
-            warm_and_cold(
-                "helsinki",
-                &["flythrough:frames=512,visible=2%", "orbit:frames=512"],
-            ),
-            warm_and_cold("us-counties", &["orbit:frames=512", "outside:frames=512"]),
-        ],
+        plan: scenes! { cold: true;
+            "uniform:n=1000" surface!(512);
+            "uniform:n=10000" surface!(512, "flythrough:frames=512,visible=500");
+            "uniform:n=100000" surface!(256, "flythrough:frames=256,visible=500");
+            "uniform:n=1000000" surface!(64, "flythrough:frames=64,visible=500");
+            "city:n=10000" surface!(512);
+            "city:n=100000" surface!(256);
+            "city:n=1000000" surface!(64);
+            "clustered:n=10000" surface!(512);
+            "clustered:n=100000" surface!(256);
+            "clustered:n=1000000" surface!(64);
+            "freedm-map12" ["places", "flythrough:frames=512,visible=2%", "outside:frames=512"];
+            "freedm-map20" ["places", "flythrough:frames=512,visible=2%", "outside:frames=512"];
+            "helsinki" ["flythrough:frames=512,visible=2%", "orbit:frames=512"];
+            "us-counties" ["orbit:frames=512", "outside:frames=512"];
+        },
         effort: Effort {
             processes: 10,
             rounds: [3, 40],
@@ -202,11 +127,11 @@ pub static SUITES: &[Suite] = &[
     Suite {
         name: "compare",
         summary: "what `compare --against` runs: a real scene and two generated ones, frustum queries only; a minute and a half by itself",
-        plan: &[
-            warm("helsinki", &["flythrough:frames=128,visible=2%"]),
-            warm("city:n=20000", &["flythrough:frames=128,visible=2%"]),
-            warm("uniform:n=100000", &["flythrough:frames=64,visible=2%"]),
-        ],
+        plan: scenes! { cold: false;
+            "helsinki" ["flythrough:frames=128,visible=2%"];
+            "city:n=20000" ["flythrough:frames=128,visible=2%"];
+            "uniform:n=100000" ["flythrough:frames=64,visible=2%"];
+        },
         effort: Effort {
             processes: 10,
             rounds: [12, 80],
@@ -219,12 +144,12 @@ pub static SUITES: &[Suite] = &[
     Suite {
         name: "growth",
         summary: "a fixed number of visible items among ten thousand to ten million; choose structures, all of them need tens of gigabytes",
-        plan: &[
-            warm("uniform:n=10000", &[FIXED_COUNT]),
-            warm("uniform:n=100000", &[FIXED_COUNT]),
-            warm("uniform:n=1000000", &[FIXED_COUNT]),
-            warm("uniform:n=10000000", &[FIXED_COUNT]),
-        ],
+        plan: scenes! { cold: false;
+            "uniform:n=10000" [FIXED_COUNT];
+            "uniform:n=100000" [FIXED_COUNT];
+            "uniform:n=1000000" [FIXED_COUNT];
+            "uniform:n=10000000" [FIXED_COUNT];
+        },
         effort: Effort {
             processes: 10,
             rounds: [3, 40],

@@ -1,8 +1,9 @@
 //! The camera's orthonormal frame in f64 and the world-to-eye matrix. How the
 //! frame moves is in `controls`; what the lens sees is in `lens`.
 
-use glam::{DMat3, DMat4, DVec3, DVec4};
+use glam::{DMat3, DMat4, DVec3};
 
+use super::projection::double;
 use super::{CameraError, Pose};
 
 /// Eye position and the unit vectors u (right), v (up) and n (backward: the
@@ -105,13 +106,7 @@ impl Frame {
     /// The world-to-eye matrix: rows u, v, n with `-e.u`, `-e.v`, `-e.n` in
     /// the last column.
     pub fn world_to_eye(&self) -> DMat4 {
-        let (u, v, n, e) = (self.u, self.v, self.n, self.eye);
-        DMat4::from_cols(
-            DVec4::new(u.x, v.x, n.x, 0.0),
-            DVec4::new(u.y, v.y, n.y, 0.0),
-            DVec4::new(u.z, v.z, n.z, 0.0),
-            DVec4::new(-e.dot(u), -e.dot(v), -e.dot(n), 1.0),
-        )
+        double::view(self)
     }
 
     /// The same frame seen from another origin.

@@ -8,44 +8,15 @@ use super::{Camera, CameraError, Lens, Pose};
 use crate::arithmetic::Expansion;
 use crate::geometry::{FrustumPlane, WidePlane};
 
-/// How a matrix is to be read. Reversed depth needs no name: what is visible is
-/// the same, and the plane before the eye is the near one.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum MatrixConvention {
-    ColumnGl,
-    ColumnD3d,
-    RowGl,
-    RowD3d,
-}
-
-/// Every convention with its name and what it is.
-pub const MATRIX_CONVENTIONS: [(MatrixConvention, &str, &str); 4] = [
-    (
-        MatrixConvention::ColumnGl,
-        "column-gl",
-        "clip = M x, depth -1 to 1 (OpenGL)",
-    ),
-    (
-        MatrixConvention::ColumnD3d,
-        "column-d3d",
-        "clip = M x, depth 0 to 1 or 1 to 0 (Vulkan, Metal, WebGPU)",
-    ),
-    (
-        MatrixConvention::RowGl,
-        "row-gl",
-        "clip = x M, depth -1 to 1",
-    ),
-    (
-        MatrixConvention::RowD3d,
-        "row-d3d",
-        "clip = x M, depth 0 to 1 or 1 to 0 (Direct3D)",
-    ),
-];
-
-impl MatrixConvention {
-    pub fn name(self) -> &'static str {
-        let row = MATRIX_CONVENTIONS.iter().find(|row| row.0 == self);
-        row.map_or("", |row| row.1)
+named! {
+    /// How a matrix is to be read. Reversed depth needs no name: what is visible is
+    /// the same, and the plane before the eye is the near one.
+    #[derive(Clone, Copy, PartialEq, Eq, Debug)]
+    pub enum MatrixConvention, MATRIX_CONVENTIONS {
+        ColumnGl = "column-gl", "clip = M x, depth -1 to 1 (OpenGL)";
+        ColumnD3d = "column-d3d", "clip = M x, depth 0 to 1 or 1 to 0 (Vulkan, Metal, WebGPU)";
+        RowGl = "row-gl", "clip = x M, depth -1 to 1";
+        RowD3d = "row-d3d", "clip = x M, depth 0 to 1 or 1 to 0 (Direct3D)";
     }
 }
 

@@ -17,7 +17,7 @@ pub(crate) use margin::check_sums;
 pub use matrix::{MATRIX_CONVENTIONS, MATRIX_ENTRIES, MatrixConvention, ViewProjection};
 pub use planes::{DEFAULT_EPSILON, PLANE_METHODS, PlaneMethod, PlaneOptions, Surroundings};
 pub use pose::Pose;
-pub use projection::{ClipSpace, gribb_hartmann};
+pub use projection::ClipSpace;
 
 use crate::geometry::VolumeError;
 

@@ -6,78 +6,29 @@ use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::margin::{Margin, TINY, check_sums};
-use super::projection::{gribb_hartmann_f32, projection_f32, projection_f64, view_f32};
-use super::{Camera, CameraError, ClipSpace, Frame, Lens, gribb_hartmann};
+use super::projection::{double, single};
+use super::{Camera, CameraError, ClipSpace, Frame, Lens};
 use crate::geometry::{
     ConvexVolume, FrustumPlane, Plane, RelativeVolume, VolumeError, WidePlane, WideVolume,
 };
 
-/// Where the planes come from.
-#[derive(Clone, Copy, PartialEq, Eq, Default, Debug, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum PlaneMethod {
-    /// Frame and lens in f64, each plane rounded once; of a camera that is a
-    /// matrix, its rows.
-    #[default]
-    Frame,
-    /// The same formulas with every operation in f32.
-    FrameF32,
-    GhGlF32,
-    GhGlF64,
-    GhD3dF32,
-    GhD3dF64,
-    GhRevzF32,
-    GhRevzF64,
-}
-
-/// Every method with its name and what it is.
-pub const PLANE_METHODS: [(PlaneMethod, &str, &str); 8] = [
-    (
-        PlaneMethod::Frame,
-        "frame",
-        "from the camera's frame in f64, rounded once (default)",
-    ),
-    (
-        PlaneMethod::FrameF32,
-        "frame-f32",
-        "from the frame, every operation in f32",
-    ),
-    (
-        PlaneMethod::GhGlF32,
-        "gh-gl-f32",
-        "Gribb-Hartmann from an f32 OpenGL matrix",
-    ),
-    (
-        PlaneMethod::GhGlF64,
-        "gh-gl-f64",
-        "Gribb-Hartmann from an f64 OpenGL matrix",
-    ),
-    (
-        PlaneMethod::GhD3dF32,
-        "gh-d3d-f32",
-        "Gribb-Hartmann from an f32 D3D/Vulkan matrix",
-    ),
-    (
-        PlaneMethod::GhD3dF64,
-        "gh-d3d-f64",
-        "Gribb-Hartmann from an f64 D3D/Vulkan matrix",
-    ),
-    (
-        PlaneMethod::GhRevzF32,
-        "gh-revz-f32",
-        "Gribb-Hartmann from an f32 reversed-Z matrix",
-    ),
-    (
-        PlaneMethod::GhRevzF64,
-        "gh-revz-f64",
-        "Gribb-Hartmann from an f64 reversed-Z matrix",
-    ),
-];
-
-impl PlaneMethod {
-    pub fn name(self) -> &'static str {
-        let row = PLANE_METHODS.iter().find(|row| row.0 == self);
-        row.map_or("", |row| row.1)
+named! {
+    /// Where the planes come from.
+    #[derive(Clone, Copy, PartialEq, Eq, Default, Debug, Serialize, Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum PlaneMethod, PLANE_METHODS {
+        /// Frame and lens in f64, each plane rounded once; of a camera that is a
+        /// matrix, its rows.
+        #[default]
+        Frame = "frame", "from the camera's frame in f64, rounded once (default)";
+        /// The same formulas with every operation in f32.
+        FrameF32 = "frame-f32", "from the frame, every operation in f32";
+        GhGlF32 = "gh-gl-f32", "Gribb-Hartmann from an f32 OpenGL matrix";
+        GhGlF64 = "gh-gl-f64", "Gribb-Hartmann from an f64 OpenGL matrix";
+        GhD3dF32 = "gh-d3d-f32", "Gribb-Hartmann from an f32 D3D/Vulkan matrix";
+        GhD3dF64 = "gh-d3d-f64", "Gribb-Hartmann from an f64 D3D/Vulkan matrix";
+        GhRevzF32 = "gh-revz-f32", "Gribb-Hartmann from an f32 reversed-Z matrix";
+        GhRevzF64 = "gh-revz-f64", "Gribb-Hartmann from an f64 reversed-Z matrix";
     }
 }
 
@@ -305,18 +256,21 @@ fn gathered(
 type NamedPlanes = Vec<(FrustumPlane, Plane)>;
 
 fn derive(frame: &Frame, lens: &Lens, method: PlaneMethod) -> NamedPlanes {
-    let matrix = |clip: ClipSpace| from_matrix(frame, lens, clip);
-    let matrix_f32 = |clip: ClipSpace| from_matrix_f32(frame, lens, clip);
-    match method {
-        PlaneMethod::Frame => from_frame(frame, lens),
-        PlaneMethod::FrameF32 => from_frame_f32(frame, lens),
-        PlaneMethod::GhGlF32 => matrix_f32(ClipSpace::OpenGl),
-        PlaneMethod::GhGlF64 => matrix(ClipSpace::OpenGl),
-        PlaneMethod::GhD3dF32 => matrix_f32(ClipSpace::D3d),
-        PlaneMethod::GhD3dF64 => matrix(ClipSpace::D3d),
-        PlaneMethod::GhRevzF32 => matrix_f32(ClipSpace::ReversedZ),
-        PlaneMethod::GhRevzF64 => matrix(ClipSpace::ReversedZ),
-    }
+    use ClipSpace::{D3d, OpenGl, ReversedZ};
+    let rows = match method {
+        PlaneMethod::Frame => return narrow(from_frame_f64(frame, lens)),
+        PlaneMethod::FrameF32 => return from_frame_f32(frame, lens),
+        PlaneMethod::GhGlF32 => single::planes(frame, lens, OpenGl),
+        PlaneMethod::GhGlF64 => double::planes(frame, lens, OpenGl),
+        PlaneMethod::GhD3dF32 => single::planes(frame, lens, D3d),
+        PlaneMethod::GhD3dF64 => double::planes(frame, lens, D3d),
+        PlaneMethod::GhRevzF32 => single::planes(frame, lens, ReversedZ),
+        PlaneMethod::GhRevzF64 => double::planes(frame, lens, ReversedZ),
+    };
+    // An infinite far plane is the absence of `far`, whatever its row holds.
+    let count = if lens.far().is_some() { 6 } else { 5 };
+    let named = FrustumPlane::ALL.into_iter().zip(rows);
+    named.take(count).collect()
 }
 
 /// The side planes pass through the eye along the window's edges (or, for an
@@ -359,47 +313,7 @@ macro_rules! planes_from_frame {
 planes_from_frame!(from_frame_f64, f64, DVec3, |v| v, WidePlane);
 planes_from_frame!(from_frame_f32, f32, Vec3, |v| v.as_vec3(), Plane);
 
-fn from_frame(frame: &Frame, lens: &Lens) -> NamedPlanes {
-    narrow(from_frame_f64(frame, lens))
-}
-
 fn narrow(wide: Vec<(FrustumPlane, WidePlane)>) -> NamedPlanes {
     let wide = wide.into_iter();
     wide.map(|(name, plane)| (name, plane.narrow())).collect()
-}
-
-fn from_matrix(frame: &Frame, lens: &Lens, clip: ClipSpace) -> NamedPlanes {
-    let matrix = projection_f64(lens, clip) * frame.world_to_eye();
-    let rows = gribb_hartmann(&matrix, clip);
-    named(
-        lens,
-        rows.map(|row| {
-            let normal = row.truncate();
-            let length = normal.length();
-            Plane::new((normal / length).as_vec3(), (row.w / length) as f32)
-        }),
-    )
-}
-
-fn from_matrix_f32(frame: &Frame, lens: &Lens, clip: ClipSpace) -> NamedPlanes {
-    let matrix = projection_f32(lens, clip) * view_f32(frame);
-    let rows = gribb_hartmann_f32(&matrix, clip);
-    named(
-        lens,
-        rows.map(|row| {
-            let normal = row.truncate();
-            let length = normal.length();
-            Plane::new(normal / length, row.w / length)
-        }),
-    )
-}
-
-/// An infinite far plane is the absence of `far`, whatever its row holds.
-fn named(lens: &Lens, rows: [Plane; 6]) -> NamedPlanes {
-    let count = if lens.far().is_some() { 6 } else { 5 };
-    FrustumPlane::ALL
-        .into_iter()
-        .zip(rows)
-        .take(count)
-        .collect()
 }

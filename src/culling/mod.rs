@@ -16,47 +16,20 @@ use crate::query::AnyView;
 
 pub use extended::{bounds, extended, silhouettes};
 
-/// How a box is tested against the volume.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Default, Debug, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum CullingTest {
-    Sphere,
-    #[default]
-    SixPlane,
-    SixBox,
-    Exact,
+named! {
+    /// How a box is tested against the volume.
+    #[derive(Clone, Copy, PartialEq, Eq, Hash, Default, Debug, Serialize, Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum CullingTest, TESTS {
+        Sphere = "sphere", "outside if one plane has the item's bounding sphere on its outer side";
+        #[default]
+        SixPlane = "six-plane", "outside if one plane has the whole box on its outer side (p-vertex)";
+        SixBox = "six-box", "six-plane, and the box must meet the volume's own axis-parallel bounds";
+        Exact = "exact", "six-box, and the volume's silhouettes along the axes: no box too many";
+    }
 }
 
-/// Every test with its name and what it is.
-pub const TESTS: [(CullingTest, &str, &str); 4] = [
-    (
-        CullingTest::Sphere,
-        "sphere",
-        "outside if one plane has the item's bounding sphere on its outer side",
-    ),
-    (
-        CullingTest::SixPlane,
-        "six-plane",
-        "outside if one plane has the whole box on its outer side (p-vertex)",
-    ),
-    (
-        CullingTest::SixBox,
-        "six-box",
-        "six-plane, and the box must meet the volume's own axis-parallel bounds",
-    ),
-    (
-        CullingTest::Exact,
-        "exact",
-        "six-box, and the volume's silhouettes along the axes: no box too many",
-    ),
-];
-
 impl CullingTest {
-    pub fn name(self) -> &'static str {
-        let row = TESTS.iter().find(|row| row.0 == self);
-        row.map_or("", |row| row.1)
-    }
-
     /// Whether the test has planes beyond the volume's own.
     fn is_extended(self) -> bool {
         matches!(self, CullingTest::SixBox | CullingTest::Exact)
@@ -72,38 +45,18 @@ impl CullingTest {
     }
 }
 
-/// In which numbers the test is carried out.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Default, Debug, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Arithmetic {
-    /// f32 planes in scene coordinates, by default moved outward by epsilon.
-    #[default]
-    F32,
-    /// f64 planes, as derived.
-    F64,
-    /// f32 planes about the eye; boxes are moved there first.
-    F32Relative,
-}
-
-/// Every arithmetic with its name and what it is.
-pub const ARITHMETICS: [(Arithmetic, &str, &str); 3] = [
-    (
-        Arithmetic::F32,
-        "f32",
-        "f32 planes in scene coordinates (default)",
-    ),
-    (Arithmetic::F64, "f64", "f64 planes, no epsilon"),
-    (
-        Arithmetic::F32Relative,
-        "f32-relative",
-        "f32 planes about the eye, boxes moved there first",
-    ),
-];
-
-impl Arithmetic {
-    pub fn name(self) -> &'static str {
-        let row = ARITHMETICS.iter().find(|row| row.0 == self);
-        row.map_or("", |row| row.1)
+named! {
+    /// In which numbers the test is carried out.
+    #[derive(Clone, Copy, PartialEq, Eq, Hash, Default, Debug, Serialize, Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum Arithmetic, ARITHMETICS {
+        /// f32 planes in scene coordinates, by default moved outward by epsilon.
+        #[default]
+        F32 = "f32", "f32 planes in scene coordinates (default)";
+        /// f64 planes, as derived.
+        F64 = "f64", "f64 planes, no epsilon";
+        /// f32 planes about the eye; boxes are moved there first.
+        F32Relative = "f32-relative", "f32 planes about the eye, boxes moved there first";
     }
 }
 

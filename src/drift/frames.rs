@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use glam::{DMat3, DVec3};
 use serde::Serialize;
 
-use super::walk::Walker;
+use super::walk::walk;
 use crate::camera::{self, look_at};
 
 /// The turn of every step: yaw, pitch and roll in degrees about the camera's
@@ -76,89 +76,49 @@ macro_rules! precision {
             const LEVEL: [$vector; 3] = [$vector::X, $vector::Y, $vector::Z];
 
             /// Axes that are turned in place.
-            pub struct Frame<const CORRECTION: u8> {
-                axes: [$vector; 3],
-                rotations: u32,
-            }
-
-            impl<const CORRECTION: u8> Walker for Frame<CORRECTION> {
-                type Step = Turn;
-                type Place = DMat3;
-
-                fn start() -> Self {
-                    let (axes, rotations) = (LEVEL, 0);
-                    Frame { axes, rotations }
-                }
-
-                fn step(&mut self, turn: &Turn) {
+            pub fn frame<const CORRECTION: u8>(turn: &Turn, looks: &[u64]) -> Vec<DMat3> {
+                let step = |(axes, rotations): &mut ([$vector; 3], u32), turn: &Turn| {
                     let by = degrees(turn).map(|angle| sin_cos(angle * DEGREE));
-                    self.axes = turned(self.axes, by);
+                    *axes = turned(*axes, by);
                     if CORRECTION == GRAM_SCHMIDT {
-                        let [u, _, n] = self.axes;
+                        let [u, _, n] = *axes;
                         let n = n.normalize();
                         let u = (u - n * u.dot(n)).normalize();
-                        self.axes = [u, n.cross(u), n];
+                        *axes = [u, n.cross(u), n];
                     }
                     if CORRECTION == POLAR {
-                        self.rotations += 3;
-                        if self.rotations >= CORRECT_EVERY {
-                            self.rotations = 0;
-                            let [u, v, n] = self.axes;
+                        *rotations += 3;
+                        if *rotations >= CORRECT_EVERY {
+                            *rotations = 0;
+                            let [u, v, n] = *axes;
                             let x = $matrix::from_cols(u, v, n);
                             let three = $matrix::from_diagonal($vector::splat(3.0));
                             let x = x * (three - x.transpose() * x) * 0.5;
-                            self.axes = [x.x_axis, x.y_axis, x.z_axis];
+                            *axes = [x.x_axis, x.y_axis, x.z_axis];
                         }
                     }
-                }
-
-                fn place(&self) -> DMat3 {
-                    wide(self.axes)
-                }
+                };
+                walk((LEVEL, 0), turn, looks, step, |(axes, _)| wide(*axes))
             }
 
             /// A quaternion that is multiplied by the step's.
-            pub struct Quaternion($quaternion);
-
-            impl Walker for Quaternion {
-                type Step = Turn;
-                type Place = DMat3;
-
-                fn start() -> Self {
-                    Quaternion($quaternion::IDENTITY)
-                }
-
-                fn step(&mut self, turn: &Turn) {
+            pub fn quaternion(turn: &Turn, looks: &[u64]) -> Vec<DMat3> {
+                let step = |q: &mut $quaternion, turn: &Turn| {
                     let half = degrees(turn).map(|angle| sin_cos(angle * DEGREE * 0.5));
                     let [(yaw, yaw_cos), (pitch, pitch_cos), (roll, roll_cos)] = half;
                     let yaw = $quaternion::from_xyzw(0.0, yaw, 0.0, yaw_cos);
                     let pitch = $quaternion::from_xyzw(pitch, 0.0, 0.0, pitch_cos);
                     let roll = $quaternion::from_xyzw(0.0, 0.0, roll, roll_cos);
-                    self.0 = (self.0 * (yaw * pitch * roll)).normalize();
-                }
-
-                fn place(&self) -> DMat3 {
-                    wide(LEVEL.map(|axis| self.0 * axis))
-                }
+                    *q = (*q * (yaw * pitch * roll)).normalize();
+                };
+                let axes = |q: &$quaternion| wide(LEVEL.map(|axis| *q * axis));
+                walk($quaternion::IDENTITY, turn, looks, step, axes)
             }
 
             /// Sums of angles, and the axes that follow from them.
-            pub struct Angles<const KIND: u8> {
-                sums: [$real; 3],
-                axes: [$vector; 3],
-            }
-
-            impl<const KIND: u8> Walker for Angles<KIND> {
-                type Step = Turn;
-                type Place = DMat3;
-
-                fn start() -> Self {
-                    let (sums, axes) = ([0.0; 3], LEVEL);
-                    Angles { sums, axes }
-                }
-
-                fn step(&mut self, turn: &Turn) {
-                    for (sum, angle) in self.sums.iter_mut().zip(degrees(turn)) {
+            pub fn angles<const KIND: u8>(turn: &Turn, looks: &[u64]) -> Vec<DMat3> {
+                let step = |(sums, axes): &mut ([$real; 3], [$vector; 3]), turn: &Turn| {
+                    for (sum, angle) in sums.iter_mut().zip(degrees(turn)) {
                         *sum += if KIND == RADIANS {
                             angle * DEGREE
                         } else {
@@ -170,12 +130,11 @@ macro_rules! precision {
                         }
                     }
                     let unit = if KIND == RADIANS { 1.0 } else { DEGREE };
-                    self.axes = turned(LEVEL, self.sums.map(|sum| sin_cos(sum * unit)));
-                }
-
-                fn place(&self) -> DMat3 {
-                    wide(self.axes)
-                }
+                    *axes = turned(LEVEL, sums.map(|sum| sin_cos(sum * unit)));
+                };
+                walk(([0.0; 3], LEVEL), turn, looks, step, |(_, axes)| {
+                    wide(*axes)
+                })
             }
         }
     };
@@ -185,50 +144,26 @@ precision!(single, f32, Vec3, Quat, Mat3, libm::sinf, libm::cosf);
 precision!(double, f64, DVec3, DQuat, DMat3, libm::sin, libm::cos);
 
 /// The camera of this toolkit.
-pub struct Toolkit(camera::Frame);
-
-impl Walker for Toolkit {
-    type Step = Turn;
-    type Place = DMat3;
-
-    fn start() -> Self {
-        let level = look_at(DVec3::ZERO, -DVec3::Z, DVec3::Y);
-        Toolkit(level.expect("two points and an up vector make a frame"))
-    }
-
-    fn step(&mut self, turn: &Turn) {
-        self.0.yaw(turn.yaw_deg);
-        self.0.pitch(turn.pitch_deg);
-        self.0.roll(turn.roll_deg);
-    }
-
-    fn place(&self) -> DMat3 {
-        DMat3::from_cols(self.0.u(), self.0.v(), self.0.n())
-    }
+pub fn toolkit(turn: &Turn, looks: &[u64]) -> Vec<DMat3> {
+    stretched(turn, looks, 1.0)
 }
 
 /// The same, with angles as the lecture's programs have them.
-pub struct Lecture(Toolkit);
+pub fn lecture(turn: &Turn, looks: &[u64]) -> Vec<DMat3> {
+    #[expect(clippy::approx_constant, reason = "it is what is measured")]
+    const STRETCH: f64 = 3.142 / PI;
+    stretched(turn, looks, STRETCH)
+}
 
-impl Walker for Lecture {
-    type Step = Turn;
-    type Place = DMat3;
-
-    fn start() -> Self {
-        Lecture(Toolkit::start())
-    }
-
-    fn step(&mut self, turn: &Turn) {
-        #[expect(clippy::approx_constant, reason = "it is what is measured")]
-        const STRETCH: f64 = 3.142 / PI;
-        self.0.step(&Turn {
-            yaw_deg: turn.yaw_deg * STRETCH,
-            pitch_deg: turn.pitch_deg * STRETCH,
-            roll_deg: turn.roll_deg * STRETCH,
-        });
-    }
-
-    fn place(&self) -> DMat3 {
-        self.0.place()
-    }
+#[inline(always)]
+fn stretched(turn: &Turn, looks: &[u64], stretch: f64) -> Vec<DMat3> {
+    let level = look_at(DVec3::ZERO, -DVec3::Z, DVec3::Y);
+    let level = level.expect("two points and an up vector make a frame");
+    let step = |frame: &mut camera::Frame, turn: &Turn| {
+        frame.yaw(turn.yaw_deg * stretch);
+        frame.pitch(turn.pitch_deg * stretch);
+        frame.roll(turn.roll_deg * stretch);
+    };
+    let axes = |frame: &camera::Frame| DMat3::from_cols(frame.u(), frame.v(), frame.n());
+    walk(level, turn, looks, step, axes)
 }

@@ -65,27 +65,6 @@ pub struct Rated {
     pub on_front: bool,
 }
 
-impl Rated {
-    /// Good enough if it has an error at all; nothing is compared yet.
-    fn new(
-        name: &'static str,
-        summary: &'static str,
-        error: Option<f64>,
-        ns_per_step: f64,
-    ) -> Rated {
-        Rated {
-            name,
-            summary,
-            is_default: false,
-            error,
-            ns_per_step,
-            qualifies: error.is_some(),
-            dominated_by: None,
-            on_front: false,
-        }
-    }
-}
-
 /// A choice, and why.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Recommendation {
@@ -184,49 +163,58 @@ fn rate_rotations(
     let times = walk::ns_per_step(methods, TIMED_STEPS, |method| {
         (method.walk)(&STEADY, &[TIMED_STEPS]);
     });
-    let rated = methods.iter().zip(times).map(|(method, ns_per_step)| {
+    let rows = methods.iter().map(|method| {
         let last = |d: &&RotationDrift| d.method == method.name && d.steps == options.steps;
         // NaN is no maximum to `max`: a frame that is lost has no error.
         let error = drifts.iter().find(last).and_then(|d| {
             let lost = d.angle_error_rad.is_nan() || d.orthogonality_error.is_nan();
             (!lost).then(|| d.angle_error_rad.max(d.orthogonality_error))
         });
-        Rated {
-            is_default: method.name == rotation::TOOLKIT,
-            qualifies: error.is_some_and(|error| error < options.tolerance_rad),
-            ..Rated::new(method.name, method.summary, error, ns_per_step)
-        }
+        (method.name, method.summary, error)
     });
-    with_front(rated.collect())
+    rated(rows, times, options.tolerance_rad)
 }
 
 fn rate_orbits(drifts: &[OrbitDrift], options: &DriftOptions) -> Vec<Rated> {
     let times = walk::ns_per_step(CARRIERS, TIMED_STEPS, |carrier| {
         (carrier.walk)(&SWING_DEG, &[TIMED_STEPS]);
     });
-    let rated = CARRIERS.iter().zip(times).map(|(carrier, ns_per_step)| {
+    let rows = CARRIERS.iter().map(|carrier| {
         let last = |d: &&OrbitDrift| d.method == carrier.name && d.steps == options.steps;
-        let error = drifts
-            .iter()
-            .find(last)
-            .map(|d| d.position_error / ORBIT_RADIUS);
-        Rated {
-            is_default: carrier.name == orbit::TOOLKIT,
-            qualifies: error.is_some_and(|error| error < options.tolerance_rad),
-            ..Rated::new(carrier.name, carrier.summary, error, ns_per_step)
-        }
+        let last = drifts.iter().find(last);
+        let error = last.map(|d| d.position_error / ORBIT_RADIUS);
+        (carrier.name, carrier.summary, error)
     });
-    with_front(rated.collect())
+    rated(rows, times, options.tolerance_rad)
 }
 
 fn rate_integrators(errors: &[SpringError]) -> Vec<Rated> {
-    let rated = INTEGRATORS.iter().zip(spring::times());
-    let rated = rated.map(|(integrator, ns_per_step)| {
+    let rows = INTEGRATORS.iter().map(|integrator| {
         let own = errors.iter().filter(|e| e.integrator == integrator.name);
         // None of them if one is missing.
         let all: Option<Vec<f64>> = own.map(|e| e.rms_error).collect();
         let error = all.map(|errors| errors.into_iter().fold(0.0, f64::max));
-        Rated::new(integrator.name, integrator.summary, error, ns_per_step)
+        (integrator.name, integrator.summary, error)
+    });
+    rated(rows, spring::times(), f64::INFINITY)
+}
+
+/// Names with summaries and errors, and the time of each: good enough below the
+/// tolerance.
+fn rated(
+    rows: impl Iterator<Item = (&'static str, &'static str, Option<f64>)>,
+    times: Vec<f64>,
+    tolerance: f64,
+) -> Vec<Rated> {
+    let rated = rows.zip(times).map(|((name, summary, error), time)| Rated {
+        name,
+        summary,
+        is_default: [rotation::TOOLKIT, orbit::TOOLKIT].contains(&name),
+        error,
+        ns_per_step: time,
+        qualifies: error.is_some_and(|error| error < tolerance),
+        dominated_by: None,
+        on_front: false,
     });
     with_front(rated.collect())
 }
@@ -252,47 +240,42 @@ fn with_front(mut rated: Vec<Rated>) -> Vec<Rated> {
     rated
 }
 
-fn least(rated: &[Rated], of: impl Fn(&Rated) -> f64) -> Option<&Rated> {
-    let good = rated.iter().filter(|rated| rated.qualifies);
-    good.min_by(|a, b| of(a).total_cmp(&of(b)))
-}
-
 /// The cheapest of the methods that are good enough.
 fn cheapest(rated: &[Rated], options: &DriftOptions) -> Recommendation {
     let rule = format!(
         "an error below {:e} after {:e} steps",
         options.tolerance_rad, options.steps as f64
     );
-    let Some(best) = least(rated, |rated| rated.ns_per_step) else {
-        return Recommendation {
-            name: None,
-            reason: format!("no method has {rule}"),
-        };
-    };
-    Recommendation {
-        name: Some(best.name),
-        reason: format!(
-            "the cheapest of {} methods with {rule}",
-            rated.iter().filter(|rated| rated.qualifies).count()
-        ),
-    }
+    let why = |count| format!("the cheapest of {count} methods with {rule}");
+    least(
+        rated,
+        |rated| rated.ns_per_step,
+        why,
+        || format!("no method has {rule}"),
+    )
 }
 
 /// The least product of error and time among the stable.
 fn best_product(rated: &[Rated]) -> Recommendation {
+    let stable = "stable at every stiffness";
     let product = |rated: &Rated| rated.error.unwrap_or(f64::INFINITY) * rated.ns_per_step;
-    let Some(best) = least(rated, product) else {
-        return Recommendation {
-            name: None,
-            reason: "no integrator is stable at every stiffness".to_owned(),
-        };
-    };
+    let why =
+        |count| format!("the least error times cost of {count} integrators that are {stable}");
+    least(rated, product, why, || format!("no integrator is {stable}"))
+}
+
+/// The least of what qualifies; why that, of so many, or why none.
+fn least(
+    rated: &[Rated],
+    by: impl Fn(&Rated) -> f64,
+    why: impl FnOnce(usize) -> String,
+    why_none: impl FnOnce() -> String,
+) -> Recommendation {
+    let good: Vec<&Rated> = rated.iter().filter(|rated| rated.qualifies).collect();
+    let best = good.iter().min_by(|a, b| by(a).total_cmp(&by(b)));
     Recommendation {
-        name: Some(best.name),
-        reason: format!(
-            "the least error times cost of {} integrators that are stable at every stiffness",
-            rated.iter().filter(|rated| rated.qualifies).count()
-        ),
+        name: best.map(|best| best.name),
+        reason: best.map_or_else(why_none, |_| why(good.len())),
     }
 }
 
@@ -300,27 +283,15 @@ fn best_product(rated: &[Rated]) -> Recommendation {
 mod tests {
     use super::*;
 
-    fn rated(name: &'static str, error: Option<f64>, ns_per_step: f64, tolerance: f64) -> Rated {
-        Rated {
-            name,
-            summary: "",
-            is_default: false,
-            error,
-            ns_per_step,
-            qualifies: error.is_some_and(|error| error < tolerance),
-            dominated_by: None,
-            on_front: false,
-        }
-    }
-
     /// Fast and rough, slow and precise, slower and no better, faster and lost.
     fn four(tolerance: f64) -> Vec<Rated> {
-        with_front(vec![
-            rated("lost", None, 1.0, tolerance),
-            rated("rough", Some(1e-3), 5.0, tolerance),
-            rated("precise", Some(1e-12), 9.0, tolerance),
-            rated("slow", Some(1e-9), 30.0, tolerance),
-        ])
+        let rows = [
+            ("lost", "", None),
+            ("rough", "", Some(1e-3)),
+            ("precise", "", Some(1e-12)),
+            ("slow", "", Some(1e-9)),
+        ];
+        rated(rows.into_iter(), vec![1.0, 5.0, 9.0, 30.0], tolerance)
     }
 
     #[test]

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::exact::Matrix;
 use super::rotation::ORBIT_RADIUS;
-use super::walk::{Walker, walk};
+use super::walk::{Walk, walk};
 use crate::arithmetic::Expansion;
 use crate::camera::{Frame, look_at};
 
@@ -22,136 +22,76 @@ pub struct Carrier {
     pub name: &'static str,
     pub summary: &'static str,
     /// The eye less the centre after each of the ascending numbers of steps.
-    pub walk: fn(&f64, &[u64]) -> Vec<DVec3>,
+    pub walk: Walk<f64, DVec3>,
 }
 
-pub const CARRIERS: &[Carrier] = &[
-    Carrier {
-        name: "f32-carried",
-        summary: "the f32 eye turned about the centre each step",
-        walk: walk::<Single<false>>,
-    },
-    Carrier {
-        name: "f32-carried-radius",
-        summary: "the same, put back to its distance each step",
-        walk: walk::<Single<true>>,
-    },
-    Carrier {
-        name: "f64-carried",
-        summary: "the f64 eye and its axes turned each step, around and over: this toolkit's orbit",
-        walk: walk::<Toolkit>,
-    },
-    Carrier {
-        name: "f64-carried-radius",
-        summary: "the f64 eye alone, put back to its distance each step",
-        walk: walk::<Restored>,
-    },
-    Carrier {
-        name: "f64-angle",
-        summary: "the eye made anew from an f64 angle in degrees, whole turns taken off",
-        walk: walk::<Angle>,
-    },
-];
+pub const CARRIERS: &[Carrier] = rows! { Carrier { name, summary, walk }
+    "f32-carried", "the f32 eye turned about the centre each step", single::<false>;
+    "f32-carried-radius", "the same, put back to its distance each step", single::<true>;
+    TOOLKIT, "the f64 eye and its axes turned each step, around and over: this toolkit's orbit",
+        toolkit;
+    "f64-carried-radius", "the f64 eye alone, put back to its distance each step", restored;
+    "f64-angle", "the eye made anew from an f64 angle in degrees, whole turns taken off", angle;
+};
 
 /// What the toolkit's own orbit does.
 pub const TOOLKIT: &str = "f64-carried";
 
+const START: DVec3 = DVec3::new(CENTRE.x + ORBIT_RADIUS, CENTRE.y, CENTRE.z);
+
+fn from_centre(eye: &DVec3) -> DVec3 {
+    *eye - CENTRE
+}
+
 /// An f32 eye; `RESTORED` says whether its distance is put right.
-struct Single<const RESTORED: bool>(Vec3);
-
-impl<const RESTORED: bool> Walker for Single<RESTORED> {
-    type Step = f64;
-    type Place = DVec3;
-
-    fn start() -> Self {
-        Single((CENTRE + DVec3::X * ORBIT_RADIUS).as_vec3())
-    }
-
-    fn step(&mut self, degrees: &f64) {
+fn single<const RESTORED: bool>(degrees: &f64, looks: &[u64]) -> Vec<DVec3> {
+    let step = |eye: &mut Vec3, degrees: &f64| {
         let half = *degrees as f32 * (std::f32::consts::PI / 180.0) / 2.0;
         let turn = Quat::from_xyzw(0.0, 0.0, libm::sinf(half), libm::cosf(half));
-        let mut offset = turn * (self.0 - CENTRE.as_vec3());
+        let mut offset = turn * (*eye - CENTRE.as_vec3());
         if RESTORED {
             offset = offset.normalize() * ORBIT_RADIUS as f32;
         }
-        self.0 = CENTRE.as_vec3() + offset;
-    }
-
-    fn place(&self) -> DVec3 {
-        self.0.as_dvec3() - CENTRE
-    }
+        *eye = CENTRE.as_vec3() + offset;
+    };
+    walk(START.as_vec3(), degrees, looks, step, |eye| {
+        eye.as_dvec3() - CENTRE
+    })
 }
 
 /// The camera of this toolkit.
-struct Toolkit(Frame);
-
-impl Walker for Toolkit {
-    type Step = f64;
-    type Place = DVec3;
-
-    fn start() -> Self {
-        let frame = look_at(CENTRE + DVec3::X * ORBIT_RADIUS, CENTRE, DVec3::Z);
-        Toolkit(frame.expect("two points and an up vector make a frame"))
-    }
-
-    fn step(&mut self, degrees: &f64) {
-        let turned = self.0.orbit(CENTRE, DVec3::Z, *degrees, 0.0);
+fn toolkit(degrees: &f64, looks: &[u64]) -> Vec<DVec3> {
+    let frame = look_at(START, CENTRE, DVec3::Z);
+    let frame = frame.expect("two points and an up vector make a frame");
+    let step = |frame: &mut Frame, degrees: &f64| {
+        let turned = frame.orbit(CENTRE, DVec3::Z, *degrees, 0.0);
         turned.expect("the z axis is an axis");
-    }
-
-    fn place(&self) -> DVec3 {
-        self.0.eye - CENTRE
-    }
+    };
+    walk(frame, degrees, looks, step, |frame| from_centre(&frame.eye))
 }
 
 /// An f64 eye whose distance is put right.
-struct Restored(DVec3);
-
-impl Walker for Restored {
-    type Step = f64;
-    type Place = DVec3;
-
-    fn start() -> Self {
-        Restored(CENTRE + DVec3::X * ORBIT_RADIUS)
-    }
-
-    fn step(&mut self, degrees: &f64) {
+fn restored(degrees: &f64, looks: &[u64]) -> Vec<DVec3> {
+    let step = |eye: &mut DVec3, degrees: &f64| {
         let half = degrees * (std::f64::consts::PI / 180.0) / 2.0;
         let turn = DQuat::from_xyzw(0.0, 0.0, libm::sin(half), libm::cos(half));
-        let offset = turn * (self.0 - CENTRE);
-        self.0 = CENTRE + offset.normalize() * ORBIT_RADIUS;
-    }
-
-    fn place(&self) -> DVec3 {
-        self.0 - CENTRE
-    }
+        let offset = turn * (*eye - CENTRE);
+        *eye = CENTRE + offset.normalize() * ORBIT_RADIUS;
+    };
+    walk(START, degrees, looks, step, from_centre)
 }
 
 /// No eye but its angle.
-struct Angle {
-    degrees: f64,
-    eye: DVec3,
-}
-
-impl Walker for Angle {
-    type Step = f64;
-    type Place = DVec3;
-
-    fn start() -> Self {
-        let (degrees, eye) = (0.0, CENTRE + DVec3::X * ORBIT_RADIUS);
-        Angle { degrees, eye }
-    }
-
-    fn step(&mut self, degrees: &f64) {
-        self.degrees = (self.degrees + degrees) % 360.0;
-        let angle = self.degrees.to_radians();
+fn angle(degrees: &f64, looks: &[u64]) -> Vec<DVec3> {
+    let step = |(sum, eye): &mut (f64, DVec3), degrees: &f64| {
+        *sum = (*sum + degrees) % 360.0;
+        let angle = sum.to_radians();
         let direction = DVec3::new(libm::cos(angle), libm::sin(angle), 0.0);
-        self.eye = CENTRE + direction * ORBIT_RADIUS;
-    }
-
-    fn place(&self) -> DVec3 {
-        self.eye - CENTRE
-    }
+        *eye = CENTRE + direction * ORBIT_RADIUS;
+    };
+    walk((0.0, START), degrees, looks, step, |(_, eye)| {
+        from_centre(eye)
+    })
 }
 
 /// How far a carried eye is off after so many steps, ten away from its centre.

@@ -7,9 +7,9 @@ use serde::Serialize;
 
 use super::exact::Matrix;
 use super::frames::{
-    DEGREES, GRAM_SCHMIDT, Lecture, NONE, POLAR, RADIANS, Toolkit, Turn, WRAPPED, double, single,
+    DEGREES, GRAM_SCHMIDT, NONE, POLAR, RADIANS, Turn, WRAPPED, double, lecture, single, toolkit,
 };
-use super::walk::{Walker, walk};
+use super::walk::Walk;
 use crate::arithmetic::Expansion;
 
 /// Slow and about no axis in particular.
@@ -63,84 +63,37 @@ pub struct Method {
     pub summary: &'static str,
     pub sum: Sum,
     /// The frame's axes u, v, n after each of the ascending numbers of steps.
-    pub walk: fn(&Turn, &[u64]) -> Vec<DMat3>,
+    pub walk: Walk<Turn, DMat3>,
 }
 
 /// What the toolkit's own camera does.
 pub const TOOLKIT: &str = "f64-polar-100";
 
-pub const METHODS: &[Method] = &[
-    turns::<single::Frame<{ NONE }>>("f32", "f32 axes, turned and never corrected"),
-    turns::<single::Frame<{ GRAM_SCHMIDT }>>(
-        "f32-gram-schmidt",
-        "f32 axes, Gram-Schmidt after each step",
-    ),
-    turns::<single::Frame<{ POLAR }>>(
-        "f32-polar-100",
-        "f32 axes, a Newton step to the polar factor after 100 rotations",
-    ),
-    turns::<single::Quaternion>(
-        "f32-quaternion",
-        "f32 quaternion, normalised after each step",
-    ),
-    angles::<single::Angles<{ RADIANS }>>(
-        "f32-radians",
-        "f32 angles summed in radians, axes made anew by sine and cosine",
-    ),
-    angles::<single::Angles<{ DEGREES }>>("f32-degrees", "the same in degrees"),
-    angles::<single::Angles<{ WRAPPED }>>(
-        "f32-degrees-wrapped",
-        "the same in degrees, whole turns taken off",
-    ),
-    turns::<double::Frame<{ NONE }>>("f64", "f64 axes, turned and never corrected"),
-    turns::<double::Frame<{ GRAM_SCHMIDT }>>(
-        "f64-gram-schmidt",
-        "f64 axes, Gram-Schmidt after each step",
-    ),
-    turns::<Toolkit>(
-        TOOLKIT,
+pub const METHODS: &[Method] = rows! { Method { name, summary, sum, walk }
+    "f32", "f32 axes, turned and never corrected", Sum::Turns, single::frame::<NONE>;
+    "f32-gram-schmidt", "f32 axes, Gram-Schmidt after each step",
+        Sum::Turns, single::frame::<GRAM_SCHMIDT>;
+    "f32-polar-100", "f32 axes, a Newton step to the polar factor after 100 rotations",
+        Sum::Turns, single::frame::<POLAR>;
+    "f32-quaternion", "f32 quaternion, normalised after each step", Sum::Turns, single::quaternion;
+    "f32-radians", "f32 angles summed in radians, axes made anew by sine and cosine",
+        Sum::Angles, single::angles::<RADIANS>;
+    "f32-degrees", "the same in degrees", Sum::Angles, single::angles::<DEGREES>;
+    "f32-degrees-wrapped", "the same in degrees, whole turns taken off",
+        Sum::Angles, single::angles::<WRAPPED>;
+    "f64", "f64 axes, turned and never corrected", Sum::Turns, double::frame::<NONE>;
+    "f64-gram-schmidt", "f64 axes, Gram-Schmidt after each step",
+        Sum::Turns, double::frame::<GRAM_SCHMIDT>;
+    TOOLKIT,
         "f64 axes, a Newton step to the polar factor after 100 rotations: this toolkit's camera",
-    ),
-    turns::<double::Quaternion>(
-        "f64-quaternion",
-        "f64 quaternion, normalised after each step",
-    ),
-    angles::<double::Angles<{ RADIANS }>>("f64-radians", "f64 angles summed in radians"),
-    angles::<double::Angles<{ WRAPPED }>>(
-        "f64-degrees-wrapped",
-        "f64 angles summed in degrees, whole turns taken off",
-    ),
-    turns::<Lecture>(
-        "f64-lecture",
-        "this toolkit's camera with the lecture's 3.142/180 for pi/180",
-    ),
-];
-
-const fn turns<W: Walker<Step = Turn, Place = DMat3>>(
-    name: &'static str,
-    summary: &'static str,
-) -> Method {
-    let (sum, walk) = (Sum::Turns, walk::<W>);
-    Method {
-        name,
-        summary,
-        sum,
-        walk,
-    }
-}
-
-const fn angles<W: Walker<Step = Turn, Place = DMat3>>(
-    name: &'static str,
-    summary: &'static str,
-) -> Method {
-    let (sum, walk) = (Sum::Angles, walk::<W>);
-    Method {
-        name,
-        summary,
-        sum,
-        walk,
-    }
-}
+        Sum::Turns, toolkit;
+    "f64-quaternion", "f64 quaternion, normalised after each step", Sum::Turns, double::quaternion;
+    "f64-radians", "f64 angles summed in radians", Sum::Angles, double::angles::<RADIANS>;
+    "f64-degrees-wrapped", "f64 angles summed in degrees, whole turns taken off",
+        Sum::Angles, double::angles::<WRAPPED>;
+    "f64-lecture", "this toolkit's camera with the lecture's 3.142/180 for pi/180",
+        Sum::Turns, lecture;
+};
 
 /// How far one method is off after so many steps.
 #[derive(Clone, PartialEq, Debug, Serialize)]

@@ -54,14 +54,11 @@ pub struct Integrator {
     follow: fn(&Spring, &[Target]) -> Vec<State>,
 }
 
-/// A row whose loop is compiled for its step, not called through a pointer.
-macro_rules! integrator {
-    ($name:literal, $summary:literal, $step:ident) => {
-        Integrator {
-            name: $name,
-            summary: $summary,
-            step: $step,
-            follow: |spring, targets| {
+/// Rows whose loops are compiled for their steps, not called through a pointer.
+macro_rules! integrators {
+    ($($name:literal, $summary:literal, $step:ident;)+) => {
+        rows! { Integrator { name, summary, step, follow } $($name, $summary, $step,
+            |spring, targets| {
                 let mut state = START;
                 let follow = targets.iter().map(|target| {
                     // Hidden, since frame times vary: factors that depend on
@@ -71,44 +68,20 @@ macro_rules! integrator {
                     state
                 });
                 follow.collect()
-            },
+            };)+
         }
     };
 }
 
-pub const INTEGRATORS: &[Integrator] = &[
-    integrator!(
-        "explicit-euler",
-        "position and velocity by the values before the step",
-        explicit_euler
-    ),
-    integrator!(
-        "semi-implicit-euler",
-        "velocity first, position by the new velocity",
-        semi_implicit_euler
-    ),
-    integrator!("rk4", "the classical Runge-Kutta method of order 4", rk4),
-    integrator!(
-        "implicit-euler",
-        "position and velocity by the values after the step",
-        implicit_euler
-    ),
-    integrator!(
-        "implicit-midpoint",
-        "by the mean of the values before and after",
-        implicit_midpoint
-    ),
-    integrator!(
-        "exact-held",
-        "the closed form for the newest target, held still",
-        exact_held
-    ),
-    integrator!(
-        "exact-linear",
-        "the closed form for a target on a straight line between frames",
-        exact_linear
-    ),
-];
+pub const INTEGRATORS: &[Integrator] = integrators! {
+    "explicit-euler", "position and velocity by the values before the step", explicit_euler;
+    "semi-implicit-euler", "velocity first, position by the new velocity", semi_implicit_euler;
+    "rk4", "the classical Runge-Kutta method of order 4", rk4;
+    "implicit-euler", "position and velocity by the values after the step", implicit_euler;
+    "implicit-midpoint", "by the mean of the values before and after", implicit_midpoint;
+    "exact-held", "the closed form for the newest target, held still", exact_held;
+    "exact-linear", "the closed form for a target on a straight line between frames", exact_linear;
+};
 
 fn acceleration(spring: &Spring, state: State, target: f64) -> f64 {
     let friction = 2.0 * spring.damping_ratio * spring.omega();

@@ -6,28 +6,27 @@ use std::hint::black_box;
 use crate::measure::Stopwatch;
 use crate::statistics::median;
 
-/// Something that moves by equal steps.
-pub trait Walker {
-    type Step;
-    type Place;
+/// Takes equal steps of one kind: the places after each of the ascending numbers
+/// of them.
+pub type Walk<S, P> = fn(&S, &[u64]) -> Vec<P>;
 
-    fn start() -> Self;
-    fn step(&mut self, by: &Self::Step);
-    fn place(&self) -> Self::Place;
-}
-
-/// The places after each of the ascending numbers of steps.
-pub fn walk<W: Walker>(step: &W::Step, looks: &[u64]) -> Vec<W::Place> {
-    let mut walker = W::start();
+/// A [`Walk`] by what a step does to the walker and where that is then.
+pub fn walk<W, S, P>(
+    mut walker: W,
+    by: &S,
+    looks: &[u64],
+    step: impl Fn(&mut W, &S),
+    place: impl Fn(&W) -> P,
+) -> Vec<P> {
     let mut taken = 0;
     let mut places = Vec::with_capacity(looks.len());
     for &look in looks {
         for _ in taken..look {
             // Hidden, so that nothing is computed once for all steps.
-            walker.step(black_box(step));
+            step(&mut walker, black_box(by));
         }
         taken = look;
-        places.push(walker.place());
+        places.push(place(&walker));
     }
     places
 }
@@ -55,28 +54,10 @@ pub fn ns_per_step<J>(jobs: &[J], steps: u64, mut run: impl FnMut(&J)) -> Vec<f6
 mod tests {
     use super::*;
 
-    struct Counter(u64);
-
-    impl Walker for Counter {
-        type Step = u64;
-        type Place = u64;
-
-        fn start() -> Self {
-            Counter(5)
-        }
-
-        fn step(&mut self, by: &u64) {
-            self.0 += by;
-        }
-
-        fn place(&self) -> u64 {
-            self.0
-        }
-    }
-
     #[test]
     fn looks_are_taken_after_exactly_so_many_steps() {
-        assert_eq!(walk::<Counter>(&3, &[0, 1, 10, 10, 12]), [5, 8, 35, 35, 41]);
+        let places = walk(5, &3, &[0, 1, 10, 10, 12], |at, by| *at += by, |at| *at);
+        assert_eq!(places, [5, 8, 35, 35, 41]);
     }
 
     #[test]

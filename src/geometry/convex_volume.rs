@@ -18,37 +18,17 @@ pub const MAX_PLANES: usize = 32;
 /// algorithms for bounding boxes", Journal of Graphics Tools 5(1), p. 15).
 pub type PlaneMask = u32;
 
-/// The names of a view frustum's planes, in the order a camera emits them.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum FrustumPlane {
-    Left,
-    Right,
-    Bottom,
-    Top,
-    Near,
-    Far,
-}
-
-impl FrustumPlane {
-    pub const ALL: [FrustumPlane; 6] = [
-        FrustumPlane::Left,
-        FrustumPlane::Right,
-        FrustumPlane::Bottom,
-        FrustumPlane::Top,
-        FrustumPlane::Near,
-        FrustumPlane::Far,
-    ];
-
-    pub const fn name(self) -> &'static str {
-        match self {
-            FrustumPlane::Left => "left",
-            FrustumPlane::Right => "right",
-            FrustumPlane::Bottom => "bottom",
-            FrustumPlane::Top => "top",
-            FrustumPlane::Near => "near",
-            FrustumPlane::Far => "far",
-        }
+named! {
+    /// The names of a view frustum's planes, in the order a camera emits them.
+    #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum FrustumPlane {
+        Left = "left",
+        Right = "right",
+        Bottom = "bottom",
+        Top = "top",
+        Near = "near",
+        Far = "far",
     }
 }
 

@@ -25,15 +25,18 @@ pub use isa::{Isa, LANES, LaneMask, Pack, Piece};
 pub use machine::{BASELINE, Baseline};
 pub use plain::Plain;
 
-/// An instruction set that queries are compiled for.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
-pub enum Kernel {
-    /// What the program was compiled for: SSE2 on x86-64, NEON on AArch64.
-    Portable,
-    /// 256-bit vectors and the bit instructions of the same generation.
-    Avx2,
-    /// 512-bit vectors: a block of sixteen boxes is one register a row.
-    Avx512,
+named! {
+    /// An instruction set that queries are compiled for, from the smallest to the
+    /// largest.
+    #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+    pub enum Kernel {
+        /// What the program was compiled for: SSE2 on x86-64, NEON on AArch64.
+        Portable = "portable",
+        /// 256-bit vectors and the bit instructions of the same generation.
+        Avx2 = "avx2",
+        /// 512-bit vectors: a block of sixteen boxes is one register a row.
+        Avx512 = "avx512",
+    }
 }
 
 /// A piece of work that [`Kernel::run`] compiles for each instruction set, whose
@@ -55,17 +58,6 @@ pub struct Unavailable {
 }
 
 impl Kernel {
-    /// From the smallest instruction set to the largest.
-    pub const ALL: [Kernel; 3] = [Kernel::Portable, Kernel::Avx2, Kernel::Avx512];
-
-    pub const fn name(self) -> &'static str {
-        match self {
-            Kernel::Portable => "portable",
-            Kernel::Avx2 => "avx2",
-            Kernel::Avx512 => "avx512",
-        }
-    }
-
     /// Whether this processor (and operating system) runs it. Asked once.
     #[inline]
     pub fn is_available(self) -> bool {

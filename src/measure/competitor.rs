@@ -8,25 +8,17 @@ use serde::{Deserialize, Serialize};
 use super::{Answer, Built, Workload};
 use crate::query::{ItemId, Located};
 
-/// Which of the two questions is asked.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Task {
-    /// What does the camera see?
-    Query,
-    /// Where is the camera?
-    Locate,
-    /// Where are all the cameras of the path? Asked at once.
-    LocateBatched,
-}
-
-impl Task {
-    pub fn name(self) -> &'static str {
-        match self {
-            Task::Query => "query",
-            Task::Locate => "locate",
-            Task::LocateBatched => "locate_batched",
-        }
+named! {
+    /// Which of the two questions is asked.
+    #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum Task {
+        /// What does the camera see?
+        Query = "query",
+        /// Where is the camera?
+        Locate = "locate",
+        /// Where are all the cameras of the path? Asked at once.
+        LocateBatched = "locate_batched",
     }
 }
 

@@ -50,40 +50,29 @@ pub use timing::{Sample, Timed, timed, timed_rounds};
 pub use update::{UPDATE_SHARES, move_share};
 pub use workload::{Workload, WorkloadError};
 
-/// What became of a cell. A gap is never silent.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
-#[cfg_attr(test, derive(schemars::JsonSchema))]
-#[serde(rename_all = "snake_case")]
-pub enum Status {
-    /// Every answer equals the reference.
-    Ok,
-    /// An answer holds ids it should not, or one twice.
-    Wrong,
-    /// An answer lacks ids: false negatives.
-    Unsafe,
-    /// The structure cannot take this scene or these parameters.
-    Refused,
-    /// Not run, for a stated reason.
-    LeftOut,
-    TimedOut,
-    Panicked,
-    OutOfMemory,
+named! {
+    /// What became of a cell. A gap is never silent.
+    #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+    #[cfg_attr(test, derive(schemars::JsonSchema))]
+    #[serde(rename_all = "snake_case")]
+    pub enum Status {
+        /// Every answer equals the reference.
+        Ok = "ok",
+        /// An answer holds ids it should not, or one twice.
+        Wrong = "wrong",
+        /// An answer lacks ids: false negatives.
+        Unsafe = "unsafe",
+        /// The structure cannot take this scene or these parameters.
+        Refused = "refused",
+        /// Not run, for a stated reason.
+        LeftOut = "left_out",
+        TimedOut = "timed_out",
+        Panicked = "panicked",
+        OutOfMemory = "out_of_memory",
+    }
 }
 
 impl Status {
-    pub fn name(self) -> &'static str {
-        match self {
-            Status::Ok => "ok",
-            Status::Wrong => "wrong",
-            Status::Unsafe => "unsafe",
-            Status::Refused => "refused",
-            Status::LeftOut => "left_out",
-            Status::TimedOut => "timed_out",
-            Status::Panicked => "panicked",
-            Status::OutOfMemory => "out_of_memory",
-        }
-    }
-
     /// What a wrong answer makes of a structure: a false negative is worse than
     /// anything that is returned too much.
     pub fn of(fault: &Fault) -> Status {

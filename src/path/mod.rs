@@ -81,43 +81,15 @@ pub struct PathFamily {
 }
 
 /// All generated families, in the order of the help.
-pub static PATHS: &[PathFamily] = &[
-    PathFamily {
-        name: "orbit",
-        summary: "a full circle about the scene, looking at its centre",
-        frames: orbit::frames,
-    },
-    PathFamily {
-        name: "flythrough",
-        summary: "a closed spline through seeded way points, looking ahead",
-        frames: flythrough::frames,
-    },
-    PathFamily {
-        name: "spin",
-        summary: "a full turn in place at the centre (yaw)",
-        frames: spin::frames,
-    },
-    PathFamily {
-        name: "zoom",
-        summary: "a dolly towards the centre, then a zoom by field of view",
-        frames: zoom::frames,
-    },
-    PathFamily {
-        name: "teleport",
-        summary: "a new random place and direction every frame: no coherence",
-        frames: teleport::frames,
-    },
-    PathFamily {
-        name: "outside",
-        summary: "the whole scene from outside, from all around",
-        frames: outside::frames,
-    },
-    PathFamily {
-        name: "places",
-        summary: "the scene's own camera places (the things of a Doom map)",
-        frames: places::frames,
-    },
-];
+pub static PATHS: &[PathFamily] = rows! { PathFamily { name, summary, frames }
+    "orbit", "a full circle about the scene, looking at its centre", orbit::frames;
+    "flythrough", "a closed spline through seeded way points, looking ahead", flythrough::frames;
+    "spin", "a full turn in place at the centre (yaw)", spin::frames;
+    "zoom", "a dolly towards the centre, then a zoom by field of view", zoom::frames;
+    "teleport", "a new random place and direction every frame: no coherence", teleport::frames;
+    "outside", "the whole scene from outside, from all around", outside::frames;
+    "places", "the scene's own camera places (the things of a Doom map)", places::frames;
+};
 
 /// Parameters that every generated path takes.
 pub const PATH_PARAMS: &str = "frames=256, seed=1, fovy=60 (degrees), aspect=1.778 (16:9), near=far/1000, \

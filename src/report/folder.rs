@@ -22,21 +22,9 @@ pub(super) const SAMPLES: &str = "samples.csv";
 pub(super) const STREAM: &str = "stream.jsonl";
 /// How names of half-written files begin and end.
 const TEMPORARY: (&str, &str) = (".cullbench-", ".tmp");
-const SAMPLE_COLUMNS: [&str; 13] = [
-    "scene",
-    "path",
-    "cache",
-    "structure",
-    "test",
-    "task",
-    "process",
-    "round",
-    "frame",
-    "queries",
-    "cpu_ns",
-    "wall_ns",
-    "returned",
-];
+/// The first line of samples.csv.
+pub(super) const SAMPLE_COLUMNS: &str = "scene,path,cache,structure,test,task,process,round,frame,\
+                                         queries,cpu_ns,wall_ns,returned\n";
 
 #[derive(Debug, thiserror::Error)]
 pub enum FolderError {
@@ -62,6 +50,16 @@ pub enum FolderError {
         line: usize,
         reason: String,
     },
+}
+
+impl FolderError {
+    /// What the file system says of a path.
+    pub(super) fn io(path: &Path) -> impl Fn(io::Error) -> FolderError + Copy {
+        move |source| FolderError::Io {
+            path: path.to_owned(),
+            source,
+        }
+    }
 }
 
 /// Writes a file whole or not at all. A link stays one, and its target is
@@ -106,10 +104,7 @@ pub fn write_atomically(
         file.persist(target)?;
         Ok(())
     };
-    attempt().map_err(|source| FolderError::Io {
-        path: path.to_owned(),
-        source,
-    })
+    attempt().map_err(FolderError::io(path))
 }
 
 /// A file that is gone when this process ends well, and that the next run in
@@ -145,10 +140,7 @@ impl RunFolder {
     /// # Errors
     /// [`FolderError::Taken`] if it holds a file of a run already.
     pub fn create(path: &Path, header: &Header) -> Result<RunFolder, FolderError> {
-        let io = |source| FolderError::Io {
-            path: path.to_owned(),
-            source,
-        };
+        let io = FolderError::io(path);
         fs::create_dir_all(path).map_err(io)?;
         refuse_taken(path)?;
         // There is no stream without its first line: it gets its name with it.
@@ -183,16 +175,12 @@ impl RunFolder {
 
     /// No samples yet: the names of the columns.
     fn begin_samples(&mut self) -> Result<(), FolderError> {
-        let columns = columns();
         let mut write = || {
             self.samples.set_len(0)?;
-            self.samples.write_all(columns.as_bytes())
+            self.samples.write_all(SAMPLE_COLUMNS.as_bytes())
         };
-        write().map_err(|source| FolderError::Io {
-            path: self.path.join(SAMPLES),
-            source,
-        })?;
-        self.samples_end = columns.len() as u64;
+        write().map_err(FolderError::io(&self.path.join(SAMPLES)))?;
+        self.samples_end = SAMPLE_COLUMNS.len() as u64;
         Ok(())
     }
 
@@ -226,10 +214,7 @@ impl RunFolder {
             text.push(b'\n');
             (&self.stream).write_all(&text)
         };
-        write().map_err(|source| FolderError::Io {
-            path: self.path.join(STREAM),
-            source,
-        })
+        write().map_err(FolderError::io(&self.path.join(STREAM)))
     }
 
     /// Appends a part: its samples first, then the line that refers to them.
@@ -238,34 +223,23 @@ impl RunFolder {
     /// What the file system says.
     pub fn keep(&mut self, part: Part, samples: &[TaskSamples]) -> Result<KeptPart, FolderError> {
         let key = &part.key;
-        let process = part.process.to_string();
         let mut rows = BTreeMap::new();
         let mut write = || -> Result<Vec<u8>, csv::Error> {
             let mut csv = csv::Writer::from_writer(Vec::new());
             for (label, task, samples) in samples {
+                let names =
+                    [&key.scene, &key.path, &key.cache, label, &key.test].map(|name| field(name));
                 for s in samples {
-                    let names =
-                        [&key.scene, &key.path, &key.cache, label, &key.test].map(|n| field(n));
-                    let numbers = [
-                        process.clone(),
-                        s.round.to_string(),
-                        s.frame.to_string(),
-                        s.queries.to_string(),
-                        format!("{:.1}", s.cpu_ns),
-                        format!("{:.1}", s.wall_ns),
-                        s.returned.to_string(),
-                    ];
-                    let names = names.iter().map(AsRef::as_ref).chain([task.name()]);
-                    csv.write_record(names.chain(numbers.iter().map(String::as_str)))?;
+                    let at = (part.process, s.round, s.frame, s.queries);
+                    let [cpu_ns, wall_ns] = [s.cpu_ns, s.wall_ns].map(|ns| format!("{ns:.1}"));
+                    csv.serialize((&names, task.name(), at, cpu_ns, wall_ns, s.returned))?;
                     *rows.entry(label.clone()).or_insert(0) += 1;
                 }
             }
             Ok(csv.into_inner().map_err(csv::IntoInnerError::into_error)?)
         };
-        let io = |source| FolderError::Io {
-            path: self.path.join(SAMPLES),
-            source,
-        };
+        let file = self.path.join(SAMPLES);
+        let io = FolderError::io(&file);
         let text = write().map_err(|error| io(error.into()))?;
         self.samples.write_all(&text).map_err(io)?;
         self.samples_end += text.len() as u64;
@@ -314,10 +288,7 @@ impl StoppedRun {
     /// work in it.
     pub fn open(path: &Path) -> Result<(StoppedRun, Stream), FolderError> {
         let file = path.join(STREAM);
-        let io = |source| FolderError::Io {
-            path: file.clone(),
-            source,
-        };
+        let io = FolderError::io(&file);
         let opened = OpenOptions::new().read(true).append(true).open(&file);
         let lock = opened.map_err(io)?;
         match lock.try_lock() {
@@ -369,10 +340,8 @@ impl StoppedRun {
             stream: self.stream,
             samples_end: 0,
         };
-        let io = |source| FolderError::Io {
-            path: folder.path.clone(),
-            source,
-        };
+        let path = folder.path.clone();
+        let io = FolderError::io(&path);
         folder.stream.set_len(self.length).map_err(io)?;
         match stream.parts.last() {
             Some(kept) => {
@@ -384,16 +353,6 @@ impl StoppedRun {
         folder.sweep();
         Ok(folder)
     }
-}
-
-/// The first line of samples.csv.
-pub(super) fn columns() -> String {
-    SAMPLE_COLUMNS.join(",") + "\n"
-}
-
-/// Where the samples of the first part begin.
-pub(super) fn samples_begin() -> u64 {
-    columns().len() as u64
 }
 
 /// A folder for files that are not whole yet.
@@ -424,10 +383,7 @@ fn open(file: &Path) -> Result<File, FolderError> {
         .append(true)
         .create(true)
         .open(file);
-    opened.map_err(|source| FolderError::Io {
-        path: file.to_owned(),
-        source,
-    })
+    opened.map_err(FolderError::io(file))
 }
 
 /// Bytes of the first lines of a file that are not empty.
@@ -459,71 +415,65 @@ pub fn save_report(folder: &Path, report: &Report) -> Result<(), FolderError> {
     })
 }
 
+/// A column of summary.csv before those of the metrics.
+type Column = (&'static str, fn(&ReportCell) -> String);
+
+const SUMMARY_COLUMNS: [Column; 16] = [
+    ("scene", |cell| field(&cell.scene.name).into_owned()),
+    ("path", |cell| field(&cell.path.name).into_owned()),
+    ("cache", |cell| cell.path.cache.clone()),
+    ("structure", |cell| field(&cell.structure).into_owned()),
+    ("test", |cell| cell.test.clone()),
+    ("arithmetic", |cell| cell.path.arithmetic.clone()),
+    ("planes", |cell| cell.path.planes.clone()),
+    ("epsilon", |cell| cell.path.epsilon.to_string()),
+    ("status", |cell| cell.status.name().to_owned()),
+    ("reason", |cell| {
+        field(cell.reason.as_deref().unwrap_or_default()).into_owned()
+    }),
+    ("rank", |cell| text(cell.rank)),
+    ("processes", |cell| cell.times.processes.to_string()),
+    ("rounds", |cell| cell.times.rounds.to_string()),
+    ("cameras_timed", |cell| cell.times.cameras_timed.to_string()),
+    ("cameras_checked", |cell| {
+        cell.times.cameras_checked.to_string()
+    }),
+    ("total_count", |cell| cell.scene.total_count.to_string()),
+];
+
+/// The metrics whose intervals summary.csv has.
+const WITH_INTERVALS: &[&str] = &[
+    "query_ns",
+    "speedup",
+    "times_read",
+    "times_memcpy",
+    "locate_ns",
+    "build_ms",
+];
+
+/// What there is; an empty field for what there is not.
+fn text(value: Option<impl ToString>) -> String {
+    value.map_or(String::new(), |value| value.to_string())
+}
+
 /// One tidy row per cell; a metric that was not measured is an empty field.
 fn write_summary(cells: &[ReportCell], out: &mut dyn Write) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(out);
-    let mut header: Vec<String> = [
-        "scene",
-        "path",
-        "cache",
-        "structure",
-        "test",
-        "arithmetic",
-        "planes",
-        "epsilon",
-        "status",
-        "reason",
-        "rank",
-        "processes",
-        "rounds",
-        "cameras_timed",
-        "cameras_checked",
-        "total_count",
-    ]
-    .map(str::to_owned)
-    .into();
-    let intervals = [
-        "query_ns",
-        "speedup",
-        "times_read",
-        "times_memcpy",
-        "locate_ns",
-        "build_ms",
-    ];
+    let mut header: Vec<String> = SUMMARY_COLUMNS.map(|(name, _)| name.to_owned()).into();
     for metric in METRICS {
         header.push(metric.name.to_owned());
-        if intervals.contains(&metric.name) {
-            header.push(format!("{}_lower", metric.name));
-            header.push(format!("{}_upper", metric.name));
+        if WITH_INTERVALS.contains(&metric.name) {
+            header.extend(["lower", "upper"].map(|end| format!("{}_{end}", metric.name)));
         }
     }
     csv.write_record(&header)?;
     for cell in cells {
-        let mut row = vec![
-            field(&cell.scene.name).into_owned(),
-            field(&cell.path.name).into_owned(),
-            cell.path.cache.clone(),
-            field(&cell.structure).into_owned(),
-            cell.test.clone(),
-            cell.path.arithmetic.clone(),
-            cell.path.planes.clone(),
-            cell.path.epsilon.to_string(),
-            cell.status.name().to_owned(),
-            field(cell.reason.as_deref().unwrap_or_default()).into_owned(),
-            cell.rank.map_or(String::new(), |rank| rank.to_string()),
-            cell.times.processes.to_string(),
-            cell.times.rounds.to_string(),
-            cell.times.cameras_timed.to_string(),
-            cell.times.cameras_checked.to_string(),
-            cell.scene.total_count.to_string(),
-        ];
-        let text = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
+        let mut row: Vec<String> = SUMMARY_COLUMNS.map(|(_, of)| of(cell)).into();
         for metric in METRICS {
             let found = cell.metrics.get(metric.name);
             row.push(text(found.map(|m| m.value)));
-            if intervals.contains(&metric.name) {
-                row.push(text(found.and_then(|m| m.lower)));
-                row.push(text(found.and_then(|m| m.upper)));
+            if WITH_INTERVALS.contains(&metric.name) {
+                row.extend([found.and_then(|m| m.lower), found.and_then(|m| m.upper)].map(text));
             }
         }
         csv.write_record(&row)?;

@@ -27,58 +27,31 @@ pub static COUNTERS: &[&str] = &[
     "memory_bytes_per_item",
 ];
 
-/// What became of a cell, worst first.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Outcome {
-    /// Was right and is wrong, unsafe or panics.
-    Broken,
-    /// Was right and is not answered any more.
-    Lost,
-    Slower,
-    /// Not the same question: not judged.
-    Different,
-    /// No time above zero on one side at least: not judged.
-    Unmeasured,
-    FailedInBoth,
-    /// Was not right and is.
-    Gained,
-    /// Neither a change nor its absence is proven.
-    Inconclusive,
-    Faster,
-    Same,
+named! {
+    /// What became of a cell, worst first.
+    #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum Outcome {
+        /// Was right and is wrong, unsafe or panics.
+        Broken = "broken",
+        /// Was right and is not answered any more.
+        Lost = "lost",
+        Slower = "slower",
+        /// Not the same question: not judged.
+        Different = "different",
+        /// No time above zero on one side at least: not judged.
+        Unmeasured = "unmeasured",
+        FailedInBoth = "failed_in_both",
+        /// Was not right and is.
+        Gained = "gained",
+        /// Neither a change nor its absence is proven.
+        Inconclusive = "inconclusive",
+        Faster = "faster",
+        Same = "same",
+    }
 }
 
 impl Outcome {
-    pub const ALL: [Outcome; 10] = [
-        Outcome::Broken,
-        Outcome::Lost,
-        Outcome::Slower,
-        Outcome::Different,
-        Outcome::Unmeasured,
-        Outcome::FailedInBoth,
-        Outcome::Gained,
-        Outcome::Inconclusive,
-        Outcome::Faster,
-        Outcome::Same,
-    ];
-
-    /// As JSON has it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Outcome::Broken => "broken",
-            Outcome::Lost => "lost",
-            Outcome::Slower => "slower",
-            Outcome::Different => "different",
-            Outcome::Unmeasured => "unmeasured",
-            Outcome::FailedInBoth => "failed_in_both",
-            Outcome::Gained => "gained",
-            Outcome::Inconclusive => "inconclusive",
-            Outcome::Faster => "faster",
-            Outcome::Same => "same",
-        }
-    }
-
     /// By statuses alone; `None` where both are ok and times decide.
     pub fn of_statuses(old: Status, new: Status) -> Option<Outcome> {
         match (old == Status::Ok, new == Status::Ok) {

@@ -6,7 +6,9 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use super::folder::{self, FolderError, REPORT, SAMPLES, STREAM, SUMMARY, save_report};
+use super::folder::{
+    self, FolderError, REPORT, SAMPLE_COLUMNS, SAMPLES, STREAM, SUMMARY, save_report,
+};
 use super::reading::read_stream;
 use super::stream::{Difference, Header, KeptPart, Line, Stream};
 use crate::measure::GroupKey;
@@ -18,26 +20,9 @@ pub enum MergeError {
     Folder(#[from] FolderError),
     #[error("{}: the run is not finished; expected a finished one (run --resume --out {})", path.display(), path.display())]
     Unfinished { path: PathBuf },
-    #[error("{}: the {} is '{}', and '{}' in {}; expected the same in all shards", path.display(), difference.what, difference.here, difference.before, first.display())]
-    Differs {
-        path: PathBuf,
-        first: PathBuf,
-        difference: Difference,
-    },
-    #[error("{}: a shard of another plan than {}; expected the same scenes, paths and tests", path.display(), first.display())]
-    Plan { path: PathBuf, first: PathBuf },
-    #[error("{}: {pair} is in {} as well; expected every cell in one shard", path.display(), first.display())]
-    Twice {
-        path: PathBuf,
-        first: PathBuf,
-        pair: String,
-    },
-    #[error("{}: scene '{scene}' is another one than in {}; expected the same file", path.display(), first.display())]
-    Scene {
-        path: PathBuf,
-        first: PathBuf,
-        scene: String,
-    },
+    /// `reason` names another folder as well.
+    #[error("{}: {reason}", path.display())]
+    Apart { path: PathBuf, reason: String },
     #[error("{}: {found} bytes; expected {wanted} that stream.jsonl refers to", path.display())]
     Samples {
         path: PathBuf,
@@ -74,9 +59,12 @@ pub fn merge(folders: &[PathBuf], args: &[String], partial: bool) -> Result<Merg
     }
     let (first, begin) = &shards[0];
     for (n, (path, stream)) in shards.iter().enumerate() {
-        belongs(&begin.header, &stream.header, path, first)?;
-        for (before, other) in &shards[..n] {
-            apart(stream, other, path, before)?;
+        let mut before = shards[..n].iter();
+        let reason = another_plan(&begin.header, &stream.header, first)
+            .or_else(|| before.find_map(|(before, other)| overlap(stream, other, before)));
+        if let Some(reason) = reason {
+            let path = path.to_path_buf();
+            return Err(MergeError::Apart { path, reason });
         }
     }
     let whole = begin.header.whole().to_vec();
@@ -88,16 +76,13 @@ pub fn merge(folders: &[PathBuf], args: &[String], partial: bool) -> Result<Merg
     }
     let mut parts = Vec::new();
     for (path, stream) in &shards {
-        let mut from = folder::samples_begin();
+        let mut from = SAMPLE_COLUMNS.len() as u64;
         let file = path.join(SAMPLES);
         for kept in &stream.parts {
             parts.push((kept, (file.clone(), [from, kept.samples_end])));
             from = kept.samples_end;
         }
-        let found = fs::metadata(&file).map_err(|source| FolderError::Io {
-            path: file.clone(),
-            source,
-        })?;
+        let found = fs::metadata(&file).map_err(FolderError::io(&file))?;
         if found.len() < from {
             return Err(MergeError::Samples {
                 path: file,
@@ -113,7 +98,7 @@ pub fn merge(folders: &[PathBuf], args: &[String], partial: bool) -> Result<Merg
         let part = &kept.part;
         (scene(&part.key), part.process, place(&part.key))
     });
-    let mut end = folder::samples_begin();
+    let mut end = SAMPLE_COLUMNS.len() as u64;
     let (mut kept, mut samples) = (Vec::new(), Vec::new());
     for (part, (file, range)) in parts {
         end += range[1] - range[0];
@@ -147,10 +132,7 @@ impl Merged {
     /// # Errors
     /// [`FolderError::Taken`]; what the file system says.
     pub fn write(&self, out: &Path) -> Result<(), FolderError> {
-        let io = |source| FolderError::Io {
-            path: out.to_owned(),
-            source,
-        };
+        let io = FolderError::io(out);
         folder::refuse_taken(out)?;
         let is_new = !out.exists();
         let parent = match out.parent() {
@@ -181,7 +163,7 @@ impl Merged {
 
     fn write_samples(&self, path: &Path) -> io::Result<()> {
         let mut out = BufWriter::new(File::create_new(path)?);
-        out.write_all(folder::columns().as_bytes())?;
+        out.write_all(SAMPLE_COLUMNS.as_bytes())?;
         for (file, [from, to]) in &self.samples {
             let mut file = File::open(file)?;
             file.seek(SeekFrom::Start(*from))?;
@@ -207,38 +189,35 @@ impl Merged {
     }
 }
 
-/// Whether a shard is one of the same plan, from the same machine and build.
-fn belongs(begin: &Header, own: &Header, path: &Path, first: &Path) -> Result<(), MergeError> {
+/// Why a shard is not one of the same plan, from the same machine and build.
+fn another_plan(begin: &Header, own: &Header, first: &Path) -> Option<String> {
     let difference = begin.differs_in_plan(own);
-    if let Some(difference) = difference.or_else(|| begin.differs_in_place(own)) {
-        return Err(MergeError::Differs {
-            path: path.to_owned(),
-            first: first.to_owned(),
-            difference,
-        });
+    let difference = difference.or_else(|| begin.differs_in_place(own));
+    let first = first.display();
+    if let Some(Difference { what, before, here }) = difference {
+        return Some(format!(
+            "the {what} is '{here}', and '{before}' in {first}; expected the same in all shards"
+        ));
     }
-    match begin.whole() == own.whole() {
-        true => Ok(()),
-        false => Err(MergeError::Plan {
-            path: path.to_owned(),
-            first: first.to_owned(),
-        }),
-    }
+    (begin.whole() != own.whole()).then(|| {
+        format!("a shard of another plan than {first}; expected the same scenes, paths and tests")
+    })
 }
 
-/// Whether two shards have no cell in common, and the same scene under a name.
-fn apart(own: &Stream, other: &Stream, path: &Path, first: &Path) -> Result<(), MergeError> {
+/// The cell that two shards have in common, or the scene that is not the same
+/// under one name.
+fn overlap(own: &Stream, other: &Stream, first: &Path) -> Option<String> {
+    let first = first.display();
     let mut groups = own.header.groups.iter();
     if let Some(key) = groups.find(|key| other.header.groups.contains(key)) {
-        return Err(MergeError::Twice {
-            path: path.to_owned(),
-            first: first.to_owned(),
-            pair: pairs(std::slice::from_ref(key)),
-        });
+        let pair = pairs(std::slice::from_ref(key));
+        return Some(format!(
+            "{pair} is in {first} as well; expected every cell in one shard"
+        ));
     }
+    // One that could not be looked at has no digest.
     let scenes = |stream: &'_ Stream| -> Vec<(String, String)> {
         let parts = stream.parts.iter().map(|kept| &kept.part);
-        // One that could not be looked at has no digest.
         let known = parts.filter(|part| !part.scene.digest.is_empty());
         known
             .map(|part| (part.key.scene.clone(), part.scene.digest.clone()))
@@ -249,14 +228,10 @@ fn apart(own: &Stream, other: &Stream, path: &Path, first: &Path) -> Result<(), 
         let mut same = before.iter().filter(|(other, _)| other == name);
         same.any(|(_, other)| other != digest)
     };
-    match scenes(own).into_iter().find(differs) {
-        Some((scene, _)) => Err(MergeError::Scene {
-            path: path.to_owned(),
-            first: first.to_owned(),
-            scene,
-        }),
-        None => Ok(()),
-    }
+    let (scene, _) = scenes(own).into_iter().find(differs)?;
+    Some(format!(
+        "scene '{scene}' is another one than in {first}; expected the same file"
+    ))
 }
 
 /// Scenes with paths, a few of them by name.

@@ -37,10 +37,7 @@ fn read_json(path: PathBuf) -> Result<Report, FolderError> {
     struct Versioned {
         schema_version: u32,
     }
-    let bytes = fs::read(&path).map_err(|source| FolderError::Io {
-        path: path.clone(),
-        source,
-    })?;
+    let bytes = fs::read(&path).map_err(FolderError::io(&path))?;
     let text = std::str::from_utf8(&bytes).map_err(|error| {
         let (good, bad) = bytes.split_at(error.valid_up_to());
         let line = good.iter().filter(|byte| **byte == b'\n').count() + 1;
@@ -100,10 +97,7 @@ fn from_json<'t, T: Deserialize<'t>>(text: &'t str, path: &Path) -> Result<T, Fo
 /// What the file system says; a line that is none (by its number); another
 /// schema version.
 pub fn read_stream(path: &Path) -> Result<(Stream, u64), FolderError> {
-    let bytes = fs::read(path).map_err(|source| FolderError::Io {
-        path: path.to_owned(),
-        source,
-    })?;
+    let bytes = fs::read(path).map_err(FolderError::io(path))?;
     let whole = bytes
         .iter()
         .rposition(|b| *b == b'\n')

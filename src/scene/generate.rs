@@ -38,38 +38,18 @@ impl From<Vec<WorldBox>> for World {
 }
 
 /// All families, in the order of the help.
-pub static FAMILIES: &[Family] = &[
-    Family {
-        name: "uniform",
-        summary: "boxes scattered evenly in a cube",
-        params: "side=1000 (cube edge, m), size=0.2*side/cbrt(n) (mean box edge, m)",
-        build: uniform::build,
-    },
-    Family {
-        name: "clustered",
-        summary: "Gaussian clusters of uneven weight",
-        params: "clusters=64, side=1000 (m), spread=0.02 (standard deviation / side)",
-        build: clustered::build,
-    },
-    Family {
-        name: "city",
-        summary: "a flat grid of blocks: tall buildings, streets, tiny street furniture",
-        params: "block=80 (m), street=16 (m)",
-        build: city::build,
-    },
-    Family {
-        name: "forest",
-        summary: "trees, bushes and rocks on a fractal heightfield",
-        params: "relief=0.12 (height / width), spacing=5 (m between plants)",
-        build: forest::build,
-    },
-    Family {
-        name: "rooms",
-        summary: "an indoor block of cells joined by doors; the cells are the regions",
-        params: "storeys=3, room=6 (mean edge, m)",
-        build: rooms::build,
-    },
-];
+pub static FAMILIES: &[Family] = rows! { Family { name, summary, params, build }
+    "uniform", "boxes scattered evenly in a cube",
+        "side=1000 (cube edge, m), size=0.2*side/cbrt(n) (mean box edge, m)", uniform::build;
+    "clustered", "Gaussian clusters of uneven weight",
+        "clusters=64, side=1000 (m), spread=0.02 (standard deviation / side)", clustered::build;
+    "city", "a flat grid of blocks: tall buildings, streets, tiny street furniture",
+        "block=80 (m), street=16 (m)", city::build;
+    "forest", "trees, bushes and rocks on a fractal heightfield",
+        "relief=0.12 (height / width), spacing=5 (m between plants)", forest::build;
+    "rooms", "an indoor block of cells joined by doors; the cells are the regions",
+        "storeys=3, room=6 (mean edge, m)", rooms::build;
+};
 
 /// Largest scene a spec may ask for: 12 GB while it is made, 7.2 GB then.
 pub(super) const MOST_ITEMS: u64 = 100_000_000;

@@ -16,45 +16,25 @@ pub struct Sample {
     pub bytes: &'static [u8],
 }
 
-macro_rules! sample {
-    ($name:literal, $file:literal, $licence:literal, $summary:literal) => {
-        Sample {
-            name: $name,
-            summary: $summary,
-            licence: $licence,
-            file: $file,
-            bytes: include_bytes!(concat!("../../datasets/", $file)),
+macro_rules! samples {
+    ($($name:literal $file:literal $licence:literal, $summary:literal;)+) => {
+        rows! { Sample { name, file, licence, summary, bytes }
+            $($name, $file, $licence, $summary, include_bytes!(concat!("../../datasets/", $file));)+
         }
     };
 }
 
 /// All of them, in the order of the quick suite.
-pub static SAMPLES: &[Sample] = &[
-    sample!(
-        "freedm-map12",
-        "freedm_map12.wad",
-        "BSD-3-Clause",
-        "small Doom deathmatch map: linedefs and things, 87 BSP leaves as regions"
-    ),
-    sample!(
-        "freedm-map20",
-        "freedm_map20.wad",
-        "BSD-3-Clause",
-        "large Doom deathmatch map, 825 BSP leaves as regions"
-    ),
-    sample!(
-        "helsinki",
-        "helsinki_boxes.csv",
-        "ODbL-1.0, (c) OpenStreetMap contributors",
-        "11,065 objects of central Helsinki in metres"
-    ),
-    sample!(
-        "us-counties",
-        "us_counties_boxes.csv",
-        "ISC",
-        "3,510 flat county boxes in degrees, sizes 1 : 10,000"
-    ),
-];
+pub static SAMPLES: &[Sample] = samples! {
+    "freedm-map12" "freedm_map12.wad" "BSD-3-Clause",
+        "small Doom deathmatch map: linedefs and things, 87 BSP leaves as regions";
+    "freedm-map20" "freedm_map20.wad" "BSD-3-Clause",
+        "large Doom deathmatch map, 825 BSP leaves as regions";
+    "helsinki" "helsinki_boxes.csv" "ODbL-1.0, (c) OpenStreetMap contributors",
+        "11,065 objects of central Helsinki in metres";
+    "us-counties" "us_counties_boxes.csv" "ISC",
+        "3,510 flat county boxes in degrees, sizes 1 : 10,000";
+};
 
 impl Sample {
     pub fn named(name: &str) -> Option<&'static Sample> {

@@ -26,25 +26,15 @@ const POWER: f64 = 1.645;
 /// Beyond so many pairs the answer to "how many more?" is: none would do.
 const MOST_PAIRS: usize = 10_000;
 
-/// How the new times stand to the old.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Change {
-    Slower,
-    Faster,
-    Same,
-    Inconclusive,
-}
-
-impl Change {
-    /// The word in tables and reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Change::Slower => "slower",
-            Change::Faster => "faster",
-            Change::Same => "same",
-            Change::Inconclusive => "inconclusive",
-        }
+named! {
+    /// How the new times stand to the old.
+    #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum Change {
+        Slower = "slower",
+        Faster = "faster",
+        Same = "same",
+        Inconclusive = "inconclusive",
     }
 }
 

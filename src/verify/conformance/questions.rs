@@ -2,19 +2,23 @@
 //! got and compared with the reference. What a structure must do with them is
 //! the properties' business.
 
+use std::ops::Range;
+
 use glam::{DVec3, Vec3};
 
-use super::super::{RandomCase, Reference, edge_volumes};
+use super::super::{RandomCase, Trial, edge_scenes, edge_volumes};
 use super::super::{explain_containment, explain_visibility};
-use crate::camera::{Camera, Frame, Lens, PlaneOptions, Surroundings};
+use crate::camera::{Camera, CameraError, Frame, Lens, PlaneOptions, Surroundings};
 use crate::geometry::{Aabb, ConvexVolume};
 use crate::index::{FrustumQuery, RegionIndex};
 use crate::query::{ItemId, NoRecorder};
 use crate::scene;
 
-pub(super) fn build<T: RegionIndex>(scene: &str, items: &[Aabb]) -> Result<T, String> {
-    T::build(items, None, &T::Params::default())
-        .map_err(|error| format!("{} on '{scene}': {error}", T::INFO.name))
+/// Why a property does not hold.
+pub(super) type Outcome = Result<(), String>;
+
+pub(super) fn build<T: RegionIndex>(items: &[Aabb]) -> Result<T, String> {
+    T::build(items, None, &T::Params::default()).map_err(|error| error.to_string())
 }
 
 /// The answer in the structure's own order.
@@ -36,80 +40,89 @@ pub(super) fn sorted(mut ids: Vec<ItemId>) -> Vec<ItemId> {
     ids
 }
 
-/// `Err` with the first of the words that fails to hold.
-pub(super) fn ensure(holds: bool, otherwise: impl FnOnce() -> String) -> Result<(), String> {
+/// `Err` with the words if it does not hold.
+pub(super) fn ensure(holds: bool, otherwise: impl FnOnce() -> String) -> Outcome {
     if holds { Ok(()) } else { Err(otherwise()) }
 }
 
-/// What an index is asked in a scene.
+/// A scene and what an index is asked in it.
 pub(super) struct Questions {
     pub(super) scene: String,
+    pub(super) items: Vec<Aabb>,
     pub(super) volumes: Vec<ConvexVolume>,
     pub(super) points: Vec<Vec3>,
 }
 
-impl Questions {
-    pub(super) fn on_edge(scene: &str, items: &[Aabb]) -> Questions {
-        Questions {
-            scene: scene.to_owned(),
-            volumes: edge_volumes(items),
-            points: points(items),
-        }
+/// Whether a property holds for a structure, built over each of the scenes. An
+/// error begins with the names of both.
+pub(super) fn each<T: FrustumQuery>(
+    scenes: impl IntoIterator<Item = Questions>,
+    mut holds: impl FnMut(&mut Questions, &mut T) -> Outcome,
+) -> Outcome {
+    for mut questions in scenes {
+        let built = build(&questions.items);
+        let outcome = built.and_then(|mut index| holds(&mut questions, &mut index));
+        outcome.map_err(|why| format!("{} on '{}': {why}", T::INFO.name, questions.scene))?;
     }
+    Ok(())
+}
 
-    pub(super) fn of_case(seed: u64, case: &RandomCase) -> Questions {
-        let mut points = points(&case.items);
-        points.push(case.point);
+/// The [`edge_scenes`] with their volumes.
+pub(super) fn edges() -> impl Iterator<Item = Questions> {
+    edge_scenes().into_iter().map(|(scene, items)| Questions {
+        scene: scene.to_owned(),
+        volumes: edge_volumes(&items),
+        points: points(&items),
+        items,
+    })
+}
+
+/// The [`RandomCase`]s of some seeds: one volume, and the case's point last.
+pub(super) fn cases(seeds: Range<u64>) -> impl Iterator<Item = Questions> {
+    seeds.map(|seed| {
+        let case = RandomCase::new(seed);
         Questions {
             scene: format!("random case {seed}"),
-            volumes: vec![case.volume.clone()],
-            points,
+            volumes: vec![case.volume],
+            points: [points(&case.items), vec![case.point]].concat(),
+            items: case.items,
         }
-    }
+    })
+}
 
-    pub(super) fn visible_is_right<T: FrustumQuery>(
-        &self,
-        index: &T,
-        items: &[Aabb],
-    ) -> Result<(), String> {
-        let mut reference = Reference::new(items.len());
+impl Questions {
+    pub(super) fn visible_is_right<T: FrustumQuery>(&self, index: &T) -> Outcome {
+        let mut trial = Trial::new(self.items.len());
         for (i, volume) in self.volumes.iter().enumerate() {
-            reference.see(items, volume);
-            let difference = reference.compare(&seen(index, volume));
-            ensure(difference.is_none(), || {
-                let first = difference.first.and_then(|id| items.get(id as usize));
-                let why = first.map_or(String::new(), |b| explain_visibility(b, volume));
-                format!(
-                    "{} on '{}', volume {i}: {difference}; {why}",
-                    T::INFO.name,
-                    self.scene
-                )
-            })?;
+            trial.see(&self.items, volume);
+            let answer = trial.ask(|ids| *ids = seen(index, volume));
+            let why = |id: usize| Some(explain_visibility(self.items.get(id)?, volume));
+            answer.map_err(|fault| format!("volume {i}: {}", fault.explained(why)))?;
         }
         Ok(())
     }
 
-    pub(super) fn locate_is_right<T: RegionIndex>(
-        &self,
-        index: &T,
-        items: &[Aabb],
-    ) -> Result<(), String> {
-        let mut reference = Reference::new(items.len());
+    pub(super) fn locate_is_right<T: RegionIndex>(&self, index: &T) -> Outcome {
+        let mut trial = Trial::new(self.items.len());
         for &p in &self.points {
-            let holding = items.iter().zip(0..).filter(|(b, _)| b.contains_point(p));
-            reference.expect(holding.map(|(_, id)| id));
-            let difference = reference.compare(&located(index, p));
-            ensure(difference.is_none(), || {
-                let first = difference.first.and_then(|id| items.get(id as usize));
-                let why = first.map_or(String::new(), |b| explain_containment(b, p));
-                format!(
-                    "{} on '{}', point {p}: {difference}; {why}",
-                    T::INFO.name,
-                    self.scene
-                )
-            })?;
+            trial.expect(self.holding(p));
+            let answer = trial.ask(|ids| *ids = located(index, p));
+            let why = |id: usize| Some(explain_containment(self.items.get(id)?, p));
+            answer.map_err(|fault| format!("point {p}: {}", fault.explained(why)))?;
         }
         Ok(())
+    }
+
+    pub(super) fn both_are_right<T: FrustumQuery>(&self, index: &T) -> Outcome {
+        self.visible_is_right(index)?;
+        self.locate_is_right(index)
+    }
+
+    /// The items whose closed box holds a point.
+    pub(super) fn holding(&self, p: Vec3) -> impl Iterator<Item = ItemId> {
+        let items = self.items.iter().zip(0..);
+        let holding = items.filter(move |(b, _)| b.contains_point(p));
+        holding.map(|(_, id)| id)
     }
 
     /// All answers in the structure's own order: equal for equal structures.
@@ -131,24 +144,22 @@ pub(super) fn points(items: &[Aabb]) -> Vec<Vec3> {
 }
 
 /// Generated worlds with cameras around and within them.
-pub(super) fn generated_scenes(n: usize) -> Result<Vec<(Questions, Vec<Aabb>)>, String> {
+pub(super) fn generated_scenes(n: usize) -> Result<Vec<Questions>, String> {
     let load = |family: &scene::Family| {
         let source = format!("{}:n={n},seed=5", family.name);
         let scene = scene::load(&source, &scene::LoadOptions::default())
             .map_err(|error| format!("{source}: {error}"))?;
-        let questions = Questions {
+        Ok(Questions {
             volumes: camera_volumes(&scene).map_err(|error| format!("{source}: {error}"))?,
             points: points(&scene.items),
             scene: source,
-        };
-        Ok((questions, scene.items))
+            items: scene.items,
+        })
     };
     scene::FAMILIES.iter().map(load).collect()
 }
 
-pub(super) fn camera_volumes(
-    scene: &scene::Scene,
-) -> Result<Vec<ConvexVolume>, crate::camera::CameraError> {
+fn camera_volumes(scene: &scene::Scene) -> Result<Vec<ConvexVolume>, CameraError> {
     let centre = scene.origin + scene.bounds.centre().as_dvec3();
     let radius = scene.bounds.extent().as_dvec3().length() / 2.0;
     let around = Surroundings {

@@ -9,40 +9,33 @@ use crate::query::View;
 /// `visible` returns exactly `{ i : view.sees(items[i]) }` for every kind of
 /// [`View`], over the items and over the cubes of their spheres; a counted
 /// query gives the same ids and evaluates no plane twice.
-pub fn every_view_sees_what_the_scan_sees<T: FrustumQuery>() -> Result<(), String> {
-    for (name, items) in edge_scenes() {
-        let volumes = edge_volumes(&items);
-        // Every kind of plane set, not each of them at each of its places.
-        check::<T>(name, &items, volumes.iter().step_by(5))?;
-    }
-    for seed in SEEDS {
-        let case = RandomCase::new(seed);
-        let scene = format!("random case {seed}");
-        check::<T>(&scene, &case.items, [&case.volume])?;
-    }
-    for (questions, items) in generated_scenes(500)? {
-        check::<T>(&questions.scene, &items, questions.volumes.iter().take(3))?;
-    }
-    Ok(())
+pub fn every_view_sees_what_the_scan_sees<T: FrustumQuery>() -> Outcome {
+    // Every kind of plane set, not each of them at each of its places.
+    each(edges(), |asked, index: &mut T| {
+        check(asked, index, 5, usize::MAX)
+    })?;
+    each(cases(SEEDS), |asked, index: &mut T| {
+        check(asked, index, 1, 1)
+    })?;
+    each(generated_scenes(500)?, |asked, index: &mut T| {
+        check(asked, index, 1, 3)
+    })
 }
 
-fn check<'v, T: FrustumQuery>(
-    scene: &str,
-    items: &[Aabb],
-    volumes: impl IntoIterator<Item = &'v ConvexVolume>,
-) -> Result<(), String> {
+/// Asks with every kind of view of some of the volumes.
+fn check<T: FrustumQuery>(asked: &Questions, index: &T, step: usize, most: usize) -> Outcome {
+    let items = &asked.items;
     let cubes: Vec<Aabb> = items.iter().map(sphere_cube).collect();
-    let (index, index_of_cubes): (T, T) = (build(scene, items)?, build(scene, &cubes)?);
-    for volume in volumes {
-        let spheres = Spheres::new(volume);
+    let index_of_cubes: T = build(&cubes)?;
+    for volume in asked.volumes.iter().step_by(step).take(most) {
         let wide = WideVolume::from_planes(&finer(volume)).map_err(|error| error.to_string())?;
-        right("planes", scene, &index, items, volume)?;
-        right("spheres", scene, &index_of_cubes, &cubes, &spheres)?;
-        right("f64 planes", scene, &index, items, &wide)?;
+        right("planes", index, items, volume)?;
+        right("spheres", &index_of_cubes, &cubes, &Spheres::new(volume))?;
+        right("f64 planes", index, items, &wide)?;
         let eye = items.first().map_or(Vec3::ONE, |b| b.max);
         // A plane may leave f32 on its way to the eye.
         if let Ok(relative) = RelativeVolume::about(eye, volume) {
-            right("planes about the eye", scene, &index, items, &relative)?;
+            right("planes about the eye", index, items, &relative)?;
         }
     }
     Ok(())
@@ -55,30 +48,23 @@ fn finer(volume: &ConvexVolume) -> Vec<WidePlane> {
     turned.collect()
 }
 
-fn right<T: FrustumQuery, V: View>(
-    kind: &str,
-    scene: &str,
-    index: &T,
-    items: &[Aabb],
-    view: &V,
-) -> Result<(), String> {
-    let mut reference = Reference::new(items.len());
+fn right<T: FrustumQuery, V: View>(kind: &str, index: &T, items: &[Aabb], view: &V) -> Outcome {
+    let mut trial = Trial::new(items.len());
     let wanted = items.iter().zip(0..).filter(|(b, _)| view.sees(b));
-    reference.expect(wanted.map(|(_, id)| id));
-    let (mut found, mut counted, mut cost) = (Vec::new(), Vec::new(), QueryCost::default());
-    let _ = index.visible(view, &mut found, &mut NoRecorder);
+    trial.expect(wanted.map(|(_, id)| id));
+    let answer = trial.ask(|ids| {
+        let _ = index.visible(view, ids, &mut NoRecorder);
+    });
+    let why = |id: usize| {
+        let b = items.get(id)?;
+        Some(format!("{b:?} is seen: {}", view.sees(b)))
+    };
+    let found = answer.map_err(|fault| format!("{kind}: {}", fault.explained(why)))?;
+    let (mut counted, mut cost) = (Vec::new(), QueryCost::default());
     let _ = index.visible(view, &mut counted, &mut cost);
-    let difference = reference.compare(&found);
     let most = cost.comparisons() * u64::from(view.mask().count_ones());
-    let holds = difference.is_none() && found == counted && cost.planes_tested <= most;
-    ensure(holds, || {
-        let first = difference.first.and_then(|id| items.get(id as usize));
-        let seen = first.map(|b| (b, view.sees(b)));
-        format!(
-            "{} on '{scene}', {kind}: {difference} (box and whether it is seen: {seen:?}); \
-             {} ids when counted, {cost:?}",
-            T::INFO.name,
-            counted.len()
-        )
+    ensure(found == counted && cost.planes_tested <= most, || {
+        let (plain, counted) = (found.len(), counted.len());
+        format!("{kind}: {plain} ids, {counted} when counted, {cost:?}")
     })
 }

@@ -1,0 +1,52 @@
+//! Tables in the source: enums whose values have names for people and files, and
+//! rows of structs. It owns how such a table is written down.
+
+/// Declares an enum with its names: `ALL` in this order, and `name`. With the name of
+/// a table behind the enum's, each name is followed by what it stands for, and the
+/// table holds all three as rows.
+macro_rules! named {
+    ($(#[$about:meta])* $vis:vis enum $Enum:ident {
+        $($(#[$of:meta])* $value:ident = $name:literal,)+
+    }) => {
+        $(#[$about])*
+        $vis enum $Enum {
+            $($(#[$of])* $value,)+
+        }
+
+        impl $Enum {
+            /// Every value, in the order of the declaration.
+            $vis const ALL: [$Enum; [$($name),+].len()] = [$($Enum::$value),+];
+
+            /// As it is typed, shown and written.
+            $vis const fn name(self) -> &'static str {
+                match self {
+                    $($Enum::$value => $name,)+
+                }
+            }
+        }
+    };
+    ($(#[$about:meta])* $vis:vis enum $Enum:ident, $TABLE:ident {
+        $($(#[$of:meta])* $value:ident = $name:literal, $what:literal;)+
+    }) => {
+        named! {
+            $(#[$about])*
+            $vis enum $Enum {
+                $($(#[$of])* $value = $name,)+
+            }
+        }
+
+        /// Every value with its name and what it is.
+        $vis const $TABLE: [($Enum, &str, &str); $Enum::ALL.len()] =
+            [$(($Enum::$value, $name, $what)),+];
+    };
+}
+
+/// A table of structs, the names of the fields written once.
+macro_rules! rows {
+    (@row $Row:ident { $($field:ident),+ } $($value:expr),+) => {
+        $Row { $($field: $value),+ }
+    };
+    ($Row:ident $fields:tt $($($value:expr),+;)+) => {
+        &[$(rows!(@row $Row $fields $($value),+)),+]
+    };
+}
