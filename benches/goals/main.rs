@@ -133,8 +133,7 @@ fn is_peer(info: &Info) -> bool {
     !info.origin.is_ours()
 }
 
-/// Not a crate, so no goal is set against it; it comes with the peers and
-/// its ratio is shown.
+/// Not a crate, so no goal is set against it; its ratio is shown.
 fn is_own_grid<Name>(kind: Kind, origin: &Origin<Name>) -> bool {
     origin.is_ours() && kind == Kind::Grid
 }

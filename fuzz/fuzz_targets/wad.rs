@@ -11,8 +11,7 @@ fuzz_target!(|bytes: &[u8]| {
         Err(error) => assert!(!error.to_string().contains('\n'), "{error}"),
         Ok(scene) => {
             for place in &scene.places {
-                let p = scene.regions.local_point(place.eye, scene.origin);
-                assert_eq!(scene.regions.holding(p, &scene.items).len(), 1);
+                assert_eq!(scene.holding(&scene.sought(place.eye)).len(), 1);
             }
         }
     }
