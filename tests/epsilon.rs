@@ -301,7 +301,7 @@ fn views_about_the_eye_drop_none_of_them_either() {
             for _ in 0..100 {
                 let scene = scene(&mut dice, kind, offset, 100);
                 let (camera, around) = (scene.setup.camera(), scene.surroundings());
-                let about = |c| camera.relative_volume(c, &around).unwrap();
+                let about = |c| camera.relative_volume(&[], c, &around).unwrap();
                 let (safe, tight) = (about(8.0), about(0.0));
                 let wide = camera.wide_volume(&around).unwrap();
                 for b in &scene.boxes {
@@ -331,7 +331,11 @@ fn about_the_eye_the_margin_does_not_grow_with_the_distance() {
                 ..PlaneOptions::default()
             };
             let planes = match relative {
-                true => camera.relative_volume(c, &around).unwrap().planes().clone(),
+                true => camera
+                    .relative_volume(&[], c, &around)
+                    .unwrap()
+                    .planes()
+                    .clone(),
                 false => camera.volume(&options, &around).unwrap(),
             };
             planes.planes().iter().map(|p| f64::from(p.d)).collect()

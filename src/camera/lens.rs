@@ -74,10 +74,7 @@ impl Lens {
         check_aspect(aspect)?;
         check_window("height", 0.0, height)?;
         finite("near", near)?;
-        finite("far", far)?;
-        if near >= far {
-            return Err(CameraError::NearFar { near, far });
-        }
+        check_far(near, far)?;
         Ok(Lens::Orthographic {
             height,
             aspect,
@@ -119,7 +116,7 @@ impl Lens {
     ///
     /// # Errors
     /// near >= far, no far plane for an orthographic lens, a value that is not
-    /// finite, a matrix.
+    /// finite; a matrix.
     pub fn with_far(&self, far: Option<f64>) -> Result<Lens, CameraError> {
         match *self {
             Lens::Perspective {
@@ -136,7 +133,7 @@ impl Lens {
                 ..
             } => Lens::orthographic(height, aspect, near, far.unwrap_or(f64::INFINITY)),
             Lens::Matrix(_) => Err(CameraError::MatrixFixed {
-                what: "a far plane",
+                what: "near and far planes",
             }),
         }
     }
@@ -201,11 +198,8 @@ fn slope(degrees: f64) -> f64 {
 }
 
 fn check_aspect(aspect: f64) -> Result<(), CameraError> {
-    if aspect > 0.0 && aspect.is_finite() {
-        Ok(())
-    } else {
-        Err(CameraError::Aspect { aspect })
-    }
+    let sound = aspect > 0.0 && aspect.is_finite();
+    sound.then_some(()).ok_or(CameraError::Aspect { aspect })
 }
 
 fn check_depth(near: f64, far: Option<f64>) -> Result<(), CameraError> {
@@ -213,22 +207,20 @@ fn check_depth(near: f64, far: Option<f64>) -> Result<(), CameraError> {
     if near <= 0.0 {
         return Err(CameraError::Near { near });
     }
-    let Some(far) = far else { return Ok(()) };
+    far.map_or(Ok(()), |far| check_far(near, far))
+}
+
+fn check_far(near: f64, far: f64) -> Result<(), CameraError> {
     finite("far", far)?;
-    if near >= far {
-        return Err(CameraError::NearFar { near, far });
-    }
-    Ok(())
+    let error = CameraError::NearFar { near, far };
+    (near < far).then_some(()).ok_or(error)
 }
 
 fn check_window(name: &'static str, low: f64, high: f64) -> Result<(), CameraError> {
     finite(name, low)?;
     finite(name, high)?;
-    if low < high {
-        Ok(())
-    } else {
-        Err(CameraError::Window { name, low, high })
-    }
+    let error = CameraError::Window { name, low, high };
+    (low < high).then_some(()).ok_or(error)
 }
 
 #[cfg(test)]

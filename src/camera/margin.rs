@@ -155,14 +155,9 @@ fn reach(near: &[DVec3; 4], far: Option<&[DVec3; 4]>, of_scene: DVec3) -> DVec3 
 /// # Errors
 /// The largest sum there may be, if not.
 pub(crate) fn check_sums(volume: &ConvexVolume, reach: DVec3) -> Result<(), CameraError> {
-    let sums = volume
-        .planes()
-        .iter()
-        .map(|plane| plane.normal.as_dvec3().abs().dot(reach) + f64::from(plane.d).abs());
+    let planes = volume.planes().iter();
+    let sums = planes.map(|p| p.normal.as_dvec3().abs().dot(reach) + f64::from(p.d).abs());
     let largest = sums.fold(0.0, f64::max);
-    if largest <= LARGEST {
-        Ok(())
-    } else {
-        Err(CameraError::Sums { largest })
-    }
+    let error = CameraError::Sums { largest };
+    (largest <= LARGEST).then_some(()).ok_or(error)
 }

@@ -107,9 +107,6 @@ pub enum CameraError {
 }
 
 pub(crate) fn finite(name: &'static str, value: f64) -> Result<f64, CameraError> {
-    if value.is_finite() {
-        Ok(value)
-    } else {
-        Err(CameraError::NotFinite { name, value })
-    }
+    let error = CameraError::NotFinite { name, value };
+    value.is_finite().then_some(value).ok_or(error)
 }

@@ -137,22 +137,13 @@ impl Camera {
     /// things come on top: the subtraction of the scene's origin in f64 (2^-53
     /// of the local eye), and normals that underflow (2^-150 of x).
     ///
-    /// # Errors
-    /// [`CameraError::Volume`] if the eye or a plane does not fit f32.
-    pub fn relative_volume(
-        &self,
-        epsilon: f64,
-        around: &Surroundings,
-    ) -> Result<RelativeVolume, CameraError> {
-        self.relative_volume_with(&[], epsilon, around)
-    }
-
-    /// The same with further planes, about the eye itself and of unit length:
-    /// see [`Camera::volume_with`].
+    /// Further planes are about the eye itself and of unit length: see
+    /// [`Camera::volume_with`].
     ///
     /// # Errors
-    /// As [`Camera::relative_volume`]; more planes than a volume has.
-    pub fn relative_volume_with(
+    /// [`CameraError::Volume`] if the eye or a plane does not fit f32; more planes
+    /// than a volume has.
+    pub fn relative_volume(
         &self,
         more: &[WidePlane],
         epsilon: f64,
@@ -167,11 +158,9 @@ impl Camera {
         let named = self.derive(&about, PlaneMethod::Frame)?;
         let more: Vec<WidePlane> = more.iter().map(|plane| plane.about(-left)).collect();
         let reach = around.reach.as_dvec3();
-        let is_unknown = around.reach == Vec3::ZERO && self.lens.far().is_some();
-        let of_scene = if is_unknown {
-            DVec3::ZERO
-        } else {
-            reach + zero.abs()
+        let of_scene = match around.reach {
+            Vec3::ZERO if self.lens.far().is_some() => DVec3::ZERO,
+            _ => reach + zero.abs(),
         };
         let options = PlaneOptions {
             epsilon,
@@ -236,19 +225,10 @@ fn gathered(
     moved: impl Fn(Option<FrustumPlane>, &Plane) -> Plane,
 ) -> Result<ConvexVolume, VolumeError> {
     let more = more.iter().map(|plane| (None, plane.narrow()));
-    let all = named
-        .iter()
-        .map(|&(name, plane)| (Some(name), plane))
-        .chain(more);
-    let all = all.map(|(name, plane)| {
-        (
-            name,
-            if epsilon > 0.0 {
-                moved(name, &plane)
-            } else {
-                plane
-            },
-        )
+    let named = named.iter().map(|&(name, plane)| (Some(name), plane));
+    let all = named.chain(more).map(|(name, plane)| match epsilon > 0.0 {
+        true => (name, moved(name, &plane)),
+        false => (name, plane),
     });
     ConvexVolume::from_labelled_planes(&all.collect::<Vec<_>>())
 }

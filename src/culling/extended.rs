@@ -28,47 +28,40 @@ pub fn bounds(faces: &[WidePlane]) -> Vec<WidePlane> {
     /// keep their bounds with that.
     const CANCELLED: f64 = 2e-9;
     let mut tightest: [Option<f64>; 6] = [None; 6];
-    for (i, a) in faces.iter().enumerate() {
-        for (j, b) in faces.iter().enumerate().skip(i + 1) {
-            for c in &faces[j + 1..] {
-                let crossed = [
-                    cross(b.normal, c.normal),
-                    cross(c.normal, a.normal),
-                    cross(a.normal, b.normal),
-                ];
-                for axis in 0..3 {
-                    // Zero where two faces do already (an edge across the
-                    // axis), but for rounding.
-                    let clean = |w: f64| if w.abs() < ROUNDING { 0.0 } else { w };
-                    let given = crossed.map(|w| w[axis]);
-                    let weights = given.map(clean);
-                    let dropped: f64 = given.iter().zip(weights).map(|(w, c)| (w - c).abs()).sum();
-                    let sign = weights.iter().sum::<f64>().signum();
-                    if weights.iter().any(|w| w * sign < 0.0) {
-                        continue;
-                    }
-                    let sum = |of: &dyn Fn(&WidePlane) -> f64| {
-                        let parts = weights.iter().zip([a, b, c]);
-                        parts.map(|(w, plane)| w * sign * of(plane)).sum::<f64>()
-                    };
-                    let (n, d) = (sum(&|p| p.normal[axis]), sum(&|p| p.d));
-                    let offset = d / n.abs();
-                    let sound = n.abs() > CANCELLED && dropped <= UNIT * n.abs();
-                    if sound && offset.is_finite() {
-                        let slot = &mut tightest[2 * axis + usize::from(n < 0.0)];
-                        *slot = Some(slot.map_or(offset, |old| old.min(offset)));
-                    }
-                }
+    for [a, b, c] in triples(faces) {
+        let crossed = [
+            cross(b.normal, c.normal),
+            cross(c.normal, a.normal),
+            cross(a.normal, b.normal),
+        ];
+        for axis in 0..3 {
+            // Zero where two faces do already (an edge across the
+            // axis), but for rounding.
+            let clean = |w: f64| if w.abs() < ROUNDING { 0.0 } else { w };
+            let given = crossed.map(|w| w[axis]);
+            let weights = given.map(clean);
+            let dropped: f64 = given.iter().zip(weights).map(|(w, c)| (w - c).abs()).sum();
+            let sign = weights.iter().sum::<f64>().signum();
+            if weights.iter().any(|w| w * sign < 0.0) {
+                continue;
+            }
+            let sum = |of: &dyn Fn(&WidePlane) -> f64| {
+                let parts = weights.iter().zip([a, b, c]);
+                parts.map(|(w, plane)| w * sign * of(plane)).sum::<f64>()
+            };
+            let (n, d) = (sum(&|p| p.normal[axis]), sum(&|p| p.d));
+            let offset = d / n.abs();
+            let sound = n.abs() > CANCELLED && dropped <= UNIT * n.abs();
+            if sound && offset.is_finite() {
+                let slot = &mut tightest[2 * axis + usize::from(n < 0.0)];
+                *slot = Some(slot.map_or(offset, |old| old.min(offset)));
             }
         }
     }
-    let directions = [DVec3::X, DVec3::Y, DVec3::Z]
-        .into_iter()
-        .flat_map(|axis| [axis, -axis]);
+    let directions = DVec3::AXES.into_iter().flat_map(|axis| [axis, -axis]);
     let found = directions.zip(tightest);
-    found
-        .filter_map(|(normal, d)| Some(WidePlane::new(normal, d?)))
-        .collect()
+    let planes = found.filter_map(|(normal, d)| Some(WidePlane::new(normal, d?)));
+    planes.collect()
 }
 
 /// The silhouettes of the volume seen along the axes: up to eighteen planes
@@ -133,10 +126,9 @@ fn corners(faces: &[WidePlane]) -> Vec<DVec3> {
 /// A plane's value at a point as a share of the magnitudes it is the sum of.
 fn share(plane: &WidePlane, p: DVec3) -> f64 {
     let size = (plane.normal * p).abs().element_sum() + plane.d.abs();
-    if size == 0.0 {
-        0.0
-    } else {
-        plane.value_at(p) / size
+    match size == 0.0 {
+        true => 0.0,
+        false => plane.value_at(p) / size,
     }
 }
 

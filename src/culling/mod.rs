@@ -126,7 +126,7 @@ impl Culling {
             Arithmetic::F32Relative => {
                 let more = self.more(&faces_about_eye(camera)?);
                 let epsilon = self.planes.epsilon;
-                let volume = camera.relative_volume_with(&more, epsilon, around)?;
+                let volume = camera.relative_volume(&more, epsilon, around)?;
                 Ok(CameraView::Relative(volume))
             }
         }

@@ -18,6 +18,12 @@ pub struct State {
     pub velocity: f64,
 }
 
+impl State {
+    pub const fn new(position: f64, velocity: f64) -> State {
+        State { position, velocity }
+    }
+}
+
 /// Below this, the square of the angle (or of its hyperbolic kin) goes into
 /// series instead of being divided by; their first term left out is 3e-17.
 const SERIES_BELOW: f64 = 1e-2;
@@ -66,35 +72,28 @@ impl Spring {
         let (cosh, sinhc) = self.damped_pair(t);
         let State { position, velocity } = state;
         let (rate, sinhc) = (self.damping_ratio * self.omega(), sinhc * t);
-        State {
-            position: (cosh + rate * sinhc) * position + sinhc * velocity,
-            velocity: (cosh - rate * sinhc) * velocity - self.stiffness * sinhc * position,
-        }
+        State::new(
+            (cosh + rate * sinhc) * position + sinhc * velocity,
+            (cosh - rate * sinhc) * velocity - self.stiffness * sinhc * position,
+        )
     }
 
     /// The arm at time `t` that was at `start` at time zero and whose target
     /// is at `sin t`.
     pub fn follows_sine(&self, start: State, t: f64) -> State {
         // The steady answer is Im(H e^it), H = k / (k - 1 + 2 i zeta omega).
-        let (re, im) = (
-            self.stiffness - 1.0,
-            2.0 * self.damping_ratio * self.omega(),
-        );
+        let re = self.stiffness - 1.0;
+        let im = 2.0 * self.damping_ratio * self.omega();
         let size = self.stiffness / (re * re + im * im);
         let steady = |t: f64| State {
             position: size * (re * libm::sin(t) - im * libm::cos(t)),
             velocity: size * (re * libm::cos(t) + im * libm::sin(t)),
         };
         let (first, now) = (steady(0.0), steady(t));
-        let rest = State {
-            position: start.position - first.position,
-            velocity: start.velocity - first.velocity,
-        };
+        let (x, v) = (first.position, first.velocity);
+        let rest = State::new(start.position - x, start.velocity - v);
         let rest = self.released(rest, t);
-        State {
-            position: now.position + rest.position,
-            velocity: now.velocity + rest.velocity,
-        }
+        State::new(now.position + rest.position, now.velocity + rest.velocity)
     }
 }
 

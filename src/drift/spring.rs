@@ -19,10 +19,7 @@ pub const STIFFNESSES: [f64; 7] = [1.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6];
 
 /// Where the arm begins: one away from its target `sin t`, so that both the
 /// way in and the steady chase count.
-const START: State = State {
-    position: 1.0,
-    velocity: 0.0,
-};
+const START: State = State::new(1.0, 0.0);
 
 /// A camera a thousand times as far away as its target ever is has blown up.
 const BLOWN_UP: f64 = 1e3;
@@ -89,28 +86,23 @@ fn acceleration(spring: &Spring, state: State, target: f64) -> f64 {
 }
 
 fn explicit_euler(spring: &Spring, state: State, target: &Target, h: f64) -> State {
-    State {
-        position: state.position + h * state.velocity,
-        velocity: state.velocity + h * acceleration(spring, state, target.start),
-    }
+    let pull = acceleration(spring, state, target.start);
+    State::new(
+        state.position + h * state.velocity,
+        state.velocity + h * pull,
+    )
 }
 
 fn semi_implicit_euler(spring: &Spring, state: State, target: &Target, h: f64) -> State {
     let velocity = state.velocity + h * acceleration(spring, state, target.start);
-    State {
-        position: state.position + h * velocity,
-        velocity,
-    }
+    State::new(state.position + h * velocity, velocity)
 }
 
 fn rk4(spring: &Spring, state: State, target: &Target, h: f64) -> State {
-    let slope = |at: State, target| State {
-        position: at.velocity,
-        velocity: acceleration(spring, at, target),
-    };
-    let ahead = |slope: State, h: f64| State {
-        position: state.position + h * slope.position,
-        velocity: state.velocity + h * slope.velocity,
+    let slope = |at: State, target| State::new(at.velocity, acceleration(spring, at, target));
+    let ahead = |slope: State, h: f64| {
+        let State { position, velocity } = slope;
+        State::new(state.position + h * position, state.velocity + h * velocity)
     };
     let first = slope(state, target.start);
     let second = slope(ahead(first, h / 2.0), target.middle);
@@ -118,47 +110,33 @@ fn rk4(spring: &Spring, state: State, target: &Target, h: f64) -> State {
     let fourth = slope(ahead(third, h), target.end);
     let mean =
         |of: fn(State) -> f64| (of(first) + 2.0 * of(second) + 2.0 * of(third) + of(fourth)) / 6.0;
-    let mean = State {
-        position: mean(|s| s.position),
-        velocity: mean(|s| s.velocity),
-    };
-    ahead(mean, h)
+    ahead(State::new(mean(|s| s.position), mean(|s| s.velocity)), h)
 }
 
 /// `v' = v + h a(x + h v', v')`, solved for v'.
 fn implicit_euler(spring: &Spring, state: State, target: &Target, h: f64) -> State {
-    let (k, friction) = (
-        spring.stiffness,
-        2.0 * spring.damping_ratio * spring.omega(),
-    );
+    let k = spring.stiffness;
+    let friction = 2.0 * spring.damping_ratio * spring.omega();
     let push = h * k * (target.end - state.position);
     let velocity = (state.velocity + push) / (1.0 + h * friction + h * h * k);
-    State {
-        position: state.position + h * velocity,
-        velocity,
-    }
+    State::new(state.position + h * velocity, velocity)
 }
 
 /// Half a step of implicit Euler to the middle and as far again.
 fn implicit_midpoint(spring: &Spring, state: State, target: &Target, h: f64) -> State {
     let end = target.middle;
     let middle = implicit_euler(spring, state, &Target { end, ..*target }, h / 2.0);
-    State {
-        position: 2.0 * middle.position - state.position,
-        velocity: 2.0 * middle.velocity - state.velocity,
-    }
+    let beyond = |middle: f64, from: f64| 2.0 * middle - from;
+    State::new(
+        beyond(middle.position, state.position),
+        beyond(middle.velocity, state.velocity),
+    )
 }
 
 fn exact_held(spring: &Spring, state: State, target: &Target, h: f64) -> State {
-    let offset = State {
-        position: state.position - target.end,
-        ..state
-    };
+    let offset = State::new(state.position - target.end, state.velocity);
     let offset = spring.released(offset, h);
-    State {
-        position: target.end + offset.position,
-        ..offset
-    }
+    State::new(target.end + offset.position, offset.velocity)
 }
 
 /// Behind a target of constant speed s the arm settles `2 zeta s / omega`
@@ -166,15 +144,10 @@ fn exact_held(spring: &Spring, state: State, target: &Target, h: f64) -> State {
 fn exact_linear(spring: &Spring, state: State, target: &Target, h: f64) -> State {
     let speed = (target.end - target.start) / h;
     let behind = 2.0 * spring.damping_ratio / spring.omega() * speed;
-    let offset = State {
-        position: state.position - (target.start - behind),
-        velocity: state.velocity - speed,
-    };
-    let offset = spring.released(offset, h);
-    State {
-        position: target.end - behind + offset.position,
-        velocity: speed + offset.velocity,
-    }
+    let from = state.position - (target.start - behind);
+    let offset = spring.released(State::new(from, state.velocity - speed), h);
+    let position = target.end - behind + offset.position;
+    State::new(position, speed + offset.velocity)
 }
 
 /// One integrator at one stiffness.

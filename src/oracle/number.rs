@@ -37,18 +37,14 @@ impl Precision {
     }
 
     fn cut(self, value: Expansion) -> Expansion {
-        if value.terms().len() > self.terms {
-            value.leading(self.terms)
-        } else {
-            value
+        match value.terms().len() > self.terms {
+            true => value.leading(self.terms),
+            false => value,
         }
     }
 
     pub fn add(self, a: &Number, b: &Number) -> Number {
-        Number {
-            value: self.cut(&a.value + &b.value),
-            size: a.size + b.size,
-        }
+        Number::new(self.cut(&a.value + &b.value), a.size + b.size)
     }
 
     pub fn subtract(self, a: &Number, b: &Number) -> Number {
@@ -56,10 +52,7 @@ impl Precision {
     }
 
     pub fn multiply(self, a: &Number, b: &Number) -> Number {
-        Number {
-            value: self.cut(&a.value * &b.value),
-            size: a.size * b.size,
-        }
+        Number::new(self.cut(&a.value * &b.value), a.size * b.size)
     }
 
     /// `a*d - b*c`.
@@ -74,22 +67,17 @@ impl Precision {
 
     /// -1, 0 or 1; 0 also for what may be nothing but noise.
     pub fn sign(self, a: &Number) -> i32 {
-        if self.is_noise(a.value.estimate(), a.size) {
-            0
-        } else {
-            a.value.sign()
+        match self.is_noise(a.value.estimate(), a.size) {
+            true => 0,
+            false => a.value.sign(),
         }
     }
 
     /// The number, or a clean zero if it may be nothing but noise.
     pub fn cleaned(self, a: Number) -> Number {
-        if self.sign(&a) == 0 {
-            Number {
-                value: Expansion::ZERO,
-                ..a
-            }
-        } else {
-            a
+        match self.sign(&a) {
+            0 => Number::new(Expansion::ZERO, a.size),
+            _ => a,
         }
     }
 }
@@ -121,18 +109,18 @@ impl From<f64> for Number {
 }
 
 impl Number {
+    fn new(value: Expansion, size: f64) -> Number {
+        Number { value, size }
+    }
+
     pub fn negated(&self) -> Number {
-        Number {
-            value: -&self.value,
-            size: self.size,
-        }
+        Number::new(-&self.value, self.size)
     }
 
     pub fn absolute(&self) -> Number {
-        if self.value.sign() < 0 {
-            self.negated()
-        } else {
-            self.clone()
+        match self.value.sign() {
+            -1 => self.negated(),
+            _ => self.clone(),
         }
     }
 

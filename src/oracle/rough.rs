@@ -22,38 +22,27 @@ pub(super) struct Rough {
 
 impl Rough {
     fn of(value: f64) -> Rough {
-        Rough {
-            value,
-            size: value.abs(),
-        }
+        Rough::new(value, value.abs())
+    }
+
+    fn new(value: f64, size: f64) -> Rough {
+        Rough { value, size }
     }
 
     fn times(self, other: Rough) -> Rough {
-        Rough {
-            value: self.value * other.value,
-            size: self.size * other.size,
-        }
+        Rough::new(self.value * other.value, self.size * other.size)
     }
 
     fn plus(self, other: Rough) -> Rough {
-        Rough {
-            value: self.value + other.value,
-            size: self.size + other.size,
-        }
+        Rough::new(self.value + other.value, self.size + other.size)
     }
 
     fn negated(self) -> Rough {
-        Rough {
-            value: -self.value,
-            ..self
-        }
+        Rough::new(-self.value, self.size)
     }
 
     fn abs(self) -> Rough {
-        Rough {
-            value: self.value.abs(),
-            ..self
-        }
+        Rough::new(self.value.abs(), self.size)
     }
 
     pub fn error(self) -> f64 {
@@ -120,6 +109,7 @@ impl RoughSpaces {
             .iter()
             .map(|c| [0, 1, 2].map(|k| Rough::of(c.normal[k].estimate())))
             .collect();
+        let offsets = constraints.iter().map(|c| Rough::of(c.d.estimate()));
         let count = normals.len();
         let mut crosses = Vec::with_capacity(count * count);
         for a in &normals {
@@ -135,10 +125,7 @@ impl RoughSpaces {
             }
         }
         RoughSpaces {
-            offsets: constraints
-                .iter()
-                .map(|c| Rough::of(c.d.estimate()))
-                .collect(),
+            offsets: offsets.collect(),
             normals,
             crosses,
             determinants,
@@ -239,12 +226,8 @@ impl RoughSpaces {
                 continue;
             }
             // The weakest bound of t that the errors allow.
-            let reach = most
-                / if most >= 0.0 {
-                    slope - error
-                } else {
-                    slope + error
-                };
+            let error = if most >= 0.0 { -error } else { error };
+            let reach = most / (slope + error);
             let reach = reach + reach.abs() * SLACK;
             if b.value > 0.0 {
                 from = from.max(-reach);

@@ -32,21 +32,20 @@ pub(super) fn for_visible_share(
     let visible = |scale: f64| -> Result<f64, PathError> {
         let mut seen = 0;
         for camera in &sample {
-            seen += count(camera, scale, &items, &around).map_err(|e| unfit(path, &e))?;
+            seen += count(camera, scale, &items, &around).map_err(|e| PathError::unfit(path, e))?;
         }
         Ok(seen as f64 / (items.len() * sample.len()).max(1) as f64)
     };
     let (mut low, mut high) = (1e-4, 4.0);
     let most = visible(high)?;
     if most < share {
-        return Err(PathError::Unfit {
-            path: path.to_owned(),
-            reason: format!(
-                "visible={share} cannot be reached: at most {:.2}% of '{}' is visible along it",
-                most * 100.0,
-                scene.name
+        let (percent, scene) = (most * 100.0, &scene.name);
+        return Err(PathError::unfit(
+            path,
+            format_args!(
+                "visible={share} cannot be reached: at most {percent:.2}% of '{scene}' is visible along it"
             ),
-        });
+        ));
     }
     for _ in 0..16 {
         let middle = f64::sqrt(low * high);
@@ -64,14 +63,7 @@ pub(super) fn scaled(path: &str, cameras: &[Camera], scale: f64) -> Result<Vec<C
     let scaled = cameras.iter().map(|camera| rescaled(camera, scale));
     scaled
         .collect::<Result<_, _>>()
-        .map_err(|e| unfit(path, &e))
-}
-
-fn unfit(path: &str, error: &CameraError) -> PathError {
-    PathError::Unfit {
-        path: path.to_owned(),
-        reason: error.to_string(),
-    }
+        .map_err(|e| PathError::unfit(path, e))
 }
 
 fn count(

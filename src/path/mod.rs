@@ -113,6 +113,13 @@ pub enum PathError {
     Unfit { path: String, reason: String },
 }
 
+impl PathError {
+    fn unfit(path: &str, reason: impl ToString) -> PathError {
+        let (path, reason) = (path.to_owned(), reason.to_string());
+        PathError::Unfit { path, reason }
+    }
+}
+
 /// What a path is made for.
 pub(crate) struct Stage<'a> {
     scene: &'a Scene,
@@ -223,10 +230,8 @@ pub fn load_scaled(
     spec.finish()?;
     let cameras = optics.cameras(source, &poses)?;
     if cameras.is_empty() {
-        return Err(PathError::Unfit {
-            path: source.to_owned(),
-            reason: "no camera in it; expected at least one".to_owned(),
-        });
+        let reason = "no camera in it; expected at least one";
+        return Err(PathError::unfit(source, reason));
     }
     let lens_scale = match (optics.visible, scale) {
         (Some(_), Some(scale)) => Some(scale),

@@ -6,13 +6,11 @@ use crate::spec::Spec;
 
 pub(super) fn frames(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, PathError> {
     if stage.scene.places.is_empty() {
-        return Err(PathError::Unfit {
-            path: "places".to_owned(),
-            reason: format!(
-                "scene '{}' has no camera places of its own",
-                stage.scene.name
-            ),
-        });
+        let reason = format!(
+            "scene '{}' has no camera places of its own",
+            stage.scene.name
+        );
+        return Err(PathError::unfit("places", reason));
     }
     let places = stage.scene.places.iter();
     Ok(places

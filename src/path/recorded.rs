@@ -63,19 +63,22 @@ pub fn read_cameras_csv(
         eyes(table, defaults)?
     };
     if cameras.is_empty() {
-        return Err(InputError::Line {
-            file: file.to_owned(),
-            line: 2,
-            found: "no camera".to_owned(),
-            expected: "at least one row after the header".to_owned(),
-        }
-        .into());
+        return Err(without_rows(file, "no camera").into());
     }
     Ok(CameraPath {
         lens_scale: None,
         name: file.to_owned(),
         cameras,
     })
+}
+
+fn without_rows(file: &str, found: &str) -> InputError {
+    InputError::Line {
+        file: file.to_owned(),
+        line: 2,
+        found: found.to_owned(),
+        expected: "at least one row after the header".to_owned(),
+    }
 }
 
 /// The camera's own message says what was expected.
@@ -88,31 +91,16 @@ fn refused(row: &Row, error: &CameraError) -> InputError {
 }
 
 /// Columns that say what a matrix says already.
-const OF_EYES: [&str; 16] = [
-    "eye_x",
-    "eye_y",
-    "eye_z",
-    "look_x",
-    "look_y",
-    "look_z",
-    "forward_x",
-    "forward_y",
-    "forward_z",
-    "up_x",
-    "up_y",
-    "up_z",
-    "fovy_deg",
-    "aspect",
-    "near",
-    "far",
-];
+const OF_EYES: &str = "eye_x eye_y eye_z look_x look_y look_z forward_x forward_y forward_z \
+                       up_x up_y up_z fovy_deg aspect near far";
 
 fn matrices(
     mut table: TableReader<impl Read>,
     convention: Option<MatrixConvention>,
 ) -> Result<Vec<Camera>, InputError> {
     let columns = table.columns(&MATRIX_ENTRIES)?;
-    if let Some(other) = OF_EYES.iter().find(|name| table.column(name).is_some()) {
+    let mut of_eyes = OF_EYES.split(' ');
+    if let Some(other) = of_eyes.find(|name| table.column(name).is_some()) {
         return Err(table.error(
             format!("columns of a matrix and '{other}'"),
             "m00 to m33 alone, or an eye and a lens".to_owned(),
@@ -149,14 +137,9 @@ fn eyes(
     } else {
         table.columns(&["look_x", "look_y", "look_z"])?
     };
-    let up = match table
-        .column("up_x")
-        .or(table.column("up_y"))
-        .or(table.column("up_z"))
-    {
-        Some(_) => Some(table.columns(&["up_x", "up_y", "up_z"])?),
-        None => None,
-    };
+    let up = ["up_x", "up_y", "up_z"];
+    let has_up = up.iter().any(|name| table.column(name).is_some());
+    let up = has_up.then(|| table.columns(&up)).transpose()?;
     let [fovy, aspect, near, far] = ["fovy_deg", "aspect", "near", "far"].map(|c| table.column(c));
     let mut cameras = Vec::new();
     while let Some(row) = table.next_row() {
@@ -171,13 +154,12 @@ fn eyes(
             Some(columns) => vector(&row, columns)?,
             None => defaults.up,
         };
+        let infinite = |column| {
+            let text = row.text(column).to_lowercase();
+            ["", "inf", "+inf", "infinity"].contains(&text.as_str())
+        };
         let far = match far {
-            Some(column)
-                if ["", "inf", "+inf", "infinity"]
-                    .contains(&row.text(column).to_lowercase().as_str()) =>
-            {
-                None
-            }
+            Some(column) if infinite(column) => None,
             Some(column) => Some(row.finite_number(column)?),
             None => defaults.far.unwrap_or(Some(FAR)),
         };
@@ -215,12 +197,7 @@ pub fn read_points_csv(input: impl Read, file: &str) -> Result<Vec<DVec3>, Input
         points.push(vector(&row?, columns)?);
     }
     if points.is_empty() {
-        return Err(InputError::Line {
-            file: file.to_owned(),
-            line: 2,
-            found: "no point".to_owned(),
-            expected: "at least one row after the header".to_owned(),
-        });
+        return Err(without_rows(file, "no point"));
     }
     Ok(points)
 }

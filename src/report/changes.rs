@@ -5,10 +5,10 @@
 use std::collections::BTreeMap;
 
 use super::judging::{Changes, CommonShift, JudgedRow, Lone, Outcome, work_changes};
-use super::matching::{Pair, asked_otherwise, matched, timed_otherwise};
+use super::matching::{Pair, asked_otherwise, grouped, matched, timed_otherwise};
 use super::{Report, ReportCell};
 use crate::measure::{CellKey, GroupKey, Status, Verdict};
-use crate::statistics::{Change, Judgement, judge_unpaired, median, trimmed_mean};
+use crate::statistics::{Judgement, judge_unpaired, median, trimmed_mean};
 
 /// Fewer other structures cannot tell which of them moved: the median of three
 /// stays where it is when one of them moves, that of two does not.
@@ -152,14 +152,10 @@ fn by_metric(pairs: &[Pair], metric: &'static str, threshold: f64) -> Vec<Judged
                     Some(reason) => {
                         (row.outcome, row.reason) = (Outcome::Different, Some(reason));
                     }
-                    None => candidates.push((
-                        rows.len(),
-                        Candidate {
-                            key,
-                            centred: centred(&logs),
-                            logs,
-                        },
-                    )),
+                    None => {
+                        let centred = centred(&logs);
+                        candidates.push((rows.len(), Candidate { key, logs, centred }));
+                    }
                 }
             }
         }
@@ -189,15 +185,12 @@ fn by_metric(pairs: &[Pair], metric: &'static str, threshold: f64) -> Vec<Judged
 /// ln(time) less what moved the median of the others, process by process;
 /// `None` with too few others.
 fn relative<'c>(own: &Candidate, all: impl Iterator<Item = &'c Candidate>) -> Option<Logs> {
-    let others: Vec<&Candidate> = all
-        .filter(|other| {
-            other.key.group == own.key.group
-                && other.key.structure != own.key.structure
-                && [0, 1]
-                    .iter()
-                    .all(|&s| other.logs[s].len() == own.logs[s].len())
-        })
-        .collect();
+    let others = all.filter(|other| {
+        let same = |side: usize| other.logs[side].len() == own.logs[side].len();
+        let (key, own) = (&other.key, &own.key);
+        key.group == own.group && key.structure != own.structure && same(0) && same(1)
+    });
+    let others: Vec<&Candidate> = others.collect();
     if others.len() < LEAST_OTHERS {
         return None;
     }
@@ -214,15 +207,9 @@ fn relative<'c>(own: &Candidate, all: impl Iterator<Item = &'c Candidate>) -> Op
 
 /// The quotient of the two values, which decides nothing.
 fn by_values(row: &JudgedRow) -> Option<Judgement> {
-    Some(Judgement {
-        change: Change::Inconclusive,
-        ratio: Some(row.new? / row.old?).filter(|ratio| is_sound(*ratio))?,
-        lower: None,
-        upper: None,
-        resolution: None,
-        more_pairs: None,
-        pairs: row.processes[0].min(row.processes[1]),
-    })
+    let ratio = Some(row.new? / row.old?).filter(|ratio| is_sound(*ratio))?;
+    let pairs = row.processes[0].min(row.processes[1]);
+    Some(Judgement::without_interval(ratio, pairs))
 }
 
 fn why_unmeasured(values: (Option<f64>, Option<f64>)) -> String {
@@ -248,18 +235,12 @@ fn why_inconclusive(has_others: bool, processes: [usize; 2]) -> Option<String> {
 /// Per process, the mean over the groups of the median over the structures, by
 /// the first metric; `None` without a cell that both have timed.
 fn common_shift(pairs: &[Pair]) -> Option<CommonShift> {
-    let mut groups: Vec<(GroupKey, Vec<Logs>)> = Vec::new();
-    for &pair in pairs {
+    let timed = pairs.iter().filter_map(|&pair| {
         let is_ok = pair.0.status == Status::Ok && timed_otherwise(pair).is_none();
-        let Some(logs) = logs(pair, super::JUDGED_METRICS[0]).filter(|_| is_ok) else {
-            continue;
-        };
-        let group = pair.1.key().group;
-        match groups.iter_mut().find(|found| found.0 == group) {
-            Some(found) => found.1.push(centred(&logs)),
-            None => groups.push((group, vec![centred(&logs)])),
-        }
-    }
+        let logs = logs(pair, super::JUDGED_METRICS[0]).filter(|_| is_ok)?;
+        Some((pair.1.key().group, centred(&logs)))
+    });
+    let groups: Vec<(GroupKey, Vec<Logs>)> = grouped(timed);
     // What is not there in every process is paired with nothing.
     let all = || groups.iter().flat_map(|group| &group.1);
     let counts = [0, 1].map(|side| all().map(|logs| logs[side].len()).max().unwrap_or(0));
@@ -272,12 +253,8 @@ fn common_shift(pairs: &[Pair]) -> Option<CommonShift> {
     let of = |side: usize| -> Vec<f64> {
         let process = |process: usize| -> f64 {
             let medians = whole.iter().filter_map(|cells| {
-                median(
-                    &cells
-                        .iter()
-                        .map(|logs| logs[side][process])
-                        .collect::<Vec<_>>(),
-                )
+                let logs = cells.iter().map(|logs| logs[side][process]);
+                median(&logs.collect::<Vec<f64>>())
             });
             medians.sum::<f64>() / whole.len() as f64
         };

@@ -1,6 +1,7 @@
 //! How cost grows with the number of items while the number of visible ones
 //! stays the same: the exponent e of N^e, from the cells of a report.
 
+use super::matching::grouped;
 use super::surface::world_of;
 use super::{Report, ReportCell};
 use crate::measure::Status;
@@ -30,22 +31,15 @@ const LEAST_SIZES: usize = 3;
 /// All structures that were measured on at least three sizes of a world with
 /// (about) the same number of visible items by the same kind of path.
 pub fn growths(report: &Report) -> Vec<Growth<'_>> {
-    let mut series: Vec<(Key, Vec<Point>)> = Vec::new();
-    for cell in report.cells.iter().filter(|c| c.status == Status::Ok) {
-        let values = (cell.value("visible_count"), cell.value("query_ns"));
-        let (Some(visible), Some(ns)) = values else {
-            continue;
-        };
-        if visible <= 0.0 || ns <= 0.0 {
-            continue;
-        }
-        let (key, point) = (key(cell), (cell.scene.total_count, visible, ns));
-        match series.iter_mut().find(|s| s.0 == key) {
-            Some(found) => found.1.push(point),
-            None => series.push((key, vec![point])),
-        }
-    }
-    series.into_iter().flat_map(of_series).collect()
+    let ok = report.cells.iter().filter(|c| c.status == Status::Ok);
+    let points = ok.filter_map(|cell| {
+        let (visible, ns) = (cell.value("visible_count")?, cell.value("query_ns")?);
+        let point = (cell.scene.total_count, visible, ns);
+        // A NaN stays, and has no slope.
+        let nothing = visible <= 0.0 || ns <= 0.0;
+        (!nothing).then(|| (key(cell), point))
+    });
+    grouped(points).into_iter().flat_map(of_series).collect()
 }
 
 type Key<'r> = (String, &'r str, &'r str, &'r str, &'r str);

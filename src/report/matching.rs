@@ -5,6 +5,18 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::ReportCell;
 
+/// Values by their key, both in the order in which they come.
+pub(super) fn grouped<K: PartialEq, V>(pairs: impl Iterator<Item = (K, V)>) -> Vec<(K, Vec<V>)> {
+    let mut groups: Vec<(K, Vec<V>)> = Vec::new();
+    for (key, value) in pairs {
+        match groups.iter_mut().find(|group| group.0 == key) {
+            Some(group) => group.1.push(value),
+            None => groups.push((key, vec![value])),
+        }
+    }
+    groups
+}
+
 /// The name in an order, and how many cells of that name come before it: a
 /// report that holds a cell twice loses none of them.
 type Key<'r> = ([&'r str; 7], u64, usize);

@@ -1,6 +1,7 @@
 //! Reading a report: which cells were asked the same, and in which order they
 //! come. Ranks are the run's own; nothing here decides a tie.
 
+use super::matching::grouped;
 use super::{Report, ReportCell};
 use crate::measure::{Judged, Status};
 
@@ -28,21 +29,12 @@ fn key(cell: &ReportCell) -> Key<'_> {
 
 /// All comparisons of a report, in the order in which they were measured.
 pub fn comparisons(report: &Report) -> Vec<Comparison<'_>> {
-    let mut keys: Vec<Key> = Vec::new();
-    for cell in &report.cells {
-        if !keys.contains(&key(cell)) {
-            keys.push(key(cell));
-        }
-    }
-    keys.into_iter()
-        .map(|wanted| {
-            let same = |cell: &&ReportCell| key(cell) == wanted;
-            Comparison {
-                ranked: ranked(report.cells.iter().filter(same).collect()),
-                bounds: report.bounds.iter().filter(same).collect(),
-            }
-        })
-        .collect()
+    let cells = report.cells.iter().map(|cell| (key(cell), cell));
+    let comparison = |(wanted, cells): (Key<'_>, Vec<_>)| Comparison {
+        ranked: ranked(cells),
+        bounds: report.bounds.iter().filter(|b| key(b) == wanted).collect(),
+    };
+    grouped(cells).into_iter().map(comparison).collect()
 }
 
 /// Time by which a cell is ranked. Nothing is found faster among no items.
@@ -83,23 +75,24 @@ impl<'r> Comparison<'r> {
         first.map(|r| r.cell)
     }
 
+    /// The cells with a rank, fastest first.
+    pub fn sound(&self) -> impl Iterator<Item = &'r ReportCell> {
+        let ranked = self.ranked.iter().filter(|r| r.rank.is_some());
+        ranked.map(|r| r.cell)
+    }
+
     /// The fastest structure that is not this crate's own and whose answers are
     /// right.
     pub fn fastest_peer(&self) -> Option<&'r ReportCell> {
-        let sound = self.ranked.iter().filter(|r| r.rank.is_some());
-        let mut cells = sound.map(|r| r.cell);
-        cells.find(|cell| cell.origin.as_ref().is_some_and(|origin| !origin.is_ours()))
+        let mut sound = self.sound();
+        sound.find(|cell| cell.origin.as_ref().is_some_and(|origin| !origin.is_ours()))
     }
 
     /// The fewest and the most of a number, over the cells that were timed.
     pub fn range(&self, of: impl Fn(&ReportCell) -> usize) -> Option<(usize, usize)> {
         let cells = self.ranked.iter().map(|r| r.cell);
-        let timed = || {
-            cells
-                .clone()
-                .filter(|cell| cell.times.processes > 0)
-                .map(&of)
-        };
+        let timed = cells.filter(|cell| cell.times.processes > 0);
+        let timed = || timed.clone().map(&of);
         Some((timed().min()?, timed().max()?))
     }
 

@@ -2,6 +2,7 @@
 //! and the share of them that is visible, and from which size on a structure is
 //! faster than the linear scan. Read off a report; nothing is measured.
 
+use super::matching::grouped;
 use super::{Comparison, ReportCell};
 use crate::measure::YARDSTICK;
 
@@ -64,37 +65,30 @@ fn class_of(share: f64) -> f64 {
 /// The surfaces of all comparisons that ranked anything, in the order in which
 /// they were measured.
 pub fn surfaces(comparisons: Vec<Comparison<'_>>) -> Vec<Surface<'_>> {
-    let mut all: Vec<Surface> = Vec::new();
-    for comparison in comparisons {
+    let places = comparisons.into_iter().filter_map(|comparison| {
         let about = comparison.about();
-        let (Some(culled), Some(_)) = (comparison.of_any("cull_rate"), comparison.winners().next())
-        else {
-            continue;
-        };
-        let share = 1.0 - culled;
+        let share = 1.0 - comparison.of_any("cull_rate")?;
+        comparison.winners().next()?;
         // Nothing is visible: no place on a logarithmic axis.
         if share.is_nan() || share <= 0.0 {
-            continue;
+            return None;
         }
         let (cache, test) = (about.path.cache.as_str(), about.test.as_str());
-        let world = world_of(&about.scene.name);
         let place = Place {
             items: about.scene.total_count,
             share,
             class: class_of(share),
             comparison,
         };
-        let same = |s: &&mut Surface| s.world == world && s.cache == cache && s.test == test;
-        match all.iter_mut().find(same) {
-            Some(surface) => surface.places.push(place),
-            None => all.push(Surface {
-                world,
-                cache,
-                test,
-                places: vec![place],
-            }),
-        }
-    }
+        Some(((world_of(&about.scene.name), cache, test), place))
+    });
+    let surface = |((world, cache, test), places)| Surface {
+        world,
+        cache,
+        test,
+        places,
+    };
+    let mut all: Vec<Surface> = grouped(places).into_iter().map(surface).collect();
     for surface in &mut all {
         surface.places.sort_by(|a, b| {
             let by_share = || a.share.total_cmp(&b.share);
@@ -118,9 +112,8 @@ impl<'r> Place<'r> {
 
     /// The sound cell of a structure.
     pub fn cell(&self, structure: &str) -> Option<&'r ReportCell> {
-        let ranked = self.comparison.ranked.iter().filter(|r| r.rank.is_some());
-        let mut cells = ranked.map(|r| r.cell);
-        cells.find(|cell| cell.structure == structure)
+        let mut sound = self.comparison.sound();
+        sound.find(|cell| cell.structure == structure)
     }
 }
 
@@ -158,8 +151,7 @@ impl Surface<'_> {
     fn names(&self, is_one: impl Fn(&ReportCell) -> bool) -> Vec<&str> {
         let mut names: Vec<&str> = Vec::new();
         for place in &self.places {
-            let sound = place.comparison.ranked.iter().filter(|r| r.rank.is_some());
-            for cell in sound.map(|r| r.cell).filter(|cell| is_one(cell)) {
+            for cell in place.comparison.sound().filter(|cell| is_one(cell)) {
                 if !names.contains(&cell.structure.as_str()) {
                     names.push(&cell.structure);
                 }

@@ -93,31 +93,18 @@ impl BspNode {
     /// others; the engine's 16.16 truncation is not imitated.
     pub fn side(&self, p: DVec2) -> usize {
         if self.dx == 0.0 {
-            let back = if p.x <= self.x {
-                self.dy > 0.0
-            } else {
-                self.dy < 0.0
-            };
-            return usize::from(back);
+            let along = if p.x <= self.x { self.dy } else { -self.dy };
+            return usize::from(along > 0.0);
         }
         if self.dy == 0.0 {
-            let back = if p.y <= self.y {
-                self.dx < 0.0
-            } else {
-                self.dx > 0.0
-            };
-            return usize::from(back);
+            let along = if p.y <= self.y { -self.dx } else { self.dx };
+            return usize::from(along > 0.0);
         }
         let (dx, dy) = (p.x - self.x, p.y - self.y);
         // The engine's short cut by sign bits; it differs from the products
         // below only for a point exactly at the line's start.
-        let odd = [self.dy, self.dx, dx, dy]
-            .iter()
-            .filter(|v| **v < 0.0)
-            .count()
-            % 2
-            == 1;
-        if odd {
+        let parts = [self.dy, self.dx, dx, dy].into_iter();
+        if parts.filter(|v| *v < 0.0).count() % 2 == 1 {
             return usize::from((self.dy < 0.0) != (dx < 0.0));
         }
         let (left, right) = (self.dy * dx, dy * self.dx);
@@ -293,17 +280,13 @@ fn clip(polygon: &[DVec2], node: &BspNode, side: usize) -> Vec<DVec2> {
 /// point of the square belongs to keeps an empty polygon; it gets a point box
 /// outside the square, which region search never enters.
 fn planar_bounds(polygon: &[DVec2]) -> Aabb {
-    let (low, high) = polygon
-        .iter()
-        .fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), &p| {
-            (low.min(p), high.max(p))
-        });
     if polygon.is_empty() {
-        return Aabb::new(
-            Vec3::splat(f32::from(i16::MAX) * 2.0),
-            Vec3::splat(f32::from(i16::MAX) * 2.0),
-        );
+        let beyond = Vec3::splat(f32::from(i16::MAX) * 2.0);
+        return Aabb::new(beyond, beyond);
     }
+    let low = polygon.iter().fold(DVec2::INFINITY, |low, p| low.min(*p));
+    let high = polygon.iter();
+    let high = high.fold(DVec2::NEG_INFINITY, |high, p| high.max(*p));
     Aabb::rounded_outward(
         (low - CELL_MARGIN).extend(0.0),
         (high + CELL_MARGIN).extend(0.0),

@@ -76,10 +76,8 @@ impl WadMap {
         for thing in &self.things {
             let at = DVec2::new(thing.x, thing.y);
             // Things are 16-bit, so the descent always ends in a leaf.
-            let floor = self
-                .bsp
-                .descend(at)
-                .map_or(0.0, |leaf| self.leaf_floors[leaf as usize]);
+            let leaf = self.bsp.descend(at);
+            let floor = leaf.map_or(0.0, |leaf| self.leaf_floors[leaf as usize]);
             let base = at.extend(floor);
             let (edge, height) = thing.size();
             boxes.push(WorldBox::standing(base, DVec3::new(edge, edge, height)));
@@ -108,10 +106,9 @@ impl Thing {
     /// Width and height (linuxdoom 1.10, info.c: players 16 by 56, the
     /// pickups of a deathmatch map 20 by 16).
     fn size(&self) -> (f64, f64) {
-        if self.is_start() {
-            (32.0, 56.0)
-        } else {
-            (40.0, 16.0)
+        match self.is_start() {
+            true => (32.0, 56.0),
+            false => (40.0, 16.0),
         }
     }
 
@@ -121,10 +118,9 @@ impl Thing {
 }
 
 fn or_none(names: &[String]) -> String {
-    if names.is_empty() {
-        "none".to_owned()
-    } else {
-        names.join(", ")
+    match names {
+        [] => "none".to_owned(),
+        _ => names.join(", "),
     }
 }
 
@@ -160,17 +156,9 @@ impl<'a> Wad<'a> {
                 let found = format!("the end of the file in directory entry {i} of {count}");
                 return Err(wad.error(bytes.len(), found, "16 bytes an entry"));
             };
-            let name: String = entry[8..16]
-                .iter()
-                .take_while(|b| **b != 0)
-                .map(|&b| {
-                    if b.is_ascii_graphic() {
-                        b.to_ascii_uppercase() as char
-                    } else {
-                        '?'
-                    }
-                })
-                .collect();
+            let shown = |b: &u8| b.is_ascii_graphic().then(|| b.to_ascii_uppercase() as char);
+            let name = entry[8..16].iter().take_while(|b| **b != 0);
+            let name: String = name.map(|b| shown(b).unwrap_or('?')).collect();
             let (offset, size) = (i32_at(entry, 0), i32_at(entry, 4));
             let range = usize::try_from(offset).ok().zip(usize::try_from(size).ok());
             let data =
@@ -178,7 +166,7 @@ impl<'a> Wad<'a> {
             let Some(data) = data else {
                 let found = format!("lump {name} at {offset}, {size} bytes long");
                 let expected = format!("a lump within the file's {} bytes", bytes.len());
-                return Err(wad.error(at, found, &expected));
+                return Err(wad.error(at, found, expected));
             };
             wad.lumps.push(Lump {
                 name,
@@ -191,52 +179,45 @@ impl<'a> Wad<'a> {
 
     fn header_int(&self, at: usize) -> Result<usize, InputError> {
         let Some(field) = self.bytes.get(at..at + 4) else {
-            return Err(self.error(
-                self.bytes.len(),
-                "the end of the file".into(),
-                "a 12 byte header",
-            ));
+            let end = self.bytes.len();
+            return Err(self.error(end, "the end of the file", "a 12 byte header"));
         };
         let value = i32_at(field, 0);
         usize::try_from(value)
             .map_err(|_| self.error(at, value.to_string(), "a count or offset of at least 0"))
     }
 
-    fn error(&self, offset: usize, found: String, expected: &str) -> InputError {
+    fn error(
+        &self,
+        offset: usize,
+        found: impl Into<String>,
+        expected: impl Into<String>,
+    ) -> InputError {
         InputError::Byte {
             file: self.file.to_owned(),
             offset: offset as u64,
-            found,
-            expected: expected.to_owned(),
+            found: found.into(),
+            expected: expected.into(),
         }
     }
 
     fn map(&self, name: &str, marker: usize) -> Result<WadMap, InputError> {
         let here: Vec<&Lump> = self.lumps[marker..].iter().skip(1).take(11).collect();
         if let Some(hexen) = here.iter().find(|l| l.name == "BEHAVIOR") {
-            return Err(self.error(
-                hexen.offset,
-                "a Hexen map (BEHAVIOR)".into(),
-                "Doom's map format",
-            ));
+            let found = "a Hexen map (BEHAVIOR)";
+            return Err(self.error(hexen.offset, found, "Doom's map format"));
         }
         let mut tables = Vec::with_capacity(LUMPS.len());
         for (lump, record) in LUMPS.iter().zip([10, 14, 30, 4, 12, 4, 28, 26]) {
             let Some(found) = here.iter().find(|l| l.name == *lump) else {
                 let at = self.lumps[marker].offset;
-                return Err(self.error(
-                    at,
-                    format!("map {name} without {lump}"),
-                    "all lumps of a Doom map",
-                ));
+                let found = format!("map {name} without {lump}");
+                return Err(self.error(at, found, "all lumps of a Doom map"));
             };
             if found.data.len() % record != 0 {
                 let what = format!("{lump} of {} bytes", found.data.len());
-                return Err(self.error(
-                    found.offset,
-                    what,
-                    &format!("a multiple of {record} bytes"),
-                ));
+                let expected = format!("a multiple of {record} bytes");
+                return Err(self.error(found.offset, what, expected));
             }
             tables.push(Table {
                 wad: self,
@@ -273,12 +254,7 @@ impl<'a> Wad<'a> {
                 }
             }
             if low > high {
-                return Err(lines.error(
-                    i,
-                    10,
-                    "a linedef without a side".into(),
-                    "at least one side",
-                ));
+                return Err(lines.error(i, 10, "a linedef without a side", "at least one side"));
             }
             line_boxes.push(WorldBox::new(a.min(b).extend(low), a.max(b).extend(high)));
         }
@@ -286,7 +262,7 @@ impl<'a> Wad<'a> {
         for i in 0..leaves.len() {
             let count = leaves.word(i, 0);
             if count == 0 {
-                return Err(leaves.error(i, 0, "a subsector of 0 segs".into(), "at least one"));
+                return Err(leaves.error(i, 0, "a subsector of 0 segs", "at least one"));
             }
             let seg = leaves.index(i, 2, segs)?;
             let line = segs.index(seg, 6, lines)?;
@@ -300,10 +276,9 @@ impl<'a> Wad<'a> {
         let child = |i: usize, at: usize| -> BspChild {
             let word = nodes.word(i, at);
             let index = u32::from(word & 0x7FFF);
-            if word & 0x8000 == 0 {
-                BspChild::Node(index)
-            } else {
-                BspChild::Leaf(index)
+            match word & 0x8000 {
+                0 => BspChild::Node(index),
+                _ => BspChild::Leaf(index),
             }
         };
         let tree: Vec<BspNode> = (0..nodes.len())
@@ -371,9 +346,15 @@ impl Table<'_> {
         Err(self.error(i, at, found, format!("less than {}", of.len())))
     }
 
-    fn error(&self, i: usize, at: usize, found: String, expected: impl Into<String>) -> InputError {
+    fn error(
+        &self,
+        i: usize,
+        at: usize,
+        found: impl Into<String>,
+        expected: impl Into<String>,
+    ) -> InputError {
         let offset = self.lump.offset + i * self.record + at;
-        self.wad.error(offset, found, &expected.into())
+        self.wad.error(offset, found, expected)
     }
 }
 

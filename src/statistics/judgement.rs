@@ -56,6 +56,21 @@ pub struct Judgement {
     pub pairs: usize,
 }
 
+impl Judgement {
+    /// A quotient that decides nothing.
+    pub(crate) fn without_interval(ratio: f64, pairs: usize) -> Judgement {
+        Judgement {
+            change: Change::Inconclusive,
+            ratio,
+            lower: None,
+            upper: None,
+            resolution: None,
+            more_pairs: None,
+            pairs,
+        }
+    }
+}
+
 /// Judges the cells of a comparison of two binaries. Per cell: ln(new / old) of
 /// each pair of processes; `threshold` 0.05 is 5 %. `None` for a cell with under
 /// three pairs, or with a value that is not finite.
@@ -76,10 +91,8 @@ pub struct Judgement {
 /// proven loss, which a series of 2 % steps would turn into any loss at all. Who
 /// wants to tolerate it compares `lower` with a tolerance.
 pub fn judge(differences: &[Vec<f64>], threshold: f64) -> Vec<Option<Judgement>> {
-    judge_estimates(
-        differences.iter().map(|d| trimmed_mean(d)).collect(),
-        threshold,
-    )
+    let estimates = differences.iter().map(|d| trimmed_mean(d));
+    judge_estimates(estimates.collect(), threshold)
 }
 
 /// Whether every judged cell is known finely enough: the rule by which a
@@ -102,42 +115,29 @@ pub(super) fn judge_estimates(
     let below: Vec<f64> = cells.iter().map(|cell| cell.p_below(-floor)).collect();
     let (slower, faster) = (holm(&above, ALPHA), holm(&below, ALPHA));
     let tests = cells.len();
-    let mut judged = cells
-        .iter()
-        .zip(slower)
-        .zip(faster)
-        .map(|((cell, slower), faster)| {
-            let change = if slower {
-                Change::Slower
-            } else if faster {
-                Change::Faster
-            } else if is_same(cell, threshold) {
-                Change::Same
-            } else {
-                Change::Inconclusive
-            };
-            judgement(cell, change, tests, threshold)
-        });
-    estimates
-        .iter()
-        .map(|estimate| estimate.and_then(|_| judged.next()))
-        .collect()
+    let mut judged = cells.iter().enumerate().map(|(i, cell)| {
+        let change = match (slower[i], faster[i]) {
+            (true, _) => Change::Slower,
+            (_, true) => Change::Faster,
+            _ if is_same(cell, threshold) => Change::Same,
+            _ => Change::Inconclusive,
+        };
+        judgement(cell, change, tests, threshold)
+    });
+    let judged = |estimate: &Option<Trimmed>| estimate.and_then(|_| judged.next());
+    estimates.iter().map(judged).collect()
 }
 
 fn judgement(cell: &Trimmed, change: Change, tests: usize, threshold: f64) -> Judgement {
     let margin = cell.margin(INTERVAL);
-    let undecided = change == Change::Inconclusive;
+    let undecided = Some(cell).filter(|_| change == Change::Inconclusive);
     Judgement {
         change,
         ratio: cell.mean.exp(),
         lower: Some((cell.mean - margin).exp()),
         upper: Some((cell.mean + margin).exp()),
         resolution: Some(resolution(cell, tests)),
-        more_pairs: if undecided {
-            more_pairs(cell, tests, threshold)
-        } else {
-            None
-        },
+        more_pairs: undecided.and_then(|cell| more_pairs(cell, tests, threshold)),
         pairs: cell.count,
     }
 }

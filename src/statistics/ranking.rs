@@ -31,13 +31,8 @@ pub fn ranks(values: &[Vec<f64>], alpha: f64) -> Vec<Placed> {
         .collect();
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|&a, &b| means[a].total_cmp(&means[b]));
-    let mut placed = vec![
-        Placed {
-            rank: 0,
-            tie: false
-        };
-        values.len()
-    ];
+    let (rank, tie) = (0, false);
+    let mut placed = vec![Placed { rank, tie }; values.len()];
     let mut leader: Option<(usize, usize)> = None;
     for (position, &i) in order.iter().enumerate() {
         match leader {

@@ -2,7 +2,7 @@
 
 use super::judgement::judge_estimates;
 use super::trimmed::{centre, difference};
-use super::{Change, Judgement, trimmed_mean};
+use super::{Judgement, trimmed_mean};
 
 /// Judges the cells of two stored reports. Per cell: one logarithm per process,
 /// of a time or better of a ratio within the process; the numbers of processes
@@ -31,15 +31,9 @@ pub fn judge_unpaired(
 }
 
 fn without_interval(old: &[f64], new: &[f64]) -> Option<Judgement> {
-    Some(Judgement {
-        change: Change::Inconclusive,
-        ratio: (centre(new)? - centre(old)?).exp(),
-        lower: None,
-        upper: None,
-        resolution: None,
-        more_pairs: None,
-        pairs: old.len().min(new.len()),
-    })
+    let ratio = (centre(new)? - centre(old)?).exp();
+    let pairs = old.len().min(new.len());
+    Some(Judgement::without_interval(ratio, pairs))
 }
 
 #[cfg(test)]

@@ -122,11 +122,8 @@ impl Reference {
         }
         // Ready for the next structure.
         for &id in found {
-            if let Some(mark) = self
-                .marks
-                .get_mut(id as usize)
-                .filter(|m| **m == self.stamp + 1)
-            {
+            let mark = self.marks.get_mut(id as usize);
+            if let Some(mark) = mark.filter(|m| **m == self.stamp + 1) {
                 *mark = self.stamp;
             }
         }
@@ -147,10 +144,8 @@ pub fn explain_visibility<'v>(b: &Aabb, view: impl Into<AnyView<'v>>) -> String 
         let seen = if view.sees(b) { "" } else { "not " };
         return format!("{bounds} is {seen}visible to {view:?}");
     };
-    let values = volume
-        .planes()
-        .iter()
-        .map(|plane| plane.value_at(plane.p_vertex(b)));
+    let planes = volume.planes().iter();
+    let values = planes.map(|plane| plane.value_at(plane.p_vertex(b)));
     let lowest = values.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
     let Some((index, value)) = lowest else {
         return format!("{bounds}: the volume has no plane");
@@ -174,16 +169,13 @@ pub fn explain_visibility<'v>(b: &Aabb, view: impl Into<AnyView<'v>>) -> String 
 
 /// The same for region search.
 pub fn explain_containment(b: &Aabb, p: Vec3) -> String {
-    let verdict = if b.contains_point(p) {
+    let [min, max] = [b.min, b.max].map(|corner| corner.to_array());
+    let holds = if b.contains_point(p) {
         "holds"
     } else {
         "does not hold"
     };
-    format!(
-        "box {:?} to {:?} {verdict} the point {p:?}",
-        b.min.to_array(),
-        b.max.to_array()
-    )
+    format!("box {min:?} to {max:?} {holds} the point {p:?}")
 }
 
 #[cfg(test)]

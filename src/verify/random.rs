@@ -48,10 +48,8 @@ impl RandomCase {
             }
         };
         let mut point = grid_point(&mut dice, scale);
-        if let Some(b) = items
-            .get(dice.below(count.max(1)))
-            .filter(|_| dice.unit() < 0.5)
-        {
+        let near = items.get(dice.below(count.max(1)));
+        if let Some(b) = near.filter(|_| dice.unit() < 0.5) {
             point = b.corner(dice.below(8));
         }
         RandomCase {
@@ -107,10 +105,7 @@ fn volume(dice: &mut Dice, kind: usize, scale: f64, items: &[Aabb]) -> Option<Co
             // A perspective volume with its x sheared along y and z: opposite
             // planes are no longer mirror images.
             let straight = camera_volume(dice, 0, scale, items)?;
-            let (a, b) = (
-                dice.between(-1.0, 1.0) as f32,
-                dice.between(-1.0, 1.0) as f32,
-            );
+            let [a, b] = [(); 2].map(|()| dice.between(-1.0, 1.0) as f32);
             let sheared = straight.planes().iter().map(|p| {
                 let n = p.normal;
                 Plane::new(Vec3::new(n.x, n.y + a * n.x, n.z + b * n.x), p.d)
@@ -127,14 +122,11 @@ fn volume(dice: &mut Dice, kind: usize, scale: f64, items: &[Aabb]) -> Option<Co
             // Two half-spaces that face away from each other, or none at all.
             let normal = dice.normal3().as_vec3();
             let gap = (scale * dice.unit()) as f32;
-            let impossible = Plane::new(Vec3::ZERO, -1.0);
+            let impossible = [Plane::new(Vec3::ZERO, -1.0)];
             let pair = [Plane::new(normal, -gap), Plane::new(-normal, -gap)];
-            let planes = if dice.unit() < 0.5 {
-                vec![impossible]
-            } else {
-                pair.to_vec()
-            };
-            ConvexVolume::from_planes(&planes).ok()
+            let none = dice.unit() < 0.5;
+            let planes = if none { &impossible[..] } else { &pair };
+            ConvexVolume::from_planes(planes).ok()
         }
     }
 }
@@ -179,34 +171,20 @@ fn camera_volume(dice: &mut Dice, kind: usize, scale: f64, items: &[Aabb]) -> Op
         2 => Lens::orthographic(scale * dice.between(0.1, 8.0), aspect, -near, far),
         _ => {
             let low = dice.between(-2.0, 0.5) * near;
-            let window = [
-                low,
-                low + near * dice.between(0.1, 2.0),
-                -near,
-                near * aspect,
-            ];
-            Lens::off_axis(window, near, Some(far))
+            let high = low + near * dice.between(0.1, 2.0);
+            Lens::off_axis([low, high, -near, near * aspect], near, Some(far))
         }
     };
     let around = Surroundings {
         origin: DVec3::ZERO,
         reach: Aabb::union_of(items).reach(),
     };
-    let epsilon = if dice.unit() < 0.5 {
-        0.0
-    } else {
-        PlaneOptions::default().epsilon
-    };
-    let options = PlaneOptions {
-        epsilon,
-        ..PlaneOptions::default()
-    };
-    Camera {
-        frame,
-        lens: lens.ok()?,
+    let mut options = PlaneOptions::default();
+    if dice.unit() < 0.5 {
+        options.epsilon = 0.0;
     }
-    .volume(&options, &around)
-    .ok()
+    let lens = lens.ok()?;
+    Camera { frame, lens }.volume(&options, &around).ok()
 }
 
 #[cfg(test)]

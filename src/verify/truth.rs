@@ -164,10 +164,6 @@ impl Truth {
         }
     }
 
-    pub fn verdicts(&self) -> &[Verdict] {
-        &self.verdicts
-    }
-
     /// The errors of an answer (any order, no id twice) about the very items
     /// the truth was made of. O(items).
     pub fn errors(&self, items: &[Aabb], answer: &[ItemId]) -> ErrorCount {
@@ -226,7 +222,7 @@ mod tests {
             Verdict::Out,
             Verdict::Out,
         ];
-        assert_eq!(truth.verdicts(), wanted);
+        assert_eq!(truth.verdicts, wanted);
         let perfect = truth.errors(&items, &[2, 1, 0]);
         assert_eq!((perfect.visible, perfect.excess()), (3, Some(0.0)));
         let poor = truth.errors(&items, &[0, 3, 4]);
@@ -254,7 +250,7 @@ mod tests {
             lens: Lens::perspective(60.0, 1.0, 1.0, Some(100.0)).unwrap(),
         };
         let truth = Truth::of_scene(&camera, &scene).unwrap();
-        assert_eq!(truth.verdicts(), [Verdict::Out, Verdict::Out, Verdict::In]);
+        assert_eq!(truth.verdicts, [Verdict::Out, Verdict::Out, Verdict::In]);
         let all = truth.errors(&scene.items, &[0, 1, 2]);
         assert_eq!((all.visible, all.false_positives), (1, 2));
         assert_eq!((all.by_storage, all.by_planes), (2, 0));

@@ -486,7 +486,7 @@ fn sums_that_overflow_are_refused_and_would_have_lost_something() {
             reach,
         };
         let volume = camera.volume(&Default::default(), &told(p));
-        let relative = camera.relative_volume(8.0, &told(p));
+        let relative = camera.relative_volume(&[], 8.0, &told(p));
         if fits {
             assert!(volume.is_ok_and(|volume| volume.sees(&corner)));
             assert!(relative.is_ok_and(|v| v.planes().sees(&v.moved(&corner))));
