@@ -1,5 +1,5 @@
 //! The speed floors this project promises, each a ratio in one run: all
-//! contenders of a row are interleaved and paired by the same harness as
+//! subjects of a row are interleaved and paired by the same harness as
 //! `cullbench run`. Before them, that harness beside a loop written by hand. Exits
 //! 3 if a floor is missed. `-- --test` only checks that every row runs.
 
@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use cullbench::culling::{Culling, CullingTest};
 use cullbench::index::Registry;
 use cullbench::measure::{
-    Cell, Competitor, Contender, Machine, Protocol, Schedule, Status, Stopwatch, Workload,
+    Cell, Machine, Protocol, Schedule, Status, Stopwatch, Subject, TimedTask, Workload,
     measure_group, timed,
 };
 use cullbench::statistics::trimmed_mean;
@@ -116,7 +116,7 @@ fn harness_overhead(only_test: bool) -> u32 {
                 out.len() as u64
             })
             .collect();
-        let tasks = [Competitor {
+        let tasks = [TimedTask {
             ask: Box::new(see),
             ask_many: None,
             expected,
@@ -203,13 +203,13 @@ fn main() -> ExitCode {
             .structures(&format!("{YARDSTICK},{}", row.structure))
             .expect(row.structure);
         let twin = specs[1].clone();
-        let mut contenders: Vec<Contender> = specs
+        let mut subjects: Vec<Subject> = specs
             .into_iter()
-            .map(|spec| Contender::build(spec, false, &scene, CullingTest::SixPlane))
+            .map(|spec| Subject::build(spec, false, &scene, CullingTest::SixPlane))
             .collect();
-        contenders.push(Contender::build(twin, true, &scene, CullingTest::SixPlane));
+        subjects.push(Subject::build(twin, true, &scene, CullingTest::SixPlane));
         let group =
-            measure_group(&workload, &contenders, &[], &protocol, &|| false).expect("not stopped");
+            measure_group(&workload, &subjects, &[], &protocol, &|| false).expect("not stopped");
         let query_ns = |cell: &Cell| {
             assert_eq!(cell.verdict.status, Status::Ok, "{:?}", cell.verdict);
             cell.metrics["query_ns"].value

@@ -12,7 +12,7 @@ use std::time::Duration;
 use cullbench::culling::Culling;
 use cullbench::index::StructureSpec;
 use cullbench::measure::{
-    Ask, Competitor, Machine, Protocol, Stopwatch, Timed, Workload, cameras_within, timed_rounds,
+    Ask, Machine, Protocol, Stopwatch, Timed, TimedTask, Workload, cameras_within, timed_rounds,
 };
 use cullbench::query::AnyView;
 use cullbench::statistics::{median, slope};
@@ -143,7 +143,7 @@ fn main() -> ExitCode {
                 let ask: Ask = Box::new(|place, out| {
                     index.see(workload.views[place].as_any(), out);
                 });
-                let competitor = Competitor {
+                let task = TimedTask {
                     ask,
                     ask_many: None,
                     expected: expected[which].clone(),
@@ -153,7 +153,7 @@ fn main() -> ExitCode {
                     cameras: if only_test { 8 } else { cameras_within(1e9, n) },
                     ..protocol
                 };
-                let timed = timed_rounds(workload.views.len(), &[competitor], &protocol, &|| false);
+                let timed = timed_rounds(workload.views.len(), &[task], &protocol, &|| false);
                 let timed: Timed = timed
                     .expect("not stopped")
                     .remove(0)

@@ -11,7 +11,7 @@ use cullbench::index::{
     BuildError, FrustumQuery, Info, Kind, MemoryUsage, Origin, RegionIndex, Registry, indexable,
 };
 use cullbench::measure::{
-    Contender, GroupPlan, Known, Part, PathInfo, Protocol, SceneInfo, Status, Task, Workload,
+    GroupPlan, Known, Part, PathInfo, Protocol, SceneInfo, Status, Subject, TaskKind, Workload,
     measure_group, measure_part,
 };
 use cullbench::path;
@@ -129,14 +129,14 @@ fn workload(scene: &Scene) -> Workload<'_> {
     Workload::new(scene, &way, &Culling::default()).expect("a workload")
 }
 
-fn contenders(names: &str, scene: &Scene) -> Vec<Contender> {
+fn subjects(names: &str, scene: &Scene) -> Vec<Subject> {
     let registry = Registry::builtin()
         .with::<Faulty<SOUND>>()
         .with::<Faulty<PANICS_LATER>>()
         .with::<Faulty<SWALLOWS_ITS_PANIC>>()
         .with::<Faulty<RIGHT_WHEN_COUNTED>>();
     let specs = registry.structures(names).expect("structures");
-    let build = |spec| Contender::build(spec, false, scene, CullingTest::SixPlane);
+    let build = |spec| Subject::build(spec, false, scene, CullingTest::SixPlane);
     specs.into_iter().map(build).collect()
 }
 
@@ -151,8 +151,8 @@ fn protocol() -> Protocol {
     }
 }
 
-fn statuses(workload: &Workload, contenders: &[Contender]) -> Vec<Status> {
-    let group = measure_group(workload, contenders, &[], &protocol(), &|| false);
+fn statuses(workload: &Workload, subjects: &[Subject]) -> Vec<Status> {
+    let group = measure_group(workload, subjects, &[], &protocol(), &|| false);
     let cells = group.expect("not stopped").cells;
     for cell in &cells {
         let is_ok = cell.verdict.status == Status::Ok;
@@ -165,7 +165,7 @@ fn statuses(workload: &Workload, contenders: &[Contender]) -> Vec<Status> {
 /// What one process hands over.
 fn part(process: u32, known: Option<&Known>) -> Part {
     let scene = scene();
-    let (workload, contenders) = (workload(&scene), contenders("linear,bvh,octree", &scene));
+    let (workload, subjects) = (workload(&scene), subjects("linear,bvh,octree", &scene));
     let info = SceneInfo::of(&scene);
     let plan = GroupPlan {
         scene: &info,
@@ -177,7 +177,7 @@ fn part(process: u32, known: Option<&Known>) -> Part {
         plan_only: false,
         locate: true,
     };
-    let measured = measure_part(&workload, &contenders, plan, &|_, _| (), &|| false);
+    let measured = measure_part(&workload, &subjects, plan, &|_, _| (), &|| false);
     measured.expect("not stopped").0
 }
 
@@ -189,7 +189,7 @@ fn of_parts(parts: &[Part]) -> Vec<Status> {
 #[test]
 fn the_unbroken_road_is_ok() {
     let scene = scene();
-    let found = statuses(&workload(&scene), &contenders("linear,sound", &scene));
+    let found = statuses(&workload(&scene), &subjects("linear,sound", &scene));
     assert_eq!(found, [Status::Ok; 2]);
 }
 
@@ -197,7 +197,7 @@ fn the_unbroken_road_is_ok() {
 fn a_panic_in_the_timed_pass_is_told_and_one_that_is_swallowed_is_wrong() {
     let scene = scene();
     let names = "linear,panics-later,swallows-its-panic";
-    let found = statuses(&workload(&scene), &contenders(names, &scene));
+    let found = statuses(&workload(&scene), &subjects(names, &scene));
     assert_eq!(found, [Status::Ok, Status::Panicked, Status::Wrong]);
 }
 
@@ -205,7 +205,7 @@ fn a_panic_in_the_timed_pass_is_told_and_one_that_is_swallowed_is_wrong() {
 fn what_is_timed_is_what_is_checked() {
     let scene = scene();
     let names = "linear,right-when-counted";
-    let found = statuses(&workload(&scene), &contenders(names, &scene));
+    let found = statuses(&workload(&scene), &subjects(names, &scene));
     assert_eq!(found, [Status::Ok, Status::Unsafe]);
 }
 
@@ -214,20 +214,20 @@ fn what_is_timed_is_what_is_checked() {
 #[test]
 fn a_reference_that_is_wrong_together_with_all_structures_is_unsafe() {
     let scene = scene();
-    let contenders = contenders("linear,bvh", &scene);
+    let subjects = subjects("linear,bvh", &scene);
     let mut wrong = workload(&scene);
     wrong.views.rotate_left(CAMERAS as usize / 2);
-    assert_eq!(statuses(&wrong, &contenders), [Status::Unsafe; 2]);
+    assert_eq!(statuses(&wrong, &subjects), [Status::Unsafe; 2]);
 }
 
 /// The reference scans other boxes than the structures were built over.
 #[test]
 fn a_reference_over_other_items_disagrees_with_every_structure() {
     let scene = scene();
-    let contenders = contenders("linear,bvh", &scene);
+    let subjects = subjects("linear,bvh", &scene);
     let mut wrong = workload(&scene);
     wrong.items.to_mut().rotate_left(1);
-    let found = statuses(&wrong, &contenders);
+    let found = statuses(&wrong, &subjects);
     assert!(!found.contains(&Status::Ok), "{found:?}");
 }
 
@@ -251,7 +251,7 @@ fn swapped_labels_are_wrong() {
     assert_eq!(of_parts(&parts), [Status::Ok; 3]);
     let sound = parts.clone();
     // Each pair of structures, each task; and a task for another.
-    for task in [Task::Query, Task::Locate] {
+    for task in [TaskKind::Query, TaskKind::Locate] {
         for (one, other) in [("linear", "bvh"), ("bvh", "octree"), ("octree", "linear")] {
             parts = sound.clone();
             for own in parts[1].tasks.iter_mut().filter(|t| t.task == task) {
@@ -268,9 +268,9 @@ fn swapped_labels_are_wrong() {
     parts = sound;
     for own in parts[1].tasks.iter_mut().filter(|t| t.label == "bvh") {
         own.task = match own.task {
-            Task::Query => Task::Locate,
-            Task::Locate => Task::Query,
-            Task::LocateBatched => Task::LocateBatched,
+            TaskKind::Query => TaskKind::Locate,
+            TaskKind::Locate => TaskKind::Query,
+            TaskKind::LocateBatched => TaskKind::LocateBatched,
         };
     }
     assert_eq!(of_parts(&parts)[1], Status::Wrong);

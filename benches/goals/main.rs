@@ -16,7 +16,7 @@ use cullbench::index::{
     Info, Kind, Origin, RegionIndex, Registry, StructureSpec, TreeOrder, Wide, caught,
 };
 use cullbench::measure::{
-    BOUNDS, Cell, Contender, Group, Machine, Metric, Protocol, Status, Stopwatch, Workload,
+    BOUNDS, Cell, Group, Machine, Metric, Protocol, Status, Stopwatch, Subject, Workload,
     cameras_within, measure_group,
 };
 use cullbench::query::AnyView;
@@ -116,7 +116,7 @@ fn query_ns(cell: &Cell) -> Option<f64> {
     time.map(|time| time.value)
 }
 
-fn contenders(names: &[&str], twin: &str, scene: &Scene) -> Vec<Contender> {
+fn subjects(names: &[&str], twin: &str, scene: &Scene) -> Vec<Subject> {
     let entered = names
         .iter()
         .map(|name| (*name, false))
@@ -124,7 +124,7 @@ fn contenders(names: &[&str], twin: &str, scene: &Scene) -> Vec<Contender> {
     entered
         .map(|(name, is_twin)| {
             let spec = StructureSpec::parse(name).expect(name);
-            Contender::build(spec, is_twin, scene, CullingTest::SixPlane)
+            Subject::build(spec, is_twin, scene, CullingTest::SixPlane)
         })
         .collect()
 }
@@ -141,10 +141,10 @@ fn is_own_grid<Name>(kind: Kind, origin: &Origin<Name>) -> bool {
 /// Those that stay in a row, and those that are left out of it: peers far
 /// behind the fastest crate over some of the views. Whoever cannot answer stays,
 /// for the row to say so.
-fn heat(entered: Vec<Contender>, workload: &Workload) -> (Vec<Contender>, Vec<Contender>) {
+fn heat(entered: Vec<Subject>, workload: &Workload) -> (Vec<Subject>, Vec<Subject>) {
     let step = workload.views.len().div_ceil(HEAT_VIEWS);
-    let time = |contender: &Contender| {
-        let built = contender.built.as_ref().ok()?;
+    let time = |subject: &Subject| {
+        let built = subject.built.as_ref().ok()?;
         let mut ids = Vec::new();
         // The first lap makes the room.
         let mut lap = || {
@@ -158,7 +158,7 @@ fn heat(entered: Vec<Contender>, workload: &Workload) -> (Vec<Contender>, Vec<Co
         let laps = caught(|| [lap(), lap()]);
         laps.ok().map(|[_, second]| second)
     };
-    let of_peers = |c: &Contender| is_peer(c.spec.info()).then(|| time(c)).flatten();
+    let of_peers = |c: &Subject| is_peer(c.spec.info()).then(|| time(c)).flatten();
     let times: Vec<Option<f64>> = entered.iter().map(of_peers).collect();
     let timed = entered.iter().zip(&times);
     let of_crates = timed.filter(|(c, _)| c.spec.info().origin.is_crate());
@@ -166,16 +166,16 @@ fn heat(entered: Vec<Contender>, workload: &Workload) -> (Vec<Contender>, Vec<Co
         .filter_map(|(_, time)| *time)
         .fold(f64::INFINITY, f64::min);
     let (mut stay, mut out) = (Vec::new(), Vec::new());
-    for (contender, time) in entered.into_iter().zip(times) {
+    for (subject, time) in entered.into_iter().zip(times) {
         match time.map(|time| time / fastest) {
             Some(times) if times > FAR_BEHIND => {
                 println!(
                     "  {}: left out, {times:.0} x the fastest crate in the heat",
-                    contender.spec.label
+                    subject.spec.label
                 );
-                out.push(contender);
+                out.push(subject);
             }
-            _ => stay.push(contender),
+            _ => stay.push(subject),
         }
     }
     (stay, out)
@@ -249,8 +249,8 @@ fn judge_row(judge: &mut Judge, world: &World, way: &Way, group: &Group) {
 }
 
 /// What is the same on all ways through a scene.
-fn judge_build(judge: &mut Judge, world: &World, contender: &Contender, items: usize) {
-    let (Ok(built), false) = (&contender.built, world.cold) else {
+fn judge_build(judge: &mut Judge, world: &World, subject: &Subject, items: usize) {
+    let (Ok(built), false) = (&subject.built, world.cold) else {
         return;
     };
     let per_item = |sum: f64, unit: &str| Metric {
@@ -259,7 +259,7 @@ fn judge_build(judge: &mut Judge, world: &World, contender: &Contender, items: u
         upper: None,
         unit: unit.to_owned(),
     };
-    let name = &contender.spec.label;
+    let name = &subject.spec.label;
     println!("{}", world.scene);
     let build = per_item(built.build_ms * 1e6, "ns");
     judge.line(
@@ -348,8 +348,8 @@ fn main() -> ExitCode {
             names.extend(&peers);
             names.extend(named(|info| is_own_grid(info.kind, &info.origin)));
         }
-        let mut contenders = contenders(&names, SUBJECT, &scene);
-        judge_build(&mut judge, world, &contenders[1], scene.items.len());
+        let mut subjects = subjects(&names, SUBJECT, &scene);
+        judge_build(&mut judge, world, &subjects[1], scene.items.len());
         for way in ways {
             let source = world.path(way);
             let cameras = path::load(&source, &scene, &Default::default()).expect(way.path);
@@ -363,11 +363,11 @@ fn main() -> ExitCode {
                 ..protocol
             };
             println!("{}", world.row(way));
-            let (stay, out) = heat(contenders, &workload);
+            let (stay, out) = heat(subjects, &workload);
             let group =
                 measure_group(&workload, &stay, BOUNDS, &protocol, &|| false).expect("not stopped");
             judge_row(&mut judge, world, way, &group);
-            contenders = stay.into_iter().chain(out).collect();
+            subjects = stay.into_iter().chain(out).collect();
             if way.path == ALL && !world.cold {
                 judge_ranges(&mut judge, &workload);
             }

@@ -185,11 +185,11 @@ pub fn prepare(
         all.trials.compare(rule);
     }
     let cameras = path.cameras.len();
-    let competitors = all.trials.competitors(&answered.counts);
+    let tasks = all.trials.tasks(&answered.counts);
     Ok(Some(Prepared {
         plan: TrialPlan {
             structures: labels,
-            schedule: Schedule::new(cameras, &competitors, protocol),
+            schedule: Schedule::new(cameras, &tasks, protocol),
             expected: answered.counts.clone(),
         },
         advice: Advice {
@@ -243,8 +243,8 @@ pub fn time(
     if found != planned || cameras.min() != Some(path.cameras.len()) {
         return Err(AdviseError::OtherPlan { found, planned });
     }
-    let competitors = all.trials.competitors(&plan.expected);
-    let timed = timed(&competitors, &plan.schedule, protocol, &|_| stop());
+    let tasks = all.trials.tasks(&plan.expected);
+    let timed = timed(&tasks, &plan.schedule, protocol, &|_| stop());
     Ok(timed.map(|timed| ProcessTimes {
         once_ns: all.once_ns,
         ..ProcessTimes::of(&timed)

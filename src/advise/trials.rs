@@ -4,7 +4,7 @@
 
 use super::case::Case;
 use super::omission::{Aside, Check, Draft, Finish, Omission, Way};
-use crate::measure::{Ask, Competitor, OverProcesses};
+use crate::measure::{Ask, OverProcesses, TimedTask};
 use crate::query::ItemId;
 use crate::statistics::Estimate;
 use crate::verify::{ErrorCount, Trial};
@@ -152,15 +152,15 @@ impl<'c> Trials<'c> {
     }
 
     /// All ways, ready to be timed.
-    pub fn competitors(self, counts: &[Vec<u64>]) -> Vec<Competitor<'c>> {
+    pub fn tasks(self, counts: &[Vec<u64>]) -> Vec<TimedTask<'c>> {
         let asks = self.asks.into_iter().zip(counts);
-        let competitor = |(ask, counts): (Ask<'c>, &Vec<u64>)| Competitor {
+        let task = |(ask, counts): (Ask<'c>, &Vec<u64>)| TimedTask {
             ask,
             ask_many: None,
             expected: counts.clone(),
             least_ns: None,
         };
-        asks.map(competitor).collect()
+        asks.map(task).collect()
     }
 
     pub fn len(&self) -> usize {

@@ -16,7 +16,7 @@ use super::interrupt;
 use super::processes::{Ended, Said, Worker, processors, see_through};
 use super::protocol::{Job, PROTOCOL, Request};
 use super::run_plan::RunPlan;
-use crate::measure::{GroupKey, Known, Part, Share, Status, Task, Verdict};
+use crate::measure::{GroupKey, Known, Part, Share, Status, TaskKind, Verdict};
 use crate::statistics::{Judgement, interquartile_mean, judge, resolved, trimmed_mean};
 
 /// How long one of a pair runs before the other takes its turn: well below the
@@ -380,7 +380,7 @@ fn note(cells: &mut [AgainstCell], side: usize, parts: &[Part]) {
             cell.verdicts[side] = failed.verdict.clone();
         }
         let mut tasks = part.tasks.iter();
-        let task = tasks.find(|t| t.label == cell.structure && t.task == Task::Query);
+        let task = tasks.find(|t| t.label == cell.structure && t.task == TaskKind::Query);
         let rounds: Vec<f64> = task
             .map(|task| task.rounds_ns.iter().map(|ns| ns.ln()).collect())
             .unwrap_or_default();

@@ -6,7 +6,7 @@ use super::verify::judge_camera_level;
 use crate::camera::{Camera, Lens, PlaneOptions, Pose, look_at};
 use crate::culling::Culling;
 use crate::index::Registry;
-use crate::measure::{Contender, Protocol, Workload, judge};
+use crate::measure::{Protocol, Subject, Workload, judge};
 use crate::path::CameraPath;
 use crate::precision::{PrecisionInput, measure_points};
 use crate::scene::{Scene, WorldBox};
@@ -65,8 +65,8 @@ fn missed(camera: Camera) -> [bool; 4] {
     let by_run = judge(&workload, usize::MAX).errors;
     assert!(by_run.visible > 700, "{by_run:?}");
 
-    let contender = Contender::build(structures[0].clone(), false, &scene, culling.test);
-    let mut checks = super::verify::check(&workload, &[contender], "", "");
+    let subject = Subject::build(structures[0].clone(), false, &scene, culling.test);
+    let mut checks = super::verify::check(&workload, &[subject], "", "");
     judge_camera_level(&workload, &mut checks, "");
     let by_verify = checks.iter().any(|check| check.difference.is_some());
 

@@ -16,7 +16,7 @@ use crate::camera::{DEFAULT_EPSILON, PlaneMethod};
 use crate::culling::{ARITHMETICS, Arithmetic, CameraView, Culling, CullingTest, TESTS};
 use crate::geometry::ConvexVolume;
 use crate::index::{BuildError, DynIndex, Registry, StructureSpec};
-use crate::measure::{Contender, Status, Workload, count_pass, guarded, judge};
+use crate::measure::{Status, Subject, Workload, count_pass, guarded, judge};
 use crate::path::{self, CameraPath};
 use crate::query::Located;
 use crate::scene::{self, FAMILIES, SAMPLES};
@@ -87,14 +87,14 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
         }
         bar.set_message(text::plain(source));
         let scene = load_scene(source, &args.scene_args, 2 * structures.len())?;
-        let contenders = |test: CullingTest| -> Vec<Contender> {
+        let subjects = |test: CullingTest| -> Vec<Subject> {
             let specs = structures.iter().cloned();
             specs
-                .map(|s| Contender::build(s, false, &scene, test))
+                .map(|s| Subject::build(s, false, &scene, test))
                 .collect()
         };
-        let over_boxes = contenders(CullingTest::SixPlane);
-        let over_cubes = contenders(CullingTest::Sphere);
+        let over_boxes = subjects(CullingTest::SixPlane);
+        let over_cubes = subjects(CullingTest::Sphere);
         for path in paths(args, &scene) {
             if interrupt::asked() {
                 interrupted = true;
@@ -104,11 +104,11 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
             let again = reproduce(source, &path, args);
             let mut rows: Vec<Check> = Vec::new();
             for (kind, workload) in workloads(&scene, &cameras, &culling)? {
-                let contenders = match workload.culling.test {
+                let subjects = match workload.culling.test {
                     CullingTest::Sphere => &over_cubes,
                     _ => &over_boxes,
                 };
-                let mut checked = check(&workload, contenders, &kind, &again);
+                let mut checked = check(&workload, subjects, &kind, &again);
                 if rows.is_empty() && is_safe(&culling) {
                     judge_camera_level(&workload, &mut checked, &again);
                 }
@@ -303,11 +303,11 @@ impl Check {
 
 pub(super) fn check(
     workload: &Workload,
-    contenders: &[Contender],
+    subjects: &[Subject],
     kind: &str,
     again: &str,
 ) -> Vec<Check> {
-    let built: Vec<_> = contenders
+    let built: Vec<_> = subjects
         .iter()
         .filter_map(|c| Some((c.label(), c.built.as_ref().ok()?)))
         .collect();
@@ -315,8 +315,8 @@ pub(super) fn check(
     let scene = workload.scene;
     let questions = workload.views.len() * scene.items.len()
         + workload.points.len() * scene.regions.boxes(&scene.items).len();
-    let checks = contenders.iter().map(|contender| {
-        let verdict = match &contender.built {
+    let checks = subjects.iter().map(|subject| {
+        let verdict = match &subject.built {
             Ok(_) => counted.next().map(|c| c.verdict),
             Err(verdict) => Some(verdict.clone()),
         };
@@ -327,7 +327,7 @@ pub(super) fn check(
         Check {
             scene: scene.name.clone(),
             path: workload.path.clone(),
-            structure: contender.spec.label.clone(),
+            structure: subject.spec.label.clone(),
             volumes: workload.views.len(),
             verdicts: questions as u64,
             status,

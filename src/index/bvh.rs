@@ -166,17 +166,17 @@ fn scale_for(items: &[Aabb]) -> f32 {
 /// Lays the items out in depth-first order. Iterative, so that a degenerate
 /// tree cannot overflow the stack. O(n).
 fn relaid(items: &[Aabb], stacks: &Stacks, built: &Bvh2) -> PackedTree {
-    enum Task {
+    enum TaskKind {
         Enter(u32),
         Leave(usize),
     }
     let mut writer = TreeWriter::with_capacity(stacks.members.len());
-    let mut open = vec![Task::Enter(0)];
+    let mut open = vec![TaskKind::Enter(0)];
     while let Some(task) = open.pop() {
         match task {
-            Task::Leave(node) => writer.close(node),
-            Task::Enter(node) => {
-                open.push(Task::Leave(writer.open()));
+            TaskKind::Leave(node) => writer.close(node),
+            TaskKind::Enter(node) => {
+                open.push(TaskKind::Leave(writer.open()));
                 let node = &built.nodes[node as usize];
                 let first = node.first_index;
                 if node.is_leaf() {
@@ -188,7 +188,7 @@ fn relaid(items: &[Aabb], stacks: &Stacks, built: &Bvh2) -> PackedTree {
                         writer.push(id, &items[id as usize]);
                     }
                 } else {
-                    open.extend([Task::Enter(first + 1), Task::Enter(first)]);
+                    open.extend([TaskKind::Enter(first + 1), TaskKind::Enter(first)]);
                 }
             }
         }

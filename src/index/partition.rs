@@ -56,7 +56,7 @@ pub fn build_top_down<S: Splitter>(
     root: S::Cell,
     splitter: &mut S,
 ) -> PackedTree {
-    enum Task<C> {
+    enum TaskKind<C> {
         Enter {
             first: usize,
             items: usize,
@@ -75,7 +75,7 @@ pub fn build_top_down<S: Splitter>(
     let mut parts = Vec::new();
     let mut open = Vec::new();
     if !records.is_empty() {
-        open.push(Task::Enter {
+        open.push(TaskKind::Enter {
             first: 0,
             items: records.len(),
             cell: Some(root),
@@ -83,15 +83,15 @@ pub fn build_top_down<S: Splitter>(
     }
     while let Some(task) = open.pop() {
         let (first, count, cell) = match task {
-            Task::Leave(node) => {
+            TaskKind::Leave(node) => {
                 writer.close(node);
                 continue;
             }
-            Task::Enter { first, items, cell } => (first, items, cell),
+            TaskKind::Enter { first, items, cell } => (first, items, cell),
         };
         let group = &mut records[first..first + count];
         let node = writer.open();
-        open.push(Task::Leave(node));
+        open.push(TaskKind::Leave(node));
         if count <= leaf {
             splitter.arrange(group);
             for record in group.iter() {
@@ -109,7 +109,7 @@ pub fn build_top_down<S: Splitter>(
         let mut end = first + count;
         for part in parts.iter().rev() {
             end -= part.items;
-            open.push(Task::Enter {
+            open.push(TaskKind::Enter {
                 first: end,
                 items: part.items,
                 cell: part.cell,

@@ -3,7 +3,7 @@
 //! rounds, so that a ratio to it is paired like any other. It owns the table of
 //! bounds and what each of them does.
 
-use super::{Competitor, Contender, Workload};
+use super::{Subject, TimedTask, Workload};
 use crate::geometry::{Aabb, BoxBlocks};
 use crate::index::{RegionIndex, Trace, Wide};
 use crate::kernel::{Isa, Kernel, Work};
@@ -16,8 +16,8 @@ pub struct Bound {
     /// The metric that holds time of a structure / time of this bound.
     pub ratio: &'static str,
     /// Makes it, with its own copy of the data; `None` where it has nothing to
-    /// do or what it needs is not among the contenders.
-    pub make: for<'a> fn(&Material<'a>) -> Option<Competitor<'a>>,
+    /// do or what it needs is not among the subjects.
+    pub make: for<'a> fn(&Material<'a>) -> Option<TimedTask<'a>>,
 }
 
 /// What a bound is made from.
@@ -25,15 +25,15 @@ pub struct Bound {
 pub struct Material<'a> {
     pub workload: &'a Workload<'a>,
     /// What was built on the scene, under the names they were asked for by.
-    pub contenders: &'a [Contender],
+    pub subjects: &'a [Subject],
     /// Items visible to each camera of the path, as everyone counted them.
     pub visible: &'a [u64],
 }
 
 impl Material<'_> {
-    /// The kernel that the contenders are asked by.
+    /// The kernel that the subjects are asked by.
     fn kernel(&self) -> Kernel {
-        let first = self.contenders.first();
+        let first = self.subjects.first();
         first.map_or_else(Kernel::best, |c| c.spec.execution.kernel)
     }
 }
@@ -72,10 +72,10 @@ impl Work for Read<'_> {
     }
 }
 
-fn read<'a>(material: &Material<'a>) -> Option<Competitor<'a>> {
+fn read<'a>(material: &Material<'a>) -> Option<TimedTask<'a>> {
     let blocks = blocks_of(&material.workload.items);
     let kernel = material.kernel();
-    (!blocks.is_empty()).then(|| Competitor {
+    (!blocks.is_empty()).then(|| TimedTask {
         ask: Box::new(move |_, _| {
             std::hint::black_box(kernel.run(Read(&blocks)));
         }),
@@ -94,7 +94,7 @@ fn blocks_of(items: &[Aabb]) -> BoxBlocks {
     blocks
 }
 
-fn memcpy<'a>(material: &Material<'a>) -> Option<Competitor<'a>> {
+fn memcpy<'a>(material: &Material<'a>) -> Option<TimedTask<'a>> {
     let count = material.workload.items.len();
     let ids: Vec<ItemId> = (0..count as ItemId).collect();
     let lengths: Vec<usize> = material.visible.iter().map(|&v| v as usize).collect();
@@ -105,24 +105,21 @@ fn memcpy<'a>(material: &Material<'a>) -> Option<Competitor<'a>> {
         None => 0,
     };
     let starts: Vec<usize> = lengths.iter().enumerate().map(start).collect();
-    lengths
-        .iter()
-        .any(|&length| length > 0)
-        .then(|| Competitor {
-            expected: material.visible.to_vec(),
-            ask: Box::new(move |place, out| {
-                let start = starts[place];
-                out.extend_from_slice(&ids[start..start + lengths[place]]);
-            }),
-            ask_many: None,
-            least_ns: None,
-        })
+    lengths.iter().any(|&length| length > 0).then(|| TimedTask {
+        expected: material.visible.to_vec(),
+        ask: Box::new(move |place, out| {
+            let start = starts[place];
+            out.extend_from_slice(&ids[start..start + lengths[place]]);
+        }),
+        ask_many: None,
+        least_ns: None,
+    })
 }
 
 /// Only beside `wide` itself. The tree is a copy of its own.
-fn replay<'a>(material: &Material<'a>) -> Option<Competitor<'a>> {
+fn replay<'a>(material: &Material<'a>) -> Option<TimedTask<'a>> {
     let wide = material
-        .contenders
+        .subjects
         .iter()
         .find(|c| c.spec.row.info.name == Wide::INFO.name && c.built.is_ok())?;
     let params = serde_json::from_value(wide.spec.params.clone()).ok()?;
@@ -136,7 +133,7 @@ fn replay<'a>(material: &Material<'a>) -> Option<Competitor<'a>> {
             AnyView::Relative(view) => Trace::of(&tree, view),
         })
         .collect();
-    Some(Competitor {
+    Some(TimedTask {
         expected: material.visible.to_vec(),
         ask: Box::new(move |place, out| traces[place].replay(&tree, out)),
         ask_many: None,
@@ -164,7 +161,7 @@ mod tests {
         let path = path::load("orbit:frames=6", &scene, &LensDefaults::default()).unwrap();
         let workload = Workload::new(&scene, &path, &Culling::default()).unwrap();
         let spec = StructureSpec::parse("wide").unwrap();
-        let wide = Contender::build(spec, false, &scene, CullingTest::SixPlane);
+        let wide = Subject::build(spec, false, &scene, CullingTest::SixPlane);
         let index = &wide.built.as_ref().unwrap().items;
         let seen = |view: &CameraView| {
             let mut ids = Vec::new();
@@ -175,12 +172,12 @@ mod tests {
         assert!(visible.iter().any(|&v| v > 0));
         let mut material = Material {
             workload: &workload,
-            contenders: &[],
+            subjects: &[],
             visible: &visible,
         };
         assert!(replay(&material).is_none(), "nothing to replay");
-        let contenders = [wide];
-        material.contenders = &contenders;
+        let subjects = [wide];
+        material.subjects = &subjects;
         for bound in BOUNDS {
             assert!(
                 crate::measure::METRICS
@@ -189,11 +186,11 @@ mod tests {
                 "{}",
                 bound.name
             );
-            let competitor = (bound.make)(&material).unwrap();
-            assert_eq!(competitor.expected.len(), visible.len());
-            for (place, &expected) in competitor.expected.iter().enumerate() {
+            let task = (bound.make)(&material).unwrap();
+            assert_eq!(task.expected.len(), visible.len());
+            for (place, &expected) in task.expected.iter().enumerate() {
                 let mut out = Vec::new();
-                (competitor.ask)(place, &mut out);
+                (task.ask)(place, &mut out);
                 assert_eq!(out.len() as u64, expected, "{}", bound.name);
             }
         }
@@ -232,7 +229,7 @@ mod tests {
         let workload = Workload::new(&scene, &path, &Culling::default()).unwrap();
         let material = Material {
             workload: &workload,
-            contenders: &[],
+            subjects: &[],
             visible: &[0, 0],
         };
         assert!(BOUNDS.iter().all(|b| (b.make)(&material).is_none()));

@@ -2,14 +2,14 @@
 //! outputs that do not grow while they are timed. When to sweep is the timed
 //! pass's business.
 
-use super::competitor::Competitor;
 use super::schedule::Protocol;
+use super::task::TimedTask;
 use crate::query::ItemId;
 
 /// Room behind the answer that a structure may ask for while it writes it.
 const SLACK: usize = 64;
 
-/// What cold queries need. One sweep serves one query of every competitor: each
+/// What cold queries need. One sweep serves one query of every task: each
 /// has data of its own, which no other's query brings back, and its own output.
 pub(super) struct Cold {
     pub(super) sweep: Sweep,
@@ -19,11 +19,11 @@ pub(super) struct Cold {
 impl Cold {
     /// The outputs have their final size: a query that is asked once a sweep
     /// must not pay for their growth.
-    pub(super) fn new(protocol: &Protocol, competitors: &[Competitor]) -> Cold {
-        let most = |c: &Competitor| c.expected.iter().copied().max().unwrap_or(0) as usize;
+    pub(super) fn new(protocol: &Protocol, tasks: &[TimedTask]) -> Cold {
+        let most = |c: &TimedTask| c.expected.iter().copied().max().unwrap_or(0) as usize;
         Cold {
             sweep: Sweep::new(protocol.cache_bytes),
-            outs: competitors
+            outs: tasks
                 .iter()
                 .map(|c| {
                     let mut out = vec![0; most(c) + SLACK];

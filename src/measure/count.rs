@@ -1,4 +1,4 @@
-//! The count pass: every contender answers every query, with the counting
+//! The count pass: every subject answers every query, with the counting
 //! recorder and as it will be timed, and every answer is compared with the
 //! reference before anything is timed.
 
@@ -6,14 +6,14 @@ use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
-use super::contender::guarded;
 use super::group::Notice;
-use super::{Built, Status, Task, Verdict, Workload};
+use super::subject::guarded;
+use super::{Built, Status, TaskKind, Verdict, Workload};
 use crate::culling::CullingTest;
 use crate::query::{ItemId, Located, QueryCost};
 use crate::verify::{ErrorCount, Fault, Trial, Truth, explain_containment, explain_visibility};
 
-/// What one contender answered and what it cost.
+/// What one subject answered and what it cost.
 #[derive(Clone, Debug)]
 pub struct Counted {
     pub verdict: Verdict,
@@ -63,33 +63,33 @@ impl Counted {
 
     /// What a query of this task surely takes, ns: from counters alone, and so
     /// the same in every run. Far below the real time of most structures.
-    pub(super) fn least_ns(&self, task: Task) -> f64 {
+    pub(super) fn least_ns(&self, task: TaskKind) -> f64 {
         let (cost, queries) = match task {
-            Task::Query => (&self.cost, self.frames.len()),
-            Task::Locate | Task::LocateBatched => (&self.locate_cost, self.located.len()),
+            TaskKind::Query => (&self.cost, self.frames.len()),
+            TaskKind::Locate | TaskKind::LocateBatched => (&self.locate_cost, self.located.len()),
         };
         20.0 + 0.1 * cost.comparisons() as f64 / queries.max(1) as f64
     }
 }
 
-/// Longest a contender may take for its whole count pass.
+/// Longest a subject may take for its whole count pass.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-/// Counts and verifies. One reference serves all contenders of a frame; a
-/// contender that fails once is asked no more.
+/// Counts and verifies. One reference serves all subjects of a frame; a
+/// subject that fails once is asked no more.
 pub fn count_pass(
     workload: &Workload,
-    contenders: &[(String, &Built)],
+    subjects: &[(String, &Built)],
     notice: Notice,
 ) -> Vec<Counted> {
-    let mut all: Vec<Counted> = contenders.iter().map(|_| Counted::new()).collect();
-    let mut spent = vec![Duration::ZERO; contenders.len()];
+    let mut all: Vec<Counted> = subjects.iter().map(|_| Counted::new()).collect();
+    let mut spent = vec![Duration::ZERO; subjects.len()];
     let items = &workload.items;
     let mut trial = Trial::new(items.len());
     for (frame, view) in workload.views.iter().enumerate() {
         let view = view.as_any();
         trial.see(items, view);
-        for (i, (label, contender)) in contenders.iter().enumerate() {
+        for (i, (label, subject)) in subjects.iter().enumerate() {
             let counted = &mut all[i];
             if counted.verdict.status != Status::Ok {
                 continue;
@@ -97,7 +97,7 @@ pub fn count_pass(
             notice(Some(label), "counting");
             let start = Instant::now();
             let cost = &mut counted.cost;
-            let index = contender.items.as_ref();
+            let index = subject.items.as_ref();
             let counting = trial.ask(|out| index.see_counted(view, out, cost));
             // What will be timed is another traversal.
             let asked = match counting.map(drop) {
@@ -116,7 +116,7 @@ pub fn count_pass(
     let mut trial = Trial::new(boxes.len());
     for (n, &p) in workload.points.iter().enumerate() {
         trial.expect(workload.scene.holding(&workload.sought[n]));
-        for (i, (label, contender)) in contenders.iter().enumerate() {
+        for (i, (label, subject)) in subjects.iter().enumerate() {
             let counted = &mut all[i];
             if counted.verdict.status != Status::Ok {
                 continue;
@@ -124,7 +124,7 @@ pub fn count_pass(
             notice(Some(label), "counting");
             let start = Instant::now();
             let cost = &mut counted.locate_cost;
-            let index = contender.regions();
+            let index = subject.regions();
             let counting = trial.ask(|out| {
                 index.locate_counted(p, out, cost);
                 workload.refine(n, out);
@@ -143,9 +143,9 @@ pub fn count_pass(
             counted.located.push(Answer::of(trial.answer()));
         }
     }
-    for (counted, (_, contender)) in all.iter_mut().zip(contenders) {
+    for (counted, (_, subject)) in all.iter_mut().zip(subjects) {
         if counted.verdict.status == Status::Ok {
-            counted.verdict = batch_verdict(workload, contender);
+            counted.verdict = batch_verdict(workload, subject);
         }
     }
     for counted in &mut all {
@@ -156,9 +156,9 @@ pub fn count_pass(
 
 /// Whether all points of the path asked at once get what each got alone, which
 /// has been compared with the reference.
-fn batch_verdict(workload: &Workload, contender: &Built) -> Verdict {
+fn batch_verdict(workload: &Workload, subject: &Built) -> Verdict {
     let (mut many, mut alone) = (Located::default(), Vec::new());
-    let index = contender.regions();
+    let index = subject.regions();
     if let Err(panicked) = guarded(|| index.locate_many(&workload.points, &mut many)) {
         return panicked;
     }

@@ -12,7 +12,7 @@ use super::part::{CellKey, GroupKey, Known, Part, TaskSamples};
 use super::schedule::cameras_within;
 use super::update::refitted_ln;
 use super::{
-    Contender, Machine, PathInfo, Protocol, SceneInfo, Status, Verdict, Workload, WorkloadError,
+    Machine, PathInfo, Protocol, SceneInfo, Status, Subject, Verdict, Workload, WorkloadError,
 };
 use crate::culling::{Culling, CullingTest};
 use crate::index::{Kind, StructureSpec};
@@ -162,13 +162,13 @@ impl Plan {
     }
 
     /// All structures, and the first that is no scan a second time.
-    fn contenders(
+    fn subjects(
         &self,
         scene: &Scene,
         test: CullingTest,
         share: &Share,
         notice: Notice,
-    ) -> Vec<Contender> {
+    ) -> Vec<Subject> {
         let proper = self
             .structures
             .iter()
@@ -180,14 +180,14 @@ impl Plan {
         once.chain(twin.map(|s| (s, true)))
             .map(|(spec, is_twin)| {
                 if let Some(verdict) = share.failed.get(&spec.label) {
-                    return Contender {
+                    return Subject {
                         spec: spec.clone(),
                         is_twin,
                         built: Err(verdict.clone()),
                     };
                 }
                 notice(Some(&spec.label), "building");
-                let built = Contender::build(spec.clone(), is_twin, scene, test);
+                let built = Subject::build(spec.clone(), is_twin, scene, test);
                 match self.has_updates(share) && !is_twin {
                     true => built.with_updates(scene, test),
                     false => built,
@@ -253,7 +253,7 @@ pub fn measure_scene(
     let scene = scene::load(&planned.source, &plan.load)?;
     let info = SceneInfo::of(&scene);
     let sweep = Machine::capture().cache_sweep_bytes();
-    let mut built: Option<(bool, Vec<Contender>)> = None;
+    let mut built: Option<(bool, Vec<Subject>)> = None;
     let mut first = true;
     for (n, question) in plan.questions(planned).into_iter().enumerate() {
         if !share.wanted[n] {
@@ -265,10 +265,10 @@ pub fn measure_scene(
         if built.as_ref().is_none_or(|(kind, _)| *kind != of_spheres) {
             // The old ones go first: memory for one set is enough.
             drop(built.take());
-            let all = plan.contenders(&scene, question.culling.test, share, notice);
+            let all = plan.subjects(&scene, question.culling.test, share, notice);
             built = Some((of_spheres, all));
         }
-        let Some((_, contenders)) = &built else {
+        let Some((_, subjects)) = &built else {
             continue;
         };
         notice(None, &question.path);
@@ -298,7 +298,7 @@ pub fn measure_scene(
             locate: plan.effort.beside != Beside::Nothing,
         };
         let protocol = group.protocol;
-        let Some((mut part, samples)) = measure_part(&workload, contenders, group, notice, stop)
+        let Some((mut part, samples)) = measure_part(&workload, subjects, group, notice, stop)
         else {
             return Ok(false);
         };

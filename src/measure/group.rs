@@ -5,12 +5,12 @@
 use std::collections::BTreeMap;
 
 use super::bounds::{Bound, Material};
-use super::contender::TWIN;
 use super::count::{Counted, count_pass, judge};
 use super::part::{GroupKey, Known, NamedSchedule, Part, SubjectPart, TaskPart, TaskSamples};
+use super::subject::TWIN;
 use super::{
-    Answer, Built, Competitor, Contender, Judged, PathInfo, Protocol, SceneInfo, Schedule, Status,
-    Task, Timed, Verdict, Workload, guarded, timed,
+    Answer, Built, Judged, PathInfo, Protocol, SceneInfo, Schedule, Status, Subject, TaskKind,
+    Timed, TimedTask, Verdict, Workload, guarded, timed,
 };
 use crate::statistics::{interquartile_mean, median};
 
@@ -47,12 +47,12 @@ pub struct GroupPlan<'a> {
 /// Measures a group; `None` if stopped.
 pub fn measure_part(
     workload: &Workload,
-    contenders: &[Contender],
+    subjects: &[Subject],
     plan: GroupPlan<'_>,
     notice: Notice,
     stop: &dyn Fn() -> bool,
 ) -> Option<(Part, Vec<TaskSamples>)> {
-    let mut entries: Vec<Entry> = contenders.iter().map(Entry::new).collect();
+    let mut entries: Vec<Entry> = subjects.iter().map(Entry::new).collect();
     let mut judged = None;
     let answered = plan.known.filter(|known| !known.visible.is_empty());
     match answered {
@@ -90,22 +90,25 @@ pub fn measure_part(
     };
     let mut samples = Vec::new();
     let mut schedules = [None, None];
-    let passes = [&[Task::Query][..], &[Task::Locate, Task::LocateBatched]];
-    for (pass, tasks) in passes.into_iter().enumerate() {
+    let passes = [
+        &[TaskKind::Query][..],
+        &[TaskKind::Locate, TaskKind::LocateBatched],
+    ];
+    for (pass, kinds) in passes.into_iter().enumerate() {
         if pass == 1 && !plan.locate {
             break;
         }
-        let mut entered = enter(workload, contenders, &entries, tasks, &answers);
+        let mut entered = enter(workload, subjects, &entries, kinds, &answers);
         if pass == 0 && !visible.is_empty() {
             let material = Material {
                 workload,
-                contenders,
+                subjects,
                 visible: &visible,
             };
             for bound in plan.bounds {
                 if let Some(task) = (bound.make)(&material) {
                     part.bounds.push(bound.name.to_owned());
-                    entered.push(bound.name.to_owned(), Task::Query, task);
+                    entered.push(bound.name.to_owned(), TaskKind::Query, task);
                 }
             }
         }
@@ -131,22 +134,22 @@ pub fn measure_part(
             false => timed(&entered.tasks, &schedule, &plan.protocol, &turn)?,
         };
         let largest = schedule.tasks.iter().map(|t| t.batch).max().unwrap_or(1) as usize;
-        for ((label, task), result) in entered.names.iter().zip(timed) {
-            let groups = match task {
-                Task::Query => schedule.cameras.len().div_ceil(largest),
+        for ((label, kind), result) in entered.names.iter().zip(timed) {
+            let groups = match kind {
+                TaskKind::Query => schedule.cameras.len().div_ceil(largest),
                 _ => 0,
             };
             part.tasks
-                .push(task_part(label, *task, &result, groups, largest, &schedule));
+                .push(task_part(label, *kind, &result, groups, largest, &schedule));
             if let (Err(verdict), Some(entry)) = (
                 &result,
-                entries.iter_mut().find(|e| e.contender.label() == *label),
+                entries.iter_mut().find(|e| e.subject.label() == *label),
             ) {
                 entry.verdict = verdict.clone();
             }
             samples.push((
                 label.clone(),
-                *task,
+                *kind,
                 result.map(|t| t.samples).unwrap_or_default(),
             ));
         }
@@ -178,14 +181,14 @@ fn structure_of<'l>(label: &'l str, bounds: &[String]) -> Option<&'l str> {
 
 /// Tasks of one timed pass with their names.
 struct Entered<'a> {
-    names: Vec<(String, Task)>,
-    tasks: Vec<Competitor<'a>>,
+    names: Vec<(String, TaskKind)>,
+    tasks: Vec<TimedTask<'a>>,
 }
 
 impl<'a> Entered<'a> {
-    fn push(&mut self, label: String, task: Task, competitor: Competitor<'a>) {
-        self.names.push((label, task));
-        self.tasks.push(competitor);
+    fn push(&mut self, label: String, kind: TaskKind, task: TimedTask<'a>) {
+        self.names.push((label, kind));
+        self.tasks.push(task);
     }
 
     /// The plan of the first process for those tasks that are here, or a new one.
@@ -199,7 +202,7 @@ impl<'a> Entered<'a> {
             return Schedule::new(cameras, &self.tasks, protocol);
         };
         let mut kept = Vec::new();
-        let planned = |name: &(String, Task)| given.names.iter().position(|n| n == name);
+        let planned = |name: &(String, TaskKind)| given.names.iter().position(|n| n == name);
         let mut names = std::mem::take(&mut self.names);
         let tasks = std::mem::take(&mut self.tasks);
         for (name, task) in names.drain(..).zip(tasks) {
@@ -215,28 +218,28 @@ impl<'a> Entered<'a> {
 
 fn enter<'a>(
     workload: &'a Workload,
-    contenders: &'a [Contender],
+    subjects: &'a [Subject],
     entries: &[Entry],
-    tasks: &[Task],
+    kinds: &[TaskKind],
     answers: &[Vec<Answer>; 2],
 ) -> Entered<'a> {
     let mut entered = Entered {
         names: Vec::new(),
         tasks: Vec::new(),
     };
-    for &task in tasks {
-        let answers = match task {
-            Task::Query => &answers[0],
-            Task::Locate | Task::LocateBatched => &answers[1],
+    for &kind in kinds {
+        let answers = match kind {
+            TaskKind::Query => &answers[0],
+            TaskKind::Locate | TaskKind::LocateBatched => &answers[1],
         };
-        for (contender, entry) in contenders.iter().zip(entries) {
-            let (Ok(built), true) = (&contender.built, entry.runs()) else {
+        for (subject, entry) in subjects.iter().zip(entries) {
+            let (Ok(built), true) = (&subject.built, entry.runs()) else {
                 continue;
             };
-            let least_ns = entry.counted.as_ref().map(|c| c.least_ns(task));
-            let label = &contender.spec.label;
-            let competitor = Competitor::of(task, label, workload, built, answers, least_ns);
-            entered.push(contender.label(), task, competitor);
+            let least_ns = entry.counted.as_ref().map(|c| c.least_ns(kind));
+            let label = &subject.spec.label;
+            let task = TimedTask::of(kind, label, workload, built, answers, least_ns);
+            entered.push(subject.label(), kind, task);
         }
     }
     entered
@@ -244,7 +247,7 @@ fn enter<'a>(
 
 fn task_part(
     label: &str,
-    task: Task,
+    kind: TaskKind,
     result: &Result<Timed, Verdict>,
     groups: usize,
     largest: usize,
@@ -262,7 +265,7 @@ fn task_part(
         .collect();
     TaskPart {
         label: label.to_owned(),
-        task,
+        task: kind,
         verdict,
         rounds_ns: timed.round_means(|s| s.cpu_ns),
         wall_ln_ns: interquartile_mean(&wall),
@@ -305,10 +308,10 @@ fn tail(timed: &Timed, largest: usize, schedule: &Schedule) -> Vec<f64> {
 fn count(workload: &Workload, entries: &mut [Entry], notice: Notice) {
     let built: Vec<(String, &Built)> = entries
         .iter()
-        .filter_map(|e| Some((e.contender.label(), e.contender.built.as_ref().ok()?)))
+        .filter_map(|e| Some((e.subject.label(), e.subject.built.as_ref().ok()?)))
         .collect();
     let mut counted = count_pass(workload, &built, notice).into_iter();
-    for entry in entries.iter_mut().filter(|e| e.contender.built.is_ok()) {
+    for entry in entries.iter_mut().filter(|e| e.subject.built.is_ok()) {
         entry.counted = counted.next();
         if let Some(counted) = &entry.counted {
             entry.verdict = counted.verdict.clone();
@@ -349,35 +352,35 @@ fn right_answers(entries: &[Entry]) -> [Vec<Answer>; 2] {
 
 /// A structure on its way through the passes.
 struct Entry<'a> {
-    contender: &'a Contender,
+    subject: &'a Subject,
     verdict: Verdict,
     counted: Option<Counted>,
 }
 
 impl<'a> Entry<'a> {
-    fn new(contender: &'a Contender) -> Self {
-        let verdict = match &contender.built {
+    fn new(subject: &'a Subject) -> Self {
+        let verdict = match &subject.built {
             Ok(_) => Verdict::ok(),
             Err(verdict) => verdict.clone(),
         };
         Entry {
-            contender,
+            subject,
             verdict,
             counted: None,
         }
     }
 
     fn runs(&self) -> bool {
-        self.verdict.status == Status::Ok && self.contender.built.is_ok()
+        self.verdict.status == Status::Ok && self.subject.built.is_ok()
     }
 
     /// Asks every camera that is to be timed once more: the answers must be those of the first
     /// process, which has compared them with the reference.
     fn compare_digests(&mut self, workload: &Workload, known: &Known, notice: Notice) {
-        let Ok(built) = &self.contender.built else {
+        let Ok(built) = &self.subject.built else {
             return;
         };
-        notice(Some(&self.contender.label()), "comparing answers");
+        notice(Some(&self.subject.label()), "comparing answers");
         let (cameras, points) = (workload.views.len(), workload.points.len());
         if (known.visible.len(), known.located.len()) != (cameras, points) {
             let reason = format!(
@@ -429,13 +432,13 @@ impl<'a> Entry<'a> {
     }
 
     fn part(&self, workload: &Workload) -> SubjectPart {
-        let built = self.contender.built.as_ref().ok();
+        let built = self.subject.built.as_ref().ok();
         let counted = self.counted.as_ref().filter(|_| self.runs());
         SubjectPart {
-            label: self.contender.label(),
-            params: self.contender.spec.params.clone(),
-            kind: self.contender.spec.row.info.kind,
-            origin: self.contender.spec.row.info.origin.owned(),
+            label: self.subject.label(),
+            params: self.subject.spec.params.clone(),
+            kind: self.subject.spec.row.info.kind,
+            origin: self.subject.spec.row.info.origin.owned(),
             verdict: self.verdict.clone(),
             build_ms: built.map(|b| b.build_ms),
             memory_bytes: built.map(|b| b.memory.total() as u64),

@@ -3,14 +3,12 @@
 //! structure does and how results are written are not its business.
 //!
 //! The road every measurement walks: [`Workload`] (scene, views, points) ->
-//! [`Contender`]s (built structures) -> [`count_pass`] -> [`timed_rounds`] ->
+//! [`Subject`]s (built structures) -> [`count_pass`] -> [`timed_rounds`] ->
 //! [`Cell`]s with named metrics. [`BOUNDS`] take part in the timed rounds only.
 
 mod bounds;
 mod clock;
 mod cold;
-mod competitor;
-mod contender;
 mod count;
 mod environment;
 mod experiment;
@@ -22,6 +20,8 @@ mod part;
 mod question;
 mod results;
 mod schedule;
+mod subject;
+mod task;
 mod timing;
 mod update;
 mod workload;
@@ -32,8 +32,6 @@ use crate::verify::Fault;
 
 pub use bounds::{BOUNDS, Bound, Material};
 pub use clock::{Lap, Stopwatch};
-pub use competitor::{Ask, AskMany, Competitor, Task};
-pub use contender::{Built, Contender, guarded};
 pub use count::{Answer, Counted, Judged, count_pass, id_sum, judge};
 pub use environment::{Machine, Source, Toolchain};
 pub use experiment::{
@@ -46,6 +44,8 @@ pub use part::{CellKey, GroupKey, Known, NamedSchedule, Part, SubjectPart, TaskP
 pub use question::{PathInfo, SceneInfo};
 pub use results::{Cell, CellTimes, Group, YARDSTICK, measure_group};
 pub use schedule::{CLOCK_NS, Protocol, Schedule, TaskPlan, cameras_within};
+pub use subject::{Built, Subject, guarded};
+pub use task::{Ask, AskMany, TaskKind, TimedTask};
 pub use timing::{Sample, Timed, timed, timed_rounds};
 pub use update::{UPDATE_SHARES, move_share};
 pub use workload::{Workload, WorkloadError};

@@ -1,13 +1,13 @@
-//! The order of the competitors in each round, balanced so that neither a place
+//! The order of the tasks in each round, balanced so that neither a place
 //! nor a neighbour is anybody's advantage. Timing itself is `timing`'s.
 
 use crate::scene::Dice;
 
 /// Orders in which everyone takes every place once and follows everyone else
-/// once in as many rounds as there are competitors (twice in twice as many for
+/// once in as many rounds as there are tasks (twice in twice as many for
 /// odd numbers): a Williams square (E. J. Williams 1949, "Experimental designs
 /// balanced for the estimation of residual effects of treatments"), its names
-/// dealt anew for each block. Who comes after a competitor that streams through
+/// dealt anew for each block. Who comes after a task that streams through
 /// the caches starts worse than others; a fixed neighbour would be a bias.
 pub struct Orders {
     names: Vec<usize>,

@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use crate::index::{Kind, Origin};
 
-use super::{Answer, Judged, PathInfo, Sample, SceneInfo, Schedule, Status, Task, Verdict};
+use super::{Answer, Judged, PathInfo, Sample, SceneInfo, Schedule, Status, TaskKind, Verdict};
 
 /// What is common to the cells that are compared with each other.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
@@ -65,7 +65,7 @@ pub struct Known {
 /// A schedule with the names of its tasks.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct NamedSchedule {
-    pub names: Vec<(String, Task)>,
+    pub names: Vec<(String, TaskKind)>,
     pub schedule: Schedule,
 }
 
@@ -95,7 +95,7 @@ pub struct SubjectPart {
 pub struct TaskPart {
     /// Of a structure or of a lower bound.
     pub label: String,
-    pub task: Task,
+    pub task: TaskKind,
     #[serde(flatten)]
     pub verdict: Verdict,
     /// Mean CPU ns per query over all timed cameras, for each round.
@@ -150,7 +150,7 @@ impl Part {
                 .sum();
             let mut planned = names.iter().zip(&schedule.tasks);
             let own = self.tasks.iter();
-            for task in own.filter(|t| (t.task == Task::Query) == (pass == 0)) {
+            for task in own.filter(|t| (t.task == TaskKind::Query) == (pass == 0)) {
                 let mut wrong = |reason: String| {
                     let verdict = Verdict::new(Status::Wrong, reason);
                     found.push((task.label.as_str(), verdict));
@@ -190,4 +190,4 @@ impl Part {
 }
 
 /// The samples of one task of a part.
-pub type TaskSamples = (String, Task, Vec<Sample>);
+pub type TaskSamples = (String, TaskKind, Vec<Sample>);

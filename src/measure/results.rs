@@ -9,13 +9,13 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::bounds::{BOUNDS, Bound};
-use super::contender::TWIN;
 use super::group::{GroupPlan, LEAST_TAIL, measure_part};
 use super::metrics::{Metric, Metrics};
 use super::part::{Known, Part, SubjectPart, TaskPart};
+use super::subject::TWIN;
 use super::update::MOST_UPDATED;
 use super::{
-    Contender, Judged, PathInfo, Protocol, SceneInfo, Status, Task, UPDATE_SHARES, Verdict,
+    Judged, PathInfo, Protocol, SceneInfo, Status, Subject, TaskKind, UPDATE_SHARES, Verdict,
     Workload,
 };
 use crate::index::{Kind, Origin};
@@ -86,7 +86,7 @@ pub struct Group {
 /// intervals. `None` if stopped.
 pub fn measure_group(
     workload: &Workload,
-    contenders: &[Contender],
+    subjects: &[Subject],
     bounds: &[Bound],
     protocol: &Protocol,
     stop: &dyn Fn() -> bool,
@@ -102,12 +102,12 @@ pub fn measure_group(
         plan_only: false,
         locate: true,
     };
-    let (part, _) = measure_part(workload, contenders, plan, &|_, _| (), stop)?;
+    let (part, _) = measure_part(workload, subjects, plan, &|_, _| (), stop)?;
     Some(Group::of(&[part]))
 }
 
 /// ln ns per query in each process, by label and task.
-type Logs<'p> = BTreeMap<(&'p str, Task), Vec<f64>>;
+type Logs<'p> = BTreeMap<(&'p str, TaskKind), Vec<f64>>;
 
 impl Group {
     /// Of the parts of one group, one for each process, the first process first.
@@ -123,10 +123,10 @@ impl Group {
             .filter(|s| !s.label.ends_with(TWIN))
             .map(|subject| facts.cell(subject))
             .collect();
-        for (i, rank) in facts.ranks(&cells, Task::Query) {
+        for (i, rank) in facts.ranks(&cells, TaskKind::Query) {
             cells[i].rank = Some(rank);
         }
-        let located = facts.ranks(&cells, Task::Locate).into_iter();
+        let located = facts.ranks(&cells, TaskKind::Locate).into_iter();
         Group {
             bounds: first.bounds.iter().map(|name| facts.bound(name)).collect(),
             twin: facts.twin(),
@@ -146,7 +146,7 @@ struct Facts<'p> {
     logs: Logs<'p>,
     /// ln ns of the yardstick for each task, or of the first structure that has
     /// times where there is no yardstick.
-    reference: BTreeMap<Task, &'p str>,
+    reference: BTreeMap<TaskKind, &'p str>,
     has_yardstick: bool,
 }
 
@@ -178,14 +178,15 @@ impl<'p> Facts<'p> {
         };
         let right = |label: &str| facts.verdict(label).status == Status::Ok;
         let labels = parts[0].subjects.iter().map(|s| s.label.as_str());
-        let has_yardstick = right(YARDSTICK) && facts.logs.contains_key(&(YARDSTICK, Task::Query));
+        let has_yardstick =
+            right(YARDSTICK) && facts.logs.contains_key(&(YARDSTICK, TaskKind::Query));
         let reference = match has_yardstick {
             true => Some(YARDSTICK),
             false => labels
                 .filter(|label| right(label))
-                .find(|label| facts.logs.contains_key(&(*label, Task::Query))),
+                .find(|label| facts.logs.contains_key(&(*label, TaskKind::Query))),
         };
-        let tasks = [Task::Query, Task::Locate, Task::LocateBatched];
+        let tasks = [TaskKind::Query, TaskKind::Locate, TaskKind::LocateBatched];
         let reference = reference
             .iter()
             .flat_map(|label| tasks.map(|task| (task, *label)));
@@ -194,11 +195,11 @@ impl<'p> Facts<'p> {
         facts
     }
 
-    fn log<'s>(&'s self, label: &'s str, task: Task) -> Option<&'s [f64]> {
+    fn log<'s>(&'s self, label: &'s str, task: TaskKind) -> Option<&'s [f64]> {
         self.logs.get(&(label, task)).map(Vec::as_slice)
     }
 
-    fn reference(&self, task: Task) -> Option<&[f64]> {
+    fn reference(&self, task: TaskKind) -> Option<&[f64]> {
         self.log(self.reference.get(&task)?, task)
     }
 
@@ -222,7 +223,7 @@ impl<'p> Facts<'p> {
         all.filter(move |s| s.label == label)
     }
 
-    fn tasks(&self, label: &str, task: Task) -> impl Iterator<Item = &'p TaskPart> {
+    fn tasks(&self, label: &str, task: TaskKind) -> impl Iterator<Item = &'p TaskPart> {
         let all = self.parts.iter().flat_map(|part| &part.tasks);
         all.filter(move |t| t.label == label && t.task == task)
     }
@@ -295,10 +296,10 @@ impl<'p> Facts<'p> {
                 "update_ms: scenes of more than {MOST_UPDATED} items are not moved"
             ));
         }
-        if self.log(label, Task::Locate).is_none() {
+        if self.log(label, TaskKind::Locate).is_none() {
             left_out.push("locate_ns: this suite times frustum queries only".to_owned());
         }
-        let mut queries = self.tasks(label, Task::Query);
+        let mut queries = self.tasks(label, TaskKind::Query);
         if queries.any(|task| task.tail_ns.len() < LEAST_TAIL) {
             left_out.push(format!(
                 "query_ns_p95: fewer than {LEAST_TAIL} comparable groups of cameras"
@@ -314,14 +315,14 @@ impl<'p> Facts<'p> {
             let place = named
                 .names
                 .iter()
-                .position(|(l, task)| l == label && *task == Task::Query)?;
+                .position(|(l, task)| l == label && *task == TaskKind::Query)?;
             Some((named.schedule.tasks[place], &named.schedule))
         });
         let mut by_process = BTreeMap::new();
         for (metric, task) in [
-            ("query_ns", Task::Query),
-            ("locate_ns", Task::Locate),
-            ("locate_batched_ns", Task::LocateBatched),
+            ("query_ns", TaskKind::Query),
+            ("locate_ns", TaskKind::Locate),
+            ("locate_batched_ns", TaskKind::LocateBatched),
         ] {
             if let Some(own) = self.log(label, task) {
                 by_process.insert(metric.to_owned(), own.iter().map(|x| x.exp()).collect());
@@ -332,11 +333,11 @@ impl<'p> Facts<'p> {
             by_process.insert("build_ms".to_owned(), builds);
         }
         let rounds = self
-            .tasks(label, Task::Query)
+            .tasks(label, TaskKind::Query)
             .map(|t| t.rounds_ns.len())
             .min();
         CellTimes {
-            processes: self.log(label, Task::Query).map_or(0, <[f64]>::len),
+            processes: self.log(label, TaskKind::Query).map_or(0, <[f64]>::len),
             rounds: rounds.unwrap_or(0),
             cameras_timed: plan.map_or(0, |(_, schedule)| schedule.cameras.len()),
             cameras_checked: known.map_or(0, |known| known.visible.len()),
@@ -373,9 +374,9 @@ impl<'p> Facts<'p> {
 
     fn time_metrics(&self, metrics: &mut Metrics, label: &str) {
         for (task, time, speedup) in [
-            (Task::Query, "query_ns", Some("speedup")),
-            (Task::Locate, "locate_ns", Some("locate_speedup")),
-            (Task::LocateBatched, "locate_batched_ns", None),
+            (TaskKind::Query, "query_ns", Some("speedup")),
+            (TaskKind::Locate, "locate_ns", Some("locate_speedup")),
+            (TaskKind::LocateBatched, "locate_batched_ns", None),
         ] {
             let (Some(own), Some(reference)) = (self.log(label, task), self.reference(task)) else {
                 continue;
@@ -389,7 +390,7 @@ impl<'p> Facts<'p> {
                 metrics.interval(speedup, shown.speedup, interval);
             }
         }
-        let queries = || self.tasks(label, Task::Query);
+        let queries = || self.tasks(label, TaskKind::Query);
         let wall: Vec<f64> = queries().filter_map(|t| t.wall_ln_ns).collect();
         metrics.estimate("query_wall_ns", shown(&wall, &wall));
         let returned: u64 = queries().map(|t| t.returned).sum();
@@ -421,8 +422,8 @@ impl<'p> Facts<'p> {
             return;
         }
         let cost = |label: &str| -> Option<(f64, f64)> {
-            let reference = self.reference(Task::Query)?;
-            let query = one_run(reference, self.log(label, Task::Query)?)?.value;
+            let reference = self.reference(TaskKind::Query)?;
+            let query = one_run(reference, self.log(label, TaskKind::Query)?)?.value;
             let mut built = Metrics::default();
             self.build_metrics(&mut built, label);
             Some((built.0.get("build_ms")?.value * 1e6, query))
@@ -439,8 +440,11 @@ impl<'p> Facts<'p> {
 
     /// Time of `label` / time of `other`: the ratio of the two shown values.
     fn ratio(&self, label: &str, other: &str) -> Option<Estimate> {
-        let reference = self.reference(Task::Query)?;
-        let (own, base) = (self.log(label, Task::Query)?, self.log(other, Task::Query)?);
+        let reference = self.reference(TaskKind::Query)?;
+        let (own, base) = (
+            self.log(label, TaskKind::Query)?,
+            self.log(other, TaskKind::Query)?,
+        );
         ratio(reference, own, base)
     }
 
@@ -460,7 +464,7 @@ impl<'p> Facts<'p> {
     }
 
     /// The ranks of those cells that have times of a task.
-    fn ranks(&self, cells: &[Cell], task: Task) -> Vec<(usize, usize)> {
+    fn ranks(&self, cells: &[Cell], task: TaskKind) -> Vec<(usize, usize)> {
         let Some(reference) = self.reference(task) else {
             return Vec::new();
         };

@@ -5,8 +5,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::clock::Stopwatch;
-use super::competitor::Competitor;
-use super::contender::guarded;
+use super::subject::guarded;
+use super::task::TimedTask;
 use crate::query::ItemId;
 use crate::statistics::median;
 
@@ -87,7 +87,7 @@ impl Schedule {
     /// Plans a pass over `count` cameras. Queries per clock reading follow from
     /// what was counted, and are the same in every run; where a task does not
     /// know its cost, from the median of a few queries.
-    pub fn new(count: usize, tasks: &[Competitor], protocol: &Protocol) -> Schedule {
+    pub fn new(count: usize, tasks: &[TimedTask], protocol: &Protocol) -> Schedule {
         let cameras = protocol.cameras_of(count);
         let timed = cameras.len().max(1);
         let mut out = Vec::new();
@@ -135,7 +135,7 @@ impl Schedule {
 }
 
 /// Median CPU time of a query, ns.
-fn pilot(task: &Competitor, cameras: &[u32], out: &mut Vec<ItemId>) -> f64 {
+fn pilot(task: &TimedTask, cameras: &[u32], out: &mut Vec<ItemId>) -> f64 {
     let some = cameras.len().min(PILOT);
     let mut asked: Vec<u32> = (0..some)
         .map(|k| cameras[k * cameras.len() / some])
@@ -217,7 +217,7 @@ mod tests {
 
     #[test]
     fn slow_tasks_take_part_in_fewer_rounds() {
-        let spin = |ns: u64| Competitor {
+        let spin = |ns: u64| TimedTask {
             ask: Box::new(move |_, _| {
                 let watch = Stopwatch::start();
                 while watch.lap().cpu_ns < ns as f64 {}

@@ -9,10 +9,10 @@ use serde::{Deserialize, Serialize};
 
 use super::clock::Stopwatch;
 use super::cold::Cold;
-use super::competitor::Competitor;
-use super::contender::guarded;
 use super::orders::Orders;
 use super::schedule::{Protocol, Schedule};
+use super::subject::guarded;
+use super::task::TimedTask;
 use super::{Status, Verdict};
 use crate::query::ItemId;
 use crate::statistics::interquartile_mean;
@@ -77,7 +77,7 @@ impl Timed {
 /// Plans and times a pass over `count` cameras: [`Schedule::new`], [`timed`].
 pub fn timed_rounds(
     count: usize,
-    tasks: &[Competitor],
+    tasks: &[TimedTask],
     protocol: &Protocol,
     stop: &dyn Fn() -> bool,
 ) -> Option<Vec<Result<Timed, Verdict>>> {
@@ -100,7 +100,7 @@ pub fn timed_rounds(
 /// # Panics
 /// If the schedule is not one of so many tasks.
 pub fn timed(
-    tasks: &[Competitor],
+    tasks: &[TimedTask],
     schedule: &Schedule,
     protocol: &Protocol,
     turn: &dyn Fn(usize) -> bool,
@@ -159,7 +159,7 @@ pub fn timed(
 /// What the rounds of a pass fill in.
 struct Pass<'p, 'a> {
     cameras: &'p [u32],
-    tasks: &'p [Competitor<'a>],
+    tasks: &'p [TimedTask<'a>],
     results: Vec<Result<Timed, Verdict>>,
 }
 
@@ -210,7 +210,7 @@ impl Pass<'_, '_> {
     }
 }
 
-fn warm_up(task: &Competitor, cameras: &[u32], batch: usize, out: &mut Vec<ItemId>) {
+fn warm_up(task: &TimedTask, cameras: &[u32], batch: usize, out: &mut Vec<ItemId>) {
     let started = Instant::now();
     for cameras in cameras.chunks(batch) {
         task.ask_all(cameras, out);
@@ -236,8 +236,8 @@ mod tests {
     }
 
     /// Returns as many ids as the camera has by `count`.
-    fn task<'a>(count: impl Fn(usize) -> u64 + 'a, expected: Vec<u64>) -> Competitor<'a> {
-        Competitor {
+    fn task<'a>(count: impl Fn(usize) -> u64 + 'a, expected: Vec<u64>) -> TimedTask<'a> {
+        TimedTask {
             ask: Box::new(move |camera, out| out.extend((0..count(camera)).map(|id| id as ItemId))),
             ask_many: None,
             expected,
@@ -268,7 +268,7 @@ mod tests {
 
     #[test]
     fn points_that_are_asked_at_once_are_one_batch() {
-        let many = Competitor {
+        let many = TimedTask {
             ask_many: Some(Box::new(|cameras| cameras.len() as u64)),
             ..task(|_| 1, vec![1; 40])
         };
@@ -301,7 +301,7 @@ mod tests {
 
     #[test]
     fn a_panic_is_the_result_of_its_task_alone() {
-        let panics = |at: usize| Competitor {
+        let panics = |at: usize| TimedTask {
             ask: Box::new(move |camera, _| assert!(camera < at, "deep in a peer's code")),
             ..task(|_| 0, vec![0; 40])
         };

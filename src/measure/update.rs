@@ -1,7 +1,7 @@
 //! Items that move: what an update costs, and what many of them do to queries.
 
 use super::clock::Stopwatch;
-use super::{Answer, Competitor, Protocol, Workload, guarded, timed_rounds};
+use super::{Answer, Protocol, TimedTask, Workload, guarded, timed_rounds};
 use crate::geometry::Aabb;
 use crate::index::{BuildError, DynIndex, StructureSpec};
 use crate::query::ItemId;
@@ -78,7 +78,7 @@ pub(super) fn refitted_ln(
     if answers(refitted.as_ref())? != expected {
         return None;
     }
-    let tasks = [&refitted, &rebuilt].map(|index| Competitor {
+    let tasks = [&refitted, &rebuilt].map(|index| TimedTask {
         ask: Box::new(|camera, out| index.see(workload.views[camera].as_any(), out)),
         ask_many: None,
         expected: expected.iter().map(|answer| answer.count).collect(),

@@ -1,4 +1,4 @@
-//! What is asked of every contender: the views of a camera path and the points
+//! What is asked of every subject: the views of a camera path and the points
 //! to locate, made before the first clock starts and the same for all.
 
 use std::borrow::Cow;
@@ -73,7 +73,7 @@ impl<'a> Workload<'a> {
         })
     }
 
-    /// Region search as every contender is asked to do it: for the point of a
+    /// Region search as every subject is asked to do it: for the point of a
     /// place the index finds boxes, the scene's regions decide, exactly.
     #[inline]
     pub fn refine(&self, place: usize, out: &mut Vec<ItemId>) {

@@ -13,7 +13,7 @@ use crate::culling::{ARITHMETICS, Arithmetic, Culling, CullingTest, TESTS};
 use crate::index::{BuildError, By, DynIndex, RegionIndex, StructureSpec};
 use crate::kernel::Kernel;
 use crate::measure::{
-    Competitor, OverProcesses, ProcessTimes, Protocol, Schedule, Status, Verdict, timed,
+    OverProcesses, ProcessTimes, Protocol, Schedule, Status, TimedTask, Verdict, timed,
 };
 use crate::path::CameraPath;
 use crate::scene::Scene;
@@ -207,9 +207,9 @@ impl<'a> Built<'a> {
 }
 
 impl<'b> Way<'b> {
-    fn competitor(&self, expected: Vec<u64>) -> Competitor<'b> {
+    fn task(&self, expected: Vec<u64>) -> TimedTask<'b> {
         let (index, views) = (self.index, &self.judged.views);
-        Competitor {
+        TimedTask {
             ask: match index {
                 Some(index) => Box::new(move |n, out| index.see(views[n].as_any(), out)),
                 None => Box::new(|_, _| ()),
@@ -295,7 +295,7 @@ pub fn prepare(
     let built = Built::new(input, &cameras, Some(&truths))?;
     drop(truths);
     let ways = built.ways();
-    let (mut points, mut timed, mut competitors) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut points, mut timed, mut tasks) = (Vec::new(), Vec::new(), Vec::new());
     let mut twin = None;
     for way in &ways {
         if stop() {
@@ -313,7 +313,7 @@ pub fn prepare(
                         twin.get_or_insert(timed.len());
                     }
                     timed.push(points.len());
-                    competitors.push(way.competitor(judged.counts()));
+                    tasks.push(way.task(judged.counts()));
                 }
                 Some(Err(wrong)) => (point.status, point.reason) = (wrong.status, wrong.reason),
             }
@@ -322,11 +322,11 @@ pub fn prepare(
     }
     if let Some(original) = twin {
         let way = &ways[timed[original]];
-        competitors.push(way.competitor(way.judged.counts()));
+        tasks.push(way.task(way.judged.counts()));
         timed.push(timed[original]);
     }
     let cameras = cameras.len();
-    let schedule = Schedule::new(cameras, &competitors, input.protocol);
+    let schedule = Schedule::new(cameras, &tasks, input.protocol);
     Ok(Some(Prepared {
         precision: Precision {
             scene: scene.name.clone(),
@@ -343,7 +343,7 @@ pub fn prepare(
         plan: PointPlan {
             timed,
             schedule,
-            expected: competitors.into_iter().map(|c| c.expected).collect(),
+            expected: tasks.into_iter().map(|c| c.expected).collect(),
         },
         twin,
     }))
@@ -365,10 +365,10 @@ pub fn time(
     let built = Built::new(input, &cameras, None)?;
     let ways = built.ways();
     let planned = plan.timed.iter().zip(&plan.expected);
-    let competitors: Vec<Competitor> = planned
-        .map(|(&point, expected)| ways[point].competitor(expected.clone()))
+    let tasks: Vec<TimedTask> = planned
+        .map(|(&point, expected)| ways[point].task(expected.clone()))
         .collect();
-    let timed = timed(&competitors, &plan.schedule, input.protocol, &|_| stop());
+    let timed = timed(&tasks, &plan.schedule, input.protocol, &|_| stop());
     Ok(timed.map(|timed| {
         let by_camera = timed.iter().map(|timed| match timed {
             Ok(timed) => by_camera(timed, cameras.len()),

@@ -39,6 +39,7 @@ fn without_interval(old: &[f64], new: &[f64]) -> Option<Judgement> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::statistics::Change;
 
     fn side(centre: f64) -> Vec<f64> {
         (0..10)

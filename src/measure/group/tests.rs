@@ -26,15 +26,15 @@ fn workload(scene: &Scene) -> Workload<'_> {
     Workload::new(scene, &way, &Culling::default()).expect("a workload")
 }
 
-fn contenders(names: &str, scene: &Scene) -> Vec<Contender> {
+fn subjects(names: &str, scene: &Scene) -> Vec<Subject> {
     let specs = Registry::builtin().structures(names).expect("structures");
-    let build = |spec| Contender::build(spec, false, scene, CullingTest::SixPlane);
+    let build = |spec| Subject::build(spec, false, scene, CullingTest::SixPlane);
     specs.into_iter().map(build).collect()
 }
 
 fn measured(names: &str, process: u32, known: Option<&Known>, plan_only: bool) -> Part {
     let scene = scene();
-    let (workload, contenders) = (workload(&scene), contenders(names, &scene));
+    let (workload, subjects) = (workload(&scene), subjects(names, &scene));
     let info = SceneInfo::of(&scene);
     let plan = GroupPlan {
         scene: &info,
@@ -46,7 +46,7 @@ fn measured(names: &str, process: u32, known: Option<&Known>, plan_only: bool) -
         plan_only,
         locate: true,
     };
-    let part = measure_part(&workload, &contenders, plan, &|_, _| (), &|| false);
+    let part = measure_part(&workload, &subjects, plan, &|_, _| (), &|| false);
     part.expect("not stopped").0
 }
 
@@ -70,7 +70,7 @@ fn a_later_process_keeps_to_the_plan_of_the_first() {
         [("linear", Status::Ok), ("bvh", Status::Ok)]
     );
     assert!(second.contradictions(known).is_empty());
-    let names = |part: &Part| -> Vec<(String, Task)> {
+    let names = |part: &Part| -> Vec<(String, TaskKind)> {
         let tasks = part.tasks.iter();
         tasks.map(|t| (t.label.clone(), t.task)).collect()
     };
@@ -127,19 +127,19 @@ fn what_has_no_plan_is_not_timed_and_the_rest_keeps_its_own() {
     plan.names.remove(1);
     plan.schedule.tasks.remove(1);
     let part = measured("linear,octree,bvh", 1, Some(&known), false);
-    let queries = part.tasks.iter().filter(|t| t.task == Task::Query);
+    let queries = part.tasks.iter().filter(|t| t.task == TaskKind::Query);
     let labels: Vec<&str> = queries.map(|t| t.label.as_str()).collect();
     assert_eq!(labels, ["linear", "bvh"]);
     // The plan names what is not here: a structure that ended a process.
     let part = measured("bvh", 2, Some(&known), false);
-    let queries = part.tasks.iter().filter(|t| t.task == Task::Query);
+    let queries = part.tasks.iter().filter(|t| t.task == TaskKind::Query);
     assert_eq!(queries.count(), 1);
     assert!(part.contradictions(&known).is_empty());
     let scene = scene();
-    let (workload, contenders) = (workload(&scene), contenders("bvh", &scene));
-    let entries: Vec<Entry> = contenders.iter().map(Entry::new).collect();
+    let (workload, subjects) = (workload(&scene), subjects("bvh", &scene));
+    let entries: Vec<Entry> = subjects.iter().map(Entry::new).collect();
     let answers = [known.visible.clone(), known.located.clone()];
-    let mut entered = enter(&workload, &contenders, &entries, &[Task::Query], &answers);
+    let mut entered = enter(&workload, &subjects, &entries, &[TaskKind::Query], &answers);
     let schedule = entered.schedule(known.query.as_ref(), 8, &protocol());
     let batches: Vec<u32> = schedule.tasks.iter().map(|t| t.batch).collect();
     assert_eq!(batches, [3], "its own, not the one in its place");

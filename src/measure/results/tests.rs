@@ -6,7 +6,7 @@ use super::super::{Answer, GroupKey, NamedSchedule, Schedule, TaskPlan};
 use super::*;
 
 /// Time per query of a task in each process, ns.
-type Times<'t> = (&'t str, Task, &'t [f64]);
+type Times<'t> = (&'t str, TaskKind, &'t [f64]);
 
 /// Cameras, ids per answer and rounds of every schedule here.
 const CAMERAS: u64 = 4;
@@ -36,8 +36,8 @@ fn parts(times: &[Times]) -> Vec<Part> {
         count: IDS,
         digest: 7,
     };
-    let schedule = |of: fn(Task) -> bool| {
-        let names: Vec<(String, Task)> = times
+    let schedule = |of: fn(TaskKind) -> bool| {
+        let names: Vec<(String, TaskKind)> = times
             .iter()
             .filter(|(_, task, _)| of(*task))
             .map(|(label, task, _)| ((*label).to_owned(), *task))
@@ -56,8 +56,8 @@ fn parts(times: &[Times]) -> Vec<Part> {
     let known = Known {
         visible: vec![answer; CAMERAS as usize],
         located: vec![answer; CAMERAS as usize],
-        query: schedule(|task| task == Task::Query),
-        locate: schedule(|task| task != Task::Query),
+        query: schedule(|task| task == TaskKind::Query),
+        locate: schedule(|task| task != TaskKind::Query),
         lens_scale: None,
     };
     let key = GroupKey {
@@ -119,10 +119,10 @@ fn times(factor: f64, salt: u64) -> Vec<f64> {
 fn values_lie_in_their_intervals_and_ratios_are_those_of_the_shown_values() {
     let (linear, fast, slow, same) = (times(1.0, 1), times(0.2, 2), times(3.0, 3), times(0.2, 4));
     let group = Group::of(&parts(&[
-        ("linear", Task::Query, &linear),
-        ("fast", Task::Query, &fast),
-        ("slow", Task::Query, &slow),
-        ("same", Task::Query, &same),
+        ("linear", TaskKind::Query, &linear),
+        ("fast", TaskKind::Query, &fast),
+        ("slow", TaskKind::Query, &slow),
+        ("same", TaskKind::Query, &same),
     ]));
     let value = |cell: &Cell, metric: &str| cell.metrics[metric].value;
     for cell in &group.cells {
@@ -151,10 +151,10 @@ fn values_lie_in_their_intervals_and_ratios_are_those_of_the_shown_values() {
 fn ranks_are_shared_by_what_no_test_tells_apart() {
     let (linear, fast, same, slow) = (times(1.0, 1), times(0.2, 2), times(0.2, 4), times(0.3, 3));
     let group = Group::of(&parts(&[
-        ("linear", Task::Query, &linear),
-        ("slow", Task::Query, &slow),
-        ("fast", Task::Query, &fast),
-        ("same", Task::Query, &same),
+        ("linear", TaskKind::Query, &linear),
+        ("slow", TaskKind::Query, &slow),
+        ("fast", TaskKind::Query, &fast),
+        ("same", TaskKind::Query, &same),
     ]));
     let ranks: Vec<_> = group.cells.iter().map(|cell| cell.rank).collect();
     assert_eq!(ranks, [Some(4), Some(3), Some(1), Some(1)]);
@@ -163,8 +163,8 @@ fn ranks_are_shared_by_what_no_test_tells_apart() {
 #[test]
 fn one_process_has_values_and_no_intervals() {
     let group = Group::of(&parts(&[
-        ("linear", Task::Query, &[1000.0]),
-        ("fast", Task::Query, &[250.0]),
+        ("linear", TaskKind::Query, &[1000.0]),
+        ("fast", TaskKind::Query, &[250.0]),
     ]));
     let fast = &group.cells[1];
     for name in ["query_ns", "speedup", "build_ms", "query_wall_ns"] {
@@ -179,9 +179,9 @@ fn one_process_has_values_and_no_intervals() {
 fn the_twin_is_no_cell_and_its_interval_holds_one() {
     let (linear, fast, again) = (times(1.0, 1), times(0.2, 2), times(0.2, 4));
     let group = Group::of(&parts(&[
-        ("linear", Task::Query, &linear),
-        ("fast", Task::Query, &fast),
-        ("fast#twin", Task::Query, &again),
+        ("linear", TaskKind::Query, &linear),
+        ("fast", TaskKind::Query, &fast),
+        ("fast#twin", TaskKind::Query, &again),
     ]));
     assert_eq!(group.cells.len(), 2);
     let (label, ratio) = group.twin.unwrap();
@@ -194,8 +194,8 @@ fn the_twin_is_no_cell_and_its_interval_holds_one() {
 fn what_failed_in_one_process_is_not_ok_and_has_no_time() {
     let (linear, fast) = (times(1.0, 1), times(0.2, 2));
     let sound = parts(&[
-        ("linear", Task::Query, &linear),
-        ("fast", Task::Query, &fast),
+        ("linear", TaskKind::Query, &linear),
+        ("fast", TaskKind::Query, &fast),
     ]);
     let failed = Verdict::new(Status::OutOfMemory, "killed while timing");
     let (mut as_subject, mut as_task) = (sound.clone(), sound);
@@ -219,8 +219,8 @@ fn what_failed_in_one_process_is_not_ok_and_has_no_time() {
 fn a_build_breaks_even_by_the_times_that_are_shown() {
     let (linear, fast) = (times(1.0, 1), times(0.2, 2));
     let group = Group::of(&parts(&[
-        ("linear", Task::Query, &linear),
-        ("fast", Task::Query, &fast),
+        ("linear", TaskKind::Query, &linear),
+        ("fast", TaskKind::Query, &fast),
     ]));
     let [linear, fast] = &group.cells[..] else {
         panic!("two cells");
@@ -236,7 +236,7 @@ fn a_build_breaks_even_by_the_times_that_are_shown() {
 fn a_tail_is_read_off_twenty_groups_and_not_fewer() {
     let linear = times(1.0, 1);
     for groups in [19, 20] {
-        let mut parts = parts(&[("linear", Task::Query, &linear)]);
+        let mut parts = parts(&[("linear", TaskKind::Query, &linear)]);
         for part in &mut parts {
             part.tasks[0].tail_ns = (1..=groups).map(f64::from).collect();
         }
@@ -253,8 +253,8 @@ fn a_tail_is_read_off_twenty_groups_and_not_fewer() {
 fn without_the_yardstick_there_are_times_and_ranks_but_no_speed_ups() {
     let (bvh, octree) = (times(1.0, 1), times(2.0, 2));
     let group = Group::of(&parts(&[
-        ("octree", Task::Query, &octree),
-        ("bvh", Task::Query, &bvh),
+        ("octree", TaskKind::Query, &octree),
+        ("bvh", TaskKind::Query, &bvh),
     ]));
     let ranks: Vec<_> = group.cells.iter().map(|cell| cell.rank).collect();
     assert_eq!(ranks, [Some(2), Some(1)]);
@@ -270,10 +270,10 @@ fn without_the_yardstick_there_are_times_and_ranks_but_no_speed_ups() {
 fn a_pass_that_is_not_the_plan_s_makes_its_structure_wrong() {
     let (linear, fast) = (times(1.0, 1), times(0.2, 2));
     let sound = parts(&[
-        ("linear", Task::Query, &linear),
-        ("linear", Task::Locate, &linear),
-        ("fast", Task::Query, &fast),
-        ("fast", Task::Locate, &fast),
+        ("linear", TaskKind::Query, &linear),
+        ("linear", TaskKind::Locate, &linear),
+        ("fast", TaskKind::Query, &fast),
+        ("fast", TaskKind::Locate, &fast),
     ]);
     let statuses = |change: &dyn Fn(&mut Part)| {
         let mut parts = sound.clone();
@@ -310,7 +310,7 @@ fn a_pass_that_is_not_the_plan_s_makes_its_structure_wrong() {
 #[test]
 fn times_of_cells_survive_json() {
     let linear = times(1.0, 1);
-    let group = Group::of(&parts(&[("linear", Task::Query, &linear)]));
+    let group = Group::of(&parts(&[("linear", TaskKind::Query, &linear)]));
     let times = &group.cells[0].times;
     let back: CellTimes = serde_json::from_value(json!(times)).unwrap();
     assert_eq!(&back, times);

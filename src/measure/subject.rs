@@ -1,6 +1,6 @@
-//! A contender of a measurement: a structure, built over its own copy of the
-//! data so that nobody is warmed by a neighbour. It owns the timing of the
-//! build and the net under panics.
+//! A subject of a measurement: a structure, built over its own copy of the
+//! data so that no other warms it. Here are the timing of the
+//! build and the guard against panics.
 
 use super::clock::Stopwatch;
 use super::update::measure_updates;
@@ -11,7 +11,7 @@ use crate::scene::Scene;
 
 /// A structure with its two indexes: over the items (what does the camera
 /// see) and over the regions (where is the camera).
-pub struct Contender {
+pub struct Subject {
     pub spec: StructureSpec,
     /// Entered a second time, as a check: it must be as fast as the first.
     pub is_twin: bool,
@@ -44,16 +44,12 @@ pub(super) const TWIN: &str = "#twin";
 /// Builds shorter than this are made twice, and the second one counts.
 const AGAIN_BELOW_MS: f64 = 50.0;
 
-impl Contender {
-    /// Builds the structure over the items as a culling test has them; a panic or a refusal becomes its verdict.
-    pub fn build(
-        spec: StructureSpec,
-        is_twin: bool,
-        scene: &Scene,
-        test: CullingTest,
-    ) -> Contender {
+impl Subject {
+    /// Builds the structure over the items as a culling test has them. A panic or a
+    /// refusal becomes its verdict.
+    pub fn build(spec: StructureSpec, is_twin: bool, scene: &Scene, test: CullingTest) -> Subject {
         let built = guarded(|| build(&spec, scene, test)).unwrap_or_else(Err);
-        Contender {
+        Subject {
             spec,
             is_twin,
             built,
@@ -61,7 +57,7 @@ impl Contender {
     }
 
     /// Measures updates as well, on another index that is then thrown away.
-    pub fn with_updates(mut self, scene: &Scene, test: CullingTest) -> Contender {
+    pub fn with_updates(mut self, scene: &Scene, test: CullingTest) -> Subject {
         let updates = |spec: &StructureSpec| {
             let items = test.items(&scene.items);
             let spare = spec.build_with(&items, scene.own_tree.as_ref())?;

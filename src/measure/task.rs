@@ -12,7 +12,7 @@ named! {
     /// Which of the two questions is asked.
     #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize, Deserialize)]
     #[serde(rename_all = "snake_case")]
-    pub enum Task {
+    pub enum TaskKind {
         /// What does the camera see?
         Query = "query",
         /// Where is the camera?
@@ -30,7 +30,7 @@ pub type AskMany<'a> = Box<dyn Fn(&[u32]) -> u64 + 'a>;
 
 /// One that takes part in a timed pass: how it answers query `place`
 /// (appending to an empty output), and what it must return.
-pub struct Competitor<'a> {
+pub struct TimedTask<'a> {
     pub ask: Ask<'a>,
     /// Takes the place of `ask`, and a whole pass is one batch.
     pub ask_many: Option<AskMany<'a>>,
@@ -41,10 +41,10 @@ pub struct Competitor<'a> {
     pub least_ns: Option<f64>,
 }
 
-impl<'a> Competitor<'a> {
+impl<'a> TimedTask<'a> {
     /// A structure that counted right, asked a task of a workload.
     pub(super) fn of(
-        task: Task,
+        task: TaskKind,
         label: &str,
         workload: &'a Workload,
         built: &'a Built,
@@ -52,7 +52,7 @@ impl<'a> Competitor<'a> {
         least_ns: Option<f64>,
     ) -> Self {
         let ask: Ask = match task {
-            Task::Query => {
+            TaskKind::Query => {
                 let index = built.items.as_ref();
                 let ask = move |place: usize, out: &mut Vec<ItemId>| {
                     index.see(workload.views[place].as_any(), out);
@@ -62,7 +62,7 @@ impl<'a> Competitor<'a> {
                     None => Box::new(ask),
                 }
             }
-            Task::Locate | Task::LocateBatched => {
+            TaskKind::Locate | TaskKind::LocateBatched => {
                 let index = built.regions();
                 Box::new(move |place, out| {
                     index.locate(workload.points[place], out);
@@ -70,8 +70,8 @@ impl<'a> Competitor<'a> {
                 })
             }
         };
-        let ask_many = (task == Task::LocateBatched).then(|| located_at_once(workload, built));
-        Competitor {
+        let ask_many = (task == TaskKind::LocateBatched).then(|| located_at_once(workload, built));
+        TimedTask {
             ask,
             ask_many,
             expected: answers.iter().map(|a| a.count).collect(),
@@ -151,7 +151,7 @@ mod tests {
     use super::*;
     use crate::culling::{Culling, CullingTest};
     use crate::index::StructureSpec;
-    use crate::measure::Contender;
+    use crate::measure::Subject;
     use crate::path::{self, LensDefaults};
     use crate::scene;
 
@@ -162,7 +162,7 @@ mod tests {
         let path = path::load("orbit:frames=12", &scene, &LensDefaults::default()).unwrap();
         let workload = Workload::new(&scene, &path, &Culling::default()).unwrap();
         let spec = StructureSpec::parse("bsp").unwrap();
-        let built = Contender::build(spec, false, &scene, CullingTest::SixPlane).built;
+        let built = Subject::build(spec, false, &scene, CullingTest::SixPlane).built;
         let built = built.unwrap();
         let alone: Vec<u64> = (0..workload.points.len())
             .map(|place| {
