@@ -13,6 +13,9 @@ pub struct Omission {
     pub rule: &'static str,
     /// What is left out, in words.
     pub left_out: &'static str,
+    /// What follows if it is left out, and if it is kept.
+    #[serde(skip)]
+    pub(super) advice: [&'static str; 2],
     /// What the rule looks at, and its unit.
     pub statistic_name: &'static str,
     /// Null where the rule has nothing to say about this scene.
@@ -170,6 +173,7 @@ impl Omission {
     pub(super) fn new(
         rule: &'static str,
         left_out: &'static str,
+        advice: [&'static str; 2],
         statistic_name: &'static str,
         left_out_if: LeftOutIf,
         by: By,
@@ -177,6 +181,7 @@ impl Omission {
         Omission {
             rule,
             left_out,
+            advice,
             statistic_name,
             statistic: None,
             threshold: None,
@@ -188,6 +193,15 @@ impl Omission {
             reason: String::new(),
             checks: Vec::new(),
             by,
+        }
+    }
+
+    /// What to do, in words; `None` where the rule does not apply.
+    pub fn advice(&self) -> Option<&'static str> {
+        match self.decision {
+            Decision::LeaveOut => Some(self.advice[0]),
+            Decision::Keep => Some(self.advice[1]),
+            Decision::NotApplicable => None,
         }
     }
 
@@ -300,7 +314,14 @@ mod tests {
     }
 
     fn settled(by: By, statistic: f64, check: Check) -> Omission {
-        let rule = Omission::new("rule", "something", "its size", LeftOutIf::AtMost, by);
+        let rule = Omission::new(
+            "rule",
+            "something",
+            ["", ""],
+            "its size",
+            LeftOutIf::AtMost,
+            by,
+        );
         let rule = rule.compares(statistic, 1.0);
         rule.settled(vec![check], &Aside::default(), None)
     }
@@ -355,12 +376,12 @@ mod tests {
 
     #[test]
     fn a_rule_without_a_statistic_says_nothing() {
-        let rule = Omission::new("rule", "x", "y", LeftOutIf::AtLeast, By::Time);
+        let rule = Omission::new("rule", "x", ["", ""], "y", LeftOutIf::AtLeast, By::Time);
         let omission = rule.settled(Vec::new(), &Aside::default(), None);
         assert_eq!(omission.decision, Decision::NotApplicable);
         assert_eq!((omission.predicted, omission.saving), (None, None));
         // An infinite threshold is none that can be written, but compares.
-        let rule = Omission::new("rule", "x", "y", LeftOutIf::AtMost, By::Time);
+        let rule = Omission::new("rule", "x", ["", ""], "y", LeftOutIf::AtMost, By::Time);
         let omission = rule.compares(3.0, f64::INFINITY);
         assert_eq!((omission.threshold, omission.predicted), (None, Some(true)));
     }

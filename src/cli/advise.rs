@@ -14,8 +14,8 @@ use super::run::progress;
 use super::run_resume::typed_args;
 use super::{Ending, interrupt, load_scene, print_json, text, unread_is_fine};
 use crate::advise::{
-    self, Advice, AdviseInput, AdviseOptions, Check, Decision, LeftOutIf, Omission,
-    StructureChoice, TestChoice, TrialPlan,
+    self, Advice, AdviseInput, AdviseOptions, Check, LeftOutIf, Omission, StructureChoice,
+    TestChoice, TrialPlan,
 };
 use crate::culling::Culling;
 use crate::index::Registry;
@@ -85,7 +85,7 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> 
     };
     let step = |process: u32, _: &str| {
         bar.set_position(u64::from(processes + process));
-        job("every rule forced on and off");
+        job("with and without every rule");
     };
     let Some(times) = workers.times(processes, trials, &step)? else {
         return Ok(Ending::Interrupted);
@@ -182,7 +182,7 @@ fn show(advice: &Advice) -> io::Result<()> {
         advice.test.structure, advice.options.draw_ns
     )?;
     writeln!(out, "{}", test_table(&advice.test))?;
-    writeln!(out, "\nWhat can be left out, each forced on and off:")?;
+    writeln!(out, "\nWhat can be left out, measured with and without:")?;
     writeln!(out, "{}", omission_table(&advice.omissions))?;
     writeln!(
         out,
@@ -239,11 +239,9 @@ fn show_advice(out: &mut impl Write, advice: &Advice) -> io::Result<()> {
     if let Some(test) = advice.test.name {
         writeln!(out, "  test: {test}{}", ties(&advice.test.ties))?;
     }
-    for decision in [Decision::LeaveOut, Decision::Keep] {
-        let of = advice.omissions.iter().filter(|o| o.decision == decision);
-        let named: Vec<&str> = of.map(|omission| omission.left_out).collect();
-        if !named.is_empty() {
-            writeln!(out, "  {}:\n    {}", decision.name(), named.join("\n    "))?;
+    for omission in &advice.omissions {
+        if let Some(told) = omission.advice() {
+            writeln!(out, "  {}: {told}", omission.rule)?;
         }
     }
     Ok(())
@@ -261,7 +259,7 @@ fn structure_table(choice: &StructureChoice) -> text::Table {
     let header = [
         "structure",
         "query [95 % interval]",
-        "times linear",
+        "speed-up",
         "build",
         "B/item",
         "break-even queries",
@@ -290,9 +288,9 @@ fn test_table(choice: &TestChoice) -> text::Table {
         "",
         "test",
         "query [95 % interval]",
-        "excess %",
+        "false positives %",
         "missed ppm",
-        "too many a query",
+        "false positives per query",
         "query and drawing",
     ];
     let mut table = text::table(&header, &[2, 3, 4, 5, 6]);
@@ -323,11 +321,11 @@ fn omission_table(omissions: &[Omission]) -> text::Table {
         "statistic",
         "threshold",
         "saving",
-        "forced on",
+        "measured on",
         "kept",
         "left out",
         "kept / left out",
-        "excess % kept / left out",
+        "false positives % kept / left out",
         "answers",
     ];
     let mut table = text::table(&header, &[2, 3, 4, 6, 7, 8, 9]);

@@ -346,7 +346,7 @@ fn the_table_ends_with_the_advice() {
         "  structure: ",
         "  region search: ",
         "  test: ",
-        "  leave out:\n    ",
+        "  no-index: ",
     ] {
         assert!(advice.contains(part), "{part}: {advice}");
     }

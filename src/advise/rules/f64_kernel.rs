@@ -13,6 +13,7 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
     let omission = Omission::new(
         NAME,
         "the plane test in f64",
+        ["f32 plane tests are enough", "use f64 plane tests"],
         "margin for rounding to f32 / depth of the view",
         LeftOutIf::AtMost,
         By::Rule,

@@ -20,6 +20,10 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
     let omission = Omission::new(
         NAME,
         "the third dimension of cells",
+        [
+            "two-dimensional cells are enough",
+            "use three-dimensional cells",
+        ],
         "height of the scene",
         LeftOutIf::AtMost,
         By::Time,

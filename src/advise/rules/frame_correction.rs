@@ -20,6 +20,10 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
     let omission = Omission::new(
         NAME,
         "correcting an f32 camera frame between steps",
+        [
+            "no need to correct an f32 camera frame between steps",
+            "correct an f32 camera frame between steps",
+        ],
         "drift after all steps of the path, radians",
         LeftOutIf::AtMost,
         By::Rule,

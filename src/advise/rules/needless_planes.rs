@@ -21,6 +21,10 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
     let omission = Omission::new(
         NAME,
         "planes that the whole scene is inside of",
+        [
+            "skip the planes that the whole scene is inside of",
+            "test every plane: the scene reaches beyond them",
+        ],
         "share of all planes that the n-vertex of the scene's bounds is inside of",
         LeftOutIf::AtLeast,
         By::Time,

@@ -20,6 +20,7 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
     let omission = Omission::new(
         NAME,
         "the index itself",
+        ["no index: a scan is fast enough", "an index pays off"],
         "items",
         LeftOutIf::AtMost,
         By::Time,

@@ -24,6 +24,10 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
     let omission = Omission::new(
         NAME,
         "tests of planes that a node above is inside of (by masks)",
+        [
+            "use plane masking",
+            "do without plane masking: it saves too little",
+        ],
         "share of the plane tests that masks save",
         LeftOutIf::AtLeast,
         By::Time,

@@ -17,6 +17,10 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
     let omission = Omission::new(
         NAME,
         "moving the scene to a zero of its own",
+        [
+            "no need to rebase the scene",
+            "rebase the scene: move its origin to its middle",
+        ],
         "margin for rounding in world coordinates / depth of the view",
         LeftOutIf::AtMost,
         By::Rule,

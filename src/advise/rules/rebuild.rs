@@ -13,6 +13,10 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
     let omission = Omission::new(
         NAME,
         "building anew after items have moved",
+        [
+            "refit after items have moved, do not rebuild",
+            "rebuild after items have moved",
+        ],
         "what queries on the refitted tree cost more until the next update, ns",
         LeftOutIf::AtMost,
         By::Rule,

@@ -14,6 +14,10 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
     let omission = Omission::new(
         NAME,
         "axes beyond the six planes",
+        [
+            "six planes are enough",
+            "use the exact test (separating axes): six planes are not enough",
+        ],
         "cost of drawing what six planes let through, ns a query",
         LeftOutIf::AtMost,
         By::Rule,
@@ -116,7 +120,7 @@ mod tests {
                 (tests[0], vec![tests[2]], Decision::LeaveOut, None),
                 (tests[1], vec![tests[3]], Decision::Keep, None),
             ] {
-                let rule = Omission::new(NAME, "x", "y", LeftOutIf::AtMost, By::Rule);
+                let rule = Omission::new(NAME, "x", ["", ""], "y", LeftOutIf::AtMost, By::Rule);
                 let rule = rule.compares(if predicted { 0.5 } else { 2.0 }, 1.0);
                 let mut omission = rule.settled(Vec::new(), &Aside::default(), None);
                 let mut choice = TestChoice {
