@@ -41,10 +41,7 @@ impl Aabb {
     pub fn rounded_outward(min: DVec3, max: DVec3, origin: DVec3) -> Self {
         let down = |axis: usize| difference_down(min[axis], origin[axis]);
         let up = |axis: usize| difference_up(max[axis], origin[axis]);
-        Aabb::new(
-            Vec3::new(down(0), down(1), down(2)),
-            Vec3::new(up(0), up(1), up(2)),
-        )
+        Aabb::new([0, 1, 2].map(down).into(), [0, 1, 2].map(up).into())
     }
 
     /// Both corners in the world, where `origin` is the box's zero: rounded
@@ -53,10 +50,7 @@ impl Aabb {
         let (min, max) = (self.min.as_dvec3(), self.max.as_dvec3());
         let down = |axis: usize| sum_down(origin[axis], min[axis]);
         let up = |axis: usize| sum_up(origin[axis], max[axis]);
-        (
-            DVec3::new(down(0), down(1), down(2)),
-            DVec3::new(up(0), up(1), up(2)),
-        )
+        ([0, 1, 2].map(down).into(), [0, 1, 2].map(up).into())
     }
 
     /// The box as seen from `eye`: each bound minus the eye's coordinate,

@@ -32,14 +32,10 @@ pub struct BoxBlock {
 
 impl BoxBlock {
     pub const EMPTY: BoxBlock = BoxBlock {
-        rows: [
-            [f32::INFINITY; LANES],
-            [f32::INFINITY; LANES],
-            [f32::INFINITY; LANES],
-            [f32::NEG_INFINITY; LANES],
-            [f32::NEG_INFINITY; LANES],
-            [f32::NEG_INFINITY; LANES],
-        ],
+        rows: {
+            let (low, high) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
+            [low, low, low, high, high, high]
+        },
     };
 
     /// Six rows of lanes, as [`BoxBlock`] keeps them.

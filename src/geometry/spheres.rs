@@ -28,10 +28,7 @@ pub fn sphere_cube(b: &Aabb) -> Aabb {
     let radius = f64::from(round_up(radius).min(f32::MAX));
     let low = |k: usize| difference_down(c[k], radius).max(f32::MIN);
     let high = |k: usize| difference_up(c[k], -radius).min(f32::MAX);
-    Aabb::new(
-        Vec3::new(low(0), low(1), low(2)),
-        Vec3::new(high(0), high(1), high(2)),
-    )
+    Aabb::new([0, 1, 2].map(low).into(), [0, 1, 2].map(high).into())
 }
 
 /// A sphere as it is read back from its cube.

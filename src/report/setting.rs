@@ -27,16 +27,12 @@ fn facts(report: &Report) -> Vec<Fact> {
     let caches: Vec<String> = caches
         .map(|cache| format!("L{} {} KiB", cache.level, cache.bytes >> 10))
         .collect();
+    let (vectors, locked) = (machine.instruction_set.clone(), tools.lock_digest.clone());
     vec![
         ("machine", "cpu", true, known(&machine.cpu)),
         ("machine", "cores", true, machine.cores.to_string()),
         ("machine", "caches", true, caches.join(" ")),
-        (
-            "machine",
-            "instruction set",
-            true,
-            machine.instruction_set.clone(),
-        ),
+        ("machine", "instruction set", true, vectors),
         ("machine", "os kernel", false, known(&machine.kernel)),
         ("toolchain", "rustc", false, known(&tools.rustc)),
         ("toolchain", "target", false, known(&tools.target)),
@@ -44,12 +40,7 @@ fn facts(report: &Report) -> Vec<Fact> {
         ("toolchain", "profile", false, known(&tools.profile)),
         ("toolchain", "opt-level", false, known(&tools.opt_level)),
         ("toolchain", "features", false, tools.features.join(",")),
-        (
-            "toolchain",
-            "dependencies",
-            false,
-            tools.lock_digest.clone(),
-        ),
+        ("toolchain", "dependencies", false, locked),
     ]
 }
 

@@ -169,11 +169,8 @@ impl Stream {
 
     /// The parts of a group, the first process first.
     pub fn of_group(&self, key: &GroupKey) -> Vec<&KeptPart> {
-        let mut parts: Vec<&KeptPart> = self
-            .parts
-            .iter()
-            .filter(|kept| kept.part.key == *key)
-            .collect();
+        let parts = self.parts.iter().filter(|kept| kept.part.key == *key);
+        let mut parts: Vec<&KeptPart> = parts.collect();
         parts.sort_by_key(|kept| kept.part.process);
         parts
     }
@@ -327,10 +324,8 @@ fn warnings(report: &Report, (two_speeds, tasks): (usize, usize)) -> Vec<String>
     const BUSY: f64 = 0.5;
     let mut warnings = Vec::new();
     let machine = &report.machine;
-    if let Some(load) = machine
-        .load
-        .filter(|load| *load > BUSY * machine.cores as f64)
-    {
+    let busy = |load: &f64| *load > BUSY * machine.cores as f64;
+    if let Some(load) = machine.load.filter(busy) {
         warnings.push(format!(
             "the machine was busy when the run began (load average {load:.1} on {} cores): close \
              other programs, or wait, and run again",
@@ -344,11 +339,8 @@ fn warnings(report: &Report, (two_speeds, tasks): (usize, usize)) -> Vec<String>
              frequency, or run on a machine of your own"
         ));
     }
-    let twins = report
-        .noise
-        .twins
-        .iter()
-        .filter_map(super::TwinEntry::holds_one);
+    let twins = report.noise.twins.iter();
+    let twins = twins.filter_map(super::TwinEntry::holds_one);
     let (missed, all) = twins.fold((0, 0), |(missed, all), holds| {
         (missed + usize::from(!holds), all + 1)
     });

@@ -29,13 +29,10 @@ pub fn read_boxes_csv(
 ) -> Result<Scene, InputError> {
     let mut table = TableReader::open(input, file)?;
     let columns = table.columns(&BOUNDS)?;
-    let mut labels: Vec<(usize, Labels)> = table
-        .header()
-        .iter()
-        .enumerate()
-        .filter(|(i, _)| !columns.contains(i))
-        .map(|(i, name)| (i, Labels::new(from_field(name))))
-        .collect();
+    let others = table.header().iter().enumerate();
+    let others = others.filter(|(i, _)| !columns.contains(i));
+    let labels = others.map(|(i, name)| (i, Labels::new(from_field(name))));
+    let mut labels: Vec<(usize, Labels)> = labels.collect();
     let (mut boxes, mut first_bad, mut bad) = (Vec::new(), None, 0);
     while let Some(row) = table.next_row() {
         let checked = row.and_then(|row| {
@@ -43,25 +40,20 @@ pub fn read_boxes_csv(
             for (bound, &column) in bounds.iter_mut().zip(&columns) {
                 *bound = row.finite_number(column)?;
             }
-            let b = WorldBox::new(
-                DVec3::new(bounds[0], bounds[1], bounds[2]),
-                DVec3::new(bounds[3], bounds[4], bounds[5]),
-            );
+            let [min, max] = [&bounds[..3], &bounds[3..]].map(DVec3::from_slice);
+            let b = WorldBox::new(min, max);
             for axis in 0..3 {
                 let (low, high) = (b.min[axis], b.max[axis]);
                 if low > high {
                     let name = ["x", "y", "z"][axis];
-                    return Err(row.error(
-                        format!("an inverted box, min_{name} {low:?} > max_{name} {high:?}"),
-                        format!("min_{name} <= max_{name}"),
-                    ));
+                    let found =
+                        format!("an inverted box, min_{name} {low:?} > max_{name} {high:?}");
+                    return Err(row.error(found, format!("min_{name} <= max_{name}")));
                 }
                 let limit = f64::from(f32::MAX);
                 if low < -limit || high > limit {
-                    return Err(row.error(
-                        format!("a bound beyond the range of f32 ({low:?} to {high:?})"),
-                        format!("numbers within +-{limit:e}"),
-                    ));
+                    let found = format!("a bound beyond the range of f32 ({low:?} to {high:?})");
+                    return Err(row.error(found, format!("numbers within +-{limit:e}")));
                 }
             }
             for (column, label) in &mut labels {

@@ -22,15 +22,13 @@ impl Labels {
 
     /// Labels the next item.
     pub fn push(&mut self, value: &str) {
-        let number = match self.numbers.get(value) {
-            Some(&number) => number,
-            None => {
-                let number = self.values.len() as u32;
-                self.values.push(value.to_owned());
-                self.numbers.insert(value.to_owned(), number);
-                number
-            }
-        };
+        let known = self.numbers.get(value).copied();
+        let number = known.unwrap_or_else(|| {
+            let number = self.values.len() as u32;
+            self.values.push(value.to_owned());
+            self.numbers.insert(value.to_owned(), number);
+            number
+        });
         self.of_item.push(number);
     }
 

@@ -108,23 +108,20 @@ impl Scene {
         origin: DVec3,
     ) -> Result<Scene, InputError> {
         let name = name.into();
-        let items = boxes
-            .iter()
-            .enumerate()
-            .map(|(item, b)| {
-                let rounded = Aabb::rounded_outward(b.min, b.max, origin);
-                let sound = rounded.is_finite() && !rounded.is_empty();
-                sound.then_some(rounded).ok_or_else(|| InputError::BadItem {
+        let stored = boxes.iter().enumerate().map(|(item, b)| {
+            let rounded = Aabb::rounded_outward(b.min, b.max, origin);
+            let sound = rounded.is_finite() && !rounded.is_empty();
+            sound.then_some(rounded).ok_or_else(|| {
+                let [min, max] = [b.min, b.max].map(|corner| corner.to_array());
+                let rule = "expected min <= max within the range of f32";
+                InputError::BadItem {
                     scene: name.clone(),
                     item,
-                    reason: format!(
-                        "a box from {:?} to {:?}; expected min <= max within the range of f32",
-                        b.min.to_array(),
-                        b.max.to_array()
-                    ),
-                })
+                    reason: format!("a box from {min:?} to {max:?}; {rule}"),
+                }
             })
-            .collect::<Result<Vec<_>, _>>()?;
+        });
+        let items = stored.collect::<Result<Vec<_>, _>>()?;
         Ok(Scene {
             bounds: Aabb::union_of(&items),
             originals: Originals::of(boxes, &items, origin),
@@ -157,21 +154,23 @@ impl Scene {
     /// the same truth. O(n).
     pub fn digest(&self) -> String {
         let mut hash = hmac_sha256::Hash::new();
-        for value in self.origin.to_array() {
+        let corner = |hash: &mut hmac_sha256::Hash, corner: DVec3| {
+            let values = corner.to_array().into_iter();
+            values.for_each(|value| hash.update(value.to_bits().to_le_bytes()));
+        };
+        corner(&mut hash, self.origin);
+        for value in self
+            .items
+            .iter()
+            .flat_map(|b| [b.min, b.max])
+            .flat_map(|c| c.to_array())
+        {
             hash.update(value.to_bits().to_le_bytes());
-        }
-        for item in &self.items {
-            for value in item.min.to_array().into_iter().chain(item.max.to_array()) {
-                hash.update(value.to_bits().to_le_bytes());
-            }
         }
         if let Some(boxes) = self.originals.boxes() {
             hash.update("as written");
-            for b in boxes {
-                for value in b.min.to_array().into_iter().chain(b.max.to_array()) {
-                    hash.update(value.to_bits().to_le_bytes());
-                }
-            }
+            let corners = boxes.iter().flat_map(|b| [b.min, b.max]);
+            corners.for_each(|c| corner(&mut hash, c));
         }
         hex(&hash.finalize())
     }

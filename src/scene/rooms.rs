@@ -26,11 +26,8 @@ pub struct Plan {
 
 impl Plan {
     pub fn shift(&mut self, by: DVec3) {
-        let all = self
-            .rooms
-            .iter_mut()
-            .chain(self.doors.iter_mut().map(|(_, b)| b));
-        for b in all {
+        let doors = self.doors.iter_mut().map(|(_, b)| b);
+        for b in self.rooms.iter_mut().chain(doors) {
             *b = WorldBox::new(b.min + by, b.max + by);
         }
     }
@@ -38,17 +35,14 @@ impl Plan {
     pub fn tiling(&self, origin: DVec3) -> Tiling {
         let local = |b: &WorldBox| Aabb::rounded_outward(b.min, b.max, origin);
         let boxes: Vec<Aabb> = self.rooms.iter().map(local).collect();
+        let portal = |(between, opening): &([ItemId; 2], WorldBox)| Portal {
+            between: *between,
+            opening: local(opening),
+        };
         Tiling {
             originals: Originals::of(&self.rooms, &boxes, origin),
             boxes,
-            portals: self
-                .doors
-                .iter()
-                .map(|(between, opening)| Portal {
-                    between: *between,
-                    opening: local(opening),
-                })
-                .collect(),
+            portals: self.doors.iter().map(portal).collect(),
         }
     }
 }

@@ -12,15 +12,16 @@ impl Scene {
     /// original is kept, origin and stored box add up without rounding.
     pub fn written(&self) -> impl Iterator<Item = WorldBox> {
         let originals = self.originals.boxes();
-        self.items.iter().enumerate().map(move |(id, item)| {
-            originals.map_or_else(
-                || {
+        self.items
+            .iter()
+            .enumerate()
+            .map(move |(id, item)| match originals {
+                Some(boxes) => boxes[id],
+                None => {
                     let (min, max) = item.in_world(self.origin);
                     WorldBox::new(min, max)
-                },
-                |boxes| boxes[id],
-            )
-        })
+                }
+            })
     }
 
     /// The scene as it is read back from a boxes file: the same boxes, as they
@@ -57,17 +58,15 @@ impl Scene {
     fn check_range(&self) -> Result<(), InputError> {
         let most = f64::from(f32::MAX);
         let within = |v: DVec3| v.abs().cmple(DVec3::splat(most)).all();
-        let outside = self
-            .written()
-            .position(|b| !within(b.min) || !within(b.max));
-        match outside {
-            None => Ok(()),
-            Some(item) => Err(InputError::BadItem {
+        let mut written = self.written();
+        let outside = written.position(|b| !within(b.min) || !within(b.max));
+        outside.map_or(Ok(()), |item| {
+            Err(InputError::BadItem {
                 scene: self.name.clone(),
                 item,
                 reason: format!("in world coordinates beyond +-{most:e}; expected less in a file"),
-            }),
-        }
+            })
+        })
     }
 }
 

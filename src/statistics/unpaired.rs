@@ -38,6 +38,7 @@ fn without_interval(old: &[f64], new: &[f64]) -> Option<Judgement> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Change;
     use super::*;
     use crate::statistics::Change;
 

@@ -27,7 +27,10 @@ pub fn edge_scenes() -> Vec<(&'static str, Vec<Aabb>)> {
         let (x, y) = (f32::from(i % 30), f32::from(i / 30));
         Aabb::new(Vec3::new(x, y, 2.0), Vec3::new(x + 1.0, y + 1.0, 2.0))
     };
+    let far = |i: u16| cube(1e7 + f32::from(i), 1e7, -1e7, 1.0);
+    let point = Aabb::new(Vec3::ONE, Vec3::ONE);
     let everything = Aabb::new(Vec3::splat(-1e6), Vec3::splat(1e6));
+    let everything = [vec![everything; 50], row(500, 1.0)].concat();
     let mut third_inverted = row(300, 1.0);
     for b in third_inverted.iter_mut().step_by(3) {
         *b = Aabb::new(b.max, b.min);
@@ -38,26 +41,15 @@ pub fn edge_scenes() -> Vec<(&'static str, Vec<Aabb>)> {
         ("one point", vec![Aabb::new(Vec3::ZERO, Vec3::ZERO)]),
         ("two", row(2, 1.0)),
         ("all the same", vec![cube(1.0, 2.0, 3.0, 0.5); 1000]),
-        (
-            "all the same point",
-            vec![Aabb::new(Vec3::ONE, Vec3::ONE); 1000],
-        ),
+        ("all the same point", vec![point; 1000]),
         ("collinear", row(1000, 1.0)),
         ("coplanar", (0..900).map(tile).collect()),
         ("needles", (0..500).map(needle).collect()),
         ("huge and tiny", [row(200, 1e30), row(200, 1e-30)].concat()),
         ("subnormal", row(100, f32::from_bits(64))),
         ("near the largest float", row(100, 1e36)),
-        (
-            "far away",
-            (0..500u16)
-                .map(|i| cube(1e7 + f32::from(i), 1e7, -1e7, 1.0))
-                .collect(),
-        ),
-        (
-            "everything overlaps",
-            [vec![everything; 50], row(500, 1.0)].concat(),
-        ),
+        ("far away", (0..500).map(far).collect()),
+        ("everything overlaps", everything),
         ("inverted among sound", third_inverted),
         ("only inverted", vec![Aabb::new(Vec3::ONE, Vec3::ZERO); 10]),
     ]

@@ -39,29 +39,18 @@ pub fn variants(
         Plane::new(p.normal, p.d + (i / 12) as f32 * 0.01 * far as f32)
     });
     let away = Plane::new(-planes[0].normal, -planes[0].d - 0.01 * far as f32);
-    let sets = [
-        vec![],
-        vec![],
-        vec![],
-        vec![],
-        sheared.collect(),
-        planes[..1 + seed % 5].to_vec(),
-        twelve.clone().collect(),
-        many.collect(),
-        vec![planes[0], away],
+    let mut volumes = vec![
+        straight.clone(),
+        with(camera.lens.with_far(None).unwrap_or(camera.lens))?,
+        with(ortho)?,
+        with(Lens::off_axis(window, near, Some(far))?)?,
     ];
-    let mut volumes = Vec::with_capacity(VOLUME_KINDS.len());
-    for (kind, planes) in VOLUME_KINDS.into_iter().zip(sets) {
-        let volume = match kind {
-            "perspective" => straight.clone(),
-            "infinite far" => with(camera.lens.with_far(None).unwrap_or(camera.lens))?,
-            "orthographic" => with(ortho)?,
-            "off-axis" => with(Lens::off_axis(window, near, Some(far))?)?,
-            _ => ConvexVolume::from_planes(&planes)?,
-        };
-        volumes.push((kind, volume));
+    let few = planes[..1 + seed % 5].to_vec();
+    let (sheared, twelve, many) = (sheared.collect(), twelve.clone().collect(), many.collect());
+    for planes in [sheared, few, twelve, many, vec![planes[0], away]] {
+        volumes.push(ConvexVolume::from_planes(&planes)?);
     }
-    Ok(volumes)
+    Ok(VOLUME_KINDS.into_iter().zip(volumes).collect())
 }
 
 #[cfg(test)]
