@@ -40,7 +40,6 @@ fn without_interval(old: &[f64], new: &[f64]) -> Option<Judgement> {
 mod tests {
     use super::super::Change;
     use super::*;
-    use crate::statistics::Change;
 
     fn side(centre: f64) -> Vec<f64> {
         (0..10)
