@@ -65,7 +65,7 @@ pub static SUITES: &[Suite] = &[
         effort: Effort {
             processes: 10,
             rounds: [3, 40],
-            task_ns: 4e6,
+            task_ns: 3e6,
             pass_ns: 8e6,
             beside: Beside::All,
         },
