@@ -65,8 +65,8 @@ pub static SUITES: &[Suite] = &[
         effort: Effort {
             processes: 10,
             rounds: [3, 40],
-            task_ns: 3e6,
-            pass_ns: 8e6,
+            task_ns: 2.5e6,
+            pass_ns: 7e6,
             beside: Beside::All,
         },
         structures: "default",

@@ -48,7 +48,7 @@ impl Subject {
     /// Builds the structure over the items as a culling test has them. A panic or a
     /// refusal becomes its verdict.
     pub fn build(spec: StructureSpec, is_twin: bool, scene: &Scene, test: CullingTest) -> Subject {
-        let built = guarded(|| build(&spec, scene, test)).unwrap_or_else(Err);
+        let built = guarded(|| build(&spec, is_twin, scene, test)).unwrap_or_else(Err);
         Subject {
             spec,
             is_twin,
@@ -82,7 +82,12 @@ impl Subject {
     }
 }
 
-fn build(spec: &StructureSpec, scene: &Scene, test: CullingTest) -> Result<Built, Verdict> {
+fn build(
+    spec: &StructureSpec,
+    is_twin: bool,
+    scene: &Scene,
+    test: CullingTest,
+) -> Result<Built, Verdict> {
     let items = test.items(&scene.items);
     let build = || {
         let watch = Stopwatch::start();
@@ -94,7 +99,8 @@ fn build(spec: &StructureSpec, scene: &Scene, test: CullingTest) -> Result<Built
         built.map(|index| (index, ms)).map_err(not_built)
     };
     let (mut index, mut build_ms) = build()?;
-    if build_ms < AGAIN_BELOW_MS {
+    // A twin's build is shown nowhere.
+    if build_ms < AGAIN_BELOW_MS && !is_twin {
         // The first one has paid for memory that nobody had touched. Never two
         // at once: a large scene would not fit twice.
         drop(index);
