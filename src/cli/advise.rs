@@ -7,11 +7,12 @@ use std::time::Duration;
 
 use tempfile::NamedTempFile;
 
-use super::args::{AdviseArgs, TableFormat};
+use super::args::AdviseArgs;
 use super::processes::{Said, Workers};
 use super::protocol::{Job, Timing};
 use super::run::progress;
 use super::run_resume::typed_args;
+use super::shared_args::TableFormat;
 use super::{Ending, interrupt, load_scene, print_json, text, unread_is_fine};
 use crate::advise::{
     self, Advice, AdviseInput, AdviseOptions, Check, LeftOutIf, Omission, StructureChoice,

@@ -7,7 +7,9 @@ use crate::suite::DEFAULT_PATH;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::scene_args::SceneCommand;
-use super::shared_args::{CullingArgs, KernelArgs, LensArgs, SceneArgs, SpreadArgs};
+use super::shared_args::{
+    CullingArgs, KernelArgs, LensArgs, RowFormat, SceneArgs, SpreadArgs, TableFormat,
+};
 use super::values;
 
 /// Which spatial index finds what a camera sees, and where the camera is:
@@ -70,18 +72,6 @@ pub enum Command {
     Completions { shell: clap_complete::Shell },
     /// Print the manual page (roff)
     Man,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum, Debug)]
-pub enum TableFormat {
-    Table,
-    Json,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum, Debug)]
-pub enum RowFormat {
-    Csv,
-    Json,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum, Debug)]

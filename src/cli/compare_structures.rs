@@ -7,7 +7,7 @@ use std::io::{self, BufWriter, Write};
 
 use serde_json::{Map, Value};
 
-use super::args::RowFormat;
+use super::shared_args::RowFormat;
 use crate::geometry::Aabb;
 use crate::index::{BuildError, DynIndex, StructureSpec};
 use crate::measure::{Answer, Verdict, guarded};

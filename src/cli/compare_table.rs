@@ -7,8 +7,9 @@ use std::io::{self, Write};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::args::{CompareArgs, TableFormat};
+use super::args::CompareArgs;
 use super::document::{Block, Rows, to_markdown};
+use super::shared_args::TableFormat;
 use super::{Ending, print_json, text};
 use crate::measure::{CellKey, METRICS};
 use crate::report::{Changes, CommonShift, JudgedRow, Lone, Outcome, Setting, WorkChange};

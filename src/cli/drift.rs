@@ -6,7 +6,8 @@ use std::io::{self, Write};
 
 use indicatif::ProgressBar;
 
-use super::args::{DriftArgs, TableFormat};
+use super::args::DriftArgs;
+use super::shared_args::TableFormat;
 use super::{Ending, print_json, text, unread_is_fine};
 use crate::drift::{
     self, DriftOptions, DriftReport, ORBIT_RADIUS, Rated, Recommendation, SWING_DEG,

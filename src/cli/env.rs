@@ -4,7 +4,8 @@ use std::io::{self, Write};
 
 use serde_json::{Value, json};
 
-use super::args::{EnvArgs, TableFormat};
+use super::args::EnvArgs;
+use super::shared_args::TableFormat;
 use super::{Ending, print_json, text};
 use crate::measure::{Machine, Source, Toolchain};
 

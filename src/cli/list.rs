@@ -4,7 +4,8 @@ use std::io::{self, Write};
 
 use serde_json::{Map, Value, json};
 
-use super::args::{ListArgs, ListTopic, TableFormat};
+use super::args::{ListArgs, ListTopic};
+use super::shared_args::TableFormat;
 use super::{Ending, print_json, text};
 use crate::culling::TESTS;
 use crate::index::{Info, Registry};

@@ -9,11 +9,12 @@ use anyhow::bail;
 use serde::Serialize;
 use tempfile::NamedTempFile;
 
-use super::args::{PrecisionArgs, TableFormat};
+use super::args::PrecisionArgs;
 use super::processes::Workers;
 use super::protocol::{Job, Timing};
 use super::run::progress;
 use super::run_resume::typed_args;
+use super::shared_args::TableFormat;
 use super::{Ending, interrupt, load_scene, precision_diagram, print_json, text, unread_is_fine};
 use crate::index::Registry;
 use crate::measure::{ProcessTimes, Protocol, Status};

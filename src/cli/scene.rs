@@ -6,8 +6,8 @@ use std::path::Path;
 
 use serde_json::json;
 
-use super::args::TableFormat;
 use super::scene_args::{SceneConvertArgs, SceneFormat, SceneGenerateArgs, SceneInfoArgs};
+use super::shared_args::TableFormat;
 use super::{Ending, interrupt, load_scene, print_json, tell, text};
 use crate::measure::SceneInfo;
 use crate::report::write_atomically;

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
 
-use super::args::TableFormat;
 use super::shared_args::SceneArgs;
+use super::shared_args::TableFormat;
 
 #[derive(Subcommand, Debug)]
 pub enum SceneCommand {

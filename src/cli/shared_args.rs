@@ -9,7 +9,7 @@ use crate::kernel::Kernel;
 use crate::measure::{Beside, Effort, Machine, Protocol};
 use crate::path::LensDefaults;
 use crate::spec::SpecError;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use glam::DVec3;
 
 #[derive(Args, Debug)]
@@ -170,4 +170,17 @@ impl CullingArgs {
             },
         })
     }
+}
+
+/// How a command prints what it found.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum, Debug)]
+pub enum TableFormat {
+    Table,
+    Json,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum, Debug)]
+pub enum RowFormat {
+    Csv,
+    Json,
 }

@@ -8,7 +8,8 @@ use std::time::Instant;
 use anyhow::bail;
 use indicatif::ProgressBar;
 
-use super::args::{StressArgs, TableFormat};
+use super::args::StressArgs;
+use super::shared_args::TableFormat;
 use super::{Ending, interrupt, tell, text, unread_is_fine};
 use crate::index::{Execution, Registry, StructureSpec};
 use crate::kernel::Kernel;

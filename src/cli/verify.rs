@@ -10,7 +10,8 @@ use glam::Vec3;
 use indicatif::ProgressBar;
 use serde::Serialize;
 
-use super::args::{TableFormat, VerifyArgs};
+use super::args::VerifyArgs;
+use super::shared_args::TableFormat;
 use super::{Ending, interrupt, load_scene, print_json, tell, text, unread_is_fine};
 use crate::camera::{DEFAULT_EPSILON, PlaneMethod};
 use crate::culling::{ARITHMETICS, Arithmetic, CameraView, Culling, CullingTest, TESTS};

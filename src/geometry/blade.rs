@@ -1,51 +1,10 @@
 //! Planes as the block kernels read them: which rows of a block are a plane's
 //! corners, and its numbers in vectors for many blocks.
 
-use super::box_block::{BoxBlock, RowMask};
-use super::{ConvexVolume, PlaneMask, Upper};
+use super::box_block::{BoxBlock, sums_at};
+use super::corner::Corner;
+use super::{ConvexVolume, PlaneMask};
 use crate::kernel::{Isa, LaneMask};
-
-/// The rows of a block that hold the p-vertices of a plane, and those of the
-/// opposite corners, its n-vertices: the same ones for every box.
-#[derive(Clone, Copy, Debug)]
-pub struct Corner {
-    /// Whether the p-vertex is at the upper bound, axis by axis. Booleans and no
-    /// numbers: a row of theirs needs no check.
-    upper: Upper,
-}
-
-impl Corner {
-    /// Of the upper bounds where `upper` says so.
-    pub const fn of(upper: Upper) -> Corner {
-        Corner { upper }
-    }
-
-    #[inline(always)]
-    pub(super) fn far(self) -> [usize; 3] {
-        let [x, y, z] = self.upper;
-        [
-            3 * usize::from(x),
-            1 + 3 * usize::from(y),
-            2 + 3 * usize::from(z),
-        ]
-    }
-
-    #[inline(always)]
-    pub(super) fn near(self) -> [usize; 3] {
-        let [x, y, z] = self.upper;
-        [
-            3 * usize::from(!x),
-            1 + 3 * usize::from(!y),
-            2 + 3 * usize::from(!z),
-        ]
-    }
-
-    /// The rows of the p-vertices as a set.
-    #[inline(always)]
-    pub fn rows(self) -> RowMask {
-        self.far().iter().fold(0, |rows, &row| rows | 1 << row)
-    }
-}
 
 /// One plane as the block kernels read it, in vectors, for many blocks.
 ///
@@ -126,5 +85,75 @@ impl<I: Isa> Blades<I> {
             kept = blade.keep(isa, kept, block);
         }
         isa.kept(kept)
+    }
+}
+
+/// THE plane test on sixteen boxes at once.
+impl BoxBlock {
+    /// The lanes that none of the planes of a mask excludes: bit for bit
+    /// [`Plane::excludes`], lane by lane. Lanes without a box come out as they
+    /// may.
+    #[inline(always)]
+    pub fn admitted_by<I: Isa>(&self, isa: I, volume: &ConvexVolume, mask: PlaneMask) -> LaneMask {
+        let mut kept = isa.keep_all();
+        let mut left = mask;
+        while left != 0 {
+            kept = Blade::new(isa, volume, left.trailing_zeros()).keep(isa, kept, self);
+            left &= left - 1;
+        }
+        isa.kept(kept)
+    }
+
+    /// [`BoxBlock::admitted_by`] for four blocks: each plane's numbers are made
+    /// ready once for all of them, which pays where all planes are open and
+    /// registers are too few to keep them ([`Blades`](super::Blades)).
+    #[inline(always)]
+    pub fn four_admitted_by<I: Isa>(
+        isa: I,
+        blocks: &[BoxBlock; 4],
+        volume: &ConvexVolume,
+        mask: PlaneMask,
+    ) -> [LaneMask; 4] {
+        let mut kept = [isa.keep_all(); 4];
+        let mut left = mask;
+        while left != 0 {
+            let blade = Blade::new(isa, volume, left.trailing_zeros());
+            left &= left - 1;
+            for (kept, block) in kept.iter_mut().zip(blocks) {
+                *kept = blade.keep(isa, *kept, block);
+            }
+        }
+        [
+            isa.kept(kept[0]),
+            isa.kept(kept[1]),
+            isa.kept(kept[2]),
+            isa.kept(kept[3]),
+        ]
+    }
+
+    /// [`BoxBlock::admitted_by`] for nodes: also which planes stay open below
+    /// each lane. A lane's word is `mask` without the planes that hold the
+    /// whole box ([`Plane::contains`]).
+    #[inline(always)]
+    pub fn sorted_by<I: Isa>(
+        &self,
+        isa: I,
+        volume: &ConvexVolume,
+        mask: PlaneMask,
+    ) -> (LaneMask, I::Words) {
+        let mut kept = isa.keep_all();
+        let mut open = isa.splat_word(mask);
+        let mut left = mask;
+        while left != 0 {
+            let bit = left.trailing_zeros();
+            left &= left - 1;
+            let blade = Blade::new(isa, volume, bit);
+            kept = blade.keep(isa, kept, self);
+            let near = self.numbered_rows(blade.corner.near());
+            let nearest = sums_at(isa, volume.plane_of_bit(bit).normal, near);
+            let least = isa.splat(volume.least_of_bit(bit));
+            open = isa.without(open, nearest, least, 1 << bit);
+        }
+        (isa.kept(kept), open)
     }
 }

@@ -5,21 +5,15 @@
 use glam::Vec3;
 
 use super::aabb::held;
-use super::blade::{Blade, Corner};
-use super::{Aabb, Ball, ConvexVolume, Plane, PlaneMask, SphereMargin, Upper, WidePlane};
+use super::corner::Corner;
+use super::{Aabb, Ball, Plane, SphereMargin, Upper, WidePlane};
 use crate::kernel::{Isa, Plain, prefetch};
 
 /// Boxes of one block, and one bit for each of them.
 pub use crate::kernel::{LANES, LaneMask};
 
-/// Some of the six rows of a [`BoxBlock`], one bit each.
-pub type RowMask = u8;
-
 /// Rows of a block.
 pub const ROWS: usize = 6;
-
-/// All of them.
-pub const ALL_ROWS: RowMask = 0b11_1111;
 
 /// Sixteen boxes as six rows: min x, y, z, then max x, y, z. 384 bytes.
 ///
@@ -108,73 +102,6 @@ impl BoxBlock {
             sum = isa.lower(sum, isa.load(&self.rows[usize::from(row)]));
         }
         isa.below_zero(sum)
-    }
-
-    /// The lanes that none of the planes of a mask excludes: bit for bit
-    /// [`Plane::excludes`], lane by lane. Lanes without a box come out as they
-    /// may.
-    #[inline(always)]
-    pub fn admitted_by<I: Isa>(&self, isa: I, volume: &ConvexVolume, mask: PlaneMask) -> LaneMask {
-        let mut kept = isa.keep_all();
-        let mut left = mask;
-        while left != 0 {
-            kept = Blade::new(isa, volume, left.trailing_zeros()).keep(isa, kept, self);
-            left &= left - 1;
-        }
-        isa.kept(kept)
-    }
-
-    /// [`BoxBlock::admitted_by`] for four blocks: each plane's numbers are made
-    /// ready once for all of them, which pays where all planes are open and
-    /// registers are too few to keep them ([`Blades`](super::Blades)).
-    #[inline(always)]
-    pub fn four_admitted_by<I: Isa>(
-        isa: I,
-        blocks: &[BoxBlock; 4],
-        volume: &ConvexVolume,
-        mask: PlaneMask,
-    ) -> [LaneMask; 4] {
-        let mut kept = [isa.keep_all(); 4];
-        let mut left = mask;
-        while left != 0 {
-            let blade = Blade::new(isa, volume, left.trailing_zeros());
-            left &= left - 1;
-            for (kept, block) in kept.iter_mut().zip(blocks) {
-                *kept = blade.keep(isa, *kept, block);
-            }
-        }
-        [
-            isa.kept(kept[0]),
-            isa.kept(kept[1]),
-            isa.kept(kept[2]),
-            isa.kept(kept[3]),
-        ]
-    }
-
-    /// [`BoxBlock::admitted_by`] for nodes: also which planes stay open below
-    /// each lane. A lane's word is `mask` without the planes that hold the
-    /// whole box ([`Plane::contains`]).
-    #[inline(always)]
-    pub fn sorted_by<I: Isa>(
-        &self,
-        isa: I,
-        volume: &ConvexVolume,
-        mask: PlaneMask,
-    ) -> (LaneMask, I::Words) {
-        let mut kept = isa.keep_all();
-        let mut open = isa.splat_word(mask);
-        let mut left = mask;
-        while left != 0 {
-            let bit = left.trailing_zeros();
-            left &= left - 1;
-            let blade = Blade::new(isa, volume, bit);
-            kept = blade.keep(isa, kept, self);
-            let near = self.numbered_rows(blade.corner.near());
-            let nearest = sums_at(isa, volume.plane_of_bit(bit).normal, near);
-            let least = isa.splat(volume.least_of_bit(bit));
-            open = isa.without(open, nearest, least, 1 << bit);
-        }
-        (isa.kept(kept), open)
     }
 
     #[inline(always)]
@@ -310,7 +237,7 @@ fn values_at<I: Isa>(isa: I, plane: &Plane, corners: [&[f32; LANES]; 3]) -> I::F
 
 /// The part of it that all planes of one normal have in common.
 #[inline(always)]
-fn sums_at<I: Isa>(isa: I, n: Vec3, [x, y, z]: [&[f32; LANES]; 3]) -> I::Floats {
+pub(super) fn sums_at<I: Isa>(isa: I, n: Vec3, [x, y, z]: [&[f32; LANES]; 3]) -> I::Floats {
     let along = |n: f32, row: &[f32; LANES]| isa.mul(isa.splat(n), isa.load(row));
     isa.add(isa.add(along(n.x, x), along(n.y, y)), along(n.z, z))
 }
@@ -424,8 +351,8 @@ pub fn lanes_of(at: usize, first: usize, end: usize) -> LaneMask {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Blades;
     use super::super::arbitrary::{any_box, number};
+    use super::super::{Blades, ConvexVolume};
     use super::*;
     use crate::kernel::BASELINE;
     use proptest::prelude::*;

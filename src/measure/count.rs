@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
-use super::group::Notice;
+use super::notice::Notice;
 use super::subject::guarded;
 use super::{Built, Status, TaskKind, Verdict, Workload};
 use crate::culling::CullingTest;

@@ -7,7 +7,8 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::bounds::BOUNDS;
-use super::group::{GroupPlan, Notice, measure_part};
+use super::group::{GroupPlan, measure_part};
+use super::notice::Notice;
 use super::part::{CellKey, GroupKey, Known, Part, TaskSamples};
 use super::schedule::cameras_within;
 use super::update::refitted_ln;

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 
 use super::bounds::{Bound, Material};
 use super::count::{Counted, count_pass, judge};
+use super::notice::{Notice, TIMING};
 use super::part::{GroupKey, Known, NamedSchedule, Part, SubjectPart, TaskPart, TaskSamples};
 use super::subject::TWIN;
 use super::{
@@ -21,13 +22,6 @@ pub(super) const LEAST_TAIL: usize = 20;
 
 /// Time of a task of region search / time of a frustum query's.
 const LOCATE_SHARE: f64 = 1.0 / 3.0;
-
-/// The step that is told at every turn of a timed pass.
-pub const TIMING: &str = "timing";
-
-/// Who is told what the process is about to do: the structure (none for the
-/// harness's own work) and the step.
-pub type Notice<'n> = &'n dyn Fn(Option<&str>, &str);
 
 /// What a group is measured with.
 pub struct GroupPlan<'a> {

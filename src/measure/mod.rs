@@ -14,6 +14,7 @@ mod environment;
 mod experiment;
 mod group;
 mod metrics;
+mod notice;
 mod orders;
 mod over_processes;
 mod part;
@@ -37,8 +38,9 @@ pub use environment::{Machine, Source, Toolchain};
 pub use experiment::{
     Beside, Effort, ExperimentError, Plan, PlannedScene, Question, Share, measure_scene,
 };
-pub use group::{GroupPlan, Notice, TIMING, measure_part};
+pub use group::{GroupPlan, measure_part};
 pub use metrics::{METRICS, Metric, MetricInfo};
+pub use notice::{Notice, TIMING};
 pub use over_processes::{OverProcesses, ProcessTimes};
 pub use part::{CellKey, GroupKey, Known, NamedSchedule, Part, SubjectPart, TaskPart, TaskSamples};
 pub use question::{PathInfo, SceneInfo};

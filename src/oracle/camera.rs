@@ -5,7 +5,7 @@
 use glam::DVec3;
 
 use super::Oracle;
-use super::certificates::HalfSpace;
+use super::half_space::HalfSpace;
 use super::number::{Number, Precision};
 use crate::arithmetic::Expansion;
 use crate::camera::{Lens, Pose, ViewProjection};

@@ -17,15 +17,9 @@
 //! of open half-spaces with "not positive" in place of "negative": a least
 //! value of zero is a touch.)
 
+use super::half_space::HalfSpace;
 use super::number::{Number, Precision};
 use super::rough::{RoughSpaces, may_agree};
-
-/// One constraint `normal . x + d >= 0`.
-#[derive(Clone, Debug)]
-pub(super) struct HalfSpace {
-    pub normal: [Number; 3],
-    pub d: Number,
-}
 
 /// What a volume is before any box is looked at.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]

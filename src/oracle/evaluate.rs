@@ -2,7 +2,7 @@
 //! error, and exactly. Which certificates there are, and what their signs mean
 //! together, is not known here.
 
-use super::certificates::HalfSpace;
+use super::half_space::HalfSpace;
 use super::number::Precision;
 use crate::arithmetic::{Expansion, two_product, two_sum, upper_half};
 use crate::geometry::Aabb;

@@ -7,13 +7,15 @@
 mod camera;
 mod certificates;
 mod evaluate;
+mod half_space;
 mod number;
 mod rough;
 
 use crate::geometry::{Aabb, ConvexVolume};
-use certificates::{Certificates, Extent, HalfSpace, certificates};
+use certificates::{Certificates, Extent, certificates};
 use evaluate::{Corners, Exact, Filter, inner_point};
 use glam::DVec3;
+use half_space::HalfSpace;
 use number::Precision;
 
 pub use crate::camera::Pose;

@@ -10,57 +10,18 @@ use std::path::{Path, PathBuf};
 
 use tempfile::{NamedTempFile, TempDir};
 
+use super::files::{FolderError, REPORT, SAMPLES, STREAM, SUMMARY};
 use super::reading::read_stream;
 use super::stream::{Header, KeptPart, Line, Stream};
-use super::{Report, ReportCell, SCHEMA_VERSION};
+use super::{Report, ReportCell};
 use crate::measure::{METRICS, Part, TaskSamples};
 use crate::shown::field;
 
-pub(super) const REPORT: &str = "report.json";
-pub(super) const SUMMARY: &str = "summary.csv";
-pub(super) const SAMPLES: &str = "samples.csv";
-pub(super) const STREAM: &str = "stream.jsonl";
 /// How names of half-written files begin and end.
 const TEMPORARY: (&str, &str) = (".cullbench-", ".tmp");
 /// The first line of samples.csv.
 pub(super) const SAMPLE_COLUMNS: &str = "scene,path,cache,structure,test,task,process,round,frame,\
                                          queries,cpu_ns,wall_ns,returned\n";
-
-#[derive(Debug, thiserror::Error)]
-pub enum FolderError {
-    #[error("{}: {source}", path.display())]
-    Io { path: PathBuf, source: io::Error },
-    /// `place` is a line with a column, and the path of the value there.
-    #[error("{}, {place}: {found}; expected the report of a run{wanted}", path.display())]
-    Json {
-        path: PathBuf,
-        place: String,
-        found: String,
-        wanted: String,
-    },
-    #[error("{}: schema version {found}; expected {SCHEMA_VERSION}", path.display())]
-    Version { path: PathBuf, found: u32 },
-    #[error("{} already holds a run; expected an empty or new folder (continue it with --resume)", path.display())]
-    Taken { path: PathBuf },
-    #[error("{}: another run is writing here; expected a folder of its own for each run", path.display())]
-    Locked { path: PathBuf },
-    #[error("{}, line {line}: {reason}; expected the stream of a run", path.display())]
-    Line {
-        path: PathBuf,
-        line: usize,
-        reason: String,
-    },
-}
-
-impl FolderError {
-    /// What the file system says of a path.
-    pub(super) fn io(path: &Path) -> impl Fn(io::Error) -> FolderError + Copy {
-        move |source| FolderError::Io {
-            path: path.to_owned(),
-            source,
-        }
-    }
-}
 
 /// Writes a file whole or not at all. A link stays one, and its target is
 /// what is replaced; an existing file keeps its permissions. What is no file

@@ -6,9 +6,8 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use super::folder::{
-    self, FolderError, REPORT, SAMPLE_COLUMNS, SAMPLES, STREAM, SUMMARY, save_report,
-};
+use super::files::{FolderError, REPORT, SAMPLES, STREAM, SUMMARY};
+use super::folder::{self, SAMPLE_COLUMNS, save_report};
 use super::reading::read_stream;
 use super::stream::{Difference, Header, KeptPart, Line, Stream};
 use crate::measure::GroupKey;

@@ -3,6 +3,7 @@
 //! read off a report. It owns the formats; the figures come from `measure`.
 
 mod changes;
+mod files;
 mod folder;
 mod growth;
 mod judging;
@@ -16,7 +17,8 @@ mod stream;
 mod surface;
 
 pub use changes::changes;
-pub use folder::{FolderError, RunFolder, StoppedRun, save_report, temporary_in, write_atomically};
+pub use files::FolderError;
+pub use folder::{RunFolder, StoppedRun, save_report, temporary_in, write_atomically};
 pub use growth::{Growth, growths};
 pub use judging::{
     COUNTERS, Changes, CommonShift, JUDGED_METRICS, JudgedRow, Lone, Outcome, WorkChange,

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::folder::{FolderError, REPORT, STREAM};
+use super::files::{FolderError, REPORT, STREAM};
 use super::stream::{Line, Stream};
 use super::{Report, SCHEMA_VERSION};
 

@@ -210,7 +210,7 @@ impl Stream {
             let rows = |label: &str| {
                 let rows: u64 = kept.iter().filter_map(|kept| kept.rows.get(label)).sum();
                 (rows > 0).then(|| SamplesRef {
-                    file: super::folder::SAMPLES.to_owned(),
+                    file: super::files::SAMPLES.to_owned(),
                     rows,
                 })
             };

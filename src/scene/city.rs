@@ -5,7 +5,8 @@
 use glam::DVec3;
 
 use super::WorldBox;
-use super::generate::{Dice, World};
+use super::dice::Dice;
+use super::world::World;
 use crate::spec::{Spec, SpecError};
 
 /// Items of one block on average: the city grows with the item count and

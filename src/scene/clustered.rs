@@ -2,7 +2,8 @@
 //! in asset-heavy levels or point-like survey data.
 
 use super::WorldBox;
-use super::generate::{Dice, World};
+use super::dice::Dice;
+use super::world::World;
 use crate::spec::{Spec, SpecError};
 
 /// Cluster k attracts items in proportion to 1/(k+1) (Zipf), so that a few

@@ -4,7 +4,8 @@
 use glam::DVec3;
 
 use super::WorldBox;
-use super::generate::{Dice, World};
+use super::dice::Dice;
+use super::world::World;
 use crate::spec::{Spec, SpecError};
 
 /// Share of the items that are ground tiles.

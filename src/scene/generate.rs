@@ -3,9 +3,9 @@
 //! of its own; adding one is that file and one row here.
 
 use glam::DVec3;
-use rand::{Rng, RngExt, SeedableRng};
-use rand_pcg::Pcg64;
 
+use super::dice::Dice;
+use super::world::World;
 use super::{Regions, Scene, WorldBox, city, clustered, forest, rooms, uniform};
 use crate::input::InputError;
 use crate::spec::{Spec, SpecError};
@@ -22,19 +22,6 @@ pub struct Family {
     /// Parameters beyond `n`, `seed` and `offset`, for the help.
     pub params: &'static str,
     build: fn(&mut Spec, usize, &mut Dice) -> Result<World, SpecError>,
-}
-
-/// What a family makes, in world coordinates.
-pub struct World {
-    pub boxes: Vec<WorldBox>,
-    /// Regions that are not the items, with their portals.
-    pub rooms: Option<rooms::Plan>,
-}
-
-impl From<Vec<WorldBox>> for World {
-    fn from(boxes: Vec<WorldBox>) -> Self {
-        World { boxes, rooms: None }
-    }
 }
 
 /// All families, in the order of the help.
@@ -81,48 +68,6 @@ impl Family {
             scene.regions = Regions::Tiling(plan.tiling(scene.origin));
         }
         Ok(scene)
-    }
-}
-
-/// Seeded randomness with the few distributions that the families need.
-pub struct Dice(Pcg64);
-
-impl Dice {
-    pub fn new(seed: u64) -> Self {
-        Dice(Pcg64::seed_from_u64(seed))
-    }
-
-    /// Uniform in `[0, 1)`: 53 random bits.
-    pub fn unit(&mut self) -> f64 {
-        self.0.random::<f64>()
-    }
-
-    /// Uniform in `[low, high)`.
-    pub fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.unit()
-    }
-
-    /// Uniform in `0..count`; 0 for an empty range.
-    pub fn below(&mut self, count: usize) -> usize {
-        // Widening multiply (Lemire 2019); the bias is below 2^-32 here.
-        ((u128::from(self.0.next_u64()) * count as u128) >> 64) as usize
-    }
-
-    /// A point in the unit cube.
-    pub fn point(&mut self) -> DVec3 {
-        DVec3::new(self.unit(), self.unit(), self.unit())
-    }
-
-    /// Standard normal (Box and Muller 1958), through `libm` so that every
-    /// platform rounds alike.
-    pub fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * libm::log(1.0 - self.unit())).sqrt();
-        radius * libm::cos(std::f64::consts::TAU * self.unit())
-    }
-
-    /// Three independent standard normals.
-    pub fn normal3(&mut self) -> DVec3 {
-        DVec3::new(self.normal(), self.normal(), self.normal())
     }
 }
 

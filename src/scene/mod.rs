@@ -6,6 +6,7 @@
 mod boxes_csv;
 mod city;
 mod clustered;
+mod dice;
 mod forest;
 mod generate;
 mod labels;
@@ -19,6 +20,7 @@ mod settled;
 mod source;
 mod uniform;
 mod wad;
+mod world;
 
 use glam::DVec3;
 
@@ -26,7 +28,7 @@ use crate::geometry::{Aabb, PlaneTree};
 use crate::input::InputError;
 
 pub use boxes_csv::{read_boxes_csv, write_boxes_csv};
-pub(crate) use generate::Dice;
+pub(crate) use dice::Dice;
 pub use generate::{FAMILIES, Family, GENERATOR_NAME};
 pub use labels::Labels;
 pub use memory::{fits, needed_bytes};

@@ -4,9 +4,9 @@
 
 use glam::DVec3;
 
-use super::generate::{Dice, World};
-use super::{Originals, Portal, Tiling, WorldBox};
-use crate::geometry::Aabb;
+use super::WorldBox;
+use super::dice::Dice;
+use super::world::{Plan, World};
 use crate::query::ItemId;
 use crate::spec::{Spec, SpecError};
 
@@ -16,36 +16,6 @@ const DOOR_WIDTH: f64 = 1.0;
 const DOOR_HEIGHT: f64 = 2.1;
 /// Items of a room on average, furniture included.
 const ITEMS_PER_ROOM: usize = 16;
-
-/// The rooms and doors in world coordinates.
-#[derive(Default)]
-pub struct Plan {
-    rooms: Vec<WorldBox>,
-    doors: Vec<([ItemId; 2], WorldBox)>,
-}
-
-impl Plan {
-    pub fn shift(&mut self, by: DVec3) {
-        let doors = self.doors.iter_mut().map(|(_, b)| b);
-        for b in self.rooms.iter_mut().chain(doors) {
-            *b = WorldBox::new(b.min + by, b.max + by);
-        }
-    }
-
-    pub fn tiling(&self, origin: DVec3) -> Tiling {
-        let local = |b: &WorldBox| Aabb::rounded_outward(b.min, b.max, origin);
-        let boxes: Vec<Aabb> = self.rooms.iter().map(local).collect();
-        let portal = |(between, opening): &([ItemId; 2], WorldBox)| Portal {
-            between: *between,
-            opening: local(opening),
-        };
-        Tiling {
-            originals: Originals::of(&self.rooms, &boxes, origin),
-            boxes,
-            portals: self.doors.iter().map(portal).collect(),
-        }
-    }
-}
 
 pub fn build(spec: &mut Spec, n: usize, dice: &mut Dice) -> Result<World, SpecError> {
     let storeys = spec.count("storeys", 3, 1000)? as usize;
@@ -157,6 +127,7 @@ fn furniture(room: &WorldBox, dice: &mut Dice) -> WorldBox {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Aabb;
 
     fn world(text: &str, n: usize) -> World {
         build(&mut Spec::parse(text).unwrap(), n, &mut Dice::new(3)).unwrap()

@@ -2,7 +2,8 @@
 //! which every other one is a special case.
 
 use super::WorldBox;
-use super::generate::{Dice, World};
+use super::dice::Dice;
+use super::world::World;
 use crate::spec::{Spec, SpecError};
 
 /// Edges vary between half and one and a half times the mean, per axis.

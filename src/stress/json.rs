@@ -5,7 +5,7 @@
 use glam::{DVec3, Vec3};
 use serde_json::{Map, Value};
 
-use super::vectors::{Names, VectorCamera, VectorPoint};
+use super::vector::{Names, VectorCamera, VectorPoint};
 use crate::geometry::{Aabb, Plane};
 use crate::input::InputError;
 

@@ -7,6 +7,7 @@ mod json;
 mod margin;
 mod replay;
 mod sheet;
+mod vector;
 mod vectors;
 
 use serde::Serialize;
@@ -17,10 +18,8 @@ use glam::DVec3;
 
 use margin::slack;
 pub use replay::{Replay, replay};
-pub use vectors::{
-    BUILT_IN, BUILT_IN_NAME, Names, Vector, VectorCamera, VectorPoint, built_in, read_vectors,
-    read_vectors_file,
-};
+pub use vector::{Names, Vector, VectorCamera, VectorPoint};
+pub use vectors::{BUILT_IN, BUILT_IN_NAME, built_in, read_vectors, read_vectors_file};
 
 /// What is taken to be exact: the planes, or the camera's numbers.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize)]

@@ -3,12 +3,12 @@
 
 use glam::DVec3;
 
-use super::sheet::Sheet;
+use super::sheet::{Built, Sheet};
 use super::{Level, Names, Row, Said, Status, Vector, VectorCamera, surroundings};
 use crate::camera::PlaneOptions;
 use crate::culling::{Culling, CullingTest, TESTS};
 use crate::geometry::{Aabb, ConvexVolume};
-use crate::index::{BuildError, DynIndex, StructureSpec};
+use crate::index::{BuildError, StructureSpec};
 use crate::oracle::{Oracle, Pose};
 
 /// Asks one vector of all structures with the default planes.
@@ -27,8 +27,6 @@ pub struct Replay<'a> {
     pub structures: &'a [StructureSpec],
     pub planes: PlaneOptions,
 }
-
-pub(super) type Built<'a> = (&'a str, Result<Box<dyn DynIndex>, BuildError>);
 
 impl Replay<'_> {
     /// All rows of a vector: O(structures * tests) of them.

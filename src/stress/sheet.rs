@@ -3,7 +3,6 @@
 //! business of `replay`.
 
 use super::margin::slack;
-use super::replay::Built;
 use super::{Level, Names, Row, Said, Status, Vector};
 use crate::arithmetic::Expansion;
 use crate::camera::{Camera, Surroundings};
@@ -17,6 +16,9 @@ use glam::Vec3;
 
 /// The name that the oracle's own rows have in place of a structure.
 const ORACLE: &str = "oracle";
+
+/// A structure by its label, built over the boxes of a vector or not.
+pub(super) type Built<'a> = (&'a str, Result<Box<dyn DynIndex>, BuildError>);
 
 /// One level of one vector.
 pub struct Sheet<'a> {
