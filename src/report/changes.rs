@@ -169,7 +169,12 @@ fn by_metric(pairs: &[Pair], metric: &'static str, threshold: f64) -> Vec<Judged
         let known = relative.iter().flatten();
         known.map(|logs| logs[side].clone()).collect()
     });
-    let mut judged = judge_unpaired(&was, &is, threshold).into_iter();
+    let with_others = candidates.iter().zip(&relative);
+    let structures: Vec<&str> = with_others
+        .filter(|(_, relative)| relative.is_some())
+        .map(|((_, own), _)| own.key.structure.as_str())
+        .collect();
+    let mut judged = judge_unpaired(&was, &is, &structures, threshold).into_iter();
     for ((at, _), relative) in candidates.iter().zip(&relative) {
         let row = &mut rows[*at];
         let judgement = relative.as_ref().and_then(|_| judged.next().flatten());
@@ -260,7 +265,7 @@ fn common_shift(pairs: &[Pair]) -> Option<CommonShift> {
         };
         (0..counts[side]).map(process).collect()
     };
-    let found = judge_unpaired(&[of(0)], &[of(1)], 0.0)[0]?;
+    let found = judge_unpaired(&[of(0)], &[of(1)], &["all"], 0.0)[0]?;
     Some(CommonShift {
         ratio: found.ratio,
         lower: found.lower,

@@ -92,7 +92,7 @@ impl Judgement {
 /// wants to tolerate it compares `lower` with a tolerance.
 pub fn judge(differences: &[Vec<f64>], threshold: f64) -> Vec<Option<Judgement>> {
     let estimates = differences.iter().map(|d| trimmed_mean(d));
-    judge_estimates(estimates.collect(), threshold)
+    judge_estimates(estimates.collect(), [threshold, FLOOR], |_| ())
 }
 
 /// Whether every judged cell is known finely enough: the rule by which a
@@ -103,14 +103,18 @@ pub fn resolved(judged: &[Option<Judgement>], threshold: f64) -> bool {
     resolutions.all(|found| found.is_some_and(|resolution| resolution <= threshold))
 }
 
-/// Judges estimates of ln(new / old); a cell without one stays without verdict.
+/// Judges estimates of ln(new / old), once their variances are moderated and then
+/// widened; a cell without an estimate stays without verdict. What is slower or
+/// faster is proven to have changed by more than the floor.
 pub(super) fn judge_estimates(
     estimates: Vec<Option<Trimmed>>,
-    threshold: f64,
+    [threshold, floor]: [f64; 2],
+    widen: impl FnOnce(&mut [Trimmed]),
 ) -> Vec<Option<Judgement>> {
     let mut cells: Vec<Trimmed> = estimates.iter().flatten().copied().collect();
     moderate(&mut cells);
-    let floor = FLOOR.ln_1p();
+    widen(&mut cells);
+    let floor = floor.ln_1p();
     let above: Vec<f64> = cells.iter().map(|cell| cell.p_above(floor)).collect();
     let below: Vec<f64> = cells.iter().map(|cell| cell.p_below(-floor)).collect();
     let (slower, faster) = (holm(&above, ALPHA), holm(&below, ALPHA));
@@ -122,13 +126,18 @@ pub(super) fn judge_estimates(
             _ if is_same(cell, threshold) => Change::Same,
             _ => Change::Inconclusive,
         };
-        judgement(cell, change, tests, threshold)
+        judgement(cell, change, tests, [threshold, floor])
     });
     let judged = |estimate: &Option<Trimmed>| estimate.and_then(|_| judged.next());
     estimates.iter().map(judged).collect()
 }
 
-fn judgement(cell: &Trimmed, change: Change, tests: usize, threshold: f64) -> Judgement {
+fn judgement(
+    cell: &Trimmed,
+    change: Change,
+    tests: usize,
+    [threshold, floor]: [f64; 2],
+) -> Judgement {
     let margin = cell.margin(INTERVAL);
     let undecided = Some(cell).filter(|_| change == Change::Inconclusive);
     Judgement {
@@ -136,8 +145,8 @@ fn judgement(cell: &Trimmed, change: Change, tests: usize, threshold: f64) -> Ju
         ratio: cell.mean.exp(),
         lower: Some((cell.mean - margin).exp()),
         upper: Some((cell.mean + margin).exp()),
-        resolution: Some(resolution(cell, tests)),
-        more_pairs: undecided.and_then(|cell| more_pairs(cell, tests, threshold)),
+        resolution: Some(resolution(cell, tests, floor)),
+        more_pairs: undecided.and_then(|cell| more_pairs(cell, tests, [threshold, floor])),
         pairs: cell.count,
     }
 }
@@ -149,14 +158,14 @@ fn is_same(cell: &Trimmed, threshold: f64) -> bool {
 
 /// The change that is found with 95 % power at the strictest step of Holm's
 /// procedure: exp(ln 1.01 + (t(1 - 0.05/m, df) + 1.645) se) - 1.
-fn resolution(cell: &Trimmed, tests: usize) -> f64 {
+fn resolution(cell: &Trimmed, tests: usize, floor: f64) -> f64 {
     let t = student::quantile(1.0 - 2.0 * ALPHA / tests as f64, cell.df);
-    (FLOOR.ln_1p() + (t + POWER) * cell.standard_error).exp_m1()
+    (floor + (t + POWER) * cell.standard_error).exp_m1()
 }
 
 /// How many more pairs would prove the change that was found, or would prove it
 /// small enough: whichever comes first, if mean and spread stay as they are.
-fn more_pairs(cell: &Trimmed, tests: usize, threshold: f64) -> Option<usize> {
+fn more_pairs(cell: &Trimmed, tests: usize, [threshold, floor]: [f64; 2]) -> Option<usize> {
     let decides = |count: usize| {
         let shrunk = cell.standard_error * (cell.count as f64 / count as f64).sqrt();
         let future = Trimmed {
@@ -166,7 +175,7 @@ fn more_pairs(cell: &Trimmed, tests: usize, threshold: f64) -> Option<usize> {
             ..*cell
         };
         let margin = future.margin(1.0 - ALPHA / tests as f64);
-        margin + FLOOR.ln_1p() < future.mean.abs() || is_same(&future, threshold)
+        margin + floor < future.mean.abs() || is_same(&future, threshold)
     };
     // More pairs never make it worse but for a step of the cut: halving is
     // exact enough for an "about".
@@ -245,7 +254,7 @@ mod tests {
                 mean: centre,
                 ..trimmed_mean(&cell(centre, spread)).unwrap()
             };
-            let more = more_pairs(&before, 1, 0.05).unwrap();
+            let more = more_pairs(&before, 1, [0.05, FLOOR.ln_1p()]).unwrap();
             // The same pairs again and again: mean and spread stay.
             let repeated = |count: usize| {
                 let values: Vec<f64> = cell(centre, spread).repeat(1 + count / 10);

@@ -1,33 +1,91 @@
 //! The verdict on two stored reports, whose processes are not paired.
 
+use std::collections::BTreeMap;
+
 use super::judgement::judge_estimates;
 use super::trimmed::{centre, difference};
-use super::{Judgement, trimmed_mean};
+use super::{Judgement, Trimmed, median, trimmed_mean};
+
+/// Single cells of one program moved by 9 % from one quiet run to the next: a change of
+/// up to 5 % of two runs is not called one.
+const FLOOR_OF_RUNS: f64 = 0.05;
+
+/// Fewer cells do not tell how far two runs scatter: of all cells, and of those of
+/// one structure.
+const LEAST_CELLS: usize = 8;
+const LEAST_OF_ONE: usize = 4;
+/// Standard deviation / median absolute deviation, of a normal distribution.
+const SD_PER_MAD: f64 = 1.4826;
 
 /// Judges the cells of two stored reports. Per cell: one logarithm per process,
 /// of a time or better of a ratio within the process; the numbers of processes
 /// may differ.
 ///
 /// The estimate is the difference of two 20 % trimmed means with the standard
-/// error and degrees of freedom of Yuen and Welch; then the rules of
-/// [`judge`](super::judge). A cell with under three processes on a side is
+/// error and degrees of freedom of Yuen and Welch. Two runs of one program differ by
+/// more than their processes do: other load, other hours. How much more, the cells
+/// themselves tell: their scatter beyond their standard errors, over all of them, or
+/// over those of one structure about their own middle if that is more, is added to
+/// their variances (an empirical null: Efron 2004, "Large-scale simultaneous
+/// hypothesis testing"). Then the rules of [`judge`](super::judge), but that slower
+/// and faster mean a change that is proven to be over 5 %. A cell with under three processes on a side is
 /// inconclusive, with a ratio but without interval, and is no test that Holm's
 /// correction counts. `None` for a cell with an empty side, or a value that is
 /// not finite. Cells that only one of the two reports has are left out.
+/// `structures` names the structure of each cell.
 pub fn judge_unpaired(
     old: &[Vec<f64>],
     new: &[Vec<f64>],
+    structures: &[&str],
     threshold: f64,
 ) -> Vec<Option<Judgement>> {
     let sides = || old.iter().zip(new);
     let estimate = |(old, new): (&Vec<f64>, &Vec<f64>)| {
         Some(difference(&trimmed_mean(old)?, &trimmed_mean(new)?))
     };
-    let judged = judge_estimates(sides().map(estimate).collect(), threshold);
+    let estimates: Vec<Option<Trimmed>> = sides().map(estimate).collect();
+    let of_judged = estimates.iter().zip(structures);
+    let names: Vec<&str> = of_judged
+        .filter_map(|(found, name)| found.map(|_| *name))
+        .collect();
+    let judged = judge_estimates(estimates, [threshold, FLOOR_OF_RUNS], |cells| {
+        add_scatter_of_runs(cells, &names);
+    });
     sides()
         .zip(judged)
         .map(|((old, new), judged)| judged.or_else(|| without_interval(old, new)))
         .collect()
+}
+
+fn add_scatter_of_runs(cells: &mut [Trimmed], structures: &[&str]) {
+    let mut of_structure: BTreeMap<&str, Vec<Trimmed>> = BTreeMap::new();
+    for (cell, &structure) in cells.iter().zip(structures) {
+        of_structure.entry(structure).or_default().push(*cell);
+    }
+    // Relative to the others of its group a cell is expected not to move.
+    let of_all = match cells.len() >= LEAST_CELLS {
+        true => excess_variance(cells, 0.0),
+        false => 0.0,
+    };
+    for (cell, structure) in cells.iter_mut().zip(structures) {
+        let own = &of_structure[structure];
+        let middle = median(&own.iter().map(|cell| cell.mean).collect::<Vec<_>>());
+        let of_own = match middle.filter(|_| own.len() >= LEAST_OF_ONE) {
+            Some(middle) => excess_variance(own, middle),
+            None => 0.0,
+        };
+        cell.standard_error = cell.standard_error.hypot(of_all.max(of_own).sqrt());
+    }
+}
+
+/// Variance of the means about `middle`, by the median absolute deviation, beyond what
+/// their standard errors explain.
+fn excess_variance(cells: &[Trimmed], middle: f64) -> f64 {
+    let of = |what: &dyn Fn(&Trimmed) -> f64| {
+        median(&cells.iter().map(what).collect::<Vec<_>>()).unwrap_or(0.0)
+    };
+    let scatter = SD_PER_MAD * of(&|cell| (cell.mean - middle).abs());
+    (scatter.powi(2) - of(&|cell| cell.standard_error.powi(2))).max(0.0)
 }
 
 fn without_interval(old: &[f64], new: &[f64]) -> Option<Judgement> {
@@ -49,20 +107,53 @@ mod tests {
 
     #[test]
     fn reports_are_judged_by_welch() {
-        let found = judge_unpaired(&[side(1.0)], &[side(1.1)], 0.05)[0].unwrap();
+        let found = judge_unpaired(&[side(1.0)], &[side(1.1)], &["a"], 0.05)[0].unwrap();
         assert_eq!((found.change, found.pairs), (Change::Slower, 10));
         // se = sqrt(2) * 0.01190238, df = 10: t = 2.228139.
         let margin = 2.228_139 * 0.011_902_38 * 2f64.sqrt();
         assert!((found.lower.unwrap().ln() - (0.1 - margin)).abs() < 1e-7);
-        let found = judge_unpaired(&[side(1.1)], &[side(1.0)], 0.05)[0].unwrap();
+        let found = judge_unpaired(&[side(1.1)], &[side(1.0)], &["a"], 0.05)[0].unwrap();
         assert_eq!(found.change, Change::Faster);
+    }
+
+    /// Ten structures in four scenes each, all of which moved by what `of` says.
+    fn judged(of: impl Fn(usize, usize) -> f64) -> Vec<Change> {
+        let names: Vec<String> = (0..40).map(|cell| format!("s{}", cell / 4)).collect();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        let old = vec![side(0.0); 40];
+        let new: Vec<Vec<f64>> = (0..40).map(|cell| side(of(cell / 4, cell % 4))).collect();
+        let found = judge_unpaired(&old, &new, &names, 0.05);
+        found
+            .into_iter()
+            .map(|found| found.unwrap().change)
+            .collect()
+    }
+
+    #[test]
+    fn what_two_runs_scatter_by_is_no_change() {
+        let calm = judged(|structure, _| if structure == 3 { 0.12 } else { 0.0 });
+        let slower = |found: &[Change]| found.iter().filter(|c| **c == Change::Slower).count();
+        assert_eq!(slower(&calm), 4, "a structure that moved as a whole");
+        // The same where every cell moves by as much, up or down.
+        let wild = judged(|structure, scene| match (structure + scene) % 2 {
+            0 => 0.12,
+            _ => -0.12,
+        });
+        assert_eq!(slower(&wild), 0);
+        // One structure alone that scatters is told by its own cells.
+        let one = judged(|structure, scene| match (structure, scene) {
+            (3, 0 | 2) => 0.12,
+            (3, _) => -0.12,
+            _ => 0.0,
+        });
+        assert_eq!(slower(&one), 0);
     }
 
     #[test]
     fn one_process_per_side_is_inconclusive() {
         let old = [vec![0.0], side(0.0), vec![]];
         let new = [vec![2f64.ln()], side(0.0), side(0.0)];
-        let found = judge_unpaired(&old, &new, 0.1);
+        let found = judge_unpaired(&old, &new, &["a", "b", "c"], 0.1);
         let lone = found[0].unwrap();
         assert_eq!((lone.change, lone.lower), (Change::Inconclusive, None));
         assert!((lone.ratio - 2.0).abs() < 1e-12);
