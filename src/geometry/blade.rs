@@ -91,7 +91,7 @@ impl<I: Isa> Blades<I> {
 /// THE plane test on sixteen boxes at once.
 impl BoxBlock {
     /// The lanes that none of the planes of a mask excludes: bit for bit
-    /// [`Plane::excludes`], lane by lane. Lanes without a box come out as they
+    /// [`Plane::excludes`](super::Plane::excludes), lane by lane. Lanes without a box come out as they
     /// may.
     #[inline(always)]
     pub fn admitted_by<I: Isa>(&self, isa: I, volume: &ConvexVolume, mask: PlaneMask) -> LaneMask {
@@ -133,7 +133,7 @@ impl BoxBlock {
 
     /// [`BoxBlock::admitted_by`] for nodes: also which planes stay open below
     /// each lane. A lane's word is `mask` without the planes that hold the
-    /// whole box ([`Plane::contains`]).
+    /// whole box ([`Plane::contains`](super::Plane::contains)).
     #[inline(always)]
     pub fn sorted_by<I: Isa>(
         &self,

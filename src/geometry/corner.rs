@@ -2,7 +2,7 @@
 
 use super::Upper;
 
-/// Some of the six rows of a [`BoxBlock`], one bit each.
+/// Some of the six rows of a [`BoxBlock`](super::BoxBlock), one bit each.
 pub type RowMask = u8;
 
 /// All of them.
