@@ -10,7 +10,7 @@ use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, 
 use cullbench::camera::PlaneOptions;
 use cullbench::culling::Culling;
 use cullbench::geometry::BoxBlocks;
-use cullbench::index::{Registry, StructureSpec};
+use cullbench::index::{Input, Registry, StructureSpec};
 use cullbench::kernel::BASELINE;
 use cullbench::measure::{UPDATE_SHARES, Workload, move_share};
 use cullbench::path;
@@ -62,7 +62,7 @@ fn cull(c: &mut Criterion) {
                 b.iter(|| {
                     for view in &workload.views {
                         out.clear();
-                        index.see(view.as_any(), &mut out);
+                        index.query(view.as_any(), &mut out);
                         black_box(&out);
                     }
                 });
@@ -116,7 +116,7 @@ fn update(c: &mut Criterion) {
                     b.iter_batched_ref(
                         || spec.build(&scene.items).expect(row.info.name),
                         |index| {
-                            spec.update(index, &items, None, &moved)
+                            spec.update(index, Input::new(&items), &moved)
                                 .expect(row.info.name)
                         },
                         BatchSize::PerIteration,

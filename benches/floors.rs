@@ -107,7 +107,8 @@ fn harness_overhead(only_test: bool) -> u32 {
         .expect("structures")
     {
         let index = spec.build(&scene.items).expect("a build");
-        let see = |camera: usize, out: &mut Vec<_>| index.see(workload.views[camera].as_any(), out);
+        let see =
+            |camera: usize, out: &mut Vec<_>| index.query(workload.views[camera].as_any(), out);
         let mut out = Vec::new();
         let expected: Vec<u64> = (0..workload.views.len())
             .map(|camera| {

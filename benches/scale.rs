@@ -14,7 +14,7 @@ use cullbench::index::StructureSpec;
 use cullbench::measure::{
     Ask, Machine, Protocol, Stopwatch, Timed, TimedTask, Workload, cameras_within, timed_rounds,
 };
-use cullbench::query::AnyView;
+use cullbench::query::AnyVolume;
 use cullbench::statistics::{median, slope};
 use cullbench::{path, scene};
 
@@ -122,7 +122,7 @@ fn main() -> ExitCode {
             .each_ref()
             .map(|way| Workload::new(&scene, way, &Culling::default()).expect("views within f32"));
         // The right numbers of ids, by the plainest loop there is.
-        let seen = |view: AnyView| scene.items.iter().filter(|b| view.sees(b)).count() as u64;
+        let seen = |view: AnyVolume| scene.items.iter().filter(|b| view.sees(b)).count() as u64;
         let expected = workloads.each_ref().map(|workload| -> Vec<u64> {
             workload
                 .views
@@ -141,7 +141,7 @@ fn main() -> ExitCode {
             let mut cells = String::new();
             for (which, workload) in workloads.iter().enumerate() {
                 let ask: Ask = Box::new(|place, out| {
-                    index.see(workload.views[place].as_any(), out);
+                    index.query(workload.views[place].as_any(), out);
                 });
                 let task = TimedTask {
                     ask,

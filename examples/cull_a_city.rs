@@ -2,14 +2,15 @@
 //! ids. Then the second question: which building stands where the camera is?
 
 use cullbench::camera::{Camera, Lens, PlaneOptions, look_at};
-use cullbench::index::{Bvh, FrustumQuery, RegionIndex};
-use cullbench::query::{Count, NoRecorder, QueryCost};
+use cullbench::index::{Bvh, FrustumQuery, Input, RegionIndex};
+use cullbench::kernel::BASELINE;
+use cullbench::query::{Count, QueryContext, QueryCost};
 use cullbench::scene;
 use glam::DVec3;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let city = scene::load("city:n=50000,seed=7", &Default::default())?;
-    let bvh = Bvh::build(&city.items, None, &Default::default())?;
+    let bvh = Bvh::build(&Input::new(&city.items), &Default::default())?;
 
     let frame = look_at(DVec3::new(-300.0, -300.0, 120.0), DVec3::ZERO, DVec3::Z)?;
     let lens = Lens::perspective(60.0, 16.0 / 9.0, 0.5, Some(800.0))?;
@@ -19,7 +20,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for step in 0..4 {
         let volume = camera.volume(&PlaneOptions::default(), &city.surroundings())?;
         let (mut visible, mut cost) = (Vec::new(), QueryCost::default());
-        let _ = bvh.visible(&volume, &mut visible, &mut cost);
+        let mut context = QueryContext::new(BASELINE, &mut visible, &mut cost);
+        let _ = bvh.query(&volume, &mut context);
         println!(
             "step {step}: {} of {} visible; {} nodes and {} items looked at, {} accepted unseen",
             visible.len(),
@@ -36,7 +38,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     // Region search, with a sink that only counts: walk into the first house.
     let inside = city.items[0].centre();
     let mut houses = Count::default();
-    let _ = bvh.locate(inside, &mut houses, &mut NoRecorder);
+    let _ = bvh.locate(inside, &mut houses);
     println!("{} item(s) hold the point {inside}", houses.0);
     Ok(())
 }

@@ -7,13 +7,10 @@
 use std::ops::ControlFlow;
 use std::process::ExitCode;
 
-use cullbench::geometry::{Aabb, PlaneTree};
-use cullbench::index::{
-    BuildError, FrustumQuery, Info, Kind, MemoryUsage, Origin, RegionIndex, Registry,
-};
-use cullbench::query::{Containment, ItemId, Recorder, Region, Sink, View};
+use cullbench::geometry::Aabb;
+use cullbench::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, Registry};
+use cullbench::query::{Containment, Context, ItemId, QueryVolume, Recorder};
 
-type Flow = ControlFlow<()>;
 const TILE: usize = 32;
 
 struct Tiles {
@@ -21,30 +18,6 @@ struct Tiles {
     ids: Vec<ItemId>,
     boxes: Vec<Aabb>,
     bounds: Vec<Aabb>,
-}
-
-impl Tiles {
-    /// One walk for every kind of region: a frustum, a point, a box.
-    fn query<G: Region>(&self, region: &G, sink: &mut impl Sink, r: &mut impl Recorder) -> Flow {
-        let tiles = self.ids.chunks(TILE).zip(self.boxes.chunks(TILE));
-        for ((ids, boxes), bounds) in tiles.zip(&self.bounds) {
-            r.node_tested();
-            // The memo knows which planes are decided for all of the tile.
-            let (verdict, memo) = region.classify(bounds, region.start(), r);
-            if verdict == Containment::Outside {
-                r.subtree_rejected();
-            } else if verdict == Containment::Inside {
-                r.subtree_accepted(ids.len());
-                sink.accept(ids)?; // `?`: a sink may break off
-            } else {
-                r.items_tested(ids.len() as u32);
-                for i in (0..ids.len()).filter(|&i| region.admits(&boxes[i], memo, r)) {
-                    sink.accept(&ids[i..=i])?;
-                }
-            }
-        }
-        Flow::Continue(())
-    }
 }
 
 impl RegionIndex for Tiles {
@@ -57,7 +30,8 @@ impl RegionIndex for Tiles {
     );
     type Params = (); // or a serde struct: `tiles:key=value`
 
-    fn build(items: &[Aabb], _: Option<&PlaneTree>, _: &()) -> Result<Self, BuildError> {
+    fn build(input: &Input<'_>, _: &()) -> Result<Self, BuildError> {
+        let items = input.items;
         // Refuses NaN and infinity, leaves empty boxes out.
         let mut ids = cullbench::index::indexable(items)?;
         let at = |id: &ItemId, axis: usize| items[*id as usize].centre()[axis];
@@ -76,14 +50,28 @@ impl RegionIndex for Tiles {
             item_bytes: size_of_val(&self.boxes[..]) + size_of_val(&self.ids[..]),
         }
     }
-    fn locate<S: Sink, R: Recorder>(&self, p: glam::Vec3, sink: &mut S, r: &mut R) -> Flow {
-        self.query(&p, sink, r)
-    }
-}
-
-impl FrustumQuery for Tiles {
-    fn visible<V: View, S: Sink, R: Recorder>(&self, v: &V, sink: &mut S, r: &mut R) -> Flow {
-        self.query(v, sink, r)
+    /// One query for every question: a frustum of any kind, a point, a box.
+    fn query<Q: QueryVolume, C: Context>(&self, q: &Q, cx: &mut C) -> ControlFlow<()> {
+        let tiles = self.ids.chunks(TILE).zip(self.boxes.chunks(TILE));
+        for ((ids, boxes), bounds) in tiles.zip(&self.bounds) {
+            cx.recorder().node_tested();
+            // The mask knows which planes are decided for all of the tile.
+            let (verdict, mask) = q.classify(bounds, q.mask(), cx.recorder());
+            if verdict == Containment::Outside {
+                cx.recorder().subtree_rejected();
+            } else if verdict == Containment::Inside {
+                cx.recorder().subtree_accepted(ids.len());
+                cx.accept(ids)?; // `?`: a sink may break off
+            } else {
+                cx.recorder().items_tested(ids.len() as u32);
+                for (id, item) in ids.iter().zip(boxes) {
+                    if q.admits(item, mask, cx.recorder()) {
+                        cx.accept(&[*id])?;
+                    }
+                }
+            }
+        }
+        ControlFlow::Continue(())
     }
 }
 

@@ -9,7 +9,7 @@ use cullbench::camera::PlaneOptions;
 use cullbench::geometry::{Aabb, ConvexVolume, PlaneMask};
 use cullbench::index::{PackedTree, Part, Record, Splitter, build_top_down, indexable};
 use cullbench::kernel::BASELINE;
-use cullbench::query::{ItemId, NoRecorder, Sink};
+use cullbench::query::{ItemId, NoRecorder, QueryContext, Sink};
 use cullbench::{path, scene};
 
 /// The median along the widest axis: the plainest tree there is.
@@ -137,7 +137,10 @@ fn without(tree: &PackedTree, volume: &ConvexVolume, out: &mut Vec<ItemId>) {
 
 #[inline(never)]
 fn with(tree: &PackedTree, volume: &ConvexVolume, out: &mut Vec<ItemId>) {
-    let _ = tree.query(BASELINE, volume, out, &mut NoRecorder);
+    let _ = tree.walk(
+        volume,
+        &mut QueryContext::new(BASELINE, out, &mut NoRecorder),
+    );
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -74,7 +74,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 let (mut cost, mut out) = (QueryCost::default(), Vec::new());
                 for p in (0..SEARCHES).map(|i| point(i, side)) {
                     out.clear();
-                    index.locate_counted(p, &mut out, &mut cost);
+                    index.query_counted(p.into(), &mut out, &mut cost);
                     let holding = out
                         .iter()
                         .filter(|&&id| boxes[id as usize].contains_point(p));

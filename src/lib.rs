@@ -9,14 +9,14 @@
 //! - [`threads`]: how many may work at once, and how they share work out
 //! - [`arithmetic`]: directed rounding, exact sums and products
 //! - [`geometry`]: boxes, planes, convex volumes, and THE plane test
-//! - [`query`]: what a query asks ([`query::Region`]), where answers go
+//! - [`query`]: what is asked ([`query::QueryVolume`]), where answers go
 //!   ([`query::Sink`]) and what is counted ([`query::Recorder`])
 //! - [`camera`]: eye, u, v, n; lenses; matrices; the planes of the view
 //! - [`culling`]: culling tests and arithmetics: from a camera to a view
 //! - [`oracle`]: the exact verdict about a box and a volume or camera
-//! - [`index`]: the contract [`index::RegionIndex`] and
-//!   [`index::FrustumQuery`], the structures behind it, and the
-//!   [`index::Registry`] that yours joins
+//! - [`index`]: the contract [`index::RegionIndex`], what follows from it
+//!   ([`index::FrustumQuery`]), the structures, and the [`index::Registry`] that
+//!   yours joins
 //! - [`scene`]: generated and real worlds, and the regions in them
 //! - [`path`]: ways through a scene
 //! - [`verify`]: the reference answer and how others differ from it

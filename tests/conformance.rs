@@ -5,16 +5,16 @@
 use std::ops::ControlFlow;
 
 use cullbench::culling::Culling;
-use cullbench::geometry::{Aabb, ConvexVolume, Plane, PlaneTree};
-use cullbench::index::{Bsp, Bvh, FrustumQuery, Linear, LinearScalar, Octree, Quadtree};
+use cullbench::geometry::{Aabb, ConvexVolume, Plane};
+use cullbench::index::{Bsp, Bvh, Input, Linear, LinearScalar, Octree, Quadtree};
 use cullbench::index::{BspTextbook, BvhTextbook, OctreeTextbook, QuadtreeTextbook};
 use cullbench::index::{BuildError, DynIndex, MemoryUsage, Registry, StructureSpec};
 use cullbench::index::{Info, Kind, RegionIndex, UniformGrid, Wide};
+use cullbench::kernel::Isa;
 use cullbench::measure::Workload;
 use cullbench::path::{self, LensDefaults};
-use cullbench::query::{AnyView, ItemId, ManySink, Recorder, Sink, View};
+use cullbench::query::{AnyVolume, Context, ItemId, ManySink, QueryVolume};
 use cullbench::scene;
-use cullbench::threads::Pool;
 use cullbench::verify::Reference;
 use glam::Vec3;
 
@@ -25,51 +25,31 @@ impl<T: RegionIndex, const WHICH: usize> RegionIndex for Variant<T, WHICH> {
     const INFO: Info = T::INFO.named(VARIANTS[WHICH]);
     type Params = ();
 
-    fn build(items: &[Aabb], own: Option<&PlaneTree>, _: &()) -> Result<Self, BuildError> {
-        Self::build_by(&Pool::new(1), items, own, &())
-    }
-
-    fn build_by(
-        pool: &Pool,
-        items: &[Aabb],
-        own: Option<&PlaneTree>,
-        _: &(),
-    ) -> Result<Self, BuildError> {
+    fn build(input: &Input<'_>, _: &()) -> Result<Self, BuildError> {
         let spec = StructureSpec::parse(Self::INFO.name).expect(Self::INFO.name);
         let params = serde_json::from_value(spec.params).expect(Self::INFO.name);
-        T::build_by(pool, items, own, &params).map(Variant)
+        T::build(input, &params).map(Variant)
     }
 
     fn memory(&self) -> MemoryUsage {
         self.0.memory()
     }
 
-    fn locate<S: Sink, R: Recorder>(
-        &self,
-        p: Vec3,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        self.0.locate(p, sink, recorder)
+    fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
+        self.0.query(volume, cx)
     }
 
-    fn locate_many<S: ManySink>(&self, points: &[Vec3], sink: &mut S) -> ControlFlow<()> {
-        self.0.locate_many(points, sink)
+    fn query_many<I: Isa, S: ManySink>(
+        &self,
+        isa: I,
+        points: &[Vec3],
+        sink: &mut S,
+    ) -> ControlFlow<()> {
+        self.0.query_many(isa, points, sink)
     }
 
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
         self.0.refit(items, moved)
-    }
-}
-
-impl<T: FrustumQuery, const WHICH: usize> FrustumQuery for Variant<T, WHICH> {
-    fn visible<V: View, S: Sink, R: Recorder>(
-        &self,
-        view: &V,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        self.0.visible(view, sink, recorder)
     }
 
     fn tree_order(&self) -> Option<&[ItemId]> {
@@ -229,7 +209,7 @@ fn every_structure_returns_the_reference_set_on_every_scene_and_path() {
                 reference.see(&scene.items, view.as_any());
                 for (index, row) in built.iter().zip(Registry::builtin().rows()) {
                     let mut found = Vec::new();
-                    index.see(view.as_any(), &mut found);
+                    index.query(view.as_any(), &mut found);
                     let difference = reference.compare(&found);
                     assert!(
                         difference.is_none(),
@@ -260,7 +240,7 @@ fn memory_and_counters_fit_the_items() {
         let index = build(row.info.name, &scene.items);
         assert!(index.memory().item_bytes >= 5000 * 28, "{}", row.info.name);
         let (mut out, mut cost) = (Vec::new(), Default::default());
-        index.visible_counted(&nothing, &mut out, &mut cost);
+        index.query_counted((&nothing).into(), &mut out, &mut cost);
         assert!(out.is_empty());
         // A scan looks at everything; a tree at its root, or at all of the
         // root's children, which lie in one block. Some peers keep no box of
@@ -285,12 +265,14 @@ fn a_maps_own_tree_gives_the_reference_set() {
         let spec = StructureSpec::parse(name).expect(name);
         // The items, and the boxes of the regions that region search asks for.
         for items in [&map.items[..], map.regions.boxes(&map.items)] {
-            let index = spec.build_with(items, map.own_tree.as_ref()).expect(name);
+            let index = spec
+                .build(Input::new(items).own_tree(map.own_tree.as_ref()))
+                .expect(name);
             let mut reference = Reference::new(items.len());
             for view in &workload.views {
                 reference.see(items, view.as_any());
                 let mut found = Vec::new();
-                index.see(view.as_any(), &mut found);
+                index.query(view.as_any(), &mut found);
                 assert!(reference.compare(&found).is_none(), "{name}");
             }
             for &p in &workload.points {
@@ -308,12 +290,14 @@ fn a_maps_own_tree_gives_the_reference_set() {
 #[test]
 fn bsp_takes_a_maps_own_planes_by_default_and_the_median_elsewhere() {
     let map = scene::load("freedm-map12", &Default::default()).expect("a sample");
-    let order = |name: &str, own: Option<&PlaneTree>| {
+    let order = |name: &str, own: Option<&cullbench::geometry::PlaneTree>| {
         let spec = StructureSpec::parse(name).expect(name);
-        let index = spec.build_with(&map.items, own).expect(name);
+        let index = spec
+            .build(Input::new(&map.items).own_tree(own))
+            .expect(name);
         let everything = ConvexVolume::from_planes(&[]).expect("no plane");
         let mut seen = Vec::new();
-        index.see(AnyView::Volume(&everything), &mut seen);
+        index.query(AnyVolume::Planes(&everything), &mut seen);
         seen
     };
     let own = map.own_tree.as_ref();

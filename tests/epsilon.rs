@@ -11,7 +11,7 @@ use by_hand::{Kind, Setup, View};
 use cullbench::camera::{PlaneMethod, PlaneOptions, Surroundings};
 use cullbench::geometry::{Aabb, FrustumPlane};
 use cullbench::index::{Registry, StructureSpec};
-use cullbench::query::View as _;
+use cullbench::query::Predicate as _;
 use glam::DVec3;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;

@@ -4,13 +4,15 @@
 
 use std::ops::ControlFlow;
 
-use cullbench::geometry::{Aabb, PlaneTree, RelativeVolume, Spheres, WideVolume, sphere_cube};
+use cullbench::geometry::{Aabb, RelativeVolume, Spheres, WideVolume, sphere_cube};
 use cullbench::index::{
-    BuildError, DynIndex, Execution, FrustumQuery, Info, Kind, MemoryUsage, Origin, RegionIndex,
-    Registry, StructureSpec,
+    BuildError, DynIndex, Execution, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, Registry,
+    StructureSpec,
 };
 use cullbench::kernel::{Isa, Kernel};
-use cullbench::query::{AnyView, ItemId, Located, ManySink, QueryCost, Recorder, Sink, View};
+use cullbench::query::{
+    AnyVolume, Context, ItemId, Located, ManySink, QueryCost, QueryVolume, Sink,
+};
 use cullbench::verify::RandomCase;
 use glam::Vec3;
 
@@ -22,10 +24,10 @@ struct Said {
 }
 
 impl Said {
-    fn see(&mut self, index: &dyn DynIndex, view: AnyView<'_>) {
+    fn see(&mut self, index: &dyn DynIndex, view: AnyVolume<'_>) {
         let (mut plain, mut ids, mut cost) = (Vec::new(), Vec::new(), QueryCost::default());
-        index.see(view, &mut plain);
-        index.see_counted(view, &mut ids, &mut cost);
+        index.query(view, &mut plain);
+        index.query_counted(view, &mut ids, &mut cost);
         assert_eq!(plain, ids, "counting changes the answer");
         self.ids.push(ids);
         self.costs.push(cost);
@@ -34,7 +36,7 @@ impl Said {
     fn locate(&mut self, index: &dyn DynIndex, p: Vec3) {
         let (mut plain, mut ids, mut cost) = (Vec::new(), Vec::new(), QueryCost::default());
         index.locate(p, &mut plain);
-        index.locate_counted(p, &mut ids, &mut cost);
+        index.query_counted(p.into(), &mut ids, &mut cost);
         assert_eq!(plain, ids, "counting changes the answer");
         self.ids.push(ids);
         self.costs.push(cost);
@@ -101,53 +103,19 @@ impl RegionIndex for TellsKernel {
     const INFO: Info = Info::new("tells-kernel", "for this test", Kind::Scan, Origin::Ours);
     type Params = ();
 
-    fn build(_: &[Aabb], _: Option<&PlaneTree>, _: &()) -> Result<Self, BuildError> {
+    fn build(_: &Input<'_>, _: &()) -> Result<Self, BuildError> {
         Ok(TellsKernel)
     }
     fn memory(&self) -> MemoryUsage {
         MemoryUsage::default()
     }
-    fn locate<S: Sink, R: Recorder>(&self, _: Vec3, _: &mut S, _: &mut R) -> ControlFlow<()> {
-        unreachable!("a kernel is always given")
+    fn query<Q: QueryVolume, C: Context>(&self, _: &Q, cx: &mut C) -> ControlFlow<()> {
+        told::<C::Isa>(cx.sink())
     }
-    fn locate_by<I: Isa, S: Sink, R: Recorder>(
-        &self,
-        _: I,
-        _: Vec3,
-        sink: &mut S,
-        _: &mut R,
-    ) -> ControlFlow<()> {
-        told::<I>(sink)
-    }
-    fn locate_many_by<I: Isa, S: ManySink>(
-        &self,
-        _: I,
-        _: &[Vec3],
-        sink: &mut S,
-    ) -> ControlFlow<()> {
+    fn query_many<I: Isa, S: ManySink>(&self, _: I, _: &[Vec3], sink: &mut S) -> ControlFlow<()> {
         let mut ids = Vec::new();
         let _ = told::<I>(&mut ids);
         sink.accept(0, &ids)
-    }
-}
-
-impl FrustumQuery for TellsKernel {
-    fn visible<V: View, S: Sink, R: Recorder>(
-        &self,
-        _: &V,
-        _: &mut S,
-        _: &mut R,
-    ) -> ControlFlow<()> {
-        unreachable!("a kernel is always given")
-    }
-    fn visible_by<I: Isa, V: View, S: Sink, R: Recorder>(
-        &self,
-        _: I,
-        _: &V,
-        sink: &mut S,
-        _: &mut R,
-    ) -> ControlFlow<()> {
-        told::<I>(sink)
     }
 }
 
@@ -158,7 +126,13 @@ fn a_structure_is_asked_by_the_kernel_of_its_spec() {
     let spec = row.structure("tells-kernel").expect("registered");
     let built = Kernel::available().map(|kernel| {
         let by = Execution { kernel, threads: 1 };
-        (kernel, spec.clone().by(by).build(&[]).expect("no items"))
+        (
+            kernel,
+            spec.clone()
+                .by(by)
+                .build(Input::new(&[]))
+                .expect("no items"),
+        )
     });
     let built: Vec<_> = built.collect();
     let volume = RandomCase::new(1).volume;
@@ -167,11 +141,11 @@ fn a_structure_is_asked_by_the_kernel_of_its_spec() {
         let [seen, counted, located, located_counted, batched] = &mut told;
         let cost = &mut QueryCost::default();
         index.visible(&volume, seen);
-        index.visible_counted(&volume, counted, cost);
+        index.query_counted((&volume).into(), counted, cost);
         index.locate(Vec3::ZERO, located);
-        index.locate_counted(Vec3::ZERO, located_counted, cost);
+        index.query_counted(Vec3::ZERO.into(), located_counted, cost);
         let mut all = Located::default();
-        index.locate_many(&[Vec3::ZERO], &mut all);
+        index.query_many(&[Vec3::ZERO], &mut all);
         batched.extend(all.iter().flatten());
         // What is counted is counted by the portable one.
         let by = |i| match i {

@@ -94,6 +94,146 @@ fn modules_import_only_what_the_table_allows() {
     );
 }
 
+/// A file's code: without comments and without its tests.
+fn code(file: &Path) -> String {
+    let text = fs::read_to_string(file).expect("readable source");
+    let lines = text
+        .lines()
+        .map(|line| line.split("//").next().unwrap_or(""));
+    let code = lines.collect::<Vec<_>>().join("\n");
+    let end = code.find("#[cfg(test)]\nmod ").unwrap_or(code.len());
+    code[..end].to_owned()
+}
+
+/// The paths of a `use` tree, one for each leaf.
+fn leaves(tree: &str, found: &mut Vec<String>) {
+    let Some((prefix, rest)) = tree.split_once('{') else {
+        let path = tree.split(" as ").next().unwrap_or("");
+        return found.push(path.split_whitespace().collect());
+    };
+    let body = &rest[..rest.rfind('}').expect("braces match")];
+    let mut depth = 0;
+    let parts = body.split(|c| {
+        depth += i32::from(c == '{') - i32::from(c == '}');
+        c == ',' && depth == 0
+    });
+    for part in parts.filter(|part| !part.trim().is_empty()) {
+        leaves(&format!("{prefix}{part}"), found);
+    }
+}
+
+/// What the code of a module names of this crate, from the root of the crate on,
+/// and whether it hands it on (`pub use`).
+fn named(module: &str, code: &str, modules: &BTreeMap<String, PathBuf>) -> Vec<(String, bool)> {
+    let mut found = Vec::new();
+    for statement in code.split(';') {
+        let Some(at) = statement.find("use ") else {
+            continue;
+        };
+        let mut paths = Vec::new();
+        leaves(&statement[at + 4..], &mut paths);
+        let is_public = statement[..at].trim_end().ends_with("pub")
+            || statement[..at].trim_end().ends_with(')');
+        found.extend(paths.into_iter().map(|path| (path, is_public)));
+    }
+    let absolute = |(path, is_public): (String, bool)| {
+        let mut inside: Vec<&str> = module.split("::").filter(|name| !name.is_empty()).collect();
+        let mut names: Vec<&str> = path.split("::").collect();
+        let child = [&inside[..], &names[..1]].concat().join("::");
+        match names[0] {
+            "crate" => inside.clear(),
+            "super" => {}
+            _ if modules.contains_key(&child) => names.insert(0, "self"),
+            _ => return None,
+        }
+        while names.first() == Some(&"super") {
+            inside.pop();
+            names.remove(0);
+        }
+        if ["crate", "self"].contains(&names[0]) {
+            names.remove(0);
+        }
+        Some(([inside, names].concat().join("::"), is_public))
+    };
+    found.into_iter().filter_map(absolute).collect()
+}
+
+#[test]
+fn no_files_import_each_other_in_a_circle() {
+    let mut files = Vec::new();
+    rust_files(Path::new("src"), &mut files);
+    let module = |file: &Path| {
+        let inside = file
+            .strip_prefix("src")
+            .expect("under src")
+            .with_extension("");
+        let names: Vec<_> = inside.iter().map(|name| name.to_string_lossy()).collect();
+        let names = names
+            .into_iter()
+            .filter(|name| name != "mod" && name != "lib");
+        names.collect::<Vec<_>>().join("::")
+    };
+    let modules: BTreeMap<String, PathBuf> = files
+        .into_iter()
+        .map(|file| (module(&file), file))
+        .collect();
+    let used: BTreeMap<&String, Vec<(String, bool)>> = modules
+        .iter()
+        .map(|(name, file)| (name, named(name, &code(file), &modules)))
+        .collect();
+    // A name that a module hands on is its owner's.
+    let handed_on: BTreeMap<(&String, &str), &String> = used
+        .iter()
+        .flat_map(|(module, paths)| paths.iter().map(move |path| (*module, path)))
+        .filter(|(_, (_, is_public))| *is_public)
+        .map(|(module, (path, _))| ((module, path.rsplit("::").next().unwrap_or("")), path))
+        .collect();
+    let owner = |path: &str| {
+        let mut path = path.to_owned();
+        loop {
+            let names: Vec<&str> = path.split("::").collect();
+            let known = (0..=names.len()).rev().find_map(|n| {
+                let module = names[..n].join("::");
+                modules
+                    .get_key_value(&module)
+                    .map(|(module, _)| (module, &names[n..]))
+            });
+            let (module, rest) = known.expect("the root is a module");
+            let next = rest.first().and_then(|name| handed_on.get(&(module, name)));
+            match next {
+                Some(next) if **next != path => {
+                    path = [&[&next[..]], &rest[1..]].concat().join("::")
+                }
+                _ => return module.clone(),
+            }
+        }
+    };
+    let mut imports: BTreeMap<&String, BTreeSet<String>> = used
+        .iter()
+        .map(|(module, paths)| {
+            let own = paths.iter().filter(|(_, is_public)| !is_public);
+            let owners = own.map(|(path, _)| owner(path));
+            (*module, owners.filter(|owner| owner != *module).collect())
+        })
+        .collect();
+    assert!(
+        imports.values().map(BTreeSet::len).sum::<usize>() > 500,
+        "{imports:?}"
+    );
+    // What imports nothing that is left, or is imported by nothing, is in no circle.
+    loop {
+        let left: BTreeSet<String> = imports.keys().map(|module| (*module).clone()).collect();
+        let imported: BTreeSet<String> = imports.values().flatten().cloned().collect();
+        imports.retain(|module, owners| {
+            imported.contains(*module) && owners.iter().any(|owner| left.contains(owner))
+        });
+        if imports.len() == left.len() {
+            break;
+        }
+    }
+    assert!(imports.is_empty(), "in a circle: {:?}", imports.keys());
+}
+
 #[test]
 fn every_file_says_what_it_owns() {
     let mut files = Vec::new();

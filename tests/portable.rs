@@ -7,11 +7,11 @@ use std::ops::Range;
 
 use cullbench::geometry::{Aabb, ConvexVolume, Spheres, WideVolume, sphere_cube};
 use cullbench::index::{
-    BlockOrder, Bsp, Bvh, FrustumQuery, Linear, Octree, Quadtree, RegionIndex, Trace, TreeOrder,
-    Wide, WideParams,
+    BlockOrder, Bsp, Bvh, FrustumQuery, Input, Linear, Octree, Quadtree, RegionIndex, Trace, Wide,
+    WideParams,
 };
 use cullbench::kernel::{BASELINE, Isa, LANES, LaneMask, Pack};
-use cullbench::query::{ItemId, Located, NoRecorder, View};
+use cullbench::query::{ItemId, Located, Predicate, QueryVolume};
 use cullbench::verify::{RandomCase, edge_scenes, edge_volumes};
 use glam::Vec3;
 
@@ -34,15 +34,15 @@ fn sorted_rest(mut ids: Vec<ItemId>, before: usize) -> Vec<ItemId> {
     ids
 }
 
-fn sees<T: FrustumQuery, V: View>(index: &T, view: &V, before: usize, wanted: &[ItemId]) {
+fn sees<T: RegionIndex, V: QueryVolume>(index: &T, view: &V, before: usize, wanted: &[ItemId]) {
     // No spare room, and a start at any place of a cache line.
     let mut ids = vec![ItemId::MAX; before];
-    let _ = index.visible(view, &mut ids, &mut NoRecorder);
+    let _ = index.visible(view, &mut ids);
     assert_eq!(sorted_rest(ids, before), wanted, "{}", T::INFO.name);
 }
 
-fn queries<T: FrustumQuery>(items: &[Aabb], volumes: &[ConvexVolume], points: &[Vec3]) -> T {
-    let index = T::build(items, None, &Default::default()).expect(T::INFO.name);
+fn queries<T: RegionIndex>(items: &[Aabb], volumes: &[ConvexVolume], points: &[Vec3]) -> T {
+    let index = T::build(&Input::new(items), &Default::default()).expect(T::INFO.name);
     for (i, volume) in volumes.iter().enumerate() {
         let wanted = those(items, |b| volume.sees(b));
         sees(&index, volume, i, &wanted);
@@ -51,12 +51,12 @@ fn queries<T: FrustumQuery>(items: &[Aabb], volumes: &[ConvexVolume], points: &[
         sees(&index, &finer, i, &wanted);
     }
     let mut all = Located::default();
-    let _ = index.locate_many(points, &mut all);
+    let _ = index.query_many(BASELINE, points, &mut all);
     let mut from = 0;
     for (&p, &end) in points.iter().zip(all.ends()) {
         let wanted = those(items, |b| b.contains_point(p));
         let mut ids = Vec::new();
-        let _ = index.locate(p, &mut ids, &mut NoRecorder);
+        let _ = index.locate(p, &mut ids);
         assert_eq!(sorted_rest(ids, 0), wanted, "{}", T::INFO.name);
         let batched = all.ids()[from..end].to_vec();
         assert_eq!(sorted_rest(batched, 0), wanted, "{}", T::INFO.name);
@@ -65,16 +65,13 @@ fn queries<T: FrustumQuery>(items: &[Aabb], volumes: &[ConvexVolume], points: &[
     index
 }
 
-fn ranges<T: TreeOrder>(index: &T, items: &[Aabb], volumes: &[ConvexVolume]) {
+fn ranges<T: RegionIndex>(index: &T, items: &[Aabb], volumes: &[ConvexVolume]) {
     for volume in volumes {
         let mut ranges: Vec<Range<u32>> = Vec::new();
-        index.visible_ranges(volume, &mut ranges);
+        let order = index.visible_ranges(volume, &mut ranges);
+        let order = order.expect("declared");
         let of = |range: &Range<u32>| range.start as usize..range.end as usize;
-        let held: Vec<ItemId> = ranges
-            .iter()
-            .flat_map(|r| &index.ids()[of(r)])
-            .copied()
-            .collect();
+        let held: Vec<ItemId> = ranges.iter().flat_map(|r| &order[of(r)]).copied().collect();
         let wanted = those(items, |b| volume.sees(b));
         assert_eq!(sorted_rest(held, 0), wanted, "{}", T::INFO.name);
     }
@@ -85,7 +82,7 @@ fn wide(tree: &Wide, items: &[Aabb], volumes: &[ConvexVolume]) {
     let params = WideParams {
         order: BlockOrder::Morton,
     };
-    let morton = Wide::build(items, None, &params).expect("finite");
+    let morton = Wide::build(&Input::new(items), &params).expect("finite");
     for (i, volume) in volumes.iter().enumerate() {
         let wanted = those(items, |b| volume.sees(b));
         sees(&morton, volume, i, &wanted);
@@ -96,9 +93,9 @@ fn wide(tree: &Wide, items: &[Aabb], volumes: &[ConvexVolume]) {
 }
 
 /// Cubes about spheres, which is what a view of spheres asks about.
-fn spheres<T: FrustumQuery>(items: &[Aabb], volumes: &[ConvexVolume]) {
+fn spheres<T: RegionIndex>(items: &[Aabb], volumes: &[ConvexVolume]) {
     let cubes: Vec<Aabb> = items.iter().map(sphere_cube).collect();
-    let index = T::build(&cubes, None, &Default::default()).expect(T::INFO.name);
+    let index = T::build(&Input::new(&cubes), &Default::default()).expect(T::INFO.name);
     for volume in volumes {
         let view = Spheres::new(volume);
         sees(&index, &view, 0, &those(&cubes, |b| view.sees(b)));
@@ -116,7 +113,7 @@ fn every_structure(items: &[Aabb], volumes: &[ConvexVolume], points: &[Vec3]) {
         )* };
     }
     trees!(Bsp, Octree, Quadtree, Bvh, Wide);
-    let tree = Wide::build(items, None, &WideParams::default()).expect("finite");
+    let tree = Wide::build(&Input::new(items), &WideParams::default()).expect("finite");
     wide(&tree, items, volumes);
 }
 

@@ -5,26 +5,32 @@
 use std::ops::Range;
 
 use cullbench::geometry::ConvexVolume;
-use cullbench::index::{Bsp, Bvh, Octree, Quadtree, TreeOrder, Wide};
+use cullbench::index::{Bsp, Bvh, FrustumQuery, Input, Octree, Quadtree, Query, RegionIndex, Wide};
 use cullbench::kernel::Kernel;
 use cullbench::path::{self, LensDefaults};
-use cullbench::query::{ItemId, NoRecorder};
+use cullbench::query::{ItemId, NoRecorder, Ranges};
 use cullbench::scene::{self, Scene};
 
-fn check<T: TreeOrder>(kernel: Kernel, scene: &Scene, volumes: &[ConvexVolume]) {
+fn check<T: RegionIndex>(kernel: Kernel, scene: &Scene, volumes: &[ConvexVolume]) {
     let items = &scene.items;
-    let index = T::build(items, None, &T::Params::default()).expect(T::INFO.name);
+    let index = T::build(&Input::new(items), &T::Params::default()).expect(T::INFO.name);
     for volume in volumes {
         let what = format!("{} on {}", T::INFO.name, scene.name);
         let mut ids = Vec::new();
-        let _ = index.visible(volume, &mut ids, &mut NoRecorder);
+        let _ = index.visible(volume, &mut ids);
         // Somebody else's range, which ends where tree order begins.
         let theirs = Range {
             start: u32::MAX,
             end: 0,
         };
         let mut ranges = Vec::from([theirs.clone()]);
-        index.visible_ranges_by(kernel, volume, &mut ranges);
+        let _ = kernel.run(Query {
+            index: &index,
+            volume,
+            sink: &mut Ranges::onto(&mut ranges),
+            recorder: &mut NoRecorder,
+        });
+        let order = index.tree_order().expect("declared");
         assert_eq!(ranges.remove(0), theirs, "{what}: not appended");
         let ends = ranges.windows(2).all(|two| two[0].end != two[1].start);
         assert!(ends, "{what}: adjoining ranges are one");
@@ -32,14 +38,14 @@ fn check<T: TreeOrder>(kernel: Kernel, scene: &Scene, volumes: &[ConvexVolume]) 
         let of = |range: &Range<u32>| range.start as usize..range.end as usize;
         let mut held: Vec<ItemId> = ranges
             .iter()
-            .flat_map(|range| &index.ids()[of(range)])
+            .flat_map(|range| &order[of(range)])
             .copied()
             .collect();
         held.sort_unstable();
         ids.sort_unstable();
         assert_eq!(held, ids, "{what}");
         if volume.mask() == 0 {
-            let all = 0..index.ids().len() as u32;
+            let all = 0..order.len() as u32;
             assert_eq!(ranges, Vec::from_iter([all]), "{what}");
         }
     }

@@ -6,16 +6,16 @@ use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use cullbench::culling::{Culling, CullingTest};
-use cullbench::geometry::{Aabb, PlaneTree};
+use cullbench::geometry::Aabb;
 use cullbench::index::{
-    BuildError, FrustumQuery, Info, Kind, MemoryUsage, Origin, RegionIndex, Registry, indexable,
+    BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, Registry, indexable,
 };
 use cullbench::measure::{
     GroupPlan, Known, Part, PathInfo, Protocol, SceneInfo, Status, Subject, TaskKind, Workload,
     measure_group, measure_part,
 };
 use cullbench::path;
-use cullbench::query::{ItemId, Recorder, Region, Sink, View};
+use cullbench::query::{Context, ItemId, QueryVolume, Recorder};
 use cullbench::scene::{self, Scene};
 
 const CAMERAS: u32 = 16;
@@ -42,24 +42,6 @@ const NAMES: [&str; 4] = [
     "right-when-counted",
 ];
 
-impl<const FAULT: u8> Faulty<FAULT> {
-    fn query<G: Region>(
-        &self,
-        region: &G,
-        last: usize,
-        sink: &mut impl Sink,
-        recorder: &mut impl Recorder,
-    ) -> ControlFlow<()> {
-        recorder.items_tested(self.ids.len() as u32);
-        for i in 0..last {
-            if region.admits(&self.boxes[i], region.start(), recorder) {
-                sink.accept(&self.ids[i..=i])?;
-            }
-        }
-        ControlFlow::Continue(())
-    }
-}
-
 impl<const FAULT: u8> RegionIndex for Faulty<FAULT> {
     const INFO: Info = Info::new(
         NAMES[FAULT as usize],
@@ -69,7 +51,8 @@ impl<const FAULT: u8> RegionIndex for Faulty<FAULT> {
     );
     type Params = ();
 
-    fn build(items: &[Aabb], _: Option<&PlaneTree>, (): &()) -> Result<Self, BuildError> {
+    fn build(input: &Input<'_>, (): &()) -> Result<Self, BuildError> {
+        let items = input.items;
         let ids = indexable(items)?;
         Ok(Faulty {
             boxes: ids.iter().map(|&id| items[id as usize]).collect(),
@@ -85,24 +68,11 @@ impl<const FAULT: u8> RegionIndex for Faulty<FAULT> {
         }
     }
 
-    fn locate<S: Sink, R: Recorder>(
-        &self,
-        p: glam::Vec3,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        self.query(&p, self.ids.len(), sink, recorder)
-    }
-}
-
-impl<const FAULT: u8> FrustumQuery for Faulty<FAULT> {
-    fn visible<V: View, S: Sink, R: Recorder>(
-        &self,
-        view: &V,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        let query = self.queries.fetch_add(1, Ordering::Relaxed);
+    fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
+        let query = match Q::IS_POINT {
+            true => 0,
+            false => self.queries.fetch_add(1, Ordering::Relaxed),
+        };
         // The count pass asks every camera twice.
         let is_timed = query >= 2 * CAMERAS;
         let work = || -> usize {
@@ -110,12 +80,19 @@ impl<const FAULT: u8> FrustumQuery for Faulty<FAULT> {
             assert!(!panics || !is_timed, "deep in the structure");
             self.ids.len()
         };
+        let is_counted = size_of::<C::Recorder>() > 0;
         let last = match FAULT {
-            RIGHT_WHEN_COUNTED if size_of::<R>() == 0 => self.ids.len() / 2,
+            RIGHT_WHEN_COUNTED if !is_counted && !Q::IS_POINT => self.ids.len() / 2,
             SWALLOWS_ITS_PANIC => std::panic::catch_unwind(work).unwrap_or(self.ids.len() / 2),
             _ => work(),
         };
-        self.query(view, last, sink, recorder)
+        cx.recorder().items_tested(self.ids.len() as u32);
+        for i in 0..last {
+            if volume.admits(&self.boxes[i], volume.mask(), cx.recorder()) {
+                cx.accept(&self.ids[i..=i])?;
+            }
+        }
+        ControlFlow::Continue(())
     }
 }
 

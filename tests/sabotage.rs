@@ -6,15 +6,12 @@ use std::collections::BTreeSet;
 use std::ops::{ControlFlow, Range};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use cullbench::geometry::{Aabb, BoxBlock, LaneMask, PlaneMask, PlaneTree};
+use cullbench::geometry::{Aabb, PlaneMask};
 use cullbench::index::{
-    BuildError, FrustumQuery, Info, Kind, MemoryUsage, Origin, RegionIndex, indexable,
+    BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, indexable,
 };
-use cullbench::kernel::Isa;
-use cullbench::query::{Containment, ItemId, NoRecorder, Recorder, Region, Sink, View};
-use cullbench::threads::Pool;
+use cullbench::query::{Containment, Context, ItemId, NoRecorder, QueryVolume, Recorder, Sink};
 use cullbench::verify::conformance::properties;
-use glam::Vec3;
 
 /// How the tree is broken.
 type Fault = u8;
@@ -99,64 +96,16 @@ impl Node {
     }
 }
 
-/// What the faults need from a kind of region beyond [`Region`].
-trait Breakable: Region {
-    const FRUSTUM: bool;
-    /// The test with touching taken for outside.
-    fn half_open(&self, b: &Aabb) -> bool;
-    /// A memo that wrongly calls one open plane decided.
-    fn loses_a_plane(memo: Self::Memo) -> Self::Memo;
-    fn planes(&self) -> usize;
-}
-
-/// A view, of a type of its own so that [`Breakable`] may tell it from a point.
-struct Seen<'a, V>(&'a V);
-
-impl<V: View> Region for Seen<'_, V> {
-    type Memo = PlaneMask;
-    fn start(&self) -> PlaneMask {
-        self.0.mask()
-    }
-    fn classify<R: Recorder>(
-        &self,
-        b: &Aabb,
-        memo: PlaneMask,
-        recorder: &mut R,
-    ) -> (Containment, PlaneMask) {
-        self.0.classify(b, memo, recorder)
-    }
-    fn admits<R: Recorder>(&self, b: &Aabb, memo: PlaneMask, recorder: &mut R) -> bool {
-        self.0.admits(b, memo, recorder)
-    }
-    fn admit_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, memo: PlaneMask) -> LaneMask {
-        self.0.admit_lanes(isa, block, memo)
-    }
-}
-
-impl<V: View> Breakable for Seen<'_, V> {
-    const FRUSTUM: bool = true;
-    fn half_open(&self, b: &Aabb) -> bool {
-        // What touches a plane is lost when it shrinks by one float.
-        let min = b.min.to_array().map(f32::next_up).into();
-        let shrunk = Aabb::new(min, b.max.to_array().map(f32::next_down).into());
-        self.admits(&shrunk, self.start(), &mut NoRecorder)
-    }
-    fn loses_a_plane(memo: PlaneMask) -> PlaneMask {
-        memo & memo.wrapping_sub(1)
-    }
-    fn planes(&self) -> usize {
-        self.start().count_ones() as usize
-    }
-}
-
-impl Breakable for Vec3 {
-    const FRUSTUM: bool = false;
-    fn half_open(&self, b: &Aabb) -> bool {
-        self.cmpge(b.min).all() && self.cmplt(b.max).all()
-    }
-    fn loses_a_plane(_: ()) {}
-    fn planes(&self) -> usize {
-        0
+/// The test of an item with touching taken for outside.
+fn half_open<Q: QueryVolume>(volume: &Q, b: &Aabb) -> bool {
+    match volume.as_point() {
+        Some(p) => p.cmpge(b.min).all() && p.cmplt(b.max).all(),
+        None => {
+            // What touches a plane is lost when it shrinks by one float.
+            let min = b.min.to_array().map(f32::next_up).into();
+            let shrunk = Aabb::new(min, b.max.to_array().map(f32::next_down).into());
+            volume.admits(&shrunk, volume.mask(), &mut NoRecorder)
+        }
     }
 }
 
@@ -174,44 +123,16 @@ impl<S: Sink> Sink for Deaf<'_, S> {
 }
 
 impl<const FAULT: Fault> Toy<FAULT> {
-    fn query<G: Breakable, S: Sink, R: Recorder>(
-        &self,
-        region: &G,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        let Some(root) = &self.root else {
-            return ControlFlow::Continue(());
-        };
-        if FAULT == ONLY_SIX_PLANES && region.planes() > 6 {
-            return sink.accept(&self.ids);
-        }
-        if FAULT == IGNORES_BREAK {
-            let mut deaf = Deaf { sink, broke: false };
-            let _ = self.walk(root, region, region.start(), &mut deaf, recorder);
-            return if deaf.broke {
-                ControlFlow::Break(())
-            } else {
-                ControlFlow::Continue(())
-            };
-        }
-        let flow = self.walk(root, region, region.start(), sink, recorder);
-        if FAULT == FORGETS_TO_PASS_BREAK_ON {
-            return ControlFlow::Continue(());
-        }
-        flow
-    }
-
-    fn walk<G: Breakable, S: Sink, R: Recorder>(
+    fn walk<Q: QueryVolume, S: Sink, R: Recorder>(
         &self,
         node: &Node,
-        region: &G,
-        memo: G::Memo,
+        volume: &Q,
+        mask: PlaneMask,
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()> {
         recorder.node_tested();
-        let (verdict, mut memo) = region.classify(&node.bounds, memo, recorder);
+        let (verdict, mut mask) = volume.classify(&node.bounds, mask, recorder);
         if verdict == Containment::Outside {
             recorder.subtree_rejected();
             return ControlFlow::Continue(());
@@ -220,13 +141,13 @@ impl<const FAULT: Fault> Toy<FAULT> {
             recorder.subtree_accepted(node.items.len());
             return self.hand_over(node.items.clone(), sink);
         }
-        if FAULT == MASK_LOSES_AN_OPEN_PLANE && node.items.len() < 64 {
-            memo = G::loses_a_plane(memo);
+        if FAULT == MASK_LOSES_AN_OPEN_PLANE && !Q::IS_POINT && node.items.len() < 64 {
+            mask &= mask.wrapping_sub(1);
         }
         for child in &node.children {
-            self.walk(child, region, memo, sink, recorder)?;
+            self.walk(child, volume, mask, sink, recorder)?;
             if FAULT == MASK_OF_ONE_CHILD_FOR_THE_OTHER {
-                memo = region.classify(&child.bounds, memo, &mut NoRecorder).1;
+                mask = volume.classify(&child.bounds, mask, &mut NoRecorder).1;
             }
         }
         if node.children.is_empty() {
@@ -240,15 +161,15 @@ impl<const FAULT: Fault> Toy<FAULT> {
                 }
                 let b = &self.boxes[place];
                 let admitted = match FAULT {
-                    TOUCHING_IS_OUTSIDE if G::FRUSTUM => region.half_open(b),
-                    TOUCHING_A_POINT_IS_OUTSIDE if !G::FRUSTUM => region.half_open(b),
+                    TOUCHING_IS_OUTSIDE if !Q::IS_POINT => half_open(volume, b),
+                    TOUCHING_A_POINT_IS_OUTSIDE if Q::IS_POINT => half_open(volume, b),
                     // The same for boxes, but not for spheres.
                     ITEMS_ARE_TESTED_LIKE_NODES => {
-                        region.classify(b, memo, recorder).0 != Containment::Outside
+                        volume.classify(b, mask, recorder).0 != Containment::Outside
                     }
                     // A recorder that records has a size.
                     COUNTED_QUERY_DIFFERS if size_of::<R>() > 0 => true,
-                    _ => region.admits(b, memo, recorder),
+                    _ => volume.admits(b, mask, recorder),
                 };
                 if admitted {
                     self.hand_over(place..place + 1, sink)?;
@@ -272,7 +193,8 @@ impl<const FAULT: Fault> RegionIndex for Toy<FAULT> {
     const INFO: Info = declared(FAULT);
     type Params = ();
 
-    fn build(items: &[Aabb], _: Option<&PlaneTree>, _: &()) -> Result<Self, BuildError> {
+    fn build(input: &Input<'_>, _: &()) -> Result<Self, BuildError> {
+        let items = input.items;
         let mut ids = match (FAULT, indexable(items)) {
             (TAKES_BAD_ITEMS, Err(_)) => vec![],
             (NAMES_THE_NEXT_ITEM, Err(BuildError::NonFiniteItem { item, bounds })) => {
@@ -291,7 +213,8 @@ impl<const FAULT: Fault> RegionIndex for Toy<FAULT> {
             ids.reverse();
         }
         let boxes: Vec<Aabb> = ids.iter().map(|&id| items[id as usize]).collect();
-        let root = (!ids.is_empty()).then(|| {
+        let is_cut = FAULT == THREADS_CHANGE_IT && input.threads() > 1;
+        let root = (!ids.is_empty() && !is_cut).then(|| {
             let mut root = Node::over(&boxes, 0..boxes.len());
             if root.bounds.is_empty() {
                 root.bounds = boxes[0];
@@ -301,30 +224,32 @@ impl<const FAULT: Fault> RegionIndex for Toy<FAULT> {
         Ok(Toy { ids, boxes, root })
     }
 
-    fn build_by(
-        pool: &Pool,
-        items: &[Aabb],
-        _: Option<&PlaneTree>,
-        _: &(),
-    ) -> Result<Self, BuildError> {
-        let mut toy = Self::build(items, None, &())?;
-        if FAULT == THREADS_CHANGE_IT && pool.threads() > 1 {
-            toy.root = None;
-        }
-        Ok(toy)
-    }
-
     fn memory(&self) -> MemoryUsage {
         MemoryUsage::default()
     }
 
-    fn locate<S: Sink, R: Recorder>(
-        &self,
-        p: Vec3,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        self.query(&p, sink, recorder)
+    fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
+        let Some(root) = &self.root else {
+            return ControlFlow::Continue(());
+        };
+        let (sink, recorder) = cx.parts();
+        if FAULT == ONLY_SIX_PLANES && Q::planes_open(volume.mask()) > 6 {
+            return sink.accept(&self.ids);
+        }
+        if FAULT == IGNORES_BREAK {
+            let mut deaf = Deaf { sink, broke: false };
+            let _ = self.walk(root, volume, volume.mask(), &mut deaf, recorder);
+            return if deaf.broke {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            };
+        }
+        let flow = self.walk(root, volume, volume.mask(), sink, recorder);
+        if FAULT == FORGETS_TO_PASS_BREAK_ON {
+            return ControlFlow::Continue(());
+        }
+        flow
     }
 
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
@@ -351,17 +276,6 @@ impl<const FAULT: Fault> RegionIndex for Toy<FAULT> {
             root.fit(&self.boxes);
         }
         true
-    }
-}
-
-impl<const FAULT: Fault> FrustumQuery for Toy<FAULT> {
-    fn visible<V: View, S: Sink, R: Recorder>(
-        &self,
-        view: &V,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        self.query(&Seen(view), sink, recorder)
     }
 
     fn tree_order(&self) -> Option<&[ItemId]> {

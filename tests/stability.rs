@@ -10,7 +10,7 @@
 use cullbench::camera::{PLANE_METHODS, PlaneOptions};
 use cullbench::culling::{ARITHMETICS, Arithmetic, CameraView, Culling, CullingTest, TESTS};
 use cullbench::geometry::{Aabb, PlaneTree, WidePlane};
-use cullbench::index::{DynIndex, Execution, Registry};
+use cullbench::index::{DynIndex, Execution, Input, Registry};
 use cullbench::kernel::Kernel;
 use cullbench::measure::Workload;
 use cullbench::path::{self, LensDefaults};
@@ -351,7 +351,9 @@ fn over(items: &[Aabb], own_tree: Option<&PlaneTree>) -> Vec<Named> {
         specs.map(move |spec| {
             let spec = spec.by(Execution { kernel, threads: 1 });
             let what = format!("{}, {kernel}", spec.label);
-            let built = spec.build_with(items, own_tree).expect(&what);
+            let built = spec
+                .build(Input::new(items).own_tree(own_tree))
+                .expect(&what);
             (what, built)
         })
     });
@@ -473,7 +475,7 @@ fn digests(scene: &Scene, structures: &Structures, path: &str, found: &mut usize
         for view in &workload.views {
             asked.view(view);
             let ids = agreed(structures.of(culling.test), &what, |index, out| {
-                index.see(view.as_any(), out);
+                index.query(view.as_any(), out);
             });
             *found += ids.len();
             answered.take(&ids);
@@ -484,7 +486,7 @@ fn digests(scene: &Scene, structures: &Structures, path: &str, found: &mut usize
             let faces: Vec<WidePlane> = view.planes().iter().map(WidePlane::from).collect();
             let points = points_on_faces(camera, scene.origin, &faces);
             let ids = agreed(&over(&points, None), &what, |index, out| {
-                index.see(view.into(), out);
+                index.query(view.into(), out);
             });
             *found += ids.len();
             answered.take(&ids);

@@ -12,17 +12,13 @@ use std::process::{Command, ExitCode, Output, Stdio};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-use cullbench::geometry::{Aabb, PlaneTree};
-use cullbench::index::{
-    BuildError, FrustumQuery, Info, Kind, MemoryUsage, Origin, RegionIndex, Registry,
-};
-use cullbench::query::{ItemId, Recorder, Region, Sink, View};
+use cullbench::geometry::Aabb;
+use cullbench::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, Registry};
+use cullbench::query::{Context, ItemId, QueryVolume, Recorder};
 use serde_json::{Value, json};
 
 /// Set for the processes that are the program.
 const CHILD: &str = "CULLBENCH_TEST_STATUSES_CHILD";
-
-type Flow = ControlFlow<()>;
 
 /// What a structure does where it should build or answer.
 trait Mishap: Send + Sync + 'static {
@@ -37,19 +33,6 @@ struct Broken<M> {
     mishap: std::marker::PhantomData<M>,
 }
 
-impl<M: Mishap> Broken<M> {
-    fn query<G: Region>(&self, region: &G, sink: &mut impl Sink, r: &mut impl Recorder) -> Flow {
-        let start = region.start();
-        r.items_tested(self.boxes.len() as u32);
-        for (id, item) in (0..).zip(&self.boxes) {
-            if !item.is_empty() && region.admits(item, start, r) {
-                sink.accept(&[id as ItemId])?;
-            }
-        }
-        Flow::Continue(())
-    }
-}
-
 impl<M: Mishap> RegionIndex for Broken<M> {
     const INFO: Info = Info::new(
         M::NAME,
@@ -59,7 +42,8 @@ impl<M: Mishap> RegionIndex for Broken<M> {
     );
     type Params = ();
 
-    fn build(items: &[Aabb], _: Option<&PlaneTree>, (): &()) -> Result<Self, BuildError> {
+    fn build(input: &Input<'_>, (): &()) -> Result<Self, BuildError> {
+        let items = input.items;
         // Parameters are tried on no items.
         if !items.is_empty() {
             M::at_build();
@@ -75,15 +59,17 @@ impl<M: Mishap> RegionIndex for Broken<M> {
             item_bytes: size_of_val(&self.boxes[..]),
         }
     }
-    fn locate<S: Sink, R: Recorder>(&self, p: glam::Vec3, sink: &mut S, r: &mut R) -> Flow {
-        self.query(&p, sink, r)
-    }
-}
-
-impl<M: Mishap> FrustumQuery for Broken<M> {
-    fn visible<V: View, S: Sink, R: Recorder>(&self, v: &V, sink: &mut S, r: &mut R) -> Flow {
-        M::at_query();
-        self.query(v, sink, r)
+    fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
+        if !Q::IS_POINT {
+            M::at_query();
+        }
+        cx.recorder().items_tested(self.boxes.len() as u32);
+        for (id, item) in (0..).zip(&self.boxes) {
+            if !item.is_empty() && volume.admits(item, volume.mask(), cx.recorder()) {
+                cx.accept(&[id as ItemId])?;
+            }
+        }
+        ControlFlow::Continue(())
     }
 }
 

@@ -9,7 +9,7 @@ use cullbench::index::{
     BuildError, DynIndex, Info, Kind, MemoryUsage, Origin, Row as Structure, StructureSpec,
     indexable,
 };
-use cullbench::query::{AnyView, ItemId, QueryCost};
+use cullbench::query::{AnyVolume, ItemId, QueryCost};
 use cullbench::stress::extremes::{CAMERA_FAMILIES, Case, Findings, PLANES_FAMILIES, camera_case};
 use cullbench::stress::{Replay, Row, Status, built_in, replay};
 use glam::Vec3;
@@ -30,11 +30,11 @@ impl DynIndex for Scan {
         MemoryUsage::default()
     }
 
-    fn see(&self, view: AnyView<'_>, out: &mut Vec<ItemId>) {
+    fn query(&self, view: AnyVolume<'_>, out: &mut Vec<ItemId>) {
         let kept = self.ids.iter().filter(|&&id| {
             let b = &self.items[id as usize];
             match view {
-                AnyView::Volume(volume) => {
+                AnyVolume::Planes(volume) => {
                     let mut planes = volume.planes().iter().enumerate();
                     !planes.any(|(i, plane)| (self.drops)(i, plane, b))
                 }
@@ -44,17 +44,8 @@ impl DynIndex for Scan {
         out.extend(kept);
     }
 
-    fn see_counted(&self, view: AnyView<'_>, out: &mut Vec<ItemId>, _: &mut QueryCost) {
-        self.see(view, out);
-    }
-
-    fn locate(&self, p: Vec3, out: &mut Vec<ItemId>) {
-        let holding = |id: &&ItemId| self.items[**id as usize].contains_point(p);
-        out.extend(self.ids.iter().filter(holding));
-    }
-
-    fn locate_counted(&self, p: Vec3, out: &mut Vec<ItemId>, _: &mut QueryCost) {
-        self.locate(p, out);
+    fn query_counted(&self, view: AnyVolume<'_>, out: &mut Vec<ItemId>, _: &mut QueryCost) {
+        self.query(view, out);
     }
 
     fn refit(&mut self, _: &[Aabb], _: &[ItemId]) -> bool {
@@ -114,7 +105,7 @@ macro_rules! scan {
     ($drops:ident) => {
         Structure {
             info: info(stringify!($drops)),
-            build: |_, items, _, _| scan(items, $drops),
+            build: |_, input, _| scan(input.items, $drops),
             params: |params| Ok(params.clone()),
         }
     };
@@ -134,12 +125,12 @@ const BROKEN: [(Structure, &str, &str); 5] = [
 const PANICKING: [Structure; 2] = [
     Structure {
         info: info("panics-while-building"),
-        build: |_, _, _, _| panic!("deep in a crate"),
+        build: |_, _, _| panic!("deep in a crate"),
         params: |params| Ok(params.clone()),
     },
     Structure {
         info: info("panics-while-asked"),
-        build: |_, items, _, _| scan(items, |_, _, _| panic!("deep in a crate")),
+        build: |_, input, _| scan(input.items, |_, _, _| panic!("deep in a crate")),
         params: |params| Ok(params.clone()),
     },
 ];

@@ -2,7 +2,7 @@
 //! same order, on every edge scene.
 
 use cullbench::geometry::{Aabb, ConvexVolume};
-use cullbench::index::{BlockOrder, TreeOrder, Wide, WideParams};
+use cullbench::index::{BlockOrder, FrustumQuery, Wide, WideParams};
 use cullbench::scene;
 use cullbench::verify::{RandomCase, edge_scenes, edge_volumes};
 use glam::Vec3;
@@ -55,14 +55,13 @@ fn a_tree_that_several_threads_have_built_is_the_tree_of_one() {
     for (name, items, volumes) in cases() {
         for order in [BlockOrder::Median, BlockOrder::Morton] {
             let one = built(1, &items, order);
-            let all = TreeOrder::visible_ranges;
             for threads in THREADS {
                 let tree = built(threads, &items, order);
                 assert!(tree.same_as(&one), "{name}, {order:?}, {threads} threads");
                 let (mut here, mut there) = (Vec::new(), Vec::new());
                 for volume in &volumes {
-                    all(&one, volume, &mut here);
-                    all(&tree, volume, &mut there);
+                    one.visible_ranges(volume, &mut here);
+                    tree.visible_ranges(volume, &mut there);
                 }
                 assert_eq!(here, there, "{name}, {order:?}, {threads} threads");
             }

@@ -187,7 +187,7 @@ fn answers(
         let what = format!("{id}, {name}");
         let (mut plain, mut counted) = (Vec::new(), Vec::new());
         structure.visible(volume, &mut plain);
-        structure.visible_counted(volume, &mut counted, &mut QueryCost::default());
+        structure.query_counted(volume.into(), &mut counted, &mut QueryCost::default());
         assert_eq!(plain, counted, "{what}: counting changed the answer");
         let found = named(names, &plain, &what);
         all.push((what, found));
@@ -381,7 +381,7 @@ fn points_are_located_in_the_closed_boxes() {
                 let what = format!("{}, point {}, {name}", vector.id(), point["id"]);
                 let (mut plain, mut counted) = (Vec::new(), Vec::new());
                 structure.locate(p, &mut plain);
-                structure.locate_counted(p, &mut counted, &mut QueryCost::default());
+                structure.query_counted(p.into(), &mut counted, &mut QueryCost::default());
                 assert_eq!(plain, counted, "{what}: counting changed the answer");
                 check_equal(&what, &named(&names, &plain, &what), &wanted);
                 located += 1;

@@ -13,13 +13,13 @@ use std::process::ExitCode;
 
 use cullbench::culling::{Culling, CullingTest};
 use cullbench::index::{
-    Info, Kind, Origin, RegionIndex, Registry, StructureSpec, TreeOrder, Wide, caught,
+    FrustumQuery, Info, Input, Kind, Origin, RegionIndex, Registry, StructureSpec, Wide, caught,
 };
 use cullbench::measure::{
     BOUNDS, Cell, Group, Machine, Metric, Protocol, Status, Stopwatch, Subject, Workload,
     cameras_within, measure_group,
 };
-use cullbench::query::AnyView;
+use cullbench::query::AnyVolume;
 use cullbench::scene::Scene;
 use cullbench::statistics::median;
 use cullbench::{path, scene};
@@ -151,7 +151,7 @@ fn heat(entered: Vec<Subject>, workload: &Workload) -> (Vec<Subject>, Vec<Subjec
             let watch = Stopwatch::start();
             for view in workload.views.iter().step_by(step) {
                 ids.clear();
-                built.items.see(view.as_any(), &mut ids);
+                built.items.query(view.as_any(), &mut ids);
             }
             watch.lap().cpu_ns
         };
@@ -277,13 +277,14 @@ fn judge_build(judge: &mut Judge, world: &World, subject: &Subject, items: usize
 
 /// Median time of `wide` answering in ranges, where everything is visible.
 fn judge_ranges(judge: &mut Judge, workload: &Workload) {
-    let tree = Wide::build(&workload.items, None, &Default::default()).expect("finite boxes");
+    let tree =
+        Wide::build(&Input::new(&workload.items), &Default::default()).expect("finite boxes");
     let mut ranges = Vec::new();
     let mut laps = Vec::new();
     for _ in 0..64 {
         let watch = Stopwatch::start();
         for view in &workload.views {
-            if let AnyView::Volume(volume) = view.as_any() {
+            if let AnyVolume::Planes(volume) = view.as_any() {
                 ranges.clear();
                 tree.visible_ranges(std::hint::black_box(volume), &mut ranges);
                 std::hint::black_box(&ranges);

@@ -6,7 +6,7 @@ use crate::camera::PlaneOptions;
 use crate::culling::{CameraView, Culling, CullingTest};
 use crate::geometry::ConvexVolume;
 use crate::index::{BuildError, DynIndex, StructureSpec};
-use crate::measure::{Ask, Workload, WorkloadError};
+use crate::measure::{Ask, Workload, WorkloadError, input_of};
 use crate::path::CameraPath;
 use crate::scene::Scene;
 use crate::verify::Truth;
@@ -36,7 +36,7 @@ impl<'a> Case<'a> {
     ) -> Result<Case<'a>, BuildError> {
         let scene = workload.scene;
         Ok(Case {
-            index: spec.build_with(&scene.items, scene.own_tree.as_ref())?,
+            index: spec.build(input_of(scene, &scene.items))?,
             workload,
             path,
             spec,
@@ -79,7 +79,7 @@ impl<'a> Case<'a> {
     pub fn tree_for(&self, test: CullingTest) -> Result<Box<dyn DynIndex>, BuildError> {
         let scene = self.scene();
         let items = test.items(&scene.items);
-        self.spec.build_with(&items, scene.own_tree.as_ref())
+        self.spec.build(input_of(scene, &items))
     }
 
     /// The depth of a camera's view, or of the scene where that is infinite.
@@ -110,5 +110,5 @@ impl<'a> Case<'a> {
 
 /// An index of one's own, asked with views of one's own.
 pub(super) fn asked<'c>(index: Box<dyn DynIndex>, views: Vec<CameraView>) -> Ask<'c> {
-    Box::new(move |n, out| index.see(views[n].as_any(), out))
+    Box::new(move |n, out| index.query(views[n].as_any(), out))
 }

@@ -6,6 +6,7 @@
 mod case;
 mod choice;
 mod omission;
+mod options;
 mod rules;
 mod trials;
 
@@ -13,12 +14,11 @@ use serde::{Deserialize, Serialize};
 
 pub use choice::{StructureChoice, StructureRow, TestChoice, TestRow};
 pub use omission::{Check, Decision, LeftOutIf, Omission};
+pub use options::{AdviseError, AdviseOptions};
 
 use crate::culling::Culling;
-use crate::index::{BuildError, StructureSpec};
-use crate::measure::{
-    OverProcesses, ProcessTimes, Protocol, Schedule, Workload, WorkloadError, timed,
-};
+use crate::index::StructureSpec;
+use crate::measure::{OverProcesses, ProcessTimes, Protocol, Schedule, Workload, timed};
 use crate::path::CameraPath;
 use crate::scene::Scene;
 use crate::statistics::Estimate;
@@ -28,31 +28,6 @@ use choice::EnteredTest;
 use omission::Draft;
 use rules::RULES;
 use trials::{Answered, BASE, Entered, Trials};
-
-/// What the advice depends on beside scene and path.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-pub struct AdviseOptions {
-    /// What drawing an item costs that cannot be seen, ns.
-    pub draw_ns: f64,
-    /// What planes may be off for rounding, in frustum depths, and a camera's
-    /// frame by drift, in radians.
-    pub tolerance: f64,
-    /// Share of the items that move between two updates.
-    pub moved: f64,
-    /// Queries between two updates.
-    pub queries_per_update: f64,
-}
-
-impl Default for AdviseOptions {
-    fn default() -> Self {
-        AdviseOptions {
-            draw_ns: 1000.0,
-            tolerance: 1e-5,
-            moved: 0.01,
-            queries_per_update: 1.0,
-        }
-    }
-}
 
 /// What to use and what to leave out, with the evidence.
 #[derive(Clone, Debug, Serialize)]
@@ -82,24 +57,6 @@ impl Advice {
         structures.into_iter().any(|row| row.is_failure)
             || omissions.into_iter().any(Check::is_wrong)
     }
-}
-
-/// Why there is no advice.
-#[derive(Debug, thiserror::Error)]
-pub enum AdviseError {
-    #[error("scene '{scene}' has no items; expected at least one")]
-    NoItems { scene: String },
-    #[error("path '{path}' has no cameras; expected at least one")]
-    NoCameras { path: String },
-    #[error(transparent)]
-    Workload(#[from] WorkloadError),
-    #[error(transparent)]
-    Build(#[from] BuildError),
-    #[error(
-        "{found} ways to answer; the plan has {planned}: the scene or the cameras have changed \
-         on the way"
-    )]
-    OtherPlan { found: usize, planned: usize },
 }
 
 /// What all processes time: the plan is the same for each.

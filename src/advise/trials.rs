@@ -62,7 +62,7 @@ impl<'c> Trials<'c> {
     pub fn add_base(&mut self) -> usize {
         let (index, views) = (self.case.index.as_ref(), &self.case.workload.views);
         self.add(
-            Box::new(move |n, out| index.see(views[n].as_any(), out)),
+            Box::new(move |n, out| index.query(views[n].as_any(), out)),
             true,
         )
     }

@@ -4,7 +4,7 @@
 
 use glam::{DQuat, DVec3};
 
-use super::frame::unit;
+use super::pose::unit;
 use super::{Camera, CameraError, Frame, Lens};
 
 /// Rotations between two corrections: a rotation drifts by about 2e-16, so

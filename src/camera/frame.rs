@@ -1,10 +1,9 @@
 //! The camera's orthonormal frame in f64 and the world-to-eye matrix. How the
 //! frame moves is in `controls`; what the lens sees is in `lens`.
 
-use glam::{DMat3, DMat4, DVec3};
+use glam::{DMat3, DVec3};
 
-use super::projection::double;
-use super::{CameraError, Pose};
+use super::{Camera, CameraError, Pose};
 
 /// Eye position and the unit vectors u (right), v (up) and n (backward: the
 /// camera looks along -n). Right-handed: `u x v = n`.
@@ -38,15 +37,29 @@ pub fn look_at(eye: DVec3, look: DVec3, up: DVec3) -> Result<Frame, CameraError>
     Pose::LookAt { eye, look, up }.frame()
 }
 
-/// The unit vector along `v`, whatever its length; `None` for zero.
-pub(super) fn unit(v: DVec3) -> Option<DVec3> {
-    let largest = v.abs().max_element();
-    if largest == 0.0 {
-        return None;
+impl Pose {
+    /// The numbers that the camera's frame was made of, as long as it has not
+    /// been turned or moved; afterwards the frame's own eye, direction and up.
+    pub fn of(camera: &Camera) -> Pose {
+        let frame = &camera.frame;
+        match frame.written {
+            Some(pose) if pose.eye() == frame.eye => pose,
+            _ => Pose::Forward {
+                eye: frame.eye,
+                forward: frame.forward(),
+                up: frame.v(),
+            },
+        }
     }
-    // Twice: 1/largest alone overflows for subnormal lengths.
-    let scaled = v / largest;
-    Some(scaled / scaled.length())
+
+    /// The frame of this pose.
+    ///
+    /// # Errors
+    /// As [`look_at`] and [`Frame::looking_along`].
+    pub fn frame(&self) -> Result<Frame, CameraError> {
+        let [u, n] = self.axes()?;
+        Ok(Frame::of_axes(*self, u, n))
+    }
 }
 
 impl Frame {
@@ -101,12 +114,6 @@ impl Frame {
     /// The direction of view, -n.
     pub fn forward(&self) -> DVec3 {
         -self.n
-    }
-
-    /// The world-to-eye matrix: rows u, v, n with `-e.u`, `-e.v`, `-e.n` in
-    /// the last column.
-    pub fn world_to_eye(&self) -> DMat4 {
-        double::view(self)
     }
 
     /// The same frame seen from another origin.

@@ -4,7 +4,7 @@
 
 use glam::DVec3;
 
-use super::{CameraError, Frame, ViewProjection, finite};
+use super::{Camera, CameraError, Frame, MatrixConvention, Pose, ViewProjection, finite};
 
 /// What the camera's lens takes in. Lengths are world units. Use the checked
 /// constructors; the planes of an unchecked lens may be nonsense.
@@ -221,6 +221,28 @@ fn check_window(name: &'static str, low: f64, high: f64) -> Result<(), CameraErr
     finite(name, high)?;
     let error = CameraError::Window { name, low, high };
     (low < high).then_some(()).ok_or(error)
+}
+
+impl Camera {
+    /// The camera that a matrix is. Its lens is the matrix; its frame only says
+    /// where the eye is and which way it looks, and turning or moving it changes
+    /// nothing that is visible.
+    ///
+    /// # Errors
+    /// As [`ViewProjection::new`].
+    pub fn of_matrix(
+        entries: [[f64; 4]; 4],
+        convention: MatrixConvention,
+    ) -> Result<Camera, CameraError> {
+        let matrix = ViewProjection::new(entries, convention)?;
+        let [_, up, _, forward] = matrix.rows.map(|[x, y, z, _]| DVec3::new(x, y, z));
+        let eye = matrix.eye;
+        let frame = Pose::Forward { eye, forward, up }.frame()?;
+        Ok(Camera {
+            frame,
+            lens: Lens::Matrix(matrix),
+        })
+    }
 }
 
 #[cfg(test)]

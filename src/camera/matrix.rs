@@ -4,7 +4,7 @@
 
 use glam::DVec3;
 
-use super::{Camera, CameraError, Lens, Pose};
+use super::CameraError;
 use crate::arithmetic::Expansion;
 use crate::geometry::{FrustumPlane, WidePlane};
 
@@ -41,13 +41,13 @@ type Four = [Expansion; 4];
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ViewProjection {
     /// For column vectors: clip = rows * (x, y, z, 1).
-    rows: [[f64; 4]; 4],
+    pub(super) rows: [[f64; 4]; 4],
     /// Depth from 0 to w instead of from -w.
     from_zero: bool,
     /// Whether depth is larger at the near plane.
     is_reversed: bool,
     /// Rounded.
-    eye: DVec3,
+    pub(super) eye: DVec3,
     /// Distances of the eye from the near and the far plane, rounded: a scale.
     near: f64,
     far: Option<f64>,
@@ -267,26 +267,4 @@ fn plane_about(face: &Four, zero: &[DVec3]) -> Option<WidePlane> {
     let normal = DVec3::new(x, y, z);
     let length = normal.length();
     Some(WidePlane::new(normal / length, d / length))
-}
-
-impl Camera {
-    /// The camera that a matrix is. Its lens is the matrix; its frame only says
-    /// where the eye is and which way it looks, and turning or moving it changes
-    /// nothing that is visible.
-    ///
-    /// # Errors
-    /// As [`ViewProjection::new`].
-    pub fn of_matrix(
-        entries: [[f64; 4]; 4],
-        convention: MatrixConvention,
-    ) -> Result<Camera, CameraError> {
-        let matrix = ViewProjection::new(entries, convention)?;
-        let [_, up, _, forward] = matrix.rows.map(|[x, y, z, _]| DVec3::new(x, y, z));
-        let eye = matrix.eye;
-        let frame = Pose::Forward { eye, forward, up }.frame()?;
-        Ok(Camera {
-            frame,
-            lens: Lens::Matrix(matrix),
-        })
-    }
 }

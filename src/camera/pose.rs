@@ -4,8 +4,7 @@
 
 use glam::DVec3;
 
-use super::frame::{Frame, unit};
-use super::{Camera, CameraError, finite};
+use super::{CameraError, finite};
 use crate::arithmetic::Expansion;
 
 /// Where a camera stands, as the numbers that say so: all are exact.
@@ -28,20 +27,6 @@ pub enum Pose {
 const PARALLEL: f64 = 4.0 * f64::EPSILON;
 
 impl Pose {
-    /// The numbers that the camera's frame was made of, as long as it has not
-    /// been turned or moved; afterwards the frame's own eye, direction and up.
-    pub fn of(camera: &Camera) -> Pose {
-        let frame = &camera.frame;
-        match frame.written {
-            Some(pose) if pose.eye() == frame.eye => pose,
-            _ => Pose::Forward {
-                eye: frame.eye,
-                forward: frame.forward(),
-                up: frame.v(),
-            },
-        }
-    }
-
     pub fn eye(&self) -> DVec3 {
         match *self {
             Pose::LookAt { eye, .. } | Pose::Forward { eye, .. } => eye,
@@ -67,13 +52,13 @@ impl Pose {
         })
     }
 
-    /// The frame of this pose, each axis true to some units of 2^-53 however
-    /// near up is to the direction of view, and look to the eye: nothing is
-    /// rounded before the cross product.
+    /// The axes u and n of this pose, true to some units of 2^-53 however near up
+    /// is to the direction of view, and look to the eye: nothing is rounded before
+    /// the cross product.
     ///
     /// # Errors
-    /// As [`look_at`](super::look_at) and [`Frame::looking_along`].
-    pub fn frame(&self) -> Result<Frame, CameraError> {
+    /// As [`look_at`](super::look_at).
+    pub(super) fn axes(&self) -> Result<[DVec3; 2], CameraError> {
         let (eye, towards, up) = match *self {
             Pose::LookAt { eye, look, up } => (eye, (["look x", "look y", "look z"], look), up),
             Pose::Forward { eye, forward, up } => {
@@ -100,8 +85,19 @@ impl Pose {
             return Err(CameraError::UpNearlyParallel { sine });
         }
         let n = -unit(forward).ok_or(CameraError::ForwardIsZero)?;
-        Ok(Frame::of_axes(*self, u, n))
+        Ok([u, n])
     }
+}
+
+/// The unit vector along `v`, whatever its length; `None` for zero.
+pub(super) fn unit(v: DVec3) -> Option<DVec3> {
+    let largest = v.abs().max_element();
+    if largest == 0.0 {
+        return None;
+    }
+    // Twice: 1/largest alone overflows for subnormal lengths.
+    let scaled = v / largest;
+    Some(scaled / scaled.length())
 }
 
 type Vector = [Expansion; 3];

@@ -169,6 +169,14 @@ precision!(
     |v| v.as_vec3()
 );
 
+impl Frame {
+    /// The world-to-eye matrix: rows u, v, n with `-e.u`, `-e.v`, `-e.n` in
+    /// the last column.
+    pub fn world_to_eye(&self) -> DMat4 {
+        double::view(self)
+    }
+}
+
 impl Lens {
     /// The projection matrix in f64.
     pub fn projection(&self, clip: ClipSpace) -> DMat4 {

@@ -10,7 +10,7 @@ use serde_json::{Map, Value};
 use super::shared_args::RowFormat;
 use crate::geometry::Aabb;
 use crate::index::{BuildError, DynIndex, StructureSpec};
-use crate::measure::{Answer, Verdict, guarded};
+use crate::measure::{Answer, Verdict, guarded, input_of};
 use crate::query::{ItemId, QueryCost};
 use crate::scene::Scene;
 use crate::threads::share;
@@ -39,7 +39,7 @@ pub fn ask_all(
     for spec in structures {
         let failed = |why: String| anyhow::anyhow!("structure '{}': {why}", spec.label);
         let panicked = |verdict: Verdict| failed(verdict.reason.unwrap_or_default());
-        let index = match spec.build_with(boxes, scene.own_tree.as_ref()) {
+        let index = match spec.build(input_of(scene, boxes)) {
             Ok(index) => index,
             // One of many: the others' answers are worth having.
             Err(error @ BuildError::Refused { .. }) if structures.len() > 1 => {
@@ -146,12 +146,12 @@ mod tests {
 
     const PANICS: index::Row = index::Row {
         info: LinearScalar::INFO.named("panics"),
-        build: |_, _, _, _| panic!("deep in a peer's code"),
+        build: |_, _, _| panic!("deep in a peer's code"),
         params: |_| Ok(Value::Null),
     };
     const REFUSES: index::Row = index::Row {
         info: LinearScalar::INFO.named("refuses"),
-        build: |_, _, _, _| {
+        build: |_, _, _| {
             Err(BuildError::Refused {
                 structure: "refuses",
                 reason: "too many alike".to_owned(),

@@ -54,7 +54,7 @@ fn by_points(scene: &Scene, structures: &[StructureSpec], file: &Path) -> anyhow
     let points: Vec<Sought> = points.map(|p| scene.sought(p)).collect();
     let boxes = scene.regions.boxes(&scene.items);
     let ask = |index: &dyn DynIndex, point: usize, out: &mut Vec<_>, cost: &mut _| {
-        index.locate_counted(points[point].local, out, cost);
+        index.query_counted(points[point].local.into(), out, cost);
         out.clear();
         index.locate(points[point].local, out);
         scene.refine(&points[point], out);
@@ -68,7 +68,7 @@ fn by_boxes(scene: &Scene, structures: &[StructureSpec], file: &Path) -> anyhow:
     let read = read_boxes_csv(input, &name, false)?;
     let boxes: Vec<SoughtBox> = read.written().map(|b| scene.sought_box(b)).collect();
     let ask = |index: &dyn DynIndex, n: usize, out: &mut Vec<_>, cost: &mut _| {
-        index.visible_counted(&boxes[n].volume, out, cost);
+        index.query_counted((&boxes[n].volume).into(), out, cost);
         out.clear();
         index.visible(&boxes[n].volume, out);
         scene.refine_overlapping(&boxes[n], out);

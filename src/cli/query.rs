@@ -17,9 +17,9 @@ pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
     let workload = Workload::new(&scene, &cameras, &culling)?;
     let ask = |index: &dyn crate::index::DynIndex, camera: usize, out: &mut _, cost: &mut _| {
         let view = workload.views[camera].as_any();
-        index.see_counted(view, out, cost);
+        index.query_counted(view, out, cost);
         out.clear();
-        index.see(view, out);
+        index.query(view, out);
     };
     let answers = ask_all(
         &structures,

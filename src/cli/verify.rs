@@ -412,7 +412,7 @@ fn differ(
     })?;
     let nowhere = Vec3::new(case.point.x, f32::NAN, case.point.z);
     let mut many = Located::default();
-    index.locate_many(&[case.point, nowhere, case.point], &mut many);
+    index.query_many(&[case.point, nowhere, case.point], &mut many);
     if !many.iter().eq([out, &[], out]) {
         let why = format!(
             "region search: a batch of points is answered otherwise than one by one: {many:?}"
@@ -486,7 +486,7 @@ mod tests {
 
     const PANICS: Row = Row {
         info: LinearScalar::INFO.named("panics"),
-        build: |_, _, _, _| panic!("deep in a peer's code"),
+        build: |_, _, _| panic!("deep in a peer's code"),
         params: |_| Ok(Value::Null),
     };
 

@@ -12,7 +12,7 @@ use crate::camera::{Camera, CameraError, PlaneMethod, PlaneOptions, Surroundings
 use crate::geometry::{
     Aabb, ConvexVolume, RelativeVolume, Spheres, WidePlane, WideVolume, sphere_cube,
 };
-use crate::query::AnyView;
+use crate::query::AnyVolume;
 
 pub use extended::{bounds, extended, silhouettes};
 
@@ -94,7 +94,7 @@ pub enum CameraView {
 }
 
 impl CameraView {
-    pub fn as_any(&self) -> AnyView<'_> {
+    pub fn as_any(&self) -> AnyVolume<'_> {
         match self {
             CameraView::Volume(view) => view.into(),
             CameraView::Spheres(view) => view.into(),

@@ -13,6 +13,7 @@ mod plane_rows;
 mod plane_tree;
 mod relative_volume;
 mod spheres;
+mod wide_plane;
 mod wide_volume;
 
 pub use aabb::Aabb;
@@ -25,4 +26,5 @@ pub use plane_rows::{PlaneRows, ROW_LANES};
 pub use plane_tree::{PlaneTree, PlaneTreeNode};
 pub use relative_volume::RelativeVolume;
 pub use spheres::{Ball, SphereMargin, Spheres, sphere_cube};
-pub use wide_volume::{WidePlane, WideVolume};
+pub use wide_plane::WidePlane;
+pub use wide_volume::WideVolume;

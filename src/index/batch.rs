@@ -7,9 +7,8 @@ use std::ops::{ControlFlow, Range};
 use glam::Vec3;
 
 use super::tree::PackedTree;
-use crate::kernel::BASELINE;
-use crate::kernel::prefetch;
-use crate::query::{ItemId, ManySink, NoRecorder};
+use crate::kernel::{Isa, prefetch};
+use crate::query::{ItemId, ManySink, NoRecorder, QueryContext};
 
 /// Points that go down together: enough to hide the waits, few enough for what
 /// they ask for to stay in the nearest caches.
@@ -61,9 +60,10 @@ pub fn answer<S: ManySink>(
 /// stay in the caches, and steps in turn only cost (docs/adr/0009).
 const WAITS_FROM: usize = 1 << 18;
 
-/// [`super::RegionIndex::locate_many`] by the nodes' bounds, for every tree.
+/// [`super::RegionIndex::query_many`] by the nodes' bounds, for every tree.
 #[inline(always)]
-pub fn locate_many<S: ManySink>(
+pub fn query_many<I: Isa, S: ManySink>(
+    isa: I,
     tree: &PackedTree,
     points: &[Vec3],
     sink: &mut S,
@@ -75,7 +75,7 @@ pub fn locate_many<S: ManySink>(
     for (p, point) in points.iter().zip(0..) {
         ids.clear();
         // A Vec never breaks off.
-        let _ = tree.query(BASELINE, p, &mut ids, &mut NoRecorder);
+        let _ = tree.query(p, &mut QueryContext::new(isa, &mut ids, &mut NoRecorder));
         sink.accept(point, &ids)?;
     }
     ControlFlow::Continue(())
@@ -130,6 +130,7 @@ mod tests {
     use super::*;
     use crate::geometry::Aabb;
     use crate::index::tree::TreeWriter;
+    use crate::kernel::BASELINE;
     use crate::query::Located;
 
     /// Overlapping boxes in three levels.
@@ -168,7 +169,7 @@ mod tests {
             points[70].y = f32::NAN;
             let (mut turns, mut alone) = (Located::default(), Located::default());
             assert!(in_turn(&tree, &points, &mut turns).is_continue());
-            assert!(locate_many(&tree, &points, &mut alone).is_continue());
+            assert!(query_many(BASELINE, &tree, &points, &mut alone).is_continue());
             assert_eq!(turns, alone);
             assert_eq!(turns.len(), points.len());
             assert_eq!(turns.ids().is_empty(), tree.ids().is_empty());

@@ -1,14 +1,15 @@
 //! One box at a time: the test that the uniform grid and the structures of other
 //! crates get, made once per query, and what they share beside it. Those that
-//! go by planes and memos have [`Region`].
+//! go by planes and masks have [`QueryVolume`].
 
 use std::cell::RefCell;
+use std::ops::ControlFlow;
 
 use glam::Vec3;
 
 use super::{BuildError, centres};
 use crate::geometry::{Aabb, PlaneRows};
-use crate::query::{ItemId, NoRecorder, Recorder, Region, View};
+use crate::query::{Context, ItemId, NoRecorder, QueryVolume, Recorder, Sink};
 
 /// A question, asked of one box at a time. Boxes are finite and not empty.
 pub trait BoxTest {
@@ -70,7 +71,7 @@ pub trait Planes {
     fn count(&self) -> u32;
 }
 
-impl<V: View> Planes for V {
+impl<V: QueryVolume> Planes for V {
     fn exclude(&self, node: &Aabb) -> bool {
         let mut mask = self.mask();
         while mask != 0 {
@@ -202,50 +203,33 @@ pub fn half_of_largest(items: &[Item]) -> Vec3 {
     halves.fold(Vec3::ZERO, Vec3::max)
 }
 
-/// [`crate::index::FrustumQuery`] of a structure with a method `search` (a
-/// [`BoxTest`], a sink, a recorder).
-macro_rules! seen_box_by_box {
-    ($structure:ty) => {
-        impl $crate::index::FrustumQuery for $structure {
-            #[inline(always)]
-            fn visible<
-                V: $crate::query::View,
-                S: $crate::query::Sink,
-                R: $crate::query::Recorder,
-            >(
-                &self,
-                view: &V,
-                sink: &mut S,
-                recorder: &mut R,
-            ) -> std::ops::ControlFlow<()> {
-                match view.rows() {
-                    Some(rows) => {
-                        self.search(&$crate::index::box_by_box::AtOnce(rows), sink, recorder)
-                    }
-                    None => self.search(
-                        &$crate::index::box_by_box::PlaneByPlane(view),
-                        sink,
-                        recorder,
-                    ),
-                }
-            }
-        }
-    };
+/// A structure that is searched one box at a time.
+pub trait BoxByBox {
+    /// Hands every item that the test admits to the sink.
+    fn search<T: BoxTest, S: Sink, R: Recorder>(
+        &self,
+        test: &T,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()>;
 }
-pub(super) use seen_box_by_box;
 
-/// Region search of such a structure.
-macro_rules! located_box_by_box {
-    () => {
-        #[inline(always)]
-        fn locate<S: $crate::query::Sink, R: $crate::query::Recorder>(
-            &self,
-            p: glam::Vec3,
-            sink: &mut S,
-            recorder: &mut R,
-        ) -> std::ops::ControlFlow<()> {
-            self.search(&$crate::index::box_by_box::Holding(p), sink, recorder)
-        }
-    };
+/// [`RegionIndex::query`](super::RegionIndex::query) of such a structure.
+#[inline(always)]
+pub fn query<X: BoxByBox, Q: QueryVolume, C: Context>(
+    index: &X,
+    volume: &Q,
+    cx: &mut C,
+) -> ControlFlow<()> {
+    let (sink, recorder) = cx.parts();
+    if Q::IS_POINT {
+        return match volume.as_point() {
+            Some(p) => index.search(&Holding(p), sink, recorder),
+            None => ControlFlow::Continue(()),
+        };
+    }
+    match volume.rows() {
+        Some(rows) => index.search(&AtOnce(rows), sink, recorder),
+        None => index.search(&PlaneByPlane(volume), sink, recorder),
+    }
 }
-pub(super) use located_box_by_box;

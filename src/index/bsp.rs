@@ -8,7 +8,6 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::batch;
-use super::by_tree::seen_by_tree;
 use super::partition::{Part, Record, Splitter, build_top_down};
 use super::plane_choice::{
     between_layers, by_own_planes, by_principal_axis, by_surface_area, divide,
@@ -17,10 +16,12 @@ use super::stack::Stack;
 use super::tiling::Tiling;
 use super::tree::PackedTree;
 use super::treelets::{DESCENT_LEAF, Treelets};
-use super::{BuildError, Info, Kind, MemoryUsage, Origin, RegionIndex, check_range, indexable};
+use super::{
+    BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, check_range, indexable,
+};
 use crate::geometry::{Aabb, Plane, PlaneTree};
-use crate::kernel::{BASELINE, Isa};
-use crate::query::{ItemId, ManySink, Recorder, Sink};
+use crate::kernel::Isa;
+use crate::query::{Context, ItemId, ManySink, Predicate, QueryVolume, Recorder};
 
 /// A binary space partition (Fuchs, Kedem and Naylor 1980, "On visible surface
 /// generation by a priori tree structures").
@@ -273,6 +274,48 @@ impl Bsp {
     pub(crate) fn into_tree(self) -> PackedTree {
         self.tree
     }
+
+    #[inline(always)]
+    fn descend<C: Context>(&self, p: Vec3, cx: &mut C) -> ControlFlow<()> {
+        let splits = match &self.planes {
+            Planes::Any(splits) => splits,
+            Planes::Axes { treelets, tiling } => {
+                return match tiling {
+                    Some(tiling) => tiling.locate(&self.tree, treelets, p, cx),
+                    None => treelets.locate(&self.tree, p, cx),
+                };
+            }
+        };
+        let nodes = self.tree.nodes();
+        let mut open = Stack::new((0, ()));
+        while let Some((at, ())) = open.pop() {
+            let mut at = at as usize;
+            // An empty tree has no node 0.
+            while let Some(node) = nodes.get(at) {
+                cx.recorder().node_tested();
+                if self.tree.is_leaf(at) {
+                    self.tree.test_items(node.items(), &p, p.mask(), cx)?;
+                    break;
+                }
+                let split = &splits[at];
+                let value = split.along().value_at(p);
+                let front = nodes[at + 1].after();
+                // Not `<=`: a NaN (coordinates beyond f32) enters both sides.
+                let beyond_back = value > split.back_high;
+                let before_front = value < split.front_low;
+                at = match (beyond_back, before_front) {
+                    (true, true) => break,
+                    (true, false) => front,
+                    (false, true) => at + 1,
+                    (false, false) => {
+                        open.push((front as u32, ()));
+                        at + 1
+                    }
+                };
+            }
+        }
+        ControlFlow::Continue(())
+    }
 }
 
 impl RegionIndex for Bsp {
@@ -286,11 +329,10 @@ impl RegionIndex for Bsp {
     .ranges();
     type Params = BspParams;
 
-    fn build(
-        items: &[Aabb],
-        own_tree: Option<&PlaneTree>,
-        params: &BspParams,
-    ) -> Result<Self, BuildError> {
+    fn build(input: &Input<'_>, params: &BspParams) -> Result<Self, BuildError> {
+        let Input {
+            items, own_tree, ..
+        } = *input;
         check_range(Self::INFO.name, "leaf", params.leaf.into(), 1.0, 4096.0)?;
         check_range(Self::INFO.name, "cut", params.cut.into(), 0.0, 1000.0)?;
         let (builder, imported) = params.chosen(own_tree)?;
@@ -333,83 +375,31 @@ impl RegionIndex for Bsp {
         memory
     }
 
-    /// Descends by planes: one dot product a node, O(log n) on a tiling.
+    /// Region search goes down by planes: one dot product per node, O(log n) on
+    /// a tiling.
     #[inline(always)]
-    fn locate<S: Sink, R: Recorder>(
-        &self,
-        p: Vec3,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        self.locate_by(BASELINE, p, sink, recorder)
-    }
-
-    #[inline(always)]
-    fn locate_by<I: Isa, S: Sink, R: Recorder>(
-        &self,
-        isa: I,
-        p: Vec3,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        let splits = match &self.planes {
-            Planes::Any(splits) => splits,
-            Planes::Axes { treelets, tiling } => {
-                return match tiling {
-                    Some(tiling) => tiling.locate(isa, &self.tree, treelets, p, sink, recorder),
-                    None => treelets.locate(&self.tree, p, sink, recorder),
-                };
-            }
-        };
-        let nodes = self.tree.nodes();
-        let mut open = Stack::new((0, ()));
-        while let Some((at, ())) = open.pop() {
-            let mut at = at as usize;
-            // An empty tree has no node 0.
-            while let Some(node) = nodes.get(at) {
-                recorder.node_tested();
-                if self.tree.is_leaf(at) {
-                    self.tree
-                        .test_items(BASELINE, node.items(), &p, (), sink, recorder)?;
-                    break;
-                }
-                let split = &splits[at];
-                let value = split.along().value_at(p);
-                let front = nodes[at + 1].after();
-                // Not `<=`: a NaN (coordinates beyond f32) enters both sides.
-                let beyond_back = value > split.back_high;
-                let before_front = value < split.front_low;
-                at = match (beyond_back, before_front) {
-                    (true, true) => break,
-                    (true, false) => front,
-                    (false, true) => at + 1,
-                    (false, false) => {
-                        open.push((front as u32, ()));
-                        at + 1
-                    }
-                };
-            }
+    fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
+        if Q::IS_POINT {
+            return match volume.as_point() {
+                Some(p) => self.descend(p, cx),
+                None => ControlFlow::Continue(()),
+            };
         }
-        ControlFlow::Continue(())
+        self.tree.query(volume, cx)
     }
 
     #[inline(always)]
-    fn locate_many<S: ManySink>(&self, points: &[Vec3], sink: &mut S) -> ControlFlow<()> {
-        self.locate_many_by(BASELINE, points, sink)
-    }
-
-    #[inline(always)]
-    fn locate_many_by<I: Isa, S: ManySink>(
+    fn query_many<I: Isa, S: ManySink>(
         &self,
         isa: I,
         points: &[Vec3],
         sink: &mut S,
     ) -> ControlFlow<()> {
         match &self.planes {
-            Planes::Any(_) => batch::locate_many(&self.tree, points, sink),
+            Planes::Any(_) => batch::query_many(isa, &self.tree, points, sink),
             Planes::Axes { treelets, tiling } => match tiling {
-                Some(tiling) => tiling.locate_many(isa, &self.tree, treelets, points, sink),
-                None => treelets.locate_many(&self.tree, points, sink),
+                Some(tiling) => tiling.query_many(isa, &self.tree, treelets, points, sink),
+                None => treelets.query_many(&self.tree, points, sink),
             },
         }
     }
@@ -425,6 +415,8 @@ impl RegionIndex for Bsp {
         }
         refitted
     }
-}
 
-seen_by_tree!(Bsp);
+    fn tree_order(&self) -> Option<&[ItemId]> {
+        Some(self.tree.ids())
+    }
+}

@@ -6,10 +6,10 @@ use std::cell::Cell;
 use std::ops::{ControlFlow, Range};
 
 use super::frontier::{AHEAD, Frontier, Merger, first_ahead, hand_over, is_far};
-use super::tree::{PackedTree, TreeNode};
+use super::node::TreeNode;
 use crate::geometry::{Aabb, BoxBlock, LANES, LaneMask, PlaneMask};
 use crate::kernel::{Isa, prefetch};
-use crate::query::{Recorder, Sink, View};
+use crate::query::{Context, ItemId, QueryVolume, Recorder};
 
 /// Where the lanes of a bundle lead.
 #[derive(Clone, Copy)]
@@ -43,21 +43,13 @@ const NOWHERE: u32 = u32::MAX;
 /// What happens at a leaf that is not decided. A trait and no closure: what is
 /// hot must be inlined for each instruction set.
 pub trait Leaves {
-    /// The tree that the bundles are of.
-    fn tree(&self) -> &PackedTree;
-
-    /// Asks for the memory of items that are tested soon.
+    /// Asks for the memory of some items ahead of their test.
     fn fetch(&self, items: Range<usize>, mask: PlaneMask);
 
-    /// Hands over those of the items that the planes of the mask admit.
-    fn test<I: Isa, S: Sink, R: Recorder>(
-        &self,
-        isa: I,
-        items: Range<usize>,
-        mask: PlaneMask,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()>;
+    /// Tests some items against the planes of the mask and hands over those that
+    /// are kept.
+    fn test<C: Context>(&self, items: Range<usize>, mask: PlaneMask, cx: &mut C)
+    -> ControlFlow<()>;
 }
 
 /// The memory of a traversal, kept between queries.
@@ -221,16 +213,15 @@ impl Bundles {
     ///
     /// The tree's root straddles the planes of `mask`.
     #[inline(always)]
-    pub fn search<I: Isa, V: View, L: Leaves, S: Sink, R: Recorder>(
+    pub fn search<Q: QueryVolume, L: Leaves, C: Context>(
         &self,
-        isa: I,
-        view: &V,
+        (nodes, ids): (&[TreeNode], &[ItemId]),
+        volume: &Q,
         mask: PlaneMask,
         test: &L,
-        sink: &mut S,
-        recorder: &mut R,
+        cx: &mut C,
     ) -> ControlFlow<()> {
-        let (nodes, ids) = (test.tree().nodes(), test.tree().ids());
+        let isa = cx.isa();
         let far = is_far(ids.len());
         let mut scratch = SCRATCH.take().unwrap_or_default();
         let Scratch {
@@ -268,11 +259,13 @@ impl Bundles {
                     self.fetch(places, i + AHEAD);
                 }
                 let links = &self.links[at as usize];
-                recorder.nodes_tested(links.lanes.count_ones());
-                recorder.planes_tested(links.lanes.count_ones() * mask.count_ones());
-                let (kept, open) = view.sorted_lanes(isa, &self.blocks[at as usize], mask);
+                let lanes = links.lanes.count_ones();
+                cx.recorder().nodes_tested(lanes);
+                cx.recorder().planes_tested(lanes * Q::planes_open(mask));
+                let (kept, open) = volume.sorted_lanes(isa, &self.blocks[at as usize], mask);
                 let kept = kept & links.lanes;
-                recorder.subtrees_rejected((links.lanes & !kept).count_ones());
+                cx.recorder()
+                    .subtrees_rejected((links.lanes & !kept).count_ones());
                 let inside = isa.zeros(open) & kept;
                 let undecided = kept & !inside;
                 let words = isa.words(&links.below);
@@ -284,14 +277,14 @@ impl Bundles {
                     left &= left - 1;
                     let places = links.first[lane] as usize..links.end[lane] as usize;
                     if let Some(ended) = run.join(places) {
-                        flow = hand_over(isa, ended, ids, sink, recorder);
+                        flow = hand_over(ended, ids, cx);
                         if flow.is_break() {
                             break 'walk;
                         }
                     }
                 }
             }
-            flow = hand_over(isa, run.take(), ids, sink, recorder);
+            flow = hand_over(run.take(), ids, cx);
             if flow.is_break() {
                 break;
             }
@@ -303,15 +296,15 @@ impl Bundles {
                 fetch_leaf(nodes, places, i);
             }
             for i in first_ahead(far).take(AHEAD / 2) {
-                fetch_items(test, places, masks, i);
+                fetch_items(nodes, test, places, masks, i);
             }
             for (i, (&leaf, &mask)) in places.iter().zip(masks).enumerate() {
                 if far {
-                    fetch_items(test, places, masks, i + AHEAD / 2);
+                    fetch_items(nodes, test, places, masks, i + AHEAD / 2);
                     fetch_leaf(nodes, places, i + AHEAD);
                 }
                 let items = nodes[leaf as usize].items();
-                flow = test.test(isa, items, mask, sink, recorder);
+                flow = test.test(items, mask, cx);
                 if flow.is_break() {
                     break;
                 }
@@ -332,9 +325,15 @@ fn fetch_leaf(nodes: &[TreeNode], places: &[u32], i: usize) {
 
 /// Asks for the items of a leaf, whose node has arrived by now.
 #[inline(always)]
-fn fetch_items<L: Leaves>(test: &L, places: &[u32], masks: &[PlaneMask], i: usize) {
+fn fetch_items<L: Leaves>(
+    nodes: &[TreeNode],
+    test: &L,
+    places: &[u32],
+    masks: &[PlaneMask],
+    i: usize,
+) {
     if let (Some(&leaf), Some(&mask)) = (places.get(i), masks.get(i)) {
-        test.fetch(test.tree().nodes()[leaf as usize].items(), mask);
+        test.fetch(nodes[leaf as usize].items(), mask);
     }
 }
 

@@ -10,10 +10,10 @@ use obvhs::bvh2::builder::build_bvh2;
 use obvhs::{Boundable, BvhBuildParams};
 use serde::{Deserialize, Serialize};
 
-use super::by_tree::{searched_by_tree, seen_by_tree};
+use super::by_tree::answered_by_tree;
 use super::tree::{PackedTree, TreeWriter};
-use super::{BuildError, Info, Kind, Origin, RegionIndex, check_range, indexable};
-use crate::geometry::{Aabb, PlaneTree};
+use super::{BuildError, Info, Input, Kind, Origin, RegionIndex, check_range, indexable};
+use crate::geometry::Aabb;
 use crate::query::ItemId;
 
 /// A BVH built bottom-up (PLOC: Meister and Bittner 2018, "Parallel locally
@@ -207,11 +207,8 @@ impl RegionIndex for Bvh {
     .ranges();
     type Params = BvhParams;
 
-    fn build(
-        items: &[Aabb],
-        _: Option<&PlaneTree>,
-        params: &BvhParams,
-    ) -> Result<Self, BuildError> {
+    fn build(input: &Input<'_>, params: &BvhParams) -> Result<Self, BuildError> {
+        let items = input.items;
         check_range(Self::INFO.name, "leaf", params.leaf.into(), 1.0, 255.0)?;
         let config = BvhBuildParams {
             max_prims_per_leaf: params.leaf,
@@ -232,7 +229,5 @@ impl RegionIndex for Bvh {
         })
     }
 
-    searched_by_tree!();
+    answered_by_tree!();
 }
-
-seen_by_tree!(Bvh);

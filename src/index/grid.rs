@@ -8,12 +8,10 @@ use std::ops::{ControlFlow, Range};
 use glam::{UVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::box_by_box::{
-    BoxTest, Item, Tally, half_of_largest, indexable, located_box_by_box, seen_box_by_box,
-};
-use super::{BuildError, Info, Kind, MemoryUsage, Origin, RegionIndex};
-use crate::geometry::{Aabb, PlaneTree};
-use crate::query::{ItemId, Recorder, Sink};
+use super::box_by_box::{self, BoxByBox, BoxTest, Item, Tally, half_of_largest, indexable};
+use super::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
+use crate::geometry::Aabb;
+use crate::query::{Context, ItemId, QueryVolume, Recorder, Sink};
 
 /// Items of a cell, on average.
 const ITEMS_A_CELL: f64 = 8.0;
@@ -98,38 +96,6 @@ impl UniformGrid {
     }
 
     #[inline(always)]
-    fn search<T: BoxTest, S: Sink, R: Recorder>(
-        &self,
-        test: &T,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        let tally = Tally::new(recorder);
-        tally.node(test);
-        if self.ids.is_empty() || test.rejects(&self.scene) {
-            return ControlFlow::Continue(());
-        }
-        let asked = test.centres(self.half, &self.scene);
-        if asked.is_empty() {
-            return ControlFlow::Continue(());
-        }
-        let range = |axis: usize| {
-            let first = self.cell_on(axis, asked.min[axis]) as usize;
-            first..self.cell_on(axis, asked.max[axis]) as usize + 1
-        };
-        let (xs, ys, zs) = (range(0), range(1), range(2));
-        for z in zs {
-            for y in ys.clone() {
-                let row = self.row(y, z).start;
-                for cell in row + xs.start..row + xs.end {
-                    self.cell(cell, test, sink, &tally)?;
-                }
-            }
-        }
-        ControlFlow::Continue(())
-    }
-
-    #[inline(always)]
     fn cell<T: BoxTest, S: Sink, R: Recorder>(
         &self,
         cell: usize,
@@ -161,6 +127,40 @@ impl UniformGrid {
     }
 }
 
+impl BoxByBox for UniformGrid {
+    #[inline(always)]
+    fn search<T: BoxTest, S: Sink, R: Recorder>(
+        &self,
+        test: &T,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        let tally = Tally::new(recorder);
+        tally.node(test);
+        if self.ids.is_empty() || test.rejects(&self.scene) {
+            return ControlFlow::Continue(());
+        }
+        let asked = test.centres(self.half, &self.scene);
+        if asked.is_empty() {
+            return ControlFlow::Continue(());
+        }
+        let range = |axis: usize| {
+            let first = self.cell_on(axis, asked.min[axis]) as usize;
+            first..self.cell_on(axis, asked.max[axis]) as usize + 1
+        };
+        let (xs, ys, zs) = (range(0), range(1), range(2));
+        for z in zs {
+            for y in ys.clone() {
+                let row = self.row(y, z).start;
+                for cell in row + xs.start..row + xs.end {
+                    self.cell(cell, test, sink, &tally)?;
+                }
+            }
+        }
+        ControlFlow::Continue(())
+    }
+}
+
 impl RegionIndex for UniformGrid {
     const INFO: Info = Info::new(
         "uniform-grid",
@@ -170,8 +170,8 @@ impl RegionIndex for UniformGrid {
     );
     type Params = GridParams;
 
-    fn build(items: &[Aabb], _: Option<&PlaneTree>, _: &GridParams) -> Result<Self, BuildError> {
-        let items: Vec<Item> = indexable(items)?;
+    fn build(input: &Input<'_>, _: &GridParams) -> Result<Self, BuildError> {
+        let items: Vec<Item> = indexable(input.items)?;
         let points = items.iter().map(|item| item.bounds.centre());
         let centres = points.fold(Aabb::EMPTY, |all, c| all.union(&Aabb::new(c, c)));
         let counts = match items.is_empty() {
@@ -216,7 +216,8 @@ impl RegionIndex for UniformGrid {
         }
     }
 
-    located_box_by_box!();
+    #[inline(always)]
+    fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
+        box_by_box::query(self, volume, cx)
+    }
 }
-
-seen_box_by_box!(UniformGrid);

@@ -63,7 +63,7 @@ pub struct Capabilities {
     /// [`RegionIndex::refit`](super::RegionIndex::refit) takes over items that
     /// have moved; without, it always declines.
     pub refits: bool,
-    /// [`FrustumQuery::tree_order`](super::FrustumQuery::tree_order): answers
+    /// [`RegionIndex::tree_order`](super::RegionIndex::tree_order): answers
     /// may be ranges of the structure's own order.
     pub ranges: bool,
     /// A build makes use of several threads.

@@ -4,16 +4,14 @@
 
 use std::ops::ControlFlow;
 
-use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::by_tree::visible_on_baseline;
 use super::id_rows::IdRows;
 use super::tree::scan_blocks;
-use super::{BuildError, FrustumQuery, Info, Kind, MemoryUsage, Origin, RegionIndex, indexable};
-use crate::geometry::{Aabb, BoxBlock, BoxBlocks, LANES, LaneMask, PlaneMask, PlaneTree, lanes_of};
-use crate::kernel::{BASELINE, Isa};
-use crate::query::{AsEver, ItemId, Planes, Recorder, Region, Sink, Tests, View};
+use super::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, indexable};
+use crate::geometry::{Aabb, BoxBlock, BoxBlocks, LANES, LaneMask, lanes_of};
+use crate::kernel::Isa;
+use crate::query::{AsEver, Context, ItemId, Planes, QueryVolume, Recorder, Sink, Tests};
 
 /// A scan has nothing to choose.
 #[derive(Clone, Copy, Default, Debug, Serialize, Deserialize)]
@@ -27,25 +25,6 @@ pub struct LinearScalar {
     ids: Vec<ItemId>,
 }
 
-impl LinearScalar {
-    #[inline(always)]
-    fn scan<G: Region, S: Sink, R: Recorder>(
-        &self,
-        region: &G,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        let memo = region.start();
-        for (b, id) in self.boxes.iter().zip(&self.ids) {
-            recorder.items_tested(1);
-            if region.admits(b, memo, recorder) {
-                sink.accept(std::slice::from_ref(id))?;
-            }
-        }
-        ControlFlow::Continue(())
-    }
-}
-
 impl RegionIndex for LinearScalar {
     const INFO: Info = Info::new(
         "linear-scalar",
@@ -55,7 +34,8 @@ impl RegionIndex for LinearScalar {
     );
     type Params = LinearParams;
 
-    fn build(items: &[Aabb], _: Option<&PlaneTree>, _: &LinearParams) -> Result<Self, BuildError> {
+    fn build(input: &Input<'_>, _: &LinearParams) -> Result<Self, BuildError> {
+        let items = input.items;
         let ids = indexable(items)?;
         let boxes = ids.iter().map(|&id| items[id as usize]).collect();
         Ok(LinearScalar { boxes, ids })
@@ -69,25 +49,15 @@ impl RegionIndex for LinearScalar {
     }
 
     #[inline(always)]
-    fn locate<S: Sink, R: Recorder>(
-        &self,
-        p: Vec3,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        self.scan(&p, sink, recorder)
-    }
-}
-
-impl FrustumQuery for LinearScalar {
-    #[inline(always)]
-    fn visible<V: View, S: Sink, R: Recorder>(
-        &self,
-        view: &V,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        self.scan(view, sink, recorder)
+    fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
+        let mask = volume.mask();
+        for (b, id) in self.boxes.iter().zip(&self.ids) {
+            cx.recorder().items_tested(1);
+            if volume.admits(b, mask, cx.recorder()) {
+                cx.accept(std::slice::from_ref(id))?;
+            }
+        }
+        ControlFlow::Continue(())
     }
 }
 
@@ -99,16 +69,16 @@ pub struct Linear {
 }
 
 impl Linear {
-    /// All planes of a mask, made ready, against every block.
+    /// All planes, made ready, against every block; they count as so many.
     #[inline(always)]
-    fn scan_all<I: Isa, P: Planes<I>, S: Sink, R: Recorder>(
+    fn scan_all<P: Planes<C::Isa>, C: Context>(
         &self,
-        isa: I,
-        mask: PlaneMask,
+        open: u32,
         planes: P,
-        sink: &mut S,
-        recorder: &mut R,
+        cx: &mut C,
     ) -> ControlFlow<()> {
+        let isa = cx.isa();
+        let (sink, recorder) = cx.parts();
         let blocks = self.boxes.blocks().chunks(TOGETHER);
         let mut items = self.ids.len();
         for (blocks, ids) in blocks.zip(self.ids.rows().chunks(TOGETHER)) {
@@ -116,7 +86,7 @@ impl Linear {
                 blocks,
                 planes,
                 items,
-                open: mask.count_ones(),
+                open,
                 recorder: &mut *recorder,
                 four: [0; 4],
             };
@@ -136,7 +106,8 @@ impl RegionIndex for Linear {
     );
     type Params = LinearParams;
 
-    fn build(items: &[Aabb], _: Option<&PlaneTree>, _: &LinearParams) -> Result<Self, BuildError> {
+    fn build(input: &Input<'_>, _: &LinearParams) -> Result<Self, BuildError> {
+        let items = input.items;
         let ids = indexable(items)?;
         let mut boxes = BoxBlocks::with_capacity(ids.len());
         ids.iter().for_each(|&id| boxes.push(&items[id as usize]));
@@ -152,34 +123,18 @@ impl RegionIndex for Linear {
     }
 
     #[inline(always)]
-    fn locate<S: Sink, R: Recorder>(
-        &self,
-        p: Vec3,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        let blocks = self.boxes.range(0, self.ids.len());
-        scan_blocks(BASELINE, blocks, &self.ids, &p, (), sink, recorder)
-    }
-}
-
-impl FrustumQuery for Linear {
-    visible_on_baseline!();
-
-    #[inline(always)]
-    fn visible_by<I: Isa, V: View, S: Sink, R: Recorder>(
-        &self,
-        isa: I,
-        view: &V,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        if I::MANY_REGISTERS
-            && let Some(planes) = view.all_planes(isa)
-        {
-            return self.scan_all(isa, view.mask(), planes, sink, recorder);
+    fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
+        if Q::IS_POINT {
+            let blocks = self.boxes.range(0, self.ids.len());
+            return scan_blocks(blocks, &self.ids, volume, volume.mask(), cx);
         }
-        self.scan_all(isa, view.mask(), AsEver::all(view), sink, recorder)
+        let open = Q::planes_open(volume.mask());
+        if C::Isa::MANY_REGISTERS
+            && let Some(planes) = volume.all_planes(cx.isa())
+        {
+            return self.scan_all(open, planes, cx);
+        }
+        self.scan_all(open, AsEver::all(volume), cx)
     }
 }
 
@@ -238,6 +193,7 @@ mod tests {
     use crate::geometry::{ConvexVolume, Plane};
     use crate::index::DynIndex;
     use crate::query::QueryCost;
+    use glam::Vec3;
 
     #[test]
     fn lanes_behind_the_last_item_are_dropped_however_many_blocks_there_are() {
@@ -255,10 +211,10 @@ mod tests {
         ] {
             let low = (0..count).map(|i| Vec3::X * (i % 100) as f32);
             let items: Vec<Aabb> = low.map(|low| Aabb::new(low, low + Vec3::ONE)).collect();
-            let scan = Linear::build(&items, None, &LinearParams::default()).unwrap();
+            let scan = Linear::build(&Input::new(&items), &LinearParams::default()).unwrap();
             for volume in &volumes {
                 let (mut found, mut cost) = (Vec::new(), QueryCost::default());
-                DynIndex::see_counted(&scan, volume.into(), &mut found, &mut cost);
+                DynIndex::query_counted(&scan, volume.into(), &mut found, &mut cost);
                 let seen = items.iter().zip(0..).filter(|(b, _)| volume.sees(b));
                 let seen: Vec<ItemId> = seen.map(|(_, id)| id).collect();
                 assert!(found == seen, "{count}: {} of {}", found.len(), seen.len());

@@ -2,12 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::by_tree::{searched_by_tree, seen_by_tree};
+use super::by_tree::answered_by_tree;
 use super::cells::{Cell, CellSplitter};
 use super::partition::build_top_down;
 use super::tree::PackedTree;
-use super::{BuildError, Info, Kind, Origin, RegionIndex, check_range, indexable};
-use crate::geometry::{Aabb, PlaneTree};
+use super::{BuildError, Info, Input, Kind, Origin, RegionIndex, check_range, indexable};
+use crate::geometry::Aabb;
 use crate::query::ItemId;
 
 /// An octree with fitted nodes (Meagher 1982, "Geometric modeling using octree
@@ -88,17 +88,12 @@ impl RegionIndex for Octree {
     .ranges();
     type Params = CellParams;
 
-    fn build(
-        items: &[Aabb],
-        _: Option<&PlaneTree>,
-        params: &CellParams,
-    ) -> Result<Self, BuildError> {
+    fn build(input: &Input<'_>, params: &CellParams) -> Result<Self, BuildError> {
+        let items = input.items;
         let ids = indexable(items)?;
         let tree = params.build(Self::INFO.name, items, &ids, &[0, 1, 2], None)?;
         Ok(Octree { tree })
     }
 
-    searched_by_tree!();
+    answered_by_tree!();
 }
-
-seen_by_tree!(Octree);

@@ -4,13 +4,33 @@
 
 use std::ops::{ControlFlow, Range};
 
-use super::TreeOrder;
 use super::by_plane::ByPlane;
 use super::frontier::{AHEAD, Frontier, Merger, NodeList, first_ahead, hand_over};
-use super::wide::{Level, Wide};
+use super::id_rows::IdRows;
 use crate::geometry::{ALL_ROWS, BoxBlock, LANES, LaneMask, PlaneMask};
 use crate::kernel::{Isa, prefetch};
-use crate::query::{ItemId, Planes, Recorder, Sink, Tests, View, runs};
+use crate::query::{ItemId, Planes, QueryContext, QueryVolume, Recorder, Sink, Tests, runs};
+
+/// Where a level lies among the blocks.
+#[derive(Clone, Copy, Debug)]
+pub struct Level {
+    pub first: usize,
+    pub blocks: usize,
+    /// Boxes in these blocks; only the last block has lanes without one.
+    pub boxes: usize,
+}
+
+impl Level {
+    /// The lanes of a block that hold a box.
+    #[inline(always)]
+    pub fn lanes(&self, block: usize) -> LaneMask {
+        if block + 1 < self.blocks {
+            LaneMask::MAX
+        } else {
+            LaneMask::MAX >> (self.blocks * LANES - self.boxes)
+        }
+    }
+}
 
 /// One level as a traversal meets it.
 pub struct Layer<'t> {
@@ -55,14 +75,14 @@ impl Layer<'_> {
 /// A query on its way through the tree, block by block: what is done with a
 /// block, in whatever order they come.
 pub struct Pass<'a, I, V, S, R> {
-    pub tree: &'a Wide,
+    pub ids: &'a IdRows,
     pub isa: I,
-    pub view: &'a V,
+    pub volume: &'a V,
     pub sink: &'a mut S,
     pub recorder: &'a mut R,
 }
 
-impl<I: Isa, V: View, S: Sink, R: Recorder> Pass<'_, I, V, S, R> {
+impl<I: Isa, V: QueryVolume, S: Sink, R: Recorder> Pass<'_, I, V, S, R> {
     /// [`Pass::sort_block`] for all blocks of a frontier.
     #[inline(always)]
     pub fn sort_level(
@@ -111,14 +131,13 @@ impl<I: Isa, V: View, S: Sink, R: Recorder> Pass<'_, I, V, S, R> {
         let tests = Whole {
             leaves,
             places: whole.entries(),
-            ids: self.tree.id_rows(),
+            ids: self.ids.rows(),
             recorder: &mut *self.recorder,
         };
         for i in first_ahead(leaves.far) {
             tests.fetch(i);
         }
-        self.sink
-            .accept_tested(self.isa, self.tree.id_rows(), tests)
+        self.sink.accept_tested(self.isa, self.ids.rows(), tests)
     }
 
     /// Hands over the items of all leaves of a frontier that no open plane
@@ -137,33 +156,31 @@ impl<I: Isa, V: View, S: Sink, R: Recorder> Pass<'_, I, V, S, R> {
             for (plane, places) in by_plane.lists() {
                 let tests = OfOnePlane {
                     leaves,
-                    view: self.view,
-                    plane: self.view.one_plane(self.isa, plane),
+                    view: self.volume,
+                    plane: self.volume.one_plane(self.isa, plane),
                     mask: 1 << plane,
                     places,
-                    ids: self.tree.id_rows(),
+                    ids: self.ids.rows(),
                     recorder: &mut *self.recorder,
                 };
                 for i in first_ahead(leaves.far) {
                     tests.fetch(i);
                 }
-                self.sink
-                    .accept_tested(self.isa, self.tree.id_rows(), tests)?;
+                self.sink.accept_tested(self.isa, self.ids.rows(), tests)?;
             }
             rest = &by_plane.rest;
         }
         let tests = OfAnyPlanes {
             leaves,
-            view: self.view,
+            view: self.volume,
             entries: rest.entries(),
             recorder: &mut *self.recorder,
-            ids: self.tree.id_rows(),
+            ids: self.ids.rows(),
         };
         for i in first_ahead(leaves.far) {
             tests.fetch(i);
         }
-        self.sink
-            .accept_tested(self.isa, self.tree.id_rows(), tests)
+        self.sink.accept_tested(self.isa, self.ids.rows(), tests)
     }
 
     /// Sorts the lanes of a block: what is undecided goes to the frontier
@@ -177,7 +194,7 @@ impl<I: Isa, V: View, S: Sink, R: Recorder> Pass<'_, I, V, S, R> {
         run: &mut Merger,
     ) -> ControlFlow<()> {
         let inside = self.sort_lanes(layer, entry, below);
-        for places in layer.places_of(entry.0 as usize, inside, self.tree.ids().len()) {
+        for places in layer.places_of(entry.0 as usize, inside, self.ids.len()) {
             if let Some(ended) = run.join(places) {
                 self.hand_over(ended)?;
             }
@@ -198,10 +215,10 @@ impl<I: Isa, V: View, S: Sink, R: Recorder> Pass<'_, I, V, S, R> {
         let lanes = layer.place.lanes(at);
         self.recorder.nodes_tested(lanes.count_ones());
         self.recorder
-            .planes_tested(lanes.count_ones() * mask.count_ones());
+            .planes_tested(lanes.count_ones() * V::planes_open(mask));
         self.recorder
             .block_read(layer.place.first + at, || ALL_ROWS);
-        let (kept, open) = self.view.sorted_lanes(self.isa, &layer.blocks[at], mask);
+        let (kept, open) = self.volume.sorted_lanes(self.isa, &layer.blocks[at], mask);
         let kept = kept & lanes;
         self.recorder
             .subtrees_rejected((lanes & !kept).count_ones());
@@ -215,8 +232,8 @@ impl<I: Isa, V: View, S: Sink, R: Recorder> Pass<'_, I, V, S, R> {
     /// Hands over a run of items that are wholly inside.
     #[inline(always)]
     pub fn hand_over(&mut self, places: Range<usize>) -> ControlFlow<()> {
-        let ids = self.tree.ids();
-        hand_over(self.isa, places, ids, self.sink, self.recorder)
+        let mut cx = QueryContext::new(self.isa, self.sink, self.recorder);
+        hand_over(places, self.ids, &mut cx)
     }
 }
 
@@ -225,7 +242,7 @@ const WORTH_PARTING: usize = 48;
 
 /// What is counted where a leaf is tested.
 #[inline(always)]
-fn record<V: View, R: Recorder>(
+fn record<V: QueryVolume, R: Recorder>(
     recorder: &mut R,
     view: &V,
     leaves: &Layer,
@@ -233,7 +250,7 @@ fn record<V: View, R: Recorder>(
 ) {
     let items = leaves.place.lanes(at).count_ones();
     recorder.items_tested(items);
-    recorder.planes_tested(items * mask.count_ones());
+    recorder.planes_tested(items * V::planes_open(mask));
     recorder.block_read(leaves.place.first + at, || view.rows_read(mask));
 }
 
@@ -294,7 +311,7 @@ struct OfOnePlane<'a, 't, V, P, R> {
     recorder: &'a mut R,
 }
 
-impl<V: View, P, R: Recorder> OfOnePlane<'_, '_, V, P, R> {
+impl<V: QueryVolume, P, R: Recorder> OfOnePlane<'_, '_, V, P, R> {
     /// Asks for the memory of a leaf of the list ahead of its turn.
     #[inline(always)]
     fn fetch<I: Isa>(&self, i: usize)
@@ -310,7 +327,7 @@ impl<V: View, P, R: Recorder> OfOnePlane<'_, '_, V, P, R> {
     }
 }
 
-impl<I: Isa, V: View, P: Planes<I>, R: Recorder> Tests<I> for OfOnePlane<'_, '_, V, P, R> {
+impl<I: Isa, V: QueryVolume, P: Planes<I>, R: Recorder> Tests<I> for OfOnePlane<'_, '_, V, P, R> {
     const SPARSE: bool = false;
 
     #[inline(always)]
@@ -339,7 +356,7 @@ struct OfAnyPlanes<'a, 't, V, R> {
     recorder: &'a mut R,
 }
 
-impl<V: View, R: Recorder> OfAnyPlanes<'_, '_, V, R> {
+impl<V: QueryVolume, R: Recorder> OfAnyPlanes<'_, '_, V, R> {
     /// Asks for the memory of a leaf of the list ahead of its turn.
     #[inline(always)]
     fn fetch(&self, i: usize) {
@@ -353,7 +370,7 @@ impl<V: View, R: Recorder> OfAnyPlanes<'_, '_, V, R> {
     }
 }
 
-impl<I: Isa, V: View, R: Recorder> Tests<I> for OfAnyPlanes<'_, '_, V, R> {
+impl<I: Isa, V: QueryVolume, R: Recorder> Tests<I> for OfAnyPlanes<'_, '_, V, R> {
     const SPARSE: bool = false;
 
     #[inline(always)]

@@ -2,11 +2,11 @@
 //! cities and maps, which are flat; where a scene is not, the cells' items are
 //! stacked along the third axis.
 
-use super::by_tree::{searched_by_tree, seen_by_tree};
+use super::by_tree::answered_by_tree;
 use super::octree::CellParams;
 use super::tree::PackedTree;
-use super::{BuildError, Info, Kind, Origin, RegionIndex, indexable};
-use crate::geometry::{Aabb, PlaneTree};
+use super::{BuildError, Info, Input, Kind, Origin, RegionIndex, indexable};
+use crate::geometry::Aabb;
 
 /// A quadtree (Finkel and Bentley 1974) with fitted three-dimensional node
 /// bounds, so that the height still culls. Cells that are much higher than wide
@@ -39,11 +39,8 @@ impl RegionIndex for Quadtree {
     .ranges();
     type Params = CellParams;
 
-    fn build(
-        items: &[Aabb],
-        _: Option<&PlaneTree>,
-        params: &CellParams,
-    ) -> Result<Self, BuildError> {
+    fn build(input: &Input<'_>, params: &CellParams) -> Result<Self, BuildError> {
+        let items = input.items;
         let ids = indexable(items)?;
         let axes = widest_axes(&Aabb::union_of(items));
         let height = 3 - axes[0] - axes[1];
@@ -51,10 +48,8 @@ impl RegionIndex for Quadtree {
         Ok(Quadtree { tree })
     }
 
-    searched_by_tree!();
+    answered_by_tree!();
 }
-
-seen_by_tree!(Quadtree);
 
 #[cfg(test)]
 mod tests {
@@ -82,7 +77,7 @@ mod tests {
     }
 
     fn built(items: &[Aabb]) -> PackedTree {
-        let quadtree = Quadtree::build(items, None, &CellParams::default());
+        let quadtree = Quadtree::build(&Input::new(items), &CellParams::default());
         quadtree.expect("boxes on a grid").tree
     }
 

@@ -7,11 +7,11 @@ use serde_json::{Map, Value};
 #[cfg(feature = "peers")]
 use super::peers;
 use super::{
-    Bsp, BspTextbook, BuildError, Bvh, BvhTextbook, By, DynIndex, Execution, FrustumQuery, Info,
-    Linear, LinearScalar, Octree, OctreeTextbook, Quadtree, QuadtreeTextbook, RegionIndex,
-    UniformGrid, Wide, caught,
+    Bsp, BspTextbook, BuildError, Bvh, BvhTextbook, By, DynIndex, Execution, Info, Input, Linear,
+    LinearScalar, Octree, OctreeTextbook, Quadtree, QuadtreeTextbook, RegionIndex, UniformGrid,
+    Wide, caught,
 };
-use crate::geometry::{Aabb, PlaneTree};
+use crate::geometry::PlaneTree;
 use crate::query::ItemId;
 use crate::spec::{Spec, SpecError};
 use crate::threads::Pool;
@@ -20,8 +20,7 @@ use crate::threads::Pool;
 const ALL: &str = "all";
 const DEFAULT: &str = "default";
 
-type Build =
-    fn(Execution, &[Aabb], Option<&PlaneTree>, &Value) -> Result<Box<dyn DynIndex>, BuildError>;
+type Build = fn(Execution, &Input<'_>, &Value) -> Result<Box<dyn DynIndex>, BuildError>;
 
 /// A row of a registry: a structure without its type.
 #[derive(Clone, Copy, Debug)]
@@ -36,7 +35,7 @@ pub struct Row {
 
 impl Row {
     /// The row of a structure, from what it declares.
-    pub const fn of<T: FrustumQuery + 'static>() -> Row {
+    pub const fn of<T: RegionIndex + 'static>() -> Row {
         fn typed<T: RegionIndex>(params: &Value) -> Result<T::Params, BuildError> {
             // Nothing given is no object for parameters that are `()`.
             let nothing = params.as_object().is_some_and(Map::is_empty);
@@ -61,9 +60,10 @@ impl Row {
         }
         Row {
             info: T::INFO,
-            build: |execution, items, own_tree, params| {
-                let (pool, kernel) = (Pool::new(execution.threads), execution.kernel);
-                let index = T::build_by(&pool, items, own_tree, &typed::<T>(params)?)?;
+            build: |execution, input, params| {
+                let pool = Pool::new(execution.threads);
+                let index = T::build(&input.pool(&pool), &typed::<T>(params)?)?;
+                let kernel = execution.kernel;
                 Ok(Box::new(By { index, kernel }))
             },
             params: |params| {
@@ -149,7 +149,7 @@ impl Registry {
     /// # Panics
     /// If there is one of that name already, or the name cannot be typed: that
     /// is a mistake of the program, and the message names it.
-    pub fn with<T: FrustumQuery + 'static>(self) -> Registry {
+    pub fn with<T: RegionIndex + 'static>(self) -> Registry {
         self.with_row(Row::of::<T>())
     }
 
@@ -215,9 +215,9 @@ impl Registry {
             .collect();
         let params = (row.params)(&Value::Object(given)).map_err(SpecError::new)?;
         // Ranges are the build's to check: let it see no items.
-        let execution = Execution::default();
-        (row.build)(execution, &[], Some(&PlaneTree::default()), &params)
-            .map_err(SpecError::new)?;
+        let (execution, no_planes) = (Execution::default(), PlaneTree::default());
+        let nothing = Input::new(&[]).own_tree(Some(&no_planes));
+        (row.build)(execution, &nothing, &params).map_err(SpecError::new)?;
         Ok(StructureSpec {
             label: text.to_owned(),
             row,
@@ -297,22 +297,13 @@ impl StructureSpec {
         &self.row.info
     }
 
-    /// Builds over boxes that bring no partition of their own.
+    /// Builds the structure, with the threads of [`StructureSpec::execution`].
     ///
     /// # Errors
-    /// As [`StructureSpec::build_with`].
-    pub fn build(&self, items: &[Aabb]) -> Result<Box<dyn DynIndex>, BuildError> {
-        self.build_with(items, None)
-    }
-
-    /// # Errors
     /// As [`RegionIndex::build`]; a panic of the structure's code.
-    pub fn build_with(
-        &self,
-        items: &[Aabb],
-        own_tree: Option<&PlaneTree>,
-    ) -> Result<Box<dyn DynIndex>, BuildError> {
-        let build = || (self.row.build)(self.execution, items, own_tree, &self.params);
+    pub fn build<'a>(&self, input: impl Into<Input<'a>>) -> Result<Box<dyn DynIndex>, BuildError> {
+        let input = input.into();
+        let build = || (self.row.build)(self.execution, &input, &self.params);
         caught(build).unwrap_or_else(|message| Err(BuildError::Panicked { message }))
     }
 
@@ -324,10 +315,10 @@ impl StructureSpec {
     pub fn update(
         &self,
         index: &mut Box<dyn DynIndex>,
-        items: &[Aabb],
-        own_tree: Option<&PlaneTree>,
+        input: Input<'_>,
         moved: &[ItemId],
     ) -> Result<bool, BuildError> {
+        let items = input.items;
         if let Some(&id) = moved.iter().find(|&&id| !items[id as usize].is_finite()) {
             let item = id as usize;
             return Err(BuildError::NonFiniteItem {
@@ -338,7 +329,7 @@ impl StructureSpec {
         if index.refit(items, moved) {
             return Ok(true);
         }
-        *index = self.build_with(items, own_tree)?;
+        *index = self.build(input)?;
         Ok(false)
     }
 }
@@ -346,6 +337,7 @@ impl StructureSpec {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Aabb;
     use glam::Vec3;
 
     #[test]

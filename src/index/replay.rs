@@ -4,12 +4,12 @@
 
 use std::ops::{ControlFlow, Range};
 
+use super::RegionIndex;
 use super::frontier::AHEAD;
 use super::wide::Wide;
-use super::{FrustumQuery, TreeOrder};
 use crate::geometry::{BoxBlock, LANES, LaneMask, ROWS, RowMask};
-use crate::kernel::{Isa, Kernel, Work, prefetch};
-use crate::query::{ItemId, Recorder, Sink, Tests, View};
+use crate::kernel::{BASELINE, Isa, Kernel, Work, prefetch};
+use crate::query::{ItemId, QueryContext, QueryVolume, Recorder, Sink, Tests};
 
 /// A block with those of its rows that were read; if they are fewer than six,
 /// some come twice.
@@ -70,14 +70,18 @@ impl Sink for Hands<'_> {
 
 impl Trace {
     /// Records one query.
-    pub fn of<V: View>(tree: &Wide, view: &V) -> Trace {
+    pub fn of<Q: QueryVolume>(tree: &Wide, volume: &Q) -> Trace {
         let mut trace = Trace::default();
         let mut hands = Hands {
             runs: &mut trace.runs,
             leaves: &mut trace.leaves,
         };
+        let mut reads = Reads(&mut trace.reads);
         // This sink never breaks off.
-        let _ = tree.visible(view, &mut hands, &mut Reads(&mut trace.reads));
+        let _ = tree.query(
+            volume,
+            &mut QueryContext::new(BASELINE, &mut hands, &mut reads),
+        );
         let leaves = tree.id_rows().len();
         let tested = trace.reads.iter().filter(|read| (read.0 as usize) < leaves);
         trace.whole = trace.leaves.len() - tested.count();
@@ -89,7 +93,7 @@ impl Trace {
         Kernel::best().run(Again {
             trace: self,
             blocks: tree.blocks(),
-            ids: tree.ids(),
+            ids: tree.id_rows().as_flattened(),
             id_rows: tree.id_rows(),
             out,
         });

@@ -13,7 +13,7 @@ use super::treelets::{
 };
 use crate::geometry::Aabb;
 use crate::kernel::{Isa, Piece, prefetch};
-use crate::query::{ManySink, NoRecorder, Recorder, Sink};
+use crate::query::{Context, ManySink, NoRecorder, QueryContext, Recorder};
 
 /// Four levels of planes and what is below them, lanes as in a treelet: two
 /// cache lines.
@@ -183,16 +183,15 @@ impl Tiling {
 
     /// Hands every item whose closed box holds `p` to the sink, in tree order.
     #[inline(always)]
-    pub fn locate<I: Isa, S: Sink, R: Recorder>(
+    pub fn locate<C: Context>(
         &self,
-        isa: I,
         tree: &PackedTree,
         treelets: &Treelets,
         p: Vec3,
-        sink: &mut S,
-        recorder: &mut R,
+        cx: &mut C,
     ) -> ControlFlow<()> {
-        recorder.node_tested();
+        let isa = cx.isa();
+        cx.recorder().node_tested();
         if !self.hull.contains_point(p) {
             return ControlFlow::Continue(());
         }
@@ -200,18 +199,18 @@ impl Tiling {
             nodes: &self.nodes,
             row: p.extend(0.0).to_array(),
         });
-        recorder.nodes_tested(AXES as u32 * steps);
+        cx.recorder().nodes_tested(AXES as u32 * steps);
         match at {
-            ON_PLANE => treelets.locate(tree, p, sink, recorder),
+            ON_PLANE => treelets.locate(tree, p, cx),
             _ if at & UNSURE == 0 => {
-                recorder.subtree_accepted(1);
-                sink.accept(&[at & REST])
+                cx.recorder().subtree_accepted(1);
+                cx.accept(&[at & REST])
             }
             _ => {
-                recorder.items_tested(1);
+                cx.recorder().items_tested(1);
                 let place = (at & REST) as usize;
                 match tree.boxes().get(place).contains_point(p) {
-                    true => sink.accept(&tree.ids()[place..place + 1]),
+                    true => cx.accept(&tree.ids()[place..place + 1]),
                     false => ControlFlow::Continue(()),
                 }
             }
@@ -221,7 +220,7 @@ impl Tiling {
     /// Searches for many points, a group of them step by step: the loads of a
     /// step do not wait for each other.
     #[inline(always)]
-    pub fn locate_many<I: Isa, S: ManySink>(
+    pub fn query_many<I: Isa, S: ManySink>(
         &self,
         isa: I,
         tree: &PackedTree,
@@ -254,7 +253,9 @@ impl Tiling {
                     OUTSIDE => {}
                     ON_PLANE => {
                         // A Vec never breaks off.
-                        let _ = treelets.locate(tree, p, &mut found, &mut NoRecorder);
+                        let mut recorder = NoRecorder;
+                        let mut cx = QueryContext::new(isa, &mut found, &mut recorder);
+                        let _ = treelets.locate(tree, p, &mut cx);
                     }
                     _ if at & UNSURE == 0 => found.push(at & REST),
                     _ => {
@@ -405,9 +406,9 @@ impl Cut<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::index::erased::{locate, locate_many};
-    use crate::index::{Bsp, BspParams, RegionIndex};
-    use crate::kernel::Kernel;
+    use crate::index::erased::query_many;
+    use crate::index::{Bsp, BspParams, Input, Query, RegionIndex};
+    use crate::kernel::{BASELINE, Kernel};
     use crate::query::{ItemId, Located, QueryCost};
 
     /// Cells between uneven walls, without those that `gone` says.
@@ -440,10 +441,16 @@ mod tests {
         let points = points(items);
         for kernel in Kernel::available() {
             let (mut many, mut alone) = (Located::default(), Vec::new());
-            locate_many(kernel, bsp, &points, &mut many);
+            query_many(kernel, bsp, &points, &mut many);
             for (&p, found) in points.iter().zip(many.iter()) {
                 alone.clear();
-                locate(kernel, bsp, p, &mut alone);
+                let (sink, recorder) = (&mut alone, &mut NoRecorder);
+                let _ = kernel.run(Query {
+                    index: bsp,
+                    volume: &p,
+                    sink,
+                    recorder,
+                });
                 assert_eq!(found, alone, "{p} {kernel}");
                 alone.sort();
                 let holding = items.iter().zip(0..).filter(|(b, _)| b.contains_point(p));
@@ -456,12 +463,15 @@ mod tests {
     #[test]
     fn a_point_in_a_cell_is_found_by_planes_alone() {
         let items = cells(|_| false);
-        let bsp = Bsp::build(&items, None, &BspParams::default()).unwrap();
+        let bsp = Bsp::build(&Input::new(&items), &BspParams::default()).unwrap();
         assert!(bsp.tiling().is_some());
         let mut cost = QueryCost::default();
         for (b, id) in items.iter().zip(0..) {
             let mut found = Vec::new();
-            let _ = RegionIndex::locate(&bsp, b.centre(), &mut found, &mut cost);
+            let _ = bsp.query(
+                &b.centre(),
+                &mut QueryContext::new(BASELINE, &mut found, &mut cost),
+            );
             assert_eq!(found, [id]);
         }
         assert_eq!(cost.items_tested, 0);
@@ -469,7 +479,7 @@ mod tests {
         let centres: Vec<Vec3> = items.iter().map(Aabb::centre).collect();
         assert!(centres.len() > 2 * GROUP && !centres.len().is_multiple_of(GROUP));
         let mut many = Located::default();
-        locate_many(Kernel::best(), &bsp, &centres, &mut many);
+        query_many(Kernel::best(), &bsp, &centres, &mut many);
         assert!(many.len() == items.len() && many.iter().zip(0..).all(|(found, id)| found == [id]));
         answers_are_right(&bsp, &items);
     }
@@ -477,7 +487,7 @@ mod tests {
     #[test]
     fn cells_beside_gaps_are_tested() {
         let items = cells(|i| i % 5 == 0 || i % 7 == 3);
-        let bsp = Bsp::build(&items, None, &BspParams::default()).unwrap();
+        let bsp = Bsp::build(&Input::new(&items), &BspParams::default()).unwrap();
         assert!(bsp.tiling().is_some());
         answers_are_right(&bsp, &items);
     }
@@ -488,7 +498,7 @@ mod tests {
         for i in (0..11 * 9 * 7).step_by(3).filter(|i| i % 11 != 10) {
             let mut items = cells(|_| false);
             items[i].max.x += 0.125;
-            let bsp = Bsp::build(&items, None, &BspParams::default()).unwrap();
+            let bsp = Bsp::build(&Input::new(&items), &BspParams::default()).unwrap();
             assert!(bsp.tiling().is_none(), "{i}");
             if i == 300 {
                 answers_are_right(&bsp, &items);
@@ -499,7 +509,7 @@ mod tests {
     #[test]
     fn moved_items_end_it() {
         let mut items = cells(|_| false);
-        let mut bsp = Bsp::build(&items, None, &BspParams::default()).unwrap();
+        let mut bsp = Bsp::build(&Input::new(&items), &BspParams::default()).unwrap();
         items[300].max.x += 0.125;
         assert!(RegionIndex::refit(&mut bsp, &items, &[300]));
         answers_are_right(&bsp, &items);

@@ -9,40 +9,13 @@ use std::ops::{ControlFlow, Range};
 use glam::Vec3;
 
 use super::bundles::{Bundles, Leaves};
+use super::node::TreeNode;
 use super::stack::Stack;
 use crate::geometry::{Aabb, BoxBlock, BoxBlocks, LaneMask, PlaneMask};
-use crate::kernel::{Isa, prefetch};
-use crate::query::{Containment, ItemId, Recorder, Region, Sink, View};
+use crate::kernel::prefetch;
+use crate::query::{Containment, Context, ItemId, QueryVolume, Recorder, Sink};
 
 use super::MemoryUsage;
-
-/// A node: the exact union of its items' bounds and where they lie.
-#[derive(Clone, Copy, Debug)]
-#[repr(C)]
-pub struct TreeNode {
-    pub bounds: Aabb,
-    /// First item of the subtree in tree order.
-    first: u32,
-    /// Number of items of the subtree.
-    count: u32,
-    /// The node after this subtree in depth-first order. A leaf's is its own
-    /// successor.
-    after: u32,
-}
-
-impl TreeNode {
-    /// The places of the subtree's items in tree order.
-    #[inline(always)]
-    pub fn items(&self) -> Range<usize> {
-        self.first as usize..(self.first + self.count) as usize
-    }
-
-    /// The node after this subtree in depth-first order.
-    #[inline(always)]
-    pub fn after(&self) -> usize {
-        self.after as usize
-    }
-}
 
 /// A tree packed for querying: 36 bytes a node, 28 an item. Nodes may have
 /// any number of children.
@@ -163,82 +136,56 @@ impl PackedTree {
         }
     }
 
-    /// Hands every item that the view sees to the sink: accepted subtrees
-    /// first, level by level, then what is left of the leaves.
+    /// Hands every item that the volume sees to the sink: those that hold a
+    /// point in tree order; of a frustum accepted subtrees first, level by
+    /// level, then what is left of the leaves.
     #[inline(always)]
-    pub fn see<I: Isa, V: View, S: Sink, R: Recorder>(
-        &self,
-        isa: I,
-        view: &V,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        let leaves = InBlocks { tree: self, view };
-        self.see_leaves(isa, view, &leaves, sink, recorder)
+    pub fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
+        if Q::IS_POINT {
+            return self.walk(volume, cx);
+        }
+        let leaves = InBlocks { tree: self, volume };
+        self.query_leaves(volume, &leaves, cx)
     }
 
-    /// [`PackedTree::see`] with the items of straddling leaves fetched and
+    /// [`PackedTree::query`] with the items of straddling leaves fetched and
     /// tested by the caller, who may keep their bounds in another form.
     #[inline(always)]
-    pub fn see_leaves<I: Isa, V: View, L: Leaves, S: Sink, R: Recorder>(
+    pub fn query_leaves<Q: QueryVolume, L: Leaves, C: Context>(
         &self,
-        isa: I,
-        view: &V,
+        volume: &Q,
         leaves: &L,
-        sink: &mut S,
-        recorder: &mut R,
+        cx: &mut C,
     ) -> ControlFlow<()> {
         let Some(root) = self.nodes.first() else {
             return ControlFlow::Continue(());
         };
-        recorder.node_tested();
-        let (verdict, mask) = view.classify(&root.bounds, view.mask(), recorder);
+        cx.recorder().node_tested();
+        let (verdict, mask) = volume.classify(&root.bounds, volume.mask(), cx.recorder());
         match verdict {
             Containment::Outside => {
-                recorder.subtree_rejected();
+                cx.recorder().subtree_rejected();
                 return ControlFlow::Continue(());
             }
             Containment::Inside => {
-                recorder.subtree_accepted(self.ids.len());
-                return sink.accept_places(isa, &self.ids, 0..self.ids.len());
+                cx.recorder().subtree_accepted(self.ids.len());
+                let isa = cx.isa();
+                return cx.sink().accept_places(isa, &self.ids, 0..self.ids.len());
             }
             Containment::Straddles => {}
         }
-        self.bundles.search(isa, view, mask, leaves, sink, recorder)
+        let tree = (&self.nodes[..], &self.ids[..]);
+        self.bundles.search(tree, volume, mask, leaves, cx)
     }
 
-    /// Hands every item that the region admits to the sink, in tree order.
+    /// Hands every item that the volume sees to the sink, in tree order.
     ///
     /// One walk along the nodes in memory order: a rejected subtree is jumped
-    /// over, an accepted one is a single slice, and a straddling one leaves
-    /// its memo (for a view the mask of planes still open) for all nodes up
-    /// to its end.
+    /// over, an accepted one is a single slice, and a straddling one leaves its
+    /// mask of open planes for all nodes up to its end.
     #[inline(always)]
-    pub fn query<I: Isa, G: Region, S: Sink, R: Recorder>(
-        &self,
-        isa: I,
-        region: &G,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        let test = |items, memo, sink: &mut S, recorder: &mut R| {
-            self.test_items(isa, items, region, memo, sink, recorder)
-        };
-        self.query_leaves(isa, region, sink, recorder, test)
-    }
-
-    /// [`PackedTree::query`] with the items of straddling leaves tested by the
-    /// caller, who may keep their bounds in another form.
-    #[inline(always)]
-    pub fn query_leaves<I: Isa, G: Region, S: Sink, R: Recorder>(
-        &self,
-        isa: I,
-        region: &G,
-        sink: &mut S,
-        recorder: &mut R,
-        test: impl Fn(Range<usize>, G::Memo, &mut S, &mut R) -> ControlFlow<()>,
-    ) -> ControlFlow<()> {
-        let mut top = (self.nodes.len() as u32, region.start());
+    pub fn walk<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
+        let mut top = (self.nodes.len() as u32, volume.mask());
         // What lies below the innermost straddling node; its own root, never
         // taken off, ends with the walk.
         let mut below = Stack::new(top);
@@ -247,25 +194,26 @@ impl PackedTree {
             while at >= top.0 {
                 top = below.pop().unwrap_or(top);
             }
-            recorder.node_tested();
-            let (verdict, memo) = region.classify(&node.bounds, top.1, recorder);
+            cx.recorder().node_tested();
+            let (verdict, mask) = volume.classify(&node.bounds, top.1, cx.recorder());
             match verdict {
                 Containment::Outside => {
-                    recorder.subtree_rejected();
+                    cx.recorder().subtree_rejected();
                     at = node.after;
                 }
                 Containment::Inside => {
-                    recorder.subtree_accepted(node.count as usize);
-                    sink.accept_places(isa, &self.ids, node.items())?;
+                    cx.recorder().subtree_accepted(node.count as usize);
+                    let isa = cx.isa();
+                    cx.sink().accept_places(isa, &self.ids, node.items())?;
                     at = node.after;
                 }
                 Containment::Straddles => {
                     at += 1;
                     if node.after == at {
-                        test(node.items(), memo, sink, recorder)?;
+                        self.test_items(node.items(), volume, mask, cx)?;
                     } else {
                         below.push(top);
-                        top = (node.after, memo);
+                        top = (node.after, mask);
                     }
                 }
             }
@@ -296,17 +244,15 @@ impl PackedTree {
 
     /// Tests items block by block and hands over runs of admitted ones.
     #[inline(always)]
-    pub fn test_items<I: Isa, G: Region, S: Sink, R: Recorder>(
+    pub fn test_items<Q: QueryVolume, C: Context>(
         &self,
-        isa: I,
         items: Range<usize>,
-        region: &G,
-        memo: G::Memo,
-        sink: &mut S,
-        recorder: &mut R,
+        volume: &Q,
+        mask: PlaneMask,
+        cx: &mut C,
     ) -> ControlFlow<()> {
         let blocks = self.boxes.range(items.start, items.end);
-        scan_blocks(isa, blocks, &self.ids, region, memo, sink, recorder)
+        scan_blocks(blocks, &self.ids, volume, mask, cx)
     }
 
     /// Takes over the new bounds of moved items without changing the tree's
@@ -396,57 +342,49 @@ impl PackedTree {
 }
 
 /// The leaves of a tree that keeps its items' bounds in blocks.
-struct InBlocks<'a, V> {
+struct InBlocks<'a, Q> {
     tree: &'a PackedTree,
-    view: &'a V,
+    volume: &'a Q,
 }
 
-impl<V: View> Leaves for InBlocks<'_, V> {
-    #[inline(always)]
-    fn tree(&self) -> &PackedTree {
-        self.tree
-    }
-
+impl<Q: QueryVolume> Leaves for InBlocks<'_, Q> {
     #[inline(always)]
     fn fetch(&self, items: Range<usize>, mask: PlaneMask) {
         for (start, _, block) in self.tree.boxes.range(items.start, items.end) {
-            self.view.prefetch(block, mask);
+            self.volume.prefetch(block, mask);
             prefetch(&self.tree.ids[start]);
         }
     }
 
     #[inline(always)]
-    fn test<I: Isa, S: Sink, R: Recorder>(
+    fn test<C: Context>(
         &self,
-        isa: I,
         items: Range<usize>,
         mask: PlaneMask,
-        sink: &mut S,
-        recorder: &mut R,
+        cx: &mut C,
     ) -> ControlFlow<()> {
-        let (tree, view) = (self.tree, self.view);
-        tree.test_items(isa, items, view, mask, sink, recorder)
+        self.tree.test_items(items, self.volume, mask, cx)
     }
 }
 
 /// Tests items in blocks (each with the place of its lane 0 and the lanes that
-/// count) and hands over runs of admitted ones: the
-/// leaf test of every tree and the whole of the linear scan.
+/// count) and hands over runs of admitted ones: the leaf test of every tree and
+/// region search in the linear scan.
 #[inline(always)]
-pub fn scan_blocks<I: Isa, B: Borrow<BoxBlock>, G: Region, S: Sink, R: Recorder>(
-    isa: I,
+pub fn scan_blocks<B: Borrow<BoxBlock>, Q: QueryVolume, C: Context>(
     blocks: impl Iterator<Item = (usize, LaneMask, B)>,
     ids: &[ItemId],
-    region: &G,
-    memo: G::Memo,
-    sink: &mut S,
-    recorder: &mut R,
+    volume: &Q,
+    mask: PlaneMask,
+    cx: &mut C,
 ) -> ControlFlow<()> {
+    let isa = cx.isa();
+    let (sink, recorder) = cx.parts();
     for (start, lanes, block) in blocks {
         let tested = lanes.count_ones();
         recorder.items_tested(tested);
-        recorder.planes_tested(tested * G::planes_open(memo));
-        let admitted = region.admit_lanes(isa, block.borrow(), memo) & lanes;
+        recorder.planes_tested(tested * Q::planes_open(mask));
+        let admitted = volume.kept_lanes(isa, block.borrow(), mask) & lanes;
         if admitted != 0 {
             sink.accept_lanes(isa, ids, start, admitted)?;
         }
@@ -458,7 +396,7 @@ pub fn scan_blocks<I: Isa, B: Borrow<BoxBlock>, G: Region, S: Sink, R: Recorder>
 mod tests {
     use super::*;
     use crate::kernel::BASELINE;
-    use crate::query::{Count, NoRecorder};
+    use crate::query::{Count, NoRecorder, QueryContext};
 
     /// A degenerate list of a tree: each node has one leaf and the rest.
     fn comb(items: &[Aabb]) -> PackedTree {
@@ -490,11 +428,17 @@ mod tests {
         assert_eq!(tree.depth(), 100_001);
         let mut all = Count::default();
         let everything = Aabb::new(Vec3::splat(-1e9), Vec3::splat(1e9));
-        let _ = tree.query(BASELINE, &everything, &mut all, &mut NoRecorder);
+        let _ = tree.walk(
+            &everything,
+            &mut QueryContext::new(BASELINE, &mut all, &mut NoRecorder),
+        );
         assert_eq!(all.0, 100_000);
         for id in [0, 50_000, 99_999] {
             let mut found = Vec::new();
-            let _ = tree.query(BASELINE, &items[id].centre(), &mut found, &mut NoRecorder);
+            let _ = tree.query(
+                &items[id].centre(),
+                &mut QueryContext::new(BASELINE, &mut found, &mut NoRecorder),
+            );
             assert_eq!(found, [id as ItemId]);
         }
     }

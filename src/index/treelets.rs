@@ -10,8 +10,8 @@ use glam::Vec3;
 use super::batch::{Descent, GROUP, answer};
 use super::tree::PackedTree;
 use crate::geometry::{Aabb, LANES};
-use crate::kernel::{BASELINE, prefetch};
-use crate::query::{ManySink, Recorder, Sink};
+use crate::kernel::prefetch;
+use crate::query::{Context, ManySink, Predicate, Recorder};
 
 /// Most items of a leaf of the descent: one or two blocks.
 pub const DESCENT_LEAF: usize = LANES;
@@ -333,13 +333,7 @@ impl Treelets {
 
     /// Hands every item whose closed box holds `p` to the sink, in tree order.
     #[inline(always)]
-    pub fn locate<S: Sink, R: Recorder>(
-        &self,
-        tree: &PackedTree,
-        p: Vec3,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
+    pub fn locate<C: Context>(&self, tree: &PackedTree, p: Vec3, cx: &mut C) -> ControlFlow<()> {
         if self.treelets.is_empty() {
             return ControlFlow::Continue(());
         }
@@ -347,7 +341,7 @@ impl Treelets {
         // entered.
         let mut above = [(0, 0); MOST_HEIGHT];
         let mut level = 0;
-        let (mut at, mut open) = (0, self.open(0, p, recorder));
+        let (mut at, mut open) = (0, self.open(0, p, cx.recorder()));
         loop {
             if open == 0 {
                 if level == 0 {
@@ -362,14 +356,14 @@ impl Treelets {
             if child & LEAF != 0 {
                 let items = self.items(child);
                 tree.prefetch_items(items.clone());
-                tree.test_items(BASELINE, items, &p, (), sink, recorder)?;
+                tree.test_items(items, &p, p.mask(), cx)?;
             } else {
                 if open != 0 {
                     above[level] = (at, open);
                     level += 1;
                 }
                 at = child as usize;
-                open = self.open(at, p, recorder);
+                open = self.open(at, p, cx.recorder());
             }
         }
     }
@@ -383,7 +377,7 @@ impl Treelets {
     /// Searches for many points, a group of them level by level: the loads of
     /// a level do not wait for each other.
     #[inline(always)]
-    pub fn locate_many<S: ManySink>(
+    pub fn query_many<S: ManySink>(
         &self,
         tree: &PackedTree,
         points: &[Vec3],

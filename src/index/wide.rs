@@ -11,17 +11,14 @@ use serde::{Deserialize, Serialize};
 
 use super::block_order::{BlockOrder, block_ordered};
 use super::by_plane::ByPlane;
-use super::by_tree::visible_on_baseline;
 use super::frontier::{Frontier, Merger, NodeList, is_far};
 use super::id_rows::IdRows;
-use super::pass::{Layer, Pass};
-use super::{
-    BuildError, FrustumQuery, Info, Kind, MemoryUsage, Origin, RegionIndex, TreeOrder, indexable,
-};
-use crate::geometry::{Aabb, BoxBlock, LANES, LaneMask, PlaneTree};
-use crate::kernel::{BASELINE, Isa, prefetch};
-use crate::query::{ItemId, Recorder, Region, Sink, View};
-use crate::threads::{Pool, share};
+use super::pass::{Layer, Level, Pass};
+use super::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, indexable};
+use crate::geometry::{Aabb, BoxBlock, LANES};
+use crate::kernel::prefetch;
+use crate::query::{Context, ItemId, QueryVolume, Recorder, Sink};
+use crate::threads::share;
 
 /// Parameters: `wide:order=median`.
 #[derive(Clone, Copy, Default, Debug, Serialize, Deserialize)]
@@ -48,27 +45,6 @@ pub struct Wide {
     levels: Vec<Level>,
     /// Place of each item in tree order, made when first needed.
     place_of: Vec<u32>,
-}
-
-/// Where a level lies among the blocks.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Level {
-    pub(super) first: usize,
-    blocks: usize,
-    /// Boxes in these blocks; only the last block has lanes without one.
-    boxes: usize,
-}
-
-impl Level {
-    /// The lanes of a block that hold a box.
-    #[inline(always)]
-    pub(super) fn lanes(&self, block: usize) -> LaneMask {
-        if block + 1 < self.blocks {
-            LaneMask::MAX
-        } else {
-            LaneMask::MAX >> (self.blocks * LANES - self.boxes)
-        }
-    }
 }
 
 /// The memory of a traversal: frontiers, kept between queries.
@@ -216,18 +192,18 @@ impl Wide {
     /// the planes that are left. Level by level, so that the blocks to come are
     /// known and can be fetched ahead.
     #[inline(always)]
-    fn search<I: Isa, V: View, S: Sink, R: Recorder>(
+    fn search<Q: QueryVolume, C: Context>(
         &self,
-        isa: I,
-        view: &V,
-        sink: &mut S,
-        recorder: &mut R,
+        volume: &Q,
+        cx: &mut C,
         scratch: &mut Scratch,
     ) -> ControlFlow<()> {
         let Some(top) = self.levels.len().checked_sub(1) else {
             return ControlFlow::Continue(());
         };
-        if view.mask() == 0 {
+        let isa = cx.isa();
+        let (sink, recorder) = cx.parts();
+        if volume.mask() == 0 {
             recorder.subtree_accepted(self.ids.len());
             return sink.accept_places(isa, &self.ids, 0..self.ids.len());
         }
@@ -237,11 +213,11 @@ impl Wide {
             whole,
             by_plane,
         } = scratch;
-        here.start(isa, view.mask());
+        here.start(isa, volume.mask());
         let mut pass = Pass {
-            tree: self,
+            ids: &self.ids,
             isa,
-            view,
+            volume,
             sink,
             recorder,
         };
@@ -259,6 +235,46 @@ impl Wide {
             std::mem::swap(here, below);
         }
         pass.test_leaves(&self.layer(0), here, by_plane)
+    }
+
+    /// Region search: from the root down, one block at a time.
+    #[inline(always)]
+    fn descend<C: Context>(&self, p: Vec3, cx: &mut C) -> ControlFlow<()> {
+        // Depth first: at most one lane of each level is left open on a tiling.
+        let Some(top) = self.levels.len().checked_sub(1) else {
+            return ControlFlow::Continue(());
+        };
+        let mut open = [(0, 0); MOST_LEVELS];
+        let holding = |level: usize, block: usize, recorder: &mut C::Recorder| {
+            let lanes = self.levels[level].lanes(block);
+            if level == 0 {
+                recorder.items_tested(lanes.count_ones());
+            } else {
+                recorder.nodes_tested(lanes.count_ones());
+            }
+            self.blocks[self.levels[level].first + block].holding(p) & lanes
+        };
+        let mut level = top;
+        open[level] = (0, holding(level, 0, cx.recorder()));
+        loop {
+            let (block, left) = open[level];
+            if level == 0 {
+                let isa = cx.isa();
+                cx.sink()
+                    .accept_lanes(isa, &self.ids, block * LANES, left)?;
+            }
+            if level == 0 || left == 0 {
+                if level == top {
+                    return ControlFlow::Continue(());
+                }
+                level += 1;
+                continue;
+            }
+            open[level].1 &= left - 1;
+            level -= 1;
+            let child = block * LANES + left.trailing_zeros() as usize;
+            open[level] = (child, holding(level, child, cx.recorder()));
+        }
     }
 
     /// Bounds of the boxes of one block, as the lane above them holds them.
@@ -282,21 +298,8 @@ impl RegionIndex for Wide {
     type Params = WideParams;
 
     /// O(n log n) by medians, O(n) but for the sort by Morton codes.
-    fn build(
-        items: &[Aabb],
-        _: Option<&PlaneTree>,
-        params: &WideParams,
-    ) -> Result<Self, BuildError> {
-        Wide::build_on(1, items, params)
-    }
-
-    fn build_by(
-        pool: &Pool,
-        items: &[Aabb],
-        _: Option<&PlaneTree>,
-        params: &WideParams,
-    ) -> Result<Self, BuildError> {
-        Wide::build_on(pool.threads(), items, params)
+    fn build(input: &Input<'_>, params: &WideParams) -> Result<Self, BuildError> {
+        Wide::build_on(input.threads(), input.items, params)
     }
 
     fn memory(&self) -> MemoryUsage {
@@ -310,45 +313,17 @@ impl RegionIndex for Wide {
     }
 
     #[inline(always)]
-    fn locate<S: Sink, R: Recorder>(
-        &self,
-        p: Vec3,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        // Depth first: at most one lane of each level is left open on a tiling.
-        let Some(top) = self.levels.len().checked_sub(1) else {
-            return ControlFlow::Continue(());
-        };
-        let mut open = [(0, 0); MOST_LEVELS];
-        let holding = |level: usize, block: usize, recorder: &mut R| {
-            let lanes = self.levels[level].lanes(block);
-            if level == 0 {
-                recorder.items_tested(lanes.count_ones());
-            } else {
-                recorder.nodes_tested(lanes.count_ones());
-            }
-            p.admit_lanes(BASELINE, &self.blocks[self.levels[level].first + block], ()) & lanes
-        };
-        let mut level = top;
-        open[level] = (0, holding(level, 0, recorder));
-        loop {
-            let (block, left) = open[level];
-            if level == 0 {
-                sink.accept_lanes(BASELINE, &self.ids, block * LANES, left)?;
-            }
-            if level == 0 || left == 0 {
-                if level == top {
-                    return ControlFlow::Continue(());
-                }
-                level += 1;
-                continue;
-            }
-            open[level].1 &= left - 1;
-            level -= 1;
-            let child = block * LANES + left.trailing_zeros() as usize;
-            open[level] = (child, holding(level, child, recorder));
+    fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
+        if Q::IS_POINT {
+            return match volume.as_point() {
+                Some(p) => self.descend(p, cx),
+                None => ControlFlow::Continue(()),
+            };
         }
+        let mut scratch = SCRATCH.take().unwrap_or_default();
+        let flow = self.search(volume, cx, &mut scratch);
+        SCRATCH.set(Some(scratch));
+        flow
     }
 
     /// O(moved * depth).
@@ -382,32 +357,8 @@ impl RegionIndex for Wide {
         }
         true
     }
-}
-
-impl FrustumQuery for Wide {
-    visible_on_baseline!();
-
-    #[inline(always)]
-    fn visible_by<I: Isa, V: View, S: Sink, R: Recorder>(
-        &self,
-        isa: I,
-        view: &V,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        let mut scratch = SCRATCH.take().unwrap_or_default();
-        let flow = self.search(isa, view, sink, recorder, &mut scratch);
-        SCRATCH.set(Some(scratch));
-        flow
-    }
 
     fn tree_order(&self) -> Option<&[ItemId]> {
         Some(&self.ids)
-    }
-}
-
-impl TreeOrder for Wide {
-    fn ids(&self) -> &[ItemId] {
-        &self.ids
     }
 }

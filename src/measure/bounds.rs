@@ -5,9 +5,9 @@
 
 use super::{Subject, TimedTask, Workload};
 use crate::geometry::{Aabb, BoxBlocks};
-use crate::index::{RegionIndex, Trace, Wide};
+use crate::index::{Input, RegionIndex, Trace, Wide};
 use crate::kernel::{Isa, Kernel, Work};
-use crate::query::{AnyView, ItemId};
+use crate::query::{ItemId, each_volume};
 
 /// A row of the table of bounds.
 pub struct Bound {
@@ -123,15 +123,10 @@ fn replay<'a>(material: &Material<'a>) -> Option<TimedTask<'a>> {
         .iter()
         .find(|c| c.spec.row.info.name == Wide::INFO.name && c.built.is_ok())?;
     let params = serde_json::from_value(wide.spec.params.clone()).ok()?;
-    let tree = Wide::build(&material.workload.items, None, &params).ok()?;
+    let tree = Wide::build(&Input::new(&material.workload.items), &params).ok()?;
     let views = material.workload.views.iter();
     let traces: Vec<Trace> = views
-        .map(|view| match view.as_any() {
-            AnyView::Volume(view) => Trace::of(&tree, view),
-            AnyView::Spheres(view) => Trace::of(&tree, view),
-            AnyView::Wide(view) => Trace::of(&tree, view),
-            AnyView::Relative(view) => Trace::of(&tree, view),
-        })
+        .map(|view| each_volume!(view.as_any(), volume => Trace::of(&tree, volume)))
         .collect();
     Some(TimedTask {
         expected: material.visible.to_vec(),
@@ -165,7 +160,7 @@ mod tests {
         let index = &wide.built.as_ref().unwrap().items;
         let seen = |view: &CameraView| {
             let mut ids = Vec::new();
-            index.see(view.as_any(), &mut ids);
+            index.query(view.as_any(), &mut ids);
             ids.len() as u64
         };
         let visible: Vec<u64> = workload.views.iter().map(seen).collect();

@@ -7,8 +7,7 @@ use std::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
 
 use super::notice::Notice;
-use super::subject::guarded;
-use super::{Built, Status, TaskKind, Verdict, Workload};
+use super::{Answer, Built, Status, TaskKind, Verdict, Workload, guarded};
 use crate::culling::CullingTest;
 use crate::query::{ItemId, Located, QueryCost};
 use crate::verify::{ErrorCount, Fault, Trial, Truth, explain_containment, explain_visibility};
@@ -23,31 +22,6 @@ pub struct Counted {
     /// The region search of each eye.
     pub located: Vec<Answer>,
     pub locate_cost: QueryCost,
-}
-
-/// A set of ids, so far as two answers are compared by it.
-#[derive(Clone, Copy, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
-#[cfg_attr(test, derive(schemars::JsonSchema))]
-pub struct Answer {
-    pub count: u64,
-    /// Sum over the ids of a hash of each: the order does not matter.
-    pub digest: u64,
-}
-
-impl Answer {
-    pub fn of(ids: &[ItemId]) -> Answer {
-        /// SplitMix64's finaliser (Steele, Lea and Flood 2014).
-        fn mixed(id: ItemId) -> u64 {
-            let mut z = u64::from(id).wrapping_add(0x9E37_79B9_7F4A_7C15);
-            z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-            z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-            z ^ (z >> 31)
-        }
-        Answer {
-            count: ids.len() as u64,
-            digest: ids.iter().fold(0, |all, &id| all.wrapping_add(mixed(id))),
-        }
-    }
 }
 
 impl Counted {
@@ -98,10 +72,10 @@ pub fn count_pass(
             let start = Instant::now();
             let cost = &mut counted.cost;
             let index = subject.items.as_ref();
-            let counting = trial.ask(|out| index.see_counted(view, out, cost));
+            let counting = trial.ask(|out| index.query_counted(view, out, cost));
             // What will be timed is another traversal.
             let asked = match counting.map(drop) {
-                Ok(()) => trial.ask(|out| index.see(view, out)).map(drop),
+                Ok(()) => trial.ask(|out| index.query(view, out)).map(drop),
                 Err(fault) => Err(fault),
             };
             spent[i] += start.elapsed();
@@ -126,7 +100,7 @@ pub fn count_pass(
             let cost = &mut counted.locate_cost;
             let index = subject.regions();
             let counting = trial.ask(|out| {
-                index.locate_counted(p, out, cost);
+                index.query_counted(p.into(), out, cost);
                 workload.refine(n, out);
             });
             let asked = match counting.map(drop) {
@@ -159,7 +133,7 @@ pub fn count_pass(
 fn batch_verdict(workload: &Workload, subject: &Built) -> Verdict {
     let (mut many, mut alone) = (Located::default(), Vec::new());
     let index = subject.regions();
-    if let Err(panicked) = guarded(|| index.locate_many(&workload.points, &mut many)) {
+    if let Err(panicked) = guarded(|| index.query_many(&workload.points, &mut many)) {
         return panicked;
     }
     for (n, &p) in workload.points.iter().enumerate() {
@@ -252,9 +226,4 @@ fn note_scan(counted: &mut Counted, items: usize) {
             "looks at {compared} bounds a query for {items} items: a scan"
         ));
     }
-}
-
-/// Sum of ids found: what `query` and `locate` print as a checksum.
-pub fn id_sum(ids: &[ItemId]) -> u64 {
-    ids.iter().map(|&id| u64::from(id)).sum()
 }

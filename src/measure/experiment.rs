@@ -8,10 +8,11 @@ use serde::{Deserialize, Serialize};
 
 use super::bounds::BOUNDS;
 use super::group::{GroupPlan, measure_part};
+use super::key::{CellKey, GroupKey};
 use super::notice::Notice;
-use super::part::{CellKey, GroupKey, Known, Part, TaskSamples};
+use super::part::{Known, Part, TaskSamples};
+use super::refitted::refitted_ln;
 use super::schedule::cameras_within;
-use super::update::refitted_ln;
 use super::{
     Machine, PathInfo, Protocol, SceneInfo, Status, Subject, Verdict, Workload, WorkloadError,
 };

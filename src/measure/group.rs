@@ -6,8 +6,9 @@ use std::collections::BTreeMap;
 
 use super::bounds::{Bound, Material};
 use super::count::{Counted, count_pass, judge};
+use super::key::GroupKey;
 use super::notice::{Notice, TIMING};
-use super::part::{GroupKey, Known, NamedSchedule, Part, SubjectPart, TaskPart, TaskSamples};
+use super::part::{Known, NamedSchedule, Part, SubjectPart, TaskPart, TaskSamples};
 use super::subject::TWIN;
 use super::{
     Answer, Built, Judged, PathInfo, Protocol, SceneInfo, Schedule, Status, Subject, TaskKind,
@@ -409,7 +410,7 @@ impl<'a> Entry<'a> {
         for n in timed(&known.query) {
             let (view, wanted) = (&workload.views[n], known.visible[n]);
             out.clear();
-            let found = guarded(|| built.items.see(view.as_any(), &mut out));
+            let found = guarded(|| built.items.query(view.as_any(), &mut out));
             if differs("camera", n, found.map(|()| Answer::of(&out)), wanted) {
                 return;
             }

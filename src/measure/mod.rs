@@ -6,6 +6,7 @@
 //! [`Subject`]s (built structures) -> [`count_pass`] -> [`timed_rounds`] ->
 //! [`Cell`]s with named metrics. [`BOUNDS`] take part in the timed rounds only.
 
+mod answer;
 mod bounds;
 mod clock;
 mod cold;
@@ -13,12 +14,15 @@ mod count;
 mod environment;
 mod experiment;
 mod group;
+mod guarded;
+mod key;
 mod metrics;
 mod notice;
 mod orders;
 mod over_processes;
 mod part;
 mod question;
+mod refitted;
 mod results;
 mod schedule;
 mod subject;
@@ -31,26 +35,29 @@ use serde::{Deserialize, Serialize};
 
 use crate::verify::Fault;
 
+pub use answer::{Answer, id_sum};
 pub use bounds::{BOUNDS, Bound, Material};
 pub use clock::{Lap, Stopwatch};
-pub use count::{Answer, Counted, Judged, count_pass, id_sum, judge};
+pub use count::{Counted, Judged, count_pass, judge};
 pub use environment::{Machine, Source, Toolchain};
 pub use experiment::{
     Beside, Effort, ExperimentError, Plan, PlannedScene, Question, Share, measure_scene,
 };
 pub use group::{GroupPlan, measure_part};
+pub use guarded::guarded;
+pub use key::{CellKey, GroupKey};
 pub use metrics::{METRICS, Metric, MetricInfo};
 pub use notice::{Notice, TIMING};
 pub use over_processes::{OverProcesses, ProcessTimes};
-pub use part::{CellKey, GroupKey, Known, NamedSchedule, Part, SubjectPart, TaskPart, TaskSamples};
+pub use part::{Known, NamedSchedule, Part, SubjectPart, TaskPart, TaskSamples};
 pub use question::{PathInfo, SceneInfo};
 pub use results::{Cell, CellTimes, Group, YARDSTICK, measure_group};
 pub use schedule::{CLOCK_NS, Protocol, Schedule, TaskPlan, cameras_within};
-pub use subject::{Built, Subject, guarded};
+pub use subject::{Built, Subject};
 pub use task::{Ask, AskMany, TaskKind, TimedTask};
 pub use timing::{Sample, Timed, timed, timed_rounds};
 pub use update::{UPDATE_SHARES, move_share};
-pub use workload::{Workload, WorkloadError};
+pub use workload::{Workload, WorkloadError, input_of};
 
 named! {
     /// What became of a cell. A gap is never silent.

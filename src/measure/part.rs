@@ -9,42 +9,9 @@ use serde_json::Value;
 
 use crate::index::{Kind, Origin};
 
-use super::{Answer, Judged, PathInfo, Sample, SceneInfo, Schedule, Status, TaskKind, Verdict};
-
-/// What is common to the cells that are compared with each other.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
-pub struct GroupKey {
-    pub scene: String,
-    pub path: String,
-    /// "warm" or "cold".
-    pub cache: String,
-    pub test: String,
-    pub arithmetic: String,
-    pub planes: String,
-    pub epsilon: f64,
-}
-
-impl GroupKey {
-    pub fn new(scene: &str, path: &PathInfo, test: &str) -> GroupKey {
-        GroupKey {
-            scene: scene.to_owned(),
-            path: path.name.clone(),
-            cache: path.cache.clone(),
-            test: test.to_owned(),
-            arithmetic: path.arithmetic.clone(),
-            planes: path.planes.clone(),
-            epsilon: path.epsilon,
-        }
-    }
-}
-
-/// A cell: a structure in a group.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
-pub struct CellKey {
-    #[serde(flatten)]
-    pub group: GroupKey,
-    pub structure: String,
-}
+use super::{
+    Answer, GroupKey, Judged, PathInfo, Sample, SceneInfo, Schedule, Status, TaskKind, Verdict,
+};
 
 /// What the first process counted and planned; the others keep to it.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]

@@ -97,3 +97,17 @@ impl PathInfo {
         }
     }
 }
+
+impl GroupKey {
+    pub fn new(scene: &str, path: &PathInfo, test: &str) -> GroupKey {
+        GroupKey {
+            scene: scene.to_owned(),
+            path: path.name.clone(),
+            cache: path.cache.clone(),
+            test: test.to_owned(),
+            arithmetic: path.arithmetic.clone(),
+            planes: path.planes.clone(),
+            epsilon: path.epsilon,
+        }
+    }
+}

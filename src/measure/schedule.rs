@@ -5,7 +5,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::clock::Stopwatch;
-use super::subject::guarded;
+use super::guarded::guarded;
 use super::task::TimedTask;
 use crate::query::ItemId;
 use crate::statistics::median;

@@ -3,10 +3,12 @@
 //! build and the guard against panics.
 
 use super::clock::Stopwatch;
+use super::guarded::guarded;
+use super::input_of;
 use super::update::measure_updates;
 use super::{Status, Verdict};
 use crate::culling::CullingTest;
-use crate::index::{BuildError, DynIndex, MemoryUsage, StructureSpec, caught};
+use crate::index::{BuildError, DynIndex, MemoryUsage, StructureSpec};
 use crate::scene::Scene;
 
 /// A structure with its two indexes: over the items (what does the camera
@@ -60,7 +62,7 @@ impl Subject {
     pub fn with_updates(mut self, scene: &Scene, test: CullingTest) -> Subject {
         let updates = |spec: &StructureSpec| {
             let items = test.items(&scene.items);
-            let spare = spec.build_with(&items, scene.own_tree.as_ref())?;
+            let spare = spec.build(input_of(scene, &items))?;
             measure_updates(spec, scene, &items, spare)
         };
         if let Ok(built) = &mut self.built {
@@ -91,7 +93,7 @@ fn build(
     let items = test.items(&scene.items);
     let build = || {
         let watch = Stopwatch::start();
-        let built = spec.build_with(&items, scene.own_tree.as_ref());
+        let built = spec.build(input_of(scene, &items));
         // This thread's CPU time says nothing about what others did for it.
         let lap = watch.lap();
         let alone = spec.execution.threads <= 1;
@@ -110,10 +112,7 @@ fn build(
     let regions = if std::ptr::eq(boxes, &items[..]) {
         None
     } else {
-        Some(
-            spec.build_with(boxes, scene.own_tree.as_ref())
-                .map_err(not_built)?,
-        )
+        Some(spec.build(input_of(scene, boxes)).map_err(not_built)?)
     };
     Ok(Built {
         memory: index.memory(),
@@ -122,11 +121,6 @@ fn build(
         items: index,
         regions,
     })
-}
-
-/// Runs foreign code; a panic becomes a verdict with its message.
-pub fn guarded<T>(work: impl FnOnce() -> T) -> Result<T, Verdict> {
-    caught(work).map_err(|text| Verdict::new(Status::Panicked, format!("panicked: {text}")))
 }
 
 /// Why there is nothing to ask.

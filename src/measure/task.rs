@@ -55,7 +55,7 @@ impl<'a> TimedTask<'a> {
             TaskKind::Query => {
                 let index = built.items.as_ref();
                 let ask = move |place: usize, out: &mut Vec<ItemId>| {
-                    index.see(workload.views[place].as_any(), out);
+                    index.query(workload.views[place].as_any(), out);
                 };
                 match slowed(label) {
                     Some(every) => twice_in(every, ask),
@@ -130,7 +130,7 @@ fn located_at_once<'a>(workload: &'a Workload, built: &'a Built) -> AskMany<'a> 
         let (points, located, region) = &mut *kept.borrow_mut();
         points.clear();
         points.extend(places.iter().map(|&place| workload.points[place as usize]));
-        index.locate_many(points, located);
+        index.query_many(points, located);
         let refined = |&place: &u32| workload.scene.is_refined(&workload.sought[place as usize]);
         if !places.iter().any(refined) {
             return std::hint::black_box(&*located).ids().len() as u64;

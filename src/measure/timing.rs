@@ -9,9 +9,9 @@ use serde::{Deserialize, Serialize};
 
 use super::clock::Stopwatch;
 use super::cold::Cold;
+use super::guarded::guarded;
 use super::orders::Orders;
 use super::schedule::{Protocol, Schedule};
-use super::subject::guarded;
 use super::task::TimedTask;
 use super::{Status, Verdict};
 use crate::query::ItemId;

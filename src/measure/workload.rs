@@ -8,9 +8,16 @@ use glam::Vec3;
 use crate::camera::Camera;
 use crate::culling::{CameraView, Culling, CullingError};
 use crate::geometry::Aabb;
+use crate::index::Input;
 use crate::path::CameraPath;
 use crate::query::ItemId;
 use crate::scene::{Scene, Sought};
+
+/// What a structure is built over: items of a scene, as they are or as a culling
+/// test has them indexed, with the scene's own partition.
+pub fn input_of<'a>(scene: &'a Scene, items: &'a [Aabb]) -> Input<'a> {
+    Input::new(items).own_tree(scene.own_tree.as_ref())
+}
 
 /// A scene with the queries along one path.
 pub struct Workload<'a> {

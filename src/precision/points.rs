@@ -10,10 +10,10 @@ use super::quantised::{Code, GridScope, Quantised};
 use super::stability::{StableAfter, by_camera, stability};
 use crate::camera::{Camera, PLANE_METHODS, PlaneMethod, PlaneOptions};
 use crate::culling::{ARITHMETICS, Arithmetic, Culling, CullingTest, TESTS};
-use crate::index::{BuildError, By, DynIndex, RegionIndex, StructureSpec};
+use crate::index::{BuildError, By, DynIndex, Input, RegionIndex, StructureSpec};
 use crate::kernel::Kernel;
 use crate::measure::{
-    OverProcesses, ProcessTimes, Protocol, Schedule, Status, TimedTask, Verdict, timed,
+    OverProcesses, ProcessTimes, Protocol, Schedule, Status, TimedTask, Verdict, input_of, timed,
 };
 use crate::path::CameraPath;
 use crate::scene::Scene;
@@ -85,7 +85,7 @@ impl Indexes {
     fn new(spec: &StructureSpec, scene: &Scene) -> Result<Indexes, BuildError> {
         let over = |test: CullingTest| {
             let items = test.items(&scene.items);
-            spec.build_with(&items, scene.own_tree.as_ref())
+            spec.build(input_of(scene, &items))
         };
         Ok(Indexes {
             boxes: over(CullingTest::SixPlane)?,
@@ -131,7 +131,7 @@ fn stored<C: Code>(
     });
     let structure = Quantised::<C>::INFO.name;
     let label = format!("{structure}:bits={},grid={name}", 8 * size_of::<C>());
-    match Quantised::<C>::build(&scene.items, None, &scope) {
+    match Quantised::<C>::build(&Input::new(&scene.items), &scope) {
         Ok(index) => {
             let items = index.decoded(scene.items.len());
             let judged =
@@ -211,7 +211,7 @@ impl<'b> Way<'b> {
         let (index, views) = (self.index, &self.judged.views);
         TimedTask {
             ask: match index {
-                Some(index) => Box::new(move |n, out| index.see(views[n].as_any(), out)),
+                Some(index) => Box::new(move |n, out| index.query(views[n].as_any(), out)),
                 None => Box::new(|_, _| ()),
             },
             ask_many: None,
@@ -419,7 +419,7 @@ fn checked(index: &dyn DynIndex, judged: &Judged, items: usize) -> Result<(), Ve
     for (view, answer) in judged.views.iter().zip(&judged.answers) {
         trial.expect(answer.iter().copied());
         trial
-            .ask(|out| index.see(view.as_any(), out))
+            .ask(|out| index.query(view.as_any(), out))
             .map_err(|fault| Verdict::new(Status::of(&fault), fault.explained(|_| None)))?;
     }
     Ok(())

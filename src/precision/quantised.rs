@@ -8,13 +8,12 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::arithmetic::rounding::round_up;
-use crate::geometry::{Aabb, BoxBlock, LANES, LaneMask, PlaneMask, PlaneTree, lanes_of};
+use crate::geometry::{Aabb, BoxBlock, LANES, LaneMask, PlaneMask, lanes_of};
 use crate::index::{
-    Bsp, BuildError, FrustumQuery, Info, Kind, Leaves, MemoryUsage, Origin, PackedTree,
-    RegionIndex, scan_blocks,
+    Bsp, BuildError, Info, Input, Kind, Leaves, MemoryUsage, Origin, PackedTree, RegionIndex,
+    scan_blocks,
 };
-use crate::kernel::{BASELINE, Isa};
-use crate::query::{ItemId, Recorder, Sink, View};
+use crate::query::{Context, ItemId, QueryVolume};
 
 /// A whole number that a coordinate is stored as.
 pub trait Code: Copy + Default + Into<f32> + TryFrom<u32> + Send + Sync + 'static {
@@ -154,30 +153,23 @@ impl<C: Code> Quantised<C> {
 /// Leaves whose bounds are decoded block by block.
 struct InCodes<'a, C, V> {
     index: &'a Quantised<C>,
-    view: &'a V,
+    volume: &'a V,
 }
 
-impl<C: Code, V: View> Leaves for InCodes<'_, C, V> {
-    #[inline(always)]
-    fn tree(&self) -> &PackedTree {
-        &self.index.tree
-    }
-
+impl<C: Code, V: QueryVolume> Leaves for InCodes<'_, C, V> {
     /// Codes are few bytes, one after the other.
     #[inline(always)]
     fn fetch(&self, _: Range<usize>, _: PlaneMask) {}
 
     #[inline(always)]
-    fn test<I: Isa, S: Sink, R: Recorder>(
+    fn test<X: Context>(
         &self,
-        isa: I,
         items: Range<usize>,
         mask: PlaneMask,
-        sink: &mut S,
-        recorder: &mut R,
+        cx: &mut X,
     ) -> ControlFlow<()> {
         let (blocks, ids) = (self.index.blocks(items), self.index.tree.ids());
-        scan_blocks(isa, blocks, ids, self.view, mask, sink, recorder)
+        scan_blocks(blocks, ids, self.volume, mask, cx)
     }
 }
 
@@ -190,12 +182,9 @@ impl<C: Code> RegionIndex for Quantised<C> {
     );
     type Params = GridScope;
 
-    fn build(
-        items: &[Aabb],
-        own_tree: Option<&PlaneTree>,
-        scope: &GridScope,
-    ) -> Result<Self, BuildError> {
-        let tree = Bsp::build(items, own_tree, &Default::default())?.into_tree();
+    fn build(input: &Input<'_>, scope: &GridScope) -> Result<Self, BuildError> {
+        let items = input.items;
+        let tree = Bsp::build(input, &Default::default())?.into_tree();
         let boxes: Vec<Aabb> = (0..tree.ids().len()).map(|i| tree.boxes().get(i)).collect();
         let groups = boxes.chunks(match scope {
             GridScope::World => boxes.len().max(1),
@@ -229,41 +218,12 @@ impl<C: Code> RegionIndex for Quantised<C> {
     }
 
     #[inline(always)]
-    fn locate<S: Sink, R: Recorder>(
-        &self,
-        p: Vec3,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        let test = |items: Range<usize>, memo, sink: &mut S, recorder: &mut R| {
-            let blocks = self.blocks(items);
-            scan_blocks(BASELINE, blocks, self.tree.ids(), &p, memo, sink, recorder)
+    fn query<Q: QueryVolume, X: Context>(&self, volume: &Q, cx: &mut X) -> ControlFlow<()> {
+        let leaves = InCodes {
+            index: self,
+            volume,
         };
-        self.tree.query_leaves(BASELINE, &p, sink, recorder, test)
-    }
-}
-
-impl<C: Code> FrustumQuery for Quantised<C> {
-    #[inline(always)]
-    fn visible<V: View, S: Sink, R: Recorder>(
-        &self,
-        view: &V,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        self.visible_by(BASELINE, view, sink, recorder)
-    }
-
-    #[inline(always)]
-    fn visible_by<I: Isa, V: View, S: Sink, R: Recorder>(
-        &self,
-        isa: I,
-        view: &V,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        let leaves = InCodes { index: self, view };
-        self.tree.see_leaves(isa, view, &leaves, sink, recorder)
+        self.tree.query_leaves(volume, &leaves, cx)
     }
 }
 
@@ -271,7 +231,7 @@ impl<C: Code> FrustumQuery for Quantised<C> {
 mod tests {
     use super::*;
     use crate::geometry::{ConvexVolume, Plane};
-    use crate::query::NoRecorder;
+    use crate::index::FrustumQuery;
     use proptest::prelude::*;
 
     fn items() -> Vec<Aabb> {
@@ -296,18 +256,18 @@ mod tests {
         let normal = Vec3::new(0.6, -0.5, 0.3);
         let planes = [Plane::new(normal, -9.0), Plane::new(-normal, 14.0)];
         let slab = ConvexVolume::from_planes(&planes).unwrap();
-        let index = Quantised::<C>::build(&items, None, &scope).unwrap();
+        let index = Quantised::<C>::build(&Input::new(&items), &scope).unwrap();
         let decoded = index.decoded(items.len());
         let holds = |(d, b): (&Aabb, &Aabb)| b.is_empty() || d.contains(b);
         assert!(decoded.iter().zip(&items).all(holds));
         let mut found = Vec::new();
-        let _ = index.visible(&slab, &mut found, &mut NoRecorder);
+        let _ = index.visible(&slab, &mut found);
         found.sort_unstable();
         assert_eq!(found, those(&decoded, &slab), "{} {scope:?}", C::MOST);
         let truly = those(&items, &slab);
         assert!(truly.iter().all(|id| found.binary_search(id).is_ok()));
         let mut here = Vec::new();
-        let _ = index.locate(items[77].centre(), &mut here, &mut NoRecorder);
+        let _ = index.locate(items[77].centre(), &mut here);
         assert!(here.contains(&77));
         found.len() - truly.len()
     }
@@ -323,11 +283,11 @@ mod tests {
     fn what_cannot_be_stored_is_refused_and_a_point_has_a_grid() {
         let huge = [Aabb::new(Vec3::splat(-3e38), Vec3::splat(3e38))];
         let world = GridScope::World;
-        assert!(Quantised::<u16>::build(&huge, None, &world).is_err());
-        let none = Quantised::<u16>::build(&[], None, &world);
+        assert!(Quantised::<u16>::build(&Input::new(&huge), &world).is_err());
+        let none = Quantised::<u16>::build(&Input::new(&[]), &world);
         assert_eq!(none.map(|q| q.memory().total()).ok(), Some(0));
         let point = Aabb::new(Vec3::ONE, Vec3::ONE);
-        let one = Quantised::<u8>::build(&[point], None, &world).unwrap();
+        let one = Quantised::<u8>::build(&Input::new(&[point]), &world).unwrap();
         assert_eq!(one.decoded(1), [point]);
     }
 

@@ -11,7 +11,7 @@ use crate::geometry::{Aabb, BoxBlocks, MAX_PLANES, Spheres, WidePlane, WideVolum
 use crate::kernel::BASELINE;
 use crate::measure::Stopwatch;
 use crate::oracle::{Oracle, Pose, Verdict};
-use crate::query::{Region, View};
+use crate::query::QueryVolume;
 use crate::scene::Dice;
 use crate::statistics::median;
 
@@ -175,12 +175,18 @@ impl Tally {
         Ok(())
     }
 
-    fn take<V: View>(&mut self, test: usize, view: &V, blocks: &BoxBlocks, verdicts: &[Verdict]) {
+    fn take<V: QueryVolume>(
+        &mut self,
+        test: usize,
+        view: &V,
+        blocks: &BoxBlocks,
+        verdicts: &[Verdict],
+    ) {
         let mut admitted = vec![0; verdicts.len().div_ceil(16)];
         let watch = Stopwatch::start();
-        let mask = view.start();
+        let mask = view.mask();
         for ((_, lanes, block), slot) in blocks.range(0, verdicts.len()).zip(&mut admitted) {
-            *slot = view.admit_lanes(BASELINE, block, mask) & lanes;
+            *slot = view.kept_lanes(BASELINE, block, mask) & lanes;
         }
         self.times[test].push(watch.lap().cpu_ns / verdicts.len() as f64);
         for (i, verdict) in verdicts.iter().enumerate() {

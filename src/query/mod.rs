@@ -1,21 +1,24 @@
-//! What a query is made of: the ids it answers with, the region or the view it
-//! asks about, where answers go (sinks) and what is counted on the way (recorders). No
-//! structure and no geometry of its own lives here.
+//! What a query is made of: the volume it asks about, the ids it answers with,
+//! and its context: where answers go (sinks), what is counted on the way
+//! (recorders), the instruction set. No structure and no geometry of its own is
+//! here.
 
+mod context;
 mod many;
 mod planes;
+mod predicate;
 mod recorder;
-mod region;
 mod sink;
-mod view;
+mod volume;
 
+pub use context::{Context, QueryContext};
 pub use many::{Located, ManySink};
-pub use planes::{AsEver, Planes};
+pub use planes::Planes;
+pub use predicate::{Containment, Predicate};
 pub use recorder::{NoRecorder, QueryCost, Recorder};
-pub use region::{Containment, Region};
-pub(crate) use sink::Ranges;
-pub use sink::{Count, First, Sink, Tests, runs};
-pub use view::{AnyView, View};
+pub use sink::{Count, First, Ranges, Sink, Tests, runs};
+pub(crate) use volume::each_volume;
+pub use volume::{AnyVolume, AsEver, QueryVolume};
 
 /// An item's number: its zero-based place in the scene.
 pub type ItemId = u32;

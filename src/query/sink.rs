@@ -212,7 +212,7 @@ const FEW: usize = 48;
 
 /// Where the answers lie in the structure's own order, without their ids;
 /// adjoining ranges are one. Only for structures that hand over places.
-pub(crate) struct Ranges<'a> {
+pub struct Ranges<'a> {
     out: &'a mut Vec<Range<u32>>,
     /// Ranges before this one are somebody else's.
     first: usize,
@@ -221,7 +221,7 @@ pub(crate) struct Ranges<'a> {
 impl<'a> Ranges<'a> {
     /// Appends to what is there.
     #[inline(always)]
-    pub(crate) fn onto(out: &'a mut Vec<Range<u32>>) -> Self {
+    pub fn onto(out: &'a mut Vec<Range<u32>>) -> Self {
         let first = out.len();
         Ranges { out, first }
     }

@@ -2,10 +2,6 @@
 //! so that the main job needs no file; their provenance is in
 //! `datasets/README.md`.
 
-use super::Scene;
-use super::source::{LoadOptions, parse_bytes};
-use crate::input::InputError;
-
 /// A real scene that is part of the program.
 pub struct Sample {
     pub name: &'static str,
@@ -39,10 +35,6 @@ pub static SAMPLES: &[Sample] = samples! {
 impl Sample {
     pub fn named(name: &str) -> Option<&'static Sample> {
         SAMPLES.iter().find(|s| s.name == name)
-    }
-
-    pub fn load(&self) -> Result<Scene, InputError> {
-        parse_bytes(self.bytes, self.file, self.name, &LoadOptions::default())
     }
 }
 

@@ -102,6 +102,16 @@ fn unknown_scene(word: &str) -> SpecError {
     ))
 }
 
+impl Sample {
+    /// The scene in it.
+    ///
+    /// # Errors
+    /// None for the samples that there are: a test loads each.
+    pub fn load(&self) -> Result<Scene, InputError> {
+        parse_bytes(self.bytes, self.file, self.name, &LoadOptions::default())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

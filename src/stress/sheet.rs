@@ -10,7 +10,7 @@ use crate::culling::CullingTest;
 use crate::geometry::{Aabb, ConvexVolume, Plane};
 use crate::index::{BuildError, DynIndex, caught};
 use crate::oracle::{Oracle, Verdict};
-use crate::query::{AnyView, ItemId, QueryCost};
+use crate::query::{AnyVolume, ItemId, QueryCost};
 use crate::verify::explain_visibility;
 use glam::Vec3;
 
@@ -91,11 +91,11 @@ impl Sheet<'_> {
     pub fn see(
         &self,
         built: &Result<Box<dyn DynIndex>, BuildError>,
-        view: AnyView<'_>,
+        view: AnyVolume<'_>,
     ) -> Result<Vec<String>, String> {
         self.answer(built, |index, cost, out| match cost {
-            None => index.see(view, out),
-            Some(cost) => index.see_counted(view, out, cost),
+            None => index.query(view, out),
+            Some(cost) => index.query_counted(view, out, cost),
         })
     }
 
@@ -211,7 +211,7 @@ impl Sheet<'_> {
         spec: &str,
         built: &Result<Box<dyn DynIndex>, BuildError>,
         test: &str,
-        view: AnyView<'_>,
+        view: AnyVolume<'_>,
         wanted: &Names,
         around: &Surroundings,
         exact: Option<(&Oracle, &Camera)>,
@@ -303,7 +303,7 @@ impl Sheet<'_> {
             for point in &vector.points {
                 let found = self.answer(built, |index, cost, out| match cost {
                     None => index.locate(point.p, out),
-                    Some(cost) => index.locate_counted(point.p, out, cost),
+                    Some(cost) => index.query_counted(point.p.into(), out, cost),
                 });
                 let list: Vec<String> = point.containing.iter().cloned().collect();
                 let right = found.as_ref() == Ok(&list);

@@ -15,7 +15,7 @@ use std::fmt;
 use glam::Vec3;
 
 use crate::geometry::Aabb;
-use crate::query::{AnyView, ItemId};
+use crate::query::{AnyVolume, ItemId};
 
 pub use edges::{edge_scenes, edge_volumes, points_on_faces};
 pub use random::{RandomCase, VOLUME_KINDS};
@@ -23,7 +23,7 @@ pub use trial::{Fault, Trial};
 pub use truth::{ErrorCount, Truth};
 pub use variants::variants;
 
-/// The reference: each box against each plane with [`AnyView::sees`], no
+/// The reference: each box against each plane with [`AnyVolume::sees`], no
 /// structure, no mask, no early way out. O(items * planes) per volume.
 ///
 /// Reuses its memory from query to query.
@@ -78,7 +78,7 @@ impl Reference {
     }
 
     /// Computes the reference answer to a frustum query; its size.
-    pub fn see<'v>(&mut self, items: &[Aabb], view: impl Into<AnyView<'v>>) -> usize {
+    pub fn see<'v>(&mut self, items: &[Aabb], view: impl Into<AnyVolume<'v>>) -> usize {
         let view = view.into();
         let wanted = items.iter().zip(0..).filter(|(b, _)| view.sees(b));
         self.expect(wanted.map(|(_, id)| id))
@@ -133,14 +133,14 @@ impl Reference {
 
 /// The verdict of a volume about one box in words: each plane that matters
 /// with the value of the box's p-vertex, so that a reader can check by hand.
-pub fn explain_visibility<'v>(b: &Aabb, view: impl Into<AnyView<'v>>) -> String {
+pub fn explain_visibility<'v>(b: &Aabb, view: impl Into<AnyVolume<'v>>) -> String {
     let view = view.into();
     let [low, high] = [b.min, b.max].map(|v| format!("({}, {}, {})", v.x, v.y, v.z));
     let bounds = format!("box {low} to {high}");
     if b.is_empty() {
         return format!("{bounds} is empty");
     }
-    let AnyView::Volume(volume) = view else {
+    let AnyVolume::Planes(volume) = view else {
         let seen = if view.sees(b) { "" } else { "not " };
         return format!("{bounds} is {seen}visible to {view:?}");
     };

@@ -6,7 +6,7 @@
 use super::{Difference, Reference};
 use crate::geometry::Aabb;
 use crate::index::caught;
-use crate::query::{AnyView, ItemId};
+use crate::query::{AnyVolume, ItemId};
 
 /// What is wrong with an answer.
 #[derive(Clone, PartialEq, Debug)]
@@ -35,7 +35,7 @@ impl Trial {
     }
 
     /// The question what a view sees, answered by the reference scan. O(items).
-    pub fn see<'v>(&mut self, items: &[Aabb], view: impl Into<AnyView<'v>>) {
+    pub fn see<'v>(&mut self, items: &[Aabb], view: impl Into<AnyVolume<'v>>) {
         self.expected = self.reference.see(items, view);
     }
 

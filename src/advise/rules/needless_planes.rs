@@ -9,7 +9,7 @@ use super::super::omission::{By, Draft, Forced, LeftOutIf, Omission, Way};
 use crate::culling::CameraView;
 use crate::geometry::{Aabb, ConvexVolume, FrustumPlane};
 use crate::index::DynIndex;
-use crate::query::View;
+use crate::query::Predicate;
 use crate::shown::counted;
 
 pub(super) const NAME: &str = "needless-planes";
@@ -53,7 +53,7 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
         on: case.spec.label.clone(),
         kept: Way::Base,
         left_out: Way::Other(Box::new(move |n, out| {
-            case.index.see(views[n].as_any(), out);
+            case.index.query(views[n].as_any(), out);
         })),
         same: true,
         judged: true,
@@ -62,9 +62,9 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
     let on_scan = Forced {
         on: case.scan.label.clone(),
         kept: Way::Other(Box::new(move |n, out| {
-            other.see(case.workload.views[n].as_any(), out);
+            other.query(case.workload.views[n].as_any(), out);
         })),
-        left_out: Way::Other(Box::new(move |n, out| scan.see(fewer[n].as_any(), out))),
+        left_out: Way::Other(Box::new(move |n, out| scan.query(fewer[n].as_any(), out))),
         same: true,
         judged: true,
     };

@@ -65,7 +65,7 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
 /// An index over items of its own, asked by the path's cameras.
 fn asked<'c>(case: &'c Case<'c>, index: Rc<dyn DynIndex>) -> Way<'c> {
     let views = &case.workload.views;
-    Way::Other(Box::new(move |n, out| index.see(views[n].as_any(), out)))
+    Way::Other(Box::new(move |n, out| index.query(views[n].as_any(), out)))
 }
 
 /// Doubled from the smallest, all fewer than `items`.

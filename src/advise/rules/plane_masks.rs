@@ -7,10 +7,10 @@ use std::rc::Rc;
 use super::super::AdviseError;
 use super::super::case::Case;
 use super::super::omission::{By, Draft, Forced, LeftOutIf, Omission, Way};
-use crate::geometry::{Aabb, Blade, Blades, BoxBlock, ConvexVolume, LANES, LaneMask, PlaneMask};
-use crate::index::{FrustumQuery, RegionIndex, Wide};
-use crate::kernel::{Isa, Kernel, Work};
-use crate::query::{ItemId, NoRecorder, QueryCost, Recorder, View};
+use crate::geometry::{Aabb, BoxBlock, ConvexVolume, LANES, LaneMask, PlaneMask};
+use crate::index::{Input, Query, RegionIndex, Wide};
+use crate::kernel::{Isa, Kernel};
+use crate::query::{ItemId, NoRecorder, Planes, Predicate, QueryCost, QueryVolume, Recorder};
 
 pub(super) const NAME: &str = "plane-masks";
 
@@ -34,7 +34,7 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
     );
     let scene = case.scene();
     let kernel = case.spec.execution.kernel;
-    let tree = Wide::build(&scene.items, scene.own_tree.as_ref(), &Default::default())?;
+    let tree = Wide::build(&Input::new(&scene.items), &Default::default())?;
     let tree = Rc::new(tree);
     let volumes: Rc<Vec<ConvexVolume>> = Rc::new(case.volumes().cloned().collect());
     let step = volumes.len().div_ceil(COUNTED).max(1);
@@ -74,37 +74,18 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
     Ok(omission.draft(vec![forced]))
 }
 
-/// A query with a view of one's own, by a kernel.
-struct See<'a, V, R> {
-    tree: &'a Wide,
-    view: &'a V,
-    out: &'a mut Vec<ItemId>,
-    recorder: &'a mut R,
-}
-
-impl<V: View, R: Recorder> Work for See<'_, V, R> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<I: Isa>(self, isa: I) {
-        // A Vec never breaks off.
-        let _ = self
-            .tree
-            .visible_by(isa, self.view, self.out, self.recorder);
-    }
-}
-
-fn see<V: View, R: Recorder>(
+fn see<Q: QueryVolume, R: Recorder>(
     kernel: Kernel,
-    tree: &Wide,
-    view: &V,
-    out: &mut Vec<ItemId>,
+    index: &Wide,
+    volume: &Q,
+    sink: &mut Vec<ItemId>,
     recorder: &mut R,
 ) {
-    kernel.run(See {
-        tree,
-        view,
-        out,
+    // A Vec never breaks off.
+    let _ = kernel.run(Query {
+        index,
+        volume,
+        sink,
         recorder,
     });
 }
@@ -112,16 +93,7 @@ fn see<V: View, R: Recorder>(
 /// The six-plane view with every plane open wherever one is.
 struct Unmasked<'a>(&'a ConvexVolume);
 
-impl View for Unmasked<'_> {
-    type OnePlane<'v, I: Isa>
-        = Blade<I>
-    where
-        Self: 'v;
-    type AllPlanes<'v, I: Isa>
-        = Blades<I>
-    where
-        Self: 'v;
-
+impl Predicate for Unmasked<'_> {
     #[inline(always)]
     fn mask(&self) -> PlaneMask {
         self.0.mask()
@@ -134,6 +106,9 @@ impl View for Unmasked<'_> {
     fn contains(&self, plane: u32, bounds: &Aabb) -> bool {
         self.0.contains(plane, bounds)
     }
+}
+
+impl QueryVolume for Unmasked<'_> {
     #[inline(always)]
     fn kept_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
         self.0.kept_lanes(isa, block, mask)
@@ -148,11 +123,11 @@ impl View for Unmasked<'_> {
         self.0.kept_of_four(isa, blocks, mask)
     }
     #[inline(always)]
-    fn one_plane<I: Isa>(&self, isa: I, plane: u32) -> Blade<I> {
+    fn one_plane<I: Isa>(&self, isa: I, plane: u32) -> impl Planes<I> {
         self.0.one_plane(isa, plane)
     }
     #[inline(always)]
-    fn all_planes<I: Isa>(&self, isa: I) -> Option<Blades<I>> {
+    fn all_planes<I: Isa>(&self, isa: I) -> Option<impl Planes<I>> {
         self.0.all_planes(isa)
     }
     #[inline(always)]
@@ -199,7 +174,7 @@ mod tests {
             )
         });
         let volume = ConvexVolume::from_planes(&planes).unwrap();
-        let tree = Wide::build(&items, None, &Default::default()).unwrap();
+        let tree = Wide::build(&Input::new(&items), &Default::default()).unwrap();
         let ask = |masked: bool| {
             let (mut out, mut cost) = (Vec::new(), QueryCost::default());
             match masked {

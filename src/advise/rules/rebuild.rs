@@ -5,7 +5,7 @@
 use super::super::AdviseError;
 use super::super::case::{Case, asked};
 use super::super::omission::{By, Draft, Forced, LeftOutIf, Omission, Way};
-use crate::measure::{Stopwatch, move_share};
+use crate::measure::{Stopwatch, input_of, move_share};
 
 pub(super) const NAME: &str = "rebuild";
 
@@ -22,10 +22,9 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
         By::Rule,
     );
     let scene = case.scene();
-    let own_tree = scene.own_tree.as_ref();
     let mut items = scene.items.clone();
     let moved = move_share(&mut items, case.options.moved);
-    let mut refitted = case.spec.build_with(&scene.items, own_tree)?;
+    let mut refitted = case.spec.build(input_of(scene, &scene.items))?;
     // Some structures make room for refits at the first one.
     let can = refitted.refit(&scene.items, &moved);
     let watch = Stopwatch::start();
@@ -35,7 +34,7 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
     }
     let refit_ns = watch.lap().cpu_ns;
     let watch = Stopwatch::start();
-    let rebuilt = case.spec.build_with(&items, own_tree)?;
+    let rebuilt = case.spec.build(input_of(scene, &items))?;
     let rebuild_ns = watch.lap().cpu_ns;
     let views = || case.workload.views.clone();
     let forced = Forced {

@@ -7,10 +7,9 @@
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::{BoxTest, Item, PeerParams, Tally, indexable, located_box_by_box, seen_box_by_box};
-use crate::geometry::{Aabb, PlaneTree};
-use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin, RegionIndex};
-use crate::query::{Recorder, Sink};
+use super::{BoxByBox, BoxTest, Item, PeerParams, Tally, indexable};
+use crate::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
+use crate::query::{Context, QueryVolume, Recorder, Sink};
 
 /// What the system reads and writes of an entity.
 struct Entity {
@@ -31,7 +30,7 @@ pub struct PeerBevyStyle {
 /// The layer of every view.
 const LAYER: u32 = 1;
 
-impl PeerBevyStyle {
+impl BoxByBox for PeerBevyStyle {
     #[inline(always)]
     fn search<T: BoxTest, S: Sink, R: Recorder>(
         &self,
@@ -64,7 +63,8 @@ impl RegionIndex for PeerBevyStyle {
     );
     type Params = PeerParams;
 
-    fn build(items: &[Aabb], _: Option<&PlaneTree>, _: &PeerParams) -> Result<Self, BuildError> {
+    fn build(input: &Input<'_>, _: &PeerParams) -> Result<Self, BuildError> {
+        let items = input.items;
         let entity = |item| Entity {
             item,
             layers: LAYER,
@@ -85,7 +85,8 @@ impl RegionIndex for PeerBevyStyle {
         }
     }
 
-    located_box_by_box!();
+    #[inline(always)]
+    fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
+        super::box_by_box::query(self, volume, cx)
+    }
 }
-
-seen_box_by_box!(PeerBevyStyle);

@@ -10,10 +10,10 @@ use ::bvh::flat_bvh::{FlatBvh, FlatNode};
 use glam::Vec3;
 use nalgebra::Point3;
 
-use super::{BoxTest, Item, PeerParams, Tally, indexable, located_box_by_box, seen_box_by_box};
-use crate::geometry::{Aabb, PlaneTree};
-use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin, RegionIndex};
-use crate::query::{Recorder, Sink};
+use super::{BoxByBox, BoxTest, Item, PeerParams, Tally, indexable};
+use crate::geometry::Aabb;
+use crate::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
+use crate::query::{Context, QueryVolume, Recorder, Sink};
 
 /// An item that the crate tells where it put it.
 #[derive(Clone, Copy)]
@@ -137,7 +137,7 @@ macro_rules! peer {
             shapes: Vec<Shape>,
         }
 
-        impl $peer {
+        impl BoxByBox for $peer {
             #[inline(always)]
             fn search<T: BoxTest, S: Sink, R: Recorder>(
                 &self,
@@ -161,11 +161,8 @@ macro_rules! peer {
             const INFO: Info = Info::new($name, $summary, Kind::Tree, Origin::Crate("bvh"));
             type Params = PeerParams;
 
-            fn build(
-                items: &[Aabb],
-                _: Option<&PlaneTree>,
-                _: &PeerParams,
-            ) -> Result<Self, BuildError> {
+            fn build(input: &Input<'_>, _: &PeerParams) -> Result<Self, BuildError> {
+                let items = input.items;
                 let mut shapes = shapes(items)?;
                 let tree = $make(tree_over(&mut shapes));
                 Ok($peer { tree, shapes })
@@ -178,10 +175,12 @@ macro_rules! peer {
                 }
             }
 
-            located_box_by_box!();
+            #[inline(always)]
+    fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
+        super::box_by_box::query(self, volume, cx)
+    }
         }
 
-        seen_box_by_box!($peer);
     };
 }
 
@@ -226,7 +225,6 @@ peer!(
 mod tests {
     use super::*;
     use crate::index::FrustumQuery;
-    use crate::query::NoRecorder;
 
     /// Left to the crate, nothing is found where areas overflow, and where
     /// widths do there is no tree.
@@ -241,14 +239,14 @@ mod tests {
     fn found(point: impl Fn(u16) -> Vec3) {
         let items: Vec<Aabb> = (0..100).map(|i| Aabb::new(point(i), point(i))).collect();
         let all = crate::geometry::ConvexVolume::from_planes(&[]).expect("no planes");
-        let tree = PeerBvh::build(&items, None, &PeerParams {}).expect("sound items");
-        let flat = PeerBvhFlat::build(&items, None, &PeerParams {}).expect("sound items");
+        let tree = PeerBvh::build(&Input::new(&items), &PeerParams {}).expect("sound items");
+        let flat = PeerBvhFlat::build(&Input::new(&items), &PeerParams {}).expect("sound items");
         let (mut seen, mut found) = (Vec::new(), Vec::new());
         for i in 0..100 {
-            let _ = tree.locate(point(i), &mut found, &mut NoRecorder);
-            let _ = flat.locate(point(i), &mut found, &mut NoRecorder);
+            let _ = tree.locate(point(i), &mut found);
+            let _ = flat.locate(point(i), &mut found);
         }
-        let _ = tree.visible(&all, &mut seen, &mut NoRecorder);
+        let _ = tree.visible(&all, &mut seen);
         assert!(found.chunks(2).zip(0..).all(|(pair, id)| pair == [id, id]) && found.len() == 200);
         assert_eq!(seen.len(), 100);
     }

@@ -8,13 +8,10 @@ use std::ops::ControlFlow;
 use bvh_arena::{BoundingVolume, Bvh};
 use glam::Vec3;
 
-use super::{
-    BoxTest, Item, PeerParams, Tally, half_of_largest, indexable, located_box_by_box,
-    seen_box_by_box,
-};
-use crate::geometry::{Aabb, PlaneTree};
-use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin, RegionIndex};
-use crate::query::{Recorder, Sink};
+use super::{BoxByBox, BoxTest, Item, PeerParams, Tally, half_of_largest, indexable};
+use crate::geometry::Aabb;
+use crate::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
+use crate::query::{Context, QueryVolume, Recorder, Sink};
 
 thread_local! {
     /// Merges since it was last set to zero: they tell how deep insertion went.
@@ -59,7 +56,7 @@ pub struct PeerBvhArena {
     half: Vec3,
 }
 
-impl PeerBvhArena {
+impl BoxByBox for PeerBvhArena {
     #[inline(always)]
     fn search<T: BoxTest, S: Sink, R: Recorder>(
         &self,
@@ -109,7 +106,8 @@ impl RegionIndex for PeerBvhArena {
     );
     type Params = PeerParams;
 
-    fn build(items: &[Aabb], _: Option<&PlaneTree>, _: &PeerParams) -> Result<Self, BuildError> {
+    fn build(input: &Input<'_>, _: &PeerParams) -> Result<Self, BuildError> {
+        let items = input.items;
         let items = indexable(items)?;
         let mut tree = Bvh::with_capacity(2 * items.len());
         for place in shuffled(items.len()) {
@@ -144,15 +142,16 @@ impl RegionIndex for PeerBvhArena {
         }
     }
 
-    located_box_by_box!();
+    #[inline(always)]
+    fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
+        super::box_by_box::query(self, volume, cx)
+    }
 }
-
-seen_box_by_box!(PeerBvhArena);
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::query::NoRecorder;
+    use crate::index::FrustumQuery;
 
     #[test]
     fn every_place_comes_once_and_neighbours_lie_apart() {
@@ -173,7 +172,7 @@ mod tests {
     #[test]
     fn a_tree_that_would_be_a_list_is_refused_before_the_stack_overflows() {
         let items = vec![Aabb::around(Vec3::ZERO, Vec3::ONE); 20_000];
-        let error = PeerBvhArena::build(&items, None, &PeerParams {}).err();
+        let error = PeerBvhArena::build(&Input::new(&items), &PeerParams {}).err();
         assert!(
             matches!(error, Some(BuildError::Refused { .. })),
             "{error:?}"
@@ -185,9 +184,9 @@ mod tests {
     fn a_sorted_scene_does_not_become_a_list() {
         let item = |i: u16| Aabb::around(Vec3::X * (f32::from(i) * 2.0), Vec3::splat(0.5));
         let items: Vec<Aabb> = (0..6000).map(item).collect();
-        let tree = PeerBvhArena::build(&items, None, &PeerParams {}).expect("a tree");
+        let tree = PeerBvhArena::build(&Input::new(&items), &PeerParams {}).expect("a tree");
         let mut found = Vec::new();
-        let _ = tree.locate(Vec3::X * 8000.0, &mut found, &mut NoRecorder);
+        let _ = tree.locate(Vec3::X * 8000.0, &mut found);
         assert_eq!(found, [4000]);
     }
 }

@@ -7,13 +7,10 @@ use std::ops::ControlFlow;
 use glam::Vec3;
 use kiddo::{Chebyshev, ImmutableKdTree};
 
-use super::{
-    BoxTest, Item, PeerParams, Tally, half_of_largest, indexable, located_box_by_box,
-    seen_box_by_box,
-};
-use crate::geometry::{Aabb, PlaneTree};
-use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin, RegionIndex};
-use crate::query::{Recorder, Sink};
+use super::{BoxByBox, BoxTest, Item, PeerParams, Tally, half_of_largest, indexable};
+use crate::geometry::Aabb;
+use crate::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
+use crate::query::{Context, QueryVolume, Recorder, Sink};
 
 /// Centres in a tree, items beside it.
 pub struct PeerKiddo {
@@ -24,7 +21,7 @@ pub struct PeerKiddo {
     half: Vec3,
 }
 
-impl PeerKiddo {
+impl BoxByBox for PeerKiddo {
     #[inline(always)]
     fn search<T: BoxTest, S: Sink, R: Recorder>(
         &self,
@@ -76,7 +73,8 @@ impl RegionIndex for PeerKiddo {
     );
     type Params = PeerParams;
 
-    fn build(items: &[Aabb], _: Option<&PlaneTree>, _: &PeerParams) -> Result<Self, BuildError> {
+    fn build(input: &Input<'_>, _: &PeerParams) -> Result<Self, BuildError> {
+        let items = input.items;
         let items = indexable(items)?;
         let centres: Vec<[f32; 3]> = items
             .iter()
@@ -109,7 +107,8 @@ impl RegionIndex for PeerKiddo {
         }
     }
 
-    located_box_by_box!();
+    #[inline(always)]
+    fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
+        super::box_by_box::query(self, volume, cx)
+    }
 }
-
-seen_box_by_box!(PeerKiddo);

@@ -15,9 +15,7 @@ mod parry3d;
 mod rstar;
 
 use super::BuildError;
-use super::box_by_box::{
-    BoxTest, Item, Tally, half_of_largest, indexable, located_box_by_box, seen_box_by_box,
-};
+use super::box_by_box::{self, BoxByBox, BoxTest, Item, Tally, half_of_largest, indexable};
 
 pub use bevy_style::PeerBevyStyle;
 pub use bvh::{PeerBvh, PeerBvhFlat};
@@ -68,7 +66,7 @@ macro_rules! peer_of_tree {
         $(#[$doc])*
         pub struct $peer(Tree);
 
-        impl $peer {
+        impl super::BoxByBox for $peer {
             #[inline(always)]
             fn search<T: super::BoxTest, S: $crate::query::Sink, R: $crate::query::Recorder>(
                 &self,
@@ -89,11 +87,8 @@ macro_rules! peer_of_tree {
             );
             type Params = super::PeerParams;
 
-            fn build(
-                items: &[$crate::geometry::Aabb],
-                _: Option<&$crate::geometry::PlaneTree>,
-                _: &super::PeerParams,
-            ) -> Result<Self, $crate::index::BuildError> {
+            fn build(input: &$crate::index::Input<'_>, _: &super::PeerParams) -> Result<Self, $crate::index::BuildError> {
+                let items = input.items;
                 Tree::build(Self::INFO.name, items, $how).map($peer)
             }
 
@@ -101,10 +96,15 @@ macro_rules! peer_of_tree {
                 self.0.memory()
             }
 
-            super::located_box_by_box!();
+            #[inline(always)]
+            fn query<Q: $crate::query::QueryVolume, C: $crate::query::Context>(
+                &self,
+                volume: &Q,
+                cx: &mut C,
+            ) -> std::ops::ControlFlow<()> {
+                $crate::index::box_by_box::query(self, volume, cx)
+            }
         }
-
-        super::seen_box_by_box!($peer);
     };
 }
 use peer_of_tree;

@@ -6,10 +6,10 @@ use std::ops::ControlFlow;
 use glam::Vec3;
 use rstar::{AABB, ParentNode, RTree, RTreeNode, RTreeObject, SelectionFunction};
 
-use super::{BoxTest, Item, PeerParams, Tally, indexable, located_box_by_box, seen_box_by_box};
-use crate::geometry::{Aabb, PlaneTree};
-use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin, RegionIndex};
-use crate::query::{Recorder, Sink};
+use super::{BoxByBox, BoxTest, Item, PeerParams, Tally, indexable};
+use crate::geometry::Aabb;
+use crate::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
+use crate::query::{Context, QueryVolume, Recorder, Sink};
 
 impl RTreeObject for Item {
     type Envelope = AABB<[f32; 3]>;
@@ -134,7 +134,7 @@ macro_rules! peer {
         $(#[$doc])*
         pub struct $peer(RTree<Item>);
 
-        impl $peer {
+        impl BoxByBox for $peer {
             #[inline(always)]
             fn search<T: BoxTest, S: Sink, R: Recorder>(
                 &self,
@@ -150,11 +150,8 @@ macro_rules! peer {
             const INFO: Info = Info::new($name, $summary, Kind::Tree, Origin::Crate("rstar"));
             type Params = PeerParams;
 
-            fn build(
-                items: &[Aabb],
-                _: Option<&PlaneTree>,
-                _: &PeerParams,
-            ) -> Result<Self, BuildError> {
+            fn build(input: &Input<'_>, _: &PeerParams) -> Result<Self, BuildError> {
+                let items = input.items;
                 Ok($peer(RTree::bulk_load(indexable(items)?)))
             }
 
@@ -162,10 +159,12 @@ macro_rules! peer {
                 memory(&self.0)
             }
 
-            located_box_by_box!();
+            #[inline(always)]
+    fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
+        super::box_by_box::query(self, volume, cx)
+    }
         }
 
-        seen_box_by_box!($peer);
     };
 }
 

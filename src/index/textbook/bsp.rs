@@ -6,12 +6,12 @@ use std::ops::ControlFlow;
 
 use glam::Vec3;
 
-use super::{Items, Node, Slice, TextbookParams, memory_of, records, seen_by_walk, test_items};
+use super::{Items, Node, Slice, TextbookParams, memory_of, records, test_items};
 use crate::geometry::{Aabb, Plane, PlaneTree};
 use crate::index::partition::Record;
 use crate::index::plane_choice::planes_of;
-use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin, RegionIndex};
-use crate::query::{Recorder, Sink};
+use crate::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
+use crate::query::{Context, Predicate, QueryVolume, Recorder};
 
 /// A BSP tree (Fuchs, Kedem and Naylor 1980, "On visible surface generation by a
 /// priori tree structures"; lecture on visibility, slides "BSP trees" and "Region
@@ -134,14 +134,9 @@ impl Planes<'_> {
 impl Split {
     /// Region search. An item in front of a plane has no point behind it, by the
     /// very arithmetic that the point's side is decided by: it is monotone.
-    fn search<S: Sink, R: Recorder>(
-        &self,
-        p: Vec3,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        recorder.node_tested();
-        test_items(self.items.all(), &p, (), sink, recorder)?;
+    fn search<C: Context>(&self, p: Vec3, cx: &mut C) -> ControlFlow<()> {
+        cx.recorder().node_tested();
+        test_items(self.items.all(), &p, p.mask(), cx)?;
         let Some(plane) = self.plane else {
             return ControlFlow::Continue(());
         };
@@ -149,7 +144,7 @@ impl Split {
         // On the plane, both; a NaN (coordinates beyond f32) is on neither.
         for (side, is_there) in self.sides.iter().zip([value >= 0.0, value <= 0.0]) {
             if let (Some(side), true) = (side, is_there) {
-                side.search(p, sink, recorder)?;
+                side.search(p, cx)?;
             }
         }
         ControlFlow::Continue(())
@@ -184,11 +179,12 @@ impl RegionIndex for BspTextbook {
     .textbook();
     type Params = TextbookParams;
 
-    fn build(
-        items: &[Aabb],
-        own: Option<&PlaneTree>,
-        params: &TextbookParams,
-    ) -> Result<Self, BuildError> {
+    fn build(input: &Input<'_>, params: &TextbookParams) -> Result<Self, BuildError> {
+        let Input {
+            items,
+            own_tree: own,
+            ..
+        } = *input;
         params.check(Self::INFO.name)?;
         let records = records(items)?;
         let first = own.and_then(|own| own.root);
@@ -201,17 +197,10 @@ impl RegionIndex for BspTextbook {
         memory_of(self.root(), size_of::<Split>())
     }
 
-    fn locate<S: Sink, R: Recorder>(
-        &self,
-        p: Vec3,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        match self.root() {
-            Some(root) => root.search(p, sink, recorder),
-            None => ControlFlow::Continue(()),
+    fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
+        match (volume.as_point(), self.root()) {
+            (Some(p), Some(root)) => root.search(p, cx),
+            (_, root) => super::query(root, volume, cx),
         }
     }
 }
-
-seen_by_walk!(BspTextbook);

@@ -7,10 +7,10 @@ use obvhs::BvhBuildParams;
 use obvhs::bvh2::builder::build_bvh2;
 use obvhs::bvh2::node::Bvh2Node;
 
-use super::{Items, Node, Slice, TextbookParams, located_by_walk, records, seen_by_walk};
-use crate::geometry::{Aabb, PlaneTree};
+use super::{Items, Node, Slice, TextbookParams, answered_by_walk, records};
+use crate::geometry::Aabb;
 use crate::index::partition::Record;
-use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin, RegionIndex};
+use crate::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
 use crate::query::ItemId;
 
 /// A bounding volume hierarchy (Clark 1976, "Hierarchical geometric models for
@@ -117,11 +117,8 @@ impl RegionIndex for BvhTextbook {
     .textbook();
     type Params = TextbookParams;
 
-    fn build(
-        items: &[Aabb],
-        _: Option<&PlaneTree>,
-        params: &TextbookParams,
-    ) -> Result<Self, BuildError> {
+    fn build(input: &Input<'_>, params: &TextbookParams) -> Result<Self, BuildError> {
+        let items = input.items;
         params.check(Self::INFO.name)?;
         let mut records = records(items)?;
         let mut tree = BvhTextbook {
@@ -162,7 +159,5 @@ impl RegionIndex for BvhTextbook {
         }
     }
 
-    located_by_walk!();
+    answered_by_walk!();
 }
-
-seen_by_walk!(BvhTextbook);

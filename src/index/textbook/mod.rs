@@ -17,8 +17,8 @@ use serde::{Deserialize, Serialize};
 
 use super::partition::Record;
 use super::{BuildError, MemoryUsage, check_range, indexable};
-use crate::geometry::Aabb;
-use crate::query::{Containment, ItemId, Recorder, Region, Sink};
+use crate::geometry::{Aabb, PlaneMask};
+use crate::query::{Containment, Context, ItemId, QueryVolume, Recorder, Sink};
 
 pub use bsp::BspTextbook;
 pub use bvh::BvhTextbook;
@@ -97,29 +97,28 @@ trait Node: Copy {
     fn children(self) -> impl Iterator<Item = Self>;
 }
 
-/// Hands over what a region admits of a subtree: nothing of a node that lies
+/// Hands over what a volume sees of a subtree: nothing of a node that lies
 /// outside, all of one that lies inside; else the node's own items are tested
 /// one by one, and then its children in the same way. O(log n + answers) where
-/// the region is small and the items are.
-fn walk<N: Node, G: Region, S: Sink, R: Recorder>(
+/// the volume is small and the items are.
+fn walk<N: Node, Q: QueryVolume, C: Context>(
     node: N,
-    region: &G,
-    memo: G::Memo,
-    sink: &mut S,
-    recorder: &mut R,
+    volume: &Q,
+    mask: PlaneMask,
+    cx: &mut C,
 ) -> ControlFlow<()> {
-    recorder.node_tested();
-    let (verdict, memo) = region.classify(&node.bounds(), memo, recorder);
+    cx.recorder().node_tested();
+    let (verdict, mask) = volume.classify(&node.bounds(), mask, cx.recorder());
     match verdict {
-        Containment::Outside => recorder.subtree_rejected(),
+        Containment::Outside => cx.recorder().subtree_rejected(),
         Containment::Inside => {
-            let count = report(node, sink)?;
-            recorder.subtree_accepted(count);
+            let count = report(node, cx.sink())?;
+            cx.recorder().subtree_accepted(count);
         }
         Containment::Straddles => {
-            test_items(node.items(), region, memo, sink, recorder)?;
+            test_items(node.items(), volume, mask, cx)?;
             for child in node.children() {
-                walk(child, region, memo, sink, recorder)?;
+                walk(child, volume, mask, cx)?;
             }
         }
     }
@@ -139,18 +138,17 @@ fn report<N: Node, S: Sink>(node: N, sink: &mut S) -> ControlFlow<(), usize> {
     ControlFlow::Continue(count)
 }
 
-/// Hands over those of some items that a region admits.
-fn test_items<G: Region, S: Sink, R: Recorder>(
+/// Hands over those of some items that a volume sees.
+fn test_items<Q: QueryVolume, C: Context>(
     (boxes, ids): Slice<'_>,
-    region: &G,
-    memo: G::Memo,
-    sink: &mut S,
-    recorder: &mut R,
+    volume: &Q,
+    mask: PlaneMask,
+    cx: &mut C,
 ) -> ControlFlow<()> {
     for (bounds, id) in boxes.iter().zip(ids) {
-        recorder.items_tested(1);
-        if region.admits(bounds, memo, recorder) {
-            sink.accept(std::slice::from_ref(id))?;
+        cx.recorder().items_tested(1);
+        if volume.admits(bounds, mask, cx.recorder()) {
+            cx.accept(std::slice::from_ref(id))?;
         }
     }
     ControlFlow::Continue(())
@@ -176,50 +174,27 @@ fn memory_of<N: Node>(root: Option<N>, bytes_per_node: usize) -> MemoryUsage {
 }
 
 /// The walk from the root, if there is one.
-fn query<N: Node, G: Region, S: Sink, R: Recorder>(
+fn query<N: Node, Q: QueryVolume, C: Context>(
     root: Option<N>,
-    region: &G,
-    sink: &mut S,
-    recorder: &mut R,
+    volume: &Q,
+    cx: &mut C,
 ) -> ControlFlow<()> {
     match root {
-        Some(root) => walk(root, region, region.start(), sink, recorder),
+        Some(root) => walk(root, volume, volume.mask(), cx),
         None => ControlFlow::Continue(()),
     }
 }
 
-/// [`super::FrustumQuery`] of a structure with a method `root`.
-macro_rules! seen_by_walk {
-    ($structure:ty) => {
-        impl $crate::index::FrustumQuery for $structure {
-            fn visible<
-                V: $crate::query::View,
-                S: $crate::query::Sink,
-                R: $crate::query::Recorder,
-            >(
-                &self,
-                view: &V,
-                sink: &mut S,
-                recorder: &mut R,
-            ) -> std::ops::ControlFlow<()> {
-                super::query(self.root(), view, sink, recorder)
-            }
-        }
-    };
-}
-use seen_by_walk;
-
-/// Region search of such a structure.
-macro_rules! located_by_walk {
+/// What a structure with a method `root` answers by the walk.
+macro_rules! answered_by_walk {
     () => {
-        fn locate<S: $crate::query::Sink, R: $crate::query::Recorder>(
+        fn query<Q: $crate::query::QueryVolume, C: $crate::query::Context>(
             &self,
-            p: glam::Vec3,
-            sink: &mut S,
-            recorder: &mut R,
+            volume: &Q,
+            cx: &mut C,
         ) -> std::ops::ControlFlow<()> {
-            super::query(self.root(), &p, sink, recorder)
+            super::query(self.root(), volume, cx)
         }
     };
 }
-use located_by_walk;
+use answered_by_walk;

@@ -3,12 +3,10 @@
 
 use glam::Vec3;
 
-use super::{
-    Items, Node, Slice, TextbookParams, located_by_walk, memory_of, records, seen_by_walk,
-};
-use crate::geometry::{Aabb, PlaneTree};
+use super::{Items, Node, Slice, TextbookParams, answered_by_walk, memory_of, records};
+use crate::geometry::Aabb;
 use crate::index::partition::Record;
-use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin, RegionIndex};
+use crate::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
 
 /// An octree (Meagher 1982, "Geometric modeling using octree encoding") as the
 /// lecture on visibility means it (slides "Visibility", "Region search"). O(log n
@@ -123,11 +121,8 @@ impl RegionIndex for OctreeTextbook {
     .textbook();
     type Params = TextbookParams;
 
-    fn build(
-        items: &[Aabb],
-        _: Option<&PlaneTree>,
-        params: &TextbookParams,
-    ) -> Result<Self, BuildError> {
+    fn build(input: &Input<'_>, params: &TextbookParams) -> Result<Self, BuildError> {
+        let items = input.items;
         params.check(Self::INFO.name)?;
         let records = records(items)?;
         let axes = [0, 1, 2];
@@ -140,7 +135,5 @@ impl RegionIndex for OctreeTextbook {
         memory_of(self.root(), size_of::<Cell<8>>())
     }
 
-    located_by_walk!();
+    answered_by_walk!();
 }
-
-seen_by_walk!(OctreeTextbook);

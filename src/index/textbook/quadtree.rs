@@ -3,10 +3,10 @@
 //! cells are columns through the whole scene.
 
 use super::octree::{Cell, root_cell};
-use super::{TextbookParams, located_by_walk, memory_of, records, seen_by_walk};
-use crate::geometry::{Aabb, PlaneTree};
+use super::{TextbookParams, answered_by_walk, memory_of, records};
+use crate::geometry::Aabb;
 use crate::index::quadtree::widest_axes;
-use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin, RegionIndex};
+use crate::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
 
 /// A quadtree (Finkel and Bentley 1974, "Quad trees: a data structure for
 /// retrieval on composite keys") as the lecture on visibility means it (slides
@@ -34,11 +34,8 @@ impl RegionIndex for QuadtreeTextbook {
     .textbook();
     type Params = TextbookParams;
 
-    fn build(
-        items: &[Aabb],
-        _: Option<&PlaneTree>,
-        params: &TextbookParams,
-    ) -> Result<Self, BuildError> {
+    fn build(input: &Input<'_>, params: &TextbookParams) -> Result<Self, BuildError> {
+        let items = input.items;
         params.check(Self::INFO.name)?;
         let records = records(items)?;
         let scene = Aabb::union_of(items);
@@ -52,7 +49,5 @@ impl RegionIndex for QuadtreeTextbook {
         memory_of(self.root(), size_of::<Cell<4>>())
     }
 
-    located_by_walk!();
+    answered_by_walk!();
 }
-
-seen_by_walk!(QuadtreeTextbook);

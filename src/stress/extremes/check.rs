@@ -9,7 +9,7 @@ use crate::culling::{ARITHMETICS, Arithmetic, Culling, CullingError, CullingTest
 use crate::geometry::Aabb;
 use crate::index::{DynIndex, StructureSpec};
 use crate::oracle::{Judgement, Oracle, Pose, Verdict};
-use crate::query::{AnyView, ItemId};
+use crate::query::{AnyVolume, ItemId};
 use crate::stress::slack;
 use crate::verify::{self, Trial};
 
@@ -332,7 +332,7 @@ const HUGE: f64 = 1e38;
 fn ask(
     built: &[(&str, Box<dyn DynIndex>)],
     name: &str,
-    view: AnyView<'_>,
+    view: AnyVolume<'_>,
     seen: &[bool],
     items: &[Aabb],
     found: &mut Findings,
@@ -342,7 +342,7 @@ fn ask(
     trial.expect(wanted.map(|(_, id): (_, ItemId)| id));
     for (structure, index) in built {
         found.tried(&mut trial, structure, name, items.len(), |out| {
-            index.see(view, out);
+            index.query(view, out);
         });
     }
 }

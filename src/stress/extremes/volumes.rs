@@ -10,7 +10,7 @@ use crate::geometry::{
 };
 use crate::index::StructureSpec;
 use crate::oracle::{Oracle, Verdict};
-use crate::query::{AnyView, ItemId};
+use crate::query::{AnyVolume, ItemId};
 use crate::scene::{Dice, Regions};
 use crate::verify::{RandomCase, Trial, VOLUME_KINDS, explain_visibility};
 
@@ -112,7 +112,7 @@ impl PlanesCase {
         let spheres = Spheres::new(&self.volume);
         let relative = RelativeVolume::about(self.point, &self.volume);
         let cubes: Vec<Aabb> = self.items.iter().map(sphere_cube).collect();
-        let mut views: Vec<(&str, AnyView, &[Aabb])> = vec![
+        let mut views: Vec<(&str, AnyVolume, &[Aabb])> = vec![
             ("six-plane", (&self.volume).into(), &self.items),
             ("six-plane f64", (&wide).into(), &self.items),
             ("sphere", (&spheres).into(), &cubes),
@@ -136,7 +136,7 @@ impl PlanesCase {
                 let wanted = items.iter().zip(0..).filter(|(b, _)| view.sees(b));
                 trial.expect(wanted.map(|(_, id): (_, ItemId)| id));
                 found.tried(&mut trial, &spec.label, name, self.items.len(), |out| {
-                    index.see(*view, out);
+                    index.query(*view, out);
                 });
             }
             trial.expect(Regions::Items.holding(self.point, &self.items));

@@ -9,7 +9,7 @@ use crate::threads::Pool;
 /// declined if not; it has a tree order if it says so, and then answers in
 /// ranges of it are the reference set. A build looks at how many threads it may
 /// use if it says so, and answers the same with several.
-pub fn declared_capabilities_are_true<T: FrustumQuery>() -> Outcome {
+pub fn declared_capabilities_are_true<T: RegionIndex>() -> Outcome {
     let says = T::INFO.capabilities;
     each(generated_scenes(500)?, |asked, index: &mut T| {
         let ordered = index.tree_order().is_some();
@@ -20,7 +20,12 @@ pub fn declared_capabilities_are_true<T: FrustumQuery>() -> Outcome {
         if let Some(ids) = index.tree_order() {
             for volume in &asked.volumes {
                 let mut ranges = Vec::new();
-                let _ = index.visible(volume, &mut Ranges::onto(&mut ranges), &mut NoRecorder);
+                let _ = ask(
+                    index,
+                    volume,
+                    &mut Ranges::onto(&mut ranges),
+                    &mut NoRecorder,
+                );
                 let places = ranges.into_iter().flatten();
                 let found = places.map(|place| ids.get(place as usize).copied());
                 let found: Option<Vec<ItemId>> = found.collect();
@@ -32,7 +37,7 @@ pub fn declared_capabilities_are_true<T: FrustumQuery>() -> Outcome {
             }
         }
         let pool = Pool::new(3);
-        let shared = T::build_by(&pool, &asked.items, None, &T::Params::default());
+        let shared = T::build(&Input::new(&asked.items).pool(&pool), &T::Params::default());
         let shared = shared.map_err(|error| error.to_string())?;
         let was_asked = pool.was_asked();
         ensure(was_asked == says.threaded_build, || {

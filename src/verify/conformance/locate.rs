@@ -6,18 +6,19 @@ use std::ops::ControlFlow;
 use glam::Vec3;
 
 use super::*;
+use crate::kernel::BASELINE;
 use crate::query::{Located, ManySink};
 
-/// `locate` returns exactly the boxes that hold the point, bounds closed.
-pub fn region_search_is_the_closed_box_scan<T: FrustumQuery>() -> Outcome {
+/// A point is answered with exactly the boxes that hold the point, bounds closed.
+pub fn region_search_is_the_closed_box_scan<T: RegionIndex>() -> Outcome {
     let scenes = edges().chain(cases(SEEDS)).chain(generated_scenes(500)?);
     each(scenes, |asked, index: &mut T| asked.locate_is_right(index))
 }
 
-/// `locate_many` hands over, for every point in order, what `locate` does:
+/// `query_many` hands over, for every point in order, what `query` does:
 /// whatever the size of the batch, with points that come again, lie on faces or
 /// outside, or are no numbers; and stops where its sink does.
-pub fn many_points_are_answered_as_one_by_one<T: FrustumQuery>() -> Outcome {
+pub fn many_points_are_answered_as_one_by_one<T: RegionIndex>() -> Outcome {
     let scenes = edges().chain(cases(SEEDS)).chain([cells()]);
     let scenes = scenes.chain(generated_scenes(500)?);
     each(scenes, |asked, index: &mut T| {
@@ -33,13 +34,13 @@ pub fn many_points_are_answered_as_one_by_one<T: FrustumQuery>() -> Outcome {
         for count in [0, 1, 3, points.len()] {
             let points = &points[..count.min(points.len())];
             let (mut many, count) = (Located::default(), points.len());
-            let flow = index.locate_many(points, &mut many);
+            let flow = index.query_many(BASELINE, points, &mut many);
             ensure(many.len() == count && flow.is_continue(), || {
                 format!("{} of {count} points answered, {flow:?}", many.len())
             })?;
             for (&p, found) in points.iter().zip(many.iter()) {
                 trial.expect(asked.holding(p));
-                let alone = located(index, p);
+                let alone = seen(index, &p);
                 let answer = trial.ask(|ids| ids.extend_from_slice(found));
                 let fault = answer.err().map(|fault| fault.explained(|_| None));
                 ensure(fault.is_none() && found == alone, || {
@@ -50,7 +51,7 @@ pub fn many_points_are_answered_as_one_by_one<T: FrustumQuery>() -> Outcome {
         if points.len() > 1 {
             let most = points.len() as u32 / 2;
             let mut sink = StopsAfter { most, got: 0 };
-            let flow = index.locate_many(&points, &mut sink);
+            let flow = index.query_many(BASELINE, &points, &mut sink);
             ensure(flow.is_break() && sink.got == most, || {
                 format!("stopped after {most} points, got {} and {flow:?}", sink.got)
             })?;

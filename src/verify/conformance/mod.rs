@@ -1,5 +1,5 @@
 //! What every structure must do, one function per property of the contract in
-//! [`RegionIndex`](crate::index::RegionIndex) and [`FrustumQuery`].
+//! [`RegionIndex`].
 //! [`conformance!`](crate::conformance)
 //! makes a test of each; an error says what differed and on which scene.
 
@@ -15,12 +15,12 @@ use glam::Vec3;
 
 use super::Trial;
 use crate::geometry::{Aabb, ConvexVolume, Plane};
-use crate::index::{BuildError, FrustumQuery};
-use crate::query::{Containment, ItemId, NoRecorder, QueryCost, Region, Sink};
+use crate::index::{BuildError, Input, RegionIndex};
+use crate::query::{Containment, ItemId, NoRecorder, Predicate, QueryCost, Sink};
 use crate::scene::Dice;
 
 use questions::{
-    Outcome, Questions, build, cases, each, edges, ensure, generated_scenes, located, points, seen,
+    Outcome, Questions, ask, build, cases, each, edges, ensure, generated_scenes, points, seen,
     sorted,
 };
 
@@ -93,7 +93,7 @@ pub struct Property {
 }
 
 /// All properties for a structure, in the order of the list.
-pub fn properties<T: FrustumQuery>() -> &'static [Property] {
+pub fn properties<T: RegionIndex>() -> &'static [Property] {
     crate::conformance!(@each table T)
 }
 
@@ -102,14 +102,14 @@ const SEEDS: Range<u64> = 0..64;
 
 /// `visible` returns exactly what a look at every box returns, where scenes
 /// are degenerate and planes touch boxes.
-pub fn reference_set_on_edge_scenes<T: FrustumQuery>() -> Outcome {
+pub fn reference_set_on_edge_scenes<T: RegionIndex>() -> Outcome {
     each(edges(), |asked, index: &mut T| {
         asked.visible_is_right(index)
     })
 }
 
 /// The same on [`RandomCase`](super::RandomCase)s.
-pub fn reference_set_on_random_cases<T: FrustumQuery>() -> Outcome {
+pub fn reference_set_on_random_cases<T: RegionIndex>() -> Outcome {
     let four_times = SEEDS.start..SEEDS.end * 4;
     each(cases(four_times), |asked, index: &mut T| {
         asked.visible_is_right(index)
@@ -117,14 +117,14 @@ pub fn reference_set_on_random_cases<T: FrustumQuery>() -> Outcome {
 }
 
 /// The same on small generated worlds, through cameras.
-pub fn reference_set_on_generated_scenes<T: FrustumQuery>() -> Outcome {
+pub fn reference_set_on_generated_scenes<T: RegionIndex>() -> Outcome {
     each(generated_scenes(1500)?, |asked, index: &mut T| {
         asked.visible_is_right(index)
     })
 }
 
 /// The same boxes in another order give the same set.
-pub fn order_of_items_changes_nothing<T: FrustumQuery>() -> Outcome {
+pub fn order_of_items_changes_nothing<T: RegionIndex>() -> Outcome {
     let mut turns = (1..).step_by(7);
     each(cases(SEEDS), |asked, index: &mut T| {
         let (volume, count) = (&asked.volumes[0], asked.items.len());
@@ -149,7 +149,7 @@ pub fn order_of_items_changes_nothing<T: FrustumQuery>() -> Outcome {
 }
 
 /// A volume with more planes sees nothing that the one with fewer does not.
-pub fn smaller_volume_sees_a_subset<T: FrustumQuery>() -> Outcome {
+pub fn smaller_volume_sees_a_subset<T: RegionIndex>() -> Outcome {
     let mut others = cases(SEEDS.start + 1..SEEDS.end + 1);
     each(cases(SEEDS), |asked, index: &mut T| {
         let more = others.next().map_or(vec![], |other| other.volumes);
@@ -169,7 +169,7 @@ pub fn smaller_volume_sees_a_subset<T: FrustumQuery>() -> Outcome {
 
 /// A volume that the scene's bounds lie wholly inside of sees every item that
 /// is not empty; one that they lie outside of sees none.
-pub fn inside_means_all_and_outside_none<T: FrustumQuery>() -> Outcome {
+pub fn inside_means_all_and_outside_none<T: RegionIndex>() -> Outcome {
     each(cases(SEEDS), |asked, index: &mut T| {
         let bounds = Aabb::union_of(&asked.items);
         if bounds.is_empty() {
@@ -187,7 +187,7 @@ pub fn inside_means_all_and_outside_none<T: FrustumQuery>() -> Outcome {
         for volume in made.into_iter().chain([Ok(asked.volumes[0].clone())]) {
             let volume = volume.map_err(|error| error.to_string())?;
             let found = seen(index, &volume).len();
-            let (verdict, _) = volume.classify(&bounds, volume.start(), &mut NoRecorder);
+            let (verdict, _) = volume.classify(&bounds, volume.mask(), &mut NoRecorder);
             let right = match verdict {
                 Containment::Inside => found == sound,
                 Containment::Outside => found == 0,
@@ -214,15 +214,15 @@ impl Slices {
     }
 
     /// Takes what the camera of a random case sees, or what holds its point.
-    fn ask<T: FrustumQuery>(
+    fn ask<T: RegionIndex>(
         &mut self,
         index: &T,
         case: &Questions,
         region_search: bool,
     ) -> ControlFlow<()> {
         match case.points.last() {
-            Some(&p) if region_search => index.locate(p, self, &mut NoRecorder),
-            _ => index.visible(&case.volumes[0], self, &mut NoRecorder),
+            Some(p) if region_search => ask(index, p, self, &mut NoRecorder),
+            _ => ask(index, &case.volumes[0], self, &mut NoRecorder),
         }
     }
 }
@@ -239,9 +239,9 @@ impl Sink for Slices {
 
 /// No id is handed over twice or does not exist, in one slice or over all;
 /// the query ends with `Continue`; any sink gets the same ids.
-pub fn each_id_comes_once<T: FrustumQuery>() -> Outcome {
+pub fn each_id_comes_once<T: RegionIndex>() -> Outcome {
     each(cases(SEEDS), |asked, index: &mut T| {
-        let located = asked.points.last().map(|&p| located(index, p));
+        let located = asked.points.last().map(|p| seen(index, p));
         let answers = [seen(index, &asked.volumes[0]), located.unwrap_or_default()];
         for (region_search, collected) in [false, true].into_iter().zip(answers) {
             let mut sink = Slices::up_to(usize::MAX);
@@ -263,7 +263,7 @@ pub fn each_id_comes_once<T: FrustumQuery>() -> Outcome {
 }
 
 /// The same items give the same structure: the same ids in the same order.
-pub fn building_again_gives_the_same_structure<T: FrustumQuery>() -> Outcome {
+pub fn building_again_gives_the_same_structure<T: RegionIndex>() -> Outcome {
     each(cases(SEEDS), |asked, index: &mut T| {
         let same = asked.answers(index) == asked.answers(&build::<T>(&asked.items)?);
         ensure(same, || "built twice, answered differently".to_owned())
@@ -272,7 +272,7 @@ pub fn building_again_gives_the_same_structure<T: FrustumQuery>() -> Outcome {
 
 /// A NaN or infinite bound makes the build fail and is named, whatever box
 /// and coordinate it stands in; the first one, if there are more.
-pub fn bad_items_are_refused_and_named<T: FrustumQuery>() -> Outcome {
+pub fn bad_items_are_refused_and_named<T: RegionIndex>() -> Outcome {
     let sound: Vec<Aabb> = (0..40u8)
         .map(|i| Aabb::around(Vec3::splat(f32::from(i)), Vec3::ONE))
         .collect();
@@ -285,7 +285,7 @@ pub fn bad_items_are_refused_and_named<T: FrustumQuery>() -> Outcome {
                     let corner = [&mut b.min, &mut b.max].into_iter().nth(coordinate / 3);
                     corner.into_iter().for_each(|c| c[coordinate % 3] = value);
                 }
-                let error = T::build(&items, None, &T::Params::default()).err();
+                let error = T::build(&Input::new(&items), &T::Params::default()).err();
                 let named = matches!(
                     error, Some(BuildError::NonFiniteItem { item: named, .. }) if named == item
                 );
@@ -301,7 +301,7 @@ pub fn bad_items_are_refused_and_named<T: FrustumQuery>() -> Outcome {
 
 /// A sink that breaks gets no further call, has what came first, and the
 /// query says `Break`.
-pub fn a_sink_that_breaks_is_not_called_again<T: FrustumQuery>() -> Outcome {
+pub fn a_sink_that_breaks_is_not_called_again<T: RegionIndex>() -> Outcome {
     let mut broken = 0;
     each(cases(SEEDS), |asked, index: &mut T| {
         for region_search in [false, true] {
@@ -329,7 +329,7 @@ pub fn a_sink_that_breaks_is_not_called_again<T: FrustumQuery>() -> Outcome {
 
 /// A counted query gives the same ids; every answer was either tested or
 /// accepted with its subtree; no test evaluates a plane twice.
-pub fn counters_are_plausible<T: FrustumQuery>() -> Outcome {
+pub fn counters_are_plausible<T: RegionIndex>() -> Outcome {
     let scenes = generated_scenes(500)?.into_iter().chain(cases(SEEDS));
     each(scenes, |asked, index: &mut T| {
         let counted = |ids: Vec<ItemId>, plain: Vec<ItemId>, cost: QueryCost, planes: usize| {
@@ -343,13 +343,13 @@ pub fn counters_are_plausible<T: FrustumQuery>() -> Outcome {
         };
         for volume in &asked.volumes {
             let (mut ids, mut cost) = (Vec::new(), QueryCost::default());
-            let _ = index.visible(volume, &mut ids, &mut cost);
+            let _ = ask(index, volume, &mut ids, &mut cost);
             counted(ids, seen(index, volume), cost, volume.planes().len())?;
         }
-        for &p in &asked.points {
+        for p in &asked.points {
             let (mut ids, mut cost) = (Vec::new(), QueryCost::default());
-            let _ = index.locate(p, &mut ids, &mut cost);
-            counted(ids, located(index, p), cost, 0)?;
+            let _ = ask(index, p, &mut ids, &mut cost);
+            counted(ids, seen(index, p), cost, 0)?;
         }
         Ok(())
     })

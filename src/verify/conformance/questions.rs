@@ -2,7 +2,7 @@
 //! got and compared with the reference. What a structure must do with them is
 //! the properties' business.
 
-use std::ops::Range;
+use std::ops::{ControlFlow, Range};
 
 use glam::{DVec3, Vec3};
 
@@ -10,28 +10,33 @@ use super::super::{RandomCase, Trial, edge_scenes, edge_volumes};
 use super::super::{explain_containment, explain_visibility};
 use crate::camera::{Camera, CameraError, Frame, Lens, PlaneOptions, Surroundings};
 use crate::geometry::{Aabb, ConvexVolume};
-use crate::index::{FrustumQuery, RegionIndex};
-use crate::query::{ItemId, NoRecorder};
+use crate::index::{Input, RegionIndex};
+use crate::kernel::BASELINE;
+use crate::query::{ItemId, NoRecorder, QueryContext, QueryVolume, Recorder, Sink};
 use crate::scene;
 
 /// Why a property does not hold.
 pub(super) type Outcome = Result<(), String>;
 
 pub(super) fn build<T: RegionIndex>(items: &[Aabb]) -> Result<T, String> {
-    T::build(items, None, &T::Params::default()).map_err(|error| error.to_string())
+    T::build(&Input::new(items), &T::Params::default()).map_err(|error| error.to_string())
+}
+
+/// Asks by the portable instruction set; `Break` if the sink broke off.
+pub(super) fn ask<T: RegionIndex, Q: QueryVolume, S: Sink, R: Recorder>(
+    index: &T,
+    volume: &Q,
+    sink: &mut S,
+    recorder: &mut R,
+) -> ControlFlow<()> {
+    index.query(volume, &mut QueryContext::new(BASELINE, sink, recorder))
 }
 
 /// The answer in the structure's own order.
-pub(super) fn seen<T: FrustumQuery>(index: &T, volume: &ConvexVolume) -> Vec<ItemId> {
+pub(super) fn seen<T: RegionIndex, Q: QueryVolume>(index: &T, volume: &Q) -> Vec<ItemId> {
     let mut ids = Vec::new();
     // A Vec never breaks off.
-    let _ = index.visible(volume, &mut ids, &mut NoRecorder);
-    ids
-}
-
-pub(super) fn located<T: RegionIndex>(index: &T, p: Vec3) -> Vec<ItemId> {
-    let mut ids = Vec::new();
-    let _ = index.locate(p, &mut ids, &mut NoRecorder);
+    let _ = ask(index, volume, &mut ids, &mut NoRecorder);
     ids
 }
 
@@ -55,7 +60,7 @@ pub(super) struct Questions {
 
 /// Whether a property holds for a structure, built over each of the scenes. An
 /// error begins with the names of both.
-pub(super) fn each<T: FrustumQuery>(
+pub(super) fn each<T: RegionIndex>(
     scenes: impl IntoIterator<Item = Questions>,
     mut holds: impl FnMut(&mut Questions, &mut T) -> Outcome,
 ) -> Outcome {
@@ -91,7 +96,7 @@ pub(super) fn cases(seeds: Range<u64>) -> impl Iterator<Item = Questions> {
 }
 
 impl Questions {
-    pub(super) fn visible_is_right<T: FrustumQuery>(&self, index: &T) -> Outcome {
+    pub(super) fn visible_is_right<T: RegionIndex>(&self, index: &T) -> Outcome {
         let mut trial = Trial::new(self.items.len());
         for (i, volume) in self.volumes.iter().enumerate() {
             trial.see(&self.items, volume);
@@ -106,14 +111,14 @@ impl Questions {
         let mut trial = Trial::new(self.items.len());
         for &p in &self.points {
             trial.expect(self.holding(p));
-            let answer = trial.ask(|ids| *ids = located(index, p));
+            let answer = trial.ask(|ids| *ids = seen(index, &p));
             let why = |id: usize| Some(explain_containment(self.items.get(id)?, p));
             answer.map_err(|fault| format!("point {p}: {}", fault.explained(why)))?;
         }
         Ok(())
     }
 
-    pub(super) fn both_are_right<T: FrustumQuery>(&self, index: &T) -> Outcome {
+    pub(super) fn both_are_right<T: RegionIndex>(&self, index: &T) -> Outcome {
         self.visible_is_right(index)?;
         self.locate_is_right(index)
     }
@@ -126,9 +131,9 @@ impl Questions {
     }
 
     /// All answers in the structure's own order: equal for equal structures.
-    pub(super) fn answers<T: FrustumQuery>(&self, index: &T) -> Vec<Vec<ItemId>> {
+    pub(super) fn answers<T: RegionIndex>(&self, index: &T) -> Vec<Vec<ItemId>> {
         let visible = self.volumes.iter().map(|volume| seen(index, volume));
-        let holding = self.points.iter().map(|&p| located(index, p));
+        let holding = self.points.iter().map(|&p| seen(index, &p));
         visible.chain(holding).collect()
     }
 }

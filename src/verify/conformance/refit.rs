@@ -5,7 +5,7 @@ use super::*;
 
 /// Brings an index up to date: by refitting where it can, else by building.
 /// An index that cannot must not have changed.
-fn update<T: FrustumQuery>(index: &mut T, asked: &Questions, moved: &[ItemId]) -> Outcome {
+fn update<T: RegionIndex>(index: &mut T, asked: &Questions, moved: &[ItemId]) -> Outcome {
     let before = asked.answers(index);
     if index.refit(&asked.items, moved) {
         return Ok(());
@@ -19,7 +19,7 @@ fn update<T: FrustumQuery>(index: &mut T, asked: &Questions, moved: &[ItemId]) -
 
 /// After 0.1 %, 1 %, 10 % and 100 % of the items have moved, one after the
 /// other, a structure that refits answers as one built anew.
-pub fn refit_equals_a_fresh_build<T: FrustumQuery>() -> Outcome {
+pub fn refit_equals_a_fresh_build<T: RegionIndex>() -> Outcome {
     let degenerate = ["all the same", "needles", "inverted among sound"];
     let degenerate = edges().filter(|asked| degenerate.contains(&asked.scene.as_str()));
     let scenes = generated_scenes(1000)?.into_iter().chain(degenerate);
@@ -54,7 +54,7 @@ pub fn refit_equals_a_fresh_build<T: FrustumQuery>() -> Outcome {
 }
 
 /// An item that becomes empty is gone, and one that becomes sound is there.
-pub fn items_that_come_and_go_are_followed<T: FrustumQuery>() -> Outcome {
+pub fn items_that_come_and_go_are_followed<T: RegionIndex>() -> Outcome {
     let names = ["one", "coplanar", "inverted among sound", "only inverted"];
     let scenes = edges().filter(|asked| names.contains(&asked.scene.as_str()));
     each(scenes, |asked, index: &mut T| {

@@ -4,12 +4,12 @@
 
 use super::*;
 use crate::geometry::{RelativeVolume, Spheres, WidePlane, WideVolume, sphere_cube};
-use crate::query::View;
+use crate::query::QueryVolume;
 
 /// `visible` returns exactly `{ i : view.sees(items[i]) }` for every kind of
-/// [`View`], over the items and over the cubes of their spheres; a counted
+/// [`QueryVolume`], over the items and over the cubes of their spheres; a counted
 /// query gives the same ids and evaluates no plane twice.
-pub fn every_view_sees_what_the_scan_sees<T: FrustumQuery>() -> Outcome {
+pub fn every_view_sees_what_the_scan_sees<T: RegionIndex>() -> Outcome {
     // Every kind of plane set, not each of them at each of its places.
     each(edges(), |asked, index: &mut T| {
         check(asked, index, 5, usize::MAX)
@@ -23,7 +23,7 @@ pub fn every_view_sees_what_the_scan_sees<T: FrustumQuery>() -> Outcome {
 }
 
 /// Asks with every kind of view of some of the volumes.
-fn check<T: FrustumQuery>(asked: &Questions, index: &T, step: usize, most: usize) -> Outcome {
+fn check<T: RegionIndex>(asked: &Questions, index: &T, step: usize, most: usize) -> Outcome {
     let items = &asked.items;
     let cubes: Vec<Aabb> = items.iter().map(sphere_cube).collect();
     let index_of_cubes: T = build(&cubes)?;
@@ -38,6 +38,16 @@ fn check<T: FrustumQuery>(asked: &Questions, index: &T, step: usize, most: usize
             right("planes about the eye", index, items, &relative)?;
         }
     }
+    // A box at either end, and all of them.
+    for sought in [
+        items.first().copied(),
+        items.last().copied(),
+        Some(Aabb::union_of(items)),
+    ] {
+        if let Some(sought) = sought.filter(|b| !b.is_empty()) {
+            right("a box", index, items, &sought)?;
+        }
+    }
     Ok(())
 }
 
@@ -48,12 +58,17 @@ fn finer(volume: &ConvexVolume) -> Vec<WidePlane> {
     turned.collect()
 }
 
-fn right<T: FrustumQuery, V: View>(kind: &str, index: &T, items: &[Aabb], view: &V) -> Outcome {
+fn right<T: RegionIndex, Q: QueryVolume>(
+    kind: &str,
+    index: &T,
+    items: &[Aabb],
+    view: &Q,
+) -> Outcome {
     let mut trial = Trial::new(items.len());
     let wanted = items.iter().zip(0..).filter(|(b, _)| view.sees(b));
     trial.expect(wanted.map(|(_, id)| id));
     let answer = trial.ask(|ids| {
-        let _ = index.visible(view, ids, &mut NoRecorder);
+        let _ = ask(index, view, ids, &mut NoRecorder);
     });
     let why = |id: usize| {
         let b = items.get(id)?;
@@ -61,8 +76,8 @@ fn right<T: FrustumQuery, V: View>(kind: &str, index: &T, items: &[Aabb], view: 
     };
     let found = answer.map_err(|fault| format!("{kind}: {}", fault.explained(why)))?;
     let (mut counted, mut cost) = (Vec::new(), QueryCost::default());
-    let _ = index.visible(view, &mut counted, &mut cost);
-    let most = cost.comparisons() * u64::from(view.mask().count_ones());
+    let _ = ask(index, view, &mut counted, &mut cost);
+    let most = cost.comparisons() * u64::from(Q::planes_open(view.mask()));
     ensure(found == counted && cost.planes_tested <= most, || {
         let (plain, counted) = (found.len(), counted.len());
         format!("{kind}: {plain} ids, {counted} when counted, {cost:?}")

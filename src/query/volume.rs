@@ -1,58 +1,59 @@
-//! What a camera's view is asked with: planes, and how a box is tested against
-//! one of them. The culling tests and precisions there are, the masks that all
-//! of them share, and one type for any of them.
+//! Query volumes as structures ask them: a [`Predicate`] and its kernels, which
+//! test sixteen boxes at once, and one type for any of them. Every kernel has the
+//! scalar test for a default; a volume with vectors of its own overrides it.
+
+use glam::Vec3;
 
 use crate::geometry::{
     ALL_ROWS, Aabb, Blade, Blades, BoxBlock, ConvexVolume, LANES, LaneMask, PlaneMask, PlaneRows,
     RelativeVolume, RowMask, Spheres, WideVolume,
 };
 
-use super::planes::planes_as_ever;
-use super::{AsEver, Containment, NoRecorder, Planes, Recorder, Region};
+use super::planes::Planes;
+use super::predicate::Bits;
+use super::{Containment, NoRecorder, Predicate};
 use crate::kernel::Isa;
 
-/// Up to 32 planes with a culling test of their own; every view is a
-/// [`Region`] whose memo is the mask of the planes that are still open.
-///
-/// An implementation must be monotone, for each plane by itself:
-///
-/// - if it [excludes](View::excludes) a box it drops every item within;
-/// - if it [contains](View::contains) a box it drops no item within.
-///
-/// Then a tree may skip what is excluded, accept what is contained and leave
-/// decided planes out, and still returns exactly `{ i : view.sees(items[i]) }`,
-/// bit for bit, as a scan does.
-pub trait View: Sized {
-    /// Bits of the planes that constrain anything: what a query starts with.
-    fn mask(&self) -> PlaneMask;
+/// What a structure is asked: which items a frustum sees, which hold a point,
+/// which share a point with a box. Bit for bit its [`Predicate`], sixteen boxes
+/// at a time.
+pub trait QueryVolume: Predicate {
+    /// Whether the volume is a point, so that a structure that goes down to one
+    /// by other means than bounds may: [`QueryVolume::as_point`].
+    const IS_POINT: bool = false;
 
-    /// Whether the plane of that bit has the whole box on its outer side.
-    fn excludes(&self, plane: u32, bounds: &Aabb) -> bool;
-
-    /// Whether the plane of that bit has the whole box on its inner side.
-    fn contains(&self, plane: u32, bounds: &Aabb) -> bool;
-
-    /// Whether an item is dropped by the plane of that bit; by default, where
-    /// its bounds are excluded.
+    /// The point, if the volume is one.
     #[inline(always)]
-    fn drops(&self, plane: u32, item: &Aabb) -> bool {
-        self.excludes(plane, item)
+    fn as_point(&self) -> Option<Vec3> {
+        None
     }
 
     /// The lanes that no plane of the mask drops: bit for bit
-    /// [`View::drops`], lane by lane.
-    fn kept_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask;
+    /// [`Predicate::drops`], lane by lane. Lanes that hold no item may come out
+    /// either way.
+    #[inline(always)]
+    fn kept_lanes<I: Isa>(&self, _: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
+        let kept = |lane: usize| self.admits(&block.get(lane), mask, &mut NoRecorder);
+        (0..LANES).fold(0, |kept_lanes, lane| {
+            kept_lanes | LaneMask::from(kept(lane)) << lane
+        })
+    }
 
-    /// One plane by itself, made ready for many blocks.
-    type OnePlane<'v, I: Isa>: Planes<I>
-    where
-        Self: 'v;
+    /// The plane of that bit, made ready for many blocks:
+    /// [`QueryVolume::kept_lanes`] with this bit for a mask.
+    #[inline(always)]
+    fn one_plane<I: Isa>(&self, _: I, plane: u32) -> impl Planes<I> {
+        AsEver::one(self, plane)
+    }
 
-    /// The plane of that bit, made ready: [`View::kept_lanes`] with this bit for
-    /// a mask.
-    fn one_plane<I: Isa>(&self, isa: I, plane: u32) -> Self::OnePlane<'_, I>;
+    /// All planes, made ready for many blocks: [`QueryVolume::kept_lanes`] with
+    /// [`Predicate::mask`]. `None` if they are too many.
+    #[inline(always)]
+    fn all_planes<I: Isa>(&self, _: I) -> Option<impl Planes<I>> {
+        Some(AsEver::all(self))
+    }
 
-    /// [`View::kept_lanes`] of four blocks.
+    /// [`QueryVolume::kept_lanes`] of four blocks.
     #[inline(always)]
     fn kept_of_four<I: Isa>(
         &self,
@@ -68,22 +69,13 @@ pub trait View: Sized {
         ]
     }
 
-    /// All planes, made ready for many blocks.
-    type AllPlanes<'v, I: Isa>: Planes<I>
-    where
-        Self: 'v;
-
-    /// All planes, made ready: [`View::kept_lanes`] with [`View::mask`]. `None`
-    /// if they are too many.
-    fn all_planes<I: Isa>(&self, isa: I) -> Option<Self::AllPlanes<'_, I>>;
-
-    /// The rows of a block that [`View::kept_lanes`] reads.
+    /// The rows of a block that [`QueryVolume::kept_lanes`] reads.
     #[inline(always)]
     fn rows_read(&self, _mask: PlaneMask) -> RowMask {
         ALL_ROWS
     }
 
-    /// Asks for the memory that [`View::kept_lanes`] reads ahead of it.
+    /// Asks for the memory that [`QueryVolume::kept_lanes`] reads ahead of it.
     #[inline(always)]
     fn prefetch(&self, block: &BoxBlock, _mask: PlaneMask) {
         block.prefetch();
@@ -91,7 +83,7 @@ pub trait View: Sized {
 
     /// Sixteen nodes at once: the lanes that no plane of the mask excludes, and
     /// for each of them the planes that do not contain it, bit for bit
-    /// [`Region::classify`]. Lanes that are excluded have any word.
+    /// [`Predicate::classify`]. Lanes that are excluded have any word.
     #[inline(always)]
     fn sorted_lanes<I: Isa>(
         &self,
@@ -115,87 +107,56 @@ pub trait View: Sized {
     fn rows(&self) -> Option<PlaneRows> {
         None
     }
+}
 
-    /// Whether an item belongs to the answer: no plane drops it, and it is not
-    /// empty. O(planes).
-    fn sees(&self, item: &Aabb) -> bool {
-        !item.is_empty() && self.admits(item, self.mask(), &mut NoRecorder)
+/// Planes of a view for which nothing can be made ready.
+pub struct AsEver<'v, V> {
+    view: &'v V,
+    mask: PlaneMask,
+}
+
+impl<V> Clone for AsEver<'_, V> {
+    fn clone(&self) -> Self {
+        *self
     }
 }
 
-impl<V: View> Region for V {
-    type Memo = PlaneMask;
+impl<V> Copy for AsEver<'_, V> {}
 
+impl<'v, V: QueryVolume> AsEver<'v, V> {
+    /// The plane of that bit.
     #[inline(always)]
-    fn start(&self) -> PlaneMask {
-        self.mask()
+    pub fn one(view: &'v V, plane: u32) -> Self {
+        let mask = 1 << plane;
+        AsEver { view, mask }
     }
 
-    /// Tests only the planes left in `mask`. `bounds` must not be empty.
+    /// All planes of the view.
     #[inline(always)]
-    fn classify<R: Recorder>(
-        &self,
-        bounds: &Aabb,
-        mask: PlaneMask,
-        recorder: &mut R,
-    ) -> (Containment, PlaneMask) {
-        let mut undecided = mask;
-        for plane in Bits(mask) {
-            recorder.planes_tested(1);
-            if self.excludes(plane, bounds) {
-                return (Containment::Outside, mask);
-            }
-            if self.contains(plane, bounds) {
-                undecided &= !(1 << plane);
-            }
-        }
-        let verdict = if undecided == 0 {
-            Containment::Inside
-        } else {
-            Containment::Straddles
-        };
-        (verdict, undecided)
-    }
-
-    /// Half the work of [`Region::classify`]: an item has no children to hand
-    /// a mask to, so nothing needs to be contained.
-    #[inline(always)]
-    fn admits<R: Recorder>(&self, item: &Aabb, mask: PlaneMask, recorder: &mut R) -> bool {
-        for plane in Bits(mask) {
-            recorder.planes_tested(1);
-            if self.drops(plane, item) {
-                return false;
-            }
-        }
-        true
-    }
-
-    #[inline(always)]
-    fn admit_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
-        self.kept_lanes(isa, block, mask)
-    }
-
-    #[inline(always)]
-    fn planes_open(mask: PlaneMask) -> u32 {
-        mask.count_ones()
+    pub fn all(view: &'v V) -> Self {
+        let mask = view.mask();
+        AsEver { view, mask }
     }
 }
 
-/// THE plane test in f32. Monotone because round-to-nearest is: see
-/// [`Plane::value_at`](crate::geometry::Plane::value_at).
-impl View for ConvexVolume {
+impl<I: Isa, V: QueryVolume> Planes<I> for AsEver<'_, V> {
+    const IN_FOURS: bool = true;
+
     #[inline(always)]
-    fn mask(&self) -> PlaneMask {
-        self.mask()
+    fn kept_of_four(&self, isa: I, blocks: &[BoxBlock; 4]) -> [LaneMask; 4] {
+        self.view.kept_of_four(isa, blocks, self.mask)
     }
     #[inline(always)]
-    fn excludes(&self, plane: u32, bounds: &Aabb) -> bool {
-        self.plane_of_bit(plane).excludes(bounds)
+    fn kept(&self, isa: I, block: &BoxBlock) -> LaneMask {
+        self.view.kept_lanes(isa, block, self.mask)
     }
     #[inline(always)]
-    fn contains(&self, plane: u32, bounds: &Aabb) -> bool {
-        self.plane_of_bit(plane).contains(bounds)
+    fn prefetch(&self, block: &BoxBlock) {
+        self.view.prefetch(block, self.mask);
     }
+}
+
+impl QueryVolume for ConvexVolume {
     #[inline(always)]
     fn kept_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
         block.admitted_by(isa, self, mask)
@@ -210,15 +171,12 @@ impl View for ConvexVolume {
         BoxBlock::four_admitted_by(isa, blocks, self, mask)
     }
 
-    type OnePlane<'v, I: Isa> = Blade<I>;
-    type AllPlanes<'v, I: Isa> = Blades<I>;
-
     #[inline(always)]
-    fn one_plane<I: Isa>(&self, isa: I, plane: u32) -> Blade<I> {
+    fn one_plane<I: Isa>(&self, isa: I, plane: u32) -> impl Planes<I> {
         Blade::new(isa, self, plane)
     }
     #[inline(always)]
-    fn all_planes<I: Isa>(&self, isa: I) -> Option<Blades<I>> {
+    fn all_planes<I: Isa>(&self, isa: I) -> Option<impl Planes<I>> {
         Blades::new(isa, self, self.mask())
     }
     #[inline(always)]
@@ -249,28 +207,7 @@ impl View for ConvexVolume {
     }
 }
 
-/// The sphere test, on an index over [`sphere_cube`](crate::geometry::sphere_cube)s.
-/// Nodes get the plane test, items that and their spheres'; monotone because
-/// the cube's corners have a say in both: see [`Spheres`].
-impl View for Spheres {
-    planes_as_ever!();
-
-    #[inline(always)]
-    fn mask(&self) -> PlaneMask {
-        self.planes().mask()
-    }
-    #[inline(always)]
-    fn excludes(&self, plane: u32, bounds: &Aabb) -> bool {
-        self.planes().plane_of_bit(plane).excludes(bounds)
-    }
-    #[inline(always)]
-    fn contains(&self, plane: u32, bounds: &Aabb) -> bool {
-        self.planes().plane_of_bit(plane).contains(bounds)
-    }
-    #[inline(always)]
-    fn drops(&self, plane: u32, item: &Aabb) -> bool {
-        self.drops(plane, item)
-    }
+impl QueryVolume for Spheres {
     #[inline(always)]
     fn kept_lanes<I: Isa>(&self, _: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
         block.admitted_as_spheres(Bits(mask).map(|index| {
@@ -280,23 +217,7 @@ impl View for Spheres {
     }
 }
 
-/// The plane test in f64. Monotone as in f32: promoting is exact, and every
-/// operation rounds to nearest.
-impl View for WideVolume {
-    planes_as_ever!();
-
-    #[inline(always)]
-    fn mask(&self) -> PlaneMask {
-        self.mask()
-    }
-    #[inline(always)]
-    fn excludes(&self, plane: u32, bounds: &Aabb) -> bool {
-        self.plane_of_bit(plane).excludes(bounds)
-    }
-    #[inline(always)]
-    fn contains(&self, plane: u32, bounds: &Aabb) -> bool {
-        self.plane_of_bit(plane).contains(bounds)
-    }
+impl QueryVolume for WideVolume {
     #[inline(always)]
     fn kept_lanes<I: Isa>(&self, _: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
         let planes = Bits(mask).map(|plane| (self.plane_of_bit(plane), self.upper_of_bit(plane)));
@@ -304,26 +225,7 @@ impl View for WideVolume {
     }
 }
 
-/// The plane test on boxes relative to the eye. Monotone because moving a box
-/// is ([`Aabb::relative_to`]): a box within another is moved to a box within
-/// the other one moved, and there the plane test is monotone.
-impl View for RelativeVolume {
-    planes_as_ever!();
-
-    #[inline(always)]
-    fn mask(&self) -> PlaneMask {
-        self.planes().mask()
-    }
-    #[inline(always)]
-    fn excludes(&self, plane: u32, bounds: &Aabb) -> bool {
-        let planes = self.planes();
-        planes.plane_of_bit(plane).excludes(&self.moved(bounds))
-    }
-    #[inline(always)]
-    fn contains(&self, plane: u32, bounds: &Aabb) -> bool {
-        let planes = self.planes();
-        planes.plane_of_bit(plane).contains(&self.moved(bounds))
-    }
+impl QueryVolume for RelativeVolume {
     #[inline(always)]
     fn kept_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
         let moved = block.relative_to(self.eye());
@@ -341,53 +243,85 @@ impl View for RelativeVolume {
     }
 }
 
-/// Any of the views there are: what an erased structure is asked with. It is
-/// looked into once per query, never per node.
-#[derive(Clone, Copy, Debug)]
-pub enum AnyView<'a> {
-    Volume(&'a ConvexVolume),
-    Spheres(&'a Spheres),
-    Wide(&'a WideVolume),
-    Relative(&'a RelativeVolume),
+impl QueryVolume for Vec3 {
+    const IS_POINT: bool = true;
+
+    #[inline(always)]
+    fn as_point(&self) -> Option<Vec3> {
+        Some(*self)
+    }
+    #[inline(always)]
+    fn kept_lanes<I: Isa>(&self, _: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
+        debug_assert_eq!(mask, self.mask(), "a point is never decided");
+        block.holding(*self)
+    }
 }
 
-impl AnyView<'_> {
-    /// [`View::sees`] of the view.
-    pub fn sees(&self, item: &Aabb) -> bool {
-        match self {
-            AnyView::Volume(view) => view.sees(item),
-            AnyView::Spheres(view) => view.sees(item),
-            AnyView::Wide(view) => view.sees(item),
-            AnyView::Relative(view) => view.sees(item),
+impl QueryVolume for Aabb {
+    #[inline(always)]
+    fn kept_lanes<I: Isa>(&self, _: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
+        match mask {
+            0 => LaneMask::MAX,
+            _ => block.meeting(self),
         }
     }
 }
 
-macro_rules! any_view_of {
-    ($($variant:ident: $view:ty),*) => {$(
-        impl<'a> From<&'a $view> for AnyView<'a> {
-            fn from(view: &'a $view) -> Self {
-                AnyView::$variant(view)
+/// Any of the volumes that an erased structure is asked. It is looked into once
+/// per query, never per node.
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub enum AnyVolume<'a> {
+    /// THE plane test in f32.
+    Planes(&'a ConvexVolume),
+    /// The sphere test.
+    Spheres(&'a Spheres),
+    /// The plane test in f64.
+    PlanesF64(&'a WideVolume),
+    /// The plane test about the eye.
+    Relative(&'a RelativeVolume),
+    /// Region search.
+    Point(Vec3),
+}
+
+/// Does the same with any of the volumes there are, compiled for each of them.
+macro_rules! each_volume {
+    ($any:expr, $volume:ident => $work:expr) => {
+        match $any {
+            $crate::query::AnyVolume::Planes($volume) => $work,
+            $crate::query::AnyVolume::Spheres($volume) => $work,
+            $crate::query::AnyVolume::PlanesF64($volume) => $work,
+            $crate::query::AnyVolume::Relative($volume) => $work,
+            $crate::query::AnyVolume::Point(point) => {
+                let $volume = &point;
+                $work
+            }
+        }
+    };
+}
+pub(crate) use each_volume;
+
+impl AnyVolume<'_> {
+    /// [`Predicate::sees`] of the volume.
+    pub fn sees(&self, item: &Aabb) -> bool {
+        each_volume!(*self, volume => volume.sees(item))
+    }
+}
+
+macro_rules! any_volume_of {
+    ($($variant:ident: $volume:ty),*) => {$(
+        impl<'a> From<&'a $volume> for AnyVolume<'a> {
+            fn from(volume: &'a $volume) -> Self {
+                AnyVolume::$variant(volume)
             }
         }
     )*};
 }
-any_view_of!(Volume: ConvexVolume, Spheres: Spheres, Wide: WideVolume, Relative: RelativeVolume);
+any_volume_of!(Planes: ConvexVolume, Spheres: Spheres, PlanesF64: WideVolume, Relative: RelativeVolume);
 
-/// The bits that are set, lowest first.
-struct Bits(PlaneMask);
-
-impl Iterator for Bits {
-    type Item = u32;
-
-    #[inline(always)]
-    fn next(&mut self) -> Option<u32> {
-        if self.0 == 0 {
-            return None;
-        }
-        let index = self.0.trailing_zeros();
-        self.0 &= self.0 - 1;
-        Some(index)
+impl From<Vec3> for AnyVolume<'_> {
+    fn from(point: Vec3) -> Self {
+        AnyVolume::Point(point)
     }
 }
 
@@ -397,12 +331,11 @@ mod tests {
     use crate::geometry::arbitrary::{any_box, number, vector};
     use crate::geometry::{BoxBlocks, Plane, sphere_cube};
     use crate::kernel::{BASELINE, Plain};
-    use glam::Vec3;
     use proptest::prelude::*;
 
-    /// What every view owes: monotone plane by plane, lanes like the scalar
+    /// What every volume owes: monotone plane by plane, lanes like the scalar
     /// test, and verdicts about a node that fit all of its items.
-    fn check<V: View>(view: &V, items: &[Aabb]) -> Result<(), TestCaseError> {
+    fn check<V: QueryVolume>(view: &V, items: &[Aabb]) -> Result<(), TestCaseError> {
         let node = Aabb::union_of(items);
         let mask = view.mask();
         for plane in Bits(mask) {
@@ -460,7 +393,7 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(4000))]
 
         #[test]
-        fn no_view_contradicts_itself(
+        fn no_volume_contradicts_itself(
             items in prop::collection::vec(any_box(), 1..20),
             planes in prop::collection::vec((vector(), number()), 1..8),
             eye in vector(),
@@ -470,6 +403,8 @@ mod tests {
             check(&volume, &items)?;
             check(&WideVolume::from(&volume), &items)?;
             check(&RelativeVolume::new(eye, volume.clone()).unwrap(), &items)?;
+            check(&eye, &items)?;
+            check(&items[0], &items)?;
             let spheres = Spheres::new(&volume);
             // Whatever the boxes are, and as they are meant.
             check(&spheres, &items)?;

@@ -1,0 +1,290 @@
+//! The question about a box that every query comes down to, plane by plane, and
+//! the verdict about a node. How sixteen boxes are asked at once is
+//! [`QueryVolume`](super::QueryVolume)'s; traversal belongs to the structures.
+
+use glam::Vec3;
+
+use super::Recorder;
+use crate::geometry::{Aabb, ConvexVolume, PlaneMask, RelativeVolume, Spheres, WideVolume};
+
+/// How a box lies to a query volume.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Containment {
+    /// No point of the box can be in the volume: skip the subtree.
+    Outside,
+    /// Not decided: look at the children.
+    Straddles,
+    /// Everything in the box passes: report the subtree as one slice.
+    Inside,
+}
+
+/// Up to 32 planes with a test of their own: a camera's frustum in any form, or
+/// a box or a point, which have a single "plane" of another shape.
+///
+/// A mask of planes is what a parent hands to its children: those that it does
+/// not lie wholly inside of are still open. An implementation must be monotone,
+/// for each plane by itself:
+///
+/// - if it [excludes](Predicate::excludes) a box it drops every item within;
+/// - if it [contains](Predicate::contains) a box it drops no item within.
+///
+/// Then a tree may skip what is excluded, accept what is contained and leave
+/// decided planes out, and still returns exactly `{ i : volume.sees(items[i]) }`,
+/// bit for bit, as a scan does.
+pub trait Predicate: Sized {
+    /// Bits of the planes that constrain anything: what a query starts with.
+    fn mask(&self) -> PlaneMask;
+
+    /// Whether the plane of that bit has the whole box on its outer side.
+    fn excludes(&self, plane: u32, bounds: &Aabb) -> bool;
+
+    /// Whether the plane of that bit has the whole box on its inner side.
+    fn contains(&self, plane: u32, bounds: &Aabb) -> bool;
+
+    /// Whether an item is dropped by the plane of that bit; by default, where
+    /// its bounds are excluded.
+    #[inline(always)]
+    fn drops(&self, plane: u32, item: &Aabb) -> bool {
+        self.excludes(plane, item)
+    }
+
+    /// How many planes a test with this mask counts as.
+    #[inline(always)]
+    fn planes_open(mask: PlaneMask) -> u32 {
+        mask.count_ones()
+    }
+
+    /// The verdict about a node's bounds, which must not be empty, and the mask
+    /// for its children. Tests only the planes of `mask`.
+    #[inline(always)]
+    fn classify<R: Recorder>(
+        &self,
+        bounds: &Aabb,
+        mask: PlaneMask,
+        recorder: &mut R,
+    ) -> (Containment, PlaneMask) {
+        let mut undecided = mask;
+        for plane in Bits(mask) {
+            recorder.planes_tested(Self::planes_open(1 << plane));
+            if self.excludes(plane, bounds) {
+                return (Containment::Outside, mask);
+            }
+            if self.contains(plane, bounds) {
+                undecided &= !(1 << plane);
+            }
+        }
+        let verdict = if undecided == 0 {
+            Containment::Inside
+        } else {
+            Containment::Straddles
+        };
+        (verdict, undecided)
+    }
+
+    /// Whether an item below a node with this mask belongs to the answer. Half
+    /// the work of [`Predicate::classify`]: an item has no children to hand a
+    /// mask to, so nothing needs to be contained.
+    #[inline(always)]
+    fn admits<R: Recorder>(&self, item: &Aabb, mask: PlaneMask, recorder: &mut R) -> bool {
+        for plane in Bits(mask) {
+            recorder.planes_tested(Self::planes_open(1 << plane));
+            if self.drops(plane, item) {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// Whether an item belongs to the answer: no plane drops it, and it is not
+    /// empty. O(planes).
+    fn sees(&self, item: &Aabb) -> bool {
+        !item.is_empty() && self.admits(item, self.mask(), &mut super::NoRecorder)
+    }
+}
+
+/// Region search: which boxes hold this point (closed bounds).
+impl Predicate for Vec3 {
+    #[inline(always)]
+    fn mask(&self) -> PlaneMask {
+        1
+    }
+    #[inline(always)]
+    fn excludes(&self, _: u32, bounds: &Aabb) -> bool {
+        !bounds.contains_point(*self)
+    }
+    /// No box is so small that each one in it holds the point.
+    #[inline(always)]
+    fn contains(&self, _: u32, _: &Aabb) -> bool {
+        false
+    }
+    #[inline(always)]
+    fn planes_open(_: PlaneMask) -> u32 {
+        0
+    }
+}
+
+/// Box search: which boxes share a point with this one (closed bounds).
+impl Predicate for Aabb {
+    #[inline(always)]
+    fn mask(&self) -> PlaneMask {
+        1
+    }
+    #[inline(always)]
+    fn excludes(&self, _: u32, bounds: &Aabb) -> bool {
+        !self.intersects(bounds)
+    }
+    #[inline(always)]
+    fn contains(&self, _: u32, bounds: &Aabb) -> bool {
+        self.contains(bounds)
+    }
+    #[inline(always)]
+    fn planes_open(_: PlaneMask) -> u32 {
+        0
+    }
+}
+
+/// THE plane test in f32. Monotone because round-to-nearest is: see
+/// [`Plane::value_at`](crate::geometry::Plane::value_at).
+impl Predicate for ConvexVolume {
+    #[inline(always)]
+    fn mask(&self) -> PlaneMask {
+        self.mask()
+    }
+    #[inline(always)]
+    fn excludes(&self, plane: u32, bounds: &Aabb) -> bool {
+        self.plane_of_bit(plane).excludes(bounds)
+    }
+    #[inline(always)]
+    fn contains(&self, plane: u32, bounds: &Aabb) -> bool {
+        self.plane_of_bit(plane).contains(bounds)
+    }
+}
+
+/// The sphere test, on an index over [`sphere_cube`](crate::geometry::sphere_cube)s.
+/// Nodes get the plane test, items that and their spheres'; monotone because
+/// the cube's corners have a say in both: see [`Spheres`].
+impl Predicate for Spheres {
+    #[inline(always)]
+    fn mask(&self) -> PlaneMask {
+        self.planes().mask()
+    }
+    #[inline(always)]
+    fn excludes(&self, plane: u32, bounds: &Aabb) -> bool {
+        self.planes().plane_of_bit(plane).excludes(bounds)
+    }
+    #[inline(always)]
+    fn contains(&self, plane: u32, bounds: &Aabb) -> bool {
+        self.planes().plane_of_bit(plane).contains(bounds)
+    }
+    #[inline(always)]
+    fn drops(&self, plane: u32, item: &Aabb) -> bool {
+        self.drops(plane, item)
+    }
+}
+
+/// The plane test in f64. Monotone as in f32: promoting is exact, and every
+/// operation rounds to nearest.
+impl Predicate for WideVolume {
+    #[inline(always)]
+    fn mask(&self) -> PlaneMask {
+        self.mask()
+    }
+    #[inline(always)]
+    fn excludes(&self, plane: u32, bounds: &Aabb) -> bool {
+        self.plane_of_bit(plane).excludes(bounds)
+    }
+    #[inline(always)]
+    fn contains(&self, plane: u32, bounds: &Aabb) -> bool {
+        self.plane_of_bit(plane).contains(bounds)
+    }
+}
+
+/// The plane test on boxes relative to the eye. Monotone because moving a box
+/// is ([`Aabb::relative_to`]): a box within another is moved to a box within
+/// the other one moved, and there the plane test is monotone.
+impl Predicate for RelativeVolume {
+    #[inline(always)]
+    fn mask(&self) -> PlaneMask {
+        self.planes().mask()
+    }
+    #[inline(always)]
+    fn excludes(&self, plane: u32, bounds: &Aabb) -> bool {
+        let planes = self.planes();
+        planes.plane_of_bit(plane).excludes(&self.moved(bounds))
+    }
+    #[inline(always)]
+    fn contains(&self, plane: u32, bounds: &Aabb) -> bool {
+        let planes = self.planes();
+        planes.plane_of_bit(plane).contains(&self.moved(bounds))
+    }
+}
+
+/// The bits that are set, lowest first.
+pub(super) struct Bits(pub PlaneMask);
+
+impl Iterator for Bits {
+    type Item = u32;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<u32> {
+        if self.0 == 0 {
+            return None;
+        }
+        let index = self.0.trailing_zeros();
+        self.0 &= self.0 - 1;
+        Some(index)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Plane;
+    use crate::query::NoRecorder;
+
+    fn unit_cube() -> ConvexVolume {
+        let planes = [Vec3::X, Vec3::Y, Vec3::Z]
+            .into_iter()
+            .flat_map(|axis| [Plane::new(axis, 1.0), Plane::new(-axis, 1.0)])
+            .collect::<Vec<_>>();
+        ConvexVolume::from_planes(&planes).unwrap()
+    }
+
+    #[test]
+    fn masks_lose_the_planes_that_are_decided() {
+        let volume = unit_cube();
+        let poking_out_right = Aabb::new(Vec3::ZERO, Vec3::new(2.0, 0.5, 0.5));
+        let (verdict, mask) = volume.classify(&poking_out_right, volume.mask(), &mut NoRecorder);
+        assert_eq!((verdict, mask), (Containment::Straddles, 0b10));
+        let within = Aabb::new(Vec3::ZERO, Vec3::splat(1.0));
+        assert_eq!(
+            volume.classify(&within, mask, &mut NoRecorder),
+            (Containment::Inside, 0)
+        );
+        let beyond = Aabb::new(Vec3::splat(1.5), Vec3::splat(2.0));
+        assert_eq!(
+            volume.classify(&beyond, volume.mask(), &mut NoRecorder).0,
+            Containment::Outside
+        );
+    }
+
+    #[test]
+    fn an_impossible_plane_rejects_every_item() {
+        let b = Aabb::new(Vec3::ZERO, Vec3::ONE);
+        let empty = ConvexVolume::from_planes(&[Plane::new(Vec3::ZERO, -1.0)]).unwrap();
+        assert!(!empty.sees(&b));
+    }
+
+    #[test]
+    fn a_point_and_a_box_count_no_planes() {
+        let mut cost = crate::query::QueryCost::default();
+        let b = Aabb::new(Vec3::ZERO, Vec3::ONE);
+        assert!(Vec3::ONE.admits(&b, 1, &mut cost) && b.admits(&b, 1, &mut cost));
+        assert_eq!(
+            Vec3::ONE.classify(&b, 1, &mut cost).0,
+            Containment::Straddles
+        );
+        assert_eq!(b.classify(&b, 1, &mut cost), (Containment::Inside, 0));
+        assert_eq!(cost, Default::default());
+    }
+}
