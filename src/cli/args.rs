@@ -72,6 +72,8 @@ pub enum Command {
     Completions { shell: clap_complete::Shell },
     /// Print the manual page (roff)
     Man,
+    /// Print the licences of the program and of the real scenes inside it
+    Licences,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum, Debug)]

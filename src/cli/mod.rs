@@ -51,7 +51,7 @@ use std::io::{self, Write};
 use std::process::ExitCode;
 
 use crate::index::Registry;
-use crate::scene::{LoadOptions, Scene};
+use crate::scene::{LoadOptions, NOTICE, Scene};
 use clap::{CommandFactory, Parser};
 use serde::Serialize;
 
@@ -134,6 +134,7 @@ fn dispatch(registry: &Registry, command: Command) -> anyhow::Result<Ending> {
         Command::Worker => worker::worker(registry),
         Command::Completions { shell } => completions(shell),
         Command::Man => man(),
+        Command::Licences => licences(),
     }
 }
 
@@ -216,6 +217,11 @@ fn man() -> anyhow::Result<Ending> {
     let mut page = Vec::new();
     clap_mangen::Man::new(Cli::command()).render(&mut page)?;
     io::stdout().write_all(&page)?;
+    Ok(Ending::Ok)
+}
+
+fn licences() -> anyhow::Result<Ending> {
+    io::stdout().write_all(NOTICE.as_bytes())?;
     Ok(Ending::Ok)
 }
 

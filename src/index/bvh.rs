@@ -3,16 +3,14 @@
 //! is one slice. obvhs has no frustum traversal of its own; ours is shared.
 
 use std::borrow::Cow;
-use std::time::Duration;
 
+use obvhs::BvhBuildParams;
 use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::builder::build_bvh2;
-use obvhs::{Boundable, BvhBuildParams};
 use serde::{Deserialize, Serialize};
 
 use super::by_tree::{searched_by_tree, seen_by_tree};
 use super::tree::{PackedTree, TreeWriter};
-use super::{BuildError, Info, Kind, Origin, RegionIndex, check_range, indexable};
+use super::{BuildError, Info, Kind, Origin, RegionIndex, check_range, indexable, ploc};
 use crate::geometry::{Aabb, PlaneTree};
 use crate::query::ItemId;
 
@@ -69,12 +67,6 @@ impl BvhPreset {
             BvhPreset::Slow => BvhBuildParams::slow_build(),
             BvhPreset::VerySlow => BvhBuildParams::very_slow_build(),
         }
-    }
-}
-
-impl Boundable for Aabb {
-    fn aabb(&self) -> obvhs::aabb::Aabb {
-        obvhs::aabb::Aabb::new(self.min.into(), self.max.into())
     }
 }
 
@@ -225,7 +217,7 @@ impl RegionIndex for Bvh {
                 tree: PackedTree::default(),
             });
         }
-        let built = build_bvh2(&boxes, config, &mut Duration::default());
+        let built = ploc::build(&boxes, config);
         drop(boxes);
         Ok(Bvh {
             tree: relaid(items, &stacks, &built),

@@ -35,7 +35,7 @@ pub use memory::{fits, needed_bytes};
 pub use originals::{Originals, Sought};
 pub use overlap::SoughtBox;
 pub use regions::{BspNode, BspRegions, Portal, Regions, Tiling};
-pub use samples::{SAMPLES, Sample};
+pub use samples::{NOTICE, SAMPLES, Sample};
 pub use source::{LoadOptions, check_fits, load};
 pub use wad::{WadMap, map_names};
 
