@@ -48,6 +48,12 @@ fn main() {
             value.unwrap_or_default()
         );
     }
+    // Plain arrays for vectors, as other architectures have them: no dependency is
+    // compiled anew for it, as it would be for a flag of the compiler.
+    println!("cargo::rerun-if-env-changed=CULLBENCH_PLAIN_VECTORS");
+    if env::var_os("CULLBENCH_PLAIN_VECTORS").is_some() {
+        println!("cargo::rustc-cfg=plain_vectors");
+    }
     // What a commit or an edit touches; missing paths are skipped,
     // because cargo would otherwise rerun this script every time.
     for path in [

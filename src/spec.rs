@@ -30,6 +30,7 @@ pub struct Spec {
 pub struct SpecError(String);
 
 impl SpecError {
+    /// An error that reads as this text.
     pub fn new(message: impl fmt::Display) -> Self {
         SpecError(message.to_string())
     }
@@ -125,6 +126,7 @@ impl Spec {
         specs
     }
 
+    /// The text before the first `:`.
     pub fn name(&self) -> &str {
         &self.name
     }

@@ -57,20 +57,28 @@ impl Default for AdviseOptions {
 /// What to use and what to leave out, with the evidence.
 #[derive(Clone, Debug, Serialize)]
 pub struct Advice {
+    /// Name of the scene.
     pub scene: String,
+    /// Name of the path.
     pub path: String,
+    /// Number of items.
     pub items: usize,
     /// Bad items that were left out on request.
     pub skipped_items: usize,
+    /// Number of cameras.
     pub cameras: usize,
+    /// What the advice was asked for with.
     pub options: AdviseOptions,
     /// Processes that were timed; an interval needs three or more.
     pub processes: usize,
     /// Time of the tree that rules are forced on, entered a second time, / time of
     /// itself: a check whose interval is to hold 1.
     pub twin: Option<Estimate>,
+    /// Which structure to take.
     pub structure: StructureChoice,
+    /// Which culling test to take.
     pub test: TestChoice,
+    /// What to leave out or keep, a rule each.
     pub omissions: Vec<Omission>,
 }
 
@@ -87,19 +95,35 @@ impl Advice {
 /// Why there is no advice.
 #[derive(Debug, thiserror::Error)]
 pub enum AdviseError {
+    /// There is nothing to cull.
     #[error("scene '{scene}' has no items; expected at least one")]
-    NoItems { scene: String },
+    NoItems {
+        /// Name of the scene.
+        scene: String,
+    },
+    /// There is nothing to cull for.
     #[error("path '{path}' has no cameras; expected at least one")]
-    NoCameras { path: String },
+    NoCameras {
+        /// Name of the path.
+        path: String,
+    },
+    /// A camera of the path cannot be culled with.
     #[error(transparent)]
     Workload(#[from] WorkloadError),
+    /// A structure that a rule needs cannot be built.
     #[error(transparent)]
     Build(#[from] BuildError),
+    /// Another process has prepared something else.
     #[error(
         "{found} ways to answer; the plan has {planned}: the scene or the cameras have changed \
          on the way"
     )]
-    OtherPlan { found: usize, planned: usize },
+    OtherPlan {
+        /// Ways to answer in this process.
+        found: usize,
+        /// Ways to answer in the plan.
+        planned: usize,
+    },
 }
 
 /// What all processes time: the plan is the same for each.
@@ -114,6 +138,7 @@ pub struct TrialPlan {
 
 /// Both sides of every rule, asked, compared and judged, but not timed.
 pub struct Prepared {
+    /// What the other processes are to measure.
     pub plan: TrialPlan,
     tests: Vec<EnteredTest>,
     rules: Vec<Entered>,
@@ -126,11 +151,15 @@ pub struct Prepared {
 /// What advice is given about, and how it is measured.
 #[derive(Clone, Copy)]
 pub struct AdviseInput<'a> {
+    /// The scene that the advice is about.
     pub scene: &'a Scene,
+    /// The cameras that look at it.
     pub path: &'a CameraPath,
     /// To choose from.
     pub structures: &'a [StructureSpec],
+    /// Thresholds and what to judge.
     pub options: &'a AdviseOptions,
+    /// Rounds and times of a process.
     pub protocol: &'a Protocol,
 }
 

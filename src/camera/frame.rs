@@ -13,6 +13,7 @@ use super::{CameraError, Pose};
 /// names.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Frame {
+    /// Position of the camera in world coordinates.
     pub eye: DVec3,
     pub(super) u: DVec3,
     pub(super) v: DVec3,

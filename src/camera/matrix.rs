@@ -112,6 +112,7 @@ impl ViewProjection {
         self.from_zero
     }
 
+    /// Distance of the near plane from the eye along the direction of view.
     pub fn near(&self) -> f64 {
         self.near
     }

@@ -11,14 +11,22 @@ use crate::arithmetic::Expansion;
 /// Where a camera stands, as the numbers that say so: all are exact.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Pose {
+    /// From the eye to a point.
     LookAt {
+        /// Position of the camera.
         eye: DVec3,
+        /// The point looked at; not the eye.
         look: DVec3,
+        /// Any vector that is not parallel to the direction of view.
         up: DVec3,
     },
+    /// From the eye in a direction.
     Forward {
+        /// Position of the camera.
         eye: DVec3,
+        /// Direction of view, of any length above 0.
         forward: DVec3,
+        /// Any vector that is not parallel to the direction of view.
         up: DVec3,
     },
 }
@@ -42,6 +50,7 @@ impl Pose {
         }
     }
 
+    /// Position of the camera in world coordinates.
     pub fn eye(&self) -> DVec3 {
         match *self {
             Pose::LookAt { eye, .. } | Pose::Forward { eye, .. } => eye,

@@ -62,6 +62,7 @@ use shared_args::SceneArgs;
 /// How a command ended that did not fail.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Ending {
+    /// Exit code 0.
     Ok,
     /// A structure answered wrongly: exit code 1.
     WrongAnswer,

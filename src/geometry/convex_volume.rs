@@ -23,11 +23,17 @@ named! {
     #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
     #[serde(rename_all = "snake_case")]
     pub enum FrustumPlane {
+        /// Against the direction of u.
         Left = "left",
+        /// In the direction of u.
         Right = "right",
+        /// Against the direction of v.
         Bottom = "bottom",
+        /// In the direction of v.
         Top = "top",
+        /// Before the eye, across the direction of view.
         Near = "near",
+        /// The end of the view; infinite perspectives have none.
         Far = "far",
     }
 }

@@ -73,6 +73,7 @@ impl<R: Read> TableReader<R> {
         })
     }
 
+    /// The names of the columns, in order.
     pub fn header(&self) -> &[String] {
         &self.header
     }
@@ -149,6 +150,7 @@ impl Row<'_> {
         })
     }
 
+    /// An error at this row.
     pub fn error(&self, found: String, expected: String) -> InputError {
         InputError::Line {
             file: self.file.to_owned(),

@@ -11,7 +11,9 @@ use crate::query::{AnyView, ItemId};
 
 /// A row of the table of bounds.
 pub struct Bound {
+    /// As `list metrics` and reports have it: `bound-read`.
     pub name: &'static str,
+    /// What it does, in one line.
     pub summary: &'static str,
     /// The metric that holds time of a structure / time of this bound.
     pub ratio: &'static str,
@@ -23,6 +25,7 @@ pub struct Bound {
 /// What a bound is made from.
 #[derive(Clone, Copy)]
 pub struct Material<'a> {
+    /// The queries that it bounds.
     pub workload: &'a Workload<'a>,
     /// What was built on the scene, under the names they were asked for by.
     pub subjects: &'a [Subject],

@@ -16,12 +16,15 @@ use crate::verify::{ErrorCount, Fault, Trial, Truth, explain_containment, explai
 /// What one subject answered and what it cost.
 #[derive(Clone, Debug)]
 pub struct Counted {
+    /// Whether every answer was that of the reference scan.
     pub verdict: Verdict,
     /// The frustum query of each camera.
     pub frames: Vec<Answer>,
+    /// Counters summed over all frustum queries.
     pub cost: QueryCost,
     /// The region search of each eye.
     pub located: Vec<Answer>,
+    /// Counters summed over all region searches.
     pub locate_cost: QueryCost,
 }
 
@@ -29,12 +32,14 @@ pub struct Counted {
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Answer {
+    /// Number of ids.
     pub count: u64,
     /// Sum over the ids of a hash of each: the order does not matter.
     pub digest: u64,
 }
 
 impl Answer {
+    /// The answer that consists of these ids, in any order.
     pub fn of(ids: &[ItemId]) -> Answer {
         /// SplitMix64's finaliser (Steele, Lea and Flood 2014).
         fn mixed(id: ItemId) -> u64 {

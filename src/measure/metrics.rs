@@ -9,8 +9,11 @@ use crate::statistics::Estimate;
 
 /// One metric of the list; the unit is part of its name where it has one.
 pub struct MetricInfo {
+    /// As in reports and `--metric`.
     pub name: &'static str,
+    /// Unit of its values; empty for counts and ratios.
     pub unit: &'static str,
+    /// What it is, in one line.
     pub summary: &'static str,
 }
 
@@ -66,9 +69,13 @@ metrics! {
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Metric {
+    /// The mean, count or ratio.
     pub value: f64,
+    /// Lower end of the interval; `None` without one.
     pub lower: Option<f64>,
+    /// Upper end of the interval; `None` without one.
     pub upper: Option<f64>,
+    /// As `cullbench list metrics` has it.
     pub unit: String,
 }
 

@@ -68,8 +68,11 @@ named! {
         Refused = "refused",
         /// Not run, for a stated reason.
         LeftOut = "left_out",
+        /// Said nothing for as long as `--timeout` allows.
         TimedOut = "timed_out",
+        /// The structure's own code did, and ended its process or not.
         Panicked = "panicked",
+        /// The system ended its process, or refused it memory.
         OutOfMemory = "out_of_memory",
     }
 }
@@ -94,11 +97,14 @@ impl Status {
 /// A status with its reason.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub struct Verdict {
+    /// How it ended.
     pub status: Status,
+    /// Why, in one line; `None` for [`Status::Ok`].
     pub reason: Option<String>,
 }
 
 impl Verdict {
+    /// Nothing wrong.
     pub fn ok() -> Self {
         Verdict {
             status: Status::Ok,
@@ -106,6 +112,7 @@ impl Verdict {
         }
     }
 
+    /// A status that has to be explained.
     pub fn new(status: Status, reason: impl Into<String>) -> Self {
         Verdict {
             status,

@@ -14,17 +14,24 @@ use super::{Answer, Judged, PathInfo, Sample, SceneInfo, Schedule, Status, TaskK
 /// What is common to the cells that are compared with each other.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct GroupKey {
+    /// Name of the scene, parameters included.
     pub scene: String,
+    /// Name of the path, parameters included.
     pub path: String,
     /// "warm" or "cold".
     pub cache: String,
+    /// Name of the culling test.
     pub test: String,
+    /// Name of the arithmetic that the test is carried out in.
     pub arithmetic: String,
+    /// Name of the method that planes are derived by.
     pub planes: String,
+    /// Factor c of the planes' epsilon.
     pub epsilon: f64,
 }
 
 impl GroupKey {
+    /// The key of a path's queries by a culling test.
     pub fn new(scene: &str, path: &PathInfo, test: &str) -> GroupKey {
         GroupKey {
             scene: scene.to_owned(),
@@ -41,8 +48,10 @@ impl GroupKey {
 /// A cell: a structure in a group.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct CellKey {
+    /// What the cell is compared within.
     #[serde(flatten)]
     pub group: GroupKey,
+    /// Label of the structure, `bvh:leaf=4`.
     pub structure: String,
 }
 
@@ -57,6 +66,7 @@ pub struct Known {
     /// Of frustum queries, bounds last, and of region searches. `None` where
     /// nothing is timed.
     pub query: Option<NamedSchedule>,
+    /// As `query`, of region searches.
     pub locate: Option<NamedSchedule>,
     /// Scale of the lens where the path was asked for by its visible share.
     pub lens_scale: Option<f64>,
@@ -65,7 +75,9 @@ pub struct Known {
 /// A schedule with the names of its tasks.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct NamedSchedule {
+    /// Label and kind of each task, in the order of the schedule.
     pub names: Vec<(String, TaskKind)>,
+    /// Cameras, batches and rounds.
     pub schedule: Schedule,
 }
 
@@ -74,13 +86,18 @@ pub struct NamedSchedule {
 pub struct SubjectPart {
     /// As asked for, `bvh:leaf=4`; the twin of one ends in `#twin`.
     pub label: String,
+    /// Parameters of the structure, defaults included.
     pub params: Value,
+    /// As the structure declares.
     pub kind: Kind,
+    /// As the structure declares.
     pub origin: Origin,
+    /// How building, counting and timing ended.
     #[serde(flatten)]
     pub verdict: Verdict,
     /// Whether builds share threads: wall time then, else CPU time.
     pub build_ms: Option<f64>,
+    /// Of nodes and items; `None` where nothing was built.
     pub memory_bytes: Option<u64>,
     /// In the order of [`super::UPDATE_SHARES`].
     pub update_ms: Vec<f64>,
@@ -95,7 +112,9 @@ pub struct SubjectPart {
 pub struct TaskPart {
     /// Of a structure or of a lower bound.
     pub label: String,
+    /// What it was timed at.
     pub task: TaskKind,
+    /// How timing it ended.
     #[serde(flatten)]
     pub verdict: Verdict,
     /// Mean CPU ns per query over all timed cameras, for each round.
@@ -107,19 +126,26 @@ pub struct TaskPart {
     pub tail_ns: Vec<f64>,
     /// Ids returned by all queries, and CPU ns spent on them.
     pub returned: u64,
+    /// CPU ns of the queries that `returned` counts.
     pub spent_ns: f64,
 }
 
 /// One process, one group.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Part {
+    /// The group.
     pub key: GroupKey,
+    /// 0 is the first, which counts and plans.
     pub process: u32,
+    /// What reports say of the scene.
     pub scene: SceneInfo,
+    /// What reports say of the path.
     pub path: PathInfo,
+    /// What the other processes are to keep to; from the first process only.
     pub known: Option<Known>,
     /// How the answers differ from the exact truth; the first process only.
     pub judged: Option<Judged>,
+    /// Structures in the order of the plan, twins last.
     pub subjects: Vec<SubjectPart>,
     /// Structures that had ended a process on this scene before: they are not
     /// tried again, by a run that is resumed neither.
@@ -127,6 +153,7 @@ pub struct Part {
     pub failed: BTreeMap<String, Verdict>,
     /// Names of the lower bounds among the tasks.
     pub bounds: Vec<String>,
+    /// Tasks in the order of the schedules.
     pub tasks: Vec<TaskPart>,
 }
 

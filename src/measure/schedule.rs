@@ -46,7 +46,9 @@ const PILOT: usize = 24;
 pub struct Schedule {
     /// Cameras of the path that are timed, by their index.
     pub cameras: Vec<u32>,
+    /// Rounds of the pass.
     pub rounds: u32,
+    /// Whether caches are emptied before each query.
     pub cold: bool,
     /// In the order of the tasks.
     pub tasks: Vec<TaskPlan>,

@@ -31,6 +31,7 @@ pub type AskMany<'a> = Box<dyn Fn(&[u32]) -> u64 + 'a>;
 /// One that takes part in a timed pass: how it answers query `place`
 /// (appending to an empty output), and what it must return.
 pub struct TimedTask<'a> {
+    /// Answers one query.
     pub ask: Ask<'a>,
     /// Takes the place of `ask`, and a whole pass is one batch.
     pub ask_many: Option<AskMany<'a>>,

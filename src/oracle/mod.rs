@@ -34,6 +34,7 @@ pub enum Verdict {
 /// A verdict and whether it could be proved.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Judgement {
+    /// What is true, as far as it could be proved.
     pub verdict: Verdict,
     /// At camera level: closer to a tie than the precision of the camera's
     /// planes (2^-150 of the magnitudes involved), and so called a touch.

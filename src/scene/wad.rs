@@ -21,6 +21,7 @@ const LUMPS: [&str; 8] = [
 /// One map of a WAD file, decoded and cross-checked.
 #[derive(Clone, Debug)]
 pub struct WadMap {
+    /// Things of the map in the order of the file.
     pub things: Vec<Thing>,
     lines: Vec<WorldBox>,
     /// Floor height under each BSP leaf.

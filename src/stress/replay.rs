@@ -24,7 +24,9 @@ pub fn replay(vector: &Vector, structures: &[StructureSpec]) -> Vec<Row> {
 /// zero, say) failures are to be expected: that is how the suite is tested.
 #[derive(Clone, Copy)]
 pub struct Replay<'a> {
+    /// Structures that are queried.
     pub structures: &'a [StructureSpec],
+    /// How the planes of cameras are derived.
     pub planes: PlaneOptions,
 }
 

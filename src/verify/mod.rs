@@ -49,6 +49,7 @@ pub struct Difference {
 }
 
 impl Difference {
+    /// Whether the answer is the reference's.
     pub fn is_none(&self) -> bool {
         *self == Difference::default()
     }
@@ -69,6 +70,7 @@ impl fmt::Display for Difference {
 }
 
 impl Reference {
+    /// A reference for scenes of so many items.
     pub fn new(item_count: usize) -> Self {
         Reference {
             marks: vec![0; item_count],
