@@ -4,6 +4,7 @@
 use crate::measure::{Beside, Effort};
 
 /// A named set of scenes and paths with the time to spend on them.
+#[non_exhaustive]
 pub struct Suite {
     /// What `--suite` takes.
     pub name: &'static str,
@@ -18,6 +19,7 @@ pub struct Suite {
 }
 
 /// A scene of a suite with the ways through it.
+#[non_exhaustive]
 pub struct SuiteScene {
     /// Spec of the scene.
     pub scene: &'static str,

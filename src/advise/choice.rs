@@ -13,6 +13,7 @@ use crate::statistics::{ALPHA, is_less};
 
 /// Which structure, and all that took part.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct StructureChoice {
     /// The fastest that answered right; null if none did.
     pub name: Option<String>,
@@ -28,6 +29,7 @@ pub struct StructureChoice {
 
 /// A structure as measured.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct StructureRow {
     /// Label of the structure.
     pub structure: String,
@@ -174,6 +176,7 @@ pub(super) fn named(name: &'static str, execution: Execution) -> Result<Structur
 
 /// Which culling test, and all that took part, on the fastest tree.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct TestChoice {
     /// The one with the least total, or the simplest of those that the processes
     /// do not tell from it; null if nothing could be judged.
@@ -188,6 +191,7 @@ pub struct TestChoice {
 
 /// A culling test as measured.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct TestRow {
     /// Name of the test.
     pub test: &'static str,

@@ -56,6 +56,7 @@ impl Default for AdviseOptions {
 
 /// What to use and what to leave out, with the evidence.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct Advice {
     /// Name of the scene.
     pub scene: String,
@@ -94,6 +95,7 @@ impl Advice {
 
 /// Why there is no advice.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum AdviseError {
     /// There is nothing to cull.
     #[error("scene '{scene}' has no items; expected at least one")]

@@ -9,6 +9,7 @@ use crate::verify::ErrorCount;
 
 /// Something that may be left out, and whether it should be.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct Omission {
     /// Name of the rule, `plane-masks`.
     pub rule: &'static str,
@@ -56,6 +57,7 @@ pub enum LeftOutIf {
 /// Whether to leave something out.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum Decision {
     /// It costs more than it brings.
     LeaveOut,
@@ -87,6 +89,7 @@ pub(super) enum By {
 
 /// One rule forced off (kept) and on (left out), on one structure.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct Check {
     /// What was asked, or done.
     pub on: String,

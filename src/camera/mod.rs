@@ -51,6 +51,7 @@ pub struct Camera {
 
 /// Why there is no such camera. Every message names the value and the rule.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum CameraError {
     /// A number that is infinite or no number.
     #[error("{name} is {value}; expected a finite number")]

@@ -20,6 +20,7 @@ named! {
     /// How a box is tested against the volume.
     #[derive(Clone, Copy, PartialEq, Eq, Hash, Default, Debug, Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
+    #[non_exhaustive]
     pub enum CullingTest, TESTS {
         Sphere = "sphere", "outside if one plane has the item's bounding sphere on its outer side";
         #[default]
@@ -49,6 +50,7 @@ named! {
     /// In which numbers the test is carried out.
     #[derive(Clone, Copy, PartialEq, Eq, Hash, Default, Debug, Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
+    #[non_exhaustive]
     pub enum Arithmetic, ARITHMETICS {
         ///
         /// By default moved outward by epsilon.
@@ -72,6 +74,7 @@ pub struct Culling {
 
 /// Why there is no such view.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum CullingError {
     /// The camera's planes or lens do not allow it.
     #[error(transparent)]

@@ -40,6 +40,7 @@ named! {
 
 /// Why a set of planes is no volume.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum VolumeError {
     #[error("a volume has at most 32 planes, not {count}")]
     TooManyPlanes { count: usize },

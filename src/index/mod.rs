@@ -70,6 +70,7 @@ pub use wide::{Wide, WideParams};
 
 /// Why an index could not be built.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum BuildError {
     #[error("item {item} has the bounds {bounds:?}; expected finite numbers")]
     NonFiniteItem { item: usize, bounds: Aabb },

@@ -7,6 +7,7 @@ use crate::spec::SpecError;
 
 /// Why a file or text cannot be used: where, what was found, what was expected.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum InputError {
     /// The system refused to read it.
     #[error("{}: {source}", path.display())]

@@ -10,6 +10,7 @@ use crate::kernel::{Isa, Kernel, Work};
 use crate::query::{AnyView, ItemId};
 
 /// A row of the table of bounds.
+#[non_exhaustive]
 pub struct Bound {
     /// As `list metrics` and reports have it: `bound-read`.
     pub name: &'static str,

@@ -15,6 +15,7 @@ use crate::verify::{ErrorCount, Fault, Trial, Truth, explain_containment, explai
 
 /// What one subject answered and what it cost.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Counted {
     /// Whether every answer was that of the reference scan.
     pub verdict: Verdict,
@@ -181,6 +182,7 @@ fn batch_verdict(workload: &Workload, subject: &Built) -> Verdict {
 /// How the answers of a workload differ from the truth at camera level.
 #[derive(Clone, Copy, Default, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct Judged {
     /// Cameras that were judged, evenly spread over the path.
     pub judged_queries: usize,

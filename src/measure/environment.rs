@@ -13,6 +13,7 @@ use crate::scene::hex;
 /// The machine of a run; what the system does not tell is `None`.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct Machine {
     /// Model name of the processor.
     pub cpu: Option<String>,
@@ -37,6 +38,7 @@ pub struct Machine {
 /// One cache of a processor core.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct Cache {
     /// 1 is the innermost.
     pub level: u32,
@@ -47,6 +49,7 @@ pub struct Cache {
 /// What the program was built with; what the build script could not find is `None`.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct Toolchain {
     /// `rustc --version`.
     pub rustc: Option<String>,
@@ -67,6 +70,7 @@ pub struct Toolchain {
 /// What the program was built from.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct Source {
     /// Version of this crate.
     pub version: String,

@@ -43,6 +43,7 @@ pub struct Effort {
 
 /// What is measured beside frustum queries.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[non_exhaustive]
 pub enum Beside {
     /// Frustum queries only.
     Nothing,
@@ -216,6 +217,7 @@ impl Plan {
 
 /// Why a scene could not be measured.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ExperimentError {
     /// The scene cannot be read.
     #[error(transparent)]

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::statistics::Estimate;
 
 /// One metric of the list; the unit is part of its name where it has one.
+#[non_exhaustive]
 pub struct MetricInfo {
     /// As in reports and `--metric`.
     pub name: &'static str,

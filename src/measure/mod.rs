@@ -57,6 +57,7 @@ named! {
     #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
     #[cfg_attr(test, derive(schemars::JsonSchema))]
     #[serde(rename_all = "snake_case")]
+    #[non_exhaustive]
     pub enum Status {
         /// Every answer equals the reference.
         Ok = "ok",

@@ -57,6 +57,7 @@ pub struct CellKey {
 
 /// What the first process counted and planned; the others keep to it.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Known {
     /// Of every camera: what every structure that is right answers. Empty if
     /// the process is to count for itself.
@@ -83,6 +84,7 @@ pub struct NamedSchedule {
 
 /// A structure in one process.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct SubjectPart {
     /// As asked for, `bvh:leaf=4`; the twin of one ends in `#twin`.
     pub label: String,
@@ -109,6 +111,7 @@ pub struct SubjectPart {
 
 /// What was timed of one task in one process.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct TaskPart {
     /// Of a structure or of a lower bound.
     pub label: String,
@@ -132,6 +135,7 @@ pub struct TaskPart {
 
 /// One process, one group.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Part {
     /// The group.
     pub key: GroupKey,

@@ -10,6 +10,7 @@ use crate::scene::Scene;
 /// The scene of a cell.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct SceneInfo {
     /// File name or spec.
     pub name: String,
@@ -63,6 +64,7 @@ impl SceneInfo {
 /// The queries of a cell.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct PathInfo {
     /// File name or spec.
     pub name: String,

@@ -36,6 +36,7 @@ pub const YARDSTICK: &str = "linear";
 
 /// One structure in one group.
 #[derive(Clone, PartialEq, Debug)]
+#[non_exhaustive]
 pub struct Cell {
     /// Label of the structure or name of the lower bound.
     pub structure: String,
@@ -61,6 +62,7 @@ pub struct Cell {
 /// What the times of a cell rest on.
 #[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct CellTimes {
     /// Processes that were timed; an interval needs three or more.
     pub processes: usize,
@@ -77,6 +79,7 @@ pub struct CellTimes {
 }
 
 /// All cells of a group, with what was measured beside them.
+#[non_exhaustive]
 pub struct Group {
     /// Structures in the order of the plan.
     pub cells: Vec<Cell>,

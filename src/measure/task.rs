@@ -12,6 +12,7 @@ named! {
     /// Which of the two questions is asked.
     #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize, Deserialize)]
     #[serde(rename_all = "snake_case")]
+    #[non_exhaustive]
     pub enum TaskKind {
         /// What does the camera see?
         Query = "query",

@@ -22,6 +22,7 @@ const WARM_UP: Duration = Duration::from_millis(2);
 
 /// One clock reading: `queries` consecutive timed cameras from `frame` on.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Sample {
     /// From 0.
     pub round: u32,
@@ -39,6 +40,7 @@ pub struct Sample {
 
 /// The samples of one task, rounds in order, cameras in order.
 #[derive(Clone, Default, Debug)]
+#[non_exhaustive]
 pub struct Timed {
     /// All clock readings of the task.
     pub samples: Vec<Sample>,

@@ -38,6 +38,7 @@ pub struct Workload<'a> {
 /// A camera of a path that has no such view.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 #[error("path '{path}', camera {index}: {error}")]
+#[non_exhaustive]
 pub struct WorkloadError {
     /// Name of the path.
     pub path: String,

@@ -33,6 +33,7 @@ pub enum Verdict {
 
 /// A verdict and whether it could be proved.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[non_exhaustive]
 pub struct Judgement {
     /// What is true, as far as it could be proved.
     pub verdict: Verdict,

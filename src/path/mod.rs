@@ -75,6 +75,7 @@ pub fn digest(cameras: &[Camera]) -> String {
 }
 
 /// A kind of path.
+#[non_exhaustive]
 pub struct PathFamily {
     /// What is typed.
     pub name: &'static str,
@@ -101,6 +102,7 @@ pub const PATH_PARAMS: &str = "frames=256, seed=1, fovy=60 (degrees), aspect=1.7
 
 /// A path that cannot be made or read.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum PathError {
     /// A file that cannot be read.
     #[error(transparent)]

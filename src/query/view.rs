@@ -344,6 +344,7 @@ impl View for RelativeVolume {
 /// Any of the views there are: what an erased structure is asked with. It is
 /// looked into once per query, never per node.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub enum AnyView<'a> {
     Volume(&'a ConvexVolume),
     Spheres(&'a Spheres),

@@ -12,6 +12,7 @@ pub(super) const STREAM: &str = "stream.jsonl";
 
 /// Why the folder of a run cannot be read or written.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FolderError {
     /// The system refused to read or write it.
     #[error("{}: {source}", path.display())]

@@ -31,6 +31,7 @@ named! {
     /// What became of a cell, worst first.
     #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize)]
     #[serde(rename_all = "snake_case")]
+    #[non_exhaustive]
     pub enum Outcome {
         /// Was right and is wrong, unsafe or panics.
         Broken = "broken",
@@ -91,6 +92,7 @@ impl From<Change> for Outcome {
 
 /// A cell of a comparison, by one metric or as a whole.
 #[derive(Clone, PartialEq, Debug, Serialize)]
+#[non_exhaustive]
 pub struct JudgedRow {
     /// Slower, faster, same, or why it cannot be said.
     #[serde(rename = "verdict")]
@@ -197,6 +199,7 @@ impl JudgedRow {
 
 /// A counter that is not what it was.
 #[derive(Clone, PartialEq, Debug, Serialize)]
+#[non_exhaustive]
 pub struct WorkChange {
     /// The cell in both reports.
     #[serde(flatten)]
@@ -229,6 +232,7 @@ pub fn work_changes(
 
 /// A cell that the other report does not have.
 #[derive(Clone, PartialEq, Debug, Serialize)]
+#[non_exhaustive]
 pub struct Lone {
     /// The cell in the report that has it.
     #[serde(flatten)]
@@ -241,6 +245,7 @@ pub struct Lone {
 
 /// What moved all structures at once: the machine, or the program as a whole.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+#[non_exhaustive]
 pub struct CommonShift {
     /// new / old: above 1 is slower.
     pub ratio: f64,
@@ -254,6 +259,7 @@ pub struct CommonShift {
 
 /// A comparison: every cell with its verdict, and what else is to be said.
 #[derive(Clone, Default, PartialEq, Debug, Serialize)]
+#[non_exhaustive]
 pub struct Changes {
     /// 0.05 is 5 %: how finely "same" is to be shown.
     pub threshold: f64,

@@ -14,6 +14,7 @@ use crate::measure::GroupKey;
 
 /// Why runs are not shards of one plan.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum MergeError {
     /// A folder cannot be read.
     #[error(transparent)]

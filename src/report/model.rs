@@ -19,6 +19,7 @@ pub const SCHEMA_VERSION: u32 = 2;
 /// The contents of report.json: a run, what it ran on, and its cells.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct Report {
     /// Raised when a field changes its meaning or goes away.
     pub schema_version: u32,
@@ -43,6 +44,7 @@ pub struct Report {
 /// A run as a whole.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct RunInfo {
     /// The start in UTC and four random digits.
     pub id: String,
@@ -73,6 +75,7 @@ fn one() -> u32 {
 /// How far apart two measurements of the same thing lie in this run.
 #[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct Noise {
     /// Geometric mean of all twin ratios: 1 unless the order is unfair.
     pub aa_ratio: Option<f64>,
@@ -87,6 +90,7 @@ pub struct Noise {
 /// A structure that was entered twice, with what its two times say.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct TwinEntry {
     /// Name of the scene.
     pub scene: String,
@@ -118,6 +122,7 @@ impl TwinEntry {
 /// A structure, or a lower bound, on one scene, path and test.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct ReportCell {
     /// The scene.
     pub scene: SceneInfo,
@@ -160,6 +165,7 @@ pub struct ReportCell {
 /// The cell's rows in samples.csv: those that have its names.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct SamplesRef {
     /// Name of the file, beside the report.
     pub file: String,

@@ -17,6 +17,7 @@ use crate::statistics::two_speeds;
 /// A line of stream.jsonl.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(tag = "line", rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum Line {
     /// The first line: everything about the run but its cells.
     Run(Box<Header>),
@@ -31,6 +32,7 @@ pub enum Line {
 
 /// Where, by what and with which options a run was begun.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Header {
     /// [`SCHEMA_VERSION`](super::SCHEMA_VERSION) of the program that wrote it.
     pub schema_version: u32,
@@ -58,6 +60,7 @@ pub struct Header {
 /// What two runs must have in common for their times to belong together, and
 /// what one and the other have.
 #[derive(Clone, PartialEq, Eq, Debug)]
+#[non_exhaustive]
 pub struct Difference {
     /// Name of the fact.
     pub what: &'static str,
@@ -148,6 +151,7 @@ fn short(digest: &str) -> String {
 
 /// A part with what samples.csv holds up to its end.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct KeptPart {
     /// What the process measured.
     pub part: Part,
@@ -159,6 +163,7 @@ pub struct KeptPart {
 
 /// Everything that a stream holds.
 #[derive(Clone, PartialEq, Debug)]
+#[non_exhaustive]
 pub struct Stream {
     /// The first line.
     pub header: Header,

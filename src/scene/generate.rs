@@ -16,6 +16,7 @@ use crate::spec::{Spec, SpecError};
 pub const GENERATOR_NAME: &str = "rand_pcg::Pcg64 (PCG XSL RR 128/64)";
 
 /// A kind of generated world.
+#[non_exhaustive]
 pub struct Family {
     /// What is typed.
     pub name: &'static str,

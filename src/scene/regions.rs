@@ -11,6 +11,7 @@ use crate::query::ItemId;
 
 /// The regions of a scene, numbered from zero.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub enum Regions {
     /// The items themselves, closed boxes that may overlap: a point belongs
     /// to every one that holds it.

@@ -7,6 +7,7 @@ use super::source::{LoadOptions, parse_bytes};
 use crate::input::InputError;
 
 /// A real scene that is part of the program.
+#[non_exhaustive]
 pub struct Sample {
     /// What is typed.
     pub name: &'static str,

@@ -37,6 +37,7 @@ pub struct Reference {
 
 /// How a structure's answer differs from the reference.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug)]
+#[non_exhaustive]
 pub struct Difference {
     /// Wanted by the reference, not returned (false negatives).
     pub missing: usize,
