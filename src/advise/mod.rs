@@ -32,7 +32,7 @@ use trials::{Answered, BASE, Entered, Trials};
 /// What the advice depends on beside scene and path.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct AdviseOptions {
-    /// What drawing an item costs that cannot be seen, ns.
+    /// Cost of drawing an item that cannot be seen, ns.
     pub draw_ns: f64,
     /// What planes may be off for rounding, in frustum depths, and a camera's
     /// frame by drift, in radians.

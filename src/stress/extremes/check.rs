@@ -274,11 +274,13 @@ impl Case {
         };
         if lost || drops.ghosts > 0 {
             let expected = match promised {
-                true => "nothing dropped that is in or touches, nothing empty returned".to_owned(),
+                true => {
+                    "nothing dropped that is inside or touches, nothing empty returned".to_owned()
+                }
                 false => format!("nothing dropped that is deeper than {allowed:e}"),
             };
             let got = format!(
-                "{} false negatives (deepest {:e}), {} touches dropped, {} empty boxes returned",
+                "{} false negatives (deepest {:e}), {} boundary contacts dropped, {} empty boxes returned",
                 drops.false_negatives, drops.deepest, drops.touch_dropped, drops.ghosts
             );
             found.fault(SCALAR, name, drops.first, &expected, got);

@@ -190,7 +190,7 @@ impl Extremes<'_> {
                 continue;
             }
             let expected = match (structure.as_str(), level) {
-                (SCALAR, Level::Camera) => "drops nothing that is in or touches",
+                (SCALAR, Level::Camera) => "drops nothing that is inside or touches",
                 (SCALAR, Level::Planes) => "drops nothing but what rounding hides",
                 _ => "returns the very set of the scalar loop",
             };
