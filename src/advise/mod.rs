@@ -1,5 +1,5 @@
 //! Advice about one scene and path: which structure, which culling test, and
-//! what can be left out, each with what was measured for it. It owns the rules
+//! what can be left out, each with what was measured for it. It defines the rules
 //! of omission and how their evidence is weighed; scenes, structures, clocks and
 //! the truth belong to other modules.
 

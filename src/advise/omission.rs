@@ -1,6 +1,5 @@
 //! An omission: a rule with its statistic and threshold, both sides of it as
-//! measured, and what follows. How a rule comes to its statistic is its own
-//! business, in `rules`.
+//! measured, and what follows. The statistics themselves are in `rules`.
 
 use serde::Serialize;
 

@@ -1,5 +1,5 @@
 //! Lenses: perspective, orthographic, off-axis and matrices, each with a finite or (but
-//! for orthographic) infinite far plane. It owns their validation and the
+//! for orthographic) infinite far plane. It defines their validation and the
 //! corners of what they see.
 
 use glam::DVec3;

@@ -1,5 +1,5 @@
 //! Where a camera stands as it was written, beside the frame that was made of
-//! it. It owns the exact arithmetic between the two; judging by it is left to
+//! it. It defines the exact arithmetic between the two; judging by it is left to
 //! others.
 
 use glam::DVec3;

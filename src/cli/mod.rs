@@ -1,8 +1,8 @@
 //! The command line: from what was typed to a validated plan to one file per
-//! command. It owns exit codes, progress and tables, and no arithmetic.
+//! command. It defines exit codes, progress and tables, and no arithmetic.
 //!
 //! It is a function of a [`Registry`]: [`main_with`] is the whole of the
-//! `cullbench` program, and of anybody's who adds a structure of their own.
+//! `cullbench` program, and of any program that adds a structure.
 //!
 //! Exit codes: 0 ok; 1 a wrong answer or a failed verification; 2 usage or bad
 //! input; 3 a regression, in `compare`; 130 interrupted.
@@ -140,7 +140,7 @@ fn dispatch(registry: &Registry, command: Command) -> anyhow::Result<Ending> {
 }
 
 /// One line on stderr, whatever is in the text. Unlike `eprintln!` it does
-/// not panic when nobody can be told.
+/// not panic where standard error is closed.
 fn tell(line: &str) {
     let _ = writeln!(io::stderr(), "{}", text::plain(line));
 }

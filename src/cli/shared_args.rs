@@ -47,7 +47,7 @@ impl KernelArgs {
         let kernel = self.name.unwrap_or_else(Kernel::best);
         let kernel = kernel.checked().map_err(|error| {
             let here: Vec<_> = Kernel::available().map(Kernel::name).collect();
-            SpecError::new(format_args!("{error}; here are: {}", here.join(", ")))
+            SpecError::new(format_args!("{error}; available: {}", here.join(", ")))
         })?;
         Ok(Execution {
             kernel,

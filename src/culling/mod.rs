@@ -1,5 +1,5 @@
 //! Which culling test is asked, and how: from a camera to the view that every
-//! structure is asked with. It owns the table of tests and of arithmetics;
+//! structure is asked with. It defines the table of tests and of arithmetics;
 //! traversal and kernels belong to `query` and `index`.
 
 mod extended;

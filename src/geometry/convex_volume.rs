@@ -1,6 +1,6 @@
 //! The query volume: an intersection of at most 32 half-spaces, with the six
-//! planes of a frustum named. It owns the plane mask logic (inside, straddle,
-//! outside); where the planes come from is the camera's business.
+//! planes of a frustum named. It defines the plane mask logic (inside, straddle,
+//! outside); where the planes come from is left to the camera.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};

@@ -1,5 +1,5 @@
 //! Comma-separated files with a header, read row by row with errors that name
-//! file, line and column. It owns the mechanics that the box, camera and point
+//! file, line and column. It defines the mechanics that the box, camera and point
 //! readers share; what the columns mean is theirs.
 
 use std::collections::{HashSet, VecDeque};

@@ -1,6 +1,6 @@
 //! Physical limits, measured beside the structures: what the memory alone would
 //! cost. A bound answers nothing and is never ranked; it takes part in the same
-//! rounds, so that a ratio to it is paired like any other. It owns the table of
+//! rounds, so that a ratio to it is paired like any other. It defines the table of
 //! bounds and what each of them does.
 
 use super::{Subject, TimedTask, Workload};

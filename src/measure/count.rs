@@ -191,7 +191,7 @@ pub struct Judged {
     pub errors: ErrorCount,
 }
 
-/// Judges the reference's answers, which are everyone's who counted right.
+/// Checks the reference's answers, which all right structures share, against the oracle.
 /// As many cameras as `most` verdicts allow, at least one.
 pub fn judge(workload: &Workload, most: usize) -> Judged {
     let scene = workload.scene;

@@ -1,8 +1,8 @@
 //! Measuring: a count pass that verifies every answer, then a timed pass that
-//! counts nothing. It owns the protocol, the clocks and the metrics; what a
-//! structure does and how results are written are not its business.
+//! counts nothing. It defines the protocol, the clocks and the metrics; it
+//! knows neither how a structure works nor how results are written.
 //!
-//! The road every measurement walks: [`Workload`] (scene, views, points) ->
+//! The pipeline of every measurement: [`Workload`] (scene, views, points) ->
 //! [`Subject`]s (built structures) -> [`count_pass`] -> [`timed_rounds`] ->
 //! [`Cell`]s with named metrics. [`BOUNDS`] take part in the timed rounds only.
 

@@ -1,5 +1,5 @@
 //! The oracle: whether a box and a convex volume have a point in common,
-//! decided exactly. It owns the verdicts OUT, TOUCH and IN at planes level
+//! decided exactly. It defines the verdicts OUT, TOUCH and IN at planes level
 //! (f32 planes and boxes are exact objects) and at camera level (the camera's
 //! parameters are); how culling tests come out against it is measured
 //! elsewhere.

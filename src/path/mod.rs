@@ -1,5 +1,5 @@
 //! Ways through a scene: sequences of cameras, generated, recorded, or taken
-//! from the scene's own places. It owns the table of path families and what
+//! from the scene's own places. It defines the table of path families and what
 //! they share; each family has a file of its own.
 
 mod calibrate;

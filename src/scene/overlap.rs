@@ -1,5 +1,5 @@
-//! Boxes to search by: which items overlap a box, exactly. It owns the comparison
-//! of boxes as they were written; searching is the indexes' business.
+//! Boxes to search by: which items overlap a box, exactly. It defines the comparison
+//! of boxes as they were written; searching is left to the indexes.
 
 use super::originals::side;
 use super::{Scene, WorldBox};

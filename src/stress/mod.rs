@@ -1,5 +1,5 @@
 //! The stiff and extreme suite: every test vector on every structure, at
-//! planes and at camera level. It owns the rows that come out and what counts
+//! planes and at camera level. It defines the rows that come out and what counts
 //! as passed; what is typed and printed is the command line's.
 
 pub mod extremes;

@@ -1,5 +1,5 @@
 //! Asking test vectors: the given planes bit for bit, the camera through the
-//! default pipeline, points, and what must be refused. It owns what passes.
+//! default pipeline, points, and what must be refused. It defines what passes.
 
 use glam::DVec3;
 

@@ -1,5 +1,5 @@
 //! One generated case under test: what every structure and culling test makes
-//! of its boxes, against the scalar loop and the oracle. It owns what counts
+//! of its boxes, against the scalar loop and the oracle. It defines what counts
 //! as a fault; cameras and boxes come from the files beside it.
 
 use glam::DVec3;
