@@ -2,8 +2,9 @@
 //! can say so: compiler, flags, profile, features, commit. Everything is
 //! optional; a build without git or from a package still works.
 
-use std::env;
+use std::path::Path;
 use std::process::Command;
+use std::{env, fs};
 
 fn main() {
     let rustc = env::var("RUSTC").unwrap_or_else(|_| "rustc".into());
@@ -12,20 +13,19 @@ fn main() {
         .filter(|feature| feature != "default")
         .collect();
     let flags = env::var("CARGO_ENCODED_RUSTFLAGS").unwrap_or_default();
-    let commit = output("git", &["rev-parse", "HEAD"]);
-    let changes = output(
-        "git",
-        &[
-            // A refreshed index would make the next build compile all anew.
-            "--no-optional-locks",
-            "status",
-            "--porcelain",
-            "--",
-            "src",
-            "Cargo.toml",
-            "Cargo.lock",
-        ],
-    );
+    // A packed crate may lie in another repository: then that one's commit is not ours.
+    let git = |args: &[&str]| Path::new(".git").exists().then(|| output("git", args))?;
+    let commit = packed_commit().or_else(|| git(&["rev-parse", "HEAD"]));
+    let changes = git(&[
+        // A refreshed index would make the next build compile all anew.
+        "--no-optional-locks",
+        "status",
+        "--porcelain",
+        "--",
+        "src",
+        "Cargo.toml",
+        "Cargo.lock",
+    ]);
     let facts = [
         ("RUSTC", output(&rustc, &["--version"])),
         ("RUSTFLAGS", Some(flags.replace('\u{1f}', " "))),
@@ -48,6 +48,12 @@ fn main() {
             value.unwrap_or_default()
         );
     }
+    // Plain arrays for vectors, as other architectures have them: no dependency is
+    // compiled anew for it, as it would be for a flag of the compiler.
+    println!("cargo::rerun-if-env-changed=CULLBENCH_PLAIN_VECTORS");
+    if env::var_os("CULLBENCH_PLAIN_VECTORS").is_some() {
+        println!("cargo::rustc-cfg=plain_vectors");
+    }
     // What a commit or an edit touches; missing paths are skipped,
     // because cargo would otherwise rerun this script every time.
     for path in [
@@ -57,10 +63,17 @@ fn main() {
         "Cargo.toml",
         "Cargo.lock",
     ] {
-        if std::path::Path::new(path).exists() {
+        if Path::new(path).exists() {
             println!("cargo::rerun-if-changed={path}");
         }
     }
+}
+
+/// The commit that a crate was packed from, by the file that cargo puts into it.
+fn packed_commit() -> Option<String> {
+    let info = fs::read_to_string(".cargo_vcs_info.json").ok()?;
+    let (_, from) = info.split_once("\"sha1\": \"")?;
+    Some(from.split('"').next()?.to_owned())
 }
 
 fn output(program: &str, args: &[&str]) -> Option<String> {

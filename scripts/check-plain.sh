@@ -2,9 +2,10 @@
 # Compiles the library with plain arrays for vectors, as other architectures and
 # interpreters get it: without one line of unsafe code, which the compiler then
 # forbids. Runs the tests of kernels, answers and pinned bits on it.
+# usage: scripts/check-plain.sh [what cargo test is to run, e.g. --lib]
 set -euo pipefail
 cd "$(dirname "$0")/.."
-export RUSTFLAGS="--cfg plain_vectors"
-cargo test --no-default-features --target-dir target/plain "$@" \
-    --lib --test portable --test conformance --test kernels --test ranges \
-    --test stability --test threads
+export CULLBENCH_PLAIN_VECTORS=1
+[ $# -gt 0 ] || set -- --lib --test portable --test conformance --test kernels \
+    --test ranges --test stability --test threads
+cargo test --no-default-features "$@"

@@ -1,9 +1,9 @@
 //! Tables in the source: enums whose values have names for people and files, and
-//! rows of structs. It owns how such a table is written down.
+//! rows of structs. It defines how such a table is written down.
 
 /// Declares an enum with its names: `ALL` in this order, and `name`. With the name of
-/// a table behind the enum's, each name is followed by what it stands for, and the
-/// table holds all three as rows.
+/// a table behind the enum's, each name is followed by what it stands for, which is
+/// its doc comment, and the table holds all three as rows.
 macro_rules! named {
     ($(#[$about:meta])* $vis:vis enum $Enum:ident {
         $($(#[$of:meta])* $value:ident = $name:literal,)+
@@ -31,7 +31,7 @@ macro_rules! named {
         named! {
             $(#[$about])*
             $vis enum $Enum {
-                $($(#[$of])* $value = $name,)+
+                $(#[doc = $what] $(#[$of])* $value = $name,)+
             }
         }
 

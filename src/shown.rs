@@ -1,5 +1,5 @@
 //! How what came from outside is shown: text without anything that a terminal,
-//! a picture or a page would obey, and counts with the word they count. It owns
+//! a picture or a page would obey, and counts with the word they count. It defines
 //! which characters are harmless, for every output there is.
 
 use std::borrow::Cow;

@@ -1,6 +1,6 @@
 //! The little language of the command line: `name:key=value,key=value` names
 //! a scene family, a camera path or a structure together with its parameters.
-//! It owns the syntax, numbers such as `100k` or `2%`, and the nearest
+//! It defines the syntax, numbers such as `100k` or `2%`, and the nearest
 //! suggestion for a misspelt word; what the words mean is up to their owners.
 
 use std::collections::BTreeMap;
@@ -30,6 +30,7 @@ pub struct Spec {
 pub struct SpecError(String);
 
 impl SpecError {
+    /// An error that reads as this text.
     pub fn new(message: impl fmt::Display) -> Self {
         SpecError(message.to_string())
     }
@@ -125,6 +126,7 @@ impl Spec {
         specs
     }
 
+    /// The text before the first `:`.
     pub fn name(&self) -> &str {
         &self.name
     }
@@ -196,7 +198,7 @@ impl Spec {
         }
     }
 
-    /// Call last: refuses parameters that nobody asked for.
+    /// Call last: refuses parameters that were not read.
     pub fn finish(&self) -> Result<(), SpecError> {
         match self
             .given

@@ -4,18 +4,26 @@
 use crate::measure::{Beside, Effort};
 
 /// A named set of scenes and paths with the time to spend on them.
+#[non_exhaustive]
 pub struct Suite {
+    /// What `--suite` takes.
     pub name: &'static str,
+    /// One line for `cullbench list scenes`.
     pub summary: &'static str,
+    /// Scenes with their paths, in the order in which they are measured.
     pub plan: &'static [SuiteScene],
+    /// Processes, rounds and times.
     pub effort: Effort,
     /// The list of structures where none are named.
     pub structures: &'static str,
 }
 
 /// A scene of a suite with the ways through it.
+#[non_exhaustive]
 pub struct SuiteScene {
+    /// Spec of the scene.
     pub scene: &'static str,
+    /// Specs of the paths.
     pub paths: &'static [&'static str],
     /// Measured with cold caches as well as with warm ones.
     pub cold: bool,
@@ -165,6 +173,7 @@ pub static SUITES: &[Suite] = &[
 pub const DEFAULT_PATH: &str = "flythrough";
 
 impl Suite {
+    /// The suite of exactly this name.
     pub fn named(name: &str) -> Option<&'static Suite> {
         SUITES.iter().find(|s| s.name == name)
     }

@@ -1,6 +1,6 @@
 //! How many threads may share a piece of work, and how they share it out. What is
 //! measured is asked on one thread. What a job is
-//! and in which order results are put together is the callers' business.
+//! and in which order results are put together is left to the callers.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -9,7 +9,7 @@ use std::thread::{Builder, scope};
 /// Most threads that can be asked for: beyond it the system may give none.
 pub const MOST_THREADS: usize = 256;
 
-/// The threads that a build may use, as a value that knows whether anybody asked.
+/// The threads that a build may use, and whether a build has asked for them.
 #[derive(Debug)]
 pub struct Pool {
     threads: usize,
@@ -37,7 +37,7 @@ impl Pool {
     }
 }
 
-/// Does every job, on so many threads of which this is one: whoever is free
+/// Does every job, on so many threads of which this is one: a free thread
 /// takes the next. With one thread the jobs are done in order, here.
 ///
 /// Where the system gives fewer threads, those do the work. A thread costs some

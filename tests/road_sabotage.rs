@@ -247,7 +247,7 @@ fn swapped_labels_are_wrong() {
         own.task = match own.task {
             TaskKind::Query => TaskKind::Locate,
             TaskKind::Locate => TaskKind::Query,
-            TaskKind::LocateBatched => TaskKind::LocateBatched,
+            batched => batched,
         };
     }
     assert_eq!(of_parts(&parts)[1], Status::Wrong);

@@ -13,6 +13,7 @@ use crate::statistics::{ALPHA, is_less};
 
 /// Which structure, and all that took part.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct StructureChoice {
     /// The fastest that answered right; null if none did.
     pub name: Option<String>,
@@ -28,19 +29,29 @@ pub struct StructureChoice {
 
 /// A structure as measured.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct StructureRow {
+    /// Label of the structure.
     pub structure: String,
+    /// How building, counting and timing ended.
     pub status: &'static str,
+    /// Why, where the status is not ok.
     pub reason: Option<String>,
+    /// CPU time per frustum query, ns.
     pub query_ns: Option<f64>,
+    /// Lower end of its 95 % interval.
     pub query_ns_lower: Option<f64>,
+    /// Upper end of its 95 % interval.
     pub query_ns_upper: Option<f64>,
     /// Time of `linear` / time of this; above 1 is faster.
     pub speedup: Option<f64>,
+    /// Time of one build, ms.
     pub build_ms: Option<f64>,
+    /// Memory of nodes and items / number of items.
     pub memory_bytes_per_item: Option<f64>,
     /// Queries after which the build is repaid against `linear`.
     pub break_even_queries: Option<f64>,
+    /// CPU time per region search, ns.
     pub locate_ns: Option<f64>,
     #[serde(skip)]
     pub(super) is_failure: bool,
@@ -165,24 +176,34 @@ pub(super) fn named(name: &'static str, execution: Execution) -> Result<Structur
 
 /// Which culling test, and all that took part, on the fastest tree.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct TestChoice {
     /// The one with the least total, or the simplest of those that the processes
     /// do not tell from it; null if nothing could be judged.
     pub name: Option<&'static str>,
     /// The others of those.
     pub ties: Vec<&'static str>,
+    /// The structure that the tests were measured with.
     pub structure: String,
+    /// Every culling test that took part.
     pub rows: Vec<TestRow>,
 }
 
+/// A culling test as measured.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct TestRow {
+    /// Name of the test.
     pub test: &'static str,
+    /// CPU time per frustum query, ns.
     pub query_ns: Option<f64>,
+    /// Lower end of its 95 % interval.
     pub query_ns_lower: Option<f64>,
+    /// Upper end of its 95 % interval.
     pub query_ns_upper: Option<f64>,
     /// False positives / visible items.
     pub excess: Option<f64>,
+    /// Visible items that were not returned, in millionths.
     pub false_negative_ppm: Option<f64>,
     /// Mean of the judged cameras.
     pub false_positives_per_query: Option<f64>,

@@ -1,5 +1,5 @@
 //! Advice about one scene and path: which structure, which culling test, and
-//! what can be left out, each with what was measured for it. It owns the rules
+//! what can be left out, each with what was measured for it. It defines the rules
 //! of omission and how their evidence is weighed; scenes, structures, clocks and
 //! the truth belong to other modules.
 
@@ -31,21 +31,30 @@ use trials::{Answered, BASE, Entered, Trials};
 
 /// What to use and what to leave out, with the evidence.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct Advice {
+    /// Name of the scene.
     pub scene: String,
+    /// Name of the path.
     pub path: String,
+    /// Number of items.
     pub items: usize,
     /// Bad items that were left out on request.
     pub skipped_items: usize,
+    /// Number of cameras.
     pub cameras: usize,
+    /// What the advice was asked for with.
     pub options: AdviseOptions,
     /// Processes that were timed; an interval needs three or more.
     pub processes: usize,
     /// Time of the tree that rules are forced on, entered a second time, / time of
     /// itself: a check whose interval is to hold 1.
     pub twin: Option<Estimate>,
+    /// Which structure to take.
     pub structure: StructureChoice,
+    /// Which culling test to take.
     pub test: TestChoice,
+    /// What to leave out or keep, a rule each.
     pub omissions: Vec<Omission>,
 }
 
@@ -71,6 +80,7 @@ pub struct TrialPlan {
 
 /// Both sides of every rule, asked, compared and judged, but not timed.
 pub struct Prepared {
+    /// What the other processes are to measure.
     pub plan: TrialPlan,
     tests: Vec<EnteredTest>,
     rules: Vec<Entered>,
@@ -83,11 +93,15 @@ pub struct Prepared {
 /// What advice is given about, and how it is measured.
 #[derive(Clone, Copy)]
 pub struct AdviseInput<'a> {
+    /// The scene that the advice is about.
     pub scene: &'a Scene,
+    /// The cameras that look at it.
     pub path: &'a CameraPath,
     /// To choose from.
     pub structures: &'a [StructureSpec],
+    /// Thresholds and what to judge.
     pub options: &'a AdviseOptions,
+    /// Rounds and times of a process.
     pub protocol: &'a Protocol,
 }
 

@@ -1,6 +1,5 @@
 //! An omission: a rule with its statistic and threshold, both sides of it as
-//! measured, and what follows. How a rule comes to its statistic is its own
-//! business, in `rules`.
+//! measured, and what follows. The statistics themselves are in `rules`.
 
 use serde::Serialize;
 
@@ -9,7 +8,9 @@ use crate::verify::ErrorCount;
 
 /// Something that may be left out, and whether it should be.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct Omission {
+    /// Name of the rule, `plane-masks`.
     pub rule: &'static str,
     /// What is left out, in words.
     pub left_out: &'static str,
@@ -20,17 +21,21 @@ pub struct Omission {
     pub statistic_name: &'static str,
     /// Null where the rule has nothing to say about this scene.
     pub statistic: Option<f64>,
+    /// Where the rule changes its mind; null without a statistic.
     pub threshold: Option<f64>,
+    /// On which side of the threshold the rule leaves out.
     pub left_out_if: LeftOutIf,
     /// What statistic and threshold say.
     pub predicted: Option<bool>,
     /// Share of the time that leaving it out saves; negative where it costs.
     pub saving: Option<f64>,
+    /// What came of statistic, clock and answers.
     pub decision: Decision,
     /// Whether the clock, or for the axes beyond six planes the test that is
     /// taken, says what the rule said; null for a tie, and where neither has a
     /// say.
     pub confirmed: Option<bool>,
+    /// The decision in a sentence.
     pub reason: String,
     /// With the rule forced off and on; the first one decides.
     pub checks: Vec<Check>,
@@ -42,20 +47,27 @@ pub struct Omission {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LeftOutIf {
+    /// Not above the threshold.
     AtMost,
+    /// Not below the threshold.
     AtLeast,
 }
 
+/// Whether to leave something out.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum Decision {
+    /// It costs more than it brings.
     LeaveOut,
+    /// It pays off, or nothing shows that it does not.
     Keep,
     /// There is nothing of the kind here.
     NotApplicable,
 }
 
 impl Decision {
+    /// As tables have it.
     pub fn name(self) -> &'static str {
         match self {
             Decision::LeaveOut => "leave out",
@@ -76,16 +88,20 @@ pub(super) enum By {
 
 /// One rule forced off (kept) and on (left out), on one structure.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct Check {
     /// What was asked, or done.
     pub on: String,
     /// Mean over the cameras, thread CPU time, over the processes as in a run.
     pub kept_ns: f64,
+    /// The same without it.
     pub left_out_ns: f64,
     /// Time with it / time without: above 1, leaving out is faster. With its 95 %
     /// interval over the processes; NaN where there is none.
     pub ratio: f64,
+    /// Lower end of the interval.
     pub ratio_lower: f64,
+    /// Upper end of the interval.
     pub ratio_upper: f64,
     /// Whether every camera got the same set from both.
     pub same_answers: bool,
@@ -93,8 +109,11 @@ pub struct Check {
     pub same_expected: bool,
     /// False positives / visible items; null where the truth was not asked.
     pub kept_excess: Option<f64>,
+    /// The same without it.
     pub left_out_excess: Option<f64>,
+    /// Visible items that were not returned, in millionths; null as above.
     pub kept_false_negative_ppm: Option<f64>,
+    /// The same without it.
     pub left_out_false_negative_ppm: Option<f64>,
     /// Sums over the judged cameras, for rules that weigh them.
     #[serde(skip)]

@@ -8,7 +8,7 @@ use crate::measure::WorkloadError;
 /// What the advice depends on beside scene and path.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct AdviseOptions {
-    /// What drawing an item costs that cannot be seen, ns.
+    /// Cost of drawing an item that cannot be seen, ns.
     pub draw_ns: f64,
     /// What planes may be off for rounding, in frustum depths, and a camera's
     /// frame by drift, in radians.
@@ -32,18 +32,35 @@ impl Default for AdviseOptions {
 
 /// Why there is no advice.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum AdviseError {
+    /// There is nothing to cull.
     #[error("scene '{scene}' has no items; expected at least one")]
-    NoItems { scene: String },
+    NoItems {
+        /// Name of the scene.
+        scene: String,
+    },
+    /// There is nothing to cull for.
     #[error("path '{path}' has no cameras; expected at least one")]
-    NoCameras { path: String },
+    NoCameras {
+        /// Name of the path.
+        path: String,
+    },
+    /// A camera of the path cannot be culled with.
     #[error(transparent)]
     Workload(#[from] WorkloadError),
+    /// A structure that a rule needs cannot be built.
     #[error(transparent)]
     Build(#[from] BuildError),
+    /// Another process has prepared something else.
     #[error(
         "{found} ways to answer; the plan has {planned}: the scene or the cameras have changed \
          on the way"
     )]
-    OtherPlan { found: usize, planned: usize },
+    OtherPlan {
+        /// Ways to answer in this process.
+        found: usize,
+        /// Ways to answer in the plan.
+        planned: usize,
+    },
 }

@@ -72,6 +72,7 @@ impl From<f32> for Expansion {
 }
 
 impl Expansion {
+    /// The sum of no terms.
     pub const ZERO: Expansion = Expansion { terms: Vec::new() };
 
     /// The exact product of two doubles (bounds as [`two_product`]).

@@ -1,6 +1,6 @@
 //! Flexible camera control: slide, move, zoom, orbit, yaw, pitch and roll of
 //! the lectures. All angles are degrees and turn counter-clockwise about the
-//! axis they name (right-hand rule). It owns the drift correction as well.
+//! axis they name (right-hand rule). It defines the drift correction as well.
 
 use glam::{DQuat, DVec3};
 

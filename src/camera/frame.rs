@@ -12,6 +12,7 @@ use super::{Camera, CameraError, Pose};
 /// names.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Frame {
+    /// Position of the camera in world coordinates.
     pub eye: DVec3,
     pub(super) u: DVec3,
     pub(super) v: DVec3,

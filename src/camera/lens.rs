@@ -1,5 +1,5 @@
 //! Lenses: perspective, orthographic, off-axis and matrices, each with a finite or (but
-//! for orthographic) infinite far plane. It owns their validation and the
+//! for orthographic) infinite far plane. It defines their validation and the
 //! corners of what they see.
 
 use glam::DVec3;
@@ -12,24 +12,34 @@ use super::{Camera, CameraError, Frame, MatrixConvention, Pose, ViewProjection, 
 pub enum Lens {
     /// Symmetric; `fovy_deg` is the full vertical angle, aspect = width/height.
     Perspective {
+        /// Full vertical angle of view, 0 < fovy < 180.
         fovy_deg: f64,
+        /// Width / height.
         aspect: f64,
+        /// Distance of the near plane, above 0.
         near: f64,
         /// `None` is infinite: the volume has five planes.
         far: Option<f64>,
     },
     /// A box `height` high; near and far may lie behind the eye.
     Orthographic {
+        /// Height of the box.
         height: f64,
+        /// Width / height.
         aspect: f64,
+        /// Distance of the near plane along the direction of view; may be negative.
         near: f64,
+        /// Distance of the far plane, above `near`.
         far: f64,
     },
     /// Any window `[left, right, bottom, top]` on the near plane: stereo,
     /// tiled displays, portals.
     OffAxis {
+        /// `[left, right, bottom, top]` on the near plane, about the axis of view.
         window: [f64; 4],
+        /// Distance of the near plane, above 0.
         near: f64,
+        /// Distance of the far plane; `None` is infinite.
         far: Option<f64>,
     },
     /// The whole camera as a matrix, see [`Camera::of_matrix`]; the frame says
@@ -94,6 +104,7 @@ impl Lens {
         Ok(Lens::OffAxis { window, near, far })
     }
 
+    /// Distance of the near plane along the direction of view.
     pub fn near(&self) -> f64 {
         match *self {
             Lens::Perspective { near, .. }

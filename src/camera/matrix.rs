@@ -12,6 +12,7 @@ named! {
     /// How a matrix is to be read. Reversed depth needs no name: what is visible is
     /// the same, and the plane before the eye is the near one.
     #[derive(Clone, Copy, PartialEq, Eq, Debug)]
+    #[non_exhaustive]
     pub enum MatrixConvention, MATRIX_CONVENTIONS {
         ColumnGl = "column-gl", "clip = M x, depth -1 to 1 (OpenGL)";
         ColumnD3d = "column-d3d", "clip = M x, depth 0 to 1 or 1 to 0 (Vulkan, Metal, WebGPU)";
@@ -112,6 +113,7 @@ impl ViewProjection {
         self.from_zero
     }
 
+    /// Distance of the near plane from the eye along the direction of view.
     pub fn near(&self) -> f64 {
         self.near
     }

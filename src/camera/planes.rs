@@ -17,11 +17,10 @@ named! {
     #[derive(Clone, Copy, PartialEq, Eq, Default, Debug, Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum PlaneMethod, PLANE_METHODS {
-        /// Frame and lens in f64, each plane rounded once; of a camera that is a
-        /// matrix, its rows.
+        ///
+        /// Of a camera that is a matrix: from its rows.
         #[default]
         Frame = "frame", "from the camera's frame in f64, rounded once (default)";
-        /// The same formulas with every operation in f32.
         FrameF32 = "frame-f32", "from the frame, every operation in f32";
         GhGlF32 = "gh-gl-f32", "Gribb-Hartmann from an f32 OpenGL matrix";
         GhGlF64 = "gh-gl-f64", "Gribb-Hartmann from an f64 OpenGL matrix";
@@ -39,6 +38,7 @@ pub const DEFAULT_EPSILON: f64 = 8.0;
 /// How to derive the planes.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct PlaneOptions {
+    /// Which derivation, in which arithmetic.
     pub method: PlaneMethod,
     /// The factor c; 0 leaves the planes as they come.
     pub epsilon: f64,

@@ -1,5 +1,5 @@
 //! Where a camera stands as it was written, beside the frame that was made of
-//! it. It owns the exact arithmetic between the two; judging by it is left to
+//! it. It defines the exact arithmetic between the two; judging by it is left to
 //! others.
 
 use glam::DVec3;
@@ -10,14 +10,22 @@ use crate::arithmetic::Expansion;
 /// Where a camera stands, as the numbers that say so: all are exact.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Pose {
+    /// From the eye to a point.
     LookAt {
+        /// Position of the camera.
         eye: DVec3,
+        /// The point looked at; not the eye.
         look: DVec3,
+        /// Any vector that is not parallel to the direction of view.
         up: DVec3,
     },
+    /// From the eye in a direction.
     Forward {
+        /// Position of the camera.
         eye: DVec3,
+        /// Direction of view, of any length above 0.
         forward: DVec3,
+        /// Any vector that is not parallel to the direction of view.
         up: DVec3,
     },
 }
@@ -27,6 +35,7 @@ pub enum Pose {
 const PARALLEL: f64 = 4.0 * f64::EPSILON;
 
 impl Pose {
+    /// Position of the camera in world coordinates.
     pub fn eye(&self) -> DVec3 {
         match *self {
             Pose::LookAt { eye, .. } | Pose::Forward { eye, .. } => eye,

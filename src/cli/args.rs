@@ -27,7 +27,7 @@ Examples:
   cullbench run --scene my.csv --path my_cameras.csv   your scene, your cameras
   cullbench query --scene city:n=100000 --cameras orbit:frames=8 --structure all
   cullbench locate --scene freedm-map12 --points points.csv --structure bvh
-  cullbench advise --scene my.csv                      what your scene needs and what it can do without
+  cullbench advise --scene my.csv                      which structure, test and shortcuts suit your scene
   cullbench compare old/report.json new/report.json    what has become slower since
 
 Scenes and paths are files or specs such as city:n=100000,seed=7; `cullbench list` names them all.
@@ -44,7 +44,7 @@ pub enum Command {
     Merge(MergeArgs),
     /// Show what a run found: ranked tables, bounds, crossovers, growth
     Report(ReportArgs),
-    /// Hold a run against an older one: what has become slower, faster or wrong
+    /// Compare a run with an older one: what is slower, faster or wrong
     Compare(CompareArgs),
     /// Answer frustum queries: what each structure sees from each camera
     Query(QueryArgs),
@@ -54,9 +54,9 @@ pub enum Command {
     Verify(VerifyArgs),
     /// Error against run time: every test, arithmetic and derivation of the planes
     Precision(PrecisionArgs),
-    /// Advise: which structure, which test and what to leave out, with the evidence
+    /// Advise: which structure, which test, which work can be skipped, with the evidence
     Advise(AdviseArgs),
-    /// Compare how ways to turn, orbit and chase drift from the truth
+    /// Errors of camera updates (turn, orbit, chase) after up to ten million steps
     Drift(DriftArgs),
     /// Replay test vectors and generated extremes, each with its declared outcome
     Stress(StressArgs),
@@ -72,6 +72,8 @@ pub enum Command {
     Completions { shell: clap_complete::Shell },
     /// Print the manual page (roff)
     Man,
+    /// Print the licences of the program and of the real scenes inside it
+    Licences,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum, Debug)]
@@ -115,7 +117,7 @@ pub struct WhatArgs {
     /// Measure with cold caches as well (the suite full does by itself)
     #[arg(long)]
     pub cold: bool,
-    /// Leave out the lower bounds: what reading all items and copying all answers would cost
+    /// Do not measure the lower bounds: reading all items, copying all answers
     #[arg(long)]
     pub no_bounds: bool,
     /// Seconds of silence after which a structure has timed out
@@ -227,7 +229,7 @@ pub struct CompareArgs {
     pub against: Option<PathBuf>,
     #[command(flatten)]
     pub what: WhatArgs,
-    /// Changes within it are the same, if that is proven; such as 5% or 0.05
+    /// The largest change that counts as the same: 5% or 0.05
     #[arg(
         long,
         value_name = "SHARE",
@@ -351,10 +353,10 @@ pub struct PrecisionArgs {
     /// Cameras of the path to look at, evenly spread
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..))]
     pub frames: u32,
-    /// Cubes for each size ratio of the size sweep; 0 leaves both sweeps out
+    /// Cubes for each ratio of the size sweep; 0 skips both sweeps
     #[arg(long, value_name = "N", default_value_t = 2_000_000)]
     pub cubes: usize,
-    /// Draw excess against time as an SVG file too
+    /// Draw false positives against time as an SVG file too
     #[arg(long, value_name = "FILE")]
     pub svg: Option<PathBuf>,
     #[command(flatten)]
@@ -380,7 +382,7 @@ pub struct AdviseArgs {
     /// Structures to choose from, e.g. linear,bvh:leaf=4
     #[arg(long, value_name = "LIST", default_value = "default")]
     pub structure: String,
-    /// What drawing an item costs that cannot be seen
+    /// Cost of drawing an item that cannot be seen, ns
     #[arg(
         long,
         value_name = "NS",
@@ -389,7 +391,7 @@ pub struct AdviseArgs {
         allow_negative_numbers = true
     )]
     pub draw_ns: f64,
-    /// What rounding may move planes by, in depths of the view, and drift a frame, in radians
+    /// The largest error to accept: of planes in depths of the view, of a camera frame in radians
     #[arg(
         long,
         value_name = "SHARE",
@@ -430,7 +432,7 @@ pub struct AdviseArgs {
 
 #[derive(Args, Debug)]
 pub struct DriftArgs {
-    /// The most steps; figures are shown at 1e3, 1e4, ... and there
+    /// Number of steps; errors are shown at 1e3, 1e4, ... and at the last one
     #[arg(
         long,
         value_name = "N",
@@ -439,7 +441,7 @@ pub struct DriftArgs {
         allow_negative_numbers = true
     )]
     pub steps: u64,
-    /// What a recommended way to turn or orbit may be off after all steps
+    /// The largest error of a recommended way to turn or orbit after all steps
     #[arg(
         long,
         value_name = "RAD",

@@ -1,5 +1,5 @@
 //! A document of headings, lines and tables, written as Markdown, as one HTML
-//! page or for a terminal. It owns the escaping of each and knows nothing of
+//! page or for a terminal. It defines the escaping of each and knows nothing of
 //! what the document says.
 
 use super::text;

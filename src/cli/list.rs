@@ -134,7 +134,7 @@ fn rows(registry: &Registry, topic: ListTopic) -> anyhow::Result<(&'static str, 
                 .map(|s| format!("  {:<9} {}", s.name, s.summary))
                 .collect();
             let note = format!(
-                "A scene is also a file: boxes CSV, or a Doom WAD (maps.wad#MAP07 picks a map).\nSuites of `run`:\n{}",
+                "A scene is also a file: boxes CSV, or a Doom WAD (maps.wad#MAP07 picks a map).\nReal scenes are works of others: `cullbench licences`.\nSuites of `run`:\n{}",
                 suites.join("\n")
             );
             ("scenes", note, families.chain(samples).collect())

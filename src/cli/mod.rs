@@ -1,8 +1,8 @@
 //! The command line: from what was typed to a validated plan to one file per
-//! command. It owns exit codes, progress and tables, and no arithmetic.
+//! command. It defines exit codes, progress and tables, and no arithmetic.
 //!
 //! It is a function of a [`Registry`]: [`main_with`] is the whole of the
-//! `cullbench` program, and of anybody's who adds a structure of their own.
+//! `cullbench` program, and of any program that adds a structure.
 //!
 //! Exit codes: 0 ok; 1 a wrong answer or a failed verification; 2 usage or bad
 //! input; 3 a regression, in `compare`; 130 interrupted.
@@ -51,7 +51,7 @@ use std::io::{self, Write};
 use std::process::ExitCode;
 
 use crate::index::Registry;
-use crate::scene::{LoadOptions, Scene};
+use crate::scene::{LoadOptions, NOTICE, Scene};
 use clap::{CommandFactory, Parser};
 use serde::Serialize;
 
@@ -62,6 +62,7 @@ use shared_args::SceneArgs;
 /// How a command ended that did not fail.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Ending {
+    /// Exit code 0.
     Ok,
     /// A structure answered wrongly: exit code 1.
     WrongAnswer,
@@ -134,11 +135,12 @@ fn dispatch(registry: &Registry, command: Command) -> anyhow::Result<Ending> {
         Command::Worker => worker::worker(registry),
         Command::Completions { shell } => completions(shell),
         Command::Man => man(),
+        Command::Licences => licences(),
     }
 }
 
 /// One line on stderr, whatever is in the text. Unlike `eprintln!` it does
-/// not panic when nobody can be told.
+/// not panic where standard error is closed.
 fn tell(line: &str) {
     let _ = writeln!(io::stderr(), "{}", text::plain(line));
 }
@@ -216,6 +218,11 @@ fn man() -> anyhow::Result<Ending> {
     let mut page = Vec::new();
     clap_mangen::Man::new(Cli::command()).render(&mut page)?;
     io::stdout().write_all(&page)?;
+    Ok(Ending::Ok)
+}
+
+fn licences() -> anyhow::Result<Ending> {
+    io::stdout().write_all(NOTICE.as_bytes())?;
     Ok(Ending::Ok)
 }
 

@@ -258,7 +258,7 @@ fn points_table(points: &[Point]) -> text::Table {
             "excess %",
             "by storage/planes/test",
             "missed ppm",
-            "touches lost",
+            "contacts dropped",
             "worst miss",
             "query [95 % interval]",
             "ns/item",

@@ -66,7 +66,7 @@ fn draw_on(svg: &mut String, precision: &Precision) -> Result<(), Box<dyn std::e
         .configure_mesh()
         .light_line_style(WHITE.mix(0.0))
         .x_desc("time per query, us (thread CPU; left is better)")
-        .y_desc("excess, % of the visible (lower is better)")
+        .y_desc("false positives, % of visible (lower is better)")
         .x_label_formatter(&|x| text::significant(*x))
         .y_label_formatter(&|y| {
             if *y <= NONE {

@@ -25,7 +25,7 @@ pub struct KernelArgs {
     /// Instruction set: portable, avx2 or avx512 [default: the best of this machine]
     #[arg(long = "kernel", value_name = "NAME", value_parser = values::kernel)]
     pub name: Option<Kernel>,
-    /// Threads that a build may use, and that query and locate share cameras and points among
+    /// Threads of a build; query and locate divide cameras and points among them
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = values::threads, allow_negative_numbers = true)]
     pub threads: usize,
 }
@@ -47,7 +47,7 @@ impl KernelArgs {
         let kernel = self.name.unwrap_or_else(Kernel::best);
         let kernel = kernel.checked().map_err(|error| {
             let here: Vec<_> = Kernel::available().map(Kernel::name).collect();
-            SpecError::new(format_args!("{error}; here are: {}", here.join(", ")))
+            SpecError::new(format_args!("{error}; available: {}", here.join(", ")))
         })?;
         Ok(Execution {
             kernel,
@@ -62,7 +62,7 @@ pub struct SpreadArgs {
     /// Processes to spread the rounds over; ten or more give intervals, one gives values alone
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub processes: u32,
-    /// Seed of whatever is drawn at random, also of the order in which things are measured
+    /// Seed of all that is random: scenes of sweeps, order of measurement
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
 }

@@ -222,7 +222,7 @@ fn table(sections: &[Section], seconds: f64, note: &str) -> io::Result<()> {
             text::count(tally.ties as usize),
             text::count(tally.undecided as usize),
             text::counted(tally.false_negatives as usize, "false negative"),
-            text::counted(tally.touch_dropped as usize, "dropped touch"),
+            text::counted(tally.touch_dropped as usize, "dropped boundary contact"),
             text::count(tally.lost_bare as usize),
             text::count(tally.refused as usize),
         )?;

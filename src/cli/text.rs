@@ -151,7 +151,7 @@ pub fn over(processes: usize, twin: Option<&Estimate>) -> String {
 }
 
 /// What the times of a table rest on: "10 processes, 100 rounds each; 64 cameras
-/// timed, 128 checked, 8 judged by the oracle".
+/// timed, 128 checked, 8 of them against the oracle".
 pub fn basis(comparison: &Comparison) -> String {
     if comparison.range(|_| 0).is_none() {
         return "no times".to_owned();
@@ -169,7 +169,7 @@ pub fn basis(comparison: &Comparison) -> String {
     };
     let judged = comparison.of_any("judged_queries").unwrap_or(0.0) as usize;
     format!(
-        "{}, {} each; {} timed, {} checked, {} judged by the oracle",
+        "{}, {} each; {} timed, {} checked, {} of them against the oracle",
         of(|cell| cell.times.processes, "process"),
         of(|cell| cell.times.rounds, "round"),
         of(|cell| cell.times.cameras_timed, "camera"),

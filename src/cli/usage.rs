@@ -1,5 +1,5 @@
 //! Errors of the command line on one line: clap tells them in several, with a
-//! tip and the usage. It owns how those become what was found and expected.
+//! tip and the usage. It defines how those become what was found and expected.
 
 use std::error::Error;
 use std::num::{ParseFloatError, ParseIntError};

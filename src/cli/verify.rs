@@ -251,8 +251,8 @@ fn is_safe(culling: &Culling) -> bool {
         && culling.arithmetic != Arithmetic::F64
 }
 
-/// Holds the answers, which are everyone's who agreed with the reference,
-/// against the exact truth about some of the cameras.
+/// Checks the reference's answers, which all structures that agreed share, against
+/// the oracle, for some of the cameras.
 pub(super) fn judge_camera_level(workload: &Workload, checks: &mut [Check], again: &str) {
     let mut errors = judge(workload, MOST_JUDGED).errors;
     errors += on_the_faces(workload);

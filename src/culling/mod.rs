@@ -1,5 +1,5 @@
 //! Which culling test is asked, and how: from a camera to the view that every
-//! structure is asked with. It owns the table of tests and of arithmetics;
+//! structure is asked with. It defines the table of tests and of arithmetics;
 //! traversal and kernels belong to `query` and `index`.
 
 mod extended;
@@ -20,6 +20,7 @@ named! {
     /// How a box is tested against the volume.
     #[derive(Clone, Copy, PartialEq, Eq, Hash, Default, Debug, Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
+    #[non_exhaustive]
     pub enum CullingTest, TESTS {
         Sphere = "sphere", "outside if one plane has the item's bounding sphere on its outer side";
         #[default]
@@ -49,13 +50,13 @@ named! {
     /// In which numbers the test is carried out.
     #[derive(Clone, Copy, PartialEq, Eq, Hash, Default, Debug, Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
+    #[non_exhaustive]
     pub enum Arithmetic, ARITHMETICS {
-        /// f32 planes in scene coordinates, by default moved outward by epsilon.
+        ///
+        /// By default moved outward by epsilon.
         #[default]
         F32 = "f32", "f32 planes in scene coordinates (default)";
-        /// f64 planes, as derived.
         F64 = "f64", "f64 planes, no epsilon";
-        /// f32 planes about the eye; boxes are moved there first.
         F32Relative = "f32-relative", "f32 planes about the eye, boxes moved there first";
     }
 }
@@ -63,23 +64,32 @@ named! {
 /// All choices together: one point of the error-against-time diagram.
 #[derive(Clone, Copy, PartialEq, Default, Debug)]
 pub struct Culling {
+    /// The shape that boxes are compared with.
     pub test: CullingTest,
+    /// The numbers that it is compared in.
     pub arithmetic: Arithmetic,
+    /// How its planes are derived, and their epsilon.
     pub planes: PlaneOptions,
 }
 
 /// Why there is no such view.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum CullingError {
+    /// The camera's planes or lens do not allow it.
     #[error(transparent)]
     Camera(#[from] CameraError),
+    /// Only f32 planes in scene coordinates have several derivations.
     #[error(
         "{arithmetic} planes come from the frame only, not from '{method}'; expected --planes frame"
     )]
     Method {
+        /// Name of the arithmetic.
         arithmetic: &'static str,
+        /// Name of the derivation.
         method: &'static str,
     },
+    /// Spheres have no arithmetic but f32.
     #[error("the sphere test is made in f32 scene coordinates; expected --arithmetic f32")]
     Sphere,
 }
@@ -87,13 +97,18 @@ pub enum CullingError {
 /// A view made for one camera.
 #[derive(Clone, Debug)]
 pub enum CameraView {
+    /// Planes in f32.
     Volume(ConvexVolume),
+    /// Planes and a sphere per box, in f32.
     Spheres(Spheres),
+    /// Planes in f64.
     Wide(WideVolume),
+    /// Planes in f32 about the eye.
     Relative(RelativeVolume),
 }
 
 impl CameraView {
+    /// The same as what structures are queried with.
     pub fn as_any(&self) -> AnyVolume<'_> {
         match self {
             CameraView::Volume(view) => view.into(),

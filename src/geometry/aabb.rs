@@ -1,5 +1,5 @@
-//! The axis-aligned box. It owns containment, union and outward rounding;
-//! which side of a plane a box lies on is the plane's business.
+//! The axis-aligned box. It defines containment, union and outward rounding;
+//! which side of a plane a box lies on is left to the plane.
 
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};

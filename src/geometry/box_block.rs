@@ -1,5 +1,5 @@
 //! Sixteen boxes side by side: the layout in which leaves and scans test their
-//! items. It owns the block kernels; each lane computes exactly what
+//! items. It defines the block kernels; each lane computes exactly what
 //! [`Plane::excludes`] computes for one box.
 
 use glam::Vec3;

@@ -1,6 +1,6 @@
 //! The query volume: an intersection of at most 32 half-spaces, with the six
-//! planes of a frustum named. It owns the plane mask logic (inside, straddle,
-//! outside); where the planes come from is the camera's business.
+//! planes of a frustum named. It defines the plane mask logic (inside, straddle,
+//! outside); where the planes come from is left to the camera.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -23,17 +23,24 @@ named! {
     #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
     #[serde(rename_all = "snake_case")]
     pub enum FrustumPlane {
+        /// Against the direction of u.
         Left = "left",
+        /// In the direction of u.
         Right = "right",
+        /// Against the direction of v.
         Bottom = "bottom",
+        /// In the direction of v.
         Top = "top",
+        /// Before the eye, across the direction of view.
         Near = "near",
+        /// The end of the view; infinite perspectives have none.
         Far = "far",
     }
 }
 
 /// Why a set of planes is no volume.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum VolumeError {
     #[error("a volume has at most 32 planes, not {count}")]
     TooManyPlanes { count: usize },

@@ -1,7 +1,7 @@
 //! Up to eight planes side by side: the layout in which one box is tested
 //! against all of them at once. Each lane computes what [`Plane::excludes`]
-//! and [`Plane::contains`] compute; which planes there are is the volume's
-//! business, and many boxes against one plane are the block kernels'.
+//! and [`Plane::contains`] compute; which planes there are is left to the
+//! volume, and many boxes against one plane are the block kernels'.
 
 use super::{Aabb, Plane};
 

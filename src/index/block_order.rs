@@ -16,6 +16,7 @@ use crate::threads::share;
 /// How items are brought into order.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum BlockOrder {
     /// Halved at the median of the widest axis, again and again, always at a
     /// multiple of the block size that the half is made of.

@@ -77,6 +77,7 @@ impl Split {
 /// How planes are chosen.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum BspBuilder {
     /// `import` where the scene brings a tree of its own, else `median`.
     Auto,

@@ -3,16 +3,14 @@
 //! is one slice. obvhs has no frustum traversal of its own; ours is shared.
 
 use std::borrow::Cow;
-use std::time::Duration;
 
+use obvhs::BvhBuildParams;
 use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::builder::build_bvh2;
-use obvhs::{Boundable, BvhBuildParams};
 use serde::{Deserialize, Serialize};
 
 use super::by_tree::answered_by_tree;
 use super::tree::{PackedTree, TreeWriter};
-use super::{BuildError, Info, Input, Kind, Origin, RegionIndex, check_range, indexable};
+use super::{BuildError, Info, Input, Kind, Origin, RegionIndex, check_range, indexable, ploc};
 use crate::geometry::Aabb;
 use crate::query::ItemId;
 
@@ -50,6 +48,7 @@ const COLLAPSE_COST: f32 = 30.0;
 /// The presets of obvhs by their own names.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum BvhPreset {
     Fastest,
     VeryFast,
@@ -69,12 +68,6 @@ impl BvhPreset {
             BvhPreset::Slow => BvhBuildParams::slow_build(),
             BvhPreset::VerySlow => BvhBuildParams::very_slow_build(),
         }
-    }
-}
-
-impl Boundable for Aabb {
-    fn aabb(&self) -> obvhs::aabb::Aabb {
-        obvhs::aabb::Aabb::new(self.min.into(), self.max.into())
     }
 }
 
@@ -222,7 +215,7 @@ impl RegionIndex for Bvh {
                 tree: PackedTree::default(),
             });
         }
-        let built = build_bvh2(&boxes, config, &mut Duration::default());
+        let built = ploc::build(&boxes, config);
         drop(boxes);
         Ok(Bvh {
             tree: relaid(items, &stacks, &built),

@@ -9,6 +9,7 @@ use crate::geometry::Aabb;
 
 /// A cell, a cube in the axes that are split.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct Cell {
     centre: Vec3,
     /// Half an edge.

@@ -18,6 +18,7 @@ use crate::threads::Pool;
 
 /// Why an index could not be built.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum BuildError {
     /// A bound of an item is NaN or infinite.
     #[error("item {item} has the bounds {bounds:?}; expected finite numbers")]

@@ -5,35 +5,52 @@ use std::path::PathBuf;
 
 use crate::spec::SpecError;
 
+/// Why a file or text cannot be used: where, what was found, what was expected.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum InputError {
+    /// The system refused to read it.
     #[error("{}: {source}", path.display())]
     Io {
+        /// File that was to be read.
         path: PathBuf,
+        /// What the system says.
         source: std::io::Error,
     },
     /// A text file: `line` counts from 1 and includes the header.
     #[error("{file}, line {line}: {found}; expected {expected}")]
     Line {
+        /// Name of the file.
         file: String,
+        /// From 1, the header included.
         line: u64,
+        /// What is there.
         found: String,
+        /// The rule.
         expected: String,
     },
     /// A structured file, by the path of the value in it.
     #[error("{file}, {place}: {found}; expected {expected}")]
     Value {
+        /// Name of the file.
         file: String,
+        /// Path of the value, `cases[3].near`.
         place: String,
+        /// What is there.
         found: String,
+        /// The rule.
         expected: String,
     },
     /// A binary file.
     #[error("{file}, byte {offset}: {found}; expected {expected}")]
     Byte {
+        /// Name of the file.
         file: String,
+        /// Bytes before it.
         offset: u64,
+        /// What is there.
         found: String,
+        /// The rule.
         expected: String,
     },
     /// Several items of a file are bad; the first is named.
@@ -41,7 +58,9 @@ pub enum InputError {
         "{first} ({count} bad items in all; --skip-bad-items leaves them out and reports the count)"
     )]
     BadItems {
+        /// Where and what.
         first: Box<InputError>,
+        /// How many there are, the first included.
         count: usize,
     },
     /// A scene that would not fit into memory; sizes in bytes.
@@ -53,17 +72,26 @@ pub enum InputError {
         if *structures > 1 { " or fewer structures" } else { "" }
     )]
     TooLarge {
+        /// Name of the scene.
         scene: String,
+        /// Structures that are to be built at once; 0 for the scene alone.
         structures: u64,
+        /// Bytes that are needed.
         needed: u64,
+        /// Bytes that are free.
         available: u64,
     },
+    /// An item of a scene that was not read from a file.
     #[error("scene '{scene}', item {item}: {reason}")]
     BadItem {
+        /// Name of the scene.
         scene: String,
+        /// Index of the item.
         item: usize,
+        /// What was found and what is expected.
         reason: String,
     },
+    /// The name or a parameter is wrong.
     #[error("{0}")]
     Spec(#[from] SpecError),
 }

@@ -1,5 +1,5 @@
-//! The bytes of a file or a pipe. It owns that a pipe, which can be read only
-//! once, may be asked for as often as a file.
+//! The bytes of a file or a pipe. A pipe can be read only once: its bytes are kept, so
+//! that it may be read again like a file.
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -1,5 +1,5 @@
 //! Comma-separated files with a header, read row by row with errors that name
-//! file, line and column. It owns the mechanics that the box, camera and point
+//! file, line and column. It defines the mechanics that the box, camera and point
 //! readers share; what the columns mean is theirs.
 
 use std::collections::{HashSet, VecDeque};
@@ -73,6 +73,7 @@ impl<R: Read> TableReader<R> {
         })
     }
 
+    /// The names of the columns, in order.
     pub fn header(&self) -> &[String] {
         &self.header
     }
@@ -149,6 +150,7 @@ impl Row<'_> {
         })
     }
 
+    /// An error at this row.
     pub fn error(&self, found: String, expected: String) -> InputError {
         InputError::Line {
             file: self.file.to_owned(),

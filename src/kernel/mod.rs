@@ -29,6 +29,7 @@ named! {
     /// An instruction set that queries are compiled for, from the smallest to the
     /// largest.
     #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+    #[non_exhaustive]
     pub enum Kernel {
         /// What the program was compiled for: SSE2 on x86-64, NEON on AArch64.
         Portable = "portable",

@@ -9,12 +9,14 @@ use crate::query::ItemId;
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Answer {
+    /// Number of ids.
     pub count: u64,
     /// Sum over the ids of a hash of each: the order does not matter.
     pub digest: u64,
 }
 
 impl Answer {
+    /// The answer that consists of these ids, in any order.
     pub fn of(ids: &[ItemId]) -> Answer {
         /// SplitMix64's finaliser (Steele, Lea and Flood 2014).
         fn mixed(id: ItemId) -> u64 {

@@ -1,6 +1,6 @@
 //! Physical limits, measured beside the structures: what the memory alone would
 //! cost. A bound answers nothing and is never ranked; it takes part in the same
-//! rounds, so that a ratio to it is paired like any other. It owns the table of
+//! rounds, so that a ratio to it is paired like any other. It defines the table of
 //! bounds and what each of them does.
 
 use super::{Subject, TimedTask, Workload};
@@ -10,8 +10,11 @@ use crate::kernel::{Isa, Kernel, Work};
 use crate::query::{ItemId, each_volume};
 
 /// A row of the table of bounds.
+#[non_exhaustive]
 pub struct Bound {
+    /// As `list metrics` and reports have it: `bound-read`.
     pub name: &'static str,
+    /// What it does, in one line.
     pub summary: &'static str,
     /// The metric that holds time of a structure / time of this bound.
     pub ratio: &'static str,
@@ -23,6 +26,7 @@ pub struct Bound {
 /// What a bound is made from.
 #[derive(Clone, Copy)]
 pub struct Material<'a> {
+    /// The queries that it bounds.
     pub workload: &'a Workload<'a>,
     /// What was built on the scene, under the names they were asked for by.
     pub subjects: &'a [Subject],

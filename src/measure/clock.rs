@@ -8,7 +8,9 @@ use cpu_time::ThreadTime;
 /// Time between two readings, in nanoseconds.
 #[derive(Clone, Copy, Default, PartialEq, Debug)]
 pub struct Lap {
+    /// CPU time of this thread.
     pub cpu_ns: f64,
+    /// Time on the wall: other programs count.
     pub wall_ns: f64,
 }
 
@@ -20,6 +22,7 @@ pub struct Stopwatch {
 }
 
 impl Stopwatch {
+    /// Both clocks are running from here on.
     #[inline]
     pub fn start() -> Self {
         let wall = Instant::now();
@@ -29,6 +32,7 @@ impl Stopwatch {
         }
     }
 
+    /// The time since [`Stopwatch::start`].
     #[inline]
     pub fn lap(&self) -> Lap {
         let cpu = self.cpu.elapsed();

@@ -1,6 +1,6 @@
 //! What cold queries need: something to stream over the caches with, and
-//! outputs that do not grow while they are timed. When to sweep is the timed
-//! pass's business.
+//! outputs that do not grow while they are timed. The timed pass decides
+//! when to sweep.
 
 use super::schedule::Protocol;
 use super::task::TimedTask;

@@ -14,13 +14,17 @@ use crate::verify::{ErrorCount, Fault, Trial, Truth, explain_containment, explai
 
 /// What one subject answered and what it cost.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Counted {
+    /// Whether every answer was that of the reference scan.
     pub verdict: Verdict,
     /// The frustum query of each camera.
     pub frames: Vec<Answer>,
+    /// Counters summed over all frustum queries.
     pub cost: QueryCost,
     /// The region search of each eye.
     pub located: Vec<Answer>,
+    /// Counters summed over all region searches.
     pub locate_cost: QueryCost,
 }
 
@@ -150,6 +154,7 @@ fn batch_verdict(workload: &Workload, subject: &Built) -> Verdict {
 /// How the answers of a workload differ from the truth at camera level.
 #[derive(Clone, Copy, Default, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct Judged {
     /// Cameras that were judged, evenly spread over the path.
     pub judged_queries: usize,
@@ -158,7 +163,7 @@ pub struct Judged {
     pub errors: ErrorCount,
 }
 
-/// Judges the reference's answers, which are everyone's who counted right.
+/// Checks the reference's answers, which all right structures share, against the oracle.
 /// As many cameras as `most` verdicts allow, at least one.
 pub fn judge(workload: &Workload, most: usize) -> Judged {
     let scene = workload.scene;

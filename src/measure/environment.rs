@@ -10,48 +10,71 @@ use sysinfo::{CpuRefreshKind, MemoryRefreshKind, RefreshKind, System};
 use crate::kernel::Kernel;
 use crate::scene::hex;
 
+/// The machine of a run; what the system does not tell is `None`.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct Machine {
+    /// Model name of the processor.
     pub cpu: Option<String>,
     /// SIMD features that kernels may choose by.
     pub features: Vec<String>,
     /// The kernel that queries ran by, of those this processor has.
     pub instruction_set: String,
+    /// Logical processors that this process may use.
     pub cores: usize,
     /// Data and unified caches of the first core, innermost first.
     pub caches: Vec<Cache>,
+    /// Physical memory.
     pub memory_bytes: Option<u64>,
+    /// Name and version of the operating system.
     pub os: Option<String>,
+    /// Version of the operating system's kernel.
     pub kernel: Option<String>,
     /// Load average over one minute at the start.
     pub load: Option<f64>,
 }
 
+/// One cache of a processor core.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct Cache {
+    /// 1 is the innermost.
     pub level: u32,
+    /// Size in bytes.
     pub bytes: u64,
 }
 
+/// What the program was built with; what the build script could not find is `None`.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct Toolchain {
+    /// `rustc --version`.
     pub rustc: Option<String>,
+    /// Target triple.
     pub target: Option<String>,
+    /// RUSTFLAGS, with blanks between.
     pub flags: String,
+    /// Cargo profile, `release`.
     pub profile: Option<String>,
+    /// `opt-level` of that profile.
     pub opt_level: Option<String>,
+    /// Cargo features without `default`.
     pub features: Vec<String>,
     /// SHA-256 of Cargo.lock: which dependencies.
     pub lock_digest: String,
 }
 
+/// What the program was built from.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct Source {
+    /// Version of this crate.
     pub version: String,
+    /// Git commit; `None` for a build from a package.
     pub commit: Option<String>,
     /// Whether files differed from the commit when the program was built.
     pub dirty: Option<bool>,
@@ -169,6 +192,7 @@ fn built_with(value: &str) -> Option<String> {
 }
 
 impl Toolchain {
+    /// The facts that the build script left in this program.
     pub fn capture() -> Toolchain {
         let lock = include_bytes!("../../Cargo.lock");
         Toolchain {
@@ -188,6 +212,7 @@ impl Toolchain {
 }
 
 impl Source {
+    /// The facts that the build script left in this program.
     pub fn capture() -> Source {
         Source {
             version: env!("CARGO_PKG_VERSION").to_owned(),

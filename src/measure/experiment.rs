@@ -38,13 +38,17 @@ pub struct Effort {
     /// The timed cameras are as many as a plain loop over all items answers in
     /// this time, ns.
     pub pass_ns: f64,
+    /// What is measured beside frustum queries.
     pub beside: Beside,
 }
 
 /// What is measured beside frustum queries.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[non_exhaustive]
 pub enum Beside {
+    /// Frustum queries only.
     Nothing,
+    /// Region search of the cameras' eyes among the scene's regions.
     RegionSearch,
     /// Region search, updates, a twin and lower bounds.
     All,
@@ -53,7 +57,9 @@ pub enum Beside {
 /// A scene with the ways through it.
 #[derive(Clone, PartialEq, Debug)]
 pub struct PlannedScene {
+    /// File, sample or spec, as [`crate::scene::load`] takes it.
     pub source: String,
+    /// Files or specs, as [`crate::path::load`] takes them.
     pub paths: Vec<String>,
     /// Whether caches are cold: the states to measure.
     pub caches: Vec<bool>,
@@ -62,22 +68,32 @@ pub struct PlannedScene {
 /// What is to be measured: data, complete before anything runs.
 #[derive(Clone)]
 pub struct Plan {
+    /// Measured one after the other.
     pub scenes: Vec<PlannedScene>,
+    /// All of them take part in every group.
     pub structures: Vec<StructureSpec>,
+    /// Culling tests with their arithmetic and planes, each a group of its own.
     pub cullings: Vec<Culling>,
+    /// What cameras have where their path does not say.
     pub lens: LensDefaults,
+    /// How scenes are read.
     pub load: LoadOptions,
+    /// How many processes, rounds and tasks.
     pub effort: Effort,
     /// Whether lower bounds are measured beside the structures.
     pub bounds: bool,
+    /// Seed of the order in which structures are measured.
     pub seed: u64,
 }
 
 /// A path, whether caches are cold, and the culling.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Question {
+    /// File or spec of the path.
     pub path: String,
+    /// Whether caches are emptied before each query.
     pub cold: bool,
+    /// Test, arithmetic and planes.
     pub culling: Culling,
 }
 
@@ -103,6 +119,7 @@ impl Plan {
         questions
     }
 
+    /// The key of the group that a question is on a scene.
     pub fn key(&self, scene: &PlannedScene, question: &Question) -> GroupKey {
         let Question {
             path,
@@ -201,13 +218,18 @@ impl Plan {
 
 /// Why a scene could not be measured.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ExperimentError {
+    /// The scene cannot be read.
     #[error(transparent)]
     Scene(#[from] InputError),
+    /// The path cannot be read or has no cameras in this scene.
     #[error(transparent)]
     Path(#[from] PathError),
+    /// A camera of the path cannot be culled with.
     #[error(transparent)]
     Workload(#[from] WorkloadError),
+    /// The name of a structure or a parameter of it is wrong.
     #[error(transparent)]
     Spec(#[from] crate::spec::SpecError),
 }
@@ -215,6 +237,7 @@ pub enum ExperimentError {
 /// One process's share of one scene.
 #[derive(Clone, Default, Debug, Serialize, Deserialize)]
 pub struct Share {
+    /// Its number; the first, 0, counts and plans for the others.
     pub process: u32,
     /// By question: what the first process found; `None` where this is the
     /// first process.

@@ -26,10 +26,15 @@ const LOCATE_SHARE: f64 = 1.0 / 3.0;
 
 /// What a group is measured with.
 pub struct GroupPlan<'a> {
+    /// What reports say of the scene.
     pub scene: &'a SceneInfo,
+    /// What reports say of the path.
     pub path: PathInfo,
+    /// Number of this process; 0 counts and plans.
     pub process: u32,
+    /// Rounds and times of the timed pass.
     pub protocol: Protocol,
+    /// Lower bounds to be timed beside the structures.
     pub bounds: &'a [Bound],
     /// From the first process; `None` in the first process itself.
     pub known: Option<&'a Known>,

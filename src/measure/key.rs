@@ -5,20 +5,28 @@ use serde::{Deserialize, Serialize};
 /// What is common to the cells that are compared with each other.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct GroupKey {
+    /// Name of the scene, parameters included.
     pub scene: String,
+    /// Name of the path, parameters included.
     pub path: String,
     /// "warm" or "cold".
     pub cache: String,
+    /// Name of the culling test.
     pub test: String,
+    /// Name of the arithmetic that the test is carried out in.
     pub arithmetic: String,
+    /// Name of the method that planes are derived by.
     pub planes: String,
+    /// Factor c of the planes' epsilon.
     pub epsilon: f64,
 }
 
 /// A cell: a structure in a group.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct CellKey {
+    /// What the cell is compared within.
     #[serde(flatten)]
     pub group: GroupKey,
+    /// Label of the structure, `bvh:leaf=4`.
     pub structure: String,
 }

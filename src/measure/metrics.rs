@@ -8,9 +8,13 @@ use serde::{Deserialize, Serialize};
 use crate::statistics::Estimate;
 
 /// One metric of the list; the unit is part of its name where it has one.
+#[non_exhaustive]
 pub struct MetricInfo {
+    /// As in reports and `--metric`.
     pub name: &'static str,
+    /// Unit of its values; empty for counts and ratios.
     pub unit: &'static str,
+    /// What it is, in one line.
     pub summary: &'static str,
 }
 
@@ -23,7 +27,7 @@ macro_rules! metrics {
 }
 
 metrics! {
-    "visible_count", "items", "visible items a query, mean over the path";
+    "visible_count", "items", "visible items per query, mean over the path";
     "cull_rate", "1", "1 - visible/total, mean over the path";
     "query_ns", "ns", "thread CPU time per frustum query, mean over the timed cameras: trimmed mean over the processes, each the interquartile mean over its rounds; interval over the processes";
     "query_ns_p5", "ns", "5th percentile over groups of cameras that are the same for all structures; absent below twenty groups";
@@ -36,18 +40,18 @@ metrics! {
     "times_read", "1", "time of this structure / time of reading all item bounds once (bound-read): what a scan is above the memory's speed";
     "times_memcpy", "1", "time of this structure / time of copying as many ids (bound-memcpy): what an answer is above its own size";
     "times_replay", "1", "time of this structure / time of a replay of what 'wide' reads and copies; only beside wide";
-    "nodes_tested", "nodes", "node bounds classified a query, mean";
-    "planes_tested", "planes", "plane tests a query, of nodes and items, mean";
-    "items_tested", "items", "item bounds tested a query, mean";
-    "items_accepted_untested", "items", "items reported with a whole subtree, untested, a query, mean";
-    "excess", "1", "false positives / truly visible items, at camera level, of the judged queries";
-    "false_positive_count", "items", "returned though out at camera level, a judged query, mean";
-    "false_negative_count", "items", "in at camera level, but not returned, a judged query, mean";
-    "touch_dropped_count", "items", "touching at camera level, but not returned, a judged query, mean";
+    "nodes_tested", "nodes", "node bounds classified per query, mean";
+    "planes_tested", "planes", "plane tests per query, of nodes and items, mean";
+    "items_tested", "items", "item bounds tested per query, mean";
+    "items_accepted_untested", "items", "items reported with a whole subtree, untested, per query, mean";
+    "excess", "1", "false positives / visible items, at camera level, of the queries checked against the oracle";
+    "false_positive_count", "items", "returned though outside at camera level, per checked query, mean";
+    "false_negative_count", "items", "inside at camera level, but not returned, per checked query, mean";
+    "touch_dropped_count", "items", "boundary contacts at camera level, but not returned, per checked query, mean";
     "worst_miss", "world units", "how deep the deepest false negative reaches into the view";
-    "undecided_count", "items", "too close to a tie for the truth itself (called a touch), a judged query, mean";
-    "judged_queries", "queries", "cameras of the path whose answers were judged against the exact truth";
-    "build_ms", "ms", "CPU time of a build; wall time with --threads above 1";
+    "undecided_count", "items", "too close to decide (counted as boundary contacts), per checked query, mean";
+    "judged_queries", "queries", "cameras of the path whose answers were checked against the oracle";
+    "build_ms", "ms", "CPU time of one build; wall time with --threads above 1";
     "update_ms_0_1_percent", "ms", "CPU time of an update after 0.1 % of the items have moved (scenes of up to 2 million)";
     "update_ms", "ms", "as above, 1 % moved";
     "update_ms_10_percent", "ms", "as above, 10 % moved";
@@ -56,9 +60,9 @@ metrics! {
     "memory_bytes_per_item", "bytes", "nodes, item bounds and ids / items";
     "break_even_queries", "queries", "queries after which the build is repaid against linear; empty if never";
     "locate_ns", "ns", "thread CPU time of a region search at the eye, mean over the timed cameras; as query_ns";
-    "locate_batched_ns", "ns", "thread CPU time of a region search when all points of the path are asked at once, per point; as query_ns";
+    "locate_batched_ns", "ns", "thread CPU time of a region search of all points of the path in one batch, per point; as query_ns";
     "locate_speedup", "1", "as speedup, for region search";
-    "comparisons", "bounds", "bounds looked at a region search, of nodes and items, mean";
+    "comparisons", "bounds", "bounds tested per region search, of nodes and items, mean";
     "regions_found", "regions", "regions that hold the eye, mean over the path";
 }
 
@@ -66,9 +70,13 @@ metrics! {
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Metric {
+    /// The mean, count or ratio.
     pub value: f64,
+    /// Lower end of the interval; `None` without one.
     pub lower: Option<f64>,
+    /// Upper end of the interval; `None` without one.
     pub upper: Option<f64>,
+    /// As `cullbench list metrics` has it.
     pub unit: String,
 }
 

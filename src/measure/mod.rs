@@ -1,8 +1,8 @@
 //! Measuring: a count pass that verifies every answer, then a timed pass that
-//! counts nothing. It owns the protocol, the clocks and the metrics; what a
-//! structure does and how results are written are not its business.
+//! counts nothing. It defines the protocol, the clocks and the metrics; it
+//! knows neither how a structure works nor how results are written.
 //!
-//! The road every measurement walks: [`Workload`] (scene, views, points) ->
+//! The pipeline of every measurement: [`Workload`] (scene, views, points) ->
 //! [`Subject`]s (built structures) -> [`count_pass`] -> [`timed_rounds`] ->
 //! [`Cell`]s with named metrics. [`BOUNDS`] take part in the timed rounds only.
 
@@ -64,6 +64,7 @@ named! {
     #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
     #[cfg_attr(test, derive(schemars::JsonSchema))]
     #[serde(rename_all = "snake_case")]
+    #[non_exhaustive]
     pub enum Status {
         /// Every answer equals the reference.
         Ok = "ok",
@@ -75,8 +76,11 @@ named! {
         Refused = "refused",
         /// Not run, for a stated reason.
         LeftOut = "left_out",
+        /// Said nothing for as long as `--timeout` allows.
         TimedOut = "timed_out",
+        /// The structure's own code did, and ended its process or not.
         Panicked = "panicked",
+        /// The system ended its process, or refused it memory.
         OutOfMemory = "out_of_memory",
     }
 }
@@ -101,11 +105,14 @@ impl Status {
 /// A status with its reason.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub struct Verdict {
+    /// How it ended.
     pub status: Status,
+    /// Why, in one line; `None` for [`Status::Ok`].
     pub reason: Option<String>,
 }
 
 impl Verdict {
+    /// Nothing wrong.
     pub fn ok() -> Self {
         Verdict {
             status: Status::Ok,
@@ -113,6 +120,7 @@ impl Verdict {
         }
     }
 
+    /// A status that has to be explained.
     pub fn new(status: Status, reason: impl Into<String>) -> Self {
         Verdict {
             status,

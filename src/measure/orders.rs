@@ -1,9 +1,9 @@
-//! The order of the tasks in each round, balanced so that neither a place
-//! nor a neighbour is anybody's advantage. Timing itself is `timing`'s.
+//! The order of the tasks in each round, balanced so that neither a position
+//! nor a neighbour favours a task. Timing itself is `timing`'s.
 
 use crate::scene::Dice;
 
-/// Orders in which everyone takes every place once and follows everyone else
+/// Orders in which every task takes every position once and follows every other
 /// once in as many rounds as there are tasks (twice in twice as many for
 /// odd numbers): a Williams square (E. J. Williams 1949, "Experimental designs
 /// balanced for the estimation of residual effects of treatments"), its names

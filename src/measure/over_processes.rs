@@ -20,6 +20,7 @@ pub struct ProcessTimes {
 }
 
 impl ProcessTimes {
+    /// The times of tasks in one process, ln ns, in their order.
     pub fn of(timed: &[Result<Timed, Verdict>]) -> ProcessTimes {
         let ln_ns = timed.iter().map(|timed| match timed {
             Ok(timed) => Ok(timed.ln_ns()),

@@ -15,6 +15,7 @@ use super::{
 
 /// What the first process counted and planned; the others keep to it.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Known {
     /// Of every camera: what every structure that is right answers. Empty if
     /// the process is to count for itself.
@@ -24,6 +25,7 @@ pub struct Known {
     /// Of frustum queries, bounds last, and of region searches. `None` where
     /// nothing is timed.
     pub query: Option<NamedSchedule>,
+    /// As `query`, of region searches.
     pub locate: Option<NamedSchedule>,
     /// Scale of the lens where the path was asked for by its visible share.
     pub lens_scale: Option<f64>,
@@ -32,22 +34,30 @@ pub struct Known {
 /// A schedule with the names of its tasks.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct NamedSchedule {
+    /// Label and kind of each task, in the order of the schedule.
     pub names: Vec<(String, TaskKind)>,
+    /// Cameras, batches and rounds.
     pub schedule: Schedule,
 }
 
 /// A structure in one process.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct SubjectPart {
     /// As asked for, `bvh:leaf=4`; the twin of one ends in `#twin`.
     pub label: String,
+    /// Parameters of the structure, defaults included.
     pub params: Value,
+    /// As the structure declares.
     pub kind: Kind,
+    /// As the structure declares.
     pub origin: Origin,
+    /// How building, counting and timing ended.
     #[serde(flatten)]
     pub verdict: Verdict,
     /// Whether builds share threads: wall time then, else CPU time.
     pub build_ms: Option<f64>,
+    /// Of nodes and items; `None` where nothing was built.
     pub memory_bytes: Option<u64>,
     /// In the order of [`super::UPDATE_SHARES`].
     pub update_ms: Vec<f64>,
@@ -59,10 +69,13 @@ pub struct SubjectPart {
 
 /// What was timed of one task in one process.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct TaskPart {
     /// Of a structure or of a lower bound.
     pub label: String,
+    /// What it was timed at.
     pub task: TaskKind,
+    /// How timing it ended.
     #[serde(flatten)]
     pub verdict: Verdict,
     /// Mean CPU ns per query over all timed cameras, for each round.
@@ -74,19 +87,27 @@ pub struct TaskPart {
     pub tail_ns: Vec<f64>,
     /// Ids returned by all queries, and CPU ns spent on them.
     pub returned: u64,
+    /// CPU ns of the queries that `returned` counts.
     pub spent_ns: f64,
 }
 
 /// One process, one group.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Part {
+    /// The group.
     pub key: GroupKey,
+    /// 0 is the first, which counts and plans.
     pub process: u32,
+    /// What reports say of the scene.
     pub scene: SceneInfo,
+    /// What reports say of the path.
     pub path: PathInfo,
+    /// What the other processes are to keep to; from the first process only.
     pub known: Option<Known>,
     /// How the answers differ from the exact truth; the first process only.
     pub judged: Option<Judged>,
+    /// Structures in the order of the plan, twins last.
     pub subjects: Vec<SubjectPart>,
     /// Structures that had ended a process on this scene before: they are not
     /// tried again, by a run that is resumed neither.
@@ -94,6 +115,7 @@ pub struct Part {
     pub failed: BTreeMap<String, Verdict>,
     /// Names of the lower bounds among the tasks.
     pub bounds: Vec<String>,
+    /// Tasks in the order of the schedules.
     pub tasks: Vec<TaskPart>,
 }
 

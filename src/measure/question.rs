@@ -10,13 +10,21 @@ use crate::scene::Scene;
 /// The scene of a cell.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct SceneInfo {
+    /// File name or spec.
     pub name: String,
+    /// Number of items.
     pub total_count: usize,
+    /// Number of regions for region search.
     pub region_count: usize,
+    /// Scene-local zero in world coordinates.
     pub origin: [f64; 3],
+    /// Smallest corner of all items, scene-local.
     pub bounds_min: [f64; 3],
+    /// Largest corner of all items, scene-local.
     pub bounds_max: [f64; 3],
+    /// Items that were left out because they could not be read.
     pub skipped_items: usize,
     /// SHA-256 over origin and item bounds.
     pub digest: String,
@@ -37,6 +45,7 @@ impl SceneInfo {
         }
     }
 
+    /// The facts of a loaded scene.
     pub fn of(scene: &Scene) -> SceneInfo {
         let bounds = scene.world_bounds();
         SceneInfo {
@@ -55,13 +64,17 @@ impl SceneInfo {
 /// The queries of a cell.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct PathInfo {
+    /// File name or spec.
     pub name: String,
+    /// Number of cameras, timed or not.
     pub camera_count: usize,
     /// "warm" or "cold".
     pub cache: String,
     /// Where the planes come from, and the factor c of their epsilon.
     pub planes: String,
+    /// Factor c of the planes' epsilon.
     pub epsilon: f64,
     /// The numbers that the culling test is carried out in.
     pub arithmetic: String,
@@ -84,6 +97,7 @@ impl PathInfo {
         }
     }
 
+    /// The facts of a workload along the path of this name.
     pub fn of(path: &str, workload: &Workload, cold: bool) -> PathInfo {
         let culling = &workload.culling;
         PathInfo {
@@ -99,6 +113,7 @@ impl PathInfo {
 }
 
 impl GroupKey {
+    /// The key of a path's queries by a culling test.
     pub fn new(scene: &str, path: &PathInfo, test: &str) -> GroupKey {
         GroupKey {
             scene: scene.to_owned(),

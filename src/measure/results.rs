@@ -36,16 +36,22 @@ pub const YARDSTICK: &str = "linear";
 
 /// One structure in one group.
 #[derive(Clone, PartialEq, Debug)]
+#[non_exhaustive]
 pub struct Cell {
+    /// Label of the structure or name of the lower bound.
     pub structure: String,
     /// As the structure declares; `None` for a lower bound.
     pub declared: Option<(Kind, Origin)>,
+    /// Parameters of the structure, defaults included; null for a lower bound.
     pub params: Value,
+    /// How building, counting and timing ended.
     pub verdict: Verdict,
     /// Fastest first; structures that no test tells apart share a rank. `None`
     /// where there is no time.
     pub rank: Option<usize>,
+    /// By name; a metric that was not measured is not there.
     pub metrics: BTreeMap<String, Metric>,
+    /// What the metrics of time were made from.
     pub times: CellTimes,
     /// The errors behind the metrics, as totals.
     pub judged: Option<Judged>,
@@ -56,11 +62,13 @@ pub struct Cell {
 /// What the times of a cell rest on.
 #[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct CellTimes {
     /// Processes that were timed; an interval needs three or more.
     pub processes: usize,
     /// Rounds in each process.
     pub rounds: usize,
+    /// Cameras in the timed pass.
     pub cameras_timed: usize,
     /// Cameras whose answers were compared with the reference.
     pub cameras_checked: usize,
@@ -71,7 +79,9 @@ pub struct CellTimes {
 }
 
 /// All cells of a group, with what was measured beside them.
+#[non_exhaustive]
 pub struct Group {
+    /// Structures in the order of the plan.
     pub cells: Vec<Cell>,
     /// Lower bounds: no structures, never ranked.
     pub bounds: Vec<Cell>,

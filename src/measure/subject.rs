@@ -14,19 +14,24 @@ use crate::scene::Scene;
 /// A structure with its two indexes: over the items (what does the camera
 /// see) and over the regions (where is the camera).
 pub struct Subject {
+    /// Structure, parameters and how it is executed.
     pub spec: StructureSpec,
     /// Entered a second time, as a check: it must be as fast as the first.
     pub is_twin: bool,
+    /// The indexes, or why there are none.
     pub built: Result<Built, Verdict>,
 }
 
+/// The indexes of a structure over one scene.
 pub struct Built {
+    /// Over the items, as the culling test has them.
     pub items: Box<dyn DynIndex>,
     /// `None` where the regions are the items as they are indexed.
     regions: Option<Box<dyn DynIndex>>,
     /// CPU time of one build over the items, ms; wall time
     /// where builds have several threads.
     pub build_ms: f64,
+    /// Of the index over the items.
     pub memory: MemoryUsage,
     /// CPU time of an update, ms, for each of [`super::UPDATE_SHARES`]; empty for
     /// scenes too large to be moved in passing.

@@ -12,6 +12,7 @@ named! {
     /// Which of the two questions is asked.
     #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize, Deserialize)]
     #[serde(rename_all = "snake_case")]
+    #[non_exhaustive]
     pub enum TaskKind {
         /// What does the camera see?
         Query = "query",
@@ -31,6 +32,7 @@ pub type AskMany<'a> = Box<dyn Fn(&[u32]) -> u64 + 'a>;
 /// One that takes part in a timed pass: how it answers query `place`
 /// (appending to an empty output), and what it must return.
 pub struct TimedTask<'a> {
+    /// Answers one query.
     pub ask: Ask<'a>,
     /// Takes the place of `ask`, and a whole pass is one batch.
     pub ask_many: Option<AskMany<'a>>,

@@ -22,12 +22,17 @@ const WARM_UP: Duration = Duration::from_millis(2);
 
 /// One clock reading: `queries` consecutive timed cameras from `frame` on.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Sample {
+    /// From 0.
     pub round: u32,
+    /// Index in the path of the first camera.
     pub frame: u32,
+    /// Consecutive cameras of this reading.
     pub queries: u32,
     /// Per query.
     pub cpu_ns: f64,
+    /// Per query, on the wall.
     pub wall_ns: f64,
     /// Ids returned by all queries of the sample: each sample is a test too.
     pub returned: u64,
@@ -35,7 +40,9 @@ pub struct Sample {
 
 /// The samples of one task, rounds in order, cameras in order.
 #[derive(Clone, Default, Debug)]
+#[non_exhaustive]
 pub struct Timed {
+    /// All clock readings of the task.
     pub samples: Vec<Sample>,
     /// Rounds in which the task took part.
     pub rounds: usize,

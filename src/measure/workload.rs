@@ -21,28 +21,37 @@ pub fn input_of<'a>(scene: &'a Scene, items: &'a [Aabb]) -> Input<'a> {
 
 /// A scene with the queries along one path.
 pub struct Workload<'a> {
+    /// Items, regions and origin.
     pub scene: &'a Scene,
+    /// Name of the path, parameters included.
     pub path: String,
+    /// Test, arithmetic and planes.
     pub culling: Culling,
     /// The scene's items as the culling test has them indexed.
     pub items: Cow<'a, [Aabb]>,
     /// The cameras of the path; the truth is theirs.
     pub cameras: Vec<Camera>,
+    /// What structures are queried with: one view per camera.
     pub views: Vec<CameraView>,
     /// Scale of the lens where the path was asked for by its visible share.
     pub lens_scale: Option<f64>,
     /// The eyes of the path, to be located among the scene's regions: as
     /// structures are asked for them, and as they are.
     pub points: Vec<Vec3>,
+    /// The same eyes as they were written.
     pub sought: Vec<Sought>,
 }
 
 /// A camera of a path that has no such view.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 #[error("path '{path}', camera {index}: {error}")]
+#[non_exhaustive]
 pub struct WorkloadError {
+    /// Name of the path.
     pub path: String,
+    /// Index of the camera.
     pub index: usize,
+    /// What is wrong with it.
     pub error: CullingError,
 }
 

@@ -1,5 +1,5 @@
 //! The oracle: whether a box and a convex volume have a point in common,
-//! decided exactly. It owns the verdicts OUT, TOUCH and IN at planes level
+//! decided exactly. It defines the verdicts OUT, TOUCH and IN at planes level
 //! (f32 planes and boxes are exact objects) and at camera level (the camera's
 //! parameters are); how culling tests come out against it is measured
 //! elsewhere.
@@ -33,7 +33,9 @@ pub enum Verdict {
 
 /// A verdict and whether it could be proved.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[non_exhaustive]
 pub struct Judgement {
+    /// What is true, as far as it could be proved.
     pub verdict: Verdict,
     /// At camera level: closer to a tie than the precision of the camera's
     /// planes (2^-150 of the magnitudes involved), and so called a touch.

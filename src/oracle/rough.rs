@@ -1,6 +1,6 @@
 //! The preparation's filter: minors and determinants of half-spaces in f64
 //! with a bound of their error, so that exact sums are only formed where
-//! rounding could matter. It owns what can be told for certain without them.
+//! rounding could matter. It defines what can be told for certain without them.
 
 use super::half_space::HalfSpace;
 

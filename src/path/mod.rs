@@ -1,5 +1,5 @@
 //! Ways through a scene: sequences of cameras, generated, recorded, or taken
-//! from the scene's own places. It owns the table of path families and what
+//! from the scene's own places. It defines the table of path families and what
 //! they share; each family has a file of its own.
 
 mod calibrate;
@@ -28,6 +28,7 @@ pub use recorded::{LensDefaults, read_cameras_csv, read_points_csv};
 pub struct CameraPath {
     /// As it was asked for: a file or a spec such as `orbit:frames=512`.
     pub name: String,
+    /// In the order of the path.
     pub cameras: Vec<Camera>,
     /// Scale of far and near that `visible=` has found.
     pub lens_scale: Option<f64>,
@@ -74,8 +75,11 @@ pub fn digest(cameras: &[Camera]) -> String {
 }
 
 /// A kind of path.
+#[non_exhaustive]
 pub struct PathFamily {
+    /// What is typed.
     pub name: &'static str,
+    /// One line for `cullbench list`.
     pub summary: &'static str,
     frames: fn(&Stage, &mut Spec) -> Result<Vec<Pose>, PathError>,
 }
@@ -98,19 +102,32 @@ pub const PATH_PARAMS: &str = "frames=256, seed=1, fovy=60 (degrees), aspect=1.7
 
 /// A path that cannot be made or read.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum PathError {
+    /// A file that cannot be read.
     #[error(transparent)]
     Input(#[from] InputError),
+    /// The name or a parameter is wrong.
     #[error(transparent)]
     Spec(#[from] SpecError),
+    /// A row that is no camera.
     #[error("path '{path}', camera {index}: {error}")]
     Camera {
+        /// Name of the path.
         path: String,
+        /// Index of the camera.
         index: usize,
+        /// What is wrong with it.
         error: CameraError,
     },
+    /// The scene lacks what this kind of path needs.
     #[error("path '{path}': {reason}")]
-    Unfit { path: String, reason: String },
+    Unfit {
+        /// Name of the path.
+        path: String,
+        /// What is missing.
+        reason: String,
+    },
 }
 
 impl PathError {

@@ -15,11 +15,15 @@ use crate::input::{InputError, Row, TableReader};
 /// paths. `None` leaves the choice to the path.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LensDefaults {
+    /// Full vertical angle of view, 0 < fovy < 180.
     pub fovy_deg: f64,
+    /// Width / height.
     pub aspect: f64,
+    /// Distance of the near plane.
     pub near: Option<f64>,
     /// `Some(None)` is an infinite far plane.
     pub far: Option<Option<f64>>,
+    /// The vector that is up in the image.
     pub up: DVec3,
     /// How files are to be read whose cameras are matrices.
     pub matrix: Option<MatrixConvention>,

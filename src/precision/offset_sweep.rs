@@ -18,15 +18,22 @@ pub const OFFSETS: [f64; 5] = [0.0, 1e4, 1e5, 1e6, 1e7];
 /// One derivation at one offset.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct OffsetRow {
+    /// Distance of the scene from zero along each axis.
     pub offset: f64,
+    /// Name of the derivation of the planes.
     pub planes: &'static str,
+    /// Name of the arithmetic.
     pub arithmetic: &'static str,
+    /// Factor c of the planes' epsilon.
     pub epsilon: f64,
     /// Null if the planes cannot be made.
     pub false_negative_ppm: Option<f64>,
+    /// False positives / visible items; null as above.
     pub excess: Option<f64>,
+    /// The same as counts.
     #[serde(flatten)]
     pub errors: ErrorCount,
+    /// Why the planes cannot be made; null if they can.
     pub refused: Option<String>,
 }
 

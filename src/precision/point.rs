@@ -11,27 +11,41 @@ use crate::verify::ErrorCount;
 /// One way to answer, with its error and its time.
 #[derive(Clone, Debug, Serialize)]
 pub struct Point {
+    /// Label of the structure.
     pub structure: String,
+    /// Name of the culling test.
     pub test: &'static str,
+    /// Name of the arithmetic.
     pub arithmetic: &'static str,
+    /// Name of the derivation of the planes.
     pub planes: &'static str,
+    /// Factor c of the planes' epsilon.
     pub epsilon: f64,
+    /// How building, counting and timing ended.
     #[serde(serialize_with = "by_name")]
     pub status: Status,
+    /// Why, where the status is not ok.
     pub reason: Option<String>,
     /// False positives / visible items.
     pub excess: Option<f64>,
+    /// Visible items that were not returned, in millionths.
     pub false_negative_ppm: Option<f64>,
+    /// The same as counts.
     #[serde(flatten)]
     pub errors: ErrorCount,
     /// Mean over the cameras, thread CPU time, over the processes as in a run.
     pub query_ns: Option<f64>,
+    /// Lower end of the 95 % interval of `query_ns`.
     pub query_ns_lower: Option<f64>,
+    /// Upper end of the 95 % interval of `query_ns`.
     pub query_ns_upper: Option<f64>,
+    /// `query_ns` / number of items.
     pub ns_per_item: Option<f64>,
+    /// Memory of nodes and items / number of items.
     pub memory_bytes_per_item: Option<f64>,
     /// Index of a point that is no worse in anything and better in something.
     pub dominated_by: Option<usize>,
+    /// Whether no point dominates it.
     pub on_front: bool,
     /// Its place among the tasks that were timed, if it has a time.
     #[serde(skip)]

@@ -23,9 +23,13 @@ use crate::verify::{Trial, Truth};
 /// The diagram of a scene and path.
 #[derive(Clone, Debug, Serialize)]
 pub struct Precision {
+    /// Name of the scene.
     pub scene: String,
+    /// Name of the path.
     pub path: String,
+    /// Number of items.
     pub items: usize,
+    /// Cameras that were judged and timed.
     pub cameras: usize,
     /// Processes that were timed; an interval needs three or more.
     pub processes: usize,
@@ -38,6 +42,7 @@ pub struct Precision {
     pub points: Vec<Point>,
     /// Indices of the points that nothing dominates, fastest first.
     pub front: Vec<usize>,
+    /// How the order by time settles with more cameras.
     pub stability: Vec<StableAfter>,
 }
 
@@ -241,6 +246,7 @@ pub struct PointPlan {
 
 /// All points, checked and judged, but not timed.
 pub struct Prepared {
+    /// What the other processes are to measure.
     pub plan: PointPlan,
     /// Place of the twin's original among those that are timed.
     twin: Option<usize>,
@@ -250,11 +256,15 @@ pub struct Prepared {
 /// What a diagram is drawn of.
 #[derive(Clone, Copy)]
 pub struct PrecisionInput<'a> {
+    /// Items to be culled.
     pub scene: &'a Scene,
+    /// Cameras to be culled for.
     pub path: &'a CameraPath,
+    /// Structures to be measured with every test.
     pub structures: &'a [StructureSpec],
     /// Of the path, evenly spread.
     pub most_cameras: usize,
+    /// Rounds and times of a process.
     pub protocol: &'a Protocol,
 }
 

@@ -21,10 +21,13 @@ pub const SIZE_RATIOS: [f64; 5] = [0.01, 0.1, 0.3, 1.0, 10.0];
 /// One ratio: false positives / visible, and what a test costs a box.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct SizeRow {
+    /// Edge of the cubes / depth of the frustum.
     pub size_over_depth: f64,
     /// Cubes that were judged, and how many of them are visible.
     pub cubes: u64,
+    /// Cubes that the camera sees.
     pub visible: u64,
+    /// Every culling test on these cubes.
     pub tests: Vec<SizeError>,
 }
 

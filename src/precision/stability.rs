@@ -10,6 +10,7 @@ use crate::statistics::median;
 /// agrees with the order from all of them.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct StableAfter {
+    /// Cameras that the times are taken from.
     pub cameras: usize,
     /// Share of pairs of points that come in the same order.
     pub pairs_in_order: f64,

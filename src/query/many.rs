@@ -62,7 +62,7 @@ impl Located {
     }
 
     /// The ids of a point, in the order of
-    /// [`locate`](crate::index::RegionIndex::locate).
+    /// [`query`](crate::index::RegionIndex::query).
     ///
     /// # Panics
     /// No such point was answered.

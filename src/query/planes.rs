@@ -7,13 +7,13 @@ use crate::kernel::Isa;
 /// Planes of a view, made ready for many blocks that no other plane is open
 /// for.
 pub trait Planes<I: Isa>: Copy {
-    /// [`QueryVolume::kept_lanes`].
+    /// [`QueryVolume::kept_lanes`](super::QueryVolume::kept_lanes).
     fn kept(&self, isa: I, block: &BoxBlock) -> LaneMask;
 
     /// Whether four blocks at once are quicker than each by itself.
     const IN_FOURS: bool;
 
-    /// [`QueryVolume::kept_of_four`].
+    /// [`QueryVolume::kept_of_four`](super::QueryVolume::kept_of_four).
     #[inline(always)]
     fn kept_of_four(&self, isa: I, [a, b, c, d]: &[BoxBlock; 4]) -> [LaneMask; 4] {
         [

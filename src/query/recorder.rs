@@ -49,6 +49,7 @@ impl Recorder for NoRecorder {}
 
 /// What one query, or a sum of queries, cost.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct QueryCost {
     pub nodes_tested: u64,
     pub planes_tested: u64,

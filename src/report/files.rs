@@ -12,27 +12,56 @@ pub(super) const STREAM: &str = "stream.jsonl";
 
 /// Why the folder of a run cannot be read or written.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FolderError {
+    /// The system refused to read or write it.
     #[error("{}: {source}", path.display())]
-    Io { path: PathBuf, source: io::Error },
+    Io {
+        /// File or folder.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
     /// `place` is a line with a column, and the path of the value there.
     #[error("{}, {place}: {found}; expected the report of a run{wanted}", path.display())]
     Json {
+        /// File that was read.
         path: PathBuf,
+        /// Line with a column, and the path of the value.
         place: String,
+        /// What is there.
         found: String,
+        /// `, here ` with what was expected in that place, where it is known.
         wanted: String,
     },
+    /// A report of another schema.
     #[error("{}: schema version {found}; expected {SCHEMA_VERSION}", path.display())]
-    Version { path: PathBuf, found: u32 },
+    Version {
+        /// File that was read.
+        path: PathBuf,
+        /// Its schema version.
+        found: u32,
+    },
+    /// There is a run already.
     #[error("{} already holds a run; expected an empty or new folder (continue it with --resume)", path.display())]
-    Taken { path: PathBuf },
+    Taken {
+        /// Folder of the run.
+        path: PathBuf,
+    },
+    /// A run is being written there.
     #[error("{}: another run is writing here; expected a folder of its own for each run", path.display())]
-    Locked { path: PathBuf },
+    Locked {
+        /// Folder of the run.
+        path: PathBuf,
+    },
+    /// A line of the stream that cannot be read or does not belong there.
     #[error("{}, line {line}: {reason}; expected the stream of a run", path.display())]
     Line {
+        /// File of the stream.
         path: PathBuf,
+        /// From 1.
         line: usize,
+        /// What is wrong with it.
         reason: String,
     },
 }

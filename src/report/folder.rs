@@ -161,6 +161,7 @@ impl RunFolder {
         }
     }
 
+    /// The folder that is written to.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -286,6 +287,7 @@ impl StoppedRun {
         self.lost
     }
 
+    /// The folder that is read from.
     pub fn path(&self) -> &Path {
         &self.path
     }

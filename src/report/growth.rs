@@ -9,11 +9,15 @@ use crate::statistics::{Estimate, slope};
 
 /// The growth of one structure.
 pub struct Growth<'r> {
+    /// Name of the scene without its number of items.
     pub world: String,
     /// Name of the path family.
     pub path: &'r str,
+    /// "warm" or "cold".
     pub cache: &'r str,
+    /// Name of the culling test.
     pub test: &'r str,
+    /// Label of the structure.
     pub structure: &'r str,
     /// Mean over the sizes.
     pub visible: f64,

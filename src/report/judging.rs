@@ -31,22 +31,27 @@ named! {
     /// What became of a cell, worst first.
     #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize)]
     #[serde(rename_all = "snake_case")]
+    #[non_exhaustive]
     pub enum Outcome {
         /// Was right and is wrong, unsafe or panics.
         Broken = "broken",
         /// Was right and is not answered any more.
         Lost = "lost",
+        /// Takes longer: proven, and by more than the comparison's floor.
         Slower = "slower",
         /// Not the same question: not judged.
         Different = "different",
         /// No time above zero on one side at least: not judged.
         Unmeasured = "unmeasured",
+        /// Right in neither report: not judged.
         FailedInBoth = "failed_in_both",
         /// Was not right and is.
         Gained = "gained",
         /// Neither a change nor its absence is proven.
         Inconclusive = "inconclusive",
+        /// Takes less time: proven, and by more than the floor.
         Faster = "faster",
+        /// A change of the threshold's size is ruled out.
         Same = "same",
     }
 }
@@ -87,21 +92,27 @@ impl From<Change> for Outcome {
 
 /// A cell of a comparison, by one metric or as a whole.
 #[derive(Clone, PartialEq, Debug, Serialize)]
+#[non_exhaustive]
 pub struct JudgedRow {
+    /// Slower, faster, same, or why it cannot be said.
     #[serde(rename = "verdict")]
     pub outcome: Outcome,
+    /// The cell in both reports.
     #[serde(flatten)]
     pub cell: CellKey,
     /// `None` where the cell failed or was not the same question.
     pub metric: Option<&'static str>,
     /// The shown value on each side, in the unit of the metric.
     pub old: Option<f64>,
+    /// The shown value on the new side.
     pub new: Option<f64>,
     /// Change, interval and resolution; `None` where nothing was judged.
     pub judgement: Option<Judgement>,
     /// Processes with a time on each side; of pairs: the same number twice.
     pub processes: [usize; 2],
+    /// How the cell ended in the old report.
     pub old_status: Status,
+    /// How the cell ended in the new report.
     pub new_status: Status,
     /// Why the verdict is what it is, where the figures do not say it.
     pub reason: Option<String>,
@@ -188,11 +199,16 @@ impl JudgedRow {
 
 /// A counter that is not what it was.
 #[derive(Clone, PartialEq, Debug, Serialize)]
+#[non_exhaustive]
 pub struct WorkChange {
+    /// The cell in both reports.
     #[serde(flatten)]
     pub cell: CellKey,
+    /// Name of the metric, `items_tested`.
     pub counter: &'static str,
+    /// Value in the old report.
     pub old: f64,
+    /// Value in the new report.
     pub new: f64,
 }
 
@@ -216,20 +232,26 @@ pub fn work_changes(
 
 /// A cell that the other report does not have.
 #[derive(Clone, PartialEq, Debug, Serialize)]
+#[non_exhaustive]
 pub struct Lone {
+    /// The cell in the report that has it.
     #[serde(flatten)]
     pub cell: CellKey,
+    /// How it ended.
     pub status: Status,
+    /// Why, where it did not end well.
     pub reason: Option<String>,
 }
 
 /// What moved all structures at once: the machine, or the program as a whole.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+#[non_exhaustive]
 pub struct CommonShift {
     /// new / old: above 1 is slower.
     pub ratio: f64,
     /// 95 % interval; `None` below three processes a side.
     pub lower: Option<f64>,
+    /// Upper end of the interval.
     pub upper: Option<f64>,
     /// Cells it is made of.
     pub cells: usize,
@@ -237,21 +259,26 @@ pub struct CommonShift {
 
 /// A comparison: every cell with its verdict, and what else is to be said.
 #[derive(Clone, Default, PartialEq, Debug, Serialize)]
+#[non_exhaustive]
 pub struct Changes {
     /// 0.05 is 5 %: how finely "same" is to be shown.
     pub threshold: f64,
+    /// Cells that both reports have.
     pub cells_in_common: usize,
     /// Worst first.
     pub rows: Vec<JudgedRow>,
     /// Differences of what was counted: exact, and no verdict.
     pub work_changed: Vec<WorkChange>,
+    /// Cells that only the old report has.
     pub only_in_old: Vec<Lone>,
+    /// Cells that only the new report has.
     pub only_in_new: Vec<Lone>,
     /// Of two reports; `None` for programs that ran in turns, which share it.
     pub common_shift: Option<CommonShift>,
 }
 
 impl Changes {
+    /// Number of rows with this outcome.
     pub fn count(&self, outcome: Outcome) -> usize {
         let rows = self.rows.iter();
         rows.filter(|row| row.outcome == outcome).count()

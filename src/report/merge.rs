@@ -14,26 +14,46 @@ use crate::measure::GroupKey;
 
 /// Why runs are not shards of one plan.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum MergeError {
+    /// A folder cannot be read.
     #[error(transparent)]
     Folder(#[from] FolderError),
+    /// A shard was stopped.
     #[error("{}: the run is not finished; expected a finished one (run --resume --out {})", path.display(), path.display())]
-    Unfinished { path: PathBuf },
+    Unfinished {
+        /// Folder of the shard.
+        path: PathBuf,
+    },
     /// `reason` names another folder as well.
     #[error("{}: {reason}", path.display())]
-    Apart { path: PathBuf, reason: String },
+    Apart {
+        /// Folder of one of them.
+        path: PathBuf,
+        /// What they do not have in common.
+        reason: String,
+    },
+    /// samples.csv of a shard is shorter than its stream says.
     #[error("{}: {found} bytes; expected {wanted} that stream.jsonl refers to", path.display())]
     Samples {
+        /// That file.
         path: PathBuf,
+        /// Its length in bytes.
         found: u64,
+        /// The length that the stream needs, in bytes.
         wanted: u64,
     },
+    /// A group of the plan is in no shard.
     #[error("no shard has {missing}; expected all of the plan (--partial joins what is there)")]
-    Missing { missing: String },
+    Missing {
+        /// Scenes and paths of the missing groups.
+        missing: String,
+    },
 }
 
 /// Shards that belong together, joined but not written.
 pub struct Merged {
+    /// The stream of the whole run.
     pub stream: Stream,
     /// The groups of the plan that no shard has.
     pub missing: Vec<GroupKey>,

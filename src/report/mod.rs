@@ -1,6 +1,6 @@
 //! Reports: the versioned model that other tools read, the folder of a run in
 //! which every finished cell is on disk before the next begins, and what can be
-//! read off a report. It owns the formats; the figures come from `measure`.
+//! read off a report. It defines the formats; the figures come from `measure`.
 
 mod changes;
 mod files;

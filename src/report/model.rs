@@ -16,15 +16,24 @@ use crate::statistics::geometric_mean;
 /// Raised when a field changes its meaning or goes away.
 pub const SCHEMA_VERSION: u32 = 2;
 
+/// The contents of report.json: a run, what it ran on, and its cells.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct Report {
+    /// Raised when a field changes its meaning or goes away.
     pub schema_version: u32,
+    /// The command and when it ran.
     pub run: RunInfo,
+    /// The machine.
     pub machine: Machine,
+    /// Compiler, flags and features of the program.
     pub toolchain: Toolchain,
+    /// Version and commit of the program.
     pub source: Source,
+    /// How far two measurements of the same thing lay apart.
     pub noise: Noise,
+    /// Structures, by scene, path and test.
     pub cells: Vec<ReportCell>,
     /// Lower bounds, measured in the same rounds as the cells of their scene and
     /// path: no structures, never ranked, and therefore a list of their own.
@@ -32,15 +41,20 @@ pub struct Report {
     pub bounds: Vec<ReportCell>,
 }
 
+/// A run as a whole.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct RunInfo {
+    /// The start in UTC and four random digits.
     pub id: String,
     /// RFC 3339, UTC.
     pub started_at: String,
     /// Null while the run goes on, and for a run that was stopped.
     pub finished_at: Option<String>,
+    /// The command line, blanks between arguments.
     pub command: String,
+    /// Seed of the order in which structures are measured.
     pub seed: u64,
     /// Name of the suite; null for scenes and paths chosen by hand.
     pub suite: Option<String>,
@@ -61,6 +75,7 @@ fn one() -> u32 {
 /// How far apart two measurements of the same thing lie in this run.
 #[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct Noise {
     /// Geometric mean of all twin ratios: 1 unless the order is unfair.
     pub aa_ratio: Option<f64>,
@@ -72,17 +87,27 @@ pub struct Noise {
     pub warnings: Vec<String>,
 }
 
+/// A structure that was entered twice, with what its two times say.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct TwinEntry {
+    /// Name of the scene.
     pub scene: String,
+    /// Name of the path.
     pub path: String,
+    /// "warm" or "cold".
     pub cache: String,
+    /// Label of the structure.
     pub structure: String,
+    /// Name of the culling test.
     pub test: String,
+    /// Time of the second entry / time of the first.
     pub ratio: f64,
+    /// Lower end of the ratio's 95 % interval.
     #[serde(default)]
     pub lower: Option<f64>,
+    /// Upper end of the ratio's 95 % interval.
     #[serde(default)]
     pub upper: Option<f64>,
 }
@@ -94,11 +119,16 @@ impl TwinEntry {
     }
 }
 
+/// A structure, or a lower bound, on one scene, path and test.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct ReportCell {
+    /// The scene.
     pub scene: SceneInfo,
+    /// The path, with caches, planes and arithmetic.
     pub path: PathInfo,
+    /// Label of the structure or name of the bound.
     pub structure: String,
     /// As the structure declares; null for a bound and in older reports.
     #[serde(default)]
@@ -106,34 +136,45 @@ pub struct ReportCell {
     /// Likewise.
     #[serde(default)]
     pub origin: Option<Origin>,
+    /// Parameters of the structure, defaults included.
     pub params: Value,
+    /// Name of the culling test.
     pub test: String,
+    /// How building, counting and timing ended.
     pub status: Status,
+    /// Why, where the status is not ok.
     pub reason: Option<String>,
     /// Fastest first; cells that no test tells apart share a rank. Null where
     /// there is no time.
     #[serde(default)]
     pub rank: Option<usize>,
+    /// What the metrics of time were made from.
     #[serde(default)]
     pub times: CellTimes,
+    /// By name; a metric that was not measured is not there.
     pub metrics: BTreeMap<String, Metric>,
     /// How the answers differ from the exact truth; null where nothing was
     /// answered.
     pub error: Option<Judged>,
     /// What was not measured of an ok cell, each with its reason.
     pub left_out: Vec<String>,
+    /// Where the samples of this cell are; null without samples.
     pub samples_ref: Option<SamplesRef>,
 }
 
 /// The cell's rows in samples.csv: those that have its names.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct SamplesRef {
+    /// Name of the file, beside the report.
     pub file: String,
+    /// Number of the cell's rows.
     pub rows: u64,
 }
 
 impl ReportCell {
+    /// A cell of a group, in the form that reports have.
     pub fn new(
         scene: &SceneInfo,
         path: &PathInfo,

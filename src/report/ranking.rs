@@ -15,7 +15,9 @@ pub struct Comparison<'r> {
 
 /// A cell with its rank; none if it may not be compared by its time.
 pub struct Ranked<'r> {
+    /// 1 is the fastest; tied cells share a rank.
     pub rank: Option<usize>,
+    /// The cell as reported.
     pub cell: &'r ReportCell,
 }
 

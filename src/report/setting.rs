@@ -10,8 +10,11 @@ use super::Report;
 pub struct Setting {
     /// "machine" or "toolchain".
     pub of: &'static str,
+    /// Name of the fact.
     pub what: &'static str,
+    /// In the old report.
     pub old: String,
+    /// In the new report.
     pub new: String,
     /// Whether it is another machine: absolute times do not compare.
     pub is_machine: bool,

@@ -17,24 +17,34 @@ use crate::statistics::two_speeds;
 /// A line of stream.jsonl.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(tag = "line", rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum Line {
     /// The first line: everything about the run but its cells.
     Run(Box<Header>),
     /// What one process found out about one group of cells.
     Part(Box<KeptPart>),
     /// All parts of the plan are there.
-    Finished { at: String },
+    Finished {
+        /// RFC 3339, UTC.
+        at: String,
+    },
 }
 
 /// Where, by what and with which options a run was begun.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Header {
+    /// [`SCHEMA_VERSION`](super::SCHEMA_VERSION) of the program that wrote it.
     pub schema_version: u32,
+    /// The command and when it was begun.
     pub run: RunInfo,
     /// The arguments of `run`, to go on with.
     pub args: Vec<String>,
+    /// The machine.
     pub machine: Machine,
+    /// Compiler, flags and features of the program.
     pub toolchain: Toolchain,
+    /// Version and commit of the program.
     pub source: Source,
     /// The groups of the plan, in order; of a shard its own.
     pub groups: Vec<GroupKey>,
@@ -50,9 +60,13 @@ pub struct Header {
 /// What two runs must have in common for their times to belong together, and
 /// what one and the other have.
 #[derive(Clone, PartialEq, Eq, Debug)]
+#[non_exhaustive]
 pub struct Difference {
+    /// Name of the fact.
     pub what: &'static str,
+    /// In the run that was begun.
     pub before: String,
+    /// In this process.
     pub here: String,
 }
 
@@ -137,7 +151,9 @@ fn short(digest: &str) -> String {
 
 /// A part with what samples.csv holds up to its end.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct KeptPart {
+    /// What the process measured.
     pub part: Part,
     /// Rows of each structure or bound.
     pub rows: BTreeMap<String, u64>,
@@ -147,9 +163,13 @@ pub struct KeptPart {
 
 /// Everything that a stream holds.
 #[derive(Clone, PartialEq, Debug)]
+#[non_exhaustive]
 pub struct Stream {
+    /// The first line.
     pub header: Header,
+    /// In the order in which they were measured.
     pub parts: Vec<KeptPart>,
+    /// RFC 3339, UTC; `None` for a run that goes on or was stopped.
     pub finished_at: Option<String>,
 }
 

@@ -10,7 +10,9 @@ use crate::measure::YARDSTICK;
 pub struct Surface<'r> {
     /// The scene's name without its number of items.
     pub world: String,
+    /// "warm" or "cold".
     pub cache: &'r str,
+    /// Name of the culling test.
     pub test: &'r str,
     /// By number of items, then by share.
     pub places: Vec<Place<'r>>,
@@ -18,12 +20,14 @@ pub struct Surface<'r> {
 
 /// A comparison as a place on a surface.
 pub struct Place<'r> {
+    /// Number of items in the scene.
     pub items: usize,
     /// Visible items / items, as measured.
     pub share: f64,
     /// The same to the nearest of 1, 1.5, 2, 3, 5, 7, 10, ... percent and parts
     /// of it: never further than a factor of 1.3.
     pub class: f64,
+    /// The cells there, and how they rank.
     pub comparison: Comparison<'r>,
 }
 

@@ -16,8 +16,11 @@ use crate::spec::{Spec, SpecError};
 pub const GENERATOR_NAME: &str = "rand_pcg::Pcg64 (PCG XSL RR 128/64)";
 
 /// A kind of generated world.
+#[non_exhaustive]
 pub struct Family {
+    /// What is typed.
     pub name: &'static str,
+    /// One line for `cullbench list`.
     pub summary: &'static str,
     /// Parameters beyond `n`, `seed` and `offset`, for the help.
     pub params: &'static str,
@@ -42,6 +45,7 @@ pub static FAMILIES: &[Family] = rows! { Family { name, summary, params, build }
 pub(super) const MOST_ITEMS: u64 = 100_000_000;
 
 impl Family {
+    /// The family of exactly this name.
     pub fn named(name: &str) -> Option<&'static Family> {
         FAMILIES.iter().find(|f| f.name == name)
     }

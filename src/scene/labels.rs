@@ -6,6 +6,7 @@ use std::collections::HashMap;
 /// One labelled column, such as `kind`.
 #[derive(Clone, Default, Debug)]
 pub struct Labels {
+    /// Name of the column.
     pub column: String,
     values: Vec<String>,
     numbers: HashMap<String, u32>,
@@ -13,6 +14,7 @@ pub struct Labels {
 }
 
 impl Labels {
+    /// A column without values.
     pub fn new(column: impl Into<String>) -> Self {
         Labels {
             column: column.into(),

@@ -36,7 +36,7 @@ pub use memory::{fits, needed_bytes};
 pub use originals::Originals;
 pub use overlap::SoughtBox;
 pub use regions::{BspNode, BspRegions, Portal, Regions, Tiling};
-pub use samples::{SAMPLES, Sample};
+pub use samples::{NOTICE, SAMPLES, Sample};
 pub use sought::Sought;
 pub use source::{LoadOptions, check_fits, load};
 pub use wad::{WadMap, map_names};
@@ -44,11 +44,14 @@ pub use wad::{WadMap, map_names};
 /// A box in world coordinates, as a file or a generator states it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct WorldBox {
+    /// Lower corner; bounds are closed.
     pub min: DVec3,
+    /// Upper corner; bounds are closed.
     pub max: DVec3,
 }
 
 impl WorldBox {
+    /// The box between two corners; empty where `min` is above `max`.
     pub fn new(min: DVec3, max: DVec3) -> Self {
         WorldBox { min, max }
     }
@@ -68,7 +71,9 @@ impl WorldBox {
 /// A place and direction that the scene itself offers to a camera.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct CameraPlace {
+    /// Position in world coordinates.
     pub eye: DVec3,
+    /// Direction of view.
     pub forward: DVec3,
 }
 
@@ -85,8 +90,11 @@ pub struct Scene {
     pub originals: Originals,
     /// Union of the items, local.
     pub bounds: Aabb,
+    /// What region search finds.
     pub regions: Regions,
+    /// Columns of the file beyond the bounds.
     pub labels: Vec<Labels>,
+    /// Camera places that the scene offers, for the path `places`.
     pub places: Vec<CameraPlace>,
     /// The partition that the scene's file brings, local coordinates.
     pub own_tree: Option<PlaneTree>,

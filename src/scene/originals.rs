@@ -1,6 +1,6 @@
 //! Boxes and points as they were written, in f64, beside the f32 that indexes
-//! hold. It owns the exact comparison of the two; searching is the indexes'
-//! business.
+//! hold. It defines the exact comparison of the two; searching is left to the
+//! indexes.
 
 use std::sync::Arc;
 

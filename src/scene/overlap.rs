@@ -1,5 +1,5 @@
-//! Boxes to search by: which items overlap a box, exactly. It owns the comparison
-//! of boxes as they were written; searching is the indexes' business.
+//! Boxes to search by: which items overlap a box, exactly. It defines the comparison
+//! of boxes as they were written; searching is left to the indexes.
 
 use super::originals::side;
 use super::{Scene, WorldBox};
@@ -9,6 +9,7 @@ use crate::query::ItemId;
 /// A box to search by: as it was written, and as indexes are asked.
 #[derive(Clone, Debug)]
 pub struct SoughtBox {
+    /// World coordinates, in f64.
     pub world: WorldBox,
     /// The planes of the smallest f32 box that holds it. Indexes may find too
     /// many items by it, never too few.

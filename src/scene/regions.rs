@@ -11,6 +11,7 @@ use crate::query::ItemId;
 
 /// The regions of a scene, numbered from zero.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub enum Regions {
     /// The items themselves, closed boxes that may overlap: a point belongs
     /// to every one that holds it.
@@ -26,16 +27,20 @@ pub enum Regions {
 /// Boxes that tile a volume.
 #[derive(Clone, Default, Debug)]
 pub struct Tiling {
+    /// In scene coordinates; the id is the index.
     pub boxes: Vec<Aabb>,
     /// The boxes as they were made, where f32 holds any of them otherwise.
     pub originals: Originals,
+    /// Openings between neighbours.
     pub portals: Vec<Portal>,
 }
 
 /// An opening between two regions of a tiling.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Portal {
+    /// Ids of the two regions.
     pub between: [ItemId; 2],
+    /// Box through which one sees from one into the other, in scene coordinates.
     pub opening: Aabb,
 }
 
@@ -58,6 +63,7 @@ impl Regions {
         holding.map(|(_, id)| id).collect()
     }
 
+    /// In words, for `scene info`.
     pub fn kind(&self) -> &'static str {
         match self {
             Regions::Items => "the items' boxes",
@@ -70,9 +76,13 @@ impl Regions {
 /// A partition line of a Doom node: through `(x, y)` along `(dx, dy)`.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct BspNode {
+    /// A point of the line, map units.
     pub x: f64,
+    /// A point of the line, map units.
     pub y: f64,
+    /// Direction of the line, not of unit length.
     pub dx: f64,
+    /// Direction of the line, not of unit length.
     pub dy: f64,
     /// Front (right of the direction) first, then back.
     pub children: [BspChild; 2],
@@ -198,10 +208,12 @@ impl BspRegions {
         }
     }
 
+    /// Number of leaves.
     pub fn len(&self) -> usize {
         self.boxes.len()
     }
 
+    /// Whether there are no leaves.
     pub fn is_empty(&self) -> bool {
         self.boxes.is_empty()
     }

@@ -3,14 +3,26 @@
 //! `datasets/README.md`.
 
 /// A real scene that is part of the program.
+#[non_exhaustive]
 pub struct Sample {
+    /// What is typed.
     pub name: &'static str,
+    /// One line for `cullbench list`.
     pub summary: &'static str,
+    /// SPDX identifier, and whom to name; the texts are in [`NOTICE`].
     pub licence: &'static str,
     /// The file under `datasets/`.
     pub file: &'static str,
+    /// That file's contents.
     pub bytes: &'static [u8],
 }
+
+/// Whose works the samples are and under which terms: a program that contains
+/// them has to be able to show it (`cullbench licences`).
+pub const NOTICE: &str = concat!(
+    include_str!("../../datasets/NOTICE.txt"),
+    include_str!("../../datasets/freedm_LICENSE.txt")
+);
 
 macro_rules! samples {
     ($($name:literal $file:literal $licence:literal, $summary:literal;)+) => {
@@ -33,6 +45,7 @@ pub static SAMPLES: &[Sample] = samples! {
 };
 
 impl Sample {
+    /// The sample of exactly this name.
     pub fn named(name: &str) -> Option<&'static Sample> {
         SAMPLES.iter().find(|s| s.name == name)
     }
@@ -49,6 +62,23 @@ mod tests {
             let digest = super::super::hex(&hmac_sha256::Hash::hash(sample.bytes));
             assert!(readme.contains(&digest), "{}: {digest}", sample.file);
             assert!(readme.contains(sample.file));
+        }
+    }
+
+    #[test]
+    fn the_notice_has_every_sample_with_its_file_and_licence() {
+        for sample in SAMPLES {
+            let (licence, owner) = sample
+                .licence
+                .split_once(", ")
+                .unwrap_or((sample.licence, ""));
+            let mut entries = NOTICE
+                .split("\n\n")
+                .filter(|entry| entry.contains(sample.name));
+            let entry = entries.next().expect(sample.name);
+            for part in [sample.file, licence, owner] {
+                assert!(entry.contains(part), "{}: {part}", sample.name);
+            }
         }
     }
 

@@ -1,5 +1,5 @@
 //! What a boxes file keeps of a scene: the boxes as they were written, and
-//! labels. It owns the promise that what is read back is the same; the format
+//! labels. It defines the promise that what is read back is the same; the format
 //! itself is `boxes_csv`'s.
 
 use glam::DVec3;

@@ -13,7 +13,9 @@ use crate::query::ItemId;
 /// beyond it is rounded beyond it or onto it. It can only find too many.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Sought {
+    /// World coordinates, in f64.
     pub world: DVec3,
+    /// Scene coordinates, rounded to the nearest f32.
     pub local: Vec3,
     /// Whether `local` is the point without any rounding.
     pub is_exact: bool,

@@ -1,5 +1,5 @@
 //! From what a user names to a scene: a built-in sample, a generated family
-//! with parameters, or a file by its contents. It owns that decision only.
+//! with parameters, or a file by its contents. It makes that decision only.
 
 use std::fs;
 use std::path::Path;

@@ -1,5 +1,5 @@
 //! Doom maps: linedefs and things as boxes, the map's own BSP leaves as
-//! regions, its things as camera places. It owns the WAD format (the
+//! regions, its things as camera places. It defines the WAD format (the
 //! unofficial Doom specs 1.666, Matthew S. Fell 1994) and trusts no byte of it.
 
 use glam::{DVec2, DVec3};
@@ -21,6 +21,7 @@ const LUMPS: [&str; 8] = [
 /// One map of a WAD file, decoded and cross-checked.
 #[derive(Clone, Debug)]
 pub struct WadMap {
+    /// Things of the map in the order of the file.
     pub things: Vec<Thing>,
     lines: Vec<WorldBox>,
     /// Floor height under each BSP leaf.

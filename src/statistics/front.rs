@@ -3,7 +3,9 @@
 /// What something costs and how wrong it is; less is better in both.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Tradeoff {
+    /// Any measure, the same for all.
     pub error: f64,
+    /// Any unit, the same for all.
     pub time: f64,
 }
 

@@ -30,23 +30,31 @@ named! {
     /// How the new times stand to the old.
     #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
     #[serde(rename_all = "snake_case")]
+    #[non_exhaustive]
     pub enum Change {
+        /// Longer: proven, and by more than the floor.
         Slower = "slower",
+        /// Shorter: proven, and by more than the floor.
         Faster = "faster",
+        /// A change of the threshold's size is ruled out.
         Same = "same",
+        /// Neither a change nor its absence is proven.
         Inconclusive = "inconclusive",
     }
 }
 
 /// The verdict on one cell, with the figures it rests on.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Judgement {
+    /// Slower, faster, same or inconclusive.
     pub change: Change,
     /// New time / old time: above 1 is slower.
     pub ratio: f64,
     /// 95 % interval of the ratio, which it always holds; `None` below three
     /// pairs.
     pub lower: Option<f64>,
+    /// Upper end of the interval.
     pub upper: Option<f64>,
     /// The smallest change (0.05 is 5 %) that 95 % of such comparisons find.
     pub resolution: Option<f64>,

@@ -11,8 +11,11 @@ const LEVEL: f64 = 0.95;
 /// A value with its 95 % interval; NaN on both sides where it has none.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Estimate {
+    /// The value itself.
     pub value: f64,
+    /// Lower end of the interval.
     pub lower: f64,
+    /// Upper end of the interval.
     pub upper: f64,
 }
 
@@ -22,13 +25,16 @@ pub struct Estimate {
 pub struct Shown {
     /// In the unit that the logarithms were taken of.
     pub value: f64,
+    /// Lower end of the interval of `value`.
     pub lower: Option<f64>,
+    /// Upper end of the interval of `value`.
     pub upper: Option<f64>,
     /// Time of the reference / time of the structure, above 1 is faster: the
     /// ratio of the two shown values.
     pub speedup: f64,
     /// `None` also for the reference itself, whose speed-up is 1 by definition.
     pub speedup_lower: Option<f64>,
+    /// Upper end of the interval of `speedup`.
     pub speedup_upper: Option<f64>,
 }
 

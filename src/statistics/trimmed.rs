@@ -21,7 +21,9 @@ const PRIOR_DF: f64 = 8.0;
 /// nothing to trim (under five values) this is the plain mean and its t.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Trimmed {
+    /// Mean of the values that are kept.
     pub mean: f64,
+    /// Standard error of `mean`.
     pub standard_error: f64,
     /// Degrees of freedom of the standard error.
     pub df: f64,

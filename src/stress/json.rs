@@ -1,6 +1,6 @@
 //! Walking through JSON with a place in hand, so that every mistake can say
-//! where it is. It owns how numbers, names, planes, cameras and boxes are
-//! written; which fields a vector has is the business of `vectors`.
+//! where it is. It defines how numbers, names, planes, cameras and boxes are
+//! written; which fields a vector has is left to `vectors`.
 
 use glam::{DVec3, Vec3};
 use serde_json::{Map, Value};

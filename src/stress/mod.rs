@@ -1,5 +1,5 @@
 //! The stiff and extreme suite: every test vector on every structure, at
-//! planes and at camera level. It owns the rows that come out and what counts
+//! planes and at camera level. It defines the rows that come out and what counts
 //! as passed; what is typed and printed is the command line's.
 
 pub mod extremes;
@@ -25,7 +25,9 @@ pub use vectors::{BUILT_IN, BUILT_IN_NAME, built_in, read_vectors, read_vectors_
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Level {
+    /// The f32 planes are exact.
     Planes,
+    /// The camera's f64 numbers are exact; planes are rounded.
     Camera,
 }
 
@@ -33,13 +35,16 @@ pub enum Level {
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
+    /// As declared.
     Pass,
+    /// Not as declared.
     Fail,
     /// Impossible, and refused as it must be.
     Refused,
 }
 
 impl Level {
+    /// As JSON has it.
     pub fn name(self) -> &'static str {
         match self {
             Level::Planes => "planes",
@@ -52,7 +57,9 @@ impl Level {
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 #[serde(untagged)]
 pub enum Said {
+    /// A set of boxes.
     Names(Vec<String>),
+    /// An outcome in words.
     Text(String),
 }
 
@@ -88,27 +95,37 @@ impl std::fmt::Display for Said {
 pub struct Row {
     /// A case, or a case and the box that went wrong.
     pub id: String,
+    /// What was taken to be exact.
     pub level: Level,
+    /// Name of the structure.
     pub structure: String,
+    /// Name of the culling test.
     pub test: String,
+    /// How it came out.
     pub status: Status,
+    /// What was declared.
     pub expected: Said,
+    /// What the structure answered.
     pub got: Said,
 }
 
 /// Checks that belong together: a category of vectors, a family of extremes.
 #[derive(Clone, Default, Debug)]
 pub struct Section {
+    /// Category or family.
     pub name: String,
+    /// Number of cases.
     pub cases: u64,
     /// Boxes asked about.
     pub boxes: u64,
     /// What the oracle said of them (extremes at camera level).
     pub tally: extremes::Tally,
+    /// Checks with their outcome.
     pub rows: Vec<Row>,
 }
 
 impl Section {
+    /// A section without checks.
     pub fn new(name: &str) -> Section {
         Section {
             name: name.to_owned(),
@@ -116,6 +133,7 @@ impl Section {
         }
     }
 
+    /// Number of checks with this status.
     pub fn count(&self, status: Status) -> usize {
         self.rows.iter().filter(|row| row.status == status).count()
     }

@@ -1,5 +1,5 @@
 //! Asking test vectors: the given planes bit for bit, the camera through the
-//! default pipeline, points, and what must be refused. It owns what passes.
+//! default pipeline, points, and what must be refused. It defines what passes.
 
 use glam::DVec3;
 
@@ -24,7 +24,9 @@ pub fn replay(vector: &Vector, structures: &[StructureSpec]) -> Vec<Row> {
 /// zero, say) failures are to be expected: that is how the suite is tested.
 #[derive(Clone, Copy)]
 pub struct Replay<'a> {
+    /// Structures that are queried.
     pub structures: &'a [StructureSpec],
+    /// How the planes of cameras are derived.
     pub planes: PlaneOptions,
 }
 

@@ -1,6 +1,6 @@
 //! The rows of one vector at one level: asking structures, comparing sets of
-//! names, and the rows that come of it. Which questions a vector has is the
-//! business of `replay`.
+//! names, and the rows that come of it. Which questions a vector has is decided in
+//! `replay`.
 
 use super::margin::slack;
 use super::{Level, Names, Row, Said, Status, Vector};

@@ -14,37 +14,55 @@ pub type Names = BTreeSet<String>;
 /// against what is absent.
 #[derive(Clone, Debug)]
 pub struct Vector {
+    /// Unique in its file.
     pub id: String,
+    /// The section of results that it belongs to.
     pub category: String,
     /// Bit for bit.
     pub planes: Option<Vec<Plane>>,
+    /// Camera that the boxes are culled for.
     pub camera: Option<VectorCamera>,
+    /// Boxes by name.
     pub boxes: Vec<(String, Aabb)>,
+    /// Points to be located among the boxes.
     pub points: Vec<VectorPoint>,
     /// Exact verdicts; what touches is among the visible.
     pub visible_planes: Option<Names>,
+    /// Boxes that touch the volume of the planes and do not reach into it.
     pub touch_planes: Option<Names>,
+    /// Boxes that reach into the camera's view or touch it.
     pub visible_camera: Option<Names>,
+    /// Boxes that touch the camera's view and do not reach into it.
     pub touch_camera: Option<Names>,
     /// What the f32 six-plane test returns; where a file does not say, what
     /// the exact one does.
     pub six_plane: Option<Names>,
     /// What the six-plane test returns without any rounding.
     pub six_plane_exact: Option<Names>,
+    /// Why the camera must be refused.
     pub camera_error: Option<String>,
+    /// Why the planes must be refused.
     pub planes_error: Option<String>,
+    /// Boxes that must be refused: a bound is not finite.
     pub rejected_at_load: Names,
+    /// Boxes that must never be returned: a lower bound is above its upper one.
     pub empty_boxes: Names,
 }
 
 /// A camera as a file states it: it may be impossible.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct VectorCamera {
+    /// Position of the camera.
     pub eye: DVec3,
+    /// The point looked at.
     pub look: DVec3,
+    /// The vector that is up in the image.
     pub up: DVec3,
+    /// Full vertical angle of view.
     pub fovy_deg: f64,
+    /// Width / height.
     pub aspect: f64,
+    /// Distance of the near plane.
     pub near: f64,
     /// `None` is infinite.
     pub far: Option<f64>,
@@ -53,8 +71,11 @@ pub struct VectorCamera {
 /// A point and the boxes that hold it.
 #[derive(Clone, Debug)]
 pub struct VectorPoint {
+    /// Name of the point.
     pub id: String,
+    /// The point in scene coordinates.
     pub p: Vec3,
+    /// Names of the boxes that hold it, bounds included.
     pub containing: Names,
 }
 

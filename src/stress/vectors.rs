@@ -1,6 +1,6 @@
 //! Reading test vectors: JSON with the answers that exact arithmetic gave. It
 //! owns the format and every way in which a file can be wrong; asking the
-//! vectors is the business of the files beside this one.
+//! vectors is left to the files beside this one.
 
 use std::collections::BTreeSet;
 use std::path::Path;

@@ -37,6 +37,7 @@ pub struct Reference {
 
 /// How a structure's answer differs from the reference.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug)]
+#[non_exhaustive]
 pub struct Difference {
     /// Wanted by the reference, not returned (false negatives).
     pub missing: usize,
@@ -49,6 +50,7 @@ pub struct Difference {
 }
 
 impl Difference {
+    /// Whether the answer is the reference's.
     pub fn is_none(&self) -> bool {
         *self == Difference::default()
     }
@@ -69,6 +71,7 @@ impl fmt::Display for Difference {
 }
 
 impl Reference {
+    /// A reference for scenes of so many items.
     pub fn new(item_count: usize) -> Self {
         Reference {
             marks: vec![0; item_count],

@@ -24,10 +24,13 @@ pub const VOLUME_KINDS: [&str; 9] = [
 
 /// One scene with one volume and one point.
 pub struct RandomCase {
+    /// Boxes, some of them inverted.
     pub items: Vec<Aabb>,
+    /// Planes to be culled by.
     pub volume: ConvexVolume,
     /// Index into [`VOLUME_KINDS`].
     pub kind: usize,
+    /// A point to be located among the items.
     pub point: Vec3,
     /// To be searched by: the items that overlap it.
     pub region: Aabb,

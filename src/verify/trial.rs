@@ -10,6 +10,7 @@ use crate::query::{AnyVolume, ItemId};
 
 /// What is wrong with an answer.
 #[derive(Clone, PartialEq, Debug)]
+#[non_exhaustive]
 pub enum Fault {
     /// The structure panicked; its message.
     Panicked(String),

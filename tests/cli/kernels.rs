@@ -55,7 +55,7 @@ fn a_kernel_that_is_none_is_refused_in_one_line() {
         if !kernels.contains(&missing) {
             let line = format!("verify --cases 1 --kernel {missing}");
             let done = cullbench(here.path(), &line);
-            assert_refused(&done, &format!("'{missing}' | here are: portable"), &line);
+            assert_refused(&done, &format!("'{missing}' | available: portable"), &line);
         }
     }
 }

@@ -110,7 +110,8 @@ fn every_command_has_help() {
     let here = Path::new(".");
     let top = works(here, "--help");
     let commands = commands_of(&top);
-    for name in set("run compare query locate verify drift list scene env completions man") {
+    for name in set("run compare query locate verify drift list scene env completions man licences")
+    {
         assert!(commands.contains(&name), "{name}: {commands:?}");
     }
     for command in commands {
@@ -129,4 +130,12 @@ fn every_command_has_help() {
         assert!(script.contains("cullbench"), "{shell}");
     }
     assert!(works(here, "man").contains("cullbench"));
+    let licences = works(here, "licences");
+    for owner in [
+        "OpenStreetMap contributors",
+        "Freedoom project",
+        "Michael Bostock",
+    ] {
+        assert!(licences.contains(owner), "{owner}");
+    }
 }

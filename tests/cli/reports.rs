@@ -165,7 +165,7 @@ fn values_ratios_and_ranks_are_the_same_everywhere() {
     }
     for text in [&screen, &markdown, &page] {
         assert!(text.contains("4 processes, "), "{text}");
-        assert!(text.contains(" judged by the oracle"), "{text}");
+        assert!(text.contains(" of them against the oracle"), "{text}");
     }
 }
 

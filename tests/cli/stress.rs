@@ -87,7 +87,8 @@ fn extremes_are_generated_from_a_seed() {
     let table = works(Path::new("."), "stress --cases 1 --structure linear");
     let boxes = "151,552 boxes judged at camera level";
     assert!(
-        table.contains(boxes) && table.contains("no false negatives and no dropped touches"),
+        table.contains(boxes)
+            && table.contains("no false negatives and no dropped boundary contacts"),
         "{table}"
     );
 }

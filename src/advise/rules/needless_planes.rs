@@ -14,7 +14,7 @@ use crate::shown::counted;
 
 pub(super) const NAME: &str = "needless-planes";
 
-/// Share of the planes below which nobody would notice.
+/// Share of the planes below which the saving is lost in noise.
 const THRESHOLD: f64 = 0.01;
 
 pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> {

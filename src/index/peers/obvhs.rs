@@ -4,18 +4,16 @@
 //! Our re-laid tree of the same builder is the structure `bvh`.
 
 use std::ops::ControlFlow;
-use std::time::Duration;
 
 use glam::Vec3;
 use obvhs::BvhBuildParams;
 use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::builder::build_bvh2;
 use obvhs::bvh2::node::Bvh2Node;
 
 use super::{BoxTest, Tally, half_of_largest, indexable, peer_of_tree, refuse_stacks};
 use crate::geometry::Aabb;
 use crate::index::stack::Stack;
-use crate::index::{BuildError, MemoryUsage};
+use crate::index::{BuildError, MemoryUsage, ploc};
 use crate::query::{ItemId, Recorder, Sink};
 
 /// A tree of obvhs with the items in the order of its primitives.
@@ -46,7 +44,7 @@ impl Tree {
             return Ok(Tree::default());
         }
         let boxes: Vec<Aabb> = items.iter().map(|item| item.bounds).collect();
-        let mut bvh = build_bvh2(&boxes, params, &mut Duration::default());
+        let mut bvh = ploc::build(&boxes, params);
         bvh.reorder_in_stack_traversal_order();
         // A walk keeps one entry a level; the crate's default is 96.
         bvh.max_depth = bvh.max_depth.max(bvh.depth(0) + 2);

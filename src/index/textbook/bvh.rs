@@ -1,16 +1,13 @@
 //! The textbook bounding volume hierarchy: the binary tree of the crate obvhs, its
 //! own nodes gone through one at a time.
 
-use std::time::Duration;
-
 use obvhs::BvhBuildParams;
-use obvhs::bvh2::builder::build_bvh2;
 use obvhs::bvh2::node::Bvh2Node;
 
 use super::{Items, Node, Slice, TextbookParams, answered_by_walk, records};
 use crate::geometry::Aabb;
 use crate::index::partition::Record;
-use crate::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
+use crate::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, ploc};
 use crate::query::ItemId;
 
 /// A bounding volume hierarchy (Clark 1976, "Hierarchical geometric models for
@@ -145,7 +142,7 @@ impl RegionIndex for BvhTextbook {
             max_prims_per_leaf: params.leaf.min(255),
             ..BvhBuildParams::medium_build()
         };
-        let built = build_bvh2(&boxes, config, &mut Duration::default());
+        let built = ploc::build(&boxes, config);
         tree.nodes = built.nodes;
         tree.settle(0, params.depth, &stacks, &built.primitive_indices);
         Ok(tree)

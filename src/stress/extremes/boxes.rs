@@ -1,6 +1,6 @@
 //! Boxes that make rounding as bad as it gets: most touch the view volume at a
 //! point of a face, an edge or a corner, and are then shifted by up to two
-//! ulps per axis; the rest lie about anywhere. It owns shapes and places; what is visible is the oracle's
+//! ulps per axis; the rest lie about anywhere. It defines shapes and places; what is visible is the oracle's
 //! to say.
 
 use glam::{DVec3, Vec3};

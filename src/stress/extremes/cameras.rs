@@ -11,22 +11,31 @@ use crate::scene::Dice;
 
 /// A camera to be built, as exact numbers.
 pub struct Setup {
+    /// Where the camera stands.
     pub pose: Pose,
+    /// What it takes in.
     pub lens: Lens,
+    /// Scene-local zero in world coordinates.
     pub origin: DVec3,
+    /// How its planes are derived.
     pub planes: PlaneOptions,
+    /// How the boxes about it are drawn.
     pub shapes: Shapes,
 }
 
 /// One way of being extreme.
 pub struct CameraFamily {
+    /// As the table of results has it.
     pub name: &'static str,
+    /// Parameters of the family, mildest first.
     pub variants: &'static [f64],
     /// How a variant is named in ids.
     pub label: fn(f64) -> String,
+    /// Draws a camera for a parameter.
     pub setup: fn(&mut Dice, f64) -> Result<Setup, CameraError>,
 }
 
+/// All families of cameras, in the order of the table of results.
 pub static CAMERA_FAMILIES: &[CameraFamily] = &[
     CameraFamily {
         name: "near-far",

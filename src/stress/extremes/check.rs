@@ -1,5 +1,5 @@
 //! One generated case under test: what every structure and culling test makes
-//! of its boxes, against the scalar loop and the oracle. It owns what counts
+//! of its boxes, against the scalar loop and the oracle. It defines what counts
 //! as a fault; cameras and boxes come from the files beside it.
 
 use glam::DVec3;
@@ -18,9 +18,13 @@ pub const SCALAR: &str = "scalar";
 
 /// A camera with boxes and the truth about them.
 pub struct Case {
+    /// The camera that is culled for.
     pub camera: Camera,
+    /// How its planes are derived.
     pub planes: PlaneOptions,
+    /// Size of the scene about it, for the epsilon.
     pub around: Surroundings,
+    /// Boxes to be culled, in scene coordinates.
     pub items: Vec<Aabb>,
     oracle: Oracle,
     judgements: Vec<Judgement>,
@@ -29,7 +33,9 @@ pub struct Case {
 /// What an answer lost.
 #[derive(Clone, Copy, Default, PartialEq, Debug)]
 pub struct Drops {
+    /// Boxes that reach into the view and were not returned.
     pub false_negatives: u64,
+    /// Boxes that touch the view and were not returned.
     pub touch_dropped: u64,
     /// Empty boxes that were returned.
     pub ghosts: u64,
@@ -44,12 +50,15 @@ pub struct Drops {
 pub struct Tally {
     /// Boxes judged at camera level.
     pub boxes: u64,
+    /// Boxes that are in or touch.
     pub seen: u64,
     /// Boxes that touch, to all that is known.
     pub ties: u64,
     /// Ties that the oracle cannot prove.
     pub undecided: u64,
+    /// Boxes that reach into the view and were not returned.
     pub false_negatives: u64,
+    /// Boxes that touch the view and were not returned.
     pub touch_dropped: u64,
     /// Views that were refused because their sums could overflow.
     pub refused: u64,
@@ -73,10 +82,15 @@ impl std::ops::AddAssign for Tally {
 /// Something that must not be.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Fault {
+    /// Name of the structure, or [`SCALAR`].
     pub structure: String,
+    /// Name of the culling test.
     pub test: String,
+    /// Index of the box; `None` where the whole answer is wrong.
     pub item: Option<usize>,
+    /// What the oracle says.
     pub expected: String,
+    /// What the structure did.
     pub got: String,
 }
 
@@ -89,6 +103,7 @@ pub struct Findings {
     pub tally: Tally,
     /// Structure and test of every question.
     pub asked: Vec<(String, String)>,
+    /// In the order in which they were found.
     pub faults: Vec<Fault>,
 }
 
@@ -259,11 +274,13 @@ impl Case {
         };
         if lost || drops.ghosts > 0 {
             let expected = match promised {
-                true => "nothing dropped that is in or touches, nothing empty returned".to_owned(),
+                true => {
+                    "nothing dropped that is inside or touches, nothing empty returned".to_owned()
+                }
                 false => format!("nothing dropped that is deeper than {allowed:e}"),
             };
             let got = format!(
-                "{} false negatives (deepest {:e}), {} touches dropped, {} empty boxes returned",
+                "{} false negatives (deepest {:e}), {} boundary contacts dropped, {} empty boxes returned",
                 drops.false_negatives, drops.deepest, drops.touch_dropped, drops.ghosts
             );
             found.fault(SCALAR, name, drops.first, &expected, got);
@@ -381,6 +398,7 @@ impl Findings {
         );
     }
 
+    /// Notes that an answer is not what was expected.
     pub fn fault(
         &mut self,
         structure: &str,

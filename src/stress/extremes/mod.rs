@@ -27,11 +27,13 @@ pub const DEFAULT_CASES: u64 = 66;
 /// How many extremes to generate.
 #[derive(Clone, Copy)]
 pub struct Extremes<'a> {
+    /// Structures that are queried.
     pub structures: &'a [StructureSpec],
     /// Seed of the first case of each variant.
     pub seed: u64,
     /// Cases of each variant.
     pub cases: u64,
+    /// Cases worked on at once.
     pub threads: usize,
 }
 
@@ -43,7 +45,9 @@ const FEW: usize = 256;
 
 /// How the run goes on: told of each case, asked whether to stop.
 pub trait Progress: Sync {
+    /// A case of this family has been judged.
     fn case_done(&self, family: &str);
+    /// Whether to leave out the cases that are left.
     fn stop(&self) -> bool;
 }
 
@@ -186,7 +190,7 @@ impl Extremes<'_> {
                 continue;
             }
             let expected = match (structure.as_str(), level) {
-                (SCALAR, Level::Camera) => "drops nothing that is in or touches",
+                (SCALAR, Level::Camera) => "drops nothing that is inside or touches",
                 (SCALAR, Level::Planes) => "drops nothing but what rounding hides",
                 _ => "returns the very set of the scalar loop",
             };

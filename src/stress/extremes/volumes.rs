@@ -16,8 +16,11 @@ use crate::verify::{RandomCase, Trial, VOLUME_KINDS, explain_visibility};
 
 /// A volume and boxes, at planes level.
 pub struct PlanesCase {
+    /// Boxes to be culled.
     pub items: Vec<Aabb>,
+    /// Planes in f32, taken to be exact.
     pub volume: ConvexVolume,
+    /// A point to be located among the boxes.
     pub point: Vec3,
     /// What kind of volume it is.
     pub kind: &'static str,
@@ -27,12 +30,15 @@ pub struct PlanesCase {
 
 /// A way to make cases at planes level.
 pub struct PlanesFamily {
+    /// As the table of results has it.
     pub name: &'static str,
+    /// Makes the case of a seed.
     pub case: fn(u64) -> PlanesCase,
     /// Cases for each case of a camera variant.
     pub factor: u64,
 }
 
+/// All families at planes level, in the order of the table of results.
 pub static PLANES_FAMILIES: &[PlanesFamily] = &[
     PlanesFamily {
         name: "volumes",

@@ -1,5 +1,5 @@
-//! The properties of region search: one point, and many at once. What a camera
-//! sees is the other properties' business.
+//! The properties of region search: one point, and many at once. Frustum
+//! queries have properties of their own.
 
 use std::ops::ControlFlow;
 

@@ -87,6 +87,7 @@ macro_rules! conformance {
 /// A property of the contract, for one structure.
 #[derive(Clone, Copy, Debug)]
 pub struct Property {
+    /// As in the name of its test.
     pub name: &'static str,
     /// `Err` says what differed, and on which scene.
     pub check: fn() -> Outcome,

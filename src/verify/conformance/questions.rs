@@ -1,6 +1,6 @@
 //! What the properties ask: volumes and points of a scene, and how an answer is
-//! got and compared with the reference. What a structure must do with them is
-//! the properties' business.
+//! got and compared with the reference. What must hold for them is in the
+//! properties.
 
 use std::ops::{ControlFlow, Range};
 

@@ -1,6 +1,6 @@
-//! The property of all views: a structure is asked with each kind there is and
-//! compared with the look at every item. Which planes a volume is made of is
-//! the other properties' business; here it is what is made of the planes.
+//! The property of all views: a structure is queried with each kind there is and
+//! compared with the scan. Other properties vary the planes of a volume; this one
+//! varies what is made of them.
 
 use super::*;
 use crate::geometry::{RelativeVolume, Spheres, WidePlane, WideVolume, sphere_cube};
