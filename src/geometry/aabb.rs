@@ -13,7 +13,9 @@ use crate::arithmetic::rounding::{difference_down, difference_up, sum_down, sum_
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[repr(C)]
 pub struct Aabb {
+    /// Lower corner.
     pub min: Vec3,
+    /// Upper corner; part of the box.
     pub max: Vec3,
 }
 
@@ -24,6 +26,8 @@ impl Aabb {
         max: Vec3::NEG_INFINITY,
     };
 
+    /// The box between two corners; the empty set where `min` is above `max` on any
+    /// axis.
     pub const fn new(min: Vec3, max: Vec3) -> Self {
         Aabb { min, max }
     }

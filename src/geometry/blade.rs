@@ -19,6 +19,7 @@ pub struct Blade<I: Isa> {
 }
 
 impl<I: Isa> Blade<I> {
+    /// The plane of a volume that this bit of a mask stands for.
     #[inline(always)]
     pub fn new(isa: I, volume: &ConvexVolume, bit: u32) -> Self {
         let [x, y, z] = volume.plane_of_bit(bit).normal.to_array();

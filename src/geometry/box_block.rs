@@ -25,6 +25,7 @@ pub struct BoxBlock {
 }
 
 impl BoxBlock {
+    /// The empty box in every lane.
     pub const EMPTY: BoxBlock = BoxBlock {
         rows: {
             let (low, high) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
@@ -38,6 +39,7 @@ impl BoxBlock {
         BoxBlock { rows }
     }
 
+    /// Puts a box into a lane, 0 to 15.
     pub fn set(&mut self, lane: usize, b: &Aabb) {
         let values = b.min.to_array().into_iter().chain(b.max.to_array());
         for (row, value) in self.rows.iter_mut().zip(values) {
@@ -45,6 +47,7 @@ impl BoxBlock {
         }
     }
 
+    /// The box in a lane, 0 to 15.
     #[inline(always)]
     pub fn get(&self, lane: usize) -> Aabb {
         let row = |k: usize| self.rows[k][lane];
@@ -256,6 +259,7 @@ pub struct BoxBlocks {
 }
 
 impl BoxBlocks {
+    /// No boxes yet, and memory for so many.
     pub fn with_capacity(boxes: usize) -> Self {
         BoxBlocks {
             blocks: Vec::with_capacity(boxes.div_ceil(LANES)),
@@ -263,6 +267,7 @@ impl BoxBlocks {
         }
     }
 
+    /// Appends a box, into the next free lane.
     pub fn push(&mut self, b: &Aabb) {
         let lane = self.count % LANES;
         if lane == 0 {
@@ -274,22 +279,27 @@ impl BoxBlocks {
         self.count += 1;
     }
 
+    /// Number of boxes; the lanes beyond the last one are not counted.
     pub fn len(&self) -> usize {
         self.count
     }
 
+    /// Whether there are no boxes.
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }
 
+    /// The box at an index below [`BoxBlocks::len`].
     pub fn get(&self, place: usize) -> Aabb {
         self.blocks[place / LANES].get(place % LANES)
     }
 
+    /// Replaces the box at an index below [`BoxBlocks::len`].
     pub fn set(&mut self, place: usize, b: &Aabb) {
         self.blocks[place / LANES].set(place % LANES, b);
     }
 
+    /// Gives back the memory beyond the last block.
     pub fn shrink_to_fit(&mut self) {
         self.blocks.shrink_to_fit();
     }

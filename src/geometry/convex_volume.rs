@@ -42,14 +42,34 @@ named! {
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum VolumeError {
+    /// More planes than a mask has bits.
     #[error("a volume has at most 32 planes, not {count}")]
-    TooManyPlanes { count: usize },
+    TooManyPlanes {
+        /// Number of planes given.
+        count: usize,
+    },
+    /// A plane in f32 with a NaN or infinite number.
     #[error("plane {index} is not finite: ({}, {}, {}, {})", plane.normal.x, plane.normal.y, plane.normal.z, plane.d)]
-    NonFinitePlane { index: usize, plane: Plane },
+    NonFinitePlane {
+        /// Its position in the list.
+        index: usize,
+        /// The plane itself.
+        plane: Plane,
+    },
+    /// A plane in f64 with a NaN or infinite number.
     #[error("plane {index} is not finite: ({}, {}, {}, {})", plane.normal.x, plane.normal.y, plane.normal.z, plane.d)]
-    NonFiniteWidePlane { index: usize, plane: WidePlane },
+    NonFiniteWidePlane {
+        /// Its position in the list.
+        index: usize,
+        /// The plane itself.
+        plane: WidePlane,
+    },
+    /// The eye of planes about the eye leaves the range of f32.
     #[error("the eye is not finite in f32: {eye}")]
-    NonFiniteEye { eye: Vec3 },
+    NonFiniteEye {
+        /// The eye in scene coordinates.
+        eye: Vec3,
+    },
 }
 
 /// The closed intersection of up to [`MAX_PLANES`] half-spaces.
@@ -148,6 +168,7 @@ impl ConvexVolume {
         Ok(volume)
     }
 
+    /// The planes, in the order in which they were given.
     pub fn planes(&self) -> &[Plane] {
         &self.planes[..self.count]
     }

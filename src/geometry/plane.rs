@@ -14,7 +14,9 @@ use super::Aabb;
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[repr(C)]
 pub struct Plane {
+    /// Points inward; of any length.
     pub normal: Vec3,
+    /// Offset: above 0 where the zero point is inside.
     pub d: f32,
 }
 
@@ -22,6 +24,7 @@ pub struct Plane {
 pub type Upper = [bool; 3];
 
 impl Plane {
+    /// The half-space `normal . x + d >= 0`.
     pub const fn new(normal: Vec3, d: f32) -> Self {
         Plane { normal, d }
     }
@@ -88,6 +91,7 @@ impl Plane {
         self.value_at(x) >= 0.0
     }
 
+    /// Whether all four numbers are finite.
     pub fn is_finite(&self) -> bool {
         self.normal.is_finite() && self.d.is_finite()
     }

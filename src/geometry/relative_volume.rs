@@ -42,6 +42,7 @@ impl RelativeVolume {
         RelativeVolume::new(eye, ConvexVolume::from_planes(&planes)?)
     }
 
+    /// The eye in f32 scene coordinates, which is subtracted from every box.
     #[inline(always)]
     pub fn eye(&self) -> Vec3 {
         self.eye

@@ -153,6 +153,7 @@ impl Spheres {
         }
     }
 
+    /// The planes in f32; what the sphere test adds to them is not in it.
     #[inline(always)]
     pub fn planes(&self) -> &ConvexVolume {
         &self.planes

@@ -7,11 +7,14 @@ use super::{Aabb, Plane};
 /// A half-space in f64: the points `x` with `normal . x + d >= 0` (closed).
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct WidePlane {
+    /// Points inward; of any length.
     pub normal: DVec3,
+    /// Offset: above 0 where the zero point is inside.
     pub d: f64,
 }
 
 impl WidePlane {
+    /// The half-space `normal . x + d >= 0`.
     pub const fn new(normal: DVec3, d: f64) -> Self {
         WidePlane { normal, d }
     }

@@ -42,6 +42,7 @@ impl WideVolume {
         Ok(volume)
     }
 
+    /// The planes, in the order in which they were given.
     pub fn planes(&self) -> &[WidePlane] {
         &self.planes[..self.count]
     }

@@ -101,6 +101,7 @@ pub enum BspBuilder {
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct BspParams {
+    /// Where the dividing planes come from.
     pub builder: BspBuilder,
     /// Most items of a leaf (1 to 4096).
     pub leaf: u32,

@@ -50,11 +50,17 @@ const COLLAPSE_COST: f32 = 30.0;
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum BvhPreset {
+    /// `BvhBuildParams::fastest_build`: the quickest build, the worst tree.
     Fastest,
+    /// `BvhBuildParams::very_fast_build`.
     VeryFast,
+    /// `BvhBuildParams::fast_build`.
     Fast,
+    /// `BvhBuildParams::medium_build`.
     Medium,
+    /// `BvhBuildParams::slow_build`.
     Slow,
+    /// `BvhBuildParams::very_slow_build`: the slowest build, the best tree.
     VerySlow,
 }
 

@@ -22,23 +22,40 @@ use crate::threads::Pool;
 pub enum BuildError {
     /// A bound of an item is NaN or infinite.
     #[error("item {item} has the bounds {bounds:?}; expected finite numbers")]
-    NonFiniteItem { item: usize, bounds: Aabb },
+    NonFiniteItem {
+        /// Index of the item.
+        item: usize,
+        /// Its bounds.
+        bounds: Aabb,
+    },
     /// More items than ids.
     #[error("{count} items; expected at most {most}")]
-    TooManyItems { count: usize, most: usize },
+    TooManyItems {
+        /// Number of items.
+        count: usize,
+        /// Number of ids there are.
+        most: usize,
+    },
     /// The structure could, but not in reasonable time or memory.
     #[error("'{structure}' refuses these items: {reason}")]
     Refused {
+        /// Name of the structure.
         structure: &'static str,
+        /// What about the items, and what is expected.
         reason: String,
     },
     /// The structure's own code did.
     #[error("panicked: {message}")]
-    Panicked { message: String },
+    Panicked {
+        /// What the panic says.
+        message: String,
+    },
     /// A parameter is unknown, unreadable or out of range.
     #[error("parameters of '{structure}': {reason}")]
     Params {
+        /// Name of the structure.
         structure: &'static str,
+        /// The value and the rule.
         reason: String,
     },
 }

@@ -8,7 +8,9 @@ use crate::kernel::Kernel;
 /// answers are the same whatever it is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Execution {
+    /// Instruction set of queries.
     pub kernel: Kernel,
+    /// Threads of builds, at least 1.
     pub threads: usize,
 }
 
@@ -25,6 +27,8 @@ impl Default for Execution {
 /// A structure that is asked by a kernel of its own choice, as a
 /// [`DynIndex`](super::DynIndex); the structure itself is asked by the best.
 pub struct By<T> {
+    /// The structure.
     pub index: T,
+    /// The kernel that answers its queries.
     pub kernel: Kernel,
 }

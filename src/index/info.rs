@@ -21,8 +21,11 @@ pub struct Info {
     pub name: &'static str,
     /// One line for `cullbench list`; says so if the layout is special.
     pub summary: &'static str,
+    /// Scan, tree or grid.
     pub kind: Kind,
+    /// Whose code it is.
     pub origin: Origin<&'static str>,
+    /// What it can do beyond the contract.
     pub capabilities: Capabilities,
     /// The form that lectures show, kept to be read beside the others: timed where
     /// it is named, or all are, and no part of the list `default`.
@@ -140,6 +143,7 @@ impl Capabilities {
 }
 
 impl Kind {
+    /// As JSON and lists have it.
     pub fn name(self) -> &'static str {
         match self {
             Kind::Scan => "scan",

@@ -9,6 +9,7 @@ use crate::geometry::Aabb;
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct TreeNode {
+    /// Exact union of its items' bounds; closed.
     pub bounds: Aabb,
     /// First item of the subtree in tree order.
     pub first: u32,

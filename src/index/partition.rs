@@ -10,13 +10,16 @@ use crate::query::ItemId;
 /// build is one pass over memory.
 #[derive(Clone, Copy, Debug)]
 pub struct Record {
+    /// Bounds of the item.
     pub bounds: Aabb,
+    /// Index of the item in the scene.
     pub id: ItemId,
 }
 
 /// A part of a divided group.
 #[derive(Clone, Copy, Debug)]
 pub struct Part<C> {
+    /// Number of items of the part.
     pub items: usize,
     /// What the splitter wants to know when it sees the part again; `None`
     /// for a part that is not to be divided by the splitter any more.

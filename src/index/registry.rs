@@ -25,6 +25,7 @@ type Build = fn(Execution, &Input<'_>, &Value) -> Result<Box<dyn DynIndex>, Buil
 /// A row of a registry: a structure without its type.
 #[derive(Clone, Copy, Debug)]
 pub struct Row {
+    /// What the structure declares.
     pub info: Info,
     /// Builds from parameters as JSON (missing ones take their defaults) what
     /// is asked by that kernel.
@@ -180,6 +181,7 @@ impl Registry {
         &self.rows
     }
 
+    /// The row of the structure of exactly this name.
     pub fn named(&self, name: &str) -> Option<&Row> {
         self.rows.iter().find(|row| row.info.name == name)
     }
@@ -269,6 +271,7 @@ impl Registry {
 pub struct StructureSpec {
     /// As typed: `bvh` or `bvh:leaf=4`.
     pub label: String,
+    /// The structure.
     pub row: Row,
     /// Complete, defaults filled in.
     pub params: Value,

@@ -42,6 +42,7 @@ pub struct TreeWriter {
 }
 
 impl TreeWriter {
+    /// An empty tree with memory for so many items.
     pub fn with_capacity(items: usize) -> Self {
         TreeWriter {
             tree: PackedTree {
@@ -82,6 +83,7 @@ impl TreeWriter {
         self.tree.fit(node);
     }
 
+    /// The tree of all nodes that were opened and closed.
     pub fn finish(mut self) -> PackedTree {
         self.tree.nodes.shrink_to_fit();
         self.tree.boxes.shrink_to_fit();
@@ -92,6 +94,7 @@ impl TreeWriter {
 }
 
 impl PackedTree {
+    /// The nodes in depth-first order, the root first.
     #[inline(always)]
     pub fn nodes(&self) -> &[TreeNode] {
         &self.nodes
@@ -127,6 +130,7 @@ impl PackedTree {
         self.depth
     }
 
+    /// Bytes of nodes and of items, as allocated.
     pub fn memory(&self) -> MemoryUsage {
         MemoryUsage {
             node_bytes: size_of_val(&self.nodes[..]) + self.bundles.bytes(),

@@ -1,6 +1,6 @@
 //! Sixteen lanes at a time: the few vector operations that the block kernels
 //! are written in. Who has them and which one runs is chosen next door; what the
-//! lanes mean is the callers' business.
+//! lanes mean is up to the callers.
 
 /// Lanes of a vector: the boxes of one block.
 pub const LANES: usize = 16;
@@ -33,13 +33,18 @@ pub trait Isa: Copy {
         piece.run(self)
     }
 
+    /// The numbers of a row.
     fn load(self, row: &[f32; LANES]) -> Self::Floats;
+    /// The numbers of all lanes, lane 0 first.
     fn to_array(self, floats: Self::Floats) -> [f32; LANES];
+    /// The same number in every lane.
     fn splat(self, x: f32) -> Self::Floats;
     /// Of four numbers, for each lane the one that its two bits of `picks` say,
     /// lane 0 the lowest bits.
     fn pick(self, from: &[f32; 4], picks: u32) -> Self::Floats;
+    /// `a + b`, rounded once.
     fn add(self, a: Self::Floats, b: Self::Floats) -> Self::Floats;
+    /// `a * b`, rounded once; never fused with a sum.
     fn mul(self, a: Self::Floats, b: Self::Floats) -> Self::Floats;
     /// `a` where `a < b`, else `b`: of a NaN and a number in this order, the
     /// number.
@@ -50,11 +55,14 @@ pub trait Isa: Copy {
     fn keep_all(self) -> Self::Kept;
     /// Those of the lanes where not `values < least`: a NaN stays.
     fn keep(self, kept: Self::Kept, values: Self::Floats, least: Self::Floats) -> Self::Kept;
+    /// One bit per lane that is kept.
     fn kept(self, kept: Self::Kept) -> LaneMask;
     /// The lanes where `a <= b`.
     fn at_most(self, a: Self::Floats, b: Self::Floats) -> LaneMask;
 
+    /// The words of a row.
     fn words(self, row: &[u32; LANES]) -> Self::Words;
+    /// The same word in every lane.
     fn splat_word(self, x: u32) -> Self::Words;
     /// `first`, `first + 1` and so on.
     fn counting(self, first: u32) -> Self::Words;
@@ -71,7 +79,7 @@ pub trait Isa: Copy {
     /// The lanes that are `x`.
     fn equal(self, words: Self::Words, x: u32) -> LaneMask;
     /// Moves the words of `lanes` together, lowest first, to the start of
-    /// `place`; what the rest of it holds is nobody's business.
+    /// `place`; the rest of it holds anything.
     fn pack(self, place: &mut [u32; LANES], words: Self::Words, lanes: LaneMask);
     /// Appends the words of `lanes`, lowest first.
     fn append(self, out: &mut Vec<u32>, row: &[u32; LANES], lanes: LaneMask);
@@ -79,6 +87,7 @@ pub trait Isa: Copy {
 
 /// A piece of a larger work: what [`Isa::apart`] does.
 pub trait Piece<I: Isa> {
+    /// What the piece returns.
     type Output;
 
     /// `#[inline(always)]`, as all that is hot in it.
@@ -148,7 +157,7 @@ mod tests {
         }
     }
 
-    /// The bits of a number; which NaN it is, is nobody's business.
+    /// The bits of a number; any NaN is as good as another.
     fn canonical(x: f32) -> u32 {
         if x.is_nan() {
             f32::NAN.to_bits()

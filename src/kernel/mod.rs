@@ -46,8 +46,10 @@ named! {
 /// `run` and all that is hot in it must be `#[inline(always)]`: what stays a
 /// call of its own was compiled for the portable set.
 pub trait Work {
+    /// What the work returns.
     type Output;
 
+    /// Does the work with these instructions.
     fn run<I: Isa>(self, isa: I) -> Self::Output;
 }
 
@@ -55,6 +57,7 @@ pub trait Work {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("kernel '{kernel}' needs instructions that this processor does not have")]
 pub struct Unavailable {
+    /// The kernel that was asked for.
     pub kernel: Kernel,
 }
 

@@ -10,6 +10,7 @@ use super::ItemId;
 /// ascending order of the points, with all its ids in one slice (empty where
 /// nothing holds the point). `Break` ends the batch.
 pub trait ManySink {
+    /// Takes the answer of the point with this index in the batch.
     fn accept(&mut self, point: u32, ids: &[ItemId]) -> ControlFlow<()>;
 
     /// The answers to several points at once, the first of them `first`: all
@@ -47,6 +48,7 @@ impl Located {
         self.ends.len()
     }
 
+    /// Whether no point was answered.
     pub fn is_empty(&self) -> bool {
         self.ends.is_empty()
     }

@@ -51,11 +51,17 @@ impl Recorder for NoRecorder {}
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct QueryCost {
+    /// Node bounds that were classified.
     pub nodes_tested: u64,
+    /// Plane tests, of nodes and items.
     pub planes_tested: u64,
+    /// Item bounds that were tested.
     pub items_tested: u64,
+    /// Items that were reported with a whole subtree, untested.
     pub items_accepted_untested: u64,
+    /// Subtrees that were wholly inside.
     pub subtrees_accepted: u64,
+    /// Subtrees that were wholly outside.
     pub subtrees_rejected: u64,
 }
 

@@ -8,6 +8,7 @@ use crate::kernel::{Isa, LANES, LaneMask, Pack, Piece};
 /// Where answers go. A structure hands over slices: a subtree that is wholly
 /// inside is one call. Returning `Break` ends the query.
 pub trait Sink {
+    /// Takes ids of answers, none of them twice in a query.
     fn accept(&mut self, ids: &[ItemId]) -> ControlFlow<()>;
 
     /// The items at some places of a structure that keeps them in the order
@@ -61,6 +62,7 @@ pub trait Tests<I: Isa> {
     /// of those are not read.
     const SPARSE: bool;
 
+    /// Number of blocks.
     fn count(&self) -> usize;
     /// The number of the i-th block, and its lanes that are answers.
     fn test(&mut self, isa: I, i: usize) -> (usize, LaneMask);

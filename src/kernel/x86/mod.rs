@@ -14,6 +14,7 @@ use super::{Kernel, Work};
 /// The instruction set that the program was compiled for, with no need to ask
 /// the processor.
 pub type Baseline = sse2::Sse2;
+/// The value of [`Baseline`].
 pub const BASELINE: Baseline = sse2::Sse2;
 
 /// Whether this processor (and operating system) runs the kernel.
