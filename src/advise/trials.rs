@@ -42,7 +42,8 @@ struct Place {
 pub(super) struct Answered {
     /// By place and camera: ids.
     pub counts: Vec<Vec<u64>>,
-    errors: Vec<Option<ErrorCount>>,
+    /// By place, of those that are judged, and by judged camera.
+    errors: Vec<Option<Vec<ErrorCount>>>,
     /// Cameras behind the errors.
     pub judged: usize,
 }
@@ -116,14 +117,14 @@ impl<'c> Trials<'c> {
         };
         let mut out: Vec<ItemId> = Vec::new();
         for (ask, &judged) in self.asks.iter().zip(&self.judged) {
-            let mut errors = judged.then(ErrorCount::default);
+            let mut errors = judged.then(Vec::new);
             let mut truths = truths.iter().peekable();
             let counts = (0..cameras).map(|camera| {
                 out.clear();
                 ask(camera, &mut out);
                 let truth = truths.next_if(|(judged, _)| *judged == camera);
                 if let (Some(errors), Some((_, truth))) = (&mut errors, truth) {
-                    *errors += truth.errors(&self.case.scene().items, &out);
+                    errors.push(truth.errors(&self.case.scene().items, &out));
                 }
                 out.len() as u64
             });
@@ -188,7 +189,7 @@ impl Place {
         let of = |side: usize| times.ns(side).map_or(f64::NAN, |found| found.value);
         let ratio = times.ratio(self.kept, self.left_out);
         let ratio = |part: fn(&Estimate) -> f64| ratio.as_ref().map_or(f64::NAN, part);
-        let [kept, left_out] = [self.kept, self.left_out].map(|side| answered.errors[side]);
+        let [kept, left_out] = [self.kept, self.left_out].map(|side| answered.errors(side));
         let excess = |errors: Option<ErrorCount>| errors.and_then(|e| e.excess());
         let missed = |errors: Option<ErrorCount>| errors.and_then(|e| e.false_negative_ppm());
         let faster = times.is_faster(self.left_out, self.kept);
@@ -214,7 +215,15 @@ impl Place {
 }
 
 impl Answered {
+    /// Of all judged cameras.
     pub fn errors(&self, place: usize) -> Option<ErrorCount> {
-        self.errors[place]
+        let mut sum = ErrorCount::default();
+        self.by_camera(place)?.iter().for_each(|own| sum += *own);
+        Some(sum)
+    }
+
+    /// Of each judged camera.
+    pub fn by_camera(&self, place: usize) -> Option<&[ErrorCount]> {
+        self.errors[place].as_deref()
     }
 }

@@ -169,6 +169,14 @@ impl Lens {
         }
     }
 
+    /// How high the view is at a depth, world units; `None` for a matrix, which
+    /// has no window of its own.
+    pub fn height_at(&self, depth: f64) -> Option<f64> {
+        let [_, _, bottom, top] = self.window();
+        let reach = if self.is_orthographic() { 1.0 } else { depth };
+        Some((top - bottom) * reach).filter(|height| height.is_finite())
+    }
+
     pub(super) fn is_orthographic(&self) -> bool {
         matches!(self, Lens::Orthographic { .. })
     }

@@ -306,8 +306,8 @@ fn test_table(choice: &TestChoice) -> text::Table {
             .to_owned(),
             row.test.to_owned(),
             text::time_within(row.query_ns, [row.query_ns_lower, row.query_ns_upper]),
-            show(row.excess, |share| format!("{:.3}", share * 100.0)),
-            show(row.false_negative_ppm, text::significant),
+            text::rate(row.excess, 100.0),
+            text::rate(row.false_negative_ppm, 1.0),
             show(row.false_positives_per_query, text::significant),
             show(row.total_ns, text::time),
         ]);

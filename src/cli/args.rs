@@ -353,7 +353,7 @@ pub struct PrecisionArgs {
     /// Cameras of the path to look at, evenly spread
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..))]
     pub frames: u32,
-    /// Cubes for each ratio of the size sweep; 0 skips both sweeps
+    /// Cubes for each ratio of the size sweep; 0 skips all sweeps
     #[arg(long, value_name = "N", default_value_t = 2_000_000)]
     pub cubes: usize,
     /// Draw false positives against time as an SVG file too

@@ -24,6 +24,7 @@ mod log_axis;
 mod merge;
 mod precision;
 mod precision_diagram;
+mod precision_tables;
 mod processes;
 mod protocol;
 mod query;

@@ -29,7 +29,8 @@ pub const COLOURS: [RGBColor; 8] = [
 
 /// Time in microseconds and excess in percent, if the point has both.
 fn place(point: &Point) -> Option<(f64, f64)> {
-    let place = (point.query_ns? / 1e3, (point.excess? * 100.0).max(NONE));
+    let excess = point.excess?.value * 100.0;
+    let place = (point.times.query_ns? / 1e3, excess.max(NONE));
     (is_drawn(place.0) && is_drawn(place.1)).then_some(place)
 }
 
@@ -44,7 +45,8 @@ pub fn draw(precision: &Precision) -> anyhow::Result<String> {
 fn draw_on(svg: &mut String, precision: &Precision) -> Result<(), Box<dyn std::error::Error>> {
     let places: Vec<(f64, f64)> = precision.points.iter().filter_map(place).collect();
     let measured = precision.points.iter();
-    let measured = measured.filter(|point| point.query_ns.is_some() && point.excess.is_some());
+    let measured =
+        measured.filter(|point| point.times.query_ns.is_some() && point.excess.is_some());
     let beyond = left_out(measured.count() - places.len());
     let times = around(places.iter().map(|p| p.0), 1.5, 2.0).log_scale();
     // From nothing to a hundredth at least.

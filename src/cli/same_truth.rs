@@ -88,10 +88,10 @@ fn missed(camera: Camera) -> [bool; 4] {
     let measured = measure_points(&input, &|| false);
     let measured = measured.expect("no refusal").expect("not stopped");
     let by_precision = measured.points.iter().any(|point| {
-        let is_default = point.test == "six-plane"
-            && point.arithmetic == "f32"
-            && point.planes == "frame"
-            && point.epsilon > 0.0;
+        let is_default = point.names.test == "six-plane"
+            && point.names.arithmetic == "f32"
+            && point.names.planes == "frame"
+            && point.names.epsilon > 0.0;
         is_default && point.errors.false_negatives > 0
     });
 

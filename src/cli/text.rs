@@ -6,7 +6,7 @@ use std::io::{self, StdoutLock, Write};
 use crate::measure::Metric;
 use crate::report::{Comparison, Report, ReportCell};
 pub use crate::shown::{count, counted, lines, plain};
-use crate::statistics::Estimate;
+use crate::statistics::{Estimate, Rate};
 use comfy_table::presets::UTF8_BORDERS_ONLY;
 use comfy_table::{CellAlignment, ContentArrangement};
 
@@ -130,6 +130,58 @@ pub fn time_within(ns: Option<f64>, ends: [Option<f64>; 2]) -> String {
     ns.map(shown).unwrap_or_default()
 }
 
+/// A value with a margin, to the digits that the margin leaves: "83.4±0.7",
+/// "560000±9000". Of nothing seen, what it is below: "<0.0005".
+pub fn plus_minus(value: f64, margin: Option<f64>) -> String {
+    let Some(margin) = margin.filter(|margin| margin.is_finite() && *margin > 0.0) else {
+        return significant(value);
+    };
+    let exponent = margin.log10().floor() as i32;
+    // A margin is rounded up, or it would no longer hold.
+    let unit = 10f64.powi(exponent);
+    let rounded = (margin / unit - 1e-9).ceil() * unit;
+    let decimals = (-rounded.log10().floor()).max(0.0) as usize;
+    if value == 0.0 {
+        return format!("<{rounded:.decimals$}");
+    }
+    let value = match unit > 1.0 {
+        true => (value / unit).round() * unit,
+        false => value,
+    };
+    format!("{value:.decimals$}±{rounded:.decimals$}")
+}
+
+/// A rate per so many units with half of its 95 % interval; nothing if there is none.
+pub fn rate(rate: Option<Rate>, units: f64) -> String {
+    let shown = |rate: Rate| plus_minus(rate.value, rate.upper.map(|upper| upper - rate.value));
+    rate.map(|rate| shown(rate.per(units))).unwrap_or_default()
+}
+
+/// Longer lines are broken at spaces.
+pub fn wrapped(text: &str, width: usize) -> String {
+    let mut lines: Vec<String> = Vec::new();
+    for line in text.split('\n') {
+        lines.push(String::new());
+        let is_short = line.chars().count() <= width;
+        let words: Vec<&str> = if is_short {
+            vec![line]
+        } else {
+            line.split(' ').collect()
+        };
+        for word in words {
+            match lines.last_mut() {
+                Some(line) if line.is_empty() => line.push_str(word),
+                Some(line) if line.chars().count() + word.chars().count() < width => {
+                    line.push(' ');
+                    line.push_str(word);
+                }
+                _ => lines.push(word.to_owned()),
+            }
+        }
+    }
+    lines.join("\n")
+}
+
 fn interval(ends: [Option<f64>; 2], unit: f64) -> String {
     match ends {
         [Some(lower), Some(upper)] => {
@@ -178,10 +230,11 @@ pub fn basis(comparison: &Comparison) -> String {
     )
 }
 
-/// False positives of the truly visible items: "0.083 %".
+/// False positives of the truly visible items: "0.08±0.03 %".
 pub fn false_positives(comparison: &Comparison) -> Option<String> {
-    let share = comparison.of_any("excess")?;
-    Some(format!("{:.3} %", share * 100.0))
+    let share = comparison.metric_of_any("excess")?;
+    let margin = share.upper.map(|upper| (upper - share.value) * 100.0);
+    Some(format!("{} %", plus_minus(share.value * 100.0, margin)))
 }
 
 /// Where they come from, as items of all judged cameras: "12/0/80". Nothing if
@@ -282,5 +335,26 @@ mod tests {
         let mut out = Terminal(Vec::new());
         write!(out, "\u{1b}[2J\n{}\n", 7.0).unwrap();
         assert_eq!(out.0, b"\\u{1b}[2J\n7\n");
+    }
+
+    #[test]
+    fn margins_leave_their_digits_and_lines_their_width() {
+        let cases = [
+            (83.364, Some(0.62), "83.4±0.7"),
+            (12.122, Some(0.05), "12.12±0.05"),
+            (0.056, Some(0.0061), "0.056±0.007"),
+            (560_397.0, Some(8_123.0), "560000±9000"),
+            (606.7, Some(3.2), "607±4"),
+            (5.0, Some(9.6), "5±10"),
+            (0.0, Some(3.1e-4), "<0.0004"),
+            (0.25, None, "0.250"),
+        ];
+        for (value, margin, text) in cases {
+            assert_eq!(plus_minus(value, margin), text);
+        }
+        assert_eq!(
+            wrapped("a  b\nfour words of text", 11),
+            "a  b\nfour words\nof text"
+        );
     }
 }

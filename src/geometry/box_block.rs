@@ -115,7 +115,7 @@ impl BoxBlock {
     /// The rows of one corner, the same one of every box: the upper bounds
     /// where `upper` says so.
     #[inline(always)]
-    fn corner_rows(&self, upper: Upper) -> [&[f32; LANES]; 3] {
+    pub(crate) fn corner_rows(&self, upper: Upper) -> [&[f32; LANES]; 3] {
         let row = |k: usize| &self.rows[k + 3 * usize::from(upper[k])];
         [row(0), row(1), row(2)]
     }

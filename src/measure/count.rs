@@ -10,6 +10,7 @@ use super::notice::Notice;
 use super::{Answer, Built, Status, TaskKind, Verdict, Workload, guarded};
 use crate::culling::CullingTest;
 use crate::query::{ItemId, Located, QueryCost};
+use crate::statistics::rate;
 use crate::verify::{ErrorCount, Fault, Trial, Truth, explain_containment, explain_visibility};
 
 /// What one subject answered and what it cost.
@@ -161,6 +162,9 @@ pub struct Judged {
     /// Sums over those.
     #[serde(flatten)]
     pub errors: ErrorCount,
+    /// The 95 % interval of the false positives per visible item, by camera.
+    #[serde(default)]
+    pub excess_interval: Option<[f64; 2]>,
 }
 
 /// Checks the reference's answers, which all right structures share, against the oracle.
@@ -170,6 +174,7 @@ pub fn judge(workload: &Workload, most: usize) -> Judged {
     let count = workload.cameras.len();
     let wanted = (most / scene.items.len().max(1)).clamp(1, 16).min(count);
     let mut judged = Judged::default();
+    let mut by_camera = Vec::with_capacity(wanted);
     for n in 0..wanted {
         let frame = n * count / wanted;
         let camera = &workload.cameras[frame];
@@ -186,7 +191,10 @@ pub fn judge(workload: &Workload, most: usize) -> Judged {
             CullingTest::SixPlane | CullingTest::SixBox => errors,
         };
         judged.judged_queries += 1;
+        by_camera.push([errors.false_positives as f64, errors.visible as f64]);
     }
+    let excess = rate(&by_camera);
+    judged.excess_interval = excess.and_then(|found| Some([found.lower?, found.upper?]));
     judged
 }
 

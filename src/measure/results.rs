@@ -505,7 +505,9 @@ pub(super) fn shown(reference: &[f64], own: &[f64]) -> Option<Estimate> {
 fn error_metrics(metrics: &mut Metrics, judged: &Judged) {
     let (errors, queries) = (&judged.errors, judged.judged_queries as f64);
     metrics.set("judged_queries", queries);
-    metrics.maybe("excess", errors.excess());
+    if let Some(excess) = errors.excess() {
+        metrics.interval("excess", excess, judged.excess_interval.map(Into::into));
+    }
     for (name, count) in [
         ("false_positive_count", errors.false_positives),
         ("false_negative_count", errors.false_negatives),

@@ -1,18 +1,24 @@
 //! Error against run time: what each culling test, arithmetic and derivation
 //! of the planes gets wrong, and what it costs on each structure. It owns the
-//! points of that diagram and the two sweeps; the truth is the oracle's, the
-//! clock is `measure`'s.
+//! points of that diagram and of region search's, and the sweeps; the truth is the
+//! oracle's, the clock is `measure`'s.
 
 mod judged;
-mod offset_sweep;
+mod other_numbers;
+mod plane_test;
 mod point;
 mod points;
 mod quantised;
+mod region_search;
 mod size_sweep;
 mod stability;
+mod stored;
+mod sweeps;
 
-pub use offset_sweep::{OFFSETS, OffsetRow, offset_sweep};
-pub use point::Point;
+pub use plane_test::Names;
+pub use point::{Point, Times};
 pub use points::{PointPlan, Precision, PrecisionInput, Prepared, measure_points, prepare, time};
-pub use size_sweep::{SIZE_RATIOS, SizeRow, size_sweep};
+pub use region_search::{POINTS_PER_CAMERA, RegionPoint};
+pub use size_sweep::{SIZE_RATIOS, SizeError, SizeRow, size_sweep};
 pub use stability::StableAfter;
+pub use sweeps::{SWEEPS, Sweep, SweepRow, sweep};

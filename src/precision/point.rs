@@ -4,52 +4,96 @@
 use serde::{Serialize, Serializer};
 
 use super::judged::Judged;
+use super::plane_test::Names;
 use crate::index::MemoryUsage;
 use crate::measure::{OverProcesses, Status};
+use crate::statistics::{ALPHA, Rate, dominance, shows_less};
 use crate::verify::ErrorCount;
+
+/// Thread CPU time, over the processes as in a run; null where it has none.
+#[derive(Clone, Copy, Default, PartialEq, Debug, Serialize)]
+pub struct Times {
+    /// Of a query.
+    pub query_ns: Option<f64>,
+    /// Lower end of the 95 % interval of `query_ns`.
+    pub query_ns_lower: Option<f64>,
+    /// Upper end of the 95 % interval of `query_ns`.
+    pub query_ns_upper: Option<f64>,
+    /// Its place among the tasks that were timed, if it has a time.
+    #[serde(skip)]
+    pub(super) task: Option<usize>,
+}
+
+impl Times {
+    /// Of a task, per so many of its queries.
+    pub(super) fn of(times: &OverProcesses, task: usize, per: f64) -> Times {
+        let Some(found) = times.ns(task) else {
+            return Times::default();
+        };
+        Times {
+            query_ns: Some(found.value / per),
+            query_ns_lower: Some(found.lower / per).filter(|ns| ns.is_finite()),
+            query_ns_upper: Some(found.upper / per).filter(|ns| ns.is_finite()),
+            task: Some(task),
+        }
+    }
+
+    /// What has no time comes last.
+    pub(super) fn order(&self) -> f64 {
+        self.query_ns.unwrap_or(f64::INFINITY)
+    }
+
+    /// Whether a paired test over the processes shows it.
+    pub(super) fn is_faster(&self, other: &Times, times: &OverProcesses) -> bool {
+        let both = self.task.zip(other.task);
+        both.is_some_and(|(own, other)| times.is_faster(own, other))
+    }
+}
 
 /// One way to answer, with its error and its time.
 #[derive(Clone, Debug, Serialize)]
 pub struct Point {
     /// Label of the structure.
     pub structure: String,
-    /// Name of the culling test.
-    pub test: &'static str,
-    /// Name of the arithmetic.
-    pub arithmetic: &'static str,
-    /// Name of the derivation of the planes.
-    pub planes: &'static str,
-    /// Factor c of the planes' epsilon.
-    pub epsilon: f64,
+    /// What it is asked with.
+    #[serde(flatten)]
+    pub names: Names,
     /// How building, counting and timing ended.
     #[serde(serialize_with = "by_name")]
     pub status: Status,
-    /// Why, where the status is not ok.
+    /// Why, where the status is not ok, or why it has no time.
     pub reason: Option<String>,
-    /// False positives / visible items.
-    pub excess: Option<f64>,
+    /// False positives / visible items, by camera.
+    pub excess: Option<Rate>,
     /// Visible items that were not returned, in millionths.
-    pub false_negative_ppm: Option<f64>,
+    pub false_negative_ppm: Option<Rate>,
+    /// Items that change from a camera to its neighbour on the path while their
+    /// truth does not / visible items; null for a path of one camera.
+    pub flicker: Option<Rate>,
     /// The same as counts.
     #[serde(flatten)]
     pub errors: ErrorCount,
-    /// Mean over the cameras, thread CPU time, over the processes as in a run.
-    pub query_ns: Option<f64>,
-    /// Lower end of the 95 % interval of `query_ns`.
-    pub query_ns_lower: Option<f64>,
-    /// Upper end of the 95 % interval of `query_ns`.
-    pub query_ns_upper: Option<f64>,
+    /// How deep the deepest false negative reaches into the view, in pixels of a
+    /// view 1080 pixels high.
+    pub worst_miss_px: Option<f64>,
+    /// Mean over the cameras.
+    #[serde(flatten)]
+    pub times: Times,
     /// `query_ns` / number of items.
     pub ns_per_item: Option<f64>,
     /// Memory of nodes and items / number of items.
     pub memory_bytes_per_item: Option<f64>,
-    /// Index of a point that is no worse in anything and better in something.
+    /// Index of a point of the front that is no worse in anything and better in
+    /// something.
     pub dominated_by: Option<usize>,
-    /// Whether no point dominates it.
+    /// Whether it is dominated by the values alone, and the samples do not show it.
+    pub is_tie: bool,
+    /// Whether by the values no point dominates it.
     pub on_front: bool,
-    /// Its place among the tasks that were timed, if it has a time.
+    /// By camera: false negatives, dropped touches, false positives, depth of the
+    /// worst miss.
     #[serde(skip)]
-    pub(super) task: Option<usize>,
+    samples: [Vec<f64>; 4],
 }
 
 fn by_name<S: Serializer>(status: &Status, serializer: S) -> Result<S::Ok, S::Error> {
@@ -58,31 +102,41 @@ fn by_name<S: Serializer>(status: &Status, serializer: S) -> Result<S::Ok, S::Er
 
 impl Point {
     pub(super) fn new(structure: &str, judged: &Judged) -> Point {
-        let (culling, errors) = (&judged.culling, judged.errors);
-        let refused = judged.refused.is_some();
+        let errors = judged.errors();
+        let is_refused = judged.refused.is_some();
+        let untimed =
+            (!judged.test.is_timed()).then(|| "emulated: errors without times".to_owned());
+        let by_camera = |of: fn(&super::judged::CameraErrors) -> f64| -> Vec<f64> {
+            judged.by_camera.iter().map(of).collect()
+        };
         Point {
             structure: structure.to_owned(),
-            test: culling.test.name(),
-            arithmetic: culling.arithmetic.name(),
-            planes: culling.planes.method.name(),
-            epsilon: culling.planes.epsilon,
-            status: match refused {
+            names: judged.test.names(),
+            status: match is_refused {
                 true => Status::Refused,
                 false if errors.false_negatives > 0 => Status::Unsafe,
                 false => Status::Ok,
             },
-            reason: judged.refused.clone(),
-            excess: errors.excess().filter(|_| !refused),
-            false_negative_ppm: errors.false_negative_ppm().filter(|_| !refused),
+            reason: judged.refused.clone().or(untimed),
+            excess: judged.rate_of(|c| c.errors.false_positives),
+            false_negative_ppm: judged
+                .rate_of(|c| c.errors.false_negatives)
+                .map(|share| share.per(1e6)),
+            flicker: judged.flicker(),
             errors,
-            query_ns: None,
-            query_ns_lower: None,
-            query_ns_upper: None,
+            worst_miss_px: (!is_refused).then(|| judged.worst_miss_px()),
+            times: Times::default(),
             ns_per_item: None,
             memory_bytes_per_item: None,
             dominated_by: None,
+            is_tie: false,
             on_front: false,
-            task: None,
+            samples: [
+                by_camera(|c| c.errors.false_negatives as f64),
+                by_camera(|c| c.errors.touch_dropped as f64),
+                by_camera(|c| c.errors.false_positives as f64),
+                by_camera(|c| c.worst_miss_px),
+            ],
         }
     }
 
@@ -95,128 +149,144 @@ impl Point {
         if let Some(wrong) = times.failure(task) {
             (self.status, self.reason) = (wrong.status, wrong.reason.clone());
         }
-        let Some(found) = times.ns(task) else {
-            return;
-        };
-        self.task = Some(task);
-        self.query_ns = Some(found.value);
-        self.query_ns_lower = Some(found.lower).filter(|ns| ns.is_finite());
-        self.query_ns_upper = Some(found.upper).filter(|ns| ns.is_finite());
-        self.ns_per_item = (items > 0).then(|| found.value / items as f64);
+        self.times = Times::of(times, task, 1.0);
+        let ns = self.times.query_ns.filter(|_| items > 0);
+        self.ns_per_item = ns.map(|ns| ns / items as f64);
     }
 
-    /// No worse in any error and no slower, and better in one of them. Times that
-    /// the processes do not tell apart are equal.
-    fn dominates(&self, other: &Point, is_faster: IsFaster) -> bool {
-        let (Some(task), Some(others_task)) = (self.task, other.task) else {
-            return false;
-        };
-        let of = |p: &Point| {
-            let e = p.errors;
-            [e.false_negatives, e.touch_dropped, e.false_positives]
-        };
-        let (mine, others) = (of(self), of(other));
-        let no_worse = mine.iter().zip(&others).all(|(a, b)| a <= b);
-        no_worse
-            && !is_faster(others_task, task)
-            && (mine != others || is_faster(task, others_task))
+    /// What less is better of: three errors, the depth of the worst miss, memory
+    /// and time.
+    fn values(&self) -> [f64; 6] {
+        let e = &self.errors;
+        let [missed, dropped, extra] =
+            [e.false_negatives, e.touch_dropped, e.false_positives].map(|n| n as f64);
+        let memory = self.memory_bytes_per_item.unwrap_or(f64::INFINITY);
+        let depth = self.worst_miss_px.unwrap_or(f64::INFINITY);
+        [missed, dropped, extra, depth, memory, self.times.order()]
     }
 }
 
-/// Whether a timed task is faster than another.
-type IsFaster<'f> = &'f dyn Fn(usize, usize) -> bool;
+/// Marks the front of what has a time, and what is off it: errors are compared
+/// camera by camera, times process by process, and memory is what it is.
+pub(super) fn mark_dominated(points: &mut [Point], times: &OverProcesses) {
+    mark(points, &|a, b| a.times.is_faster(&b.times, times));
+}
 
-pub(super) fn mark_dominated(points: &mut [Point], is_faster: IsFaster) {
-    for i in 0..points.len() {
-        let better = (0..points.len()).find(|&k| points[k].dominates(&points[i], is_faster));
-        points[i].on_front = better.is_none() && points[i].task.is_some();
-        points[i].dominated_by = better;
+fn mark(points: &mut [Point], is_faster: &dyn Fn(&Point, &Point) -> bool) {
+    let timed: Vec<usize> = (0..points.len())
+        .filter(|&i| points[i].times.task.is_some())
+        .collect();
+    let values: Vec<[f64; 6]> = timed.iter().map(|&i| points[i].values()).collect();
+    let is_less = |a: usize, b: usize, k: usize| {
+        let (a, b) = (&points[timed[a]], &points[timed[b]]);
+        match k {
+            4 => true,
+            5 => is_faster(a, b),
+            _ => shows_less(&a.samples[k], &b.samples[k], ALPHA),
+        }
+    };
+    let found = dominance(&values, &is_less);
+    for (&i, found) in timed.iter().zip(found) {
+        points[i].on_front = found.is_none();
+        points[i].dominated_by = found.map(|found| timed[found.by]);
+        points[i].is_tie = found.is_some_and(|found| !found.is_shown);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::precision::plane_test::PlaneTest;
 
-    /// A point with false negatives, dropped touches and false positives, and
-    /// its place among the times.
-    fn point(errors: [u64; 3], task: Option<usize>) -> Point {
+    /// A point with false negatives, dropped touches and false positives, each the
+    /// same number at four cameras, and its time.
+    fn point(errors: [u64; 3], ns: Option<f64>) -> Point {
         let [false_negatives, touch_dropped, false_positives] = errors;
         Point {
             structure: "linear".to_owned(),
-            test: "six-plane",
-            arithmetic: "f32",
-            planes: "frame",
-            epsilon: 0.0,
+            names: PlaneTest::Culling(Default::default()).names(),
             status: Status::Ok,
             reason: None,
             excess: None,
             false_negative_ppm: None,
+            flicker: None,
             errors: ErrorCount {
                 false_negatives,
                 touch_dropped,
                 false_positives,
                 ..ErrorCount::default()
             },
-            query_ns: None,
-            query_ns_lower: None,
-            query_ns_upper: None,
+            worst_miss_px: Some(0.0),
+            times: Times {
+                query_ns: ns,
+                task: ns.map(|ns| ns as usize),
+                ..Times::default()
+            },
             ns_per_item: None,
-            memory_bytes_per_item: None,
+            memory_bytes_per_item: Some(24.0),
             dominated_by: None,
+            is_tie: false,
             on_front: false,
-            task,
+            samples: [
+                vec![false_negatives as f64 / 4.0; 4],
+                vec![touch_dropped as f64 / 4.0; 4],
+                vec![false_positives as f64 / 4.0; 4],
+                vec![0.0; 4],
+            ],
         }
     }
 
     /// Times in steps of ten are told apart, those within a step are not.
-    fn is_faster(a: usize, b: usize) -> bool {
-        a / 10 < b / 10
+    fn is_faster(a: &Point, b: &Point) -> bool {
+        let step = |p: &Point| p.times.task.map(|task| task / 10);
+        step(a) < step(b)
+    }
+
+    fn marked(points: &[Point]) -> Vec<(Option<usize>, bool, bool)> {
+        let mut points = points.to_vec();
+        mark(&mut points, &is_faster);
+        let of = |p: &Point| (p.dominated_by, p.is_tie, p.on_front);
+        points.iter().map(of).collect()
     }
 
     #[test]
-    fn times_not_told_apart_are_equal_and_errors_are_not_traded() {
+    fn errors_are_not_traded_and_ties_are_no_front() {
         let (none, some) = ([0, 0, 5], [0, 0, 9]);
+        let (front, tie, worse) = (
+            (None, false, true),
+            (Some(0), true, false),
+            (Some(0), false, false),
+        );
         let cases = [
-            // Equal errors: only what is faster dominates.
-            (none, 10, none, 20, [true, false]),
-            (none, 10, none, 11, [false, false]),
-            // A tie in time is decided by the errors.
-            (none, 10, some, 11, [true, false]),
-            (none, 11, some, 10, [true, false]),
-            // Fewer errors for more time: both stay.
-            (none, 20, some, 10, [false, false]),
+            // Equal errors: the faster one, shown or not.
+            (none, 10.0, none, 20.0, [front, worse]),
+            (none, 10.0, none, 11.0, [front, tie]),
+            // Slower by a little, with fewer errors: both stay.
+            (none, 11.0, some, 10.0, [front, front]),
+            (none, 10.0, some, 11.0, [front, worse]),
             // One error more, another one fewer: both stay, however fast.
-            ([1, 0, 0], 10, [0, 0, 9], 50, [false, false]),
-            ([0, 1, 0], 10, [0, 0, 9], 50, [false, false]),
-            ([0, 1, 9], 50, [0, 1, 8], 10, [false, true]),
+            ([1, 0, 0], 10.0, [0, 0, 9], 50.0, [front, front]),
+            ([0, 1, 0], 10.0, [0, 0, 9], 50.0, [front, front]),
         ];
         for (errors_a, time_a, errors_b, time_b, wanted) in cases {
-            let (a, b) = (point(errors_a, Some(time_a)), point(errors_b, Some(time_b)));
-            let found = [a.dominates(&b, &is_faster), b.dominates(&a, &is_faster)];
-            assert_eq!(found, wanted, "{:?}", (errors_a, time_a, errors_b, time_b));
+            let points = [point(errors_a, Some(time_a)), point(errors_b, Some(time_b))];
+            let case = (errors_a, time_a, errors_b, time_b);
+            assert_eq!(marked(&points), wanted, "{case:?}");
         }
     }
 
     #[test]
-    fn the_front_is_what_nothing_dominates() {
-        let mut points = [
-            point([0, 0, 9], Some(10)),
-            point([0, 0, 9], Some(15)),
-            point([0, 0, 9], Some(30)),
-            point([0, 0, 0], Some(50)),
-            point([0, 0, 1], Some(50)),
-            // One that was never timed has no say and no place.
-            point([0, 0, 0], None),
-        ];
-        mark_dominated(&mut points, &is_faster);
-        assert_eq!(
-            points.each_ref().map(|p| p.dominated_by),
-            [None, None, Some(0), None, Some(3), None]
-        );
-        assert_eq!(
-            points.each_ref().map(|p| p.on_front),
-            [true, true, false, true, false, false]
-        );
+    fn memory_and_the_depth_of_a_miss_are_dimensions() {
+        let mut small = point([0, 0, 5], Some(90.0));
+        small.memory_bytes_per_item = Some(12.0);
+        let mut shallow = point([1, 0, 5], Some(90.0));
+        let mut deep = point([1, 0, 5], Some(10.0));
+        (shallow.worst_miss_px, deep.worst_miss_px) = (Some(0.1), Some(30.0));
+        let untimed = point([0, 0, 0], None);
+        let found = marked(&[deep, point([0, 0, 5], Some(20.0)), small, shallow, untimed]);
+        let on_front: Vec<bool> = found.iter().map(|(.., on_front)| *on_front).collect();
+        assert_eq!(on_front, [true, true, true, false, false]);
+        // What has no time is neither on it nor off it.
+        assert_eq!(found[4], (None, false, false));
     }
 }

@@ -1,24 +1,29 @@
 //! Measuring the points of the diagram for one scene and path: every structure
 //! with every culling, checked, judged against the exact truth, and timed side
-//! by side.
+//! by side; and region search likewise.
 
 use serde::{Deserialize, Serialize};
 
-use super::judged::{Judged, Truths};
-use super::point::{Point, mark_dominated};
-use super::quantised::{Code, GridScope, Quantised};
+use super::judged::{Judged, Shots, Truths};
+use super::plane_test::{PlaneTest, Scan};
+use super::point::{Point, Times, mark_dominated};
+use super::region_search::{
+    self, POINTS_PER_CAMERA, RegionJudged, RegionNumbers, RegionPoint, RegionQueries,
+};
 use super::stability::{StableAfter, by_camera, stability};
-use crate::camera::{Camera, PLANE_METHODS, PlaneMethod, PlaneOptions};
+use super::stored::{Stored, stored_points};
+use crate::camera::{PLANE_METHODS, PlaneMethod, PlaneOptions};
 use crate::culling::{ARITHMETICS, Arithmetic, Culling, CullingTest, TESTS};
-use crate::index::{BuildError, By, DynIndex, Input, RegionIndex, StructureSpec};
+use crate::index::{BuildError, DynIndex, MemoryUsage, StructureSpec};
 use crate::kernel::Kernel;
 use crate::measure::{
     OverProcesses, ProcessTimes, Protocol, Schedule, Status, TimedTask, Verdict, input_of, timed,
 };
 use crate::path::CameraPath;
+use crate::query::ItemId;
 use crate::scene::Scene;
 use crate::statistics::Estimate;
-use crate::verify::{Trial, Truth};
+use crate::verify::Trial;
 
 /// The diagram of a scene and path.
 #[derive(Clone, Debug, Serialize)]
@@ -42,6 +47,8 @@ pub struct Precision {
     pub points: Vec<Point>,
     /// Indices of the points that nothing dominates, fastest first.
     pub front: Vec<usize>,
+    /// The other diagram: where is the camera. Fastest first.
+    pub region_points: Vec<RegionPoint>,
     /// How the order by time settles with more cameras.
     pub stability: Vec<StableAfter>,
 }
@@ -80,10 +87,12 @@ fn cullings() -> Vec<Culling> {
     all
 }
 
-/// A structure over the boxes and over the cubes of the sphere test.
+/// A structure over the boxes, over the cubes of the sphere test, and over the
+/// regions where those are other boxes.
 struct Indexes {
     boxes: Box<dyn DynIndex>,
     cubes: Box<dyn DynIndex>,
+    regions: Option<Box<dyn DynIndex>>,
 }
 
 impl Indexes {
@@ -92,9 +101,13 @@ impl Indexes {
             let items = test.items(&scene.items);
             spec.build(input_of(scene, &items))
         };
+        let regions = scene.regions.boxes(&scene.items);
+        let others = !std::ptr::eq(regions, &scene.items[..]);
+        let others = others.then(|| spec.build(input_of(scene, regions)));
         Ok(Indexes {
             boxes: over(CullingTest::SixPlane)?,
             cubes: over(CullingTest::Sphere)?,
+            regions: others.transpose()?,
         })
     }
 
@@ -104,143 +117,198 @@ impl Indexes {
             _ => self.boxes.as_ref(),
         }
     }
-}
 
-/// The experiment with items in few bits: an index, or none if the scene does
-/// not fit.
-struct Stored {
-    label: String,
-    index: Option<Box<dyn DynIndex>>,
-    judged: Vec<Judged>,
-}
-
-/// u8 and u16 codes, on one grid or on one for each block, with the default
-/// view and with the exact test.
-fn quantised(kernel: Kernel, scene: &Scene, cameras: &[Camera], truths: Truths) -> Vec<Stored> {
-    let scopes = [(GridScope::World, "world"), (GridScope::Block, "block")];
-    let bytes = scopes.map(|scope| stored::<u8>(scope, kernel, scene, cameras, truths));
-    let words = scopes.map(|scope| stored::<u16>(scope, kernel, scene, cameras, truths));
-    bytes.into_iter().chain(words).collect()
-}
-
-fn stored<C: Code>(
-    (scope, name): (GridScope, &str),
-    kernel: Kernel,
-    scene: &Scene,
-    cameras: &[Camera],
-    truths: Truths,
-) -> Stored {
-    let cullings = [CullingTest::SixPlane, CullingTest::Exact].map(|test| Culling {
-        test,
-        ..Culling::default()
-    });
-    let structure = Quantised::<C>::INFO.name;
-    let label = format!("{structure}:bits={},grid={name}", 8 * size_of::<C>());
-    match Quantised::<C>::build(&Input::new(&scene.items), &scope) {
-        Ok(index) => {
-            let items = index.decoded(scene.items.len());
-            let judged =
-                cullings.map(|culling| Judged::new(scene, &items, cameras, truths, culling));
-            Stored {
-                label,
-                index: Some(Box::new(By { index, kernel })),
-                judged: judged.into(),
-            }
-        }
-        Err(error) => Stored {
-            label,
-            index: None,
-            judged: cullings.map(|c| Judged::refused(c, &error)).into(),
-        },
+    fn regions(&self) -> &dyn DynIndex {
+        self.regions.as_deref().unwrap_or(self.boxes.as_ref())
     }
 }
 
 /// Everything that points are made of, the same in every process.
 struct Built<'a> {
+    scene: &'a Scene,
     judged: Vec<Judged>,
     structures: Vec<(&'a str, Indexes)>,
     stored: Vec<Stored>,
+    /// The plain loop, asked in all numbers there are.
+    scan: Scan,
+    scanned: Vec<Judged>,
+    kernel: Kernel,
+    queries: RegionQueries,
+}
+
+/// What answers.
+#[derive(Clone, Copy)]
+enum Asked<'b> {
+    Index(&'b dyn DynIndex),
+    Scan(&'b Scan, Kernel),
+    Nothing,
+}
+
+impl Asked<'_> {
+    fn see(self, judged: &Judged, n: usize, out: &mut Vec<ItemId>) {
+        match (self, judged.views[n].as_any()) {
+            (Asked::Index(index), Some(view)) => index.query(view, out),
+            (Asked::Scan(scan, kernel), _) => scan.see(kernel, &judged.views[n], out),
+            _ => {}
+        }
+    }
 }
 
 /// One way to answer: a structure with a culling.
 struct Way<'b> {
     structure: &'b str,
-    index: Option<&'b dyn DynIndex>,
+    asked: Asked<'b>,
+    memory: Option<MemoryUsage>,
     judged: &'b Judged,
+}
+
+/// One way to search for a region: a structure, or a loop over all regions.
+struct RegionWay<'b> {
+    structure: &'b str,
+    index: Option<&'b dyn DynIndex>,
+    numbers: RegionNumbers,
+}
+
+/// What is asked without an index.
+const SCAN: &str = "scan";
+
+/// The toolkit's own f32 and f64, and all others, for the same loop.
+fn scanned() -> Vec<PlaneTest> {
+    let own = [Arithmetic::F32, Arithmetic::F64].map(|arithmetic| Culling {
+        arithmetic,
+        planes: PlaneOptions {
+            epsilon: match arithmetic {
+                Arithmetic::F32 => PlaneOptions::default().epsilon,
+                _ => 0.0,
+            },
+            ..PlaneOptions::default()
+        },
+        ..Culling::default()
+    });
+    let own = own.into_iter().map(PlaneTest::Culling);
+    own.chain(PlaneTest::others()).collect()
 }
 
 impl<'a> Built<'a> {
     fn new(
         input: &PrecisionInput<'a>,
-        cameras: &[Camera],
-        truths: Truths,
+        shots: &Shots,
+        truths: Option<&Truths>,
     ) -> Result<Built<'a>, BuildError> {
         let (scene, structures) = (input.scene, input.structures);
-        let judged = cullings().into_iter().map(|culling| {
-            let items = culling.test.items(&scene.items);
-            Judged::new(scene, &items, cameras, truths, culling)
-        });
-        let execution = structures.first().map(|spec| spec.execution);
+        let judge = |test: PlaneTest| {
+            let items = test.test().items(&scene.items);
+            Judged::new(scene, &items, shots, truths, test)
+        };
+        let kernel = structures.first().map(|spec| spec.execution);
+        let kernel = kernel.unwrap_or_default().kernel;
         let indexed = structures
             .iter()
             .map(|spec| Ok((spec.label.as_str(), Indexes::new(spec, scene)?)));
         Ok(Built {
-            judged: judged.collect(),
+            scene,
+            judged: cullings()
+                .into_iter()
+                .map(PlaneTest::Culling)
+                .map(judge)
+                .collect(),
             structures: indexed.collect::<Result<_, BuildError>>()?,
-            stored: quantised(execution.unwrap_or_default().kernel, scene, cameras, truths),
+            stored: stored_points(kernel, scene, shots, truths),
+            scan: Scan::new(&scene.items),
+            scanned: scanned().into_iter().map(judge).collect(),
+            kernel,
+            queries: RegionQueries::new(scene, shots),
         })
     }
 
     /// All points in their order.
     fn ways(&self) -> Vec<Way<'_>> {
-        let of_structures = self.structures.iter().flat_map(|(structure, indexes)| {
-            self.judged.iter().map(|judged| Way {
-                structure,
-                index: Some(indexes.of(judged.culling.test)),
-                judged,
-            })
-        });
-        let of_stored = self.stored.iter().flat_map(|stored| {
-            stored.judged.iter().map(|judged| Way {
+        let mut ways = Vec::new();
+        for (structure, indexes) in &self.structures {
+            ways.extend(self.judged.iter().map(|judged| {
+                let index = indexes.of(judged.test.test());
+                Way {
+                    structure,
+                    asked: Asked::Index(index),
+                    memory: Some(index.memory()),
+                    judged,
+                }
+            }));
+        }
+        for stored in &self.stored {
+            ways.extend(stored.judged.iter().map(|judged| Way {
                 structure: &stored.label,
-                index: stored.index.as_deref(),
+                asked: stored.index.as_deref().map_or(Asked::Nothing, Asked::Index),
+                memory: stored.index.as_deref().map(DynIndex::memory),
                 judged,
-            })
-        });
-        of_structures.chain(of_stored).collect()
+            }));
+        }
+        ways.extend(self.scanned.iter().map(|judged| Way {
+            structure: SCAN,
+            asked: Asked::Scan(&self.scan, self.kernel),
+            memory: Some(self.scan.memory()),
+            judged,
+        }));
+        ways
+    }
+
+    /// All ways to search for a region: f32 by every structure, the others by a
+    /// loop over all regions.
+    fn region_ways(&self) -> Vec<RegionWay<'_>> {
+        let mut ways = Vec::new();
+        for (structure, indexes) in &self.structures {
+            ways.extend(
+                [RegionNumbers::F32, RegionNumbers::Checked].map(|numbers| RegionWay {
+                    structure,
+                    index: Some(indexes.regions()),
+                    numbers,
+                }),
+            );
+        }
+        ways.extend(
+            [RegionNumbers::F64, RegionNumbers::Exact].map(|numbers| RegionWay {
+                structure: SCAN,
+                index: None,
+                numbers,
+            }),
+        );
+        ways
+    }
+
+    fn region_task<'b>(&'b self, way: &RegionWay<'b>, expected: Vec<u64>) -> TimedTask<'b> {
+        let (index, numbers) = (way.index, way.numbers);
+        task(expected, move |n, out: &mut Vec<ItemId>| {
+            self.queries.ask(self.scene, numbers, index, n, out);
+        })
+    }
+}
+
+fn task<'b>(expected: Vec<u64>, ask: impl Fn(usize, &mut Vec<ItemId>) + 'b) -> TimedTask<'b> {
+    TimedTask {
+        ask: Box::new(ask),
+        ask_many: None,
+        expected,
+        least_ns: None,
     }
 }
 
 impl<'b> Way<'b> {
     fn task(&self, expected: Vec<u64>) -> TimedTask<'b> {
-        let (index, views) = (self.index, &self.judged.views);
-        TimedTask {
-            ask: match index {
-                Some(index) => Box::new(move |n, out| index.query(views[n].as_any(), out)),
-                None => Box::new(|_, _| ()),
-            },
-            ask_many: None,
-            expected,
-            least_ns: None,
-        }
+        let (asked, judged) = (self.asked, self.judged);
+        task(expected, move |n, out| asked.see(judged, n, out))
     }
-}
-
-/// The cameras that are looked at: at most `most`, evenly spread.
-fn cameras_of(path: &CameraPath, most: usize) -> Vec<Camera> {
-    let count = path.cameras.len();
-    let wanted = most.max(1).min(count);
-    let chosen = (0..wanted).map(|i| path.cameras[i * count / wanted]);
-    chosen.collect()
 }
 
 /// What all processes time: the plan is the same for each.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PointPlan {
-    /// Places of the points that are timed; the twin, where there is one, last.
+    /// Places of the points that are timed, then of the region points; last of
+    /// all comes the twin, which is one of the points.
     timed: Vec<usize>,
+    timed_regions: Vec<usize>,
+    twin: Option<usize>,
     schedule: Schedule,
-    /// By timed point and camera: ids.
+    /// By task and camera: ids.
     expected: Vec<Vec<u64>>,
 }
 
@@ -248,8 +316,7 @@ pub struct PointPlan {
 pub struct Prepared {
     /// What the other processes are to measure.
     pub plan: PointPlan,
-    /// Place of the twin's original among those that are timed.
-    twin: Option<usize>,
+    region_judged: Vec<RegionJudged>,
     precision: Precision,
 }
 
@@ -289,7 +356,8 @@ pub fn measure_points(
 ///
 /// Every answer is compared with the plain loop before it is timed, and the
 /// plain loop with the exact truth: O(cameras * items) verdicts of some 50 ns
-/// and as many plain tests for each culling.
+/// and as many plain tests for each culling, twice for what changes from frame to
+/// frame.
 ///
 /// # Errors
 /// A structure that refuses the scene.
@@ -298,12 +366,8 @@ pub fn prepare(
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<Prepared>, BuildError> {
     let scene = input.scene;
-    let cameras = cameras_of(input.path, input.most_cameras);
-    let truths = cameras.iter();
-    // A frame always makes a pose.
-    let truths: Vec<Truth> = truths.filter_map(|c| Truth::of_scene(c, scene)).collect();
-    let built = Built::new(input, &cameras, Some(&truths))?;
-    drop(truths);
+    let shots = Shots::of(input.path, input.most_cameras);
+    let built = Built::new(input, &shots, Some(&shots.truths(scene)))?;
     let ways = built.ways();
     let (mut points, mut timed, mut tasks) = (Vec::new(), Vec::new(), Vec::new());
     let mut twin = None;
@@ -311,31 +375,42 @@ pub fn prepare(
         if stop() {
             return Ok(None);
         }
-        let judged = way.judged;
-        let mut point = Point::new(way.structure, judged);
-        if let Some(index) = way.index {
-            point.memory(index.memory(), scene.items.len());
-            let has_views = judged.refused.is_none();
-            match has_views.then(|| checked(index, judged, scene.items.len())) {
-                None => {}
-                Some(Ok(())) => {
-                    if judged.culling == Culling::default() {
-                        twin.get_or_insert(timed.len());
+        let mut point = Point::new(way.structure, way.judged);
+        if let Some(memory) = way.memory {
+            point.memory(memory, scene.items.len());
+        }
+        let is_asked = !matches!(way.asked, Asked::Nothing) && way.judged.refused.is_none();
+        if is_asked && way.judged.test.is_timed() {
+            match checked(way, scene.items.len()) {
+                Ok(()) => {
+                    if way.judged.test == PlaneTest::Culling(Culling::default()) {
+                        twin.get_or_insert(points.len());
                     }
                     timed.push(points.len());
-                    tasks.push(way.task(judged.counts()));
+                    tasks.push(way.task(way.judged.counts()));
                 }
-                Some(Err(wrong)) => (point.status, point.reason) = (wrong.status, wrong.reason),
+                Err(wrong) => (point.status, point.reason) = (wrong.status, wrong.reason),
             }
         }
         points.push(point);
     }
-    if let Some(original) = twin {
-        let way = &ways[timed[original]];
-        tasks.push(way.task(way.judged.counts()));
-        timed.push(timed[original]);
+    let region_judged = built.queries.judged(scene);
+    let (mut region_points, mut timed_regions) = (Vec::new(), Vec::new());
+    for way in built.region_ways() {
+        let own = &region_judged[way.numbers as usize];
+        let mut point = own.point(way.structure);
+        if region_is_right(&built, &way, own, shots.cameras.len()) {
+            timed_regions.push(region_points.len());
+            tasks.push(built.region_task(&way, own.counts()));
+        } else {
+            (point.status, point.reason) = (Status::Wrong, Some("other regions".to_owned()));
+        }
+        region_points.push(point);
     }
-    let cameras = cameras.len();
+    if let Some(way) = twin.map(|original: usize| &ways[original]) {
+        tasks.push(way.task(way.judged.counts()));
+    }
+    let cameras = shots.cameras.len();
     let schedule = Schedule::new(cameras, &tasks, input.protocol);
     Ok(Some(Prepared {
         precision: Precision {
@@ -348,14 +423,17 @@ pub fn prepare(
             twin: None,
             points,
             front: Vec::new(),
+            region_points,
             stability: Vec::new(),
         },
         plan: PointPlan {
             timed,
+            timed_regions,
+            twin,
             schedule,
             expected: tasks.into_iter().map(|c| c.expected).collect(),
         },
-        twin,
+        region_judged,
     }))
 }
 
@@ -371,17 +449,24 @@ pub fn time(
     plan: &PointPlan,
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<ProcessTimes>, BuildError> {
-    let cameras = cameras_of(input.path, input.most_cameras);
-    let built = Built::new(input, &cameras, None)?;
-    let ways = built.ways();
-    let planned = plan.timed.iter().zip(&plan.expected);
-    let tasks: Vec<TimedTask> = planned
-        .map(|(&point, expected)| ways[point].task(expected.clone()))
-        .collect();
+    let shots = Shots::of(input.path, input.most_cameras);
+    let cameras = shots.cameras.len();
+    let built = Built::new(input, &shots, None)?;
+    let (ways, region_ways) = (built.ways(), built.region_ways());
+    let mut expected = plan.expected.iter().cloned();
+    let mut next = || expected.next().unwrap_or_default();
+    let points = plan.timed.iter().map(|&point| &ways[point]);
+    let mut tasks: Vec<TimedTask> = points.map(|way| way.task(next())).collect();
+    let regions = plan
+        .timed_regions
+        .iter()
+        .map(|&region| &region_ways[region]);
+    tasks.extend(regions.map(|way| built.region_task(way, next())));
+    tasks.extend(plan.twin.map(|point| ways[point].task(next())));
     let timed = timed(&tasks, &plan.schedule, input.protocol, &|_| stop());
     Ok(timed.map(|timed| {
         let by_camera = timed.iter().map(|timed| match timed {
-            Ok(timed) => by_camera(timed, cameras.len()),
+            Ok(timed) => by_camera(timed, cameras),
             Err(_) => Vec::new(),
         });
         ProcessTimes {
@@ -396,41 +481,57 @@ impl Prepared {
     pub fn conclude(self, processes: &[ProcessTimes]) -> Precision {
         let Prepared {
             mut precision,
-            mut plan,
-            twin,
+            plan,
+            region_judged,
         } = self;
         let times = OverProcesses::of(processes);
-        if let Some(original) = twin {
-            plan.timed.pop();
-            precision.twin = times.ratio(plan.timed.len(), original);
+        let (points, regions) = (plan.timed.len(), plan.timed_regions.len());
+        let place = |twin| plan.timed.iter().position(|&point| point == twin);
+        if let Some(original) = plan.twin.and_then(place) {
+            precision.twin = times.ratio(points + regions, original);
         }
-        let points = &mut precision.points;
         for (task, &point) in plan.timed.iter().enumerate() {
-            points[point].time(&times, task, precision.items);
+            precision.points[point].time(&times, task, precision.items);
         }
-        let timed: Vec<usize> = (0..plan.timed.len())
+        for (task, &region) in (points..).zip(&plan.timed_regions) {
+            let point = &mut precision.region_points[region];
+            if let Some(wrong) = times.failure(task) {
+                (point.status, point.reason) = (wrong.status, wrong.reason.clone());
+            }
+            point.times = Times::of(&times, task, POINTS_PER_CAMERA as f64);
+        }
+        let timed: Vec<usize> = (0..points)
             .filter(|&task| times.failure(task).is_none())
             .collect();
         precision.stability = stability(&timed, processes, precision.cameras, precision.rounds);
-        points.sort_by(|a, b| {
-            let key = |p: &Point| p.query_ns.unwrap_or(f64::INFINITY);
-            key(a).total_cmp(&key(b))
-        });
-        mark_dominated(points, &|a, b| times.is_faster(a, b));
+        let points = &mut precision.points;
+        points.sort_by(|a, b| a.times.order().total_cmp(&b.times.order()));
+        mark_dominated(points, &times);
         precision.front = (0..points.len()).filter(|&i| points[i].on_front).collect();
+        region_search::conclude(&mut precision.region_points, &region_judged, &times);
         precision.processes = processes.len();
         precision
     }
 }
 
 /// Asks every query once; what was wrong, if anything.
-fn checked(index: &dyn DynIndex, judged: &Judged, items: usize) -> Result<(), Verdict> {
+fn checked(way: &Way, items: usize) -> Result<(), Verdict> {
     let mut trial = Trial::new(items);
-    for (view, answer) in judged.views.iter().zip(&judged.answers) {
+    for (n, answer) in way.judged.answers.iter().enumerate() {
         trial.expect(answer.iter().copied());
         trial
-            .ask(|out| index.query(view.as_any(), out))
+            .ask(|out| way.asked.see(way.judged, n, out))
             .map_err(|fault| Verdict::new(Status::of(&fault), fault.explained(|_| None)))?;
     }
     Ok(())
+}
+
+fn region_is_right(built: &Built, way: &RegionWay, own: &RegionJudged, cameras: usize) -> bool {
+    let mut out = Vec::new();
+    (0..cameras).all(|n| {
+        out.clear();
+        let (scene, queries) = (built.scene, &built.queries);
+        queries.ask(scene, way.numbers, way.index, n, &mut out);
+        own.is_right(n, &out)
+    })
 }

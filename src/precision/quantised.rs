@@ -1,10 +1,10 @@
-//! Items stored in few bits: bounds as whole numbers on a grid, rounded outward,
-//! under the tree of [`Bsp`]. Sixteen boxes take 96 bytes (u8) or 192 (u16)
-//! instead of 384. An experiment of the diagram, and no structure to choose.
+//! Items stored in few bits: bounds as whole numbers on a grid or as half floats,
+//! rounded outward, under the tree of [`Bsp`]. Sixteen boxes take 96 bytes (u8) or
+//! 192 (u16, half floats) instead of 384. An experiment of the diagram, and no
+//! structure to choose.
 
 use std::ops::{ControlFlow, Range};
 
-use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::arithmetic::rounding::round_up;
@@ -15,17 +15,104 @@ use crate::index::{
 };
 use crate::query::{Context, ItemId, QueryVolume};
 
-/// A whole number that a coordinate is stored as.
-pub trait Code: Copy + Default + Into<f32> + TryFrom<u32> + Send + Sync + 'static {
-    const MOST: u32;
+/// What a coordinate is stored as.
+pub trait Code: Copy + Default + Send + Sync + 'static {
+    /// Where code 0 lies on an axis and how far codes are apart, for bounds on it;
+    /// `None` if they do not fit.
+    fn line_over(low: f32, high: f32) -> Option<[f32; 2]>;
+
+    /// What a code stands for. Monotone in the code, as rounding is.
+    fn value(self, line: [f32; 2]) -> f32;
+
+    /// The first code not below `x` for an upper bound, else the last one not
+    /// above it.
+    fn outward(x: f32, line: [f32; 2], upper: bool) -> Self;
 }
 
-impl Code for u8 {
-    const MOST: u32 = u8::MAX as u32;
-}
+/// Whole numbers on a grid.
+macro_rules! grid_code {
+    ($($code:ty),*) => {$(
+        impl Code for $code {
+            fn line_over(low: f32, high: f32) -> Option<[f32; 2]> {
+                let most = f64::from(<$code>::MAX);
+                let mut step = round_up((f64::from(high) - f64::from(low)) / most);
+                // Rounding may leave the last line short of the bound.
+                while low + step * f32::from(<$code>::MAX) < high {
+                    step = step.next_up();
+                }
+                let last = low + step * f32::from(<$code>::MAX);
+                (last.is_finite() && step.is_finite()).then_some([low, step])
+            }
 
-impl Code for u16 {
-    const MOST: u32 = u16::MAX as u32;
+            #[inline(always)]
+            fn value(self, [low, step]: [f32; 2]) -> f32 {
+                low + step * f32::from(self)
+            }
+
+            fn outward(x: f32, line: [f32; 2], upper: bool) -> Self {
+                let steps = (f64::from(x) - f64::from(line[0])) / f64::from(line[1]);
+                // No step at all gives NaN, which becomes 0.
+                let mut code = steps.round() as $code;
+                while upper && code < <$code>::MAX && code.value(line) < x {
+                    code += 1;
+                }
+                while !upper && code > 0 && code.value(line) > x {
+                    code -= 1;
+                }
+                code
+            }
+        }
+    )*};
+}
+grid_code!(u8, u16);
+
+/// A half float of IEEE 754 (binary16): 11 bits, up to 65504.
+#[derive(Clone, Copy, Default)]
+pub struct F16(u16);
+
+/// The upper half of an f32 (bfloat16): 8 bits, and its range.
+#[derive(Clone, Copy, Default)]
+pub struct Bf16(u16);
+
+/// Half floats about the scene's origin, with no grid; the largest finite one is
+/// `$largest`.
+macro_rules! float_code {
+    ($($code:ident, $largest:literal, $decode:expr;)*) => {$(
+        impl Code for $code {
+            fn line_over(low: f32, high: f32) -> Option<[f32; 2]> {
+                let largest = $code($largest).value([0.0; 2]);
+                (-largest <= low && high <= largest).then_some([0.0; 2])
+            }
+
+            #[inline(always)]
+            fn value(self, _: [f32; 2]) -> f32 {
+                let decode: fn(u32) -> f32 = $decode;
+                f32::from_bits(decode(u32::from(self.0 & 0x7FFF)).to_bits() | u32::from(self.0 >> 15) << 31)
+            }
+
+            fn outward(x: f32, line: [f32; 2], upper: bool) -> Self {
+                // Codes of one sign are in the order of what they stand for: the
+                // last one not beyond the size of x, and one more away from zero.
+                let sign = u16::from(x.is_sign_negative()) << 15;
+                let (mut within, mut beyond) = (0, $largest + 1);
+                while beyond - within > 1 {
+                    let middle = within + (beyond - within) / 2;
+                    match $code(middle).value(line) <= x.abs() {
+                        true => within = middle,
+                        false => beyond = middle,
+                    }
+                }
+                let is_short = $code(within).value(line) < x.abs();
+                let grows = is_short && upper != x.is_sign_negative();
+                $code(within + u16::from(grows) | sign)
+            }
+        }
+    )*};
+}
+float_code! {
+    // The exponent is 112 too small; a subnormal one is scaled all the same.
+    F16, 0x7BFF, |bits| f32::from_bits(bits << 13) * f32::from_bits((127 + 112) << 23);
+    Bf16, 0x7F7F, |bits| f32::from_bits(bits << 16);
 }
 
 /// What the codes count from.
@@ -38,52 +125,12 @@ pub enum GridScope {
     Block,
 }
 
-/// Where code 0 lies and how far the codes are apart, per axis.
-#[derive(Clone, Copy, PartialEq, Debug)]
-struct Grid {
-    low: Vec3,
-    step: Vec3,
-}
+/// What codes count from, per axis: [`Code::line_over`].
+type Grid = [[f32; 2]; 3];
 
-impl Grid {
-    /// The grid of `most + 1` lines an axis over the bounds; `None` if it does
-    /// not fit f32.
-    fn over(bounds: &Aabb, most: u32) -> Option<Grid> {
-        let mut step = Vec3::ZERO;
-        for k in 0..3 {
-            let (low, high) = (bounds.min[k], bounds.max[k]);
-            let mut s = round_up((f64::from(high) - f64::from(low)) / f64::from(most));
-            // Rounding may leave the last line short of the bound.
-            while low + s * (most as f32) < high {
-                s = s.next_up();
-            }
-            step[k] = s;
-        }
-        let last = bounds.min + step * most as f32;
-        let low = bounds.min;
-        (last.is_finite() && step.is_finite()).then_some(Grid { low, step })
-    }
-
-    /// The coordinate of a code. Monotone in the code, as rounding is.
-    #[inline(always)]
-    fn line(&self, axis: usize, code: f32) -> f32 {
-        self.low[axis] + self.step[axis] * code
-    }
-
-    /// The first line not below `x` for an upper bound, else the last one not
-    /// above it.
-    fn code<C: Code>(&self, axis: usize, x: f32, upper: bool) -> C {
-        let steps = (f64::from(x) - f64::from(self.low[axis])) / f64::from(self.step[axis]);
-        // No step at all gives NaN, which becomes 0.
-        let mut code = (steps.round() as u32).min(C::MOST);
-        while upper && code < C::MOST && self.line(axis, code as f32) < x {
-            code += 1;
-        }
-        while !upper && code > 0 && self.line(axis, code as f32) > x {
-            code -= 1;
-        }
-        C::try_from(code).ok().unwrap_or_default()
-    }
+fn grid_over<C: Code>(bounds: &Aabb) -> Option<Grid> {
+    let line = |k: usize| C::line_over(bounds.min[k], bounds.max[k]);
+    Some([line(0)?, line(1)?, line(2)?])
 }
 
 /// Sixteen boxes as codes: rows min x, y, z, max x, y, z.
@@ -95,8 +142,8 @@ fn encode<C: Code>(boxes: &[Aabb], grid: &Grid) -> CodeBlock<C> {
     let mut rows = [[C::default(); LANES]; 6];
     for (lane, b) in boxes.iter().enumerate() {
         for k in 0..3 {
-            rows[k][lane] = grid.code(k, b.min[k], false);
-            rows[k + 3][lane] = grid.code(k, b.max[k], true);
+            rows[k][lane] = C::outward(b.min[k], grid[k], false);
+            rows[k + 3][lane] = C::outward(b.max[k], grid[k], true);
         }
     }
     rows
@@ -108,7 +155,7 @@ fn decode<C: Code>(codes: &CodeBlock<C>, grid: &Grid) -> BoxBlock {
     let mut rows = [[0.0; LANES]; 6];
     for (k, (row, codes)) in rows.iter_mut().zip(codes).enumerate() {
         for (x, &code) in row.iter_mut().zip(codes) {
-            *x = grid.line(k % 3, code.into());
+            *x = code.value(grid[k % 3]);
         }
     }
     BoxBlock::from_rows(rows)
@@ -176,7 +223,7 @@ impl<C: Code, V: QueryVolume> Leaves for InCodes<'_, C, V> {
 impl<C: Code> RegionIndex for Quantised<C> {
     const INFO: Info = Info::new(
         "quantised",
-        "experiment: the bsp tree with items stored as u8 or u16",
+        "experiment: the bsp tree with items stored in 8 or 16 bits",
         Kind::Tree,
         Origin::Ours,
     );
@@ -190,11 +237,11 @@ impl<C: Code> RegionIndex for Quantised<C> {
             GridScope::World => boxes.len().max(1),
             GridScope::Block => LANES,
         });
-        let grids = groups.map(|group| Grid::over(&Aabb::union_of(group), C::MOST));
+        let grids = groups.map(|group| grid_over::<C>(&Aabb::union_of(group)));
         let grids: Option<Vec<Grid>> = grids.collect();
         let grids = grids.ok_or_else(|| BuildError::Params {
             structure: Self::INFO.name,
-            reason: "the scene's extent does not fit f32".to_owned(),
+            reason: "the scene's extent does not fit these numbers".to_owned(),
         })?;
         let blocks = boxes.chunks(LANES).enumerate();
         let codes = blocks.map(|(i, boxes)| encode(boxes, &grids[i % grids.len()]));
@@ -232,6 +279,7 @@ mod tests {
     use super::*;
     use crate::geometry::{ConvexVolume, Plane};
     use crate::index::FrustumQuery;
+    use glam::Vec3;
     use proptest::prelude::*;
 
     fn items() -> Vec<Aabb> {
@@ -263,7 +311,7 @@ mod tests {
         let mut found = Vec::new();
         let _ = index.visible(&slab, &mut found);
         found.sort_unstable();
-        assert_eq!(found, those(&decoded, &slab), "{} {scope:?}", C::MOST);
+        assert_eq!(found, those(&decoded, &slab), "{scope:?}");
         let truly = those(&items, &slab);
         assert!(truly.iter().all(|id| found.binary_search(id).is_ok()));
         let mut here = Vec::new();
@@ -277,6 +325,8 @@ mod tests {
         let (bytes, words) = (excess::<u8>, excess::<u16>);
         assert!(bytes(GridScope::World) > words(GridScope::World));
         assert!(bytes(GridScope::Block) >= words(GridScope::Block));
+        let (long, short) = (excess::<F16>, excess::<Bf16>);
+        assert!(short(GridScope::World) > long(GridScope::World));
     }
 
     #[test]
@@ -284,6 +334,7 @@ mod tests {
         let huge = [Aabb::new(Vec3::splat(-3e38), Vec3::splat(3e38))];
         let world = GridScope::World;
         assert!(Quantised::<u16>::build(&Input::new(&huge), &world).is_err());
+        assert!(Quantised::<F16>::build(&Input::new(&huge), &world).is_err());
         let none = Quantised::<u16>::build(&Input::new(&[]), &world);
         assert_eq!(none.map(|q| q.memory().total()).ok(), Some(0));
         let point = Aabb::new(Vec3::ONE, Vec3::ONE);
@@ -291,20 +342,57 @@ mod tests {
         assert_eq!(one.decoded(1), [point]);
     }
 
-    fn check<C: Code>(boxes: &[Aabb]) {
+    /// `share` of a coordinate's size, beside the steps of a grid, is what a code may
+    /// be off by.
+    fn check<C: Code>(boxes: &[Aabb], share: f32) {
         let bounds = Aabb::union_of(boxes);
-        let grid = Grid::over(&bounds, C::MOST).unwrap();
+        let grid = grid_over::<C>(&bounds).unwrap();
         let block = decode(&encode::<C>(boxes, &grid), &grid);
         for (lane, b) in boxes.iter().enumerate() {
             let decoded = block.get(lane);
             assert!(decoded.contains(b), "{b:?} became {decoded:?}");
-            for k in 0..3 {
+            for (k, [_, step]) in grid.iter().enumerate() {
                 // Not a line too far, but for the rounding of the lines.
-                let slack = grid.step[k] * 1.01 + bounds.reach()[k] * 1e-6;
-                assert!(b.min[k] - decoded.min[k] <= slack, "{b:?} {decoded:?}");
-                assert!(decoded.max[k] - b.max[k] <= slack, "{b:?} {decoded:?}");
+                let slack = step * 1.01 + bounds.reach()[k] * 1e-6;
+                let slack = |x: f32| slack + share * x.abs();
+                assert!(
+                    b.min[k] - decoded.min[k] <= slack(b.min[k]),
+                    "{b:?} {decoded:?}"
+                );
+                assert!(
+                    decoded.max[k] - b.max[k] <= slack(b.max[k]),
+                    "{b:?} {decoded:?}"
+                );
             }
         }
+    }
+
+    /// Every half float is its own outward neighbour, and what lies between two is
+    /// rounded to the outer one.
+    #[test]
+    fn half_floats_are_rounded_outward_to_the_nearest() {
+        fn check<C: Code>(code: impl Fn(u16) -> C, largest: u16) {
+            let of = |x: f32, upper: bool| C::outward(x, [0.0; 2], upper).value([0.0; 2]);
+            for bits in 0..largest {
+                let (x, next) = (code(bits).value([0.0; 2]), code(bits + 1).value([0.0; 2]));
+                assert!(x < next, "{bits:#x}");
+                for x in [x, -x] {
+                    assert_eq!([of(x, true), of(x, false)], [x; 2], "{bits:#x}");
+                }
+                let between = x.next_up();
+                if between < next {
+                    assert_eq!([of(between, true), of(between, false)], [next, x]);
+                    assert_eq!([of(-between, true), of(-between, false)], [-x, -next]);
+                }
+            }
+        }
+        check(F16, 0x7BFF);
+        check(Bf16, 0x7F7F);
+        let known = [(0x3C00, 1.0), (0x7BFF, 65504.0), (0x0001, 5.960_464_5e-8)];
+        for (bits, value) in known {
+            assert_eq!(F16(bits).value([0.0; 2]), value);
+        }
+        assert_eq!(Bf16(0x4049).value([0.0; 2]), 3.140_625);
     }
 
     proptest! {
@@ -317,8 +405,14 @@ mod tests {
                 .iter()
                 .map(|&c| Aabb::around(Vec3::from(c), Vec3::splat(half)))
                 .collect();
-            check::<u8>(&boxes);
-            check::<u16>(&boxes);
+            check::<u8>(&boxes, 0.0);
+            check::<u16>(&boxes, 0.0);
+            check::<Bf16>(&boxes, 2f32.powi(-7));
+            let small: Vec<Aabb> = boxes
+                .iter()
+                .map(|b| Aabb::new(b.min * 0.03, b.max * 0.03))
+                .collect();
+            check::<F16>(&small, 2f32.powi(-10));
         }
     }
 }

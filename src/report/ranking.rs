@@ -3,7 +3,7 @@
 
 use super::matching::grouped;
 use super::{Report, ReportCell};
-use crate::measure::{Judged, Status};
+use crate::measure::{Judged, Metric, Status};
 
 /// Cells of one scene, path, cache state and culling test.
 pub struct Comparison<'r> {
@@ -105,7 +105,12 @@ impl<'r> Comparison<'r> {
 
     /// A metric that is the same in all cells, from the first that has it.
     pub fn of_any(&self, metric: &str) -> Option<f64> {
-        self.ranked.iter().find_map(|r| r.cell.value(metric))
+        self.metric_of_any(metric).map(|metric| metric.value)
+    }
+
+    /// The same with its interval.
+    pub fn metric_of_any(&self, metric: &str) -> Option<&'r Metric> {
+        self.ranked.iter().find_map(|r| r.cell.metrics.get(metric))
     }
 }
 

@@ -9,6 +9,7 @@ mod means;
 mod one_run;
 mod quantiles;
 mod ranking;
+mod rate;
 #[cfg(test)]
 mod simulation;
 mod slope;
@@ -17,13 +18,14 @@ mod student;
 mod trimmed;
 mod unpaired;
 
-pub use front::{Tradeoff, dominated_by};
+pub use front::{Dominated, Tradeoff, dominance, dominated_by};
 pub use holm::holm;
 pub use judgement::{Change, Judgement, judge, resolved};
 pub use means::{geometric_mean, interquartile_mean};
 pub use one_run::{Estimate, Shown, one_run, ratio};
 pub use quantiles::{median, quantile, sorted};
 pub use ranking::{ALPHA, Placed, is_less, ranks};
+pub use rate::{Rate, rate, shows_less, shows_less_in_sum};
 pub use slope::slope;
 pub use speeds::two_speeds;
 pub use trimmed::{Trimmed, moderate, trimmed_mean};

@@ -165,6 +165,25 @@ impl Truth {
         }
     }
 
+    /// About every item, by id.
+    pub fn verdicts(&self) -> &[Verdict] {
+        &self.verdicts
+    }
+
+    /// The items that an answer lacks though they are in, each with how deep it
+    /// reaches into the volume, world units. O(items).
+    pub fn misses(&self, items: &[Aabb], answer: &[ItemId]) -> Vec<(ItemId, f64)> {
+        let mut returned = vec![false; items.len()];
+        for &id in answer {
+            returned[id as usize] = true;
+        }
+        let verdicts = self.verdicts.iter().zip(returned).zip(0..);
+        let missed =
+            verdicts.filter(|((verdict, returned), _)| **verdict == Verdict::In && !returned);
+        let with_depth = missed.map(|(_, id)| (id, self.depth(id as usize, &items[id as usize])));
+        with_depth.collect()
+    }
+
     /// The errors of an answer (any order, no id twice) about the very items
     /// the truth was made of. O(items).
     pub fn errors(&self, items: &[Aabb], answer: &[ItemId]) -> ErrorCount {

@@ -177,13 +177,16 @@ fn tests_and_structures_have_their_rows() {
     let rows = array(&small()["test"], "rows");
     let names: Vec<&str> = rows.iter().filter_map(|r| r["test"].as_str()).collect();
     assert_eq!(names, ["sphere", "six-plane", "six-box", "exact"]);
-    let excess: Vec<f64> = rows.iter().map(|row| number(row, "excess")).collect();
+    let excess: Vec<f64> = rows
+        .iter()
+        .map(|row| number(&row["excess"], "value"))
+        .collect();
     assert!(
         excess.is_sorted_by(|a, b| a >= b) && excess[3] == 0.0,
         "{excess:?}"
     );
     for row in rows {
-        assert_eq!(number(row, "false_negative_ppm"), 0.0);
+        assert_eq!(number(&row["false_negative_ppm"], "value"), 0.0);
         let drawn = number(row, "false_positives_per_query") * 1000.0;
         let total = number(row, "query_ns") + drawn;
         assert!((number(row, "total_ns") - total).abs() < 1e-6 * total);

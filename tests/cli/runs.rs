@@ -323,10 +323,10 @@ fn what_storage_returns_too_much_is_told_only_where_there_is_any() {
         (table, works(folder.path(), &format!("report {out}")))
     };
     let (table, text) = run("far.csv", "beside.csv", "one");
-    let wanted = ", 200.000 % false positives (2/0/0 by storage/planes/test)\n";
+    let wanted = ", 200 % false positives (2/0/0 by storage/planes/test)\n";
     assert!(table.contains(wanted), "{table}");
     let wanted =
-        "False positives: 200.000 % of the visible items; 2/0/0 items by storage/planes/test.\n";
+        "False positives: 200 % of the visible items; 2/0/0 items by storage/planes/test.\n";
     assert!(text.contains(wanted), "{text}");
     // Nothing is visible, and something is returned.
     let (table, text) = run("far.csv", "away.csv", "two");
@@ -337,7 +337,7 @@ fn what_storage_returns_too_much_is_told_only_where_there_is_any() {
     let (table, text) = run("near.csv", "before.csv", "three");
     assert!(!table.contains("by storage"), "{table}");
     assert!(
-        text.contains("False positives: 0.000 % of the visible items.\n"),
+        text.contains("False positives: 0 % of the visible items.\n"),
         "{text}"
     );
 }

@@ -1,0 +1,259 @@
+//! Error against what makes a camera ill-conditioned: how far from zero the world
+//! lies, how small it is, far/near, field of view, aspect, and how nearly up is
+//! the direction of view. Every derivation of the planes and every kind of numbers
+//! is asked for the six-plane test; boxes are f32 world coordinates, on purpose,
+//! and nothing is rebased.
+
+use glam::{DVec3, Vec3};
+use serde::{Serialize, Serializer};
+
+use super::plane_test::{Names, PlaneTest};
+use crate::camera::{Camera, Frame, Lens, PLANE_METHODS, PlaneOptions, Surroundings};
+use crate::culling::{Arithmetic, Culling};
+use crate::geometry::Aabb;
+use crate::query::ItemId;
+use crate::scene::Dice;
+use crate::statistics::{Rate, rate};
+use crate::verify::{ErrorCount, Truth};
+
+named! {
+    /// What is swept over.
+    #[derive(Clone, Copy, PartialEq, Eq, Debug)]
+    pub enum Sweep, SWEEPS {
+        Offset = "offset", "distance of the world from zero along each axis";
+        Scale = "scale", "size of the world, depth / 100";
+        FarOverNear = "far/near", "far / near";
+        FieldOfView = "fov", "vertical field of view, degrees";
+        Aspect = "aspect", "width / height";
+        Up = "up", "angle between up and the direction of view, rad";
+    }
+}
+
+impl Sweep {
+    /// What the others are while one is swept over is among them.
+    pub fn values(self) -> [f64; 5] {
+        match self {
+            Sweep::Offset => [0.0, 1e4, 1e5, 1e6, 1e7],
+            Sweep::Scale => [1.0, 1e-20, 1e-30, 1e-36, 1e-38],
+            Sweep::FarOverNear => [10, 16, 20, 24, 26].map(|power| (1u32 << power).into()),
+            Sweep::FieldOfView => [1e-3, 1.0, 60.0, 150.0, 179.9],
+            Sweep::Aspect => [1e-4, 1e-2, 1.0, 1e2, 1e4],
+            Sweep::Up => [1.0, 1e-4, 1e-8, 1e-11, 1e-14],
+        }
+    }
+}
+
+/// One plane test at one value of a sweep.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct SweepRow {
+    #[serde(serialize_with = "by_name")]
+    pub sweep: Sweep,
+    pub value: f64,
+    #[serde(flatten)]
+    pub names: Names,
+    /// Null if the planes cannot be made.
+    pub false_negative_ppm: Option<Rate>,
+    pub excess: Option<Rate>,
+    #[serde(flatten)]
+    pub errors: ErrorCount,
+    pub refused: Option<String>,
+}
+
+fn by_name<S: Serializer>(sweep: &Sweep, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(sweep.name())
+}
+
+/// Depth of the views of a world of size 1, and how many boxes each camera looks
+/// at.
+const DEPTH: f64 = 100.0;
+const BOXES: usize = 500;
+
+/// The f32 default, f64 and f32 about the eye, every derivation and all other
+/// numbers without epsilon.
+fn tests() -> Vec<PlaneTest> {
+    let bare = |arithmetic, method| {
+        PlaneTest::Culling(Culling {
+            arithmetic,
+            planes: PlaneOptions {
+                method,
+                epsilon: 0.0,
+            },
+            ..Culling::default()
+        })
+    };
+    let method = PlaneOptions::default().method;
+    let mut tests = vec![PlaneTest::Culling(Culling::default())];
+    tests.extend([Arithmetic::F64, Arithmetic::F32Relative].map(|a| bare(a, method)));
+    tests.extend(PLANE_METHODS.map(|(method, ..)| bare(Arithmetic::F32, method)));
+    tests.extend(PlaneTest::others());
+    tests
+}
+
+/// Judges `cameras` random cameras at every value with every test; the same
+/// cameras for each. `None` if stopped.
+pub fn sweep(
+    sweep: Sweep,
+    cameras: usize,
+    seed: u64,
+    stop: &dyn Fn() -> bool,
+) -> Option<Vec<SweepRow>> {
+    let tests = tests();
+    let mut rows = Vec::new();
+    for value in sweep.values() {
+        let mut own: Vec<Judged> = tests.iter().map(|_| Judged::default()).collect();
+        let mut dice = Dice::new(seed);
+        for _ in 0..cameras {
+            if stop() {
+                return None;
+            }
+            judge(&mut dice, sweep, value, &tests, &mut own);
+        }
+        let judged = tests.iter().zip(own);
+        rows.extend(judged.map(|(test, judged)| judged.row(sweep, value, test)));
+    }
+    Some(rows)
+}
+
+/// What one test gets wrong, by camera.
+#[derive(Default)]
+struct Judged {
+    errors: Vec<ErrorCount>,
+    refused: Option<String>,
+}
+
+impl Judged {
+    fn row(self, sweep: Sweep, value: f64, test: &PlaneTest) -> SweepRow {
+        let rate_of = |count: fn(&ErrorCount) -> u64| {
+            let errors = self.errors.iter();
+            let clusters = errors.map(|e| [count(e) as f64, e.visible as f64]);
+            rate(&clusters.collect::<Vec<_>>()).filter(|_| self.refused.is_none())
+        };
+        let mut errors = ErrorCount::default();
+        self.errors.iter().for_each(|own| errors += *own);
+        SweepRow {
+            sweep,
+            value,
+            names: test.names(),
+            false_negative_ppm: rate_of(|e| e.false_negatives).map(|share| share.per(1e6)),
+            excess: rate_of(|e| e.false_positives),
+            errors,
+            refused: self.refused,
+        }
+    }
+}
+
+/// A camera and the size of its world.
+fn camera_at(dice: &mut Dice, sweep: Sweep, value: f64) -> Option<(Camera, f64)> {
+    let of = |own: Sweep, otherwise: f64| if own == sweep { value } else { otherwise };
+    let scale = of(Sweep::Scale, 1.0);
+    let centre = DVec3::splat(of(Sweep::Offset, 0.0));
+    let eye = centre + dice.normal3() * 10.0 * scale;
+    let (forward, beside) = (dice.normal3().normalize(), dice.normal3());
+    let across = forward.cross(beside).normalize();
+    let angle = of(Sweep::Up, 1.0);
+    let up = forward * libm::cos(angle) + across * libm::sin(angle);
+    let depth = DEPTH * scale;
+    let near = depth / of(Sweep::FarOverNear, 1000.0);
+    let (fovy, aspect) = (of(Sweep::FieldOfView, 60.0), of(Sweep::Aspect, 16.0 / 9.0));
+    let lens = Lens::perspective(fovy, aspect, near, Some(depth)).ok()?;
+    let frame = Frame::looking_along(eye, forward, up).ok()?;
+    Some((Camera { frame, lens }, scale))
+}
+
+/// Boxes in and about the view, no larger than a twentieth of what it is narrow
+/// by. As a world in f32 has them: rounded to its grid, and exact from there on.
+fn boxes_about(dice: &mut Dice, camera: &Camera, scale: f64) -> Vec<Aabb> {
+    let Lens::Perspective { aspect, .. } = camera.lens else {
+        return Vec::new();
+    };
+    let depth = DEPTH * scale;
+    let slope = camera.lens.height_at(1.0).unwrap_or(1.0) / 2.0;
+    let narrow = depth * slope.min(slope * aspect).min(1.0);
+    let frame = &camera.frame;
+    let one = |dice: &mut Dice| {
+        let half = dice.between(0.005, 0.05) * narrow;
+        let ahead = dice.between(0.0, 1.1) * depth;
+        let mut beside = |slope: f64| dice.between(-1.2, 1.2) * (slope * ahead + 2.0 * half);
+        let (x, y) = (beside(slope * aspect), beside(slope));
+        let at = frame.eye + frame.u() * x + frame.v() * y - frame.n() * ahead;
+        Aabb::around(at.as_vec3(), Vec3::splat(half as f32))
+    };
+    (0..BOXES).map(|_| one(dice)).collect()
+}
+
+fn judge(dice: &mut Dice, sweep: Sweep, value: f64, tests: &[PlaneTest], all: &mut [Judged]) {
+    let Some((camera, scale)) = camera_at(dice, sweep, value) else {
+        return;
+    };
+    let boxes = boxes_about(dice, &camera, scale);
+    let around = Surroundings {
+        origin: DVec3::ZERO,
+        reach: Aabb::union_of(&boxes).reach(),
+    };
+    let Some(truth) = Truth::of_camera(&camera, DVec3::ZERO, &boxes) else {
+        return;
+    };
+    for (test, judged) in tests.iter().zip(all) {
+        match test.view(&camera, &around) {
+            Ok(view) => {
+                let seen = boxes.iter().zip(0..).filter(|(b, _)| view.sees(b));
+                let answer: Vec<ItemId> = seen.map(|(_, id)| id).collect();
+                judged.errors.push(truth.errors(&boxes, &answer));
+            }
+            Err(error) => judged.refused = Some(error.to_string()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of<'r>(rows: &'r [SweepRow], value: f64, arithmetic: &str, planes: &str) -> &'r SweepRow {
+        let named = |row: &&SweepRow| {
+            let names = &row.names;
+            let is_bare = names.epsilon == 0.0;
+            (names.arithmetic, names.planes, row.value) == (arithmetic, planes, value) && is_bare
+        };
+        rows.iter().find(named).expect(arithmetic)
+    }
+
+    #[test]
+    fn the_default_and_intervals_lose_nothing_anywhere() {
+        for (which, name, _) in SWEEPS {
+            let rows = sweep(which, 4, 3, &|| false).unwrap();
+            assert_eq!(rows.len(), 5 * tests().len());
+            for row in &rows {
+                let is_safe = row.names.epsilon > 0.0 && row.names.arithmetic == "f32"
+                    || row.names.arithmetic == "interval";
+                let lost = row.errors.false_negatives + row.errors.touch_dropped;
+                assert!(!is_safe || lost == 0, "{row:?}");
+                // There is something to lose, and something to return too much.
+                let seen = row.refused.is_some() || row.errors.visible > 100;
+                assert!(
+                    seen && row.errors.visible < 4 * BOXES as u64,
+                    "{name} {row:?}"
+                );
+            }
+        }
+        assert_eq!(sweep(Sweep::Up, 1, 1, &|| true), None);
+    }
+
+    #[test]
+    fn each_sweep_finds_what_it_is_there_for() {
+        let lost = |row: &SweepRow| row.errors.false_negatives;
+        let rows = sweep(Sweep::FarOverNear, 6, 1, &|| false).unwrap();
+        let [least, .., large, most] = Sweep::FarOverNear.values();
+        assert!(lost(of(&rows, large, "f32", "gh-gl-f32")) > 0);
+        assert!(of(&rows, most, "f32", "gh-gl-f32").refused.is_some());
+        assert_eq!(lost(of(&rows, least, "f32", "frame")), 0);
+        let rows = sweep(Sweep::Scale, 6, 1, &|| false).unwrap();
+        let extra = |arithmetic| of(&rows, 1e-38, arithmetic, "frame").errors.false_positives;
+        assert!(extra("f32-flush") > 2 * extra("f32").max(10));
+        let rows = sweep(Sweep::Offset, 6, 1, &|| false).unwrap();
+        assert!(lost(of(&rows, 1e6, "f32", "gh-gl-f32")) > 0);
+        for exact in ["f64", "double-double", "interval"] {
+            assert_eq!(lost(of(&rows, 1e7, exact, "frame")), 0);
+        }
+    }
+}

@@ -1,0 +1,234 @@
+//! Rates of rare things, such as false positives per visible item, with their
+//! sampling error. What is seen by one camera is one observation: its items see
+//! the same planes and err together.
+
+use serde::{Deserialize, Serialize};
+
+use super::student;
+use super::trimmed::{Trimmed, paired_difference};
+
+/// Level of the intervals shown.
+const LEVEL: f64 = 0.95;
+/// Level at which [`Rate::elsewhere`] holds.
+const ELSEWHERE: f64 = 0.99999;
+/// Nothing seen in n: below 3/n at 95 %, because 0.95 = 1 - exp(-3).
+const NOTHING_SEEN: f64 = 3.0;
+
+/// Events per unit, with how well the sample tells it.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+pub struct Rate {
+    pub value: f64,
+    /// The 95 % interval; null from one cluster alone.
+    pub lower: Option<f64>,
+    pub upper: Option<f64>,
+    /// How far another sample of as many clusters may be from `value`: both are
+    /// samples, and 99.999 % of all pairs come nearer. Null from one cluster.
+    pub elsewhere: Option<f64>,
+}
+
+impl Rate {
+    /// The same for another number of units, such as a million.
+    pub fn per(self, units: f64) -> Rate {
+        let times = |x: Option<f64>| x.map(|x| x * units);
+        Rate {
+            value: self.value * units,
+            lower: times(self.lower),
+            upper: times(self.upper),
+            elsewhere: times(self.elsewhere),
+        }
+    }
+}
+
+/// The rate of clusters, each with its events and its units; `None` without
+/// units.
+///
+/// The ratio of the sums, with the standard error of a ratio of cluster totals,
+/// `n/(n-1) sum (y - R x)^2 / (sum x)^2`, and Student's t of n - 1 degrees of
+/// freedom (Cochran 1977, "Sampling Techniques", 3rd ed., secs. 2.11 and 9A.1).
+/// Where nothing was seen in `x` units the upper end is 3/x (Hanley and
+/// Lippman-Hand 1983, "If nothing goes wrong, is everything all right?", JAMA
+/// 249, p. 1743), and it is never nearer than that: units count as independent
+/// there, since nothing says otherwise.
+///
+/// Two samples of the same rate differ by `d` with `d^2 < z^2 (s^2 + s'^2)`. The
+/// other's variance is `s^2 + d w` if all it has more are events of weight `w`, and
+/// what solves that, `d = (z^2 w + sqrt(z^4 w^2 + 8 z^2 s^2)) / 2`, is `elsewhere`:
+/// for many events the usual sqrt(2) standard errors by `z`, for none `z^2`
+/// events.
+///
+/// ```
+/// use cullbench::statistics::rate;
+/// let found = rate(&[[2.0, 100.0], [4.0, 100.0], [3.0, 100.0]]).unwrap();
+/// assert_eq!(found.value, 0.03);
+/// let nothing = rate(&[[0.0, 100.0], [0.0, 200.0]]).unwrap();
+/// assert_eq!(nothing.upper, Some(0.01));
+/// ```
+pub fn rate(clusters: &[[f64; 2]]) -> Option<Rate> {
+    let sum = |k: usize| clusters.iter().map(|c| c[k]).sum::<f64>();
+    let (events, units) = (sum(0), sum(1));
+    let value = events / units;
+    if !(units > 0.0 && value.is_finite()) {
+        return None;
+    }
+    let count = clusters.len() as f64;
+    let residuals = clusters.iter().map(|[y, x]| (y - value * x).powi(2));
+    let error = (count / (count - 1.0) * residuals.sum::<f64>()).sqrt() / units;
+    let margin = |level: f64| student::quantile(0.5 + level / 2.0, count - 1.0) * error;
+    let least = NOTHING_SEEN / units;
+    // The weight of one event: as many as come together weigh one.
+    let together = (error * units).powi(2) / events.max(1.0);
+    let square = student::quantile(0.5 + ELSEWHERE / 2.0, count - 1.0).powi(2);
+    let one = square * together.max(1.0) / units;
+    let elsewhere = (one + (one * one + 8.0 * square * error * error).sqrt()) / 2.0;
+    let several = |x: f64| (clusters.len() > 1).then_some(x);
+    Some(Rate {
+        value,
+        lower: several((value - margin(LEVEL)).max(0.0)),
+        upper: several(value + margin(LEVEL).max(least)),
+        elsewhere: several(elsewhere),
+    })
+}
+
+/// Whether the clusters, paired by index, show the mean of `a` to be below that
+/// of `b`: Student's paired t, two-sided at `alpha`. From one cluster, or where
+/// all differences are the same, the order of the means decides.
+///
+/// The plain mean and no trimmed one: what is rare lies in few clusters, and
+/// those a trimmed mean leaves out.
+pub fn shows_less(a: &[f64], b: &[f64], alpha: f64) -> bool {
+    is_above_zero(&[plain_difference(a, b)], alpha)
+}
+
+/// Whether two independent samples, each paired by index, show the sum of their
+/// means to be less for `a` than for `b`: `times` over processes by Yuen's paired
+/// difference of trimmed means, `counts` over clusters as in [`shows_less`], with
+/// the degrees of freedom of Welch. Under three processes the order of the sums
+/// decides.
+pub fn shows_less_in_sum(times: [&[f64]; 2], counts: [&[f64]; 2], alpha: f64) -> bool {
+    let counts = plain_difference(counts[0], counts[1]);
+    match paired_difference(times[0], times[1]) {
+        Some(times) => is_above_zero(&[times, counts], alpha),
+        None => plain_difference(times[0], times[1]).mean + counts.mean > 0.0,
+    }
+}
+
+/// `b - a`, without an error where there is but one cluster.
+fn plain_difference(a: &[f64], b: &[f64]) -> Trimmed {
+    let differences: Vec<f64> = b.iter().zip(a).map(|(b, a)| b - a).collect();
+    let count = differences.len() as f64;
+    let mean = differences.iter().sum::<f64>() / count;
+    let squares: f64 = differences.iter().map(|d| (d - mean).powi(2)).sum();
+    let error = (squares / (count * (count - 1.0))).sqrt();
+    Trimmed {
+        mean,
+        standard_error: if error > 0.0 { error } else { 0.0 },
+        df: (count - 1.0).max(1.0),
+        count: differences.len(),
+    }
+}
+
+fn is_above_zero(parts: &[Trimmed], alpha: f64) -> bool {
+    let sum = |of: fn(&Trimmed) -> f64| parts.iter().map(of).sum::<f64>();
+    let (mean, square) = (sum(|p| p.mean), sum(|p| p.standard_error.powi(2)));
+    if square == 0.0 {
+        return mean > 0.0;
+    }
+    let df = square.powi(2) / sum(|p| p.standard_error.powi(4) / p.df);
+    mean > student::quantile(1.0 - alpha / 2.0, df) * square.sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64;
+
+    #[test]
+    fn the_standard_error_is_that_of_a_ratio_of_totals() {
+        // Residuals 0, 1 and -1: sqrt(3/2 * 2) / 60, by t(2) = 4.302653.
+        let found = rate(&[[1.0, 10.0], [3.0, 20.0], [2.0, 30.0]]).unwrap();
+        assert!((found.value - 0.1).abs() < 1e-15);
+        let margin = 4.302_652_73 * 0.028_867_513;
+        assert!((found.upper.unwrap() - 0.1 - margin).abs() < 1e-8);
+        assert_eq!(found.lower, Some(0.0));
+    }
+
+    #[test]
+    fn one_cluster_has_no_interval_and_no_units_no_rate() {
+        let one = rate(&[[1.0, 4.0]]).unwrap();
+        assert_eq!((one.value, one.lower, one.upper), (0.25, None, None));
+        assert_eq!(rate(&[[1.0, 0.0], [0.0, 0.0]]), None);
+        assert_eq!(rate(&[]), None);
+        // Nothing seen, and a single event: never nearer than 3/n.
+        let rare = rate(&[[1.0, 5e5], [0.0, 5e5]].map(|c| c)).unwrap();
+        assert!(rare.upper.unwrap() >= 4e-6);
+        // Of many clusters none with an event: z^2 / n, z = 4.42.
+        let elsewhere = rate(&[[0.0, 1e3]; 5000]).unwrap().elsewhere.unwrap();
+        assert!((elsewhere * 5e6 - 19.5).abs() < 0.1, "{elsewhere}");
+    }
+
+    /// Cameras with rates of their own, as frusta of other directions have them.
+    fn sample(seed: u64, cameras: usize) -> Vec<[f64; 2]> {
+        let mut random = Pcg64::seed_from_u64(seed);
+        let one = |_| {
+            let own = 0.2 + 0.2 * random.random::<f64>();
+            let units = 40 + (random.random::<f64>() * 40.0) as usize;
+            let events = (0..units).filter(|_| random.random::<f64>() < own);
+            [events.count() as f64, units as f64]
+        };
+        (0..cameras).map(one).collect()
+    }
+
+    #[test]
+    fn intervals_hold_the_truth_and_other_samples() {
+        let rates: Vec<Rate> = (0..2000)
+            .map(|seed| rate(&sample(seed, 30)).unwrap())
+            .collect();
+        let holds = |r: &&Rate| r.lower.unwrap() <= 0.3 && 0.3 <= r.upper.unwrap();
+        let held = rates.iter().filter(holds).count();
+        assert!((1860..=1940).contains(&held), "{held} of 2000");
+        let none_apart = |rates: &[Rate]| {
+            let off = |pair: &[Rate]| (pair[0].value - pair[1].value).abs();
+            let pairs = rates.chunks(2);
+            pairs
+                .map(|pair| off(pair) / pair[0].elsewhere.unwrap())
+                .fold(0.0, f64::max)
+                <= 1.0
+        };
+        assert!(none_apart(&rates));
+        // Rare ones as well: two in all, on the mean.
+        let mut random = Pcg64::seed_from_u64(7);
+        let mut rare = || [f64::from(u8::from(random.random::<f64>() < 0.02)), 50.0];
+        let rare: Vec<Rate> = (0..2000)
+            .map(|_| rate(&(0..100).map(|_| rare()).collect::<Vec<_>>()).unwrap())
+            .collect();
+        assert!(none_apart(&rare));
+    }
+
+    #[test]
+    fn what_is_less_in_most_clusters_is_shown_and_chance_is_not() {
+        let b = [5.0, 7.0, 6.0, 9.0, 5.0, 8.0];
+        let a = b.map(|x| x - 1.0 - 0.1 * (x - 6.0));
+        assert!(shows_less(&a, &b, 0.05) && !shows_less(&b, &a, 0.05));
+        // One cluster of six tells nothing.
+        let mut one = [0.0; 6];
+        one[3] = 9.0;
+        assert!(!shows_less(&[0.0; 6], &one, 0.05));
+        assert!(shows_less(&[0.0; 6], &[1.0; 6], 0.05) && !shows_less(&b, &b, 0.05));
+        assert!(shows_less(&[1.0], &[2.0], 0.05) && !shows_less(&[], &[], 0.05));
+    }
+
+    #[test]
+    fn a_sum_is_as_uncertain_as_its_parts() {
+        let times = |base: f64| [0.0, 1.0, -1.0, 0.5, -0.5].map(|off| base + off / 100.0);
+        let (fast, slow) = (times(90.0), times(100.0));
+        let less = |a: &[f64], b: &[f64]| shows_less_in_sum([&fast, &slow], [a, b], 0.05);
+        // Drawn for certain, and too little to make up for it; then enough.
+        assert!(less(&[5.0; 4], &[0.0; 4]) && !less(&[15.0; 4], &[0.0; 4]));
+        // The same on the mean, all of it at one camera.
+        assert!(!less(&[20.0, 0.0, 0.0, 0.0], &[0.0; 4]));
+        // One process, one camera: the order decides.
+        assert!(shows_less_in_sum([&[1.0], &[3.0]], [&[1.0], &[0.0]], 0.05));
+        assert!(!shows_less_in_sum([&[1.0], &[3.0]], [&[3.0], &[0.0]], 0.05));
+    }
+}
