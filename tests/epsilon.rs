@@ -16,11 +16,11 @@ use glam::DVec3;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-struct Dice(Pcg64);
+struct SeededRng(Pcg64);
 
-impl Dice {
+impl SeededRng {
     fn new(seed: u64) -> Self {
-        Dice(Pcg64::seed_from_u64(seed))
+        SeededRng(Pcg64::seed_from_u64(seed))
     }
 
     fn between(&mut self, low: f64, high: f64) -> f64 {
@@ -64,27 +64,27 @@ const KINDS: [&str; 5] = [
 
 /// A camera that makes rounding as bad as it gets: `scale` is the depth of
 /// its volume, `offset` its distance from the scene's zero.
-fn adversarial(dice: &mut Dice, kind: &str, offset: f64) -> Setup {
-    let scale = dice.log_between(1e-3, 1e6);
-    let eye = dice.direction() * offset + dice.direction() * scale * dice.between(0.0, 1.0);
+fn adversarial(rng: &mut SeededRng, kind: &str, offset: f64) -> Setup {
+    let scale = rng.log_between(1e-3, 1e6);
+    let eye = rng.direction() * offset + rng.direction() * scale * rng.between(0.0, 1.0);
     let (forward, up) = loop {
-        let (forward, up) = (dice.direction(), dice.direction());
+        let (forward, up) = (rng.direction(), rng.direction());
         if forward.cross(up).length() > 1e-2 {
             break (forward, up);
         }
     };
-    let near = scale / dice.log_between(1.1, 1e6);
-    let fovy_deg = dice.between(5.0, 140.0);
-    let aspect = dice.between(0.3, 3.0);
+    let near = scale / rng.log_between(1.1, 1e6);
+    let fovy_deg = rng.between(5.0, 140.0);
+    let aspect = rng.between(0.3, 3.0);
     let y = near * (fovy_deg.to_radians() / 2.0).tan();
     let far = (!kind.ends_with("infinite far")).then_some(scale);
     let kind = match kind {
         "orthographic" => Kind::Orthographic {
-            height: scale * dice.log_between(1e-2, 1.0),
+            height: scale * rng.log_between(1e-2, 1.0),
             aspect,
         },
         "off-axis" | "off-axis, infinite far" => {
-            let (x, dx, dy) = (y * aspect, dice.between(-3.0, 3.0), dice.between(-3.0, 3.0));
+            let (x, dx, dy) = (y * aspect, rng.between(-3.0, 3.0), rng.between(-3.0, 3.0));
             Kind::OffAxis {
                 window: [
                     x * (dx - 1.0),
@@ -108,16 +108,16 @@ fn adversarial(dice: &mut Dice, kind: &str, offset: f64) -> Setup {
 
 /// A point on the surface and the direction back inside: on a face, an edge
 /// or a corner.
-fn on_surface(dice: &mut Dice, view: &View) -> (DVec3, DVec3) {
+fn on_surface(rng: &mut SeededRng, view: &View) -> (DVec3, DVec3) {
     let far = view.far_or(DEEP);
     let mut at = [
-        dice.between(0.0, 1.0),
-        dice.between(0.0, 1.0),
-        dice.log_between(view.near, far),
+        rng.between(0.0, 1.0),
+        rng.between(0.0, 1.0),
+        rng.log_between(view.near, far),
     ];
     let mut inward = DVec3::ZERO;
-    for _ in 0..dice.pick(&[1, 1, 1, 2, 3]) {
-        let face = dice.pick(view.faces());
+    for _ in 0..rng.pick(&[1, 1, 1, 2, 3]) {
+        let face = rng.pick(view.faces());
         let (axis, place) = match face {
             FrustumPlane::Left => (0, 0.0),
             FrustumPlane::Right => (0, 1.0),
@@ -157,8 +157,8 @@ fn just_inside(view: &View, on: DVec3, inward: DVec3) -> Option<DVec3> {
 
 /// A visible point whose coordinates about zero are f32 values, one f32 step
 /// from being invisible: the worst there is, nothing is left to round.
-fn just_inside_f32(dice: &mut Dice, view: &View, on: DVec3, inward: DVec3) -> Option<DVec3> {
-    let axis = dice.pick(&[0, 1, 2]);
+fn just_inside_f32(rng: &mut SeededRng, view: &View, on: DVec3, inward: DVec3) -> Option<DVec3> {
+    let axis = rng.pick(&[0, 1, 2]);
     let mut p = on.as_vec3();
     let step = |x: f32, up: bool| if up { x.next_up() } else { x.next_down() };
     for _ in 0..64 {
@@ -179,10 +179,10 @@ fn just_inside_f32(dice: &mut Dice, view: &View, on: DVec3, inward: DVec3) -> Op
 /// A box that has `p` as the corner (or on the face or edge, where it is flat)
 /// farthest inside, extends away from the volume, and is rounded outward to
 /// f32 about `origin`.
-fn touching(dice: &mut Dice, p: DVec3, inward: DVec3, size: f64, origin: DVec3) -> Aabb {
+fn touching(rng: &mut SeededRng, p: DVec3, inward: DVec3, size: f64, origin: DVec3) -> Aabb {
     let (mut min, mut max) = (p, p);
     for axis in 0..3 {
-        let size = dice.pick(&[0.0, 1.0, 1.0, 1.0]) * dice.log_between(size * 1e-6, size);
+        let size = rng.pick(&[0.0, 1.0, 1.0, 1.0]) * rng.log_between(size * 1e-6, size);
         if inward[axis] >= 0.0 {
             min[axis] -= size;
         } else {
@@ -204,26 +204,26 @@ struct Scene {
     boxes: Vec<Aabb>,
 }
 
-fn scene(dice: &mut Dice, kind: &str, offset: f64, count: usize) -> Scene {
-    let setup = adversarial(dice, kind, offset);
+fn scene(rng: &mut SeededRng, kind: &str, offset: f64, count: usize) -> Scene {
+    let setup = adversarial(rng, kind, offset);
     let view = setup.view();
     // Scene-local coordinates about zero, or about a point near the camera.
-    let origin = match dice.pick(&[0, 0, 1]) {
+    let origin = match rng.pick(&[0, 0, 1]) {
         0 => DVec3::ZERO,
         _ => (setup.eye * 0.9).round(),
     };
     let size = view.far_or(DEEP);
     let mut boxes = Vec::with_capacity(count);
     for i in 0..count {
-        let (on, inward) = on_surface(dice, &view);
+        let (on, inward) = on_surface(rng, &view);
         let p = if i % 2 == 0 && origin == DVec3::ZERO {
-            just_inside_f32(dice, &view, on, inward)
+            just_inside_f32(rng, &view, on, inward)
         } else {
             just_inside(&view, on, inward)
         };
         if let Some(p) = p {
             assert!(surely_inside(&view, p));
-            boxes.push(touching(dice, p, inward, size, origin));
+            boxes.push(touching(rng, p, inward, size, origin));
         }
     }
     Scene {
@@ -252,7 +252,7 @@ impl Scene {
 
 #[test]
 fn no_box_that_holds_a_visible_point_is_ever_dropped() {
-    let mut dice = Dice::new(0x0065_7073);
+    let mut rng = SeededRng::new(0x0065_7073);
     let default = PlaneOptions::default();
     assert_eq!((default.method, default.epsilon), (PlaneMethod::Frame, 8.0));
     let with = |epsilon| PlaneOptions { epsilon, ..default };
@@ -262,7 +262,7 @@ fn no_box_that_holds_a_visible_point_is_ever_dropped() {
     for offset in [0.0, 1e4, 1e6] {
         for kind in KINDS {
             for _ in 0..100 {
-                let scene = scene(&mut dice, kind, offset, 200);
+                let scene = scene(&mut rng, kind, offset, 200);
                 let dropped = scene.dropped(&default);
                 assert!(
                     dropped.is_empty(),
@@ -294,16 +294,16 @@ fn no_box_that_holds_a_visible_point_is_ever_dropped() {
 
 #[test]
 fn views_about_the_eye_drop_none_of_them_either() {
-    let mut dice = Dice::new(31);
+    let mut rng = SeededRng::new(31);
     let (mut bare, mut rounded_near_zero, mut boxes) = (0, 0, 0);
     for offset in [0.0, 1e4, 1e6] {
         for kind in KINDS {
             for _ in 0..100 {
-                let scene = scene(&mut dice, kind, offset, 100);
+                let scene = scene(&mut rng, kind, offset, 100);
                 let (camera, around) = (scene.setup.camera(), scene.surroundings());
                 let about = |c| camera.relative_volume(&[], c, &around).unwrap();
                 let (safe, tight) = (about(8.0), about(0.0));
-                let wide = camera.wide_volume(&around).unwrap();
+                let wide = camera.convex_volume_f64(&around).unwrap();
                 for b in &scene.boxes {
                     assert!(safe.sees(b), "{b:?}; {:?}, {around:?}", scene.setup);
                     bare += usize::from(!tight.sees(b));
@@ -321,8 +321,8 @@ fn views_about_the_eye_drop_none_of_them_either() {
 
 #[test]
 fn about_the_eye_the_margin_does_not_grow_with_the_distance() {
-    let mut dice = Dice::new(37);
-    let mut camera = scene(&mut dice, "perspective", 0.0, 1).setup.camera();
+    let mut rng = SeededRng::new(37);
+    let mut camera = scene(&mut rng, "perspective", 0.0, 1).setup.camera();
     let margin = |camera: &cullbench::camera::Camera, relative: bool| -> f64 {
         let at = |c| -> Vec<f64> {
             let around = Surroundings::default();
@@ -352,10 +352,10 @@ fn about_the_eye_the_margin_does_not_grow_with_the_distance() {
 
 #[test]
 fn structures_drop_none_of_them_either() {
-    let mut dice = Dice::new(17);
+    let mut rng = SeededRng::new(17);
     for kind in KINDS {
         for offset in [0.0, 1e4, 1e6] {
-            let scene = scene(&mut dice, kind, offset, 500);
+            let scene = scene(&mut rng, kind, offset, 500);
             let camera = scene.setup.camera();
             let volume = camera.volume(&PlaneOptions::default(), &scene.surroundings());
             let volume = volume.unwrap();
@@ -382,11 +382,11 @@ fn corners(view: &View) -> ([DVec3; 4], Vec<DVec3>) {
 
 #[test]
 fn planes_move_outward_by_the_documented_margin_and_no_more() {
-    let mut dice = Dice::new(23);
+    let mut rng = SeededRng::new(23);
     for offset in [0.0, 1e4, 1e6] {
         for kind in KINDS {
             for _ in 0..50 {
-                let scene = scene(&mut dice, kind, offset, 20);
+                let scene = scene(&mut rng, kind, offset, 20);
                 let around = scene.surroundings();
                 let view = Setup {
                     eye: scene.setup.eye - scene.origin,
@@ -449,10 +449,10 @@ fn planes_move_outward_by_the_documented_margin_and_no_more() {
 fn without_a_far_plane_the_scenes_bound_carries_the_promise() {
     // The margin of an unbounded volume comes from the scene alone: a bound
     // that is too small must show, or the reach is not what is used.
-    let mut dice = Dice::new(29);
+    let mut rng = SeededRng::new(29);
     let mut dropped = 0;
     for _ in 0..100 {
-        let scene = scene(&mut dice, "perspective, infinite far", 0.0, 200);
+        let scene = scene(&mut rng, "perspective, infinite far", 0.0, 200);
         let small = Surroundings {
             reach: scene.surroundings().reach * 1e-3,
             ..scene.surroundings()

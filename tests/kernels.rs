@@ -4,7 +4,7 @@
 
 use std::ops::ControlFlow;
 
-use cullbench::geometry::{Aabb, RelativeVolume, Spheres, WideVolume, sphere_cube};
+use cullbench::geometry::{Aabb, ConvexVolumeF64, RelativeVolume, Spheres, sphere_cube};
 use cullbench::index::{
     BuildError, DynIndex, Execution, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, Registry,
     StructureSpec,
@@ -56,7 +56,7 @@ fn ask(structure: &str, kernel: Kernel, case: &RandomCase) -> Said {
     let mut said = Said::default();
     said.see(&*index, volume.into());
     said.see(&*index_of_cubes, (&Spheres::new(volume)).into());
-    said.see(&*index, (&WideVolume::from(volume)).into());
+    said.see(&*index, (&ConvexVolumeF64::from(volume)).into());
     if let Ok(relative) = RelativeVolume::about(case.point, volume) {
         said.see(&*index, (&relative).into());
     }

@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use cullbench::geometry::{Aabb, ConvexVolume, Spheres, WideVolume, sphere_cube};
+use cullbench::geometry::{Aabb, ConvexVolume, ConvexVolumeF64, Spheres, sphere_cube};
 use cullbench::index::{
     BlockOrder, Bsp, Bvh, FrustumQuery, Input, Linear, Octree, Quadtree, RegionIndex, Trace, Wide,
     WideParams,
@@ -46,7 +46,7 @@ fn queries<T: RegionIndex>(items: &[Aabb], volumes: &[ConvexVolume], points: &[V
     for (i, volume) in volumes.iter().enumerate() {
         let wanted = those(items, |b| volume.sees(b));
         sees(&index, volume, i, &wanted);
-        let finer = WideVolume::from(volume);
+        let finer = ConvexVolumeF64::from(volume);
         let wanted = those(items, |b| finer.sees(b));
         sees(&index, &finer, i, &wanted);
     }

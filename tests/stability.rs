@@ -9,7 +9,7 @@
 
 use cullbench::camera::{PLANE_METHODS, PlaneOptions};
 use cullbench::culling::{ARITHMETICS, Arithmetic, CameraView, Culling, CullingTest, TESTS};
-use cullbench::geometry::{Aabb, PlaneTree, WidePlane};
+use cullbench::geometry::{Aabb, PlaneF64, PlaneTree};
 use cullbench::index::{DynIndex, Execution, Input, Registry};
 use cullbench::kernel::Kernel;
 use cullbench::measure::Workload;
@@ -483,7 +483,7 @@ fn digests(scene: &Scene, structures: &Structures, path: &str, found: &mut usize
         if let (Some(camera), [CameraView::Volume(view), ..]) =
             (path.cameras.first(), &workload.views[..])
         {
-            let faces: Vec<WidePlane> = view.planes().iter().map(WidePlane::from).collect();
+            let faces: Vec<PlaneF64> = view.planes().iter().map(PlaneF64::from).collect();
             let points = points_on_faces(camera, scene.origin, &faces);
             let ids = agreed(&over(&points, None), &what, |index, out| {
                 index.query(view.into(), out);

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::CameraError;
 use crate::arithmetic::Expansion;
-use crate::geometry::{FrustumPlane, WidePlane};
+use crate::geometry::{FrustumPlane, PlaneF64};
 
 named! {
     /// How a matrix is to be read. Reversed depth needs no name: what is visible is
@@ -129,7 +129,7 @@ impl ViewProjection {
     ///
     /// A row whose normal is zero is no plane (an infinite far plane), and
     /// neither is one that lies farther away than f32 has numbers.
-    pub(super) fn planes_about(&self, zero: &[DVec3]) -> Vec<(FrustumPlane, WidePlane)> {
+    pub(super) fn planes_about(&self, zero: &[DVec3]) -> Vec<(FrustumPlane, PlaneF64)> {
         let [x, y, z, w] = self.exact_rows();
         let sum = |a: &Four, b: &Four| [0, 1, 2, 3].map(|k| &a[k] + &b[k]);
         let difference = |a: &Four, b: &Four| [0, 1, 2, 3].map(|k| &a[k] - &b[k]);
@@ -253,7 +253,7 @@ fn about(point: &Four, zero: &[DVec3]) -> Option<DVec3> {
 
 /// A plane about the sum of some points, of unit length; `None` without a
 /// normal.
-fn plane_about(face: &Four, zero: &[DVec3]) -> Option<WidePlane> {
+fn plane_about(face: &Four, zero: &[DVec3]) -> Option<PlaneF64> {
     let [x, y, z, d] = face;
     let mut offset = d.clone();
     for zero in zero {
@@ -268,5 +268,5 @@ fn plane_about(face: &Four, zero: &[DVec3]) -> Option<WidePlane> {
     let [x, y, z, d] = [x, y, z, &offset].map(|n| n.scaled(-exponent).estimate());
     let normal = DVec3::new(x, y, z);
     let length = normal.length();
-    Some(WidePlane::new(normal / length, d / length))
+    Some(PlaneF64::new(normal / length, d / length))
 }

@@ -9,7 +9,7 @@ use super::margin::{Margin, TINY, check_sums};
 use super::projection::{double, single};
 use super::{Camera, CameraError, ClipSpace, Frame, Lens};
 use crate::geometry::{
-    ConvexVolume, FrustumPlane, Plane, RelativeVolume, VolumeError, WidePlane, WideVolume,
+    ConvexVolume, ConvexVolumeF64, FrustumPlane, Plane, PlaneF64, RelativeVolume, VolumeError,
 };
 
 named! {
@@ -97,7 +97,7 @@ impl Camera {
     /// As [`Camera::volume`]; more planes than a volume has.
     pub fn volume_with(
         &self,
-        more: &[WidePlane],
+        more: &[PlaneF64],
         options: &PlaneOptions,
         around: &Surroundings,
     ) -> Result<ConvexVolume, CameraError> {
@@ -116,10 +116,10 @@ impl Camera {
     ///
     /// # Errors
     /// [`CameraError::Volume`] if a plane does not even fit f64.
-    pub fn wide_volume(&self, around: &Surroundings) -> Result<WideVolume, CameraError> {
+    pub fn convex_volume_f64(&self, around: &Surroundings) -> Result<ConvexVolumeF64, CameraError> {
         let planes = self.planes_f64(&[around.origin]).into_iter();
-        let planes: Vec<WidePlane> = planes.map(|(_, plane)| plane).collect();
-        Ok(WideVolume::from_planes(&planes)?)
+        let planes: Vec<PlaneF64> = planes.map(|(_, plane)| plane).collect();
+        Ok(ConvexVolumeF64::from_planes(&planes)?)
     }
 
     /// The view volume in coordinates relative to the eye: the local eye
@@ -145,7 +145,7 @@ impl Camera {
     /// than a volume has.
     pub fn relative_volume(
         &self,
-        more: &[WidePlane],
+        more: &[PlaneF64],
         epsilon: f64,
         around: &Surroundings,
     ) -> Result<RelativeVolume, CameraError> {
@@ -156,7 +156,7 @@ impl Camera {
         let left = local.eye - zero;
         let about = [around.origin, zero];
         let named = self.derive(&about, PlaneMethod::Frame)?;
-        let more: Vec<WidePlane> = more.iter().map(|plane| plane.about(-left)).collect();
+        let more: Vec<PlaneF64> = more.iter().map(|plane| plane.about(-left)).collect();
         let reach = around.reach.as_dvec3();
         let of_scene = match around.reach {
             Vec3::ZERO if self.lens.far().is_some() => DVec3::ZERO,
@@ -184,7 +184,7 @@ impl Camera {
             .fold(frame, |frame, &zero| frame.relative_to(zero))
     }
 
-    fn planes_f64(&self, zero: &[DVec3]) -> Vec<(FrustumPlane, WidePlane)> {
+    fn planes_f64(&self, zero: &[DVec3]) -> Vec<(FrustumPlane, PlaneF64)> {
         match &self.lens {
             Lens::Matrix(matrix) => matrix.planes_about(zero),
             lens => from_frame_f64(&self.frame_about(zero), lens),
@@ -220,7 +220,7 @@ impl Camera {
 /// epsilon.
 fn gathered(
     named: &[(FrustumPlane, Plane)],
-    more: &[WidePlane],
+    more: &[PlaneF64],
     epsilon: f64,
     moved: impl Fn(Option<FrustumPlane>, &Plane) -> Plane,
 ) -> Result<ConvexVolume, VolumeError> {
@@ -290,10 +290,10 @@ macro_rules! planes_from_frame {
     };
 }
 
-planes_from_frame!(from_frame_f64, f64, DVec3, |v| v, WidePlane);
+planes_from_frame!(from_frame_f64, f64, DVec3, |v| v, PlaneF64);
 planes_from_frame!(from_frame_f32, f32, Vec3, |v| v.as_vec3(), Plane);
 
-fn narrow(wide: Vec<(FrustumPlane, WidePlane)>) -> NamedPlanes {
+fn narrow(wide: Vec<(FrustumPlane, PlaneF64)>) -> NamedPlanes {
     let wide = wide.into_iter();
     wide.map(|(name, plane)| (name, plane.narrow())).collect()
 }

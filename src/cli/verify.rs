@@ -275,7 +275,7 @@ fn on_the_faces(workload: &Workload) -> ErrorCount {
     let around = workload.scene.surroundings();
     let mut errors = ErrorCount::default();
     for (camera, view) in workload.cameras.iter().zip(&workload.views) {
-        let (Some(_), Ok(volume)) = (camera.lens.far(), camera.wide_volume(&around)) else {
+        let (Some(_), Ok(volume)) = (camera.lens.far(), camera.convex_volume_f64(&around)) else {
             continue;
         };
         let mut points = points_on_faces(camera, around.origin, volume.planes());

@@ -9,14 +9,14 @@
 use glam::DVec3;
 
 use crate::arithmetic::cross;
-use crate::geometry::{MAX_PLANES, WidePlane};
+use crate::geometry::{MAX_PLANES, PlaneF64};
 
 /// The volume's bounds along the axes: up to six planes, fewer where it has no
 /// bound.
 ///
 /// Each is a sum of three faces, with positive weights, that leaves one axis
 /// of the normal. O(m^3) for m faces.
-pub fn bounds(faces: &[WidePlane]) -> Vec<WidePlane> {
+pub fn bounds(faces: &[PlaneF64]) -> Vec<PlaneF64> {
     /// Of a product of unit vectors.
     const ROUNDING: f64 = 1e-14;
     /// What may be taken for rounding of a sum of length 1: one of the units
@@ -45,7 +45,7 @@ pub fn bounds(faces: &[WidePlane]) -> Vec<WidePlane> {
             if weights.iter().any(|w| w * sign < 0.0) {
                 continue;
             }
-            let sum = |of: &dyn Fn(&WidePlane) -> f64| {
+            let sum = |of: &dyn Fn(&PlaneF64) -> f64| {
                 let parts = weights.iter().zip([a, b, c]);
                 parts.map(|(w, plane)| w * sign * of(plane)).sum::<f64>()
             };
@@ -60,7 +60,7 @@ pub fn bounds(faces: &[WidePlane]) -> Vec<WidePlane> {
     }
     let directions = DVec3::AXES.into_iter().flat_map(|axis| [axis, -axis]);
     let found = directions.zip(tightest);
-    let planes = found.filter_map(|(normal, d)| Some(WidePlane::new(normal, d?)));
+    let planes = found.filter_map(|(normal, d)| Some(PlaneF64::new(normal, d?)));
     planes.collect()
 }
 
@@ -70,7 +70,7 @@ pub fn bounds(faces: &[WidePlane]) -> Vec<WidePlane> {
 /// Each is the sum of two faces that pull the axis both ways; only sums that
 /// touch the volume are kept, the tightest ones if there are too many for
 /// `room`. O(m^3) for the m faces' corners and O(m^2) sums.
-pub fn silhouettes(faces: &[WidePlane], room: usize) -> Vec<WidePlane> {
+pub fn silhouettes(faces: &[PlaneF64], room: usize) -> Vec<PlaneF64> {
     /// Of faces of unit length: a sum shorter than this has lost too many digits
     /// to be a plane (1e-9 of it would be noise). Doing without is always safe.
     const CANCELLED: f64 = 1e-7;
@@ -78,7 +78,7 @@ pub fn silhouettes(faces: &[WidePlane], room: usize) -> Vec<WidePlane> {
     /// there: far above rounding, far below the gap of a sum that is idle.
     const TIGHT: f64 = 1e-7;
     let corners = corners(faces);
-    let mut found: Vec<(f64, WidePlane)> = Vec::new();
+    let mut found: Vec<(f64, PlaneF64)> = Vec::new();
     for (i, a) in faces.iter().enumerate() {
         for b in &faces[i + 1..] {
             for axis in 0..3 {
@@ -90,7 +90,7 @@ pub fn silhouettes(faces: &[WidePlane], room: usize) -> Vec<WidePlane> {
                 normal[axis] = 0.0;
                 let length = normal.length();
                 let d = (a.d * against.abs() + b.d * pull.abs()) / length;
-                let plane = WidePlane::new(normal / length, d);
+                let plane = PlaneF64::new(normal / length, d);
                 if length < CANCELLED {
                     continue;
                 }
@@ -108,14 +108,14 @@ pub fn silhouettes(faces: &[WidePlane], room: usize) -> Vec<WidePlane> {
 }
 
 /// What the exact test needs beside the faces: bounds and silhouettes.
-pub fn extended(faces: &[WidePlane]) -> Vec<WidePlane> {
+pub fn extended(faces: &[PlaneF64]) -> Vec<PlaneF64> {
     let bounds = bounds(faces);
     let room = MAX_PLANES.saturating_sub(faces.len() + bounds.len());
     [bounds, silhouettes(faces, room)].concat()
 }
 
 /// The corners of a volume, to f64 rounding.
-fn corners(faces: &[WidePlane]) -> Vec<DVec3> {
+fn corners(faces: &[PlaneF64]) -> Vec<DVec3> {
     /// How far outside rounding may put a corner.
     const OUTSIDE: f64 = 1e-10;
     let points = triples(faces).filter_map(meeting_point);
@@ -124,7 +124,7 @@ fn corners(faces: &[WidePlane]) -> Vec<DVec3> {
 }
 
 /// A plane's value at a point as a share of the magnitudes it is the sum of.
-fn share(plane: &WidePlane, p: DVec3) -> f64 {
+fn share(plane: &PlaneF64, p: DVec3) -> f64 {
     let size = (plane.normal * p).abs().element_sum() + plane.d.abs();
     match size == 0.0 {
         true => 0.0,
@@ -132,14 +132,14 @@ fn share(plane: &WidePlane, p: DVec3) -> f64 {
     }
 }
 
-fn triples(faces: &[WidePlane]) -> impl Iterator<Item = [&WidePlane; 3]> {
+fn triples(faces: &[PlaneF64]) -> impl Iterator<Item = [&PlaneF64; 3]> {
     let count = faces.len();
     let pairs = (0..count).flat_map(move |i| (i + 1..count).map(move |j| (i, j)));
     pairs.flat_map(move |(i, j)| (j + 1..count).map(move |l| [&faces[i], &faces[j], &faces[l]]))
 }
 
 /// Where three planes meet, by Cramer's rule.
-fn meeting_point([a, b, c]: [&WidePlane; 3]) -> Option<DVec3> {
+fn meeting_point([a, b, c]: [&PlaneF64; 3]) -> Option<DVec3> {
     let crossed = b.normal.cross(c.normal);
     let sum = crossed * a.d + c.normal.cross(a.normal) * b.d + a.normal.cross(b.normal) * c.d;
     let point = -sum / a.normal.dot(crossed);

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::camera::{Camera, CameraError, PlaneMethod, PlaneOptions, Surroundings, check_sums};
 use crate::geometry::{
-    Aabb, ConvexVolume, RelativeVolume, Spheres, WidePlane, WideVolume, sphere_cube,
+    Aabb, ConvexVolume, ConvexVolumeF64, PlaneF64, RelativeVolume, Spheres, sphere_cube,
 };
 use crate::query::AnyVolume;
 
@@ -102,7 +102,7 @@ pub enum CameraView {
     /// Planes and a sphere per box, in f32.
     Spheres(Spheres),
     /// Planes in f64.
-    Wide(WideVolume),
+    Wide(ConvexVolumeF64),
     /// Planes in f32 about the eye.
     Relative(RelativeVolume),
 }
@@ -132,10 +132,10 @@ impl Culling {
         match self.arithmetic {
             Arithmetic::F32 => self.in_f32(camera, around),
             Arithmetic::F64 => {
-                let mut planes = camera.wide_volume(around)?.planes().to_vec();
+                let mut planes = camera.convex_volume_f64(around)?.planes().to_vec();
                 let more = self.more(&faces_about_eye(camera)?);
                 planes.extend(more.iter().map(|plane| plane.about(-local_eye)));
-                let volume = WideVolume::from_planes(&planes).map_err(CameraError::from)?;
+                let volume = ConvexVolumeF64::from_planes(&planes).map_err(CameraError::from)?;
                 Ok(CameraView::Wide(volume))
             }
             Arithmetic::F32Relative => {
@@ -179,14 +179,14 @@ impl Culling {
                     ..self.planes
                 };
                 let faces = camera.volume(&bare, around)?;
-                let wide = faces.planes().iter().map(WidePlane::from);
+                let wide = faces.planes().iter().map(PlaneF64::from);
                 wide.map(|plane| plane.about(local_eye)).collect()
             };
             self.more(&faces)
         } else {
             Vec::new()
         };
-        let more: Vec<WidePlane> = more.iter().map(|plane| plane.about(-local_eye)).collect();
+        let more: Vec<PlaneF64> = more.iter().map(|plane| plane.about(-local_eye)).collect();
         let volume = camera.volume_with(&more, &self.planes, around)?;
         Ok(match self.test {
             CullingTest::Sphere => {
@@ -200,7 +200,7 @@ impl Culling {
     }
 
     /// What the test asks for beyond the faces.
-    fn more(&self, faces: &[WidePlane]) -> Vec<WidePlane> {
+    fn more(&self, faces: &[PlaneF64]) -> Vec<PlaneF64> {
         match self.test {
             CullingTest::Sphere | CullingTest::SixPlane => Vec::new(),
             CullingTest::SixBox => bounds(faces),
@@ -209,12 +209,12 @@ impl Culling {
     }
 }
 
-fn faces_about_eye(camera: &Camera) -> Result<Vec<WidePlane>, CameraError> {
+fn faces_about_eye(camera: &Camera) -> Result<Vec<PlaneF64>, CameraError> {
     let around = Surroundings {
         origin: camera.frame.eye,
         ..Surroundings::default()
     };
-    Ok(camera.wide_volume(&around)?.planes().to_vec())
+    Ok(camera.convex_volume_f64(&around)?.planes().to_vec())
 }
 
 #[cfg(test)]

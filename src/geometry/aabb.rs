@@ -15,7 +15,7 @@ use crate::arithmetic::rounding::{difference_down, difference_up, sum_down, sum_
 pub struct Aabb {
     /// Lower corner.
     pub min: Vec3,
-    /// Upper corner; part of the box.
+    /// PVertexSigns corner; part of the box.
     pub max: Vec3,
 }
 
@@ -131,7 +131,7 @@ impl Aabb {
         self.min.abs().max(self.max.abs())
     }
 
-    /// Corner `i` of eight: bit k of `i` picks `max` on axis k.
+    /// PVertexRows `i` of eight: bit k of `i` picks `max` on axis k.
     pub fn corner(&self, i: usize) -> Vec3 {
         let pick = |axis: usize| {
             if i >> axis & 1 == 1 {

@@ -5,8 +5,8 @@
 use glam::Vec3;
 
 use super::aabb::held;
-use super::corner::Corner;
-use super::{Aabb, Ball, Plane, SphereMargin, Upper, WidePlane};
+use super::p_vertex::PVertexRows;
+use super::{Aabb, Ball, PVertexSigns, Plane, PlaneF64, SphereMargin};
 use crate::kernel::{Isa, Plain, prefetch};
 
 /// Boxes of one block, and one bit for each of them.
@@ -82,7 +82,7 @@ impl BoxBlock {
 
     /// Asks for the rows of one corner.
     #[inline(always)]
-    pub fn prefetch_corner(&self, corner: Corner) {
+    pub fn prefetch_p_vertex(&self, corner: PVertexRows) {
         for row in corner.far() {
             prefetch(&self.rows[row]);
         }
@@ -102,7 +102,7 @@ impl BoxBlock {
     pub fn touch<I: Isa>(&self, isa: I, rows: &[u8; ROWS]) -> LaneMask {
         let mut sum = isa.splat(0.0);
         for &row in rows {
-            sum = isa.lower(sum, isa.load(&self.rows[usize::from(row)]));
+            sum = isa.min(sum, isa.load(&self.rows[usize::from(row)]));
         }
         isa.below_zero(sum)
     }
@@ -115,17 +115,17 @@ impl BoxBlock {
     /// The rows of one corner, the same one of every box: the upper bounds
     /// where `upper` says so.
     #[inline(always)]
-    pub(crate) fn corner_rows(&self, upper: Upper) -> [&[f32; LANES]; 3] {
+    pub(crate) fn corner_rows(&self, upper: PVertexSigns) -> [&[f32; LANES]; 3] {
         let row = |k: usize| &self.rows[k + 3 * usize::from(upper[k])];
         [row(0), row(1), row(2)]
     }
 
     /// The lanes that none of the f64 planes excludes: bit for bit
-    /// [`WidePlane::excludes`], lane by lane.
+    /// [`PlaneF64::excludes`], lane by lane.
     #[inline(always)]
     pub fn admitted_by_wide<'p>(
         &self,
-        planes: impl Iterator<Item = (&'p WidePlane, Upper)>,
+        planes: impl Iterator<Item = (&'p PlaneF64, PVertexSigns)>,
     ) -> LaneMask {
         let mut lowest = [f64::INFINITY; LANES];
         for (plane, upper) in planes {
@@ -157,7 +157,7 @@ impl BoxBlock {
     #[inline(always)]
     pub fn admitted_as_spheres<'p>(
         &self,
-        planes: impl Iterator<Item = (&'p Plane, Upper, &'p SphereMargin)>,
+        planes: impl Iterator<Item = (&'p Plane, PVertexSigns, &'p SphereMargin)>,
     ) -> LaneMask {
         // Row by row, like the block itself: centre x, y, z, radius, reach.
         let mut balls = [[0.0; LANES]; 5];
@@ -362,7 +362,7 @@ pub fn lanes_of(at: usize, first: usize, end: usize) -> LaneMask {
 #[cfg(test)]
 mod tests {
     use super::super::arbitrary::{any_box, number};
-    use super::super::{Blades, ConvexVolume};
+    use super::super::{BroadcastPlanes, ConvexVolume};
     use super::*;
     use crate::kernel::BASELINE;
     use proptest::prelude::*;
@@ -387,7 +387,7 @@ mod tests {
                 let four = [*block; 4];
                 let four = BoxBlock::four_admitted_by(BASELINE, &four, &volume, volume.mask());
                 prop_assert_eq!(four, [admitted; 4]);
-                let ready = Blades::new(BASELINE, &volume, volume.mask());
+                let ready = BroadcastPlanes::new(BASELINE, &volume, volume.mask());
                 prop_assert_eq!(ready.is_some(), volume.mask().count_ones() <= 6);
                 if let Some(ready) = ready {
                     prop_assert_eq!(ready.admitted(BASELINE, block), admitted);

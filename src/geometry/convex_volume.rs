@@ -6,7 +6,7 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::aabb::held;
-use super::{Aabb, Corner, Plane, Upper, WidePlane};
+use super::{Aabb, PVertexRows, PVertexSigns, Plane, PlaneF64};
 
 /// Largest number of planes of one volume: one bit each in a [`PlaneMask`].
 pub const MAX_PLANES: usize = 32;
@@ -58,11 +58,11 @@ pub enum VolumeError {
     },
     /// A plane in f64 with a NaN or infinite number.
     #[error("plane {index} is not finite: ({}, {}, {}, {})", plane.normal.x, plane.normal.y, plane.normal.z, plane.d)]
-    NonFiniteWidePlane {
+    NonFinitePlaneF64 {
         /// Its position in the list.
         index: usize,
         /// The plane itself.
-        plane: WidePlane,
+        plane: PlaneF64,
     },
     /// The eye of planes about the eye leaves the range of f32.
     #[error("the eye is not finite in f32: {eye}")]
@@ -96,10 +96,10 @@ pub struct ConvexVolume {
     names: [Option<FrustumPlane>; MAX_PLANES],
     count: usize,
     mask: PlaneMask,
-    upper: [Upper; MAX_PLANES],
-    corners: [Corner; MAX_PLANES],
+    upper: [PVertexSigns; MAX_PLANES],
+    corners: [PVertexRows; MAX_PLANES],
     /// What `n * p` must not be below: `-d`.
-    least: [f32; MAX_PLANES],
+    minus_d: [f32; MAX_PLANES],
 }
 
 impl ConvexVolume {
@@ -151,8 +151,8 @@ impl ConvexVolume {
             count,
             mask: 0,
             upper: [[true; 3]; MAX_PLANES],
-            corners: [Corner::of([true; 3]); MAX_PLANES],
-            least: [0.0; MAX_PLANES],
+            corners: [PVertexRows::of([true; 3]); MAX_PLANES],
+            minus_d: [0.0; MAX_PLANES],
         };
         for (index, (plane, name)) in planes.enumerate() {
             if !plane.is_finite() {
@@ -161,8 +161,8 @@ impl ConvexVolume {
             volume.planes[index] = plane;
             volume.names[index] = name;
             volume.upper[index] = plane.upper();
-            volume.corners[index] = Corner::of(plane.upper());
-            volume.least[index] = -plane.d;
+            volume.corners[index] = PVertexRows::of(plane.upper());
+            volume.minus_d[index] = -plane.d;
             volume.mask |= PlaneMask::from(!plane.is_trivial()) << index;
         }
         Ok(volume)
@@ -183,19 +183,19 @@ impl ConvexVolume {
     /// The rows of a [`BoxBlock`](super::BoxBlock) that hold the p-vertices of
     /// plane `index`, likewise.
     #[inline(always)]
-    pub fn corner_of_bit(&self, index: u32) -> Corner {
+    pub fn p_vertex_of_bit(&self, index: u32) -> PVertexRows {
         self.corners[index as usize % MAX_PLANES]
     }
 
     /// `-d` of plane `index`, likewise.
     #[inline(always)]
-    pub fn least_of_bit(&self, index: u32) -> f32 {
-        self.least[index as usize % MAX_PLANES]
+    pub fn minus_d_of_bit(&self, index: u32) -> f32 {
+        self.minus_d[index as usize % MAX_PLANES]
     }
 
     /// [`Plane::upper`] of plane `index`, likewise.
     #[inline(always)]
-    pub fn upper_of_bit(&self, index: u32) -> Upper {
+    pub fn p_vertex_signs_of_bit(&self, index: u32) -> PVertexSigns {
         self.upper[index as usize % MAX_PLANES]
     }
 

@@ -4,27 +4,27 @@
 mod aabb;
 #[cfg(test)]
 pub mod arbitrary;
-mod blade;
 mod box_block;
+mod broadcast;
 mod convex_volume;
-mod corner;
+mod convex_volume_f64;
+mod p_vertex;
 mod plane;
+mod plane_f64;
 mod plane_rows;
 mod plane_tree;
 mod relative_volume;
 mod spheres;
-mod wide_plane;
-mod wide_volume;
 
 pub use aabb::Aabb;
-pub use blade::{Blade, Blades};
 pub use box_block::{BoxBlock, BoxBlocks, LANES, LaneMask, ROWS, lanes_of};
+pub use broadcast::{BroadcastPlane, BroadcastPlanes};
 pub use convex_volume::{ConvexVolume, FrustumPlane, MAX_PLANES, PlaneMask, VolumeError};
-pub use corner::{ALL_ROWS, Corner, RowMask};
-pub use plane::{Plane, Upper};
+pub use convex_volume_f64::ConvexVolumeF64;
+pub use p_vertex::{ALL_ROWS, PVertexRows, RowMask};
+pub use plane::{PVertexSigns, Plane};
+pub use plane_f64::PlaneF64;
 pub use plane_rows::{PlaneRows, ROW_LANES};
 pub use plane_tree::{PlaneTree, PlaneTreeNode};
 pub use relative_volume::RelativeVolume;
 pub use spheres::{Ball, SphereMargin, Spheres, sphere_cube};
-pub use wide_plane::WidePlane;
-pub use wide_volume::WideVolume;

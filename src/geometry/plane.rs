@@ -21,7 +21,7 @@ pub struct Plane {
 }
 
 /// Which bound the p-vertex takes on each axis: the upper one?
-pub type Upper = [bool; 3];
+pub type PVertexSigns = [bool; 3];
 
 impl Plane {
     /// The half-space `normal . x + d >= 0`.
@@ -61,7 +61,7 @@ impl Plane {
 
     /// The bounds that make up [`Plane::p_vertex`]. Kernels for many boxes ask
     /// once a plane.
-    pub fn upper(&self) -> Upper {
+    pub fn upper(&self) -> PVertexSigns {
         self.normal.to_array().map(|n| n >= 0.0)
     }
 

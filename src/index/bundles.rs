@@ -230,7 +230,7 @@ impl Bundles {
             leaves,
         } = &mut *scratch;
         // The root's bundle; or the root itself, if it is a leaf.
-        let start = (isa.counting(0), isa.splat_word(mask));
+        let start = (isa.iota(0), isa.splat_word(mask));
         here.clear(1);
         leaves.clear(1);
         here.push(

@@ -32,7 +32,7 @@ impl ByPlane {
                 let alone = isa.equal(open, 1 << plane) & lanes;
                 rest &= !alone;
                 if let Some(place) = list[*used..].first_chunk_mut() {
-                    isa.pack(place, nodes, alone);
+                    isa.compress(place, nodes, alone);
                 }
                 *used += alone.count_ones() as usize;
             }

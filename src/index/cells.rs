@@ -100,25 +100,25 @@ impl<'a> CellSplitter<'a> {
     }
 }
 
-/// How a column, a cell with much above each other, is cut into storeys.
+/// How a column, a cell with much above each other, is cut into slabs.
 ///
 /// Cells that leave one axis alone become ever narrower columns over the full
 /// height of the world. Where that is high, a leaf is a thin needle, and even a
 /// small view grazes many. So a cell is split on only while a cube of its width
 /// would hold more than some leaves; then its items are sorted by height and
-/// stacked, the same number in each storey.
+/// stacked, the same number in each slab.
 struct Columns {
     axis: usize,
     leaf: usize,
 }
 
 /// A cell is a column once a cube of its width would hold fewer than this
-/// many leaves. A split makes that number eight times less, so storeys come
+/// many leaves. A split makes that number eight times less, so slabs come
 /// out between a third as high as they are wide and three times as high.
 const LEAVES_OF_A_CUBE: f32 = 3.0;
 
-/// Most storeys of one node: one test of sixteen.
-const STOREYS: usize = 16;
+/// Most slabs of one node: one test of sixteen.
+const SLABS: usize = 16;
 
 impl Columns {
     /// Whether the items of the cell are to be stacked. O(items).
@@ -137,11 +137,11 @@ impl Columns {
     fn stack(&self, records: &mut [Record], cell: Cell, parts: &mut Vec<Part<Cell>>) {
         let height = |record: &Record| record.bounds.centre()[self.axis];
         records.sort_unstable_by(|a, b| height(a).total_cmp(&height(b)).then(a.id.cmp(&b.id)));
-        let storeys = records.len().div_ceil(self.leaf).min(STOREYS);
-        let place = |storey| records.len() * storey / storeys;
-        for storey in 0..storeys {
+        let slabs = records.len().div_ceil(self.leaf).min(SLABS);
+        let place = |slab| records.len() * slab / slabs;
+        for slab in 0..slabs {
             parts.push(Part {
-                items: place(storey + 1) - place(storey),
+                items: place(slab + 1) - place(slab),
                 cell: Some(cell),
             });
         }

@@ -58,7 +58,7 @@ impl Frontier {
     #[inline(always)]
     pub fn start<I: Isa>(&mut self, isa: I, mask: PlaneMask) {
         self.clear(1);
-        self.push(isa, isa.counting(0), isa.splat_word(mask), 1);
+        self.push(isa, isa.iota(0), isa.splat_word(mask), 1);
     }
 
     /// Number of nodes.
@@ -76,8 +76,8 @@ impl Frontier {
         );
         debug_assert!(places.0.is_some(), "no room was made");
         if let (Some(place), Some(masks)) = places {
-            isa.pack(place, nodes, lanes);
-            isa.pack(masks, open, lanes);
+            isa.compress(place, nodes, lanes);
+            isa.compress(masks, open, lanes);
             self.used += lanes.count_ones() as usize;
         }
     }
@@ -125,7 +125,7 @@ impl NodeList {
         let place = self.nodes[self.used..].first_chunk_mut();
         debug_assert!(place.is_some(), "no room was made");
         if let Some(place) = place {
-            isa.pack(place, nodes, lanes);
+            isa.compress(place, nodes, lanes);
             self.used += lanes.count_ones() as usize;
         }
     }

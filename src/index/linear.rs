@@ -11,7 +11,7 @@ use super::tree::scan_blocks;
 use super::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, indexable};
 use crate::geometry::{Aabb, BoxBlock, BoxBlocks, LANES, LaneMask, lanes_of};
 use crate::kernel::Isa;
-use crate::query::{AsEver, Context, ItemId, Planes, QueryVolume, Recorder, Sink, Tests};
+use crate::query::{Context, ItemId, Planes, QueryVolume, Recorder, Sink, Tests, UnpreparedPlanes};
 
 /// A scan has nothing to choose.
 #[derive(Clone, Copy, Default, Debug, Serialize, Deserialize)]
@@ -134,7 +134,7 @@ impl RegionIndex for Linear {
         {
             return self.scan_all(open, planes, cx);
         }
-        self.scan_all(open, AsEver::all(volume), cx)
+        self.scan_all(open, UnpreparedPlanes::all(volume), cx)
     }
 }
 

@@ -123,12 +123,12 @@ impl<I: Isa, V: QueryVolume, S: Sink, R: Recorder> Pass<'_, I, V, S, R> {
         for (i, (&at, &mask)) in places.iter().zip(masks).enumerate() {
             layer.fetch(places, i + AHEAD);
             let inside = self.sort_lanes(layer, (at, mask), below);
-            whole.push(self.isa, self.isa.counting(at * LANES as u32), inside);
+            whole.push(self.isa, self.isa.iota(at * LANES as u32), inside);
         }
         if whole.entries().is_empty() {
             return ControlFlow::Continue(());
         }
-        let tests = Whole {
+        let tests = InsideLeaves {
             leaves,
             places: whole.entries(),
             ids: self.ids.rows(),
@@ -154,7 +154,7 @@ impl<I: Isa, V: QueryVolume, S: Sink, R: Recorder> Pass<'_, I, V, S, R> {
         if here.len() >= WORTH_PARTING {
             by_plane.part(self.isa, here);
             for (plane, places) in by_plane.lists() {
-                let tests = OfOnePlane {
+                let tests = SinglePlaneLeaves {
                     leaves,
                     view: self.volume,
                     plane: self.volume.one_plane(self.isa, plane),
@@ -170,7 +170,7 @@ impl<I: Isa, V: QueryVolume, S: Sink, R: Recorder> Pass<'_, I, V, S, R> {
             }
             rest = &by_plane.rest;
         }
-        let tests = OfAnyPlanes {
+        let tests = OpenLeaves {
             leaves,
             view: self.volume,
             entries: rest.entries(),
@@ -225,7 +225,7 @@ impl<I: Isa, V: QueryVolume, S: Sink, R: Recorder> Pass<'_, I, V, S, R> {
         let inside = self.isa.zeros(open) & kept;
         let undecided = kept & !inside;
         let first = at * LANES;
-        below.push(self.isa, self.isa.counting(first as u32), open, undecided);
+        below.push(self.isa, self.isa.iota(first as u32), open, undecided);
         inside
     }
 
@@ -263,14 +263,14 @@ fn fetch_ids(ids: &[[ItemId; LANES]], leaf: u32) {
 }
 
 /// Leaves that are wholly inside: nothing of theirs is tested.
-struct Whole<'a, 't, R> {
+struct InsideLeaves<'a, 't, R> {
     leaves: &'a Layer<'t>,
     places: &'a [u32],
     ids: &'a [[ItemId; LANES]],
     recorder: &'a mut R,
 }
 
-impl<R> Whole<'_, '_, R> {
+impl<R> InsideLeaves<'_, '_, R> {
     /// Asks for the ids of a leaf of the list ahead of its turn.
     #[inline(always)]
     fn fetch(&self, i: usize) {
@@ -280,7 +280,7 @@ impl<R> Whole<'_, '_, R> {
     }
 }
 
-impl<I: Isa, R: Recorder> Tests<I> for Whole<'_, '_, R> {
+impl<I: Isa, R: Recorder> Tests<I> for InsideLeaves<'_, '_, R> {
     const SPARSE: bool = false;
 
     #[inline(always)]
@@ -301,7 +301,7 @@ impl<I: Isa, R: Recorder> Tests<I> for Whole<'_, '_, R> {
 }
 
 /// Leaves that one plane is open for.
-struct OfOnePlane<'a, 't, V, P, R> {
+struct SinglePlaneLeaves<'a, 't, V, P, R> {
     leaves: &'a Layer<'t>,
     view: &'a V,
     plane: P,
@@ -311,7 +311,7 @@ struct OfOnePlane<'a, 't, V, P, R> {
     recorder: &'a mut R,
 }
 
-impl<V: QueryVolume, P, R: Recorder> OfOnePlane<'_, '_, V, P, R> {
+impl<V: QueryVolume, P, R: Recorder> SinglePlaneLeaves<'_, '_, V, P, R> {
     /// Asks for the memory of a leaf of the list ahead of its turn.
     #[inline(always)]
     fn fetch<I: Isa>(&self, i: usize)
@@ -327,7 +327,9 @@ impl<V: QueryVolume, P, R: Recorder> OfOnePlane<'_, '_, V, P, R> {
     }
 }
 
-impl<I: Isa, V: QueryVolume, P: Planes<I>, R: Recorder> Tests<I> for OfOnePlane<'_, '_, V, P, R> {
+impl<I: Isa, V: QueryVolume, P: Planes<I>, R: Recorder> Tests<I>
+    for SinglePlaneLeaves<'_, '_, V, P, R>
+{
     const SPARSE: bool = false;
 
     #[inline(always)]
@@ -348,7 +350,7 @@ impl<I: Isa, V: QueryVolume, P: Planes<I>, R: Recorder> Tests<I> for OfOnePlane<
 }
 
 /// Leaves that different planes are open for.
-struct OfAnyPlanes<'a, 't, V, R> {
+struct OpenLeaves<'a, 't, V, R> {
     leaves: &'a Layer<'t>,
     view: &'a V,
     entries: (&'a [u32], &'a [PlaneMask]),
@@ -356,7 +358,7 @@ struct OfAnyPlanes<'a, 't, V, R> {
     recorder: &'a mut R,
 }
 
-impl<V: QueryVolume, R: Recorder> OfAnyPlanes<'_, '_, V, R> {
+impl<V: QueryVolume, R: Recorder> OpenLeaves<'_, '_, V, R> {
     /// Asks for the memory of a leaf of the list ahead of its turn.
     #[inline(always)]
     fn fetch(&self, i: usize) {
@@ -370,7 +372,7 @@ impl<V: QueryVolume, R: Recorder> OfAnyPlanes<'_, '_, V, R> {
     }
 }
 
-impl<I: Isa, V: QueryVolume, R: Recorder> Tests<I> for OfAnyPlanes<'_, '_, V, R> {
+impl<I: Isa, V: QueryVolume, R: Recorder> Tests<I> for OpenLeaves<'_, '_, V, R> {
     const SPARSE: bool = false;
 
     #[inline(always)]

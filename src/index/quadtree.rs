@@ -10,7 +10,7 @@ use crate::geometry::Aabb;
 
 /// A quadtree (Finkel and Bentley 1974) with fitted three-dimensional node
 /// bounds, so that the height still culls. Cells that are much higher than wide
-/// are columns of storeys with as many items each (docs/adr/0012); in a flat
+/// are columns of slabs with as many items each (docs/adr/0012); in a flat
 /// scene there are none. Crossing and coincident items are treated as in
 /// [`super::Octree`].
 pub struct Quadtree {
@@ -31,7 +31,7 @@ pub(super) fn widest_axes(bounds: &Aabb) -> [usize; 2] {
 impl RegionIndex for Quadtree {
     const INFO: Info = Info::new(
         "quadtree",
-        "quadtree over the two widest axes, high cells in storeys; loose=2 for the loose variant",
+        "quadtree over the two widest axes, high cells in slabs; loose=2 for the loose variant",
         Kind::Tree,
         Origin::Ours,
     )
@@ -99,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flat_world_has_no_storeys() {
+    fn a_flat_world_has_no_slabs() {
         let items = grid([64, 64, 2]);
         let (tree, params) = (built(&items), CellParams::default());
         let ids = indexable(&items).expect("boxes on a grid");
@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn towers_are_cut_in_storeys() {
+    fn towers_are_cut_in_slabs() {
         // Items above each other, which no split of the two axes parts.
         let ground = |i: u32| [(i & 1) as f32 * 4000.0, (i >> 1 & 1) as f32 * 4000.0];
         let items: Vec<Aabb> = (0..4000)
@@ -118,7 +118,7 @@ mod tests {
             .map(|([x, y], z)| Aabb::new(Vec3::new(x, y, z), Vec3::new(x, y, z + 1.0)))
             .collect();
         let tree = built(&items);
-        // The world, a tower, sixteen storeys of 62 or 63, two of those each.
+        // The world, a tower, sixteen slabs of 62 or 63, two of those each.
         assert_eq!(tree.depth(), 4);
         let leaves = (0..tree.nodes().len()).filter(|&node| tree.is_leaf(node));
         let highest = leaves.map(|leaf| tree.nodes()[leaf].bounds.extent().z);

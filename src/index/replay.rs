@@ -38,12 +38,12 @@ impl Recorder for Reads<'_> {
     }
 }
 
-struct Hands<'a> {
+struct TraceSink<'a> {
     runs: &'a mut Vec<Range<u32>>,
     leaves: &'a mut Vec<(u32, LaneMask)>,
 }
 
-impl Sink for Hands<'_> {
+impl Sink for TraceSink<'_> {
     fn accept(&mut self, _: &[ItemId]) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
@@ -72,7 +72,7 @@ impl Trace {
     /// Records one query.
     pub fn of<Q: QueryVolume>(tree: &Wide, volume: &Q) -> Trace {
         let mut trace = Trace::default();
-        let mut hands = Hands {
+        let mut sink = TraceSink {
             runs: &mut trace.runs,
             leaves: &mut trace.leaves,
         };
@@ -80,7 +80,7 @@ impl Trace {
         // This sink never breaks off.
         let _ = tree.query(
             volume,
-            &mut QueryContext::new(BASELINE, &mut hands, &mut reads),
+            &mut QueryContext::new(BASELINE, &mut sink, &mut reads),
         );
         let leaves = tree.id_rows().len();
         let tested = trace.reads.iter().filter(|read| (read.0 as usize) < leaves);
@@ -90,7 +90,7 @@ impl Trace {
 
     /// Reads what the query read and appends what it answered.
     pub fn replay(&self, tree: &Wide, out: &mut Vec<ItemId>) {
-        Kernel::best().run(Again {
+        Kernel::best().run(Replay {
             trace: self,
             blocks: tree.blocks(),
             ids: tree.id_rows().as_flattened(),
@@ -100,7 +100,7 @@ impl Trace {
     }
 }
 
-struct Again<'a> {
+struct Replay<'a> {
     trace: &'a Trace,
     blocks: &'a [BoxBlock],
     ids: &'a [ItemId],
@@ -120,7 +120,7 @@ fn fetch(blocks: &[BoxBlock], reads: &[Read], i: usize) {
     }
 }
 
-impl Work for Again<'_> {
+impl Work for Replay<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -144,7 +144,7 @@ impl Work for Again<'_> {
             let _ = self.out.accept_places(isa, self.ids, places);
         }
         for (reads, leaves) in [(&[][..], whole), (below, tested)] {
-            let tests = Known {
+            let tests = TracedLeaves {
                 blocks: self.blocks,
                 reads,
                 leaves,
@@ -160,7 +160,7 @@ impl Work for Again<'_> {
 
 /// Leaves of which it is known what they hold, read all the same if they have
 /// been.
-struct Known<'a> {
+struct TracedLeaves<'a> {
     blocks: &'a [BoxBlock],
     reads: &'a [Read],
     leaves: &'a [(u32, LaneMask)],
@@ -168,7 +168,7 @@ struct Known<'a> {
     seen: &'a mut LaneMask,
 }
 
-impl Known<'_> {
+impl TracedLeaves<'_> {
     #[inline(always)]
     fn fetch(&self, i: usize) {
         fetch(self.blocks, self.reads, i);
@@ -180,7 +180,7 @@ impl Known<'_> {
     }
 }
 
-impl<I: Isa> Tests<I> for Known<'_> {
+impl<I: Isa> Tests<I> for TracedLeaves<'_> {
     const SPARSE: bool = false;
 
     #[inline(always)]

@@ -91,7 +91,7 @@ impl Node {
     /// One step down, for a point within the hull.
     #[inline(always)]
     fn step<I: Isa>(&self, isa: I, p: &[f32; 4]) -> u32 {
-        let value = isa.pick(p, self.planes[AXES].to_bits());
+        let value = isa.permute(p, self.planes[AXES].to_bits());
         let planes = isa.load(&self.planes);
         let (lower, upper) = (isa.at_most(value, planes), isa.at_most(planes, value));
         // A point within the hull is a number.
@@ -195,7 +195,7 @@ impl Tiling {
         if !self.hull.contains_point(p) {
             return ControlFlow::Continue(());
         }
-        let (at, steps) = isa.apart(Alone {
+        let (at, steps) = isa.apart(SinglePoint {
             nodes: &self.nodes,
             row: p.extend(0.0).to_array(),
         });
@@ -275,12 +275,12 @@ impl Tiling {
 
 /// The way down of one point within the hull: where it ends, and how many nodes
 /// it passes.
-struct Alone<'a> {
+struct SinglePoint<'a> {
     nodes: &'a [Node],
     row: [f32; 4],
 }
 
-impl<I: Isa> Piece<I> for Alone<'_> {
+impl<I: Isa> Piece<I> for SinglePoint<'_> {
     type Output = (u32, u32);
 
     #[inline(always)]

@@ -41,14 +41,14 @@ pub trait Isa: Copy {
     fn splat(self, x: f32) -> Self::Floats;
     /// Of four numbers, for each lane the one that its two bits of `picks` say,
     /// lane 0 the lowest bits.
-    fn pick(self, from: &[f32; 4], picks: u32) -> Self::Floats;
+    fn permute(self, from: &[f32; 4], picks: u32) -> Self::Floats;
     /// `a + b`, rounded once.
     fn add(self, a: Self::Floats, b: Self::Floats) -> Self::Floats;
     /// `a * b`, rounded once; never fused with a sum.
     fn mul(self, a: Self::Floats, b: Self::Floats) -> Self::Floats;
     /// `a` where `a < b`, else `b`: of a NaN and a number in this order, the
     /// number.
-    fn lower(self, a: Self::Floats, b: Self::Floats) -> Self::Floats;
+    fn min(self, a: Self::Floats, b: Self::Floats) -> Self::Floats;
     /// The lanes where `a < 0`.
     fn below_zero(self, a: Self::Floats) -> LaneMask;
     /// All lanes.
@@ -65,7 +65,7 @@ pub trait Isa: Copy {
     /// The same word in every lane.
     fn splat_word(self, x: u32) -> Self::Words;
     /// `first`, `first + 1` and so on.
-    fn counting(self, first: u32) -> Self::Words;
+    fn iota(self, first: u32) -> Self::Words;
     /// `words` without `bits` in the lanes where `values >= least`.
     fn without(
         self,
@@ -80,7 +80,7 @@ pub trait Isa: Copy {
     fn equal(self, words: Self::Words, x: u32) -> LaneMask;
     /// Moves the words of `lanes` together, lowest first, to the start of
     /// `place`; the rest of it holds anything.
-    fn pack(self, place: &mut [u32; LANES], words: Self::Words, lanes: LaneMask);
+    fn compress(self, place: &mut [u32; LANES], words: Self::Words, lanes: LaneMask);
     /// Appends the words of `lanes`, lowest first.
     fn append(self, out: &mut Vec<u32>, row: &[u32; LANES], lanes: LaneMask);
 }
@@ -132,16 +132,16 @@ mod tests {
             let floats = [
                 isa.add(a, b),
                 isa.mul(a, isa.splat(self.b[3])),
-                isa.lower(a, b),
-                isa.pick(&std::array::from_fn(|i| self.a[i]), self.b[5].to_bits()),
+                isa.min(a, b),
+                isa.permute(&std::array::from_fn(|i| self.a[i]), self.b[5].to_bits()),
             ];
             let bits = floats.map(|x| isa.to_array(x).map(canonical));
             let mut out: Vec<u32> = bits.as_flattened().to_vec();
             let words = isa.without(isa.words(self.words), a, b, 0b101);
-            let all = [words, isa.counting(self.words[0]), isa.splat_word(7)];
+            let all = [words, isa.iota(self.words[0]), isa.splat_word(7)];
             for words in all {
                 let mut place = [0; LANES];
-                isa.pack(&mut place, words, self.lanes);
+                isa.compress(&mut place, words, self.lanes);
                 out.extend_from_slice(&place[..self.lanes.count_ones() as usize]);
             }
             isa.append(&mut out, self.words, self.lanes);

@@ -36,7 +36,7 @@ impl Isa for Plain {
         [x; LANES]
     }
     #[inline(always)]
-    fn pick(self, from: &[f32; 4], picks: u32) -> [f32; LANES] {
+    fn permute(self, from: &[f32; 4], picks: u32) -> [f32; LANES] {
         std::array::from_fn(|lane| from[(picks >> (2 * lane) & 3) as usize])
     }
     #[inline(always)]
@@ -48,7 +48,7 @@ impl Isa for Plain {
         std::array::from_fn(|lane| a[lane] * b[lane])
     }
     #[inline(always)]
-    fn lower(self, a: [f32; LANES], b: [f32; LANES]) -> [f32; LANES] {
+    fn min(self, a: [f32; LANES], b: [f32; LANES]) -> [f32; LANES] {
         std::array::from_fn(|lane| if a[lane] < b[lane] { a[lane] } else { b[lane] })
     }
     #[inline(always)]
@@ -80,7 +80,7 @@ impl Isa for Plain {
         [x; LANES]
     }
     #[inline(always)]
-    fn counting(self, first: u32) -> [u32; LANES] {
+    fn iota(self, first: u32) -> [u32; LANES] {
         std::array::from_fn(|lane| first.wrapping_add(lane as u32))
     }
     #[inline(always)]
@@ -105,7 +105,7 @@ impl Isa for Plain {
         lanes_where(|lane| words[lane] == x)
     }
     #[inline(always)]
-    fn pack(self, place: &mut [u32; LANES], words: [u32; LANES], lanes: LaneMask) {
+    fn compress(self, place: &mut [u32; LANES], words: [u32; LANES], lanes: LaneMask) {
         let mut left = lanes;
         for to in place.iter_mut().take(lanes.count_ones() as usize) {
             *to = words[left.trailing_zeros() as usize % LANES];
@@ -115,7 +115,7 @@ impl Isa for Plain {
     #[inline(always)]
     fn append(self, out: &mut Vec<u32>, row: &[u32; LANES], lanes: LaneMask) {
         let mut place = [0; LANES];
-        self.pack(&mut place, *row, lanes);
+        self.compress(&mut place, *row, lanes);
         out.extend_from_slice(&place[..lanes.count_ones() as usize]);
     }
 }

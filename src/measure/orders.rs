@@ -1,7 +1,7 @@
 //! The order of the tasks in each round, balanced so that neither a position
 //! nor a neighbour favours a task. Timing itself is `timing`'s.
 
-use crate::scene::Dice;
+use crate::scene::SeededRng;
 
 /// Orders in which every task takes every position once and follows every other
 /// once in as many rounds as there are tasks (twice in twice as many for
@@ -12,7 +12,7 @@ use crate::scene::Dice;
 pub struct Orders {
     names: Vec<usize>,
     turn: usize,
-    dice: Dice,
+    rng: SeededRng,
 }
 
 impl Orders {
@@ -20,7 +20,7 @@ impl Orders {
         Orders {
             names: (0..count).collect(),
             turn: 0,
-            dice: Dice::new(seed),
+            rng: SeededRng::new(seed),
         }
     }
 
@@ -35,7 +35,7 @@ impl Orders {
         let turn = self.turn.checked_rem(block).unwrap_or(0);
         if turn == 0 {
             for i in (1..count).rev() {
-                self.names.swap(i, self.dice.below(i + 1));
+                self.names.swap(i, self.rng.below(i + 1));
             }
         }
         self.turn += 1;

@@ -9,11 +9,11 @@ use crate::spec::Spec;
 /// `waypoints` (default 8) random points within the scene's middle.
 pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, PathError> {
     let count = spec.whole("waypoints", 8, 10_000)?.max(4) as usize;
-    let mut dice = stage.dice();
+    let mut rng = stage.rng();
     let (low, extent) = (stage.bounds.min, stage.extent());
     let points: Vec<DVec3> = (0..count)
         .map(|_| {
-            let share = dice.point() * 0.8 + 0.1;
+            let share = rng.point() * 0.8 + 0.1;
             let z = stage.flight_level(share.z);
             (low + extent * share).with_z(z)
         })

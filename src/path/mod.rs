@@ -18,7 +18,7 @@ use glam::DVec3;
 
 use crate::camera::{Camera, CameraError, Frame, Lens, Surroundings};
 use crate::input::{InputError, is_readable, read_file};
-use crate::scene::{self, Dice, Scene, WorldBox};
+use crate::scene::{self, Scene, SeededRng, WorldBox};
 use crate::spec::{Spec, SpecError};
 
 pub use recorded::{LensDefaults, read_cameras_csv, read_points_csv};
@@ -184,8 +184,8 @@ impl Stage<'_> {
         self.bounds.min.z + share * self.extent().z.max(0.1 * width)
     }
 
-    fn dice(&self) -> Dice {
-        Dice::new(self.seed)
+    fn rng(&self) -> SeededRng {
+        SeededRng::new(self.seed)
     }
 
     /// `0/count, 1/count, ...`: positions on a closed path.

@@ -6,13 +6,13 @@ use super::{PathError, Pose, Stage};
 use crate::spec::Spec;
 
 pub(super) fn frames(stage: &Stage, _: &mut Spec) -> Result<Vec<Pose>, PathError> {
-    let mut dice = stage.dice();
+    let mut rng = stage.rng();
     let poses = (0..stage.count).map(|_| {
-        let share = dice.point();
+        let share = rng.point();
         let z = stage.flight_level(share.z);
         let eye = (stage.bounds.min + stage.extent() * share).with_z(z);
         // Normal components: every direction is equally likely.
-        let forward = dice.normal3();
+        let forward = rng.normal3();
         let forward = if forward == DVec3::ZERO {
             DVec3::X
         } else {

@@ -8,7 +8,7 @@ use glam::Vec3;
 
 use crate::arithmetic::{Expansion, two_sum};
 use crate::geometry::{
-    Aabb, BoxBlock, LANES, LaneMask, MAX_PLANES, Plane, PlaneMask, Upper, WidePlane,
+    Aabb, BoxBlock, LANES, LaneMask, MAX_PLANES, PVertexSigns, Plane, PlaneF64, PlaneMask,
 };
 use crate::kernel::Isa;
 use crate::query::{Predicate, QueryVolume};
@@ -21,7 +21,7 @@ pub trait PlaneForm: Copy + 'static {
     /// What the farthest corner evaluates to, as far as it takes no decision.
     type Value: Copy;
 
-    fn normal_upper(&self) -> Upper;
+    fn normal_upper(&self) -> PVertexSigns;
     fn value(&self, far: [f32; 3], near: [f32; 3]) -> Self::Value;
     /// Whether the whole box lies outside, from [`PlaneForm::value`].
     fn is_outside(&self, value: Self::Value, far: [f32; 3], near: [f32; 3]) -> bool;
@@ -97,7 +97,7 @@ impl<P: PlaneForm> QueryVolume for Formed<P> {
     }
 }
 
-fn upper(normal: [f64; 3]) -> Upper {
+fn upper(normal: [f64; 3]) -> PVertexSigns {
     normal.map(|n| n >= 0.0)
 }
 
@@ -116,7 +116,7 @@ impl PlaneForm for Fused {
     type Value = f32;
 
     #[inline(always)]
-    fn normal_upper(&self) -> Upper {
+    fn normal_upper(&self) -> PVertexSigns {
         self.0.upper()
     }
     #[inline(always)]
@@ -160,7 +160,7 @@ impl PlaneForm for Flushed {
     type Value = f32;
 
     #[inline(always)]
-    fn normal_upper(&self) -> Upper {
+    fn normal_upper(&self) -> PVertexSigns {
         self.0.upper()
     }
     #[inline(always)]
@@ -211,7 +211,7 @@ impl PlaneForm for CentreExtent {
     type Value = f32;
 
     #[inline(always)]
-    fn normal_upper(&self) -> Upper {
+    fn normal_upper(&self) -> PVertexSigns {
         self.0.upper()
     }
     #[inline(always)]
@@ -248,8 +248,8 @@ pub struct DoubleDouble {
 /// Some times 3 * 3 * 2^-106.
 const UNDECIDED: f64 = f64::from_bits((1023 - 102) << 52);
 
-impl From<&WidePlane> for DoubleDouble {
-    fn from(plane: &WidePlane) -> Self {
+impl From<&PlaneF64> for DoubleDouble {
+    fn from(plane: &PlaneF64) -> Self {
         let normal = plane.normal.to_array();
         let high = normal.map(|n| f64::from_bits(n.to_bits() & !((1 << 24) - 1)));
         DoubleDouble {
@@ -295,7 +295,7 @@ impl PlaneForm for DoubleDouble {
     type Value = [f64; 2];
 
     #[inline(always)]
-    fn normal_upper(&self) -> Upper {
+    fn normal_upper(&self) -> PVertexSigns {
         upper(array::from_fn(|k| self.high[k]))
     }
     #[inline(always)]
@@ -334,7 +334,7 @@ pub struct Interval {
 impl Interval {
     /// A plane whose normal is true to `normal_error` in each component and its
     /// offset to `offset_error`.
-    pub fn around(plane: &WidePlane, normal_error: f64, offset_error: f64) -> Interval {
+    pub fn around(plane: &PlaneF64, normal_error: f64, offset_error: f64) -> Interval {
         let around = |x: f64, error: f64| [(x - error).next_down(), (x + error).next_up()];
         Interval {
             normal: plane.normal.to_array().map(|n| around(n, normal_error)),
@@ -369,7 +369,7 @@ impl PlaneForm for Interval {
     type Value = f64;
 
     #[inline(always)]
-    fn normal_upper(&self) -> Upper {
+    fn normal_upper(&self) -> PVertexSigns {
         upper(array::from_fn(|k| self.normal[k][1]))
     }
     #[inline(always)]
@@ -390,9 +390,9 @@ impl PlaneForm for Interval {
 mod tests {
     use super::*;
     use crate::geometry::arbitrary::{any_box, number, vector};
-    use crate::geometry::{ConvexVolume, WideVolume};
+    use crate::geometry::{ConvexVolume, ConvexVolumeF64};
     use crate::kernel::BASELINE;
-    use crate::scene::Dice;
+    use crate::scene::SeededRng;
     use glam::DVec3;
     use proptest::prelude::*;
 
@@ -424,7 +424,7 @@ mod tests {
     }
 
     /// The sign of `n . x + d` at the farthest corner, without any error.
-    fn exact(plane: &WidePlane, b: &Aabb) -> i32 {
+    fn exact(plane: &PlaneF64, b: &Aabb) -> i32 {
         let mut sum = Expansion::from(plane.d);
         for k in 0..3 {
             let x = if plane.normal[k] >= 0.0 {
@@ -447,7 +447,7 @@ mod tests {
             planes in prop::collection::vec((vector(), number()), 1..8),
         ) {
             let planes: Vec<Plane> = planes.into_iter().map(|(n, d)| Plane::new(n, d)).collect();
-            let wide = WideVolume::from(&ConvexVolume::from_planes(&planes).unwrap());
+            let wide = ConvexVolumeF64::from(&ConvexVolume::from_planes(&planes).unwrap());
             let wide = wide.planes();
             check(&Formed::new(planes.iter().map(Fused::from)), &items)?;
             check(&Formed::new(planes.iter().map(Flushed::from)), &items)?;
@@ -472,7 +472,7 @@ mod tests {
                 true => f64::from_bits(d.to_bits().wrapping_add_signed(ulps)),
                 false => free,
             };
-            let plane = WidePlane::new(normal, d);
+            let plane = PlaneF64::new(normal, d);
             let sign = exact(&plane, &b);
             let doubled = Formed::new([DoubleDouble::from(&plane)]);
             prop_assert_eq!(doubled.excludes(0, &b), sign < 0);
@@ -499,9 +499,9 @@ mod tests {
         assert!(plane.excludes(&at(0.0)));
         assert!(!Formed::new([Flushed::from(&plane)]).excludes(0, &at(0.0)));
         // Touching boxes that the centre, rounded, takes from the plane.
-        let mut dice = Dice::new(1);
+        let mut rng = SeededRng::new(1);
         let lost = (0..1000).filter(|_| {
-            let [a, b, n] = [(); 3].map(|()| (dice.point() * 2.0 - 1.0).as_vec3());
+            let [a, b, n] = [(); 3].map(|()| (rng.point() * 2.0 - 1.0).as_vec3());
             let b = Aabb::new(a.min(b), a.max(b));
             let through = Plane::new(n, 0.0);
             let plane = Plane::new(n, -through.value_at(through.p_vertex(&b)));

@@ -141,7 +141,7 @@ impl PlaneTest {
             ..PlaneOptions::default()
         };
         let volume = || camera.volume(&options, around);
-        let wide = || camera.wide_volume(around);
+        let wide = || camera.convex_volume_f64(around);
         Ok(match numbers {
             OtherNumbers::Fused => {
                 PointView::Fused(Formed::new(volume()?.planes().iter().map(Fused::from)))
@@ -170,7 +170,7 @@ fn intervals(camera: &Camera, around: &Surroundings) -> Result<Formed<Interval>,
     let eye = local_eye.abs() + camera.frame.eye.abs();
     let far = camera.lens.far().unwrap_or(0.0).abs();
     let size = eye.element_sum() + camera.lens.near().abs() + far;
-    let wide = camera.wide_volume(around)?;
+    let wide = camera.convex_volume_f64(around)?;
     let interval = |plane| Interval::around(plane, 16.0 * UNIT, 16.0 * UNIT * size);
     Ok(Formed::new(wide.planes().iter().map(interval)))
 }

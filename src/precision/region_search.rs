@@ -10,7 +10,7 @@ use super::point::Times;
 use crate::index::DynIndex;
 use crate::measure::{OverProcesses, Status};
 use crate::query::ItemId;
-use crate::scene::{Dice, Regions, Scene, Sought};
+use crate::scene::{Regions, Scene, SeededRng, Sought};
 use crate::statistics::{ALPHA, Rate, dominance, rate, shows_less};
 
 named! {
@@ -94,7 +94,7 @@ fn boxes_of(scene: &Scene) -> Vec<[DVec3; 2]> {
 impl RegionQueries {
     pub fn new(scene: &Scene, shots: &Shots) -> RegionQueries {
         let boxes = boxes_of(scene);
-        let mut dice = Dice::new(SEED);
+        let mut rng = SeededRng::new(SEED);
         let bounds = boxes
             .iter()
             .copied()
@@ -103,9 +103,9 @@ impl RegionQueries {
         let mut of_camera = |eye: DVec3| {
             let mut points = vec![scene.sought(eye)];
             for n in 1..POINTS_PER_CAMERA {
-                let at = match boxes.get(dice.below(boxes.len())) {
-                    Some(&b) if n >= ANYWHERE => beside_a_face(&mut dice, scene.origin, b),
-                    _ => low + (high - low) * dice.point(),
+                let at = match boxes.get(rng.below(boxes.len())) {
+                    Some(&b) if n >= ANYWHERE => beside_a_face(&mut rng, scene.origin, b),
+                    _ => low + (high - low) * rng.point(),
                 };
                 points.push(scene.sought(at));
             }
@@ -229,13 +229,13 @@ impl RegionQueries {
 
 /// A point in a region but for one axis, where it lies within an ulp of f32 of a
 /// face, on either side.
-fn beside_a_face(dice: &mut Dice, origin: DVec3, [low, high]: [DVec3; 2]) -> DVec3 {
-    let mut at = low + (high - low) * dice.point();
-    let axis = dice.below(3);
-    let face = if dice.below(2) == 0 { low } else { high }[axis];
+fn beside_a_face(rng: &mut SeededRng, origin: DVec3, [low, high]: [DVec3; 2]) -> DVec3 {
+    let mut at = low + (high - low) * rng.point();
+    let axis = rng.below(3);
+    let face = if rng.below(2) == 0 { low } else { high }[axis];
     let local = ((face - origin[axis]) as f32).abs();
     let ulp = f64::from(local.next_up()) - f64::from(local);
-    at[axis] = face + dice.between(-1.0, 1.0) * ulp;
+    at[axis] = face + rng.between(-1.0, 1.0) * ulp;
     at
 }
 

@@ -8,13 +8,13 @@ use serde::Serialize;
 use crate::camera::{Camera, CameraError, Frame, Lens, PlaneOptions, Surroundings};
 use crate::culling::{bounds, extended, silhouettes};
 use crate::geometry::{
-    Aabb, BoxBlocks, ConvexVolume, MAX_PLANES, Spheres, WidePlane, WideVolume, sphere_cube,
+    Aabb, BoxBlocks, ConvexVolume, ConvexVolumeF64, MAX_PLANES, PlaneF64, Spheres, sphere_cube,
 };
 use crate::kernel::BASELINE;
 use crate::measure::Stopwatch;
 use crate::oracle::{Oracle, Pose, Verdict};
 use crate::query::QueryVolume;
-use crate::scene::Dice;
+use crate::scene::SeededRng;
 use crate::statistics::{Rate, median, rate};
 
 /// Edge of the cubes / depth of the frustum.
@@ -82,19 +82,19 @@ pub fn size_sweep(
     seed: u64,
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<Vec<SizeRow>>, CameraError> {
-    let mut dice = Dice::new(seed);
+    let mut rng = SeededRng::new(seed);
     let mut tallies = SIZE_RATIOS.map(|_| Tally::default());
     for n in 0..cubes.div_ceil(BATCH) {
         if stop() {
             return Ok(None);
         }
-        let camera = random_camera(&mut dice)?;
+        let camera = random_camera(&mut rng)?;
         let Some(oracle) = Oracle::of_camera(&Pose::of(&camera), &camera.lens, DVec3::ZERO) else {
             continue;
         };
         let views = Views::of(&camera)?;
         for (tally, ratio) in tallies.iter_mut().zip(SIZE_RATIOS) {
-            let cubes = strewn(&mut dice, &camera, ratio);
+            let cubes = strewn(&mut rng, &camera, ratio);
             tally.add(&oracle, &views, &cubes, n % REPEATS == 0);
         }
     }
@@ -114,10 +114,10 @@ struct Tally {
 }
 
 /// A frustum in any direction, at zero, of depth 1.
-fn random_camera(dice: &mut Dice) -> Result<Camera, CameraError> {
+fn random_camera(rng: &mut SeededRng) -> Result<Camera, CameraError> {
     let lens = Lens::perspective(FOVY_DEG, ASPECT, NEAR, Some(1.0))?;
     loop {
-        let (forward, up) = (dice.normal3(), dice.normal3());
+        let (forward, up) = (rng.normal3(), rng.normal3());
         if let Ok(frame) = Frame::looking_along(DVec3::ZERO, forward, up) {
             return Ok(Camera { frame, lens });
         }
@@ -148,12 +148,12 @@ fn cube_at(camera: &Camera, ratio: f64, at: DVec3) -> Aabb {
 }
 
 /// Cubes whose centres are strewn evenly over the region.
-fn strewn(dice: &mut Dice, camera: &Camera, ratio: f64) -> Vec<Aabb> {
+fn strewn(rng: &mut SeededRng, camera: &Camera, ratio: f64) -> Vec<Aabb> {
     let [low, high] = region(ratio);
     let cell = (high - low) / GRID as f64;
     let cube = |i: usize| {
         let corner = [i % GRID, i / GRID % GRID, i / GRID / GRID].map(|at| at as f64);
-        let at = low + (DVec3::from(corner) + dice.point()) * cell;
+        let at = low + (DVec3::from(corner) + rng.point()) * cell;
         cube_at(camera, ratio, at)
     };
     (0..BATCH).map(cube).collect()
@@ -163,20 +163,20 @@ fn strewn(dice: &mut Dice, camera: &Camera, ratio: f64) -> Vec<Aabb> {
 struct Views {
     spheres: Spheres,
     volumes: [ConvexVolume; 5],
-    exact: WideVolume,
+    exact: ConvexVolumeF64,
 }
 
 impl Views {
     fn of(camera: &Camera) -> Result<Views, CameraError> {
         let around = Surroundings::default();
-        let wide = camera.wide_volume(&around)?;
+        let wide = camera.convex_volume_f64(&around)?;
         let faces = wide.planes();
         let moved = PlaneOptions::default();
         let bare = PlaneOptions {
             epsilon: 0.0,
             ..moved
         };
-        let with = |more: &[WidePlane], options| camera.volume_with(more, options, &around);
+        let with = |more: &[PlaneF64], options| camera.volume_with(more, options, &around);
         let silhouettes = silhouettes(faces, MAX_PLANES - faces.len());
         let all = extended(faces);
         let six = with(&[], &bare)?;
@@ -189,7 +189,7 @@ impl Views {
                 with(&all, &bare)?,
                 with(&all, &moved)?,
             ],
-            exact: WideVolume::from_planes(&[faces, &all].concat())?,
+            exact: ConvexVolumeF64::from_planes(&[faces, &all].concat())?,
         })
     }
 }
@@ -282,18 +282,18 @@ mod tests {
     /// returned it.
     #[test]
     fn nothing_beside_the_region_is_returned_by_any_test() {
-        let mut dice = Dice::new(5);
+        let mut rng = SeededRng::new(5);
         for ratio in SIZE_RATIOS {
             let [low, high] = region(ratio);
             let mut spheres_extra = 0.0;
             for _ in 0..8 {
-                let camera = random_camera(&mut dice).unwrap();
+                let camera = random_camera(&mut rng).unwrap();
                 let mut cubes = Vec::new();
                 for _ in 0..2000 {
-                    let mut at = low + (high - low) * dice.point();
+                    let mut at = low + (high - low) * rng.point();
                     // Just outside one of the six faces.
-                    let (axis, out) = (dice.below(3), 1e-3 * (high - low));
-                    at[axis] = match dice.below(2) {
+                    let (axis, out) = (rng.below(3), 1e-3 * (high - low));
+                    at[axis] = match rng.below(2) {
                         0 => low[axis] - out[axis],
                         _ => high[axis] + out[axis],
                     };
@@ -304,7 +304,7 @@ mod tests {
                 assert_eq!(extra(&beside), [0.0; TESTS.len()], "{ratio}");
                 // The other way round: cubes within are seen, and the f64 test
                 // with all planes makes no mistake.
-                let within = judged(&camera, &strewn(&mut dice, &camera, ratio));
+                let within = judged(&camera, &strewn(&mut rng, &camera, ratio));
                 assert!(within.visible > 0, "{ratio}");
                 spheres_extra += extra(&within)[0];
                 let exact = TESTS.len() - 1;

@@ -12,7 +12,7 @@ use crate::camera::{Camera, Frame, Lens, PLANE_METHODS, PlaneOptions, Surroundin
 use crate::culling::{Arithmetic, Culling};
 use crate::geometry::Aabb;
 use crate::query::ItemId;
-use crate::scene::Dice;
+use crate::scene::SeededRng;
 use crate::statistics::{Rate, rate};
 use crate::verify::{ErrorCount, Truth};
 
@@ -101,12 +101,12 @@ pub fn sweep(
     let mut rows = Vec::new();
     for value in sweep.values() {
         let mut own: Vec<Judged> = tests.iter().map(|_| Judged::default()).collect();
-        let mut dice = Dice::new(seed);
+        let mut rng = SeededRng::new(seed);
         for _ in 0..cameras {
             if stop() {
                 return None;
             }
-            judge(&mut dice, sweep, value, &tests, &mut own);
+            judge(&mut rng, sweep, value, &tests, &mut own);
         }
         let judged = tests.iter().zip(own);
         rows.extend(judged.map(|(test, judged)| judged.row(sweep, value, test)));
@@ -143,12 +143,12 @@ impl Judged {
 }
 
 /// A camera and the size of its world.
-fn camera_at(dice: &mut Dice, sweep: Sweep, value: f64) -> Option<(Camera, f64)> {
+fn camera_at(rng: &mut SeededRng, sweep: Sweep, value: f64) -> Option<(Camera, f64)> {
     let of = |own: Sweep, otherwise: f64| if own == sweep { value } else { otherwise };
     let scale = of(Sweep::Scale, 1.0);
     let centre = DVec3::splat(of(Sweep::Offset, 0.0));
-    let eye = centre + dice.normal3() * 10.0 * scale;
-    let (forward, beside) = (dice.normal3().normalize(), dice.normal3());
+    let eye = centre + rng.normal3() * 10.0 * scale;
+    let (forward, beside) = (rng.normal3().normalize(), rng.normal3());
     let across = forward.cross(beside).normalize();
     let angle = of(Sweep::Up, 1.0);
     let up = forward * libm::cos(angle) + across * libm::sin(angle);
@@ -162,7 +162,7 @@ fn camera_at(dice: &mut Dice, sweep: Sweep, value: f64) -> Option<(Camera, f64)>
 
 /// Boxes in and about the view, no larger than a twentieth of what it is narrow
 /// by. As a world in f32 has them: rounded to its grid, and exact from there on.
-fn boxes_about(dice: &mut Dice, camera: &Camera, scale: f64) -> Vec<Aabb> {
+fn boxes_about(rng: &mut SeededRng, camera: &Camera, scale: f64) -> Vec<Aabb> {
     let Lens::Perspective { aspect, .. } = camera.lens else {
         return Vec::new();
     };
@@ -170,22 +170,22 @@ fn boxes_about(dice: &mut Dice, camera: &Camera, scale: f64) -> Vec<Aabb> {
     let slope = camera.lens.height_at(1.0).unwrap_or(1.0) / 2.0;
     let narrow = depth * slope.min(slope * aspect).min(1.0);
     let frame = &camera.frame;
-    let one = |dice: &mut Dice| {
-        let half = dice.between(0.005, 0.05) * narrow;
-        let ahead = dice.between(0.0, 1.1) * depth;
-        let mut beside = |slope: f64| dice.between(-1.2, 1.2) * (slope * ahead + 2.0 * half);
+    let one = |rng: &mut SeededRng| {
+        let half = rng.between(0.005, 0.05) * narrow;
+        let ahead = rng.between(0.0, 1.1) * depth;
+        let mut beside = |slope: f64| rng.between(-1.2, 1.2) * (slope * ahead + 2.0 * half);
         let (x, y) = (beside(slope * aspect), beside(slope));
         let at = frame.eye + frame.u() * x + frame.v() * y - frame.n() * ahead;
         Aabb::around(at.as_vec3(), Vec3::splat(half as f32))
     };
-    (0..BOXES).map(|_| one(dice)).collect()
+    (0..BOXES).map(|_| one(rng)).collect()
 }
 
-fn judge(dice: &mut Dice, sweep: Sweep, value: f64, tests: &[PlaneTest], all: &mut [Judged]) {
-    let Some((camera, scale)) = camera_at(dice, sweep, value) else {
+fn judge(rng: &mut SeededRng, sweep: Sweep, value: f64, tests: &[PlaneTest], all: &mut [Judged]) {
+    let Some((camera, scale)) = camera_at(rng, sweep, value) else {
         return;
     };
-    let boxes = boxes_about(dice, &camera, scale);
+    let boxes = boxes_about(rng, &camera, scale);
     let around = Surroundings {
         origin: DVec3::ZERO,
         reach: Aabb::union_of(&boxes).reach(),

@@ -18,7 +18,7 @@ pub use predicate::{Containment, Predicate};
 pub use recorder::{NoRecorder, QueryCost, Recorder};
 pub use sink::{Count, First, Ranges, Sink, Tests, runs};
 pub(crate) use volume::each_volume;
-pub use volume::{AnyVolume, AsEver, QueryVolume};
+pub use volume::{AnyVolume, QueryVolume, UnpreparedPlanes};
 
 /// An item's number: its zero-based place in the scene.
 pub type ItemId = u32;

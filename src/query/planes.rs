@@ -1,7 +1,7 @@
 //! Planes of a view made ready for many blocks: by numbers that stay in
 //! registers, or, where a view has none to keep, by asking it as ever.
 
-use crate::geometry::{Blade, Blades, BoxBlock, LaneMask};
+use crate::geometry::{BoxBlock, BroadcastPlane, BroadcastPlanes, LaneMask};
 use crate::kernel::Isa;
 
 /// Planes of a view, made ready for many blocks that no other plane is open
@@ -28,7 +28,7 @@ pub trait Planes<I: Isa>: Copy {
     fn prefetch(&self, block: &BoxBlock);
 }
 
-impl<I: Isa> Planes<I> for Blade<I> {
+impl<I: Isa> Planes<I> for BroadcastPlane<I> {
     const IN_FOURS: bool = false;
 
     #[inline(always)]
@@ -41,7 +41,7 @@ impl<I: Isa> Planes<I> for Blade<I> {
     }
 }
 
-impl<I: Isa> Planes<I> for Blades<I> {
+impl<I: Isa> Planes<I> for BroadcastPlanes<I> {
     const IN_FOURS: bool = false;
 
     #[inline(always)]

@@ -5,7 +5,7 @@
 use glam::Vec3;
 
 use super::Recorder;
-use crate::geometry::{Aabb, ConvexVolume, PlaneMask, RelativeVolume, Spheres, WideVolume};
+use crate::geometry::{Aabb, ConvexVolume, ConvexVolumeF64, PlaneMask, RelativeVolume, Spheres};
 
 /// How a box lies to a query volume.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -184,7 +184,7 @@ impl Predicate for Spheres {
 
 /// The plane test in f64. Monotone as in f32: promoting is exact, and every
 /// operation rounds to nearest.
-impl Predicate for WideVolume {
+impl Predicate for ConvexVolumeF64 {
     #[inline(always)]
     fn mask(&self) -> PlaneMask {
         self.mask()

@@ -192,7 +192,7 @@ impl<I: Isa, T: Tests<I>> Piece<I> for Gather<'_, T> {
             for (i, row) in rows.iter().enumerate() {
                 let some = !isa.zeros(isa.words(row));
                 if let Some(place) = hits[found..].first_chunk_mut() {
-                    isa.pack(place, isa.counting((i * LANES) as u32), some);
+                    isa.compress(place, isa.iota((i * LANES) as u32), some);
                 }
                 found += some.count_ones() as usize;
             }

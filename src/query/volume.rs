@@ -5,8 +5,8 @@
 use glam::Vec3;
 
 use crate::geometry::{
-    ALL_ROWS, Aabb, Blade, Blades, BoxBlock, ConvexVolume, LANES, LaneMask, PlaneMask, PlaneRows,
-    RelativeVolume, RowMask, Spheres, WideVolume,
+    ALL_ROWS, Aabb, BoxBlock, BroadcastPlane, BroadcastPlanes, ConvexVolume, ConvexVolumeF64,
+    LANES, LaneMask, PlaneMask, PlaneRows, RelativeVolume, RowMask, Spheres,
 };
 
 use super::planes::Planes;
@@ -43,14 +43,14 @@ pub trait QueryVolume: Predicate {
     /// [`QueryVolume::kept_lanes`] with this bit for a mask.
     #[inline(always)]
     fn one_plane<I: Isa>(&self, _: I, plane: u32) -> impl Planes<I> {
-        AsEver::one(self, plane)
+        UnpreparedPlanes::one(self, plane)
     }
 
     /// All planes, made ready for many blocks: [`QueryVolume::kept_lanes`] with
     /// [`Predicate::mask`]. `None` if they are too many.
     #[inline(always)]
     fn all_planes<I: Isa>(&self, _: I) -> Option<impl Planes<I>> {
-        Some(AsEver::all(self))
+        Some(UnpreparedPlanes::all(self))
     }
 
     /// [`QueryVolume::kept_lanes`] of four blocks.
@@ -110,36 +110,36 @@ pub trait QueryVolume: Predicate {
 }
 
 /// Planes of a view for which nothing can be made ready.
-pub struct AsEver<'v, V> {
+pub struct UnpreparedPlanes<'v, V> {
     view: &'v V,
     mask: PlaneMask,
 }
 
-impl<V> Clone for AsEver<'_, V> {
+impl<V> Clone for UnpreparedPlanes<'_, V> {
     fn clone(&self) -> Self {
         *self
     }
 }
 
-impl<V> Copy for AsEver<'_, V> {}
+impl<V> Copy for UnpreparedPlanes<'_, V> {}
 
-impl<'v, V: QueryVolume> AsEver<'v, V> {
+impl<'v, V: QueryVolume> UnpreparedPlanes<'v, V> {
     /// The plane of that bit.
     #[inline(always)]
     pub fn one(view: &'v V, plane: u32) -> Self {
         let mask = 1 << plane;
-        AsEver { view, mask }
+        UnpreparedPlanes { view, mask }
     }
 
     /// All planes of the view.
     #[inline(always)]
     pub fn all(view: &'v V) -> Self {
         let mask = view.mask();
-        AsEver { view, mask }
+        UnpreparedPlanes { view, mask }
     }
 }
 
-impl<I: Isa, V: QueryVolume> Planes<I> for AsEver<'_, V> {
+impl<I: Isa, V: QueryVolume> Planes<I> for UnpreparedPlanes<'_, V> {
     const IN_FOURS: bool = true;
 
     #[inline(always)]
@@ -173,22 +173,22 @@ impl QueryVolume for ConvexVolume {
 
     #[inline(always)]
     fn one_plane<I: Isa>(&self, isa: I, plane: u32) -> impl Planes<I> {
-        Blade::new(isa, self, plane)
+        BroadcastPlane::new(isa, self, plane)
     }
     #[inline(always)]
     fn all_planes<I: Isa>(&self, isa: I) -> Option<impl Planes<I>> {
-        Blades::new(isa, self, self.mask())
+        BroadcastPlanes::new(isa, self, self.mask())
     }
     #[inline(always)]
     fn rows_read(&self, mask: PlaneMask) -> RowMask {
-        Bits(mask).fold(0, |rows, plane| rows | self.corner_of_bit(plane).rows())
+        Bits(mask).fold(0, |rows, plane| rows | self.p_vertex_of_bit(plane).rows())
     }
     #[inline(always)]
     fn prefetch(&self, block: &BoxBlock, mask: PlaneMask) {
         // Mostly one plane or two; more read nearly everything.
         let (lowest, highest) = (mask.trailing_zeros(), mask.checked_ilog2().unwrap_or(0));
-        block.prefetch_corner(self.corner_of_bit(lowest));
-        block.prefetch_corner(self.corner_of_bit(highest));
+        block.prefetch_p_vertex(self.p_vertex_of_bit(lowest));
+        block.prefetch_p_vertex(self.p_vertex_of_bit(highest));
         if mask & mask.wrapping_sub(1) & !(1 << highest) != 0 {
             block.prefetch();
         }
@@ -212,15 +212,16 @@ impl QueryVolume for Spheres {
     fn kept_lanes<I: Isa>(&self, _: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
         block.admitted_as_spheres(Bits(mask).map(|index| {
             let (plane, margin) = self.plane_of_bit(index);
-            (plane, self.planes().upper_of_bit(index), margin)
+            (plane, self.planes().p_vertex_signs_of_bit(index), margin)
         }))
     }
 }
 
-impl QueryVolume for WideVolume {
+impl QueryVolume for ConvexVolumeF64 {
     #[inline(always)]
     fn kept_lanes<I: Isa>(&self, _: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
-        let planes = Bits(mask).map(|plane| (self.plane_of_bit(plane), self.upper_of_bit(plane)));
+        let planes =
+            Bits(mask).map(|plane| (self.plane_of_bit(plane), self.p_vertex_signs_of_bit(plane)));
         block.admitted_by_wide(planes)
     }
 }
@@ -277,7 +278,7 @@ pub enum AnyVolume<'a> {
     /// The sphere test.
     Spheres(&'a Spheres),
     /// The plane test in f64.
-    PlanesF64(&'a WideVolume),
+    PlanesF64(&'a ConvexVolumeF64),
     /// The plane test about the eye.
     Relative(&'a RelativeVolume),
     /// Region search.
@@ -317,7 +318,7 @@ macro_rules! any_volume_of {
         }
     )*};
 }
-any_volume_of!(Planes: ConvexVolume, Spheres: Spheres, PlanesF64: WideVolume, Relative: RelativeVolume);
+any_volume_of!(Planes: ConvexVolume, Spheres: Spheres, PlanesF64: ConvexVolumeF64, Relative: RelativeVolume);
 
 impl From<Vec3> for AnyVolume<'_> {
     fn from(point: Vec3) -> Self {
@@ -401,7 +402,7 @@ mod tests {
             let planes = planes.into_iter().map(|(n, d)| Plane::new(n, d));
             let volume = ConvexVolume::from_planes(&planes.collect::<Vec<_>>()).unwrap();
             check(&volume, &items)?;
-            check(&WideVolume::from(&volume), &items)?;
+            check(&ConvexVolumeF64::from(&volume), &items)?;
             check(&RelativeVolume::new(eye, volume.clone()).unwrap(), &items)?;
             check(&eye, &items)?;
             check(&items[0], &items)?;

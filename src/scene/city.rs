@@ -5,7 +5,7 @@
 use glam::DVec3;
 
 use super::WorldBox;
-use super::dice::Dice;
+use super::rng::SeededRng;
 use super::world::World;
 use crate::spec::{Spec, SpecError};
 
@@ -15,7 +15,7 @@ const ITEMS_PER_BLOCK: f64 = 40.0;
 /// Share of the items that are buildings; the rest stands in the streets.
 const BUILDINGS: f64 = 0.25;
 
-pub fn build(spec: &mut Spec, n: usize, dice: &mut Dice) -> Result<World, SpecError> {
+pub fn build(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Result<World, SpecError> {
     let block = spec.number_between("block", 80.0, 0.0, f64::INFINITY)?;
     let street = spec.number_between("street", 16.0, 0.0, f64::INFINITY)?;
     let blocks = (n as f64 / ITEMS_PER_BLOCK).sqrt().ceil().max(1.0) as usize;
@@ -23,42 +23,42 @@ pub fn build(spec: &mut Spec, n: usize, dice: &mut Dice) -> Result<World, SpecEr
     // Centred on zero: the tallest houses stand in the middle.
     let corner = -(blocks as f64) * pitch / 2.0;
     let boxes = (0..n).map(|_| {
-        let cell = DVec3::new(dice.below(blocks) as f64, dice.below(blocks) as f64, 0.0);
+        let cell = DVec3::new(rng.below(blocks) as f64, rng.below(blocks) as f64, 0.0);
         let low = cell * pitch + DVec3::new(corner, corner, 0.0);
-        if dice.unit() < BUILDINGS {
-            building(low, block, -corner, dice)
+        if rng.unit() < BUILDINGS {
+            building(low, block, -corner, rng)
         } else {
-            furniture(low, block, street, dice)
+            furniture(low, block, street, rng)
         }
     });
     Ok(boxes.collect::<Vec<WorldBox>>().into())
 }
 
 /// A house on one of 4 x 4 plots of the block; towers grow towards the centre.
-fn building(block_low: DVec3, block: f64, half_city: f64, dice: &mut Dice) -> WorldBox {
+fn building(block_low: DVec3, block: f64, half_city: f64, rng: &mut SeededRng) -> WorldBox {
     let plot = block / 4.0;
-    let cell = DVec3::new(dice.below(4) as f64, dice.below(4) as f64, 0.0);
+    let cell = DVec3::new(rng.below(4) as f64, rng.below(4) as f64, 0.0);
     let centre = block_low + (cell + DVec3::new(0.5, 0.5, 0.0)) * plot;
     let downtown = 1.0 - (centre.x.abs().max(centre.y.abs()) / half_city).min(1.0);
-    let floors = 2.0 + 4.0 * dice.unit() + 40.0 * downtown * downtown * dice.unit();
+    let floors = 2.0 + 4.0 * rng.unit() + 40.0 * downtown * downtown * rng.unit();
     let size = DVec3::new(
-        dice.between(0.5, 0.95) * plot,
-        dice.between(0.5, 0.95) * plot,
+        rng.between(0.5, 0.95) * plot,
+        rng.between(0.5, 0.95) * plot,
         3.0 * floors,
     );
     WorldBox::standing(centre, size)
 }
 
 /// A lamp, bin, sign or car on the street that borders the block.
-fn furniture(block_low: DVec3, block: f64, street: f64, dice: &mut Dice) -> WorldBox {
-    let along = dice.between(0.0, block + street);
-    let across = block + dice.unit() * street;
-    let place = if dice.unit() < 0.5 {
+fn furniture(block_low: DVec3, block: f64, street: f64, rng: &mut SeededRng) -> WorldBox {
+    let along = rng.between(0.0, block + street);
+    let across = block + rng.unit() * street;
+    let place = if rng.unit() < 0.5 {
         DVec3::new(along, across, 0.0)
     } else {
         DVec3::new(across, along, 0.0)
     };
-    let size = match dice.below(4) {
+    let size = match rng.below(4) {
         0 => DVec3::new(0.2, 0.2, 5.0),
         1 => DVec3::new(0.5, 0.5, 1.0),
         2 => DVec3::new(0.1, 0.6, 2.2),

@@ -2,17 +2,17 @@
 //! in asset-heavy levels or point-like survey data.
 
 use super::WorldBox;
-use super::dice::Dice;
+use super::rng::SeededRng;
 use super::world::World;
 use crate::spec::{Spec, SpecError};
 
 /// Cluster k attracts items in proportion to 1/(k+1) (Zipf), so that a few
 /// clusters hold most of the scene.
-pub fn build(spec: &mut Spec, n: usize, dice: &mut Dice) -> Result<World, SpecError> {
+pub fn build(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Result<World, SpecError> {
     let clusters = spec.count("clusters", 64, 1_000_000)? as usize;
     let side = spec.number_between("side", 1000.0, 0.0, f64::INFINITY)?;
     let spread = spec.number_between("spread", 0.02, 0.0, 10.0)? * side;
-    let centres: Vec<_> = (0..clusters).map(|_| dice.point() * side).collect();
+    let centres: Vec<_> = (0..clusters).map(|_| rng.point() * side).collect();
     let mut total = 0.0;
     let cumulative: Vec<f64> = (1..=clusters)
         .map(|k| {
@@ -22,10 +22,10 @@ pub fn build(spec: &mut Spec, n: usize, dice: &mut Dice) -> Result<World, SpecEr
         .collect();
     let size = 0.2 * spread / libm::cbrt(n.max(1) as f64 / clusters as f64).max(1.0);
     let boxes = (0..n).map(|_| {
-        let draw = dice.unit() * total;
+        let draw = rng.unit() * total;
         let k = cumulative.partition_point(|&c| c < draw).min(clusters - 1);
-        let centre = centres[k] + dice.normal3() * spread;
-        WorldBox::around(centre, (dice.point() + 0.5) * size)
+        let centre = centres[k] + rng.normal3() * spread;
+        WorldBox::around(centre, (rng.point() + 0.5) * size)
     });
     Ok(boxes.collect::<Vec<WorldBox>>().into())
 }

@@ -4,21 +4,21 @@
 use glam::DVec3;
 
 use super::WorldBox;
-use super::dice::Dice;
+use super::rng::SeededRng;
 use super::world::World;
 use crate::spec::{Spec, SpecError};
 
 /// Share of the items that are ground tiles.
 const GROUND: f64 = 0.1;
 
-pub fn build(spec: &mut Spec, n: usize, dice: &mut Dice) -> Result<World, SpecError> {
+pub fn build(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Result<World, SpecError> {
     let relief = spec.number_between("relief", 0.12, -1.0, 10.0)?;
     let spacing = spec.number_between("spacing", 5.0, 0.0, f64::INFINITY)?;
     let width = spacing * (n.max(1) as f64).sqrt();
     let land = Terrain {
         width,
         height: width * relief,
-        seed: dice.below(1 << 32) as u64,
+        seed: rng.below(1 << 32) as u64,
     };
     let tiles_per_side = (n as f64 * GROUND).sqrt().floor() as usize;
     let mut boxes = Vec::with_capacity(n);
@@ -31,13 +31,13 @@ pub fn build(spec: &mut Spec, n: usize, dice: &mut Dice) -> Result<World, SpecEr
         boxes.push(land.tile(x, y, tile));
     }
     boxes.extend((boxes.len()..n).map(|_| {
-        let (x, y) = (dice.unit() * width, dice.unit() * width);
+        let (x, y) = (rng.unit() * width, rng.unit() * width);
         let base = DVec3::new(x, y, land.altitude(x, y));
-        let size = match dice.below(10) {
-            0 => DVec3::splat(dice.between(0.3, 2.0)),
-            1..=3 => DVec3::new(1.2, 1.2, dice.between(0.5, 1.5)),
+        let size = match rng.below(10) {
+            0 => DVec3::splat(rng.between(0.3, 2.0)),
+            1..=3 => DVec3::new(1.2, 1.2, rng.between(0.5, 1.5)),
             _ => {
-                let tall = dice.between(4.0, 30.0);
+                let tall = rng.between(4.0, 30.0);
                 DVec3::new(tall * 0.3, tall * 0.3, tall)
             }
         };

@@ -4,7 +4,7 @@
 
 use glam::DVec3;
 
-use super::dice::Dice;
+use super::rng::SeededRng;
 use super::world::World;
 use super::{Regions, Scene, WorldBox, city, clustered, forest, rooms, uniform};
 use crate::input::InputError;
@@ -24,7 +24,7 @@ pub struct Family {
     pub summary: &'static str,
     /// Parameters beyond `n`, `seed` and `offset`, for the help.
     pub params: &'static str,
-    build: fn(&mut Spec, usize, &mut Dice) -> Result<World, SpecError>,
+    build: fn(&mut Spec, usize, &mut SeededRng) -> Result<World, SpecError>,
 }
 
 /// All families, in the order of the help.
@@ -38,7 +38,7 @@ pub static FAMILIES: &[Family] = rows! { Family { name, summary, params, build }
     "forest", "trees, bushes and rocks on a fractal heightfield",
         "relief=0.12 (height / width), spacing=5 (m between plants)", forest::build;
     "rooms", "an indoor block of cells joined by doors; the cells are the regions",
-        "storeys=3, room=6 (mean edge, m)", rooms::build;
+        "slabs=3, room=6 (mean edge, m)", rooms::build;
 };
 
 /// Largest scene a spec may ask for: 12 GB while it is made, 7.2 GB then.
@@ -58,8 +58,8 @@ impl Family {
         let n = spec.whole("n", 100_000, MOST_ITEMS)? as usize;
         let seed = spec.whole("seed", 1, u64::MAX)?;
         let offset = spec.number("offset", 0.0)?;
-        let mut dice = Dice::new(seed);
-        let mut world = (self.build)(&mut spec, n, &mut dice)?;
+        let mut rng = SeededRng::new(seed);
+        let mut world = (self.build)(&mut spec, n, &mut rng)?;
         spec.finish()?;
         if offset != 0.0 {
             for b in &mut world.boxes {
@@ -148,7 +148,7 @@ mod tests {
             "city:n=-1",
             "city:n=1.5",
             "uniform:side=0",
-            "rooms:storeys=0",
+            "rooms:slabs=0",
             "city:trees=4",
         ] {
             let spec = Spec::parse(text).unwrap();

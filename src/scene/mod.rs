@@ -6,7 +6,6 @@
 mod boxes_csv;
 mod city;
 mod clustered;
-mod dice;
 mod forest;
 mod generate;
 mod labels;
@@ -14,6 +13,7 @@ mod memory;
 mod originals;
 mod overlap;
 mod regions;
+mod rng;
 mod rooms;
 mod samples;
 mod settled;
@@ -29,13 +29,13 @@ use crate::geometry::{Aabb, PlaneTree};
 use crate::input::InputError;
 
 pub use boxes_csv::{read_boxes_csv, write_boxes_csv};
-pub(crate) use dice::Dice;
 pub use generate::{FAMILIES, Family, GENERATOR_NAME};
 pub use labels::Labels;
 pub use memory::{fits, needed_bytes};
 pub use originals::Originals;
 pub use overlap::SoughtBox;
 pub use regions::{BspNode, BspRegions, Portal, Regions, Tiling};
+pub(crate) use rng::SeededRng;
 pub use samples::{NOTICE, SAMPLES, Sample};
 pub use sought::Sought;
 pub use source::{LoadOptions, check_fits, load};
@@ -46,7 +46,7 @@ pub use wad::{WadMap, map_names};
 pub struct WorldBox {
     /// Lower corner; bounds are closed.
     pub min: DVec3,
-    /// Upper corner; bounds are closed.
+    /// PVertexSigns corner; bounds are closed.
     pub max: DVec3,
 }
 

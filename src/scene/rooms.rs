@@ -5,7 +5,7 @@
 use glam::DVec3;
 
 use super::WorldBox;
-use super::dice::Dice;
+use super::rng::SeededRng;
 use super::world::{Plan, World};
 use crate::query::ItemId;
 use crate::spec::{Spec, SpecError};
@@ -17,7 +17,7 @@ const DOOR_HEIGHT: f64 = 2.1;
 /// Items of a room on average, furniture included.
 const ITEMS_PER_ROOM: usize = 16;
 
-pub fn build(spec: &mut Spec, n: usize, dice: &mut Dice) -> Result<World, SpecError> {
+pub fn build(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Result<World, SpecError> {
     let storeys = spec.count("storeys", 3, 1000)? as usize;
     let edge = spec.number_between("room", 6.0, 2.0 * DOOR_WIDTH, 1e6)?;
     let wanted = n.div_ceil(ITEMS_PER_ROOM).max(1);
@@ -30,7 +30,7 @@ pub fn build(spec: &mut Spec, n: usize, dice: &mut Dice) -> Result<World, SpecEr
         let mut at = 0.0;
         let mut lines = vec![0.0];
         for _ in 0..per_side {
-            let width: f64 = edge + dice.between(-jitter, jitter);
+            let width: f64 = edge + rng.between(-jitter, jitter);
             at += (width * 4.0).round() / 4.0;
             lines.push(at);
         }
@@ -49,7 +49,7 @@ pub fn build(spec: &mut Spec, n: usize, dice: &mut Dice) -> Result<World, SpecEr
                 boxes.push(WorldBox::new(low, DVec3::new(high.x, high.y, low.z + WALL)));
                 // The walls towards the rooms before this one carry doors.
                 for (axis, first, before) in [(0, i == 0, 1), (1, j == 0, per_side)] {
-                    let door = door_in(&room, axis, dice);
+                    let door = door_in(&room, axis, rng);
                     push_wall(&mut boxes, &room, axis, (!first).then_some(&door));
                     if !first {
                         plan.doors
@@ -62,8 +62,8 @@ pub fn build(spec: &mut Spec, n: usize, dice: &mut Dice) -> Result<World, SpecEr
     }
     boxes.truncate(n);
     while boxes.len() < n {
-        let room = plan.rooms[dice.below(plan.rooms.len())];
-        boxes.push(furniture(&room, dice));
+        let room = plan.rooms[rng.below(plan.rooms.len())];
+        boxes.push(furniture(&room, rng));
     }
     // Storeys are joined by one stairwell: the first room of each.
     let per_storey = per_side * per_side;
@@ -82,11 +82,11 @@ pub fn build(spec: &mut Spec, n: usize, dice: &mut Dice) -> Result<World, SpecEr
 }
 
 /// The door in the room's low wall across `axis`: flat in that axis.
-fn door_in(room: &WorldBox, axis: usize, dice: &mut Dice) -> WorldBox {
+fn door_in(room: &WorldBox, axis: usize, rng: &mut SeededRng) -> WorldBox {
     let along = 1 - axis;
     let free = room.max[along] - room.min[along] - 2.0 * WALL - DOOR_WIDTH;
     let (mut low, mut high) = (room.min, room.min);
-    low[along] += WALL + dice.unit() * free;
+    low[along] += WALL + rng.unit() * free;
     high[along] = low[along] + DOOR_WIDTH;
     low.z += WALL;
     high.z = low.z + DOOR_HEIGHT;
@@ -112,14 +112,14 @@ fn push_wall(boxes: &mut Vec<WorldBox>, room: &WorldBox, axis: usize, door: Opti
 }
 
 /// A table, cupboard or trinket on the room's floor.
-fn furniture(room: &WorldBox, dice: &mut Dice) -> WorldBox {
-    let size = match dice.below(3) {
-        0 => DVec3::new(dice.between(0.6, 1.6), dice.between(0.6, 1.0), 0.8),
-        1 => DVec3::new(0.5, dice.between(0.5, 1.5), dice.between(1.2, 2.0)),
-        _ => DVec3::splat(dice.between(0.05, 0.3)),
+fn furniture(room: &WorldBox, rng: &mut SeededRng) -> WorldBox {
+    let size = match rng.below(3) {
+        0 => DVec3::new(rng.between(0.6, 1.6), rng.between(0.6, 1.0), 0.8),
+        1 => DVec3::new(0.5, rng.between(0.5, 1.5), rng.between(1.2, 2.0)),
+        _ => DVec3::splat(rng.between(0.05, 0.3)),
     };
     let free = room.max - room.min - size - 2.0 * WALL;
-    let place = DVec3::new(dice.unit() * free.x, dice.unit() * free.y, 0.0);
+    let place = DVec3::new(rng.unit() * free.x, rng.unit() * free.y, 0.0);
     let low = room.min + WALL + place;
     WorldBox::new(low, low + size)
 }
@@ -130,7 +130,7 @@ mod tests {
     use crate::geometry::Aabb;
 
     fn world(text: &str, n: usize) -> World {
-        build(&mut Spec::parse(text).unwrap(), n, &mut Dice::new(3)).unwrap()
+        build(&mut Spec::parse(text).unwrap(), n, &mut SeededRng::new(3)).unwrap()
     }
 
     #[test]

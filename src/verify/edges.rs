@@ -4,7 +4,7 @@
 use glam::{DVec3, Vec3};
 
 use crate::camera::Camera;
-use crate::geometry::{Aabb, ConvexVolume, Plane, WidePlane};
+use crate::geometry::{Aabb, ConvexVolume, Plane, PlaneF64};
 
 fn cube(x: f32, y: f32, z: f32, half: f32) -> Aabb {
     Aabb::around(Vec3::new(x, y, z), Vec3::splat(half))
@@ -80,7 +80,7 @@ pub fn edge_volumes(items: &[Aabb]) -> Vec<ConvexVolume> {
 /// rounding that is not the usual one, or a missing epsilon, puts on the other
 /// side. For each face points all over the view (the R3 sequence of Roberts
 /// 2018), moved onto it; faces and points are about `origin`.
-pub fn points_on_faces(camera: &Camera, origin: DVec3, faces: &[WidePlane]) -> Vec<Aabb> {
+pub fn points_on_faces(camera: &Camera, origin: DVec3, faces: &[PlaneF64]) -> Vec<Aabb> {
     const EACH: u32 = 48;
     const STEP: DVec3 = DVec3::new(
         0.819_172_513_396_164_4,

@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 use crate::camera::{Camera, Frame, Lens, PlaneOptions, Surroundings};
 use crate::geometry::{Aabb, ConvexVolume, Plane};
 use crate::query::ItemId;
-use crate::scene::Dice;
+use crate::scene::SeededRng;
 
 /// The volumes that cases are drawn from.
 pub const VOLUME_KINDS: [&str; 9] = [
@@ -39,28 +39,28 @@ pub struct RandomCase {
 impl RandomCase {
     /// The case of a seed; the same on every machine.
     pub fn new(seed: u64) -> RandomCase {
-        let mut dice = Dice::new(seed ^ 0xC011_BE7C);
-        let scale = libm::exp2((dice.below(41) as f64) - 20.0);
-        let count = [0, 1, 2, 17, 120, 600][dice.below(6)];
-        let items: Vec<Aabb> = (0..count).map(|_| item(&mut dice, scale)).collect();
-        let kind = dice.below(VOLUME_KINDS.len());
+        let mut rng = SeededRng::new(seed ^ 0xC011_BE7C);
+        let scale = libm::exp2((rng.below(41) as f64) - 20.0);
+        let count = [0, 1, 2, 17, 120, 600][rng.below(6)];
+        let items: Vec<Aabb> = (0..count).map(|_| item(&mut rng, scale)).collect();
+        let kind = rng.below(VOLUME_KINDS.len());
         let volume = loop {
             // A drawn camera may be impossible (up along the view): again.
-            if let Some(volume) = volume(&mut dice, kind, scale, &items) {
+            if let Some(volume) = volume(&mut rng, kind, scale, &items) {
                 break volume;
             }
         };
-        let mut point = grid_point(&mut dice, scale);
-        let near = items.get(dice.below(count.max(1)));
-        if let Some(b) = near.filter(|_| dice.unit() < 0.5) {
-            point = b.corner(dice.below(8));
+        let mut point = grid_point(&mut rng, scale);
+        let near = items.get(rng.below(count.max(1)));
+        if let Some(b) = near.filter(|_| rng.unit() < 0.5) {
+            point = b.corner(rng.below(8));
         }
         RandomCase {
             items,
             volume,
             kind,
             point,
-            region: item(&mut dice, scale),
+            region: item(&mut rng, scale),
         }
     }
 }
@@ -75,15 +75,15 @@ impl RandomCase {
 }
 
 /// A point on a coarse grid half of the time: exact ties are the point.
-fn grid_point(dice: &mut Dice, scale: f64) -> Vec3 {
-    let on_grid = dice.unit() < 0.5;
-    let p = (dice.point() * 2.0 - 1.0) * 8.0;
+fn grid_point(rng: &mut SeededRng, scale: f64) -> Vec3 {
+    let on_grid = rng.unit() < 0.5;
+    let p = (rng.point() * 2.0 - 1.0) * 8.0;
     ((if on_grid { p.round() } else { p }) * scale).as_vec3()
 }
 
-fn item(dice: &mut Dice, scale: f64) -> Aabb {
-    let (a, b) = (grid_point(dice, scale), grid_point(dice, scale));
-    match dice.below(8) {
+fn item(rng: &mut SeededRng, scale: f64) -> Aabb {
+    let (a, b) = (grid_point(rng, scale), grid_point(rng, scale));
+    match rng.below(8) {
         // A point, a flat box, a needle, an inverted (empty) box.
         0 => Aabb::new(a, a),
         1 => Aabb::new(a.min(b), a.max(b).with_z(a.min(b).z)),
@@ -94,21 +94,21 @@ fn item(dice: &mut Dice, scale: f64) -> Aabb {
         3 => Aabb::new(a.max(b) + Vec3::splat(scale as f32), a.min(b)),
         4 => Aabb::new(
             a,
-            a + Vec3::splat((scale * libm::exp2(-dice.unit() * 20.0)) as f32),
+            a + Vec3::splat((scale * libm::exp2(-rng.unit() * 20.0)) as f32),
         ),
         // Overlapping boxes of the scene's own size.
         _ => Aabb::new(a.min(b), a.max(b)),
     }
 }
 
-fn volume(dice: &mut Dice, kind: usize, scale: f64, items: &[Aabb]) -> Option<ConvexVolume> {
+fn volume(rng: &mut SeededRng, kind: usize, scale: f64, items: &[Aabb]) -> Option<ConvexVolume> {
     match kind {
-        0..=3 => camera_volume(dice, kind, scale, items),
+        0..=3 => camera_volume(rng, kind, scale, items),
         4 => {
             // A perspective volume with its x sheared along y and z: opposite
             // planes are no longer mirror images.
-            let straight = camera_volume(dice, 0, scale, items)?;
-            let [a, b] = [(); 2].map(|()| dice.between(-1.0, 1.0) as f32);
+            let straight = camera_volume(rng, 0, scale, items)?;
+            let [a, b] = [(); 2].map(|()| rng.between(-1.0, 1.0) as f32);
             let sheared = straight.planes().iter().map(|p| {
                 let n = p.normal;
                 Plane::new(Vec3::new(n.x, n.y + a * n.x, n.z + b * n.x), p.d)
@@ -116,18 +116,18 @@ fn volume(dice: &mut Dice, kind: usize, scale: f64, items: &[Aabb]) -> Option<Co
             ConvexVolume::from_planes(&sheared.collect::<Vec<_>>()).ok()
         }
         5 => {
-            let count = 1 + dice.below(5);
-            planes(dice, count, scale)
+            let count = 1 + rng.below(5);
+            planes(rng, count, scale)
         }
-        6 => planes(dice, 12, scale),
-        7 => planes(dice, 31, scale),
+        6 => planes(rng, 12, scale),
+        7 => planes(rng, 31, scale),
         _ => {
             // Two half-spaces that face away from each other, or none at all.
-            let normal = dice.normal3().as_vec3();
-            let gap = (scale * dice.unit()) as f32;
+            let normal = rng.normal3().as_vec3();
+            let gap = (scale * rng.unit()) as f32;
             let impossible = [Plane::new(Vec3::ZERO, -1.0)];
             let pair = [Plane::new(normal, -gap), Plane::new(-normal, -gap)];
-            let none = dice.unit() < 0.5;
+            let none = rng.unit() < 0.5;
             let planes = if none { &impossible[..] } else { &pair };
             ConvexVolume::from_planes(planes).ok()
         }
@@ -136,16 +136,16 @@ fn volume(dice: &mut Dice, kind: usize, scale: f64, items: &[Aabb]) -> Option<Co
 
 /// Planes near the middle of the scene, facing it more often than not; some
 /// axis-parallel, some through grid points, so that boxes touch them.
-fn planes(dice: &mut Dice, count: usize, scale: f64) -> Option<ConvexVolume> {
+fn planes(rng: &mut SeededRng, count: usize, scale: f64) -> Option<ConvexVolume> {
     let planes = (0..count).map(|_| {
-        let axis = [Vec3::X, Vec3::Y, Vec3::Z][dice.below(3)];
-        let normal = match dice.below(3) {
+        let axis = [Vec3::X, Vec3::Y, Vec3::Z][rng.below(3)];
+        let normal = match rng.below(3) {
             0 => axis,
             1 => -axis,
-            _ => dice.normal3().as_vec3(),
+            _ => rng.normal3().as_vec3(),
         };
-        let through = grid_point(dice, scale);
-        let facing = if normal.dot(through) > 0.0 && dice.unit() < 0.8 {
+        let through = grid_point(rng, scale);
+        let facing = if normal.dot(through) > 0.0 && rng.unit() < 0.8 {
             -normal
         } else {
             normal
@@ -155,26 +155,31 @@ fn planes(dice: &mut Dice, count: usize, scale: f64) -> Option<ConvexVolume> {
     ConvexVolume::from_planes(&planes.collect::<Vec<_>>()).ok()
 }
 
-fn camera_volume(dice: &mut Dice, kind: usize, scale: f64, items: &[Aabb]) -> Option<ConvexVolume> {
-    let eye = grid_point(dice, scale).as_dvec3();
-    let axis = [DVec3::X, DVec3::Y, DVec3::Z][dice.below(3)];
-    let forward = if dice.unit() < 0.3 {
+fn camera_volume(
+    rng: &mut SeededRng,
+    kind: usize,
+    scale: f64,
+    items: &[Aabb],
+) -> Option<ConvexVolume> {
+    let eye = grid_point(rng, scale).as_dvec3();
+    let axis = [DVec3::X, DVec3::Y, DVec3::Z][rng.below(3)];
+    let forward = if rng.unit() < 0.3 {
         axis
     } else {
-        dice.normal3()
+        rng.normal3()
     };
-    let frame = Frame::looking_along(eye, forward, dice.normal3()).ok()?;
-    let near = scale * dice.between(0.001, 1.0);
-    let far = near + scale * dice.between(0.1, 16.0);
-    let fovy = dice.between(1.0, 175.0);
-    let aspect = dice.between(0.2, 4.0);
+    let frame = Frame::looking_along(eye, forward, rng.normal3()).ok()?;
+    let near = scale * rng.between(0.001, 1.0);
+    let far = near + scale * rng.between(0.1, 16.0);
+    let fovy = rng.between(1.0, 175.0);
+    let aspect = rng.between(0.2, 4.0);
     let lens = match kind {
         0 => Lens::perspective(fovy, aspect, near, Some(far)),
         1 => Lens::perspective(fovy, aspect, near, None),
-        2 => Lens::orthographic(scale * dice.between(0.1, 8.0), aspect, -near, far),
+        2 => Lens::orthographic(scale * rng.between(0.1, 8.0), aspect, -near, far),
         _ => {
-            let low = dice.between(-2.0, 0.5) * near;
-            let high = low + near * dice.between(0.1, 2.0);
+            let low = rng.between(-2.0, 0.5) * near;
+            let high = low + near * rng.between(0.1, 2.0);
             Lens::off_axis([low, high, -near, near * aspect], near, Some(far))
         }
     };
@@ -183,7 +188,7 @@ fn camera_volume(dice: &mut Dice, kind: usize, scale: f64, items: &[Aabb]) -> Op
         reach: Aabb::union_of(items).reach(),
     };
     let mut options = PlaneOptions::default();
-    if dice.unit() < 0.5 {
+    if rng.unit() < 0.5 {
         options.epsilon = 0.0;
     }
     let lens = lens.ok()?;

@@ -8,7 +8,7 @@ use cullbench::oracle::{Oracle, Pose, Verdict};
 use glam::DVec3;
 
 use crate::cases;
-use crate::draw::Dice;
+use crate::draw::SeededRng;
 use crate::simplex::{self, ExactPlane};
 use crate::wide::{Dyadic, Vector, along, cross, dot, pi, tangent, unit, vector};
 
@@ -114,23 +114,23 @@ impl View {
     }
 
     /// A point near the view's boundary, more often than not; in f64.
-    pub fn point(&self, dice: &mut Dice) -> DVec3 {
+    pub fn point(&self, rng: &mut SeededRng) -> DVec3 {
         let near = self.lens.near();
         let depth = match (self.lens, self.lens.far()) {
-            (Lens::Orthographic { far, .. }, _) => dice.between(near, far),
-            (_, Some(far)) => near * (far / near).powf(dice.between(-0.05, 1.05)),
-            (_, None) => near * dice.magnitude(-0.1, 6.0),
+            (Lens::Orthographic { far, .. }, _) => rng.between(near, far),
+            (_, Some(far)) => near * (far / near).powf(rng.between(-0.05, 1.05)),
+            (_, None) => near * rng.magnitude(-0.1, 6.0),
         };
         let spread = match self.lens {
             Lens::Orthographic { .. } => 1.0,
             _ => depth,
         };
         let [left, right, bottom, top] = self.window().map(|x| x.to_f64());
-        let mut share = || match dice.below(4) {
-            0 => -dice.magnitude(-6.0, 0.0),
-            1 => 1.0 + dice.magnitude(-6.0, 0.0),
-            2 => dice.between(-0.5, 1.5),
-            _ => dice.unit(),
+        let mut share = || match rng.below(4) {
+            0 => -rng.magnitude(-6.0, 0.0),
+            1 => 1.0 + rng.magnitude(-6.0, 0.0),
+            2 => rng.between(-0.5, 1.5),
+            _ => rng.unit(),
         };
         let x = (left + (right - left) * share()) * spread;
         let y = (bottom + (top - bottom) * share()) * spread;
@@ -219,35 +219,35 @@ pub const LENSES: [&str; 5] = [
 ];
 
 /// Angles, aspects and depths to the ends of what is usable.
-pub fn lens(kind: usize, dice: &mut Dice) -> Lens {
-    let near = dice.magnitude(-3.0, 3.0);
-    let far = near * (1.0 + dice.magnitude(-3.0, 9.0));
-    let aspect = match dice.below(3) {
-        0 => dice.magnitude(-8.0, 8.0),
-        _ => dice.between(0.3, 3.0),
+pub fn lens(kind: usize, rng: &mut SeededRng) -> Lens {
+    let near = rng.magnitude(-3.0, 3.0);
+    let far = near * (1.0 + rng.magnitude(-3.0, 9.0));
+    let aspect = match rng.below(3) {
+        0 => rng.magnitude(-8.0, 8.0),
+        _ => rng.between(0.3, 3.0),
     };
-    let fovy = match dice.below(6) {
-        0 => dice.magnitude(-9.0, -3.0),
-        1 => 180.0 - dice.magnitude(-7.0, -2.0),
-        2 => dice.magnitude(-3.0, 0.0),
-        _ => dice.between(1.0, 175.0),
+    let fovy = match rng.below(6) {
+        0 => rng.magnitude(-9.0, -3.0),
+        1 => 180.0 - rng.magnitude(-7.0, -2.0),
+        2 => rng.magnitude(-3.0, 0.0),
+        _ => rng.between(1.0, 175.0),
     };
     let far = [Some(far), None, Some(far), None, Some(far)][kind];
     let lens = match kind {
         0 | 1 => Lens::perspective(fovy, aspect, near, far),
         2 | 3 => {
             let mut edges = || {
-                let size = near * dice.magnitude(-2.0, 2.0);
-                let low = dice.between(-2.0, 1.0) * size;
+                let size = near * rng.magnitude(-2.0, 2.0);
+                let low = rng.between(-2.0, 1.0) * size;
                 [low, low + size]
             };
             let ([left, right], [bottom, top]) = (edges(), edges());
             Lens::off_axis([left, right, bottom, top], near, far)
         }
         _ => Lens::orthographic(
-            dice.magnitude(-3.0, 3.0),
+            rng.magnitude(-3.0, 3.0),
             aspect,
-            near * dice.between(-1.0, 0.9),
+            near * rng.between(-1.0, 0.9),
             far.expect("finite"),
         ),
     };
@@ -255,46 +255,46 @@ pub fn lens(kind: usize, dice: &mut Dice) -> Lens {
 }
 
 /// A pose and the origin of the boxes' coordinates.
-pub fn pose(dice: &mut Dice) -> (Pose, DVec3) {
-    let direction = |dice: &mut Dice| loop {
-        let v = DVec3::from_array([0; 3].map(|_| dice.between(-1.0, 1.0)));
+pub fn pose(rng: &mut SeededRng) -> (Pose, DVec3) {
+    let direction = |rng: &mut SeededRng| loop {
+        let v = DVec3::from_array([0; 3].map(|_| rng.between(-1.0, 1.0)));
         if v.length() > 0.1 {
             break v;
         }
     };
-    let axis = |dice: &mut Dice| [DVec3::X, -DVec3::Y, DVec3::Z][dice.below(3)];
-    let any = |dice: &mut Dice| {
-        if dice.chance(0.2) {
-            axis(dice)
+    let axis = |rng: &mut SeededRng| [DVec3::X, -DVec3::Y, DVec3::Z][rng.below(3)];
+    let any = |rng: &mut SeededRng| {
+        if rng.chance(0.2) {
+            axis(rng)
         } else {
-            direction(dice)
+            direction(rng)
         }
     };
-    let offset = match dice.below(3) {
+    let offset = match rng.below(3) {
         0 => 0.0,
-        1 => dice.magnitude(0.0, 15.0),
-        _ => dice.magnitude(-3.0, 3.0),
+        1 => rng.magnitude(0.0, 15.0),
+        _ => rng.magnitude(-3.0, 3.0),
     };
-    let eye = direction(dice) * offset;
+    let eye = direction(rng) * offset;
     // Rounded: the rest stays in the boxes' coordinates.
-    let origin = if dice.chance(0.5) {
+    let origin = if rng.chance(0.5) {
         eye.round()
     } else {
         DVec3::ZERO
     };
-    let mut forward = any(dice) * dice.magnitude(-30.0, 30.0);
-    if dice.chance(0.2) {
+    let mut forward = any(rng) * rng.magnitude(-30.0, 30.0);
+    if rng.chance(0.2) {
         // Look is the eye's neighbour, or nearly so.
-        forward = any(dice) * (offset * dice.magnitude(-15.5, -6.0));
+        forward = any(rng) * (offset * rng.magnitude(-15.5, -6.0));
     }
-    let mut up = any(dice) * dice.magnitude(-5.0, 5.0);
-    if dice.chance(0.4) {
+    let mut up = any(rng) * rng.magnitude(-5.0, 5.0);
+    if rng.chance(0.4) {
         // All but parallel to the view.
-        up = forward.normalize() + any(dice) * dice.magnitude(-15.0, -6.0);
-        up *= if dice.chance(0.5) { 1.0 } else { -3.3e4 };
+        up = forward.normalize() + any(rng) * rng.magnitude(-15.0, -6.0);
+        up *= if rng.chance(0.5) { 1.0 } else { -3.3e4 };
     }
     let look = eye + forward;
-    let pose = if dice.chance(0.5) && look != eye {
+    let pose = if rng.chance(0.5) && look != eye {
         Pose::LookAt { eye, look, up }
     } else {
         Pose::Forward { eye, forward, up }
@@ -307,10 +307,10 @@ fn random_cameras_of_every_lens() {
     const BOXES: usize = 8;
     let (mut verdicts, mut undecided, mut views) = ([0; 3], 0, 0);
     for seed in 0..(cases(3000) / BOXES) as u64 {
-        let mut dice = Dice::new(seed);
+        let mut rng = SeededRng::new(seed);
         let kind = seed as usize % LENSES.len();
-        let lens = lens(kind, &mut dice);
-        let (pose, origin) = pose(&mut dice);
+        let lens = lens(kind, &mut rng);
+        let (pose, origin) = pose(&mut rng);
         let Some(oracle) = Oracle::of_camera(&pose, &lens, origin) else {
             continue;
         };
@@ -319,11 +319,11 @@ fn random_cameras_of_every_lens() {
         let mut boxes = Vec::with_capacity(BOXES);
         let mut seen = Vec::with_capacity(BOXES);
         for _ in 0..BOXES {
-            let (a, b) = (view.point(&mut dice), view.point(&mut dice));
-            let share = if dice.chance(0.15) {
+            let (a, b) = (view.point(&mut rng), view.point(&mut rng));
+            let share = if rng.chance(0.15) {
                 1.0
             } else {
-                dice.magnitude(-6.0, 0.0)
+                rng.magnitude(-6.0, 0.0)
             };
             let (a, b) = (a.as_vec3(), (a + (b - a) * share).as_vec3());
             let b = Aabb::new(a.min(b), a.max(b));
@@ -499,7 +499,7 @@ fn sums_that_overflow_are_refused_and_would_have_lost_something() {
             assert!(line.contains("e38") && line.contains("expected") && !line.contains('\n'));
         }
         // Of the far plane x and y alone are beyond f32; z would bring it back.
-        let wide = camera.wide_volume(&told(p)).expect("planes in f64");
+        let wide = camera.convex_volume_f64(&told(p)).expect("planes in f64");
         assert!(wide.planes().iter().all(|plane| !plane.excludes(&corner)));
         let narrow = wide.planes().iter().map(|plane| plane.narrow());
         let mut narrow = narrow.filter(|plane| plane.excludes(&corner));

@@ -7,15 +7,15 @@ use cullbench::oracle::{Oracle, Pose, Verdict};
 use glam::{DVec3, Vec3};
 
 use crate::cases;
-use crate::draw::{Dice, grid_box};
+use crate::draw::{SeededRng, grid_box};
 use crate::simplex::{self, ExactPlane};
 use crate::wide::Dyadic;
 
 /// Three whole-number vectors at right angles, all of the same whole length
 /// (Euler and Rodrigues: a rotation by a whole quaternion).
-fn whole_frame(dice: &mut Dice) -> ([DVec3; 3], f64) {
+fn whole_frame(rng: &mut SeededRng) -> ([DVec3; 3], f64) {
     loop {
-        let [w, x, y, z] = [0; 4].map(|_| dice.whole(2) as f64);
+        let [w, x, y, z] = [0; 4].map(|_| rng.whole(2) as f64);
         let length = w * w + x * x + y * y + z * z;
         if length == 0.0 {
             continue;
@@ -43,17 +43,17 @@ fn whole_frame(dice: &mut Dice) -> ([DVec3; 3], f64) {
 
 /// Pose and lens in whole numbers and quarters, the origin of the boxes, the
 /// very planes, and points of the volume's edges, eye first.
-fn whole_camera(dice: &mut Dice) -> (Pose, Lens, DVec3, Vec<ExactPlane>, Vec<Vec3>) {
-    let ([right, up, back], length) = whole_frame(dice);
+fn whole_camera(rng: &mut SeededRng) -> (Pose, Lens, DVec3, Vec<ExactPlane>, Vec<Vec3>) {
+    let ([right, up, back], length) = whole_frame(rng);
     let forward = -back;
-    let eye = dice.whole3(4).as_dvec3();
-    let origin = dice.whole3(1).as_dvec3() * 1e6;
+    let eye = rng.whole3(4).as_dvec3();
+    let origin = rng.whole3(1).as_dvec3() * 1e6;
     // Depths in lengths of the frame's vectors, whose sums stay whole.
-    let (near, far) = (1.0, dice.chance(0.7).then(|| 2.0 + dice.below(3) as f64));
-    let quarters = |dice: &mut Dice, most: usize| 0.25 * (1 + dice.below(most)) as f64;
-    let (width, height) = (quarters(dice, 12), quarters(dice, 12));
-    let low = [0; 2].map(|_| 0.25 * dice.whole(8) as f64);
-    let kind = dice.below(3);
+    let (near, far) = (1.0, rng.chance(0.7).then(|| 2.0 + rng.below(3) as f64));
+    let quarters = |rng: &mut SeededRng, most: usize| 0.25 * (1 + rng.below(most)) as f64;
+    let (width, height) = (quarters(rng, 12), quarters(rng, 12));
+    let low = [0; 2].map(|_| 0.25 * rng.whole(8) as f64);
+    let kind = rng.below(3);
     let slopes = match kind {
         0 => [-width, width, -1.0, 1.0],
         1 => [low[0], low[0] + width, low[1], low[1] + height],
@@ -100,8 +100,8 @@ fn whole_camera(dice: &mut Dice) -> (Pose, Lens, DVec3, Vec<ExactPlane>, Vec<Vec
     let exact = planes
         .iter()
         .map(|(n, offset)| [n.x, n.y, n.z, offset - n.dot(eye)].map(Dyadic::from));
-    let scale = libm::exp2(dice.whole(100) as f64);
-    let pose = if dice.chance(0.5) {
+    let scale = libm::exp2(rng.whole(100) as f64);
+    let pose = if rng.chance(0.5) {
         Pose::Forward {
             eye: seen_from,
             forward: forward * scale,
@@ -121,15 +121,15 @@ fn whole_camera(dice: &mut Dice) -> (Pose, Lens, DVec3, Vec<ExactPlane>, Vec<Vec
 fn whole_number_cameras_whose_ties_are_exact() {
     let mut verdicts = [0; 3];
     for seed in 0..(cases(4000) / 8) as u64 {
-        let mut dice = Dice::new(seed);
-        let (pose, lens, origin, planes, tips) = whole_camera(&mut dice);
+        let mut rng = SeededRng::new(seed);
+        let (pose, lens, origin, planes, tips) = whole_camera(&mut rng);
         let oracle = Oracle::of_camera(&pose, &lens, origin).expect("a camera");
         for _ in 0..8 {
-            let tip = tips[dice.below(tips.len())];
-            let mut b = grid_box(&mut dice, tip);
-            if dice.chance(0.4) {
+            let tip = tips[rng.below(tips.len())];
+            let mut b = grid_box(&mut rng, tip);
+            if rng.chance(0.4) {
                 // A little beside the tie.
-                let by = dice.whole3(1) / 1024.0;
+                let by = rng.whole3(1) / 1024.0;
                 (b.min, b.max) = (b.min + by, b.max + by);
             }
             let wanted = simplex::verdict(&planes, &b);

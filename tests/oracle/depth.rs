@@ -6,7 +6,7 @@ use cullbench::oracle::{Oracle, Verdict};
 use cullbench::verify::RandomCase;
 use glam::{DVec3, Vec3};
 
-use crate::draw::Dice;
+use crate::draw::SeededRng;
 
 fn oracle(planes: &[(Vec3, f32)]) -> Oracle {
     let planes: Vec<Plane> = planes.iter().map(|&(n, d)| Plane::new(n, d)).collect();
@@ -57,7 +57,7 @@ fn no_move_shorter_than_the_depth_changes_the_verdict() {
     for seed in 0..1500 {
         let case = RandomCase::new(seed);
         let oracle = Oracle::of_volume(&case.volume);
-        let mut dice = Dice::new(seed);
+        let mut rng = SeededRng::new(seed);
         for b in case.items.iter().take(6) {
             let verdict = oracle.verdict(b);
             let depth = oracle.depth(b);
@@ -76,7 +76,7 @@ fn no_move_shorter_than_the_depth_changes_the_verdict() {
             };
             assert_eq!(verdict, wanted, "seed {seed}: {depth} for {b:?}");
             for _ in 0..8 {
-                let direction = DVec3::from_array([0; 3].map(|_| dice.between(-1.0, 1.0)));
+                let direction = DVec3::from_array([0; 3].map(|_| rng.between(-1.0, 1.0)));
                 let step = direction.normalize() * depth * 0.9;
                 let by = step.clamp_length_max(1e30).as_vec3();
                 let moved = Aabb::new(b.min + by, b.max + by);

@@ -4,11 +4,11 @@ use cullbench::geometry::Aabb;
 use glam::Vec3;
 
 /// SplitMix64 (Steele, Lea and Flood 2014).
-pub struct Dice(u64);
+pub struct SeededRng(u64);
 
-impl Dice {
-    pub fn new(seed: u64) -> Dice {
-        Dice(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15))
+impl SeededRng {
+    pub fn new(seed: u64) -> SeededRng {
+        SeededRng(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15))
     }
 
     pub fn bits(&mut self) -> u64 {
@@ -63,19 +63,19 @@ impl Dice {
 
 /// A box that begins, ends or has its inside at `point`, axis by axis; some
 /// are flat, some points.
-pub fn grid_box(dice: &mut Dice, point: Vec3) -> Aabb {
-    let reach = |dice: &mut Dice| {
-        let unit = if dice.chance(0.5) { 1.0 } else { 0.5 };
-        dice.below(4) as f32 * unit
+pub fn grid_box(rng: &mut SeededRng, point: Vec3) -> Aabb {
+    let reach = |rng: &mut SeededRng| {
+        let unit = if rng.chance(0.5) { 1.0 } else { 0.5 };
+        rng.below(4) as f32 * unit
     };
     let (mut low, mut high) = (point, point);
     for k in 0..3 {
-        let side = dice.below(5);
+        let side = rng.below(5);
         if side < 3 {
-            low[k] -= reach(dice);
+            low[k] -= reach(rng);
         }
         if side == 0 || side > 2 {
-            high[k] += reach(dice);
+            high[k] += reach(rng);
         }
     }
     Aabb::new(low, high)

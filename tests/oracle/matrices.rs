@@ -14,7 +14,7 @@ use glam::{DMat4, DVec3, Vec3};
 
 use crate::camera::{self, View, robust, safe_views_of};
 use crate::cases;
-use crate::draw::{Dice, grid_box};
+use crate::draw::{SeededRng, grid_box};
 use crate::simplex::{self, ExactPlane};
 use crate::wide::Dyadic;
 
@@ -64,39 +64,39 @@ fn planes(rows: &Entries, from_zero: bool, origin: DVec3) -> Vec<ExactPlane> {
 
 /// A matrix as some engine would have made it: of any lens with an eye, any
 /// depth, scaled, upside down, rounded to f32, or with entries that are off.
-fn matrix(dice: &mut Dice, pose: &Pose, lens: &Lens, from_zero: bool) -> Option<DMat4> {
-    let clip = match (from_zero, dice.chance(0.5)) {
+fn matrix(rng: &mut SeededRng, pose: &Pose, lens: &Lens, from_zero: bool) -> Option<DMat4> {
+    let clip = match (from_zero, rng.chance(0.5)) {
         (false, _) => ClipSpace::OpenGl,
         (true, false) => ClipSpace::D3d,
         (true, true) => ClipSpace::ReversedZ,
     };
     let mut matrix = lens.projection(clip) * pose.frame().ok()?.world_to_eye();
-    if dice.chance(0.3) {
+    if rng.chance(0.3) {
         matrix = DMat4::from_scale(DVec3::new(1.0, -1.0, 1.0)) * matrix;
     }
-    if dice.chance(0.3) {
-        matrix *= dice.magnitude(-6.0, 6.0);
+    if rng.chance(0.3) {
+        matrix *= rng.magnitude(-6.0, 6.0);
     }
     let mut entries = matrix.to_cols_array();
-    if dice.chance(0.4) {
+    if rng.chance(0.4) {
         entries = entries.map(|entry| f64::from(entry as f32));
     }
-    if dice.chance(0.2) {
-        entries = entries.map(|entry| entry * (1.0 + dice.between(-0.01, 0.01)));
+    if rng.chance(0.2) {
+        entries = entries.map(|entry| entry * (1.0 + rng.between(-0.01, 0.01)));
     }
     Some(DMat4::from_cols_array(&entries))
 }
 
 /// A point near the volume's surface, about `origin`.
-fn point(dice: &mut Dice, camera: &Camera, view: &View, origin: DVec3) -> DVec3 {
+fn point(rng: &mut SeededRng, camera: &Camera, view: &View, origin: DVec3) -> DVec3 {
     let Some(corners) = camera.lens.corners(&camera.frame) else {
-        return view.point(dice);
+        return view.point(rng);
     };
-    let mut share = || match dice.below(4) {
-        0 => -dice.magnitude(-6.0, 0.0),
-        1 => 1.0 + dice.magnitude(-6.0, 0.0),
-        2 => dice.between(-0.5, 1.5),
-        _ => dice.unit(),
+    let mut share = || match rng.below(4) {
+        0 => -rng.magnitude(-6.0, 0.0),
+        1 => 1.0 + rng.magnitude(-6.0, 0.0),
+        2 => rng.between(-0.5, 1.5),
+        _ => rng.unit(),
     };
     let [x, y, z] = [share(), share(), share()];
     let near = corners[0]
@@ -114,12 +114,12 @@ fn random_matrices_of_every_convention() {
     let (mut verdicts, mut refused, mut views) = ([0; 3], 0, 0);
     let rounds = cases(3000) / BOXES;
     for seed in 0..rounds as u64 {
-        let mut dice = Dice::new(seed ^ 0x5EED);
+        let mut rng = SeededRng::new(seed ^ 0x5EED);
         let (convention, name, _) = MATRIX_CONVENTIONS[seed as usize % 4];
         // All but the orthographic one.
-        let lens = camera::lens(dice.below(4), &mut dice);
-        let (pose, origin) = camera::pose(&mut dice);
-        let Some(matrix) = matrix(&mut dice, &pose, &lens, is_from_zero(convention)) else {
+        let lens = camera::lens(rng.below(4), &mut rng);
+        let (pose, origin) = camera::pose(&mut rng);
+        let Some(matrix) = matrix(&mut rng, &pose, &lens, is_from_zero(convention)) else {
             continue;
         };
         let made = Camera::of_matrix(written(&matrix, convention), convention);
@@ -139,8 +139,8 @@ fn random_matrices_of_every_convention() {
         let oracle = Oracle::of_camera(&pose, &camera.lens, origin).expect("a camera");
         let (mut boxes, mut seen) = (Vec::new(), Vec::new());
         for _ in 0..BOXES {
-            let [a, b] = [0; 2].map(|_| point(&mut dice, &camera, &view, origin));
-            let share = dice.magnitude(-6.0, 0.0);
+            let [a, b] = [0; 2].map(|_| point(&mut rng, &camera, &view, origin));
+            let share = rng.magnitude(-6.0, 0.0);
             let (a, b) = (a.as_vec3(), (a + (b - a) * share).as_vec3());
             let b = Aabb::new(a.min(b), a.max(b));
             if !b.is_finite() || b.reach().max_element() > 1e37 {
@@ -196,24 +196,24 @@ fn random_matrices_of_every_convention() {
 fn points_on_the_planes_of_matrices_are_not_lost() {
     let (mut visible, mut lost_bare) = (0, 0);
     for seed in 0..cases(3000) as u64 / 60 {
-        let mut dice = Dice::new(seed ^ 0xFACE);
+        let mut rng = SeededRng::new(seed ^ 0xFACE);
         let (convention, name, _) = MATRIX_CONVENTIONS[seed as usize % 4];
-        let direction = |dice: &mut Dice| {
-            DVec3::from_array([0; 3].map(|_| dice.between(-1.0, 1.0))) + DVec3::splat(1e-3)
+        let direction = |rng: &mut SeededRng| {
+            DVec3::from_array([0; 3].map(|_| rng.between(-1.0, 1.0))) + DVec3::splat(1e-3)
         };
-        let eye = direction(&mut dice) * dice.magnitude(0.0, 7.0);
-        let (forward, up) = (direction(&mut dice), DVec3::Z);
+        let eye = direction(&mut rng) * rng.magnitude(0.0, 7.0);
+        let (forward, up) = (direction(&mut rng), DVec3::Z);
         let pose = Pose::Forward { eye, forward, up };
-        let near = dice.magnitude(-2.0, 1.0);
-        let far = dice.chance(0.7).then_some(near * dice.magnitude(1.0, 5.0));
-        let lens = Lens::perspective(dice.between(10.0, 150.0), 1.5, near, far);
+        let near = rng.magnitude(-2.0, 1.0);
+        let far = rng.chance(0.7).then_some(near * rng.magnitude(1.0, 5.0));
+        let lens = Lens::perspective(rng.between(10.0, 150.0), 1.5, near, far);
         let lens = lens.expect("a lens");
-        let matrix = matrix(&mut dice, &pose, &lens, is_from_zero(convention));
+        let matrix = matrix(&mut rng, &pose, &lens, is_from_zero(convention));
         let entries = written(&matrix.expect("a matrix"), convention);
         let Ok(camera) = Camera::of_matrix(entries, convention) else {
             continue;
         };
-        let origin = if dice.chance(0.5) {
+        let origin = if rng.chance(0.5) {
             eye.round()
         } else {
             DVec3::ZERO
@@ -222,7 +222,7 @@ fn points_on_the_planes_of_matrices_are_not_lost() {
             origin,
             ..Surroundings::default()
         };
-        let faces = camera.wide_volume(&around).expect("planes");
+        let faces = camera.convex_volume_f64(&around).expect("planes");
         let mut points = points_on_faces(&camera, origin, faces.planes());
         points.retain(|b| b.is_finite());
         let oracle = Oracle::of_camera(&Pose::of(&camera), &camera.lens, origin);
@@ -314,12 +314,12 @@ fn whole_matrices_see_what_their_planes_say_under_every_name() {
         planes.extend(far.map(|far| plane([0.0, 0.0, 1.0, far])));
         let pose = Pose::of(&camera);
         let oracle = Oracle::of_camera(&pose, &camera.lens, DVec3::ZERO).expect(&what);
-        let mut dice = Dice::new(7);
+        let mut rng = SeededRng::new(7);
         let mut touching = 0;
         let mut boxes = Vec::new();
         for _ in 0..2000 {
-            let at = dice.whole3(5) + Vec3::new(0.0, 0.0, -2.0);
-            let b = grid_box(&mut dice, at);
+            let at = rng.whole3(5) + Vec3::new(0.0, 0.0, -2.0);
+            let b = grid_box(&mut rng, at);
             let wanted = simplex::verdict(&planes, &b);
             assert_eq!(oracle.verdict(&b), wanted, "{b:?}: {what}");
             touching += u32::from(wanted == Verdict::Touch);
@@ -349,11 +349,11 @@ fn whole_matrices_see_what_their_planes_say_under_every_name() {
 fn a_matrix_of_a_known_camera_sees_what_the_camera_sees() {
     let mut differing = 0;
     for seed in 0..cases(3000) as u64 / 100 {
-        let mut dice = Dice::new(seed);
-        let eye = DVec3::from_array([0; 3].map(|_| dice.between(-100.0, 100.0)));
-        let look = DVec3::from_array([0; 3].map(|_| dice.between(-100.0, 100.0)));
+        let mut rng = SeededRng::new(seed);
+        let eye = DVec3::from_array([0; 3].map(|_| rng.between(-100.0, 100.0)));
+        let look = DVec3::from_array([0; 3].map(|_| rng.between(-100.0, 100.0)));
         let far = (seed % 3 > 0).then_some(300.0);
-        let lens = Lens::perspective(dice.between(20.0, 120.0), 1.5, 0.5, far);
+        let lens = Lens::perspective(rng.between(20.0, 120.0), 1.5, 0.5, far);
         let known = Camera {
             frame: look_at(eye, look, DVec3::Z).expect("a frame"),
             lens: lens.expect("a lens"),
@@ -371,8 +371,8 @@ fn a_matrix_of_a_known_camera_sees_what_the_camera_sees() {
         assert!((camera.lens.near() / 0.5 - 1.0).abs() < 1e-9);
         let boxes: Vec<Aabb> = (0..2000)
             .map(|_| {
-                let at = Vec3::from_array([0; 3].map(|_| dice.between(-200.0, 200.0) as f32));
-                Aabb::around(at, Vec3::splat(dice.between(0.0, 9.0) as f32))
+                let at = Vec3::from_array([0; 3].map(|_| rng.between(-200.0, 200.0) as f32));
+                Aabb::around(at, Vec3::splat(rng.between(0.0, 9.0) as f32))
             })
             .collect();
         let by_pose = Oracle::of_camera(&Pose::of(&known), &known.lens, DVec3::ZERO);

@@ -214,22 +214,22 @@ fn by_corners(planes: &[[i128; 4]], low: [i128; 3], high: [i128; 3]) -> Verdict 
 
 #[test]
 fn the_linear_program_agrees_with_corners_found_by_brute_force() {
-    let mut dice = crate::draw::Dice::new(1);
+    let mut rng = crate::draw::SeededRng::new(1);
     let mut seen = [0; 3];
     for case in 0..3000 {
-        let count = 1 + dice.below(6);
+        let count = 1 + rng.below(6);
         let planes: Vec<[i128; 4]> = (0..count)
             .map(|_| {
                 loop {
-                    let p = [1, 1, 2, 2].map(|reach| i128::from(dice.whole(reach)));
+                    let p = [1, 1, 2, 2].map(|reach| i128::from(rng.whole(reach)));
                     if p[..3] != [0; 3] {
                         break p;
                     }
                 }
             })
             .collect();
-        let low = [0; 3].map(|_| i128::from(dice.whole(3)));
-        let high = low.map(|x| x + dice.below(3) as i128);
+        let low = [0; 3].map(|_| i128::from(rng.whole(3)));
+        let high = low.map(|x| x + rng.below(3) as i128);
         let exact: Vec<ExactPlane> = planes
             .iter()
             .map(|p| p.map(|x| Dyadic::from(x as f32)))

@@ -57,7 +57,7 @@ impl Isa for Avx2 {
         [unsafe { _mm256_set1_ps(x) }; 2]
     }
     #[inline(always)]
-    fn pick(self, from: &[f32; 4], picks: u32) -> [__m256; 2] {
+    fn permute(self, from: &[f32; 4], picks: u32) -> [__m256; 2] {
         each!(2, |i| unsafe {
             let four = _mm_loadu_ps(from.as_ptr());
             let four = _mm256_set_m128(four, four);
@@ -76,7 +76,7 @@ impl Isa for Avx2 {
         each!(2, |i| unsafe { _mm256_mul_ps(a[i], b[i]) })
     }
     #[inline(always)]
-    fn lower(self, a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
+    fn min(self, a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
         each!(2, |i| unsafe { _mm256_min_ps(a[i], b[i]) })
     }
     #[inline(always)]
@@ -117,7 +117,7 @@ impl Isa for Avx2 {
         [unsafe { _mm256_set1_epi32(x as i32) }; 2]
     }
     #[inline(always)]
-    fn counting(self, first: u32) -> [__m256i; 2] {
+    fn iota(self, first: u32) -> [__m256i; 2] {
         each!(2, |i| unsafe {
             let from = _mm256_set1_epi32(first.wrapping_add(8 * i as u32) as i32);
             _mm256_add_epi32(from, _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7))
@@ -151,7 +151,7 @@ impl Isa for Avx2 {
         }))
     }
     #[inline(always)]
-    fn pack(self, place: &mut [u32; LANES], words: [__m256i; 2], lanes: LaneMask) {
+    fn compress(self, place: &mut [u32; LANES], words: [__m256i; 2], lanes: LaneMask) {
         // SAFETY: sixteen words may be written.
         unsafe { self.pack_to(place.as_mut_ptr(), words, lanes) };
     }

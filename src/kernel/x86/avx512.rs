@@ -56,7 +56,7 @@ impl Isa for Avx512 {
         unsafe { _mm512_set1_ps(x) }
     }
     #[inline(always)]
-    fn pick(self, from: &[f32; 4], picks: u32) -> __m512 {
+    fn permute(self, from: &[f32; 4], picks: u32) -> __m512 {
         unsafe {
             let four = _mm512_broadcast_f32x4(_mm_loadu_ps(from.as_ptr()));
             let lanes =
@@ -75,7 +75,7 @@ impl Isa for Avx512 {
         unsafe { _mm512_mul_ps(a, b) }
     }
     #[inline(always)]
-    fn lower(self, a: __m512, b: __m512) -> __m512 {
+    fn min(self, a: __m512, b: __m512) -> __m512 {
         unsafe { _mm512_min_ps(a, b) }
     }
     #[inline(always)]
@@ -107,7 +107,7 @@ impl Isa for Avx512 {
         unsafe { _mm512_set1_epi32(x as i32) }
     }
     #[inline(always)]
-    fn counting(self, first: u32) -> __m512i {
+    fn iota(self, first: u32) -> __m512i {
         unsafe {
             let lanes = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
             _mm512_add_epi32(_mm512_set1_epi32(first as i32), lanes)
@@ -130,7 +130,7 @@ impl Isa for Avx512 {
         unsafe { _mm512_cmpeq_epi32_mask(words, _mm512_set1_epi32(x as i32)) }
     }
     #[inline(always)]
-    fn pack(self, place: &mut [u32; LANES], words: __m512i, lanes: LaneMask) {
+    fn compress(self, place: &mut [u32; LANES], words: __m512i, lanes: LaneMask) {
         // SAFETY: sixteen words may be written.
         unsafe { self.pack_to(place.as_mut_ptr(), words, lanes) };
     }

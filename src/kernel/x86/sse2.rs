@@ -38,7 +38,7 @@ impl Isa for Sse2 {
         [unsafe { _mm_set1_ps(x) }; 4]
     }
     #[inline(always)]
-    fn pick(self, from: &[f32; 4], picks: u32) -> [__m128; 4] {
+    fn permute(self, from: &[f32; 4], picks: u32) -> [__m128; 4] {
         each!(4, |i| unsafe {
             // The two bits of a lane, each as a mask.
             let here = _mm_set1_epi32((picks >> (8 * i)) as i32);
@@ -59,7 +59,7 @@ impl Isa for Sse2 {
         each!(4, |i| unsafe { _mm_mul_ps(a[i], b[i]) })
     }
     #[inline(always)]
-    fn lower(self, a: [__m128; 4], b: [__m128; 4]) -> [__m128; 4] {
+    fn min(self, a: [__m128; 4], b: [__m128; 4]) -> [__m128; 4] {
         each!(4, |i| unsafe { _mm_min_ps(a[i], b[i]) })
     }
     #[inline(always)]
@@ -96,7 +96,7 @@ impl Isa for Sse2 {
         [unsafe { _mm_set1_epi32(x as i32) }; 4]
     }
     #[inline(always)]
-    fn counting(self, first: u32) -> [__m128i; 4] {
+    fn iota(self, first: u32) -> [__m128i; 4] {
         each!(4, |i| unsafe {
             let from = _mm_set1_epi32(first.wrapping_add(4 * i as u32) as i32);
             _mm_add_epi32(from, _mm_setr_epi32(0, 1, 2, 3))
@@ -128,7 +128,7 @@ impl Isa for Sse2 {
         }))
     }
     #[inline(always)]
-    fn pack(self, place: &mut [u32; LANES], words: [__m128i; 4], lanes: LaneMask) {
+    fn compress(self, place: &mut [u32; LANES], words: [__m128i; 4], lanes: LaneMask) {
         // SAFETY: sixteen words may be written.
         unsafe { self.pack_to(place.as_mut_ptr(), words, lanes) };
     }

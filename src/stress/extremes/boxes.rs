@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 
 use crate::camera::{Camera, Surroundings};
 use crate::geometry::Aabb;
-use crate::scene::Dice;
+use crate::scene::SeededRng;
 
 /// What the boxes of a case look like.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -46,7 +46,7 @@ impl Hull {
             frame: camera.frame,
         };
         // Only as a hint where inside is.
-        let planes = camera.wide_volume(around).ok()?;
+        let planes = camera.convex_volume_f64(around).ok()?;
         let normals: Vec<DVec3> = planes.planes().iter().map(|p| p.normal).collect();
         Some(Hull {
             corners: lens.corners(&frame)?,
@@ -66,7 +66,7 @@ impl Hull {
 /// `count` boxes about a camera's volume, in scene-local coordinates. One in
 /// 64 is inverted, and so empty. None if the lens has no corners.
 pub fn adversarial(
-    dice: &mut Dice,
+    rng: &mut SeededRng,
     camera: &Camera,
     around: &Surroundings,
     shapes: Shapes,
@@ -80,11 +80,11 @@ pub fn adversarial(
             boxes.push(again);
             continue;
         }
-        let mut b = match dice.below(8) {
-            0 => astray(dice, &hull),
-            _ => touching(dice, &hull, shapes),
+        let mut b = match rng.below(8) {
+            0 => astray(rng, &hull),
+            _ => touching(rng, &hull, shapes),
         };
-        if dice.below(64) == 0 {
+        if rng.below(64) == 0 {
             b = Aabb::new(b.max, b.min);
         }
         boxes.push(b);
@@ -93,28 +93,28 @@ pub fn adversarial(
 }
 
 /// A box whose corner, edge or face meets the hull where it was aimed.
-fn touching(dice: &mut Dice, hull: &Hull, shapes: Shapes) -> Aabb {
+fn touching(rng: &mut SeededRng, hull: &Hull, shapes: Shapes) -> Aabb {
     // Anywhere between near and far, every order of magnitude alike.
-    let depth = libm::exp2(-dice.between(0.0, 14.0));
-    let mut at = [dice.unit(), dice.unit(), depth];
+    let depth = libm::exp2(-rng.between(0.0, 14.0));
+    let mut at = [rng.unit(), rng.unit(), depth];
     let mut faces: Vec<DVec3> = Vec::with_capacity(3);
-    let first = dice.below(3);
-    for step in 0..[1, 2, 2, 3][dice.below(4)] {
+    let first = rng.below(3);
+    for step in 0..[1, 2, 2, 3][rng.below(4)] {
         let axis = (first + step) % 3;
-        let high = dice.below(2);
+        let high = rng.below(2);
         at[axis] = high as f64;
         faces.push(hull.normals[2 * axis + high]);
     }
     let (mut inward, mut both) = (faces.iter().sum::<DVec3>(), [false; 3]);
-    let axis = dice.below(3);
+    let axis = rng.below(3);
     match faces[..] {
         // An edge against an edge of the box along this axis.
-        [a, b, ..] if a[axis] * b[axis] < 0.0 && dice.below(2) == 0 => {
+        [a, b, ..] if a[axis] * b[axis] < 0.0 && rng.below(2) == 0 => {
             inward = a * b[axis].abs() + b * a[axis].abs();
             both[axis] = true;
         }
         // A corner against a face of the box across this axis.
-        [_, _, _] if dice.below(2) == 0 => {
+        [_, _, _] if rng.below(2) == 0 => {
             both = [0, 1, 2].map(|k| k != axis);
         }
         _ => {}
@@ -125,9 +125,9 @@ fn touching(dice: &mut Dice, hull: &Hull, shapes: Shapes) -> Aabb {
     }
     let scale = (hull.at([0.5, 0.5, at[2]]) - hull.at([0.0, 0.0, at[2]])).length();
     let (mut min, mut max) = (p.as_vec3(), p.as_vec3());
-    let sizes = sizes(dice, shapes, scale);
+    let sizes = sizes(rng, shapes, scale);
     for k in 0..3 {
-        let ulps = dice.below(5) as i32 - 2;
+        let ulps = rng.below(5) as i32 - 2;
         let corner = shifted(p[k] as f32, ulps);
         let (low, high) = (p[k] - sizes[k], p[k] + sizes[k]);
         (min[k], max[k]) = if both[k] {
@@ -144,39 +144,39 @@ fn touching(dice: &mut Dice, hull: &Hull, shapes: Shapes) -> Aabb {
 
 /// A box well inside, beside, behind or before the volume: a plane that is
 /// missing or far off shows here.
-fn astray(dice: &mut Dice, hull: &Hull) -> Aabb {
-    let wide = |dice: &mut Dice| dice.between(-0.5, 1.5);
-    let (s, t) = (wide(dice), wide(dice));
+fn astray(rng: &mut SeededRng, hull: &Hull) -> Aabb {
+    let wide = |rng: &mut SeededRng| rng.between(-0.5, 1.5);
+    let (s, t) = (wide(rng), wide(rng));
     // The size of near against the depth of the volume.
     let near = (hull.corners[0] - hull.corners[3]).length();
     let far = (hull.corners[4] - hull.corners[7]).length();
     let before = (near / (far - near).max(near)).min(1.0);
-    let w = match dice.below(3) {
-        0 => dice.unit(),
-        1 => 1.0 + dice.unit(),
-        _ => -dice.unit() * before,
+    let w = match rng.below(3) {
+        0 => rng.unit(),
+        1 => 1.0 + rng.unit(),
+        _ => -rng.unit() * before,
     };
     let p = hull.at([s, t, w]);
-    let size = near * libm::exp2(dice.between(-8.0, 1.0));
-    let half = dice.point() * size;
+    let size = near * libm::exp2(rng.between(-8.0, 1.0));
+    let half = rng.point() * size;
     let limit = DVec3::splat(f64::from(f32::MAX));
     let [low, high] = [p - half, p + half].map(|corner| corner.clamp(-limit, limit));
     Aabb::new(low.as_vec3(), high.as_vec3())
 }
 
 /// Edge lengths for a volume that is `scale` wide where the box is.
-fn sizes(dice: &mut Dice, shapes: Shapes, scale: f64) -> [f64; 3] {
-    let edge = scale * libm::exp2(dice.between(-6.0, 0.0));
+fn sizes(rng: &mut SeededRng, shapes: Shapes, scale: f64) -> [f64; 3] {
+    let edge = scale * libm::exp2(rng.between(-6.0, 0.0));
     match shapes {
-        Shapes::Grid => [0, 1, 2].map(|_| dice.below(9) as f64 / 4.0),
-        Shapes::Ratio => [scale * [1e-3, 1e3][dice.below(2)]; 3],
-        Shapes::Needles => [0, 1, 2].map(|_| [0.0, edge * 64.0][dice.below(2)]),
-        Shapes::Mixed | Shapes::Coincident => match dice.below(6) {
+        Shapes::Grid => [0, 1, 2].map(|_| rng.below(9) as f64 / 4.0),
+        Shapes::Ratio => [scale * [1e-3, 1e3][rng.below(2)]; 3],
+        Shapes::Needles => [0, 1, 2].map(|_| [0.0, edge * 64.0][rng.below(2)]),
+        Shapes::Mixed | Shapes::Coincident => match rng.below(6) {
             0 => [0.0; 3],
-            1 => [0, 1, 2].map(|_| [0.0, edge][dice.below(2)]),
+            1 => [0, 1, 2].map(|_| [0.0, edge][rng.below(2)]),
             2 => [edge * 1e-5; 3],
-            3 => [0, 1, 2].map(|_| edge * 1e3 * dice.unit()),
-            4 => [0, 1, 2].map(|_| edge * dice.unit()),
+            3 => [0, 1, 2].map(|_| edge * 1e3 * rng.unit()),
+            4 => [0, 1, 2].map(|_| edge * rng.unit()),
             _ => [edge; 3],
         },
     }

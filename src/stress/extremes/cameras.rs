@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::boxes::Shapes;
 use crate::camera::{CameraError, Lens, PlaneMethod, PlaneOptions};
 use crate::oracle::Pose;
-use crate::scene::Dice;
+use crate::scene::SeededRng;
 
 /// A camera to be built, as exact numbers.
 pub struct Setup {
@@ -32,7 +32,7 @@ pub struct CameraFamily {
     /// How a variant is named in ids.
     pub label: fn(f64) -> String,
     /// Draws a camera for a parameter.
-    pub setup: fn(&mut Dice, f64) -> Result<Setup, CameraError>,
+    pub setup: fn(&mut SeededRng, f64) -> Result<Setup, CameraError>,
 }
 
 /// All families of cameras, in the order of the table of results.
@@ -42,8 +42,8 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = &[
         // Far / near from 1e3 to 1e9, and infinite.
         variants: &[1e3, 1e6, 1e9, f64::INFINITY],
         label: plain,
-        setup: |dice, ratio| {
-            let mut draft = Draft::any(dice);
+        setup: |rng, ratio| {
+            let mut draft = Draft::any(rng);
             draft.depth(ratio);
             draft.perspective()
         },
@@ -53,8 +53,8 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = &[
         // The same with planes from a reversed-Z matrix in f64.
         variants: &[1e3, 1e6, 1e9, f64::INFINITY],
         label: plain,
-        setup: |dice, ratio| {
-            let mut draft = Draft::any(dice);
+        setup: |rng, ratio| {
+            let mut draft = Draft::any(rng);
             draft.depth(ratio);
             draft.planes.method = PlaneMethod::GhRevzF64;
             draft.perspective()
@@ -75,8 +75,8 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = &[
             179.9999999,
         ],
         label: plain,
-        setup: |dice, fov| {
-            let mut draft = Draft::any(dice);
+        setup: |rng, fov| {
+            let mut draft = Draft::any(rng);
             draft.fovy_deg = fov;
             draft.perspective()
         },
@@ -86,8 +86,8 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = &[
         // Width / height from 1e-8 to 1e8.
         variants: &[1e-8, 1e-4, 1e-2, 1e2, 1e4, 1e8],
         label: plain,
-        setup: |dice, aspect| {
-            let mut draft = Draft::any(dice);
+        setup: |rng, aspect| {
+            let mut draft = Draft::any(rng);
             draft.aspect = aspect;
             draft.perspective()
         },
@@ -97,9 +97,9 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = &[
         // A camera 1e4 to 1e15 depths of 1 away from the scene's zero.
         variants: &[1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e12, 1e15],
         label: plain,
-        setup: |dice, offset| {
-            let mut draft = Draft::any(dice);
-            draft.eye += dice.point().map(|c| (c - 0.5).signum() * offset);
+        setup: |rng, offset| {
+            let mut draft = Draft::any(rng);
+            draft.eye += rng.point().map(|c| (c - 0.5).signum() * offset);
             draft.perspective()
         },
     },
@@ -108,9 +108,9 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = &[
         // The same in coordinates about a point near the camera.
         variants: &[1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e12, 1e15],
         label: plain,
-        setup: |dice, offset| {
-            let mut draft = Draft::any(dice);
-            draft.eye += dice.point().map(|c| (c - 0.5).signum() * offset);
+        setup: |rng, offset| {
+            let mut draft = Draft::any(rng);
+            draft.eye += rng.point().map(|c| (c - 0.5).signum() * offset);
             draft.origin = draft.eye.round();
             draft.perspective()
         },
@@ -120,15 +120,15 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = &[
         // Up within 1e-6 to 1e-15 rad of the direction of view.
         variants: &[1e-6, 1e-9, 1e-11, 1e-13, 1e-14, 1e-15],
         label: plain,
-        setup: |dice, angle| {
-            let mut draft = Draft::any(dice);
-            draft.to_look = dice.below(2) == 0;
+        setup: |rng, angle| {
+            let mut draft = Draft::any(rng);
+            draft.to_look = rng.below(2) == 0;
             let (forward, across) = (draft.forward, draft.up);
             loop {
                 // Along the view as f64 has it, and hardly away from it.
-                let length = libm::exp2(dice.between(-4.0, 4.0));
+                let length = libm::exp2(rng.between(-4.0, 4.0));
                 let across = across * (angle * forward.length() / across.length());
-                draft.up = (forward + across * dice.between(0.9, 1.5)) * length;
+                draft.up = (forward + across * rng.between(0.9, 1.5)) * length;
                 if draft.pose().frame().is_ok() {
                     break draft.perspective();
                 }
@@ -140,8 +140,8 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = &[
         // Eye and look 1e-6 to 1e-15 of their coordinates apart.
         variants: &[1e-6, 1e-9, 1e-12, 1e-15],
         label: plain,
-        setup: |dice, share| loop {
-            let mut draft = Draft::any(dice);
+        setup: |rng, share| loop {
+            let mut draft = Draft::any(rng);
             draft.to_look = true;
             let size = draft.eye.abs().max_element();
             draft.forward *= 4.0 * share * size / draft.forward.length();
@@ -155,8 +155,8 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = &[
         // A volume about zero, seen from 1e3 to 1e15 depths away.
         variants: &[1e3, 1e6, 1e9, 1e12, 1e15],
         label: plain,
-        setup: |dice, distance| {
-            let mut draft = Draft::any(dice);
+        setup: |rng, distance| {
+            let mut draft = Draft::any(rng);
             let half = draft.far.unwrap_or(1.0) / 2.0;
             let distance = distance * half;
             draft.eye = draft.forward.normalize() * -distance;
@@ -172,8 +172,8 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = &[
             -148.0, -140.0, -126.0, -100.0, -60.0, 60.0, 100.0, 120.0, 122.0, 124.0, 127.0,
         ],
         label: |power| format!("2^{power}"),
-        setup: |dice, power| {
-            let mut draft = Draft::any(dice);
+        setup: |rng, power| {
+            let mut draft = Draft::any(rng);
             draft.scale(libm::exp2(power));
             draft.perspective()
         },
@@ -183,31 +183,31 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = &[
         // Boxes 1e-3 and 1e3 times as wide as the view, side by side.
         variants: &[1e6],
         label: plain,
-        setup: |dice, _| Draft::any(dice).shaped(Shapes::Ratio).perspective(),
+        setup: |rng, _| Draft::any(rng).shaped(Shapes::Ratio).perspective(),
     },
     CameraFamily {
         name: "coincident",
         // Sixteen boxes, over and over.
         variants: &[16.0],
         label: plain,
-        setup: |dice, _| Draft::any(dice).shaped(Shapes::Coincident).perspective(),
+        setup: |rng, _| Draft::any(rng).shaped(Shapes::Coincident).perspective(),
     },
     CameraFamily {
         name: "needles",
         // Lines, plates and points without thickness.
         variants: &[64.0],
         label: plain,
-        setup: |dice, _| Draft::any(dice).shaped(Shapes::Needles).perspective(),
+        setup: |rng, _| Draft::any(rng).shaped(Shapes::Needles).perspective(),
     },
     CameraFamily {
         name: "ties",
         // A 90 degree camera on a grid of integers with its boxes: exact ties and one-ulp shifts.
         variants: &[8.0, 64.0, 4096.0],
         label: plain,
-        setup: |dice, far| {
-            let mut draft = Draft::any(dice).shaped(Shapes::Grid);
+        setup: |rng, far| {
+            let mut draft = Draft::any(rng).shaped(Shapes::Grid);
             draft.eye = draft.eye.round();
-            draft.forward = [DVec3::X, -DVec3::Y, DVec3::Z][dice.below(3)];
+            draft.forward = [DVec3::X, -DVec3::Y, DVec3::Z][rng.below(3)];
             draft.up = DVec3::new(draft.forward.z, draft.forward.x, draft.forward.y);
             (draft.fovy_deg, draft.aspect) = (90.0, 1.0);
             (draft.near, draft.far) = (1.0, Some(far));
@@ -219,14 +219,14 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = &[
         // Orthographic, off-axis, and off-axis without a far plane.
         variants: &[0.0, 1.0, 2.0],
         label: |kind| ["orthographic", "off-axis", "off-axis inf"][kind as usize].to_owned(),
-        setup: |dice, kind| {
-            let draft = Draft::any(dice);
+        setup: |rng, kind| {
+            let draft = Draft::any(rng);
             let half = draft.near * libm::tan(draft.fovy_deg.to_radians() / 2.0);
-            let shift = half * dice.between(-3.0, 3.0);
+            let shift = half * rng.between(-3.0, 3.0);
             let window = [shift - half, shift + half, -half, half * draft.aspect];
             let far = draft.far.unwrap_or(1.0);
             let lens = match kind as u32 {
-                0 => Lens::orthographic(far * dice.unit().max(0.01), draft.aspect, -far, far),
+                0 => Lens::orthographic(far * rng.unit().max(0.01), draft.aspect, -far, far),
                 1 => Lens::off_axis(window, draft.near, draft.far),
                 _ => Lens::off_axis(window, draft.near, None),
             };
@@ -262,24 +262,24 @@ struct Draft {
 impl Draft {
     /// Ordinary in every way: some 10 deep, within some 10 of zero; along an
     /// axis one time in four.
-    fn any(dice: &mut Dice) -> Draft {
+    fn any(rng: &mut SeededRng) -> Draft {
         let (forward, up) = loop {
-            let (mut forward, up) = (dice.normal3(), dice.normal3());
-            if dice.below(4) == 0 {
-                forward = [DVec3::X, DVec3::Y, -DVec3::Z][dice.below(3)];
+            let (mut forward, up) = (rng.normal3(), rng.normal3());
+            if rng.below(4) == 0 {
+                forward = [DVec3::X, DVec3::Y, -DVec3::Z][rng.below(3)];
             }
             if forward.cross(up).length() > 0.01 * forward.length() * up.length() {
                 break (forward, up);
             }
         };
-        let far = libm::exp2(dice.between(1.0, 5.0));
+        let far = libm::exp2(rng.between(1.0, 5.0));
         Draft {
-            eye: (dice.point() - 0.5) * 20.0,
+            eye: (rng.point() - 0.5) * 20.0,
             forward,
             up,
-            fovy_deg: dice.between(20.0, 120.0),
-            aspect: dice.between(0.4, 2.5),
-            near: far / libm::exp2(dice.between(2.0, 8.0)),
+            fovy_deg: rng.between(20.0, 120.0),
+            aspect: rng.between(0.4, 2.5),
+            near: far / libm::exp2(rng.between(2.0, 8.0)),
             far: Some(far),
             origin: DVec3::ZERO,
             planes: PlaneOptions::default(),

@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use super::{Level, Row, Section, Status, surroundings};
 use crate::camera::Camera;
 use crate::index::StructureSpec;
-use crate::scene::Dice;
+use crate::scene::SeededRng;
 
 pub use boxes::Shapes;
 use boxes::adversarial;
@@ -217,8 +217,8 @@ pub fn camera_case(family: &CameraFamily, variant: f64, seed: u64) -> Result<Cas
     let words = name.fold(seed, |hash, byte| {
         hash.rotate_left(9).wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ u64::from(byte)
     });
-    let dice = &mut Dice::new(words);
-    let setup = (family.setup)(dice, variant).map_err(|error| error.to_string())?;
+    let rng = &mut SeededRng::new(words);
+    let setup = (family.setup)(rng, variant).map_err(|error| error.to_string())?;
     let frame = setup.pose.frame().map_err(|error| error.to_string())?;
     let camera = Camera {
         frame,
@@ -226,7 +226,7 @@ pub fn camera_case(family: &CameraFamily, variant: f64, seed: u64) -> Result<Cas
     };
     let mut around = surroundings(&[]);
     around.origin = setup.origin;
-    let items = adversarial(dice, &camera, &around, setup.shapes, BOXES);
+    let items = adversarial(rng, &camera, &around, setup.shapes, BOXES);
     let items = items.ok_or("a lens without corners")?;
     around.reach = surroundings(&items).reach;
     let case = Case::new(camera, &setup.pose, setup.planes, around, items);

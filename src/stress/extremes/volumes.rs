@@ -6,12 +6,12 @@ use glam::Vec3;
 
 use super::check::{Findings, SCALAR};
 use crate::geometry::{
-    Aabb, ConvexVolume, Plane, RelativeVolume, Spheres, WideVolume, sphere_cube,
+    Aabb, ConvexVolume, ConvexVolumeF64, Plane, RelativeVolume, Spheres, sphere_cube,
 };
 use crate::index::StructureSpec;
 use crate::oracle::{Oracle, Verdict};
 use crate::query::{AnyVolume, ItemId};
-use crate::scene::{Dice, Regions};
+use crate::scene::{Regions, SeededRng};
 use crate::verify::{RandomCase, Trial, VOLUME_KINDS, explain_visibility};
 
 /// A volume and boxes, at planes level.
@@ -67,10 +67,10 @@ pub static PLANES_FAMILIES: &[PlanesFamily] = &[
 /// Normals of -1, 0 and 1, offsets and bounds of whole multiples of the least
 /// number: no operation rounds, and all of them work on denormals.
 fn denormals(seed: u64) -> PlanesCase {
-    let mut dice = Dice::new(seed ^ 0xDE_0A11);
+    let mut rng = SeededRng::new(seed ^ 0xDE_0A11);
     let mut number = |most: usize| {
-        let magnitude = f32::from_bits(dice.below(most) as u32);
-        if dice.below(2) == 0 {
+        let magnitude = f32::from_bits(rng.below(most) as u32);
+        if rng.below(2) == 0 {
             magnitude
         } else {
             -magnitude
@@ -86,10 +86,10 @@ fn denormals(seed: u64) -> PlanesCase {
     items.extend(items.clone().iter().map(|b| Aabb::new(b.max, b.max)));
     let mut planes = Vec::new();
     for _ in 0..3 {
-        let mut sign = || [-1.0, 0.0, 1.0, 1.0f32][dice.below(4)];
+        let mut sign = || [-1.0, 0.0, 1.0, 1.0f32][rng.below(4)];
         let normal = Vec3::new(sign(), sign(), sign());
-        let d = f32::from_bits(dice.below(1 << 22) as u32);
-        planes.push(Plane::new(normal, if dice.below(3) == 0 { -d } else { d }));
+        let d = f32::from_bits(rng.below(1 << 22) as u32);
+        planes.push(Plane::new(normal, if rng.below(3) == 0 { -d } else { d }));
     }
     let point = items[0].min;
     // Finite numbers by construction; without planes everything is seen.
@@ -114,7 +114,7 @@ impl PlanesCase {
             ..Findings::default()
         };
         self.scalar(&mut found);
-        let wide = WideVolume::from(&self.volume);
+        let wide = ConvexVolumeF64::from(&self.volume);
         let spheres = Spheres::new(&self.volume);
         let relative = RelativeVolume::about(self.point, &self.volume);
         let cubes: Vec<Aabb> = self.items.iter().map(sphere_cube).collect();

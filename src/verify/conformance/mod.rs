@@ -17,7 +17,7 @@ use super::Trial;
 use crate::geometry::{Aabb, ConvexVolume, Plane};
 use crate::index::{BuildError, Input, RegionIndex};
 use crate::query::{Containment, ItemId, NoRecorder, Predicate, QueryCost, Sink};
-use crate::scene::Dice;
+use crate::scene::SeededRng;
 
 use questions::{
     Outcome, Questions, ask, build, cases, each, edges, ensure, generated_scenes, points, seen,

@@ -24,7 +24,7 @@ pub fn refit_equals_a_fresh_build<T: RegionIndex>() -> Outcome {
     let degenerate = edges().filter(|asked| degenerate.contains(&asked.scene.as_str()));
     let scenes = generated_scenes(1000)?.into_iter().chain(degenerate);
     each(scenes, |asked, index: &mut T| {
-        let mut dice = Dice::new(11);
+        let mut rng = SeededRng::new(11);
         let width = f64::from(Aabb::union_of(&asked.items).extent().max_element());
         update(index, asked, &[])?;
         for step in [1000, 100, 10, 1] {
@@ -33,7 +33,7 @@ pub fn refit_equals_a_fresh_build<T: RegionIndex>() -> Outcome {
             for (at, &id) in moved.iter().enumerate() {
                 // Most move a little, some far.
                 let far = if at % 5 == 0 { 0.5 } else { 0.01 };
-                let by = (dice.normal3() * width * far).as_vec3();
+                let by = (rng.normal3() * width * far).as_vec3();
                 let b = &mut asked.items[id as usize];
                 *b = Aabb::new(b.min + by, b.max + by);
             }

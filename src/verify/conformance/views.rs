@@ -3,7 +3,7 @@
 //! varies what is made of them.
 
 use super::*;
-use crate::geometry::{RelativeVolume, Spheres, WidePlane, WideVolume, sphere_cube};
+use crate::geometry::{ConvexVolumeF64, PlaneF64, RelativeVolume, Spheres, sphere_cube};
 use crate::query::QueryVolume;
 
 /// `visible` returns exactly `{ i : view.sees(items[i]) }` for every kind of
@@ -28,7 +28,8 @@ fn check<T: RegionIndex>(asked: &Questions, index: &T, step: usize, most: usize)
     let cubes: Vec<Aabb> = items.iter().map(sphere_cube).collect();
     let index_of_cubes: T = build(&cubes)?;
     for volume in asked.volumes.iter().step_by(step).take(most) {
-        let wide = WideVolume::from_planes(&finer(volume)).map_err(|error| error.to_string())?;
+        let wide =
+            ConvexVolumeF64::from_planes(&finer(volume)).map_err(|error| error.to_string())?;
         right("planes", index, items, volume)?;
         right("spheres", &index_of_cubes, &cubes, &Spheres::new(volume))?;
         right("f64 planes", index, items, &wide)?;
@@ -52,9 +53,9 @@ fn check<T: RegionIndex>(asked: &Questions, index: &T, step: usize, most: usize)
 }
 
 /// Planes that are none of f32.
-fn finer(volume: &ConvexVolume) -> Vec<WidePlane> {
-    let planes = volume.planes().iter().map(WidePlane::from);
-    let turned = planes.map(|p| WidePlane::new(p.normal * (1.0 + 1e-9), p.d));
+fn finer(volume: &ConvexVolume) -> Vec<PlaneF64> {
+    let planes = volume.planes().iter().map(PlaneF64::from);
+    let turned = planes.map(|p| PlaneF64::new(p.normal * (1.0 + 1e-9), p.d));
     turned.collect()
 }
 

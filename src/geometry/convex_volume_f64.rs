@@ -5,34 +5,34 @@
 use glam::DVec3;
 
 use super::convex_volume::MAX_PLANES;
-use super::{ConvexVolume, PlaneMask, Upper, VolumeError, WidePlane};
+use super::{ConvexVolume, PVertexSigns, PlaneF64, PlaneMask, VolumeError};
 
 /// The closed intersection of up to 32 half-spaces in f64.
 #[derive(Clone, Debug)]
-pub struct WideVolume {
-    planes: [WidePlane; MAX_PLANES],
+pub struct ConvexVolumeF64 {
+    planes: [PlaneF64; MAX_PLANES],
     count: usize,
     mask: PlaneMask,
-    upper: [Upper; MAX_PLANES],
+    upper: [PVertexSigns; MAX_PLANES],
 }
 
-impl WideVolume {
+impl ConvexVolumeF64 {
     /// # Errors
     /// More than 32 planes, or a plane with a NaN or infinite number.
-    pub fn from_planes(planes: &[WidePlane]) -> Result<Self, VolumeError> {
+    pub fn from_planes(planes: &[PlaneF64]) -> Result<Self, VolumeError> {
         let count = planes.len();
         if count > MAX_PLANES {
             return Err(VolumeError::TooManyPlanes { count });
         }
-        let mut volume = WideVolume {
-            planes: [WidePlane::new(DVec3::ZERO, 0.0); MAX_PLANES],
+        let mut volume = ConvexVolumeF64 {
+            planes: [PlaneF64::new(DVec3::ZERO, 0.0); MAX_PLANES],
             count,
             mask: 0,
             upper: [[true; 3]; MAX_PLANES],
         };
         for (index, &plane) in planes.iter().enumerate() {
             if !(plane.normal.is_finite() && plane.d.is_finite()) {
-                return Err(VolumeError::NonFiniteWidePlane { index, plane });
+                return Err(VolumeError::NonFinitePlaneF64 { index, plane });
             }
             let trivial = plane.normal == DVec3::ZERO && plane.d >= 0.0;
             volume.planes[index] = plane;
@@ -43,19 +43,19 @@ impl WideVolume {
     }
 
     /// The planes, in the order in which they were given.
-    pub fn planes(&self) -> &[WidePlane] {
+    pub fn planes(&self) -> &[PlaneF64] {
         &self.planes[..self.count]
     }
 
     /// Plane `index` of a mask bit, without a check in the inner loop.
     #[inline(always)]
-    pub fn plane_of_bit(&self, index: u32) -> &WidePlane {
+    pub fn plane_of_bit(&self, index: u32) -> &PlaneF64 {
         &self.planes[index as usize % MAX_PLANES]
     }
 
     /// Which bounds the p-vertex of plane `index` takes, likewise.
     #[inline(always)]
-    pub fn upper_of_bit(&self, index: u32) -> Upper {
+    pub fn p_vertex_signs_of_bit(&self, index: u32) -> PVertexSigns {
         self.upper[index as usize % MAX_PLANES]
     }
 
@@ -67,17 +67,17 @@ impl WideVolume {
 }
 
 /// The very same planes; only the arithmetic of the test is finer.
-impl From<&ConvexVolume> for WideVolume {
+impl From<&ConvexVolume> for ConvexVolumeF64 {
     fn from(volume: &ConvexVolume) -> Self {
-        let mut planes = [WidePlane::new(DVec3::ZERO, 0.0); MAX_PLANES];
+        let mut planes = [PlaneF64::new(DVec3::ZERO, 0.0); MAX_PLANES];
         for (wide, plane) in planes.iter_mut().zip(volume.planes()) {
             *wide = plane.into();
         }
-        WideVolume {
+        ConvexVolumeF64 {
             planes,
             count: volume.planes().len(),
             mask: volume.mask(),
-            upper: std::array::from_fn(|index| volume.upper_of_bit(index as u32)),
+            upper: std::array::from_fn(|index| volume.p_vertex_signs_of_bit(index as u32)),
         }
     }
 }
@@ -91,24 +91,24 @@ mod tests {
     #[test]
     fn what_f32_rounds_away_decides_in_f64() {
         // 1e8 - 1 is no f32: in f32 the point touches the plane.
-        let plane = WidePlane::new(DVec3::X, -1e8 - 1.0);
+        let plane = PlaneF64::new(DVec3::X, -1e8 - 1.0);
         let b = Aabb::new(Vec3::splat(0.0), Vec3::new(1e8, 0.0, 0.0));
         assert!(plane.excludes(&b) && !plane.narrow().excludes(&b));
     }
 
     #[test]
     fn bad_planes_are_typed_errors() {
-        let good = WidePlane::new(DVec3::X, 0.0);
-        let bad = WidePlane::new(DVec3::X, f64::NAN);
+        let good = PlaneF64::new(DVec3::X, 0.0);
+        let bad = PlaneF64::new(DVec3::X, f64::NAN);
         assert!(matches!(
-            WideVolume::from_planes(&[good, bad]),
-            Err(VolumeError::NonFiniteWidePlane { index: 1, .. })
+            ConvexVolumeF64::from_planes(&[good, bad]),
+            Err(VolumeError::NonFinitePlaneF64 { index: 1, .. })
         ));
         assert!(matches!(
-            WideVolume::from_planes(&[good; 33]),
+            ConvexVolumeF64::from_planes(&[good; 33]),
             Err(VolumeError::TooManyPlanes { count: 33 })
         ));
-        let free = WideVolume::from_planes(&[WidePlane::new(DVec3::ZERO, 0.0), good]).unwrap();
+        let free = ConvexVolumeF64::from_planes(&[PlaneF64::new(DVec3::ZERO, 0.0), good]).unwrap();
         assert_eq!(free.mask(), 0b10);
     }
 }

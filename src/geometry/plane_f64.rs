@@ -6,17 +6,17 @@ use super::{Aabb, Plane};
 
 /// A half-space in f64: the points `x` with `normal . x + d >= 0` (closed).
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct WidePlane {
+pub struct PlaneF64 {
     /// Points inward; of any length.
     pub normal: DVec3,
     /// Offset: above 0 where the zero point is inside.
     pub d: f64,
 }
 
-impl WidePlane {
+impl PlaneF64 {
     /// The half-space `normal . x + d >= 0`.
     pub const fn new(normal: DVec3, d: f64) -> Self {
-        WidePlane { normal, d }
+        PlaneF64 { normal, d }
     }
 
     /// `((nx*x + ny*y) + nz*z) + d` in f64, as [`Plane::value_at`] does it in
@@ -50,8 +50,8 @@ impl WidePlane {
     }
 
     /// The same plane in coordinates about another point.
-    pub fn about(&self, zero: DVec3) -> WidePlane {
-        WidePlane::new(self.normal, self.normal.dot(zero) + self.d)
+    pub fn about(&self, zero: DVec3) -> PlaneF64 {
+        PlaneF64::new(self.normal, self.normal.dot(zero) + self.d)
     }
 
     /// Rounded once to f32.
@@ -60,8 +60,8 @@ impl WidePlane {
     }
 }
 
-impl From<&Plane> for WidePlane {
+impl From<&Plane> for PlaneF64 {
     fn from(plane: &Plane) -> Self {
-        WidePlane::new(plane.normal.as_dvec3(), f64::from(plane.d))
+        PlaneF64::new(plane.normal.as_dvec3(), f64::from(plane.d))
     }
 }

@@ -1,6 +1,6 @@
 //! Which rows of a block are a plane's corners.
 
-use super::Upper;
+use super::PVertexSigns;
 
 /// Some of the six rows of a [`BoxBlock`](super::BoxBlock), one bit each.
 pub type RowMask = u8;
@@ -11,16 +11,16 @@ pub const ALL_ROWS: RowMask = 0b11_1111;
 /// The rows of a block that hold the p-vertices of a plane, and those of the
 /// opposite corners, its n-vertices: the same ones for every box.
 #[derive(Clone, Copy, Debug)]
-pub struct Corner {
+pub struct PVertexRows {
     /// Whether the p-vertex is at the upper bound, axis by axis. Booleans and no
     /// numbers: a row of theirs needs no check.
-    upper: Upper,
+    upper: PVertexSigns,
 }
 
-impl Corner {
+impl PVertexRows {
     /// Of the upper bounds where `upper` says so.
-    pub const fn of(upper: Upper) -> Corner {
-        Corner { upper }
+    pub const fn of(upper: PVertexSigns) -> PVertexRows {
+        PVertexRows { upper }
     }
 
     #[inline(always)]

@@ -2,7 +2,7 @@
 //! corners, and its numbers in vectors for many blocks.
 
 use super::box_block::{BoxBlock, sums_at};
-use super::corner::Corner;
+use super::p_vertex::PVertexRows;
 use super::{ConvexVolume, PlaneMask};
 use crate::kernel::{Isa, LaneMask};
 
@@ -12,21 +12,21 @@ use crate::kernel::{Isa, LaneMask};
 /// sum in brackets is below `-d`, which is the same bit for bit: a rounded sum
 /// of two numbers has the sign of the exact one, and is zero only where that is.
 #[derive(Clone, Copy)]
-pub struct Blade<I: Isa> {
+pub struct BroadcastPlane<I: Isa> {
     normal: [I::Floats; 3],
-    pub(super) least: I::Floats,
-    pub(super) corner: Corner,
+    pub(super) minus_d: I::Floats,
+    pub(super) p_vertex: PVertexRows,
 }
 
-impl<I: Isa> Blade<I> {
+impl<I: Isa> BroadcastPlane<I> {
     /// The plane of a volume that this bit of a mask stands for.
     #[inline(always)]
     pub fn new(isa: I, volume: &ConvexVolume, bit: u32) -> Self {
         let [x, y, z] = volume.plane_of_bit(bit).normal.to_array();
-        Blade {
+        BroadcastPlane {
             normal: [isa.splat(x), isa.splat(y), isa.splat(z)],
-            least: isa.splat(volume.least_of_bit(bit)),
-            corner: volume.corner_of_bit(bit),
+            minus_d: isa.splat(volume.minus_d_of_bit(bit)),
+            p_vertex: volume.p_vertex_of_bit(bit),
         }
     }
 
@@ -34,10 +34,10 @@ impl<I: Isa> Blade<I> {
     #[inline(always)]
     pub(super) fn keep(&self, isa: I, kept: I::Kept, block: &BoxBlock) -> I::Kept {
         let [a, b, c] = self.normal;
-        let [x, y, z] = block.numbered_rows(self.corner.far());
+        let [x, y, z] = block.numbered_rows(self.p_vertex.far());
         let sum = isa.add(isa.mul(a, isa.load(x)), isa.mul(b, isa.load(y)));
         let sum = isa.add(sum, isa.mul(c, isa.load(z)));
-        isa.keep(kept, sum, self.least)
+        isa.keep(kept, sum, self.minus_d)
     }
 
     /// [`BoxBlock::admitted_by`] for this plane alone.
@@ -46,44 +46,44 @@ impl<I: Isa> Blade<I> {
         isa.kept(self.keep(isa, isa.keep_all(), block))
     }
 
-    /// Asks for the rows that [`Blade::admitted`] reads.
+    /// Asks for the rows that [`BroadcastPlane::admitted`] reads.
     #[inline(always)]
     pub fn prefetch(&self, block: &BoxBlock) {
-        block.prefetch_corner(self.corner);
+        block.prefetch_p_vertex(self.p_vertex);
     }
 }
 
-/// Planes of [`Blades`]: those of a frustum.
-pub const MOST_BLADES: usize = 6;
+/// Planes of [`BroadcastPlanes`]: those of a frustum.
+pub const MOST_PLANES: usize = 6;
 
 /// The planes of a volume, all of them made ready for many blocks.
 #[derive(Clone, Copy)]
-pub struct Blades<I: Isa>([Blade<I>; MOST_BLADES]);
+pub struct BroadcastPlanes<I: Isa>([BroadcastPlane<I>; MOST_PLANES]);
 
-impl<I: Isa> Blades<I> {
+impl<I: Isa> BroadcastPlanes<I> {
     /// The planes of a mask; `None` if they are too many.
     #[inline(always)]
     pub fn new(isa: I, volume: &ConvexVolume, mask: PlaneMask) -> Option<Self> {
         // Where there are fewer, the first one is tested again; a volume
         // without any has a plane that excludes nothing in its place.
-        let first = Blade::new(isa, volume, mask.trailing_zeros());
-        let mut blades = [first; MOST_BLADES];
+        let first = BroadcastPlane::new(isa, volume, mask.trailing_zeros());
+        let mut planes = [first; MOST_PLANES];
         let mut left = mask;
-        for blade in &mut blades {
+        for plane in &mut planes {
             if left != 0 {
-                *blade = Blade::new(isa, volume, left.trailing_zeros());
+                *plane = BroadcastPlane::new(isa, volume, left.trailing_zeros());
                 left &= left - 1;
             }
         }
-        (left == 0).then_some(Blades(blades))
+        (left == 0).then_some(BroadcastPlanes(planes))
     }
 
     /// [`BoxBlock::admitted_by`] for these planes.
     #[inline(always)]
     pub fn admitted(&self, isa: I, block: &BoxBlock) -> LaneMask {
         let mut kept = isa.keep_all();
-        for blade in &self.0 {
-            kept = blade.keep(isa, kept, block);
+        for plane in &self.0 {
+            kept = plane.keep(isa, kept, block);
         }
         isa.kept(kept)
     }
@@ -99,7 +99,7 @@ impl BoxBlock {
         let mut kept = isa.keep_all();
         let mut left = mask;
         while left != 0 {
-            kept = Blade::new(isa, volume, left.trailing_zeros()).keep(isa, kept, self);
+            kept = BroadcastPlane::new(isa, volume, left.trailing_zeros()).keep(isa, kept, self);
             left &= left - 1;
         }
         isa.kept(kept)
@@ -107,7 +107,7 @@ impl BoxBlock {
 
     /// [`BoxBlock::admitted_by`] for four blocks: each plane's numbers are made
     /// ready once for all of them, which pays where all planes are open and
-    /// registers are too few to keep them ([`Blades`](super::Blades)).
+    /// registers are too few to keep them ([`BroadcastPlanes`](super::BroadcastPlanes)).
     #[inline(always)]
     pub fn four_admitted_by<I: Isa>(
         isa: I,
@@ -118,10 +118,10 @@ impl BoxBlock {
         let mut kept = [isa.keep_all(); 4];
         let mut left = mask;
         while left != 0 {
-            let blade = Blade::new(isa, volume, left.trailing_zeros());
+            let plane = BroadcastPlane::new(isa, volume, left.trailing_zeros());
             left &= left - 1;
             for (kept, block) in kept.iter_mut().zip(blocks) {
-                *kept = blade.keep(isa, *kept, block);
+                *kept = plane.keep(isa, *kept, block);
             }
         }
         [
@@ -148,12 +148,12 @@ impl BoxBlock {
         while left != 0 {
             let bit = left.trailing_zeros();
             left &= left - 1;
-            let blade = Blade::new(isa, volume, bit);
-            kept = blade.keep(isa, kept, self);
-            let near = self.numbered_rows(blade.corner.near());
+            let plane = BroadcastPlane::new(isa, volume, bit);
+            kept = plane.keep(isa, kept, self);
+            let near = self.numbered_rows(plane.p_vertex.near());
             let nearest = sums_at(isa, volume.plane_of_bit(bit).normal, near);
-            let least = isa.splat(volume.least_of_bit(bit));
-            open = isa.without(open, nearest, least, 1 << bit);
+            let minus_d = isa.splat(volume.minus_d_of_bit(bit));
+            open = isa.without(open, nearest, minus_d, 1 << bit);
         }
         (isa.kept(kept), open)
     }

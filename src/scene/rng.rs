@@ -5,11 +5,11 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 /// Seeded randomness with the few distributions that the families need.
-pub struct Dice(Pcg64);
+pub struct SeededRng(Pcg64);
 
-impl Dice {
+impl SeededRng {
     pub fn new(seed: u64) -> Self {
-        Dice(Pcg64::seed_from_u64(seed))
+        SeededRng(Pcg64::seed_from_u64(seed))
     }
 
     /// Uniform in `[0, 1)`: 53 random bits.
