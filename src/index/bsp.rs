@@ -21,7 +21,7 @@ use super::{
 };
 use crate::geometry::{Aabb, Plane, PlaneTree};
 use crate::kernel::Isa;
-use crate::query::{Context, ItemId, ManySink, Predicate, QueryVolume, Recorder};
+use crate::query::{Context, ItemId, ManySink, Predicate, QueryVolume, Recorder, Sink};
 
 /// A binary space partition (Fuchs, Kedem and Naylor 1980, "On visible surface
 /// generation by a priori tree structures").
@@ -278,13 +278,19 @@ impl Bsp {
     }
 
     #[inline(always)]
-    fn descend<C: Context>(&self, p: Vec3, cx: &mut C) -> ControlFlow<()> {
+    fn descend<I: Isa, S: Sink, R: Recorder>(
+        &self,
+        isa: I,
+        p: Vec3,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
         let splits = match &self.planes {
             Planes::Any(splits) => splits,
             Planes::Axes { treelets, tiling } => {
                 return match tiling {
-                    Some(tiling) => tiling.locate(&self.tree, treelets, p, cx),
-                    None => treelets.locate(&self.tree, p, cx),
+                    Some(tiling) => tiling.locate(isa, &self.tree, treelets, p, sink, recorder),
+                    None => treelets.locate(isa, &self.tree, p, sink, recorder),
                 };
             }
         };
@@ -294,9 +300,10 @@ impl Bsp {
             let mut at = at as usize;
             // An empty tree has no node 0.
             while let Some(node) = nodes.get(at) {
-                cx.recorder().node_tested();
+                recorder.node_tested();
                 if self.tree.is_leaf(at) {
-                    self.tree.test_items(node.items(), &p, p.mask(), cx)?;
+                    self.tree
+                        .test_items(isa, node.items(), (&p, p.mask()), sink, recorder)?;
                     break;
                 }
                 let split = &splits[at];
@@ -382,8 +389,10 @@ impl RegionIndex for Bsp {
     #[inline(always)]
     fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
         if Q::IS_POINT {
+            let isa = cx.isa();
+            let (sink, recorder) = cx.parts();
             return match volume.as_point() {
-                Some(p) => self.descend(p, cx),
+                Some(p) => self.descend(isa, p, sink, recorder),
                 None => ControlFlow::Continue(()),
             };
         }

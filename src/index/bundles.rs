@@ -9,7 +9,7 @@ use super::frontier::{AHEAD, Frontier, Merger, first_ahead, hand_over, is_far};
 use super::node::TreeNode;
 use crate::geometry::{Aabb, BoxBlock, LANES, LaneMask, PlaneMask};
 use crate::kernel::{Isa, prefetch};
-use crate::query::{Context, ItemId, QueryVolume, Recorder};
+use crate::query::{ItemId, QueryVolume, Recorder, Sink};
 
 /// Where the lanes of a bundle lead.
 #[derive(Clone, Copy)]
@@ -48,8 +48,14 @@ pub trait Leaves {
 
     /// Tests some items against the planes of the mask and hands over those that
     /// are kept.
-    fn test<C: Context>(&self, items: Range<usize>, mask: PlaneMask, cx: &mut C)
-    -> ControlFlow<()>;
+    fn test<I: Isa, S: Sink, R: Recorder>(
+        &self,
+        isa: I,
+        items: Range<usize>,
+        mask: PlaneMask,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()>;
 }
 
 /// The memory of a traversal, kept between queries.
@@ -213,15 +219,15 @@ impl Bundles {
     ///
     /// The tree's root straddles the planes of `mask`.
     #[inline(always)]
-    pub fn search<Q: QueryVolume, L: Leaves, C: Context>(
+    pub fn search<I: Isa, Q: QueryVolume, L: Leaves, S: Sink, R: Recorder>(
         &self,
+        isa: I,
         (nodes, ids): (&[TreeNode], &[ItemId]),
-        volume: &Q,
-        mask: PlaneMask,
+        (volume, mask): (&Q, PlaneMask),
         test: &L,
-        cx: &mut C,
+        sink: &mut S,
+        recorder: &mut R,
     ) -> ControlFlow<()> {
-        let isa = cx.isa();
         let far = is_far(ids.len());
         let mut scratch = SCRATCH.take().unwrap_or_default();
         let Scratch {
@@ -260,12 +266,11 @@ impl Bundles {
                 }
                 let links = &self.links[at as usize];
                 let lanes = links.lanes.count_ones();
-                cx.recorder().nodes_tested(lanes);
-                cx.recorder().planes_tested(lanes * Q::planes_open(mask));
+                recorder.nodes_tested(lanes);
+                recorder.planes_tested(lanes * Q::planes_open(mask));
                 let (kept, open) = volume.sorted_lanes(isa, &self.blocks[at as usize], mask);
                 let kept = kept & links.lanes;
-                cx.recorder()
-                    .subtrees_rejected((links.lanes & !kept).count_ones());
+                recorder.subtrees_rejected((links.lanes & !kept).count_ones());
                 let inside = isa.zeros(open) & kept;
                 let undecided = kept & !inside;
                 let words = isa.words(&links.below);
@@ -277,14 +282,14 @@ impl Bundles {
                     left &= left - 1;
                     let places = links.first[lane] as usize..links.end[lane] as usize;
                     if let Some(ended) = run.join(places) {
-                        flow = hand_over(ended, ids, cx);
+                        flow = hand_over(isa, ended, ids, sink, recorder);
                         if flow.is_break() {
                             break 'walk;
                         }
                     }
                 }
             }
-            flow = hand_over(run.take(), ids, cx);
+            flow = hand_over(isa, run.take(), ids, sink, recorder);
             if flow.is_break() {
                 break;
             }
@@ -304,7 +309,7 @@ impl Bundles {
                     fetch_leaf(nodes, places, i + AHEAD);
                 }
                 let items = nodes[leaf as usize].items();
-                flow = test.test(items, mask, cx);
+                flow = test.test(isa, items, mask, sink, recorder);
                 if flow.is_break() {
                     break;
                 }

@@ -6,7 +6,7 @@ use std::ops::{ControlFlow, Range};
 
 use crate::geometry::{LANES, LaneMask, PlaneMask};
 use crate::kernel::Isa;
-use crate::query::{Context, ItemId, Recorder, Sink};
+use crate::query::{ItemId, Recorder, Sink};
 
 /// So many blocks ahead their memory is asked for: enough to hide a cache
 /// miss, and not so many that lines are gone before their turn.
@@ -161,11 +161,16 @@ impl Merger {
 
 /// Hands over a run of items that are wholly inside, unless it is empty.
 #[inline(always)]
-pub fn hand_over<C: Context>(places: Range<usize>, ids: &[ItemId], cx: &mut C) -> ControlFlow<()> {
+pub fn hand_over<I: Isa, S: Sink, R: Recorder>(
+    isa: I,
+    places: Range<usize>,
+    ids: &[ItemId],
+    sink: &mut S,
+    recorder: &mut R,
+) -> ControlFlow<()> {
     if places.is_empty() {
         return ControlFlow::Continue(());
     }
-    cx.recorder().subtree_accepted(places.len());
-    let isa = cx.isa();
-    cx.sink().accept_places(isa, ids, places)
+    recorder.subtree_accepted(places.len());
+    sink.accept_places(isa, ids, places)
 }

@@ -126,7 +126,16 @@ impl RegionIndex for Linear {
     fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
         if Q::IS_POINT {
             let blocks = self.boxes.range(0, self.ids.len());
-            return scan_blocks(blocks, &self.ids, volume, volume.mask(), cx);
+            let isa = cx.isa();
+            let (sink, recorder) = cx.parts();
+            return scan_blocks(
+                isa,
+                blocks,
+                &self.ids,
+                (volume, volume.mask()),
+                sink,
+                recorder,
+            );
         }
         let open = Q::planes_open(volume.mask());
         if C::Isa::MANY_REGISTERS

@@ -9,7 +9,7 @@ use super::frontier::{AHEAD, Frontier, Merger, NodeList, first_ahead, hand_over}
 use super::id_rows::IdRows;
 use crate::geometry::{ALL_ROWS, BoxBlock, LANES, LaneMask, PlaneMask};
 use crate::kernel::{Isa, prefetch};
-use crate::query::{ItemId, Planes, QueryContext, QueryVolume, Recorder, Sink, Tests, runs};
+use crate::query::{ItemId, Planes, QueryVolume, Recorder, Sink, Tests, runs};
 
 /// Where a level lies among the blocks.
 #[derive(Clone, Copy, Debug)]
@@ -232,8 +232,7 @@ impl<I: Isa, V: QueryVolume, S: Sink, R: Recorder> Pass<'_, I, V, S, R> {
     /// Hands over a run of items that are wholly inside.
     #[inline(always)]
     pub fn hand_over(&mut self, places: Range<usize>) -> ControlFlow<()> {
-        let mut cx = QueryContext::new(self.isa, self.sink, self.recorder);
-        hand_over(places, self.ids, &mut cx)
+        hand_over(self.isa, places, self.ids, self.sink, self.recorder)
     }
 }
 

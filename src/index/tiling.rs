@@ -13,7 +13,7 @@ use super::treelets::{
 };
 use crate::geometry::Aabb;
 use crate::kernel::{Isa, Piece, prefetch};
-use crate::query::{Context, ManySink, NoRecorder, QueryContext, Recorder};
+use crate::query::{ManySink, NoRecorder, Recorder, Sink};
 
 /// Four levels of planes and what is below them, lanes as in a treelet: two
 /// cache lines.
@@ -183,15 +183,16 @@ impl Tiling {
 
     /// Hands every item whose closed box holds `p` to the sink, in tree order.
     #[inline(always)]
-    pub fn locate<C: Context>(
+    pub fn locate<I: Isa, S: Sink, R: Recorder>(
         &self,
+        isa: I,
         tree: &PackedTree,
         treelets: &Treelets,
         p: Vec3,
-        cx: &mut C,
+        sink: &mut S,
+        recorder: &mut R,
     ) -> ControlFlow<()> {
-        let isa = cx.isa();
-        cx.recorder().node_tested();
+        recorder.node_tested();
         if !self.hull.contains_point(p) {
             return ControlFlow::Continue(());
         }
@@ -199,18 +200,18 @@ impl Tiling {
             nodes: &self.nodes,
             row: p.extend(0.0).to_array(),
         });
-        cx.recorder().nodes_tested(AXES as u32 * steps);
+        recorder.nodes_tested(AXES as u32 * steps);
         match at {
-            ON_PLANE => treelets.locate(tree, p, cx),
+            ON_PLANE => treelets.locate(isa, tree, p, sink, recorder),
             _ if at & UNSURE == 0 => {
-                cx.recorder().subtree_accepted(1);
-                cx.accept(&[at & REST])
+                recorder.subtree_accepted(1);
+                sink.accept(&[at & REST])
             }
             _ => {
-                cx.recorder().items_tested(1);
+                recorder.items_tested(1);
                 let place = (at & REST) as usize;
                 match tree.boxes().get(place).contains_point(p) {
-                    true => cx.accept(&tree.ids()[place..place + 1]),
+                    true => sink.accept(&tree.ids()[place..place + 1]),
                     false => ControlFlow::Continue(()),
                 }
             }
@@ -253,9 +254,7 @@ impl Tiling {
                     OUTSIDE => {}
                     ON_PLANE => {
                         // A Vec never breaks off.
-                        let mut recorder = NoRecorder;
-                        let mut cx = QueryContext::new(isa, &mut found, &mut recorder);
-                        let _ = treelets.locate(tree, p, &mut cx);
+                        let _ = treelets.locate(isa, tree, p, &mut found, &mut NoRecorder);
                     }
                     _ if at & UNSURE == 0 => found.push(at & REST),
                     _ => {
@@ -409,7 +408,7 @@ mod tests {
     use crate::index::erased::query_many;
     use crate::index::{Bsp, BspParams, Input, Query, RegionIndex};
     use crate::kernel::{BASELINE, Kernel};
-    use crate::query::{ItemId, Located, QueryCost};
+    use crate::query::{ItemId, Located, QueryContext, QueryCost};
 
     /// Cells between uneven walls, without those that `gone` says.
     fn cells(gone: impl Fn(usize) -> bool) -> Vec<Aabb> {

@@ -10,8 +10,8 @@ use glam::Vec3;
 use super::batch::{Descent, GROUP, answer};
 use super::tree::PackedTree;
 use crate::geometry::{Aabb, LANES};
-use crate::kernel::prefetch;
-use crate::query::{Context, ManySink, Predicate, Recorder};
+use crate::kernel::{Isa, prefetch};
+use crate::query::{ManySink, Predicate, Recorder, Sink};
 
 /// Most items of a leaf of the descent: one or two blocks.
 pub const DESCENT_LEAF: usize = LANES;
@@ -333,7 +333,14 @@ impl Treelets {
 
     /// Hands every item whose closed box holds `p` to the sink, in tree order.
     #[inline(always)]
-    pub fn locate<C: Context>(&self, tree: &PackedTree, p: Vec3, cx: &mut C) -> ControlFlow<()> {
+    pub fn locate<I: Isa, S: Sink, R: Recorder>(
+        &self,
+        isa: I,
+        tree: &PackedTree,
+        p: Vec3,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
         if self.treelets.is_empty() {
             return ControlFlow::Continue(());
         }
@@ -341,7 +348,7 @@ impl Treelets {
         // entered.
         let mut above = [(0, 0); MOST_HEIGHT];
         let mut level = 0;
-        let (mut at, mut open) = (0, self.open(0, p, cx.recorder()));
+        let (mut at, mut open) = (0, self.open(0, p, recorder));
         loop {
             if open == 0 {
                 if level == 0 {
@@ -356,14 +363,14 @@ impl Treelets {
             if child & LEAF != 0 {
                 let items = self.items(child);
                 tree.prefetch_items(items.clone());
-                tree.test_items(items, &p, p.mask(), cx)?;
+                tree.test_items(isa, items, (&p, p.mask()), sink, recorder)?;
             } else {
                 if open != 0 {
                     above[level] = (at, open);
                     level += 1;
                 }
                 at = child as usize;
-                open = self.open(at, p, cx.recorder());
+                open = self.open(at, p, recorder);
             }
         }
     }

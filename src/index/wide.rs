@@ -16,7 +16,7 @@ use super::id_rows::IdRows;
 use super::pass::{Layer, Level, Pass};
 use super::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, indexable};
 use crate::geometry::{Aabb, BoxBlock, LANES};
-use crate::kernel::prefetch;
+use crate::kernel::{Isa, prefetch};
 use crate::query::{Context, ItemId, QueryVolume, Recorder, Sink};
 use crate::threads::share;
 
@@ -239,13 +239,19 @@ impl Wide {
 
     /// Region search: from the root down, one block at a time.
     #[inline(always)]
-    fn descend<C: Context>(&self, p: Vec3, cx: &mut C) -> ControlFlow<()> {
+    fn descend<I: Isa, S: Sink, R: Recorder>(
+        &self,
+        isa: I,
+        p: Vec3,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
         // Depth first: at most one lane of each level is left open on a tiling.
         let Some(top) = self.levels.len().checked_sub(1) else {
             return ControlFlow::Continue(());
         };
         let mut open = [(0, 0); MOST_LEVELS];
-        let holding = |level: usize, block: usize, recorder: &mut C::Recorder| {
+        let holding = |level: usize, block: usize, recorder: &mut R| {
             let lanes = self.levels[level].lanes(block);
             if level == 0 {
                 recorder.items_tested(lanes.count_ones());
@@ -255,13 +261,11 @@ impl Wide {
             self.blocks[self.levels[level].first + block].holding(p) & lanes
         };
         let mut level = top;
-        open[level] = (0, holding(level, 0, cx.recorder()));
+        open[level] = (0, holding(level, 0, recorder));
         loop {
             let (block, left) = open[level];
             if level == 0 {
-                let isa = cx.isa();
-                cx.sink()
-                    .accept_lanes(isa, &self.ids, block * LANES, left)?;
+                sink.accept_lanes(isa, &self.ids, block * LANES, left)?;
             }
             if level == 0 || left == 0 {
                 if level == top {
@@ -273,7 +277,7 @@ impl Wide {
             open[level].1 &= left - 1;
             level -= 1;
             let child = block * LANES + left.trailing_zeros() as usize;
-            open[level] = (child, holding(level, child, cx.recorder()));
+            open[level] = (child, holding(level, child, recorder));
         }
     }
 
@@ -315,8 +319,10 @@ impl RegionIndex for Wide {
     #[inline(always)]
     fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
         if Q::IS_POINT {
+            let isa = cx.isa();
+            let (sink, recorder) = cx.parts();
             return match volume.as_point() {
-                Some(p) => self.descend(p, cx),
+                Some(p) => self.descend(isa, p, sink, recorder),
                 None => ControlFlow::Continue(()),
             };
         }

@@ -13,7 +13,8 @@ use crate::index::{
     Bsp, BuildError, Info, Input, Kind, Leaves, MemoryUsage, Origin, PackedTree, RegionIndex,
     scan_blocks,
 };
-use crate::query::{Context, ItemId, QueryVolume};
+use crate::kernel::Isa;
+use crate::query::{Context, ItemId, QueryVolume, Recorder, Sink};
 
 /// What a coordinate is stored as.
 pub trait Code: Copy + Default + Send + Sync + 'static {
@@ -209,14 +210,16 @@ impl<C: Code, V: QueryVolume> Leaves for InCodes<'_, C, V> {
     fn fetch(&self, _: Range<usize>, _: PlaneMask) {}
 
     #[inline(always)]
-    fn test<X: Context>(
+    fn test<I: Isa, S: Sink, R: Recorder>(
         &self,
+        isa: I,
         items: Range<usize>,
         mask: PlaneMask,
-        cx: &mut X,
+        sink: &mut S,
+        recorder: &mut R,
     ) -> ControlFlow<()> {
         let (blocks, ids) = (self.index.blocks(items), self.index.tree.ids());
-        scan_blocks(blocks, ids, self.volume, mask, cx)
+        scan_blocks(isa, blocks, ids, (self.volume, mask), sink, recorder)
     }
 }
 
