@@ -120,18 +120,17 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = &[
         // Up within 1e-6 to 1e-15 rad of the direction of view.
         variants: &[1e-6, 1e-9, 1e-11, 1e-13, 1e-14, 1e-15],
         label: plain,
-        setup: |rng, angle| {
+        setup: |rng, angle| loop {
             let mut draft = Draft::any(rng);
             draft.to_look = rng.below(2) == 0;
-            let (forward, across) = (draft.forward, draft.up);
-            loop {
-                // Along the view as f64 has it, and hardly away from it.
-                let length = libm::exp2(rng.between(-4.0, 4.0));
-                let across = across * (angle * forward.length() / across.length());
-                draft.up = (forward + across * rng.between(0.9, 1.5)) * length;
-                if draft.pose().frame().is_ok() {
-                    break draft.perspective();
-                }
+            // Along the view as f64 has it, and hardly away from it: rounding can bring
+            // one camera's up too near to the view whatever its length is.
+            let length = libm::exp2(rng.between(-4.0, 4.0));
+            let away = angle * draft.forward.length() / draft.up.length();
+            let across = draft.up * away * rng.between(0.9, 1.5);
+            draft.up = (draft.forward + across) * length;
+            if draft.pose().frame().is_ok() {
+                break draft.perspective();
             }
         },
     },

@@ -303,6 +303,19 @@ mod tests {
         assert!(variants as u64 * BOXES as u64 * DEFAULT_CASES >= 10_000_000);
     }
 
+    /// A draw that is refused must not be drawn again from numbers that stay.
+    #[test]
+    fn every_seed_draws_a_camera() {
+        for family in CAMERA_FAMILIES {
+            for &variant in family.variants {
+                for seed in 0..300 {
+                    let setup = (family.setup)(&mut SeededRng::new(seed), variant);
+                    assert!(setup.is_ok(), "{} {variant:e} {seed}", family.name);
+                }
+            }
+        }
+    }
+
     #[test]
     fn a_case_of_every_variant_comes_out_as_declared() {
         let structures = Registry::builtin().structures("all").unwrap();
