@@ -376,9 +376,9 @@ fn sweep_shown(name: &str, what: &str, rows: &[&SweepRow]) -> String {
             None => text::rate(row.false_negative_ppm, 1.0),
         });
         let label = numbers(&kind.names);
-        let label = label
-            .strip_prefix("f32 gh")
-            .map_or(label.clone(), |rest| format!("gh{rest}"));
+        let is_named = kind.names.planes != "frame";
+        let short = label.strip_prefix("f32 ").filter(|_| is_named);
+        let label = short.unwrap_or(&label).to_owned();
         table.add_row([label].into_iter().chain(ppm));
     }
     let least = rows.iter().filter_map(|row| row.false_negative_ppm?.upper);
@@ -564,7 +564,7 @@ fn of_sweeps(rows: &[SweepRow]) -> Vec<String> {
         let own = rows.iter().filter(|row| row.sweep == *sweep);
         let lost = |row: &&SweepRow| row.false_negative_ppm.map_or(0.0, |rate| rate.value);
         let worst = own.clone().max_by(|a, b| lost(a).total_cmp(&lost(b)))?;
-        let default = own.filter(|row| row.names.epsilon > 0.0 && row.names.arithmetic == "f32");
+        let default = own.filter(|row| numbers(&row.names) == "f32 c=8");
         let default: u64 = default.map(|row| row.errors.false_negatives).sum();
         if lost(&worst) == 0.0 {
             return Some(format!("Over {name} nothing is missed by any."));
