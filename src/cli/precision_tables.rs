@@ -3,7 +3,8 @@
 
 use std::io::{self, Write};
 
-use super::precision::Outcome;
+use serde::Serialize;
+
 use super::text;
 use crate::measure::Status;
 use crate::precision::{
@@ -11,6 +12,16 @@ use crate::precision::{
 };
 use crate::statistics::Rate;
 use crate::verify::ErrorCount;
+
+/// Everything that is printed.
+#[derive(Serialize)]
+pub struct Outcome {
+    #[serde(flatten)]
+    pub precision: Precision,
+    pub seed: u64,
+    pub size_sweep: Vec<SizeRow>,
+    pub sweeps: Vec<SweepRow>,
+}
 
 /// Lines and tables are no wider.
 const WIDTH: usize = 100;
