@@ -6,7 +6,6 @@ use std::path::Path;
 use std::time::Duration;
 
 use anyhow::bail;
-use serde::Serialize;
 use tempfile::NamedTempFile;
 
 use super::args::PrecisionArgs;
@@ -22,21 +21,9 @@ use super::{
 use crate::index::Registry;
 use crate::measure::{ProcessTimes, Protocol, Status};
 use crate::path;
-use crate::precision::{
-    self, PointPlan, Precision, PrecisionInput, SWEEPS, SizeRow, SweepRow, size_sweep, sweep,
-};
+use crate::precision::{self, PointPlan, PrecisionInput, SWEEPS, size_sweep, sweep};
 use crate::report::write_atomically;
 use crate::scene::{self, LoadOptions};
-
-/// Everything that is printed.
-#[derive(Serialize)]
-pub struct Outcome {
-    #[serde(flatten)]
-    pub precision: Precision,
-    pub seed: u64,
-    pub size_sweep: Vec<SizeRow>,
-    pub sweeps: Vec<SweepRow>,
-}
 
 /// Rounds of a point, if one process has them all.
 const ROUNDS: [usize; 2] = [5, 15];
@@ -126,7 +113,7 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
         .points
         .iter()
         .any(|p| matches!(p.status, Status::Wrong | Status::Panicked));
-    let outcome = Outcome {
+    let outcome = precision_tables::Outcome {
         precision,
         seed: args.spread.seed,
         size_sweep: sizes,

@@ -3,7 +3,8 @@
 
 use std::io::{self, Write};
 
-use super::precision::Outcome;
+use serde::Serialize;
+
 use super::text;
 use crate::measure::Status;
 use crate::precision::{
@@ -11,6 +12,16 @@ use crate::precision::{
 };
 use crate::statistics::Rate;
 use crate::verify::ErrorCount;
+
+/// Everything that is printed.
+#[derive(Serialize)]
+pub struct Outcome {
+    #[serde(flatten)]
+    pub precision: Precision,
+    pub seed: u64,
+    pub size_sweep: Vec<SizeRow>,
+    pub sweeps: Vec<SweepRow>,
+}
 
 /// Lines and tables are no wider.
 const WIDTH: usize = 100;
@@ -376,9 +387,9 @@ fn sweep_shown(name: &str, what: &str, rows: &[&SweepRow]) -> String {
             None => text::rate(row.false_negative_ppm, 1.0),
         });
         let label = numbers(&kind.names);
-        let label = label
-            .strip_prefix("f32 gh")
-            .map_or(label.clone(), |rest| format!("gh{rest}"));
+        let is_named = kind.names.planes != "frame";
+        let short = label.strip_prefix("f32 ").filter(|_| is_named);
+        let label = short.unwrap_or(&label).to_owned();
         table.add_row([label].into_iter().chain(ppm));
     }
     let least = rows.iter().filter_map(|row| row.false_negative_ppm?.upper);
@@ -564,7 +575,7 @@ fn of_sweeps(rows: &[SweepRow]) -> Vec<String> {
         let own = rows.iter().filter(|row| row.sweep == *sweep);
         let lost = |row: &&SweepRow| row.false_negative_ppm.map_or(0.0, |rate| rate.value);
         let worst = own.clone().max_by(|a, b| lost(a).total_cmp(&lost(b)))?;
-        let default = own.filter(|row| row.names.epsilon > 0.0 && row.names.arithmetic == "f32");
+        let default = own.filter(|row| numbers(&row.names) == "f32 c=8");
         let default: u64 = default.map(|row| row.errors.false_negatives).sum();
         if lost(&worst) == 0.0 {
             return Some(format!("Over {name} nothing is missed by any."));

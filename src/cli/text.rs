@@ -136,19 +136,15 @@ pub fn plus_minus(value: f64, margin: Option<f64>) -> String {
     let Some(margin) = margin.filter(|margin| margin.is_finite() && *margin > 0.0) else {
         return significant(value);
     };
-    let exponent = margin.log10().floor() as i32;
-    // A margin is rounded up, or it would no longer hold.
-    let unit = 10f64.powi(exponent);
-    let rounded = (margin / unit - 1e-9).ceil() * unit;
-    let decimals = (-rounded.log10().floor()).max(0.0) as usize;
-    if value == 0.0 {
-        return format!("<{rounded:.decimals$}");
+    let unit = 10f64.powi(margin.log10().floor() as i32);
+    let shown = (value / unit).round() * unit;
+    // A margin is rounded up, or it would no longer hold what it held.
+    let margin = ((margin + (value - shown).abs()) / unit - 1e-9).ceil() * unit;
+    let decimals = (-unit.log10().round()).max(0.0) as usize;
+    match value == 0.0 {
+        true => format!("<{margin:.decimals$}"),
+        false => format!("{shown:.decimals$}±{margin:.decimals$}"),
     }
-    let value = match unit > 1.0 {
-        true => (value / unit).round() * unit,
-        false => value,
-    };
-    format!("{value:.decimals$}±{rounded:.decimals$}")
 }
 
 /// A rate per so many units with half of its 95 % interval; nothing if there is none.
@@ -341,7 +337,9 @@ mod tests {
     fn margins_leave_their_digits_and_lines_their_width() {
         let cases = [
             (83.364, Some(0.62), "83.4±0.7"),
-            (12.122, Some(0.05), "12.12±0.05"),
+            (83.36, Some(0.58), "83.4±0.7"),
+            (9.97, Some(0.96), "10.0±1.0"),
+            (12.122, Some(0.05), "12.12±0.06"),
             (0.056, Some(0.0061), "0.056±0.007"),
             (560_397.0, Some(8_123.0), "560000±9000"),
             (606.7, Some(3.2), "607±4"),

@@ -6,7 +6,7 @@ use std::array;
 
 use glam::Vec3;
 
-use crate::arithmetic::{Expansion, two_sum};
+use crate::arithmetic::{Expansion, two_sum, upper_half};
 use crate::geometry::{
     Aabb, BoxBlock, LANES, LaneMask, MAX_PLANES, PVertexSigns, Plane, PlaneF64, PlaneMask,
 };
@@ -83,7 +83,7 @@ impl<P: PlaneForm> QueryVolume for Formed<P> {
                 block.corner_rows(upper.map(|u| !u)),
             );
             let of = |rows: [&[f32; LANES]; 3], lane: usize| rows.map(|row| row[lane]);
-            // First what vectors can do, then what may take a decision of its own.
+            // First what vectors do, then what may take a decision of its own.
             let values: [P::Value; LANES] =
                 array::from_fn(|lane| plane.value(of(far, lane), of(near, lane)));
             for (lane, outside) in outside.iter_mut().enumerate() {
@@ -238,7 +238,7 @@ impl PlaneForm for CentreExtent {
 /// and the test as monotone as real numbers are.
 #[derive(Clone, Copy, Debug)]
 pub struct DoubleDouble {
-    /// The normal as two parts of at most 29 and 24 bits: their products with an
+    /// The normal as two parts of at most 28 and 25 bits: their products with an
     /// f32 number are exact.
     high: [f64; 3],
     low: [f64; 3],
@@ -251,7 +251,7 @@ const UNDECIDED: f64 = f64::from_bits((1023 - 102) << 52);
 impl From<&PlaneF64> for DoubleDouble {
     fn from(plane: &PlaneF64) -> Self {
         let normal = plane.normal.to_array();
-        let high = normal.map(|n| f64::from_bits(n.to_bits() & !((1 << 24) - 1)));
+        let high = normal.map(upper_half);
         DoubleDouble {
             low: array::from_fn(|k| normal[k] - high[k]),
             high,
@@ -335,7 +335,7 @@ impl Interval {
     /// A plane whose normal is true to `normal_error` in each component and its
     /// offset to `offset_error`.
     pub fn around(plane: &PlaneF64, normal_error: f64, offset_error: f64) -> Interval {
-        let around = |x: f64, error: f64| [(x - error).next_down(), (x + error).next_up()];
+        let around = |x: f64, error: f64| [down(x - error), up(x + error)];
         Interval {
             normal: plane.normal.to_array().map(|n| around(n, normal_error)),
             d: around(plane.d, offset_error),
@@ -349,19 +349,35 @@ impl Interval {
         for k in 0..3 {
             let [low, high] = self.normal[k];
             let (a, b) = (f64::from(far[k]), f64::from(near[k]));
-            let products = [low * a, high * a, low * b, high * b];
-            let least = products.into_iter().fold(f64::INFINITY, f64::min);
-            let most = products.into_iter().fold(f64::NEG_INFINITY, f64::max);
-            sum = added(sum, [least.next_down(), most.next_up()]);
+            let [c, d] = sorted(low * a, high * a);
+            let [e, f] = sorted(low * b, high * b);
+            sum = added(sum, [down(sorted(c, e)[0]), up(sorted(d, f)[1])]);
         }
         added(sum, self.d)
     }
 }
 
+#[inline(always)]
+fn sorted(a: f64, b: f64) -> [f64; 2] {
+    if a < b { [a, b] } else { [b, a] }
+}
+
+/// A number that is surely above the one that was rounded to `x`: what is added is
+/// an ulp or two. Monotone, and without a branch.
+#[inline(always)]
+fn up(x: f64) -> f64 {
+    x + (x.abs() * f64::EPSILON + f64::MIN_POSITIVE)
+}
+
+#[inline(always)]
+fn down(x: f64) -> f64 {
+    x - (x.abs() * f64::EPSILON + f64::MIN_POSITIVE)
+}
+
 /// The sum of two intervals, rounded outward.
 #[inline(always)]
 fn added(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
-    [(a[0] + b[0]).next_down(), (a[1] + b[1]).next_up()]
+    [down(a[0] + b[0]), up(a[1] + b[1])]
 }
 
 impl PlaneForm for Interval {

@@ -4,7 +4,7 @@
 use serde::Serialize;
 
 use super::other_numbers::{CentreExtent, DoubleDouble, Flushed, Formed, Fused, Interval};
-use crate::camera::{Camera, CameraError, PlaneOptions, Surroundings};
+use crate::camera::{Camera, CameraError, Frame, PlaneOptions, Pose, Surroundings};
 use crate::culling::{CameraView, Culling, CullingError, CullingTest};
 use crate::geometry::{Aabb, BoxBlocks};
 use crate::index::MemoryUsage;
@@ -29,6 +29,9 @@ named! {
 pub enum PlaneTest {
     Culling(Culling),
     Other(OtherNumbers, f64),
+    /// The default, with a frame whose axes are cross products in f64, rounded as
+    /// they come: what a camera without the toolkit's care has.
+    PlainFrame,
 }
 
 /// The names of a [`PlaneTest`].
@@ -93,13 +96,17 @@ impl PlaneTest {
                 epsilon: *epsilon,
                 ..PlaneTest::Culling(Culling::default()).names()
             },
+            PlaneTest::PlainFrame => Names {
+                planes: "frame-plain",
+                ..PlaneTest::Culling(Culling::default()).names()
+            },
         }
     }
 
     pub fn test(&self) -> CullingTest {
         match self {
             PlaneTest::Culling(culling) => culling.test,
-            PlaneTest::Other(..) => CullingTest::SixPlane,
+            PlaneTest::Other(..) | PlaneTest::PlainFrame => CullingTest::SixPlane,
         }
     }
 
@@ -129,12 +136,16 @@ impl PlaneTest {
     /// # Errors
     /// Planes that do not fit their numbers.
     pub fn view(&self, camera: &Camera, around: &Surroundings) -> Result<PointView, CullingError> {
-        let &(numbers, epsilon) = match self {
+        let (numbers, epsilon) = match *self {
             PlaneTest::Culling(culling) => {
                 let view = culling.view(camera, around)?;
                 return Ok(PointView::Camera(Box::new(view)));
             }
-            PlaneTest::Other(numbers, epsilon) => &(*numbers, *epsilon),
+            PlaneTest::PlainFrame => {
+                let default = PlaneTest::Culling(Culling::default());
+                return default.view(&with_plain_frame(camera)?, around);
+            }
+            PlaneTest::Other(numbers, epsilon) => (numbers, epsilon),
         };
         let options = PlaneOptions {
             epsilon,
@@ -159,6 +170,19 @@ impl PlaneTest {
             OtherNumbers::Interval => PointView::Interval(intervals(camera, around)?),
         })
     }
+}
+
+/// The same camera with axes from the pose by rounded cross products.
+fn with_plain_frame(camera: &Camera) -> Result<Camera, CameraError> {
+    let (eye, forward, up) = match Pose::of(camera) {
+        Pose::LookAt { eye, look, up } => (eye, look - eye, up),
+        Pose::Forward { eye, forward, up } => (eye, forward, up),
+    };
+    let u = forward.cross(up).normalize();
+    Ok(Camera {
+        frame: Frame::looking_along(eye, forward, u.cross(forward))?,
+        lens: camera.lens,
+    })
 }
 
 /// The planes of a camera with what f64 leaves uncertain of them: docs/NUMERICS.md
