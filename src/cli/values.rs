@@ -28,6 +28,26 @@ pub fn above_zero(text: &str) -> Result<f64, SpecError> {
     expected(sound, "a number above 0")
 }
 
+fn within(text: &str, [least, most]: [f64; 2]) -> Result<f64, SpecError> {
+    let sound = number(text).filter(|n| (least..=most).contains(n));
+    expected(sound, format_args!("a number from {least} to {most:e}"))
+}
+
+/// Of a spring arm, in 1/s^2.
+pub fn stiffness(text: &str) -> Result<f64, SpecError> {
+    within(text, [0.01, 1e8])
+}
+
+/// Frames per second.
+pub fn frame_rate(text: &str) -> Result<f64, SpecError> {
+    within(text, [1.0, 1e3])
+}
+
+/// Simulated time.
+pub fn simulated_seconds(text: &str) -> Result<f64, SpecError> {
+    within(text, [1.0, 1e3])
+}
+
 /// A far plane; `inf` is none.
 pub fn far(text: &str) -> Result<f64, SpecError> {
     let endless = text.eq_ignore_ascii_case("inf").then_some(f64::INFINITY);
