@@ -450,6 +450,15 @@ pub struct DriftArgs {
         allow_negative_numbers = true
     )]
     pub tolerance: f64,
+    /// Spring arms to study: linear, collision (stiffens as it is stretched, and has a stop), quaternion (turns)
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        default_value = "linear,collision,quaternion",
+        value_parser = values::arm
+    )]
+    pub arm: Vec<ArmKind>,
     /// Stiffnesses of the spring arms, k in 1/s^2, critically damped
     #[arg(
         long,

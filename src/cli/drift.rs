@@ -18,8 +18,8 @@ use super::{
     unread_is_fine,
 };
 use crate::drift::{
-    self, ArmOptions, DriftOptions, DriftPlan, DriftReport, ORBIT_RADIUS, Rated, Recommendation,
-    SWING_DEG,
+    self, ArmKind, ArmOptions, DriftOptions, DriftPlan, DriftReport, ORBIT_RADIUS, Rated,
+    Recommendation, SWING_DEG,
 };
 use crate::measure::{ProcessTimes, Protocol};
 use crate::report::write_atomically;
@@ -77,6 +77,10 @@ fn options(args: &DriftArgs) -> DriftOptions {
         steps: args.steps,
         tolerance_rad: args.tolerance,
         arm: ArmOptions {
+            arms: ArmKind::ALL
+                .into_iter()
+                .filter(|kind| args.arm.contains(kind))
+                .collect(),
             stiffnesses: once(&args.stiffness),
             rates_hz: once(&args.rate),
             seconds: args.seconds,

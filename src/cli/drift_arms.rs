@@ -26,7 +26,7 @@ pub fn show(report: &ArmReport, out: &mut impl Write) -> io::Result<()> {
         report.seconds
     )?;
     writeln!(out, "{}", shown.information())?;
-    for (arm, name, what) in ARMS {
+    for (arm, name, what) in shown.arms() {
         writeln!(out, "{name} arm: {what}")?;
         writeln!(out, "{}", shown.within(arm, name))?;
     }
@@ -91,6 +91,12 @@ impl<'r> Shown<'r> {
         }
     }
 
+    /// Those that were studied.
+    fn arms(&self) -> impl Iterator<Item = (ArmKind, &'static str, &'static str)> {
+        let is_there = |arm| self.report.choices.iter().any(|c| c.setting.arm == arm);
+        ARMS.into_iter().filter(move |(arm, ..)| is_there(*arm))
+    }
+
     /// The points of a method on an arm at the rate that is shown, in f64.
     fn points(
         &self,
@@ -137,7 +143,7 @@ impl<'r> Shown<'r> {
             let all = self.report.information.iter();
             all.filter(|told| told.frame_times == FrameTimes::Jittered)
         };
-        for (arm, name, _) in ARMS {
+        for (arm, name, _) in self.arms() {
             for &stiffness in &self.stiffnesses {
                 for information in Information::ALL {
                     let row = jittered().filter(|told| {
@@ -174,7 +180,7 @@ impl<'r> Shown<'r> {
     fn orders(&self) -> text::Table {
         let mut table = self.by_stiffness("observed order", "arm");
         for method in self.methods() {
-            for (arm, name, _) in ARMS {
+            for (arm, name, _) in self.arms() {
                 let cells: Vec<String> = self
                     .stiffnesses
                     .iter()
@@ -213,7 +219,7 @@ impl<'r> Shown<'r> {
             .into_iter()
             .filter(|m| !m.ends_with("-midpoints"))
         {
-            for (arm, name, _) in ARMS {
+            for (arm, name, _) in self.arms() {
                 let find = |times, arithmetic| {
                     let points = self.points(arm, stiffness, times);
                     let own = points.filter(|p| p.method == method && p.arithmetic == arithmetic);
@@ -247,7 +253,7 @@ impl<'r> Shown<'r> {
         let header: Vec<&str> = header.iter().map(String::as_str).collect();
         let mut table = text::table(&header, &[]);
         table.fit(WIDTH);
-        for (arm, name, _) in ARMS {
+        for (arm, name, _) in self.arms() {
             for &stiffness in &self.stiffnesses {
                 let choices = self.report.choices.iter();
                 let row = choices.filter(|choice| {

@@ -9,7 +9,7 @@ use plotters::prelude::*;
 use super::log_axis::{around, is_drawn};
 use super::precision_diagram::COLOURS;
 use super::text;
-use crate::drift::{ARMS, ArmPoint, ArmReport, FrameTimes, Information, Setting};
+use crate::drift::{ArmPoint, ArmReport, FrameTimes, Information, Setting};
 
 /// Of one panel.
 const SIZE: (u32, u32) = (460, 340);
@@ -43,13 +43,14 @@ fn draw_on(svg: &mut String, report: &ArmReport) -> Drawn {
         .map(|choice| &choice.setting)
         .filter(|setting| Some(setting.rate_hz) == rate)
         .collect();
-    let columns = shown.len().div_ceil(ARMS.len()).max(1);
-    let size = (SIZE.0 * columns as u32, SIZE.1 * ARMS.len() as u32 + LEGEND);
+    let rows = shown.chunk_by(|a, b| a.arm == b.arm).count().max(1);
+    let columns = shown.len().div_ceil(rows).max(1);
+    let size = (SIZE.0 * columns as u32, SIZE.1 * rows as u32 + LEGEND);
     let root = SVGBackend::with_string(svg, size).into_drawing_area();
     root.fill(&WHITE)?;
     let (panels, names) = root.split_vertically(size.1 - LEGEND);
     let methods = methods(report);
-    for (area, setting) in panels.split_evenly((ARMS.len(), columns)).iter().zip(shown) {
+    for (area, setting) in panels.split_evenly((rows, columns)).iter().zip(shown) {
         let points: Vec<&ArmPoint> = report
             .points
             .iter()

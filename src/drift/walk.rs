@@ -31,10 +31,10 @@ pub fn walk<W, S, P>(
 }
 
 /// Queries of a round of the timed pass: all the same.
-pub const QUERIES: usize = 4;
+pub const QUERIES: usize = 8;
 
 /// Steps of a frame or an eye in one query.
-pub const QUERY_STEPS: u64 = 2_000;
+pub const QUERY_STEPS: u64 = 500;
 
 /// A task of the timed pass, and how many steps or simulated seconds one query is.
 pub struct Repeated {

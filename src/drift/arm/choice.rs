@@ -192,6 +192,7 @@ mod tests {
     /// The points of a soft linear arm, whose times are the steps of a frame.
     fn concluded(tolerance: f64, processes: u32) -> (Vec<ArmPoint>, ArmChoice) {
         let options = ArmOptions {
+            arms: vec![ArmKind::Linear],
             stiffnesses: vec![1e2],
             rates_hz: vec![60.0],
             seconds: 1.0,

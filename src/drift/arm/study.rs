@@ -26,6 +26,7 @@ named! {
 /// What is to be studied.
 #[derive(Clone, PartialEq, Debug)]
 pub struct ArmOptions {
+    pub arms: Vec<ArmKind>,
     /// k in 1/s^2.
     pub stiffnesses: Vec<f64>,
     pub rates_hz: Vec<f64>,
@@ -136,7 +137,7 @@ pub fn settings(options: &ArmOptions) -> Vec<Setting> {
             })
         })
     };
-    ArmKind::ALL.into_iter().flat_map(of).collect()
+    options.arms.iter().copied().flat_map(of).collect()
 }
 
 /// Most steps per frame of the arm whose steps are dear.

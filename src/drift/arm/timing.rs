@@ -15,10 +15,10 @@ use super::turning::Turning;
 /// frames.
 const SECONDS: f64 = 1.0;
 
-/// Steps of one query, about: tens of microseconds.
-const STEPS: f64 = 2_000.0;
+/// Steps of one query, about: a round is some tens of microseconds.
+const STEPS: f64 = 750.0;
 /// The same of an arm that takes some twenty times as long for each.
-const DEAR_STEPS: f64 = 100.0;
+const DEAR_STEPS: f64 = 40.0;
 
 /// The task of a point, in simulated seconds.
 pub fn task(key: &Key) -> Repeated {
