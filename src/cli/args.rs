@@ -3,6 +3,7 @@
 
 use std::path::PathBuf;
 
+use crate::drift::ArmKind;
 use crate::suite::DEFAULT_PATH;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 

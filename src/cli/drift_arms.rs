@@ -46,24 +46,7 @@ pub fn show(report: &ArmReport, out: &mut impl Write) -> io::Result<()> {
          in the end is not on the way."
     )?;
     writeln!(out, "{}", shown.choices())?;
-    for line in wrapped(&report.conclusion) {
-        writeln!(out, "{line}")?;
-    }
-    Ok(())
-}
-
-/// Lines of whole words.
-fn wrapped(sentence: &str) -> Vec<String> {
-    let mut lines = vec![String::new()];
-    for word in sentence.split(' ') {
-        let last = lines.len() - 1;
-        match lines[last].len() + word.len() < usize::from(WIDTH) {
-            true if lines[last].is_empty() => lines[last].push_str(word),
-            true => lines[last] += &format!(" {word}"),
-            false => lines.push(word.to_owned()),
-        }
-    }
-    lines
+    writeln!(out, "{}", text::wrapped(&report.conclusion, WIDTH.into()))
 }
 
 /// What the tables show: all stiffnesses, the rate in the middle.
@@ -329,7 +312,7 @@ fn stability(limits: &[StabilityLimit]) -> text::Table {
         }));
         let critical = own.iter().find(|limit| limit.damping_ratio == 1.0);
         cells.extend(critical.map(|limit| left(limit.stiffest_left_per_step)));
-        cells.extend(critical.map(|limit| growth(limit)));
+        cells.extend(critical.map(growth));
         table.add_row(cells);
     }
     table

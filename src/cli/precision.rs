@@ -16,8 +16,7 @@ use super::run_resume::typed_args;
 use super::shared_args::TableFormat;
 use super::{
     Ending, expect_folder_of, interrupt, load_scene, precision_diagram, precision_tables,
-    print_json, text,
-    unread_is_fine,
+    print_json, text, unread_is_fine,
 };
 use crate::index::Registry;
 use crate::measure::{ProcessTimes, Protocol, Status};

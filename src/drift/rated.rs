@@ -1,12 +1,12 @@
 //! Methods as points of error against time: who dominates whom, and which one to take.
-//! Times that the processes do not tell apart count as equal.
+//! Times that the processes do not tell apart are ties.
 
 use serde::Serialize;
 
 use super::walk::QUERY_STEPS;
 use super::{orbit, rotation};
 use crate::measure::OverProcesses;
-use crate::statistics::{ALPHA, Tradeoff, dominated_by, ranks};
+use crate::statistics::{ALPHA, Dominated, dominance, is_less, ranks};
 
 /// A way to turn or carry as a point of error against time.
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -27,6 +27,8 @@ pub struct Rated {
     pub qualifies: bool,
     /// Another that is no worse in error or time and better in one.
     pub dominated_by: Option<&'static str>,
+    /// It is dominated, but by times that the processes do not tell apart.
+    pub is_tie: bool,
     /// Has an error, and nothing dominates it.
     pub on_front: bool,
 }
@@ -71,6 +73,7 @@ pub fn rated(
                 ns_per_step_upper: end(ns.map(|ns| ns.upper)),
                 qualifies: error.is_some_and(|error| error < tolerance),
                 dominated_by: None,
+                is_tie: false,
                 on_front: false,
             },
         }
@@ -78,8 +81,8 @@ pub fn rated(
     with_front((first..).zip(rows).map(row).collect())
 }
 
-/// Places in the order of the times, shared where a paired test over the processes
-/// does not tell two apart: an order that is transitive.
+/// Ranks by time, shared where a paired test over the processes does not tell two
+/// apart.
 fn places(rows: &[&Row]) -> Vec<usize> {
     let values: Vec<Vec<f64>> = rows.iter().map(|row| row.ln_ns.clone()).collect();
     let placed = ranks(&values, ALPHA).into_iter();
@@ -89,24 +92,33 @@ fn places(rows: &[&Row]) -> Vec<usize> {
 /// Fills in who dominates whom. What has no error that is finite is left out:
 /// being the fastest does not put it on the front.
 fn with_front(mut rows: Vec<Row>) -> Vec<Row> {
-    let with_error: Vec<&Row> = rows
-        .iter()
-        .filter(|row| row.rated.error.is_some())
+    let rated: Vec<usize> = (0..rows.len())
+        .filter(|&i| rows[i].rated.error.is_some())
         .collect();
-    let names: Vec<&str> = with_error.iter().map(|row| row.rated.name).collect();
-    let placed = with_error.iter().zip(places(&with_error));
-    let points: Vec<Tradeoff> = placed
-        .map(|(row, place)| Tradeoff {
-            error: row.rated.error.unwrap_or(f64::INFINITY),
-            time: place as f64,
+    let values: Vec<[f64; 2]> = rated
+        .iter()
+        .map(|&i| {
+            let own = &rows[i].rated;
+            [own.error.unwrap_or(f64::INFINITY), own.ns_per_step]
         })
         .collect();
-    let with_error = rows.iter_mut().filter(|row| row.rated.error.is_some());
-    for (row, by) in with_error.zip(dominated_by(&points)) {
-        row.rated.dominated_by = by.map(|by| names[by]);
-        row.rated.on_front = by.is_none();
+    let logs: Vec<&[f64]> = rated.iter().map(|&i| &*rows[i].ln_ns).collect();
+    for (&i, found) in rated.iter().zip(front(&values, &logs)) {
+        let by = found.map(|found| rows[rated[found.by]].rated.name);
+        let own = &mut rows[i].rated;
+        own.dominated_by = by;
+        own.on_front = by.is_none();
+        own.is_tie = found.is_some_and(|found| !found.is_shown);
     }
     rows
+}
+
+/// Dominance of points of error and time with ln of their times in every process: an
+/// error is what it is, a time what a paired test over the processes shows.
+pub fn front(values: &[[f64; 2]], ln_ns: &[&[f64]]) -> Vec<Option<Dominated>> {
+    dominance(values, &|a, b, dimension| {
+        dimension == 0 || is_less(ln_ns[a], ln_ns[b], ALPHA)
+    })
 }
 
 /// Of the methods that are good enough and that none is faster than, the most precise.
@@ -212,6 +224,7 @@ mod tests {
             (Some("precise"), &["slow"][..])
         );
         assert_eq!(rows[3].rated.dominated_by, Some("precise"));
+        assert!(!rows[3].rated.is_tie, "its error is larger");
         // The other way round: the slower one is the more precise.
         let swapped = ROWS.map(|(name, summary, error)| match name {
             "precise" => (name, summary, Some(1e-9)),
@@ -229,6 +242,6 @@ mod tests {
             .collect();
         let rows = rated(swapped.into_iter(), &OverProcesses::of(&times), 0, 1e-6);
         assert_eq!(cheapest(&rows, "such errors").name, Some("slow"));
-        assert_eq!(rows[2].rated.dominated_by, Some("slow"));
+        assert!(rows[2].rated.on_front, "the values alone make the front");
     }
 }

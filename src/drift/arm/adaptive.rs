@@ -247,7 +247,7 @@ mod tests {
             near(sum(&pair.error, &|i| c[i] * c[i]), 0.0),
             pair.order > 3
         );
-        assert_eq!(near(sum(&pair.error, &|i| c[i].powi(4)), 0.0), false);
+        assert!(!near(sum(&pair.error, &|i| c[i].powi(4)), 0.0));
     }
 
     #[test]

@@ -3,10 +3,11 @@
 
 use serde::Serialize;
 
+use super::super::rated::front;
 use super::methods::Information;
 use super::study::{ARMS, ArmKind, ArmPoint, Setting};
 use crate::measure::OverProcesses;
-use crate::statistics::{ALPHA, Tradeoff, dominated_by, ranks};
+use crate::statistics::{ALPHA, ranks};
 
 /// The method to take for an arm at a frame rate.
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -67,9 +68,7 @@ fn candidates(
     .collect()
 }
 
-/// Marks the front of one setting, and chooses. Times that a paired test over the
-/// processes does not tell apart count as equal: a place in order takes the time's
-/// part, so that dominance is transitive.
+/// Marks the front of one setting, and chooses.
 pub fn conclude(
     points: &mut [ArmPoint],
     tasks: &[Option<(usize, f64)>],
@@ -78,19 +77,17 @@ pub fn conclude(
 ) -> Option<ArmChoice> {
     time(points, tasks, times);
     let candidates = candidates(points, tasks, times);
-    let places = places(&candidates.iter().collect::<Vec<_>>());
-    let tradeoffs: Vec<Tradeoff> = candidates
-        .iter()
-        .zip(&places)
-        .map(|(candidate, &place)| Tradeoff {
-            error: candidate.error,
-            time: place as f64,
-        })
-        .collect();
-    for (candidate, by) in candidates.iter().zip(dominated_by(&tradeoffs)) {
-        let by = by.map(|by| points[candidates[by].point].label());
+    let value = |c: &Candidate| {
+        let time = points[c.point].us_per_second;
+        [c.error, time.unwrap_or(f64::INFINITY)]
+    };
+    let values: Vec<[f64; 2]> = candidates.iter().map(value).collect();
+    let logs: Vec<&[f64]> = candidates.iter().map(|c| &*c.ln_ns).collect();
+    for (candidate, found) in candidates.iter().zip(front(&values, &logs)) {
+        let by = found.map(|found| points[candidates[found.by].point].label());
         let point = &mut points[candidate.point];
         point.on_front = by.is_none();
+        point.is_tie = found.is_some_and(|found| !found.is_shown);
         point.dominated_by = by;
     }
     Some(choose(

@@ -83,6 +83,8 @@ pub struct ArmPoint {
     /// Another point of the setting that is no worse in position or time and better
     /// in one.
     pub dominated_by: Option<String>,
+    /// It is dominated, but by times that the processes do not tell apart.
+    pub is_tie: bool,
     /// Timed, told of frame ends alone, and not dominated.
     pub on_front: bool,
 }
@@ -335,6 +337,7 @@ impl Key {
             us_per_second_lower: None,
             us_per_second_upper: None,
             dominated_by: None,
+            is_tie: false,
             on_front: false,
         }
     }
