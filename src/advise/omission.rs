@@ -4,6 +4,7 @@
 use serde::Serialize;
 
 use crate::measure::Ask;
+use crate::statistics::Estimate;
 use crate::verify::ErrorCount;
 
 /// Something that may be left out, and whether it should be.
@@ -172,6 +173,8 @@ pub(super) struct Aside {
     pub ratios: Vec<f64>,
     /// Of [`Draft::once_ns`].
     pub once_ns: Vec<f64>,
+    /// Time of the second of these / time of the first, where there are two.
+    pub once_ratio: Option<Estimate>,
 }
 
 /// Completes an omission from its checks and from what was timed beside them.

@@ -175,6 +175,10 @@ impl Entered {
         let ratio = |[a, b]: &[usize; 2]| times.ratio(*a, *b).map_or(f64::NAN, |r| r.value);
         let aside = Aside {
             ratios: self.pairs.iter().map(ratio).collect(),
+            once_ratio: match self.once.len() {
+                2 => times.once_ratio(self.once.start + 1, self.once.start),
+                _ => None,
+            },
             once_ns: self.once.map(|i| times.once_ns(i)).collect(),
         };
         let checks = self.checks.into_iter();

@@ -3,6 +3,7 @@
 
 use std::path::PathBuf;
 
+use crate::drift::ArmKind;
 use crate::suite::DEFAULT_PATH;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
@@ -450,6 +451,58 @@ pub struct DriftArgs {
         allow_negative_numbers = true
     )]
     pub tolerance: f64,
+    /// Spring arms to study: linear, collision (stiffens as it is stretched, and has a stop), quaternion (turns)
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        default_value = "linear,collision,quaternion",
+        value_parser = values::arm
+    )]
+    pub arm: Vec<ArmKind>,
+    /// Stiffnesses of the spring arms, k in 1/s^2, critically damped
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        default_value = "1e2,1e4,1e6",
+        value_parser = values::stiffness,
+        allow_negative_numbers = true
+    )]
+    pub stiffness: Vec<f64>,
+    /// Frames per second of the spring arms; tables show the middle one
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        default_value = "30,60,144",
+        value_parser = values::frame_rate,
+        allow_negative_numbers = true
+    )]
+    pub rate: Vec<f64>,
+    /// Simulated time that errors of spring arms are the maxima of
+    #[arg(
+        long,
+        value_name = "S",
+        default_value_t = 10.0,
+        value_parser = values::simulated_seconds,
+        allow_negative_numbers = true
+    )]
+    pub seconds: f64,
+    /// What a recommended spring arm's position may be off: its target swings by one (or a radian)
+    #[arg(
+        long,
+        value_name = "ERROR",
+        default_value_t = 1e-3,
+        value_parser = values::above_zero,
+        allow_negative_numbers = true
+    )]
+    pub arm_tolerance: f64,
+    /// Draw work against precision of the spring arms as an SVG file too
+    #[arg(long, value_name = "FILE")]
+    pub svg: Option<PathBuf>,
+    #[command(flatten)]
+    pub spread: SpreadArgs,
     #[arg(long, value_enum, default_value = "table")]
     pub format: TableFormat,
 }

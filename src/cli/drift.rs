@@ -3,35 +3,105 @@
 
 use std::collections::BTreeSet;
 use std::io::{self, Write};
+use std::time::Duration;
 
-use indicatif::ProgressBar;
+use tempfile::NamedTempFile;
 
 use super::args::DriftArgs;
+use super::processes::Workers;
+use super::protocol::Job;
+use super::run::progress;
+use super::run_resume::typed_args;
 use super::shared_args::TableFormat;
-use super::{Ending, print_json, text, unread_is_fine};
-use crate::drift::{
-    self, DriftOptions, DriftReport, ORBIT_RADIUS, Rated, Recommendation, SWING_DEG,
+use super::{
+    Ending, drift_arms, drift_diagram, expect_folder_of, interrupt, print_json, text,
+    unread_is_fine,
 };
+use crate::drift::{
+    self, ArmKind, ArmOptions, DriftOptions, DriftPlan, DriftReport, ORBIT_RADIUS, Rated,
+    Recommendation, SWING_DEG,
+};
+use crate::measure::{ProcessTimes, Protocol};
+use crate::report::write_atomically;
 
 /// Long summaries wrap at this width.
-const WIDTH: u16 = 110;
+const WIDTH: u16 = 100;
+
+/// Rounds of what is timed, if one process has them all.
+const ROUNDS: [usize; 2] = [5, 15];
 
 pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
-    let options = DriftOptions {
-        steps: args.steps,
-        tolerance_rad: args.tolerance,
-    };
-    let bar = ProgressBar::new(drift::jobs() as u64);
-    let report = drift::measure(&options, |job| {
+    expect_folder_of(args.svg.as_deref())?;
+    let options = options(args);
+    interrupt::from_now_on_finish();
+    let workers = Workers::new(typed_args()?, Duration::MAX, &NamedTempFile::new)?;
+    let jobs = drift::jobs(&options) as u64;
+    let bar = progress(jobs + u64::from(args.spread.processes));
+    let prepared = drift::prepare(&options, &protocol(args, 0), |job| {
         bar.set_message(job.to_owned());
         bar.inc(1);
+        interrupt::asked()
     });
+    let Some(prepared) = prepared else {
+        return Ok(Ending::Interrupted);
+    };
+    let job = |process| Job::Drift(prepared.plan.clone(), process);
+    let step = |process: u32, _: &str| {
+        bar.set_position(jobs + u64::from(process));
+        bar.set_message("everything, timed");
+    };
+    let Some(times) = workers.times(args.spread.processes, job, &step)? else {
+        return Ok(Ending::Interrupted);
+    };
+    let report = prepared.conclude(&times);
     bar.finish_and_clear();
+    if let Some(file) = &args.svg {
+        let svg = drift_diagram::draw(&report.arm)?;
+        write_atomically(file, |out| out.write_all(svg.as_bytes()))?;
+    }
     unread_is_fine(match args.format {
         TableFormat::Json => print_json(&report),
         TableFormat::Table => show(&report, &mut io::stdout().lock()),
     })?;
     Ok(Ending::Ok)
+}
+
+fn options(args: &DriftArgs) -> DriftOptions {
+    let once = |typed: &[f64]| {
+        let mut list = typed.to_vec();
+        list.sort_by(f64::total_cmp);
+        list.dedup();
+        list
+    };
+    DriftOptions {
+        steps: args.steps,
+        tolerance_rad: args.tolerance,
+        arm: ArmOptions {
+            arms: ArmKind::ALL
+                .into_iter()
+                .filter(|kind| args.arm.contains(kind))
+                .collect(),
+            stiffnesses: once(&args.stiffness),
+            rates_hz: once(&args.rate),
+            seconds: args.seconds,
+            tolerance: args.arm_tolerance,
+        },
+    }
+}
+
+fn protocol(args: &DriftArgs, process: u32) -> Protocol {
+    let effort = args.spread.effort(ROUNDS);
+    args.spread.protocol(&effort, process, usize::MAX)
+}
+
+/// One process's share of the times.
+pub fn time(
+    args: &DriftArgs,
+    plan: &DriftPlan,
+    process: u32,
+    stop: &dyn Fn() -> bool,
+) -> Option<ProcessTimes> {
+    drift::time(&options(args), plan, &protocol(args, process), stop)
 }
 
 /// Rows by columns, where each cell is looked up by its row's and its
@@ -69,9 +139,15 @@ fn names(rated: &[Rated]) -> Vec<&'static str> {
 }
 
 fn show(report: &DriftReport, out: &mut impl Write) -> io::Result<()> {
+    writeln!(
+        out,
+        "Times over {}, {} in each",
+        text::over(report.processes, None),
+        text::counted(report.rounds, "round")
+    )?;
     show_rotations(report, out)?;
     show_orbits(report, out)?;
-    show_springs(report, out)
+    drift_arms::show(&report.arm, out)
 }
 
 /// Numbers of steps as the heads of columns.
@@ -86,8 +162,9 @@ fn show_rotations(report: &DriftReport, out: &mut impl Write) -> io::Result<()> 
     let turn = report.turn_per_step;
     writeln!(
         out,
-        "Frames: yaw {}, pitch {} and roll {} degrees per step",
-        turn.yaw_deg, turn.pitch_deg, turn.roll_deg
+        "Camera bases: yaw {}, pitch {} and roll {} degrees per step; the most in the {} steps\n\
+         that end there, a period between two corrections",
+        turn.yaw_deg, turn.pitch_deg, turn.roll_deg, report.period_steps
     )?;
     let measures: [Measure<drift::RotationDrift>; 4] = [
         ("orthogonality after", |d| d.orthogonality_error),
@@ -153,66 +230,9 @@ fn show_orbits(report: &DriftReport, out: &mut impl Write) -> io::Result<()> {
     recommend("an orbit", &report.recommended_orbit, out)
 }
 
-fn show_springs(report: &DriftReport, out: &mut impl Write) -> io::Result<()> {
-    let integrators = names(&report.integrators);
-    writeln!(
-        out,
-        "Chase camera on a spring arm: critically damped, 60 Hz, RMS error over 20 s\n\
-         behind a target at sin t, begun one away from it"
-    )?;
-    let first = report.spring.first().map(|e| e.integrator);
-    let stiffnesses = report.spring.iter().filter(|e| Some(e.integrator) == first);
-    let columns: Vec<String> = stiffnesses
-        .map(|e| format!("k={:e}", e.stiffness))
-        .collect();
-    let table = grid("integrator", &columns, &integrators, |name, column| {
-        let own = report.spring.iter().filter(|e| e.integrator == name);
-        let mut errors = own.map(|e| e.rms_error.map_or("unstable".to_owned(), scientific));
-        errors.nth(column).unwrap_or_default()
-    });
-    writeln!(out, "{table}")?;
-    let first = report.stability.first().map(|l| l.integrator);
-    let dampings = report
-        .stability
-        .iter()
-        .filter(|l| Some(l.integrator) == first);
-    let mut columns: Vec<String> = dampings
-        .map(|l| format!("zeta={}", l.damping_ratio))
-        .collect();
-    let dampings = columns.len();
-    columns.push("left per step at k=1e6".to_owned());
-    let title = "stable while omega h < (formula)";
-    let table = grid(title, &columns, &integrators, |name, column| {
-        let mut own = report.stability.iter().filter(|l| l.integrator == name);
-        if column == dampings {
-            let critical = own.find(|l| l.damping_ratio == 1.0);
-            return critical.map_or(String::new(), |l| left(l.stiffest_left_per_step));
-        }
-        let limit = |omega_h: Option<f64>| {
-            omega_h.map_or("always".to_owned(), |limit| format!("{limit:.4}"))
-        };
-        own.nth(column).map_or(String::new(), |l| {
-            format!("{} ({})", limit(l.limit_omega_h), limit(l.formula_omega_h))
-        })
-    });
-    writeln!(out, "{table}")?;
-    show_rated("integrators", "worst error", &report.integrators, out)?;
-    recommend("a spring arm", &report.recommended_integrator, out)
-}
-
-/// What is left of an error after a step, and what that means.
-fn left(share: f64) -> String {
-    let meaning = match share {
-        s if s.abs() > 1.0 => ", unstable",
-        s if s < -0.5 => ", rings",
-        _ => "",
-    };
-    format!("{share:.1e}{meaning}")
-}
-
 fn show_rated(title: &str, error: &str, rated: &[Rated], out: &mut impl Write) -> io::Result<()> {
     let header = [title, error, "ns/step", "good", "dominated by", ""];
-    let mut table = text::table(&header, &[1, 2]);
+    let mut table = text::table(&header, &[1]);
     table.fit(WIDTH);
     for row in rated {
         let name = match row.is_default {
@@ -222,7 +242,8 @@ fn show_rated(title: &str, error: &str, rated: &[Rated], out: &mut impl Write) -
         table.add_row([
             name,
             row.error.map_or("unstable".to_owned(), scientific),
-            text::significant(row.ns_per_step),
+            text::significant(row.ns_per_step)
+                + &text::interval([row.ns_per_step_lower, row.ns_per_step_upper], 1.0),
             if row.qualifies { "yes" } else { "no" }.to_owned(),
             match row.dominated_by {
                 Some(name) => name.to_owned(),

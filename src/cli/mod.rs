@@ -16,6 +16,8 @@ mod compare_structures;
 mod compare_table;
 mod document;
 mod drift;
+mod drift_arms;
+mod drift_diagram;
 mod env;
 mod interrupt;
 mod list;
@@ -49,6 +51,7 @@ mod worker;
 
 use std::error::Error;
 use std::io::{self, Write};
+use std::path::Path;
 use std::process::ExitCode;
 
 use crate::index::Registry;
@@ -162,6 +165,17 @@ fn load_scene(source: &str, args: &SceneArgs, structures: usize) -> anyhow::Resu
         ));
     }
     Ok(scene)
+}
+
+/// That a picture has a folder to be written to: said before the work, not after it.
+fn expect_folder_of(picture: Option<&Path>) -> anyhow::Result<()> {
+    match picture.and_then(Path::parent) {
+        Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => anyhow::bail!(
+            "{}: expected an existing folder for --svg",
+            folder.display()
+        ),
+        _ => Ok(()),
+    }
 }
 
 /// One JSON document on standard output, indented.

@@ -2,7 +2,6 @@
 //! sweeps over item size and ill-conditioned cameras behind it. How it is shown is
 //! in `precision_tables`.
 
-use std::path::Path;
 use std::time::Duration;
 
 use anyhow::bail;
@@ -15,8 +14,8 @@ use super::run::progress;
 use super::run_resume::typed_args;
 use super::shared_args::TableFormat;
 use super::{
-    Ending, interrupt, load_scene, precision_diagram, precision_tables, print_json, text,
-    unread_is_fine,
+    Ending, expect_folder_of, interrupt, load_scene, precision_diagram, precision_tables,
+    print_json, text, unread_is_fine,
 };
 use crate::index::Registry;
 use crate::measure::{ProcessTimes, Protocol, Status};
@@ -33,16 +32,7 @@ const CUBES_PER_CAMERA: usize = 10_000;
 const SWEEP_CAMERAS: usize = 200;
 
 pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<Ending> {
-    // Before the work, not after it.
-    if let Some(folder) = args.svg.as_deref().and_then(Path::parent)
-        && !folder.as_os_str().is_empty()
-        && !folder.is_dir()
-    {
-        bail!(
-            "{}: expected an existing folder for --svg",
-            folder.display()
-        );
-    }
+    expect_folder_of(args.svg.as_deref())?;
     let structures = args.kernel.structures(registry, &args.structure)?;
     let defaults = args.lens.defaults()?;
     let scene = load_scene(&args.scene, &args.scene_args, 2 * structures.len())?;

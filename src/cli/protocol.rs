@@ -8,12 +8,13 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 
 use crate::advise::TrialPlan;
+use crate::drift::DriftPlan;
 use crate::measure::{Part, ProcessTimes, Share, TaskSamples};
 use crate::precision::PointPlan;
 
 /// Raised when requests or messages change: programs of different versions do
 /// not understand each other.
-pub const PROTOCOL: u32 = 3;
+pub const PROTOCOL: u32 = 4;
 
 /// What a worker is to do.
 #[derive(Clone, Serialize, Deserialize)]
@@ -46,6 +47,8 @@ pub enum Job {
     Trials(TrialPlan, Timing),
     /// All points (`precision`).
     Points(PointPlan, Timing),
+    /// Frames, eyes and arms (`drift`), in a process of this number.
+    Drift(DriftPlan, u32),
 }
 
 /// What a process is to know beside its plan.

@@ -178,7 +178,8 @@ pub fn wrapped(text: &str, width: usize) -> String {
     lines.join("\n")
 }
 
-fn interval(ends: [Option<f64>; 2], unit: f64) -> String {
+/// " [lower, upper]" in a unit; nothing if an end is not known.
+pub fn interval(ends: [Option<f64>; 2], unit: f64) -> String {
     match ends {
         [Some(lower), Some(upper)] => {
             let [lower, upper] = [lower, upper].map(|end| significant(end / unit));

@@ -4,7 +4,7 @@
 
 use crate::camera::{MATRIX_CONVENTIONS, MatrixConvention, PLANE_METHODS, PlaneMethod};
 use crate::culling::{ARITHMETICS, Arithmetic, CullingTest, TESTS};
-use crate::drift::MOST_STEPS;
+use crate::drift::{ARMS, ArmKind, MOST_STEPS};
 use crate::kernel::Kernel;
 use crate::spec::{SpecError, parse_number};
 use crate::threads::MOST_THREADS;
@@ -26,6 +26,30 @@ pub fn at_least_zero(text: &str) -> Result<f64, SpecError> {
 pub fn above_zero(text: &str) -> Result<f64, SpecError> {
     let sound = number(text).filter(|n| *n > 0.0);
     expected(sound, "a number above 0")
+}
+
+fn within(text: &str, [least, most]: [f64; 2]) -> Result<f64, SpecError> {
+    let sound = number(text).filter(|n| (least..=most).contains(n));
+    expected(sound, format_args!("a number from {least} to {most:e}"))
+}
+
+pub fn arm(name: &str) -> Result<ArmKind, SpecError> {
+    choice("arm", &ARMS, name)
+}
+
+/// Of a spring arm, in 1/s^2.
+pub fn stiffness(text: &str) -> Result<f64, SpecError> {
+    within(text, [0.01, 1e8])
+}
+
+/// Frames per second.
+pub fn frame_rate(text: &str) -> Result<f64, SpecError> {
+    within(text, [1.0, 1e3])
+}
+
+/// Simulated time.
+pub fn simulated_seconds(text: &str) -> Result<f64, SpecError> {
+    within(text, [1.0, 1e3])
 }
 
 /// A far plane; `inf` is none.

@@ -25,7 +25,7 @@ pub const GRAM_SCHMIDT: u8 = 1;
 pub const POLAR: u8 = 2;
 
 /// Rotations between two polar corrections, as in the toolkit's camera.
-const CORRECT_EVERY: u32 = 100;
+pub const CORRECT_EVERY: u32 = 100;
 
 /// How angles are summed.
 pub const RADIANS: u8 = 0;

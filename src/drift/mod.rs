@@ -1,29 +1,37 @@
 //! Small errors that add up: frames that are turned step by step, eyes that
 //! are carried around, and a chase camera on a spring arm. It owns the methods
-//! and integrators that are compared, their exact references and what follows
+//! that are compared, their exact references and what follows
 //! from the figures; how those look on a terminal is the program's business.
 
+mod arm;
 mod exact;
 mod frames;
 mod orbit;
 mod oscillator;
+mod rated;
+mod real;
 mod rotation;
-mod spring;
 mod stability;
 mod walk;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
+pub use arm::Method as ArmMethod;
+pub use arm::{
+    ARMS, ArmChoice, ArmKind, ArmOptions, ArmPoint, FrameTimes, Information, InformationError,
+    Setting,
+};
 pub use frames::Turn;
 pub use orbit::{OrbitDrift, SWING_DEG};
-pub use rotation::{ORBIT_RADIUS, RotationDrift, TurnDrift};
-pub use spring::SpringError;
+pub use rated::{Rated, Recommendation};
+pub use rotation::{ORBIT_RADIUS, PERIOD, RotationDrift, TurnDrift};
 pub use stability::StabilityLimit;
 
-use crate::statistics::{Tradeoff, dominated_by};
+use crate::measure::{OverProcesses, ProcessTimes, Protocol, Schedule, TimedTask, timed};
 use orbit::CARRIERS;
+use rated::{Row, cheapest, rated};
 use rotation::{Exact, METHODS, Method, STEADY};
-use spring::{INTEGRATORS, STIFFNESSES};
+use walk::{QUERIES, QUERY_STEPS, Repeated};
 
 /// The most steps: beyond, an f32 frame overflows and a run takes hours.
 pub const MOST_STEPS: u64 = 1_000_000_000;
@@ -31,46 +39,32 @@ pub const MOST_STEPS: u64 = 1_000_000_000;
 /// Whole turns that are looked at, in steps of one degree.
 const TURNS: [u64; 2] = [1, 1000];
 
-/// Steps in one sample of the clock.
-const TIMED_STEPS: u64 = 20_000;
-
 /// What is asked.
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, PartialEq, Debug)]
 pub struct DriftOptions {
     /// Up to how many steps.
     pub steps: u64,
     /// What a recommended method may be off after all of them: a frame's angle
     /// in radians and orthogonality, an eye's distance in radii.
     pub tolerance_rad: f64,
+    pub arm: ArmOptions,
 }
 
-/// A method or an integrator as a point of error against time.
+/// The study of spring arms.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct Rated {
-    pub name: &'static str,
-    pub summary: &'static str,
-    /// What this toolkit's camera does.
-    pub is_default: bool,
-    /// A frame's or an eye's worst error after the most steps: the larger of
-    /// angle and orthogonality, or the distance in radii. An arm's largest
-    /// error over all stiffnesses. `None` where it has none that is finite.
-    pub error: Option<f64>,
-    /// Median thread CPU time.
-    pub ns_per_step: f64,
-    /// Good enough to be recommended.
-    pub qualifies: bool,
-    /// Another that is no worse in error or time and better in one.
-    pub dominated_by: Option<&'static str>,
-    /// Has an error, and nothing dominates it.
-    pub on_front: bool,
-}
-
-/// A choice, and why.
-#[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct Recommendation {
-    /// `None` if nothing is good enough.
-    pub name: Option<&'static str>,
-    pub reason: String,
+pub struct ArmReport {
+    /// Simulated time.
+    pub seconds: f64,
+    /// What a recommended method's position may be off.
+    pub tolerance: f64,
+    pub methods: &'static [ArmMethod],
+    pub points: Vec<ArmPoint>,
+    pub information: Vec<InformationError>,
+    pub stability: Vec<StabilityLimit>,
+    /// One of every setting.
+    pub choices: Vec<ArmChoice>,
+    /// All of them in a sentence.
+    pub conclusion: String,
 }
 
 /// Everything `cullbench drift` finds.
@@ -78,23 +72,46 @@ pub struct Recommendation {
 pub struct DriftReport {
     pub steps: u64,
     pub tolerance_rad: f64,
+    /// Processes that were timed; an interval needs three or more.
+    pub processes: usize,
+    /// In each process.
+    pub rounds: usize,
     pub turn_per_step: Turn,
+    /// Steps that the figures of `rotation` are the maxima of.
+    pub period_steps: u64,
     pub rotation: Vec<RotationDrift>,
     pub one_degree_turns: Vec<TurnDrift>,
     pub orbit: Vec<OrbitDrift>,
-    pub spring: Vec<SpringError>,
-    pub stability: Vec<StabilityLimit>,
     pub rotation_methods: Vec<Rated>,
     pub orbit_methods: Vec<Rated>,
-    pub integrators: Vec<Rated>,
     pub recommended_rotation: Recommendation,
     pub recommended_orbit: Recommendation,
-    pub recommended_integrator: Recommendation,
+    pub arm: ArmReport,
 }
 
-/// Jobs that `progress` of [`measure`] is told of.
-pub fn jobs() -> usize {
-    METHODS.len() + CARRIERS.len() + 2
+/// What all processes time: the plan is the same for each.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct DriftPlan {
+    schedule: Schedule,
+    /// Points of the arms that are timed, by their place among all.
+    arms: Vec<usize>,
+}
+
+/// All errors, without times.
+pub struct Prepared {
+    pub plan: DriftPlan,
+    options: DriftOptions,
+    units: Vec<f64>,
+    rotation: Vec<RotationDrift>,
+    one_degree_turns: Vec<TurnDrift>,
+    orbit: Vec<OrbitDrift>,
+    points: Vec<ArmPoint>,
+    information: Vec<InformationError>,
+}
+
+/// Jobs that `progress` of [`prepare`] is told of.
+pub fn jobs(options: &DriftOptions) -> usize {
+    METHODS.len() + CARRIERS.len() + arm::settings(&options.arm).len()
 }
 
 /// Powers of ten from a thousand on, and the most steps themselves.
@@ -104,67 +121,189 @@ fn looks(most: u64) -> Vec<u64> {
     below.chain([most]).collect()
 }
 
-/// Measures everything; `progress` is told each job's name before it starts.
-pub fn measure(options: &DriftOptions, mut progress: impl FnMut(&str)) -> DriftReport {
+/// Finds all errors and plans how everything is timed; `progress` is told each job's
+/// name before it starts, and ends the work early if it says so.
+pub fn prepare(
+    options: &DriftOptions,
+    protocol: &Protocol,
+    mut progress: impl FnMut(&str) -> bool,
+) -> Option<Prepared> {
     let looks = looks(options.steps);
     let exact = Exact::new(&looks);
     let (mut rotation, mut one_degree_turns, mut orbit) = (Vec::new(), Vec::new(), Vec::new());
     for method in METHODS {
-        progress(method.name);
+        if progress(method.name) {
+            return None;
+        }
         rotation.extend(method.drift(&exact));
         one_degree_turns.extend(method.turn_drift(&TURNS));
     }
     for carrier in CARRIERS {
-        progress(carrier.name);
+        if progress(carrier.name) {
+            return None;
+        }
         orbit.extend(carrier.drift(&looks));
     }
-    progress("spring arm");
-    let pairs = INTEGRATORS.iter().flat_map(|i| STIFFNESSES.map(|k| (i, k)));
-    let spring: Vec<SpringError> = pairs.map(|(i, k)| i.error(k)).collect();
-    let stability = stability::limits();
-    progress("clock");
-    let methods: Vec<&Method> = METHODS.iter().collect();
-    let rotation_methods = rate_rotations(&methods, &rotation, options);
-    let orbit_methods = rate_orbits(&orbit, options);
-    let integrators = rate_integrators(&spring);
-    DriftReport {
-        steps: options.steps,
-        tolerance_rad: options.tolerance_rad,
-        turn_per_step: STEADY,
-        recommended_rotation: cheapest(&rotation_methods, options),
-        recommended_orbit: cheapest(&orbit_methods, options),
-        recommended_integrator: best_product(&integrators),
+    let (mut points, mut information) = (Vec::new(), Vec::new());
+    for setting in arm::settings(&options.arm) {
+        if progress(&format!(
+            "{} arm, k = {:e}",
+            setting.arm.name(),
+            setting.stiffness
+        )) {
+            return None;
+        }
+        let (found, told) = arm::errors(setting, options.arm.seconds);
+        points.extend(found);
+        information.extend(told);
+    }
+    // Real frames are never steady, and what has blown up is no choice.
+    let is_timed =
+        |p: &ArmPoint| p.frame_times == FrameTimes::Jittered && p.position_error.is_some();
+    let arms: Vec<usize> = (0..points.len())
+        .filter(|&i| is_timed(&points[i]))
+        .collect();
+    let (tasks, units) = tasks(options, &arms);
+    Some(Prepared {
+        plan: DriftPlan {
+            schedule: Schedule::new(QUERIES, &tasks, protocol),
+            arms,
+        },
+        options: options.clone(),
+        units,
         rotation,
         one_degree_turns,
         orbit,
-        spring,
-        stability,
-        rotation_methods,
-        orbit_methods,
-        integrators,
+        points,
+        information,
+    })
+}
+
+/// All that is timed, with the units of a query: frames, eyes, arms.
+fn tasks(options: &DriftOptions, arms: &[usize]) -> (Vec<TimedTask<'static>>, Vec<f64>) {
+    let frames = METHODS.iter().map(of_frame);
+    let eyes = CARRIERS.iter().map(|carrier| {
+        let walk = carrier.walk;
+        Repeated::new(QUERY_STEPS as f64, move || {
+            walk(&SWING_DEG, &[QUERY_STEPS]);
+        })
+    });
+    let settings = arm::settings(&options.arm).into_iter();
+    let keys: Vec<_> = settings.flat_map(arm::keys).collect();
+    let arms = arms.iter().map(|&i| arm::task(&keys[i]));
+    let all = frames.chain(eyes).chain(arms);
+    all.map(|repeated| (repeated.task, repeated.units)).unzip()
+}
+
+fn of_frame(method: &Method) -> Repeated {
+    let walk = method.walk;
+    Repeated::new(QUERY_STEPS as f64, move || {
+        walk(&STEADY, &[QUERY_STEPS]);
+    })
+}
+
+/// Times in this process what was planned; `None` if stopped.
+pub fn time(
+    options: &DriftOptions,
+    plan: &DriftPlan,
+    protocol: &Protocol,
+    stop: &dyn Fn() -> bool,
+) -> Option<ProcessTimes> {
+    let (tasks, _) = tasks(options, &plan.arms);
+    let timed = timed(&tasks, &plan.schedule, protocol, &|_| stop())?;
+    Some(ProcessTimes::of(&timed))
+}
+
+impl Prepared {
+    /// The report from the times of all processes.
+    pub fn conclude(mut self, processes: &[ProcessTimes]) -> DriftReport {
+        let times = OverProcesses::of(processes);
+        let options = &self.options;
+        let rotation_methods = rate_rotations(
+            METHODS.iter(),
+            &self.rotation,
+            options.steps,
+            options.tolerance_rad,
+            &times,
+        );
+        let orbit_methods = rate_orbits(&self.orbit, options, &times);
+        let rule = format!(
+            "an error below {:e} after {:e} steps",
+            options.tolerance_rad, options.steps as f64
+        );
+        let mut tasks = vec![None; self.points.len()];
+        let first = METHODS.len() + CARRIERS.len();
+        for (task, &point) in (first..).zip(&self.plan.arms) {
+            tasks[point] = Some((task, self.units[task]));
+        }
+        let tolerance = options.arm.tolerance;
+        let of_setting = |points: &mut [ArmPoint], from: usize| {
+            let tasks = &tasks[from..from + points.len()];
+            arm::conclude(points, tasks, &times, tolerance)
+        };
+        let (mut choices, mut from) = (Vec::new(), 0);
+        for points in self.points.chunk_by_mut(|a, b| a.setting == b.setting) {
+            choices.extend(of_setting(points, from));
+            from += points.len();
+        }
+        DriftReport {
+            steps: options.steps,
+            tolerance_rad: options.tolerance_rad,
+            processes: processes.len(),
+            rounds: self.plan.schedule.rounds as usize,
+            turn_per_step: STEADY,
+            period_steps: PERIOD,
+            rotation: self.rotation,
+            one_degree_turns: self.one_degree_turns,
+            orbit: self.orbit,
+            recommended_rotation: cheapest(&rotation_methods, &rule),
+            recommended_orbit: cheapest(&orbit_methods, &rule),
+            rotation_methods: rotation_methods.into_iter().map(|row| row.rated).collect(),
+            orbit_methods: orbit_methods.into_iter().map(|row| row.rated).collect(),
+            arm: ArmReport {
+                seconds: options.arm.seconds,
+                tolerance,
+                methods: arm::METHODS,
+                points: self.points,
+                information: self.information,
+                stability: stability::limits(),
+                conclusion: arm::conclusion(&choices, tolerance),
+                choices,
+            },
+        }
     }
 }
 
-/// How some ways to turn a frame fare after so many steps: what [`measure`] says
-/// of them, by themselves.
-pub fn rotations(names: &[&str], options: &DriftOptions) -> Vec<Rated> {
-    let exact = Exact::new(&[options.steps]);
-    let named = METHODS.iter().filter(|method| names.contains(&method.name));
-    let methods: Vec<&Method> = named.collect();
-    let drifts: Vec<_> = methods.iter().flat_map(|m| m.drift(&exact)).collect();
-    rate_rotations(&methods, &drifts, options)
+/// How some ways to turn a frame fare after so many steps, timed in this process: what
+/// a report says of them, by themselves.
+pub fn rotations(names: &[&str], steps: u64, tolerance_rad: f64) -> Vec<Rated> {
+    let protocol = Protocol {
+        rounds: [5, 5],
+        task_ns: 0.0,
+        cameras: QUERIES,
+        cold: false,
+        seed: 1,
+        cache_bytes: 0,
+    };
+    let methods = || METHODS.iter().filter(|method| names.contains(&method.name));
+    let exact = Exact::new(&[steps]);
+    let drifts: Vec<_> = methods().flat_map(|m| m.drift(&exact)).collect();
+    let tasks: Vec<TimedTask> = methods().map(|method| of_frame(method).task).collect();
+    let timed = crate::measure::timed_rounds(QUERIES, &tasks, &protocol, &|| false);
+    let times = OverProcesses::of(&[ProcessTimes::of(&timed.unwrap_or_default())]);
+    let rows = rate_rotations(methods(), &drifts, steps, tolerance_rad, &times);
+    rows.into_iter().map(|row| row.rated).collect()
 }
 
-fn rate_rotations(
-    methods: &[&Method],
+fn rate_rotations<'m>(
+    methods: impl Iterator<Item = &'m Method>,
     drifts: &[RotationDrift],
-    options: &DriftOptions,
-) -> Vec<Rated> {
-    let times = walk::ns_per_step(methods, TIMED_STEPS, |method| {
-        (method.walk)(&STEADY, &[TIMED_STEPS]);
-    });
-    let rows = methods.iter().map(|method| {
-        let last = |d: &&RotationDrift| d.method == method.name && d.steps == options.steps;
+    steps: u64,
+    tolerance: f64,
+    times: &OverProcesses,
+) -> Vec<Row> {
+    let rows = methods.map(|method| {
+        let last = |d: &&RotationDrift| d.method == method.name && d.steps == steps;
         // NaN is no maximum to `max`: a frame that is lost has no error.
         let error = drifts.iter().find(last).and_then(|d| {
             let lost = d.angle_error_rad.is_nan() || d.orthogonality_error.is_nan();
@@ -172,161 +311,22 @@ fn rate_rotations(
         });
         (method.name, method.summary, error)
     });
-    rated(rows, times, options.tolerance_rad)
+    rated(rows, times, 0, tolerance)
 }
 
-fn rate_orbits(drifts: &[OrbitDrift], options: &DriftOptions) -> Vec<Rated> {
-    let times = walk::ns_per_step(CARRIERS, TIMED_STEPS, |carrier| {
-        (carrier.walk)(&SWING_DEG, &[TIMED_STEPS]);
-    });
+fn rate_orbits(drifts: &[OrbitDrift], options: &DriftOptions, times: &OverProcesses) -> Vec<Row> {
     let rows = CARRIERS.iter().map(|carrier| {
         let last = |d: &&OrbitDrift| d.method == carrier.name && d.steps == options.steps;
         let last = drifts.iter().find(last);
         let error = last.map(|d| d.position_error / ORBIT_RADIUS);
         (carrier.name, carrier.summary, error)
     });
-    rated(rows, times, options.tolerance_rad)
-}
-
-fn rate_integrators(errors: &[SpringError]) -> Vec<Rated> {
-    let rows = INTEGRATORS.iter().map(|integrator| {
-        let own = errors.iter().filter(|e| e.integrator == integrator.name);
-        // None of them if one is missing.
-        let all: Option<Vec<f64>> = own.map(|e| e.rms_error).collect();
-        let error = all.map(|errors| errors.into_iter().fold(0.0, f64::max));
-        (integrator.name, integrator.summary, error)
-    });
-    rated(rows, spring::times(), f64::INFINITY)
-}
-
-/// Names with summaries and errors, and the time of each: good enough below the
-/// tolerance.
-fn rated(
-    rows: impl Iterator<Item = (&'static str, &'static str, Option<f64>)>,
-    times: Vec<f64>,
-    tolerance: f64,
-) -> Vec<Rated> {
-    let rated = rows.zip(times).map(|((name, summary, error), time)| Rated {
-        name,
-        summary,
-        is_default: [rotation::TOOLKIT, orbit::TOOLKIT].contains(&name),
-        error,
-        ns_per_step: time,
-        qualifies: error.is_some_and(|error| error < tolerance),
-        dominated_by: None,
-        on_front: false,
-    });
-    with_front(rated.collect())
-}
-
-/// Fills in who dominates whom. What has no error that is finite is left out:
-/// being the fastest does not put it on the front.
-fn with_front(mut rated: Vec<Rated>) -> Vec<Rated> {
-    let (mut names, mut points) = (Vec::new(), Vec::new());
-    for row in &rated {
-        if let Some(error) = row.error {
-            names.push(row.name);
-            points.push(Tradeoff {
-                error,
-                time: row.ns_per_step,
-            });
-        }
-    }
-    let with_error = rated.iter_mut().filter(|row| row.error.is_some());
-    for (row, by) in with_error.zip(dominated_by(&points)) {
-        row.dominated_by = by.map(|by| names[by]);
-        row.on_front = by.is_none();
-    }
-    rated
-}
-
-/// The cheapest of the methods that are good enough.
-fn cheapest(rated: &[Rated], options: &DriftOptions) -> Recommendation {
-    let rule = format!(
-        "an error below {:e} after {:e} steps",
-        options.tolerance_rad, options.steps as f64
-    );
-    let why = |count| format!("the cheapest of {count} methods with {rule}");
-    least(
-        rated,
-        |rated| rated.ns_per_step,
-        why,
-        || format!("no method has {rule}"),
-    )
-}
-
-/// The least product of error and time among the stable.
-fn best_product(rated: &[Rated]) -> Recommendation {
-    let stable = "stable at every stiffness";
-    let product = |rated: &Rated| rated.error.unwrap_or(f64::INFINITY) * rated.ns_per_step;
-    let why =
-        |count| format!("the least error times cost of {count} integrators that are {stable}");
-    least(rated, product, why, || format!("no integrator is {stable}"))
-}
-
-/// The least of what qualifies; why that, of so many, or why none.
-fn least(
-    rated: &[Rated],
-    by: impl Fn(&Rated) -> f64,
-    why: impl FnOnce(usize) -> String,
-    why_none: impl FnOnce() -> String,
-) -> Recommendation {
-    let good: Vec<&Rated> = rated.iter().filter(|rated| rated.qualifies).collect();
-    let best = good.iter().min_by(|a, b| by(a).total_cmp(&by(b)));
-    Recommendation {
-        name: best.map(|best| best.name),
-        reason: best.map_or_else(why_none, |_| why(good.len())),
-    }
+    rated(rows, times, METHODS.len(), options.tolerance_rad)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Fast and rough, slow and precise, slower and no better, faster and lost.
-    fn four(tolerance: f64) -> Vec<Rated> {
-        let rows = [
-            ("lost", "", None),
-            ("rough", "", Some(1e-3)),
-            ("precise", "", Some(1e-12)),
-            ("slow", "", Some(1e-9)),
-        ];
-        rated(rows.into_iter(), vec![1.0, 5.0, 9.0, 30.0], tolerance)
-    }
-
-    #[test]
-    fn the_cheapest_within_the_tolerance_is_recommended() {
-        let choose = |tolerance_rad| {
-            let steps = 1000;
-            let options = DriftOptions {
-                steps,
-                tolerance_rad,
-            };
-            cheapest(&four(tolerance_rad), &options)
-        };
-        assert_eq!(choose(1e-2).name, Some("rough"));
-        assert_eq!(choose(1e-6).name, Some("precise"));
-        assert!(choose(1e-6).reason.contains("of 2 methods"));
-        let none = choose(1e-15);
-        assert_eq!(none.name, None);
-        assert!(
-            none.reason.contains("below 1e-15 after 1e3 steps"),
-            "{none:?}"
-        );
-    }
-
-    #[test]
-    fn what_is_lost_is_neither_on_the_front_nor_recommended() {
-        let rated = four(1.0);
-        let dominated: Vec<_> = rated.iter().map(|r| (r.dominated_by, r.on_front)).collect();
-        let front = (None, true);
-        assert_eq!(
-            dominated,
-            [(None, false), front, front, (Some("precise"), false)]
-        );
-        assert_eq!(best_product(&rated).name, Some("precise"));
-        assert_eq!(best_product(&rated[..1]).name, None);
-    }
 
     #[test]
     fn figures_are_taken_at_powers_of_ten_and_at_the_end() {

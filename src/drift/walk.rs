@@ -1,10 +1,9 @@
-//! Taking many steps of one kind and looking at where they led, and the time a
-//! step takes. What a step is, its owners know.
+//! Taking many steps of one kind and looking at where they led, and steps as tasks of
+//! the timed pass. What a step is, its owners know.
 
 use std::hint::black_box;
 
-use crate::measure::Stopwatch;
-use crate::statistics::median;
+use crate::measure::TimedTask;
 
 /// Takes equal steps of one kind: the places after each of the ascending numbers
 /// of them.
@@ -31,23 +30,30 @@ pub fn walk<W, S, P>(
     places
 }
 
-/// Samples that a time is the median of.
-const ROUNDS: usize = 15;
+/// Queries of a round of the timed pass: all the same.
+pub const QUERIES: usize = 8;
 
-/// Median thread CPU time in nanoseconds of one step of each job, where `run`
-/// does `steps` steps of one. The jobs take turns, so that a change of the
-/// machine's speed meets all of them.
-pub fn ns_per_step<J>(jobs: &[J], steps: u64, mut run: impl FnMut(&J)) -> Vec<f64> {
-    let mut samples = vec![Vec::with_capacity(ROUNDS); jobs.len()];
-    for _ in 0..ROUNDS {
-        for (job, samples) in jobs.iter().zip(&mut samples) {
-            let watch = Stopwatch::start();
-            run(job);
-            samples.push(watch.lap().cpu_ns / steps as f64);
+/// Steps of a frame or an eye in one query.
+pub const QUERY_STEPS: u64 = 500;
+
+/// A task of the timed pass, and how many steps or simulated seconds one query is.
+pub struct Repeated {
+    pub task: TimedTask<'static>,
+    pub units: f64,
+}
+
+impl Repeated {
+    pub fn new(units: f64, run: impl Fn() + 'static) -> Repeated {
+        Repeated {
+            task: TimedTask {
+                ask: Box::new(move |_, _| run()),
+                ask_many: None,
+                expected: vec![0; QUERIES],
+                least_ns: None,
+            },
+            units,
         }
     }
-    let medians = samples.iter().map(|samples| median(samples));
-    medians.map(|ns| ns.unwrap_or(f64::NAN)).collect()
 }
 
 #[cfg(test)]
@@ -58,16 +64,5 @@ mod tests {
     fn looks_are_taken_after_exactly_so_many_steps() {
         let places = walk(5, &3, &[0, 1, 10, 10, 12], |at, by| *at += by, |at| *at);
         assert_eq!(places, [5, 8, 35, 35, 41]);
-    }
-
-    #[test]
-    fn every_job_is_timed_as_often() {
-        let mut runs = [0, 0];
-        let times = ns_per_step(&[0, 1], 10, |&job: &usize| runs[job] += 1);
-        assert_eq!(runs, [ROUNDS; 2]);
-        assert!(
-            times.len() == 2 && times.iter().all(|ns| *ns >= 0.0),
-            "{times:?}"
-        );
     }
 }

@@ -97,6 +97,11 @@ impl OverProcesses {
         shown(&self.once[i], &self.once[i]).map_or(f64::NAN, |found| found.value)
     }
 
+    /// Time of one thing that is done once / time of another.
+    pub fn once_ratio(&self, i: usize, other: usize) -> Option<Estimate> {
+        ratio(&self.once[i], &self.once[i], &self.once[other])
+    }
+
     /// Time of `task` / time of `other`: the ratio of the two that [`Self::ns`]
     /// gives.
     pub fn ratio(&self, task: usize, other: usize) -> Option<Estimate> {
@@ -117,7 +122,7 @@ mod tests {
     fn process(ln_ns: [f64; 3], once: f64) -> ProcessTimes {
         ProcessTimes {
             ln_ns: ln_ns.map(|ln_ns| Ok(Some(ln_ns))).into(),
-            once_ns: vec![once],
+            once_ns: vec![once, 2.0 * once],
             by_camera: Vec::new(),
         }
     }
@@ -149,6 +154,8 @@ mod tests {
         assert!(times.is_faster(0, 1) && !times.is_faster(1, 0));
         assert!(!times.is_faster(1, 2) && !times.is_faster(2, 1));
         assert!((times.once_ns(0) - 100.0).abs() < 1e-9);
+        let twice = times.once_ratio(1, 0).unwrap();
+        assert!((twice.value - 2.0).abs() < 1e-12 && twice.lower <= twice.value);
     }
 
     #[test]

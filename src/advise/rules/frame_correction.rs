@@ -5,7 +5,8 @@
 use super::super::AdviseError;
 use super::super::case::Case;
 use super::super::omission::{By, Draft, LeftOutIf, Omission};
-use crate::drift::{DriftOptions, Rated, rotations};
+use crate::drift::{Rated, rotations};
+use crate::statistics::Estimate;
 
 pub(super) const NAME: &str = "frame-correction";
 
@@ -30,11 +31,7 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
     );
     let tolerance = case.options.tolerance;
     let steps = case.workload.cameras.len() as u64;
-    let options = DriftOptions {
-        steps,
-        tolerance_rad: tolerance,
-    };
-    let rated = rotations(&[KEPT, LEFT_OUT], &options);
+    let rated = rotations(&[KEPT, LEFT_OUT], steps, tolerance);
     let of = |name: &str| -> Option<&Rated> { rated.iter().find(|r| r.name == name) };
     let (Some(kept), Some(left_out)) = (of(KEPT), of(LEFT_OUT)) else {
         return Ok(omission.because("no such method").draft(Vec::new()));
@@ -53,15 +50,30 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
     let mut draft = omission.draft(Vec::new());
     draft.once_ns = vec![left_out.ns_per_step, kept.ns_per_step];
     Ok(draft.finished_by(move |omission, aside| {
-        let [left_out_ns, kept_ns] = aside.once_ns[..] else {
+        let ([left_out_ns, kept_ns], Some(ratio)) = (&aside.once_ns[..], &aside.once_ratio) else {
             return;
         };
+        let dearer = dearer(ratio);
         omission.reason = format!(
             "{steps} steps of {DRIFT:.0e}; walked: {left_out_error} uncorrected at {left_out_ns:.0} ns a step, \
-             {kept_error} with a Newton step to the polar factor every 100 at {kept_ns:.0} ns; a tenth of \
+             {kept_error} with a Newton step to the polar factor every 100 at {kept_ns:.0} ns ({dearer}); a tenth of \
              {tolerance:.0e} is used up after some {:.0} steps",
             tolerance * MUCH_LESS / DRIFT
         );
-        omission.saving = Some(1.0 - left_out_ns / kept_ns);
+        omission.saving = Some(1.0 - 1.0 / ratio.value);
     }))
+}
+
+/// How much longer it takes, and whether the processes show that it does.
+fn dearer(ratio: &Estimate) -> String {
+    let Estimate {
+        value,
+        lower,
+        upper,
+    } = ratio;
+    match (lower.is_finite(), *lower > 1.0) {
+        (false, _) => format!("{value:.2} times as long"),
+        (_, true) => format!("{value:.2} [{lower:.2}, {upper:.2}] times as long"),
+        (_, false) => format!("as long: {value:.2} [{lower:.2}, {upper:.2}]"),
+    }
 }
