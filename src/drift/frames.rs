@@ -39,7 +39,7 @@ macro_rules! precision {
         pub mod $module {
             use glam::{$matrix, $quaternion, $vector};
 
-            use super::*;
+            use crate::drift::frames::*;
 
             fn sin_cos(radians: $real) -> ($real, $real) {
                 ($sin(radians), $cos(radians))
