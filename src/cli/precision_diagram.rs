@@ -1,19 +1,20 @@
-//! The picture of `cullbench precision`: excess against time, one mark for each
-//! point, the Pareto front as a line. It draws what was measured and decides
-//! nothing.
+//! The pictures of `cullbench precision`: error against time, one mark for each
+//! point, the Pareto front as a line; frustum queries above, region search below.
+//! They draw what was measured and decide nothing.
 
 use std::collections::BTreeMap;
 
 use anyhow::anyhow;
+use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::log_axis::{around, is_drawn, left_out};
 use super::text;
-use crate::precision::{Point, Precision};
+use crate::precision::{Point, Precision, RegionPoint};
 
-const SIZE: (u32, u32) = (1000, 640);
-/// Percent that stand for no excess at all: a logarithmic axis has no zero.
-const NONE: f64 = 1e-4;
+const SIZE: (u32, u32) = (1000, 1080);
+/// Height of the picture of frustum queries.
+const UPPER: u32 = 640;
 
 /// Told apart also without colours of their own names: dark to light.
 pub const COLOURS: [RGBColor; 8] = [
@@ -27,93 +28,172 @@ pub const COLOURS: [RGBColor; 8] = [
     RGBColor(120, 120, 120),
 ];
 
-/// Time in microseconds and excess in percent, if the point has both.
-fn place(point: &Point) -> Option<(f64, f64)> {
-    let excess = point.excess?.value * 100.0;
-    let place = (point.times.query_ns? / 1e3, excess.max(NONE));
-    (is_drawn(place.0) && is_drawn(place.1)).then_some(place)
+/// A point of a picture.
+struct Mark {
+    series: String,
+    /// Time and error, as the axes have them.
+    at: [f64; 2],
+    on_front: bool,
+    /// Whether it misses something.
+    is_cross: bool,
 }
 
-/// The diagram as SVG.
+impl Mark {
+    /// If the point has a time and an error.
+    fn of(point: &Point) -> Option<Mark> {
+        Some(Mark {
+            series: point.structure.clone(),
+            at: [point.times.query_ns? / 1e3, point.excess?.value * 100.0],
+            on_front: point.on_front,
+            is_cross: point.errors.false_negatives > 0,
+        })
+    }
+
+    fn of_region(point: &RegionPoint) -> Option<Mark> {
+        Some(Mark {
+            series: format!("{} {}", point.structure, point.numbers),
+            at: [point.times.query_ns?, point.wrong?.value * 100.0],
+            on_front: point.on_front,
+            is_cross: point.missed_region_count > 0,
+        })
+    }
+}
+
+/// One picture: what stands over it and at its axes, and its marks.
+struct Picture {
+    caption: String,
+    axes: [&'static str; 2],
+    /// What stands for no error at all: a logarithmic axis has no zero.
+    none: f64,
+    marks: Vec<Mark>,
+    /// Whether a series has a place in the legend.
+    is_named: fn(&[Mark], &str) -> bool,
+}
+
+/// The diagrams as SVG.
 pub fn draw(precision: &Precision) -> anyhow::Result<String> {
+    let about = format!("{}, {}", precision.scene, precision.path);
+    let queries = Picture {
+        caption: format!("{about}: error against run time"),
+        axes: [
+            "time per query, us (thread CPU; left is better)",
+            "false positives, % of visible (lower is better)",
+        ],
+        none: 1e-4,
+        marks: precision.points.iter().filter_map(Mark::of).collect(),
+        is_named: |_, _| true,
+    };
+    let regions = Picture {
+        caption: format!("{about}: region search"),
+        axes: [
+            "time per point, ns (thread CPU; left is better)",
+            "points with a wrong answer, % (lower is better)",
+        ],
+        none: 1e-2,
+        marks: precision
+            .region_points
+            .iter()
+            .filter_map(Mark::of_region)
+            .collect(),
+        // Two for each structure are too many to name.
+        is_named: |marks, series| marks.iter().any(|m| m.on_front && m.series == series),
+    };
     let mut svg = String::new();
-    let drawn = draw_on(&mut svg, precision);
+    let drawn = draw_on(&mut svg, &queries, &regions);
     drawn.map_err(|error| anyhow!("the diagram cannot be drawn: {error}"))?;
     Ok(text::lines(&svg))
 }
 
-fn draw_on(svg: &mut String, precision: &Precision) -> Result<(), Box<dyn std::error::Error>> {
-    let places: Vec<(f64, f64)> = precision.points.iter().filter_map(place).collect();
-    let measured = precision.points.iter();
-    let measured =
-        measured.filter(|point| point.times.query_ns.is_some() && point.excess.is_some());
-    let beyond = left_out(measured.count() - places.len());
-    let times = around(places.iter().map(|p| p.0), 1.5, 2.0).log_scale();
-    // From nothing to a hundredth at least.
-    let excesses = places.iter().map(|p| p.1).chain([NONE, 1.0]);
-    let excesses = around(excesses, 1.5, 2.0).log_scale();
+type Drawn = Result<(), Box<dyn std::error::Error>>;
+
+fn draw_on(svg: &mut String, upper: &Picture, lower: &Picture) -> Drawn {
     let root = SVGBackend::with_string(svg, SIZE).into_drawing_area();
     root.fill(&WHITE)?;
-    let caption = format!(
-        "{}, {}: error against run time{beyond}",
-        precision.scene, precision.path
-    );
-    let mut chart = ChartBuilder::on(&root)
-        .caption(caption, ("sans-serif", 18))
-        .margin(14)
-        .x_label_area_size(44)
-        .y_label_area_size(64)
-        .build_cartesian_2d(times, excesses)?;
-    chart
-        .configure_mesh()
-        .light_line_style(WHITE.mix(0.0))
-        .x_desc("time per query, us (thread CPU; left is better)")
-        .y_desc("false positives, % of visible (lower is better)")
-        .x_label_formatter(&|x| text::significant(*x))
-        .y_label_formatter(&|y| {
-            if *y <= NONE {
-                "0".to_owned()
-            } else {
-                text::significant(*y)
-            }
-        })
-        .draw()?;
-    let front: Vec<(f64, f64)> = precision
-        .front
-        .iter()
-        .filter_map(|&i| place(&precision.points[i]))
-        .collect();
-    chart
-        .draw_series(LineSeries::new(front, BLACK.mix(0.5)))?
-        .label("Pareto front")
-        .legend(|(x, y)| PathElement::new([(x, y), (x + 16, y)], BLACK.mix(0.5)));
-    let mut series: BTreeMap<&str, Vec<&Point>> = BTreeMap::new();
-    for point in &precision.points {
-        series.entry(&point.structure).or_default().push(point);
-    }
-    for (i, (structure, points)) in series.into_iter().enumerate() {
-        let colour = COLOURS[i % COLOURS.len()];
-        let (safe, unsafe_): (Vec<&Point>, Vec<&Point>) = points
-            .into_iter()
-            .partition(|p| p.errors.false_negatives == 0);
-        let marks = safe.into_iter().filter_map(|point| {
-            let size = if point.on_front { 6 } else { 4 };
-            Some(Circle::new(place(point)?, size, colour.filled()))
-        });
-        chart
-            .draw_series(marks)?
-            .label(structure)
-            .legend(move |(x, y)| Circle::new((x + 8, y), 4, colour.filled()));
-        // A cross misses something that is visible.
-        let crosses = unsafe_.into_iter().filter_map(place);
-        chart.draw_series(crosses.map(|at| Cross::new(at, 5, colour.stroke_width(2))))?;
-    }
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::UpperRight)
-        .background_style(WHITE.mix(0.8))
-        .border_style(BLACK.mix(0.3))
-        .draw()?;
+    let (top, bottom) = root.split_vertically(UPPER);
+    upper.draw(&top)?;
+    lower.draw(&bottom)?;
     root.present()?;
     Ok(())
+}
+
+impl Picture {
+    /// Where a mark is drawn, if its axes have such a place.
+    fn place(&self, mark: &Mark) -> Option<(f64, f64)> {
+        let place = (mark.at[0], mark.at[1].max(self.none));
+        (is_drawn(place.0) && is_drawn(place.1)).then_some(place)
+    }
+
+    /// Those of the front that are better the longer they take: the others are on it
+    /// for their memory or for what they do not miss.
+    fn front(&self) -> Vec<(f64, f64)> {
+        let mut least = f64::INFINITY;
+        let marks = self.marks.iter().filter(|mark| mark.on_front);
+        let places = marks.filter_map(|mark| self.place(mark));
+        places
+            .filter(|&(_, error)| {
+                let is_better = error < least;
+                least = least.min(error);
+                is_better
+            })
+            .collect()
+    }
+
+    fn draw(&self, area: &DrawingArea<SVGBackend, Shift>) -> Drawn {
+        let places: Vec<(f64, f64)> = self.marks.iter().filter_map(|m| self.place(m)).collect();
+        let beyond = left_out(self.marks.len() - places.len());
+        let times = around(places.iter().map(|p| p.0), 1.5, 2.0).log_scale();
+        // From nothing to a hundredth at least.
+        let errors = places.iter().map(|p| p.1).chain([self.none, 1.0]);
+        let errors = around(errors, 1.5, 2.0).log_scale();
+        let mut chart = ChartBuilder::on(area)
+            .caption(format!("{}{beyond}", self.caption), ("sans-serif", 18))
+            .margin(14)
+            .x_label_area_size(44)
+            .y_label_area_size(64)
+            .build_cartesian_2d(times, errors)?;
+        chart
+            .configure_mesh()
+            .light_line_style(WHITE.mix(0.0))
+            .x_desc(self.axes[0])
+            .y_desc(self.axes[1])
+            .x_label_formatter(&|x| text::significant(*x))
+            .y_label_formatter(&|y| match *y <= self.none {
+                true => "0".to_owned(),
+                false => text::significant(*y),
+            })
+            .draw()?;
+        chart
+            .draw_series(LineSeries::new(self.front(), BLACK.mix(0.5)))?
+            .label("Pareto front")
+            .legend(|(x, y)| PathElement::new([(x, y), (x + 16, y)], BLACK.mix(0.5)));
+        let mut series: BTreeMap<&str, Vec<&Mark>> = BTreeMap::new();
+        for mark in &self.marks {
+            series.entry(&mark.series).or_default().push(mark);
+        }
+        for (i, (name, marks)) in series.into_iter().enumerate() {
+            let colour = COLOURS[i % COLOURS.len()];
+            let (crosses, sound): (Vec<&Mark>, Vec<&Mark>) =
+                marks.into_iter().partition(|mark| mark.is_cross);
+            let circles = sound.into_iter().filter_map(|mark| {
+                let size = if mark.on_front { 6 } else { 4 };
+                Some(Circle::new(self.place(mark)?, size, colour.filled()))
+            });
+            let drawn = chart.draw_series(circles)?;
+            if (self.is_named)(&self.marks, name) {
+                drawn
+                    .label(name)
+                    .legend(move |(x, y)| Circle::new((x + 8, y), 4, colour.filled()));
+            }
+            // A cross misses something that is to be found.
+            let crosses = crosses.into_iter().filter_map(|mark| self.place(mark));
+            chart.draw_series(crosses.map(|at| Cross::new(at, 5, colour.stroke_width(2))))?;
+        }
+        chart
+            .configure_series_labels()
+            .position(SeriesLabelPosition::UpperRight)
+            .background_style(WHITE.mix(0.8))
+            .border_style(BLACK.mix(0.3))
+            .draw()?;
+        Ok(())
+    }
 }

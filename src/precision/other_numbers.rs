@@ -498,6 +498,39 @@ mod tests {
         }
     }
 
+    /// Planes through a box's corner but for what f64 cannot hold: rounding drops
+    /// many of those boxes, an interval none, and exact signs none.
+    #[test]
+    fn intervals_and_exact_signs_keep_what_rounding_would_drop() {
+        let mut rng = SeededRng::new(2);
+        let mut dropped = 0;
+        for _ in 0..2000 {
+            let [normal, a, b] = [(); 3].map(|()| rng.point() * 2.0 - 1.0);
+            let (a, b) = (a.as_vec3(), b.as_vec3());
+            let b = Aabb::new(a.min(b), a.max(b));
+            let mut plane = PlaneF64::new(normal, 0.0);
+            let upper = normal.to_array().map(|n| n >= 0.0);
+            let far = (0..3).map(|k| if upper[k] { b.max[k] } else { b.min[k] });
+            plane.d = -(0..3)
+                .zip(far)
+                .map(|(k, x)| normal[k] * f64::from(x))
+                .sum::<f64>();
+            while exact(&plane, &b) < 0 {
+                plane.d = plane.d.next_up();
+            }
+            // As low as it goes with the box still touching.
+            let lower = |plane: &PlaneF64| PlaneF64::new(plane.normal, plane.d.next_down());
+            while exact(&lower(&plane), &b) >= 0 {
+                plane = lower(&plane);
+            }
+            dropped += u32::from(plane.excludes(&b));
+            let interval = Formed::new([Interval::around(&plane, 0.0, 0.0)]);
+            let doubled = Formed::new([DoubleDouble::from(&plane)]);
+            assert!(interval.sees(&b) && doubled.sees(&b), "{plane:?} {b:?}");
+        }
+        assert!(dropped > 20, "{dropped}");
+    }
+
     /// What each form loses, or keeps, that the plain test does not.
     #[test]
     fn the_forms_differ_where_they_must() {
