@@ -25,6 +25,7 @@ mod locate;
 mod log_axis;
 mod merge;
 mod precision;
+mod precision_conclusions;
 mod precision_diagram;
 mod precision_tables;
 mod processes;

@@ -1,6 +1,6 @@
 //! `cullbench precision`: error against run time of a scene and path, and the
 //! sweeps over item size and ill-conditioned cameras behind it. How it is shown is
-//! in `precision_tables`.
+//! in `precision_tables` and `precision_conclusions`.
 
 use std::time::Duration;
 
@@ -14,8 +14,8 @@ use super::run::progress;
 use super::run_resume::typed_args;
 use super::shared_args::TableFormat;
 use super::{
-    Ending, expect_folder_of, interrupt, load_scene, precision_diagram, precision_tables,
-    print_json, text, unread_is_fine,
+    Ending, expect_folder_of, interrupt, load_scene, precision_conclusions, precision_diagram,
+    precision_tables, print_json, text, unread_is_fine,
 };
 use crate::index::Registry;
 use crate::measure::{ProcessTimes, Protocol, Status};
@@ -111,7 +111,9 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
     };
     unread_is_fine(match args.format {
         TableFormat::Json => print_json(&outcome),
-        TableFormat::Table => precision_tables::show(&outcome),
+        TableFormat::Table => {
+            precision_tables::show(&outcome).and_then(|()| precision_conclusions::show(&outcome))
+        }
     })?;
     Ok(if wrong {
         Ending::WrongAnswer

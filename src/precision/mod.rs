@@ -14,6 +14,7 @@ mod size_sweep;
 mod stability;
 mod stored;
 mod sweeps;
+mod ways;
 
 pub use plane_test::Names;
 pub use point::{Point, Times};
