@@ -42,7 +42,7 @@ pub struct StructureRow {
     pub query_ns: Option<f64>,
     /// Lower end of its 95 % interval.
     pub query_ns_lower: Option<f64>,
-    /// PVertexSigns end of its 95 % interval.
+    /// Upper end of its 95 % interval.
     pub query_ns_upper: Option<f64>,
     /// Time of `linear` / time of this; above 1 is faster.
     pub speedup: Option<f64>,
@@ -200,7 +200,7 @@ pub struct TestRow {
     pub query_ns: Option<f64>,
     /// Lower end of its 95 % interval.
     pub query_ns_lower: Option<f64>,
-    /// PVertexSigns end of its 95 % interval.
+    /// Upper end of its 95 % interval.
     pub query_ns_upper: Option<f64>,
     /// False positives / visible items, by judged camera.
     pub excess: Option<Rate>,

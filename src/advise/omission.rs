@@ -102,7 +102,7 @@ pub struct Check {
     pub ratio: f64,
     /// Lower end of the interval.
     pub ratio_lower: f64,
-    /// PVertexSigns end of the interval.
+    /// Upper end of the interval.
     pub ratio_upper: f64,
     /// Whether every camera got the same set from both.
     pub same_answers: bool,

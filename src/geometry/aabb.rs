@@ -15,7 +15,7 @@ use crate::arithmetic::rounding::{difference_down, difference_up, sum_down, sum_
 pub struct Aabb {
     /// Lower corner.
     pub min: Vec3,
-    /// PVertexSigns corner; part of the box.
+    /// Upper corner; part of the box.
     pub max: Vec3,
 }
 

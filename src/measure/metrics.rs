@@ -74,7 +74,7 @@ pub struct Metric {
     pub value: f64,
     /// Lower end of the interval; `None` without one.
     pub lower: Option<f64>,
-    /// PVertexSigns end of the interval; `None` without one.
+    /// Upper end of the interval; `None` without one.
     pub upper: Option<f64>,
     /// As `cullbench list metrics` has it.
     pub unit: String,

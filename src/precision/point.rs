@@ -17,7 +17,7 @@ pub struct Times {
     pub query_ns: Option<f64>,
     /// Lower end of the 95 % interval of `query_ns`.
     pub query_ns_lower: Option<f64>,
-    /// PVertexSigns end of the 95 % interval of `query_ns`.
+    /// Upper end of the 95 % interval of `query_ns`.
     pub query_ns_upper: Option<f64>,
     /// Its place among the tasks that were timed, if it has a time.
     #[serde(skip)]

@@ -251,7 +251,7 @@ pub struct CommonShift {
     pub ratio: f64,
     /// 95 % interval; `None` below three processes a side.
     pub lower: Option<f64>,
-    /// PVertexSigns end of the interval.
+    /// Upper end of the interval.
     pub upper: Option<f64>,
     /// Cells it is made of.
     pub cells: usize,

@@ -107,7 +107,7 @@ pub struct TwinEntry {
     /// Lower end of the ratio's 95 % interval.
     #[serde(default)]
     pub lower: Option<f64>,
-    /// PVertexSigns end of the ratio's 95 % interval.
+    /// Upper end of the ratio's 95 % interval.
     #[serde(default)]
     pub upper: Option<f64>,
 }

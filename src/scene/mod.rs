@@ -46,7 +46,7 @@ pub use wad::{WadMap, map_names};
 pub struct WorldBox {
     /// Lower corner; bounds are closed.
     pub min: DVec3,
-    /// PVertexSigns corner; bounds are closed.
+    /// Upper corner; bounds are closed.
     pub max: DVec3,
 }
 

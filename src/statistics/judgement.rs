@@ -54,7 +54,7 @@ pub struct Judgement {
     /// 95 % interval of the ratio, which it always holds; `None` below three
     /// pairs.
     pub lower: Option<f64>,
-    /// PVertexSigns end of the interval.
+    /// Upper end of the interval.
     pub upper: Option<f64>,
     /// The smallest change (0.05 is 5 %) that 95 % of such comparisons find.
     pub resolution: Option<f64>,

@@ -15,7 +15,7 @@ pub struct Estimate {
     pub value: f64,
     /// Lower end of the interval.
     pub lower: f64,
-    /// PVertexSigns end of the interval.
+    /// Upper end of the interval.
     pub upper: f64,
 }
 
@@ -27,14 +27,14 @@ pub struct Shown {
     pub value: f64,
     /// Lower end of the interval of `value`.
     pub lower: Option<f64>,
-    /// PVertexSigns end of the interval of `value`.
+    /// Upper end of the interval of `value`.
     pub upper: Option<f64>,
     /// Time of the reference / time of the structure, above 1 is faster: the
     /// ratio of the two shown values.
     pub speedup: f64,
     /// `None` also for the reference itself, whose speed-up is 1 by definition.
     pub speedup_lower: Option<f64>,
-    /// PVertexSigns end of the interval of `speedup`.
+    /// Upper end of the interval of `speedup`.
     pub speedup_upper: Option<f64>,
 }
 
