@@ -141,9 +141,13 @@ fn names(rated: &[Rated]) -> Vec<&'static str> {
 fn show(report: &DriftReport, out: &mut impl Write) -> io::Result<()> {
     writeln!(
         out,
-        "Times over {}, {} in each",
-        text::over(report.processes, None),
-        text::counted(report.rounds, "round")
+        "{}, {} in each{}",
+        text::counted(report.processes, "process"),
+        text::counted(report.rounds, "round"),
+        match report.processes {
+            ..3 => ": times without intervals (--processes 10 gives them)",
+            _ => ": times with 95 % intervals",
+        }
     )?;
     show_rotations(report, out)?;
     show_orbits(report, out)?;
@@ -257,8 +261,9 @@ fn show_rated(title: &str, error: &str, rated: &[Rated], out: &mut impl Write) -
 }
 
 fn recommend(what: &str, choice: &Recommendation, out: &mut impl Write) -> io::Result<()> {
-    match choice.name {
-        Some(name) => writeln!(out, "Recommended for {what}: {name}, {}.\n", choice.reason),
-        None => writeln!(out, "Recommended for {what}: nothing; {}.\n", choice.reason),
-    }
+    let said = match choice.name {
+        Some(name) => format!("Recommended for {what}: {name}, {}.", choice.reason),
+        None => format!("Recommended for {what}: nothing; {}.", choice.reason),
+    };
+    writeln!(out, "{}\n", text::wrapped(&said, WIDTH.into()))
 }

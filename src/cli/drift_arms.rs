@@ -27,7 +27,11 @@ pub fn show(report: &ArmReport, out: &mut impl Write) -> io::Result<()> {
     )?;
     writeln!(out, "{}", shown.information())?;
     for (arm, name, what) in shown.arms() {
-        writeln!(out, "{name} arm: {what}")?;
+        writeln!(
+            out,
+            "{}",
+            text::wrapped(&format!("{name} arm: {what}"), WIDTH.into())
+        )?;
         writeln!(out, "{}", shown.within(arm, name))?;
     }
     writeln!(out, "{}", shown.orders())?;
