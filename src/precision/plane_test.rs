@@ -37,9 +37,13 @@ pub enum PlaneTest {
 /// The names of a [`PlaneTest`].
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Names {
+    /// Name of the culling test.
     pub test: &'static str,
+    /// Name of the arithmetic.
     pub arithmetic: &'static str,
+    /// Name of the derivation of the planes.
     pub planes: &'static str,
+    /// Factor c of the planes' epsilon.
     pub epsilon: f64,
 }
 
