@@ -34,7 +34,7 @@ pub enum PlaneTest {
     PlainFrame,
 }
 
-/// The names of a [`PlaneTest`].
+/// What a plane test is called: one each of test, arithmetic, planes and epsilon.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Names {
     /// Name of the culling test.
