@@ -60,6 +60,7 @@
 
 // docs.rs says of each item which feature it needs.
 #![cfg_attr(docsrs, feature(doc_cfg))]
+#![deny(missing_docs)]
 // Denied, not forbidden, where there are vectors: one folder may, and says so
 // itself. With plain arrays there is none.
 #![deny(unsafe_code)]

@@ -8,7 +8,7 @@ use crate::report::{Comparison, Report, ReportCell};
 pub use crate::shown::{count, counted, lines, plain};
 use crate::statistics::{Estimate, Rate};
 use comfy_table::presets::UTF8_BORDERS_ONLY;
-use comfy_table::{CellAlignment, ContentArrangement};
+use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement};
 
 /// A table whose cells may come from anywhere.
 pub struct Table(comfy_table::Table);
@@ -34,10 +34,14 @@ impl Table {
             .add_row(row.into_iter().map(|cell| plain(cell.as_ref())));
     }
 
-    /// Breaks long cells into lines so that the table is no wider.
+    /// Breaks long cells into lines so that the table is no wider; names, in the first
+    /// column, stay whole.
     pub fn fit(&mut self, width: u16) {
         let arranged = ContentArrangement::Dynamic;
         self.0.set_content_arrangement(arranged).set_width(width);
+        if let Some(names) = self.0.column_mut(0) {
+            names.set_constraint(ColumnConstraint::ContentWidth);
+        }
     }
 }
 

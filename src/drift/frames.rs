@@ -14,8 +14,11 @@ use crate::camera::{self, look_at};
 /// as exact.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Turn {
+    /// About the camera's v, degrees per step.
     pub yaw_deg: f64,
+    /// About the camera's u, degrees per step.
     pub pitch_deg: f64,
+    /// About the camera's n, degrees per step.
     pub roll_deg: f64,
 }
 

@@ -47,6 +47,7 @@ pub struct DriftOptions {
     /// What a recommended method may be off after all of them: a frame's angle
     /// in radians and orthogonality, an eye's distance in radii.
     pub tolerance_rad: f64,
+    /// Which spring arms are studied.
     pub arm: ArmOptions,
 }
 
@@ -57,9 +58,13 @@ pub struct ArmReport {
     pub seconds: f64,
     /// What a recommended method's position may be off.
     pub tolerance: f64,
+    /// All methods, timed or not.
     pub methods: &'static [ArmMethod],
+    /// Every method with every effort on every arm.
     pub points: Vec<ArmPoint>,
+    /// Error of the information that steps have, before any method adds its own.
     pub information: Vec<InformationError>,
+    /// Limits of stability of every method.
     pub stability: Vec<StabilityLimit>,
     /// One of every setting.
     pub choices: Vec<ArmChoice>,
@@ -70,22 +75,33 @@ pub struct ArmReport {
 /// Everything `cullbench drift` finds.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct DriftReport {
+    /// The most steps.
     pub steps: u64,
+    /// The tolerance that recommendations keep to, radians.
     pub tolerance_rad: f64,
     /// Processes that were timed; an interval needs three or more.
     pub processes: usize,
     /// In each process.
     pub rounds: usize,
+    /// The turn of one step.
     pub turn_per_step: Turn,
     /// Steps that the figures of `rotation` are the maxima of.
     pub period_steps: u64,
+    /// Ways to turn, by method and number of steps.
     pub rotation: Vec<RotationDrift>,
+    /// The same in whole turns of steps of one degree.
     pub one_degree_turns: Vec<TurnDrift>,
+    /// Ways to carry an eye around, by method and number of steps.
     pub orbit: Vec<OrbitDrift>,
+    /// Ways to turn, error against time.
     pub rotation_methods: Vec<Rated>,
+    /// Ways to carry an eye, error against time.
     pub orbit_methods: Vec<Rated>,
+    /// Which way to turn.
     pub recommended_rotation: Recommendation,
+    /// Which way to carry an eye.
     pub recommended_orbit: Recommendation,
+    /// The spring arms.
     pub arm: ArmReport,
 }
 
@@ -99,6 +115,7 @@ pub struct DriftPlan {
 
 /// All errors, without times.
 pub struct Prepared {
+    /// What the other processes are to measure.
     pub plan: DriftPlan,
     options: DriftOptions,
     units: Vec<f64>,

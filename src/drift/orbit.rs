@@ -97,9 +97,13 @@ fn angle(degrees: &f64, looks: &[u64]) -> Vec<DVec3> {
 /// How far a carried eye is off after so many steps, ten away from its centre.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct OrbitDrift {
+    /// Name of the method.
     pub method: &'static str,
+    /// Steps taken.
     pub steps: u64,
+    /// Distance from the exact eye.
     pub position_error: f64,
+    /// Difference from the exact radius.
     pub radius_error: f64,
 }
 

@@ -11,7 +11,9 @@ use crate::statistics::{ALPHA, Dominated, dominance, is_less, ranks};
 /// A way to turn or carry as a point of error against time.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Rated {
+    /// As in tables and JSON.
     pub name: &'static str,
+    /// What it does, in one line.
     pub summary: &'static str,
     /// What this toolkit's camera does.
     pub is_default: bool,
@@ -21,7 +23,9 @@ pub struct Rated {
     pub error: Option<f64>,
     /// Thread CPU time with its 95 % interval, which needs three processes.
     pub ns_per_step: f64,
+    /// Lower end of the interval.
     pub ns_per_step_lower: Option<f64>,
+    /// Upper end of the interval.
     pub ns_per_step_upper: Option<f64>,
     /// Good enough to be recommended.
     pub qualifies: bool,
@@ -40,6 +44,7 @@ pub struct Recommendation {
     pub name: Option<&'static str>,
     /// Others that are good enough and that the processes do not show to be slower.
     pub as_fast: Vec<&'static str>,
+    /// The choice in a sentence.
     pub reason: String,
 }
 

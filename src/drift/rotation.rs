@@ -110,7 +110,9 @@ const ROTATIONS: u64 = 3;
 /// there.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RotationDrift {
+    /// Name of the method.
     pub method: &'static str,
+    /// Steps taken.
     pub steps: u64,
     /// Largest entry of `X^T X - I` for the axes X.
     pub orthogonality_error: f64,
@@ -118,14 +120,18 @@ pub struct RotationDrift {
     pub angle_error_rad: f64,
     /// Of an eye ten away from the centre that the camera looks at.
     pub orbit_position_error: f64,
+    /// Difference of that eye's radius from ten.
     pub orbit_radius_error: f64,
 }
 
 /// How far a method is off after whole turns in steps of one degree.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct TurnDrift {
+    /// Name of the method.
     pub method: &'static str,
+    /// Whole turns taken.
     pub turns: u64,
+    /// Angle to the frame that it began with.
     pub angle_error_rad: f64,
 }
 

@@ -170,7 +170,9 @@ fn rk4_growth(zeta: f64, omega_h: f64) -> f64 {
 /// One method at one damping.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct StabilityLimit {
+    /// Name of the method.
     pub method: &'static str,
+    /// Damping / critical damping.
     pub damping_ratio: f64,
     /// Found by trying; `None` if it is stable always.
     pub limit_omega_h: Option<f64>,
@@ -183,6 +185,7 @@ pub struct StabilityLimit {
     /// The most that an error's energy norm grows to before it falls (1 if it never
     /// grows), for `omega h` up to 0.9 of the limit or 100, and where.
     pub largest_growth: f64,
+    /// `omega h` at which it grows most.
     pub growth_omega_h: f64,
 }
 

@@ -6,6 +6,7 @@ use super::{Kernel, Work};
 /// The instruction set that the program was compiled for, with no need to ask
 /// the processor.
 pub type Baseline = Plain;
+/// The value of [`Baseline`].
 pub const BASELINE: Baseline = Plain;
 
 /// Whether this processor runs the kernel.

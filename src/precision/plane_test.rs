@@ -34,12 +34,16 @@ pub enum PlaneTest {
     PlainFrame,
 }
 
-/// The names of a [`PlaneTest`].
+/// What a plane test is called: one each of test, arithmetic, planes and epsilon.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Names {
+    /// Name of the culling test.
     pub test: &'static str,
+    /// Name of the arithmetic.
     pub arithmetic: &'static str,
+    /// Name of the derivation of the planes.
     pub planes: &'static str,
+    /// Factor c of the planes' epsilon.
     pub epsilon: f64,
 }
 

@@ -34,24 +34,33 @@ const SEED: u64 = 18;
 /// One way to search, with its error and its time.
 #[derive(Clone, Debug, Serialize)]
 pub struct RegionPoint {
+    /// Label of the structure.
     pub structure: String,
+    /// The numbers that points and regions are compared in.
     pub numbers: &'static str,
+    /// How building, searching and timing ended.
     #[serde(serialize_with = "by_name")]
     pub status: Status,
+    /// Why, where the status is not ok.
     pub reason: Option<String>,
     /// Share of the points whose answer is not the exact one.
     pub wrong: Option<Rate>,
+    /// Points that were searched for.
     pub points: u64,
+    /// Regions that were returned though they do not hold the point, over all points.
     pub false_region_count: u64,
+    /// Regions that hold the point and were not returned, over all points.
     pub missed_region_count: u64,
     /// How far outside its farthest false region a point lies, world units.
     pub worst_false: f64,
     /// Per point.
     #[serde(flatten)]
     pub times: Times,
+    /// Index of a row that is no worse in anything and better in something.
     pub dominated_by: Option<usize>,
     /// Whether it is dominated by the values alone, and the samples do not show it.
     pub is_tie: bool,
+    /// Whether no row dominates it.
     pub on_front: bool,
 }
 

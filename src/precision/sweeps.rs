@@ -46,16 +46,22 @@ impl Sweep {
 /// One plane test at one value of a sweep.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct SweepRow {
+    /// What is varied.
     #[serde(serialize_with = "by_name")]
     pub sweep: Sweep,
+    /// Its value, in the sweep's own unit.
     pub value: f64,
+    /// Test, arithmetic and planes.
     #[serde(flatten)]
     pub names: Names,
     /// Null if the planes cannot be made.
     pub false_negative_ppm: Option<Rate>,
+    /// False positives / visible items; null as above.
     pub excess: Option<Rate>,
+    /// The same as counts.
     #[serde(flatten)]
     pub errors: ErrorCount,
+    /// Why the planes cannot be made; null if they can.
     pub refused: Option<String>,
 }
 

@@ -17,9 +17,11 @@ const NOTHING_SEEN: f64 = 3.0;
 /// Events per unit, with how well the sample tells it.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Rate {
+    /// Events / units over the whole sample.
     pub value: f64,
     /// The 95 % interval; null from one cluster alone.
     pub lower: Option<f64>,
+    /// Upper end of the interval.
     pub upper: Option<f64>,
     /// How far another sample of as many clusters may be from `value`: both are
     /// samples, and 99.999 % of all pairs come nearer. Null from one cluster.

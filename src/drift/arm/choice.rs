@@ -12,16 +12,20 @@ use crate::statistics::{ALPHA, ranks};
 /// The method to take for an arm at a frame rate.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct ArmChoice {
+    /// The arm and its frame rate.
     #[serde(flatten)]
     pub setting: Setting,
     /// The method; null if none is precise enough.
     pub method: Option<&'static str>,
     /// With its effort and precision.
     pub name: Option<String>,
+    /// Largest error of its position, in the unit of the arm; null without a method.
     pub position_error: Option<f64>,
+    /// Thread CPU time per simulated second; null without a method or a time.
     pub us_per_second: Option<f64>,
     /// Others that are precise enough and that the processes do not show to be slower.
     pub as_fast: Vec<String>,
+    /// The choice in a sentence.
     pub reason: String,
 }
 

@@ -46,14 +46,19 @@ pub enum Scheme {
 /// One row of the study.
 #[derive(PartialEq, Debug, serde::Serialize)]
 pub struct Method {
+    /// As in tables and JSON.
     pub name: &'static str,
+    /// What it does, in one line.
     pub summary: &'static str,
+    /// How a step is made.
     #[serde(skip)]
     pub scheme: Scheme,
     /// Classical order: of the error for steps far below 1/omega. Of the closed forms on
     /// an arm that is not linear, by the nonlinearity that they freeze.
     pub order: u32,
+    /// What a step is told of the target's way.
     pub information: Information,
+    /// How much work it is measured with, least first.
     #[serde(skip)]
     pub efforts: &'static [Effort],
 }

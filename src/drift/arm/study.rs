@@ -26,9 +26,11 @@ named! {
 /// What is to be studied.
 #[derive(Clone, PartialEq, Debug)]
 pub struct ArmOptions {
+    /// Kinds of arm, each with every stiffness and rate.
     pub arms: Vec<ArmKind>,
     /// k in 1/s^2.
     pub stiffnesses: Vec<f64>,
+    /// Frames per second.
     pub rates_hz: Vec<f64>,
     /// Simulated time that errors are the maxima of.
     pub seconds: f64,
@@ -39,9 +41,11 @@ pub struct ArmOptions {
 /// An arm at a frame rate.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Setting {
+    /// The kind of arm.
     pub arm: ArmKind,
     /// k in 1/s^2, critically damped.
     pub stiffness: f64,
+    /// Frames per second.
     pub rate_hz: f64,
     /// sqrt(k) in units of the frame rate: how stiff the arm is to a frame.
     pub omega_h: f64,
@@ -50,11 +54,16 @@ pub struct Setting {
 /// One method with one effort on one arm.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct ArmPoint {
+    /// The arm and its frame rate.
     #[serde(flatten)]
     pub setting: Setting,
+    /// Whether frames are evenly spaced.
     pub frame_times: FrameTimes,
+    /// Name of the method.
     pub method: &'static str,
+    /// What a step is told of the target's way.
     pub information: Information,
+    /// The numbers that steps are computed in.
     pub arithmetic: &'static str,
     /// Equal steps per frame; null for methods that choose their own.
     pub substeps: Option<u32>,
@@ -78,7 +87,9 @@ pub struct ArmPoint {
     /// Thread CPU time per simulated second, with its 95 % interval; null where it
     /// is not timed (steady frames, and what blew up) or has no interval.
     pub us_per_second: Option<f64>,
+    /// Lower end of the interval.
     pub us_per_second_lower: Option<f64>,
+    /// Upper end of the interval.
     pub us_per_second_upper: Option<f64>,
     /// Another point of the setting that is no worse in position or time and better
     /// in one.
@@ -105,12 +116,16 @@ impl ArmPoint {
 /// How far the exact answer to what methods are told is from the arm's true way.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct InformationError {
+    /// The arm and its frame rate.
     #[serde(flatten)]
     pub setting: Setting,
+    /// Whether frames are evenly spaced.
     pub frame_times: FrameTimes,
+    /// What a step is told of the target's way.
     pub information: Information,
     /// Largest over the ends of all frames.
     pub position_error: f64,
+    /// The same of the velocity.
     pub velocity_error: f64,
     /// Bound of what the references themselves are off, by their own estimate.
     pub reference_error: f64,
