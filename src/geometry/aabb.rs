@@ -131,7 +131,7 @@ impl Aabb {
         self.min.abs().max(self.max.abs())
     }
 
-    /// PVertexRows `i` of eight: bit k of `i` picks `max` on axis k.
+    /// Corner `i` of eight: bit k of `i` picks `max` on axis k.
     pub fn corner(&self, i: usize) -> Vec3 {
         let pick = |axis: usize| {
             if i >> axis & 1 == 1 {
