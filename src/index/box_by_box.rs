@@ -71,7 +71,7 @@ pub trait Planes {
     fn count(&self) -> u32;
 }
 
-impl<V: QueryVolume> Planes for V {
+impl<Q: QueryVolume> Planes for Q {
     fn exclude(&self, node: &Aabb) -> bool {
         let mut mask = self.mask();
         while mask != 0 {
@@ -96,7 +96,7 @@ impl<V: QueryVolume> Planes for V {
         self.admits(item, self.mask(), &mut NoRecorder)
     }
     fn count(&self) -> u32 {
-        self.mask().count_ones()
+        Q::planes_open(self.mask())
     }
 }
 
