@@ -159,7 +159,7 @@ fn strewn(rng: &mut SeededRng, camera: &Camera, ratio: f64) -> Vec<Aabb> {
     (0..BATCH).map(cube).collect()
 }
 
-/// A frustum as every test has it.
+/// The planes of one frustum in the form that each test takes.
 struct Views {
     spheres: Spheres,
     volumes: [ConvexVolume; 5],

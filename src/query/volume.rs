@@ -109,7 +109,7 @@ pub trait QueryVolume: Predicate {
     }
 }
 
-/// Planes of a view for which nothing can be made ready.
+/// Planes of a volume that prepares nothing: each block asks the volume itself.
 pub struct UnpreparedPlanes<'v, V> {
     view: &'v V,
     mask: PlaneMask,

@@ -84,7 +84,7 @@ impl Scene {
         })
     }
 
-    /// The reference answer, by the plainest means there are: the map's own
+    /// The reference answer, by the simplest method: the map's own
     /// descent, or an exact look at every box. Ascending ids.
     pub fn holding(&self, p: &Sought) -> Vec<ItemId> {
         if let Regions::Bsp(bsp) = &self.regions {

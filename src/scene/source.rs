@@ -106,7 +106,7 @@ impl Sample {
     /// The scene in it.
     ///
     /// # Errors
-    /// None for the samples that there are: a test loads each.
+    /// The file cannot be read; no sample of this build has that error.
     pub fn load(&self) -> Result<Scene, InputError> {
         parse_bytes(self.bytes, self.file, self.name, &LoadOptions::default())
     }

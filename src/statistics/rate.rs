@@ -161,9 +161,11 @@ mod tests {
         assert_eq!((one.value, one.lower, one.upper), (0.25, None, None));
         assert_eq!(rate(&[[1.0, 0.0], [0.0, 0.0]]), None);
         assert_eq!(rate(&[]), None);
-        // Nothing seen, and a single event: never nearer than 3/n.
-        let rare = rate(&[[1.0, 5e5], [0.0, 5e5]].map(|c| c)).unwrap();
-        assert!(rare.upper.unwrap() >= 4e-6);
+        // Nothing seen, and clusters that are all alike: never nearer than 3/n.
+        for events in [0.0, 1.0] {
+            let alike = rate(&[[events, 10.0]; 30]).unwrap();
+            assert_eq!(alike.upper, Some(alike.value + 3.0 / 300.0), "{events}");
+        }
         // Of many clusters none with an event: z^2 / n, z = 4.42.
         let elsewhere = rate(&[[0.0, 1e3]; 5000]).unwrap().elsewhere.unwrap();
         assert!((elsewhere * 5e6 - 19.5).abs() < 0.1, "{elsewhere}");

@@ -56,7 +56,7 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
             excess * 100.0,
             predicted * 100.0,
             match worth.is_finite() && worth > 0.0 {
-                true => format!("; worth it above {worth:.0} ns an item"),
+                true => format!("; worth it above {worth:.0} ns per item"),
                 false => String::new(),
             }
         );
