@@ -19,6 +19,7 @@
 //!   yours joins
 //! - [`scene`]: generated and real worlds, and the regions in them
 //! - [`path`]: ways through a scene
+//! - [`visibility`]: what hides what: the stages after and before the object stage
 //! - [`verify`]: the reference answer and how others differ from it
 //! - [`stress`]: test vectors and extremes with their declared outcome
 //! - [`measure`]: count, verify, time; [`statistics`] makes figures of it
@@ -97,3 +98,4 @@ pub mod stress;
 pub mod suite;
 pub mod threads;
 pub mod verify;
+pub mod visibility;

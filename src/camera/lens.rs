@@ -152,7 +152,7 @@ impl Lens {
     /// Left, right, bottom and top: slopes (offset per unit of depth) for a
     /// lens with a centre, plain offsets for an orthographic one. A matrix need
     /// not have any: its planes and corners are its own.
-    pub(super) fn window(&self) -> [f64; 4] {
+    pub fn window(&self) -> [f64; 4] {
         match *self {
             Lens::Perspective {
                 fovy_deg, aspect, ..

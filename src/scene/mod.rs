@@ -35,7 +35,7 @@ pub use memory::{fits, needed_bytes};
 pub use originals::Originals;
 pub use overlap::SoughtBox;
 pub use regions::{BspNode, BspRegions, Portal, Regions, Tiling};
-pub(crate) use rng::SeededRng;
+pub use rng::SeededRng;
 pub use samples::{NOTICE, SAMPLES, Sample};
 pub use sought::Sought;
 pub use source::{LoadOptions, check_fits, load};

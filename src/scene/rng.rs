@@ -8,6 +8,7 @@ use rand_pcg::Pcg64;
 pub struct SeededRng(Pcg64);
 
 impl SeededRng {
+    /// The stream of a seed.
     pub fn new(seed: u64) -> Self {
         SeededRng(Pcg64::seed_from_u64(seed))
     }

@@ -1,0 +1,25 @@
+//! What a back end of a stage promises of its answers.
+
+named! {
+    /// What a back end of a stage promises: declared by it, held against it by the
+    /// tests.
+    #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+    #[non_exhaustive]
+    pub enum Guarantee {
+        /// The visible set itself.
+        Exact = "exact",
+        /// All that is visible, by any ray whatever, and something more.
+        Conservative = "conservative",
+        /// The set that the rays of a sample grid see.
+        SampleExact = "sample-exact",
+        /// Nothing: visible items may be missing.
+        Unproven = "unproven",
+    }
+}
+
+impl Guarantee {
+    /// Whether no visible item is ever missing.
+    pub fn is_safe(self) -> bool {
+        matches!(self, Guarantee::Exact | Guarantee::Conservative)
+    }
+}

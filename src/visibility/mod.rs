@@ -1,0 +1,12 @@
+//! Where visibility is resolved, stage by stage: level, region, object, occlusion,
+//! triangle, fragment; and picking. One folder a stage, one file a back end; the
+//! object stage is [`crate::index`]. The truth that all are held against is in
+//! `truth`. It knows scenes and cameras, not how anything is timed or shown.
+
+mod guarantee;
+mod rays;
+mod solids;
+
+pub use guarantee::Guarantee;
+pub use rays::{NoRays, Ray, Rays, SampleGrid};
+pub use solids::Solids;

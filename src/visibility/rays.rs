@@ -1,0 +1,152 @@
+//! The rays of a camera: one for each sample of an image. A ray is three f64 of
+//! direction (and three of origin), rounded once and then taken as they are, so
+//! every back end and the truth ask about the very same line.
+
+use glam::DVec3;
+
+use crate::camera::{Camera, Lens};
+
+/// An image's samples: one at the centre of each pixel.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub struct SampleGrid {
+    /// Columns, from the left.
+    pub width: u32,
+    /// Rows, from the top.
+    pub height: u32,
+}
+
+impl SampleGrid {
+    /// So many columns and rows.
+    pub const fn new(width: u32, height: u32) -> SampleGrid {
+        SampleGrid { width, height }
+    }
+
+    /// How many samples there are.
+    pub fn samples(self) -> usize {
+        self.width as usize * self.height as usize
+    }
+}
+
+/// A half-line `origin + t * direction`. `t` is the depth: direction has length 1
+/// along the axis of view (to rounding), not length 1.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Ray {
+    /// World coordinates; the eye, but for an orthographic lens.
+    pub origin: DVec3,
+    /// Per unit of depth.
+    pub direction: DVec3,
+    /// Least depth that is visible; what is nearer hides nothing.
+    pub near: f64,
+    /// Largest depth that is visible, `f64::INFINITY` without a far plane.
+    pub far: f64,
+}
+
+impl Ray {
+    /// The point at a depth, rounded.
+    pub fn at(&self, depth: f64) -> DVec3 {
+        self.origin + self.direction * depth
+    }
+}
+
+/// A camera for which no rays can be made.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[error("the camera is a matrix; expected an eye and a lens, whose rays are known")]
+pub struct NoRays;
+
+/// All rays of a camera.
+#[derive(Clone, Copy, Debug)]
+pub struct Rays {
+    camera: Camera,
+    /// Left, right, bottom, top: slopes, or offsets of an orthographic lens.
+    window: [f64; 4],
+    near: f64,
+    far: f64,
+}
+
+impl Rays {
+    /// The rays of a camera.
+    ///
+    /// # Errors
+    /// A camera that was given as a matrix.
+    pub fn of(camera: &Camera) -> Result<Rays, NoRays> {
+        if matches!(camera.lens, Lens::Matrix(_)) {
+            return Err(NoRays);
+        }
+        Ok(Rays {
+            camera: *camera,
+            window: camera.lens.window(),
+            near: camera.lens.near(),
+            far: camera.lens.far().unwrap_or(f64::INFINITY),
+        })
+    }
+
+    /// The camera that they are of.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// Left, right, bottom and top of the image: slopes per unit of depth, or
+    /// offsets of an orthographic lens, world units.
+    pub fn window(&self) -> [f64; 4] {
+        self.window
+    }
+
+    /// The ray through a place in the image: (0, 0) is its upper left corner,
+    /// (1, 1) its lower right one.
+    pub fn through(&self, x: f64, y: f64) -> Ray {
+        let [left, right, bottom, top] = self.window;
+        let across = left + (right - left) * x;
+        let up = top + (bottom - top) * y;
+        let frame = &self.camera.frame;
+        let aside = frame.u() * across + frame.v() * up;
+        let (near, far) = (self.near, self.far);
+        let (origin, direction) = match self.camera.lens {
+            Lens::Orthographic { .. } => (frame.eye + aside, frame.forward()),
+            _ => (frame.eye, aside + frame.forward()),
+        };
+        Ray {
+            origin,
+            direction,
+            near,
+            far,
+        }
+    }
+
+    /// The ray of a sample: the centre of a pixel, column from the left and row
+    /// from the top.
+    pub fn sample(&self, grid: SampleGrid, column: u32, row: u32) -> Ray {
+        let at = |index: u32, count: u32| (f64::from(index) + 0.5) / f64::from(count);
+        self.through(at(column, grid.width), at(row, grid.height))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::look_at;
+
+    #[test]
+    fn rays_pass_through_the_corners_of_the_view() {
+        let frame = look_at(DVec3::new(3.0, -2.0, 5.0), DVec3::ZERO, DVec3::Z).unwrap();
+        for lens in [
+            Lens::perspective(70.0, 1.5, 0.5, Some(40.0)).unwrap(),
+            Lens::orthographic(8.0, 1.5, 0.5, 40.0).unwrap(),
+            Lens::off_axis([-0.1, 0.4, -0.2, 0.3], 0.5, Some(40.0)).unwrap(),
+        ] {
+            let rays = Rays::of(&Camera { frame, lens }).unwrap();
+            let corners = lens.corners(&frame).unwrap();
+            for (i, (x, y)) in [(0.0, 1.0), (1.0, 1.0), (0.0, 0.0), (1.0, 0.0)]
+                .iter()
+                .enumerate()
+            {
+                let ray = rays.through(*x, *y);
+                for (depth, corner) in [(ray.near, corners[i]), (ray.far, corners[4 + i])] {
+                    assert!(
+                        ray.at(depth).distance(corner) < 1e-12 * ray.far,
+                        "{lens:?} {i}"
+                    );
+                }
+            }
+        }
+    }
+}

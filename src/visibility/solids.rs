@@ -1,0 +1,75 @@
+//! A box scene as solids: each item hides what is behind its box, exactly.
+//!
+//! What a solid is to a ray: it is met where the ray enters it, if that is between
+//! near and far. A ray that enters it before the near plane (or begins inside it)
+//! does not meet it: there is only its inside to be seen from there, which, as the
+//! back of any closed surface, is not drawn and hides nothing.
+
+use glam::DVec3;
+
+use crate::arithmetic::rounding::{difference_down, difference_up};
+use crate::geometry::Aabb;
+use crate::scene::{Scene, WorldBox};
+
+/// The items of a scene as solid boxes, in three forms.
+#[derive(Clone, Debug)]
+pub struct Solids {
+    /// Where the zero of `outer` and `inner` is in the world.
+    pub origin: DVec3,
+    /// As they were written: the truth.
+    pub boxes: Vec<WorldBox>,
+    /// The smallest f32 boxes that hold them: what may be hidden.
+    pub outer: Vec<Aabb>,
+    /// The largest f32 boxes within them, empty where there is none: what may hide.
+    pub inner: Vec<Aabb>,
+}
+
+impl Solids {
+    /// All items of a scene. O(n).
+    pub fn of(scene: &Scene) -> Solids {
+        let boxes = match scene.originals.boxes() {
+            Some(boxes) => boxes.to_vec(),
+            None => {
+                let exact = |b: &Aabb| {
+                    let (min, max) = b.in_world(scene.origin);
+                    WorldBox::new(min, max)
+                };
+                scene.items.iter().map(exact).collect()
+            }
+        };
+        let inner = boxes.iter().map(|b| rounded_inward(b, scene.origin));
+        Solids {
+            inner: inner.collect(),
+            boxes,
+            outer: scene.items.clone(),
+            origin: scene.origin,
+        }
+    }
+}
+
+/// The largest f32 box about an origin that lies within the f64 one; empty if
+/// there is none.
+fn rounded_inward(b: &WorldBox, origin: DVec3) -> Aabb {
+    let low = |axis: usize| difference_up(b.min[axis], origin[axis]);
+    let high = |axis: usize| difference_down(b.max[axis], origin[axis]);
+    Aabb::new([0, 1, 2].map(low).into(), [0, 1, 2].map(high).into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn inner_boxes_lie_within_and_outer_ones_around() {
+        let tenth = WorldBox::new(DVec3::splat(0.1), DVec3::splat(0.3));
+        let thin = WorldBox::new(DVec3::splat(0.1), DVec3::splat(0.1));
+        let whole = WorldBox::new(DVec3::ZERO, DVec3::ONE);
+        let scene = Scene::about("three", &[tenth, thin, whole], DVec3::ZERO).unwrap();
+        let solids = Solids::of(&scene);
+        assert!(f64::from(solids.inner[0].min.x) >= 0.1);
+        assert!(f64::from(solids.inner[0].max.x) <= 0.3 && !solids.inner[0].is_empty());
+        assert!(solids.inner[1].is_empty(), "no f32 is 0.1");
+        assert_eq!(solids.inner[2], solids.outer[2]);
+        assert_eq!(solids.boxes[0], tenth);
+    }
+}
