@@ -9,6 +9,7 @@ mod outside;
 mod places;
 mod recorded;
 mod spin;
+mod street;
 mod teleport;
 mod zoom;
 
@@ -92,6 +93,7 @@ pub static PATHS: &[PathFamily] = rows! { PathFamily { name, summary, frames }
     "zoom", "a dolly towards the centre, then a zoom by field of view", zoom::frames;
     "teleport", "a new random place and direction every frame: no coherence", teleport::frames;
     "outside", "the whole scene from outside, from all around", outside::frames;
+    "street", "eyes outside of every item, height=1.7 above the ground, looking level; near=0.1", street::frames;
     "places", "the scene's own camera places (the things of a Doom map)", places::frames;
 };
 
@@ -293,6 +295,8 @@ impl Optics {
         };
         let near = match spec.text("near") {
             Some(_) => Some(spec.number("near", 0.0)?),
+            // What an eye among items looks at may be an arm's length away.
+            None if spec.name() == "street" => defaults.near.or(Some(0.1)),
             None => defaults.near,
         };
         // A near plane that follows from it would be named in its place.

@@ -1,0 +1,152 @@
+//! Where people are: eyes above the ground and outside of every item, looking level.
+//! Most of such a view is hidden by what stands nearest.
+
+use glam::DVec3;
+
+use super::{PathError, Pose, Stage};
+use crate::geometry::Aabb;
+use crate::query::ItemId;
+use crate::scene::{Regions, SeededRng};
+use crate::spec::Spec;
+
+/// Places drawn for each eye, of which it takes the lowest: in a city the street and
+/// not a roof.
+const DRAWN: usize = 8;
+/// Room that an eye has on all sides, world units.
+const CLEARANCE: f64 = 0.3;
+
+/// A place that was drawn, and what is above and below it.
+struct Column {
+    x: f64,
+    y: f64,
+    /// Floor and ceiling of the room that it is in, or of the scene.
+    low: f64,
+    high: f64,
+    /// Bottom and top of each item that it passes through.
+    spans: Vec<[f64; 2]>,
+}
+
+pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, PathError> {
+    let height = spec.number_between("height", 1.7, 0.0, 1e6)?;
+    let mut rng = stage.rng();
+    let places = &stage.scene.places;
+    if !places.is_empty() {
+        // The scene's author knows where one stands.
+        let poses = (0..stage.count).map(|_| {
+            let eye = places[rng.below(places.len())].eye;
+            Pose::new(eye, level(&mut rng))
+        });
+        return Ok(poses.collect());
+    }
+    let mut columns: Vec<Column> = (0..stage.count)
+        .flat_map(|_| drawn(stage, &mut rng))
+        .collect();
+    fill(stage, &mut columns);
+    let poses = columns.chunks_mut(DRAWN).map(|columns| {
+        let stands = columns.iter_mut().map(|column| {
+            let ground = column.ground(height + CLEARANCE);
+            DVec3::new(column.x, column.y, ground + height)
+        });
+        let eye = stands
+            .min_by(|a, b| a.z.total_cmp(&b.z))
+            .unwrap_or_default();
+        Pose::new(eye, level(&mut rng))
+    });
+    Ok(poses.collect())
+}
+
+/// A direction in the plane of the ground, each equally likely.
+fn level(rng: &mut SeededRng) -> DVec3 {
+    let angle = std::f64::consts::TAU * rng.unit();
+    DVec3::new(libm::cos(angle), libm::sin(angle), 0.0)
+}
+
+/// The places that one eye may take: in one room, where there are rooms.
+fn drawn(stage: &Stage, rng: &mut SeededRng) -> Vec<Column> {
+    let (min, max) = match &stage.scene.regions {
+        Regions::Tiling(tiling) if !tiling.boxes.is_empty() => {
+            tiling.boxes[rng.below(tiling.boxes.len())].in_world(stage.scene.origin)
+        }
+        _ => (stage.bounds.min, stage.bounds.max),
+    };
+    let place = |_| Column {
+        x: rng.between(min.x, max.x),
+        y: rng.between(min.y, max.y),
+        low: min.z,
+        high: max.z,
+        spans: Vec::new(),
+    };
+    (0..DRAWN).map(place).collect()
+}
+
+/// Finds the items of all columns. O((n + columns) log columns) where items are small.
+fn fill(stage: &Stage, columns: &mut [Column]) {
+    let mut by_x: Vec<ItemId> = (0..columns.len() as ItemId).collect();
+    by_x.sort_by(|&a, &b| columns[a as usize].x.total_cmp(&columns[b as usize].x));
+    let xs: Vec<f64> = by_x.iter().map(|&c| columns[c as usize].x).collect();
+    for (min, max) in stage
+        .scene
+        .items
+        .iter()
+        .map(|b: &Aabb| b.in_world(stage.scene.origin))
+    {
+        let from = xs.partition_point(|&x| x < min.x - CLEARANCE);
+        let to = xs.partition_point(|&x| x <= max.x + CLEARANCE);
+        for &c in by_x.get(from..to).unwrap_or_default() {
+            let column = &mut columns[c as usize];
+            let beside = column.y < min.y - CLEARANCE || column.y > max.y + CLEARANCE;
+            if !beside && min.z <= column.high && max.z >= column.low {
+                column.spans.push([min.z, max.z]);
+            }
+        }
+    }
+}
+
+impl Column {
+    /// The lowest level with so much room above it: on the lowest item, or on what
+    /// stands on that, or on the floor where there is no item at all.
+    fn ground(&mut self, room: f64) -> f64 {
+        self.spans.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let mut ground = self.low;
+        for (i, [bottom, top]) in self.spans.iter().enumerate() {
+            // Below the lowest item is under the ground.
+            if i > 0 && bottom - ground >= room {
+                break;
+            }
+            ground = ground.max(*top);
+        }
+        ground
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::path::{self, LensDefaults};
+    use crate::scene;
+
+    #[test]
+    fn eyes_stand_free_and_look_level() {
+        for (name, on_the_floor) in [
+            ("city:n=3000", 15),
+            ("rooms:n=3000", 12),
+            ("forest:n=3000", 0),
+        ] {
+            let scene = scene::load(name, &Default::default()).unwrap();
+            let path = path::load("street:frames=16", &scene, &LensDefaults::default()).unwrap();
+            let mut low = 0;
+            for camera in &path.cameras {
+                let eye = camera.frame.eye;
+                assert_eq!(camera.frame.forward().z, 0.0);
+                assert_eq!(camera.lens.near(), 0.1);
+                for b in &scene.items {
+                    let (min, max) = b.in_world(scene.origin);
+                    let near = eye.clamp(min, max);
+                    assert!(near.distance(eye) > 0.2, "{name}: {eye} in {min} {max}");
+                }
+                let above = (eye.z - scene.world_bounds().min.z) % 3.0;
+                low += u32::from(above < 2.0);
+            }
+            assert!(low >= on_the_floor, "{name}: {low} of 16 on the ground");
+        }
+    }
+}
