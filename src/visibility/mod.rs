@@ -4,9 +4,11 @@
 //! `truth`. It knows scenes and cameras, not how anything is timed or shown.
 
 mod guarantee;
+mod level;
 mod rays;
 mod solids;
 
 pub use guarantee::Guarantee;
+pub use level::{Level, LevelMap};
 pub use rays::{NoRays, Ray, Rays, SampleGrid};
 pub use solids::Solids;
