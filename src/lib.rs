@@ -25,6 +25,7 @@
 //! - [`measure`]: count, verify, time; [`statistics`] makes figures of it
 //! - [`precision`]: error against run time, and the sweeps behind it
 //! - [`drift`]: how methods of turning and chasing drift from the truth
+//! - [`funnel`]: what each stage from region to fragment removes, and at what cost
 //! - [`report`]: the files that other tools read; [`suite`]: what to run
 //! - [`spec`] and [`input`]: what users type and the files they bring
 //! - `cli` (feature `cli`): the command line over any registry
@@ -80,6 +81,7 @@ pub mod camera;
 pub mod cli;
 pub mod culling;
 pub mod drift;
+pub mod funnel;
 pub mod geometry;
 pub mod index;
 pub mod input;

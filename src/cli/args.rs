@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use crate::drift::ArmKind;
 use crate::suite::DEFAULT_PATH;
+use crate::visibility::SampleGrid;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::scene_args::SceneCommand;
@@ -55,6 +56,8 @@ pub enum Command {
     Verify(VerifyArgs),
     /// Error against run time: every test, arithmetic and derivation of the planes
     Precision(PrecisionArgs),
+    /// The visibility funnel: what each stage from region to fragment removes, at what cost
+    Funnel(FunnelArgs),
     /// Advise: which structure, which test, which work can be skipped, with the evidence
     Advise(AdviseArgs),
     /// Errors of camera updates (turn, orbit, chase) after up to ten million steps
@@ -370,6 +373,68 @@ pub struct PrecisionArgs {
     pub lens: LensArgs,
     #[command(flatten)]
     pub kernel: KernelArgs,
+}
+
+const FUNNEL_HELP: &str = "\
+Columns of the table:
+  in, out      items (triangles in the triangle stage) that the stage is given and hands on, a view
+  visible      of them those that are in front at a sample (that face the eye)
+  FP, FN       handed on though not visible; visible and not handed on
+  time         CPU time of the stage, a view
+  per removed  time / what the stage removed
+The rows of a stage are given what the chain hands them; * marks the chain's own. Truth are the
+rays through the samples, decided exactly.";
+
+#[derive(Args, Debug)]
+#[command(after_help = FUNNEL_HELP)]
+pub struct FunnelArgs {
+    /// A scene: boxes CSV, Doom WAD, built-in name or spec
+    #[arg(long)]
+    pub scene: String,
+    /// A camera path: a spec or a cameras CSV
+    #[arg(long, visible_alias = "cameras", value_name = "PATH", default_value = "street:frames=32")]
+    pub path: String,
+    /// Cameras of the path to look at, evenly spread
+    #[arg(long, value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..))]
+    pub frames: u32,
+    /// Columns and rows of samples
+    #[arg(long, value_name = "WxH", default_value = "320x180", value_parser = values::samples)]
+    pub samples: SampleGrid,
+    /// What does the region stage in the chain [default: the best that the scene has regions for]
+    #[arg(long, value_name = "NAME")]
+    pub region: Option<String>,
+    /// Structures for the object stage; the first is the chain's
+    #[arg(long, value_name = "LIST", default_value = "wide,bvh,linear")]
+    pub structure: String,
+    /// What does the occlusion stage in the chain
+    #[arg(long, value_name = "NAME")]
+    pub occlusion: Option<String>,
+    /// What does the triangle stage in the chain
+    #[arg(long, value_name = "NAME")]
+    pub triangle: Option<String>,
+    /// What does the fragment stage in the chain
+    #[arg(long, value_name = "NAME")]
+    pub fragment: Option<String>,
+    /// Write the tables as one HTML page too
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
+    #[command(flatten)]
+    pub spread: SpreadArgs,
+    #[arg(long, value_enum, default_value = "table")]
+    pub format: FunnelFormat,
+    #[command(flatten)]
+    pub scene_args: SceneArgs,
+    #[command(flatten)]
+    pub lens: LensArgs,
+    #[command(flatten)]
+    pub kernel: KernelArgs,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum, Debug)]
+pub enum FunnelFormat {
+    Table,
+    Csv,
+    Json,
 }
 
 #[derive(Args, Debug)]

@@ -19,6 +19,8 @@ mod drift;
 mod drift_arms;
 mod drift_diagram;
 mod env;
+mod funnel;
+mod funnel_table;
 mod interrupt;
 mod list;
 mod locate;
@@ -131,6 +133,7 @@ fn dispatch(registry: &Registry, command: Command) -> anyhow::Result<Ending> {
         Command::Verify(args) => verify::verify(registry, &args),
         Command::Precision(args) => precision::precision(registry, &args),
         Command::Advise(args) => advise::advise(registry, &args),
+        Command::Funnel(args) => funnel::funnel(registry, &args),
         Command::Drift(args) => drift::drift(&args),
         Command::Stress(args) => stress::stress(registry, &args),
         Command::Scene(SceneCommand::Info(args)) => scene::info(&args),

@@ -9,12 +9,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::advise::TrialPlan;
 use crate::drift::DriftPlan;
+use crate::funnel::FunnelPlan;
 use crate::measure::{Part, ProcessTimes, Share, TaskSamples};
 use crate::precision::PointPlan;
 
 /// Raised when requests or messages change: programs of different versions do
 /// not understand each other.
-pub const PROTOCOL: u32 = 4;
+pub const PROTOCOL: u32 = 5;
 
 /// What a worker is to do.
 #[derive(Clone, Serialize, Deserialize)]
@@ -49,6 +50,8 @@ pub enum Job {
     Points(PointPlan, Timing),
     /// Frames, eyes and arms (`drift`), in a process of this number.
     Drift(DriftPlan, u32),
+    /// Every stage of the funnel with every back end (`funnel`).
+    Funnel(FunnelPlan, Timing),
 }
 
 /// What a process is to know beside its plan.

@@ -8,6 +8,7 @@ use crate::drift::{ARMS, ArmKind, MOST_STEPS};
 use crate::kernel::Kernel;
 use crate::spec::{SpecError, parse_number};
 use crate::threads::MOST_THREADS;
+use crate::visibility::SampleGrid;
 
 fn expected<T>(value: Option<T>, what: impl std::fmt::Display) -> Result<T, SpecError> {
     value.ok_or_else(|| SpecError::new(format_args!("expected {what}")))
@@ -90,6 +91,16 @@ pub fn steps(text: &str) -> Result<u64, SpecError> {
         .filter(|n| n.fract() == 0.0 && (1.0..=MOST_STEPS as f64).contains(n));
     let what = format_args!("a whole number from 1 to {MOST_STEPS:e}");
     expected(steps, what).map(|steps| steps as u64)
+}
+
+/// Columns and rows of an image, `320x180`.
+pub fn samples(text: &str) -> Result<SampleGrid, SpecError> {
+    const MOST: u32 = 16_384;
+    let side = |text: &str| text.trim().parse().ok().filter(|n| (1..=MOST).contains(n));
+    let sides = text.split_once(['x', 'X']);
+    let grid = sides.and_then(|(width, height)| Some(SampleGrid::new(side(width)?, side(height)?)));
+    let what = format_args!("columns x rows such as 320x180, each from 1 to {MOST}");
+    expected(grid, what)
 }
 
 pub fn threads(text: &str) -> Result<usize, SpecError> {

@@ -16,7 +16,7 @@ use rand_pcg::Pcg64;
 use super::Ending;
 use super::args::{Cli, Command};
 use super::protocol::{Job, Message, PROTOCOL, Request};
-use super::{advise, drift, precision, run_plan};
+use super::{advise, drift, funnel, precision, run_plan};
 use crate::index::Registry;
 use crate::measure::{Part, Plan, ProcessTimes, TIMING, TaskSamples, measure_scene};
 
@@ -69,6 +69,9 @@ fn answer(registry: &Registry, request: &Request) -> anyhow::Result<()> {
         }
         (Job::Points(plan, timing), Command::Precision(args)) => {
             here.times(&|stop| precision::time(registry, &args, plan, timing, stop))?;
+        }
+        (Job::Funnel(plan, timing), Command::Funnel(args)) => {
+            here.times(&|stop| funnel::time(registry, &args, plan, timing, stop))?;
         }
         (Job::Drift(plan, process), Command::Drift(args)) => {
             here.times(&|stop| Ok(drift::time(&args, plan, *process, stop)))?;

@@ -68,6 +68,11 @@ impl OverProcesses {
         }
     }
 
+    /// How many there are.
+    pub fn processes(&self) -> usize {
+        self.reference.len()
+    }
+
     /// Why a task has no times.
     pub fn failure(&self, task: usize) -> Option<&Verdict> {
         self.logs[task].as_ref().err()

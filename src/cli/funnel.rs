@@ -1,0 +1,158 @@
+//! `cullbench funnel`: every stage from region to fragment with every back end on the
+//! views of a path, and what each is worth. How it is shown is in `funnel_table`.
+
+use std::io::{self, Write};
+use std::time::Duration;
+
+use anyhow::{Context, bail};
+use tempfile::NamedTempFile;
+
+use super::args::{FunnelArgs, FunnelFormat};
+use super::document::{Block, to_html};
+use super::processes::Workers;
+use super::protocol::{Job, Timing};
+use super::run::progress;
+use super::run_resume::typed_args;
+use super::{Ending, funnel_table, interrupt, load_scene, print_json, text, unread_is_fine};
+use crate::funnel::{self, Chain, FunnelInput, FunnelPlan, StageKind};
+use crate::index::{Registry, StructureSpec};
+use crate::measure::{ProcessTimes, Protocol};
+use crate::path;
+use crate::report::write_atomically;
+use crate::scene::{self, LoadOptions, Scene};
+use crate::spec::SpecError;
+use crate::visibility::Guarantee;
+
+/// Rounds of a stage, if one process has them all.
+const ROUNDS: [usize; 2] = [5, 15];
+
+pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> {
+    let structures = args.kernel.structures(registry, &args.structure)?;
+    let defaults = args.lens.defaults()?;
+    let scene = load_scene(&args.scene, &args.scene_args, structures.len() + 2)?;
+    if scene.items.is_empty() {
+        bail!("scene '{}' has no items; expected at least one", scene.name);
+    }
+    let path = path::load(&args.path, &scene, &defaults)?;
+    let chain = chain(args, &scene, &structures)?;
+    interrupt::from_now_on_finish();
+    let workers = Workers::new(typed_args()?, Duration::MAX, &NamedTempFile::new)?;
+    let bar = progress(u64::from(args.spread.processes));
+    let job = |next: &str| {
+        let job = format!("{}, {}: {next}", args.scene, args.path);
+        bar.set_message(text::plain(&job));
+    };
+    job("the truth, and every stage held against it");
+    let protocol = protocol(args, 0);
+    let input = FunnelInput {
+        scene: &scene,
+        path: &path,
+        most_views: args.frames as usize,
+        samples: args.samples,
+        chain: &chain,
+        structures: &structures,
+        protocol: &protocol,
+        execution: args.kernel.execution()?,
+    };
+    let Some(prepared) = funnel::prepare(&input, &interrupt::asked)? else {
+        return Ok(Ending::Interrupted);
+    };
+    let share = |process| {
+        let timing = Timing {
+            process,
+            lens_scale: path.lens_scale,
+        };
+        Job::Funnel(prepared.plan.clone(), timing)
+    };
+    let step = |process: u32, _: &str| {
+        bar.set_position(process.into());
+        job("every stage, timed");
+    };
+    let Some(times) = workers.times(args.spread.processes, share, &step)? else {
+        return Ok(Ending::Interrupted);
+    };
+    bar.finish_and_clear();
+    if let Some(verdict) = funnel::failure(&times) {
+        bail!("a stage failed when it was timed: {}", verdict.reason.as_deref().unwrap_or("no reason"));
+    }
+    let report = prepared.conclude(&times);
+    if let Some(file) = &args.html {
+        let page = to_html(&format!("cullbench funnel {}", report.scene), &funnel_table::blocks(&report));
+        write_atomically(file, |out| out.write_all(page.as_bytes()))
+            .with_context(|| file.display().to_string())?;
+    }
+    unread_is_fine(match args.format {
+        FunnelFormat::Json => print_json(&report),
+        FunnelFormat::Csv => funnel_table::csv(&report, io::stdout().lock()),
+        FunnelFormat::Table => {
+            let text = funnel_table::terminal(&funnel_table::blocks(&report));
+            text::terminal().write_all(text.as_bytes())
+        }
+    })?;
+    let is_broken = |row: &&funnel::StageRow| {
+        row.back_end.guarantee != Guarantee::Unproven && row.errors.false_negative_count > 0.0
+    };
+    let broken: Vec<_> = report.stages.iter().filter(is_broken).collect();
+    // A chain with an unproven stage hands on what that has left.
+    let is_safe = report.stages.iter().all(|row| !row.is_chosen || row.back_end.guarantee != Guarantee::Unproven);
+    Ok(match is_safe && !broken.is_empty() {
+        true => Ending::WrongAnswer,
+        false => Ending::Ok,
+    })
+}
+
+/// What was typed for each stage, or what suits the scene.
+fn chain(args: &FunnelArgs, scene: &Scene, structures: &[StructureSpec]) -> Result<Chain, SpecError> {
+    let object = structures.first().map_or(funnel::NONE, |spec| &spec.label);
+    let typed = [
+        (StageKind::Region, &args.region),
+        (StageKind::Occlusion, &args.occlusion),
+        (StageKind::Triangle, &args.triangle),
+        (StageKind::Fragment, &args.fragment),
+    ];
+    let mut chain = Chain::for_scene(scene).with(StageKind::Object, object);
+    for (stage, name) in typed {
+        if let Some(name) = name {
+            let known: Vec<&str> = funnel::names(stage, scene);
+            if !known.contains(&name.as_str()) {
+                return Err(SpecError::unknown(stage.name(), name, known.into_iter()));
+            }
+            chain = chain.with(stage, name);
+        }
+    }
+    Ok(chain)
+}
+
+/// Of one of the processes, all views.
+fn protocol(args: &FunnelArgs, process: u32) -> Protocol {
+    let effort = args.spread.effort(ROUNDS);
+    args.spread.protocol(&effort, process, usize::MAX)
+}
+
+/// One process's share of the times.
+pub fn time(
+    registry: &Registry,
+    args: &FunnelArgs,
+    plan: &FunnelPlan,
+    timing: &Timing,
+    stop: &dyn Fn() -> bool,
+) -> anyhow::Result<Option<ProcessTimes>> {
+    let load = LoadOptions {
+        skip_bad_items: args.scene_args.skip_bad_items,
+        structures: 0,
+    };
+    let scene = scene::load(&args.scene, &load)?;
+    let lens = args.lens.defaults()?;
+    let structures = args.kernel.structures(registry, &args.structure)?;
+    let input = FunnelInput {
+        scene: &scene,
+        path: &path::load_scaled(&args.path, &scene, &lens, timing.lens_scale)?,
+        most_views: args.frames as usize,
+        samples: args.samples,
+        chain: &chain(args, &scene, &structures)?,
+        structures: &structures,
+        protocol: &protocol(args, timing.process),
+        execution: args.kernel.execution()?,
+    };
+    Ok(funnel::time(&input, plan, stop)?)
+}

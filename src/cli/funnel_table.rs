@@ -1,0 +1,170 @@
+//! The tables of `cullbench funnel`: a row for each stage and back end, what each stage
+//! of the chain is worth, and what follows.
+
+use std::io::{self, Write};
+
+use super::document::{Block, Rows};
+use super::text;
+use crate::funnel::{FunnelReport, Gain, StageRow};
+use crate::shown::field;
+
+/// No line is longer.
+const WIDTH: usize = 100;
+
+pub fn blocks(report: &FunnelReport) -> Vec<Block> {
+    let mut blocks = vec![
+        Block::Heading(1, format!("Funnel of {}, {}", report.scene, report.path)),
+        Block::Line(format!(
+            "{}; {} of {} x {} samples; {}; figures are means per view.",
+            text::counted(report.items, "item"),
+            text::counted(report.views, "view"),
+            report.samples[0],
+            report.samples[1],
+            text::over(report.processes, None),
+        )),
+        Block::Table(stages(report)),
+    ];
+    if !report.gains.is_empty() {
+        blocks.push(Block::Heading(2, "With and without each stage of the chain".into()));
+        blocks.push(Block::Table(gains(report)));
+    }
+    blocks.extend(report.conclusions.iter().cloned().map(Block::Line));
+    blocks
+}
+
+/// The blocks for a terminal.
+pub fn terminal(blocks: &[Block]) -> String {
+    let lines = blocks.iter().map(|block| match block {
+        Block::Heading(_, text) | Block::Line(text) => text::wrapped(text, WIDTH),
+        Block::Table(rows) => rows.terminal(),
+        Block::Picture(_) => String::new(),
+    });
+    lines.map(|line| line + "\n").collect()
+}
+
+fn stages(report: &FunnelReport) -> Rows {
+    let mut rows = Rows {
+        header: ["stage", "by", "promise", "in", "out", "visible", "FP", "FN", "time", "per removed"]
+            .map(str::to_owned)
+            .into(),
+        right: (3..10).collect(),
+        rows: Vec::new(),
+    };
+    let level = &report.level;
+    let mut first = vec!["level".to_owned(), level.selected.clone(), String::new()];
+    first.extend([level.input_count, level.output_count].map(|n| n.to_string()));
+    first.resize(rows.header.len(), String::new());
+    if level.map_count > 1 {
+        first[8] = format!("-{}", text::time(level.saved_load_ns));
+    }
+    rows.rows.push(first);
+    rows.rows.extend(report.stages.iter().map(stage));
+    rows
+}
+
+fn stage(row: &StageRow) -> Vec<String> {
+    let errors = &row.errors;
+    let name = row.structure.as_deref().unwrap_or(row.back_end.name);
+    let mark = if row.is_chosen { "*" } else { "" };
+    let times = &row.times;
+    vec![
+        row.back_end.stage.name().to_owned(),
+        format!("{name}{mark}"),
+        row.back_end.guarantee.name().to_owned(),
+        count(errors.input_count),
+        count(errors.output_count),
+        count(errors.truth_count),
+        count(errors.false_positive_count),
+        count(errors.false_negative_count),
+        text::time_within(times.stage_ns, [times.stage_ns_lower, times.stage_ns_upper]),
+        row.ns_per_removed.map(text::time).unwrap_or_default(),
+    ]
+}
+
+/// A mean of counts.
+fn count(mean: f64) -> String {
+    match mean {
+        mean if mean >= 100.0 || mean.fract() == 0.0 => format!("{mean:.0}"),
+        mean => text::significant(mean),
+    }
+}
+
+fn gains(report: &FunnelReport) -> Rows {
+    let mut rows = Rows::of_numbers([
+        "stage",
+        "time with",
+        "without",
+        "items with",
+        "without",
+        "pays above a draw cost of",
+    ]);
+    rows.rows.extend(report.gains.iter().map(gain));
+    rows
+}
+
+fn gain(gain: &Gain) -> Vec<String> {
+    let time = |ns: Option<f64>| ns.map(text::time).unwrap_or_default();
+    vec![
+        format!("{} ({})", gain.stage.name(), gain.back_end),
+        time(gain.with_ns),
+        time(gain.without_ns),
+        count(gain.with_count),
+        count(gain.without_count),
+        match gain.break_even_ns {
+            Some(_) => text::time_within(
+                gain.break_even_ns,
+                [gain.break_even_ns_lower, gain.break_even_ns_upper],
+            ),
+            None => "removes nothing".to_owned(),
+        },
+    ]
+}
+
+/// One tidy row for each stage and back end; numbers as they are.
+pub fn csv(report: &FunnelReport, out: impl Write) -> io::Result<()> {
+    let mut out = csv::Writer::from_writer(out);
+    out.write_record([
+        "scene",
+        "path",
+        "stage",
+        "back_end",
+        "guarantee",
+        "is_chosen",
+        "unit",
+        "input_count",
+        "output_count",
+        "truth_count",
+        "false_positive_count",
+        "false_negative_count",
+        "worst_missing_samples",
+        "image_error",
+        "stage_ns",
+        "ns_per_removed",
+        "ns_per_decided",
+    ])?;
+    for row in &report.stages {
+        let errors = &row.errors;
+        let name = row.structure.as_deref().unwrap_or(row.back_end.name);
+        let optional = |value: Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
+        out.write_record([
+            field(&report.scene).into_owned(),
+            field(&report.path).into_owned(),
+            row.back_end.stage.name().to_owned(),
+            field(name).into_owned(),
+            row.back_end.guarantee.name().to_owned(),
+            row.is_chosen.to_string(),
+            row.unit.to_owned(),
+            errors.input_count.to_string(),
+            errors.output_count.to_string(),
+            errors.truth_count.to_string(),
+            errors.false_positive_count.to_string(),
+            errors.false_negative_count.to_string(),
+            errors.worst_missing_samples.to_string(),
+            optional(errors.image_error.map(|rate| rate.value)),
+            optional(row.times.stage_ns),
+            optional(row.ns_per_removed),
+            optional(row.ns_per_decided),
+        ])?;
+    }
+    out.flush()
+}

@@ -1,0 +1,52 @@
+//! What follows from a funnel, in sentences: which stages pay from which draw cost on,
+//! and which back ends lost what is visible.
+
+use super::report::{FunnelReport, Gain, StageRow};
+
+/// A sentence for each stage of the chain, and one for each back end that lost items.
+pub fn conclusions(report: &FunnelReport) -> Vec<String> {
+    let mut sentences: Vec<String> = report.gains.iter().map(of_gain).collect();
+    let lossy = |row: &&StageRow| row.errors.false_negative_count > 0.0;
+    sentences.extend(report.stages.iter().filter(lossy).map(of_loss));
+    if let Some(last) = report.gains.first() {
+        sentences.push(format!(
+            "Of {} items {:.1} are left and {:.1} are in front at a sample, a view.",
+            report.items,
+            last.with_count,
+            visible(report)
+        ));
+    }
+    sentences
+}
+
+fn visible(report: &FunnelReport) -> f64 {
+    let rows = report.stages.iter().filter(|row| row.unit == "items");
+    rows.map(|row| row.errors.truth_count).next().unwrap_or(0.0)
+}
+
+fn of_gain(gain: &Gain) -> String {
+    let what = format!("{} ({})", gain.stage.name(), gain.back_end);
+    let removed = gain.without_count - gain.with_count;
+    if removed <= 0.0 {
+        return format!("{what} removes nothing that the other stages leave: leave it out.");
+    }
+    match gain.break_even_ns {
+        Some(0.0) => format!("{what} removes {removed:.1} items a view and saves time as well."),
+        Some(ns) => format!(
+            "{what} removes {removed:.1} items a view and pays where drawing one of them takes \
+             more than {ns:.1} ns."
+        ),
+        None => format!("{what} removes {removed:.1} items a view; it has no time."),
+    }
+}
+
+fn of_loss(row: &StageRow) -> String {
+    let errors = &row.errors;
+    format!(
+        "{} {} lost {:.2} visible items a view, one of them {} samples large.",
+        row.back_end.stage.name(),
+        row.back_end.name,
+        errors.false_negative_count,
+        errors.worst_missing_samples
+    )
+}

@@ -1,0 +1,23 @@
+//! The funnel of a scene and a path: level, region, object, occlusion, triangle,
+//! fragment, each stage with interchangeable back ends, held against the truth and
+//! timed. How a stage works is in [`crate::visibility`]; this is what is read off it.
+//!
+//! A [`Chain`] names a back end for each stage. The study compares it with every chain
+//! that differs from it in one stage: [`prepare`] judges, [`time`] measures in each
+//! process, [`Prepared::conclude`] puts both together.
+
+mod chain;
+mod conclusions;
+mod judged;
+mod pass;
+mod report;
+mod stage;
+mod study;
+mod world;
+
+pub use chain::Chain;
+pub use judged::Errors;
+pub use report::{FunnelReport, Gain, LevelRow, StageRow, Times};
+pub use stage::{BackEnd, NONE, STAGES, StageKind};
+pub use study::{FunnelPlan, Prepared, failure, prepare, time};
+pub use world::{FunnelError, FunnelInput};

@@ -1,0 +1,197 @@
+//! What a study of the funnel finds, as it is shown and written.
+
+use serde::Serialize;
+
+use super::chain::Chain;
+use super::judged::Errors;
+use super::stage::{BackEnd, StageKind};
+use crate::measure::OverProcesses;
+use crate::statistics::{ALPHA, Estimate, trimmed_mean};
+use crate::visibility::Level;
+
+/// The funnel of a scene and a path.
+#[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
+pub struct FunnelReport {
+    /// As it was asked for.
+    pub scene: String,
+    /// As it was asked for.
+    pub path: String,
+    /// Items of the scene.
+    pub items: usize,
+    /// Views that were looked at.
+    pub views: usize,
+    /// Columns and rows of samples of a view.
+    pub samples: [u32; 2],
+    /// Processes that the times are of.
+    pub processes: usize,
+    /// What was selected of the scene's file.
+    pub level: LevelRow,
+    /// The chain whose stages follow each other in [`FunnelReport::stages`].
+    pub chain: Chain,
+    /// Every stage with every back end, each given what the chain hands it.
+    pub stages: Vec<StageRow>,
+    /// Each stage of the chain, with it and without it.
+    pub gains: Vec<Gain>,
+    /// What follows, in a sentence each.
+    pub conclusions: Vec<String>,
+}
+
+/// The level stage.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+#[non_exhaustive]
+pub struct LevelRow {
+    /// Maps of the file; 1 for what holds none.
+    pub map_count: usize,
+    /// The one that was selected.
+    pub selected: String,
+    /// Items of all maps.
+    pub input_count: usize,
+    /// Items of the selected one.
+    pub output_count: usize,
+    /// What decoding the others would have taken.
+    pub saved_load_ns: f64,
+}
+
+impl LevelRow {
+    /// Of a level.
+    pub fn of(level: &Level) -> LevelRow {
+        LevelRow {
+            map_count: level.maps.len(),
+            selected: level.maps[level.selected].name.clone(),
+            input_count: level.items(),
+            output_count: level.selected_items(),
+            saved_load_ns: level.saved_ns(),
+        }
+    }
+}
+
+/// A stage done by a back end.
+#[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
+pub struct StageRow {
+    /// What does it.
+    #[serde(flatten)]
+    pub back_end: BackEnd,
+    /// The structure of the object stage; `null` elsewhere.
+    pub structure: Option<String>,
+    /// Whether it is part of the chain.
+    pub is_chosen: bool,
+    /// What is counted: items or triangles.
+    pub unit: &'static str,
+    /// What it let through and what it lost.
+    #[serde(flatten)]
+    pub errors: Errors,
+    /// Thread CPU time of a view.
+    #[serde(flatten)]
+    pub times: Times,
+    /// Time / what it removed: above this cost of drawing one of them it pays.
+    pub ns_per_removed: Option<f64>,
+    /// Time / what it was given.
+    pub ns_per_decided: Option<f64>,
+}
+
+/// A time with its interval; null where there is none.
+#[derive(Clone, Copy, Default, PartialEq, Debug, Serialize)]
+pub struct Times {
+    /// Mean over the views.
+    pub stage_ns: Option<f64>,
+    /// Lower end of the 95 % interval.
+    pub stage_ns_lower: Option<f64>,
+    /// Upper end of the 95 % interval.
+    pub stage_ns_upper: Option<f64>,
+}
+
+impl Times {
+    /// Of an estimate, where there is one.
+    pub fn of(found: Option<Estimate>) -> Times {
+        let Some(found) = found else {
+            return Times::default();
+        };
+        Times {
+            stage_ns: Some(found.value),
+            stage_ns_lower: Some(found.lower).filter(|ns| ns.is_finite()),
+            stage_ns_upper: Some(found.upper).filter(|ns| ns.is_finite()),
+        }
+    }
+}
+
+/// What a stage is worth where all others are as in the chain.
+#[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
+pub struct Gain {
+    /// The stage that is left out on the other side.
+    pub stage: StageKind,
+    /// What does it.
+    pub back_end: String,
+    /// Time of all stages together, a view.
+    pub with_ns: Option<f64>,
+    /// The same without the stage.
+    pub without_ns: Option<f64>,
+    /// Items left in the end, a view.
+    pub with_count: f64,
+    /// The same without the stage.
+    pub without_count: f64,
+    /// Cost of drawing an item above which the stage pays: what it costs in all / what
+    /// it removes in the end. 0 if it saves time as well; null if it removes nothing.
+    pub break_even_ns: Option<f64>,
+    /// Lower end of its 95 % interval.
+    pub break_even_ns_lower: Option<f64>,
+    /// Upper end of its 95 % interval.
+    pub break_even_ns_upper: Option<f64>,
+}
+
+/// One side of a [`Gain`]: the tasks of a chain's steps, and what is left in the end.
+pub struct Side {
+    /// Tasks of the timed pass.
+    pub tasks: Vec<usize>,
+    /// Items left, a view.
+    pub count: f64,
+}
+
+impl Gain {
+    /// Of a chain with and without a stage.
+    pub fn of(
+        stage: StageKind,
+        back_end: &str,
+        [with, without]: [&Side; 2],
+        times: &OverProcesses,
+    ) -> Gain {
+        let (spent, saved) = (sums(with, times), sums(without, times));
+        let mean = |sums: &[f64]| centre(sums).filter(|_| !sums.is_empty());
+        let removed = without.count - with.count;
+        let costs: Vec<f64> = spent.iter().zip(&saved).map(|(a, b)| (a - b) / removed).collect();
+        let pays = removed > 0.0;
+        let interval = trimmed_mean(&costs)
+            .map(|cost| cost.interval(1.0 - ALPHA))
+            .filter(|_| pays);
+        Gain {
+            stage,
+            back_end: back_end.to_owned(),
+            with_ns: mean(&spent),
+            without_ns: mean(&saved),
+            with_count: with.count,
+            without_count: without.count,
+            break_even_ns: centre(&costs).filter(|_| pays).map(|ns| ns.max(0.0)),
+            break_even_ns_lower: interval.map(|(lower, _)| lower.max(0.0)),
+            break_even_ns_upper: interval.map(|(_, upper)| upper.max(0.0)),
+        }
+    }
+}
+
+/// Time of all steps of a side in each process, ns. A chain without steps takes none;
+/// one with a step that has no time has none.
+fn sums(side: &Side, times: &OverProcesses) -> Vec<f64> {
+    let of_steps: Vec<Vec<f64>> = side.tasks.iter().map(|&task| times.ln_ns(task)).collect();
+    let processes = (0..times.processes()).map(|process| {
+        let parts = of_steps.iter().map(|step| step.get(process).map(|ln| ln.exp()));
+        parts.sum::<Option<f64>>()
+    });
+    processes.collect::<Option<_>>().unwrap_or_default()
+}
+
+/// The trimmed mean, or below three values the plain one.
+fn centre(values: &[f64]) -> Option<f64> {
+    let plain = || values.iter().sum::<f64>() / values.len() as f64;
+    (!values.is_empty()).then(|| trimmed_mean(values).map_or_else(plain, |mean| mean.mean))
+}

@@ -1,0 +1,58 @@
+//! The stages of the funnel that cameras go through, in their order.
+
+use serde::{Deserialize, Serialize};
+
+use crate::visibility::Guarantee;
+
+named! {
+    /// A stage that takes what may be visible and hands on less.
+    #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Serialize, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    #[non_exhaustive]
+    pub enum StageKind, STAGES {
+        Region = "region", "which rooms can be seen into, and so which items";
+        Object = "object", "which items the frustum meets";
+        Occlusion = "occlusion", "which items are not hidden behind others";
+        Triangle = "triangle", "which triangles of what is left face the eye";
+        Fragment = "fragment", "which items are in front at a sample";
+    }
+}
+
+/// A way to do a stage.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+#[non_exhaustive]
+pub struct BackEnd {
+    /// The stage that it does.
+    pub stage: StageKind,
+    /// What is typed.
+    pub name: &'static str,
+    /// One line about it.
+    pub summary: &'static str,
+    /// What it promises.
+    #[serde(serialize_with = "by_name")]
+    pub guarantee: Guarantee,
+    /// Whether it does the object stage as well, in one traversal.
+    pub does_object_stage: bool,
+}
+
+fn by_name<S: serde::Serializer>(guarantee: &Guarantee, out: S) -> Result<S::Ok, S::Error> {
+    out.serialize_str(guarantee.name())
+}
+
+/// The name of doing nothing: a row of every stage.
+pub const NONE: &str = "none";
+
+impl StageKind {
+    /// Whether what it hands on are items: triangles are handed on to nobody here.
+    pub fn hands_on_items(self) -> bool {
+        self != StageKind::Triangle
+    }
+
+    /// What is counted at its exit.
+    pub fn unit(self) -> &'static str {
+        match self {
+            StageKind::Triangle => "triangles",
+            _ => "items",
+        }
+    }
+}
