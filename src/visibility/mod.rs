@@ -6,6 +6,7 @@
 mod guarantee;
 mod rays;
 mod solids;
+pub mod truth;
 
 pub use guarantee::Guarantee;
 pub use rays::{NoRays, Ray, Rays, SampleGrid};
