@@ -7,6 +7,7 @@ mod guarantee;
 mod level;
 mod rays;
 mod solids;
+pub mod truth;
 
 pub use guarantee::Guarantee;
 pub use level::{Level, LevelMap};
