@@ -4,9 +4,12 @@
 //! `truth`. It knows scenes and cameras, not how anything is timed or shown.
 
 mod guarantee;
+pub mod meshes;
 mod rays;
 mod solids;
+mod surface;
 
 pub use guarantee::Guarantee;
 pub use rays::{NoRays, Ray, Rays, SampleGrid};
 pub use solids::Solids;
+pub use surface::{SurfaceKind, Surfaces};
