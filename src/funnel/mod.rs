@@ -20,4 +20,4 @@ pub use judged::Errors;
 pub use report::{FunnelReport, Gain, LevelRow, StageRow, Times};
 pub use stage::{BackEnd, NONE, STAGES, StageKind};
 pub use study::{FunnelPlan, Prepared, failure, prepare, time};
-pub use world::{FunnelError, FunnelInput};
+pub use world::{FunnelError, FunnelInput, names};

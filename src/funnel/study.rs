@@ -41,7 +41,7 @@ pub fn prepare(
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<Prepared>, FunnelError> {
     let world = World::new(input)?;
-    let Some(truth) = world.truth(input, stop)? else {
+    let Some(truth) = world.truth(input, stop) else {
         return Ok(None);
     };
     let mut pass = Pass::new(&world);

@@ -6,7 +6,7 @@ use super::judged::{Judged, judge_items};
 use super::pass::{Step, Walked};
 use super::stage::{BackEnd, NONE, StageKind};
 use crate::culling::{CameraView, Culling};
-use crate::index::{BuildError, DynIndex, StructureSpec};
+use crate::index::{BuildError, DynIndex, Execution, StructureSpec};
 use crate::input::InputError;
 use crate::measure::{Protocol, WorkloadError, input_of};
 use crate::path::CameraPath;
@@ -32,8 +32,8 @@ pub struct FunnelInput<'a> {
     pub structures: &'a [StructureSpec],
     /// Rounds and times of a process.
     pub protocol: &'a Protocol,
-    /// Threads that look for the truth.
-    pub threads: usize,
+    /// Instructions of every stage, and threads that look for the truth.
+    pub execution: Execution,
 }
 
 /// Why there is no funnel.
@@ -106,7 +106,7 @@ impl<'a> World<'a> {
         });
         let built = input.structures.iter().map(|spec| {
             let index = spec.build(input_of(input.scene, &input.scene.items))?;
-            Ok::<_, BuildError>((spec.label().to_owned(), index))
+            Ok::<_, BuildError>((spec.label.clone(), index))
         });
         Ok(World {
             scene: input.scene,
@@ -135,7 +135,7 @@ impl<'a> World<'a> {
                 return None;
             }
             let truth =
-                SampleTruth::of(&solids, &index, &view.rays, input.samples, input.threads);
+                SampleTruth::of(&solids, &index, &view.rays, input.samples, input.execution.threads);
             let counts = truth.visible.into_iter().zip(truth.samples_of);
             visible.push(counts.collect());
         }
@@ -144,7 +144,7 @@ impl<'a> World<'a> {
 
     /// The back ends of a stage that are compared, the chain's among them.
     pub fn names(&self, stage: StageKind, chain: &Chain) -> Vec<String> {
-        let mut names = vec![NONE.to_owned()];
+        let mut names: Vec<String> = names(stage, self.scene).into_iter().map(str::to_owned).collect();
         if stage == StageKind::Object {
             names.extend(self.structures.iter().map(|(label, _)| label.clone()));
         }
@@ -227,5 +227,19 @@ impl<'a> World<'a> {
         });
         let object = of(StageKind::Object).filter(|_| !does_both);
         [of(StageKind::Region), object, occlusion].into_iter().flatten().collect()
+    }
+}
+
+/// The back ends of a stage that a scene can have; structures of the object stage are
+/// not among them.
+pub fn names(stage: StageKind, _scene: &Scene) -> Vec<&'static str> {
+    let _ = stage;
+    vec![NONE]
+}
+
+impl Chain {
+    /// What suits a scene, but for the object stage.
+    pub fn for_scene(_scene: &Scene) -> Chain {
+        Chain::empty()
     }
 }

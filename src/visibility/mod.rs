@@ -5,11 +5,14 @@
 
 mod guarantee;
 mod level;
+pub mod meshes;
 mod rays;
 mod solids;
+mod surface;
 pub mod truth;
 
 pub use guarantee::Guarantee;
 pub use level::{Level, LevelMap};
 pub use rays::{NoRays, Ray, Rays, SampleGrid};
 pub use solids::Solids;
+pub use surface::{SurfaceKind, Surfaces};

@@ -1,0 +1,241 @@
+//! Surfaces beside boxes: the triangles of the items, what light does at them and
+//! how many sides they have. It defines the form and its checks; where triangles
+//! come from is in `meshes`.
+
+use std::ops::Range;
+
+use glam::{DVec3, Vec3};
+
+use crate::geometry::Aabb;
+use crate::input::InputError;
+use crate::scene::{Scene, WorldBox};
+
+named! {
+    /// What a ray does that meets a surface.
+    #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+    #[non_exhaustive]
+    pub enum SurfaceKind {
+        /// It ends there.
+        Opaque = "opaque",
+        /// It ends there or passes, as a mask of holes says: leaves, fences. Such a
+        /// surface is counted on to hide nothing.
+        CutOut = "cut-out",
+        /// It passes, changed: glass, water. Hides nothing.
+        Clear = "clear",
+    }
+}
+
+/// Triangles, item by item. Coordinates are f32 about an f64 origin; corners are
+/// counter-clockwise as seen from the outside.
+#[derive(Clone, Debug, Default)]
+#[non_exhaustive]
+pub struct Surfaces {
+    /// Where the zero of `points` is in the world.
+    pub origin: DVec3,
+    /// Corners, scene-local. No two items share one.
+    pub points: Vec<Vec3>,
+    /// Three indices into `points` each.
+    pub triangles: Vec<[u32; 3]>,
+    /// The triangles of each item: one range follows the other, without gaps.
+    pub of_item: Vec<Range<u32>>,
+    /// What each item is made of.
+    pub kinds: Vec<SurfaceKind>,
+    /// Whether an item's triangles are seen from both sides.
+    pub two_sided: Vec<bool>,
+}
+
+/// The six faces of a box, two triangles each: corners as [`Aabb::corner`] numbers
+/// them.
+const BOX: [[u32; 3]; 12] = {
+    let mut triangles = [[0; 3]; 12];
+    let mut axis = 0;
+    while axis < 3 {
+        // (axis, u, v) is right-handed, so u then v turns to the left about +axis.
+        let (k, u, v) = (1 << axis, 1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
+        triangles[4 * axis] = [k, k | u, k | u | v];
+        triangles[4 * axis + 1] = [k, k | u | v, k | v];
+        triangles[4 * axis + 2] = [0, u | v, u];
+        triangles[4 * axis + 3] = [0, v, u | v];
+        axis += 1;
+    }
+    triangles
+};
+
+impl Surfaces {
+    /// No item yet.
+    pub fn about(origin: DVec3) -> Surfaces {
+        Surfaces {
+            origin,
+            ..Surfaces::default()
+        }
+    }
+
+    /// Every item of a scene as the twelve triangles of its box (the smallest f32
+    /// box that holds it), opaque and one-sided. O(n).
+    pub fn from_boxes(scene: &Scene) -> Surfaces {
+        let mut all = Surfaces::about(scene.origin);
+        for item in &scene.items {
+            let corners: [Vec3; 8] = std::array::from_fn(|i| item.corner(i));
+            all.push(SurfaceKind::Opaque, false, &corners, &BOX);
+        }
+        all
+    }
+
+    /// Appends an item; `triangles` are indices into its own `points`.
+    ///
+    /// # Panics
+    /// If an index is beyond `points`, or the sums do not fit u32.
+    pub fn push(
+        &mut self,
+        kind: SurfaceKind,
+        two_sided: bool,
+        points: &[Vec3],
+        triangles: &[[u32; 3]],
+    ) {
+        let first = u32::try_from(self.points.len()).expect("points are counted in u32");
+        let start = self.triangles.len() as u32;
+        u32::try_from(self.points.len() + points.len()).expect("points are counted in u32");
+        self.points.extend_from_slice(points);
+        self.triangles.extend(triangles.iter().map(|corners| {
+            corners.map(|corner| {
+                assert!((corner as usize) < points.len(), "a corner without a point");
+                first + corner
+            })
+        }));
+        let end = u32::try_from(self.triangles.len()).expect("triangles are counted in u32");
+        self.of_item.push(start..end);
+        self.kinds.push(kind);
+        self.two_sided.push(two_sided);
+    }
+
+    /// How many items there are.
+    pub fn items(&self) -> usize {
+        self.of_item.len()
+    }
+
+    /// The corners of a triangle, scene-local.
+    #[inline(always)]
+    pub fn corners(&self, triangle: u32) -> [Vec3; 3] {
+        self.triangles[triangle as usize].map(|point| self.points[point as usize])
+    }
+
+    /// The triangles of an item, as corners.
+    pub fn of(&self, item: usize) -> impl Iterator<Item = [Vec3; 3]> {
+        self.of_item[item].clone().map(|t| self.corners(t))
+    }
+
+    /// The item that a triangle belongs to. O(log items).
+    pub fn item_of(&self, triangle: u32) -> usize {
+        self.of_item.partition_point(|range| range.end <= triangle)
+    }
+
+    /// The smallest box that holds an item; empty for an item without triangles.
+    pub fn bounds(&self, item: usize) -> Aabb {
+        self.of(item).flatten().fold(Aabb::EMPTY, |all, p| {
+            Aabb::new(all.min.min(p), all.max.max(p))
+        })
+    }
+
+    /// The boxes of the items as a scene: what the stages before this one work on.
+    ///
+    /// # Errors
+    /// An item without triangles, which has no box.
+    pub fn scene(&self, name: impl Into<String>) -> Result<Scene, InputError> {
+        self.boxes_as_scene(name, (0..self.items()).map(|item| self.bounds(item)))
+    }
+
+    /// Scene-local boxes as a scene about the same origin.
+    pub(super) fn boxes_as_scene(
+        &self,
+        name: impl Into<String>,
+        boxes: impl Iterator<Item = Aabb>,
+    ) -> Result<Scene, InputError> {
+        let boxes: Vec<WorldBox> = boxes
+            .map(|b| {
+                let (min, max) = b.in_world(self.origin);
+                WorldBox::new(min, max)
+            })
+            .collect();
+        Scene::about(name, &boxes, self.origin)
+    }
+
+    /// How many directed edges of an item lack their opposite, or have it more than
+    /// once: zero for a closed surface whose triangles are wound alike. Edges are
+    /// told by their indices. O(t log t).
+    pub fn open_edges(&self, item: usize) -> usize {
+        let mut edges: Vec<(u64, bool)> = Vec::new();
+        for triangle in &self.triangles[self.range(item)] {
+            for k in 0..3 {
+                let (a, b) = (triangle[k], triangle[(k + 1) % 3]);
+                let key = u64::from(a.min(b)) << 32 | u64::from(a.max(b));
+                edges.push((key, a < b));
+            }
+        }
+        edges.sort_unstable();
+        let matched = |run: &&[(u64, bool)]| matches!(run, [(_, false), (_, true)]);
+        let runs = edges.chunk_by(|a, b| a.0 == b.0);
+        runs.filter(|run| !matched(run)).map(<[_]>::len).sum()
+    }
+
+    /// Volume of an item, cubic world units, rounded: positive where a closed
+    /// surface is wound outward.
+    pub fn volume(&self, item: usize) -> f64 {
+        let Some(zero) = self.of(item).next() else {
+            return 0.0;
+        };
+        let six = self.of(item).map(|corners| {
+            let [a, b, c] = corners.map(|p| p.as_dvec3() - zero[0].as_dvec3());
+            a.dot(b.cross(c))
+        });
+        six.sum::<f64>() / 6.0
+    }
+
+    /// The triangles of an item as a range of indices.
+    pub(super) fn range(&self, item: usize) -> Range<usize> {
+        let range = &self.of_item[item];
+        range.start as usize..range.end as usize
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::load;
+
+    #[test]
+    fn boxes_are_closed_and_wound_outward() {
+        let scene = load("city:n=50,offset=1e7", &Default::default()).unwrap();
+        let surfaces = Surfaces::from_boxes(&scene);
+        assert_eq!(surfaces.triangles.len(), 12 * 50);
+        for (item, b) in scene.items.iter().enumerate() {
+            assert_eq!(surfaces.open_edges(item), 0);
+            let size = b.max.as_dvec3() - b.min.as_dvec3();
+            let volume = size.x * size.y * size.z;
+            assert!((surfaces.volume(item) - volume).abs() <= 1e-9 * volume);
+            assert_eq!(surfaces.bounds(item), *b);
+            // Every triangle for itself: the centre is behind it.
+            for [p, q, r] in surfaces.of(item).map(|c| c.map(Vec3::as_dvec3)) {
+                let normal = (q - p).cross(r - p);
+                assert!(normal.dot(b.centre().as_dvec3() - p) < 0.0);
+            }
+        }
+        let again = surfaces.scene("again").unwrap();
+        assert_eq!(again.items, scene.items);
+    }
+
+    #[test]
+    fn an_open_or_twisted_surface_is_told() {
+        let mut surfaces = Surfaces::about(DVec3::ZERO);
+        let unit = Aabb::new(Vec3::ZERO, Vec3::ONE);
+        let corners: [Vec3; 8] = std::array::from_fn(|i| unit.corner(i));
+        surfaces.push(SurfaceKind::Opaque, false, &corners, &BOX[..11]);
+        let mut twisted = BOX;
+        twisted[3].swap(0, 1);
+        surfaces.push(SurfaceKind::Clear, true, &corners, &twisted);
+        assert_eq!(surfaces.open_edges(0), 3);
+        assert!(surfaces.open_edges(1) > 0);
+        let owners: Vec<usize> = (0..23).map(|t| surfaces.item_of(t)).collect();
+        assert!(owners[..11].iter().all(|&item| item == 0));
+        assert!(owners[11..].iter().all(|&item| item == 1));
+    }
+}
