@@ -392,7 +392,12 @@ pub struct FunnelArgs {
     #[arg(long)]
     pub scene: String,
     /// A camera path: a spec or a cameras CSV
-    #[arg(long, visible_alias = "cameras", value_name = "PATH", default_value = "street:frames=32")]
+    #[arg(
+        long,
+        visible_alias = "cameras",
+        value_name = "PATH",
+        default_value = "street:frames=32"
+    )]
     pub path: String,
     /// Cameras of the path to look at, evenly spread
     #[arg(long, value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..))]

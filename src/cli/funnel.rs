@@ -8,7 +8,7 @@ use anyhow::{Context, bail};
 use tempfile::NamedTempFile;
 
 use super::args::{FunnelArgs, FunnelFormat};
-use super::document::{Block, to_html};
+use super::document::to_html;
 use super::processes::Workers;
 use super::protocol::{Job, Timing};
 use super::run::progress;
@@ -73,11 +73,17 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     };
     bar.finish_and_clear();
     if let Some(verdict) = funnel::failure(&times) {
-        bail!("a stage failed when it was timed: {}", verdict.reason.as_deref().unwrap_or("no reason"));
+        bail!(
+            "a stage failed when it was timed: {}",
+            verdict.reason.as_deref().unwrap_or("no reason")
+        );
     }
     let report = prepared.conclude(&times);
     if let Some(file) = &args.html {
-        let page = to_html(&format!("cullbench funnel {}", report.scene), &funnel_table::blocks(&report));
+        let page = to_html(
+            &format!("cullbench funnel {}", report.scene),
+            &funnel_table::blocks(&report),
+        );
         write_atomically(file, |out| out.write_all(page.as_bytes()))
             .with_context(|| file.display().to_string())?;
     }
@@ -94,7 +100,10 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     };
     let broken: Vec<_> = report.stages.iter().filter(is_broken).collect();
     // A chain with an unproven stage hands on what that has left.
-    let is_safe = report.stages.iter().all(|row| !row.is_chosen || row.back_end.guarantee != Guarantee::Unproven);
+    let is_safe = report
+        .stages
+        .iter()
+        .all(|row| !row.is_chosen || row.back_end.guarantee != Guarantee::Unproven);
     Ok(match is_safe && !broken.is_empty() {
         true => Ending::WrongAnswer,
         false => Ending::Ok,
@@ -102,7 +111,11 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
 }
 
 /// What was typed for each stage, or what suits the scene.
-fn chain(args: &FunnelArgs, scene: &Scene, structures: &[StructureSpec]) -> Result<Chain, SpecError> {
+fn chain(
+    args: &FunnelArgs,
+    scene: &Scene,
+    structures: &[StructureSpec],
+) -> Result<Chain, SpecError> {
     let object = structures.first().map_or(funnel::NONE, |spec| &spec.label);
     let typed = [
         (StageKind::Region, &args.region),

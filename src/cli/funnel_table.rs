@@ -25,7 +25,10 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
         Block::Table(stages(report)),
     ];
     if !report.gains.is_empty() {
-        blocks.push(Block::Heading(2, "With and without each stage of the chain".into()));
+        blocks.push(Block::Heading(
+            2,
+            "With and without each stage of the chain".into(),
+        ));
         blocks.push(Block::Table(gains(report)));
     }
     blocks.extend(report.conclusions.iter().cloned().map(Block::Line));
@@ -44,9 +47,20 @@ pub fn terminal(blocks: &[Block]) -> String {
 
 fn stages(report: &FunnelReport) -> Rows {
     let mut rows = Rows {
-        header: ["stage", "by", "promise", "in", "out", "visible", "FP", "FN", "time", "per removed"]
-            .map(str::to_owned)
-            .into(),
+        header: [
+            "stage",
+            "by",
+            "promise",
+            "in",
+            "out",
+            "visible",
+            "FP",
+            "FN",
+            "time",
+            "per removed",
+        ]
+        .map(str::to_owned)
+        .into(),
         right: (3..10).collect(),
         rows: Vec::new(),
     };

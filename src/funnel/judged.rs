@@ -107,7 +107,11 @@ impl Errors {
             excess: share(|v| [v.false_positives, v.truth]),
             missing: share(|v| [v.false_negatives, v.truth]),
             image_error: share(|v| [v.missing_samples, v.samples]),
-            worst_missing_samples: views.iter().map(|v| v.worst_missing_samples).max().unwrap_or(0),
+            worst_missing_samples: views
+                .iter()
+                .map(|v| v.worst_missing_samples)
+                .max()
+                .unwrap_or(0),
             longest_missing_streak: streaks.map(<[Judged]>::len).max().unwrap_or(0),
             removed_share: share(|v| [v.hidden.saturating_sub(v.false_positives), v.hidden]),
         }
@@ -123,7 +127,10 @@ mod tests {
         let visible = [(2, 10), (5, 1), (9, 4)];
         let judged = judge_items(Some(&[1, 2, 3, 7, 9]), 12, &[1, 2, 3, 9], &visible);
         assert_eq!((judged.false_positives, judged.false_negatives), (2, 1));
-        assert_eq!((judged.missing_samples, judged.worst_missing_samples), (1, 1));
+        assert_eq!(
+            (judged.missing_samples, judged.worst_missing_samples),
+            (1, 1)
+        );
         assert_eq!((judged.samples, judged.truth), (15, 3));
         assert_eq!((judged.input, judged.hidden), (5, 3));
         assert_eq!(judge_items(None, 12, &[], &visible).false_negatives, 3);
@@ -145,6 +152,9 @@ mod tests {
         assert_eq!(errors.longest_missing_streak, 2);
         assert_eq!(errors.false_negative_count, 0.8);
         assert_eq!(errors.missing.unwrap().value, 0.2);
-        assert_eq!(Errors::of(&[view(0)]).removed_share.unwrap().value, 4.0 / 6.0);
+        assert_eq!(
+            Errors::of(&[view(0)]).removed_share.unwrap().value,
+            4.0 / 6.0
+        );
     }
 }

@@ -160,7 +160,11 @@ impl Gain {
         let (spent, saved) = (sums(with, times), sums(without, times));
         let mean = |sums: &[f64]| centre(sums).filter(|_| !sums.is_empty());
         let removed = without.count - with.count;
-        let costs: Vec<f64> = spent.iter().zip(&saved).map(|(a, b)| (a - b) / removed).collect();
+        let costs: Vec<f64> = spent
+            .iter()
+            .zip(&saved)
+            .map(|(a, b)| (a - b) / removed)
+            .collect();
         let pays = removed > 0.0;
         let interval = trimmed_mean(&costs)
             .map(|cost| cost.interval(1.0 - ALPHA))
@@ -184,7 +188,9 @@ impl Gain {
 fn sums(side: &Side, times: &OverProcesses) -> Vec<f64> {
     let of_steps: Vec<Vec<f64>> = side.tasks.iter().map(|&task| times.ln_ns(task)).collect();
     let processes = (0..times.processes()).map(|process| {
-        let parts = of_steps.iter().map(|step| step.get(process).map(|ln| ln.exp()));
+        let parts = of_steps
+            .iter()
+            .map(|step| step.get(process).map(|ln| ln.exp()));
         parts.sum::<Option<f64>>()
     });
     processes.collect::<Option<_>>().unwrap_or_default()

@@ -158,12 +158,7 @@ struct Walks {
 }
 
 impl Walks {
-    fn of(
-        pass: &mut Pass,
-        world: &World,
-        chain: &Chain,
-        stop: &dyn Fn() -> bool,
-    ) -> Option<Walks> {
+    fn of(pass: &mut Pass, world: &World, chain: &Chain, stop: &dyn Fn() -> bool) -> Option<Walks> {
         let chosen = pass.walk(chain, stop)?;
         let (mut rows, mut without) = (Vec::new(), Vec::new());
         for stage in StageKind::ALL {
@@ -201,9 +196,10 @@ impl Prepared {
             row.ns_per_removed = per(row.errors.input_count - row.errors.output_count);
             row.ns_per_decided = per(row.errors.input_count);
         }
-        let gains = self.gains.iter().map(|(stage, name, [with, without])| {
-            Gain::of(*stage, name, [with, without], &times)
-        });
+        let gains = self
+            .gains
+            .iter()
+            .map(|(stage, name, [with, without])| Gain::of(*stage, name, [with, without], &times));
         report.gains = gains.collect();
         report.conclusions = conclusions(&report);
         report

@@ -134,8 +134,13 @@ impl<'a> World<'a> {
             if stop() {
                 return None;
             }
-            let truth =
-                SampleTruth::of(&solids, &index, &view.rays, input.samples, input.execution.threads);
+            let truth = SampleTruth::of(
+                &solids,
+                &index,
+                &view.rays,
+                input.samples,
+                input.execution.threads,
+            );
             let counts = truth.visible.into_iter().zip(truth.samples_of);
             visible.push(counts.collect());
         }
@@ -144,7 +149,10 @@ impl<'a> World<'a> {
 
     /// The back ends of a stage that are compared, the chain's among them.
     pub fn names(&self, stage: StageKind, chain: &Chain) -> Vec<String> {
-        let mut names: Vec<String> = names(stage, self.scene).into_iter().map(str::to_owned).collect();
+        let mut names: Vec<String> = names(stage, self.scene)
+            .into_iter()
+            .map(str::to_owned)
+            .collect();
         if stage == StageKind::Object {
             names.extend(self.structures.iter().map(|(label, _)| label.clone()));
         }
@@ -186,9 +194,11 @@ impl<'a> World<'a> {
                     match input {
                         None => index.query(frustum, out),
                         // What is left of a scene by other means is a short list.
-                        Some(items) => out.extend(items.iter().filter(|&&id| {
-                            frustum.sees(&self.scene.items[id as usize])
-                        })),
+                        Some(items) => out.extend(
+                            items
+                                .iter()
+                                .filter(|&&id| frustum.sees(&self.scene.items[id as usize])),
+                        ),
                     }
                 })
             }
@@ -226,7 +236,10 @@ impl<'a> World<'a> {
             self.back_end(StageKind::Occlusion, name).does_object_stage
         });
         let object = of(StageKind::Object).filter(|_| !does_both);
-        [of(StageKind::Region), object, occlusion].into_iter().flatten().collect()
+        [of(StageKind::Region), object, occlusion]
+            .into_iter()
+            .flatten()
+            .collect()
     }
 }
 
