@@ -420,9 +420,12 @@ pub struct FunnelArgs {
     /// What does the fragment stage in the chain
     #[arg(long, value_name = "NAME")]
     pub fragment: Option<String>,
-    /// Write the tables as one HTML page too
+    /// Write tables and picture as one HTML page too
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
+    /// Draw the first view from above, each item by the stage that removed it
+    #[arg(long, value_name = "FILE")]
+    pub svg: Option<PathBuf>,
     #[command(flatten)]
     pub spread: SpreadArgs,
     #[arg(long, value_enum, default_value = "table")]

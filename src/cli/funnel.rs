@@ -4,16 +4,19 @@
 use std::io::{self, Write};
 use std::time::Duration;
 
-use anyhow::{Context, bail};
+use anyhow::bail;
 use tempfile::NamedTempFile;
 
 use super::args::{FunnelArgs, FunnelFormat};
-use super::document::to_html;
+use super::document::{Block, to_html};
 use super::processes::Workers;
 use super::protocol::{Job, Timing};
 use super::run::progress;
 use super::run_resume::typed_args;
-use super::{Ending, funnel_table, interrupt, load_scene, print_json, text, unread_is_fine};
+use super::{
+    Ending, expect_folder_of, funnel_picture, funnel_table, interrupt, load_scene, print_json,
+    text, unread_is_fine,
+};
 use crate::funnel::{self, Chain, FunnelInput, FunnelPlan, StageKind};
 use crate::index::{Registry, StructureSpec};
 use crate::measure::{ProcessTimes, Protocol};
@@ -27,6 +30,7 @@ use crate::visibility::Guarantee;
 const ROUNDS: [usize; 2] = [5, 15];
 
 pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> {
+    expect_folder_of(args.svg.as_deref())?;
     let structures = args.kernel.structures(registry, &args.structure)?;
     let defaults = args.lens.defaults()?;
     let scene = load_scene(&args.scene, &args.scene_args, structures.len() + 2)?;
@@ -79,13 +83,15 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
         );
     }
     let report = prepared.conclude(&times);
+    if let Some(file) = &args.svg {
+        let svg = funnel_picture::draw(&report)?;
+        write_atomically(file, |out| out.write_all(svg.as_bytes()))?;
+    }
     if let Some(file) = &args.html {
-        let page = to_html(
-            &format!("cullbench funnel {}", report.scene),
-            &funnel_table::blocks(&report),
-        );
-        write_atomically(file, |out| out.write_all(page.as_bytes()))
-            .with_context(|| file.display().to_string())?;
+        let mut blocks = funnel_table::blocks(&report);
+        blocks.push(Block::Picture(funnel_picture::draw(&report)?));
+        let page = to_html(&format!("cullbench funnel {}", report.scene), &blocks);
+        write_atomically(file, |out| out.write_all(page.as_bytes()))?;
     }
     unread_is_fine(match args.format {
         FunnelFormat::Json => print_json(&report),

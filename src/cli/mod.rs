@@ -20,6 +20,7 @@ mod drift_arms;
 mod drift_diagram;
 mod env;
 mod funnel;
+mod funnel_picture;
 mod funnel_table;
 mod interrupt;
 mod list;

@@ -10,6 +10,7 @@ mod chain;
 mod conclusions;
 mod judged;
 mod pass;
+mod plan_view;
 mod report;
 mod stage;
 mod study;
@@ -17,6 +18,7 @@ mod world;
 
 pub use chain::Chain;
 pub use judged::Errors;
+pub use plan_view::{Fate, PlanView};
 pub use report::{FunnelReport, Gain, LevelRow, StageRow, Times};
 pub use stage::{BackEnd, NONE, STAGES, StageKind};
 pub use study::{FunnelPlan, Prepared, failure, prepare, time};

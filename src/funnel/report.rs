@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::chain::Chain;
 use super::judged::Errors;
+use super::plan_view::PlanView;
 use super::stage::{BackEnd, StageKind};
 use crate::measure::OverProcesses;
 use crate::statistics::{ALPHA, Estimate, trimmed_mean};
@@ -35,6 +36,9 @@ pub struct FunnelReport {
     pub gains: Vec<Gain>,
     /// What follows, in a sentence each.
     pub conclusions: Vec<String>,
+    /// The first view from above.
+    #[serde(skip)]
+    pub plan_view: PlanView,
 }
 
 /// The level stage.
@@ -191,7 +195,7 @@ fn sums(side: &Side, times: &OverProcesses) -> Vec<f64> {
         let parts = of_steps
             .iter()
             .map(|step| step.get(process).map(|ln| ln.exp()));
-        parts.sum::<Option<f64>>()
+        parts.sum::<Option<f64>>().map(|sum| sum + 0.0)
     });
     processes.collect::<Option<_>>().unwrap_or_default()
 }

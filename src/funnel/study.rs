@@ -7,9 +7,10 @@ use super::chain::Chain;
 use super::conclusions::conclusions;
 use super::judged::Errors;
 use super::pass::{Pass, Walked};
+use super::plan_view::{PlanView, fate};
 use super::report::{FunnelReport, Gain, LevelRow, Side, StageRow, Times};
 use super::stage::{NONE, StageKind};
-use super::world::{FunnelError, FunnelInput, World};
+use super::world::{FunnelError, FunnelInput, Truth, World};
 use crate::measure::{OverProcesses, ProcessTimes, Schedule, TimedTask, Verdict, timed};
 use crate::visibility::Level;
 
@@ -103,6 +104,7 @@ pub fn prepare(
             stages: rows,
             gains: Vec::new(),
             conclusions: Vec::new(),
+            plan_view: plan_view(&world, &pass, &walks.chosen, &truth),
         },
     }))
 }
@@ -179,6 +181,16 @@ impl Walks {
             without,
         })
     }
+}
+
+/// The first view from above, after the stages that decide what is drawn.
+fn plan_view(world: &World, pass: &Pass, walked: &Walked, truth: &Truth) -> PlanView {
+    let stages = &StageKind::ALL[..StageKind::Triangle as usize];
+    let handed_on = stages.iter().zip(&walked.sets[1..]);
+    let sets: Vec<_> = handed_on
+        .map(|(&stage, &set)| (stage, pass.items(set, 0)))
+        .collect();
+    world.plan_view(0, |item| fate(item, &sets, truth.sees(0, item)))
 }
 
 impl Prepared {

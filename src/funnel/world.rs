@@ -1,9 +1,12 @@
 //! What the stages of a funnel work on: a scene with everything built once, the views
 //! of a path, and each back end as something that can be asked.
 
+use glam::DVec3;
+
 use super::chain::Chain;
 use super::judged::{Judged, judge_items};
 use super::pass::{Step, Walked};
+use super::plan_view::{Fate, MOST_DRAWN, PlanView};
 use super::stage::{BackEnd, NONE, StageKind};
 use crate::culling::{CameraView, Culling};
 use crate::index::{BuildError, DynIndex, Execution, StructureSpec};
@@ -79,6 +82,14 @@ struct View {
 /// What is visible in each view: items with the samples of each, ascending.
 pub struct Truth {
     visible: Vec<Vec<(ItemId, u32)>>,
+}
+
+impl Truth {
+    /// Whether an item is in front at a sample of a view.
+    pub fn sees(&self, view: usize, item: ItemId) -> bool {
+        let found = self.visible[view].binary_search_by_key(&item, |(item, _)| *item);
+        found.is_ok()
+    }
 }
 
 impl<'a> World<'a> {
@@ -224,6 +235,39 @@ impl<'a> World<'a> {
             }
         };
         judge_items(input, self.items(), output, &truth.visible[view])
+    }
+
+    /// The items about the eye of a view, each with its fate.
+    pub fn plan_view(&self, view: usize, fate: impl Fn(ItemId) -> Fate) -> PlanView {
+        let Some(view) = self.views.get(view) else {
+            return PlanView::default();
+        };
+        let eye = view.rays.camera().frame.eye;
+        let flat = |v: DVec3| [v.x, v.y];
+        let boxes = self
+            .scene
+            .items
+            .iter()
+            .zip(0..)
+            .filter(|(b, _)| !b.is_empty());
+        let mut near: Vec<(f64, [f64; 4], ItemId)> = boxes
+            .map(|(b, item)| {
+                let (min, max) = b.in_world(self.scene.origin);
+                let nearest = eye.clamp(min, max).with_z(eye.z);
+                (nearest.distance(eye), [min.x, min.y, max.x, max.y], item)
+            })
+            .collect();
+        near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.2.cmp(&b.2)));
+        near.truncate(MOST_DRAWN);
+        PlanView {
+            eye: flat(eye),
+            edges: [0.0, 1.0].map(|x| flat(view.rays.through(x, 0.5).direction)),
+            items: near
+                .iter()
+                .rev()
+                .map(|(_, plan, item)| (*plan, fate(*item)))
+                .collect(),
+        }
     }
 
     /// The steps of a chain whose times add up: not the object stage where the
