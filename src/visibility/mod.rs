@@ -6,6 +6,7 @@
 mod guarantee;
 mod level;
 pub mod meshes;
+pub mod occlusion;
 mod rays;
 mod solids;
 mod surface;

@@ -1,0 +1,52 @@
+//! What all depth buffers of this stage have in common: occluders are drawn into
+//! them, and rectangles are asked whether they are hidden.
+
+use super::outline::{Coverage, Outline};
+use super::rect::Rect;
+use crate::visibility::{Guarantee, SampleGrid};
+
+/// Where the idea of a back end comes from.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[non_exhaustive]
+pub enum Origin {
+    /// Of this project.
+    Own,
+    /// Textbook knowledge.
+    Textbook,
+    /// Written for this project after a description: which one. Not the genuine
+    /// code, and no statement about its speed.
+    StandIn(&'static str),
+}
+
+/// A buffer that says what lies behind what was drawn.
+pub trait OcclusionBuffer {
+    /// Its name in tables.
+    const NAME: &'static str;
+    /// What it is, one line.
+    const SUMMARY: &'static str;
+    /// What it promises of the items that it does not hide.
+    const GUARANTEE: Guarantee;
+    /// Where the idea is from.
+    const ORIGIN: Origin;
+    /// Which pixels of an occluder are drawn.
+    const COVERAGE: Coverage;
+    /// Whether drawing and asking may alternate. If not, [`OcclusionBuffer::finish`]
+    /// has to be called in between.
+    const ALTERNATES: bool;
+
+    /// A buffer of so many pixels, nothing drawn.
+    fn new(grid: SampleGrid) -> Self;
+
+    /// Forgets what was drawn.
+    fn clear(&mut self);
+
+    /// Draws an occluder.
+    fn draw(&mut self, outline: &Outline);
+
+    /// Everything has been drawn.
+    fn finish(&mut self) {}
+
+    /// Whether something that was drawn is nearer than the rectangle in all its
+    /// pixels. As near is not nearer.
+    fn hides(&self, rect: &Rect) -> bool;
+}

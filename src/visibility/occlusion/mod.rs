@@ -1,0 +1,32 @@
+//! Which of the items in the view are hidden by others.
+//!
+//! Back ends are buffers that occluders are drawn into ([`OcclusionBuffer`]), each
+//! in a file of its own, under two couplings: [`TwoPass`] (all occluders, then all
+//! candidates) and `interleaved` (front to back on a tree of its own).
+//!
+//! Semantics are those of [`Solids`](super::Solids): a ray meets a box where it
+//! enters it, between near and far; a box that some ray enters before the near
+//! plane is not drawn; items as near as an occluder are not hidden by it.
+
+mod block;
+mod buffer;
+mod interleaved;
+mod masked;
+mod outline;
+mod rect;
+mod scene;
+mod stats;
+#[cfg(test)]
+mod tests;
+mod two_pass;
+mod view;
+
+pub use block::Block;
+pub use buffer::{OcclusionBuffer, Origin};
+pub use masked::{Masked, MaskedCentre, MaskedInner};
+pub use outline::{Coverage, Outline};
+pub use rect::{Rect, Rects};
+pub use scene::{Faces, OccluderScene};
+pub use stats::CullStats;
+pub use two_pass::{OccluderChoice, TwoPass};
+pub use view::{Linear, Projection, View};

@@ -1,0 +1,358 @@
+//! What a box covers in the image, without clipping: one convex outline of at most
+//! six half-planes, and its nearness, the least of at most three linear functions.
+//!
+//! # Half-planes
+//!
+//! About the eye, mirror each axis of which the eye is not within the box's slab so
+//! that the box is on its positive side: near bound n > 0, far bound f >= n, and g
+//! the ray's direction along it. A ray enters the box through the face of such an
+//! axis i at depth `n_i / g_i`, and it does hit the box if no slab is left before
+//! all are entered: `n_i / g_i <= f_j / g_j` for each such i and each far bound of
+//! each other axis j, or, without dividing, `f_j g_i - n_i g_j >= 0`. Directions
+//! are linear functions of the place in the image, so these are half-planes,
+//! wherever the box is: one that crosses the plane of the eye needs no clipping.
+//! The depth is the greatest `n_i / g_i`, so the nearness 1 / depth is the least
+//! `g_i / n_i`, again linear. Parallel rays: the depth at which a slab is entered
+//! is itself linear, and nearness is a base minus depth.
+//!
+//! # Open faces
+//!
+//! Let Z be the least z of all items as written, the eye not below it, and a box
+//! whose z begins at Z. Drawn as if it went down for ever it hides nothing that is
+//! visible: let a ray enter the extended box at a point p. If p is not below Z it
+//! is in the box itself, which the ray thus enters there or before, and not before
+//! the near plane (`View::entered_before_near`). If p is below Z, the ray descends,
+//! as it began at or above Z, and whatever it meets from there on would lie below Z:
+//! there is nothing. So no item is met behind p by that ray, and items before p are
+//! not behind the extension either. The same holds for the five other faces of the
+//! scene's bounds and for several of them at once: p is in the box itself, or
+//! beyond an open face. Parallel rays must not run towards the inner side of an
+//! open face. Comparisons are exact, of numbers as written; that occluders are
+//! rounded inward does not matter, as what the extension fills up to an open face
+//! is part of the box.
+
+use glam::DVec3;
+
+use super::scene::Faces;
+use super::view::{Linear, MARGIN, TILE_HEIGHT, TILE_WIDTH, U, View};
+use crate::geometry::Aabb;
+
+/// Which pixels an outline covers.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Coverage {
+    /// Those whose centre is within it.
+    Centre,
+    /// Those that are wholly within it.
+    Whole,
+}
+
+/// A bound of the columns: `at + slope * row`.
+#[derive(Clone, Copy, Debug)]
+struct Bound {
+    at: f64,
+    slope: f64,
+}
+
+/// The pixels that a box covers and how near it is there.
+#[derive(Clone, Debug)]
+pub struct Outline {
+    /// First `lower` bounds from below, then `upper` ones from above, of columns.
+    lower: [Bound; 8],
+    lower_count: usize,
+    upper: [Bound; 8],
+    upper_count: usize,
+    /// First row and the one behind the last.
+    rows: [f64; 2],
+    /// The least of these is the nearness, rounded down already.
+    faces: [Linear; 3],
+    face_count: usize,
+    /// What the nearness is not below.
+    floor: f64,
+    columns: f64,
+    coverage: Coverage,
+}
+
+impl Outline {
+    /// The outline of a box; `None` where it covers no pixel or the eye is in it.
+    /// Those faces that are `open` are drawn as if they lay infinitely far out.
+    pub fn of(inner: &Aabb, open: Faces, view: &View, coverage: Coverage) -> Option<Outline> {
+        if inner.is_empty() {
+            return None;
+        }
+        let mut low = inner.min.as_dvec3() - view.eye;
+        let mut high = inner.max.as_dvec3() - view.eye;
+        for axis in 0..3 {
+            if open >> axis & 1 == 1 {
+                low[axis] = f64::NEG_INFINITY;
+            }
+            if open >> (3 + axis) & 1 == 1 {
+                high[axis] = f64::INFINITY;
+            }
+        }
+        let size = [view.grid.width, view.grid.height].map(|s| s as usize);
+        let padded = |size: usize, tile: usize| (size.div_ceil(tile) * tile) as f64;
+        let none = Bound {
+            at: 0.0,
+            slope: 0.0,
+        };
+        let mut outline = Outline {
+            lower: [none; 8],
+            lower_count: 0,
+            upper: [none; 8],
+            upper_count: 0,
+            rows: [0.0, padded(size[1], TILE_HEIGHT)],
+            faces: [Linear::constant(f64::INFINITY); 3],
+            face_count: 0,
+            floor: 0.0,
+            columns: padded(size[0], TILE_WIDTH),
+            coverage,
+        };
+        match view.parallel {
+            true => outline.add_parallel(low, high, view),
+            false => outline.add_perspective(low, high, view),
+        }
+        let drawn = outline.face_count > 0 && outline.rows[0] < outline.rows[1];
+        drawn.then_some(outline)
+    }
+
+    fn add_perspective(&mut self, low: DVec3, high: DVec3, view: &View) {
+        // Axes of which a face is turned to the eye, mirrored.
+        let mut toward = [false; 3];
+        let mut near = [0.0; 3];
+        let mut far = [0.0; 3];
+        let mut along = view.rays;
+        for axis in 0..3 {
+            if low[axis] > 0.0 {
+                (near[axis], far[axis]) = (low[axis], high[axis]);
+                toward[axis] = true;
+            } else if high[axis] < 0.0 {
+                (near[axis], far[axis]) = (-high[axis], -low[axis]);
+                along[axis] = along[axis].times(-1.0);
+                toward[axis] = true;
+            }
+        }
+        let zero = view.far_from_zero;
+        for i in (0..3).filter(|&i| toward[i]) {
+            let (n, g) = (near[i], &along[i]);
+            for j in (0..3).filter(|&j| j != i) {
+                let d = &along[j];
+                let margin = |f: f64| MARGIN * (f.abs() + n + zero) * view.reach;
+                let ahead = MARGIN * view.reach;
+                if toward[j] {
+                    match far[j].is_finite() {
+                        true => self.keep(g.blend(far[j], d, -n), margin(far[j])),
+                        false => self.keep(*g, ahead),
+                    }
+                } else {
+                    match high[j].is_finite() {
+                        true => self.keep(g.blend(high[j], d, -n), margin(high[j])),
+                        false => self.keep(*g, ahead),
+                    }
+                    match low[j].is_finite() {
+                        true => self.keep(d.blend(n, g, -low[j]), margin(low[j])),
+                        false => self.keep(*g, ahead),
+                    }
+                }
+            }
+            // A little farther than it is: n may be wrong by its error, and so may
+            // what is divided.
+            let n = n + MARGIN * (n + zero);
+            let mut nearness = g.times(1.0 / n);
+            nearness.c -= MARGIN * view.reach / n;
+            self.faces[self.face_count] = nearness;
+            self.face_count += 1;
+        }
+        let (depth, size) = farthest(low, high, view.forward);
+        self.floor = 1.0 / (depth + MARGIN * (size + zero));
+    }
+
+    fn add_parallel(&mut self, low: DVec3, high: DVec3, view: &View) {
+        let f = view.forward.abs();
+        let mut toward = [false; 3];
+        let mut near = [0.0; 3];
+        let mut far = [0.0; 3];
+        let mut beside = view.rays;
+        for axis in 0..3 {
+            if view.forward[axis] > 0.0 {
+                (near[axis], far[axis]) = (low[axis], high[axis]);
+                toward[axis] = true;
+            } else if view.forward[axis] < 0.0 {
+                (near[axis], far[axis]) = (-high[axis], -low[axis]);
+                beside[axis] = beside[axis].times(-1.0);
+                toward[axis] = true;
+            }
+        }
+        let zero = view.far_from_zero + view.reach;
+        // Rays that run along a slab are in it all the way or not at all.
+        for j in (0..3).filter(|&j| !toward[j]) {
+            let margin = |bound: f64| MARGIN * (bound.abs() + zero);
+            if high[j].is_finite() {
+                let under = Linear::constant(high[j]).blend(1.0, &beside[j], -1.0);
+                self.keep(under, margin(high[j]));
+            }
+            if low[j].is_finite() {
+                let over = beside[j].blend(1.0, &Linear::constant(low[j]), -1.0);
+                self.keep(over, margin(low[j]));
+            }
+        }
+        for i in (0..3).filter(|&i| toward[i]) {
+            // Depths of entering i and leaving j, both times |f_i f_j|.
+            let entered = Linear::constant(near[i]).blend(1.0, &beside[i], -1.0);
+            for j in (0..3).filter(|&j| j != i && toward[j] && far[j].is_finite()) {
+                let left = Linear::constant(far[j]).blend(1.0, &beside[j], -1.0);
+                let edge = left.blend(f[i], &entered, -f[j]);
+                self.keep(edge, MARGIN * (near[i].abs() + far[j].abs() + zero));
+            }
+            let error = MARGIN * (near[i].abs() + zero + f[i] * view.far.abs());
+            let mut nearness = entered.times(-1.0 / f[i]);
+            nearness.c += view.far - error / f[i];
+            self.faces[self.face_count] = nearness;
+            self.face_count += 1;
+        }
+        let (depth, size) = farthest(low, high, view.forward);
+        self.floor = (view.far - depth) - MARGIN * (size + zero + view.far.abs());
+    }
+
+    /// Only where `edge >= margin`, at the centre of a pixel or at all its corners.
+    ///
+    /// The margin is 2^-44 of what the edge's terms can reach in the padded image;
+    /// dividing by its slope, adding up and rounding take less than 2^-50 of that.
+    fn keep(&mut self, edge: Linear, margin: f64) {
+        let Linear { x, y, c } = edge;
+        let c = c - margin
+            + match self.coverage {
+                Coverage::Whole => x.min(0.0) + y.min(0.0),
+                Coverage::Centre => 0.5 * (x + y),
+            };
+        if x.abs() * self.columns >= margin {
+            let bound = Bound {
+                at: -c / x,
+                slope: -y / x,
+            };
+            if x > 0.0 {
+                self.lower[self.lower_count & 7] = bound;
+                self.lower_count += 1;
+            } else {
+                self.upper[self.upper_count & 7] = bound;
+                self.upper_count += 1;
+            }
+            return;
+        }
+        // Along the rows but for less than the margin over the whole width.
+        let c = c - margin;
+        let [first, end] = self.rows;
+        if y.abs() * end < margin {
+            // Here or nowhere. (A NaN is nowhere.)
+            if !(c - margin >= 0.0) {
+                self.rows = [0.0, 0.0];
+            }
+        } else if y > 0.0 {
+            self.rows[0] = first.max((-c / y).ceil());
+        } else {
+            self.rows[1] = end.min((c / -y).floor() + 1.0);
+        }
+    }
+
+    /// First row and the one behind the last that columns have to be asked for.
+    pub fn rows(&self) -> (usize, usize) {
+        (self.rows[0] as usize, self.rows[1] as usize)
+    }
+
+    /// For `N` rows from `first` on: the first column and the one behind the last;
+    /// none where the second is not above the first.
+    #[inline(always)]
+    pub fn spans<const N: usize>(&self, first: usize) -> ([i32; N], [i32; N]) {
+        let mut row = [0.0; N];
+        for i in 0..N {
+            row[i] = (first + i) as f64;
+        }
+        let mut low = [0.0; N];
+        let mut high = [self.columns; N];
+        for bound in &self.lower[..self.lower_count.min(8)] {
+            for i in 0..N {
+                let at = bound.at + bound.slope * row[i];
+                low[i] = if at > low[i] { at } else { low[i] };
+            }
+        }
+        for bound in &self.upper[..self.upper_count.min(8)] {
+            for i in 0..N {
+                let at = bound.at + bound.slope * row[i] + 1.0;
+                high[i] = if at < high[i] { at } else { high[i] };
+            }
+        }
+        let mut start = [0; N];
+        let mut end = [0; N];
+        let columns = self.columns as i32;
+        for i in 0..N {
+            // Rounded up; and no columns in rows that are not the outline's.
+            let down = (self.columns - low[i]) as i32;
+            let within = (row[i] >= self.rows[0]) & (row[i] < self.rows[1]);
+            start[i] = columns - down;
+            end[i] = if within { high[i] as i32 } else { 0 };
+        }
+        (start, end)
+    }
+
+    /// The nearness of tiles, never above that of any covered pixel in them.
+    pub fn per_tile(&self, tiles: [usize; 2]) -> TileNearness {
+        let per = [TILE_WIDTH as f64, TILE_HEIGHT as f64];
+        let mut faces = [[f32::INFINITY, 0.0, 0.0]; 3];
+        for (of_tile, face) in faces.iter_mut().zip(&self.faces[..self.face_count]) {
+            let (x, y) = (face.x * per[0], face.y * per[1]);
+            // At the farthest corner of the tile. Six u of the greatest terms: one
+            // for rounding each coefficient, one for each product, two sums.
+            let size = face.c.abs() + x.abs() * tiles[0] as f64 + y.abs() * tiles[1] as f64;
+            let c = face.c + x.min(0.0) + y.min(0.0) - 6.0 * f64::from(U) * size;
+            *of_tile = [c as f32, x as f32, y as f32];
+        }
+        TileNearness {
+            faces,
+            floor: (self.floor as f32).next_down(),
+        }
+    }
+
+    /// The nearness at a point of the image, rounded.
+    pub fn nearness_at(&self, x: f64, y: f64) -> f32 {
+        let faces = self.faces[..self.face_count].iter();
+        let least = faces.fold(f64::INFINITY, |least, l| least.min(l.x * x + l.y * y + l.c));
+        least as f32
+    }
+}
+
+/// The nearness of an outline tile by tile, in f32, rounded down.
+#[derive(Clone, Copy, Debug)]
+pub struct TileNearness {
+    faces: [[f32; 3]; 3],
+    floor: f32,
+}
+
+impl TileNearness {
+    /// Of a tile by its column and row.
+    #[inline(always)]
+    pub fn of(&self, column: f32, row: f32) -> f32 {
+        let [a, b, c] = &self.faces;
+        let at = |f: &[f32; 3]| (f[0] + f[1] * column) + f[2] * row;
+        let (a, b, c) = (at(a), at(b), at(c));
+        let ab = if a < b { a } else { b };
+        let least = if ab < c { ab } else { c };
+        if least > self.floor {
+            least
+        } else {
+            self.floor
+        }
+    }
+}
+
+/// The greatest depth of any point of the box, and how large its terms are.
+/// Infinite if an open face makes it so.
+fn farthest(low: DVec3, high: DVec3, forward: DVec3) -> (f64, f64) {
+    let mut depth = 0.0;
+    let mut size = 0.0;
+    for axis in (0..3).filter(|&k| forward[k] != 0.0) {
+        let bound = if forward[axis] > 0.0 { high } else { low };
+        let term = forward[axis] * bound[axis];
+        depth += term;
+        size += term.abs();
+    }
+    (depth, size)
+}

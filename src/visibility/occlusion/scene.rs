@@ -1,0 +1,198 @@
+//! The solids of a scene, prepared once for occlusion: a packed tree of blocks of
+//! sixteen, and for each item what the drawing of occluders must know of it.
+
+use glam::DVec3;
+
+use super::block::{Block, first_lanes};
+use crate::geometry::Aabb;
+use crate::kernel::{LANES, LaneMask};
+use crate::query::ItemId;
+use crate::scene::WorldBox;
+use crate::visibility::Solids;
+
+/// Some of a box's six faces: bit `axis` is the lower one, bit `3 + axis` the
+/// upper one.
+pub type Faces = u8;
+
+/// A scene's solids in a tree of which every node has sixteen children but the
+/// last ones: the children of box `j` of a level are block `j` of the level below.
+#[derive(Clone, Debug)]
+pub struct OccluderScene {
+    origin: DVec3,
+    /// Level 0 holds the items' outer boxes; the last level is one block.
+    levels: Vec<Vec<Block>>,
+    /// In tree order, as all that follows.
+    ids: Vec<ItemId>,
+    inner: Vec<Aabb>,
+    faces: Vec<Faces>,
+    /// Where in the tree an item is.
+    positions: Vec<u32>,
+    bounds: WorldBox,
+}
+
+impl OccluderScene {
+    /// Sorts the items into the tree. O(n log n).
+    pub fn of(solids: &Solids) -> OccluderScene {
+        let mut ids: Vec<ItemId> = (0..solids.outer.len() as ItemId).collect();
+        let mut capacity = LANES;
+        while capacity < ids.len() {
+            capacity *= LANES;
+        }
+        let centres: Vec<_> = solids.outer.iter().map(Aabb::centre).collect();
+        sort_into(&mut ids, capacity, &|id, axis| centres[id as usize][axis]);
+        let in_order =
+            |boxes: &[Aabb]| -> Vec<Aabb> { ids.iter().map(|&id| boxes[id as usize]).collect() };
+        let mut levels = vec![blocks_of(&in_order(&solids.outer))];
+        while let Some(last) = levels.last().filter(|last| last.len() > 1) {
+            let unions: Vec<Aabb> = last.iter().map(Block::union).collect();
+            levels.push(blocks_of(&unions));
+        }
+        let bounds = bounds_of(&solids.boxes);
+        let reached = |&id: &ItemId| faces_reached(&solids.boxes[id as usize], &bounds);
+        let mut positions = vec![0; ids.len()];
+        for (position, &id) in ids.iter().enumerate() {
+            positions[id as usize] = position as u32;
+        }
+        OccluderScene {
+            origin: solids.origin,
+            levels,
+            inner: in_order(&solids.inner),
+            faces: ids.iter().map(reached).collect(),
+            positions,
+            ids,
+            bounds,
+        }
+    }
+
+    /// Number of items.
+    pub fn len(&self) -> usize {
+        self.ids.len()
+    }
+
+    /// Whether there are no items.
+    pub fn is_empty(&self) -> bool {
+        self.ids.is_empty()
+    }
+
+    /// Where the zero of the boxes is in the world.
+    pub fn origin(&self) -> DVec3 {
+        self.origin
+    }
+
+    /// The union of the boxes as they were written.
+    pub fn bounds(&self) -> &WorldBox {
+        &self.bounds
+    }
+
+    /// The items in tree order.
+    pub fn ids(&self) -> &[ItemId] {
+        &self.ids
+    }
+
+    /// Where in tree order an item is.
+    #[inline(always)]
+    pub fn position(&self, item: ItemId) -> usize {
+        self.positions[item as usize] as usize
+    }
+
+    /// Number of levels, at least one.
+    pub fn height(&self) -> usize {
+        self.levels.len()
+    }
+
+    /// The blocks of a level; level 0 holds the items.
+    #[inline(always)]
+    pub fn level(&self, level: usize) -> &[Block] {
+        &self.levels[level]
+    }
+
+    /// The lanes of a block that hold a box.
+    #[inline(always)]
+    pub fn lanes(&self, level: usize, block: usize) -> LaneMask {
+        let boxes = match level {
+            0 => self.ids.len(),
+            _ => self.levels[level - 1].len(),
+        };
+        first_lanes(boxes - block * LANES)
+    }
+
+    /// The outer box at a position: what may be hidden.
+    #[inline(always)]
+    pub fn outer(&self, position: usize) -> Aabb {
+        self.levels[0][position / LANES].get(position % LANES)
+    }
+
+    /// The inner box at a position: what may hide; empty where there is none.
+    #[inline(always)]
+    pub fn inner(&self, position: usize) -> &Aabb {
+        &self.inner[position]
+    }
+
+    /// The faces of the scene's bounds that the box at a position reaches, as
+    /// written, exactly.
+    #[inline(always)]
+    pub fn faces(&self, position: usize) -> Faces {
+        self.faces[position]
+    }
+
+    /// Heap bytes.
+    pub fn bytes(&self) -> usize {
+        let blocks: usize = self.levels.iter().map(|l| size_of_val(&l[..])).sum();
+        let items = size_of::<ItemId>() + size_of::<Aabb>() + size_of::<Faces>() + 4;
+        blocks + self.ids.len() * items
+    }
+}
+
+/// Orders the items so that each run of `capacity` of them (the last may be
+/// shorter) lies close together, and each sixteenth of a run too.
+fn sort_into(ids: &mut [ItemId], capacity: usize, centre: &impl Fn(ItemId, usize) -> f32) {
+    if ids.len() <= capacity {
+        if capacity > LANES {
+            sort_into(ids, capacity / LANES, centre);
+        }
+        return;
+    }
+    let width = |axis: usize| {
+        let along = ids.iter().map(|&id| centre(id, axis));
+        let (low, high) = along.fold((f32::MAX, f32::MIN), |(l, h), c| (l.min(c), h.max(c)));
+        high - low
+    };
+    let widths = [width(0), width(1), width(2)];
+    let axis = (0..3).fold(0, |best, k| if widths[k] > widths[best] { k } else { best });
+    let left = ids.len().div_ceil(capacity) / 2 * capacity;
+    ids.select_nth_unstable_by(left, |&a, &b| {
+        centre(a, axis).total_cmp(&centre(b, axis)).then(a.cmp(&b))
+    });
+    let (before, behind) = ids.split_at_mut(left);
+    sort_into(before, capacity, centre);
+    sort_into(behind, capacity, centre);
+}
+
+fn blocks_of(boxes: &[Aabb]) -> Vec<Block> {
+    let filled = |chunk: &[Aabb]| {
+        let mut block = Block::EMPTY;
+        let lanes = chunk.iter().enumerate();
+        lanes.for_each(|(lane, b)| block.set(lane, b));
+        block
+    };
+    let blocks: Vec<Block> = boxes.chunks(LANES).map(filled).collect();
+    if blocks.is_empty() {
+        return vec![Block::EMPTY];
+    }
+    blocks
+}
+
+fn bounds_of(boxes: &[WorldBox]) -> WorldBox {
+    let nothing = WorldBox::new(DVec3::INFINITY, DVec3::NEG_INFINITY);
+    boxes.iter().fold(nothing, |all, b| {
+        WorldBox::new(all.min.min(b.min), all.max.max(b.max))
+    })
+}
+
+fn faces_reached(b: &WorldBox, bounds: &WorldBox) -> Faces {
+    (0..3).fold(0, |faces, axis| {
+        let low = Faces::from(b.min[axis] <= bounds.min[axis]);
+        let high = Faces::from(b.max[axis] >= bounds.max[axis]);
+        faces | low << axis | high << (3 + axis)
+    })
+}

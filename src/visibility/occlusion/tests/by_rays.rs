@@ -1,0 +1,157 @@
+//! What random rays see, by trying every box; and what a back end then misses.
+
+use glam::{DVec3, Vec3};
+
+use super::super::{OccluderScene, View};
+use crate::camera::{Camera, Lens, PlaneOptions, Surroundings};
+use crate::geometry::ConvexVolume;
+use crate::query::ItemId;
+use crate::scene::{Scene, SeededRng, WorldBox};
+use crate::visibility::{Ray, Rays, SampleGrid, Solids};
+
+/// A scene made ready.
+pub struct Ready {
+    pub scene: Scene,
+    pub solids: Solids,
+    pub occluders: OccluderScene,
+}
+
+impl Ready {
+    pub fn of(scene: Scene) -> Ready {
+        let solids = Solids::of(&scene);
+        let occluders = OccluderScene::of(&solids);
+        Ready {
+            scene,
+            solids,
+            occluders,
+        }
+    }
+
+    pub fn volume(&self, camera: &Camera) -> ConvexVolume {
+        let around = Surroundings {
+            origin: self.scene.origin,
+            reach: self
+                .scene
+                .items
+                .iter()
+                .map(|b| b.reach())
+                .fold(Vec3::ZERO, Vec3::max),
+        };
+        camera.volume(&PlaneOptions::default(), &around).unwrap()
+    }
+
+    /// The items that no plane excludes, by trying each.
+    pub fn in_view(&self, volume: &ConvexVolume) -> Vec<ItemId> {
+        let items = self.scene.items.iter().enumerate();
+        let seen = items.filter(|(_, b)| volume.sees(b));
+        seen.map(|(id, _)| id as ItemId).collect()
+    }
+}
+
+/// Where a ray enters a box, if it does so between near and far.
+pub fn entry(ray: &Ray, b: &WorldBox) -> Option<f64> {
+    let (mut enters, mut leaves) = (f64::NEG_INFINITY, f64::INFINITY);
+    for axis in 0..3 {
+        let (o, d) = (ray.origin[axis], ray.direction[axis]);
+        let (low, high) = (b.min[axis] - o, b.max[axis] - o);
+        if d == 0.0 {
+            if low > 0.0 || high < 0.0 {
+                return None;
+            }
+            continue;
+        }
+        let (first, last) = if d > 0.0 { (low, high) } else { (high, low) };
+        enters = enters.max(first / d);
+        leaves = leaves.min(last / d);
+    }
+    (enters <= leaves && enters >= ray.near && enters <= ray.far).then_some(enters)
+}
+
+/// The items that a ray meets first, all of them where several are as near.
+pub fn front(ray: &Ray, boxes: &[WorldBox]) -> Vec<ItemId> {
+    let mut least = f64::INFINITY;
+    let mut first = Vec::new();
+    for (id, b) in boxes.iter().enumerate() {
+        match entry(ray, b) {
+            Some(depth) if depth < least => {
+                least = depth;
+                first = vec![id as ItemId];
+            }
+            Some(depth) if depth == least => first.push(id as ItemId),
+            _ => {}
+        }
+    }
+    first
+}
+
+/// The items that are in front of some of so many rays, in order: every other ray
+/// anywhere in the image, the rest at points of items, on their edges mostly.
+pub fn seen_by_rays(
+    rays: &Rays,
+    boxes: &[WorldBox],
+    count: usize,
+    rng: &mut SeededRng,
+) -> Vec<ItemId> {
+    let mut seen = Vec::new();
+    for number in 0..count {
+        let (x, y) = match number % 2 {
+            0 => (rng.unit(), rng.unit()),
+            _ => aimed_at(rays, &boxes[rng.below(boxes.len())], rng),
+        };
+        if (0.0..=1.0).contains(&x) && (0.0..=1.0).contains(&y) {
+            seen.extend(front(&rays.through(x, y), boxes));
+        }
+    }
+    seen.sort_unstable();
+    seen.dedup();
+    seen
+}
+
+/// Where in the image a point of a box is, a little off its edges mostly.
+fn aimed_at(rays: &Rays, b: &WorldBox, rng: &mut SeededRng) -> (f64, f64) {
+    let mut along = || match rng.below(3) {
+        0 => rng.unit(),
+        1 => rng.unit() * 1e-3,
+        _ => 1.0 - rng.unit() * 1e-3,
+    };
+    let at = b.min + (b.max - b.min) * DVec3::new(along(), along(), along());
+    let camera = rays.camera();
+    let about = at - camera.frame.eye;
+    let depth = match camera.lens {
+        Lens::Orthographic { .. } => 1.0,
+        _ => about.dot(camera.frame.forward()),
+    };
+    let [left, right, bottom, top] = rays.window();
+    let (u, v) = (about.dot(camera.frame.u()), about.dot(camera.frame.v()));
+    let (x, y) = (
+        (u / depth - left) / (right - left),
+        (v / depth - top) / (bottom - top),
+    );
+    if depth > 0.0 { (x, y) } else { (-1.0, -1.0) }
+}
+
+/// Those of `seen` that are not in `kept`.
+pub fn missing(seen: &[ItemId], kept: &[ItemId]) -> Vec<ItemId> {
+    let mut kept = kept.to_vec();
+    kept.sort_unstable();
+    let lost = seen.iter().filter(|id| kept.binary_search(id).is_err());
+    lost.copied().collect()
+}
+
+/// A view made by a camera, for the length of a test.
+pub fn with_view<R>(
+    ready: &Ready,
+    camera: &Camera,
+    grid: SampleGrid,
+    ask: impl FnOnce(&View, &Rays) -> R,
+) -> R {
+    let rays = Rays::of(camera).unwrap();
+    let volume = ready.volume(camera);
+    let view = View::new(&rays, &volume, &ready.occluders, grid);
+    ask(&view, &rays)
+}
+
+/// A point of a box, anywhere.
+pub fn point_between(low: DVec3, high: DVec3, rng: &mut SeededRng) -> DVec3 {
+    low + (high - low) * rng.point()
+}

@@ -1,0 +1,150 @@
+//! Thousands of small random worlds: nothing that a ray sees may be missing.
+
+use glam::DVec3;
+
+use super::super::{MaskedCentre, MaskedInner, OccluderChoice, OcclusionBuffer, TwoPass};
+use super::by_rays::{Ready, missing, point_between, seen_by_rays, with_view};
+use crate::camera::{Camera, Frame, Lens};
+use crate::kernel::Kernel;
+use crate::scene::{Scene, SeededRng, WorldBox};
+use crate::visibility::SampleGrid;
+
+/// A handful of boxes of any shape, on a grid of whole numbers every other time
+/// (so that faces coincide), standing on a floor every other time.
+fn world(rng: &mut SeededRng, far_out: f64) -> Vec<WorldBox> {
+    let count = 4 + rng.below(40);
+    let whole = rng.below(2) == 0;
+    let standing = rng.below(2) == 0;
+    let flat = rng.below(4) == 0;
+    let centre = DVec3::new(far_out, -far_out, 0.0);
+    let mut boxes = Vec::new();
+    for _ in 0..count {
+        let mut low = point_between(DVec3::splat(-10.0), DVec3::splat(10.0), rng);
+        let largest = if rng.below(2) == 0 { 12.0 } else { 1.5 };
+        let mut size = rng.point() * largest;
+        if flat {
+            size[rng.below(3)] = 0.0;
+        }
+        if whole {
+            (low, size) = (low.round(), size.round());
+        }
+        if standing && rng.below(3) > 0 {
+            low.z = -10.0;
+        }
+        boxes.push(WorldBox::new(low + centre, low + size + centre));
+        if rng.below(8) == 0 {
+            boxes.push(boxes[boxes.len() - 1]);
+        }
+    }
+    boxes
+}
+
+/// An eye about the boxes, every other time within their bounds.
+fn camera(rng: &mut SeededRng, far_out: f64, parallel: bool) -> Camera {
+    let reach = if rng.below(2) == 0 { 9.0 } else { 25.0 };
+    let mut eye = point_between(DVec3::splat(-reach), DVec3::splat(reach), rng);
+    let mut forward = point_between(DVec3::splat(-6.0), DVec3::splat(6.0), rng) - eye;
+    if rng.below(3) == 0 {
+        // Along an axis, from a whole number.
+        (eye, forward) = (eye.round(), [DVec3::X, DVec3::Y, -DVec3::Z][rng.below(3)]);
+    }
+    if rng.below(3) == 0 {
+        forward.z = 0.0;
+    }
+    if forward.length() < 1e-3 {
+        forward = DVec3::X;
+    }
+    let up = if forward.x == 0.0 && forward.y == 0.0 {
+        DVec3::Y
+    } else {
+        DVec3::Z
+    };
+    let eye = eye + DVec3::new(far_out, -far_out, 0.0);
+    let frame = Frame::looking_along(eye, forward, up).unwrap();
+    let near = [0.01, 0.5, 2.0][rng.below(3)];
+    let far = [None, Some(30.0), Some(1000.0)][rng.below(3)];
+    let lens = if parallel {
+        let near = [-20.0, 0.0, 3.0][rng.below(3)];
+        Lens::orthographic(rng.between(2.0, 30.0), 1.6, near, 60.0).unwrap()
+    } else if rng.below(3) == 0 {
+        let side = |low: f64, rng: &mut SeededRng| near * (low + rng.unit());
+        let (left, bottom) = (side(-1.5, rng), side(-1.5, rng));
+        let window = [left, left + near * 1.2, bottom, bottom + near];
+        Lens::off_axis(window, near, far).unwrap()
+    } else {
+        Lens::perspective(rng.between(20.0, 130.0), 1.6, near, far).unwrap()
+    };
+    Camera { frame, lens }
+}
+
+/// How many items that rays see are missing, and how many items were removed.
+fn losses<B: OcclusionBuffer>(worlds: u64, far_out: f64, parallel: bool) -> (usize, usize) {
+    let (mut lost, mut removed, mut hidden) = (0, 0, 0);
+    for seed in 0..worlds {
+        let mut rng = SeededRng::new(seed);
+        let boxes = world(&mut rng, far_out);
+        let ready = Ready::of(Scene::from_boxes("world", &boxes).unwrap());
+        let camera = camera(&mut rng, far_out, parallel);
+        let grid = [(16, 10), (40, 25), (64, 40)][rng.below(3)];
+        let grid = SampleGrid::new(grid.0, grid.1);
+        with_view(&ready, &camera, grid, |view, rays| {
+            let candidates = ready.in_view(view.volume);
+            let mut culler = TwoPass::new(B::new(grid), OccluderChoice::All, Kernel::best());
+            let mut kept = Vec::new();
+            culler.cull(&ready.occluders, view, &candidates, &mut kept);
+            let seen = seen_by_rays(rays, &ready.solids.boxes, 400, &mut rng);
+            let lost_here = missing(&seen, &kept);
+            if !lost_here.is_empty() && B::GUARANTEE.is_safe() {
+                println!("{} seed {seed}: lost {lost_here:?} of {seen:?}", B::NAME);
+            }
+            lost += lost_here.len();
+            removed += candidates.len() - kept.len();
+            hidden += candidates.len() - seen.len();
+        });
+    }
+    println!("{}: lost {lost}, removed {removed} of {hidden}", B::NAME);
+    (lost, removed)
+}
+
+#[test]
+fn whole_pixels_lose_nothing_that_a_ray_sees() {
+    for (far_out, parallel) in [(0.0, false), (0.0, true), (1e7, false), (1e7, true)] {
+        let (lost, removed) = losses::<MaskedInner>(1500, far_out, parallel);
+        assert_eq!(lost, 0, "far out {far_out}, parallel {parallel}");
+        assert!(removed > 1000, "{removed}: the worlds hide something");
+    }
+}
+
+#[test]
+fn pixel_centres_lose_what_rays_see() {
+    for parallel in [false, true] {
+        let (lost, _) = losses::<MaskedCentre>(1000, 0.0, parallel);
+        assert!(lost > 10, "{lost}: the worlds are hard enough");
+    }
+}
+
+#[test]
+fn a_wall_hides_what_is_behind_it_and_nothing_beside_it() {
+    let wall = WorldBox::new(DVec3::new(10.0, -3.0, -3.0), DVec3::new(11.0, 3.0, 3.0));
+    let behind = WorldBox::new(DVec3::new(20.0, -1.0, -1.0), DVec3::new(21.0, 1.0, 1.0));
+    let beside = WorldBox::new(DVec3::new(20.0, 5.0, -1.0), DVec3::new(21.0, 7.0, 1.0));
+    let bound = WorldBox::around(DVec3::ZERO, DVec3::splat(0.5));
+    let below = WorldBox::new(DVec3::splat(-50.0), DVec3::splat(-49.0));
+    let above = WorldBox::new(DVec3::splat(50.0), DVec3::splat(51.0));
+    let boxes = [wall, behind, beside, bound, below, above];
+    let ready = Ready::of(Scene::from_boxes("wall", &boxes).unwrap());
+    let grid = SampleGrid::new(64, 40);
+    let frame = Frame::looking_along(DVec3::ZERO, DVec3::X, DVec3::Z).unwrap();
+    for lens in [
+        Lens::perspective(60.0, 1.6, 0.5, None).unwrap(),
+        Lens::orthographic(20.0, 1.6, 0.5, 100.0).unwrap(),
+    ] {
+        with_view(&ready, &Camera { frame, lens }, grid, |view, _| {
+            let mut culler =
+                TwoPass::new(MaskedInner::new(grid), OccluderChoice::All, Kernel::best());
+            let mut kept = Vec::new();
+            culler.cull(&ready.occluders, view, &[0, 1, 2], &mut kept);
+            assert_eq!(kept, [0, 2], "{lens:?}");
+        });
+    }
+}

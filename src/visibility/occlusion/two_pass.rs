@@ -1,0 +1,191 @@
+//! The coupling in two passes: all occluders first, then all candidates.
+
+use super::block::Block;
+use super::buffer::OcclusionBuffer;
+use super::outline::Outline;
+use super::rect::{Rect, Rects};
+use super::scene::OccluderScene;
+use super::stats::CullStats;
+use super::view::View;
+use crate::kernel::{Isa, Kernel, LANES, Work};
+use crate::query::ItemId;
+
+/// Which candidates are drawn as occluders.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[non_exhaustive]
+pub enum OccluderChoice {
+    /// All of them.
+    All,
+    /// So many of least depth.
+    Nearest(usize),
+    /// So many that cover the most pixels by their rectangles.
+    Largest(usize),
+}
+
+/// A candidate and what is known of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Candidate {
+    /// In tree order.
+    pub position: u32,
+    /// The rectangle, if there is one.
+    pub rect: Rect,
+    /// Whether there is none, as the box is too near.
+    pub near: bool,
+    /// Not above the least depth.
+    pub depth: f32,
+}
+
+/// Two passes over candidates, with memory that is kept from view to view.
+#[derive(Clone, Debug)]
+pub struct TwoPass<B> {
+    buffer: B,
+    choice: OccluderChoice,
+    kernel: Kernel,
+    candidates: Vec<Candidate>,
+    order: Vec<u32>,
+}
+
+impl<B: OcclusionBuffer> TwoPass<B> {
+    /// With a buffer, on an instruction set.
+    pub fn new(buffer: B, choice: OccluderChoice, kernel: Kernel) -> TwoPass<B> {
+        TwoPass {
+            buffer,
+            choice,
+            kernel,
+            candidates: Vec::new(),
+            order: Vec::new(),
+        }
+    }
+
+    /// Appends those candidates that are not hidden, in their order. The candidates
+    /// are items in the view, each once.
+    pub fn cull(
+        &mut self,
+        scene: &OccluderScene,
+        view: &View,
+        candidates: &[ItemId],
+        out: &mut Vec<ItemId>,
+    ) -> CullStats {
+        self.kernel.run(Culled {
+            state: self,
+            scene,
+            view,
+            ids: candidates,
+            out,
+        })
+    }
+
+    /// The buffer as the last view left it.
+    pub fn buffer(&self) -> &B {
+        &self.buffer
+    }
+}
+
+struct Culled<'a, B> {
+    state: &'a mut TwoPass<B>,
+    scene: &'a OccluderScene,
+    view: &'a View<'a>,
+    ids: &'a [ItemId],
+    out: &'a mut Vec<ItemId>,
+}
+
+impl<B: OcclusionBuffer> Work for Culled<'_, B> {
+    type Output = CullStats;
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) -> CullStats {
+        let (state, scene, view) = (self.state, self.scene, self.view);
+        let mut stats = CullStats::default();
+        project_all(isa, scene, view, self.ids, &mut state.candidates);
+        stats.boxes = self.ids.len();
+        let drawable = |c: &Candidate| !view.entered_before_near(&scene.outer(c.position as usize));
+        choose(&state.candidates, state.choice, &mut state.order, drawable);
+        state.buffer.clear();
+        for &index in &state.order {
+            let position = state.candidates[index as usize].position as usize;
+            let open = view.open & scene.faces(position);
+            if let Some(outline) = Outline::of(scene.inner(position), open, view, B::COVERAGE) {
+                state.buffer.draw(&outline);
+                stats.drawn += 1;
+            }
+        }
+        state.buffer.finish();
+        let before = self.out.len();
+        for candidate in &state.candidates {
+            if candidate.near || !state.buffer.hides(&candidate.rect) {
+                self.out.push(scene.ids()[candidate.position as usize]);
+            }
+        }
+        stats.kept = self.out.len() - before;
+        stats
+    }
+}
+
+/// The candidates that some ray of the image may meet, in their order, projected
+/// sixteen at a time.
+#[inline(always)]
+fn project_all<I: Isa>(
+    isa: I,
+    scene: &OccluderScene,
+    view: &View,
+    ids: &[ItemId],
+    candidates: &mut Vec<Candidate>,
+) {
+    candidates.clear();
+    let mut rects = Rects::NONE;
+    for chunk in ids.chunks(LANES) {
+        let mut block = Block::EMPTY;
+        for (lane, &id) in chunk.iter().enumerate() {
+            block.set(lane, &scene.outer(scene.position(id)));
+        }
+        rects.project(&block, view);
+        let (seen, flat) = rects.lanes(isa);
+        for (lane, &id) in chunk.iter().enumerate() {
+            if seen >> lane & 1 == 1 {
+                candidates.push(Candidate {
+                    position: scene.position(id) as u32,
+                    rect: rects.get(lane),
+                    near: flat >> lane & 1 == 0,
+                    depth: rects.depth[lane],
+                });
+            }
+        }
+    }
+}
+
+/// The indices of the occluders, the nearest first.
+fn choose(
+    candidates: &[Candidate],
+    choice: OccluderChoice,
+    order: &mut Vec<u32>,
+    drawable: impl Fn(&Candidate) -> bool,
+) {
+    order.clear();
+    let allowed = |&index: &u32| drawable(&candidates[index as usize]);
+    order.extend((0..candidates.len() as u32).filter(allowed));
+    let depth = |index: u32| candidates[index as usize].depth;
+    let nearer = |&a: &u32, &b: &u32| depth(a).total_cmp(&depth(b)).then(a.cmp(&b));
+    let area = |index: u32| match &candidates[index as usize] {
+        candidate if candidate.near => u32::MAX,
+        candidate => candidate.rect.area(),
+    };
+    match choice {
+        OccluderChoice::All => {}
+        OccluderChoice::Nearest(count) => keep_first(order, count, nearer),
+        OccluderChoice::Largest(count) => {
+            keep_first(order, count, |&a, &b| area(b).cmp(&area(a)).then(a.cmp(&b)));
+        }
+    }
+    order.sort_unstable_by(nearer);
+}
+
+fn keep_first(
+    order: &mut Vec<u32>,
+    count: usize,
+    compare: impl FnMut(&u32, &u32) -> std::cmp::Ordering,
+) {
+    if count < order.len() {
+        order.select_nth_unstable_by(count, compare);
+        order.truncate(count);
+    }
+}

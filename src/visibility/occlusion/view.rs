@@ -1,0 +1,276 @@
+//! A camera as the occlusion stage needs it: where the rays of an image are, as
+//! linear functions of the place in the image (f64, for what is drawn), and where a
+//! point is in the image (f32, for the sixteen boxes of a block).
+//!
+//! The image has x from 0 to width and y from 0, the top, to height: the pixel in
+//! column c and row r is the closed square `[c, c + 1] x [r, r + 1]`.
+
+use glam::DVec3;
+
+use super::scene::{Faces, OccluderScene};
+use crate::geometry::{Aabb, ConvexVolume};
+use crate::visibility::{Rays, SampleGrid};
+
+/// Half a unit in the last place of 1, of f32.
+pub const U: f32 = 1.0 / (1u32 << 24) as f32;
+
+/// Columns of a tile of the buffer.
+pub const TILE_WIDTH: usize = 8;
+/// Rows of a tile of the buffer.
+pub const TILE_HEIGHT: usize = 4;
+
+/// `x * a + y * b + c` over the image.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Linear {
+    /// Per column.
+    pub x: f64,
+    /// Per row.
+    pub y: f64,
+    /// At the image's upper left corner.
+    pub c: f64,
+}
+
+impl Linear {
+    /// A function that is the same everywhere.
+    pub const fn constant(c: f64) -> Linear {
+        Linear { x: 0.0, y: 0.0, c }
+    }
+
+    /// `a * self + b * other`.
+    #[inline(always)]
+    pub fn blend(&self, a: f64, other: &Linear, b: f64) -> Linear {
+        Linear {
+            x: a * self.x + b * other.x,
+            y: a * self.y + b * other.y,
+            c: a * self.c + b * other.c,
+        }
+    }
+
+    /// `a * self`.
+    #[inline(always)]
+    pub fn times(&self, a: f64) -> Linear {
+        Linear {
+            x: a * self.x,
+            y: a * self.y,
+            c: a * self.c,
+        }
+    }
+}
+
+/// How positions become pixels, in f32 and about the eye.
+#[derive(Clone, Copy, Debug)]
+pub struct Projection {
+    /// The eye, rounded to f32, and what the rounding left.
+    pub eye: [f32; 3],
+    /// To be subtracted after the eye.
+    pub rest: [f32; 3],
+    /// Rows for x, y and depth: of a perspective lens x and y are still to be
+    /// divided by the depth.
+    pub rows: [[f32; 3]; 3],
+    /// What is added to x and y; zero for a perspective lens.
+    pub shift: [f32; 2],
+    /// Width and height of the image.
+    pub size: [f32; 2],
+    /// What a coordinate's error is, apart from the box's own size, in units of
+    /// two u: see `rect`.
+    pub far_from_zero: f32,
+    /// Factors of the slack in x and y: see `rect`.
+    pub slack: [f32; 2],
+    /// The part of it that no size of a box changes.
+    pub slack_added: [f32; 2],
+    /// What depths are subtracted from for an orthographic lens.
+    pub base: f32,
+}
+
+/// A camera's rays over a buffer of so many pixels, in a scene's coordinates.
+#[derive(Clone, Debug)]
+pub struct View<'v> {
+    /// The volume whose planes say what is in the view at all.
+    pub volume: &'v ConvexVolume,
+    /// Pixels.
+    pub grid: SampleGrid,
+    /// Whether all rays are parallel.
+    pub parallel: bool,
+    /// The eye in scene coordinates.
+    pub eye: DVec3,
+    /// The axis of view.
+    pub forward: DVec3,
+    /// Perspective: a ray's direction for unit depth, axis by axis. Parallel rays:
+    /// where the ray leaves the plane of the eye, about the eye.
+    pub rays: [Linear; 3],
+    /// What a coordinate of `rays` can reach within the padded image, all axes
+    /// together.
+    pub reach: f64,
+    /// What the eye's coordinates may be wrong by, in units of 2^-52.
+    pub far_from_zero: f64,
+    /// Least visible depth.
+    pub near: f64,
+    /// Largest visible depth, or infinity.
+    pub far: f64,
+    /// What no ray has passed through before the near plane lies outside of this
+    /// box (perspective lenses).
+    pub before_near: [DVec3; 2],
+    /// The faces of the scene's bounds beyond which no ray comes back: see
+    /// `outline`.
+    pub open: Faces,
+    /// For the boxes of a block.
+    pub projection: Projection,
+}
+
+impl<'v> View<'v> {
+    /// A camera's rays in a scene. The volume is asked which items are in the view;
+    /// it should hold all that the rays can meet.
+    pub fn new(
+        rays: &Rays,
+        volume: &'v ConvexVolume,
+        scene: &OccluderScene,
+        grid: SampleGrid,
+    ) -> View<'v> {
+        let camera = rays.camera();
+        let frame = &camera.frame;
+        let parallel = matches!(camera.lens, crate::camera::Lens::Orthographic { .. });
+        let [left, right, bottom, top] = rays.window();
+        let (width, height) = (f64::from(grid.width), f64::from(grid.height));
+        let (u, v, forward) = (frame.u(), frame.v(), frame.forward());
+        let corner = u * left + v * top;
+        let corner = if parallel { corner } else { corner + forward };
+        let across = u * ((right - left) / width);
+        let down = v * ((bottom - top) / height);
+        let linear = |axis: usize| Linear {
+            x: across[axis],
+            y: down[axis],
+            c: corner[axis],
+        };
+        let lines = [linear(0), linear(1), linear(2)];
+        let padded = [
+            padded(grid.width, TILE_WIDTH),
+            padded(grid.height, TILE_HEIGHT),
+        ];
+        let reach = |l: &Linear| l.x.abs() * padded[0] + l.y.abs() * padded[1] + l.c.abs();
+        let reach: f64 = lines.iter().map(reach).sum();
+        let eye = frame.eye - scene.origin();
+        // Parallel rays begin at points of their own, which were rounded in world
+        // coordinates; one that all rays share is exact there.
+        let in_world = if parallel {
+            frame.eye.abs().element_sum()
+        } else {
+            0.0
+        };
+        let far_from_zero = eye.abs().element_sum() + 4.0 * in_world;
+        let near = camera.lens.near();
+        View {
+            volume,
+            grid,
+            parallel,
+            eye,
+            forward,
+            rays: lines,
+            reach,
+            far_from_zero,
+            near,
+            far: camera.lens.far().unwrap_or(f64::INFINITY),
+            before_near: before_near(rays, near, eye, far_from_zero),
+            open: open_faces(frame.eye, forward, parallel, scene),
+            projection: Projection::new(rays, eye, far_from_zero, grid, parallel),
+        }
+    }
+
+    /// Whether some ray may enter the box before the near plane (or begin in it).
+    /// Such a box may not be drawn: that ray does not meet it.
+    #[inline(always)]
+    pub fn entered_before_near(&self, outer: &Aabb) -> bool {
+        let (low, high) = (outer.min.as_dvec3(), outer.max.as_dvec3());
+        if self.parallel {
+            let (low, high) = (low - self.eye, high - self.eye);
+            let f = self.forward;
+            let least: f64 = (0..3).map(|k| (f[k] * low[k]).min(f[k] * high[k])).sum();
+            let size = low.abs().max(high.abs()).element_sum() + self.far_from_zero;
+            return least <= self.near + size * MARGIN;
+        }
+        let [first, last] = self.before_near;
+        low.cmple(last).all() && first.cmple(high).all()
+    }
+}
+
+/// What f64 sums of a few products of coordinates are moved by, relative to the
+/// sum of their sizes: 2^-44. Each coordinate about the eye is wrong by at most
+/// 2^-52 of itself and of the eye's (the eye in scene coordinates was rounded
+/// once, the difference once), each coefficient of a ray by less than 2^-50 of the
+/// ray's reach, the truth's own rays by as much, and a sum of three products adds
+/// 2^-51 of their sizes: less than 2^-47 in all.
+pub const MARGIN: f64 = 1.0 / (1u64 << 44) as f64;
+
+fn padded(size: u32, tile: usize) -> f64 {
+    ((size as usize).div_ceil(tile) * tile) as f64
+}
+
+/// The bounds of the pyramid from the eye to the near window, moved outward.
+fn before_near(rays: &Rays, near: f64, eye: DVec3, far_from_zero: f64) -> [DVec3; 2] {
+    let frame = &rays.camera().frame;
+    let [left, right, bottom, top] = rays.window();
+    let (mut low, mut high) = (eye, eye);
+    for (x, y) in [(left, bottom), (right, bottom), (left, top), (right, top)] {
+        let corner = eye + (frame.u() * x + frame.v() * y + frame.forward()) * near;
+        (low, high) = (low.min(corner), high.max(corner));
+    }
+    let width = near * (1.0 + left.abs() + right.abs() + bottom.abs() + top.abs());
+    let slack = DVec3::splat((far_from_zero + width) * MARGIN);
+    [low - slack, high + slack]
+}
+
+/// The faces of the scene's bounds that no ray passes and comes back through:
+/// those that the eye is not beyond, or that parallel rays do not leave by.
+fn open_faces(eye: DVec3, forward: DVec3, parallel: bool, scene: &OccluderScene) -> Faces {
+    let bounds = scene.bounds();
+    (0..3).fold(0, |faces, axis| {
+        let (low, high) = match parallel {
+            true => (forward[axis] <= 0.0, forward[axis] >= 0.0),
+            false => (eye[axis] >= bounds.min[axis], eye[axis] <= bounds.max[axis]),
+        };
+        faces | Faces::from(low) << axis | Faces::from(high) << (3 + axis)
+    })
+}
+
+impl Projection {
+    fn new(
+        rays: &Rays,
+        eye: DVec3,
+        far_from_zero: f64,
+        grid: SampleGrid,
+        parallel: bool,
+    ) -> Projection {
+        let frame = &rays.camera().frame;
+        let [left, right, bottom, top] = rays.window();
+        let (width, height) = (f64::from(grid.width), f64::from(grid.height));
+        let (per_x, per_y) = (width / (right - left), height / (bottom - top));
+        let (u, v, f) = (frame.u(), frame.v(), frame.forward());
+        let (rows, shift) = match parallel {
+            true => ([u * per_x, v * per_y, f], [-left * per_x, -top * per_y]),
+            false => (
+                [(u - f * left) * per_x, (v - f * top) * per_y, f],
+                [0.0, 0.0],
+            ),
+        };
+        let local = eye.as_vec3();
+        let rest = (eye - local.as_dvec3()).as_vec3();
+        let u_f64 = f64::from(U);
+        let base = rays.camera().lens.far().unwrap_or(0.0);
+        // 10 u: derived in `rect`.
+        let factor = |row: DVec3, size: f64| match parallel {
+            true => (10.0 * u_f64 * row.length()) as f32,
+            false => (10.0 * u_f64 * (row.length() + 2.0 * size)) as f32,
+        };
+        let added = |shift: f64, size: f64| (10.0 * u_f64 * (shift.abs() + 2.0 * size)) as f32;
+        Projection {
+            eye: local.to_array(),
+            rest: rest.to_array(),
+            rows: rows.map(|row| row.as_vec3().to_array()),
+            shift: shift.map(|s| s as f32),
+            size: [width as f32, height as f32],
+            far_from_zero: (u_f64 * far_from_zero) as f32,
+            slack: [factor(rows[0], width), factor(rows[1], height)],
+            slack_added: [added(shift[0], width), added(shift[1], height)],
+            base: base as f32,
+        }
+    }
+}
