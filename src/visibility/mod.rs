@@ -5,6 +5,7 @@
 
 mod guarantee;
 mod rays;
+pub mod region;
 mod solids;
 
 pub use guarantee::Guarantee;
