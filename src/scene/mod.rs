@@ -39,7 +39,7 @@ pub use rng::SeededRng;
 pub use samples::{NOTICE, SAMPLES, Sample};
 pub use sought::Sought;
 pub use source::{LoadOptions, check_fits, load};
-pub use wad::{WadMap, map_names};
+pub use wad::{WadMap, map_lump, map_names};
 
 /// A box in world coordinates, as a file or a generator states it.
 #[derive(Clone, Copy, PartialEq, Debug)]

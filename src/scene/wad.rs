@@ -17,6 +17,8 @@ const HIGH: f64 = i16::MAX as f64;
 const LUMPS: [&str; 8] = [
     "THINGS", "LINEDEFS", "SIDEDEFS", "VERTEXES", "SEGS", "SSECTORS", "NODES", "SECTORS",
 ];
+/// What a map may have besides.
+const MORE_LUMPS: [&str; 3] = ["REJECT", "BLOCKMAP", "BEHAVIOR"];
 
 /// One map of a WAD file, decoded and cross-checked.
 #[derive(Clone, Debug)]
@@ -38,11 +40,33 @@ pub struct Thing {
     pub kind: u16,
 }
 
+/// The bytes of one lump of a map (`SECTORS`, `REJECT`) as the file has them: of
+/// the named map, or of the first. `None` if the map has no such lump.
+///
+/// Only the lump's place in the file is checked; [`WadMap::read`] checks that the
+/// lumps of a map fit each other.
+///
+/// # Errors
+/// [`InputError::Byte`] for a file that is no WAD or has no such map.
+pub fn map_lump<'a>(
+    bytes: &'a [u8],
+    file: &'a str,
+    map: Option<&str>,
+    lump: &str,
+) -> Result<Option<&'a [u8]>, InputError> {
+    let wad = Wad::open(bytes, file)?;
+    let (_, marker) = wad.marker(map)?;
+    // The next map begins with a marker, which has none of these names.
+    let own = wad.lumps[marker + 1..]
+        .iter()
+        .take_while(|l| LUMPS.contains(&l.name.as_str()) || MORE_LUMPS.contains(&l.name.as_str()));
+    let found = own.into_iter().find(|l| l.name == lump);
+    Ok(found.map(|l| l.data))
+}
+
 /// The names of the maps in a WAD file, in file order.
 pub fn map_names(bytes: &[u8], file: &str) -> Result<Vec<String>, InputError> {
-    let wad = Wad::open(bytes, file)?;
-    let markers = wad.lumps.windows(2).filter(|pair| pair[1].name == LUMPS[0]);
-    Ok(markers.map(|pair| pair[0].name.clone()).collect())
+    Ok(Wad::open(bytes, file)?.map_names())
 }
 
 impl WadMap {
@@ -52,20 +76,8 @@ impl WadMap {
     /// [`InputError::Byte`] with the offset of the first thing that is wrong.
     pub fn read(bytes: &[u8], file: &str, map: Option<&str>) -> Result<WadMap, InputError> {
         let wad = Wad::open(bytes, file)?;
-        let names = map_names(bytes, file)?;
-        let wanted = match map {
-            Some(name) => names.iter().find(|n| n.eq_ignore_ascii_case(name)),
-            None => names.first(),
-        };
-        let Some(name) = wanted else {
-            let found = match map {
-                Some(name) => format!("no map '{name}' among {}", or_none(&names)),
-                None => "no map".to_owned(),
-            };
-            return Err(wad.error(0, found, "a map marker followed by THINGS"));
-        };
-        let marker = wad.lumps.iter().position(|l| &l.name == name);
-        wad.map(name, marker.unwrap_or_default())
+        let (name, marker) = wad.marker(map)?;
+        wad.map(&name, marker)
     }
 
     /// The map as a scene: linedefs first, then things, in lump order.
@@ -176,6 +188,31 @@ impl<'a> Wad<'a> {
             });
         }
         Ok(wad)
+    }
+
+    /// The name of the wanted map, or of the first, and the index of its marker.
+    fn marker(&self, map: Option<&str>) -> Result<(String, usize), InputError> {
+        let names = self.map_names();
+        let wanted = match map {
+            Some(name) => names.iter().find(|n| n.eq_ignore_ascii_case(name)),
+            None => names.first(),
+        };
+        let Some(name) = wanted else {
+            let found = match map {
+                Some(name) => format!("no map '{name}' among {}", or_none(&names)),
+                None => "no map".to_owned(),
+            };
+            return Err(self.error(0, found, "a map marker followed by THINGS"));
+        };
+        let marker = self.lumps.iter().position(|l| &l.name == name);
+        Ok((name.clone(), marker.unwrap_or_default()))
+    }
+
+    /// The names of the maps, in file order.
+    fn map_names(&self) -> Vec<String> {
+        let pairs = self.lumps.windows(2);
+        let markers = pairs.filter(|pair| pair[1].name == LUMPS[0]);
+        markers.map(|pair| pair[0].name.clone()).collect()
     }
 
     fn header_int(&self, at: usize) -> Result<usize, InputError> {
@@ -433,6 +470,21 @@ mod tests {
             }
             bytes[at] = kept;
         }
+    }
+
+    #[test]
+    fn a_lump_is_found_by_map_and_name() {
+        // One bit for each pair of sectors.
+        for (bytes, sectors) in [(MAP12, 49usize), (MAP20, 191)] {
+            let lump = |name| map_lump(bytes, "m.wad", None, name).unwrap();
+            assert_eq!(lump("SECTORS").unwrap().len(), sectors * 26);
+            assert_eq!(
+                lump("REJECT").unwrap().len(),
+                (sectors * sectors).div_ceil(8)
+            );
+            assert_eq!(lump("PWADINFO"), None);
+        }
+        assert!(map_lump(MAP12, "m.wad", Some("E1M1"), "SECTORS").is_err());
     }
 
     #[test]

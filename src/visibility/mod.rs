@@ -8,6 +8,7 @@ mod level;
 pub mod meshes;
 pub mod occlusion;
 mod rays;
+pub mod region;
 mod solids;
 mod surface;
 pub mod truth;

@@ -1,0 +1,71 @@
+//! Flood: every region that is reached through openings which meet the view volume,
+//! each taken by itself.
+
+use std::sync::Arc;
+
+use super::answer::{EyePlace, RegionId, RegionRow, Scratch};
+use super::graph::RegionGraph;
+use super::view::{Polygon, View};
+use crate::visibility::{Guarantee, Rays};
+
+/// As it is typed.
+pub const NAME: &str = "flood";
+/// One line of what it does.
+pub const SUMMARY: &str = "regions reached through openings that meet the view volume";
+/// What it promises.
+pub const GUARANTEE: Guarantee = Guarantee::Conservative;
+
+/// The row.
+#[derive(Clone, Debug)]
+pub struct Flood(pub Arc<RegionGraph>);
+
+impl RegionRow for Flood {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn summary(&self) -> &'static str {
+        SUMMARY
+    }
+
+    fn guarantee(&self) -> Guarantee {
+        GUARANTEE
+    }
+
+    fn graph(&self) -> &Arc<RegionGraph> {
+        &self.0
+    }
+
+    fn from_eye(&self, rays: &Rays, scratch: &mut Scratch, out: &mut Vec<RegionId>) -> EyePlace {
+        let graph = &*self.0;
+        let inside = graph.homes(rays, &mut scratch.homes);
+        let (true, Some(view)) = (inside, View::of(rays)) else {
+            out.clear();
+            out.extend(0..graph.len() as u32);
+            return EyePlace::Outside;
+        };
+        let (seen, queue) = (&mut scratch.seen, &mut scratch.queue);
+        seen.clear(graph.len());
+        queue.clear();
+        for &home in &scratch.homes {
+            seen.insert(home);
+            queue.push(home);
+        }
+        let mut polygon = Polygon::default();
+        while let Some(at) = queue.pop() {
+            for &exit in graph.exits(at) {
+                let opening = &graph.openings()[exit as usize];
+                let (corners, reach) = view.corners(opening);
+                let meets = !view.is_beyond(&corners, reach)
+                    && polygon.begin(&corners, reach)
+                    && view.sides.iter().all(|side| polygon.cut(side));
+                let other = opening.other(at);
+                if meets && seen.insert(other) {
+                    queue.push(other);
+                }
+            }
+        }
+        seen.list(out);
+        EyePlace::Inside
+    }
+}

@@ -1,0 +1,170 @@
+//! Which boxes hold a point or meet a box: a uniform grid over them. Used for the
+//! region of an eye and for the items of a region.
+
+use glam::DVec3;
+
+use crate::scene::WorldBox;
+
+/// A uniform grid of buckets over boxes.
+#[derive(Clone, Debug)]
+pub struct BoxGrid {
+    boxes: Vec<WorldBox>,
+    low: DVec3,
+    per_unit: DVec3,
+    count: [usize; 3],
+    /// Start of each bucket in `entries`.
+    starts: Vec<u32>,
+    entries: Vec<u32>,
+}
+
+impl BoxGrid {
+    /// About as many buckets as boxes. O(n + entries).
+    pub fn new(boxes: Vec<WorldBox>) -> BoxGrid {
+        let start = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let (low, high) = boxes
+            .iter()
+            .fold(start, |(low, high), b| (low.min(b.min), high.max(b.max)));
+        let size = (high - low).max(DVec3::ZERO);
+        // Cubes: the edge that gives one bucket for each box.
+        let solid = size.max(DVec3::splat(size.max_element() * 1e-3));
+        let volume = solid.x * solid.y * solid.z;
+        let edge = libm::cbrt(volume / boxes.len().max(1) as f64);
+        let cells = |k: usize| match solid[k] / edge {
+            cells if cells >= 1.0 => (cells as usize).min(1024),
+            _ => 1,
+        };
+        let count = [cells(0), cells(1), cells(2)];
+        let per = |k: usize| match size[k] {
+            size if size > 0.0 => count[k] as f64 / size,
+            _ => 0.0,
+        };
+        let mut grid = BoxGrid {
+            boxes,
+            low,
+            per_unit: DVec3::new(per(0), per(1), per(2)),
+            count,
+            starts: vec![0; count[0] * count[1] * count[2] + 1],
+            entries: Vec::new(),
+        };
+        let mut lists = vec![Vec::new(); grid.starts.len() - 1];
+        for (id, b) in (0..).zip(&grid.boxes) {
+            grid.buckets(b, |bucket| lists[bucket].push(id));
+        }
+        for (i, list) in lists.iter().enumerate() {
+            grid.entries.extend_from_slice(list);
+            grid.starts[i + 1] = grid.entries.len() as u32;
+        }
+        grid
+    }
+
+    /// The boxes, as they were given.
+    pub fn boxes(&self) -> &[WorldBox] {
+        &self.boxes
+    }
+
+    /// Calls `found` with each box that meets a box, closed; a box that lies in
+    /// several buckets may be named several times.
+    pub fn meeting(&self, b: &WorldBox, mut found: impl FnMut(u32)) {
+        let meets = |id: u32| {
+            let other = &self.boxes[id as usize];
+            b.min.cmple(other.max).all() && other.min.cmple(b.max).all()
+        };
+        self.buckets(b, |bucket| {
+            let range = self.starts[bucket] as usize..self.starts[bucket + 1] as usize;
+            let entries = self.entries[range].iter().copied();
+            entries.filter(|id| meets(*id)).for_each(&mut found);
+        });
+    }
+
+    /// The bucket's number on an axis. Monotone in `x`, so a box's buckets lie
+    /// between those of its corners, whatever is rounded.
+    fn cell(&self, axis: usize, x: f64) -> usize {
+        let at = (x - self.low[axis]) * self.per_unit[axis];
+        // Below zero and NaN become 0.
+        (at as usize).min(self.count[axis] - 1)
+    }
+
+    fn buckets(&self, b: &WorldBox, mut found: impl FnMut(usize)) {
+        let from = [0, 1, 2].map(|k| self.cell(k, b.min[k]));
+        let to = [0, 1, 2].map(|k| self.cell(k, b.max[k]));
+        for z in from[2]..=to[2] {
+            for y in from[1]..=to[1] {
+                for x in from[0]..=to[0] {
+                    found((z * self.count[1] + y) * self.count[0] + x);
+                }
+            }
+        }
+    }
+}
+
+/// Whether closed boxes cover a box wholly. Exact; O(pieces * boxes), meant for few.
+pub fn covers(by: &[WorldBox], b: &WorldBox) -> bool {
+    let mut open = vec![(*b, 0)];
+    while let Some((piece, first)) = open.pop() {
+        let meets = |o: &WorldBox| piece.min.cmple(o.max).all() && o.min.cmple(piece.max).all();
+        let rest = by[first..].iter();
+        let Some(hit) = rest.zip(first..).find(|(o, _)| meets(o)) else {
+            return false;
+        };
+        let (cut, next) = (hit.0, hit.1 + 1);
+        let mut left = piece;
+        for axis in 0..3 {
+            if left.min[axis] < cut.min[axis] {
+                let mut below = left;
+                below.max[axis] = cut.min[axis];
+                left.min[axis] = cut.min[axis];
+                open.push((below, next));
+            }
+            if left.max[axis] > cut.max[axis] {
+                let mut above = left;
+                above.min[axis] = cut.max[axis];
+                left.max[axis] = cut.max[axis];
+                open.push((above, next));
+            }
+        }
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::SeededRng;
+
+    fn random(rng: &mut SeededRng, edge: f64) -> WorldBox {
+        let at = DVec3::new(rng.unit(), rng.unit(), rng.unit() * 0.1) * 100.0;
+        WorldBox::new(
+            at,
+            at + DVec3::new(rng.unit(), rng.unit(), rng.unit()) * edge,
+        )
+    }
+
+    #[test]
+    fn the_grid_finds_what_a_look_at_each_box_finds() {
+        let mut rng = SeededRng::new(5);
+        let boxes: Vec<WorldBox> = (0..300).map(|_| random(&mut rng, 20.0)).collect();
+        let grid = BoxGrid::new(boxes.clone());
+        for _ in 0..300 {
+            let b = random(&mut rng, 5.0);
+            let mut found = Vec::new();
+            grid.meeting(&b, |id| found.push(id));
+            found.sort_unstable();
+            found.dedup();
+            let meets = |o: &WorldBox| b.min.cmple(o.max).all() && o.min.cmple(b.max).all();
+            let wanted = (0..).zip(&boxes).filter(|(_, o)| meets(o));
+            assert_eq!(found, wanted.map(|(id, _)| id).collect::<Vec<u32>>());
+        }
+        assert!(BoxGrid::new(Vec::new()).boxes().is_empty());
+    }
+
+    #[test]
+    fn covering_is_exact() {
+        let part =
+            |a: f64, b: f64| WorldBox::new(DVec3::splat(0.0).with_x(a), DVec3::ONE.with_x(b));
+        assert!(covers(&[part(0.0, 0.5), part(0.5, 1.0)], &part(0.1, 0.9)));
+        let gap = 0.5f64.next_up().next_up();
+        assert!(!covers(&[part(0.0, 0.5), part(gap, 1.0)], &part(0.1, 0.9)));
+        assert!(!covers(&[part(0.0, 0.5)], &part(0.1, 0.9)));
+        assert!(!covers(&[], &part(0.1, 0.9)));
+    }
+}

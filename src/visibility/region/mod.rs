@@ -1,0 +1,35 @@
+//! The region stage: which rooms, sectors or cells of a scene can be seen at all,
+//! and so which items.
+//!
+//! A [`RegionGraph`] is what is searched: regions and the openings between them, made
+//! from a tiling of rooms, a Doom map, or a grid over the free space of any box scene.
+//! The back ends are one file each; all answer "from this camera", some also "from
+//! anywhere in this region".
+//!
+//! What is seen is defined by regions and openings alone: a line of sight leaves a
+//! region through an opening, and everything else on a region's border is opaque.
+//! Doors are open. Lines that only touch an edge of an opening see nothing; all back
+//! ends but the exact ones list what they touch too.
+
+mod answer;
+mod flood;
+mod graph;
+mod locate;
+mod none;
+mod opening;
+pub mod portal_clip;
+pub mod portal_rect;
+mod view;
+mod walk;
+
+pub use answer::{EyePlace, Marks, RegionId, RegionRow, Scratch, decode};
+pub use flood::Flood;
+pub use graph::{Ground, NoRegions, RegionGraph};
+pub use locate::{BoxGrid, covers};
+pub use none::EveryRegion;
+pub use opening::{Opening, OpeningPlane, rectangle};
+pub use portal_clip::PortalClip;
+pub use portal_rect::PortalRect;
+pub use walk::{follow_boxes, seen_by_samples};
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,139 @@
+//! A portal: a flat, upright or level, rectangle that two regions share. It
+//! defines on which side of it a point lies; what is seen through it is left to the
+//! back ends.
+
+use glam::{DVec2, DVec3};
+
+use super::answer::RegionId;
+
+/// The plane of an opening and which side is its front.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[non_exhaustive]
+pub enum OpeningPlane {
+    /// Across an axis: the front has the larger coordinates.
+    Axis {
+        /// 0, 1 or 2.
+        axis: usize,
+        /// Where it is on the axis, world units.
+        at: f64,
+    },
+    /// Upright over the line from one point to another: the front is right of it.
+    Upright {
+        /// Where the line begins, seen from above.
+        from: DVec2,
+        /// Where it ends.
+        to: DVec2,
+    },
+    /// One face of an opening that has a thickness: passed in both directions.
+    Undirected,
+}
+
+/// An opening between two regions, in world coordinates.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Opening {
+    /// The region in front of it and the region behind it.
+    pub sides: [RegionId; 2],
+    /// The rectangle's corners, in turn; closed.
+    pub corners: [DVec3; 4],
+    /// Its plane.
+    pub plane: OpeningPlane,
+}
+
+/// What a sum of two products of rounded differences loses at most, relative to the
+/// products' sizes: (3 + 16 u) u with u = 2^-53 (Shewchuk 1997, "Adaptive precision
+/// floating-point arithmetic", section 4.2), rounded up.
+const TURN_BOUND: f64 = 4.0 / (1u64 << 53) as f64;
+
+impl Opening {
+    /// Which side of the plane a point is surely on: 1 in front, -1 behind, 0 on it,
+    /// or where rounding leaves it open.
+    pub fn side(&self, p: DVec3) -> i32 {
+        match self.plane {
+            OpeningPlane::Axis { axis, at } => sign(p[axis] - at),
+            OpeningPlane::Upright { from, to } => {
+                let p = p.truncate();
+                let (left, right) = ((from.x - p.x) * (to.y - p.y), (from.y - p.y) * (to.x - p.x));
+                // Above zero: the point is left of the line.
+                let left_of = left - right;
+                let bound = TURN_BOUND * (left.abs() + right.abs()) + f64::MIN_POSITIVE;
+                if left_of.abs() <= bound {
+                    return 0;
+                }
+                -sign(left_of)
+            }
+            OpeningPlane::Undirected => 0,
+        }
+    }
+
+    /// The region that a line of sight from `eye` enters through this opening out of
+    /// `region`; `None` if it can only leave the other way.
+    pub fn entered(&self, region: RegionId, eye: DVec3) -> Option<RegionId> {
+        let [front, behind] = self.sides;
+        let side = self.side(eye);
+        match (region == front, region == behind) {
+            (true, _) if side >= 0 => Some(behind),
+            (_, true) if side <= 0 => Some(front),
+            _ => None,
+        }
+    }
+
+    /// The other of its two regions.
+    pub fn other(&self, region: RegionId) -> RegionId {
+        let [front, behind] = self.sides;
+        if region == front { behind } else { front }
+    }
+}
+
+fn sign(x: f64) -> i32 {
+    i32::from(x > 0.0) - i32::from(x < 0.0)
+}
+
+/// The corners of a rectangle across an axis, in turn.
+pub fn rectangle(axis: usize, min: DVec3, max: DVec3) -> [DVec3; 4] {
+    let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
+    let corner = |high_j: bool, high_k: bool| {
+        let mut p = min;
+        p[j] = if high_j { max[j] } else { min[j] };
+        p[k] = if high_k { max[k] } else { min[k] };
+        p
+    };
+    [(false, false), (true, false), (true, true), (false, true)].map(|(a, b)| corner(a, b))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_opening_is_passed_away_from_the_eye() {
+        let (min, max) = (DVec3::new(4.0, 0.0, 0.0), DVec3::new(4.0, 1.0, 2.0));
+        let across = Opening {
+            sides: [7, 3],
+            corners: rectangle(0, min, max),
+            plane: OpeningPlane::Axis { axis: 0, at: 4.0 },
+        };
+        let upright = Opening {
+            plane: OpeningPlane::Upright {
+                from: DVec2::new(4.0, 0.0),
+                to: DVec2::new(4.0, 1.0),
+            },
+            ..across
+        };
+        for opening in [across, upright] {
+            let (high, low) = (DVec3::splat(9.0), DVec3::splat(-9.0));
+            assert_eq!(opening.entered(7, high), Some(3));
+            assert_eq!(opening.entered(3, high), None);
+            assert_eq!(opening.entered(3, low), Some(7));
+            assert_eq!(opening.entered(7, low), None);
+            assert_eq!(opening.entered(5, low), None);
+            // On the plane it is open to both.
+            assert_eq!(opening.entered(7, min), Some(3));
+            assert_eq!(opening.entered(3, min), Some(7));
+        }
+        let ring = across.corners;
+        for i in 0..4 {
+            let edge = ring[(i + 1) % 4] - ring[i];
+            assert_eq!(edge.to_array().iter().filter(|e| **e != 0.0).count(), 1);
+        }
+    }
+}

@@ -1,0 +1,97 @@
+use std::sync::Arc;
+
+use super::super::*;
+use super::worlds::*;
+use crate::scene::SeededRng;
+use crate::visibility::Rays;
+
+pub fn rows(graph: &Arc<RegionGraph>) -> Vec<Box<dyn RegionRow>> {
+    vec![
+        Box::new(EveryRegion(graph.clone())),
+        Box::new(Flood(graph.clone())),
+        Box::new(PortalRect(graph.clone())),
+        Box::new(PortalClip(graph.clone())),
+    ]
+}
+
+/// Regions that random rays of the camera pass.
+fn sampled(graph: &RegionGraph, rays: &Rays, count: usize, rng: &mut SeededRng) -> Vec<u32> {
+    let mut seen = Marks::default();
+    seen.clear(graph.len());
+    for _ in 0..count {
+        let ray = rays.through(rng.unit(), rng.unit());
+        graph.ground().follow(graph, &ray, &mut seen);
+    }
+    let mut out = Vec::new();
+    seen.list(&mut out);
+    out
+}
+
+/// How many regions that rays pass are missing in the row's answers.
+pub fn missing(row: &dyn RegionRow, truth: &RegionGraph, eyes: usize, seed: u64) -> usize {
+    let mut rng = SeededRng::new(seed);
+    let (mut scratch, mut out) = (Scratch::default(), Vec::new());
+    let mut missing = 0;
+    for _ in 0..eyes {
+        let rays = eye_in(truth, &mut rng);
+        let seen = sampled(truth, &rays, 500, &mut rng);
+        row.from_eye(&rays, &mut scratch, &mut out);
+        assert!(out.is_sorted());
+        missing += seen
+            .iter()
+            .filter(|r| out.binary_search(r).is_err())
+            .count();
+    }
+    missing
+}
+
+const WORLDS: [&str; 4] = [
+    "rooms:n=1600,seed=1",
+    "rooms:n=700,seed=2,storeys=2",
+    "rooms:n=3000,seed=3,storeys=8",
+    "rooms:n=2000,seed=4,storeys=1,room=3",
+];
+
+#[test]
+fn no_row_misses_a_region_that_a_ray_passes() {
+    for world in WORLDS {
+        let (_, graph) = rooms(world);
+        for row in rows(&graph) {
+            assert_eq!(missing(&*row, &graph, 60, 9), 0, "{world} {}", row.name());
+        }
+    }
+}
+
+#[test]
+fn a_forgotten_opening_is_noticed() {
+    let (_, graph) = rooms(WORLDS[0]);
+    for opening in [0, 20, 33] {
+        let wrong = Arc::new(graph.without_opening(opening));
+        let caught = rows(&wrong)
+            .iter()
+            .skip(1)
+            .filter(|row| missing(&***row, &graph, 800, 9) > 0)
+            .count();
+        // Flood may come by another way.
+        assert!(caught >= 2, "{opening}: {caught}");
+    }
+}
+
+#[test]
+fn each_row_lists_no_more_than_the_one_before() {
+    let mut rng = SeededRng::new(4);
+    let (_, graph) = rooms("rooms:n=5000,seed=3");
+    let (mut scratch, mut sums) = (Scratch::default(), [0; 4]);
+    for _ in 0..50 {
+        let rays = eye_in(&graph, &mut rng);
+        for (sum, row) in sums.iter_mut().zip(rows(&graph)) {
+            let mut out = Vec::new();
+            assert_eq!(
+                row.from_eye(&rays, &mut scratch, &mut out),
+                EyePlace::Inside
+            );
+            *sum += out.len();
+        }
+    }
+    assert!(sums.is_sorted_by(|a, b| a > b), "{sums:?}");
+}

@@ -1,0 +1,37 @@
+//! Small worlds and eyes in them.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::super::RegionGraph;
+use crate::camera::{Camera, Frame, Lens};
+use crate::scene::{self, Scene, SeededRng};
+use crate::visibility::Rays;
+
+pub fn rooms(spec: &str) -> (Scene, Arc<RegionGraph>) {
+    let scene = scene::load(spec, &Default::default()).unwrap();
+    let graph = RegionGraph::of_scene(&scene).unwrap();
+    (scene, Arc::new(graph))
+}
+
+/// A camera in a random region, its eye 1.7 above the floor where that is inside,
+/// looking about level.
+pub fn eye_in(graph: &RegionGraph, rng: &mut SeededRng) -> Rays {
+    let b = graph.parts(rng.below(graph.len()) as u32)[0];
+    let size = b.max - b.min;
+    let mut eye = b.min + size * DVec3::new(rng.unit(), rng.unit(), 0.5) * 0.999;
+    eye.z = (b.min.z + 1.7).min(b.max.z - 0.01);
+    looking(eye, rng)
+}
+
+pub fn looking(eye: DVec3, rng: &mut SeededRng) -> Rays {
+    let forward = DVec3::new(
+        rng.between(-1.0, 1.0),
+        rng.between(-1.0, 1.0),
+        rng.between(-0.2, 0.2),
+    );
+    let frame = Frame::looking_along(eye, forward, DVec3::Z).unwrap();
+    let lens = Lens::perspective(60.0, 16.0 / 9.0, 0.05, None).unwrap();
+    Rays::of(&Camera { frame, lens }).unwrap()
+}
