@@ -7,6 +7,7 @@ mod guarantee;
 mod level;
 pub mod meshes;
 pub mod occlusion;
+pub mod pick;
 mod rays;
 pub mod region;
 mod solids;

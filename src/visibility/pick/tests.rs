@@ -1,0 +1,331 @@
+//! Back ends against arithmetic on integers of any size, which shares nothing
+//! with theirs.
+
+use std::cmp::Ordering;
+
+use dashu_int::IBig;
+use glam::DVec3;
+
+use super::*;
+use crate::kernel::Kernel;
+use crate::query::ItemId;
+use crate::scene::{Scene, SeededRng, WorldBox, load};
+use crate::visibility::{Guarantee, Ray, Solids};
+
+/// In units of 2^-1100: every f64 is an integer.
+fn exact(x: f64) -> IBig {
+    let bits = x.to_bits();
+    let (exponent, fraction) = (bits >> 52 & 0x7ff, bits & ((1 << 52) - 1));
+    let (mantissa, power) = match exponent {
+        0 => (fraction, -1074),
+        _ => (fraction | 1 << 52, exponent as i64 - 1075),
+    };
+    let size = IBig::from(mantissa) << (power + 1100) as usize;
+    if x < 0.0 { -size } else { size }
+}
+
+/// A depth as a fraction with a denominator above zero.
+#[derive(Clone, PartialEq, Eq)]
+struct Depth(IBig, IBig);
+
+impl Depth {
+    fn order(&self, other: &Depth) -> Ordering {
+        (&self.0 * &other.1).cmp(&(&other.0 * &self.1))
+    }
+
+    fn number(x: f64) -> Depth {
+        Depth(exact(x), IBig::from(1) << 1100)
+    }
+}
+
+/// Where the judge says that a ray enters a box.
+fn judged(ray: &Ray, b: &WorldBox) -> Option<Depth> {
+    let (mut enters, mut leaves): (Option<Depth>, Option<Depth>) = (None, None);
+    for axis in 0..3 {
+        let (at, along) = (exact(ray.origin[axis]), exact(ray.direction[axis]));
+        let (mut low, mut high) = (exact(b.min[axis]) - &at, exact(b.max[axis]) - &at);
+        if along == IBig::ZERO {
+            if low > IBig::ZERO || high < IBig::ZERO {
+                return None;
+            }
+            continue;
+        }
+        let mut size = along;
+        if size < IBig::ZERO {
+            (low, high, size) = (-high, -low, -size);
+        }
+        let (low, high) = (Depth(low, size.clone()), Depth(high, size));
+        if enters
+            .as_ref()
+            .is_none_or(|enters| low.order(enters).is_gt())
+        {
+            enters = Some(low);
+        }
+        if leaves
+            .as_ref()
+            .is_none_or(|leaves| high.order(leaves).is_lt())
+        {
+            leaves = Some(high);
+        }
+    }
+    let (enters, leaves) = (enters?, leaves?);
+    let early = enters.order(&Depth::number(ray.near)).is_lt();
+    let late = ray.far.is_finite() && enters.order(&Depth::number(ray.far)).is_gt();
+    (enters.order(&leaves).is_le() && !early && !late).then_some(enters)
+}
+
+/// All items that the ray meets, by depth and id.
+fn all_judged(ray: &Ray, solids: &Solids) -> Vec<(Depth, ItemId)> {
+    let boxes = solids.boxes.iter().zip(0..);
+    let mut met: Vec<_> = boxes
+        .filter_map(|(b, id)| judged(ray, b).map(|depth| (depth, id)))
+        .collect();
+    met.sort_by(|a, b| a.0.order(&b.0).then(a.1.cmp(&b.1)));
+    met
+}
+
+fn solids(boxes: &[WorldBox]) -> Solids {
+    Solids::of(&Scene::from_boxes("test", boxes).unwrap())
+}
+
+/// Boxes between grid points, many of them alike, flat or touching; rays from
+/// grid points through others.
+struct Worlds {
+    rng: SeededRng,
+    /// A unit of the grid, and where its zero is.
+    unit: f64,
+    zero: DVec3,
+}
+
+impl Worlds {
+    fn new(seed: u64, unit: f64, zero: DVec3) -> Worlds {
+        let rng = SeededRng::new(seed);
+        Worlds { rng, unit, zero }
+    }
+
+    fn whole(&mut self, low: i32, high: i32) -> f64 {
+        f64::from(low) + self.rng.below((high - low + 1) as usize) as f64
+    }
+
+    fn boxes(&mut self, count: usize) -> Solids {
+        let mut boxes = Vec::new();
+        for _ in 0..count {
+            let low = [(); 3].map(|()| self.whole(0, 9));
+            let size = [(); 3].map(|()| self.whole(0, 3));
+            let (low, size) = (DVec3::from(low), DVec3::from(size));
+            let at = |corner: DVec3| self.zero + corner * self.unit;
+            boxes.push(WorldBox::new(at(low), at(low + size)));
+        }
+        solids(&boxes)
+    }
+
+    fn ray(&mut self) -> Ray {
+        let origin = DVec3::from([(); 3].map(|()| self.whole(-3, 12)));
+        let mut direction = DVec3::ZERO;
+        while direction == DVec3::ZERO {
+            direction = DVec3::from([(); 3].map(|()| self.whole(1, 10))) - origin;
+        }
+        let far = [f64::INFINITY, 2.0, 5.0][self.rng.below(3)];
+        Ray {
+            origin: self.zero + origin * self.unit,
+            direction: direction * [1.0, 1.0 / 3.0][self.rng.below(2)],
+            near: self.whole(-1, 2) * self.unit,
+            far: far * self.unit,
+        }
+    }
+}
+
+/// The grids that worlds are made on: integers, numbers that no f32 holds, and
+/// integers far from zero.
+fn grids(seed: u64) -> [Worlds; 3] {
+    [
+        Worlds::new(seed, 1.0, DVec3::ZERO),
+        Worlds::new(seed + 1, 0.1, DVec3::new(0.05, -0.3, 0.0)),
+        Worlds::new(seed + 2, 1.0, DVec3::new(1e7, -3e9, 0.5)),
+    ]
+}
+
+/// Asks of the first hit and of the nearest few; returns how many answers of
+/// how many differ from the judge's.
+fn differing(
+    first: impl Fn(&Ray) -> Option<Hit>,
+    nearest: impl Fn(&Ray, usize, &mut Vec<Hit>),
+    ray: &Ray,
+    truth: &[(Depth, ItemId)],
+) -> usize {
+    let mut wrong = 0;
+    let found = first(ray).map(|hit| hit.item);
+    wrong += usize::from(found != truth.first().map(|met| met.1));
+    let mut hits = vec![Hit {
+        item: 7,
+        depth: 0.0,
+    }];
+    for count in [0, 1, 2, 5] {
+        nearest(ray, count, &mut hits);
+        let kept = match count.checked_sub(1).map(|last| truth.get(last)) {
+            None => 0,
+            Some(None) => truth.len(),
+            Some(Some(last)) => truth.partition_point(|met| met.0.order(&last.0).is_le()),
+        };
+        let items = hits.iter().map(|hit| hit.item);
+        wrong += usize::from(!items.eq(truth[..kept].iter().map(|met| met.1)));
+    }
+    wrong
+}
+
+#[test]
+fn exact_back_ends_answer_as_arithmetic_on_integers_does() {
+    let (mut met, mut ties) = (0, 0);
+    for mut worlds in grids(11) {
+        for count in [0, 1, 5, 40, 200] {
+            let solids = worlds.boxes(count);
+            let built: Vec<_> = BACK_ENDS
+                .iter()
+                .filter(|row| row.about.guarantee == Guarantee::Exact)
+                .collect();
+            assert!(built.len() >= 2);
+            let built: Vec<_> = built
+                .iter()
+                .map(|row| (row.build)(&solids).unwrap())
+                .collect();
+            let wide = WideRay::of(&solids).unwrap();
+            for _ in 0..if count > 100 { 60 } else { 120 } {
+                let ray = worlds.ray();
+                let truth = all_judged(&ray, &solids);
+                met += usize::from(!truth.is_empty());
+                let tied = |pair: &[(Depth, ItemId)]| pair[0].0.order(&pair[1].0).is_eq();
+                ties += usize::from(truth.windows(2).take(1).any(tied));
+                for back_end in &built {
+                    let first = |ray: &Ray| back_end.first(ray);
+                    let nearest =
+                        |ray: &Ray, count, hits: &mut Vec<Hit>| back_end.nearest(ray, count, hits);
+                    let wrong = differing(first, nearest, &ray, &truth);
+                    assert_eq!(wrong, 0, "{} {ray:?}", back_end.about().name);
+                }
+                for kernel in Kernel::available() {
+                    let first = |ray: &Ray| wide.first_by(kernel, ray);
+                    let nearest = |ray: &Ray, count, hits: &mut Vec<Hit>| {
+                        wide.nearest_by(kernel, ray, count, hits);
+                    };
+                    assert_eq!(
+                        differing(first, nearest, &ray, &truth),
+                        0,
+                        "{kernel} {ray:?}"
+                    );
+                }
+            }
+        }
+    }
+    assert!(
+        met > 300 && ties > 40,
+        "the premise: {met} rays meet something, {ties} ties"
+    );
+}
+
+/// What declares nothing may differ where depths are equal or rounded, but not
+/// in the open: on rays and boxes without any grid the answers are the same.
+#[test]
+fn back_ends_in_f32_differ_on_ties_and_agree_elsewhere() {
+    let unproven = BACK_ENDS
+        .iter()
+        .filter(|row| row.about.guarantee != Guarantee::Exact);
+    for row in unproven {
+        let (mut on_grids, mut asked) = (0, 0);
+        for mut worlds in grids(77) {
+            let solids = worlds.boxes(40);
+            let back_end = (row.build)(&solids).unwrap();
+            for _ in 0..150 {
+                let ray = worlds.ray();
+                let truth = all_judged(&ray, &solids);
+                let first = back_end.first(&ray).map(|hit| hit.item);
+                on_grids += usize::from(first != truth.first().map(|met| met.1));
+                asked += 1;
+            }
+        }
+        println!(
+            "{}: {on_grids} of {asked} first hits on grids differ",
+            row.about.name
+        );
+        let mut rng = SeededRng::new(5);
+        let mut random = |_| WorldBox::around(rng.point() * 100.0, rng.point() * 8.0);
+        let solids = solids(&(0..300).map(&mut random).collect::<Vec<_>>());
+        let (back_end, reference) = ((row.build)(&solids).unwrap(), Linear::of(&solids));
+        let (mut hits, mut truth) = (Vec::new(), Vec::new());
+        let mut met = 0;
+        for _ in 0..300 {
+            let ray = Ray {
+                origin: rng.point() * 20.0,
+                direction: DVec3::splat(50.0) - rng.point() * 20.0,
+                near: 0.5,
+                far: 200.0,
+            };
+            let (found, wanted) = (back_end.first(&ray), reference.first(&ray));
+            let item = |hit: Option<Hit>| hit.map(|hit| hit.item);
+            assert_eq!(item(found), item(wanted), "{} {ray:?}", row.about.name);
+            met += usize::from(wanted.is_some());
+            if let (Some(found), Some(wanted)) = (found, wanted) {
+                assert!((found.depth - wanted.depth).abs() < 1e-3 * wanted.depth.max(1.0));
+            }
+            back_end.nearest(&ray, 4, &mut hits);
+            reference.nearest(&ray, 4, &mut truth);
+            assert!(hits.iter().map(|h| h.item).eq(truth.iter().map(|h| h.item)));
+        }
+        assert!(met > 100, "the premise: {met}");
+    }
+}
+
+/// Directions that hardly move along an axis, or not at all, and rays that the
+/// bounds in f32 do not cover.
+#[test]
+fn rays_along_faces_and_beyond_the_analysis_are_exact_too() {
+    let mut worlds = Worlds::new(3, 1.0, DVec3::ZERO);
+    let solids = worlds.boxes(150);
+    let wide = WideRay::of(&solids).unwrap();
+    let sizes = [
+        0.0, 1e-300, 1e-30, -1e-26, 6e-17, -6e-17, 1e-9, 0.2, -1.0, 1.0, 3000.0,
+    ];
+    let mut met = 0;
+    for _ in 0..1500 {
+        let mut ray = worlds.ray();
+        let pick = |worlds: &mut Worlds| sizes[worlds.rng.below(sizes.len())];
+        ray.direction = DVec3::from([(); 3].map(|()| pick(&mut worlds)));
+        ray.origin *= [1.0, 1.0, -1e12][worlds.rng.below(3)];
+        let truth = all_judged(&ray, &solids);
+        met += usize::from(!truth.is_empty());
+        for kernel in Kernel::available() {
+            let first = |ray: &Ray| wide.first_by(kernel, ray);
+            let nearest =
+                |ray: &Ray, count, hits: &mut Vec<Hit>| wide.nearest_by(kernel, ray, count, hits);
+            assert_eq!(
+                differing(first, nearest, &ray, &truth),
+                0,
+                "{kernel} {ray:?}"
+            );
+        }
+    }
+    assert!(met > 200, "the premise: {met}");
+}
+
+#[test]
+fn in_scenes_the_wide_tree_finds_what_the_reference_finds() {
+    for name in ["city:n=2000", "rooms:n=2000", "forest:n=2000", "helsinki"] {
+        let scene = load(name, &Default::default()).unwrap();
+        let bounds = scene.world_bounds();
+        let solids = Solids::of(&scene);
+        let (wide, reference) = (WideRay::of(&solids).unwrap(), Linear::of(&solids));
+        let mut rng = SeededRng::new(9);
+        let (mut hits, mut truth) = (Vec::new(), Vec::new());
+        for _ in 0..100 {
+            let ray = Ray {
+                origin: bounds.min + (bounds.max - bounds.min) * rng.point(),
+                direction: rng.normal3(),
+                near: 0.1,
+                far: f64::INFINITY,
+            };
+            assert_eq!(wide.first(&ray), reference.first(&ray), "{name} {ray:?}");
+            wide.nearest(&ray, 3, &mut hits);
+            reference.nearest(&ray, 3, &mut truth);
+            assert_eq!(hits, truth, "{name} {ray:?}");
+        }
+    }
+}

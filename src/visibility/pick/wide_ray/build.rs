@@ -1,0 +1,259 @@
+//! How the sixteen-wide tree is made: from the root down, each node's set cut by
+//! the surface area heuristic (Wald 2007, "On fast construction of SAH-based
+//! bounding volume hierarchies", 16 bins an axis) until it has sixteen parts.
+
+use std::ops::Range;
+
+use glam::Vec3;
+
+use super::slabs::Rows;
+use crate::geometry::Aabb;
+use crate::kernel::LANES;
+use crate::query::ItemId;
+
+const BINS: usize = 16;
+
+/// Sixteen boxes: items in the first lanes, nodes in those behind.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(super) struct Node {
+    pub rows: Rows,
+    /// Places of items in tree order, numbers of nodes; of unused lanes any.
+    pub children: [u32; LANES],
+    /// How many lanes hold items.
+    pub items: u32,
+}
+
+const EMPTY: Node = Node {
+    rows: {
+        let (low, high) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
+        [low, low, low, high, high, high]
+    },
+    children: [0; LANES],
+    items: 0,
+};
+
+impl Node {
+    fn set(&mut self, lane: usize, b: &Aabb, child: u32) {
+        for axis in 0..3 {
+            self.rows[axis][lane] = b.min[axis];
+            self.rows[axis + 3][lane] = b.max[axis];
+        }
+        self.children[lane] = child;
+    }
+}
+
+/// An item while the tree is built.
+#[derive(Clone, Copy)]
+struct Item {
+    bounds: Aabb,
+    id: ItemId,
+}
+
+/// A part of the items and its bounds.
+#[derive(Clone)]
+struct Part {
+    range: Range<usize>,
+    bounds: Aabb,
+}
+
+impl Part {
+    fn of(items: &[Item], range: Range<usize>) -> Part {
+        Part {
+            bounds: Aabb::union_of(items[range.clone()].iter().map(|item| &item.bounds)),
+            range,
+        }
+    }
+
+    fn len(&self) -> usize {
+        self.range.len()
+    }
+}
+
+fn half_area(b: &Aabb) -> f32 {
+    let e = b.extent();
+    e.x * e.y + e.y * e.z + e.z * e.x
+}
+
+/// Nodes, the root first, and the ids of the items in tree order. O(n log n).
+pub(super) fn build(boxes: &[Aabb]) -> (Vec<Node>, Vec<ItemId>) {
+    let item = |(id, &bounds): (usize, &Aabb)| Item {
+        bounds,
+        id: id as ItemId,
+    };
+    let mut items: Vec<Item> = boxes.iter().enumerate().map(item).collect();
+    let mut nodes = Vec::with_capacity(boxes.len() / 8 + 1);
+    // Where the number of the node is to be written.
+    let mut open: Vec<(Part, Option<(usize, usize)>)> = Vec::new();
+    if !items.is_empty() {
+        open.push((Part::of(&items, 0..items.len()), None));
+    }
+    while let Some((part, above)) = open.pop() {
+        let at = nodes.len();
+        if let Some((node, lane)) = above {
+            let node: &mut Node = &mut nodes[node];
+            node.children[lane] = at as u32;
+        }
+        let mut parts = cut(&mut items, part);
+        parts.sort_by_key(|part| part.len() > 1);
+        let mut node = EMPTY;
+        node.items = parts.iter().filter(|part| part.len() == 1).count() as u32;
+        for (lane, part) in parts.iter().enumerate() {
+            node.set(lane, &part.bounds, part.range.start as u32);
+        }
+        nodes.push(node);
+        let single = node.items as usize;
+        for (lane, part) in parts.into_iter().enumerate().skip(single).rev() {
+            open.push((part, Some((at, lane))));
+        }
+    }
+    (nodes, items.iter().map(|item| item.id).collect())
+}
+
+/// Cuts a set into at most sixteen parts: the one with the largest surface
+/// first, as long as there is one that does not fit a node; then small ones into
+/// single items, as many as there are lanes left for.
+fn cut(items: &mut [Item], part: Part) -> Vec<Part> {
+    let mut parts = vec![part];
+    while parts.len() < LANES {
+        let wide = (0..parts.len()).filter(|&i| parts[i].len() > LANES);
+        let largest = wide.max_by(|&a, &b| {
+            let area = |i: usize| half_area(&parts[i].bounds);
+            area(a).total_cmp(&area(b))
+        });
+        let Some(largest) = largest else {
+            break;
+        };
+        let part = parts.swap_remove(largest);
+        let middle = part.range.start + halve(&mut items[part.range.clone()]);
+        parts.push(Part::of(items, part.range.start..middle));
+        parts.push(Part::of(items, middle..part.range.end));
+    }
+    loop {
+        let left = LANES - parts.len();
+        let fits = (0..parts.len()).filter(|&i| (2..=left + 1).contains(&parts[i].len()));
+        let Some(smallest) = fits.min_by_key(|&i| parts[i].len()) else {
+            break;
+        };
+        let part = parts.swap_remove(smallest);
+        parts.extend(part.range.map(|i| Part::of(items, i..i + 1)));
+    }
+    parts
+}
+
+/// Orders a set so that its first part, whose length is returned, is one side of
+/// the cheapest cut between bins; by halves where no cut parts the centres.
+fn halve(items: &mut [Item]) -> usize {
+    let centres = items.iter().map(|item| item.bounds.centre());
+    let (low, high) = centres.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), c| {
+        (low.min(c), high.max(c))
+    });
+    let scale = BINS as f32 / (high - low);
+    let bin = |item: &Item, axis: usize| {
+        let along = (item.bounds.centre()[axis] - low[axis]) * scale[axis];
+        (along as usize).min(BINS - 1)
+    };
+    let mut best: Option<(f32, usize, usize)> = None;
+    for axis in (0..3).filter(|&axis| scale[axis].is_finite()) {
+        let mut bins = [(Aabb::EMPTY, 0usize); BINS];
+        for item in items.iter() {
+            let bin = &mut bins[bin(item, axis)];
+            *bin = (bin.0.union(&item.bounds), bin.1 + 1);
+        }
+        // What lies above each cut.
+        let mut above = [(Aabb::EMPTY, 0); BINS];
+        for i in (1..BINS).rev() {
+            let rest = above.get(i).copied().unwrap_or((Aabb::EMPTY, 0));
+            above[i - 1] = (rest.0.union(&bins[i].0), rest.1 + bins[i].1);
+        }
+        let mut below = (Aabb::EMPTY, 0);
+        for i in 0..BINS - 1 {
+            below = (below.0.union(&bins[i].0), below.1 + bins[i].1);
+            let cost =
+                half_area(&below.0) * below.1 as f32 + half_area(&above[i].0) * above[i].1 as f32;
+            let parts = below.1 > 0 && above[i].1 > 0;
+            if parts && cost.is_finite() && best.is_none_or(|best| cost < best.0) {
+                best = Some((cost, axis, i));
+            }
+        }
+    }
+    let Some((_, axis, last)) = best else {
+        return items.len() / 2;
+    };
+    let mut first = 0;
+    for i in 0..items.len() {
+        if bin(&items[i], axis) <= last {
+            items.swap(first, i);
+            first += 1;
+        }
+    }
+    first
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::SeededRng;
+
+    fn check(boxes: &[Aabb]) -> usize {
+        let (nodes, ids) = build(boxes);
+        let mut sorted = ids.clone();
+        sorted.sort_unstable();
+        assert!(sorted.iter().copied().eq(0..boxes.len() as u32));
+        let mut found = vec![0; boxes.len()];
+        let mut reached = vec![0; nodes.len()];
+        for node in &nodes {
+            for lane in 0..LANES {
+                let bound = |row: usize| node.rows[row][lane];
+                let b = Aabb::new(
+                    Vec3::new(bound(0), bound(1), bound(2)),
+                    Vec3::new(bound(3), bound(4), bound(5)),
+                );
+                let child = node.children[lane] as usize;
+                if b.is_empty() {
+                    continue;
+                }
+                if lane < node.items as usize {
+                    assert_eq!(b, boxes[ids[child] as usize]);
+                    found[child] += 1;
+                } else {
+                    reached[child] += 1;
+                    let below = &nodes[child].rows;
+                    for axis in 0..3 {
+                        let low = below[axis].iter().fold(f32::INFINITY, |a, &b| a.min(b));
+                        let high = below[axis + 3].iter();
+                        let high = high.fold(f32::NEG_INFINITY, |a, &b| a.max(b));
+                        assert_eq!((low, high), (b.min[axis], b.max[axis]));
+                    }
+                }
+            }
+        }
+        assert!(found.iter().all(|&n| n == 1));
+        assert!(reached.iter().skip(1).all(|&n| n == 1), "each node once");
+        nodes.len()
+    }
+
+    #[test]
+    fn every_item_is_in_one_lane_within_the_bounds_above_it() {
+        let mut rng = SeededRng::new(3);
+        for n in [0, 1, 2, 15, 16, 17, 40, 300, 5000] {
+            let mut random = |_| {
+                let at = (rng.point() * 100.0).as_vec3();
+                Aabb::new(at, at + rng.point().as_vec3() * 3.0)
+            };
+            let boxes: Vec<Aabb> = (0..n).map(&mut random).collect();
+            let nodes = check(&boxes);
+            assert!(nodes <= 1 + n / 6, "{nodes} nodes for {n} items");
+        }
+    }
+
+    #[test]
+    fn stacks_and_rows_that_grow_are_built_too() {
+        check(&[Aabb::new(Vec3::ZERO, Vec3::ONE); 3000]);
+        let corner = |i: i32| Vec3::splat(1.05_f32.powi(i));
+        let growing: Vec<Aabb> = (-500..1700)
+            .map(|i| Aabb::new(Vec3::ZERO, corner(i)))
+            .collect();
+        check(&growing);
+    }
+}

@@ -1,0 +1,375 @@
+//! The sixteen-wide tree: sixteen slab tests at once, nearest children first.
+//! What the tests in f32 leave open is decided exactly, among the few items
+//! whose depths are within their slack of the first. This file owns the
+//! traversal.
+
+mod build;
+mod slabs;
+
+use glam::{DVec3, Vec3};
+
+use self::build::Node;
+use self::slabs::Slabs;
+use super::contract::{About, Hit, NotBuilt, Pick};
+use super::exactly;
+use crate::geometry::Aabb;
+use crate::index::Origin;
+use crate::kernel::{Isa, Kernel, LANES, LaneMask, Work};
+use crate::query::ItemId;
+use crate::scene::WorldBox;
+use crate::visibility::{Guarantee, Ray, Solids};
+
+/// As typed on the command line.
+pub const NAME: &str = "wide-ray";
+/// One line for tables and help.
+pub const SUMMARY: &str = "16-wide tree, sixteen slab tests at once, the last step exact";
+
+/// What it declares of itself.
+pub const ABOUT: About = About {
+    name: NAME,
+    summary: SUMMARY,
+    origin: Origin::Ours,
+    guarantee: Guarantee::Exact,
+};
+
+/// Most items: their places and numbers of nodes are u32.
+const MOST: usize = ItemId::MAX as usize - 1;
+
+/// Boxes under a tree of nodes of sixteen. Some 80 bytes of nodes, 48 of the
+/// boxes as they were written and 4 of id per item.
+#[derive(Clone, Debug)]
+pub struct WideRay {
+    nodes: Vec<Node>,
+    /// In tree order, as they were written.
+    boxes: Vec<WorldBox>,
+    ids: Vec<ItemId>,
+    /// Where the zero of the nodes is.
+    zero: DVec3,
+    /// Largest absolute local coordinate on each axis.
+    reach: Vec3,
+}
+
+impl WideRay {
+    /// Builds the tree. O(n log n).
+    ///
+    /// # Errors
+    /// More items than ids.
+    pub fn of(solids: &Solids) -> Result<WideRay, NotBuilt> {
+        let count = solids.outer.len();
+        if count > MOST {
+            return Err(NotBuilt::TooMany { count, most: MOST });
+        }
+        let (nodes, ids) = build::build(&solids.outer);
+        Ok(WideRay {
+            nodes,
+            boxes: ids.iter().map(|&id| solids.boxes[id as usize]).collect(),
+            ids,
+            zero: solids.origin,
+            reach: Aabb::union_of(&solids.outer).reach(),
+        })
+    }
+
+    /// [`Pick::first`] by an instruction set of one's choice.
+    #[inline]
+    pub fn first_by(&self, kernel: Kernel, ray: &Ray) -> Option<Hit> {
+        kernel.run(First { tree: self, ray })
+    }
+
+    /// [`Pick::nearest`] by an instruction set of one's choice.
+    pub fn nearest_by(&self, kernel: Kernel, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {
+        kernel.run(Nearest {
+            tree: self,
+            ray,
+            count,
+            hits,
+        });
+    }
+
+    fn place(&self, place: u32) -> (ItemId, &WorldBox) {
+        (self.ids[place as usize], &self.boxes[place as usize])
+    }
+
+    fn all(&self) -> impl Iterator<Item = (ItemId, &WorldBox)> {
+        self.ids.iter().copied().zip(&self.boxes)
+    }
+
+    /// Offers every item that the ray can meet no deeper than the candidates'
+    /// bound, near ones first as far as the tree tells.
+    #[inline(always)]
+    fn search<I: Isa, C: Candidates>(&self, isa: I, slabs: &Slabs, found: &mut C) {
+        let mut open = Open::new();
+        if self.nodes.is_empty() {
+            return;
+        }
+        let mut at = 0u32;
+        loop {
+            let node = &self.nodes[at as usize];
+            let tested = slabs.test(isa, &node.rows, found.bound());
+            let items = ((1u32 << node.items) - 1) as LaneMask;
+            let mut left = tested.lanes;
+            if left != 0 {
+                let less_entry = isa.to_array(tested.less_entry);
+                let mut here = left & items;
+                while here != 0 {
+                    let lane = here.trailing_zeros() as usize % LANES;
+                    here &= here - 1;
+                    let low = -less_entry[lane];
+                    if low <= found.bound()
+                        && let Some(bounds) = slabs.bounds(&node.rows, lane, low)
+                    {
+                        found.offer(bounds.low, bounds.high, node.children[lane]);
+                    }
+                }
+                left &= !items;
+                let first = open.len();
+                while left != 0 {
+                    let lane = left.trailing_zeros() as usize % LANES;
+                    left &= left - 1;
+                    open.push_sorted(first, -less_entry[lane], node.children[lane]);
+                }
+            }
+            loop {
+                match open.pop() {
+                    None => return,
+                    Some((low, next)) if low <= found.bound() => {
+                        at = next;
+                        break;
+                    }
+                    Some(_) => {}
+                }
+            }
+        }
+    }
+}
+
+/// What a search collects.
+trait Candidates {
+    /// Nothing deeper than this is wanted.
+    fn bound(&self) -> f32;
+    /// An item that can be met from `low` on, and is met at `high` or before if
+    /// that is finite.
+    fn offer(&mut self, low: f32, high: f32, place: u32);
+}
+
+/// Nodes kept without the heap.
+const NEAR: usize = 48;
+
+/// Nodes still to be visited, the nearest of each node's children last.
+struct Open {
+    near: [(f32, u32); NEAR],
+    used: usize,
+    /// What does not fit.
+    far: Vec<(f32, u32)>,
+}
+
+impl Open {
+    #[inline(always)]
+    fn new() -> Open {
+        Open {
+            near: [(0.0, 0); NEAR],
+            used: 0,
+            far: Vec::new(),
+        }
+    }
+
+    #[inline(always)]
+    fn len(&self) -> usize {
+        self.used
+    }
+
+    /// Adds a node to those from `first` on, which are sorted.
+    #[inline(always)]
+    fn push_sorted(&mut self, first: usize, low: f32, node: u32) {
+        if self.used == NEAR {
+            // Out of order, which costs time only.
+            self.far.push((low, node));
+            return;
+        }
+        let mut at = self.used;
+        self.used += 1;
+        while at > first && self.near[at - 1].0 < low {
+            self.near[at] = self.near[at - 1];
+            at -= 1;
+        }
+        self.near[at] = (low, node);
+    }
+
+    #[inline(always)]
+    fn pop(&mut self) -> Option<(f32, u32)> {
+        if let Some(last) = self.far.pop() {
+            return Some(last);
+        }
+        self.used = self.used.checked_sub(1)?;
+        Some(self.near[self.used % NEAR])
+    }
+}
+
+/// Candidates kept without the heap.
+const FEW: usize = 8;
+
+/// The candidates for the first hit.
+struct Foremost {
+    bound: f32,
+    few: [(f32, u32); FEW],
+    used: usize,
+    more: Vec<(f32, u32)>,
+}
+
+impl Foremost {
+    #[inline(always)]
+    fn within(&self) -> impl Iterator<Item = u32> {
+        let all = self.few[..self.used].iter().chain(&self.more);
+        all.filter(|(low, _)| *low <= self.bound)
+            .map(|&(_, place)| place)
+    }
+
+    #[cold]
+    fn make_room(&mut self) {
+        let mut kept = 0;
+        for i in 0..self.used {
+            if self.few[i].0 <= self.bound {
+                self.few[kept] = self.few[i];
+                kept += 1;
+            }
+        }
+        self.used = kept;
+        if kept == FEW {
+            self.more.extend(self.few);
+            self.used = 0;
+        }
+    }
+}
+
+impl Candidates for Foremost {
+    #[inline(always)]
+    fn bound(&self) -> f32 {
+        self.bound
+    }
+
+    #[inline(always)]
+    fn offer(&mut self, low: f32, high: f32, place: u32) {
+        if high < self.bound {
+            self.bound = high;
+        }
+        if self.used == FEW {
+            self.make_room();
+        }
+        self.few[self.used % FEW] = (low, place);
+        self.used += 1;
+    }
+}
+
+struct First<'a> {
+    tree: &'a WideRay,
+    ray: &'a Ray,
+}
+
+impl Work for First<'_> {
+    type Output = Option<Hit>;
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) -> Option<Hit> {
+        let First { tree, ray } = self;
+        let Some(slabs) = Slabs::of(ray, tree.zero, tree.reach) else {
+            return exactly::first(ray, tree.all());
+        };
+        let mut found = Foremost {
+            bound: slabs.far(),
+            few: [(0.0, 0); FEW],
+            used: 0,
+            more: Vec::new(),
+        };
+        tree.search(isa, &slabs, &mut found);
+        exactly::first(ray, found.within().map(|place| tree.place(place)))
+    }
+}
+
+/// The candidates for the first `count` hits.
+struct Several {
+    count: usize,
+    far: f32,
+    /// The lowest upper bounds of depths, sorted, at most `count`.
+    highs: Vec<f32>,
+    all: Vec<(f32, u32)>,
+}
+
+impl Candidates for Several {
+    #[inline(always)]
+    fn bound(&self) -> f32 {
+        match self.highs.len() == self.count {
+            true => self.highs[self.count - 1].min(self.far),
+            false => self.far,
+        }
+    }
+
+    #[inline(always)]
+    fn offer(&mut self, low: f32, high: f32, place: u32) {
+        self.all.push((low, place));
+        if high < self.bound() {
+            self.highs.truncate(self.count - 1);
+            let at = self.highs.partition_point(|&other| other <= high);
+            self.highs.insert(at, high);
+        }
+    }
+}
+
+struct Nearest<'a> {
+    tree: &'a WideRay,
+    ray: &'a Ray,
+    count: usize,
+    hits: &'a mut Vec<Hit>,
+}
+
+impl Work for Nearest<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) {
+        let Nearest {
+            tree,
+            ray,
+            count,
+            hits,
+        } = self;
+        let Some(slabs) = Slabs::of(ray, tree.zero, tree.reach) else {
+            return exactly::nearest(ray, count, tree.all(), hits);
+        };
+        if count == 0 {
+            return hits.clear();
+        }
+        let mut found = Several {
+            count,
+            far: slabs.far(),
+            highs: Vec::new(),
+            all: Vec::new(),
+        };
+        tree.search(isa, &slabs, &mut found);
+        let bound = found.bound();
+        let within = found.all.iter().filter(|(low, _)| *low <= bound);
+        let places = within.map(|&(_, place)| tree.place(place));
+        exactly::nearest(ray, count, places, hits);
+    }
+}
+
+/// Builds it for the table of back ends.
+pub(super) fn build(solids: &Solids) -> Result<Box<dyn Pick>, NotBuilt> {
+    Ok(Box::new(WideRay::of(solids)?))
+}
+
+impl Pick for WideRay {
+    fn about(&self) -> About {
+        ABOUT
+    }
+
+    fn first(&self, ray: &Ray) -> Option<Hit> {
+        self.first_by(Kernel::best(), ray)
+    }
+
+    fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {
+        self.nearest_by(Kernel::best(), ray, count, hits);
+    }
+
+    fn memory(&self) -> usize {
+        size_of_val(&self.nodes[..]) + size_of_val(&self.boxes[..]) + size_of_val(&self.ids[..])
+    }
+}

@@ -1,0 +1,185 @@
+//! A ray as the sixteen-fold slab tests take it: in f32, with numbers that bound
+//! its depths from both sides. It owns the error analysis.
+//!
+//! A box side `b` (f32, local) is crossed at `t = (s - o) / d`, where `s` is the
+//! true side, within 2^-23 `|b|` of `b` (the box was rounded outward by less than
+//! one unit in the last place), `o` the ray's origin, both about the zero of the
+//! tree, and `d` the component of the direction. Computed is
+//! `fl(fl(b * i) + c)` with `i` the f32 next to `1 / d` and `c` near `-o * i`,
+//! taken in f64. With u = 2^-24 the errors are at most, in units of `u * |i|`:
+//!
+//! - the inverse, `|b - o|` off by one part in 2^24: 1.01 (|b| + |o|)
+//! - the product: |b|
+//! - the sum: |b| + |o| + slack
+//! - the rounding of the box: 2 |b|
+//! - `o` and `c` in f64: far below 0.1 |o|
+//!
+//! together 5.01 |b| + 2.1 |o| and the rounding of the slack, which
+//! `6 R + 3 |o| + 2^-80` exceeds for all `|b| <= R` (2^-80 is above all that
+//! underflows). So `t` lies between the values that are computed with `c` less and
+//! plus this slack, rounded outward. What is computed for one box is monotone in
+//! its sides, so a node's bounds bound those of its items.
+//!
+//! An axis along which the ray moves by less than 2^-80 per unit of depth is
+//! taken as one with the inverse 2^64 and at least 2^44 of slack: all depths at
+//! which such a ray can meet a box are below 2^40 (one component of the direction
+//! is 1/4 or more and all lengths are at most 2^36), by which it moves less than
+//! 2^-40 along that axis. The origin lies between the sides of a box that such a
+//! ray meets (but for that), so the lower bound of entry comes out below -2^43
+//! and the upper one of exit above 2^43: neither rejects it. Where the upper bound
+//! of entry is not above the lower one of exit, which then is -2^40 or more, the
+//! origin is 2^-21 or more within both sides: that axis is crossed 2^59 before
+//! and behind, whichever way. Else the upper bound of entry says nothing.
+
+use glam::{DVec3, Vec3};
+
+use crate::arithmetic::rounding::round_up;
+use crate::kernel::{Isa, LANES, LaneMask};
+use crate::visibility::Ray;
+
+/// Largest coordinate for which the analysis holds.
+const MOST_REACH: f64 = (1u64 << 36) as f64;
+/// Components of a direction below this are taken as zero.
+const LEAST_ALONG: f64 = 1.0 / (1u128 << 80) as f64;
+/// The inverse of such a component.
+const INVERSE_OF_NONE: f32 = (1u128 << 64) as f32;
+/// The slack of such an axis, at least.
+const SLACK_OF_NONE: f64 = (1u64 << 44) as f64;
+
+/// Sixteen boxes as six rows: min x, y, z, then max x, y, z.
+pub(super) type Rows = [[f32; LANES]; 6];
+
+/// A ray's numbers for the slab test.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Slabs {
+    /// Which row is crossed first, and which last, on each axis.
+    first: [usize; 3],
+    last: [usize; 3],
+    inverse: [f32; 3],
+    /// `c` less and plus the slack.
+    low: [f32; 3],
+    high: [f32; 3],
+    /// Near and far, rounded down and up.
+    near: [f32; 2],
+    far: [f32; 2],
+}
+
+/// What the test of sixteen boxes found.
+pub(super) struct Tested<I: Isa> {
+    /// Those that the ray can meet.
+    pub lanes: LaneMask,
+    /// Less the least depth at which it can enter each.
+    pub less_entry: I::Floats,
+}
+
+/// Bounds of the depths of one box.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bounds {
+    /// It is entered at this depth or later.
+    pub low: f32,
+    /// And at this depth or earlier, if it is met for certain; else infinite.
+    pub high: f32,
+}
+
+impl Slabs {
+    /// `None` for a ray that the analysis does not cover.
+    #[inline(always)]
+    pub fn of(ray: &Ray, zero: DVec3, reach: Vec3) -> Option<Slabs> {
+        let start = ray.origin - zero;
+        let largest = ray.direction.abs().max_element();
+        // Written so that no NaN passes.
+        let covered = start.abs().max_element() <= MOST_REACH
+            && f64::from(reach.max_element()) <= MOST_REACH
+            && (0.25..=1024.0).contains(&largest)
+            && ray.near.is_finite()
+            && !ray.far.is_nan();
+        if !covered || start.is_nan() || ray.direction.is_nan() {
+            return None;
+        }
+        let mut slabs = Slabs {
+            first: [0, 1, 2],
+            last: [3, 4, 5],
+            inverse: [0.0; 3],
+            low: [0.0; 3],
+            high: [0.0; 3],
+            near: [-round_up(-ray.near), round_up(ray.near)],
+            far: [-round_up(-ray.far), round_up(ray.far)],
+        };
+        for axis in 0..3 {
+            let along = ray.direction[axis];
+            let moves = along.abs() >= LEAST_ALONG;
+            let inverse = if moves {
+                (1.0 / along) as f32
+            } else {
+                INVERSE_OF_NONE
+            };
+            if inverse < 0.0 {
+                slabs.first[axis] = axis + 3;
+                slabs.last[axis] = axis;
+            }
+            let i = f64::from(inverse);
+            let size = 6.0 * f64::from(reach[axis]) + 3.0 * start[axis].abs() + LEAST_ALONG;
+            let slack = size * i.abs() * (f64::from(f32::EPSILON) / 2.0);
+            let slack = if moves {
+                slack
+            } else {
+                slack.max(SLACK_OF_NONE)
+            };
+            let centre = -start[axis] * i;
+            slabs.inverse[axis] = inverse;
+            slabs.low[axis] = -round_up(slack - centre);
+            slabs.high[axis] = round_up(centre + slack);
+        }
+        Some(slabs)
+    }
+
+    /// The far plane, rounded up: nothing deeper is met.
+    #[inline(always)]
+    pub fn far(&self) -> f32 {
+        self.far[1]
+    }
+
+    /// The boxes that the ray can meet no deeper than `most`.
+    #[inline(always)]
+    pub fn test<I: Isa>(&self, isa: I, rows: &Rows, most: f32) -> Tested<I> {
+        let entry = |axis: usize| {
+            let sides = isa.load(&rows[self.first[axis] % 6]);
+            let product = isa.mul(sides, isa.splat(-self.inverse[axis]));
+            isa.add(product, isa.splat(-self.low[axis]))
+        };
+        let exit = |axis: usize| {
+            let sides = isa.load(&rows[self.last[axis] % 6]);
+            let product = isa.mul(sides, isa.splat(self.inverse[axis]));
+            isa.add(product, isa.splat(self.high[axis]))
+        };
+        let less_entry = isa.min(entry(0), isa.min(entry(1), entry(2)));
+        let exit = isa.min(isa.min(exit(0), exit(1)), isa.min(exit(2), isa.splat(most)));
+        let less_first = isa.min(less_entry, isa.splat(-self.near[0]));
+        Tested {
+            // A sum has the sign of the true one.
+            lanes: !isa.below_zero(isa.add(less_first, exit)),
+            less_entry,
+        }
+    }
+
+    /// The bounds of one lane that [`Slabs::test`] let pass, `low` being what it
+    /// found; `None` if it is entered before the near plane for certain.
+    #[inline(always)]
+    pub fn bounds(&self, rows: &Rows, lane: usize, low: f32) -> Option<Bounds> {
+        let at = |row: usize, axis: usize, c: &[f32; 3]| {
+            rows[row % 6][lane % LANES] * self.inverse[axis] + c[axis]
+        };
+        let entry = |axis: usize| at(self.first[axis], axis, &self.high);
+        let exit = |axis: usize| at(self.last[axis], axis, &self.low);
+        let high = entry(0).max(entry(1)).max(entry(2));
+        let leaves = exit(0).min(exit(1)).min(exit(2));
+        let mut high = if high <= leaves { high } else { f32::INFINITY };
+        if high < self.near[0] {
+            return None;
+        }
+        if low < self.near[1] || high > self.far[0] {
+            high = f32::INFINITY;
+        }
+        Some(Bounds { low, high })
+    }
+}
