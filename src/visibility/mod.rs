@@ -8,6 +8,7 @@ pub mod meshes;
 mod rays;
 mod solids;
 mod surface;
+pub mod triangle;
 
 pub use guarantee::Guarantee;
 pub use rays::{NoRays, Ray, Rays, SampleGrid};
