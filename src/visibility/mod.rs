@@ -12,6 +12,7 @@ mod rays;
 pub mod region;
 mod solids;
 mod surface;
+pub mod triangle;
 pub mod truth;
 
 pub use guarantee::Guarantee;

@@ -1,0 +1,148 @@
+//! A search for lost triangles: eyes next to the boundary of a cluster's cone, of
+//! flat, thin and far clusters. What a back end removes is held against the exact
+//! test.
+
+use std::sync::Arc;
+
+use glam::{DVec3, Vec3};
+
+use super::super::surface::{SurfaceKind, Surfaces};
+use super::clusters::Clusters;
+use super::contract::TriangleRow;
+use super::exact::{faces, normal};
+use super::eye::Eye;
+use super::selection::Selection;
+use super::view::View;
+use crate::kernel::Kernel;
+use crate::scene::SeededRng;
+
+named! {
+    /// Which eyes are tried.
+    #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+    #[non_exhaustive]
+    pub enum EyeKind {
+        /// Points that f32 holds: only the test itself rounds.
+        Single = "f32",
+        /// Any points of f64: the eye is rounded too.
+        Double = "f64",
+    }
+}
+
+/// What a search found.
+#[derive(Clone, PartialEq, Debug)]
+#[non_exhaustive]
+pub struct Audit {
+    /// Pairs of a cluster and an eye.
+    pub pairs: usize,
+    /// Pairs of which the back end removed a triangle.
+    pub rejected: usize,
+    /// Pairs of which it removed a triangle whose front the eye sees.
+    pub false_negatives: usize,
+    /// Eye and corners of the first of them.
+    pub witness: Option<(DVec3, [Vec3; 3])>,
+}
+
+/// Clusters of one world; each is tried with `EYES` eyes.
+const WORLD: usize = 16;
+const EYES: usize = 64;
+
+/// Tries at least so many pairs. The same ones for every back end and machine.
+pub fn audit(row: &TriangleRow, pairs: usize, seed: u64, eyes: EyeKind) -> Audit {
+    let mut rng = SeededRng::new(seed);
+    let mut found = Audit {
+        pairs: 0,
+        rejected: 0,
+        false_negatives: 0,
+        witness: None,
+    };
+    while found.pairs < pairs {
+        let mut surfaces = Surfaces::about(DVec3::ZERO);
+        for _ in 0..WORLD {
+            let (points, triangles) = patch(&mut rng);
+            surfaces.push(SurfaceKind::Opaque, false, &points, &triangles);
+        }
+        let clusters = Arc::new(Clusters::of(Arc::new(surfaces), 64));
+        let back_end = (row.build)(&clusters);
+        let all = Selection::all(&clusters);
+        for cluster in 0..clusters.len() {
+            for _ in 0..EYES {
+                let eye = boundary(&clusters, cluster, &mut rng);
+                let eye = match eyes {
+                    EyeKind::Single => eye.as_vec3().as_dvec3(),
+                    EyeKind::Double => eye,
+                };
+                let view = View::from_eye(Eye::local(eye));
+                let mut kept = all.clone();
+                back_end.cull(&view, Kernel::best(), &mut kept);
+                found.pairs += 1;
+                let removed = all.words()[cluster] & !kept.words()[cluster];
+                found.rejected += usize::from(removed != 0);
+                let lost = clusters
+                    .corners_of(cluster)
+                    .enumerate()
+                    .find(|(bit, corners)| removed >> bit & 1 == 1 && faces(&view.eye, *corners));
+                if let Some((_, corners)) = lost {
+                    found.false_negatives += 1;
+                    found.witness.get_or_insert((eye, corners));
+                }
+            }
+        }
+    }
+    found
+}
+
+/// A few triangles about a point: flat, bent or thin; near the zero or far from it.
+fn patch(rng: &mut SeededRng) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    let size = libm::exp2(rng.between(-8.0, 8.0));
+    let offset = match rng.below(3) {
+        0 => 0.0,
+        _ => size * libm::exp2(rng.between(0.0, 16.0)),
+    };
+    let centre = rng.normal3() * offset;
+    let (up, u) = (rng.normal3().normalize(), rng.normal3());
+    let u = up.cross(u).normalize();
+    let v = up.cross(u) * [1.0, 1.0, 1e-3, 1e-5][rng.below(4)];
+    let bend = [0.0, 0.0, 0.05, 0.5][rng.below(4)];
+    let count = 1 + rng.below(6);
+    // A fan about the centre.
+    let points = (0..=count + 1).map(|i| {
+        let angle = std::f64::consts::TAU * i as f64 / (count + 2) as f64;
+        let (sin, cos) = libm::sincos(angle);
+        let at = match i {
+            0 => DVec3::ZERO,
+            _ => u * cos + v * sin - up * (bend * rng.unit()),
+        };
+        (centre + at * size).as_vec3()
+    });
+    let points: Vec<Vec3> = points.collect();
+    let triangles = (1..=count as u32).map(|i| [0, i, i + 1]).collect();
+    (points, triangles)
+}
+
+/// An eye near the boundary: in the plane of a triangle but for some ulps, where the
+/// cone of the cluster touches that plane or anywhere.
+fn boundary(clusters: &Clusters, cluster: usize, rng: &mut SeededRng) -> DVec3 {
+    let triangles: Vec<[Vec3; 3]> = clusters.corners_of(cluster).collect();
+    let normals: Vec<DVec3> = triangles
+        .iter()
+        .map(|corners| normal(*corners).normalize_or_zero())
+        .collect();
+    let axis = normals.iter().sum::<DVec3>().normalize_or(DVec3::Z);
+    let chosen = rng.below(triangles.len());
+    let [a, b, c] = triangles[chosen].map(Vec3::as_dvec3);
+    let n = normals[chosen];
+    let size = (b - a).length().max((c - a).length());
+    let far = size * libm::exp2(rng.between(-6.0, 18.0));
+    let way = match rng.below(2) {
+        0 => (n * axis.dot(n) - axis).normalize_or((b - a).normalize_or(DVec3::X)),
+        _ => ((b - a) * rng.between(-1.0, 1.0) + (c - a) * rng.between(-1.0, 1.0))
+            .normalize_or(DVec3::X),
+    };
+    let mut eye = a + way * far;
+    // Some ulps of f32 or of f64 to either side.
+    let ulp = [f64::from(f32::EPSILON), f64::EPSILON][rng.below(2)];
+    for k in 0..3 {
+        eye[k] += (eye[k].abs() + far * 1e-3) * ulp * (rng.below(9) as f64 - 4.0) / 2.0;
+    }
+    eye
+}

@@ -1,0 +1,283 @@
+//! Clusters: at most 64 neighbouring triangles of one item, so that a word has a bit
+//! for each. Grown greedily over common edges, along the Morton curve (Kapoulkine's
+//! meshoptimizer grows meshlets in the same spirit). Deterministic.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use glam::{DVec3, Vec3};
+
+use super::super::surface::Surfaces;
+use super::exact::normal;
+use crate::geometry::Aabb;
+use crate::input::InputError;
+use crate::scene::Scene;
+
+/// Most triangles of a cluster: the bits of a word.
+pub const MOST_TRIANGLES: usize = 64;
+
+/// The triangles of surfaces in clusters. An item's clusters follow one another.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Clusters {
+    /// What they are of.
+    pub surfaces: Arc<Surfaces>,
+    /// Indices of triangles, cluster after cluster.
+    pub triangles: Vec<u32>,
+    /// Where each cluster begins in `triangles`; one more at the end.
+    pub starts: Vec<u32>,
+    /// The clusters of each item.
+    pub of_item: Vec<Range<u32>>,
+}
+
+impl Clusters {
+    /// Clusters of at most so many triangles, 1 to 64. O(t log t).
+    ///
+    /// # Panics
+    /// If the number is outside 1..=64.
+    pub fn of(surfaces: Arc<Surfaces>, most: usize) -> Clusters {
+        assert!((1..=MOST_TRIANGLES).contains(&most), "1 to 64 triangles");
+        let mut clusters = Clusters {
+            triangles: Vec::with_capacity(surfaces.triangles.len()),
+            starts: vec![0],
+            of_item: Vec::with_capacity(surfaces.items()),
+            surfaces: surfaces.clone(),
+        };
+        for item in 0..surfaces.items() {
+            let first = clusters.len() as u32;
+            grow(&surfaces, item, most, &mut clusters);
+            clusters.of_item.push(first..clusters.len() as u32);
+        }
+        clusters
+    }
+
+    /// How many clusters there are.
+    pub fn len(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    /// Whether there is no cluster.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Indices of the triangles of a cluster: bit `i` of its word is the `i`-th.
+    pub fn triangles_of(&self, cluster: usize) -> &[u32] {
+        &self.triangles[self.starts[cluster] as usize..self.starts[cluster + 1] as usize]
+    }
+
+    /// The corners of the triangles of a cluster, in the same order.
+    pub fn corners_of(&self, cluster: usize) -> impl Iterator<Item = [Vec3; 3]> {
+        let triangles = self.triangles_of(cluster).iter();
+        triangles.map(|&t| self.surfaces.corners(t))
+    }
+
+    /// One bit for each triangle of a cluster.
+    pub fn word(&self, cluster: usize) -> u64 {
+        match self.triangles_of(cluster).len() {
+            MOST_TRIANGLES => u64::MAX,
+            count => (1 << count) - 1,
+        }
+    }
+
+    /// Whether the triangles of a cluster are seen from both sides.
+    pub fn is_two_sided(&self, cluster: usize) -> bool {
+        let triangle = self.triangles_of(cluster)[0];
+        self.surfaces.two_sided[self.surfaces.item_of(triangle)]
+    }
+
+    /// The box of a cluster, scene-local.
+    pub fn bounds(&self, cluster: usize) -> Aabb {
+        let corners = self.corners_of(cluster).flatten();
+        corners.fold(Aabb::EMPTY, |all, p| {
+            Aabb::new(all.min.min(p), all.max.max(p))
+        })
+    }
+
+    /// The boxes of the clusters as a scene, one item each.
+    ///
+    /// # Errors
+    /// As [`Surfaces::scene`].
+    pub fn scene(&self, name: impl Into<String>) -> Result<Scene, InputError> {
+        let boxes = (0..self.len()).map(|cluster| self.bounds(cluster));
+        self.surfaces.boxes_as_scene(name, boxes)
+    }
+
+    fn close(&mut self) {
+        self.starts.push(self.triangles.len() as u32);
+    }
+}
+
+/// No neighbour across an edge.
+const NONE: u32 = u32::MAX;
+
+/// What growing needs to know of a triangle of an item.
+struct Node {
+    centre: DVec3,
+    /// Of unit length, or zero.
+    normal: DVec3,
+    neighbours: [u32; 3],
+    is_used: bool,
+}
+
+fn grow(surfaces: &Surfaces, item: usize, most: usize, out: &mut Clusters) {
+    let first = surfaces.of_item[item].start;
+    let mut nodes = nodes(surfaces, item);
+    let order = along_the_curve(&nodes, &surfaces.bounds(item));
+    let mut seeds = order.iter().copied().peekable();
+    let mut frontier: Vec<u32> = Vec::new();
+    loop {
+        while seeds
+            .next_if(|&seed| nodes[seed as usize].is_used)
+            .is_some()
+        {}
+        let Some(&seed) = seeds.peek() else { break };
+        frontier.clear();
+        let mut next = Some(seed);
+        let (mut centres, mut normals, mut count) = (DVec3::ZERO, DVec3::ZERO, 0);
+        while let Some(index) = next {
+            let node = &mut nodes[index as usize];
+            node.is_used = true;
+            centres += node.centre;
+            normals += node.normal;
+            count += 1;
+            out.triangles.push(first + index);
+            frontier.extend(node.neighbours.iter().filter(|&&n| n != NONE));
+            if count == most {
+                break;
+            }
+            frontier.retain(|&n| !nodes[n as usize].is_used);
+            let (centre, axis) = (centres / count as f64, normals.normalize_or_zero());
+            let cost = |index: u32| {
+                let node = &nodes[index as usize];
+                let free = |&&n: &&u32| n != NONE && !nodes[n as usize].is_used;
+                let free = node.neighbours.iter().filter(free).count();
+                // Near, turned alike, and rather those that would be left alone.
+                let turned = 1.5 - node.normal.dot(axis);
+                node.centre.distance_squared(centre) * turned * (2.0 + free as f64)
+            };
+            let costs = frontier.iter().map(|&index| (cost(index), index));
+            let best = costs.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            next = best.map(|(_, index)| index).or_else(|| {
+                // The piece is used up: on to the next along the curve.
+                while seeds
+                    .next_if(|&seed| nodes[seed as usize].is_used)
+                    .is_some()
+                {}
+                seeds.peek().copied()
+            });
+        }
+        out.close();
+    }
+}
+
+fn nodes(surfaces: &Surfaces, item: usize) -> Vec<Node> {
+    let mut nodes: Vec<Node> = surfaces
+        .of(item)
+        .map(|corners| Node {
+            centre: corners.map(Vec3::as_dvec3).iter().sum::<DVec3>() / 3.0,
+            normal: normal(corners).normalize_or_zero(),
+            neighbours: [NONE; 3],
+            is_used: false,
+        })
+        .collect();
+    let mut edges: Vec<(u64, u32)> = Vec::with_capacity(3 * nodes.len());
+    for (index, t) in surfaces.triangles[surfaces.range(item)].iter().enumerate() {
+        for k in 0..3 {
+            let (a, b) = (t[k], t[(k + 1) % 3]);
+            let key = u64::from(a.min(b)) << 32 | u64::from(a.max(b));
+            edges.push((key, (3 * index + k) as u32));
+        }
+    }
+    edges.sort_unstable();
+    // Where more than two meet, they are chained in pairs.
+    for run in edges.chunk_by(|a, b| a.0 == b.0) {
+        for pair in run.chunks_exact(2) {
+            let (a, b) = (pair[0].1 as usize, pair[1].1 as usize);
+            nodes[a / 3].neighbours[a % 3] = (b / 3) as u32;
+            nodes[b / 3].neighbours[b % 3] = (a / 3) as u32;
+        }
+    }
+    nodes
+}
+
+/// The triangles by the Morton code of their centres, 21 bits an axis.
+fn along_the_curve(nodes: &[Node], bounds: &Aabb) -> Vec<u32> {
+    let low = bounds.min.as_dvec3();
+    let edge = (bounds.max.as_dvec3() - low).max_element();
+    let scale = if edge > 0.0 { 2_097_151.0 / edge } else { 0.0 };
+    let spread = |x: f64| {
+        let mut x = x as u64 & 0x1F_FFFF;
+        x = (x | x << 32) & 0x001F_0000_0000_FFFF;
+        x = (x | x << 16) & 0x001F_0000_FF00_00FF;
+        x = (x | x << 8) & 0x100F_00F0_0F00_F00F;
+        x = (x | x << 4) & 0x10C3_0C30_C30C_30C3;
+        (x | x << 2) & 0x1249_2492_4924_9249
+    };
+    let mut keyed: Vec<(u64, u32)> = nodes
+        .iter()
+        .enumerate()
+        .map(|(index, node)| {
+            let [x, y, z] = ((node.centre - low) * scale).to_array().map(spread);
+            (x | y << 1 | z << 2, index as u32)
+        })
+        .collect();
+    keyed.sort_unstable();
+    keyed.into_iter().map(|(_, index)| index).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::meshes::MESHES;
+    use super::*;
+
+    #[test]
+    fn every_triangle_is_in_one_cluster_of_its_item() {
+        for mesh in MESHES {
+            let surfaces = Arc::new((mesh.build)(20_000, 3));
+            for most in [1, 17, 64] {
+                let clusters = Clusters::of(surfaces.clone(), most);
+                let mut seen = clusters.triangles.clone();
+                seen.sort_unstable();
+                assert!(seen.iter().copied().eq(0..surfaces.triangles.len() as u32));
+                for (item, range) in clusters.of_item.iter().enumerate() {
+                    for cluster in range.clone() {
+                        let own = clusters.triangles_of(cluster as usize);
+                        assert!((1..=most).contains(&own.len()));
+                        assert!(own.iter().all(|t| surfaces.of_item[item].contains(t)));
+                        let bits = clusters.word(cluster as usize).count_ones();
+                        assert_eq!(bits as usize, own.len());
+                    }
+                }
+                let again = Clusters::of(surfaces.clone(), most);
+                assert_eq!(clusters.triangles, again.triangles);
+                assert_eq!(clusters.starts, again.starts);
+            }
+        }
+    }
+
+    #[test]
+    fn clusters_are_full_and_small() {
+        let surfaces = Arc::new((super::super::super::meshes::Mesh::named("statue")
+            .unwrap()
+            .build)(50_000, 3));
+        let clusters = Clusters::of(surfaces.clone(), 64);
+        let least = surfaces.triangles.len() / 64;
+        assert!(
+            clusters.len() < least * 5 / 4,
+            "{} of {least}",
+            clusters.len()
+        );
+        let size = |b: Aabb| b.extent().max_element();
+        let whole = size(surfaces.bounds(0));
+        let mean = (0..clusters.len())
+            .map(|c| size(clusters.bounds(c)))
+            .sum::<f32>()
+            / clusters.len() as f32;
+        assert!(mean < whole * 0.1, "{mean} of {whole}");
+        assert_eq!(
+            clusters.scene("clusters").unwrap().items.len(),
+            clusters.len()
+        );
+    }
+}

@@ -1,0 +1,105 @@
+//! One cone per cluster with axis and sine in eight bits: rounded outward, so that
+//! what it rejects is a subset of what the exact cone about the rounded axis does.
+
+use std::sync::Arc;
+
+use glam::{DVec3, Vec3};
+
+use super::super::guarantee::Guarantee;
+use super::clusters::Clusters;
+use super::cone_block::{ConeRows, cull_clusters, reject_all};
+use super::contract::{Criterion, TriangleCull, TriangleRow};
+use super::normal_cone::Cone;
+use super::selection::Selection;
+use super::view::View;
+use crate::kernel::{Isa, Kernel, LANES, LaneMask};
+
+/// The row of this file.
+pub const ROW: TriangleRow = TriangleRow {
+    name: "cone s8",
+    summary: "One normal cone per cluster, axis and sine in 8 bits, rounding proven; 16 B",
+    guarantee: Guarantee::Conservative,
+    criterion: Criterion::Facing,
+    build: |clusters| Box::new(ByteCones::of(clusters)),
+};
+
+/// Steps per unit of axis and sine. A power of two: decoding is exact.
+const STEPS: f64 = 128.0;
+/// The sine of a lane that is never rejected: 255 / 128, above any cosine.
+const NEVER: u8 = 255;
+
+/// Sixteen cones: 16 bytes a cone.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+struct ByteBlock {
+    apex: [[f32; LANES]; 3],
+    axis: [[i8; LANES]; 3],
+    sine: [u8; LANES],
+}
+
+impl ConeRows for ByteBlock {
+    #[inline(always)]
+    fn rows<I: Isa>(&self, isa: I) -> [I::Floats; 7] {
+        const UNIT: f32 = 1.0 / STEPS as f32;
+        let [x, y, z] = &self.apex;
+        let [a, b, c] = self.axis.map(|row| row.map(|q| f32::from(q) * UNIT));
+        // At most 16 bits before scaling: exact.
+        let square = self.sine.map(|q| {
+            let sine = f32::from(q) * UNIT;
+            sine * sine
+        });
+        [x, y, z, &a, &b, &c, &square].map(|row| isa.load(row))
+    }
+}
+
+/// The axis in whole steps; at most 127 each, so shorter than 1.
+fn rounded(axis: DVec3) -> Vec3 {
+    ((axis * (STEPS - 1.0)).round() / STEPS).as_vec3()
+}
+
+/// The cones of clusters.
+#[derive(Clone, Debug)]
+pub struct ByteCones {
+    blocks: Vec<ByteBlock>,
+}
+
+impl ByteCones {
+    /// One cone per cluster. O(t).
+    pub fn of(clusters: &Arc<Clusters>) -> ByteCones {
+        let empty = ByteBlock {
+            apex: [[0.0; LANES]; 3],
+            axis: [[0; LANES]; 3],
+            sine: [NEVER; LANES],
+        };
+        let mut blocks = vec![empty; clusters.len().div_ceil(LANES)];
+        for cluster in (0..clusters.len()).filter(|&cluster| !clusters.is_two_sided(cluster)) {
+            let triangles: Vec<[Vec3; 3]> = clusters.corners_of(cluster).collect();
+            let Some(cone) = Cone::fit(&triangles, rounded) else {
+                continue;
+            };
+            let (block, lane) = (&mut blocks[cluster / LANES], cluster % LANES);
+            for k in 0..3 {
+                block.apex[k][lane] = cone.apex[k];
+                block.axis[k][lane] = (f64::from(cone.axis[k]) * STEPS) as i8;
+            }
+            block.sine[lane] = libm::ceil(cone.sine * STEPS) as u8;
+        }
+        ByteCones { blocks }
+    }
+
+    /// The test alone: bit `i` of word `w` says that cluster `16 w + i` turns only
+    /// backs to the eye. `out` is overwritten.
+    pub fn reject(&self, view: &View, kernel: Kernel, out: &mut Vec<LaneMask>) {
+        reject_all(&self.blocks, view, kernel, out);
+    }
+}
+
+impl TriangleCull for ByteCones {
+    fn cull(&self, view: &View, kernel: Kernel, kept: &mut Selection) {
+        cull_clusters(&self.blocks, view, kernel, kept);
+    }
+
+    fn bytes(&self) -> usize {
+        size_of_val(&self.blocks[..])
+    }
+}

@@ -1,0 +1,59 @@
+//! One cone per cluster in f32, with a proven margin for rounding.
+
+use std::sync::Arc;
+
+use glam::{DVec3, Vec3};
+
+use super::super::guarantee::Guarantee;
+use super::clusters::Clusters;
+use super::cone_block::{ConeBlock, cull_clusters, reject_all};
+use super::contract::{Criterion, TriangleCull, TriangleRow};
+use super::normal_cone::Cone;
+use super::selection::Selection;
+use super::view::View;
+use crate::kernel::{Kernel, LANES, LaneMask};
+
+/// The row of this file.
+pub const ROW: TriangleRow = TriangleRow {
+    name: "cone f32 safe",
+    summary: "One normal cone per cluster, sixteen at a time, rounding proven; 28 B",
+    guarantee: Guarantee::Conservative,
+    criterion: Criterion::Facing,
+    build: |clusters| Box::new(SafeCones::of(clusters)),
+};
+
+/// The cones of clusters.
+#[derive(Clone, Debug)]
+pub struct SafeCones {
+    blocks: Vec<ConeBlock>,
+}
+
+impl SafeCones {
+    /// One cone per cluster. O(t).
+    pub fn of(clusters: &Arc<Clusters>) -> SafeCones {
+        let mut blocks = vec![ConeBlock::EMPTY; clusters.len().div_ceil(LANES)];
+        for cluster in (0..clusters.len()).filter(|&cluster| !clusters.is_two_sided(cluster)) {
+            let triangles: Vec<[Vec3; 3]> = clusters.corners_of(cluster).collect();
+            if let Some(cone) = Cone::fit(&triangles, |axis: DVec3| axis.as_vec3()) {
+                blocks[cluster / LANES].set(cluster % LANES, &cone);
+            }
+        }
+        SafeCones { blocks }
+    }
+
+    /// The test alone: bit `i` of word `w` says that cluster `16 w + i` turns only
+    /// backs to the eye. `out` is overwritten.
+    pub fn reject(&self, view: &View, kernel: Kernel, out: &mut Vec<LaneMask>) {
+        reject_all(&self.blocks, view, kernel, out);
+    }
+}
+
+impl TriangleCull for SafeCones {
+    fn cull(&self, view: &View, kernel: Kernel, kept: &mut Selection) {
+        cull_clusters(&self.blocks, view, kernel, kept);
+    }
+
+    fn bytes(&self) -> usize {
+        size_of_val(&self.blocks[..])
+    }
+}

@@ -1,0 +1,170 @@
+//! Which side of a triangle an eye is on, exactly: the truth of this stage.
+
+use glam::{DVec3, Vec3};
+
+use super::eye::Eye;
+use crate::arithmetic::{Expansion, cross, two_sum};
+
+/// Error of the filter per unit of the permanent. Three differences of one rounding
+/// each, two products, a difference, a product and two sums: eight roundings on the
+/// longest way, 8 * 2^-53 and terms of second order (Shewchuk 1997 proves 7 for this
+/// order of operations); 16 is twice that.
+const FILTER: f64 = 16.0 / (1u64 << 53) as f64;
+
+/// Whether the eye is strictly in front of a triangle: its corners turn
+/// counter-clockwise as seen from there. Behind it or in its plane a one-sided
+/// triangle cannot be seen; nor can one without area from anywhere.
+///
+/// Exact for finite corners and an eye whose coordinates are zero or between
+/// 2^-500 and 2^500.
+pub fn faces(eye: &Eye, corners: [Vec3; 3]) -> bool {
+    let [a, b, c] = corners.map(Vec3::as_dvec3);
+    let (u, v) = (b - a, c - a);
+    let w = eye.high - a * f64::from(eye.weight);
+    let determinant = w.dot(u.cross(v));
+    let (w, u, v) = (w.abs(), u.abs(), v.abs());
+    let minors = DVec3::new(
+        u.y * v.z + u.z * v.y,
+        u.z * v.x + u.x * v.z,
+        u.x * v.y + u.y * v.x,
+    );
+    // What the low part of the eye adds, doubled for the roundings here; and what
+    // underflow may take.
+    let bound = FILTER * w.dot(minors) + 2.0 * eye.low.abs().dot(minors) + 1e-300;
+    if determinant.abs() > bound {
+        return determinant > 0.0;
+    }
+    orientation(eye, corners) > 0
+}
+
+/// The sign of the determinant by expansions.
+#[cold]
+fn orientation(eye: &Eye, corners: [Vec3; 3]) -> i32 {
+    let (u, v) = (
+        difference(corners[1], corners[0]),
+        difference(corners[2], corners[0]),
+    );
+    let a = corners[0] * eye.weight;
+    let mut sum = Expansion::ZERO;
+    for k in 0..3 {
+        let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+        let minor = &(&u[i] * &v[j]) - &(&u[j] * &v[i]);
+        let mut w = Expansion::from(eye.low[k]);
+        w.grow(eye.high[k]);
+        w.grow(f64::from(-a[k]));
+        sum = &sum + &(&w * &minor);
+    }
+    sum.sign()
+}
+
+/// A normal of a triangle, each component true to 2^-50 of itself; zero exactly
+/// where the triangle has no area. Not of unit length.
+pub fn normal(corners: [Vec3; 3]) -> DVec3 {
+    let [a, b, c] = corners.map(Vec3::as_dvec3);
+    let exact = |p: DVec3, q: DVec3| (0..3).all(|k| two_sum(p[k], -q[k]).1 == 0.0);
+    if exact(b, a) && exact(c, a) {
+        // Kahan's products do not cancel: two roundings at the most.
+        return cross(b - a, c - a);
+    }
+    let (u, v) = (
+        difference(corners[1], corners[0]),
+        difference(corners[2], corners[0]),
+    );
+    let minor = |i: usize, j: usize| &(&u[i] * &v[j]) - &(&u[j] * &v[i]);
+    DVec3::new(
+        minor(1, 2).estimate(),
+        minor(2, 0).estimate(),
+        minor(0, 1).estimate(),
+    )
+}
+
+/// `p - q`, exactly.
+fn difference(p: Vec3, q: Vec3) -> [Expansion; 3] {
+    [0, 1, 2].map(|k| &Expansion::from(p[k]) - &Expansion::from(q[k]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::SeededRng;
+    use dashu_int::IBig;
+
+    /// A number as a whole count of 2^-300.
+    fn units(x: f64) -> IBig {
+        let bits = x.abs().to_bits();
+        let mantissa = bits & ((1 << 52) - 1) | 1 << 52;
+        let shift = (bits >> 52) as i64 - 1075 + 300;
+        assert!(x == 0.0 || shift >= 0, "too small for this test");
+        let size = if x == 0.0 {
+            IBig::ZERO
+        } else {
+            IBig::from(mantissa) << shift as usize
+        };
+        if x < 0.0 { -size } else { size }
+    }
+
+    fn in_integers(eye: &Eye, corners: [Vec3; 3]) -> bool {
+        let point = |p: Vec3| [0, 1, 2].map(|k| units(f64::from(p[k])));
+        let [a, b, c] = corners.map(point);
+        let minus = |p: &[IBig; 3], q: &[IBig; 3]| [0, 1, 2].map(|k| &p[k] - &q[k]);
+        let (u, v) = (minus(&b, &a), minus(&c, &a));
+        let weight = IBig::from(eye.weight as i32);
+        let w = [0, 1, 2].map(|k| units(eye.high[k]) + units(eye.low[k]) - &weight * &a[k]);
+        let minor = |i: usize, j: usize| &u[i] * &v[j] - &u[j] * &v[i];
+        let sum = &w[0] * minor(1, 2) + &w[1] * minor(2, 0) + &w[2] * minor(0, 1);
+        sum > IBig::ZERO
+    }
+
+    #[test]
+    fn the_side_of_a_triangle_is_that_of_whole_numbers() {
+        let mut rng = SeededRng::new(1);
+        let (mut near, mut fronts) = (0, 0);
+        for round in 0..20_000 {
+            let far = [0.0, 1.0, 1e4, 1e7][round % 4];
+            let size = [1.0, 1e-3, 100.0][round % 3];
+            let mut point = || (rng.normal3() * size + far).as_vec3();
+            let mut corners = [point(), point(), point()];
+            if round % 5 == 0 {
+                corners[2] = corners[0] + (corners[1] - corners[0]) * 0.3;
+            }
+            let [a, b, c] = corners.map(Vec3::as_dvec3);
+            // In the plane but for rounding, or an ulp or two from it.
+            let (s, t) = (rng.between(-9.0, 9.0), rng.between(-9.0, 9.0));
+            let mut at = a + (b - a) * s + (c - a) * t;
+            at[round % 3] += at[round % 3].abs() * f64::EPSILON * (rng.below(5) as f64 - 2.0);
+            let eye = match round % 7 {
+                0 => Eye::along(b - a),
+                1 | 2 => Eye::at(at + 1e9, DVec3::splat(1e9 + 0.1)),
+                3 => Eye::local(at.as_vec3().as_dvec3()),
+                _ => Eye::local(at),
+            };
+            assert_eq!(faces(&eye, corners), in_integers(&eye, corners), "{round}");
+            fronts += u32::from(faces(&eye, corners));
+            let plain = (eye.high - a * f64::from(eye.weight)).dot((b - a).cross(c - a)) > 0.0;
+            near += u32::from(plain != in_integers(&eye, corners));
+        }
+        assert!(
+            near > 300,
+            "{near}: the premise: plain f64 is often wrong here"
+        );
+        assert!((2000..18_000).contains(&fronts), "{fronts}");
+    }
+
+    #[test]
+    fn normals_keep_their_digits_and_are_zero_only_without_area() {
+        let flat = [
+            Vec3::ZERO,
+            Vec3::new(1.0, 2.0, 3.0),
+            Vec3::new(3.0, 6.0, 9.0),
+        ];
+        assert_eq!(normal(flat), DVec3::ZERO);
+        let thin = [Vec3::ZERO, Vec3::ONE, Vec3::new(2.0, 2.0, 2f32.next_up())];
+        // An ulp of 2 is 2^-22.
+        let ulp = 2f64.powi(-22);
+        assert_eq!(normal(thin), DVec3::new(ulp, -ulp, 0.0));
+        // Edges that f64 cannot hold.
+        let (tiny, far) = (2f32.powi(-100), 2f32.powi(20));
+        let wide = [Vec3::X * tiny, Vec3::X * far, Vec3::new(far, tiny, 0.0)];
+        assert!(normal(wide).z > 0.0);
+    }
+}

@@ -1,0 +1,68 @@
+//! What a back end delivered, held against the exact truth.
+
+use super::clusters::Clusters;
+use super::exact::faces;
+use super::selection::Selection;
+use super::view::View;
+
+/// The truth of the facing rows: triangles of `candidates` whose front the eye sees,
+/// and all two-sided ones. Exact; one predicate per triangle, no shared structure.
+pub fn facing(clusters: &Clusters, view: &View, candidates: &Selection) -> Selection {
+    let mut truth = candidates.clone();
+    truth.retain(|cluster, bit| {
+        let triangle = clusters.triangles_of(cluster)[bit];
+        clusters.is_two_sided(cluster) || faces(&view.eye, clusters.surfaces.corners(triangle))
+    });
+    truth
+}
+
+/// Triangles in and out of a stage.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+#[non_exhaustive]
+pub struct Counts {
+    /// What the stage was given.
+    pub candidates: usize,
+    /// What it delivered.
+    pub delivered: usize,
+    /// What it should have delivered.
+    pub truth: usize,
+    /// Delivered, but not in the truth.
+    pub false_positives: usize,
+    /// In the truth, but not delivered.
+    pub false_negatives: usize,
+}
+
+impl Counts {
+    /// Compares two selections of the same candidates.
+    pub fn of(candidates: &Selection, delivered: &Selection, truth: &Selection) -> Counts {
+        Counts {
+            candidates: candidates.triangles(),
+            delivered: delivered.triangles(),
+            truth: truth.triangles(),
+            false_positives: delivered.without(truth),
+            false_negatives: truth.without(delivered),
+        }
+    }
+
+    /// Share of the candidates that was removed.
+    pub fn removed(&self) -> f64 {
+        1.0 - self.delivered as f64 / self.candidates.max(1) as f64
+    }
+
+    /// Share of what could be removed that was not: the loss of a cone.
+    pub fn loss(&self) -> f64 {
+        let removable = self.candidates - self.truth;
+        self.false_positives as f64 / removable.max(1) as f64
+    }
+
+    /// Both counts together: of several views.
+    pub fn plus(self, other: Counts) -> Counts {
+        Counts {
+            candidates: self.candidates + other.candidates,
+            delivered: self.delivered + other.delivered,
+            truth: self.truth + other.truth,
+            false_positives: self.false_positives + other.false_positives,
+            false_negatives: self.false_negatives + other.false_negatives,
+        }
+    }
+}

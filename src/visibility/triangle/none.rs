@@ -1,0 +1,33 @@
+//! No test: what leaving the stage out costs.
+
+use std::sync::Arc;
+
+use super::super::guarantee::Guarantee;
+use super::clusters::Clusters;
+use super::contract::{Criterion, TriangleCull, TriangleRow};
+use super::selection::Selection;
+use super::view::View;
+use crate::kernel::Kernel;
+
+/// The row of this file.
+pub const ROW: TriangleRow = TriangleRow {
+    name: "none",
+    summary: "Keeps every triangle",
+    guarantee: Guarantee::Conservative,
+    criterion: Criterion::Facing,
+    build,
+};
+
+struct Nothing;
+
+fn build(_: &Arc<Clusters>) -> Box<dyn TriangleCull> {
+    Box::new(Nothing)
+}
+
+impl TriangleCull for Nothing {
+    fn cull(&self, _: &View, _: Kernel, _: &mut Selection) {}
+
+    fn bytes(&self) -> usize {
+        0
+    }
+}

@@ -1,0 +1,235 @@
+//! Every row of the table against the exact truth.
+
+use std::sync::Arc;
+
+use glam::{DVec3, Vec3};
+
+use super::super::guarantee::Guarantee;
+use super::super::meshes::{MESHES, Mesh};
+use super::super::rays::{Rays, SampleGrid};
+use super::super::surface::Surfaces;
+use super::*;
+use crate::camera::{Camera, Lens, look_at};
+use crate::kernel::Kernel;
+use crate::scene::{SeededRng, load};
+
+/// Scenes of some thousand triangles: all meshes, and boxes far from the zero.
+fn scenes() -> Vec<(String, Arc<Clusters>)> {
+    let mesh = |mesh: &Mesh| (mesh.name.to_string(), (mesh.build)(6000, 5));
+    let boxes = ["city:n=200", "rooms:n=200", "uniform:n=100,offset=1e7"].map(|name| {
+        let scene = load(name, &Default::default()).unwrap();
+        (name.to_string(), Surfaces::from_boxes(&scene))
+    });
+    let all = MESHES.iter().map(mesh).chain(boxes);
+    all.map(|(name, surfaces)| (name, Arc::new(Clusters::of(Arc::new(surfaces), 64))))
+        .collect()
+}
+
+/// Cameras in and around a scene: three lenses in turn.
+fn cameras(clusters: &Clusters, count: usize, seed: u64) -> Vec<Camera> {
+    let scene = clusters.surfaces.scene("cameras").unwrap();
+    let bounds = scene.world_bounds();
+    let (centre, size) = ((bounds.min + bounds.max) / 2.0, bounds.max - bounds.min);
+    let mut rng = SeededRng::new(seed);
+    let mut point =
+        |scale: f64| centre + (rng.point() - 0.5) * (size + size.max_element() * 0.1) * scale;
+    let pairs: Vec<(DVec3, DVec3)> = (0..count).map(|_| (point(1.5), point(0.8))).collect();
+    let lenses = [
+        Lens::perspective(70.0, 1.5, 0.1, None).unwrap(),
+        Lens::off_axis([-0.1, 0.4, -0.2, 0.3], 0.5, Some(200.0)).unwrap(),
+        Lens::orthographic(20.0, 1.5, 0.1, 500.0).unwrap(),
+    ];
+    let camera = |(i, (eye, look)): (usize, &(DVec3, DVec3))| Camera {
+        frame: look_at(*eye, *look, DVec3::Z).unwrap(),
+        lens: lenses[i % 3],
+    };
+    pairs.iter().enumerate().map(camera).collect()
+}
+
+const GRID: SampleGrid = SampleGrid::new(32, 20);
+
+fn view(camera: &Camera, clusters: &Clusters) -> View {
+    View::of(camera, clusters.surfaces.origin, GRID).unwrap()
+}
+
+#[test]
+fn facing_rows_keep_their_promises_and_kernels_agree() {
+    for (name, clusters) in scenes() {
+        let all = Selection::all(&clusters);
+        let cameras = cameras(&clusters, 12, 9);
+        for row in TRIANGLE_ROWS {
+            let back_end = (row.build)(&clusters);
+            let mut sum = Counts::default();
+            for camera in &cameras {
+                let view = view(camera, &clusters);
+                let mut kept = all.clone();
+                back_end.cull(&view, Kernel::Portable, &mut kept);
+                for kernel in Kernel::available() {
+                    let mut other = all.clone();
+                    back_end.cull(&view, kernel, &mut other);
+                    assert_eq!(other, kept, "{name} {} {kernel}", row.name);
+                }
+                assert_eq!(kept.without(&all), 0);
+                // What is taken away beforehand stays away, and changes nothing else.
+                let items = (0..clusters.surfaces.items() as u32).step_by(2);
+                let half = Selection::of_items(&clusters, items);
+                let mut rest = half.clone();
+                back_end.cull(&view, Kernel::best(), &mut rest);
+                let both = half.words().iter().zip(kept.words()).map(|(a, b)| a & b);
+                assert!(rest.words().iter().copied().eq(both), "{name} {}", row.name);
+                let truth = facing(&clusters, &view, &all);
+                sum = sum.plus(Counts::of(&all, &kept, &truth));
+            }
+            if row.criterion != Criterion::Facing {
+                continue;
+            }
+            match row.guarantee {
+                Guarantee::Exact => {
+                    assert_eq!((sum.false_positives, sum.false_negatives), (0, 0), "{name}");
+                }
+                Guarantee::Conservative => {
+                    assert_eq!(sum.false_negatives, 0, "{name} {}", row.name);
+                }
+                _ => {}
+            }
+            // Where clusters are nearly flat, each row finds something to remove.
+            let is_smooth = name == "mesh:spheres" || name == "mesh:statue";
+            assert!(
+                row.name == "none" || !is_smooth || sum.removed() > 0.05,
+                "{name} {}: {:.3}",
+                row.name,
+                sum.removed()
+            );
+        }
+    }
+}
+
+#[test]
+fn adversarial_eyes_find_what_the_unsafe_rows_lose_and_nothing_else() {
+    for row in TRIANGLE_ROWS {
+        if row.criterion != Criterion::Facing {
+            continue;
+        }
+        for eyes in EyeKind::ALL {
+            let found = audit(row, 20_000, 1, eyes);
+            let what = format!("{} {}: {found:?}", row.name, eyes.name());
+            if row.guarantee.is_safe() {
+                assert_eq!(found.false_negatives, 0, "{what}");
+            } else {
+                assert!(found.false_negatives > 10, "{what}");
+            }
+            // A search that rejects nothing shows nothing.
+            assert!(row.name == "none" || found.rejected > 200, "{what}");
+        }
+    }
+}
+
+#[test]
+fn two_sided_triangles_are_kept_and_flat_ones_without_area_are_not() {
+    let clusters = scenes()
+        .into_iter()
+        .find(|(name, _)| name == "mesh:forest")
+        .unwrap()
+        .1;
+    let all = Selection::all(&clusters);
+    let two_sided = |c: &usize| clusters.is_two_sided(*c);
+    assert!((0..clusters.len()).filter(two_sided).count() > 20);
+    for camera in cameras(&clusters, 6, 3) {
+        let view = view(&camera, &clusters);
+        for row in TRIANGLE_ROWS
+            .iter()
+            .filter(|row| row.criterion == Criterion::Facing)
+        {
+            let mut kept = all.clone();
+            (row.build)(&clusters).cull(&view, Kernel::best(), &mut kept);
+            for cluster in (0..clusters.len()).filter(two_sided) {
+                assert_eq!(
+                    kept.words()[cluster],
+                    clusters.word(cluster),
+                    "{}",
+                    row.name
+                );
+            }
+        }
+    }
+}
+
+/// Where a ray meets the plane of a triangle, if that is within it: in f64, and wide
+/// by a billionth.
+fn meets(ray: &super::super::rays::Ray, corners: [Vec3; 3], origin: DVec3) -> bool {
+    let [a, b, c] = corners.map(|p| p.as_dvec3() + origin - ray.origin);
+    let side = |p: DVec3, q: DVec3| ray.direction.dot(p.cross(q));
+    let sides = [side(a, b), side(b, c), side(c, a)];
+    let slack = 1e-9 * (a.length() * b.length() + b.length() * c.length());
+    let is_in = sides.iter().all(|s| *s > slack) || sides.iter().all(|s| *s < -slack);
+    let n = (b - a).cross(c - a);
+    let depth = n.dot(a) / n.dot(ray.direction);
+    is_in && depth > ray.near * (1.0 + 1e-9) && depth < ray.far
+}
+
+#[test]
+fn no_sample_meets_what_the_window_rows_remove() {
+    let rows = TRIANGLE_ROWS
+        .iter()
+        .filter(|row| row.criterion != Criterion::Facing);
+    let rows: Vec<_> = rows.collect();
+    assert_eq!(rows.len(), 2);
+    for (name, clusters) in scenes() {
+        let all = Selection::all(&clusters);
+        let mut most = 0;
+        for camera in cameras(&clusters, 3, 4) {
+            let rays = Rays::of(&camera).unwrap();
+            let view = view(&camera, &clusters);
+            let samples: Vec<_> = (0..GRID.height)
+                .flat_map(|row| (0..GRID.width).map(move |column| (column, row)))
+                .map(|(column, row)| rays.sample(GRID, column, row))
+                .collect();
+            for row in &rows {
+                let mut kept = all.clone();
+                (row.build)(&clusters).cull(&view, Kernel::best(), &mut kept);
+                let mut removed = all.clone();
+                removed.retain(|cluster, bit| kept.words()[cluster] >> bit & 1 == 0);
+                most = most.max(removed.triangles());
+                let mut number = 0;
+                removed.retain(|cluster, bit| {
+                    number += 1;
+                    // Some of them: each against every sample.
+                    if number % 7 == 0 {
+                        let t = clusters.triangles_of(cluster)[bit];
+                        let corners = clusters.surfaces.corners(t);
+                        let origin = clusters.surfaces.origin;
+                        let met = samples.iter().any(|ray| meets(ray, corners, origin));
+                        assert!(!met, "{name} {}", row.name);
+                    }
+                    true
+                });
+            }
+        }
+        assert!(most > 0, "{name}");
+    }
+}
+
+#[test]
+fn a_clipper_is_told_what_to_do() {
+    let camera = Camera {
+        frame: look_at(DVec3::ZERO, DVec3::X, DVec3::Z).unwrap(),
+        lens: Lens::perspective(90.0, 1.0, 1.0, Some(100.0)).unwrap(),
+    };
+    let view = View::of(&camera, DVec3::ZERO, GRID).unwrap();
+    let screen = Screen::of(&view).unwrap();
+    let at = |x: f32, y: f32| {
+        clipping(
+            &screen,
+            [[x, y, 0.0], [x, y + 1.0, 0.0], [x, y, 1.0]].map(Vec3::from),
+            2.0,
+        )
+    };
+    assert_eq!(at(10.0, 0.0), Clipping::Inside);
+    assert_eq!(at(10.0, 9.5), Clipping::GuardBand);
+    assert_eq!(at(10.0, 10.5), Clipping::Outside);
+    assert_eq!(at(0.5, 0.0), Clipping::Outside);
+    let crosses = [[0.5, 0.0, 0.0], [5.0, 0.0, 0.0], [5.0, 0.0, 1.0]].map(Vec3::from);
+    assert_eq!(clipping(&screen, crosses, 2.0), Clipping::Clip);
+    let wide = [[10.0, 0.0, 0.0], [10.0, 25.0, 0.0], [10.0, 0.0, 1.0]].map(Vec3::from);
+    assert_eq!(clipping(&screen, wide, 2.0), Clipping::Clip);
+}
