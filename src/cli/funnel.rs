@@ -132,9 +132,10 @@ fn chain(
     let mut chain = Chain::for_scene(scene).with(StageKind::Object, object);
     for (stage, name) in typed {
         if let Some(name) = name {
-            let known: Vec<&str> = funnel::names(stage, scene);
-            if !known.contains(&name.as_str()) {
-                return Err(SpecError::unknown(stage.name(), name, known.into_iter()));
+            let known = funnel::back_ends(stage, scene);
+            if !known.iter().any(|row| row.name == name) {
+                let names = known.iter().map(|row| row.name);
+                return Err(SpecError::unknown(stage.name(), name, names));
             }
             chain = chain.with(stage, name);
         }

@@ -8,6 +8,7 @@
 
 mod chain;
 mod conclusions;
+mod hiding;
 mod judged;
 mod pass;
 mod plan_view;
@@ -22,4 +23,4 @@ pub use plan_view::{Fate, PlanView};
 pub use report::{FunnelReport, Gain, LevelRow, StageRow, Times};
 pub use stage::{BackEnd, NONE, STAGES, StageKind};
 pub use study::{FunnelPlan, Prepared, failure, prepare, time};
-pub use world::{FunnelError, FunnelInput, names};
+pub use world::{FunnelError, FunnelInput, back_ends};

@@ -59,7 +59,7 @@ pub fn prepare(
             .map(|view| {
                 let output = step.map_or(given, |step| pass.steps()[step].output);
                 let sets = [given, output].map(|set| pass.items(set, view));
-                world.judge(*stage, view, sets, step.is_some(), &truth)
+                world.judge(*stage, name, view, sets, &truth)
             })
             .collect();
         rows.push(StageRow {

@@ -1,22 +1,36 @@
 //! What the stages of a funnel work on: a scene with everything built once, the views
 //! of a path, and each back end as something that can be asked.
 
+use std::cell::RefCell;
+use std::sync::Arc;
+
 use glam::DVec3;
 
 use super::chain::Chain;
+use super::hiding::{HIDING, HidingRow};
 use super::judged::{Judged, judge_items};
 use super::pass::{Step, Walked};
 use super::plan_view::{Fate, MOST_DRAWN, PlanView};
 use super::stage::{BackEnd, NONE, StageKind};
-use crate::culling::{CameraView, Culling};
+use crate::camera::PlaneOptions;
+use crate::geometry::ConvexVolume;
 use crate::index::{BuildError, DynIndex, Execution, StructureSpec};
 use crate::input::InputError;
+use crate::kernel::Kernel;
 use crate::measure::{Protocol, WorkloadError, input_of};
 use crate::path::CameraPath;
 use crate::query::ItemId;
-use crate::scene::Scene;
+use crate::scene::{self, Scene};
+use crate::visibility::occlusion::{self, OccluderScene};
+use crate::visibility::region::{
+    EyePlace, Flood, Marks, PortalClip, PortalRect, RegionGraph, RegionItems, RegionRow, Scratch,
+    flood, portal_clip, portal_rect,
+};
+use crate::visibility::triangle::{
+    self, Clusters, Counts, Criterion, Selection, TRIANGLE_ROWS, TriangleCull, TriangleRow, facing,
+};
 use crate::visibility::truth::{RayIndex, SampleTruth};
-use crate::visibility::{Guarantee, NoRays, Rays, SampleGrid, Solids};
+use crate::visibility::{Guarantee, NoRays, Rays, SampleGrid, Solids, Surfaces};
 
 /// What a funnel is studied on.
 #[derive(Clone, Copy)]
@@ -69,14 +83,67 @@ pub type Run<'w> = Box<dyn Fn(usize, Option<&[ItemId]>, &mut Vec<ItemId>) + 'w>;
 /// A scene and the views of a path, ready for every back end.
 pub struct World<'a> {
     scene: &'a Scene,
+    kernel: Kernel,
+    samples: SampleGrid,
     structures: Vec<(String, Box<dyn DynIndex>)>,
     views: Vec<View>,
+    solids: Solids,
+    occluders: OccluderScene,
+    regions: Option<Regions>,
+    triangles: Option<Triangles>,
 }
 
 /// A camera in every form that a stage needs.
 struct View {
-    frustum: CameraView,
+    volume: ConvexVolume,
     rays: Rays,
+    triangles: triangle::View,
+}
+
+/// The rooms of a scene and what finds a way through them.
+struct Regions {
+    rows: Vec<Box<dyn RegionRow>>,
+    items: RegionItems,
+}
+
+impl Regions {
+    fn of(scene: &Scene) -> Option<Regions> {
+        let graph = Arc::new(RegionGraph::of_scene(scene).ok()?);
+        let items = RegionItems::of(&graph, scene);
+        let rows: Vec<Box<dyn RegionRow>> = vec![
+            Box::new(Flood(graph.clone())),
+            Box::new(PortalRect(graph.clone())),
+            Box::new(PortalClip(graph)),
+        ];
+        Some(Regions { rows, items })
+    }
+}
+
+/// The items' faces, in clusters, and what turns away those that are seen from behind.
+struct Triangles {
+    clusters: Arc<Clusters>,
+    rows: Vec<(&'static TriangleRow, Box<dyn TriangleCull>)>,
+}
+
+/// Most items whose triangles are kept in memory: 12 and 8 points for each.
+const MOST_MESHED: usize = 300_000;
+
+impl Triangles {
+    fn of(scene: &Scene) -> Option<Triangles> {
+        if scene.items.len() > MOST_MESHED {
+            return None;
+        }
+        let surfaces = Arc::new(Surfaces::from_boxes(scene));
+        let clusters = Arc::new(Clusters::of(surfaces, triangle::MOST_TRIANGLES));
+        let sides = TRIANGLE_ROWS
+            .iter()
+            .filter(|row| row.criterion == Criterion::Facing);
+        let rows = sides.map(|row| (row, (row.build)(&clusters)));
+        Some(Triangles {
+            rows: rows.collect(),
+            clusters,
+        })
+    }
 }
 
 /// What is visible in each view: items with the samples of each, ascending.
@@ -99,30 +166,39 @@ impl<'a> World<'a> {
     /// A structure that refuses the scene, a camera without frustum or rays.
     pub fn new(input: &FunnelInput<'a>) -> Result<World<'a>, FunnelError> {
         let around = input.scene.surroundings();
-        let culling = Culling::default();
         let all = &input.path.cameras;
         let count = all.len().min(input.most_views.max(1));
         let chosen = (0..count).map(|k| k * all.len() / count);
         let views = chosen.map(|index| {
             let camera = &all[index];
-            let error = |error| WorkloadError {
-                path: input.path.name.clone(),
-                index,
-                error,
-            };
+            let error = |error| FunnelError::Rays { index, error };
+            let volume = camera.volume(&PlaneOptions::default(), &around);
             Ok(View {
-                frustum: culling.view(camera, &around).map_err(error)?,
-                rays: Rays::of(camera).map_err(|error| FunnelError::Rays { index, error })?,
+                volume: volume.map_err(|error| WorkloadError {
+                    path: input.path.name.clone(),
+                    index,
+                    error: error.into(),
+                })?,
+                rays: Rays::of(camera).map_err(error)?,
+                triangles: triangle::View::of(camera, input.scene.origin, input.samples)
+                    .map_err(error)?,
             })
         });
         let built = input.structures.iter().map(|spec| {
             let index = spec.build(input_of(input.scene, &input.scene.items))?;
             Ok::<_, BuildError>((spec.label.clone(), index))
         });
+        let solids = Solids::of(input.scene);
         Ok(World {
             scene: input.scene,
+            kernel: input.execution.kernel,
+            samples: input.samples,
             structures: built.collect::<Result<_, _>>()?,
             views: views.collect::<Result<_, FunnelError>>()?,
+            occluders: OccluderScene::of(&solids),
+            solids,
+            regions: Regions::of(input.scene),
+            triangles: Triangles::of(input.scene),
         })
     }
 
@@ -138,8 +214,8 @@ impl<'a> World<'a> {
 
     /// What each view shows at its samples; `None` if stopped.
     pub fn truth(&self, input: &FunnelInput, stop: &dyn Fn() -> bool) -> Option<Truth> {
-        let solids = Solids::of(self.scene);
-        let index = RayIndex::build(&solids);
+        let solids = &self.solids;
+        let index = RayIndex::build(solids);
         let mut visible = Vec::with_capacity(self.views());
         for view in &self.views {
             if stop() {
@@ -160,10 +236,8 @@ impl<'a> World<'a> {
 
     /// The back ends of a stage that are compared, the chain's among them.
     pub fn names(&self, stage: StageKind, chain: &Chain) -> Vec<String> {
-        let mut names: Vec<String> = names(stage, self.scene)
-            .into_iter()
-            .map(str::to_owned)
-            .collect();
+        let rows = back_ends(stage, self.scene).into_iter();
+        let mut names: Vec<String> = rows.map(|row| row.name.to_owned()).collect();
         if stage == StageKind::Object {
             names.extend(self.structures.iter().map(|(label, _)| label.clone()));
         }
@@ -173,22 +247,15 @@ impl<'a> World<'a> {
 
     /// What a back end declares.
     pub fn back_end(&self, stage: StageKind, name: &str) -> BackEnd {
-        match (stage, name) {
-            (_, NONE) => BackEnd {
-                stage,
-                name: NONE,
-                summary: "the stage is left out",
-                guarantee: Guarantee::Conservative,
-                does_object_stage: false,
-            },
-            _ => BackEnd {
-                stage,
-                name: "frustum",
-                summary: "the six-plane test",
-                guarantee: Guarantee::Conservative,
-                does_object_stage: false,
-            },
-        }
+        let known = back_ends(stage, self.scene);
+        let found = known.into_iter().find(|row| row.name == name);
+        found.unwrap_or(BackEnd {
+            stage,
+            name: "frustum",
+            summary: "the six-plane test by a structure",
+            guarantee: Guarantee::Conservative,
+            does_object_stage: false,
+        })
     }
 
     /// A back end, ready to be asked.
@@ -197,35 +264,94 @@ impl<'a> World<'a> {
     /// If there is no such back end.
     pub fn run(&self, stage: StageKind, name: &str) -> Run<'_> {
         match stage {
-            StageKind::Object => {
-                let found = self.structures.iter().find(|(label, _)| label == name);
-                let (_, index) = found.expect("a structure that was built");
-                Box::new(move |view, input, out| {
-                    let frustum = self.views[view].frustum.as_any();
-                    match input {
-                        None => index.query(frustum, out),
-                        // What is left of a scene by other means is a short list.
-                        Some(items) => out.extend(
-                            items
-                                .iter()
-                                .filter(|&&id| frustum.sees(&self.scene.items[id as usize])),
-                        ),
-                    }
-                })
-            }
-            _ => unreachable!("no back end {name}"),
+            StageKind::Region => self.run_region(name),
+            StageKind::Object => self.run_object(name),
+            StageKind::Occlusion => self.run_occlusion(name),
+            StageKind::Triangle => self.run_triangle(name),
+            StageKind::Fragment => unreachable!("no back end {name}"),
         }
     }
 
-    /// What a stage made of its input in a view.
+    fn run_region(&self, name: &str) -> Run<'_> {
+        let regions = self.regions.as_ref().expect("a scene with regions");
+        let row = regions.rows.iter().find(|row| row.name() == name);
+        let row = row.expect("a row of the region stage");
+        let kept = RefCell::new((Scratch::default(), Marks::default(), Vec::new()));
+        Box::new(move |view, _, out| {
+            let (scratch, marks, seen) = &mut *kept.borrow_mut();
+            match row.from_eye(&self.views[view].rays, scratch, seen) {
+                EyePlace::Inside => regions.items.of_regions(seen, marks, out),
+                _ => out.extend(0..self.items() as ItemId),
+            }
+        })
+    }
+
+    fn run_object(&self, name: &str) -> Run<'_> {
+        let found = self.structures.iter().find(|(label, _)| label == name);
+        let (_, index) = found.expect("a structure that was built");
+        Box::new(move |view, input, out| {
+            let volume = &self.views[view].volume;
+            match input {
+                None => index.visible(volume, out),
+                // What other stages leave of a scene is a short list.
+                Some(items) => {
+                    let sees = |&&id: &&ItemId| volume.sees(&self.scene.items[id as usize]);
+                    out.extend(items.iter().filter(sees));
+                }
+            }
+        })
+    }
+
+    fn run_occlusion(&self, name: &str) -> Run<'_> {
+        let row = HIDING.iter().find(|row| row.back_end().name == name);
+        let row = row.expect("a row of the occlusion stage");
+        let hide = RefCell::new((row.make)(self.samples, self.kernel));
+        let does_both = row.back_end().does_object_stage;
+        let every: Vec<ItemId> = (0..self.items() as ItemId).collect();
+        Box::new(move |view, input, out| {
+            let View { rays, volume, .. } = &self.views[view];
+            let view = occlusion::View::new(rays, volume, &self.occluders, self.samples);
+            let items = input.unwrap_or(&every);
+            hide.borrow_mut().hide(&self.occluders, &view, items, out);
+            // It has looked beyond the regions that are seen.
+            if does_both && self.regions.is_some() && input.is_some() {
+                out.retain(|id| items.binary_search(id).is_ok());
+            }
+        })
+    }
+
+    /// Hands on clusters: those with a triangle left.
+    fn run_triangle(&self, name: &str) -> Run<'_> {
+        let name = name.to_owned();
+        Box::new(move |view, input, out| {
+            let left = self.selected(&name, view, input);
+            let clusters = left.words().iter().zip(0..).filter(|(word, _)| **word != 0);
+            out.extend(clusters.map(|(_, cluster)| cluster));
+        })
+    }
+
+    /// The triangles that a back end leaves of some items.
+    fn selected(&self, name: &str, view: usize, input: Option<&[ItemId]>) -> Selection {
+        let triangles = self.triangles.as_ref().expect("a scene with triangles");
+        let mut selection = triangles.of_items(input);
+        if let Some((_, cull)) = triangles.rows.iter().find(|(row, _)| row.name == name) {
+            cull.cull(&self.views[view].triangles, self.kernel, &mut selection);
+        }
+        selection
+    }
+
+    /// What a back end made of its input in a view.
     pub fn judge(
         &self,
-        _stage: StageKind,
+        stage: StageKind,
+        name: &str,
         view: usize,
         [input, output]: [Option<&[ItemId]>; 2],
-        _is_done: bool,
         truth: &Truth,
     ) -> Judged {
+        if stage == StageKind::Triangle {
+            return self.judge_triangles(name, view, input);
+        }
         let every: Vec<ItemId>;
         let output = match output {
             Some(output) => output,
@@ -235,6 +361,25 @@ impl<'a> World<'a> {
             }
         };
         judge_items(input, self.items(), output, &truth.visible[view])
+    }
+
+    fn judge_triangles(&self, name: &str, view: usize, input: Option<&[ItemId]>) -> Judged {
+        let Some(triangles) = &self.triangles else {
+            return Judged::default();
+        };
+        let given = triangles.of_items(input);
+        let left = self.selected(name, view, input);
+        let truth = facing(&triangles.clusters, &self.views[view].triangles, &given);
+        let counts = Counts::of(&given, &left, &truth);
+        Judged {
+            input: counts.candidates as u64,
+            hidden: (counts.candidates - counts.truth) as u64,
+            output: counts.delivered as u64,
+            truth: counts.truth as u64,
+            false_positives: counts.false_positives as u64,
+            false_negatives: counts.false_negatives as u64,
+            ..Judged::default()
+        }
     }
 
     /// The items about the eye of a view, each with its fate.
@@ -287,16 +432,78 @@ impl<'a> World<'a> {
     }
 }
 
+impl Triangles {
+    fn of_items(&self, items: Option<&[ItemId]>) -> Selection {
+        match items {
+            Some(items) => Selection::of_items(&self.clusters, items.iter().copied()),
+            None => Selection::all(&self.clusters),
+        }
+    }
+}
+
 /// The back ends of a stage that a scene can have; structures of the object stage are
 /// not among them.
-pub fn names(stage: StageKind, _scene: &Scene) -> Vec<&'static str> {
-    let _ = stage;
-    vec![NONE]
+pub fn back_ends(stage: StageKind, scene: &Scene) -> Vec<BackEnd> {
+    let plain = |name, summary, guarantee| BackEnd {
+        stage,
+        name,
+        summary,
+        guarantee,
+        does_object_stage: false,
+    };
+    let mut rows = vec![plain(
+        NONE,
+        "the stage is left out",
+        Guarantee::Conservative,
+    )];
+    match stage {
+        StageKind::Region if matches!(scene.regions, scene::Regions::Tiling(_)) => rows.extend([
+            plain(flood::NAME, flood::SUMMARY, flood::GUARANTEE),
+            plain(
+                portal_rect::NAME,
+                portal_rect::SUMMARY,
+                portal_rect::GUARANTEE,
+            ),
+            plain(
+                portal_clip::NAME,
+                portal_clip::SUMMARY,
+                portal_clip::GUARANTEE,
+            ),
+        ]),
+        StageKind::Occlusion => rows.extend(HIDING.iter().map(HidingRow::back_end)),
+        StageKind::Triangle if scene.items.len() <= MOST_MESHED => {
+            let sides = TRIANGLE_ROWS
+                .iter()
+                .filter(|row| row.criterion == Criterion::Facing);
+            let others = sides.filter(|row| row.name != NONE);
+            rows.extend(others.map(|row| plain(row.name, row.summary, row.guarantee)));
+        }
+        _ => {}
+    }
+    rows
 }
 
 impl Chain {
-    /// What suits a scene, but for the object stage.
-    pub fn for_scene(_scene: &Scene) -> Chain {
-        Chain::empty()
+    /// What suits a scene, but for the object stage: the safest back end of each stage
+    /// that removes the most.
+    pub fn for_scene(scene: &Scene) -> Chain {
+        let has = |stage, name: &'static str| {
+            back_ends(stage, scene)
+                .iter()
+                .any(|row| row.name == name)
+                .then_some(name)
+        };
+        [
+            (StageKind::Region, portal_clip::NAME),
+            (StageKind::Occlusion, "masked-inner"),
+            (StageKind::Triangle, "cone-safe"),
+        ]
+        .into_iter()
+        .fold(Chain::empty(), |chain, (stage, name)| {
+            match has(stage, name) {
+                Some(name) => chain.with(stage, name),
+                None => chain,
+            }
+        })
     }
 }

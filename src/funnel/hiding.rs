@@ -1,0 +1,86 @@
+//! The occlusion stage's back ends as rows: which buffer, in which coupling.
+
+use super::stage::{BackEnd, StageKind};
+use crate::kernel::Kernel;
+use crate::query::ItemId;
+use crate::visibility::occlusion::{
+    Interleaved, MaskedCentre, MaskedInner, OccluderChoice, OccluderScene, OcclusionBuffer,
+    TwoPass, View,
+};
+use crate::visibility::{Guarantee, SampleGrid};
+
+/// Something that removes what is hidden, with memory of its own.
+pub trait Hide {
+    /// Appends what is not hidden of `items`; a coupling that walks its own tree looks
+    /// for all items of the view.
+    fn hide(&mut self, scene: &OccluderScene, view: &View, items: &[ItemId], out: &mut Vec<ItemId>);
+}
+
+impl<B: OcclusionBuffer> Hide for TwoPass<B> {
+    fn hide(
+        &mut self,
+        scene: &OccluderScene,
+        view: &View,
+        items: &[ItemId],
+        out: &mut Vec<ItemId>,
+    ) {
+        self.cull(scene, view, items, out);
+    }
+}
+
+impl<B: OcclusionBuffer> Hide for Interleaved<B> {
+    fn hide(&mut self, scene: &OccluderScene, view: &View, _: &[ItemId], out: &mut Vec<ItemId>) {
+        self.cull(scene, view, out);
+    }
+}
+
+/// A row of the occlusion stage.
+pub struct HidingRow {
+    name: &'static str,
+    summary: &'static str,
+    guarantee: Guarantee,
+    is_interleaved: bool,
+    /// With a buffer of so many pixels, on an instruction set.
+    pub make: fn(SampleGrid, Kernel) -> Box<dyn Hide>,
+}
+
+impl HidingRow {
+    /// What it declares.
+    pub fn back_end(&self) -> BackEnd {
+        BackEnd {
+            stage: StageKind::Occlusion,
+            name: self.name,
+            summary: self.summary,
+            guarantee: self.guarantee,
+            does_object_stage: self.is_interleaved,
+        }
+    }
+
+    const fn interleaved<B: OcclusionBuffer + 'static>(name: &'static str) -> HidingRow {
+        HidingRow {
+            name,
+            summary: B::SUMMARY,
+            guarantee: B::GUARANTEE,
+            is_interleaved: true,
+            make: |grid, kernel| Box::new(Interleaved::new(B::new(grid), kernel)),
+        }
+    }
+
+    const fn two_pass<B: OcclusionBuffer + 'static>(name: &'static str) -> HidingRow {
+        HidingRow {
+            name,
+            summary: B::SUMMARY,
+            guarantee: B::GUARANTEE,
+            is_interleaved: false,
+            make: |grid, kernel| Box::new(TwoPass::new(B::new(grid), OccluderChoice::All, kernel)),
+        }
+    }
+}
+
+/// All of them; the first is what a chain takes.
+pub static HIDING: &[HidingRow] = &[
+    HidingRow::interleaved::<MaskedInner>("masked-inner"),
+    HidingRow::interleaved::<MaskedCentre>("masked"),
+    HidingRow::two_pass::<MaskedInner>("masked-inner-two-pass"),
+    HidingRow::two_pass::<MaskedCentre>("masked-two-pass"),
+];
