@@ -74,6 +74,14 @@ impl Marks {
         fresh
     }
 
+    /// Adds the numbers whose bits are set.
+    pub fn insert_all(&mut self, set: &[u64]) {
+        self.words
+            .iter_mut()
+            .zip(set)
+            .for_each(|(word, more)| *word |= more);
+    }
+
     /// Replaces `out` by the numbers, ascending.
     pub fn list(&self, out: &mut Vec<u32>) {
         out.clear();

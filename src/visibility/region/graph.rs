@@ -8,6 +8,7 @@ use super::answer::{Marks, RegionId};
 use super::locate::{BoxGrid, covers};
 use super::opening::{Opening, OpeningPlane, rectangle};
 use super::walk::follow_boxes;
+use super::witness::{Rejected, Witness, check_boxes};
 use crate::camera::Lens;
 use crate::scene::{Regions, Scene, Tiling, WorldBox};
 use crate::visibility::{Ray, Rays};
@@ -21,6 +22,13 @@ pub trait Ground: Send + Sync + std::fmt::Debug {
     /// Adds the regions that a ray passes before it meets what is opaque, by a
     /// search that shares nothing with the back ends.
     fn follow(&self, graph: &RegionGraph, ray: &Ray, seen: &mut Marks);
+
+    /// Checks a line of sight exactly, by a walk that shares nothing with what finds
+    /// such lines.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    fn check(&self, graph: &RegionGraph, witness: &Witness) -> Result<(), Rejected>;
 }
 
 /// Regions joined by openings: what one can see from one into another is seen
@@ -62,6 +70,10 @@ impl Ground for Boxes {
         for home in homes {
             follow_boxes(graph, home, ray, seen);
         }
+    }
+
+    fn check(&self, graph: &RegionGraph, witness: &Witness) -> Result<(), Rejected> {
+        check_boxes(graph, witness)
     }
 }
 
@@ -194,6 +206,14 @@ impl RegionGraph {
     pub fn exits(&self, region: RegionId) -> &[u32] {
         let at = region as usize;
         &self.exits[self.exit_starts[at] as usize..self.exit_starts[at + 1] as usize]
+    }
+
+    /// Checks a line of sight between two regions, exactly.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn check_witness(&self, witness: &Witness) -> Result<(), Rejected> {
+        self.ground.check(self, witness)
     }
 
     /// What finds the regions of a place.

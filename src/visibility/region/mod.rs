@@ -12,24 +12,38 @@
 //! ends but the exact ones list what they touch too.
 
 mod answer;
+mod audit;
 mod flood;
 mod graph;
+mod items;
 mod locate;
 mod none;
 mod opening;
 pub mod portal_clip;
 pub mod portal_rect;
+mod pvs;
+mod rooms;
+mod stab;
+pub mod stored;
 mod view;
 mod walk;
+mod witness;
 
 pub use answer::{EyePlace, Marks, RegionId, RegionRow, Scratch, decode};
+pub use audit::{Audit, OtherRegions, audit};
 pub use flood::Flood;
 pub use graph::{Ground, NoRegions, RegionGraph};
+pub use items::RegionItems;
 pub use locate::{BoxGrid, covers};
 pub use none::EveryRegion;
 pub use opening::{Opening, OpeningPlane, rectangle};
 pub use portal_clip::PortalClip;
 pub use portal_rect::PortalRect;
+pub use pvs::{Pvs, PvsError};
+pub use rooms::{NotFlat, RoomsPvs};
+pub use stab::{Stabbing, turn};
+pub use stored::StoredPvs;
 pub use walk::{follow_boxes, seen_by_samples};
+pub use witness::{ProvenPvs, Rejected, Witness, check_boxes};
 #[cfg(test)]
 mod tests;

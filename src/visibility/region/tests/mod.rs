@@ -1,4 +1,5 @@
 //! Every row against rays that are followed through the regions one by one.
 
+mod exact_rooms;
 mod from_eye;
 mod worlds;

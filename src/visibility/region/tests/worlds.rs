@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::super::RegionGraph;
+use super::super::{Marks, Pvs, RegionGraph};
 use crate::camera::{Camera, Frame, Lens};
 use crate::scene::{self, Scene, SeededRng};
-use crate::visibility::Rays;
+use crate::visibility::{Ray, Rays};
 
 pub fn rooms(spec: &str) -> (Scene, Arc<RegionGraph>) {
     let scene = scene::load(spec, &Default::default()).unwrap();
@@ -34,4 +34,31 @@ pub fn looking(eye: DVec3, rng: &mut SeededRng) -> Rays {
     let frame = Frame::looking_along(eye, forward, DVec3::Z).unwrap();
     let lens = Lens::perspective(60.0, 16.0 / 9.0, 0.05, None).unwrap();
     Rays::of(&Camera { frame, lens }).unwrap()
+}
+
+/// Pairs of regions that random rays, each from a random point of a region, join.
+pub fn joined_by_rays(graph: &RegionGraph, rays: usize, seed: u64) -> Pvs {
+    let mut rng = SeededRng::new(seed);
+    let mut pvs = Pvs::alone(graph.len());
+    let (mut seen, mut list) = (Marks::default(), Vec::new());
+    for i in 0..rays {
+        let from = (i % graph.len()) as u32;
+        let b = graph.parts(from)[0];
+        let at = DVec3::new(rng.unit(), rng.unit(), rng.unit());
+        let ray = Ray {
+            origin: b.min + (b.max - b.min) * at,
+            direction: DVec3::new(
+                rng.normal(),
+                rng.normal(),
+                rng.normal() * [0.05, 1.0][i % 2],
+            ),
+            near: 0.0,
+            far: f64::INFINITY,
+        };
+        seen.clear(graph.len());
+        graph.ground().follow(graph, &ray, &mut seen);
+        seen.list(&mut list);
+        list.iter().for_each(|&to| pvs.insert(from, to));
+    }
+    pvs
 }

@@ -1,0 +1,187 @@
+//! Which region may be seen from which: one row of bits for each region. Made by an
+//! exact search, or read from a file: then it is a claim, to be audited.
+
+use serde::{Deserialize, Serialize};
+
+use super::answer::{RegionId, decode};
+
+/// A potentially visible set: for each region the set of regions seen from it.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Pvs {
+    regions: usize,
+    words: usize,
+    bits: Vec<u64>,
+}
+
+/// Why bytes are no potentially visible set.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PvsError {
+    /// Not the JSON of one.
+    #[error("{0}; expected {{\"regions\": COUNT, \"sees\": [[FROM, TO], ...]}}")]
+    Json(#[from] serde_json::Error),
+    /// A region that is not there.
+    #[error("pair {pair} names region {region} of {regions}; expected less")]
+    Region {
+        /// Index of the pair.
+        pair: usize,
+        /// The number.
+        region: RegionId,
+        /// How many regions there are.
+        regions: usize,
+    },
+    /// More regions than pairs of them can be held.
+    #[error("{0} regions; expected at most 65536")]
+    TooMany(usize),
+    /// A REJECT table that ends early.
+    #[error("{found} bytes for {regions} sectors; expected at least {expected}")]
+    Short {
+        /// Bytes there are.
+        found: usize,
+        /// Bytes it takes.
+        expected: usize,
+        /// Number of sectors.
+        regions: usize,
+    },
+}
+
+/// Its form in a file: ordered pairs.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Written {
+    regions: usize,
+    sees: Vec<[RegionId; 2]>,
+}
+
+/// Most regions of a set: half a gigabyte of bits.
+const MOST_REGIONS: usize = 1 << 16;
+
+impl Pvs {
+    /// Each region sees itself alone. O(n^2) bits.
+    pub fn alone(regions: usize) -> Pvs {
+        let words = regions.div_ceil(64);
+        let mut pvs = Pvs {
+            regions,
+            words,
+            bits: vec![0; words * regions],
+        };
+        (0..regions as u32).for_each(|r| pvs.insert(r, r));
+        pvs
+    }
+
+    /// Reads `{"regions": COUNT, "sees": [[FROM, TO], ...]}`; each region sees
+    /// itself, whether that is written or not.
+    ///
+    /// # Errors
+    /// Other JSON, or a region that is not there.
+    pub fn from_json(text: &str) -> Result<Pvs, PvsError> {
+        let written: Written = serde_json::from_str(text)?;
+        let regions = written.regions;
+        if regions > MOST_REGIONS {
+            return Err(PvsError::TooMany(regions));
+        }
+        let mut pvs = Pvs::alone(regions);
+        for (pair, [from, to]) in written.sees.into_iter().enumerate() {
+            let region = from.max(to);
+            if region as usize >= regions {
+                return Err(PvsError::Region {
+                    pair,
+                    region,
+                    regions,
+                });
+            }
+            pvs.insert(from, to);
+        }
+        Ok(pvs)
+    }
+
+    /// As [`Pvs::from_json`] reads it; what each region sees of itself is left out.
+    pub fn to_json(&self) -> String {
+        let mut sees = Vec::new();
+        let mut row = Vec::new();
+        for from in 0..self.regions as u32 {
+            row.clear();
+            decode(self.row(from), &mut row);
+            sees.extend(row.iter().filter(|to| **to != from).map(|&to| [from, to]));
+        }
+        let written = Written {
+            regions: self.regions,
+            sees,
+        };
+        serde_json::to_string(&written).expect("numbers are JSON")
+    }
+
+    /// The REJECT table of a Doom map: bit `from * sectors + to`, lowest bit of a
+    /// byte first, is 1 where a monster in sector `from` cannot see sector `to`.
+    ///
+    /// # Errors
+    /// Fewer bits than pairs of sectors.
+    pub fn from_reject(bytes: &[u8], sectors: usize) -> Result<Pvs, PvsError> {
+        if sectors > MOST_REGIONS {
+            return Err(PvsError::TooMany(sectors));
+        }
+        let expected = (sectors * sectors).div_ceil(8);
+        if bytes.len() < expected {
+            return Err(PvsError::Short {
+                found: bytes.len(),
+                expected,
+                regions: sectors,
+            });
+        }
+        let mut pvs = Pvs::alone(sectors);
+        for from in 0..sectors {
+            for to in 0..sectors {
+                let bit = from * sectors + to;
+                if bytes[bit / 8] >> (bit % 8) & 1 == 0 {
+                    pvs.insert(from as u32, to as u32);
+                }
+            }
+        }
+        Ok(pvs)
+    }
+
+    /// Number of regions.
+    pub fn len(&self) -> usize {
+        self.regions
+    }
+
+    /// Whether there are no regions.
+    pub fn is_empty(&self) -> bool {
+        self.regions == 0
+    }
+
+    /// The bits of what a region sees, lowest first.
+    pub fn row(&self, from: RegionId) -> &[u64] {
+        let first = from as usize * self.words;
+        &self.bits[first..first + self.words]
+    }
+
+    /// Whether `to` is seen from `from`.
+    pub fn sees(&self, from: RegionId, to: RegionId) -> bool {
+        self.row(from)[to as usize / 64] >> (to % 64) & 1 == 1
+    }
+
+    /// Adds a pair, in this direction only.
+    pub fn insert(&mut self, from: RegionId, to: RegionId) {
+        self.bits[from as usize * self.words + to as usize / 64] |= 1 << (to % 64);
+    }
+
+    /// Takes a pair away, in this direction only.
+    pub fn remove(&mut self, from: RegionId, to: RegionId) {
+        self.bits[from as usize * self.words + to as usize / 64] &= !(1 << (to % 64));
+    }
+
+    /// Adds a whole set of regions to a row.
+    pub fn insert_all(&mut self, from: RegionId, set: &[u64]) {
+        let first = from as usize * self.words;
+        let row = &mut self.bits[first..first + self.words];
+        row.iter_mut()
+            .zip(set)
+            .for_each(|(word, more)| *word |= more);
+    }
+
+    /// Number of ordered pairs, each region with itself included.
+    pub fn pairs(&self) -> u64 {
+        self.bits.iter().map(|w| u64::from(w.count_ones())).sum()
+    }
+}

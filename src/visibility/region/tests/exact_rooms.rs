@@ -1,0 +1,140 @@
+use std::sync::Arc;
+
+use super::super::*;
+use super::worlds::*;
+use crate::scene::SeededRng;
+
+const WORLDS: [&str; 4] = [
+    "rooms:n=1600,seed=1",
+    "rooms:n=700,seed=2,storeys=6",
+    "rooms:n=1000,seed=4,storeys=1,room=3",
+    "rooms:n=64,seed=5,storeys=4",
+];
+
+#[test]
+fn each_pair_has_a_witness_and_rays_find_no_other() {
+    for world in WORLDS {
+        let (_, graph) = rooms(world);
+        let exact = RoomsPvs::of(graph.clone()).unwrap();
+        let pvs = exact.pvs();
+        let (mut flood, n) = (Vec::new(), graph.len() as u32);
+        for a in 0..n {
+            graph.component(a, &mut flood);
+            for b in 0..n {
+                assert_eq!(pvs.sees(a, b), pvs.sees(b, a), "{world} {a} {b}");
+                let open = exact.undecided().contains(&[a.min(b), a.max(b)]);
+                if a == b || !pvs.sees(a, b) || open {
+                    continue;
+                }
+                assert!(flood.binary_search(&b).is_ok());
+                let witness = exact.witness(a, b).expect("a line of sight");
+                graph.check_witness(&witness).expect("a good one");
+                // The same line proves nothing of other regions.
+                let other = Witness {
+                    regions: [a, (b + 1) % n],
+                    ..witness
+                };
+                assert!(graph.check_witness(&other).is_err());
+            }
+        }
+        let rays = joined_by_rays(&graph, 100_000, 3);
+        for a in 0..n {
+            for b in 0..n {
+                assert!(pvs.sees(a, b) || !rays.sees(a, b), "{world} {a} {b}");
+            }
+        }
+        // Rays find most of what there is.
+        assert!(
+            rays.pairs() * 2 > pvs.pairs(),
+            "{} {}",
+            rays.pairs(),
+            pvs.pairs()
+        );
+        assert!(
+            exact.undecided().len() * 50 < pvs.pairs() as usize,
+            "{world}"
+        );
+        println!(
+            "{world}: {} rooms, {} pairs, rays {}, undecided {}",
+            n,
+            pvs.pairs(),
+            rays.pairs(),
+            exact.undecided().len()
+        );
+    }
+}
+
+#[test]
+fn a_search_that_forgets_an_opening_is_caught_by_rays() {
+    let (_, graph) = rooms(WORLDS[0]);
+    let wrong = RoomsPvs::of(Arc::new(graph.without_opening(7))).unwrap();
+    let rays = joined_by_rays(&graph, 100_000, 3);
+    let n = graph.len() as u32;
+    let lost = |a: u32| {
+        (0..n)
+            .filter(|&b| rays.sees(a, b) && !wrong.pvs().sees(a, b))
+            .count()
+    };
+    assert!((0..n).map(lost).sum::<usize>() > 0);
+}
+
+#[test]
+fn an_audit_finds_each_doctored_bit_with_a_line_of_sight() {
+    let (_, graph) = rooms(WORLDS[0]);
+    let exact = RoomsPvs::of(graph.clone()).unwrap();
+    let honest = audit(exact.pvs(), &exact, &graph).unwrap();
+    assert!(honest.false_negatives.is_empty() && honest.asymmetric.is_empty());
+    assert_eq!(
+        (honest.false_positives, honest.claimed),
+        (0, honest.visible)
+    );
+
+    let mut doctored = Pvs::from_json(&exact.pvs().to_json()).unwrap();
+    assert_eq!(&doctored, exact.pvs());
+    let (mut rng, mut cleared, mut set) = (SeededRng::new(2), 0, 0);
+    let n = graph.len();
+    while cleared < 40 || set < 10 {
+        let [a, b] = [rng.below(n) as u32, rng.below(n) as u32];
+        if a != b && doctored.sees(a, b) == exact.pvs().sees(a, b) {
+            if doctored.sees(a, b) && cleared < 40 {
+                doctored.remove(a, b);
+                cleared += 1;
+            } else if !doctored.sees(a, b) && set < 10 {
+                doctored.insert(a, b);
+                set += 1;
+            }
+        }
+    }
+    let found = audit(&doctored, &exact, &graph).unwrap();
+    assert_eq!(found.false_negatives.len() + found.unproven.len(), 40);
+    assert!(found.unproven.len() <= exact.undecided().len());
+    assert_eq!(found.false_positives, 10);
+    assert!(!found.asymmetric.is_empty());
+    for witness in &found.false_negatives {
+        let [a, b] = witness.regions;
+        assert!(!doctored.sees(a, b) && graph.check_witness(witness).is_ok());
+    }
+    assert!(audit(&Pvs::alone(3), &exact, &graph).is_err());
+}
+
+#[test]
+fn witnesses_that_touch_or_pass_walls_are_rejected() {
+    let (_, graph) = rooms(WORLDS[0]);
+    let exact = RoomsPvs::of(graph.clone()).unwrap();
+    let [a, b] = graph.openings()[3].sides;
+    let good = exact.witness(a, b).unwrap();
+    assert_eq!(graph.check_witness(&good), Ok(()));
+    // Through the very edge of the opening.
+    let edge = graph.openings()[3].corners[0];
+    let mut touching = good;
+    touching.ends[1] = edge + (edge - good.ends[0]) * 2f64.powi(-20);
+    assert!(graph.check_witness(&touching).is_err());
+    let mut outside = good;
+    outside.ends[0] = graph.parts(a)[0].min;
+    assert_eq!(graph.check_witness(&outside), Err(Rejected::End(0)));
+    let nowhere = Witness {
+        regions: [a, 99_999],
+        ..good
+    };
+    assert_eq!(graph.check_witness(&nowhere), Err(Rejected::Region));
+}
