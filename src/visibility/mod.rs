@@ -7,6 +7,7 @@ mod guarantee;
 pub mod pick;
 mod rays;
 mod solids;
+pub mod truth;
 
 pub use guarantee::Guarantee;
 pub use rays::{NoRays, Ray, Rays, SampleGrid};

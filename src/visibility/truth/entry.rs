@@ -1,0 +1,190 @@
+//! Where a ray enters a box, exactly: in f64 with an error bound, and by expansions
+//! where that does not decide. Which box is the front one is left to the index.
+
+use std::cmp::Ordering;
+
+use crate::arithmetic::{Expansion, two_sum};
+use crate::scene::WorldBox;
+use crate::visibility::Ray;
+
+/// Relative error of a rounded depth, with room to spare: `(plane - origin)`, the
+/// reciprocal of the direction and their product each round by at most 2^-53, so
+/// the depth is true to 3.01 * 2^-53 of itself; `x + GUARD * |x|` and the like round
+/// once or twice more. 8 * 2^-53 is above their sum.
+const GUARD: f64 = 8.0 / (1u64 << 53) as f64;
+
+/// Where a ray crosses a plane across an axis. Its true depth is the fraction
+/// `(plane - origin[axis]) / direction[axis]`.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Crossing {
+    /// That depth in f64, true to 2^-50 of itself.
+    pub depth: f64,
+    /// The bound of the box that is crossed there, world coordinate.
+    pub plane: f64,
+    axis: usize,
+}
+
+impl Crossing {
+    /// No depth at which the ray crosses there is below this.
+    pub fn at_least(&self) -> f64 {
+        self.depth - GUARD * self.depth.abs()
+    }
+
+    /// No depth at which the ray crosses there is above this.
+    pub fn at_most(&self) -> f64 {
+        self.depth + GUARD * self.depth.abs()
+    }
+}
+
+/// A ray that asks boxes where it enters them.
+///
+/// Exact for coordinates and components of direction that are 0 or from 2^-400 to
+/// 2^400 in size.
+#[derive(Clone, Copy, Debug)]
+pub struct Probe {
+    ray: Ray,
+    /// Infinite where the direction's component is zero, and not used there.
+    inverse: [f64; 3],
+}
+
+impl Probe {
+    /// The ray, made ready.
+    pub fn new(ray: Ray) -> Probe {
+        let inverse = ray.direction.to_array().map(|d| 1.0 / d);
+        Probe { ray, inverse }
+    }
+
+    /// The ray as it was given.
+    pub fn ray(&self) -> &Ray {
+        &self.ray
+    }
+
+    #[inline(always)]
+    fn crossing(&self, axis: usize, plane: f64) -> Crossing {
+        let depth = (plane - self.ray.origin[axis]) * self.inverse[axis];
+        Crossing { depth, plane, axis }
+    }
+
+    /// Where the ray enters the closed box, if that is from near to far: the truth
+    /// of [`Solids`](crate::visibility::Solids). `None` as well if it certainly
+    /// enters beyond `limit`.
+    #[inline]
+    pub fn enter(&self, b: &WorldBox, limit: f64) -> Option<Crossing> {
+        let ray = &self.ray;
+        let mut entries = [Crossing {
+            depth: f64::NEG_INFINITY,
+            plane: 0.0,
+            axis: 0,
+        }; 3];
+        let mut exits = entries;
+        let (mut first, mut last) = (f64::NEG_INFINITY, f64::INFINITY);
+        let mut axes = 0;
+        for axis in 0..3 {
+            let (d, o) = (ray.direction[axis], ray.origin[axis]);
+            let (low, high) = (b.min[axis], b.max[axis]);
+            if d == 0.0 {
+                if o < low || o > high {
+                    return None;
+                }
+                continue;
+            }
+            let (near_side, far_side) = if d > 0.0 { (low, high) } else { (high, low) };
+            entries[axes] = self.crossing(axis, near_side);
+            exits[axes] = self.crossing(axis, far_side);
+            first = first.max(entries[axes].depth);
+            last = last.min(exits[axes].depth);
+            axes += 1;
+        }
+        // x -> x + GUARD |x| grows with x: what holds for the largest rounded entry
+        // holds for the true one, and likewise for the least exit.
+        let slack = |x: f64| GUARD * x.abs();
+        let (enters_from, enters_to) = (first - slack(first), first + slack(first));
+        let leaves_from = last - slack(last);
+        if enters_from > last + slack(last)
+            || enters_to < ray.near
+            || enters_from > ray.far
+            || enters_from > limit
+        {
+            return None;
+        }
+        let (entries, exits) = (&entries[..axes], &exits[..axes]);
+        let enters = self.latest(entries)?;
+        let misses = || exits.iter().any(|e| self.compare(&enters, e).is_gt());
+        if enters_to > leaves_from && misses() {
+            return None;
+        }
+        if enters_from < ray.near && self.compare_with(&enters, ray.near).is_lt() {
+            return None;
+        }
+        if enters_to > ray.far && self.compare_with(&enters, ray.far).is_gt() {
+            return None;
+        }
+        Some(enters)
+    }
+
+    /// The crossing of the largest depth.
+    #[inline]
+    fn latest(&self, crossings: &[Crossing]) -> Option<Crossing> {
+        let later = |a: Crossing, b: &Crossing| if self.compare(b, &a).is_gt() { *b } else { a };
+        let (&first, rest) = crossings.split_first()?;
+        Some(rest.iter().fold(first, later))
+    }
+
+    /// Which of two crossings of this ray comes first, exactly.
+    #[inline]
+    pub fn compare(&self, a: &Crossing, b: &Crossing) -> Ordering {
+        if a.axis == b.axis {
+            let order = a.plane.total_cmp(&b.plane);
+            let same = a.plane == b.plane;
+            return match self.ray.direction[a.axis] > 0.0 {
+                _ if same => Ordering::Equal,
+                true => order,
+                false => order.reverse(),
+            };
+        }
+        let difference = a.depth - b.depth;
+        if difference.abs() > GUARD * (a.depth.abs() + b.depth.abs()) {
+            return if difference > 0.0 {
+                Ordering::Greater
+            } else {
+                Ordering::Less
+            };
+        }
+        self.compare_exactly(a, b)
+    }
+
+    /// `N_a / d_a` against `N_b / d_b`, multiplied by both `d`.
+    #[cold]
+    fn compare_exactly(&self, a: &Crossing, b: &Crossing) -> Ordering {
+        let direction = &self.ray.direction;
+        let (da, db) = (direction[a.axis], direction[b.axis]);
+        let left = &self.numerator(a) * &Expansion::from(db);
+        let right = &self.numerator(b) * &Expansion::from(da);
+        let order = (&left - &right).sign().cmp(&0);
+        if (da > 0.0) == (db > 0.0) {
+            order
+        } else {
+            order.reverse()
+        }
+    }
+
+    /// A crossing against a depth, exactly.
+    fn compare_with(&self, a: &Crossing, depth: f64) -> Ordering {
+        if depth.is_infinite() {
+            return 0.0_f64.total_cmp(&depth);
+        }
+        let d = self.ray.direction[a.axis];
+        let order = (&self.numerator(a) - &Expansion::product(depth, d))
+            .sign()
+            .cmp(&0);
+        if d > 0.0 { order } else { order.reverse() }
+    }
+
+    /// `plane - origin`, exactly.
+    fn numerator(&self, a: &Crossing) -> Expansion {
+        let (sum, lost) = two_sum(a.plane, -self.ray.origin[a.axis]);
+        let mut exact = Expansion::from(lost);
+        exact.grow(sum);
+        exact
+    }
+}

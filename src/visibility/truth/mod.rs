@@ -1,0 +1,14 @@
+//! What is really visible: exact along the rays of a sample grid (`sample`, kept on
+//! disk by `cache`), and for all rays of a view where a witness or a cover proves it
+//! (`certificate`, held against the boxes by `check`, which shares no code with the
+//! search). It knows boxes, cameras and rays, not the back ends that it judges.
+
+mod entry;
+#[cfg(test)]
+pub(super) mod judge;
+mod ray_index;
+mod sample;
+
+pub use entry::{Crossing, Probe};
+pub use ray_index::{Front, RayIndex};
+pub use sample::{NO_ITEM, SampleTruth, visible_by_random_rays};
