@@ -108,11 +108,13 @@ fn turned(order: Ordering, reversed: bool) -> Ordering {
 #[inline(always)]
 fn by_error(a: f64, b: f64) -> Option<Ordering> {
     let (difference, error) = (a - b, (a.abs() + b.abs()) * ERROR + TINY);
-    // No comparison with a NaN holds.
-    if difference > error && difference.is_finite() {
-        Some(Ordering::Greater)
-    } else if -difference > error && difference.is_finite() {
-        Some(Ordering::Less)
+    // No comparison with a NaN holds; that of infinities tells nothing.
+    if difference.abs() > error && error.is_finite() {
+        Some(if difference > 0.0 {
+            Ordering::Greater
+        } else {
+            Ordering::Less
+        })
     } else {
         None
     }
@@ -154,6 +156,35 @@ pub fn entry(ray: &Ray, b: &WorldBox) -> Option<Crossing> {
         && enters.order_depth(ray.near, ray).is_ge()
         && enters.order_depth(ray.far, ray).is_le();
     met.then_some(enters)
+}
+
+/// The rounded depth of [`entry`] for a box that the ray is known to meet.
+#[inline]
+pub fn depth_of_met(ray: &Ray, b: &WorldBox) -> Option<f64> {
+    let depth = |axis: usize| {
+        let along = ray.direction[axis];
+        let first = if along > 0.0 {
+            b.min[axis]
+        } else {
+            b.max[axis]
+        };
+        let depth = (first - ray.origin[axis]) / along;
+        if along == 0.0 {
+            f64::NEG_INFINITY
+        } else {
+            depth
+        }
+    };
+    let [x, y, z] = [depth(0), depth(1), depth(2)];
+    let deepest = x.max(y).max(z);
+    // Where two are within their errors, the deeper one may be rounded less.
+    let near = |depth: f64| by_error(deepest, depth).is_none();
+    let near = [x, y, z].map(|depth| u32::from(near(depth)));
+    if near.iter().sum::<u32>() == 1 && deepest.is_finite() {
+        Some(deepest)
+    } else {
+        entry(ray, b).map(|at| at.depth())
+    }
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@ use glam::{DVec3, Vec3};
 use self::build::Node;
 use self::slabs::Slabs;
 use super::contract::{About, Hit, NotBuilt, Pick};
+use super::entry::depth_of_met;
 use super::exactly;
 use crate::geometry::Aabb;
 use crate::index::Origin;
@@ -47,6 +48,8 @@ pub struct WideRay {
     zero: DVec3,
     /// Largest absolute local coordinate on each axis.
     reach: Vec3,
+    /// The best of the machine that it was built on.
+    kernel: Kernel,
 }
 
 impl WideRay {
@@ -66,6 +69,7 @@ impl WideRay {
             ids,
             zero: solids.origin,
             reach: Aabb::union_of(&solids.outer).reach(),
+            kernel: Kernel::best(),
         })
     }
 
@@ -121,11 +125,28 @@ impl WideRay {
                     }
                 }
                 left &= !items;
-                let first = open.len();
-                while left != 0 {
+                if left != 0 {
+                    let first = open.len();
+                    // The nearest so far is kept out of the stack.
                     let lane = left.trailing_zeros() as usize % LANES;
                     left &= left - 1;
-                    open.push_sorted(first, -less_entry[lane], node.children[lane]);
+                    let mut next = (-less_entry[lane], node.children[lane]);
+                    while left != 0 {
+                        let lane = left.trailing_zeros() as usize % LANES;
+                        left &= left - 1;
+                        let other = (-less_entry[lane], node.children[lane]);
+                        let (low, high) = if other.0 < next.0 {
+                            (other, next)
+                        } else {
+                            (next, other)
+                        };
+                        next = low;
+                        open.push_sorted(first, high);
+                    }
+                    if next.0 <= found.bound() {
+                        at = next.1;
+                        continue;
+                    }
                 }
             }
             loop {
@@ -179,19 +200,19 @@ impl Open {
 
     /// Adds a node to those from `first` on, which are sorted.
     #[inline(always)]
-    fn push_sorted(&mut self, first: usize, low: f32, node: u32) {
+    fn push_sorted(&mut self, first: usize, node: (f32, u32)) {
         if self.used == NEAR {
             // Out of order, which costs time only.
-            self.far.push((low, node));
+            self.far.push(node);
             return;
         }
         let mut at = self.used;
         self.used += 1;
-        while at > first && self.near[at - 1].0 < low {
+        while at > first && self.near[at - 1].0 < node.0 {
             self.near[at] = self.near[at - 1];
             at -= 1;
         }
-        self.near[at] = (low, node);
+        self.near[at] = node;
     }
 
     #[inline(always)]
@@ -210,6 +231,8 @@ const FEW: usize = 8;
 /// The candidates for the first hit.
 struct Foremost {
     bound: f32,
+    /// The candidate that the bound is of, for certain met.
+    certain: u32,
     few: [(f32, u32); FEW],
     used: usize,
     more: Vec<(f32, u32)>,
@@ -250,6 +273,7 @@ impl Candidates for Foremost {
     fn offer(&mut self, low: f32, high: f32, place: u32) {
         if high < self.bound {
             self.bound = high;
+            self.certain = place;
         }
         if self.used == FEW {
             self.make_room();
@@ -275,11 +299,17 @@ impl Work for First<'_> {
         };
         let mut found = Foremost {
             bound: slabs.far(),
+            certain: u32::MAX,
             few: [(0.0, 0); FEW],
             used: 0,
             more: Vec::new(),
         };
         tree.search(isa, &slabs, &mut found);
+        let mut within = found.within();
+        if within.next() == Some(found.certain) && within.next().is_none() {
+            let (item, b) = tree.place(found.certain);
+            return depth_of_met(ray, b).map(|depth| Hit { item, depth });
+        }
         exactly::first(ray, found.within().map(|place| tree.place(place)))
     }
 }
@@ -362,11 +392,11 @@ impl Pick for WideRay {
     }
 
     fn first(&self, ray: &Ray) -> Option<Hit> {
-        self.first_by(Kernel::best(), ray)
+        self.first_by(self.kernel, ray)
     }
 
     fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {
-        self.nearest_by(Kernel::best(), ray, count, hits);
+        self.nearest_by(self.kernel, ray, count, hits);
     }
 
     fn memory(&self) -> usize {

@@ -12,13 +12,15 @@
 //! - the product: |b|
 //! - the sum: |b| + |o| + slack
 //! - the rounding of the box: 2 |b|
+//! - `c` less or plus the slack, rounded to f32: |o| + slack
 //! - `o` and `c` in f64: far below 0.1 |o|
 //!
-//! together 5.01 |b| + 2.1 |o| and the rounding of the slack, which
-//! `6 R + 3 |o| + 2^-80` exceeds for all `|b| <= R` (2^-80 is above all that
+//! together 5.01 |b| + 3.1 |o| and two roundings of the slack, which
+//! `6 R + 4 |o| + 2^-80` exceeds for all `|b| <= R` (2^-80 is above all that
 //! underflows). So `t` lies between the values that are computed with `c` less and
-//! plus this slack, rounded outward. What is computed for one box is monotone in
-//! its sides, so a node's bounds bound those of its items.
+//! plus this slack. What is computed for one box is monotone in its sides, so a
+//! node's bounds bound those of its items. (Nothing here is rounded by a branch on
+//! its sign or size: those cost more than the test of a node.)
 //!
 //! An axis along which the ray moves by less than 2^-80 per unit of depth is
 //! taken as one with the inverse 2^64 and at least 2^44 of slack: all depths at
@@ -33,7 +35,6 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::arithmetic::rounding::round_up;
 use crate::kernel::{Isa, LANES, LaneMask};
 use crate::visibility::Ray;
 
@@ -45,6 +46,17 @@ const LEAST_ALONG: f64 = 1.0 / (1u128 << 80) as f64;
 const INVERSE_OF_NONE: f32 = (1u128 << 64) as f32;
 /// The slack of such an axis, at least.
 const SLACK_OF_NONE: f64 = (1u64 << 44) as f64;
+
+/// Below the largest f32, above all depths.
+const MOST_DEPTH: f64 = 1e38;
+
+/// Two f32 below and above a depth: one part in 2^24 is lost when they are
+/// rounded, and less than 1e-37 where they underflow. (Infinity has no lower one.)
+#[inline(always)]
+fn around(depth: f64) -> [f32; 2] {
+    let more = depth.abs() * f64::from(f32::EPSILON) + 1e-37;
+    [(depth - more) as f32, (depth + more) as f32]
+}
 
 /// Sixteen boxes as six rows: min x, y, z, then max x, y, z.
 pub(super) type Rows = [[f32; LANES]; 6];
@@ -102,8 +114,8 @@ impl Slabs {
             inverse: [0.0; 3],
             low: [0.0; 3],
             high: [0.0; 3],
-            near: [-round_up(-ray.near), round_up(ray.near)],
-            far: [-round_up(-ray.far), round_up(ray.far)],
+            near: around(ray.near),
+            far: [around(ray.far.min(MOST_DEPTH))[0], around(ray.far)[1]],
         };
         for axis in 0..3 {
             let along = ray.direction[axis];
@@ -118,7 +130,7 @@ impl Slabs {
                 slabs.last[axis] = axis;
             }
             let i = f64::from(inverse);
-            let size = 6.0 * f64::from(reach[axis]) + 3.0 * start[axis].abs() + LEAST_ALONG;
+            let size = 6.0 * f64::from(reach[axis]) + 4.0 * start[axis].abs() + LEAST_ALONG;
             let slack = size * i.abs() * (f64::from(f32::EPSILON) / 2.0);
             let slack = if moves {
                 slack
@@ -127,8 +139,8 @@ impl Slabs {
             };
             let centre = -start[axis] * i;
             slabs.inverse[axis] = inverse;
-            slabs.low[axis] = -round_up(slack - centre);
-            slabs.high[axis] = round_up(centre + slack);
+            slabs.low[axis] = (centre - slack) as f32;
+            slabs.high[axis] = (centre + slack) as f32;
         }
         Some(slabs)
     }
