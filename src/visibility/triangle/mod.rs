@@ -11,6 +11,8 @@ mod contract;
 mod exact;
 mod eye;
 mod masks;
+#[cfg(feature = "peers")]
+mod meshopt;
 mod metrics;
 mod none;
 mod normal_cone;
@@ -31,6 +33,8 @@ pub use cone_safe::SafeCones;
 pub use contract::{Criterion, TriangleCull, TriangleRow};
 pub use exact::faces;
 pub use eye::Eye;
+#[cfg(feature = "peers")]
+pub use meshopt::MeshoptCones;
 pub use metrics::{Counts, facing};
 pub use outcode::{Clipping, clipping};
 pub use screen::Screen;
@@ -49,6 +53,8 @@ pub const TRIANGLE_ROWS: &[TriangleRow] = &[
     masks::ROW,
     outcode::ROW,
     small::ROW,
+    #[cfg(feature = "peers")]
+    meshopt::ROW,
 ];
 
 #[cfg(test)]
