@@ -188,3 +188,28 @@ impl Probe {
         exact
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    #[test]
+    fn near_and_far_are_decided_to_the_last_bit() {
+        // A third lies between two neighbouring doubles.
+        let (below, above) = (1.0 / 3.0, (1.0_f64 / 3.0).next_up());
+        let b = WorldBox::new(DVec3::new(1.0, -1.0, -1.0), DVec3::splat(2.0));
+        let met = |near, far| {
+            let (origin, direction) = (DVec3::ZERO, DVec3::X * 3.0);
+            let ray = Ray {
+                origin,
+                direction,
+                near,
+                far,
+            };
+            Probe::new(ray).enter(&b, f64::INFINITY).is_some()
+        };
+        assert!(met(below, f64::INFINITY) && !met(above, f64::INFINITY));
+        assert!(met(0.0, above) && !met(0.0, below));
+    }
+}

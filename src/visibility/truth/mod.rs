@@ -3,12 +3,17 @@
 //! (`certificate`, held against the boxes by `check`, which shares no code with the
 //! search). It knows boxes, cameras and rays, not the back ends that it judges.
 
+mod certificate;
+mod cover;
 mod entry;
 #[cfg(test)]
 pub(super) mod judge;
 mod ray_index;
 mod sample;
+mod sight;
 
+pub use certificate::{Cell, Certificates, Edge, Proof, View};
+pub use cover::{Class, Prover, certify};
 pub use entry::{Crossing, Probe};
 pub use ray_index::{Front, RayIndex};
 pub use sample::{NO_ITEM, SampleTruth, visible_by_random_rays};

@@ -1,0 +1,209 @@
+//! Proofs of what is visible and what is hidden, for all rays of a view and not
+//! only for those of a grid. It defines how they are written down; `cover` looks for
+//! them and `check` verifies them.
+
+use serde::{Deserialize, Serialize};
+
+use crate::camera::Lens;
+use crate::query::ItemId;
+use crate::visibility::{Ray, Rays};
+
+/// By how much the view of a certificate is larger than the camera's, as a share of
+/// its width: rays are rounded, and the four sides are too (both some 2^-52). What
+/// is proven for the larger view holds for every rounded ray of the camera.
+const SLACK: f64 = 1.0 / (1u64 << 30) as f64;
+
+/// The same as a share of the coordinates, where an orthographic ray begins.
+const SLACK_OF_PLACE: f64 = 1.0 / (1u64 << 45) as f64;
+
+/// All rays of a camera, in plain numbers that are taken as they are.
+///
+/// A line of sight is three numbers up to a factor above zero. From an eye, they are
+/// its direction. Of parallel lines, let `m` be the axis along which their direction
+/// is longest (the first of equals): the numbers are (x, y, z) = (X, Y, Z) * W where
+/// the line crosses the plane of the other two axes, with W above zero in place m.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct View {
+    /// Where depths are counted from; the origin of all rays of a lens with a centre.
+    pub eye: [f64; 3],
+    /// The direction in which depths are counted, of length 1 (to rounding).
+    pub forward: [f64; 3],
+    /// Whether all rays go `forward`, instead of through the eye.
+    pub parallel: bool,
+    /// A line of sight is in the view if its scalar product with none of these four
+    /// is below zero.
+    pub sides: [[f64; 3]; 4],
+    /// Least depth, along the ray's own direction, at which items are visible.
+    pub near: f64,
+    /// Largest such depth; none without a far plane.
+    pub far: Option<f64>,
+    /// Least depth at which a box that a ray enters hides what is behind: near and a
+    /// little more.
+    pub hides_from: f64,
+}
+
+/// A line through the image that parts a cell.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Edge {
+    /// The item of whose box it is an edge.
+    pub item: ItemId,
+    /// The two axes across it, ascending.
+    pub axes: [u8; 2],
+    /// On each of them: whether it is at the upper bound.
+    pub upper: [bool; 2],
+}
+
+/// A part of the image of an item, and why no ray through it sees the item.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Cell {
+    /// There are no rays in it.
+    Empty,
+    /// Every ray through it enters the box of this item first, and not before the
+    /// near plane.
+    Behind(ItemId),
+    /// Two parts, on the one side of an edge (where the form of `check` is not below
+    /// zero) and on the other.
+    Parted(Edge, Box<[Cell; 2]>),
+}
+
+/// What is known of an item, and the proof of it.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Proof {
+    /// Visible: it is in front (or ties) along this ray.
+    Witness {
+        /// Where the ray begins.
+        origin: [f64; 3],
+        /// Its direction per unit of depth.
+        direction: [f64; 3],
+    },
+    /// Hidden: the eye is in the closed box, which is entered before any near plane.
+    AroundEye,
+    /// Hidden: the image of the box is covered. The outline lists corners of the
+    /// box (bit k: the upper bound on axis k), so that each side has the whole box on
+    /// its left; none if the box has no image that is an area.
+    Cover {
+        /// Corners round its image.
+        outline: Vec<u8>,
+        /// Why each part of it is hidden.
+        cell: Cell,
+    },
+    /// Neither was found.
+    Undecided,
+}
+
+/// What is known of some items in a view.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct Certificates {
+    /// The scene's name, for people.
+    pub scene: String,
+    /// Number of its boxes.
+    pub boxes: usize,
+    /// The view.
+    pub view: View,
+    /// Items with their proofs.
+    pub proofs: Vec<(ItemId, Proof)>,
+}
+
+impl Certificates {
+    /// Proofs of a scene's items in a view.
+    pub fn new(
+        scene: impl Into<String>,
+        boxes: usize,
+        view: View,
+        proofs: Vec<(ItemId, Proof)>,
+    ) -> Certificates {
+        let scene = scene.into();
+        Certificates {
+            scene,
+            boxes,
+            view,
+            proofs,
+        }
+    }
+
+    /// As text; [`Certificates::from_json`] reads back the very same numbers.
+    ///
+    /// # Panics
+    /// Never: these types have no value that JSON cannot hold.
+    pub fn to_json(&self) -> String {
+        serde_json::to_string(self).expect("numbers, names and lists")
+    }
+
+    /// Reads what [`Certificates::to_json`] wrote.
+    ///
+    /// # Errors
+    /// Text that is something else.
+    pub fn from_json(text: &str) -> Result<Certificates, serde_json::Error> {
+        serde_json::from_str(text)
+    }
+}
+
+impl View {
+    /// The rays of a camera, and a 2^-30 more on each side.
+    pub fn of(rays: &Rays) -> View {
+        let camera = rays.camera();
+        let frame = &camera.frame;
+        let (u, v, forward, eye) = (frame.u(), frame.v(), frame.forward(), frame.eye);
+        let parallel = matches!(camera.lens, Lens::Orthographic { .. });
+        let [left, right, bottom, top] = rays.window();
+        let place = match parallel {
+            true => SLACK_OF_PLACE * eye.abs().max_element(),
+            false => 0.0,
+        };
+        let (wide, high) = (
+            SLACK * (right - left) + place,
+            SLACK * (top - bottom) + place,
+        );
+        let bounds = [left - wide, right + wide, bottom - high, top + high];
+        // Of a line at (a, b) of the window, times -1 on the upper sides: a - left.
+        let side = |axis: glam::DVec3, bound: f64| match parallel {
+            false => axis - forward * bound,
+            true => {
+                let mut line = axis;
+                line[longest(forward.to_array())] = -axis.dot(eye) - bound;
+                line
+            }
+        };
+        let near = camera.lens.near();
+        View {
+            eye: eye.to_array(),
+            forward: forward.to_array(),
+            parallel,
+            sides: [
+                side(u, bounds[0]).to_array(),
+                (-side(u, bounds[1])).to_array(),
+                side(v, bounds[2]).to_array(),
+                (-side(v, bounds[3])).to_array(),
+            ],
+            near,
+            far: camera.lens.far(),
+            hides_from: near + SLACK * near.abs() + place,
+        }
+    }
+
+    /// A ray of this view.
+    pub(super) fn ray(&self, origin: [f64; 3], direction: [f64; 3]) -> Ray {
+        Ray {
+            origin: origin.into(),
+            direction: direction.into(),
+            near: self.near,
+            far: self.far.unwrap_or(f64::INFINITY),
+        }
+    }
+}
+
+/// The axis along which a direction is longest, the first of equals.
+pub(super) fn longest(direction: [f64; 3]) -> usize {
+    let size = direction.map(f64::abs);
+    let first = if size[1] > size[0] { 1 } else { 0 };
+    if size[2] > size[first] { 2 } else { first }
+}
