@@ -4,10 +4,10 @@
 use std::cmp::Ordering;
 
 use super::contract::Hit;
-use super::entry::{Crossing, entry};
 use crate::query::ItemId;
 use crate::scene::WorldBox;
 use crate::visibility::Ray;
+use crate::visibility::truth::{Crossing, Probe};
 
 /// An item that the ray meets, with its exact depth.
 #[derive(Clone, Copy, Debug)]
@@ -20,14 +20,13 @@ impl Met {
     pub fn hit(&self) -> Hit {
         Hit {
             item: self.item,
-            depth: self.at.depth(),
+            depth: self.at.depth,
         }
     }
 
-    fn order(&self, other: &Met, ray: &Ray) -> Ordering {
-        self.at
-            .order(&other.at, ray)
-            .then(self.item.cmp(&other.item))
+    fn order(&self, other: &Met, probe: &Probe) -> Ordering {
+        let by_depth = probe.compare(&self.at, &other.at);
+        by_depth.then(self.item.cmp(&other.item))
     }
 }
 
@@ -37,11 +36,13 @@ pub(super) fn first<'a>(
     ray: &Ray,
     candidates: impl IntoIterator<Item = (ItemId, &'a WorldBox)>,
 ) -> Option<Hit> {
+    let probe = Probe::new(*ray);
     let mut best: Option<Met> = None;
     for (item, b) in candidates {
-        if let Some(at) = entry(ray, b) {
+        let limit = best.map_or(ray.far, |best| best.at.at_most());
+        if let Some(at) = probe.enter(b, limit) {
             let met = Met { item, at };
-            if best.is_none_or(|best| met.order(&best, ray).is_lt()) {
+            if best.is_none_or(|best| met.order(&best, &probe).is_lt()) {
                 best = Some(met);
             }
         }
@@ -61,11 +62,12 @@ pub(super) fn nearest<'a>(
     let Some(last) = count.checked_sub(1) else {
         return;
     };
-    let met = |(item, b)| entry(ray, b).map(|at| Met { item, at });
+    let probe = Probe::new(*ray);
+    let met = |(item, b)| probe.enter(b, ray.far).map(|at| Met { item, at });
     let mut all: Vec<Met> = candidates.into_iter().filter_map(met).collect();
-    all.sort_unstable_by(|a, b| a.order(b, ray));
+    all.sort_unstable_by(|a, b| a.order(b, &probe));
     if let Some(last) = all.get(last).copied() {
-        let kept = all.partition_point(|met| met.at.order(&last.at, ray).is_le());
+        let kept = all.partition_point(|met| probe.compare(&met.at, &last.at).is_le());
         all.truncate(kept);
     }
     hits.extend(all.iter().map(Met::hit));

@@ -7,7 +7,6 @@
 
 mod contract;
 mod cursor;
-pub mod entry;
 mod exactly;
 pub mod linear;
 pub mod obvhs;

@@ -1,86 +1,25 @@
 //! Back ends against arithmetic on integers of any size, which shares nothing
 //! with theirs.
 
-use std::cmp::Ordering;
-
-use dashu_int::IBig;
 use glam::DVec3;
 
 use super::*;
+use crate::camera::{Camera, Frame, Lens, Surroundings};
+use crate::index::{self, Input, RegionIndex};
 use crate::kernel::Kernel;
 use crate::query::ItemId;
 use crate::scene::{Scene, SeededRng, WorldBox, load};
-use crate::visibility::{Guarantee, Ray, Solids};
-
-/// In units of 2^-1100: every f64 is an integer.
-fn exact(x: f64) -> IBig {
-    let bits = x.to_bits();
-    let (exponent, fraction) = (bits >> 52 & 0x7ff, bits & ((1 << 52) - 1));
-    let (mantissa, power) = match exponent {
-        0 => (fraction, -1074),
-        _ => (fraction | 1 << 52, exponent as i64 - 1075),
-    };
-    let size = IBig::from(mantissa) << (power + 1100) as usize;
-    if x < 0.0 { -size } else { size }
-}
-
-/// A depth as a fraction with a denominator above zero.
-#[derive(Clone, PartialEq, Eq)]
-struct Depth(IBig, IBig);
-
-impl Depth {
-    fn order(&self, other: &Depth) -> Ordering {
-        (&self.0 * &other.1).cmp(&(&other.0 * &self.1))
-    }
-
-    fn number(x: f64) -> Depth {
-        Depth(exact(x), IBig::from(1) << 1100)
-    }
-}
-
-/// Where the judge says that a ray enters a box.
-fn judged(ray: &Ray, b: &WorldBox) -> Option<Depth> {
-    let (mut enters, mut leaves): (Option<Depth>, Option<Depth>) = (None, None);
-    for axis in 0..3 {
-        let (at, along) = (exact(ray.origin[axis]), exact(ray.direction[axis]));
-        let (mut low, mut high) = (exact(b.min[axis]) - &at, exact(b.max[axis]) - &at);
-        if along == IBig::ZERO {
-            if low > IBig::ZERO || high < IBig::ZERO {
-                return None;
-            }
-            continue;
-        }
-        let mut size = along;
-        if size < IBig::ZERO {
-            (low, high, size) = (-high, -low, -size);
-        }
-        let (low, high) = (Depth(low, size.clone()), Depth(high, size));
-        if enters
-            .as_ref()
-            .is_none_or(|enters| low.order(enters).is_gt())
-        {
-            enters = Some(low);
-        }
-        if leaves
-            .as_ref()
-            .is_none_or(|leaves| high.order(leaves).is_lt())
-        {
-            leaves = Some(high);
-        }
-    }
-    let (enters, leaves) = (enters?, leaves?);
-    let early = enters.order(&Depth::number(ray.near)).is_lt();
-    let late = ray.far.is_finite() && enters.order(&Depth::number(ray.far)).is_gt();
-    (enters.order(&leaves).is_le() && !early && !late).then_some(enters)
-}
+use crate::visibility::truth::judge::{self, Depth};
+use crate::visibility::truth::{NO_ITEM, RayIndex, SampleTruth};
+use crate::visibility::{Guarantee, Ray, Rays, SampleGrid, Solids};
 
 /// All items that the ray meets, by depth and id.
 fn all_judged(ray: &Ray, solids: &Solids) -> Vec<(Depth, ItemId)> {
     let boxes = solids.boxes.iter().zip(0..);
     let mut met: Vec<_> = boxes
-        .filter_map(|(b, id)| judged(ray, b).map(|depth| (depth, id)))
+        .filter_map(|(b, id)| judge::entry(ray, b).map(|depth| (depth, id)))
         .collect();
-    met.sort_by(|a, b| a.0.order(&b.0).then(a.1.cmp(&b.1)));
+    met.sort_by(|a, b| judge::order(&a.0, &b.0).then(a.1.cmp(&b.1)));
     met
 }
 
@@ -165,7 +104,7 @@ fn differing(
         let kept = match count.checked_sub(1).map(|last| truth.get(last)) {
             None => 0,
             Some(None) => truth.len(),
-            Some(Some(last)) => truth.partition_point(|met| met.0.order(&last.0).is_le()),
+            Some(Some(last)) => truth.partition_point(|met| judge::order(&met.0, &last.0).is_le()),
         };
         let items = hits.iter().map(|hit| hit.item);
         wrong += usize::from(!items.eq(truth[..kept].iter().map(|met| met.1)));
@@ -193,7 +132,7 @@ fn exact_back_ends_answer_as_arithmetic_on_integers_does() {
                 let ray = worlds.ray();
                 let truth = all_judged(&ray, &solids);
                 met += usize::from(!truth.is_empty());
-                let tied = |pair: &[(Depth, ItemId)]| pair[0].0.order(&pair[1].0).is_eq();
+                let tied = |pair: &[(Depth, ItemId)]| judge::order(&pair[0].0, &pair[1].0).is_eq();
                 ties += usize::from(truth.windows(2).take(1).any(tied));
                 for back_end in &built {
                     let first = |ray: &Ray| back_end.first(ray);
@@ -282,7 +221,7 @@ fn rays_along_faces_and_beyond_the_analysis_are_exact_too() {
     let solids = worlds.boxes(150);
     let wide = WideRay::of(&solids).unwrap();
     let sizes = [
-        0.0, 1e-300, 1e-30, -1e-26, 6e-17, -6e-17, 1e-9, 0.2, -1.0, 1.0, 3000.0,
+        0.0, 1e-70, 1e-30, -1e-26, 6e-17, -6e-17, 1e-9, 0.2, -1.0, 1.0, 3000.0,
     ];
     let mut met = 0;
     for _ in 0..1500 {
@@ -328,4 +267,101 @@ fn in_scenes_the_wide_tree_finds_what_the_reference_finds() {
             assert_eq!(hits, truth, "{name} {ray:?}");
         }
     }
+}
+
+/// Cameras in scenes: on the ground and above everything.
+fn cameras(name: &str) -> (Scene, Vec<Camera>) {
+    let scene = load(name, &Default::default()).unwrap();
+    let bounds = scene.world_bounds();
+    let size = bounds.max - bounds.min;
+    let mut rng = SeededRng::new(21);
+    let mut cameras = Vec::new();
+    for lens in [
+        Lens::perspective(60.0, 1.5, 0.25, None),
+        Lens::off_axis([-0.1, 0.3, -0.2, 0.1], 0.25, Some(500.0)),
+        Lens::orthographic(60.0, 1.5, 1.0, 800.0),
+    ] {
+        let at = bounds.min + size * rng.point();
+        for (height, down) in [(bounds.min.z + 1.7, 0.0), (bounds.max.z + 20.0, -0.7)] {
+            let eye = DVec3::new(at.x, at.y, height);
+            let turn = rng.between(0.0, std::f64::consts::TAU);
+            let forward = DVec3::new(libm::cos(turn), libm::sin(turn), down);
+            let frame = Frame::looking_along(eye, forward, DVec3::Z).unwrap();
+            let lens = lens.unwrap();
+            cameras.push(Camera { frame, lens });
+        }
+    }
+    (scene, cameras)
+}
+
+#[test]
+fn at_every_sample_the_pick_is_the_item_of_the_id_buffer() {
+    let grid = SampleGrid::new(64, 40);
+    for name in ["city:n=3000", "rooms:n=2000", "freedm-map12"] {
+        let (scene, cameras) = cameras(name);
+        let solids = Solids::of(&scene);
+        let (wide, index) = (WideRay::of(&solids).unwrap(), RayIndex::build(&solids));
+        let mut items = 0;
+        for camera in cameras {
+            let rays = Rays::of(&camera).unwrap();
+            let truth = SampleTruth::of(&solids, &index, &rays, grid, 1);
+            items += truth.visible.len();
+            for row in 0..grid.height {
+                for column in 0..grid.width {
+                    let picked = wide.first(&rays.sample(grid, column, row));
+                    let picked = picked.map_or(NO_ITEM, |hit| hit.item);
+                    let front = truth.front[(row * grid.width + column) as usize];
+                    assert_eq!(picked, front, "{name} {column} {row}");
+                }
+            }
+        }
+        assert!(items > 50, "the premise: {items}");
+    }
+}
+
+#[test]
+fn a_cursors_frustum_holds_what_every_ray_through_it_meets_and_no_more_than_its_planes() {
+    let (scene, cameras) = cameras("city:n=3000");
+    let solids = Solids::of(&scene);
+    let wide = WideRay::of(&solids).unwrap();
+    let index = index::Wide::build(&Input::new(&scene.items), &Default::default()).unwrap();
+    let around = Surroundings {
+        origin: scene.origin,
+        reach: scene.bounds.reach(),
+    };
+    let mut rng = SeededRng::new(2);
+    let (mut met, mut found) = (0, 0);
+    let mut hits = Vec::new();
+    for camera in cameras {
+        let rays = Rays::of(&camera).unwrap();
+        for half in [0.5, 4.0, 60.0] {
+            let cursor = [rng.between(60.0, 260.0), rng.between(60.0, 120.0)];
+            let rectangle = CursorRectangle::around(cursor, half, [320.0, 180.0]);
+            let mut items = through_cursor(&index, &rays, &rectangle, &around).unwrap();
+            items.sort_unstable();
+            let volume = rectangle.volume(&rays, &around).unwrap();
+            let seen = scene.items.iter().map(|b| volume.sees(b));
+            let seen = seen.zip(0..).filter(|(sees, _)| *sees).map(|(_, id)| id);
+            assert_eq!(items, seen.collect::<Vec<ItemId>>());
+            let between = |a: f64, b: f64, part: f64| a + (b - a) * part;
+            for (x, y) in (0..9).map(|i| (f64::from(i % 3) / 2.0, f64::from(i / 3) / 2.0)) {
+                let ([x0, y0], [x1, y1]) = (rectangle.min, rectangle.max);
+                let ray = rays.through(between(x0, x1, x), between(y0, y1, y));
+                wide.nearest(&ray, usize::MAX, &mut hits);
+                met += hits.len();
+                for hit in &hits {
+                    assert!(items.binary_search(&hit.item).is_ok(), "{half} {hit:?}");
+                }
+            }
+            found += items.len();
+            // No wider than the rectangle: what the whole image holds is more.
+            let whole = CursorRectangle {
+                min: [0.0; 2],
+                max: [1.0; 2],
+            };
+            let all = through_cursor(&index, &rays, &whole, &around).unwrap();
+            assert!(items.len() < all.len() || all.is_empty());
+        }
+    }
+    assert!(met > 100 && found > 300, "the premise: {met} {found}");
 }

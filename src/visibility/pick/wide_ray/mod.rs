@@ -11,7 +11,6 @@ use glam::{DVec3, Vec3};
 use self::build::Node;
 use self::slabs::Slabs;
 use super::contract::{About, Hit, NotBuilt, Pick};
-use super::entry::depth_of_met;
 use super::exactly;
 use crate::geometry::Aabb;
 use crate::index::Origin;
@@ -231,8 +230,6 @@ const FEW: usize = 8;
 /// The candidates for the first hit.
 struct Foremost {
     bound: f32,
-    /// The candidate that the bound is of, for certain met.
-    certain: u32,
     few: [(f32, u32); FEW],
     used: usize,
     more: Vec<(f32, u32)>,
@@ -273,7 +270,6 @@ impl Candidates for Foremost {
     fn offer(&mut self, low: f32, high: f32, place: u32) {
         if high < self.bound {
             self.bound = high;
-            self.certain = place;
         }
         if self.used == FEW {
             self.make_room();
@@ -299,17 +295,11 @@ impl Work for First<'_> {
         };
         let mut found = Foremost {
             bound: slabs.far(),
-            certain: u32::MAX,
             few: [(0.0, 0); FEW],
             used: 0,
             more: Vec::new(),
         };
         tree.search(isa, &slabs, &mut found);
-        let mut within = found.within();
-        if within.next() == Some(found.certain) && within.next().is_none() {
-            let (item, b) = tree.place(found.certain);
-            return depth_of_met(ray, b).map(|depth| Hit { item, depth });
-        }
         exactly::first(ray, found.within().map(|place| tree.place(place)))
     }
 }
