@@ -11,6 +11,7 @@ mod converting;
 mod cullings;
 mod drift;
 mod foreign_text;
+mod funnel;
 mod kernels;
 mod listing;
 mod matrices;

@@ -13,7 +13,7 @@
 
 mod answer;
 mod audit;
-mod flood;
+pub mod flood;
 mod graph;
 mod items;
 mod locate;

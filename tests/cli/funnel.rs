@@ -1,0 +1,180 @@
+//! `funnel`: a scene whose answer is seen with the naked eye, the fields of its JSON
+//! and CSV, promises that hold on generated scenes, and refusals. No time is judged.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+
+use super::process::*;
+use super::{BOXES, EYE_LOOK};
+
+/// A wall, a box behind it, one beside it, one behind the camera, and one around it.
+const SCENE: &str = "\
+10,-5,-1,11,5,10
+20,-1,0,21,1,2
+20,12,0,21,13,2
+-9,-1,0,-8,1,2
+-1,-1,0,1,1,3
+";
+
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("scene.csv"), format!("{BOXES}\n{SCENE}")).expect("written");
+    let cameras = format!("{EYE_LOOK},near,far\n0,0,1.7,1,0,1.7,0.1,100\n");
+    fs::write(folder.path().join("cameras.csv"), cameras).expect("written");
+    folder
+}
+
+/// The rows of a stage.
+fn rows<'r>(report: &'r Value, stage: &'r str) -> impl Iterator<Item = &'r Value> {
+    let rows = array(report, "stages").iter();
+    rows.filter(move |row| row["stage"] == stage)
+}
+
+fn row<'r>(report: &'r Value, stage: &'r str, name: &str) -> &'r Value {
+    let mut found = rows(report, stage).filter(|row| row["name"] == name);
+    found.next().unwrap_or_else(|| panic!("{stage} {name}"))
+}
+
+const LINE: &str = "funnel --scene scene.csv --path cameras.csv --processes 1 --format json";
+
+#[test]
+fn a_wall_hides_what_is_behind_it_and_nothing_else() {
+    let folder = folder();
+    let report = json(&works(folder.path(), LINE));
+    assert_eq!((&report["items"], &report["views"]), (&5.into(), &1.into()));
+    let object = rows(&report, "object").find(|row| row["structure"] == "wide");
+    let object = object.expect("the structure of the chain");
+    // All but the one behind the camera.
+    assert_eq!(number(object, "output_count"), 4.0);
+    for name in ["masked-inner", "masked-inner-two-pass", "masked"] {
+        let row = row(&report, "occlusion", name);
+        // The box around the eye stays, though nothing of it is seen from within.
+        assert_eq!(number(row, "output_count"), 3.0, "{name}");
+        assert_eq!(number(row, "truth_count"), 2.0, "{name}");
+        assert_eq!(number(row, "false_negative_count"), 0.0, "{name}");
+        assert_eq!(number(row, "false_positive_count"), 1.0, "{name}");
+    }
+    // Of each box at most three sides face an eye outside of it.
+    let triangles = row(&report, "triangle", "per-triangle");
+    assert!(number(triangles, "output_count") <= 12.0);
+    assert_eq!(number(triangles, "false_positive_count"), 0.0);
+    let gains = array(&report, "gains");
+    let occlusion = gains.iter().find(|gain| gain["stage"] == "occlusion");
+    let occlusion = occlusion.expect("a stage of the chain");
+    assert_eq!(number(occlusion, "with_count"), 3.0);
+    assert_eq!(number(occlusion, "without_count"), 4.0);
+}
+
+#[test]
+fn what_promises_to_lose_nothing_loses_nothing() {
+    for scene in ["city:n=1500", "rooms:n=1500", "forest:n=1500"] {
+        let line = format!(
+            "funnel --scene {scene} --path street:frames=6 --samples 96x54 --processes 2 \
+             --format json"
+        );
+        let report = json(&works(Path::new("."), &line));
+        for row in array(&report, "stages") {
+            let what = format!("{scene} {} {}", row["stage"], row["name"]);
+            if row["guarantee"] != "unproven" {
+                assert_eq!(number(row, "false_negative_count"), 0.0, "{what}");
+            }
+            let [input, output] = ["input_count", "output_count"].map(|name| number(row, name));
+            assert!(output <= input, "{what}: {output} of {input}");
+            let removed = input - output;
+            if let (Some(ns), Some(per)) =
+                (row["stage_ns"].as_f64(), row["ns_per_removed"].as_f64())
+            {
+                assert!((per * removed / ns - 1.0).abs() < 1e-9, "{what}");
+            }
+        }
+        let chosen = |stage| {
+            rows(&report, stage)
+                .filter(|row| row["is_chosen"] == true)
+                .count()
+        };
+        for stage in ["region", "object", "occlusion", "triangle", "fragment"] {
+            assert_eq!(chosen(stage), 1, "{scene} {stage}");
+        }
+        assert_eq!(
+            rows(&report, "region").count() > 1,
+            scene.starts_with("rooms"),
+            "{scene}"
+        );
+        assert!(!array(&report, "conclusions").is_empty());
+    }
+}
+
+#[test]
+fn tables_fit_and_csv_and_pictures_are_whole() {
+    let folder = folder();
+    let table = LINE.replace("--format json", "");
+    let text = works(folder.path(), &table);
+    for word in ["stage", "level", "occlusion", "masked-inner*", "pays above"] {
+        assert!(text.contains(word), "{word}: {text}");
+    }
+    for line in text.lines() {
+        assert!(line.chars().count() <= 110, "{line}");
+    }
+    let csv = works(folder.path(), &LINE.replace("json", "csv"));
+    let mut lines = csv.lines();
+    let columns = lines.next().expect("a header").split(',').count();
+    assert!(lines.clone().count() > 8);
+    assert!(
+        lines.all(|line| line.split(',').count() == columns),
+        "{csv}"
+    );
+    works(
+        folder.path(),
+        &format!("{table} --svg plan.svg --html page.html"),
+    );
+    let picture = fs::read_to_string(folder.path().join("plan.svg")).expect("a picture");
+    assert!(picture.contains("behind others") && picture.trim_end().ends_with("</svg>"));
+    let page = fs::read_to_string(folder.path().join("page.html")).expect("a page");
+    assert!(page.contains("<svg") && page.contains("<table>"));
+}
+
+#[test]
+fn stages_can_be_chosen_and_left_out() {
+    let folder = folder();
+    let without = json(&works(folder.path(), &format!("{LINE} --occlusion none")));
+    assert_eq!(row(&without, "occlusion", "none")["is_chosen"], true);
+    assert!(
+        array(&without, "gains")
+            .iter()
+            .all(|gain| gain["stage"] != "occlusion")
+    );
+    let typed = format!("{LINE} --structure linear --triangle per-triangle --samples 64x36");
+    let other = json(&works(folder.path(), &typed));
+    assert_eq!(other["samples"], serde_json::json!([64, 36]));
+    assert_eq!(row(&other, "triangle", "per-triangle")["is_chosen"], true);
+}
+
+#[test]
+fn what_cannot_be_is_refused_in_a_line() {
+    let folder = folder();
+    for (more, wanted) in [
+        ("--occlusion maskd", "maskd | did you mean 'masked'"),
+        ("--region portal-clip", "portal-clip"),
+        ("--samples 0x4", "--samples | 0x4 | columns x rows"),
+        ("--samples 320", "--samples | 320"),
+        ("--structure nosuch", "nosuch"),
+        ("--svg no/such/folder/x.svg", "--svg"),
+    ] {
+        let done = cullbench(folder.path(), &format!("{LINE} {more}"));
+        assert_refused(&done, wanted, more);
+    }
+    let matrix = "m00,m01,m02,m03,m10,m11,m12,m13,m20,m21,m22,m23,m30,m31,m32,m33\n\
+                  1,0,0,0,0,1,0,0,0,0,-1.02,-0.2,0,0,-1,0\n";
+    fs::write(folder.path().join("matrix.csv"), matrix).expect("written");
+    let line = LINE.replace("cameras.csv", "matrix.csv --matrix-convention column-gl");
+    assert_refused(
+        &cullbench(folder.path(), &line),
+        "camera 0 | matrix",
+        "a matrix",
+    );
+    fs::write(folder.path().join("empty.csv"), format!("{BOXES}\n")).expect("written");
+    let line = LINE.replace("scene.csv", "empty.csv");
+    assert_refused(&cullbench(folder.path(), &line), "no items", "no items");
+}
