@@ -1,2 +1,259 @@
 //! The interleaved coupling: the tree is walked front to back; blocks are tested
-//! before they are opened; what is found visible and large is drawn at once.
+//! before they are opened; what is found visible and large is drawn at once; and
+//! what was found visible early is tested once more at the end.
+
+use super::buffer::OcclusionBuffer;
+use super::outline::Outline;
+use super::rect::{Rect, Rects};
+use super::scene::OccluderScene;
+use super::stats::CullStats;
+use super::view::View;
+use crate::geometry::PlaneMask;
+use crate::kernel::{Isa, Kernel, LANES, LaneMask, Work};
+use crate::query::ItemId;
+
+/// Survivors are drawn whose rectangle is at least this part of the image.
+pub const DEFAULT_DRAWN_PART: u32 = 1024;
+
+/// The interleaved coupling, with memory that is kept from view to view.
+#[derive(Clone, Debug)]
+pub struct Interleaved<B> {
+    buffer: B,
+    kernel: Kernel,
+    drawn_part: u32,
+    second_look: bool,
+    stack: Vec<Entry>,
+    survivors: Vec<Survivor>,
+}
+
+/// A block that is still to be opened.
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    rect: Rect,
+    depth: f32,
+    block: u32,
+    level: u16,
+    /// Whether there is no rectangle.
+    near: bool,
+    open: PlaneMask,
+}
+
+/// An item that was not hidden when it was met.
+#[derive(Clone, Copy, Debug)]
+struct Survivor {
+    rect: Rect,
+    position: u32,
+    near: bool,
+}
+
+impl<B: OcclusionBuffer> Interleaved<B> {
+    /// With a buffer that may be drawn into and asked in turn, on an instruction
+    /// set.
+    ///
+    /// # Panics
+    /// If the buffer may not.
+    pub fn new(buffer: B, kernel: Kernel) -> Interleaved<B> {
+        assert!(B::ALTERNATES, "{} is drawn first and asked then", B::NAME);
+        Interleaved {
+            buffer,
+            kernel,
+            drawn_part: DEFAULT_DRAWN_PART,
+            second_look: true,
+            stack: Vec::new(),
+            survivors: Vec::new(),
+        }
+    }
+
+    /// Draws survivors of at least the image's pixels divided by `part`.
+    pub fn drawing_from(mut self, part: u32) -> Self {
+        self.drawn_part = part.max(1);
+        self
+    }
+
+    /// Whether survivors are tested once more when all have been drawn.
+    pub fn second_look(mut self, second_look: bool) -> Self {
+        self.second_look = second_look;
+        self
+    }
+
+    /// Appends the items that no plane of the view's volume excludes, that some ray
+    /// of the image may meet and that are not hidden; the nearest come first,
+    /// roughly.
+    pub fn cull(
+        &mut self,
+        scene: &OccluderScene,
+        view: &View,
+        out: &mut Vec<ItemId>,
+    ) -> CullStats {
+        self.kernel.run(Walk {
+            state: self,
+            scene,
+            view,
+            out,
+        })
+    }
+
+    /// The buffer as the last view left it.
+    pub fn buffer(&self) -> &B {
+        &self.buffer
+    }
+}
+
+struct Walk<'a, B> {
+    state: &'a mut Interleaved<B>,
+    scene: &'a OccluderScene,
+    view: &'a View<'a>,
+    out: &'a mut Vec<ItemId>,
+}
+
+impl<B: OcclusionBuffer> Work for Walk<'_, B> {
+    type Output = CullStats;
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) -> CullStats {
+        let (state, scene, view) = (self.state, self.scene, self.view);
+        let mut stats = CullStats::default();
+        if scene.is_empty() {
+            return stats;
+        }
+        let pixels = view.grid.width * view.grid.height;
+        let least_area = (pixels / state.drawn_part).max(1);
+        let Interleaved {
+            buffer,
+            stack,
+            survivors,
+            ..
+        } = state;
+        buffer.clear();
+        survivors.clear();
+        stack.clear();
+        stack.push(Entry {
+            rect: Rect::default(),
+            depth: 0.0,
+            block: 0,
+            level: (scene.height() - 1) as u16,
+            near: true,
+            open: view.volume.mask(),
+        });
+        let mut rects = Rects::NONE;
+        let mut open = [0; LANES];
+        while let Some(entry) = stack.pop() {
+            // Much may have been drawn since it was put there.
+            if !entry.near && buffer.hides(&entry.rect) {
+                continue;
+            }
+            let (level, index) = (usize::from(entry.level), entry.block as usize);
+            let block = &scene.level(level)[index];
+            let mut lanes = scene.lanes(level, index);
+            if level > 0 {
+                lanes &= block.sorted_by(isa, view.volume, entry.open, &mut open);
+            } else {
+                lanes &= block.admitted_by(isa, view.volume, entry.open);
+            }
+            if lanes == 0 {
+                continue;
+            }
+            rects.project(block, view);
+            stats.boxes += lanes.count_ones() as usize;
+            let (seen, flat) = rects.lanes(isa);
+            lanes &= seen;
+            let mut left = lanes & flat;
+            while left != 0 {
+                let lane = left.trailing_zeros() as usize;
+                left &= left - 1;
+                if buffer.hides(&rects.get(lane)) {
+                    lanes &= !(1 << lane);
+                }
+            }
+            let mut order = [0; LANES];
+            let count = by_depth(&rects.depth, lanes, &mut order);
+            let order = &order[..count];
+            if level > 0 {
+                for &key in order.iter().rev() {
+                    let lane = (key & 15) as usize;
+                    stack.push(Entry {
+                        rect: rects.get(lane),
+                        depth: rects.depth[lane],
+                        block: (index * LANES + lane) as u32,
+                        level: entry.level - 1,
+                        near: flat >> lane & 1 == 0,
+                        open: open[lane],
+                    });
+                }
+                continue;
+            }
+            let mut drawn = false;
+            for &key in order {
+                let lane = (key & 15) as usize;
+                let (rect, near) = (rects.get(lane), flat >> lane & 1 == 0);
+                if drawn && !near && buffer.hides(&rect) {
+                    continue;
+                }
+                let position = index * LANES + lane;
+                survivors.push(Survivor {
+                    rect,
+                    position: position as u32,
+                    near,
+                });
+                let large = near || rect.area() >= least_area;
+                if large && draw(buffer, scene, view, position) {
+                    drawn = true;
+                    stats.drawn += 1;
+                }
+            }
+        }
+        let before = self.out.len();
+        for survivor in survivors {
+            let again = state.second_look && !survivor.near;
+            if !(again && buffer.hides(&survivor.rect)) {
+                self.out.push(scene.ids()[survivor.position as usize]);
+            }
+        }
+        stats.kept = self.out.len() - before;
+        stats
+    }
+}
+
+/// Draws the item at a position, if it may be drawn and covers anything.
+#[inline(always)]
+fn draw<B: OcclusionBuffer>(
+    buffer: &mut B,
+    scene: &OccluderScene,
+    view: &View,
+    position: usize,
+) -> bool {
+    if view.entered_before_near(&scene.outer(position)) {
+        return false;
+    }
+    let open = view.open & scene.faces(position);
+    let outline = Outline::of(scene.inner(position), open, view, B::COVERAGE);
+    if let Some(outline) = &outline {
+        buffer.draw(outline);
+    }
+    outline.is_some()
+}
+
+/// The lanes in the order of their depths, each with its key's upper bits in front
+/// of its number; returns how many there are.
+#[inline(always)]
+fn by_depth(depth: &[f32; LANES], lanes: LaneMask, order: &mut [u32; LANES]) -> usize {
+    let mut count = 0;
+    let mut left = lanes;
+    while left != 0 {
+        let lane = left.trailing_zeros();
+        left &= left - 1;
+        // Bits of a float grow with it from zero on; what is before the eye comes
+        // first, in the order of lanes.
+        let depth = depth[lane as usize];
+        let bits = if depth > 0.0 { depth.to_bits() } else { 0 };
+        let key = bits & !15 | lane;
+        let mut at = count;
+        while at > 0 && order[at - 1] > key {
+            order[at] = order[at - 1];
+            at -= 1;
+        }
+        order[at] = key;
+        count += 1;
+    }
+    count
+}

@@ -23,6 +23,7 @@ mod view;
 
 pub use block::Block;
 pub use buffer::{OcclusionBuffer, Origin};
+pub use interleaved::{DEFAULT_DRAWN_PART, Interleaved};
 pub use masked::{Masked, MaskedCentre, MaskedInner};
 pub use outline::{Coverage, Outline};
 pub use rect::{Rect, Rects};

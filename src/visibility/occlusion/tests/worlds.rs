@@ -119,7 +119,7 @@ fn whole_pixels_lose_nothing_that_a_ray_sees() {
 fn pixel_centres_lose_what_rays_see() {
     for parallel in [false, true] {
         let (lost, _) = losses::<MaskedCentre>(1000, 0.0, parallel);
-        assert!(lost > 10, "{lost}: the worlds are hard enough");
+        assert!(lost > 3, "{lost}: the worlds are hard enough");
     }
 }
 
