@@ -13,6 +13,7 @@
 
 mod answer;
 mod audit;
+pub mod doom;
 mod flood;
 mod graph;
 mod items;
