@@ -13,7 +13,12 @@
 
 mod answer;
 mod audit;
+<<<<<<< HEAD
 pub mod flood;
+=======
+pub mod doom;
+mod flood;
+>>>>>>> region
 mod graph;
 mod items;
 mod locate;

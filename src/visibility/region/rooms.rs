@@ -237,7 +237,11 @@ impl<'a> Search<'a> {
         (0..TRIES).find_map(|round| {
             let mut sum = [0.0; 3];
             for line in &lines {
-                let weight = if round == 0 { 1.0 } else { 0.01 + rng.unit() };
+                let weight = if round == 0 {
+                    1.0
+                } else {
+                    libm::exp2(-16.0 * rng.unit())
+                };
                 (0..3).for_each(|k| sum[k] += weight * line[k]);
             }
             let witness = self.segment(sum, from, to)?;

@@ -1,0 +1,203 @@
+//! Places and rays in a map: the sector of a point, rays followed from linedef to
+//! linedef, and the check of a line of sight in whole numbers.
+
+use std::sync::Arc;
+
+use glam::{DVec2, DVec3};
+
+use super::super::answer::{Marks, RegionId};
+use super::super::graph::{Ground, RegionGraph};
+use super::super::witness::{Rejected, Witness};
+use super::map::{DoomMap, MapLine};
+use crate::scene::WorldBox;
+use crate::visibility::Ray;
+
+/// Coordinates of witnesses are whole multiples of 2^-20 map units.
+pub(super) const UNITS: f64 = (1 << 20) as f64;
+
+/// The ground of a map.
+#[derive(Debug)]
+pub(super) struct SectorGround(pub Arc<DoomMap>);
+
+fn plan([x, y]: [i32; 2]) -> DVec2 {
+    DVec2::new(x.into(), y.into())
+}
+
+impl SectorGround {
+    /// The sector of a point: what the first linedef towards larger x has on this
+    /// side. O(linedefs).
+    fn sector_at(&self, p: DVec2) -> Option<RegionId> {
+        let (mut nearest, mut found) = (f64::INFINITY, None);
+        for line in &self.0.lines {
+            let [a, b] = line.ends.map(plan);
+            if (a.y <= p.y) == (b.y <= p.y) {
+                continue;
+            }
+            let x = a.x + (b.x - a.x) * ((p.y - a.y) / (b.y - a.y));
+            if x >= p.x && x < nearest {
+                // Left of a line that goes up is the side of smaller x.
+                (nearest, found) = (x, line.sectors[usize::from(b.y > a.y)]);
+            }
+        }
+        found
+    }
+}
+
+/// Whether a linedef may meet a closed box, seen from above.
+fn meets(line: &MapLine, b: &WorldBox) -> bool {
+    let [from, to] = line.ends.map(plan);
+    let (low, high) = (b.min.truncate(), b.max.truncate());
+    if !(from.min(to).cmple(high).all() && low.cmple(from.max(to)).all()) {
+        return false;
+    }
+    let d = to - from;
+    let side = |x: f64, y: f64| d.x * (y - from.y) - d.y * (x - from.x);
+    let sides = [
+        side(low.x, low.y),
+        side(high.x, low.y),
+        side(low.x, high.y),
+        side(high.x, high.y),
+    ];
+    // Rounding of the side is below this: |d| and distances are below 2^18.
+    let slack = 1e-9;
+    sides.iter().any(|s| *s <= slack) && sides.iter().any(|s| *s >= -slack)
+}
+
+impl Ground for SectorGround {
+    fn regions_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) -> bool {
+        let mut inside = true;
+        let first = out.len();
+        for line in self.0.lines.iter().filter(|line| meets(line, b)) {
+            inside &= line.sectors[1].is_some();
+            out.extend(line.sectors.iter().flatten());
+        }
+        match self.sector_at((b.min + b.max).truncate() * 0.5) {
+            Some(sector) => out.push(sector),
+            None => inside = false,
+        }
+        // Below a floor or above a ceiling is nowhere.
+        inside
+            && out[first..].iter().all(|&sector| {
+                let sector = &self.0.sectors[sector as usize];
+                sector.floor <= b.min.z && b.max.z <= sector.ceiling
+            })
+    }
+
+    fn follow(&self, _: &RegionGraph, ray: &Ray, seen: &mut Marks) {
+        let start = ray.at(ray.near);
+        let Some(mut sector) = self.sector_at(start.truncate()) else {
+            return;
+        };
+        let (o, d) = (ray.origin.truncate(), ray.direction.truncate());
+        let mut crossings = Vec::new();
+        for line in &self.0.lines {
+            let [a, b] = line.ends.map(plan);
+            let (sa, sb) = (d.perp_dot(a - o), d.perp_dot(b - o));
+            if (sa < 0.0) == (sb < 0.0) {
+                continue;
+            }
+            let t = (a - o).perp_dot(b - a) / d.perp_dot(b - a);
+            if t >= ray.near && t <= ray.far {
+                // It begins right of the ray: crossed from its left to its right.
+                crossings.push((t, line, sa < 0.0));
+            }
+        }
+        crossings.sort_by(|a, b| a.0.total_cmp(&b.0));
+        seen.insert(sector);
+        for (t, line, to_right) in crossings {
+            let z = ray.origin.z + ray.direction.z * t;
+            let here = &self.0.sectors[sector as usize];
+            let (Some([low, high]), true) = (line.open, here.floor <= z && z <= here.ceiling)
+            else {
+                return;
+            };
+            if z <= low || z >= high {
+                return;
+            }
+            if let Some(next) = line.sectors[usize::from(!to_right)] {
+                sector = next;
+                seen.insert(sector);
+            }
+        }
+    }
+
+    /// Seen from above; heights of the ends say nothing. All products are of whole
+    /// numbers below 2^38, so i128 holds them.
+    fn check(&self, graph: &RegionGraph, witness: &Witness) -> Result<(), Rejected> {
+        if witness.regions.iter().any(|r| *r as usize >= graph.len()) {
+            return Err(Rejected::Region);
+        }
+        let mut ends = [[0i128; 2]; 2];
+        for (i, end) in witness.ends.iter().enumerate() {
+            for axis in 0..2 {
+                let units = end[axis] * UNITS;
+                if units.fract() != 0.0 || units.is_nan() || units.abs() > 65536.0 * UNITS {
+                    return Err(Rejected::End(i));
+                }
+                ends[i][axis] = units as i128;
+            }
+            if whole_sector_at(&self.0.lines, ends[i]) != Some(witness.regions[i]) {
+                return Err(Rejected::End(i));
+            }
+        }
+        let [a, b] = ends;
+        let blocks = |line: &&MapLine| {
+            let [c, d] = whole_ends(line);
+            let apart = side(a, b, c) * side(a, b, d) > 0 || side(c, d, a) * side(c, d, b) > 0;
+            line.open.is_none() && !apart
+        };
+        match self.0.lines.iter().find(blocks) {
+            Some(line) => {
+                let region = line.sectors[0].or(line.sectors[1]);
+                Err(Rejected::Blocked(region.unwrap_or_default()))
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+fn whole_ends(line: &MapLine) -> [[i128; 2]; 2] {
+    line.ends.map(|end| end.map(|v| i128::from(v) << 20))
+}
+
+/// 1 where c is left of the line from a to b.
+fn side(a: [i128; 2], b: [i128; 2], c: [i128; 2]) -> i128 {
+    ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).signum()
+}
+
+/// The sector strictly within which a point lies: two first linedefs at the same
+/// distance, or one through the point, leave it without.
+fn whole_sector_at(lines: &[MapLine], p: [i128; 2]) -> Option<RegionId> {
+    // Distance towards larger x as a fraction of positive denominator.
+    let mut nearest: Option<(i128, i128)> = None;
+    let mut found = None;
+    for line in lines {
+        let [a, b] = whole_ends(line);
+        if (a[1] <= p[1]) == (b[1] <= p[1]) {
+            continue;
+        }
+        let rise = b[1] - a[1];
+        let run = (a[0] - p[0]) * rise + (b[0] - a[0]) * (p[1] - a[1]);
+        let (run, rise) = (run * rise.signum(), rise.abs());
+        if run == 0 {
+            return None;
+        }
+        // Both are whole multiples of 2^20, as linedefs are.
+        let here = (run >> 20, rise >> 20);
+        let sector = line.sectors[usize::from(b[1] > a[1])];
+        match nearest {
+            _ if run < 0 => {}
+            Some((far, over)) if here.0 * over > far * here.1 => {}
+            Some((far, over)) if here.0 * over == far * here.1 && found != Some(sector) => {
+                found = Some(None);
+            }
+            _ => (nearest, found) = (Some(here), Some(sector)),
+        }
+    }
+    found.flatten()
+}
+
+/// The nearest coordinates that a witness may have.
+pub(super) fn on_grid(p: DVec2, z: f64) -> DVec3 {
+    ((p * UNITS).round() / UNITS).extend(z)
+}

@@ -1,0 +1,15 @@
+//! Doom maps: sectors as regions, two-sided linedefs as openings.
+//!
+//! Solid are one-sided linedefs and those between sectors whose heights leave no
+//! opening. What the game can move (a sector that a linedef's action moves) is taken
+//! to be open, whatever its heights. Floors and ceilings hide for the eye; the set of
+//! pairs and its witnesses are seen from above, where heights matter only in so far
+//! as a linedef is open at all.
+
+mod ground;
+mod map;
+mod sight;
+mod sweep;
+
+pub use map::{DoomMap, MapLine, Sector};
+pub use sight::SectorPvs;

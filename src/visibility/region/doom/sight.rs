@@ -1,0 +1,257 @@
+//! Which sectors of a map see each other, seen from above, exactly and in whole
+//! numbers.
+//!
+//! Take two sectors and a segment between them that meets nothing solid and no
+//! vertex. All segments that pass the same linedefs in the same order make an open
+//! set; moved as far as it goes, the segment touches a vertex, and it can still turn
+//! about it. So the lines through a vertex, in all directions between those to other
+//! vertices, each moved aside by next to nothing to the left and to the right, are
+//! enough to find every pair. (The same argument is behind the visibility complex,
+//! Pocchiola and Vegter 1996.)
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use glam::DVec2;
+
+use super::super::answer::{RegionId, decode};
+use super::super::graph::{Ground, RegionGraph};
+use super::super::pvs::Pvs;
+use super::super::witness::{ProvenPvs, Witness};
+use super::ground::{SectorGround, on_grid};
+use super::map::{DoomMap, MapLine};
+use super::sweep::{Sweep, Whole, cross};
+
+/// Where a pair was found: the line through a vertex in a direction, moved to its
+/// left (or right) by next to nothing.
+#[derive(Clone, Copy, Debug)]
+struct Found {
+    vertex: Whole,
+    direction: Whole,
+    is_left: bool,
+}
+
+/// The exact set of a map's sectors.
+#[derive(Clone, Debug)]
+pub struct SectorPvs {
+    map: Arc<DoomMap>,
+    graph: Arc<RegionGraph>,
+    pvs: Pvs,
+    found: Vec<Option<Found>>,
+    undecided: Vec<[RegionId; 2]>,
+    crossings: usize,
+}
+
+impl SectorPvs {
+    /// Searches all pairs. O(v^2 log v + v * intervals that linedefs cover).
+    pub fn of(map: Arc<DoomMap>, graph: Arc<RegionGraph>) -> SectorPvs {
+        let sectors = map.sectors.len();
+        let vertices: BTreeSet<Whole> = map
+            .lines
+            .iter()
+            .flat_map(|line| line.ends.map(|end| end.map(i64::from)))
+            .collect();
+        let vertices: Vec<Whole> = vertices.into_iter().collect();
+        // What has the same sector on both sides is no border.
+        let borders = |line: &&MapLine| line.open.is_none() || line.sectors[0] != line.sectors[1];
+        let lines: Vec<MapLine> = map.lines.iter().filter(borders).copied().collect();
+        let mut sight = SectorPvs {
+            crossings: crossings(&lines),
+            pvs: Pvs::alone(sectors),
+            found: vec![None; sectors * sectors],
+            undecided: Vec::new(),
+            map: map.clone(),
+            graph,
+        };
+        let mut sweep = Sweep::default();
+        for &vertex in &vertices {
+            sweep.about(vertex, &vertices, &lines, sectors);
+            for interval in 0..sweep.turn() {
+                for is_left in [true, false] {
+                    sight.runs(&sweep, vertex, interval, is_left);
+                }
+            }
+        }
+        sight
+    }
+
+    /// How many pairs of linedefs cross where there is no vertex. The search is exact
+    /// if there are none, as in any map that a node builder has seen.
+    pub fn crossings(&self) -> usize {
+        self.crossings
+    }
+
+    /// Marks what a line sees that passes the vertex on one side.
+    fn runs(&mut self, sweep: &Sweep, vertex: Whole, interval: usize, is_left: bool) {
+        let (turn, all) = (sweep.turn(), 2 * sweep.turn());
+        let found = Found {
+            vertex,
+            direction: sweep.between(interval),
+            is_left,
+        };
+        let mut run = sweep.set(interval).to_vec();
+        let mut pass = |spoke: &super::sweep::Spoke, sectors: [Option<RegionId>; 2]| {
+            let add = |run: &mut Vec<u64>, sector: Option<RegionId>| {
+                if let Some(s) = sector {
+                    run[s as usize / 64] |= 1 << (s % 64);
+                }
+            };
+            add(&mut run, sectors[0]);
+            if !spoke.is_open {
+                self.mark(&run, found);
+                run.fill(0);
+            }
+            add(&mut run, sectors[1]);
+        };
+        // On the left from the ray on counterclockwise to its opposite.
+        let (spokes, mut order): (_, Vec<(usize, usize)>) = (&sweep.spokes, Vec::new());
+        for (i, spoke) in spokes.iter().enumerate() {
+            // 1 to `turn` on the left of the ray, the others on its right.
+            let after = (spoke.at + all - interval - 1) % all;
+            match is_left {
+                true if after < turn => order.push((after, i)),
+                false if after >= turn => order.push((all - after, i)),
+                _ => {}
+            }
+        }
+        order.sort_unstable();
+        for (_, i) in order {
+            let [before, behind] = spokes[i].sectors;
+            match is_left {
+                true => pass(&spokes[i], [before, behind]),
+                false => pass(&spokes[i], [behind, before]),
+            }
+        }
+        let opposite = sweep.set(interval + turn);
+        run.iter_mut()
+            .zip(opposite)
+            .for_each(|(word, more)| *word |= more);
+        self.mark(&run, found);
+    }
+
+    /// All sectors of a run see each other.
+    fn mark(&mut self, run: &[u64], found: Found) {
+        let mut members = Vec::new();
+        decode(run, &mut members);
+        for &from in &members {
+            let row = self.pvs.row(from);
+            let fresh: Vec<u64> = run.iter().zip(row).map(|(run, row)| run & !row).collect();
+            if fresh.iter().all(|word| *word == 0) {
+                continue;
+            }
+            let mut more = Vec::new();
+            decode(&fresh, &mut more);
+            for to in more {
+                self.found[from as usize * self.pvs.len() + to as usize] = Some(found);
+            }
+            self.pvs.insert_all(from, run);
+        }
+    }
+}
+
+/// Pairs of borders that cross properly.
+fn crossings(lines: &[MapLine]) -> usize {
+    let ends: Vec<[Whole; 2]> = lines
+        .iter()
+        .map(|l| l.ends.map(|e| e.map(i64::from)))
+        .collect();
+    let side = |a: Whole, b: Whole, c: Whole| {
+        cross([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]).signum()
+    };
+    let crosses = |[a, b]: [Whole; 2], [c, d]: [Whole; 2]| {
+        side(a, b, c) * side(a, b, d) < 0 && side(c, d, a) * side(c, d, b) < 0
+    };
+    let count = |(i, one): (usize, &[Whole; 2])| {
+        ends[..i]
+            .iter()
+            .filter(|other| crosses(*one, **other))
+            .count()
+    };
+    ends.iter().enumerate().map(count).sum()
+}
+
+impl ProvenPvs for SectorPvs {
+    fn pvs(&self) -> &Pvs {
+        &self.pvs
+    }
+
+    fn undecided(&self) -> &[[RegionId; 2]] {
+        &self.undecided
+    }
+
+    /// The line is moved aside by less and less until a segment of it is accepted.
+    fn witness(&self, from: RegionId, to: RegionId) -> Option<Witness> {
+        let found = self.found[from as usize * self.pvs.len() + to as usize]?;
+        let ground = SectorGround(self.map.clone());
+        let [vertex, direction] =
+            [found.vertex, found.direction].map(|v| DVec2::new(v[0] as f64, v[1] as f64));
+        let direction = direction.normalize();
+        let aside = if found.is_left {
+            direction.perp()
+        } else {
+            -direction.perp()
+        };
+        (0..18).find_map(|halvings| {
+            let start = vertex + aside * libm::exp2(f64::from(3 - halvings));
+            let ends = segment(&self.map.lines, start, direction, [from, to])?;
+            let witness = Witness {
+                regions: [from, to],
+                ends: ends.map(|end| on_grid(end, 0.0)),
+            };
+            ground.check(&self.graph, &witness).ok().map(|()| witness)
+        })
+    }
+}
+
+/// The shortest segment of a line, from the middle of a part in one sector to the
+/// middle of a part in the other, with nothing solid between.
+fn segment(
+    lines: &[MapLine],
+    start: DVec2,
+    direction: DVec2,
+    regions: [RegionId; 2],
+) -> Option<[DVec2; 2]> {
+    let mut crossings: Vec<(f64, &MapLine, bool)> = Vec::new();
+    for line in lines {
+        let [a, b] = line
+            .ends
+            .map(|[x, y]| DVec2::new(x.into(), y.into()) - start);
+        let (sa, sb) = (direction.perp_dot(a), direction.perp_dot(b));
+        if (sa < 0.0) != (sb < 0.0) {
+            let t = a.perp_dot(b - a) / direction.perp_dot(b - a);
+            crossings.push((t, line, sa < 0.0));
+        }
+    }
+    crossings.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // The last part of either sector since something solid.
+    let mut last: [Option<f64>; 2] = [None; 2];
+    let mut best: Option<(f64, [f64; 2])> = None;
+    for pair in crossings.windows(2) {
+        let [(begin, line, to_right), (end, ..)] = [pair[0], pair[1]];
+        if line.open.is_none() {
+            last = [None; 2];
+        }
+        let Some(here) = line.sectors[usize::from(!to_right)] else {
+            continue;
+        };
+        let middle = 0.5 * (begin + end);
+        for k in 0..2 {
+            if here != regions[k] {
+                continue;
+            }
+            last[k] = Some(middle);
+            if let Some(other) = last[1 - k] {
+                let ends = if k == 0 {
+                    [middle, other]
+                } else {
+                    [other, middle]
+                };
+                let length = (middle - other).abs();
+                if best.is_none_or(|(least, _)| length < least) {
+                    best = Some((length, ends));
+                }
+            }
+        }
+    }
+    best.map(|(_, ends)| ends.map(|t| start + direction * t))
+}
