@@ -13,12 +13,8 @@
 
 mod answer;
 mod audit;
-<<<<<<< HEAD
-pub mod flood;
-=======
 pub mod doom;
-mod flood;
->>>>>>> region
+pub mod flood;
 mod graph;
 mod items;
 mod locate;
