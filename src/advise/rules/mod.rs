@@ -5,8 +5,10 @@
 mod f64_kernel;
 mod flat;
 mod frame_correction;
+mod hidden;
 mod needless_planes;
 mod no_index;
+mod occlusion;
 mod plane_masks;
 mod rebasing;
 mod rebuild;
@@ -40,6 +42,14 @@ pub(super) const RULES: &[Rule] = &[
     Rule {
         name: six_planes::NAME,
         prepare: six_planes::prepare,
+    },
+    Rule {
+        name: occlusion::NAME,
+        prepare: occlusion::prepare,
+    },
+    Rule {
+        name: occlusion::BUFFER_NAME,
+        prepare: occlusion::prepare_buffer,
     },
     Rule {
         name: flat::NAME,

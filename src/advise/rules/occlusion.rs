@@ -1,0 +1,152 @@
+//! The occlusion stage: pays where the eye is among things that hide others, and is
+//! left out where it looks down on them. Predicted from how far a few rays get.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use super::super::AdviseError;
+use super::super::case::Case;
+use super::super::omission::{By, Draft, LeftOutIf, Omission, Way};
+use super::hidden;
+use crate::geometry::{Aabb, ConvexVolume};
+use crate::measure::Ask;
+use crate::visibility::occlusion::{
+    Interleaved, MaskedInner, OccluderScene, OcclusionBuffer, View,
+};
+use crate::visibility::truth::RayIndex;
+use crate::visibility::{Rays, SampleGrid, Solids};
+
+pub(super) const NAME: &str = "occlusion";
+pub(super) const BUFFER_NAME: &str = "occlusion-buffer";
+
+/// Pixels of the buffer that is usual, and of the smaller one.
+const USUAL: SampleGrid = SampleGrid::new(320, 180);
+const SMALL: SampleGrid = SampleGrid::new(160, 90);
+/// Rays of a camera that say how far one sees, and cameras that a prediction looks at.
+const PROBES: SampleGrid = SampleGrid::new(16, 9);
+const PROBED: usize = 8;
+
+/// Everything that is asked, and shared by both sides.
+struct Occlusion {
+    scene: OccluderScene,
+    views: Vec<(Rays, ConvexVolume)>,
+}
+
+impl Occlusion {
+    /// `None` for cameras without rays.
+    fn of(case: &Case, solids: &Solids) -> Option<Occlusion> {
+        let cameras = case.workload.cameras.iter();
+        let rays = cameras.map(|camera| Rays::of(camera).ok());
+        let views = rays.zip(case.volumes());
+        let views: Option<Vec<_>> = views
+            .map(|(rays, volume)| Some((rays?, volume.clone())))
+            .collect();
+        Some(Occlusion {
+            scene: OccluderScene::of(solids),
+            views: views.filter(|views| views.len() == case.workload.views.len())?,
+        })
+    }
+}
+
+/// By the tree of the occluders, in a buffer of so many pixels.
+fn asked<'c>(case: &Case, all: Rc<Occlusion>, grid: SampleGrid) -> Ask<'c> {
+    let kernel = case.spec.execution.kernel;
+    let culling = RefCell::new(Interleaved::new(MaskedInner::new(grid), kernel));
+    Box::new(move |n, out| {
+        let (rays, volume) = &all.views[n];
+        let view = View::new(rays, volume, &all.scene, grid);
+        culling.borrow_mut().cull(&all.scene, &view, out);
+    })
+}
+
+pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> {
+    let omission = Omission::new(
+        NAME,
+        "occlusion culling",
+        [
+            "no occlusion culling: too little is hidden",
+            "cull what is hidden (masked-inner)",
+        ],
+        "share of the items in the view that others hide",
+        LeftOutIf::AtMost,
+        By::Rule,
+    );
+    let solids = Solids::of(case.scene());
+    let Some(all) = Occlusion::of(case, &solids) else {
+        return Ok(omission
+            .because("cameras without rays of their own")
+            .draft(Vec::new()));
+    };
+    let predicted = predicted(&all, &solids);
+    let on = format!(
+        "masked-inner {}x{} against {}",
+        USUAL.width, USUAL.height, case.spec.label
+    );
+    let kept = asked(case, Rc::new(all), USUAL);
+    Ok(hidden::draft(
+        case,
+        omission,
+        on,
+        kept,
+        Way::Base,
+        predicted,
+    ))
+}
+
+pub(super) fn prepare_buffer<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> {
+    let omission = Omission::new(
+        BUFFER_NAME,
+        "half of the occlusion buffer's columns and rows",
+        ["a buffer of 160x90 is enough", "use a buffer of 320x180"],
+        "share of the items left by 160x90 that 320x180 removes as well",
+        LeftOutIf::AtMost,
+        By::Rule,
+    );
+    let solids = Solids::of(case.scene());
+    let Some(all) = Occlusion::of(case, &solids) else {
+        return Ok(omission
+            .because("cameras without rays of their own")
+            .draft(Vec::new()));
+    };
+    let all = Rc::new(all);
+    let on = "masked-inner 320x180 against 160x90".to_owned();
+    let left_out = Way::Other(asked(case, all.clone(), SMALL));
+    let kept = asked(case, all.clone(), USUAL);
+    let few = [SMALL, USUAL].map(|grid| {
+        let ask = asked(case, all.clone(), grid);
+        hidden::mean_count(&ask, all.views.len(), PROBED)
+    });
+    let predicted = 1.0 - few[1] / few[0];
+    Ok(hidden::draft(case, omission, on, kept, left_out, predicted))
+}
+
+/// Items spread evenly over the ground are hidden if they are farther than what is
+/// seen: of a view of depth D in which rays get as far as d, the share 1 - (d / D)^2.
+fn predicted(all: &Occlusion, solids: &Solids) -> f64 {
+    let index = RayIndex::build(solids);
+    let extent = f64::from(Aabb::union_of(&solids.outer).extent().length());
+    let mut shares = Vec::new();
+    for frame in hidden::frames(all.views.len(), PROBED) {
+        let rays = &all.views[frame].0;
+        let depth = rays.sample(PROBES, 0, 0).far.min(extent);
+        for row in 0..PROBES.height {
+            for column in 0..PROBES.width {
+                let ray = rays.sample(PROBES, column, row);
+                let met = index
+                    .front_of(&ray)
+                    .map_or(depth, |front| front.entry.depth.min(depth));
+                shares.push(1.0 - (met / depth).powi(2));
+            }
+        }
+    }
+    // Rays into the sky say nothing of the ground.
+    let below: Vec<f64> = shares
+        .iter()
+        .copied()
+        .filter(|share| *share > 0.0)
+        .collect();
+    match below.is_empty() {
+        true => 0.0,
+        false => below.iter().sum::<f64>() / below.len() as f64,
+    }
+}
