@@ -3,6 +3,7 @@
 //! object stage is [`crate::index`]. The truth that all are held against is in
 //! `truth`. It knows scenes and cameras, not how anything is timed or shown.
 
+pub mod fragment;
 mod guarantee;
 mod level;
 pub mod meshes;

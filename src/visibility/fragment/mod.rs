@@ -1,0 +1,29 @@
+//! The fragment stage: which samples' fragments survive. Solids are drawn sample by
+//! sample with the rays of a camera, in the order of a list; the z-test keeps the
+//! nearest, the alpha-test drops what a mask says is clear, the stencil-test
+//! restricts the samples. What an order costs (overdraw) and gets wrong is counted.
+//!
+//! A fragment is an item at a sample whose ray meets the item: where it enters it,
+//! so front faces only, as it is said where [`Solids`](super::Solids) are.
+
+mod canvas;
+mod cycles;
+mod depth;
+mod draw;
+mod errors;
+mod mask;
+pub mod order;
+mod screen;
+mod stencil;
+
+#[cfg(test)]
+mod tests;
+
+pub use canvas::{Canvas, Fragment};
+pub use depth::DepthBuffer;
+pub use draw::{Drawn, Tally, Tests, draw};
+pub use errors::{OrderErrors, order_errors};
+pub use mask::{MASKS, Mask, Surface, Surfaces};
+pub use order::{DepthOrder, Piece};
+pub use screen::{Rectangle, Screen};
+pub use stencil::Stencil;

@@ -1,0 +1,195 @@
+//! A binary space partition of the items (Fuchs, Kedem, Naylor 1980): planes
+//! through faces of boxes, each across an axis; boxes that a plane passes through
+//! are cut in two. On either side of a plane all entries of one side are before
+//! those of the other, so the order of the parts is exact wherever planes part
+//! them: everywhere, unless boxes overlap in space.
+
+use super::contract::{DepthOrder, Piece, distance, nearest_point};
+use crate::camera::{Camera, Lens};
+use crate::scene::WorldBox;
+use crate::visibility::Solids;
+
+/// As typed on the command line.
+pub const NAME: &str = "bsp";
+/// One line for tables and help.
+pub const SUMMARY: &str = "planes through faces of boxes, boxes cut where they cross: exact";
+
+/// Parts that there may be for each item before cutting ends.
+const MOST_PARTS: usize = 4;
+/// A cut costs as much as so many boxes of imbalance.
+const COST_OF_CUT: usize = 8;
+
+/// A node, or the parts of a leaf.
+#[derive(Clone, Debug)]
+enum Node {
+    /// What is not above the plane, and what is.
+    Plane {
+        axis: usize,
+        at: f64,
+        sides: [usize; 2],
+    },
+    /// Parts that no plane parts.
+    Leaf(Vec<Part>),
+}
+
+/// A part of an item while the tree is built, and in its leaves.
+#[derive(Clone, Copy, Debug)]
+struct Part {
+    item: u32,
+    b: WorldBox,
+    cut: bool,
+}
+
+/// The tree.
+#[derive(Clone, Debug)]
+pub struct BspOrder {
+    nodes: Vec<Node>,
+    parts: usize,
+}
+
+impl BspOrder {
+    /// Builds the tree. O(n log^2 n) where few boxes are cut.
+    pub fn of(solids: &Solids) -> BspOrder {
+        let part = |(b, item): (&WorldBox, u32)| Part {
+            item,
+            b: *b,
+            cut: false,
+        };
+        let all: Vec<Part> = solids.boxes.iter().zip(0..).map(part).collect();
+        let most = all.len() * MOST_PARTS;
+        let mut tree = BspOrder {
+            parts: all.len(),
+            nodes: vec![Node::Leaf(Vec::new())],
+        };
+        let mut open = vec![(0, all)];
+        while let Some((node, parts)) = open.pop() {
+            let room = most.saturating_sub(tree.parts);
+            let Some((axis, at)) = plane(&parts, room) else {
+                tree.nodes[node] = Node::Leaf(parts);
+                continue;
+            };
+            let count = parts.len();
+            let sides = sides(parts, axis, at);
+            tree.parts += sides[0].len() + sides[1].len() - count;
+            let first = tree.nodes.len();
+            for (side, parts) in sides.into_iter().enumerate() {
+                tree.nodes.push(Node::Leaf(Vec::new()));
+                open.push((first + side, parts));
+            }
+            tree.nodes[node] = Node::Plane {
+                axis,
+                at,
+                sides: [first, first + 1],
+            };
+        }
+        tree
+    }
+
+    /// How many parts the items were cut into.
+    pub fn parts(&self) -> usize {
+        self.parts
+    }
+
+    /// The largest number of parts that no plane parts.
+    pub fn largest_leaf(&self) -> usize {
+        let leaf = |node: &Node| match node {
+            Node::Leaf(parts) => parts.len(),
+            Node::Plane { .. } => 0,
+        };
+        self.nodes.iter().map(leaf).max().unwrap_or(0)
+    }
+}
+
+/// The parts up to the plane, and those from it on. What lies in it counts as
+/// below.
+fn sides(parts: Vec<Part>, axis: usize, at: f64) -> [Vec<Part>; 2] {
+    let (mut below, mut above) = (Vec::new(), Vec::new());
+    for part in parts {
+        if part.b.max[axis] <= at {
+            below.push(part);
+        } else if part.b.min[axis] >= at {
+            above.push(part);
+        } else {
+            let [mut low, mut high] = [Part { cut: true, ..part }; 2];
+            low.b.max[axis] = at;
+            high.b.min[axis] = at;
+            below.push(low);
+            above.push(high);
+        }
+    }
+    [below, above]
+}
+
+/// The plane through a face that leaves least on either side and cuts least;
+/// `None` if there is none with fewer parts on each side than there are, or it
+/// cuts more than `room` parts.
+fn plane(parts: &[Part], room: usize) -> Option<(usize, f64)> {
+    let count = parts.len();
+    if count < 2 {
+        return None;
+    }
+    let mut best: Option<(usize, usize, f64)> = None;
+    for axis in 0..3 {
+        let sorted = |bound: fn(&WorldBox) -> glam::DVec3| {
+            let mut bounds: Vec<f64> = parts.iter().map(|part| bound(&part.b)[axis]).collect();
+            bounds.sort_unstable_by(f64::total_cmp);
+            bounds
+        };
+        let (low, high) = (sorted(|b| b.min), sorted(|b| b.max));
+        let mut flat: Vec<f64> = parts
+            .iter()
+            .filter(|part| part.b.min[axis] == part.b.max[axis])
+            .map(|part| part.b.min[axis])
+            .collect();
+        flat.sort_unstable_by(f64::total_cmp);
+        let equal = |list: &[f64], at: f64| {
+            list.partition_point(|&x| x <= at) - list.partition_point(|&x| x < at)
+        };
+        for &at in low.iter().chain(&high) {
+            let below = high.partition_point(|&x| x <= at);
+            // What lies in the plane is below it.
+            let above = count - low.partition_point(|&x| x < at) - equal(&flat, at);
+            let cut = count - below - above;
+            if below + cut == count || above + cut == count || cut > room {
+                continue;
+            }
+            let cost = below.abs_diff(above) + COST_OF_CUT * cut;
+            if best.is_none_or(|best| cost < best.0) {
+                best = Some((cost, axis, at));
+            }
+        }
+    }
+    best.map(|(_, axis, at)| (axis, at))
+}
+
+impl DepthOrder for BspOrder {
+    fn order(&self, _: &Solids, camera: &Camera, pieces: &mut Vec<Piece>) {
+        pieces.clear();
+        let parallel = matches!(camera.lens, Lens::Orthographic { .. });
+        let mut open = vec![0];
+        while let Some(node) = open.pop() {
+            match &self.nodes[node] {
+                &Node::Plane { axis, at, sides } => {
+                    let below_first = match parallel {
+                        true => camera.frame.forward()[axis] > 0.0,
+                        false => camera.frame.eye[axis] < at,
+                    };
+                    let [below, above] = sides;
+                    open.extend(match below_first {
+                        true => [above, below],
+                        false => [below, above],
+                    });
+                }
+                Node::Leaf(parts) => {
+                    let far = |part: &Part| distance(camera, nearest_point(camera, &part.b));
+                    let mut parts: Vec<&Part> = parts.iter().collect();
+                    parts.sort_by(|a, b| far(a).total_cmp(&far(b)).then(a.item.cmp(&b.item)));
+                    pieces.extend(parts.iter().map(|part| Piece {
+                        item: part.item,
+                        part: part.cut.then_some(part.b),
+                    }));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,56 @@
+//! What a depth order is: a list of pieces from front to back.
+
+use glam::DVec3;
+
+use crate::camera::{Camera, Lens};
+use crate::query::ItemId;
+use crate::scene::WorldBox;
+use crate::visibility::Solids;
+
+/// An item to be drawn, or a part of it.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Piece {
+    /// The item.
+    pub item: ItemId,
+    /// Only where it is entered through this part; `None` is all of it.
+    pub part: Option<WorldBox>,
+}
+
+/// A way to order items for a camera.
+pub trait DepthOrder: Send + Sync {
+    /// Puts all items, from front to back as well as it can, into `pieces` in place
+    /// of what it held. Deterministic.
+    fn order(&self, solids: &Solids, camera: &Camera, pieces: &mut Vec<Piece>);
+}
+
+/// The items, least key first; of the same key the lowest id.
+pub(super) fn by_key(solids: &Solids, pieces: &mut Vec<Piece>, key: impl Fn(&WorldBox) -> f64) {
+    let keyed = solids.boxes.iter().zip(0..).map(|(b, item)| (key(b), item));
+    let mut keyed: Vec<(f64, ItemId)> = keyed.collect();
+    keyed.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    pieces.clear();
+    pieces.extend(keyed.iter().map(|&(_, item)| Piece { item, part: None }));
+}
+
+/// How far a point is: squared distance from the eye, or the depth for an
+/// orthographic lens.
+pub(super) fn distance(camera: &Camera, point: DVec3) -> f64 {
+    let away = point - camera.frame.eye;
+    match camera.lens {
+        Lens::Orthographic { .. } => away.dot(camera.frame.forward()),
+        _ => away.length_squared(),
+    }
+}
+
+/// The point of a box that is nearest to the eye, or of least depth for an
+/// orthographic lens.
+pub(super) fn nearest_point(camera: &Camera, b: &WorldBox) -> DVec3 {
+    match camera.lens {
+        Lens::Orthographic { .. } => {
+            let forward = camera.frame.forward();
+            let pick = |k: usize| if forward[k] > 0.0 { b.min[k] } else { b.max[k] };
+            DVec3::new(pick(0), pick(1), pick(2))
+        }
+        _ => camera.frame.eye.max(b.min).min(b.max),
+    }
+}

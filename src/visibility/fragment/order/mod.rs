@@ -1,0 +1,53 @@
+//! Depth orders: in which order items are drawn. One file an order; each gives a
+//! list from front to back as well as it can.
+
+mod box_distance;
+mod bsp;
+mod centre_distance;
+mod contract;
+mod none;
+mod tree;
+
+pub use bsp::BspOrder;
+pub use contract::{DepthOrder, Piece};
+
+/// A row of the table of orders.
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub struct OrderRow {
+    /// As typed on the command line.
+    pub name: &'static str,
+    /// One line for tables and help.
+    pub summary: &'static str,
+    /// Prepares it for the items of a scene.
+    pub build: fn(&crate::visibility::Solids) -> Box<dyn DepthOrder>,
+}
+
+/// All orders.
+pub const ORDERS: &[OrderRow] = &[
+    OrderRow {
+        name: none::NAME,
+        summary: none::SUMMARY,
+        build: |_| Box::new(none::None),
+    },
+    OrderRow {
+        name: tree::NAME,
+        summary: tree::SUMMARY,
+        build: |solids| Box::new(tree::TreeOrder::of(solids)),
+    },
+    OrderRow {
+        name: centre_distance::NAME,
+        summary: centre_distance::SUMMARY,
+        build: |_| Box::new(centre_distance::CentreDistance),
+    },
+    OrderRow {
+        name: box_distance::NAME,
+        summary: box_distance::SUMMARY,
+        build: |_| Box::new(box_distance::BoxDistance),
+    },
+    OrderRow {
+        name: bsp::NAME,
+        summary: bsp::SUMMARY,
+        build: |solids| Box::new(BspOrder::of(solids)),
+    },
+];

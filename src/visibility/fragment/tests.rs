@@ -1,0 +1,344 @@
+//! Drawn images against the exact truth of their samples.
+
+use glam::DVec3;
+
+use super::*;
+use crate::camera::{Camera, Frame, Lens};
+use crate::query::ItemId;
+use crate::scene::{SeededRng, WorldBox, load};
+use crate::visibility::truth::{NO_ITEM, RayIndex, SampleTruth, judge};
+use crate::visibility::{Rays, SampleGrid, Solids};
+use order::{BspOrder, ORDERS};
+
+fn all(solids: &Solids) -> Vec<Piece> {
+    let items = 0..solids.boxes.len() as ItemId;
+    items.map(|item| Piece { item, part: None }).collect()
+}
+
+/// Cameras in a scene: on the ground and above it, of all lenses.
+fn cameras(solids: &Solids, seed: u64) -> Vec<Camera> {
+    let low = solids
+        .boxes
+        .iter()
+        .fold(DVec3::INFINITY, |low, b| low.min(b.min));
+    let high = solids
+        .boxes
+        .iter()
+        .fold(DVec3::NEG_INFINITY, |high, b| high.max(b.max));
+    let mut rng = SeededRng::new(seed);
+    let mut cameras = Vec::new();
+    for lens in [
+        Lens::perspective(60.0, 1.5, 0.25, None),
+        Lens::off_axis([-0.1, 0.3, -0.2, 0.1], 0.25, Some(300.0)),
+        Lens::orthographic(60.0, 1.5, -5.0, 800.0),
+    ] {
+        for (height, down) in [(low.z + 1.7, 0.0), (high.z + 20.0, -0.7)] {
+            let at = low + (high - low) * rng.point();
+            let turn = rng.between(0.0, std::f64::consts::TAU);
+            let forward = DVec3::new(libm::cos(turn), libm::sin(turn), down);
+            let eye = DVec3::new(at.x, at.y, height);
+            let frame = Frame::looking_along(eye, forward, DVec3::Z).unwrap();
+            let lens = lens.unwrap();
+            cameras.push(Camera { frame, lens });
+        }
+    }
+    cameras
+}
+
+const GRID: SampleGrid = SampleGrid::new(48, 32);
+
+#[test]
+fn the_z_test_leaves_the_sample_truth_whatever_the_order() {
+    for name in ["city:n=800", "rooms:n=800", "clustered:n=800"] {
+        let solids = Solids::of(&load(name, &Default::default()).unwrap());
+        let index = RayIndex::build(&solids);
+        let orders: Vec<_> = ORDERS.iter().map(|row| (row.build)(&solids)).collect();
+        let mut seen = 0;
+        for camera in cameras(&solids, 4) {
+            let rays = Rays::of(&camera).unwrap();
+            let canvas = Canvas::of(&rays, GRID);
+            let truth = SampleTruth::of(&solids, &index, &rays, GRID, 1);
+            seen += truth.visible.len();
+            let mut pieces = Vec::new();
+            for (order, row) in orders.iter().zip(ORDERS) {
+                order.order(&solids, &camera, &mut pieces);
+                let drawn = draw(&canvas, &solids, &pieces, &Tests::default());
+                assert_eq!(drawn.depth.ids(), truth.front, "{name} {}", row.name);
+                assert_eq!(
+                    drawn.depth.visible(&canvas),
+                    truth.visible,
+                    "{name} {}",
+                    row.name
+                );
+                assert!(drawn.tally.passed >= drawn.tally.covered);
+            }
+        }
+        assert!(seen > 100, "the premise: {seen}");
+    }
+}
+
+#[test]
+fn worlds_full_of_ties_are_drawn_as_they_are_seen() {
+    let mut rng = SeededRng::new(8);
+    let grid = SampleGrid::new(8, 6);
+    let mut tied = 0;
+    for _ in 0..150 {
+        let count = 1 + rng.below(10);
+        let solids = judge::solids(&judge::ties(&mut rng, count));
+        let camera = judge::camera(&mut rng);
+        let rays = Rays::of(&camera).unwrap();
+        let index = RayIndex::build(&solids);
+        let truth = SampleTruth::of(&solids, &index, &rays, grid, 1);
+        let canvas = Canvas::of(&rays, grid);
+        let mut pieces = Vec::new();
+        for row in ORDERS {
+            (row.build)(&solids).order(&solids, &camera, &mut pieces);
+            let drawn = draw(&canvas, &solids, &pieces, &Tests::default());
+            assert_eq!(
+                drawn.depth.ids(),
+                truth.front,
+                "{} {camera:?} {:?}",
+                row.name,
+                solids.boxes
+            );
+            assert_eq!(drawn.depth.visible(&canvas), truth.visible, "{}", row.name);
+        }
+        let samples: u32 = truth.samples_of.iter().sum();
+        let covered = truth.front.iter().filter(|&&id| id != NO_ITEM).count();
+        tied += samples as usize - covered;
+    }
+    assert!(tied > 100, "the premise: {tied}");
+}
+
+/// Boxes that share no inner point, some of them touching.
+fn apart(rng: &mut SeededRng, count: usize) -> Vec<WorldBox> {
+    let mut boxes: Vec<WorldBox> = Vec::new();
+    while boxes.len() < count {
+        let whole = |rng: &mut SeededRng, n: usize| rng.below(n) as f64;
+        let low = DVec3::from([(); 3].map(|()| whole(rng, 24) - 12.0));
+        let size = DVec3::from([(); 3].map(|()| 1.0 + whole(rng, 9)));
+        let b = WorldBox::new(low, low + size);
+        let meets = |o: &WorldBox| (0..3).all(|k| b.min[k] < o.max[k] && o.min[k] < b.max[k]);
+        if !boxes.iter().any(meets) {
+            boxes.push(b);
+        }
+    }
+    boxes
+}
+
+#[test]
+fn the_painters_picture_by_bsp_is_exact_and_by_distances_it_is_not() {
+    let mut rng = SeededRng::new(12);
+    let grid = SampleGrid::new(40, 30);
+    let mut wrong = vec![0; ORDERS.len()];
+    let (mut pairs, mut cut) = (0, 0);
+    for _ in 0..12 {
+        let solids = judge::solids(&apart(&mut rng, 40));
+        cut += BspOrder::of(&solids).parts() - 40;
+        for lens in [
+            Lens::perspective(70.0, 1.3, 0.5, None),
+            Lens::orthographic(30.0, 1.3, -40.0, 80.0),
+        ] {
+            let eye = rng.normal3().normalize() * 25.0;
+            let frame = Frame::looking_along(eye, -eye, DVec3::Z).unwrap();
+            let lens = lens.unwrap();
+            let camera = Camera { frame, lens };
+            let canvas = Canvas::of(&Rays::of(&camera).unwrap(), grid);
+            let mut pieces = Vec::new();
+            for (i, row) in ORDERS.iter().enumerate() {
+                (row.build)(&solids).order(&solids, &camera, &mut pieces);
+                let errors = order_errors(&canvas, &solids, &pieces);
+                wrong[i] += errors.wrong;
+                pairs += errors.pairs;
+                // The painter's picture, drawn, is wrong where it was said to be.
+                let drawn = draw(&canvas, &solids, pieces.iter().rev(), &Tests::default());
+                let ids = drawn.depth.ids();
+                let differing = drawn.last.iter().zip(&ids).filter(|(last, id)| last != id);
+                let tied = |sample: usize| {
+                    let probe = canvas.probe(sample);
+                    let at =
+                        |item: ItemId| probe.enter(&solids.boxes[item as usize], f64::INFINITY);
+                    let (a, b) = (at(drawn.last[sample]).unwrap(), at(ids[sample]).unwrap());
+                    probe.compare(&a, &b).is_eq()
+                };
+                let ties = (0..ids.len())
+                    .filter(|&s| drawn.last[s] != ids[s] && tied(s))
+                    .count();
+                assert_eq!((differing.count() - ties) as u64, errors.wrong_samples);
+                if row.name == "bsp" {
+                    assert_eq!(errors.wrong_samples, 0);
+                    assert!(drawn.tally.passed > 0);
+                    // From front to back nothing is shaded twice, but for ties.
+                    let drawn = draw(&canvas, &solids, &pieces, &Tests::default());
+                    assert!(drawn.tally.passed <= drawn.tally.covered + ties as u64);
+                }
+            }
+        }
+    }
+    let of = |name: &str| wrong[ORDERS.iter().position(|row| row.name == name).unwrap()];
+    assert_eq!(of("bsp"), 0, "of {pairs} pairs");
+    assert!(cut > 0, "the premise: boxes were cut");
+    assert!(of("centre-distance") > 0 && of("none") > of("centre-distance"));
+}
+
+/// Three beams that lie on each other in a circle: no order is right, but that of
+/// their parts.
+#[test]
+fn overlaps_in_a_cycle_are_found_and_only_cutting_undoes_them() {
+    let beam = |low: [f64; 3], high: [f64; 3]| WorldBox::new(low.into(), high.into());
+    let boxes = [
+        beam([-4.0, -4.0, 0.0], [4.0, -3.0, 1.0]),
+        beam([3.0, -4.0, 1.0], [4.0, 4.0, 2.0]),
+        beam([-4.0, 3.0, 0.0], [4.0, 4.0, 1.0]),
+        beam([-4.0, -4.0, 1.0], [-3.0, -2.0, 2.0]),
+    ];
+    let tilted = |a: [f64; 3], b: [f64; 3]| beam(a, b);
+    // x over y over z over x, seen along the diagonal.
+    let cycle = [
+        tilted([0.0, 2.0, 1.0], [6.0, 3.0, 2.0]),
+        tilted([1.0, 0.0, 2.0], [2.0, 6.0, 3.0]),
+        tilted([2.0, 1.0, 0.0], [3.0, 2.0, 6.0]),
+    ];
+    let lens = Lens::perspective(60.0, 1.0, 0.5, None).unwrap();
+    let count = |boxes: &[WorldBox], eye: DVec3, at: DVec3| {
+        let solids = judge::solids(boxes);
+        let frame = Frame::looking_along(eye, at - eye, DVec3::new(0.1, 0.2, 1.0)).unwrap();
+        let camera = Camera { frame, lens };
+        let canvas = Canvas::of(&Rays::of(&camera).unwrap(), SampleGrid::new(80, 80));
+        let mut pieces = Vec::new();
+        (row("box-distance").build)(&solids).order(&solids, &camera, &mut pieces);
+        let sorted = order_errors(&canvas, &solids, &pieces);
+        (row("bsp").build)(&solids).order(&solids, &camera, &mut pieces);
+        let cut = order_errors(&canvas, &solids, &pieces);
+        assert_eq!((cut.wrong, cut.wrong_samples), (0, 0));
+        assert_eq!(cut.cyclic, sorted.cyclic);
+        sorted
+    };
+    let eye = DVec3::splat(14.0);
+    let errors = count(&cycle, eye, DVec3::splat(2.0));
+    assert_eq!(errors.cyclic, 3);
+    assert!(errors.wrong > 0 && errors.wrong_samples > 0);
+    let errors = count(&boxes, DVec3::new(0.3, 0.2, 20.0), DVec3::ZERO);
+    assert_eq!(errors.cyclic, 0);
+}
+
+fn row(name: &str) -> &'static order::OrderRow {
+    ORDERS.iter().find(|row| row.name == name).unwrap()
+}
+
+/// The front item of a sample is the first along its ray that is opaque there.
+#[test]
+fn through_the_holes_of_cut_outs_is_seen_what_is_behind_them() {
+    let solids = Solids::of(&load("city:n=400", &Default::default()).unwrap());
+    let index = RayIndex::build(&solids);
+    let mut surfaces = Surfaces::default();
+    for item in 0..solids.boxes.len() as ItemId {
+        let mask = [Mask::Solid, Mask::Fence, Mask::Foliage][item as usize % 3];
+        surfaces.set(item, Surface { mask, tile: 4.0 });
+    }
+    let (mut through, mut clear) = (0, 0);
+    for camera in cameras(&solids, 6) {
+        let rays = Rays::of(&camera).unwrap();
+        let canvas = Canvas::of(&rays, GRID);
+        let tests = Tests {
+            surfaces: Some(&surfaces),
+            stencil: None,
+        };
+        let drawn = draw(&canvas, &solids, &all(&solids), &tests);
+        clear += drawn.tally.clear;
+        let solid = draw(&canvas, &solids, &all(&solids), &Tests::default());
+        let (ids, solid) = (drawn.depth.ids(), solid.depth.ids());
+        for (sample, &id) in ids.iter().enumerate() {
+            let probe = canvas.probe(sample);
+            let mut along = index.all_along(probe.ray(), f64::INFINITY);
+            along.sort_by(|a, b| probe.compare(&a.1, &b.1).then(a.0.cmp(&b.0)));
+            let opaque =
+                |item: ItemId, at| surfaces.opaque(item, &solids.boxes[item as usize], probe, at);
+            let first = along.iter().find(|(item, at)| opaque(*item, at));
+            assert_eq!(id, first.map_or(NO_ITEM, |first| first.0));
+            through += usize::from(id != solid[sample] && id != NO_ITEM);
+        }
+    }
+    assert!(
+        through > 100 && clear > 1000,
+        "the premise: {through} {clear}"
+    );
+}
+
+/// A portal in a wall: the pass beyond it draws on its samples alone, and there
+/// just what the whole view has beyond the wall.
+#[test]
+fn a_stencil_saves_samples_and_changes_nothing_where_it_is_marked() {
+    let wall = |y: [f64; 2], z: [f64; 2]| {
+        WorldBox::new(DVec3::new(10.0, y[0], z[0]), DVec3::new(10.5, y[1], z[1]))
+    };
+    let mut boxes = vec![
+        wall([-20.0, -1.0], [-20.0, 20.0]),
+        wall([1.0, 20.0], [-20.0, 20.0]),
+        wall([-1.0, 1.0], [2.0, 20.0]),
+        wall([-1.0, 1.0], [-20.0, 0.0]),
+    ];
+    let mut rng = SeededRng::new(3);
+    let first_beyond = boxes.len();
+    for _ in 0..200 {
+        let at = DVec3::new(12.0, -15.0, -15.0) + rng.point() * 30.0;
+        boxes.push(WorldBox::around(at, rng.point() * 2.0));
+    }
+    let solids = judge::solids(&boxes);
+    let frame = Frame::looking_along(DVec3::new(0.0, 0.3, 1.0), DVec3::X, DVec3::Z).unwrap();
+    let lens = Lens::perspective(60.0, 1.5, 0.5, None).unwrap();
+    let canvas = Canvas::of(&Rays::of(&Camera { frame, lens }).unwrap(), GRID);
+    let pieces = all(&solids);
+    let (room, beyond) = pieces.split_at(first_beyond);
+    let walls = draw(&canvas, &solids, room, &Tests::default());
+    let portal = wall([-1.0, 1.0], [0.0, 2.0]);
+    let portal = WorldBox::new(portal.min, DVec3::new(10.0, portal.max.y, portal.max.z));
+    let stencil = Stencil::of_rectangle(&canvas, &portal, &walls.depth);
+    assert!((5..400).contains(&stencil.count()), "{}", stencil.count());
+    let tests = Tests {
+        stencil: Some(&stencil),
+        surfaces: None,
+    };
+    let (masked, open) = (
+        draw(&canvas, &solids, beyond, &tests),
+        draw(&canvas, &solids, beyond, &Tests::default()),
+    );
+    for sample in 0..GRID.samples() {
+        let (masked, open) = (masked.depth.front(sample), open.depth.front(sample));
+        assert_eq!(masked, open.filter(|_| stencil.holds(sample)));
+        // What is marked is what the walls leave free or stand behind.
+        if walls.depth.front(sample).is_none() && stencil.count() > 0 {
+            assert!(stencil.holds(sample));
+        }
+    }
+    let (with, without) = (masked.tally, open.tally);
+    assert_eq!(with.asked + with.kept_out, without.asked);
+    assert!(with.fragments > 0 && with.fragments * 4 < without.fragments);
+}
+
+#[test]
+fn screen_rectangles_hold_every_sample_that_meets_the_box() {
+    let mut rng = SeededRng::new(30);
+    let grid = SampleGrid::new(16, 12);
+    let (mut met, mut held) = (0, 0);
+    for _ in 0..400 {
+        let solids = judge::solids(&judge::ties(&mut rng, 12));
+        let rays = Rays::of(&judge::camera(&mut rng)).unwrap();
+        let canvas = Canvas::of(&rays, grid);
+        for b in &solids.boxes {
+            let rectangle = canvas.screen().rectangle(b);
+            held += rectangle.as_ref().map_or(0, Rectangle::samples);
+            for sample in 0..grid.samples() {
+                let probe = canvas.probe(sample);
+                if probe.enter(b, f64::INFINITY).is_some() {
+                    let (column, row) = (sample as u32 % 16, sample as u32 / 16);
+                    let holds =
+                        |r: &Rectangle| r.columns.contains(&column) && r.rows.contains(&row);
+                    assert!(rectangle.as_ref().is_some_and(holds), "{b:?} {rays:?}");
+                    met += 1;
+                }
+            }
+        }
+    }
+    assert!(met > 5000 && held < 8 * met, "the premise: {met} of {held}");
+}
