@@ -24,6 +24,11 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
         )),
         Block::Table(stages(report)),
     ];
+    blocks.push(Block::Heading(
+        2,
+        "What is left, drawn in every order".into(),
+    ));
+    blocks.push(Block::Table(orders(report)));
     if !report.gains.is_empty() {
         blocks.push(Block::Heading(
             2,
@@ -101,6 +106,33 @@ fn count(mean: f64) -> String {
         mean if mean >= 100.0 || mean.fract() == 0.0 => format!("{mean:.0}"),
         mean => text::significant(mean),
     }
+}
+
+fn orders(report: &FunnelReport) -> Rows {
+    let mut rows = Rows::of_numbers([
+        "order",
+        "fragments",
+        "shaded",
+        "overdraw",
+        "overlapping pairs",
+        "wrong",
+        "wrong samples",
+        "time",
+    ]);
+    rows.rows.extend(report.orders.iter().map(|row| {
+        let times = &row.times;
+        vec![
+            row.name.to_owned(),
+            count(row.fragment_count),
+            count(row.shaded_count),
+            row.overdraw.map(text::significant).unwrap_or_default(),
+            count(row.pair_count),
+            count(row.wrong_pair_count),
+            count(row.wrong_sample_count),
+            text::time_within(times.stage_ns, [times.stage_ns_lower, times.stage_ns_upper]),
+        ]
+    }));
+    rows
 }
 
 fn gains(report: &FunnelReport) -> Rows {

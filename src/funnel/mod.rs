@@ -10,6 +10,7 @@ mod chain;
 mod conclusions;
 mod hiding;
 mod judged;
+mod orders;
 mod pass;
 mod plan_view;
 mod report;
@@ -19,6 +20,7 @@ mod world;
 
 pub use chain::Chain;
 pub use judged::Errors;
+pub use orders::OrderRow;
 pub use plan_view::{Fate, PlanView};
 pub use report::{FunnelReport, Gain, LevelRow, StageRow, Times};
 pub use stage::{BackEnd, NONE, STAGES, StageKind};

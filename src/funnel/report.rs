@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::chain::Chain;
 use super::judged::Errors;
+use super::orders::OrderRow;
 use super::plan_view::PlanView;
 use super::stage::{BackEnd, StageKind};
 use crate::measure::OverProcesses;
@@ -32,6 +33,8 @@ pub struct FunnelReport {
     pub chain: Chain,
     /// Every stage with every back end, each given what the chain hands it.
     pub stages: Vec<StageRow>,
+    /// What is left, drawn in every order.
+    pub orders: Vec<OrderRow>,
     /// Each stage of the chain, with it and without it.
     pub gains: Vec<Gain>,
     /// What follows, in a sentence each.

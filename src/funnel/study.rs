@@ -1,17 +1,20 @@
 //! The study: every stage with every back end on the views of a path, held against
 //! the truth, then timed side by side in one or more processes.
 
+use std::cell::RefCell;
+
 use serde::{Deserialize, Serialize};
 
 use super::chain::Chain;
 use super::conclusions::conclusions;
 use super::judged::Errors;
+use super::orders::{self, Orders};
 use super::pass::{Pass, Walked};
 use super::plan_view::{PlanView, fate};
 use super::report::{FunnelReport, Gain, LevelRow, Side, StageRow, Times};
 use super::stage::{NONE, StageKind};
 use super::world::{FunnelError, FunnelInput, Truth, World};
-use crate::measure::{OverProcesses, ProcessTimes, Schedule, TimedTask, Verdict, timed};
+use crate::measure::{Ask, OverProcesses, ProcessTimes, Schedule, TimedTask, Verdict, timed};
 use crate::visibility::Level;
 
 /// What all processes time: the plan is the same for each.
@@ -46,7 +49,7 @@ pub fn prepare(
         return Ok(None);
     };
     let mut pass = Pass::new(&world);
-    let Some(walks) = Walks::of(&mut pass, &world, &input.chain, stop) else {
+    let Some(walks) = Walks::of(&mut pass, &world, input.chain, stop) else {
         return Ok(None);
     };
     let mut rows = Vec::new();
@@ -82,7 +85,11 @@ pub fn prepare(
         (*stage, name, [side(&walks.chosen), side(without)])
     });
     let gains = gains.collect();
-    let tasks = timed_tasks(&pass, &world, None);
+    let orders = Orders::of(&world, &pass, walks.left());
+    let Some(drawn) = orders.drawn(input.samples, stop) else {
+        return Ok(None);
+    };
+    let tasks = timed_tasks(&pass, &world, &orders, None);
     let schedule = Schedule::new(world.views(), &tasks, input.protocol);
     let level = Level::of(&input.scene.name, input.scene)?;
     Ok(Some(Prepared {
@@ -102,6 +109,7 @@ pub fn prepare(
             level: LevelRow::of(&level),
             chain: input.chain.clone(),
             stages: rows,
+            orders: drawn,
             gains: Vec::new(),
             conclusions: Vec::new(),
             plan_view: plan_view(&world, &pass, &walks.chosen, &truth),
@@ -120,35 +128,58 @@ pub fn time(
 ) -> Result<Option<ProcessTimes>, FunnelError> {
     let world = World::new(input)?;
     let mut pass = Pass::new(&world);
-    if Walks::of(&mut pass, &world, &input.chain, stop).is_none() {
+    let Some(walks) = Walks::of(&mut pass, &world, input.chain, stop) else {
         return Ok(None);
-    }
-    let tasks = timed_tasks(&pass, &world, Some(&plan.expected));
+    };
+    let orders = Orders::of(&world, &pass, walks.left());
+    let tasks = timed_tasks(&pass, &world, &orders, Some(&plan.expected));
     let timed = timed(&tasks, &plan.schedule, input.protocol, &|_| stop());
     Ok(timed.map(|timed| ProcessTimes::of(&timed)))
 }
 
-/// Every step as a task; what it must hand on is what it has, or what another
-/// process says.
+/// Every step, and then every order, as a task; what it must hand on is what it has, or
+/// what another process says.
 fn timed_tasks<'p>(
     pass: &'p Pass<'p>,
     world: &'p World<'p>,
+    orders: &'p Orders,
     expected: Option<&[Vec<u64>]>,
 ) -> Vec<TimedTask<'p>> {
-    let task = |(place, step): (usize, &'p super::pass::Step)| {
+    let steps = pass.steps().iter().map(|step| {
         let run = world.run(step.stage, &step.back_end);
-        let counts = || {
-            let counts = (0..world.views()).map(|view| pass.count(step.output, view) as u64);
-            counts.collect()
-        };
-        TimedTask {
-            ask: Box::new(move |view, out| run(view, pass.items(step.input, view), out)),
-            ask_many: None,
-            expected: expected.map_or_else(counts, |expected| expected[place].clone()),
-            least_ns: None,
-        }
+        let ask: Ask = Box::new(move |view, out| run(view, pass.items(step.input, view), out));
+        ask
+    });
+    let sorts = (0..orders::COUNT).map(|order| {
+        let pieces = RefCell::new(Vec::new());
+        let ask: Ask = Box::new(move |view, out| {
+            let pieces = &mut *pieces.borrow_mut();
+            orders.sort(order, view, pieces);
+            out.extend(pieces.iter().map(|piece| piece.item));
+        });
+        ask
+    });
+    let task = |(place, ask): (usize, Ask<'p>)| TimedTask {
+        expected: match expected {
+            Some(expected) => expected[place].clone(),
+            None => counts(&ask, world.views()),
+        },
+        ask,
+        ask_many: None,
+        least_ns: None,
     };
-    pass.steps().iter().enumerate().map(task).collect()
+    steps.chain(sorts).enumerate().map(task).collect()
+}
+
+/// How much is handed on in each view.
+fn counts(ask: &Ask, views: usize) -> Vec<u64> {
+    let mut out = Vec::new();
+    let counts = (0..views).map(|view| {
+        out.clear();
+        ask(view, &mut out);
+        out.len() as u64
+    });
+    counts.collect()
 }
 
 /// The chains that are gone through: the chosen one, every back end in its place in
@@ -160,6 +191,11 @@ struct Walks {
 }
 
 impl Walks {
+    /// The set that the chosen chain leaves to be drawn.
+    fn left(&self) -> usize {
+        self.chosen.sets[StageKind::Triangle as usize]
+    }
+
     fn of(pass: &mut Pass, world: &World, chain: &Chain, stop: &dyn Fn() -> bool) -> Option<Walks> {
         let chosen = pass.walk(chain, stop)?;
         let (mut rows, mut without) = (Vec::new(), Vec::new());
@@ -203,6 +239,9 @@ impl Prepared {
             let Some(found) = task.and_then(|task| times.ns(task)) else {
                 continue;
             };
+            if row.back_end.stage == StageKind::Fragment {
+                continue;
+            }
             row.times = Times::of(Some(found));
             let per = |count: f64| (count > 0.0).then(|| found.value / count);
             row.ns_per_removed = per(row.errors.input_count - row.errors.output_count);

@@ -21,6 +21,7 @@ use crate::measure::{Protocol, WorkloadError, input_of};
 use crate::path::CameraPath;
 use crate::query::ItemId;
 use crate::scene::{self, Scene};
+use crate::visibility::fragment::{Canvas, Piece, Tests, draw};
 use crate::visibility::occlusion::{self, OccluderScene};
 use crate::visibility::region::{
     EyePlace, Flood, Marks, PortalClip, PortalRect, RegionGraph, RegionItems, RegionRow, Scratch,
@@ -207,6 +208,16 @@ impl<'a> World<'a> {
         self.views.len()
     }
 
+    /// The items as they hide each other.
+    pub fn solids(&self) -> &Solids {
+        &self.solids
+    }
+
+    /// The rays of a view.
+    pub fn rays(&self, view: usize) -> &Rays {
+        &self.views[view].rays
+    }
+
     /// How many items there are.
     pub fn items(&self) -> usize {
         self.scene.items.len()
@@ -268,7 +279,8 @@ impl<'a> World<'a> {
             StageKind::Object => self.run_object(name),
             StageKind::Occlusion => self.run_occlusion(name),
             StageKind::Triangle => self.run_triangle(name),
-            StageKind::Fragment => unreachable!("no back end {name}"),
+            // Left to the graphics processor: it is judged and not timed.
+            StageKind::Fragment => Box::new(|_, input, out| out.extend(input.unwrap_or_default())),
         }
     }
 
@@ -352,6 +364,9 @@ impl<'a> World<'a> {
         if stage == StageKind::Triangle {
             return self.judge_triangles(name, view, input);
         }
+        if stage == StageKind::Fragment && name != NONE {
+            return self.judge_fragments(view, input, truth);
+        }
         let every: Vec<ItemId>;
         let output = match output {
             Some(output) => output,
@@ -361,6 +376,26 @@ impl<'a> World<'a> {
             }
         };
         judge_items(input, self.items(), output, &truth.visible[view])
+    }
+
+    /// What the z-test leaves: items in front at a sample, drawn one by one.
+    fn judge_fragments(&self, view: usize, input: Option<&[ItemId]>, truth: &Truth) -> Judged {
+        let every: Vec<ItemId>;
+        let items = match input {
+            Some(items) => items,
+            None => {
+                every = (0..self.items() as ItemId).collect();
+                &every
+            }
+        };
+        let canvas = Canvas::of(&self.views[view].rays, self.samples);
+        let solids = self.solids.some(items);
+        let pieces = (0..items.len() as ItemId).map(|item| Piece { item, part: None });
+        let pieces: Vec<Piece> = pieces.collect();
+        let drawn = draw(&canvas, &solids, &pieces, &Tests::default());
+        let visible = drawn.depth.visible(&canvas);
+        let output: Vec<ItemId> = visible.iter().map(|&place| items[place as usize]).collect();
+        judge_items(input, self.items(), &output, &truth.visible[view])
     }
 
     fn judge_triangles(&self, name: &str, view: usize, input: Option<&[ItemId]>) -> Judged {
@@ -478,6 +513,11 @@ pub fn back_ends(stage: StageKind, scene: &Scene) -> Vec<BackEnd> {
             let others = sides.filter(|row| row.name != NONE);
             rows.extend(others.map(|row| plain(row.name, row.summary, row.guarantee)));
         }
+        StageKind::Fragment => rows.push(plain(
+            "z-test",
+            "the nearest fragment of each sample, exactly",
+            Guarantee::SampleExact,
+        )),
         _ => {}
     }
     rows
@@ -497,6 +537,7 @@ impl Chain {
             (StageKind::Region, portal_clip::NAME),
             (StageKind::Occlusion, "masked-inner"),
             (StageKind::Triangle, "cone-safe"),
+            (StageKind::Fragment, "z-test"),
         ]
         .into_iter()
         .fold(Chain::empty(), |chain, (stage, name)| {

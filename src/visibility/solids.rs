@@ -9,6 +9,7 @@ use glam::DVec3;
 
 use crate::arithmetic::rounding::{difference_down, difference_up};
 use crate::geometry::Aabb;
+use crate::query::ItemId;
 use crate::scene::{Scene, WorldBox};
 
 /// The items of a scene as solid boxes, in three forms.
@@ -43,6 +44,20 @@ impl Solids {
             boxes,
             outer: scene.items.clone(),
             origin: scene.origin,
+        }
+    }
+
+    /// Some of them, numbered anew in this order.
+    ///
+    /// # Panics
+    /// If there is no such item.
+    pub fn some(&self, items: &[ItemId]) -> Solids {
+        let of = |boxes: &[Aabb]| items.iter().map(|&id| boxes[id as usize]).collect();
+        Solids {
+            origin: self.origin,
+            boxes: items.iter().map(|&id| self.boxes[id as usize]).collect(),
+            outer: of(&self.outer),
+            inner: of(&self.inner),
         }
     }
 }
