@@ -382,8 +382,9 @@ Columns of the table:
   FP, FN       handed on though not visible; visible and not handed on
   time         CPU time of the stage, a view
   per removed  time / what the stage removed
-The rows of a stage are given what the chain hands them; * marks the chain's own. Truth are the
-rays through the samples, decided exactly.";
+The rows of a stage are given what the chain hands them; * marks the chain's own, ? a back end that
+promises nothing. What is true is decided exactly, along the rays through the samples. Where the
+occlusion stage walks a tree of its own (masked-inner, masked), its time holds the object stage's.";
 
 #[derive(Args, Debug)]
 #[command(after_help = FUNNEL_HELP)]

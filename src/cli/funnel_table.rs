@@ -7,6 +7,7 @@ use super::document::{Block, Rows};
 use super::text;
 use crate::funnel::{FunnelReport, Gain, StageRow};
 use crate::shown::field;
+use crate::visibility::Guarantee;
 
 /// No line is longer.
 const WIDTH: usize = 100;
@@ -70,11 +71,11 @@ fn stages(report: &FunnelReport) -> Rows {
         rows: Vec::new(),
     };
     let level = &report.level;
-    let mut first = vec!["level".to_owned(), level.selected.clone(), String::new()];
+    let mut first = vec!["level".to_owned(), level.selected.clone()];
     first.extend([level.input_count, level.output_count].map(|n| n.to_string()));
     first.resize(rows.header.len(), String::new());
     if level.map_count > 1 {
-        first[8] = format!("-{}", text::time(level.saved_load_ns));
+        first[7] = format!("-{}", text::time(level.saved_load_ns));
     }
     rows.rows.push(first);
     rows.rows.extend(report.stages.iter().map(stage));
@@ -85,11 +86,14 @@ fn stage(row: &StageRow) -> Vec<String> {
     let errors = &row.errors;
     let name = row.structure.as_deref().unwrap_or(row.back_end.name);
     let mark = if row.is_chosen { "*" } else { "" };
+    let doubt = match row.back_end.guarantee {
+        Guarantee::Unproven => "?",
+        _ => "",
+    };
     let times = &row.times;
     vec![
         row.back_end.stage.name().to_owned(),
-        format!("{name}{mark}"),
-        row.back_end.guarantee.name().to_owned(),
+        format!("{name}{mark}{doubt}"),
         count(errors.input_count),
         count(errors.output_count),
         count(errors.truth_count),

@@ -8,6 +8,7 @@
 
 mod chain;
 mod conclusions;
+mod faces;
 mod hiding;
 mod judged;
 mod orders;

@@ -6,7 +6,6 @@ use serde::Serialize;
 use super::pass::Pass;
 use super::report::Times;
 use super::world::World;
-use crate::query::ItemId;
 use crate::visibility::fragment::order::ORDERS;
 use crate::visibility::fragment::{Canvas, DepthOrder, Piece, Tests, draw, order_errors};
 use crate::visibility::{Rays, SampleGrid, Solids};
@@ -56,15 +55,7 @@ impl Orders {
     /// For a set of items of each view.
     pub fn of(world: &World, pass: &Pass, set: usize) -> Orders {
         let views = (0..world.views()).map(|view| {
-            let every: Vec<ItemId>;
-            let items = match pass.items(set, view) {
-                Some(items) => items,
-                None => {
-                    every = (0..world.items() as ItemId).collect();
-                    &every
-                }
-            };
-            let solids = world.solids().some(items);
+            let solids = world.solids().some(&world.listed(pass.items(set, view)));
             Left {
                 orders: ORDERS.iter().map(|row| (row.build)(&solids)).collect(),
                 rays: *world.rays(view),

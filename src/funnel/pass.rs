@@ -33,13 +33,22 @@ pub struct Pass<'w> {
     found: HashMap<(StageKind, String, usize), usize>,
 }
 
+const COUNT: usize = StageKind::OF_ITEMS.len();
+
 /// A chain that has been gone through.
 #[derive(Clone, Debug)]
 pub struct Walked {
     /// By stage: the step, if the stage does anything.
-    pub steps: [Option<usize>; StageKind::ALL.len()],
+    pub steps: [Option<usize>; COUNT],
     /// By stage: the set that it was given, and behind them the last one.
-    pub sets: [usize; StageKind::ALL.len() + 1],
+    pub sets: [usize; COUNT + 1],
+}
+
+impl Walked {
+    /// The set that is left to be drawn.
+    pub fn left(&self) -> usize {
+        self.sets[COUNT]
+    }
 }
 
 impl<'w> Pass<'w> {
@@ -76,37 +85,21 @@ impl<'w> Pass<'w> {
         counts.sum::<f64>() / views.max(1) as f64
     }
 
-    /// Goes through the stages of a chain; `None` if `stop` says
+    /// Goes through the stages of a chain that hand on items; `None` if `stop` says
     /// so on the way.
     pub fn walk(&mut self, chain: &Chain, stop: &dyn Fn() -> bool) -> Option<Walked> {
-        self.walk_through(chain, &StageKind::ALL, stop)
-    }
-
-    /// The same as far as the stages decide what is drawn.
-    pub fn walk_items(&mut self, chain: &Chain, stop: &dyn Fn() -> bool) -> Option<Walked> {
-        self.walk_through(chain, &StageKind::ALL[..StageKind::Triangle as usize], stop)
-    }
-
-    fn walk_through(
-        &mut self,
-        chain: &Chain,
-        stages: &[StageKind],
-        stop: &dyn Fn() -> bool,
-    ) -> Option<Walked> {
         let mut walked = Walked {
-            steps: [None; StageKind::ALL.len()],
-            sets: [ALL; StageKind::ALL.len() + 1],
+            steps: [None; COUNT],
+            sets: [ALL; COUNT + 1],
         };
-        for (place, &stage) in stages.iter().enumerate() {
+        for (place, stage) in StageKind::OF_ITEMS.into_iter().enumerate() {
             let (name, input) = (chain.of(stage), walked.sets[place]);
-            let step = match name {
-                NONE => None,
-                _ => Some(self.step(stage, name, input, stop)?),
-            };
-            walked.steps[place] = step;
-            walked.sets[place + 1] = match step {
-                Some(step) if stage.hands_on_items() => self.steps[step].output,
-                _ => input,
+            if name != NONE {
+                walked.steps[place] = Some(self.step(stage, name, input, stop)?);
+            }
+            walked.sets[place + 1] = match walked.steps[place] {
+                Some(step) => self.steps[step].output,
+                None => input,
             };
         }
         Some(walked)

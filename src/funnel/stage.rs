@@ -43,10 +43,9 @@ fn by_name<S: serde::Serializer>(guarantee: &Guarantee, out: S) -> Result<S::Ok,
 pub const NONE: &str = "none";
 
 impl StageKind {
-    /// Whether what it hands on are items: triangles are handed on to nobody here.
-    pub fn hands_on_items(self) -> bool {
-        self != StageKind::Triangle
-    }
+    /// The stages that hand on whole items, which is what is drawn.
+    pub const OF_ITEMS: [StageKind; 3] =
+        [StageKind::Region, StageKind::Object, StageKind::Occlusion];
 
     /// What is counted at its exit.
     pub fn unit(self) -> &'static str {

@@ -7,13 +7,14 @@ use serde::{Deserialize, Serialize};
 
 use super::chain::Chain;
 use super::conclusions::conclusions;
+use super::faces::{self, Faces};
 use super::judged::Errors;
 use super::orders::{self, Orders};
 use super::pass::{Pass, Walked};
 use super::plan_view::{PlanView, fate};
 use super::report::{FunnelReport, Gain, LevelRow, Side, StageRow, Times};
 use super::stage::{NONE, StageKind};
-use super::world::{FunnelError, FunnelInput, Truth, World};
+use super::world::{FunnelError, FunnelInput, Truth, World, back_ends};
 use crate::measure::{Ask, OverProcesses, ProcessTimes, Schedule, TimedTask, Verdict, timed};
 use crate::visibility::Level;
 
@@ -52,52 +53,79 @@ pub fn prepare(
     let Some(walks) = Walks::of(&mut pass, &world, input.chain, stop) else {
         return Ok(None);
     };
+    let left = Left::of(&world, &pass, &walks.chosen);
     let mut rows = Vec::new();
     for (stage, name, step) in &walks.rows {
         if stop() {
             return Ok(None);
         }
         let given = walks.chosen.sets[*stage as usize];
+        let output = step.map_or(given, |step| pass.steps()[step].output);
         let judged: Vec<_> = (0..world.views())
             .map(|view| {
-                let output = step.map_or(given, |step| pass.steps()[step].output);
                 let sets = [given, output].map(|set| pass.items(set, view));
-                world.judge(*stage, name, view, sets, &truth)
+                world.judge(view, sets, &truth)
             })
             .collect();
-        rows.push(StageRow {
-            back_end: world.back_end(*stage, name),
-            structure: (*stage == StageKind::Object && step.is_some()).then(|| name.clone()),
-            is_chosen: input.chain.of(*stage) == name,
+        rows.push((world.back_end(*stage, name), name.clone(), judged, *step));
+    }
+    let culls = faces::back_ends().zip(std::iter::once(None).chain((0..).map(Some)));
+    for (back_end, place) in culls {
+        if stop() {
+            return Ok(None);
+        }
+        let task = place.map(|place: usize| pass.steps().len() + place);
+        rows.push((
+            back_end,
+            back_end.name.to_owned(),
+            left.faces.judged(place),
+            task,
+        ));
+    }
+    let last = walks.chosen.left();
+    for back_end in back_ends(StageKind::Fragment, input.scene) {
+        let judged = (0..world.views()).map(|view| match back_end.name {
+            NONE => world.judge(view, [pass.items(last, view); 2], &truth),
+            _ => world.judge_fragments(view, pass.items(last, view), &truth),
+        });
+        rows.push((back_end, back_end.name.to_owned(), judged.collect(), None));
+    }
+    let Some(drawn) = left.orders.drawn(input.samples, stop) else {
+        return Ok(None);
+    };
+    let tasks: Vec<Option<usize>> = rows.iter().map(|(_, _, _, task)| *task).collect();
+    let rows = rows.into_iter().map(|(back_end, name, judged, task)| {
+        let stage = back_end.stage;
+        StageRow {
+            back_end,
+            structure: (stage == StageKind::Object && task.is_some()).then(|| name.clone()),
+            is_chosen: input.chain.of(stage) == name,
             unit: stage.unit(),
             errors: Errors::of(&judged),
             times: Times::default(),
             ns_per_removed: None,
             ns_per_decided: None,
-        });
-    }
+        }
+    });
+    let rows = rows.collect();
     let side = |walked: &Walked| Side {
         tasks: world.timed_steps(walked, pass.steps()),
-        count: pass.mean_count(walked.sets[StageKind::Triangle as usize]),
+        count: pass.mean_count(walked.left()),
     };
     let gains = walks.without.iter().map(|(stage, without)| {
         let name = input.chain.of(*stage).to_owned();
         (*stage, name, [side(&walks.chosen), side(without)])
     });
     let gains = gains.collect();
-    let orders = Orders::of(&world, &pass, walks.left());
-    let Some(drawn) = orders.drawn(input.samples, stop) else {
-        return Ok(None);
-    };
-    let tasks = timed_tasks(&pass, &world, &orders, None);
-    let schedule = Schedule::new(world.views(), &tasks, input.protocol);
+    let timed = timed_tasks(&pass, &world, &left, None);
+    let schedule = Schedule::new(world.views(), &timed, input.protocol);
     let level = Level::of(&input.scene.name, input.scene)?;
     Ok(Some(Prepared {
         plan: FunnelPlan {
-            expected: tasks.iter().map(|task| task.expected.clone()).collect(),
+            expected: timed.iter().map(|task| task.expected.clone()).collect(),
             schedule,
         },
-        tasks: walks.rows.iter().map(|(_, _, step)| *step).collect(),
+        tasks,
         gains,
         report: FunnelReport {
             scene: input.scene.name.clone(),
@@ -131,18 +159,33 @@ pub fn time(
     let Some(walks) = Walks::of(&mut pass, &world, input.chain, stop) else {
         return Ok(None);
     };
-    let orders = Orders::of(&world, &pass, walks.left());
-    let tasks = timed_tasks(&pass, &world, &orders, Some(&plan.expected));
+    let left = Left::of(&world, &pass, &walks.chosen);
+    let tasks = timed_tasks(&pass, &world, &left, Some(&plan.expected));
     let timed = timed(&tasks, &plan.schedule, input.protocol, &|_| stop());
     Ok(timed.map(|timed| ProcessTimes::of(&timed)))
 }
 
-/// Every step, and then every order, as a task; what it must hand on is what it has, or
+/// What the chosen chain leaves of every view, ready for the stages behind it.
+struct Left {
+    faces: Faces,
+    orders: Orders,
+}
+
+impl Left {
+    fn of(world: &World, pass: &Pass, chosen: &Walked) -> Left {
+        Left {
+            faces: Faces::of(world, pass, chosen.left()),
+            orders: Orders::of(world, pass, chosen.left()),
+        }
+    }
+}
+
+/// Every step, every back end of the triangle stage and every order as a task; what it must hand on is what it has, or
 /// what another process says.
 fn timed_tasks<'p>(
     pass: &'p Pass<'p>,
     world: &'p World<'p>,
-    orders: &'p Orders,
+    left: &'p Left,
     expected: Option<&[Vec<u64>]>,
 ) -> Vec<TimedTask<'p>> {
     let steps = pass.steps().iter().map(|step| {
@@ -150,7 +193,12 @@ fn timed_tasks<'p>(
         let ask: Ask = Box::new(move |view, out| run(view, pass.items(step.input, view), out));
         ask
     });
+    let culls = (1..faces::back_ends().count()).map(|place| {
+        let ask: Ask = Box::new(move |view, out| left.faces.cull(place - 1, view, out));
+        ask
+    });
     let sorts = (0..orders::COUNT).map(|order| {
+        let orders = &left.orders;
         let pieces = RefCell::new(Vec::new());
         let ask: Ask = Box::new(move |view, out| {
             let pieces = &mut *pieces.borrow_mut();
@@ -168,7 +216,12 @@ fn timed_tasks<'p>(
         ask_many: None,
         least_ns: None,
     };
-    steps.chain(sorts).enumerate().map(task).collect()
+    steps
+        .chain(culls)
+        .chain(sorts)
+        .enumerate()
+        .map(task)
+        .collect()
 }
 
 /// How much is handed on in each view.
@@ -191,15 +244,12 @@ struct Walks {
 }
 
 impl Walks {
-    /// The set that the chosen chain leaves to be drawn.
-    fn left(&self) -> usize {
-        self.chosen.sets[StageKind::Triangle as usize]
-    }
-
     fn of(pass: &mut Pass, world: &World, chain: &Chain, stop: &dyn Fn() -> bool) -> Option<Walks> {
         let chosen = pass.walk(chain, stop)?;
         let (mut rows, mut without) = (Vec::new(), Vec::new());
-        for stage in StageKind::ALL {
+        // Where occlusion is culled in a walk of its own, the frustum is part of that.
+        let does_both = world.does_object_stage(chain.of(StageKind::Occlusion));
+        for stage in StageKind::OF_ITEMS {
             for name in world.names(stage, chain) {
                 let step = match name.as_str() {
                     NONE => None,
@@ -207,8 +257,9 @@ impl Walks {
                 };
                 rows.push((stage, name, step));
             }
-            if stage.hands_on_items() && stage != StageKind::Fragment && chain.of(stage) != NONE {
-                without.push((stage, pass.walk_items(&chain.without(stage), stop)?));
+            let is_part = does_both && stage == StageKind::Object;
+            if chain.of(stage) != NONE && !is_part {
+                without.push((stage, pass.walk(&chain.without(stage), stop)?));
             }
         }
         Some(Walks {
@@ -221,10 +272,9 @@ impl Walks {
 
 /// The first view from above, after the stages that decide what is drawn.
 fn plan_view(world: &World, pass: &Pass, walked: &Walked, truth: &Truth) -> PlanView {
-    let stages = &StageKind::ALL[..StageKind::Triangle as usize];
-    let handed_on = stages.iter().zip(&walked.sets[1..]);
+    let handed_on = StageKind::OF_ITEMS.into_iter().zip(&walked.sets[1..]);
     let sets: Vec<_> = handed_on
-        .map(|(&stage, &set)| (stage, pass.items(set, 0)))
+        .map(|(stage, &set)| (stage, pass.items(set, 0)))
         .collect();
     world.plan_view(0, |item| fate(item, &sets, truth.sees(0, item)))
 }
@@ -239,9 +289,6 @@ impl Prepared {
             let Some(found) = task.and_then(|task| times.ns(task)) else {
                 continue;
             };
-            if row.back_end.stage == StageKind::Fragment {
-                continue;
-            }
             row.times = Times::of(Some(found));
             let per = |count: f64| (count > 0.0).then(|| found.value / count);
             row.ns_per_removed = per(row.errors.input_count - row.errors.output_count);

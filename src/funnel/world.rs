@@ -1,12 +1,14 @@
 //! What the stages of a funnel work on: a scene with everything built once, the views
 //! of a path, and each back end as something that can be asked.
 
+use std::borrow::Cow;
 use std::cell::RefCell;
 use std::sync::Arc;
 
 use glam::DVec3;
 
 use super::chain::Chain;
+use super::faces;
 use super::hiding::{HIDING, HidingRow};
 use super::judged::{Judged, judge_items};
 use super::pass::{Step, Walked};
@@ -27,11 +29,9 @@ use crate::visibility::region::{
     EyePlace, Flood, Marks, PortalClip, PortalRect, RegionGraph, RegionItems, RegionRow, Scratch,
     flood, portal_clip, portal_rect,
 };
-use crate::visibility::triangle::{
-    self, Clusters, Counts, Criterion, Selection, TRIANGLE_ROWS, TriangleCull, TriangleRow, facing,
-};
+use crate::visibility::triangle;
 use crate::visibility::truth::{RayIndex, SampleTruth};
-use crate::visibility::{Guarantee, NoRays, Rays, SampleGrid, Solids, Surfaces};
+use crate::visibility::{Guarantee, NoRays, Rays, SampleGrid, Solids};
 
 /// What a funnel is studied on.
 #[derive(Clone, Copy)]
@@ -91,7 +91,6 @@ pub struct World<'a> {
     solids: Solids,
     occluders: OccluderScene,
     regions: Option<Regions>,
-    triangles: Option<Triangles>,
 }
 
 /// A camera in every form that a stage needs.
@@ -117,33 +116,6 @@ impl Regions {
             Box::new(PortalClip(graph)),
         ];
         Some(Regions { rows, items })
-    }
-}
-
-/// The items' faces, in clusters, and what turns away those that are seen from behind.
-struct Triangles {
-    clusters: Arc<Clusters>,
-    rows: Vec<(&'static TriangleRow, Box<dyn TriangleCull>)>,
-}
-
-/// Most items whose triangles are kept in memory: 12 and 8 points for each.
-const MOST_MESHED: usize = 300_000;
-
-impl Triangles {
-    fn of(scene: &Scene) -> Option<Triangles> {
-        if scene.items.len() > MOST_MESHED {
-            return None;
-        }
-        let surfaces = Arc::new(Surfaces::from_boxes(scene));
-        let clusters = Arc::new(Clusters::of(surfaces, triangle::MOST_TRIANGLES));
-        let sides = TRIANGLE_ROWS
-            .iter()
-            .filter(|row| row.criterion == Criterion::Facing);
-        let rows = sides.map(|row| (row, (row.build)(&clusters)));
-        Some(Triangles {
-            rows: rows.collect(),
-            clusters,
-        })
     }
 }
 
@@ -199,13 +171,27 @@ impl<'a> World<'a> {
             occluders: OccluderScene::of(&solids),
             solids,
             regions: Regions::of(input.scene),
-            triangles: Triangles::of(input.scene),
         })
     }
 
     /// How many views there are.
     pub fn views(&self) -> usize {
         self.views.len()
+    }
+
+    /// The scene itself.
+    pub fn scene(&self) -> &Scene {
+        self.scene
+    }
+
+    /// The instructions of every stage.
+    pub fn kernel(&self) -> Kernel {
+        self.kernel
+    }
+
+    /// A view as the triangle stage has it.
+    pub fn triangle_view(&self, view: usize) -> &triangle::View {
+        &self.views[view].triangles
     }
 
     /// The items as they hide each other.
@@ -278,9 +264,7 @@ impl<'a> World<'a> {
             StageKind::Region => self.run_region(name),
             StageKind::Object => self.run_object(name),
             StageKind::Occlusion => self.run_occlusion(name),
-            StageKind::Triangle => self.run_triangle(name),
-            // Left to the graphics processor: it is judged and not timed.
-            StageKind::Fragment => Box::new(|_, input, out| out.extend(input.unwrap_or_default())),
+            StageKind::Triangle | StageKind::Fragment => unreachable!("no stage of whole items"),
         }
     }
 
@@ -332,64 +316,22 @@ impl<'a> World<'a> {
         })
     }
 
-    /// Hands on clusters: those with a triangle left.
-    fn run_triangle(&self, name: &str) -> Run<'_> {
-        let name = name.to_owned();
-        Box::new(move |view, input, out| {
-            let left = self.selected(&name, view, input);
-            let clusters = left.words().iter().zip(0..).filter(|(word, _)| **word != 0);
-            out.extend(clusters.map(|(_, cluster)| cluster));
-        })
-    }
-
-    /// The triangles that a back end leaves of some items.
-    fn selected(&self, name: &str, view: usize, input: Option<&[ItemId]>) -> Selection {
-        let triangles = self.triangles.as_ref().expect("a scene with triangles");
-        let mut selection = triangles.of_items(input);
-        if let Some((_, cull)) = triangles.rows.iter().find(|(row, _)| row.name == name) {
-            cull.cull(&self.views[view].triangles, self.kernel, &mut selection);
-        }
-        selection
-    }
-
-    /// What a back end made of its input in a view.
+    /// What a stage made of its input in a view: what it was given and what it handed on.
     pub fn judge(
         &self,
-        stage: StageKind,
-        name: &str,
         view: usize,
         [input, output]: [Option<&[ItemId]>; 2],
         truth: &Truth,
     ) -> Judged {
-        if stage == StageKind::Triangle {
-            return self.judge_triangles(name, view, input);
-        }
-        if stage == StageKind::Fragment && name != NONE {
-            return self.judge_fragments(view, input, truth);
-        }
-        let every: Vec<ItemId>;
-        let output = match output {
-            Some(output) => output,
-            None => {
-                every = (0..self.items() as ItemId).collect();
-                &every
-            }
-        };
-        judge_items(input, self.items(), output, &truth.visible[view])
+        let output = self.listed(output);
+        judge_items(input, self.items(), &output, &truth.visible[view])
     }
 
     /// What the z-test leaves: items in front at a sample, drawn one by one.
-    fn judge_fragments(&self, view: usize, input: Option<&[ItemId]>, truth: &Truth) -> Judged {
-        let every: Vec<ItemId>;
-        let items = match input {
-            Some(items) => items,
-            None => {
-                every = (0..self.items() as ItemId).collect();
-                &every
-            }
-        };
+    pub fn judge_fragments(&self, view: usize, input: Option<&[ItemId]>, truth: &Truth) -> Judged {
+        let items = self.listed(input);
         let canvas = Canvas::of(&self.views[view].rays, self.samples);
-        let solids = self.solids.some(items);
+        let solids = self.solids.some(&items);
         let pieces = (0..items.len() as ItemId).map(|item| Piece { item, part: None });
         let pieces: Vec<Piece> = pieces.collect();
         let drawn = draw(&canvas, &solids, &pieces, &Tests::default());
@@ -398,23 +340,17 @@ impl<'a> World<'a> {
         judge_items(input, self.items(), &output, &truth.visible[view])
     }
 
-    fn judge_triangles(&self, name: &str, view: usize, input: Option<&[ItemId]>) -> Judged {
-        let Some(triangles) = &self.triangles else {
-            return Judged::default();
-        };
-        let given = triangles.of_items(input);
-        let left = self.selected(name, view, input);
-        let truth = facing(&triangles.clusters, &self.views[view].triangles, &given);
-        let counts = Counts::of(&given, &left, &truth);
-        Judged {
-            input: counts.candidates as u64,
-            hidden: (counts.candidates - counts.truth) as u64,
-            output: counts.delivered as u64,
-            truth: counts.truth as u64,
-            false_positives: counts.false_positives as u64,
-            false_negatives: counts.false_negatives as u64,
-            ..Judged::default()
+    /// The ids of a set; `None` is all items.
+    pub fn listed<'i>(&self, items: Option<&'i [ItemId]>) -> Cow<'i, [ItemId]> {
+        match items {
+            Some(items) => items.into(),
+            None => (0..self.items() as ItemId).collect::<Vec<_>>().into(),
         }
+    }
+
+    /// Whether a row of the occlusion stage does the object stage as well.
+    pub fn does_object_stage(&self, name: &str) -> bool {
+        self.back_end(StageKind::Occlusion, name).does_object_stage
     }
 
     /// The items about the eye of a view, each with its fate.
@@ -455,24 +391,12 @@ impl<'a> World<'a> {
     pub fn timed_steps(&self, walked: &Walked, steps: &[Step]) -> Vec<usize> {
         let of = |stage: StageKind| walked.steps[stage as usize];
         let occlusion = of(StageKind::Occlusion);
-        let does_both = occlusion.is_some_and(|step| {
-            let name = &steps[step].back_end;
-            self.back_end(StageKind::Occlusion, name).does_object_stage
-        });
+        let does_both = occlusion.is_some_and(|step| self.does_object_stage(&steps[step].back_end));
         let object = of(StageKind::Object).filter(|_| !does_both);
         [of(StageKind::Region), object, occlusion]
             .into_iter()
             .flatten()
             .collect()
-    }
-}
-
-impl Triangles {
-    fn of_items(&self, items: Option<&[ItemId]>) -> Selection {
-        match items {
-            Some(items) => Selection::of_items(&self.clusters, items.iter().copied()),
-            None => Selection::all(&self.clusters),
-        }
     }
 }
 
@@ -506,13 +430,7 @@ pub fn back_ends(stage: StageKind, scene: &Scene) -> Vec<BackEnd> {
             ),
         ]),
         StageKind::Occlusion => rows.extend(HIDING.iter().map(HidingRow::back_end)),
-        StageKind::Triangle if scene.items.len() <= MOST_MESHED => {
-            let sides = TRIANGLE_ROWS
-                .iter()
-                .filter(|row| row.criterion == Criterion::Facing);
-            let others = sides.filter(|row| row.name != NONE);
-            rows.extend(others.map(|row| plain(row.name, row.summary, row.guarantee)));
-        }
+        StageKind::Triangle => rows = faces::back_ends().collect(),
         StageKind::Fragment => rows.push(plain(
             "z-test",
             "the nearest fragment of each sample, exactly",
@@ -536,7 +454,7 @@ impl Chain {
         [
             (StageKind::Region, portal_clip::NAME),
             (StageKind::Occlusion, "masked-inner"),
-            (StageKind::Triangle, "cone-safe"),
+            (StageKind::Triangle, faces::DEFAULT),
             (StageKind::Fragment, "z-test"),
         ]
         .into_iter()

@@ -8,6 +8,7 @@ use glam::{DVec3, Vec3};
 
 use crate::geometry::Aabb;
 use crate::input::InputError;
+use crate::query::ItemId;
 use crate::scene::{Scene, WorldBox};
 
 named! {
@@ -73,8 +74,20 @@ impl Surfaces {
     /// Every item of a scene as the twelve triangles of its box (the smallest f32
     /// box that holds it), opaque and one-sided. O(n).
     pub fn from_boxes(scene: &Scene) -> Surfaces {
+        Surfaces::of_boxes(scene, scene.items.iter())
+    }
+
+    /// The same for some of the items, numbered anew in this order.
+    ///
+    /// # Panics
+    /// If there is no such item.
+    pub fn of_items(scene: &Scene, items: &[ItemId]) -> Surfaces {
+        Surfaces::of_boxes(scene, items.iter().map(|&id| &scene.items[id as usize]))
+    }
+
+    fn of_boxes<'b>(scene: &Scene, boxes: impl Iterator<Item = &'b Aabb>) -> Surfaces {
         let mut all = Surfaces::about(scene.origin);
-        for item in &scene.items {
+        for item in boxes {
             let corners: [Vec3; 8] = std::array::from_fn(|i| item.corner(i));
             all.push(SurfaceKind::Opaque, false, &corners, &BOX);
         }
