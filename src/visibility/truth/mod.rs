@@ -4,6 +4,7 @@
 //! search). It knows boxes, cameras and rays, not the back ends that it judges.
 
 mod certificate;
+mod check;
 mod cover;
 mod entry;
 #[cfg(test)]
@@ -13,6 +14,7 @@ mod sample;
 mod sight;
 
 pub use certificate::{Cell, Certificates, Edge, Proof, View};
+pub use check::{Counts, Rejected, check};
 pub use cover::{Class, Prover, certify};
 pub use entry::{Crossing, Probe};
 pub use ray_index::{Front, RayIndex};
