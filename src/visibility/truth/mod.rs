@@ -3,6 +3,7 @@
 //! (`certificate`, held against the boxes by `check`, which shares no code with the
 //! search). It knows boxes, cameras and rays, not the back ends that it judges.
 
+mod cache;
 mod certificate;
 mod check;
 mod cover;
@@ -13,6 +14,7 @@ mod ray_index;
 mod sample;
 mod sight;
 
+pub use cache::{TruthCache, digest_of};
 pub use certificate::{Cell, Certificates, Edge, Proof, View};
 pub use check::{Counts, Rejected, check};
 pub use cover::{Class, Prover, certify};
