@@ -66,9 +66,16 @@ pub enum Cell {
     /// Every ray through it enters the box of this item first, and not before the
     /// near plane.
     Behind(ItemId),
-    /// Two parts, on the one side of an edge (where the form of `check` is not below
-    /// zero) and on the other.
-    Parted(Edge, Box<[Cell; 2]>),
+    /// Two parts. The line between them need be proven in one of them only: in the
+    /// other, the box in front may be as far as the item along it.
+    Parted {
+        /// The edge that parts them.
+        edge: Edge,
+        /// Whether the first part has the line.
+        line_in_first: bool,
+        /// Where the form of `check` is above zero, and where it is below.
+        cells: Box<[Cell; 2]>,
+    },
 }
 
 /// What is known of an item, and the proof of it.
@@ -91,6 +98,9 @@ pub enum Proof {
     Cover {
         /// Corners round its image.
         outline: Vec<u8>,
+        /// Whether an item of a lower number hides where it is as near: then this
+        /// one is the front item of no ray, though it may tie with one.
+        ties: bool,
         /// Why each part of it is hidden.
         cell: Cell,
     },

@@ -35,6 +35,8 @@ named! {
         SubSample = "sub-sample",
         /// No ray of the view sees it.
         Hidden = "hidden",
+        /// It is the front item of no ray, but may tie with one of a lower number.
+        Tied = "tied",
         /// No proof was found either way.
         Undecided = "undecided",
     }
@@ -46,6 +48,7 @@ impl Class {
         match proof {
             _ if truth.sees(item) => Class::Visible,
             Proof::Witness { .. } => Class::SubSample,
+            Proof::Cover { ties: true, .. } => Class::Tied,
             Proof::AroundEye | Proof::Cover { .. } => Class::Hidden,
             Proof::Undecided => Class::Undecided,
         }
@@ -73,6 +76,8 @@ struct Hunt<'p> {
     /// What was met in front of it, the largest to the eye first.
     known: Vec<(f64, ItemId)>,
     cells: usize,
+    /// Whether items of lower numbers may be as near.
+    ties: bool,
 }
 
 impl<'s> Prover<'s> {
@@ -113,17 +118,30 @@ impl<'s> Prover<'s> {
             .sight
             .sides
             .iter()
-            .try_fold(image, |image, side| image.cut(side));
-        let mut hunt = Hunt {
-            prover: self,
-            item,
-            known: Vec::new(),
-            cells: 0,
+            .try_fold(image, |image, side| image.cut(side, false));
+        let search = |ties: bool| {
+            let (known, cells) = (Vec::new(), 0);
+            let mut hunt = Hunt {
+                prover: self,
+                item,
+                known,
+                cells,
+                ties,
+            };
+            let cell = clipped
+                .as_ref()
+                .map_or(Ok(Cell::Empty), |image| hunt.cell(image, 0))?;
+            let outline = outline.clone();
+            Ok(Proof::Cover {
+                outline,
+                ties,
+                cell,
+            })
         };
-        match clipped.map_or(Ok(Cell::Empty), |image| hunt.cell(&image, 0)) {
-            Ok(cell) => Proof::Cover { outline, cell },
+        match search(false) {
+            Ok(proof) => proof,
             Err(End::Seen(ray)) => witness(&ray),
-            Err(End::GaveUp) => Proof::Undecided,
+            Err(End::GaveUp) => search(true).unwrap_or(Proof::Undecided),
         }
     }
 
@@ -151,19 +169,22 @@ impl<'s> Prover<'s> {
 
     /// Whether the ray, as rounded, is one of the view.
     fn is_of_view(&self, ray: &Ray) -> bool {
-        let line = match self.view().parallel {
+        let line = self.line_of(ray);
+        let sides = &self.sight.sides;
+        sides.iter().all(|side| side.dot_sign(&line) >= 0)
+    }
+
+    /// A ray of the view as three numbers.
+    fn line_of(&self, ray: &Ray) -> Triple {
+        match self.view().parallel {
             false => ray.direction.to_array().map(Into::into).into(),
             true => self.sight.through(ray.origin.to_array()),
-        };
-        self.sight
-            .sides
-            .iter()
-            .all(|side| side.dot_sign(&line) >= 0)
+        }
     }
 
     /// Whether all rays through the polygon enter `front` from where boxes hide on,
-    /// and before they enter `back`, if they do.
-    fn hides(&self, front: &WorldBox, back: &WorldBox, image: &Polygon) -> bool {
+    /// and before they enter `back`, if they do; with `ties` not after that.
+    fn hides(&self, front: &WorldBox, back: &WorldBox, image: &Polygon, ties: bool) -> bool {
         let (sight, corners) = (&self.sight, &image.corners[..]);
         // Rays that pierce a convex box are a convex set: the corners are enough.
         if !corners.iter().all(|line| pierces(sight, line, front)) {
@@ -206,9 +227,13 @@ impl<'s> Prover<'s> {
                     false => side_of(sight.view.eye[k], front, k) == 0,
                 };
                 let before = |line: &Triple| {
-                    sight.order(line, entry(front, k, ways[k]), behind) * ways[k] * way < 0
+                    sight.order(line, entry(front, k, ways[k]), behind) * ways[k] * way
                 };
-                free || ways[k] != 0 && corners.iter().all(before)
+                let always = || match ties {
+                    true => corners.iter().all(|line| before(line) <= 0),
+                    false => image.below_zero(before),
+                };
+                free || ways[k] != 0 && always()
             })
         })
     }
@@ -307,11 +332,18 @@ impl Hunt<'_> {
         &self.prover.solids.boxes[item as usize]
     }
 
+    /// Whether an item may be entered together with the one that it hides.
+    fn may_tie(&self, front: ItemId) -> bool {
+        self.ties && front < self.item
+    }
+
     /// The proof for a part of the image.
     fn cell(&mut self, image: &Polygon, cuts: usize) -> Result<Cell, End> {
-        let back = *self.boxed(self.item);
-        let hides = |front: &WorldBox| self.prover.hides(front, &back, image);
-        if let Some((_, front)) = self.known.iter().find(|known| hides(self.boxed(known.1))) {
+        let hides = |hunt: &Self, front: ItemId| {
+            let (b, back) = (hunt.boxed(front), hunt.boxed(hunt.item));
+            hunt.prover.hides(b, back, image, hunt.may_tie(front))
+        };
+        if let Some((_, front)) = self.known.iter().find(|known| hides(self, known.1)) {
             return Ok(Cell::Behind(*front));
         }
         self.cells += 1;
@@ -326,19 +358,35 @@ impl Hunt<'_> {
             }
             let at = self.known.partition_point(|known| known.0 >= size);
             self.known.insert(at, (size, front));
-            if self.prover.hides(self.boxed(front), &back, image) {
+            if hides(self, front) {
                 return Ok(Cell::Behind(front));
             }
         }
         let Some((edge, line)) = self.best_cut(&pierced, image, &ray) else {
             return Err(End::GaveUp);
         };
-        let mut part = |line: &Triple| match image.cut(line) {
-            Some(part) => self.cell(&part, cuts + 1),
-            None => Ok(Cell::Empty),
+        // What hides the middle is most likely nearer along its own edge as well.
+        let inner = line.dot_sign(&self.prover.line_of(&ray)) > 0;
+        let mut parts = |line_in_first: bool| {
+            let mut part = |line: &Triple, open: bool| match image.cut(line, open) {
+                Some(part) => self.cell(&part, cuts + 1),
+                None => Ok(Cell::Empty),
+            };
+            let cells = [
+                part(&line, !line_in_first)?,
+                part(&line.negated(), line_in_first)?,
+            ];
+            let cells = Box::new(cells);
+            Ok(Cell::Parted {
+                edge,
+                line_in_first,
+                cells,
+            })
         };
-        let parts = [part(&line)?, part(&line.negated())?];
-        Ok(Cell::Parted(edge, Box::new(parts)))
+        match parts(inner) {
+            Err(End::GaveUp) => parts(!inner),
+            found => found,
+        }
     }
 
     /// The items that the ray enters before this one, the largest to the eye first.
@@ -348,7 +396,10 @@ impl Hunt<'_> {
         let limit = own.map_or(f64::INFINITY, |own| own.at_most());
         let mut pierced = self.prover.index.all_along(ray, limit);
         if let Some(own) = own {
-            pierced.retain(|(_, entry)| probe.compare(entry, &own) == Ordering::Less);
+            pierced.retain(|(item, entry)| match probe.compare(entry, &own) {
+                Ordering::Equal => self.may_tie(*item),
+                order => order.is_lt(),
+            });
             if pierced.is_empty() && self.prover.is_of_view(ray) {
                 return Err(End::Seen(*ray));
             }
@@ -393,10 +444,7 @@ impl Hunt<'_> {
             .map(|&(_, item)| (covered(item), item))
             .collect();
         by_cover.sort_by_key(|&(count, _)| std::cmp::Reverse(count));
-        let middle: Triple = match sight.view.parallel {
-            false => ray.direction.to_array().map(Into::into).into(),
-            true => sight.through(ray.origin.to_array()),
-        };
+        let middle = self.prover.line_of(ray);
         let best = by_cover
             .iter()
             .find_map(|&(_, item)| self.cut_along(item, image, &middle, true));
@@ -528,4 +576,84 @@ fn first_samples(prover: &Prover, rays: &Rays, truth: &SampleTruth) -> Vec<usize
         }
     }
     seen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::SeededRng;
+    use crate::visibility::SampleGrid;
+    use crate::visibility::truth::{check, judge, visible_by_random_rays};
+
+    /// No ray sees what is proven hidden, all witnesses see their items, and `check`
+    /// agrees with all of it.
+    #[test]
+    fn proofs_hold_in_worlds_full_of_ties() {
+        let mut rng = SeededRng::new(21);
+        let mut classes = [0; 5];
+        for world in 0..150 {
+            let count = 2 + rng.below(10);
+            let boxes = judge::ties(&mut rng, count);
+            let solids = judge::solids(&boxes);
+            let index = RayIndex::build(&solids);
+            let rays = Rays::of(&judge::camera(&mut rng)).unwrap();
+            let truth = SampleTruth::of(&solids, &index, &rays, SampleGrid::new(8, 8), 1);
+            let prover = Prover::new(&solids, &index, &rays);
+            let items: Vec<ItemId> = (0..boxes.len() as ItemId).collect();
+            let certificates = certify("ties", &prover, &rays, &truth, &items, 1);
+            let checked = check(&certificates, &boxes);
+            assert!(
+                checked.is_ok(),
+                "{world}: {checked:?} {certificates:?} {boxes:?}"
+            );
+            let seen = visible_by_random_rays(&index, &rays, 500, world, 1);
+            for (item, proof) in &certificates.proofs {
+                let class = Class::of(&truth, *item, proof);
+                classes[class as usize] += 1;
+                if truth.sees(*item) {
+                    assert!(
+                        matches!(proof, Proof::Witness { .. }),
+                        "{world} {item} {proof:?}"
+                    );
+                }
+                let seen = seen.contains(item);
+                assert!(class != Class::Hidden || !seen, "{world} {item}");
+                // And where it does tie, the front item is another.
+                assert!(class != Class::Tied || !truth.front.contains(item));
+                if let Proof::Witness { origin, direction } = proof {
+                    let ray = prover.view().ray(*origin, *direction);
+                    assert!(judge::front(&ray, &boxes).contains(item));
+                }
+            }
+        }
+        let [visible, _, hidden, tied, undecided] = classes;
+        println!("{classes:?}");
+        assert!(
+            visible > 150 && hidden > 150 && tied > 0 && undecided < hidden / 2,
+            "{classes:?}"
+        );
+    }
+
+    #[test]
+    fn items_of_a_street_are_all_decided() {
+        let scene = crate::scene::load("city:n=2000", &Default::default()).unwrap();
+        let solids = Solids::of(&scene);
+        let index = RayIndex::build(&solids);
+        let eye = DVec3::new(-8.0, 20.0, 1.7);
+        let frame = crate::camera::look_at(eye, DVec3::new(-8.0, 300.0, 1.7), DVec3::Z).unwrap();
+        let lens = crate::camera::Lens::perspective(60.0, 1.5, 0.1, None).unwrap();
+        let rays = Rays::of(&crate::camera::Camera { frame, lens }).unwrap();
+        let truth = SampleTruth::of(&solids, &index, &rays, SampleGrid::new(90, 60), 1);
+        let prover = Prover::new(&solids, &index, &rays);
+        let items: Vec<ItemId> = (0..2000).collect();
+        let certificates =
+            [1, 3].map(|threads| certify("street", &prover, &rays, &truth, &items, threads));
+        assert_eq!(certificates[0], certificates[1]);
+        let counts = check(&certificates[0], &solids.boxes).unwrap();
+        assert_eq!(
+            (counts.visible + counts.hidden, counts.undecided),
+            (2000, 0)
+        );
+        assert!(counts.visible >= truth.visible.len() && truth.visible.len() > 10);
+    }
 }

@@ -3,7 +3,9 @@
 //! (`certificate`, held against the boxes by `check`, which shares no code with the
 //! search). It knows boxes, cameras and rays, not the back ends that it judges.
 
+mod cache;
 mod certificate;
+mod check;
 mod cover;
 mod entry;
 #[cfg(test)]
@@ -12,7 +14,9 @@ mod ray_index;
 mod sample;
 mod sight;
 
+pub use cache::{TruthCache, digest_of};
 pub use certificate::{Cell, Certificates, Edge, Proof, View};
+pub use check::{Counts, Rejected, check};
 pub use cover::{Class, Prover, certify};
 pub use entry::{Crossing, Probe};
 pub use ray_index::{Front, RayIndex};

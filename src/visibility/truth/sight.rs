@@ -267,17 +267,40 @@ pub struct Polygon {
     pub corners: Vec<Triple>,
     /// The side from each corner to the next; made when it is cut.
     sides: Vec<Option<Triple>>,
+    /// Whether the lines along that side are proven hidden elsewhere.
+    open: Vec<bool>,
 }
 
 impl Polygon {
     pub fn new(corners: Vec<Triple>) -> Polygon {
-        let sides = vec![None; corners.len()];
-        Polygon { corners, sides }
+        let (sides, open) = (vec![None; corners.len()], vec![false; corners.len()]);
+        Polygon {
+            corners,
+            sides,
+            open,
+        }
+    }
+
+    /// Whether a form that has these signs at the corners is below zero for all lines
+    /// in the polygon but those along an open side.
+    pub fn below_zero(&self, mut signs: impl FnMut(&Triple) -> i32) -> bool {
+        let count = self.corners.len();
+        let mut zeros = Vec::new();
+        for (k, corner) in self.corners.iter().enumerate() {
+            match signs(corner) {
+                0 if self.open[k] || self.open[(k + count - 1) % count] => zeros.push(k),
+                -1 => {}
+                _ => return false,
+            }
+        }
+        let on = |side: usize| zeros.iter().all(|&k| k == side || k == (side + 1) % count);
+        zeros.is_empty() || (0..count).any(|side| self.open[side] && on(side))
     }
 
     /// The part where the scalar product with `line` is not below zero; `None` where
-    /// no more than a corner or side of it would be left.
-    pub fn cut(&self, line: &Triple) -> Option<Polygon> {
+    /// no more than a corner or side of it would be left. `open`: the lines along the
+    /// cut are proven hidden elsewhere.
+    pub fn cut(&self, line: &Triple, open: bool) -> Option<Polygon> {
         let signs: Vec<i32> = self.corners.iter().map(|c| c.dot_sign(line)).collect();
         if signs.iter().all(|&sign| sign <= 0) {
             return None;
@@ -286,7 +309,12 @@ impl Polygon {
             return Some(self.clone());
         }
         let count = self.corners.len();
-        let (mut corners, mut sides) = (Vec::new(), Vec::new());
+        let mut part = Polygon::new(Vec::new());
+        let mut push = |corner: Triple, side: Option<Triple>, open: bool| {
+            part.corners.push(corner);
+            part.sides.push(side);
+            part.open.push(open);
+        };
         for here in 0..count {
             let next = (here + 1) % count;
             let (a, b) = (signs[here], signs[next]);
@@ -294,24 +322,24 @@ impl Polygon {
                 let known = self.sides[here].clone();
                 known.unwrap_or_else(|| self.corners[here].cross(&self.corners[next]))
             };
-            if a >= 0 {
-                corners.push(self.corners[here].clone());
+            let corner = self.corners[here].clone();
+            match (a, b) {
+                (1, -1) => {
+                    let side = side();
+                    let crossing = side.cross(line);
+                    push(corner, Some(side), self.open[here]);
+                    push(crossing, Some(line.clone()), open);
+                }
+                (-1, 1) => {
+                    let side = side();
+                    push(line.cross(&side), Some(side), self.open[here]);
+                }
                 // From a corner on the line out of the part: along the line.
-                sides.push(match a == 0 && b < 0 {
-                    true => Some(line.clone()),
-                    false => self.sides[here].clone(),
-                });
-            }
-            if a > 0 && b < 0 {
-                corners.push(side().cross(line));
-                sides.push(Some(line.clone()));
-            }
-            if a < 0 && b > 0 {
-                let side = side();
-                corners.push(line.cross(&side));
-                sides.push(Some(side));
+                (0, -1) => push(corner, Some(line.clone()), open),
+                (0 | 1, _) => push(corner, self.sides[here].clone(), self.open[here]),
+                _ => {}
             }
         }
-        Some(Polygon { corners, sides })
+        Some(part)
     }
 }
