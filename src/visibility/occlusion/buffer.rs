@@ -3,6 +3,7 @@
 
 use super::outline::{Coverage, Outline};
 use super::rect::Rect;
+use crate::kernel::Isa;
 use crate::visibility::{Guarantee, SampleGrid};
 
 /// Where the idea of a back end comes from.
@@ -48,5 +49,5 @@ pub trait OcclusionBuffer {
 
     /// Whether something that was drawn is nearer than the rectangle in all its
     /// pixels. As near is not nearer.
-    fn hides(&self, rect: &Rect) -> bool;
+    fn hides<I: Isa>(&self, isa: I, rect: &Rect) -> bool;
 }

@@ -33,6 +33,7 @@
 
 use glam::DVec3;
 
+use super::rect::Rect;
 use super::scene::Faces;
 use super::view::{Linear, MARGIN, TILE_HEIGHT, TILE_WIDTH, U, View};
 use crate::geometry::Aabb;
@@ -63,6 +64,8 @@ pub struct Outline {
     upper_count: usize,
     /// First row and the one behind the last.
     rows: [f64; 2],
+    /// No columns before the first and from the second on.
+    columns_within: [f64; 2],
     /// The least of these is the nearness, rounded down already.
     faces: [Linear; 3],
     face_count: usize,
@@ -75,6 +78,7 @@ pub struct Outline {
 impl Outline {
     /// The outline of a box; `None` where it covers no pixel or the eye is in it.
     /// Those faces that are `open` are drawn as if they lay infinitely far out.
+    #[inline(always)]
     pub fn of(inner: &Aabb, open: Faces, view: &View, coverage: Coverage) -> Option<Outline> {
         if inner.is_empty() {
             return None;
@@ -101,6 +105,7 @@ impl Outline {
             upper: [none; 8],
             upper_count: 0,
             rows: [0.0, padded(size[1], TILE_HEIGHT)],
+            columns_within: [0.0, padded(size[0], TILE_WIDTH)],
             faces: [Linear::constant(f64::INFINITY); 3],
             face_count: 0,
             floor: 0.0,
@@ -217,6 +222,7 @@ impl Outline {
     ///
     /// The margin is 2^-44 of what the edge's terms can reach in the padded image;
     /// dividing by its slope, adding up and rounding take less than 2^-50 of that.
+    #[inline(always)]
     fn keep(&mut self, edge: Linear, margin: f64) {
         let Linear { x, y, c } = edge;
         let c = c - margin
@@ -253,6 +259,19 @@ impl Outline {
         }
     }
 
+    /// Leaves out what lies more than a tile beside the box's own rectangle: what
+    /// open faces add there hides only what is below the floor, or beyond another
+    /// face, in almost all of its pixels.
+    pub fn within(&mut self, rect: &Rect) {
+        let tile = [TILE_WIDTH as f64, TILE_HEIGHT as f64];
+        let [left, right] = self.columns_within;
+        let (x0, x1) = (f64::from(rect.x0) - tile[0], f64::from(rect.x1) + 1.0 + tile[0]);
+        self.columns_within = [left.max(x0), right.min(x1)];
+        let [top, bottom] = self.rows;
+        let (y0, y1) = (f64::from(rect.y0) - tile[1], f64::from(rect.y1) + 1.0 + tile[1]);
+        self.rows = [top.max(y0), bottom.min(y1)];
+    }
+
     /// First row and the one behind the last that columns have to be asked for.
     pub fn rows(&self) -> (usize, usize) {
         (self.rows[0] as usize, self.rows[1] as usize)
@@ -266,8 +285,9 @@ impl Outline {
         for i in 0..N {
             row[i] = (first + i) as f64;
         }
-        let mut low = [0.0; N];
-        let mut high = [self.columns; N];
+        let [left, right] = self.columns_within;
+        let mut low = [left; N];
+        let mut high = [right; N];
         for bound in &self.lower[..self.lower_count.min(8)] {
             for i in 0..N {
                 let at = bound.at + bound.slope * row[i];
@@ -294,6 +314,7 @@ impl Outline {
     }
 
     /// The nearness of tiles, never above that of any covered pixel in them.
+    #[inline(always)]
     pub fn per_tile(&self, tiles: [usize; 2]) -> TileNearness {
         let per = [TILE_WIDTH as f64, TILE_HEIGHT as f64];
         let mut faces = [[f32::INFINITY, 0.0, 0.0]; 3];
