@@ -42,7 +42,7 @@ pub trait OcclusionBuffer {
     fn clear(&mut self);
 
     /// Draws an occluder.
-    fn draw(&mut self, outline: &Outline);
+    fn draw<I: Isa>(&mut self, isa: I, outline: &Outline);
 
     /// Everything has been drawn.
     fn finish(&mut self) {}

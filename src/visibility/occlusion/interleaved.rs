@@ -196,7 +196,7 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
                     near,
                 });
                 let large = near || rect.area() >= least_area;
-                if large && draw(buffer, scene, view, &survivors[survivors.len() - 1]) {
+                if large && draw(isa, buffer, scene, view, &survivors[survivors.len() - 1]) {
                     drawn = true;
                     stats.drawn += 1;
                 }
@@ -216,7 +216,8 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
 
 /// Draws the item at a position, if it may be drawn and covers anything.
 #[inline(always)]
-fn draw<B: OcclusionBuffer>(
+fn draw<I: Isa, B: OcclusionBuffer>(
+    isa: I,
     buffer: &mut B,
     scene: &OccluderScene,
     view: &View,
@@ -234,7 +235,7 @@ fn draw<B: OcclusionBuffer>(
     if !item.near {
         outline.within(&item.rect);
     }
-    buffer.draw(&outline);
+    buffer.draw(isa, &outline);
     true
 }
 

@@ -82,7 +82,7 @@ impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
     }
 
     #[inline(always)]
-    fn draw(&mut self, outline: &Outline) {
+    fn draw<I: Isa>(&mut self, isa: I, outline: &Outline) {
         let nearness = outline.per_tile([self.columns, self.rows]);
         let (first, end) = outline.rows();
         let mut row = first / TILE_HEIGHT;
@@ -91,7 +91,7 @@ impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
             let (starts, ends) = outline.spans::<16>(row * TILE_HEIGHT);
             let tiles = starts.as_chunks().0.iter().zip(ends.as_chunks().0);
             for (row, (start, end)) in (row..last).zip(tiles) {
-                self.draw_row(row, start, end, &nearness);
+                self.draw_row(isa, row, start, end, &nearness);
             }
             row += 4;
         }
@@ -130,8 +130,9 @@ impl<const WHOLE: bool> Masked<WHOLE> {
     /// Draws four rows of pixels, given by their first columns and the ones behind
     /// the last.
     #[inline(always)]
-    fn draw_row(
+    fn draw_row<I: Isa>(
         &mut self,
+        isa: I,
         row: usize,
         start: &[i32; TILE_HEIGHT],
         end: &[i32; TILE_HEIGHT],
@@ -151,23 +152,38 @@ impl<const WHOLE: bool> Masked<WHOLE> {
         let of_row = row as f32;
         let first = least as usize / TILE_WIDTH;
         let last = (greatest as usize).div_ceil(TILE_WIDTH);
-        for column in (first..last).step_by(CHUNK) {
+        for column in (first..last).step_by(LANES) {
             let at = row * self.columns + column;
-            let mut layer = Layer {
-                mask: [0; CHUNK],
-                near: [0.0; CHUNK],
+            let Some(reference) = self.reference[at..].first_chunk::<LANES>() else {
+                return;
             };
-            let (left, of_column) = ((column * TILE_WIDTH) as i32, column as f32);
-            for i in 0..CHUNK {
-                let left = left + (i * TILE_WIDTH) as i32;
-                layer.mask[i] = pixels_between(start, end, left);
-                layer.near[i] = nearness.of(of_column + STEPS[i], of_row);
+            let mut near = [0.0; LANES];
+            for i in 0..LANES {
+                near[i] = nearness.of(column as f32 + STEPS[i], of_row);
             }
-            let reference = self.reference[at..].first_chunk_mut();
-            let working = self.working[at..].first_chunk_mut();
-            let mask = self.mask[at..].first_chunk_mut();
-            if let (Some(reference), Some(working), Some(mask)) = (reference, working, mask) {
-                layer.merge(reference, working, mask);
+            // Where nearer ones have been drawn all over, as front to back mostly.
+            let below = isa.at_most(isa.load(&near), isa.load(reference));
+            let adds = !below & first_lanes(last - column);
+            for half in 0..2 {
+                if adds >> (CHUNK * half) & 0xff == 0 {
+                    continue;
+                }
+                let at = at + CHUNK * half;
+                let left = ((column + CHUNK * half) * TILE_WIDTH) as i32;
+                let mut layer = Layer {
+                    mask: [0; CHUNK],
+                    near: [0.0; CHUNK],
+                };
+                for i in 0..CHUNK {
+                    layer.mask[i] = pixels_between(start, end, left + (i * TILE_WIDTH) as i32);
+                    layer.near[i] = near[CHUNK * half + i];
+                }
+                let reference = self.reference[at..].first_chunk_mut();
+                let working = self.working[at..].first_chunk_mut();
+                let mask = self.mask[at..].first_chunk_mut();
+                if let (Some(reference), Some(working), Some(mask)) = (reference, working, mask) {
+                    layer.merge(reference, working, mask);
+                }
             }
         }
     }
@@ -175,8 +191,10 @@ impl<const WHOLE: bool> Masked<WHOLE> {
 
 /// Tiles that are drawn together.
 const CHUNK: usize = 8;
-/// Their columns from the first one on.
-const STEPS: [f32; CHUNK] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+/// The columns of sixteen tiles from the first one on.
+const STEPS: [f32; LANES] = [
+    0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0,
+];
 
 /// What an occluder adds to some tiles side by side.
 struct Layer {

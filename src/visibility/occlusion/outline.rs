@@ -47,12 +47,16 @@ pub enum Coverage {
     Whole,
 }
 
-/// A bound of the columns: `at + slope * row`.
+/// A bound of the columns: `at + slope * row`, rounded inward.
 #[derive(Clone, Copy, Debug)]
 struct Bound {
-    at: f64,
-    slope: f64,
+    at: f32,
+    slope: f32,
 }
+
+/// 2^23: a number from 0 up to it, added to it, is rounded to a whole one, which is
+/// then in the lower bits.
+const WHOLE_NUMBERS: f32 = (1u32 << 23) as f32;
 
 /// The pixels that a box covers and how near it is there.
 #[derive(Clone, Debug)]
@@ -71,7 +75,9 @@ pub struct Outline {
     face_count: usize,
     /// What the nearness is not below.
     floor: f64,
+    /// Of the padded image.
     columns: f64,
+    height: f64,
     coverage: Coverage,
 }
 
@@ -104,6 +110,7 @@ impl Outline {
             lower_count: 0,
             upper: [none; 8],
             upper_count: 0,
+            height: padded(size[1], TILE_HEIGHT),
             rows: [0.0, padded(size[1], TILE_HEIGHT)],
             columns_within: [0.0, padded(size[0], TILE_WIDTH)],
             faces: [Linear::constant(f64::INFINITY); 3],
@@ -231,9 +238,17 @@ impl Outline {
                 Coverage::Centre => 0.5 * (x + y),
             };
         if x.abs() * self.columns >= margin {
+            // In f32: u of each term for rounding it, u of the product, u of both for
+            // the sum, and u of a column for the half that is added: 4 u of the terms
+            // and 2 u of the width cover it. Lines along the rows have large terms,
+            // but it is across them that a shift counts.
+            let (at, slope) = (-c / x, -y / x);
+            let size = at.abs() + slope.abs() * self.height;
+            let error = f64::from(U) * (4.0 * size + 2.0 * (self.columns + 1.0));
+            let inward = if x > 0.0 { at + error } else { at - error };
             let bound = Bound {
-                at: -c / x,
-                slope: -y / x,
+                at: inward as f32,
+                slope: slope as f32,
             };
             if x > 0.0 {
                 self.lower[self.lower_count & 7] = bound;
@@ -281,34 +296,34 @@ impl Outline {
     /// none where the second is not above the first.
     #[inline(always)]
     pub fn spans<const N: usize>(&self, first: usize) -> ([i32; N], [i32; N]) {
-        let mut row = [0.0; N];
-        for i in 0..N {
-            row[i] = (first + i) as f64;
-        }
         let [left, right] = self.columns_within;
-        let mut low = [left; N];
-        let mut high = [right; N];
+        let [top, bottom] = self.rows.map(|row| row as f32);
+        let first = first as f32;
+        let mut low = [left as f32; N];
+        let mut high = [right as f32 - 1.0; N];
         for bound in &self.lower[..self.lower_count.min(8)] {
             for i in 0..N {
-                let at = bound.at + bound.slope * row[i];
+                let at = bound.at + bound.slope * (first + i as f32);
                 low[i] = if at > low[i] { at } else { low[i] };
             }
         }
         for bound in &self.upper[..self.upper_count.min(8)] {
             for i in 0..N {
-                let at = bound.at + bound.slope * row[i] + 1.0;
+                let at = bound.at + bound.slope * (first + i as f32);
                 high[i] = if at < high[i] { at } else { high[i] };
             }
         }
         let mut start = [0; N];
         let mut end = [0; N];
-        let columns = self.columns as i32;
         for i in 0..N {
-            // Rounded up; and no columns in rows that are not the outline's.
-            let down = (self.columns - low[i]) as i32;
-            let within = (row[i] >= self.rows[0]) & (row[i] < self.rows[1]);
-            start[i] = columns - down;
-            end[i] = if within { high[i] as i32 } else { 0 };
+            // Half a column on and to the nearest whole one: up, and for the end one
+            // behind what is rounded down. Ties may lose a column.
+            let row = first + i as f32;
+            let within = (row >= top) & (row < bottom) & (high[i] >= 0.0) & (low[i] <= right as f32);
+            let low = if within { low[i] } else { 1.0 };
+            let high = if within { high[i] } else { 0.0 };
+            start[i] = ((low + 0.5) + WHOLE_NUMBERS).to_bits() as i32 & 0x7f_ffff;
+            end[i] = ((high + 0.5) + WHOLE_NUMBERS).to_bits() as i32 & 0x7f_ffff;
         }
         (start, end)
     }

@@ -109,7 +109,7 @@ impl<B: OcclusionBuffer> Work for Culled<'_, B> {
                 if !candidate.near {
                     outline.within(&candidate.rect);
                 }
-                state.buffer.draw(&outline);
+                state.buffer.draw(isa, &outline);
                 stats.drawn += 1;
             }
         }
