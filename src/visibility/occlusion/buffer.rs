@@ -3,6 +3,7 @@
 
 use super::outline::{Coverage, Outline};
 use super::rect::Rect;
+use crate::kernel::Isa;
 use crate::visibility::{Guarantee, SampleGrid};
 
 /// Where the idea of a back end comes from.
@@ -41,12 +42,12 @@ pub trait OcclusionBuffer {
     fn clear(&mut self);
 
     /// Draws an occluder.
-    fn draw(&mut self, outline: &Outline);
+    fn draw<I: Isa>(&mut self, isa: I, outline: &Outline);
 
     /// Everything has been drawn.
     fn finish(&mut self) {}
 
     /// Whether something that was drawn is nearer than the rectangle in all its
     /// pixels. As near is not nearer.
-    fn hides(&self, rect: &Rect) -> bool;
+    fn hides<I: Isa>(&self, isa: I, rect: &Rect) -> bool;
 }

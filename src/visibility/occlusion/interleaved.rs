@@ -134,7 +134,7 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
         let mut open = [0; LANES];
         while let Some(entry) = stack.pop() {
             // Much may have been drawn since it was put there.
-            if !entry.near && buffer.hides(&entry.rect) {
+            if !entry.near && buffer.hides(isa, &entry.rect) {
                 continue;
             }
             let (level, index) = (usize::from(entry.level), entry.block as usize);
@@ -156,7 +156,7 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
             while left != 0 {
                 let lane = left.trailing_zeros() as usize;
                 left &= left - 1;
-                if buffer.hides(&rects.get(lane)) {
+                if buffer.hides(isa, &rects.get(lane)) {
                     lanes &= !(1 << lane);
                 }
             }
@@ -181,7 +181,7 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
             for &key in order {
                 let lane = (key & 15) as usize;
                 let (rect, near) = (rects.get(lane), flat >> lane & 1 == 0);
-                if drawn && !near && buffer.hides(&rect) {
+                if drawn && !near && buffer.hides(isa, &rect) {
                     continue;
                 }
                 let position = index * LANES + lane;
@@ -191,7 +191,7 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
                     near,
                 });
                 let large = near || rect.area() >= least_area;
-                if large && draw(buffer, scene, view, position) {
+                if large && draw(isa, buffer, scene, view, &survivors[survivors.len() - 1]) {
                     drawn = true;
                     stats.drawn += 1;
                 }
@@ -200,7 +200,7 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
         let before = self.out.len();
         for survivor in survivors {
             let again = state.second_look && !survivor.near;
-            if !(again && buffer.hides(&survivor.rect)) {
+            if !(again && buffer.hides(isa, &survivor.rect)) {
                 self.out.push(scene.ids()[survivor.position as usize]);
             }
         }
@@ -211,21 +211,27 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
 
 /// Draws the item at a position, if it may be drawn and covers anything.
 #[inline(always)]
-fn draw<B: OcclusionBuffer>(
+fn draw<I: Isa, B: OcclusionBuffer>(
+    isa: I,
     buffer: &mut B,
     scene: &OccluderScene,
     view: &View,
-    position: usize,
+    item: &Survivor,
 ) -> bool {
+    let position = item.position as usize;
     if view.entered_before_near(&scene.outer(position)) {
         return false;
     }
     let open = view.open & scene.faces(position);
     let outline = Outline::of(scene.inner(position), open, view, B::COVERAGE);
-    if let Some(outline) = &outline {
-        buffer.draw(outline);
+    let Some(mut outline) = outline else {
+        return false;
+    };
+    if !item.near {
+        outline.within(&item.rect);
     }
-    outline.is_some()
+    buffer.draw(isa, &outline);
+    true
 }
 
 /// The lanes in the order of their depths, each with its key's upper bits in front

@@ -6,10 +6,12 @@
 //! triangles and everything else is not. Two coverage rules, and nothing else,
 //! tell the two back ends apart.
 
+use super::block::first_lanes;
 use super::buffer::{OcclusionBuffer, Origin};
 use super::outline::{Coverage, Outline, TileNearness};
 use super::rect::Rect;
 use super::view::{TILE_HEIGHT, TILE_WIDTH};
+use crate::kernel::{Isa, LANES};
 use crate::visibility::{Guarantee, SampleGrid};
 
 /// Pixels of a tile: bit `8 * row + column`.
@@ -62,7 +64,8 @@ impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
     fn new(grid: SampleGrid) -> Self {
         let columns = (grid.width as usize).div_ceil(TILE_WIDTH);
         let rows = (grid.height as usize).div_ceil(TILE_HEIGHT);
-        let tiles = columns * rows;
+        // So that a chunk that begins with the last tile is whole.
+        let tiles = columns * rows + LANES;
         Masked {
             columns,
             rows,
@@ -79,50 +82,43 @@ impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
     }
 
     #[inline(always)]
-    fn draw(&mut self, outline: &Outline) {
+    fn draw<I: Isa>(&mut self, isa: I, outline: &Outline) {
         let nearness = outline.per_tile([self.columns, self.rows]);
         let (first, end) = outline.rows();
         let mut row = first / TILE_HEIGHT;
         let last = end.div_ceil(TILE_HEIGHT).min(self.rows);
         while row < last {
             let (starts, ends) = outline.spans::<16>(row * TILE_HEIGHT);
-            for (part, (start, end)) in starts.chunks(4).zip(ends.chunks(4)).enumerate() {
-                if row + part < last {
-                    self.draw_row(row + part, start, end, &nearness);
-                }
+            let tiles = starts.as_chunks().0.iter().zip(ends.as_chunks().0);
+            for (row, (start, end)) in (row..last).zip(tiles) {
+                self.draw_row(isa, row, start, end, &nearness);
             }
             row += 4;
         }
     }
 
     #[inline(always)]
-    fn hides(&self, rect: &Rect) -> bool {
-        let [x0, x1, y0, y1] = [rect.x0, rect.x1, rect.y0, rect.y1].map(usize::from);
-        let columns = x0 / TILE_WIDTH..x1 / TILE_WIDTH + 1;
-        for row in y0 / TILE_HEIGHT..y1 / TILE_HEIGHT + 1 {
-            let at = row * self.columns;
-            let place = at + columns.start..at + columns.end;
-            let reference = &self.reference[place.clone()];
-            // All of the row by its reference, as it mostly is.
-            let open = reference
-                .iter()
-                .fold(false, |any, &near| any | !(near > rect.nearness));
-            if !open {
-                continue;
-            }
-            let tiles = self.working[place.clone()].iter().zip(&self.mask[place]);
-            let tiles = reference.iter().zip(tiles).zip(columns.clone());
-            for ((&near, (&working, &mask)), column) in tiles {
-                if near > rect.nearness {
-                    continue;
-                }
-                let left = x0.saturating_sub(column * TILE_WIDTH);
-                let right = (x1 - column * TILE_WIDTH).min(TILE_WIDTH - 1);
-                let top = y0.saturating_sub(row * TILE_HEIGHT);
-                let bottom = (y1 - row * TILE_HEIGHT).min(TILE_HEIGHT - 1);
-                let pixels = columns_from_to(left, right + 1) & rows_from_to(top, bottom + 1);
-                if !(working > rect.nearness) || pixels & !mask != 0 {
+    fn hides<I: Isa>(&self, isa: I, rect: &Rect) -> bool {
+        let nearness = isa.splat(rect.nearness);
+        let first = usize::from(rect.x0) / TILE_WIDTH;
+        let last = usize::from(rect.x1) / TILE_WIDTH;
+        for row in usize::from(rect.y0) / TILE_HEIGHT..usize::from(rect.y1) / TILE_HEIGHT + 1 {
+            for column in (first..last + 1).step_by(LANES) {
+                let at = row * self.columns + column;
+                let Some(reference) = self.reference[at..].first_chunk::<LANES>() else {
                     return false;
+                };
+                // By the reference of the tile, as it mostly is.
+                let passed = isa.at_most(isa.load(reference), nearness);
+                let mut open = passed & first_lanes(last + 1 - column);
+                while open != 0 {
+                    let i = open.trailing_zeros() as usize;
+                    open &= open - 1;
+                    let pixels = pixels_of(rect, column + i, row);
+                    let shown = pixels & !self.mask[at + i] != 0;
+                    if shown | !(self.working[at + i] > rect.nearness) {
+                        return false;
+                    }
                 }
             }
         }
@@ -134,98 +130,136 @@ impl<const WHOLE: bool> Masked<WHOLE> {
     /// Draws four rows of pixels, given by their first columns and the ones behind
     /// the last.
     #[inline(always)]
-    fn draw_row(&mut self, row: usize, start: &[i32], end: &[i32], nearness: &TileNearness) {
+    fn draw_row<I: Isa>(
+        &mut self,
+        isa: I,
+        row: usize,
+        start: &[i32; TILE_HEIGHT],
+        end: &[i32; TILE_HEIGHT],
+        nearness: &TileNearness,
+    ) {
         let (mut least, mut greatest) = (i32::MAX, 0);
-        let (mut full_from, mut full_to) = (0, i32::MAX);
-        for (&start, &end) in start.iter().zip(end) {
+        for line in 0..TILE_HEIGHT {
+            let (start, end) = (start[line], end[line]);
             if start < end {
                 least = least.min(start);
                 greatest = greatest.max(end);
             }
-            full_from = full_from.max(start);
-            full_to = full_to.min(end);
         }
         if least >= greatest {
             return;
         }
-        let tile = TILE_WIDTH as i32;
-        let first = (least / tile) as usize;
-        let last = ((greatest + tile - 1) / tile) as usize;
-        // Tiles that all four rows fill.
-        let full_from = ((full_from + tile - 1) / tile) as usize;
-        let full_to = (full_to.max(0) / tile) as usize;
-        let (full_from, full_to) = match full_from < full_to {
-            true => (full_from, full_to),
-            false => (last, last),
-        };
-        let at = row * self.columns;
         let of_row = row as f32;
-        for column in (first..full_from).chain(full_to..last) {
-            let mut mask = 0;
-            for (line, (&start, &end)) in start.iter().zip(end).enumerate() {
-                let left = (start - column as i32 * tile).clamp(0, tile) as usize;
-                let right = (end - column as i32 * tile).clamp(0, tile) as usize;
-                if left < right {
-                    mask |= columns_from_to(left, right) & rows_from_to(line, line + 1);
+        let first = least as usize / TILE_WIDTH;
+        let last = (greatest as usize).div_ceil(TILE_WIDTH);
+        for column in (first..last).step_by(LANES) {
+            let at = row * self.columns + column;
+            let Some(reference) = self.reference[at..].first_chunk::<LANES>() else {
+                return;
+            };
+            let mut near = [0.0; LANES];
+            for i in 0..LANES {
+                near[i] = nearness.of(column as f32 + STEPS[i], of_row);
+            }
+            // Where nearer ones have been drawn all over, as front to back mostly.
+            let below = isa.at_most(isa.load(&near), isa.load(reference));
+            let adds = !below & first_lanes(last - column);
+            for half in 0..2 {
+                if adds >> (CHUNK * half) & 0xff == 0 {
+                    continue;
+                }
+                let at = at + CHUNK * half;
+                let left = ((column + CHUNK * half) * TILE_WIDTH) as i32;
+                let mut layer = Layer {
+                    mask: [0; CHUNK],
+                    near: [0.0; CHUNK],
+                };
+                for i in 0..CHUNK {
+                    layer.mask[i] = pixels_between(start, end, left + (i * TILE_WIDTH) as i32);
+                    layer.near[i] = near[CHUNK * half + i];
+                }
+                let reference = self.reference[at..].first_chunk_mut();
+                let working = self.working[at..].first_chunk_mut();
+                let mask = self.mask[at..].first_chunk_mut();
+                if let (Some(reference), Some(working), Some(mask)) = (reference, working, mask) {
+                    layer.merge(reference, working, mask);
                 }
             }
-            self.merge(at + column, mask, nearness.of(column as f32, of_row));
-        }
-        if full_from >= full_to {
-            return;
-        }
-        let place = at + full_from..at + full_to;
-        let reference = &mut self.reference[place.clone()];
-        let working = &self.working[place.clone()];
-        let masks = &mut self.mask[place];
-        for i in 0..reference.len().min(working.len()).min(masks.len()) {
-            let near = nearness.of((full_from + i) as f32, of_row);
-            let kept = reference[i];
-            let near = if near > kept { near } else { kept };
-            reference[i] = near;
-            // A working layer that is no nearer than all of the tile is done with.
-            masks[i] = if working[i] > near { masks[i] } else { 0 };
         }
     }
+}
 
-    /// Adds a layer that covers some pixels of a tile.
+/// Tiles that are drawn together.
+const CHUNK: usize = 8;
+/// The columns of sixteen tiles from the first one on.
+const STEPS: [f32; LANES] = [
+    0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0,
+];
+
+/// What an occluder adds to some tiles side by side.
+struct Layer {
+    mask: [Mask; CHUNK],
+    near: [f32; CHUNK],
+}
+
+impl Layer {
+    /// Two layers are kept of three. The paper's rule: give up the working one if it
+    /// lies nearer to the reference than to the new one. A layer adds nothing that
+    /// is no nearer than the reference, or that the working one covers no farther;
+    /// the other way round it takes the working one's place.
     #[inline(always)]
-    fn merge(&mut self, tile: usize, mask: Mask, near: f32) {
-        let reference = self.reference[tile];
-        if mask == 0 || !(near > reference) {
-            return;
+    fn merge(
+        &self,
+        reference: &mut [f32; CHUNK],
+        working: &mut [f32; CHUNK],
+        mask: &mut [Mask; CHUNK],
+    ) {
+        for i in 0..CHUNK {
+            let (new, near) = (self.mask[i], self.near[i]);
+            let (least, old) = (reference[i], mask[i]);
+            let layer = if old == 0 { least } else { working[i] };
+            let adds = (new != 0) & (near > least) & ((new & !old != 0) | (near > layer));
+            let behind = (new == Mask::MAX) & (near < layer);
+            let replaces = (old & !new == 0) & (near >= layer);
+            let joins = !replaces & (near - layer <= layer - least);
+            let lower = if near < layer { near } else { layer };
+            let new = if joins { new | old } else { new };
+            let near_or_lower = if joins { lower } else { near };
+            let full = new == Mask::MAX;
+            let to_reference = if full { near_or_lower } else { least };
+            let to_mask = if full { 0 } else { new };
+            let to_reference = if behind { near } else { to_reference };
+            let to_mask = if behind { old } else { to_mask };
+            let to_working = if behind { layer } else { near_or_lower };
+            reference[i] = if adds { to_reference } else { least };
+            mask[i] = if adds { to_mask } else { old };
+            working[i] = if adds { to_working } else { working[i] };
         }
-        let (old, working) = (self.mask[tile], self.working[tile]);
-        let (mut mask, mut near) = (mask, near);
-        // A layer that another one covers, no farther, adds nothing.
-        if mask & !old == 0 && near <= working {
-            return;
-        }
-        let replaces = old & !mask == 0 && near >= working;
-        // Two layers are kept of three. The paper's rule: give up the working one
-        // if it lies nearer to the reference than to the new one.
-        if !replaces && near - working <= working - reference {
-            mask |= old;
-            near = if near < working { near } else { working };
-        }
-        if mask == Mask::MAX {
-            self.reference[tile] = near;
-            mask = 0;
-        }
-        self.mask[tile] = mask;
-        self.working[tile] = near;
     }
 }
 
-/// The pixels of a tile in some columns, from `left` to before `right`.
+/// The pixels of the tile from column `left` on that lie in the spans of its rows.
 #[inline(always)]
-fn columns_from_to(left: usize, right: usize) -> Mask {
-    let byte = (0xff >> (TILE_WIDTH - right)) & (0xff << left) & 0xff;
-    byte * 0x0101_0101
+fn pixels_between(start: &[i32; 4], end: &[i32; 4], left: i32) -> Mask {
+    let mut mask = 0;
+    for line in 0..TILE_HEIGHT {
+        let from = (start[line] - left).clamp(0, 8) as u32;
+        let to = (end[line] - left).clamp(0, 8) as u32;
+        let row = 0xffu32.wrapping_shl(from) & !0xffu32.wrapping_shl(to) & 0xff;
+        mask |= row << (8 * line);
+    }
+    mask
 }
 
-/// The pixels of a tile in some rows, from `top` to before `bottom`.
+/// The pixels of a tile that lie in a rectangle which meets the tile.
 #[inline(always)]
-fn rows_from_to(top: usize, bottom: usize) -> Mask {
-    (Mask::MAX >> (8 * (TILE_HEIGHT - bottom))) & (Mask::MAX << (8 * top))
+fn pixels_of(rect: &Rect, column: usize, row: usize) -> Mask {
+    let [x0, x1, y0, y1] = [rect.x0, rect.x1, rect.y0, rect.y1].map(usize::from);
+    let left = x0.saturating_sub(column * TILE_WIDTH);
+    let right = (x1 - column * TILE_WIDTH).min(TILE_WIDTH - 1);
+    let top = y0.saturating_sub(row * TILE_HEIGHT);
+    let bottom = (y1 - row * TILE_HEIGHT).min(TILE_HEIGHT - 1);
+    let columns = (0xff >> (TILE_WIDTH - 1 - right)) & (0xff << left) & 0xff;
+    let below = Mask::MAX >> (8 * (TILE_HEIGHT - 1 - bottom));
+    columns * 0x0101_0101 & below & Mask::MAX << (8 * top)
 }

@@ -33,6 +33,7 @@
 
 use glam::DVec3;
 
+use super::rect::Rect;
 use super::scene::Faces;
 use super::view::{Linear, MARGIN, TILE_HEIGHT, TILE_WIDTH, U, View};
 use crate::geometry::Aabb;
@@ -46,12 +47,16 @@ pub enum Coverage {
     Whole,
 }
 
-/// A bound of the columns: `at + slope * row`.
+/// A bound of the columns: `at + slope * row`, rounded inward.
 #[derive(Clone, Copy, Debug)]
 struct Bound {
-    at: f64,
-    slope: f64,
+    at: f32,
+    slope: f32,
 }
+
+/// 2^23: a number from 0 up to it, added to it, is rounded to a whole one, which is
+/// then in the lower bits.
+const WHOLE_NUMBERS: f32 = (1u32 << 23) as f32;
 
 /// The pixels that a box covers and how near it is there.
 #[derive(Clone, Debug)]
@@ -63,18 +68,23 @@ pub struct Outline {
     upper_count: usize,
     /// First row and the one behind the last.
     rows: [f64; 2],
+    /// No columns before the first and from the second on.
+    columns_within: [f64; 2],
     /// The least of these is the nearness, rounded down already.
     faces: [Linear; 3],
     face_count: usize,
     /// What the nearness is not below.
     floor: f64,
+    /// Of the padded image.
     columns: f64,
+    height: f64,
     coverage: Coverage,
 }
 
 impl Outline {
     /// The outline of a box; `None` where it covers no pixel or the eye is in it.
     /// Those faces that are `open` are drawn as if they lay infinitely far out.
+    #[inline(always)]
     pub fn of(inner: &Aabb, open: Faces, view: &View, coverage: Coverage) -> Option<Outline> {
         if inner.is_empty() {
             return None;
@@ -100,7 +110,9 @@ impl Outline {
             lower_count: 0,
             upper: [none; 8],
             upper_count: 0,
+            height: padded(size[1], TILE_HEIGHT),
             rows: [0.0, padded(size[1], TILE_HEIGHT)],
+            columns_within: [0.0, padded(size[0], TILE_WIDTH)],
             faces: [Linear::constant(f64::INFINITY); 3],
             face_count: 0,
             floor: 0.0,
@@ -217,6 +229,7 @@ impl Outline {
     ///
     /// The margin is 2^-44 of what the edge's terms can reach in the padded image;
     /// dividing by its slope, adding up and rounding take less than 2^-50 of that.
+    #[inline(always)]
     fn keep(&mut self, edge: Linear, margin: f64) {
         let Linear { x, y, c } = edge;
         let c = c - margin
@@ -225,9 +238,17 @@ impl Outline {
                 Coverage::Centre => 0.5 * (x + y),
             };
         if x.abs() * self.columns >= margin {
+            // In f32: u of each term for rounding it, u of the product, u of both for
+            // the sum, and u of a column for the half that is added: 4 u of the terms
+            // and 2 u of the width cover it. Lines along the rows have large terms,
+            // but it is across them that a shift counts.
+            let (at, slope) = (-c / x, -y / x);
+            let size = at.abs() + slope.abs() * self.height;
+            let error = f64::from(U) * (4.0 * size + 2.0 * (self.columns + 1.0));
+            let inward = if x > 0.0 { at + error } else { at - error };
             let bound = Bound {
-                at: -c / x,
-                slope: -y / x,
+                at: inward as f32,
+                slope: slope as f32,
             };
             if x > 0.0 {
                 self.lower[self.lower_count & 7] = bound;
@@ -253,6 +274,19 @@ impl Outline {
         }
     }
 
+    /// Leaves out what lies more than a tile beside the box's own rectangle: what
+    /// open faces add there hides only what is below the floor, or beyond another
+    /// face, in almost all of its pixels.
+    pub fn within(&mut self, rect: &Rect) {
+        let tile = [TILE_WIDTH as f64, TILE_HEIGHT as f64];
+        let [left, right] = self.columns_within;
+        let (x0, x1) = (f64::from(rect.x0) - tile[0], f64::from(rect.x1) + 1.0 + tile[0]);
+        self.columns_within = [left.max(x0), right.min(x1)];
+        let [top, bottom] = self.rows;
+        let (y0, y1) = (f64::from(rect.y0) - tile[1], f64::from(rect.y1) + 1.0 + tile[1]);
+        self.rows = [top.max(y0), bottom.min(y1)];
+    }
+
     /// First row and the one behind the last that columns have to be asked for.
     pub fn rows(&self) -> (usize, usize) {
         (self.rows[0] as usize, self.rows[1] as usize)
@@ -262,38 +296,40 @@ impl Outline {
     /// none where the second is not above the first.
     #[inline(always)]
     pub fn spans<const N: usize>(&self, first: usize) -> ([i32; N], [i32; N]) {
-        let mut row = [0.0; N];
-        for i in 0..N {
-            row[i] = (first + i) as f64;
-        }
-        let mut low = [0.0; N];
-        let mut high = [self.columns; N];
+        let [left, right] = self.columns_within;
+        let [top, bottom] = self.rows.map(|row| row as f32);
+        let first = first as f32;
+        let mut low = [left as f32; N];
+        let mut high = [right as f32 - 1.0; N];
         for bound in &self.lower[..self.lower_count.min(8)] {
             for i in 0..N {
-                let at = bound.at + bound.slope * row[i];
+                let at = bound.at + bound.slope * (first + i as f32);
                 low[i] = if at > low[i] { at } else { low[i] };
             }
         }
         for bound in &self.upper[..self.upper_count.min(8)] {
             for i in 0..N {
-                let at = bound.at + bound.slope * row[i] + 1.0;
+                let at = bound.at + bound.slope * (first + i as f32);
                 high[i] = if at < high[i] { at } else { high[i] };
             }
         }
         let mut start = [0; N];
         let mut end = [0; N];
-        let columns = self.columns as i32;
         for i in 0..N {
-            // Rounded up; and no columns in rows that are not the outline's.
-            let down = (self.columns - low[i]) as i32;
-            let within = (row[i] >= self.rows[0]) & (row[i] < self.rows[1]);
-            start[i] = columns - down;
-            end[i] = if within { high[i] as i32 } else { 0 };
+            // Half a column on and to the nearest whole one: up, and for the end one
+            // behind what is rounded down. Ties may lose a column.
+            let row = first + i as f32;
+            let within = (row >= top) & (row < bottom) & (high[i] >= 0.0) & (low[i] <= right as f32);
+            let low = if within { low[i] } else { 1.0 };
+            let high = if within { high[i] } else { 0.0 };
+            start[i] = ((low + 0.5) + WHOLE_NUMBERS).to_bits() as i32 & 0x7f_ffff;
+            end[i] = ((high + 0.5) + WHOLE_NUMBERS).to_bits() as i32 & 0x7f_ffff;
         }
         (start, end)
     }
 
     /// The nearness of tiles, never above that of any covered pixel in them.
+    #[inline(always)]
     pub fn per_tile(&self, tiles: [usize; 2]) -> TileNearness {
         let per = [TILE_WIDTH as f64, TILE_HEIGHT as f64];
         let mut faces = [[f32::INFINITY, 0.0, 0.0]; 3];

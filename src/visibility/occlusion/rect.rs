@@ -130,22 +130,22 @@ impl Rects {
         let [width, height] = p.size;
         for l in 0..LANES {
             let (c, r) = about_eye(block, l, p.eye, p.rest, p.far_from_zero);
-            let mut w = [0.0; 8];
-            let mut x = [0.0; 8];
-            let mut y = [0.0; 8];
-            corners(&mut w, &c, &p.rows[2]);
-            corners(&mut x, &c, &p.rows[0]);
-            corners(&mut y, &c, &p.rows[1]);
-            let least = least8(&w);
-            for i in 0..8 {
-                let inverse = 1.0 / w[i];
-                x[i] *= inverse;
-                y[i] *= inverse;
+            let [x, y, w] = [0, 1, 2].map(|row| products(&c, &p.rows[row]));
+            let (mut least, mut x0, mut y0) = (f32::INFINITY, f32::INFINITY, f32::INFINITY);
+            let (mut x1, mut y1) = (f32::NEG_INFINITY, f32::NEG_INFINITY);
+            for corner in 0..8 {
+                let depth = at_corner(&w, corner);
+                let inverse = 1.0 / depth;
+                let across = at_corner(&x, corner) * inverse;
+                let down = at_corner(&y, corner) * inverse;
+                least = smaller(depth, least);
+                (x0, x1) = (smaller(across, x0), larger(across, x1));
+                (y0, y1) = (smaller(down, y0), larger(down, y1));
             }
             let relative = r / least;
             let (slack_x, slack_y) = (p.slack[0] * relative, p.slack[1] * relative);
-            let (x0, x1) = (least8(&x) - slack_x, greatest8(&x) + slack_x);
-            let (y0, y1) = (least8(&y) - slack_y, greatest8(&y) + slack_y);
+            let (x0, x1) = (x0 - slack_x, x1 + slack_x);
+            let (y0, y1) = (y0 - slack_y, y1 + slack_y);
             let depth = least - 8.0 * U * r;
             let nearness = 1.0 / depth;
             let sound = (least > r * (1.0 / 4096.0)) & (least > 1e-25) & (r < 1e25);
@@ -207,17 +207,20 @@ fn about_eye(
     (c, r)
 }
 
-/// The products with a row at all eight corners.
+/// The products of the lower and upper bounds with a row, axis by axis.
 #[inline(always)]
-fn corners(out: &mut [f32; 8], c: &[[f32; 2]; 3], row: &[f32; 3]) {
-    let x = [row[0] * c[0][0], row[0] * c[0][1]];
-    let y = [row[1] * c[1][0], row[1] * c[1][1]];
-    let z = [row[2] * c[2][0], row[2] * c[2][1]];
-    for i in 0..4 {
-        let xy = x[i & 1] + y[i >> 1];
-        out[i] = xy + z[0];
-        out[i + 4] = xy + z[1];
+fn products(c: &[[f32; 2]; 3], row: &[f32; 3]) -> [[f32; 2]; 3] {
+    let mut products = [[0.0; 2]; 3];
+    for axis in 0..3 {
+        products[axis] = [row[axis] * c[axis][0], row[axis] * c[axis][1]];
     }
+    products
+}
+
+/// Their sum at corner 0 to 7: bit `axis` takes the upper bound.
+#[inline(always)]
+fn at_corner(p: &[[f32; 2]; 3], corner: usize) -> f32 {
+    (p[0][corner & 1] + p[1][corner >> 1 & 1]) + p[2][corner >> 2]
 }
 
 /// The least and the greatest product with a row at any corner.
@@ -255,22 +258,4 @@ fn smaller(a: f32, b: f32) -> f32 {
 #[inline(always)]
 fn larger(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
-}
-
-#[inline(always)]
-fn least8(v: &[f32; 8]) -> f32 {
-    let [a, b, c, d, e, f, g, h] = *v;
-    smaller(
-        smaller(smaller(a, b), smaller(c, d)),
-        smaller(smaller(e, f), smaller(g, h)),
-    )
-}
-
-#[inline(always)]
-fn greatest8(v: &[f32; 8]) -> f32 {
-    let [a, b, c, d, e, f, g, h] = *v;
-    larger(
-        larger(larger(a, b), larger(c, d)),
-        larger(larger(e, f), larger(g, h)),
-    )
 }

@@ -102,17 +102,21 @@ impl<B: OcclusionBuffer> Work for Culled<'_, B> {
         choose(&state.candidates, state.choice, &mut state.order, drawable);
         state.buffer.clear();
         for &index in &state.order {
-            let position = state.candidates[index as usize].position as usize;
+            let candidate = &state.candidates[index as usize];
+            let position = candidate.position as usize;
             let open = view.open & scene.faces(position);
-            if let Some(outline) = Outline::of(scene.inner(position), open, view, B::COVERAGE) {
-                state.buffer.draw(&outline);
+            if let Some(mut outline) = Outline::of(scene.inner(position), open, view, B::COVERAGE) {
+                if !candidate.near {
+                    outline.within(&candidate.rect);
+                }
+                state.buffer.draw(isa, &outline);
                 stats.drawn += 1;
             }
         }
         state.buffer.finish();
         let before = self.out.len();
         for candidate in &state.candidates {
-            if candidate.near || !state.buffer.hides(&candidate.rect) {
+            if candidate.near || !state.buffer.hides(isa, &candidate.rect) {
                 self.out.push(scene.ids()[candidate.position as usize]);
             }
         }
