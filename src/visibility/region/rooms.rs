@@ -291,9 +291,13 @@ impl<'a> Search<'a> {
         for line in heights.passing_lines() {
             (0..3).for_each(|k| sum[k] += line[k]);
         }
-        let (slope, base) = (-sum[0] / sum[1], -sum[2] / sum[1]);
-        let at = |t: f64| (foot + direction * t).extend(base + slope * t);
-        let line = (at(0.0), at(1.0) - at(0.0));
+        // The line over that of the plan: how far along it, and how high.
+        let [a, b, c] = sum.map(|v| v / libm::hypot(sum[0], sum[1]));
+        let (start, onward) = (DVec2::new(-a * c, -b * c), DVec2::new(b, -a));
+        let line = (
+            (foot + direction * start.x).extend(start.y),
+            (direction * onward.x).extend(onward.y),
+        );
         // Half way between where the line enters or leaves the region and the opening.
         let passing = |exit: u32| {
             let OpeningPlane::Axis { axis, at } = self.graph.openings()[exit as usize].plane else {

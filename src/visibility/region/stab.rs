@@ -103,9 +103,11 @@ impl Stabbing {
 
     /// Coefficients (a, b, c) of lines a x + b y + c that the openings let pass, at
     /// least weakly, above zero on the left: a positive combination of them is
-    /// strictly inside, but for rounding.
+    /// strictly inside, but for rounding. There is at least one opening.
     pub fn passing_lines(&self) -> Vec<[f64; 3]> {
-        if let ([left], [right]) = (&self.lefts[..], &self.rights[..]) {
+        let (left, right) = (self.lefts[0], self.rights[0]);
+        let same = |all: &[DVec2], one: DVec2| all.iter().all(|p| *p == one);
+        if same(&self.lefts, left) && same(&self.rights, right) {
             // Across a single opening, towards larger x rather than straight up.
             let v = left - right;
             let d = DVec2::new(v.y + v.x.abs(), -v.x).normalize();

@@ -40,6 +40,8 @@ pub struct SectorPvs {
     found: Vec<Option<Found>>,
     undecided: Vec<[RegionId; 2]>,
     crossings: usize,
+    /// The runs that were marked last: neighbouring lines mostly see the same.
+    marked: [Vec<u64>; 2],
 }
 
 impl SectorPvs {
@@ -60,6 +62,7 @@ impl SectorPvs {
             pvs: Pvs::alone(sectors),
             found: vec![None; sectors * sectors],
             undecided: Vec::new(),
+            marked: Default::default(),
             map: map.clone(),
             graph,
         };
@@ -131,6 +134,12 @@ impl SectorPvs {
 
     /// All sectors of a run see each other.
     fn mark(&mut self, run: &[u64], found: Found) {
+        let last = &mut self.marked[usize::from(found.is_left)];
+        if last == run {
+            return;
+        }
+        last.clear();
+        last.extend_from_slice(run);
         let mut members = Vec::new();
         decode(run, &mut members);
         for &from in &members {

@@ -57,7 +57,7 @@ fn each_pair_has_a_witness_and_rays_find_no_other() {
         );
         // Between storeys a few pairs stay open.
         assert!(
-            open * 20 < pvs.pairs(),
+            open * 12 < pvs.pairs(),
             "{world}: {open} of {}",
             pvs.pairs()
         );

@@ -58,7 +58,10 @@ pub fn joined_by_rays(graph: &RegionGraph, rays: usize, seed: u64) -> Pvs {
         seen.clear(graph.len());
         graph.ground().follow(graph, &ray, &mut seen);
         seen.list(&mut list);
-        list.iter().for_each(|&to| pvs.insert(from, to));
+        // All of one ray see each other.
+        for &a in &list {
+            list.iter().for_each(|&b| pvs.insert(a, b));
+        }
     }
     pvs
 }
