@@ -51,7 +51,7 @@ pub struct NoRegions(pub &'static str);
 
 /// A ground of boxes.
 #[derive(Debug)]
-struct Boxes(BoxGrid);
+pub(super) struct Boxes(pub(super) BoxGrid);
 
 impl Ground for Boxes {
     fn regions_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) -> bool {

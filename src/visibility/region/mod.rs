@@ -15,6 +15,7 @@ mod answer;
 mod audit;
 pub mod doom;
 mod flood;
+mod free_space;
 mod graph;
 mod items;
 mod locate;

@@ -2,5 +2,6 @@
 
 mod exact_doom;
 mod exact_rooms;
+mod free_space;
 mod from_eye;
 mod worlds;
