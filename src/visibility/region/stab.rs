@@ -37,14 +37,16 @@ pub struct Stabbing {
 
 impl Stabbing {
     /// Adds an opening; `false`, and nothing is added, if no line passes all of them
-    /// strictly between their ends. O(k) to O(k^3) for k openings.
+    /// strictly between their ends. O(k) to O(k^2) for k openings.
     pub fn push(&mut self, left: DVec2, right: DVec2) -> bool {
         self.lefts.push(left);
         self.rights.push(right);
+        // There is one such line. If it is another than before, it goes through one of
+        // the new points.
         let last = self.extreme.last().copied();
         let found = last.filter(|pair| self.is_extreme(*pair)).or_else(|| {
-            let count = self.lefts.len();
-            let pairs = (0..count).flat_map(|r| (0..count).map(move |l| [r, l]));
+            let new = self.lefts.len() - 1;
+            let pairs = (0..=new).flat_map(|old| [[new, old], [old, new]]);
             pairs.into_iter().find(|pair| self.is_extreme(*pair))
         });
         match found {

@@ -202,7 +202,7 @@ impl DoomMap {
             })
         };
         let openings = self.lines.iter().filter_map(opening).collect();
-        let ground = Arc::new(SectorGround(self.clone()));
+        let ground = Arc::new(SectorGround::new(self.clone()));
         RegionGraph::new(&self.parts, openings, ground)
     }
 }

@@ -15,10 +15,10 @@ use std::sync::Arc;
 use glam::DVec2;
 
 use super::super::answer::{RegionId, decode};
-use super::super::graph::{Ground, RegionGraph};
+use super::super::graph::RegionGraph;
 use super::super::pvs::Pvs;
 use super::super::witness::{ProvenPvs, Witness};
-use super::ground::{SectorGround, on_grid};
+use super::ground::on_grid;
 use super::map::{DoomMap, MapLine};
 use super::sweep::{Sweep, Whole, cross};
 
@@ -191,7 +191,6 @@ impl ProvenPvs for SectorPvs {
     /// The line is moved aside by less and less until a segment of it is accepted.
     fn witness(&self, from: RegionId, to: RegionId) -> Option<Witness> {
         let found = self.found[from as usize * self.pvs.len() + to as usize]?;
-        let ground = SectorGround(self.map.clone());
         let [vertex, direction] =
             [found.vertex, found.direction].map(|v| DVec2::new(v[0] as f64, v[1] as f64));
         let direction = direction.normalize();
@@ -207,7 +206,7 @@ impl ProvenPvs for SectorPvs {
                 regions: [from, to],
                 ends: ends.map(|end| on_grid(end, 0.0)),
             };
-            ground.check(&self.graph, &witness).ok().map(|()| witness)
+            self.graph.check_witness(&witness).ok().map(|()| witness)
         })
     }
 }
