@@ -4,4 +4,5 @@ mod exact_doom;
 mod exact_rooms;
 mod free_space;
 mod from_eye;
+mod stress;
 mod worlds;
