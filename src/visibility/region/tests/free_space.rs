@@ -4,24 +4,7 @@ use super::super::*;
 use super::from_eye::rows;
 use super::worlds::*;
 use crate::scene::{self, SeededRng, WorldBox};
-use crate::visibility::{Ray, Rays, Solids};
-
-/// The first solid that a ray enters, or none if it begins in one.
-fn first_hit(solids: &[WorldBox], ray: &Ray) -> Option<u32> {
-    let enters = |b: &WorldBox| {
-        let inverse = ray.direction.recip();
-        let (a, b) = (
-            (b.min - ray.origin) * inverse,
-            (b.max - ray.origin) * inverse,
-        );
-        let (near, far) = (a.min(b).max_element(), a.max(b).min_element());
-        (near <= far && near >= ray.near && near <= ray.far).then_some(near)
-    };
-    let hits = (0..)
-        .zip(solids)
-        .filter_map(|(id, b)| Some((enters(b)?, id)));
-    hits.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, id)| id)
-}
+use crate::visibility::{Rays, Solids};
 
 fn street_eyes(solids: &Solids, scene: &crate::scene::Scene, rng: &mut SeededRng) -> Vec<Rays> {
     let bounds = scene.world_bounds();

@@ -4,5 +4,6 @@ mod exact_doom;
 mod exact_rooms;
 mod free_space;
 mod from_eye;
+mod items;
 mod stress;
 mod worlds;
