@@ -51,7 +51,7 @@ pub struct NoRegions(pub &'static str);
 
 /// A ground of boxes.
 #[derive(Debug)]
-struct Boxes(BoxGrid);
+pub(super) struct Boxes(pub(super) BoxGrid);
 
 impl Ground for Boxes {
     fn regions_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) -> bool {
@@ -74,6 +74,33 @@ impl Ground for Boxes {
 
     fn check(&self, graph: &RegionGraph, witness: &Witness) -> Result<(), Rejected> {
         check_boxes(graph, witness)
+    }
+}
+
+/// Boxes, and the solids that close their borders. A ray that begins in such a solid
+/// is not hidden by it, and may go on in every region that the solid meets.
+#[derive(Debug)]
+struct Rooms {
+    boxes: Boxes,
+    borders: BoxGrid,
+}
+
+impl Ground for Rooms {
+    fn regions_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) -> bool {
+        let inside = self.boxes.regions_at(b, out);
+        self.borders.meeting(b, |solid| {
+            let solid = &self.borders.boxes()[solid as usize];
+            self.boxes.0.meeting(solid, |id| out.push(id));
+        });
+        inside
+    }
+
+    fn follow(&self, graph: &RegionGraph, ray: &Ray, seen: &mut Marks) {
+        self.boxes.follow(graph, ray, seen);
+    }
+
+    fn check(&self, graph: &RegionGraph, witness: &Witness) -> Result<(), Rejected> {
+        self.boxes.check(graph, witness)
     }
 }
 
@@ -114,14 +141,35 @@ impl RegionGraph {
         RegionGraph::new(&regions, openings, Arc::new(Boxes(BoxGrid::new(boxes))))
     }
 
-    /// The regions of a scene that is a tiling of boxes. An opening is as the tiling
-    /// has it, flat: the wall about it has a thickness, so less is seen through it.
+    /// The regions of a scene that is a tiling of boxes whose borders, but for the
+    /// openings, lie in solid items. An opening is as the tiling has it, flat: the wall
+    /// about it has a thickness, so less is seen through it.
     ///
     /// # Errors
     /// A scene whose regions are not a tiling.
     pub fn of_scene(scene: &Scene) -> Result<RegionGraph, NoRegions> {
         match &scene.regions {
-            Regions::Tiling(tiling) => Ok(RegionGraph::of_tiling(tiling, scene.origin)),
+            Regions::Tiling(tiling) => {
+                let mut graph = RegionGraph::of_tiling(tiling, scene.origin);
+                let boxes = BoxGrid::new(graph.parts.clone());
+                // What is strictly within one box closes no border.
+                let closes = |item: &WorldBox| {
+                    let mut within = false;
+                    boxes.meeting(item, |id| {
+                        let b = &boxes.boxes()[id as usize];
+                        within |= b.min.cmplt(item.min).all() && item.max.cmplt(b.max).all();
+                    });
+                    !within
+                };
+                let world = scene.items.iter().map(|item| {
+                    let (min, max) = item.in_world(scene.origin);
+                    WorldBox::new(min, max)
+                });
+                let borders = BoxGrid::new(world.filter(closes).collect());
+                let boxes = Boxes(boxes);
+                graph.ground = Arc::new(Rooms { boxes, borders });
+                Ok(graph)
+            }
             other => Err(NoRegions(other.kind())),
         }
     }

@@ -14,22 +14,28 @@
 mod answer;
 mod audit;
 pub mod doom;
+<<<<<<< HEAD
 pub mod flood;
+=======
+mod flood;
+mod free_space;
+>>>>>>> region
 mod graph;
 mod items;
 mod locate;
 mod none;
 mod opening;
-pub mod portal_clip;
-pub mod portal_rect;
+mod portal_clip;
+mod portal_rect;
 mod pvs;
 mod rooms;
 mod stab;
-pub mod stored;
+mod stored;
 mod view;
 mod walk;
 mod witness;
 
+use crate::visibility::Guarantee;
 pub use answer::{EyePlace, Marks, RegionId, RegionRow, Scratch, decode};
 pub use audit::{Audit, OtherRegions, audit};
 pub use flood::Flood;
@@ -46,5 +52,34 @@ pub use stab::{Stabbing, turn};
 pub use stored::StoredPvs;
 pub use walk::{follow_boxes, seen_by_samples};
 pub use witness::{ProvenPvs, Rejected, Witness, check_boxes};
+
+/// The back ends of the region stage: name, one line of what it does, what it
+/// promises of its answers from an eye.
+pub const ROWS: [(&str, &str, Guarantee); 7] = [
+    (none::NAME, none::SUMMARY, none::GUARANTEE),
+    (flood::NAME, flood::SUMMARY, flood::GUARANTEE),
+    (
+        portal_rect::NAME,
+        portal_rect::SUMMARY,
+        portal_rect::GUARANTEE,
+    ),
+    (
+        portal_clip::NAME,
+        portal_clip::SUMMARY,
+        portal_clip::GUARANTEE,
+    ),
+    (stored::NAME, stored::SUMMARY, stored::GUARANTEE),
+    (
+        stored::REJECT_NAME,
+        stored::REJECT_SUMMARY,
+        stored::GUARANTEE,
+    ),
+    (
+        stored::EXACT_NAME,
+        stored::EXACT_SUMMARY,
+        stored::EXACT_GUARANTEE,
+    ),
+];
+
 #[cfg(test)]
 mod tests;

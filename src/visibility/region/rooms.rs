@@ -29,6 +29,7 @@ pub struct RoomsPvs {
     graph: Arc<RegionGraph>,
     pvs: Pvs,
     undecided: Vec<[RegionId; 2]>,
+    rising: Vec<Vec<bool>>,
 }
 
 /// Openings for which there is no exact search.
@@ -66,8 +67,13 @@ const fn sign_of(i: usize, bit: usize) -> i32 {
 struct Search<'a> {
     graph: &'a RegionGraph,
     heading: Heading,
+    /// Of a heading that is not level: the regions from which it leads on to an
+    /// opening across z. Where it does not, the level search has found all.
+    rising: &'a [bool],
     stabbing: [Stabbing; 3],
     path: Vec<u32>,
+    /// How many openings of the path lie across z.
+    risen: usize,
 }
 
 impl RoomsPvs {
@@ -83,9 +89,10 @@ impl RoomsPvs {
         }
         let mut pvs = Pvs::alone(graph.len());
         let mut level = pvs.clone();
+        let rising: Vec<Vec<bool>> = HEADINGS.iter().map(|h| rising(&graph, *h)).collect();
         for from in 0..graph.len() as u32 {
-            for heading in HEADINGS {
-                let mut search = Search::new(&graph, heading);
+            for (heading, rising) in HEADINGS.into_iter().zip(&rising) {
+                let mut search = Search::new(&graph, heading, rising);
                 let set = if heading.0[2] == 0 {
                     &mut level
                 } else {
@@ -101,6 +108,7 @@ impl RoomsPvs {
             graph: graph.clone(),
             pvs,
             undecided: Vec::new(),
+            rising,
         };
         for from in 0..graph.len() as u32 {
             rooms.pvs.insert_all(from, level.row(from));
@@ -128,8 +136,8 @@ impl ProvenPvs for RoomsPvs {
 
     fn witness(&self, from: RegionId, to: RegionId) -> Option<Witness> {
         let mut found = None;
-        for heading in HEADINGS {
-            let mut search = Search::new(&self.graph, heading);
+        for (heading, rising) in HEADINGS.into_iter().zip(&self.rising) {
+            let mut search = Search::new(&self.graph, heading, rising);
             search.visit(from, &mut |region, search| {
                 if region == to && found.is_none() {
                     found = search.line_of_sight(from, to);
@@ -145,10 +153,12 @@ impl ProvenPvs for RoomsPvs {
 }
 
 impl<'a> Search<'a> {
-    fn new(graph: &'a RegionGraph, heading: Heading) -> Search<'a> {
+    fn new(graph: &'a RegionGraph, heading: Heading, rising: &'a [bool]) -> Search<'a> {
         Search {
             graph,
             heading,
+            rising,
+            risen: 0,
             stabbing: Default::default(),
             path: Vec::new(),
         }
@@ -157,7 +167,11 @@ impl<'a> Search<'a> {
     /// Calls `reached` with each region that a line of the heading reaches, until it
     /// says that it is enough.
     fn visit(&mut self, at: RegionId, reached: &mut dyn FnMut(RegionId, &Search) -> bool) -> bool {
-        if reached(at, self) {
+        let is_level = self.heading.0[2] == 0;
+        if !is_level && self.risen == 0 && !self.rising[at as usize] {
+            return false;
+        }
+        if (is_level || self.risen > 0) && reached(at, self) {
             return true;
         }
         let graph = self.graph;
@@ -172,7 +186,9 @@ impl<'a> Search<'a> {
                 continue;
             }
             if self.push(exit) {
+                self.risen += usize::from(axis == 2);
                 let enough = self.visit(opening.other(at), reached);
+                self.risen -= usize::from(axis == 2);
                 self.pop();
                 if enough {
                     return true;
@@ -291,9 +307,13 @@ impl<'a> Search<'a> {
         for line in heights.passing_lines() {
             (0..3).for_each(|k| sum[k] += line[k]);
         }
-        let (slope, base) = (-sum[0] / sum[1], -sum[2] / sum[1]);
-        let at = |t: f64| (foot + direction * t).extend(base + slope * t);
-        let line = (at(0.0), at(1.0) - at(0.0));
+        // The line over that of the plan: how far along it, and how high.
+        let [a, b, c] = sum.map(|v| v / libm::hypot(sum[0], sum[1]));
+        let (start, onward) = (DVec2::new(-a * c, -b * c), DVec2::new(b, -a));
+        let line = (
+            (foot + direction * start.x).extend(start.y),
+            (direction * onward.x).extend(onward.y),
+        );
         // Half way between where the line enters or leaves the region and the opening.
         let passing = |exit: u32| {
             let OpeningPlane::Axis { axis, at } = self.graph.openings()[exit as usize].plane else {
@@ -321,6 +341,40 @@ impl<'a> Search<'a> {
             ends: [end(from, first, false), end(to, last, true)],
         })
     }
+}
+
+/// The regions from which a line of the heading can come to an opening across z, by
+/// way of openings that are passed in its direction.
+fn rising(graph: &RegionGraph, heading: Heading) -> Vec<bool> {
+    let mut leads = vec![false; graph.len()];
+    let onward = |opening: &Opening| match opening.plane {
+        // From the region behind towards larger coordinates.
+        OpeningPlane::Axis { axis, .. } => match heading.0[axis] {
+            1 => Some((axis, opening.sides[1], opening.sides[0])),
+            -1 => Some((axis, opening.sides[0], opening.sides[1])),
+            _ => None,
+        },
+        _ => None,
+    };
+    let mut open = Vec::new();
+    for opening in graph.openings() {
+        if let Some((2, from, _)) = onward(opening)
+            && !std::mem::replace(&mut leads[from as usize], true)
+        {
+            open.push(from);
+        }
+    }
+    while let Some(at) = open.pop() {
+        for &exit in graph.exits(at) {
+            if let Some((_, from, to)) = onward(&graph.openings()[exit as usize])
+                && to == at
+                && !std::mem::replace(&mut leads[from as usize], true)
+            {
+                open.push(from);
+            }
+        }
+    }
+    leads
 }
 
 fn bounds(opening: &Opening) -> (DVec3, DVec3) {

@@ -37,14 +37,16 @@ pub struct Stabbing {
 
 impl Stabbing {
     /// Adds an opening; `false`, and nothing is added, if no line passes all of them
-    /// strictly between their ends. O(k) to O(k^3) for k openings.
+    /// strictly between their ends. O(k) to O(k^2) for k openings.
     pub fn push(&mut self, left: DVec2, right: DVec2) -> bool {
         self.lefts.push(left);
         self.rights.push(right);
+        // There is one such line. If it is another than before, it goes through one of
+        // the new points.
         let last = self.extreme.last().copied();
         let found = last.filter(|pair| self.is_extreme(*pair)).or_else(|| {
-            let count = self.lefts.len();
-            let pairs = (0..count).flat_map(|r| (0..count).map(move |l| [r, l]));
+            let new = self.lefts.len() - 1;
+            let pairs = (0..=new).flat_map(|old| [[new, old], [old, new]]);
             pairs.into_iter().find(|pair| self.is_extreme(*pair))
         });
         match found {
@@ -103,9 +105,11 @@ impl Stabbing {
 
     /// Coefficients (a, b, c) of lines a x + b y + c that the openings let pass, at
     /// least weakly, above zero on the left: a positive combination of them is
-    /// strictly inside, but for rounding.
+    /// strictly inside, but for rounding. There is at least one opening.
     pub fn passing_lines(&self) -> Vec<[f64; 3]> {
-        if let ([left], [right]) = (&self.lefts[..], &self.rights[..]) {
+        let (left, right) = (self.lefts[0], self.rights[0]);
+        let same = |all: &[DVec2], one: DVec2| all.iter().all(|p| *p == one);
+        if same(&self.lefts, left) && same(&self.rights, right) {
             // Across a single opening, towards larger x rather than straight up.
             let v = left - right;
             let d = DVec2::new(v.y + v.x.abs(), -v.x).normalize();

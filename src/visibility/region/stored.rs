@@ -12,6 +12,8 @@ use crate::visibility::{Guarantee, Rays};
 pub const NAME: &str = "stored-pvs";
 /// One line of what it does.
 pub const SUMMARY: &str = "the row of the eye's region in a set of pairs read from a file";
+/// What a claim promises: nothing.
+pub const GUARANTEE: Guarantee = Guarantee::Unproven;
 /// As the row is typed that reads a Doom map's REJECT table.
 pub const REJECT_NAME: &str = "reject";
 /// One line of what it does.
@@ -20,6 +22,8 @@ pub const REJECT_SUMMARY: &str = "the row of the eye's sector in the map's REJEC
 pub const EXACT_NAME: &str = "exact-pvs";
 /// One line of what it does.
 pub const EXACT_SUMMARY: &str = "regions seen from anywhere in the eye's region, exactly";
+/// What it promises: nothing that is seen through the inside of openings is missing.
+pub const EXACT_GUARANTEE: Guarantee = Guarantee::Conservative;
 
 /// The row.
 #[derive(Clone, Debug)]
@@ -38,12 +42,12 @@ impl StoredPvs {
     /// A claim: nothing is promised of it. `None` if it is of another number of
     /// regions.
     pub fn claim(graph: Arc<RegionGraph>, pvs: Arc<Pvs>) -> Option<StoredPvs> {
-        StoredPvs::of(graph, pvs, NAME, SUMMARY, Guarantee::Unproven)
+        StoredPvs::of(graph, pvs, NAME, SUMMARY, GUARANTEE)
     }
 
     /// The same of a REJECT table.
     pub fn reject(graph: Arc<RegionGraph>, pvs: Arc<Pvs>) -> Option<StoredPvs> {
-        StoredPvs::of(graph, pvs, REJECT_NAME, REJECT_SUMMARY, Guarantee::Unproven)
+        StoredPvs::of(graph, pvs, REJECT_NAME, REJECT_SUMMARY, GUARANTEE)
     }
 
     /// What an exact search has found. It promises no region missing that is seen

@@ -15,20 +15,56 @@ use crate::visibility::Ray;
 /// Coordinates of witnesses are whole multiples of 2^-20 map units.
 pub(super) const UNITS: f64 = (1 << 20) as f64;
 
+/// The height, seen from above, of a strip of the map that lists its linedefs.
+const STRIP: f64 = 64.0;
+
 /// The ground of a map.
 #[derive(Debug)]
-pub(super) struct SectorGround(pub Arc<DoomMap>);
+pub(super) struct SectorGround {
+    map: Arc<DoomMap>,
+    /// The linedefs that meet each strip, from the least y on.
+    strips: Vec<Vec<MapLine>>,
+    low: f64,
+}
 
 fn plan([x, y]: [i32; 2]) -> DVec2 {
     DVec2::new(x.into(), y.into())
 }
 
 impl SectorGround {
+    /// Sorts the linedefs into strips. O(linedefs * strips that each meets).
+    pub fn new(map: Arc<DoomMap>) -> SectorGround {
+        let ends = || {
+            map.lines
+                .iter()
+                .flat_map(|line| line.ends)
+                .map(|[_, y]| f64::from(y))
+        };
+        let (low, high) = (ends().fold(0.0, f64::min), ends().fold(0.0, f64::max));
+        let mut ground = SectorGround {
+            strips: vec![Vec::new(); ((high - low) / STRIP) as usize + 1],
+            map: map.clone(),
+            low,
+        };
+        for line in &map.lines {
+            let [a, b] = line.ends.map(|[_, y]| ground.strip(y.into()));
+            for strip in a.min(b)..=a.max(b) {
+                ground.strips[strip].push(*line);
+            }
+        }
+        ground
+    }
+
+    /// Monotone in y; what is beyond the map has the first or the last.
+    fn strip(&self, y: f64) -> usize {
+        (((y - self.low) / STRIP) as usize).min(self.strips.len() - 1)
+    }
+
     /// The sector of a point: what the first linedef towards larger x has on this
-    /// side. O(linedefs).
+    /// side. O(linedefs of its strip).
     fn sector_at(&self, p: DVec2) -> Option<RegionId> {
         let (mut nearest, mut found) = (f64::INFINITY, None);
-        for line in &self.0.lines {
+        for line in &self.strips[self.strip(p.y)] {
             let [a, b] = line.ends.map(plan);
             if (a.y <= p.y) == (b.y <= p.y) {
                 continue;
@@ -67,7 +103,8 @@ impl Ground for SectorGround {
     fn regions_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) -> bool {
         let mut inside = true;
         let first = out.len();
-        for line in self.0.lines.iter().filter(|line| meets(line, b)) {
+        let strips = &self.strips[self.strip(b.min.y)..=self.strip(b.max.y)];
+        for line in strips.iter().flatten().filter(|line| meets(line, b)) {
             inside &= line.sectors[1].is_some();
             out.extend(line.sectors.iter().flatten());
         }
@@ -78,7 +115,7 @@ impl Ground for SectorGround {
         // Below a floor or above a ceiling is nowhere.
         inside
             && out[first..].iter().all(|&sector| {
-                let sector = &self.0.sectors[sector as usize];
+                let sector = &self.map.sectors[sector as usize];
                 sector.floor <= b.min.z && b.max.z <= sector.ceiling
             })
     }
@@ -90,7 +127,7 @@ impl Ground for SectorGround {
         };
         let (o, d) = (ray.origin.truncate(), ray.direction.truncate());
         let mut crossings = Vec::new();
-        for line in &self.0.lines {
+        for line in &self.map.lines {
             let [a, b] = line.ends.map(plan);
             let (sa, sb) = (d.perp_dot(a - o), d.perp_dot(b - o));
             if (sa < 0.0) == (sb < 0.0) {
@@ -106,7 +143,7 @@ impl Ground for SectorGround {
         seen.insert(sector);
         for (t, line, to_right) in crossings {
             let z = ray.origin.z + ray.direction.z * t;
-            let here = &self.0.sectors[sector as usize];
+            let here = &self.map.sectors[sector as usize];
             let (Some([low, high]), true) = (line.open, here.floor <= z && z <= here.ceiling)
             else {
                 return;
@@ -136,7 +173,7 @@ impl Ground for SectorGround {
                 }
                 ends[i][axis] = units as i128;
             }
-            if whole_sector_at(&self.0.lines, ends[i]) != Some(witness.regions[i]) {
+            if whole_sector_at(&self.map.lines, ends[i]) != Some(witness.regions[i]) {
                 return Err(Rejected::End(i));
             }
         }
@@ -146,7 +183,7 @@ impl Ground for SectorGround {
             let apart = side(a, b, c) * side(a, b, d) > 0 || side(c, d, a) * side(c, d, b) > 0;
             line.open.is_none() && !apart
         };
-        match self.0.lines.iter().find(blocks) {
+        match self.map.lines.iter().find(blocks) {
             Some(line) => {
                 let region = line.sectors[0].or(line.sectors[1]);
                 Err(Rejected::Blocked(region.unwrap_or_default()))

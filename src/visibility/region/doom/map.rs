@@ -165,6 +165,22 @@ impl DoomMap {
         self.reject.as_ref()
     }
 
+    /// The same map with all heights left out: each linedef of two sides is open, as
+    /// builders of REJECT tables take it.
+    pub fn without_heights(&self) -> DoomMap {
+        let mut map = self.clone();
+        for line in &mut map.lines {
+            if let [Some(_), Some(_)] = line.sectors {
+                line.open = Some([-HIGHEST, HIGHEST]);
+            }
+        }
+        map.sectors.fill(Sector {
+            floor: -HIGHEST,
+            ceiling: HIGHEST,
+        });
+        map
+    }
+
     /// Sectors as regions, linedefs that are open as openings. A sector's parts have
     /// all heights.
     pub fn graph(self: &Arc<Self>) -> RegionGraph {
@@ -186,7 +202,7 @@ impl DoomMap {
             })
         };
         let openings = self.lines.iter().filter_map(opening).collect();
-        let ground = Arc::new(SectorGround(self.clone()));
+        let ground = Arc::new(SectorGround::new(self.clone()));
         RegionGraph::new(&self.parts, openings, ground)
     }
 }

@@ -15,10 +15,10 @@ use std::sync::Arc;
 use glam::DVec2;
 
 use super::super::answer::{RegionId, decode};
-use super::super::graph::{Ground, RegionGraph};
+use super::super::graph::RegionGraph;
 use super::super::pvs::Pvs;
 use super::super::witness::{ProvenPvs, Witness};
-use super::ground::{SectorGround, on_grid};
+use super::ground::on_grid;
 use super::map::{DoomMap, MapLine};
 use super::sweep::{Sweep, Whole, cross};
 
@@ -40,6 +40,8 @@ pub struct SectorPvs {
     found: Vec<Option<Found>>,
     undecided: Vec<[RegionId; 2]>,
     crossings: usize,
+    /// The runs that were marked last: neighbouring lines mostly see the same.
+    marked: [Vec<u64>; 2],
 }
 
 impl SectorPvs {
@@ -60,6 +62,7 @@ impl SectorPvs {
             pvs: Pvs::alone(sectors),
             found: vec![None; sectors * sectors],
             undecided: Vec::new(),
+            marked: Default::default(),
             map: map.clone(),
             graph,
         };
@@ -131,6 +134,12 @@ impl SectorPvs {
 
     /// All sectors of a run see each other.
     fn mark(&mut self, run: &[u64], found: Found) {
+        let last = &mut self.marked[usize::from(found.is_left)];
+        if last == run {
+            return;
+        }
+        last.clear();
+        last.extend_from_slice(run);
         let mut members = Vec::new();
         decode(run, &mut members);
         for &from in &members {
@@ -182,7 +191,6 @@ impl ProvenPvs for SectorPvs {
     /// The line is moved aside by less and less until a segment of it is accepted.
     fn witness(&self, from: RegionId, to: RegionId) -> Option<Witness> {
         let found = self.found[from as usize * self.pvs.len() + to as usize]?;
-        let ground = SectorGround(self.map.clone());
         let [vertex, direction] =
             [found.vertex, found.direction].map(|v| DVec2::new(v[0] as f64, v[1] as f64));
         let direction = direction.normalize();
@@ -198,7 +206,7 @@ impl ProvenPvs for SectorPvs {
                 regions: [from, to],
                 ends: ends.map(|end| on_grid(end, 0.0)),
             };
-            ground.check(&self.graph, &witness).ok().map(|()| witness)
+            self.graph.check_witness(&witness).ok().map(|()| witness)
         })
     }
 }

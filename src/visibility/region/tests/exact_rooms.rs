@@ -55,12 +55,8 @@ fn each_pair_has_a_witness_and_rays_find_no_other() {
             "{world}: {n} rooms, {} pairs, {open} undecided",
             pvs.pairs()
         );
-        // Between storeys a few pairs stay open.
-        assert!(
-            open * 20 < pvs.pairs(),
-            "{world}: {open} of {}",
-            pvs.pairs()
-        );
+        // Even between storeys, though nothing promises it there.
+        assert_eq!(open, 0, "{world}");
     }
 }
 

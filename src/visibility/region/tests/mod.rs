@@ -2,5 +2,8 @@
 
 mod exact_doom;
 mod exact_rooms;
+mod free_space;
 mod from_eye;
+mod items;
+mod stress;
 mod worlds;

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::super::{Marks, Pvs, RegionGraph};
 use crate::camera::{Camera, Frame, Lens};
-use crate::scene::{self, Scene, SeededRng};
+use crate::scene::{self, Scene, SeededRng, WorldBox};
 use crate::visibility::{Ray, Rays};
 
 pub fn rooms(spec: &str) -> (Scene, Arc<RegionGraph>) {
@@ -58,7 +58,27 @@ pub fn joined_by_rays(graph: &RegionGraph, rays: usize, seed: u64) -> Pvs {
         seen.clear(graph.len());
         graph.ground().follow(graph, &ray, &mut seen);
         seen.list(&mut list);
-        list.iter().for_each(|&to| pvs.insert(from, to));
+        // All of one ray see each other.
+        for &a in &list {
+            list.iter().for_each(|&b| pvs.insert(a, b));
+        }
     }
     pvs
+}
+
+/// The first solid that a ray enters, or none.
+pub fn first_hit(solids: &[WorldBox], ray: &Ray) -> Option<u32> {
+    let enters = |b: &WorldBox| {
+        let inverse = ray.direction.recip();
+        let (a, b) = (
+            (b.min - ray.origin) * inverse,
+            (b.max - ray.origin) * inverse,
+        );
+        let (near, far) = (a.min(b).max_element(), a.max(b).min_element());
+        (near <= far && near >= ray.near && near <= ray.far).then_some(near)
+    };
+    let hits = (0..)
+        .zip(solids)
+        .filter_map(|(id, b)| Some((enters(b)?, id)));
+    hits.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, id)| id)
 }
