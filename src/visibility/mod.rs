@@ -4,6 +4,7 @@
 //! `truth`. It knows scenes and cameras, not how anything is timed or shown.
 
 mod guarantee;
+pub mod inscribed;
 pub mod meshes;
 mod rays;
 mod solids;
