@@ -28,22 +28,31 @@ pub const CELLS: usize = 24;
 /// Half the lengths by which a box shrinks when its proof fails: some tries.
 const TRIES: usize = 4;
 
-/// A large axis-parallel box inside an item, by a grid of `cells` (4 to 64) along
-/// each axis: the largest box of whole cells. `None` for an item that is not opaque,
+/// A large axis-parallel box inside an item: of each of its pieces the largest box of
+/// whole cells, by a grid of `cells` (4 to 64) along each axis, and of these the
+/// largest. `None` for an item that is not opaque,
 /// one-sided and closed, or where no box was found. O(t + cells⁴).
 pub fn inscribed_box(surfaces: &Surfaces, item: usize, cells: usize) -> Option<Inscribed> {
     let is_solid = surfaces.kinds[item] == SurfaceKind::Opaque && !surfaces.two_sided[item];
     if !is_solid || surfaces.of_item[item].is_empty() || surfaces.open_edges(item) != 0 {
         return None;
     }
-    let grid = Grid::of(surfaces, item, cells.clamp(4, 64));
+    let inner = parts(surfaces, item)
+        .iter()
+        .filter_map(|part| box_in(part, cells.clamp(4, 64)))
+        .max_by(|a, b| volume(a).total_cmp(&volume(b)))?;
+    let share = volume(&inner) / surfaces.volume(item);
+    Some(Inscribed { inner, share })
+}
+
+/// A large box in a closed surface in one piece.
+fn box_in(part: &[[Vec3; 3]], cells: usize) -> Option<Aabb> {
+    let grid = Grid::of(part, cells);
     let [low, high] = grid.largest_box()?;
     let mut inner = Aabb::new(grid.corner(low), grid.corner(high));
     for _ in 0..TRIES {
-        if !inner.is_empty() && is_inside(surfaces, item, &inner) {
-            let size = inner.max.as_dvec3() - inner.min.as_dvec3();
-            let share = size.x * size.y * size.z / surfaces.volume(item);
-            return Some(Inscribed { inner, share });
+        if !inner.is_empty() && is_in(part, &inner) {
+            return Some(inner);
         }
         // Not proven: a little smaller.
         let less = inner.extent() / 8.0;
@@ -52,17 +61,59 @@ pub fn inscribed_box(surfaces: &Surfaces, item: usize, cells: usize) -> Option<I
     None
 }
 
+fn volume(b: &Aabb) -> f64 {
+    let size = b.max.as_dvec3() - b.min.as_dvec3();
+    size.x * size.y * size.z
+}
+
+/// The triangles of an item, apart where they have no point in common: pieces of a
+/// closed surface are closed, and may overlap.
+fn parts(surfaces: &Surfaces, item: usize) -> Vec<Vec<[Vec3; 3]>> {
+    let triangles = &surfaces.triangles[surfaces.range(item)];
+    let points = triangles.iter().flatten().copied();
+    let (low, high) = points.fold((u32::MAX, 0), |(low, high), p| (low.min(p), high.max(p)));
+    // Union and find by halving paths; the lowest point stands for its piece.
+    let mut parent: Vec<u32> = (0..=high - low).collect();
+    fn root(parent: &mut [u32], mut at: u32) -> u32 {
+        while parent[at as usize] != at {
+            parent[at as usize] = parent[parent[at as usize] as usize];
+            at = parent[at as usize];
+        }
+        at
+    }
+    for [a, b, c] in triangles {
+        for other in [b, c] {
+            let [a, b] = [a, other].map(|p| root(&mut parent, p - low));
+            parent[a.max(b) as usize] = a.min(b);
+        }
+    }
+    let mut parts: Vec<(u32, Vec<[Vec3; 3]>)> = Vec::new();
+    for corners in triangles {
+        let piece = root(&mut parent, corners[0] - low);
+        let corners = corners.map(|p| surfaces.points[p as usize]);
+        match parts.iter_mut().rev().find(|(of, _)| *of == piece) {
+            Some((_, part)) => part.push(corners),
+            None => parts.push((piece, vec![corners])),
+        }
+    }
+    parts.into_iter().map(|(_, part)| part).collect()
+}
+
 /// The boxes of all items, in their order; empty where there is none.
 pub fn inner_boxes(surfaces: &Surfaces, cells: usize) -> Vec<Aabb> {
     let inner = |item| inscribed_box(surfaces, item, cells).map_or(Aabb::EMPTY, |b| b.inner);
     (0..surfaces.items()).map(inner).collect()
 }
 
-/// Whether the open box is in the inside of a closed item: exactly.
+/// Whether the open box is in the inside of one piece of a closed item: exactly.
 pub fn is_inside(surfaces: &Surfaces, item: usize, inner: &Aabb) -> bool {
-    let is_apart = surfaces.of(item).all(|corners| is_outside(corners, inner));
+    parts(surfaces, item).iter().any(|part| is_in(part, inner))
+}
+
+fn is_in(part: &[[Vec3; 3]], inner: &Aabb) -> bool {
+    let is_apart = part.iter().all(|corners| is_outside(*corners, inner));
     // All of an open box without a surface in it is inside, or none is.
-    is_apart && winding(surfaces, item, inner).is_some_and(|turns| turns > 0)
+    is_apart && winding(part, inner).is_some_and(|turns| turns > 0)
 }
 
 /// Whether a triangle and an open box have no point in common: exactly, by the
@@ -73,9 +124,11 @@ fn is_outside(corners: [Vec3; 3], b: &Aabb) -> bool {
     if high.cmple(b.min).any() || low.cmpge(b.max).any() {
         return true;
     }
-    let on_plane = [[p, q, r], [p, r, q]]
-        .into_iter()
-        .any(|triangle| (0..8).all(|i| !faces(&Eye::local(b.corner(i).as_dvec3()), triangle)));
+    // Without area there is no plane to be behind.
+    let on_plane = normal(corners) != DVec3::ZERO
+        && [[p, q, r], [p, r, q]]
+            .into_iter()
+            .any(|triangle| (0..8).all(|i| !faces(&Eye::local(b.corner(i).as_dvec3()), triangle)));
     // Edges against the box's axes: a line of the projection along the axis that has
     // the rectangle on one side, the triangle on the other.
     on_plane
@@ -114,21 +167,21 @@ fn turn(a: [f32; 2], b: [f32; 2], c: [f32; 2]) -> i32 {
     (&left - &right).sign()
 }
 
-/// How often a closed item winds around a point in the box: crossings of a ray
+/// How often a closed surface winds around a point in the box: crossings of a ray
 /// upward from it, `None` if every ray that was tried meets an edge.
-fn winding(surfaces: &Surfaces, item: usize, inner: &Aabb) -> Option<i32> {
+fn winding(part: &[[Vec3; 3]], inner: &Aabb) -> Option<i32> {
     let (low, size) = (inner.min.as_dvec3(), inner.extent().as_dvec3());
     // Places of the plane that are unlikely to be those of corners.
     (1..16).find_map(|k| {
-        let part = |step: f64| (0.5 + f64::from(k) * step).fract() * 0.8 + 0.1;
-        let at = DVec3::new(part(0.381_966), part(0.237_512), 0.5);
+        let within = |step: f64| (0.5 + f64::from(k) * step).fract() * 0.8 + 0.1;
+        let at = DVec3::new(within(0.381_966), within(0.237_512), 0.5);
         let from = (low + size * at).as_vec3();
         if !(from.cmpgt(inner.min).all() && from.cmplt(inner.max).all()) {
             return None;
         }
         let eye = Eye::local(from.as_dvec3());
         let mut turns = 0;
-        for [a, b, c] in surfaces.of(item) {
+        for &[a, b, c] in part {
             let (low, high) = (a.min(b).min(c), a.max(b).max(c));
             let is_aside = low.x > from.x || high.x < from.x || low.y > from.y || high.y < from.y;
             if is_aside || high.z < from.z {
@@ -156,7 +209,7 @@ fn winding(surfaces: &Surfaces, item: usize, inner: &Aabb) -> Option<i32> {
     })
 }
 
-/// Cells of an item's bounds: inside or not.
+/// Cells of the bounds of a piece: inside or not.
 struct Grid {
     cells: usize,
     low: DVec3,
@@ -166,17 +219,19 @@ struct Grid {
 }
 
 impl Grid {
-    fn of(surfaces: &Surfaces, item: usize, cells: usize) -> Grid {
-        let bounds = surfaces.bounds(item);
-        let low = bounds.min.as_dvec3();
-        let step = (bounds.max.as_dvec3() - low) / cells as f64;
+    fn of(part: &[[Vec3; 3]], cells: usize) -> Grid {
+        let points = part.iter().flatten();
+        let low = points.clone().fold(Vec3::INFINITY, |low, p| low.min(*p));
+        let high = points.fold(Vec3::NEG_INFINITY, |high, p| high.max(*p));
+        let low = low.as_dvec3();
+        let step = (high.as_dvec3() - low) / cells as f64;
         let mut grid = Grid {
             cells,
             low,
             step,
             inside: vec![0; cells * cells],
         };
-        let touched = grid.touched(surfaces, item);
+        let touched = grid.touched(part);
         grid.fill(&touched);
         grid
     }
@@ -189,13 +244,13 @@ impl Grid {
 
     /// Cells that a triangle may enter: those of its bounds on both sides of its
     /// plane, and a little more. (Only a proposal: the proof does not use it.)
-    fn touched(&self, surfaces: &Surfaces, item: usize) -> Vec<u64> {
+    fn touched(&self, part: &[[Vec3; 3]]) -> Vec<u64> {
         let n = self.cells;
         let mut touched = vec![0u64; n * n];
-        for corners in surfaces.of(item) {
+        for corners in part {
             let [a, b, c] = corners.map(Vec3::as_dvec3);
-            let normal = (b - a).cross(c - a);
-            let reach = normal.abs().dot(self.step) * 0.5001;
+            let across = (b - a).cross(c - a);
+            let reach = across.abs().dot(self.step) * 0.5001;
             let cell = |p: DVec3, slack: f64| {
                 let at = (p - self.low) / self.step + slack;
                 at.to_array().map(|x| (x.max(0.0) as usize).min(n - 1))
@@ -207,7 +262,7 @@ impl Grid {
                     for x in first[0]..=last[0] {
                         let at = DVec3::new(x as f64, y as f64, z as f64) + 0.5;
                         let centre = self.low + self.step * at;
-                        if normal.dot(centre - a).abs() <= reach {
+                        if across.dot(centre - a).abs() <= reach {
                             touched[z * n + y] |= 1 << x;
                         }
                     }
