@@ -5,6 +5,7 @@
 
 pub mod fragment;
 mod guarantee;
+pub mod inscribed;
 mod level;
 pub mod meshes;
 pub mod occlusion;

@@ -42,9 +42,16 @@ impl ConeBlock {
 impl ConeRows for ConeBlock {
     #[inline(always)]
     fn rows<I: Isa>(&self, isa: I) -> [I::Floats; 7] {
-        let [x, y, z] = &self.apex;
-        let [a, b, c] = &self.axis;
-        [x, y, z, a, b, c, &self.square].map(|row| isa.load(row))
+        // One by one: a closure would be compiled for the portable set.
+        [
+            isa.load(&self.apex[0]),
+            isa.load(&self.apex[1]),
+            isa.load(&self.apex[2]),
+            isa.load(&self.axis[0]),
+            isa.load(&self.axis[1]),
+            isa.load(&self.axis[2]),
+            isa.load(&self.square),
+        ]
     }
 }
 
@@ -57,13 +64,16 @@ pub fn rejected<I: Isa, B: ConeRows>(isa: I, block: &B, view: &Broadcast<I>) -> 
         true => [ex, ey, ez],
         false => [isa.add(x, ex), isa.add(y, ey), isa.add(z, ez)],
     };
-    let dot = |p: [I::Floats; 3]| {
-        let [p, q, r] = [isa.mul(x, p[0]), isa.mul(y, p[1]), isa.mul(z, p[2])];
-        isa.add(isa.add(p, q), r)
-    };
-    let t = isa.add(dot([a, b, c]), view.minus_margin);
-    let needed = isa.mul(square, dot([x, y, z]));
+    let way = [x, y, z];
+    let t = isa.add(dot(isa, way, [a, b, c]), view.minus_margin);
+    let needed = isa.mul(square, dot(isa, way, way));
     isa.at_most(view.zero, t) & isa.at_most(needed, isa.mul(t, t))
+}
+
+#[inline(always)]
+fn dot<I: Isa>(isa: I, [x, y, z]: [I::Floats; 3], [a, b, c]: [I::Floats; 3]) -> I::Floats {
+    let xy = isa.add(isa.mul(x, a), isa.mul(y, b));
+    isa.add(xy, isa.mul(z, c))
 }
 
 /// A view in all lanes.
@@ -80,7 +90,11 @@ impl<I: Isa> Broadcast<I> {
     #[inline(always)]
     pub fn of(isa: I, view: &Prepared) -> Broadcast<I> {
         Broadcast {
-            minus_eye: view.minus_eye.map(|x| isa.splat(x)),
+            minus_eye: [
+                isa.splat(view.minus_eye[0]),
+                isa.splat(view.minus_eye[1]),
+                isa.splat(view.minus_eye[2]),
+            ],
             minus_margin: isa.splat(view.minus_margin),
             zero: isa.splat(0.0),
             is_parallel: view.is_parallel,
@@ -142,12 +156,40 @@ impl<B: ConeRows> Work for Clear<'_, B> {
     fn run<I: Isa>(self, isa: I) {
         let view = Broadcast::of(isa, self.view);
         for (block, words) in self.blocks.iter().zip(self.words.chunks_mut(LANES)) {
-            let mut gone = rejected(isa, block, &view);
-            while gone != 0 {
-                // Lanes beyond the last cluster never reject.
-                words[gone.trailing_zeros() as usize] = 0;
-                gone &= gone - 1;
+            let gone = rejected(isa, block, &view);
+            clear(words, gone, &[u64::MAX; LANES]);
+        }
+    }
+}
+
+/// All ones in the places of the bits of a number below 16.
+const SPREAD: [[u64; 4]; 16] = {
+    let mut spread = [[0; 4]; 16];
+    let mut bits = 0;
+    while bits < 16 {
+        let mut lane = 0;
+        while lane < 4 {
+            if bits >> lane & 1 == 1 {
+                spread[bits][lane] = u64::MAX;
             }
+            lane += 1;
+        }
+        bits += 1;
+    }
+    spread
+};
+
+/// Takes `triangles` out of the words of the lanes that are gone, without a branch a
+/// lane. Lanes beyond the last cluster are never gone.
+#[inline(always)]
+pub fn clear(words: &mut [u64], gone: LaneMask, triangles: &[u64; LANES]) {
+    if gone == 0 {
+        return;
+    }
+    for (part, (words, own)) in words.chunks_mut(4).zip(triangles.chunks(4)).enumerate() {
+        let spread = &SPREAD[usize::from(gone >> (4 * part)) & 15];
+        for (lane, word) in words.iter_mut().enumerate() {
+            *word &= !(spread[lane] & own[lane]);
         }
     }
 }

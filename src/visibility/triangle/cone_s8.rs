@@ -40,16 +40,40 @@ struct ByteBlock {
 impl ConeRows for ByteBlock {
     #[inline(always)]
     fn rows<I: Isa>(&self, isa: I) -> [I::Floats; 7] {
-        const UNIT: f32 = 1.0 / STEPS as f32;
-        let [x, y, z] = &self.apex;
-        let [a, b, c] = self.axis.map(|row| row.map(|q| f32::from(q) * UNIT));
-        // At most 16 bits before scaling: exact.
-        let square = self.sine.map(|q| {
-            let sine = f32::from(q) * UNIT;
-            sine * sine
-        });
-        [x, y, z, &a, &b, &c, &square].map(|row| isa.load(row))
+        // One by one: a closure would be compiled for the portable set.
+        [
+            isa.load(&self.apex[0]),
+            isa.load(&self.apex[1]),
+            isa.load(&self.apex[2]),
+            isa.load(&decoded(&self.axis[0])),
+            isa.load(&decoded(&self.axis[1])),
+            isa.load(&decoded(&self.axis[2])),
+            isa.load(&squares(&self.sine)),
+        ]
     }
+}
+
+/// The unit of the stored numbers.
+const UNIT: f32 = 1.0 / STEPS as f32;
+
+#[inline(always)]
+fn decoded(row: &[i8; LANES]) -> [f32; LANES] {
+    let mut out = [0.0; LANES];
+    for lane in 0..LANES {
+        out[lane] = f32::from(row[lane]) * UNIT;
+    }
+    out
+}
+
+/// At most 16 bits before scaling: exact.
+#[inline(always)]
+fn squares(row: &[u8; LANES]) -> [f32; LANES] {
+    let mut out = [0.0; LANES];
+    for lane in 0..LANES {
+        let sine = f32::from(row[lane]) * UNIT;
+        out[lane] = sine * sine;
+    }
+    out
 }
 
 /// The axis in whole steps; at most 127 each, so shorter than 1.

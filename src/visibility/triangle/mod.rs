@@ -10,6 +10,7 @@ mod cone_safe;
 mod contract;
 mod exact;
 mod eye;
+mod locals;
 mod masks;
 #[cfg(feature = "peers")]
 mod meshopt;
@@ -31,7 +32,7 @@ pub use cone_f32::PlainCones;
 pub use cone_s8::ByteCones;
 pub use cone_safe::SafeCones;
 pub use contract::{Criterion, TriangleCull, TriangleRow};
-pub use exact::faces;
+pub use exact::{faces, normal};
 pub use eye::Eye;
 #[cfg(feature = "peers")]
 pub use meshopt::MeshoptCones;

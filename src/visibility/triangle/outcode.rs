@@ -1,17 +1,15 @@
 //! Triangles wholly outside one plane of the view: outcodes as clipping computes
 //! them (Sproull and Sutherland 1968). What crosses the near plane is kept.
 
-use std::sync::Arc;
-
 use glam::Vec3;
 
 use super::super::guarantee::Guarantee;
-use super::clusters::Clusters;
 use super::contract::{Criterion, TriangleCull, TriangleRow};
+use super::locals::Locals;
 use super::screen::Screen;
 use super::selection::Selection;
 use super::view::View;
-use crate::kernel::Kernel;
+use crate::kernel::{Isa, Kernel, Work};
 
 /// The row of this file.
 pub const ROW: TriangleRow = TriangleRow {
@@ -19,7 +17,7 @@ pub const ROW: TriangleRow = TriangleRow {
     summary: "Drops what has all corners outside one of the six planes of the view",
     guarantee: Guarantee::Conservative,
     criterion: Criterion::Window,
-    build: |clusters| Box::new(Outcodes(clusters.clone())),
+    build: |clusters| Box::new(Outcodes(Locals::of(clusters))),
 };
 
 named! {
@@ -57,25 +55,39 @@ pub fn clipping(screen: &Screen, corners: [Vec3; 3], band: f64) -> Clipping {
     }
 }
 
-struct Outcodes(Arc<Clusters>);
+struct Outcodes(Locals);
 
 impl TriangleCull for Outcodes {
-    fn cull(&self, view: &View, _: Kernel, kept: &mut Selection) {
-        let Some(screen) = Screen::of(view) else {
-            return;
-        };
-        let clusters = &*self.0;
-        kept.retain(|cluster, bit| {
-            let corners = clusters
-                .surfaces
-                .corners(clusters.triangles_of(cluster)[bit]);
-            let [a, b, c] = corners.map(|p| screen.outcode(p));
-            a & b & c == 0
-        });
+    fn cull(&self, view: &View, kernel: Kernel, kept: &mut Selection) {
+        if let Some(screen) = Screen::of(view) {
+            let locals = &self.0;
+            kernel.run(Query {
+                locals,
+                screen,
+                kept,
+            });
+        }
     }
 
     fn bytes(&self) -> usize {
-        let surfaces = &self.0.surfaces;
-        size_of_val(&surfaces.points[..]) + size_of_val(&surfaces.triangles[..])
+        self.0.bytes()
+    }
+}
+
+struct Query<'a> {
+    locals: &'a Locals,
+    screen: Screen,
+    kept: &'a mut Selection,
+}
+
+impl Work for Query<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Isa>(self, _: I) {
+        let screen = &self.screen;
+        let code = |p: Vec3| screen.outcode(p);
+        self.locals
+            .retain(self.kept, code, |[a, b, c]| a & b & c == 0);
     }
 }

@@ -1,92 +1,106 @@
-//! Every triangle for itself, exactly: its plane in f64 with a bound on its error,
-//! and expansions where that does not decide.
+//! Every triangle for itself, exactly: sixteen planes at a time in f32 with a bound
+//! on the error, and the exact test where that does not decide.
+//!
+//! Normals are scaled so that their largest component is about 1. Let u = 2^-24, E
+//! the error of the f32 eye. The way from corner to eye is off by E and u of itself,
+//! a normal's component by u, three products and two sums by 3.01 u: together the
+//! side is off by at most 1.75 E + 5.1 u |way|, where |way| adds components and 1.75
+//! is above the root of three. The bound takes 8 u, for its own rounding (5 u of it).
 
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::DVec3;
 
 use super::super::guarantee::Guarantee;
-use super::clusters::{Clusters, MOST_TRIANGLES};
+use super::clusters::Clusters;
 use super::contract::{Criterion, TriangleCull, TriangleRow};
 use super::exact::{faces, normal};
 use super::eye::Eye;
 use super::selection::Selection;
 use super::view::View;
+use crate::arithmetic::rounding::round_up;
 use crate::kernel::{Isa, Kernel, LANES, Work};
 
 /// The row of this file.
 pub const ROW: TriangleRow = TriangleRow {
     name: "per-triangle",
-    summary: "The side of each triangle's plane, exactly (f64, then expansions)",
+    summary: "The side of each triangle's plane, exactly (f32, f64, then expansions)",
     guarantee: Guarantee::Exact,
     criterion: Criterion::Facing,
     build,
 };
 
-/// Error of the plane test per unit of |n| times the length of the way from corner
-/// to eye, components added. The normal: 2^-50. The way: one rounding of 2^-53. A
-/// product and two sums: three. Together below 2^-50 + 4 * 2^-53 and terms of second
-/// order, 1.5 * 2^-50; 2^-48 is above twice that.
-const ERROR: f64 = 1.0 / (1u64 << 48) as f64;
+/// Error per unit of the way: see above.
+const ERROR: f32 = 8.0 / (1u32 << 24) as f32;
+/// Where sums may overflow.
+const FAR: f32 = (1u64 << 59) as f32;
+/// For what underflows.
+const LEAST: f64 = 1e-30;
 
-/// The planes of 16 triangles, lane by lane.
+/// Sixteen triangles. Without area, or without a triangle, a lane is NaN: never in
+/// front.
 #[derive(Clone, Copy)]
+#[repr(C, align(64))]
 struct Planes {
-    normal: [[f64; LANES]; 3],
+    normal: [[f32; LANES]; 3],
     corner: [[f32; LANES]; 3],
-    /// `ERROR` times the largest component of the normal; negative where a lane is
-    /// to be kept whatever the eye (two-sided).
-    error: [f64; LANES],
 }
-
-/// Sixteen triangles a row, four rows a cluster.
-const ROWS: usize = MOST_TRIANGLES / LANES;
 
 struct PerTriangle {
     clusters: Arc<Clusters>,
-    /// Rows of each cluster; one more at the end.
+    /// Rows of each cluster; one more at the end. None for a two-sided one.
     starts: Vec<u32>,
     planes: Vec<Planes>,
+    /// Whether all corners are near enough for f32.
+    is_near: bool,
 }
 
 fn build(clusters: &Arc<Clusters>) -> Box<dyn TriangleCull> {
+    let empty = Planes {
+        normal: [[f32::NAN; LANES]; 3],
+        corner: [[0.0; LANES]; 3],
+    };
     let mut starts = vec![0];
     let mut planes: Vec<Planes> = Vec::new();
     for cluster in 0..clusters.len() {
-        let is_two_sided = clusters.is_two_sided(cluster);
-        for (bit, corners) in clusters.corners_of(cluster).enumerate() {
-            if bit % LANES == 0 {
-                planes.push(Planes {
-                    normal: [[0.0; LANES]; 3],
-                    corner: [[0.0; LANES]; 3],
-                    error: [0.0; LANES],
-                });
+        if !clusters.is_two_sided(cluster) {
+            for (bit, corners) in clusters.corners_of(cluster).enumerate() {
+                if bit % LANES == 0 {
+                    planes.push(empty);
+                }
+                let n = normal(corners);
+                let row = planes.last_mut().expect("a row was just begun");
+                for k in 0..3 {
+                    if n != DVec3::ZERO {
+                        row.normal[k][bit % LANES] = (n[k] / n.abs().max_element()) as f32;
+                    }
+                    row.corner[k][bit % LANES] = corners[0][k];
+                }
             }
-            let row = planes.last_mut().expect("a row was just begun");
-            let (lane, n) = (bit % LANES, normal(corners));
-            for k in 0..3 {
-                row.normal[k][lane] = n[k];
-                row.corner[k][lane] = corners[0][k];
-            }
-            let error = ERROR * n.abs().max_element();
-            row.error[lane] = if is_two_sided { -1.0 } else { error };
         }
         starts.push(planes.len() as u32);
     }
+    let points = &clusters.surfaces.points;
     Box::new(PerTriangle {
         clusters: clusters.clone(),
         starts,
         planes,
+        is_near: points.iter().all(|p| p.abs().max_element() < FAR),
     })
 }
 
 impl TriangleCull for PerTriangle {
     fn cull(&self, view: &View, kernel: Kernel, kept: &mut Selection) {
-        kernel.run(Query {
-            all: self,
-            eye: &view.eye,
-            kept,
-        });
+        let (all, eye) = (self, &view.eye);
+        if !(self.is_near && eye.nearest.abs().max_element() < FAR) {
+            let clusters = &self.clusters;
+            kept.retain(|cluster, bit| {
+                let triangle = clusters.triangles_of(cluster)[bit];
+                clusters.is_two_sided(cluster) || faces(eye, clusters.surfaces.corners(triangle))
+            });
+            return;
+        }
+        kernel.run(Query { all, eye, kept });
     }
 
     fn bytes(&self) -> usize {
@@ -104,54 +118,96 @@ impl Work for Query<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<I: Isa>(self, _: I) {
+    fn run<I: Isa>(self, isa: I) {
+        let eye = Lanes::of(isa, self.eye);
         for (cluster, word) in self.kept.words_mut().iter_mut().enumerate() {
-            if *word == 0 {
+            let rows = self.all.starts[cluster] as usize..self.all.starts[cluster + 1] as usize;
+            if *word == 0 || rows.is_empty() {
                 continue;
             }
-            let rows = self.all.starts[cluster] as usize..self.all.starts[cluster + 1] as usize;
             let (mut front, mut doubt) = (0, 0);
-            for (row, planes) in self.all.planes[rows].iter().enumerate().take(ROWS) {
-                let [plus, unsure] = sides(planes, self.eye);
-                front |= plus << (LANES * row);
+            for (row, planes) in self.all.planes[rows].iter().enumerate() {
+                let [sure, unsure] = sides(isa, planes, &eye);
+                front |= sure << (LANES * row);
                 doubt |= unsure << (LANES * row);
             }
-            let mut left = *word & doubt;
+            let left = *word & doubt;
             if left != 0 {
-                let clusters = &self.all.clusters;
-                while left != 0 {
-                    let bit = left.trailing_zeros();
-                    left &= left - 1;
-                    let triangle = clusters.triangles_of(cluster)[bit as usize];
-                    let corners: [Vec3; 3] = clusters.surfaces.corners(triangle);
-                    front |= u64::from(faces(self.eye, corners)) << bit;
-                }
+                front |= in_doubt(&self.all.clusters, cluster, left, self.eye);
             }
             *word &= front;
         }
     }
 }
 
-/// The lanes surely in front, and those in doubt.
-#[inline(always)]
-fn sides(planes: &Planes, eye: &Eye) -> [u64; 2] {
-    let weight = f64::from(eye.weight);
-    let (mut side, mut reach) = ([0.0; LANES], [1e-300; LANES]);
-    for k in 0..3 {
-        // The low part doubles as its own error.
-        let slack = eye.low[k].abs() * (2.0 / ERROR);
-        for lane in 0..LANES {
-            let way = eye.high[k] - f64::from(planes.corner[k][lane]) * weight;
-            side[lane] += planes.normal[k][lane] * way;
-            reach[lane] += way.abs() + slack;
+/// Those of some triangles of a cluster that the eye is in front of.
+#[cold]
+fn in_doubt(clusters: &Clusters, cluster: usize, mut left: u64, eye: &Eye) -> u64 {
+    let mut front = 0;
+    while left != 0 {
+        let bit = left.trailing_zeros();
+        left &= left - 1;
+        let triangle = clusters.triangles_of(cluster)[bit as usize];
+        front |= u64::from(faces(eye, clusters.surfaces.corners(triangle))) << bit;
+    }
+    front
+}
+
+/// The eye in all lanes.
+struct Lanes<I: Isa> {
+    at: [I::Floats; 3],
+    /// -1 for a point, 0 for a direction.
+    minus_weight: I::Floats,
+    minus_one: I::Floats,
+    minus_error: I::Floats,
+    margin: I::Floats,
+}
+
+impl<I: Isa> Lanes<I> {
+    #[inline(always)]
+    fn of(isa: I, eye: &Eye) -> Lanes<I> {
+        let [x, y, z] = eye.nearest.to_array();
+        Lanes {
+            at: [isa.splat(x), isa.splat(y), isa.splat(z)],
+            minus_weight: isa.splat(-eye.weight),
+            minus_one: isa.splat(-1.0),
+            minus_error: isa.splat(-ERROR),
+            margin: isa.splat(round_up(1.75 * eye.error + LEAST)),
         }
     }
-    let (mut front, mut doubt) = ([0u64; LANES], [0u64; LANES]);
-    for lane in 0..LANES {
-        let bound = planes.error[lane] * reach[lane];
-        front[lane] = u64::from(side[lane] > bound || bound < 0.0) << lane;
-        doubt[lane] = u64::from(side[lane].abs() <= bound) << lane;
-    }
-    let all = |lanes: [u64; LANES]| lanes.iter().fold(0, |all, bit| all | bit);
-    [all(front), all(doubt)]
+}
+
+/// The lanes surely in front, and those in doubt.
+#[inline(always)]
+fn sides<I: Isa>(isa: I, planes: &Planes, eye: &Lanes<I>) -> [u64; 2] {
+    let x = way(isa, &planes.corner[0], eye.at[0], eye);
+    let y = way(isa, &planes.corner[1], eye.at[1], eye);
+    let z = way(isa, &planes.corner[2], eye.at[2], eye);
+    let side = isa.add(
+        isa.add(
+            isa.mul(isa.load(&planes.normal[0]), x),
+            isa.mul(isa.load(&planes.normal[1]), y),
+        ),
+        isa.mul(isa.load(&planes.normal[2]), z),
+    );
+    // The negated lengths, as there is only a minimum.
+    let length = isa.add(
+        isa.add(least(isa, x, eye), least(isa, y, eye)),
+        least(isa, z, eye),
+    );
+    let bound = isa.add(isa.mul(length, eye.minus_error), eye.margin);
+    let above = isa.at_most(bound, side);
+    let is_in = isa.at_most(isa.mul(bound, eye.minus_one), side) & isa.at_most(side, bound);
+    [u64::from(above & !is_in), u64::from(is_in)]
+}
+
+#[inline(always)]
+fn way<I: Isa>(isa: I, corner: &[f32; LANES], at: I::Floats, eye: &Lanes<I>) -> I::Floats {
+    isa.add(at, isa.mul(isa.load(corner), eye.minus_weight))
+}
+
+/// -|x|
+#[inline(always)]
+fn least<I: Isa>(isa: I, x: I::Floats, eye: &Lanes<I>) -> I::Floats {
+    isa.min(x, isa.mul(x, eye.minus_one))
 }

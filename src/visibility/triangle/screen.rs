@@ -1,7 +1,5 @@
 //! Points in the frame of the camera, in f64, with a bound on their error.
 
-use std::ops::RangeInclusive;
-
 use glam::{DVec3, Vec3};
 
 use super::super::rays::SampleGrid;
@@ -99,46 +97,83 @@ impl Screen {
         within(x, left, right) && within(y, bottom, top)
     }
 
-    /// Columns and rows of the samples that the screen box of some points holds;
-    /// `None` if one is not surely in front of the eye.
+    /// Where a point may be in the image; everywhere if it is not surely in front of
+    /// the eye.
     #[inline(always)]
-    pub fn samples(&self, points: [Vec3; 3]) -> Option<[RangeInclusive<i64>; 2]> {
+    pub fn pixels(&self, p: Vec3) -> PixelBox {
+        let Seen { x, y, depth, error } = self.seen(p);
         let [left, right, bottom, top] = self.window;
-        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for p in points {
-            let Seen { x, y, depth, error } = self.seen(p);
-            if depth <= error {
-                return None;
-            }
-            let (x, y) = match self.is_parallel {
-                true => (x, y),
-                false => (x / depth, y / depth),
-            };
-            let scale = if self.is_parallel { 1.0 } else { depth - error };
-            let slack = |at: f64| error / scale * (1.0 + at.abs()) + ERROR * at.abs();
-            let slack = DVec3::new(slack(x), slack(y), 0.0);
-            let at = DVec3::new(x, y, 0.0);
-            low = low.min(at - slack);
-            high = high.max(at + slack);
-        }
-        // A sample is at the centre of its pixel: index + 1/2.
-        let within = |low: f64, high: f64, count: u32| {
-            let slack = ERROR * f64::from(count) * (1.0 + low.abs() + high.abs());
-            let first = libm::ceil(low * f64::from(count) - 0.5 - slack).max(0.0);
-            let last = libm::floor(high * f64::from(count) - 0.5 + slack);
-            first as i64..=last.min(f64::from(count) - 1.0) as i64
+        // The error of a quotient: that of its parts, by the least depth there is.
+        let (scale, least) = match self.is_parallel {
+            true => (1.0, 1.0),
+            false => (1.0 / depth, depth - error),
         };
-        let (width, height) = (right - left, top - bottom);
-        let columns = within(
-            (low.x - left) / width,
-            (high.x - left) / width,
-            self.grid.width,
-        );
-        let rows = within(
-            (top - high.y) / height,
-            (top - low.y) / height,
-            self.grid.height,
-        );
-        Some([columns, rows])
+        if !(depth > error && least > 0.0) {
+            return PixelBox::EVERYWHERE;
+        }
+        let (x, y, slack) = (x * scale, y * scale, error / least);
+        let columns = f64::from(self.grid.width) / (right - left);
+        let rows = f64::from(self.grid.height) / (top - bottom);
+        let span = |at: f64, from: f64, unit: f64| {
+            let slack = slack * (1.0 + at.abs()) + ERROR * (at.abs() + from.abs() + 1.0);
+            // A sample is at the centre of its pixel: index + 1/2.
+            let middle = at * unit - from * unit - 0.5;
+            let slack = slack * unit + ERROR * middle.abs();
+            (middle - slack, middle + slack)
+        };
+        let (first_column, last_column) = span(x, left, columns);
+        // Rows are counted downward.
+        let (first_row, last_row) = span(-y, -top, rows);
+        PixelBox {
+            low: [first_column, first_row],
+            high: [last_column, last_row],
+        }
     }
+
+    /// Whether a sample lies in the box.
+    #[inline(always)]
+    pub fn has_sample(&self, all: &PixelBox) -> bool {
+        let within = |low: f64, high: f64, count: u32| {
+            let low = low.max(0.0);
+            let high = high.min(f64::from(count) - 1.0);
+            // The next whole number, without a call; far ones saturate.
+            let whole = low as i64 as f64;
+            let next = if whole < low { whole + 1.0 } else { whole };
+            next <= high
+        };
+        within(all.low[0], all.high[0], self.grid.width)
+            && within(all.low[1], all.high[1], self.grid.height)
+    }
+}
+
+/// Column and row of what is seen, in samples: 0 is the first one.
+#[derive(Clone, Copy, Default, Debug)]
+pub struct PixelBox {
+    low: [f64; 2],
+    high: [f64; 2],
+}
+
+impl PixelBox {
+    /// The whole plane.
+    const EVERYWHERE: PixelBox = PixelBox {
+        low: [f64::NEG_INFINITY; 2],
+        high: [f64::INFINITY; 2],
+    };
+
+    /// The box of two.
+    #[inline(always)]
+    pub fn union(self, other: PixelBox) -> PixelBox {
+        let low = |k: usize| least(self.low[k], other.low[k]);
+        let high = |k: usize| -least(-self.high[k], -other.high[k]);
+        PixelBox {
+            low: [low(0), low(1)],
+            high: [high(0), high(1)],
+        }
+    }
+}
+
+/// The lesser of two numbers, neither a NaN: one instruction.
+#[inline(always)]
+fn least(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
 }

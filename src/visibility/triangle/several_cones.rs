@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 
 use super::super::guarantee::Guarantee;
 use super::clusters::Clusters;
-use super::cone_block::{Broadcast, ConeBlock, rejected};
+use super::cone_block::{Broadcast, ConeBlock, clear, rejected};
 use super::contract::{Criterion, TriangleCull, TriangleRow};
 use super::exact::normal;
 use super::normal_cone::{Cone, Prepared};
@@ -130,13 +130,8 @@ impl Work for Query<'_> {
         let view = Broadcast::of(isa, self.view);
         for (block, words) in self.blocks.iter().zip(self.words.chunks_mut(LANES)) {
             for group in block {
-                let mut gone = rejected(isa, &group.cones, &view);
-                while gone != 0 {
-                    // Lanes beyond the last cluster never reject.
-                    let lane = gone.trailing_zeros() as usize;
-                    words[lane] &= !group.triangles[lane];
-                    gone &= gone - 1;
-                }
+                let gone = rejected(isa, &group.cones, &view);
+                clear(words, gone, &group.triangles);
             }
         }
     }

@@ -1,15 +1,15 @@
 //! Triangles whose screen box holds no sample: between the rays, at this size of
 //! image.
 
-use std::sync::Arc;
+use glam::Vec3;
 
 use super::super::guarantee::Guarantee;
-use super::clusters::Clusters;
 use super::contract::{Criterion, TriangleCull, TriangleRow};
-use super::screen::Screen;
+use super::locals::Locals;
+use super::screen::{PixelBox, Screen};
 use super::selection::Selection;
 use super::view::View;
-use crate::kernel::Kernel;
+use crate::kernel::{Isa, Kernel, Work};
 
 /// The row of this file.
 pub const ROW: TriangleRow = TriangleRow {
@@ -17,30 +17,44 @@ pub const ROW: TriangleRow = TriangleRow {
     summary: "Drops what no sample of the image can meet: its screen box holds none",
     guarantee: Guarantee::SampleExact,
     criterion: Criterion::Samples,
-    build: |clusters| Box::new(Small(clusters.clone())),
+    build: |clusters| Box::new(Small(Locals::of(clusters))),
 };
 
-struct Small(Arc<Clusters>);
+struct Small(Locals);
 
 impl TriangleCull for Small {
-    fn cull(&self, view: &View, _: Kernel, kept: &mut Selection) {
-        let Some(screen) = Screen::of(view) else {
-            return;
-        };
-        let clusters = &*self.0;
-        kept.retain(|cluster, bit| {
-            let corners = clusters
-                .surfaces
-                .corners(clusters.triangles_of(cluster)[bit]);
-            match screen.samples(corners) {
-                None => true,
-                Some([columns, rows]) => !columns.is_empty() && !rows.is_empty(),
-            }
-        });
+    fn cull(&self, view: &View, kernel: Kernel, kept: &mut Selection) {
+        if let Some(screen) = Screen::of(view) {
+            let locals = &self.0;
+            kernel.run(Query {
+                locals,
+                screen,
+                kept,
+            });
+        }
     }
 
     fn bytes(&self) -> usize {
-        let surfaces = &self.0.surfaces;
-        size_of_val(&surfaces.points[..]) + size_of_val(&surfaces.triangles[..])
+        self.0.bytes()
+    }
+}
+
+struct Query<'a> {
+    locals: &'a Locals,
+    screen: Screen,
+    kept: &'a mut Selection,
+}
+
+impl Work for Query<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Isa>(self, _: I) {
+        let screen = &self.screen;
+        let pixels = |p: Vec3| screen.pixels(p);
+        self.locals.retain(self.kept, pixels, |[a, b, c]| {
+            let all: PixelBox = a.union(b).union(c);
+            screen.has_sample(&all)
+        });
     }
 }
