@@ -47,6 +47,29 @@ impl Canvas {
         }
     }
 
+    /// The same samples seen in a mirror that is a plane across an axis: the rays
+    /// from where they cross the plane on, reflected. (A ray that is reflected keeps
+    /// its depths.) Rays that do not reach the plane meet nothing.
+    pub fn mirrored(&self, axis: usize, at: f64) -> Canvas {
+        let reflected = |probe: &Probe| {
+            let mut ray = *probe.ray();
+            let depth = (at - ray.origin[axis]) / ray.direction[axis];
+            let reached = depth >= 0.0 && depth.is_finite();
+            ray.near = if reached {
+                depth.max(ray.near)
+            } else {
+                f64::INFINITY
+            };
+            ray.origin[axis] = 2.0 * at - ray.origin[axis];
+            ray.direction[axis] = -ray.direction[axis];
+            Probe::new(ray)
+        };
+        Canvas {
+            screen: self.screen.mirrored(axis, at),
+            probes: self.probes.iter().map(reflected).collect(),
+        }
+    }
+
     /// Columns and rows.
     pub fn grid(&self) -> SampleGrid {
         self.screen.grid()

@@ -52,6 +52,8 @@ pub struct Screen {
     near: f64,
     far: f64,
     parallel: bool,
+    /// What the eye may be off, world units.
+    eye_off: f64,
 }
 
 /// Bounds of what was placed so far.
@@ -84,7 +86,18 @@ impl Screen {
             near: near - near.abs() * 1e-9,
             far: far + far.abs() * 1e-9,
             parallel: matches!(lens, Lens::Orthographic { .. }),
+            eye_off: 0.0,
         }
+    }
+
+    /// The image of the same camera seen in a mirror, the plane across an axis.
+    pub(super) fn mirrored(&self, axis: usize, at: f64) -> Screen {
+        let mut screen = *self;
+        screen.eye[axis] = 2.0 * at - self.eye[axis];
+        screen.axes.iter_mut().for_each(|of| of[axis] = -of[axis]);
+        // One rounding of the reflected eye.
+        screen.eye_off = self.eye_off + screen.eye[axis].abs() * f64::EPSILON;
+        screen
     }
 
     /// Columns and rows.
@@ -106,7 +119,7 @@ impl Screen {
             let pick = |k: usize| if i >> k & 1 == 1 { b.max[k] } else { b.min[k] };
             let at = DVec3::new(pick(0), pick(1), pick(2)) - self.eye;
             let [x, y, w] = self.axes.map(|axis| at.dot(axis));
-            let size = at.abs().element_sum();
+            let size = at.abs().element_sum() + self.eye_off / ROUNDED;
             *corner = [x, y, w, size];
             behind += usize::from(w < self.near);
         }

@@ -1,8 +1,14 @@
 //! A binary space partition of the items (Fuchs, Kedem, Naylor 1980): planes
 //! through faces of boxes, each across an axis; boxes that a plane passes through
-//! are cut in two. On either side of a plane all entries of one side are before
-//! those of the other, so the order of the parts is exact wherever planes part
-//! them: everywhere, unless boxes overlap in space.
+//! are cut in two.
+//!
+//! On the eye's side of a plane every entry is before those on the other side, so
+//! the order of what planes part is exact. What no plane parts or cuts are boxes
+//! with the same bounds, of which a ray that passes enters one or several, by their
+//! own faces, at the same depth; or flat ones in a face of another. So the order is
+//! exact for boxes that overlap in space as well, as long as there is room for the
+//! parts; but for rays that run within a plane, whose sides are then both the
+//! eye's.
 
 use super::contract::{DepthOrder, Piece, distance, nearest_point};
 use crate::camera::{Camera, Lens};
@@ -12,10 +18,10 @@ use crate::visibility::Solids;
 /// As typed on the command line.
 pub const NAME: &str = "bsp";
 /// One line for tables and help.
-pub const SUMMARY: &str = "planes through faces of boxes, boxes cut where they cross: exact";
+pub const SUMMARY: &str = "planes through faces of boxes, which are cut where they cross: exact";
 
 /// Parts that there may be for each item before cutting ends.
-const MOST_PARTS: usize = 4;
+const MOST_PARTS: usize = 16;
 /// A cut costs as much as so many boxes of imbalance.
 const COST_OF_CUT: usize = 8;
 
@@ -28,7 +34,7 @@ enum Node {
         at: f64,
         sides: [usize; 2],
     },
-    /// Parts that no plane parts.
+    /// Parts between which there is no plane.
     Leaf(Vec<Part>),
 }
 
@@ -90,7 +96,7 @@ impl BspOrder {
         self.parts
     }
 
-    /// The largest number of parts that no plane parts.
+    /// The largest number of parts between which there is no plane.
     pub fn largest_leaf(&self) -> usize {
         let leaf = |node: &Node| match node {
             Node::Leaf(parts) => parts.len(),
@@ -120,9 +126,9 @@ fn sides(parts: Vec<Part>, axis: usize, at: f64) -> [Vec<Part>; 2] {
     [below, above]
 }
 
-/// The plane through a face that leaves least on either side and cuts least;
-/// `None` if there is none with fewer parts on each side than there are, or it
-/// cuts more than `room` parts.
+/// The plane through a face that balances its sides best and cuts least; `None` if
+/// there is none that parts or cuts anything, or only such as cut more than `room`
+/// parts.
 fn plane(parts: &[Part], room: usize) -> Option<(usize, f64)> {
     let count = parts.len();
     if count < 2 {
@@ -150,7 +156,9 @@ fn plane(parts: &[Part], room: usize) -> Option<(usize, f64)> {
             // What lies in the plane is below it.
             let above = count - low.partition_point(|&x| x < at) - equal(&flat, at);
             let cut = count - below - above;
-            if below + cut == count || above + cut == count || cut > room {
+            // What was cut at a plane is never cut there again: this ends.
+            let parts_them = cut > 0 || (below < count && above < count);
+            if !parts_them || cut > room {
                 continue;
             }
             let cost = below.abs_diff(above) + COST_OF_CUT * cut;
