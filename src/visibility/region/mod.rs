@@ -14,12 +14,8 @@
 mod answer;
 mod audit;
 pub mod doom;
-<<<<<<< HEAD
 pub mod flood;
-=======
-mod flood;
 mod free_space;
->>>>>>> region
 mod graph;
 mod items;
 mod locate;
