@@ -26,8 +26,8 @@ use crate::scene::{self, Scene};
 use crate::visibility::fragment::{Canvas, Piece, Tests, draw};
 use crate::visibility::occlusion::{self, OccluderScene};
 use crate::visibility::region::{
-    EyePlace, Flood, Marks, PortalClip, PortalRect, RegionGraph, RegionItems, RegionRow, Scratch,
-    flood, portal_clip, portal_rect,
+    self, EyePlace, Flood, Marks, PortalClip, PortalRect, RegionGraph, RegionItems, RegionRow,
+    Scratch,
 };
 use crate::visibility::triangle;
 use crate::visibility::truth::{RayIndex, SampleTruth};
@@ -76,6 +76,9 @@ pub enum FunnelError {
     #[error(transparent)]
     Input(#[from] InputError),
 }
+
+/// What a chain takes where there are rooms.
+const PORTAL_CLIP: &str = "portal-clip";
 
 /// Answers a stage in a view from what it is given (`None`: all items), appending to
 /// an empty output.
@@ -416,19 +419,13 @@ pub fn back_ends(stage: StageKind, scene: &Scene) -> Vec<BackEnd> {
         Guarantee::Conservative,
     )];
     match stage {
-        StageKind::Region if matches!(scene.regions, scene::Regions::Tiling(_)) => rows.extend([
-            plain(flood::NAME, flood::SUMMARY, flood::GUARANTEE),
-            plain(
-                portal_rect::NAME,
-                portal_rect::SUMMARY,
-                portal_rect::GUARANTEE,
-            ),
-            plain(
-                portal_clip::NAME,
-                portal_clip::SUMMARY,
-                portal_clip::GUARANTEE,
-            ),
-        ]),
+        StageKind::Region if matches!(scene.regions, scene::Regions::Tiling(_)) => {
+            let of_cameras = ["flood", PORTAL_CLIP, "portal-rect"];
+            let known = region::ROWS
+                .iter()
+                .filter(|row| of_cameras.contains(&row.0));
+            rows.extend(known.map(|&(name, summary, guarantee)| plain(name, summary, guarantee)));
+        }
         StageKind::Occlusion => rows.extend(HIDING.iter().map(HidingRow::back_end)),
         StageKind::Triangle => rows = faces::back_ends().collect(),
         StageKind::Fragment => rows.push(plain(
@@ -452,7 +449,7 @@ impl Chain {
                 .then_some(name)
         };
         [
-            (StageKind::Region, portal_clip::NAME),
+            (StageKind::Region, PORTAL_CLIP),
             (StageKind::Occlusion, "masked-inner"),
             (StageKind::Triangle, faces::DEFAULT),
             (StageKind::Fragment, "z-test"),

@@ -14,7 +14,7 @@
 mod answer;
 mod audit;
 pub mod doom;
-pub mod flood;
+mod flood;
 mod free_space;
 mod graph;
 mod items;
