@@ -58,6 +58,8 @@ pub enum Command {
     Precision(PrecisionArgs),
     /// The visibility funnel: what each stage from region to fragment removes, at what cost
     Funnel(FunnelArgs),
+    /// Check the proofs that `funnel --certificates` writes, by another program
+    Check(CheckArgs),
     /// Advise: which structure, which test, which work can be skipped, with the evidence
     Advise(AdviseArgs),
     /// Errors of camera updates (turn, orbit, chase) after up to ten million steps
@@ -421,6 +423,9 @@ pub struct FunnelArgs {
     /// What does the fragment stage in the chain
     #[arg(long, value_name = "NAME")]
     pub fragment: Option<String>,
+    /// Write proofs for every item in view that is visible or was removed, a line of JSON a view
+    #[arg(long, value_name = "FILE")]
+    pub certificates: Option<PathBuf>,
     /// Write tables and picture as one HTML page too
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
@@ -437,6 +442,30 @@ pub struct FunnelArgs {
     pub lens: LensArgs,
     #[command(flatten)]
     pub kernel: KernelArgs,
+}
+
+const CHECK_HELP: &str = "\
+Example:
+  cullbench funnel --scene city:n=10000 --frames 4 --certificates proofs.jsonl
+  cullbench check proofs.jsonl
+
+A visible item is proven by a ray along which it is in front, a hidden one by a division of its
+image into parts that each lie behind one nearer box. Both are checked in exact arithmetic, against
+the boxes as they are written. Exit code 1 if a proof does not hold.";
+
+#[derive(Args, Debug)]
+#[command(after_help = CHECK_HELP)]
+pub struct CheckArgs {
+    /// The file that `funnel --certificates` wrote
+    #[arg(value_name = "CERTIFICATES")]
+    pub certificates: PathBuf,
+    /// The scene, if it is to be found elsewhere than the certificates say
+    #[arg(long)]
+    pub scene: Option<String>,
+    #[arg(long, value_enum, default_value = "table")]
+    pub format: TableFormat,
+    #[command(flatten)]
+    pub scene_args: SceneArgs,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum, Debug)]

@@ -25,6 +25,7 @@ use crate::report::write_atomically;
 use crate::scene::{self, LoadOptions, Scene};
 use crate::spec::SpecError;
 use crate::visibility::Guarantee;
+use crate::visibility::truth::Certificates;
 
 /// Rounds of a stage, if one process has them all.
 const ROUNDS: [usize; 2] = [5, 15];
@@ -58,6 +59,18 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
         protocol: &protocol,
         execution: args.kernel.execution()?,
     };
+    if let Some(file) = &args.certificates {
+        job("proofs");
+        let mut lines = String::new();
+        let each = |proofs: Certificates| {
+            lines += &proofs.to_json();
+            lines.push('\n');
+        };
+        if !funnel::certificates(&input, &interrupt::asked, each)? {
+            return Ok(Ending::Interrupted);
+        }
+        write_atomically(file, |out| out.write_all(lines.as_bytes()))?;
+    }
     let Some(prepared) = funnel::prepare(&input, &interrupt::asked)? else {
         return Ok(Ending::Interrupted);
     };

@@ -6,6 +6,7 @@
 //! that differs from it in one stage: [`prepare`] judges, [`time`] measures in each
 //! process, [`Prepared::conclude`] puts both together.
 
+mod certified;
 mod chain;
 mod conclusions;
 mod faces;
@@ -19,6 +20,7 @@ mod stage;
 mod study;
 mod world;
 
+pub use certified::certificates;
 pub use chain::Chain;
 pub use judged::Errors;
 pub use orders::OrderRow;
