@@ -30,6 +30,8 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
         "What is left, drawn in every order".into(),
     ));
     blocks.push(Block::Table(orders(report)));
+    blocks.push(Block::Heading(2, "The first item under a cursor".into()));
+    blocks.push(Block::Table(picks(report)));
     if !report.gains.is_empty() {
         blocks.push(Block::Heading(
             2,
@@ -134,6 +136,24 @@ fn orders(report: &FunnelReport) -> Rows {
             count(row.wrong_pair_count),
             count(row.wrong_sample_count),
             text::time_within(times.stage_ns, [times.stage_ns_lower, times.stage_ns_upper]),
+        ]
+    }));
+    rows
+}
+
+fn picks(report: &FunnelReport) -> Rows {
+    let mut rows = Rows::of_numbers(["picking by", "rays", "wrong", "time per ray"]);
+    rows.rows.extend(report.picks.iter().map(|row| {
+        let doubt = if row.guarantee == Guarantee::Unproven {
+            "?"
+        } else {
+            ""
+        };
+        vec![
+            format!("{}{doubt}", row.name),
+            row.ray_count.to_string(),
+            row.wrong_count.to_string(),
+            row.ns_per_ray.map(text::time).unwrap_or_default(),
         ]
     }));
     rows

@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::chain::Chain;
 use super::judged::Errors;
 use super::orders::OrderRow;
+use super::picks::PickRow;
 use super::plan_view::PlanView;
 use super::stage::{BackEnd, StageKind};
 use crate::measure::OverProcesses;
@@ -35,6 +36,8 @@ pub struct FunnelReport {
     pub stages: Vec<StageRow>,
     /// What is left, drawn in every order.
     pub orders: Vec<OrderRow>,
+    /// The first item under a cursor, by every back end of picking.
+    pub picks: Vec<PickRow>,
     /// Each stage of the chain, with it and without it.
     pub gains: Vec<Gain>,
     /// What follows, in a sentence each.

@@ -11,12 +11,14 @@ use super::faces::{self, Faces};
 use super::judged::Errors;
 use super::orders::{self, Orders};
 use super::pass::{Pass, Walked};
+use super::picks::Picks;
 use super::plan_view::{PlanView, fate};
 use super::report::{FunnelReport, Gain, LevelRow, Side, StageRow, Times};
 use super::stage::{NONE, StageKind};
 use super::world::{FunnelError, FunnelInput, Truth, World, back_ends};
 use crate::measure::{Ask, OverProcesses, ProcessTimes, Schedule, TimedTask, Verdict, timed};
 use crate::visibility::Level;
+use crate::visibility::truth::RayIndex;
 
 /// What all processes time: the plan is the same for each.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -34,6 +36,7 @@ pub struct Prepared {
     /// By row: its task.
     tasks: Vec<Option<usize>>,
     gains: Vec<(StageKind, String, [Side; 2])>,
+    rays_per_view: f64,
 }
 
 /// Goes through all chains, judges them, and plans how they are timed; `None` if
@@ -127,6 +130,7 @@ pub fn prepare(
         },
         tasks,
         gains,
+        rays_per_view: left.picks.rays_per_view(),
         report: FunnelReport {
             scene: input.scene.name.clone(),
             path: input.path.name.clone(),
@@ -138,6 +142,7 @@ pub fn prepare(
             chain: input.chain.clone(),
             stages: rows,
             orders: drawn,
+            picks: left.picks.judged(&RayIndex::build(world.solids())),
             gains: Vec::new(),
             conclusions: Vec::new(),
             plan_view: plan_view(&world, &pass, &walks.chosen, &truth),
@@ -169,6 +174,7 @@ pub fn time(
 struct Left {
     faces: Faces,
     orders: Orders,
+    picks: Picks,
 }
 
 impl Left {
@@ -176,11 +182,12 @@ impl Left {
         Left {
             faces: Faces::of(world, pass, chosen.left()),
             orders: Orders::of(world, pass, chosen.left()),
+            picks: Picks::of(world),
         }
     }
 }
 
-/// Every step, every back end of the triangle stage and every order as a task; what it must hand on is what it has, or
+/// Every step, every back end of the triangle stage and of picking and every order as a task; what it must hand on is what it has, or
 /// what another process says.
 fn timed_tasks<'p>(
     pass: &'p Pass<'p>,
@@ -216,9 +223,14 @@ fn timed_tasks<'p>(
         ask_many: None,
         least_ns: None,
     };
+    let picks = (0..left.picks.count()).map(|back_end| {
+        let ask: Ask = Box::new(move |view, out| left.picks.first(back_end, view, out));
+        ask
+    });
     steps
         .chain(culls)
         .chain(sorts)
+        .chain(picks)
         .enumerate()
         .map(task)
         .collect()
@@ -293,6 +305,15 @@ impl Prepared {
             let per = |count: f64| (count > 0.0).then(|| found.value / count);
             row.ns_per_removed = per(row.errors.input_count - row.errors.output_count);
             row.ns_per_decided = per(row.errors.input_count);
+        }
+        // Behind the stages come the orders, and last of all picking.
+        let picks = self.plan.expected.len() - report.picks.len();
+        for (row, task) in report.picks.iter_mut().zip(picks..) {
+            row.times = Times::of(times.ns(task));
+            row.ns_per_ray = row.times.stage_ns.map(|ns| ns / self.rays_per_view);
+        }
+        for (row, task) in report.orders.iter_mut().rev().zip((0..picks).rev()) {
+            row.times = Times::of(times.ns(task));
         }
         let gains = self
             .gains
