@@ -109,7 +109,7 @@ pub enum Proof {
     AroundEye,
     /// Hidden: the image of the box is covered. The outline lists corners of the
     /// box (bit k: the upper bound on axis k), so that each side has the whole box on
-    /// its left; none if the box has no image that is an area.
+    /// its left; none of them if the whole image is one line.
     Cover {
         /// Corners round its image.
         outline: Vec<u8>,

@@ -16,7 +16,7 @@ mod witness;
 
 use self::judge::Judge;
 use self::line::{exact, holds};
-use self::part::{Side, image};
+use self::part::{Side, has_no_area, image};
 use self::witness::witness;
 use super::certificate::{Certificates, Except, Proof, View};
 use crate::query::ItemId;
@@ -79,6 +79,13 @@ pub fn check(certificates: &Certificates, boxes: &[WorldBox]) -> Result<Counts, 
                 let around = !view.parallel && view.near > 0.0 && holds(own, view.eye);
                 around.then_some(()).ok_or(reject("the eye is not in it"))?;
                 counts.hidden += 1;
+            }
+            Proof::Cover {
+                outline, except, ..
+            } if outline.is_empty() => {
+                let flat = *except == Except::Lines && has_no_area(view, own);
+                flat.then_some(()).ok_or(reject("its image has an area"))?;
+                counts.along_lines += 1;
             }
             Proof::Cover {
                 outline,

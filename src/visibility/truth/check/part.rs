@@ -18,6 +18,14 @@ pub struct Part {
     corners: Vec<(Line, Side)>,
 }
 
+/// Whether the image of a box, seen from outside it, is no more than a line.
+pub fn has_no_area(view: &View, b: &WorldBox) -> bool {
+    let all = [0, 1, 2, 3, 4, 5, 6, 7].map(|k: u8| Line::through(view, corner(b, k)).numbers);
+    let outside = view.parallel || !holds(b, view.eye);
+    let flat = |p: usize, q: usize, r: usize| dot(&cross(&all[p], &all[q]), &all[r]).sign() == 0;
+    outside && (0..8).all(|p| (0..p).all(|q| (0..q).all(|r| flat(p, q, r))))
+}
+
 /// The image of a box with these corners round it.
 pub fn image(view: &View, b: &WorldBox, outline: &[u8]) -> Result<Part, &'static str> {
     if !view.parallel && holds(b, view.eye) {

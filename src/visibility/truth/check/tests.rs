@@ -179,10 +179,7 @@ fn a_cover_that_was_doctored_is_rejected() {
         let around = "its outline does not go round the box";
         assert_eq!(outlined(|outline| outline.reverse()), around);
         assert_eq!(outlined(|outline| outline.truncate(3)), around);
-        assert_eq!(
-            outlined(|outline| outline.clear()),
-            "its outline is not one"
-        );
+        assert_eq!(outlined(|outline| outline.clear()), "its image has an area");
         assert_eq!(
             outlined(|outline| outline.push(outline[0])),
             "its outline is not one"
@@ -224,6 +221,31 @@ fn of_twins_only_the_first_hides_the_other() {
         assert!(with(TWIN, HIDDEN, Except::Nothing).is_err());
         assert!(with(HIDDEN, TWIN, Except::Lines).is_err());
         assert!(with(TWIN, TWIN, Except::Lines).is_err());
+    }
+}
+
+#[test]
+fn a_box_seen_edge_on_has_no_area() {
+    let flat = WorldBox::new(DVec3::new(2.0, 0.0, -1.0), DVec3::new(3.0, 0.0, 1.0));
+    let boxes = [flat, WorldBox::new(flat.min - DVec3::Y, flat.max)];
+    let solids = judge::solids(&boxes);
+    let index = RayIndex::build(&solids);
+    for parallel in [false, true] {
+        let rays = rays(parallel);
+        let prover = Prover::new(&solids, &index, &rays);
+        let with = |item: ItemId, proof: Proof| {
+            let view = prover.view().clone();
+            check(
+                &Certificates::new("flat", 2, view, vec![(item, proof)]),
+                &boxes,
+            )
+        };
+        let proof = prover.prove(0);
+        assert_eq!(
+            with(0, proof.clone()).map(|counts| counts.along_lines),
+            Ok(1)
+        );
+        assert!(with(1, proof).is_err());
     }
 }
 

@@ -11,7 +11,7 @@ use std::cmp::Reverse;
 use glam::DVec3;
 
 use self::hunt::{End, Hunt};
-use self::outline::{corners_of, outline};
+use self::outline::{corners_of, is_flat, outline};
 use self::outlook::Outlook;
 use super::certificate::{Cell, Except, Proof, View};
 use super::ray_index::RayIndex;
@@ -75,7 +75,15 @@ impl<'s> Prover<'s> {
         }
         let corners = corners_of(b).map(|corner| sight.through(corner));
         let Some(outline) = outline(&corners) else {
-            return Proof::Undecided;
+            let (outline, except, cell) = (Vec::new(), Except::Lines, Cell::Empty);
+            return match is_flat(&corners) {
+                true => Proof::Cover {
+                    outline,
+                    except,
+                    cell,
+                },
+                false => Proof::Undecided,
+            };
         };
         let image = Polygon::new(
             outline

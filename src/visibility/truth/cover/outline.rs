@@ -44,6 +44,13 @@ pub fn outline(corners: &[Triple; 8]) -> Option<Vec<u8>> {
     (round.len() > 2).then_some(round)
 }
 
+/// Whether the whole image is one line or point.
+pub fn is_flat(corners: &[Triple; 8]) -> bool {
+    let flat =
+        |p: usize, q: usize, r: usize| Triple::turn(&corners[p], &corners[q], &corners[r]) == 0;
+    (0..8).all(|p| (0..p).all(|q| (0..q).all(|r| flat(p, q, r))))
+}
+
 /// Whether two lines of sight are the same one, near enough: only a guess is made
 /// of it.
 fn parallel(a: &Triple, b: &Triple) -> bool {
