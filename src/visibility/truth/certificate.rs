@@ -78,6 +78,21 @@ pub enum Cell {
     },
 }
 
+/// Rays along which an item that is covered may be met as soon as what covers it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Except {
+    /// None: no ray sees it.
+    Nothing,
+    /// Any, where the box in front has a lower number: it may tie, but is the front
+    /// item of no ray.
+    Ties,
+    /// As before, and of any box those along lines of the image: it is the front item
+    /// of no part of the image that has an area.
+    Lines,
+}
+
 /// What is known of an item, and the proof of it.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -94,13 +109,12 @@ pub enum Proof {
     AroundEye,
     /// Hidden: the image of the box is covered. The outline lists corners of the
     /// box (bit k: the upper bound on axis k), so that each side has the whole box on
-    /// its left; none if the box has no image that is an area.
+    /// its left; none of them if the whole image is one line.
     Cover {
         /// Corners round its image.
         outline: Vec<u8>,
-        /// Whether an item of a lower number hides where it is as near: then this
-        /// one is the front item of no ray, though it may tie with one.
-        ties: bool,
+        /// What the cover does not rule out.
+        except: Except,
         /// Why each part of it is hidden.
         cell: Cell,
     },
@@ -121,6 +135,16 @@ pub struct Certificates {
     pub view: View,
     /// Items with their proofs.
     pub proofs: Vec<(ItemId, Proof)>,
+}
+
+impl Proof {
+    /// That this ray sees the item.
+    pub(super) fn witness(ray: &Ray) -> Proof {
+        Proof::Witness {
+            origin: ray.origin.to_array(),
+            direction: ray.direction.to_array(),
+        }
+    }
 }
 
 impl Certificates {

@@ -5,7 +5,9 @@
 
 mod cache;
 mod certificate;
+mod certify;
 mod check;
+mod class;
 mod cover;
 mod entry;
 #[cfg(test)]
@@ -15,9 +17,11 @@ mod sample;
 mod sight;
 
 pub use cache::{TruthCache, digest_of};
-pub use certificate::{Cell, Certificates, Edge, Proof, View};
+pub use certificate::{Cell, Certificates, Edge, Except, Proof, View};
+pub use certify::certify;
 pub use check::{Counts, Rejected, check};
-pub use cover::{Class, Prover, certify};
+pub use class::Class;
+pub use cover::Prover;
 pub use entry::{Crossing, Probe};
 pub use ray_index::{Front, RayIndex};
 pub use sample::{NO_ITEM, SampleTruth, visible_by_random_rays};

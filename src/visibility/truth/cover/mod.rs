@@ -1,0 +1,120 @@
+//! The search for certificates: for an item a ray that sees it, or boxes that hide
+//! it. Everything that it claims is decided exactly.
+
+mod hides;
+mod hunt;
+mod outline;
+mod outlook;
+
+use std::cmp::Reverse;
+
+use glam::DVec3;
+
+use self::hunt::{End, Hunt};
+use self::outline::{corners_of, is_flat, outline};
+use self::outlook::Outlook;
+use super::certificate::{Cell, Except, Proof, View};
+use super::ray_index::RayIndex;
+use super::sample::SampleTruth;
+use super::sight::{Polygon, Sight};
+use crate::query::ItemId;
+use crate::visibility::{Rays, Solids};
+
+/// How many of the largest items are tried first as boxes in front.
+const LIKELY: usize = 48;
+
+/// Looks for proofs in one view of a scene.
+#[derive(Clone, Debug)]
+pub struct Prover<'s> {
+    look: Outlook<'s>,
+}
+
+impl<'s> Prover<'s> {
+    /// For the view of these rays.
+    pub fn new(solids: &'s Solids, index: &'s RayIndex, rays: &Rays) -> Prover<'s> {
+        let sight = Sight::new(&View::of(rays));
+        let likely = Vec::new();
+        let look = Outlook {
+            solids,
+            index,
+            sight,
+            likely,
+        };
+        Prover { look }
+    }
+
+    /// The same, but what most samples see is tried first: proofs are found sooner.
+    pub fn knowing(mut self, truth: &SampleTruth) -> Prover<'s> {
+        let seen = truth.visible.iter().zip(&truth.samples_of);
+        let mut seen: Vec<_> = seen
+            .map(|(&item, &samples)| (Reverse(samples), item))
+            .collect();
+        seen.sort_unstable();
+        self.look.likely = seen.iter().take(LIKELY).map(|seen| seen.1).collect();
+        self
+    }
+
+    /// The view that the proofs are about.
+    pub fn view(&self) -> &View {
+        &self.look.sight.view
+    }
+
+    /// The index that finds what is in front.
+    pub(super) fn index(&self) -> &RayIndex {
+        self.look.index
+    }
+
+    /// Whether the item is visible along any ray of the view, with the proof.
+    pub fn prove(&self, item: ItemId) -> Proof {
+        let b = self.look.boxed(item);
+        let Outlook { sight, .. } = &self.look;
+        let view = &sight.view;
+        let holds = |p: DVec3| p.cmpge(b.min).all() && p.cmple(b.max).all();
+        if !view.parallel && holds(view.eye.into()) {
+            return Proof::AroundEye;
+        }
+        let corners = corners_of(b).map(|corner| sight.through(corner));
+        let Some(outline) = outline(&corners) else {
+            let (outline, except, cell) = (Vec::new(), Except::Lines, Cell::Empty);
+            return match is_flat(&corners) {
+                true => Proof::Cover {
+                    outline,
+                    except,
+                    cell,
+                },
+                false => Proof::Undecided,
+            };
+        };
+        let image = Polygon::new(
+            outline
+                .iter()
+                .map(|&k| corners[usize::from(k)].clone())
+                .collect(),
+        );
+        let clipped = sight
+            .sides
+            .iter()
+            .try_fold(image, |image, side| image.cut(side, false));
+        for except in [Except::Nothing, Except::Ties, Except::Lines] {
+            let mut hunt = Hunt::new(&self.look, item, except);
+            match clipped
+                .as_ref()
+                .map_or(Ok(Cell::Empty), |image| hunt.cell(image, 0))
+            {
+                Ok(cell) => {
+                    return Proof::Cover {
+                        outline,
+                        except,
+                        cell,
+                    };
+                }
+                Err(End::Seen(ray)) => return Proof::witness(&ray),
+                Err(End::GaveUp) => {}
+            }
+        }
+        Proof::Undecided
+    }
+}
+
+#[cfg(test)]
+mod tests;
