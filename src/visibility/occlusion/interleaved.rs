@@ -79,12 +79,7 @@ impl<B: OcclusionBuffer> Interleaved<B> {
     /// Appends the items that no plane of the view's volume excludes, that some ray
     /// of the image may meet and that are not hidden; the nearest come first,
     /// roughly.
-    pub fn cull(
-        &mut self,
-        scene: &OccluderScene,
-        view: &View,
-        out: &mut Vec<ItemId>,
-    ) -> CullStats {
+    pub fn cull(&mut self, scene: &OccluderScene, view: &View, out: &mut Vec<ItemId>) -> CullStats {
         self.kernel.run(Walk {
             state: self,
             scene,

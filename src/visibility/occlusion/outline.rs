@@ -280,10 +280,16 @@ impl Outline {
     pub fn within(&mut self, rect: &Rect) {
         let tile = [TILE_WIDTH as f64, TILE_HEIGHT as f64];
         let [left, right] = self.columns_within;
-        let (x0, x1) = (f64::from(rect.x0) - tile[0], f64::from(rect.x1) + 1.0 + tile[0]);
+        let (x0, x1) = (
+            f64::from(rect.x0) - tile[0],
+            f64::from(rect.x1) + 1.0 + tile[0],
+        );
         self.columns_within = [left.max(x0), right.min(x1)];
         let [top, bottom] = self.rows;
-        let (y0, y1) = (f64::from(rect.y0) - tile[1], f64::from(rect.y1) + 1.0 + tile[1]);
+        let (y0, y1) = (
+            f64::from(rect.y0) - tile[1],
+            f64::from(rect.y1) + 1.0 + tile[1],
+        );
         self.rows = [top.max(y0), bottom.min(y1)];
     }
 
@@ -319,7 +325,8 @@ impl Outline {
             // Half a column on and to the nearest whole one: up, and for the end one
             // behind what is rounded down. Ties may lose a column.
             let row = first + i as f32;
-            let within = (row >= top) & (row < bottom) & (high[i] >= 0.0) & (low[i] <= right as f32);
+            let within =
+                (row >= top) & (row < bottom) & (high[i] >= 0.0) & (low[i] <= right as f32);
             let low = if within { low[i] } else { 1.0 };
             let high = if within { high[i] } else { 0.0 };
             start[i] = ((low + 0.5) + WHOLE_NUMBERS).to_bits() as i32 & 0x7f_ffff;
