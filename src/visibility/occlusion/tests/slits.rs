@@ -21,7 +21,7 @@ fn lost_behind_fence<B: OcclusionBuffer>(grid: SampleGrid, gap: f64, seed: u64) 
     let mut y = 10.0 * left;
     while y < 10.0 * right {
         let width = pixel * rng.between(6.0, 40.0);
-        let (low, high) = (DVec3::new(10.0, y, -8.0), DVec3::new(10.2, y + width, 8.0));
+        let (low, high) = (DVec3::new(10.0, y, -8.0), DVec3::new(10.0, y + width, 8.0));
         boxes.push(WorldBox::new(low, high));
         y += width + gap * pixel;
     }
