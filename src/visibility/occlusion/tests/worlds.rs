@@ -2,7 +2,9 @@
 
 use glam::DVec3;
 
-use super::super::{MaskedCentre, MaskedInner, OcclusionBuffer};
+use super::super::{
+    DepthRays, HierarchicalZ, MaskedCentre, MaskedInner, NoOcclusion, OcclusionBuffer, ZBuffer,
+};
 use super::by_rays::{Ready, missing, point_between, seen_by_rays, with_view};
 use super::kept;
 use crate::camera::{Camera, Frame, Lens};
@@ -122,11 +124,24 @@ fn whole_pixels_lose_nothing_that_a_ray_sees() {
 }
 
 #[test]
-fn pixel_centres_lose_what_rays_see() {
+fn samples_at_centres_lose_what_rays_see() {
     for parallel in [false, true] {
-        let (lost, _) = losses::<MaskedCentre>(0..1000, 0.0, parallel);
-        assert!(lost > 3, "{lost}: the worlds are hard enough");
+        let lost = [
+            losses::<MaskedCentre>(0..600, 0.0, parallel).0,
+            losses::<ZBuffer>(0..600, 0.0, parallel).0,
+            losses::<HierarchicalZ>(0..600, 0.0, parallel).0,
+            losses::<DepthRays<8>>(0..600, 0.0, parallel).0,
+        ];
+        assert!(
+            lost.iter().all(|&lost| lost > 2),
+            "{lost:?}: the worlds are hard enough"
+        );
     }
+}
+
+#[test]
+fn no_occlusion_loses_nothing() {
+    assert_eq!(losses::<NoOcclusion>(0..200, 0.0, false).0, 0);
 }
 
 /// More worlds than a test has time for: `cargo test --release -- --ignored`, with
