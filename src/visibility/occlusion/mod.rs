@@ -10,8 +10,11 @@
 
 mod block;
 mod buffer;
+mod depth_rays;
+mod hierarchical_z;
 mod interleaved;
 mod masked;
+mod none;
 mod outline;
 mod rect;
 mod scene;
@@ -20,14 +23,19 @@ mod stats;
 mod tests;
 mod two_pass;
 mod view;
+mod zbuffer;
 
 pub use block::Block;
 pub use buffer::{OcclusionBuffer, Origin};
+pub use depth_rays::DepthRays;
+pub use hierarchical_z::HierarchicalZ;
 pub use interleaved::{DEFAULT_DRAWN_PART, Interleaved};
 pub use masked::{Masked, MaskedCentre, MaskedInner};
+pub use none::NoOcclusion;
 pub use outline::{Coverage, Outline};
 pub use rect::{Rect, Rects};
 pub use scene::{Faces, OccluderScene};
 pub use stats::CullStats;
 pub use two_pass::{OccluderChoice, TwoPass};
 pub use view::{Linear, Projection, View};
+pub use zbuffer::ZBuffer;

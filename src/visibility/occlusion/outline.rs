@@ -354,11 +354,29 @@ impl Outline {
         }
     }
 
-    /// The nearness at a point of the image, rounded.
-    pub fn nearness_at(&self, x: f64, y: f64) -> f32 {
-        let faces = self.faces[..self.face_count].iter();
-        let least = faces.fold(f64::INFINITY, |least, l| least.min(l.x * x + l.y * y + l.c));
-        least as f32
+    /// The nearness at the centres of pixels, rounded.
+    #[inline(always)]
+    pub fn per_pixel(&self) -> PixelNearness {
+        let mut faces = [[f32::INFINITY, 0.0, 0.0]; 3];
+        for (of_pixel, face) in faces.iter_mut().zip(&self.faces[..self.face_count]) {
+            let c = face.c + 0.5 * (face.x + face.y);
+            *of_pixel = [c as f32, face.x as f32, face.y as f32];
+        }
+        PixelNearness { faces }
+    }
+}
+
+/// The nearness of an outline pixel by pixel, in f32.
+#[derive(Clone, Copy, Debug)]
+pub struct PixelNearness {
+    faces: [[f32; 3]; 3],
+}
+
+impl PixelNearness {
+    /// At the centre of a pixel, by its column and row.
+    #[inline(always)]
+    pub fn of(&self, column: f32, row: f32) -> f32 {
+        least_of(&self.faces, column, row)
     }
 }
 
@@ -373,11 +391,7 @@ impl TileNearness {
     /// Of a tile by its column and row.
     #[inline(always)]
     pub fn of(&self, column: f32, row: f32) -> f32 {
-        let [a, b, c] = &self.faces;
-        let at = |f: &[f32; 3]| (f[0] + f[1] * column) + f[2] * row;
-        let (a, b, c) = (at(a), at(b), at(c));
-        let ab = if a < b { a } else { b };
-        let least = if ab < c { ab } else { c };
+        let least = least_of(&self.faces, column, row);
         if least > self.floor {
             least
         } else {
@@ -398,4 +412,12 @@ fn farthest(low: DVec3, high: DVec3, forward: DVec3) -> (f64, f64) {
         size += term.abs();
     }
     (depth, size)
+}
+
+#[inline(always)]
+fn least_of(faces: &[[f32; 3]; 3], column: f32, row: f32) -> f32 {
+    let at = |f: &[f32; 3]| (f[0] + f[1] * column) + f[2] * row;
+    let (a, b, c) = (at(&faces[0]), at(&faces[1]), at(&faces[2]));
+    let ab = if a < b { a } else { b };
+    if ab < c { ab } else { c }
 }

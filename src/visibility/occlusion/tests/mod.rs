@@ -1,4 +1,40 @@
 //! The stage against rays, one by one and in f64.
 
 mod by_rays;
+mod rules;
+mod slits;
+mod streets;
 mod worlds;
+
+use super::{Interleaved, OccluderChoice, OcclusionBuffer, TwoPass, View};
+use crate::kernel::Kernel;
+use crate::query::ItemId;
+use by_rays::Ready;
+
+/// What is left of the items in the view, in order: by two passes, and interleaved
+/// where the back end allows it.
+fn kept<B: OcclusionBuffer>(ready: &Ready, view: &View, kernel: Kernel) -> Vec<Vec<ItemId>> {
+    let mut answers = vec![by_two_passes::<B>(ready, view, OccluderChoice::All, kernel)];
+    if B::ALTERNATES {
+        let mut culler = Interleaved::new(B::new(view.grid), kernel).drawing_from(1 << 16);
+        let mut kept = Vec::new();
+        culler.cull(&ready.occluders, view, &mut kept);
+        kept.sort_unstable();
+        answers.push(kept);
+    }
+    answers
+}
+
+fn by_two_passes<B: OcclusionBuffer>(
+    ready: &Ready,
+    view: &View,
+    choice: OccluderChoice,
+    kernel: Kernel,
+) -> Vec<ItemId> {
+    let candidates = ready.in_view(view.volume);
+    let mut culler = TwoPass::new(B::new(view.grid), choice, kernel);
+    let mut kept = Vec::new();
+    culler.cull(&ready.occluders, view, &candidates, &mut kept);
+    kept.sort_unstable();
+    kept
+}

@@ -1,0 +1,35 @@
+//! No occlusion at all: what leaving the stage out keeps.
+
+use super::buffer::{OcclusionBuffer, Origin};
+use super::outline::{Coverage, Outline};
+use super::rect::Rect;
+use crate::kernel::Isa;
+use crate::visibility::{Guarantee, SampleGrid};
+
+/// A buffer that hides nothing. What no ray of the image can meet is still left
+/// out, as the couplings see to that.
+#[derive(Clone, Copy, Default, Debug)]
+pub struct NoOcclusion;
+
+impl OcclusionBuffer for NoOcclusion {
+    const NAME: &'static str = "none";
+    const SUMMARY: &'static str = "hides nothing";
+    const GUARANTEE: Guarantee = Guarantee::Conservative;
+    const ORIGIN: Origin = Origin::Textbook;
+    const COVERAGE: Coverage = Coverage::Whole;
+    const ALTERNATES: bool = true;
+
+    fn new(_: SampleGrid) -> Self {
+        NoOcclusion
+    }
+
+    fn clear(&mut self) {}
+
+    #[inline(always)]
+    fn draw<I: Isa>(&mut self, _: I, _: &Outline) {}
+
+    #[inline(always)]
+    fn hides<I: Isa>(&self, _: I, _: &Rect) -> bool {
+        false
+    }
+}

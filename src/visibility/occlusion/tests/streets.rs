@@ -1,0 +1,98 @@
+//! Scenes of the generators, seen from the street.
+
+use glam::{DVec3, Vec3};
+
+use super::super::{MaskedCentre, MaskedInner, OcclusionBuffer};
+use super::by_rays::{Ready, missing, seen_by_rays, with_view};
+use super::kept;
+use crate::camera::{Camera, Frame, Lens};
+use crate::kernel::Kernel;
+use crate::scene::{LoadOptions, SeededRng, load};
+use crate::visibility::SampleGrid;
+
+const GRID: SampleGrid = SampleGrid::new(160, 90);
+
+/// Eyes 1.7 above the lowest point, outside of all boxes, looking about.
+fn cameras(ready: &Ready, count: usize) -> Vec<Camera> {
+    let mut rng = SeededRng::new(11);
+    let world = ready.scene.world_bounds();
+    let mut cameras = Vec::new();
+    while cameras.len() < count {
+        let (low, high) = (world.min * 0.8, world.max * 0.8);
+        let mut eye = low + (high - low) * rng.point();
+        eye.z = world.min.z + 1.7;
+        let local = (eye - ready.scene.origin).as_vec3();
+        let reach = Vec3::splat(0.3);
+        let near = |b: &crate::geometry::Aabb| {
+            (b.min - reach).cmple(local).all() && local.cmple(b.max + reach).all()
+        };
+        let angle = rng.unit() * std::f64::consts::TAU;
+        if ready.scene.items.iter().any(near) {
+            continue;
+        }
+        let forward = DVec3::new(libm::cos(angle), libm::sin(angle), 0.0);
+        let frame = Frame::looking_along(eye, forward, DVec3::Z).unwrap();
+        let lens = Lens::perspective(60.0, 16.0 / 9.0, 0.1, None).unwrap();
+        cameras.push(Camera { frame, lens });
+    }
+    cameras
+}
+
+fn ready(spec: &str) -> Ready {
+    Ready::of(load(spec, &LoadOptions::default()).unwrap())
+}
+
+const SCENES: [&str; 3] = ["city:n=3000", "rooms:n=3000", "forest:n=3000"];
+
+fn lost<B: OcclusionBuffer>(spec: &str) -> (usize, usize, usize) {
+    let ready = ready(spec);
+    let mut rng = SeededRng::new(5);
+    let (mut lost, mut hidden, mut removed) = (0, 0, 0);
+    for camera in cameras(&ready, 4) {
+        with_view(&ready, &camera, GRID, |view, rays| {
+            let seen = seen_by_rays(rays, &ready.solids.boxes, 3000, &mut rng);
+            let in_view = ready.in_view(view.volume);
+            hidden += in_view.len() - seen.len();
+            for kept in kept::<B>(&ready, view, Kernel::best()) {
+                assert!(missing(&kept, &in_view).is_empty());
+                lost += missing(&seen, &kept).len();
+                removed += in_view.len() - kept.len();
+            }
+        });
+    }
+    (lost, hidden, removed / 2)
+}
+
+#[test]
+fn streets_lose_nothing_and_most_of_what_is_hidden_is_removed() {
+    for (spec, least) in SCENES.into_iter().zip([0.9, 0.95, 0.0]) {
+        let (lost, hidden, removed) = lost::<MaskedInner>(spec);
+        assert_eq!(lost, 0, "{spec}");
+        let share = removed as f64 / hidden as f64;
+        assert!(share > least, "{spec}: {share}");
+    }
+}
+
+#[test]
+fn every_instruction_set_gives_the_same_answer() {
+    for spec in SCENES {
+        let ready = ready(spec);
+        for (n, mut camera) in cameras(&ready, 3).into_iter().enumerate() {
+            if n == 0 {
+                camera.lens = Lens::orthographic(60.0, 1.6, 0.0, 2000.0).unwrap();
+            }
+            with_view(&ready, &camera, GRID, |view, _| {
+                let plain = kept::<MaskedInner>(&ready, view, Kernel::Portable);
+                let centres = kept::<MaskedCentre>(&ready, view, Kernel::Portable);
+                for kernel in Kernel::available() {
+                    assert_eq!(kept::<MaskedInner>(&ready, view, kernel), plain, "{kernel}");
+                    assert_eq!(
+                        kept::<MaskedCentre>(&ready, view, kernel),
+                        centres,
+                        "{kernel}"
+                    );
+                }
+            });
+        }
+    }
+}

@@ -1,0 +1,82 @@
+//! The plain depth buffer: one depth a pixel, sampled at its centre.
+
+use super::block::first_lanes;
+use super::buffer::{OcclusionBuffer, Origin};
+use super::outline::{Coverage, Outline};
+use super::rect::Rect;
+use crate::kernel::{Isa, LANES};
+use crate::visibility::{Guarantee, SampleGrid};
+
+/// Nearness at the centre of each pixel; 0 where nothing was drawn.
+#[derive(Clone, Debug)]
+pub struct ZBuffer {
+    grid: SampleGrid,
+    nearness: Vec<f32>,
+}
+
+impl ZBuffer {
+    /// The pixels, row by row, and something behind them.
+    pub(super) fn nearness(&self) -> &[f32] {
+        &self.nearness
+    }
+}
+
+impl OcclusionBuffer for ZBuffer {
+    const NAME: &'static str = "z-buffer";
+    const SUMMARY: &'static str =
+        "one depth a pixel, at its centre; every pixel of a box is tested";
+    const GUARANTEE: Guarantee = Guarantee::Unproven;
+    const ORIGIN: Origin = Origin::Textbook;
+    const COVERAGE: Coverage = Coverage::Centre;
+    const ALTERNATES: bool = true;
+
+    fn new(grid: SampleGrid) -> Self {
+        ZBuffer {
+            grid,
+            nearness: vec![0.0; grid.samples() + LANES],
+        }
+    }
+
+    fn clear(&mut self) {
+        self.nearness.fill(0.0);
+    }
+
+    #[inline(always)]
+    fn draw<I: Isa>(&mut self, _: I, outline: &Outline) {
+        let (width, height) = (self.grid.width as usize, self.grid.height as usize);
+        let nearness = outline.per_pixel();
+        let (first, end) = outline.rows();
+        for row in first..end.min(height) {
+            let ([start], [end]) = outline.spans::<1>(row);
+            let (start, end) = (start as usize, (end as usize).min(width));
+            if start >= end {
+                continue;
+            }
+            let pixels = &mut self.nearness[row * width + start..row * width + end];
+            for (i, pixel) in pixels.iter_mut().enumerate() {
+                let near = nearness.of((start + i) as u32 as f32, row as f32);
+                *pixel = if near > *pixel { near } else { *pixel };
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn hides<I: Isa>(&self, isa: I, rect: &Rect) -> bool {
+        let width = self.grid.width as usize;
+        let nearness = isa.splat(rect.nearness);
+        let (first, end) = (usize::from(rect.x0), usize::from(rect.x1) + 1);
+        for row in usize::from(rect.y0)..usize::from(rect.y1) + 1 {
+            for column in (first..end).step_by(LANES) {
+                let at = row * width + column;
+                let Some(pixels) = self.nearness[at..].first_chunk() else {
+                    return false;
+                };
+                let passed = isa.at_most(isa.load(pixels), nearness);
+                if passed & first_lanes(end - column) != 0 {
+                    return false;
+                }
+            }
+        }
+        true
+    }
+}
