@@ -332,8 +332,8 @@ impl Grid {
                 }
                 for first in 0..n {
                     let mut common = u64::MAX;
-                    for last in first..n {
-                        common &= rows[last];
+                    for (last, row) in rows.iter().enumerate().skip(first) {
+                        common &= row;
                         if common == 0 {
                             break;
                         }

@@ -10,6 +10,7 @@ mod statue;
 mod terrain;
 
 use super::surface::Surfaces;
+use crate::spec::{Spec, SpecError};
 
 /// A kind of generated mesh.
 #[derive(Clone, Copy, Debug)]
@@ -43,6 +44,28 @@ impl Mesh {
     }
 }
 
+/// Most triangles that a spec may ask for: the indices of their corners fit u32.
+const MOST_TRIANGLES: u64 = 100_000_000;
+
+/// The mesh that a text describes: `mesh:statue:n=1M,seed=7`. Parameters: `n`
+/// triangles (100k), `seed` (1), and `offset`, where the zero of the mesh lies on
+/// all axes of the world (0).
+///
+/// # Errors
+/// An unknown mesh, or a parameter that is unknown or out of range.
+pub fn load(text: &str) -> Result<Surfaces, SpecError> {
+    let mut spec = Spec::parse(text.strip_prefix("mesh:").unwrap_or(text))?;
+    let mesh = Mesh::named(spec.name())
+        .ok_or_else(|| SpecError::unknown("mesh", text, MESHES.iter().map(|mesh| mesh.name)))?;
+    let triangles = spec.count("n", 100_000, MOST_TRIANGLES)?;
+    let seed = spec.whole("seed", 1, u64::MAX)?;
+    let offset = spec.number("offset", 0.0)?;
+    spec.finish()?;
+    let mut surfaces = (mesh.build)(triangles as usize, seed);
+    surfaces.origin += offset;
+    Ok(surfaces)
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::surface::SurfaceKind;
@@ -66,6 +89,19 @@ mod tests {
             }
         }
         assert!(Mesh::named("terrain").is_some() && Mesh::named("mesh:teapot").is_none());
+    }
+
+    #[test]
+    fn a_text_names_a_mesh_its_size_and_its_place() {
+        let near = load("mesh:spheres:n=3k,seed=2").unwrap();
+        let far = load("spheres:n=3k,seed=2,offset=1e7").unwrap();
+        assert_eq!((near.items(), &near.points), (2, &far.points));
+        assert_eq!(far.origin, glam::DVec3::splat(1e7));
+        let scene = far.scene("far").unwrap();
+        assert_eq!(scene.items, near.scene("near").unwrap().items);
+        for wrong in ["mesh:sphere", "mesh:spheres:n=0", "mesh:spheres:m=3"] {
+            assert!(load(wrong).is_err(), "{wrong}");
+        }
     }
 
     #[test]

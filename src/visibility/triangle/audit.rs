@@ -25,6 +25,8 @@ named! {
         Single = "f32",
         /// Any points of f64: the eye is rounded too.
         Double = "f64",
+        /// Eyes at infinity: directions of a parallel lens.
+        Direction = "direction",
     }
 }
 
@@ -38,6 +40,9 @@ pub struct Audit {
     pub rejected: usize,
     /// Pairs of which it removed a triangle whose front the eye sees.
     pub false_negatives: usize,
+    /// Largest sine of the angle between the plane of a lost triangle and the line
+    /// from the eye to its first corner, rounded: how far it is turned to the eye.
+    pub worst_sine: f64,
     /// Eye and corners of the first of them.
     pub witness: Option<(DVec3, [Vec3; 3])>,
 }
@@ -53,6 +58,7 @@ pub fn audit(row: &TriangleRow, pairs: usize, seed: u64, eyes: EyeKind) -> Audit
         pairs: 0,
         rejected: 0,
         false_negatives: 0,
+        worst_sine: 0.0,
         witness: None,
     };
     while found.pairs < pairs {
@@ -66,29 +72,36 @@ pub fn audit(row: &TriangleRow, pairs: usize, seed: u64, eyes: EyeKind) -> Audit
         let all = Selection::all(&clusters);
         for cluster in 0..clusters.len() {
             for _ in 0..EYES {
-                let eye = boundary(&clusters, cluster, &mut rng);
+                let [eye, way] = boundary(&clusters, cluster, &mut rng);
                 let eye = match eyes {
-                    EyeKind::Single => eye.as_vec3().as_dvec3(),
-                    EyeKind::Double => eye,
+                    EyeKind::Single => Eye::local(eye.as_vec3().as_dvec3()),
+                    EyeKind::Double => Eye::local(eye),
+                    EyeKind::Direction => Eye::along(-way),
                 };
-                let view = View::from_eye(Eye::local(eye));
+                let view = View::from_eye(eye);
                 let mut kept = all.clone();
                 back_end.cull(&view, Kernel::best(), &mut kept);
                 found.pairs += 1;
                 let removed = all.words()[cluster] & !kept.words()[cluster];
                 found.rejected += usize::from(removed != 0);
-                let lost = clusters
-                    .corners_of(cluster)
-                    .enumerate()
-                    .find(|(bit, corners)| removed >> bit & 1 == 1 && faces(&view.eye, *corners));
-                if let Some((_, corners)) = lost {
-                    found.false_negatives += 1;
-                    found.witness.get_or_insert((eye, corners));
+                let mut is_lost = false;
+                for (bit, corners) in clusters.corners_of(cluster).enumerate() {
+                    if removed >> bit & 1 == 1 && faces(&view.eye, corners) {
+                        is_lost = true;
+                        found.worst_sine = found.worst_sine.max(sine(&view.eye, corners));
+                        found.witness.get_or_insert((eye.high, corners));
+                    }
                 }
+                found.false_negatives += usize::from(is_lost);
             }
         }
     }
     found
+}
+
+fn sine(eye: &Eye, corners: [Vec3; 3]) -> f64 {
+    let way = eye.high - corners[0].as_dvec3() * f64::from(eye.weight);
+    way.normalize_or_zero().dot(normal(corners).normalize())
 }
 
 /// A few triangles about a point: flat, bent or thin; near the zero or far from it.
@@ -120,8 +133,9 @@ fn patch(rng: &mut SeededRng) -> (Vec<Vec3>, Vec<[u32; 3]>) {
 }
 
 /// An eye near the boundary: in the plane of a triangle but for some ulps, where the
-/// cone of the cluster touches that plane or anywhere.
-fn boundary(clusters: &Clusters, cluster: usize, rng: &mut SeededRng) -> DVec3 {
+/// cone of the cluster touches that plane or anywhere. And the direction to it, also
+/// off by some ulps.
+fn boundary(clusters: &Clusters, cluster: usize, rng: &mut SeededRng) -> [DVec3; 2] {
     let triangles: Vec<[Vec3; 3]> = clusters.corners_of(cluster).collect();
     let normals: Vec<DVec3> = triangles
         .iter()
@@ -138,11 +152,15 @@ fn boundary(clusters: &Clusters, cluster: usize, rng: &mut SeededRng) -> DVec3 {
         _ => ((b - a) * rng.between(-1.0, 1.0) + (c - a) * rng.between(-1.0, 1.0))
             .normalize_or(DVec3::X),
     };
-    let mut eye = a + way * far;
     // Some ulps of f32 or of f64 to either side.
     let ulp = [f64::from(f32::EPSILON), f64::EPSILON][rng.below(2)];
-    for k in 0..3 {
-        eye[k] += (eye[k].abs() + far * 1e-3) * ulp * (rng.below(9) as f64 - 4.0) / 2.0;
-    }
-    eye
+    let mut off = |size: DVec3| {
+        let step = |k: usize| size[k] * ulp * (rng.below(9) as f64 - 4.0) / 2.0;
+        DVec3::from([0, 1, 2].map(step))
+    };
+    let eye = a + way * far;
+    [
+        eye + off(eye.abs() + far * 1e-3),
+        way + off(DVec3::splat(1.0)),
+    ]
 }

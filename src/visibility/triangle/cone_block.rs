@@ -12,7 +12,7 @@ pub trait ConeRows: Sync {
 }
 
 /// Sixteen cones in f32: 28 bytes a cone.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, bytemuck::Zeroable, bytemuck::Pod)]
 #[repr(C, align(64))]
 pub struct ConeBlock {
     apex: [[f32; LANES]; 3],

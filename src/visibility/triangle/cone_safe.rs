@@ -11,7 +11,7 @@ use super::contract::{Criterion, TriangleCull, TriangleRow};
 use super::normal_cone::Cone;
 use super::selection::Selection;
 use super::view::View;
-use crate::kernel::{Kernel, LANES, LaneMask};
+use crate::kernel::{Isa, Kernel, LANES, LaneMask, Work};
 
 /// The row of this file.
 pub const ROW: TriangleRow = TriangleRow {
@@ -41,10 +41,33 @@ impl SafeCones {
         SafeCones { blocks }
     }
 
+    /// A lower bound of any test of these cones: reads all of them once. The value
+    /// only keeps the compiler from leaving it out.
+    pub fn read(&self, kernel: Kernel) -> u64 {
+        kernel.run(Read(bytemuck::cast_slice(&self.blocks)))
+    }
+
     /// The test alone: bit `i` of word `w` says that cluster `16 w + i` turns only
     /// backs to the eye. `out` is overwritten.
     pub fn reject(&self, view: &View, kernel: Kernel, out: &mut Vec<LaneMask>) {
         reject_all(&self.blocks, view, kernel, out);
+    }
+}
+
+struct Read<'a>(&'a [[u64; 8]]);
+
+impl Work for Read<'_> {
+    type Output = u64;
+
+    #[inline(always)]
+    fn run<I: Isa>(self, _: I) -> u64 {
+        let mut all = [0; 8];
+        for line in self.0 {
+            for (all, word) in all.iter_mut().zip(line) {
+                *all ^= word;
+            }
+        }
+        all.iter().fold(0, |all, word| all ^ word)
     }
 }
 

@@ -11,6 +11,9 @@ use crate::camera::Lens;
 /// thousands of times that.
 const ERROR: f64 = 1.0 / (1u64 << 40) as f64;
 
+/// 2^52: adding it rounds what is not negative to a whole number.
+const WHOLE: f64 = (1u64 << 52) as f64;
+
 /// A camera with a window, scene-local.
 #[derive(Clone, Copy, Debug)]
 pub struct Screen {
@@ -108,7 +111,7 @@ impl Screen {
             true => (1.0, 1.0),
             false => (1.0 / depth, depth - error),
         };
-        if !(depth > error && least > 0.0) {
+        if !(depth > error && least > 1e-300) {
             return PixelBox::EVERYWHERE;
         }
         let (x, y, slack) = (x * scale, y * scale, error / least);
@@ -134,12 +137,13 @@ impl Screen {
     #[inline(always)]
     pub fn has_sample(&self, all: &PixelBox) -> bool {
         let within = |low: f64, high: f64, count: u32| {
-            let low = low.max(0.0);
-            let high = high.min(f64::from(count) - 1.0);
-            // The next whole number, without a call; far ones saturate.
-            let whole = low as i64 as f64;
+            let count = f64::from(count);
+            let low = -least(-low, 0.0);
+            let low = least(low, count);
+            // Near 2^52 only whole numbers are left: the nearest one, without a call.
+            let whole = (low + WHOLE) - WHOLE;
             let next = if whole < low { whole + 1.0 } else { whole };
-            next <= high
+            next <= least(high, count - 1.0)
         };
         within(all.low[0], all.high[0], self.grid.width)
             && within(all.low[1], all.high[1], self.grid.height)

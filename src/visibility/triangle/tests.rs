@@ -154,6 +154,53 @@ fn two_sided_triangles_are_kept_and_flat_ones_without_area_are_not() {
     }
 }
 
+#[test]
+fn the_proven_margin_costs_next_to_nothing() {
+    for (name, clusters) in scenes() {
+        let all = Selection::all(&clusters);
+        let removed = |wanted: &str| {
+            let row = TRIANGLE_ROWS.iter().find(|row| row.name == wanted).unwrap();
+            let back_end = (row.build)(&clusters);
+            let views = cameras(&clusters, 16, 8);
+            let of = |camera: &Camera| {
+                let mut kept = all.clone();
+                back_end.cull(&view(camera, &clusters), Kernel::best(), &mut kept);
+                all.without(&kept)
+            };
+            views.iter().map(of).sum::<usize>() as f64
+        };
+        let unsafe_one = removed("cone f32");
+        assert!(removed("cone f32 safe") >= 0.99 * unsafe_one, "{name}");
+        assert!(removed("cone s8") >= 0.97 * unsafe_one, "{name}");
+        assert!(removed("several cones") >= 1.1 * unsafe_one, "{name}");
+    }
+}
+
+#[test]
+fn the_test_alone_says_what_the_stage_takes_away() {
+    for (name, clusters) in scenes() {
+        let (safe, bytes) = (SafeCones::of(&clusters), ByteCones::of(&clusters));
+        let (mut masks, mut more) = (Vec::new(), Vec::new());
+        for camera in cameras(&clusters, 6, 2) {
+            let view = view(&camera, &clusters);
+            for kernel in Kernel::available() {
+                safe.reject(&view, kernel, &mut masks);
+                bytes.reject(&view, kernel, &mut more);
+                for (masks, back_end) in [(&masks, &safe as &dyn TriangleCull), (&more, &bytes)] {
+                    let mut kept = Selection::all(&clusters);
+                    back_end.cull(&view, kernel, &mut kept);
+                    assert_eq!(masks.len(), clusters.len().div_ceil(16));
+                    for (cluster, word) in kept.words().iter().enumerate() {
+                        let is_gone = masks[cluster / 16] >> (cluster % 16) & 1 == 1;
+                        assert_eq!(is_gone, *word == 0, "{name} {kernel}");
+                    }
+                }
+                assert_eq!(safe.read(kernel), safe.read(Kernel::Portable));
+            }
+        }
+    }
+}
+
 /// Where a ray meets the plane of a triangle, if that is within it: in f64, and wide
 /// by a billionth.
 fn meets(ray: &super::super::rays::Ray, corners: [Vec3; 3], origin: DVec3) -> bool {
