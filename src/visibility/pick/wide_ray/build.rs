@@ -8,20 +8,50 @@ use glam::Vec3;
 
 use super::slabs::Rows;
 use crate::geometry::Aabb;
-use crate::kernel::LANES;
+use crate::kernel::{LANES, LaneMask};
 use crate::query::ItemId;
 
 const BINS: usize = 16;
 
-/// Sixteen boxes: items in the first lanes, nodes in those behind.
+/// Sixteen boxes: items in the first lanes, nodes in those behind. 448 bytes.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(super) struct Node {
     pub rows: Rows,
-    /// Places of items in tree order, numbers of nodes; of unused lanes any.
+    /// Places of items in tree order, nodes as [`Child`]; of unused lanes any.
     pub children: [u32; LANES],
-    /// How many lanes hold items.
-    pub items: u32,
+}
+
+/// A node's number and how many of its first lanes hold items, in 27 and 5 bits:
+/// known before the node is read.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Child(pub u32);
+
+impl Child {
+    /// Most nodes there can be.
+    pub const MOST: usize = 1 << 27;
+
+    fn new(node: usize, items: usize) -> Child {
+        Child((node as u32) << 5 | items as u32)
+    }
+
+    #[inline(always)]
+    pub fn node(self) -> usize {
+        (self.0 >> 5) as usize
+    }
+
+    /// The lanes of items.
+    #[inline(always)]
+    pub fn items(self) -> LaneMask {
+        ((1u32 << (self.0 & 31)) - 1) as LaneMask
+    }
+}
+
+/// The tree: nodes, the root first, and the ids of the items in tree order.
+pub(super) struct Built {
+    pub nodes: Vec<Node>,
+    pub root: Child,
+    pub ids: Vec<ItemId>,
 }
 
 const EMPTY: Node = Node {
@@ -30,7 +60,6 @@ const EMPTY: Node = Node {
         [low, low, low, high, high, high]
     },
     children: [0; LANES],
-    items: 0,
 };
 
 impl Node {
@@ -75,14 +104,15 @@ fn half_area(b: &Aabb) -> f32 {
     e.x * e.y + e.y * e.z + e.z * e.x
 }
 
-/// Nodes, the root first, and the ids of the items in tree order. O(n log n).
-pub(super) fn build(boxes: &[Aabb]) -> (Vec<Node>, Vec<ItemId>) {
+/// Builds the tree. O(n log n).
+pub(super) fn build(boxes: &[Aabb]) -> Built {
     let item = |(id, &bounds): (usize, &Aabb)| Item {
         bounds,
         id: id as ItemId,
     };
     let mut items: Vec<Item> = boxes.iter().enumerate().map(item).collect();
-    let mut nodes = Vec::with_capacity(boxes.len() / 8 + 1);
+    let mut nodes: Vec<Node> = Vec::with_capacity(boxes.len() / 8 + 1);
+    let mut root = Child::new(0, 0);
     // Where the number of the node is to be written.
     let mut open: Vec<(Part, Option<(usize, usize)>)> = Vec::new();
     if !items.is_empty() {
@@ -90,24 +120,28 @@ pub(super) fn build(boxes: &[Aabb]) -> (Vec<Node>, Vec<ItemId>) {
     }
     while let Some((part, above)) = open.pop() {
         let at = nodes.len();
-        if let Some((node, lane)) = above {
-            let node: &mut Node = &mut nodes[node];
-            node.children[lane] = at as u32;
-        }
         let mut parts = cut(&mut items, part);
         parts.sort_by_key(|part| part.len() > 1);
+        let single = parts.iter().filter(|part| part.len() == 1).count();
+        let child = Child::new(at, single);
+        match above {
+            None => root = child,
+            Some((node, lane)) => nodes[node].children[lane] = child.0,
+        }
         let mut node = EMPTY;
-        node.items = parts.iter().filter(|part| part.len() == 1).count() as u32;
         for (lane, part) in parts.iter().enumerate() {
             node.set(lane, &part.bounds, part.range.start as u32);
         }
         nodes.push(node);
-        let single = node.items as usize;
         for (lane, part) in parts.into_iter().enumerate().skip(single).rev() {
             open.push((part, Some((at, lane))));
         }
     }
-    (nodes, items.iter().map(|item| item.id).collect())
+    Built {
+        nodes,
+        root,
+        ids: items.iter().map(|item| item.id).collect(),
+    }
 }
 
 /// Cuts a set into at most sixteen parts: the one with the largest surface
@@ -196,29 +230,33 @@ mod tests {
     use crate::scene::SeededRng;
 
     fn check(boxes: &[Aabb]) -> usize {
-        let (nodes, ids) = build(boxes);
+        let Built { nodes, root, ids } = build(boxes);
         let mut sorted = ids.clone();
         sorted.sort_unstable();
         assert!(sorted.iter().copied().eq(0..boxes.len() as u32));
         let mut found = vec![0; boxes.len()];
         let mut reached = vec![0; nodes.len()];
-        for node in &nodes {
+        let mut children = vec![root; nodes.len()];
+        for (at, node) in nodes.iter().enumerate() {
+            let items = children[at].items();
             for lane in 0..LANES {
                 let bound = |row: usize| node.rows[row][lane];
                 let b = Aabb::new(
                     Vec3::new(bound(0), bound(1), bound(2)),
                     Vec3::new(bound(3), bound(4), bound(5)),
                 );
-                let child = node.children[lane] as usize;
+                let child = node.children[lane];
                 if b.is_empty() {
                     continue;
                 }
-                if lane < node.items as usize {
-                    assert_eq!(b, boxes[ids[child] as usize]);
-                    found[child] += 1;
+                if items >> lane & 1 == 1 {
+                    assert_eq!(b, boxes[ids[child as usize] as usize]);
+                    found[child as usize] += 1;
                 } else {
-                    reached[child] += 1;
-                    let below = &nodes[child].rows;
+                    let child = Child(child);
+                    children[child.node()] = child;
+                    reached[child.node()] += 1;
+                    let below = &nodes[child.node()].rows;
                     for axis in 0..3 {
                         let low = below[axis].iter().fold(f32::INFINITY, |a, &b| a.min(b));
                         let high = below[axis + 3].iter();

@@ -8,13 +8,13 @@ mod slabs;
 
 use glam::{DVec3, Vec3};
 
-use self::build::Node;
+use self::build::{Built, Child, Node};
 use self::slabs::Slabs;
 use super::contract::{About, Hit, NotBuilt, Pick};
 use super::exactly;
 use crate::geometry::Aabb;
 use crate::index::Origin;
-use crate::kernel::{Isa, Kernel, LANES, LaneMask, Work};
+use crate::kernel::{Isa, Kernel, LANES, Work};
 use crate::query::ItemId;
 use crate::scene::WorldBox;
 use crate::visibility::{Guarantee, Ray, Solids};
@@ -32,17 +32,26 @@ pub const ABOUT: About = About {
     guarantee: Guarantee::Exact,
 };
 
-/// Most items: their places and numbers of nodes are u32.
-const MOST: usize = ItemId::MAX as usize - 1;
+/// Most items: a node holds one at least.
+const MOST: usize = Child::MOST;
 
-/// Boxes under a tree of nodes of sixteen. Some 80 bytes of nodes, 48 of the
-/// boxes as they were written and 4 of id per item.
+/// An item in one cache line.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+struct Item {
+    /// As it was written.
+    b: WorldBox,
+    id: ItemId,
+}
+
+/// Boxes under a tree of nodes of sixteen. Some 45 bytes of nodes and 64 of the
+/// box as it was written per item.
 #[derive(Clone, Debug)]
 pub struct WideRay {
     nodes: Vec<Node>,
-    /// In tree order, as they were written.
-    boxes: Vec<WorldBox>,
-    ids: Vec<ItemId>,
+    root: Child,
+    /// In tree order.
+    items: Vec<Item>,
     /// Where the zero of the nodes is.
     zero: DVec3,
     /// Largest absolute local coordinate on each axis.
@@ -55,17 +64,21 @@ impl WideRay {
     /// Builds the tree. O(n log n).
     ///
     /// # Errors
-    /// More items than ids.
+    /// More than 2^27 items.
     pub fn of(solids: &Solids) -> Result<WideRay, NotBuilt> {
         let count = solids.outer.len();
         if count > MOST {
             return Err(NotBuilt::TooMany { count, most: MOST });
         }
-        let (nodes, ids) = build::build(&solids.outer);
+        let Built { nodes, root, ids } = build::build(&solids.outer);
+        let item = |&id: &ItemId| Item {
+            b: solids.boxes[id as usize],
+            id,
+        };
         Ok(WideRay {
             nodes,
-            boxes: ids.iter().map(|&id| solids.boxes[id as usize]).collect(),
-            ids,
+            root,
+            items: ids.iter().map(item).collect(),
             zero: solids.origin,
             reach: Aabb::union_of(&solids.outer).reach(),
             kernel: Kernel::best(),
@@ -89,11 +102,12 @@ impl WideRay {
     }
 
     fn place(&self, place: u32) -> (ItemId, &WorldBox) {
-        (self.ids[place as usize], &self.boxes[place as usize])
+        let item = &self.items[place as usize];
+        (item.id, &item.b)
     }
 
     fn all(&self) -> impl Iterator<Item = (ItemId, &WorldBox)> {
-        self.ids.iter().copied().zip(&self.boxes)
+        self.items.iter().map(|item| (item.id, &item.b))
     }
 
     /// Offers every item that the ray can meet no deeper than the candidates'
@@ -104,11 +118,11 @@ impl WideRay {
         if self.nodes.is_empty() {
             return;
         }
-        let mut at = 0u32;
+        let mut at = self.root;
         loop {
-            let node = &self.nodes[at as usize];
+            let node = &self.nodes[at.node()];
             let tested = slabs.test(isa, &node.rows, found.bound());
-            let items = ((1u32 << node.items) - 1) as LaneMask;
+            let items = at.items();
             let mut left = tested.lanes;
             if left != 0 {
                 let less_entry = isa.to_array(tested.less_entry);
@@ -143,7 +157,7 @@ impl WideRay {
                         open.push_sorted(first, high);
                     }
                     if next.0 <= found.bound() {
-                        at = next.1;
+                        at = Child(next.1);
                         continue;
                     }
                 }
@@ -152,7 +166,7 @@ impl WideRay {
                 match open.pop() {
                     None => return,
                     Some((low, next)) if low <= found.bound() => {
-                        at = next;
+                        at = Child(next);
                         break;
                     }
                     Some(_) => {}
@@ -390,6 +404,6 @@ impl Pick for WideRay {
     }
 
     fn memory(&self) -> usize {
-        size_of_val(&self.nodes[..]) + size_of_val(&self.boxes[..]) + size_of_val(&self.ids[..])
+        size_of_val(&self.nodes[..]) + size_of_val(&self.items[..])
     }
 }
