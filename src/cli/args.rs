@@ -4,6 +4,7 @@
 use std::path::PathBuf;
 
 use crate::drift::ArmKind;
+use crate::funnel::StageKind;
 use crate::suite::DEFAULT_PATH;
 use crate::visibility::SampleGrid;
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -365,6 +366,9 @@ pub struct PrecisionArgs {
     /// Draw false positives against time as an SVG file too
     #[arg(long, value_name = "FILE")]
     pub svg: Option<PathBuf>,
+    /// Another stage of the funnel in place of the frustum: occlusion (over the sizes of its buffer), region (portals) or triangle (cones); the first structure does the object stage, the path is street if none is named
+    #[arg(long, value_name = "STAGE", value_parser = values::stage)]
+    pub stage: Option<StageKind>,
     #[command(flatten)]
     pub spread: SpreadArgs,
     #[arg(long, value_enum, default_value = "table")]

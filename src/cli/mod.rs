@@ -45,6 +45,7 @@ mod same_truth;
 mod scene;
 mod scene_args;
 mod shared_args;
+mod stage_sweep;
 mod stress;
 mod surface_diagram;
 mod surface_tables;

@@ -15,7 +15,7 @@ use super::run_resume::typed_args;
 use super::shared_args::TableFormat;
 use super::{
     Ending, expect_folder_of, interrupt, load_scene, precision_conclusions, precision_diagram,
-    precision_tables, print_json, text, unread_is_fine,
+    precision_tables, print_json, stage_sweep, text, unread_is_fine,
 };
 use crate::index::Registry;
 use crate::measure::{ProcessTimes, Protocol, Status};
@@ -32,6 +32,9 @@ const CUBES_PER_CAMERA: usize = 10_000;
 const SWEEP_CAMERAS: usize = 200;
 
 pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<Ending> {
+    if let Some(stage) = args.stage {
+        return stage_sweep::sweep(registry, args, stage);
+    }
     expect_folder_of(args.svg.as_deref())?;
     let structures = args.kernel.structures(registry, &args.structure)?;
     let defaults = args.lens.defaults()?;

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::advise::TrialPlan;
 use crate::drift::DriftPlan;
-use crate::funnel::FunnelPlan;
+use crate::funnel::{FunnelPlan, SweepPlan};
 use crate::measure::{Part, ProcessTimes, Share, TaskSamples};
 use crate::precision::PointPlan;
 
@@ -52,6 +52,8 @@ pub enum Job {
     Drift(DriftPlan, u32),
     /// Every stage of the funnel with every back end (`funnel`).
     Funnel(FunnelPlan, Timing),
+    /// One stage with every back end (`precision --stage`).
+    Sweep(SweepPlan, Timing),
 }
 
 /// What a process is to know beside its plan.

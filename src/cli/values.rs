@@ -5,6 +5,7 @@
 use crate::camera::{MATRIX_CONVENTIONS, MatrixConvention, PLANE_METHODS, PlaneMethod};
 use crate::culling::{ARITHMETICS, Arithmetic, CullingTest, TESTS};
 use crate::drift::{ARMS, ArmKind, MOST_STEPS};
+use crate::funnel::StageKind;
 use crate::kernel::Kernel;
 use crate::spec::{SpecError, parse_number};
 use crate::threads::MOST_THREADS;
@@ -91,6 +92,12 @@ pub fn steps(text: &str) -> Result<u64, SpecError> {
         .filter(|n| n.fract() == 0.0 && (1.0..=MOST_STEPS as f64).contains(n));
     let what = format_args!("a whole number from 1 to {MOST_STEPS:e}");
     expected(steps, what).map(|steps| steps as u64)
+}
+
+/// A stage of the funnel whose error and time can be swept.
+pub fn stage(name: &str) -> Result<StageKind, SpecError> {
+    let swept = [StageKind::Region, StageKind::Occlusion, StageKind::Triangle];
+    choice("stage", &swept.map(|stage| (stage, stage.name(), "")), name)
 }
 
 /// Columns and rows of an image, `320x180`.

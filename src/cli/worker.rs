@@ -16,7 +16,7 @@ use rand_pcg::Pcg64;
 use super::Ending;
 use super::args::{Cli, Command};
 use super::protocol::{Job, Message, PROTOCOL, Request};
-use super::{advise, drift, funnel, precision, run_plan};
+use super::{advise, drift, funnel, precision, run_plan, stage_sweep};
 use crate::index::Registry;
 use crate::measure::{Part, Plan, ProcessTimes, TIMING, TaskSamples, measure_scene};
 
@@ -69,6 +69,9 @@ fn answer(registry: &Registry, request: &Request) -> anyhow::Result<()> {
         }
         (Job::Points(plan, timing), Command::Precision(args)) => {
             here.times(&|stop| precision::time(registry, &args, plan, timing, stop))?;
+        }
+        (Job::Sweep(plan, timing), Command::Precision(args)) => {
+            here.times(&|stop| stage_sweep::time(registry, &args, plan, timing, stop))?;
         }
         (Job::Funnel(plan, timing), Command::Funnel(args)) => {
             here.times(&|stop| funnel::time(registry, &args, plan, timing, stop))?;

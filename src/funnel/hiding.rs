@@ -4,8 +4,8 @@ use super::stage::{BackEnd, StageKind};
 use crate::kernel::Kernel;
 use crate::query::ItemId;
 use crate::visibility::occlusion::{
-    Interleaved, MaskedCentre, MaskedInner, OccluderChoice, OccluderScene, OcclusionBuffer,
-    TwoPass, View,
+    DepthRays, HierarchicalZ, Interleaved, MaskedCentre, MaskedInner, OccluderChoice,
+    OccluderScene, OcclusionBuffer, TwoPass, View, ZBuffer,
 };
 use crate::visibility::{Guarantee, SampleGrid};
 
@@ -81,6 +81,9 @@ impl HidingRow {
 pub static HIDING: &[HidingRow] = &[
     HidingRow::interleaved::<MaskedInner>("masked-inner"),
     HidingRow::interleaved::<MaskedCentre>("masked"),
+    HidingRow::interleaved::<ZBuffer>("z-buffer"),
+    HidingRow::interleaved::<DepthRays<16>>("rays"),
     HidingRow::two_pass::<MaskedInner>("masked-inner-two-pass"),
     HidingRow::two_pass::<MaskedCentre>("masked-two-pass"),
+    HidingRow::two_pass::<HierarchicalZ>("hierarchical-z"),
 ];

@@ -19,6 +19,7 @@ mod plan_view;
 mod report;
 mod stage;
 mod study;
+mod sweep;
 mod world;
 
 pub use certified::certificates;
@@ -30,4 +31,5 @@ pub use plan_view::{Fate, PlanView};
 pub use report::{FunnelReport, Gain, LevelRow, StageRow, Times};
 pub use stage::{BackEnd, NONE, STAGES, StageKind};
 pub use study::{FunnelPlan, Prepared, failure, prepare, time};
+pub use sweep::{PreparedSweep, StageSweep, SweepPlan, SweepPoint, prepare_sweep, time_sweep};
 pub use world::{FunnelError, FunnelInput, back_ends};

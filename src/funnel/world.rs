@@ -128,6 +128,11 @@ pub struct Truth {
 }
 
 impl Truth {
+    /// Items with their samples, ascending.
+    pub fn of_view(&self, view: usize) -> &[(ItemId, u32)] {
+        &self.visible[view]
+    }
+
     /// Whether an item is in front at a sample of a view.
     pub fn sees(&self, view: usize, item: ItemId) -> bool {
         let found = self.visible[view].binary_search_by_key(&item, |(item, _)| *item);
@@ -303,13 +308,17 @@ impl<'a> World<'a> {
 
     fn run_occlusion(&self, name: &str) -> Run<'_> {
         let row = HIDING.iter().find(|row| row.back_end().name == name);
-        let row = row.expect("a row of the occlusion stage");
-        let hide = RefCell::new((row.make)(self.samples, self.kernel));
+        self.run_hiding(row.expect("a row of the occlusion stage"), self.samples)
+    }
+
+    /// A back end of the occlusion stage with a buffer of so many pixels.
+    pub fn run_hiding(&self, row: &HidingRow, buffer: SampleGrid) -> Run<'_> {
+        let hide = RefCell::new((row.make)(buffer, self.kernel));
         let does_both = row.back_end().does_object_stage;
         let every: Vec<ItemId> = (0..self.items() as ItemId).collect();
         Box::new(move |view, input, out| {
             let View { rays, volume, .. } = &self.views[view];
-            let view = occlusion::View::new(rays, volume, &self.occluders, self.samples);
+            let view = occlusion::View::new(rays, volume, &self.occluders, buffer);
             let items = input.unwrap_or(&every);
             hide.borrow_mut().hide(&self.occluders, &view, items, out);
             // It has looked beyond the regions that are seen.

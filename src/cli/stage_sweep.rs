@@ -1,0 +1,227 @@
+//! `cullbench precision --stage`: error against run time of one stage of the funnel.
+
+use std::io::{self, Write};
+use std::time::Duration;
+
+use anyhow::bail;
+use tempfile::NamedTempFile;
+
+use super::args::PrecisionArgs;
+use super::document::Rows;
+use super::processes::Workers;
+use super::protocol::{Job, Timing};
+use super::run::progress;
+use super::run_resume::typed_args;
+use super::shared_args::TableFormat;
+use super::{Ending, interrupt, load_scene, print_json, text, unread_is_fine};
+use crate::funnel::{self, Chain, FunnelInput, NONE, StageKind, StageSweep, SweepPlan, SweepPoint};
+use crate::index::{Registry, StructureSpec};
+use crate::measure::{ProcessTimes, Protocol};
+use crate::path::{self, CameraPath};
+use crate::scene::{self, LoadOptions, Scene};
+use crate::suite::DEFAULT_PATH;
+use crate::visibility::{Guarantee, SampleGrid};
+
+/// Rounds of a point, if one process has them all.
+const ROUNDS: [usize; 2] = [3, 9];
+/// The samples of a view, beside its random rays.
+const SAMPLES: SampleGrid = SampleGrid::new(320, 180);
+/// Where the stages behind the frustum have something to do.
+const STREET: &str = "street:frames=32";
+
+/// Everything that a process needs to know.
+struct Setting {
+    structures: Vec<StructureSpec>,
+    scene: Scene,
+    path: CameraPath,
+    chain: Chain,
+}
+
+impl Setting {
+    fn of(
+        registry: &Registry,
+        args: &PrecisionArgs,
+        scene: Scene,
+        lens_scale: Option<f64>,
+    ) -> anyhow::Result<Setting> {
+        let mut structures = args.kernel.structures(registry, &args.structure)?;
+        structures.truncate(1);
+        let typed = match args.path.as_str() {
+            DEFAULT_PATH => STREET,
+            typed => typed,
+        };
+        let path = path::load_scaled(typed, &scene, &args.lens.defaults()?, lens_scale)?;
+        let object = structures.first().map_or(NONE, |spec| &spec.label);
+        let chain = Chain::for_scene(&scene).with(StageKind::Object, object);
+        Ok(Setting {
+            structures,
+            scene,
+            path,
+            chain,
+        })
+    }
+
+    fn input<'s>(
+        &'s self,
+        args: &PrecisionArgs,
+        protocol: &'s Protocol,
+    ) -> anyhow::Result<FunnelInput<'s>> {
+        Ok(FunnelInput {
+            scene: &self.scene,
+            path: &self.path,
+            most_views: args.frames as usize,
+            samples: SAMPLES,
+            chain: &self.chain,
+            structures: &self.structures,
+            protocol,
+            execution: args.kernel.execution()?,
+        })
+    }
+}
+
+pub fn sweep(
+    registry: &Registry,
+    args: &PrecisionArgs,
+    stage: StageKind,
+) -> anyhow::Result<Ending> {
+    if args.svg.is_some() {
+        bail!("--svg draws the frustum's diagram; expected --svg or --stage, not both");
+    }
+    let scene = load_scene(&args.scene, &args.scene_args, 3)?;
+    if scene.items.is_empty() {
+        bail!("scene '{}' has no items; expected at least one", scene.name);
+    }
+    let setting = Setting::of(registry, args, scene, None)?;
+    interrupt::from_now_on_finish();
+    let workers = Workers::new(typed_args()?, Duration::MAX, &NamedTempFile::new)?;
+    let bar = progress(u64::from(args.spread.processes));
+    let job = |next: &str| {
+        let job = format!("{}, {} stage: {next}", args.scene, stage.name());
+        bar.set_message(text::plain(&job));
+    };
+    job("every point, judged");
+    let protocol = protocol(args, 0);
+    let input = setting.input(args, &protocol)?;
+    let Some(prepared) = funnel::prepare_sweep(&input, stage, &interrupt::asked)? else {
+        return Ok(Ending::Interrupted);
+    };
+    let share = |process| {
+        let timing = Timing {
+            process,
+            lens_scale: setting.path.lens_scale,
+        };
+        Job::Sweep(prepared.plan.clone(), timing)
+    };
+    let step = |process: u32, _: &str| {
+        bar.set_position(process.into());
+        job("every point, timed");
+    };
+    let Some(times) = workers.times(args.spread.processes, share, &step)? else {
+        return Ok(Ending::Interrupted);
+    };
+    bar.finish_and_clear();
+    let sweep = prepared.conclude(&times);
+    unread_is_fine(match args.format {
+        TableFormat::Json => print_json(&sweep),
+        TableFormat::Table => show(&sweep, &mut text::terminal()),
+    })?;
+    let is_broken = |point: &SweepPoint| {
+        point.back_end.guarantee != Guarantee::Unproven && point.errors.false_negative_count > 0.0
+    };
+    Ok(match sweep.points.iter().any(is_broken) {
+        true => Ending::WrongAnswer,
+        false => Ending::Ok,
+    })
+}
+
+fn protocol(args: &PrecisionArgs, process: u32) -> Protocol {
+    let effort = args.spread.effort(ROUNDS);
+    args.spread.protocol(&effort, process, usize::MAX)
+}
+
+/// One process's share of the times.
+pub fn time(
+    registry: &Registry,
+    args: &PrecisionArgs,
+    plan: &SweepPlan,
+    timing: &Timing,
+    stop: &dyn Fn() -> bool,
+) -> anyhow::Result<Option<ProcessTimes>> {
+    let Some(stage) = args.stage else {
+        bail!("a sweep without a stage");
+    };
+    let load = LoadOptions {
+        skip_bad_items: args.scene_args.skip_bad_items,
+        structures: 0,
+    };
+    let scene = scene::load(&args.scene, &load)?;
+    let setting = Setting::of(registry, args, scene, timing.lens_scale)?;
+    let protocol = protocol(args, timing.process);
+    let input = setting.input(args, &protocol)?;
+    Ok(funnel::time_sweep(&input, stage, plan, stop)?)
+}
+
+fn show(sweep: &StageSweep, out: &mut impl Write) -> io::Result<()> {
+    writeln!(
+        out,
+        "{}, {}: {} stage, error against run time\n{} with {} random rays each beside {} x {} \
+         samples; {}.",
+        sweep.scene,
+        sweep.path,
+        sweep.stage.name(),
+        text::counted(sweep.views, "view"),
+        sweep.rays_per_view,
+        SAMPLES.width,
+        SAMPLES.height,
+        text::over(sweep.processes, None)
+    )?;
+    let mut rows = Rows::of_numbers([
+        "by",
+        "buffer",
+        "out",
+        "FP / visible",
+        "FN / visible",
+        "FN a view",
+        "time a view",
+        "front",
+    ]);
+    rows.rows.extend(sweep.points.iter().map(|point| {
+        let (errors, times) = (&point.errors, &point.times);
+        let doubt = if point.back_end.guarantee == Guarantee::Unproven {
+            "?"
+        } else {
+            ""
+        };
+        vec![
+            format!("{}{doubt}", point.back_end.name),
+            point
+                .buffer
+                .map(|[w, h]| format!("{w}x{h}"))
+                .unwrap_or_default(),
+            text::significant(errors.output_count),
+            text::rate(errors.excess, 1.0),
+            text::rate(errors.missing, 1.0),
+            text::significant(errors.false_negative_count),
+            text::time_within(times.stage_ns, [times.stage_ns_lower, times.stage_ns_upper]),
+            if point.on_front { "*" } else { "" }.to_owned(),
+        ]
+    }));
+    writeln!(out, "{}", rows.terminal())?;
+    let safe = sweep
+        .points
+        .iter()
+        .filter(|p| p.back_end.guarantee != Guarantee::Unproven);
+    let lossy = sweep
+        .points
+        .iter()
+        .filter(|p| p.errors.false_negative_count > 0.0)
+        .count();
+    writeln!(
+        out,
+        "{lossy} of {} points lost something visible; {} of them promise that they do not. * is no \
+         worse than any other in time and both errors.",
+        sweep.points.len(),
+        safe.filter(|point| point.errors.false_negative_count > 0.0)
+            .count()
+    )
+}

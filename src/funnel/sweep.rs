@@ -1,0 +1,329 @@
+//! Error against run time of one stage: what each back end loses and lets through
+//! beside what it takes, the occlusion stage over the sizes of its buffer. Truth are
+//! rays between the samples too, so that no size of a buffer is its own judge.
+
+use serde::{Deserialize, Serialize};
+
+use super::faces::{self, Faces};
+use super::hiding::HIDING;
+use super::judged::{Errors, Judged, judge_items};
+use super::pass::{ALL, Pass};
+use super::report::Times;
+use super::stage::{BackEnd, NONE, StageKind};
+use super::world::{FunnelError, FunnelInput, World, back_ends};
+use crate::measure::{Ask, OverProcesses, ProcessTimes, Schedule, TimedTask, timed};
+use crate::query::ItemId;
+use crate::visibility::SampleGrid;
+use crate::visibility::truth::{RayIndex, visible_by_random_rays};
+
+/// Columns of the buffers that are looked at; rows are 9 for 16 of them.
+pub const WIDTHS: [u32; 7] = [40, 80, 160, 320, 640, 1280, 1920];
+/// Random rays of a view, beside the samples.
+const RAYS: usize = 100_000;
+
+/// One back end, at one size of its buffer.
+#[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
+pub struct SweepPoint {
+    /// What does the stage.
+    #[serde(flatten)]
+    pub back_end: BackEnd,
+    /// Columns and rows of its buffer; null where it has none.
+    pub buffer: Option<[u32; 2]>,
+    /// What it let through and what it lost.
+    #[serde(flatten)]
+    pub errors: Errors,
+    /// Thread CPU time of a view.
+    #[serde(flatten)]
+    pub times: Times,
+    /// Whether no other point is at least as good in time and both errors, and better
+    /// in one.
+    pub on_front: bool,
+}
+
+/// The points of a stage.
+#[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
+pub struct StageSweep {
+    /// As it was asked for.
+    pub scene: String,
+    /// As it was asked for.
+    pub path: String,
+    /// The stage.
+    pub stage: StageKind,
+    /// Views that were looked at.
+    pub views: usize,
+    /// Random rays of each view that are the truth together with its samples.
+    pub rays_per_view: usize,
+    /// Processes that the times are of.
+    pub processes: usize,
+    /// In the order of the table of back ends, small buffers first.
+    pub points: Vec<SweepPoint>,
+}
+
+/// What all processes time: the plan is the same for each.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct SweepPlan {
+    schedule: Schedule,
+    expected: Vec<Vec<u64>>,
+}
+
+/// Everything judged, and nothing timed.
+pub struct PreparedSweep {
+    /// What the other processes are to measure.
+    pub plan: SweepPlan,
+    sweep: StageSweep,
+}
+
+/// A point, and how it is asked.
+struct Entry<'w> {
+    back_end: BackEnd,
+    buffer: Option<SampleGrid>,
+    ask: Ask<'w>,
+    /// Of the triangle stage: its place among the back ends.
+    faces: Option<usize>,
+}
+
+/// What the stage is given in each view, and the faces of what occlusion leaves.
+struct Given<'w> {
+    pass: Pass<'w>,
+    set: usize,
+    faces: Option<Faces>,
+}
+
+impl<'w> Given<'w> {
+    fn of(
+        world: &'w World<'w>,
+        input: &FunnelInput,
+        stage: StageKind,
+        stop: &dyn Fn() -> bool,
+    ) -> Option<Given<'w>> {
+        let mut pass = Pass::new(world);
+        let set = match (stage, input.chain.of(StageKind::Object)) {
+            (StageKind::Region, _) | (_, NONE) => ALL,
+            (_, name) => {
+                let step = pass.step(StageKind::Object, name, ALL, stop)?;
+                pass.steps()[step].output
+            }
+        };
+        let faces = match stage {
+            StageKind::Triangle => {
+                let walked = pass.walk(input.chain, stop)?;
+                Some(Faces::of(world, &pass, walked.left()))
+            }
+            _ => None,
+        };
+        Some(Given { pass, set, faces })
+    }
+
+    fn entries<'g>(&'g self, world: &'g World<'g>, stage: StageKind) -> Vec<Entry<'g>> {
+        let given = move |view| self.pass.items(self.set, view);
+        match stage {
+            StageKind::Occlusion => {
+                let sized = HIDING
+                    .iter()
+                    .flat_map(|row| WIDTHS.map(|width| (row, width)));
+                let entry = |(row, width): (&'g super::hiding::HidingRow, u32)| {
+                    let grid = SampleGrid::new(width, (width * 9).div_ceil(16));
+                    let run = world.run_hiding(row, grid);
+                    Entry {
+                        back_end: row.back_end(),
+                        buffer: Some(grid),
+                        ask: Box::new(move |view, out| run(view, given(view), out)),
+                        faces: None,
+                    }
+                };
+                sized.map(entry).collect()
+            }
+            StageKind::Triangle => {
+                let rows = faces::back_ends().skip(1).zip(0..);
+                let entry = |(back_end, place): (BackEnd, usize)| Entry {
+                    back_end,
+                    buffer: None,
+                    ask: Box::new(move |view, out| {
+                        if let Some(faces) = &self.faces {
+                            faces.cull(place, view, out);
+                        }
+                    }),
+                    faces: Some(place),
+                };
+                rows.map(entry).collect()
+            }
+            _ => {
+                let rows = back_ends(stage, world.scene()).into_iter();
+                let entry = |back_end: BackEnd| {
+                    let run = world.run(stage, back_end.name);
+                    Entry {
+                        back_end,
+                        buffer: None,
+                        ask: Box::new(move |view, out| run(view, given(view), out)),
+                        faces: None,
+                    }
+                };
+                rows.filter(|row| row.name != NONE).map(entry).collect()
+            }
+        }
+    }
+}
+
+/// Judges all points of a stage and plans how they are timed; `None` if stopped.
+///
+/// # Errors
+/// As [`prepare`](super::prepare).
+pub fn prepare_sweep(
+    input: &FunnelInput,
+    stage: StageKind,
+    stop: &dyn Fn() -> bool,
+) -> Result<Option<PreparedSweep>, FunnelError> {
+    let world = World::new(input)?;
+    let Some(given) = Given::of(&world, input, stage, stop) else {
+        return Ok(None);
+    };
+    let entries = given.entries(&world, stage);
+    let truth = match stage {
+        StageKind::Triangle => Vec::new(),
+        _ => match seen(&world, input, stop) {
+            Some(truth) => truth,
+            None => return Ok(None),
+        },
+    };
+    let (mut points, mut tasks) = (Vec::new(), Vec::new());
+    for Entry {
+        back_end,
+        buffer,
+        ask,
+        faces,
+    } in entries
+    {
+        if stop() {
+            return Ok(None);
+        }
+        let mut counts = Vec::new();
+        let mut judged: Vec<Judged> = Vec::new();
+        let mut out = Vec::new();
+        for view in 0..world.views() {
+            out.clear();
+            ask(view, &mut out);
+            counts.push(out.len() as u64);
+            if faces.is_none() {
+                out.sort_unstable();
+                let input = given.pass.items(given.set, view);
+                judged.push(judge_items(input, world.items(), &out, &truth[view]));
+            }
+        }
+        if let (Some(place), Some(of_views)) = (faces, &given.faces) {
+            judged = of_views.judged(Some(place));
+        }
+        points.push(SweepPoint {
+            back_end,
+            buffer: buffer.map(|grid| [grid.width, grid.height]),
+            errors: Errors::of(&judged),
+            times: Times::default(),
+            on_front: false,
+        });
+        tasks.push(TimedTask {
+            ask,
+            ask_many: None,
+            expected: counts,
+            least_ns: None,
+        });
+    }
+    Ok(Some(PreparedSweep {
+        plan: SweepPlan {
+            schedule: Schedule::new(world.views(), &tasks, input.protocol),
+            expected: tasks.iter().map(|task| task.expected.clone()).collect(),
+        },
+        sweep: StageSweep {
+            scene: input.scene.name.clone(),
+            path: input.path.name.clone(),
+            stage,
+            views: world.views(),
+            rays_per_view: RAYS,
+            processes: 0,
+            points,
+        },
+    }))
+}
+
+/// What each view shows at its samples or along a random ray; items seen between
+/// samples only count as one sample.
+fn seen(
+    world: &World,
+    input: &FunnelInput,
+    stop: &dyn Fn() -> bool,
+) -> Option<Vec<Vec<(ItemId, u32)>>> {
+    let index = RayIndex::build(world.solids());
+    let truth = world.truth(input, stop)?;
+    let views = (0..world.views()).map(|view| {
+        if stop() {
+            return None;
+        }
+        let threads = input.execution.threads;
+        let seed = view as u64 + 1;
+        let more = visible_by_random_rays(&index, world.rays(view), RAYS, seed, threads);
+        let mut all = truth.of_view(view).to_vec();
+        all.extend(
+            more.iter()
+                .filter(|id| !truth.sees(view, **id))
+                .map(|&id| (id, 1)),
+        );
+        all.sort_unstable();
+        Some(all)
+    });
+    views.collect()
+}
+
+/// One process's share of the times; `None` if stopped.
+///
+/// # Errors
+/// As [`prepare_sweep`].
+pub fn time_sweep(
+    input: &FunnelInput,
+    stage: StageKind,
+    plan: &SweepPlan,
+    stop: &dyn Fn() -> bool,
+) -> Result<Option<ProcessTimes>, FunnelError> {
+    let world = World::new(input)?;
+    let Some(given) = Given::of(&world, input, stage, stop) else {
+        return Ok(None);
+    };
+    let entries = given.entries(&world, stage).into_iter().zip(&plan.expected);
+    let tasks = entries.map(|(entry, expected)| TimedTask {
+        ask: entry.ask,
+        ask_many: None,
+        expected: expected.clone(),
+        least_ns: None,
+    });
+    let tasks: Vec<TimedTask> = tasks.collect();
+    let timed = timed(&tasks, &plan.schedule, input.protocol, &|_| stop());
+    Ok(timed.map(|timed| ProcessTimes::of(&timed)))
+}
+
+impl PreparedSweep {
+    /// The points with the times of all processes.
+    pub fn conclude(self, processes: &[ProcessTimes]) -> StageSweep {
+        let times = OverProcesses::of(processes);
+        let mut sweep = self.sweep;
+        sweep.processes = processes.len();
+        for (task, point) in sweep.points.iter_mut().enumerate() {
+            point.times = Times::of(times.ns(task));
+        }
+        let figures: Vec<Option<[f64; 3]>> = sweep.points.iter().map(figures).collect();
+        for (place, point) in sweep.points.iter_mut().enumerate() {
+            let Some(own) = figures[place] else { continue };
+            let beats = |other: &[f64; 3]| {
+                let pairs = || other.iter().zip(&own);
+                pairs().all(|(a, b)| a <= b) && pairs().any(|(a, b)| a < b)
+            };
+            point.on_front = !figures.iter().flatten().any(beats);
+        }
+        sweep
+    }
+}
+
+/// What a point is compared by: time, missing, handed on too much.
+fn figures(point: &SweepPoint) -> Option<[f64; 3]> {
+    let errors = &point.errors;
+    let ns = point.times.stage_ns?;
+    Some([ns, errors.false_negative_count, errors.false_positive_count])
+}
