@@ -14,7 +14,10 @@ use super::{Ending, interrupt, tell, text, unread_is_fine};
 use crate::index::{Execution, Registry, StructureSpec};
 use crate::kernel::Kernel;
 use crate::stress::extremes::{DEFAULT_CASES, Extremes, Progress, Tally};
-use crate::stress::{Row, Section, Status, Vector, built_in, read_vectors_file, replay};
+use crate::stress::{
+    Row, Section, Status, VISIBILITY_FAMILIES, Vector, built_in, occlusion_cases,
+    read_vectors_file, replay,
+};
 
 pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> {
     let structures = args.kernel.structures(registry, &args.structure)?;
@@ -53,7 +56,9 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
     let case_passes = passes
         .iter()
         .map(|&(_, cases)| Extremes { cases, ..extremes }.total());
-    let bar = ProgressBar::new(vector_passes + case_passes.sum::<u64>());
+    let stages = VISIBILITY_FAMILIES.iter().filter(|_| cases > 0);
+    let stage_passes = stages.clone().count() as u64;
+    let bar = ProgressBar::new(vector_passes + case_passes.sum::<u64>() + stage_passes);
     for (kernel, cases) in passes {
         let by_kernel = |spec: &StructureSpec| {
             let execution = Execution {
@@ -86,6 +91,17 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
         }
         sections.extend(found);
     }
+    for family in stages {
+        bar.set_message(family.0);
+        let of_stage = 0..cases.saturating_mul(STAGE_CASES);
+        sections.push(occlusion_cases(
+            *family,
+            of_stage,
+            args.seed,
+            &interrupt::asked,
+        ));
+        bar.inc(1);
+    }
     let interrupted = interrupt::asked();
     bar.finish_and_clear();
     unread_is_fine(match args.format {
@@ -111,6 +127,9 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
         (false, false) => Ending::Ok,
     })
 }
+
+/// Cases of each family of the occlusion stage for one of each extreme: they are small.
+const STAGE_CASES: u64 = 10;
 
 /// Cases of each extreme by another instruction set than the chosen one.
 const OF_OTHERS: u64 = 2;
