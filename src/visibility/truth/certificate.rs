@@ -44,15 +44,16 @@ pub struct View {
     pub hides_from: f64,
 }
 
-/// A line through the image that parts a cell.
+/// A line through the image that parts a cell: where the planes of two faces meet. Of
+/// one box that is an edge; of two, beyond it the other one is nearer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Edge {
-    /// The item of whose box it is an edge.
-    pub item: ItemId,
-    /// The two axes across it, ascending.
+    /// The items of whose boxes they are faces.
+    pub items: [ItemId; 2],
+    /// The axes across the faces, ascending.
     pub axes: [u8; 2],
-    /// On each of them: whether it is at the upper bound.
+    /// Whether each is at the upper bound.
     pub upper: [bool; 2],
 }
 

@@ -220,16 +220,13 @@ impl Sight {
         (&reached - &needed).sign() * way >= 0
     }
 
-    /// The line through the image along an edge of a box, so that its scalar product
-    /// with a line of sight is `order` of the second plane and the first.
-    pub fn edge(&self, b: &WorldBox, edge: &Edge) -> Triple {
+    /// The line through the image where two faces' planes meet, so that its scalar
+    /// product with a line of sight is `order` of the second plane and the first.
+    pub fn edge(&self, boxes: [&WorldBox; 2], edge: &Edge) -> Triple {
         let [i, j] = edge.axes.map(usize::from);
-        let bound = |place: usize, axis: usize| {
-            if edge.upper[place] {
-                b.max[axis]
-            } else {
-                b.min[axis]
-            }
+        let bound = |place: usize, axis: usize| match edge.upper[place] {
+            true => boxes[place].max[axis],
+            false => boxes[place].min[axis],
         };
         let (at_i, at_j) = (bound(0, i), bound(1, j));
         let View {

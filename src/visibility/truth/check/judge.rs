@@ -64,22 +64,24 @@ impl Judge<'_> {
         }
     }
 
-    /// The line through the image along an edge: the form of its two planes, whose
-    /// three factors are what it is of the lines (1, 0, 0), (0, 1, 0) and (0, 0, 1).
+    /// The line through the image where two planes meet: their form, whose three
+    /// factors are what it is of the lines (1, 0, 0), (0, 1, 0) and (0, 0, 1).
     fn line(&self, edge: &Edge) -> Result<Three, &'static str> {
-        let b = self
-            .boxes
-            .get(edge.item as usize)
-            .ok_or("there is no box with that edge")?;
         let [i, j] = edge.axes.map(usize::from);
         if i >= j || j > 2 {
             return Err("there is no such edge");
         }
-        let [at_i, at_j] =
-            [(i, edge.upper[0]), (j, edge.upper[1])].map(|(axis, upper)| match upper {
-                true => b.max[axis],
-                false => b.min[axis],
-            });
+        let bound = |side: usize, axis: usize| {
+            let b = self.boxes.get(edge.items[side] as usize)?;
+            Some(if edge.upper[side] {
+                b.max[axis]
+            } else {
+                b.min[axis]
+            })
+        };
+        let (Some(at_i), Some(at_j)) = (bound(0, i), bound(1, j)) else {
+            return Err("there is no box with that edge");
+        };
         Ok([0, 1, 2].map(|k: usize| {
             let mut unit = [0.0; 3];
             unit[k] = 1.0;

@@ -79,7 +79,7 @@ pub fn hides(
 }
 
 /// On which side of a point the box lies along an axis: 1 is above it, 0 at it.
-fn side_of(at: f64, b: &WorldBox, axis: usize) -> i32 {
+pub fn side_of(at: f64, b: &WorldBox, axis: usize) -> i32 {
     i32::from(b.min[axis] > at) - i32::from(b.max[axis] < at)
 }
 

@@ -7,8 +7,8 @@ use glam::DVec3;
 
 use super::super::certificate::{Cell, Edge, Except};
 use super::super::entry::Probe;
-use super::super::sight::{Polygon, Sight, Triple};
-use super::hides::{Nearer, hides, pierces};
+use super::super::sight::{Polygon, Sight, Triple, sign};
+use super::hides::{Nearer, hides, pierces, side_of};
 use super::outline::corners_of;
 use super::outlook::Outlook;
 use crate::query::ItemId;
@@ -85,11 +85,10 @@ impl<'p> Hunt<'p> {
                 return Ok(Cell::Behind(front));
             }
         }
-        let Some((edge, line)) = self.best_cut(&pierced, image, &ray) else {
+        let Some((edge, line, inner)) = self.best_cut(&pierced, image, &ray) else {
             return Err(End::GaveUp);
         };
-        // What hides the middle is most likely nearer along its own edge as well.
-        let inner = line.dot_sign(&self.look.line_of(&ray)) > 0;
+        let matters = self.except != Except::Lines;
         let mut parts = |line_in_first: bool| {
             let mut part = |line: &Triple, open: bool| match image.cut(line, open) {
                 Some(part) => self.cell(&part, cuts + 1),
@@ -107,7 +106,7 @@ impl<'p> Hunt<'p> {
             })
         };
         match parts(inner) {
-            Err(End::GaveUp) => parts(!inner),
+            Err(End::GaveUp) if matters => parts(!inner),
             found => found,
         }
     }
@@ -145,39 +144,67 @@ impl<'p> Hunt<'p> {
         Ok(sized)
     }
 
-    /// The edge to part the image by: of the box that hides most of it, that side
-    /// beyond which most is left over.
+    /// The edge to part the image by, and whether the first part should have the line:
+    /// of the box that hides most of it, that side beyond which most is left over.
     fn best_cut(
         &self,
         pierced: &[(f64, ItemId)],
         image: &Polygon,
         ray: &Ray,
-    ) -> Option<(Edge, Triple)> {
+    ) -> Option<(Edge, Triple, bool)> {
         let sight = &self.look.sight;
         let covered = |item: ItemId| {
             let b = self.look.boxed(item);
-            image
-                .corners
-                .iter()
-                .filter(|line| pierces(sight, line, b))
-                .count()
+            let covers = |line: &&Triple| pierces(sight, line, b);
+            image.corners.iter().filter(covers).count()
         };
         let mut by_cover: Vec<_> = pierced
             .iter()
             .map(|&(_, item)| (covered(item), item))
             .collect();
         by_cover.sort_by_key(|&(count, _)| Reverse(count));
+        let fronts = || by_cover.iter().map(|&(_, item)| item);
         let middle = self.look.line_of(ray);
-        let best = by_cover
-            .iter()
-            .find_map(|&(_, item)| self.cut_along(item, image, &middle, true));
-        // It is covered already, but not by one face before one face.
-        best.or_else(|| self.cut_along(self.item, image, &middle, false))
-            .or_else(|| {
-                by_cover
-                    .iter()
-                    .find_map(|&(_, item)| self.cut_along(item, image, &middle, false))
-            })
+        let along = |item: ItemId, outer: bool| self.cut_along(item, image, &middle, outer);
+        // What hides the middle is most likely nearer along its own edge as well.
+        let outlined = fronts().find_map(|item| along(item, true));
+        // It is covered already, but not by one face before one face; or the box in
+        // front goes through the item.
+        let found = outlined.or_else(|| along(self.item, false));
+        let found = found.or_else(|| fronts().find_map(|item| along(item, false)));
+        let inner = |line: &Triple| line.dot_sign(&middle) > 0;
+        let found = found.map(|(edge, line)| (edge, inner(&line), line));
+        let through = || {
+            let (edge, line) = fronts().find_map(|item| self.cut_through(item, image))?;
+            Some((edge, !inner(&line), line))
+        };
+        let (edge, first, line) = found.or_else(through)?;
+        Some((edge, line, first))
+    }
+
+    /// Where a face of a box in front goes through a face of the item.
+    fn cut_through(&self, front: ItemId, image: &Polygon) -> Option<(Edge, Triple)> {
+        let sight = &self.look.sight;
+        let way = |item: ItemId, axis: usize| match sight.view.parallel {
+            true => sign(sight.view.forward[axis]),
+            false => side_of(sight.view.eye[axis], self.look.boxed(item), axis),
+        };
+        let pairs = [[0, 1], [0, 2], [1, 2]]
+            .into_iter()
+            .flat_map(|axes: [usize; 2]| {
+                [[front, self.item], [self.item, front]].map(|items| (axes, items))
+            });
+        pairs.into_iter().find_map(|(axes, items)| {
+            let ways = [0, 1].map(|k: usize| way(items[k], axes[k]));
+            let edge = Edge {
+                items,
+                axes: axes.map(|axis| axis as u8),
+                upper: ways.map(|way| way < 0),
+            };
+            let line = sight.edge(items.map(|item| self.look.boxed(item)), &edge);
+            let cuts = |sign: i32| image.corners.iter().any(|c| c.dot_sign(&line) == sign);
+            (!ways.contains(&0) && cuts(1) && cuts(-1)).then_some((edge, line))
+        })
     }
 
     /// The edge of a box that leaves most of the image beyond it; of its outline, or
@@ -197,11 +224,11 @@ impl<'p> Hunt<'p> {
             .flat_map(|axes| (0..4).map(move |bits| (axes, bits)))
         {
             let edge = Edge {
-                item,
+                items: [item, item],
                 axes,
                 upper: [bits & 1 == 1, bits & 2 == 2],
             };
-            let line = sight.edge(b, &edge);
+            let line = sight.edge([b, b], &edge);
             let side = line.dot_sign(middle);
             if side == 0 || outer && !holds_all(sight, b, &edge, side) {
                 continue;
@@ -226,7 +253,7 @@ impl<'p> Hunt<'p> {
 
 /// Whether the edge is one of the box's outline, with the box on the side `side`.
 fn holds_all(sight: &Sight, b: &WorldBox, edge: &Edge, side: i32) -> bool {
-    let line = sight.edge(b, edge);
+    let line = sight.edge([b, b], edge);
     corners_of(b).iter().enumerate().all(|(k, corner)| {
         let own = |place: usize| (k >> edge.axes[place] & 1 == 1) == edge.upper[place];
         own(0) && own(1) || line.dot_sign(&sight.through(*corner)) * side >= 0
