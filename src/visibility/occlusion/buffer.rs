@@ -2,8 +2,8 @@
 //! them, and rectangles are asked whether they are hidden.
 
 use super::outline::{Coverage, Outline};
-use super::rect::Rect;
-use crate::kernel::Isa;
+use super::rect::{Rect, Rects};
+use crate::kernel::{Isa, LaneMask};
 use crate::visibility::{Guarantee, SampleGrid};
 
 /// Where the idea of a back end comes from.
@@ -50,4 +50,17 @@ pub trait OcclusionBuffer {
     /// Whether something that was drawn is nearer than the rectangle in all its
     /// pixels. As near is not nearer.
     fn hides<I: Isa>(&self, isa: I, rect: &Rect) -> bool;
+
+    /// The same for some boxes of a block at once.
+    #[inline(always)]
+    fn hides_lanes<I: Isa>(&self, isa: I, rects: &Rects, lanes: LaneMask) -> LaneMask {
+        let mut hidden = 0;
+        let mut left = lanes;
+        while left != 0 {
+            let lane = left.trailing_zeros();
+            left &= left - 1;
+            hidden |= LaneMask::from(self.hides(isa, &rects.get(lane as usize))) << lane;
+        }
+        hidden
+    }
 }

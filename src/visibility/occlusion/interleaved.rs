@@ -152,14 +152,7 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
             stats.boxes += lanes.count_ones() as usize;
             let (seen, flat) = rects.lanes(isa);
             lanes &= seen;
-            let mut left = lanes & flat;
-            while left != 0 {
-                let lane = left.trailing_zeros() as usize;
-                left &= left - 1;
-                if buffer.hides(isa, &rects.get(lane)) {
-                    lanes &= !(1 << lane);
-                }
-            }
+            lanes &= !buffer.hides_lanes(isa, &rects, lanes & flat);
             let mut order = [0; LANES];
             let count = by_depth(&rects.depth, lanes, &mut order);
             let order = &order[..count];

@@ -9,9 +9,9 @@
 use super::block::first_lanes;
 use super::buffer::{OcclusionBuffer, Origin};
 use super::outline::{Coverage, Outline, TileNearness};
-use super::rect::Rect;
+use super::rect::{Rect, Rects};
 use super::view::{TILE_HEIGHT, TILE_WIDTH};
-use crate::kernel::{Isa, LANES};
+use crate::kernel::{Isa, LANES, LaneMask};
 use crate::visibility::{Guarantee, SampleGrid};
 
 /// Pixels of a tile: bit `8 * row + column`.
@@ -123,6 +123,49 @@ impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
             }
         }
         true
+    }
+
+    /// Boxes of two by two tiles at most, as most are, all together; if their tiles
+    /// are all nearer by their references, that is.
+    #[inline(always)]
+    fn hides_lanes<I: Isa>(&self, isa: I, rects: &Rects, lanes: LaneMask) -> LaneMask {
+        if lanes == 0 {
+            return 0;
+        }
+        let columns = self.columns as i32;
+        let (tile_width, tile_height) = (TILE_WIDTH as i32, TILE_HEIGHT as i32);
+        let mut at = [[0; LANES]; 4];
+        let mut large = [0; LANES];
+        for lane in 0..LANES {
+            let (x0, x1) = (rects.x0[lane] / tile_width, rects.x1[lane] / tile_width);
+            let (y0, y1) = (rects.y0[lane] / tile_height, rects.y1[lane] / tile_height);
+            at[0][lane] = (y0 * columns + x0) as u32;
+            at[1][lane] = (y0 * columns + x1) as u32;
+            at[2][lane] = (y1 * columns + x0) as u32;
+            at[3][lane] = (y1 * columns + x1) as u32;
+            large[lane] = u32::from((x1 - x0 > 1) | (y1 - y0 > 1));
+        }
+        let small = lanes & isa.zeros(isa.words(&large));
+        let nearness = isa.load(&rects.nearness);
+        let mut hidden = small;
+        for at in &at {
+            if hidden == 0 {
+                break;
+            }
+            let mut reference = [0.0; LANES];
+            for lane in 0..LANES {
+                let tile = self.reference.get(at[lane] as usize);
+                reference[lane] = tile.copied().unwrap_or(0.0);
+            }
+            hidden &= !isa.at_most(isa.load(&reference), nearness);
+        }
+        let mut left = lanes & !hidden;
+        while left != 0 {
+            let lane = left.trailing_zeros();
+            left &= left - 1;
+            hidden |= LaneMask::from(self.hides(isa, &rects.get(lane as usize))) << lane;
+        }
+        hidden
     }
 }
 

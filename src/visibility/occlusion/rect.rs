@@ -36,7 +36,7 @@
 //! nothing overflows. Comparisons are such that a NaN makes a box near.
 
 use super::block::Block;
-use super::view::{U, View};
+use super::view::{Projection, U, View};
 use crate::kernel::{Isa, LANES, LaneMask};
 
 /// Pixels and nearness of one box: columns and rows from the first to the last
@@ -67,11 +67,16 @@ impl Rect {
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub struct Rects {
-    x0: [i32; LANES],
-    x1: [i32; LANES],
-    y0: [i32; LANES],
-    y1: [i32; LANES],
-    nearness: [f32; LANES],
+    /// First columns, pixels.
+    pub x0: [i32; LANES],
+    /// Last columns.
+    pub x1: [i32; LANES],
+    /// First rows.
+    pub y0: [i32; LANES],
+    /// Last rows.
+    pub y1: [i32; LANES],
+    /// As [`Rect::nearness`].
+    pub nearness: [f32; LANES],
     /// Not above the least depth: what boxes are sorted by.
     pub depth: [f32; LANES],
     /// Bit 0: no ray of the image meets the box. Bit 1: no rectangle, too near.
@@ -117,16 +122,18 @@ impl Rects {
     /// Projects the boxes of a block.
     #[inline(always)]
     pub fn project(&mut self, block: &Block, view: &View) {
-        if view.parallel {
-            self.project_parallel(block, view);
-        } else {
-            self.project_perspective(block, view);
-        }
+        // Of copies and into a new one: what cannot overlap with anything else is
+        // what the compiler makes vectors of, wherever this is inlined.
+        let (block, projection) = (*block, view.projection);
+        *self = match view.parallel {
+            true => Rects::parallel(&block, &projection),
+            false => Rects::perspective(&block, &projection),
+        };
     }
 
     #[inline(always)]
-    fn project_perspective(&mut self, block: &Block, view: &View) {
-        let p = &view.projection;
+    fn perspective(block: &Block, p: &Projection) -> Rects {
+        let mut rects = Rects::NONE;
         let [width, height] = p.size;
         for l in 0..LANES {
             let (c, r) = about_eye(block, l, p.eye, p.rest, p.far_from_zero);
@@ -142,27 +149,28 @@ impl Rects {
                 (x0, x1) = (smaller(across, x0), larger(across, x1));
                 (y0, y1) = (smaller(down, y0), larger(down, y1));
             }
-            let relative = r / least;
+            let depth = least - 8.0 * U * r;
+            let nearness = 1.0 / depth;
+            let relative = r * nearness;
             let (slack_x, slack_y) = (p.slack[0] * relative, p.slack[1] * relative);
             let (x0, x1) = (x0 - slack_x, x1 + slack_x);
             let (y0, y1) = (y0 - slack_y, y1 + slack_y);
-            let depth = least - 8.0 * U * r;
-            let nearness = 1.0 / depth;
             let sound = (least > r * (1.0 / 4096.0)) & (least > 1e-25) & (r < 1e25);
             let seen = (x1 >= 0.0) & (x0 <= width) & (y1 >= 0.0) & (y0 <= height);
-            self.nearness[l] = nearness + nearness * (8.0 * U);
-            self.depth[l] = depth;
-            self.x0[l] = pixel(x0, width);
-            self.x1[l] = pixel(x1, width);
-            self.y0[l] = pixel(y0, height);
-            self.y1[l] = pixel(y1, height);
-            self.state[l] = state(sound, seen);
+            rects.nearness[l] = nearness + nearness * (8.0 * U);
+            rects.depth[l] = depth;
+            rects.x0[l] = pixel(x0, width);
+            rects.x1[l] = pixel(x1, width);
+            rects.y0[l] = pixel(y0, height);
+            rects.y1[l] = pixel(y1, height);
+            rects.state[l] = state(sound, seen);
         }
+        rects
     }
 
     #[inline(always)]
-    fn project_parallel(&mut self, block: &Block, view: &View) {
-        let p = &view.projection;
+    fn parallel(block: &Block, p: &Projection) -> Rects {
+        let mut rects = Rects::NONE;
         let [width, height] = p.size;
         for l in 0..LANES {
             let (c, r) = about_eye(block, l, p.eye, p.rest, p.far_from_zero);
@@ -176,14 +184,15 @@ impl Rects {
             let depth = least - 8.0 * U * r;
             let sound = r < 1e25;
             let seen = (x1 >= 0.0) & (x0 <= width) & (y1 >= 0.0) & (y0 <= height);
-            self.nearness[l] = (p.base - depth) + 8.0 * U * (p.base.abs() + depth.abs());
-            self.depth[l] = depth;
-            self.x0[l] = pixel(x0, width);
-            self.x1[l] = pixel(x1, width);
-            self.y0[l] = pixel(y0, height);
-            self.y1[l] = pixel(y1, height);
-            self.state[l] = state(sound, seen);
+            rects.nearness[l] = (p.base - depth) + 8.0 * U * (p.base.abs() + depth.abs());
+            rects.depth[l] = depth;
+            rects.x0[l] = pixel(x0, width);
+            rects.x1[l] = pixel(x1, width);
+            rects.y0[l] = pixel(y0, height);
+            rects.y1[l] = pixel(y1, height);
+            rects.state[l] = state(sound, seen);
         }
+        rects
     }
 }
 
