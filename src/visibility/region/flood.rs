@@ -57,7 +57,7 @@ impl RegionRow for Flood {
                 let opening = &graph.openings()[exit as usize];
                 let (corners, reach) = view.corners(opening);
                 let meets = !view.is_beyond(&corners, reach)
-                    && polygon.begin(&corners, reach)
+                    && polygon.begin(&view, opening, &corners, reach)
                     && view.sides.iter().all(|side| polygon.cut(side));
                 let other = opening.other(at);
                 if meets && seen.insert(other) {

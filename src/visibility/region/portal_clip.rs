@@ -143,7 +143,7 @@ impl RegionRow for PortalClip {
                     continue;
                 }
                 let mut polygon = std::mem::take(&mut search.polygon);
-                let passes = polygon.begin(&corners, reach)
+                let passes = polygon.begin(&view, opening, &corners, reach)
                     && search.range(&window).iter().all(|plane| polygon.cut(plane));
                 search.polygon = polygon;
                 if !passes {

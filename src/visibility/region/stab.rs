@@ -86,11 +86,8 @@ impl Stabbing {
         for &left in &self.lefts {
             match turn(from, to, left) {
                 1 => {}
-                0 if ahead(from, left) => {
-                    if ahead(left, first_left) {
-                        first_left = left;
-                    }
-                }
+                0 if ahead(left, first_left) => first_left = left,
+                0 => {}
                 _ => return false,
             }
         }

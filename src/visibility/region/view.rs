@@ -110,7 +110,11 @@ impl View {
 
     /// A point in camera coordinates.
     pub fn camera(&self, p: DVec3) -> DVec3 {
-        let d = p - self.eye;
+        self.turned(p - self.eye)
+    }
+
+    /// A vector in camera coordinates.
+    fn turned(&self, d: DVec3) -> DVec3 {
         let [u, v, forward] = self.axes;
         DVec3::new(u.dot(d), v.dot(d), forward.dot(d))
     }
@@ -170,15 +174,22 @@ impl View {
 impl Polygon {
     /// Makes it the whole of an opening, grown by the slack. `false` if the opening
     /// has no area: nothing is seen through it.
-    pub fn begin(&mut self, corners: &[DVec3; 4], reach: f64) -> bool {
-        let (along, across) = (corners[1] - corners[0], corners[3] - corners[0]);
-        let (a, b) = (along.length(), across.length());
-        if a == 0.0 || b == 0.0 {
+    pub fn begin(
+        &mut self,
+        view: &View,
+        opening: &Opening,
+        corners: &[DVec3; 4],
+        reach: f64,
+    ) -> bool {
+        // Of the opening itself: from far away its corners may come out the same.
+        let ring = &opening.corners;
+        let (along, across) = (ring[1] - ring[0], ring[3] - ring[0]);
+        if along == DVec3::ZERO || across == DVec3::ZERO {
             return false;
         }
-        // Twice the slack, as coordinates are off too.
-        let grow = 4.0 * SLACK * reach;
-        let (along, across) = (along * (grow / a), across * (grow / b));
+        // More than the slack, as coordinates are off too.
+        let grow = |edge: DVec3| view.turned(edge.normalize()) * (4.0 * SLACK * reach);
+        let (along, across) = (grow(along), grow(across));
         self.corners.clear();
         self.corners.extend([
             corners[0] - along - across,

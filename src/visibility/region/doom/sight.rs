@@ -3,11 +3,11 @@
 //!
 //! Take two sectors and a segment between them that meets nothing solid and no
 //! vertex. All segments that pass the same linedefs in the same order make an open
-//! set; moved as far as it goes, the segment touches a vertex, and it can still turn
-//! about it. So the lines through a vertex, in all directions between those to other
-//! vertices, each moved aside by next to nothing to the left and to the right, are
-//! enough to find every pair. (The same argument is behind the visibility complex,
-//! Pocchiola and Vegter 1996.)
+//! set; moved to its right as far as it goes, at the latest to the end of a linedef
+//! that it passes, the segment touches a vertex, and it can still turn about it. So the
+//! lines through a vertex, in all directions between those to other vertices, each
+//! moved by next to nothing to the left, are enough to find every pair. (The same
+//! argument is behind the visibility complex, Pocchiola and Vegter 1996.)
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -23,12 +23,11 @@ use super::map::{DoomMap, MapLine};
 use super::sweep::{Sweep, Whole, cross};
 
 /// Where a pair was found: the line through a vertex in a direction, moved to its
-/// left (or right) by next to nothing.
+/// left by next to nothing.
 #[derive(Clone, Copy, Debug)]
 struct Found {
     vertex: Whole,
     direction: Whole,
-    is_left: bool,
 }
 
 /// The exact set of a map's sectors.
@@ -40,8 +39,9 @@ pub struct SectorPvs {
     found: Vec<Option<Found>>,
     undecided: Vec<[RegionId; 2]>,
     crossings: usize,
-    /// The runs that were marked last: neighbouring lines mostly see the same.
-    marked: [Vec<u64>; 2],
+    /// The run that was marked last: neighbouring lines mostly see the same.
+    marked: Vec<u64>,
+    run: Vec<u64>,
 }
 
 impl SectorPvs {
@@ -62,17 +62,17 @@ impl SectorPvs {
             pvs: Pvs::alone(sectors),
             found: vec![None; sectors * sectors],
             undecided: Vec::new(),
-            marked: Default::default(),
+            marked: Vec::new(),
+            run: Vec::new(),
             map: map.clone(),
             graph,
         };
         let mut sweep = Sweep::default();
         for &vertex in &vertices {
             sweep.about(vertex, &vertices, &lines, sectors);
+            // Each line in the direction that goes up.
             for interval in 0..sweep.turn() {
-                for is_left in [true, false] {
-                    sight.runs(&sweep, vertex, interval, is_left);
-                }
+                sight.runs(&sweep, vertex, interval);
             }
         }
         sight
@@ -84,62 +84,47 @@ impl SectorPvs {
         self.crossings
     }
 
-    /// Marks what a line sees that passes the vertex on one side.
-    fn runs(&mut self, sweep: &Sweep, vertex: Whole, interval: usize, is_left: bool) {
+    /// Marks what a line sees that passes the vertex on its right: from the ray on,
+    /// counterclockwise over the linedefs at the vertex, to the opposite ray.
+    fn runs(&mut self, sweep: &Sweep, vertex: Whole, interval: usize) {
         let (turn, all) = (sweep.turn(), 2 * sweep.turn());
         let found = Found {
             vertex,
             direction: sweep.between(interval),
-            is_left,
         };
-        let mut run = sweep.set(interval).to_vec();
-        let mut pass = |spoke: &super::sweep::Spoke, sectors: [Option<RegionId>; 2]| {
-            let add = |run: &mut Vec<u64>, sector: Option<RegionId>| {
-                if let Some(s) = sector {
-                    run[s as usize / 64] |= 1 << (s % 64);
-                }
-            };
-            add(&mut run, sectors[0]);
+        let mut run = std::mem::take(&mut self.run);
+        run.clear();
+        run.extend_from_slice(sweep.set(interval));
+        // The directions after the ray's interval, as far as its opposite.
+        let first = sweep.spokes.partition_point(|spoke| spoke.at <= interval);
+        let (before, after) = sweep.spokes.split_at(first);
+        for spoke in after.iter().chain(before) {
+            if (spoke.at + all - interval - 1) % all >= turn {
+                break;
+            }
             if !spoke.is_open {
                 self.mark(&run, found);
                 run.fill(0);
             }
-            add(&mut run, sectors[1]);
-        };
-        // On the left from the ray on counterclockwise to its opposite.
-        let (spokes, mut order): (_, Vec<(usize, usize)>) = (&sweep.spokes, Vec::new());
-        for (i, spoke) in spokes.iter().enumerate() {
-            // 1 to `turn` on the left of the ray, the others on its right.
-            let after = (spoke.at + all - interval - 1) % all;
-            match is_left {
-                true if after < turn => order.push((after, i)),
-                false if after >= turn => order.push((all - after, i)),
-                _ => {}
+            if let Some(sector) = spoke.behind {
+                run[sector as usize / 64] |= 1 << (sector % 64);
             }
         }
-        order.sort_unstable();
-        for (_, i) in order {
-            let [before, behind] = spokes[i].sectors;
-            match is_left {
-                true => pass(&spokes[i], [before, behind]),
-                false => pass(&spokes[i], [behind, before]),
-            }
-        }
-        let opposite = sweep.set(interval + turn);
+        let opposite = sweep.set((interval + turn) % all);
         run.iter_mut()
             .zip(opposite)
             .for_each(|(word, more)| *word |= more);
         self.mark(&run, found);
+        self.run = run;
     }
 
     /// All sectors of a run see each other.
     fn mark(&mut self, run: &[u64], found: Found) {
-        let last = &mut self.marked[usize::from(found.is_left)];
-        if last == run {
+        if self.marked == run {
             return;
         }
-        last.clear();
-        last.extend_from_slice(run);
+        self.marked.clear();
+        self.marked.extend_from_slice(run);
         let mut members = Vec::new();
         decode(run, &mut members);
         for &from in &members {
@@ -194,11 +179,7 @@ impl ProvenPvs for SectorPvs {
         let [vertex, direction] =
             [found.vertex, found.direction].map(|v| DVec2::new(v[0] as f64, v[1] as f64));
         let direction = direction.normalize();
-        let aside = if found.is_left {
-            direction.perp()
-        } else {
-            -direction.perp()
-        };
+        let aside = direction.perp();
         (0..18).find_map(|halvings| {
             let start = vertex + aside * libm::exp2(f64::from(3 - halvings));
             let ends = segment(&self.map.lines, start, direction, [from, to])?;

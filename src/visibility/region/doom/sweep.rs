@@ -27,8 +27,8 @@ fn minus(a: Whole, b: Whole) -> Whole {
 pub(super) struct Spoke {
     /// Index of its direction.
     pub at: usize,
-    /// The sectors just before and just after it, counterclockwise.
-    pub sectors: [Option<RegionId>; 2],
+    /// The sector just after it, counterclockwise.
+    pub behind: Option<RegionId>,
     pub is_open: bool,
 }
 
@@ -124,13 +124,13 @@ impl Sweep {
             if goes(ends[0]) > 0 || goes(ends[1]) < 0 {
                 continue;
             }
-            // Through the vertex: clockwise of a direction is right of it.
-            for (end, sectors) in [(ends[1], [right, left]), (ends[0], [left, right])] {
+            // Through the vertex: counterclockwise of a direction is left of it.
+            for (end, behind) in [(ends[1], left), (ends[0], right)] {
                 if end != [0, 0] {
                     let at = self.index(end);
                     self.spokes.push(Spoke {
                         at,
-                        sectors,
+                        behind,
                         is_open,
                     });
                 }

@@ -69,7 +69,9 @@ fn lost(row: usize, shrink: f64) -> (usize, usize) {
     for round in 0..400u64 {
         let base = [DVec3::ZERO, DVec3::new(1e7, -3e6, 12_345.678)][round as usize % 2];
         let length = 2 + round as usize % 63;
-        let margins = [1e-3, 1e-5, 1e-7];
+        // The finest are some units in the last place.
+        let last_place = f64::EPSILON * (1.0 + base.abs().max_element());
+        let margins = [1e-3, 1e-7, 8.0 * last_place, 2.0 * last_place];
         // The same numbers for the truth and for what the row is told.
         let truth = chain(&mut SeededRng::new(round), base, length, 0.0, &margins);
         let told = chain(&mut SeededRng::new(round), base, length, shrink, &margins);
@@ -103,7 +105,7 @@ fn lines_through_chains_of_slits_are_not_lost() {
     for row in 0..4 {
         let (lost, accepted) = lost(row, 0.0);
         assert_eq!(lost, 0, "row {row}");
-        assert!(accepted > 300, "{accepted}");
+        assert!(accepted > 100, "{accepted}");
     }
 }
 
