@@ -8,6 +8,7 @@ use glam::Vec3;
 
 use super::clusters::{Clusters, MOST_TRIANGLES};
 use super::selection::Selection;
+use crate::geometry::Aabb;
 
 /// Points of a cluster at the most.
 const MOST_POINTS: usize = 3 * MOST_TRIANGLES;
@@ -21,6 +22,7 @@ pub struct Locals {
     firsts: Vec<u32>,
     /// Three points of the cluster each.
     triangles: Vec<[u8; 3]>,
+    bounds: Vec<Aabb>,
 }
 
 impl Locals {
@@ -31,6 +33,7 @@ impl Locals {
             points: Vec::new(),
             firsts: clusters.starts.clone(),
             triangles: Vec::with_capacity(clusters.triangles.len()),
+            bounds: (0..clusters.len()).map(|c| clusters.bounds(c)).collect(),
         };
         for cluster in 0..clusters.len() {
             let first = locals.points.len();
@@ -50,18 +53,33 @@ impl Locals {
         locals
     }
 
-    /// Keeps the triangles that a rule keeps, by what `of_point` says of each corner.
+    /// Keeps the triangles that a rule keeps, by what `of_point` says of each corner:
+    /// first all of a cluster or none of it, by the corners of its box, where `of_box`
+    /// decides.
     #[inline(always)]
     pub fn retain<T: Copy + Default>(
         &self,
         kept: &mut Selection,
         of_point: impl Fn(Vec3) -> T,
+        of_box: impl Fn([T; 8]) -> Option<bool>,
         keep: impl Fn([T; 3]) -> bool,
     ) {
         let mut of = [T::default(); MOST_POINTS];
         for (cluster, word) in kept.words_mut().iter_mut().enumerate() {
             if *word == 0 {
                 continue;
+            }
+            let mut corners = [T::default(); 8];
+            for (i, corner) in corners.iter_mut().enumerate() {
+                *corner = of_point(self.bounds[cluster].corner(i));
+            }
+            match of_box(corners) {
+                Some(true) => continue,
+                Some(false) => {
+                    *word = 0;
+                    continue;
+                }
+                None => {}
             }
             let points = self.starts[cluster] as usize..self.starts[cluster + 1] as usize;
             for (of, point) in of.iter_mut().zip(&self.points[points]) {
@@ -79,6 +97,7 @@ impl Locals {
     /// Bytes of all.
     pub fn bytes(&self) -> usize {
         let indices = size_of_val(&self.starts[..]) + size_of_val(&self.firsts[..]);
+        let indices = indices + size_of_val(&self.bounds[..]);
         indices + size_of_val(&self.points[..]) + size_of_val(&self.triangles[..])
     }
 }

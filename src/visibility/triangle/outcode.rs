@@ -87,7 +87,18 @@ impl Work for Query<'_> {
     fn run<I: Isa>(self, _: I) {
         let screen = &self.screen;
         let code = |p: Vec3| screen.outcode(p);
-        self.locals
-            .retain(self.kept, code, |[a, b, c]| a & b & c == 0);
+        // What is outside a plane with all corners of its box is outside; what has no
+        // corner outside any plane is not worth a closer look.
+        let of_box = |codes: [u8; 8]| {
+            let all = codes.iter().fold(u8::MAX, |all, code| all & code);
+            let any = codes.iter().fold(0, |any, code| any | code);
+            match (all, any) {
+                (0, 0) => Some(true),
+                (0, _) => None,
+                _ => Some(false),
+            }
+        };
+        let keep = |[a, b, c]: [u8; 3]| a & b & c == 0;
+        self.locals.retain(self.kept, code, of_box, keep);
     }
 }

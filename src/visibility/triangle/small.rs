@@ -52,9 +52,13 @@ impl Work for Query<'_> {
     fn run<I: Isa>(self, _: I) {
         let screen = &self.screen;
         let pixels = |p: Vec3| screen.pixels(p);
-        self.locals.retain(self.kept, pixels, |[a, b, c]| {
-            let all: PixelBox = a.union(b).union(c);
-            screen.has_sample(&all)
-        });
+        // In front of the eye the image of a box is within that of its corners.
+        let of_box = |corners: [PixelBox; 8]| {
+            let all = corners.iter().skip(1);
+            let all = all.fold(corners[0], |all, corner| all.union(*corner));
+            (!screen.has_sample(&all)).then_some(false)
+        };
+        let keep = |[a, b, c]: [PixelBox; 3]| screen.has_sample(&a.union(b).union(c));
+        self.locals.retain(self.kept, pixels, of_box, keep);
     }
 }
