@@ -8,21 +8,27 @@ use glam::Vec3;
 
 use super::clusters::{Clusters, MOST_TRIANGLES};
 use super::selection::Selection;
-use crate::geometry::Aabb;
 
 /// Points of a cluster at the most.
 const MOST_POINTS: usize = 3 * MOST_TRIANGLES;
+
+/// Points that are looked at together.
+pub const EIGHT: usize = 8;
+
+/// Eight points: x, y and z in a row each.
+pub type Points = [[f32; EIGHT]; 3];
 
 /// Points and triangles of clusters.
 pub struct Locals {
     /// Where the points of each cluster begin; one more at the end.
     starts: Vec<u32>,
-    points: Vec<Vec3>,
+    points: Vec<Points>,
     /// Where the triangles of each cluster begin; one more at the end.
     firsts: Vec<u32>,
     /// Three points of the cluster each.
     triangles: Vec<[u8; 3]>,
-    bounds: Vec<Aabb>,
+    /// The corners of each cluster's box.
+    corners: Vec<Points>,
 }
 
 impl Locals {
@@ -33,35 +39,38 @@ impl Locals {
             points: Vec::new(),
             firsts: clusters.starts.clone(),
             triangles: Vec::with_capacity(clusters.triangles.len()),
-            bounds: (0..clusters.len()).map(|c| clusters.bounds(c)).collect(),
+            corners: Vec::with_capacity(clusters.len()),
         };
         for cluster in 0..clusters.len() {
-            let first = locals.points.len();
             let mut own: HashMap<u32, u8> = HashMap::new();
+            let mut points: Vec<Vec3> = Vec::new();
             for &triangle in clusters.triangles_of(cluster) {
                 let corners = clusters.surfaces.triangles[triangle as usize].map(|point| {
-                    let next = (locals.points.len() - first) as u8;
                     *own.entry(point).or_insert_with(|| {
-                        locals.points.push(clusters.surfaces.points[point as usize]);
-                        next
+                        points.push(clusters.surfaces.points[point as usize]);
+                        (points.len() - 1) as u8
                     })
                 });
                 locals.triangles.push(corners);
             }
+            locals.points.extend(points.chunks(EIGHT).map(in_rows));
             locals.starts.push(locals.points.len() as u32);
+            let bounds = clusters.bounds(cluster);
+            let corners: [Vec3; 8] = std::array::from_fn(|i| bounds.corner(i));
+            locals.corners.push(in_rows(&corners));
         }
         locals
     }
 
-    /// Keeps the triangles that a rule keeps, by what `of_point` says of each corner:
+    /// Keeps the triangles that a rule keeps, by what `of_points` says of each corner:
     /// first all of a cluster or none of it, by the corners of its box, where `of_box`
     /// decides.
     #[inline(always)]
     pub fn retain<T: Copy + Default>(
         &self,
         kept: &mut Selection,
-        of_point: impl Fn(Vec3) -> T,
-        of_box: impl Fn([T; 8]) -> Option<bool>,
+        of_points: impl Fn(&Points) -> [T; EIGHT],
+        of_box: impl Fn([T; EIGHT]) -> Option<bool>,
         keep: impl Fn([T; 3]) -> bool,
     ) {
         let mut of = [T::default(); MOST_POINTS];
@@ -69,11 +78,7 @@ impl Locals {
             if *word == 0 {
                 continue;
             }
-            let mut corners = [T::default(); 8];
-            for (i, corner) in corners.iter_mut().enumerate() {
-                *corner = of_point(self.bounds[cluster].corner(i));
-            }
-            match of_box(corners) {
+            match of_box(of_points(&self.corners[cluster])) {
                 Some(true) => continue,
                 Some(false) => {
                     *word = 0;
@@ -82,8 +87,8 @@ impl Locals {
                 None => {}
             }
             let points = self.starts[cluster] as usize..self.starts[cluster + 1] as usize;
-            for (of, point) in of.iter_mut().zip(&self.points[points]) {
-                *of = of_point(*point);
+            for (of, points) in of.chunks_exact_mut(EIGHT).zip(&self.points[points]) {
+                of.copy_from_slice(&of_points(points));
             }
             let triangles = self.firsts[cluster] as usize..self.firsts[cluster + 1] as usize;
             let mut front = 0;
@@ -97,7 +102,18 @@ impl Locals {
     /// Bytes of all.
     pub fn bytes(&self) -> usize {
         let indices = size_of_val(&self.starts[..]) + size_of_val(&self.firsts[..]);
-        let indices = indices + size_of_val(&self.bounds[..]);
-        indices + size_of_val(&self.points[..]) + size_of_val(&self.triangles[..])
+        let corners = size_of_val(&self.corners[..]) + size_of_val(&self.triangles[..]);
+        indices + corners + size_of_val(&self.points[..])
     }
+}
+
+/// Up to eight points; zeros where there are fewer.
+pub fn in_rows(points: &[Vec3]) -> Points {
+    let mut rows = [[0.0; EIGHT]; 3];
+    for (lane, point) in points.iter().enumerate() {
+        for (k, row) in rows.iter_mut().enumerate() {
+            row[lane] = point[k];
+        }
+    }
+    rows
 }

@@ -5,7 +5,7 @@ use glam::Vec3;
 
 use super::super::guarantee::Guarantee;
 use super::contract::{Criterion, TriangleCull, TriangleRow};
-use super::locals::Locals;
+use super::locals::{Locals, Points, in_rows};
 use super::screen::Screen;
 use super::selection::Selection;
 use super::view::View;
@@ -40,7 +40,8 @@ named! {
 /// What a clipper has to do with a triangle whose guard band is `band` times as wide
 /// and high as the window (1 is none). `Outside` is proven; the others are rounded.
 pub fn clipping(screen: &Screen, corners: [Vec3; 3], band: f64) -> Clipping {
-    let outside = corners.map(|p| screen.outcode(p));
+    let codes = screen.outcodes(&in_rows(&corners));
+    let outside = [codes[0], codes[1], codes[2]];
     if outside[0] & outside[1] & outside[2] != 0 {
         return Clipping::Outside;
     }
@@ -86,7 +87,7 @@ impl Work for Query<'_> {
     #[inline(always)]
     fn run<I: Isa>(self, _: I) {
         let screen = &self.screen;
-        let code = |p: Vec3| screen.outcode(p);
+        let codes = |points: &Points| screen.outcodes(points);
         // What is outside a plane with all corners of its box is outside; what has no
         // corner outside any plane is not worth a closer look.
         let of_box = |codes: [u8; 8]| {
@@ -99,6 +100,6 @@ impl Work for Query<'_> {
             }
         };
         let keep = |[a, b, c]: [u8; 3]| a & b & c == 0;
-        self.locals.retain(self.kept, code, of_box, keep);
+        self.locals.retain(self.kept, codes, of_box, keep);
     }
 }

@@ -3,6 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::super::rays::SampleGrid;
+use super::locals::{EIGHT, Points};
 use super::view::View;
 use crate::camera::Lens;
 
@@ -26,12 +27,12 @@ pub struct Screen {
     grid: SampleGrid,
 }
 
-/// A point: right, up, depth, and the error of each.
+/// Eight points: right, up, depth, and the error of each.
 struct Seen {
-    x: f64,
-    y: f64,
-    depth: f64,
-    error: f64,
+    x: [f64; EIGHT],
+    y: [f64; EIGHT],
+    depth: [f64; EIGHT],
+    error: [f64; EIGHT],
 }
 
 impl Screen {
@@ -54,45 +55,61 @@ impl Screen {
         })
     }
 
-    #[inline(always)]
-    fn seen(&self, p: Vec3) -> Seen {
-        let way = p.as_dvec3() - self.eye;
-        let size = way.abs() + self.eye.abs() * (1.0 / 1024.0);
-        let [x, y, depth] = self.axes.map(|axis| axis.dot(way));
-        let error = ERROR * (size.x + size.y + size.z);
-        Seen { x, y, depth, error }
-    }
+    // Plain loops over lanes: what the compiler makes vectors of.
 
-    /// The scale of the window at a depth.
     #[inline(always)]
-    fn scale(&self, depth: f64) -> f64 {
-        if self.is_parallel { 1.0 } else { depth }
+    fn seen(&self, points: &Points) -> Seen {
+        let zero = [0.0; EIGHT];
+        let (mut x, mut y, mut depth, mut size) = (zero, zero, zero, zero);
+        for (k, row) in points.iter().enumerate() {
+            let (eye, [u, v, n]) = (self.eye[k], self.axes.map(|axis| axis[k]));
+            let least = eye.abs() * (1.0 / 1024.0);
+            for lane in 0..EIGHT {
+                let way = f64::from(row[lane]) - eye;
+                x[lane] += u * way;
+                y[lane] += v * way;
+                depth[lane] += n * way;
+                size[lane] += way.abs() + least;
+            }
+        }
+        let error = size.map(|size| ERROR * size);
+        Seen { x, y, depth, error }
     }
 
     /// One bit for each plane that a point is surely outside of: left, right,
     /// bottom, top, near, far.
     #[inline(always)]
-    pub fn outcode(&self, p: Vec3) -> u8 {
-        let Seen { x, y, depth, error } = self.seen(p);
+    pub fn outcodes(&self, points: &Points) -> [u8; EIGHT] {
+        let Seen { x, y, depth, error } = self.seen(points);
         let [left, right, bottom, top] = self.window;
-        let scale = self.scale(depth);
-        let slack = |slope: f64| error * (1.0 + slope.abs());
-        let bits = [
-            x + slack(left) < left * scale,
-            x - slack(right) > right * scale,
-            y + slack(bottom) < bottom * scale,
-            y - slack(top) > top * scale,
-            depth + error < self.near,
-            depth - error > self.far,
+        let mut codes = [0u64; EIGHT];
+        let across = [
+            (x, left, 1.0),
+            (x, right, -1.0),
+            (y, bottom, 1.0),
+            (y, top, -1.0),
         ];
-        (0..6).fold(0, |code, k| code | u8::from(bits[k]) << k)
+        for (bit, (at, slope, sign)) in across.into_iter().enumerate() {
+            let slack = 1.0 + slope.abs();
+            for lane in 0..EIGHT {
+                let scale = if self.is_parallel { 1.0 } else { depth[lane] };
+                let inside = (at[lane] - slope * scale) * sign + error[lane] * slack;
+                codes[lane] |= u64::from(inside < 0.0) << bit;
+            }
+        }
+        for lane in 0..EIGHT {
+            codes[lane] |= u64::from(depth[lane] + error[lane] < self.near) << 4;
+            codes[lane] |= u64::from(depth[lane] - error[lane] > self.far) << 5;
+        }
+        codes.map(|code| code as u8)
     }
 
     /// Whether a point in front of the eye is in a window `band` times as large.
     pub fn is_within(&self, p: Vec3, band: f64) -> bool {
-        let Seen { x, y, depth, .. } = self.seen(p);
+        let way = p.as_dvec3() - self.eye;
+        let [x, y, depth] = self.axes.map(|axis| axis.dot(way));
         let [left, right, bottom, top] = self.window;
-        let scale = self.scale(depth);
+        let scale = if self.is_parallel { 1.0 } else { depth };
         let within = |at: f64, low: f64, high: f64| {
             let (centre, half) = ((low + high) / 2.0, (high - low) / 2.0 * band);
             (at - centre * scale).abs() <= half * scale
@@ -100,37 +117,56 @@ impl Screen {
         within(x, left, right) && within(y, bottom, top)
     }
 
-    /// Where a point may be in the image; everywhere if it is not surely in front of
+    /// Where points may be in the image; everywhere if they are not surely in front of
     /// the eye.
     #[inline(always)]
-    pub fn pixels(&self, p: Vec3) -> PixelBox {
-        let Seen { x, y, depth, error } = self.seen(p);
+    pub fn pixels(&self, points: &Points) -> [PixelBox; EIGHT] {
+        let Seen {
+            mut x,
+            mut y,
+            depth,
+            error,
+        } = self.seen(points);
         let [left, right, bottom, top] = self.window;
         // The error of a quotient: that of its parts, by the least depth there is.
-        let (scale, least) = match self.is_parallel {
-            true => (1.0, 1.0),
-            false => (1.0 / depth, depth - error),
-        };
-        if !(depth > error && least > 1e-300) {
-            return PixelBox::EVERYWHERE;
+        let mut slack = error;
+        if !self.is_parallel {
+            for lane in 0..EIGHT {
+                let scale = 1.0 / depth[lane];
+                x[lane] *= scale;
+                // Rows are counted downward.
+                y[lane] *= -scale;
+                // 1 / (depth - error), and something more, where error is far below
+                // depth; elsewhere the point is not used.
+                slack[lane] *= scale * (1.0 + 4.0 * ERROR);
+            }
+        } else {
+            y = y.map(|y| -y);
         }
-        let (x, y, slack) = (x * scale, y * scale, error / least);
-        let columns = f64::from(self.grid.width) / (right - left);
-        let rows = f64::from(self.grid.height) / (top - bottom);
-        let span = |at: f64, from: f64, unit: f64| {
-            let slack = slack * (1.0 + at.abs()) + ERROR * (at.abs() + from.abs() + 1.0);
-            // A sample is at the centre of its pixel: index + 1/2.
-            let middle = at * unit - from * unit - 0.5;
-            let slack = slack * unit + ERROR * middle.abs();
-            (middle - slack, middle + slack)
-        };
-        let (first_column, last_column) = span(x, left, columns);
-        // Rows are counted downward.
-        let (first_row, last_row) = span(-y, -top, rows);
-        PixelBox {
-            low: [first_column, first_row],
-            high: [last_column, last_row],
+        let columns = span(
+            &x,
+            &slack,
+            left,
+            f64::from(self.grid.width) / (right - left),
+        );
+        let rows = span(
+            &y,
+            &slack,
+            -top,
+            f64::from(self.grid.height) / (top - bottom),
+        );
+        let mut boxes = [PixelBox::EVERYWHERE; EIGHT];
+        for lane in 0..EIGHT {
+            // Far below: 2^-1 of it is enough for the slack above, doubled there.
+            let is_ahead = depth[lane] * 0.5 > error[lane] && depth[lane] > 1e-300;
+            if is_ahead {
+                boxes[lane] = PixelBox {
+                    low: [columns[0][lane], rows[0][lane]],
+                    high: [columns[1][lane], rows[1][lane]],
+                };
+            }
         }
+        boxes
     }
 
     /// Whether a sample lies in the box.
@@ -148,6 +184,23 @@ impl Screen {
         within(all.low[0], all.high[0], self.grid.width)
             && within(all.low[1], all.high[1], self.grid.height)
     }
+}
+
+/// Where samples begin and end for offsets `at` and their errors: `unit` samples per
+/// unit, counted from `from`.
+#[inline(always)]
+fn span(at: &[f64; EIGHT], error: &[f64; EIGHT], from: f64, unit: f64) -> [[f64; EIGHT]; 2] {
+    let (mut low, mut high) = ([0.0; EIGHT], [0.0; EIGHT]);
+    for lane in 0..EIGHT {
+        let size = at[lane].abs();
+        let slack = 2.0 * error[lane] * (1.0 + size) + ERROR * (size + from.abs() + 1.0);
+        // A sample is at the centre of its pixel: index + 1/2.
+        let middle = (at[lane] - from) * unit - 0.5;
+        let slack = slack * unit + ERROR * middle.abs();
+        low[lane] = middle - slack;
+        high[lane] = middle + slack;
+    }
+    [low, high]
 }
 
 /// Column and row of what is seen, in samples: 0 is the first one.

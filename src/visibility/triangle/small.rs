@@ -1,11 +1,9 @@
 //! Triangles whose screen box holds no sample: between the rays, at this size of
 //! image.
 
-use glam::Vec3;
-
 use super::super::guarantee::Guarantee;
 use super::contract::{Criterion, TriangleCull, TriangleRow};
-use super::locals::Locals;
+use super::locals::{Locals, Points};
 use super::screen::{PixelBox, Screen};
 use super::selection::Selection;
 use super::view::View;
@@ -51,7 +49,7 @@ impl Work for Query<'_> {
     #[inline(always)]
     fn run<I: Isa>(self, _: I) {
         let screen = &self.screen;
-        let pixels = |p: Vec3| screen.pixels(p);
+        let pixels = |points: &Points| screen.pixels(points);
         // In front of the eye the image of a box is within that of its corners.
         let of_box = |corners: [PixelBox; 8]| {
             let all = corners.iter().skip(1);
