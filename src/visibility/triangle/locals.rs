@@ -31,6 +31,22 @@ pub struct Locals {
     corners: Vec<Points>,
 }
 
+/// Which triangles are kept. All of it is `#[inline(always)]`: what stays a call of
+/// its own was compiled for the portable instruction set.
+pub trait Rule {
+    /// What is to be known of a point.
+    type Of: Copy + Default;
+
+    /// Of eight points.
+    fn of_points(&self, points: &Points) -> [Self::Of; EIGHT];
+
+    /// Whether all of a cluster is kept, or none, by the corners of its box.
+    fn of_box(&self, corners: [Self::Of; EIGHT]) -> Option<bool>;
+
+    /// Whether a triangle is kept.
+    fn keep(&self, corners: [Self::Of; 3]) -> bool;
+}
+
 impl Locals {
     /// Copies the points. O(t).
     pub fn of(clusters: &Arc<Clusters>) -> Locals {
@@ -62,23 +78,16 @@ impl Locals {
         locals
     }
 
-    /// Keeps the triangles that a rule keeps, by what `of_points` says of each corner:
-    /// first all of a cluster or none of it, by the corners of its box, where `of_box`
-    /// decides.
+    /// Keeps the triangles that a rule keeps: first all of a cluster or none of it, by
+    /// the corners of its box, where that decides.
     #[inline(always)]
-    pub fn retain<T: Copy + Default>(
-        &self,
-        kept: &mut Selection,
-        of_points: impl Fn(&Points) -> [T; EIGHT],
-        of_box: impl Fn([T; EIGHT]) -> Option<bool>,
-        keep: impl Fn([T; 3]) -> bool,
-    ) {
-        let mut of = [T::default(); MOST_POINTS];
+    pub fn retain<R: Rule>(&self, kept: &mut Selection, rule: &R) {
+        let mut of = [R::Of::default(); MOST_POINTS];
         for (cluster, word) in kept.words_mut().iter_mut().enumerate() {
             if *word == 0 {
                 continue;
             }
-            match of_box(of_points(&self.corners[cluster])) {
+            match rule.of_box(rule.of_points(&self.corners[cluster])) {
                 Some(true) => continue,
                 Some(false) => {
                     *word = 0;
@@ -88,12 +97,13 @@ impl Locals {
             }
             let points = self.starts[cluster] as usize..self.starts[cluster + 1] as usize;
             for (of, points) in of.chunks_exact_mut(EIGHT).zip(&self.points[points]) {
-                of.copy_from_slice(&of_points(points));
+                of.copy_from_slice(&rule.of_points(points));
             }
             let triangles = self.firsts[cluster] as usize..self.firsts[cluster + 1] as usize;
             let mut front = 0;
-            for (bit, corners) in self.triangles[triangles].iter().enumerate() {
-                front |= u64::from(keep(corners.map(|corner| of[usize::from(corner)]))) << bit;
+            for (bit, [a, b, c]) in self.triangles[triangles].iter().enumerate() {
+                let corners = [a, b, c].map(|corner| of[usize::from(*corner)]);
+                front |= u64::from(rule.keep(corners)) << bit;
             }
             *word &= front;
         }

@@ -5,7 +5,7 @@ use glam::Vec3;
 
 use super::super::guarantee::Guarantee;
 use super::contract::{Criterion, TriangleCull, TriangleRow};
-use super::locals::{Locals, Points, in_rows};
+use super::locals::{EIGHT, Locals, Points, Rule, in_rows};
 use super::screen::Screen;
 use super::selection::Selection;
 use super::view::View;
@@ -86,20 +86,38 @@ impl Work for Query<'_> {
 
     #[inline(always)]
     fn run<I: Isa>(self, _: I) {
-        let screen = &self.screen;
-        let codes = |points: &Points| screen.outcodes(points);
-        // What is outside a plane with all corners of its box is outside; what has no
-        // corner outside any plane is not worth a closer look.
-        let of_box = |codes: [u8; 8]| {
-            let all = codes.iter().fold(u8::MAX, |all, code| all & code);
-            let any = codes.iter().fold(0, |any, code| any | code);
-            match (all, any) {
-                (0, 0) => Some(true),
-                (0, _) => None,
-                _ => Some(false),
-            }
-        };
-        let keep = |[a, b, c]: [u8; 3]| a & b & c == 0;
-        self.locals.retain(self.kept, codes, of_box, keep);
+        self.locals.retain(self.kept, &Codes(self.screen));
+    }
+}
+
+struct Codes(Screen);
+
+impl Rule for Codes {
+    type Of = u8;
+
+    #[inline(always)]
+    fn of_points(&self, points: &Points) -> [u8; EIGHT] {
+        self.0.outcodes(points)
+    }
+
+    /// What is outside a plane with all corners of its box is outside; what has no
+    /// corner outside any plane is not worth a closer look.
+    #[inline(always)]
+    fn of_box(&self, codes: [u8; EIGHT]) -> Option<bool> {
+        let (mut all, mut any) = (u8::MAX, 0);
+        for code in codes {
+            all &= code;
+            any |= code;
+        }
+        match (all, any) {
+            (0, 0) => Some(true),
+            (0, _) => None,
+            _ => Some(false),
+        }
+    }
+
+    #[inline(always)]
+    fn keep(&self, [a, b, c]: [u8; 3]) -> bool {
+        a & b & c == 0
     }
 }

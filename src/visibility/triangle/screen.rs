@@ -37,7 +37,7 @@ struct Seen {
 
 impl Screen {
     /// Bits of an outcode that are about depth: nearer than near, beyond far.
-    pub const DEPTH: u8 = 0b11_0000;
+    pub(super) const DEPTH: u8 = 0b11_0000;
 
     /// `None` for a view without a window.
     pub fn of(view: &View) -> Option<Screen> {
@@ -79,7 +79,7 @@ impl Screen {
     /// One bit for each plane that a point is surely outside of: left, right,
     /// bottom, top, near, far.
     #[inline(always)]
-    pub fn outcodes(&self, points: &Points) -> [u8; EIGHT] {
+    pub(super) fn outcodes(&self, points: &Points) -> [u8; EIGHT] {
         let Seen { x, y, depth, error } = self.seen(points);
         let [left, right, bottom, top] = self.window;
         let mut codes = [0u64; EIGHT];
@@ -120,7 +120,7 @@ impl Screen {
     /// Where points may be in the image; everywhere if they are not surely in front of
     /// the eye.
     #[inline(always)]
-    pub fn pixels(&self, points: &Points) -> [PixelBox; EIGHT] {
+    pub(super) fn pixels(&self, points: &Points) -> [PixelBox; EIGHT] {
         let Seen {
             mut x,
             mut y,
@@ -143,89 +143,87 @@ impl Screen {
         } else {
             y = y.map(|y| -y);
         }
-        let columns = span(
-            &x,
-            &slack,
-            left,
-            f64::from(self.grid.width) / (right - left),
-        );
-        let rows = span(
-            &y,
-            &slack,
-            -top,
-            f64::from(self.grid.height) / (top - bottom),
-        );
+        let columns = span(&x, &slack, left, 1.0 / (right - left), self.grid.width);
+        let rows = span(&y, &slack, -top, 1.0 / (top - bottom), self.grid.height);
         let mut boxes = [PixelBox::EVERYWHERE; EIGHT];
         for lane in 0..EIGHT {
             // Far below: 2^-1 of it is enough for the slack above, doubled there.
             let is_ahead = depth[lane] * 0.5 > error[lane] && depth[lane] > 1e-300;
             if is_ahead {
-                boxes[lane] = PixelBox {
-                    low: [columns[0][lane], rows[0][lane]],
-                    high: [columns[1][lane], rows[1][lane]],
-                };
+                let least = [
+                    columns[0][lane],
+                    rows[0][lane],
+                    columns[1][lane],
+                    rows[1][lane],
+                ];
+                boxes[lane] = PixelBox { least };
             }
         }
         boxes
     }
-
-    /// Whether a sample lies in the box.
-    #[inline(always)]
-    pub fn has_sample(&self, all: &PixelBox) -> bool {
-        let within = |low: f64, high: f64, count: u32| {
-            let count = f64::from(count);
-            let low = -least(-low, 0.0);
-            let low = least(low, count);
-            // Near 2^52 only whole numbers are left: the nearest one, without a call.
-            let whole = (low + WHOLE) - WHOLE;
-            let next = if whole < low { whole + 1.0 } else { whole };
-            next <= least(high, count - 1.0)
-        };
-        within(all.low[0], all.high[0], self.grid.width)
-            && within(all.low[1], all.high[1], self.grid.height)
-    }
 }
 
-/// Where samples begin and end for offsets `at` and their errors: `unit` samples per
-/// unit, counted from `from`.
+/// First and negated last sample between offsets `at` with their errors, `count`
+/// samples per width, the first one beginning at `from`; none outside the image.
 #[inline(always)]
-fn span(at: &[f64; EIGHT], error: &[f64; EIGHT], from: f64, unit: f64) -> [[f64; EIGHT]; 2] {
-    let (mut low, mut high) = ([0.0; EIGHT], [0.0; EIGHT]);
+fn span(
+    at: &[f64; EIGHT],
+    error: &[f64; EIGHT],
+    from: f64,
+    per_width: f64,
+    count: u32,
+) -> [[i32; EIGHT]; 2] {
+    let count = f64::from(count.min(FAR as u32));
+    let unit = per_width * count;
+    let (mut first, mut minus_last) = ([0; EIGHT], [0; EIGHT]);
     for lane in 0..EIGHT {
         let size = at[lane].abs();
         let slack = 2.0 * error[lane] * (1.0 + size) + ERROR * (size + from.abs() + 1.0);
         // A sample is at the centre of its pixel: index + 1/2.
         let middle = (at[lane] - from) * unit - 0.5;
         let slack = slack * unit + ERROR * middle.abs();
-        low[lane] = middle - slack;
-        high[lane] = middle + slack;
+        // Near 2^52 only whole numbers are left, in the lowest bits: the nearest one
+        // without a call, and from there up or down.
+        let low = least(-least(-(middle - slack), 0.0), count);
+        let near = low + WHOLE;
+        first[lane] = near.to_bits() as i32 + i32::from(near - WHOLE < low);
+        let above = least(-least(-(middle + slack + 1.0), 0.0), count);
+        let near = above + WHOLE;
+        minus_last[lane] = 1 - near.to_bits() as i32 + i32::from(near - WHOLE > above);
     }
-    [low, high]
+    [first, minus_last]
 }
 
-/// Column and row of what is seen, in samples: 0 is the first one.
+/// Beyond any column or row.
+const FAR: i32 = 1 << 29;
+
+/// Columns and rows of samples: first column and row, last ones negated. Clipped to
+/// the image.
 #[derive(Clone, Copy, Default, Debug)]
 pub struct PixelBox {
-    low: [f64; 2],
-    high: [f64; 2],
+    least: [i32; 4],
 }
 
 impl PixelBox {
     /// The whole plane.
-    const EVERYWHERE: PixelBox = PixelBox {
-        low: [f64::NEG_INFINITY; 2],
-        high: [f64::INFINITY; 2],
-    };
+    const EVERYWHERE: PixelBox = PixelBox { least: [-FAR; 4] };
 
     /// The box of two.
     #[inline(always)]
     pub fn union(self, other: PixelBox) -> PixelBox {
-        let low = |k: usize| least(self.low[k], other.low[k]);
-        let high = |k: usize| -least(-self.high[k], -other.high[k]);
-        PixelBox {
-            low: [low(0), low(1)],
-            high: [high(0), high(1)],
+        let mut least = self.least;
+        for (least, other) in least.iter_mut().zip(other.least) {
+            *least = (*least).min(other);
         }
+        PixelBox { least }
+    }
+
+    /// Whether a sample lies in it.
+    #[inline(always)]
+    pub fn has_sample(self) -> bool {
+        let [column, row, minus_column, minus_row] = self.least;
+        // Both, without a branch that could not be predicted.
+        (column + minus_column <= 0) & (row + minus_row <= 0)
     }
 }
 

@@ -3,7 +3,7 @@
 
 use super::super::guarantee::Guarantee;
 use super::contract::{Criterion, TriangleCull, TriangleRow};
-use super::locals::{Locals, Points};
+use super::locals::{EIGHT, Locals, Points, Rule};
 use super::screen::{PixelBox, Screen};
 use super::selection::Selection;
 use super::view::View;
@@ -48,15 +48,32 @@ impl Work for Query<'_> {
 
     #[inline(always)]
     fn run<I: Isa>(self, _: I) {
-        let screen = &self.screen;
-        let pixels = |points: &Points| screen.pixels(points);
-        // In front of the eye the image of a box is within that of its corners.
-        let of_box = |corners: [PixelBox; 8]| {
-            let all = corners.iter().skip(1);
-            let all = all.fold(corners[0], |all, corner| all.union(*corner));
-            (!screen.has_sample(&all)).then_some(false)
-        };
-        let keep = |[a, b, c]: [PixelBox; 3]| screen.has_sample(&a.union(b).union(c));
-        self.locals.retain(self.kept, pixels, of_box, keep);
+        self.locals.retain(self.kept, &Pixels(self.screen));
+    }
+}
+
+struct Pixels(Screen);
+
+impl Rule for Pixels {
+    type Of = PixelBox;
+
+    #[inline(always)]
+    fn of_points(&self, points: &Points) -> [PixelBox; EIGHT] {
+        self.0.pixels(points)
+    }
+
+    /// In front of the eye the image of a box is within that of its corners.
+    #[inline(always)]
+    fn of_box(&self, corners: [PixelBox; EIGHT]) -> Option<bool> {
+        let mut all = corners[0];
+        for corner in corners {
+            all = all.union(corner);
+        }
+        (!all.has_sample()).then_some(false)
+    }
+
+    #[inline(always)]
+    fn keep(&self, [a, b, c]: [PixelBox; 3]) -> bool {
+        a.union(b).union(c).has_sample()
     }
 }
