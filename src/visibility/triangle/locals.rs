@@ -12,15 +12,39 @@ use super::selection::Selection;
 /// Points of a cluster at the most.
 const MOST_POINTS: usize = 3 * MOST_TRIANGLES;
 
+/// Points that are looked at together.
+pub const EIGHT: usize = 8;
+
+/// Eight points: x, y and z in a row each.
+pub type Points = [[f32; EIGHT]; 3];
+
 /// Points and triangles of clusters.
 pub struct Locals {
     /// Where the points of each cluster begin; one more at the end.
     starts: Vec<u32>,
-    points: Vec<Vec3>,
+    points: Vec<Points>,
     /// Where the triangles of each cluster begin; one more at the end.
     firsts: Vec<u32>,
     /// Three points of the cluster each.
     triangles: Vec<[u8; 3]>,
+    /// The corners of each cluster's box.
+    corners: Vec<Points>,
+}
+
+/// Which triangles are kept. All of it is `#[inline(always)]`: what stays a call of
+/// its own was compiled for the portable instruction set.
+pub trait Rule {
+    /// What is to be known of a point.
+    type Of: Copy + Default;
+
+    /// Of eight points.
+    fn of_points(&self, points: &Points) -> [Self::Of; EIGHT];
+
+    /// Whether all of a cluster is kept, or none, by the corners of its box.
+    fn of_box(&self, corners: [Self::Of; EIGHT]) -> Option<bool>;
+
+    /// Whether a triangle is kept.
+    fn keep(&self, corners: [Self::Of; 3]) -> bool;
 }
 
 impl Locals {
@@ -31,46 +55,55 @@ impl Locals {
             points: Vec::new(),
             firsts: clusters.starts.clone(),
             triangles: Vec::with_capacity(clusters.triangles.len()),
+            corners: Vec::with_capacity(clusters.len()),
         };
         for cluster in 0..clusters.len() {
-            let first = locals.points.len();
             let mut own: HashMap<u32, u8> = HashMap::new();
+            let mut points: Vec<Vec3> = Vec::new();
             for &triangle in clusters.triangles_of(cluster) {
                 let corners = clusters.surfaces.triangles[triangle as usize].map(|point| {
-                    let next = (locals.points.len() - first) as u8;
                     *own.entry(point).or_insert_with(|| {
-                        locals.points.push(clusters.surfaces.points[point as usize]);
-                        next
+                        points.push(clusters.surfaces.points[point as usize]);
+                        (points.len() - 1) as u8
                     })
                 });
                 locals.triangles.push(corners);
             }
+            locals.points.extend(points.chunks(EIGHT).map(in_rows));
             locals.starts.push(locals.points.len() as u32);
+            let bounds = clusters.bounds(cluster);
+            let corners: [Vec3; 8] = std::array::from_fn(|i| bounds.corner(i));
+            locals.corners.push(in_rows(&corners));
         }
         locals
     }
 
-    /// Keeps the triangles that a rule keeps, by what `of_point` says of each corner.
+    /// Keeps the triangles that a rule keeps: first all of a cluster or none of it, by
+    /// the corners of its box, where that decides.
     #[inline(always)]
-    pub fn retain<T: Copy + Default>(
-        &self,
-        kept: &mut Selection,
-        of_point: impl Fn(Vec3) -> T,
-        keep: impl Fn([T; 3]) -> bool,
-    ) {
-        let mut of = [T::default(); MOST_POINTS];
+    pub fn retain<R: Rule>(&self, kept: &mut Selection, rule: &R) {
+        let mut of = [R::Of::default(); MOST_POINTS];
         for (cluster, word) in kept.words_mut().iter_mut().enumerate() {
             if *word == 0 {
                 continue;
             }
+            match rule.of_box(rule.of_points(&self.corners[cluster])) {
+                Some(true) => continue,
+                Some(false) => {
+                    *word = 0;
+                    continue;
+                }
+                None => {}
+            }
             let points = self.starts[cluster] as usize..self.starts[cluster + 1] as usize;
-            for (of, point) in of.iter_mut().zip(&self.points[points]) {
-                *of = of_point(*point);
+            for (of, points) in of.chunks_exact_mut(EIGHT).zip(&self.points[points]) {
+                of.copy_from_slice(&rule.of_points(points));
             }
             let triangles = self.firsts[cluster] as usize..self.firsts[cluster + 1] as usize;
             let mut front = 0;
-            for (bit, corners) in self.triangles[triangles].iter().enumerate() {
-                front |= u64::from(keep(corners.map(|corner| of[usize::from(corner)]))) << bit;
+            for (bit, [a, b, c]) in self.triangles[triangles].iter().enumerate() {
+                let corners = [a, b, c].map(|corner| of[usize::from(*corner)]);
+                front |= u64::from(rule.keep(corners)) << bit;
             }
             *word &= front;
         }
@@ -79,6 +112,18 @@ impl Locals {
     /// Bytes of all.
     pub fn bytes(&self) -> usize {
         let indices = size_of_val(&self.starts[..]) + size_of_val(&self.firsts[..]);
-        indices + size_of_val(&self.points[..]) + size_of_val(&self.triangles[..])
+        let corners = size_of_val(&self.corners[..]) + size_of_val(&self.triangles[..]);
+        indices + corners + size_of_val(&self.points[..])
     }
+}
+
+/// Up to eight points; zeros where there are fewer.
+pub fn in_rows(points: &[Vec3]) -> Points {
+    let mut rows = [[0.0; EIGHT]; 3];
+    for (lane, point) in points.iter().enumerate() {
+        for (k, row) in rows.iter_mut().enumerate() {
+            row[lane] = point[k];
+        }
+    }
+    rows
 }

@@ -5,7 +5,7 @@ use glam::Vec3;
 
 use super::super::guarantee::Guarantee;
 use super::contract::{Criterion, TriangleCull, TriangleRow};
-use super::locals::Locals;
+use super::locals::{EIGHT, Locals, Points, Rule, in_rows};
 use super::screen::Screen;
 use super::selection::Selection;
 use super::view::View;
@@ -40,7 +40,8 @@ named! {
 /// What a clipper has to do with a triangle whose guard band is `band` times as wide
 /// and high as the window (1 is none). `Outside` is proven; the others are rounded.
 pub fn clipping(screen: &Screen, corners: [Vec3; 3], band: f64) -> Clipping {
-    let outside = corners.map(|p| screen.outcode(p));
+    let codes = screen.outcodes(&in_rows(&corners));
+    let outside = [codes[0], codes[1], codes[2]];
     if outside[0] & outside[1] & outside[2] != 0 {
         return Clipping::Outside;
     }
@@ -85,9 +86,38 @@ impl Work for Query<'_> {
 
     #[inline(always)]
     fn run<I: Isa>(self, _: I) {
-        let screen = &self.screen;
-        let code = |p: Vec3| screen.outcode(p);
-        self.locals
-            .retain(self.kept, code, |[a, b, c]| a & b & c == 0);
+        self.locals.retain(self.kept, &Codes(self.screen));
+    }
+}
+
+struct Codes(Screen);
+
+impl Rule for Codes {
+    type Of = u8;
+
+    #[inline(always)]
+    fn of_points(&self, points: &Points) -> [u8; EIGHT] {
+        self.0.outcodes(points)
+    }
+
+    /// What is outside a plane with all corners of its box is outside; what has no
+    /// corner outside any plane is not worth a closer look.
+    #[inline(always)]
+    fn of_box(&self, codes: [u8; EIGHT]) -> Option<bool> {
+        let (mut all, mut any) = (u8::MAX, 0);
+        for code in codes {
+            all &= code;
+            any |= code;
+        }
+        match (all, any) {
+            (0, 0) => Some(true),
+            (0, _) => None,
+            _ => Some(false),
+        }
+    }
+
+    #[inline(always)]
+    fn keep(&self, [a, b, c]: [u8; 3]) -> bool {
+        a & b & c == 0
     }
 }

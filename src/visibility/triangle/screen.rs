@@ -3,6 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::super::rays::SampleGrid;
+use super::locals::{EIGHT, Points};
 use super::view::View;
 use crate::camera::Lens;
 
@@ -26,17 +27,17 @@ pub struct Screen {
     grid: SampleGrid,
 }
 
-/// A point: right, up, depth, and the error of each.
+/// Eight points: right, up, depth, and the error of each.
 struct Seen {
-    x: f64,
-    y: f64,
-    depth: f64,
-    error: f64,
+    x: [f64; EIGHT],
+    y: [f64; EIGHT],
+    depth: [f64; EIGHT],
+    error: [f64; EIGHT],
 }
 
 impl Screen {
     /// Bits of an outcode that are about depth: nearer than near, beyond far.
-    pub const DEPTH: u8 = 0b11_0000;
+    pub(super) const DEPTH: u8 = 0b11_0000;
 
     /// `None` for a view without a window.
     pub fn of(view: &View) -> Option<Screen> {
@@ -54,45 +55,61 @@ impl Screen {
         })
     }
 
-    #[inline(always)]
-    fn seen(&self, p: Vec3) -> Seen {
-        let way = p.as_dvec3() - self.eye;
-        let size = way.abs() + self.eye.abs() * (1.0 / 1024.0);
-        let [x, y, depth] = self.axes.map(|axis| axis.dot(way));
-        let error = ERROR * (size.x + size.y + size.z);
-        Seen { x, y, depth, error }
-    }
+    // Plain loops over lanes: what the compiler makes vectors of.
 
-    /// The scale of the window at a depth.
     #[inline(always)]
-    fn scale(&self, depth: f64) -> f64 {
-        if self.is_parallel { 1.0 } else { depth }
+    fn seen(&self, points: &Points) -> Seen {
+        let zero = [0.0; EIGHT];
+        let (mut x, mut y, mut depth, mut size) = (zero, zero, zero, zero);
+        for (k, row) in points.iter().enumerate() {
+            let (eye, [u, v, n]) = (self.eye[k], self.axes.map(|axis| axis[k]));
+            let least = eye.abs() * (1.0 / 1024.0);
+            for lane in 0..EIGHT {
+                let way = f64::from(row[lane]) - eye;
+                x[lane] += u * way;
+                y[lane] += v * way;
+                depth[lane] += n * way;
+                size[lane] += way.abs() + least;
+            }
+        }
+        let error = size.map(|size| ERROR * size);
+        Seen { x, y, depth, error }
     }
 
     /// One bit for each plane that a point is surely outside of: left, right,
     /// bottom, top, near, far.
     #[inline(always)]
-    pub fn outcode(&self, p: Vec3) -> u8 {
-        let Seen { x, y, depth, error } = self.seen(p);
+    pub(super) fn outcodes(&self, points: &Points) -> [u8; EIGHT] {
+        let Seen { x, y, depth, error } = self.seen(points);
         let [left, right, bottom, top] = self.window;
-        let scale = self.scale(depth);
-        let slack = |slope: f64| error * (1.0 + slope.abs());
-        let bits = [
-            x + slack(left) < left * scale,
-            x - slack(right) > right * scale,
-            y + slack(bottom) < bottom * scale,
-            y - slack(top) > top * scale,
-            depth + error < self.near,
-            depth - error > self.far,
+        let mut codes = [0u64; EIGHT];
+        let across = [
+            (x, left, 1.0),
+            (x, right, -1.0),
+            (y, bottom, 1.0),
+            (y, top, -1.0),
         ];
-        (0..6).fold(0, |code, k| code | u8::from(bits[k]) << k)
+        for (bit, (at, slope, sign)) in across.into_iter().enumerate() {
+            let slack = 1.0 + slope.abs();
+            for lane in 0..EIGHT {
+                let scale = if self.is_parallel { 1.0 } else { depth[lane] };
+                let inside = (at[lane] - slope * scale) * sign + error[lane] * slack;
+                codes[lane] |= u64::from(inside < 0.0) << bit;
+            }
+        }
+        for lane in 0..EIGHT {
+            codes[lane] |= u64::from(depth[lane] + error[lane] < self.near) << 4;
+            codes[lane] |= u64::from(depth[lane] - error[lane] > self.far) << 5;
+        }
+        codes.map(|code| code as u8)
     }
 
     /// Whether a point in front of the eye is in a window `band` times as large.
     pub fn is_within(&self, p: Vec3, band: f64) -> bool {
-        let Seen { x, y, depth, .. } = self.seen(p);
+        let way = p.as_dvec3() - self.eye;
+        let [x, y, depth] = self.axes.map(|axis| axis.dot(way));
         let [left, right, bottom, top] = self.window;
-        let scale = self.scale(depth);
+        let scale = if self.is_parallel { 1.0 } else { depth };
         let within = |at: f64, low: f64, high: f64| {
             let (centre, half) = ((low + high) / 2.0, (high - low) / 2.0 * band);
             (at - centre * scale).abs() <= half * scale
@@ -100,79 +117,113 @@ impl Screen {
         within(x, left, right) && within(y, bottom, top)
     }
 
-    /// Where a point may be in the image; everywhere if it is not surely in front of
+    /// Where points may be in the image; everywhere if they are not surely in front of
     /// the eye.
     #[inline(always)]
-    pub fn pixels(&self, p: Vec3) -> PixelBox {
-        let Seen { x, y, depth, error } = self.seen(p);
+    pub(super) fn pixels(&self, points: &Points) -> [PixelBox; EIGHT] {
+        let Seen {
+            mut x,
+            mut y,
+            depth,
+            error,
+        } = self.seen(points);
         let [left, right, bottom, top] = self.window;
         // The error of a quotient: that of its parts, by the least depth there is.
-        let (scale, least) = match self.is_parallel {
-            true => (1.0, 1.0),
-            false => (1.0 / depth, depth - error),
-        };
-        if !(depth > error && least > 1e-300) {
-            return PixelBox::EVERYWHERE;
+        let mut slack = error;
+        if !self.is_parallel {
+            for lane in 0..EIGHT {
+                let scale = 1.0 / depth[lane];
+                x[lane] *= scale;
+                // Rows are counted downward.
+                y[lane] *= -scale;
+                // 1 / (depth - error), and something more, where error is far below
+                // depth; elsewhere the point is not used.
+                slack[lane] *= scale * (1.0 + 4.0 * ERROR);
+            }
+        } else {
+            y = y.map(|y| -y);
         }
-        let (x, y, slack) = (x * scale, y * scale, error / least);
-        let columns = f64::from(self.grid.width) / (right - left);
-        let rows = f64::from(self.grid.height) / (top - bottom);
-        let span = |at: f64, from: f64, unit: f64| {
-            let slack = slack * (1.0 + at.abs()) + ERROR * (at.abs() + from.abs() + 1.0);
-            // A sample is at the centre of its pixel: index + 1/2.
-            let middle = at * unit - from * unit - 0.5;
-            let slack = slack * unit + ERROR * middle.abs();
-            (middle - slack, middle + slack)
-        };
-        let (first_column, last_column) = span(x, left, columns);
-        // Rows are counted downward.
-        let (first_row, last_row) = span(-y, -top, rows);
-        PixelBox {
-            low: [first_column, first_row],
-            high: [last_column, last_row],
+        let columns = span(&x, &slack, left, 1.0 / (right - left), self.grid.width);
+        let rows = span(&y, &slack, -top, 1.0 / (top - bottom), self.grid.height);
+        let mut boxes = [PixelBox::EVERYWHERE; EIGHT];
+        for lane in 0..EIGHT {
+            // Far below: 2^-1 of it is enough for the slack above, doubled there.
+            let is_ahead = depth[lane] * 0.5 > error[lane] && depth[lane] > 1e-300;
+            if is_ahead {
+                let least = [
+                    columns[0][lane],
+                    rows[0][lane],
+                    columns[1][lane],
+                    rows[1][lane],
+                ];
+                boxes[lane] = PixelBox { least };
+            }
         }
-    }
-
-    /// Whether a sample lies in the box.
-    #[inline(always)]
-    pub fn has_sample(&self, all: &PixelBox) -> bool {
-        let within = |low: f64, high: f64, count: u32| {
-            let count = f64::from(count);
-            let low = -least(-low, 0.0);
-            let low = least(low, count);
-            // Near 2^52 only whole numbers are left: the nearest one, without a call.
-            let whole = (low + WHOLE) - WHOLE;
-            let next = if whole < low { whole + 1.0 } else { whole };
-            next <= least(high, count - 1.0)
-        };
-        within(all.low[0], all.high[0], self.grid.width)
-            && within(all.low[1], all.high[1], self.grid.height)
+        boxes
     }
 }
 
-/// Column and row of what is seen, in samples: 0 is the first one.
+/// First and negated last sample between offsets `at` with their errors, `count`
+/// samples per width, the first one beginning at `from`; none outside the image.
+#[inline(always)]
+fn span(
+    at: &[f64; EIGHT],
+    error: &[f64; EIGHT],
+    from: f64,
+    per_width: f64,
+    count: u32,
+) -> [[i32; EIGHT]; 2] {
+    let count = f64::from(count.min(FAR as u32));
+    let unit = per_width * count;
+    let (mut first, mut minus_last) = ([0; EIGHT], [0; EIGHT]);
+    for lane in 0..EIGHT {
+        let size = at[lane].abs();
+        let slack = 2.0 * error[lane] * (1.0 + size) + ERROR * (size + from.abs() + 1.0);
+        // A sample is at the centre of its pixel: index + 1/2.
+        let middle = (at[lane] - from) * unit - 0.5;
+        let slack = slack * unit + ERROR * middle.abs();
+        // Near 2^52 only whole numbers are left, in the lowest bits: the nearest one
+        // without a call, and from there up or down.
+        let low = least(-least(-(middle - slack), 0.0), count);
+        let near = low + WHOLE;
+        first[lane] = near.to_bits() as i32 + i32::from(near - WHOLE < low);
+        let above = least(-least(-(middle + slack + 1.0), 0.0), count);
+        let near = above + WHOLE;
+        minus_last[lane] = 1 - near.to_bits() as i32 + i32::from(near - WHOLE > above);
+    }
+    [first, minus_last]
+}
+
+/// Beyond any column or row.
+const FAR: i32 = 1 << 29;
+
+/// Columns and rows of samples: first column and row, last ones negated. Clipped to
+/// the image.
 #[derive(Clone, Copy, Default, Debug)]
 pub struct PixelBox {
-    low: [f64; 2],
-    high: [f64; 2],
+    least: [i32; 4],
 }
 
 impl PixelBox {
     /// The whole plane.
-    const EVERYWHERE: PixelBox = PixelBox {
-        low: [f64::NEG_INFINITY; 2],
-        high: [f64::INFINITY; 2],
-    };
+    const EVERYWHERE: PixelBox = PixelBox { least: [-FAR; 4] };
 
     /// The box of two.
     #[inline(always)]
     pub fn union(self, other: PixelBox) -> PixelBox {
-        let low = |k: usize| least(self.low[k], other.low[k]);
-        let high = |k: usize| -least(-self.high[k], -other.high[k]);
-        PixelBox {
-            low: [low(0), low(1)],
-            high: [high(0), high(1)],
+        let mut least = self.least;
+        for (least, other) in least.iter_mut().zip(other.least) {
+            *least = (*least).min(other);
         }
+        PixelBox { least }
+    }
+
+    /// Whether a sample lies in it.
+    #[inline(always)]
+    pub fn has_sample(self) -> bool {
+        let [column, row, minus_column, minus_row] = self.least;
+        // Both, without a branch that could not be predicted.
+        (column + minus_column <= 0) & (row + minus_row <= 0)
     }
 }
 

@@ -1,11 +1,9 @@
 //! Triangles whose screen box holds no sample: between the rays, at this size of
 //! image.
 
-use glam::Vec3;
-
 use super::super::guarantee::Guarantee;
 use super::contract::{Criterion, TriangleCull, TriangleRow};
-use super::locals::Locals;
+use super::locals::{EIGHT, Locals, Points, Rule};
 use super::screen::{PixelBox, Screen};
 use super::selection::Selection;
 use super::view::View;
@@ -50,11 +48,32 @@ impl Work for Query<'_> {
 
     #[inline(always)]
     fn run<I: Isa>(self, _: I) {
-        let screen = &self.screen;
-        let pixels = |p: Vec3| screen.pixels(p);
-        self.locals.retain(self.kept, pixels, |[a, b, c]| {
-            let all: PixelBox = a.union(b).union(c);
-            screen.has_sample(&all)
-        });
+        self.locals.retain(self.kept, &Pixels(self.screen));
+    }
+}
+
+struct Pixels(Screen);
+
+impl Rule for Pixels {
+    type Of = PixelBox;
+
+    #[inline(always)]
+    fn of_points(&self, points: &Points) -> [PixelBox; EIGHT] {
+        self.0.pixels(points)
+    }
+
+    /// In front of the eye the image of a box is within that of its corners.
+    #[inline(always)]
+    fn of_box(&self, corners: [PixelBox; EIGHT]) -> Option<bool> {
+        let mut all = corners[0];
+        for corner in corners {
+            all = all.union(corner);
+        }
+        (!all.has_sample()).then_some(false)
+    }
+
+    #[inline(always)]
+    fn keep(&self, [a, b, c]: [PixelBox; 3]) -> bool {
+        a.union(b).union(c).has_sample()
     }
 }
