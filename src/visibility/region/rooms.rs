@@ -5,11 +5,12 @@
 //! Seen along an axis, each opening has an end on the left of the line and an end on
 //! its right, by the line's direction alone; so a line that passes all openings gives
 //! three lines in the plane that separate lefts from rights, which is decided in exact
-//! arithmetic ([`Stabbing`]). If no opening lies across z and all heights overlap, the
-//! line from above is enough: the answer is exact. Otherwise (through stairwells) the
-//! three together are necessary, not sufficient (Teller 1992, "Visibility computations
-//! in densely occluded polyhedral environments", chapter 5); a line of sight that is
-//! found settles the pair, else it stays undecided and is listed as visible.
+//! arithmetic ([`Stabbing`]). If no opening lies across z and all have a height in
+//! common, the line from above is enough, as a level line does: the answer is exact.
+//! Otherwise (through stairwells, or where heights differ) the three together are
+//! necessary, not sufficient (Teller 1992, "Visibility computations in densely occluded
+//! polyhedral environments", chapter 5); a line of sight that is found and checked
+//! settles the pair, else it stays undecided and is listed as visible.
 
 use std::sync::Arc;
 
@@ -30,6 +31,7 @@ pub struct RoomsPvs {
     pvs: Pvs,
     undecided: Vec<[RegionId; 2]>,
     rising: Vec<Vec<bool>>,
+    layered: bool,
 }
 
 /// Openings for which there is no exact search.
@@ -68,8 +70,10 @@ struct Search<'a> {
     graph: &'a RegionGraph,
     heading: Heading,
     /// Of a heading that is not level: the regions from which it leads on to an
-    /// opening across z. Where it does not, the level search has found all.
+    /// opening across z, all if not `layered`.
     rising: &'a [bool],
+    /// Whether a level line does for all that no opening across z is passed for.
+    layered: bool,
     stabbing: [Stabbing; 3],
     path: Vec<u32>,
     /// How many openings of the path lie across z.
@@ -89,10 +93,15 @@ impl RoomsPvs {
         }
         let mut pvs = Pvs::alone(graph.len());
         let mut level = pvs.clone();
-        let rising: Vec<Vec<bool>> = HEADINGS.iter().map(|h| rising(&graph, *h)).collect();
+        let layered = is_layered(&graph);
+        let rising = |heading: &Heading| match layered {
+            true => rising(&graph, *heading),
+            false => vec![true; graph.len()],
+        };
+        let rising: Vec<Vec<bool>> = HEADINGS.iter().map(rising).collect();
         for from in 0..graph.len() as u32 {
             for (heading, rising) in HEADINGS.into_iter().zip(&rising) {
-                let mut search = Search::new(&graph, heading, rising);
+                let mut search = Search::new(&graph, heading, rising, layered);
                 let set = if heading.0[2] == 0 {
                     &mut level
                 } else {
@@ -109,6 +118,7 @@ impl RoomsPvs {
             pvs,
             undecided: Vec::new(),
             rising,
+            layered,
         };
         for from in 0..graph.len() as u32 {
             rooms.pvs.insert_all(from, level.row(from));
@@ -137,7 +147,7 @@ impl ProvenPvs for RoomsPvs {
     fn witness(&self, from: RegionId, to: RegionId) -> Option<Witness> {
         let mut found = None;
         for (heading, rising) in HEADINGS.into_iter().zip(&self.rising) {
-            let mut search = Search::new(&self.graph, heading, rising);
+            let mut search = Search::new(&self.graph, heading, rising, self.layered);
             search.visit(from, &mut |region, search| {
                 if region == to && found.is_none() {
                     found = search.line_of_sight(from, to);
@@ -153,11 +163,17 @@ impl ProvenPvs for RoomsPvs {
 }
 
 impl<'a> Search<'a> {
-    fn new(graph: &'a RegionGraph, heading: Heading, rising: &'a [bool]) -> Search<'a> {
+    fn new(
+        graph: &'a RegionGraph,
+        heading: Heading,
+        rising: &'a [bool],
+        layered: bool,
+    ) -> Search<'a> {
         Search {
             graph,
             heading,
             rising,
+            layered,
             risen: 0,
             stabbing: Default::default(),
             path: Vec::new(),
@@ -171,7 +187,7 @@ impl<'a> Search<'a> {
         if !is_level && self.risen == 0 && !self.rising[at as usize] {
             return false;
         }
-        if (is_level || self.risen > 0) && reached(at, self) {
+        if (is_level || self.risen > 0 || !self.layered) && reached(at, self) {
             return true;
         }
         let graph = self.graph;
@@ -341,6 +357,31 @@ impl<'a> Search<'a> {
             ends: [end(from, first, false), end(to, last, true)],
         })
     }
+}
+
+/// Whether all openings by which one can go about without passing one across z have
+/// a height in common, storey by storey: then a level line does wherever a slanting
+/// one does.
+fn is_layered(graph: &RegionGraph) -> bool {
+    let mut seen = vec![false; graph.len()];
+    (0..graph.len() as u32).all(|start| {
+        let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+        let mut open = vec![start];
+        while let Some(at) = open.pop() {
+            if std::mem::replace(&mut seen[at as usize], true) {
+                continue;
+            }
+            for &exit in graph.exits(at) {
+                let opening = &graph.openings()[exit as usize];
+                if !matches!(opening.plane, OpeningPlane::Axis { axis: 2, .. }) {
+                    let (min, max) = bounds(opening);
+                    (low, high) = (low.max(min.z), high.min(max.z));
+                    open.push(opening.other(at));
+                }
+            }
+        }
+        low < high
+    })
 }
 
 /// The regions from which a line of the heading can come to an opening across z, by

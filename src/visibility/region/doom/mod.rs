@@ -5,6 +5,10 @@
 //! to be open, whatever its heights. Floors and ceilings hide for the eye; the set of
 //! pairs and its witnesses are seen from above, where heights matter only in so far
 //! as a linedef is open at all.
+//!
+//! This is the world of the game. Where items are taken as solid boxes, rays over and
+//! under them pass, as floors and ceilings are no items: what such a ray meets beyond a
+//! ceiling is not promised here.
 
 mod ground;
 mod map;

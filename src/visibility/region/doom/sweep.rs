@@ -38,7 +38,9 @@ pub(super) struct Spoke {
 pub(super) struct Sweep {
     /// The boundaries: `turn` directions in the upper half circle, counterclockwise,
     /// and as many opposites. Interval i follows boundary i.
-    pub directions: Vec<Whole>,
+    directions: Vec<Whole>,
+    /// The direction that stands for each interval.
+    middles: Vec<Whole>,
     pub spokes: Vec<Spoke>,
     /// Words of a set of sectors.
     words: usize,
@@ -80,8 +82,7 @@ impl Sweep {
 
     /// The direction that stands for an interval.
     pub fn between(&self, interval: usize) -> Whole {
-        let [a, b] = [interval, interval + 1].map(|i| self.directions[i % self.directions.len()]);
-        [a[0] + b[0], a[1] + b[1]]
+        self.middles[interval]
     }
 
     /// The sectors along the rays of an interval, up to what blocks them.
@@ -167,12 +168,13 @@ impl Sweep {
 
     fn each(&mut self, line: &Seen, mut visit: impl FnMut(&mut Sweep, usize, Hit)) {
         let along = minus(line.ends[1], line.ends[0]);
-        let count = self.directions.len();
-        for step in 0..line.count {
-            let interval = (line.first + step) % count;
+        let (count, run) = (self.directions.len(), cross(line.ends[0], along));
+        let wraps = (line.first + line.count).saturating_sub(count);
+        let ranges = [line.first..line.first + line.count - wraps, 0..wraps];
+        for interval in ranges.into_iter().flatten() {
             let hit = Hit {
-                run: cross(line.ends[0], along),
-                over: cross(self.between(interval), along),
+                run,
+                over: cross(self.middles[interval], along),
                 facing: line.sectors[0],
             };
             visit(self, interval, hit);
@@ -190,6 +192,11 @@ impl Sweep {
         self.directions.clear();
         self.directions.extend_from_slice(&upper);
         self.directions.extend(upper.iter().map(|d| [-d[0], -d[1]]));
+        let next = self.directions.iter().cycle().skip(1);
+        let pairs = self.directions.iter().zip(next);
+        self.middles.clear();
+        self.middles
+            .extend(pairs.map(|(a, b)| [a[0] + b[0], a[1] + b[1]]));
     }
 
     /// The index of a direction that is one of the boundaries.

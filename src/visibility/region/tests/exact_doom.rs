@@ -161,3 +161,28 @@ fn no_row_misses_a_sector_that_a_ray_passes() {
         assert!(sums[3] >= sums[rows.len()] && sums[rows.len()] > 60);
     }
 }
+
+#[test]
+fn an_eye_at_a_wall_or_below_the_floor_is_nowhere() {
+    let (map, graph) = sample("freedm-map12");
+    let wall = map.lines.iter().find(|l| l.sectors[1].is_none()).unwrap();
+    let [from, to] = wall.ends.map(|[x, y]| glam::DVec2::new(x.into(), y.into()));
+    let sector = map.sectors[wall.sectors[0].unwrap() as usize];
+    let (middle, right) = ((from + to) * 0.5, -(to - from).perp().normalize());
+    let mut rng = SeededRng::new(1);
+    // The near window is some 0.1 wide; right of a linedef is its front.
+    for (away, height, place) in [
+        (4.0, 41.0, EyePlace::Inside),
+        (0.01, 41.0, EyePlace::Outside),
+        (-4.0, 41.0, EyePlace::Outside),
+        (4.0, -1.0, EyePlace::Outside),
+    ] {
+        let eye = (middle + right * away).extend(sector.floor + height);
+        let rays = looking(eye, &mut rng);
+        for row in super::from_eye::rows(&graph) {
+            let mut out = Vec::new();
+            let answer = row.from_eye(&rays, &mut Scratch::default(), &mut out);
+            assert_eq!(answer, place, "{away} {height} {}", row.name());
+        }
+    }
+}

@@ -134,3 +134,26 @@ fn witnesses_that_touch_or_pass_walls_are_rejected() {
     };
     assert_eq!(graph.check_witness(&nowhere), Err(Rejected::Region));
 }
+
+#[test]
+fn openings_at_all_heights_are_searched_in_three_dimensions() {
+    let mut rng = SeededRng::new(31);
+    let (mut pairs, mut open, mut by_rays) = (0, 0, 0);
+    for count in [[5, 1, 1], [4, 4, 1], [3, 3, 3], [2, 2, 4], [6, 2, 1]] {
+        let graph = cubes(count, &mut rng);
+        let exact = RoomsPvs::of(graph.clone()).unwrap();
+        let n = graph.len() as u32;
+        let rays = joined_by_rays(&graph, 30_000, 3);
+        for a in 0..n {
+            for b in 0..n {
+                let sees = exact.pvs().sees(a, b);
+                assert_eq!(sees, exact.pvs().sees(b, a));
+                assert!(sees || !rays.sees(a, b), "{count:?} {a} {b}");
+            }
+        }
+        (pairs, open) = (pairs + exact.pvs().pairs(), open + exact.undecided().len());
+        by_rays += rays.pairs();
+    }
+    println!("{pairs} pairs, {open} undecided, {by_rays} by rays");
+    assert!(open * 50 < pairs as usize, "{open} of {pairs}");
+}

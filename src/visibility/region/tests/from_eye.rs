@@ -63,6 +63,17 @@ fn no_row_misses_a_region_that_a_ray_passes() {
 }
 
 #[test]
+fn no_row_misses_a_cube_that_a_ray_passes() {
+    let mut rng = SeededRng::new(17);
+    for count in [[5, 1, 1], [4, 4, 1], [3, 3, 3], [2, 2, 4]] {
+        let graph = cubes(count, &mut rng);
+        for row in rows(&graph) {
+            assert_eq!(missing(&*row, &graph, 60, 9), 0, "{count:?} {}", row.name());
+        }
+    }
+}
+
+#[test]
 fn a_forgotten_opening_is_noticed() {
     let (_, graph) = rooms(WORLDS[0]);
     for opening in [0, 20, 33] {

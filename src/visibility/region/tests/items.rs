@@ -84,3 +84,16 @@ fn items_of_regions_are_those_that_meet_them() {
     items.of_regions(&all, &mut marks, &mut list);
     assert_eq!(list.len(), scene.items.len());
 }
+
+#[test]
+fn an_item_that_sticks_out_of_all_regions_is_loose() {
+    let (scene, graph) = rooms("rooms:n=200,seed=2,storeys=1");
+    let all: Vec<_> = (0..graph.len() as u32).map(|r| graph.parts(r)[0]).collect();
+    let fewer = RegionGraph::of_boxes(all[1..].to_vec(), Vec::new());
+    let items = RegionItems::of(&fewer, &scene);
+    let kept = RegionItems::of(&graph, &scene);
+    assert!(!items.loose().is_empty() && items.loose().len() < scene.items.len());
+    // Those that meet the room that is left out, or a border of it.
+    let near: Vec<u32> = kept.of_region(0).to_vec();
+    assert!(items.loose().iter().all(|id| near.contains(id)));
+}

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::super::{Marks, Pvs, RegionGraph};
+use super::super::{Marks, Opening, OpeningPlane, Pvs, RegionGraph, rectangle};
 use crate::camera::{Camera, Frame, Lens};
 use crate::scene::{self, Scene, SeededRng, WorldBox};
 use crate::visibility::{Ray, Rays};
@@ -81,4 +81,38 @@ pub fn first_hit(solids: &[WorldBox], ray: &Ray) -> Option<u32> {
         .zip(solids)
         .filter_map(|(id, b)| Some((enters(b)?, id)));
     hits.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, id)| id)
+}
+
+/// Cubes in a block, with openings of all sizes and heights between most of them.
+pub fn cubes(count: [usize; 3], rng: &mut SeededRng) -> Arc<RegionGraph> {
+    let number = |i: [usize; 3]| ((i[2] * count[1] + i[1]) * count[0] + i[0]) as u32;
+    let (mut boxes, mut openings) = (Vec::new(), Vec::new());
+    for z in 0..count[2] {
+        for y in 0..count[1] {
+            for x in 0..count[0] {
+                let here = [x, y, z];
+                let low = DVec3::from_array(here.map(|i| i as f64 * 3.0));
+                boxes.push(WorldBox::new(low, low + 3.0));
+                for axis in 0..3 {
+                    if here[axis] == 0 || rng.unit() < 0.2 {
+                        continue;
+                    }
+                    let (a, b) = (low + rng.point() * 3.0, low + rng.point() * 3.0);
+                    let (mut min, mut max) = (a.min(b), a.max(b));
+                    (min[axis], max[axis]) = (low[axis], low[axis]);
+                    let mut before = here;
+                    before[axis] -= 1;
+                    openings.push(Opening {
+                        sides: [number(here), number(before)],
+                        corners: rectangle(axis, min, max),
+                        plane: OpeningPlane::Axis {
+                            axis,
+                            at: low[axis],
+                        },
+                    });
+                }
+            }
+        }
+    }
+    Arc::new(RegionGraph::of_boxes(boxes, openings))
 }
