@@ -33,7 +33,7 @@ pub trait TriangleCull: Send + Sync {
 }
 
 /// A row of the table of back ends.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub struct TriangleRow {
     /// As it is typed and shown.

@@ -58,5 +58,12 @@ pub const TRIANGLE_ROWS: &[TriangleRow] = &[
     meshopt::ROW,
 ];
 
+impl TriangleRow {
+    /// The row of exactly this name.
+    pub fn named(name: &str) -> Option<&'static TriangleRow> {
+        TRIANGLE_ROWS.iter().find(|row| row.name == name)
+    }
+}
+
 #[cfg(test)]
 mod tests;

@@ -12,7 +12,9 @@
 //! v'.A and q' the computed |v'|², both off by at most 3.01 u (|v'| |A|, |v'|²). The
 //! test is, with rounding in each step,
 //!
-//!     t = s' - M >= 0   and   t² >= k² q'
+//! ```text
+//! t = s' - M >= 0   and   t² >= k² q'
+//! ```
 //!
 //! from which, for |A| <= 1 + 2^-20, v'.A >= M + |v'| (k (1 - 3.7 u) - 3.01 u |A|).
 //! Wanted is v.A >= sin(alpha) |A| |v|, for which it is enough that v'.A >=

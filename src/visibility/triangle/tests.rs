@@ -159,7 +159,7 @@ fn the_proven_margin_costs_next_to_nothing() {
     for (name, clusters) in scenes() {
         let all = Selection::all(&clusters);
         let removed = |wanted: &str| {
-            let row = TRIANGLE_ROWS.iter().find(|row| row.name == wanted).unwrap();
+            let row = TriangleRow::named(wanted).unwrap();
             let back_end = (row.build)(&clusters);
             let views = cameras(&clusters, 16, 8);
             let of = |camera: &Camera| {
