@@ -10,9 +10,8 @@ use super::judged::{Errors, Judged, judge_items};
 use super::pass::{ALL, Pass};
 use super::report::Times;
 use super::stage::{BackEnd, NONE, StageKind};
-use super::world::{FunnelError, FunnelInput, World, back_ends};
+use super::world::{FunnelError, FunnelInput, Truth, World, back_ends};
 use crate::measure::{Ask, OverProcesses, ProcessTimes, Schedule, TimedTask, timed};
-use crate::query::ItemId;
 use crate::visibility::SampleGrid;
 use crate::visibility::truth::{RayIndex, visible_by_random_rays};
 
@@ -180,12 +179,14 @@ pub fn prepare_sweep(
         return Ok(None);
     };
     let entries = given.entries(&world, stage);
-    let truth = match stage {
-        StageKind::Triangle => Vec::new(),
-        _ => match seen(&world, input, stop) {
-            Some(truth) => truth,
-            None => return Ok(None),
-        },
+    // What faces the eye is no question of rays.
+    let rays = if stage == StageKind::Triangle {
+        0
+    } else {
+        RAYS
+    };
+    let Some(truth) = seen(&world, input, rays, stop) else {
+        return Ok(None);
     };
     let (mut points, mut tasks) = (Vec::new(), Vec::new());
     for Entry {
@@ -208,7 +209,7 @@ pub fn prepare_sweep(
             if faces.is_none() {
                 out.sort_unstable();
                 let input = given.pass.items(given.set, view);
-                judged.push(judge_items(input, world.items(), &out, &truth[view]));
+                judged.push(judge_items(input, world.items(), &out, truth.of_view(view)));
             }
         }
         if let (Some(place), Some(of_views)) = (faces, &given.faces) {
@@ -250,8 +251,9 @@ pub fn prepare_sweep(
 fn seen(
     world: &World,
     input: &FunnelInput,
+    count: usize,
     stop: &dyn Fn() -> bool,
-) -> Option<Vec<Vec<(ItemId, u32)>>> {
+) -> Option<Truth> {
     let index = RayIndex::build(world.solids());
     let truth = world.truth(input, stop)?;
     let views = (0..world.views()).map(|view| {
@@ -260,7 +262,7 @@ fn seen(
         }
         let threads = input.execution.threads;
         let seed = view as u64 + 1;
-        let more = visible_by_random_rays(&index, world.rays(view), RAYS, seed, threads);
+        let more = visible_by_random_rays(&index, world.rays(view), count, seed, threads);
         let mut all = truth.of_view(view).to_vec();
         all.extend(
             more.iter()
@@ -270,7 +272,8 @@ fn seen(
         all.sort_unstable();
         Some(all)
     });
-    views.collect()
+    let visible: Option<Vec<_>> = views.collect();
+    Some(Truth::new(visible?))
 }
 
 /// One process's share of the times; `None` if stopped.

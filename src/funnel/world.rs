@@ -128,6 +128,11 @@ pub struct Truth {
 }
 
 impl Truth {
+    /// By view: items with the samples of each, ascending.
+    pub fn new(visible: Vec<Vec<(ItemId, u32)>>) -> Truth {
+        Truth { visible }
+    }
+
     /// Items with their samples, ascending.
     pub fn of_view(&self, view: usize) -> &[(ItemId, u32)] {
         &self.visible[view]
@@ -227,7 +232,7 @@ impl<'a> World<'a> {
                 return None;
             }
             let truth = SampleTruth::of(
-                &solids,
+                solids,
                 &index,
                 &view.rays,
                 input.samples,

@@ -178,3 +178,101 @@ fn what_cannot_be_is_refused_in_a_line() {
     let line = LINE.replace("scene.csv", "empty.csv");
     assert_refused(&cullbench(folder.path(), &line), "no items", "no items");
 }
+
+#[test]
+fn proofs_are_checked_and_doctored_ones_rejected() {
+    let folder = folder();
+    let line = LINE.replace("--format json", "--certificates proofs.jsonl");
+    works(folder.path(), &line);
+    let done = works(folder.path(), "check proofs.jsonl --format json");
+    let checked = json(&done);
+    // The wall and the box beside it; the one behind the wall and the one around the eye.
+    let counts = [
+        "view_count",
+        "visible_count",
+        "hidden_count",
+        "undecided_count",
+    ];
+    assert_eq!(
+        counts.map(|name| number(&checked, name)),
+        [1.0, 2.0, 1.0, 0.0],
+        "{done}"
+    );
+    let proofs = fs::read_to_string(folder.path().join("proofs.jsonl")).expect("proofs");
+    let mut told = 0;
+    for (from, to) in [
+        ("{\"behind\":0}", "{\"behind\":2}"),
+        ("{\"behind\":0}", "\"empty\""),
+        ("\"near\":0.1", "\"near\":15.0"),
+    ] {
+        let doctored = proofs.replace(from, to);
+        assert_ne!(doctored, proofs, "{from} in {proofs}");
+        fs::write(folder.path().join("doctored.jsonl"), doctored).expect("written");
+        let done = cullbench(folder.path(), "check doctored.jsonl");
+        assert_eq!(done.code, Some(1), "{to}: {done:?}");
+        told += usize::from(done.out.contains("rejected"));
+    }
+    assert_eq!(told, 3);
+    for (content, wanted) in [
+        ("", "no certificate"),
+        ("{}", "line 1 | certificates"),
+        ("\u{7f}ELF", "line 1"),
+        (
+            &proofs.replace("\"boxes\":5", "\"boxes\":7"),
+            "7 boxes | 5 of scene",
+        ),
+        (&proofs.replace("scene.csv", "gone.csv"), "gone.csv"),
+        (&proofs[..proofs.len() / 2], "line 1"),
+    ] {
+        fs::write(folder.path().join("bad.jsonl"), content).expect("written");
+        assert_refused(
+            &cullbench(folder.path(), "check bad.jsonl"),
+            wanted,
+            content,
+        );
+    }
+}
+
+#[test]
+fn whole_pixels_lose_nothing_at_any_size_and_pixel_centres_do() {
+    let line = "precision --scene city:n=4000 --stage occlusion --path street:frames=6 --processes 1 \
+                --structure wide --format json";
+    let sweep = json(&works(Path::new("."), line));
+    let points = array(&sweep, "points");
+    let of = |name: &str| {
+        let own = points.iter().filter(|point| point["name"] == name);
+        own.map(|point| number(point, "false_negative_count"))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(of("masked-inner"), [0.0; 7]);
+    assert_eq!(of("masked-inner-two-pass"), [0.0; 7]);
+    assert!(of("z-buffer")[0] > 0.0 && of("rays").iter().sum::<f64>() > 0.0);
+    let let_through = |name: &str| {
+        let own = points.iter().filter(|point| point["name"] == name);
+        own.map(|point| number(point, "output_count"))
+            .collect::<Vec<_>>()
+    };
+    let inner = let_through("masked-inner");
+    assert!(inner[0] > inner[6], "a larger buffer hides more: {inner:?}");
+    assert!(points.iter().any(|point| point["on_front"] == true));
+    let cones = json(&works(
+        Path::new("."),
+        &line.replace("occlusion", "triangle"),
+    ));
+    assert!(
+        array(&cones, "points")
+            .iter()
+            .any(|point| point["name"] == "cone-f32-safe")
+    );
+    let rooms = line
+        .replace("city:n=4000", "rooms:n=2000")
+        .replace("occlusion", "region");
+    for point in array(&json(&works(Path::new("."), &rooms)), "points") {
+        assert_eq!(number(point, "false_negative_count"), 0.0, "{point}");
+    }
+    let done = cullbench(
+        Path::new("."),
+        &line.replace("--stage occlusion", "--stage fragment"),
+    );
+    assert_refused(&done, "--stage | fragment", "a stage without a sweep");
+}

@@ -15,7 +15,7 @@ use crate::kernel::Kernel;
 
 /// The row of this file.
 pub const ROW: TriangleRow = TriangleRow {
-    name: "cone f32",
+    name: "cone-f32",
     summary: "One normal cone per cluster as meshoptimizer tests it (stand-in, scalar)",
     guarantee: Guarantee::Unproven,
     criterion: Criterion::Facing,

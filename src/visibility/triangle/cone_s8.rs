@@ -16,7 +16,7 @@ use crate::kernel::{Isa, Kernel, LANES, LaneMask};
 
 /// The row of this file.
 pub const ROW: TriangleRow = TriangleRow {
-    name: "cone s8",
+    name: "cone-s8",
     summary: "One normal cone per cluster, axis and sine in 8 bits, rounding proven; 16 B",
     guarantee: Guarantee::Conservative,
     criterion: Criterion::Facing,

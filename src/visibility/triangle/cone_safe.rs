@@ -15,7 +15,7 @@ use crate::kernel::{Isa, Kernel, LANES, LaneMask, Work};
 
 /// The row of this file.
 pub const ROW: TriangleRow = TriangleRow {
-    name: "cone f32 safe",
+    name: "cone-f32-safe",
     summary: "One normal cone per cluster, sixteen at a time, rounding proven; 28 B",
     guarantee: Guarantee::Conservative,
     criterion: Criterion::Facing,

@@ -12,7 +12,7 @@ use crate::kernel::{Isa, Kernel, LANES, Work};
 
 /// The row of this file.
 pub const ROW: TriangleRow = TriangleRow {
-    name: "per-triangle f32",
+    name: "per-triangle-f32",
     summary: "The side of each triangle's plane in f32, no margin; 24 B a triangle",
     guarantee: Guarantee::Unproven,
     criterion: Criterion::Facing,

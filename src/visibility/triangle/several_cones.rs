@@ -16,7 +16,7 @@ use crate::kernel::{Isa, Kernel, LANES, Work};
 
 /// The row of this file.
 pub const ROW: TriangleRow = TriangleRow {
-    name: "several cones",
+    name: "several-cones",
     summary: "Four cones per cluster, each of triangles turned alike, rounding proven",
     guarantee: Guarantee::Conservative,
     criterion: Criterion::Facing,

@@ -11,7 +11,7 @@ use crate::kernel::{Isa, Kernel, Work};
 
 /// The row of this file.
 pub const ROW: TriangleRow = TriangleRow {
-    name: "smaller than a sample",
+    name: "below-a-sample",
     summary: "Drops what no sample of the image can meet: its screen box holds none",
     guarantee: Guarantee::SampleExact,
     criterion: Criterion::Samples,
