@@ -15,7 +15,7 @@ pub struct Side {
 
 /// A convex part of the image: corners, each with the side to the next.
 pub struct Part {
-    corners: Vec<(Line, Side)>,
+    pub corners: Vec<(Line, Side)>,
 }
 
 /// Whether the image of a box, seen from outside it, is no more than a line.

@@ -1,5 +1,8 @@
 use super::super::certificate::{Cell, Edge};
+use super::line::Line;
+use super::part::Part;
 use super::*;
+use crate::arithmetic::Expansion;
 use crate::camera::{Camera, Lens, look_at};
 use crate::visibility::truth::{Prover, RayIndex, SampleTruth, certify, judge};
 use crate::visibility::{Rays, SampleGrid};
@@ -263,4 +266,36 @@ fn a_view_that_was_doctored_is_rejected() {
         doctored(parallel, |certificates| certificates.boxes += 1);
         doctored(parallel, |certificates| certificates.proofs[0].0 = 77);
     }
+}
+
+#[test]
+fn a_form_may_be_zero_along_one_open_side_only() {
+    let view = certified(false).view;
+    let corner = |k: usize, open: bool| {
+        let numbers = [k as f64 + 1.0, 0.0, 0.0].map(Expansion::from);
+        let side = Side {
+            line: numbers.clone(),
+            open,
+        };
+        (Line::new(&view, numbers), side)
+    };
+    let below = |open: [bool; 4], signs: [i32; 4]| {
+        let corners = (0..4).map(|k| corner(k, open[k])).collect();
+        let sign = |line: &Line| signs[line.numbers[0].estimate() as usize - 1];
+        Part { corners }.below(sign)
+    };
+    let one = [true, false, false, false];
+    assert!(below([false; 4], [-1; 4]) && below(one, [0, 0, -1, -1]));
+    assert!(below(one, [-1, 0, -1, -1]) && below([true; 4], [0, -1, -1, 0]));
+    assert!(!below([false; 4], [0, -1, -1, -1]));
+    for signs in [
+        [0, -1, -1, 0],
+        [-1, -1, 0, -1],
+        [0, 0, 0, -1],
+        [1, 0, -1, -1],
+    ] {
+        assert!(!below(one, signs), "{signs:?}");
+    }
+    // Corners that face each other: zero along a line through the middle.
+    assert!(!below([true; 4], [0, -1, 0, -1]));
 }
