@@ -148,9 +148,9 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
             if lanes == 0 {
                 continue;
             }
-            rects.project(block, view);
+            rects.project(isa, block, view);
             stats.boxes += lanes.count_ones() as usize;
-            let (seen, flat) = rects.lanes(isa);
+            let (seen, flat) = (rects.seen, rects.flat);
             lanes &= seen;
             lanes &= !buffer.hides_lanes(isa, &rects, lanes & flat);
             let mut order = [0; LANES];

@@ -125,41 +125,33 @@ impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
         true
     }
 
-    /// Boxes of two by two tiles at most, as most are, all together; if their tiles
-    /// are all nearer by their references, that is.
+    /// Boxes of two by two tiles at most, as most are, all together; larger ones one
+    /// by one.
     #[inline(always)]
     fn hides_lanes<I: Isa>(&self, isa: I, rects: &Rects, lanes: LaneMask) -> LaneMask {
         if lanes == 0 {
             return 0;
         }
-        let columns = self.columns as i32;
-        let (tile_width, tile_height) = (TILE_WIDTH as i32, TILE_HEIGHT as i32);
-        let mut at = [[0; LANES]; 4];
         let mut large = [0; LANES];
         for lane in 0..LANES {
-            let (x0, x1) = (rects.x0[lane] / tile_width, rects.x1[lane] / tile_width);
-            let (y0, y1) = (rects.y0[lane] / tile_height, rects.y1[lane] / tile_height);
-            at[0][lane] = (y0 * columns + x0) as u32;
-            at[1][lane] = (y0 * columns + x1) as u32;
-            at[2][lane] = (y1 * columns + x0) as u32;
-            at[3][lane] = (y1 * columns + x1) as u32;
-            large[lane] = u32::from((x1 - x0 > 1) | (y1 - y0 > 1));
+            let wide = (rects.x1[lane] >> 3) - (rects.x0[lane] >> 3) > 1;
+            let high = (rects.y1[lane] >> 2) - (rects.y0[lane] >> 2) > 1;
+            large[lane] = u32::from(wide | high);
         }
         let small = lanes & isa.zeros(isa.words(&large));
-        let nearness = isa.load(&rects.nearness);
         let mut hidden = small;
-        for at in &at {
+        for (x, y) in [
+            (&rects.x0, &rects.y0),
+            (&rects.x1, &rects.y0),
+            (&rects.x0, &rects.y1),
+            (&rects.x1, &rects.y1),
+        ] {
             if hidden == 0 {
                 break;
             }
-            let mut reference = [0.0; LANES];
-            for lane in 0..LANES {
-                let tile = self.reference.get(at[lane] as usize);
-                reference[lane] = tile.copied().unwrap_or(0.0);
-            }
-            hidden &= !isa.at_most(isa.load(&reference), nearness);
+            hidden &= self.hidden_in_tile(isa, rects, hidden, x, y);
         }
-        let mut left = lanes & !hidden;
+        let mut left = lanes & !small;
         while left != 0 {
             let lane = left.trailing_zeros();
             left &= left - 1;
@@ -170,6 +162,57 @@ impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
 }
 
 impl<const WHOLE: bool> Masked<WHOLE> {
+    /// Those of the lanes that are hidden as far as one tile goes: the one that
+    /// holds the pixel (x, y) of each.
+    #[inline(always)]
+    fn hidden_in_tile<I: Isa>(
+        &self,
+        isa: I,
+        rects: &Rects,
+        lanes: LaneMask,
+        x: &[i32; LANES],
+        y: &[i32; LANES],
+    ) -> LaneMask {
+        let columns = self.columns as i32;
+        let mut at = [0; LANES];
+        for lane in 0..LANES {
+            at[lane] = ((y[lane] >> 2) * columns + (x[lane] >> 3)) as u32;
+        }
+        let mut reference = [0.0; LANES];
+        for lane in 0..LANES {
+            let tile = self.reference.get(at[lane] as usize);
+            reference[lane] = tile.copied().unwrap_or(0.0);
+        }
+        let nearness = isa.load(&rects.nearness);
+        let open = isa.at_most(isa.load(&reference), nearness);
+        if open & lanes == 0 {
+            return lanes;
+        }
+        // Not by the reference alone: by the working layer and its pixels.
+        let mut working = [0.0; LANES];
+        let mut masks = [0; LANES];
+        for lane in 0..LANES {
+            let tile = at[lane] as usize;
+            working[lane] = self.working.get(tile).copied().unwrap_or(0.0);
+            masks[lane] = self.mask.get(tile).copied().unwrap_or(0);
+        }
+        let mut shown = [0; LANES];
+        for lane in 0..LANES {
+            let (first_column, first_row) = (x[lane] & !7, y[lane] & !3);
+            let left = (rects.x0[lane] - first_column).max(0) as u32;
+            let right = (rects.x1[lane] - first_column).min(7) as u32;
+            let top = (rects.y0[lane] - first_row).max(0) as u32;
+            let bottom = (rects.y1[lane] - first_row).min(3) as u32;
+            let row = 0xffu32.wrapping_shl(left) & 0xffu32.wrapping_shr(7 - right);
+            let above = Mask::MAX.wrapping_shl(8 * top);
+            let below = Mask::MAX.wrapping_shr(8 * (3 - bottom));
+            shown[lane] = (row * 0x0101_0101) & above & below & !masks[lane];
+        }
+        let behind = isa.at_most(isa.load(&working), nearness);
+        let covered = isa.zeros(isa.words(&shown)) & !behind;
+        lanes & (!open | covered)
+    }
+
     /// Draws four rows of pixels, given by their first columns and the ones behind
     /// the last.
     #[inline(always)]

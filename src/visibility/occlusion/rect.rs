@@ -79,12 +79,11 @@ pub struct Rects {
     pub nearness: [f32; LANES],
     /// Not above the least depth: what boxes are sorted by.
     pub depth: [f32; LANES],
-    /// Bit 0: no ray of the image meets the box. Bit 1: no rectangle, too near.
-    state: [u32; LANES],
+    /// The lanes that some ray of the image may meet.
+    pub seen: LaneMask,
+    /// The lanes that have a rectangle; the others are too near.
+    pub flat: LaneMask,
 }
-
-const UNSEEN: u32 = 1;
-const NEAR: u32 = 2;
 
 impl Rects {
     /// Nothing yet.
@@ -95,7 +94,8 @@ impl Rects {
         y1: [0; LANES],
         nearness: [0.0; LANES],
         depth: [0.0; LANES],
-        state: [NEAR; LANES],
+        seen: 0,
+        flat: 0,
     };
 
     /// One lane.
@@ -110,161 +110,179 @@ impl Rects {
         }
     }
 
-    /// The lanes that some ray of the image may meet, and those of all lanes that
-    /// have a rectangle.
-    #[inline(always)]
-    pub fn lanes<I: Isa>(&self, isa: I) -> (LaneMask, LaneMask) {
-        let words = isa.words(&self.state);
-        let (unseen, near) = (isa.equal(words, UNSEEN), isa.equal(words, NEAR));
-        (!unseen, !near)
-    }
-
     /// Projects the boxes of a block.
     #[inline(always)]
-    pub fn project(&mut self, block: &Block, view: &View) {
-        // Of copies and into a new one: what cannot overlap with anything else is
-        // what the compiler makes vectors of, wherever this is inlined.
-        let (block, projection) = (*block, view.projection);
-        *self = match view.parallel {
-            true => Rects::parallel(&block, &projection),
-            false => Rects::perspective(&block, &projection),
-        };
+    pub fn project<I: Isa>(&mut self, isa: I, block: &Block, view: &View) {
+        let p = &view.projection;
+        let boxes = AboutEye::of(isa, block, p);
+        match view.parallel {
+            true => self.project_parallel(isa, &boxes, p),
+            false => self.project_perspective(isa, &boxes, p),
+        }
     }
 
     #[inline(always)]
-    fn perspective(block: &Block, p: &Projection) -> Rects {
-        let mut rects = Rects::NONE;
-        let [width, height] = p.size;
-        for l in 0..LANES {
-            let (c, r) = about_eye(block, l, p.eye, p.rest, p.far_from_zero);
-            let [x, y, w] = [0, 1, 2].map(|row| products(&c, &p.rows[row]));
-            let (mut least, mut x0, mut y0) = (f32::INFINITY, f32::INFINITY, f32::INFINITY);
-            let (mut x1, mut y1) = (f32::NEG_INFINITY, f32::NEG_INFINITY);
-            for corner in 0..8 {
-                let depth = at_corner(&w, corner);
-                let inverse = 1.0 / depth;
-                let across = at_corner(&x, corner) * inverse;
-                let down = at_corner(&y, corner) * inverse;
-                least = smaller(depth, least);
-                (x0, x1) = (smaller(across, x0), larger(across, x1));
-                (y0, y1) = (smaller(down, y0), larger(down, y1));
+    fn project_perspective<I: Isa>(&mut self, isa: I, boxes: &AboutEye<I>, p: &Projection) {
+        let minus = isa.splat(-1.0);
+        let depths = boxes.products(isa, &p.rows[2]);
+        let mut inverse = [[0.0; LANES]; 8];
+        let mut least = isa.splat(f32::INFINITY);
+        for (corner, row) in inverse.iter_mut().enumerate() {
+            let depth = at_corner(isa, &depths, corner);
+            least = isa.min(depth, least);
+            *row = inverses(isa.to_array(depth));
+        }
+        // The greatest as the least of what has the other sign.
+        let mut extremes = [isa.splat(f32::INFINITY); 4];
+        for (axis, row) in p.rows[..2].iter().enumerate() {
+            let products = boxes.products(isa, row);
+            for (corner, inverse) in inverse.iter().enumerate() {
+                let at = isa.mul(at_corner(isa, &products, corner), isa.load(inverse));
+                extremes[2 * axis] = isa.min(at, extremes[2 * axis]);
+                extremes[2 * axis + 1] = isa.min(isa.mul(at, minus), extremes[2 * axis + 1]);
             }
-            let depth = least - 8.0 * U * r;
-            let nearness = 1.0 / depth;
-            let relative = r * nearness;
-            let (slack_x, slack_y) = (p.slack[0] * relative, p.slack[1] * relative);
-            let (x0, x1) = (x0 - slack_x, x1 + slack_x);
-            let (y0, y1) = (y0 - slack_y, y1 + slack_y);
-            let sound = (least > r * (1.0 / 4096.0)) & (least > 1e-25) & (r < 1e25);
-            let seen = (x1 >= 0.0) & (x0 <= width) & (y1 >= 0.0) & (y0 <= height);
-            rects.nearness[l] = nearness + nearness * (8.0 * U);
-            rects.depth[l] = depth;
-            rects.x0[l] = pixel(x0, width);
-            rects.x1[l] = pixel(x1, width);
-            rects.y0[l] = pixel(y0, height);
-            rects.y1[l] = pixel(y1, height);
-            rects.state[l] = state(sound, seen);
         }
-        rects
+        let depth = isa.add(least, isa.mul(boxes.minus_size, isa.splat(8.0 * U)));
+        let nearness = isa.load(&inverses(isa.to_array(depth)));
+        // - r / w
+        let relative = isa.mul(boxes.minus_size, nearness);
+        for (axis, slack) in p.slack.iter().enumerate() {
+            let slack = isa.mul(relative, isa.splat(*slack));
+            extremes[2 * axis] = isa.add(extremes[2 * axis], slack);
+            extremes[2 * axis + 1] = isa.add(extremes[2 * axis + 1], slack);
+        }
+        let behind = isa.mul(boxes.minus_size, isa.splat(-1.0 / 4096.0));
+        let near = isa.at_most(least, behind) | isa.at_most(least, isa.splat(1e-25));
+        let raised = isa.add(nearness, isa.mul(nearness, isa.splat(8.0 * U)));
+        self.finish(isa, boxes, p, &extremes, [depth, raised], near);
     }
 
     #[inline(always)]
-    fn parallel(block: &Block, p: &Projection) -> Rects {
-        let mut rects = Rects::NONE;
-        let [width, height] = p.size;
-        for l in 0..LANES {
-            let (c, r) = about_eye(block, l, p.eye, p.rest, p.far_from_zero);
-            let (x0, x1) = range(&c, &p.rows[0]);
-            let (y0, y1) = range(&c, &p.rows[1]);
-            let (least, _) = range(&c, &p.rows[2]);
-            let slack_x = p.slack[0] * r + p.slack_added[0];
-            let slack_y = p.slack[1] * r + p.slack_added[1];
-            let (x0, x1) = (x0 + p.shift[0] - slack_x, x1 + p.shift[0] + slack_x);
-            let (y0, y1) = (y0 + p.shift[1] - slack_y, y1 + p.shift[1] + slack_y);
-            let depth = least - 8.0 * U * r;
-            let sound = r < 1e25;
-            let seen = (x1 >= 0.0) & (x0 <= width) & (y1 >= 0.0) & (y0 <= height);
-            rects.nearness[l] = (p.base - depth) + 8.0 * U * (p.base.abs() + depth.abs());
-            rects.depth[l] = depth;
-            rects.x0[l] = pixel(x0, width);
-            rects.x1[l] = pixel(x1, width);
-            rects.y0[l] = pixel(y0, height);
-            rects.y1[l] = pixel(y1, height);
-            rects.state[l] = state(sound, seen);
+    fn project_parallel<I: Isa>(&mut self, isa: I, boxes: &AboutEye<I>, p: &Projection) {
+        let mut extremes = [isa.splat(0.0); 4];
+        for axis in 0..2 {
+            let (low, minus_high) = boxes.range(isa, &p.rows[axis]);
+            let slack = isa.mul(boxes.minus_size, isa.splat(p.slack[axis]));
+            let slack = isa.add(slack, isa.splat(-p.slack_added[axis]));
+            let shift = p.shift[axis];
+            extremes[2 * axis] = isa.add(isa.add(low, isa.splat(shift)), slack);
+            extremes[2 * axis + 1] = isa.add(isa.add(minus_high, isa.splat(-shift)), slack);
         }
-        rects
+        let (least, _) = boxes.range(isa, &p.rows[2]);
+        let depth = isa.add(least, isa.mul(boxes.minus_size, isa.splat(8.0 * U)));
+        let minus = isa.splat(-1.0);
+        // -|depth|
+        let size = isa.min(depth, isa.mul(depth, minus));
+        let slack = isa.mul(size, isa.splat(-8.0 * U));
+        let slack = isa.add(slack, isa.splat(8.0 * U * p.base.abs()));
+        let nearness = isa.add(isa.splat(p.base), isa.mul(depth, minus));
+        let raised = isa.add(nearness, slack);
+        self.finish(isa, boxes, p, &extremes, [depth, raised], 0);
+    }
+
+    /// From the least and (negated) greatest x and y to pixels.
+    #[inline(always)]
+    fn finish<I: Isa>(
+        &mut self,
+        isa: I,
+        boxes: &AboutEye<I>,
+        p: &Projection,
+        [x0, minus_x1, y0, minus_y1]: &[I::Floats; 4],
+        [depth, nearness]: [I::Floats; 2],
+        near: LaneMask,
+    ) {
+        let [width, height] = p.size;
+        let zero = isa.splat(0.0);
+        let within_x = isa.at_most(*x0, isa.splat(width)) & isa.at_most(*minus_x1, zero);
+        let within_y = isa.at_most(*y0, isa.splat(height)) & isa.at_most(*minus_y1, zero);
+        self.flat = isa.at_most(isa.splat(-1e25), boxes.minus_size) & !near;
+        self.seen = within_x & within_y | !self.flat;
+        self.depth = isa.to_array(depth);
+        self.nearness = isa.to_array(nearness);
+        let minus = isa.splat(-1.0);
+        self.x0 = pixels(isa.to_array(*x0), width);
+        self.x1 = pixels(isa.to_array(isa.mul(*minus_x1, minus)), width);
+        self.y0 = pixels(isa.to_array(*y0), height);
+        self.y1 = pixels(isa.to_array(isa.mul(*minus_y1, minus)), height);
     }
 }
 
-/// Six bounds about the eye, and what all errors are relative to.
-#[inline(always)]
-fn about_eye(
-    block: &Block,
-    lane: usize,
-    eye: [f32; 3],
-    rest: [f32; 3],
-    far_from_zero: f32,
-) -> ([[f32; 2]; 3], f32) {
-    let mut c = [[0.0; 2]; 3];
-    let mut r = far_from_zero;
-    for axis in 0..3 {
-        let low = (block.rows[axis][lane] - eye[axis]) - rest[axis];
-        let high = (block.rows[3 + axis][lane] - eye[axis]) - rest[axis];
-        c[axis] = [low, high];
-        r += larger(low.abs(), high.abs());
+/// Sixteen boxes about the eye.
+struct AboutEye<I: Isa> {
+    /// Axis by axis the lower and the upper bounds.
+    bounds: [[I::Floats; 2]; 3],
+    /// What all errors are relative to, negated: -r.
+    minus_size: I::Floats,
+}
+
+impl<I: Isa> AboutEye<I> {
+    #[inline(always)]
+    fn of(isa: I, block: &Block, p: &Projection) -> Self {
+        let minus = isa.splat(-1.0);
+        let mut bounds = [[isa.splat(0.0); 2]; 3];
+        let mut minus_size = isa.splat(-p.far_from_zero);
+        for axis in 0..3 {
+            let (eye, rest) = (isa.splat(-p.eye[axis]), isa.splat(-p.rest[axis]));
+            let about = |row: &[f32; LANES]| isa.add(isa.add(isa.load(row), eye), rest);
+            let (low, high) = (about(&block.rows[axis]), about(&block.rows[3 + axis]));
+            bounds[axis] = [low, high];
+            // low <= high, so the greater size is that of -low or of high.
+            minus_size = isa.add(minus_size, isa.min(low, isa.mul(high, minus)));
+        }
+        AboutEye { bounds, minus_size }
     }
-    (c, r)
-}
 
-/// The products of the lower and upper bounds with a row, axis by axis.
-#[inline(always)]
-fn products(c: &[[f32; 2]; 3], row: &[f32; 3]) -> [[f32; 2]; 3] {
-    let mut products = [[0.0; 2]; 3];
-    for axis in 0..3 {
-        products[axis] = [row[axis] * c[axis][0], row[axis] * c[axis][1]];
+    /// The products of the bounds with a row.
+    #[inline(always)]
+    fn products(&self, isa: I, row: &[f32; 3]) -> [[I::Floats; 2]; 3] {
+        let mut products = self.bounds;
+        for (of_axis, factor) in products.iter_mut().zip(row) {
+            let factor = isa.splat(*factor);
+            *of_axis = [isa.mul(of_axis[0], factor), isa.mul(of_axis[1], factor)];
+        }
+        products
     }
-    products
-}
 
-/// Their sum at corner 0 to 7: bit `axis` takes the upper bound.
-#[inline(always)]
-fn at_corner(p: &[[f32; 2]; 3], corner: usize) -> f32 {
-    (p[0][corner & 1] + p[1][corner >> 1 & 1]) + p[2][corner >> 2]
-}
-
-/// The least and the greatest product with a row at any corner.
-#[inline(always)]
-fn range(c: &[[f32; 2]; 3], row: &[f32; 3]) -> (f32, f32) {
-    let mut low = [0.0; 3];
-    let mut high = [0.0; 3];
-    for axis in 0..3 {
-        let (p, q) = (row[axis] * c[axis][0], row[axis] * c[axis][1]);
-        low[axis] = smaller(p, q);
-        high[axis] = larger(p, q);
+    /// The least product with a row at any corner, and the greatest one negated.
+    #[inline(always)]
+    fn range(&self, isa: I, row: &[f32; 3]) -> (I::Floats, I::Floats) {
+        let minus = isa.splat(-1.0);
+        let mut low = [isa.splat(0.0); 3];
+        let mut high = low;
+        for (axis, [p, q]) in self.products(isa, row).into_iter().enumerate() {
+            low[axis] = isa.min(p, q);
+            high[axis] = isa.min(isa.mul(p, minus), isa.mul(q, minus));
+        }
+        (
+            isa.add(isa.add(low[0], low[1]), low[2]),
+            isa.add(isa.add(high[0], high[1]), high[2]),
+        )
     }
-    ((low[0] + low[1]) + low[2], (high[0] + high[1]) + high[2])
+}
+
+/// The sum of products at corner 0 to 7: bit `axis` takes the upper bound.
+#[inline(always)]
+fn at_corner<I: Isa>(isa: I, p: &[[I::Floats; 2]; 3], corner: usize) -> I::Floats {
+    let across = isa.add(p[0][corner & 1], p[1][corner >> 1 & 1]);
+    isa.add(across, p[2][corner >> 2])
 }
 
 #[inline(always)]
-fn state(sound: bool, seen: bool) -> u32 {
-    // No branches: each is a lane's select.
-    let near = if sound { 0 } else { NEAR };
-    let unseen = if seen { 0 } else { UNSEEN };
-    if sound { unseen } else { near }
+fn inverses(mut row: [f32; LANES]) -> [f32; LANES] {
+    for x in &mut row {
+        *x = 1.0 / *x;
+    }
+    row
 }
 
-/// The pixel that holds a coordinate, or the nearest one.
+/// The pixels that hold coordinates, or the nearest ones.
 #[inline(always)]
-fn pixel(at: f32, size: f32) -> i32 {
-    smaller(larger(at, 0.0), size - 1.0) as i32
-}
-
-#[inline(always)]
-fn smaller(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
-}
-
-#[inline(always)]
-fn larger(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
+fn pixels(at: [f32; LANES], size: f32) -> [i32; LANES] {
+    let mut pixels = [0; LANES];
+    for lane in 0..LANES {
+        let at = if at[lane] > 0.0 { at[lane] } else { 0.0 };
+        let at = if at < size - 1.0 { at } else { size - 1.0 };
+        pixels[lane] = at as i32;
+    }
+    pixels
 }

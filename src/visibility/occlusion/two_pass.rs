@@ -142,8 +142,8 @@ fn project_all<I: Isa>(
         for (lane, &id) in chunk.iter().enumerate() {
             block.set(lane, &scene.outer(scene.position(id)));
         }
-        rects.project(&block, view);
-        let (seen, flat) = rects.lanes(isa);
+        rects.project(isa, &block, view);
+        let (seen, flat) = (rects.seen, rects.flat);
         for (lane, &id) in chunk.iter().enumerate() {
             if seen >> lane & 1 == 1 {
                 candidates.push(Candidate {

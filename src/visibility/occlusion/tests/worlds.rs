@@ -117,9 +117,9 @@ fn losses<B: OcclusionBuffer>(
 #[test]
 fn whole_pixels_lose_nothing_that_a_ray_sees() {
     for (far_out, parallel) in [(0.0, false), (0.0, true), (1e7, false), (1e7, true)] {
-        let (lost, removed) = losses::<MaskedInner>(0..1000, far_out, parallel);
+        let (lost, removed) = losses::<MaskedInner>(0..400, far_out, parallel);
         assert_eq!(lost, 0, "far out {far_out}, parallel {parallel}");
-        assert!(removed > 1000, "{removed}: the worlds hide something");
+        assert!(removed > 400, "{removed}: the worlds hide something");
     }
 }
 
@@ -127,13 +127,13 @@ fn whole_pixels_lose_nothing_that_a_ray_sees() {
 fn samples_at_centres_lose_what_rays_see() {
     for parallel in [false, true] {
         let lost = [
-            losses::<MaskedCentre>(0..600, 0.0, parallel).0,
-            losses::<ZBuffer>(0..600, 0.0, parallel).0,
-            losses::<HierarchicalZ>(0..600, 0.0, parallel).0,
-            losses::<DepthRays<8>>(0..600, 0.0, parallel).0,
+            losses::<MaskedCentre>(0..300, 0.0, parallel).0,
+            losses::<ZBuffer>(0..300, 0.0, parallel).0,
+            losses::<HierarchicalZ>(0..300, 0.0, parallel).0,
+            losses::<DepthRays<8>>(0..300, 0.0, parallel).0,
         ];
         assert!(
-            lost.iter().all(|&lost| lost > 2),
+            lost.iter().all(|&lost| lost > 0),
             "{lost:?}: the worlds are hard enough"
         );
     }
