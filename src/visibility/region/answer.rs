@@ -19,6 +19,7 @@ pub enum EyePlace {
 }
 
 /// A back end of the region stage: which regions can be seen at all.
+#[allow(clippy::wrong_self_convention)] // What is seen from an eye, not a conversion.
 pub trait RegionRow: Send + Sync {
     /// As it is typed.
     fn name(&self) -> &'static str;

@@ -185,3 +185,43 @@ impl Pvs {
         self.bits.iter().map(|w| u64::from(w.count_ones())).sum()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pairs_are_written_and_read_again() {
+        let mut pvs = Pvs::alone(70);
+        pvs.insert(3, 69);
+        pvs.insert(69, 4);
+        let text = pvs.to_json();
+        assert_eq!(text, r#"{"regions":70,"sees":[[3,69],[69,4]]}"#);
+        assert_eq!(Pvs::from_json(&text).unwrap(), pvs);
+        assert!(pvs.sees(3, 69) && !pvs.sees(69, 3) && pvs.pairs() == 72);
+        pvs.remove(3, 69);
+        assert!(!pvs.sees(3, 69));
+        let mut row = Vec::new();
+        decode(pvs.row(69), &mut row);
+        assert_eq!(row, [4, 69]);
+    }
+
+    #[test]
+    fn other_files_are_typed_errors() {
+        let error = |text: &str| Pvs::from_json(text).unwrap_err().to_string();
+        assert!(error("[]").contains("expected {\"regions\""));
+        assert!(error(r#"{"regions":2,"sees":[[0,2]]}"#).contains("pair 0 names region 2 of 2"));
+        assert!(error(r#"{"regions":1,"sees":[],"more":1}"#).contains("more"));
+        assert!(error(r#"{"regions":99999,"sees":[]}"#).contains("at most 65536"));
+    }
+
+    #[test]
+    fn a_reject_bit_hides_and_bits_run_on_over_rows() {
+        // Bit 1 (0 to 1) and bit 8 (2 to 2, which sees itself all the same).
+        let pvs = Pvs::from_reject(&[0b10, 0b1], 3).unwrap();
+        assert!(!pvs.sees(0, 1) && pvs.sees(1, 0) && pvs.sees(2, 2));
+        assert_eq!(pvs.pairs(), 8);
+        let error = Pvs::from_reject(&[0], 3).unwrap_err().to_string();
+        assert!(error.contains("1 bytes for 3 sectors"), "{error}");
+    }
+}

@@ -221,8 +221,8 @@ impl<'a> Search<'a> {
             self.path.pop();
             return false;
         }
-        for i in 0..self.views() {
-            let [left, right] = ends(opening, VIEWS[i], self.heading);
+        for (i, view) in VIEWS.into_iter().enumerate().take(self.views()) {
+            let [left, right] = ends(opening, view, self.heading);
             if !self.stabbing[i].push(left, right) {
                 self.stabbing[..i].iter_mut().for_each(Stabbing::pop);
                 self.path.pop();

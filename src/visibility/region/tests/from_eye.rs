@@ -106,3 +106,45 @@ fn each_row_lists_no_more_than_the_one_before() {
     }
     assert!(sums.is_sorted_by(|a, b| a > b), "{sums:?}");
 }
+
+#[test]
+fn openings_with_a_thickness_are_seen_through() {
+    use crate::geometry::Aabb;
+    use crate::scene::{Portal, Tiling};
+    use glam::{DVec3, Vec3};
+    let b = |low: [f32; 3], high: [f32; 3]| Aabb::new(Vec3::from(low), Vec3::from(high));
+    let tiling = Tiling {
+        boxes: vec![
+            b([0.0; 3], [3.0; 3]),
+            b([3.0, 0.0, 0.0], [6.0, 3.0, 3.0]),
+            b([6.0, 0.0, 0.0], [9.0, 3.0, 3.0]),
+        ],
+        portals: vec![
+            Portal {
+                between: [0, 1],
+                opening: b([2.9, 1.0, 1.0], [3.1, 2.0, 2.0]),
+            },
+            Portal {
+                between: [2, 1],
+                opening: b([6.0, 1.0, 1.0], [6.0, 2.0, 2.0]),
+            },
+        ],
+        ..Default::default()
+    };
+    let graph = Arc::new(RegionGraph::of_tiling(&tiling, DVec3::splat(1e3)));
+    let answers = |forward: DVec3| -> Vec<usize> {
+        let eye = DVec3::splat(1e3) + 1.5;
+        let frame = crate::camera::Frame::looking_along(eye, forward, DVec3::Z).unwrap();
+        let lens = crate::camera::Lens::perspective(60.0, 1.0, 0.1, None).unwrap();
+        let rays = Rays::of(&crate::camera::Camera { frame, lens }).unwrap();
+        let mut out = Vec::new();
+        let mut count = |row: &dyn RegionRow| {
+            row.from_eye(&rays, &mut Scratch::default(), &mut out);
+            out.len()
+        };
+        rows(&graph).iter().map(|row| count(&**row)).collect()
+    };
+    assert_eq!(answers(DVec3::X), [3, 3, 3, 3]);
+    assert_eq!(answers(DVec3::NEG_X), [3, 1, 1, 1]);
+    assert_eq!(RoomsPvs::of(graph).unwrap_err(), NotFlat(0));
+}
