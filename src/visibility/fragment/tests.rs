@@ -7,7 +7,7 @@ use crate::camera::{Camera, Frame, Lens};
 use crate::query::ItemId;
 use crate::scene::{SeededRng, WorldBox, load};
 use crate::visibility::truth::{NO_ITEM, RayIndex, SampleTruth, judge};
-use crate::visibility::{Ray, Rays, SampleGrid, Solids};
+use crate::visibility::{Guarantee, Ray, Rays, SampleGrid, Solids};
 use order::{BspOrder, ORDERS};
 
 fn all(solids: &Solids) -> Vec<Piece> {
@@ -171,7 +171,7 @@ fn the_painters_picture_by_bsp_is_exact_and_by_distances_it_is_not() {
                     .filter(|&s| drawn.last[s] != ids[s] && tied(s))
                     .count();
                 assert_eq!((differing.count() - ties) as u64, errors.wrong_samples);
-                if row.name == "bsp" {
+                if row.guarantee == Guarantee::Exact {
                     assert_eq!(errors.wrong_samples, 0);
                     // Each item once at a sample, in however many parts it comes.
                     let whole = draw(&canvas, &solids, &all(&solids), &Tests::default());

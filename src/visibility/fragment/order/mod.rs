@@ -11,6 +11,8 @@ mod tree;
 pub use bsp::BspOrder;
 pub use contract::{DepthOrder, Piece};
 
+use crate::visibility::{Guarantee, Solids};
+
 /// A row of the table of orders.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
@@ -19,8 +21,11 @@ pub struct OrderRow {
     pub name: &'static str,
     /// One line for tables and help.
     pub summary: &'static str,
+    /// [`Guarantee::Exact`]: no pair that overlaps in the image is the wrong way
+    /// round.
+    pub guarantee: Guarantee,
     /// Prepares it for the items of a scene.
-    pub build: fn(&crate::visibility::Solids) -> Box<dyn DepthOrder>,
+    pub build: fn(&Solids) -> Box<dyn DepthOrder>,
 }
 
 /// All orders.
@@ -28,26 +33,31 @@ pub const ORDERS: &[OrderRow] = &[
     OrderRow {
         name: none::NAME,
         summary: none::SUMMARY,
+        guarantee: Guarantee::Unproven,
         build: |_| Box::new(none::None),
     },
     OrderRow {
         name: tree::NAME,
         summary: tree::SUMMARY,
+        guarantee: Guarantee::Unproven,
         build: |solids| Box::new(tree::TreeOrder::of(solids)),
     },
     OrderRow {
         name: centre_distance::NAME,
         summary: centre_distance::SUMMARY,
+        guarantee: Guarantee::Unproven,
         build: |_| Box::new(centre_distance::CentreDistance),
     },
     OrderRow {
         name: box_distance::NAME,
         summary: box_distance::SUMMARY,
+        guarantee: Guarantee::Unproven,
         build: |_| Box::new(box_distance::BoxDistance),
     },
     OrderRow {
         name: bsp::NAME,
         summary: bsp::SUMMARY,
+        guarantee: Guarantee::Exact,
         build: |solids| Box::new(BspOrder::of(solids)),
     },
 ];
