@@ -11,8 +11,12 @@ mod entry;
 #[cfg(test)]
 pub(super) mod judge;
 mod ray_index;
+mod ray_tree;
+mod ray_triangle;
 mod sample;
 mod sight;
+mod surface_index;
+mod surface_sample;
 
 pub use cache::{TruthCache, digest_of};
 pub use certificate::{Cell, Certificates, Edge, Proof, View};
@@ -20,4 +24,6 @@ pub use check::{Counts, Rejected, check};
 pub use cover::{Class, Prover, certify};
 pub use entry::{Crossing, Probe};
 pub use ray_index::{Front, RayIndex};
+pub use ray_triangle::{Meeting, TriangleProbe};
 pub use sample::{NO_ITEM, SampleTruth, visible_by_random_rays};
+pub use surface_index::{SurfaceFront, SurfaceIndex};

@@ -8,7 +8,9 @@
 
 mod ground;
 mod map;
+mod plan;
 mod sight;
+mod surfaces;
 mod sweep;
 
 pub use map::{DoomMap, MapLine, Sector};
