@@ -87,11 +87,14 @@ impl Surfaces {
 
     fn of_boxes<'b>(scene: &Scene, boxes: impl Iterator<Item = &'b Aabb>) -> Surfaces {
         let mut all = Surfaces::about(scene.origin);
-        for item in boxes {
-            let corners: [Vec3; 8] = std::array::from_fn(|i| item.corner(i));
-            all.push(SurfaceKind::Opaque, false, &corners, &BOX);
-        }
+        boxes.for_each(|item| all.push_box(SurfaceKind::Opaque, false, item));
         all
+    }
+
+    /// Appends the twelve triangles of a scene-local box as an item.
+    pub fn push_box(&mut self, kind: SurfaceKind, two_sided: bool, item: &Aabb) {
+        let corners: [Vec3; 8] = std::array::from_fn(|i| item.corner(i));
+        self.push(kind, two_sided, &corners, &BOX);
     }
 
     /// Appends an item; `triangles` are indices into its own `points`.

@@ -13,8 +13,12 @@ mod entry;
 #[cfg(test)]
 pub(super) mod judge;
 mod ray_index;
+mod ray_tree;
+mod ray_triangle;
 mod sample;
 mod sight;
+mod surface_index;
+mod surface_sample;
 
 pub use cache::{TruthCache, digest_of};
 pub use certificate::{Cell, Certificates, Edge, Except, Proof, View};
@@ -24,4 +28,6 @@ pub use class::Class;
 pub use cover::Prover;
 pub use entry::{Crossing, Probe};
 pub use ray_index::{Front, RayIndex};
+pub use ray_triangle::{Meeting, TriangleProbe};
 pub use sample::{NO_ITEM, SampleTruth, visible_by_random_rays};
+pub use surface_index::{SurfaceFront, SurfaceIndex};

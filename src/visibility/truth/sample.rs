@@ -1,10 +1,10 @@
-//! Exact sample truth of a box scene: the front item of each ray of an image. What
-//! lies between the rays is left to certificates.
+//! Exact sample truth: the front item of each ray of an image, here of a box scene.
+//! What lies between the rays is left to certificates, triangles to `surface_sample`.
 
 use crate::query::ItemId;
 use crate::scene::SeededRng;
 use crate::threads;
-use crate::visibility::{Rays, SampleGrid, Solids};
+use crate::visibility::{Ray, Rays, SampleGrid, Solids};
 
 use super::ray_index::{RayIndex, Search};
 
@@ -41,24 +41,38 @@ impl SampleTruth {
         threads: usize,
     ) -> SampleTruth {
         debug_assert_eq!(solids.boxes.len(), index.len(), "an index of these solids");
+        let see = |search: &mut Search, ray: &Ray, others: &mut Vec<ItemId>| {
+            search.front(index, ray);
+            let (first, ties) = search.items.split_first()?;
+            others.extend_from_slice(ties);
+            Some(*first)
+        };
+        SampleTruth::by(see, index.len(), rays, grid, threads)
+    }
+
+    /// Follows every ray of the grid by `see`, which gives the front item of a ray
+    /// and appends what else of `items` items is visible along it.
+    pub(super) fn by<M: Default>(
+        see: impl Fn(&mut M, &Ray, &mut Vec<ItemId>) -> Option<ItemId> + Sync,
+        items: usize,
+        rays: &Rays,
+        grid: SampleGrid,
+        threads: usize,
+    ) -> SampleTruth {
         let width = grid.width as usize;
         let mut front = vec![NO_ITEM; grid.samples()];
-        // Of each band, every item of a tie but the one in `front`.
-        let mut ties = vec![Vec::new(); (grid.height as usize).div_ceil(BAND)];
-        let rows = front.chunks_mut((width * BAND).max(1)).zip(&mut ties);
-        threads::share(threads, rows.enumerate(), |(band, (front, ties))| {
-            let mut search = Search::default();
+        // Of each band, every visible item but those in `front`.
+        let mut others = vec![Vec::new(); (grid.height as usize).div_ceil(BAND)];
+        let rows = front.chunks_mut((width * BAND).max(1)).zip(&mut others);
+        threads::share(threads, rows.enumerate(), |(band, (front, others))| {
+            let mut memory = M::default();
             for (place, sample) in front.iter_mut().enumerate() {
                 let (column, row) = (place % width, band * BAND + place / width);
                 let ray = rays.sample(grid, column as u32, row as u32);
-                search.front(index, &ray);
-                if let [first, others @ ..] = &search.items[..] {
-                    *sample = *first;
-                    ties.extend_from_slice(others);
-                }
+                *sample = see(&mut memory, &ray, others).unwrap_or(NO_ITEM);
             }
         });
-        let (visible, samples_of) = counted(&front, ties.into_iter().flatten(), index.len());
+        let (visible, samples_of) = counted(&front, others.into_iter().flatten(), items);
         SampleTruth {
             grid,
             front,

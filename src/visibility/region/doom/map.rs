@@ -44,6 +44,11 @@ pub struct DoomMap {
     pub sectors: Vec<Sector>,
     /// Boxes about the leaves of the map's own tree, by sector, without a height.
     parts: Vec<Vec<WorldBox>>,
+    /// Which linedef of the file each of `lines` is, and how many the file has.
+    pub(super) numbers: Vec<u32>,
+    pub(super) linedefs: usize,
+    /// Heights of floor and ceiling as the file has them, where they move too.
+    pub(super) heights: Vec<[f64; 2]>,
     reject: Option<Pvs>,
 }
 
@@ -133,8 +138,9 @@ impl DoomMap {
                 open,
             }
         };
-        let all = lines.chunks_exact(14).map(line);
-        let map_lines: Vec<MapLine> = all.filter(|l| l.ends[0] != l.ends[1]).collect();
+        let all = (0..).zip(lines.chunks_exact(14).map(line));
+        let all = all.filter(|(_, l)| l.ends[0] != l.ends[1]);
+        let (numbers, map_lines): (Vec<u32>, Vec<MapLine>) = all.unzip();
 
         let mut parts = vec![Vec::new(); sectors.len()];
         let (segs, leaves) = (lump("SEGS")?, lump("SSECTORS")?);
@@ -156,6 +162,12 @@ impl DoomMap {
             lines: map_lines,
             sectors,
             parts,
+            numbers,
+            linedefs: lines.len() / 14,
+            heights: records
+                .chunks_exact(26)
+                .map(|r| [0, 2].map(|at| height(r, at)))
+                .collect(),
             reject,
         })
     }

@@ -12,7 +12,9 @@
 
 mod ground;
 mod map;
+mod plan;
 mod sight;
+mod surfaces;
 mod sweep;
 
 pub use map::{DoomMap, MapLine, Sector};

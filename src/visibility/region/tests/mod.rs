@@ -1,5 +1,6 @@
 //! Every row against rays that are followed through the regions one by one.
 
+mod doom_surfaces;
 mod exact_doom;
 mod exact_rooms;
 mod free_space;

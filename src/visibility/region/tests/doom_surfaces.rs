@@ -1,0 +1,158 @@
+//! A map as surfaces against the same map as sectors: two ways to what is visible that
+//! share only the lumps.
+
+use std::sync::Arc;
+
+use super::super::doom::DoomMap;
+use super::super::*;
+use super::from_eye::rows;
+use super::worlds::*;
+use crate::query::ItemId;
+use crate::scene::{Sample, Scene, SeededRng};
+use crate::visibility::truth::{SampleTruth, SurfaceIndex};
+use crate::visibility::{SampleGrid, SurfaceKind, Surfaces};
+
+const MAPS: [&str; 2] = ["freedm-map12", "freedm-map20"];
+
+struct World {
+    scene: Scene,
+    map: Arc<DoomMap>,
+    graph: Arc<RegionGraph>,
+    surfaces: Surfaces,
+}
+
+fn world(name: &str) -> World {
+    let sample = Sample::named(name).unwrap();
+    let scene = crate::scene::load(name, &Default::default()).unwrap();
+    let map = Arc::new(DoomMap::read(sample.bytes, sample.file, None).unwrap());
+    World {
+        graph: Arc::new(map.graph()),
+        surfaces: map.surfaces(&scene),
+        scene,
+        map,
+    }
+}
+
+/// How many items are visible, and how many of them are missing in each row's answer.
+fn visible_and_lost(world: &World, graph: &Arc<RegionGraph>, eyes: usize) -> (usize, Vec<usize>) {
+    let index = SurfaceIndex::build(&world.surfaces);
+    let items = RegionItems::of(graph, &world.scene);
+    let rows = rows(graph);
+    let mut rng = SeededRng::new(12);
+    let (mut scratch, mut regions) = (Scratch::default(), Vec::new());
+    let (mut marks, mut list) = (Marks::default(), Vec::new());
+    let (mut visible, mut lost) = (0, vec![0; rows.len()]);
+    for place in world.scene.places.iter().cycle().take(eyes) {
+        let rays = looking(place.eye, &mut rng);
+        let truth = SampleTruth::of_surfaces(&index, &rays, SampleGrid::new(64, 36), 2);
+        let own = (world.scene.items.len()) as ItemId;
+        let seen: Vec<ItemId> = truth.visible.into_iter().filter(|&id| id < own).collect();
+        visible += seen.len();
+        for (lost, row) in lost.iter_mut().zip(&rows) {
+            row.from_eye(&rays, &mut scratch, &mut regions);
+            items.of_regions(&regions, &mut marks, &mut list);
+            let missing = seen.iter().filter(|id| list.binary_search(id).is_err());
+            *lost += missing.count();
+        }
+    }
+    (visible, lost)
+}
+
+#[test]
+fn items_have_the_numbers_of_the_scene_and_lie_in_their_boxes() {
+    for name in MAPS {
+        let world = world(name);
+        let (scene, surfaces) = (&world.scene, &world.surfaces);
+        assert_eq!(surfaces.items(), scene.items.len() + world.graph.len());
+        assert!(world.map.unclosed().is_empty(), "{name}");
+        let kinds = &scene.labels[0];
+        let mut whole = 0;
+        for (item, b) in scene.items.iter().enumerate() {
+            if kinds.get(item) != "linedef" {
+                assert_eq!(surfaces.bounds(item), *b);
+                assert_eq!(surfaces.kinds[item], SurfaceKind::CutOut);
+            } else if !surfaces.of_item[item].is_empty() {
+                let bounds = surfaces.bounds(item);
+                assert!(bounds.min.cmpge(b.min).all() && bounds.max.cmple(b.max).all());
+                whole += usize::from(bounds == *b);
+            }
+        }
+        // Those of one side, at least, from floor to ceiling.
+        println!("{name}: {whole} of {} items", scene.items.len());
+        assert!(whole > scene.items.len() / 3, "{whole}");
+    }
+}
+
+#[test]
+fn what_is_visible_lies_in_sectors_that_every_row_lists() {
+    for name in MAPS {
+        let world = world(name);
+        let (visible, lost) = visible_and_lost(&world, &world.graph, 40);
+        println!("{name}: {visible} visible");
+        assert_eq!(lost, [0; 4], "{name}");
+        assert!(visible > 500, "{visible}");
+    }
+}
+
+#[test]
+fn a_graph_that_lacks_openings_is_caught() {
+    let world = world("freedm-map12");
+    let openings = world.graph.openings().len();
+    let caught = |opening: &usize| {
+        let graph = Arc::new(world.graph.without_opening(*opening));
+        let (_, lost) = visible_and_lost(&world, &graph, 12);
+        lost[1..].iter().any(|lost| *lost > 0)
+    };
+    let caught = (0..openings).step_by(16).filter(caught).count();
+    println!("{caught} of {}", openings.div_ceil(16));
+    assert!(caught > 0);
+}
+
+/// A ray ends at a wall, floor or ceiling of the last sector that it passes, neither
+/// earlier nor later. Rays that pass a corner of the map to rounding are not counted
+/// on: there is none among these.
+#[test]
+fn rays_end_where_rays_through_sectors_end() {
+    for name in MAPS {
+        let world = world(name);
+        let index = SurfaceIndex::build(&world.surfaces);
+        let own = world.scene.items.len() as ItemId;
+        let items = RegionItems::of(&world.graph, &world.scene);
+        let mut rng = SeededRng::new(13);
+        let (mut whole, mut part) = (Marks::default(), Marks::default());
+        let (mut ended, mut escaped) = (0, 0);
+        for place in world.scene.places.iter().take(40) {
+            let rays = looking(place.eye, &mut rng);
+            for _ in 0..100 {
+                let ray = rays.through(rng.unit(), rng.unit());
+                let sight = index.front_of(&ray);
+                whole.clear(world.graph.len());
+                world.graph.ground().follow(&world.graph, &ray, &mut whole);
+                let (mut all, mut until) = (Vec::new(), Vec::new());
+                whole.list(&mut all);
+                let Some(meeting) = sight.meeting else {
+                    escaped += 1;
+                    continue;
+                };
+                let front = sight.front[0];
+                let near = |sector: &u32| match front < own {
+                    true => items.of_region(*sector).binary_search(&front).is_ok(),
+                    false => *sector == front - own,
+                };
+                assert!(all.iter().any(near), "{name} {ray:?}: {front} in {all:?}");
+                let shorter = crate::visibility::Ray {
+                    far: meeting.depth * (1.0 - 1e-9),
+                    ..ray
+                };
+                part.clear(world.graph.len());
+                let ground = world.graph.ground();
+                ground.follow(&world.graph, &shorter, &mut part);
+                part.list(&mut until);
+                assert_eq!(all, until, "{name} {ray:?}");
+                ended += 1;
+            }
+        }
+        println!("{name}: {ended} end, {escaped} meet nothing");
+        assert!(ended > 1500 && escaped == 0);
+    }
+}

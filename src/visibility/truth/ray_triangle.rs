@@ -1,0 +1,231 @@
+//! Where a ray meets a triangle, exactly: in f64 with an error bound, and by
+//! expansions where that does not decide. Which triangle is the front one is left to
+//! the index.
+//!
+//! What a triangle is to a ray: closed, so that a ray through a common edge or corner
+//! meets all triangles that share it and slips between none. A ray in its plane does
+//! not meet it (there is nothing to be seen of it), nor does any ray one without area.
+
+use std::cmp::Ordering;
+
+use glam::{DVec3, Vec3};
+
+use crate::arithmetic::{Expansion, two_sum};
+use crate::visibility::Ray;
+
+/// With u = 2^-53; A, B, C the corners about the ray's origin, U = B - A, V = C - A,
+/// d the direction; D, L, M, S the largest absolute coordinate of d, of U and V, of A,
+/// and of the shift from scene-local coordinates to those about the ray's origin:
+///
+/// - A is a rounded sum with a rounded shift: off by u (M + S); U, V by u L.
+/// - Q = d x A: two products and a difference, with A's error u D (6 M + 2 S).
+/// - U . Q and V . Q, the signed volumes of d with two of the edges: three products
+///   and two sums of terms below 2 L D M, 18 u; Q's error three times; U's, 6 u:
+///   together u D L (42 M + 6 S).
+/// - N = U x V: 8 u L^2. d . N: 18 + 24 = 42 u D L^2.
+/// - The third volume is d . N less the other two: their errors and two more
+///   roundings, u D L (54 L + 108 M + 12 S).
+/// - A . N: 18 + 24 u L^2 M, and 6 u L^2 (M + S) for A.
+///
+/// Terms of second order are below 2^-50 of these. So 128 u D L (L + M + S) is above
+/// the error of each volume, 64 u D L^2 above that of d . N, 64 u L^2 (M + S) above
+/// that of A . N, each by an eighth and more.
+const UNIT: f64 = 1.0 / (1u64 << 53) as f64;
+
+/// Where a ray meets a triangle.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Meeting {
+    /// The depth in f64; 0 where f64 says nothing of it.
+    pub depth: f64,
+    /// The true depth is within this of it; may be infinite.
+    pub error: f64,
+    corners: [Vec3; 3],
+}
+
+impl Meeting {
+    /// No depth at which the ray meets it there is below this.
+    pub fn at_least(&self) -> f64 {
+        self.depth - self.error
+    }
+
+    /// No depth at which the ray meets it there is above this.
+    pub fn at_most(&self) -> f64 {
+        self.depth + self.error
+    }
+}
+
+/// A ray that asks triangles where it meets them.
+///
+/// Exact for coordinates of corners, origins and eyes and components of direction
+/// that are 0 or from 2^-100 to 2^100 in size: products of six of them, of two depths
+/// as fractions, are then within what [`Expansion`] holds.
+#[derive(Clone, Copy, Debug)]
+pub struct TriangleProbe {
+    ray: Ray,
+    /// What is added to a scene-local point to have it about the ray's origin, as a
+    /// sum of two.
+    shift: DVec3,
+    rest: DVec3,
+    /// Largest coordinate of the direction, and of the shift.
+    across: f64,
+    far: f64,
+}
+
+impl TriangleProbe {
+    /// The ray, made ready for triangles about an origin.
+    pub fn new(ray: Ray, origin: DVec3) -> TriangleProbe {
+        let sums = [0, 1, 2].map(|k| two_sum(origin[k], -ray.origin[k]));
+        let shift = DVec3::from(sums.map(|sum| sum.0));
+        TriangleProbe {
+            shift,
+            rest: DVec3::from(sums.map(|sum| sum.1)),
+            across: ray.direction.abs().max_element(),
+            far: shift.abs().max_element(),
+            ray,
+        }
+    }
+
+    /// The ray as it was given.
+    pub fn ray(&self) -> &Ray {
+        &self.ray
+    }
+
+    /// Where the ray meets a triangle, if that is from near to far, and from its front
+    /// (where its corners turn counter-clockwise) if it is one-sided. `None` as well
+    /// if it certainly meets it beyond `limit`.
+    #[inline]
+    pub fn meet(&self, corners: [Vec3; 3], two_sided: bool, limit: f64) -> Option<Meeting> {
+        let [a, b, c] = corners.map(Vec3::as_dvec3);
+        let direction = self.ray.direction;
+        let (u, v, at) = (b - a, c - a, a + self.shift);
+        let normal = u.cross(v);
+        let towards = direction.dot(normal);
+        // Twice the signed volumes of the direction with each edge: of one sign where
+        // the ray passes within, and below zero for one from the front.
+        let turned = direction.cross(at);
+        let (ab, ca) = (u.dot(turned), -v.dot(turned));
+        let bc = towards - ab - ca;
+        let size = u.abs().max(v.abs()).max_element();
+        let reach = at.abs().max_element() + self.far;
+        let bound = 128.0 * UNIT * self.across * size * (size + reach);
+        let (low, high) = (ab.min(bc).min(ca), ab.max(bc).max(ca));
+        if high > bound && (low < -bound || !two_sided) {
+            return None;
+        }
+        let certainly = high < -bound || (two_sided && low > bound);
+        if !certainly && !self.pierces(corners, two_sided) {
+            return None;
+        }
+        let towards_off = 64.0 * UNIT * self.across * size * size;
+        let (mut depth, mut error) = (0.0, f64::INFINITY);
+        // The true d . N is then at least half of the rounded one.
+        if towards.abs() > 2.0 * towards_off {
+            depth = at.dot(normal) / towards;
+            let along_off = 64.0 * UNIT * size * size * reach;
+            error = 2.0 * (along_off + depth.abs() * towards_off) / towards.abs()
+                + 4.0 * UNIT * depth.abs();
+        }
+        let meeting = Meeting {
+            depth,
+            error,
+            corners,
+        };
+        let (near, far) = (self.ray.near, self.ray.far);
+        if meeting.at_least() > limit || meeting.at_least() > far || meeting.at_most() < near {
+            return None;
+        }
+        if meeting.at_least() < near && self.compare_with(&meeting, near).is_lt() {
+            return None;
+        }
+        if meeting.at_most() > far && self.compare_with(&meeting, far).is_gt() {
+            return None;
+        }
+        Some(meeting)
+    }
+
+    /// Which of two meetings of this ray comes first, exactly.
+    #[inline]
+    pub fn compare(&self, a: &Meeting, b: &Meeting) -> Ordering {
+        if a.at_most() < b.at_least() {
+            return Ordering::Less;
+        }
+        if b.at_most() < a.at_least() {
+            return Ordering::Greater;
+        }
+        if a.corners == b.corners {
+            return Ordering::Equal;
+        }
+        self.compare_exactly(a, b)
+    }
+
+    #[cold]
+    fn compare_exactly(&self, a: &Meeting, b: &Meeting) -> Ordering {
+        let (above_a, below_a) = self.fraction(a.corners);
+        let (above_b, below_b) = self.fraction(b.corners);
+        let difference = &(&above_a * &below_b) - &(&above_b * &below_a);
+        difference.sign().cmp(&0)
+    }
+
+    /// A meeting against a depth, exactly.
+    #[cold]
+    fn compare_with(&self, a: &Meeting, depth: f64) -> Ordering {
+        if depth.is_infinite() {
+            return 0.0_f64.total_cmp(&depth);
+        }
+        let (above, below) = self.fraction(a.corners);
+        (&above - &(&below * &Expansion::from(depth)))
+            .sign()
+            .cmp(&0)
+    }
+
+    /// Whether the ray's line meets the closed triangle, from its front if that is
+    /// asked for.
+    #[cold]
+    fn pierces(&self, corners: [Vec3; 3], two_sided: bool) -> bool {
+        let d = self.direction();
+        let about = corners.map(|corner| self.about(corner));
+        let volume = |i: usize, j: usize| dot(&d, &cross(&about[i], &about[j])).sign();
+        let signs = [volume(0, 1), volume(1, 2), volume(2, 0)];
+        // Their sum is d . N, which is zero only if all are.
+        match (signs.contains(&1), signs.contains(&-1)) {
+            (false, true) => true,
+            (true, false) => two_sided,
+            _ => false,
+        }
+    }
+
+    /// The depth as a fraction, A . N over d . N, the latter made positive.
+    fn fraction(&self, corners: [Vec3; 3]) -> (Expansion, Expansion) {
+        let [a, b, c] = corners;
+        let minus = |p: Vec3| [0, 1, 2].map(|k| &Expansion::from(p[k]) - &Expansion::from(a[k]));
+        let normal = cross(&minus(b), &minus(c));
+        let above = dot(&self.about(a), &normal);
+        let below = dot(&self.direction(), &normal);
+        match below.sign() {
+            -1 => (-&above, -&below),
+            _ => (above, below),
+        }
+    }
+
+    fn direction(&self) -> [Expansion; 3] {
+        self.ray.direction.to_array().map(Expansion::from)
+    }
+
+    /// A scene-local point about the ray's origin.
+    fn about(&self, p: Vec3) -> [Expansion; 3] {
+        [0, 1, 2].map(|k| {
+            let mut sum = Expansion::from(self.rest[k]);
+            sum.grow(self.shift[k]);
+            sum.grow(f64::from(p[k]));
+            sum
+        })
+    }
+}
+
+fn cross(a: &[Expansion; 3], b: &[Expansion; 3]) -> [Expansion; 3] {
+    [(1, 2), (2, 0), (0, 1)].map(|(i, j)| &(&a[i] * &b[j]) - &(&a[j] * &b[i]))
+}
+
+fn dot(a: &[Expansion; 3], b: &[Expansion; 3]) -> Expansion {
+    &(&(&a[0] * &b[0]) + &(&a[1] * &b[1])) + &(&a[2] * &b[2])
+}
