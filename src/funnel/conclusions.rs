@@ -8,6 +8,19 @@ pub fn conclusions(report: &FunnelReport) -> Vec<String> {
     let mut sentences: Vec<String> = report.gains.iter().map(of_gain).collect();
     let lossy = |row: &&StageRow| row.errors.false_negative_count > 0.0;
     sentences.extend(report.stages.iter().filter(lossy).map(of_loss));
+    if let Some(audit) = &report.reject {
+        sentences.push(format!(
+            "The map's REJECT table calls {} of {} ordered pairs of sectors visible, {} are: {} \
+             pairs in one direction only, {} false negatives with a line of sight, {} false \
+             positives.",
+            audit.claimed,
+            2 * audit.pairs,
+            audit.visible,
+            audit.asymmetric.len(),
+            audit.false_negatives.len(),
+            audit.false_positives
+        ));
+    }
     if let Some(last) = report.gains.first() {
         sentences.push(format!(
             "Of {} items {:.1} are left and {:.1} are in front at a sample, a view.",

@@ -11,6 +11,7 @@ use super::stage::{BackEnd, StageKind};
 use crate::measure::OverProcesses;
 use crate::statistics::{ALPHA, Estimate, trimmed_mean};
 use crate::visibility::Level;
+use crate::visibility::region::Audit;
 
 /// The funnel of a scene and a path.
 #[derive(Clone, Debug, Serialize)]
@@ -34,6 +35,9 @@ pub struct FunnelReport {
     pub chain: Chain,
     /// Every stage with every back end, each given what the chain hands it.
     pub stages: Vec<StageRow>,
+    /// What the map's own table of sectors that cannot see each other gets wrong; null
+    /// for what is no map.
+    pub reject: Option<Audit>,
     /// What is left, drawn in every order.
     pub orders: Vec<OrderRow>,
     /// The first item under a cursor, by every back end of picking.

@@ -141,6 +141,7 @@ pub fn prepare(
             level: LevelRow::of(&level),
             chain: input.chain.clone(),
             stages: rows,
+            reject: world.audit()?,
             orders: drawn,
             picks: left.picks.judged(&RayIndex::build(world.solids())),
             gains: Vec::new(),
@@ -262,7 +263,7 @@ impl Walks {
         // Where occlusion is culled in a walk of its own, the frustum is part of that.
         let does_both = world.does_object_stage(chain.of(StageKind::Occlusion));
         for stage in StageKind::OF_ITEMS {
-            for name in world.names(stage, chain) {
+            for name in world.names(stage) {
                 let step = match name.as_str() {
                     NONE => None,
                     _ => Some(pass.step(stage, &name, chosen.sets[stage as usize], stop)?),

@@ -25,13 +25,14 @@ use crate::query::ItemId;
 use crate::scene::{self, Scene};
 use crate::visibility::fragment::{Canvas, Piece, Tests, draw};
 use crate::visibility::occlusion::{self, OccluderScene};
+use crate::visibility::region::doom::{DoomMap, SectorPvs};
 use crate::visibility::region::{
-    self, EyePlace, Flood, Marks, PortalClip, PortalRect, RegionGraph, RegionItems, RegionRow,
-    Scratch,
+    self, Audit, EyePlace, Flood, Marks, PortalClip, PortalRect, ProvenPvs, RegionGraph,
+    RegionItems, RegionRow, RoomsPvs, Scratch, StoredPvs, audit,
 };
 use crate::visibility::triangle;
 use crate::visibility::truth::{RayIndex, SampleTruth};
-use crate::visibility::{Guarantee, NoRays, Rays, SampleGrid, Solids};
+use crate::visibility::{Guarantee, MapFile, NoRays, Rays, SampleGrid, Solids};
 
 /// What a funnel is studied on.
 #[derive(Clone, Copy)]
@@ -75,6 +76,16 @@ pub enum FunnelError {
     /// The scene's file, read a second time.
     #[error(transparent)]
     Input(#[from] InputError),
+    /// A back end that the scene has no data for.
+    #[error("{stage} '{name}' needs what the scene does not have; expected one of {known}", stage = stage.name())]
+    Absent {
+        /// The stage.
+        stage: StageKind,
+        /// What was asked for.
+        name: String,
+        /// What there is.
+        known: String,
+    },
 }
 
 /// What a chain takes where there are rooms.
@@ -109,16 +120,54 @@ struct Regions {
     items: RegionItems,
 }
 
+/// Most rooms of which it is found out, exactly, what is seen from each.
+const MOST_EXACT_ROOMS: usize = 4_096;
+
 impl Regions {
-    fn of(scene: &Scene) -> Option<Regions> {
-        let graph = Arc::new(RegionGraph::of_scene(scene).ok()?);
+    /// `None` for a scene without any.
+    ///
+    /// # Errors
+    /// The map's file, read a second time.
+    fn of(scene: &Scene) -> Result<Option<Regions>, InputError> {
+        let (graph, mut stored) = match MapFile::of(&scene.name)? {
+            Some(file) => Regions::of_map(&file)?,
+            None => match RegionGraph::of_scene(scene) {
+                Ok(graph) => (Arc::new(graph), Vec::new()),
+                Err(_) => return Ok(None),
+            },
+        };
+        if stored.is_empty() && graph.len() <= MOST_EXACT_ROOMS {
+            let exact = RoomsPvs::of(graph.clone()).ok();
+            stored.extend(
+                exact.and_then(|exact| {
+                    StoredPvs::exact(graph.clone(), Arc::new(exact.pvs().clone()))
+                }),
+            );
+        }
         let items = RegionItems::of(&graph, scene);
-        let rows: Vec<Box<dyn RegionRow>> = vec![
+        let mut rows: Vec<Box<dyn RegionRow>> = vec![
             Box::new(Flood(graph.clone())),
             Box::new(PortalRect(graph.clone())),
             Box::new(PortalClip(graph)),
         ];
-        Some(Regions { rows, items })
+        rows.extend(
+            stored
+                .into_iter()
+                .map(|row| Box::new(row) as Box<dyn RegionRow>),
+        );
+        Ok(Some(Regions { rows, items }))
+    }
+
+    /// The sectors of a map, with its own table and with what is exact.
+    fn of_map(file: &MapFile) -> Result<(Arc<RegionGraph>, Vec<StoredPvs>), InputError> {
+        let map = DoomMap::read(&file.bytes, &file.name, file.map.as_deref())?;
+        let map = Arc::new(map);
+        let graph = Arc::new(map.graph());
+        let exact = SectorPvs::of(map.clone(), graph.clone());
+        let reject = map.reject().cloned().map(Arc::new);
+        let reject = reject.and_then(|pvs| StoredPvs::reject(graph.clone(), pvs));
+        let exact = StoredPvs::exact(graph.clone(), Arc::new(exact.pvs().clone()));
+        Ok((graph, [reject, exact].into_iter().flatten().collect()))
     }
 }
 
@@ -175,7 +224,7 @@ impl<'a> World<'a> {
             Ok::<_, BuildError>((spec.label.clone(), index))
         });
         let solids = Solids::of(input.scene);
-        Ok(World {
+        let world = World {
             scene: input.scene,
             kernel: input.execution.kernel,
             samples: input.samples,
@@ -183,13 +232,41 @@ impl<'a> World<'a> {
             views: views.collect::<Result<_, FunnelError>>()?,
             occluders: OccluderScene::of(&solids),
             solids,
-            regions: Regions::of(input.scene),
-        })
+            regions: Regions::of(input.scene)?,
+        };
+        for stage in StageKind::OF_ITEMS {
+            let (name, known) = (input.chain.of(stage), world.names(stage));
+            if !known.iter().any(|other| other == name) {
+                return Err(FunnelError::Absent {
+                    stage,
+                    name: name.to_owned(),
+                    known: known.join(", "),
+                });
+            }
+        }
+        Ok(world)
     }
 
     /// How many views there are.
     pub fn views(&self) -> usize {
         self.views.len()
+    }
+
+    /// What a map's own table of what is seen from where gets wrong; `None` for a scene
+    /// without one.
+    ///
+    /// # Errors
+    /// The map's file, read again.
+    pub fn audit(&self) -> Result<Option<Audit>, InputError> {
+        let Some(file) = MapFile::of(&self.scene.name)? else {
+            return Ok(None);
+        };
+        let map = DoomMap::read(&file.bytes, &file.name, file.map.as_deref())?;
+        let map = Arc::new(map);
+        let graph = Arc::new(map.graph());
+        let exact = SectorPvs::of(map.clone(), graph.clone());
+        let claim = map.reject();
+        Ok(claim.and_then(|claim| audit(claim, &exact, &graph).ok()))
     }
 
     /// The scene itself.
@@ -244,14 +321,17 @@ impl<'a> World<'a> {
         Some(Truth { visible })
     }
 
-    /// The back ends of a stage that are compared, the chain's among them.
-    pub fn names(&self, stage: StageKind, chain: &Chain) -> Vec<String> {
+    /// The back ends of a stage that are compared.
+    pub fn names(&self, stage: StageKind) -> Vec<String> {
         let rows = back_ends(stage, self.scene).into_iter();
         let mut names: Vec<String> = rows.map(|row| row.name.to_owned()).collect();
         if stage == StageKind::Object {
             names.extend(self.structures.iter().map(|(label, _)| label.clone()));
         }
-        debug_assert!(names.iter().any(|name| name == chain.of(stage)));
+        if let (StageKind::Region, Some(regions)) = (stage, &self.regions) {
+            let is_there = |name: &String| regions.rows.iter().any(|row| row.name() == name);
+            names.retain(|name| name == NONE || is_there(name));
+        }
         names
     }
 

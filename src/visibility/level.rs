@@ -2,6 +2,7 @@
 //! that was chosen is loaded at all.
 
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 
 use crate::input::{InputError, is_readable, read_file};
@@ -27,6 +28,41 @@ pub struct Level {
     pub selected: usize,
 }
 
+/// The WAD file that a scene comes from.
+#[derive(Clone, Debug)]
+pub struct MapFile {
+    /// Its contents.
+    pub bytes: Arc<[u8]>,
+    /// As it was typed, or the name of a sample.
+    pub name: String,
+    /// The map that was asked for; the first if none was.
+    pub map: Option<String>,
+}
+
+impl MapFile {
+    /// The file behind what was typed for a scene; `None` if that is no WAD.
+    ///
+    /// # Errors
+    /// The file cannot be read (again).
+    pub fn of(source: &str) -> Result<Option<MapFile>, InputError> {
+        let (file, map) = match source.rsplit_once('#') {
+            Some((file, map)) if !Path::new(source).exists() => (file, Some(map)),
+            _ => (source, None),
+        };
+        let bytes: Arc<[u8]> = match (is_readable(Path::new(file)), Sample::named(file)) {
+            (true, _) => read_file(Path::new(file))?,
+            (false, Some(sample)) => sample.bytes.into(),
+            (false, None) => return Ok(None),
+        };
+        let is_wad = bytes.starts_with(b"PWAD") || bytes.starts_with(b"IWAD");
+        Ok(is_wad.then(|| MapFile {
+            bytes,
+            name: file.to_owned(),
+            map: map.map(str::to_owned),
+        }))
+    }
+}
+
 impl Level {
     /// The level that a scene was loaded from, by what was typed for it. Maps that
     /// cannot be decoded were not selected and are left out.
@@ -34,23 +70,15 @@ impl Level {
     /// # Errors
     /// The file cannot be read again.
     pub fn of(source: &str, scene: &Scene) -> Result<Level, InputError> {
-        let (file, map) = match source.rsplit_once('#') {
-            Some((file, map)) if !Path::new(source).exists() => (file, Some(map)),
-            _ => (source, None),
+        let file = MapFile::of(source)?;
+        let Some(file) = file else {
+            return Ok(Level::alone(scene));
         };
-        let sample = Sample::named(file);
-        let bytes = match (is_readable(Path::new(file)), sample) {
-            (true, _) => read_file(Path::new(file))?,
-            (false, Some(sample)) => sample.bytes.into(),
-            (false, None) => [].into(),
-        };
-        let names = match bytes.get(..4) {
-            Some(b"PWAD" | b"IWAD") => map_names(&bytes, file)?,
-            _ => Vec::new(),
-        };
+        let (bytes, map) = (&file.bytes, file.map.as_deref());
+        let names = map_names(bytes, &file.name)?;
         let decoded = names.into_iter().filter_map(|name| {
             let begun = Instant::now();
-            let map = WadMap::read(&bytes, file, Some(&name)).ok()?;
+            let map = WadMap::read(bytes, &file.name, Some(&name)).ok()?;
             let items = map.into_scene(&name).ok()?.items.len();
             Some(LevelMap {
                 items,
@@ -63,14 +91,19 @@ impl Level {
             |candidate: &LevelMap| map.is_none_or(|map| candidate.name.eq_ignore_ascii_case(map));
         match maps.iter().position(is_selected) {
             Some(selected) => Ok(Level { maps, selected }),
-            None => Ok(Level {
-                maps: vec![LevelMap {
-                    name: scene.name.clone(),
-                    items: scene.items.len(),
-                    load_ns: f64::NAN,
-                }],
-                selected: 0,
-            }),
+            None => Ok(Level::alone(scene)),
+        }
+    }
+
+    /// A scene that is all there is.
+    fn alone(scene: &Scene) -> Level {
+        Level {
+            maps: vec![LevelMap {
+                name: scene.name.clone(),
+                items: scene.items.len(),
+                load_ns: f64::NAN,
+            }],
+            selected: 0,
         }
     }
 

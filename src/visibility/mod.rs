@@ -18,7 +18,7 @@ pub mod triangle;
 pub mod truth;
 
 pub use guarantee::Guarantee;
-pub use level::{Level, LevelMap};
+pub use level::{Level, LevelMap, MapFile};
 pub use rays::{NoRays, Ray, Rays, SampleGrid};
 pub use solids::Solids;
 pub use surface::{SurfaceKind, Surfaces};
