@@ -5,6 +5,9 @@
 //! to be open, whatever its heights. Floors and ceilings hide for the eye; the set of
 //! pairs and its witnesses are seen from above, where heights matter only in so far
 //! as a linedef is open at all.
+//!
+//! The same map as triangles, floors and ceilings among them, is
+//! [`DoomMap::surfaces`].
 
 mod ground;
 mod map;
