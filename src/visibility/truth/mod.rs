@@ -1,7 +1,8 @@
 //! What is really visible: exact along the rays of a sample grid (`sample`, kept on
-//! disk by `cache`), and for all rays of a view where a witness or a cover proves it
-//! (`certificate`, held against the boxes by `check`, which shares no code with the
-//! search). It knows boxes, cameras and rays, not the back ends that it judges.
+//! disk by `cache`; of triangles `surface_sample`), and for all rays of a view where a
+//! witness or a cover proves it (`certificate`, held against the boxes by `check`,
+//! which shares no code with the search). It knows boxes, triangles, cameras and rays,
+//! not the back ends that it judges.
 
 mod cache;
 mod certificate;

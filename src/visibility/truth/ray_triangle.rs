@@ -229,3 +229,59 @@ fn cross(a: &[Expansion; 3], b: &[Expansion; 3]) -> [Expansion; 3] {
 fn dot(a: &[Expansion; 3], b: &[Expansion; 3]) -> Expansion {
     &(&(&a[0] * &b[0]) + &(&a[1] * &b[1])) + &(&a[2] * &b[2])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ACROSS: [Vec3; 3] = [
+        Vec3::new(1.0, -1.0, -1.0),
+        Vec3::new(1.0, 0.0, 2.0),
+        Vec3::new(1.0, 1.0, -1.0),
+    ];
+
+    fn ray(near: f64, far: f64) -> Ray {
+        Ray {
+            origin: DVec3::ZERO,
+            direction: DVec3::X * 3.0,
+            near,
+            far,
+        }
+    }
+
+    #[test]
+    fn near_and_far_are_decided_to_the_last_bit() {
+        // A third lies between two neighbouring doubles.
+        let (below, above) = (1.0 / 3.0, (1.0_f64 / 3.0).next_up());
+        let met = |near, far| {
+            let probe = TriangleProbe::new(ray(near, far), DVec3::ZERO);
+            probe.meet(ACROSS, false, f64::INFINITY).is_some()
+        };
+        assert!(met(below, f64::INFINITY) && !met(above, f64::INFINITY));
+        assert!(met(0.0, above) && !met(0.0, below));
+        // A depth that is a double is met by both.
+        let twice = ACROSS.map(|p| p * 1.5);
+        let probe = TriangleProbe::new(ray(0.5, 0.5), DVec3::ZERO);
+        assert!(probe.meet(twice, false, f64::INFINITY).is_some());
+    }
+
+    #[test]
+    fn a_triangle_of_one_side_is_met_from_there_alone() {
+        let [a, b, c] = ACROSS;
+        let probe = TriangleProbe::new(ray(0.0, f64::INFINITY), DVec3::ZERO);
+        for (corners, two_sided, met) in [
+            ([a, b, c], false, true),
+            ([a, c, b], false, false),
+            ([a, c, b], true, true),
+            ([a, a, b], true, false),
+        ] {
+            // Through the middle, a corner, and an edge.
+            for at in [Vec3::ZERO, a, (a + b) * 0.5] {
+                let off = Vec3::new(0.0, at.y, at.z);
+                let corners = corners.map(|p| p - off);
+                let found = probe.meet(corners, two_sided, f64::INFINITY);
+                assert_eq!(found.is_some(), met, "{corners:?}");
+            }
+        }
+    }
+}

@@ -152,7 +152,7 @@ mod tests {
     fn triangles_full_of_ties_are_seen_as_whole_numbers_see_them() {
         let mut rng = SeededRng::new(31);
         let (mut met, mut tied, mut before, mut edges) = (0, 0, 0, 0);
-        for world in 0..250 {
+        for world in 0..80 {
             let surfaces = small_world(&mut rng);
             let index = SurfaceIndex::build(&surfaces);
             let mut camera = judge::camera(&mut rng);
@@ -201,7 +201,7 @@ mod tests {
             }
         }
         println!("{met} met, {tied} tied, {before} before, {edges} at edges");
-        assert!(met > 1000 && tied > 60 && before > 60 && edges > 500);
+        assert!(met > 300 && tied > 25 && before > 25 && edges > 500);
     }
 
     #[test]

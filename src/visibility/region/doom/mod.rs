@@ -9,6 +9,9 @@
 //! This is the world of the game. Where items are taken as solid boxes, rays over and
 //! under them pass, as floors and ceilings are no items: what such a ray meets beyond a
 //! ceiling is not promised here.
+//!
+//! The same map as triangles, floors and ceilings among them, is
+//! [`DoomMap::surfaces`].
 
 mod ground;
 mod map;

@@ -24,8 +24,8 @@ fn cross([a, b]: [Point; 2], [c, d]: [Point; 2]) -> bool {
 }
 
 /// Cuts the polygons that lie on the right of all edges together, holes and all, into
-/// triangles that turn to the right. `None` where the edges do not close, or one has a
-/// corner of another between its ends.
+/// triangles that turn to the right. `None` where the edges do not close, cross, or one
+/// has a corner of another between its ends.
 ///
 /// A front advances from edge to edge: each triangle takes an edge and a corner that
 /// it sees, and leaves less. O(n^2) for each of n triangles at worst, about O(n).
@@ -60,6 +60,10 @@ pub fn triangles(edges: &[[Point; 2]]) -> Option<Vec<[Point; 3]>> {
             })
         };
         let c = corners.into_iter().find(sees)?;
+        // A hole adds two to the triangles of its corners: beyond this, edges cross.
+        if made.len() > 2 * edges.len() {
+            return None;
+        }
         made.push([a, b, c]);
         // What is beyond the new sides remains, unless they were sides already.
         for (side, back) in [([a, c], [c, a]), ([c, b], [b, c])] {
@@ -143,5 +147,11 @@ mod tests {
         let edges = ring(&[[0, 0], [4, 0], [4, 4], [0, 4]]);
         assert_eq!(triangles(&edges), None);
         assert_eq!(triangles(&[]), Some(Vec::new()));
+        // Whatever the edges, it comes to an end.
+        let mut rng = crate::scene::SeededRng::new(9);
+        for _ in 0..300 {
+            let corners = [(); 9].map(|()| [(); 2].map(|()| rng.below(6) as i32));
+            let _ = triangles(&ring(&corners));
+        }
     }
 }
