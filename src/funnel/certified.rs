@@ -20,6 +20,11 @@ pub fn certificates(
     mut each: impl FnMut(Certificates),
 ) -> Result<bool, FunnelError> {
     let world = World::new(input)?;
+    if !world.has_solids() {
+        return Err(FunnelError::NoSolids {
+            scene: input.scene.name.clone(),
+        });
+    }
     let solids: &Solids = world.solids();
     let index = RayIndex::build(solids);
     let mut pass = Pass::new(&world);

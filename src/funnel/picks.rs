@@ -51,7 +51,9 @@ impl Picks {
     /// Builds all.
     pub fn of(world: &World) -> Picks {
         let solids = world.solids();
-        let suits = |row: &&BackEnd| row.about.name != "linear" || world.items() <= MOST_FOR_LOOP;
+        let suits = |row: &&BackEnd| {
+            world.has_solids() && (row.about.name != "linear" || world.items() <= MOST_FOR_LOOP)
+        };
         let built = BACK_ENDS.iter().filter(suits);
         let picks = built.filter_map(|row| Some((row, (row.build)(solids).ok()?)));
         let of_view = |view: usize| {

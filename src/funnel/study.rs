@@ -49,7 +49,7 @@ pub fn prepare(
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<Prepared>, FunnelError> {
     let world = World::new(input)?;
-    let Some(truth) = world.truth(input, stop) else {
+    let Some(truth) = world.truth(input, stop)? else {
         return Ok(None);
     };
     let mut pass = Pass::new(&world);
@@ -72,7 +72,8 @@ pub fn prepare(
             .collect();
         rows.push((world.back_end(*stage, name), name.clone(), judged, *step));
     }
-    let culls = faces::back_ends().zip(std::iter::once(None).chain((0..).map(Some)));
+    let culls = back_ends(StageKind::Triangle, input.scene).into_iter();
+    let culls = culls.zip(std::iter::once(None).chain((0..).map(Some)));
     for (back_end, place) in culls {
         if stop() {
             return Ok(None);
@@ -93,7 +94,11 @@ pub fn prepare(
         });
         rows.push((back_end, back_end.name.to_owned(), judged.collect(), None));
     }
-    let Some(drawn) = left.orders.drawn(input.samples, stop) else {
+    let drawn = match left.is_solid {
+        true => left.orders.drawn(input.samples, stop),
+        false => Some(Vec::new()),
+    };
+    let Some(drawn) = drawn else {
         return Ok(None);
     };
     let tasks: Vec<Option<usize>> = rows.iter().map(|(_, _, _, task)| *task).collect();
@@ -176,6 +181,8 @@ struct Left {
     faces: Faces,
     orders: Orders,
     picks: Picks,
+    /// Whether any of these has something to work on.
+    is_solid: bool,
 }
 
 impl Left {
@@ -184,6 +191,7 @@ impl Left {
             faces: Faces::of(world, pass, chosen.left()),
             orders: Orders::of(world, pass, chosen.left()),
             picks: Picks::of(world),
+            is_solid: world.has_solids(),
         }
     }
 }
@@ -201,11 +209,16 @@ fn timed_tasks<'p>(
         let ask: Ask = Box::new(move |view, out| run(view, pass.items(step.input, view), out));
         ask
     });
-    let culls = (1..faces::back_ends().count()).map(|place| {
-        let ask: Ask = Box::new(move |view, out| left.faces.cull(place - 1, view, out));
-        ask
-    });
-    let sorts = (0..orders::COUNT).map(|order| {
+    let culls = (1..if left.is_solid {
+        faces::back_ends().count()
+    } else {
+        0
+    })
+        .map(|place| {
+            let ask: Ask = Box::new(move |view, out| left.faces.cull(place - 1, view, out));
+            ask
+        });
+    let sorts = (0..if left.is_solid { orders::COUNT } else { 0 }).map(|order| {
         let orders = &left.orders;
         let pieces = RefCell::new(Vec::new());
         let ask: Ask = Box::new(move |view, out| {

@@ -239,7 +239,7 @@ pub fn prepare_sweep(
             path: input.path.name.clone(),
             stage,
             views: world.views(),
-            rays_per_view: RAYS,
+            rays_per_view: rays,
             processes: 0,
             points,
         },
@@ -253,12 +253,18 @@ fn seen(
     input: &FunnelInput,
     count: usize,
     stop: &dyn Fn() -> bool,
-) -> Option<Truth> {
+) -> Result<Option<Truth>, FunnelError> {
+    let Some(truth) = world.truth(input, stop)? else {
+        return Ok(None);
+    };
+    if count == 0 {
+        return Ok(Some(truth));
+    }
     let index = RayIndex::build(world.solids());
-    let truth = world.truth(input, stop)?;
-    let views = (0..world.views()).map(|view| {
+    let mut visible = Vec::with_capacity(world.views());
+    for view in 0..world.views() {
         if stop() {
-            return None;
+            return Ok(None);
         }
         let threads = input.execution.threads;
         let seed = view as u64 + 1;
@@ -270,10 +276,9 @@ fn seen(
                 .map(|&id| (id, 1)),
         );
         all.sort_unstable();
-        Some(all)
-    });
-    let visible: Option<Vec<_>> = views.collect();
-    Some(Truth::new(visible?))
+        visible.push(all);
+    }
+    Ok(Some(Truth::new(visible)))
 }
 
 /// One process's share of the times; `None` if stopped.

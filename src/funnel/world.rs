@@ -31,7 +31,7 @@ use crate::visibility::region::{
     RegionItems, RegionRow, RoomsPvs, Scratch, StoredPvs, audit,
 };
 use crate::visibility::triangle;
-use crate::visibility::truth::{RayIndex, SampleTruth};
+use crate::visibility::truth::{RayIndex, SampleTruth, SurfaceIndex};
 use crate::visibility::{Guarantee, MapFile, NoRays, Rays, SampleGrid, Solids};
 
 /// What a funnel is studied on.
@@ -76,6 +76,14 @@ pub enum FunnelError {
     /// The scene's file, read a second time.
     #[error(transparent)]
     Input(#[from] InputError),
+    /// Proofs are about solid boxes.
+    #[error(
+        "'{scene}' is a map, whose items are walls; expected a scene of solid boxes for proofs"
+    )]
+    NoSolids {
+        /// Its name.
+        scene: String,
+    },
     /// A back end that the scene has no data for.
     #[error("{stage} '{name}' needs what the scene does not have; expected one of {known}", stage = stage.name())]
     Absent {
@@ -258,11 +266,9 @@ impl<'a> World<'a> {
     /// # Errors
     /// The map's file, read again.
     pub fn audit(&self) -> Result<Option<Audit>, InputError> {
-        let Some(file) = MapFile::of(&self.scene.name)? else {
+        let Some(map) = self.map()? else {
             return Ok(None);
         };
-        let map = DoomMap::read(&file.bytes, &file.name, file.map.as_deref())?;
-        let map = Arc::new(map);
         let graph = Arc::new(map.graph());
         let exact = SectorPvs::of(map.clone(), graph.clone());
         let claim = map.reject();
@@ -299,8 +305,54 @@ impl<'a> World<'a> {
         self.scene.items.len()
     }
 
-    /// What each view shows at its samples; `None` if stopped.
-    pub fn truth(&self, input: &FunnelInput, stop: &dyn Fn() -> bool) -> Option<Truth> {
+    /// Whether items are what their boxes are. Linedefs of a map are walls in them.
+    pub fn has_solids(&self) -> bool {
+        is_solid(self.scene)
+    }
+
+    /// The map that the scene is, if it is one.
+    ///
+    /// # Errors
+    /// The map's file, read again.
+    fn map(&self) -> Result<Option<Arc<DoomMap>>, InputError> {
+        let Some(file) = MapFile::of(&self.scene.name)? else {
+            return Ok(None);
+        };
+        let map = DoomMap::read(&file.bytes, &file.name, file.map.as_deref())?;
+        Ok(Some(Arc::new(map)))
+    }
+
+    /// What each view shows at its samples: solids, or the walls, floors and ceilings of a
+    /// map. `None` if stopped.
+    ///
+    /// # Errors
+    /// The map's file, read again.
+    pub fn truth(
+        &self,
+        input: &FunnelInput,
+        stop: &dyn Fn() -> bool,
+    ) -> Result<Option<Truth>, InputError> {
+        let Some(map) = self.map()? else {
+            return Ok(self.truth_of_solids(input, stop));
+        };
+        let surfaces = map.surfaces(self.scene);
+        let index = SurfaceIndex::build(&surfaces);
+        let items = self.items() as ItemId;
+        let mut visible = Vec::with_capacity(self.views());
+        for view in &self.views {
+            if stop() {
+                return Ok(None);
+            }
+            let threads = input.execution.threads;
+            let truth = SampleTruth::of_surfaces(&index, &view.rays, input.samples, threads);
+            let counts = truth.visible.into_iter().zip(truth.samples_of);
+            // Behind the scene's items come floors and ceilings.
+            visible.push(counts.filter(|(item, _)| *item < items).collect());
+        }
+        Ok(Some(Truth { visible }))
+    }
+
+    fn truth_of_solids(&self, input: &FunnelInput, stop: &dyn Fn() -> bool) -> Option<Truth> {
         let solids = &self.solids;
         let index = RayIndex::build(solids);
         let mut visible = Vec::with_capacity(self.views());
@@ -427,6 +479,13 @@ impl<'a> World<'a> {
     /// What the z-test leaves: items in front at a sample, drawn one by one.
     pub fn judge_fragments(&self, view: usize, input: Option<&[ItemId]>, truth: &Truth) -> Judged {
         let items = self.listed(input);
+        if !self.has_solids() {
+            let visible = truth.visible[view].iter().map(|(item, _)| *item);
+            let output: Vec<ItemId> = visible
+                .filter(|id| items.binary_search(id).is_ok())
+                .collect();
+            return judge_items(input, self.items(), &output, &truth.visible[view]);
+        }
         let canvas = Canvas::of(&self.views[view].rays, self.samples);
         let solids = self.solids.some(&items);
         let pieces = (0..items.len() as ItemId).map(|item| Piece { item, part: None });
@@ -497,6 +556,11 @@ impl<'a> World<'a> {
     }
 }
 
+/// Whether the items of a scene are solid boxes.
+fn is_solid(scene: &Scene) -> bool {
+    !matches!(scene.regions, scene::Regions::Bsp(_))
+}
+
 /// The back ends of a stage that a scene can have; structures of the object stage are
 /// not among them.
 pub fn back_ends(stage: StageKind, scene: &Scene) -> Vec<BackEnd> {
@@ -520,8 +584,10 @@ pub fn back_ends(stage: StageKind, scene: &Scene) -> Vec<BackEnd> {
                 .filter(|row| of_cameras.contains(&row.0));
             rows.extend(known.map(|&(name, summary, guarantee)| plain(name, summary, guarantee)));
         }
-        StageKind::Occlusion => rows.extend(HIDING.iter().map(HidingRow::back_end)),
-        StageKind::Triangle => rows = faces::back_ends().collect(),
+        StageKind::Occlusion if is_solid(scene) => {
+            rows.extend(HIDING.iter().map(HidingRow::back_end))
+        }
+        StageKind::Triangle if is_solid(scene) => rows = faces::back_ends().collect(),
         StageKind::Fragment => rows.push(plain(
             "z-test",
             "the nearest fragment of each sample, exactly",
