@@ -179,10 +179,12 @@ pub fn prepare_sweep(
         return Ok(None);
     };
     let entries = given.entries(&world, stage);
-    // What faces the eye is no question of rays.
-    let rays = if stage == StageKind::Triangle {
-        0
-    } else {
+    // What faces the eye is no question of rays, and those at random are of solids.
+    let rays = match stage != StageKind::Triangle && world.has_solids() {
+        true => RAYS,
+        false => 0,
+    };
+    let Some(truth) = seen(&world, input, rays, stop)? else {
         RAYS
     };
     let Some(truth) = seen(&world, input, rays, stop) else {
