@@ -1,6 +1,7 @@
 //! The stage against rays, one by one and in f64.
 
 mod by_rays;
+mod lanes;
 mod rules;
 mod slits;
 mod streets;
