@@ -278,9 +278,12 @@ mod tests {
             // Through the middle, a corner, and an edge.
             for at in [Vec3::ZERO, a, (a + b) * 0.5] {
                 let off = Vec3::new(0.0, at.y, at.z);
-                let corners = corners.map(|p| p - off);
-                let found = probe.meet(corners, two_sided, f64::INFINITY);
-                assert_eq!(found.is_some(), met, "{corners:?}");
+                // So small a triangle is beyond what f64 decides.
+                for size in [1.0, 2f32.powi(-70)] {
+                    let corners = corners.map(|p| (p - off) * Vec3::new(1.0, size, size));
+                    let found = probe.meet(corners, two_sided, f64::INFINITY);
+                    assert_eq!(found.is_some(), met, "{corners:?}");
+                }
             }
         }
     }
