@@ -185,9 +185,6 @@ pub fn prepare_sweep(
         false => 0,
     };
     let Some(truth) = seen(&world, input, rays, stop)? else {
-        RAYS
-    };
-    let Some(truth) = seen(&world, input, rays, stop) else {
         return Ok(None);
     };
     let (mut points, mut tasks) = (Vec::new(), Vec::new());
