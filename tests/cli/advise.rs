@@ -13,8 +13,8 @@ use super::process::*;
 
 const SMALL: &str =
     "advise --scene uniform:n=900 --path orbit:frames=6 --structure linear,wide,bvh --processes";
-const RULES: &str = "needless-planes plane-masks no-index six-planes third-dimension rebasing \
-     rebuild f64-kernel frame-correction";
+const RULES: &str = "needless-planes plane-masks no-index six-planes occlusion occlusion-buffer \
+     third-dimension rebasing rebuild f64-kernel frame-correction";
 
 /// Of one process: for what is no time.
 fn advice(folder: &Path, line: &str) -> Value {
@@ -379,4 +379,22 @@ fn mistakes_are_one_line() {
     let nothing = "advise --scene uniform:n=0 --path cameras.csv";
     all_refused(&folder, &[nothing], "uniform:n=0 | no items");
     all_refused(&folder, &["advise --scene nothing.csv"], "nothing.csv");
+}
+
+#[test]
+fn occlusion_is_left_out_from_the_air_and_kept_on_the_street() {
+    let of = |path: &str| {
+        let line = format!(
+            "advise --scene city:n=4000 --path {path} --structure linear,wide --draw-ns 200"
+        );
+        let advice = advice(Path::new("."), &line);
+        let rule = rule(&advice, "occlusion");
+        (rule["decision"].clone(), number(rule, "statistic"))
+    };
+    let (street, hidden) = of("street:frames=12");
+    assert_eq!(street, "keep");
+    assert!(hidden > 0.5, "{hidden}");
+    let (air, hidden) = of("outside:frames=12");
+    assert_eq!(air, "leave_out");
+    assert!(hidden < 0.5, "{hidden}");
 }

@@ -44,6 +44,7 @@ impl RoundedRay {
     }
 
     /// Whether the line of the ray, from its origin to `most`, meets the box.
+    #[cfg(feature = "peers")]
     #[inline(always)]
     pub fn meets(&self, b: &Aabb, most: f32) -> bool {
         let (enters, leaves) = self.slabs(b);
