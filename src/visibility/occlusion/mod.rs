@@ -2,7 +2,7 @@
 //!
 //! Back ends are buffers that occluders are drawn into ([`OcclusionBuffer`]), each
 //! in a file of its own, under two couplings: [`TwoPass`] (all occluders, then all
-//! candidates) and `interleaved` (front to back on a tree of its own).
+//! candidates) and [`Interleaved`] (front to back on a tree of its own).
 //!
 //! Semantics are those of [`Solids`](super::Solids): a ray meets a box where it
 //! enters it, between near and far; a box that some ray enters before the near

@@ -12,6 +12,8 @@ use crate::scene::{Scene, SeededRng, WorldBox};
 use crate::visibility::SampleGrid;
 
 const GRID: SampleGrid = SampleGrid::new(320, 180);
+/// Pixels so fine that rounding of coordinates shows.
+const FINE: SampleGrid = SampleGrid::new(32_000, 18_000);
 
 /// Boxes before an eye that is so far from the scene's zero, all in scene-local
 /// coordinates.
@@ -69,7 +71,7 @@ fn rectangles_hold_every_corner_of_their_boxes() {
         let (ready, frame) = before_eye(far_out, 3);
         for lens in lenses() {
             let camera = Camera { frame, lens };
-            let held = with_view(&ready, &camera, GRID, |view, _| {
+            let held = with_view(&ready, &camera, FINE, |view, _| {
                 let all = Kernel::best().run(Projected(&ready, view));
                 for kernel in Kernel::available() {
                     let same = kernel.run(Projected(&ready, view));
@@ -116,7 +118,8 @@ fn corners_held(ready: &Ready, view: &View, block: usize, rects: &Rects) -> usiz
                 "{} {nearness}",
                 rect.nearness
             );
-            if (0.0..320.0).contains(&x) && (0.0..180.0).contains(&y) {
+            let [width, height] = [view.grid.width, view.grid.height].map(f64::from);
+            if (0.0..width).contains(&x) && (0.0..height).contains(&y) {
                 held += 1;
                 assert!(rects.seen >> lane & 1 == 1);
                 let (x, y) = (x as u16, y as u16);
