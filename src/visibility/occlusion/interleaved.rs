@@ -30,7 +30,6 @@ pub struct Interleaved<B> {
 #[derive(Clone, Copy, Debug)]
 struct Entry {
     rect: Rect,
-    depth: f32,
     block: u32,
     level: u16,
     /// Whether there is no rectangle.
@@ -124,7 +123,6 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
         stack.clear();
         stack.push(Entry {
             rect: Rect::default(),
-            depth: 0.0,
             block: 0,
             level: (scene.height() - 1) as u16,
             near: true,
@@ -161,7 +159,6 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
                     let lane = (key & 15) as usize;
                     stack.push(Entry {
                         rect: rects.get(lane),
-                        depth: rects.depth[lane],
                         block: (index * LANES + lane) as u32,
                         level: entry.level - 1,
                         near: flat >> lane & 1 == 0,

@@ -116,7 +116,8 @@ impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
                     open &= open - 1;
                     let pixels = pixels_of(rect, column + i, row);
                     let shown = pixels & !self.mask[at + i] != 0;
-                    if shown | !(self.working[at + i] > rect.nearness) {
+                    let behind = self.working[at + i] > rect.nearness;
+                    if shown | !behind {
                         return false;
                     }
                 }
@@ -132,12 +133,11 @@ impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
         if lanes == 0 {
             return 0;
         }
-        let mut large = [0; LANES];
-        for lane in 0..LANES {
+        let large = std::array::from_fn(|lane| {
             let wide = (rects.x1[lane] >> 3) - (rects.x0[lane] >> 3) > 1;
             let high = (rects.y1[lane] >> 2) - (rects.y0[lane] >> 2) > 1;
-            large[lane] = u32::from(wide | high);
-        }
+            u32::from(wide | high)
+        });
         let small = lanes & isa.zeros(isa.words(&large));
         let mut hidden = small;
         for (x, y) in [
@@ -347,5 +347,5 @@ fn pixels_of(rect: &Rect, column: usize, row: usize) -> Mask {
     let bottom = (y1 - row * TILE_HEIGHT).min(TILE_HEIGHT - 1);
     let columns = (0xff >> (TILE_WIDTH - 1 - right)) & (0xff << left) & 0xff;
     let below = Mask::MAX >> (8 * (TILE_HEIGHT - 1 - bottom));
-    columns * 0x0101_0101 & below & Mask::MAX << (8 * top)
+    (columns * 0x0101_0101) & below & (Mask::MAX << (8 * top))
 }

@@ -264,7 +264,8 @@ impl Outline {
         let [first, end] = self.rows;
         if y.abs() * end < margin {
             // Here or nowhere. (A NaN is nowhere.)
-            if !(c - margin >= 0.0) {
+            let is_here = c - margin >= 0.0;
+            if !is_here {
                 self.rows = [0.0, 0.0];
             }
         } else if y > 0.0 {
@@ -308,15 +309,15 @@ impl Outline {
         let mut low = [left as f32; N];
         let mut high = [right as f32 - 1.0; N];
         for bound in &self.lower[..self.lower_count.min(8)] {
-            for i in 0..N {
+            for (i, low) in low.iter_mut().enumerate() {
                 let at = bound.at + bound.slope * (first + i as f32);
-                low[i] = if at > low[i] { at } else { low[i] };
+                *low = if at > *low { at } else { *low };
             }
         }
         for bound in &self.upper[..self.upper_count.min(8)] {
-            for i in 0..N {
+            for (i, high) in high.iter_mut().enumerate() {
                 let at = bound.at + bound.slope * (first + i as f32);
-                high[i] = if at < high[i] { at } else { high[i] };
+                *high = if at < *high { at } else { *high };
             }
         }
         let mut start = [0; N];

@@ -221,11 +221,11 @@ impl<I: Isa> AboutEye<I> {
         let minus = isa.splat(-1.0);
         let mut bounds = [[isa.splat(0.0); 2]; 3];
         let mut minus_size = isa.splat(-p.far_from_zero);
-        for axis in 0..3 {
+        for (axis, bounds) in bounds.iter_mut().enumerate() {
             let (eye, rest) = (isa.splat(-p.eye[axis]), isa.splat(-p.rest[axis]));
             let about = |row: &[f32; LANES]| isa.add(isa.add(isa.load(row), eye), rest);
             let (low, high) = (about(&block.rows[axis]), about(&block.rows[3 + axis]));
-            bounds[axis] = [low, high];
+            *bounds = [low, high];
             // low <= high, so the greater size is that of -low or of high.
             minus_size = isa.add(minus_size, isa.min(low, isa.mul(high, minus)));
         }

@@ -84,8 +84,7 @@ impl Slabs {
     #[inline(always)]
     fn entry(&self, bounds: &[[f32; 3]; 2], limit: f64) -> Option<f64> {
         let (mut enters, mut leaves) = (f64::NEG_INFINITY, f64::INFINITY);
-        for axis in 0..3 {
-            let side = self.side[axis];
+        for (axis, &side) in self.side.iter().enumerate() {
             let from = f64::from(bounds[side][axis]) - self.enter[axis];
             let to = f64::from(bounds[1 - side][axis]) - self.leave[axis];
             enters = enters.max(from * self.inverse[axis]);
