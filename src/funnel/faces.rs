@@ -5,37 +5,13 @@ use std::sync::Arc;
 
 use super::judged::Judged;
 use super::pass::Pass;
-use super::stage::{BackEnd, NONE, StageKind};
+use super::triangle_rows::sides;
 use super::world::World;
 use crate::kernel::Kernel;
+use crate::visibility::Surfaces;
 use crate::visibility::triangle::{
-    Clusters, Counts, Criterion, MOST_TRIANGLES, Selection, TRIANGLE_ROWS, TriangleCull,
-    TriangleRow, View, facing,
+    Clusters, Counts, MOST_TRIANGLES, Selection, TriangleCull, View, facing,
 };
-use crate::visibility::{Guarantee, Surfaces};
-
-/// What the chain takes.
-pub const DEFAULT: &str = "per-triangle";
-
-/// The rows of the table that decide by the side that the eye is on.
-fn sides() -> impl Iterator<Item = &'static TriangleRow> {
-    let sides = TRIANGLE_ROWS.iter();
-    sides.filter(|row| row.criterion == Criterion::Facing && row.name != NONE)
-}
-
-/// Every back end, the first of which leaves the stage out.
-pub fn back_ends() -> impl Iterator<Item = BackEnd> {
-    let declared = |name, summary, guarantee| BackEnd {
-        stage: StageKind::Triangle,
-        name,
-        summary,
-        guarantee,
-        does_object_stage: false,
-    };
-    let none = declared(NONE, "the stage is left out", Guarantee::Conservative);
-    let rows = sides().map(move |row| declared(row.name, row.summary, row.guarantee));
-    std::iter::once(none).chain(rows)
-}
 
 /// The faces of what is left of one view.
 struct Left {

@@ -6,6 +6,7 @@
 //! that differs from it in one stage: [`prepare`] judges, [`time`] measures in each
 //! process, [`Prepared::conclude`] puts both together.
 
+mod back_ends;
 mod certified;
 mod chain;
 mod conclusions;
@@ -20,16 +21,20 @@ mod report;
 mod stage;
 mod study;
 mod sweep;
+mod times;
+mod triangle_rows;
 mod world;
 
+pub use back_ends::back_ends;
 pub use certified::certificates;
 pub use chain::Chain;
 pub use judged::Errors;
 pub use orders::OrderRow;
 pub use picks::PickRow;
 pub use plan_view::{Fate, PlanView};
-pub use report::{FunnelReport, Gain, LevelRow, StageRow, Times};
+pub use report::{FunnelReport, Gain, LevelRow, StageRow};
 pub use stage::{BackEnd, NONE, STAGES, StageKind};
 pub use study::{FunnelPlan, Prepared, failure, prepare, time};
 pub use sweep::{PreparedSweep, StageSweep, SweepPlan, SweepPoint, prepare_sweep, time_sweep};
-pub use world::{FunnelError, FunnelInput, back_ends};
+pub use times::Times;
+pub use world::{FunnelError, FunnelInput};

@@ -4,7 +4,7 @@
 use serde::Serialize;
 
 use super::pass::Pass;
-use super::report::Times;
+use super::times::Times;
 use super::world::World;
 use crate::visibility::fragment::order::ORDERS;
 use crate::visibility::fragment::{Canvas, DepthOrder, Piece, Tests, draw, order_errors};

@@ -85,6 +85,17 @@ impl<'w> Pass<'w> {
         counts.sum::<f64>() / views.max(1) as f64
     }
 
+    /// The steps of a chain whose times add up: not the object stage where the
+    /// occlusion stage does it as well.
+    pub fn timed_steps(&self, walked: &Walked) -> Vec<usize> {
+        let of = |stage: StageKind| walked.steps[stage as usize];
+        let occlusion = of(StageKind::Occlusion);
+        let is_both = |step: usize| self.world.does_object_stage(&self.steps[step].back_end);
+        let object = of(StageKind::Object).filter(|_| !occlusion.is_some_and(is_both));
+        let steps = [of(StageKind::Region), object, occlusion];
+        steps.into_iter().flatten().collect()
+    }
+
     /// Goes through the stages of a chain that hand on items; `None` if `stop` says
     /// so on the way.
     pub fn walk(&mut self, chain: &Chain, stop: &dyn Fn() -> bool) -> Option<Walked> {

@@ -3,7 +3,7 @@
 
 use serde::{Serialize, Serializer};
 
-use super::report::Times;
+use super::times::Times;
 use super::world::World;
 use crate::query::ItemId;
 use crate::visibility::pick::{BACK_ENDS, BackEnd, Pick};

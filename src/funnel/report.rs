@@ -8,8 +8,9 @@ use super::orders::OrderRow;
 use super::picks::PickRow;
 use super::plan_view::PlanView;
 use super::stage::{BackEnd, StageKind};
+use super::times::Times;
 use crate::measure::OverProcesses;
-use crate::statistics::{ALPHA, Estimate, trimmed_mean};
+use crate::statistics::{ALPHA, trimmed_mean};
 use crate::visibility::Level;
 use crate::visibility::region::Audit;
 
@@ -103,31 +104,6 @@ pub struct StageRow {
     pub ns_per_removed: Option<f64>,
     /// Time / what it was given.
     pub ns_per_decided: Option<f64>,
-}
-
-/// A time with its interval; null where there is none.
-#[derive(Clone, Copy, Default, PartialEq, Debug, Serialize)]
-pub struct Times {
-    /// Mean over the views.
-    pub stage_ns: Option<f64>,
-    /// Lower end of the 95 % interval.
-    pub stage_ns_lower: Option<f64>,
-    /// Upper end of the 95 % interval.
-    pub stage_ns_upper: Option<f64>,
-}
-
-impl Times {
-    /// Of an estimate, where there is one.
-    pub fn of(found: Option<Estimate>) -> Times {
-        let Some(found) = found else {
-            return Times::default();
-        };
-        Times {
-            stage_ns: Some(found.value),
-            stage_ns_lower: Some(found.lower).filter(|ns| ns.is_finite()),
-            stage_ns_upper: Some(found.upper).filter(|ns| ns.is_finite()),
-        }
-    }
 }
 
 /// What a stage is worth where all others are as in the chain.

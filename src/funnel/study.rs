@@ -5,17 +5,20 @@ use std::cell::RefCell;
 
 use serde::{Deserialize, Serialize};
 
+use super::back_ends::back_ends;
 use super::chain::Chain;
 use super::conclusions::conclusions;
-use super::faces::{self, Faces};
+use super::faces::Faces;
 use super::judged::Errors;
 use super::orders::{self, Orders};
 use super::pass::{Pass, Walked};
 use super::picks::Picks;
 use super::plan_view::{PlanView, fate};
-use super::report::{FunnelReport, Gain, LevelRow, Side, StageRow, Times};
+use super::report::{FunnelReport, Gain, LevelRow, Side, StageRow};
 use super::stage::{NONE, StageKind};
-use super::world::{FunnelError, FunnelInput, Truth, World, back_ends};
+use super::times::Times;
+use super::triangle_rows;
+use super::world::{FunnelError, FunnelInput, Truth, World};
 use crate::measure::{Ask, OverProcesses, ProcessTimes, Schedule, TimedTask, Verdict, timed};
 use crate::visibility::Level;
 use crate::visibility::truth::RayIndex;
@@ -117,7 +120,7 @@ pub fn prepare(
     });
     let rows = rows.collect();
     let side = |walked: &Walked| Side {
-        tasks: world.timed_steps(walked, pass.steps()),
+        tasks: pass.timed_steps(walked),
         count: pass.mean_count(walked.left()),
     };
     let gains = walks.without.iter().map(|(stage, without)| {
@@ -210,7 +213,7 @@ fn timed_tasks<'p>(
         ask
     });
     let culls = (1..if left.is_solid {
-        faces::back_ends().count()
+        triangle_rows::back_ends().count()
     } else {
         0
     })

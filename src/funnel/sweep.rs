@@ -4,13 +4,15 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::faces::{self, Faces};
+use super::back_ends::back_ends;
+use super::faces::Faces;
 use super::hiding::HIDING;
 use super::judged::{Errors, Judged, judge_items};
 use super::pass::{ALL, Pass};
-use super::report::Times;
 use super::stage::{BackEnd, NONE, StageKind};
-use super::world::{FunnelError, FunnelInput, Truth, World, back_ends};
+use super::times::Times;
+use super::triangle_rows;
+use super::world::{FunnelError, FunnelInput, Truth, World};
 use crate::measure::{Ask, OverProcesses, ProcessTimes, Schedule, TimedTask, timed};
 use crate::visibility::SampleGrid;
 use crate::visibility::truth::{RayIndex, visible_by_random_rays};
@@ -135,7 +137,7 @@ impl<'w> Given<'w> {
                 sized.map(entry).collect()
             }
             StageKind::Triangle => {
-                let rows = faces::back_ends().skip(1).zip(0..);
+                let rows = triangle_rows::back_ends().skip(1).zip(0..);
                 let entry = |(back_end, place): (BackEnd, usize)| Entry {
                     back_end,
                     buffer: None,

@@ -7,11 +7,10 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::back_ends::{MOST_EXACT_ROOMS, back_ends, is_solid};
 use super::chain::Chain;
-use super::faces;
 use super::hiding::{HIDING, HidingRow};
 use super::judged::{Judged, judge_items};
-use super::pass::{Step, Walked};
 use super::plan_view::{Fate, MOST_DRAWN, PlanView};
 use super::stage::{BackEnd, NONE, StageKind};
 use crate::camera::PlaneOptions;
@@ -22,13 +21,13 @@ use crate::kernel::Kernel;
 use crate::measure::{Protocol, WorkloadError, input_of};
 use crate::path::CameraPath;
 use crate::query::ItemId;
-use crate::scene::{self, Scene};
+use crate::scene::Scene;
 use crate::visibility::fragment::{Canvas, Piece, Tests, draw};
 use crate::visibility::occlusion::{self, OccluderScene};
 use crate::visibility::region::doom::{DoomMap, SectorPvs};
 use crate::visibility::region::{
-    self, Audit, EyePlace, Flood, Marks, PortalClip, PortalRect, ProvenPvs, RegionGraph,
-    RegionItems, RegionRow, RoomsPvs, Scratch, StoredPvs, audit,
+    Audit, EyePlace, Flood, Marks, PortalClip, PortalRect, ProvenPvs, RegionGraph, RegionItems,
+    RegionRow, RoomsPvs, Scratch, StoredPvs, audit,
 };
 use crate::visibility::triangle;
 use crate::visibility::truth::{RayIndex, SampleTruth, SurfaceIndex};
@@ -96,9 +95,6 @@ pub enum FunnelError {
     },
 }
 
-/// What a chain takes where there are rooms.
-const PORTAL_CLIP: &str = "portal-clip";
-
 /// Answers a stage in a view from what it is given (`None`: all items), appending to
 /// an empty output.
 pub type Run<'w> = Box<dyn Fn(usize, Option<&[ItemId]>, &mut Vec<ItemId>) + 'w>;
@@ -127,9 +123,6 @@ struct Regions {
     rows: Vec<Box<dyn RegionRow>>,
     items: RegionItems,
 }
-
-/// Most rooms of which it is found out, exactly, what is seen from each.
-const MOST_EXACT_ROOMS: usize = 4_096;
 
 impl Regions {
     /// `None` for a scene without any.
@@ -540,86 +533,5 @@ impl<'a> World<'a> {
                 .map(|(_, plan, item)| (*plan, fate(*item)))
                 .collect(),
         }
-    }
-
-    /// The steps of a chain whose times add up: not the object stage where the
-    /// occlusion stage does it as well.
-    pub fn timed_steps(&self, walked: &Walked, steps: &[Step]) -> Vec<usize> {
-        let of = |stage: StageKind| walked.steps[stage as usize];
-        let occlusion = of(StageKind::Occlusion);
-        let does_both = occlusion.is_some_and(|step| self.does_object_stage(&steps[step].back_end));
-        let object = of(StageKind::Object).filter(|_| !does_both);
-        [of(StageKind::Region), object, occlusion]
-            .into_iter()
-            .flatten()
-            .collect()
-    }
-}
-
-/// Whether the items of a scene are solid boxes.
-fn is_solid(scene: &Scene) -> bool {
-    !matches!(scene.regions, scene::Regions::Bsp(_))
-}
-
-/// The back ends of a stage that a scene can have; structures of the object stage are
-/// not among them.
-pub fn back_ends(stage: StageKind, scene: &Scene) -> Vec<BackEnd> {
-    let plain = |name, summary, guarantee| BackEnd {
-        stage,
-        name,
-        summary,
-        guarantee,
-        does_object_stage: false,
-    };
-    let mut rows = vec![plain(
-        NONE,
-        "the stage is left out",
-        Guarantee::Conservative,
-    )];
-    match stage {
-        StageKind::Region if matches!(scene.regions, scene::Regions::Tiling(_)) => {
-            let of_cameras = ["flood", PORTAL_CLIP, "portal-rect"];
-            let known = region::ROWS
-                .iter()
-                .filter(|row| of_cameras.contains(&row.0));
-            rows.extend(known.map(|&(name, summary, guarantee)| plain(name, summary, guarantee)));
-        }
-        StageKind::Occlusion if is_solid(scene) => {
-            rows.extend(HIDING.iter().map(HidingRow::back_end))
-        }
-        StageKind::Triangle if is_solid(scene) => rows = faces::back_ends().collect(),
-        StageKind::Fragment => rows.push(plain(
-            "z-test",
-            "the nearest fragment of each sample, exactly",
-            Guarantee::SampleExact,
-        )),
-        _ => {}
-    }
-    rows
-}
-
-impl Chain {
-    /// What suits a scene, but for the object stage: the safest back end of each stage
-    /// that removes the most.
-    pub fn for_scene(scene: &Scene) -> Chain {
-        let has = |stage, name: &'static str| {
-            back_ends(stage, scene)
-                .iter()
-                .any(|row| row.name == name)
-                .then_some(name)
-        };
-        [
-            (StageKind::Region, PORTAL_CLIP),
-            (StageKind::Occlusion, "masked-inner"),
-            (StageKind::Triangle, faces::DEFAULT),
-            (StageKind::Fragment, "z-test"),
-        ]
-        .into_iter()
-        .fold(Chain::empty(), |chain, (stage, name)| {
-            match has(stage, name) {
-                Some(name) => chain.with(stage, name),
-                None => chain,
-            }
-        })
     }
 }

@@ -145,7 +145,8 @@ fn every_rule_is_there_once_with_both_sides_checked() {
                 assert_eq!(check["same_answers"], true, "{omission}");
                 assert_eq!(check["kept_excess"], check["left_out_excess"], "{omission}");
             }
-            if name != "rebuild" {
+            // What is hidden is in the frustum all the same: another truth.
+            if !set("rebuild occlusion occlusion-buffer").contains(name) {
                 for side in ["kept", "left_out"] {
                     let missed = number(check, &format!("{side}_false_negative_ppm"));
                     assert_eq!(missed, 0.0, "{omission}");

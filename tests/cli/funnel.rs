@@ -274,5 +274,5 @@ fn whole_pixels_lose_nothing_at_any_size_and_pixel_centres_do() {
         Path::new("."),
         &line.replace("--stage occlusion", "--stage fragment"),
     );
-    assert_refused(&done, "--stage | fragment", "a stage without a sweep");
+    assert_refused(&done, "unknown stage 'fragment'", "a stage without a sweep");
 }

@@ -11,6 +11,7 @@ mod cycles;
 mod depth;
 mod draw;
 mod errors;
+mod marking;
 mod mask;
 pub mod order;
 mod screen;

@@ -1,10 +1,6 @@
 //! The stencil-test: the samples on which a portal or a mirror is seen, and no
 //! others, are drawn on in the pass that shows what is beyond it.
 
-use super::canvas::Canvas;
-use super::depth::DepthBuffer;
-use crate::scene::WorldBox;
-
 /// Some of the samples of an image.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Stencil {
@@ -13,14 +9,8 @@ pub struct Stencil {
 }
 
 impl Stencil {
-    /// The samples that see a flat rectangle (a box with no thickness along one
-    /// axis) before what is in the depth buffer already, or as near.
-    pub fn of_rectangle(canvas: &Canvas, rectangle: &WorldBox, depth: &DepthBuffer) -> Stencil {
-        let mut marked = vec![false; canvas.grid().samples()];
-        canvas.meet(rectangle, None, |sample, at| {
-            let before = |(front, _): (_, _)| canvas.probe(sample).compare(&at, &front).is_le();
-            marked[sample] = depth.front(sample).is_none_or(before);
-        });
+    /// The samples that are marked.
+    pub fn of(marked: Vec<bool>) -> Stencil {
         let count = marked.iter().filter(|marked| **marked).count();
         Stencil { marked, count }
     }

@@ -196,6 +196,7 @@ impl<const WHOLE: bool> Masked<WHOLE> {
             working[lane] = self.working.get(tile).copied().unwrap_or(0.0);
             masks[lane] = self.mask.get(tile).copied().unwrap_or(0);
         }
+        // Of lanes that are not asked about anything may come out.
         let mut shown = [0; LANES];
         for lane in 0..LANES {
             let (first_column, first_row) = (x[lane] & !7, y[lane] & !3);
@@ -203,9 +204,9 @@ impl<const WHOLE: bool> Masked<WHOLE> {
             let right = (rects.x1[lane] - first_column).min(7) as u32;
             let top = (rects.y0[lane] - first_row).max(0) as u32;
             let bottom = (rects.y1[lane] - first_row).min(3) as u32;
-            let row = 0xffu32.wrapping_shl(left) & 0xffu32.wrapping_shr(7 - right);
-            let above = Mask::MAX.wrapping_shl(8 * top);
-            let below = Mask::MAX.wrapping_shr(8 * (3 - bottom));
+            let row = 0xffu32.wrapping_shl(left) & 0xffu32.wrapping_shr(7u32.wrapping_sub(right));
+            let above = Mask::MAX.wrapping_shl(top.wrapping_mul(8));
+            let below = Mask::MAX.wrapping_shr(3u32.wrapping_sub(bottom).wrapping_mul(8));
             shown[lane] = (row * 0x0101_0101) & above & below & !masks[lane];
         }
         let behind = isa.at_most(isa.load(&working), nearness);

@@ -7,7 +7,8 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::answer::{Marks, RegionId};
-use super::graph::{Boxes, Ground, RegionGraph};
+use super::boxes::Boxes;
+use super::graph::{Ground, RegionGraph};
 use super::locate::BoxGrid;
 use super::opening::{Opening, OpeningPlane, rectangle};
 use super::witness::{Rejected, Witness};

@@ -2,15 +2,11 @@
 
 use std::sync::Arc;
 
-use glam::DVec3;
-
 use super::answer::{Marks, RegionId};
-use super::locate::{BoxGrid, covers};
-use super::opening::{Opening, OpeningPlane, rectangle};
-use super::walk::follow_boxes;
-use super::witness::{Rejected, Witness, check_boxes};
+use super::opening::Opening;
+use super::witness::{Rejected, Witness};
 use crate::camera::Lens;
-use crate::scene::{Regions, Scene, Tiling, WorldBox};
+use crate::scene::WorldBox;
 use crate::visibility::{Ray, Rays};
 
 /// Finds the regions of a place.
@@ -36,72 +32,12 @@ pub trait Ground: Send + Sync + std::fmt::Debug {
 #[derive(Clone, Debug)]
 pub struct RegionGraph {
     /// Each region lies in the boxes of its range of `parts`.
-    parts: Vec<WorldBox>,
+    pub(super) parts: Vec<WorldBox>,
     part_starts: Vec<u32>,
     openings: Vec<Opening>,
     exit_starts: Vec<u32>,
     exits: Vec<u32>,
-    ground: Arc<dyn Ground>,
-}
-
-/// No regions are known of a scene.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[error("the scene has {0} as regions; expected a tiling of boxes with portals")]
-pub struct NoRegions(pub &'static str);
-
-/// A ground of boxes.
-#[derive(Debug)]
-pub(super) struct Boxes(pub(super) BoxGrid);
-
-impl Ground for Boxes {
-    fn regions_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) -> bool {
-        let first = out.len();
-        self.0.meeting(b, |id| out.push(id));
-        let boxes = self.0.boxes();
-        let met: Vec<WorldBox> = out[first..].iter().map(|&id| boxes[id as usize]).collect();
-        covers(&met, b)
-    }
-
-    fn follow(&self, graph: &RegionGraph, ray: &Ray, seen: &mut Marks) {
-        let start = ray.at(ray.near);
-        let mut homes = Vec::new();
-        self.0
-            .meeting(&WorldBox::new(start, start), |id| homes.push(id));
-        for home in homes {
-            follow_boxes(graph, home, ray, seen);
-        }
-    }
-
-    fn check(&self, graph: &RegionGraph, witness: &Witness) -> Result<(), Rejected> {
-        check_boxes(graph, witness)
-    }
-}
-
-/// Boxes, and the solids that close their borders. A ray that begins in such a solid
-/// is not hidden by it, and may go on in every region that the solid meets.
-#[derive(Debug)]
-struct Rooms {
-    boxes: Boxes,
-    borders: BoxGrid,
-}
-
-impl Ground for Rooms {
-    fn regions_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) -> bool {
-        let inside = self.boxes.regions_at(b, out);
-        self.borders.meeting(b, |solid| {
-            let solid = &self.borders.boxes()[solid as usize];
-            self.boxes.0.meeting(solid, |id| out.push(id));
-        });
-        inside
-    }
-
-    fn follow(&self, graph: &RegionGraph, ray: &Ray, seen: &mut Marks) {
-        self.boxes.follow(graph, ray, seen);
-    }
-
-    fn check(&self, graph: &RegionGraph, witness: &Witness) -> Result<(), Rejected> {
-        self.boxes.check(graph, witness)
-    }
+    pub(super) ground: Arc<dyn Ground>,
 }
 
 impl RegionGraph {
@@ -133,100 +69,6 @@ impl RegionGraph {
             exits: lists.concat(),
             ground,
         }
-    }
-
-    /// Regions that are boxes themselves.
-    pub fn of_boxes(boxes: Vec<WorldBox>, openings: Vec<Opening>) -> RegionGraph {
-        let regions: Vec<Vec<WorldBox>> = boxes.iter().map(|b| vec![*b]).collect();
-        RegionGraph::new(&regions, openings, Arc::new(Boxes(BoxGrid::new(boxes))))
-    }
-
-    /// The regions of a scene that is a tiling of boxes whose borders, but for the
-    /// openings, lie in solid items. An opening is as the tiling has it, flat: the wall
-    /// about it has a thickness, so less is seen through it.
-    ///
-    /// # Errors
-    /// A scene whose regions are not a tiling.
-    pub fn of_scene(scene: &Scene) -> Result<RegionGraph, NoRegions> {
-        match &scene.regions {
-            Regions::Tiling(tiling) => {
-                let mut graph = RegionGraph::of_tiling(tiling, scene.origin);
-                let boxes = BoxGrid::new(graph.parts.clone());
-                // What is strictly within one box closes no border.
-                let closes = |item: &WorldBox| {
-                    let mut within = false;
-                    boxes.meeting(item, |id| {
-                        let b = &boxes.boxes()[id as usize];
-                        within |= b.min.cmplt(item.min).all() && item.max.cmplt(b.max).all();
-                    });
-                    !within
-                };
-                let world = scene.items.iter().map(|item| {
-                    let (min, max) = item.in_world(scene.origin);
-                    WorldBox::new(min, max)
-                });
-                let borders = BoxGrid::new(world.filter(closes).collect());
-                let boxes = Boxes(boxes);
-                graph.ground = Arc::new(Rooms { boxes, borders });
-                Ok(graph)
-            }
-            other => Err(NoRegions(other.kind())),
-        }
-    }
-
-    /// The same for a tiling about an origin.
-    pub fn of_tiling(tiling: &Tiling, origin: DVec3) -> RegionGraph {
-        let world = |b: &crate::geometry::Aabb| {
-            let (min, max) = b.in_world(origin);
-            WorldBox::new(min, max)
-        };
-        let boxes: Vec<WorldBox> = tiling.boxes.iter().map(world).collect();
-        let mut openings = Vec::with_capacity(tiling.portals.len());
-        for portal in &tiling.portals {
-            let hole = world(&portal.opening);
-            let [a, b] = portal.between;
-            let size = hole.max - hole.min;
-            let flat = (0..3).find(|&axis| size[axis] == 0.0);
-            // The front is the region that goes on to larger coordinates.
-            let front = flat.and_then(|axis| {
-                let (a, b) = (&boxes[a as usize], &boxes[b as usize]);
-                let at = hole.min[axis];
-                if a.min[axis] == at && b.max[axis] == at {
-                    Some((axis, false))
-                } else if b.min[axis] == at && a.max[axis] == at {
-                    Some((axis, true))
-                } else {
-                    None
-                }
-            });
-            if let Some((axis, swap)) = front {
-                openings.push(Opening {
-                    sides: if swap { [b, a] } else { [a, b] },
-                    corners: rectangle(axis, hole.min, hole.max),
-                    plane: OpeningPlane::Axis {
-                        axis,
-                        at: hole.min[axis],
-                    },
-                });
-                continue;
-            }
-            // A line through a box passes one of its faces.
-            for axis in 0..3 {
-                for (from, to) in [(hole.min, hole.max), (hole.max, hole.min)] {
-                    let (mut low, mut high) = (hole.min, hole.max);
-                    (low[axis], high[axis]) = (from[axis], from[axis]);
-                    openings.push(Opening {
-                        sides: [a, b],
-                        corners: rectangle(axis, low, high),
-                        plane: OpeningPlane::Undirected,
-                    });
-                    if from[axis] == to[axis] {
-                        break;
-                    }
-                }
-            }
-        }
-        RegionGraph::of_boxes(boxes, openings)
     }
 
     /// Number of regions.

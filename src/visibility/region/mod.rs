@@ -13,6 +13,9 @@
 
 mod answer;
 mod audit;
+mod boxes;
+mod check_boxes;
+mod clip_windows;
 pub mod doom;
 mod flood;
 mod free_space;
@@ -20,10 +23,12 @@ mod graph;
 mod items;
 mod locate;
 mod none;
+mod number;
 mod opening;
 mod portal_clip;
 mod portal_rect;
 mod pvs;
+mod rectangle_windows;
 mod rooms;
 mod stab;
 mod stored;
@@ -32,13 +37,16 @@ mod walk;
 mod witness;
 
 use crate::visibility::Guarantee;
-pub use answer::{EyePlace, Marks, RegionId, RegionRow, Scratch, decode};
+pub use answer::{EyePlace, RegionRow, Scratch};
 pub use audit::{Audit, OtherRegions, audit};
+pub use boxes::NoRegions;
+pub use check_boxes::check_boxes;
 pub use flood::Flood;
-pub use graph::{Ground, NoRegions, RegionGraph};
+pub use graph::{Ground, RegionGraph};
 pub use items::RegionItems;
 pub use locate::{BoxGrid, covers};
 pub use none::EveryRegion;
+pub use number::{Marks, RegionId, decode};
 pub use opening::{Opening, OpeningPlane, rectangle};
 pub use portal_clip::PortalClip;
 pub use portal_rect::PortalRect;
@@ -47,7 +55,7 @@ pub use rooms::{NotFlat, RoomsPvs};
 pub use stab::{Stabbing, turn};
 pub use stored::StoredPvs;
 pub use walk::{follow_boxes, seen_by_samples};
-pub use witness::{ProvenPvs, Rejected, Witness, check_boxes};
+pub use witness::{ProvenPvs, Rejected, Witness};
 
 /// The back ends of the region stage: name, one line of what it does, what it
 /// promises of its answers from an eye.

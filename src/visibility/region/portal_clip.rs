@@ -8,9 +8,9 @@
 
 use std::sync::Arc;
 
-use super::answer::{EyePlace, Marks, RegionId, RegionRow, Scratch};
+use super::answer::{EyePlace, RegionId, RegionRow, Scratch};
 use super::graph::RegionGraph;
-use super::view::{HalfSpace, MOST_PLANES, Polygon, View, through_edge};
+use super::view::{MOST_PLANES, View, through_edge};
 use crate::visibility::{Guarantee, Rays};
 
 /// As it is typed.
@@ -20,81 +20,9 @@ pub const SUMMARY: &str = "openings clipped as convex polygons by those before t
 /// What it promises.
 pub const GUARANTEE: Guarantee = Guarantee::Conservative;
 
-/// After this many different windows a region is taken to be seen through the whole
-/// image: bounds the time where many ways lead to one region.
-const MOST_WINDOWS: u32 = 32;
-
 /// The row.
 #[derive(Clone, Debug)]
 pub struct PortalClip(pub Arc<RegionGraph>);
-
-/// A region seen through the common part of half-spaces.
-#[derive(Clone, Copy, Debug)]
-struct Window {
-    region: RegionId,
-    /// Its half-spaces, a range of `Search::planes`.
-    planes: [u32; 2],
-    /// The window before it in the same region, plus one.
-    before: u32,
-}
-
-/// Memory of a search.
-#[derive(Clone, Default, Debug)]
-pub struct Search {
-    windows: Vec<Window>,
-    planes: Vec<HalfSpace>,
-    last: Vec<u32>,
-    count: Vec<u32>,
-    polygon: Polygon,
-    kept: Vec<HalfSpace>,
-}
-
-impl Search {
-    fn clear(&mut self, regions: usize) {
-        self.windows.clear();
-        self.planes.clear();
-        self.last.resize(regions.max(self.last.len()), 0);
-        self.count.resize(regions.max(self.count.len()), 0);
-    }
-
-    fn range(&self, window: &Window) -> &[HalfSpace] {
-        &self.planes[window.planes[0] as usize..window.planes[1] as usize]
-    }
-
-    /// Enters a region through the window of `kept`, unless an earlier one holds it.
-    fn enter(&mut self, seen: &mut Marks, region: RegionId, view: &View) {
-        let at = region as usize;
-        if seen.insert(region) {
-            (self.last[at], self.count[at]) = (0, 0);
-        }
-        let mut earlier = self.last[at];
-        while earlier > 0 {
-            let window = self.windows[earlier as usize - 1];
-            // Each half-space of the earlier one is one of this or holds its polygon.
-            let implied = |old: &HalfSpace| {
-                let shared = self.kept.iter().any(|plane| plane.number == old.number);
-                shared || self.polygon.is_within(old)
-            };
-            if self.range(&window).iter().all(implied) {
-                return;
-            }
-            earlier = window.before;
-        }
-        self.count[at] += 1;
-        let first = self.planes.len() as u32;
-        if self.count[at] > MOST_WINDOWS {
-            self.planes.extend_from_slice(&view.sides);
-        } else {
-            self.planes.extend_from_slice(&self.kept);
-        }
-        self.windows.push(Window {
-            region,
-            planes: [first, self.planes.len() as u32],
-            before: self.last[at],
-        });
-        self.last[at] = self.windows.len() as u32;
-    }
-}
 
 impl RegionRow for PortalClip {
     fn name(&self) -> &'static str {

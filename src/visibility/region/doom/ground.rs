@@ -7,6 +7,7 @@ use glam::{DVec2, DVec3};
 
 use super::super::answer::{Marks, RegionId};
 use super::super::graph::{Ground, RegionGraph};
+use super::super::opening::{Opening, OpeningPlane};
 use super::super::witness::{Rejected, Witness};
 use super::map::{DoomMap, MapLine};
 use crate::scene::WorldBox;
@@ -97,6 +98,33 @@ fn meets(line: &MapLine, b: &WorldBox) -> bool {
     // Rounding of the side is below this: |d| and distances are below 2^18.
     let slack = 1e-9;
     sides.iter().any(|s| *s <= slack) && sides.iter().any(|s| *s >= -slack)
+}
+
+impl DoomMap {
+    /// Sectors as regions, linedefs that are open as openings. A sector's parts have
+    /// all heights.
+    pub fn graph(self: &Arc<Self>) -> RegionGraph {
+        let opening = |line: &MapLine| {
+            let ([Some(front), Some(behind)], Some([low, high])) = (line.sectors, line.open) else {
+                return None;
+            };
+            let [from, to] = line.ends.map(|[x, y]| DVec2::new(x.into(), y.into()));
+            let corners = [
+                from.extend(low),
+                to.extend(low),
+                to.extend(high),
+                from.extend(high),
+            ];
+            (front != behind).then_some(Opening {
+                sides: [front, behind],
+                corners,
+                plane: OpeningPlane::Upright { from, to },
+            })
+        };
+        let openings = self.lines.iter().filter_map(opening).collect();
+        let ground = Arc::new(SectorGround::new(self.clone()));
+        RegionGraph::new(&self.parts, openings, ground)
+    }
 }
 
 impl Ground for SectorGround {

@@ -1,14 +1,9 @@
 //! The lumps of a map, as far as they say what is solid and what is open.
 
-use std::sync::Arc;
-
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 
 use super::super::answer::RegionId;
-use super::super::graph::RegionGraph;
-use super::super::opening::{Opening, OpeningPlane};
 use super::super::pvs::Pvs;
-use super::ground::SectorGround;
 use crate::input::InputError;
 use crate::scene::{WadMap, WorldBox, map_lump};
 
@@ -43,7 +38,7 @@ pub struct DoomMap {
     /// Its sectors, in file order.
     pub sectors: Vec<Sector>,
     /// Boxes about the leaves of the map's own tree, by sector, without a height.
-    parts: Vec<Vec<WorldBox>>,
+    pub(super) parts: Vec<Vec<WorldBox>>,
     /// Which linedef of the file each of `lines` is, and how many the file has.
     pub(super) numbers: Vec<u32>,
     pub(super) linedefs: usize,
@@ -191,30 +186,5 @@ impl DoomMap {
             ceiling: HIGHEST,
         });
         map
-    }
-
-    /// Sectors as regions, linedefs that are open as openings. A sector's parts have
-    /// all heights.
-    pub fn graph(self: &Arc<Self>) -> RegionGraph {
-        let opening = |line: &MapLine| {
-            let ([Some(front), Some(behind)], Some([low, high])) = (line.sectors, line.open) else {
-                return None;
-            };
-            let [from, to] = line.ends.map(|[x, y]| DVec2::new(x.into(), y.into()));
-            let corners = [
-                from.extend(low),
-                to.extend(low),
-                to.extend(high),
-                from.extend(high),
-            ];
-            (front != behind).then_some(Opening {
-                sides: [front, behind],
-                corners,
-                plane: OpeningPlane::Upright { from, to },
-            })
-        };
-        let openings = self.lines.iter().filter_map(opening).collect();
-        let ground = Arc::new(SectorGround::new(self.clone()));
-        RegionGraph::new(&self.parts, openings, ground)
     }
 }

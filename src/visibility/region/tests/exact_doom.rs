@@ -1,3 +1,5 @@
+//! Exact sets of sectors, REJECT and its audit.
+
 use std::sync::Arc;
 
 use super::super::doom::{DoomMap, SectorPvs};

@@ -1,3 +1,5 @@
+//! Exact sets of rooms against rays and witnesses.
+
 use std::sync::Arc;
 
 use super::super::*;

@@ -1,3 +1,5 @@
+//! The flood over a grid against the truth of solids.
+
 use std::sync::Arc;
 
 use super::super::*;

@@ -1,3 +1,5 @@
+//! Every back end from an eye against rays.
+
 use std::sync::Arc;
 
 use super::super::*;

@@ -1,3 +1,5 @@
+//! Items of regions against what rays meet.
+
 use std::sync::Arc;
 
 use super::super::*;

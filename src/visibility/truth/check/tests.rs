@@ -1,3 +1,5 @@
+//! Every doctored certificate is rejected.
+
 use super::super::certificate::{Cell, Edge};
 use super::line::Line;
 use super::part::Part;

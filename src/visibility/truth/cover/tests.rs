@@ -1,3 +1,5 @@
+//! The search for proofs against the judge and the check.
+
 use super::*;
 use crate::query::ItemId;
 use crate::scene::SeededRng;

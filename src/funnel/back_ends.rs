@@ -1,0 +1,82 @@
+//! What each stage can be done by, for a scene, and what a chain takes of it.
+
+use super::chain::Chain;
+use super::hiding::{HIDING, HidingRow};
+use super::stage::{BackEnd, NONE, StageKind};
+use super::triangle_rows;
+use crate::scene::{self, Scene};
+use crate::visibility::{Guarantee, region};
+
+/// What a chain takes where there are rooms.
+const PORTAL_CLIP: &str = "portal-clip";
+
+/// Most rooms of which it is found out, exactly, what is seen from each.
+pub const MOST_EXACT_ROOMS: usize = 4_096;
+
+/// Whether the items of a scene are solid boxes.
+pub fn is_solid(scene: &Scene) -> bool {
+    !matches!(scene.regions, scene::Regions::Bsp(_))
+}
+
+/// The back ends of a stage that a scene can have; structures of the object stage are
+/// not among them.
+pub fn back_ends(stage: StageKind, scene: &Scene) -> Vec<BackEnd> {
+    let plain = |name, summary, guarantee| BackEnd {
+        stage,
+        name,
+        summary,
+        guarantee,
+        does_object_stage: false,
+    };
+    let mut rows = vec![plain(
+        NONE,
+        "the stage is left out",
+        Guarantee::Conservative,
+    )];
+    match stage {
+        StageKind::Region if matches!(scene.regions, scene::Regions::Tiling(_)) => {
+            let of_cameras = ["flood", PORTAL_CLIP, "portal-rect"];
+            let known = region::ROWS
+                .iter()
+                .filter(|row| of_cameras.contains(&row.0));
+            rows.extend(known.map(|&(name, summary, guarantee)| plain(name, summary, guarantee)));
+        }
+        StageKind::Occlusion if is_solid(scene) => {
+            rows.extend(HIDING.iter().map(HidingRow::back_end))
+        }
+        StageKind::Triangle if is_solid(scene) => rows = triangle_rows::back_ends().collect(),
+        StageKind::Fragment => rows.push(plain(
+            "z-test",
+            "the nearest fragment of each sample, exactly",
+            Guarantee::SampleExact,
+        )),
+        _ => {}
+    }
+    rows
+}
+
+impl Chain {
+    /// What suits a scene, but for the object stage: the safest back end of each stage
+    /// that removes the most.
+    pub fn for_scene(scene: &Scene) -> Chain {
+        let has = |stage, name: &'static str| {
+            back_ends(stage, scene)
+                .iter()
+                .any(|row| row.name == name)
+                .then_some(name)
+        };
+        [
+            (StageKind::Region, PORTAL_CLIP),
+            (StageKind::Occlusion, "masked-inner"),
+            (StageKind::Triangle, triangle_rows::DEFAULT),
+            (StageKind::Fragment, "z-test"),
+        ]
+        .into_iter()
+        .fold(Chain::empty(), |chain, (stage, name)| {
+            match has(stage, name) {
+                Some(name) => chain.with(stage, name),
+                None => chain,
+            }
+        })
+    }
+}
