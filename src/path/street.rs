@@ -5,7 +5,6 @@ use glam::DVec3;
 
 use super::{PathError, Pose, Stage};
 use crate::geometry::Aabb;
-use crate::query::ItemId;
 use crate::scene::{Regions, SeededRng};
 use crate::spec::Spec;
 
@@ -81,7 +80,7 @@ fn drawn(stage: &Stage, rng: &mut SeededRng) -> Vec<Column> {
 
 /// Finds the items of all columns. O((n + columns) log columns) where items are small.
 fn fill(stage: &Stage, columns: &mut [Column]) {
-    let mut by_x: Vec<ItemId> = (0..columns.len() as ItemId).collect();
+    let mut by_x: Vec<u32> = (0..columns.len() as u32).collect();
     by_x.sort_by(|&a, &b| columns[a as usize].x.total_cmp(&columns[b as usize].x));
     let xs: Vec<f64> = by_x.iter().map(|&c| columns[c as usize].x).collect();
     for (min, max) in stage
