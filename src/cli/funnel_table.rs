@@ -21,7 +21,7 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
             text::counted(report.views, "view"),
             report.samples[0],
             report.samples[1],
-            text::over(report.processes, None),
+            spread(report.processes),
         )),
         Block::Table(stages(report)),
     ];
@@ -43,6 +43,17 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
     blocks
 }
 
+/// What the times rest on.
+pub fn spread(processes: usize) -> String {
+    match processes {
+        0..3 => text::over(processes, None),
+        _ => format!(
+            "times over {}, with 95 % intervals",
+            text::counted(processes, "process")
+        ),
+    }
+}
+
 /// The blocks for a terminal.
 pub fn terminal(blocks: &[Block]) -> String {
     let lines = blocks.iter().map(|block| match block {
@@ -58,7 +69,6 @@ fn stages(report: &FunnelReport) -> Rows {
         header: [
             "stage",
             "by",
-            "promise",
             "in",
             "out",
             "visible",
@@ -69,7 +79,7 @@ fn stages(report: &FunnelReport) -> Rows {
         ]
         .map(str::to_owned)
         .into(),
-        right: (3..10).collect(),
+        right: (2..9).collect(),
         rows: Vec::new(),
     };
     let level = &report.level;

@@ -13,7 +13,7 @@ use super::protocol::{Job, Timing};
 use super::run::progress;
 use super::run_resume::typed_args;
 use super::shared_args::TableFormat;
-use super::{Ending, interrupt, load_scene, print_json, text, unread_is_fine};
+use super::{Ending, funnel_table, interrupt, load_scene, print_json, text, unread_is_fine};
 use crate::funnel::{self, Chain, FunnelInput, NONE, StageKind, StageSweep, SweepPlan, SweepPoint};
 use crate::index::{Registry, StructureSpec};
 use crate::measure::{ProcessTimes, Protocol};
@@ -173,7 +173,7 @@ fn show(sweep: &StageSweep, out: &mut impl Write) -> io::Result<()> {
         sweep.rays_per_view,
         SAMPLES.width,
         SAMPLES.height,
-        text::over(sweep.processes, None)
+        funnel_table::spread(sweep.processes)
     )?;
     let mut rows = Rows::of_numbers([
         "by",
