@@ -7,7 +7,8 @@ use plotters::prelude::*;
 use super::text;
 use crate::funnel::{Fate, FunnelReport, PlanView, StageKind};
 
-const SIZE: (u32, u32) = (900, 980);
+/// The plan itself is square: less the margins, the labels and the caption.
+const SIZE: (u32, u32) = (900, 892);
 
 /// Every fate that is drawn, with its colour and its words.
 const FATES: [(Fate, RGBColor, &str); 7] = [
@@ -82,13 +83,15 @@ fn draw_on(svg: &mut String, report: &FunnelReport) -> Result<(), Box<dyn std::e
             .legend(move |(x, y)| Rectangle::new([(x, y - 5), (x + 14, y + 5)], colour.filled()));
     }
     for [dx, dy] in plan.edges {
-        let far = 2.0 * reach / dx.hypot(dy).max(f64::MIN_POSITIVE);
+        // What lies beyond the picture would be moved to its border, and turned.
+        let far = reach / dx.abs().max(dy.abs()).max(f64::MIN_POSITIVE);
         let line = [(x, y), (x + dx * far, y + dy * far)];
         chart.draw_series([PathElement::new(line, BLACK.stroke_width(1))])?;
     }
     chart.draw_series([Circle::new((x, y), 4, BLACK.filled())])?;
     chart
         .configure_series_labels()
+        .position(SeriesLabelPosition::UpperLeft)
         .background_style(WHITE.mix(0.85))
         .border_style(BLACK.mix(0.3))
         .draw()?;
