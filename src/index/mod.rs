@@ -29,7 +29,7 @@ mod pass;
 #[cfg(feature = "peers")]
 pub mod peers;
 mod plane_choice;
-mod ploc;
+pub(crate) mod ploc;
 mod quadtree;
 mod registry;
 mod replay;

@@ -19,7 +19,7 @@ impl Boundable for Aabb {
 
 /// Clusters boxes bottom-up (PLOC), reinserts, and puts leaves together, as
 /// obvhs 0.4.0 does with the same parameters; `pre_split` is for triangles only.
-pub(super) fn build(boxes: &[Aabb], params: BvhBuildParams) -> Bvh2 {
+pub(crate) fn build(boxes: &[Aabb], params: BvhBuildParams) -> Bvh2 {
     let mut tree = PlocBuilder::with_capacity(boxes.len()).build(
         params.ploc_search_distance,
         boxes,

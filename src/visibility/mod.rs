@@ -12,6 +12,7 @@ pub mod occlusion;
 pub mod pick;
 mod rays;
 pub mod region;
+mod sah;
 mod solids;
 mod surface;
 pub mod triangle;

@@ -139,7 +139,10 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
             let block = &scene.level(level)[index];
             let mut lanes = scene.lanes(level, index);
             if level > 0 {
-                lanes &= block.sorted_by(isa, view.volume, entry.open, &mut open);
+                let (kept, words) = block.sorted_by(isa, view.volume, entry.open);
+                lanes &= kept;
+                // The words leave the vector by a row that adds nothing to them.
+                isa.compress(&mut open, words, LaneMask::MAX);
             } else {
                 lanes &= block.admitted_by(isa, view.volume, entry.open);
             }

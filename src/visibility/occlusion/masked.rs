@@ -6,8 +6,8 @@
 //! triangles and everything else is not. Two coverage rules, and nothing else,
 //! tell the two back ends apart.
 
-use super::block::first_lanes;
 use super::buffer::{OcclusionBuffer, Origin};
+use super::lanes::first_lanes;
 use super::outline::{Coverage, Outline, TileNearness};
 use super::rect::{Rect, Rects};
 use super::view::{TILE_HEIGHT, TILE_WIDTH};

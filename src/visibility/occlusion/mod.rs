@@ -8,11 +8,11 @@
 //! enters it, between near and far; a box that some ray enters before the near
 //! plane is not drawn; items as near as an occluder are not hidden by it.
 
-mod block;
 mod buffer;
 mod depth_rays;
 mod hierarchical_z;
 mod interleaved;
+mod lanes;
 mod masked;
 mod none;
 mod outline;
@@ -25,7 +25,6 @@ mod two_pass;
 mod view;
 mod zbuffer;
 
-pub use block::Block;
 pub use buffer::{OcclusionBuffer, Origin};
 pub use depth_rays::DepthRays;
 pub use hierarchical_z::HierarchicalZ;

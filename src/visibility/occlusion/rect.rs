@@ -35,8 +35,8 @@
 //! Underflow: with w > 1e-25 and r < 1e25 nothing that counts is subnormal, and
 //! nothing overflows. Comparisons are such that a NaN makes a box near.
 
-use super::block::Block;
 use super::view::{Projection, U, View};
+use crate::geometry::BoxBlock;
 use crate::kernel::{Isa, LANES, LaneMask};
 
 /// Pixels and nearness of one box: columns and rows from the first to the last
@@ -112,7 +112,7 @@ impl Rects {
 
     /// Projects the boxes of a block.
     #[inline(always)]
-    pub fn project<I: Isa>(&mut self, isa: I, block: &Block, view: &View) {
+    pub fn project<I: Isa>(&mut self, isa: I, block: &BoxBlock, view: &View) {
         let p = &view.projection;
         let boxes = AboutEye::of(isa, block, p);
         match view.parallel {
@@ -217,14 +217,15 @@ struct AboutEye<I: Isa> {
 
 impl<I: Isa> AboutEye<I> {
     #[inline(always)]
-    fn of(isa: I, block: &Block, p: &Projection) -> Self {
+    fn of(isa: I, block: &BoxBlock, p: &Projection) -> Self {
         let minus = isa.splat(-1.0);
+        let [lower, upper] = [[false; 3], [true; 3]].map(|side| block.corner_rows(side));
         let mut bounds = [[isa.splat(0.0); 2]; 3];
         let mut minus_size = isa.splat(-p.far_from_zero);
         for (axis, bounds) in bounds.iter_mut().enumerate() {
             let (eye, rest) = (isa.splat(-p.eye[axis]), isa.splat(-p.rest[axis]));
             let about = |row: &[f32; LANES]| isa.add(isa.add(isa.load(row), eye), rest);
-            let (low, high) = (about(&block.rows[axis]), about(&block.rows[3 + axis]));
+            let (low, high) = (about(lower[axis]), about(upper[axis]));
             *bounds = [low, high];
             // low <= high, so the greater size is that of -low or of high.
             minus_size = isa.add(minus_size, isa.min(low, isa.mul(high, minus)));

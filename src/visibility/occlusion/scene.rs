@@ -3,8 +3,8 @@
 
 use glam::DVec3;
 
-use super::block::{Block, first_lanes};
-use crate::geometry::Aabb;
+use super::lanes::first_lanes;
+use crate::geometry::{Aabb, BoxBlock};
 use crate::kernel::{LANES, LaneMask};
 use crate::query::ItemId;
 use crate::scene::WorldBox;
@@ -20,7 +20,7 @@ pub type Faces = u8;
 pub struct OccluderScene {
     origin: DVec3,
     /// Level 0 holds the items' outer boxes; the last level is one block.
-    levels: Vec<Vec<Block>>,
+    levels: Vec<Vec<BoxBlock>>,
     /// In tree order, as all that follows.
     ids: Vec<ItemId>,
     inner: Vec<Aabb>,
@@ -44,7 +44,7 @@ impl OccluderScene {
             |boxes: &[Aabb]| -> Vec<Aabb> { ids.iter().map(|&id| boxes[id as usize]).collect() };
         let mut levels = vec![blocks_of(&in_order(&solids.outer))];
         while let Some(last) = levels.last().filter(|last| last.len() > 1) {
-            let unions: Vec<Aabb> = last.iter().map(Block::union).collect();
+            let unions: Vec<Aabb> = last.iter().map(BoxBlock::union).collect();
             levels.push(blocks_of(&unions));
         }
         let bounds = bounds_of(&solids.boxes);
@@ -102,7 +102,7 @@ impl OccluderScene {
 
     /// The blocks of a level; level 0 holds the items.
     #[inline(always)]
-    pub fn level(&self, level: usize) -> &[Block] {
+    pub fn level(&self, level: usize) -> &[BoxBlock] {
         &self.levels[level]
     }
 
@@ -168,16 +168,16 @@ fn sort_into(ids: &mut [ItemId], capacity: usize, centre: &impl Fn(ItemId, usize
     sort_into(behind, capacity, centre);
 }
 
-fn blocks_of(boxes: &[Aabb]) -> Vec<Block> {
+fn blocks_of(boxes: &[Aabb]) -> Vec<BoxBlock> {
     let filled = |chunk: &[Aabb]| {
-        let mut block = Block::EMPTY;
+        let mut block = BoxBlock::EMPTY;
         let lanes = chunk.iter().enumerate();
         lanes.for_each(|(lane, b)| block.set(lane, b));
         block
     };
-    let blocks: Vec<Block> = boxes.chunks(LANES).map(filled).collect();
+    let blocks: Vec<BoxBlock> = boxes.chunks(LANES).map(filled).collect();
     if blocks.is_empty() {
-        return vec![Block::EMPTY];
+        return vec![BoxBlock::EMPTY];
     }
     blocks
 }

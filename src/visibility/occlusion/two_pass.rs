@@ -1,12 +1,12 @@
 //! The coupling in two passes: all occluders first, then all candidates.
 
-use super::block::Block;
 use super::buffer::OcclusionBuffer;
 use super::outline::Outline;
 use super::rect::{Rect, Rects};
 use super::scene::OccluderScene;
 use super::stats::CullStats;
 use super::view::View;
+use crate::geometry::BoxBlock;
 use crate::kernel::{Isa, Kernel, LANES, Work};
 use crate::query::ItemId;
 
@@ -138,7 +138,7 @@ fn project_all<I: Isa>(
     candidates.clear();
     let mut rects = Rects::NONE;
     for chunk in ids.chunks(LANES) {
-        let mut block = Block::EMPTY;
+        let mut block = BoxBlock::EMPTY;
         for (lane, &id) in chunk.iter().enumerate() {
             block.set(lane, &scene.outer(scene.position(id)));
         }

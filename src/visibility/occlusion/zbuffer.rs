@@ -1,7 +1,7 @@
 //! The plain depth buffer: one depth a pixel, sampled at its centre.
 
-use super::block::first_lanes;
 use super::buffer::{OcclusionBuffer, Origin};
+use super::lanes::first_lanes;
 use super::outline::{Coverage, Outline};
 use super::rect::Rect;
 use crate::kernel::{Isa, LANES};

@@ -3,20 +3,17 @@
 
 use ::obvhs::BvhBuildParams;
 use ::obvhs::bvh2::Bvh2;
-use ::obvhs::bvh2::leaf_collapser::collapse;
 use ::obvhs::bvh2::node::Bvh2Node;
-use ::obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use ::obvhs::cwbvh::CwBvh;
 use ::obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
 use ::obvhs::cwbvh::node::CwBvhNode;
-use ::obvhs::ploc::PlocBuilder;
 use ::obvhs::ray::{Ray as TheirRay, RayHit};
 use glam::DVec3;
 
 use super::contract::{About, Hit, NotBuilt, Pick, keep_nearest, refuse_stacks};
 use super::rounded::RoundedRay;
 use crate::geometry::Aabb;
-use crate::index::Origin;
+use crate::index::{Origin, ploc};
 use crate::query::ItemId;
 use crate::visibility::{Guarantee, Ray, Solids};
 
@@ -52,24 +49,6 @@ const PARAMS: BvhBuildParams = BvhBuildParams {
     pre_split: false,
     ..BvhBuildParams::very_slow_build()
 };
-
-/// The steps of the crate's own `build_bvh2` without the validation that ends it
-/// in debug builds, which overflows the stack on deep trees.
-fn tree_over(boxes: &[Aabb]) -> Bvh2 {
-    let boxes: Vec<_> = boxes
-        .iter()
-        .map(|b| ::obvhs::aabb::Aabb::new(b.min.into(), b.max.into()))
-        .collect();
-    let mut tree = PlocBuilder::with_capacity(boxes.len()).build(
-        PARAMS.ploc_search_distance,
-        &boxes,
-        (0..boxes.len() as u32).collect(),
-        PARAMS.sort_precision,
-        PARAMS.search_depth_threshold,
-    );
-    ReinsertionOptimizer::default().run(&mut tree, PARAMS.reinsertion_batch_ratio, None);
-    tree
-}
 
 /// Items in the order of the tree's primitives.
 #[derive(Clone)]
@@ -123,8 +102,7 @@ impl Obvhs {
     /// [`NotBuilt::Alike`].
     pub fn of(solids: &Solids) -> Result<Obvhs, NotBuilt> {
         refuse_stacks(NAME, &solids.outer)?;
-        let mut tree = tree_over(&solids.outer);
-        collapse(&mut tree, 1, PARAMS.collapse_traversal_cost);
+        let mut tree = ploc::build(&solids.outer, PARAMS);
         tree.reorder_in_stack_traversal_order();
         // A walk keeps one entry a level; the crate's default is 96.
         if !tree.nodes.is_empty() {
@@ -192,7 +170,7 @@ impl ObvhsWide {
     /// [`NotBuilt::Alike`].
     pub fn of(solids: &Solids) -> Result<ObvhsWide, NotBuilt> {
         refuse_stacks(NAME_WIDE, &solids.outer)?;
-        let tree = bvh2_to_cwbvh(&tree_over(&solids.outer), 3, true, false);
+        let tree = bvh2_to_cwbvh(&ploc::build(&solids.outer, PARAMS), 3, true, false);
         let items = Items::of(solids, &tree.primitive_indices);
         Ok(ObvhsWide { tree, items })
     }

@@ -4,13 +4,13 @@
 use std::ops::Range;
 
 use glam::DVec3;
-use obvhs::BvhBuildParams;
-use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
-use obvhs::ploc::PlocBuilder;
 
 use crate::geometry::Aabb;
 use crate::visibility::Ray;
+use crate::visibility::sah::{Item, Part, halve};
+
+/// Most boxes of a leaf.
+const LEAF: usize = 2;
 
 /// Two children side by side, one cache line.
 #[derive(Clone, Copy, Debug)]
@@ -24,7 +24,7 @@ struct Pair {
     count: [u32; 2],
 }
 
-/// A binary tree over boxes (crate obvhs: PLOC, Meister and Bittner 2018).
+/// A binary tree over boxes, halved by the surface area heuristic.
 #[derive(Clone, Debug)]
 pub(super) struct RayTree {
     origin: DVec3,
@@ -97,48 +97,48 @@ impl Slabs {
 impl RayTree {
     /// Builds the tree over boxes about an origin. O(n log n).
     pub fn build(boxes: &[Aabb], origin: DVec3) -> RayTree {
-        let tree = clustered(boxes);
-        let mut all = RayTree {
+        let items = boxes.iter().zip(0..);
+        let mut items: Vec<Item> = items.map(|(&bounds, id)| Item { bounds, id }).collect();
+        let mut pairs: Vec<Pair> = Vec::with_capacity(boxes.len() / LEAF + 1);
+        // A set to be halved, and the side of the pair that is to lead to its halves.
+        let mut open = Vec::new();
+        if !items.is_empty() {
+            open.push((Part::of(&items, 0..items.len()), None));
+        }
+        while let Some((part, above)) = open.pop() {
+            let at = pairs.len() as u32;
+            if let Some((pair, side)) = above {
+                let pair: &mut Pair = &mut pairs[pair];
+                pair.first[side] = at;
+            }
+            // A tree of one box gets a pair whose other half is empty.
+            let middle = match part.len() {
+                1 => part.range.end,
+                _ => part.range.start + halve(&mut items[part.range.clone()]),
+            };
+            let halves = [part.range.start..middle, middle..part.range.end];
+            let halves = halves.map(|range| Part::of(&items, range));
+            let is_leaf = |half: &Part| half.len() <= LEAF;
+            pairs.push(Pair {
+                bounds: [0, 1].map(|side: usize| corners(&halves[side].bounds)),
+                first: [0, 1].map(|side: usize| halves[side].range.start as u32),
+                count: [0, 1].map(|side: usize| match is_leaf(&halves[side]) {
+                    true => halves[side].len() as u32,
+                    false => 0,
+                }),
+            });
+            for (side, half) in halves.into_iter().enumerate() {
+                if !is_leaf(&half) {
+                    open.push((half, Some((at as usize, side))));
+                }
+            }
+        }
+        RayTree {
             origin,
             reach: f64::from(Aabb::union_of(boxes).reach().max_element()),
-            pairs: Vec::with_capacity(tree.nodes.len() / 2 + 1),
-            ids: tree.primitive_indices.clone(),
-        };
-        let Some(root) = tree.nodes.first() else {
-            return all;
-        };
-        let bounds = |node: usize| {
-            [
-                tree.nodes[node].min.to_array(),
-                tree.nodes[node].max.to_array(),
-            ]
-        };
-        // A tree of one leaf gets a pair whose other half is empty.
-        let nothing = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
-        if root.is_leaf() {
-            all.pairs.push(Pair {
-                bounds: [bounds(0), nothing],
-                first: [root.first_index, 0],
-                count: [root.prim_count, 0],
-            });
-            return all;
+            pairs,
+            ids: items.iter().map(|item| item.id).collect(),
         }
-        // The children of node k, which are nodes c and c + 1, become pair (c - 1) / 2.
-        for c in (1..tree.nodes.len()).step_by(2) {
-            let both = [&tree.nodes[c], &tree.nodes[c + 1]];
-            let first = both.map(|node| match node.is_leaf() {
-                true => node.first_index,
-                false => (node.first_index - 1) / 2,
-            });
-            let count = both.map(|node| node.prim_count);
-            let bounds = [bounds(c), bounds(c + 1)];
-            all.pairs.push(Pair {
-                bounds,
-                first,
-                count,
-            });
-        }
-        all
     }
 
     /// Shows `leaf` the places, in the order of `ids`, of what the ray may meet from
@@ -185,20 +185,7 @@ impl RayTree {
     }
 }
 
-/// The tree of crate obvhs over the boxes.
-fn clustered(boxes: &[Aabb]) -> Bvh2 {
-    if boxes.is_empty() {
-        return Bvh2::default();
-    }
-    let params = BvhBuildParams::medium_build();
-    let mut tree = PlocBuilder::with_capacity(boxes.len()).build(
-        params.ploc_search_distance,
-        boxes,
-        (0..boxes.len() as u32).collect(),
-        params.sort_precision,
-        params.search_depth_threshold,
-    );
-    ReinsertionOptimizer::default().run(&mut tree, params.reinsertion_batch_ratio, None);
-    tree.reorder_in_stack_traversal_order();
-    tree
+/// Lower and upper corner.
+fn corners(b: &Aabb) -> [[f32; 3]; 2] {
+    [b.min.to_array(), b.max.to_array()]
 }
