@@ -31,7 +31,7 @@ const WIDTH: u16 = 100;
 const ROUNDS: [usize; 2] = [5, 15];
 
 pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
-    expect_folder_of(args.svg.as_deref())?;
+    expect_folder_of("--svg", args.svg.as_deref())?;
     let options = options(args);
     interrupt::from_now_on_finish();
     let workers = Workers::new(typed_args()?, Duration::MAX, &NamedTempFile::new)?;

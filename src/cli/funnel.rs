@@ -17,7 +17,7 @@ use super::{
     Ending, expect_folder_of, funnel_picture, funnel_table, interrupt, load_scene, print_json,
     text, unread_is_fine,
 };
-use crate::funnel::{self, Chain, FunnelInput, FunnelPlan, StageKind};
+use crate::funnel::{self, Chain, FunnelInput, FunnelPlan, FunnelReport, StageKind, StageRow};
 use crate::index::{Registry, StructureSpec};
 use crate::measure::{ProcessTimes, Protocol};
 use crate::path;
@@ -31,7 +31,9 @@ use crate::visibility::truth::Certificates;
 const ROUNDS: [usize; 2] = [5, 15];
 
 pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> {
-    expect_folder_of(args.svg.as_deref())?;
+    expect_folder_of("--svg", args.svg.as_deref())?;
+    expect_folder_of("--html", args.html.as_deref())?;
+    expect_folder_of("--certificates", args.certificates.as_deref())?;
     let structures = args.kernel.structures(registry, &args.structure)?;
     let defaults = args.lens.defaults()?;
     let scene = load_scene(&args.scene, &args.scene_args, structures.len() + 2)?;
@@ -114,19 +116,26 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
             text::terminal().write_all(text.as_bytes())
         }
     })?;
-    let is_broken = |row: &&funnel::StageRow| {
-        row.back_end.guarantee != Guarantee::Unproven && row.errors.false_negative_count > 0.0
-    };
-    let broken: Vec<_> = report.stages.iter().filter(is_broken).collect();
-    // A chain with an unproven stage hands on what that has left.
-    let is_safe = report
+    Ok(match keeps_its_word(&report) {
+        true => Ending::Ok,
+        false => Ending::WrongAnswer,
+    })
+}
+
+/// Whether nothing that promises not to lose what is visible has lost it. Stages behind
+/// an unproven one of the chain miss what that has lost.
+fn keeps_its_word(report: &FunnelReport) -> bool {
+    let is_unproven = |row: &&StageRow| row.back_end.guarantee == Guarantee::Unproven;
+    let chosen = report.stages.iter().filter(|row| row.is_chosen);
+    let first = chosen
+        .filter(is_unproven)
+        .map(|row| row.back_end.stage)
+        .min();
+    let mut judged = report
         .stages
         .iter()
-        .all(|row| !row.is_chosen || row.back_end.guarantee != Guarantee::Unproven);
-    Ok(match is_safe && !broken.is_empty() {
-        true => Ending::WrongAnswer,
-        false => Ending::Ok,
-    })
+        .filter(|row| !is_unproven(row) && first.is_none_or(|first| row.back_end.stage <= first));
+    judged.all(|row| row.errors.false_negative_count == 0.0)
 }
 
 /// What was typed for each stage, or what suits the scene.

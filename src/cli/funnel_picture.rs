@@ -11,7 +11,7 @@ use crate::funnel::{Fate, FunnelReport, PlanView, StageKind};
 const SIZE: (u32, u32) = (900, 892);
 
 /// Every fate that is drawn, with its colour and its words.
-const FATES: [(Fate, RGBColor, &str); 7] = [
+const FATES: [(Fate, RGBColor, &str); 6] = [
     (
         Fate::Removed(StageKind::Region),
         RGBColor(225, 225, 225),
@@ -30,11 +30,6 @@ const FATES: [(Fate, RGBColor, &str); 7] = [
     (Fate::Kept, RGBColor(86, 180, 233), "drawn, and not visible"),
     (Fate::Visible, RGBColor(0, 130, 90), "visible"),
     (Fate::Lost, RGBColor(213, 0, 0), "visible, and removed"),
-    (
-        Fate::Removed(StageKind::Triangle),
-        RGBColor(160, 160, 160),
-        "removed",
-    ),
 ];
 
 /// The picture as SVG.

@@ -25,19 +25,15 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
         )),
         Block::Table(stages(report)),
     ];
-    blocks.push(Block::Heading(
-        2,
-        "What is left, drawn in every order".into(),
-    ));
-    blocks.push(Block::Table(orders(report)));
-    blocks.push(Block::Heading(2, "The first item under a cursor".into()));
-    blocks.push(Block::Table(picks(report)));
-    if !report.gains.is_empty() {
-        blocks.push(Block::Heading(
-            2,
-            "With and without each stage of the chain".into(),
-        ));
-        blocks.push(Block::Table(gains(report)));
+    // Nothing to draw in order or to pick in a scene without solids.
+    for (heading, table) in [
+        ("What is left, drawn in every order", orders(report)),
+        ("The first item under a cursor", picks(report)),
+        ("With and without each stage of the chain", gains(report)),
+    ] {
+        if !table.rows.is_empty() {
+            blocks.extend([Block::Heading(2, heading.into()), Block::Table(table)]);
+        }
     }
     blocks.extend(report.conclusions.iter().cloned().map(Block::Line));
     blocks

@@ -175,11 +175,11 @@ fn load_scene(source: &str, args: &SceneArgs, structures: usize) -> anyhow::Resu
     Ok(scene)
 }
 
-/// That a picture has a folder to be written to: said before the work, not after it.
-fn expect_folder_of(picture: Option<&Path>) -> anyhow::Result<()> {
-    match picture.and_then(Path::parent) {
+/// That a file has a folder to be written to: said before the work, not after it.
+fn expect_folder_of(option: &str, file: Option<&Path>) -> anyhow::Result<()> {
+    match file.and_then(Path::parent) {
         Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => anyhow::bail!(
-            "{}: expected an existing folder for --svg",
+            "{}: expected an existing folder for {option}",
             folder.display()
         ),
         _ => Ok(()),

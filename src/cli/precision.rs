@@ -35,7 +35,7 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
     if let Some(stage) = args.stage {
         return stage_sweep::sweep(registry, args, stage);
     }
-    expect_folder_of(args.svg.as_deref())?;
+    expect_folder_of("--svg", args.svg.as_deref())?;
     let structures = args.kernel.structures(registry, &args.structure)?;
     let defaults = args.lens.defaults()?;
     let scene = load_scene(&args.scene, &args.scene_args, 2 * structures.len())?;

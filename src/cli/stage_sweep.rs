@@ -91,6 +91,17 @@ pub fn sweep(
     if scene.items.is_empty() {
         bail!("scene '{}' has no items; expected at least one", scene.name);
     }
+    if funnel::back_ends(stage, &scene)
+        .iter()
+        .all(|row| row.name == NONE)
+    {
+        let expected = match stage {
+            StageKind::Region => "a scene with rooms or sectors",
+            _ => "a scene of solid boxes",
+        };
+        let (name, stage) = (&scene.name, stage.name());
+        bail!("scene '{name}' has nothing for the {stage} stage; expected {expected}");
+    }
     let setting = Setting::of(registry, args, scene, None)?;
     interrupt::from_now_on_finish();
     let workers = Workers::new(typed_args()?, Duration::MAX, &NamedTempFile::new)?;

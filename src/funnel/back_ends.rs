@@ -4,8 +4,8 @@ use super::chain::Chain;
 use super::hiding::{HIDING, HidingRow};
 use super::stage::{BackEnd, NONE, StageKind};
 use super::triangle_rows;
-use crate::scene::{self, Scene};
-use crate::visibility::{Guarantee, region};
+use crate::scene::{Regions, Scene};
+use crate::visibility::{Guarantee, Solids, region};
 
 /// What a chain takes where there are rooms.
 const PORTAL_CLIP: &str = "portal-clip";
@@ -13,9 +13,17 @@ const PORTAL_CLIP: &str = "portal-clip";
 /// Most rooms of which it is found out, exactly, what is seen from each.
 pub const MOST_EXACT_ROOMS: usize = 4_096;
 
-/// Whether the items of a scene are solid boxes.
-pub fn is_solid(scene: &Scene) -> bool {
-    !matches!(scene.regions, scene::Regions::Bsp(_))
+/// What finds a way through the rooms or sectors of a scene.
+fn of_regions(scene: &Scene) -> &'static [&'static str] {
+    const OF_ROOMS: &[&str] = &["flood", "portal-rect", PORTAL_CLIP, "exact-pvs"];
+    const OF_MANY_ROOMS: &[&str] = &["flood", "portal-rect", PORTAL_CLIP];
+    const OF_SECTORS: &[&str] = &["flood", "portal-rect", PORTAL_CLIP, "reject", "exact-pvs"];
+    match &scene.regions {
+        Regions::Tiling(rooms) if rooms.boxes.len() <= MOST_EXACT_ROOMS => OF_ROOMS,
+        Regions::Tiling(_) => OF_MANY_ROOMS,
+        Regions::Bsp(_) => OF_SECTORS,
+        _ => &[],
+    }
 }
 
 /// The back ends of a stage that a scene can have; structures of the object stage are
@@ -34,17 +42,17 @@ pub fn back_ends(stage: StageKind, scene: &Scene) -> Vec<BackEnd> {
         Guarantee::Conservative,
     )];
     match stage {
-        StageKind::Region if matches!(scene.regions, scene::Regions::Tiling(_)) => {
-            let of_cameras = ["flood", PORTAL_CLIP, "portal-rect"];
-            let known = region::ROWS
-                .iter()
-                .filter(|row| of_cameras.contains(&row.0));
+        StageKind::Region => {
+            let names = of_regions(scene);
+            let known = region::ROWS.iter().filter(|row| names.contains(&row.0));
             rows.extend(known.map(|&(name, summary, guarantee)| plain(name, summary, guarantee)));
         }
-        StageKind::Occlusion if is_solid(scene) => {
+        StageKind::Occlusion if Solids::are_items_of(scene) => {
             rows.extend(HIDING.iter().map(HidingRow::back_end))
         }
-        StageKind::Triangle if is_solid(scene) => rows = triangle_rows::back_ends().collect(),
+        StageKind::Triangle if Solids::are_items_of(scene) => {
+            rows = triangle_rows::back_ends().collect()
+        }
         StageKind::Fragment => rows.push(plain(
             "z-test",
             "the nearest fragment of each sample, exactly",

@@ -21,7 +21,7 @@ pub struct Step {
     pub output: usize,
 }
 
-/// The set of all items, which nobody writes down: index 0.
+/// The set of all items, which is never listed: index 0.
 pub const ALL: usize = 0;
 
 /// Steps, and the sets of items between them.

@@ -48,12 +48,13 @@ pub struct Picks {
 }
 
 impl Picks {
+    /// Rays of a view.
+    pub const RAYS_PER_VIEW: f64 = (CURSORS.width * CURSORS.height) as f64;
+
     /// Builds all.
     pub fn of(world: &World) -> Picks {
         let solids = world.solids();
-        let suits = |row: &&BackEnd| {
-            world.has_solids() && (row.about.name != "linear" || world.items() <= MOST_FOR_LOOP)
-        };
+        let suits = |row: &&BackEnd| row.about.name != "linear" || world.items() <= MOST_FOR_LOOP;
         let built = BACK_ENDS.iter().filter(suits);
         let picks = built.filter_map(|row| Some((row, (row.build)(solids).ok()?)));
         let of_view = |view: usize| {
@@ -106,10 +107,5 @@ impl Picks {
             }
         });
         rows.collect()
-    }
-
-    /// Rays of a view.
-    pub fn rays_per_view(&self) -> f64 {
-        CURSORS.samples() as f64
     }
 }

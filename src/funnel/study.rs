@@ -75,19 +75,17 @@ pub fn prepare(
             .collect();
         rows.push((world.back_end(*stage, name), name.clone(), judged, *step));
     }
-    let culls = back_ends(StageKind::Triangle, input.scene).into_iter();
-    let culls = culls.zip(std::iter::once(None).chain((0..).map(Some)));
-    for (back_end, place) in culls {
-        if stop() {
-            return Ok(None);
+    if let Some(left) = &left {
+        let culls = back_ends(StageKind::Triangle, input.scene).into_iter();
+        let culls = culls.zip(std::iter::once(None).chain((0..).map(Some)));
+        for (back_end, place) in culls {
+            if stop() {
+                return Ok(None);
+            }
+            let task = place.map(|place: usize| pass.steps().len() + place);
+            let judged = left.faces.judged(place);
+            rows.push((back_end, back_end.name.to_owned(), judged, task));
         }
-        let task = place.map(|place: usize| pass.steps().len() + place);
-        rows.push((
-            back_end,
-            back_end.name.to_owned(),
-            left.faces.judged(place),
-            task,
-        ));
     }
     let last = walks.chosen.left();
     for back_end in back_ends(StageKind::Fragment, input.scene) {
@@ -97,9 +95,9 @@ pub fn prepare(
         });
         rows.push((back_end, back_end.name.to_owned(), judged.collect(), None));
     }
-    let drawn = match left.is_solid {
-        true => left.orders.drawn(input.samples, stop),
-        false => Some(Vec::new()),
+    let drawn = match &left {
+        Some(left) => left.orders.drawn(input.samples, stop),
+        None => Some(Vec::new()),
     };
     let Some(drawn) = drawn else {
         return Ok(None);
@@ -128,7 +126,7 @@ pub fn prepare(
         (*stage, name, [side(&walks.chosen), side(without)])
     });
     let gains = gains.collect();
-    let timed = timed_tasks(&pass, &world, &left, None);
+    let timed = timed_tasks(&pass, &world, left.as_ref(), None);
     let schedule = Schedule::new(world.views(), &timed, input.protocol);
     let level = Level::of(&input.scene.name, input.scene)?;
     Ok(Some(Prepared {
@@ -138,7 +136,7 @@ pub fn prepare(
         },
         tasks,
         gains,
-        rays_per_view: left.picks.rays_per_view(),
+        rays_per_view: Picks::RAYS_PER_VIEW,
         report: FunnelReport {
             scene: input.scene.name.clone(),
             path: input.path.name.clone(),
@@ -151,7 +149,9 @@ pub fn prepare(
             stages: rows,
             reject: world.audit()?,
             orders: drawn,
-            picks: left.picks.judged(&RayIndex::build(world.solids())),
+            picks: left.as_ref().map_or_else(Vec::new, |left| {
+                left.picks.judged(&RayIndex::build(world.solids()))
+            }),
             gains: Vec::new(),
             conclusions: Vec::new(),
             plan_view: plan_view(&world, &pass, &walks.chosen, &truth),
@@ -174,7 +174,7 @@ pub fn time(
         return Ok(None);
     };
     let left = Left::of(&world, &pass, &walks.chosen);
-    let tasks = timed_tasks(&pass, &world, &left, Some(&plan.expected));
+    let tasks = timed_tasks(&pass, &world, left.as_ref(), Some(&plan.expected));
     let timed = timed(&tasks, &plan.schedule, input.protocol, &|_| stop());
     Ok(timed.map(|timed| ProcessTimes::of(&timed)))
 }
@@ -184,27 +184,25 @@ struct Left {
     faces: Faces,
     orders: Orders,
     picks: Picks,
-    /// Whether any of these has something to work on.
-    is_solid: bool,
 }
 
 impl Left {
-    fn of(world: &World, pass: &Pass, chosen: &Walked) -> Left {
-        Left {
+    /// `None` for a scene whose items are no solid boxes: those stages are about their faces.
+    fn of(world: &World, pass: &Pass, chosen: &Walked) -> Option<Left> {
+        world.has_solids().then(|| Left {
             faces: Faces::of(world, pass, chosen.left()),
             orders: Orders::of(world, pass, chosen.left()),
             picks: Picks::of(world),
-            is_solid: world.has_solids(),
-        }
+        })
     }
 }
 
-/// Every step, every back end of the triangle stage and of picking and every order as a task; what it must hand on is what it has, or
-/// what another process says.
+/// Every step, every back end of the triangle stage, every order and every back end of
+/// picking as a task; what it must hand on is what it has, or what another process says.
 fn timed_tasks<'p>(
     pass: &'p Pass<'p>,
     world: &'p World<'p>,
-    left: &'p Left,
+    left: Option<&'p Left>,
     expected: Option<&[Vec<u64>]>,
 ) -> Vec<TimedTask<'p>> {
     let steps = pass.steps().iter().map(|step| {
@@ -212,25 +210,32 @@ fn timed_tasks<'p>(
         let ask: Ask = Box::new(move |view, out| run(view, pass.items(step.input, view), out));
         ask
     });
-    let culls = (1..if left.is_solid {
-        triangle_rows::back_ends().count()
-    } else {
-        0
-    })
-        .map(|place| {
-            let ask: Ask = Box::new(move |view, out| left.faces.cull(place - 1, view, out));
-            ask
-        });
-    let sorts = (0..if left.is_solid { orders::COUNT } else { 0 }).map(|order| {
-        let orders = &left.orders;
-        let pieces = RefCell::new(Vec::new());
-        let ask: Ask = Box::new(move |view, out| {
-            let pieces = &mut *pieces.borrow_mut();
-            orders.sort(order, view, pieces);
-            out.extend(pieces.iter().map(|piece| piece.item));
-        });
-        ask
-    });
+    let behind = left.into_iter().flat_map(
+        |Left {
+             faces,
+             orders,
+             picks,
+         }| {
+            let culls = (1..triangle_rows::back_ends().count()).map(move |place| {
+                let ask: Ask = Box::new(move |view, out| faces.cull(place - 1, view, out));
+                ask
+            });
+            let sorts = (0..orders::COUNT).map(move |order| {
+                let pieces = RefCell::new(Vec::new());
+                let ask: Ask = Box::new(move |view, out| {
+                    let pieces = &mut *pieces.borrow_mut();
+                    orders.sort(order, view, pieces);
+                    out.extend(pieces.iter().map(|piece| piece.item));
+                });
+                ask
+            });
+            let picks = (0..picks.count()).map(move |back_end| {
+                let ask: Ask = Box::new(move |view, out| picks.first(back_end, view, out));
+                ask
+            });
+            culls.chain(sorts).chain(picks)
+        },
+    );
     let task = |(place, ask): (usize, Ask<'p>)| TimedTask {
         expected: match expected {
             Some(expected) => expected[place].clone(),
@@ -240,17 +245,7 @@ fn timed_tasks<'p>(
         ask_many: None,
         least_ns: None,
     };
-    let picks = (0..left.picks.count()).map(|back_end| {
-        let ask: Ask = Box::new(move |view, out| left.picks.first(back_end, view, out));
-        ask
-    });
-    steps
-        .chain(culls)
-        .chain(sorts)
-        .chain(picks)
-        .enumerate()
-        .map(task)
-        .collect()
+    steps.chain(behind).enumerate().map(task).collect()
 }
 
 /// How much is handed on in each view.

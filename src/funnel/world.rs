@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::back_ends::{MOST_EXACT_ROOMS, back_ends, is_solid};
+use super::back_ends::{MOST_EXACT_ROOMS, back_ends};
 use super::chain::Chain;
 use super::hiding::{HIDING, HidingRow};
 use super::judged::{Judged, judge_items};
@@ -300,7 +300,7 @@ impl<'a> World<'a> {
 
     /// Whether items are what their boxes are. Linedefs of a map are walls in them.
     pub fn has_solids(&self) -> bool {
-        is_solid(self.scene)
+        Solids::are_items_of(self.scene)
     }
 
     /// The map that the scene is, if it is one.
@@ -373,9 +373,10 @@ impl<'a> World<'a> {
         if stage == StageKind::Object {
             names.extend(self.structures.iter().map(|(label, _)| label.clone()));
         }
-        if let (StageKind::Region, Some(regions)) = (stage, &self.regions) {
-            let is_there = |name: &String| regions.rows.iter().any(|row| row.name() == name);
-            names.retain(|name| name == NONE || is_there(name));
+        if stage == StageKind::Region {
+            let rows = self.regions.iter().flat_map(|regions| &regions.rows);
+            let there: Vec<_> = rows.map(|row| row.name()).collect();
+            names.retain(|name| name == NONE || there.contains(&name.as_str()));
         }
         names
     }

@@ -10,7 +10,7 @@ use glam::DVec3;
 use crate::arithmetic::rounding::{difference_down, difference_up};
 use crate::geometry::Aabb;
 use crate::query::ItemId;
-use crate::scene::{Scene, WorldBox};
+use crate::scene::{Regions, Scene, WorldBox};
 
 /// The items of a scene as solid boxes, in three forms.
 #[derive(Clone, Debug)]
@@ -26,6 +26,11 @@ pub struct Solids {
 }
 
 impl Solids {
+    /// Whether the items of a scene are solid boxes: linedefs of a map are walls in theirs.
+    pub fn are_items_of(scene: &Scene) -> bool {
+        !matches!(scene.regions, Regions::Bsp(_))
+    }
+
     /// All items of a scene. O(n).
     pub fn of(scene: &Scene) -> Solids {
         let boxes = match scene.originals.boxes() {

@@ -33,17 +33,21 @@ struct Occlusion {
 }
 
 impl Occlusion {
-    /// `None` for cameras without rays.
-    fn of(case: &Case, solids: &Solids) -> Option<Occlusion> {
+    /// Or why there is nothing to ask.
+    fn of(case: &Case, solids: &Solids) -> Result<Occlusion, &'static str> {
+        if !Solids::are_items_of(case.scene()) {
+            return Err("items are walls, not solid boxes");
+        }
         let cameras = case.workload.cameras.iter();
         let rays = cameras.map(|camera| Rays::of(camera).ok());
         let views = rays.zip(case.volumes());
         let views: Option<Vec<_>> = views
             .map(|(rays, volume)| Some((rays?, volume.clone())))
             .collect();
-        Some(Occlusion {
+        let views = views.filter(|views| views.len() == case.workload.views.len());
+        Ok(Occlusion {
             scene: OccluderScene::of(solids),
-            views: views.filter(|views| views.len() == case.workload.views.len())?,
+            views: views.ok_or("cameras without rays of their own")?,
         })
     }
 }
@@ -72,10 +76,9 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
         By::Rule,
     );
     let solids = Solids::of(case.scene());
-    let Some(all) = Occlusion::of(case, &solids) else {
-        return Ok(omission
-            .because("cameras without rays of their own")
-            .draft(Vec::new()));
+    let all = match Occlusion::of(case, &solids) {
+        Ok(all) => all,
+        Err(reason) => return Ok(omission.because(reason).draft(Vec::new())),
     };
     let predicted = predicted(&all, &solids);
     let on = format!(
@@ -103,10 +106,9 @@ pub(super) fn prepare_buffer<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, Advise
         By::Rule,
     );
     let solids = Solids::of(case.scene());
-    let Some(all) = Occlusion::of(case, &solids) else {
-        return Ok(omission
-            .because("cameras without rays of their own")
-            .draft(Vec::new()));
+    let all = match Occlusion::of(case, &solids) {
+        Ok(all) => all,
+        Err(reason) => return Ok(omission.because(reason).draft(Vec::new())),
     };
     let all = Rc::new(all);
     let on = "masked-inner 320x180 against 160x90".to_owned();

@@ -116,7 +116,7 @@ pub fn visible_by_random_rays(
     const CHUNK: usize = 4096;
     let mut found = vec![Vec::new(); count.div_ceil(CHUNK)];
     threads::share(threads, found.iter_mut().enumerate(), |(chunk, found)| {
-        // A stream of its own for each chunk, whoever does it.
+        // A stream of its own for each chunk, on whichever thread.
         let mut rng = SeededRng::new(seed.wrapping_add((chunk as u64) << 32));
         let mut search = Search::default();
         for _ in 0..CHUNK.min(count - chunk * CHUNK) {
