@@ -44,8 +44,8 @@ pub fn back_ends(stage: StageKind, scene: &Scene) -> Vec<BackEnd> {
     match stage {
         StageKind::Region => {
             let names = of_regions(scene);
-            let known = region::ROWS.iter().filter(|row| names.contains(&row.0));
-            rows.extend(known.map(|&(name, summary, guarantee)| plain(name, summary, guarantee)));
+            let known = region::ROWS.iter().filter(|row| names.contains(&row.name));
+            rows.extend(known.map(|row| plain(row.name, row.summary, row.guarantee)));
         }
         StageKind::Occlusion if Solids::are_items_of(scene) => {
             rows.extend(HIDING.iter().map(HidingRow::back_end))

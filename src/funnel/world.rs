@@ -375,7 +375,7 @@ impl<'a> World<'a> {
         }
         if stage == StageKind::Region {
             let rows = self.regions.iter().flat_map(|regions| &regions.rows);
-            let there: Vec<_> = rows.map(|row| row.name()).collect();
+            let there: Vec<_> = rows.map(|row| row.about().name).collect();
             names.retain(|name| name == NONE || there.contains(&name.as_str()));
         }
         names
@@ -409,7 +409,7 @@ impl<'a> World<'a> {
 
     fn run_region(&self, name: &str) -> Run<'_> {
         let regions = self.regions.as_ref().expect("a scene with regions");
-        let row = regions.rows.iter().find(|row| row.name() == name);
+        let row = regions.rows.iter().find(|row| row.about().name == name);
         let row = row.expect("a row of the region stage");
         let kept = RefCell::new((Scratch::default(), Marks::default(), Vec::new()));
         Box::new(move |view, _, out| {

@@ -8,8 +8,9 @@ use crate::geometry::Aabb;
 use crate::scene::{Regions, SeededRng};
 use crate::spec::Spec;
 
-/// Places drawn for each eye, of which it takes the lowest: in a city the street and
-/// not a roof.
+/// Places drawn for each eye, of which it takes the one that rises least above the foot
+/// of what it stands on: in a city the street and not a roof, in a forest the ground
+/// and not the top of a tree, in the valley or not.
 const DRAWN: usize = 8;
 /// Room that an eye has on all sides, world units.
 const CLEARANCE: f64 = 0.3;
@@ -44,11 +45,11 @@ pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, PathEr
     let poses = columns.chunks_mut(DRAWN).map(|columns| {
         let stands = columns.iter_mut().map(|column| {
             let ground = column.ground(height + CLEARANCE);
-            DVec3::new(column.x, column.y, ground + height)
+            let eye = DVec3::new(column.x, column.y, ground + height);
+            (ground - column.foot(), eye)
         });
-        let eye = stands
-            .min_by(|a, b| a.z.total_cmp(&b.z))
-            .unwrap_or_default();
+        let least = stands.min_by(|a, b| a.0.total_cmp(&b.0));
+        let eye = least.map_or(DVec3::ZERO, |(_, eye)| eye);
         Pose::new(eye, level(&mut rng))
     });
     Ok(poses.collect())
@@ -116,10 +117,17 @@ impl Column {
         }
         ground
     }
+
+    /// The bottom of the lowest item, or the floor; after [`Column::ground`].
+    fn foot(&self) -> f64 {
+        self.spans.first().map_or(self.low, |[bottom, _]| *bottom)
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use crate::path::{self, LensDefaults};
     use crate::scene;
 
@@ -147,5 +155,23 @@ mod tests {
             }
             assert!(low >= on_the_floor, "{name}: {low} of 16 on the ground");
         }
+    }
+
+    #[test]
+    fn in_a_forest_eyes_stand_on_the_ground() {
+        let scene = scene::load("forest:n=3000", &Default::default()).unwrap();
+        let path = path::load("street:frames=32", &scene, &LensDefaults::default()).unwrap();
+        let is_on_a_tree = |eye: DVec3| {
+            scene.items.iter().any(|b| {
+                let (min, max) = b.in_world(scene.origin);
+                let is_tree = max.z - min.z >= 4.0 && max.x - min.x < 10.0;
+                // At the edge of the one that it stands on, perhaps.
+                let below = eye.clamp(min - 0.3, max + 0.3).truncate() == eye.truncate();
+                is_tree && below && (eye.z - 1.7 - max.z).abs() < 1e-3
+            })
+        };
+        let eyes = path.cameras.iter().map(|camera| camera.frame.eye);
+        let on_trees = eyes.filter(|eye| is_on_a_tree(*eye)).count();
+        assert!(on_trees <= 3, "{on_trees} of 32 on a tree");
     }
 }

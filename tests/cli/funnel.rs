@@ -136,6 +136,25 @@ fn tables_fit_and_csv_and_pictures_are_whole() {
 }
 
 #[test]
+fn a_map_has_regions_and_no_faces() {
+    let line = "funnel --scene freedm-map12 --path street:frames=4 --processes 1 --format json";
+    let report = json(&works(Path::new("."), line));
+    for name in ["flood", "portal-rect", "portal-clip", "reject", "exact-pvs"] {
+        let row = row(&report, "region", name);
+        assert_eq!(number(row, "false_negative_count"), 0.0, "{name}");
+        assert!(
+            number(row, "output_count") < number(row, "input_count"),
+            "{name}"
+        );
+    }
+    assert_eq!(rows(&report, "triangle").count(), 0);
+    assert!(array(&report, "orders").is_empty() && array(&report, "picks").is_empty());
+    let exact = "funnel --scene rooms:n=500 --path street:frames=2 --processes 1 --format json";
+    let report = json(&works(Path::new("."), exact));
+    row(&report, "region", "exact-pvs");
+}
+
+#[test]
 fn stages_can_be_chosen_and_left_out() {
     let folder = folder();
     let without = json(&works(folder.path(), &format!("{LINE} --occlusion none")));
@@ -161,6 +180,8 @@ fn what_cannot_be_is_refused_in_a_line() {
         ("--samples 320", "--samples | 320"),
         ("--structure nosuch", "nosuch"),
         ("--svg no/such/folder/x.svg", "--svg"),
+        ("--html no/such/folder/x.html", "--html"),
+        ("--certificates no/such/folder/x", "--certificates"),
     ] {
         let done = cullbench(folder.path(), &format!("{LINE} {more}"));
         assert_refused(&done, wanted, more);
@@ -177,6 +198,14 @@ fn what_cannot_be_is_refused_in_a_line() {
     fs::write(folder.path().join("empty.csv"), format!("{BOXES}\n")).expect("written");
     let line = LINE.replace("scene.csv", "empty.csv");
     assert_refused(&cullbench(folder.path(), &line), "no items", "no items");
+    for (scene, stage, wanted) in [
+        ("freedm-map12", "occlusion", "freedm-map12 | solid boxes"),
+        ("freedm-map12", "triangle", "freedm-map12 | solid boxes"),
+        ("city:n=50", "region", "city:n=50 | rooms or sectors"),
+    ] {
+        let line = format!("precision --stage {stage} --scene {scene}");
+        assert_refused(&cullbench(folder.path(), &line), wanted, &line);
+    }
 }
 
 #[test]

@@ -19,18 +19,23 @@ pub enum EyePlace {
     Outside,
 }
 
+/// What a back end declares of itself.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct About {
+    /// As it is typed.
+    pub name: &'static str,
+    /// One line of what it does.
+    pub summary: &'static str,
+    /// What it promises of its answers from an eye, in the world of regions and
+    /// openings (what items hide is not asked here).
+    pub guarantee: Guarantee,
+}
+
 /// A back end of the region stage: which regions can be seen at all.
 #[allow(clippy::wrong_self_convention)] // What is seen from an eye, not a conversion.
 pub trait RegionRow: Send + Sync {
-    /// As it is typed.
-    fn name(&self) -> &'static str;
-
-    /// One line of what it does.
-    fn summary(&self) -> &'static str;
-
-    /// What it promises of its answers from an eye, in the world of regions and
-    /// openings (what items hide is not asked here).
-    fn guarantee(&self) -> Guarantee;
+    /// Name, summary and promise.
+    fn about(&self) -> About;
 
     /// The graph that it searches.
     fn graph(&self) -> &Arc<RegionGraph>;

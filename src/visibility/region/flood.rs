@@ -3,33 +3,25 @@
 
 use std::sync::Arc;
 
-use super::answer::{EyePlace, RegionId, RegionRow, Scratch};
+use super::answer::{About, EyePlace, RegionId, RegionRow, Scratch};
 use super::graph::RegionGraph;
 use super::view::{Polygon, View};
 use crate::visibility::{Guarantee, Rays};
 
-/// As it is typed.
-pub const NAME: &str = "flood";
-/// One line of what it does.
-pub const SUMMARY: &str = "regions reached through openings that meet the view volume";
-/// What it promises.
-pub const GUARANTEE: Guarantee = Guarantee::Conservative;
+/// What it declares of itself.
+pub const ABOUT: About = About {
+    name: "flood",
+    summary: "regions reached through openings that meet the view volume",
+    guarantee: Guarantee::Conservative,
+};
 
 /// The row.
 #[derive(Clone, Debug)]
 pub struct Flood(pub Arc<RegionGraph>);
 
 impl RegionRow for Flood {
-    fn name(&self) -> &'static str {
-        NAME
-    }
-
-    fn summary(&self) -> &'static str {
-        SUMMARY
-    }
-
-    fn guarantee(&self) -> Guarantee {
-        GUARANTEE
+    fn about(&self) -> About {
+        ABOUT
     }
 
     fn graph(&self) -> &Arc<RegionGraph> {

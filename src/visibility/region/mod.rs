@@ -36,8 +36,7 @@ mod view;
 mod walk;
 mod witness;
 
-use crate::visibility::Guarantee;
-pub use answer::{EyePlace, RegionRow, Scratch};
+pub use answer::{About, EyePlace, RegionRow, Scratch};
 pub use audit::{Audit, OtherRegions, audit};
 pub use boxes::NoRegions;
 pub use check_boxes::check_boxes;
@@ -57,32 +56,15 @@ pub use stored::StoredPvs;
 pub use walk::{follow_boxes, seen_by_samples};
 pub use witness::{ProvenPvs, Rejected, Witness};
 
-/// The back ends of the region stage: name, one line of what it does, what it
-/// promises of its answers from an eye.
-pub const ROWS: [(&str, &str, Guarantee); 7] = [
-    (none::NAME, none::SUMMARY, none::GUARANTEE),
-    (flood::NAME, flood::SUMMARY, flood::GUARANTEE),
-    (
-        portal_rect::NAME,
-        portal_rect::SUMMARY,
-        portal_rect::GUARANTEE,
-    ),
-    (
-        portal_clip::NAME,
-        portal_clip::SUMMARY,
-        portal_clip::GUARANTEE,
-    ),
-    (stored::NAME, stored::SUMMARY, stored::GUARANTEE),
-    (
-        stored::REJECT_NAME,
-        stored::REJECT_SUMMARY,
-        stored::GUARANTEE,
-    ),
-    (
-        stored::EXACT_NAME,
-        stored::EXACT_SUMMARY,
-        stored::EXACT_GUARANTEE,
-    ),
+/// The back ends of the region stage.
+pub const ROWS: [About; 7] = [
+    none::ABOUT,
+    flood::ABOUT,
+    portal_rect::ABOUT,
+    portal_clip::ABOUT,
+    stored::ABOUT,
+    stored::REJECT,
+    stored::EXACT,
 ];
 
 #[cfg(test)]

@@ -2,32 +2,24 @@
 
 use std::sync::Arc;
 
-use super::answer::{EyePlace, RegionId, RegionRow, Scratch};
+use super::answer::{About, EyePlace, RegionId, RegionRow, Scratch};
 use super::graph::RegionGraph;
 use crate::visibility::{Guarantee, Rays};
 
-/// As it is typed.
-pub const NAME: &str = "none";
-/// One line of what it does.
-pub const SUMMARY: &str = "every region, whatever the camera";
-/// What it promises.
-pub const GUARANTEE: Guarantee = Guarantee::Conservative;
+/// What it declares of itself.
+pub const ABOUT: About = About {
+    name: "none",
+    summary: "every region, whatever the camera",
+    guarantee: Guarantee::Conservative,
+};
 
 /// The row.
 #[derive(Clone, Debug)]
 pub struct EveryRegion(pub Arc<RegionGraph>);
 
 impl RegionRow for EveryRegion {
-    fn name(&self) -> &'static str {
-        NAME
-    }
-
-    fn summary(&self) -> &'static str {
-        SUMMARY
-    }
-
-    fn guarantee(&self) -> Guarantee {
-        GUARANTEE
+    fn about(&self) -> About {
+        ABOUT
     }
 
     fn graph(&self) -> &Arc<RegionGraph> {

@@ -8,33 +8,25 @@
 
 use std::sync::Arc;
 
-use super::answer::{EyePlace, RegionId, RegionRow, Scratch};
+use super::answer::{About, EyePlace, RegionId, RegionRow, Scratch};
 use super::graph::RegionGraph;
 use super::view::{MOST_PLANES, View, through_edge};
 use crate::visibility::{Guarantee, Rays};
 
-/// As it is typed.
-pub const NAME: &str = "portal-clip";
-/// One line of what it does.
-pub const SUMMARY: &str = "openings clipped as convex polygons by those before them";
-/// What it promises.
-pub const GUARANTEE: Guarantee = Guarantee::Conservative;
+/// What it declares of itself.
+pub const ABOUT: About = About {
+    name: "portal-clip",
+    summary: "openings clipped as convex polygons by those before them",
+    guarantee: Guarantee::Conservative,
+};
 
 /// The row.
 #[derive(Clone, Debug)]
 pub struct PortalClip(pub Arc<RegionGraph>);
 
 impl RegionRow for PortalClip {
-    fn name(&self) -> &'static str {
-        NAME
-    }
-
-    fn summary(&self) -> &'static str {
-        SUMMARY
-    }
-
-    fn guarantee(&self) -> Guarantee {
-        GUARANTEE
+    fn about(&self) -> About {
+        ABOUT
     }
 
     fn graph(&self) -> &Arc<RegionGraph> {

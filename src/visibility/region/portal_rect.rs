@@ -5,34 +5,26 @@
 
 use std::sync::Arc;
 
-use super::answer::{EyePlace, RegionId, RegionRow, Scratch};
+use super::answer::{About, EyePlace, RegionId, RegionRow, Scratch};
 use super::graph::RegionGraph;
 use super::rectangle_windows::Window;
 use super::view::View;
 use crate::visibility::{Guarantee, Rays};
 
-/// As it is typed.
-pub const NAME: &str = "portal-rect";
-/// One line of what it does.
-pub const SUMMARY: &str = "rectangles of the image, intersected from opening to opening";
-/// What it promises.
-pub const GUARANTEE: Guarantee = Guarantee::Conservative;
+/// What it declares of itself.
+pub const ABOUT: About = About {
+    name: "portal-rect",
+    summary: "rectangles of the image, intersected from opening to opening",
+    guarantee: Guarantee::Conservative,
+};
 
 /// The row.
 #[derive(Clone, Debug)]
 pub struct PortalRect(pub Arc<RegionGraph>);
 
 impl RegionRow for PortalRect {
-    fn name(&self) -> &'static str {
-        NAME
-    }
-
-    fn summary(&self) -> &'static str {
-        SUMMARY
-    }
-
-    fn guarantee(&self) -> Guarantee {
-        GUARANTEE
+    fn about(&self) -> About {
+        ABOUT
     }
 
     fn graph(&self) -> &Arc<RegionGraph> {

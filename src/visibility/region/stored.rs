@@ -3,27 +3,32 @@
 
 use std::sync::Arc;
 
-use super::answer::{EyePlace, RegionId, RegionRow, Scratch, decode};
+use super::answer::{About, EyePlace, RegionId, RegionRow, Scratch, decode};
 use super::graph::RegionGraph;
 use super::pvs::Pvs;
 use crate::visibility::{Guarantee, Rays};
 
-/// As the row is typed that reads a file of pairs.
-pub const NAME: &str = "stored-pvs";
-/// One line of what it does.
-pub const SUMMARY: &str = "the row of the eye's region in a set of pairs read from a file";
-/// What a claim promises: nothing.
-pub const GUARANTEE: Guarantee = Guarantee::Unproven;
-/// As the row is typed that reads a Doom map's REJECT table.
-pub const REJECT_NAME: &str = "reject";
-/// One line of what it does.
-pub const REJECT_SUMMARY: &str = "the row of the eye's sector in the map's REJECT table";
-/// As the row is typed whose pairs are found by an exact search.
-pub const EXACT_NAME: &str = "exact-pvs";
-/// One line of what it does.
-pub const EXACT_SUMMARY: &str = "regions seen from anywhere in the eye's region, exactly";
-/// What it promises: nothing that is seen through the inside of openings is missing.
-pub const EXACT_GUARANTEE: Guarantee = Guarantee::Conservative;
+/// The row that reads a file of pairs: a claim promises nothing.
+pub const ABOUT: About = About {
+    name: "stored-pvs",
+    summary: "the row of the eye's region in a set of pairs read from a file",
+    guarantee: Guarantee::Unproven,
+};
+
+/// The row that reads a Doom map's REJECT table, a claim as well.
+pub const REJECT: About = About {
+    name: "reject",
+    summary: "the row of the eye's sector in the map's REJECT table",
+    guarantee: Guarantee::Unproven,
+};
+
+/// The row whose pairs are found by an exact search: nothing that is seen through the
+/// inside of openings is missing.
+pub const EXACT: About = About {
+    name: "exact-pvs",
+    summary: "regions seen from anywhere in the eye's region, exactly",
+    guarantee: Guarantee::Conservative,
+};
 
 /// The row.
 #[derive(Clone, Debug)]
@@ -33,42 +38,28 @@ pub struct StoredPvs {
     /// The rows as lists: what is read is what is answered.
     starts: Vec<u32>,
     lists: Vec<RegionId>,
-    name: &'static str,
-    summary: &'static str,
-    guarantee: Guarantee,
+    about: About,
 }
 
 impl StoredPvs {
     /// A claim: nothing is promised of it. `None` if it is of another number of
     /// regions.
     pub fn claim(graph: Arc<RegionGraph>, pvs: Arc<Pvs>) -> Option<StoredPvs> {
-        StoredPvs::of(graph, pvs, NAME, SUMMARY, GUARANTEE)
+        StoredPvs::of(graph, pvs, ABOUT)
     }
 
     /// The same of a REJECT table.
     pub fn reject(graph: Arc<RegionGraph>, pvs: Arc<Pvs>) -> Option<StoredPvs> {
-        StoredPvs::of(graph, pvs, REJECT_NAME, REJECT_SUMMARY, GUARANTEE)
+        StoredPvs::of(graph, pvs, REJECT)
     }
 
     /// What an exact search has found. It promises no region missing that is seen
     /// through the inside of openings.
     pub fn exact(graph: Arc<RegionGraph>, pvs: Arc<Pvs>) -> Option<StoredPvs> {
-        StoredPvs::of(
-            graph,
-            pvs,
-            EXACT_NAME,
-            EXACT_SUMMARY,
-            Guarantee::Conservative,
-        )
+        StoredPvs::of(graph, pvs, EXACT)
     }
 
-    fn of(
-        graph: Arc<RegionGraph>,
-        pvs: Arc<Pvs>,
-        name: &'static str,
-        summary: &'static str,
-        guarantee: Guarantee,
-    ) -> Option<StoredPvs> {
+    fn of(graph: Arc<RegionGraph>, pvs: Arc<Pvs>, about: About) -> Option<StoredPvs> {
         if pvs.len() != graph.len() {
             return None;
         }
@@ -82,9 +73,7 @@ impl StoredPvs {
             pvs,
             starts,
             lists,
-            name,
-            summary,
-            guarantee,
+            about,
         })
     }
 
@@ -101,16 +90,8 @@ impl StoredPvs {
 }
 
 impl RegionRow for StoredPvs {
-    fn name(&self) -> &'static str {
-        self.name
-    }
-
-    fn summary(&self) -> &'static str {
-        self.summary
-    }
-
-    fn guarantee(&self) -> Guarantee {
-        self.guarantee
+    fn about(&self) -> About {
+        self.about
     }
 
     fn graph(&self) -> &Arc<RegionGraph> {

@@ -153,7 +153,7 @@ fn no_row_misses_a_sector_that_a_ray_passes() {
                     .iter()
                     .filter(|r| out.binary_search(r).is_err())
                     .count();
-                assert_eq!(lost, 0, "{name} {}", row.name());
+                assert_eq!(lost, 0, "{name} {}", row.about().name);
                 sums[i] += out.len();
             }
         }
@@ -184,7 +184,7 @@ fn an_eye_at_a_wall_or_below_the_floor_is_nowhere() {
         for row in super::from_eye::rows(&graph) {
             let mut out = Vec::new();
             let answer = row.from_eye(&rays, &mut Scratch::default(), &mut out);
-            assert_eq!(answer, place, "{away} {height} {}", row.name());
+            assert_eq!(answer, place, "{away} {height} {}", row.about().name);
         }
     }
 }

@@ -51,7 +51,11 @@ fn the_first_solid_on_a_ray_lies_in_a_listed_cell() {
                 for _ in 0..60 {
                     let ray = rays.through(rng.unit(), rng.unit());
                     if let Some(hit) = first_hit(&solids.boxes, &ray) {
-                        assert!(list.binary_search(&hit).is_ok(), "{spec} {}", row.name());
+                        assert!(
+                            list.binary_search(&hit).is_ok(),
+                            "{spec} {}",
+                            row.about().name
+                        );
                     }
                 }
             }

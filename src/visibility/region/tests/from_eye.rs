@@ -59,7 +59,12 @@ fn no_row_misses_a_region_that_a_ray_passes() {
     for world in WORLDS {
         let (_, graph) = rooms(world);
         for row in rows(&graph) {
-            assert_eq!(missing(&*row, &graph, 60, 9), 0, "{world} {}", row.name());
+            assert_eq!(
+                missing(&*row, &graph, 60, 9),
+                0,
+                "{world} {}",
+                row.about().name
+            );
         }
     }
 }
@@ -70,7 +75,12 @@ fn no_row_misses_a_cube_that_a_ray_passes() {
     for count in [[5, 1, 1], [4, 4, 1], [3, 3, 3], [2, 2, 4]] {
         let graph = cubes(count, &mut rng);
         for row in rows(&graph) {
-            assert_eq!(missing(&*row, &graph, 60, 9), 0, "{count:?} {}", row.name());
+            assert_eq!(
+                missing(&*row, &graph, 60, 9),
+                0,
+                "{count:?} {}",
+                row.about().name
+            );
         }
     }
 }

@@ -136,6 +136,6 @@ fn an_orthographic_camera_and_one_with_a_far_plane() {
         let near = Lens::perspective(60.0, 1.0, 1e-4, Some(9.9)).unwrap();
         let (place, count) = answer(&**row, near);
         assert_eq!(place, EyePlace::Inside);
-        assert!((10..=12).contains(&count), "{} {count}", row.name());
+        assert!((10..=12).contains(&count), "{} {count}", row.about().name);
     }
 }
