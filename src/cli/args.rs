@@ -6,9 +6,9 @@ use std::path::PathBuf;
 use crate::drift::ArmKind;
 use crate::funnel::StageKind;
 use crate::suite::DEFAULT_PATH;
-use crate::visibility::SampleGrid;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use super::funnel_args::{CheckArgs, FunnelArgs};
 use super::scene_args::SceneCommand;
 use super::shared_args::{
     CullingArgs, KernelArgs, LensArgs, RowFormat, SceneArgs, SpreadArgs, TableFormat,
@@ -379,104 +379,6 @@ pub struct PrecisionArgs {
     pub lens: LensArgs,
     #[command(flatten)]
     pub kernel: KernelArgs,
-}
-
-const FUNNEL_HELP: &str = "\
-Columns of the table:
-  in, out      items (triangles in the triangle stage) that the stage is given and hands on, a view
-  visible      of them those that are in front at a sample (that face the eye)
-  FP, FN       handed on though not visible; visible and not handed on
-  time         CPU time of the stage, a view
-  per removed  time / what the stage removed
-The rows of a stage are given what the chain hands them; * marks the chain's own, ? a back end that
-promises nothing. What is true is decided exactly, along the rays through the samples. Where the
-occlusion stage walks a tree of its own (masked-inner, masked), its time holds the object stage's.";
-
-#[derive(Args, Debug)]
-#[command(after_help = FUNNEL_HELP)]
-pub struct FunnelArgs {
-    /// A scene: boxes CSV, Doom WAD, built-in name or spec
-    #[arg(long)]
-    pub scene: String,
-    /// A camera path: a spec or a cameras CSV
-    #[arg(
-        long,
-        visible_alias = "cameras",
-        value_name = "PATH",
-        default_value = "street:frames=32"
-    )]
-    pub path: String,
-    /// Cameras of the path to look at, evenly spread
-    #[arg(long, value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..))]
-    pub frames: u32,
-    /// Columns and rows of samples
-    #[arg(long, value_name = "WxH", default_value = "320x180", value_parser = values::samples)]
-    pub samples: SampleGrid,
-    /// What does the region stage in the chain [default: the best that the scene has regions for]
-    #[arg(long, value_name = "NAME")]
-    pub region: Option<String>,
-    /// Structures for the object stage; the first is the chain's
-    #[arg(long, value_name = "LIST", default_value = "wide,bvh,linear")]
-    pub structure: String,
-    /// What does the occlusion stage in the chain
-    #[arg(long, value_name = "NAME")]
-    pub occlusion: Option<String>,
-    /// What does the triangle stage in the chain
-    #[arg(long, value_name = "NAME")]
-    pub triangle: Option<String>,
-    /// What does the fragment stage in the chain
-    #[arg(long, value_name = "NAME")]
-    pub fragment: Option<String>,
-    /// Write proofs for every item in view that is visible or was removed, a line of JSON a view
-    #[arg(long, value_name = "FILE")]
-    pub certificates: Option<PathBuf>,
-    /// Write tables and picture as one HTML page too
-    #[arg(long, value_name = "FILE")]
-    pub html: Option<PathBuf>,
-    /// Draw the first view from above, each item by the stage that removed it
-    #[arg(long, value_name = "FILE")]
-    pub svg: Option<PathBuf>,
-    #[command(flatten)]
-    pub spread: SpreadArgs,
-    #[arg(long, value_enum, default_value = "table")]
-    pub format: FunnelFormat,
-    #[command(flatten)]
-    pub scene_args: SceneArgs,
-    #[command(flatten)]
-    pub lens: LensArgs,
-    #[command(flatten)]
-    pub kernel: KernelArgs,
-}
-
-const CHECK_HELP: &str = "\
-Example:
-  cullbench funnel --scene city:n=10000 --frames 4 --certificates proofs.jsonl
-  cullbench check proofs.jsonl
-
-A visible item is proven by a ray along which it is in front, a hidden one by a division of its
-image into parts that each lie behind one nearer box. Both are checked in exact arithmetic, against
-the boxes as they are written. Exit code 1 if a proof does not hold.";
-
-#[derive(Args, Debug)]
-#[command(after_help = CHECK_HELP)]
-pub struct CheckArgs {
-    /// The file that `funnel --certificates` wrote
-    #[arg(value_name = "CERTIFICATES")]
-    pub certificates: PathBuf,
-    /// The scene, if it is to be found elsewhere than the certificates say
-    #[arg(long)]
-    pub scene: Option<String>,
-    #[arg(long, value_enum, default_value = "table")]
-    pub format: TableFormat,
-    #[command(flatten)]
-    pub scene_args: SceneArgs,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum, Debug)]
-pub enum FunnelFormat {
-    Table,
-    Csv,
-    Json,
 }
 
 #[derive(Args, Debug)]

@@ -6,7 +6,7 @@ use std::io::{self, Write};
 
 use anyhow::{Context, bail};
 
-use super::args::CheckArgs;
+use super::funnel_args::CheckArgs;
 use super::shared_args::TableFormat;
 use super::{Ending, load_scene, print_json, text, unread_is_fine};
 use crate::input::read_file;

@@ -7,8 +7,8 @@ use std::time::Duration;
 use anyhow::bail;
 use tempfile::NamedTempFile;
 
-use super::args::{FunnelArgs, FunnelFormat};
 use super::document::{Block, to_html};
+use super::funnel_args::{FunnelArgs, FunnelFormat};
 use super::processes::Workers;
 use super::protocol::{Job, Timing};
 use super::run::progress;

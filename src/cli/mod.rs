@@ -21,6 +21,7 @@ mod drift_arms;
 mod drift_diagram;
 mod env;
 mod funnel;
+mod funnel_args;
 mod funnel_picture;
 mod funnel_table;
 mod interrupt;
@@ -175,9 +176,17 @@ fn load_scene(source: &str, args: &SceneArgs, structures: usize) -> anyhow::Resu
     Ok(scene)
 }
 
-/// That a file has a folder to be written to: said before the work, not after it.
+/// That a file can be written where it is to be: said before the work, not after it.
 fn expect_folder_of(option: &str, file: Option<&Path>) -> anyhow::Result<()> {
-    match file.and_then(Path::parent) {
+    let Some(file) = file else {
+        return Ok(());
+    };
+    anyhow::ensure!(
+        !file.is_dir(),
+        "{}: a folder; expected a file for {option}",
+        file.display()
+    );
+    match file.parent() {
         Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => anyhow::bail!(
             "{}: expected an existing folder for {option}",
             folder.display()

@@ -17,12 +17,14 @@ mod orders;
 mod pass;
 mod picks;
 mod plan_view;
+mod regions;
 mod report;
 mod stage;
 mod study;
 mod sweep;
 mod times;
 mod triangle_rows;
+mod truth;
 mod world;
 
 pub use back_ends::back_ends;

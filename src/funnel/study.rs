@@ -18,7 +18,8 @@ use super::report::{FunnelReport, Gain, LevelRow, Side, StageRow};
 use super::stage::{NONE, StageKind};
 use super::times::Times;
 use super::triangle_rows;
-use super::world::{FunnelError, FunnelInput, Truth, World};
+use super::truth::Truth;
+use super::world::{FunnelError, FunnelInput, World};
 use crate::measure::{Ask, OverProcesses, ProcessTimes, Schedule, TimedTask, Verdict, timed};
 use crate::visibility::Level;
 use crate::visibility::truth::RayIndex;
@@ -147,7 +148,7 @@ pub fn prepare(
             level: LevelRow::of(&level),
             chain: input.chain.clone(),
             stages: rows,
-            reject: world.audit()?,
+            reject: world.audit().cloned(),
             orders: drawn,
             picks: left.as_ref().map_or_else(Vec::new, |left| {
                 left.picks.judged(&RayIndex::build(world.solids()))

@@ -3,16 +3,17 @@
 
 use std::borrow::Cow;
 use std::cell::RefCell;
-use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::back_ends::{MOST_EXACT_ROOMS, back_ends};
+use super::back_ends::back_ends;
 use super::chain::Chain;
 use super::hiding::{HIDING, HidingRow};
 use super::judged::{Judged, judge_items};
 use super::plan_view::{Fate, MOST_DRAWN, PlanView};
+use super::regions::{Regions, map_of};
 use super::stage::{BackEnd, NONE, StageKind};
+use super::truth::Truth;
 use crate::camera::PlaneOptions;
 use crate::geometry::ConvexVolume;
 use crate::index::{BuildError, DynIndex, Execution, StructureSpec};
@@ -24,14 +25,10 @@ use crate::query::ItemId;
 use crate::scene::Scene;
 use crate::visibility::fragment::{Canvas, Piece, Tests, draw};
 use crate::visibility::occlusion::{self, OccluderScene};
-use crate::visibility::region::doom::{DoomMap, SectorPvs};
-use crate::visibility::region::{
-    Audit, EyePlace, Flood, Marks, PortalClip, PortalRect, ProvenPvs, RegionGraph, RegionItems,
-    RegionRow, RoomsPvs, Scratch, StoredPvs, audit,
-};
+use crate::visibility::region::{Audit, EyePlace, Marks, Scratch};
 use crate::visibility::triangle;
 use crate::visibility::truth::{RayIndex, SampleTruth, SurfaceIndex};
-use crate::visibility::{Guarantee, MapFile, NoRays, Rays, SampleGrid, Solids};
+use crate::visibility::{Guarantee, NoRays, Rays, SampleGrid, Solids};
 
 /// What a funnel is studied on.
 #[derive(Clone, Copy)]
@@ -118,83 +115,6 @@ struct View {
     triangles: triangle::View,
 }
 
-/// The rooms of a scene and what finds a way through them.
-struct Regions {
-    rows: Vec<Box<dyn RegionRow>>,
-    items: RegionItems,
-}
-
-impl Regions {
-    /// `None` for a scene without any.
-    ///
-    /// # Errors
-    /// The map's file, read a second time.
-    fn of(scene: &Scene) -> Result<Option<Regions>, InputError> {
-        let (graph, mut stored) = match MapFile::of(&scene.name)? {
-            Some(file) => Regions::of_map(&file)?,
-            None => match RegionGraph::of_scene(scene) {
-                Ok(graph) => (Arc::new(graph), Vec::new()),
-                Err(_) => return Ok(None),
-            },
-        };
-        if stored.is_empty() && graph.len() <= MOST_EXACT_ROOMS {
-            let exact = RoomsPvs::of(graph.clone()).ok();
-            stored.extend(
-                exact.and_then(|exact| {
-                    StoredPvs::exact(graph.clone(), Arc::new(exact.pvs().clone()))
-                }),
-            );
-        }
-        let items = RegionItems::of(&graph, scene);
-        let mut rows: Vec<Box<dyn RegionRow>> = vec![
-            Box::new(Flood(graph.clone())),
-            Box::new(PortalRect(graph.clone())),
-            Box::new(PortalClip(graph)),
-        ];
-        rows.extend(
-            stored
-                .into_iter()
-                .map(|row| Box::new(row) as Box<dyn RegionRow>),
-        );
-        Ok(Some(Regions { rows, items }))
-    }
-
-    /// The sectors of a map, with its own table and with what is exact.
-    fn of_map(file: &MapFile) -> Result<(Arc<RegionGraph>, Vec<StoredPvs>), InputError> {
-        let map = DoomMap::read(&file.bytes, &file.name, file.map.as_deref())?;
-        let map = Arc::new(map);
-        let graph = Arc::new(map.graph());
-        let exact = SectorPvs::of(map.clone(), graph.clone());
-        let reject = map.reject().cloned().map(Arc::new);
-        let reject = reject.and_then(|pvs| StoredPvs::reject(graph.clone(), pvs));
-        let exact = StoredPvs::exact(graph.clone(), Arc::new(exact.pvs().clone()));
-        Ok((graph, [reject, exact].into_iter().flatten().collect()))
-    }
-}
-
-/// What is visible in each view: items with the samples of each, ascending.
-pub struct Truth {
-    visible: Vec<Vec<(ItemId, u32)>>,
-}
-
-impl Truth {
-    /// By view: items with the samples of each, ascending.
-    pub fn new(visible: Vec<Vec<(ItemId, u32)>>) -> Truth {
-        Truth { visible }
-    }
-
-    /// Items with their samples, ascending.
-    pub fn of_view(&self, view: usize) -> &[(ItemId, u32)] {
-        &self.visible[view]
-    }
-
-    /// Whether an item is in front at a sample of a view.
-    pub fn sees(&self, view: usize, item: ItemId) -> bool {
-        let found = self.visible[view].binary_search_by_key(&item, |(item, _)| *item);
-        found.is_ok()
-    }
-}
-
 impl<'a> World<'a> {
     /// Builds all that is asked for.
     ///
@@ -255,17 +175,8 @@ impl<'a> World<'a> {
 
     /// What a map's own table of what is seen from where gets wrong; `None` for a scene
     /// without one.
-    ///
-    /// # Errors
-    /// The map's file, read again.
-    pub fn audit(&self) -> Result<Option<Audit>, InputError> {
-        let Some(map) = self.map()? else {
-            return Ok(None);
-        };
-        let graph = Arc::new(map.graph());
-        let exact = SectorPvs::of(map.clone(), graph.clone());
-        let claim = map.reject();
-        Ok(claim.and_then(|claim| audit(claim, &exact, &graph).ok()))
+    pub fn audit(&self) -> Option<&Audit> {
+        self.regions.as_ref()?.audit.as_ref()
     }
 
     /// The scene itself.
@@ -303,18 +214,6 @@ impl<'a> World<'a> {
         Solids::are_items_of(self.scene)
     }
 
-    /// The map that the scene is, if it is one.
-    ///
-    /// # Errors
-    /// The map's file, read again.
-    fn map(&self) -> Result<Option<Arc<DoomMap>>, InputError> {
-        let Some(file) = MapFile::of(&self.scene.name)? else {
-            return Ok(None);
-        };
-        let map = DoomMap::read(&file.bytes, &file.name, file.map.as_deref())?;
-        Ok(Some(Arc::new(map)))
-    }
-
     /// What each view shows at its samples: solids, or the walls, floors and ceilings of a
     /// map. `None` if stopped.
     ///
@@ -325,7 +224,7 @@ impl<'a> World<'a> {
         input: &FunnelInput,
         stop: &dyn Fn() -> bool,
     ) -> Result<Option<Truth>, InputError> {
-        let Some(map) = self.map()? else {
+        let Some(map) = map_of(self.scene)? else {
             return Ok(self.truth_of_solids(input, stop));
         };
         let surfaces = map.surfaces(self.scene);
@@ -342,7 +241,7 @@ impl<'a> World<'a> {
             // Behind the scene's items come floors and ceilings.
             visible.push(counts.filter(|(item, _)| *item < items).collect());
         }
-        Ok(Some(Truth { visible }))
+        Ok(Some(Truth::new(visible)))
     }
 
     fn truth_of_solids(&self, input: &FunnelInput, stop: &dyn Fn() -> bool) -> Option<Truth> {
@@ -363,7 +262,7 @@ impl<'a> World<'a> {
             let counts = truth.visible.into_iter().zip(truth.samples_of);
             visible.push(counts.collect());
         }
-        Some(Truth { visible })
+        Some(Truth::new(visible))
     }
 
     /// The back ends of a stage that are compared.
@@ -374,8 +273,7 @@ impl<'a> World<'a> {
             names.extend(self.structures.iter().map(|(label, _)| label.clone()));
         }
         if stage == StageKind::Region {
-            let rows = self.regions.iter().flat_map(|regions| &regions.rows);
-            let there: Vec<_> = rows.map(|row| row.about().name).collect();
+            let there: Vec<_> = self.regions.iter().flat_map(Regions::names).collect();
             names.retain(|name| name == NONE || there.contains(&name.as_str()));
         }
         names
@@ -409,8 +307,7 @@ impl<'a> World<'a> {
 
     fn run_region(&self, name: &str) -> Run<'_> {
         let regions = self.regions.as_ref().expect("a scene with regions");
-        let row = regions.rows.iter().find(|row| row.about().name == name);
-        let row = row.expect("a row of the region stage");
+        let row = regions.row(name).expect("a row of the region stage");
         let kept = RefCell::new((Scratch::default(), Marks::default(), Vec::new()));
         Box::new(move |view, _, out| {
             let (scratch, marks, seen) = &mut *kept.borrow_mut();
@@ -467,18 +364,18 @@ impl<'a> World<'a> {
         truth: &Truth,
     ) -> Judged {
         let output = self.listed(output);
-        judge_items(input, self.items(), &output, &truth.visible[view])
+        judge_items(input, self.items(), &output, truth.of_view(view))
     }
 
     /// What the z-test leaves: items in front at a sample, drawn one by one.
     pub fn judge_fragments(&self, view: usize, input: Option<&[ItemId]>, truth: &Truth) -> Judged {
         let items = self.listed(input);
         if !self.has_solids() {
-            let visible = truth.visible[view].iter().map(|(item, _)| *item);
+            let visible = truth.of_view(view).iter().map(|(item, _)| *item);
             let output: Vec<ItemId> = visible
                 .filter(|id| items.binary_search(id).is_ok())
                 .collect();
-            return judge_items(input, self.items(), &output, &truth.visible[view]);
+            return judge_items(input, self.items(), &output, truth.of_view(view));
         }
         let canvas = Canvas::of(&self.views[view].rays, self.samples);
         let solids = self.solids.some(&items);
@@ -487,7 +384,7 @@ impl<'a> World<'a> {
         let drawn = draw(&canvas, &solids, &pieces, &Tests::default());
         let visible = drawn.depth.visible(&canvas);
         let output: Vec<ItemId> = visible.iter().map(|&place| items[place as usize]).collect();
-        judge_items(input, self.items(), &output, &truth.visible[view])
+        judge_items(input, self.items(), &output, truth.of_view(view))
     }
 
     /// The ids of a set; `None` is all items.

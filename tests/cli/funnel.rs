@@ -182,6 +182,7 @@ fn what_cannot_be_is_refused_in_a_line() {
         ("--svg no/such/folder/x.svg", "--svg"),
         ("--html no/such/folder/x.html", "--html"),
         ("--certificates no/such/folder/x", "--certificates"),
+        ("--svg .", "--svg | a folder"),
     ] {
         let done = cullbench(folder.path(), &format!("{LINE} {more}"));
         assert_refused(&done, wanted, more);
