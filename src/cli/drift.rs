@@ -14,7 +14,7 @@ use super::run::progress;
 use super::run_resume::typed_args;
 use super::shared_args::TableFormat;
 use super::{
-    Ending, drift_arms, drift_diagram, expect_folder_of, interrupt, print_json, text,
+    Ending, drift_arms, drift_diagram, expect_place_for, interrupt, print_json, text,
     unread_is_fine,
 };
 use crate::drift::{
@@ -31,7 +31,7 @@ const WIDTH: u16 = 100;
 const ROUNDS: [usize; 2] = [5, 15];
 
 pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
-    expect_folder_of("--svg", args.svg.as_deref())?;
+    expect_place_for("--svg", args.svg.as_deref())?;
     let options = options(args);
     interrupt::from_now_on_finish();
     let workers = Workers::new(typed_args()?, Duration::MAX, &NamedTempFile::new)?;

@@ -14,10 +14,10 @@ use super::protocol::{Job, Timing};
 use super::run::progress;
 use super::run_resume::typed_args;
 use super::{
-    Ending, expect_folder_of, funnel_picture, funnel_table, interrupt, load_scene, print_json,
+    Ending, expect_place_for, funnel_picture, funnel_table, interrupt, load_scene, print_json,
     text, unread_is_fine,
 };
-use crate::funnel::{self, Chain, FunnelInput, FunnelPlan, FunnelReport, StageKind, StageRow};
+use crate::funnel::{self, Chain, FunnelInput, FunnelPlan, StageKind, StageRow};
 use crate::index::{Registry, StructureSpec};
 use crate::measure::{ProcessTimes, Protocol};
 use crate::path;
@@ -31,9 +31,9 @@ use crate::visibility::truth::Certificates;
 const ROUNDS: [usize; 2] = [5, 15];
 
 pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> {
-    expect_folder_of("--svg", args.svg.as_deref())?;
-    expect_folder_of("--html", args.html.as_deref())?;
-    expect_folder_of("--certificates", args.certificates.as_deref())?;
+    expect_place_for("--svg", args.svg.as_deref())?;
+    expect_place_for("--html", args.html.as_deref())?;
+    expect_place_for("--certificates", args.certificates.as_deref())?;
     let structures = args.kernel.structures(registry, &args.structure)?;
     let defaults = args.lens.defaults()?;
     let scene = load_scene(&args.scene, &args.scene_args, structures.len() + 2)?;
@@ -116,7 +116,7 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
             text::terminal().write_all(text.as_bytes())
         }
     })?;
-    Ok(match keeps_its_word(&report) {
+    Ok(match keep_their_word(&report.stages) {
         true => Ending::Ok,
         false => Ending::WrongAnswer,
     })
@@ -124,15 +124,14 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
 
 /// Whether nothing that promises not to lose what is visible has lost it. Stages behind
 /// an unproven one of the chain miss what that has lost.
-fn keeps_its_word(report: &FunnelReport) -> bool {
+fn keep_their_word(stages: &[StageRow]) -> bool {
     let is_unproven = |row: &&StageRow| row.back_end.guarantee == Guarantee::Unproven;
-    let chosen = report.stages.iter().filter(|row| row.is_chosen);
+    let chosen = stages.iter().filter(|row| row.is_chosen);
     let first = chosen
         .filter(is_unproven)
         .map(|row| row.back_end.stage)
         .min();
-    let mut judged = report
-        .stages
+    let mut judged = stages
         .iter()
         .filter(|row| !is_unproven(row) && first.is_none_or(|first| row.back_end.stage <= first));
     judged.all(|row| row.errors.false_negative_count == 0.0)
@@ -197,4 +196,56 @@ pub fn time(
         execution: args.kernel.execution()?,
     };
     Ok(funnel::time(&input, plan, stop)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::funnel::{BackEnd, Errors, Times};
+
+    fn row(stage: StageKind, guarantee: Guarantee, false_negative_count: f64) -> StageRow {
+        StageRow {
+            back_end: BackEnd {
+                stage,
+                name: "a row",
+                summary: "",
+                guarantee,
+                does_object_stage: false,
+            },
+            structure: None,
+            is_chosen: true,
+            unit: stage.unit(),
+            errors: Errors {
+                false_negative_count,
+                ..Errors::of(&[])
+            },
+            times: Times::default(),
+            ns_per_removed: None,
+            ns_per_decided: None,
+        }
+    }
+
+    #[test]
+    fn a_broken_promise_counts_unless_an_unproven_stage_came_before() {
+        use Guarantee::{Conservative, Unproven};
+        let region = |guarantee, lost| row(StageKind::Region, guarantee, lost);
+        let occlusion = |guarantee, lost| row(StageKind::Occlusion, guarantee, lost);
+        let keeps = |rows: [StageRow; 2]| keep_their_word(&rows);
+        assert!(keeps([region(Conservative, 0.0), occlusion(Unproven, 2.0)]));
+        assert!(!keeps([
+            region(Conservative, 0.0),
+            occlusion(Conservative, 2.0)
+        ]));
+        assert!(!keeps([
+            region(Conservative, 1.0),
+            occlusion(Unproven, 2.0)
+        ]));
+        // What the region stage has lost, the next one cannot hand on.
+        assert!(keeps([region(Unproven, 1.0), occlusion(Conservative, 1.0)]));
+        let other = StageRow {
+            is_chosen: false,
+            ..region(Unproven, 1.0)
+        };
+        assert!(!keeps([other, occlusion(Conservative, 1.0)]));
+    }
 }

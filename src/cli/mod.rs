@@ -177,7 +177,7 @@ fn load_scene(source: &str, args: &SceneArgs, structures: usize) -> anyhow::Resu
 }
 
 /// That a file can be written where it is to be: said before the work, not after it.
-fn expect_folder_of(option: &str, file: Option<&Path>) -> anyhow::Result<()> {
+fn expect_place_for(option: &str, file: Option<&Path>) -> anyhow::Result<()> {
     let Some(file) = file else {
         return Ok(());
     };

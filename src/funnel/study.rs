@@ -40,7 +40,6 @@ pub struct Prepared {
     /// By row: its task.
     tasks: Vec<Option<usize>>,
     gains: Vec<(StageKind, String, [Side; 2])>,
-    rays_per_view: f64,
 }
 
 /// Goes through all chains, judges them, and plans how they are timed; `None` if
@@ -137,7 +136,6 @@ pub fn prepare(
         },
         tasks,
         gains,
-        rays_per_view: Picks::RAYS_PER_VIEW,
         report: FunnelReport {
             scene: input.scene.name.clone(),
             path: input.path.name.clone(),
@@ -323,7 +321,7 @@ impl Prepared {
         let picks = self.plan.expected.len() - report.picks.len();
         for (row, task) in report.picks.iter_mut().zip(picks..) {
             row.times = Times::of(times.ns(task));
-            row.ns_per_ray = row.times.stage_ns.map(|ns| ns / self.rays_per_view);
+            row.ns_per_ray = row.times.stage_ns.map(|ns| ns / Picks::RAYS_PER_VIEW);
         }
         for (row, task) in report.orders.iter_mut().rev().zip((0..picks).rev()) {
             row.times = Times::of(times.ns(task));

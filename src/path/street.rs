@@ -10,7 +10,7 @@ use crate::spec::Spec;
 
 /// Places drawn for each eye, of which it takes the one that rises least above the foot
 /// of what it stands on: in a city the street and not a roof, in a forest the ground
-/// and not the top of a tree, in the valley or not.
+/// and not the top of a tree.
 const DRAWN: usize = 8;
 /// Room that an eye has on all sides, world units.
 const CLEARANCE: f64 = 0.3;
@@ -170,7 +170,7 @@ mod tests {
             eye.z - 1.7 - foot
         };
         let eyes = path.cameras.iter().map(|camera| camera.frame.eye);
-        // Three on steep tiles; of the lowest of eight places sixteen are on trees.
+        // Those of steep tiles; of the lowest of eight places fifteen are so high, on trees.
         let high = eyes.filter(|eye| rise(*eye) > 8.0).count();
         assert!(high <= 6, "{high} of 64 above the ground");
     }

@@ -189,3 +189,33 @@ impl RayTree {
 fn corners(b: &Aabb) -> [[f32; 3]; 2] {
     [b.min.to_array(), b.max.to_array()]
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+
+    /// Neither clustering nor a cut between centres parts boxes that are all alike.
+    #[test]
+    fn a_stack_of_equal_boxes_is_halved() {
+        for n in [1, 2, 3, 5, 4096] {
+            let boxes = vec![Aabb::new(Vec3::ZERO, Vec3::ONE); n];
+            let tree = RayTree::build(&boxes, DVec3::ZERO);
+            let (mut held, mut deepest, mut open) = (0, 0, vec![(0, 1)]);
+            while let Some((at, depth)) = open.pop() {
+                let pair = &tree.pairs[at as usize];
+                deepest = deepest.max(depth);
+                for side in 0..2 {
+                    held += pair.count[side] as usize;
+                    // A half that is empty leads nowhere.
+                    if pair.count[side] == 0 && pair.bounds[side][0][0] <= pair.bounds[side][1][0] {
+                        open.push((pair.first[side], depth + 1));
+                    }
+                }
+            }
+            assert_eq!(held, n);
+            assert!(deepest <= n.ilog2() as usize + 1, "{n}: {deepest} deep");
+        }
+    }
+}
