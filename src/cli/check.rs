@@ -6,11 +6,15 @@ use std::io::{self, Write};
 
 use anyhow::{Context, bail};
 
+use super::funnel::claim;
 use super::funnel_args::CheckArgs;
 use super::shared_args::TableFormat;
 use super::{Ending, load_scene, print_json, text, unread_is_fine};
+use crate::funnel::regions_of;
 use crate::input::read_file;
+use crate::scene::{Scene, WorldBox};
 use crate::visibility::Solids;
+use crate::visibility::region::{ClaimErrors, Pvs, REJECT, RegionGraph};
 use crate::visibility::truth::{Certificates, Counts, check as check_proofs};
 use serde::Serialize;
 
@@ -23,15 +27,19 @@ struct Checked {
     tied_count: usize,
     undecided_count: usize,
     cell_count: usize,
-    /// The first proof of each view that does not hold.
+    claim_count: usize,
+    asymmetric_count: usize,
+    false_negative_count: usize,
+    /// The first proof of each view, and of each claim, that does not hold.
     rejected: Vec<Rejection>,
 }
 
 #[derive(Serialize)]
 struct Rejection {
     line: usize,
-    item: u32,
-    reason: &'static str,
+    /// Null for an error of a claim.
+    item: Option<u32>,
+    reason: String,
 }
 
 impl Checked {
@@ -42,6 +50,67 @@ impl Checked {
         self.undecided_count += counts.undecided;
         self.cell_count += counts.cells;
     }
+
+    /// The proofs of one view.
+    fn view(&mut self, line: usize, proofs: &Certificates, boxes: &[WorldBox]) {
+        self.view_count += 1;
+        match check_proofs(proofs, boxes) {
+            Ok(counts) => self.add(&counts),
+            Err(rejected) => self.rejected.push(Rejection {
+                line,
+                item: Some(rejected.item),
+                reason: rejected.reason.to_owned(),
+            }),
+        }
+    }
+
+    /// The errors of one claim.
+    fn claim(&mut self, line: usize, errors: &ClaimErrors, claim: &Pvs, graph: &RegionGraph) {
+        self.claim_count += 1;
+        match errors.check(claim, graph) {
+            Ok(()) => {
+                self.asymmetric_count += errors.asymmetric.len();
+                self.false_negative_count += errors.false_negatives.len();
+            }
+            Err(rejected) => self.rejected.push(Rejection {
+                line,
+                item: None,
+                reason: rejected.to_string(),
+            }),
+        }
+    }
+}
+
+/// A line of the file.
+enum Line {
+    View(Certificates),
+    Claim(ClaimErrors),
+}
+
+impl Line {
+    fn read(text: &str) -> serde_json::Result<Line> {
+        // The error is that of the kind that most lines are.
+        Certificates::from_json(text)
+            .map(Line::View)
+            .or_else(|error| {
+                let claim = serde_json::from_str(text).map(Line::Claim);
+                claim.map_err(|_| error)
+            })
+    }
+
+    fn scene(&self) -> &str {
+        match self {
+            Line::View(proofs) => &proofs.scene,
+            Line::Claim(errors) => &errors.scene,
+        }
+    }
+}
+
+/// A scene, loaded once for all lines that are about it.
+struct Loaded {
+    scene: Scene,
+    boxes: Vec<WorldBox>,
+    regions: Option<(RegionGraph, Option<Pvs>)>,
 }
 
 pub fn check(args: &CheckArgs) -> anyhow::Result<Ending> {
@@ -50,45 +119,83 @@ pub fn check(args: &CheckArgs) -> anyhow::Result<Ending> {
     let Ok(lines) = std::str::from_utf8(&bytes) else {
         bail!("{file}: no UTF-8; expected certificates as lines of JSON");
     };
-    let mut scenes: BTreeMap<String, Solids> = BTreeMap::new();
+    let stored = claim(args.pvs.as_deref())?;
+    let mut scenes: BTreeMap<String, Loaded> = BTreeMap::new();
     let mut checked = Checked::default();
     for (number, line) in lines
         .lines()
         .enumerate()
         .filter(|(_, line)| !line.trim().is_empty())
     {
-        let place = || format!("{file}, line {}", number + 1);
-        let certificates = Certificates::from_json(line)
+        let number = number + 1;
+        let place = || format!("{file}, line {number}");
+        let line = Line::read(line)
             .with_context(|| format!("{}: expected the certificates of a view as JSON", place()))?;
-        let name = args
-            .scene
-            .clone()
-            .unwrap_or_else(|| certificates.scene.clone());
+        let name = args.scene.as_deref().unwrap_or(line.scene()).to_owned();
         if !scenes.contains_key(&name) {
             let scene = load_scene(&name, &args.scene_args, 1)
                 .with_context(|| format!("{}: the scene it is about", place()))?;
-            scenes.insert(name.clone(), Solids::of(&scene));
-        }
-        let boxes = &scenes[&name].boxes;
-        if boxes.len() != certificates.boxes {
-            bail!(
-                "{}: it is about {} boxes; expected the {} of scene '{name}'",
-                place(),
-                certificates.boxes,
-                boxes.len()
+            scenes.insert(
+                name.clone(),
+                Loaded {
+                    boxes: Solids::of(&scene).boxes,
+                    regions: None,
+                    scene,
+                },
             );
         }
-        checked.view_count += 1;
-        match check_proofs(&certificates, boxes) {
-            Ok(counts) => checked.add(&counts),
-            Err(rejected) => checked.rejected.push(Rejection {
-                line: number + 1,
-                item: rejected.item,
-                reason: rejected.reason,
-            }),
+        let Some(loaded) = scenes.get_mut(&name) else {
+            continue;
+        };
+        match line {
+            Line::View(proofs) => {
+                let (found, boxes) = (loaded.boxes.len(), proofs.boxes);
+                if found != boxes {
+                    bail!(
+                        "{}: it is about {boxes} boxes; expected the {found} of scene '{name}'",
+                        place()
+                    );
+                }
+                checked.view(number, &proofs, &loaded.boxes);
+            }
+            Line::Claim(errors) => {
+                if loaded.regions.is_none() {
+                    loaded.regions = regions_of(&loaded.scene)?;
+                }
+                let Some((graph, own)) = &loaded.regions else {
+                    bail!("{}: scene '{name}' has no regions; expected some", place());
+                };
+                let claim = match errors.claim == REJECT.name {
+                    true => own.as_ref(),
+                    false => stored.as_deref(),
+                };
+                let Some(claim) = claim else {
+                    let claim = &errors.claim;
+                    bail!(
+                        "{}: it is about the claim of {claim}; expected it {}",
+                        place(),
+                        match errors.claim == REJECT.name {
+                            true => "in the map",
+                            false => "as --pvs FILE",
+                        }
+                    );
+                };
+                let found = [claim.len(), graph.len()];
+                if found != [errors.regions; 2] {
+                    bail!(
+                        "{}: it is about {} regions; expected the {} of the claim and the {} of \
+                         scene '{name}'",
+                        place(),
+                        errors.regions,
+                        found[0],
+                        found[1]
+                    );
+                }
+                checked.claim(number, &errors, claim, graph);
+            }
         }
     }
-    if checked.view_count == 0 {
+    if checked.view_count + checked.claim_count == 0 {
         bail!("{file}: no certificate in it; expected at least one line");
     }
     unread_is_fine(match args.format {
@@ -103,25 +210,41 @@ pub fn check(args: &CheckArgs) -> anyhow::Result<Ending> {
 
 fn show(checked: &Checked, out: &mut impl Write) -> io::Result<()> {
     for Rejection { line, item, reason } in &checked.rejected {
-        writeln!(out, "line {line}, item {item}: rejected, {reason}")?;
+        let item = item
+            .map(|item| format!(", item {item}"))
+            .unwrap_or_default();
+        writeln!(out, "line {line}{item}: rejected, {reason}")?;
     }
-    let decided = checked.visible_count + checked.hidden_count + checked.tied_count;
-    writeln!(
-        out,
-        "{}: {} proven visible, {} proven hidden ({} of images), {} tied, {} undecided.",
-        text::counted(checked.view_count, "view"),
-        checked.visible_count,
-        checked.hidden_count,
-        text::counted(checked.cell_count, "part"),
-        checked.tied_count,
-        checked.undecided_count
-    )?;
+    let mut decided = checked.visible_count + checked.hidden_count + checked.tied_count;
+    if checked.view_count > 0 {
+        writeln!(
+            out,
+            "{}: {} proven visible, {} proven hidden ({} of images), {} tied, {} undecided.",
+            text::counted(checked.view_count, "view"),
+            checked.visible_count,
+            checked.hidden_count,
+            text::counted(checked.cell_count, "part"),
+            checked.tied_count,
+            checked.undecided_count
+        )?;
+    }
+    if checked.claim_count > 0 {
+        decided += checked.asymmetric_count + checked.false_negative_count;
+        writeln!(
+            out,
+            "{} of what is seen from where: {} with a line of sight, {} visible in one direction \
+             only.",
+            text::counted(checked.claim_count, "claim"),
+            text::counted(checked.false_negative_count, "false negative"),
+            text::counted(checked.asymmetric_count, "pair"),
+        )?;
+    }
     match checked.rejected.len() {
         0 => writeln!(out, "All {decided} proofs hold."),
         count => writeln!(
             out,
-            "{} with a proof that does not hold.",
-            text::counted(count, "view")
+            "{} of views or claims with a proof that does not hold.",
+            text::counted(count, "line")
         ),
     }
 }

@@ -2,9 +2,11 @@
 //! views of a path, and what each is worth. How it is shown is in `funnel_table`.
 
 use std::io::{self, Write};
+use std::path::Path;
+use std::sync::Arc;
 use std::time::Duration;
 
-use anyhow::bail;
+use anyhow::{Context, bail};
 use tempfile::NamedTempFile;
 
 use super::document::{Block, to_html};
@@ -19,12 +21,14 @@ use super::{
 };
 use crate::funnel::{self, Chain, FunnelInput, FunnelPlan, StageKind, StageRow};
 use crate::index::{Registry, StructureSpec};
+use crate::input::read_file;
 use crate::measure::{ProcessTimes, Protocol};
 use crate::path;
 use crate::report::write_atomically;
 use crate::scene::{self, LoadOptions, Scene};
 use crate::spec::SpecError;
 use crate::visibility::Guarantee;
+use crate::visibility::region::Pvs;
 use crate::visibility::truth::Certificates;
 
 /// Rounds of a stage, if one process has them all.
@@ -42,6 +46,7 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     }
     let path = path::load(&args.path, &scene, &defaults)?;
     let chain = chain(args, &scene, &structures)?;
+    let claim = claim(args.pvs.as_deref())?;
     interrupt::from_now_on_finish();
     let workers = Workers::new(typed_args()?, Duration::MAX, &NamedTempFile::new)?;
     let bar = progress(u64::from(args.spread.processes));
@@ -59,11 +64,16 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
         chain: &chain,
         structures: &structures,
         protocol: &protocol,
+        claim: claim.as_ref(),
         execution: args.kernel.execution()?,
     };
     if let Some(file) = &args.certificates {
         job("proofs");
         let mut lines = String::new();
+        for errors in funnel::claim_errors(&input)? {
+            lines += &serde_json::to_string(&errors)?;
+            lines.push('\n');
+        }
         let each = |proofs: Certificates| {
             lines += &proofs.to_json();
             lines.push('\n');
@@ -164,6 +174,16 @@ fn chain(
     Ok(chain)
 }
 
+/// The claim of what is seen from each region that a file holds.
+pub(super) fn claim(file: Option<&Path>) -> anyhow::Result<Option<Arc<Pvs>>> {
+    let Some(file) = file else { return Ok(None) };
+    let bytes = read_file(file)?;
+    let text = std::str::from_utf8(&bytes).context("no UTF-8");
+    let pvs = text.and_then(|text| Ok(Pvs::from_json(text)?));
+    let pvs = pvs.with_context(|| format!("{}: expected a set of region pairs", file.display()))?;
+    Ok(Some(Arc::new(pvs)))
+}
+
 /// Of one of the processes, all views.
 fn protocol(args: &FunnelArgs, process: u32) -> Protocol {
     let effort = args.spread.effort(ROUNDS);
@@ -185,6 +205,7 @@ pub fn time(
     let scene = scene::load(&args.scene, &load)?;
     let lens = args.lens.defaults()?;
     let structures = args.kernel.structures(registry, &args.structure)?;
+    let claim = claim(args.pvs.as_deref())?;
     let input = FunnelInput {
         scene: &scene,
         path: &path::load_scaled(&args.path, &scene, &lens, timing.lens_scale)?,
@@ -193,6 +214,7 @@ pub fn time(
         chain: &chain(args, &scene, &structures)?,
         structures: &structures,
         protocol: &protocol(args, timing.process),
+        claim: claim.as_ref(),
         execution: args.kernel.execution()?,
     };
     Ok(funnel::time(&input, plan, stop)?)

@@ -55,7 +55,11 @@ pub struct FunnelArgs {
     /// What does the fragment stage in the chain
     #[arg(long, value_name = "NAME")]
     pub fragment: Option<String>,
-    /// Write proofs for every item in view that is visible or was removed, a line of JSON a view
+    /// A claim of what is seen from each region, to be audited: {"regions": N, "sees": [[0, 1], ..]}
+    #[arg(long, value_name = "FILE")]
+    pub pvs: Option<PathBuf>,
+
+    /// Write proofs: of each claim's errors, and of every item in view that is visible or was removed
     #[arg(long, value_name = "FILE")]
     pub certificates: Option<PathBuf>,
     /// Write tables and picture as one HTML page too
@@ -83,7 +87,9 @@ Example:
 
 A visible item is proven by a ray along which it is in front, a hidden one by a division of its
 image into parts that each lie behind one nearer box. Both are checked in exact arithmetic, against
-the boxes as they are written. Exit code 1 if a proof does not hold.";
+the boxes as they are written. An error of a claim of what is seen from where (a map's REJECT table,
+a file given as --pvs) is proven by a line of sight between two regions that leads through openings,
+or by what it says of the two directions. Exit code 1 if a proof does not hold.";
 
 #[derive(Args, Debug)]
 #[command(after_help = CHECK_HELP)]
@@ -91,6 +97,9 @@ pub struct CheckArgs {
     /// The file that `funnel --certificates` wrote
     #[arg(value_name = "CERTIFICATES")]
     pub certificates: PathBuf,
+    /// The claim that the errors of stored-pvs are of
+    #[arg(long, value_name = "FILE")]
+    pub pvs: Option<PathBuf>,
     /// The scene, if it is to be found elsewhere than the certificates say
     #[arg(long)]
     pub scene: Option<String>,

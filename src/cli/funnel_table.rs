@@ -29,6 +29,10 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
     for (heading, table) in [
         ("What is left, drawn in every order", orders(report)),
         ("The first item under a cursor", picks(report)),
+        (
+            "Lower bounds: what must be read or written at any rate",
+            bounds(report),
+        ),
         ("With and without each stage of the chain", gains(report)),
     ] {
         if !table.rows.is_empty() {
@@ -160,6 +164,21 @@ fn picks(report: &FunnelReport) -> Rows {
             row.ray_count.to_string(),
             row.wrong_count.to_string(),
             row.ns_per_ray.map(text::time).unwrap_or_default(),
+        ]
+    }));
+    rows
+}
+
+fn bounds(report: &FunnelReport) -> Rows {
+    let mut rows = Rows::of_numbers(["bound", "of", "time", "time of the back end / bound"]);
+    rows.right.retain(|column| *column > 1);
+    rows.rows.extend(report.bounds.iter().map(|row| {
+        let times = &row.times;
+        vec![
+            row.name.to_owned(),
+            row.back_end.to_owned(),
+            text::time_within(times.stage_ns, [times.stage_ns_lower, times.stage_ns_upper]),
+            row.ratio.map(text::significant).unwrap_or_default(),
         ]
     }));
     rows

@@ -74,6 +74,7 @@ impl Setting {
             chain: &self.chain,
             structures: &self.structures,
             protocol,
+            claim: None,
             execution: args.kernel.execution()?,
         })
     }

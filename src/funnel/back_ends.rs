@@ -10,14 +10,23 @@ use crate::visibility::{Guarantee, Solids, region};
 /// What a chain takes where there are rooms.
 const PORTAL_CLIP: &str = "portal-clip";
 
+/// What there is only where a claim was given.
+const CLAIM: &str = region::STORED.name;
 /// Most rooms of which it is found out, exactly, what is seen from each.
 pub const MOST_EXACT_ROOMS: usize = 4_096;
 
 /// What finds a way through the rooms or sectors of a scene.
 fn of_regions(scene: &Scene) -> &'static [&'static str] {
-    const OF_ROOMS: &[&str] = &["flood", "portal-rect", PORTAL_CLIP, "exact-pvs"];
-    const OF_MANY_ROOMS: &[&str] = &["flood", "portal-rect", PORTAL_CLIP];
-    const OF_SECTORS: &[&str] = &["flood", "portal-rect", PORTAL_CLIP, "reject", "exact-pvs"];
+    const OF_ROOMS: &[&str] = &["flood", "portal-rect", PORTAL_CLIP, CLAIM, "exact-pvs"];
+    const OF_MANY_ROOMS: &[&str] = &["flood", "portal-rect", PORTAL_CLIP, CLAIM];
+    const OF_SECTORS: &[&str] = &[
+        "flood",
+        "portal-rect",
+        PORTAL_CLIP,
+        CLAIM,
+        "reject",
+        "exact-pvs",
+    ];
     match &scene.regions {
         Regions::Tiling(rooms) if rooms.boxes.len() <= MOST_EXACT_ROOMS => OF_ROOMS,
         Regions::Tiling(_) => OF_MANY_ROOMS,

@@ -1,16 +1,32 @@
 //! Proofs for what the chain removed and for what is visible: written to a file, and
 //! checked by `cullbench check`.
 
+use super::error::FunnelError;
 use super::pass::{ALL, Pass};
+use super::regions::ClaimAudit;
 use super::stage::{NONE, StageKind};
-use super::world::{FunnelError, FunnelInput, World};
+use super::world::{FunnelInput, World};
 use crate::query::ItemId;
 use crate::visibility::Solids;
+use crate::visibility::region::ClaimErrors;
 use crate::visibility::truth::{Certificates, Prover, RayIndex, SampleTruth, certify};
+
+/// What is wrong with each claim of what is seen from where, with what shows it.
+///
+/// # Errors
+/// As [`prepare`](super::prepare).
+pub fn claim_errors(input: &FunnelInput) -> Result<Vec<ClaimErrors>, FunnelError> {
+    let world = World::new(input)?;
+    let audits = world.audits().iter().map(|ClaimAudit { claim, audit }| {
+        let regions = world.region_row(claim).map_or(0, |row| row.graph().len());
+        ClaimErrors::of(audit, &input.scene.name, claim, regions)
+    });
+    Ok(audits.collect())
+}
 
 /// Looks for a proof of every item of each view that the frustum meets and that is
 /// either visible or removed by the chain; hands over one view after the other. False
-/// if stopped.
+/// if stopped. Of a map, whose items are no solids, there are none.
 ///
 /// # Errors
 /// As [`prepare`](super::prepare).
@@ -21,9 +37,12 @@ pub fn certificates(
 ) -> Result<bool, FunnelError> {
     let world = World::new(input)?;
     if !world.has_solids() {
-        return Err(FunnelError::NoSolids {
-            scene: input.scene.name.clone(),
-        });
+        return match world.audits() {
+            [] => Err(FunnelError::NoSolids {
+                scene: input.scene.name.clone(),
+            }),
+            _ => Ok(true),
+        };
     }
     let solids: &Solids = world.solids();
     let index = RayIndex::build(solids);

@@ -1,6 +1,7 @@
 //! What follows from a funnel, in sentences: which stages pay from which draw cost on,
 //! and which back ends lost what is visible.
 
+use super::regions::ClaimAudit;
 use super::report::{FunnelReport, Gain, StageRow};
 
 /// A sentence for each stage of the chain, and one for each back end that lost items.
@@ -8,9 +9,9 @@ pub fn conclusions(report: &FunnelReport) -> Vec<String> {
     let mut sentences: Vec<String> = report.gains.iter().map(of_gain).collect();
     let lossy = |row: &&StageRow| row.errors.false_negative_count > 0.0;
     sentences.extend(report.stages.iter().filter(lossy).map(of_loss));
-    if let Some(audit) = &report.reject {
+    for ClaimAudit { claim, audit } in &report.audits {
         sentences.push(format!(
-            "The map's REJECT table calls {} of {} ordered pairs of sectors visible, {} are: {} \
+            "The claim of {claim} calls {} of {} ordered pairs of regions visible, {} are: {} \
              pairs in one direction only, {} false negatives with a line of sight, {} false \
              positives.",
             audit.claimed,

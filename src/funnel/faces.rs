@@ -46,6 +46,11 @@ impl Faces {
         }
     }
 
+    /// The faces of a view.
+    pub fn clusters(&self, view: usize) -> &Arc<Clusters> {
+        &self.views[view].clusters
+    }
+
     /// What a back end leaves of the triangles of a view; `None` is no back end.
     fn selected(&self, back_end: Option<usize>, view: usize) -> Selection {
         let left = &self.views[view];

@@ -7,9 +7,11 @@
 //! process, [`Prepared::conclude`] puts both together.
 
 mod back_ends;
+mod bounds;
 mod certified;
 mod chain;
 mod conclusions;
+mod error;
 mod faces;
 mod hiding;
 mod judged;
@@ -28,15 +30,18 @@ mod truth;
 mod world;
 
 pub use back_ends::back_ends;
-pub use certified::certificates;
+pub use bounds::BoundRow;
+pub use certified::{certificates, claim_errors};
 pub use chain::Chain;
+pub use error::FunnelError;
 pub use judged::Errors;
 pub use orders::OrderRow;
 pub use picks::PickRow;
 pub use plan_view::{Fate, PlanView};
+pub use regions::{ClaimAudit, regions_of};
 pub use report::{FunnelReport, Gain, LevelRow, StageRow};
 pub use stage::{BackEnd, NONE, STAGES, StageKind};
 pub use study::{FunnelPlan, Prepared, failure, prepare, time};
 pub use sweep::{PreparedSweep, StageSweep, SweepPlan, SweepPoint, prepare_sweep, time_sweep};
 pub use times::Times;
-pub use world::{FunnelError, FunnelInput};
+pub use world::FunnelInput;

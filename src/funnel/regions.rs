@@ -3,14 +3,17 @@
 
 use std::sync::Arc;
 
+use serde::Serialize;
+
 use super::back_ends::MOST_EXACT_ROOMS;
+use super::error::FunnelError;
 use crate::input::InputError;
 use crate::scene::Scene;
 use crate::visibility::MapFile;
 use crate::visibility::region::doom::{DoomMap, SectorPvs};
 use crate::visibility::region::{
-    Audit, Flood, PortalClip, PortalRect, ProvenPvs, RegionGraph, RegionItems, RegionRow, RoomsPvs,
-    StoredPvs, audit,
+    Audit, Flood, OtherRegions, PortalClip, PortalRect, ProvenPvs, Pvs, REJECT, RegionGraph,
+    RegionItems, RegionRow, RoomsPvs, STORED, StoredPvs, audit,
 };
 
 /// The regions of a scene and what finds a way through them.
@@ -18,8 +21,31 @@ pub(super) struct Regions {
     rows: Vec<Box<dyn RegionRow>>,
     /// Which items are in which.
     pub items: RegionItems,
-    /// What a map's own table of what is seen from where gets wrong.
-    pub audit: Option<Audit>,
+    /// What claims of what is seen from where get wrong.
+    pub audits: Vec<ClaimAudit>,
+}
+
+/// A claim of which regions see which, and what is wrong with it.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+#[non_exhaustive]
+pub struct ClaimAudit {
+    /// The back end that reads it.
+    pub claim: &'static str,
+    /// Against what is proven.
+    #[serde(flatten)]
+    pub audit: Audit,
+}
+
+/// The regions of a scene, and the table that its own file claims to be what is seen
+/// from where; `None` for a scene without regions.
+///
+/// # Errors
+/// The map's file, read a second time.
+pub fn regions_of(scene: &Scene) -> Result<Option<(RegionGraph, Option<Pvs>)>, InputError> {
+    Ok(match map_of(scene)? {
+        Some(map) => Some((map.graph(), map.reject().cloned())),
+        None => RegionGraph::of_scene(scene).ok().map(|graph| (graph, None)),
+    })
 }
 
 /// The map that a scene is, if it is one.
@@ -39,9 +65,9 @@ impl Regions {
     ///
     /// # Errors
     /// The map's file, read a second time.
-    pub fn of(scene: &Scene) -> Result<Option<Regions>, InputError> {
+    pub fn of(scene: &Scene, claim: Option<&Arc<Pvs>>) -> Result<Option<Regions>, FunnelError> {
         if let Some(map) = map_of(scene)? {
-            return Ok(Some(Regions::of_map(map, scene)));
+            return Regions::of_map(map, scene, claim).map(Some);
         }
         let Ok(graph) = RegionGraph::of_scene(scene) else {
             return Ok(None);
@@ -51,23 +77,52 @@ impl Regions {
             true => RoomsPvs::of(graph.clone()).ok(),
             false => None,
         };
-        let exact = exact.and_then(|exact| stored(&exact, &graph));
-        Ok(Some(Regions::with(graph, exact, scene)))
+        let mut audits = Vec::new();
+        let mut rows = Vec::new();
+        if let Some(claim) = claim {
+            rows.push(claimed(claim, &graph)?);
+            let found = exact.as_ref().map(|exact| audit(claim, exact, &graph));
+            audits.extend(found.transpose()?.map(|audit| ClaimAudit {
+                claim: STORED.name,
+                audit,
+            }));
+        }
+        rows.extend(exact.and_then(|exact| stored(&exact, &graph)));
+        Ok(Some(Regions {
+            audits,
+            ..Regions::with(graph, rows, scene)
+        }))
     }
 
     /// The sectors of a map, with its own table and with what is exact.
-    fn of_map(map: Arc<DoomMap>, scene: &Scene) -> Regions {
+    fn of_map(
+        map: Arc<DoomMap>,
+        scene: &Scene,
+        claim: Option<&Arc<Pvs>>,
+    ) -> Result<Regions, FunnelError> {
         let graph = Arc::new(map.graph());
         let exact = SectorPvs::of(map.clone(), graph.clone());
-        let claim = map.reject();
-        let audit = claim.and_then(|claim| audit(claim, &exact, &graph).ok());
-        let reject = claim.cloned().map(Arc::new);
-        let reject = reject.and_then(|pvs| StoredPvs::reject(graph.clone(), pvs));
-        let exact = stored(&exact, &graph);
-        Regions {
-            audit,
-            ..Regions::with(graph, [reject, exact].into_iter().flatten(), scene)
+        let mut rows = Vec::new();
+        let mut audits = Vec::new();
+        if let Some(reject) = map.reject() {
+            rows.extend(StoredPvs::reject(graph.clone(), Arc::new(reject.clone())));
+            audits.push(ClaimAudit {
+                claim: REJECT.name,
+                audit: audit(reject, &exact, &graph)?,
+            });
         }
+        if let Some(claim) = claim {
+            rows.push(claimed(claim, &graph)?);
+            audits.push(ClaimAudit {
+                claim: STORED.name,
+                audit: audit(claim, &exact, &graph)?,
+            });
+        }
+        rows.extend(stored(&exact, &graph));
+        Ok(Regions {
+            audits,
+            ..Regions::with(graph, rows, scene)
+        })
     }
 
     fn with(
@@ -89,7 +144,7 @@ impl Regions {
         Regions {
             rows,
             items,
-            audit: None,
+            audits: Vec::new(),
         }
     }
 
@@ -103,6 +158,17 @@ impl Regions {
         let found = self.rows.iter().find(|row| row.about().name == name);
         found.map(|row| &**row)
     }
+}
+
+/// The claim of a file, as a row.
+fn claimed(claim: &Arc<Pvs>, graph: &Arc<RegionGraph>) -> Result<StoredPvs, FunnelError> {
+    let row = StoredPvs::claim(graph.clone(), claim.clone());
+    row.ok_or_else(|| {
+        FunnelError::Claim(OtherRegions {
+            claimed: claim.len(),
+            regions: graph.len(),
+        })
+    })
 }
 
 /// What an exact search has found, as a row.

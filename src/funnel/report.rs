@@ -2,17 +2,18 @@
 
 use serde::Serialize;
 
+use super::bounds::BoundRow;
 use super::chain::Chain;
 use super::judged::Errors;
 use super::orders::OrderRow;
 use super::picks::PickRow;
 use super::plan_view::PlanView;
+use super::regions::ClaimAudit;
 use super::stage::{BackEnd, StageKind};
 use super::times::Times;
 use crate::measure::OverProcesses;
 use crate::statistics::{ALPHA, trimmed_mean};
 use crate::visibility::Level;
-use crate::visibility::region::Audit;
 
 /// The funnel of a scene and a path.
 #[derive(Clone, Debug, Serialize)]
@@ -36,13 +37,15 @@ pub struct FunnelReport {
     pub chain: Chain,
     /// Every stage with every back end, each given what the chain hands it.
     pub stages: Vec<StageRow>,
-    /// What the map's own table of sectors that cannot see each other gets wrong; null
-    /// for what is no map.
-    pub reject: Option<Audit>,
+    /// What each claim of what is seen from where gets wrong: a map's own table of
+    /// sectors that cannot see each other, and what was given in a file.
+    pub audits: Vec<ClaimAudit>,
     /// What is left, drawn in every order.
     pub orders: Vec<OrderRow>,
     /// The first item under a cursor, by every back end of picking.
     pub picks: Vec<PickRow>,
+    /// The least that some of the back ends can take.
+    pub bounds: Vec<BoundRow>,
     /// Each stage of the chain, with it and without it.
     pub gains: Vec<Gain>,
     /// What follows, in a sentence each.

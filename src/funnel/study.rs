@@ -6,8 +6,10 @@ use std::cell::RefCell;
 use serde::{Deserialize, Serialize};
 
 use super::back_ends::back_ends;
+use super::bounds::{Bound, bounds};
 use super::chain::Chain;
 use super::conclusions::conclusions;
+use super::error::FunnelError;
 use super::faces::Faces;
 use super::judged::Errors;
 use super::orders::{self, Orders};
@@ -19,7 +21,7 @@ use super::stage::{NONE, StageKind};
 use super::times::Times;
 use super::triangle_rows;
 use super::truth::Truth;
-use super::world::{FunnelError, FunnelInput, World};
+use super::world::{FunnelInput, World};
 use crate::measure::{Ask, OverProcesses, ProcessTimes, Schedule, TimedTask, Verdict, timed};
 use crate::visibility::Level;
 use crate::visibility::truth::RayIndex;
@@ -126,7 +128,9 @@ pub fn prepare(
         (*stage, name, [side(&walks.chosen), side(without)])
     });
     let gains = gains.collect();
-    let timed = timed_tasks(&pass, &world, left.as_ref(), None);
+    let bounds = bounds_of(&world, &pass, &walks.chosen, left.as_ref());
+    let bound_rows = bounds.iter().map(Bound::row).collect();
+    let timed = timed_tasks(&pass, &world, left.as_ref(), bounds, None);
     let schedule = Schedule::new(world.views(), &timed, input.protocol);
     let level = Level::of(&input.scene.name, input.scene)?;
     Ok(Some(Prepared {
@@ -146,11 +150,12 @@ pub fn prepare(
             level: LevelRow::of(&level),
             chain: input.chain.clone(),
             stages: rows,
-            reject: world.audit().cloned(),
+            audits: world.audits().to_vec(),
             orders: drawn,
             picks: left.as_ref().map_or_else(Vec::new, |left| {
                 left.picks.judged(&RayIndex::build(world.solids()))
             }),
+            bounds: bound_rows,
             gains: Vec::new(),
             conclusions: Vec::new(),
             plan_view: plan_view(&world, &pass, &walks.chosen, &truth),
@@ -173,7 +178,8 @@ pub fn time(
         return Ok(None);
     };
     let left = Left::of(&world, &pass, &walks.chosen);
-    let tasks = timed_tasks(&pass, &world, left.as_ref(), Some(&plan.expected));
+    let bounds = bounds_of(&world, &pass, &walks.chosen, left.as_ref());
+    let tasks = timed_tasks(&pass, &world, left.as_ref(), bounds, Some(&plan.expected));
     let timed = timed(&tasks, &plan.schedule, input.protocol, &|_| stop());
     Ok(timed.map(|timed| ProcessTimes::of(&timed)))
 }
@@ -196,12 +202,22 @@ impl Left {
     }
 }
 
-/// Every step, every back end of the triangle stage, every order and every back end of
-/// picking as a task; what it must hand on is what it has, or what another process says.
+fn bounds_of<'w>(
+    world: &'w World<'w>,
+    pass: &Pass,
+    chosen: &Walked,
+    left: Option<&Left>,
+) -> Vec<Bound<'w>> {
+    bounds(world, pass, chosen.left(), left.map(|left| &left.faces))
+}
+
+/// Every step, every back end of the triangle stage, every order, every back end of
+/// picking and every bound as a task; what it must hand on is what it has, or what another process says.
 fn timed_tasks<'p>(
     pass: &'p Pass<'p>,
     world: &'p World<'p>,
     left: Option<&'p Left>,
+    bounds: Vec<Bound<'p>>,
     expected: Option<&[Vec<u64>]>,
 ) -> Vec<TimedTask<'p>> {
     let steps = pass.steps().iter().map(|step| {
@@ -244,7 +260,13 @@ fn timed_tasks<'p>(
         ask_many: None,
         least_ns: None,
     };
-    steps.chain(behind).enumerate().map(task).collect()
+    let bounds = bounds.into_iter().map(|bound| bound.ask);
+    steps
+        .chain(behind)
+        .chain(bounds)
+        .enumerate()
+        .map(task)
+        .collect()
 }
 
 /// How much is handed on in each view.
@@ -317,8 +339,20 @@ impl Prepared {
             row.ns_per_removed = per(row.errors.input_count - row.errors.output_count);
             row.ns_per_decided = per(row.errors.input_count);
         }
-        // Behind the stages come the orders, and last of all picking.
-        let picks = self.plan.expected.len() - report.picks.len();
+        // Behind the stages come the orders, then picking, and last of all the bounds.
+        let bounds = self.plan.expected.len() - report.bounds.len();
+        for (bound, own) in report.bounds.iter_mut().zip(bounds..) {
+            let of = |row: &StageRow| {
+                row.back_end.stage == bound.stage && row.back_end.name == bound.back_end
+            };
+            let task = report
+                .stages
+                .iter()
+                .position(of)
+                .and_then(|row| self.tasks[row]);
+            bound.set(times.ns(own), task.and_then(|task| times.ratio(task, own)));
+        }
+        let picks = bounds - report.picks.len();
         for (row, task) in report.picks.iter_mut().zip(picks..) {
             row.times = Times::of(times.ns(task));
             row.ns_per_ray = row.times.stage_ns.map(|ns| ns / Picks::RAYS_PER_VIEW);

@@ -4,7 +4,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::back_ends::back_ends;
+use super::error::FunnelError;
 use super::faces::Faces;
 use super::hiding::HIDING;
 use super::judged::{Errors, Judged, judge_items};
@@ -13,7 +13,7 @@ use super::stage::{BackEnd, NONE, StageKind};
 use super::times::Times;
 use super::triangle_rows;
 use super::truth::Truth;
-use super::world::{FunnelError, FunnelInput, World};
+use super::world::{FunnelInput, World};
 use crate::measure::{Ask, OverProcesses, ProcessTimes, Schedule, TimedTask, timed};
 use crate::visibility::SampleGrid;
 use crate::visibility::truth::{RayIndex, visible_by_random_rays};
@@ -152,7 +152,8 @@ impl<'w> Given<'w> {
                 rows.map(entry).collect()
             }
             _ => {
-                let rows = back_ends(stage, world.scene()).into_iter();
+                let rows = world.names(stage).into_iter();
+                let rows = rows.map(|name| world.back_end(stage, &name));
                 let entry = |back_end: BackEnd| {
                     let run = world.run(stage, back_end.name);
                     Entry {

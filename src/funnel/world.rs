@@ -3,15 +3,17 @@
 
 use std::borrow::Cow;
 use std::cell::RefCell;
+use std::sync::Arc;
 
 use glam::DVec3;
 
 use super::back_ends::back_ends;
 use super::chain::Chain;
+use super::error::FunnelError;
 use super::hiding::{HIDING, HidingRow};
 use super::judged::{Judged, judge_items};
 use super::plan_view::{Fate, MOST_DRAWN, PlanView};
-use super::regions::{Regions, map_of};
+use super::regions::{ClaimAudit, Regions, map_of};
 use super::stage::{BackEnd, NONE, StageKind};
 use super::truth::Truth;
 use crate::camera::PlaneOptions;
@@ -25,10 +27,10 @@ use crate::query::ItemId;
 use crate::scene::Scene;
 use crate::visibility::fragment::{Canvas, Piece, Tests, draw};
 use crate::visibility::occlusion::{self, OccluderScene};
-use crate::visibility::region::{Audit, EyePlace, Marks, Scratch};
+use crate::visibility::region::{EyePlace, Marks, Pvs, RegionRow, Scratch};
 use crate::visibility::triangle;
 use crate::visibility::truth::{RayIndex, SampleTruth, SurfaceIndex};
-use crate::visibility::{Guarantee, NoRays, Rays, SampleGrid, Solids};
+use crate::visibility::{Guarantee, Rays, SampleGrid, Solids};
 
 /// What a funnel is studied on.
 #[derive(Clone, Copy)]
@@ -47,49 +49,10 @@ pub struct FunnelInput<'a> {
     pub structures: &'a [StructureSpec],
     /// Rounds and times of a process.
     pub protocol: &'a Protocol,
+    /// What is claimed to be seen from each region: a back end of the region stage.
+    pub claim: Option<&'a Arc<Pvs>>,
     /// Instructions of every stage, and threads that look for the truth.
     pub execution: Execution,
-}
-
-/// Why there is no funnel.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum FunnelError {
-    /// A structure that refuses the scene.
-    #[error(transparent)]
-    Build(#[from] BuildError),
-    /// A camera without a frustum.
-    #[error(transparent)]
-    View(#[from] WorkloadError),
-    /// A camera without rays.
-    #[error("camera {index}: {error}")]
-    Rays {
-        /// Its index in the path.
-        index: usize,
-        /// Why.
-        error: NoRays,
-    },
-    /// The scene's file, read a second time.
-    #[error(transparent)]
-    Input(#[from] InputError),
-    /// Proofs are about solid boxes.
-    #[error(
-        "'{scene}' is a map, whose items are walls; expected a scene of solid boxes for proofs"
-    )]
-    NoSolids {
-        /// Its name.
-        scene: String,
-    },
-    /// A back end that the scene has no data for.
-    #[error("{stage} '{name}' needs what the scene does not have; expected one of {known}", stage = stage.name())]
-    Absent {
-        /// The stage.
-        stage: StageKind,
-        /// What was asked for.
-        name: String,
-        /// What there is.
-        known: String,
-    },
 }
 
 /// Answers a stage in a view from what it is given (`None`: all items), appending to
@@ -153,7 +116,7 @@ impl<'a> World<'a> {
             views: views.collect::<Result<_, FunnelError>>()?,
             occluders: OccluderScene::of(&solids),
             solids,
-            regions: Regions::of(input.scene)?,
+            regions: Regions::of(input.scene, input.claim)?,
         };
         for stage in StageKind::OF_ITEMS {
             let (name, known) = (input.chain.of(stage), world.names(stage));
@@ -173,15 +136,35 @@ impl<'a> World<'a> {
         self.views.len()
     }
 
-    /// What a map's own table of what is seen from where gets wrong; `None` for a scene
-    /// without one.
-    pub fn audit(&self) -> Option<&Audit> {
-        self.regions.as_ref()?.audit.as_ref()
+    /// What each claim of what is seen from where gets wrong.
+    pub fn audits(&self) -> &[ClaimAudit] {
+        self.regions.as_ref().map_or(&[], |regions| &regions.audits)
     }
 
     /// The scene itself.
     pub fn scene(&self) -> &Scene {
         self.scene
+    }
+
+    /// The items as they are drawn and tested in the occlusion stage.
+    pub fn occluders(&self) -> &OccluderScene {
+        &self.occluders
+    }
+
+    /// A view as the occlusion stage has it, with a buffer of so many pixels.
+    pub fn hiding_view(&self, view: usize, buffer: SampleGrid) -> occlusion::View<'_> {
+        let View { rays, volume, .. } = &self.views[view];
+        occlusion::View::new(rays, volume, &self.occluders, buffer)
+    }
+
+    /// A back end of the region stage, if the scene has it.
+    pub fn region_row(&self, name: &str) -> Option<&dyn RegionRow> {
+        self.regions.as_ref()?.row(name)
+    }
+
+    /// Where it is looked whether an item is visible.
+    pub fn samples(&self) -> SampleGrid {
+        self.samples
     }
 
     /// The instructions of every stage.
@@ -345,8 +328,7 @@ impl<'a> World<'a> {
         let does_both = row.back_end().does_object_stage;
         let every: Vec<ItemId> = (0..self.items() as ItemId).collect();
         Box::new(move |view, input, out| {
-            let View { rays, volume, .. } = &self.views[view];
-            let view = occlusion::View::new(rays, volume, &self.occluders, buffer);
+            let view = self.hiding_view(view, buffer);
             let items = input.unwrap_or(&every);
             hide.borrow_mut().hide(&self.occluders, &view, items, out);
             // It has looked beyond the regions that are seen.

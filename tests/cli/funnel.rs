@@ -263,6 +263,89 @@ fn proofs_are_checked_and_doctored_ones_rejected() {
     }
 }
 
+/// The map with a table that calls every pair of sectors invisible, a sector and itself too.
+fn map_that_hides_everything() -> Vec<u8> {
+    let mut bytes = fs::read("datasets/freedm_map12.wad").expect("a map");
+    let word = |bytes: &[u8], at: usize| {
+        u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]) as usize
+    };
+    let [count, directory] = [4, 8].map(|at| word(&bytes, at));
+    let entries = (0..count).map(|entry| directory + 16 * entry);
+    let mut table = entries.filter(|at| bytes[at + 8..].starts_with(b"REJECT"));
+    let entry = table.next().expect("a REJECT lump");
+    let (place, size) = (word(&bytes, entry), word(&bytes, entry + 4));
+    assert!(size > 0, "an empty REJECT lump");
+    bytes[place..place + size].fill(0xff);
+    bytes
+}
+
+#[test]
+fn what_a_claim_hides_is_proven_to_be_seen() {
+    let folder = folder();
+    let at = folder.path();
+    fs::write(at.join("dark.wad"), map_that_hides_everything()).expect("written");
+    let line = "funnel --scene dark.wad --path street:frames=2 --processes 1 --format json \
+                --certificates errors.jsonl";
+    let done = cullbench(at, line);
+    // The claim promises nothing, so what it loses is no failure.
+    assert_eq!(done.code, Some(0), "{done:?}");
+    let report = json(&done.out);
+    let audits = array(&report, "audits");
+    assert_eq!((audits.len(), &audits[0]["claim"]), (1, &"reject".into()));
+    let lost = array(&audits[0], "false_negatives").len() as f64;
+    assert!(lost > 100.0, "{lost}");
+    let checked = json(&works(at, "check errors.jsonl --format json"));
+    assert_eq!(number(&checked, "false_negative_count"), lost);
+    assert_eq!(number(&checked, "claim_count"), 1.0);
+    let errors = fs::read_to_string(at.join("errors.jsonl")).expect("errors");
+    let doctored = errors.replacen("\"ends\":[[", "\"ends\":[[9", 1);
+    assert_ne!(doctored, errors);
+    fs::write(at.join("doctored.jsonl"), doctored).expect("written");
+    let done = cullbench(at, "check doctored.jsonl");
+    assert_eq!(done.code, Some(1), "{done:?}");
+    assert!(done.out.contains("rejected, regions"), "{done:?}");
+    // The true map's table does not say that.
+    let true_map = "check errors.jsonl --scene freedm-map12";
+    assert_eq!(cullbench(at, true_map).code, Some(1));
+
+    // The same by a file, of which stored-pvs is the back end.
+    let regions = number(&json(errors.trim()), "regions");
+    let none = format!("{{\"regions\": {regions}, \"sees\": []}}");
+    fs::write(at.join("none.json"), none).expect("written");
+    let line = "funnel --scene freedm-map12 --path street:frames=2 --processes 1 --format json \
+                --pvs none.json --region stored-pvs --certificates stored.jsonl";
+    let report = json(&works(at, line));
+    let claims: Vec<_> = array(&report, "audits")
+        .iter()
+        .map(|a| &a["claim"])
+        .collect();
+    assert_eq!(claims, ["reject", "stored-pvs"]);
+    assert!(number(row(&report, "region", "stored-pvs"), "false_negative_count") > 0.0);
+    let checked = json(&works(
+        at,
+        "check stored.jsonl --pvs none.json --format json",
+    ));
+    assert_eq!(number(&checked, "false_negative_count"), lost);
+    assert_refused(
+        &cullbench(at, "check stored.jsonl"),
+        "line 2 | --pvs FILE",
+        "no claim",
+    );
+    for (content, wanted) in [
+        ("{\"regions\": 3, \"sees\": []}", "3 regions"),
+        (
+            "{\"regions\": 3, \"sees\": [[0, 9]]}",
+            "bad.json | region 9",
+        ),
+        ("[]", "bad.json | regions"),
+        ("\u{7f}", "bad.json"),
+    ] {
+        fs::write(at.join("bad.json"), content).expect("written");
+        let line = "funnel --scene freedm-map12 --path street:frames=2 --pvs bad.json";
+        assert_refused(&cullbench(at, line), wanted, content);
+    }
+}
+
 #[test]
 fn whole_pixels_lose_nothing_at_any_size_and_pixel_centres_do() {
     let line = "precision --scene city:n=4000 --stage occlusion --path street:frames=6 --processes 1 \

@@ -161,7 +161,61 @@ impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
     }
 }
 
+/// What is known of a tile's pixels.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) struct Tile {
+    pub reference: f32,
+    pub working: f32,
+    pub mask: Mask,
+}
+
 impl<const WHOLE: bool> Masked<WHOLE> {
+    /// How many tiles there are.
+    pub(super) fn tiles(&self) -> usize {
+        self.columns * self.rows
+    }
+
+    #[inline(always)]
+    pub(super) fn tile(&self, at: usize) -> Tile {
+        Tile {
+            reference: self.reference[at],
+            working: self.working[at],
+            mask: self.mask[at],
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn set_tile(&mut self, at: usize, tile: &Tile) {
+        self.reference[at] = tile.reference;
+        self.working[at] = tile.working;
+        self.mask[at] = tile.mask;
+    }
+
+    /// The tiles that a rectangle meets, each with the part of it that lies there.
+    pub(super) fn tiles_of(&self, rect: &Rect) -> impl Iterator<Item = (usize, Rect)> {
+        let (rect, columns) = (*rect, self.columns);
+        let of = |first: u16, last: u16, size: usize| {
+            let tiles = usize::from(first) / size..usize::from(last) / size + 1;
+            tiles.map(move |tile| {
+                let low = (tile * size) as u16;
+                (tile, first.max(low), last.min(low + (size - 1) as u16))
+            })
+        };
+        of(rect.y0, rect.y1, TILE_HEIGHT).flat_map(move |(row, y0, y1)| {
+            of(rect.x0, rect.x1, TILE_WIDTH).map(move |(column, x0, x1)| {
+                let nearness = rect.nearness;
+                let part = Rect {
+                    x0,
+                    x1,
+                    y0,
+                    y1,
+                    nearness,
+                };
+                (row * columns + column, part)
+            })
+        })
+    }
+
     /// Those of the lanes that are hidden as far as one tile goes: the one that
     /// holds the pixel (x, y) of each.
     #[inline(always)]

@@ -21,6 +21,7 @@ mod scene;
 mod stats;
 #[cfg(test)]
 mod tests;
+mod trace;
 mod two_pass;
 mod view;
 mod zbuffer;
@@ -35,6 +36,7 @@ pub use outline::{Coverage, Outline};
 pub use rect::{Rect, Rects};
 pub use scene::{Faces, OccluderScene};
 pub use stats::CullStats;
+pub use trace::FrameTrace;
 pub use two_pass::{OccluderChoice, TwoPass};
 pub use view::{Linear, Projection, View};
 pub use zbuffer::ZBuffer;

@@ -1,0 +1,229 @@
+//! The least that stages can take: what they must read and write at any rate, and
+//! nothing decided. Bounds are timed beside the stages, so that a ratio to one is paired
+//! like any other.
+
+use std::cell::RefCell;
+use std::hint::black_box;
+
+use serde::Serialize;
+
+use super::faces::Faces;
+use super::pass::Pass;
+use super::stage::StageKind;
+use super::times::Times;
+use super::world::World;
+use crate::measure::Ask;
+use crate::query::ItemId;
+use crate::statistics::Estimate;
+use crate::visibility::fragment::{Canvas, Piece, Tests, draw};
+use crate::visibility::occlusion::{FrameTrace, MaskedInner, OcclusionBuffer};
+use crate::visibility::region::{Opening, RegionId, RegionRow, Scratch};
+use crate::visibility::triangle::SafeCones;
+
+/// A lower bound of a back end, over all views.
+#[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
+pub struct BoundRow {
+    /// The stage of the back end.
+    pub stage: StageKind,
+    /// The back end that it is a bound of.
+    pub back_end: &'static str,
+    /// What is done and nothing else.
+    pub name: &'static str,
+    /// Thread CPU time of a view.
+    #[serde(flatten)]
+    pub times: Times,
+    /// Time of the back end / time of this; null where the back end has none.
+    pub ratio: Option<f64>,
+    /// Lower end of its 95 % interval.
+    pub ratio_lower: Option<f64>,
+    /// Upper end of its 95 % interval.
+    pub ratio_upper: Option<f64>,
+}
+
+impl BoundRow {
+    /// With its time, and the back end's over it.
+    pub fn set(&mut self, own: Option<Estimate>, ratio: Option<Estimate>) {
+        self.times = Times::of(own);
+        let finite = |end: f64| Some(end).filter(|end| end.is_finite());
+        self.ratio = ratio.map(|r| r.value);
+        self.ratio_lower = ratio.and_then(|r| finite(r.lower));
+        self.ratio_upper = ratio.and_then(|r| finite(r.upper));
+    }
+}
+
+/// A bound, ready to be timed.
+pub struct Bound<'w> {
+    stage: StageKind,
+    back_end: &'static str,
+    name: &'static str,
+    /// Does it in a view; what is appended is counted and no answer.
+    pub ask: Ask<'w>,
+}
+
+impl Bound<'_> {
+    /// Without times.
+    pub fn row(&self) -> BoundRow {
+        BoundRow {
+            stage: self.stage,
+            back_end: self.back_end,
+            name: self.name,
+            times: Times::default(),
+            ratio: None,
+            ratio_lower: None,
+            ratio_upper: None,
+        }
+    }
+}
+
+/// The bounds that a scene has data for: of the region stage, and where items are solid
+/// boxes of all others. `left` is the set that the chain leaves.
+pub fn bounds<'w>(
+    world: &'w World<'w>,
+    pass: &Pass,
+    left: usize,
+    faces: Option<&Faces>,
+) -> Vec<Bound<'w>> {
+    let mut bounds = of_regions(world);
+    if let Some(faces) = faces {
+        bounds.extend(of_occlusion(world));
+        bounds.push(of_cones(world, faces));
+        bounds.push(of_fragments(world, pass, left));
+    }
+    bounds
+}
+
+fn of_regions<'w>(world: &'w World<'w>) -> Vec<Bound<'w>> {
+    let mut bounds = Vec::new();
+    let views = 0..world.views();
+    if let Some(row) = world.region_row("exact-pvs") {
+        let homes = views.clone().map(|view| {
+            let mut homes = Vec::new();
+            let inside = row.graph().homes(world.rays(view), &mut homes);
+            homes.truncate(if inside { homes.len() } else { 0 });
+            homes
+        });
+        let homes: Vec<Vec<RegionId>> = homes.collect();
+        bounds.push(Bound {
+            stage: StageKind::Region,
+            back_end: "exact-pvs",
+            name: "read the rows of the eye's regions",
+            ask: Box::new(move |view, out| {
+                // Replaces what is there: of several regions the last one stays.
+                homes[view]
+                    .iter()
+                    .for_each(|&home| row.from_region(home, out));
+            }),
+        });
+    }
+    if let Some(row) = world.region_row("portal-clip") {
+        let openings: Vec<Vec<Opening>> =
+            views.map(|view| seen_openings(world, row, view)).collect();
+        bounds.push(Bound {
+            stage: StageKind::Region,
+            back_end: "portal-clip",
+            name: "read the portals between regions that are seen",
+            ask: Box::new(move |view, _| {
+                let corners = openings[view].iter().flat_map(|opening| &opening.corners);
+                let bits = corners.fold(0, |all, p| {
+                    all ^ p.x.to_bits() ^ p.y.to_bits() ^ p.z.to_bits()
+                });
+                black_box(bits);
+            }),
+        });
+    }
+    bounds
+}
+
+/// The openings between two regions that are both seen.
+fn seen_openings(world: &World, row: &dyn RegionRow, view: usize) -> Vec<Opening> {
+    let mut seen = Vec::new();
+    row.from_eye(world.rays(view), &mut Scratch::default(), &mut seen);
+    let is_seen = |region: &RegionId| seen.binary_search(region).is_ok();
+    let openings = row.graph().openings().iter();
+    openings
+        .filter(|opening| opening.sides.iter().all(is_seen))
+        .copied()
+        .collect()
+}
+
+fn of_occlusion<'w>(world: &'w World<'w>) -> [Bound<'w>; 3] {
+    let traces = || -> Vec<FrameTrace> {
+        let views = (0..world.views()).map(|view| world.hiding_view(view, world.samples()));
+        let trace = |view| FrameTrace::of(world.occluders(), &view, world.kernel());
+        views.map(trace).collect()
+    };
+    let scene = world.occluders();
+    let bound = |name, ask| Bound {
+        stage: StageKind::Occlusion,
+        back_end: "masked-inner",
+        name,
+        ask,
+    };
+    let [reading, replaying, testing] = [(); 3].map(|()| traces());
+    let buffer = RefCell::new(MaskedInner::new(world.samples()));
+    let read = MaskedInner::new(world.samples());
+    [
+        bound(
+            "read the occluders that are drawn",
+            Box::new(move |view, _| {
+                black_box(reading[view].read_occluders(scene));
+            }),
+        ),
+        bound(
+            "clear the buffer and write its tiles as in this view",
+            Box::new(move |view, _| replaying[view].replay(&mut buffer.borrow_mut())),
+        ),
+        bound(
+            "read the boxes that are tested and the tiles that decide",
+            Box::new(move |view, _| {
+                black_box(testing[view].read_tested(scene, &read));
+            }),
+        ),
+    ]
+}
+
+fn of_cones<'w>(world: &'w World<'w>, faces: &Faces) -> Bound<'w> {
+    let views = (0..world.views()).map(|view| SafeCones::of(faces.clusters(view)));
+    let cones: Vec<SafeCones> = views.collect();
+    let kernel = world.kernel();
+    Bound {
+        stage: StageKind::Triangle,
+        back_end: "cone-f32-safe",
+        name: "read the cones",
+        ask: Box::new(move |view, _| {
+            black_box(cones[view].read(kernel));
+        }),
+    }
+}
+
+fn of_fragments<'w>(world: &'w World<'w>, pass: &Pass, left: usize) -> Bound<'w> {
+    let covered = (0..world.views()).map(|view| {
+        let items = world.listed(pass.items(left, view));
+        let solids = world.solids().some(&items);
+        let pieces: Vec<Piece> = (0..items.len() as ItemId)
+            .map(|item| Piece { item, part: None })
+            .collect();
+        let canvas = Canvas::of(world.rays(view), world.samples());
+        draw(&canvas, &solids, &pieces, &Tests::default())
+            .tally
+            .covered as usize
+    });
+    let covered: Vec<usize> = covered.collect();
+    let samples = world.samples().samples();
+    let depths = vec![1.0f32; samples];
+    let buffer = RefCell::new(vec![0.0f32; samples]);
+    let ids: Vec<ItemId> = (0..samples as ItemId).collect();
+    Bound {
+        stage: StageKind::Fragment,
+        back_end: "z-test",
+        name: "write id and depth of each covered sample once",
+        ask: Box::new(move |view, out| {
+            let count = covered[view];
+            out.extend_from_slice(&ids[..count]);
+            let buffer = &mut buffer.borrow_mut();
+            buffer[..count].copy_from_slice(&depths[..count]);
+            black_box(&buffer[..count]);
+        }),
+    }
+}

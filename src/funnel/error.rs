@@ -1,0 +1,53 @@
+//! Why there is no funnel of a scene.
+
+use super::stage::StageKind;
+use crate::index::BuildError;
+use crate::input::InputError;
+use crate::measure::WorkloadError;
+use crate::visibility::NoRays;
+use crate::visibility::region::OtherRegions;
+
+/// Why there is no funnel.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum FunnelError {
+    /// A structure that refuses the scene.
+    #[error(transparent)]
+    Build(#[from] BuildError),
+    /// A camera without a frustum.
+    #[error(transparent)]
+    View(#[from] WorkloadError),
+    /// A camera without rays.
+    #[error("camera {index}: {error}")]
+    Rays {
+        /// Its index in the path.
+        index: usize,
+        /// Why.
+        error: NoRays,
+    },
+    /// The scene's file, read a second time.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// Proofs are about solid boxes.
+    #[error(
+        "'{scene}' is a map without a claim of what is seen from where, and its items are walls; \
+         expected a scene of solid boxes, or a claim, for proofs"
+    )]
+    NoSolids {
+        /// Its name.
+        scene: String,
+    },
+    /// What is claimed to be seen from where is of other regions.
+    #[error(transparent)]
+    Claim(#[from] OtherRegions),
+    /// A back end that the scene has no data for.
+    #[error("{stage} '{name}' needs what the scene does not have; expected one of {known}", stage = stage.name())]
+    Absent {
+        /// The stage.
+        stage: StageKind,
+        /// What was asked for.
+        name: String,
+        /// What there is.
+        known: String,
+    },
+}
