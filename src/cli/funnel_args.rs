@@ -12,13 +12,16 @@ use crate::visibility::SampleGrid;
 const FUNNEL_HELP: &str = "\
 Columns of the table:
   in, out      items (triangles in the triangle stage) that the stage is given and hands on, a view
-  visible      of them those that are in front at a sample (that face the eye)
+  truth        of them those that are in front at a sample (that face the eye)
   FP, FN       handed on though not visible; visible and not handed on
-  time         CPU time of the stage, a view
-  per removed  time / what the stage removed
+  time         CPU time of the stage, a view, with half of its 95 % interval
+  per item     time / what the stage removed
 The rows of a stage are given what the chain hands them; * marks the chain's own, ? a back end that
-promises nothing. NAME is what the column `by` shows; none leaves a stage out. What is true is decided exactly, along the rays through the samples. Where the
-occlusion stage walks a tree of its own (masked-inner, masked), its time holds the object stage's.";
+promises nothing. NAME is what the column `by` shows; none leaves a stage out. What is true is
+decided exactly, along the rays through the samples. Where the occlusion stage walks a tree of its
+own (masked-inner, masked), its time holds the object stage's. Orders: pairs of items that overlap in
+the image, those drawn in the wrong order, and samples that show a wrong item without a z-test.
+A lower bound does what must be done at any rate and decides nothing.";
 
 #[derive(Args, Debug)]
 #[command(after_help = FUNNEL_HELP)]

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 
 use super::document::{Block, Rows};
 use super::text;
-use crate::funnel::{FunnelReport, Gain, StageRow};
+use crate::funnel::{FunnelReport, Gain, StageRow, Times};
 use crate::shown::field;
 use crate::visibility::Guarantee;
 
@@ -67,15 +67,7 @@ pub fn terminal(blocks: &[Block]) -> String {
 fn stages(report: &FunnelReport) -> Rows {
     let mut rows = Rows {
         header: [
-            "stage",
-            "by",
-            "in",
-            "out",
-            "visible",
-            "FP",
-            "FN",
-            "time",
-            "per removed",
+            "stage", "by", "in", "out", "truth", "FP", "FN", "time", "per item",
         ]
         .map(str::to_owned)
         .into(),
@@ -102,7 +94,6 @@ fn stage(row: &StageRow) -> Vec<String> {
         Guarantee::Unproven => "?",
         _ => "",
     };
-    let times = &row.times;
     vec![
         row.back_end.stage.name().to_owned(),
         format!("{name}{mark}{doubt}"),
@@ -111,9 +102,14 @@ fn stage(row: &StageRow) -> Vec<String> {
         count(errors.truth_count),
         count(errors.false_positive_count),
         count(errors.false_negative_count),
-        text::time_within(times.stage_ns, [times.stage_ns_lower, times.stage_ns_upper]),
+        of_view(&row.times),
         row.ns_per_removed.map(text::time).unwrap_or_default(),
     ]
+}
+
+/// A time with half of its interval.
+fn of_view(times: &Times) -> String {
+    text::time_plus_minus(times.stage_ns, [times.stage_ns_lower, times.stage_ns_upper])
 }
 
 /// A mean of counts.
@@ -130,13 +126,12 @@ fn orders(report: &FunnelReport) -> Rows {
         "fragments",
         "shaded",
         "overdraw",
-        "overlapping pairs",
+        "pairs",
         "wrong",
         "wrong samples",
         "time",
     ]);
     rows.rows.extend(report.orders.iter().map(|row| {
-        let times = &row.times;
         vec![
             row.name.to_owned(),
             count(row.fragment_count),
@@ -145,7 +140,7 @@ fn orders(report: &FunnelReport) -> Rows {
             count(row.pair_count),
             count(row.wrong_pair_count),
             count(row.wrong_sample_count),
-            text::time_within(times.stage_ns, [times.stage_ns_lower, times.stage_ns_upper]),
+            of_view(&row.times),
         ]
     }));
     rows
@@ -170,14 +165,13 @@ fn picks(report: &FunnelReport) -> Rows {
 }
 
 fn bounds(report: &FunnelReport) -> Rows {
-    let mut rows = Rows::of_numbers(["bound", "of", "time", "time of the back end / bound"]);
+    let mut rows = Rows::of_numbers(["bound", "of", "time", "ratio"]);
     rows.right.retain(|column| *column > 1);
     rows.rows.extend(report.bounds.iter().map(|row| {
-        let times = &row.times;
         vec![
             row.name.to_owned(),
             row.back_end.to_owned(),
-            text::time_within(times.stage_ns, [times.stage_ns_lower, times.stage_ns_upper]),
+            of_view(&row.times),
             row.ratio.map(text::significant).unwrap_or_default(),
         ]
     }));
@@ -206,7 +200,7 @@ fn gain(gain: &Gain) -> Vec<String> {
         count(gain.with_count),
         count(gain.without_count),
         match gain.break_even_ns {
-            Some(_) => text::time_within(
+            Some(_) => text::time_plus_minus(
                 gain.break_even_ns,
                 [gain.break_even_ns_lower, gain.break_even_ns_upper],
             ),

@@ -134,6 +134,17 @@ pub fn time_within(ns: Option<f64>, ends: [Option<f64>; 2]) -> String {
     ns.map(shown).unwrap_or_default()
 }
 
+/// The same with a margin on both sides: "1.30±0.38 us".
+pub fn time_plus_minus(ns: Option<f64>, ends: [Option<f64>; 2]) -> String {
+    let shown = |ns: f64| {
+        let (size, name) = unit(ns);
+        let margin = ends.into_iter().map(|end| Some((end? - ns).abs() / size));
+        let margin = margin.fold(Some(0.0), |all, end| Some(f64::max(all?, end?)));
+        format!("{} {name}", plus_minus(ns / size, margin))
+    };
+    ns.map(shown).unwrap_or_default()
+}
+
 /// A value with a margin, to the digits that the margin leaves: "83.4±0.7",
 /// "560000±9000". Of nothing seen, what it is below: "<0.0005".
 pub fn plus_minus(value: f64, margin: Option<f64>) -> String {

@@ -122,7 +122,7 @@ fn of_regions<'w>(world: &'w World<'w>) -> Vec<Bound<'w>> {
         bounds.push(Bound {
             stage: StageKind::Region,
             back_end: "portal-clip",
-            name: "read the portals between regions that are seen",
+            name: "read the portals between seen regions",
             ask: Box::new(move |view, _| {
                 let corners = openings[view].iter().flat_map(|opening| &opening.corners);
                 let bits = corners.fold(0, |all, p| {
@@ -171,11 +171,11 @@ fn of_occlusion<'w>(world: &'w World<'w>) -> [Bound<'w>; 3] {
             }),
         ),
         bound(
-            "clear the buffer and write its tiles as in this view",
+            "clear the buffer and write its tiles again",
             Box::new(move |view, _| replaying[view].replay(&mut buffer.borrow_mut())),
         ),
         bound(
-            "read the boxes that are tested and the tiles that decide",
+            "read the tested boxes and the deciding tiles",
             Box::new(move |view, _| {
                 black_box(testing[view].read_tested(scene, &read));
             }),
@@ -217,7 +217,7 @@ fn of_fragments<'w>(world: &'w World<'w>, pass: &Pass, left: usize) -> Bound<'w>
     Bound {
         stage: StageKind::Fragment,
         back_end: "z-test",
-        name: "write id and depth of each covered sample once",
+        name: "write id and depth of each covered sample",
         ask: Box::new(move |view, out| {
             let count = covered[view];
             out.extend_from_slice(&ids[..count]);
