@@ -10,12 +10,16 @@ use super::funnel::claim;
 use super::funnel_args::CheckArgs;
 use super::shared_args::TableFormat;
 use super::{Ending, load_scene, print_json, text, unread_is_fine};
+use crate::camera::Camera;
 use crate::funnel::regions_of;
 use crate::input::read_file;
+use crate::path::{self, CameraPath, LensDefaults};
 use crate::scene::{Scene, WorldBox};
-use crate::visibility::Solids;
 use crate::visibility::region::{ClaimErrors, Pvs, REJECT, RegionGraph};
-use crate::visibility::truth::{Certificates, Counts, check as check_proofs};
+use crate::visibility::truth::{
+    CameraOf, Certificates, Counts, View as CertifiedView, check as check_proofs,
+};
+use crate::visibility::{Rays, Solids};
 use serde::Serialize;
 
 /// What was found in a file.
@@ -37,7 +41,7 @@ struct Checked {
 #[derive(Serialize)]
 struct Rejection {
     line: usize,
-    /// Null for an error of a claim.
+    /// Null for an error of a claim, and for a view as a whole.
     item: Option<u32>,
     reason: String,
 }
@@ -51,9 +55,25 @@ impl Checked {
         self.cell_count += counts.cells;
     }
 
-    /// The proofs of one view.
-    fn view(&mut self, line: usize, proofs: &Certificates, boxes: &[WorldBox]) {
+    /// The proofs of one view, which is to be that of a camera.
+    fn view(
+        &mut self,
+        line: usize,
+        proofs: &Certificates,
+        boxes: &[WorldBox],
+        camera: Option<&Camera>,
+    ) {
         self.view_count += 1;
+        let is_its_view = |camera: &Camera| {
+            Rays::of(camera).is_ok_and(|rays| CertifiedView::of(&rays) == proofs.view)
+        };
+        if !camera.is_none_or(is_its_view) {
+            return self.rejected.push(Rejection {
+                line,
+                item: None,
+                reason: "the view is not that of its camera".to_owned(),
+            });
+        }
         match check_proofs(proofs, boxes) {
             Ok(counts) => self.add(&counts),
             Err(rejected) => self.rejected.push(Rejection {
@@ -110,7 +130,25 @@ impl Line {
 struct Loaded {
     scene: Scene,
     boxes: Vec<WorldBox>,
+    paths: BTreeMap<String, CameraPath>,
     regions: Option<(RegionGraph, Option<Pvs>)>,
+}
+
+impl Loaded {
+    /// The camera that a view is said to be of.
+    fn camera(&mut self, of: &CameraOf, lens: &LensDefaults) -> anyhow::Result<Camera> {
+        let CameraOf { path, index } = of;
+        if !self.paths.contains_key(path) {
+            let found = path::load(path, &self.scene, lens)?;
+            self.paths.insert(path.clone(), found);
+        }
+        let cameras = &self.paths[path].cameras;
+        let camera = cameras.get(*index).copied();
+        camera.with_context(|| {
+            let count = cameras.len();
+            format!("it is about camera {index} of '{path}'; expected one below {count}")
+        })
+    }
 }
 
 pub fn check(args: &CheckArgs) -> anyhow::Result<Ending> {
@@ -120,6 +158,7 @@ pub fn check(args: &CheckArgs) -> anyhow::Result<Ending> {
         bail!("{file}: no UTF-8; expected certificates as lines of JSON");
     };
     let stored = claim(args.pvs.as_deref())?;
+    let lens = args.lens.defaults()?;
     let mut scenes: BTreeMap<String, Loaded> = BTreeMap::new();
     let mut checked = Checked::default();
     for (number, line) in lines
@@ -139,6 +178,7 @@ pub fn check(args: &CheckArgs) -> anyhow::Result<Ending> {
                 name.clone(),
                 Loaded {
                     boxes: Solids::of(&scene).boxes,
+                    paths: BTreeMap::new(),
                     regions: None,
                     scene,
                 },
@@ -156,7 +196,11 @@ pub fn check(args: &CheckArgs) -> anyhow::Result<Ending> {
                         place()
                     );
                 }
-                checked.view(number, &proofs, &loaded.boxes);
+                let camera = match &proofs.camera {
+                    Some(camera) => Some(loaded.camera(camera, &lens).with_context(place)?),
+                    None => None,
+                };
+                checked.view(number, &proofs, &loaded.boxes, camera.as_ref());
             }
             Line::Claim(errors) => {
                 if loaded.regions.is_none() {

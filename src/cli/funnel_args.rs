@@ -90,7 +90,8 @@ Example:
 
 A visible item is proven by a ray along which it is in front, a hidden one by a division of its
 image into parts that each lie behind one nearer box. Both are checked in exact arithmetic, against
-the boxes as they are written. An error of a claim of what is seen from where (a map's REJECT table,
+the boxes as they are written, and each view against the camera that it is said to be of (a lens
+that was given to funnel is to be given here too). An error of a claim of what is seen from where (a map's REJECT table,
 a file given as --pvs) is proven by a line of sight between two regions that leads through openings,
 or by what it says of the two directions. Exit code 1 if a proof does not hold.";
 
@@ -110,6 +111,8 @@ pub struct CheckArgs {
     pub format: TableFormat,
     #[command(flatten)]
     pub scene_args: SceneArgs,
+    #[command(flatten)]
+    pub lens: LensArgs,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum, Debug)]

@@ -79,7 +79,8 @@ pub fn certificates(
         items.sort_unstable();
         let prover = Prover::new(solids, &index, rays);
         let scene = &input.scene.name;
-        each(certify(scene, &prover, rays, &truth, &items, threads));
+        let proofs = certify(scene, &prover, rays, &truth, &items, threads);
+        each(proofs.of_camera(&input.path.name, world.camera(view)));
     }
     Ok(true)
 }

@@ -73,6 +73,8 @@ pub struct World<'a> {
 
 /// A camera in every form that a stage needs.
 struct View {
+    /// Its place in the path.
+    camera: usize,
     volume: ConvexVolume,
     rays: Rays,
     triangles: triangle::View,
@@ -93,6 +95,7 @@ impl<'a> World<'a> {
             let error = |error| FunnelError::Rays { index, error };
             let volume = camera.volume(&PlaneOptions::default(), &around);
             Ok(View {
+                camera: index,
                 volume: volume.map_err(|error| WorkloadError {
                     path: input.path.name.clone(),
                     index,
@@ -180,6 +183,11 @@ impl<'a> World<'a> {
     /// The items as they hide each other.
     pub fn solids(&self) -> &Solids {
         &self.solids
+    }
+
+    /// The place of a view's camera in the path.
+    pub fn camera(&self, view: usize) -> usize {
+        self.views[view].camera
     }
 
     /// The rays of a view.

@@ -243,6 +243,20 @@ fn proofs_are_checked_and_doctored_ones_rejected() {
         told += usize::from(done.out.contains("rejected"));
     }
     assert_eq!(told, 3);
+    // A view of another camera proves nothing of this one; of no camera it may.
+    let other = proofs.replace("\"near\":0.1", "\"near\":0.0625");
+    let (from, to) = (
+        other.find("\"camera\"").expect("a camera"),
+        other.find("\"view\""),
+    );
+    let mut bare = other.clone();
+    bare.replace_range(from..to.expect("a view"), "");
+    for (content, code) in [(&other, Some(1)), (&bare, Some(0))] {
+        fs::write(folder.path().join("other.jsonl"), content).expect("written");
+        let done = cullbench(folder.path(), "check other.jsonl");
+        assert_eq!(done.code, code, "{content}: {done:?}");
+        assert_eq!(done.out.contains("not that of its camera"), code == Some(1));
+    }
     for (content, wanted) in [
         ("", "no certificate"),
         ("{}", "line 1 | certificates"),
@@ -252,6 +266,10 @@ fn proofs_are_checked_and_doctored_ones_rejected() {
             "7 boxes | 5 of scene",
         ),
         (&proofs.replace("scene.csv", "gone.csv"), "gone.csv"),
+        (
+            &proofs.replace("\"index\":0", "\"index\":7"),
+            "line 1 | camera 7",
+        ),
         (&proofs[..proofs.len() / 2], "line 1"),
     ] {
         fs::write(folder.path().join("bad.jsonl"), content).expect("written");

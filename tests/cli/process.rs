@@ -35,7 +35,7 @@ pub fn command(folder: &Path, line: &str) -> std::process::Command {
 /// Runs the program in a folder.
 pub fn cullbench(folder: &Path, line: &str) -> Done {
     let output = assert_cmd::Command::from_std(command(folder, line))
-        .timeout(Duration::from_secs(60))
+        .timeout(Duration::from_secs(300))
         .output()
         .expect("the program starts");
     Done {

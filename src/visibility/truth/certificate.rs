@@ -132,10 +132,23 @@ pub struct Certificates {
     pub scene: String,
     /// Number of its boxes.
     pub boxes: usize,
+    /// The camera that it is the view of.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<CameraOf>,
     /// The view.
     pub view: View,
     /// Items with their proofs.
     pub proofs: Vec<(ItemId, Proof)>,
+}
+
+/// A camera of a path.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CameraOf {
+    /// The path, as it is typed.
+    pub path: String,
+    /// Place of the camera in it.
+    pub index: usize,
 }
 
 impl Proof {
@@ -160,9 +173,17 @@ impl Certificates {
         Certificates {
             scene,
             boxes,
+            camera: None,
             view,
             proofs,
         }
+    }
+
+    /// Of a camera, of which the view is to be.
+    pub fn of_camera(mut self, path: &str, index: usize) -> Certificates {
+        let path = path.to_owned();
+        self.camera = Some(CameraOf { path, index });
+        self
     }
 
     /// As text; [`Certificates::from_json`] reads back the very same numbers.

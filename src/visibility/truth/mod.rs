@@ -22,7 +22,7 @@ mod surface_index;
 mod surface_sample;
 
 pub use cache::{TruthCache, digest_of};
-pub use certificate::{Cell, Certificates, Edge, Except, Proof, View};
+pub use certificate::{CameraOf, Cell, Certificates, Edge, Except, Proof, View};
 pub use certify::certify;
 pub use check::{Counts, Rejected, check};
 pub use class::Class;
