@@ -12,6 +12,8 @@ use crate::spec::Spec;
 /// of what it stands on: in a city the street and not a roof, in a forest the ground
 /// and not the top of a tree.
 const DRAWN: usize = 8;
+/// How often more places are drawn for an eye that is not on the ground.
+const MORE: usize = 4;
 /// Room that an eye has on all sides, world units.
 const CLEARANCE: f64 = 0.3;
 
@@ -38,21 +40,65 @@ pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, PathEr
         });
         return Ok(poses.collect());
     }
-    let mut columns: Vec<Column> = (0..stage.count)
-        .flat_map(|_| drawn(stage, &mut rng))
-        .collect();
+    let mut stands = lowest(stage, height, stage.count, &mut rng);
+    let directions: Vec<DVec3> = (0..stage.count).map(|_| level(&mut rng)).collect();
+    for _ in 0..MORE {
+        // All places of an eye may have been under trees.
+        let high = stands
+            .iter_mut()
+            .filter(|stand| stand.is_on_top)
+            .collect::<Vec<_>>();
+        let others = lowest(stage, height, high.len(), &mut rng);
+        for (stand, other) in high.into_iter().zip(others) {
+            if other.rise < stand.rise || !other.is_on_top {
+                *stand = other;
+            }
+        }
+    }
+    let poses = stands.iter().zip(directions);
+    Ok(poses
+        .map(|(stand, ahead)| Pose::new(stand.eye, ahead))
+        .collect())
+}
+
+/// Where an eye may be.
+#[derive(Clone, Copy)]
+struct Stand {
+    eye: DVec3,
+    /// How far above the foot of the lowest item there, or of the floor.
+    rise: f64,
+    /// Whether on what stands on that.
+    is_on_top: bool,
+}
+
+/// For each of so many eyes the lowest of the places that are drawn for it.
+fn lowest(stage: &Stage, height: f64, count: usize, rng: &mut SeededRng) -> Vec<Stand> {
+    let mut columns: Vec<Column> = (0..count).flat_map(|_| drawn(stage, rng)).collect();
     fill(stage, &mut columns);
-    let poses = columns.chunks_mut(DRAWN).map(|columns| {
+    let has_ground = have_ground(&columns);
+    let stands = columns.chunks_mut(DRAWN).filter_map(|columns| {
         let stands = columns.iter_mut().map(|column| {
             let ground = column.ground(height + CLEARANCE);
-            let eye = DVec3::new(column.x, column.y, ground + height);
-            (ground - column.foot(), eye)
+            Stand {
+                eye: DVec3::new(column.x, column.y, ground + height),
+                rise: ground - column.foot(),
+                is_on_top: ground > column.spans.first().map_or(column.low, |[_, top]| *top),
+            }
         });
-        let least = stands.min_by(|a, b| a.0.total_cmp(&b.0));
-        let eye = least.map_or(DVec3::ZERO, |(_, eye)| eye);
-        Pose::new(eye, level(&mut rng))
+        let is_outside = |stand: &Stand| has_ground && stand.rise == 0.0;
+        stands.min_by(|a, b| {
+            let rise = a.rise.total_cmp(&b.rise);
+            is_outside(a).cmp(&is_outside(b)).then(rise)
+        })
     });
-    Ok(poses.collect())
+    stands.collect()
+}
+
+/// Whether there is something below nearly all places, so that the others are beyond the
+/// edge of the ground.
+fn have_ground(columns: &[Column]) -> bool {
+    let bare = columns.iter().filter(|column| column.spans.is_empty());
+    bare.count() * 10 < columns.len()
 }
 
 /// A direction in the plane of the ground, each equally likely.
@@ -170,8 +216,16 @@ mod tests {
             eye.z - 1.7 - foot
         };
         let eyes = path.cameras.iter().map(|camera| camera.frame.eye);
-        // Those of steep tiles; of the lowest of eight places fifteen are so high, on trees.
+        // Those of steep tiles.
         let high = eyes.filter(|eye| rise(*eye) > 8.0).count();
         assert!(high <= 6, "{high} of 64 above the ground");
+        // Trees at the edge of the ground reach beyond it; nobody stands there.
+        let mut eyes = path.cameras.iter().map(|camera| camera.frame.eye);
+        let is_over = |eye: DVec3| {
+            let boxes = scene.items.iter().map(|b| b.in_world(scene.origin));
+            let mut below = boxes.filter(|(min, _)| min.z < eye.z);
+            below.any(|(min, max)| eye.clamp(min, max).truncate() == eye.truncate())
+        };
+        assert!(eyes.all(is_over));
     }
 }
