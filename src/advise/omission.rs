@@ -311,11 +311,11 @@ impl Omission {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
     /// A check with such a ratio, and what the clock says of leaving out.
-    fn check(ratio: f64, pays: Option<bool>) -> Check {
+    pub(in super::super) fn check(ratio: f64, pays: Option<bool>) -> Check {
         Check {
             on: "wide".to_owned(),
             kept_ns: ratio * 100.0,

@@ -13,7 +13,7 @@ use super::error::FunnelError;
 use super::hiding::{HIDING, HidingRow};
 use super::judged::{Judged, judge_items};
 use super::plan_view::{Fate, MOST_DRAWN, PlanView};
-use super::regions::{ClaimAudit, Regions, map_of};
+use super::regions::{ClaimAudit, Regions};
 use super::stage::{BackEnd, NONE, StageKind};
 use super::truth::Truth;
 use crate::camera::PlaneOptions;
@@ -27,6 +27,7 @@ use crate::query::ItemId;
 use crate::scene::Scene;
 use crate::visibility::fragment::{Canvas, Piece, Tests, draw};
 use crate::visibility::occlusion::{self, OccluderScene};
+use crate::visibility::region::doom::DoomMap;
 use crate::visibility::region::{EyePlace, Marks, Pvs, RegionRow, Scratch};
 use crate::visibility::triangle;
 use crate::visibility::truth::{RayIndex, SampleTruth, SurfaceIndex};
@@ -215,7 +216,7 @@ impl<'a> World<'a> {
         input: &FunnelInput,
         stop: &dyn Fn() -> bool,
     ) -> Result<Option<Truth>, InputError> {
-        let Some(map) = map_of(self.scene)? else {
+        let Some(map) = DoomMap::of_scene(self.scene)? else {
             return Ok(self.truth_of_solids(input, stop));
         };
         let surfaces = map.surfaces(self.scene);
