@@ -135,6 +135,11 @@ impl Regions {
         }
     }
 
+    /// What all back ends search.
+    pub fn graph(&self) -> &RegionGraph {
+        self.rows[0].graph()
+    }
+
     /// The back ends that there are.
     pub fn names(&self) -> impl Iterator<Item = &'static str> {
         self.rows.iter().map(|row| row.about().name)

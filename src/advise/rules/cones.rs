@@ -32,6 +32,8 @@ const OF_A_FACE: usize = 2;
 struct Cones {
     part: Box<dyn DynIndex>,
     clusters: Arc<Clusters>,
+    /// By cluster: the item that it is of.
+    owners: Vec<ItemId>,
     cones: SafeCones,
     views: Vec<View>,
 }
@@ -66,6 +68,7 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
     let all = Rc::new(Cones {
         part: case.spec.build(&boxes)?,
         cones: SafeCones::of(&clusters),
+        owners: owners_of(&clusters, &items),
         clusters,
         views,
     });
@@ -101,6 +104,14 @@ fn part_of(scene: &Scene) -> Vec<ItemId> {
     (0..count).map(|k| (k * items / count) as ItemId).collect()
 }
 
+/// The item of each cluster.
+fn owners_of(clusters: &Clusters, items: &[ItemId]) -> Vec<ItemId> {
+    let of_items = clusters.of_item.iter().zip(items);
+    of_items
+        .flat_map(|(own, &id)| own.clone().map(move |_| id))
+        .collect()
+}
+
 /// The triangles of what the frustum meets, all or those that the cones leave.
 fn selected(case: &Case, all: &Cones, n: usize, by_cones: bool) -> Selection {
     let mut items = Vec::new();
@@ -113,12 +124,12 @@ fn selected(case: &Case, all: &Cones, n: usize, by_cones: bool) -> Selection {
     selection
 }
 
-/// Hands on the clusters that have a triangle left.
+/// Hands on the item of each cluster that has a triangle left.
 fn asked<'c>(case: &'c Case<'c>, all: Rc<Cones>, by_cones: bool) -> Ask<'c> {
     Box::new(move |n, out| {
         let selection = selected(case, &all, n, by_cones);
-        let clusters = selection.words().iter().zip(0..);
-        out.extend(clusters.filter(|(word, _)| **word != 0).map(|(_, c)| c));
+        let clusters = selection.words().iter().zip(&all.owners);
+        out.extend(clusters.filter(|(word, _)| **word != 0).map(|(_, &id)| id));
     })
 }
 

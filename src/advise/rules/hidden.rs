@@ -183,7 +183,7 @@ mod tests {
             rule.settled(vec![check], &Aside::default(), Some(Box::new(finish)))
         };
         // 200 ns for 40 of 50: pays above 5 ns each.
-        let dear = of(10.0, 5.1, 0.7);
+        let dear = of(10.0, 5.1, 0.79);
         assert_eq!(
             (dear.decision, dear.confirmed),
             (Decision::Keep, Some(true))
