@@ -5,37 +5,35 @@
 use std::rc::Rc;
 use std::sync::Arc;
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
 use super::super::AdviseError;
 use super::super::case::Case;
 use super::super::omission::{By, Draft, Forced, LeftOutIf, Omission, Way};
 use super::hidden::{self, PROBED, PROBES, Removal};
-use crate::geometry::Aabb;
-use crate::index::DynIndex;
+use crate::kernel::Kernel;
 use crate::measure::Ask;
 use crate::query::ItemId;
-use crate::scene::Scene;
 use crate::visibility::triangle::{Clusters, Cone, SafeCones, Selection, TriangleCull, View};
-use crate::visibility::{Solids, Surfaces};
+use crate::visibility::{NoRays, Solids, Surfaces};
 
 pub(super) const NAME: &str = "cones";
 
-/// Items whose triangles are looked at, evenly spread: a share of them is enough.
-const MOST_ITEMS: usize = 4_096;
-/// Clusters whose cones a prediction looks at.
-const MOST_CONES: usize = 512;
+/// Items of a camera whose triangles are looked at, evenly spread.
+const MOST_ITEMS: usize = 1_024;
+/// Clusters of a camera whose cones a prediction looks at.
+const MOST_CONES: usize = 64;
 /// Triangles of a cluster: a face of a box.
 const OF_A_FACE: usize = 2;
 
-/// Part of the items, their clusters, and the cones of these.
-struct Cones {
-    part: Box<dyn DynIndex>,
+/// Items that a camera meets as clusters, and the cones of these.
+struct Seen {
+    items: Vec<ItemId>,
     clusters: Arc<Clusters>,
     /// By cluster: the item that it is of.
     owners: Vec<ItemId>,
     cones: SafeCones,
-    views: Vec<View>,
+    view: View,
 }
 
 pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> {
@@ -50,95 +48,93 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
         LeftOutIf::AtMost,
         By::Rule,
     );
-    let scene = case.scene();
-    if !Solids::are_items_of(scene) {
+    if !Solids::are_items_of(case.scene()) {
         let reason = "items are walls, not solid boxes with faces";
         return Ok(omission.because(reason).draft(Vec::new()));
     }
-    let cameras = case.workload.cameras.iter();
-    let views = cameras.map(|camera| View::of(camera, scene.origin, PROBES));
-    let Ok(views) = views.collect::<Result<Vec<View>, _>>() else {
+    let cameras = case.workload.views.len();
+    let few = hidden::frames(cameras, PROBED).map(|frame| Seen::of(case, frame));
+    let Ok(few) = few.collect::<Result<Vec<Seen>, NoRays>>() else {
         let reason = "cameras without rays of their own";
         return Ok(omission.because(reason).draft(Vec::new()));
     };
-    let items = part_of(scene);
-    let boxes: Vec<Aabb> = items.iter().map(|&id| scene.items[id as usize]).collect();
-    let surfaces = Surfaces::of_items(scene, &items);
-    let clusters = Arc::new(Clusters::as_listed(Arc::new(surfaces), OF_A_FACE));
-    let all = Rc::new(Cones {
-        part: case.spec.build(&boxes)?,
-        cones: SafeCones::of(&clusters),
-        owners: owners_of(&clusters, &items),
-        clusters,
-        views,
-    });
-    let forced = Forced {
-        on: format!(
-            "cone-f32-safe, {} triangles per cluster, after {}",
-            OF_A_FACE, case.spec.label
-        ),
-        kept: Way::Other(asked(case, all.clone(), true)),
-        left_out: Way::Other(asked(case, all.clone(), false)),
-        same: false,
-        judged: false,
+    let sum = |of: fn(&Seen) -> usize| few.iter().map(of).sum::<usize>() as f64;
+    let of_item = sum(|seen| seen.clusters.triangles.len()) / sum(|seen| seen.items.len());
+    let kernel = case.spec.execution.kernel;
+    let mean = |cones| {
+        let left = few.iter().map(|seen| seen.left(cones).triangles() as f64);
+        hidden::mean(left)
     };
-    let [with, without] = [true, false].map(|by_cones| {
-        let frames = hidden::frames(all.views.len(), PROBED);
-        let selected = frames.map(|n| selected(case, &all, n, by_cones).triangles() as f64);
-        hidden::mean(selected)
-    });
     let removal = Removal {
         unit: ["triangle", "triangles"],
-        with,
-        without,
-        cost_ns: case.options.draw_ns * items.len() as f64 / all.clusters.triangles.len() as f64,
-        predicted: turned_away(&all.clusters),
+        with: mean(Some(kernel)),
+        without: mean(None),
+        cost_ns: case.options.draw_ns / of_item,
+        predicted: turned_away(&few),
+    };
+    let few = Rc::new(few);
+    let asked = |cones| Way::Other(asked(few.clone(), cameras, cones));
+    let forced = Forced {
+        on: format!("cone-f32-safe, {OF_A_FACE} triangles per cluster"),
+        kept: asked(Some(kernel)),
+        left_out: asked(None),
+        same: false,
+        judged: false,
     };
     Ok(hidden::weighed(omission, forced, move || removal))
 }
 
-/// At most [`MOST_ITEMS`] items, evenly spread.
-fn part_of(scene: &Scene) -> Vec<ItemId> {
-    let items = scene.items.len();
-    let count = items.min(MOST_ITEMS);
-    (0..count).map(|k| (k * items / count) as ItemId).collect()
-}
-
-/// The item of each cluster.
-fn owners_of(clusters: &Clusters, items: &[ItemId]) -> Vec<ItemId> {
-    let of_items = clusters.of_item.iter().zip(items);
-    of_items
-        .flat_map(|(own, &id)| own.clone().map(move |_| id))
-        .collect()
-}
-
-/// The triangles of what the frustum meets, all or those that the cones leave.
-fn selected(case: &Case, all: &Cones, n: usize, by_cones: bool) -> Selection {
-    let mut items = Vec::new();
-    all.part.query(case.workload.views[n].as_any(), &mut items);
-    let mut selection = Selection::of_items(&all.clusters, items);
-    if by_cones {
-        let kernel = case.spec.execution.kernel;
-        all.cones.cull(&all.views[n], kernel, &mut selection);
+impl Seen {
+    fn of(case: &Case, frame: usize) -> Result<Seen, NoRays> {
+        let scene = case.scene();
+        let mut met = Vec::new();
+        case.query(frame, &mut met);
+        let items = hidden::frames(met.len(), MOST_ITEMS).map(|n| met[n]);
+        let items: Vec<ItemId> = items.collect();
+        let surfaces = Surfaces::of_items(scene, &items);
+        let clusters = Arc::new(Clusters::as_listed(Arc::new(surfaces), OF_A_FACE));
+        let owners = clusters.of_item.iter().zip(&items);
+        Ok(Seen {
+            owners: owners
+                .flat_map(|(own, &id)| own.clone().map(move |_| id))
+                .collect(),
+            cones: SafeCones::of(&clusters),
+            clusters,
+            items,
+            view: View::of(&case.workload.cameras[frame], scene.origin, PROBES)?,
+        })
     }
-    selection
+
+    /// All triangles, or those that the cones leave.
+    fn left(&self, cones: Option<Kernel>) -> Selection {
+        let mut selection = Selection::all(&self.clusters);
+        if let Some(kernel) = cones {
+            self.cones.cull(&self.view, kernel, &mut selection);
+        }
+        selection
+    }
 }
 
-/// Hands on the item of each cluster that has a triangle left.
-fn asked<'c>(case: &'c Case<'c>, all: Rc<Cones>, by_cones: bool) -> Ask<'c> {
+/// Hands on the item of each cluster that has a triangle left. A few cameras stand for
+/// those that follow them.
+fn asked<'c>(few: Rc<Vec<Seen>>, cameras: usize, cones: Option<Kernel>) -> Ask<'c> {
     Box::new(move |n, out| {
-        let selection = selected(case, &all, n, by_cones);
-        let clusters = selection.words().iter().zip(&all.owners);
+        let seen = &few[n * few.len() / cameras];
+        let selection = seen.left(cones);
+        let clusters = selection.words().iter().zip(&seen.owners);
         out.extend(clusters.filter(|(word, _)| **word != 0).map(|(_, &id)| id));
     })
 }
 
 /// The share of all directions from which a triangle's whole cluster faces away, mean
 /// of the triangles of some clusters.
-fn turned_away(clusters: &Clusters) -> f64 {
+fn turned_away(few: &[Seen]) -> f64 {
+    let some = few.iter().flat_map(|seen| {
+        let clusters = hidden::frames(seen.clusters.len(), MOST_CONES);
+        clusters.map(|cluster| seen.clusters.corners_of(cluster).collect::<Vec<_>>())
+    });
     let (mut triangles, mut away) = (0.0, 0.0);
-    for cluster in hidden::frames(clusters.len(), MOST_CONES) {
-        let corners: Vec<[Vec3; 3]> = clusters.corners_of(cluster).collect();
+    for corners in some {
         let cone = Cone::fit(&corners, |axis: DVec3| axis.as_vec3());
         triangles += corners.len() as f64;
         away += corners.len() as f64 * cone.map_or(0.0, |cone| cone.turned_away());

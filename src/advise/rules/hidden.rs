@@ -78,6 +78,11 @@ impl Removal {
     pub fn weigh(&self, omission: &mut Omission, check: &Check) {
         let (with, without, cost_ns) = (self.with, self.without, self.cost_ns);
         let [one, many] = self.unit;
+        if without == 0.0 {
+            omission.saving = None;
+            omission.reason = format!("no {one} is in any view that was looked at");
+            return;
+        }
         let removed = without - with;
         let testing = check.kept_ns - check.left_out_ns;
         let pays = (testing / (cost_ns * without)).max(0.0);
@@ -208,5 +213,16 @@ mod tests {
         // It costs 300 + 49 with and 100 + 245 without.
         assert!((cheap.saving.unwrap() - (1.0 - 345.0 / 349.0)).abs() < 1e-12);
         assert_eq!(of(50.0, 1e9, 0.0).decision, Decision::LeaveOut);
+        let removal = Removal {
+            unit: ["thing", "things"],
+            with: 0.0,
+            without: 0.0,
+            cost_ns: 1.0,
+            predicted: f64::NAN,
+        };
+        let mut nothing = Omission::new("rule", "x", ["", ""], "y", LeftOutIf::AtMost, By::Rule);
+        removal.weigh(&mut nothing, &check(3.0, None));
+        assert_eq!((nothing.predicted, nothing.threshold), (None, None));
+        assert!(nothing.reason.contains("no thing"), "{}", nothing.reason);
     }
 }
