@@ -100,7 +100,9 @@ pub fn prepare(
     let Some(drawn) = drawn else {
         return Ok(None);
     };
-    let tasks: Vec<Option<usize>> = rows.iter().map(|(_, _, _, task)| *task).collect();
+    // The tests of the fragment stage are not timed.
+    let tasks = rows.iter().map(|(_, _, _, task)| *task);
+    let tasks: Vec<Option<usize>> = tasks.chain(tested.iter().map(|_| None)).collect();
     let row = |back_end: BackEnd, name: &str, judged: &[Judged]| StageRow {
         back_end,
         structure: None,
@@ -119,7 +121,6 @@ pub fn prepare(
             ..row(back_end, &name, &judged)
         }
     });
-    // The tests of the fragment stage are not timed: they come behind all tasks.
     let tested = tested.into_iter().map(|tested| StageRow {
         fragments: tested.counts,
         ..row(tested.back_end, tested.back_end.name, &tested.judged)

@@ -157,8 +157,7 @@ pub(super) fn draft<'c>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::omission::tests::check;
-    use super::super::super::omission::{Aside, By, Decision, LeftOutIf};
+    use super::super::super::omission::{Aside, By, Decision, LeftOutIf, check};
     use super::*;
 
     #[test]
