@@ -8,6 +8,7 @@ use crate::geometry::ConvexVolume;
 use crate::index::{BuildError, DynIndex, StructureSpec};
 use crate::measure::{Ask, Workload, WorkloadError, input_of};
 use crate::path::CameraPath;
+use crate::query::ItemId;
 use crate::scene::Scene;
 use crate::verify::Truth;
 
@@ -56,6 +57,12 @@ impl<'a> Case<'a> {
             Some((frame, truth))
         });
         judged.collect()
+    }
+
+    /// What the tree hands on for a camera of the path, appended.
+    pub fn query(&self, camera: usize, out: &mut Vec<ItemId>) {
+        let view = self.workload.views[camera].as_any();
+        self.index.query(view, out);
     }
 
     pub fn scene(&self) -> &'a Scene {

@@ -310,30 +310,31 @@ impl Omission {
     }
 }
 
+/// A check with such a ratio, and what the clock says of leaving out.
+#[cfg(test)]
+pub(super) fn check(ratio: f64, pays: Option<bool>) -> Check {
+    Check {
+        on: "wide".to_owned(),
+        kept_ns: ratio * 100.0,
+        left_out_ns: 100.0,
+        ratio,
+        ratio_lower: f64::NAN,
+        ratio_upper: f64::NAN,
+        same_answers: true,
+        same_expected: true,
+        kept_excess: None,
+        left_out_excess: None,
+        kept_false_negative_ppm: None,
+        left_out_false_negative_ppm: None,
+        errors: None,
+        judged: 10,
+        pays,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// A check with such a ratio, and what the clock says of leaving out.
-    fn check(ratio: f64, pays: Option<bool>) -> Check {
-        Check {
-            on: "wide".to_owned(),
-            kept_ns: ratio * 100.0,
-            left_out_ns: 100.0,
-            ratio,
-            ratio_lower: f64::NAN,
-            ratio_upper: f64::NAN,
-            same_answers: true,
-            same_expected: true,
-            kept_excess: None,
-            left_out_excess: None,
-            kept_false_negative_ppm: None,
-            left_out_false_negative_ppm: None,
-            errors: None,
-            judged: 10,
-            pays,
-        }
-    }
 
     fn settled(by: By, statistic: f64, check: Check) -> Omission {
         let rule = Omission::new(

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use crate::index::BuildError;
+use crate::input::InputError;
 use crate::measure::WorkloadError;
 
 /// What the advice depends on beside scene and path.
@@ -10,6 +11,8 @@ use crate::measure::WorkloadError;
 pub struct AdviseOptions {
     /// Cost of drawing an item that cannot be seen, ns.
     pub draw_ns: f64,
+    /// Cost of shading a fragment, ns.
+    pub shade_ns: f64,
     /// What planes may be off for rounding, in frustum depths, and a camera's
     /// frame by drift, in radians.
     pub tolerance: f64,
@@ -23,6 +26,7 @@ impl Default for AdviseOptions {
     fn default() -> Self {
         AdviseOptions {
             draw_ns: 1000.0,
+            shade_ns: 1.0,
             tolerance: 1e-5,
             moved: 0.01,
             queries_per_update: 1.0,
@@ -52,6 +56,9 @@ pub enum AdviseError {
     /// A structure that a rule needs cannot be built.
     #[error(transparent)]
     Build(#[from] BuildError),
+    /// The scene's file, read a second time.
+    #[error(transparent)]
+    Input(#[from] InputError),
     /// Another process has prepared something else.
     #[error(
         "{found} ways to answer; the plan has {planned}: the scene or the cameras have changed \

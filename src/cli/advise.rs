@@ -153,6 +153,7 @@ pub fn time(
 fn options(args: &AdviseArgs) -> AdviseOptions {
     AdviseOptions {
         draw_ns: args.draw_ns,
+        shade_ns: args.shade_ns,
         tolerance: args.tolerance,
         moved: args.moved,
         queries_per_update: args.queries_per_update,

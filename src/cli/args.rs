@@ -401,6 +401,15 @@ pub struct AdviseArgs {
         allow_negative_numbers = true
     )]
     pub draw_ns: f64,
+    /// Cost of shading a fragment, ns (1 shades an image of 1920 x 1080 in 2 ms)
+    #[arg(
+        long,
+        value_name = "NS",
+        default_value_t = 1.0,
+        value_parser = values::at_least_zero,
+        allow_negative_numbers = true
+    )]
+    pub shade_ns: f64,
     /// The largest error to accept: of planes in depths of the view, of a camera frame in radians
     #[arg(
         long,

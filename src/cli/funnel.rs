@@ -38,6 +38,9 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     expect_place_for("--svg", args.svg.as_deref())?;
     expect_place_for("--html", args.html.as_deref())?;
     expect_place_for("--certificates", args.certificates.as_deref())?;
+    if args.certificates.is_some() && args.cut_out.is_some() {
+        bail!("--certificates are about boxes without holes; expected no --cut-out with them");
+    }
     let structures = args.kernel.structures(registry, &args.structure)?;
     let defaults = args.lens.defaults()?;
     let scene = load_scene(&args.scene, &args.scene_args, structures.len() + 2)?;
@@ -61,6 +64,7 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
         path: &path,
         most_views: args.frames as usize,
         samples: args.samples,
+        cut_outs: args.cut_out.as_ref(),
         chain: &chain,
         structures: &structures,
         protocol: &protocol,
@@ -160,10 +164,10 @@ fn chain(
         (StageKind::Triangle, &args.triangle),
         (StageKind::Fragment, &args.fragment),
     ];
-    let mut chain = Chain::for_scene(scene).with(StageKind::Object, object);
+    let mut chain = Chain::for_scene(scene, args.cut_out.is_some()).with(StageKind::Object, object);
     for (stage, name) in typed {
         if let Some(name) = name {
-            let known = funnel::back_ends(stage, scene);
+            let known = funnel::back_ends(stage, scene, args.cut_out.is_some());
             if !known.iter().any(|row| row.name == name) {
                 let names = known.iter().map(|row| row.name);
                 return Err(SpecError::unknown(stage.name(), name, names));
@@ -211,6 +215,7 @@ pub fn time(
         path: &path::load_scaled(&args.path, &scene, &lens, timing.lens_scale)?,
         most_views: args.frames as usize,
         samples: args.samples,
+        cut_outs: args.cut_out.as_ref(),
         chain: &chain(args, &scene, &structures)?,
         structures: &structures,
         protocol: &protocol(args, timing.process),
@@ -244,6 +249,7 @@ mod tests {
             times: Times::default(),
             ns_per_removed: None,
             ns_per_decided: None,
+            fragments: None,
         }
     }
 

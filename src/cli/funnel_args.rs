@@ -8,6 +8,7 @@ use clap::{Args, ValueEnum};
 use super::shared_args::{KernelArgs, LensArgs, SceneArgs, SpreadArgs, TableFormat};
 use super::values;
 use crate::visibility::SampleGrid;
+use crate::visibility::fragment::CutOuts;
 
 const FUNNEL_HELP: &str = "\
 Columns of the table:
@@ -21,7 +22,11 @@ promises nothing. NAME is what the column `by` shows; none leaves a stage out. W
 decided exactly, along the rays through the samples. Where the occlusion stage walks a tree of its
 own (masked-inner, masked), its time holds the object stage's. Orders: pairs of items that overlap in
 the image, those drawn in the wrong order, and samples that show a wrong item without a z-test.
-A lower bound does what must be done at any rate and decides nothing.";
+A lower bound does what must be done at any rate and decides nothing.
+Items that are cut out hide nothing in the occlusion stage, and at a sample only where their mask is
+opaque: z-test takes them for solid, alpha-test asks the mask. stencil-test (rooms) draws what is
+beyond the eye's room only on the samples that see its portals. Walls of rooms are never cut out,
+picking takes every item for solid.";
 
 #[derive(Args, Debug)]
 #[command(after_help = FUNNEL_HELP)]
@@ -43,6 +48,9 @@ pub struct FunnelArgs {
     /// Columns and rows of samples
     #[arg(long, value_name = "WxH", default_value = "320x180", value_parser = values::samples)]
     pub samples: SampleGrid,
+    /// Cut holes into a share of the items: fence or foliage, e.g. fence:share=0.2,tile=1,seed=1
+    #[arg(long, value_name = "MASK", value_parser = CutOuts::parse)]
+    pub cut_out: Option<CutOuts>,
     /// What does the region stage in the chain [default: the best that the scene has regions for]
     #[arg(long, value_name = "NAME")]
     pub region: Option<String>,

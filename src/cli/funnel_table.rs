@@ -25,8 +25,16 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
         )),
         Block::Table(stages(report)),
     ];
+    if let Some(made) = &report.cut_outs {
+        let line = format!(
+            "{} of the items are cut out by a mask ({}, tiles of {}): they hide nothing where it has holes.",
+            made.item_count, made.mask, made.tile
+        );
+        blocks.insert(2, Block::Line(line));
+    }
     // Nothing to draw in order or to pick in a scene without solids.
     for (heading, table) in [
+        ("Samples and fragments of what is left", fragments(report)),
         ("What is left, drawn in every order", orders(report)),
         ("The first item under a cursor", picks(report)),
         (
@@ -118,6 +126,32 @@ fn count(mean: f64) -> String {
         mean if mean >= 100.0 || mean.fract() == 0.0 => format!("{mean:.0}"),
         mean => text::significant(mean),
     }
+}
+
+/// One test alone has nothing to be compared with.
+fn fragments(report: &FunnelReport) -> Rows {
+    let mut rows = Rows::of_numbers([
+        "test",
+        "samples asked",
+        "kept out",
+        "fragments",
+        "clear",
+        "shaded",
+        "covered",
+    ]);
+    let tests = report
+        .stages
+        .iter()
+        .filter_map(|row| Some((row, row.fragments?)));
+    rows.rows.extend(tests.map(|(row, counts)| {
+        let mut cells = vec![row.back_end.name.to_owned()];
+        cells.extend(counts.in_order().map(count));
+        cells
+    }));
+    if rows.rows.len() < 2 {
+        rows.rows.clear();
+    }
+    rows
 }
 
 fn orders(report: &FunnelReport) -> Rows {
@@ -230,12 +264,18 @@ pub fn csv(report: &FunnelReport, out: impl Write) -> io::Result<()> {
         "stage_ns",
         "ns_per_removed",
         "ns_per_decided",
+        "asked_count",
+        "kept_out_count",
+        "fragment_count",
+        "clear_count",
+        "shaded_count",
+        "covered_count",
     ])?;
     for row in &report.stages {
         let errors = &row.errors;
         let name = row.structure.as_deref().unwrap_or(row.back_end.name);
         let optional = |value: Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
-        out.write_record([
+        let mut record = vec![
             field(&report.scene).into_owned(),
             field(&report.path).into_owned(),
             row.back_end.stage.name().to_owned(),
@@ -253,7 +293,10 @@ pub fn csv(report: &FunnelReport, out: impl Write) -> io::Result<()> {
             optional(row.times.stage_ns),
             optional(row.ns_per_removed),
             optional(row.ns_per_decided),
-        ])?;
+        ];
+        let counts = row.fragments.map(|counts| counts.in_order());
+        record.extend((0..6).map(|n| optional(counts.map(|counts| counts[n]))));
+        out.write_record(record)?;
     }
     out.flush()
 }

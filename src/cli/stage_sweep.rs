@@ -52,7 +52,7 @@ impl Setting {
         };
         let path = path::load_scaled(typed, &scene, &args.lens.defaults()?, lens_scale)?;
         let object = structures.first().map_or(NONE, |spec| &spec.label);
-        let chain = Chain::for_scene(&scene).with(StageKind::Object, object);
+        let chain = Chain::for_scene(&scene, false).with(StageKind::Object, object);
         Ok(Setting {
             structures,
             scene,
@@ -71,6 +71,7 @@ impl Setting {
             path: &self.path,
             most_views: args.frames as usize,
             samples: SAMPLES,
+            cut_outs: None,
             chain: &self.chain,
             structures: &self.structures,
             protocol,
@@ -92,7 +93,7 @@ pub fn sweep(
     if scene.items.is_empty() {
         bail!("scene '{}' has no items; expected at least one", scene.name);
     }
-    if funnel::back_ends(stage, &scene)
+    if funnel::back_ends(stage, &scene, false)
         .iter()
         .all(|row| row.name == NONE)
     {

@@ -1,6 +1,7 @@
 //! What each stage can be done by, for a scene, and what a chain takes of it.
 
 use super::chain::Chain;
+use super::fragment_rows;
 use super::hiding::{HIDING, HidingRow};
 use super::stage::{BackEnd, NONE, StageKind};
 use super::triangle_rows;
@@ -35,9 +36,9 @@ fn of_regions(scene: &Scene) -> &'static [&'static str] {
     }
 }
 
-/// The back ends of a stage that a scene can have; structures of the object stage are
-/// not among them.
-pub fn back_ends(stage: StageKind, scene: &Scene) -> Vec<BackEnd> {
+/// The back ends of a stage that a scene can have, with or without cut-outs among its
+/// items; structures of the object stage are not among them.
+pub fn back_ends(stage: StageKind, scene: &Scene, has_cut_outs: bool) -> Vec<BackEnd> {
     let plain = |name, summary, guarantee| BackEnd {
         stage,
         name,
@@ -62,11 +63,7 @@ pub fn back_ends(stage: StageKind, scene: &Scene) -> Vec<BackEnd> {
         StageKind::Triangle if Solids::are_items_of(scene) => {
             rows = triangle_rows::back_ends().collect()
         }
-        StageKind::Fragment => rows.push(plain(
-            "z-test",
-            "the nearest fragment of each sample, exactly",
-            Guarantee::SampleExact,
-        )),
+        StageKind::Fragment => rows.extend(fragment_rows::back_ends(scene, has_cut_outs)),
         _ => {}
     }
     rows
@@ -75,9 +72,9 @@ pub fn back_ends(stage: StageKind, scene: &Scene) -> Vec<BackEnd> {
 impl Chain {
     /// What suits a scene, but for the object stage: the safest back end of each stage
     /// that removes the most.
-    pub fn for_scene(scene: &Scene) -> Chain {
+    pub fn for_scene(scene: &Scene, has_cut_outs: bool) -> Chain {
         let has = |stage, name: &'static str| {
-            back_ends(stage, scene)
+            back_ends(stage, scene, has_cut_outs)
                 .iter()
                 .any(|row| row.name == name)
                 .then_some(name)
@@ -86,7 +83,7 @@ impl Chain {
             (StageKind::Region, PORTAL_CLIP),
             (StageKind::Occlusion, "masked-inner"),
             (StageKind::Triangle, triangle_rows::DEFAULT),
-            (StageKind::Fragment, "z-test"),
+            (StageKind::Fragment, fragment_rows::default(has_cut_outs)),
         ]
         .into_iter()
         .fold(Chain::empty(), |chain, (stage, name)| {

@@ -1,6 +1,7 @@
 //! What follows from a funnel, in sentences: which stages pay from which draw cost on,
 //! and which back ends lost what is visible.
 
+use super::fragment_rows;
 use super::regions::ClaimAudit;
 use super::report::{FunnelReport, Gain, StageRow};
 
@@ -9,6 +10,7 @@ pub fn conclusions(report: &FunnelReport) -> Vec<String> {
     let mut sentences: Vec<String> = report.gains.iter().map(of_gain).collect();
     let lossy = |row: &&StageRow| row.errors.false_negative_count > 0.0;
     sentences.extend(report.stages.iter().filter(lossy).map(of_loss));
+    sentences.extend(of_stencil(report));
     for ClaimAudit { claim, audit } in &report.audits {
         sentences.push(format!(
             "The claim of {claim} calls {} of {} ordered pairs of regions visible, {} are: {} \
@@ -52,6 +54,27 @@ fn of_gain(gain: &Gain) -> String {
         ),
         None => format!("{what} removes {removed:.1} items a view; it has no time."),
     }
+}
+
+/// What the stencil saves, against the same tests without it.
+fn of_stencil(report: &FunnelReport) -> Option<String> {
+    let tests = || report.stages.iter().filter(|row| row.fragments.is_some());
+    let stencil = tests().find(|row| row.back_end.name == fragment_rows::STENCIL)?;
+    let other = fragment_rows::default(report.cut_outs.is_some());
+    let other = tests().find(|row| row.back_end.name == other)?;
+    let [with, without] = [stencil, other].map(|row| row.fragments);
+    let (with, without) = (with?.asked_count, without?.asked_count);
+    Some(format!(
+        "fragment {} asks {with:.0} samples a view in place of {without:.0} ({:.1} % fewer) and \
+         leaves {} items as {} does.",
+        stencil.back_end.name,
+        (1.0 - with / without) * 100.0,
+        match stencil.errors.output_count == other.errors.output_count {
+            true => "as many",
+            false => "not as many",
+        },
+        other.back_end.name,
+    ))
 }
 
 fn of_loss(row: &StageRow) -> String {

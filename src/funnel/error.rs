@@ -37,6 +37,14 @@ pub enum FunnelError {
         /// Its name.
         scene: String,
     },
+    /// Holes are cut into solid boxes.
+    #[error(
+        "'{scene}' is a map, whose items are walls; expected a scene of solid boxes for --cut-out"
+    )]
+    NoBoxes {
+        /// Its name.
+        scene: String,
+    },
     /// What is claimed to be seen from where is of other regions.
     #[error(transparent)]
     Claim(#[from] OtherRegions),

@@ -7,7 +7,7 @@ use super::pass::Pass;
 use super::times::Times;
 use super::world::World;
 use crate::visibility::fragment::order::ORDERS;
-use crate::visibility::fragment::{Canvas, DepthOrder, Piece, Tests, draw, order_errors};
+use crate::visibility::fragment::{Canvas, DepthOrder, Piece, Surfaces, Tests, draw, order_errors};
 use crate::visibility::{Rays, SampleGrid, Solids};
 
 /// A depth order over all views. Counts are means per view.
@@ -18,7 +18,7 @@ pub struct OrderRow {
     pub name: &'static str,
     /// One line about it.
     pub summary: &'static str,
-    /// Fragments of all items that are left: samples that meet an item.
+    /// Fragments of all items that are left: samples that meet an item, holes or not.
     pub fragment_count: f64,
     /// Of them those that pass the z-test when they come, and are shaded.
     pub shaded_count: f64,
@@ -42,6 +42,7 @@ pub struct OrderRow {
 /// What is left of a view, and every order prepared for it.
 struct Left {
     solids: Solids,
+    cut_outs: Option<Surfaces>,
     rays: Rays,
     orders: Vec<Box<dyn DepthOrder>>,
 }
@@ -55,10 +56,12 @@ impl Orders {
     /// For a set of items of each view.
     pub fn of(world: &World, pass: &Pass, set: usize) -> Orders {
         let views = (0..world.views()).map(|view| {
-            let solids = world.solids().some(&world.listed(pass.items(set, view)));
+            let items = world.listed(pass.items(set, view));
+            let solids = world.solids().some(&items);
             Left {
                 orders: ORDERS.iter().map(|row| (row.build)(&solids)).collect(),
                 rays: *world.rays(view),
+                cut_outs: world.cut_outs().map(|surfaces| surfaces.some(&items)),
                 solids,
             }
         });
@@ -86,8 +89,12 @@ impl Orders {
                 let canvas = Canvas::of(&left.rays, samples);
                 let mut pieces = Vec::new();
                 self.sort(order, view, &mut pieces);
-                let tally = draw(&canvas, &left.solids, &pieces, &Tests::default()).tally;
-                let errors = order_errors(&canvas, &left.solids, &pieces);
+                let tests = Tests {
+                    surfaces: left.cut_outs.as_ref(),
+                    stencil: None,
+                };
+                let tally = draw(&canvas, &left.solids, &pieces, &tests).tally;
+                let errors = order_errors(&canvas, &left.solids, &pieces, &tests);
                 let counts = [
                     tally.fragments,
                     tally.passed,

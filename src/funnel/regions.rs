@@ -9,7 +9,6 @@ use super::back_ends::MOST_EXACT_ROOMS;
 use super::error::FunnelError;
 use crate::input::InputError;
 use crate::scene::Scene;
-use crate::visibility::MapFile;
 use crate::visibility::region::doom::{DoomMap, SectorPvs};
 use crate::visibility::region::{
     Audit, Flood, OtherRegions, PortalClip, PortalRect, ProvenPvs, Pvs, REJECT, RegionGraph,
@@ -42,22 +41,10 @@ pub struct ClaimAudit {
 /// # Errors
 /// The map's file, read a second time.
 pub fn regions_of(scene: &Scene) -> Result<Option<(RegionGraph, Option<Pvs>)>, InputError> {
-    Ok(match map_of(scene)? {
+    Ok(match DoomMap::of_scene(scene)? {
         Some(map) => Some((map.graph(), map.reject().cloned())),
         None => RegionGraph::of_scene(scene).ok().map(|graph| (graph, None)),
     })
-}
-
-/// The map that a scene is, if it is one.
-///
-/// # Errors
-/// The map's file, read a second time.
-pub(super) fn map_of(scene: &Scene) -> Result<Option<Arc<DoomMap>>, InputError> {
-    let Some(file) = MapFile::of(&scene.name)? else {
-        return Ok(None);
-    };
-    let map = DoomMap::read(&file.bytes, &file.name, file.map.as_deref())?;
-    Ok(Some(Arc::new(map)))
 }
 
 impl Regions {
@@ -66,7 +53,7 @@ impl Regions {
     /// # Errors
     /// The map's file, read a second time.
     pub fn of(scene: &Scene, claim: Option<&Arc<Pvs>>) -> Result<Option<Regions>, FunnelError> {
-        if let Some(map) = map_of(scene)? {
+        if let Some(map) = DoomMap::of_scene(scene)? {
             return Regions::of_map(map, scene, claim).map(Some);
         }
         let Ok(graph) = RegionGraph::of_scene(scene) else {
@@ -146,6 +133,11 @@ impl Regions {
             items,
             audits: Vec::new(),
         }
+    }
+
+    /// What all back ends search.
+    pub fn graph(&self) -> &RegionGraph {
+        self.rows[0].graph()
     }
 
     /// The back ends that there are.

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::bounds::BoundRow;
 use super::chain::Chain;
+use super::fragments::FragmentCounts;
 use super::judged::Errors;
 use super::orders::OrderRow;
 use super::picks::PickRow;
@@ -14,6 +15,7 @@ use super::times::Times;
 use crate::measure::OverProcesses;
 use crate::statistics::{ALPHA, trimmed_mean};
 use crate::visibility::Level;
+use crate::visibility::fragment::{CutOuts, Surfaces};
 
 /// The funnel of a scene and a path.
 #[derive(Clone, Debug, Serialize)]
@@ -33,6 +35,8 @@ pub struct FunnelReport {
     pub processes: usize,
     /// What was selected of the scene's file.
     pub level: LevelRow,
+    /// Which items have holes; null where none was asked for.
+    pub cut_outs: Option<CutOutRow>,
     /// The chain whose stages follow each other in [`FunnelReport::stages`].
     pub chain: Chain,
     /// Every stage with every back end, each given what the chain hands it.
@@ -84,6 +88,35 @@ impl LevelRow {
     }
 }
 
+/// The items that have holes.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+#[non_exhaustive]
+pub struct CutOutRow {
+    /// Where they are opaque.
+    pub mask: &'static str,
+    /// Of the items that may be cut out.
+    pub share: f64,
+    /// Edge length of a tile of the mask, world units.
+    pub tile: f64,
+    /// Which items they are.
+    pub seed: u64,
+    /// How many they are.
+    pub item_count: usize,
+}
+
+impl CutOutRow {
+    /// Of what was asked for, and what it made.
+    pub fn of(cut_outs: &CutOuts, made: &Surfaces) -> CutOutRow {
+        CutOutRow {
+            mask: cut_outs.mask.name(),
+            share: cut_outs.share,
+            tile: cut_outs.tile,
+            seed: cut_outs.seed,
+            item_count: made.count(),
+        }
+    }
+}
+
 /// A stage done by a back end.
 #[derive(Clone, Debug, Serialize)]
 #[non_exhaustive]
@@ -107,6 +140,8 @@ pub struct StageRow {
     pub ns_per_removed: Option<f64>,
     /// Time / what it was given.
     pub ns_per_decided: Option<f64>,
+    /// Samples and fragments of a test of the fragment stage; null elsewhere.
+    pub fragments: Option<FragmentCounts>,
 }
 
 /// What a stage is worth where all others are as in the chain.

@@ -5,19 +5,19 @@ use std::cell::RefCell;
 
 use serde::{Deserialize, Serialize};
 
-use super::back_ends::back_ends;
 use super::bounds::{Bound, bounds};
 use super::chain::Chain;
 use super::conclusions::conclusions;
 use super::error::FunnelError;
 use super::faces::Faces;
-use super::judged::Errors;
+use super::fragments;
+use super::judged::{Errors, Judged};
 use super::orders::{self, Orders};
 use super::pass::{Pass, Walked};
 use super::picks::Picks;
 use super::plan_view::{PlanView, fate};
-use super::report::{FunnelReport, Gain, LevelRow, Side, StageRow};
-use super::stage::{NONE, StageKind};
+use super::report::{CutOutRow, FunnelReport, Gain, LevelRow, Side, StageRow};
+use super::stage::{BackEnd, NONE, StageKind};
 use super::times::Times;
 use super::triangle_rows;
 use super::truth::Truth;
@@ -78,7 +78,7 @@ pub fn prepare(
         rows.push((world.back_end(*stage, name), name.clone(), judged, *step));
     }
     if let Some(left) = &left {
-        let culls = back_ends(StageKind::Triangle, input.scene).into_iter();
+        let culls = world.back_ends(StageKind::Triangle).into_iter();
         let culls = culls.zip(std::iter::once(None).chain((0..).map(Some)));
         for (back_end, place) in culls {
             if stop() {
@@ -90,13 +90,9 @@ pub fn prepare(
         }
     }
     let last = walks.chosen.left();
-    for back_end in back_ends(StageKind::Fragment, input.scene) {
-        let judged = (0..world.views()).map(|view| match back_end.name {
-            NONE => world.judge(view, [pass.items(last, view); 2], &truth),
-            _ => world.judge_fragments(view, pass.items(last, view), &truth),
-        });
-        rows.push((back_end, back_end.name.to_owned(), judged.collect(), None));
-    }
+    let Some(tested) = fragments::tested(&world, &pass, last, &truth, stop) else {
+        return Ok(None);
+    };
     let drawn = match &left {
         Some(left) => left.orders.drawn(input.samples, stop),
         None => Some(Vec::new()),
@@ -104,21 +100,32 @@ pub fn prepare(
     let Some(drawn) = drawn else {
         return Ok(None);
     };
-    let tasks: Vec<Option<usize>> = rows.iter().map(|(_, _, _, task)| *task).collect();
+    // The tests of the fragment stage are not timed.
+    let tasks = rows.iter().map(|(_, _, _, task)| *task);
+    let tasks: Vec<Option<usize>> = tasks.chain(tested.iter().map(|_| None)).collect();
+    let row = |back_end: BackEnd, name: &str, judged: &[Judged]| StageRow {
+        back_end,
+        structure: None,
+        is_chosen: input.chain.of(back_end.stage) == name,
+        unit: back_end.stage.unit(),
+        errors: Errors::of(judged),
+        times: Times::default(),
+        ns_per_removed: None,
+        ns_per_decided: None,
+        fragments: None,
+    };
     let rows = rows.into_iter().map(|(back_end, name, judged, task)| {
-        let stage = back_end.stage;
+        let is_built = back_end.stage == StageKind::Object && task.is_some();
         StageRow {
-            back_end,
-            structure: (stage == StageKind::Object && task.is_some()).then(|| name.clone()),
-            is_chosen: input.chain.of(stage) == name,
-            unit: stage.unit(),
-            errors: Errors::of(&judged),
-            times: Times::default(),
-            ns_per_removed: None,
-            ns_per_decided: None,
+            structure: is_built.then(|| name.clone()),
+            ..row(back_end, &name, &judged)
         }
     });
-    let rows = rows.collect();
+    let tested = tested.into_iter().map(|tested| StageRow {
+        fragments: tested.counts,
+        ..row(tested.back_end, tested.back_end.name, &tested.judged)
+    });
+    let rows = rows.chain(tested).collect();
     let side = |walked: &Walked| Side {
         tasks: pass.timed_steps(walked),
         count: pass.mean_count(walked.left()),
@@ -148,6 +155,10 @@ pub fn prepare(
             samples: [input.samples.width, input.samples.height],
             processes: 0,
             level: LevelRow::of(&level),
+            cut_outs: input
+                .cut_outs
+                .zip(world.cut_outs())
+                .map(|(typed, made)| CutOutRow::of(typed, made)),
             chain: input.chain.clone(),
             stages: rows,
             audits: world.audits().to_vec(),

@@ -13,7 +13,7 @@ use super::error::FunnelError;
 use super::hiding::{HIDING, HidingRow};
 use super::judged::{Judged, judge_items};
 use super::plan_view::{Fate, MOST_DRAWN, PlanView};
-use super::regions::{ClaimAudit, Regions, map_of};
+use super::regions::{ClaimAudit, Regions};
 use super::stage::{BackEnd, NONE, StageKind};
 use super::truth::Truth;
 use crate::camera::PlaneOptions;
@@ -25,8 +25,9 @@ use crate::measure::{Protocol, WorkloadError, input_of};
 use crate::path::CameraPath;
 use crate::query::ItemId;
 use crate::scene::Scene;
-use crate::visibility::fragment::{Canvas, Piece, Tests, draw};
+use crate::visibility::fragment::{CutOuts, Surfaces};
 use crate::visibility::occlusion::{self, OccluderScene};
+use crate::visibility::region::doom::DoomMap;
 use crate::visibility::region::{EyePlace, Marks, Pvs, RegionRow, Scratch};
 use crate::visibility::triangle;
 use crate::visibility::truth::{RayIndex, SampleTruth, SurfaceIndex};
@@ -43,6 +44,8 @@ pub struct FunnelInput<'a> {
     pub most_views: usize,
     /// Where it is looked whether an item is visible.
     pub samples: SampleGrid,
+    /// Items that have holes.
+    pub cut_outs: Option<&'a CutOuts>,
     /// What each stage is done by.
     pub chain: &'a Chain,
     /// Structures for the object stage; one of them is the chain's.
@@ -67,6 +70,7 @@ pub struct World<'a> {
     structures: Vec<(String, Box<dyn DynIndex>)>,
     views: Vec<View>,
     solids: Solids,
+    cut_outs: Option<Surfaces>,
     occluders: OccluderScene,
     regions: Option<Regions>,
 }
@@ -110,7 +114,12 @@ impl<'a> World<'a> {
             let index = spec.build(input_of(input.scene, &input.scene.items))?;
             Ok::<_, BuildError>((spec.label.clone(), index))
         });
-        let solids = Solids::of(input.scene);
+        let mut solids = Solids::of(input.scene);
+        let regions = Regions::of(input.scene, input.claim)?;
+        let cut_outs = match input.cut_outs {
+            Some(typed) => Some(cut_out(typed, input.scene, regions.as_ref(), &mut solids)?),
+            None => None,
+        };
         let world = World {
             scene: input.scene,
             kernel: input.execution.kernel,
@@ -119,7 +128,8 @@ impl<'a> World<'a> {
             views: views.collect::<Result<_, FunnelError>>()?,
             occluders: OccluderScene::of(&solids),
             solids,
-            regions: Regions::of(input.scene, input.claim)?,
+            cut_outs,
+            regions,
         };
         for stage in StageKind::OF_ITEMS {
             let (name, known) = (input.chain.of(stage), world.names(stage));
@@ -190,6 +200,16 @@ impl<'a> World<'a> {
         self.views[view].camera
     }
 
+    /// Which items have holes, if any have.
+    pub fn cut_outs(&self) -> Option<&Surfaces> {
+        self.cut_outs.as_ref()
+    }
+
+    /// The regions of the scene.
+    pub(super) fn regions(&self) -> Option<&Regions> {
+        self.regions.as_ref()
+    }
+
     /// The rays of a view.
     pub fn rays(&self, view: usize) -> &Rays {
         &self.views[view].rays
@@ -215,7 +235,7 @@ impl<'a> World<'a> {
         input: &FunnelInput,
         stop: &dyn Fn() -> bool,
     ) -> Result<Option<Truth>, InputError> {
-        let Some(map) = map_of(self.scene)? else {
+        let Some(map) = DoomMap::of_scene(self.scene)? else {
             return Ok(self.truth_of_solids(input, stop));
         };
         let surfaces = map.surfaces(self.scene);
@@ -243,22 +263,29 @@ impl<'a> World<'a> {
             if stop() {
                 return None;
             }
-            let truth = SampleTruth::of(
-                solids,
-                &index,
-                &view.rays,
-                input.samples,
-                input.execution.threads,
-            );
+            let (rays, threads) = (&view.rays, input.execution.threads);
+            let truth = match &self.cut_outs {
+                Some(surfaces) => {
+                    let opaque =
+                        |item, b: &_, probe: &_, at: &_| surfaces.opaque(item, b, probe, at);
+                    SampleTruth::of_opaque(&index, &opaque, rays, input.samples, threads)
+                }
+                None => SampleTruth::of(solids, &index, rays, input.samples, threads),
+            };
             let counts = truth.visible.into_iter().zip(truth.samples_of);
             visible.push(counts.collect());
         }
         Some(Truth::new(visible))
     }
 
-    /// The back ends of a stage that are compared.
+    /// The back ends of a stage that the scene can have, but for structures.
+    pub fn back_ends(&self, stage: StageKind) -> Vec<BackEnd> {
+        back_ends(stage, self.scene, self.cut_outs.is_some())
+    }
+
+    /// The names of the back ends of a stage that are compared.
     pub fn names(&self, stage: StageKind) -> Vec<String> {
-        let rows = back_ends(stage, self.scene).into_iter();
+        let rows = self.back_ends(stage).into_iter();
         let mut names: Vec<String> = rows.map(|row| row.name.to_owned()).collect();
         if stage == StageKind::Object {
             names.extend(self.structures.iter().map(|(label, _)| label.clone()));
@@ -272,8 +299,10 @@ impl<'a> World<'a> {
 
     /// What a back end declares.
     pub fn back_end(&self, stage: StageKind, name: &str) -> BackEnd {
-        let known = back_ends(stage, self.scene);
-        let found = known.into_iter().find(|row| row.name == name);
+        let found = self
+            .back_ends(stage)
+            .into_iter()
+            .find(|row| row.name == name);
         found.unwrap_or(BackEnd {
             stage,
             name: "frustum",
@@ -357,26 +386,6 @@ impl<'a> World<'a> {
         judge_items(input, self.items(), &output, truth.of_view(view))
     }
 
-    /// What the z-test leaves: items in front at a sample, drawn one by one.
-    pub fn judge_fragments(&self, view: usize, input: Option<&[ItemId]>, truth: &Truth) -> Judged {
-        let items = self.listed(input);
-        if !self.has_solids() {
-            let visible = truth.of_view(view).iter().map(|(item, _)| *item);
-            let output: Vec<ItemId> = visible
-                .filter(|id| items.binary_search(id).is_ok())
-                .collect();
-            return judge_items(input, self.items(), &output, truth.of_view(view));
-        }
-        let canvas = Canvas::of(&self.views[view].rays, self.samples);
-        let solids = self.solids.some(&items);
-        let pieces = (0..items.len() as ItemId).map(|item| Piece { item, part: None });
-        let pieces: Vec<Piece> = pieces.collect();
-        let drawn = draw(&canvas, &solids, &pieces, &Tests::default());
-        let visible = drawn.depth.visible(&canvas);
-        let output: Vec<ItemId> = visible.iter().map(|&place| items[place as usize]).collect();
-        judge_items(input, self.items(), &output, truth.of_view(view))
-    }
-
     /// The ids of a set; `None` is all items.
     pub fn listed<'i>(&self, items: Option<&'i [ItemId]>) -> Cow<'i, [ItemId]> {
         match items {
@@ -422,4 +431,26 @@ impl<'a> World<'a> {
                 .collect(),
         }
     }
+}
+
+/// Gives items holes, which hide nothing from then on. Walls that close off rooms are
+/// left whole: what is seen of the rooms beyond is known by their portals alone.
+fn cut_out(
+    typed: &CutOuts,
+    scene: &Scene,
+    regions: Option<&Regions>,
+    solids: &mut Solids,
+) -> Result<Surfaces, FunnelError> {
+    if !Solids::are_items_of(scene) {
+        let scene = scene.name.clone();
+        return Err(FunnelError::NoBoxes { scene });
+    }
+    let walls = regions.map(|regions| regions.graph().borders(scene));
+    let is_free = |item: ItemId| walls.as_ref().is_none_or(|walls| !walls[item as usize]);
+    let surfaces = typed.surfaces(scene.items.len(), is_free);
+    let items = 0..scene.items.len() as ItemId;
+    items
+        .filter(|&item| surfaces.of(item).is_some())
+        .for_each(|item| solids.hides_nothing(item));
+    Ok(surfaces)
 }

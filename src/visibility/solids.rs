@@ -52,6 +52,11 @@ impl Solids {
         }
     }
 
+    /// Takes an item as something with holes, which may be hidden and hides nothing.
+    pub fn hides_nothing(&mut self, item: ItemId) {
+        self.inner[item as usize] = Aabb::EMPTY;
+    }
+
     /// Some of them, numbered anew in this order.
     ///
     /// # Panics

@@ -13,8 +13,8 @@ use super::process::*;
 
 const SMALL: &str =
     "advise --scene uniform:n=900 --path orbit:frames=6 --structure linear,wide,bvh --processes";
-const RULES: &str = "needless-planes plane-masks no-index six-planes occlusion occlusion-buffer \
-     third-dimension rebasing rebuild f64-kernel frame-correction";
+const RULES: &str = "needless-planes plane-masks no-index six-planes regions occlusion occlusion-buffer \
+     cones sorting third-dimension rebasing rebuild f64-kernel frame-correction";
 
 /// Of one process: for what is no time.
 fn advice(folder: &Path, line: &str) -> Value {
@@ -50,7 +50,7 @@ fn rule<'a>(advice: &'a Value, name: &str) -> &'a Value {
 fn json_has_the_documented_fields() {
     let top =
         "scene path items skipped_items cameras options processes twin structure test omissions";
-    let options = "draw_ns tolerance moved queries_per_update";
+    let options = "draw_ns shade_ns tolerance moved queries_per_update";
     let structure = "name ties region_search region_search_ties rows";
     let times = "query_ns query_ns_lower query_ns_upper";
     let structure_row = format!(
@@ -112,6 +112,11 @@ fn every_rule_is_there_once_with_both_sides_checked() {
     for omission in omissions {
         let name = omission["rule"].as_str().expect("a name");
         assert!(told.contains(&format!("\n| {name} |")), "{name}");
+        if name == "regions" {
+            // Boxes in the open: the rule has a test of its own.
+            assert_eq!(omission["decision"], "not_applicable", "{omission}");
+            continue;
+        }
         let (statistic, threshold) = (number(omission, "statistic"), number(omission, "threshold"));
         let wanted = match omission["left_out_if"].as_str() {
             Some("at_most") => statistic <= threshold,
@@ -146,7 +151,7 @@ fn every_rule_is_there_once_with_both_sides_checked() {
                 assert_eq!(check["kept_excess"], check["left_out_excess"], "{omission}");
             }
             // What is hidden is in the frustum all the same: another truth.
-            if !set("rebuild occlusion occlusion-buffer").contains(name) {
+            if !set("rebuild occlusion occlusion-buffer cones").contains(name) {
                 for side in ["kept", "left_out"] {
                     let missed = number(check, &format!("{side}_false_negative_ppm"));
                     assert_eq!(missed, 0.0, "{omission}");
@@ -158,7 +163,7 @@ fn every_rule_is_there_once_with_both_sides_checked() {
         let checks = array(rule(small(), name), "checks");
         checks.iter().all(|check| check["same_expected"] == true)
     };
-    for name in "needless-planes plane-masks no-index third-dimension rebuild".split(' ') {
+    for name in "needless-planes plane-masks no-index sorting third-dimension rebuild".split(' ') {
         assert!(expected(name), "{name}");
     }
 }
@@ -367,6 +372,7 @@ fn mistakes_are_one_line() {
         ("--structure bhv", "bhv | did you mean 'bvh'"),
         ("--draw-ns -1", "--draw-ns is '-1' | at least 0"),
         ("--draw-ns nan", "--draw-ns is 'nan'"),
+        ("--shade-ns -1", "--shade-ns is '-1' | at least 0"),
         ("--tolerance 0", "--tolerance is '0' | above 0"),
         ("--queries-per-update inf", "--queries-per-update is 'inf'"),
         ("--moved 0", "--moved is '0' | above 0"),
@@ -398,4 +404,57 @@ fn occlusion_is_left_out_from_the_air_and_kept_on_the_street() {
     let (air, hidden) = of("outside:frames=12");
     assert_eq!(air, "leave_out");
     assert!(hidden < 0.5, "{hidden}");
+}
+
+/// The decision of a rule with its statistic, for a scene and path.
+fn decided(name: &str, line: &str) -> (String, f64) {
+    let line = format!("advise --structure linear,wide {line}");
+    let advice = advice(Path::new("."), &line);
+    let rule = rule(&advice, name);
+    let decision = rule["decision"].as_str().expect("a decision");
+    (decision.to_owned(), number(rule, "statistic"))
+}
+
+#[test]
+fn regions_are_kept_indoors_and_left_out_from_outside() {
+    let (indoors, hidden) = decided("regions", "--scene rooms:n=4000 --path street:frames=12");
+    assert_eq!(indoors, "keep");
+    assert!(hidden > 0.5, "{hidden}");
+    // Eyes in no room: all rooms may be seen.
+    let (outside, hidden) = decided("regions", "--scene rooms:n=4000 --path outside:frames=12");
+    assert_eq!((outside.as_str(), hidden), ("leave_out", 0.0));
+    let (map, hidden) = decided("regions", "--scene freedm-map12 --path street:frames=12");
+    assert_eq!(map, "keep");
+    assert!(hidden > 0.2, "{hidden}");
+}
+
+#[test]
+fn cones_are_kept_where_triangles_cost_something() {
+    let of = |more: &str| decided("cones", &format!("--scene city:n=2000 {more}"));
+    let (kept, away) = of("--path street:frames=12");
+    assert_eq!(kept, "keep");
+    // Of a box one sees one to three of six faces.
+    assert!((0.5..0.84).contains(&away), "{away}");
+    assert_eq!(of("--path street:frames=12 --draw-ns 0").0, "leave_out");
+}
+
+#[test]
+fn sorting_pays_by_the_layers_and_the_cost_of_a_fragment() {
+    let of = |more: &str| decided("sorting", &format!("--scene city:n=2000 {more}"));
+    let (street, saved) = of("--path street:frames=12 --shade-ns 5");
+    assert_eq!(street, "keep");
+    let (_, from_the_air) = of("--path outside:frames=12");
+    assert!(saved > 1.5 * from_the_air, "{saved} {from_the_air}");
+    assert_eq!(of("--path street:frames=12 --shade-ns 0").0, "leave_out");
+}
+
+#[test]
+fn walls_of_a_map_have_neither_faces_nor_fragments() {
+    let line = "advise --scene freedm-map12 --path street:frames=4 --structure linear,wide";
+    let advice = advice(Path::new("."), line);
+    for name in ["occlusion", "cones", "sorting"] {
+        let rule = rule(&advice, name);
+        assert_eq!(rule["decision"], "not_applicable", "{rule}");
+        assert!(rule["reason"].as_str().expect("a reason").contains("walls"));
+    }
 }

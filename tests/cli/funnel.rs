@@ -183,6 +183,15 @@ fn what_cannot_be_is_refused_in_a_line() {
         ("--html no/such/folder/x.html", "--html"),
         ("--certificates no/such/folder/x", "--certificates"),
         ("--svg .", "--svg | a folder"),
+        ("--cut-out fense", "fense | did you mean 'fence'"),
+        (
+            "--cut-out fence:share=2",
+            "fence:share=2 | share=2 | at most 1",
+        ),
+        (
+            "--cut-out fence --certificates x",
+            "--certificates | holes | --cut-out",
+        ),
     ] {
         let done = cullbench(folder.path(), &format!("{LINE} {more}"));
         assert_refused(&done, wanted, more);
@@ -199,6 +208,11 @@ fn what_cannot_be_is_refused_in_a_line() {
     fs::write(folder.path().join("empty.csv"), format!("{BOXES}\n")).expect("written");
     let line = LINE.replace("scene.csv", "empty.csv");
     assert_refused(&cullbench(folder.path(), &line), "no items", "no items");
+    assert_refused(
+        &cullbench(folder.path(), "funnel --scene freedm-map12 --cut-out fence"),
+        "freedm-map12 | walls | solid boxes | --cut-out",
+        "a map with cut-outs",
+    );
     for (scene, stage, wanted) in [
         ("freedm-map12", "occlusion", "freedm-map12 | solid boxes"),
         ("freedm-map12", "triangle", "freedm-map12 | solid boxes"),
@@ -406,4 +420,111 @@ fn whole_pixels_lose_nothing_at_any_size_and_pixel_centres_do() {
         &line.replace("--stage occlusion", "--stage fragment"),
     );
     assert_refused(&done, "unknown stage 'fragment'", "a stage without a sweep");
+}
+
+/// A test of the fragment stage, and one of its counts.
+fn counted(report: &Value, test: &str, count: &str) -> f64 {
+    number(&row(report, "fragment", test)["fragments"], count)
+}
+
+#[test]
+fn through_the_holes_of_a_wall_is_seen_what_is_behind_it() {
+    let folder = folder();
+    let line = format!("{LINE} --cut-out foliage:share=1,tile=0.5");
+    let report = json(&works(folder.path(), &line));
+    let cut_outs = &report["cut_outs"];
+    assert_eq!(cut_outs["mask"], "foliage");
+    assert_eq!(number(cut_outs, "item_count"), 5.0);
+    for row in rows(&report, "occlusion") {
+        // Nothing hides, so nothing but what is behind the camera is removed.
+        assert_eq!(number(row, "output_count"), 4.0, "{row}");
+        assert_eq!(number(row, "truth_count"), 3.0, "{row}");
+        assert_eq!(number(row, "false_negative_count"), 0.0, "{row}");
+    }
+    let [z, alpha] = ["z-test", "alpha-test"].map(|name| row(&report, "fragment", name));
+    assert_eq!(
+        (&z["guarantee"], &z["is_chosen"]),
+        (&"unproven".into(), &false.into())
+    );
+    assert_eq!(number(z, "false_negative_count"), 1.0);
+    assert_eq!(alpha["is_chosen"], true);
+    for count in ["false_negative_count", "false_positive_count"] {
+        assert_eq!(number(alpha, count), 0.0, "{count}");
+    }
+    let clear = ["z-test", "alpha-test"].map(|test| counted(&report, test, "clear_count"));
+    assert!(clear[0] == 0.0 && clear[1] > 100.0, "{clear:?}");
+    let covered = ["z-test", "alpha-test"].map(|test| counted(&report, test, "covered_count"));
+    assert!(
+        covered[1] < covered[0] && covered[1] > 0.5 * covered[0],
+        "{covered:?}"
+    );
+    let table = works(folder.path(), &line.replace("--format json", ""));
+    for words in [
+        "5 of the items are cut out by a mask (foliage",
+        "Samples and fragments",
+        "z-test?",
+    ] {
+        assert!(table.contains(words), "{words}: {table}");
+    }
+    let csv = works(folder.path(), &line.replace("json", "csv"));
+    let of_alpha = csv.lines().find(|line| line.contains("alpha-test"));
+    assert!(!of_alpha.expect("a row").ends_with(','), "{csv}");
+    // Without holes there is no such test.
+    let solid = json(&works(folder.path(), LINE));
+    assert!(rows(&solid, "fragment").all(|row| row["name"] != "alpha-test"));
+    assert!(solid["cut_outs"].is_null());
+}
+
+#[test]
+fn what_promises_to_lose_nothing_sees_through_holes() {
+    for (scene, mask) in [
+        ("city:n=1500", "fence:share=0.3,tile=2"),
+        ("rooms:n=1500", "foliage:share=1,tile=0.25"),
+    ] {
+        let line = format!(
+            "funnel --scene {scene} --cut-out {mask} --path street:frames=8 --samples 96x54 \
+             --processes 1 --format json"
+        );
+        let report = json(&works(Path::new("."), &line));
+        // Walls of rooms are left whole.
+        let share = number(&report["cut_outs"], "item_count") / number(&report, "items");
+        assert!((0.1..0.8).contains(&share), "{scene}: {share}");
+        for row in array(&report, "stages") {
+            let what = format!("{scene} {} {}", row["stage"], row["name"]);
+            if row["guarantee"] != "unproven" {
+                assert_eq!(number(row, "false_negative_count"), 0.0, "{what}");
+            }
+        }
+        let z = row(&report, "fragment", "z-test");
+        assert!(number(z, "false_negative_count") > 0.0, "{scene}: {z}");
+        let alpha = row(&report, "fragment", "alpha-test");
+        assert_eq!(number(alpha, "false_positive_count"), 0.0, "{scene}");
+    }
+}
+
+#[test]
+fn a_stencil_of_portals_saves_samples_and_shows_the_same() {
+    let line = "funnel --scene rooms:n=3000 --path street:frames=8 --samples 96x54 --processes 1 \
+                --region none --occlusion none --format json";
+    for more in ["", " --cut-out fence:share=0.5,tile=0.5"] {
+        let report = json(&works(Path::new("."), &format!("{line}{more}")));
+        let stencil = row(&report, "fragment", "stencil-test");
+        for count in ["false_negative_count", "false_positive_count"] {
+            assert_eq!(number(stencil, count), 0.0, "{count}");
+        }
+        let asked = ["z-test", "stencil-test"].map(|test| counted(&report, test, "asked_count"));
+        assert!(asked[1] < 0.5 * asked[0], "{asked:?}");
+        // What was not kept out was asked, and so were the samples of the portals.
+        let kept_out = counted(&report, "stencil-test", "kept_out_count");
+        assert!(asked[1] + kept_out > asked[0], "{asked:?} {kept_out}");
+        let said = array(&report, "conclusions").iter();
+        let said = said.filter_map(Value::as_str);
+        assert_eq!(
+            said.filter(|told| told.contains("stencil-test asks"))
+                .count(),
+            1
+        );
+    }
+    let open = json(&works(Path::new("."), &line.replace("rooms", "city")));
+    assert!(rows(&open, "fragment").all(|row| row["name"] != "stencil-test"));
 }

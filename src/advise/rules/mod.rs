@@ -2,6 +2,7 @@
 //! threshold and makes both sides of itself ready to be asked; who decides, and
 //! how, is `omission`'s.
 
+mod cones;
 mod f64_kernel;
 mod flat;
 mod frame_correction;
@@ -12,7 +13,9 @@ mod occlusion;
 mod plane_masks;
 mod rebasing;
 mod rebuild;
+mod regions;
 mod six_planes;
+mod sorting;
 
 pub(super) use six_planes::follow as follow_test;
 
@@ -44,12 +47,24 @@ pub(super) const RULES: &[Rule] = &[
         prepare: six_planes::prepare,
     },
     Rule {
+        name: regions::NAME,
+        prepare: regions::prepare,
+    },
+    Rule {
         name: occlusion::NAME,
         prepare: occlusion::prepare,
     },
     Rule {
         name: occlusion::BUFFER_NAME,
         prepare: occlusion::prepare_buffer,
+    },
+    Rule {
+        name: cones::NAME,
+        prepare: cones::prepare,
+    },
+    Rule {
+        name: sorting::NAME,
+        prepare: sorting::prepare,
     },
     Rule {
         name: flat::NAME,

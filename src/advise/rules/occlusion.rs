@@ -7,7 +7,7 @@ use std::rc::Rc;
 use super::super::AdviseError;
 use super::super::case::Case;
 use super::super::omission::{By, Draft, LeftOutIf, Omission, Way};
-use super::hidden;
+use super::hidden::{self, PROBED, PROBES};
 use crate::geometry::{Aabb, ConvexVolume};
 use crate::measure::Ask;
 use crate::visibility::occlusion::{
@@ -22,9 +22,6 @@ pub(super) const BUFFER_NAME: &str = "occlusion-buffer";
 /// Pixels of the buffer that is usual, and of the smaller one.
 const USUAL: SampleGrid = SampleGrid::new(320, 180);
 const SMALL: SampleGrid = SampleGrid::new(160, 90);
-/// Rays of a camera that say how far one sees, and cameras that a prediction looks at.
-const PROBES: SampleGrid = SampleGrid::new(16, 9);
-const PROBED: usize = 8;
 
 /// Everything that is asked, and shared by both sides.
 struct Occlusion {
@@ -33,22 +30,14 @@ struct Occlusion {
 }
 
 impl Occlusion {
-    /// Or why there is nothing to ask.
-    fn of(case: &Case, solids: &Solids) -> Result<Occlusion, &'static str> {
-        if !Solids::are_items_of(case.scene()) {
-            return Err("items are walls, not solid boxes");
-        }
-        let cameras = case.workload.cameras.iter();
-        let rays = cameras.map(|camera| Rays::of(camera).ok());
-        let views = rays.zip(case.volumes());
-        let views: Option<Vec<_>> = views
-            .map(|(rays, volume)| Some((rays?, volume.clone())))
-            .collect();
-        let views = views.filter(|views| views.len() == case.workload.views.len());
-        Ok(Occlusion {
-            scene: OccluderScene::of(solids),
-            views: views.ok_or("cameras without rays of their own")?,
-        })
+    /// With the solids, or why there is nothing to ask.
+    fn of(case: &Case) -> Result<(Occlusion, Solids), &'static str> {
+        let solids = hidden::solids(case.scene())?;
+        let all = Occlusion {
+            scene: OccluderScene::of(&solids),
+            views: hidden::sights(case)?,
+        };
+        Ok((all, solids))
     }
 }
 
@@ -75,9 +64,8 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
         LeftOutIf::AtMost,
         By::Rule,
     );
-    let solids = Solids::of(case.scene());
-    let all = match Occlusion::of(case, &solids) {
-        Ok(all) => all,
+    let (all, solids) = match Occlusion::of(case) {
+        Ok(both) => both,
         Err(reason) => return Ok(omission.because(reason).draft(Vec::new())),
     };
     let predicted = predicted(&all, &solids);
@@ -105,9 +93,8 @@ pub(super) fn prepare_buffer<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, Advise
         LeftOutIf::AtMost,
         By::Rule,
     );
-    let solids = Solids::of(case.scene());
-    let all = match Occlusion::of(case, &solids) {
-        Ok(all) => all,
+    let all = match Occlusion::of(case) {
+        Ok((all, _)) => all,
         Err(reason) => return Ok(omission.because(reason).draft(Vec::new())),
     };
     let all = Rc::new(all);

@@ -1,7 +1,7 @@
 //! Draws a list of pieces with the tests switched on that are asked for, and counts
 //! what each of them lets through.
 
-use super::canvas::Canvas;
+use super::canvas::{Canvas, Fragment};
 use super::depth::DepthBuffer;
 use super::mask::Surfaces;
 use super::order::Piece;
@@ -17,6 +17,17 @@ pub struct Tests<'a> {
     pub surfaces: Option<&'a Surfaces>,
     /// The stencil-test.
     pub stencil: Option<&'a Stencil>,
+}
+
+impl Tests<'_> {
+    /// Whether the alpha-test keeps a fragment.
+    pub(super) fn keep(&self, canvas: &Canvas, solids: &Solids, fragment: &Fragment) -> bool {
+        self.surfaces.is_none_or(|surfaces| {
+            let b = &solids.boxes[fragment.item as usize];
+            let probe = canvas.probe(fragment.sample);
+            surfaces.opaque(fragment.item, b, probe, &fragment.at)
+        })
+    }
 }
 
 /// What was counted while a list was drawn.
@@ -79,30 +90,34 @@ pub fn draw<'a>(
         depth: DepthBuffer::new(samples),
         last: vec![NO_ITEM; samples],
     };
-    for piece in pieces {
-        let Drawn { tally, depth, last } = &mut drawn;
-        let asked = canvas.fragments(solids, piece, tests.stencil, |fragment| {
-            tally.fragments += 1;
-            let opaque = |surfaces: &Surfaces| {
-                let b = &solids.boxes[fragment.item as usize];
-                surfaces.opaque(
-                    fragment.item,
-                    b,
-                    canvas.probe(fragment.sample),
-                    &fragment.at,
-                )
-            };
-            if !tests.surfaces.is_none_or(opaque) {
-                tally.clear += 1;
-                return;
-            }
-            last[fragment.sample] = fragment.item;
-            tally.passed += u64::from(depth.test(canvas, &fragment));
-        });
-        tally.drawn += u64::from(asked.samples + asked.kept_out > 0);
-        tally.asked += asked.samples;
-        tally.kept_out += asked.kept_out;
-    }
-    drawn.tally.covered = drawn.depth.covered();
+    drawn.draw(canvas, solids, pieces, tests);
     drawn
+}
+
+impl Drawn {
+    /// Draws more on the same image.
+    pub fn draw<'a>(
+        &mut self,
+        canvas: &Canvas,
+        solids: &Solids,
+        pieces: impl IntoIterator<Item = &'a Piece>,
+        tests: &Tests<'_>,
+    ) {
+        let Drawn { tally, depth, last } = self;
+        for piece in pieces {
+            let asked = canvas.fragments(solids, piece, tests.stencil, |fragment| {
+                tally.fragments += 1;
+                if !tests.keep(canvas, solids, &fragment) {
+                    tally.clear += 1;
+                    return;
+                }
+                last[fragment.sample] = fragment.item;
+                tally.passed += u64::from(depth.test(canvas, &fragment));
+            });
+            tally.drawn += u64::from(asked.samples + asked.kept_out > 0);
+            tally.asked += asked.samples;
+            tally.kept_out += asked.kept_out;
+        }
+        tally.covered = depth.covered();
+    }
 }

@@ -2,6 +2,7 @@
 
 use super::canvas::Canvas;
 use super::cycles::items_in_cycles;
+use super::draw::Tests;
 use super::order::Piece;
 use crate::query::ItemId;
 use crate::visibility::Solids;
@@ -31,17 +32,25 @@ struct Layer {
     at: Crossing,
 }
 
-/// Compares an order from front to back with the exact one at every sample. It
-/// keeps all fragments: 40 bytes each. O(samples * layers^2).
-pub fn order_errors(canvas: &Canvas, solids: &Solids, pieces: &[Piece]) -> OrderErrors {
+/// Compares an order from front to back with the exact one at every sample, of the
+/// fragments that the tests beside the z-test let through. It keeps all of them: 40
+/// bytes each. O(samples * layers^2).
+pub fn order_errors(
+    canvas: &Canvas,
+    solids: &Solids,
+    pieces: &[Piece],
+    tests: &Tests,
+) -> OrderErrors {
     let mut layers: Vec<Vec<Layer>> = vec![Vec::new(); canvas.grid().samples()];
     for (piece, when) in pieces.iter().zip(0..) {
-        canvas.fragments(solids, piece, None, |fragment| {
-            layers[fragment.sample].push(Layer {
-                when,
-                item: fragment.item,
-                at: fragment.at,
-            });
+        canvas.fragments(solids, piece, tests.stencil, |fragment| {
+            if tests.keep(canvas, solids, &fragment) {
+                layers[fragment.sample].push(Layer {
+                    when,
+                    item: fragment.item,
+                    at: fragment.at,
+                });
+            }
         });
     }
     let mut errors = OrderErrors::default();

@@ -10,10 +10,12 @@ impl Stencil {
     /// axis) before what is in the depth buffer already, or as near.
     pub fn of_rectangle(canvas: &Canvas, rectangle: &WorldBox, depth: &DepthBuffer) -> Stencil {
         let mut marked = vec![false; canvas.grid().samples()];
-        canvas.meet(rectangle, None, |sample, at| {
+        let asked = canvas.meet(rectangle, None, |sample, at| {
             let before = |(front, _): (_, _)| canvas.probe(sample).compare(&at, &front).is_le();
             marked[sample] = depth.front(sample).is_none_or(before);
         });
-        Stencil::of(marked)
+        let mut stencil = Stencil::of(marked);
+        stencil.asked = asked.samples;
+        stencil
     }
 }

@@ -68,6 +68,19 @@ impl Surfaces {
         self.of_item[item] = (surface.mask != Mask::Solid).then_some(surface);
     }
 
+    /// Those of some of the items, numbered anew in this order.
+    pub fn some(&self, items: &[ItemId]) -> Surfaces {
+        let of_item = items.iter().map(|&item| self.of(item).copied());
+        Surfaces {
+            of_item: of_item.collect(),
+        }
+    }
+
+    /// How many items are not solid.
+    pub fn count(&self) -> usize {
+        self.of_item.iter().flatten().count()
+    }
+
     /// The surface of an item, `None` if it is solid.
     #[inline]
     pub fn of(&self, item: ItemId) -> Option<&Surface> {

@@ -7,6 +7,7 @@
 //! so front faces only, as it is said where [`Solids`](super::Solids) are.
 
 mod canvas;
+mod cut_outs;
 mod cycles;
 mod depth;
 mod draw;
@@ -21,6 +22,7 @@ mod stencil;
 mod tests;
 
 pub use canvas::{Canvas, Fragment};
+pub use cut_outs::CutOuts;
 pub use depth::DepthBuffer;
 pub use draw::{Drawn, Tally, Tests, draw};
 pub use errors::{OrderErrors, order_errors};

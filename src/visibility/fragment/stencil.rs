@@ -6,13 +6,32 @@
 pub struct Stencil {
     marked: Vec<bool>,
     count: usize,
+    /// Samples whose rays were asked to mark it.
+    pub(super) asked: u64,
 }
 
 impl Stencil {
     /// The samples that are marked.
     pub fn of(marked: Vec<bool>) -> Stencil {
         let count = marked.iter().filter(|marked| **marked).count();
-        Stencil { marked, count }
+        Stencil {
+            marked,
+            count,
+            asked: 0,
+        }
+    }
+
+    /// Marks what another of the same image marks as well.
+    pub fn add(&mut self, other: &Stencil) {
+        let pairs = self.marked.iter_mut().zip(&other.marked);
+        pairs.for_each(|(own, other)| *own |= other);
+        self.count = self.marked.iter().filter(|marked| **marked).count();
+        self.asked += other.asked;
+    }
+
+    /// How many samples' rays were asked to mark it.
+    pub fn asked(&self) -> u64 {
+        self.asked
     }
 
     /// Whether the sample may be drawn on.

@@ -153,7 +153,7 @@ fn the_painters_picture_by_bsp_is_exact_and_by_distances_it_is_not() {
             let mut pieces = Vec::new();
             for (i, row) in ORDERS.iter().enumerate() {
                 (row.build)(&solids).order(&solids, &camera, &mut pieces);
-                let errors = order_errors(&canvas, &solids, &pieces);
+                let errors = order_errors(&canvas, &solids, &pieces, &Tests::default());
                 wrong[i] += errors.wrong;
                 pairs += errors.pairs;
                 // The painter's picture, drawn, is wrong where it was said to be.
@@ -215,9 +215,9 @@ fn overlaps_in_a_cycle_are_found_and_only_cutting_undoes_them() {
         let canvas = Canvas::of(&Rays::of(&camera).unwrap(), SampleGrid::new(80, 80));
         let mut pieces = Vec::new();
         (row("box-distance").build)(&solids).order(&solids, &camera, &mut pieces);
-        let sorted = order_errors(&canvas, &solids, &pieces);
+        let sorted = order_errors(&canvas, &solids, &pieces, &Tests::default());
         (row("bsp").build)(&solids).order(&solids, &camera, &mut pieces);
-        let cut = order_errors(&canvas, &solids, &pieces);
+        let cut = order_errors(&canvas, &solids, &pieces, &Tests::default());
         assert_eq!((cut.wrong, cut.wrong_samples), (0, 0));
         assert_eq!(cut.cyclic, sorted.cyclic);
         sorted
@@ -255,7 +255,11 @@ fn through_the_holes_of_cut_outs_is_seen_what_is_behind_them() {
         let drawn = draw(&canvas, &solids, &all(&solids), &tests);
         clear += drawn.tally.clear;
         let solid = draw(&canvas, &solids, &all(&solids), &Tests::default());
+        let opaque = |item, b: &_, probe: &_, at: &_| surfaces.opaque(item, b, probe, at);
+        let truth = SampleTruth::of_opaque(&index, &opaque, &rays, GRID, 1);
+        assert_eq!(drawn.depth.visible(&canvas), truth.visible);
         let (ids, solid) = (drawn.depth.ids(), solid.depth.ids());
+        assert_eq!(ids, truth.front);
         for (sample, &id) in ids.iter().enumerate() {
             let probe = canvas.probe(sample);
             let mut along = index.all_along(probe.ray(), f64::INFINITY);

@@ -11,6 +11,7 @@ use super::number::{Marks, RegionId};
 use super::opening::{Opening, OpeningPlane, rectangle};
 use super::walk::follow_boxes;
 use super::witness::{Rejected, Witness};
+use crate::geometry::Aabb;
 use crate::scene::{Regions, Scene, Tiling, WorldBox};
 use crate::visibility::Ray;
 
@@ -74,6 +75,21 @@ impl Ground for Rooms {
     }
 }
 
+fn in_world(b: &Aabb, origin: DVec3) -> WorldBox {
+    let (min, max) = b.in_world(origin);
+    WorldBox::new(min, max)
+}
+
+/// What is strictly within one box closes no border.
+fn is_within_one(boxes: &BoxGrid, item: &WorldBox) -> bool {
+    let mut within = false;
+    boxes.meeting(item, |id| {
+        let b = &boxes.boxes()[id as usize];
+        within |= b.min.cmplt(item.min).all() && item.max.cmplt(b.max).all();
+    });
+    within
+}
+
 impl RegionGraph {
     /// Regions that are boxes themselves.
     pub fn of_boxes(boxes: Vec<WorldBox>, openings: Vec<Opening>) -> RegionGraph {
@@ -92,20 +108,9 @@ impl RegionGraph {
             Regions::Tiling(tiling) => {
                 let mut graph = RegionGraph::of_tiling(tiling, scene.origin);
                 let boxes = BoxGrid::new(graph.parts.clone());
-                // What is strictly within one box closes no border.
-                let closes = |item: &WorldBox| {
-                    let mut within = false;
-                    boxes.meeting(item, |id| {
-                        let b = &boxes.boxes()[id as usize];
-                        within |= b.min.cmplt(item.min).all() && item.max.cmplt(b.max).all();
-                    });
-                    !within
-                };
-                let world = scene.items.iter().map(|item| {
-                    let (min, max) = item.in_world(scene.origin);
-                    WorldBox::new(min, max)
-                });
-                let borders = BoxGrid::new(world.filter(closes).collect());
+                let world = scene.items.iter().map(|item| in_world(item, scene.origin));
+                let borders = world.filter(|item| !is_within_one(&boxes, item));
+                let borders = BoxGrid::new(borders.collect());
                 let boxes = Boxes(boxes);
                 graph.ground = Arc::new(Rooms { boxes, borders });
                 Ok(graph)
@@ -114,12 +119,16 @@ impl RegionGraph {
         }
     }
 
+    /// By item: whether it may close a border between regions; furniture does not.
+    pub fn borders(&self, scene: &Scene) -> Vec<bool> {
+        let boxes = BoxGrid::new(self.parts.clone());
+        let closes = |item: &Aabb| !is_within_one(&boxes, &in_world(item, scene.origin));
+        scene.items.iter().map(closes).collect()
+    }
+
     /// The same for a tiling about an origin.
     pub fn of_tiling(tiling: &Tiling, origin: DVec3) -> RegionGraph {
-        let world = |b: &crate::geometry::Aabb| {
-            let (min, max) = b.in_world(origin);
-            WorldBox::new(min, max)
-        };
+        let world = |b: &Aabb| in_world(b, origin);
         let boxes: Vec<WorldBox> = tiling.boxes.iter().map(world).collect();
         let mut openings = Vec::with_capacity(tiling.portals.len());
         for portal in &tiling.portals {

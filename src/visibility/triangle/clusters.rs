@@ -51,6 +51,28 @@ impl Clusters {
         clusters
     }
 
+    /// Clusters of so many triangles of an item as they are listed, 1 to 64, without
+    /// any growing: two are the faces of a box. O(t).
+    ///
+    /// # Panics
+    /// If the number is outside 1..=64.
+    pub fn as_listed(surfaces: Arc<Surfaces>, most: usize) -> Clusters {
+        assert!((1..=MOST_TRIANGLES).contains(&most), "1 to 64 triangles");
+        let mut clusters = Clusters {
+            triangles: (0..surfaces.triangles.len() as u32).collect(),
+            starts: vec![0],
+            of_item: Vec::with_capacity(surfaces.items()),
+            surfaces: surfaces.clone(),
+        };
+        for item in 0..surfaces.items() {
+            let (first, end) = (clusters.len() as u32, surfaces.of_item[item].end);
+            let starts = surfaces.of_item[item].clone().step_by(most).skip(1);
+            clusters.starts.extend(starts.chain([end]));
+            clusters.of_item.push(first..clusters.len() as u32);
+        }
+        clusters
+    }
+
     /// How many clusters there are.
     pub fn len(&self) -> usize {
         self.starts.len() - 1
@@ -254,6 +276,27 @@ mod tests {
                 assert_eq!(clusters.starts, again.starts);
             }
         }
+    }
+
+    #[test]
+    fn faces_of_boxes_are_clusters_as_listed() {
+        let scene = crate::scene::load("city:n=20", &Default::default()).unwrap();
+        let surfaces = Arc::new(Surfaces::from_boxes(&scene));
+        let faces = Clusters::as_listed(surfaces.clone(), 2);
+        assert_eq!((faces.len(), faces.of_item[7].clone()), (120, 42..48));
+        for cluster in 0..faces.len() {
+            let extent = faces.bounds(cluster).extent();
+            assert_eq!(faces.triangles_of(cluster).len(), 2);
+            assert_eq!(extent.to_array().iter().filter(|e| **e == 0.0).count(), 1);
+            assert_eq!(
+                surfaces.item_of(faces.triangles_of(cluster)[1]),
+                cluster / 6
+            );
+        }
+        // 12 triangles in fives: the last cluster of an item has two.
+        let fives = Clusters::as_listed(surfaces, 5);
+        let sizes = (3..6).map(|cluster| fives.triangles_of(cluster).len());
+        assert_eq!(sizes.collect::<Vec<_>>(), [5, 5, 2]);
     }
 
     #[test]

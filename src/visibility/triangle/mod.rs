@@ -37,6 +37,7 @@ pub use eye::Eye;
 #[cfg(feature = "peers")]
 pub use meshopt::MeshoptCones;
 pub use metrics::{Counts, facing};
+pub use normal_cone::Cone;
 pub use outcode::{Clipping, clipping};
 pub use screen::Screen;
 pub use selection::Selection;

@@ -108,6 +108,17 @@ impl Search {
     /// Where the front items of the ray are entered; which they are is in `items`.
     #[inline]
     pub fn front(&mut self, index: &RayIndex, ray: &Ray) -> Option<Crossing> {
+        self.front_of(index, ray, &|_, _, _, _| true)
+    }
+
+    /// The same among the items that are opaque where the ray enters them.
+    #[inline]
+    pub fn front_of(
+        &mut self,
+        index: &RayIndex,
+        ray: &Ray,
+        is_opaque: &impl Fn(ItemId, &WorldBox, &Probe, &Crossing) -> bool,
+    ) -> Option<Crossing> {
         let probe = Probe::new(*ray);
         let items = &mut self.items;
         items.clear();
@@ -118,14 +129,16 @@ impl Search {
                 let Some(entry) = probe.enter(b, limit) else {
                     continue;
                 };
-                match best.map_or(Ordering::Less, |best| probe.compare(&entry, &best)) {
+                let order = best.map_or(Ordering::Less, |best| probe.compare(&entry, &best));
+                match order {
+                    Ordering::Greater => continue,
+                    _ if !is_opaque(id, b, &probe, &entry) => continue,
                     Ordering::Less => {
                         items.clear();
                         best = Some(entry);
                         limit = entry.at_most();
                     }
                     Ordering::Equal => {}
-                    Ordering::Greater => continue,
                 }
                 items.push(id);
             }

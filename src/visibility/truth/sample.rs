@@ -2,10 +2,11 @@
 //! What lies between the rays is left to certificates, triangles to `surface_sample`.
 
 use crate::query::ItemId;
-use crate::scene::SeededRng;
+use crate::scene::{SeededRng, WorldBox};
 use crate::threads;
 use crate::visibility::{Ray, Rays, SampleGrid, Solids};
 
+use super::entry::{Crossing, Probe};
 use super::ray_index::{RayIndex, Search};
 
 /// In place of an item where a ray meets nothing.
@@ -41,8 +42,20 @@ impl SampleTruth {
         threads: usize,
     ) -> SampleTruth {
         debug_assert_eq!(solids.boxes.len(), index.len(), "an index of these solids");
+        SampleTruth::of_opaque(index, &|_, _, _, _| true, rays, grid, threads)
+    }
+
+    /// The same where items have holes: what is seen is the first item that is opaque
+    /// where the ray enters it, and those that tie with it.
+    pub fn of_opaque(
+        index: &RayIndex,
+        is_opaque: &(impl Fn(ItemId, &WorldBox, &Probe, &Crossing) -> bool + Sync),
+        rays: &Rays,
+        grid: SampleGrid,
+        threads: usize,
+    ) -> SampleTruth {
         let see = |search: &mut Search, ray: &Ray, others: &mut Vec<ItemId>| {
-            search.front(index, ray);
+            search.front_of(index, ray, is_opaque);
             let (first, ties) = search.items.split_first()?;
             others.extend_from_slice(ties);
             Some(*first)

@@ -1,7 +1,9 @@
 //! By the distance of the nearest point of each box.
 
-use super::contract::{DepthOrder, Piece, by_key, distance, nearest_point};
+use super::contract::{DepthOrder, Piece, by_key, distance, nearest_point, sorted};
 use crate::camera::Camera;
+use crate::query::ItemId;
+use crate::scene::WorldBox;
 use crate::visibility::Solids;
 
 /// As typed on the command line.
@@ -14,8 +16,21 @@ pub struct BoxDistance;
 
 impl DepthOrder for BoxDistance {
     fn order(&self, solids: &Solids, camera: &Camera, pieces: &mut Vec<Piece>) {
-        by_key(solids, pieces, |b| {
-            distance(camera, nearest_point(camera, b))
-        });
+        by_key(solids, pieces, |b| nearest(camera, b));
     }
+}
+
+/// Brings some of the items into this order. O(n log n).
+///
+/// # Panics
+/// If there is no such item.
+pub fn front_to_back(solids: &Solids, camera: &Camera, items: &mut [ItemId]) {
+    let key = |&item: &ItemId| (nearest(camera, &solids.boxes[item as usize]), item);
+    let order = sorted(items.iter().map(key));
+    let places = items.iter_mut().zip(order);
+    places.for_each(|(to, (_, item))| *to = item);
+}
+
+fn nearest(camera: &Camera, b: &WorldBox) -> f64 {
+    distance(camera, nearest_point(camera, b))
 }

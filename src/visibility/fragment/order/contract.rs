@@ -23,13 +23,19 @@ pub trait DepthOrder: Send + Sync {
     fn order(&self, solids: &Solids, camera: &Camera, pieces: &mut Vec<Piece>);
 }
 
-/// The items, least key first; of the same key the lowest id.
+/// All items, least key first; of the same key the lowest id.
 pub(super) fn by_key(solids: &Solids, pieces: &mut Vec<Piece>, key: impl Fn(&WorldBox) -> f64) {
     let keyed = solids.boxes.iter().zip(0..).map(|(b, item)| (key(b), item));
+    pieces.clear();
+    let items = sorted(keyed).into_iter().map(|(_, item)| item);
+    pieces.extend(items.map(|item| Piece { item, part: None }));
+}
+
+/// Items with their keys, least first; of the same key the lowest id.
+pub(super) fn sorted(keyed: impl Iterator<Item = (f64, ItemId)>) -> Vec<(f64, ItemId)> {
     let mut keyed: Vec<(f64, ItemId)> = keyed.collect();
     keyed.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    pieces.clear();
-    pieces.extend(keyed.iter().map(|&(_, item)| Piece { item, part: None }));
+    keyed
 }
 
 /// How far a point is: squared distance from the eye, or the depth for an

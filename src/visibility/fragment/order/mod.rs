@@ -8,6 +8,7 @@ mod contract;
 mod none;
 mod tree;
 
+pub use box_distance::front_to_back;
 pub use bsp::BspOrder;
 pub use contract::{DepthOrder, Piece};
 

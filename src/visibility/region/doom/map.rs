@@ -1,11 +1,14 @@
 //! The lumps of a map, as far as they say what is solid and what is open.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
 use super::super::answer::RegionId;
 use super::super::pvs::Pvs;
 use crate::input::InputError;
-use crate::scene::{WadMap, WorldBox, map_lump};
+use crate::scene::{Scene, WadMap, WorldBox, map_lump};
+use crate::visibility::MapFile;
 
 /// Height at which what moves ends; map units fit 16 bits.
 const HIGHEST: f64 = 32768.0;
@@ -66,6 +69,16 @@ fn is_still(action: u16) -> bool {
 const BOSS_TAGS: [u16; 2] = [666, 667];
 
 impl DoomMap {
+    /// The map that a scene was loaded from, if it was one.
+    ///
+    /// # Errors
+    /// The map's file, read a second time.
+    pub fn of_scene(scene: &Scene) -> Result<Option<Arc<DoomMap>>, InputError> {
+        let file = MapFile::of(&scene.name)?;
+        let map = file.map(|file| DoomMap::read(&file.bytes, &file.name, file.map.as_deref()));
+        Ok(map.transpose()?.map(Arc::new))
+    }
+
     /// Reads the named map of a WAD file, or its first.
     ///
     /// # Errors

@@ -1,0 +1,116 @@
+//! The region stage: pays where walls close off most of what the frustum meets, and is
+//! left out where the eye is in the open. Predicted from the regions that a few rays
+//! pass.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+use std::sync::Arc;
+
+use super::super::AdviseError;
+use super::super::case::Case;
+use super::super::omission::{By, Draft, LeftOutIf, Omission, Way};
+use super::hidden::{self, PROBED, PROBES};
+use crate::geometry::ConvexVolume;
+use crate::measure::Ask;
+use crate::scene::Scene;
+use crate::visibility::Rays;
+use crate::visibility::region::doom::DoomMap;
+use crate::visibility::region::{
+    EyePlace, Marks, PortalClip, RegionGraph, RegionItems, RegionRow, Scratch, seen_by_samples,
+};
+
+pub(super) const NAME: &str = "regions";
+
+/// The regions of the scene with their items, and what is asked of them.
+struct Regions {
+    row: PortalClip,
+    items: RegionItems,
+    views: Vec<(Rays, ConvexVolume)>,
+}
+
+/// The rooms of a scene or the sectors of its map.
+fn graph_of(scene: &Scene) -> Result<Option<Arc<RegionGraph>>, AdviseError> {
+    let graph = match DoomMap::of_scene(scene)? {
+        Some(map) => Some(map.graph()),
+        None => RegionGraph::of_scene(scene).ok(),
+    };
+    let joined = graph.filter(|graph| !graph.openings().is_empty());
+    Ok(joined.map(Arc::new))
+}
+
+pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> {
+    let omission = Omission::new(
+        NAME,
+        "the region stage (portals)",
+        [
+            "no region stage: portals close off too little",
+            "find the regions that are seen before their items (portal-clip)",
+        ],
+        "share of the items in the view that lie in no region that is seen",
+        LeftOutIf::AtMost,
+        By::Rule,
+    );
+    let Some(graph) = graph_of(case.scene())? else {
+        let reason = "the scene has no rooms or sectors that portals join";
+        return Ok(omission.because(reason).draft(Vec::new()));
+    };
+    let views = match hidden::sights(case) {
+        Ok(views) => views,
+        Err(reason) => return Ok(omission.because(reason).draft(Vec::new())),
+    };
+    let regions = Rc::new(Regions {
+        items: RegionItems::of(&graph, case.scene()),
+        row: PortalClip(graph),
+        views,
+    });
+    let predicted = predicted(case, &regions);
+    let on = format!("portal-clip against {}", case.spec.label);
+    let kept = asked(case, regions);
+    Ok(hidden::draft(
+        case,
+        omission,
+        on,
+        kept,
+        Way::Base,
+        predicted,
+    ))
+}
+
+/// The items of the regions that are seen, each tested against the six planes; all
+/// items by the tree where the eye is in no region.
+fn asked<'c>(case: &'c Case<'c>, regions: Rc<Regions>) -> Ask<'c> {
+    let memory = RefCell::new((Scratch::default(), Marks::default(), Vec::new()));
+    let items = &case.scene().items;
+    Box::new(move |n, out| {
+        let (rays, volume) = &regions.views[n];
+        let (scratch, marks, seen) = &mut *memory.borrow_mut();
+        match regions.row.from_eye(rays, scratch, seen) {
+            EyePlace::Inside => {
+                regions.items.of_regions(seen, marks, out);
+                out.retain(|&id| volume.sees(&items[id as usize]));
+            }
+            EyePlace::Outside => case.query(n, out),
+        }
+    })
+}
+
+/// Of the items that a few cameras meet, those in no region that a few rays pass.
+fn predicted(case: &Case, regions: &Regions) -> f64 {
+    let graph = &regions.row.0;
+    let (mut met, mut gone) = (0, 0);
+    let (mut found, mut listed) = (Vec::new(), Vec::new());
+    let (mut homes, mut seen, mut marks) = (Vec::new(), Vec::new(), Marks::default());
+    for frame in hidden::frames(regions.views.len(), PROBED) {
+        found.clear();
+        case.query(frame, &mut found);
+        met += found.len();
+        let rays = &regions.views[frame].0;
+        if graph.homes(rays, &mut homes) {
+            seen_by_samples(graph, rays, PROBES, &mut seen);
+            regions.items.of_regions(&seen, &mut marks, &mut listed);
+            let is_gone = |id: &&u32| listed.binary_search(id).is_err();
+            gone += found.iter().filter(is_gone).count();
+        }
+    }
+    gone as f64 / met.max(1) as f64
+}

@@ -1,0 +1,115 @@
+//! Sorting what is left from front to back: with an early z-test a hidden fragment that
+//! comes late is not shaded. Pays where many layers lie behind each other and shading
+//! is dear. Predicted from the layers along a few rays.
+
+use std::rc::Rc;
+
+use super::super::AdviseError;
+use super::super::case::Case;
+use super::super::omission::{By, Draft, Forced, LeftOutIf, Omission, Way};
+use super::hidden::{self, PROBED, PROBES, Removal};
+use crate::query::ItemId;
+use crate::visibility::fragment::order::front_to_back;
+use crate::visibility::fragment::{Canvas, Piece, Tests, draw};
+use crate::visibility::truth::RayIndex;
+use crate::visibility::{Rays, SampleGrid, Solids};
+
+pub(super) const NAME: &str = "sorting";
+
+/// Samples of the images that fragments are counted in, and of the image they stand for.
+const COUNTED: SampleGrid = SampleGrid::new(160, 90);
+const SHADED: SampleGrid = SampleGrid::new(1920, 1080);
+
+pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> {
+    let omission = Omission::new(
+        NAME,
+        "sorting what is left from front to back",
+        [
+            "no sorting: draw in the order of the tree",
+            "sort what is left from front to back",
+        ],
+        "share of the shaded fragments that an early z-test saves once items are sorted",
+        LeftOutIf::AtMost,
+        By::Rule,
+    );
+    let both = hidden::solids(case.scene()).and_then(|s| Ok((s, hidden::sights(case)?)));
+    let (solids, views) = match both {
+        Ok((solids, views)) => (Rc::new(solids), views),
+        Err(reason) => return Ok(omission.because(reason).draft(Vec::new())),
+    };
+    let frames = hidden::frames(views.len(), PROBED);
+    let few = frames.map(|n| {
+        let mut items = Vec::new();
+        case.query(n, &mut items);
+        View {
+            rays: views[n].0,
+            solids: solids.some(&items),
+        }
+    });
+    let few: Vec<View> = few.collect();
+    let shade_ns = case.options.shade_ns;
+    let cameras: Vec<_> = views.iter().map(|(rays, _)| *rays.camera()).collect();
+    let forced = Forced {
+        on: format!(
+            "box-distance against {}, {}x{}",
+            case.spec.label, SHADED.width, SHADED.height
+        ),
+        kept: Way::Other(Box::new(move |n, out| {
+            case.query(n, out);
+            front_to_back(&solids, &cameras[n], out);
+        })),
+        left_out: Way::Base,
+        same: true,
+        judged: true,
+    };
+    Ok(hidden::weighed(omission, forced, move || Removal {
+        unit: ["shaded fragment", "shaded fragments"],
+        with: hidden::mean(few.iter().map(|view| view.shaded(true))),
+        without: hidden::mean(few.iter().map(|view| view.shaded(false))),
+        cost_ns: shade_ns,
+        predicted: predicted(&few),
+    }))
+}
+
+/// What the frustum leaves of a view, in the order in which the tree hands it on.
+struct View {
+    rays: Rays,
+    solids: Solids,
+}
+
+impl View {
+    /// Fragments that pass an early z-test when they come.
+    fn shaded(&self, sorted: bool) -> f64 {
+        let mut items: Vec<ItemId> = (0..self.solids.boxes.len() as ItemId).collect();
+        if sorted {
+            front_to_back(&self.solids, self.rays.camera(), &mut items);
+        }
+        let pieces = items.iter().map(|&item| Piece { item, part: None });
+        let pieces: Vec<Piece> = pieces.collect();
+        let canvas = Canvas::of(&self.rays, COUNTED);
+        let tally = draw(&canvas, &self.solids, &pieces, &Tests::default()).tally;
+        tally.passed as f64 * (SHADED.samples() as f64 / COUNTED.samples() as f64)
+    }
+}
+
+/// Of n layers in random order 1 + 1/2 + ... + 1/n are nearer than all before them
+/// (Knuth, The Art of Computer Programming, 1.2.10): so many are shaded, and in order
+/// only one.
+fn predicted(few: &[View]) -> f64 {
+    let (mut shaded, mut covered) = (0.0, 0.0);
+    for view in few {
+        let index = RayIndex::build(&view.solids);
+        for row in 0..PROBES.height {
+            for column in 0..PROBES.width {
+                let ray = view.rays.sample(PROBES, column, row);
+                let layers = index.all_along(&ray, ray.far).len();
+                shaded += (1..=layers).map(|n| 1.0 / n as f64).sum::<f64>();
+                covered += f64::from(u8::from(layers > 0));
+            }
+        }
+    }
+    match covered > 0.0 {
+        true => 1.0 - covered / shaded,
+        false => 0.0,
+    }
+}
