@@ -5,6 +5,7 @@ mod lanes;
 mod rules;
 mod slits;
 mod streets;
+mod traces;
 mod worlds;
 
 use super::{Interleaved, OccluderChoice, OcclusionBuffer, TwoPass, View};

@@ -13,7 +13,7 @@ use crate::visibility::SampleGrid;
 const GRID: SampleGrid = SampleGrid::new(160, 90);
 
 /// Eyes 1.7 above the lowest point, outside of all boxes, looking about.
-fn cameras(ready: &Ready, count: usize) -> Vec<Camera> {
+pub fn cameras(ready: &Ready, count: usize) -> Vec<Camera> {
     let mut rng = SeededRng::new(11);
     let world = ready.scene.world_bounds();
     let mut cameras = Vec::new();
@@ -38,7 +38,7 @@ fn cameras(ready: &Ready, count: usize) -> Vec<Camera> {
     cameras
 }
 
-fn ready(spec: &str) -> Ready {
+pub fn ready(spec: &str) -> Ready {
     Ready::of(load(spec, &LoadOptions::default()).unwrap())
 }
 
