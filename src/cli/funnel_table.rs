@@ -5,7 +5,7 @@ use std::io::{self, Write};
 
 use super::document::{Block, Rows};
 use super::text;
-use crate::funnel::{FunnelReport, Gain, StageRow};
+use crate::funnel::{FunnelReport, Gain, InnerRow, StageRow};
 use crate::shown::field;
 use crate::visibility::Guarantee;
 
@@ -25,7 +25,8 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
         )),
         Block::Table(stages(report)),
     ];
-    // Nothing to draw in order or to pick in a scene without solids.
+    blocks.extend(report.inner_boxes.as_ref().map(inner_boxes));
+    // Drawn in order and picked are solid boxes only.
     for (heading, table) in [
         ("What is left, drawn in every order", orders(report)),
         ("The first item under a cursor", picks(report)),
@@ -37,6 +38,21 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
     }
     blocks.extend(report.conclusions.iter().cloned().map(Block::Line));
     blocks
+}
+
+/// What hides in a mesh, and what finding it took.
+fn inner_boxes(row: &InnerRow) -> Block {
+    let held = row.volume_share.map(|share| {
+        let [held, lost] = [share, 1.0 - share].map(|share| share * 100.0);
+        format!(", {held:.1} % of the volume of these (loss {lost:.1} %)")
+    });
+    Block::Line(format!(
+        "Occluders: boxes proven inside {} of {}{}; found in {}.",
+        row.boxed_count,
+        text::counted(row.item_count, "item"),
+        held.unwrap_or_default(),
+        text::time(row.build_ns)
+    ))
 }
 
 /// What the times rest on.

@@ -5,7 +5,7 @@ use super::pass::{ALL, Pass};
 use super::stage::{NONE, StageKind};
 use super::world::{FunnelError, FunnelInput, World};
 use crate::query::ItemId;
-use crate::visibility::Solids;
+use crate::scene::ItemShape;
 use crate::visibility::truth::{Certificates, Prover, RayIndex, SampleTruth, certify};
 
 /// Looks for a proof of every item of each view that the frustum meets and that is
@@ -19,13 +19,15 @@ pub fn certificates(
     stop: &dyn Fn() -> bool,
     mut each: impl FnMut(Certificates),
 ) -> Result<bool, FunnelError> {
-    let world = World::new(input)?;
-    if !world.has_solids() {
-        return Err(FunnelError::NoSolids {
-            scene: input.scene.name.clone(),
-        });
+    let no_solids = || FunnelError::NoSolids {
+        scene: input.scene.name.clone(),
+        shape: input.scene.item_shape(),
+    };
+    if input.scene.item_shape() != ItemShape::Box {
+        return Err(no_solids());
     }
-    let solids: &Solids = world.solids();
+    let world = World::new(input)?;
+    let solids = world.solids().ok_or_else(no_solids)?;
     let index = RayIndex::build(solids);
     let mut pass = Pass::new(&world);
     let Some(walked) = pass.walk(input.chain, stop) else {

@@ -53,9 +53,9 @@ pub struct Orders {
 
 impl Orders {
     /// For a set of items of each view.
-    pub fn of(world: &World, pass: &Pass, set: usize) -> Orders {
+    pub fn of(world: &World, all: &Solids, pass: &Pass, set: usize) -> Orders {
         let views = (0..world.views()).map(|view| {
-            let solids = world.solids().some(&world.listed(pass.items(set, view)));
+            let solids = all.some(&world.listed(pass.items(set, view)));
             Left {
                 orders: ORDERS.iter().map(|row| (row.build)(&solids)).collect(),
                 rays: *world.rays(view),

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::chain::Chain;
+use super::inner::InnerRow;
 use super::judged::Errors;
 use super::orders::OrderRow;
 use super::picks::PickRow;
@@ -39,9 +40,12 @@ pub struct FunnelReport {
     /// What the map's own table of sectors that cannot see each other gets wrong; null
     /// for what is no map.
     pub reject: Option<Audit>,
-    /// What is left, drawn in every order.
+    /// The boxes inside the items of a mesh, which hide what is behind them; null for
+    /// what is no mesh.
+    pub inner_boxes: Option<InnerRow>,
+    /// What is left, drawn in every order; empty unless items are solid boxes.
     pub orders: Vec<OrderRow>,
-    /// The first item under a cursor, by every back end of picking.
+    /// The first item under a cursor, by every back end of picking; empty as above.
     pub picks: Vec<PickRow>,
     /// Each stage of the chain, with it and without it.
     pub gains: Vec<Gain>,

@@ -15,14 +15,16 @@ use super::pass::{Pass, Walked};
 use super::picks::Picks;
 use super::plan_view::{PlanView, fate};
 use super::report::{FunnelReport, Gain, LevelRow, Side, StageRow};
+use super::seen::seen;
 use super::stage::{NONE, StageKind};
 use super::times::Times;
 use super::triangle_rows;
 use super::truth::Truth;
 use super::world::{FunnelError, FunnelInput, World};
 use crate::measure::{Ask, OverProcesses, ProcessTimes, Schedule, TimedTask, Verdict, timed};
-use crate::visibility::Level;
+use crate::scene::ItemShape;
 use crate::visibility::truth::RayIndex;
+use crate::visibility::{Level, Solids};
 
 /// What all processes time: the plan is the same for each.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -52,7 +54,8 @@ pub fn prepare(
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<Prepared>, FunnelError> {
     let world = World::new(input)?;
-    let Some(truth) = world.truth(input, stop)? else {
+    let threads = input.execution.threads;
+    let Some(truth) = seen(&world, input.samples, 0, threads, stop)? else {
         return Ok(None);
     };
     let mut pass = Pass::new(&world);
@@ -75,7 +78,7 @@ pub fn prepare(
             .collect();
         rows.push((world.back_end(*stage, name), name.clone(), judged, *step));
     }
-    if let Some(left) = &left {
+    if let Some(faces) = &left.faces {
         let culls = back_ends(StageKind::Triangle, input.scene).into_iter();
         let culls = culls.zip(std::iter::once(None).chain((0..).map(Some)));
         for (back_end, place) in culls {
@@ -83,7 +86,7 @@ pub fn prepare(
                 return Ok(None);
             }
             let task = place.map(|place: usize| pass.steps().len() + place);
-            let judged = left.faces.judged(place);
+            let judged = faces.judged(place);
             rows.push((back_end, back_end.name.to_owned(), judged, task));
         }
     }
@@ -95,13 +98,14 @@ pub fn prepare(
         });
         rows.push((back_end, back_end.name.to_owned(), judged.collect(), None));
     }
-    let drawn = match &left {
-        Some(left) => left.orders.drawn(input.samples, stop),
-        None => Some(Vec::new()),
-    };
-    let Some(drawn) = drawn else {
-        return Ok(None);
-    };
+    let (mut drawn, mut picked) = (Vec::new(), Vec::new());
+    if let Some(boxes) = &left.boxes {
+        let Some(rows) = boxes.orders.drawn(input.samples, stop) else {
+            return Ok(None);
+        };
+        drawn = rows;
+        picked = boxes.picks.judged(&RayIndex::build(boxes.solids));
+    }
     let tasks: Vec<Option<usize>> = rows.iter().map(|(_, _, _, task)| *task).collect();
     let rows = rows.into_iter().map(|(back_end, name, judged, task)| {
         let stage = back_end.stage;
@@ -126,7 +130,7 @@ pub fn prepare(
         (*stage, name, [side(&walks.chosen), side(without)])
     });
     let gains = gains.collect();
-    let timed = timed_tasks(&pass, &world, left.as_ref(), None);
+    let timed = timed_tasks(&pass, &world, &left, None);
     let schedule = Schedule::new(world.views(), &timed, input.protocol);
     let level = Level::of(&input.scene.name, input.scene)?;
     Ok(Some(Prepared {
@@ -147,10 +151,9 @@ pub fn prepare(
             chain: input.chain.clone(),
             stages: rows,
             reject: world.audit().cloned(),
+            inner_boxes: world.inner().map(|inner| inner.row.clone()),
             orders: drawn,
-            picks: left.as_ref().map_or_else(Vec::new, |left| {
-                left.picks.judged(&RayIndex::build(world.solids()))
-            }),
+            picks: picked,
             gains: Vec::new(),
             conclusions: Vec::new(),
             plan_view: plan_view(&world, &pass, &walks.chosen, &truth),
@@ -173,26 +176,38 @@ pub fn time(
         return Ok(None);
     };
     let left = Left::of(&world, &pass, &walks.chosen);
-    let tasks = timed_tasks(&pass, &world, left.as_ref(), Some(&plan.expected));
+    let tasks = timed_tasks(&pass, &world, &left, Some(&plan.expected));
     let timed = timed(&tasks, &plan.schedule, input.protocol, &|_| stop());
     Ok(timed.map(|timed| ProcessTimes::of(&timed)))
 }
 
 /// What the chosen chain leaves of every view, ready for the stages behind it.
-struct Left {
-    faces: Faces,
+struct Left<'w> {
+    /// None for a scene of walls.
+    faces: Option<Faces>,
+    /// None for a scene whose items are no solid boxes.
+    boxes: Option<LeftBoxes<'w>>,
+}
+
+/// What is asked of solid boxes only.
+struct LeftBoxes<'w> {
+    solids: &'w Solids,
     orders: Orders,
     picks: Picks,
 }
 
-impl Left {
-    /// `None` for a scene whose items are no solid boxes: those stages are about their faces.
-    fn of(world: &World, pass: &Pass, chosen: &Walked) -> Option<Left> {
-        world.has_solids().then(|| Left {
-            faces: Faces::of(world, pass, chosen.left()),
-            orders: Orders::of(world, pass, chosen.left()),
-            picks: Picks::of(world),
-        })
+impl<'w> Left<'w> {
+    fn of(world: &'w World, pass: &Pass, chosen: &Walked) -> Left<'w> {
+        let set = chosen.left();
+        let has_faces = world.scene().item_shape() != ItemShape::Wall;
+        Left {
+            faces: has_faces.then(|| Faces::of(world, pass, set)),
+            boxes: world.solids().map(|solids| LeftBoxes {
+                solids,
+                orders: Orders::of(world, solids, pass, set),
+                picks: Picks::of(world, solids),
+            }),
+        }
     }
 }
 
@@ -201,7 +216,7 @@ impl Left {
 fn timed_tasks<'p>(
     pass: &'p Pass<'p>,
     world: &'p World<'p>,
-    left: Option<&'p Left>,
+    left: &'p Left<'p>,
     expected: Option<&[Vec<u64>]>,
 ) -> Vec<TimedTask<'p>> {
     let steps = pass.steps().iter().map(|step| {
@@ -209,16 +224,16 @@ fn timed_tasks<'p>(
         let ask: Ask = Box::new(move |view, out| run(view, pass.items(step.input, view), out));
         ask
     });
-    let behind = left.into_iter().flat_map(
-        |Left {
-             faces,
-             orders,
-             picks,
-         }| {
-            let culls = (1..triangle_rows::back_ends().count()).map(move |place| {
-                let ask: Ask = Box::new(move |view, out| faces.cull(place - 1, view, out));
-                ask
-            });
+    let culls = left.faces.iter().flat_map(|faces| {
+        (1..triangle_rows::back_ends().count()).map(move |place| {
+            let ask: Ask = Box::new(move |view, out| faces.cull(place - 1, view, out));
+            ask
+        })
+    });
+    let behind = left
+        .boxes
+        .iter()
+        .flat_map(|LeftBoxes { orders, picks, .. }| {
             let sorts = (0..orders::COUNT).map(move |order| {
                 let pieces = RefCell::new(Vec::new());
                 let ask: Ask = Box::new(move |view, out| {
@@ -232,9 +247,8 @@ fn timed_tasks<'p>(
                 let ask: Ask = Box::new(move |view, out| picks.first(back_end, view, out));
                 ask
             });
-            culls.chain(sorts).chain(picks)
-        },
-    );
+            sorts.chain(picks)
+        });
     let task = |(place, ask): (usize, Ask<'p>)| TimedTask {
         expected: match expected {
             Some(expected) => expected[place].clone(),
@@ -244,7 +258,12 @@ fn timed_tasks<'p>(
         ask_many: None,
         least_ns: None,
     };
-    steps.chain(behind).enumerate().map(task).collect()
+    steps
+        .chain(culls)
+        .chain(behind)
+        .enumerate()
+        .map(task)
+        .collect()
 }
 
 /// How much is handed on in each view.

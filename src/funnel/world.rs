@@ -3,15 +3,17 @@
 
 use std::borrow::Cow;
 use std::cell::RefCell;
+use std::sync::Arc;
 
 use glam::DVec3;
 
 use super::back_ends::back_ends;
 use super::chain::Chain;
 use super::hiding::{HIDING, HidingRow};
+use super::inner::Inner;
 use super::judged::{Judged, judge_items};
 use super::plan_view::{Fate, MOST_DRAWN, PlanView};
-use super::regions::{Regions, map_of};
+use super::regions::Regions;
 use super::stage::{BackEnd, NONE, StageKind};
 use super::truth::Truth;
 use crate::camera::PlaneOptions;
@@ -22,12 +24,11 @@ use crate::kernel::Kernel;
 use crate::measure::{Protocol, WorkloadError, input_of};
 use crate::path::CameraPath;
 use crate::query::ItemId;
-use crate::scene::Scene;
+use crate::scene::{ItemShape, Scene, Surfaces};
 use crate::visibility::fragment::{Canvas, Piece, Tests, draw};
 use crate::visibility::occlusion::{self, OccluderScene};
 use crate::visibility::region::{Audit, EyePlace, Marks, Scratch};
 use crate::visibility::triangle;
-use crate::visibility::truth::{RayIndex, SampleTruth, SurfaceIndex};
 use crate::visibility::{Guarantee, NoRays, Rays, SampleGrid, Solids};
 
 /// What a funnel is studied on.
@@ -74,11 +75,14 @@ pub enum FunnelError {
     Input(#[from] InputError),
     /// Proofs are about solid boxes.
     #[error(
-        "'{scene}' is a map, whose items are walls; expected a scene of solid boxes for proofs"
+        "the items of '{scene}' are {}; expected a scene of solid boxes for proofs",
+        shape.name()
     )]
     NoSolids {
         /// Its name.
         scene: String,
+        /// What its items are.
+        shape: ItemShape,
     },
     /// A back end that the scene has no data for.
     #[error("{stage} '{name}' needs what the scene does not have; expected one of {known}", stage = stage.name())]
@@ -103,8 +107,12 @@ pub struct World<'a> {
     samples: SampleGrid,
     structures: Vec<(String, Box<dyn DynIndex>)>,
     views: Vec<View>,
-    solids: Solids,
-    occluders: OccluderScene,
+    /// The items, if they are solid boxes.
+    solids: Option<Solids>,
+    /// Boxes inside the items, if those are triangles.
+    inner: Option<Inner>,
+    /// None where nothing is known to hide.
+    occluders: Option<OccluderScene>,
     regions: Option<Regions>,
 }
 
@@ -144,15 +152,22 @@ impl<'a> World<'a> {
             let index = spec.build(input_of(input.scene, &input.scene.items))?;
             Ok::<_, BuildError>((spec.label.clone(), index))
         });
-        let solids = Solids::of(input.scene);
+        let solids = (input.scene.item_shape() == ItemShape::Box).then(|| Solids::of(input.scene));
+        let inner = Inner::of(input.scene, input.execution.threads);
+        let occluders = match (&solids, &inner) {
+            (Some(solids), _) => Some(OccluderScene::of(solids)),
+            (None, Some(inner)) => Some(OccluderScene::within(input.scene, &inner.boxes)),
+            (None, None) => None,
+        };
         let world = World {
             scene: input.scene,
             kernel: input.execution.kernel,
             samples: input.samples,
             structures: built.collect::<Result<_, _>>()?,
             views: views.collect::<Result<_, FunnelError>>()?,
-            occluders: OccluderScene::of(&solids),
             solids,
+            inner,
+            occluders,
             regions: Regions::of(input.scene)?,
         };
         for stage in StageKind::OF_ITEMS {
@@ -194,9 +209,19 @@ impl<'a> World<'a> {
         &self.views[view].triangles
     }
 
-    /// The items as they hide each other.
-    pub fn solids(&self) -> &Solids {
-        &self.solids
+    /// The items as they hide each other, if they are solid boxes.
+    pub fn solids(&self) -> Option<&Solids> {
+        self.solids.as_ref()
+    }
+
+    /// The triangles of the items, if the scene is a mesh.
+    pub fn mesh(&self) -> Option<&Arc<Surfaces>> {
+        self.scene.surfaces.as_ref()
+    }
+
+    /// The boxes inside the items of a mesh, which are drawn as occluders.
+    pub fn inner(&self) -> Option<&Inner> {
+        self.inner.as_ref()
     }
 
     /// The rays of a view.
@@ -207,62 +232,6 @@ impl<'a> World<'a> {
     /// How many items there are.
     pub fn items(&self) -> usize {
         self.scene.items.len()
-    }
-
-    /// Whether items are what their boxes are. Linedefs of a map are walls in them.
-    pub fn has_solids(&self) -> bool {
-        Solids::are_items_of(self.scene)
-    }
-
-    /// What each view shows at its samples: solids, or the walls, floors and ceilings of a
-    /// map. `None` if stopped.
-    ///
-    /// # Errors
-    /// The map's file, read again.
-    pub fn truth(
-        &self,
-        input: &FunnelInput,
-        stop: &dyn Fn() -> bool,
-    ) -> Result<Option<Truth>, InputError> {
-        let Some(map) = map_of(self.scene)? else {
-            return Ok(self.truth_of_solids(input, stop));
-        };
-        let surfaces = map.surfaces(self.scene);
-        let index = SurfaceIndex::build(&surfaces);
-        let items = self.items() as ItemId;
-        let mut visible = Vec::with_capacity(self.views());
-        for view in &self.views {
-            if stop() {
-                return Ok(None);
-            }
-            let threads = input.execution.threads;
-            let truth = SampleTruth::of_surfaces(&index, &view.rays, input.samples, threads);
-            let counts = truth.visible.into_iter().zip(truth.samples_of);
-            // Behind the scene's items come floors and ceilings.
-            visible.push(counts.filter(|(item, _)| *item < items).collect());
-        }
-        Ok(Some(Truth::new(visible)))
-    }
-
-    fn truth_of_solids(&self, input: &FunnelInput, stop: &dyn Fn() -> bool) -> Option<Truth> {
-        let solids = &self.solids;
-        let index = RayIndex::build(solids);
-        let mut visible = Vec::with_capacity(self.views());
-        for view in &self.views {
-            if stop() {
-                return None;
-            }
-            let truth = SampleTruth::of(
-                solids,
-                &index,
-                &view.rays,
-                input.samples,
-                input.execution.threads,
-            );
-            let counts = truth.visible.into_iter().zip(truth.samples_of);
-            visible.push(counts.collect());
-        }
-        Some(Truth::new(visible))
     }
 
     /// The back ends of a stage that are compared.
@@ -344,11 +313,12 @@ impl<'a> World<'a> {
         let hide = RefCell::new((row.make)(buffer, self.kernel));
         let does_both = row.back_end().does_object_stage;
         let every: Vec<ItemId> = (0..self.items() as ItemId).collect();
+        let occluders = self.occluders.as_ref().expect("a scene with occluders");
         Box::new(move |view, input, out| {
             let View { rays, volume, .. } = &self.views[view];
-            let view = occlusion::View::new(rays, volume, &self.occluders, buffer);
+            let view = occlusion::View::new(rays, volume, occluders, buffer);
             let items = input.unwrap_or(&every);
-            hide.borrow_mut().hide(&self.occluders, &view, items, out);
+            hide.borrow_mut().hide(occluders, &view, items, out);
             // It has looked beyond the regions that are seen.
             if does_both && self.regions.is_some() && input.is_some() {
                 out.retain(|id| items.binary_search(id).is_ok());
@@ -370,15 +340,15 @@ impl<'a> World<'a> {
     /// What the z-test leaves: items in front at a sample, drawn one by one.
     pub fn judge_fragments(&self, view: usize, input: Option<&[ItemId]>, truth: &Truth) -> Judged {
         let items = self.listed(input);
-        if !self.has_solids() {
+        let Some(solids) = &self.solids else {
             let visible = truth.of_view(view).iter().map(|(item, _)| *item);
             let output: Vec<ItemId> = visible
                 .filter(|id| items.binary_search(id).is_ok())
                 .collect();
             return judge_items(input, self.items(), &output, truth.of_view(view));
-        }
+        };
         let canvas = Canvas::of(&self.views[view].rays, self.samples);
-        let solids = self.solids.some(&items);
+        let solids = solids.some(&items);
         let pieces = (0..items.len() as ItemId).map(|item| Piece { item, part: None });
         let pieces: Vec<Piece> = pieces.collect();
         let drawn = draw(&canvas, &solids, &pieces, &Tests::default());

@@ -10,6 +10,7 @@ use super::super::omission::{By, Draft, LeftOutIf, Omission, Way};
 use super::hidden;
 use crate::geometry::{Aabb, ConvexVolume};
 use crate::measure::Ask;
+use crate::scene::ItemShape;
 use crate::visibility::occlusion::{
     Interleaved, MaskedInner, OccluderScene, OcclusionBuffer, View,
 };
@@ -35,8 +36,10 @@ struct Occlusion {
 impl Occlusion {
     /// Or why there is nothing to ask.
     fn of(case: &Case, solids: &Solids) -> Result<Occlusion, &'static str> {
-        if !Solids::are_items_of(case.scene()) {
-            return Err("items are walls, not solid boxes");
+        match case.scene().item_shape() {
+            ItemShape::Box => {}
+            ItemShape::Wall => return Err("items are walls, not solid boxes"),
+            ItemShape::Mesh => return Err("items are triangles, not solid boxes"),
         }
         let cameras = case.workload.cameras.iter();
         let rays = cameras.map(|camera| Rays::of(camera).ok());

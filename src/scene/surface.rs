@@ -3,13 +3,14 @@
 //! come from is in `meshes`.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
+use super::{Scene, WorldBox};
 use crate::geometry::Aabb;
 use crate::input::InputError;
 use crate::query::ItemId;
-use crate::scene::{Scene, WorldBox};
 
 named! {
     /// What a ray does that meets a surface.
@@ -152,16 +153,22 @@ impl Surfaces {
         })
     }
 
-    /// The boxes of the items as a scene: what the stages before this one work on.
+    /// The scene of these triangles: its items are the smallest f32 boxes that hold
+    /// those of each item.
     ///
     /// # Errors
     /// An item without triangles, which has no box.
-    pub fn scene(&self, name: impl Into<String>) -> Result<Scene, InputError> {
-        self.boxes_as_scene(name, (0..self.items()).map(|item| self.bounds(item)))
+    pub fn into_scene(self, name: impl Into<String>) -> Result<Scene, InputError> {
+        let boxes = (0..self.items()).map(|item| self.bounds(item));
+        let scene = self.boxes_as_scene(name, boxes)?;
+        Ok(Scene {
+            surfaces: Some(Arc::new(self)),
+            ..scene
+        })
     }
 
     /// Scene-local boxes as a scene about the same origin.
-    pub(super) fn boxes_as_scene(
+    pub(crate) fn boxes_as_scene(
         &self,
         name: impl Into<String>,
         boxes: impl Iterator<Item = Aabb>,
@@ -207,7 +214,7 @@ impl Surfaces {
     }
 
     /// The triangles of an item as a range of indices.
-    pub(super) fn range(&self, item: usize) -> Range<usize> {
+    pub(crate) fn range(&self, item: usize) -> Range<usize> {
         let range = &self.of_item[item];
         range.start as usize..range.end as usize
     }
@@ -215,8 +222,8 @@ impl Surfaces {
 
 #[cfg(test)]
 mod tests {
+    use super::super::load;
     use super::*;
-    use crate::scene::load;
 
     #[test]
     fn boxes_are_closed_and_wound_outward() {
@@ -235,7 +242,7 @@ mod tests {
                 assert!(normal.dot(b.centre().as_dvec3() - p) < 0.0);
             }
         }
-        let again = surfaces.scene("again").unwrap();
+        let again = surfaces.into_scene("again").unwrap();
         assert_eq!(again.items, scene.items);
     }
 
