@@ -89,7 +89,19 @@ pub fn parse_number(text: &str) -> Option<f64> {
 impl Spec {
     /// Splits `name:key=value,...`. The name may stand alone.
     pub fn parse(text: &str) -> Result<Spec, SpecError> {
-        let (name, rest) = text.split_once(':').unwrap_or((text, ""));
+        Spec::parse_behind("", text)
+    }
+
+    /// The same of a name that begins with `prefix`, if the text does, and may hold a `:`
+    /// there: `mesh:statue:n=1M`.
+    pub fn parse_behind(prefix: &str, text: &str) -> Result<Spec, SpecError> {
+        let begun = if text.starts_with(prefix) {
+            prefix.len()
+        } else {
+            0
+        };
+        let end = text[begun..].find(':').map_or(text.len(), |at| begun + at);
+        let (name, rest) = (&text[..end], text.get(end + 1..).unwrap_or_default());
         let mut given = BTreeMap::new();
         for pair in rest.split(',').filter(|p| !p.trim().is_empty()) {
             let Some((key, value)) = pair.split_once('=') else {

@@ -182,8 +182,9 @@ fn build(name: &str, items: &[Aabb]) -> Box<dyn DynIndex> {
 #[test]
 fn every_structure_returns_the_reference_set_on_every_scene_and_path() {
     let families = scene::FAMILIES.iter().map(|f| format!("{}:n=2000", f.name));
+    let meshes = scene::MESHES.iter().map(|m| format!("{}:n=20000", m.name));
     let samples = scene::SAMPLES.iter().map(|s| s.name.to_owned());
-    for source in families.chain(samples) {
+    for source in families.chain(meshes).chain(samples) {
         let scene = scene::load(&source, &Default::default()).expect(&source);
         let built: Vec<_> = Registry::builtin()
             .rows()

@@ -24,7 +24,7 @@ use crate::measure::{
     Effort, Group, Part, Plan, PlannedScene, ProcessTimes, Protocol, Share, cameras_within,
 };
 use crate::path;
-use crate::scene::{self, LoadOptions};
+use crate::scene;
 use crate::statistics::Estimate;
 
 /// Rounds of a task, if one process has them all.
@@ -114,10 +114,7 @@ pub fn plan(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Plan> {
         structures: args.kernel.structures(registry, &args.structure)?,
         cullings: vec![Culling::default()],
         lens: args.lens.defaults()?,
-        load: LoadOptions {
-            skip_bad_items: args.scene_args.skip_bad_items,
-            structures: 0,
-        },
+        load: args.scene_args.options(0),
         effort: args.spread.effort(ROUNDS),
         bounds: false,
         seed: args.spread.seed,

@@ -16,7 +16,7 @@ use super::protocol::{Job, Timing};
 use super::run::progress;
 use super::run_resume::typed_args;
 use super::{
-    Ending, expect_place_for, funnel_picture, funnel_table, interrupt, load_scene, print_json,
+    Ending, expect_place_for, funnel_picture, funnel_table, interrupt, load_scene_by, print_json,
     text, unread_is_fine,
 };
 use crate::funnel::{self, Chain, FunnelInput, FunnelPlan, StageKind, StageRow};
@@ -43,7 +43,11 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     }
     let structures = args.kernel.structures(registry, &args.structure)?;
     let defaults = args.lens.defaults()?;
-    let scene = load_scene(&args.scene, &args.scene_args, structures.len() + 2)?;
+    let load = LoadOptions {
+        per_triangle: funnel::BYTES_PER_TRIANGLE,
+        ..args.scene_args.options(structures.len() + 2)
+    };
+    let scene = load_scene_by(&args.scene, &load)?;
     if scene.items.is_empty() {
         bail!("scene '{}' has no items; expected at least one", scene.name);
     }
@@ -202,11 +206,7 @@ pub fn time(
     timing: &Timing,
     stop: &dyn Fn() -> bool,
 ) -> anyhow::Result<Option<ProcessTimes>> {
-    let load = LoadOptions {
-        skip_bad_items: args.scene_args.skip_bad_items,
-        structures: 0,
-    };
-    let scene = scene::load(&args.scene, &load)?;
+    let scene = scene::load(&args.scene, &args.scene_args.options(0))?;
     let lens = args.lens.defaults()?;
     let structures = args.kernel.structures(registry, &args.structure)?;
     let claim = claim(args.pvs.as_deref())?;

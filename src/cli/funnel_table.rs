@@ -5,7 +5,7 @@ use std::io::{self, Write};
 
 use super::document::{Block, Rows};
 use super::text;
-use crate::funnel::{FunnelReport, Gain, StageRow, Times};
+use crate::funnel::{FunnelReport, Gain, InnerRow, StageRow, Times};
 use crate::shown::field;
 use crate::visibility::Guarantee;
 
@@ -25,6 +25,7 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
         )),
         Block::Table(stages(report)),
     ];
+    blocks.extend(report.inner_boxes.as_ref().map(inner_boxes));
     if let Some(made) = &report.cut_outs {
         let line = format!(
             "{} of the items are cut out by a mask ({}, tiles of {}): they hide nothing where it has holes.",
@@ -32,7 +33,7 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
         );
         blocks.insert(2, Block::Line(line));
     }
-    // Nothing to draw in order or to pick in a scene without solids.
+    // Drawn in order and picked are solid boxes only.
     for (heading, table) in [
         ("Samples and fragments of what is left", fragments(report)),
         ("What is left, drawn in every order", orders(report)),
@@ -49,6 +50,21 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
     }
     blocks.extend(report.conclusions.iter().cloned().map(Block::Line));
     blocks
+}
+
+/// What hides in a mesh, and what finding it took.
+fn inner_boxes(row: &InnerRow) -> Block {
+    let held = row.volume_share.map(|share| {
+        let [held, lost] = [share, 1.0 - share].map(|share| share * 100.0);
+        format!(", {held:.1} % of the volume of these (loss {lost:.1} %)")
+    });
+    Block::Line(format!(
+        "Occluders: boxes proven inside {} of {}{}; found in {}.",
+        row.boxed_count,
+        text::counted(row.item_count, "item"),
+        held.unwrap_or_default(),
+        text::time(row.build_ns)
+    ))
 }
 
 /// What the times rest on.

@@ -11,7 +11,7 @@ use crate::culling::TESTS;
 use crate::index::{Info, Registry};
 use crate::measure::METRICS;
 use crate::path::{PATH_PARAMS, PATHS};
-use crate::scene::{FAMILIES, SAMPLES};
+use crate::scene::{FAMILIES, MESHES, SAMPLES};
 use crate::suite::SUITES;
 
 /// Long summaries wrap at this width.
@@ -125,6 +125,14 @@ fn rows(registry: &Registry, topic: ListTopic) -> anyhow::Result<(&'static str, 
                     f.summary.to_owned(),
                 )
             });
+            let meshes = MESHES.iter().map(|m| {
+                let params = "n=100000 (triangles), seed=1, offset=0";
+                (
+                    m.name.to_owned(),
+                    vec![("params", params.into())],
+                    m.summary.to_owned(),
+                )
+            });
             let samples = SAMPLES.iter().map(|s| {
                 let licence = vec![("params", format!("real; {}", s.licence).into())];
                 (s.name.to_owned(), licence, s.summary.to_owned())
@@ -137,7 +145,11 @@ fn rows(registry: &Registry, topic: ListTopic) -> anyhow::Result<(&'static str, 
                 "A scene is also a file: boxes CSV, or a Doom WAD (maps.wad#MAP07 picks a map).\nReal scenes are works of others: `cullbench licences`.\nSuites of `run`:\n{}",
                 suites.join("\n")
             );
-            ("scenes", note, families.chain(samples).collect())
+            (
+                "scenes",
+                note,
+                families.chain(meshes).chain(samples).collect(),
+            )
         }
         ListTopic::Paths => (
             "paths",

@@ -161,11 +161,11 @@ fn tell(line: &str) {
 /// Loads a scene that so many structures are to be held over at once, and says so
 /// if some of it was left out.
 fn load_scene(source: &str, args: &SceneArgs, structures: usize) -> anyhow::Result<Scene> {
-    let options = LoadOptions {
-        skip_bad_items: args.skip_bad_items,
-        structures: structures as u64,
-    };
-    let scene = crate::scene::load(source, &options)?;
+    load_scene_by(source, &args.options(structures))
+}
+
+fn load_scene_by(source: &str, options: &LoadOptions) -> anyhow::Result<Scene> {
+    let scene = crate::scene::load(source, options)?;
     if scene.skipped_items > 0 {
         tell(&format!(
             "note: {} left out of {}",

@@ -22,7 +22,7 @@ use crate::measure::{ProcessTimes, Protocol, Status};
 use crate::path;
 use crate::precision::{self, PointPlan, PrecisionInput, SWEEPS, size_sweep, sweep};
 use crate::report::write_atomically;
-use crate::scene::{self, LoadOptions};
+use crate::scene;
 
 /// Rounds of a point, if one process has them all.
 const ROUNDS: [usize; 2] = [5, 15];
@@ -139,11 +139,7 @@ pub fn time(
     timing: &Timing,
     stop: &dyn Fn() -> bool,
 ) -> anyhow::Result<Option<ProcessTimes>> {
-    let load = LoadOptions {
-        skip_bad_items: args.scene_args.skip_bad_items,
-        structures: 0,
-    };
-    let scene = scene::load(&args.scene, &load)?;
+    let scene = scene::load(&args.scene, &args.scene_args.options(0))?;
     let lens = args.lens.defaults()?;
     let input = PrecisionInput {
         scene: &scene,

@@ -9,7 +9,7 @@ use crate::index::Registry;
 use crate::measure::{GroupKey, Plan, PlannedScene, Workload};
 use crate::path::{self, CameraPath, LensDefaults};
 use crate::report::{KeptPart, Stream};
-use crate::scene::{self, LoadOptions, Scene};
+use crate::scene::{self, Scene};
 use crate::spec::SpecError;
 use crate::suite::{DEFAULT_PATH, SUITES, Suite};
 
@@ -66,10 +66,7 @@ pub fn plan_of(
         scenes: scenes(args, suite),
         cullings,
         lens: args.lens.defaults()?,
-        load: LoadOptions {
-            skip_bad_items: args.scene_args.skip_bad_items,
-            structures: structures.len() as u64,
-        },
+        load: args.scene_args.options(structures.len()),
         structures,
         effort: suite.effort,
         bounds: !args.no_bounds,

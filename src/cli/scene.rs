@@ -27,6 +27,9 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
         let mut value = serde_json::to_value(&info)?;
         value["region_kind"] = json!(scene.regions.kind());
         value["portal_count"] = json!(portals);
+        if let Some(surfaces) = &scene.surfaces {
+            value["triangle_count"] = json!(surfaces.triangles.len());
+        }
         value["camera_place_count"] = json!(scene.places.len());
         let names = ["size_min", "size_median", "size_max"];
         for (name, size) in names.into_iter().zip(sizes) {
@@ -63,6 +66,9 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
             ),
         ),
     ];
+    if let Some(surfaces) = &scene.surfaces {
+        rows.push(("triangles", text::count(surfaces.triangles.len())));
+    }
     if portals > 0 {
         rows.push(("portals", text::count(portals)));
     }
@@ -155,6 +161,9 @@ fn left_behind(scene: &Scene) -> Vec<String> {
     if !scene.places.is_empty() {
         let count = scene.places.len();
         lost.push(text::counted(count, "camera place"));
+    }
+    if let Some(surfaces) = &scene.surfaces {
+        lost.push(text::counted(surfaces.triangles.len(), "triangle"));
     }
     if scene.own_tree.is_some() {
         lost.push("the map's own tree".to_owned());

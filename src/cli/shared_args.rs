@@ -8,6 +8,7 @@ use crate::index::{Execution, Registry, StructureSpec};
 use crate::kernel::Kernel;
 use crate::measure::{Beside, Effort, Machine, Protocol};
 use crate::path::LensDefaults;
+use crate::scene::LoadOptions;
 use crate::spec::SpecError;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
@@ -17,6 +18,17 @@ pub struct SceneArgs {
     /// Leave out items that are no finite box, and report their number
     #[arg(long)]
     pub skip_bad_items: bool,
+}
+
+impl SceneArgs {
+    /// How a scene is read that so many structures will be built over.
+    pub fn options(&self, structures: usize) -> LoadOptions {
+        LoadOptions {
+            skip_bad_items: self.skip_bad_items,
+            structures: structures as u64,
+            per_triangle: 0,
+        }
+    }
 }
 
 /// How queries are computed; the answers are the same.

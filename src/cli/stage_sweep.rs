@@ -13,7 +13,7 @@ use super::protocol::{Job, Timing};
 use super::run::progress;
 use super::run_resume::typed_args;
 use super::shared_args::TableFormat;
-use super::{Ending, funnel_table, interrupt, load_scene, print_json, text, unread_is_fine};
+use super::{Ending, funnel_table, interrupt, load_scene_by, print_json, text, unread_is_fine};
 use crate::funnel::{self, Chain, FunnelInput, NONE, StageKind, StageSweep, SweepPlan, SweepPoint};
 use crate::index::{Registry, StructureSpec};
 use crate::measure::{ProcessTimes, Protocol};
@@ -89,7 +89,11 @@ pub fn sweep(
     if args.svg.is_some() {
         bail!("--svg draws the frustum's diagram; expected --svg or --stage, not both");
     }
-    let scene = load_scene(&args.scene, &args.scene_args, 3)?;
+    let load = LoadOptions {
+        per_triangle: funnel::BYTES_PER_TRIANGLE,
+        ..args.scene_args.options(3)
+    };
+    let scene = load_scene_by(&args.scene, &load)?;
     if scene.items.is_empty() {
         bail!("scene '{}' has no items; expected at least one", scene.name);
     }
@@ -99,7 +103,7 @@ pub fn sweep(
     {
         let expected = match stage {
             StageKind::Region => "a scene with rooms or sectors",
-            _ => "a scene of solid boxes",
+            _ => "a scene of solid boxes or a mesh",
         };
         let (name, stage) = (&scene.name, stage.name());
         bail!("scene '{name}' has nothing for the {stage} stage; expected {expected}");
@@ -163,11 +167,7 @@ pub fn time(
     let Some(stage) = args.stage else {
         bail!("a sweep without a stage");
     };
-    let load = LoadOptions {
-        skip_bad_items: args.scene_args.skip_bad_items,
-        structures: 0,
-    };
-    let scene = scene::load(&args.scene, &load)?;
+    let scene = scene::load(&args.scene, &args.scene_args.options(0))?;
     let setting = Setting::of(registry, args, scene, timing.lens_scale)?;
     let protocol = protocol(args, timing.process);
     let input = setting.input(args, &protocol)?;

@@ -138,8 +138,8 @@ pub fn time_within(ns: Option<f64>, ends: [Option<f64>; 2]) -> String {
 pub fn time_plus_minus(ns: Option<f64>, ends: [Option<f64>; 2]) -> String {
     let shown = |ns: f64| {
         let (size, name) = unit(ns);
-        let margin = ends.into_iter().map(|end| Some((end? - ns).abs() / size));
-        let margin = margin.fold(Some(0.0), |all, end| Some(f64::max(all?, end?)));
+        let of = |end: Option<f64>| Some((end? - ns).abs() / size);
+        let margin = of(ends[0]).zip(of(ends[1])).map(|(a, b)| f64::max(a, b));
         format!("{} {name}", plus_minus(ns / size, margin))
     };
     ns.map(shown).unwrap_or_default()

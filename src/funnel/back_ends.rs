@@ -5,8 +5,8 @@ use super::fragment_rows;
 use super::hiding::{HIDING, HidingRow};
 use super::stage::{BackEnd, NONE, StageKind};
 use super::triangle_rows;
-use crate::scene::{Regions, Scene};
-use crate::visibility::{Guarantee, Solids, region};
+use crate::scene::{ItemShape, Regions, Scene};
+use crate::visibility::{Guarantee, region};
 
 /// What a chain takes where there are rooms.
 const PORTAL_CLIP: &str = "portal-clip";
@@ -51,18 +51,16 @@ pub fn back_ends(stage: StageKind, scene: &Scene, has_cut_outs: bool) -> Vec<Bac
         "the stage is left out",
         Guarantee::Conservative,
     )];
+    // Nothing is known to hide within the boxes of walls.
+    let hides = scene.item_shape() != ItemShape::Wall;
     match stage {
         StageKind::Region => {
             let names = of_regions(scene);
             let known = region::ROWS.iter().filter(|row| names.contains(&row.name));
             rows.extend(known.map(|row| plain(row.name, row.summary, row.guarantee)));
         }
-        StageKind::Occlusion if Solids::are_items_of(scene) => {
-            rows.extend(HIDING.iter().map(HidingRow::back_end))
-        }
-        StageKind::Triangle if Solids::are_items_of(scene) => {
-            rows = triangle_rows::back_ends().collect()
-        }
+        StageKind::Occlusion if hides => rows.extend(HIDING.iter().map(HidingRow::back_end)),
+        StageKind::Triangle if hides => rows = triangle_rows::back_ends().collect(),
         StageKind::Fragment => rows.extend(fragment_rows::back_ends(scene, has_cut_outs)),
         _ => {}
     }

@@ -15,8 +15,9 @@ use super::world::World;
 use crate::measure::Ask;
 use crate::query::ItemId;
 use crate::statistics::Estimate;
+use crate::visibility::Solids;
 use crate::visibility::fragment::{Canvas, Piece, Tests, draw};
-use crate::visibility::occlusion::{FrameTrace, MaskedInner, OcclusionBuffer};
+use crate::visibility::occlusion::{FrameTrace, MaskedInner, OccluderScene, OcclusionBuffer, View};
 use crate::visibility::region::{Opening, RegionId, RegionRow, Scratch};
 use crate::visibility::triangle::SafeCones;
 
@@ -76,8 +77,9 @@ impl Bound<'_> {
     }
 }
 
-/// The bounds that a scene has data for: of the region stage, and where items are solid
-/// boxes of all others. `left` is the set that the chain leaves.
+/// The bounds that a scene has data for: of occlusion where something is known to hide, of
+/// cones where there are faces, of fragments where items are solid boxes. `left` is the
+/// set that the chain leaves.
 pub fn bounds<'w>(
     world: &'w World<'w>,
     pass: &Pass,
@@ -85,11 +87,18 @@ pub fn bounds<'w>(
     faces: Option<&Faces>,
 ) -> Vec<Bound<'w>> {
     let mut bounds = of_regions(world);
-    if let Some(faces) = faces {
-        bounds.extend(of_occlusion(world));
-        bounds.push(of_cones(world, faces));
-        bounds.push(of_fragments(world, pass, left));
-    }
+    bounds.extend(
+        world
+            .occluders()
+            .into_iter()
+            .flat_map(|scene| of_occlusion(world, scene)),
+    );
+    bounds.extend(faces.map(|faces| of_cones(world, faces)));
+    bounds.extend(
+        world
+            .solids()
+            .map(|solids| of_fragments(world, solids, pass, left)),
+    );
     bounds
 }
 
@@ -147,13 +156,13 @@ fn seen_openings(world: &World, row: &dyn RegionRow, view: usize) -> Vec<Opening
         .collect()
 }
 
-fn of_occlusion<'w>(world: &'w World<'w>) -> [Bound<'w>; 3] {
-    let traces = || -> Vec<FrameTrace> {
-        let views = (0..world.views()).map(|view| world.hiding_view(view, world.samples()));
-        let trace = |view| FrameTrace::of(world.occluders(), &view, world.kernel());
-        views.map(trace).collect()
+fn of_occlusion<'w>(world: &'w World<'w>, scene: &'w OccluderScene) -> [Bound<'w>; 3] {
+    let trace = |view| {
+        let (rays, volume) = (world.rays(view), world.volume(view));
+        let view = View::new(rays, volume, scene, world.samples());
+        FrameTrace::of(scene, &view, world.kernel())
     };
-    let scene = world.occluders();
+    let traces = || -> Vec<FrameTrace> { (0..world.views()).map(trace).collect() };
     let bound = |name, ask| Bound {
         stage: StageKind::Occlusion,
         back_end: "masked-inner",
@@ -197,10 +206,10 @@ fn of_cones<'w>(world: &'w World<'w>, faces: &Faces) -> Bound<'w> {
     }
 }
 
-fn of_fragments<'w>(world: &'w World<'w>, pass: &Pass, left: usize) -> Bound<'w> {
+fn of_fragments<'w>(world: &'w World<'w>, solids: &Solids, pass: &Pass, left: usize) -> Bound<'w> {
     let covered = (0..world.views()).map(|view| {
         let items = world.listed(pass.items(left, view));
-        let solids = world.solids().some(&items);
+        let solids = solids.some(&items);
         let pieces: Vec<Piece> = (0..items.len() as ItemId)
             .map(|item| Piece { item, part: None })
             .collect();

@@ -7,7 +7,7 @@ use super::regions::ClaimAudit;
 use super::stage::{NONE, StageKind};
 use super::world::{FunnelInput, World};
 use crate::query::ItemId;
-use crate::visibility::Solids;
+use crate::scene::ItemShape;
 use crate::visibility::region::ClaimErrors;
 use crate::visibility::truth::{Certificates, Prover, RayIndex, SampleTruth, certify};
 
@@ -35,16 +35,20 @@ pub fn certificates(
     stop: &dyn Fn() -> bool,
     mut each: impl FnMut(Certificates),
 ) -> Result<bool, FunnelError> {
+    let no_solids = || FunnelError::NoSolids {
+        scene: input.scene.name.clone(),
+        shape: input.scene.item_shape(),
+    };
+    if input.scene.item_shape() == ItemShape::Mesh {
+        return Err(no_solids());
+    }
     let world = World::new(input)?;
-    if !world.has_solids() {
+    let Some(solids) = world.solids() else {
         return match world.audits() {
-            [] => Err(FunnelError::NoSolids {
-                scene: input.scene.name.clone(),
-            }),
+            [] => Err(no_solids()),
             _ => Ok(true),
         };
-    }
-    let solids: &Solids = world.solids();
+    };
     let index = RayIndex::build(solids);
     let mut pass = Pass::new(&world);
     let Some(walked) = pass.walk(input.chain, stop) else {

@@ -4,6 +4,7 @@ use super::stage::StageKind;
 use crate::index::BuildError;
 use crate::input::InputError;
 use crate::measure::WorkloadError;
+use crate::scene::ItemShape;
 use crate::visibility::NoRays;
 use crate::visibility::region::OtherRegions;
 
@@ -30,20 +31,26 @@ pub enum FunnelError {
     Input(#[from] InputError),
     /// Proofs are about solid boxes.
     #[error(
-        "'{scene}' is a map without a claim of what is seen from where, and its items are walls; \
-         expected a scene of solid boxes, or a claim, for proofs"
+        "the items of '{scene}' are {}; expected a scene of solid boxes, or a claim of what is \
+         seen from where, for proofs",
+        shape.name()
     )]
     NoSolids {
         /// Its name.
         scene: String,
+        /// What its items are.
+        shape: ItemShape,
     },
     /// Holes are cut into solid boxes.
     #[error(
-        "'{scene}' is a map, whose items are walls; expected a scene of solid boxes for --cut-out"
+        "the items of '{scene}' are {}; expected a scene of solid boxes for --cut-out",
+        shape.name()
     )]
     NoBoxes {
         /// Its name.
         scene: String,
+        /// What its items are.
+        shape: ItemShape,
     },
     /// What is claimed to be seen from where is of other regions.
     #[error(transparent)]

@@ -1,6 +1,8 @@
-//! The triangle stage on what the chain leaves: the faces of those items, in clusters
-//! made for each view, and every back end that tells which of them are turned away.
+//! The triangle stage on what the chain leaves: the faces of those items in clusters, and
+//! every back end that tells which of them are turned away. Of solid boxes clusters are
+//! made for each view; of a mesh once, and a back end passes over those of other items.
 
+use std::rc::Rc;
 use std::sync::Arc;
 
 use super::judged::Judged;
@@ -8,16 +10,36 @@ use super::pass::Pass;
 use super::triangle_rows::sides;
 use super::world::World;
 use crate::kernel::Kernel;
-use crate::visibility::Surfaces;
+use crate::scene::Surfaces;
 use crate::visibility::triangle::{
     Clusters, Counts, MOST_TRIANGLES, Selection, TriangleCull, View, facing,
 };
 
+/// Bytes that the study of a mesh takes for each triangle, beside its scene: a tree for
+/// rays, clusters and every back end; 160 were measured.
+pub const BYTES_PER_TRIANGLE: u64 = 200;
+
+/// Triangles in clusters, ready for every back end.
+struct Built {
+    clusters: Arc<Clusters>,
+    culls: Vec<Box<dyn TriangleCull>>,
+}
+
+impl Built {
+    fn of(surfaces: Arc<Surfaces>) -> Rc<Built> {
+        let clusters = Arc::new(Clusters::of(surfaces, MOST_TRIANGLES));
+        Rc::new(Built {
+            culls: sides().map(|row| (row.build)(&clusters)).collect(),
+            clusters,
+        })
+    }
+}
+
 /// The faces of what is left of one view.
 struct Left {
-    clusters: Arc<Clusters>,
+    built: Rc<Built>,
+    given: Selection,
     view: View,
-    culls: Vec<Box<dyn TriangleCull>>,
 }
 
 /// The faces of what is left of every view.
@@ -30,14 +52,21 @@ impl Faces {
     /// Of a set of items of each view. Most views have few items left; where a stage
     /// before is left out, 12 triangles an item take memory.
     pub fn of(world: &World, pass: &Pass, set: usize) -> Faces {
+        let whole = world.mesh().map(|mesh| Built::of(mesh.clone()));
         let views = (0..world.views()).map(|view| {
             let items = world.listed(pass.items(set, view));
-            let surfaces = Surfaces::of_items(world.scene(), &items);
-            let clusters = Arc::new(Clusters::of(Arc::new(surfaces), MOST_TRIANGLES));
+            let built = whole.clone().unwrap_or_else(|| {
+                let surfaces = Surfaces::of_items(world.scene(), &items);
+                Built::of(Arc::new(surfaces))
+            });
+            let clusters = &built.clusters;
             Left {
-                culls: sides().map(|row| (row.build)(&clusters)).collect(),
+                given: match whole {
+                    Some(_) => Selection::of_items(clusters, items.iter().copied()),
+                    None => Selection::all(clusters),
+                },
                 view: *world.triangle_view(view),
-                clusters,
+                built,
             }
         });
         Faces {
@@ -48,15 +77,15 @@ impl Faces {
 
     /// The faces of a view.
     pub fn clusters(&self, view: usize) -> &Arc<Clusters> {
-        &self.views[view].clusters
+        &self.views[view].built.clusters
     }
 
     /// What a back end leaves of the triangles of a view; `None` is no back end.
     fn selected(&self, back_end: Option<usize>, view: usize) -> Selection {
         let left = &self.views[view];
-        let mut selection = Selection::all(&left.clusters);
+        let mut selection = left.given.clone();
         if let Some(back_end) = back_end {
-            left.culls[back_end].cull(&left.view, self.kernel, &mut selection);
+            left.built.culls[back_end].cull(&left.view, self.kernel, &mut selection);
         }
         selection
     }
@@ -73,9 +102,8 @@ impl Faces {
     pub fn judged(&self, back_end: Option<usize>) -> Vec<Judged> {
         let judged = (0..self.views.len()).map(|view| {
             let left = &self.views[view];
-            let all = Selection::all(&left.clusters);
-            let truth = facing(&left.clusters, &left.view, &all);
-            let counts = Counts::of(&all, &self.selected(back_end, view), &truth);
+            let truth = facing(&left.built.clusters, &left.view, &left.given);
+            let counts = Counts::of(&left.given, &self.selected(back_end, view), &truth);
             Judged {
                 input: counts.candidates as u64,
                 hidden: (counts.candidates - counts.truth) as u64,

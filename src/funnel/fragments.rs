@@ -88,7 +88,8 @@ pub fn tested(
         }
         let given = pass.items(set, view);
         let items = world.listed(given);
-        let left = world.has_solids().then(|| Left::of(world, view, &items));
+        let solids = world.solids();
+        let left = solids.map(|solids| Left::of(world, solids, view, &items));
         for (place, back_end) in back_ends.iter().enumerate() {
             let output = match (&left, back_end.name) {
                 (_, NONE) => items.to_vec(),
@@ -98,7 +99,7 @@ pub fn tested(
                     let visible = drawn.depth.visible(&left.canvas).into_iter();
                     visible.map(|place| items[place as usize]).collect()
                 }
-                // What the walls of a map hide is known from their truth alone.
+                // What walls and triangles hide is known from their truth alone.
                 (None, _) => {
                     let visible = truth.of_view(view).iter().map(|(item, _)| *item);
                     let given = visible.filter(|item| items.binary_search(item).is_ok());
@@ -135,7 +136,7 @@ struct Room {
 }
 
 impl Left {
-    fn of(world: &World, view: usize, items: &[ItemId]) -> Left {
+    fn of(world: &World, solids: &Solids, view: usize, items: &[ItemId]) -> Left {
         let rays = world.rays(view);
         let room = Room::of(world, rays).map(|room| {
             let pieces = (0..items.len() as ItemId).map(piece);
@@ -145,7 +146,7 @@ impl Left {
         });
         Left {
             canvas: Canvas::of(rays, world.samples()),
-            solids: world.solids().some(items),
+            solids: solids.some(items),
             cut_outs: world.cut_outs().map(|surfaces| surfaces.some(items)),
             room,
         }

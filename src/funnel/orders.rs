@@ -54,10 +54,10 @@ pub struct Orders {
 
 impl Orders {
     /// For a set of items of each view.
-    pub fn of(world: &World, pass: &Pass, set: usize) -> Orders {
+    pub fn of(world: &World, all: &Solids, pass: &Pass, set: usize) -> Orders {
         let views = (0..world.views()).map(|view| {
             let items = world.listed(pass.items(set, view));
-            let solids = world.solids().some(&items);
+            let solids = all.some(&items);
             Left {
                 orders: ORDERS.iter().map(|row| (row.build)(&solids)).collect(),
                 rays: *world.rays(view),

@@ -8,7 +8,7 @@ use super::world::World;
 use crate::query::ItemId;
 use crate::visibility::pick::{BACK_ENDS, BackEnd, Pick};
 use crate::visibility::truth::RayIndex;
-use crate::visibility::{Guarantee, Ray, SampleGrid};
+use crate::visibility::{Guarantee, Ray, SampleGrid, Solids};
 
 /// Cursor places of a view.
 const CURSORS: SampleGrid = SampleGrid::new(16, 9);
@@ -52,8 +52,7 @@ impl Picks {
     pub const RAYS_PER_VIEW: f64 = (CURSORS.width * CURSORS.height) as f64;
 
     /// Builds all.
-    pub fn of(world: &World) -> Picks {
-        let solids = world.solids();
+    pub fn of(world: &World, solids: &Solids) -> Picks {
         let suits = |row: &&BackEnd| row.about.name != "linear" || world.items() <= MOST_FOR_LOOP;
         let built = BACK_ENDS.iter().filter(suits);
         let picks = built.filter_map(|row| Some((row, (row.build)(solids).ok()?)));

@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::bounds::BoundRow;
 use super::chain::Chain;
 use super::fragments::FragmentCounts;
+use super::inner::InnerRow;
 use super::judged::Errors;
 use super::orders::OrderRow;
 use super::picks::PickRow;
@@ -44,9 +45,12 @@ pub struct FunnelReport {
     /// What each claim of what is seen from where gets wrong: a map's own table of
     /// sectors that cannot see each other, and what was given in a file.
     pub audits: Vec<ClaimAudit>,
-    /// What is left, drawn in every order.
+    /// The boxes inside the items of a mesh, which hide what is behind them; null for
+    /// what is no mesh.
+    pub inner_boxes: Option<InnerRow>,
+    /// What is left, drawn in every order; empty unless items are solid boxes.
     pub orders: Vec<OrderRow>,
-    /// The first item under a cursor, by every back end of picking.
+    /// The first item under a cursor, by every back end of picking; empty as above.
     pub picks: Vec<PickRow>,
     /// The least that some of the back ends can take.
     pub bounds: Vec<BoundRow>,

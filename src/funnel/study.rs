@@ -17,14 +17,16 @@ use super::pass::{Pass, Walked};
 use super::picks::Picks;
 use super::plan_view::{PlanView, fate};
 use super::report::{CutOutRow, FunnelReport, Gain, LevelRow, Side, StageRow};
+use super::seen::seen;
 use super::stage::{BackEnd, NONE, StageKind};
 use super::times::Times;
 use super::triangle_rows;
 use super::truth::Truth;
 use super::world::{FunnelInput, World};
 use crate::measure::{Ask, OverProcesses, ProcessTimes, Schedule, TimedTask, Verdict, timed};
-use crate::visibility::Level;
+use crate::scene::ItemShape;
 use crate::visibility::truth::RayIndex;
+use crate::visibility::{Level, Solids};
 
 /// What all processes time: the plan is the same for each.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -54,7 +56,8 @@ pub fn prepare(
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<Prepared>, FunnelError> {
     let world = World::new(input)?;
-    let Some(truth) = world.truth(input, stop)? else {
+    let threads = input.execution.threads;
+    let Some(truth) = seen(&world, input.samples, 0, threads, stop)? else {
         return Ok(None);
     };
     let mut pass = Pass::new(&world);
@@ -77,7 +80,7 @@ pub fn prepare(
             .collect();
         rows.push((world.back_end(*stage, name), name.clone(), judged, *step));
     }
-    if let Some(left) = &left {
+    if let Some(faces) = &left.faces {
         let culls = world.back_ends(StageKind::Triangle).into_iter();
         let culls = culls.zip(std::iter::once(None).chain((0..).map(Some)));
         for (back_end, place) in culls {
@@ -85,7 +88,7 @@ pub fn prepare(
                 return Ok(None);
             }
             let task = place.map(|place: usize| pass.steps().len() + place);
-            let judged = left.faces.judged(place);
+            let judged = faces.judged(place);
             rows.push((back_end, back_end.name.to_owned(), judged, task));
         }
     }
@@ -93,13 +96,14 @@ pub fn prepare(
     let Some(tested) = fragments::tested(&world, &pass, last, &truth, stop) else {
         return Ok(None);
     };
-    let drawn = match &left {
-        Some(left) => left.orders.drawn(input.samples, stop),
-        None => Some(Vec::new()),
-    };
-    let Some(drawn) = drawn else {
-        return Ok(None);
-    };
+    let (mut drawn, mut picked) = (Vec::new(), Vec::new());
+    if let Some(boxes) = &left.boxes {
+        let Some(rows) = boxes.orders.drawn(input.samples, stop) else {
+            return Ok(None);
+        };
+        drawn = rows;
+        picked = boxes.picks.judged(&RayIndex::build(boxes.solids));
+    }
     // The tests of the fragment stage are not timed.
     let tasks = rows.iter().map(|(_, _, _, task)| *task);
     let tasks: Vec<Option<usize>> = tasks.chain(tested.iter().map(|_| None)).collect();
@@ -135,9 +139,9 @@ pub fn prepare(
         (*stage, name, [side(&walks.chosen), side(without)])
     });
     let gains = gains.collect();
-    let bounds = bounds_of(&world, &pass, &walks.chosen, left.as_ref());
+    let bounds = bounds_of(&world, &pass, &walks.chosen, &left);
     let bound_rows = bounds.iter().map(Bound::row).collect();
-    let timed = timed_tasks(&pass, &world, left.as_ref(), bounds, None);
+    let timed = timed_tasks(&pass, &world, &left, bounds, None);
     let schedule = Schedule::new(world.views(), &timed, input.protocol);
     let level = Level::of(&input.scene.name, input.scene)?;
     Ok(Some(Prepared {
@@ -162,10 +166,9 @@ pub fn prepare(
             chain: input.chain.clone(),
             stages: rows,
             audits: world.audits().to_vec(),
+            inner_boxes: world.inner().map(|inner| inner.row.clone()),
             orders: drawn,
-            picks: left.as_ref().map_or_else(Vec::new, |left| {
-                left.picks.judged(&RayIndex::build(world.solids()))
-            }),
+            picks: picked,
             bounds: bound_rows,
             gains: Vec::new(),
             conclusions: Vec::new(),
@@ -189,27 +192,39 @@ pub fn time(
         return Ok(None);
     };
     let left = Left::of(&world, &pass, &walks.chosen);
-    let bounds = bounds_of(&world, &pass, &walks.chosen, left.as_ref());
-    let tasks = timed_tasks(&pass, &world, left.as_ref(), bounds, Some(&plan.expected));
+    let bounds = bounds_of(&world, &pass, &walks.chosen, &left);
+    let tasks = timed_tasks(&pass, &world, &left, bounds, Some(&plan.expected));
     let timed = timed(&tasks, &plan.schedule, input.protocol, &|_| stop());
     Ok(timed.map(|timed| ProcessTimes::of(&timed)))
 }
 
 /// What the chosen chain leaves of every view, ready for the stages behind it.
-struct Left {
-    faces: Faces,
+struct Left<'w> {
+    /// None for a scene of walls.
+    faces: Option<Faces>,
+    /// None for a scene whose items are no solid boxes.
+    boxes: Option<LeftBoxes<'w>>,
+}
+
+/// What is asked of solid boxes only.
+struct LeftBoxes<'w> {
+    solids: &'w Solids,
     orders: Orders,
     picks: Picks,
 }
 
-impl Left {
-    /// `None` for a scene whose items are no solid boxes: those stages are about their faces.
-    fn of(world: &World, pass: &Pass, chosen: &Walked) -> Option<Left> {
-        world.has_solids().then(|| Left {
-            faces: Faces::of(world, pass, chosen.left()),
-            orders: Orders::of(world, pass, chosen.left()),
-            picks: Picks::of(world),
-        })
+impl<'w> Left<'w> {
+    fn of(world: &'w World, pass: &Pass, chosen: &Walked) -> Left<'w> {
+        let set = chosen.left();
+        let has_faces = world.scene().item_shape() != ItemShape::Wall;
+        Left {
+            faces: has_faces.then(|| Faces::of(world, pass, set)),
+            boxes: world.solids().map(|solids| LeftBoxes {
+                solids,
+                orders: Orders::of(world, solids, pass, set),
+                picks: Picks::of(world, solids),
+            }),
+        }
     }
 }
 
@@ -217,17 +232,18 @@ fn bounds_of<'w>(
     world: &'w World<'w>,
     pass: &Pass,
     chosen: &Walked,
-    left: Option<&Left>,
+    left: &Left,
 ) -> Vec<Bound<'w>> {
-    bounds(world, pass, chosen.left(), left.map(|left| &left.faces))
+    bounds(world, pass, chosen.left(), left.faces.as_ref())
 }
 
 /// Every step, every back end of the triangle stage, every order, every back end of
-/// picking and every bound as a task; what it must hand on is what it has, or what another process says.
+/// picking and every bound as a task; what it must hand on is what it has, or what another
+/// process says.
 fn timed_tasks<'p>(
     pass: &'p Pass<'p>,
     world: &'p World<'p>,
-    left: Option<&'p Left>,
+    left: &'p Left<'p>,
     bounds: Vec<Bound<'p>>,
     expected: Option<&[Vec<u64>]>,
 ) -> Vec<TimedTask<'p>> {
@@ -236,16 +252,16 @@ fn timed_tasks<'p>(
         let ask: Ask = Box::new(move |view, out| run(view, pass.items(step.input, view), out));
         ask
     });
-    let behind = left.into_iter().flat_map(
-        |Left {
-             faces,
-             orders,
-             picks,
-         }| {
-            let culls = (1..triangle_rows::back_ends().count()).map(move |place| {
-                let ask: Ask = Box::new(move |view, out| faces.cull(place - 1, view, out));
-                ask
-            });
+    let culls = left.faces.iter().flat_map(|faces| {
+        (1..triangle_rows::back_ends().count()).map(move |place| {
+            let ask: Ask = Box::new(move |view, out| faces.cull(place - 1, view, out));
+            ask
+        })
+    });
+    let behind = left
+        .boxes
+        .iter()
+        .flat_map(|LeftBoxes { orders, picks, .. }| {
             let sorts = (0..orders::COUNT).map(move |order| {
                 let pieces = RefCell::new(Vec::new());
                 let ask: Ask = Box::new(move |view, out| {
@@ -259,9 +275,8 @@ fn timed_tasks<'p>(
                 let ask: Ask = Box::new(move |view, out| picks.first(back_end, view, out));
                 ask
             });
-            culls.chain(sorts).chain(picks)
-        },
-    );
+            sorts.chain(picks)
+        });
     let task = |(place, ask): (usize, Ask<'p>)| TimedTask {
         expected: match expected {
             Some(expected) => expected[place].clone(),
@@ -273,6 +288,7 @@ fn timed_tasks<'p>(
     };
     let bounds = bounds.into_iter().map(|bound| bound.ask);
     steps
+        .chain(culls)
         .chain(behind)
         .chain(bounds)
         .enumerate()

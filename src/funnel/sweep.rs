@@ -9,6 +9,7 @@ use super::faces::Faces;
 use super::hiding::HIDING;
 use super::judged::{Errors, Judged, judge_items};
 use super::pass::{ALL, Pass};
+use super::seen::seen;
 use super::stage::{BackEnd, NONE, StageKind};
 use super::times::Times;
 use super::triangle_rows;
@@ -16,7 +17,6 @@ use super::truth::Truth;
 use super::world::{FunnelInput, World};
 use crate::measure::{Ask, OverProcesses, ProcessTimes, Schedule, TimedTask, timed};
 use crate::visibility::SampleGrid;
-use crate::visibility::truth::{RayIndex, visible_by_random_rays};
 
 /// Columns of the buffers that are looked at; rows are 9 for 16 of them.
 pub const WIDTHS: [u32; 7] = [40, 80, 160, 320, 640, 1280, 1920];
@@ -183,12 +183,16 @@ pub fn prepare_sweep(
         return Ok(None);
     };
     let entries = given.entries(&world, stage);
-    // What faces the eye is no question of rays, and those at random are of solids.
-    let rays = match stage != StageKind::Triangle && world.has_solids() {
-        true => RAYS,
-        false => 0,
+    // What faces the eye is no question of rays.
+    let (rays, truth) = match stage {
+        StageKind::Triangle => (0, Some(Truth::empty(world.views()))),
+        _ => {
+            let threads = input.execution.threads;
+            let truth = seen(&world, input.samples, RAYS, threads, stop)?;
+            (RAYS, truth)
+        }
     };
-    let Some(truth) = seen(&world, input, rays, stop)? else {
+    let Some(truth) = truth else {
         return Ok(None);
     };
     let (mut points, mut tasks) = (Vec::new(), Vec::new());
@@ -247,41 +251,6 @@ pub fn prepare_sweep(
             points,
         },
     }))
-}
-
-/// What each view shows at its samples or along a random ray; items seen between
-/// samples only count as one sample.
-fn seen(
-    world: &World,
-    input: &FunnelInput,
-    count: usize,
-    stop: &dyn Fn() -> bool,
-) -> Result<Option<Truth>, FunnelError> {
-    let Some(truth) = world.truth(input, stop)? else {
-        return Ok(None);
-    };
-    if count == 0 {
-        return Ok(Some(truth));
-    }
-    let index = RayIndex::build(world.solids());
-    let mut visible = Vec::with_capacity(world.views());
-    for view in 0..world.views() {
-        if stop() {
-            return Ok(None);
-        }
-        let threads = input.execution.threads;
-        let seed = view as u64 + 1;
-        let more = visible_by_random_rays(&index, world.rays(view), count, seed, threads);
-        let mut all = truth.of_view(view).to_vec();
-        all.extend(
-            more.iter()
-                .filter(|id| !truth.sees(view, **id))
-                .map(|&id| (id, 1)),
-        );
-        all.sort_unstable();
-        visible.push(all);
-    }
-    Ok(Some(Truth::new(visible)))
 }
 
 /// One process's share of the times; `None` if stopped.

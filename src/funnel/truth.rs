@@ -13,6 +13,13 @@ impl Truth {
         Truth { visible }
     }
 
+    /// Nothing, in so many views.
+    pub fn empty(views: usize) -> Truth {
+        Truth {
+            visible: vec![Vec::new(); views],
+        }
+    }
+
     /// Items with their samples, ascending.
     pub fn of_view(&self, view: usize) -> &[(ItemId, u32)] {
         &self.visible[view]

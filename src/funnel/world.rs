@@ -11,6 +11,7 @@ use super::back_ends::back_ends;
 use super::chain::Chain;
 use super::error::FunnelError;
 use super::hiding::{HIDING, HidingRow};
+use super::inner::Inner;
 use super::judged::{Judged, judge_items};
 use super::plan_view::{Fate, MOST_DRAWN, PlanView};
 use super::regions::{ClaimAudit, Regions};
@@ -19,18 +20,15 @@ use super::truth::Truth;
 use crate::camera::PlaneOptions;
 use crate::geometry::ConvexVolume;
 use crate::index::{BuildError, DynIndex, Execution, StructureSpec};
-use crate::input::InputError;
 use crate::kernel::Kernel;
 use crate::measure::{Protocol, WorkloadError, input_of};
 use crate::path::CameraPath;
 use crate::query::ItemId;
-use crate::scene::Scene;
-use crate::visibility::fragment::{CutOuts, Surfaces};
+use crate::scene::{ItemShape, Scene, Surfaces};
+use crate::visibility::fragment::{self, CutOuts};
 use crate::visibility::occlusion::{self, OccluderScene};
-use crate::visibility::region::doom::DoomMap;
 use crate::visibility::region::{EyePlace, Marks, Pvs, RegionRow, Scratch};
 use crate::visibility::triangle;
-use crate::visibility::truth::{RayIndex, SampleTruth, SurfaceIndex};
 use crate::visibility::{Guarantee, Rays, SampleGrid, Solids};
 
 /// What a funnel is studied on.
@@ -69,9 +67,13 @@ pub struct World<'a> {
     samples: SampleGrid,
     structures: Vec<(String, Box<dyn DynIndex>)>,
     views: Vec<View>,
-    solids: Solids,
-    cut_outs: Option<Surfaces>,
-    occluders: OccluderScene,
+    /// The items, if they are solid boxes.
+    solids: Option<Solids>,
+    cut_outs: Option<fragment::Surfaces>,
+    /// Boxes inside the items, if those are triangles.
+    inner: Option<Inner>,
+    /// None where nothing is known to hide.
+    occluders: Option<OccluderScene>,
     regions: Option<Regions>,
 }
 
@@ -114,11 +116,26 @@ impl<'a> World<'a> {
             let index = spec.build(input_of(input.scene, &input.scene.items))?;
             Ok::<_, BuildError>((spec.label.clone(), index))
         });
-        let mut solids = Solids::of(input.scene);
+        let is_boxes = input.scene.item_shape() == ItemShape::Box;
+        let mut solids = is_boxes.then(|| Solids::of(input.scene));
         let regions = Regions::of(input.scene, input.claim)?;
-        let cut_outs = match input.cut_outs {
-            Some(typed) => Some(cut_out(typed, input.scene, regions.as_ref(), &mut solids)?),
-            None => None,
+        let cut_outs = match (input.cut_outs, &mut solids) {
+            (None, _) => None,
+            (Some(typed), Some(solids)) => {
+                Some(cut_out(typed, input.scene, regions.as_ref(), solids))
+            }
+            (Some(_), None) => {
+                return Err(FunnelError::NoBoxes {
+                    scene: input.scene.name.clone(),
+                    shape: input.scene.item_shape(),
+                });
+            }
+        };
+        let inner = Inner::of(input.scene, input.execution.threads);
+        let occluders = match (&solids, &inner) {
+            (Some(solids), _) => Some(OccluderScene::of(solids)),
+            (None, Some(inner)) => Some(OccluderScene::within(input.scene, &inner.boxes)),
+            (None, None) => None,
         };
         let world = World {
             scene: input.scene,
@@ -126,9 +143,10 @@ impl<'a> World<'a> {
             samples: input.samples,
             structures: built.collect::<Result<_, _>>()?,
             views: views.collect::<Result<_, FunnelError>>()?,
-            occluders: OccluderScene::of(&solids),
             solids,
             cut_outs,
+            inner,
+            occluders,
             regions,
         };
         for stage in StageKind::OF_ITEMS {
@@ -159,15 +177,15 @@ impl<'a> World<'a> {
         self.scene
     }
 
-    /// The items as they are drawn and tested in the occlusion stage.
-    pub fn occluders(&self) -> &OccluderScene {
-        &self.occluders
+    /// The items as they are drawn and tested in the occlusion stage; `None`
+    /// where nothing is known to hide.
+    pub fn occluders(&self) -> Option<&OccluderScene> {
+        self.occluders.as_ref()
     }
 
-    /// A view as the occlusion stage has it, with a buffer of so many pixels.
-    pub fn hiding_view(&self, view: usize, buffer: SampleGrid) -> occlusion::View<'_> {
-        let View { rays, volume, .. } = &self.views[view];
-        occlusion::View::new(rays, volume, &self.occluders, buffer)
+    /// The six planes of a view.
+    pub fn volume(&self, view: usize) -> &ConvexVolume {
+        &self.views[view].volume
     }
 
     /// A back end of the region stage, if the scene has it.
@@ -190,9 +208,19 @@ impl<'a> World<'a> {
         &self.views[view].triangles
     }
 
-    /// The items as they hide each other.
-    pub fn solids(&self) -> &Solids {
-        &self.solids
+    /// The items as they hide each other, if they are solid boxes.
+    pub fn solids(&self) -> Option<&Solids> {
+        self.solids.as_ref()
+    }
+
+    /// The triangles of the items, if the scene is a mesh.
+    pub fn mesh(&self) -> Option<&Arc<Surfaces>> {
+        self.scene.surfaces.as_ref()
+    }
+
+    /// The boxes inside the items of a mesh, which are drawn as occluders.
+    pub fn inner(&self) -> Option<&Inner> {
+        self.inner.as_ref()
     }
 
     /// The place of a view's camera in the path.
@@ -201,7 +229,7 @@ impl<'a> World<'a> {
     }
 
     /// Which items have holes, if any have.
-    pub fn cut_outs(&self) -> Option<&Surfaces> {
+    pub fn cut_outs(&self) -> Option<&fragment::Surfaces> {
         self.cut_outs.as_ref()
     }
 
@@ -218,64 +246,6 @@ impl<'a> World<'a> {
     /// How many items there are.
     pub fn items(&self) -> usize {
         self.scene.items.len()
-    }
-
-    /// Whether items are what their boxes are. Linedefs of a map are walls in them.
-    pub fn has_solids(&self) -> bool {
-        Solids::are_items_of(self.scene)
-    }
-
-    /// What each view shows at its samples: solids, or the walls, floors and ceilings of a
-    /// map. `None` if stopped.
-    ///
-    /// # Errors
-    /// The map's file, read again.
-    pub fn truth(
-        &self,
-        input: &FunnelInput,
-        stop: &dyn Fn() -> bool,
-    ) -> Result<Option<Truth>, InputError> {
-        let Some(map) = DoomMap::of_scene(self.scene)? else {
-            return Ok(self.truth_of_solids(input, stop));
-        };
-        let surfaces = map.surfaces(self.scene);
-        let index = SurfaceIndex::build(&surfaces);
-        let items = self.items() as ItemId;
-        let mut visible = Vec::with_capacity(self.views());
-        for view in &self.views {
-            if stop() {
-                return Ok(None);
-            }
-            let threads = input.execution.threads;
-            let truth = SampleTruth::of_surfaces(&index, &view.rays, input.samples, threads);
-            let counts = truth.visible.into_iter().zip(truth.samples_of);
-            // Behind the scene's items come floors and ceilings.
-            visible.push(counts.filter(|(item, _)| *item < items).collect());
-        }
-        Ok(Some(Truth::new(visible)))
-    }
-
-    fn truth_of_solids(&self, input: &FunnelInput, stop: &dyn Fn() -> bool) -> Option<Truth> {
-        let solids = &self.solids;
-        let index = RayIndex::build(solids);
-        let mut visible = Vec::with_capacity(self.views());
-        for view in &self.views {
-            if stop() {
-                return None;
-            }
-            let (rays, threads) = (&view.rays, input.execution.threads);
-            let truth = match &self.cut_outs {
-                Some(surfaces) => {
-                    let opaque =
-                        |item, b: &_, probe: &_, at: &_| surfaces.opaque(item, b, probe, at);
-                    SampleTruth::of_opaque(&index, &opaque, rays, input.samples, threads)
-                }
-                None => SampleTruth::of(solids, &index, rays, input.samples, threads),
-            };
-            let counts = truth.visible.into_iter().zip(truth.samples_of);
-            visible.push(counts.collect());
-        }
-        Some(Truth::new(visible))
     }
 
     /// The back ends of a stage that the scene can have, but for structures.
@@ -364,10 +334,12 @@ impl<'a> World<'a> {
         let hide = RefCell::new((row.make)(buffer, self.kernel));
         let does_both = row.back_end().does_object_stage;
         let every: Vec<ItemId> = (0..self.items() as ItemId).collect();
+        let occluders = self.occluders.as_ref().expect("a scene with occluders");
         Box::new(move |view, input, out| {
-            let view = self.hiding_view(view, buffer);
+            let View { rays, volume, .. } = &self.views[view];
+            let view = occlusion::View::new(rays, volume, occluders, buffer);
             let items = input.unwrap_or(&every);
-            hide.borrow_mut().hide(&self.occluders, &view, items, out);
+            hide.borrow_mut().hide(occluders, &view, items, out);
             // It has looked beyond the regions that are seen.
             if does_both && self.regions.is_some() && input.is_some() {
                 out.retain(|id| items.binary_search(id).is_ok());
@@ -440,11 +412,7 @@ fn cut_out(
     scene: &Scene,
     regions: Option<&Regions>,
     solids: &mut Solids,
-) -> Result<Surfaces, FunnelError> {
-    if !Solids::are_items_of(scene) {
-        let scene = scene.name.clone();
-        return Err(FunnelError::NoBoxes { scene });
-    }
+) -> fragment::Surfaces {
     let walls = regions.map(|regions| regions.graph().borders(scene));
     let is_free = |item: ItemId| walls.as_ref().is_none_or(|walls| !walls[item as usize]);
     let surfaces = typed.surfaces(scene.items.len(), is_free);
@@ -452,5 +420,5 @@ fn cut_out(
     items
         .filter(|&item| surfaces.of(item).is_some())
         .for_each(|item| solids.hides_nothing(item));
-    Ok(surfaces)
+    surfaces
 }

@@ -24,8 +24,17 @@ struct Column {
     /// Floor and ceiling of the room that it is in, or of the scene.
     low: f64,
     high: f64,
-    /// Bottom and top of each item that it passes through.
-    spans: Vec<[f64; 2]>,
+    /// The items that it passes through.
+    spans: Vec<Span>,
+}
+
+/// An item in a column.
+struct Span {
+    item: usize,
+    bottom: f64,
+    top: f64,
+    /// Whether it is triangles that all face up.
+    is_ground: bool,
 }
 
 pub(super) fn frames(stage: &Stage, spec: &mut Spec) -> Result<Vec<Pose>, PathError> {
@@ -69,6 +78,10 @@ struct Stand {
     rise: f64,
     /// Whether on what stands on that.
     is_on_top: bool,
+    /// Whether not on the ground of a mesh.
+    is_off: bool,
+    /// Whether on nothing, where nearly all places are on something.
+    is_bare: bool,
 }
 
 /// For each of so many eyes the lowest of the places that are drawn for it.
@@ -79,16 +92,19 @@ fn lowest(stage: &Stage, height: f64, count: usize, rng: &mut SeededRng) -> Vec<
     let stands = columns.chunks_mut(DRAWN).filter_map(|columns| {
         let stands = columns.iter_mut().map(|column| {
             let ground = column.ground(height + CLEARANCE);
+            let first = column.spans.first();
             Stand {
                 eye: DVec3::new(column.x, column.y, ground + height),
+                is_off: !first.is_some_and(|span| span.is_ground),
+                is_bare: has_ground && first.is_none(),
                 rise: ground - column.foot(),
-                is_on_top: ground > column.spans.first().map_or(column.low, |[_, top]| *top),
+                is_on_top: ground > first.map_or(column.low, |span| span.top),
             }
         });
-        let is_outside = |stand: &Stand| has_ground && stand.rise == 0.0;
+        // Where there is ground, a place without any is beyond its edge.
         stands.min_by(|a, b| {
             let rise = a.rise.total_cmp(&b.rise);
-            is_outside(a).cmp(&is_outside(b)).then(rise)
+            (a.is_off, a.is_bare).cmp(&(b.is_off, b.is_bare)).then(rise)
         })
     });
     stands.collect()
@@ -125,48 +141,73 @@ fn drawn(stage: &Stage, rng: &mut SeededRng) -> Vec<Column> {
     (0..DRAWN).map(place).collect()
 }
 
-/// Finds the items of all columns. O((n + columns) log columns) where items are small.
+/// Finds the items of all columns: by their boxes, or of a mesh by those of their
+/// triangles. O((n + columns) log columns) where boxes are small.
 fn fill(stage: &Stage, columns: &mut [Column]) {
     let mut by_x: Vec<u32> = (0..columns.len() as u32).collect();
     by_x.sort_by(|&a, &b| columns[a as usize].x.total_cmp(&columns[b as usize].x));
     let xs: Vec<f64> = by_x.iter().map(|&c| columns[c as usize].x).collect();
-    for (min, max) in stage
-        .scene
-        .items
-        .iter()
-        .map(|b: &Aabb| b.in_world(stage.scene.origin))
-    {
+    let mut add = |item: usize, is_ground: bool, b: &Aabb| {
+        let (min, max) = b.in_world(stage.scene.origin);
         let from = xs.partition_point(|&x| x < min.x - CLEARANCE);
         let to = xs.partition_point(|&x| x <= max.x + CLEARANCE);
         for &c in by_x.get(from..to).unwrap_or_default() {
             let column = &mut columns[c as usize];
             let beside = column.y < min.y - CLEARANCE || column.y > max.y + CLEARANCE;
             if !beside && min.z <= column.high && max.z >= column.low {
-                column.spans.push([min.z, max.z]);
+                column.add(Span {
+                    item,
+                    bottom: min.z,
+                    top: max.z,
+                    is_ground,
+                });
             }
+        }
+    };
+    let Some(mesh) = &stage.scene.surfaces else {
+        let items = stage.scene.items.iter().enumerate();
+        return items.for_each(|(item, b)| add(item, false, b));
+    };
+    for item in 0..mesh.items() {
+        for [p, q, r] in mesh.of(item) {
+            let [u, v] = [q - p, r - p].map(|edge| edge.truncate().as_dvec2());
+            let bounds = Aabb::new(p.min(q).min(r), p.max(q).max(r));
+            add(item, u.perp_dot(v) > 0.0, &bounds);
         }
     }
 }
 
 impl Column {
+    /// A part of an item; those of one item follow each other.
+    fn add(&mut self, part: Span) {
+        match self.spans.last_mut() {
+            Some(span) if span.item == part.item => {
+                span.bottom = span.bottom.min(part.bottom);
+                span.top = span.top.max(part.top);
+                span.is_ground &= part.is_ground;
+            }
+            _ => self.spans.push(part),
+        }
+    }
+
     /// The lowest level with so much room above it: on the lowest item, or on what
     /// stands on that, or on the floor where there is no item at all.
     fn ground(&mut self, room: f64) -> f64 {
-        self.spans.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        self.spans.sort_by(|a, b| a.bottom.total_cmp(&b.bottom));
         let mut ground = self.low;
-        for (i, [bottom, top]) in self.spans.iter().enumerate() {
+        for (i, span) in self.spans.iter().enumerate() {
             // Below the lowest item is under the ground.
-            if i > 0 && bottom - ground >= room {
+            if i > 0 && span.bottom - ground >= room {
                 break;
             }
-            ground = ground.max(*top);
+            ground = ground.max(span.top);
         }
         ground
     }
 
     /// The bottom of the lowest item, or the floor; after [`Column::ground`].
     fn foot(&self) -> f64 {
-        self.spans.first().map_or(self.low, |[bottom, _]| *bottom)
+        self.spans.first().map_or(self.low, |span| span.bottom)
     }
 }
 
@@ -227,5 +268,38 @@ mod tests {
             below.any(|(min, max)| eye.clamp(min, max).truncate() == eye.truncate())
         };
         assert!(eyes.all(is_over));
+    }
+
+    #[test]
+    fn on_a_mesh_eyes_stand_on_its_triangles() {
+        for name in ["mesh:terrain:n=20000", "mesh:forest:n=20000"] {
+            let scene = scene::load(name, &Default::default()).unwrap();
+            let path = path::load("street:frames=32", &scene, &LensDefaults::default()).unwrap();
+            let mesh = scene.surfaces.as_ref().unwrap();
+            let triangles = (0..mesh.items()).flat_map(|item| mesh.of(item));
+            let triangles: Vec<_> = triangles.map(|t| t.map(|p| p.as_dvec3())).collect();
+            let mut over = 0;
+            for camera in &path.cameras {
+                let eye = camera.frame.eye;
+                // Of triangles over or under the eye, the height of their planes there.
+                let heights = triangles.iter().filter_map(|[a, b, c]| {
+                    let side =
+                        |p: &DVec3, q: &DVec3| (q - p).truncate().perp_dot((eye - p).truncate());
+                    let sides = [side(a, b), side(b, c), side(c, a)];
+                    let is_within =
+                        sides.iter().all(|s| *s > 0.0) || sides.iter().all(|s| *s < 0.0);
+                    let normal = (b - a).cross(c - a);
+                    is_within.then(|| eye.z + normal.dot(a - eye) / normal.z)
+                });
+                // Within reach of the edge there may be none.
+                let Some(below) = heights.filter(|z| *z <= eye.z).reduce(f64::max) else {
+                    continue;
+                };
+                let rise = eye.z - below;
+                assert!((1.7 - 1e-4..2.8).contains(&rise), "{name}: {rise}");
+                over += 1;
+            }
+            assert!(over >= 30, "{name}: {over} of 32 above the ground");
+        }
     }
 }

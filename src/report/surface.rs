@@ -42,9 +42,9 @@ pub enum Crossing {
     Above(usize),
 }
 
-/// `uniform:n=1000,seed=7` is `uniform:seed=7`.
+/// `uniform:n=1000,seed=7` is `uniform:seed=7`, `mesh:forest:n=1000` is `mesh:forest`.
 pub fn world_of(scene: &str) -> String {
-    let Some((name, parameters)) = scene.split_once(':') else {
+    let Some((name, parameters)) = scene.rsplit_once(':') else {
         return scene.to_owned();
     };
     let others: Vec<&str> = parameters
@@ -346,6 +346,8 @@ mod tests {
             ("city:n=1000,seed=7", "city:seed=7"),
             ("city", "city"),
             ("maps.wad#MAP07", "maps.wad#MAP07"),
+            ("mesh:forest:n=1000,seed=7", "mesh:forest:seed=7"),
+            ("mesh:forest", "mesh:forest"),
         ] {
             assert_eq!(world_of(scene), world);
         }

@@ -3,7 +3,9 @@
 
 use sysinfo::{MemoryRefreshKind, RefreshKind, System};
 
-use super::{WorldBox, generate::MOST_ITEMS};
+use super::WorldBox;
+use super::generate::MOST_ITEMS;
+use super::meshes::{MOST_TRIANGLES, TRIANGLES};
 use crate::geometry::Aabb;
 use crate::input::InputError;
 use crate::spec::Spec;
@@ -16,8 +18,13 @@ const MADE: u64 = HELD + size_of::<WorldBox>() as u64;
 const INDEXED: u64 = 40;
 /// What a build needs beside that, for the one that is being built.
 const BUILT: u64 = 64;
-/// Scenes of fewer items are made without asking.
+/// Scenes of fewer items, and meshes of fewer triangles, are made without asking.
 const ANYWHERE: u64 = 1_000_000;
+/// Bytes of a triangle while a mesh is made: 117 were measured of the statue, which
+/// finds its points in a table, 20 to 24 of the others.
+const MESHED: u64 = 120;
+/// Fewest triangles of an item: those of a bush.
+const FEWEST: u64 = 24;
 
 /// About how much memory a scene takes with so many structures over it.
 pub fn needed_bytes(items: u64, structures: u64) -> u64 {
@@ -36,7 +43,20 @@ pub fn fits(
     structures: u64,
     available: Option<u64>,
 ) -> Result<(), InputError> {
-    let needed = needed_bytes(items, structures);
+    fits_bytes(
+        scene,
+        needed_bytes(items, structures),
+        structures,
+        available,
+    )
+}
+
+fn fits_bytes(
+    scene: &str,
+    needed: u64,
+    structures: u64,
+    available: Option<u64>,
+) -> Result<(), InputError> {
     match available {
         Some(available) if needed > available => Err(InputError::TooLarge {
             scene: scene.to_owned(),
@@ -53,6 +73,24 @@ pub(super) fn fits_here(scene: &str, spec: &Spec, structures: u64) -> Result<(),
     // What is no number is told by the generator.
     match spec.clone().whole("n", 0, MOST_ITEMS) {
         Ok(items) if items > ANYWHERE => fits(scene, items, structures, available_bytes()),
+        _ => Ok(()),
+    }
+}
+
+/// The same of the text of a mesh, whose `n` counts triangles, each of which will need
+/// so many bytes beside the scene.
+pub(super) fn mesh_fits_here(
+    scene: &str,
+    spec: &Spec,
+    structures: u64,
+    per_triangle: u64,
+) -> Result<(), InputError> {
+    match spec.clone().whole("n", TRIANGLES, MOST_TRIANGLES) {
+        Ok(triangles) if triangles > ANYWHERE => {
+            let of_items = needed_bytes(triangles / FEWEST, structures);
+            let needed = triangles * (MESHED + per_triangle) + of_items;
+            fits_bytes(scene, needed, structures, available_bytes())
+        }
         _ => Ok(()),
     }
 }

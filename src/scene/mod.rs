@@ -1,5 +1,6 @@
-//! A scene: boxes in local f32 coordinates about an f64 origin, the regions
-//! that region search looks for, and camera places the scene itself knows.
+//! A scene: boxes in local f32 coordinates about an f64 origin, the triangles in
+//! them where it is a mesh, the regions that region search looks for, and camera
+//! places the scene itself knows.
 //! Generators and readers each have a file of their own; this one owns what
 //! they all produce and how the origin is chosen.
 
@@ -10,6 +11,7 @@ mod forest;
 mod generate;
 mod labels;
 mod memory;
+mod meshes;
 mod originals;
 mod overlap;
 mod regions;
@@ -17,11 +19,15 @@ mod rng;
 mod rooms;
 mod samples;
 mod settled;
+mod shape;
 mod sought;
 mod source;
+mod surface;
 mod uniform;
 mod wad;
 mod world;
+
+use std::sync::Arc;
 
 use glam::DVec3;
 
@@ -32,13 +38,16 @@ pub use boxes_csv::{read_boxes_csv, write_boxes_csv};
 pub use generate::{FAMILIES, Family, GENERATOR_NAME};
 pub use labels::Labels;
 pub use memory::{fits, needed_bytes};
+pub use meshes::{MESHES, Mesh};
 pub use originals::Originals;
 pub use overlap::SoughtBox;
 pub use regions::{BspNode, BspRegions, Portal, Regions, Tiling};
 pub use rng::SeededRng;
 pub use samples::{NOTICE, SAMPLES, Sample};
+pub use shape::ItemShape;
 pub use sought::Sought;
 pub use source::{LoadOptions, check_fits, load};
+pub use surface::{SurfaceKind, Surfaces};
 pub use wad::{WadMap, map_lump, map_names};
 
 /// A box in world coordinates, as a file or a generator states it.
@@ -90,6 +99,8 @@ pub struct Scene {
     pub originals: Originals,
     /// Union of the items, local.
     pub bounds: Aabb,
+    /// The triangles that the items are the boxes of, if the scene is a mesh.
+    pub surfaces: Option<Arc<Surfaces>>,
     /// What region search finds.
     pub regions: Regions,
     /// Columns of the file beyond the bounds.
@@ -140,6 +151,7 @@ impl Scene {
             name,
             origin,
             items,
+            surfaces: None,
             regions: Regions::Items,
             labels: Vec::new(),
             places: Vec::new(),

@@ -25,7 +25,7 @@ impl Scene {
     }
 
     /// The scene as it is read back from a boxes file: the same boxes, as they
-    /// were written, and labels, without regions, camera places and a partition
+    /// were written, and labels, without triangles, regions, camera places and a partition
     /// of its own.
     ///
     /// Almost always the stored items are the very same too. Where the reader
@@ -48,6 +48,7 @@ impl Scene {
             });
         }
         Ok(Scene {
+            surfaces: None,
             regions: Regions::Items,
             places: Vec::new(),
             own_tree: None,
@@ -109,6 +110,8 @@ mod tests {
             "freedm-map12",
             "helsinki",
             "us-counties",
+            "mesh:terrain:n=5000",
+            "mesh:forest:n=5000",
         ] {
             let scene = load(source, &LoadOptions::default()).unwrap();
             let read = there_and_back(&scene);

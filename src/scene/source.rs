@@ -4,7 +4,9 @@
 use std::fs;
 use std::path::Path;
 
-use super::{FAMILIES, Family, SAMPLES, Sample, Scene, WadMap, boxes_csv, memory};
+use super::{
+    FAMILIES, Family, MESHES, Mesh, SAMPLES, Sample, Scene, WadMap, boxes_csv, memory, meshes,
+};
 use crate::input::{InputError, is_readable, read_file};
 use crate::spec::{Spec, SpecError, nearest};
 
@@ -15,10 +17,12 @@ pub struct LoadOptions {
     pub skip_bad_items: bool,
     /// Structures that will be built over the scene: they need memory as well.
     pub structures: u64,
+    /// Bytes that will be needed for each triangle of a mesh, beside the scene.
+    pub per_triangle: u64,
 }
 
-/// Loads `freedm-map12`, `city:n=100000,seed=7`, `boxes.csv`, `map.wad` or
-/// `maps.wad#MAP07`. An existing file wins over a name.
+/// Loads `freedm-map12`, `city:n=100000,seed=7`, `mesh:statue:n=1M`, `boxes.csv`,
+/// `map.wad` or `maps.wad#MAP07`. An existing file wins over a name.
 ///
 /// # Errors
 /// One line that names what was found and what was expected.
@@ -36,11 +40,11 @@ pub fn load(source: &str, options: &LoadOptions) -> Result<Scene, InputError> {
     }
     let looks_like_a_file = source.contains(['/', '\\', '.']) && !source.contains('=');
     if !looks_like_a_file {
-        let spec = Spec::parse(source)?;
-        if let Some(family) = Family::named(spec.name()) {
-            memory::fits_here(source, &spec, options.structures)?;
-            return family.generate(source, spec);
+        if let Some(generated) = Generated::named(source)? {
+            generated.check_fits(source, options)?;
+            return generated.generate(source);
         }
+        let spec = Spec::parse_behind(meshes::PREFIX, source)?;
         if let Some(sample) = Sample::named(spec.name()) {
             spec.finish()?;
             return sample.load();
@@ -62,11 +66,46 @@ pub fn load(source: &str, options: &LoadOptions) -> Result<Scene, InputError> {
 /// # Errors
 /// [`InputError::TooLarge`].
 pub fn check_fits(source: &str, options: &LoadOptions) -> Result<(), InputError> {
-    match Spec::parse(source) {
-        Ok(spec) if Family::named(spec.name()).is_some() && !is_readable(Path::new(source)) => {
-            memory::fits_here(source, &spec, options.structures)
+    match Generated::named(source) {
+        Ok(Some(generated)) if !is_readable(Path::new(source)) => {
+            generated.check_fits(source, options)
         }
         _ => Ok(()),
+    }
+}
+
+/// Something that is made from parameters.
+enum Generated {
+    Family(&'static Family, Spec),
+    Mesh(&'static Mesh, Spec),
+}
+
+impl Generated {
+    /// `None` if no generator has this name.
+    fn named(source: &str) -> Result<Option<Generated>, SpecError> {
+        let spec = Spec::parse_behind(meshes::PREFIX, source)?;
+        if let Some(mesh) = Mesh::named(spec.name()) {
+            return Ok(Some(Generated::Mesh(mesh, spec)));
+        }
+        let family = Family::named(spec.name());
+        Ok(family.map(|family| Generated::Family(family, spec)))
+    }
+
+    fn check_fits(&self, source: &str, options: &LoadOptions) -> Result<(), InputError> {
+        let structures = options.structures;
+        match self {
+            Generated::Family(_, spec) => memory::fits_here(source, spec, structures),
+            Generated::Mesh(_, spec) => {
+                memory::mesh_fits_here(source, spec, structures, options.per_triangle)
+            }
+        }
+    }
+
+    fn generate(self, source: &str) -> Result<Scene, InputError> {
+        match self {
+            Generated::Family(family, spec) => family.generate(source, spec),
+            Generated::Mesh(mesh, spec) => mesh.generate(source, spec),
+        }
     }
 }
 
@@ -91,7 +130,8 @@ pub(super) fn parse_bytes(
 
 fn unknown_scene(word: &str) -> SpecError {
     let families = FAMILIES.iter().map(|f| f.name);
-    let known = families.chain(SAMPLES.iter().map(|s| s.name));
+    let generated = families.chain(MESHES.iter().map(|m| m.name));
+    let known = generated.chain(SAMPLES.iter().map(|s| s.name));
     let hint = match nearest(word, known.clone()) {
         Some(guess) => format!("; did you mean '{guess}'?"),
         None => String::new(),
@@ -129,6 +169,7 @@ mod tests {
             "city:n=10",
             "datasets/freedm_map20.wad",
             "datasets/freedm_map12.wad#map12",
+            "mesh:statue:n=500,seed=7",
         ] {
             let scene = load(source, &LoadOptions::default()).unwrap();
             assert_eq!(scene.name, source);
@@ -139,6 +180,9 @@ mod tests {
     #[test]
     fn what_cannot_be_loaded_says_why() {
         assert!(error("unifrom").contains("did you mean 'uniform'"));
+        assert!(error("mesh:sphere").contains("did you mean 'mesh:spheres'"));
+        assert!(error("mesh:statue:n=many").contains("n=many"));
+        assert!(error("mesh:statue:size=3").contains("unknown parameter"));
         assert!(error("no/such/file.csv").contains("no/such/file.csv: No such file"));
         assert!(error("datasets/").contains("not a file"));
         assert!(error("datasets/freedm_map12.wad#MAP99").contains("no map 'MAP99'"));

@@ -7,10 +7,11 @@
 
 use glam::{DVec3, Vec3};
 
-use super::surface::{SurfaceKind, Surfaces};
 use super::triangle::{Eye, faces, normal};
 use crate::arithmetic::Expansion;
 use crate::geometry::Aabb;
+use crate::scene::{SurfaceKind, Surfaces};
+use crate::threads;
 
 /// A box proven to be inside a mesh.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -99,10 +100,45 @@ fn parts(surfaces: &Surfaces, item: usize) -> Vec<Vec<[Vec3; 3]>> {
     parts.into_iter().map(|(_, part)| part).collect()
 }
 
-/// The boxes of all items, in their order; empty where there is none.
-pub fn inner_boxes(surfaces: &Surfaces, cells: usize) -> Vec<Aabb> {
-    let inner = |item| inscribed_box(surfaces, item, cells).map_or(Aabb::EMPTY, |b| b.inner);
-    (0..surfaces.items()).map(inner).collect()
+/// The boxes inside all items of a mesh.
+#[derive(Clone, PartialEq, Debug)]
+#[non_exhaustive]
+pub struct InnerBoxes {
+    /// By item, scene-local; empty where there is none.
+    pub boxes: Vec<Aabb>,
+    /// How many items have one.
+    pub count: usize,
+    /// Volume of the boxes over that of the items that have one, in which pieces that
+    /// overlap count twice; `None` if no item has one.
+    pub share: Option<f64>,
+}
+
+impl InnerBoxes {
+    /// A box for each item, as [`inscribed_box`] finds it on a grid of so many cells.
+    /// The same on any number of threads.
+    pub fn of(surfaces: &Surfaces, cells: usize, threads: usize) -> InnerBoxes {
+        const CHUNK: usize = 16;
+        let mut found = vec![None; surfaces.items()];
+        let chunks = found.chunks_mut(CHUNK).enumerate();
+        threads::share(threads, chunks, |(chunk, found)| {
+            for (place, found) in found.iter_mut().enumerate() {
+                *found = inscribed_box(surfaces, chunk * CHUNK + place, cells);
+            }
+        });
+        let some = found.iter().flatten();
+        let [boxes, items] = some.clone().fold([0.0, 0.0], |[boxes, items], one| {
+            let own = volume(&one.inner);
+            [boxes + own, items + own / one.share]
+        });
+        InnerBoxes {
+            count: some.count(),
+            share: (items > 0.0).then(|| boxes / items),
+            boxes: found
+                .iter()
+                .map(|found| found.map_or(Aabb::EMPTY, |one| one.inner))
+                .collect(),
+        }
+    }
 }
 
 /// Whether the open box is in the inside of one piece of a closed item: exactly.
@@ -365,12 +401,11 @@ fn longest_run(word: u64) -> (usize, usize) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::meshes::Mesh;
     use super::*;
-    use crate::scene::{SeededRng, load};
+    use crate::scene::{Mesh, SeededRng, load};
 
     fn mesh(name: &str, triangles: usize) -> Surfaces {
-        (Mesh::named(name).unwrap().build)(triangles, 3)
+        (Mesh::named(&format!("mesh:{name}")).unwrap().build)(triangles, 3)
     }
 
     #[test]
@@ -424,15 +459,24 @@ mod tests {
     #[test]
     fn only_closed_opaque_items_have_one() {
         let forest = mesh("forest", 20_000);
-        let boxes = inner_boxes(&forest, 12);
-        let mut trees = 0;
-        for (item, inner) in boxes.iter().enumerate() {
+        let found = InnerBoxes::of(&forest, 12, 1);
+        assert_eq!(found, InnerBoxes::of(&forest, 12, 3));
+        let (mut trees, mut volumes) = (0, [0.0, 0.0]);
+        for (item, inner) in found.boxes.iter().enumerate() {
             let is_tree = forest.of_item[item].len() == 118;
             assert!(is_tree || inner.is_empty());
             assert!(inner.is_empty() || is_inside(&forest, item, inner));
-            trees += usize::from(!inner.is_empty());
+            if !inner.is_empty() {
+                trees += 1;
+                volumes[0] += volume(inner);
+                volumes[1] += forest.volume(item);
+            }
         }
-        assert!(trees > 20, "{trees}");
+        assert!(trees > 20 && trees == found.count, "{trees}");
+        let share = volumes[0] / volumes[1];
+        assert!((found.share.unwrap() / share - 1.0).abs() < 1e-9 && share < 0.5);
+        let ground = InnerBoxes::of(&mesh("terrain", 2000), CELLS, 1);
+        assert_eq!((ground.count, ground.share), (0, None));
     }
 
     #[test]

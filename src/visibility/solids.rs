@@ -10,7 +10,7 @@ use glam::DVec3;
 use crate::arithmetic::rounding::{difference_down, difference_up};
 use crate::geometry::Aabb;
 use crate::query::ItemId;
-use crate::scene::{Regions, Scene, WorldBox};
+use crate::scene::{Scene, WorldBox};
 
 /// The items of a scene as solid boxes, in three forms.
 #[derive(Clone, Debug)]
@@ -26,23 +26,9 @@ pub struct Solids {
 }
 
 impl Solids {
-    /// Whether the items of a scene are solid boxes: linedefs of a map are walls in theirs.
-    pub fn are_items_of(scene: &Scene) -> bool {
-        !matches!(scene.regions, Regions::Bsp(_))
-    }
-
-    /// All items of a scene. O(n).
+    /// All items of a scene, whatever their shape is. O(n).
     pub fn of(scene: &Scene) -> Solids {
-        let boxes = match scene.originals.boxes() {
-            Some(boxes) => boxes.to_vec(),
-            None => {
-                let exact = |b: &Aabb| {
-                    let (min, max) = b.in_world(scene.origin);
-                    WorldBox::new(min, max)
-                };
-                scene.items.iter().map(exact).collect()
-            }
-        };
+        let boxes: Vec<WorldBox> = scene.written().collect();
         let inner = boxes.iter().map(|b| rounded_inward(b, scene.origin));
         Solids {
             inner: inner.collect(),

@@ -15,6 +15,7 @@ mod funnel;
 mod kernels;
 mod listing;
 mod matrices;
+mod meshes;
 mod pipes;
 mod precision;
 mod process;

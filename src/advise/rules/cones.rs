@@ -14,8 +14,11 @@ use super::hidden::{self, PROBED, PROBES, Removal};
 use crate::kernel::Kernel;
 use crate::measure::Ask;
 use crate::query::ItemId;
-use crate::visibility::triangle::{Clusters, Cone, SafeCones, Selection, TriangleCull, View};
-use crate::visibility::{NoRays, Solids, Surfaces};
+use crate::scene::{ItemShape, Surfaces};
+use crate::visibility::NoRays;
+use crate::visibility::triangle::{
+    Clusters, Cone, MOST_TRIANGLES, SafeCones, Selection, TriangleCull, View,
+};
 
 pub(super) const NAME: &str = "cones";
 
@@ -48,8 +51,8 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
         LeftOutIf::AtMost,
         By::Rule,
     );
-    if !Solids::are_items_of(case.scene()) {
-        let reason = "items are walls, not solid boxes with faces";
+    if case.scene().item_shape() == ItemShape::Wall {
+        let reason = "items are walls, without faces of their own";
         return Ok(omission.because(reason).draft(Vec::new()));
     }
     let cameras = case.workload.views.len();
@@ -92,7 +95,11 @@ impl Seen {
         let items = hidden::frames(met.len(), MOST_ITEMS).map(|n| met[n]);
         let items: Vec<ItemId> = items.collect();
         let surfaces = Surfaces::of_items(scene, &items);
-        let clusters = Arc::new(Clusters::as_listed(Arc::new(surfaces), OF_A_FACE));
+        let surfaces = Arc::new(surfaces);
+        let clusters = Arc::new(match scene.item_shape() {
+            ItemShape::Mesh => Clusters::of(surfaces, MOST_TRIANGLES),
+            _ => Clusters::as_listed(surfaces, OF_A_FACE),
+        });
         let owners = clusters.of_item.iter().zip(&items);
         Ok(Seen {
             owners: owners

@@ -6,7 +6,7 @@ use super::super::case::Case;
 use super::super::omission::{Check, Draft, Forced, Omission, Way};
 use crate::geometry::ConvexVolume;
 use crate::measure::Ask;
-use crate::scene::Scene;
+use crate::scene::{ItemShape, Scene};
 use crate::visibility::{Rays, SampleGrid, Solids};
 
 /// Cameras that a prediction looks at, evenly spread, and rays of each.
@@ -26,9 +26,10 @@ pub(super) fn sights(case: &Case) -> Result<Vec<(Rays, ConvexVolume)>, &'static 
 
 /// The items as solid boxes, or why they are none.
 pub(super) fn solids(scene: &Scene) -> Result<Solids, &'static str> {
-    match Solids::are_items_of(scene) {
-        true => Ok(Solids::of(scene)),
-        false => Err("items are walls, not solid boxes"),
+    match scene.item_shape() {
+        ItemShape::Box => Ok(Solids::of(scene)),
+        ItemShape::Wall => Err("items are walls, not solid boxes"),
+        ItemShape::Mesh => Err("items are triangles, not solid boxes"),
     }
 }
 

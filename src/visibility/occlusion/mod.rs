@@ -6,7 +6,9 @@
 //!
 //! Semantics are those of [`Solids`](super::Solids): a ray meets a box where it
 //! enters it, between near and far; a box that some ray enters before the near
-//! plane is not drawn; items as near as an occluder are not hidden by it.
+//! plane is not drawn; items as near as an occluder are not hidden by it. Of a mesh
+//! what is drawn is a box inside each item ([`OccluderScene::within`]): a ray that enters
+//! it has met the item's surface before, unless that was before the near plane.
 
 mod buffer;
 mod depth_rays;

@@ -1,20 +1,21 @@
-//! The solids of a scene, prepared once for occlusion: a packed tree of blocks of
+//! The items of a scene, prepared once for occlusion: a packed tree of blocks of
 //! sixteen, and for each item what the drawing of occluders must know of it.
 
 use glam::DVec3;
 
 use super::lanes::first_lanes;
+use crate::arithmetic::rounding::{sum_down, sum_up};
 use crate::geometry::{Aabb, BoxBlock};
 use crate::kernel::{LANES, LaneMask};
 use crate::query::ItemId;
-use crate::scene::WorldBox;
+use crate::scene::{Scene, WorldBox};
 use crate::visibility::Solids;
 
 /// Some of a box's six faces: bit `axis` is the lower one, bit `3 + axis` the
 /// upper one.
 pub type Faces = u8;
 
-/// A scene's solids in a tree of which every node has sixteen children but the
+/// A scene's items in a tree of which every node has sixteen children but the
 /// last ones: the children of box `j` of a level are block `j` of the level below.
 #[derive(Clone, Debug)]
 pub struct OccluderScene {
@@ -31,33 +32,60 @@ pub struct OccluderScene {
 }
 
 impl OccluderScene {
-    /// Sorts the items into the tree. O(n log n).
+    /// Solid boxes, which hide what is behind them. O(n log n).
     pub fn of(solids: &Solids) -> OccluderScene {
-        let mut ids: Vec<ItemId> = (0..solids.outer.len() as ItemId).collect();
+        let bounds = bounds_of(solids.boxes.iter().copied());
+        let boxes = solids.boxes.iter();
+        let faces = boxes.map(|b| faces_reached(b, &bounds)).collect();
+        OccluderScene::sorted(solids.origin, &solids.outer, &solids.inner, faces, bounds)
+    }
+
+    /// Items of a mesh, each of which hides what is behind a box inside it: by item,
+    /// scene-local, empty where there is none. O(n log n).
+    pub fn within(scene: &Scene, inner: &[Aabb]) -> OccluderScene {
+        let bounds = bounds_of(scene.written());
+        // Rounded inward: what hides reaches a face only if this does.
+        let in_world = |b: &Aabb| {
+            let low = |k: usize| sum_up(scene.origin[k], b.min[k].into());
+            let high = |k: usize| sum_down(scene.origin[k], b.max[k].into());
+            WorldBox::new([0, 1, 2].map(low).into(), [0, 1, 2].map(high).into())
+        };
+        let faces = inner.iter().map(|b| faces_reached(&in_world(b), &bounds));
+        let faces = faces.collect();
+        OccluderScene::sorted(scene.origin, &scene.items, inner, faces, bounds)
+    }
+
+    /// All by item.
+    fn sorted(
+        origin: DVec3,
+        outer: &[Aabb],
+        inner: &[Aabb],
+        faces: Vec<Faces>,
+        bounds: WorldBox,
+    ) -> OccluderScene {
+        let mut ids: Vec<ItemId> = (0..outer.len() as ItemId).collect();
         let mut capacity = LANES;
         while capacity < ids.len() {
             capacity *= LANES;
         }
-        let centres: Vec<_> = solids.outer.iter().map(Aabb::centre).collect();
+        let centres: Vec<_> = outer.iter().map(Aabb::centre).collect();
         sort_into(&mut ids, capacity, &|id, axis| centres[id as usize][axis]);
         let in_order =
             |boxes: &[Aabb]| -> Vec<Aabb> { ids.iter().map(|&id| boxes[id as usize]).collect() };
-        let mut levels = vec![blocks_of(&in_order(&solids.outer))];
+        let mut levels = vec![blocks_of(&in_order(outer))];
         while let Some(last) = levels.last().filter(|last| last.len() > 1) {
             let unions: Vec<Aabb> = last.iter().map(BoxBlock::union).collect();
             levels.push(blocks_of(&unions));
         }
-        let bounds = bounds_of(&solids.boxes);
-        let reached = |&id: &ItemId| faces_reached(&solids.boxes[id as usize], &bounds);
         let mut positions = vec![0; ids.len()];
         for (position, &id) in ids.iter().enumerate() {
             positions[id as usize] = position as u32;
         }
         OccluderScene {
-            origin: solids.origin,
+            origin,
             levels,
-            inner: in_order(&solids.inner),
-            faces: ids.iter().map(reached).collect(),
+            inner: in_order(inner),
+            faces: ids.iter().map(|&id| faces[id as usize]).collect(),
             positions,
             ids,
             bounds,
@@ -128,7 +156,7 @@ impl OccluderScene {
         &self.inner[position]
     }
 
-    /// The faces of the scene's bounds that the box at a position reaches, as
+    /// The faces of the scene's bounds that what hides at a position reaches, as
     /// written, exactly.
     #[inline(always)]
     pub fn faces(&self, position: usize) -> Faces {
@@ -182,9 +210,9 @@ fn blocks_of(boxes: &[Aabb]) -> Vec<BoxBlock> {
     blocks
 }
 
-fn bounds_of(boxes: &[WorldBox]) -> WorldBox {
+fn bounds_of(boxes: impl Iterator<Item = WorldBox>) -> WorldBox {
     let nothing = WorldBox::new(DVec3::INFINITY, DVec3::NEG_INFINITY);
-    boxes.iter().fold(nothing, |all, b| {
+    boxes.fold(nothing, |all, b| {
         WorldBox::new(all.min.min(b.min), all.max.max(b.max))
     })
 }

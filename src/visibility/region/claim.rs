@@ -127,7 +127,8 @@ mod tests {
             change(&mut doctored);
             doctored.check(&claim, &graph).unwrap_err().to_string()
         };
-        let cases: [(&dyn Fn(&mut ClaimErrors), &str); 6] = [
+        type Change<'c> = &'c dyn Fn(&mut ClaimErrors);
+        let cases: [(Change, &str); 6] = [
             (
                 &|e| e.false_negatives[0].ends[1] += 1e4,
                 "not strictly within",

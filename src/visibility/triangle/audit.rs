@@ -6,7 +6,6 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
-use super::super::surface::{SurfaceKind, Surfaces};
 use super::clusters::Clusters;
 use super::contract::TriangleRow;
 use super::exact::{faces, normal};
@@ -14,7 +13,7 @@ use super::eye::Eye;
 use super::selection::Selection;
 use super::view::View;
 use crate::kernel::Kernel;
-use crate::scene::SeededRng;
+use crate::scene::{SeededRng, SurfaceKind, Surfaces};
 
 named! {
     /// Which eyes are tried.

@@ -7,11 +7,10 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
-use super::super::surface::Surfaces;
 use super::exact::normal;
 use crate::geometry::Aabb;
 use crate::input::InputError;
-use crate::scene::Scene;
+use crate::scene::{Scene, Surfaces};
 
 /// Most triangles of a cluster: the bits of a word.
 pub const MOST_TRIANGLES: usize = 64;
@@ -119,7 +118,7 @@ impl Clusters {
     /// The boxes of the clusters as a scene, one item each.
     ///
     /// # Errors
-    /// As [`Surfaces::scene`].
+    /// As [`Surfaces::into_scene`].
     pub fn scene(&self, name: impl Into<String>) -> Result<Scene, InputError> {
         let boxes = (0..self.len()).map(|cluster| self.bounds(cluster));
         self.surfaces.boxes_as_scene(name, boxes)
@@ -250,8 +249,8 @@ fn along_the_curve(nodes: &[Node], bounds: &Aabb) -> Vec<u32> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::meshes::MESHES;
     use super::*;
+    use crate::scene::{MESHES, Mesh};
 
     #[test]
     fn every_triangle_is_in_one_cluster_of_its_item() {
@@ -301,9 +300,7 @@ mod tests {
 
     #[test]
     fn clusters_are_full_and_small() {
-        let surfaces = Arc::new((super::super::super::meshes::Mesh::named("statue")
-            .unwrap()
-            .build)(50_000, 3));
+        let surfaces = Arc::new((Mesh::named("mesh:statue").unwrap().build)(50_000, 3));
         let clusters = Clusters::of(surfaces.clone(), 64);
         let least = surfaces.triangles.len() / 64;
         assert!(

@@ -53,23 +53,25 @@ struct Masks {
 }
 
 fn build(clusters: &Arc<Clusters>) -> Box<dyn TriangleCull> {
+    let cells: Vec<[DVec3; 4]> = (0..CELLS).map(corners_of).collect();
     let cell = |cluster| {
+        let is_two_sided = clusters.is_two_sided(cluster);
         let bounds = clusters.bounds(cluster);
         let centre = bounds.centre();
         let least = bounds.extent().max_element() * 0.5 * REACH;
         let mut words = [0; CELLS];
         for (bit, corners) in clusters.corners_of(cluster).enumerate() {
             let n = normal(corners).normalize_or_zero();
-            if n == DVec3::ZERO && !clusters.is_two_sided(cluster) {
+            if n == DVec3::ZERO && !is_two_sided {
                 continue;
             }
             let way = centre.as_dvec3() - corners[0].as_dvec3();
             let (height, reach) = (n.dot(way), f64::from(least));
             let slack = SLACK * (way.length() + reach);
-            for (cell, word) in words.iter_mut().enumerate() {
-                let most = corners_of(cell).map(|d| n.dot(d)).fold(-2.0, f64::max) + SLACK;
+            for (cell, word) in cells.iter().zip(&mut words) {
+                let most = cell.iter().map(|d| n.dot(*d)).fold(-2.0, f64::max) + SLACK;
                 let is_behind = most <= 0.0 && height + reach * most + slack <= 0.0;
-                if !is_behind || clusters.is_two_sided(cluster) {
+                if !is_behind || is_two_sided {
                     *word |= 1 << bit;
                 }
             }
@@ -86,14 +88,14 @@ fn build(clusters: &Arc<Clusters>) -> Box<dyn TriangleCull> {
 }
 
 /// The corners of a cell on the cube of half edge 1, and a little beyond.
-fn corners_of(cell: usize) -> impl Iterator<Item = DVec3> {
+fn corners_of(cell: usize) -> [DVec3; 4] {
     let (face, row, column) = (cell / (SIDE * SIDE), cell / SIDE % SIDE, cell % SIDE);
     let (axis, sign) = (face / 2, if face % 2 == 0 { 1.0 } else { -1.0 });
     let at = |index: usize, end: usize| {
         let edge = (index + end) as f64 * 2.0 / SIDE as f64 - 1.0;
         edge + OVERLAP * (2.0 * end as f64 - 1.0)
     };
-    (0..4).map(move |corner| {
+    std::array::from_fn(|corner| {
         let mut d = DVec3::ZERO;
         d[axis] = sign;
         d[(axis + 1) % 3] = at(row, corner & 1);

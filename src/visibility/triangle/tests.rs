@@ -5,13 +5,11 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 
 use super::super::guarantee::Guarantee;
-use super::super::meshes::{MESHES, Mesh};
 use super::super::rays::{Rays, SampleGrid};
-use super::super::surface::Surfaces;
 use super::*;
 use crate::camera::{Camera, Lens, look_at};
 use crate::kernel::Kernel;
-use crate::scene::{SeededRng, load};
+use crate::scene::{MESHES, Mesh, SeededRng, Surfaces, load};
 
 /// Scenes of some thousand triangles: all meshes, and boxes far from the zero.
 fn scenes() -> Vec<(String, Arc<Clusters>)> {
@@ -27,7 +25,8 @@ fn scenes() -> Vec<(String, Arc<Clusters>)> {
 
 /// Cameras in and around a scene: three lenses in turn.
 fn cameras(clusters: &Clusters, count: usize, seed: u64) -> Vec<Camera> {
-    let scene = clusters.surfaces.scene("cameras").unwrap();
+    let surfaces = Surfaces::clone(&clusters.surfaces);
+    let scene = surfaces.into_scene("cameras").unwrap();
     let bounds = scene.world_bounds();
     let (centre, size) = ((bounds.min + bounds.max) / 2.0, bounds.max - bounds.min);
     let mut rng = SeededRng::new(seed);

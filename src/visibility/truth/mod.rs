@@ -32,3 +32,4 @@ pub use ray_index::{Front, RayIndex};
 pub use ray_triangle::{Meeting, TriangleProbe};
 pub use sample::{NO_ITEM, SampleTruth, visible_by_random_rays};
 pub use surface_index::{SurfaceFront, SurfaceIndex};
+pub use surface_sample::visible_surfaces_by_random_rays;

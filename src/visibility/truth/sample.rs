@@ -126,16 +126,30 @@ pub fn visible_by_random_rays(
     seed: u64,
     threads: usize,
 ) -> Vec<ItemId> {
+    let see = |search: &mut Search, ray: &Ray, seen: &mut Vec<ItemId>| {
+        search.front(index, ray);
+        seen.extend_from_slice(&search.items);
+    };
+    seen_at_random(see, rays, count, seed, threads)
+}
+
+/// The items that `see` appends for any of so many random rays, ascending.
+pub(super) fn seen_at_random<M: Default>(
+    see: impl Fn(&mut M, &Ray, &mut Vec<ItemId>) + Sync,
+    rays: &Rays,
+    count: usize,
+    seed: u64,
+    threads: usize,
+) -> Vec<ItemId> {
     const CHUNK: usize = 4096;
     let mut found = vec![Vec::new(); count.div_ceil(CHUNK)];
     threads::share(threads, found.iter_mut().enumerate(), |(chunk, found)| {
         // A stream of its own for each chunk, on whichever thread.
         let mut rng = SeededRng::new(seed.wrapping_add((chunk as u64) << 32));
-        let mut search = Search::default();
+        let mut memory = M::default();
         for _ in 0..CHUNK.min(count - chunk * CHUNK) {
             let (x, y) = (rng.unit(), rng.unit());
-            search.front(index, &rays.through(x, y));
-            found.extend_from_slice(&search.items);
+            see(&mut memory, &rays.through(x, y), found);
         }
         found.sort_unstable();
         found.dedup();

@@ -9,7 +9,8 @@ use super::ray_tree::RayTree;
 use super::ray_triangle::{Meeting, TriangleProbe};
 use crate::geometry::Aabb;
 use crate::query::ItemId;
-use crate::visibility::{Ray, SurfaceKind, Surfaces};
+use crate::scene::{SurfaceKind, Surfaces};
+use crate::visibility::Ray;
 
 /// A triangle as a leaf needs it.
 #[derive(Clone, Copy, Debug)]

@@ -1,6 +1,6 @@
 //! Exact sample truth of a scene of triangles.
 
-use super::sample::SampleTruth;
+use super::sample::{SampleTruth, seen_at_random};
 use super::surface_index::{Search, SurfaceIndex};
 use crate::query::ItemId;
 use crate::visibility::{Ray, Rays, SampleGrid};
@@ -26,6 +26,24 @@ impl SampleTruth {
     }
 }
 
+/// The items that are visible along any of `count` seeded random rays through the
+/// window, ascending, as [`SampleTruth::of_surfaces`] counts them. The same on any
+/// number of threads.
+pub fn visible_surfaces_by_random_rays(
+    index: &SurfaceIndex,
+    rays: &Rays,
+    count: usize,
+    seed: u64,
+    threads: usize,
+) -> Vec<ItemId> {
+    let see = |search: &mut Search, ray: &Ray, seen: &mut Vec<ItemId>| {
+        search.front(index, ray);
+        seen.extend_from_slice(&search.front);
+        seen.extend_from_slice(&search.before);
+    };
+    seen_at_random(see, rays, count, seed, threads)
+}
+
 #[cfg(test)]
 mod tests {
     use std::cmp::Ordering;
@@ -35,10 +53,10 @@ mod tests {
 
     use super::*;
     use crate::camera::{Camera, Lens};
-    use crate::scene::{self, SeededRng};
+    use crate::scene::{self, Mesh, SeededRng, SurfaceKind, Surfaces};
+    use crate::visibility::Solids;
     use crate::visibility::truth::judge::{self, Depth, exact};
     use crate::visibility::truth::{NO_ITEM, RayIndex};
-    use crate::visibility::{Solids, SurfaceKind, Surfaces};
 
     type Point = [IBig; 3];
 
@@ -206,9 +224,7 @@ mod tests {
 
     #[test]
     fn no_ray_slips_through_the_edges_of_a_closed_surface() {
-        let surfaces = (crate::visibility::meshes::Mesh::named("statue")
-            .unwrap()
-            .build)(2000, 3);
+        let surfaces = (Mesh::named("mesh:statue").unwrap().build)(2000, 3);
         let index = SurfaceIndex::build(&surfaces);
         let bounds = surfaces.bounds(0);
         let eye = bounds.centre().as_dvec3()

@@ -2,6 +2,7 @@
 
 mod by_rays;
 mod lanes;
+mod meshes;
 mod rules;
 mod slits;
 mod streets;

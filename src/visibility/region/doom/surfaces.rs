@@ -6,8 +6,7 @@ use glam::Vec3;
 use super::super::answer::RegionId;
 use super::map::{DoomMap, MapLine};
 use super::plan;
-use crate::scene::Scene;
-use crate::visibility::{SurfaceKind, Surfaces};
+use crate::scene::{Scene, SurfaceKind, Surfaces};
 
 /// A part of a linedef's wall: which of its two sides is faced, from which height to
 /// which.

@@ -8,9 +8,9 @@ use super::super::*;
 use super::from_eye::rows;
 use super::worlds::*;
 use crate::query::ItemId;
-use crate::scene::{Sample, Scene, SeededRng};
+use crate::scene::{Sample, Scene, SeededRng, SurfaceKind, Surfaces};
+use crate::visibility::SampleGrid;
 use crate::visibility::truth::{SampleTruth, SurfaceIndex};
-use crate::visibility::{SampleGrid, SurfaceKind, Surfaces};
 
 const MAPS: [&str; 2] = ["freedm-map12", "freedm-map20"];
 

@@ -3,7 +3,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::super::surface::{SurfaceKind, Surfaces};
+use super::super::{SurfaceKind, Surfaces};
 use super::shapes::{Shape, card, column, cone};
 use super::terrain::{Ground, on_ground};
 use crate::scene::SeededRng;

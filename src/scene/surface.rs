@@ -3,13 +3,14 @@
 //! come from is in `meshes`.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
+use super::{Scene, WorldBox};
 use crate::geometry::Aabb;
 use crate::input::InputError;
 use crate::query::ItemId;
-use crate::scene::{Scene, WorldBox};
 
 named! {
     /// What a ray does that meets a surface.
@@ -77,12 +78,30 @@ impl Surfaces {
         Surfaces::of_boxes(scene, scene.items.iter())
     }
 
-    /// The same for some of the items, numbered anew in this order.
+    /// The same for some of the items, numbered anew in this order; of a mesh their own
+    /// triangles.
     ///
     /// # Panics
     /// If there is no such item.
     pub fn of_items(scene: &Scene, items: &[ItemId]) -> Surfaces {
-        Surfaces::of_boxes(scene, items.iter().map(|&id| &scene.items[id as usize]))
+        let Some(mesh) = &scene.surfaces else {
+            return Surfaces::of_boxes(scene, items.iter().map(|&id| &scene.items[id as usize]));
+        };
+        let mut some = Surfaces::about(mesh.origin);
+        for item in items.iter().map(|&id| id as usize) {
+            let triangles = &mesh.triangles[mesh.range(item)];
+            let own = triangles.iter().flatten().copied();
+            let (first, end) = own.fold((u32::MAX, 0), |(low, high), p| {
+                (low.min(p), high.max(p + 1))
+            });
+            let points = &mesh.points[first.min(end) as usize..end as usize];
+            let triangles: Vec<[u32; 3]> = triangles
+                .iter()
+                .map(|corners| corners.map(|p| p - first))
+                .collect();
+            some.push(mesh.kinds[item], mesh.two_sided[item], points, &triangles);
+        }
+        some
     }
 
     fn of_boxes<'b>(scene: &Scene, boxes: impl Iterator<Item = &'b Aabb>) -> Surfaces {
@@ -152,16 +171,22 @@ impl Surfaces {
         })
     }
 
-    /// The boxes of the items as a scene: what the stages before this one work on.
+    /// The scene of these triangles: its items are the smallest f32 boxes that hold
+    /// those of each item.
     ///
     /// # Errors
     /// An item without triangles, which has no box.
-    pub fn scene(&self, name: impl Into<String>) -> Result<Scene, InputError> {
-        self.boxes_as_scene(name, (0..self.items()).map(|item| self.bounds(item)))
+    pub fn into_scene(self, name: impl Into<String>) -> Result<Scene, InputError> {
+        let boxes = (0..self.items()).map(|item| self.bounds(item));
+        let scene = self.boxes_as_scene(name, boxes)?;
+        Ok(Scene {
+            surfaces: Some(Arc::new(self)),
+            ..scene
+        })
     }
 
     /// Scene-local boxes as a scene about the same origin.
-    pub(super) fn boxes_as_scene(
+    pub(crate) fn boxes_as_scene(
         &self,
         name: impl Into<String>,
         boxes: impl Iterator<Item = Aabb>,
@@ -207,7 +232,7 @@ impl Surfaces {
     }
 
     /// The triangles of an item as a range of indices.
-    pub(super) fn range(&self, item: usize) -> Range<usize> {
+    pub(crate) fn range(&self, item: usize) -> Range<usize> {
         let range = &self.of_item[item];
         range.start as usize..range.end as usize
     }
@@ -215,8 +240,20 @@ impl Surfaces {
 
 #[cfg(test)]
 mod tests {
+    use super::super::load;
     use super::*;
-    use crate::scene::load;
+
+    #[test]
+    fn some_items_of_a_mesh_keep_their_triangles() {
+        let scene = load("mesh:spheres:n=5k", &Default::default()).unwrap();
+        let mesh = scene.surfaces.as_ref().unwrap();
+        let some = Surfaces::of_items(&scene, &[2, 0]);
+        assert_eq!(some.items(), 2);
+        for (place, item) in [(0, 2), (1, 0)] {
+            assert!(some.of(place).eq(mesh.of(item)));
+            assert_eq!(some.open_edges(place), 0);
+        }
+    }
 
     #[test]
     fn boxes_are_closed_and_wound_outward() {
@@ -235,7 +272,7 @@ mod tests {
                 assert!(normal.dot(b.centre().as_dvec3() - p) < 0.0);
             }
         }
-        let again = surfaces.scene("again").unwrap();
+        let again = surfaces.into_scene("again").unwrap();
         assert_eq!(again.items, scene.items);
     }
 

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::super::surface::{SurfaceKind, Surfaces};
+use super::super::{SurfaceKind, Surfaces};
 use super::icosphere::icosphere;
 use crate::scene::SeededRng;
 

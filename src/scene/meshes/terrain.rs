@@ -3,7 +3,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::super::surface::{SurfaceKind, Surfaces};
+use super::super::{SurfaceKind, Surfaces};
 use super::noise::fractal;
 use super::shapes::Shape;
 

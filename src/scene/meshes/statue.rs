@@ -4,7 +4,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::super::surface::{SurfaceKind, Surfaces};
+use super::super::{SurfaceKind, Surfaces};
 use super::icosphere::icosphere;
 use super::noise::fractal;
 use crate::scene::SeededRng;

@@ -1,0 +1,98 @@
+//! What the views of a funnel show, exactly: solid boxes as boxes, meshes and maps as
+//! triangles.
+
+use super::truth::Truth;
+use super::world::World;
+use crate::input::InputError;
+use crate::query::ItemId;
+use crate::scene::Surfaces;
+use crate::visibility::fragment;
+use crate::visibility::region::doom::DoomMap;
+use crate::visibility::truth::{
+    RayIndex, SampleTruth, SurfaceIndex, visible_by_random_rays, visible_surfaces_by_random_rays,
+};
+use crate::visibility::{Rays, SampleGrid, Solids};
+
+/// At the samples of every view and along so many random rays, whose items count as
+/// one sample each if they are at none. `None` if stopped.
+///
+/// # Errors
+/// The map's file, read again.
+pub fn seen(
+    world: &World,
+    samples: SampleGrid,
+    random_rays: usize,
+    threads: usize,
+    stop: &dyn Fn() -> bool,
+) -> Result<Option<Truth>, InputError> {
+    let all = Hiding::of(world)?;
+    let items = world.items() as ItemId;
+    let mut visible = Vec::with_capacity(world.views());
+    for view in 0..world.views() {
+        if stop() {
+            return Ok(None);
+        }
+        let rays = world.rays(view);
+        let truth = all.at_samples(rays, samples, threads);
+        let counts = truth.visible.iter().copied().zip(truth.samples_of);
+        let mut seen: Vec<(ItemId, u32)> = counts.collect();
+        if random_rays > 0 {
+            let more = all.along_random(rays, random_rays, view as u64 + 1, threads);
+            let is_new = |id: &ItemId| truth.visible.binary_search(id).is_err();
+            seen.extend(more.into_iter().filter(is_new).map(|id| (id, 1)));
+            seen.sort_unstable();
+        }
+        // Behind a map's items come its floors and ceilings.
+        seen.retain(|(item, _)| *item < items);
+        visible.push(seen);
+    }
+    Ok(Some(Truth::new(visible)))
+}
+
+/// What rays end at: solid boxes; or the triangles of a mesh, or the walls, floors and
+/// ceilings of a map.
+enum Hiding<'w> {
+    Solids(&'w Solids, RayIndex, Option<&'w fragment::Surfaces>),
+    Surfaces(SurfaceIndex),
+}
+
+impl Hiding<'_> {
+    fn of<'w>(world: &'w World) -> Result<Hiding<'w>, InputError> {
+        if let Some(solids) = world.solids() {
+            let index = RayIndex::build(solids);
+            return Ok(Hiding::Solids(solids, index, world.cut_outs()));
+        }
+        let index = |surfaces: &Surfaces| Hiding::Surfaces(SurfaceIndex::build(surfaces));
+        let scene = world.scene();
+        Ok(match (&scene.surfaces, DoomMap::of_scene(scene)?) {
+            (Some(mesh), _) => index(mesh),
+            (None, Some(map)) => index(&map.surfaces(scene)),
+            // A map whose file is not known.
+            (None, None) => index(&Surfaces::from_boxes(scene)),
+        })
+    }
+
+    fn at_samples(&self, rays: &Rays, grid: SampleGrid, threads: usize) -> SampleTruth {
+        match self {
+            Hiding::Solids(_, index, Some(holes)) => {
+                let opaque = |item, b: &_, probe: &_, at: &_| holes.opaque(item, b, probe, at);
+                SampleTruth::of_opaque(index, &opaque, rays, grid, threads)
+            }
+            Hiding::Solids(solids, index, None) => {
+                SampleTruth::of(solids, index, rays, grid, threads)
+            }
+            Hiding::Surfaces(index) => SampleTruth::of_surfaces(index, rays, grid, threads),
+        }
+    }
+
+    fn along_random(&self, rays: &Rays, count: usize, seed: u64, threads: usize) -> Vec<ItemId> {
+        match self {
+            Hiding::Solids(_, index, _) => {
+                visible_by_random_rays(index, rays, count, seed, threads)
+            }
+            Hiding::Surfaces(index) => {
+                visible_surfaces_by_random_rays(index, rays, count, seed, threads)
+            }
+        }
+    }
+}
