@@ -2,6 +2,7 @@
 //! than the defaults; then what needs the table of structures: all scenes and
 //! paths, memory, the map's own tree.
 
+use std::cell::Cell;
 use std::ops::ControlFlow;
 
 use cullbench::culling::Culling;
@@ -16,19 +17,27 @@ use cullbench::path::{self, LensDefaults};
 use cullbench::query::{AnyVolume, Context, ItemId, ManySink, QueryVolume};
 use cullbench::scene;
 use cullbench::verify::Reference;
+use cullbench::verify::conformance::properties;
 use glam::Vec3;
 
-/// A structure with the parameters of [`VARIANTS`]`[WHICH]` for its defaults.
-struct Variant<T, const WHICH: usize>(T);
+thread_local! {
+    /// The parameters that this thread builds structures with; empty for the defaults.
+    /// Were they part of the type, each set would compile the whole suite anew.
+    static PARAMS: Cell<&'static str> = const { Cell::new("") };
+}
 
-impl<T: RegionIndex, const WHICH: usize> RegionIndex for Variant<T, WHICH> {
-    const INFO: Info = T::INFO.named(VARIANTS[WHICH]);
+/// A structure with the parameters of [`PARAMS`] for its defaults.
+struct Given<T>(T);
+
+impl<T: RegionIndex> RegionIndex for Given<T> {
+    const INFO: Info = T::INFO;
     type Params = ();
 
     fn build(input: &Input<'_>, _: &()) -> Result<Self, BuildError> {
-        let spec = StructureSpec::parse(Self::INFO.name).expect(Self::INFO.name);
-        let params = serde_json::from_value(spec.params).expect(Self::INFO.name);
-        T::build(input, &params).map(Variant)
+        let spec = format!("{}:{}", T::INFO.name, PARAMS.get());
+        let spec = StructureSpec::parse(spec.trim_end_matches(':')).expect(&spec);
+        let params = serde_json::from_value(spec.params).expect(T::INFO.name);
+        T::build(input, &params).map(Given)
     }
 
     fn memory(&self) -> MemoryUsage {
@@ -68,18 +77,18 @@ macro_rules! conforms {
 }
 
 conforms! {
-    linear_scalar: LinearScalar;
-    linear: Linear;
-    bsp: Bsp;
-    octree: Octree;
-    quadtree: Quadtree;
-    bvh: Bvh;
-    wide: Wide;
-    uniform_grid: UniformGrid;
-    bsp_textbook: BspTextbook;
-    octree_textbook: OctreeTextbook;
-    quadtree_textbook: QuadtreeTextbook;
-    bvh_textbook: BvhTextbook;
+    linear_scalar: Given<LinearScalar>;
+    linear: Given<Linear>;
+    bsp: Given<Bsp>;
+    octree: Given<Octree>;
+    quadtree: Given<Quadtree>;
+    bvh: Given<Bvh>;
+    wide: Given<Wide>;
+    uniform_grid: Given<UniformGrid>;
+    bsp_textbook: Given<BspTextbook>;
+    octree_textbook: Given<OctreeTextbook>;
+    quadtree_textbook: Given<QuadtreeTextbook>;
+    bvh_textbook: Given<BvhTextbook>;
 }
 
 /// The peers and their modules: tests and names from one list.
@@ -114,42 +123,36 @@ peers! {
 #[cfg(not(feature = "peers"))]
 const PEERS: &[&str] = &[];
 
-const VARIANTS: &[&str] = &[
-    "octree:loose=2,leaf=4",
-    "octree:depth=3,leaf=1",
-    "quadtree:loose=2",
-    "bsp:leaf=1",
-    "bsp:leaf=300",
-    "bsp:builder=sah",
-    "bsp:builder=oblique,leaf=3",
-    "bsp:builder=faces,cut=4",
-    "bvh:preset=fastest,leaf=1",
-    "bvh:preset=medium,leaf=255",
-    "bvh:preset=very-slow",
-    "wide:order=morton",
-    "bsp-textbook:leaf=1,depth=256",
-    "octree-textbook:leaf=1,depth=3",
-    "quadtree-textbook:leaf=1,depth=256",
-    "bvh-textbook:leaf=1,depth=2",
-];
+/// Puts structures with other parameters than their defaults through the suite.
+macro_rules! conforms_with {
+    ($($name:ident: $structure:ty = $params:literal;)*) => {$(
+        #[test]
+        fn $name() {
+            PARAMS.set($params);
+            for property in properties::<Given<$structure>>() {
+                (property.check)().expect(property.name);
+            }
+        }
+    )*};
+}
 
-conforms! {
-    octree_loose: Variant<Octree, 0>;
-    octree_shallow: Variant<Octree, 1>;
-    quadtree_loose: Variant<Quadtree, 2>;
-    bsp_small_leaves: Variant<Bsp, 3>;
-    bsp_large_leaves: Variant<Bsp, 4>;
-    bsp_sah: Variant<Bsp, 5>;
-    bsp_oblique: Variant<Bsp, 6>;
-    bsp_faces: Variant<Bsp, 7>;
-    bvh_fastest: Variant<Bvh, 8>;
-    bvh_large_leaves: Variant<Bvh, 9>;
-    bvh_slowest: Variant<Bvh, 10>;
-    wide_morton: Variant<Wide, 11>;
-    bsp_textbook_deep: Variant<BspTextbook, 12>;
-    octree_textbook_shallow: Variant<OctreeTextbook, 13>;
-    quadtree_textbook_deep: Variant<QuadtreeTextbook, 14>;
-    bvh_textbook_shallow: Variant<BvhTextbook, 15>;
+conforms_with! {
+    octree_loose: Octree = "loose=2,leaf=4";
+    octree_shallow: Octree = "depth=3,leaf=1";
+    quadtree_loose: Quadtree = "loose=2";
+    bsp_small_leaves: Bsp = "leaf=1";
+    bsp_large_leaves: Bsp = "leaf=300";
+    bsp_sah: Bsp = "builder=sah";
+    bsp_oblique: Bsp = "builder=oblique,leaf=3";
+    bsp_faces: Bsp = "builder=faces,cut=4";
+    bvh_fastest: Bvh = "preset=fastest,leaf=1";
+    bvh_large_leaves: Bvh = "preset=medium,leaf=255";
+    bvh_slowest: Bvh = "preset=very-slow";
+    wide_morton: Wide = "order=morton";
+    bsp_textbook_deep: BspTextbook = "leaf=1,depth=256";
+    octree_textbook_shallow: OctreeTextbook = "leaf=1,depth=3";
+    quadtree_textbook_deep: QuadtreeTextbook = "leaf=1,depth=256";
+    bvh_textbook_shallow: BvhTextbook = "leaf=1,depth=2";
 }
 
 #[test]

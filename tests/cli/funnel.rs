@@ -513,7 +513,7 @@ fn a_stencil_of_portals_saves_samples_and_shows_the_same() {
             assert_eq!(number(stencil, count), 0.0, "{count}");
         }
         let asked = ["z-test", "stencil-test"].map(|test| counted(&report, test, "asked_count"));
-        assert!(asked[1] < 0.5 * asked[0], "{asked:?}");
+        assert!(asked[1] < 0.7 * asked[0], "{asked:?}");
         // What was not kept out was asked, and so were the samples of the portals.
         let kept_out = counted(&report, "stencil-test", "kept_out_count");
         assert!(asked[1] + kept_out > asked[0], "{asked:?} {kept_out}");

@@ -184,10 +184,6 @@ fn what_a_mesh_cannot_be_is_refused_in_a_line() {
             "mesh:spheres:n=3k | triangles | solid boxes",
         ),
         (
-            "funnel --scene freedm-map12 --certificates /dev/null",
-            "freedm-map12 | walls | solid boxes",
-        ),
-        (
             "precision --stage region --scene mesh:spheres:n=3k",
             "rooms or sectors",
         ),
