@@ -260,7 +260,7 @@ mod tests {
         // Those of steep tiles.
         let high = eyes.filter(|eye| rise(*eye) > 8.0).count();
         assert!(high <= 6, "{high} of 64 above the ground");
-        // Trees at the edge of the ground reach beyond it; nobody stands there.
+        // Trees at the edge of the terrain reach beyond it; no eye is there.
         let mut eyes = path.cameras.iter().map(|camera| camera.frame.eye);
         let is_over = |eye: DVec3| {
             let boxes = scene.items.iter().map(|b| b.in_world(scene.origin));
