@@ -1,9 +1,11 @@
 //! What follows from a funnel, in sentences: which stages pay from which draw cost on,
 //! and which back ends lost what is visible.
 
+use super::back_ends::MOST_EXACT_ROOMS;
 use super::fragment_rows;
 use super::regions::ClaimAudit;
 use super::report::{FunnelReport, Gain, StageRow};
+use crate::visibility::region::STORED;
 
 /// A sentence for each stage of the chain, and one for each back end that lost items.
 pub fn conclusions(report: &FunnelReport) -> Vec<String> {
@@ -22,6 +24,15 @@ pub fn conclusions(report: &FunnelReport) -> Vec<String> {
             audit.asymmetric.len(),
             audit.false_negatives.len(),
             audit.false_positives
+        ));
+    }
+    let is_claim = |row: &&StageRow| row.back_end.name == STORED.name;
+    let is_audited = report.audits.iter().any(|a| a.claim == STORED.name);
+    if !is_audited && report.stages.iter().any(|row| is_claim(&row)) {
+        sentences.push(format!(
+            "The claim of {} is not audited: what is seen from each is found out, exactly, of at \
+             most {MOST_EXACT_ROOMS} rooms.",
+            STORED.name
         ));
     }
     if let Some(last) = report.gains.first() {

@@ -52,6 +52,12 @@ pub enum FunnelError {
         /// What its items are.
         shape: ItemShape,
     },
+    /// A claim of what is seen from where, about a scene without regions.
+    #[error("'{scene}' has no rooms or sectors; expected some for --pvs")]
+    NoRegions {
+        /// Its name.
+        scene: String,
+    },
     /// What is claimed to be seen from where is of other regions.
     #[error(transparent)]
     Claim(#[from] OtherRegions),

@@ -119,6 +119,10 @@ impl<'a> World<'a> {
         let is_boxes = input.scene.item_shape() == ItemShape::Box;
         let mut solids = is_boxes.then(|| Solids::of(input.scene));
         let regions = Regions::of(input.scene, input.claim)?;
+        if input.claim.is_some() && regions.is_none() {
+            let scene = input.scene.name.clone();
+            return Err(FunnelError::NoRegions { scene });
+        }
         let cut_outs = match (input.cut_outs, &mut solids) {
             (None, _) => None,
             (Some(typed), Some(solids)) => {
@@ -177,8 +181,8 @@ impl<'a> World<'a> {
         self.scene
     }
 
-    /// The items as they are drawn and tested in the occlusion stage; `None`
-    /// where nothing is known to hide.
+    /// The items as the occlusion stage draws and tests them; `None` where nothing is
+    /// known to hide.
     pub fn occluders(&self) -> Option<&OccluderScene> {
         self.occluders.as_ref()
     }

@@ -78,7 +78,13 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
     let few = Rc::new(few);
     let asked = |cones| Way::Other(asked(few.clone(), cameras, cones));
     let forced = Forced {
-        on: format!("cone-f32-safe, {OF_A_FACE} triangles per cluster"),
+        on: format!(
+            "cone-f32-safe, {}",
+            match case.scene().item_shape() {
+                ItemShape::Mesh => format!("clusters of up to {MOST_TRIANGLES} triangles"),
+                _ => format!("{OF_A_FACE} triangles per cluster"),
+            }
+        ),
         kept: asked(Some(kernel)),
         left_out: asked(None),
         same: false,
@@ -94,8 +100,7 @@ impl Seen {
         case.query(frame, &mut met);
         let items = hidden::frames(met.len(), MOST_ITEMS).map(|n| met[n]);
         let items: Vec<ItemId> = items.collect();
-        let surfaces = Surfaces::of_items(scene, &items);
-        let surfaces = Arc::new(surfaces);
+        let surfaces = Arc::new(Surfaces::of_items(scene, &items));
         let clusters = Arc::new(match scene.item_shape() {
             ItemShape::Mesh => Clusters::of(surfaces, MOST_TRIANGLES),
             _ => Clusters::as_listed(surfaces, OF_A_FACE),

@@ -33,7 +33,9 @@ pub struct Audit {
 
 /// Two sets of different numbers of regions.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[error("the claim is of {claimed} regions; expected the graph's {regions}")]
+#[error(
+    "the claim of what is seen from where is of {claimed} regions; expected the scene's {regions}"
+)]
 pub struct OtherRegions {
     /// Regions of the claim.
     pub claimed: usize,
