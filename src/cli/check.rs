@@ -11,7 +11,7 @@ use super::funnel_args::CheckArgs;
 use super::shared_args::TableFormat;
 use super::{Ending, load_scene, print_json, text, unread_is_fine};
 use crate::camera::Camera;
-use crate::funnel::regions_of;
+use crate::funnel::{Proofs, regions_of};
 use crate::input::read_file;
 use crate::path::{self, CameraPath, LensDefaults};
 use crate::scene::{Scene, WorldBox};
@@ -101,31 +101,6 @@ impl Checked {
     }
 }
 
-/// A line of the file.
-enum Line {
-    View(Certificates),
-    Claim(ClaimErrors),
-}
-
-impl Line {
-    fn read(text: &str) -> serde_json::Result<Line> {
-        // The error is that of the kind that most lines are.
-        Certificates::from_json(text)
-            .map(Line::View)
-            .or_else(|error| {
-                let claim = serde_json::from_str(text).map(Line::Claim);
-                claim.map_err(|_| error)
-            })
-    }
-
-    fn scene(&self) -> &str {
-        match self {
-            Line::View(proofs) => &proofs.scene,
-            Line::Claim(errors) => &errors.scene,
-        }
-    }
-}
-
 /// A scene, loaded once for all lines that are about it.
 struct Loaded {
     scene: Scene,
@@ -168,8 +143,12 @@ pub fn check(args: &CheckArgs) -> anyhow::Result<Ending> {
     {
         let number = number + 1;
         let place = || format!("{file}, line {number}");
-        let line = Line::read(line)
-            .with_context(|| format!("{}: expected the certificates of a view as JSON", place()))?;
+        let line = Proofs::from_json(line).with_context(|| {
+            format!(
+                "{}: expected the certificates of a view, or the errors of a claim, as JSON",
+                place()
+            )
+        })?;
         let name = args.scene.as_deref().unwrap_or(line.scene()).to_owned();
         if !scenes.contains_key(&name) {
             let scene = load_scene(&name, &args.scene_args, 1)
@@ -188,7 +167,7 @@ pub fn check(args: &CheckArgs) -> anyhow::Result<Ending> {
             continue;
         };
         match line {
-            Line::View(proofs) => {
+            Proofs::View(proofs) => {
                 let (found, boxes) = (loaded.boxes.len(), proofs.boxes);
                 if found != boxes {
                     bail!(
@@ -202,7 +181,7 @@ pub fn check(args: &CheckArgs) -> anyhow::Result<Ending> {
                 };
                 checked.view(number, &proofs, &loaded.boxes, camera.as_ref());
             }
-            Line::Claim(errors) => {
+            Proofs::Claim(errors) => {
                 if loaded.regions.is_none() {
                     loaded.regions = regions_of(&loaded.scene)?;
                 }

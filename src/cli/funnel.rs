@@ -19,7 +19,7 @@ use super::{
     Ending, expect_place_for, funnel_picture, funnel_table, interrupt, load_scene_by, print_json,
     text, unread_is_fine,
 };
-use crate::funnel::{self, Chain, FunnelInput, FunnelPlan, StageKind, StageRow};
+use crate::funnel::{self, Chain, FunnelInput, FunnelPlan, Proofs, StageKind, StageRow};
 use crate::index::{Registry, StructureSpec};
 use crate::input::read_file;
 use crate::measure::{ProcessTimes, Protocol};
@@ -29,7 +29,6 @@ use crate::scene::{self, LoadOptions, Scene};
 use crate::spec::SpecError;
 use crate::visibility::Guarantee;
 use crate::visibility::region::Pvs;
-use crate::visibility::truth::Certificates;
 
 /// Rounds of a stage, if one process has them all.
 const ROUNDS: [usize; 2] = [5, 15];
@@ -78,11 +77,7 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     if let Some(file) = &args.certificates {
         job("proofs");
         let mut lines = String::new();
-        for errors in funnel::claim_errors(&input)? {
-            lines += &serde_json::to_string(&errors)?;
-            lines.push('\n');
-        }
-        let each = |proofs: Certificates| {
+        let each = |proofs: Proofs| {
             lines += &proofs.to_json();
             lines.push('\n');
         };

@@ -296,6 +296,14 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_time_has_the_larger_half_of_its_interval() {
+        let shown = |ends| time_plus_minus(Some(1301.0), ends);
+        assert_eq!(shown([Some(1201.0), Some(1681.0)]), "1.3±0.4 us");
+        assert_eq!(shown([Some(1300.0), None]), "1.30 us");
+        assert_eq!(time_plus_minus(None, [None, None]), "");
+    }
+
+    #[test]
     fn figures_have_three_digits_and_a_unit() {
         let cases = [
             (12.345, "12.3 ns"),

@@ -35,7 +35,7 @@ mod world;
 
 pub use back_ends::back_ends;
 pub use bounds::BoundRow;
-pub use certified::{certificates, claim_errors};
+pub use certified::{Proofs, certificates};
 pub use chain::Chain;
 pub use error::FunnelError;
 pub use faces::BYTES_PER_TRIANGLE;

@@ -3,20 +3,8 @@
 
 use std::path::Path;
 
-use serde_json::Value;
-
+use super::funnel::{row, rows};
 use super::process::*;
-
-/// The rows of a stage.
-fn rows<'r>(report: &'r Value, stage: &'r str) -> impl Iterator<Item = &'r Value> {
-    let rows = array(report, "stages").iter();
-    rows.filter(move |row| row["stage"] == stage)
-}
-
-fn row<'r>(report: &'r Value, stage: &'r str, name: &str) -> &'r Value {
-    let mut found = rows(report, stage).filter(|row| row["name"] == name);
-    found.next().unwrap_or_else(|| panic!("{stage} {name}"))
-}
 
 #[test]
 fn the_funnel_of_a_mesh_is_judged_by_its_triangles() {
