@@ -1,9 +1,16 @@
 //! The interleaved coupling: the tree is walked front to back; blocks are tested
 //! before they are opened; what is found visible and large is drawn at once; and
 //! what was found visible early is tested once more at the end.
+//!
+//! Of all blocks that are still to be opened the nearest comes first, wherever it is
+//! in the tree: less is drawn that something nearer hides than by going down child by
+//! child, and a masked buffer loses less (docs/adr/0021-nearest-block-first.md).
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
 
 use super::buffer::OcclusionBuffer;
-use super::outline::Outline;
+use super::outline::{Coverage, Outline};
 use super::rect::{Rect, Rects};
 use super::scene::OccluderScene;
 use super::stats::CullStats;
@@ -12,8 +19,9 @@ use crate::geometry::PlaneMask;
 use crate::kernel::{Isa, Kernel, LANES, LaneMask, Work};
 use crate::query::ItemId;
 
-/// Survivors are drawn whose rectangle is at least this part of the image.
-pub const DEFAULT_DRAWN_PART: u32 = 1024;
+/// Survivors are drawn that may cover at least this part of the image: a pixel of
+/// 320 x 180.
+pub const DEFAULT_DRAWN_PART: u32 = 65_536;
 
 /// The interleaved coupling, with memory that is kept from view to view.
 #[derive(Clone, Debug)]
@@ -22,7 +30,7 @@ pub struct Interleaved<B> {
     kernel: Kernel,
     drawn_part: u32,
     second_look: bool,
-    stack: Vec<Entry>,
+    queue: BinaryHeap<Entry>,
     survivors: Vec<Survivor>,
 }
 
@@ -31,11 +39,37 @@ pub struct Interleaved<B> {
 struct Entry {
     rect: Rect,
     block: u32,
+    /// Of a depth that is not above the block's: see [`depth_bits`].
+    depth: u32,
     level: u16,
     /// Whether there is no rectangle.
     near: bool,
     open: PlaneMask,
 }
+
+/// The nearest is the greatest; of as near ones the first of the lowest level.
+impl Ord for Entry {
+    #[inline(always)]
+    fn cmp(&self, other: &Entry) -> Ordering {
+        let key = |entry: &Entry| (entry.depth, entry.level, entry.block);
+        key(other).cmp(&key(self))
+    }
+}
+
+impl PartialOrd for Entry {
+    #[inline(always)]
+    fn partial_cmp(&self, other: &Entry) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Entry {
+    fn eq(&self, other: &Entry) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Entry {}
 
 /// An item that was not hidden when it was met.
 #[derive(Clone, Copy, Debug)]
@@ -58,12 +92,12 @@ impl<B: OcclusionBuffer> Interleaved<B> {
             kernel,
             drawn_part: DEFAULT_DRAWN_PART,
             second_look: true,
-            stack: Vec::new(),
+            queue: BinaryHeap::new(),
             survivors: Vec::new(),
         }
     }
 
-    /// Draws survivors of at least the image's pixels divided by `part`.
+    /// Draws survivors that may cover at least the image's pixels divided by `part`.
     pub fn drawing_from(mut self, part: u32) -> Self {
         self.drawn_part = part.max(1);
         self
@@ -114,23 +148,24 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
         let least_area = (pixels / state.drawn_part).max(1);
         let Interleaved {
             buffer,
-            stack,
+            queue,
             survivors,
             ..
         } = state;
         buffer.clear();
         survivors.clear();
-        stack.clear();
-        stack.push(Entry {
+        queue.clear();
+        queue.push(Entry {
             rect: Rect::default(),
             block: 0,
+            depth: 0,
             level: (scene.height() - 1) as u16,
             near: true,
             open: view.volume.mask(),
         });
         let mut rects = Rects::NONE;
         let mut open = [0; LANES];
-        while let Some(entry) = stack.pop() {
+        while let Some(entry) = queue.pop() {
             // Much may have been drawn since it was put there.
             if !entry.near && buffer.hides(isa, &entry.rect) {
                 continue;
@@ -154,15 +189,15 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
             let (seen, flat) = (rects.seen, rects.flat);
             lanes &= seen;
             lanes &= !buffer.hides_lanes(isa, &rects, lanes & flat);
-            let mut order = [0; LANES];
-            let count = by_depth(&rects.depth, lanes, &mut order);
-            let order = &order[..count];
             if level > 0 {
-                for &key in order.iter().rev() {
-                    let lane = (key & 15) as usize;
-                    stack.push(Entry {
+                let mut left = lanes;
+                while left != 0 {
+                    let lane = left.trailing_zeros() as usize;
+                    left &= left - 1;
+                    queue.push(Entry {
                         rect: rects.get(lane),
                         block: (index * LANES + lane) as u32,
+                        depth: depth_bits(rects.depth[lane]),
                         level: entry.level - 1,
                         near: flat >> lane & 1 == 0,
                         open: open[lane],
@@ -170,8 +205,10 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
                 }
                 continue;
             }
+            let mut order = [0; LANES];
+            let count = by_depth(&rects.depth, lanes, &mut order);
             let mut drawn = false;
-            for &key in order {
+            for &key in &order[..count] {
                 let lane = (key & 15) as usize;
                 let (rect, near) = (rects.get(lane), flat >> lane & 1 == 0);
                 if drawn && !near && buffer.hides(isa, &rect) {
@@ -183,7 +220,7 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
                     position: position as u32,
                     near,
                 });
-                let large = near || rect.area() >= least_area;
+                let large = near || coverable(&rect, B::COVERAGE) >= least_area;
                 if large && draw(isa, buffer, scene, view, &survivors[survivors.len() - 1]) {
                     drawn = true;
                     stats.drawn += 1;
@@ -236,11 +273,7 @@ fn by_depth(depth: &[f32; LANES], lanes: LaneMask, order: &mut [u32; LANES]) -> 
     while left != 0 {
         let lane = left.trailing_zeros();
         left &= left - 1;
-        // Bits of a float grow with it from zero on; what is before the eye comes
-        // first, in the order of lanes.
-        let depth = depth[lane as usize];
-        let bits = if depth > 0.0 { depth.to_bits() } else { 0 };
-        let key = bits & !15 | lane;
+        let key = depth_bits(depth[lane as usize]) & !15 | lane;
         let mut at = count;
         while at > 0 && order[at - 1] > key {
             order[at] = order[at - 1];
@@ -250,4 +283,22 @@ fn by_depth(depth: &[f32; LANES], lanes: LaneMask, order: &mut [u32; LANES]) -> 
         count += 1;
     }
     count
+}
+
+/// The pixels of a rectangle that its box may cover, as a rule: it is rounded outward,
+/// so that those at its rim are covered in part.
+#[inline(always)]
+fn coverable(rect: &Rect, coverage: Coverage) -> u32 {
+    let rim = match coverage {
+        Coverage::Centre => 1,
+        Coverage::Whole => 2,
+    };
+    let size = |first: u16, last: u16| u32::from(last - first + 1).saturating_sub(rim);
+    size(rect.x0, rect.x1) * size(rect.y0, rect.y1)
+}
+
+/// Bits of a float grow with it from zero on; what is before the eye comes first.
+#[inline(always)]
+fn depth_bits(depth: f32) -> u32 {
+    if depth > 0.0 { depth.to_bits() } else { 0 }
 }

@@ -83,7 +83,7 @@ impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
 
     #[inline(always)]
     fn draw<I: Isa>(&mut self, isa: I, outline: &Outline) {
-        let nearness = outline.per_tile([self.columns, self.rows]);
+        let nearness = outline.per_tile();
         let (first, end) = outline.rows();
         let mut row = first / TILE_HEIGHT;
         let last = end.div_ceil(TILE_HEIGHT).min(self.rows);
@@ -280,17 +280,21 @@ impl<const WHOLE: bool> Masked<WHOLE> {
         nearness: &TileNearness,
     ) {
         let (mut least, mut greatest) = (i32::MAX, 0);
+        let (mut top, mut bottom) = (TILE_HEIGHT, 0);
         for line in 0..TILE_HEIGHT {
             let (start, end) = (start[line], end[line]);
             if start < end {
                 least = least.min(start);
                 greatest = greatest.max(end);
+                top = top.min(line);
+                bottom = line + 1;
             }
         }
         if least >= greatest {
             return;
         }
-        let of_row = row as f32;
+        let lines = [top, bottom].map(|line| (row * TILE_HEIGHT + line) as f32);
+        let columns = [least as f32, greatest as f32];
         let first = least as usize / TILE_WIDTH;
         let last = (greatest as usize).div_ceil(TILE_WIDTH);
         for column in (first..last).step_by(LANES) {
@@ -300,7 +304,15 @@ impl<const WHOLE: bool> Masked<WHOLE> {
             };
             let mut near = [0.0; LANES];
             for i in 0..LANES {
-                near[i] = nearness.of(column as f32 + STEPS[i], of_row);
+                let left = (column * TILE_WIDTH) as f32 + STEPS[i];
+                let right = left + TILE_WIDTH as f32;
+                let left = if left > columns[0] { left } else { columns[0] };
+                let right = if right < columns[1] {
+                    right
+                } else {
+                    columns[1]
+                };
+                near[i] = nearness.within([left, right], lines);
             }
             // Where nearer ones have been drawn all over, as front to back mostly.
             let below = isa.at_most(isa.load(&near), isa.load(reference));
@@ -332,9 +344,9 @@ impl<const WHOLE: bool> Masked<WHOLE> {
 
 /// Tiles that are drawn together.
 const CHUNK: usize = 8;
-/// The columns of sixteen tiles from the first one on.
+/// The first columns of sixteen tiles from that of the first one on.
 const STEPS: [f32; LANES] = [
-    0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0,
+    0.0, 8.0, 16.0, 24.0, 32.0, 40.0, 48.0, 56.0, 64.0, 72.0, 80.0, 88.0, 96.0, 104.0, 112.0, 120.0,
 ];
 
 /// What an occluder adds to some tiles side by side.

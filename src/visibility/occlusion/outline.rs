@@ -336,18 +336,16 @@ impl Outline {
         (start, end)
     }
 
-    /// The nearness of tiles, never above that of any covered pixel in them.
+    /// The nearness of parts of tiles, never above that of any covered pixel in them.
     #[inline(always)]
-    pub fn per_tile(&self, tiles: [usize; 2]) -> TileNearness {
-        let per = [TILE_WIDTH as f64, TILE_HEIGHT as f64];
+    pub fn per_tile(&self) -> TileNearness {
         let mut faces = [[f32::INFINITY, 0.0, 0.0]; 3];
         for (of_tile, face) in faces.iter_mut().zip(&self.faces[..self.face_count]) {
-            let (x, y) = (face.x * per[0], face.y * per[1]);
-            // At the farthest corner of the tile. Six u of the greatest terms: one
-            // for rounding each coefficient, one for each product, two sums.
-            let size = face.c.abs() + x.abs() * tiles[0] as f64 + y.abs() * tiles[1] as f64;
-            let c = face.c + x.min(0.0) + y.min(0.0) - 6.0 * f64::from(U) * size;
-            *of_tile = [c as f32, x as f32, y as f32];
+            // Six u of the greatest terms: one for rounding each coefficient, one for
+            // each product, two sums.
+            let size = face.c.abs() + face.x.abs() * self.columns + face.y.abs() * self.height;
+            let c = face.c - 6.0 * f64::from(U) * size;
+            *of_tile = [c as f32, face.x as f32, face.y as f32];
         }
         TileNearness {
             faces,
@@ -377,7 +375,7 @@ impl PixelNearness {
     /// At the centre of a pixel, by its column and row.
     #[inline(always)]
     pub fn of(&self, column: f32, row: f32) -> f32 {
-        least_of(&self.faces, column, row)
+        least(self.faces.map(|f| (f[0] + f[1] * column) + f[2] * row))
     }
 }
 
@@ -389,10 +387,17 @@ pub struct TileNearness {
 }
 
 impl TileNearness {
-    /// Of a tile by its column and row.
+    /// From the column `left` to the column `right` and from the row `top` to the row
+    /// `bottom`, edges of pixels.
     #[inline(always)]
-    pub fn of(&self, column: f32, row: f32) -> f32 {
-        let least = least_of(&self.faces, column, row);
+    pub fn within(&self, [left, right]: [f32; 2], [top, bottom]: [f32; 2]) -> f32 {
+        // At the farthest corner of each face.
+        let at = |f: &[f32; 3]| {
+            let column = if f[1] < 0.0 { right } else { left };
+            let row = if f[2] < 0.0 { bottom } else { top };
+            (f[0] + f[2] * row) + f[1] * column
+        };
+        let least = least(self.faces.each_ref().map(at));
         if least > self.floor {
             least
         } else {
@@ -416,9 +421,7 @@ fn farthest(low: DVec3, high: DVec3, forward: DVec3) -> (f64, f64) {
 }
 
 #[inline(always)]
-fn least_of(faces: &[[f32; 3]; 3], column: f32, row: f32) -> f32 {
-    let at = |f: &[f32; 3]| (f[0] + f[1] * column) + f[2] * row;
-    let (a, b, c) = (at(&faces[0]), at(&faces[1]), at(&faces[2]));
+fn least([a, b, c]: [f32; 3]) -> f32 {
     let ab = if a < b { a } else { b };
     if ab < c { ab } else { c }
 }

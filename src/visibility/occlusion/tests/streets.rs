@@ -4,11 +4,12 @@ use glam::{DVec3, Vec3};
 
 use super::super::{MaskedCentre, MaskedInner, OcclusionBuffer};
 use super::by_rays::{Ready, missing, seen_by_rays, with_view};
-use super::kept;
+use super::{asked_for, kept};
 use crate::camera::{Camera, Frame, Lens};
 use crate::kernel::Kernel;
 use crate::scene::{LoadOptions, SeededRng, load};
 use crate::visibility::SampleGrid;
+use crate::visibility::truth::{RayIndex, visible_by_random_rays};
 
 const GRID: SampleGrid = SampleGrid::new(160, 90);
 
@@ -94,5 +95,33 @@ fn every_instruction_set_gives_the_same_answer() {
                 }
             });
         }
+    }
+}
+
+/// More rays between the samples than a test has time for, `OCCLUSION_RAYS` over all.
+#[test]
+#[ignore = "minutes"]
+fn streets_lose_nothing_along_many_more_rays() {
+    let scenes = ["city:n=10k", "city:n=100k", "rooms:n=50k", "forest:n=50k"];
+    let (views, threads) = (8, 2);
+    let rays_each = asked_for("OCCLUSION_RAYS", 100_000_000) / (scenes.len() * views);
+    for spec in scenes {
+        let ready = ready(spec);
+        let index = RayIndex::build(&ready.solids);
+        let (mut seen_by_all, mut removed) = (0, 0);
+        for (number, camera) in cameras(&ready, views).into_iter().enumerate() {
+            let grid = [GRID, SampleGrid::new(320, 180)][number % 2];
+            with_view(&ready, &camera, grid, |view, rays| {
+                let seed = number as u64;
+                let seen = visible_by_random_rays(&index, rays, rays_each, seed, threads);
+                let in_view = ready.in_view(view.volume).len();
+                seen_by_all += seen.len();
+                for kept in kept::<MaskedInner>(&ready, view, Kernel::best()) {
+                    removed += in_view - kept.len();
+                    assert!(missing(&seen, &kept).is_empty(), "{spec}, view {number}");
+                }
+            });
+        }
+        println!("{spec}: {seen_by_all} seen along {rays_each} rays a view, {removed} removed");
     }
 }

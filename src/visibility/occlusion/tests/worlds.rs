@@ -6,7 +6,7 @@ use super::super::{
     DepthRays, HierarchicalZ, MaskedCentre, MaskedInner, NoOcclusion, OcclusionBuffer, ZBuffer,
 };
 use super::by_rays::{Ready, missing, point_between, seen_by_rays, with_view};
-use super::kept;
+use super::{asked_for, kept};
 use crate::camera::{Camera, Frame, Lens};
 use crate::kernel::Kernel;
 use crate::scene::{Scene, SeededRng, WorldBox};
@@ -144,14 +144,14 @@ fn no_occlusion_loses_nothing() {
     assert_eq!(losses::<NoOcclusion>(0..200, 0.0, false).0, 0);
 }
 
-/// More worlds than a test has time for: `cargo test --release -- --ignored`, with
-/// `OCCLUSION_WORLDS` for how many.
+/// More worlds than a test has time for, four times `OCCLUSION_WORLDS`.
 #[test]
 #[ignore = "minutes"]
 fn whole_pixels_lose_nothing_in_many_more_worlds() {
-    let count = std::env::var("OCCLUSION_WORLDS").map_or(25_000, |n| n.parse().unwrap());
+    let count = asked_for("OCCLUSION_WORLDS", 25_000) as u64;
     for (far_out, parallel) in [(0.0, false), (0.0, true), (1e7, false), (1e7, true)] {
-        let (lost, _) = losses::<MaskedInner>(1000..1000 + count, far_out, parallel);
+        let (lost, removed) = losses::<MaskedInner>(1000..1000 + count, far_out, parallel);
+        println!("far out {far_out}, parallel {parallel}: {removed} removed, {lost} lost");
         assert_eq!(lost, 0, "far out {far_out}, parallel {parallel}");
     }
 }
