@@ -15,10 +15,12 @@ use cullbench::kernel::Isa;
 use cullbench::measure::Workload;
 use cullbench::path::{self, LensDefaults};
 use cullbench::query::{AnyVolume, Context, ItemId, ManySink, QueryVolume};
-use cullbench::scene;
+use cullbench::scene::{self, Scene, SeededRng, WorldBox};
 use cullbench::verify::Reference;
 use cullbench::verify::conformance::properties;
-use glam::Vec3;
+use cullbench::visibility::pick::{self, Hit, Pick};
+use cullbench::visibility::{Ray, Solids};
+use glam::{DVec3, Vec3};
 
 thread_local! {
     /// The parameters that this thread builds structures with; empty for the defaults.
@@ -308,4 +310,40 @@ fn bsp_takes_a_maps_own_planes_by_default_and_the_median_elsewhere() {
     assert_eq!(order("bsp", own), order("bsp:builder=import", own));
     assert_eq!(order("bsp", None), order("bsp:builder=median", own));
     assert_ne!(order("bsp", own), order("bsp", None));
+}
+
+/// Back ends of picking that declare nothing may differ from the exact answer where
+/// depths are equal or rounded, but not in the open: on rays and boxes without any grid
+/// the answers are the same.
+#[test]
+fn peers_pick_what_the_reference_picks() {
+    let mut rng = SeededRng::new(5);
+    let mut random = |_| WorldBox::around(rng.point() * 100.0, rng.point() * 8.0);
+    let boxes = (0..300).map(&mut random).collect::<Vec<_>>();
+    let solids = Solids::of(&Scene::from_boxes("random", &boxes).unwrap());
+    let reference = pick::Linear::of(&solids);
+    for row in pick::BACK_ENDS {
+        let back_end = (row.build)(&solids).unwrap();
+        let (mut hits, mut truth) = (Vec::new(), Vec::new());
+        let mut met = 0;
+        for _ in 0..300 {
+            let ray = Ray {
+                origin: rng.point() * 20.0,
+                direction: DVec3::splat(50.0) - rng.point() * 20.0,
+                near: 0.5,
+                far: 200.0,
+            };
+            let (found, wanted) = (back_end.first(&ray), reference.first(&ray));
+            let item = |hit: Option<Hit>| hit.map(|hit| hit.item);
+            assert_eq!(item(found), item(wanted), "{} {ray:?}", row.about.name);
+            met += usize::from(wanted.is_some());
+            if let (Some(found), Some(wanted)) = (found, wanted) {
+                assert!((found.depth - wanted.depth).abs() < 1e-3 * wanted.depth.max(1.0));
+            }
+            back_end.nearest(&ray, 4, &mut hits);
+            reference.nearest(&ray, 4, &mut truth);
+            assert!(hits.iter().map(|h| h.item).eq(truth.iter().map(|h| h.item)));
+        }
+        assert!(met > 100, "the premise: {met}");
+    }
 }

@@ -1,9 +1,6 @@
 //! Picking, the selection under the cursor: the first item that a ray meets, the
 //! nearest few, and everything through a cursor's frustum. One file a back end;
 //! what a ray meets is said where [`Solids`](super::Solids) are.
-//!
-//! Embree is not among the back ends: crate `embree-rs` links a library of the
-//! system, which a build of this crate must do without.
 
 mod contract;
 mod cursor;
@@ -15,6 +12,8 @@ pub mod wide_ray;
 
 #[cfg(feature = "peers")]
 pub mod bvh;
+#[cfg(feature = "embree")]
+pub mod embree;
 #[cfg(feature = "peers")]
 pub mod parry3d;
 #[cfg(feature = "peers")]
@@ -61,5 +60,10 @@ pub const BACK_ENDS: &[BackEnd] = &[
     BackEnd {
         about: rstar::ABOUT,
         build: rstar::build,
+    },
+    #[cfg(feature = "embree")]
+    BackEnd {
+        about: embree::ABOUT,
+        build: embree::build,
     },
 ];

@@ -15,7 +15,7 @@ pub(super) struct RoundedRay {
     pub origin: Vec3,
     pub direction: Vec3,
     inverse: Vec3,
-    near: f32,
+    pub near: f32,
     pub far: f32,
 }
 

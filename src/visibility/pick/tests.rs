@@ -161,10 +161,10 @@ fn exact_back_ends_answer_as_arithmetic_on_integers_does() {
     );
 }
 
-/// What declares nothing may differ where depths are equal or rounded, but not
-/// in the open: on rays and boxes without any grid the answers are the same.
+/// What declares nothing may differ where depths are equal or rounded. In the open it
+/// may not: tests/conformance.rs.
 #[test]
-fn back_ends_in_f32_differ_on_ties_and_agree_elsewhere() {
+fn back_ends_in_f32_differ_on_few_ties() {
     let unproven = BACK_ENDS
         .iter()
         .filter(|row| row.about.guarantee != Guarantee::Exact);
@@ -181,35 +181,11 @@ fn back_ends_in_f32_differ_on_ties_and_agree_elsewhere() {
                 asked += 1;
             }
         }
-        println!(
-            "{}: {on_grids} of {asked} first hits on grids differ",
+        assert!(
+            on_grids < asked / 4,
+            "{}: {on_grids} of {asked}",
             row.about.name
         );
-        let mut rng = SeededRng::new(5);
-        let mut random = |_| WorldBox::around(rng.point() * 100.0, rng.point() * 8.0);
-        let solids = solids(&(0..300).map(&mut random).collect::<Vec<_>>());
-        let (back_end, reference) = ((row.build)(&solids).unwrap(), Linear::of(&solids));
-        let (mut hits, mut truth) = (Vec::new(), Vec::new());
-        let mut met = 0;
-        for _ in 0..300 {
-            let ray = Ray {
-                origin: rng.point() * 20.0,
-                direction: DVec3::splat(50.0) - rng.point() * 20.0,
-                near: 0.5,
-                far: 200.0,
-            };
-            let (found, wanted) = (back_end.first(&ray), reference.first(&ray));
-            let item = |hit: Option<Hit>| hit.map(|hit| hit.item);
-            assert_eq!(item(found), item(wanted), "{} {ray:?}", row.about.name);
-            met += usize::from(wanted.is_some());
-            if let (Some(found), Some(wanted)) = (found, wanted) {
-                assert!((found.depth - wanted.depth).abs() < 1e-3 * wanted.depth.max(1.0));
-            }
-            back_end.nearest(&ray, 4, &mut hits);
-            reference.nearest(&ray, 4, &mut truth);
-            assert!(hits.iter().map(|h| h.item).eq(truth.iter().map(|h| h.item)));
-        }
-        assert!(met > 100, "the premise: {met}");
     }
 }
 

@@ -1,7 +1,10 @@
 //! The speed floors this project promises, each a ratio in one run: all
 //! subjects of a row are interleaved and paired by the same harness as
-//! `cullbench run`. Before them, that harness beside a loop written by hand. Exits
-//! 3 if a floor is missed. `-- --test` only checks that every row runs.
+//! `cullbench run`. Before them, that harness beside a loop written by hand, and the
+//! floors of the occlusion stage. Exits 3 if a floor is missed. `-- --test` only checks
+//! that every row runs.
+
+mod occlusion;
 
 use std::process::ExitCode;
 
@@ -84,7 +87,7 @@ const TURNS: usize = 41;
 /// Time of the harness / time of a loop by hand over the same cameras, for a short
 /// query and a long one; the number of structures for which it is proven to be
 /// above 1 + [`MOST_OVERHEAD`].
-fn harness_overhead(only_test: bool) -> u32 {
+fn harness_overhead(only_test: bool, turns: usize) -> u32 {
     let scene = scene::load("city:n=20000", &Default::default()).expect("a city");
     let cameras = path::load(
         "flythrough:frames=512,visible=2%",
@@ -150,7 +153,6 @@ fn harness_overhead(only_test: bool) -> u32 {
             }
             watch.lap().cpu_ns / queries as f64
         };
-        let turns = if only_test { 3 } else { TURNS };
         let ratios = (0..turns).map(|turn| match turn % 2 {
             0 => (by_harness() / by_hand()).ln(),
             _ => -(by_hand() / by_harness()).ln(),
@@ -190,7 +192,8 @@ fn main() -> ExitCode {
         seed: 1,
         cache_bytes: Machine::capture().cache_sweep_bytes(),
     };
-    let mut missed = harness_overhead(only_test);
+    let turns = if only_test { 3 } else { TURNS };
+    let mut missed = harness_overhead(only_test, turns) + occlusion::missed(only_test, turns);
     for row in &FLOORS {
         let source = if only_test {
             row.scene.replace("1000000", "1000")

@@ -1,0 +1,187 @@
+//! Floors of the occlusion stage: rectangles of a tree's boxes in its order, and
+//! sixteen boxes a test against the same boxes one by one.
+
+use std::hint::black_box;
+
+use cullbench::culling::Culling;
+use cullbench::kernel::{Isa, Kernel, LaneMask, Work};
+use cullbench::measure::{Stopwatch, Workload};
+use cullbench::query::AnyVolume;
+use cullbench::statistics::trimmed_mean;
+use cullbench::visibility::occlusion::{
+    Interleaved, MaskedInner, OccluderScene, OcclusionBuffer, Rects, View,
+};
+use cullbench::visibility::{Rays, SampleGrid, Solids};
+use cullbench::{path, scene};
+
+use super::verdict;
+
+const SCENE: &str = "city:n=100000";
+const PATH: &str = "street:frames=32";
+const GRID: SampleGrid = SampleGrid::new(320, 180);
+/// Time of a rectangle.
+const MOST_NS: f64 = 4.0;
+/// Time one by one / time of sixteen at a time.
+const LEAST_TIMES: f64 = 2.5;
+
+/// The rectangles of all boxes.
+struct Project<'a>(&'a OccluderScene, &'a View<'a>);
+
+impl Work for Project<'_> {
+    type Output = LaneMask;
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) -> LaneMask {
+        let mut rects = Rects::NONE;
+        let blocks = self.0.level(0).iter();
+        blocks.fold(0, |all, block| {
+            rects.project(isa, block, self.1);
+            all ^ black_box(&rects).seen
+        })
+    }
+}
+
+/// What the boxes of a view's blocks are tested with.
+type Asked = [(Rects, LaneMask)];
+
+/// How many of them are hidden, sixteen at a time.
+struct Together<'a>(&'a MaskedInner, &'a Asked);
+
+impl Work for Together<'_> {
+    type Output = u32;
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) -> u32 {
+        let hidden = |(rects, lanes): &_| self.0.hides_lanes(isa, rects, *lanes).count_ones();
+        self.1.iter().map(hidden).sum()
+    }
+}
+
+/// The same one by one.
+struct Alone<'a>(&'a MaskedInner, &'a Asked);
+
+impl Work for Alone<'_> {
+    type Output = u32;
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) -> u32 {
+        let mut hidden = 0;
+        for (rects, lanes) in self.1 {
+            let mut left = *lanes;
+            while left != 0 {
+                let lane = left.trailing_zeros() as usize;
+                left &= left - 1;
+                hidden += u32::from(self.0.hides(isa, &rects.get(lane)));
+            }
+        }
+        hidden
+    }
+}
+
+/// What some block of the view asks: its boxes that have a rectangle.
+struct Ask<'a>(
+    &'a OccluderScene,
+    &'a View<'a>,
+    &'a mut Vec<(Rects, LaneMask)>,
+);
+
+impl Work for Ask<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) {
+        let Ask(scene, view, asked) = self;
+        for (index, block) in scene.level(0).iter().enumerate() {
+            let admitted = block.admitted_by(isa, view.volume, view.volume.mask());
+            let mut rects = Rects::NONE;
+            rects.project(isa, block, view);
+            let lanes = scene.lanes(0, index) & admitted & rects.seen & rects.flat;
+            if lanes != 0 {
+                asked.push((rects, lanes));
+            }
+        }
+    }
+}
+
+/// Turns of each of two tasks; the mean of their ratios' logarithms as a ratio, with
+/// its interval.
+fn ratio(turns: usize, mut base: impl FnMut() -> f64, mut other: impl FnMut() -> f64) -> [f64; 3] {
+    let ratios = (0..turns).map(|turn| match turn % 2 {
+        0 => (base() / other()).ln(),
+        _ => -(other() / base()).ln(),
+    });
+    let found = trimmed_mean(&ratios.collect::<Vec<_>>()).expect("turns");
+    let (low, high) = found.interval(0.95);
+    [found.mean.exp(), low.exp(), high.exp()]
+}
+
+/// Judges both; how many are missed.
+pub fn missed(only_test: bool, turns: usize) -> u32 {
+    let source = match only_test {
+        true => "city:n=1000",
+        false => SCENE,
+    };
+    let scene = scene::load(source, &Default::default()).expect(source);
+    let cameras = path::load(PATH, &scene, &Default::default()).expect(PATH);
+    let workload = Workload::new(&scene, &cameras, &Culling::default()).expect("views");
+    let occluders = OccluderScene::of(&Solids::of(&scene));
+    let kernel = Kernel::best();
+    let mut views = Vec::new();
+    for (camera, view) in cameras.cameras.iter().zip(&workload.views) {
+        let AnyVolume::Planes(volume) = view.as_any() else {
+            unreachable!("a perspective camera's default test")
+        };
+        let rays = Rays::of(camera).expect("rays");
+        let view = View::new(&rays, volume, &occluders, GRID);
+        let mut culling = Interleaved::new(MaskedInner::new(GRID), kernel);
+        culling.cull(&occluders, &view, &mut Vec::new());
+        let mut asked = Vec::new();
+        kernel.run(Ask(&occluders, &view, &mut asked));
+        views.push((view, culling, asked));
+    }
+
+    let laps = (0..turns).map(|_| {
+        let watch = Stopwatch::start();
+        for (view, ..) in &views {
+            black_box(kernel.run(Project(&occluders, view)));
+        }
+        watch.lap().cpu_ns / (views.len() * occluders.len()) as f64
+    });
+    let laps = laps.collect::<Vec<_>>();
+    let ns = trimmed_mean(&laps).expect("turns");
+    let (low, high) = ns.interval(0.95);
+    let fast = only_test || ns.mean <= MOST_NS;
+    println!(
+        "{source}: rectangles of all boxes in the order of the tree, {:.2} ns [{low:.2}, {high:.2}] each, at most \
+         {MOST_NS} ns: {}",
+        ns.mean,
+        verdict(only_test, fast)
+    );
+
+    let counts = |count: &dyn Fn(&MaskedInner, &Asked) -> u32| -> Vec<u32> {
+        let of_view = |(_, culling, asked): &(_, Interleaved<MaskedInner>, Vec<_>)| {
+            count(culling.buffer(), asked)
+        };
+        views.iter().map(of_view).collect()
+    };
+    let together = |buffer: &MaskedInner, asked: &Asked| kernel.run(Together(buffer, asked));
+    let alone = |buffer: &MaskedInner, asked: &Asked| kernel.run(Alone(buffer, asked));
+    assert_eq!(
+        counts(&together),
+        counts(&alone),
+        "the same boxes are hidden"
+    );
+    let timed = |count: &dyn Fn(&MaskedInner, &Asked) -> u32| {
+        let watch = Stopwatch::start();
+        black_box(counts(count));
+        watch.lap().cpu_ns
+    };
+    let [times, low, high] = ratio(turns, || timed(&alone), || timed(&together));
+    let ahead = only_test || times >= LEAST_TIMES;
+    println!(
+        "{source}: one by one takes {times:.2} x [{low:.2}, {high:.2}] sixteen boxes a test, at least \
+         {LEAST_TIMES} x: {}",
+        verdict(only_test, ahead)
+    );
+    u32::from(!fast) + u32::from(!ahead)
+}

@@ -1,0 +1,177 @@
+//! Embree 3 (Wald et al. 2014, "Embree: a kernel framework for efficient CPU ray
+//! tracing", ACM Transactions on Graphics 33, 4) through the crate embree-rs, boxes as
+//! six quads each.
+//!
+//! Links the system's library `embree3`, so it is a feature of its own.
+
+use std::thread;
+
+use ::embree_rs::{
+    CommittedScene, Device, Geometry, IntersectContext, QuadMesh, RayHit, Scene, sys,
+};
+use glam::DVec3;
+
+use super::contract::{About, Hit, NotBuilt, Pick, keep_nearest};
+use super::rounded::RoundedRay;
+use crate::geometry::Aabb;
+use crate::index::Origin;
+use crate::query::ItemId;
+use crate::visibility::{Guarantee, Ray, Solids};
+
+/// As typed on the command line.
+pub const NAME: &str = "embree";
+/// One line for tables and help.
+pub const SUMMARY: &str = "Embree 3 by crate embree-rs, boxes of quads, its rtcIntersect1";
+
+/// What it declares of itself.
+pub const ABOUT: About = About {
+    name: NAME,
+    summary: SUMMARY,
+    origin: Origin::Crate("embree-rs"),
+    // Rays and quads are in f32, and rays may slip through between two quads.
+    guarantee: Guarantee::Unproven,
+};
+
+/// Corners of a box in the order of its faces; a bit of a corner is an axis, set for
+/// the upper bound.
+const QUADS: [[u32; 4]; 6] = [
+    [0, 4, 6, 2],
+    [1, 3, 7, 5],
+    [0, 1, 5, 4],
+    [2, 6, 7, 3],
+    [0, 2, 3, 1],
+    [4, 5, 7, 6],
+];
+
+/// Its tree of quads.
+pub struct Embree {
+    scene: CommittedScene<'static>,
+    boxes: Vec<Aabb>,
+    zero: DVec3,
+}
+
+/// Builds it for the table of back ends.
+pub(super) fn build(solids: &Solids) -> Result<Box<dyn Pick>, NotBuilt> {
+    let most = u32::MAX as usize / 8;
+    if solids.outer.len() > most {
+        let count = solids.outer.len();
+        return Err(NotBuilt::TooMany { count, most });
+    }
+    // The crate's scene makes the processor flush what is tiny to zero from then on, on
+    // the thread that makes it. So that is another one.
+    let scene = thread::scope(|scope| {
+        let made = scope.spawn(|| committed(&solids.outer));
+        made.join().unwrap_or_else(|e| std::panic::resume_unwind(e))
+    });
+    Ok(Box::new(Embree {
+        scene,
+        boxes: solids.outer.clone(),
+        zero: solids.origin,
+    }))
+}
+
+/// A scene that lives as long as the process, as its device does: the crate's types
+/// borrow one from the other, which no type of ours can hold both of.
+fn committed(boxes: &[Aabb]) -> CommittedScene<'static> {
+    let device: &'static Device = Box::leak(Box::new(Device::new()));
+    let mut mesh = QuadMesh::unanimated(device, boxes.len() * 6, boxes.len() * 8);
+    {
+        let mut vertices = mesh.vertex_buffer.map();
+        let mut indices = mesh.index_buffer.map();
+        for (item, b) in boxes.iter().enumerate() {
+            for corner in 0..8 {
+                let side = |axis: usize| match corner >> axis & 1 {
+                    0 => b.min[axis],
+                    _ => b.max[axis],
+                };
+                let vertex = &mut vertices[item * 8 + corner];
+                (vertex.x, vertex.y, vertex.z) = (side(0), side(1), side(2));
+            }
+            for (face, corners) in QUADS.iter().enumerate() {
+                let at = corners.map(|corner| item as u32 * 8 + corner);
+                let quad = &mut indices[item * 6 + face];
+                [quad.x, quad.y, quad.z, quad.w] = at;
+            }
+        }
+    }
+    let mut geometry = Geometry::Quad(mesh);
+    geometry.commit();
+    let mut scene = Scene::new(device);
+    scene.attach_geometry(geometry);
+    let scene: &'static Scene = Box::leak(Box::new(scene));
+    scene.commit()
+}
+
+impl Embree {
+    /// The first face at `from` or beyond: its item, how deep it is, and how deep that
+    /// item is entered, infinite where the ray leaves it only.
+    #[inline(always)]
+    fn next(&self, rounded: &RoundedRay, from: f32) -> Option<(ItemId, f32, f32)> {
+        let ray = sys::RTCRay {
+            org_x: rounded.origin.x,
+            org_y: rounded.origin.y,
+            org_z: rounded.origin.z,
+            tnear: from,
+            dir_x: rounded.direction.x,
+            dir_y: rounded.direction.y,
+            dir_z: rounded.direction.z,
+            time: 0.0,
+            tfar: rounded.far.next_up(),
+            mask: u32::MAX,
+            id: 0,
+            flags: 0,
+        };
+        let mut found = RayHit::new(ray);
+        let mut context = IntersectContext::incoherent();
+        self.scene.intersect(&mut context, &mut found);
+        if !found.hit.hit() {
+            return None;
+        }
+        let item = found.hit.primID / 6;
+        let enters = rounded.entry(&self.boxes[item as usize]);
+        Some((item, found.ray.tfar, enters))
+    }
+}
+
+impl Pick for Embree {
+    fn about(&self) -> About {
+        ABOUT
+    }
+
+    fn first(&self, ray: &Ray) -> Option<Hit> {
+        let rounded = RoundedRay::of(ray, self.zero);
+        let mut from = rounded.near.max(0.0);
+        // Faces by which the ray leaves what it began in are passed by.
+        while let Some((item, at, enters)) = self.next(&rounded, from) {
+            if enters.is_finite() {
+                let depth = f64::from(enters);
+                return Some(Hit { item, depth });
+            }
+            from = at.next_up();
+        }
+        None
+    }
+
+    /// From face to face; of faces at the very same depth one is found.
+    fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {
+        let rounded = RoundedRay::of(ray, self.zero);
+        hits.clear();
+        let mut from = rounded.near.max(0.0);
+        while hits.len() < count
+            && let Some((item, at, enters)) = self.next(&rounded, from)
+        {
+            let depth = f64::from(enters);
+            if enters.is_finite() && !hits.iter().any(|hit| hit.item == item) {
+                hits.push(Hit { item, depth });
+            }
+            from = at.next_up();
+        }
+        keep_nearest(hits, count);
+    }
+
+    /// What was given to it: the library does not tell how large its tree is.
+    fn memory(&self) -> usize {
+        let quads = size_of::<[f32; 4]>() * 8 + size_of::<[u32; 4]>() * 6;
+        self.boxes.len() * quads + size_of_val(&self.boxes[..])
+    }
+}
