@@ -133,23 +133,30 @@ impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
         if lanes == 0 {
             return 0;
         }
-        let large = std::array::from_fn(|lane| {
-            let wide = (rects.x1[lane] >> 3) - (rects.x0[lane] >> 3) > 1;
-            let high = (rects.y1[lane] >> 2) - (rects.y0[lane] >> 2) > 1;
-            u32::from(wide | high)
-        });
+        let (mut across, mut down) = ([0; LANES], [0; LANES]);
+        for lane in 0..LANES {
+            across[lane] = ((rects.x1[lane] >> 3) - (rects.x0[lane] >> 3)) as u32;
+            down[lane] = ((rects.y1[lane] >> 2) - (rects.y0[lane] >> 2)) as u32;
+        }
+        let mut large = [0; LANES];
+        for lane in 0..LANES {
+            large[lane] = (across[lane] | down[lane]) & !1;
+        }
         let small = lanes & isa.zeros(isa.words(&large));
+        let wide = !isa.zeros(isa.words(&across));
+        let high = !isa.zeros(isa.words(&down));
         let mut hidden = small;
-        for (x, y) in [
-            (&rects.x0, &rects.y0),
-            (&rects.x1, &rects.y0),
-            (&rects.x0, &rects.y1),
-            (&rects.x1, &rects.y1),
+        // A corner is looked at if it is in another tile than those before.
+        for (x, y, other) in [
+            (&rects.x0, &rects.y0, LaneMask::MAX),
+            (&rects.x1, &rects.y0, wide),
+            (&rects.x0, &rects.y1, high),
+            (&rects.x1, &rects.y1, wide & high),
         ] {
-            if hidden == 0 {
-                break;
+            let asked = hidden & other;
+            if asked != 0 {
+                hidden &= !asked | self.hidden_in_tile(isa, rects, asked, x, y);
             }
-            hidden &= self.hidden_in_tile(isa, rects, hidden, x, y);
         }
         let mut left = lanes & !small;
         while left != 0 {
