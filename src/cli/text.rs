@@ -145,16 +145,21 @@ pub fn time_plus_minus(ns: Option<f64>, ends: [Option<f64>; 2]) -> String {
     ns.map(shown).unwrap_or_default()
 }
 
-/// A value with a margin, to the digits that the margin leaves: "83.4±0.7",
-/// "560000±9000". Of nothing seen, what it is below: "<0.0005".
+/// A value with a margin, to the digits that the margin leaves, one at least:
+/// "83.4±0.7", "560000±9000", "70±200". Of nothing seen, what it is below: "<0.0005".
 pub fn plus_minus(value: f64, margin: Option<f64>) -> String {
     let Some(margin) = margin.filter(|margin| margin.is_finite() && *margin > 0.0) else {
         return significant(value);
     };
-    let unit = 10f64.powi(margin.log10().floor() as i32);
+    let place = |x: f64| 10f64.powi(x.log10().floor() as i32);
+    let of_margin = place(margin);
+    let unit = match value == 0.0 {
+        true => of_margin,
+        false => of_margin.min(place(value.abs())),
+    };
     let shown = (value / unit).round() * unit;
     // A margin is rounded up, or it would no longer hold what it held.
-    let margin = ((margin + (value - shown).abs()) / unit - 1e-9).ceil() * unit;
+    let margin = ((margin + (value - shown).abs()) / of_margin - 1e-9).ceil() * of_margin;
     let decimals = (-unit.log10().round()).max(0.0) as usize;
     match value == 0.0 {
         true => format!("<{margin:.decimals$}"),
@@ -368,6 +373,9 @@ mod tests {
             (560_397.0, Some(8_123.0), "560000±9000"),
             (606.7, Some(3.2), "607±4"),
             (5.0, Some(9.6), "5±10"),
+            (71.9, Some(156.0), "70±200"),
+            (7.1, Some(22.0), "7±30"),
+            (0.24, Some(3.0), "0.2±4.0"),
             (0.0, Some(3.1e-4), "<0.0004"),
             (0.25, None, "0.250"),
         ];
