@@ -87,10 +87,9 @@ fn locate(c: &mut Criterion) {
             let mut out = Vec::new();
             group.bench_function(BenchmarkId::new(row.info.name, source), |b| {
                 b.iter(|| {
-                    for (place, &p) in workload.points.iter().enumerate() {
+                    for place in 0..workload.points.len() {
                         out.clear();
-                        index.locate(p, &mut out);
-                        workload.refine(place, &mut out);
+                        workload.search(place, &mut out, |p, out| index.locate(p, out));
                         black_box(&out);
                     }
                 });

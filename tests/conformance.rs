@@ -232,6 +232,10 @@ fn every_structure_returns_the_reference_set_on_every_scene_and_path() {
                     scene.refine(sought, &mut found);
                     found.sort_unstable();
                     assert_eq!(found, wanted, "{} on {source} at {p}", row.info.name);
+                    found.clear();
+                    scene.search(sought, &mut found, |p, out| index.locate(p, out));
+                    found.sort_unstable();
+                    assert_eq!(found, wanted, "{} on {source} at {p}, moved", row.info.name);
                 }
             }
         }

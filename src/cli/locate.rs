@@ -54,10 +54,10 @@ fn by_points(scene: &Scene, structures: &[StructureSpec], file: &Path) -> anyhow
     let points: Vec<Sought> = points.map(|p| scene.sought(p)).collect();
     let boxes = scene.regions.boxes(&scene.items);
     let ask = |index: &dyn DynIndex, point: usize, out: &mut Vec<_>, cost: &mut _| {
-        index.query_counted(points[point].local.into(), out, cost);
+        let p = &points[point];
+        scene.search(p, out, |p, out| index.query_counted(p.into(), out, cost));
         out.clear();
-        index.locate(points[point].local, out);
-        scene.refine(&points[point], out);
+        scene.search(p, out, |p, out| index.locate(p, out));
     };
     ask_all(structures, scene, boxes, points.len(), true, ask)
 }

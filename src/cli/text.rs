@@ -155,7 +155,7 @@ pub fn plus_minus(value: f64, margin: Option<f64>) -> String {
     let of_margin = place(margin);
     let unit = match value == 0.0 {
         true => of_margin,
-        false => of_margin.min(place(value.abs())),
+        false => of_margin.min(place(value.abs()).max(0.01 * of_margin)),
     };
     let shown = (value / unit).round() * unit;
     // A margin is rounded up, or it would no longer hold what it held.
@@ -376,6 +376,7 @@ mod tests {
             (71.9, Some(156.0), "70±200"),
             (7.1, Some(22.0), "7±30"),
             (0.24, Some(3.0), "0.2±4.0"),
+            (5e-324, Some(3.0), "0.00±4.00"),
             (0.0, Some(3.1e-4), "<0.0004"),
             (0.25, None, "0.250"),
         ];

@@ -105,14 +105,10 @@ pub fn count_pass(
             let cost = &mut counted.locate_cost;
             let index = subject.regions();
             let counting = trial.ask(|out| {
-                index.query_counted(p.into(), out, cost);
-                workload.refine(n, out);
+                workload.search(n, out, |p, out| index.query_counted(p.into(), out, cost));
             });
             let asked = match counting.map(drop) {
-                Ok(()) => trial.ask(|out| {
-                    index.locate(p, out);
-                    workload.refine(n, out);
-                }),
+                Ok(()) => trial.ask(|out| workload.search(n, out, |p, out| index.locate(p, out))),
                 Err(fault) => Err(fault),
             };
             spent[i] += start.elapsed();

@@ -421,10 +421,9 @@ impl<'a> Entry<'a> {
             }
         }
         for n in timed(&known.locate) {
-            let (p, wanted) = (workload.points[n], known.located[n]);
+            let (index, wanted) = (built.regions(), known.located[n]);
             out.clear();
-            let found = guarded(|| built.regions().locate(p, &mut out));
-            workload.refine(n, &mut out);
+            let found = guarded(|| workload.search(n, &mut out, |p, out| index.locate(p, out)));
             if differs("point", n, found.map(|()| Answer::of(&out)), wanted) {
                 return;
             }

@@ -67,8 +67,7 @@ impl<'a> TimedTask<'a> {
             TaskKind::Locate | TaskKind::LocateBatched => {
                 let index = built.regions();
                 Box::new(move |place, out| {
-                    index.locate(workload.points[place], out);
-                    workload.refine(place, out);
+                    workload.search(place, out, |p, out| index.locate(p, out));
                 })
             }
         };
@@ -131,17 +130,25 @@ fn located_at_once<'a>(workload: &'a Workload, built: &'a Built) -> AskMany<'a> 
     Box::new(move |places| {
         let (points, located, region) = &mut *kept.borrow_mut();
         points.clear();
-        points.extend(places.iter().map(|&place| workload.points[place as usize]));
+        let mut is_refined = false;
+        points.extend(places.iter().map(|&place| {
+            let sought = &workload.sought[place as usize];
+            workload.scene.moved(sought).unwrap_or_else(|| {
+                is_refined |= workload.scene.is_refined(sought);
+                sought.local
+            })
+        }));
         index.query_many(points, located);
-        let refined = |&place: &u32| workload.scene.is_refined(&workload.sought[place as usize]);
-        if !places.iter().any(refined) {
+        if !is_refined {
             return std::hint::black_box(&*located).ids().len() as u64;
         }
         let mut found = 0;
         for (&place, ids) in places.iter().zip(located.iter()) {
             region.clear();
             region.extend_from_slice(ids);
-            workload.refine(place as usize, region);
+            workload
+                .scene
+                .refine(&workload.sought[place as usize], region);
             found += std::hint::black_box(&*region).len() as u64;
         }
         found
@@ -169,8 +176,8 @@ mod tests {
         let alone: Vec<u64> = (0..workload.points.len())
             .map(|place| {
                 let mut out = Vec::new();
-                built.regions().locate(workload.points[place], &mut out);
-                workload.refine(place, &mut out);
+                let index = built.regions();
+                workload.search(place, &mut out, |p, out| index.locate(p, out));
                 out.len() as u64
             })
             .collect();

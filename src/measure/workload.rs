@@ -89,10 +89,15 @@ impl<'a> Workload<'a> {
         })
     }
 
-    /// Region search as every subject is asked to do it: for the point of a
-    /// place the index finds boxes, the scene's regions decide, exactly.
+    /// Region search as every subject is asked to do it: what its index finds for
+    /// the point of a place, made exact ([`Scene::search`]).
     #[inline]
-    pub fn refine(&self, place: usize, out: &mut Vec<ItemId>) {
-        self.scene.refine(&self.sought[place], out);
+    pub fn search(
+        &self,
+        place: usize,
+        out: &mut Vec<ItemId>,
+        ask: impl FnOnce(Vec3, &mut Vec<ItemId>),
+    ) {
+        self.scene.search(&self.sought[place], out, ask);
     }
 }

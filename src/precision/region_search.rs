@@ -170,8 +170,7 @@ impl RegionQueries {
                 (RegionNumbers::F32, Some(index)) => index.locate(p.local, out),
                 (RegionNumbers::Checked, Some(index)) => {
                     own.clear();
-                    index.locate(p.local, &mut own);
-                    scene.refine(p, &mut own);
+                    scene.search(p, &mut own, |p, out| index.locate(p, out));
                     out.extend_from_slice(&own);
                 }
                 (RegionNumbers::F64, _) => self.in_f64(scene, p, out),

@@ -20,6 +20,7 @@ mod rooms;
 mod samples;
 mod settled;
 mod shape;
+mod shared_faces;
 mod sought;
 mod source;
 mod surface;

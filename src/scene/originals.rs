@@ -2,11 +2,12 @@
 //! hold. It defines the exact comparison of the two; searching is left to the
 //! indexes.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
 
 use super::WorldBox;
+use super::shared_faces::SharedFaces;
 use crate::arithmetic::two_sum;
 use crate::geometry::Aabb;
 
@@ -14,6 +15,8 @@ use crate::geometry::Aabb;
 #[derive(Clone, Default, Debug)]
 pub struct Originals {
     boxes: Arc<[WorldBox]>,
+    /// Made when first asked for.
+    faces: Arc<OnceLock<Option<SharedFaces>>>,
 }
 
 impl Originals {
@@ -28,7 +31,16 @@ impl Originals {
         });
         Originals {
             boxes: if exact { &[] } else { written }.into(),
+            faces: Arc::default(),
         }
+    }
+
+    /// The faces that these boxes share, if they do. `stored` and `origin` as they were
+    /// given.
+    #[inline]
+    pub(super) fn faces(&self, stored: &[Aabb], origin: DVec3) -> Option<&SharedFaces> {
+        let made = || SharedFaces::of(self.boxes(), stored, origin);
+        self.faces.get_or_init(made).as_ref()
     }
 
     /// In world coordinates; `None` if the stored boxes are the very same.

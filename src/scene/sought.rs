@@ -39,6 +39,38 @@ impl Scene {
         }
     }
 
+    /// Region search: `ask` is an index's, what it finds is what holds the point
+    /// exactly. Where boxes share their faces it is asked for a point that needs no
+    /// second look ([`Scene::moved`]).
+    #[inline]
+    pub fn search(
+        &self,
+        p: &Sought,
+        out: &mut Vec<ItemId>,
+        ask: impl FnOnce(Vec3, &mut Vec<ItemId>),
+    ) {
+        match self.moved(p) {
+            Some(moved) => ask(moved, out),
+            None => {
+                ask(p.local, out);
+                self.refine(p, out);
+            }
+        }
+    }
+
+    /// The point moved to an f32 that the stored boxes hold if and only if the boxes
+    /// as written hold the point; `None`, then for all points, where boxes share too
+    /// few faces. O(1), and the logarithm of the number of faces beside one of them.
+    #[inline]
+    pub fn moved(&self, p: &Sought) -> Option<Vec3> {
+        if let Regions::Bsp(_) = self.regions {
+            return None;
+        }
+        let boxes = self.regions.boxes(&self.items);
+        let faces = self.originals_of(&self.regions).faces(boxes, self.origin)?;
+        Some(faces.moved(p.world, p.local))
+    }
+
     /// Whether what an index finds for a point must still be looked at by
     /// [`Scene::refine`].
     pub fn is_refined(&self, p: &Sought) -> bool {
