@@ -229,7 +229,7 @@ fn every_structure_returns_the_reference_set_on_every_scene_and_path() {
                 for (index, row) in regions.iter().zip(Registry::builtin().rows()) {
                     let mut found = Vec::new();
                     index.locate(p, &mut found);
-                    scene.refine(sought, &mut found);
+                    scene.refine(sought, &mut found, 0);
                     found.sort_unstable();
                     assert_eq!(found, wanted, "{} on {source} at {p}", row.info.name);
                     found.clear();

@@ -55,7 +55,7 @@ fn every_structure_finds_what_f64_says_where_f32_cannot_tell() {
                     let mut found = Vec::new();
                     index.locate(sought.local, &mut found);
                     wrong_in_f32 += usize::from(found.len() != wanted.len());
-                    scene.refine(&sought, &mut found);
+                    scene.refine(&sought, &mut found, 0);
                     found.sort_unstable();
                     assert_eq!(found, wanted, "{}: {p:?}", spec.label);
                     let Some(p) = scene.moved(&sought) else {

@@ -497,7 +497,7 @@ fn digests(scene: &Scene, structures: &Structures, path: &str, found: &mut usize
                 let what = format!("{}, {}, region search", scene.name, path.name);
                 let ids = agreed(&structures.regions, &what, |index, out| {
                     index.locate(p, out);
-                    workload.scene.refine(&workload.sought[n], out);
+                    workload.scene.refine(&workload.sought[n], out, 0);
                 });
                 *found += ids.len();
                 answered.take(&ids);

@@ -1,10 +1,13 @@
 //! The speed floors this project promises, each a ratio in one run: all
 //! subjects of a row are interleaved and paired by the same harness as
-//! `cullbench run`. Before them, that harness beside a loop written by hand, and the
-//! floors of the occlusion stage. Exits 3 if a floor is missed. `-- --test` only checks
-//! that every row runs.
+//! `cullbench run`. Before them, that harness beside a loop written by hand, the floors
+//! of the occlusion stage, and region search beside itself in f32 alone. Exits 3 if a
+//! floor is missed. Words after `--` choose by name what runs: `harness`, `occlusion`,
+//! `region-search`, or rows with the word in their scene or structure. `-- --test` only
+//! checks that every row runs.
 
 mod occlusion;
+mod region_search;
 
 use std::process::ExitCode;
 
@@ -153,25 +156,32 @@ fn harness_overhead(only_test: bool, turns: usize) -> u32 {
             }
             watch.lap().cpu_ns / queries as f64
         };
-        let ratios = (0..turns).map(|turn| match turn % 2 {
-            0 => (by_harness() / by_hand()).ln(),
-            _ => -(by_hand() / by_harness()).ln(),
-        });
-        let found = trimmed_mean(&ratios.collect::<Vec<_>>()).expect("turns");
-        let (low, high) = found.interval(0.95);
-        let holds = only_test || low.exp_m1() <= MOST_OVERHEAD;
+        let [added, low, high] = ratio(turns, by_harness, by_hand).map(|times| times - 1.0);
+        let holds = only_test || low <= MOST_OVERHEAD;
         missed += u32::from(!holds);
         println!(
             "harness: {} takes {:+.2} % [{:+.2}, {:+.2}] beside a loop by hand, at most {:.0} %: {}",
             spec.label,
-            100.0 * found.mean.exp_m1(),
-            100.0 * low.exp_m1(),
-            100.0 * high.exp_m1(),
+            100.0 * added,
+            100.0 * low,
+            100.0 * high,
             100.0 * MOST_OVERHEAD,
             verdict(only_test, holds)
         );
     }
     missed
+}
+
+/// Time of one task / time of another, from turns of both: the mean of the ratios'
+/// logarithms as a ratio, with its interval.
+fn ratio(turns: usize, mut one: impl FnMut() -> f64, mut other: impl FnMut() -> f64) -> [f64; 3] {
+    let ratios = (0..turns).map(|turn| match turn % 2 {
+        0 => (one() / other()).ln(),
+        _ => -(other() / one()).ln(),
+    });
+    let found = trimmed_mean(&ratios.collect::<Vec<_>>()).expect("turns");
+    let (low, high) = found.interval(0.95);
+    [found.mean, low, high].map(f64::exp)
 }
 
 fn verdict(only_test: bool, holds: bool) -> &'static str {
@@ -183,7 +193,10 @@ fn verdict(only_test: bool, holds: bool) -> &'static str {
 }
 
 fn main() -> ExitCode {
-    let only_test = std::env::args().any(|arg| arg == "--test");
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let only_test = words.iter().any(|word| word == "--test");
+    let wanted: Vec<&String> = words.iter().filter(|w| !w.starts_with('-')).collect();
+    let chosen = |name: &str| wanted.is_empty() || wanted.iter().any(|w| name.contains(w.as_str()));
     let protocol = Protocol {
         rounds: if only_test { [1, 1] } else { [9, 25] },
         task_ns: 3e9,
@@ -193,8 +206,19 @@ fn main() -> ExitCode {
         cache_bytes: Machine::capture().cache_sweep_bytes(),
     };
     let turns = if only_test { 3 } else { TURNS };
-    let mut missed = harness_overhead(only_test, turns) + occlusion::missed(only_test, turns);
-    for row in &FLOORS {
+    let mut missed = 0;
+    let parts: [(&str, fn(bool, usize) -> u32); 3] = [
+        ("harness", harness_overhead),
+        ("occlusion", occlusion::missed),
+        ("region-search", region_search::missed),
+    ];
+    for (_, part) in parts.iter().filter(|(name, _)| chosen(name)) {
+        missed += part(only_test, turns);
+    }
+    for row in FLOORS
+        .iter()
+        .filter(|row| chosen(row.scene) || chosen(row.structure))
+    {
         let source = if only_test {
             row.scene.replace("1000000", "1000")
         } else {

@@ -14,7 +14,7 @@ use cullbench::visibility::occlusion::{
 use cullbench::visibility::{Rays, SampleGrid, Solids};
 use cullbench::{path, scene};
 
-use super::verdict;
+use super::{ratio, verdict};
 
 const SCENE: &str = "city:n=100000";
 const PATH: &str = "street:frames=32";
@@ -106,18 +106,6 @@ impl Work for Ask<'_> {
             }
         }
     }
-}
-
-/// Turns of each of two tasks; the mean of their ratios' logarithms as a ratio, with
-/// its interval.
-fn ratio(turns: usize, mut base: impl FnMut() -> f64, mut other: impl FnMut() -> f64) -> [f64; 3] {
-    let ratios = (0..turns).map(|turn| match turn % 2 {
-        0 => (base() / other()).ln(),
-        _ => -(other() / base()).ln(),
-    });
-    let found = trimmed_mean(&ratios.collect::<Vec<_>>()).expect("turns");
-    let (low, high) = found.interval(0.95);
-    [found.mean.exp(), low.exp(), high.exp()]
 }
 
 /// Judges both; how many are missed.

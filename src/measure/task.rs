@@ -146,9 +146,8 @@ fn located_at_once<'a>(workload: &'a Workload, built: &'a Built) -> AskMany<'a> 
         for (&place, ids) in places.iter().zip(located.iter()) {
             region.clear();
             region.extend_from_slice(ids);
-            workload
-                .scene
-                .refine(&workload.sought[place as usize], region);
+            let sought = &workload.sought[place as usize];
+            workload.scene.refine(sought, region, 0);
             found += std::hint::black_box(&*region).len() as u64;
         }
         found

@@ -163,15 +163,11 @@ impl RegionQueries {
         camera: usize,
         out: &mut Vec<ItemId>,
     ) {
-        // An index appends; what is looked at again is a point's own.
-        let mut own = Vec::new();
         for p in &self.by_camera[camera] {
             match (numbers, index) {
                 (RegionNumbers::F32, Some(index)) => index.locate(p.local, out),
                 (RegionNumbers::Checked, Some(index)) => {
-                    own.clear();
-                    scene.search(p, &mut own, |p, out| index.locate(p, out));
-                    out.extend_from_slice(&own);
+                    scene.search(p, out, |p, out| index.locate(p, out));
                 }
                 (RegionNumbers::F64, _) => self.in_f64(scene, p, out),
                 _ => out.extend(scene.holding(p)),

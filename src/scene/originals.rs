@@ -112,11 +112,11 @@ mod tests {
         let scene = Scene::about("exact", &boxes, DVec3::ZERO).expect("a scene");
         assert!(scene.originals.boxes().is_none());
         let p = scene.sought(DVec3::splat(0.5));
-        assert!(p.is_exact && !scene.is_refined(&p));
+        assert!(!scene.is_refined(&p));
         let p = scene.sought(DVec3::new(1.0 + 1e-12, 0.5, 0.5));
         let mut found = vec![0];
-        assert!(!p.is_exact && p.local.x == 1.0);
-        scene.refine(&p, &mut found);
+        assert!(scene.is_refined(&p) && p.local.x == 1.0);
+        scene.refine(&p, &mut found, 0);
         assert!(found.is_empty());
     }
 }

@@ -5,10 +5,9 @@
 //! A face `v` is stored as an f32 less than one step of f32 below it where it bounds a
 //! box from below, and above it where from above. The f32 next to a point is less than
 //! one step from the point. So it lies to the stored face as the point to `v` does if
-//! three steps or more are between the two. For all f32 that are nearer to some face a
-//! bit is set; a point that meets one is looked up among the faces as written: on a
-//! face it becomes the lower one of the stored two, and between two of them an f32
-//! between what is stored of these.
+//! three steps or more are between the two. A table says for each f32 which face is
+//! nearer than that: on the face as written a point becomes the lower one of the stored
+//! two, beside it an f32 on the same side of these.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -21,8 +20,13 @@ use crate::geometry::Aabb;
 
 /// Coordinates of one axis: with more the boxes share hardly any.
 const MOST: usize = 1 << 14;
-/// Bits for a coordinate: about as many as two are set.
+/// Bits for a coordinate: about two of them are set, and what is not near a face seldom
+/// meets one.
 const BITS_EACH: usize = 64;
+/// Bits that share an entry of the table.
+const BITS_OF_ENTRY: usize = 4;
+/// In the table, where more than one face is near.
+const SEVERAL: u16 = u16::MAX;
 
 /// The faces of all boxes.
 #[derive(Clone, Debug)]
@@ -32,12 +36,51 @@ pub(super) struct SharedFaces {
 
 #[derive(Clone, Debug)]
 struct Axis {
-    /// As written, ascending.
-    written: Vec<f64>,
-    /// The least and the greatest f32 that each is stored as.
-    stored: Vec<[f32; 2]>,
+    /// Ascending; behind them [`Face::NONE`].
+    faces: Vec<Face>,
     /// Whether an f32 may be near a face, by [`Axis::bit`].
     near: Vec<u64>,
+    /// Which face that is, for every few bits.
+    which: Vec<u16>,
+}
+
+/// A face as written, and where f32 has it.
+#[derive(Clone, Copy, Debug)]
+struct Face {
+    written: f64,
+    /// The least and the greatest f32 that a coordinate becomes: no number, above the
+    /// face, below it, on it.
+    within: [[f32; 2]; 4],
+}
+
+impl Face {
+    /// Beside which nothing is moved.
+    const NONE: Face = Face {
+        written: f64::NAN,
+        within: [[f32::NEG_INFINITY, f32::INFINITY]; 4],
+    };
+
+    /// A face that is stored as these, ascending.
+    fn new(written: f64, [least, greatest]: [f32; 2]) -> Face {
+        let [any, ..] = Face::NONE.within;
+        let above = [greatest.next_up(), f32::INFINITY];
+        let below = [f32::NEG_INFINITY, least.next_down()];
+        Face {
+            written,
+            within: [any, above, below, [least; 2]],
+        }
+    }
+
+    /// The f32 next to a coordinate, moved to its side of the face. Near a face either
+    /// side is as likely, so the sides are looked up: a jump would often be guessed
+    /// wrong.
+    #[inline(always)]
+    fn moved(&self, world: f64, local: f32) -> f32 {
+        let side = usize::from(world >= self.written) + 2 * usize::from(world <= self.written);
+        let [least, greatest] = self.within[side];
+        let local = if greatest < local { greatest } else { local };
+        if least > local { least } else { local }
+    }
 }
 
 /// What a coordinate is stored as: of a lower bound, of an upper bound.
@@ -79,14 +122,24 @@ impl SharedFaces {
     }
 
     /// The point that indexes are to be asked for, of one in the world and the f32
-    /// next to it in the scene.
+    /// next to it in the scene. That it is near no face is mostly true: nobody waits
+    /// for more then.
     #[inline]
     pub fn moved(&self, world: DVec3, local: Vec3) -> Vec3 {
         let [x, y, z] = &self.axes;
+        let bits = [x.bit(local.x), y.bit(local.y), z.bit(local.z)];
+        match x.is_near(bits[0]) | y.is_near(bits[1]) | z.is_near(bits[2]) {
+            false => local,
+            true => self.beside(bits, world, local),
+        }
+    }
+
+    fn beside(&self, bits: [usize; 3], world: DVec3, local: Vec3) -> Vec3 {
+        let [x, y, z] = &self.axes;
         Vec3::new(
-            x.moved(world.x, local.x),
-            y.moved(world.y, local.y),
-            z.moved(world.z, local.z),
+            x.moved(bits[0], world.x, local.x),
+            y.moved(bits[1], world.y, local.y),
+            z.moved(bits[2], world.z, local.z),
         )
     }
 }
@@ -115,20 +168,27 @@ impl Axis {
         if !faces.iter().all(is_tight) || !stored.windows(2).all(apart) {
             return None;
         }
+        let none = faces.len() as u16;
         let bits = (faces.len() * BITS_EACH).next_power_of_two();
+        let of_stored = faces.iter().zip(&stored);
+        let of_stored = of_stored.map(|(face, &stored)| Face::new(face.0, stored));
         let mut axis = Axis {
-            written: faces.iter().map(|face| face.0).collect(),
-            near: vec![0; bits.div_ceil(64)],
-            stored,
+            faces: of_stored.chain([Face::NONE]).collect(),
+            near: vec![0; bits / 64],
+            which: vec![none; bits / BITS_OF_ENTRY],
         };
-        for at in 0..axis.stored.len() {
-            let [least, greatest] = axis.stored[at];
+        for (at, &[least, greatest]) in (0..).zip(&stored) {
             let mut x = least.next_down().next_down();
             while x <= greatest.next_up().next_up() {
                 // The bits of the two zeros are far apart.
                 for x in if x == 0.0 { [0.0, -0.0] } else { [x, x] } {
-                    let (word, bit) = axis.bit(x);
-                    axis.near[word] |= 1 << bit;
+                    let bit = axis.bit(x);
+                    axis.near[bit / 64] |= 1 << (bit % 64);
+                    let which = &mut axis.which[bit / BITS_OF_ENTRY];
+                    *which = match *which {
+                        known if known == none || known == at => at,
+                        _ => SEVERAL,
+                    };
                 }
                 if x == f32::INFINITY {
                     break;
@@ -141,35 +201,31 @@ impl Axis {
 
     /// Eight neighbours share a bit.
     #[inline(always)]
-    fn bit(&self, x: f32) -> (usize, u32) {
+    fn bit(&self, x: f32) -> usize {
         let hash = u64::from(x.to_bits() >> 3).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 32;
-        let word = (hash as usize / 64) & (self.near.len() - 1);
-        (word, hash as u32 % 64)
+        hash as usize & (64 * self.near.len() - 1)
     }
 
     #[inline(always)]
-    fn moved(&self, world: f64, local: f32) -> f32 {
-        let (word, bit) = self.bit(local);
-        match self.near[word] >> bit & 1 {
-            0 => local,
-            _ => self.among(world, local),
+    fn is_near(&self, bit: usize) -> bool {
+        self.near[bit / 64] >> (bit % 64) & 1 != 0
+    }
+
+    #[inline(always)]
+    fn moved(&self, bit: usize, world: f64, local: f32) -> f32 {
+        match self.which[bit / BITS_OF_ENTRY] {
+            SEVERAL => self.among(world, local),
+            at => self.faces[usize::from(at)].moved(world, local),
         }
     }
 
+    /// Beside the two faces that a coordinate lies between.
     fn among(&self, world: f64, local: f32) -> f32 {
-        if world.is_nan() {
-            return local;
-        }
-        let at = self.written.partition_point(|&face| face < world);
-        if self.written.get(at) == Some(&world) {
-            return self.stored[at][0];
-        }
-        let before = at.checked_sub(1).map(|before| self.stored[before][1]);
-        let low = before.map_or(f32::NEG_INFINITY, f32::next_up);
-        let after = self.stored.get(at).map(|after| after[0]);
-        local
-            .max(low)
-            .min(after.map_or(f32::INFINITY, f32::next_down))
+        let faces = &self.faces[..self.faces.len() - 1];
+        let at = faces.partition_point(|face| face.written < world);
+        let [before, after] =
+            [at.wrapping_sub(1), at].map(|at| *faces.get(at).unwrap_or(&Face::NONE));
+        after.moved(world, before.moved(world, local))
     }
 }
 

@@ -17,31 +17,23 @@ pub struct Sought {
     pub world: DVec3,
     /// Scene coordinates, rounded to the nearest f32.
     pub local: Vec3,
-    /// Whether `local` is the point without any rounding.
-    pub is_exact: bool,
 }
 
 impl Scene {
     /// A point of the world as this scene's indexes are asked for it. A planar
     /// BSP ignores the height.
+    #[inline]
     pub fn sought(&self, world: DVec3) -> Sought {
         let mut local = (world - self.origin).as_vec3();
-        let axes = if let Regions::Bsp(_) = self.regions {
+        if let Regions::Bsp(_) = self.regions {
             local.z = 0.0;
-            2
-        } else {
-            3
-        };
-        Sought {
-            world,
-            local,
-            is_exact: (0..axes).all(|k| side(world[k], self.origin[k], local[k]) == 0),
         }
+        Sought { world, local }
     }
 
-    /// Region search: `ask` is an index's, what it finds is what holds the point
-    /// exactly. Where boxes share their faces it is asked for a point that needs no
-    /// second look ([`Scene::moved`]).
+    /// Region search: `ask` appends what an index finds, and left is what holds the
+    /// point exactly. Where boxes share their faces it is asked for a point that needs
+    /// no second look ([`Scene::moved`]).
     #[inline]
     pub fn search(
         &self,
@@ -52,8 +44,9 @@ impl Scene {
         match self.moved(p) {
             Some(moved) => ask(moved, out),
             None => {
+                let first = out.len();
                 ask(p.local, out);
-                self.refine(p, out);
+                self.refine(p, out, first);
             }
         }
     }
@@ -76,30 +69,30 @@ impl Scene {
     pub fn is_refined(&self, p: &Sought) -> bool {
         match &self.regions {
             Regions::Bsp(_) => true,
-            regions => !p.is_exact || self.originals_of(regions).boxes().is_some(),
+            regions => {
+                let is_rounded = |k| side(p.world[k], self.origin[k], p.local[k]) != 0;
+                self.originals_of(regions).boxes().is_some() || (0..3).any(is_rounded)
+            }
         }
     }
 
-    /// Keeps of the boxes that an index found the regions that hold the point
-    /// exactly.
+    /// Keeps of the boxes that an index found, those from `first` on, the regions that
+    /// hold the point exactly.
     #[inline]
-    pub fn refine(&self, p: &Sought, found: &mut Vec<ItemId>) {
-        if !found.is_empty() && self.is_refined(p) {
-            self.keep_holding(p, found);
+    pub fn refine(&self, p: &Sought, found: &mut Vec<ItemId>, first: usize) {
+        if found.len() > first && self.is_refined(p) {
+            self.keep_holding(p, found, first);
         }
     }
 
-    fn keep_holding(&self, p: &Sought, found: &mut Vec<ItemId>) {
+    fn keep_holding(&self, p: &Sought, found: &mut Vec<ItemId>, first: usize) {
         match &self.regions {
             Regions::Bsp(bsp) => {
                 let at = (p.world - self.origin).truncate();
-                if bsp.covers(at) {
-                    found.retain(|&region| bsp.holds(region, at));
-                } else {
-                    found.clear();
-                }
+                let covers = bsp.covers(at);
+                retain_from(first, found, |region| covers && bsp.holds(region, at));
             }
-            _ => found.retain(|&id| self.holds(id, p.world)),
+            _ => retain_from(first, found, |id| self.holds(id, p.world)),
         }
     }
 
@@ -133,4 +126,17 @@ impl Scene {
             _ => &self.originals,
         }
     }
+}
+
+/// `Vec::retain` of the ids from `first` on.
+fn retain_from(first: usize, ids: &mut Vec<ItemId>, keep: impl Fn(ItemId) -> bool) {
+    let mut kept = first;
+    for at in first..ids.len() {
+        let id = ids[at];
+        if keep(id) {
+            ids[kept] = id;
+            kept += 1;
+        }
+    }
+    ids.truncate(kept);
 }

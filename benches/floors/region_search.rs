@@ -1,0 +1,84 @@
+//! What exactness costs region search: a structure that is asked for points as they
+//! were written, beside the same structure with the points rounded to f32, on a tiling.
+
+use std::hint::black_box;
+
+use cullbench::index::Registry;
+use cullbench::measure::Stopwatch;
+use cullbench::query::ItemId;
+use cullbench::scene::{self, Scene, SeededRng};
+use glam::{DVec3, Vec3};
+
+use super::{ratio, verdict};
+
+const SCENE: &str = "rooms:n=1000000";
+const STRUCTURES: &str = "bsp,octree,quadtree,bvh,wide,uniform-grid";
+const POINTS: usize = 1 << 14;
+/// Time of exact search / time in f32.
+const MOST_TIMES: f64 = 1.25;
+
+/// Points in regions drawn at random: anywhere in them, or within an ulp of f32 of a
+/// face, on either side.
+fn points(scene: &Scene, beside_faces: bool) -> Vec<DVec3> {
+    let boxes = scene.regions.boxes(&scene.items);
+    let mut rng = SeededRng::new(18);
+    let mut point = || {
+        let region = boxes[rng.below(boxes.len())];
+        let [low, high] = [region.min, region.max].map(Vec3::as_dvec3);
+        let mut at = low + (high - low) * rng.point();
+        if beside_faces {
+            let (axis, side) = (rng.below(3), rng.below(2));
+            let face = [region.min, region.max][side][axis];
+            let ulp = f64::from(face.abs().next_up()) - f64::from(face.abs());
+            at[axis] = f64::from(face) + rng.between(-1.0, 1.0) * ulp;
+        }
+        scene.origin + at
+    };
+    (0..POINTS).map(|_| point()).collect()
+}
+
+/// Judges each structure on both kinds of points; how many are missed.
+pub fn missed(only_test: bool, turns: usize) -> u32 {
+    let source = if only_test { "rooms:n=1000" } else { SCENE };
+    let scene = scene::load(source, &Default::default()).expect(source);
+    let boxes = scene.regions.boxes(&scene.items);
+    let asked = [("anywhere", false), ("beside faces", true)];
+    let asked = asked.map(|(where_, beside_faces)| (where_, points(&scene, beside_faces)));
+    let mut missed = 0;
+    for spec in Registry::builtin()
+        .structures(STRUCTURES)
+        .expect(STRUCTURES)
+    {
+        let index = spec.build(boxes).expect("a build");
+        for (where_, points) in &asked {
+            let mut out: Vec<ItemId> = Vec::new();
+            let mut timed = |ask: &dyn Fn(DVec3, &mut Vec<ItemId>)| {
+                let watch = Stopwatch::start();
+                for &p in points {
+                    out.clear();
+                    ask(p, &mut out);
+                    black_box(&out);
+                }
+                watch.lap().cpu_ns
+            };
+            let in_f32 = |p: DVec3, out: &mut Vec<ItemId>| {
+                index.locate(black_box((p - scene.origin).as_vec3()), out);
+            };
+            let exactly = |p: DVec3, out: &mut Vec<ItemId>| {
+                scene.search(&scene.sought(p), out, |p, out| index.locate(p, out));
+            };
+            let timed = std::cell::RefCell::new(&mut timed);
+            let turn = |ask: &dyn Fn(DVec3, &mut Vec<ItemId>)| (timed.borrow_mut())(ask);
+            let [times, low, high] = ratio(turns, || turn(&exactly), || turn(&in_f32));
+            let holds = only_test || times <= MOST_TIMES;
+            missed += u32::from(!holds);
+            println!(
+                "{source}: {} finds the regions of points {where_} exactly in {times:.2} x \
+                 [{low:.2}, {high:.2}] the time in f32, at most {MOST_TIMES} x: {}",
+                spec.label,
+                verdict(only_test, holds)
+            );
+        }
+    }
+    missed
+}
