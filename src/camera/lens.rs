@@ -256,7 +256,9 @@ impl Camera {
         let matrix = ViewProjection::new(entries, convention)?;
         let [_, up, _, forward] = matrix.rows.map(|[x, y, z, _]| DVec3::new(x, y, z));
         let eye = matrix.eye;
-        let frame = Pose::Forward { eye, forward, up }.frame()?;
+        // What is visible does not depend on the frame, so any up will do.
+        let with = |up: DVec3| Pose::Forward { eye, forward, up }.frame();
+        let frame = with(up).or_else(|_| with(forward.any_orthogonal_vector()))?;
         Ok(Camera {
             frame,
             lens: Lens::Matrix(matrix),

@@ -21,7 +21,7 @@ const DERIVED: f64 = 1.0 / (1u64 << 49) as f64;
 
 /// Sums of the plane test must stay below this: half the largest f32, because
 /// a node's bounds may be wider than its items'.
-const LARGEST: f64 = (f32::MAX / 2.0) as f64;
+pub(super) const LARGEST_SUM: f64 = (f32::MAX / 2.0) as f64;
 
 /// What the margins of one volume's planes depend on.
 pub(super) struct Margin {
@@ -155,9 +155,14 @@ fn reach(near: &[DVec3; 4], far: Option<&[DVec3; 4]>, of_scene: DVec3) -> DVec3 
 /// # Errors
 /// The largest sum there may be, if not.
 pub(crate) fn check_sums(volume: &ConvexVolume, reach: DVec3) -> Result<(), CameraError> {
-    let planes = volume.planes().iter();
-    let sums = planes.map(|p| p.normal.as_dvec3().abs().dot(reach) + f64::from(p.d).abs());
+    let sums = volume.planes().iter().map(|p| largest_sum(p, reach));
     let largest = sums.fold(0.0, f64::max);
     let error = CameraError::Sums { largest };
-    (largest <= LARGEST).then_some(()).ok_or(error)
+    (largest <= LARGEST_SUM).then_some(()).ok_or(error)
+}
+
+/// What the parts of a plane's sum can add up to within `reach`; no number for a plane
+/// that holds one.
+pub(super) fn largest_sum(plane: &Plane, reach: DVec3) -> f64 {
+    plane.normal.as_dvec3().abs().dot(reach) + f64::from(plane.d).abs()
 }

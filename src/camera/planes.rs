@@ -5,7 +5,7 @@
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::margin::{Margin, TINY, check_sums};
+use super::margin::{LARGEST_SUM, Margin, TINY, check_sums, largest_sum};
 use super::projection::{double, single};
 use super::{Camera, CameraError, ClipSpace, Frame, Lens};
 use crate::geometry::{
@@ -91,7 +91,8 @@ impl Camera {
 
     /// The view volume with further planes (scene-local, of unit length), each
     /// rounded to f32 and moved outward like the six: their own errors must be
-    /// small against 2^-24.
+    /// small against 2^-24. Those that f32 cannot hold are left out, which is
+    /// always safe.
     ///
     /// # Errors
     /// As [`Camera::volume`]; more planes than a volume has.
@@ -106,7 +107,7 @@ impl Camera {
         let named = self.derive(&zero, options.method)?;
         let margin = self.margin(&zero, of_scene, options);
         let moved = |name, plane: &Plane| margin.moved(name, plane, 0.0);
-        let volume = gathered(&named, more, options.epsilon, moved)?;
+        let volume = gathered(&named, more, options.epsilon, of_scene, moved)?;
         check_sums(&volume, of_scene)?;
         Ok(volume)
     }
@@ -170,8 +171,9 @@ impl Camera {
         let of_eye = local.eye.abs().element_sum() * f64::EPSILON;
         let slack = of_eye + margin.reach.element_sum() * TINY;
         let moved = |name, plane: &Plane| margin.moved(name, plane, slack);
-        let planes = gathered(&named, &more, epsilon, moved)?;
-        check_sums(&planes, reach + zero.abs())?;
+        let reach = reach + zero.abs();
+        let planes = gathered(&named, &more, epsilon, reach, moved)?;
+        check_sums(&planes, reach)?;
         Ok(RelativeVolume::new(eye, planes)?)
     }
 }
@@ -222,15 +224,17 @@ fn gathered(
     named: &[(FrustumPlane, Plane)],
     more: &[PlaneF64],
     epsilon: f64,
+    reach: DVec3,
     moved: impl Fn(Option<FrustumPlane>, &Plane) -> Plane,
 ) -> Result<ConvexVolume, VolumeError> {
-    let more = more.iter().map(|plane| (None, plane.narrow()));
-    let named = named.iter().map(|&(name, plane)| (Some(name), plane));
-    let all = named.chain(more).map(|(name, plane)| match epsilon > 0.0 {
-        true => (name, moved(name, &plane)),
-        false => (name, plane),
-    });
-    ConvexVolume::from_labelled_planes(&all.collect::<Vec<_>>())
+    let placed = |name, plane: &Plane| match epsilon > 0.0 {
+        true => (name, moved(name, plane)),
+        false => (name, *plane),
+    };
+    let more = more.iter().map(|plane| placed(None, &plane.narrow()));
+    let more = more.filter(|(_, plane)| largest_sum(plane, reach) <= LARGEST_SUM);
+    let named = named.iter().map(|(name, plane)| placed(Some(*name), plane));
+    ConvexVolume::from_labelled_planes(&named.chain(more).collect::<Vec<_>>())
 }
 
 type NamedPlanes = Vec<(FrustumPlane, Plane)>;

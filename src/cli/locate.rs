@@ -11,7 +11,7 @@ use super::compare_structures::{Row, all_agree, ask_all, write};
 use super::{Ending, load_scene, unread_is_fine};
 use crate::index::{DynIndex, Registry, StructureSpec};
 use crate::path::read_points_csv;
-use crate::scene::{Scene, Sought, SoughtBox, read_boxes_csv};
+use crate::scene::{Scene, Sought, SoughtBox, read_sought_boxes_csv};
 
 pub fn locate(registry: &Registry, args: &LocateArgs) -> anyhow::Result<Ending> {
     let structures = args.kernel.structures(registry, &args.structure)?;
@@ -65,8 +65,8 @@ fn by_points(scene: &Scene, structures: &[StructureSpec], file: &Path) -> anyhow
 /// The items that overlap each box.
 fn by_boxes(scene: &Scene, structures: &[StructureSpec], file: &Path) -> anyhow::Result<Vec<Row>> {
     let (input, name) = open(file)?;
-    let read = read_boxes_csv(input, &name, false)?;
-    let boxes: Vec<SoughtBox> = read.written().map(|b| scene.sought_box(b)).collect();
+    let boxes = read_sought_boxes_csv(input, &name)?.into_iter();
+    let boxes: Vec<SoughtBox> = boxes.map(|b| scene.sought_box(b)).collect();
     let ask = |index: &dyn DynIndex, n: usize, out: &mut Vec<_>, cost: &mut _| {
         index.query_counted((&boxes[n].volume).into(), out, cost);
         out.clear();

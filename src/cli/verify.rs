@@ -44,6 +44,8 @@ struct Outcome {
     ok: bool,
     verdicts: u64,
     mismatches: usize,
+    /// Whether answers were held against the cameras as written, beside each other.
+    against_cameras: bool,
     seconds: f64,
     seed: u64,
     cases: u64,
@@ -136,6 +138,7 @@ pub fn verify(registry: &Registry, args: &VerifyArgs) -> anyhow::Result<Ending> 
         ok: checks.iter().all(|c| c.difference.is_none()),
         verdicts: checks.iter().map(|c| c.verdicts).sum(),
         mismatches: checks.iter().filter(|c| c.difference.is_some()).count(),
+        against_cameras: is_safe(&culling),
         seconds: started.elapsed().as_secs_f64(),
         seed: args.seed,
         cases,
@@ -475,6 +478,13 @@ fn show(outcome: &Outcome, format: TableFormat) -> io::Result<()> {
         outcome.verdicts as f64 / outcome.seconds / 1e6,
         text::counted(outcome.mismatches, "mismatch")
     )?;
+    if !outcome.against_cameras {
+        writeln!(
+            out,
+            "Planes without the whole margin may lose what is visible: structures were held \
+             against each other, not against the cameras."
+        )?;
+    }
     Ok(())
 }
 

@@ -11,22 +11,26 @@ use glam::DVec3;
 use crate::arithmetic::cross;
 use crate::geometry::{MAX_PLANES, PlaneF64};
 
+/// How true planes must be to be of use, as a share of their magnitudes: where they
+/// are rounded to f32, one of the units that the epsilon covers.
+pub const FOR_F32: f64 = 1.0 / (1u64 << 24) as f64;
+/// Where they stay f64 and nothing is moved outward.
+pub const FOR_F64: f64 = 1.0 / (1u64 << 40) as f64;
+
 /// The volume's bounds along the axes: up to six planes, fewer where it has no
-/// bound.
+/// bound or f64 cannot make one that is true to `unit`.
 ///
 /// Each is a sum of three faces, with positive weights, that leaves one axis
 /// of the normal. O(m^3) for m faces.
-pub fn bounds(faces: &[PlaneF64]) -> Vec<PlaneF64> {
+pub fn bounds(faces: &[PlaneF64], unit: f64) -> Vec<PlaneF64> {
     /// Of a product of unit vectors.
     const ROUNDING: f64 = 1e-14;
-    /// What may be taken for rounding of a sum of length 1: one of the units
-    /// that the epsilon covers.
-    const UNIT: f64 = 1.0 / (1u64 << 24) as f64;
     /// The faces' own roundings (2^-53 of each of nine numbers) over the sum
-    /// of them that is left. Axis planes need 2 of the 8 units of 2^-24 that
-    /// the epsilon covers, and so 5 may go here. Views of up to 179.99 degrees
-    /// keep their bounds with that.
+    /// of them that is left, at [`FOR_F32`]. Axis planes need 2 of the 8 units of
+    /// 2^-24 that the epsilon covers, and so 5 may go here. Views of up to 179.99
+    /// degrees keep their bounds with that.
     const CANCELLED: f64 = 2e-9;
+    let cancelled = CANCELLED * (FOR_F32 / unit);
     let mut tightest: [Option<f64>; 6] = [None; 6];
     for [a, b, c] in triples(faces) {
         let crossed = [
@@ -51,7 +55,7 @@ pub fn bounds(faces: &[PlaneF64]) -> Vec<PlaneF64> {
             };
             let (n, d) = (sum(&|p| p.normal[axis]), sum(&|p| p.d));
             let offset = d / n.abs();
-            let sound = n.abs() > CANCELLED && dropped <= UNIT * n.abs();
+            let sound = n.abs() > cancelled && dropped <= unit * n.abs();
             if sound && offset.is_finite() {
                 let slot = &mut tightest[2 * axis + usize::from(n < 0.0)];
                 *slot = Some(slot.map_or(offset, |old| old.min(offset)));
@@ -70,10 +74,12 @@ pub fn bounds(faces: &[PlaneF64]) -> Vec<PlaneF64> {
 /// Each is the sum of two faces that pull the axis both ways; only sums that
 /// touch the volume are kept, the tightest ones if there are too many for
 /// `room`. O(m^3) for the m faces' corners and O(m^2) sums.
-pub fn silhouettes(faces: &[PlaneF64], room: usize) -> Vec<PlaneF64> {
-    /// Of faces of unit length: a sum shorter than this has lost too many digits
-    /// to be a plane (1e-9 of it would be noise). Doing without is always safe.
+pub fn silhouettes(faces: &[PlaneF64], room: usize, unit: f64) -> Vec<PlaneF64> {
+    /// Of faces of unit length, at [`FOR_F32`]: a sum shorter than this has lost too
+    /// many digits to be a plane (1e-9 of it would be noise). Doing without is always
+    /// safe.
     const CANCELLED: f64 = 1e-7;
+    let cancelled = CANCELLED * (FOR_F32 / unit);
     /// How near to a corner a sum must pass, as a share of the magnitudes
     /// there: far above rounding, far below the gap of a sum that is idle.
     const TIGHT: f64 = 1e-7;
@@ -91,7 +97,7 @@ pub fn silhouettes(faces: &[PlaneF64], room: usize) -> Vec<PlaneF64> {
                 let length = normal.length();
                 let d = (a.d * against.abs() + b.d * pull.abs()) / length;
                 let plane = PlaneF64::new(normal / length, d);
-                if length < CANCELLED {
+                if length < cancelled {
                     continue;
                 }
                 let gaps = corners.iter().map(|&corner| share(&plane, corner));
@@ -108,10 +114,10 @@ pub fn silhouettes(faces: &[PlaneF64], room: usize) -> Vec<PlaneF64> {
 }
 
 /// What the exact test needs beside the faces: bounds and silhouettes.
-pub fn extended(faces: &[PlaneF64]) -> Vec<PlaneF64> {
-    let bounds = bounds(faces);
+pub fn extended(faces: &[PlaneF64], unit: f64) -> Vec<PlaneF64> {
+    let bounds = bounds(faces, unit);
     let room = MAX_PLANES.saturating_sub(faces.len() + bounds.len());
-    [bounds, silhouettes(faces, room)].concat()
+    [bounds, silhouettes(faces, room, unit)].concat()
 }
 
 /// The corners of a volume, to f64 rounding.

@@ -14,7 +14,7 @@ use crate::geometry::{
 };
 use crate::query::AnyVolume;
 
-pub use extended::{bounds, extended, silhouettes};
+pub use extended::{FOR_F32, FOR_F64, bounds, extended, silhouettes};
 
 named! {
     /// How a box is tested against the volume.
@@ -133,13 +133,13 @@ impl Culling {
             Arithmetic::F32 => self.in_f32(camera, around),
             Arithmetic::F64 => {
                 let mut planes = camera.convex_volume_f64(around)?.planes().to_vec();
-                let more = self.more(&faces_about_eye(camera)?);
+                let more = self.more(&faces_about_eye(camera)?, FOR_F64);
                 planes.extend(more.iter().map(|plane| plane.about(-local_eye)));
                 let volume = ConvexVolumeF64::from_planes(&planes).map_err(CameraError::from)?;
                 Ok(CameraView::Wide(volume))
             }
             Arithmetic::F32Relative => {
-                let more = self.more(&faces_about_eye(camera)?);
+                let more = self.more(&faces_about_eye(camera)?, FOR_F32);
                 let epsilon = self.planes.epsilon;
                 let volume = camera.relative_volume(&more, epsilon, around)?;
                 Ok(CameraView::Relative(volume))
@@ -182,7 +182,7 @@ impl Culling {
                 let wide = faces.planes().iter().map(PlaneF64::from);
                 wide.map(|plane| plane.about(local_eye)).collect()
             };
-            self.more(&faces)
+            self.more(&faces, FOR_F32)
         } else {
             Vec::new()
         };
@@ -199,12 +199,12 @@ impl Culling {
         })
     }
 
-    /// What the test asks for beyond the faces.
-    fn more(&self, faces: &[PlaneF64]) -> Vec<PlaneF64> {
+    /// What the test asks for beyond the faces, true to `unit`.
+    fn more(&self, faces: &[PlaneF64], unit: f64) -> Vec<PlaneF64> {
         match self.test {
             CullingTest::Sphere | CullingTest::SixPlane => Vec::new(),
-            CullingTest::SixBox => bounds(faces),
-            CullingTest::Exact => extended(faces),
+            CullingTest::SixBox => bounds(faces, unit),
+            CullingTest::Exact => extended(faces, unit),
         }
     }
 }
@@ -250,6 +250,55 @@ mod tests {
         assert_eq!(planes(CullingTest::SixBox), 12);
         let exact = planes(CullingTest::Exact);
         assert!((24..=30).contains(&exact), "{exact}");
+    }
+
+    /// A view a hundred million times as high as wide: sums of its planes cancel.
+    #[test]
+    fn nothing_in_the_middle_of_a_needle_is_lost_in_any_arithmetic() {
+        for (fovy, aspect) in [(1e-6, 1e-8), (1e-5, 1e-7), (1e-9, 1e-8), (1e-3, 1e-4)] {
+            let forward = DVec3::new(3.0, 2.0, -1.0).normalize();
+            let frame = Frame::looking_along(DVec3::ZERO, forward, DVec3::Z).unwrap();
+            let lens = Lens::perspective(fovy, aspect, 1.0, Some(100.0)).unwrap();
+            let camera = Camera { frame, lens };
+            let half = 50.0 * libm::tan(f64::to_radians(fovy) / 2.0);
+            for (test, name, _) in TESTS {
+                for (arithmetic, number, _) in ARITHMETICS {
+                    let culling = of(test, arithmetic);
+                    if culling.check().is_err() {
+                        continue;
+                    }
+                    let view = culling.view(&camera, &AROUND).unwrap();
+                    for share in [-0.9, -0.5, 0.0, 0.1, 0.5, 0.9] {
+                        let at = forward * 50.0 + frame.v() * (half * share);
+                        let at = at.as_vec3();
+                        let b = Aabb::new(at.map(f32::next_down), at.map(f32::next_up));
+                        assert!(
+                            view.as_any().sees(&b),
+                            "{name} {number}, {fovy} by {aspect}: {share} is lost"
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    /// Nothing but the test's own planes is too large for f32.
+    #[test]
+    fn further_planes_that_f32_cannot_hold_are_left_out() {
+        let frame = Frame::looking_along(DVec3::ZERO, DVec3::new(0.6, 0.0, -0.8), DVec3::Y);
+        let lens = Lens::perspective(90.0, 1.0, 1e-3, Some(1.6e38)).unwrap();
+        let frame = frame.unwrap();
+        let around = Surroundings {
+            origin: DVec3::ZERO,
+            reach: Vec3::splat(1e30),
+        };
+        let view = |test, arithmetic| of(test, arithmetic).view(&Camera { frame, lens }, &around);
+        for arithmetic in [Arithmetic::F32, Arithmetic::F32Relative] {
+            assert!(view(CullingTest::SixPlane, arithmetic).is_ok());
+            for test in [CullingTest::SixBox, CullingTest::Exact] {
+                view(test, arithmetic).unwrap();
+            }
+        }
     }
 
     #[test]

@@ -49,10 +49,15 @@ pub enum VolumeError {
         count: usize,
     },
     /// A plane in f32 with a NaN or infinite number.
-    #[error("plane {index} is not finite: ({}, {}, {}, {})", plane.normal.x, plane.normal.y, plane.normal.z, plane.d)]
+    #[error(
+        "{} is not finite: ({}, {}, {}, {})", label(*index, *name),
+        plane.normal.x, plane.normal.y, plane.normal.z, plane.d
+    )]
     NonFinitePlane {
         /// Its position in the list.
         index: usize,
+        /// Its name, of a frustum's planes.
+        name: Option<FrustumPlane>,
         /// The plane itself.
         plane: Plane,
     },
@@ -70,6 +75,14 @@ pub enum VolumeError {
         /// The eye in scene coordinates.
         eye: Vec3,
     },
+}
+
+/// What messages call a plane.
+fn label(index: usize, name: Option<FrustumPlane>) -> String {
+    match name {
+        Some(name) => format!("the {} plane", name.name()),
+        None => format!("plane {index}"),
+    }
 }
 
 /// The closed intersection of up to [`MAX_PLANES`] half-spaces.
@@ -156,7 +169,7 @@ impl ConvexVolume {
         };
         for (index, (plane, name)) in planes.enumerate() {
             if !plane.is_finite() {
-                return Err(VolumeError::NonFinitePlane { index, plane });
+                return Err(VolumeError::NonFinitePlane { index, name, plane });
             }
             volume.planes[index] = plane;
             volume.names[index] = name;

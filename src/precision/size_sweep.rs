@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 use serde::Serialize;
 
 use crate::camera::{Camera, CameraError, Frame, Lens, PlaneOptions, Surroundings};
-use crate::culling::{bounds, extended, silhouettes};
+use crate::culling::{FOR_F32, bounds, extended, silhouettes};
 use crate::geometry::{
     Aabb, BoxBlocks, ConvexVolume, ConvexVolumeF64, MAX_PLANES, PlaneF64, Spheres, sphere_cube,
 };
@@ -177,14 +177,14 @@ impl Views {
             ..moved
         };
         let with = |more: &[PlaneF64], options| camera.volume_with(more, options, &around);
-        let silhouettes = silhouettes(faces, MAX_PLANES - faces.len());
-        let all = extended(faces);
+        let silhouettes = silhouettes(faces, MAX_PLANES - faces.len(), FOR_F32);
+        let all = extended(faces, FOR_F32);
         let six = with(&[], &bare)?;
         Ok(Views {
             spheres: Spheres::new(&six),
             volumes: [
                 six,
-                with(&bounds(faces), &bare)?,
+                with(&bounds(faces, FOR_F32), &bare)?,
                 with(&silhouettes, &bare)?,
                 with(&all, &bare)?,
                 with(&all, &moved)?,

@@ -27,6 +27,41 @@ pub fn read_boxes_csv(
     file: &str,
     skip_bad_items: bool,
 ) -> Result<Scene, InputError> {
+    let rows = read_rows(input, file, f64::from(f32::MAX))?;
+    if let Some(first) = rows.first_bad.filter(|_| !skip_bad_items) {
+        return Err(match rows.bad {
+            1 => first,
+            count => InputError::BadItems {
+                first: Box::new(first),
+                count,
+            },
+        });
+    }
+    let mut scene = Scene::from_boxes(file, &rows.boxes)?;
+    scene.labels = rows.labels;
+    scene.skipped_items = rows.bad;
+    Ok(scene)
+}
+
+/// Boxes to search by, of the same form: any numbers of f64.
+///
+/// # Errors
+/// [`InputError::Line`] for a missing or wrong header and the first bad row.
+pub fn read_sought_boxes_csv(input: impl Read, file: &str) -> Result<Vec<WorldBox>, InputError> {
+    let rows = read_rows(input, file, f64::MAX)?;
+    rows.first_bad.map_or(Ok(rows.boxes), Err)
+}
+
+/// What a file holds, and what is wrong with it.
+struct Rows {
+    boxes: Vec<WorldBox>,
+    labels: Vec<Labels>,
+    first_bad: Option<InputError>,
+    bad: usize,
+}
+
+/// Reads all rows; bad is also a bound beyond `limit`.
+fn read_rows(input: impl Read, file: &str, limit: f64) -> Result<Rows, InputError> {
     let mut table = TableReader::open(input, file)?;
     let columns = table.columns(&BOUNDS)?;
     let others = table.header().iter().enumerate();
@@ -50,7 +85,6 @@ pub fn read_boxes_csv(
                         format!("an inverted box, min_{name} {low:?} > max_{name} {high:?}");
                     return Err(row.error(found, format!("min_{name} <= max_{name}")));
                 }
-                let limit = f64::from(f32::MAX);
                 if low < -limit || high > limit {
                     let found = format!("a bound beyond the range of f32 ({low:?} to {high:?})");
                     return Err(row.error(found, format!("numbers within +-{limit:e}")));
@@ -69,19 +103,12 @@ pub fn read_boxes_csv(
             }
         }
     }
-    if let Some(first) = first_bad.filter(|_| !skip_bad_items) {
-        return Err(match bad {
-            1 => first,
-            count => InputError::BadItems {
-                first: Box::new(first),
-                count,
-            },
-        });
-    }
-    let mut scene = Scene::from_boxes(file, &boxes)?;
-    scene.labels = labels.into_iter().map(|(_, label)| label).collect();
-    scene.skipped_items = bad;
-    Ok(scene)
+    Ok(Rows {
+        boxes,
+        labels: labels.into_iter().map(|(_, label)| label).collect(),
+        first_bad,
+        bad,
+    })
 }
 
 /// Writes a scene's boxes as they were written, in world coordinates, with its

@@ -35,7 +35,7 @@ use glam::DVec3;
 use crate::geometry::{Aabb, PlaneTree};
 use crate::input::InputError;
 
-pub use boxes_csv::{read_boxes_csv, write_boxes_csv};
+pub use boxes_csv::{read_boxes_csv, read_sought_boxes_csv, write_boxes_csv};
 pub use generate::{FAMILIES, Family, GENERATOR_NAME};
 pub use labels::Labels;
 pub use memory::{fits, needed_bytes};
@@ -228,7 +228,11 @@ fn origin_between(low: DVec3, high: DVec3) -> DVec3 {
         }
         let floor = centre.abs() * f64::EPSILON;
         let grid = libm::exp2(libm::floor(libm::log2(width.max(floor))));
-        (centre / grid).round() * grid
+        match grid {
+            // Nearer to zero than f64 can divide by.
+            0.0 => 0.0,
+            grid => (centre / grid).round() * grid,
+        }
     };
     DVec3::new(axis(0), axis(1), axis(2))
 }
@@ -258,6 +262,16 @@ mod tests {
         assert_eq!((world.min.x, world.max.x), (1e9 + 0.25, 1e9 + 100.5));
         // One far point: width zero.
         assert!(scene(1e7, 1e7).items[0].min.x.abs() < 1.0);
+    }
+
+    #[test]
+    fn a_flat_scene_next_to_zero_stays_there() {
+        for power in [-1074, -1040, -1030, -1023, -1022, -1021, -1000, -300] {
+            let at = -libm::exp2(f64::from(power));
+            let scene = scene(at, at);
+            assert!(scene.origin.is_finite(), "2^{power}: {}", scene.origin);
+            assert_eq!(scene.written().next().unwrap().min.x, at, "2^{power}");
+        }
     }
 
     #[test]

@@ -102,6 +102,17 @@ impl<'a> At<'a> {
         said.ok_or_else(|| self.wrong(&of(value), "a number, NaN, Infinity or -Infinity"))
     }
 
+    /// A number that f32 holds: the answers beside it are about this very number.
+    /// What is beyond its range is infinite.
+    pub fn f32_number(&self, value: &Value) -> Result<f32, InputError> {
+        let number = self.number(value)?;
+        let narrow = number as f32;
+        match !narrow.is_finite() || f64::from(narrow) == number {
+            true => Ok(narrow),
+            false => Err(self.wrong(&of(value), "a number that f32 holds without rounding")),
+        }
+    }
+
     pub fn vector(&self, value: &Value) -> Result<DVec3, InputError> {
         let [x, y, z] = self.exactly(value, "three numbers")?;
         let number = |(at, value): (At, &Value)| at.number(value);
@@ -159,13 +170,17 @@ impl<'a> At<'a> {
         })
     }
 
-    /// Bounds are f32 numbers, and the nearest ones if they are not.
+    /// Bounds are f32 numbers.
     pub fn bounds(&self, value: &Value) -> Result<(String, Aabb), InputError> {
         let object = self.object(value)?;
         let name = self.child("id").name(self.required(object, "id")?)?;
-        let corner = |field: &str| self.child(field).vector(self.required(object, field)?);
-        let bounds = Aabb::new(corner("lo")?.as_vec3(), corner("hi")?.as_vec3());
-        Ok((name, bounds))
+        let corner = |field: &str| -> Result<Vec3, InputError> {
+            let corner = self.required(object, field)?;
+            let [x, y, z] = self.child(field).exactly(corner, "three numbers")?;
+            let number = |(at, value): (At, &Value)| at.f32_number(value);
+            Ok(Vec3::new(number(x)?, number(y)?, number(z)?))
+        };
+        Ok((name, Aabb::new(corner("lo")?, corner("hi")?)))
     }
 
     pub fn point(&self, value: &Value) -> Result<VectorPoint, InputError> {
@@ -173,10 +188,7 @@ impl<'a> At<'a> {
         let field = "expected_containing";
         Ok(VectorPoint {
             id: self.child("id").name(self.required(object, "id")?)?,
-            p: self
-                .child("p")
-                .vector(self.required(object, "p")?)?
-                .as_vec3(),
+            p: self.child("p").vector(self.required(object, "p")?)?,
             containing: self.child(field).names(self.required(object, field)?)?,
         })
     }

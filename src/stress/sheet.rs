@@ -301,9 +301,18 @@ impl Sheet<'_> {
         let vector = self.vector;
         for (spec, built) in built {
             for point in &vector.points {
-                let found = self.answer(built, |index, cost, out| match cost {
-                    None => index.locate(point.p, out),
-                    Some(cost) => index.query_counted(point.p.into(), out, cost),
+                let holds = |id: &ItemId| {
+                    let b = &self.items[*id as usize];
+                    let (min, max) = (b.min.as_dvec3(), b.max.as_dvec3());
+                    point.p.cmpge(min).all() && point.p.cmple(max).all()
+                };
+                // Boxes are f32: a point that is none can only find too many.
+                let found = self.answer(built, |index, cost, out| {
+                    match cost {
+                        None => index.locate(point.p.as_vec3(), out),
+                        Some(cost) => index.query_counted(point.p.as_vec3().into(), out, cost),
+                    }
+                    out.retain(holds);
                 });
                 let list: Vec<String> = point.containing.iter().cloned().collect();
                 let right = found.as_ref() == Ok(&list);

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
 use crate::camera::{Camera, CameraError, Lens, look_at};
 use crate::geometry::{Aabb, Plane};
@@ -73,8 +73,8 @@ pub struct VectorCamera {
 pub struct VectorPoint {
     /// Name of the point.
     pub id: String,
-    /// The point in scene coordinates.
-    pub p: Vec3,
+    /// The point in scene coordinates, as written.
+    pub p: DVec3,
     /// Names of the boxes that hold it, bounds included.
     pub containing: Names,
 }
