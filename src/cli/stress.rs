@@ -15,8 +15,8 @@ use crate::index::{Execution, Registry, StructureSpec};
 use crate::kernel::Kernel;
 use crate::stress::extremes::{DEFAULT_CASES, Extremes, Progress, Tally};
 use crate::stress::{
-    Row, Section, Status, VISIBILITY_FAMILIES, Vector, built_in, occlusion_cases,
-    read_vectors_file, replay,
+    Row, Section, Status, VISIBILITY_FAMILIES, Vector, built_in, read_vectors_file, replay,
+    visibility_cases,
 };
 
 pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> {
@@ -56,8 +56,7 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
     let case_passes = passes
         .iter()
         .map(|&(_, cases)| Extremes { cases, ..extremes }.total());
-    let stages = VISIBILITY_FAMILIES.iter().filter(|_| cases > 0);
-    let stage_passes = stages.clone().count() as u64;
+    let stage_passes = (VISIBILITY_FAMILIES.len() * passes.len()) as u64;
     let bar = ProgressBar::new(vector_passes + case_passes.sum::<u64>() + stage_passes);
     for (kernel, cases) in passes {
         let by_kernel = |spec: &StructureSpec| {
@@ -81,6 +80,7 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
                 ..extremes
             };
             found.extend(extremes.run(&Shown(&bar)));
+            found.extend(of_stages(cases, args.seed, kernel, &bar));
         }
         if kernel != chosen {
             by_others += found
@@ -90,17 +90,6 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
             found = failures(found, kernel);
         }
         sections.extend(found);
-    }
-    for family in stages {
-        bar.set_message(family.0);
-        let of_stage = 0..cases.saturating_mul(STAGE_CASES);
-        sections.push(occlusion_cases(
-            *family,
-            of_stage,
-            args.seed,
-            &interrupt::asked,
-        ));
-        bar.inc(1);
     }
     let interrupted = interrupt::asked();
     bar.finish_and_clear();
@@ -128,7 +117,19 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
     })
 }
 
-/// Cases of each family of the occlusion stage for one of each extreme: they are small.
+/// The families of the other stages, by an instruction set.
+fn of_stages(cases: u64, seed: u64, kernel: Kernel, bar: &ProgressBar) -> Vec<Section> {
+    let sections = VISIBILITY_FAMILIES.iter().map(|family| {
+        bar.set_message(family.name);
+        let cases = 0..cases.saturating_mul(STAGE_CASES);
+        let section = visibility_cases(*family, cases, seed, kernel, &interrupt::asked);
+        bar.inc(1);
+        section
+    });
+    sections.collect()
+}
+
+/// Cases of each family of the other stages for one of each extreme: they are small.
 const STAGE_CASES: u64 = 10;
 
 /// Cases of each extreme by another instruction set than the chosen one.

@@ -1,18 +1,19 @@
 //! The triangle stage on what the chain leaves: the faces of those items in clusters, and
-//! every back end that tells which of them are turned away. Of solid boxes clusters are
+//! every back end that tells which of them are turned away or beside the image. Of solid boxes clusters are
 //! made for each view; of a mesh once, and a back end passes over those of other items.
 
+use std::cell::OnceCell;
 use std::rc::Rc;
 use std::sync::Arc;
 
 use super::judged::Judged;
 use super::pass::Pass;
-use super::triangle_rows::sides;
+use super::triangle_rows::rows;
 use super::world::World;
 use crate::kernel::Kernel;
 use crate::scene::Surfaces;
 use crate::visibility::triangle::{
-    Clusters, Counts, MOST_TRIANGLES, Selection, TriangleCull, View, facing,
+    Clusters, Counts, Criterion, MOST_TRIANGLES, Selection, TriangleCull, View, truth,
 };
 
 /// Bytes that the study of a mesh takes for each triangle, beside its scene: a tree for
@@ -29,7 +30,7 @@ impl Built {
     fn of(surfaces: Arc<Surfaces>) -> Rc<Built> {
         let clusters = Arc::new(Clusters::of(surfaces, MOST_TRIANGLES));
         Rc::new(Built {
-            culls: sides().map(|row| (row.build)(&clusters)).collect(),
+            culls: rows().map(|row| (row.build)(&clusters)).collect(),
             clusters,
         })
     }
@@ -40,6 +41,15 @@ struct Left {
     built: Rc<Built>,
     given: Selection,
     view: View,
+    /// By criterion: what should be left, found where it is asked for.
+    truths: [OnceCell<Selection>; Criterion::ALL.len()],
+}
+
+impl Left {
+    fn truth(&self, criterion: Criterion) -> &Selection {
+        let find = || truth(criterion, &self.built.clusters, &self.view, &self.given);
+        self.truths[criterion as usize].get_or_init(find)
+    }
 }
 
 /// The faces of what is left of every view.
@@ -66,6 +76,7 @@ impl Faces {
                     None => Selection::all(clusters),
                 },
                 view: *world.triangle_view(view),
+                truths: Default::default(),
                 built,
             }
         });
@@ -98,12 +109,15 @@ impl Faces {
         out.extend(kept.map(|(_, cluster)| cluster));
     }
 
-    /// Every view, held against the exact side of each triangle.
+    /// Every view, held against what a back end is to decide by: the exact side of each
+    /// triangle, the window or the samples.
     pub fn judged(&self, back_end: Option<usize>) -> Vec<Judged> {
+        let row = back_end.and_then(|back_end| rows().nth(back_end));
+        let criterion = row.map_or(Criterion::Facing, |row| row.criterion);
         let judged = (0..self.views.len()).map(|view| {
             let left = &self.views[view];
-            let truth = facing(&left.built.clusters, &left.view, &left.given);
-            let counts = Counts::of(&left.given, &self.selected(back_end, view), &truth);
+            let truth = left.truth(criterion);
+            let counts = Counts::of(&left.given, &self.selected(back_end, view), truth);
             Judged {
                 input: counts.candidates as u64,
                 hidden: (counts.candidates - counts.truth) as u64,

@@ -2,15 +2,14 @@
 
 use super::stage::{BackEnd, NONE, StageKind};
 use crate::visibility::Guarantee;
-use crate::visibility::triangle::{Criterion, TRIANGLE_ROWS, TriangleRow};
+use crate::visibility::triangle::{TRIANGLE_ROWS, TriangleRow};
 
 /// What the chain takes.
 pub const DEFAULT: &str = "per-triangle";
 
-/// The rows of the table that decide by the side that the eye is on.
-pub fn sides() -> impl Iterator<Item = &'static TriangleRow> {
-    let sides = TRIANGLE_ROWS.iter();
-    sides.filter(|row| row.criterion == Criterion::Facing && row.name != NONE)
+/// The rows of the table that remove something.
+pub fn rows() -> impl Iterator<Item = &'static TriangleRow> {
+    TRIANGLE_ROWS.iter().filter(|row| row.name != NONE)
 }
 
 /// Every back end, the first of which leaves the stage out.
@@ -23,6 +22,6 @@ pub fn back_ends() -> impl Iterator<Item = BackEnd> {
         does_object_stage: false,
     };
     let none = declared(NONE, "the stage is left out", Guarantee::Conservative);
-    let rows = sides().map(move |row| declared(row.name, row.summary, row.guarantee));
+    let rows = rows().map(move |row| declared(row.name, row.summary, row.guarantee));
     std::iter::once(none).chain(rows)
 }

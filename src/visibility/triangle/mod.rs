@@ -10,6 +10,7 @@ mod cone_safe;
 mod contract;
 mod exact;
 mod eye;
+mod image;
 mod locals;
 mod masks;
 #[cfg(feature = "peers")]
@@ -34,9 +35,10 @@ pub use cone_safe::SafeCones;
 pub use contract::{Criterion, TriangleCull, TriangleRow};
 pub use exact::{faces, normal};
 pub use eye::Eye;
+pub use image::Image;
 #[cfg(feature = "peers")]
 pub use meshopt::MeshoptCones;
-pub use metrics::{Counts, facing};
+pub use metrics::{Counts, facing, truth};
 pub use normal_cone::Cone;
 pub use outcode::{Clipping, clipping};
 pub use screen::Screen;

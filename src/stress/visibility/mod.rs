@@ -1,0 +1,391 @@
+//! Generated extremes of the stages beside the object stage. Whatever a ray sees, exactly,
+//! must be handed on by what promises it: worlds full of contacts, far from the origin,
+//! by every kind of lens; gaps of a fraction of a pixel; faces that coincide or just miss
+//! each other; chains of portals.
+
+mod case;
+mod portals;
+mod slits;
+mod touching;
+mod worlds;
+
+use std::ops::Range;
+
+use glam::DVec3;
+
+use super::{Level, Row, Section, Status};
+use crate::camera::{Lens, PlaneOptions};
+use crate::kernel::Kernel;
+use crate::query::ItemId;
+use crate::scene::{Scene, SeededRng, WorldBox};
+use crate::visibility::occlusion::{
+    Interleaved, MaskedInner, OccluderChoice, OccluderScene, OcclusionBuffer, TwoPass, View,
+};
+use crate::visibility::truth::{RayIndex, visible_by_random_rays};
+use crate::visibility::{Rays, Solids};
+use case::StageCase;
+use portals::Chain;
+use worlds::Kind;
+
+/// Random rays of a case.
+const RAYS: usize = 1_000;
+/// Rays of a case at points of its boxes, most of them next to an edge.
+const RAYS_AT_BOXES: usize = 300;
+
+/// Extremes of one kind.
+#[derive(Clone, Copy)]
+pub struct Family {
+    /// As in the table of results.
+    pub name: &'static str,
+    draw: Draw,
+}
+
+/// A case of a family, by the stage that it is asked of.
+#[derive(Clone, Copy)]
+enum Draw {
+    Occlusion(fn(&mut SeededRng) -> StageCase),
+    Region(fn(&mut SeededRng) -> Chain),
+}
+
+const fn occlusion(name: &'static str, draw: fn(&mut SeededRng) -> StageCase) -> Family {
+    let draw = Draw::Occlusion(draw);
+    Family { name, draw }
+}
+
+const fn region(name: &'static str, draw: fn(&mut SeededRng) -> Chain) -> Family {
+    let draw = Draw::Region(draw);
+    Family { name, draw }
+}
+
+/// All of them.
+pub const VISIBILITY_FAMILIES: [Family; 14] = [
+    occlusion("occlusion-contacts", |rng| {
+        worlds::contacts(rng, 0.0, Kind::Perspective)
+    }),
+    occlusion("occlusion-far-out", |rng| {
+        worlds::contacts(rng, 1e7, Kind::Perspective)
+    }),
+    occlusion("occlusion-parallel", |rng| {
+        worlds::contacts(rng, 0.0, Kind::Parallel)
+    }),
+    occlusion("occlusion-off-axis", |rng| {
+        worlds::contacts(rng, 0.0, Kind::OffAxis)
+    }),
+    occlusion("occlusion-fence", slits::fence),
+    occlusion("occlusion-lattice", slits::lattice),
+    occlusion("occlusion-t-junctions", slits::t_junctions),
+    occlusion("occlusion-decals", touching::decals),
+    occlusion("occlusion-eye-at-face", touching::eye_at_face),
+    occlusion("occlusion-same-size", touching::same_size),
+    occlusion("occlusion-infinite-far", touching::infinite_far),
+    occlusion("occlusion-near-plane", touching::near_plane),
+    region("region-chain", |rng| portals::chain(rng, 64, 0.5)),
+    region("region-eye-at-portal", |rng| {
+        let length = 2 + rng.below(8) as u32;
+        let ahead = [1e-9, 0.0][rng.below(2)];
+        portals::chain(rng, length, ahead)
+    }),
+];
+
+/// Cases of a family, each asked by a kernel: a row for each case and back end. `stop` is
+/// asked before each case.
+pub fn visibility_cases(
+    family: Family,
+    cases: Range<u64>,
+    seed: u64,
+    kernel: Kernel,
+    stop: &dyn Fn() -> bool,
+) -> Section {
+    let mut section = Section::new(family.name);
+    for case in cases {
+        if stop() {
+            break;
+        }
+        let mut rng = SeededRng::new(seed.wrapping_mul(0x9E37_79B9).wrapping_add(case));
+        let id = format!("{}/{case}", family.name);
+        section.cases += 1;
+        match family.draw {
+            Draw::Occlusion(draw) => {
+                let case = draw(&mut rng);
+                section.boxes += case.boxes.len() as u64;
+                let back_ends = answers::<MaskedInner>(kernel, "masked-inner");
+                section
+                    .rows
+                    .extend(occlusion_rows(&id, &case, &mut rng, &back_ends));
+            }
+            Draw::Region(draw) => {
+                let chain = draw(&mut rng);
+                section.boxes += chain.len() as u64;
+                section.rows.extend(region_rows(&id, &chain, 0.0));
+            }
+        }
+    }
+    section
+}
+
+fn row(id: &str, structure: &str, test: &str, (status, got): (Status, String)) -> Row {
+    Row {
+        id: id.to_owned(),
+        level: Level::Camera,
+        structure: structure.to_owned(),
+        test: test.to_owned(),
+        status,
+        expected: "everything that a ray sees".into(),
+        got: got.into(),
+    }
+}
+
+/// A back end under its name: what it hands on of the items in view.
+type BackEnd = (
+    String,
+    Box<dyn Fn(&OccluderScene, &View, &[ItemId]) -> Vec<ItemId>>,
+);
+
+/// Both couplings of a buffer, the one of two passes by every choice of occluders.
+fn answers<B: OcclusionBuffer + 'static>(kernel: Kernel, name: &str) -> Vec<BackEnd> {
+    let walk: BackEnd = (
+        name.to_owned(),
+        Box::new(move |scene, view, _| {
+            let mut kept = Vec::new();
+            Interleaved::new(B::new(view.grid), kernel).cull(scene, view, &mut kept);
+            kept
+        }),
+    );
+    let choices = [
+        ("two-pass", OccluderChoice::All),
+        ("two-pass-nearest-8", OccluderChoice::Nearest(8)),
+        ("two-pass-largest-8", OccluderChoice::Largest(8)),
+    ];
+    let two_passes = choices.map(|(coupling, choice)| -> BackEnd {
+        (
+            format!("{name}-{coupling}"),
+            Box::new(move |scene, view, in_view| {
+                let mut kept = Vec::new();
+                let mut two = TwoPass::new(B::new(view.grid), choice, kernel);
+                two.cull(scene, view, in_view, &mut kept);
+                kept
+            }),
+        )
+    });
+    std::iter::once(walk).chain(two_passes).collect()
+}
+
+fn occlusion_rows(
+    id: &str,
+    case: &StageCase,
+    rng: &mut SeededRng,
+    back_ends: &[BackEnd],
+) -> Vec<Row> {
+    let made = Scene::from_boxes(id, &case.boxes).map_err(|error| error.to_string());
+    let made = made.and_then(|scene| {
+        let volume = case
+            .camera
+            .volume(&PlaneOptions::default(), &scene.surroundings());
+        let rays = Rays::of(&case.camera).map_err(|error| error.to_string())?;
+        Ok((volume.map_err(|error| error.to_string())?, rays, scene))
+    });
+    let (volume, rays, scene) = match made {
+        Ok(made) => made,
+        Err(reason) => return vec![row(id, "occlusion", "occlusion", (Status::Fail, reason))],
+    };
+    let solids = Solids::of(&scene);
+    let occluders = OccluderScene::of(&solids);
+    let view = View::new(&rays, &volume, &occluders, case.grid);
+    let items = scene.items.iter().zip(0..);
+    let in_view: Vec<ItemId> = items
+        .filter(|(b, _)| volume.sees(b))
+        .map(|(_, id)| id)
+        .collect();
+    let seen = seen(&RayIndex::build(&solids), &rays, case, rng);
+    let judged = back_ends.iter().map(|(name, answer)| {
+        let kept = answer(&occluders, &view, &in_view);
+        row(id, name, "occlusion", status(&seen, kept, &in_view))
+    });
+    judged.collect()
+}
+
+/// The items in front of random rays, of rays at edges of boxes, and of those where the
+/// family wants to look.
+fn seen(index: &RayIndex, rays: &Rays, case: &StageCase, rng: &mut SeededRng) -> Vec<ItemId> {
+    let seed = rng.below(usize::MAX) as u64;
+    let mut seen = visible_by_random_rays(index, rays, RAYS, seed, 1);
+    let at_boxes =
+        (0..RAYS_AT_BOXES).map(|_| point_of(&case.boxes[rng.below(case.boxes.len())], rng));
+    for point in at_boxes.chain(case.aims.iter().copied()) {
+        if let Some([x, y]) = in_image(rays, point) {
+            let front = index.front_of(&rays.through(x, y));
+            seen.extend(front.into_iter().flat_map(|front| front.items));
+        }
+    }
+    seen.sort_unstable();
+    seen.dedup();
+    seen
+}
+
+/// A point of a box, on each axis anywhere or next to an end.
+fn point_of(b: &WorldBox, rng: &mut SeededRng) -> DVec3 {
+    let mut along = || match rng.below(3) {
+        0 => rng.unit(),
+        1 => rng.unit() * 1e-3,
+        _ => 1.0 - rng.unit() * 1e-3,
+    };
+    b.min + (b.max - b.min) * DVec3::new(along(), along(), along())
+}
+
+/// Where in the image a point is, across and down, if it is in it.
+fn in_image(rays: &Rays, point: DVec3) -> Option<[f64; 2]> {
+    let camera = rays.camera();
+    let about = point - camera.frame.eye;
+    let depth = match camera.lens {
+        Lens::Orthographic { .. } => 1.0,
+        _ => about.dot(camera.frame.forward()),
+    };
+    let [left, right, bottom, top] = rays.window();
+    let across = about.dot(camera.frame.u()) / depth;
+    let up = about.dot(camera.frame.v()) / depth;
+    let at = [
+        (across - left) / (right - left),
+        (up - top) / (bottom - top),
+    ];
+    let is_inside = depth > 0.0 && at.iter().all(|x| (0.0..=1.0).contains(x));
+    is_inside.then_some(at)
+}
+
+/// Whether all that is seen was handed on, and nothing from outside of the view.
+fn status(seen: &[ItemId], mut kept: Vec<ItemId>, in_view: &[ItemId]) -> (Status, String) {
+    kept.sort_unstable();
+    let lost = seen.iter().filter(|id| kept.binary_search(id).is_err());
+    let lost: Vec<u32> = lost.copied().collect();
+    let outside = |id: &&ItemId| in_view.binary_search(id).is_err();
+    match kept.iter().filter(outside).count() {
+        0 => nothing_lost("items", &lost),
+        more if lost.is_empty() => (Status::Fail, format!("{more} items outside of the frustum")),
+        _ => nothing_lost("items", &lost),
+    }
+}
+
+fn nothing_lost(what: &str, lost: &[u32]) -> (Status, String) {
+    if lost.is_empty() {
+        return (Status::Pass, "all of it".to_owned());
+    }
+    let lost: Vec<String> = lost.iter().map(u32::to_string).collect();
+    (
+        Status::Fail,
+        format!("{what} {} are missing", lost.join(", ")),
+    )
+}
+
+/// A row for each back end of the region stage; none where no line of sight is proven.
+fn region_rows(id: &str, chain: &Chain, shrink: f64) -> Vec<Row> {
+    let answers = chain.answers(shrink).unwrap_or_default().into_iter();
+    let rows = answers.map(|answer| {
+        row(
+            id,
+            answer.row,
+            "region",
+            nothing_lost("rooms", &answer.lost),
+        )
+    });
+    rows.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::visibility::occlusion::{MaskedCentre, NoOcclusion, ZBuffer};
+
+    /// Rows of a family that fail, and all of them.
+    fn failing(family: Family, back_ends: &[BackEnd], shrink: f64) -> [usize; 2] {
+        let rows: Vec<Row> = (0..100)
+            .flat_map(|case| {
+                let mut rng = SeededRng::new(case);
+                match family.draw {
+                    Draw::Occlusion(draw) => {
+                        let case = draw(&mut rng);
+                        occlusion_rows(family.name, &case, &mut rng, back_ends)
+                    }
+                    Draw::Region(draw) => region_rows(family.name, &draw(&mut rng), shrink),
+                }
+            })
+            .collect();
+        let failed = rows.iter().filter(|row| row.status == Status::Fail);
+        [failed.count(), rows.len()]
+    }
+
+    #[test]
+    fn what_promises_everything_passes() {
+        for family in VISIBILITY_FAMILIES {
+            let section = visibility_cases(family, 0..12, 5, Kernel::best(), &|| false);
+            let failed: Vec<&Row> = section
+                .rows
+                .iter()
+                .filter(|row| row.status != Status::Pass)
+                .collect();
+            assert!(failed.is_empty(), "{}: {failed:?}", family.name);
+            assert!(section.rows.len() >= 24, "{}", family.name);
+        }
+    }
+
+    #[test]
+    fn every_instruction_set_is_asked() {
+        for kernel in Kernel::available() {
+            for family in VISIBILITY_FAMILIES {
+                let section = visibility_cases(family, 0..4, 9, kernel, &|| false);
+                assert_eq!(section.count(Status::Fail), 0, "{} {kernel}", family.name);
+            }
+        }
+    }
+
+    /// The same suite on buffers that promise nothing: every family finds what they lose.
+    #[test]
+    fn unsafe_rows_fail_where_safe_ones_pass() {
+        let kernel = Kernel::best();
+        let unsafe_ones = [
+            answers::<MaskedCentre>(kernel, "masked"),
+            answers::<ZBuffer>(kernel, "z-buffer"),
+        ];
+        let keep_all = answers::<NoOcclusion>(kernel, "none");
+        let mut unnoticed = Vec::new();
+        for family in VISIBILITY_FAMILIES {
+            if let Draw::Region(_) = family.draw {
+                continue;
+            }
+            for back_ends in &unsafe_ones {
+                let [failed, all] = failing(family, back_ends, 0.0);
+                let found = format!("{}, {}: {failed} of {all}", family.name, back_ends[0].0);
+                println!("{found}");
+                unnoticed.extend((failed == 0).then_some(found));
+            }
+            // Two passes that remove nothing lose nothing.
+            assert_eq!(
+                failing(family, &keep_all[1..], 0.0)[0],
+                0,
+                "{}",
+                family.name
+            );
+        }
+        assert!(unnoticed.is_empty(), "{unnoticed:?}");
+    }
+
+    /// Openings that rows are told to be too narrow lose rooms.
+    #[test]
+    fn openings_that_are_too_narrow_are_noticed() {
+        for family in VISIBILITY_FAMILIES {
+            if let Draw::Region(_) = family.draw {
+                let [failed, all] = failing(family, &[], 1e-3);
+                println!("{}: {failed} of {all}", family.name);
+                assert!(failed > 0, "{}", family.name);
+                assert_eq!(failing(family, &[], 0.0)[0], 0, "{}", family.name);
+            }
+        }
+    }
+
+    /// A row fails where an item is missing: judged with an answer that lacks one.
+    #[test]
+    fn a_missing_item_fails_its_row() {
+        let judge = |seen: &[ItemId], kept: &[ItemId]| status(seen, kept.to_vec(), &[0, 1, 2]).0;
+        assert_eq!(judge(&[0, 2], &[2, 0]), Status::Pass);
+        assert_eq!(judge(&[0, 2], &[0, 1]), Status::Fail);
+        assert_eq!(judge(&[0], &[0, 7]), Status::Fail, "what is not in view");
+    }
+}

@@ -1,0 +1,132 @@
+//! Rooms in a row, seen through slits around one line of sight, with an eye as near to
+//! the first opening as numbers go.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::case::looking;
+use crate::camera::Lens;
+use crate::scene::{SeededRng, WorldBox};
+use crate::visibility::Rays;
+use crate::visibility::region::{
+    EveryRegion, Flood, Opening, OpeningPlane, PortalClip, PortalRect, RegionGraph, RegionRow,
+    Scratch, Witness, rectangle,
+};
+
+/// A chain of rooms along x, and a line of sight from the first to the last of them.
+pub struct Chain {
+    rooms: Vec<WorldBox>,
+    openings: Vec<Opening>,
+    ends: [DVec3; 2],
+    rays: Rays,
+}
+
+/// What a row made of a chain.
+pub struct Answer {
+    pub row: &'static str,
+    /// Rooms on the line of sight that it does not list.
+    pub lost: Vec<u32>,
+}
+
+/// So many rooms, near the origin or far from it. The eye stands before the first opening
+/// by `ahead` of a room's length, where numbers are that fine.
+pub fn chain(rng: &mut SeededRng, length: u32, ahead: f64) -> Chain {
+    let base = [DVec3::ZERO, DVec3::new(1e7, -3e6, 12_345.678)][rng.below(2)];
+    let ulp = f64::EPSILON * (1.0 + base.abs().max_element());
+    let direction = DVec3::new(1.0, rng.normal() * 2e-3, rng.normal() * 2e-3);
+    let border = |number: u32| base.x + f64::from(number);
+    let mut eye = base;
+    eye.x = (border(1) - ahead).min(border(1).next_down());
+    let on_line = |x: f64| eye + direction * (x - eye.x);
+    let room = |number: u32| {
+        let (mut low, mut high) = (base - 2.0, base + 2.0);
+        (low.x, high.x) = (border(number), border(number + 1));
+        WorldBox::new(low, high)
+    };
+    let openings = (1..length).map(|number| {
+        let at = border(number);
+        let mut margin = || [1e-2, 1e-5, 1e-8, 8.0 * ulp][rng.below(4)] * (0.5 + rng.unit());
+        let low = on_line(at) - DVec3::new(0.0, margin(), margin());
+        let high = on_line(at) + DVec3::new(0.0, margin(), margin());
+        Opening {
+            sides: [number, number - 1],
+            corners: rectangle(0, low, high),
+            plane: OpeningPlane::Axis { axis: 0, at },
+        }
+    });
+    let openings = openings.collect();
+    let forward = direction + (rng.point() - 0.5) * 0.4;
+    let lens = Lens::perspective(60.0, 1.3, 1e-4, Some(1e3)).expect("a lens");
+    let rays = Rays::of(&looking(eye, forward, lens)).expect("a lens with rays");
+    Chain {
+        rooms: (0..length).map(room).collect(),
+        openings,
+        ends: [eye, on_line(border(length) - 0.5)],
+        rays,
+    }
+}
+
+impl Chain {
+    /// How many rooms there are.
+    pub fn len(&self) -> usize {
+        self.rooms.len()
+    }
+
+    /// What the rows that promise everything lose, with every opening narrower by
+    /// `shrink` on each side than it is. `None` if the line of sight does not lead through
+    /// the openings, as exact arithmetic has it.
+    pub fn answers(&self, shrink: f64) -> Option<Vec<Answer>> {
+        let graph = RegionGraph::of_boxes(self.rooms.clone(), self.openings.clone());
+        let last = self.rooms.len() as u32 - 1;
+        let regions = [0, last];
+        let ends = self.ends;
+        graph.check_witness(&Witness { regions, ends }).ok()?;
+        let told = self
+            .openings
+            .iter()
+            .map(|opening| narrower(*opening, shrink));
+        let told = RegionGraph::of_boxes(self.rooms.clone(), told.collect());
+        let rows = rows(&Arc::new(told));
+        let safe = rows.iter().filter(|row| row.about().guarantee.is_safe());
+        Some(safe.map(|row| self.answer(&**row)).collect())
+    }
+
+    fn answer(&self, row: &dyn RegionRow) -> Answer {
+        let mut listed = Vec::new();
+        row.from_eye(&self.rays, &mut Scratch::default(), &mut listed);
+        let rooms = 0..self.rooms.len() as u32;
+        Answer {
+            row: row.about().name,
+            lost: rooms
+                .filter(|room| listed.binary_search(room).is_err())
+                .collect(),
+        }
+    }
+}
+
+fn narrower(opening: Opening, by: f64) -> Opening {
+    let [low, ..] = opening.corners;
+    let (low, high) = opening
+        .corners
+        .iter()
+        .fold((low, low), |(low, high), corner| {
+            (low.min(*corner), high.max(*corner))
+        });
+    let aside = DVec3::new(0.0, by, by);
+    let middle = (low + high) / 2.0;
+    Opening {
+        corners: rectangle(0, (low + aside).min(middle), (high - aside).max(middle)),
+        ..opening
+    }
+}
+
+fn rows(graph: &Arc<RegionGraph>) -> [Box<dyn RegionRow>; 4] {
+    let graph = || graph.clone();
+    [
+        Box::new(EveryRegion(graph())),
+        Box::new(Flood(graph())),
+        Box::new(PortalRect(graph())),
+        Box::new(PortalClip(graph())),
+    ]
+}
