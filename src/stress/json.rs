@@ -102,14 +102,15 @@ impl<'a> At<'a> {
         said.ok_or_else(|| self.wrong(&of(value), "a number, NaN, Infinity or -Infinity"))
     }
 
-    /// A number that f32 holds: the answers beside it are about this very number.
-    /// What is beyond its range is infinite.
+    /// A number of f32, exactly or in the fewest decimals that read back as it: the
+    /// answers beside it are about this very number. What is beyond its range is infinite.
     pub fn f32_number(&self, value: &Value) -> Result<f32, InputError> {
         let number = self.number(value)?;
         let narrow = number as f32;
-        match !narrow.is_finite() || f64::from(narrow) == number {
+        let is_shortest = || narrow.to_string().parse() == Ok(number);
+        match !narrow.is_finite() || f64::from(narrow) == number || is_shortest() {
             true => Ok(narrow),
-            false => Err(self.wrong(&of(value), "a number that f32 holds without rounding")),
+            false => Err(self.wrong(&of(value), "a number that f32 holds")),
         }
     }
 

@@ -248,8 +248,8 @@ mod tests {
                 "planes[0][3]: '-1.00000000001'; expected a number that f32 holds",
             ),
             (
-                boxed(r#"{"id":"b","lo":[0,0,0],"hi":[1,0.1,1]}"#),
-                "boxes[0], hi[1]: '0.1'; expected a number that f32 holds",
+                boxed(r#"{"id":"b","lo":[0,0,0],"hi":[1,0.1000001,0.10000000001]}"#),
+                "boxes[0], hi[2]: '0.10000000001'; expected a number that f32 holds",
             ),
             (
                 with(
