@@ -19,7 +19,7 @@ use super::{
     Ending, expect_place_for, funnel_picture, funnel_table, interrupt, load_scene_by, print_json,
     text, unread_is_fine,
 };
-use crate::funnel::{self, Chain, FunnelInput, FunnelPlan, Proofs, StageKind, StageRow};
+use crate::funnel::{self, Chain, FunnelInput, FunnelPlan, Proofs, SeenFrom, StageKind, StageRow};
 use crate::index::{Registry, StructureSpec};
 use crate::input::read_file;
 use crate::measure::{ProcessTimes, Protocol};
@@ -29,6 +29,7 @@ use crate::scene::{self, LoadOptions, Scene};
 use crate::spec::SpecError;
 use crate::visibility::Guarantee;
 use crate::visibility::region::Pvs;
+use crate::visibility::truth::TruthCache;
 
 /// Rounds of a stage, if one process has them all.
 const ROUNDS: [usize; 2] = [5, 15];
@@ -39,6 +40,9 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     expect_place_for("--certificates", args.certificates.as_deref())?;
     if args.certificates.is_some() && args.cut_out.is_some() {
         bail!("--certificates are about boxes without holes; expected no --cut-out with them");
+    }
+    if args.certificates.is_some() && args.from == SeenFrom::Region {
+        bail!("--certificates are about what cameras see; expected no --from region with them");
     }
     let structures = args.kernel.structures(registry, &args.structure)?;
     let defaults = args.lens.defaults()?;
@@ -61,6 +65,7 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
         bar.set_message(text::plain(&job));
     };
     job("the truth, and every stage held against it");
+    let truth_cache = args.truth_cache.as_ref().map(TruthCache::new);
     let protocol = protocol(args, 0);
     let input = FunnelInput {
         scene: &scene,
@@ -72,6 +77,9 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
         structures: &structures,
         protocol: &protocol,
         claim: claim.as_ref(),
+        from: args.from,
+        occluders: args.occluders,
+        truth_cache: truth_cache.as_ref(),
         execution: args.kernel.execution()?,
     };
     if let Some(file) = &args.certificates {
@@ -163,7 +171,9 @@ fn chain(
         (StageKind::Triangle, &args.triangle),
         (StageKind::Fragment, &args.fragment),
     ];
-    let mut chain = Chain::for_scene(scene, args.cut_out.is_some()).with(StageKind::Object, object);
+    let mut chain = Chain::for_scene(scene, args.cut_out.is_some())
+        .from(args.from, scene)
+        .with(StageKind::Object, object);
     for (stage, name) in typed {
         if let Some(name) = name {
             let known = funnel::back_ends(stage, scene, args.cut_out.is_some());
@@ -215,6 +225,10 @@ pub fn time(
         structures: &structures,
         protocol: &protocol(args, timing.process),
         claim: claim.as_ref(),
+        from: args.from,
+        occluders: args.occluders,
+        // Times are compared with counts, not with the truth.
+        truth_cache: None,
         execution: args.kernel.execution()?,
     };
     Ok(funnel::time(&input, plan, stop)?)

@@ -7,13 +7,16 @@ use clap::{Args, ValueEnum};
 
 use super::shared_args::{KernelArgs, LensArgs, SceneArgs, SpreadArgs, TableFormat};
 use super::values;
+use crate::funnel::SeenFrom;
 use crate::visibility::SampleGrid;
 use crate::visibility::fragment::CutOuts;
+use crate::visibility::occlusion::OccluderChoice;
 
 const FUNNEL_HELP: &str = "\
 Columns of the table:
   in, out      items (triangles in the triangle stage) that the stage is given and hands on, a view
-  truth        of them those that are in front at a sample (that face the eye)
+  truth        of them those that are in front at a sample; of triangles those that face the eye
+               (outcode: that are in the window; below-a-sample: that the ray of a sample meets)
   FP, FN       handed on though not visible; visible and not handed on
   time         CPU time of the stage, a view, with half of its 95 % interval
   per item     time / what the stage removed
@@ -26,7 +29,8 @@ A lower bound does what must be done at any rate and decides nothing.
 Items that are cut out hide nothing in the occlusion stage, and at a sample only where their mask is
 opaque: z-test takes them for solid, alpha-test asks the mask. stencil-test (rooms) draws what is
 beyond the eye's room only on the samples that see its portals. Walls of rooms are never cut out,
-picking takes every item for solid.";
+picking takes every item for solid. --from region asks what may be seen from anywhere in the eye's
+region: portals restrict an eye only, so the searches that are left are flood and the stored sets.";
 
 #[derive(Args, Debug)]
 #[command(after_help = FUNNEL_HELP)]
@@ -54,12 +58,18 @@ pub struct FunnelArgs {
     /// What does the region stage in the chain [default: the best that the scene has regions for]
     #[arg(long, value_name = "NAME")]
     pub region: Option<String>,
+    /// Where the region stage looks from: the eye, or anywhere in the region that the eye is in
+    #[arg(long, value_name = "PLACE", default_value = "eye", value_parser = values::seen_from)]
+    pub from: SeenFrom,
     /// Structures for the object stage; the first is the chain's
     #[arg(long, value_name = "LIST", default_value = "wide,bvh,linear")]
     pub structure: String,
     /// What does the occlusion stage in the chain
     #[arg(long, value_name = "NAME")]
     pub occlusion: Option<String>,
+    /// What the back ends *-two-pass and hierarchical-z draw: all, nearest:64, largest:64
+    #[arg(long, value_name = "CHOICE", default_value = "all", value_parser = values::occluders)]
+    pub occluders: OccluderChoice,
     /// What does the triangle stage in the chain
     #[arg(long, value_name = "NAME")]
     pub triangle: Option<String>,
@@ -70,6 +80,10 @@ pub struct FunnelArgs {
     #[arg(long, value_name = "FILE")]
     pub pvs: Option<PathBuf>,
 
+    /// Keep what solid boxes without holes show at the samples in this directory, and read it
+    /// from there if it is of this very question
+    #[arg(long, value_name = "DIR")]
+    pub truth_cache: Option<PathBuf>,
     /// Write proofs: of each claim's errors, and of every item in view that is visible or was removed
     #[arg(long, value_name = "FILE")]
     pub certificates: Option<PathBuf>,

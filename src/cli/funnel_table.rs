@@ -5,9 +5,10 @@ use std::io::{self, Write};
 
 use super::document::{Block, Rows};
 use super::text;
-use crate::funnel::{FunnelReport, Gain, InnerRow, StageRow, Times};
+use crate::funnel::{FunnelReport, Gain, InnerRow, SeenFrom, StageRow, Times};
 use crate::shown::field;
 use crate::visibility::Guarantee;
+use crate::visibility::occlusion::OccluderChoice;
 
 /// No line is longer.
 const WIDTH: usize = 100;
@@ -33,11 +34,22 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
         );
         blocks.insert(2, Block::Line(line));
     }
+    if report.from == SeenFrom::Region {
+        let line = "The region stage is asked what may be seen from anywhere in the eye's region.";
+        blocks.insert(2, Block::Line(line.into()));
+    }
+    if report.occluders != OccluderChoice::All.to_string() {
+        let line = format!(
+            "Occluders of the back ends in two passes: {}.",
+            report.occluders
+        );
+        blocks.insert(2, Block::Line(line));
+    }
     // Drawn in order and picked are solid boxes only.
     for (heading, table) in [
         ("Samples and fragments of what is left", fragments(report)),
         ("What is left, drawn in every order", orders(report)),
-        ("The first item under a cursor", picks(report)),
+        ("What is under a cursor", picks(report)),
         (
             "Lower bounds: what must be read or written at any rate",
             bounds(report),
@@ -197,7 +209,8 @@ fn orders(report: &FunnelReport) -> Rows {
 }
 
 fn picks(report: &FunnelReport) -> Rows {
-    let mut rows = Rows::of_numbers(["picking by", "rays", "wrong", "time per ray"]);
+    let mut rows = Rows::of_numbers(["question", "by", "cursors", "wrong", "time per cursor"]);
+    rows.right.retain(|column| *column > 1);
     rows.rows.extend(report.picks.iter().map(|row| {
         let doubt = if row.guarantee == Guarantee::Unproven {
             "?"
@@ -205,6 +218,7 @@ fn picks(report: &FunnelReport) -> Rows {
             ""
         };
         vec![
+            row.question.name().to_owned(),
             format!("{}{doubt}", row.name),
             row.ray_count.to_string(),
             row.wrong_count.to_string(),

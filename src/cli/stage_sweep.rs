@@ -14,12 +14,15 @@ use super::run::progress;
 use super::run_resume::typed_args;
 use super::shared_args::TableFormat;
 use super::{Ending, funnel_table, interrupt, load_scene_by, print_json, text, unread_is_fine};
-use crate::funnel::{self, Chain, FunnelInput, NONE, StageKind, StageSweep, SweepPlan, SweepPoint};
+use crate::funnel::{
+    self, Chain, FunnelInput, NONE, SeenFrom, StageKind, StageSweep, SweepPlan, SweepPoint,
+};
 use crate::index::{Registry, StructureSpec};
 use crate::measure::{ProcessTimes, Protocol};
 use crate::path::{self, CameraPath};
 use crate::scene::{self, LoadOptions, Scene};
 use crate::suite::DEFAULT_PATH;
+use crate::visibility::occlusion::OccluderChoice;
 use crate::visibility::{Guarantee, SampleGrid};
 
 /// Rounds of a point, if one process has them all.
@@ -76,6 +79,9 @@ impl Setting {
             structures: &self.structures,
             protocol,
             claim: None,
+            from: SeenFrom::Eye,
+            occluders: OccluderChoice::All,
+            truth_cache: None,
             execution: args.kernel.execution()?,
         })
     }

@@ -130,7 +130,7 @@ fn of_stages(cases: u64, seed: u64, kernel: Kernel, bar: &ProgressBar) -> Vec<Se
 }
 
 /// Cases of each family of the other stages for one of each extreme: they are small.
-const STAGE_CASES: u64 = 10;
+const STAGE_CASES: u64 = 4;
 
 /// Cases of each extreme by another instruction set than the chosen one.
 const OF_OTHERS: u64 = 2;

@@ -5,11 +5,12 @@
 use crate::camera::{MATRIX_CONVENTIONS, MatrixConvention, PLANE_METHODS, PlaneMethod};
 use crate::culling::{ARITHMETICS, Arithmetic, CullingTest, TESTS};
 use crate::drift::{ARMS, ArmKind, MOST_STEPS};
-use crate::funnel::StageKind;
+use crate::funnel::{SEEN_FROM, SeenFrom, StageKind};
 use crate::kernel::Kernel;
 use crate::spec::{SpecError, parse_number};
 use crate::threads::MOST_THREADS;
 use crate::visibility::SampleGrid;
+use crate::visibility::occlusion::OccluderChoice;
 
 fn expected<T>(value: Option<T>, what: impl std::fmt::Display) -> Result<T, SpecError> {
     value.ok_or_else(|| SpecError::new(format_args!("expected {what}")))
@@ -98,6 +99,17 @@ pub fn steps(text: &str) -> Result<u64, SpecError> {
 pub fn stage(name: &str) -> Result<StageKind, SpecError> {
     let swept = [StageKind::Region, StageKind::Occlusion, StageKind::Triangle];
     choice("stage", &swept.map(|stage| (stage, stage.name(), "")), name)
+}
+
+/// From where the region stage looks.
+pub fn seen_from(name: &str) -> Result<SeenFrom, SpecError> {
+    choice("place", &SEEN_FROM, name)
+}
+
+/// Which candidates are drawn as occluders.
+pub fn occluders(text: &str) -> Result<OccluderChoice, SpecError> {
+    let what = "all, nearest:COUNT or largest:COUNT, COUNT at least 1";
+    expected(OccluderChoice::parse(text), what)
 }
 
 /// Columns and rows of an image, `320x180`.

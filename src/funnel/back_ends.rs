@@ -3,6 +3,7 @@
 use super::chain::Chain;
 use super::fragment_rows;
 use super::hiding::{HIDING, HidingRow};
+use super::seen_from::SeenFrom;
 use super::stage::{BackEnd, NONE, StageKind};
 use super::triangle_rows;
 use crate::scene::{ItemShape, Regions, Scene};
@@ -13,13 +14,22 @@ const PORTAL_CLIP: &str = "portal-clip";
 
 /// What there is only where a claim was given.
 const CLAIM: &str = region::STORED.name;
+/// What knows of solids only, and makes a grid of its own.
+const GRID: &str = region::GRID_FLOOD.name;
 /// Most rooms of which it is found out, exactly, what is seen from each.
 pub const MOST_EXACT_ROOMS: usize = 4_096;
 
 /// What finds a way through the rooms or sectors of a scene.
 fn of_regions(scene: &Scene) -> &'static [&'static str] {
-    const OF_ROOMS: &[&str] = &["flood", "portal-rect", PORTAL_CLIP, CLAIM, "exact-pvs"];
-    const OF_MANY_ROOMS: &[&str] = &["flood", "portal-rect", PORTAL_CLIP, CLAIM];
+    const OF_ROOMS: &[&str] = &[
+        "flood",
+        "portal-rect",
+        PORTAL_CLIP,
+        GRID,
+        CLAIM,
+        "exact-pvs",
+    ];
+    const OF_MANY_ROOMS: &[&str] = &["flood", "portal-rect", PORTAL_CLIP, GRID, CLAIM];
     const OF_SECTORS: &[&str] = &[
         "flood",
         "portal-rect",
@@ -90,5 +100,17 @@ impl Chain {
                 None => chain,
             }
         })
+    }
+
+    /// The same with what suits the place that the region stage looks from.
+    pub fn from(self, from: SeenFrom, scene: &Scene) -> Chain {
+        let known = of_regions(scene);
+        let best = ["exact-pvs", "flood"]
+            .into_iter()
+            .find(|name| known.contains(name));
+        match (from, best) {
+            (SeenFrom::Region, Some(best)) => self.with(StageKind::Region, best),
+            _ => self,
+        }
     }
 }

@@ -40,8 +40,9 @@ pub struct HidingRow {
     summary: &'static str,
     guarantee: Guarantee,
     is_interleaved: bool,
-    /// With a buffer of so many pixels, on an instruction set.
-    pub make: fn(SampleGrid, Kernel) -> Box<dyn Hide>,
+    /// With a buffer of so many pixels, on an instruction set. Two passes draw the occluders
+    /// that are chosen; a walk of a tree draws what it comes upon.
+    pub make: fn(SampleGrid, Kernel, OccluderChoice) -> Box<dyn Hide>,
 }
 
 impl HidingRow {
@@ -62,7 +63,7 @@ impl HidingRow {
             summary: B::SUMMARY,
             guarantee: B::GUARANTEE,
             is_interleaved: true,
-            make: |grid, kernel| Box::new(Interleaved::new(B::new(grid), kernel)),
+            make: |grid, kernel, _| Box::new(Interleaved::new(B::new(grid), kernel)),
         }
     }
 
@@ -72,7 +73,7 @@ impl HidingRow {
             summary: B::SUMMARY,
             guarantee: B::GUARANTEE,
             is_interleaved: false,
-            make: |grid, kernel| Box::new(TwoPass::new(B::new(grid), OccluderChoice::All, kernel)),
+            make: |grid, kernel, choice| Box::new(TwoPass::new(B::new(grid), choice, kernel)),
         }
     }
 }

@@ -7,19 +7,26 @@ use serde::Serialize;
 
 use super::back_ends::MOST_EXACT_ROOMS;
 use super::error::FunnelError;
+use super::seen_from::SeenFrom;
 use crate::input::InputError;
 use crate::scene::Scene;
+use crate::visibility::Solids;
 use crate::visibility::region::doom::{DoomMap, SectorPvs};
 use crate::visibility::region::{
-    Audit, Flood, OtherRegions, PortalClip, PortalRect, ProvenPvs, Pvs, REJECT, RegionGraph,
-    RegionItems, RegionRow, RoomsPvs, STORED, StoredPvs, audit,
+    Audit, Flood, FromRegion, GridFlood, OtherRegions, PortalClip, PortalRect, ProvenPvs, Pvs,
+    REJECT, RegionGraph, RegionItems, RegionRow, RoomsPvs, STORED, StoredPvs, audit, pairs_of,
 };
+
+/// A back end, and which items are in which of its regions.
+struct Row {
+    row: Box<dyn RegionRow>,
+    items: Arc<RegionItems>,
+}
 
 /// The regions of a scene and what finds a way through them.
 pub(super) struct Regions {
-    rows: Vec<Box<dyn RegionRow>>,
-    /// Which items are in which.
-    pub items: RegionItems,
+    graph: Arc<RegionGraph>,
+    rows: Vec<Row>,
     /// What claims of what is seen from where get wrong.
     pub audits: Vec<ClaimAudit>,
 }
@@ -48,13 +55,18 @@ pub fn regions_of(scene: &Scene) -> Result<Option<(RegionGraph, Option<Pvs>)>, I
 }
 
 impl Regions {
-    /// `None` for a scene without any.
+    /// `None` for a scene without any. Of `solids`, boxes without holes, a grid is made too.
     ///
     /// # Errors
     /// The map's file, read a second time.
-    pub fn of(scene: &Scene, claim: Option<&Arc<Pvs>>) -> Result<Option<Regions>, FunnelError> {
+    pub fn of(
+        scene: &Scene,
+        claim: Option<&Arc<Pvs>>,
+        from: SeenFrom,
+        solids: Option<&Solids>,
+    ) -> Result<Option<Regions>, FunnelError> {
         if let Some(map) = DoomMap::of_scene(scene)? {
-            return Regions::of_map(map, scene, claim).map(Some);
+            return Regions::of_map(map, scene, claim, from).map(Some);
         }
         let Ok(graph) = RegionGraph::of_scene(scene) else {
             return Ok(None);
@@ -74,11 +86,16 @@ impl Regions {
                 audit,
             }));
         }
-        rows.extend(exact.and_then(|exact| stored(&exact, &graph)));
-        Ok(Some(Regions {
-            audits,
-            ..Regions::with(graph, rows, scene)
-        }))
+        rows.extend(exact.as_ref().and_then(|exact| stored(exact, &graph)));
+        let mut regions = Regions::with(graph, rows, scene, from);
+        regions
+            .rows
+            .extend(solids.map(|solids| grid(solids, scene)));
+        regions.audits = audits;
+        if let Some(exact) = exact.filter(|_| from == SeenFrom::Region) {
+            regions.audit_searches(&exact)?;
+        }
+        Ok(Some(regions))
     }
 
     /// The sectors of a map, with its own table and with what is exact.
@@ -86,6 +103,7 @@ impl Regions {
         map: Arc<DoomMap>,
         scene: &Scene,
         claim: Option<&Arc<Pvs>>,
+        from: SeenFrom,
     ) -> Result<Regions, FunnelError> {
         let graph = Arc::new(map.graph());
         let exact = SectorPvs::of(map.clone(), graph.clone());
@@ -106,49 +124,94 @@ impl Regions {
             });
         }
         rows.extend(stored(&exact, &graph));
-        Ok(Regions {
-            audits,
-            ..Regions::with(graph, rows, scene)
-        })
+        let mut regions = Regions::with(graph, rows, scene, from);
+        regions.audits = audits;
+        if from == SeenFrom::Region {
+            regions.audit_searches(&exact)?;
+        }
+        Ok(regions)
     }
 
+    /// The searches that can answer from there, and what is stored.
     fn with(
         graph: Arc<RegionGraph>,
         stored: impl IntoIterator<Item = StoredPvs>,
         scene: &Scene,
+        from: SeenFrom,
     ) -> Regions {
-        let items = RegionItems::of(&graph, scene);
-        let mut rows: Vec<Box<dyn RegionRow>> = vec![
-            Box::new(Flood(graph.clone())),
-            Box::new(PortalRect(graph.clone())),
-            Box::new(PortalClip(graph)),
-        ];
-        rows.extend(
-            stored
-                .into_iter()
-                .map(|row| Box::new(row) as Box<dyn RegionRow>),
-        );
+        let items = Arc::new(RegionItems::of(&graph, scene));
+        let mut rows: Vec<Box<dyn RegionRow>> = vec![Box::new(Flood(graph.clone()))];
+        // Portals restrict an eye: from a whole region they let through what a flood does.
+        if from == SeenFrom::Eye {
+            rows.push(Box::new(PortalRect(graph.clone())));
+            rows.push(Box::new(PortalClip(graph.clone())));
+        }
+        let stored = stored.into_iter();
+        rows.extend(stored.map(|row| Box::new(row) as Box<dyn RegionRow>));
+        let row = |row| Row {
+            row: match from {
+                SeenFrom::Eye => row,
+                SeenFrom::Region => Box::new(FromRegion(row)),
+            },
+            items: items.clone(),
+        };
         Regions {
-            rows,
-            items,
+            rows: rows.into_iter().map(row).collect(),
+            graph,
             audits: Vec::new(),
         }
     }
 
-    /// What all back ends search.
+    /// Holds what the searches say of whole regions against what is proven, as a claim is.
+    fn audit_searches(&mut self, exact: &dyn ProvenPvs) -> Result<(), OtherRegions> {
+        let searches = self.rows.iter().map(|Row { row, .. }| &**row);
+        let searches = searches.filter(|row| Arc::ptr_eq(row.graph(), &self.graph));
+        for row in searches {
+            let claim = row.about().name;
+            if self.audits.iter().all(|audit| audit.claim != claim) {
+                let audit = audit(&pairs_of(row), exact, &self.graph)?;
+                self.audits.push(ClaimAudit { claim, audit });
+            }
+        }
+        Ok(())
+    }
+
+    /// What all back ends search, but for the one that makes its own grid.
     pub fn graph(&self) -> &RegionGraph {
-        self.rows[0].graph()
+        &self.graph
+    }
+
+    /// Which items are in which region of that graph.
+    pub fn items_of_graph(&self) -> &RegionItems {
+        &self.rows[0].items
     }
 
     /// The back ends that there are.
     pub fn names(&self) -> impl Iterator<Item = &'static str> {
-        self.rows.iter().map(|row| row.about().name)
+        self.rows.iter().map(|row| row.row.about().name)
     }
 
     /// A back end by its name.
     pub fn row(&self, name: &str) -> Option<&dyn RegionRow> {
-        let found = self.rows.iter().find(|row| row.about().name == name);
-        found.map(|row| &**row)
+        self.found(name).map(|found| &*found.row)
+    }
+
+    /// Which items are in which region of a back end.
+    pub fn items(&self, name: &str) -> Option<&RegionItems> {
+        self.found(name).map(|found| &*found.items)
+    }
+
+    fn found(&self, name: &str) -> Option<&Row> {
+        self.rows.iter().find(|row| row.row.about().name == name)
+    }
+}
+
+/// The flood over a grid of the scene's own boxes.
+fn grid(solids: &Solids, scene: &Scene) -> Row {
+    let row = GridFlood::of(solids);
+    Row {
+        items: Arc::new(RegionItems::of(row.graph(), scene)),
+        row: Box::new(row),
     }
 }
 

@@ -11,6 +11,7 @@ use super::orders::OrderRow;
 use super::picks::PickRow;
 use super::plan_view::PlanView;
 use super::regions::ClaimAudit;
+use super::seen_from::SeenFrom;
 use super::stage::{BackEnd, StageKind};
 use super::times::Times;
 use crate::measure::OverProcesses;
@@ -38,6 +39,10 @@ pub struct FunnelReport {
     pub level: LevelRow,
     /// Which items have holes; null where none was asked for.
     pub cut_outs: Option<CutOutRow>,
+    /// From where the region stage looks.
+    pub from: SeenFrom,
+    /// What the back ends of the occlusion stage in two passes draw: `all`, `nearest:64`.
+    pub occluders: String,
     /// The chain whose stages follow each other in [`FunnelReport::stages`].
     pub chain: Chain,
     /// Every stage with every back end, each given what the chain hands it.
@@ -50,7 +55,8 @@ pub struct FunnelReport {
     pub inner_boxes: Option<InnerRow>,
     /// What is left, drawn in every order; empty unless items are solid boxes.
     pub orders: Vec<OrderRow>,
-    /// The first item under a cursor, by every back end of picking; empty as above.
+    /// What is under a cursor, by every back end of picking and every structure; empty as
+    /// above.
     pub picks: Vec<PickRow>,
     /// The least that some of the back ends can take.
     pub bounds: Vec<BoundRow>,

@@ -9,7 +9,8 @@ use crate::scene::Surfaces;
 use crate::visibility::fragment;
 use crate::visibility::region::doom::DoomMap;
 use crate::visibility::truth::{
-    RayIndex, SampleTruth, SurfaceIndex, visible_by_random_rays, visible_surfaces_by_random_rays,
+    RayIndex, SampleTruth, SurfaceIndex, TruthCache, digest_of, visible_by_random_rays,
+    visible_surfaces_by_random_rays,
 };
 use crate::visibility::{Rays, SampleGrid, Solids};
 
@@ -53,6 +54,8 @@ pub fn seen(
 /// ceilings of a map.
 enum Hiding<'w> {
     Solids(&'w Solids, RayIndex, Option<&'w fragment::Surfaces>),
+    /// Boxes without holes, of which some truth may be known already.
+    Kept(&'w Solids, RayIndex, &'w TruthCache, [u8; 32]),
     Surfaces(SurfaceIndex),
 }
 
@@ -60,7 +63,10 @@ impl Hiding<'_> {
     fn of<'w>(world: &'w World) -> Result<Hiding<'w>, InputError> {
         if let Some(solids) = world.solids() {
             let index = RayIndex::build(solids);
-            return Ok(Hiding::Solids(solids, index, world.cut_outs()));
+            return Ok(match (world.cut_outs(), world.truth_cache()) {
+                (None, Some(cache)) => Hiding::Kept(solids, index, cache, digest_of(solids)),
+                (holes, _) => Hiding::Solids(solids, index, holes),
+            });
         }
         let index = |surfaces: &Surfaces| Hiding::Surfaces(SurfaceIndex::build(surfaces));
         let scene = world.scene();
@@ -81,13 +87,16 @@ impl Hiding<'_> {
             Hiding::Solids(solids, index, None) => {
                 SampleTruth::of(solids, index, rays, grid, threads)
             }
+            Hiding::Kept(solids, index, cache, digest) => {
+                cache.sample_truth(digest, solids, index, rays, grid, threads)
+            }
             Hiding::Surfaces(index) => SampleTruth::of_surfaces(index, rays, grid, threads),
         }
     }
 
     fn along_random(&self, rays: &Rays, count: usize, seed: u64, threads: usize) -> Vec<ItemId> {
         match self {
-            Hiding::Solids(_, index, _) => {
+            Hiding::Solids(_, index, _) | Hiding::Kept(_, index, _, _) => {
                 visible_by_random_rays(index, rays, count, seed, threads)
             }
             Hiding::Surfaces(index) => {

@@ -163,6 +163,8 @@ pub fn prepare(
                 .cut_outs
                 .zip(world.cut_outs())
                 .map(|(typed, made)| CutOutRow::of(typed, made)),
+            from: input.from,
+            occluders: input.occluders.to_string(),
             chain: input.chain.clone(),
             stages: rows,
             audits: world.audits().to_vec(),
@@ -210,11 +212,11 @@ struct Left<'w> {
 struct LeftBoxes<'w> {
     solids: &'w Solids,
     orders: Orders,
-    picks: Picks,
+    picks: Picks<'w>,
 }
 
 impl<'w> Left<'w> {
-    fn of(world: &'w World, pass: &Pass, chosen: &Walked) -> Left<'w> {
+    fn of(world: &'w World<'w>, pass: &Pass, chosen: &Walked) -> Left<'w> {
         let set = chosen.left();
         let has_faces = world.scene().item_shape() != ItemShape::Wall;
         Left {
@@ -272,7 +274,7 @@ fn timed_tasks<'p>(
                 ask
             });
             let picks = (0..picks.count()).map(move |back_end| {
-                let ask: Ask = Box::new(move |view, out| picks.first(back_end, view, out));
+                let ask: Ask = Box::new(move |view, out| picks.ask(back_end, view, out));
                 ask
             });
             sorts.chain(picks)

@@ -15,6 +15,7 @@ use super::inner::Inner;
 use super::judged::{Judged, judge_items};
 use super::plan_view::{Fate, MOST_DRAWN, PlanView};
 use super::regions::{ClaimAudit, Regions};
+use super::seen_from::SeenFrom;
 use super::stage::{BackEnd, NONE, StageKind};
 use super::truth::Truth;
 use crate::camera::PlaneOptions;
@@ -26,9 +27,10 @@ use crate::path::CameraPath;
 use crate::query::ItemId;
 use crate::scene::{ItemShape, Scene, Surfaces};
 use crate::visibility::fragment::{self, CutOuts};
-use crate::visibility::occlusion::{self, OccluderScene};
+use crate::visibility::occlusion::{self, OccluderChoice, OccluderScene};
 use crate::visibility::region::{EyePlace, Marks, Pvs, RegionRow, Scratch};
 use crate::visibility::triangle;
+use crate::visibility::truth::TruthCache;
 use crate::visibility::{Guarantee, Rays, SampleGrid, Solids};
 
 /// What a funnel is studied on.
@@ -52,6 +54,12 @@ pub struct FunnelInput<'a> {
     pub protocol: &'a Protocol,
     /// What is claimed to be seen from each region: a back end of the region stage.
     pub claim: Option<&'a Arc<Pvs>>,
+    /// From where the region stage looks.
+    pub from: SeenFrom,
+    /// What the back ends of the occlusion stage in two passes draw.
+    pub occluders: OccluderChoice,
+    /// Where what solid boxes show at the samples is kept from run to run.
+    pub truth_cache: Option<&'a TruthCache>,
     /// Instructions of every stage, and threads that look for the truth.
     pub execution: Execution,
 }
@@ -74,7 +82,9 @@ pub struct World<'a> {
     inner: Option<Inner>,
     /// None where nothing is known to hide.
     occluders: Option<OccluderScene>,
+    choice: OccluderChoice,
     regions: Option<Regions>,
+    truth_cache: Option<&'a TruthCache>,
 }
 
 /// A camera in every form that a stage needs.
@@ -118,7 +128,9 @@ impl<'a> World<'a> {
         });
         let is_boxes = input.scene.item_shape() == ItemShape::Box;
         let mut solids = is_boxes.then(|| Solids::of(input.scene));
-        let regions = Regions::of(input.scene, input.claim)?;
+        // What has holes closes no face of a grid.
+        let whole = solids.as_ref().filter(|_| input.cut_outs.is_none());
+        let regions = Regions::of(input.scene, input.claim, input.from, whole)?;
         if input.claim.is_some() && regions.is_none() {
             let scene = input.scene.name.clone();
             return Err(FunnelError::NoRegions { scene });
@@ -151,7 +163,9 @@ impl<'a> World<'a> {
             cut_outs,
             inner,
             occluders,
+            choice: input.occluders,
             regions,
+            truth_cache: input.truth_cache,
         };
         for stage in StageKind::OF_ITEMS {
             let (name, known) = (input.chain.of(stage), world.names(stage));
@@ -197,6 +211,12 @@ impl<'a> World<'a> {
         self.regions.as_ref()?.row(name)
     }
 
+    /// The structures of the object stage under their labels.
+    pub fn structures(&self) -> impl Iterator<Item = (&str, &dyn DynIndex)> {
+        let structures = self.structures.iter();
+        structures.map(|(label, index)| (&label[..], &**index))
+    }
+
     /// Where it is looked whether an item is visible.
     pub fn samples(&self) -> SampleGrid {
         self.samples
@@ -235,6 +255,11 @@ impl<'a> World<'a> {
     /// Which items have holes, if any have.
     pub fn cut_outs(&self) -> Option<&fragment::Surfaces> {
         self.cut_outs.as_ref()
+    }
+
+    /// Where sample truth is kept, if it is.
+    pub fn truth_cache(&self) -> Option<&TruthCache> {
+        self.truth_cache
     }
 
     /// The regions of the scene.
@@ -302,11 +327,12 @@ impl<'a> World<'a> {
     fn run_region(&self, name: &str) -> Run<'_> {
         let regions = self.regions.as_ref().expect("a scene with regions");
         let row = regions.row(name).expect("a row of the region stage");
+        let items = regions.items(name).expect("the items of its regions");
         let kept = RefCell::new((Scratch::default(), Marks::default(), Vec::new()));
         Box::new(move |view, _, out| {
             let (scratch, marks, seen) = &mut *kept.borrow_mut();
             match row.from_eye(&self.views[view].rays, scratch, seen) {
-                EyePlace::Inside => regions.items.of_regions(seen, marks, out),
+                EyePlace::Inside => items.of_regions(seen, marks, out),
                 _ => out.extend(0..self.items() as ItemId),
             }
         })
@@ -335,7 +361,7 @@ impl<'a> World<'a> {
 
     /// A back end of the occlusion stage with a buffer of so many pixels.
     pub fn run_hiding(&self, row: &HidingRow, buffer: SampleGrid) -> Run<'_> {
-        let hide = RefCell::new((row.make)(buffer, self.kernel));
+        let hide = RefCell::new((row.make)(buffer, self.kernel, self.choice));
         let does_both = row.back_end().does_object_stage;
         let every: Vec<ItemId> = (0..self.items() as ItemId).collect();
         let occluders = self.occluders.as_ref().expect("a scene with occluders");

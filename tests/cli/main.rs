@@ -12,6 +12,7 @@ mod cullings;
 mod drift;
 mod foreign_text;
 mod funnel;
+mod funnel_options;
 mod kernels;
 mod listing;
 mod matrices;

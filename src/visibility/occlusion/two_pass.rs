@@ -1,5 +1,7 @@
 //! The coupling in two passes: all occluders first, then all candidates.
 
+use std::fmt;
+
 use super::buffer::OcclusionBuffer;
 use super::outline::Outline;
 use super::rect::{Rect, Rects};
@@ -20,6 +22,29 @@ pub enum OccluderChoice {
     Nearest(usize),
     /// So many that cover the most pixels by their rectangles.
     Largest(usize),
+}
+
+impl OccluderChoice {
+    /// As it is typed: `all`, `nearest:64`, `largest:64`.
+    pub fn parse(text: &str) -> Option<OccluderChoice> {
+        let count = |text: &str| text.parse().ok().filter(|count| *count > 0);
+        match text.split_once(':') {
+            None if text == "all" => Some(OccluderChoice::All),
+            Some(("nearest", number)) => count(number).map(OccluderChoice::Nearest),
+            Some(("largest", number)) => count(number).map(OccluderChoice::Largest),
+            _ => None,
+        }
+    }
+}
+
+impl fmt::Display for OccluderChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            OccluderChoice::All => f.write_str("all"),
+            OccluderChoice::Nearest(count) => write!(f, "nearest:{count}"),
+            OccluderChoice::Largest(count) => write!(f, "largest:{count}"),
+        }
+    }
 }
 
 /// A candidate and what is known of it.

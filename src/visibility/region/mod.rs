@@ -20,7 +20,9 @@ mod clip_windows;
 pub mod doom;
 mod flood;
 mod free_space;
+mod from_region;
 mod graph;
+mod grid_flood;
 mod items;
 mod locate;
 mod none;
@@ -43,7 +45,9 @@ pub use boxes::NoRegions;
 pub use check_boxes::check_boxes;
 pub use claim::{ClaimErrors, NoError};
 pub use flood::Flood;
+pub use from_region::{FromRegion, pairs_of};
 pub use graph::{Ground, RegionGraph};
+pub use grid_flood::{ABOUT as GRID_FLOOD, GridFlood};
 pub use items::RegionItems;
 pub use locate::{BoxGrid, covers};
 pub use none::EveryRegion;
@@ -59,11 +63,12 @@ pub use walk::{follow_boxes, seen_by_samples};
 pub use witness::{ProvenPvs, Rejected, Witness};
 
 /// The back ends of the region stage.
-pub const ROWS: [About; 7] = [
+pub const ROWS: [About; 8] = [
     none::ABOUT,
     flood::ABOUT,
     portal_rect::ABOUT,
     portal_clip::ABOUT,
+    grid_flood::ABOUT,
     stored::ABOUT,
     stored::REJECT,
     stored::EXACT,

@@ -1,0 +1,184 @@
+//! `funnel`: what its options ask beside the chain: another choice of occluders, what is
+//! seen from a whole region, truth kept on disk, every question of picking.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+
+use super::funnel::{row, rows};
+use super::process::*;
+
+const CITY: &str = "funnel --scene city:n=800 --path street:frames=3 --samples 96x54 --processes 1 \
+                    --format json";
+const ROOMS: &str = "funnel --scene rooms:n=800 --path street:frames=3 --samples 96x54 \
+                     --processes 1 --format json";
+
+fn report(line: &str) -> Value {
+    json(&works(Path::new("."), line))
+}
+
+#[test]
+fn every_question_of_picking_is_answered_exactly() {
+    let report = report(CITY);
+    let picks = array(&report, "picks");
+    for question in ["first item", "nearest 8", "all within 4 pixels"] {
+        let of_question = || picks.iter().filter(|row| row["question"] == question);
+        assert!(of_question().count() >= 3, "{question}");
+        for row in of_question().filter(|row| row["guarantee"] != "unproven") {
+            assert_eq!(number(row, "wrong_count"), 0.0, "{row}");
+            assert_eq!(number(row, "ray_count"), 3.0 * 144.0, "{row}");
+            assert!(number(row, "ns_per_ray") > 0.0, "{row}");
+        }
+    }
+}
+
+#[test]
+fn triangles_beside_the_window_and_between_samples_are_removed() {
+    // Without occlusion much of what is left reaches beyond the window, or is tiny.
+    let report = report(&format!("{CITY} --occlusion none"));
+    for name in ["outcode", "below-a-sample", "cone-f32-safe"] {
+        let row = row(&report, "triangle", name);
+        assert_eq!(number(row, "false_negative_count"), 0.0, "{name}");
+        assert!(
+            number(row, "output_count") < number(row, "input_count"),
+            "{name}"
+        );
+        assert!(
+            number(row, "truth_count") > 0.0 && number(row, "stage_ns") > 0.0,
+            "{name}"
+        );
+    }
+    let line =
+        "precision --scene city:n=300 --stage triangle --frames 2 --processes 1 --format json";
+    let sweep = json(&works(Path::new("."), line));
+    for name in ["outcode", "below-a-sample"] {
+        let point = array(&sweep, "points").iter().find(|p| p["name"] == name);
+        let point = point.unwrap_or_else(|| panic!("{name}"));
+        assert_eq!(number(point, "false_negative_count"), 0.0, "{name}");
+    }
+}
+
+#[test]
+fn fewer_occluders_hide_less_and_lose_nothing() {
+    let all = report(CITY);
+    assert_eq!(all["occluders"], "all");
+    for choice in ["nearest:1", "largest:1"] {
+        let few = report(&format!("{CITY} --occluders {choice}"));
+        assert_eq!(few["occluders"], choice);
+        let [left, more] = [&all, &few].map(|report| {
+            let row = row(report, "occlusion", "masked-inner-two-pass");
+            assert_eq!(number(row, "false_negative_count"), 0.0, "{choice}");
+            number(row, "output_count")
+        });
+        assert!(more > left, "{choice}: {more}, with all {left}");
+        // A walk of a tree draws what it comes upon.
+        let [same, again] = [&all, &few]
+            .map(|report| number(row(report, "occlusion", "masked-inner"), "output_count"));
+        assert_eq!(same, again, "{choice}");
+    }
+    for wrong in ["nearest", "nearest:0", "best:3", "all:2"] {
+        let line = format!("{CITY} --occluders {wrong}");
+        let done = cullbench(Path::new("."), &line);
+        assert_refused(&done, "nearest:COUNT", wrong);
+    }
+}
+
+#[test]
+fn from_a_region_more_is_seen_than_from_an_eye_and_nothing_is_lost() {
+    let [eye, region] = ["eye", "region"].map(|from| report(&format!("{ROOMS} --from {from}")));
+    let names = |report: &Value| -> Vec<String> {
+        let names = rows(report, "region").map(|row| row["name"].as_str().unwrap().to_owned());
+        names.collect()
+    };
+    let of_eye = [
+        "none",
+        "flood",
+        "portal-rect",
+        "portal-clip",
+        "grid-flood",
+        "exact-pvs",
+    ];
+    assert_eq!(names(&eye), of_eye);
+    assert_eq!(names(&region), ["none", "flood", "exact-pvs"]);
+    for report in [&eye, &region] {
+        for row in rows(report, "region") {
+            assert_eq!(number(row, "false_negative_count"), 0.0, "{row}");
+        }
+    }
+    let left = |report, name| number(row(report, "region", name), "output_count");
+    // The rooms of these scenes hang together.
+    assert_eq!(left(&region, "flood"), number(&region, "items"));
+    assert!(left(&eye, "flood") < left(&region, "flood"));
+    assert_eq!(left(&eye, "exact-pvs"), left(&region, "exact-pvs"));
+    assert!(left(&eye, "grid-flood") < number(&eye, "items"));
+    let audits = array(&region, "audits");
+    let flood = audits.iter().find(|audit| audit["claim"] == "flood");
+    let flood = flood.expect("the search, held against what is proven");
+    assert!(number(flood, "false_positives") > 0.0);
+    assert!(array(flood, "false_negatives").is_empty() && array(flood, "unproven").is_empty());
+    assert!(array(&eye, "audits").is_empty());
+    let line = format!("{ROOMS} --from region --certificates proofs.jsonl");
+    let done = cullbench(Path::new("."), &line);
+    assert_refused(&done, "--from region", &line);
+}
+
+/// The report without what a clock has a part in.
+fn counts(report: &Value) -> Vec<Value> {
+    let fields = [
+        "name",
+        "structure",
+        "input_count",
+        "output_count",
+        "truth_count",
+    ];
+    let more = [
+        "false_positive_count",
+        "false_negative_count",
+        "image_error",
+    ];
+    let of = |row: &Value| {
+        fields
+            .iter()
+            .chain(&more)
+            .map(|field| row[*field].clone())
+            .collect()
+    };
+    array(report, "stages").iter().map(of).collect()
+}
+
+#[test]
+fn truth_is_kept_on_disk_and_only_read_if_it_is_of_this_question() {
+    let folder = folder(&[]);
+    let line = format!("{CITY} --truth-cache of/truth");
+    let ask = |line: &str| counts(&json(&works(folder.path(), line)));
+    let first = ask(&line);
+    assert_eq!(first, counts(&report(CITY)), "the same without a cache");
+    let directory = folder.path().join("of/truth");
+    let files = || {
+        let entries = fs::read_dir(&directory).expect("a directory");
+        let mut paths: Vec<_> = entries.map(|entry| entry.expect("a file").path()).collect();
+        paths.sort();
+        paths
+    };
+    let kept = files();
+    assert_eq!(kept.len(), 3, "one for each view");
+    let whole: Vec<Vec<u8>> = kept.iter().map(|path| fs::read(path).unwrap()).collect();
+    let written = |path: &Path| fs::metadata(path).unwrap().modified().unwrap();
+    let before: Vec<_> = kept.iter().map(|path| written(path)).collect();
+    assert_eq!(ask(&line), first);
+    let after: Vec<_> = kept.iter().map(|path| written(path)).collect();
+    assert_eq!(before, after, "read, not written anew");
+    // An altered file, one that is cut short, one of another view: found out anew.
+    let mut altered = whole[0].clone();
+    altered[80] ^= 1;
+    fs::write(&kept[0], altered).unwrap();
+    fs::write(&kept[1], &whole[1][..whole[1].len() / 2]).unwrap();
+    fs::write(&kept[2], &whole[0]).unwrap();
+    assert_eq!(ask(&line), first);
+    let healed: Vec<Vec<u8>> = kept.iter().map(|path| fs::read(path).unwrap()).collect();
+    assert_eq!(healed, whole);
+    // Another scene is another question.
+    ask(&line.replace("n=800", "n=801"));
+    assert_eq!(files().len(), 6);
+}
