@@ -1,7 +1,7 @@
 //! `cullbench check`: goes through a file of certificates with a program that shares
 //! no code with what made them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write};
 
 use anyhow::{Context, bail};
@@ -14,6 +14,7 @@ use crate::camera::Camera;
 use crate::funnel::{Proofs, regions_of};
 use crate::input::read_file;
 use crate::path::{self, CameraPath, LensDefaults};
+use crate::query::ItemId;
 use crate::scene::{Scene, WorldBox};
 use crate::visibility::region::{ClaimErrors, Pvs, REJECT, RegionGraph};
 use crate::visibility::truth::{
@@ -29,6 +30,7 @@ struct Checked {
     visible_count: usize,
     hidden_count: usize,
     tied_count: usize,
+    along_lines_count: usize,
     undecided_count: usize,
     cell_count: usize,
     claim_count: usize,
@@ -51,28 +53,27 @@ impl Checked {
         self.visible_count += counts.visible;
         self.hidden_count += counts.hidden;
         self.tied_count += counts.tied;
+        self.along_lines_count += counts.along_lines;
         self.undecided_count += counts.undecided;
         self.cell_count += counts.cells;
     }
 
     /// The proofs of one view, which is to be that of a camera.
-    fn view(
-        &mut self,
-        line: usize,
-        proofs: &Certificates,
-        boxes: &[WorldBox],
-        camera: Option<&Camera>,
-    ) {
+    fn view(&mut self, line: usize, proofs: &Certificates, boxes: &[WorldBox], camera: &Camera) {
         self.view_count += 1;
-        let is_its_view = |camera: &Camera| {
-            Rays::of(camera).is_ok_and(|rays| CertifiedView::of(&rays) == proofs.view)
-        };
-        if !camera.is_none_or(is_its_view) {
-            return self.rejected.push(Rejection {
+        let is_its_view =
+            Rays::of(camera).is_ok_and(|rays| CertifiedView::of(&rays) == proofs.view);
+        if !is_its_view {
+            return self.reject(line, "the view is not that of its camera");
+        }
+        let proven: BTreeSet<ItemId> = proofs.proofs.iter().map(|(item, _)| *item).collect();
+        if [proven.len(), proofs.proofs.len()] != [proofs.items; 2] {
+            let (items, count) = (proofs.items, proofs.proofs.len());
+            let of = proven.len();
+            return self.reject(
                 line,
-                item: None,
-                reason: "the view is not that of its camera".to_owned(),
-            });
+                &format!("{count} proofs of {of} items; expected one of each of {items} items"),
+            );
         }
         match check_proofs(proofs, boxes) {
             Ok(counts) => self.add(&counts),
@@ -84,6 +85,15 @@ impl Checked {
         }
     }
 
+    /// All of a line.
+    fn reject(&mut self, line: usize, reason: &str) {
+        self.rejected.push(Rejection {
+            line,
+            item: None,
+            reason: reason.to_owned(),
+        });
+    }
+
     /// The errors of one claim.
     fn claim(&mut self, line: usize, errors: &ClaimErrors, claim: &Pvs, graph: &RegionGraph) {
         self.claim_count += 1;
@@ -92,11 +102,7 @@ impl Checked {
                 self.asymmetric_count += errors.asymmetric.len();
                 self.false_negative_count += errors.false_negatives.len();
             }
-            Err(rejected) => self.rejected.push(Rejection {
-                line,
-                item: None,
-                reason: rejected.to_string(),
-            }),
+            Err(rejected) => self.reject(line, &rejected.to_string()),
         }
     }
 }
@@ -136,6 +142,8 @@ pub fn check(args: &CheckArgs) -> anyhow::Result<Ending> {
     let lens = args.lens.defaults()?;
     let mut scenes: BTreeMap<String, Loaded> = BTreeMap::new();
     let mut checked = Checked::default();
+    // The views and claims so far.
+    let mut about = BTreeSet::new();
     for (number, line) in lines
         .lines()
         .enumerate()
@@ -175,13 +183,31 @@ pub fn check(args: &CheckArgs) -> anyhow::Result<Ending> {
                         place()
                     );
                 }
-                let camera = match &proofs.camera {
-                    Some(camera) => Some(loaded.camera(camera, &lens).with_context(place)?),
-                    None => None,
+                let Some(of) = &proofs.camera else {
+                    bail!(
+                        "{}: a view of no camera; expected the field 'camera'",
+                        place()
+                    );
                 };
-                checked.view(number, &proofs, &loaded.boxes, camera.as_ref());
+                if !about.insert(format!("{name}\n{}\n{}", of.path, of.index)) {
+                    bail!(
+                        "{}: camera {} of '{}' a second time; expected it once",
+                        place(),
+                        of.index,
+                        of.path
+                    );
+                }
+                let camera = loaded.camera(of, &lens).with_context(place)?;
+                checked.view(number, &proofs, &loaded.boxes, &camera);
             }
             Proofs::Claim(errors) => {
+                if !about.insert(format!("{name}\n{}", errors.claim)) {
+                    bail!(
+                        "{}: the claim of {} a second time; expected it once",
+                        place(),
+                        errors.claim
+                    );
+                }
                 if loaded.regions.is_none() {
                     loaded.regions = regions_of(&loaded.scene)?;
                 }
@@ -238,16 +264,19 @@ fn show(checked: &Checked, out: &mut impl Write) -> io::Result<()> {
             .unwrap_or_default();
         writeln!(out, "line {line}{item}: rejected, {reason}")?;
     }
-    let mut decided = checked.visible_count + checked.hidden_count + checked.tied_count;
+    let mut decided = checked.visible_count + checked.hidden_count;
+    decided += checked.tied_count + checked.along_lines_count;
     if checked.view_count > 0 {
         writeln!(
             out,
-            "{}: {} proven visible, {} proven hidden ({} of images), {} tied, {} undecided.",
+            "{}: {} proven visible, {} proven hidden ({} of images), {} hidden but for ties, {} \
+             but along lines of the image, {} undecided.",
             text::counted(checked.view_count, "view"),
             checked.visible_count,
             checked.hidden_count,
             text::counted(checked.cell_count, "part"),
             checked.tied_count,
+            checked.along_lines_count,
             checked.undecided_count
         )?;
     }

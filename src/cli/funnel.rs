@@ -16,7 +16,7 @@ use super::protocol::{Job, Timing};
 use super::run::progress;
 use super::run_resume::typed_args;
 use super::{
-    Ending, expect_place_for, funnel_picture, funnel_table, interrupt, load_scene_by, print_json,
+    Ending, expect_places, funnel_picture, funnel_table, interrupt, load_scene_by, print_json,
     text, unread_is_fine,
 };
 use crate::funnel::{self, Chain, FunnelInput, FunnelPlan, Proofs, SeenFrom, StageKind, StageRow};
@@ -35,9 +35,18 @@ use crate::visibility::truth::TruthCache;
 const ROUNDS: [usize; 2] = [5, 15];
 
 pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> {
-    expect_place_for("--svg", args.svg.as_deref())?;
-    expect_place_for("--html", args.html.as_deref())?;
-    expect_place_for("--certificates", args.certificates.as_deref())?;
+    let outputs = [
+        ("--svg", args.svg.as_deref()),
+        ("--html", args.html.as_deref()),
+        ("--certificates", args.certificates.as_deref()),
+    ];
+    let inputs = [
+        args.pvs.as_deref(),
+        Some(args.scene.as_ref()),
+        Some(args.path.as_ref()),
+    ];
+    let inputs: Vec<&Path> = inputs.into_iter().flatten().collect();
+    expect_places(&outputs, &inputs)?;
     if args.certificates.is_some() && args.cut_out.is_some() {
         bail!("--certificates are about boxes without holes; expected no --cut-out with them");
     }

@@ -58,7 +58,7 @@ mod worker;
 
 use std::error::Error;
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use crate::index::Registry;
@@ -176,7 +176,42 @@ fn load_scene_by(source: &str, options: &LoadOptions) -> anyhow::Result<Scene> {
     Ok(scene)
 }
 
-/// That a file can be written where it is to be: said before the work, not after it.
+/// That files can be written where they are to be, and that none of them is an input or
+/// another output: said before the work, not after it. Inputs may be specs and names.
+fn expect_places(outputs: &[(&str, Option<&Path>)], inputs: &[&Path]) -> anyhow::Result<()> {
+    // As the file system knows it, also where there is none yet.
+    let known = |file: &Path| -> Option<PathBuf> {
+        let folder = file
+            .parent()
+            .filter(|folder| !folder.as_os_str().is_empty());
+        let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok()?;
+        let named = folder.join(file.file_name()?);
+        Some(named.canonicalize().unwrap_or(named))
+    };
+    let mut taken: Vec<PathBuf> = Vec::new();
+    taken.extend(
+        inputs
+            .iter()
+            .filter(|file| file.is_file())
+            .filter_map(|file| known(file)),
+    );
+    for &(option, file) in outputs {
+        expect_place_for(option, file)?;
+        let Some(place) = file.and_then(known) else {
+            continue;
+        };
+        if taken.contains(&place) {
+            let file = place.display();
+            anyhow::bail!(
+                "{file}: an input or another output; expected a file of its own for {option}"
+            );
+        }
+        taken.push(place);
+    }
+    Ok(())
+}
+
+/// The same of one file.
 fn expect_place_for(option: &str, file: Option<&Path>) -> anyhow::Result<()> {
     let Some(file) = file else {
         return Ok(());

@@ -14,7 +14,7 @@ use super::run::progress;
 use super::run_resume::typed_args;
 use super::shared_args::TableFormat;
 use super::{
-    Ending, expect_place_for, interrupt, load_scene, precision_conclusions, precision_diagram,
+    Ending, expect_places, interrupt, load_scene, precision_conclusions, precision_diagram,
     precision_tables, print_json, stage_sweep, text, unread_is_fine,
 };
 use crate::index::Registry;
@@ -35,7 +35,8 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
     if let Some(stage) = args.stage {
         return stage_sweep::sweep(registry, args, stage);
     }
-    expect_place_for("--svg", args.svg.as_deref())?;
+    let inputs = [args.scene.as_ref(), args.path.as_ref()];
+    expect_places(&[("--svg", args.svg.as_deref())], &inputs)?;
     let structures = args.kernel.structures(registry, &args.structure)?;
     let defaults = args.lens.defaults()?;
     let scene = load_scene(&args.scene, &args.scene_args, 2 * structures.len())?;

@@ -341,14 +341,21 @@ impl<'a> World<'a> {
     fn run_object(&self, name: &str) -> Run<'_> {
         let found = self.structures.iter().find(|(label, _)| label == name);
         let (_, index) = found.expect("a structure that was built");
+        let kept = RefCell::new((Marks::default(), Vec::new()));
         Box::new(move |view, input, out| {
             let volume = &self.views[view].volume;
             match input {
                 None => index.visible(volume, out),
-                // What other stages leave of a scene is a short list.
+                // What the structure finds in the whole scene, of these.
                 Some(items) => {
-                    let sees = |&&id: &&ItemId| volume.sees(&self.scene.items[id as usize]);
-                    out.extend(items.iter().filter(sees));
+                    let (marks, found) = &mut *kept.borrow_mut();
+                    found.clear();
+                    index.visible(volume, found);
+                    marks.clear(self.items());
+                    for &id in found.iter() {
+                        marks.insert(id);
+                    }
+                    out.extend(items.iter().filter(|&&id| marks.holds(id)));
                 }
             }
         })

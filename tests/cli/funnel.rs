@@ -213,6 +213,11 @@ fn what_cannot_be_is_refused_in_a_line() {
         ("--svg no/such/folder/x.svg", "--svg"),
         ("--html no/such/folder/x.html", "--html"),
         ("--certificates no/such/folder/x", "--certificates"),
+        ("--html scene.csv", "scene.csv | input | --html"),
+        (
+            "--certificates x --svg ./x",
+            "another output | --certificates",
+        ),
         ("--svg .", "--svg | a folder"),
         ("--cut-out fense", "fense | did you mean 'fence'"),
         (
@@ -288,7 +293,8 @@ fn proofs_are_checked_and_doctored_ones_rejected() {
         told += usize::from(done.out.contains("rejected"));
     }
     assert_eq!(told, 3);
-    // A view of another camera proves nothing of this one; of no camera it may.
+    // A view of another camera proves nothing of this one, and one of no camera nothing
+    // at all; nor do proofs of some of the items in question, or of one item twice.
     let other = proofs.replace("\"near\":0.1", "\"near\":0.0625");
     let (from, to) = (
         other.find("\"camera\"").expect("a camera"),
@@ -296,13 +302,25 @@ fn proofs_are_checked_and_doctored_ones_rejected() {
     );
     let mut bare = other.clone();
     bare.replace_range(from..to.expect("a view"), "");
-    for (content, code) in [(&other, Some(1)), (&bare, Some(0))] {
+    let first = proofs.find("\"proofs\":[").expect("proofs") + "\"proofs\":[".len();
+    let mut none = proofs.clone();
+    none.replace_range(first..proofs.trim_end().len() - 2, "");
+    let mut twice = proofs.clone();
+    let all = &proofs[first..proofs.trim_end().len() - 2];
+    twice.insert_str(first, &format!("{all},"));
+    for (content, wanted) in [
+        (&other, "not that of its camera"),
+        (&none, "0 proofs of 0 items"),
+        (&twice, "expected one of each"),
+    ] {
         fs::write(folder.path().join("other.jsonl"), content).expect("written");
         let done = cullbench(folder.path(), "check other.jsonl");
-        assert_eq!(done.code, code, "{content}: {done:?}");
-        assert_eq!(done.out.contains("not that of its camera"), code == Some(1));
+        assert_eq!(done.code, Some(1), "{content}: {done:?}");
+        assert!(done.out.contains(wanted), "{content}: {done:?}");
     }
     for (content, wanted) in [
+        (&bare[..], "line 1 | no camera | 'camera'"),
+        (&format!("{proofs}{proofs}"), "line 2 | second time"),
         ("", "no certificate"),
         ("{}", "line 1 | certificates"),
         ("\u{7f}ELF", "line 1"),

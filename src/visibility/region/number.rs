@@ -24,6 +24,11 @@ impl Marks {
         fresh
     }
 
+    /// Whether the number is in it.
+    pub fn holds(&self, number: u32) -> bool {
+        self.words[number as usize / 64] >> (number % 64) & 1 != 0
+    }
+
     /// Adds the numbers whose bits are set.
     pub fn insert_all(&mut self, set: &[u64]) {
         self.words

@@ -137,6 +137,9 @@ pub struct Certificates {
     pub camera: Option<CameraOf>,
     /// The view.
     pub view: View,
+    /// How many items are in question: those that were removed, and those seen at a
+    /// sample. Each has a proof or is undecided.
+    pub items: usize,
     /// Items with their proofs.
     pub proofs: Vec<(ItemId, Proof)>,
 }
@@ -175,6 +178,7 @@ impl Certificates {
             boxes,
             camera: None,
             view,
+            items: proofs.len(),
             proofs,
         }
     }
