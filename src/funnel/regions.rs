@@ -88,6 +88,8 @@ impl Regions {
         }
         rows.extend(exact.as_ref().and_then(|exact| stored(exact, &graph)));
         let mut regions = Regions::with(graph, rows, scene, from);
+        // From a whole cell nearly all others are reached.
+        let solids = solids.filter(|_| from == SeenFrom::Eye);
         regions
             .rows
             .extend(solids.map(|solids| grid(solids, scene)));

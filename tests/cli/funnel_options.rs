@@ -37,7 +37,7 @@ fn every_question_of_picking_is_answered_exactly() {
 fn triangles_beside_the_window_and_between_samples_are_removed() {
     // Without occlusion much of what is left reaches beyond the window, or is tiny.
     let report = report(&format!("{CITY} --occlusion none"));
-    for name in ["outcode", "below-a-sample", "cone-f32-safe"] {
+    for name in ["outcode", "below-a-sample", "per-triangle"] {
         let row = row(&report, "triangle", name);
         assert_eq!(number(row, "false_negative_count"), 0.0, "{name}");
         assert!(
