@@ -172,6 +172,9 @@ fn harness_overhead(only_test: bool, turns: usize) -> u32 {
     missed
 }
 
+/// Judges some floors: only tested or timed, in so many turns; how many are missed.
+type Part = fn(bool, usize) -> u32;
+
 /// Time of one task / time of another, from turns of both: the mean of the ratios'
 /// logarithms as a ratio, with its interval.
 fn ratio(turns: usize, mut one: impl FnMut() -> f64, mut other: impl FnMut() -> f64) -> [f64; 3] {
@@ -207,7 +210,7 @@ fn main() -> ExitCode {
     };
     let turns = if only_test { 3 } else { TURNS };
     let mut missed = 0;
-    let parts: [(&str, fn(bool, usize) -> u32); 3] = [
+    let parts: [(&str, Part); 3] = [
         ("harness", harness_overhead),
         ("occlusion", occlusion::missed),
         ("region-search", region_search::missed),

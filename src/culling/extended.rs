@@ -14,8 +14,25 @@ use crate::geometry::{MAX_PLANES, PlaneF64};
 /// How true planes must be to be of use, as a share of their magnitudes: where they
 /// are rounded to f32, one of the units that the epsilon covers.
 pub const FOR_F32: f64 = 1.0 / (1u64 << 24) as f64;
-/// Where they stay f64 and nothing is moved outward.
+/// Where they stay f64: what is left of it is covered by [`moved_out`].
 pub const FOR_F64: f64 = 1.0 / (1u64 << 40) as f64;
+
+/// Planes made for [`FOR_F64`], moved outward by all that making them can have cost at
+/// points within `reach` of the zero: 2^-35 of it. What was dropped is 2^-40 of twice
+/// the reach, and rounding 16 units of 2^-53 over a sum that is not below 2^-13.
+pub fn moved_out(planes: Vec<PlaneF64>, reach: f64) -> Vec<PlaneF64> {
+    let slack = reach / (1u64 << 35) as f64;
+    let moved = |plane: PlaneF64| PlaneF64::new(plane.normal, plane.d + slack);
+    planes.into_iter().map(moved).collect()
+}
+
+/// How far the corners of a bounded volume are from the zero.
+pub fn farthest_corner(faces: &[PlaneF64]) -> f64 {
+    corners(faces)
+        .iter()
+        .map(|corner| corner.length())
+        .fold(0.0, f64::max)
+}
 
 /// The volume's bounds along the axes: up to six planes, fewer where it has no
 /// bound or f64 cannot make one that is true to `unit`.

@@ -6,6 +6,7 @@ mod extended;
 
 use std::borrow::Cow;
 
+use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::camera::{Camera, CameraError, PlaneMethod, PlaneOptions, Surroundings, check_sums};
@@ -14,7 +15,9 @@ use crate::geometry::{
 };
 use crate::query::AnyVolume;
 
-pub use extended::{FOR_F32, FOR_F64, bounds, extended, silhouettes};
+use extended::{FOR_F64, farthest_corner, moved_out};
+
+pub use extended::{FOR_F32, bounds, extended, silhouettes};
 
 named! {
     /// How a box is tested against the volume.
@@ -128,13 +131,11 @@ impl Culling {
     /// Planes that do not fit f32; combinations that make no sense.
     pub fn view(&self, camera: &Camera, around: &Surroundings) -> Result<CameraView, CullingError> {
         self.check()?;
-        let local_eye = camera.frame.eye - around.origin;
         match self.arithmetic {
             Arithmetic::F32 => self.in_f32(camera, around),
             Arithmetic::F64 => {
                 let mut planes = camera.convex_volume_f64(around)?.planes().to_vec();
-                let more = self.more(&faces_about_eye(camera)?, FOR_F64);
-                planes.extend(more.iter().map(|plane| plane.about(-local_eye)));
+                planes.extend(self.more_in_f64(camera, around)?);
                 let volume = ConvexVolumeF64::from_planes(&planes).map_err(CameraError::from)?;
                 Ok(CameraView::Wide(volume))
             }
@@ -199,6 +200,22 @@ impl Culling {
         })
     }
 
+    /// The further planes in f64, in scene coordinates.
+    fn more_in_f64(
+        &self,
+        camera: &Camera,
+        around: &Surroundings,
+    ) -> Result<Vec<PlaneF64>, CameraError> {
+        let local_eye = camera.frame.eye - around.origin;
+        let faces = faces_about_eye(camera)?;
+        let reach = match around.reach {
+            Vec3::ZERO => farthest_corner(&faces),
+            of_scene => (of_scene.as_dvec3() + local_eye.abs()).length(),
+        };
+        let more = moved_out(self.more(&faces, FOR_F64), reach);
+        Ok(more.iter().map(|plane| plane.about(-local_eye)).collect())
+    }
+
     /// What the test asks for beyond the faces, true to `unit`.
     fn more(&self, faces: &[PlaneF64], unit: f64) -> Vec<PlaneF64> {
         match self.test {
@@ -221,7 +238,7 @@ fn faces_about_eye(camera: &Camera) -> Result<Vec<PlaneF64>, CameraError> {
 mod tests {
     use super::*;
     use crate::camera::{Frame, Lens};
-    use glam::{DVec3, Vec3};
+    use glam::DVec3;
 
     const AROUND: Surroundings = Surroundings {
         origin: DVec3::ZERO,

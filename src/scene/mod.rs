@@ -21,6 +21,7 @@ mod samples;
 mod settled;
 mod shape;
 mod shared_faces;
+mod side;
 mod sought;
 mod source;
 mod surface;

@@ -1,7 +1,7 @@
 //! Boxes to search by: which items overlap a box, exactly. It defines the comparison
 //! of boxes as they were written; searching is left to the indexes.
 
-use super::originals::side;
+use super::side::side;
 use super::{Scene, WorldBox};
 use crate::geometry::{Aabb, ConvexVolume};
 use crate::query::ItemId;

@@ -15,7 +15,7 @@ use std::collections::hash_map::Entry;
 use glam::{DVec3, Vec3};
 
 use super::WorldBox;
-use super::originals::side;
+use super::side::side;
 use crate::geometry::Aabb;
 
 /// Coordinates of one axis: with more the boxes share hardly any.

@@ -3,7 +3,8 @@
 
 use glam::{DVec3, Vec3};
 
-use super::originals::{Originals, side};
+use super::originals::Originals;
+use super::side::side;
 use super::{Regions, Scene};
 use crate::query::ItemId;
 
