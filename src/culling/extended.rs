@@ -11,43 +11,24 @@ use glam::DVec3;
 use crate::arithmetic::cross;
 use crate::geometry::{MAX_PLANES, PlaneF64};
 
-/// How true planes must be to be of use, as a share of their magnitudes: where they
-/// are rounded to f32, one of the units that the epsilon covers.
-pub const FOR_F32: f64 = 1.0 / (1u64 << 24) as f64;
-/// Where they stay f64: what is left of it is covered by [`moved_out`].
-pub const FOR_F64: f64 = 1.0 / (1u64 << 40) as f64;
-
-/// Planes made for [`FOR_F64`], moved outward by all that making them can have cost at
-/// points within `reach` of the zero: 2^-35 of it. What was dropped is 2^-40 of twice
-/// the reach, and rounding 16 units of 2^-53 over a sum that is not below 2^-13.
-pub fn moved_out(planes: Vec<PlaneF64>, reach: f64) -> Vec<PlaneF64> {
-    let slack = reach / (1u64 << 35) as f64;
-    let moved = |plane: PlaneF64| PlaneF64::new(plane.normal, plane.d + slack);
-    planes.into_iter().map(moved).collect()
-}
-
-/// How far the corners of a bounded volume are from the zero.
-pub fn farthest_corner(faces: &[PlaneF64]) -> f64 {
-    corners(faces)
-        .iter()
-        .map(|corner| corner.length())
-        .fold(0.0, f64::max)
-}
+/// What is left of a sum of unit normals where it should be nothing: some units of
+/// 2^-53 for each of up to three.
+const RESIDUE: f64 = 1.0 / (1u64 << 49) as f64;
 
 /// The volume's bounds along the axes: up to six planes, fewer where it has no
-/// bound or f64 cannot make one that is true to `unit`.
+/// bound.
 ///
 /// Each is a sum of three faces, with positive weights, that leaves one axis
-/// of the normal. O(m^3) for m faces.
-pub fn bounds(faces: &[PlaneF64], unit: f64) -> Vec<PlaneF64> {
+/// of the normal, moved outward by what making it can cost at points within
+/// `reach` of the zero. O(m^3) for m faces.
+pub fn bounds(faces: &[PlaneF64], reach: f64) -> Vec<PlaneF64> {
     /// Of a product of unit vectors.
     const ROUNDING: f64 = 1e-14;
-    /// The faces' own roundings (2^-53 of each of nine numbers) over the sum
-    /// of them that is left, at [`FOR_F32`]. Axis planes need 2 of the 8 units of
-    /// 2^-24 that the epsilon covers, and so 5 may go here. Views of up to 179.99
-    /// degrees keep their bounds with that.
+    /// What may be taken for rounding of a sum of length 1.
+    const UNIT: f64 = 1.0 / (1u64 << 24) as f64;
+    /// Of a shorter sum nothing is left. Views of up to 179.99 degrees keep their
+    /// bounds with that.
     const CANCELLED: f64 = 2e-9;
-    let cancelled = CANCELLED * (FOR_F32 / unit);
     let mut tightest: [Option<f64>; 6] = [None; 6];
     for [a, b, c] in triples(faces) {
         let crossed = [
@@ -71,8 +52,10 @@ pub fn bounds(faces: &[PlaneF64], unit: f64) -> Vec<PlaneF64> {
                 parts.map(|(w, plane)| w * sign * of(plane)).sum::<f64>()
             };
             let (n, d) = (sum(&|p| p.normal[axis]), sum(&|p| p.d));
-            let offset = d / n.abs();
-            let sound = n.abs() > cancelled && dropped <= unit * n.abs();
+            // A face is at most twice the reach away from any point within it.
+            let cost = (dropped + RESIDUE) * 2.0 * reach;
+            let offset = (d + cost) / n.abs();
+            let sound = n.abs() > CANCELLED && dropped <= UNIT * n.abs();
             if sound && offset.is_finite() {
                 let slot = &mut tightest[2 * axis + usize::from(n < 0.0)];
                 *slot = Some(slot.map_or(offset, |old| old.min(offset)));
@@ -90,13 +73,11 @@ pub fn bounds(faces: &[PlaneF64], unit: f64) -> Vec<PlaneF64> {
 ///
 /// Each is the sum of two faces that pull the axis both ways; only sums that
 /// touch the volume are kept, the tightest ones if there are too many for
-/// `room`. O(m^3) for the m faces' corners and O(m^2) sums.
-pub fn silhouettes(faces: &[PlaneF64], room: usize, unit: f64) -> Vec<PlaneF64> {
-    /// Of faces of unit length, at [`FOR_F32`]: a sum shorter than this has lost too
-    /// many digits to be a plane (1e-9 of it would be noise). Doing without is always
-    /// safe.
+/// `room`, each moved outward by what making it can cost within `reach`. O(m^3) for the m faces' corners and O(m^2) sums.
+pub fn silhouettes(faces: &[PlaneF64], room: usize, reach: f64) -> Vec<PlaneF64> {
+    /// Of faces of unit length: a sum shorter than this has lost too many digits
+    /// to be a plane (1e-9 of it would be noise). Doing without is always safe.
     const CANCELLED: f64 = 1e-7;
-    let cancelled = CANCELLED * (FOR_F32 / unit);
     /// How near to a corner a sum must pass, as a share of the magnitudes
     /// there: far above rounding, far below the gap of a sum that is idle.
     const TIGHT: f64 = 1e-7;
@@ -114,13 +95,14 @@ pub fn silhouettes(faces: &[PlaneF64], room: usize, unit: f64) -> Vec<PlaneF64> 
                 let length = normal.length();
                 let d = (a.d * against.abs() + b.d * pull.abs()) / length;
                 let plane = PlaneF64::new(normal / length, d);
-                if length < cancelled {
+                if length < CANCELLED {
                     continue;
                 }
                 let gaps = corners.iter().map(|&corner| share(&plane, corner));
                 let gap = gaps.fold(f64::INFINITY, f64::min);
+                let d = d + RESIDUE * 2.0 * reach / length;
                 if plane.normal.is_finite() && d.is_finite() && gap <= TIGHT {
-                    found.push((gap, plane));
+                    found.push((gap, PlaneF64::new(plane.normal, d)));
                 }
             }
         }
@@ -131,10 +113,16 @@ pub fn silhouettes(faces: &[PlaneF64], room: usize, unit: f64) -> Vec<PlaneF64> 
 }
 
 /// What the exact test needs beside the faces: bounds and silhouettes.
-pub fn extended(faces: &[PlaneF64], unit: f64) -> Vec<PlaneF64> {
-    let bounds = bounds(faces, unit);
+pub fn extended(faces: &[PlaneF64], reach: f64) -> Vec<PlaneF64> {
+    let bounds = bounds(faces, reach);
     let room = MAX_PLANES.saturating_sub(faces.len() + bounds.len());
-    [bounds, silhouettes(faces, room, unit)].concat()
+    [bounds, silhouettes(faces, room, reach)].concat()
+}
+
+/// How far the corners of a bounded volume are from the zero.
+pub fn farthest_corner(faces: &[PlaneF64]) -> f64 {
+    let lengths = corners(faces).into_iter().map(DVec3::length);
+    lengths.fold(0.0, f64::max)
 }
 
 /// The corners of a volume, to f64 rounding.

@@ -6,7 +6,7 @@ mod extended;
 
 use std::borrow::Cow;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::camera::{Camera, CameraError, PlaneMethod, PlaneOptions, Surroundings, check_sums};
@@ -15,9 +15,7 @@ use crate::geometry::{
 };
 use crate::query::AnyVolume;
 
-use extended::{FOR_F64, farthest_corner, moved_out};
-
-pub use extended::{FOR_F32, bounds, extended, silhouettes};
+pub use extended::{bounds, extended, farthest_corner, silhouettes};
 
 named! {
     /// How a box is tested against the volume.
@@ -131,16 +129,18 @@ impl Culling {
     /// Planes that do not fit f32; combinations that make no sense.
     pub fn view(&self, camera: &Camera, around: &Surroundings) -> Result<CameraView, CullingError> {
         self.check()?;
+        let local_eye = camera.frame.eye - around.origin;
         match self.arithmetic {
             Arithmetic::F32 => self.in_f32(camera, around),
             Arithmetic::F64 => {
                 let mut planes = camera.convex_volume_f64(around)?.planes().to_vec();
-                planes.extend(self.more_in_f64(camera, around)?);
+                let more = self.more(&faces_about_eye(camera)?, local_eye, around);
+                planes.extend(more.iter().map(|plane| plane.about(-local_eye)));
                 let volume = ConvexVolumeF64::from_planes(&planes).map_err(CameraError::from)?;
                 Ok(CameraView::Wide(volume))
             }
             Arithmetic::F32Relative => {
-                let more = self.more(&faces_about_eye(camera)?, FOR_F32);
+                let more = self.more(&faces_about_eye(camera)?, local_eye, around);
                 let epsilon = self.planes.epsilon;
                 let volume = camera.relative_volume(&more, epsilon, around)?;
                 Ok(CameraView::Relative(volume))
@@ -183,7 +183,7 @@ impl Culling {
                 let wide = faces.planes().iter().map(PlaneF64::from);
                 wide.map(|plane| plane.about(local_eye)).collect()
             };
-            self.more(&faces, FOR_F32)
+            self.more(&faces, local_eye, around)
         } else {
             Vec::new()
         };
@@ -200,28 +200,17 @@ impl Culling {
         })
     }
 
-    /// The further planes in f64, in scene coordinates.
-    fn more_in_f64(
-        &self,
-        camera: &Camera,
-        around: &Surroundings,
-    ) -> Result<Vec<PlaneF64>, CameraError> {
-        let local_eye = camera.frame.eye - around.origin;
-        let faces = faces_about_eye(camera)?;
-        let reach = match around.reach {
-            Vec3::ZERO => farthest_corner(&faces),
+    /// What the test asks for beyond the faces, which are about the eye.
+    fn more(&self, faces: &[PlaneF64], local_eye: DVec3, around: &Surroundings) -> Vec<PlaneF64> {
+        // Of the items about the eye, or of the volume where they are not known.
+        let reach = || match around.reach {
+            Vec3::ZERO => farthest_corner(faces),
             of_scene => (of_scene.as_dvec3() + local_eye.abs()).length(),
         };
-        let more = moved_out(self.more(&faces, FOR_F64), reach);
-        Ok(more.iter().map(|plane| plane.about(-local_eye)).collect())
-    }
-
-    /// What the test asks for beyond the faces, true to `unit`.
-    fn more(&self, faces: &[PlaneF64], unit: f64) -> Vec<PlaneF64> {
         match self.test {
             CullingTest::Sphere | CullingTest::SixPlane => Vec::new(),
-            CullingTest::SixBox => bounds(faces, unit),
-            CullingTest::Exact => extended(faces, unit),
+            CullingTest::SixBox => bounds(faces, reach()),
+            CullingTest::Exact => extended(faces, reach()),
         }
     }
 }
@@ -238,7 +227,6 @@ fn faces_about_eye(camera: &Camera) -> Result<Vec<PlaneF64>, CameraError> {
 mod tests {
     use super::*;
     use crate::camera::{Frame, Lens};
-    use glam::DVec3;
 
     const AROUND: Surroundings = Surroundings {
         origin: DVec3::ZERO,
@@ -274,6 +262,10 @@ mod tests {
     #[test]
     fn nothing_in_the_middle_of_a_needle_is_lost_in_any_arithmetic() {
         let frame = Frame::looking_along(DVec3::ZERO, -DVec3::Z, DVec3::Y).unwrap();
+        let around = Surroundings {
+            origin: DVec3::ZERO,
+            reach: Vec3::splat(500.0),
+        };
         for (fovy, aspect) in [(1e-6, 1e-8), (1e-5, 1e-7), (1e-9, 1e-8), (1e-3, 1e-4)] {
             let lens = Lens::perspective(fovy, aspect, 1.0, Some(1000.0)).unwrap();
             let camera = Camera { frame, lens };
@@ -284,7 +276,7 @@ mod tests {
                     if culling.check().is_err() {
                         continue;
                     }
-                    let view = culling.view(&camera, &AROUND).unwrap();
+                    let view = culling.view(&camera, &around).unwrap();
                     for share in [-0.9, -0.5, 0.0, 0.1, 0.5, 0.9] {
                         let at = Vec3::new((half * share) as f32, 0.0, -500.0);
                         assert!(

@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 use serde::Serialize;
 
 use crate::camera::{Camera, CameraError, Frame, Lens, PlaneOptions, Surroundings};
-use crate::culling::{FOR_F32, bounds, extended, silhouettes};
+use crate::culling::{bounds, extended, farthest_corner, silhouettes};
 use crate::geometry::{
     Aabb, BoxBlocks, ConvexVolume, ConvexVolumeF64, MAX_PLANES, PlaneF64, Spheres, sphere_cube,
 };
@@ -171,20 +171,21 @@ impl Views {
         let around = Surroundings::default();
         let wide = camera.convex_volume_f64(&around)?;
         let faces = wide.planes();
+        let reach = farthest_corner(faces);
         let moved = PlaneOptions::default();
         let bare = PlaneOptions {
             epsilon: 0.0,
             ..moved
         };
         let with = |more: &[PlaneF64], options| camera.volume_with(more, options, &around);
-        let silhouettes = silhouettes(faces, MAX_PLANES - faces.len(), FOR_F32);
-        let all = extended(faces, FOR_F32);
+        let silhouettes = silhouettes(faces, MAX_PLANES - faces.len(), reach);
+        let all = extended(faces, reach);
         let six = with(&[], &bare)?;
         Ok(Views {
             spheres: Spheres::new(&six),
             volumes: [
                 six,
-                with(&bounds(faces, FOR_F32), &bare)?,
+                with(&bounds(faces, reach), &bare)?,
                 with(&silhouettes, &bare)?,
                 with(&all, &bare)?,
                 with(&all, &moved)?,
