@@ -169,7 +169,7 @@ impl Axis {
             return None;
         }
         let none = faces.len() as u16;
-        let bits = (faces.len() * BITS_EACH).next_power_of_two();
+        let bits = (faces.len() * BITS_EACH).next_power_of_two().max(64);
         let of_stored = faces.iter().zip(&stored);
         let of_stored = of_stored.map(|(face, &stored)| Face::new(face.0, stored));
         let mut axis = Axis {
