@@ -91,21 +91,21 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
         truth_cache: truth_cache.as_ref(),
         execution: args.kernel.execution()?,
     };
-    if let Some(file) = &args.certificates {
-        job("proofs");
-        let mut lines = String::new();
-        let each = |proofs: Proofs| {
-            lines += &proofs.to_json();
-            lines.push('\n');
-        };
-        if !funnel::certificates(&input, &interrupt::asked, each)? {
-            return Ok(Ending::Interrupted);
-        }
-        write_atomically(file, |out| out.write_all(lines.as_bytes()))?;
-    }
-    let Some(prepared) = funnel::prepare(&input, &interrupt::asked)? else {
+    let mut lines = String::new();
+    let mut each = |proofs: Proofs| {
+        lines += &proofs.to_json();
+        lines.push('\n');
+    };
+    let proofs: Option<&mut dyn FnMut(Proofs)> = match args.certificates {
+        Some(_) => Some(&mut each),
+        None => None,
+    };
+    let Some(prepared) = funnel::prepare(&input, proofs, &interrupt::asked)? else {
         return Ok(Ending::Interrupted);
     };
+    if let Some(file) = &args.certificates {
+        write_atomically(file, |out| out.write_all(lines.as_bytes()))?;
+    }
     let share = |process| {
         let timing = Timing {
             process,
@@ -153,8 +153,14 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
 }
 
 /// Whether nothing that promises not to lose what is visible has lost it. Stages behind
-/// an unproven one of the chain miss what that has lost.
+/// an unproven one of the chain miss what that has lost. What is proven visible between
+/// the samples may be removed by what promises no more than the samples.
 fn keep_their_word(stages: &[StageRow]) -> bool {
+    let promises_all = |row: &&StageRow| row.back_end.guarantee.is_safe();
+    let mut proven = stages.iter().filter(promises_all);
+    if proven.any(|row| row.proofs.as_ref().is_some_and(|p| p.sub_sample_count > 0)) {
+        return false;
+    }
     let is_unproven = |row: &&StageRow| row.back_end.guarantee == Guarantee::Unproven;
     let chosen = stages.iter().filter(|row| row.is_chosen);
     let first = chosen
@@ -246,7 +252,7 @@ pub fn time(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::funnel::{BackEnd, Errors, Times};
+    use crate::funnel::{BackEnd, Errors, ProofCounts, Times};
 
     fn row(stage: StageKind, guarantee: Guarantee, false_negative_count: f64) -> StageRow {
         StageRow {
@@ -268,6 +274,7 @@ mod tests {
             ns_per_removed: None,
             ns_per_decided: None,
             fragments: None,
+            proofs: None,
         }
     }
 
@@ -293,5 +300,22 @@ mod tests {
             ..region(Unproven, 1.0)
         };
         assert!(!keeps([other, occlusion(Conservative, 1.0)]));
+    }
+
+    #[test]
+    fn what_promises_all_may_not_remove_what_is_seen_between_samples() {
+        let removing = |guarantee: Guarantee| {
+            let proofs = ProofCounts {
+                sub_sample_count: 1,
+                ..ProofCounts::default()
+            };
+            StageRow {
+                proofs: Some(proofs),
+                ..row(StageKind::Occlusion, guarantee, 0.0)
+            }
+        };
+        let keeps = |guarantee| keep_their_word(&[removing(guarantee)]);
+        assert!(keeps(Guarantee::Unproven) && keeps(Guarantee::SampleExact));
+        assert!(!keeps(Guarantee::Conservative) && !keeps(Guarantee::Exact));
     }
 }

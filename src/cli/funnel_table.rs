@@ -5,7 +5,7 @@ use std::io::{self, Write};
 
 use super::document::{Block, Rows};
 use super::text;
-use crate::funnel::{FunnelReport, Gain, InnerRow, SeenFrom, StageRow, Times};
+use crate::funnel::{FunnelReport, Gain, InnerRow, ProofCounts, SeenFrom, StageRow, Times};
 use crate::shown::field;
 use crate::visibility::Guarantee;
 use crate::visibility::occlusion::OccluderChoice;
@@ -47,6 +47,10 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
     }
     // Drawn in order and picked are solid boxes only.
     for (heading, table) in [
+        (
+            "What was removed within the frustum, by its proof, over all views",
+            proofs(report),
+        ),
         ("Samples and fragments of what is left", fragments(report)),
         ("What is left, drawn in every order", orders(report)),
         ("What is under a cursor", picks(report)),
@@ -122,17 +126,22 @@ fn stages(report: &FunnelReport) -> Rows {
     rows
 }
 
-fn stage(row: &StageRow) -> Vec<String> {
-    let errors = &row.errors;
+/// A back end with its marks.
+fn by(row: &StageRow) -> String {
     let name = row.structure.as_deref().unwrap_or(row.back_end.name);
     let mark = if row.is_chosen { "*" } else { "" };
     let doubt = match row.back_end.guarantee {
         Guarantee::Unproven => "?",
         _ => "",
     };
+    format!("{name}{mark}{doubt}")
+}
+
+fn stage(row: &StageRow) -> Vec<String> {
+    let errors = &row.errors;
     vec![
         row.back_end.stage.name().to_owned(),
-        format!("{name}{mark}{doubt}"),
+        by(row),
         count(errors.input_count),
         count(errors.output_count),
         count(errors.truth_count),
@@ -154,6 +163,37 @@ fn count(mean: f64) -> String {
         mean if mean >= 100.0 || mean.fract() == 0.0 => format!("{mean:.0}"),
         mean => text::significant(mean),
     }
+}
+
+/// Every back end that removed what is in view, where proofs were made.
+fn proofs(report: &FunnelReport) -> Rows {
+    let mut rows = Rows::of_numbers([
+        "stage",
+        "by",
+        "hidden",
+        "tied",
+        "along lines",
+        "undecided",
+        "sub-sample",
+        "visible",
+    ]);
+    rows.right.retain(|column| *column > 1);
+    let proven = report.stages.iter();
+    let proven = proven.filter_map(|row| Some((row, row.proofs.as_ref()?)));
+    for (row, proofs) in proven.filter(|(_, proofs)| **proofs != ProofCounts::default()) {
+        let mut cells = vec![row.back_end.stage.name().to_owned(), by(row)];
+        let counts = [
+            proofs.hidden_count,
+            proofs.tied_count,
+            proofs.along_lines_count,
+            proofs.undecided_count,
+            proofs.sub_sample_count,
+            proofs.visible_count,
+        ];
+        cells.extend(counts.map(|count| count.to_string()));
+        rows.rows.push(cells);
+    }
+    rows
 }
 
 /// One test alone has nothing to be compared with.

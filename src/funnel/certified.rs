@@ -1,17 +1,19 @@
-//! Proofs for what the chain removed and for what is visible: written to a file, and
-//! checked by `cullbench check`.
+//! Proofs for what the back ends removed and for what is visible: written to a file,
+//! checked by `cullbench check`, and held against what the back ends promise.
 
 use serde::Serialize;
 
 use super::error::FunnelError;
 use super::pass::{ALL, Pass};
+use super::proven::Proven;
 use super::regions::ClaimAudit;
-use super::stage::{NONE, StageKind};
+use super::walks::Walks;
 use super::world::{FunnelInput, World};
 use crate::query::ItemId;
-use crate::scene::ItemShape;
 use crate::visibility::region::ClaimErrors;
-use crate::visibility::truth::{Certificates, Prover, RayIndex, SampleTruth, certify};
+use crate::visibility::truth::{
+    Certificates, Class, Proof, Prover, RayIndex, SampleTruth, certify,
+};
 
 /// A line of a file of proofs.
 #[derive(Clone, Debug, Serialize)]
@@ -54,74 +56,87 @@ impl Proofs {
     }
 }
 
-/// Looks for a proof of every item of each view that the frustum meets and that is
-/// either visible or removed by the chain; hands over the errors of every claim, then one
-/// view after the other. Of a map, whose items are no solids, there are no views. False if
-/// stopped.
+/// That there is something to be proven: solid boxes, or a claim.
 ///
 /// # Errors
-/// As [`prepare`](super::prepare).
-pub fn certificates(
-    input: &FunnelInput,
-    stop: &dyn Fn() -> bool,
-    mut each: impl FnMut(Proofs),
-) -> Result<bool, FunnelError> {
-    let no_solids = || FunnelError::NoSolids {
-        scene: input.scene.name.clone(),
-        shape: input.scene.item_shape(),
-    };
-    if input.scene.item_shape() == ItemShape::Mesh {
-        return Err(no_solids());
+/// If there is nothing.
+pub fn expect_provable(world: &World) -> Result<(), FunnelError> {
+    let is_mesh = world.mesh().is_some();
+    let has_claim = !world.audits().is_empty() && !is_mesh;
+    match world.solids().is_some() || has_claim {
+        true => Ok(()),
+        false => Err(FunnelError::NoSolids {
+            scene: world.scene().name.clone(),
+            shape: world.scene().item_shape(),
+        }),
     }
-    let world = World::new(input)?;
+}
+
+/// Looks for a proof of every item of each view that the frustum meets and that is
+/// either visible or removed by any back end; hands over the errors of every claim, then
+/// one view after the other. Of a map, whose items are no solids, nothing is known in a
+/// view. `None` if stopped.
+pub fn certified(
+    input: &FunnelInput,
+    world: &World,
+    pass: &Pass,
+    walks: &Walks,
+    stop: &dyn Fn() -> bool,
+    each: &mut dyn FnMut(Proofs),
+) -> Option<Option<Proven>> {
     for ClaimAudit { claim, audit } in world.audits() {
         let regions = world.region_row(claim).map_or(0, |row| row.graph().len());
         let errors = ClaimErrors::of(audit, &input.scene.name, claim, regions);
         each(Proofs::Claim(errors));
     }
     let Some(solids) = world.solids() else {
-        return match world.audits() {
-            [] => Err(no_solids()),
-            _ => Ok(true),
-        };
+        return Some(None);
     };
     let index = RayIndex::build(solids);
-    let mut pass = Pass::new(&world);
-    let Some(walked) = pass.walk(input.chain, stop) else {
-        return Ok(false);
-    };
-    let object = input.chain.of(StageKind::Object);
-    let in_view = match object {
-        NONE => ALL,
-        name => match pass.step(StageKind::Object, name, ALL, stop) {
-            Some(step) => pass.steps()[step].output,
-            None => return Ok(false),
-        },
-    };
+    let mut known = Vec::with_capacity(world.views());
     for view in 0..world.views() {
         if stop() {
-            return Ok(false);
+            return None;
         }
         let rays = world.rays(view);
         let threads = input.execution.threads;
         let truth = SampleTruth::of(solids, &index, rays, input.samples, threads);
-        let left = world.listed(pass.items(walked.left(), view));
-        let all = world.listed(pass.items(in_view, view));
-        let is_asked = |id: &ItemId| truth.sees(*id) || left.binary_search(id).is_err();
-        let mut items: Vec<ItemId> = all.iter().copied().filter(is_asked).collect();
-        // What an unproven chain lost is proven visible, which is the point.
-        items.extend(
-            truth
-                .visible
-                .iter()
-                .filter(|id| all.binary_search(id).is_err()),
-        );
-        items.sort_unstable();
+        let items = in_question(world, pass, walks, view, &truth);
         let prover = Prover::new(solids, &index, rays);
         let scene = &input.scene.name;
         let proofs = certify(scene, &prover, rays, &truth, &items, threads);
+        let class = |(item, proof): &(ItemId, Proof)| (*item, Class::of(&truth, *item, proof));
+        known.push(proofs.proofs.iter().map(class).collect());
         let proofs = proofs.of_camera(&input.path.name, world.camera(view));
         each(Proofs::View(proofs));
     }
-    Ok(true)
+    Some(Some(Proven::new(known)))
+}
+
+/// The items in the frustum that are in front at a sample or that a back end removed, and
+/// what is in front of all others wherever it is; ascending. Which items are in the
+/// frustum is asked without any structure.
+fn in_question(
+    world: &World,
+    pass: &Pass,
+    walks: &Walks,
+    view: usize,
+    truth: &SampleTruth,
+) -> Vec<ItemId> {
+    let rows = walks.rows.iter();
+    let outputs = rows.map(|(stage, _, step)| walks.sets(pass, *stage, *step)[1]);
+    let mut outputs: Vec<usize> = outputs.filter(|&set| set != ALL).collect();
+    outputs.sort_unstable();
+    outputs.dedup();
+    let outputs = outputs.into_iter().map(|set| pass.items(set, view));
+    let outputs: Vec<&[ItemId]> = outputs.flatten().collect();
+    let is_removed = |id: &ItemId| outputs.iter().any(|set| set.binary_search(id).is_err());
+    let boxes = (0..).zip(&world.scene().items);
+    let in_view = boxes.filter(|(_, b)| world.volume(view).sees(b));
+    let mut items: Vec<ItemId> = in_view.map(|(id, _)| id).filter(is_removed).collect();
+    // What was lost is proven visible, which is the point.
+    items.extend(&truth.visible);
+    items.sort_unstable();
+    items.dedup();
+    items
 }

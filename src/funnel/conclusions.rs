@@ -3,27 +3,33 @@
 
 use super::back_ends::MOST_EXACT_ROOMS;
 use super::fragment_rows;
+use super::orders::OrderRow;
 use super::regions::ClaimAudit;
 use super::report::{FunnelReport, Gain, StageRow};
+use crate::shown::counted;
 use crate::visibility::region::STORED;
+
+/// Items that a sentence names.
+const MOST_NAMED: usize = 5;
 
 /// A sentence for each stage of the chain, and one for each back end that lost items.
 pub fn conclusions(report: &FunnelReport) -> Vec<String> {
     let mut sentences: Vec<String> = report.gains.iter().map(of_gain).collect();
     let lossy = |row: &&StageRow| row.errors.false_negative_count > 0.0;
     sentences.extend(report.stages.iter().filter(lossy).map(of_loss));
+    sentences.extend(report.stages.iter().filter_map(of_sub_samples));
     sentences.extend(of_stencil(report));
+    sentences.extend(report.orders.iter().flat_map(of_order));
     for ClaimAudit { claim, audit } in &report.audits {
         sentences.push(format!(
-            "The claim of {claim} calls {} of {} ordered pairs of regions visible, {} are: {} \
-             pairs in one direction only, {} false negatives with a line of sight, {} false \
-             positives.",
+            "The claim of {claim} calls {} of {} visible, {} are: {} in one direction only, {} \
+             with a line of sight, {}.",
             audit.claimed,
-            2 * audit.pairs,
+            counted(2 * audit.pairs as usize, "ordered pair"),
             audit.visible,
-            audit.asymmetric.len(),
-            audit.false_negatives.len(),
-            audit.false_positives
+            counted(audit.asymmetric.len(), "pair"),
+            counted(audit.false_negatives.len(), "false negative"),
+            counted(audit.false_positives as usize, "false positive"),
         ));
     }
     let is_claim = |row: &&StageRow| row.back_end.name == STORED.name;
@@ -86,6 +92,40 @@ fn of_stencil(report: &FunnelReport) -> Option<String> {
         },
         other.back_end.name,
     ))
+}
+
+/// What is seen between the samples only, and removed: no error of sample truth, and one
+/// of what promises more.
+fn of_sub_samples(row: &StageRow) -> Option<String> {
+    let found = &row.proofs.as_ref()?.sub_sample_items;
+    let (first, more) = found.split_at(found.len().min(MOST_NAMED));
+    let named = first.iter();
+    let named = named.map(|(camera, item)| format!("item {item} of camera {camera}"));
+    let named: Vec<String> = named.collect();
+    let more = match more.len() {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    (!found.is_empty()).then(|| {
+        format!(
+            "{} {} removed {} proven visible between the samples (sub-sample): {}{more}.",
+            row.back_end.stage.name(),
+            row.structure.as_deref().unwrap_or(row.back_end.name),
+            counted(found.len(), "item"),
+            named.join(", ")
+        )
+    })
+}
+
+/// Where an order that is declared exact is not.
+fn of_order(row: &OrderRow) -> impl Iterator<Item = String> {
+    row.exceptions.iter().map(|(reason, views)| {
+        format!(
+            "Order {} may be wrong in {}: {reason}.",
+            row.name,
+            counted(*views, "view")
+        )
+    })
 }
 
 fn of_loss(row: &StageRow) -> String {

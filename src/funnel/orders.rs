@@ -1,14 +1,17 @@
 //! The order in which what is left is drawn: how many fragments an early z-test keeps
 //! from being shaded, what a painter without z-test would get wrong, what sorting takes.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 
 use super::pass::Pass;
+use super::stage::by_name;
 use super::times::Times;
 use super::world::World;
 use crate::visibility::fragment::order::ORDERS;
 use crate::visibility::fragment::{Canvas, DepthOrder, Piece, Surfaces, Tests, draw, order_errors};
-use crate::visibility::{Rays, SampleGrid, Solids};
+use crate::visibility::{Guarantee, Rays, SampleGrid, Solids};
 
 /// A depth order over all views. Counts are means per view.
 #[derive(Clone, Debug, Serialize)]
@@ -34,6 +37,11 @@ pub struct OrderRow {
     pub wrong_sample_count: f64,
     /// Items on cycles of overlaps, for which no order is right.
     pub cyclic_count: f64,
+    /// What the order promises.
+    #[serde(serialize_with = "by_name")]
+    pub guarantee: Guarantee,
+    /// Why it does not hold in some views, and in how many.
+    pub exceptions: BTreeMap<&'static str, usize>,
     /// Thread CPU time of bringing the items of a view into this order.
     #[serde(flatten)]
     pub times: Times,
@@ -82,6 +90,7 @@ impl Orders {
         let mut rows = Vec::new();
         for (order, row) in ORDERS.iter().enumerate() {
             let mut sums = [0.0; 7];
+            let mut exceptions = BTreeMap::new();
             for (view, left) in self.views.iter().enumerate() {
                 if stop() {
                     return None;
@@ -89,6 +98,9 @@ impl Orders {
                 let canvas = Canvas::of(&left.rays, samples);
                 let mut pieces = Vec::new();
                 self.sort(order, view, &mut pieces);
+                if let Some(reason) = left.orders[order].exception(left.rays.camera()) {
+                    *exceptions.entry(reason).or_default() += 1;
+                }
                 let tests = Tests {
                     surfaces: left.cut_outs.as_ref(),
                     stencil: None,
@@ -128,6 +140,8 @@ impl Orders {
                 wrong_pair_count: wrong,
                 wrong_sample_count: wrong_samples,
                 cyclic_count: cyclic,
+                guarantee: row.guarantee,
+                exceptions,
                 times: Times::default(),
             });
         }

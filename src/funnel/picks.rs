@@ -6,6 +6,7 @@ use std::rc::Rc;
 
 use serde::{Serialize, Serializer};
 
+use super::stage::by_name;
 use super::times::Times;
 use super::world::World;
 use crate::camera::Surroundings;
@@ -66,10 +67,6 @@ pub struct PickRow {
     pub times: Times,
     /// The same per place.
     pub ns_per_ray: Option<f64>,
-}
-
-fn by_name<S: Serializer>(guarantee: &Guarantee, out: S) -> Result<S::Ok, S::Error> {
-    out.serialize_str(guarantee.name())
 }
 
 /// What answers a question.

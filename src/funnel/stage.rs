@@ -35,7 +35,8 @@ pub struct BackEnd {
     pub does_object_stage: bool,
 }
 
-fn by_name<S: serde::Serializer>(guarantee: &Guarantee, out: S) -> Result<S::Ok, S::Error> {
+/// A guarantee as it is written.
+pub fn by_name<S: serde::Serializer>(guarantee: &Guarantee, out: S) -> Result<S::Ok, S::Error> {
     out.serialize_str(guarantee.name())
 }
 

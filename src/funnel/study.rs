@@ -6,7 +6,7 @@ use std::cell::RefCell;
 use serde::{Deserialize, Serialize};
 
 use super::bounds::{Bound, bounds};
-use super::chain::Chain;
+use super::certified::{Proofs, certified, expect_provable};
 use super::conclusions::conclusions;
 use super::error::FunnelError;
 use super::faces::Faces;
@@ -16,12 +16,14 @@ use super::orders::{self, Orders};
 use super::pass::{Pass, Walked};
 use super::picks::Picks;
 use super::plan_view::{PlanView, fate};
+use super::proven::ProofCounts;
 use super::report::{CutOutRow, FunnelReport, Gain, LevelRow, Side, StageRow};
 use super::seen::seen;
-use super::stage::{BackEnd, NONE, StageKind};
+use super::stage::{BackEnd, StageKind};
 use super::times::Times;
 use super::triangle_rows;
 use super::truth::Truth;
+use super::walks::Walks;
 use super::world::{FunnelInput, World};
 use crate::measure::{Ask, OverProcesses, ProcessTimes, Schedule, TimedTask, Verdict, timed};
 use crate::scene::ItemShape;
@@ -47,15 +49,20 @@ pub struct Prepared {
 }
 
 /// Goes through all chains, judges them, and plans how they are timed; `None` if
-/// stopped.
+/// stopped. `proofs` is handed a proof of every item in view that is visible or that a
+/// back end removed, and the errors of every claim.
 ///
 /// # Errors
-/// A camera, a structure or a back end that cannot be had.
+/// A camera, a structure or a back end that cannot be had; a scene without proofs.
 pub fn prepare(
     input: &FunnelInput,
+    proofs: Option<&mut dyn FnMut(Proofs)>,
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<Prepared>, FunnelError> {
     let world = World::new(input)?;
+    if proofs.is_some() {
+        expect_provable(&world)?;
+    }
     let threads = input.execution.threads;
     let Some(truth) = seen(&world, input.samples, 0, threads, stop)? else {
         return Ok(None);
@@ -64,21 +71,27 @@ pub fn prepare(
     let Some(walks) = Walks::of(&mut pass, &world, input.chain, stop) else {
         return Ok(None);
     };
+    let proven = match proofs {
+        Some(each) => match certified(input, &world, &pass, &walks, stop, each) {
+            Some(proven) => proven,
+            None => return Ok(None),
+        },
+        None => None,
+    };
     let left = Left::of(&world, &pass, &walks.chosen);
     let mut rows = Vec::new();
     for (stage, name, step) in &walks.rows {
         if stop() {
             return Ok(None);
         }
-        let given = walks.chosen.sets[*stage as usize];
-        let output = step.map_or(given, |step| pass.steps()[step].output);
+        let sets = walks.sets(&pass, *stage, *step);
         let judged: Vec<_> = (0..world.views())
-            .map(|view| {
-                let sets = [given, output].map(|set| pass.items(set, view));
-                world.judge(view, sets, &truth)
-            })
+            .map(|view| world.judge(view, sets.map(|set| pass.items(set, view)), &truth))
             .collect();
-        rows.push((world.back_end(*stage, name), name.clone(), judged, *step));
+        let proofs = proven.as_ref();
+        let proofs = proofs.map(|proven| ProofCounts::of(proven, &world, &pass, sets));
+        let back_end = world.back_end(*stage, name);
+        rows.push((back_end, name.clone(), judged, *step, proofs));
     }
     if let Some(faces) = &left.faces {
         let culls = world.back_ends(StageKind::Triangle).into_iter();
@@ -89,7 +102,7 @@ pub fn prepare(
             }
             let task = place.map(|place: usize| pass.steps().len() + place);
             let judged = faces.judged(place);
-            rows.push((back_end, back_end.name.to_owned(), judged, task));
+            rows.push((back_end, back_end.name.to_owned(), judged, task, None));
         }
     }
     let last = walks.chosen.left();
@@ -105,7 +118,7 @@ pub fn prepare(
         picked = boxes.picks.judged(&RayIndex::build(boxes.solids));
     }
     // The tests of the fragment stage are not timed.
-    let tasks = rows.iter().map(|(_, _, _, task)| *task);
+    let tasks = rows.iter().map(|(_, _, _, task, _)| *task);
     let tasks: Vec<Option<usize>> = tasks.chain(tested.iter().map(|_| None)).collect();
     let row = |back_end: BackEnd, name: &str, judged: &[Judged]| StageRow {
         back_end,
@@ -117,14 +130,18 @@ pub fn prepare(
         ns_per_removed: None,
         ns_per_decided: None,
         fragments: None,
+        proofs: None,
     };
-    let rows = rows.into_iter().map(|(back_end, name, judged, task)| {
-        let is_built = back_end.stage == StageKind::Object && task.is_some();
-        StageRow {
-            structure: is_built.then(|| name.clone()),
-            ..row(back_end, &name, &judged)
-        }
-    });
+    let rows = rows
+        .into_iter()
+        .map(|(back_end, name, judged, task, proofs)| {
+            let is_built = back_end.stage == StageKind::Object && task.is_some();
+            StageRow {
+                structure: is_built.then(|| name.clone()),
+                proofs,
+                ..row(back_end, &name, &judged)
+            }
+        });
     let tested = tested.into_iter().map(|tested| StageRow {
         fragments: tested.counts,
         ..row(tested.back_end, tested.back_end.name, &tested.judged)
@@ -307,41 +324,6 @@ fn counts(ask: &Ask, views: usize) -> Vec<u64> {
         out.len() as u64
     });
     counts.collect()
-}
-
-/// The chains that are gone through: the chosen one, every back end in its place in
-/// it, and the chain without each of its stages.
-struct Walks {
-    chosen: Walked,
-    rows: Vec<(StageKind, String, Option<usize>)>,
-    without: Vec<(StageKind, Walked)>,
-}
-
-impl Walks {
-    fn of(pass: &mut Pass, world: &World, chain: &Chain, stop: &dyn Fn() -> bool) -> Option<Walks> {
-        let chosen = pass.walk(chain, stop)?;
-        let (mut rows, mut without) = (Vec::new(), Vec::new());
-        // Where occlusion is culled in a walk of its own, the frustum is part of that.
-        let does_both = world.does_object_stage(chain.of(StageKind::Occlusion));
-        for stage in StageKind::OF_ITEMS {
-            for name in world.names(stage) {
-                let step = match name.as_str() {
-                    NONE => None,
-                    _ => Some(pass.step(stage, &name, chosen.sets[stage as usize], stop)?),
-                };
-                rows.push((stage, name, step));
-            }
-            let is_part = does_both && stage == StageKind::Object;
-            if chain.of(stage) != NONE && !is_part {
-                without.push((stage, pass.walk(&chain.without(stage), stop)?));
-            }
-        }
-        Some(Walks {
-            chosen,
-            rows,
-            without,
-        })
-    }
 }
 
 /// The first view from above, after the stages that decide what is drawn.

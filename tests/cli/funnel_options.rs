@@ -60,6 +60,33 @@ fn triangles_beside_the_window_and_between_samples_are_removed() {
 }
 
 #[test]
+fn what_is_removed_is_held_against_its_proofs() {
+    assert!(row(&report(CITY), "occlusion", "masked")["proofs"].is_null());
+    let folder = folder(&[]);
+    let line = CITY.replace("96x54", "24x14") + " --certificates proofs.jsonl";
+    let report = json(&works(folder.path(), &line));
+    let count = |name, count| number(&row(&report, "occlusion", name)["proofs"], count);
+    // Samples this far apart see none of them.
+    let lost = count("masked", "sub_sample_count");
+    assert!(lost > 0.0);
+    let named = array(
+        &row(&report, "occlusion", "masked")["proofs"],
+        "sub_sample_items",
+    );
+    assert_eq!(named.len() as f64, lost);
+    assert_eq!(count("masked-inner", "sub_sample_count"), 0.0);
+    assert!(count("masked-inner", "hidden_count") > 100.0);
+    let said = array(&report, "conclusions").iter();
+    let mut said = said.filter_map(Value::as_str);
+    assert!(
+        said.any(|told| told.contains("occlusion masked removed") && told.contains("sub-sample"))
+    );
+    let checked = json(&works(folder.path(), "check proofs.jsonl --format json"));
+    let hidden = count("masked-inner", "hidden_count");
+    assert!(number(&checked, "hidden_count") >= hidden);
+}
+
+#[test]
 fn fewer_occluders_hide_less_and_lose_nothing() {
     let all = report(CITY);
     assert_eq!(all["occluders"], "all");

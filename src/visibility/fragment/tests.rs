@@ -230,6 +230,50 @@ fn overlaps_in_a_cycle_are_found_and_only_cutting_undoes_them() {
     assert_eq!(errors.cyclic, 0);
 }
 
+/// Boxes each within the next, hardly larger: hundreds of parts.
+#[test]
+fn nested_boxes_are_cut_until_the_order_is_exact_or_it_is_said() {
+    let cube = |at: [f64; 3], half: f64| {
+        let middle = DVec3::from(at) + 1e5;
+        WorldBox::new(middle - half, middle + half)
+    };
+    let boxes = [
+        cube([15.0, 0.0, 0.0], 8.0),
+        cube([15.0, 0.0, 0.0], 8.000_000_1),
+        cube([0.0, 0.0, 0.0], 3.000_000_1),
+        cube([15.0, 0.0, 0.0], 7.000_000_1),
+        cube([15.0, 0.0, 0.0], 12.0),
+        cube([20.0, 0.0, 0.0], 11.000_000_1),
+    ];
+    let solids = judge::solids(&boxes);
+    let tree = BspOrder::of(&solids);
+    assert!(
+        tree.parts() > 8 * boxes.len(),
+        "the premise: many parts, {}",
+        tree.parts()
+    );
+    let eye = DVec3::new(-12.868_988_890, 17.166_524_562, -18.450_470_565) + 1e5;
+    let frame = Frame::looking_along(eye, DVec3::X, DVec3::Z).unwrap();
+    let lens = Lens::perspective(130.0, 16.0 / 9.0, 2.0, None).unwrap();
+    let camera = Camera { frame, lens };
+    let canvas = Canvas::of(&Rays::of(&camera).unwrap(), SampleGrid::new(32, 18));
+    let mut pieces = Vec::new();
+    tree.order(&solids, &camera, &mut pieces);
+    let errors = order_errors(&canvas, &solids, &pieces, &Tests::default());
+    assert_eq!((errors.wrong_samples, tree.exception(&camera)), (0, None));
+    assert!(errors.pairs > 6, "the premise: they overlap in the image");
+    // What is within a box is never drawn.
+    let drawn = draw(&canvas, &solids, &pieces, &Tests::default());
+    let whole = draw(&canvas, &solids, &all(&solids), &Tests::default());
+    assert_eq!(drawn.tally.fragments, whole.tally.fragments);
+    // The eye in the plane of a face, and more parts than there is room for.
+    let frame = Frame::looking_along(eye.with_x(1e5 + 7.0), DVec3::Y, DVec3::Z).unwrap();
+    let within = Camera { frame, lens };
+    assert!(tree.exception(&within).unwrap().contains("plane"));
+    let tree = BspOrder::within(&solids, 2 * boxes.len());
+    assert!(tree.exception(&camera).unwrap().contains("cutting ended"));
+}
+
 fn row(name: &str) -> &'static order::OrderRow {
     ORDERS.iter().find(|row| row.name == name).unwrap()
 }

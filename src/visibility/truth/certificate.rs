@@ -137,8 +137,8 @@ pub struct Certificates {
     pub camera: Option<CameraOf>,
     /// The view.
     pub view: View,
-    /// How many items are in question: those that were removed, and those seen at a
-    /// sample. Each has a proof or is undecided.
+    /// How many items are in question: those in view that any back end removed, and those
+    /// seen at a sample. Each has a proof or is undecided.
     pub items: usize,
     /// Items with their proofs.
     pub proofs: Vec<(ItemId, Proof)>,

@@ -6,9 +6,9 @@
 //! the order of what planes part is exact. What no plane parts or cuts are boxes
 //! with the same bounds, of which a ray that passes enters one or several, by their
 //! own faces, at the same depth; or flat ones in a face of another. So the order is
-//! exact for boxes that overlap in space as well, as long as there is room for the
-//! parts; but for rays that run within a plane, whose sides are then both the
-//! eye's.
+//! exact for boxes that overlap in space as well. Two limits are left, and told where
+//! they are met ([`DepthOrder::exception`]): cutting ends where there are too many
+//! parts; and rays that run within a plane have both of its sides on the eye's.
 
 use super::contract::{DepthOrder, Piece, distance, nearest_point};
 use crate::camera::{Camera, Lens};
@@ -22,6 +22,9 @@ pub const SUMMARY: &str = "planes through faces of boxes, which are cut where th
 
 /// Parts that there may be for each item before cutting ends.
 const MOST_PARTS: usize = 16;
+/// Parts that there may be at any rate: few boxes, each within the next, are cut into
+/// hundreds.
+const ROOM: usize = 1 << 14;
 /// A cut costs as much as so many boxes of imbalance.
 const COST_OF_CUT: usize = 8;
 
@@ -51,32 +54,40 @@ struct Part {
 pub struct BspOrder {
     nodes: Vec<Node>,
     parts: usize,
+    /// Whether cutting ended before everything was parted.
+    is_cut_short: bool,
 }
 
 impl BspOrder {
     /// Builds the tree. O(n log^2 n) where few boxes are cut.
     pub fn of(solids: &Solids) -> BspOrder {
+        BspOrder::within(solids, (solids.boxes.len() * MOST_PARTS).max(ROOM))
+    }
+
+    /// The same, of so many parts at most.
+    pub fn within(solids: &Solids, most: usize) -> BspOrder {
         let part = |(b, item): (&WorldBox, u32)| Part {
             item,
             b: *b,
             cut: false,
         };
         let all: Vec<Part> = solids.boxes.iter().zip(0..).map(part).collect();
-        let most = all.len() * MOST_PARTS;
         let mut tree = BspOrder {
             parts: all.len(),
+            is_cut_short: false,
             nodes: vec![Node::Leaf(Vec::new())],
         };
         let mut open = vec![(0, all)];
         while let Some((node, parts)) = open.pop() {
             let room = most.saturating_sub(tree.parts);
             let Some((axis, at)) = plane(&parts, room) else {
+                tree.is_cut_short |= plane(&parts, usize::MAX).is_some();
                 tree.nodes[node] = Node::Leaf(parts);
                 continue;
             };
             let count = parts.len();
-            let sides = sides(parts, axis, at);
-            tree.parts += sides[0].len() + sides[1].len() - count;
+            let sides = sides(parts, axis, at).map(|side| entered(side, &solids.boxes));
+            tree.parts = tree.parts + sides[0].len() + sides[1].len() - count;
             let first = tree.nodes.len();
             for (side, parts) in sides.into_iter().enumerate() {
                 tree.nodes.push(Node::Leaf(Vec::new()));
@@ -124,6 +135,16 @@ fn sides(parts: Vec<Part>, axis: usize, at: f64) -> [Vec<Part>; 2] {
         }
     }
     [below, above]
+}
+
+/// The parts through which a ray can enter their items: those within are never drawn.
+fn entered(mut parts: Vec<Part>, boxes: &[WorldBox]) -> Vec<Part> {
+    parts.retain(|Part { item, b, cut }| {
+        let whole = &boxes[*item as usize];
+        let ends = b.min.cmpeq(whole.min) | b.max.cmpeq(whole.max);
+        !cut || ends.any()
+    });
+    parts
 }
 
 /// The plane through a face that balances its sides best and cuts least; `None` if
@@ -199,5 +220,20 @@ impl DepthOrder for BspOrder {
                 }
             }
         }
+    }
+
+    fn exception(&self, camera: &Camera) -> Option<&'static str> {
+        if self.is_cut_short {
+            return Some("cutting ended before everything was parted");
+        }
+        let Camera { frame, lens } = camera;
+        let parallel = matches!(lens, Lens::Orthographic { .. });
+        let is_within = |node: &Node| match node {
+            Node::Plane { axis, .. } if parallel => frame.forward()[*axis] == 0.0,
+            Node::Plane { axis, at, .. } => frame.eye[*axis] == *at,
+            Node::Leaf(_) => false,
+        };
+        let within = self.nodes.iter().any(is_within);
+        within.then_some("rays may run within the plane of a face")
     }
 }

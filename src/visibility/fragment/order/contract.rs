@@ -21,6 +21,11 @@ pub trait DepthOrder: Send + Sync {
     /// Puts all items, from front to back as well as it can, into `pieces` in place
     /// of what it held. Deterministic.
     fn order(&self, solids: &Solids, camera: &Camera, pieces: &mut Vec<Piece>);
+
+    /// Why an order that is declared exact may be wrong for a camera all the same.
+    fn exception(&self, _: &Camera) -> Option<&'static str> {
+        None
+    }
 }
 
 /// All items, least key first; of the same key the lowest id.

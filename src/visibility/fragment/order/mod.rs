@@ -23,7 +23,7 @@ pub struct OrderRow {
     /// One line for tables and help.
     pub summary: &'static str,
     /// [`Guarantee::Exact`]: no pair that overlaps in the image is the wrong way
-    /// round.
+    /// round, but where it says so ([`DepthOrder::exception`]).
     pub guarantee: Guarantee,
     /// Prepares it for the items of a scene.
     pub build: fn(&Solids) -> Box<dyn DepthOrder>,
