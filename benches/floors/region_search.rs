@@ -37,6 +37,18 @@ fn points(scene: &Scene, beside_faces: bool) -> Vec<DVec3> {
     (0..POINTS).map(|_| point()).collect()
 }
 
+/// CPU time of asking for all points, ns.
+fn lap(points: &[DVec3], ask: &dyn Fn(DVec3, &mut Vec<ItemId>)) -> f64 {
+    let mut out = Vec::with_capacity(64);
+    let watch = Stopwatch::start();
+    for &p in points {
+        out.clear();
+        ask(p, &mut out);
+        black_box(&out);
+    }
+    watch.lap().cpu_ns
+}
+
 /// Judges each structure on both kinds of points; how many are missed.
 pub fn missed(only_test: bool, turns: usize) -> u32 {
     let source = if only_test { "rooms:n=1000" } else { SCENE };
@@ -45,31 +57,18 @@ pub fn missed(only_test: bool, turns: usize) -> u32 {
     let asked = [("anywhere", false), ("beside faces", true)];
     let asked = asked.map(|(where_, beside_faces)| (where_, points(&scene, beside_faces)));
     let mut missed = 0;
-    for spec in Registry::builtin()
-        .structures(STRUCTURES)
-        .expect(STRUCTURES)
-    {
+    let specs = Registry::builtin().structures(STRUCTURES);
+    for spec in specs.expect(STRUCTURES) {
         let index = spec.build(boxes).expect("a build");
+        let in_f32 = |p: DVec3, out: &mut Vec<ItemId>| {
+            index.locate((p - scene.origin).as_vec3(), out);
+        };
+        let exactly = |p: DVec3, out: &mut Vec<ItemId>| {
+            scene.search(&scene.sought(p), out, |p, out| index.locate(p, out));
+        };
         for (where_, points) in &asked {
-            let mut out: Vec<ItemId> = Vec::new();
-            let mut timed = |ask: &dyn Fn(DVec3, &mut Vec<ItemId>)| {
-                let watch = Stopwatch::start();
-                for &p in points {
-                    out.clear();
-                    ask(p, &mut out);
-                    black_box(&out);
-                }
-                watch.lap().cpu_ns
-            };
-            let in_f32 = |p: DVec3, out: &mut Vec<ItemId>| {
-                index.locate(black_box((p - scene.origin).as_vec3()), out);
-            };
-            let exactly = |p: DVec3, out: &mut Vec<ItemId>| {
-                scene.search(&scene.sought(p), out, |p, out| index.locate(p, out));
-            };
-            let timed = std::cell::RefCell::new(&mut timed);
-            let turn = |ask: &dyn Fn(DVec3, &mut Vec<ItemId>)| (timed.borrow_mut())(ask);
-            let [times, low, high] = ratio(turns, || turn(&exactly), || turn(&in_f32));
+            let exact = || lap(points, &exactly);
+            let [times, low, high] = ratio(turns, exact, || lap(points, &in_f32));
             let holds = only_test || times <= MOST_TIMES;
             missed += u32::from(!holds);
             println!(

@@ -270,6 +270,22 @@ impl Camera {
 mod tests {
     use super::*;
 
+    /// The second row nearly along the fourth: as an up vector it would be refused.
+    #[test]
+    fn a_matrix_needs_no_up() {
+        for up in [1.0, 1e-14, 1e-16, 1e-20, 1e-60] {
+            let entries = [
+                [1.0, 0.0, 0.0, 0.0],
+                [0.0, up, -1.0, 0.0],
+                [0.0, 0.0, -1.0002, -0.20002],
+                [0.0, 0.0, -1.0, 0.0],
+            ];
+            let camera = Camera::of_matrix(entries, MatrixConvention::ColumnGl).unwrap();
+            assert_eq!(camera.frame.eye, DVec3::ZERO, "{up:e}");
+            assert_eq!(camera.frame.forward(), -DVec3::Z, "{up:e}");
+        }
+    }
+
     #[test]
     fn slopes_keep_their_digits_up_to_180_degrees() {
         // 180 less 2^-40 degrees: the tangent is 2 / (2^-40 pi/180) but for a

@@ -32,11 +32,11 @@ const CUBES_PER_CAMERA: usize = 10_000;
 const SWEEP_CAMERAS: usize = 200;
 
 pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<Ending> {
+    let inputs = [args.scene.as_ref(), args.path.as_ref()];
+    expect_places(&[("--svg", args.svg.as_deref())], &inputs)?;
     if let Some(stage) = args.stage {
         return stage_sweep::sweep(registry, args, stage);
     }
-    let inputs = [args.scene.as_ref(), args.path.as_ref()];
-    expect_places(&[("--svg", args.svg.as_deref())], &inputs)?;
     let structures = args.kernel.structures(registry, &args.structure)?;
     let defaults = args.lens.defaults()?;
     let scene = load_scene(&args.scene, &args.scene_args, 2 * structures.len())?;

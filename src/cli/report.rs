@@ -9,7 +9,7 @@ use anyhow::Context;
 
 use super::args::ReportArgs;
 use super::document::{Block, Rows, to_html, to_markdown};
-use super::{Ending, surface_diagram, surface_tables, tell, text};
+use super::{Ending, expect_places, surface_diagram, surface_tables, tell, text};
 use crate::index::Registry;
 use crate::measure::Status;
 use crate::report::{
@@ -18,6 +18,12 @@ use crate::report::{
 };
 
 pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> {
+    let outputs = [
+        ("--markdown", args.markdown.as_deref()),
+        ("--html", args.html.as_deref()),
+    ];
+    // Of a run's folder the report is read.
+    expect_places(&outputs, &[&args.report, &args.report.join("report.json")])?;
     let mut report = read_report(&args.report)?;
     declare(&mut report, registry);
     let pictures = match args.svg.is_some() || args.html.is_some() {

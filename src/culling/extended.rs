@@ -52,8 +52,8 @@ pub fn bounds(faces: &[PlaneF64], reach: f64) -> Vec<PlaneF64> {
                 parts.map(|(w, plane)| w * sign * of(plane)).sum::<f64>()
             };
             let (n, d) = (sum(&|p| p.normal[axis]), sum(&|p| p.d));
-            // A face is at most twice the reach away from any point within it.
-            let cost = (dropped + RESIDUE) * 2.0 * reach;
+            // What other axes are left with in the normal, and roundings of the offset.
+            let cost = (dropped + RESIDUE) * 2.0 * reach + RESIDUE * sum(&|p| p.d.abs()).abs();
             let offset = (d + cost) / n.abs();
             let sound = n.abs() > CANCELLED && dropped <= UNIT * n.abs();
             if sound && offset.is_finite() {
@@ -73,7 +73,8 @@ pub fn bounds(faces: &[PlaneF64], reach: f64) -> Vec<PlaneF64> {
 ///
 /// Each is the sum of two faces that pull the axis both ways; only sums that
 /// touch the volume are kept, the tightest ones if there are too many for
-/// `room`, each moved outward by what making it can cost within `reach`. O(m^3) for the m faces' corners and O(m^2) sums.
+/// `room`, each moved outward by what making it can cost within `reach`. O(m^3) for
+/// the m faces' corners and O(m^2) sums.
 pub fn silhouettes(faces: &[PlaneF64], room: usize, reach: f64) -> Vec<PlaneF64> {
     /// Of faces of unit length: a sum shorter than this has lost too many digits
     /// to be a plane (1e-9 of it would be noise). Doing without is always safe.
@@ -93,14 +94,16 @@ pub fn silhouettes(faces: &[PlaneF64], room: usize, reach: f64) -> Vec<PlaneF64>
                 let mut normal = a.normal * against.abs() + b.normal * pull.abs();
                 normal[axis] = 0.0;
                 let length = normal.length();
-                let d = (a.d * against.abs() + b.d * pull.abs()) / length;
+                let [of_a, of_b] = [a.d * against.abs(), b.d * pull.abs()];
+                let d = (of_a + of_b) / length;
                 let plane = PlaneF64::new(normal / length, d);
                 if length < CANCELLED {
                     continue;
                 }
                 let gaps = corners.iter().map(|&corner| share(&plane, corner));
                 let gap = gaps.fold(f64::INFINITY, f64::min);
-                let d = d + RESIDUE * 2.0 * reach / length;
+                let cost = RESIDUE * (2.0 * reach + of_a.abs() + of_b.abs());
+                let d = d + cost / length;
                 if plane.normal.is_finite() && d.is_finite() && gap <= TIGHT {
                     found.push((gap, PlaneF64::new(plane.normal, d)));
                 }

@@ -459,3 +459,63 @@ fn cut_out(
         .for_each(|item| solids.hides_nothing(item));
     surfaces
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::index::Row;
+    use crate::path::{self, LensDefaults};
+    use crate::scene;
+
+    /// A structure that finds nothing, beside one that is right: what is behind a region
+    /// stage is asked of each.
+    #[test]
+    fn an_object_row_behind_a_region_stage_asks_its_structure() {
+        const LINEAR: fn() -> StructureSpec = || StructureSpec::parse("linear").expect("linear");
+        let blind = StructureSpec {
+            label: "blind".to_owned(),
+            row: Row {
+                build: |_, _, _| LINEAR().build(&[][..]),
+                ..LINEAR().row
+            },
+            ..LINEAR()
+        };
+        let scene = scene::load("rooms:n=500", &Default::default()).expect("rooms");
+        let path = path::load("street:frames=3", &scene, &LensDefaults::default());
+        let input = FunnelInput {
+            scene: &scene,
+            path: &path.expect("a path"),
+            most_views: 3,
+            samples: SampleGrid::new(8, 5),
+            cut_outs: None,
+            chain: &Chain::for_scene(&scene, false).with(StageKind::Object, "linear"),
+            structures: &[LINEAR(), blind],
+            protocol: &Protocol {
+                rounds: [1, 1],
+                task_ns: 1e6,
+                cameras: 3,
+                cold: false,
+                seed: 1,
+                cache_bytes: 0,
+            },
+            claim: None,
+            from: SeenFrom::Eye,
+            occluders: OccluderChoice::All,
+            truth_cache: None,
+            execution: Execution::default(),
+        };
+        let world = World::new(&input).expect("a world");
+        let mut found = 0;
+        for view in 0..world.views() {
+            let (mut left, mut right, mut none) = (Vec::new(), Vec::new(), Vec::new());
+            world.run(StageKind::Region, "flood")(view, None, &mut left);
+            world.run(StageKind::Object, "linear")(view, Some(&left), &mut right);
+            world.run(StageKind::Object, "blind")(view, Some(&left), &mut none);
+            let sees = |id: &ItemId| world.volume(view).sees(&scene.items[*id as usize]);
+            let wanted: Vec<ItemId> = left.iter().copied().filter(sees).collect();
+            assert_eq!((right, none), (wanted.clone(), vec![]));
+            found += wanted.len();
+        }
+        assert!(found > 0);
+    }
+}

@@ -122,8 +122,7 @@ impl SharedFaces {
     }
 
     /// The point that indexes are to be asked for, of one in the world and the f32
-    /// next to it in the scene. That it is near no face is mostly true: nobody waits
-    /// for more then.
+    /// next to it in the scene. Most points are near no face, which one test decides.
     #[inline]
     pub fn moved(&self, world: DVec3, local: Vec3) -> Vec3 {
         let [x, y, z] = &self.axes;

@@ -270,4 +270,14 @@ fn a_box_finds_what_it_touches_and_nothing_an_ulp_away() {
     assert!(sought.iter().filter(|s| s.1.len() > 1).count() > 50);
     let folder = folder(&[("boxes.csv", scene.as_bytes())]);
     check_search(&folder, "boxes.csv", ["box", "--boxes", BOXES], &sought);
+    // Whatever f64 holds can be searched by; what is bad in it is told by its line alone.
+    let all: Vec<usize> = (0..items.len()).collect();
+    let wide = ([-1e300, -1e300, -1e300, 1e300, 1e300, 1e300], all);
+    check_search(&folder, "boxes.csv", ["box", "--boxes", BOXES], &[wide]);
+    let bad = format!("{BOXES}\n0,0,0,-1,0,0\n0,0,0,0,-1,0\n");
+    std::fs::write(folder.path().join("bad.csv"), bad).expect("written");
+    let line = "locate --scene boxes.csv --boxes bad.csv --skip-bad-items";
+    let done = cullbench(folder.path(), line);
+    assert_refused(&done, "bad.csv, line 2 | inverted | min_x <= max_x", line);
+    assert!(!done.err.contains("--skip-bad-items"), "{done:?}");
 }

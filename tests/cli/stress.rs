@@ -93,6 +93,23 @@ fn extremes_are_generated_from_a_seed() {
     );
 }
 
+/// A point beside a shared face by less than f32 tells is in one of the boxes.
+#[test]
+fn points_are_compared_as_written() {
+    for (holding, code) in [(json!(["b"]), 0), (json!(["a", "b"]), 1)] {
+        let file = json!([{
+            "id": "beside",
+            "boxes": [
+                {"id": "a", "lo": [0, 0, 0], "hi": [1, 1, 1]},
+                {"id": "b", "lo": [1, 0, 0], "hi": [2, 1, 1]}
+            ],
+            "points": [{"id": "p", "p": [1.0000000001, 0.5, 0.5], "expected_containing": holding}]
+        }]);
+        let done = cullbench(with_file(&file).path(), "stress --vectors v.json");
+        assert_eq!(done.code, Some(code), "{holding}: {done:?}");
+    }
+}
+
 #[test]
 fn other_vectors_run_alone() {
     let folder = with_file(&subset(&["A01-basic", "F04-nan-inf", "I01-point-location"]));
