@@ -112,7 +112,7 @@ pub struct WhatArgs {
     /// A camera path (spec or cameras CSV) instead of the suite's; may be repeated
     #[arg(long, visible_alias = "cameras", value_name = "PATH")]
     pub path: Vec<String>,
-    /// Structures, e.g. linear,bvh:leaf=4; may be repeated all, or default (all but the textbook forms) [default: all for the suites standard and full, else default; compare --against: the trees, linear and wide]
+    /// Structures, e.g. linear,bvh:leaf=4; may be repeated; also all, or default (all but the textbook forms) [default: all for the suites standard and full, else default; compare --against: the trees, linear and wide]
     #[arg(long, value_name = "LIST")]
     pub structure: Vec<String>,
     /// The culling test: sphere, six-plane, six-box or exact; may be repeated
@@ -127,7 +127,7 @@ pub struct WhatArgs {
     /// Do not measure the lower bounds: reading all items, copying all answers
     #[arg(long)]
     pub no_bounds: bool,
-    /// Seconds of silence after which a structure has timed out
+    /// Seconds without progress after which a structure has timed out
     #[arg(long, value_name = "SECONDS", default_value_t = 300, value_parser = clap::value_parser!(u64).range(1..))]
     pub timeout: u64,
     #[command(flatten)]
@@ -498,7 +498,7 @@ pub struct DriftArgs {
         allow_negative_numbers = true
     )]
     pub rate: Vec<f64>,
-    /// Simulated time that errors of spring arms are the maxima of
+    /// Simulated time over which the largest error of a spring arm is taken
     #[arg(
         long,
         value_name = "S",
@@ -507,7 +507,7 @@ pub struct DriftArgs {
         allow_negative_numbers = true
     )]
     pub seconds: f64,
-    /// What a recommended spring arm's position may be off: its target swings by one (or a radian)
+    /// Largest position error of a spring arm to recommend; its target swings by one (or a radian)
     #[arg(
         long,
         value_name = "ERROR",

@@ -14,11 +14,11 @@ use crate::visibility::occlusion::OccluderChoice;
 
 const FUNNEL_HELP: &str = "\
 Columns of the table:
-  in, out      items (triangles in the triangle stage) that the stage is given and hands on, a view
+  in, out      items (triangles in the triangle stage) that the stage is given and hands on, per view
   truth        of them those that are in front at a sample; of triangles those that face the eye
                (outcode: that are in the window; below-a-sample: that the ray of a sample meets)
   FP, FN       handed on though not visible; visible and not handed on
-  time         CPU time of the stage, a view, with half of its 95 % interval
+  time         CPU time of the stage per view, with half of its 95 % interval
   per item     time / what the stage removed
 The rows of a stage are given what the chain hands them; * marks the chain's own, ? a back end that
 promises nothing. NAME is what the column `by` shows; none leaves a stage out. What is true is
@@ -55,7 +55,7 @@ pub struct FunnelArgs {
     /// Cut holes into a share of the items: fence or foliage, e.g. fence:share=0.2,tile=1,seed=1
     #[arg(long, value_name = "MASK", value_parser = CutOuts::parse)]
     pub cut_out: Option<CutOuts>,
-    /// What does the region stage in the chain [default: the best that the scene has regions for]
+    /// Back end of the region stage [default: the best that the scene has regions for]
     #[arg(long, value_name = "NAME")]
     pub region: Option<String>,
     /// Where the region stage looks from: the eye, or anywhere in the region that the eye is in
@@ -64,16 +64,16 @@ pub struct FunnelArgs {
     /// Structures for the object stage; the first is the chain's
     #[arg(long, value_name = "LIST", default_value = "wide,bvh,linear")]
     pub structure: String,
-    /// What does the occlusion stage in the chain
+    /// Back end of the occlusion stage
     #[arg(long, value_name = "NAME")]
     pub occlusion: Option<String>,
     /// What the back ends *-two-pass and hierarchical-z draw: all, nearest:64, largest:64
     #[arg(long, value_name = "CHOICE", default_value = "all", value_parser = values::occluders)]
     pub occluders: OccluderChoice,
-    /// What does the triangle stage in the chain
+    /// Back end of the triangle stage
     #[arg(long, value_name = "NAME")]
     pub triangle: Option<String>,
-    /// What does the fragment stage in the chain
+    /// Back end of the fragment stage
     #[arg(long, value_name = "NAME")]
     pub fragment: Option<String>,
     /// A claim of what is seen from each region, to be audited: {"regions": N, "sees": [[0, 1], ..]}
@@ -123,7 +123,7 @@ pub struct CheckArgs {
     /// The file that `funnel --certificates` wrote
     #[arg(value_name = "CERTIFICATES")]
     pub certificates: PathBuf,
-    /// The claim that the errors of stored-pvs are of
+    /// The stored PVS whose errors are to be checked
     #[arg(long, value_name = "FILE")]
     pub pvs: Option<PathBuf>,
     /// The scene, if it is to be found elsewhere than the certificates say

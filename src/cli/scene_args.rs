@@ -54,7 +54,7 @@ Examples:
   cullbench scene convert city:n=1000 | head
 
 Boxes CSV is in world coordinates, in the order of the ids and with all labels. Bounds are written
-in f64, as they came in and not as f32 holds them: the file asks the same questions, and
+in f64, as they came in and not as f32 holds them: queries of the file have the same answers, and
 converting it again gives the same bytes. Regions, camera places and a map's own tree stay
 behind.";
 
@@ -67,7 +67,7 @@ pub struct SceneConvertArgs {
     /// The file to write [default: standard output]
     #[arg(value_name = "OUTPUT")]
     pub output: Option<PathBuf>,
-    /// The same
+    /// The file to write, in place of OUTPUT
     #[arg(long, short, value_name = "FILE", conflicts_with = "output")]
     pub out: Option<PathBuf>,
     /// The format [default: by the extension]

@@ -15,7 +15,7 @@ use glam::DVec3;
 
 #[derive(Args, Debug)]
 pub struct SceneArgs {
-    /// Leave out items that are no finite box, and report their number
+    /// Leave out items that are not finite boxes, and report their number
     #[arg(long)]
     pub skip_bad_items: bool,
 }
@@ -137,7 +137,7 @@ pub struct LensArgs {
     /// Far plane for cameras without one, or inf [default: 1000 for recorded cameras, the scene for paths]
     #[arg(long, value_parser = values::far, allow_negative_numbers = true)]
     pub far: Option<f64>,
-    /// How cameras that are matrices (columns m00 to m33: row, column) are read: column-gl or column-d3d (clip = M x, depth -1..1 or 0..1), row-gl or row-d3d (clip = x M); reversed depth and infinite far as they come
+    /// How cameras that are matrices (columns m00 to m33: row, column) are read: column-gl or column-d3d (clip = M x, depth -1..1 or 0..1), row-gl or row-d3d (clip = x M); reversed depth and infinite far are recognised
     #[arg(long, value_name = "NAME")]
     pub matrix_convention: Option<String>,
 }

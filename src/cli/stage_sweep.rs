@@ -200,8 +200,8 @@ fn show(sweep: &StageSweep, out: &mut impl Write) -> io::Result<()> {
         "out",
         "FP / visible",
         "FN / visible",
-        "FN a view",
-        "time a view",
+        "FN / view",
+        "time / view",
         "front",
     ]);
     rows.rows.extend(sweep.points.iter().map(|point| {

@@ -43,7 +43,7 @@ pub fn conclusions(report: &FunnelReport) -> Vec<String> {
     }
     if let Some(last) = report.gains.first() {
         sentences.push(format!(
-            "Of {} items {:.1} are left and {:.1} are in front at a sample, a view.",
+            "Of {} items {:.1} are left and {:.1} are in front at a sample, per view.",
             report.items,
             last.with_count,
             visible(report)
@@ -64,12 +64,12 @@ fn of_gain(gain: &Gain) -> String {
         return format!("{what} removes nothing that the other stages leave: leave it out.");
     }
     match gain.break_even_ns {
-        Some(0.0) => format!("{what} removes {removed:.1} items a view and saves time as well."),
+        Some(0.0) => format!("{what} removes {removed:.1} items per view and saves time as well."),
         Some(ns) => format!(
-            "{what} removes {removed:.1} items a view and pays where drawing one of them takes \
+            "{what} removes {removed:.1} items per view and pays where drawing one of them takes \
              more than {ns:.1} ns."
         ),
-        None => format!("{what} removes {removed:.1} items a view; it has no time."),
+        None => format!("{what} removes {removed:.1} items per view; it has no time."),
     }
 }
 
@@ -82,7 +82,7 @@ fn of_stencil(report: &FunnelReport) -> Option<String> {
     let [with, without] = [stencil, other].map(|row| row.fragments);
     let (with, without) = (with?.asked_count, without?.asked_count);
     Some(format!(
-        "fragment {} asks {with:.0} samples a view in place of {without:.0} ({:.1} % fewer) and \
+        "fragment {} asks {with:.0} samples per view in place of {without:.0} ({:.1} % fewer) and \
          leaves {} items as {} does.",
         stencil.back_end.name,
         (1.0 - with / without) * 100.0,
@@ -131,7 +131,7 @@ fn of_order(row: &OrderRow) -> impl Iterator<Item = String> {
 fn of_loss(row: &StageRow) -> String {
     let errors = &row.errors;
     format!(
-        "{} {} lost {:.2} visible items a view, one of them {} samples large.",
+        "{} {} lost {:.2} visible items per view, one of them {} samples large.",
         row.back_end.stage.name(),
         row.back_end.name,
         errors.false_negative_count,

@@ -1,6 +1,7 @@
 //! The triangle stage on what the chain leaves: the faces of those items in clusters, and
-//! every back end that tells which of them are turned away or beside the image. Of solid boxes clusters are
-//! made for each view; of a mesh once, and a back end passes over those of other items.
+//! every back end that tells which of them are turned away or beside the image. Of solid
+//! boxes clusters are made for each view; of a mesh once, and a back end passes over those
+//! of other items.
 
 use std::cell::OnceCell;
 use std::rc::Rc;

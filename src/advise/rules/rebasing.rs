@@ -16,7 +16,7 @@ pub(super) const NAME: &str = "rebasing";
 pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> {
     let omission = Omission::new(
         NAME,
-        "moving the scene to a zero of its own",
+        "rebasing the scene",
         [
             "no need to rebase the scene",
             "rebase the scene: move its origin to its middle",
