@@ -6,6 +6,5 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 export CULLBENCH_PLAIN_VECTORS=1
-[ $# -gt 0 ] || set -- --lib --test portable --test conformance --test kernels \
-    --test ranges --test stability --test threads
+[ $# -gt 0 ] || set -- --lib --test contract
 cargo test --no-default-features "$@"

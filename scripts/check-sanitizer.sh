@@ -14,4 +14,4 @@ export RUSTFLAGS="-Zsanitizer=address -Cforce-frame-pointers=yes"
 # Build scripts and proc macros are for the host: a target of its own keeps
 # the sanitizer out of them.
 cargo test --target "$target" --target-dir target/sanitizer "$@" \
-    --lib --test conformance --test kernels --test ranges --test threads
+    --lib --test contract

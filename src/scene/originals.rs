@@ -34,11 +34,21 @@ impl Originals {
         }
     }
 
-    /// The faces that these boxes share, if they do. `stored` and `origin` as they were
-    /// given.
+    /// The faces that these boxes share, if they do; `of` gives the boxes as stored and
+    /// their origin, as they were given.
     #[inline]
-    pub(super) fn faces(&self, stored: &[Aabb], origin: DVec3) -> Option<&SharedFaces> {
-        let made = || SharedFaces::of(self.boxes(), stored, origin);
+    pub(super) fn faces<'a>(
+        &self,
+        of: impl FnOnce() -> (&'a [Aabb], DVec3),
+    ) -> Option<&SharedFaces> {
+        // A searched point waits for this: what is known is looked at first.
+        if let Some(known) = self.faces.get() {
+            return known.as_ref();
+        }
+        let made = || {
+            let (stored, origin) = of();
+            SharedFaces::of(self.boxes(), stored, origin)
+        };
         self.faces.get_or_init(made).as_ref()
     }
 

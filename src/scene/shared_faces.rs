@@ -24,7 +24,7 @@ const MOST: usize = 1 << 14;
 /// meets one.
 const BITS_EACH: usize = 64;
 /// Bits that share an entry of the table.
-const BITS_OF_ENTRY: usize = 4;
+const BITS_OF_ENTRY: usize = 2;
 /// In the table, where more than one face is near.
 const SEVERAL: u16 = u16::MAX;
 
@@ -133,6 +133,7 @@ impl SharedFaces {
         }
     }
 
+    #[inline(always)]
     fn beside(&self, bits: [usize; 3], world: DVec3, local: Vec3) -> Vec3 {
         let [x, y, z] = &self.axes;
         Vec3::new(
@@ -219,6 +220,7 @@ impl Axis {
     }
 
     /// Beside the two faces that a coordinate lies between.
+    #[cold]
     fn among(&self, world: f64, local: f32) -> f32 {
         let faces = &self.faces[..self.faces.len() - 1];
         let at = faces.partition_point(|face| face.written < world);

@@ -60,8 +60,8 @@ impl Scene {
         if let Regions::Bsp(_) = self.regions {
             return None;
         }
-        let boxes = self.regions.boxes(&self.items);
-        let faces = self.originals_of(&self.regions).faces(boxes, self.origin)?;
+        let of = || (self.regions.boxes(&self.items), self.origin);
+        let faces = self.originals_of(&self.regions).faces(of)?;
         Some(faces.moved(p.world, p.local))
     }
 

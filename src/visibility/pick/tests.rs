@@ -162,7 +162,7 @@ fn exact_back_ends_answer_as_arithmetic_on_integers_does() {
 }
 
 /// What declares nothing may differ where depths are equal or rounded. In the open it
-/// may not: tests/conformance.rs.
+/// may not: tests/contract/conformance.rs.
 #[test]
 fn back_ends_in_f32_differ_on_few_ties() {
     let unproven = BACK_ENDS

@@ -10,7 +10,7 @@ use glam::{DVec3, Vec3};
 use serde_json::Value;
 
 fn vectors() -> Vec<Value> {
-    let text = include_str!("../../datasets/vectors.json");
+    let text = include_str!("../../../datasets/vectors.json");
     let file: Value = serde_json::from_str(text).expect("vectors.json");
     file["vectors"].as_array().expect("vectors").clone()
 }

@@ -7,10 +7,10 @@ use cullbench::geometry::{Aabb, sphere_cube};
 use cullbench::oracle::{Oracle, Pose, Verdict};
 use glam::DVec3;
 
-use crate::cases;
-use crate::draw::SeededRng;
-use crate::simplex::{self, ExactPlane};
-use crate::wide::{Dyadic, Vector, along, cross, dot, pi, tangent, unit, vector};
+use super::cases;
+use super::draw::SeededRng;
+use super::simplex::{self, ExactPlane};
+use super::wide::{Dyadic, Vector, along, cross, dot, pi, tangent, unit, vector};
 
 /// A camera with all that the expected planes are made from.
 pub struct View {

@@ -12,11 +12,11 @@ use cullbench::oracle::{Oracle, Pose, Verdict};
 use cullbench::verify::points_on_faces;
 use glam::{DMat4, DVec3, Vec3};
 
-use crate::camera::{self, View, robust, safe_views_of};
-use crate::cases;
-use crate::draw::{SeededRng, grid_box};
-use crate::simplex::{self, ExactPlane};
-use crate::wide::Dyadic;
+use super::camera::{self, View, robust, safe_views_of};
+use super::cases;
+use super::draw::{SeededRng, grid_box};
+use super::simplex::{self, ExactPlane};
+use super::wide::Dyadic;
 
 type Entries = [[f64; 4]; 4];
 

@@ -6,10 +6,10 @@ use cullbench::geometry::Aabb;
 use cullbench::oracle::{Oracle, Pose, Verdict};
 use glam::{DVec3, Vec3};
 
-use crate::cases;
-use crate::draw::{SeededRng, grid_box};
-use crate::simplex::{self, ExactPlane};
-use crate::wide::Dyadic;
+use super::cases;
+use super::draw::{SeededRng, grid_box};
+use super::simplex::{self, ExactPlane};
+use super::wide::Dyadic;
 
 /// Three whole-number vectors at right angles, all of the same whole length
 /// (Euler and Rodrigues: a rotation by a whole quaternion).

@@ -9,9 +9,9 @@ use cullbench::oracle::{Oracle, Verdict};
 use cullbench::verify::{RandomCase, VOLUME_KINDS};
 use glam::Vec3;
 
-use crate::cases;
-use crate::draw::{SeededRng, grid_box};
-use crate::simplex;
+use super::cases;
+use super::draw::{SeededRng, grid_box};
+use super::simplex;
 
 /// What a run met: cases by verdict, and how many of them no plane shows alone
 /// (edges against edges, corners, bounds).

@@ -361,7 +361,7 @@ fn every_fault_is_caught_and_every_property_catches_one() {
     };
     let mut useful = BTreeSet::new();
     for (fault, failed, expected) in faults {
-        // Seen with `cargo test --test sabotage -- --nocapture`.
+        // Seen with `cargo test --test contract sabotage:: -- --nocapture`.
         println!("{fault}:");
         for (property, error) in &failed {
             println!("    {property}: {error}");

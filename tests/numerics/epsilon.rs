@@ -3,11 +3,9 @@
 //! view volume by a hair, at offsets, scales and near/far ratios where f32
 //! runs out of digits; the same boxes must trip planes without the epsilon.
 
-mod by_hand;
-
 use std::collections::BTreeMap;
 
-use by_hand::{Kind, Setup, View};
+use super::by_hand::{Kind, Setup, View};
 use cullbench::camera::{PlaneMethod, PlaneOptions, Surroundings};
 use cullbench::geometry::{Aabb, FrustumPlane};
 use cullbench::index::{Registry, StructureSpec};

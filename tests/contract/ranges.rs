@@ -1,6 +1,5 @@
 //! Answers as ranges of tree order hold what answers as ids hold, for every
-//! structure that keeps such an order. A process of its own with one test,
-//! because the kernel is chosen for the process.
+//! structure that keeps such an order.
 
 use std::ops::Range;
 

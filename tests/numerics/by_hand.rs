@@ -1,7 +1,6 @@
 //! A second camera, written out from the lecture and sharing no formula with
 //! the crate's: it measures how far a point lies inside each face in eye space
 //! and never forms a plane or a matrix. What the crate says is judged by it.
-#![allow(dead_code)] // Each test file needs its own part.
 
 use cullbench::camera::{Camera, Lens, look_at};
 use cullbench::geometry::FrustumPlane;

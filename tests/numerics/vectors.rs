@@ -4,11 +4,9 @@
 //! pipeline must not drop anything that is visible. Point location and what
 //! must be refused come from there too.
 
-mod by_hand;
-
 use std::collections::BTreeSet;
 
-use by_hand::{Kind, Setup};
+use super::by_hand::{Kind, Setup};
 use cullbench::camera::{Camera, CameraError, Lens, PlaneOptions, Surroundings, look_at};
 use cullbench::geometry::{Aabb, ConvexVolume, Plane, VolumeError};
 use cullbench::index::{BuildError, DynIndex, Execution, Registry, StructureSpec};
@@ -131,7 +129,7 @@ impl Vector {
 }
 
 fn vectors() -> Vec<Vector> {
-    let file: Value = serde_json::from_str(include_str!("../datasets/vectors.json")).unwrap();
+    let file: Value = serde_json::from_str(include_str!("../../datasets/vectors.json")).unwrap();
     assert_eq!(file["format"], 1);
     let vectors = file["vectors"].as_array().unwrap();
     assert_eq!(file["count"], vectors.len());

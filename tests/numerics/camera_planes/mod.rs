@@ -3,8 +3,6 @@
 //! written out by hand; glam's own matrices and the lecture's look-at must
 //! agree with ours, and the controls must turn and slide as the lecture says.
 
-#[path = "../by_hand/mod.rs"]
-mod by_hand;
 mod controls;
 mod matrices;
 mod planes;
@@ -12,7 +10,7 @@ mod planes;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 
-use by_hand::{Kind, Setup, View};
+use super::by_hand::{Kind, Setup, View};
 use cullbench::camera::{
     Camera, CameraError, ClipSpace, Frame, PLANE_METHODS, PlaneMethod, PlaneOptions, Surroundings,
     look_at,

@@ -1,7 +1,6 @@
 //! The whole road from a seed to ids, pinned: scenes, paths, planes of every
 //! derivation, culling tests, structures, kernels, region search. What is
-//! pinned here must come out on any x86-64 or AArch64 machine. A process of its
-//! own with one test, because the kernel is chosen for the process.
+//! pinned here must come out on any x86-64 or AArch64 machine.
 //!
 //! To renew the digests after a change that is meant: run the test, put the
 //! lines that it prints in place of [`PINNED`], and give the change a line in

@@ -6,7 +6,7 @@ use cullbench::oracle::{Oracle, Verdict};
 use cullbench::verify::RandomCase;
 use glam::{DVec3, Vec3};
 
-use crate::draw::SeededRng;
+use super::draw::SeededRng;
 
 fn oracle(planes: &[(Vec3, f32)]) -> Oracle {
     let planes: Vec<Plane> = planes.iter().map(|&(n, d)| Plane::new(n, d)).collect();

@@ -8,7 +8,7 @@ use cullbench::geometry::{Aabb, Plane};
 use cullbench::oracle::Verdict;
 use dashu_int::IBig;
 
-use crate::wide::Dyadic;
+use super::wide::Dyadic;
 
 /// The finest unit that these numbers need.
 fn unit_of<'a>(numbers: impl IntoIterator<Item = &'a Dyadic>) -> i64 {
@@ -214,7 +214,7 @@ fn by_corners(planes: &[[i128; 4]], low: [i128; 3], high: [i128; 3]) -> Verdict 
 
 #[test]
 fn the_linear_program_agrees_with_corners_found_by_brute_force() {
-    let mut rng = crate::draw::SeededRng::new(1);
+    let mut rng = super::draw::SeededRng::new(1);
     let mut seen = [0; 3];
     for case in 0..3000 {
         let count = 1 + rng.below(6);

@@ -1,0 +1,13 @@
+//! The contract of a structure, and of what asks, times and judges it: the same sets by
+//! every structure, instruction set and number of threads, pinned; and the same suites
+//! put to the proof, by structures and roads that are broken on purpose.
+
+mod conformance;
+mod kernels;
+mod portable;
+mod ranges;
+mod road_sabotage;
+mod sabotage;
+mod stability;
+mod stress_sabotage;
+mod threads;
