@@ -316,7 +316,7 @@ fn test_table(choice: &TestChoice) -> text::Table {
 fn omission_table(omissions: &[Omission]) -> text::Table {
     let header = [
         "rule",
-        "advice",
+        "decision",
         "statistic",
         "threshold",
         "saving",

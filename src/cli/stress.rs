@@ -234,8 +234,8 @@ fn table(sections: &[Section], seconds: f64, note: &str) -> io::Result<()> {
     if tally.boxes > 0 {
         writeln!(
             out,
-            "{} judged at camera level: {} visible, {} of them touching ({} too close to \
-             tell); {} and {}; lost without the epsilon: {}; refused because sums could \
+            "{} judged at camera level: {} visible, {} of them boundary contacts ({} \
+             too close to decide); {} and {}; lost without the epsilon: {}; refused because sums could \
              overflow: {}",
             text::counted(tally.boxes as usize, "box"),
             text::count(tally.seen as usize),

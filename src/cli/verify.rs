@@ -265,7 +265,7 @@ pub(super) fn judge_camera_level(workload: &Workload, checks: &mut [Check], agai
     for check in checks.iter_mut().filter(|c| c.difference.is_none()) {
         check.status = Status::Unsafe.name();
         check.difference = Some(format!(
-            "camera level: {} visible items (or points on the faces) and {} touching ones are missed, the deepest by {:e}\n  again: {again}",
+            "camera level: {} visible items (or points on the faces) and {} boundary contacts are missed, the deepest by {:e}\n  again: {again}",
             errors.false_negatives, errors.touch_dropped, errors.worst_miss
         ));
     }

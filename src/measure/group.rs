@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 
 use super::bounds::{Bound, Material};
-use super::count::{Counted, count_pass, judge};
+use super::count::{Counted, count_pass, judge, note_scan};
 use super::key::GroupKey;
 use super::notice::{Notice, TIMING};
 use super::part::{Known, NamedSchedule, Part, SubjectPart, TaskPart, TaskSamples};
@@ -14,6 +14,7 @@ use super::{
     Answer, Built, Judged, PathInfo, Protocol, SceneInfo, Schedule, Status, Subject, TaskKind,
     Timed, TimedTask, Verdict, Workload, guarded, timed,
 };
+use crate::index::Kind;
 use crate::statistics::{interquartile_mean, median};
 
 /// Verdicts of the oracle that a group may take: some 50 ns each.
@@ -313,6 +314,11 @@ fn count(workload: &Workload, entries: &mut [Entry], notice: Notice) {
     let mut counted = count_pass(workload, &built, notice).into_iter();
     for entry in entries.iter_mut().filter(|e| e.subject.built.is_ok()) {
         entry.counted = counted.next();
+        if let Some(counted) = &mut entry.counted
+            && entry.subject.spec.info().kind != Kind::Scan
+        {
+            note_scan(counted, workload.items.len());
+        }
         if let Some(counted) = &entry.counted {
             entry.verdict = counted.verdict.clone();
         }

@@ -52,11 +52,11 @@ metrics! {
     "undecided_count", "items", "too close to decide (counted as boundary contacts), per checked query, mean";
     "judged_queries", "queries", "cameras of the path whose answers were checked against the oracle";
     "build_ms", "ms", "CPU time of one build; wall time with --threads above 1";
-    "update_ms_0_1_percent", "ms", "CPU time of an update after 0.1 % of the items have moved (scenes of up to 2 million)";
-    "update_ms", "ms", "as above, 1 % moved";
-    "update_ms_10_percent", "ms", "as above, 10 % moved";
-    "update_ms_100_percent", "ms", "as above, all moved";
-    "refitted_over_rebuilt", "1", "query time after 32 updates of 1 % each / query time on a fresh build of the same boxes, for structures that refit";
+    "update_ms_0_1_percent", "ms", "as update_ms, after 0.1 % have moved";
+    "update_ms", "ms", "CPU time of an update after 1 % of the items have moved (scenes of up to 2 million)";
+    "update_ms_10_percent", "ms", "as update_ms, after 10 % have moved";
+    "update_ms_100_percent", "ms", "as update_ms, after all have moved";
+    "refitted_over_rebuilt", "1", "time per query after 32 refits, each after 1 % of the items have moved / time per query on a fresh build of the same boxes; only structures that refit";
     "memory_bytes_per_item", "bytes", "nodes, item bounds and ids / items";
     "break_even_queries", "queries", "queries after which the build is repaid against linear; empty if never";
     "locate_ns", "ns", "thread CPU time of a region search at the eye, mean over the timed cameras; as query_ns";
