@@ -9,10 +9,19 @@ use super::isa::{Isa, LANES, LaneMask, Pack};
 pub struct Plain;
 
 #[inline(always)]
+fn lanes<T: Copy + Default>(of: impl Fn(usize) -> T) -> [T; LANES] {
+    let mut lanes = [T::default(); LANES];
+    for (lane, value) in lanes.iter_mut().enumerate() {
+        *value = of(lane);
+    }
+    lanes
+}
+
+#[inline(always)]
 fn lanes_where(holds: impl Fn(usize) -> bool) -> LaneMask {
     // A bit as wide as a float: a comparison then selects among them without
     // leaving the vector.
-    let bits: [u32; LANES] = std::array::from_fn(|lane| u32::from(holds(lane)) << lane);
+    let bits: [u32; LANES] = lanes(|lane| u32::from(holds(lane)) << lane);
     bits.iter().fold(0, |all, bit| all | bit) as LaneMask
 }
 
@@ -37,19 +46,19 @@ impl Isa for Plain {
     }
     #[inline(always)]
     fn permute(self, from: &[f32; 4], picks: u32) -> [f32; LANES] {
-        std::array::from_fn(|lane| from[(picks >> (2 * lane) & 3) as usize])
+        lanes(|lane| from[(picks >> (2 * lane) & 3) as usize])
     }
     #[inline(always)]
     fn add(self, a: [f32; LANES], b: [f32; LANES]) -> [f32; LANES] {
-        std::array::from_fn(|lane| a[lane] + b[lane])
+        lanes(|lane| a[lane] + b[lane])
     }
     #[inline(always)]
     fn mul(self, a: [f32; LANES], b: [f32; LANES]) -> [f32; LANES] {
-        std::array::from_fn(|lane| a[lane] * b[lane])
+        lanes(|lane| a[lane] * b[lane])
     }
     #[inline(always)]
     fn min(self, a: [f32; LANES], b: [f32; LANES]) -> [f32; LANES] {
-        std::array::from_fn(|lane| if a[lane] < b[lane] { a[lane] } else { b[lane] })
+        lanes(|lane| if a[lane] < b[lane] { a[lane] } else { b[lane] })
     }
     #[inline(always)]
     fn below_zero(self, a: [f32; LANES]) -> LaneMask {
@@ -61,7 +70,7 @@ impl Isa for Plain {
     }
     #[inline(always)]
     fn keep(self, kept: [u32; LANES], values: [f32; LANES], least: [f32; LANES]) -> [u32; LANES] {
-        std::array::from_fn(|lane| kept[lane] | if values[lane] < least[lane] { !0 } else { 0 })
+        lanes(|lane| kept[lane] | if values[lane] < least[lane] { !0 } else { 0 })
     }
     #[inline(always)]
     fn kept(self, kept: [u32; LANES]) -> LaneMask {
@@ -81,7 +90,7 @@ impl Isa for Plain {
     }
     #[inline(always)]
     fn iota(self, first: u32) -> [u32; LANES] {
-        std::array::from_fn(|lane| first.wrapping_add(lane as u32))
+        lanes(|lane| first.wrapping_add(lane as u32))
     }
     #[inline(always)]
     fn without(
@@ -91,7 +100,7 @@ impl Isa for Plain {
         least: [f32; LANES],
         bits: u32,
     ) -> [u32; LANES] {
-        std::array::from_fn(|lane| {
+        lanes(|lane| {
             let inside = values[lane] >= least[lane];
             words[lane] & !if inside { bits } else { 0 }
         })

@@ -178,7 +178,7 @@ unsafe impl PackTo for Avx2 {
 
 #[inline(always)]
 fn signs_256(x: [__m256; 2]) -> LaneMask {
-    let signs = x.map(|x| unsafe { _mm256_movemask_ps(x) } as LaneMask);
+    let signs = each!(2, |i| unsafe { _mm256_movemask_ps(x[i]) } as LaneMask);
     signs[0] | signs[1] << 8
 }
 

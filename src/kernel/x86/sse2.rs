@@ -46,7 +46,7 @@ impl Isa for Sse2 {
             let odd = mask(_mm_setr_epi32(1, 4, 16, 64));
             let late = mask(_mm_setr_epi32(2, 8, 32, 128));
             let either = |mask, yes, no| _mm_or_ps(_mm_and_ps(mask, yes), _mm_andnot_ps(mask, no));
-            let [a, b, c, d] = from.map(|x| _mm_set1_ps(x));
+            let [a, b, c, d] = each!(4, |i| _mm_set1_ps(from[i]));
             either(late, either(odd, d, c), either(odd, b, a))
         })
     }
@@ -157,6 +157,6 @@ unsafe impl PackTo for Sse2 {
 
 #[inline(always)]
 fn signs_128(x: [__m128; 4]) -> LaneMask {
-    let signs = x.map(|x| unsafe { _mm_movemask_ps(x) } as LaneMask);
+    let signs = each!(4, |i| unsafe { _mm_movemask_ps(x[i]) } as LaneMask);
     signs[0] | signs[1] << 4 | signs[2] << 8 | signs[3] << 12
 }

@@ -88,7 +88,8 @@ impl Work for Query<'_> {
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) {
-        let minus_eye = (-self.view.eye.nearest).to_array().map(|x| isa.splat(x));
+        let [x, y, z] = (-self.view.eye.nearest).to_array();
+        let minus_eye = [isa.splat(x), isa.splat(y), isa.splat(z)];
         let is_parallel = self.view.eye.weight == 0.0;
         for (cluster, word) in self.kept.words_mut().iter_mut().enumerate() {
             if *word == 0 || self.all.is_two_sided[cluster] {
