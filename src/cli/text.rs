@@ -145,17 +145,18 @@ pub fn time_plus_minus(ns: Option<f64>, ends: [Option<f64>; 2]) -> String {
     ns.map(shown).unwrap_or_default()
 }
 
-/// A value with a margin, to the digits that the margin leaves, one at least:
-/// "83.4±0.7", "560000±9000", "70±200". Of nothing seen, what it is below: "<0.0005".
+/// A value with a margin, to the digit that the margin leaves, and one more for a value
+/// below that digit: "83.4±0.7", "560000±9000", "70±200", "0.2±4.0". Of nothing seen, what
+/// it is below: "<0.0005".
 pub fn plus_minus(value: f64, margin: Option<f64>) -> String {
     let Some(margin) = margin.filter(|margin| margin.is_finite() && *margin > 0.0) else {
         return significant(value);
     };
     let place = |x: f64| 10f64.powi(x.log10().floor() as i32);
     let of_margin = place(margin);
-    let unit = match value == 0.0 {
-        true => of_margin,
-        false => of_margin.min(place(value.abs()).max(0.01 * of_margin)),
+    let unit = match value.abs() / of_margin {
+        0.2..1.0 => 0.1 * of_margin,
+        _ => of_margin,
     };
     let shown = (value / unit).round() * unit;
     // A margin is rounded up, or it would no longer hold what it held.
@@ -376,7 +377,9 @@ mod tests {
             (71.9, Some(156.0), "70±200"),
             (7.1, Some(22.0), "7±30"),
             (0.24, Some(3.0), "0.2±4.0"),
-            (5e-324, Some(3.0), "0.00±3.00"),
+            (0.6e-3, Some(3.5e-3), "0.0006±0.0040"),
+            (0.1e-3, Some(3.1e-3), "0.000±0.004"),
+            (5e-324, Some(3.0), "0±3"),
             (0.0, Some(3.1e-4), "<0.0004"),
             (0.25, None, "0.250"),
         ];

@@ -66,7 +66,7 @@ const TESTS: [&str; 7] = [
     "sphere",
     "six-plane",
     "six-box",
-    "six + silhouettes",
+    "six+silhouettes",
     "exact",
     "exact + epsilon",
     "exact f64",
