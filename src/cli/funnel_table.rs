@@ -5,7 +5,7 @@ use std::io::{self, Write};
 
 use super::document::{Block, Rows};
 use super::text;
-use crate::funnel::{FunnelReport, Gain, InnerRow, ProofCounts, SeenFrom, StageRow, Times};
+use crate::funnel::{FunnelReport, Gain, InnerRow, LevelRow, ProofCounts, SeenFrom, StageRow, Times};
 use crate::shown::field;
 use crate::visibility::Guarantee;
 use crate::visibility::occlusion::OccluderChoice;
@@ -26,6 +26,7 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
         )),
         Block::Table(stages(report)),
     ];
+    blocks.extend(saved_load(&report.level).map(Block::Line));
     blocks.extend(report.inner_boxes.as_ref().map(inner_boxes));
     if let Some(made) = &report.cut_outs {
         let line = format!(
@@ -66,6 +67,23 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
     }
     blocks.extend(report.conclusions.iter().cloned().map(Block::Line));
     blocks
+}
+
+/// What the selection of a level saves; nothing where there is but one.
+fn saved_load(level: &LevelRow) -> Option<String> {
+    let [lower, upper] = [level.saved_load_ns_lower?, level.saved_load_ns_upper?];
+    let others = text::counted(level.map_count - 1, "other map");
+    Some(match lower > 0.0 {
+        true => format!(
+            "Decoding the {others} of the file takes {} of wall time, which the level stage saves.",
+            text::time_plus_minus(level.saved_load_ns, [Some(lower), Some(upper)])
+        ),
+        false => format!(
+            "Decoding the {others} of the file takes less than {} of wall time: what the level \
+             stage saves is within noise.",
+            text::time(upper)
+        ),
+    })
 }
 
 /// What hides in a mesh, and what finding it took.
@@ -118,9 +136,6 @@ fn stages(report: &FunnelReport) -> Rows {
     let mut first = vec!["level".to_owned(), level.selected.clone()];
     first.extend([level.input_count, level.output_count].map(|n| n.to_string()));
     first.resize(rows.header.len(), String::new());
-    if level.map_count > 1 {
-        first[7] = format!("-{}", text::time(level.saved_load_ns));
-    }
     rows.rows.push(first);
     rows.rows.extend(report.stages.iter().map(stage));
     rows

@@ -6,7 +6,7 @@ use super::fragment_rows;
 use super::orders::OrderRow;
 use super::regions::ClaimAudit;
 use super::report::{FunnelReport, Gain, StageRow};
-use crate::shown::counted;
+use crate::shown::{counted, first_of};
 use crate::visibility::region::STORED;
 
 /// Items that a sentence names.
@@ -98,21 +98,16 @@ fn of_stencil(report: &FunnelReport) -> Option<String> {
 /// of what promises more.
 fn of_sub_samples(row: &StageRow) -> Option<String> {
     let found = &row.proofs.as_ref()?.sub_sample_items;
-    let (first, more) = found.split_at(found.len().min(MOST_NAMED));
-    let named = first.iter();
+    let named = found.iter();
     let named = named.map(|(camera, item)| format!("item {item} of camera {camera}"));
     let named: Vec<String> = named.collect();
-    let more = match more.len() {
-        0 => String::new(),
-        more => format!(" and {more} more"),
-    };
     (!found.is_empty()).then(|| {
         format!(
-            "{} {} removed {} proven visible between the samples (sub-sample): {}{more}.",
+            "{} {} removed {} proven visible between the samples (sub-sample): {}.",
             row.back_end.stage.name(),
             row.structure.as_deref().unwrap_or(row.back_end.name),
             counted(found.len(), "item"),
-            named.join(", ")
+            first_of(&named, MOST_NAMED)
         )
     })
 }

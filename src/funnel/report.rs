@@ -82,19 +82,27 @@ pub struct LevelRow {
     pub input_count: usize,
     /// Items of the selected one.
     pub output_count: usize,
-    /// What decoding the others would have taken.
-    pub saved_load_ns: f64,
+    /// Wall time that decoding the others takes; null where there are none.
+    pub saved_load_ns: Option<f64>,
+    /// Lower end of its 95 % interval.
+    pub saved_load_ns_lower: Option<f64>,
+    /// Upper end of its 95 % interval.
+    pub saved_load_ns_upper: Option<f64>,
 }
 
 impl LevelRow {
     /// Of a level.
     pub fn of(level: &Level) -> LevelRow {
+        let saved = level.saved_ns();
+        let interval = saved.map(|saved| saved.interval(1.0 - ALPHA));
         LevelRow {
             map_count: level.maps.len(),
             selected: level.maps[level.selected].name.clone(),
             input_count: level.items(),
             output_count: level.selected_items(),
-            saved_load_ns: level.saved_ns(),
+            saved_load_ns: saved.map(|saved| saved.mean),
+            saved_load_ns_lower: interval.map(|(lower, _)| lower.max(0.0)),
+            saved_load_ns_upper: interval.map(|(_, upper)| upper),
         }
     }
 }
