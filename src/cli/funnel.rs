@@ -16,8 +16,8 @@ use super::protocol::{Job, Timing};
 use super::run::progress;
 use super::run_resume::typed_args;
 use super::{
-    Ending, expect_places, funnel_picture, funnel_table, interrupt, load_scene_by, print_json,
-    text, unread_is_fine,
+    Ending, expect_places, funnel_csv, funnel_picture, funnel_table, interrupt, load_scene_by,
+    print_json, text, unread_is_fine,
 };
 use crate::funnel::{self, Chain, FunnelInput, FunnelPlan, Proofs, SeenFrom, StageKind, StageRow};
 use crate::index::{Registry, StructureSpec};
@@ -140,7 +140,7 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     }
     unread_is_fine(match args.format {
         FunnelFormat::Json => print_json(&report),
-        FunnelFormat::Csv => funnel_table::csv(&report, io::stdout().lock()),
+        FunnelFormat::Csv => funnel_csv::write(&report, io::stdout().lock()),
         FunnelFormat::Table => {
             let text = funnel_table::terminal(&funnel_table::blocks(&report));
             text::terminal().write_all(text.as_bytes())

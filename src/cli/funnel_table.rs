@@ -1,17 +1,19 @@
 //! The tables of `cullbench funnel`: a row for each stage and back end, what each stage
 //! of the chain is worth, and what follows.
 
-use std::io::{self, Write};
-
 use super::document::{Block, Rows};
 use super::text;
-use crate::funnel::{FunnelReport, Gain, InnerRow, LevelRow, ProofCounts, SeenFrom, StageRow, Times};
-use crate::shown::field;
+use crate::funnel::{
+    FunnelReport, Gain, InnerRow, LevelRow, ProofCounts, SeenFrom, StageKind, StageRow, Times,
+};
 use crate::visibility::Guarantee;
 use crate::visibility::occlusion::OccluderChoice;
 
 /// No line is longer.
-const WIDTH: usize = 100;
+const WIDTH: u16 = 100;
+
+/// What is judged and has no time.
+const NOT_TIMED: &str = "not timed";
 
 pub fn blocks(report: &FunnelReport) -> Vec<Block> {
     let mut blocks = vec![
@@ -59,11 +61,25 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
             "Lower bounds: what must be read or written at any rate",
             bounds(report),
         ),
-        ("With and without each stage of the chain", gains(report)),
+        (
+            "With and without each stage of the chain, and the draw cost above which it pays",
+            gains(report),
+        ),
     ] {
         if !table.rows.is_empty() {
             blocks.extend([Block::Heading(2, heading.into()), Block::Table(table)]);
         }
+    }
+    let mut stages = report.bounds.iter().map(|row| row.stage);
+    let mut gained = report.gains.iter().map(|gain| gain.stage);
+    if stages.any(|stage| stage == StageKind::Fragment)
+        || gained.any(|stage| stage == StageKind::Fragment)
+    {
+        let line = format!(
+            "{NOT_TIMED}: the fragment stage is the graphics processor's and judged only, so a \
+             lower bound of it has no ratio."
+        );
+        blocks.push(Block::Line(line));
     }
     blocks.extend(report.conclusions.iter().cloned().map(Block::Line));
     blocks
@@ -115,8 +131,8 @@ pub fn spread(processes: usize) -> String {
 /// The blocks for a terminal.
 pub fn terminal(blocks: &[Block]) -> String {
     let lines = blocks.iter().map(|block| match block {
-        Block::Heading(_, text) | Block::Line(text) => text::wrapped(text, WIDTH),
-        Block::Table(rows) => rows.terminal(),
+        Block::Heading(_, text) | Block::Line(text) => text::wrapped(text, WIDTH.into()),
+        Block::Table(rows) => rows.terminal_within(WIDTH),
         Block::Picture(_) => String::new(),
     });
     lines.map(|line| line + "\n").collect()
@@ -291,7 +307,11 @@ fn bounds(report: &FunnelReport) -> Rows {
             row.name.to_owned(),
             row.back_end.to_owned(),
             of_view(&row.times),
-            row.ratio.map(text::significant).unwrap_or_default(),
+            match (row.ratio, row.times.stage_ns) {
+                (Some(ratio), _) => text::significant(ratio),
+                (None, Some(_)) => NOT_TIMED.to_owned(),
+                (None, None) => String::new(),
+            },
         ]
     }));
     rows
@@ -302,10 +322,12 @@ fn gains(report: &FunnelReport) -> Rows {
         "stage",
         "time with",
         "without",
-        "items with",
+        "counted",
+        "with",
         "without",
-        "pays above a draw cost of",
+        "pays above",
     ]);
+    rows.right.retain(|column| *column != 3);
     rows.rows.extend(report.gains.iter().map(gain));
     rows
 }
@@ -316,6 +338,7 @@ fn gain(gain: &Gain) -> Vec<String> {
         format!("{} ({})", gain.stage.name(), gain.back_end),
         time(gain.with_ns),
         time(gain.without_ns),
+        gain.unit.to_owned(),
         count(gain.with_count),
         count(gain.without_count),
         match gain.break_even_ns {
@@ -323,65 +346,8 @@ fn gain(gain: &Gain) -> Vec<String> {
                 gain.break_even_ns,
                 [gain.break_even_ns_lower, gain.break_even_ns_upper],
             ),
+            None if gain.removed() > 0.0 => NOT_TIMED.to_owned(),
             None => "removes nothing".to_owned(),
         },
     ]
-}
-
-/// One tidy row for each stage and back end; numbers as they are.
-pub fn csv(report: &FunnelReport, out: impl Write) -> io::Result<()> {
-    let mut out = csv::Writer::from_writer(out);
-    out.write_record([
-        "scene",
-        "path",
-        "stage",
-        "back_end",
-        "guarantee",
-        "is_chosen",
-        "unit",
-        "input_count",
-        "output_count",
-        "truth_count",
-        "false_positive_count",
-        "false_negative_count",
-        "worst_missing_samples",
-        "image_error",
-        "stage_ns",
-        "ns_per_removed",
-        "ns_per_decided",
-        "asked_count",
-        "kept_out_count",
-        "fragment_count",
-        "clear_count",
-        "shaded_count",
-        "covered_count",
-    ])?;
-    for row in &report.stages {
-        let errors = &row.errors;
-        let name = row.structure.as_deref().unwrap_or(row.back_end.name);
-        let optional = |value: Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
-        let mut record = vec![
-            field(&report.scene).into_owned(),
-            field(&report.path).into_owned(),
-            row.back_end.stage.name().to_owned(),
-            field(name).into_owned(),
-            row.back_end.guarantee.name().to_owned(),
-            row.is_chosen.to_string(),
-            row.unit.to_owned(),
-            errors.input_count.to_string(),
-            errors.output_count.to_string(),
-            errors.truth_count.to_string(),
-            errors.false_positive_count.to_string(),
-            errors.false_negative_count.to_string(),
-            errors.worst_missing_samples.to_string(),
-            optional(errors.image_error.map(|rate| rate.value)),
-            optional(row.times.stage_ns),
-            optional(row.ns_per_removed),
-            optional(row.ns_per_decided),
-        ];
-        let counts = row.fragments.map(|counts| counts.in_order());
-        record.extend((0..6).map(|n| optional(counts.map(|counts| counts[n]))));
-        out.write_record(record)?;
-    }
-    out.flush()
 }

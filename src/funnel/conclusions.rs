@@ -6,6 +6,7 @@ use super::fragment_rows;
 use super::orders::OrderRow;
 use super::regions::ClaimAudit;
 use super::report::{FunnelReport, Gain, StageRow};
+use super::stage::StageKind;
 use crate::shown::{counted, first_of};
 use crate::visibility::region::STORED;
 
@@ -41,35 +42,32 @@ pub fn conclusions(report: &FunnelReport) -> Vec<String> {
             STORED.name
         ));
     }
-    if let Some(last) = report.gains.first() {
+    let of_chain = |stage| {
+        let mut chosen = report.stages.iter().filter(|row| row.is_chosen);
+        chosen.find(|row| row.back_end.stage == stage)
+    };
+    if let Some(last) = of_chain(StageKind::Occlusion) {
         sentences.push(format!(
             "Of {} items {:.1} are left and {:.1} are in front at a sample, per view.",
-            report.items,
-            last.with_count,
-            visible(report)
+            report.items, last.errors.output_count, last.errors.truth_count
         ));
     }
     sentences
 }
 
-fn visible(report: &FunnelReport) -> f64 {
-    let rows = report.stages.iter().filter(|row| row.unit == "items");
-    rows.map(|row| row.errors.truth_count).next().unwrap_or(0.0)
-}
-
 fn of_gain(gain: &Gain) -> String {
     let what = format!("{} ({})", gain.stage.name(), gain.back_end);
-    let removed = gain.without_count - gain.with_count;
+    let (removed, unit) = (gain.removed(), gain.unit);
     if removed <= 0.0 {
         return format!("{what} removes nothing that the other stages leave: leave it out.");
     }
     match gain.break_even_ns {
-        Some(0.0) => format!("{what} removes {removed:.1} items per view and saves time as well."),
+        Some(0.0) => format!("{what} removes {removed:.1} {unit} per view and saves time as well."),
         Some(ns) => format!(
-            "{what} removes {removed:.1} items per view and pays where drawing one of them takes \
+            "{what} removes {removed:.1} {unit} per view and pays where drawing one of them takes \
              more than {ns:.1} ns."
         ),
-        None => format!("{what} removes {removed:.1} items per view; it has no time."),
+        None => format!("{what} removes {removed:.1} {unit} per view; it is not timed."),
     }
 }
 

@@ -173,16 +173,20 @@ pub struct Gain {
     pub stage: StageKind,
     /// What does it.
     pub back_end: String,
-    /// Time of all stages together, a view.
+    /// What is counted at the end: items, triangles or shaded fragments.
+    pub unit: &'static str,
+    /// Time of all stages of whole items together, a view, and of the triangle stage if it
+    /// is this one; null for the fragment stage.
     pub with_ns: Option<f64>,
     /// The same without the stage.
     pub without_ns: Option<f64>,
-    /// Items left in the end, a view.
+    /// What is left in the end, a view.
     pub with_count: f64,
     /// The same without the stage.
     pub without_count: f64,
-    /// Cost of drawing an item above which the stage pays: what it costs in all / what
-    /// it removes in the end. 0 if it saves time as well; null if it removes nothing.
+    /// Cost of drawing one of them above which the stage pays: what it costs in all / what
+    /// it removes in the end. 0 if it saves time as well; null if it removes nothing or has no
+    /// time.
     pub break_even_ns: Option<f64>,
     /// Lower end of its 95 % interval.
     pub break_even_ns_lower: Option<f64>,
@@ -192,17 +196,23 @@ pub struct Gain {
 
 /// One side of a [`Gain`]: the tasks of a chain's steps, and what is left in the end.
 pub struct Side {
-    /// Tasks of the timed pass.
-    pub tasks: Vec<usize>,
-    /// Items left, a view.
+    /// Tasks of the timed pass; `None` where there is a step that is not timed.
+    pub tasks: Option<Vec<usize>>,
+    /// What is left, a view.
     pub count: f64,
 }
 
 impl Gain {
+    /// What the stage removes in the end, a view.
+    pub fn removed(&self) -> f64 {
+        self.without_count - self.with_count
+    }
+
     /// Of a chain with and without a stage.
     pub fn of(
         stage: StageKind,
         back_end: &str,
+        unit: &'static str,
         [with, without]: [&Side; 2],
         times: &OverProcesses,
     ) -> Gain {
@@ -221,6 +231,7 @@ impl Gain {
         Gain {
             stage,
             back_end: back_end.to_owned(),
+            unit,
             with_ns: mean(&spent),
             without_ns: mean(&saved),
             with_count: with.count,
@@ -235,7 +246,10 @@ impl Gain {
 /// Time of all steps of a side in each process, ns. A chain without steps takes none;
 /// one with a step that has no time has none.
 fn sums(side: &Side, times: &OverProcesses) -> Vec<f64> {
-    let of_steps: Vec<Vec<f64>> = side.tasks.iter().map(|&task| times.ln_ns(task)).collect();
+    let Some(tasks) = &side.tasks else {
+        return Vec::new();
+    };
+    let of_steps: Vec<Vec<f64>> = tasks.iter().map(|&task| times.ln_ns(task)).collect();
     let processes = (0..times.processes()).map(|process| {
         let parts = of_steps
             .iter()

@@ -10,6 +10,7 @@ use super::certified::{Proofs, certified, expect_provable};
 use super::conclusions::conclusions;
 use super::error::FunnelError;
 use super::faces::Faces;
+use super::fragment_rows;
 use super::fragments;
 use super::judged::{Errors, Judged};
 use super::orders::{self, Orders};
@@ -19,7 +20,7 @@ use super::plan_view::{PlanView, fate};
 use super::proven::ProofCounts;
 use super::report::{CutOutRow, FunnelReport, Gain, LevelRow, Side, StageRow};
 use super::seen::seen;
-use super::stage::{BackEnd, StageKind};
+use super::stage::{BackEnd, NONE, StageKind};
 use super::times::Times;
 use super::triangle_rows;
 use super::truth::Truth;
@@ -45,7 +46,15 @@ pub struct Prepared {
     report: FunnelReport,
     /// By row: its task.
     tasks: Vec<Option<usize>>,
-    gains: Vec<(StageKind, String, [Side; 2])>,
+    gains: Vec<Sides>,
+}
+
+/// The chain with a stage and without it.
+struct Sides {
+    stage: StageKind,
+    back_end: String,
+    unit: &'static str,
+    sides: [Side; 2],
 }
 
 /// Goes through all chains, judges them, and plans how they are timed; `None` if
@@ -146,16 +155,22 @@ pub fn prepare(
         fragments: tested.counts,
         ..row(tested.back_end, tested.back_end.name, &tested.judged)
     });
-    let rows = rows.chain(tested).collect();
+    let rows: Vec<StageRow> = rows.chain(tested).collect();
     let side = |walked: &Walked| Side {
-        tasks: pass.timed_steps(walked),
+        tasks: Some(pass.timed_steps(walked)),
         count: pass.mean_count(walked.left()),
     };
-    let gains = walks.without.iter().map(|(stage, without)| {
-        let name = input.chain.of(*stage).to_owned();
-        (*stage, name, [side(&walks.chosen), side(without)])
+    let of_items = walks.without.iter().map(|(stage, without)| Sides {
+        stage: *stage,
+        back_end: input.chain.of(*stage).to_owned(),
+        unit: stage.unit(),
+        sides: [side(&walks.chosen), side(without)],
     });
-    let gains = gains.collect();
+    let steps = pass.timed_steps(&walks.chosen);
+    let behind = rows.iter().zip(&tasks).filter_map(|(row, task)| {
+        sides_behind(row, *task, &steps, world.cut_outs().is_some(), &rows)
+    });
+    let gains = of_items.chain(behind).collect();
     let bounds = bounds_of(&world, &pass, &walks.chosen, &left);
     let bound_rows = bounds.iter().map(Bound::row).collect();
     let timed = timed_tasks(&pass, &world, &left, bounds, None);
@@ -215,6 +230,39 @@ pub fn time(
     let tasks = timed_tasks(&pass, &world, &left, bounds, Some(&plan.expected));
     let timed = timed(&tasks, &plan.schedule, input.protocol, &|_| stop());
     Ok(timed.map(|timed| ProcessTimes::of(&timed)))
+/// The chain with and without a stage behind those of whole items, if this is the chain's
+/// row of one: of triangles what is left of them, of fragments those that are shaded.
+fn sides_behind(
+    row: &StageRow,
+    task: Option<usize>,
+    steps: &[usize],
+    cut_outs: bool,
+    rows: &[StageRow],
+) -> Option<Sides> {
+    let stage = row.back_end.stage;
+    if !row.is_chosen || row.back_end.name == NONE || StageKind::OF_ITEMS.contains(&stage) {
+        return None;
+    }
+    // Without a test every fragment of what is left is shaded.
+    let every = rows
+        .iter()
+        .find(|row| row.back_end.name == fragment_rows::default(cut_outs));
+    let every = every.and_then(|row| row.fragments);
+    let (unit, counts) = match row.fragments.zip(every) {
+        Some((own, every)) => ("fragments", [own.shaded_count, every.fragment_count]),
+        None => (row.unit, [row.errors.output_count, row.errors.input_count]),
+    };
+    let with = task.map(|task| [steps, &[task]].concat());
+    let without = with.is_some().then(|| steps.to_vec());
+    let [with, without] = [(with, counts[0]), (without, counts[1])];
+    Some(Sides {
+        stage,
+        back_end: row.back_end.name.to_owned(),
+        unit,
+        sides: [with, without].map(|(tasks, count)| Side { tasks, count }),
+    })
+}
+
 }
 
 /// What the chosen chain leaves of every view, ready for the stages behind it.
@@ -371,10 +419,11 @@ impl Prepared {
         for (row, task) in report.orders.iter_mut().rev().zip((0..picks).rev()) {
             row.times = Times::of(times.ns(task));
         }
-        let gains = self
-            .gains
-            .iter()
-            .map(|(stage, name, [with, without])| Gain::of(*stage, name, [with, without], &times));
+        let gains = self.gains.iter().map(|sides| {
+            let [with, without] = &sides.sides;
+            let back_end = &sides.back_end;
+            Gain::of(sides.stage, back_end, sides.unit, [with, without], &times)
+        });
         report.gains = gains.collect();
         report.conclusions = conclusions(&report);
         report

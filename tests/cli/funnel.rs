@@ -106,25 +106,177 @@ fn what_promises_to_lose_nothing_loses_nothing() {
     }
 }
 
+/// No line of a table or a sentence is wider than a terminal of 100 columns.
+fn assert_fits(text: &str) {
+    for line in text.lines() {
+        assert!(line.chars().count() <= 100, "{line}");
+    }
+}
+
+/// Intervals make the times wide, large scenes the counts, and names are as long as they
+/// are.
 #[test]
-fn tables_fit_and_csv_and_pictures_are_whole() {
+fn tables_of_many_items_with_intervals_fit() {
+    let more = "--path street:frames=2 --samples 64x36 --processes 3";
+    let lines = [
+        format!("funnel --scene city:n=10000 {more}"),
+        format!(
+            "funnel --scene rooms:n=2000,seed=12345678901234567890 {more} --region portal-clip \
+             --occlusion masked-inner-two-pass"
+        ),
+    ];
+    for line in lines {
+        let text = works(Path::new("."), &line);
+        assert!(text.contains('±'), "{text}");
+        assert_fits(&text);
+    }
+}
+
+/// The fields of a JSON row that hold something, by the names of their columns.
+fn fields(row: &Value, before: &str, found: &mut Vec<(String, String)>) {
+    for (name, value) in row.as_object().expect("a row") {
+        let name = match (before, &name[..]) {
+            ("", name) => name.to_owned(),
+            (before, "value") => before.to_owned(),
+            (before, name) => format!("{before}_{name}"),
+        };
+        match value {
+            // Sentences, and how far another sample may be.
+            _ if name == "summary" || name.ends_with("_elsewhere") => {}
+            Value::Null => {}
+            Value::Object(_) if name != "exceptions" => fields(value, &name, found),
+            Value::Object(list) => found.push((name, list.len().to_string())),
+            Value::Array(list) => found.push((name, list.len().to_string())),
+            Value::String(text) => found.push((name, text.clone())),
+            plain => found.push((name, plain.to_string())),
+        }
+    }
+}
+
+#[test]
+fn csv_has_every_field_of_every_table_of_the_json() {
+    let folder = folder();
+    let more = "--path street:frames=2 --samples 32x18 --processes 3";
+    let proofs = folder.path().join("proofs.jsonl");
+    let lines = [
+        format!(
+            "funnel --scene rooms:n=500 {more} --certificates {}",
+            proofs.display()
+        ),
+        format!("funnel --scene city:n=500 {more} --cut-out fence"),
+        format!("funnel --scene freedm-map12 {more}"),
+        format!("funnel --scene mesh:spheres:n=2000 {more}"),
+    ];
+    let mut headers = Vec::new();
+    let mut tables = std::collections::BTreeSet::new();
+    for line in lines {
+        let report = json(&works(Path::new("."), &format!("{line} --format json")));
+        let text = works(Path::new("."), &format!("{line} --format csv"));
+        let mut read = csv::Reader::from_reader(text.as_bytes());
+        let header = read.headers().expect("a header").clone();
+        let records: Vec<csv::StringRecord> = read.records().map(|r| r.expect("a row")).collect();
+        let mut records = records.iter();
+        let wanted = [
+            "level",
+            "cut_outs",
+            "inner_boxes",
+            "stages",
+            "audits",
+            "orders",
+            "picks",
+            "bounds",
+            "gains",
+        ];
+        for table in wanted {
+            let rows = match &report[table] {
+                Value::Array(rows) => &rows[..],
+                Value::Null => &[],
+                row => std::slice::from_ref(row),
+            };
+            for row in rows {
+                tables.insert(table);
+                let record = records.next().expect("a row");
+                let cell = |name: &str| {
+                    let place = header.iter().position(|column| column == name);
+                    &record[place.unwrap_or_else(|| panic!("no column {name} of {table}"))]
+                };
+                assert_eq!(cell("table"), table);
+                let mut found = Vec::new();
+                fields(row, "", &mut found);
+                for (name, value) in found {
+                    // Times are of another run.
+                    match name.contains("ns") || name.starts_with("ratio") {
+                        true => assert!(!cell(&name).is_empty(), "{table} {name}"),
+                        false => assert_eq!(cell(&name), value, "{table} {name}"),
+                    }
+                }
+            }
+        }
+        assert!(records.next().is_none(), "more rows than the JSON has");
+        headers.push(header);
+    }
+    assert!(headers.iter().all(|header| *header == headers[0]));
+    assert_eq!(tables.len(), 9, "{tables:?}");
+}
+
+#[test]
+fn triangles_and_fragments_are_gained_too() {
+    let folder = folder();
+    let report = json(&works(folder.path(), LINE));
+    let gain = |stage: &str| {
+        let mut gains = array(&report, "gains").iter();
+        gains.find(|gain| gain["stage"] == stage).expect("a gain")
+    };
+    let [triangle, fragment] = ["triangle", "fragment"].map(gain);
+    let faces = row(
+        &report,
+        "triangle",
+        triangle["back_end"].as_str().expect("a name"),
+    );
+    for (of_gain, of_row) in [
+        ("with_count", "output_count"),
+        ("without_count", "input_count"),
+    ] {
+        assert_eq!(number(triangle, of_gain), number(faces, of_row));
+    }
+    assert_eq!(triangle["unit"], "triangles");
+    // Only the stage itself is between the two times.
+    let spent = number(triangle, "with_ns") - number(triangle, "without_ns");
+    assert!(
+        (spent / number(faces, "stage_ns") - 1.0).abs() < 1e-6,
+        "{triangle}"
+    );
+    assert_eq!(fragment["unit"], "fragments");
+    assert_eq!(
+        number(fragment, "with_count"),
+        counted(&report, "z-test", "shaded_count")
+    );
+    let every = counted(&report, "z-test", "fragment_count");
+    assert_eq!(number(fragment, "without_count"), every);
+    assert!(fragment["with_ns"].is_null() && fragment["break_even_ns"].is_null());
+    let table = works(folder.path(), &LINE.replace("--format json", ""));
+    assert!(
+        table.contains("fragment (z-test)") && table.contains("not timed"),
+        "{table}"
+    );
+    let none = format!("{LINE} --triangle none --fragment none");
+    let report = json(&works(folder.path(), &none));
+    assert!(
+        array(&report, "gains")
+            .iter()
+            .all(|gain| gain["unit"] == "items")
+    );
+}
+
+#[test]
+fn tables_fit_and_pictures_are_whole() {
     let folder = folder();
     let table = LINE.replace("--format json", "");
     let text = works(folder.path(), &table);
     for word in ["stage", "level", "occlusion", "masked-inner*", "pays above"] {
         assert!(text.contains(word), "{word}: {text}");
     }
-    for line in text.lines() {
-        assert!(line.chars().count() <= 110, "{line}");
-    }
-    let csv = works(folder.path(), &LINE.replace("json", "csv"));
-    let mut lines = csv.lines();
-    let columns = lines.next().expect("a header").split(',').count();
-    assert!(lines.clone().count() > 8);
-    assert!(
-        lines.all(|line| line.split(',').count() == columns),
-        "{csv}"
-    );
+    assert_fits(&text);
     works(
         folder.path(),
         &format!("{table} --svg plan.svg --html page.html"),
@@ -543,9 +695,6 @@ fn through_the_holes_of_a_wall_is_seen_what_is_behind_it() {
     ] {
         assert!(table.contains(words), "{words}: {table}");
     }
-    let csv = works(folder.path(), &line.replace("json", "csv"));
-    let of_alpha = csv.lines().find(|line| line.contains("alpha-test"));
-    assert!(!of_alpha.expect("a row").ends_with(','), "{csv}");
     // Without holes there is no such test.
     let solid = json(&works(folder.path(), LINE));
     assert!(rows(&solid, "fragment").all(|row| row["name"] != "alpha-test"));
