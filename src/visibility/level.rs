@@ -151,7 +151,9 @@ mod tests {
 
     /// Maps in one file: the samples and their directories joined.
     fn joined(samples: &[&str]) -> Vec<u8> {
-        let maps = samples.iter().map(|name| Sample::named(name).expect("a sample").bytes);
+        let maps = samples
+            .iter()
+            .map(|name| Sample::named(name).expect("a sample").bytes);
         let word = |bytes: &[u8], at: usize| {
             u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"))
         };
