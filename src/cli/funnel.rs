@@ -50,6 +50,9 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     if args.certificates.is_some() && args.cut_out.is_some() {
         bail!("--certificates are about boxes without holes; expected no --cut-out with them");
     }
+    if args.mirror.is_some() && args.cut_out.is_some() {
+        bail!("--mirror shows whole boxes; expected no --cut-out with it");
+    }
     if args.certificates.is_some() && args.from == SeenFrom::Region {
         bail!("--certificates are about what cameras see; expected no --from region with them");
     }
@@ -82,6 +85,7 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
         most_views: args.frames as usize,
         samples: args.samples,
         cut_outs: args.cut_out.as_ref(),
+        mirror: args.mirror,
         chain: &chain,
         structures: &structures,
         protocol: &protocol,
@@ -236,6 +240,7 @@ pub fn time(
         most_views: args.frames as usize,
         samples: args.samples,
         cut_outs: args.cut_out.as_ref(),
+        mirror: args.mirror,
         chain: &chain(args, &scene, &structures)?,
         structures: &structures,
         protocol: &protocol(args, timing.process),

@@ -8,6 +8,7 @@ use clap::{Args, ValueEnum};
 use super::shared_args::{KernelArgs, LensArgs, SceneArgs, SpreadArgs, TableFormat};
 use super::values;
 use crate::funnel::SeenFrom;
+use crate::query::ItemId;
 use crate::visibility::SampleGrid;
 use crate::visibility::fragment::CutOuts;
 use crate::visibility::occlusion::OccluderChoice;
@@ -57,6 +58,10 @@ pub struct FunnelArgs {
     /// Cut holes into a share of the items: fence or foliage, e.g. fence:share=0.2,tile=1,seed=1
     #[arg(long, value_name = "MASK", value_parser = CutOuts::parse)]
     pub cut_out: Option<CutOuts>,
+    /// Take a face of this item for a mirror (across its shortest edge): what is seen in it, with
+    /// and without a stencil of its samples
+    #[arg(long, value_name = "ITEM")]
+    pub mirror: Option<ItemId>,
     /// Back end of the region stage [default: the best that the scene has regions for]
     #[arg(long, value_name = "NAME")]
     pub region: Option<String>,

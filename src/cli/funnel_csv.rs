@@ -9,10 +9,11 @@ use crate::funnel::FunnelReport;
 use crate::shown::field;
 
 /// Tables of the report: a list of rows, or a single row.
-const TABLES: [&str; 9] = [
+const TABLES: [&str; 10] = [
     "level",
     "cut_outs",
     "inner_boxes",
+    "mirror",
     "stages",
     "audits",
     "orders",
@@ -42,6 +43,11 @@ const FIELDS: &str = "
     break_even_ns break_even_ns_lower break_even_ns_upper
     map_count saved_load_ns saved_load_ns_lower saved_load_ns_upper
     pairs claimed visible asymmetric false_negatives unproven false_positives
+    item axis view_count marked_count shown_count
+    with_stencil/asked_count with_stencil/kept_out_count with_stencil/fragment_count
+    with_stencil/clear_count with_stencil/shaded_count with_stencil/covered_count
+    without_stencil/asked_count without_stencil/kept_out_count without_stencil/fragment_count
+    without_stencil/clear_count without_stencil/shaded_count without_stencil/covered_count
     mask share tile seed item_count boxed_count volume_share build_ns";
 
 /// One row for each row of each table; numbers as they are, lists as their lengths.

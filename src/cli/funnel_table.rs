@@ -55,6 +55,7 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
             proofs(report),
         ),
         ("Samples and fragments of what is left", fragments(report)),
+        ("What is seen in the mirror", mirror(report)),
         ("What is left, drawn in every order", orders(report)),
         ("What is under a cursor", picks(report)),
         (
@@ -227,9 +228,9 @@ fn proofs(report: &FunnelReport) -> Rows {
     rows
 }
 
-/// One test alone has nothing to be compared with.
-fn fragments(report: &FunnelReport) -> Rows {
-    let mut rows = Rows::of_numbers([
+/// Counts of fragments, by the name of a test.
+fn of_fragments() -> Rows {
+    Rows::of_numbers([
         "test",
         "samples asked",
         "kept out",
@@ -237,7 +238,29 @@ fn fragments(report: &FunnelReport) -> Rows {
         "clear",
         "shaded",
         "covered",
-    ]);
+    ])
+}
+
+/// The reflected scene on the samples of a mirror, and on all.
+fn mirror(report: &FunnelReport) -> Rows {
+    let mut rows = of_fragments();
+    let drawn = report.mirror.iter().flat_map(|mirror| {
+        [
+            ("z-test", &mirror.without_stencil),
+            ("stencil-test", &mirror.with_stencil),
+        ]
+    });
+    rows.rows.extend(drawn.map(|(name, counts)| {
+        let mut cells = vec![name.to_owned()];
+        cells.extend(counts.in_order().map(count));
+        cells
+    }));
+    rows
+}
+
+/// One test alone has nothing to be compared with.
+fn fragments(report: &FunnelReport) -> Rows {
+    let mut rows = of_fragments();
     let tests = report
         .stages
         .iter()

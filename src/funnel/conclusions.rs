@@ -3,6 +3,7 @@
 
 use super::back_ends::MOST_EXACT_ROOMS;
 use super::fragment_rows;
+use super::mirror::MirrorRow;
 use super::orders::OrderRow;
 use super::regions::ClaimAudit;
 use super::report::{FunnelReport, Gain, StageRow};
@@ -20,6 +21,7 @@ pub fn conclusions(report: &FunnelReport) -> Vec<String> {
     sentences.extend(report.stages.iter().filter(lossy).map(of_loss));
     sentences.extend(report.stages.iter().filter_map(of_sub_samples));
     sentences.extend(of_stencil(report));
+    sentences.extend(report.mirror.as_ref().map(of_mirror));
     sentences.extend(report.orders.iter().flat_map(of_order));
     for ClaimAudit { claim, audit } in &report.audits {
         sentences.push(format!(
@@ -90,6 +92,27 @@ fn of_stencil(report: &FunnelReport) -> Option<String> {
         },
         other.back_end.name,
     ))
+}
+
+/// What the stencil of a mirror saves.
+fn of_mirror(row: &MirrorRow) -> String {
+    let MirrorRow {
+        with_stencil: with,
+        without_stencil: without,
+        ..
+    } = row;
+    format!(
+        "In item {} as a mirror across {} (in front in {}, at {:.1} samples per view) {:.1} items are \
+         seen; the stencil asks {:.0} samples per view in place of {:.0}, and {} are shown differently.",
+        row.item,
+        row.axis,
+        counted(row.view_count, "view"),
+        row.marked_count,
+        row.shown_count,
+        with.asked_count,
+        without.asked_count,
+        counted(row.wrong_sample_count as usize, "sample")
+    )
 }
 
 /// What is seen between the samples only, and removed: no error of sample truth, and one

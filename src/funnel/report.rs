@@ -7,6 +7,7 @@ use super::chain::Chain;
 use super::fragments::FragmentCounts;
 use super::inner::InnerRow;
 use super::judged::Errors;
+use super::mirror::MirrorRow;
 use super::orders::OrderRow;
 use super::picks::PickRow;
 use super::plan_view::PlanView;
@@ -54,6 +55,8 @@ pub struct FunnelReport {
     /// The boxes inside the items of a mesh, which hide what is behind them; null for
     /// what is no mesh.
     pub inner_boxes: Option<InnerRow>,
+    /// What is seen in a mirror; null where none was asked for.
+    pub mirror: Option<MirrorRow>,
     /// What is left, drawn in every order; empty unless items are solid boxes.
     pub orders: Vec<OrderRow>,
     /// What is under a cursor, by every back end of picking and every structure; empty as

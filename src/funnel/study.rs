@@ -13,6 +13,7 @@ use super::faces::Faces;
 use super::fragment_rows;
 use super::fragments;
 use super::judged::{Errors, Judged};
+use super::mirror::mirrored;
 use super::orders::{self, Orders};
 use super::pass::{Pass, Walked};
 use super::picks::Picks;
@@ -27,7 +28,6 @@ use super::truth::Truth;
 use super::walks::Walks;
 use super::world::{FunnelInput, World};
 use crate::measure::{Ask, OverProcesses, ProcessTimes, Schedule, TimedTask, Verdict, timed};
-use crate::scene::ItemShape;
 use crate::visibility::truth::RayIndex;
 use crate::visibility::{Level, Solids};
 
@@ -73,7 +73,7 @@ pub fn prepare(
         expect_provable(&world)?;
     }
     let threads = input.execution.threads;
-    let Some(truth) = seen(&world, input.samples, 0, threads, stop)? else {
+    let Some(truth) = seen(&world, input.samples, 0, threads, stop) else {
         return Ok(None);
     };
     let mut pass = Pass::new(&world);
@@ -102,24 +102,28 @@ pub fn prepare(
         let back_end = world.back_end(*stage, name);
         rows.push((back_end, name.clone(), judged, *step, proofs));
     }
-    if let Some(faces) = &left.faces {
-        let culls = world.back_ends(StageKind::Triangle).into_iter();
-        let culls = culls.zip(std::iter::once(None).chain((0..).map(Some)));
-        for (back_end, place) in culls {
-            if stop() {
-                return Ok(None);
-            }
-            let task = place.map(|place: usize| pass.steps().len() + place);
-            let judged = faces.judged(place);
-            rows.push((back_end, back_end.name.to_owned(), judged, task, None));
+    let culls = world.back_ends(StageKind::Triangle).into_iter();
+    let culls = culls.zip(std::iter::once(None).chain((0..).map(Some)));
+    for (back_end, place) in culls {
+        if stop() {
+            return Ok(None);
         }
+        let task = place.map(|place: usize| pass.steps().len() + place);
+        let judged = left.faces.judged(place);
+        rows.push((back_end, back_end.name.to_owned(), judged, task, None));
     }
     let last = walks.chosen.left();
     let Some(tested) = fragments::tested(&world, &pass, last, &truth, stop) else {
         return Ok(None);
     };
-    let (mut drawn, mut picked) = (Vec::new(), Vec::new());
+    let (mut drawn, mut picked, mut mirror) = (Vec::new(), Vec::new(), None);
     if let Some(boxes) = &left.boxes {
+        if let Some(item) = input.mirror {
+            let Some(row) = mirrored(item, &world, boxes.solids, &pass, last, stop) else {
+                return Ok(None);
+            };
+            mirror = Some(row);
+        }
         let Some(rows) = boxes.orders.drawn(input.samples, stop) else {
             return Ok(None);
         };
@@ -201,6 +205,7 @@ pub fn prepare(
             stages: rows,
             audits: world.audits().to_vec(),
             inner_boxes: world.inner().map(|inner| inner.row.clone()),
+            mirror,
             orders: drawn,
             picks: picked,
             bounds: bound_rows,
@@ -230,6 +235,8 @@ pub fn time(
     let tasks = timed_tasks(&pass, &world, &left, bounds, Some(&plan.expected));
     let timed = timed(&tasks, &plan.schedule, input.protocol, &|_| stop());
     Ok(timed.map(|timed| ProcessTimes::of(&timed)))
+}
+
 /// The chain with and without a stage behind those of whole items, if this is the chain's
 /// row of one: of triangles what is left of them, of fragments those that are shaded.
 fn sides_behind(
@@ -263,12 +270,9 @@ fn sides_behind(
     })
 }
 
-}
-
 /// What the chosen chain leaves of every view, ready for the stages behind it.
 struct Left<'w> {
-    /// None for a scene of walls.
-    faces: Option<Faces>,
+    faces: Faces,
     /// None for a scene whose items are no solid boxes.
     boxes: Option<LeftBoxes<'w>>,
 }
@@ -283,9 +287,8 @@ struct LeftBoxes<'w> {
 impl<'w> Left<'w> {
     fn of(world: &'w World<'w>, pass: &Pass, chosen: &Walked) -> Left<'w> {
         let set = chosen.left();
-        let has_faces = world.scene().item_shape() != ItemShape::Wall;
         Left {
-            faces: has_faces.then(|| Faces::of(world, pass, set)),
+            faces: Faces::of(world, pass, set),
             boxes: world.solids().map(|solids| LeftBoxes {
                 solids,
                 orders: Orders::of(world, solids, pass, set),
@@ -301,7 +304,7 @@ fn bounds_of<'w>(
     chosen: &Walked,
     left: &Left,
 ) -> Vec<Bound<'w>> {
-    bounds(world, pass, chosen.left(), left.faces.as_ref())
+    bounds(world, pass, chosen.left(), &left.faces)
 }
 
 /// Every step, every back end of the triangle stage, every order, every back end of
@@ -319,11 +322,9 @@ fn timed_tasks<'p>(
         let ask: Ask = Box::new(move |view, out| run(view, pass.items(step.input, view), out));
         ask
     });
-    let culls = left.faces.iter().flat_map(|faces| {
-        (1..triangle_rows::back_ends().count()).map(move |place| {
-            let ask: Ask = Box::new(move |view, out| faces.cull(place - 1, view, out));
-            ask
-        })
+    let culls = (1..triangle_rows::back_ends().count()).map(|place| {
+        let ask: Ask = Box::new(move |view, out| left.faces.cull(place - 1, view, out));
+        ask
     });
     let behind = left
         .boxes
