@@ -93,6 +93,22 @@ pub fn counted(value: usize, one: &str) -> String {
     }
 }
 
+/// The first few names of a list and how many more there are: "a, b and 3 more".
+///
+/// ```
+/// use cullbench::shown::first_of;
+/// let told = [0, 2, 5].map(|n| first_of(&["a", "b", "c", "d", "e"][..n], 2));
+/// assert_eq!(told, ["none", "a, b", "a, b and 3 more"]);
+/// ```
+pub fn first_of(names: &[impl AsRef<str>], most: usize) -> String {
+    let named: Vec<&str> = names.iter().take(most).map(AsRef::as_ref).collect();
+    match names.len() - named.len() {
+        _ if named.is_empty() => "none".to_owned(),
+        0 => named.join(", "),
+        more => format!("{} and {} more", named.join(", "), count(more)),
+    }
+}
+
 /// Regular words only.
 fn plural(one: &str) -> String {
     let stem = one.strip_suffix('y');

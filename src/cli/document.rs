@@ -33,12 +33,23 @@ impl Rows {
 
     /// For a terminal.
     pub fn terminal(&self) -> String {
+        self.table().to_string()
+    }
+
+    /// For a terminal, no line wider.
+    pub fn terminal_within(&self, width: u16) -> String {
+        let mut table = self.table();
+        table.fit(width);
+        table.to_string()
+    }
+
+    fn table(&self) -> text::Table {
         let header: Vec<&str> = self.header.iter().map(String::as_str).collect();
         let mut table = text::table(&header, &self.right);
         for row in &self.rows {
             table.add_row(row);
         }
-        table.to_string()
+        table
     }
 
     fn markdown(&self) -> String {

@@ -16,8 +16,8 @@ use super::protocol::{Job, Timing};
 use super::run::progress;
 use super::run_resume::typed_args;
 use super::{
-    Ending, expect_places, funnel_picture, funnel_table, interrupt, load_scene_by, print_json,
-    text, unread_is_fine,
+    Ending, expect_places, funnel_csv, funnel_picture, funnel_table, interrupt, load_scene_by,
+    print_json, text, unread_is_fine,
 };
 use crate::funnel::{self, Chain, FunnelInput, FunnelPlan, Proofs, SeenFrom, StageKind, StageRow};
 use crate::index::{Registry, StructureSpec};
@@ -49,6 +49,9 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     expect_places(&outputs, &inputs)?;
     if args.certificates.is_some() && args.cut_out.is_some() {
         bail!("--certificates are about boxes without holes; expected no --cut-out with them");
+    }
+    if args.mirror.is_some() && args.cut_out.is_some() {
+        bail!("--mirror shows whole boxes; expected no --cut-out with it");
     }
     if args.certificates.is_some() && args.from == SeenFrom::Region {
         bail!("--certificates are about what cameras see; expected no --from region with them");
@@ -82,6 +85,7 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
         most_views: args.frames as usize,
         samples: args.samples,
         cut_outs: args.cut_out.as_ref(),
+        mirror: args.mirror,
         chain: &chain,
         structures: &structures,
         protocol: &protocol,
@@ -140,7 +144,7 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     }
     unread_is_fine(match args.format {
         FunnelFormat::Json => print_json(&report),
-        FunnelFormat::Csv => funnel_table::csv(&report, io::stdout().lock()),
+        FunnelFormat::Csv => funnel_csv::write(&report, io::stdout().lock()),
         FunnelFormat::Table => {
             let text = funnel_table::terminal(&funnel_table::blocks(&report));
             text::terminal().write_all(text.as_bytes())
@@ -236,6 +240,7 @@ pub fn time(
         most_views: args.frames as usize,
         samples: args.samples,
         cut_outs: args.cut_out.as_ref(),
+        mirror: args.mirror,
         chain: &chain(args, &scene, &structures)?,
         structures: &structures,
         protocol: &protocol(args, timing.process),

@@ -8,6 +8,7 @@ use clap::{Args, ValueEnum};
 use super::shared_args::{KernelArgs, LensArgs, SceneArgs, SpreadArgs, TableFormat};
 use super::values;
 use crate::funnel::SeenFrom;
+use crate::query::ItemId;
 use crate::visibility::SampleGrid;
 use crate::visibility::fragment::CutOuts;
 use crate::visibility::occlusion::OccluderChoice;
@@ -25,7 +26,9 @@ promises nothing. NAME is what the column `by` shows; none leaves a stage out. W
 decided exactly, along the rays through the samples. Where the occlusion stage walks a tree of its
 own (masked-inner, masked), its time holds the object stage's. Orders: pairs of items that overlap in
 the image, those drawn in the wrong order, and samples that show a wrong item without a z-test.
-A lower bound does what must be done at any rate and decides nothing.
+A lower bound does what must be done at any rate and decides nothing. With and without each stage
+is counted what is left in the end: items, of the triangle stage triangles, of the fragment stage
+shaded fragments; it pays where drawing one of them takes longer than what stands in the last column.
 Items that are cut out hide nothing in the occlusion stage, and at a sample only where their mask is
 opaque: z-test takes them for solid, alpha-test asks the mask. stencil-test (rooms) draws what is
 beyond the eye's room only on the samples that see its portals. Walls of rooms are never cut out,
@@ -55,6 +58,10 @@ pub struct FunnelArgs {
     /// Cut holes into a share of the items: fence or foliage, e.g. fence:share=0.2,tile=1,seed=1
     #[arg(long, value_name = "MASK", value_parser = CutOuts::parse)]
     pub cut_out: Option<CutOuts>,
+    /// Take a face of this item for a mirror (across its shortest edge): what is seen in it, with
+    /// and without a stencil of its samples
+    #[arg(long, value_name = "ITEM")]
+    pub mirror: Option<ItemId>,
     /// Back end of the region stage [default: the best that the scene has regions for]
     #[arg(long, value_name = "NAME")]
     pub region: Option<String>,

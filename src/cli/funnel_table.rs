@@ -1,17 +1,19 @@
 //! The tables of `cullbench funnel`: a row for each stage and back end, what each stage
 //! of the chain is worth, and what follows.
 
-use std::io::{self, Write};
-
 use super::document::{Block, Rows};
 use super::text;
-use crate::funnel::{FunnelReport, Gain, InnerRow, ProofCounts, SeenFrom, StageRow, Times};
-use crate::shown::field;
+use crate::funnel::{
+    FunnelReport, Gain, InnerRow, LevelRow, ProofCounts, SeenFrom, StageKind, StageRow, Times,
+};
 use crate::visibility::Guarantee;
 use crate::visibility::occlusion::OccluderChoice;
 
 /// No line is longer.
-const WIDTH: usize = 100;
+const WIDTH: u16 = 100;
+
+/// What is judged and has no time.
+const NOT_TIMED: &str = "not timed";
 
 pub fn blocks(report: &FunnelReport) -> Vec<Block> {
     let mut blocks = vec![
@@ -26,6 +28,7 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
         )),
         Block::Table(stages(report)),
     ];
+    blocks.extend(saved_load(&report.level).map(Block::Line));
     blocks.extend(report.inner_boxes.as_ref().map(inner_boxes));
     if let Some(made) = &report.cut_outs {
         let line = format!(
@@ -52,20 +55,52 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
             proofs(report),
         ),
         ("Samples and fragments of what is left", fragments(report)),
+        ("What is seen in the mirror", mirror(report)),
         ("What is left, drawn in every order", orders(report)),
         ("What is under a cursor", picks(report)),
         (
             "Lower bounds: what must be read or written at any rate",
             bounds(report),
         ),
-        ("With and without each stage of the chain", gains(report)),
+        (
+            "With and without each stage of the chain, and the draw cost above which it pays",
+            gains(report),
+        ),
     ] {
         if !table.rows.is_empty() {
             blocks.extend([Block::Heading(2, heading.into()), Block::Table(table)]);
         }
     }
+    let mut stages = report.bounds.iter().map(|row| row.stage);
+    let mut gained = report.gains.iter().map(|gain| gain.stage);
+    if stages.any(|stage| stage == StageKind::Fragment)
+        || gained.any(|stage| stage == StageKind::Fragment)
+    {
+        let line = format!(
+            "{NOT_TIMED}: the fragment stage is the graphics processor's and judged only, so a \
+             lower bound of it has no ratio."
+        );
+        blocks.push(Block::Line(line));
+    }
     blocks.extend(report.conclusions.iter().cloned().map(Block::Line));
     blocks
+}
+
+/// What the selection of a level saves; nothing where there is but one.
+fn saved_load(level: &LevelRow) -> Option<String> {
+    let [lower, upper] = [level.saved_load_ns_lower?, level.saved_load_ns_upper?];
+    let others = text::counted(level.map_count - 1, "other map");
+    Some(match lower > 0.0 {
+        true => format!(
+            "Decoding the {others} of the file takes {} of wall time, which the level stage saves.",
+            text::time_plus_minus(level.saved_load_ns, [Some(lower), Some(upper)])
+        ),
+        false => format!(
+            "Decoding the {others} of the file takes less than {} of wall time: what the level \
+             stage saves is within noise.",
+            text::time(upper)
+        ),
+    })
 }
 
 /// What hides in a mesh, and what finding it took.
@@ -97,8 +132,8 @@ pub fn spread(processes: usize) -> String {
 /// The blocks for a terminal.
 pub fn terminal(blocks: &[Block]) -> String {
     let lines = blocks.iter().map(|block| match block {
-        Block::Heading(_, text) | Block::Line(text) => text::wrapped(text, WIDTH),
-        Block::Table(rows) => rows.terminal(),
+        Block::Heading(_, text) | Block::Line(text) => text::wrapped(text, WIDTH.into()),
+        Block::Table(rows) => rows.terminal_within(WIDTH),
         Block::Picture(_) => String::new(),
     });
     lines.map(|line| line + "\n").collect()
@@ -118,9 +153,6 @@ fn stages(report: &FunnelReport) -> Rows {
     let mut first = vec!["level".to_owned(), level.selected.clone()];
     first.extend([level.input_count, level.output_count].map(|n| n.to_string()));
     first.resize(rows.header.len(), String::new());
-    if level.map_count > 1 {
-        first[7] = format!("-{}", text::time(level.saved_load_ns));
-    }
     rows.rows.push(first);
     rows.rows.extend(report.stages.iter().map(stage));
     rows
@@ -196,9 +228,9 @@ fn proofs(report: &FunnelReport) -> Rows {
     rows
 }
 
-/// One test alone has nothing to be compared with.
-fn fragments(report: &FunnelReport) -> Rows {
-    let mut rows = Rows::of_numbers([
+/// Counts of fragments, by the name of a test.
+fn of_fragments() -> Rows {
+    Rows::of_numbers([
         "test",
         "samples asked",
         "kept out",
@@ -206,7 +238,29 @@ fn fragments(report: &FunnelReport) -> Rows {
         "clear",
         "shaded",
         "covered",
-    ]);
+    ])
+}
+
+/// The reflected scene on the samples of a mirror, and on all.
+fn mirror(report: &FunnelReport) -> Rows {
+    let mut rows = of_fragments();
+    let drawn = report.mirror.iter().flat_map(|mirror| {
+        [
+            ("z-test", &mirror.without_stencil),
+            ("stencil-test", &mirror.with_stencil),
+        ]
+    });
+    rows.rows.extend(drawn.map(|(name, counts)| {
+        let mut cells = vec![name.to_owned()];
+        cells.extend(counts.in_order().map(count));
+        cells
+    }));
+    rows
+}
+
+/// One test alone has nothing to be compared with.
+fn fragments(report: &FunnelReport) -> Rows {
+    let mut rows = of_fragments();
     let tests = report
         .stages
         .iter()
@@ -276,7 +330,11 @@ fn bounds(report: &FunnelReport) -> Rows {
             row.name.to_owned(),
             row.back_end.to_owned(),
             of_view(&row.times),
-            row.ratio.map(text::significant).unwrap_or_default(),
+            match (row.ratio, row.times.stage_ns) {
+                (Some(ratio), _) => text::significant(ratio),
+                (None, Some(_)) => NOT_TIMED.to_owned(),
+                (None, None) => String::new(),
+            },
         ]
     }));
     rows
@@ -287,10 +345,12 @@ fn gains(report: &FunnelReport) -> Rows {
         "stage",
         "time with",
         "without",
-        "items with",
+        "counted",
+        "with",
         "without",
-        "pays above a draw cost of",
+        "pays above",
     ]);
+    rows.right.retain(|column| *column != 3);
     rows.rows.extend(report.gains.iter().map(gain));
     rows
 }
@@ -301,6 +361,7 @@ fn gain(gain: &Gain) -> Vec<String> {
         format!("{} ({})", gain.stage.name(), gain.back_end),
         time(gain.with_ns),
         time(gain.without_ns),
+        gain.unit.to_owned(),
         count(gain.with_count),
         count(gain.without_count),
         match gain.break_even_ns {
@@ -308,65 +369,8 @@ fn gain(gain: &Gain) -> Vec<String> {
                 gain.break_even_ns,
                 [gain.break_even_ns_lower, gain.break_even_ns_upper],
             ),
+            None if gain.removed() > 0.0 => NOT_TIMED.to_owned(),
             None => "removes nothing".to_owned(),
         },
     ]
-}
-
-/// One tidy row for each stage and back end; numbers as they are.
-pub fn csv(report: &FunnelReport, out: impl Write) -> io::Result<()> {
-    let mut out = csv::Writer::from_writer(out);
-    out.write_record([
-        "scene",
-        "path",
-        "stage",
-        "back_end",
-        "guarantee",
-        "is_chosen",
-        "unit",
-        "input_count",
-        "output_count",
-        "truth_count",
-        "false_positive_count",
-        "false_negative_count",
-        "worst_missing_samples",
-        "image_error",
-        "stage_ns",
-        "ns_per_removed",
-        "ns_per_decided",
-        "asked_count",
-        "kept_out_count",
-        "fragment_count",
-        "clear_count",
-        "shaded_count",
-        "covered_count",
-    ])?;
-    for row in &report.stages {
-        let errors = &row.errors;
-        let name = row.structure.as_deref().unwrap_or(row.back_end.name);
-        let optional = |value: Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
-        let mut record = vec![
-            field(&report.scene).into_owned(),
-            field(&report.path).into_owned(),
-            row.back_end.stage.name().to_owned(),
-            field(name).into_owned(),
-            row.back_end.guarantee.name().to_owned(),
-            row.is_chosen.to_string(),
-            row.unit.to_owned(),
-            errors.input_count.to_string(),
-            errors.output_count.to_string(),
-            errors.truth_count.to_string(),
-            errors.false_positive_count.to_string(),
-            errors.false_negative_count.to_string(),
-            errors.worst_missing_samples.to_string(),
-            optional(errors.image_error.map(|rate| rate.value)),
-            optional(row.times.stage_ns),
-            optional(row.ns_per_removed),
-            optional(row.ns_per_decided),
-        ];
-        let counts = row.fragments.map(|counts| counts.in_order());
-        record.extend((0..6).map(|n| optional(counts.map(|counts| counts[n]))));
-        out.write_record(record)?;
-    }
-    out.flush()
 }

@@ -22,6 +22,7 @@ mod drift_diagram;
 mod env;
 mod funnel;
 mod funnel_args;
+mod funnel_csv;
 mod funnel_picture;
 mod funnel_table;
 mod interrupt;

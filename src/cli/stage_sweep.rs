@@ -75,6 +75,7 @@ impl Setting {
             most_views: args.frames as usize,
             samples: SAMPLES,
             cut_outs: None,
+            mirror: None,
             chain: &self.chain,
             structures: &self.structures,
             protocol,

@@ -11,7 +11,11 @@ use comfy_table::presets::UTF8_BORDERS_ONLY;
 use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement};
 
 /// A table whose cells may come from anywhere.
-pub struct Table(comfy_table::Table);
+pub struct Table {
+    cells: comfy_table::Table,
+    /// Columns of the terminal, where the table is to fit into them.
+    width: Option<u16>,
+}
 
 /// A table with a header. Columns named in `right` hold numbers.
 pub fn table(header: &[&str], right: &[usize]) -> Table {
@@ -25,29 +29,47 @@ pub fn table(header: &[&str], right: &[usize]) -> Table {
             column.set_cell_alignment(CellAlignment::Right);
         }
     }
-    Table(table)
+    Table {
+        cells: table,
+        width: None,
+    }
 }
 
 impl Table {
     pub fn add_row(&mut self, row: impl IntoIterator<Item = impl AsRef<str>>) {
-        self.0
-            .add_row(row.into_iter().map(|cell| plain(cell.as_ref())));
+        let cells = row.into_iter().map(|cell| plain(cell.as_ref()));
+        self.cells.add_row(cells);
     }
 
-    /// Breaks long cells into lines so that the table is no wider; names, in the first
-    /// column, stay whole.
+    /// Makes the table no wider, whatever is added to it: columns move together, and if that
+    /// is not enough long cells are broken into lines; names, in the first column, stay
+    /// whole.
     pub fn fit(&mut self, width: u16) {
-        let arranged = ContentArrangement::Dynamic;
-        self.0.set_content_arrangement(arranged).set_width(width);
-        if let Some(names) = self.0.column_mut(0) {
-            names.set_constraint(ColumnConstraint::ContentWidth);
-        }
+        self.width = Some(width);
     }
 }
 
 impl fmt::Display for Table {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        self.0.fmt(f)
+        let wide = self.cells.to_string();
+        let is_within = |width: u16| {
+            let mut lines = wide.lines();
+            lines.all(|line| line.chars().count() <= usize::from(width))
+        };
+        let Some(width) = self.width.filter(|width| !is_within(*width)) else {
+            return f.write_str(&wide);
+        };
+        let mut cells = self.cells.clone();
+        cells
+            .set_content_arrangement(ContentArrangement::Dynamic)
+            .set_width(width);
+        for (place, column) in cells.column_iter_mut().enumerate() {
+            match place {
+                0 => column.set_constraint(ColumnConstraint::ContentWidth),
+                _ => column.set_padding((0, 1)),
+            };
+        }
+        cells.fmt(f)
     }
 }
 
@@ -350,6 +372,29 @@ mod tests {
         };
         assert_eq!(time_estimate(Some(&bare)), "1.81 us");
         assert_eq!(time_estimate(None), "");
+    }
+
+    #[test]
+    fn a_table_that_is_too_wide_moves_together_and_then_breaks_cells() {
+        let fitted = |name: &str| {
+            let mut table = table(&["stage", "by", "time"], &[2]);
+            table.add_row(["occlusion", name, "1.85±0.02 ms"]);
+            let whole = table.to_string();
+            table.fit(40);
+            (whole, table.to_string())
+        };
+        let widest = |text: &str| text.lines().map(|line| line.chars().count()).max();
+        let (whole, same) = fitted("a-name");
+        assert_eq!(whole, same);
+        let (whole, closer) = fitted("a-name-of-1");
+        assert_eq!([widest(&whole), widest(&closer)], [Some(42), Some(40)]);
+        assert!(
+            closer.contains("occlusion  a-name-of-1  1.85±0.02 ms"),
+            "{closer}"
+        );
+        let (_, broken) = fitted(&"x".repeat(70));
+        assert!(widest(&broken) <= Some(40), "{broken}");
+        assert!(broken.contains("occlusion") && broken.contains("ms"));
     }
 
     #[test]

@@ -70,7 +70,7 @@ pub fn back_ends(stage: StageKind, scene: &Scene, has_cut_outs: bool) -> Vec<Bac
             rows.extend(known.map(|row| plain(row.name, row.summary, row.guarantee)));
         }
         StageKind::Occlusion if hides => rows.extend(HIDING.iter().map(HidingRow::back_end)),
-        StageKind::Triangle if hides => rows = triangle_rows::back_ends().collect(),
+        StageKind::Triangle => rows = triangle_rows::back_ends().collect(),
         StageKind::Fragment => rows.extend(fragment_rows::back_ends(scene, has_cut_outs)),
         _ => {}
     }

@@ -79,14 +79,8 @@ impl Bound<'_> {
 }
 
 /// The bounds that a scene has data for: of occlusion where something is known to hide, of
-/// cones where there are faces, of fragments where items are solid boxes. `left` is the
-/// set that the chain leaves.
-pub fn bounds<'w>(
-    world: &'w World<'w>,
-    pass: &Pass,
-    left: usize,
-    faces: Option<&Faces>,
-) -> Vec<Bound<'w>> {
+/// fragments where items are solid boxes. `left` is the set that the chain leaves.
+pub fn bounds<'w>(world: &'w World<'w>, pass: &Pass, left: usize, faces: &Faces) -> Vec<Bound<'w>> {
     let mut bounds = of_regions(world);
     bounds.extend(
         world
@@ -94,7 +88,7 @@ pub fn bounds<'w>(
             .into_iter()
             .flat_map(|scene| of_occlusion(world, scene)),
     );
-    bounds.extend(faces.map(|faces| of_cones(world, faces)));
+    bounds.push(of_cones(world, faces));
     bounds.extend(
         world
             .solids()

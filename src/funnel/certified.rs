@@ -61,9 +61,7 @@ impl Proofs {
 /// # Errors
 /// If there is nothing.
 pub fn expect_provable(world: &World) -> Result<(), FunnelError> {
-    let is_mesh = world.mesh().is_some();
-    let has_claim = !world.audits().is_empty() && !is_mesh;
-    match world.solids().is_some() || has_claim {
+    match world.solids().is_some() || !world.audits().is_empty() {
         true => Ok(()),
         false => Err(FunnelError::NoSolids {
             scene: world.scene().name.clone(),

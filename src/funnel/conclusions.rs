@@ -3,10 +3,12 @@
 
 use super::back_ends::MOST_EXACT_ROOMS;
 use super::fragment_rows;
+use super::mirror::MirrorRow;
 use super::orders::OrderRow;
 use super::regions::ClaimAudit;
 use super::report::{FunnelReport, Gain, StageRow};
-use crate::shown::counted;
+use super::stage::StageKind;
+use crate::shown::{counted, first_of};
 use crate::visibility::region::STORED;
 
 /// Items that a sentence names.
@@ -19,6 +21,7 @@ pub fn conclusions(report: &FunnelReport) -> Vec<String> {
     sentences.extend(report.stages.iter().filter(lossy).map(of_loss));
     sentences.extend(report.stages.iter().filter_map(of_sub_samples));
     sentences.extend(of_stencil(report));
+    sentences.extend(report.mirror.as_ref().map(of_mirror));
     sentences.extend(report.orders.iter().flat_map(of_order));
     for ClaimAudit { claim, audit } in &report.audits {
         sentences.push(format!(
@@ -41,35 +44,32 @@ pub fn conclusions(report: &FunnelReport) -> Vec<String> {
             STORED.name
         ));
     }
-    if let Some(last) = report.gains.first() {
+    let of_chain = |stage| {
+        let mut chosen = report.stages.iter().filter(|row| row.is_chosen);
+        chosen.find(|row| row.back_end.stage == stage)
+    };
+    if let Some(last) = of_chain(StageKind::Occlusion) {
         sentences.push(format!(
             "Of {} items {:.1} are left and {:.1} are in front at a sample, per view.",
-            report.items,
-            last.with_count,
-            visible(report)
+            report.items, last.errors.output_count, last.errors.truth_count
         ));
     }
     sentences
 }
 
-fn visible(report: &FunnelReport) -> f64 {
-    let rows = report.stages.iter().filter(|row| row.unit == "items");
-    rows.map(|row| row.errors.truth_count).next().unwrap_or(0.0)
-}
-
 fn of_gain(gain: &Gain) -> String {
     let what = format!("{} ({})", gain.stage.name(), gain.back_end);
-    let removed = gain.without_count - gain.with_count;
+    let (removed, unit) = (gain.removed(), gain.unit);
     if removed <= 0.0 {
         return format!("{what} removes nothing that the other stages leave: leave it out.");
     }
     match gain.break_even_ns {
-        Some(0.0) => format!("{what} removes {removed:.1} items per view and saves time as well."),
+        Some(0.0) => format!("{what} removes {removed:.1} {unit} per view and saves time as well."),
         Some(ns) => format!(
-            "{what} removes {removed:.1} items per view and pays where drawing one of them takes \
+            "{what} removes {removed:.1} {unit} per view and pays where drawing one of them takes \
              more than {ns:.1} ns."
         ),
-        None => format!("{what} removes {removed:.1} items per view; it has no time."),
+        None => format!("{what} removes {removed:.1} {unit} per view; it is not timed."),
     }
 }
 
@@ -94,25 +94,41 @@ fn of_stencil(report: &FunnelReport) -> Option<String> {
     ))
 }
 
+/// What the stencil of a mirror saves.
+fn of_mirror(row: &MirrorRow) -> String {
+    let MirrorRow {
+        with_stencil: with,
+        without_stencil: without,
+        ..
+    } = row;
+    format!(
+        "In item {} as a mirror across {} (in front in {}, at {:.1} samples per view) {:.1} items are \
+         seen; the stencil asks {:.0} samples per view in place of {:.0}, and {} are shown differently.",
+        row.item,
+        row.axis,
+        counted(row.view_count, "view"),
+        row.marked_count,
+        row.shown_count,
+        with.asked_count,
+        without.asked_count,
+        counted(row.wrong_sample_count as usize, "sample")
+    )
+}
+
 /// What is seen between the samples only, and removed: no error of sample truth, and one
 /// of what promises more.
 fn of_sub_samples(row: &StageRow) -> Option<String> {
     let found = &row.proofs.as_ref()?.sub_sample_items;
-    let (first, more) = found.split_at(found.len().min(MOST_NAMED));
-    let named = first.iter();
+    let named = found.iter();
     let named = named.map(|(camera, item)| format!("item {item} of camera {camera}"));
     let named: Vec<String> = named.collect();
-    let more = match more.len() {
-        0 => String::new(),
-        more => format!(" and {more} more"),
-    };
     (!found.is_empty()).then(|| {
         format!(
-            "{} {} removed {} proven visible between the samples (sub-sample): {}{more}.",
+            "{} {} removed {} proven visible between the samples (sub-sample): {}.",
             row.back_end.stage.name(),
             row.structure.as_deref().unwrap_or(row.back_end.name),
             counted(found.len(), "item"),
-            named.join(", ")
+            first_of(&named, MOST_NAMED)
         )
     })
 }

@@ -4,6 +4,7 @@ use super::stage::StageKind;
 use crate::index::BuildError;
 use crate::input::InputError;
 use crate::measure::WorkloadError;
+use crate::query::ItemId;
 use crate::scene::ItemShape;
 use crate::visibility::NoRays;
 use crate::visibility::region::OtherRegions;
@@ -41,9 +42,9 @@ pub enum FunnelError {
         /// What its items are.
         shape: ItemShape,
     },
-    /// Holes are cut into solid boxes.
+    /// Holes and mirrors are made of solid boxes.
     #[error(
-        "the items of '{scene}' are {}; expected a scene of solid boxes for --cut-out",
+        "the items of '{scene}' are {}; expected a scene of solid boxes for {option}",
         shape.name()
     )]
     NoBoxes {
@@ -51,6 +52,18 @@ pub enum FunnelError {
         scene: String,
         /// What its items are.
         shape: ItemShape,
+        /// What was asked for.
+        option: &'static str,
+    },
+    /// A mirror that is no item.
+    #[error("--mirror {item}: '{scene}' has {items} items; expected one from 0 to {}", items - 1)]
+    NoMirror {
+        /// What was asked for.
+        item: ItemId,
+        /// The scene's name.
+        scene: String,
+        /// How many items it has.
+        items: usize,
     },
     /// A claim of what is seen from where, about a scene without regions.
     #[error("'{scene}' has no rooms or sectors; expected some for --pvs")]

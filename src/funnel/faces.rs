@@ -1,7 +1,7 @@
 //! The triangle stage on what the chain leaves: the faces of those items in clusters, and
 //! every back end that tells which of them are turned away or beside the image. Of solid
-//! boxes clusters are made for each view; of a mesh once, and a back end passes over those
-//! of other items.
+//! boxes clusters are made for each view; of a mesh or a map once, and a back end passes
+//! over those of other items. A map's floors and ceilings are of no item.
 
 use std::cell::OnceCell;
 use std::rc::Rc;
@@ -63,7 +63,7 @@ impl Faces {
     /// Of a set of items of each view. Most views have few items left; where a stage
     /// before is left out, 12 triangles an item take memory.
     pub fn of(world: &World, pass: &Pass, set: usize) -> Faces {
-        let whole = world.mesh().map(|mesh| Built::of(mesh.clone()));
+        let whole = world.surfaces().map(|all| Built::of(all.clone()));
         let views = (0..world.views()).map(|view| {
             let items = world.listed(pass.items(set, view));
             let built = whole.clone().unwrap_or_else(|| {

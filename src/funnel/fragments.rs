@@ -47,7 +47,7 @@ impl FragmentCounts {
     }
 
     /// `None` of no view.
-    fn of(tallies: &[Tally]) -> Option<FragmentCounts> {
+    pub(super) fn of(tallies: &[Tally]) -> Option<FragmentCounts> {
         let views = tallies.len() as f64;
         let mean = |of: fn(&Tally) -> u64| tallies.iter().map(of).sum::<u64>() as f64 / views;
         (!tallies.is_empty()).then(|| FragmentCounts {

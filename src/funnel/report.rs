@@ -7,6 +7,7 @@ use super::chain::Chain;
 use super::fragments::FragmentCounts;
 use super::inner::InnerRow;
 use super::judged::Errors;
+use super::mirror::MirrorRow;
 use super::orders::OrderRow;
 use super::picks::PickRow;
 use super::plan_view::PlanView;
@@ -54,6 +55,8 @@ pub struct FunnelReport {
     /// The boxes inside the items of a mesh, which hide what is behind them; null for
     /// what is no mesh.
     pub inner_boxes: Option<InnerRow>,
+    /// What is seen in a mirror; null where none was asked for.
+    pub mirror: Option<MirrorRow>,
     /// What is left, drawn in every order; empty unless items are solid boxes.
     pub orders: Vec<OrderRow>,
     /// What is under a cursor, by every back end of picking and every structure; empty as
@@ -82,19 +85,27 @@ pub struct LevelRow {
     pub input_count: usize,
     /// Items of the selected one.
     pub output_count: usize,
-    /// What decoding the others would have taken.
-    pub saved_load_ns: f64,
+    /// Wall time that decoding the others takes; null where there are none.
+    pub saved_load_ns: Option<f64>,
+    /// Lower end of its 95 % interval.
+    pub saved_load_ns_lower: Option<f64>,
+    /// Upper end of its 95 % interval.
+    pub saved_load_ns_upper: Option<f64>,
 }
 
 impl LevelRow {
     /// Of a level.
     pub fn of(level: &Level) -> LevelRow {
+        let saved = level.saved_ns();
+        let interval = saved.map(|saved| saved.interval(1.0 - ALPHA));
         LevelRow {
             map_count: level.maps.len(),
             selected: level.maps[level.selected].name.clone(),
             input_count: level.items(),
             output_count: level.selected_items(),
-            saved_load_ns: level.saved_ns(),
+            saved_load_ns: saved.map(|saved| saved.mean),
+            saved_load_ns_lower: interval.map(|(lower, _)| lower.max(0.0)),
+            saved_load_ns_upper: interval.map(|(_, upper)| upper),
         }
     }
 }
@@ -165,16 +176,20 @@ pub struct Gain {
     pub stage: StageKind,
     /// What does it.
     pub back_end: String,
-    /// Time of all stages together, a view.
+    /// What is counted at the end: items, triangles or shaded fragments.
+    pub unit: &'static str,
+    /// Time of all stages of whole items together, a view, and of the triangle stage if it
+    /// is this one; null for the fragment stage.
     pub with_ns: Option<f64>,
     /// The same without the stage.
     pub without_ns: Option<f64>,
-    /// Items left in the end, a view.
+    /// What is left in the end, a view.
     pub with_count: f64,
     /// The same without the stage.
     pub without_count: f64,
-    /// Cost of drawing an item above which the stage pays: what it costs in all / what
-    /// it removes in the end. 0 if it saves time as well; null if it removes nothing.
+    /// Cost of drawing one of them above which the stage pays: what it costs in all / what
+    /// it removes in the end. 0 if it saves time as well; null if it removes nothing or has no
+    /// time.
     pub break_even_ns: Option<f64>,
     /// Lower end of its 95 % interval.
     pub break_even_ns_lower: Option<f64>,
@@ -184,17 +199,23 @@ pub struct Gain {
 
 /// One side of a [`Gain`]: the tasks of a chain's steps, and what is left in the end.
 pub struct Side {
-    /// Tasks of the timed pass.
-    pub tasks: Vec<usize>,
-    /// Items left, a view.
+    /// Tasks of the timed pass; `None` where there is a step that is not timed.
+    pub tasks: Option<Vec<usize>>,
+    /// What is left, a view.
     pub count: f64,
 }
 
 impl Gain {
+    /// What the stage removes in the end, a view.
+    pub fn removed(&self) -> f64 {
+        self.without_count - self.with_count
+    }
+
     /// Of a chain with and without a stage.
     pub fn of(
         stage: StageKind,
         back_end: &str,
+        unit: &'static str,
         [with, without]: [&Side; 2],
         times: &OverProcesses,
     ) -> Gain {
@@ -213,6 +234,7 @@ impl Gain {
         Gain {
             stage,
             back_end: back_end.to_owned(),
+            unit,
             with_ns: mean(&spent),
             without_ns: mean(&saved),
             with_count: with.count,
@@ -227,7 +249,10 @@ impl Gain {
 /// Time of all steps of a side in each process, ns. A chain without steps takes none;
 /// one with a step that has no time has none.
 fn sums(side: &Side, times: &OverProcesses) -> Vec<f64> {
-    let of_steps: Vec<Vec<f64>> = side.tasks.iter().map(|&task| times.ln_ns(task)).collect();
+    let Some(tasks) = &side.tasks else {
+        return Vec::new();
+    };
+    let of_steps: Vec<Vec<f64>> = tasks.iter().map(|&task| times.ln_ns(task)).collect();
     let processes = (0..times.processes()).map(|process| {
         let parts = of_steps
             .iter()

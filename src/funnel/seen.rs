@@ -3,11 +3,8 @@
 
 use super::truth::Truth;
 use super::world::World;
-use crate::input::InputError;
 use crate::query::ItemId;
-use crate::scene::Surfaces;
 use crate::visibility::fragment;
-use crate::visibility::region::doom::DoomMap;
 use crate::visibility::truth::{
     RayIndex, SampleTruth, SurfaceIndex, TruthCache, digest_of, visible_by_random_rays,
     visible_surfaces_by_random_rays,
@@ -16,22 +13,19 @@ use crate::visibility::{Rays, SampleGrid, Solids};
 
 /// At the samples of every view and along so many random rays, whose items count as
 /// one sample each if they are at none. `None` if stopped.
-///
-/// # Errors
-/// The map's file, read again.
 pub fn seen(
     world: &World,
     samples: SampleGrid,
     random_rays: usize,
     threads: usize,
     stop: &dyn Fn() -> bool,
-) -> Result<Option<Truth>, InputError> {
-    let all = Hiding::of(world)?;
+) -> Option<Truth> {
+    let all = Hiding::of(world);
     let items = world.items() as ItemId;
     let mut visible = Vec::with_capacity(world.views());
     for view in 0..world.views() {
         if stop() {
-            return Ok(None);
+            return None;
         }
         let rays = world.rays(view);
         let truth = all.at_samples(rays, samples, threads);
@@ -47,7 +41,7 @@ pub fn seen(
         seen.retain(|(item, _)| *item < items);
         visible.push(seen);
     }
-    Ok(Some(Truth::new(visible)))
+    Some(Truth::new(visible))
 }
 
 /// What rays end at: solid boxes; or the triangles of a mesh, or the walls, floors and
@@ -60,22 +54,16 @@ enum Hiding<'w> {
 }
 
 impl Hiding<'_> {
-    fn of<'w>(world: &'w World) -> Result<Hiding<'w>, InputError> {
+    fn of<'w>(world: &'w World) -> Hiding<'w> {
         if let Some(solids) = world.solids() {
             let index = RayIndex::build(solids);
-            return Ok(match (world.cut_outs(), world.truth_cache()) {
+            return match (world.cut_outs(), world.truth_cache()) {
                 (None, Some(cache)) => Hiding::Kept(solids, index, cache, digest_of(solids)),
                 (holes, _) => Hiding::Solids(solids, index, holes),
-            });
+            };
         }
-        let index = |surfaces: &Surfaces| Hiding::Surfaces(SurfaceIndex::build(surfaces));
-        let scene = world.scene();
-        Ok(match (&scene.surfaces, DoomMap::of_scene(scene)?) {
-            (Some(mesh), _) => index(mesh),
-            (None, Some(map)) => index(&map.surfaces(scene)),
-            // A map whose file is not known.
-            (None, None) => index(&Surfaces::from_boxes(scene)),
-        })
+        let surfaces = world.surfaces().expect("triangles of what is no solid box");
+        Hiding::Surfaces(SurfaceIndex::build(surfaces))
     }
 
     fn at_samples(&self, rays: &Rays, grid: SampleGrid, threads: usize) -> SampleTruth {

@@ -10,8 +10,10 @@ use super::certified::{Proofs, certified, expect_provable};
 use super::conclusions::conclusions;
 use super::error::FunnelError;
 use super::faces::Faces;
+use super::fragment_rows;
 use super::fragments;
 use super::judged::{Errors, Judged};
+use super::mirror::mirrored;
 use super::orders::{self, Orders};
 use super::pass::{Pass, Walked};
 use super::picks::Picks;
@@ -19,14 +21,13 @@ use super::plan_view::{PlanView, fate};
 use super::proven::ProofCounts;
 use super::report::{CutOutRow, FunnelReport, Gain, LevelRow, Side, StageRow};
 use super::seen::seen;
-use super::stage::{BackEnd, StageKind};
+use super::stage::{BackEnd, NONE, StageKind};
 use super::times::Times;
 use super::triangle_rows;
 use super::truth::Truth;
 use super::walks::Walks;
 use super::world::{FunnelInput, World};
 use crate::measure::{Ask, OverProcesses, ProcessTimes, Schedule, TimedTask, Verdict, timed};
-use crate::scene::ItemShape;
 use crate::visibility::truth::RayIndex;
 use crate::visibility::{Level, Solids};
 
@@ -45,7 +46,15 @@ pub struct Prepared {
     report: FunnelReport,
     /// By row: its task.
     tasks: Vec<Option<usize>>,
-    gains: Vec<(StageKind, String, [Side; 2])>,
+    gains: Vec<Sides>,
+}
+
+/// The chain with a stage and without it.
+struct Sides {
+    stage: StageKind,
+    back_end: String,
+    unit: &'static str,
+    sides: [Side; 2],
 }
 
 /// Goes through all chains, judges them, and plans how they are timed; `None` if
@@ -64,7 +73,7 @@ pub fn prepare(
         expect_provable(&world)?;
     }
     let threads = input.execution.threads;
-    let Some(truth) = seen(&world, input.samples, 0, threads, stop)? else {
+    let Some(truth) = seen(&world, input.samples, 0, threads, stop) else {
         return Ok(None);
     };
     let mut pass = Pass::new(&world);
@@ -93,24 +102,28 @@ pub fn prepare(
         let back_end = world.back_end(*stage, name);
         rows.push((back_end, name.clone(), judged, *step, proofs));
     }
-    if let Some(faces) = &left.faces {
-        let culls = world.back_ends(StageKind::Triangle).into_iter();
-        let culls = culls.zip(std::iter::once(None).chain((0..).map(Some)));
-        for (back_end, place) in culls {
-            if stop() {
-                return Ok(None);
-            }
-            let task = place.map(|place: usize| pass.steps().len() + place);
-            let judged = faces.judged(place);
-            rows.push((back_end, back_end.name.to_owned(), judged, task, None));
+    let culls = world.back_ends(StageKind::Triangle).into_iter();
+    let culls = culls.zip(std::iter::once(None).chain((0..).map(Some)));
+    for (back_end, place) in culls {
+        if stop() {
+            return Ok(None);
         }
+        let task = place.map(|place: usize| pass.steps().len() + place);
+        let judged = left.faces.judged(place);
+        rows.push((back_end, back_end.name.to_owned(), judged, task, None));
     }
     let last = walks.chosen.left();
     let Some(tested) = fragments::tested(&world, &pass, last, &truth, stop) else {
         return Ok(None);
     };
-    let (mut drawn, mut picked) = (Vec::new(), Vec::new());
+    let (mut drawn, mut picked, mut mirror) = (Vec::new(), Vec::new(), None);
     if let Some(boxes) = &left.boxes {
+        if let Some(item) = input.mirror {
+            let Some(row) = mirrored(item, &world, boxes.solids, &pass, last, stop) else {
+                return Ok(None);
+            };
+            mirror = Some(row);
+        }
         let Some(rows) = boxes.orders.drawn(input.samples, stop) else {
             return Ok(None);
         };
@@ -146,16 +159,22 @@ pub fn prepare(
         fragments: tested.counts,
         ..row(tested.back_end, tested.back_end.name, &tested.judged)
     });
-    let rows = rows.chain(tested).collect();
+    let rows: Vec<StageRow> = rows.chain(tested).collect();
     let side = |walked: &Walked| Side {
-        tasks: pass.timed_steps(walked),
+        tasks: Some(pass.timed_steps(walked)),
         count: pass.mean_count(walked.left()),
     };
-    let gains = walks.without.iter().map(|(stage, without)| {
-        let name = input.chain.of(*stage).to_owned();
-        (*stage, name, [side(&walks.chosen), side(without)])
+    let of_items = walks.without.iter().map(|(stage, without)| Sides {
+        stage: *stage,
+        back_end: input.chain.of(*stage).to_owned(),
+        unit: stage.unit(),
+        sides: [side(&walks.chosen), side(without)],
     });
-    let gains = gains.collect();
+    let steps = pass.timed_steps(&walks.chosen);
+    let behind = rows.iter().zip(&tasks).filter_map(|(row, task)| {
+        sides_behind(row, *task, &steps, world.cut_outs().is_some(), &rows)
+    });
+    let gains = of_items.chain(behind).collect();
     let bounds = bounds_of(&world, &pass, &walks.chosen, &left);
     let bound_rows = bounds.iter().map(Bound::row).collect();
     let timed = timed_tasks(&pass, &world, &left, bounds, None);
@@ -186,6 +205,7 @@ pub fn prepare(
             stages: rows,
             audits: world.audits().to_vec(),
             inner_boxes: world.inner().map(|inner| inner.row.clone()),
+            mirror,
             orders: drawn,
             picks: picked,
             bounds: bound_rows,
@@ -217,10 +237,42 @@ pub fn time(
     Ok(timed.map(|timed| ProcessTimes::of(&timed)))
 }
 
+/// The chain with and without a stage behind those of whole items, if this is the chain's
+/// row of one: of triangles what is left of them, of fragments those that are shaded.
+fn sides_behind(
+    row: &StageRow,
+    task: Option<usize>,
+    steps: &[usize],
+    cut_outs: bool,
+    rows: &[StageRow],
+) -> Option<Sides> {
+    let stage = row.back_end.stage;
+    if !row.is_chosen || row.back_end.name == NONE || StageKind::OF_ITEMS.contains(&stage) {
+        return None;
+    }
+    // Without a test every fragment of what is left is shaded.
+    let every = rows
+        .iter()
+        .find(|row| row.back_end.name == fragment_rows::default(cut_outs));
+    let every = every.and_then(|row| row.fragments);
+    let (unit, counts) = match row.fragments.zip(every) {
+        Some((own, every)) => ("fragments", [own.shaded_count, every.fragment_count]),
+        None => (row.unit, [row.errors.output_count, row.errors.input_count]),
+    };
+    let with = task.map(|task| [steps, &[task]].concat());
+    let without = with.is_some().then(|| steps.to_vec());
+    let [with, without] = [(with, counts[0]), (without, counts[1])];
+    Some(Sides {
+        stage,
+        back_end: row.back_end.name.to_owned(),
+        unit,
+        sides: [with, without].map(|(tasks, count)| Side { tasks, count }),
+    })
+}
+
 /// What the chosen chain leaves of every view, ready for the stages behind it.
 struct Left<'w> {
-    /// None for a scene of walls.
-    faces: Option<Faces>,
+    faces: Faces,
     /// None for a scene whose items are no solid boxes.
     boxes: Option<LeftBoxes<'w>>,
 }
@@ -235,9 +287,8 @@ struct LeftBoxes<'w> {
 impl<'w> Left<'w> {
     fn of(world: &'w World<'w>, pass: &Pass, chosen: &Walked) -> Left<'w> {
         let set = chosen.left();
-        let has_faces = world.scene().item_shape() != ItemShape::Wall;
         Left {
-            faces: has_faces.then(|| Faces::of(world, pass, set)),
+            faces: Faces::of(world, pass, set),
             boxes: world.solids().map(|solids| LeftBoxes {
                 solids,
                 orders: Orders::of(world, solids, pass, set),
@@ -253,7 +304,7 @@ fn bounds_of<'w>(
     chosen: &Walked,
     left: &Left,
 ) -> Vec<Bound<'w>> {
-    bounds(world, pass, chosen.left(), left.faces.as_ref())
+    bounds(world, pass, chosen.left(), &left.faces)
 }
 
 /// Every step, every back end of the triangle stage, every order, every back end of
@@ -271,11 +322,9 @@ fn timed_tasks<'p>(
         let ask: Ask = Box::new(move |view, out| run(view, pass.items(step.input, view), out));
         ask
     });
-    let culls = left.faces.iter().flat_map(|faces| {
-        (1..triangle_rows::back_ends().count()).map(move |place| {
-            let ask: Ask = Box::new(move |view, out| faces.cull(place - 1, view, out));
-            ask
-        })
+    let culls = (1..triangle_rows::back_ends().count()).map(|place| {
+        let ask: Ask = Box::new(move |view, out| left.faces.cull(place - 1, view, out));
+        ask
     });
     let behind = left
         .boxes
@@ -371,10 +420,11 @@ impl Prepared {
         for (row, task) in report.orders.iter_mut().rev().zip((0..picks).rev()) {
             row.times = Times::of(times.ns(task));
         }
-        let gains = self
-            .gains
-            .iter()
-            .map(|(stage, name, [with, without])| Gain::of(*stage, name, [with, without], &times));
+        let gains = self.gains.iter().map(|sides| {
+            let [with, without] = &sides.sides;
+            let back_end = &sides.back_end;
+            Gain::of(sides.stage, back_end, sides.unit, [with, without], &times)
+        });
         report.gains = gains.collect();
         report.conclusions = conclusions(&report);
         report

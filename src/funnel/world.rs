@@ -28,6 +28,7 @@ use crate::query::ItemId;
 use crate::scene::{ItemShape, Scene, Surfaces};
 use crate::visibility::fragment::{self, CutOuts};
 use crate::visibility::occlusion::{self, OccluderChoice, OccluderScene};
+use crate::visibility::region::doom::DoomMap;
 use crate::visibility::region::{EyePlace, Marks, Pvs, RegionRow, Scratch};
 use crate::visibility::triangle;
 use crate::visibility::truth::TruthCache;
@@ -46,6 +47,8 @@ pub struct FunnelInput<'a> {
     pub samples: SampleGrid,
     /// Items that have holes.
     pub cut_outs: Option<&'a CutOuts>,
+    /// The item whose face is a mirror.
+    pub mirror: Option<ItemId>,
     /// What each stage is done by.
     pub chain: &'a Chain,
     /// Structures for the object stage; one of them is the chain's.
@@ -78,6 +81,9 @@ pub struct World<'a> {
     /// The items, if they are solid boxes.
     solids: Option<Solids>,
     cut_outs: Option<fragment::Surfaces>,
+    /// The triangles of the items, if they are no solid boxes; of a map also those of its
+    /// floors and ceilings, behind the items.
+    surfaces: Option<Arc<Surfaces>>,
     /// Boxes inside the items, if those are triangles.
     inner: Option<Inner>,
     /// None where nothing is known to hide.
@@ -144,9 +150,35 @@ impl<'a> World<'a> {
                 return Err(FunnelError::NoBoxes {
                     scene: input.scene.name.clone(),
                     shape: input.scene.item_shape(),
+                    option: "--cut-out",
                 });
             }
         };
+        let surfaces = match (is_boxes, &input.scene.surfaces) {
+            (true, _) => None,
+            (_, Some(mesh)) => Some(mesh.clone()),
+            (_, None) => Some(Arc::new(match DoomMap::of_scene(input.scene)? {
+                Some(map) => map.surfaces(input.scene),
+                // A map whose file is not known.
+                None => Surfaces::from_boxes(input.scene),
+            })),
+        };
+        if let Some(item) = input.mirror {
+            let Some(solids) = &solids else {
+                return Err(FunnelError::NoBoxes {
+                    scene: input.scene.name.clone(),
+                    shape: input.scene.item_shape(),
+                    option: "--mirror",
+                });
+            };
+            if item as usize >= solids.boxes.len() {
+                return Err(FunnelError::NoMirror {
+                    item,
+                    scene: input.scene.name.clone(),
+                    items: solids.boxes.len(),
+                });
+            }
+        }
         let inner = Inner::of(input.scene, input.execution.threads);
         let occluders = match (&solids, &inner) {
             (Some(solids), _) => Some(OccluderScene::of(solids)),
@@ -161,6 +193,7 @@ impl<'a> World<'a> {
             views: views.collect::<Result<_, FunnelError>>()?,
             solids,
             cut_outs,
+            surfaces,
             inner,
             occluders,
             choice: input.occluders,
@@ -237,9 +270,10 @@ impl<'a> World<'a> {
         self.solids.as_ref()
     }
 
-    /// The triangles of the items, if the scene is a mesh.
-    pub fn mesh(&self) -> Option<&Arc<Surfaces>> {
-        self.scene.surfaces.as_ref()
+    /// The triangles of the items, if they are no solid boxes; of a map also those of its
+    /// floors and ceilings, behind the items.
+    pub fn surfaces(&self) -> Option<&Arc<Surfaces>> {
+        self.surfaces.as_ref()
     }
 
     /// The boxes inside the items of a mesh, which are drawn as occluders.
@@ -488,6 +522,7 @@ mod tests {
             most_views: 3,
             samples: SampleGrid::new(8, 5),
             cut_outs: None,
+            mirror: None,
             chain: &Chain::for_scene(&scene, false).with(StageKind::Object, "linear"),
             structures: &[LINEAR(), blind],
             protocol: &Protocol {

@@ -11,6 +11,7 @@ use super::folder::{self, SAMPLE_COLUMNS, save_report};
 use super::reading::read_stream;
 use super::stream::{Difference, Header, KeptPart, Line, Stream};
 use crate::measure::GroupKey;
+use crate::shown::first_of;
 
 /// Why runs are not shards of one plan.
 #[derive(Debug, thiserror::Error)]
@@ -263,13 +264,7 @@ fn pairs(groups: &[GroupKey]) -> String {
             named.push(pair);
         }
     }
-    let more = named.len().saturating_sub(NAMED);
-    named.truncate(NAMED);
-    let named = named.join(", ");
-    match more {
-        0 => named,
-        more => format!("{named} and {more} more"),
-    }
+    first_of(&named, NAMED)
 }
 
 /// The header of the run that the shards are together.

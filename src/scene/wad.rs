@@ -7,6 +7,7 @@ use glam::{DVec2, DVec3};
 use super::{BspNode, BspRegions, CameraPlace, Labels, Regions, Scene, WorldBox};
 use crate::input::InputError;
 use crate::scene::regions::BspChild;
+use crate::shown::first_of;
 
 /// Height of a player's eyes above the floor, in map units.
 const EYE_HEIGHT: f64 = 41.0;
@@ -19,6 +20,8 @@ const LUMPS: [&str; 8] = [
 ];
 /// What a map may have besides.
 const MORE_LUMPS: [&str; 3] = ["REJECT", "BLOCKMAP", "BEHAVIOR"];
+/// Maps that a message names.
+const MOST_NAMED: usize = 8;
 
 /// One map of a WAD file, decoded and cross-checked.
 #[derive(Clone, Debug)]
@@ -41,13 +44,14 @@ pub struct Thing {
 }
 
 /// The bytes of one lump of a map (`SECTORS`, `REJECT`) as the file has them: of
-/// the named map, or of the first. `None` if the map has no such lump.
+/// the named map, or of the only one. `None` if the map has no such lump.
 ///
 /// Only the lump's place in the file is checked; [`WadMap::read`] checks that the
 /// lumps of a map fit each other.
 ///
 /// # Errors
-/// [`InputError::Byte`] for a file that is no WAD or has no such map.
+/// [`InputError::Byte`] for a file that is no WAD, has no such map, or several maps
+/// where none is named.
 pub fn map_lump<'a>(
     bytes: &'a [u8],
     file: &'a str,
@@ -66,18 +70,19 @@ pub fn map_lump<'a>(
 
 /// The names of the maps in a WAD file, in file order.
 pub fn map_names(bytes: &[u8], file: &str) -> Result<Vec<String>, InputError> {
-    Ok(Wad::open(bytes, file)?.map_names())
+    let wad = Wad::open(bytes, file)?;
+    Ok(wad.markers().map(|(name, _)| name.to_owned()).collect())
 }
 
 impl WadMap {
-    /// Decodes one map: the named one, or the first.
+    /// Decodes one map: the named one, or the only one.
     ///
     /// # Errors
     /// [`InputError::Byte`] with the offset of the first thing that is wrong.
     pub fn read(bytes: &[u8], file: &str, map: Option<&str>) -> Result<WadMap, InputError> {
         let wad = Wad::open(bytes, file)?;
         let (name, marker) = wad.marker(map)?;
-        wad.map(&name, marker)
+        wad.map(name, marker)
     }
 
     /// The map as a scene: linedefs first, then things, in lump order.
@@ -127,13 +132,6 @@ impl Thing {
 
     fn kind_name(&self) -> &'static str {
         if self.is_start() { "start" } else { "thing" }
-    }
-}
-
-fn or_none(names: &[String]) -> String {
-    match names {
-        [] => "none".to_owned(),
-        _ => names.join(", "),
     }
 }
 
@@ -190,29 +188,44 @@ impl<'a> Wad<'a> {
         Ok(wad)
     }
 
-    /// The name of the wanted map, or of the first, and the index of its marker.
-    fn marker(&self, map: Option<&str>) -> Result<(String, usize), InputError> {
-        let names = self.map_names();
-        let wanted = match map {
-            Some(name) => names.iter().find(|n| n.eq_ignore_ascii_case(name)),
-            None => names.first(),
+    /// The name of the wanted map, or of the only one, and the index of its marker.
+    fn marker(&self, map: Option<&str>) -> Result<(&str, usize), InputError> {
+        let is_wanted = |name: &str| map.is_none_or(|map| name.eq_ignore_ascii_case(map));
+        let wanted: Vec<(&str, usize)> =
+            self.markers().filter(|(name, _)| is_wanted(name)).collect();
+        let (found, expected) = match (&wanted[..], map) {
+            ([one], _) => return Ok(*one),
+            ([], None) => (
+                "no map".to_owned(),
+                "a map marker followed by THINGS".into(),
+            ),
+            ([], Some(map)) => (
+                format!("no map '{map}' among {}", self.listed()),
+                "one of the file's maps".into(),
+            ),
+            ([first, ..], None) => (
+                format!("{} maps, {}", wanted.len(), self.listed()),
+                format!("one of them by name, as in '{}#{}'", self.file, first.0),
+            ),
+            ([..], Some(map)) => (
+                format!("{} maps of the name '{map}'", wanted.len()),
+                "one".into(),
+            ),
         };
-        let Some(name) = wanted else {
-            let found = match map {
-                Some(name) => format!("no map '{name}' among {}", or_none(&names)),
-                None => "no map".to_owned(),
-            };
-            return Err(self.error(0, found, "a map marker followed by THINGS"));
-        };
-        let marker = self.lumps.iter().position(|l| &l.name == name);
-        Ok((name.clone(), marker.unwrap_or_default()))
+        Err(self.error(0, found, expected))
     }
 
-    /// The names of the maps, in file order.
-    fn map_names(&self) -> Vec<String> {
-        let pairs = self.lumps.windows(2);
-        let markers = pairs.filter(|pair| pair[1].name == LUMPS[0]);
-        markers.map(|pair| pair[0].name.clone()).collect()
+    /// The names of the maps and the indices of their markers, in file order.
+    fn markers(&self) -> impl Iterator<Item = (&str, usize)> {
+        let pairs = self.lumps.windows(2).zip(0..);
+        let markers = pairs.filter(|(pair, _)| pair[1].name == LUMPS[0]);
+        markers.map(|(pair, at)| (&pair[0].name[..], at))
+    }
+
+    /// The names of the maps for a message.
+    fn listed(&self) -> String {
+        let names: Vec<&str> = self.markers().map(|(name, _)| name).collect();
+        first_of(&names, MOST_NAMED)
     }
 
     fn header_int(&self, at: usize) -> Result<usize, InputError> {

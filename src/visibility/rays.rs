@@ -112,6 +112,26 @@ impl Rays {
         }
     }
 
+    /// Where in the image a point is, rounded, if it is in it: across and down, so that the
+    /// ray [`through`](Rays::through) there leads to it.
+    pub fn in_image(&self, point: DVec3) -> Option<[f64; 2]> {
+        let frame = &self.camera.frame;
+        let about = point - frame.eye;
+        let depth = match self.camera.lens {
+            Lens::Orthographic { .. } => 1.0,
+            _ => about.dot(frame.forward()),
+        };
+        let [left, right, bottom, top] = self.window;
+        let across = about.dot(frame.u()) / depth;
+        let up = about.dot(frame.v()) / depth;
+        let at = [
+            (across - left) / (right - left),
+            (up - top) / (bottom - top),
+        ];
+        let is_inside = depth > 0.0 && at.iter().all(|x| (0.0..=1.0).contains(x));
+        is_inside.then_some(at)
+    }
+
     /// The ray of a sample: the centre of a pixel, column from the left and row
     /// from the top.
     pub fn sample(&self, grid: SampleGrid, column: u32, row: u32) -> Ray {
@@ -135,6 +155,9 @@ mod tests {
         ] {
             let rays = Rays::of(&Camera { frame, lens }).unwrap();
             let corners = lens.corners(&frame).unwrap();
+            let [x, y] = rays.in_image(rays.through(0.3, 0.8).at(7.0)).unwrap();
+            assert!((x - 0.3).abs() < 1e-12 && (y - 0.8).abs() < 1e-12);
+            assert_eq!(rays.in_image(rays.through(1.1, 0.8).at(7.0)), None);
             for (i, (x, y)) in [(0.0, 1.0), (1.0, 1.0), (0.0, 0.0), (1.0, 0.0)]
                 .iter()
                 .enumerate()

@@ -1,12 +1,13 @@
 //! Generated extremes of the stages beside the object stage. Whatever a ray sees, exactly,
 //! must be handed on by what promises it: worlds full of contacts, far from the origin,
 //! by every kind of lens; gaps of a fraction of a pixel; faces that coincide or just miss
-//! each other; chains of portals.
+//! each other; chains of portals; triangles that are met between the samples.
 
 mod case;
 mod portals;
 mod slits;
 mod touching;
+mod triangles;
 mod worlds;
 
 use std::ops::Range;
@@ -14,7 +15,7 @@ use std::ops::Range;
 use glam::DVec3;
 
 use super::{Level, Row, Section, Status};
-use crate::camera::{Lens, PlaneOptions};
+use crate::camera::PlaneOptions;
 use crate::kernel::Kernel;
 use crate::query::ItemId;
 use crate::scene::{Scene, SeededRng, WorldBox};
@@ -25,6 +26,7 @@ use crate::visibility::truth::{RayIndex, visible_by_random_rays};
 use crate::visibility::{Rays, Solids};
 use case::StageCase;
 use portals::Chain;
+use triangles::{Lost, TriangleCase};
 use worlds::Kind;
 
 /// Random rays of a case.
@@ -45,6 +47,7 @@ pub struct Family {
 enum Draw {
     Occlusion(fn(&mut SeededRng) -> StageCase),
     Region(fn(&mut SeededRng) -> Chain),
+    Triangle(fn(&mut SeededRng) -> TriangleCase),
 }
 
 const fn occlusion(name: &'static str, draw: fn(&mut SeededRng) -> StageCase) -> Family {
@@ -57,8 +60,13 @@ const fn region(name: &'static str, draw: fn(&mut SeededRng) -> Chain) -> Family
     Family { name, draw }
 }
 
+const fn triangle(name: &'static str, draw: fn(&mut SeededRng) -> TriangleCase) -> Family {
+    let draw = Draw::Triangle(draw);
+    Family { name, draw }
+}
+
 /// All of them.
-pub const VISIBILITY_FAMILIES: [Family; 14] = [
+pub const VISIBILITY_FAMILIES: [Family; 21] = [
     occlusion("occlusion-contacts", |rng| {
         worlds::contacts(rng, 0.0, Kind::Perspective)
     }),
@@ -85,6 +93,25 @@ pub const VISIBILITY_FAMILIES: [Family; 14] = [
         let ahead = [1e-9, 0.0][rng.below(2)];
         portals::chain(rng, length, ahead)
     }),
+    triangle("triangle-contacts", |rng| {
+        worlds::contacts(rng, 0.0, Kind::Perspective).into()
+    }),
+    triangle("triangle-far-out", |rng| {
+        worlds::contacts(rng, 1e7, Kind::Perspective).into()
+    }),
+    triangle("triangle-parallel", |rng| {
+        worlds::contacts(rng, 0.0, Kind::Parallel).into()
+    }),
+    triangle("triangle-off-axis", |rng| {
+        worlds::contacts(rng, 0.0, Kind::OffAxis).into()
+    }),
+    triangle("triangle-eye-at-face", |rng| {
+        touching::eye_at_face(rng).into()
+    }),
+    triangle("triangle-near-plane", |rng| {
+        touching::near_plane(rng).into()
+    }),
+    triangle("triangle-mesh", triangles::mesh),
 ];
 
 /// Cases of a family, each asked by a kernel: a row for each case and back end. `stop` is
@@ -117,6 +144,12 @@ pub fn visibility_cases(
                 let chain = draw(&mut rng);
                 section.boxes += chain.len() as u64;
                 section.rows.extend(region_rows(&id, &chain, 0.0));
+            }
+            Draw::Triangle(draw) => {
+                let case = draw(&mut rng);
+                section.boxes += case.triangles() as u64;
+                let lost = case.lost(&mut rng, kernel);
+                section.rows.extend(triangle_rows(&id, &lost));
             }
         }
     }
@@ -212,7 +245,7 @@ fn seen(index: &RayIndex, rays: &Rays, case: &StageCase, rng: &mut SeededRng) ->
     let at_boxes =
         (0..RAYS_AT_BOXES).map(|_| point_of(&case.boxes[rng.below(case.boxes.len())], rng));
     for point in at_boxes.chain(case.aims.iter().copied()) {
-        if let Some([x, y]) = in_image(rays, point) {
+        if let Some([x, y]) = rays.in_image(point) {
             let front = index.front_of(&rays.through(x, y));
             seen.extend(front.into_iter().flat_map(|front| front.items));
         }
@@ -224,31 +257,16 @@ fn seen(index: &RayIndex, rays: &Rays, case: &StageCase, rng: &mut SeededRng) ->
 
 /// A point of a box, on each axis anywhere or next to an end.
 fn point_of(b: &WorldBox, rng: &mut SeededRng) -> DVec3 {
-    let mut along = || match rng.below(3) {
+    b.min + (b.max - b.min) * DVec3::new(along(rng), along(rng), along(rng))
+}
+
+/// A share of an edge: anywhere, or next to one of its ends.
+fn along(rng: &mut SeededRng) -> f64 {
+    match rng.below(3) {
         0 => rng.unit(),
         1 => rng.unit() * 1e-3,
         _ => 1.0 - rng.unit() * 1e-3,
-    };
-    b.min + (b.max - b.min) * DVec3::new(along(), along(), along())
-}
-
-/// Where in the image a point is, across and down, if it is in it.
-fn in_image(rays: &Rays, point: DVec3) -> Option<[f64; 2]> {
-    let camera = rays.camera();
-    let about = point - camera.frame.eye;
-    let depth = match camera.lens {
-        Lens::Orthographic { .. } => 1.0,
-        _ => about.dot(camera.frame.forward()),
-    };
-    let [left, right, bottom, top] = rays.window();
-    let across = about.dot(camera.frame.u()) / depth;
-    let up = about.dot(camera.frame.v()) / depth;
-    let at = [
-        (across - left) / (right - left),
-        (up - top) / (bottom - top),
-    ];
-    let is_inside = depth > 0.0 && at.iter().all(|x| (0.0..=1.0).contains(x));
-    is_inside.then_some(at)
+    }
 }
 
 /// Whether all that is seen was handed on, and nothing from outside of the view.
@@ -289,9 +307,25 @@ fn region_rows(id: &str, chain: &Chain, shrink: f64) -> Vec<Row> {
     rows.collect()
 }
 
+/// A row for each back end of the triangle stage that promises anything.
+fn triangle_rows<'l>(id: &'l str, lost: &'l [Lost]) -> impl Iterator<Item = Row> + 'l {
+    let promising = lost
+        .iter()
+        .filter_map(|lost| Some((lost.row, lost.against_promise()?)));
+    promising.map(move |(back_end, lost)| {
+        row(
+            id,
+            back_end.name,
+            "triangle",
+            nothing_lost("triangles", lost),
+        )
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::visibility::Guarantee;
     use crate::visibility::occlusion::{MaskedCentre, NoOcclusion, ZBuffer};
 
     /// Rows of a family that fail, and all of them.
@@ -305,6 +339,7 @@ mod tests {
                         occlusion_rows(family.name, &case, &mut rng, back_ends)
                     }
                     Draw::Region(draw) => region_rows(family.name, &draw(&mut rng), shrink),
+                    Draw::Triangle(_) => Vec::new(),
                 }
             })
             .collect();
@@ -347,9 +382,9 @@ mod tests {
         let keep_all = answers::<NoOcclusion>(kernel, "none");
         let mut unnoticed = Vec::new();
         for family in VISIBILITY_FAMILIES {
-            if let Draw::Region(_) = family.draw {
+            let Draw::Occlusion(_) = family.draw else {
                 continue;
-            }
+            };
             for back_ends in &unsafe_ones {
                 let [failed, all] = failing(family, back_ends, 0.0);
                 let found = format!("{}, {}: {failed} of {all}", family.name, back_ends[0].0);
@@ -377,6 +412,25 @@ mod tests {
                 assert!(failed > 0, "{}", family.name);
                 assert_eq!(failing(family, &[], 0.0)[0], 0, "{}", family.name);
             }
+        }
+    }
+
+    /// Triangles without a sample are not met at one, and are met between them.
+    #[test]
+    fn what_promises_the_samples_only_loses_what_is_between_them() {
+        for family in VISIBILITY_FAMILIES {
+            let Draw::Triangle(draw) = family.draw else {
+                continue;
+            };
+            let cases = (0..20).flat_map(|case| {
+                let mut rng = SeededRng::new(case);
+                draw(&mut rng).lost(&mut rng, Kernel::best())
+            });
+            let of_samples = cases.filter(|lost| lost.row.guarantee == Guarantee::SampleExact);
+            let counts = of_samples.map(|lost| [lost.anywhere.len(), lost.at_samples.len()]);
+            let sums = counts.fold([0, 0], |[a, b], [c, d]| [a + c, b + d]);
+            println!("{}: {sums:?}", family.name);
+            assert!(sums[0] > 0 && sums[1] == 0, "{}: {sums:?}", family.name);
         }
     }
 

@@ -43,6 +43,11 @@ pub struct Meeting {
 }
 
 impl Meeting {
+    /// The corners of the triangle, as it was given.
+    pub fn corners(&self) -> [Vec3; 3] {
+        self.corners
+    }
+
     /// No depth at which the ray meets it there is below this.
     pub fn at_least(&self) -> f64 {
         self.depth - self.error

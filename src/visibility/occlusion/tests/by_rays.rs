@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::super::{OccluderScene, View};
-use crate::camera::{Camera, Lens, PlaneOptions, Surroundings};
+use crate::camera::{Camera, PlaneOptions, Surroundings};
 use crate::geometry::ConvexVolume;
 use crate::query::ItemId;
 use crate::scene::{Scene, SeededRng, WorldBox};
@@ -94,11 +94,11 @@ pub fn seen_by_rays(
 ) -> Vec<ItemId> {
     let mut seen = Vec::new();
     for number in 0..count {
-        let (x, y) = match number % 2 {
-            0 => (rng.unit(), rng.unit()),
-            _ => aimed_at(rays, &boxes[rng.below(boxes.len())], rng),
+        let at = match number % 2 {
+            0 => Some([rng.unit(), rng.unit()]),
+            _ => rays.in_image(point_of(&boxes[rng.below(boxes.len())], rng)),
         };
-        if (0.0..=1.0).contains(&x) && (0.0..=1.0).contains(&y) {
+        if let Some([x, y]) = at {
             seen.extend(front(&rays.through(x, y), boxes));
         }
     }
@@ -107,27 +107,14 @@ pub fn seen_by_rays(
     seen
 }
 
-/// Where in the image a point of a box is, a little off its edges mostly.
-fn aimed_at(rays: &Rays, b: &WorldBox, rng: &mut SeededRng) -> (f64, f64) {
+/// A point of a box, a little off its edges mostly.
+fn point_of(b: &WorldBox, rng: &mut SeededRng) -> DVec3 {
     let mut along = || match rng.below(3) {
         0 => rng.unit(),
         1 => rng.unit() * 1e-3,
         _ => 1.0 - rng.unit() * 1e-3,
     };
-    let at = b.min + (b.max - b.min) * DVec3::new(along(), along(), along());
-    let camera = rays.camera();
-    let about = at - camera.frame.eye;
-    let depth = match camera.lens {
-        Lens::Orthographic { .. } => 1.0,
-        _ => about.dot(camera.frame.forward()),
-    };
-    let [left, right, bottom, top] = rays.window();
-    let (u, v) = (about.dot(camera.frame.u()), about.dot(camera.frame.v()));
-    let (x, y) = (
-        (u / depth - left) / (right - left),
-        (v / depth - top) / (bottom - top),
-    );
-    if depth > 0.0 { (x, y) } else { (-1.0, -1.0) }
+    b.min + (b.max - b.min) * DVec3::new(along(), along(), along())
 }
 
 /// Those of `seen` that are not in `kept`.

@@ -1,0 +1,178 @@
+//! The triangle stage: a triangle that a ray meets first must be left, wherever in the
+//! image the ray is, or at a sample if no more than the samples is promised.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use glam::{DVec3, Vec3};
+
+use super::case::{StageCase, looking};
+use super::{RAYS, along};
+use crate::camera::{Camera, Lens};
+use crate::kernel::Kernel;
+use crate::scene::{MESHES, Scene, SeededRng, Surfaces};
+use crate::visibility::triangle::{
+    Clusters, MOST_TRIANGLES, Selection, TRIANGLE_ROWS, TriangleRow, View,
+};
+use crate::visibility::truth::SurfaceIndex;
+use crate::visibility::{Guarantee, Ray, Rays, SampleGrid};
+
+/// Triangles of a mesh.
+const OF_MESH: usize = 1_500;
+
+/// What the back ends are asked.
+pub struct TriangleCase {
+    surfaces: Surfaces,
+    camera: Camera,
+    grid: SampleGrid,
+    /// Points that rays are sent through beside random ones.
+    aims: Vec<DVec3>,
+}
+
+/// Triangles that a back end removed though a ray meets them first, by their numbers.
+pub struct Lost {
+    /// The back end.
+    pub row: &'static TriangleRow,
+    /// Met anywhere in the image.
+    pub anywhere: Vec<u32>,
+    /// Met at a sample.
+    pub at_samples: Vec<u32>,
+}
+
+impl Lost {
+    /// Those that the back end promises to leave; `None` if it promises nothing.
+    pub fn against_promise(&self) -> Option<&[u32]> {
+        match self.row.guarantee {
+            Guarantee::Exact | Guarantee::Conservative => Some(&self.anywhere),
+            Guarantee::SampleExact => Some(&self.at_samples),
+            _ => None,
+        }
+    }
+}
+
+/// The twelve triangles of each box.
+impl From<StageCase> for TriangleCase {
+    fn from(case: StageCase) -> TriangleCase {
+        let scene = Scene::from_boxes("triangles", &case.boxes).expect("boxes of a scene");
+        TriangleCase {
+            surfaces: Surfaces::from_boxes(&scene),
+            camera: case.camera,
+            grid: case.grid,
+            aims: case.aims,
+        }
+    }
+}
+
+/// Any of the meshes, from anywhere in it or about it.
+pub fn mesh(rng: &mut SeededRng) -> TriangleCase {
+    let mesh = &MESHES[rng.below(MESHES.len())];
+    let surfaces = (mesh.build)(OF_MESH, rng.below(1000) as u64);
+    let scene = surfaces.clone().into_scene("mesh").expect("a mesh");
+    let bounds = scene.world_bounds();
+    let (centre, size) = ((bounds.min + bounds.max) / 2.0, bounds.max - bounds.min);
+    let mut point =
+        |scale| centre + (rng.point() - 0.5) * (size + size.max_element() * 0.1) * scale;
+    let (eye, look) = (point(1.4), point(0.8));
+    let near = size.max_element() * 1e-3;
+    let lens = Lens::perspective(60.0, 16.0 / 9.0, near, None).expect("a lens");
+    TriangleCase {
+        surfaces,
+        camera: looking(eye, look - eye, lens),
+        grid: SampleGrid::new(40, 25),
+        aims: Vec::new(),
+    }
+}
+
+impl TriangleCase {
+    /// How many there are.
+    pub fn triangles(&self) -> usize {
+        self.surfaces.triangles.len()
+    }
+
+    /// What every back end loses, by rays anywhere, most of them at triangles, and by rays of
+    /// samples.
+    pub fn lost(self, rng: &mut SeededRng, kernel: Kernel) -> Vec<Lost> {
+        let rays = Rays::of(&self.camera).expect("a camera with a lens");
+        let aimed: Vec<DVec3> = (0..RAYS).map(|_| self.point(rng)).collect();
+        let aims = aimed.iter().chain(&self.aims);
+        let aims = aims.filter_map(|&point| rays.in_image(point));
+        let random = (0..RAYS).map(|_| [rng.unit(), rng.unit()]);
+        let anywhere: Vec<[f64; 2]> = aims.chain(random).collect();
+        let anywhere = anywhere.iter().map(|&[x, y]| rays.through(x, y));
+        let SampleGrid { width, height } = self.grid;
+        let samples = (0..RAYS).map(|_| [width, height].map(|n| rng.below(n as usize) as u32));
+        let samples: Vec<[u32; 2]> = samples.collect();
+        let samples = samples.iter().map(|&[x, y]| rays.sample(self.grid, x, y));
+
+        let clusters = Arc::new(Clusters::of(Arc::new(self.surfaces), MOST_TRIANGLES));
+        let origin = clusters.surfaces.origin;
+        let view = View::of(&self.camera, origin, self.grid).expect("a camera with a lens");
+        let met = Met::new(&clusters);
+        let (anywhere, at_samples) = (met.first(anywhere), met.first(samples));
+        let all = Selection::all(&clusters);
+        let lost = TRIANGLE_ROWS.iter().map(|row| {
+            let mut kept = all.clone();
+            (row.build)(&clusters).cull(&view, kernel, &mut kept);
+            let missing = |met: &[(usize, u64)]| {
+                let lost = met.iter().map(|&(c, bits)| (c, bits & !kept.words()[c]));
+                let lost = lost.flat_map(|(c, bits)| {
+                    let own = clusters.triangles_of(c).iter().enumerate();
+                    own.filter_map(move |(i, &t)| (bits >> i & 1 == 1).then_some(t))
+                });
+                let mut lost: Vec<u32> = lost.collect();
+                lost.sort_unstable();
+                lost.dedup();
+                lost
+            };
+            Lost {
+                row,
+                anywhere: missing(&anywhere),
+                at_samples: missing(&at_samples),
+            }
+        });
+        lost.collect()
+    }
+
+    /// A point of a triangle, next to an edge or a corner mostly.
+    fn point(&self, rng: &mut SeededRng) -> DVec3 {
+        let triangle = rng.below(self.triangles()) as u32;
+        let [a, b, c] = self.surfaces.corners(triangle).map(Vec3::as_dvec3);
+        let (s, t) = (along(rng), along(rng));
+        self.surfaces.origin + a + ((b - a) + (c - b) * t) * s
+    }
+}
+
+/// Every triangle by its corners.
+struct Met {
+    index: SurfaceIndex,
+    /// Clusters and bits of the triangles with these corners.
+    places: HashMap<[[u32; 3]; 3], Vec<(usize, u64)>>,
+}
+
+/// Corners by which triangles are told apart.
+fn key(corners: [Vec3; 3]) -> [[u32; 3]; 3] {
+    corners.map(|corner| corner.to_array().map(f32::to_bits))
+}
+
+impl Met {
+    fn new(clusters: &Clusters) -> Met {
+        let mut places: HashMap<_, Vec<_>> = HashMap::new();
+        for cluster in 0..clusters.len() {
+            for (i, corners) in clusters.corners_of(cluster).enumerate() {
+                let place = (cluster, 1 << i);
+                places.entry(key(corners)).or_default().push(place);
+            }
+        }
+        Met {
+            index: SurfaceIndex::build(&clusters.surfaces),
+            places,
+        }
+    }
+
+    /// Clusters and bits of what is met first by some ray.
+    fn first(&self, rays: impl Iterator<Item = Ray>) -> Vec<(usize, u64)> {
+        let meetings = rays.filter_map(|ray| self.index.front_of(&ray).meeting);
+        let places = meetings.flat_map(|meeting| &self.places[&key(meeting.corners())]);
+        places.copied().collect()
+    }
+}
