@@ -53,6 +53,12 @@ pub fn field(text: &str) -> Cow<'_, str> {
     }
 }
 
+/// The same of a text that is shown: without what a terminal would obey. Line breaks
+/// stay, for CSV has them within quotes.
+pub fn shown_field(text: &str) -> String {
+    field(&lines(text)).into_owned()
+}
+
 /// The text of a field that [`field`] may have marked.
 pub fn from_field(field: &str) -> &str {
     let marked = field.strip_prefix('\'');
@@ -161,6 +167,12 @@ mod tests {
             assert_eq!(field(text), text);
             assert_eq!(from_field(text), text);
         }
+    }
+
+    #[test]
+    fn a_shown_field_steers_no_terminal_and_no_spreadsheet() {
+        assert_eq!(shown_field("\u{1b}[2J\na"), "\\u{1b}[2J\na");
+        assert_eq!(shown_field("\t=1"), "' =1");
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use super::document::{Block, Rows};
 use super::text;
 use crate::funnel::{FunnelReport, Gain, InnerRow, ProofCounts, SeenFrom, StageRow, Times};
-use crate::shown::field;
+use crate::shown::shown_field;
 use crate::visibility::Guarantee;
 use crate::visibility::occlusion::OccluderChoice;
 
@@ -346,10 +346,10 @@ pub fn csv(report: &FunnelReport, out: impl Write) -> io::Result<()> {
         let name = row.structure.as_deref().unwrap_or(row.back_end.name);
         let optional = |value: Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
         let mut record = vec![
-            field(&report.scene).into_owned(),
-            field(&report.path).into_owned(),
+            shown_field(&report.scene),
+            shown_field(&report.path),
             row.back_end.stage.name().to_owned(),
-            field(name).into_owned(),
+            shown_field(name),
             row.back_end.guarantee.name().to_owned(),
             row.is_chosen.to_string(),
             row.unit.to_owned(),

@@ -53,7 +53,8 @@ const FAR: f64 = 1000.0;
 ///
 /// # Errors
 /// The line of the first value that is no number or makes no camera; a file
-/// without cameras; matrices without a convention, or beside an eye or a lens.
+/// without cameras; matrices without a convention, or beside an eye or a lens; both a place to look at and a
+/// direction.
 pub fn read_cameras_csv(
     input: impl Read,
     file: &str,
@@ -135,7 +136,15 @@ fn eyes(
     defaults: &LensDefaults,
 ) -> Result<Vec<Camera>, InputError> {
     let eye = table.columns(&["eye_x", "eye_y", "eye_z"])?;
-    let by_forward = table.column("forward_x").is_some() && table.column("look_x").is_none();
+    let has = |name: &str| ["_x", "_y", "_z"].map(|axis| table.column(&format!("{name}{axis}")));
+    let [looks, forwards] = ["look", "forward"].map(|name| has(name).iter().any(Option::is_some));
+    if looks && forwards {
+        return Err(table.error(
+            "columns look_* and forward_*".to_owned(),
+            "a place to look at or a direction, not both".to_owned(),
+        ));
+    }
+    let by_forward = forwards;
     let target = if by_forward {
         table.columns(&["forward_x", "forward_y", "forward_z"])?
     } else {
@@ -271,6 +280,10 @@ mod tests {
         assert!(read("").unwrap_err().to_string().contains("an empty file"));
         let none = read(&format!("{header}\n")).unwrap_err().to_string();
         assert!(none.contains("no camera"), "{none}");
+        let both = read(&format!("{header},forward_z\n{good},1\n"));
+        let wanted = "c.csv, line 1: columns look_* and forward_*; expected a place to look at or a \
+                      direction, not both";
+        assert_eq!(both.unwrap_err().to_string(), wanted);
         let wrong = read("x,y,z\n1,2,3\n").unwrap_err().to_string();
         assert!(wrong.contains("no column 'eye_x'"), "{wrong}");
     }

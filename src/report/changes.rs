@@ -93,7 +93,8 @@ fn as_a_whole(pair: Pair) -> Option<JudgedRow> {
 fn answered_otherwise((old, new): Pair) -> Option<String> {
     let counts = old.value("visible_count").zip(new.value("visible_count"));
     let (was, is) = counts.filter(|(was, is)| was != is)?;
-    Some(format!("visible_count {was} and {is}"))
+    // As many digits as tell them apart; of more than a count has, an exponent.
+    Some(format!("visible_count {was:?} and {is:?}"))
 }
 
 /// ln(time) in each process, old and new.

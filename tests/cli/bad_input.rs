@@ -149,7 +149,7 @@ fn a_scene_file_that_is_none_is_refused_by_every_command() {
 #[test]
 fn a_scene_spec_that_is_none_is_refused_by_every_command() {
     let cases: [(&str, &str); 17] = [
-        ("city:n=200%", "n=200% | a whole number from 0"),
+        ("city:n=200%", "n is '200%' | a whole number from 0"),
         (
             "unifrom",
             "unknown scene 'unifrom' | did you mean 'uniform'",
@@ -157,7 +157,7 @@ fn a_scene_spec_that_is_none_is_refused_by_every_command() {
         ("helsinky", "did you mean 'helsinki'"),
         ("''", "unknown scene '' | uniform | helsinki"),
         ("city:n", "city:n | 'n' | key=value"),
-        ("city:n=many", "n=many | a whole number from 0"),
+        ("city:n=many", "n is 'many' | a whole number from 0"),
         ("city:n=-1", "n=-1"),
         ("city:n=1.5", "n=1.5"),
         ("city:n=1e30", "n=1e30"),
@@ -238,7 +238,10 @@ fn cameras_that_are_none_are_refused_with_line_and_rule() {
             "visible=200% | a share between 0 and 1",
         ),
         ("orbit:visible=-5%", "visible=-5% | a share between 0 and 1"),
-        ("orbit:frames=200%", "frames=200% | a whole number"),
+        (
+            "orbit:frames=200%",
+            "frames is '200%' | a whole number from 1 to",
+        ),
         ("orbit:far=-1", "far is -1 | expected a number above 0"),
         ("orbit:far=0", "far is 0 | expected a number above 0"),
         ("orbit:far=5e-324", "far is 5e-324 | expected"),
@@ -248,7 +251,10 @@ fn cameras_that_are_none_are_refused_with_line_and_rule() {
         ("folder.csv", "folder.csv: Is a directory"),
         ("orbt", "unknown path 'orbt' | did you mean 'orbit'"),
         ("''", "unknown path '' | orbit"),
-        ("orbit:frames=few", "frames=few | a whole number"),
+        (
+            "orbit:frames=few",
+            "frames is 'few' | a whole number from 1 to",
+        ),
         ("orbit:frame=3", "did you mean 'frames'"),
         ("orbit:fovy=0", "camera 0 | 0 degrees | expected"),
         ("orbit:fovy=180", "180 degrees"),
@@ -326,12 +332,12 @@ fn options_that_name_nothing_are_refused_with_the_nearest_name() {
         ("--structure all,linear", "'linear' | twice"),
         ("--structure bvh:leaf=many", "leaf | many"),
         ("--structure bvh:leaf=0", "leaf=0 | expected 1 to"),
-        ("--structure bvh:leave=4", "`leave` | `leaf`"),
+        ("--structure bvh:leave=4", "'leave' | 'leaf'"),
         (
             "--structure bvh:layout=cwbvh",
-            "`layout` | `preset` or `leaf`",
+            "'layout' | 'preset' or 'leaf'",
         ),
-        ("--structure linear:leaf=4", "linear | `leaf`"),
+        ("--structure linear:leaf=4", "linear | 'leaf'"),
         (
             "--test six-plain",
             "unknown test 'six-plain' | did you mean 'six-plane'",
@@ -390,7 +396,63 @@ fn usage_errors_are_one_line_that_says_what_was_expected() {
         ("run --sead 3", "'--sead' | did you mean '--seed'"),
         (
             "run --seed x --out new",
-            "'x' for '--seed <SEED>'; expected a whole number",
+            "--seed is 'x'; expected a whole number from 0",
+        ),
+        (
+            "run --seed -1 --out new",
+            "--seed is '-1'; expected a whole number from 0",
+        ),
+        (
+            "run --processes 0 --out new",
+            "--processes is '0'; expected a whole number from 1 to 1000",
+        ),
+        (
+            "run --timeout -3 --out new",
+            "--timeout is '-3'; expected a whole number from 1",
+        ),
+        (
+            "verify --cases -1",
+            "--cases is '-1'; expected a whole number from 0",
+        ),
+        (
+            "precision --scene scene.csv --frames 0",
+            "--frames is '0'; expected a whole number from 1",
+        ),
+        (
+            "query --scene scene.csv --cameras orbit --threads 0",
+            "--threads is '0'; expected a whole number from 1 to 256",
+        ),
+        (
+            "query --scene scene.csv --cameras orbit --fovy nan",
+            "--fovy is 'nan'; expected a number above 0 and below 180",
+        ),
+        (
+            "query --scene scene.csv --cameras orbit --near=-4",
+            "--near is '-4'; expected a number above 0",
+        ),
+        (
+            "query --scene scene.csv --cameras orbit --near 9 --far 3",
+            "--near is 9 and --far 3; expected near < far",
+        ),
+        (
+            "query --scene scene.csv --cameras orbit --epsilon 1e300",
+            "--epsilon is '1e300'; expected a number from 0 to 1e9",
+        ),
+        (
+            "query --scene scene.csv --cameras orbit:frames=0",
+            "in 'orbit': frames is '0'; expected a whole number from 1 to 1000000",
+        ),
+        (
+            "funnel --scene city:n=9 --triangle x --region portals",
+            "--region is 'portals'; expected none | 'city:n=9' has nothing for that stage",
+        ),
+        (
+            "compare a.json b.json --seed 3 --test sphere",
+            "--seed says what --against BINARY measures | expected no --seed",
+        ),
+        (
+            "compare --against scene.csv --metric build_ms",
+            "'--metric <LIST>' cannot be used with '--against <BINARY>' | expected",
         ),
         (
             "advise --scene scene.csv --path orbit --draw-ns x",
@@ -443,7 +505,11 @@ fn places_that_cannot_be_written_to_are_named_and_stay_as_they_are() {
             "kept.csv/x.csv",
             "kept.csv/x.csv: Not a directory",
         ),
-        (run, "kept.csv", "kept.csv: File exists"),
+        (
+            run,
+            "kept.csv",
+            "kept.csv: not a folder; expected a folder for --out",
+        ),
         (run, "kept.csv/run", "kept.csv/run: Not a directory"),
     ];
     for (command, out, wanted) in cases {
@@ -456,6 +522,11 @@ fn places_that_cannot_be_written_to_are_named_and_stay_as_they_are() {
     all_refused(&folder, &[mine], "mine | expected an empty or new folder");
     let resume = format!("{run} nowhere --resume");
     all_refused(&folder, &[resume], "nowhere/stream.jsonl: No such file");
+    let wanted = "no unfinished run in results; expected one | --out DIR";
+    all_refused(&folder, &["run --resume"], wanted);
+    let cache = "funnel --scene scene.csv --truth-cache kept.csv";
+    let wanted = "kept.csv: not a folder; expected a folder for --truth-cache";
+    all_refused(&folder, &[cache], wanted);
 }
 
 #[test]
