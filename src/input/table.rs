@@ -154,6 +154,11 @@ impl Row<'_> {
         })
     }
 
+    /// Its line in the file, from 1.
+    pub fn line(&self) -> u64 {
+        self.line
+    }
+
     /// An error at this row.
     pub fn error(&self, found: String, expected: String) -> InputError {
         InputError::Line {

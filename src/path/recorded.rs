@@ -62,11 +62,13 @@ pub fn read_cameras_csv(
 ) -> Result<CameraPath, PathError> {
     let table = TableReader::open(input, file)?;
     let is_matrix = MATRIX_ENTRIES.iter().any(|m| table.column(m).is_some());
-    let cameras = if is_matrix {
+    let (lines, cameras): (Vec<u64>, Vec<Camera>) = if is_matrix {
         matrices(table, defaults.matrix)?
     } else {
         eyes(table, defaults)?
-    };
+    }
+    .into_iter()
+    .unzip();
     if cameras.is_empty() {
         return Err(without_rows(file, "no camera").into());
     }
@@ -74,6 +76,7 @@ pub fn read_cameras_csv(
         lens_scale: None,
         name: file.to_owned(),
         cameras,
+        lines,
     })
 }
 
@@ -102,7 +105,7 @@ const OF_EYES: &str = "eye_x eye_y eye_z look_x look_y look_z forward_x forward_
 fn matrices(
     mut table: TableReader<impl Read>,
     convention: Option<MatrixConvention>,
-) -> Result<Vec<Camera>, InputError> {
+) -> Result<Vec<(u64, Camera)>, InputError> {
     let columns = table.columns(&MATRIX_ENTRIES)?;
     let mut of_eyes = OF_EYES.split(' ');
     if let Some(other) = of_eyes.find(|name| table.column(name).is_some()) {
@@ -126,7 +129,8 @@ fn matrices(
             *entry = row.finite_number(column)?;
         }
         let camera = Camera::of_matrix(entries, convention);
-        cameras.push(camera.map_err(|error| refused(&row, &error))?);
+        let camera = camera.map_err(|error| refused(&row, &error))?;
+        cameras.push((row.line(), camera));
     }
     Ok(cameras)
 }
@@ -134,7 +138,7 @@ fn matrices(
 fn eyes(
     mut table: TableReader<impl Read>,
     defaults: &LensDefaults,
-) -> Result<Vec<Camera>, InputError> {
+) -> Result<Vec<(u64, Camera)>, InputError> {
     let eye = table.columns(&["eye_x", "eye_y", "eye_z"])?;
     let has = |name: &str| ["_x", "_y", "_z"].map(|axis| table.column(&format!("{name}{axis}")));
     let [looks, forwards] = ["look", "forward"].map(|name| has(name).iter().any(Option::is_some));
@@ -192,7 +196,8 @@ fn eyes(
                 lens: Lens::perspective(fovy, aspect, near, far)?,
             })
         };
-        cameras.push(camera().map_err(|error| refused(&row, &error))?);
+        let camera = camera().map_err(|error| refused(&row, &error))?;
+        cameras.push((row.line(), camera));
     }
     Ok(cameras)
 }

@@ -54,6 +54,16 @@ pub enum FolderError {
         /// Folder of the run.
         path: PathBuf,
     },
+    /// A cell that a report has twice.
+    #[error("{}, cells[{index}]: {cell} a second time; expected each cell once", path.display())]
+    Repeated {
+        /// File that was read.
+        path: PathBuf,
+        /// Place among the cells.
+        index: usize,
+        /// Structure, scene and path.
+        cell: String,
+    },
     /// A line of the stream that does not belong there.
     #[error("{}, line {line}: {found}; expected {expected}", path.display())]
     Line {

@@ -12,7 +12,7 @@ use super::files::{FolderError, REPORT, STREAM};
 use super::stream::{Header, KeptPart, Stream};
 use super::{Report, SCHEMA_VERSION};
 use crate::json::{JsonError, from_json};
-use crate::measure::{GroupKey, Part};
+use crate::measure::{CellKey, GroupKey, Part};
 use crate::shown::plain;
 
 /// Reads a report from its file, or from the folder of a run, finished or not.
@@ -54,7 +54,23 @@ fn read_json(path: PathBuf) -> Result<Report, FolderError> {
             found: schema_version,
         });
     }
-    from_json(&bytes).map_err(bad)
+    let report: Report = from_json(&bytes).map_err(bad)?;
+    // Judged twice, a cell would be two.
+    let mut seen = BTreeSet::new();
+    for (index, cell) in report.cells.iter().enumerate() {
+        let CellKey { group, structure } = cell.key();
+        if !seen.insert(format!("{structure:?} {group:?}")) {
+            let GroupKey {
+                scene,
+                path: along,
+                test,
+                ..
+            } = group;
+            let cell = format!("{structure} on {scene}, {along}, {test}");
+            return Err(FolderError::Repeated { path, index, cell });
+        }
+    }
+    Ok(report)
 }
 
 /// Reads the stream of a run, and how long it is without half a line at its end.

@@ -4,7 +4,7 @@
 use std::fs;
 
 use super::process::*;
-use super::{BOXES, FULL_CAMERA};
+use super::{BOXES, EYE_LOOK, FULL_CAMERA};
 
 /// Every command that reads a scene.
 fn commands_with_scene(scene: &str) -> [String; 10] {
@@ -158,15 +158,15 @@ fn a_scene_spec_that_is_none_is_refused_by_every_command() {
         ("''", "unknown scene '' | uniform | helsinki"),
         ("city:n", "city:n | 'n' | key=value"),
         ("city:n=many", "n is 'many' | a whole number from 0"),
-        ("city:n=-1", "n=-1"),
-        ("city:n=1.5", "n=1.5"),
-        ("city:n=1e30", "n=1e30"),
+        ("city:n=-1", "n is '-1'"),
+        ("city:n=1.5", "n is '1.5'"),
+        ("city:n=1e30", "n is '1e30'"),
         ("city:n=1,n=2", "'n' is given twice"),
         ("city:sed=3", "unknown parameter | did you mean 'seed'"),
-        ("uniform:n=9,side=0", "side=0 | a number above 0"),
-        ("uniform:n=9,side=nan", "side=nan | a number"),
+        ("uniform:n=9,side=0", "side is '0' | a number above 0"),
+        ("uniform:n=9,side=nan", "side is 'nan' | a number"),
         ("uniform:n=9,offset=1e300,size=1e300", "f32"),
-        ("rooms:n=9,room=1e-300", "room=1e-300 | between"),
+        ("rooms:n=9,room=1e-300", "room is '1e-300' | between"),
         ("helsinki:n=5", "unknown parameter | 'n'"),
         ("two\nlines", "unknown scene 'two lines'"),
     ];
@@ -202,7 +202,7 @@ fn cameras_that_are_none_are_refused_with_line_and_rule() {
         all_refused(&folder, &commands_with_cameras("bad.csv"), &wanted);
     }
     let wad = map12();
-    let files: [(&[u8], &str); 10] = [
+    let files: [(&[u8], &str); 12] = [
         (b"", "line 1 | empty file"),
         (b"\n\n\n", "empty file"),
         (FULL_CAMERA.as_bytes(), "line 2 | no camera"),
@@ -224,6 +224,11 @@ fn cameras_that_are_none_are_refused_with_line_and_rule() {
             b"eye_x,eye_y,eye_z,\"a\nb\",\"a\nb\"\n",
             "line 1 | column 'a b' twice",
         ),
+        (
+            b"eye_x,eye_y,eye_z,look_x,look_y,look_z,forward_x\n0,0,0,1,0,0,1\n",
+            "line 1 | look_* and forward_* | not both",
+        ),
+        (b",,,\n,,,\n", "line 1 | 4 columns without a name"),
         (&wad, "line 1"),
     ];
     for (bytes, wanted) in files {
@@ -349,8 +354,8 @@ fn options_that_name_nothing_are_refused_with_the_nearest_name() {
         ("--epsilon -1", "--epsilon is '-1'; expected"),
         ("--epsilon nan", "--epsilon is 'nan'; expected"),
         ("--far away", "--far is 'away' | expected"),
-        ("--fovy 0", "0 degrees | 0 < fov < 180"),
-        ("--near 0", "near is 0 | expected"),
+        ("--fovy 0", "--fovy is '0' | above 0 and below 180"),
+        ("--near 0", "--near is '0' | expected"),
         ("--near 7 --far 7", "expected near < far"),
     ];
     let folder = with_good_files(&[]);
@@ -448,7 +453,7 @@ fn usage_errors_are_one_line_that_says_what_was_expected() {
         ),
         (
             "compare a.json b.json --seed 3 --test sphere",
-            "--seed says what --against BINARY measures | expected no --seed",
+            "--test says what --against BINARY measures | expected no --test",
         ),
         (
             "compare --against scene.csv --metric build_ms",
@@ -527,6 +532,23 @@ fn places_that_cannot_be_written_to_are_named_and_stay_as_they_are() {
     let cache = "funnel --scene scene.csv --truth-cache kept.csv";
     let wanted = "kept.csv: not a folder; expected a folder for --truth-cache";
     all_refused(&folder, &[cache], wanted);
+}
+
+/// A row may be a camera whose planes do not fit f32.
+#[test]
+fn a_camera_too_far_away_is_named_by_its_line() {
+    let far = format!("{EYE_LOOK}\n\n0,0,0,1,0,0\n1e300,0,0,0,1,0\n");
+    let folder = with_good_files(&[("far.csv", far.as_bytes())]);
+    let lines = [
+        "query --scene scene.csv --cameras far.csv",
+        "run --scene scene.csv --path far.csv --out new",
+        "funnel --scene scene.csv --path far.csv",
+    ];
+    all_refused(
+        &folder,
+        &lines,
+        "far.csv, line 4: | does not fit f32 | expected",
+    );
 }
 
 #[test]
