@@ -113,7 +113,9 @@ impl Spec {
             };
             let (key, value) = (key.trim().to_owned(), value.trim().to_owned());
             if given.insert(key.clone(), value).is_some() {
-                return Err(SpecError(format!("in '{text}': '{key}' is given twice")));
+                return Err(SpecError(format!(
+                    "in '{text}': '{key}' is given twice; expected it once"
+                )));
             }
         }
         Ok(Spec {

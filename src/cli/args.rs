@@ -165,7 +165,7 @@ pub struct RunArgs {
     #[arg(long, value_name = "N", value_parser = values::whole(1..=1000u32), allow_negative_numbers = true)]
     pub processes: Option<u32>,
     /// Print the cells as JSON lines instead of measuring them
-    #[arg(long)]
+    #[arg(long, conflicts_with = "resume")]
     pub plan: bool,
     /// Measure share i of n of the plan only; `merge` joins the reports
     #[arg(long, value_name = "i/n")]

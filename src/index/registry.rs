@@ -259,7 +259,7 @@ impl Registry {
             for spec in more {
                 if chosen.iter().any(|c| c.label == spec.label) {
                     return Err(SpecError::new(format_args!(
-                        "structure '{}' is named twice",
+                        "structure '{}' is named twice; expected each once",
                         spec.label
                     )));
                 }

@@ -1,6 +1,5 @@
 //! The files of a run's folder, and what can be wrong with them.
 
-use std::error::Error;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -30,7 +29,7 @@ pub enum FolderError {
         /// File that was read.
         path: PathBuf,
         /// Where, and what is there.
-        error: JsonError,
+        error: Box<JsonError>,
         /// What the file should be.
         whole: &'static str,
     },
@@ -53,16 +52,6 @@ pub enum FolderError {
     Locked {
         /// Folder of the run.
         path: PathBuf,
-    },
-    /// A cell that a report has twice.
-    #[error("{}, cells[{index}]: {cell} a second time; expected each cell once", path.display())]
-    Repeated {
-        /// File that was read.
-        path: PathBuf,
-        /// Place among the cells.
-        index: usize,
-        /// Structure, scene and path.
-        cell: String,
     },
     /// A line of the stream that does not belong there.
     #[error("{}, line {line}: {found}; expected {expected}", path.display())]
@@ -90,7 +79,9 @@ impl FolderError {
 
 /// What the system says, without the name of a temporary file that was wrapped around it.
 pub fn bare(error: io::Error) -> io::Error {
-    let inner = error.get_ref().and_then(Error::source);
-    let code = inner.and_then(|inner| inner.downcast_ref::<io::Error>()?.raw_os_error());
-    code.map_or(error, io::Error::from_raw_os_error)
+    // `tempfile` wraps it so, and hands on no more of it than its kind and text.
+    match error.to_string().split_once(" at path \"") {
+        Some((said, _)) if error.get_ref().is_some() => io::Error::new(error.kind(), said),
+        _ => error,
+    }
 }

@@ -475,6 +475,20 @@ mod tests {
         assert!(!error.to_string().contains(".cullbench-"), "{error}");
     }
 
+    #[test]
+    fn nobody_is_told_of_temporary_files() {
+        let error = temporary_in(Path::new("no/such")).unwrap_err();
+        assert!(
+            error.to_string().contains(TEMPORARY.0),
+            "the premise: {error}"
+        );
+        let told = FolderError::io(Path::new("no/such"))(error).to_string();
+        assert!(
+            told.starts_with("no/such: ") && !told.contains(TEMPORARY.0),
+            "{told}"
+        );
+    }
+
     #[cfg(unix)]
     #[test]
     fn links_and_permissions_stay() {

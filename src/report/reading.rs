@@ -12,7 +12,7 @@ use super::files::{FolderError, REPORT, STREAM};
 use super::stream::{Header, KeptPart, Stream};
 use super::{Report, SCHEMA_VERSION};
 use crate::json::{JsonError, from_json};
-use crate::measure::{CellKey, GroupKey, Part};
+use crate::measure::{GroupKey, Part};
 use crate::shown::plain;
 
 /// Reads a report from its file, or from the folder of a run, finished or not.
@@ -44,7 +44,7 @@ fn read_json(path: PathBuf) -> Result<Report, FolderError> {
     let bytes = fs::read(&path).map_err(FolderError::io(&path))?;
     let bad = |error| FolderError::Json {
         path: path.clone(),
-        error,
+        error: Box::new(error),
         whole: "the report of a run",
     };
     let Versioned { schema_version } = from_json(&bytes).map_err(bad)?;
@@ -54,23 +54,7 @@ fn read_json(path: PathBuf) -> Result<Report, FolderError> {
             found: schema_version,
         });
     }
-    let report: Report = from_json(&bytes).map_err(bad)?;
-    // Judged twice, a cell would be two.
-    let mut seen = BTreeSet::new();
-    for (index, cell) in report.cells.iter().enumerate() {
-        let CellKey { group, structure } = cell.key();
-        if !seen.insert(format!("{structure:?} {group:?}")) {
-            let GroupKey {
-                scene,
-                path: along,
-                test,
-                ..
-            } = group;
-            let cell = format!("{structure} on {scene}, {along}, {test}");
-            return Err(FolderError::Repeated { path, index, cell });
-        }
-    }
-    Ok(report)
+    from_json(&bytes).map_err(bad)
 }
 
 /// Reads the stream of a run, and how long it is without half a line at its end.
@@ -99,10 +83,10 @@ pub fn read_stream(path: &Path) -> Result<(Stream, u64), FolderError> {
         }
         let no_json = |error| FolderError::Json {
             path: path.to_owned(),
-            error: JsonError {
+            error: Box::new(JsonError {
                 line: n + 1,
                 ..error
-            },
+            }),
             whole: "the stream of a run",
         };
         let bad = |found: String, expected| FolderError::Line {

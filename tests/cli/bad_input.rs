@@ -161,7 +161,7 @@ fn a_scene_spec_that_is_none_is_refused_by_every_command() {
         ("city:n=-1", "n is '-1'"),
         ("city:n=1.5", "n is '1.5'"),
         ("city:n=1e30", "n is '1e30'"),
-        ("city:n=1,n=2", "'n' is given twice"),
+        ("city:n=1,n=2", "'n' is given twice; expected it once"),
         ("city:sed=3", "unknown parameter | did you mean 'seed'"),
         ("uniform:n=9,side=0", "side is '0' | a number above 0"),
         ("uniform:n=9,side=nan", "side is 'nan' | a number"),
@@ -385,7 +385,11 @@ fn options_that_name_nothing_are_refused_with_the_nearest_name() {
         "nothing to verify | expected",
     );
     let twice = "run --out new --path orbit --scene scene.csv --scene scene.csv";
-    all_refused(&folder, &[twice], "scene 'scene.csv' is named twice");
+    all_refused(
+        &folder,
+        &[twice],
+        "scene 'scene.csv' is named twice; expected each once",
+    );
 }
 
 #[test]
@@ -402,6 +406,10 @@ fn usage_errors_are_one_line_that_says_what_was_expected() {
         (
             "run --seed x --out new",
             "--seed is 'x'; expected a whole number from 0",
+        ),
+        (
+            "run --plan --resume",
+            "'--plan' cannot be used with '--resume' | expected",
         ),
         (
             "run --seed -1 --out new",
@@ -457,7 +465,7 @@ fn usage_errors_are_one_line_that_says_what_was_expected() {
         ),
         (
             "compare --against scene.csv --metric build_ms",
-            "'--metric <LIST>' cannot be used with '--against <BINARY>' | expected",
+            "'--metric <LIST>' | cannot be used with | '--against <BINARY>' | expected",
         ),
         (
             "advise --scene scene.csv --path orbit --draw-ns x",
