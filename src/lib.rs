@@ -85,6 +85,7 @@ pub mod funnel;
 pub mod geometry;
 pub mod index;
 pub mod input;
+pub mod json;
 pub mod kernel;
 pub mod measure;
 pub mod oracle;

@@ -53,6 +53,12 @@ pub fn field(text: &str) -> Cow<'_, str> {
     }
 }
 
+/// The same of a text that is shown: without what a terminal would obey. Line breaks
+/// stay, for CSV has them within quotes.
+pub fn shown_field(text: &str) -> String {
+    field(&lines(text)).into_owned()
+}
+
 /// The text of a field that [`field`] may have marked.
 pub fn from_field(field: &str) -> &str {
     let marked = field.strip_prefix('\'');
@@ -76,6 +82,14 @@ pub fn count(value: usize) -> String {
         grouped.push(digit);
     }
     grouped
+}
+
+/// All digits of a number, with an exponent where it has more than a count can have.
+pub fn number(value: f64) -> String {
+    match value.abs() < 1e15 {
+        true => value.to_string(),
+        false => format!("{value:e}"),
+    }
 }
 
 /// "1 cell", "1,234 cells", "no queries".
@@ -177,6 +191,18 @@ mod tests {
             assert_eq!(field(text), text);
             assert_eq!(from_field(text), text);
         }
+    }
+
+    #[test]
+    fn a_shown_field_steers_no_terminal_and_no_spreadsheet() {
+        assert_eq!(shown_field("\u{1b}[2J\na"), "\\u{1b}[2J\na");
+        assert_eq!(shown_field("\t=1"), "' =1");
+    }
+
+    #[test]
+    fn numbers_have_an_exponent_where_nobody_counts_their_digits() {
+        let shown = [25.0, 182.25, 999_999_999_999_999.0, 1.5e300, f64::INFINITY].map(number);
+        assert_eq!(shown, ["25", "182.25", "999999999999999", "1.5e300", "inf"]);
     }
 
     #[test]

@@ -5,6 +5,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::ops::RangeInclusive;
 
 /// A name with its parameters, as typed.
 ///
@@ -43,10 +44,11 @@ impl SpecError {
     ) -> Self {
         let all = known.clone().into_iter().collect::<Vec<_>>().join(", ");
         let hint = match nearest(word, known) {
-            Some(guess) => format!("; did you mean '{guess}'?"),
-            None => String::new(),
+            Some(guess) => format!("; did you mean '{guess}'? (known: {all})"),
+            None if all.is_empty() => "; expected none".to_owned(),
+            None => format!(" (known: {all})"),
         };
-        SpecError(format!("unknown {what} '{word}'{hint} (known: {all})"))
+        SpecError(format!("unknown {what} '{word}'{hint}"))
     }
 }
 
@@ -111,7 +113,9 @@ impl Spec {
             };
             let (key, value) = (key.trim().to_owned(), value.trim().to_owned());
             if given.insert(key.clone(), value).is_some() {
-                return Err(SpecError(format!("in '{text}': '{key}' is given twice")));
+                return Err(SpecError(format!(
+                    "in '{text}': '{key}' is given twice; expected it once"
+                )));
             }
         }
         Ok(Spec {
@@ -186,6 +190,20 @@ impl Spec {
 
     /// A whole number in `0..=most`, or the default.
     pub fn whole(&mut self, key: &'static str, default: u64, most: u64) -> Result<u64, SpecError> {
+        self.whole_of(key, default, 0..=most)
+    }
+
+    /// A whole number in `1..=most`, or the default.
+    pub fn count(&mut self, key: &'static str, default: u64, most: u64) -> Result<u64, SpecError> {
+        self.whole_of(key, default, 1..=most)
+    }
+
+    fn whole_of(
+        &mut self,
+        key: &'static str,
+        default: u64,
+        range: RangeInclusive<u64>,
+    ) -> Result<u64, SpecError> {
         let Some(text) = self.text(key) else {
             return Ok(default);
         };
@@ -196,18 +214,15 @@ impl Spec {
             .filter(|_| !text.ends_with('%'))
             .filter(|v| v.fract() == 0.0 && (0.0..9e15).contains(v))
             .map(|v| v as u64);
-        exact
-            .or(rounded)
-            .filter(|v| *v <= most)
-            .ok_or_else(|| self.bad(key, &text, &format!("a whole number from 0 to {most}")))
-    }
-
-    /// A whole number in `1..=most`, or the default.
-    pub fn count(&mut self, key: &'static str, default: u64, most: u64) -> Result<u64, SpecError> {
-        match self.whole(key, default, most)? {
-            0 => Err(self.bad(key, "0", &format!("a whole number from 1 to {most}"))),
-            count => Ok(count),
-        }
+        let sound = exact.or(rounded).filter(|v| range.contains(v));
+        sound.ok_or_else(|| {
+            let (least, most) = (range.start(), range.end());
+            self.bad(
+                key,
+                &text,
+                &format!("a whole number from {least} to {most}"),
+            )
+        })
     }
 
     /// Call last: refuses parameters that were not read.
@@ -228,7 +243,7 @@ impl Spec {
 
     fn bad(&self, key: &str, found: &str, expected: &str) -> SpecError {
         SpecError(format!(
-            "in '{}': {key}={found} is not {expected}",
+            "in '{}': {key} is '{found}'; expected {expected}",
             self.name
         ))
     }
@@ -267,6 +282,9 @@ mod tests {
     fn unknown_words_get_the_nearest_suggestion() {
         let error = SpecError::unknown("structure", "bhv", ["linear", "bvh"]);
         assert!(error.to_string().contains("did you mean 'bvh'"), "{error}");
+        let error = Spec::parse("helsinki:n=3").unwrap().finish().unwrap_err();
+        let wanted = "unknown parameter of 'helsinki': 'n'; expected none";
+        assert_eq!(error.to_string(), wanted);
         let mut spec = Spec::parse("city:sed=3").unwrap();
         spec.whole("seed", 1, u64::MAX).unwrap();
         let error = spec.finish().unwrap_err().to_string();
@@ -280,12 +298,15 @@ mod tests {
             spec.whole("n", 1, 10)
                 .unwrap_err()
                 .to_string()
-                .contains("n=many")
+                .contains("n is 'many'")
         );
         assert_eq!(spec.whole("seed", 1, u64::MAX).unwrap(), u64::MAX);
         let mut percents = Spec::parse("city:n=200%").unwrap();
         let error = percents.whole("n", 1, 10).unwrap_err().to_string();
-        assert!(error.contains("n=200% is not a whole number"), "{error}");
+        assert!(
+            error.contains("n is '200%'; expected a whole number"),
+            "{error}"
+        );
         assert!(spec.number_between("x", 1.0, 0.0, 2.0).is_err());
         assert!(Spec::parse("city:n").is_err());
         assert!(Spec::parse("city:n=1,n=2").is_err());

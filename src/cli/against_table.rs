@@ -151,10 +151,11 @@ fn changes(found: &Against, threshold: f64) -> Changes {
     changes
 }
 
-/// The arguments of `run` that ask for the same.
-fn arguments() -> anyhow::Result<Vec<String>> {
+/// The options of `run` that were typed behind `compare`: what they were given, by
+/// name.
+fn typed() -> anyhow::Result<Vec<String>> {
     let matches = Cli::command().try_get_matches_from(std::env::args_os())?;
-    let mut typed = vec!["run".to_owned()];
+    let mut typed = Vec::new();
     let Some(matches) = matches.subcommand_matches("compare") else {
         return Ok(typed);
     };
@@ -177,10 +178,28 @@ fn arguments() -> anyhow::Result<Vec<String>> {
             false => typed.push(format!("--{name}")),
         }
     }
-    for (option, value) in [("suite", SUITE), ("structure", STRUCTURES)] {
-        if matches.value_source(option) != Some(ValueSource::CommandLine) {
-            typed.push(format!("--{option}={value}"));
+    Ok(typed)
+}
+
+/// The arguments of `run` that ask for the same.
+fn arguments() -> anyhow::Result<Vec<String>> {
+    let mut arguments = vec!["run".to_owned()];
+    arguments.extend(typed()?);
+    for (option, value) in [("--suite=", SUITE), ("--structure=", STRUCTURES)] {
+        if !arguments.iter().any(|typed| typed.starts_with(option)) {
+            arguments.push(format!("{option}{value}"));
         }
     }
-    Ok(typed)
+    Ok(arguments)
+}
+
+/// Refuses what says how to measure where nothing is measured.
+pub fn expect_none_of_a_run() -> anyhow::Result<()> {
+    match typed()?.first().and_then(|typed| typed.split('=').next()) {
+        Some(option) => bail!(
+            "{option} says what --against BINARY measures, and two reports are measured already; \
+             expected no {option}"
+        ),
+        None => Ok(()),
+    }
 }

@@ -119,7 +119,7 @@ pub struct WhatArgs {
     #[arg(long, value_name = "TEST", default_value = "six-plane")]
     pub test: Vec<String>,
     /// Seed of the order in which structures are measured
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = values::whole(0..=u64::MAX), allow_negative_numbers = true)]
     pub seed: u64,
     /// Measure with cold caches as well (the suite full does by itself)
     #[arg(long)]
@@ -128,7 +128,7 @@ pub struct WhatArgs {
     #[arg(long)]
     pub no_bounds: bool,
     /// Seconds without progress after which a structure has timed out
-    #[arg(long, value_name = "SECONDS", default_value_t = 300, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "SECONDS", default_value_t = 300, value_parser = values::whole(1..=u64::MAX), allow_negative_numbers = true)]
     pub timeout: u64,
     #[command(flatten)]
     pub scene_args: SceneArgs,
@@ -162,10 +162,10 @@ pub struct RunArgs {
     #[arg(long)]
     pub resume: bool,
     /// Processes to spread the rounds over; ten or more give intervals [default: the suite's]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    #[arg(long, value_name = "N", value_parser = values::whole(1..=1000u32), allow_negative_numbers = true)]
     pub processes: Option<u32>,
     /// Print the cells as JSON lines instead of measuring them
-    #[arg(long)]
+    #[arg(long, conflicts_with = "resume")]
     pub plan: bool,
     /// Measure share i of n of the plan only; `merge` joins the reports
     #[arg(long, value_name = "i/n")]
@@ -246,7 +246,12 @@ pub struct CompareArgs {
     )]
     pub threshold: f64,
     /// The metrics to judge by, of query_ns, locate_ns, locate_batched_ns, build_ms; may be repeated
-    #[arg(long, value_name = "LIST", default_value = "query_ns")]
+    #[arg(
+        long,
+        value_name = "LIST",
+        default_value = "query_ns",
+        conflicts_with = "against"
+    )]
     pub metric: Vec<String>,
     /// Show what stayed the same as well
     #[arg(long)]
@@ -329,10 +334,10 @@ pub struct VerifyArgs {
     #[arg(long, value_name = "LIST", default_value = "all")]
     pub structure: String,
     /// Random differential cases [default: 20000, or 0 if scenes or paths are named]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = values::whole(0..=u64::MAX), allow_negative_numbers = true)]
     pub cases: Option<u64>,
     /// Seed of the first case; case i has seed N + i
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = values::whole(0..=u64::MAX), allow_negative_numbers = true)]
     pub seed: u64,
     #[arg(long, value_enum, default_value = "table")]
     pub format: TableFormat,
@@ -358,10 +363,10 @@ pub struct PrecisionArgs {
     #[arg(long, value_name = "LIST", default_value = "default")]
     pub structure: String,
     /// Cameras of the path to look at, evenly spread
-    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = values::whole(1..=u32::MAX), allow_negative_numbers = true)]
     pub frames: u32,
     /// Cubes for each ratio of the size sweep; 0 skips all sweeps
-    #[arg(long, value_name = "N", default_value_t = 2_000_000)]
+    #[arg(long, value_name = "N", default_value_t = 2_000_000, value_parser = values::whole(0..=usize::MAX), allow_negative_numbers = true)]
     pub cubes: usize,
     /// Draw false positives against time as an SVG file too
     #[arg(long, value_name = "FILE")]
@@ -534,10 +539,10 @@ pub struct StressArgs {
     #[arg(long, value_name = "LIST", default_value = "all")]
     pub structure: String,
     /// Cases of each generated extreme, 0 for none [default: 66, ten million boxes; 0 with --vectors]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = values::whole(0..=u64::MAX), allow_negative_numbers = true)]
     pub cases: Option<u64>,
     /// Seed of the first case; case i has seed N + i
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = values::whole(0..=u64::MAX), allow_negative_numbers = true)]
     pub seed: u64,
     #[arg(long, value_enum, default_value = "table")]
     pub format: TableFormat,

@@ -13,6 +13,7 @@ use super::{Ending, load_scene, print_json, text, unread_is_fine};
 use crate::camera::Camera;
 use crate::funnel::{Proofs, regions_of};
 use crate::input::read_file;
+use crate::json::JsonError;
 use crate::path::{self, CameraPath, LensDefaults};
 use crate::query::ItemId;
 use crate::scene::{Scene, WorldBox};
@@ -135,26 +136,29 @@ impl Loaded {
 pub fn check(args: &CheckArgs) -> anyhow::Result<Ending> {
     let file = args.certificates.display().to_string();
     let bytes = read_file(&args.certificates)?;
-    let Ok(lines) = std::str::from_utf8(&bytes) else {
-        bail!("{file}: no UTF-8; expected certificates as lines of JSON");
-    };
     let stored = claim(args.pvs.as_deref())?;
     let lens = args.lens.defaults()?;
     let mut scenes: BTreeMap<String, Loaded> = BTreeMap::new();
     let mut checked = Checked::default();
     // The views and claims so far.
     let mut about = BTreeSet::new();
-    for (number, line) in lines
-        .lines()
+    for (number, line) in bytes
+        .split(|byte| *byte == b'\n')
         .enumerate()
-        .filter(|(_, line)| !line.trim().is_empty())
+        .filter(|(_, line)| !line.trim_ascii().is_empty())
     {
         let number = number + 1;
         let place = || format!("{file}, line {number}");
-        let line = Proofs::from_json(line).with_context(|| {
-            format!(
-                "{}: expected the certificates of a view, or the errors of a claim, as JSON",
-                place()
+        let line = Proofs::from_json(line).map_err(|error| {
+            let error = JsonError {
+                line: number,
+                ..error
+            };
+            let expected = error.expected_of("the certificates of a view or the errors of a claim");
+            anyhow::anyhow!(
+                "{file}, {}: {}; expected {expected}",
+                error.place(),
+                error.found
             )
         })?;
         let name = args.scene.as_deref().unwrap_or(line.scene()).to_owned();

@@ -20,6 +20,7 @@ pub fn compare(registry: &Registry, args: &CompareArgs) -> anyhow::Result<Ending
     if let Some(binary) = &args.against {
         return super::against_table::compare_against(registry, args, binary, threshold);
     }
+    super::against_table::expect_none_of_a_run()?;
     let metrics = metrics(&args.metric)?;
     let (Some(old), Some(new)) = (&args.old, &args.new) else {
         bail!("two reports, or --against BINARY: expected one of them");

@@ -13,6 +13,7 @@ use crate::index::{BuildError, DynIndex, StructureSpec};
 use crate::measure::{Answer, Verdict, guarded, input_of};
 use crate::query::{ItemId, QueryCost};
 use crate::scene::Scene;
+use crate::shown::shown_field;
 use crate::threads::share;
 
 /// One structure's answer to one question.
@@ -133,7 +134,7 @@ pub fn write(
 /// A value as CSV holds it: ids separated by spaces.
 fn cell(value: &Value) -> String {
     match value {
-        Value::String(text) => text.clone(),
+        Value::String(text) => shown_field(text),
         Value::Array(ids) => ids.iter().map(cell).collect::<Vec<_>>().join(" "),
         other => other.to_string(),
     }

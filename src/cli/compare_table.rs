@@ -13,6 +13,7 @@ use super::shared_args::TableFormat;
 use super::{Ending, print_json, text};
 use crate::measure::{CellKey, METRICS};
 use crate::report::{Changes, CommonShift, JudgedRow, Lone, Outcome, Setting, WorkChange};
+use crate::shown::number;
 
 /// So many counters are listed; `--all` lists every one.
 const LISTED: usize = 20;
@@ -279,10 +280,11 @@ fn shift_line(shift: CommonShift) -> String {
 /// "work changed: bvh on city, ...: items_tested 1200 to 1111 (-7.4 %)".
 fn work_line(work: &WorkChange) -> String {
     let short = |value: f64| (value * 1e3).round() / 1e3;
-    let (old, new) = match (short(work.old), short(work.new)) {
-        (old, new) if old != new => (old, new),
-        _ => (work.old, work.new),
+    let shown = match [work.old, work.new].map(short) {
+        [old, new] if old != new && old.is_finite() && new.is_finite() => [old, new],
+        _ => [work.old, work.new],
     };
+    let [old, new] = shown.map(number);
     let much = match work.old != 0.0 {
         true => format!(" ({})", change_of(work.new / work.old, None)),
         false => String::new(),

@@ -31,6 +31,20 @@ impl Rows {
         }
     }
 
+    /// Without the columns that have nothing in any row.
+    pub fn without_empty_columns(self) -> Rows {
+        let is_kept = |column: usize| self.rows.iter().any(|row| !row[column].is_empty());
+        let kept: Vec<usize> = (0..self.header.len()).filter(|c| is_kept(*c)).collect();
+        let of = |cells: &[String]| kept.iter().map(|&column| cells[column].clone()).collect();
+        Rows {
+            header: of(&self.header),
+            right: (0..kept.len())
+                .filter(|&place| self.right.contains(&kept[place]))
+                .collect(),
+            rows: self.rows.iter().map(|row| of(row)).collect(),
+        }
+    }
+
     /// For a terminal.
     pub fn terminal(&self) -> String {
         self.table().to_string()
@@ -157,6 +171,20 @@ pub fn to_html(title: &str, blocks: &[Block]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn columns_of_nothing_are_left_out() {
+        let mut rows = Rows::of_numbers(["name", "none", "some"]);
+        rows.rows = [["a", "", ""], ["b", "", "7"]]
+            .map(|row| row.map(str::to_owned).to_vec())
+            .to_vec();
+        let kept = rows.without_empty_columns();
+        assert_eq!(
+            (&kept.header[..], &kept.right[..]),
+            (&["name".into(), "some".into()][..], &[1][..])
+        );
+        assert_eq!(kept.rows, [["a", ""], ["b", "7"]]);
+    }
 
     #[test]
     fn text_stays_text_in_every_format() {

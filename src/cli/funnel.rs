@@ -16,8 +16,8 @@ use super::protocol::{Job, Timing};
 use super::run::progress;
 use super::run_resume::typed_args;
 use super::{
-    Ending, expect_places, funnel_csv, funnel_picture, funnel_table, interrupt, load_scene_by,
-    print_json, text, unread_is_fine,
+    Ending, expect_folder, expect_places, funnel_csv, funnel_picture, funnel_table, interrupt,
+    load_scene_by, print_json, text, unread_is_fine,
 };
 use crate::funnel::{self, Chain, FunnelInput, FunnelPlan, Proofs, SeenFrom, StageKind, StageRow};
 use crate::index::{Registry, StructureSpec};
@@ -47,6 +47,7 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     ];
     let inputs: Vec<&Path> = inputs.into_iter().flatten().collect();
     expect_places(&outputs, &inputs)?;
+    expect_folder("--truth-cache", args.truth_cache.as_deref())?;
     if args.certificates.is_some() && args.cut_out.is_some() {
         bail!("--certificates are about boxes without holes; expected no --cut-out with them");
     }
@@ -197,8 +198,17 @@ fn chain(
         if let Some(name) = name {
             let known = funnel::back_ends(stage, scene, args.cut_out.is_some());
             if !known.iter().any(|row| row.name == name) {
+                let stage = stage.name();
+                if let [_] = known[..] {
+                    return Err(SpecError::new(format_args!(
+                        "--{stage} is '{name}'; expected none: scene '{}' has nothing for that \
+                         stage",
+                        scene.name
+                    )));
+                }
                 let names = known.iter().map(|row| row.name);
-                return Err(SpecError::unknown(stage.name(), name, names));
+                let what = format!("back end of the {stage} stage");
+                return Err(SpecError::unknown(&what, name, names));
             }
             chain = chain.with(stage, name);
         }
@@ -210,9 +220,7 @@ fn chain(
 pub(super) fn claim(file: Option<&Path>) -> anyhow::Result<Option<Arc<Pvs>>> {
     let Some(file) = file else { return Ok(None) };
     let bytes = read_file(file)?;
-    let text = std::str::from_utf8(&bytes).context("no UTF-8");
-    let pvs = text.and_then(|text| Ok(Pvs::from_json(text)?));
-    let pvs = pvs.with_context(|| format!("{}: expected a set of region pairs", file.display()))?;
+    let pvs = Pvs::from_json(&bytes).with_context(|| file.display().to_string())?;
     Ok(Some(Arc::new(pvs)))
 }
 

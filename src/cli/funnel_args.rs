@@ -50,7 +50,7 @@ pub struct FunnelArgs {
     )]
     pub path: String,
     /// Cameras of the path to look at, evenly spread
-    #[arg(long, value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 32, value_parser = values::whole(1..=u32::MAX), allow_negative_numbers = true)]
     pub frames: u32,
     /// Columns and rows of samples
     #[arg(long, value_name = "WxH", default_value = "320x180", value_parser = values::samples)]

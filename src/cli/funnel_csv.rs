@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use serde_json::Value;
 
 use crate::funnel::FunnelReport;
-use crate::shown::field;
+use crate::shown::shown_field;
 
 /// Tables of the report: a list of rows, or a single row.
 const TABLES: [&str; 10] = [
@@ -64,7 +64,7 @@ pub fn write(report: &FunnelReport, out: impl Write) -> io::Result<()> {
             row => std::slice::from_ref(row),
         };
         for row in rows {
-            let own = [&report.scene, &report.path, table].map(|text| field(text).into_owned());
+            let own = [&report.scene, &report.path, table].map(shown_field);
             let fields = FIELDS.split_whitespace();
             let cells = fields.map(|path| cell(row.pointer(&format!("/{path}"))));
             out.write_record(own.into_iter().chain(cells))?;
@@ -81,7 +81,7 @@ fn column(path: &str) -> String {
 fn cell(value: Option<&Value>) -> String {
     match value {
         None | Some(Value::Null) => String::new(),
-        Some(Value::String(text)) => field(text).into_owned(),
+        Some(Value::String(text)) => shown_field(text),
         Some(Value::Array(list)) => list.len().to_string(),
         Some(Value::Object(list)) => list.len().to_string(),
         Some(plain) => plain.to_string(),

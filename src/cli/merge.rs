@@ -7,10 +7,11 @@ use anyhow::Context;
 
 use super::args::MergeArgs;
 use super::run_resume::same_recorded;
-use super::{Ending, surface_tables, tell, text, unread_is_fine};
+use super::{Ending, expect_folder, surface_tables, tell, text, unread_is_fine};
 use crate::report::{Stream, merge as join, read_stream};
 
 pub fn merge(args: &MergeArgs) -> anyhow::Result<Ending> {
+    expect_folder("--out", Some(&args.out))?;
     let recorded =
         |path: &Path| -> anyhow::Result<Stream> { Ok(read_stream(&path.join("stream.jsonl"))?.0) };
     let first = recorded(&args.runs[0])?.header.args;

@@ -231,6 +231,17 @@ fn expect_place_for(option: &str, file: Option<&Path>) -> anyhow::Result<()> {
     }
 }
 
+/// That a folder can be there: it is, or nothing of its name is.
+fn expect_folder(option: &str, folder: Option<&Path>) -> anyhow::Result<()> {
+    match folder {
+        Some(folder) if folder.exists() && !folder.is_dir() => anyhow::bail!(
+            "{}: not a folder; expected a folder for {option}",
+            folder.display()
+        ),
+        _ => Ok(()),
+    }
+}
+
 /// One JSON document on standard output, indented.
 fn print_json(document: &impl Serialize) -> io::Result<()> {
     let mut out = io::stdout().lock();

@@ -44,8 +44,6 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
         bail!("scene '{}' has no items; expected at least one", scene.name);
     }
     let path = path::load(&args.path, &scene, &defaults)?;
-    interrupt::from_now_on_finish();
-    let workers = Workers::new(typed_args()?, Duration::MAX, &NamedTempFile::new)?;
     let bar = progress(u64::from(args.spread.processes));
     let job = |next: &str| {
         let job = format!("{}, {}: {next}", args.scene, args.path);
@@ -60,9 +58,28 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
         most_cameras: args.frames as usize,
         protocol: &protocol,
     };
-    let Some(prepared) = precision::prepare(&input, &interrupt::asked)? else {
+    // There are no files yet: Ctrl-C ends the program.
+    let going_on = &|| false;
+    let Some(prepared) = precision::prepare(&input, going_on)? else {
         return Ok(Ending::Interrupted);
     };
+    let (mut sizes, mut sweeps) = (Vec::new(), Vec::new());
+    if args.cubes > 0 {
+        job("the sweep over sizes");
+        let rows = size_sweep(args.cubes, args.spread.seed, going_on)?;
+        sizes = rows.unwrap_or_default();
+        let cameras = args
+            .cubes
+            .div_ceil(CUBES_PER_CAMERA)
+            .clamp(2, SWEEP_CAMERAS);
+        for (which, name, _) in SWEEPS {
+            job(&format!("the sweep over {name}"));
+            let rows = sweep(which, cameras, args.spread.seed, going_on);
+            sweeps.extend(rows.unwrap_or_default());
+        }
+    }
+    interrupt::from_now_on_finish();
+    let workers = Workers::new(typed_args()?, Duration::MAX, &NamedTempFile::new)?;
     let points = |process| {
         let timing = Timing {
             process,
@@ -78,26 +95,6 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
         return Ok(Ending::Interrupted);
     };
     let precision = prepared.conclude(&times);
-    let (mut sizes, mut sweeps) = (Vec::new(), Vec::new());
-    if args.cubes > 0 {
-        job("the sweep over sizes");
-        let Some(rows) = size_sweep(args.cubes, args.spread.seed, &interrupt::asked)? else {
-            return Ok(Ending::Interrupted);
-        };
-        sizes = rows;
-        let cameras = args
-            .cubes
-            .div_ceil(CUBES_PER_CAMERA)
-            .clamp(2, SWEEP_CAMERAS);
-        for (which, name, _) in SWEEPS {
-            job(&format!("the sweep over {name}"));
-            let rows = sweep(which, cameras, args.spread.seed, &interrupt::asked);
-            let Some(rows) = rows else {
-                return Ok(Ending::Interrupted);
-            };
-            sweeps.extend(rows);
-        }
-    }
     bar.finish_and_clear();
     if let Some(file) = &args.svg {
         let svg = precision_diagram::draw(&precision)?;

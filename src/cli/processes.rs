@@ -16,6 +16,7 @@ use super::interrupt;
 use super::protocol::{Job, Message, PROTOCOL, Request};
 use crate::input;
 use crate::measure::{Part, ProcessTimes, Status, TaskSamples, Verdict};
+use crate::report::bare;
 
 /// Longest wait before looking whether the user wants to stop.
 const GLANCE: Duration = Duration::from_millis(20);
@@ -274,8 +275,12 @@ impl Workers {
     ) -> anyhow::Result<Workers> {
         let (mut spool, mut spooled) = (Vec::new(), BTreeMap::new());
         for (source, bytes) in input::pipes() {
-            let mut file = temporary()?;
-            file.write_all(&bytes)?;
+            let kept = temporary().and_then(|mut file| {
+                file.write_all(&bytes)?;
+                Ok(file)
+            });
+            let place = || format!("{source}: cannot be kept for the processes to read");
+            let file = kept.map_err(bare).with_context(place)?;
             spooled.insert(source, std::path::absolute(file.path())?);
             spool.push(file);
         }

@@ -9,7 +9,8 @@ use anyhow::Context;
 
 use super::args::ReportArgs;
 use super::document::{Block, Rows, to_html, to_markdown};
-use super::{Ending, expect_places, surface_diagram, surface_tables, tell, text};
+use super::surface_diagram::{self, Picture};
+use super::{Ending, expect_folder, expect_places, surface_tables, tell, text};
 use crate::index::Registry;
 use crate::measure::Status;
 use crate::report::{
@@ -24,6 +25,7 @@ pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> 
     ];
     // Of a run's folder the report is read.
     expect_places(&outputs, &[&args.report, &args.report.join("report.json")])?;
+    expect_folder("--svg", args.svg.as_deref())?;
     let mut report = read_report(&args.report)?;
     declare(&mut report, registry);
     let pictures = match args.svg.is_some() || args.html.is_some() {
@@ -34,18 +36,14 @@ pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> 
     if let Some(path) = &args.markdown {
         write(path, &to_markdown(&blocks))?;
     }
-    if let Some(folder) = &args.svg {
-        fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-        for picture in &pictures {
-            write(&folder.join(format!("{}.svg", picture.name)), &picture.svg)?;
-        }
-        if pictures.is_empty() {
-            tell(&format!(
-                "note: no chart in {}; a chart needs a structure that was measured on two sizes \
-                 of a scene",
-                folder.display()
-            ));
-        }
+    match &args.svg {
+        Some(folder) if pictures.is_empty() => tell(&format!(
+            "note: no chart in {}; a chart needs a structure that was measured on two sizes of a \
+             scene",
+            folder.display()
+        )),
+        Some(folder) => write_charts(folder, &pictures)?,
+        None => {}
     }
     if let Some(path) = &args.html {
         blocks.extend(pictures.into_iter().map(|p| Block::Picture(p.svg)));
@@ -66,6 +64,20 @@ fn declare(report: &mut Report, registry: &Registry) {
             cell.origin = Some(row.info.origin.owned());
         }
     }
+}
+
+/// All of them, or no folder that was not there before.
+fn write_charts(folder: &Path, pictures: &[Picture]) -> anyhow::Result<()> {
+    let is_new = !folder.exists();
+    fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    let file = |picture: &Picture| folder.join(format!("{}.svg", picture.name));
+    let written = pictures
+        .iter()
+        .try_for_each(|picture| write(&file(picture), &picture.svg));
+    if written.is_err() && is_new {
+        let _ = fs::remove_dir_all(folder);
+    }
+    written
 }
 
 fn write(path: &Path, text: &str) -> anyhow::Result<()> {
@@ -189,17 +201,12 @@ fn of_comparison(comparison: &Comparison) -> Vec<Block> {
         rows.rows.push(row(cell, rank, peer));
     }
     for bound in &comparison.bounds {
-        let mut row = row(bound, "lower bound".to_owned(), peer);
-        // A lower bound has no ratio to itself.
-        for cell in &mut row[4..] {
-            cell.clear();
-        }
-        rows.rows.push(row);
+        rows.rows.push(row(bound, "lower bound".to_owned(), peer));
     }
     let basis = format!("{}.", text::basis(comparison));
     let mut blocks = vec![Block::Heading(3, heading), Block::Line(basis)];
     blocks.extend(false_positives(comparison).map(Block::Line));
-    blocks.push(Block::Table(rows));
+    blocks.push(Block::Table(rows.without_empty_columns()));
     let told = comparison.ranked.iter().map(|r| r.cell);
     for cell in told.filter(|c| c.reason.is_some()) {
         let reason = cell.reason.as_deref().unwrap_or_default();

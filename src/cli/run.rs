@@ -14,7 +14,7 @@ use super::protocol::Job;
 use super::run_plan::{RunPlan, plan};
 use super::run_resume::{create, go_on, resume, utc_now};
 use super::run_table::show_scene;
-use super::{Ending, interrupt, surface_tables, text, unread_is_fine};
+use super::{Ending, expect_folder, interrupt, surface_tables, tell, text, unread_is_fine};
 use crate::index::Registry;
 use crate::measure::{
     GroupKey, Machine, Part, PathInfo, PlannedScene, SceneInfo, Share, SubjectPart, Verdict,
@@ -25,6 +25,7 @@ pub fn run(registry: &Registry, args: &RunArgs) -> anyhow::Result<Ending> {
     if args.plan {
         return print_plan(registry, args);
     }
+    expect_folder("--out", args.out.as_deref())?;
     if args.resume {
         let (folder, stream, begun) = resume(args)?;
         let plan = plan(registry, &begun)?;
@@ -139,7 +140,10 @@ impl Run {
             return Err(error.into());
         }
         unread_is_fine(surface_tables::show(&report))?;
-        unread_is_fine(self.close(&report, stopped))?;
+        unread_is_fine(self.close(&report))?;
+        if stopped {
+            tell("interrupted: finished cells were saved; continue with --resume");
+        }
         let failed = report.cells.iter().any(|c| c.status.is_failure());
         Ok(match (stopped, failed) {
             (true, _) => Ending::Interrupted,
@@ -308,7 +312,7 @@ impl Run {
         Ok(())
     }
 
-    fn close(&self, report: &Report, stopped: bool) -> io::Result<()> {
+    fn close(&self, report: &Report) -> io::Result<()> {
         let failed = report
             .cells
             .iter()
@@ -330,12 +334,6 @@ impl Run {
             "{}/{{report.json, summary.csv, samples.csv, stream.jsonl}}",
             text::plain(&self.folder.path().display().to_string())
         )?;
-        if stopped {
-            writeln!(
-                out,
-                "interrupted: finished cells were saved; continue with --resume"
-            )?;
-        }
         out.flush()
     }
 }

@@ -57,7 +57,7 @@ pub fn plan_of(
         let culling = args.culling.culling(test)?;
         culling.check()?;
         if cullings.contains(&culling) {
-            bail!("test '{test}' is named twice");
+            bail!("test '{test}' is named twice; expected each once");
         }
         cullings.push(culling);
     }
@@ -97,11 +97,11 @@ fn shard(text: &str) -> Result<(usize, usize), SpecError> {
 fn check_names(plan: &Plan) -> anyhow::Result<()> {
     for (i, PlannedScene { source, paths, .. }) in plan.scenes.iter().enumerate() {
         if plan.scenes[..i].iter().any(|other| other.source == *source) {
-            bail!("scene '{source}' is named twice");
+            bail!("scene '{source}' is named twice; expected each once");
         }
         for (k, path) in paths.iter().enumerate() {
             if paths[..k].contains(path) {
-                bail!("path '{path}' is named twice");
+                bail!("path '{path}' is named twice; expected each once");
             }
         }
     }

@@ -243,7 +243,8 @@ fn nanos(clock: SystemTime) -> u32 {
 }
 
 fn newest_unfinished(results: &Path) -> anyhow::Result<PathBuf> {
-    let listing = fs::read_dir(results).with_context(|| results.display().to_string())?;
+    // No folder of results holds no run.
+    let listing = fs::read_dir(results).into_iter().flatten();
     let mut folders: Vec<PathBuf> = listing
         .filter_map(|entry| Some(entry.ok()?.path()))
         .collect();
@@ -257,7 +258,7 @@ fn newest_unfinished(results: &Path) -> anyhow::Result<PathBuf> {
     let found = folders.into_iter().rev().find(unfinished);
     found.with_context(|| {
         format!(
-            "no unfinished run in {}; expected one to resume",
+            "no unfinished run in {}; expected one to resume there, or its folder as --out DIR",
             results.display()
         )
     })

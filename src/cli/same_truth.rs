@@ -56,6 +56,7 @@ fn missed(camera: Camera) -> [bool; 4] {
     let path = CameraPath {
         name: "one".to_owned(),
         cameras: vec![camera],
+        lines: Vec::new(),
         lens_scale: None,
     };
     let structures = Registry::builtin().structures("linear");

@@ -10,6 +10,7 @@ use crate::measure::{Beside, Effort, Machine, Protocol};
 use crate::path::LensDefaults;
 use crate::scene::LoadOptions;
 use crate::spec::SpecError;
+use crate::threads::MOST_THREADS;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 
@@ -38,7 +39,7 @@ pub struct KernelArgs {
     #[arg(long = "kernel", value_name = "NAME", value_parser = values::kernel)]
     pub name: Option<Kernel>,
     /// Threads of a build; query and locate divide cameras and points among them
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = values::threads, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = values::whole(1..=MOST_THREADS), allow_negative_numbers = true)]
     pub threads: usize,
 }
 
@@ -72,10 +73,10 @@ impl KernelArgs {
 #[derive(Args, Debug)]
 pub struct SpreadArgs {
     /// Processes to spread the rounds over; ten or more give intervals, one gives values alone
-    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = values::whole(1..=1000u32), allow_negative_numbers = true)]
     pub processes: u32,
     /// Seed of all that is random: scenes of sweeps, order of measurement
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = values::whole(0..=u64::MAX), allow_negative_numbers = true)]
     pub seed: u64,
 }
 
@@ -125,14 +126,15 @@ pub struct LensArgs {
         long,
         value_name = "DEG",
         default_value_t = 60.0,
+        value_parser = values::field_of_view,
         allow_negative_numbers = true
     )]
     pub fovy: f64,
     /// Width / height for cameras without one
-    #[arg(long, default_value_t = 16.0 / 9.0, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 16.0 / 9.0, value_parser = values::above_zero, allow_negative_numbers = true)]
     pub aspect: f64,
     /// Near plane for cameras without one [default: 0.1 for recorded cameras, far/1000 for paths]
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long, value_parser = values::above_zero, allow_negative_numbers = true)]
     pub near: Option<f64>,
     /// Far plane for cameras without one, or inf [default: 1000 for recorded cameras, the scene for paths]
     #[arg(long, value_parser = values::far, allow_negative_numbers = true)]
@@ -144,6 +146,13 @@ pub struct LensArgs {
 
 impl LensArgs {
     pub fn defaults(&self) -> Result<LensDefaults, SpecError> {
+        if let (Some(near), Some(far)) = (self.near, self.far)
+            && near >= far
+        {
+            return Err(SpecError::new(format_args!(
+                "--near is {near} and --far {far}; expected near < far"
+            )));
+        }
         let matrix = self.matrix_convention.as_deref();
         Ok(LensDefaults {
             matrix: matrix.map(values::matrix_convention).transpose()?,
@@ -163,7 +172,7 @@ pub struct CullingArgs {
     #[arg(long, value_name = "METHOD", default_value = "frame", value_parser = values::plane_method)]
     pub planes: PlaneMethod,
     /// Factor c of the conservative epsilon; 0 leaves the planes as derived
-    #[arg(long, value_name = "C", default_value_t = DEFAULT_EPSILON, value_parser = values::at_least_zero, allow_negative_numbers = true)]
+    #[arg(long, value_name = "C", default_value_t = DEFAULT_EPSILON, value_parser = values::epsilon, allow_negative_numbers = true)]
     pub epsilon: f64,
     /// Numbers the culling test is carried out in: f32, f64, f32-relative
     #[arg(long, value_name = "NUMBERS", default_value = "f32", value_parser = values::arithmetic)]

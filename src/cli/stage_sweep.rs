@@ -116,8 +116,6 @@ pub fn sweep(
         bail!("scene '{name}' has nothing for the {stage} stage; expected {expected}");
     }
     let setting = Setting::of(registry, args, scene, None)?;
-    interrupt::from_now_on_finish();
-    let workers = Workers::new(typed_args()?, Duration::MAX, &NamedTempFile::new)?;
     let bar = progress(u64::from(args.spread.processes));
     let job = |next: &str| {
         let job = format!("{}, {} stage: {next}", args.scene, stage.name());
@@ -126,9 +124,12 @@ pub fn sweep(
     job("every point, judged");
     let protocol = protocol(args, 0);
     let input = setting.input(args, &protocol)?;
-    let Some(prepared) = funnel::prepare_sweep(&input, stage, &interrupt::asked)? else {
+    // There are no files yet: Ctrl-C ends the program.
+    let Some(prepared) = funnel::prepare_sweep(&input, stage, &|| false)? else {
         return Ok(Ending::Interrupted);
     };
+    interrupt::from_now_on_finish();
+    let workers = Workers::new(typed_args()?, Duration::MAX, &NamedTempFile::new)?;
     let share = |process| {
         let timing = Timing {
             process,

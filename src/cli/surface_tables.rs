@@ -125,8 +125,9 @@ pub fn of_surface(surface: &Surface) -> Vec<Block> {
     let mut blocks = vec![
         Block::Line(
             "The fastest (= where no test tells them apart) and its speed-up vs linear; none \
-             where a scan wins. Shares stand under the nearest of 1, 1.5, 2, \
-             3, 5, 7, 10, ... percent; (at ...) where that is more than a tenth off."
+             where a scan wins. Shares stand under the nearest, by its logarithm, of 1, 1.5, 2, \
+             3, 5, 7, 10, ... percent; (at ...) where that is more than a tenth off. ~ N lies \
+             between two sizes, in the logarithms of size and speed-up."
                 .to_owned(),
         ),
         Block::Table(winners(surface)),

@@ -77,8 +77,13 @@ impl fmt::Display for Table {
 pub fn conclusion(report: &Report) -> String {
     let processes = report.cells.iter().map(|c| c.times.processes);
     let least = processes.filter(|p| *p > 0).min().unwrap_or(0);
+    let planned = report.run.processes as usize;
+    let of_planned = |processes: &str| match report.run.finished_at {
+        None if least < planned => format!("{} of {planned} processes", count(least)),
+        _ => processes.to_owned(),
+    };
     if least < 3 {
-        let processes = counted(least.max(1), "process");
+        let processes = of_planned(&counted(least.max(1), "process"));
         return format!(
             "{processes}: times without intervals, ranks by their order alone (--processes 10 \
              gives intervals)"
@@ -96,8 +101,8 @@ pub fn conclusion(report: &Report) -> String {
         _ => "",
     };
     format!(
-        "95 % intervals over {least} processes{few}; a structure entered twice agreed with itself in \
-         {held} of {}",
+        "95 % intervals over {}{few}; a structure entered twice agreed with itself in {held} of {}",
+        of_planned(&format!("{least} processes")),
         counted(twins.len(), "comparison")
     )
 }

@@ -2,7 +2,6 @@
 //! tip and the usage. It defines how those become what was found and expected.
 
 use std::error::Error;
-use std::num::{ParseFloatError, ParseIntError};
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
@@ -43,17 +42,6 @@ pub fn one_line(error: &clap::Error) -> Option<String> {
     let first = lines.next().unwrap_or_default();
     let mut found = first.strip_prefix("error: ").unwrap_or(first).to_owned();
     let mut expected = None;
-    // What a parser says of a number does not say what it wanted.
-    if let Some(source) = error.source() {
-        expected = match (source.is::<ParseIntError>(), source.is::<ParseFloatError>()) {
-            (true, _) => Some("; expected a whole number of at least 0".to_owned()),
-            (_, true) => Some("; expected a number".to_owned()),
-            _ => None,
-        };
-        if expected.is_some() {
-            found = found.replace(&format!(": {source}"), "");
-        }
-    }
     let mut missing = Vec::new();
     let mut usage = None;
     for line in lines {

@@ -2,23 +2,40 @@
 //! calls. An error says what was expected; the parser says where and what it found
 //! ([`usage`](super::usage)).
 
+use std::fmt::Display;
+use std::ops::RangeInclusive;
+use std::str::FromStr;
+
 use crate::camera::{MATRIX_CONVENTIONS, MatrixConvention, PLANE_METHODS, PlaneMethod};
 use crate::culling::{ARITHMETICS, Arithmetic, CullingTest, TESTS};
 use crate::drift::{ARMS, ArmKind, MOST_STEPS};
 use crate::funnel::{SEEN_FROM, SeenFrom, StageKind};
 use crate::kernel::Kernel;
 use crate::spec::{SpecError, parse_number};
-use crate::threads::MOST_THREADS;
 use crate::visibility::SampleGrid;
 use crate::visibility::occlusion::OccluderChoice;
 
-fn expected<T>(value: Option<T>, what: impl std::fmt::Display) -> Result<T, SpecError> {
+fn expected<T>(value: Option<T>, what: impl Display) -> Result<T, SpecError> {
     value.ok_or_else(|| SpecError::new(format_args!("expected {what}")))
 }
 
 /// A finite number.
 fn number(text: &str) -> Option<f64> {
     text.parse().ok().filter(|n: &f64| n.is_finite())
+}
+
+/// A whole number of a range.
+pub fn whole<N: FromStr + PartialOrd + Display>(
+    range: RangeInclusive<N>,
+) -> impl Fn(&str) -> Result<N, SpecError> + Clone
+where
+    RangeInclusive<N>: Clone,
+{
+    move |text| {
+        let sound = text.parse().ok().filter(|n| range.contains(n));
+        let (least, most) = (range.start(), range.end());
+        expected(sound, format_args!("a whole number from {least} to {most}"))
+    }
 }
 
 pub fn at_least_zero(text: &str) -> Result<f64, SpecError> {
@@ -55,10 +72,22 @@ pub fn simulated_seconds(text: &str) -> Result<f64, SpecError> {
     within(text, [1.0, 1e3])
 }
 
+/// A vertical angle of view in degrees.
+pub fn field_of_view(text: &str) -> Result<f64, SpecError> {
+    let sound = number(text).filter(|n| *n > 0.0 && *n < 180.0);
+    expected(sound, "a number above 0 and below 180")
+}
+
+/// The factor of the planes' epsilon: with the largest one everything is visible.
+pub fn epsilon(text: &str) -> Result<f64, SpecError> {
+    within(text, [0.0, 1e9])
+}
+
 /// A far plane; `inf` is none.
 pub fn far(text: &str) -> Result<f64, SpecError> {
     let endless = text.eq_ignore_ascii_case("inf").then_some(f64::INFINITY);
-    expected(endless.or_else(|| number(text)), "a finite number or inf")
+    let sound = endless.or_else(|| number(text).filter(|n| *n > 0.0));
+    expected(sound, "a number above 0 or inf")
 }
 
 /// A share that is not nothing: `1%` or `0.01`.
@@ -120,13 +149,6 @@ pub fn samples(text: &str) -> Result<SampleGrid, SpecError> {
     let grid = sides.and_then(|(width, height)| Some(SampleGrid::new(side(width)?, side(height)?)));
     let what = format_args!("columns x rows such as 320x180, each from 1 to {MOST}");
     expected(grid, what)
-}
-
-pub fn threads(text: &str) -> Result<usize, SpecError> {
-    let count = text.parse().ok();
-    let count = count.filter(|count| (1..=MOST_THREADS).contains(count));
-    let what = format_args!("a whole number from 1 to {MOST_THREADS}");
-    expected(count, what)
 }
 
 pub fn kernel(name: &str) -> Result<Kernel, SpecError> {

@@ -1,7 +1,8 @@
 //! Proofs for what the back ends removed and for what is visible: written to a file,
 //! checked by `cullbench check`, and held against what the back ends promise.
 
-use serde::Serialize;
+use serde::de::IgnoredAny;
+use serde::{Deserialize, Serialize};
 
 use super::error::FunnelError;
 use super::pass::{ALL, Pass};
@@ -9,6 +10,7 @@ use super::proven::Proven;
 use super::regions::ClaimAudit;
 use super::walks::Walks;
 use super::world::{FunnelInput, World};
+use crate::json::{JsonError, from_json};
 use crate::query::ItemId;
 use crate::visibility::region::ClaimErrors;
 use crate::visibility::truth::{
@@ -38,12 +40,16 @@ impl Proofs {
     /// Reads a line.
     ///
     /// # Errors
-    /// What is no view's: most lines are of views.
-    pub fn from_json(text: &str) -> serde_json::Result<Proofs> {
-        let view = Certificates::from_json(text).map(Proofs::View);
-        view.or_else(|error| {
-            let claim = serde_json::from_str(text).map(Proofs::Claim);
-            claim.map_err(|_| error)
+    /// What is no claim's, if it has the field `claim`, and no view's if not.
+    pub fn from_json(text: impl AsRef<[u8]>) -> Result<Proofs, JsonError> {
+        #[derive(Deserialize)]
+        struct Tag {
+            claim: Option<IgnoredAny>,
+        }
+        let text = text.as_ref();
+        Ok(match from_json::<Tag>(text)?.claim {
+            Some(_) => Proofs::Claim(from_json(text)?),
+            None => Proofs::View(from_json(text)?),
         })
     }
 

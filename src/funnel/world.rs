@@ -119,8 +119,7 @@ impl<'a> World<'a> {
             Ok(View {
                 camera: index,
                 volume: volume.map_err(|error| WorkloadError {
-                    path: input.path.name.clone(),
-                    index,
+                    place: input.path.place(index),
                     error: error.into(),
                 })?,
                 rays: Rays::of(camera).map_err(error)?,

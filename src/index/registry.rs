@@ -12,6 +12,7 @@ use super::{
     Wide, caught,
 };
 use crate::geometry::PlaneTree;
+use crate::json::told;
 use crate::query::ItemId;
 use crate::spec::{Spec, SpecError};
 use crate::threads::Pool;
@@ -43,12 +44,20 @@ impl Row {
             if nothing && let Ok(none) = serde_json::from_value(Value::Null) {
                 return Ok(none);
             }
-            serde_json::from_value(params.clone()).map_err(|error| BuildError::Params {
-                structure: T::INFO.name,
-                reason: match culprit::<T>(params) {
-                    Some(pair) => format!("{pair}: {error}"),
-                    None => error.to_string(),
-                },
+            serde_json::from_value(params.clone()).map_err(|error| {
+                let (found, expected) = told(&error);
+                let is_value = !found.starts_with("a field");
+                let found = match culprit::<T>(params) {
+                    Some(pair) if is_value => pair,
+                    _ => found,
+                };
+                BuildError::Params {
+                    structure: T::INFO.name,
+                    reason: match expected {
+                        Some(expected) => format!("{found}; expected {expected}"),
+                        None => found,
+                    },
+                }
             })
         }
         /// The one pair that cannot be read; serde's message lacks its name.
@@ -250,7 +259,7 @@ impl Registry {
             for spec in more {
                 if chosen.iter().any(|c| c.label == spec.label) {
                     return Err(SpecError::new(format_args!(
-                        "structure '{}' is named twice",
+                        "structure '{}' is named twice; expected each once",
                         spec.label
                     )));
                 }
@@ -363,13 +372,16 @@ mod tests {
     fn mistakes_are_named() {
         for (text, wanted) in [
             ("bhv", "did you mean 'bvh'"),
-            ("bvh:leav=4", "unknown field `leav`"),
-            ("bvh:leaf=many", "leaf"),
+            ("bvh:leav=4", "a field 'leav'; expected 'preset' or 'leaf'"),
+            (
+                "bvh:leaf=many",
+                "leaf=\"many\"; expected a whole number from 0 to 4294967295",
+            ),
             ("bvh:leaf=0", "leaf=0; expected 1 to 255"),
-            ("bvh:preset=best", "unknown variant `best`"),
+            ("bvh:preset=best", "preset=\"best\"; expected one of 'fast"),
             ("bvh,bvh", "named twice"),
             ("", "no structure"),
-            ("linear:leaf=3", "unknown field `leaf`"),
+            ("linear:leaf=3", "a field 'leaf'; expected none"),
         ] {
             let error = Registry::builtin()
                 .structures(text)

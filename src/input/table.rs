@@ -55,7 +55,11 @@ impl<R: Read> TableReader<R> {
             expected: expected.to_owned(),
         };
         if header.iter().all(String::is_empty) {
-            return Err(complain("an empty file".into(), "a header line"));
+            let found = match header.len() {
+                0 | 1 => "an empty file".to_owned(),
+                columns => format!("{} without a name", counted(columns, "column")),
+            };
+            return Err(complain(found, "a header line"));
         }
         let mut seen = HashSet::with_capacity(header.len());
         for name in header.iter().filter(|name| !name.is_empty()) {
@@ -148,6 +152,11 @@ impl Row<'_> {
             let (name, text) = (&self.header[column], shortened(self.text(column)));
             self.error(format!("{name} '{text}'"), "a finite number".into())
         })
+    }
+
+    /// Its line in the file, from 1.
+    pub fn line(&self) -> u64 {
+        self.line
     }
 
     /// An error at this row.
@@ -273,6 +282,24 @@ mod tests {
         // Longer than any buffer.
         let rows = format!("1,{}\r\n", "a".repeat(100)).repeat(5000);
         assert_eq!(bad_line(&format!("x,y\r\n{rows}q,2\r\n")), 5002);
+    }
+
+    #[test]
+    fn nothing_is_told_from_columns_without_names() {
+        for (text, wanted) in [
+            ("", "t.csv, line 1: an empty file; expected a header line"),
+            (
+                "\n\n",
+                "t.csv, line 2: an empty file; expected a header line",
+            ),
+            (
+                ",,\n1,2,3\n",
+                "t.csv, line 1: 3 columns without a name; expected a header line",
+            ),
+        ] {
+            let error = TableReader::open(text.as_bytes(), "t.csv").err().unwrap();
+            assert_eq!(error.to_string(), wanted, "{text:?}");
+        }
     }
 
     #[test]

@@ -35,7 +35,7 @@ metrics! {
     "query_ns_p99", "ns", "99th percentile over groups of cameras that are the same for all structures; absent below twenty groups";
     "query_ns_max", "ns", "slowest group of cameras";
     "query_wall_ns", "ns", "as query_ns, wall time";
-    "ns_per_visible", "ns", "CPU time of all queries / visible items of all queries";
+    "ns_per_visible", "ns", "query_ns / visible items of a timed camera, mean; interval scaled likewise";
     "speedup", "1", "time of linear / time of this structure: above 1 is faster; the ratio of the two query_ns";
     "times_read", "1", "time of this structure / time of reading all item bounds once (bound-read): what a scan is above the memory's speed";
     "times_memcpy", "1", "time of this structure / time of copying as many ids (bound-memcpy): what an answer is above its own size";

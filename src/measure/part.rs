@@ -85,10 +85,8 @@ pub struct TaskPart {
     /// CPU ns per query of groups of cameras that are the same for all tasks,
     /// median over the rounds; empty below twenty of them.
     pub tail_ns: Vec<f64>,
-    /// Ids returned by all queries, and CPU ns spent on them.
+    /// Ids returned by all queries.
     pub returned: u64,
-    /// CPU ns of the queries that `returned` counts.
-    pub spent_ns: f64,
 }
 
 /// One process, one group.

@@ -238,6 +238,15 @@ impl<'p> Facts<'p> {
         all.filter(move |t| t.label == label && t.task == task)
     }
 
+    /// Visible items of a timed camera, mean.
+    fn visible_when_timed(&self) -> Option<f64> {
+        let known = self.known()?;
+        let cameras = &known.query.as_ref()?.schedule.cameras;
+        let of_camera = |camera: &u32| Some(known.visible.get(*camera as usize)?.count);
+        let visible: u64 = cameras.iter().map(of_camera).sum::<Option<u64>>()?;
+        Some(visible as f64 / cameras.len() as f64)
+    }
+
     fn known(&self) -> Option<&'p Known> {
         self.parts.iter().find_map(|part| part.known.as_ref())
     }
@@ -395,6 +404,11 @@ impl<'p> Facts<'p> {
                 continue;
             };
             metrics.interval(time, shown.value, shown.lower.zip(shown.upper));
+            if let (TaskKind::Query, Some(visible)) = (task, self.visible_when_timed()) {
+                let interval = shown.lower.zip(shown.upper);
+                let interval = interval.map(|(lower, upper)| (lower / visible, upper / visible));
+                metrics.interval("ns_per_visible", shown.value / visible, interval);
+            }
             if let (Some(speedup), true) = (speedup, self.has_yardstick) {
                 let interval = shown.speedup_lower.zip(shown.speedup_upper);
                 metrics.interval(speedup, shown.speedup, interval);
@@ -403,12 +417,6 @@ impl<'p> Facts<'p> {
         let queries = || self.tasks(label, TaskKind::Query);
         let wall: Vec<f64> = queries().filter_map(|t| t.wall_ln_ns).collect();
         metrics.estimate("query_wall_ns", shown(&wall, &wall));
-        let returned: u64 = queries().map(|t| t.returned).sum();
-        metrics.ratio(
-            "ns_per_visible",
-            queries().map(|t| t.spent_ns).sum(),
-            returned as f64,
-        );
         let tails: Vec<&Vec<f64>> = queries().map(|t| &t.tail_ns).collect();
         let groups = tails.iter().map(|t| t.len()).min().unwrap_or(0);
         if groups >= LEAST_TAIL {

@@ -44,13 +44,11 @@ pub struct Workload<'a> {
 
 /// A camera of a path that has no such view.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
-#[error("path '{path}', camera {index}: {error}")]
+#[error("{place}: {error}")]
 #[non_exhaustive]
 pub struct WorkloadError {
-    /// Name of the path.
-    pub path: String,
-    /// Index of the camera.
-    pub index: usize,
+    /// Where it stands: [`CameraPath::place`].
+    pub place: String,
     /// What is wrong with it.
     pub error: CullingError,
 }
@@ -69,8 +67,7 @@ impl<'a> Workload<'a> {
             culling
                 .view(camera, &around)
                 .map_err(|error| WorkloadError {
-                    path: path.name.clone(),
-                    index,
+                    place: path.place(index),
                     error,
                 })
         });

@@ -31,8 +31,20 @@ pub struct CameraPath {
     pub name: String,
     /// In the order of the path.
     pub cameras: Vec<Camera>,
+    /// The line of each camera in the file that it was read from; empty for a spec.
+    pub lines: Vec<u64>,
     /// Scale of far and near that `visible=` has found.
     pub lens_scale: Option<f64>,
+}
+
+impl CameraPath {
+    /// Where a camera stands, for messages: by its line, or its index where it has none.
+    pub fn place(&self, index: usize) -> String {
+        match self.lines.get(index) {
+            Some(line) => format!("{}, line {line}", self.name),
+            None => format!("path '{}', camera {index}", self.name),
+        }
+    }
 }
 
 /// SHA-256 over frames and lenses: two paths with the same digest ask the same
@@ -265,6 +277,7 @@ pub fn load_scaled(
             Some(scale) => calibrate::scaled(source, &cameras, scale)?,
             None => cameras,
         },
+        lines: Vec::new(),
         lens_scale,
     })
 }

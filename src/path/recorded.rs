@@ -53,7 +53,8 @@ const FAR: f64 = 1000.0;
 ///
 /// # Errors
 /// The line of the first value that is no number or makes no camera; a file
-/// without cameras; matrices without a convention, or beside an eye or a lens.
+/// without cameras; matrices without a convention, or beside an eye or a lens; both a place to look at and a
+/// direction.
 pub fn read_cameras_csv(
     input: impl Read,
     file: &str,
@@ -61,11 +62,13 @@ pub fn read_cameras_csv(
 ) -> Result<CameraPath, PathError> {
     let table = TableReader::open(input, file)?;
     let is_matrix = MATRIX_ENTRIES.iter().any(|m| table.column(m).is_some());
-    let cameras = if is_matrix {
+    let (lines, cameras): (Vec<u64>, Vec<Camera>) = if is_matrix {
         matrices(table, defaults.matrix)?
     } else {
         eyes(table, defaults)?
-    };
+    }
+    .into_iter()
+    .unzip();
     if cameras.is_empty() {
         return Err(without_rows(file, "no camera").into());
     }
@@ -73,6 +76,7 @@ pub fn read_cameras_csv(
         lens_scale: None,
         name: file.to_owned(),
         cameras,
+        lines,
     })
 }
 
@@ -101,7 +105,7 @@ const OF_EYES: &str = "eye_x eye_y eye_z look_x look_y look_z forward_x forward_
 fn matrices(
     mut table: TableReader<impl Read>,
     convention: Option<MatrixConvention>,
-) -> Result<Vec<Camera>, InputError> {
+) -> Result<Vec<(u64, Camera)>, InputError> {
     let columns = table.columns(&MATRIX_ENTRIES)?;
     let mut of_eyes = OF_EYES.split(' ');
     if let Some(other) = of_eyes.find(|name| table.column(name).is_some()) {
@@ -125,7 +129,8 @@ fn matrices(
             *entry = row.finite_number(column)?;
         }
         let camera = Camera::of_matrix(entries, convention);
-        cameras.push(camera.map_err(|error| refused(&row, &error))?);
+        let camera = camera.map_err(|error| refused(&row, &error))?;
+        cameras.push((row.line(), camera));
     }
     Ok(cameras)
 }
@@ -133,9 +138,17 @@ fn matrices(
 fn eyes(
     mut table: TableReader<impl Read>,
     defaults: &LensDefaults,
-) -> Result<Vec<Camera>, InputError> {
+) -> Result<Vec<(u64, Camera)>, InputError> {
     let eye = table.columns(&["eye_x", "eye_y", "eye_z"])?;
-    let by_forward = table.column("forward_x").is_some() && table.column("look_x").is_none();
+    let has = |name: &str| ["_x", "_y", "_z"].map(|axis| table.column(&format!("{name}{axis}")));
+    let [looks, forwards] = ["look", "forward"].map(|name| has(name).iter().any(Option::is_some));
+    if looks && forwards {
+        return Err(table.error(
+            "columns look_* and forward_*".to_owned(),
+            "a place to look at or a direction, not both".to_owned(),
+        ));
+    }
+    let by_forward = forwards;
     let target = if by_forward {
         table.columns(&["forward_x", "forward_y", "forward_z"])?
     } else {
@@ -183,7 +196,8 @@ fn eyes(
                 lens: Lens::perspective(fovy, aspect, near, far)?,
             })
         };
-        cameras.push(camera().map_err(|error| refused(&row, &error))?);
+        let camera = camera().map_err(|error| refused(&row, &error))?;
+        cameras.push((row.line(), camera));
     }
     Ok(cameras)
 }
@@ -271,6 +285,10 @@ mod tests {
         assert!(read("").unwrap_err().to_string().contains("an empty file"));
         let none = read(&format!("{header}\n")).unwrap_err().to_string();
         assert!(none.contains("no camera"), "{none}");
+        let both = read(&format!("{header},forward_z\n{good},1\n"));
+        let wanted = "c.csv, line 1: columns look_* and forward_*; expected a place to look at or a \
+                      direction, not both";
+        assert_eq!(both.unwrap_err().to_string(), wanted);
         let wrong = read("x,y,z\n1,2,3\n").unwrap_err().to_string();
         assert!(wrong.contains("no column 'eye_x'"), "{wrong}");
     }

@@ -8,6 +8,7 @@ use super::judging::{Changes, CommonShift, JudgedRow, Lone, Outcome, work_change
 use super::matching::{Pair, asked_otherwise, grouped, matched, timed_otherwise};
 use super::{Report, ReportCell};
 use crate::measure::{CellKey, GroupKey, Status, Verdict};
+use crate::shown::number;
 use crate::statistics::{Judgement, judge_unpaired, median, trimmed_mean};
 
 /// Fewer other structures cannot tell which of them moved: the median of three
@@ -93,7 +94,7 @@ fn as_a_whole(pair: Pair) -> Option<JudgedRow> {
 fn answered_otherwise((old, new): Pair) -> Option<String> {
     let counts = old.value("visible_count").zip(new.value("visible_count"));
     let (was, is) = counts.filter(|(was, is)| was != is)?;
-    Some(format!("visible_count {was} and {is}"))
+    Some(format!("visible_count {} and {}", number(was), number(is)))
 }
 
 /// ln(time) in each process, old and new.

@@ -4,6 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::SCHEMA_VERSION;
+use crate::json::JsonError;
 
 pub(super) const REPORT: &str = "report.json";
 pub(super) const SUMMARY: &str = "summary.csv";
@@ -22,17 +23,15 @@ pub enum FolderError {
         /// What the system says.
         source: io::Error,
     },
-    /// `place` is a line with a column, and the path of the value there.
-    #[error("{}, {place}: {found}; expected the report of a run{wanted}", path.display())]
+    /// Not the report or the stream of a run.
+    #[error("{}, {}: {}; expected {}", path.display(), error.place(), error.found, error.expected_of(whole))]
     Json {
         /// File that was read.
         path: PathBuf,
-        /// Line with a column, and the path of the value.
-        place: String,
-        /// What is there.
-        found: String,
-        /// `, here ` with what was expected in that place, where it is known.
-        wanted: String,
+        /// Where, and what is there.
+        error: Box<JsonError>,
+        /// What the file should be.
+        whole: &'static str,
     },
     /// A report of another schema.
     #[error("{}: schema version {found}; expected {SCHEMA_VERSION}", path.display())]
@@ -54,15 +53,17 @@ pub enum FolderError {
         /// Folder of the run.
         path: PathBuf,
     },
-    /// A line of the stream that cannot be read or does not belong there.
-    #[error("{}, line {line}: {reason}; expected the stream of a run", path.display())]
+    /// A line of the stream that does not belong there.
+    #[error("{}, line {line}: {found}; expected {expected}", path.display())]
     Line {
         /// File of the stream.
         path: PathBuf,
         /// From 1.
         line: usize,
-        /// What is wrong with it.
-        reason: String,
+        /// What is there.
+        found: String,
+        /// The rule.
+        expected: &'static str,
     },
 }
 
@@ -71,7 +72,16 @@ impl FolderError {
     pub(super) fn io(path: &Path) -> impl Fn(io::Error) -> FolderError + Copy {
         move |source| FolderError::Io {
             path: path.to_owned(),
-            source,
+            source: bare(source),
         }
+    }
+}
+
+/// What the system says, without the name of a temporary file that was wrapped around it.
+pub fn bare(error: io::Error) -> io::Error {
+    // `tempfile` wraps it so, and hands on no more of it than its kind and text.
+    match error.to_string().split_once(" at path \"") {
+        Some((said, _)) if error.get_ref().is_some() => io::Error::new(error.kind(), said),
+        _ => error,
     }
 }

@@ -15,7 +15,7 @@ use super::reading::read_stream;
 use super::stream::{Header, KeptPart, Line, Stream};
 use super::{Report, ReportCell};
 use crate::measure::{METRICS, Part, TaskSamples};
-use crate::shown::field;
+use crate::shown::shown_field;
 
 /// How names of half-written files begin and end.
 const TEMPORARY: (&str, &str) = (".cullbench-", ".tmp");
@@ -102,6 +102,7 @@ impl RunFolder {
     /// [`FolderError::Taken`] if it holds a file of a run already.
     pub fn create(path: &Path, header: &Header) -> Result<RunFolder, FolderError> {
         let io = FolderError::io(path);
+        let is_new = !path.exists();
         fs::create_dir_all(path).map_err(io)?;
         refuse_taken(path)?;
         // There is no stream without its first line: it gets its name with it.
@@ -114,7 +115,13 @@ impl RunFolder {
             Ok(stream)
         };
         let file = path.join(STREAM);
-        let stream = match begin().map_err(io)?.persist_noclobber(&file) {
+        let begun = begin().map_err(|error| {
+            if is_new {
+                let _ = fs::remove_dir(path);
+            }
+            io(error)
+        })?;
+        let stream = match begun.persist_noclobber(&file) {
             Ok(stream) => stream,
             Err(error) if error.error.kind() == io::ErrorKind::AlreadyExists => {
                 return Err(FolderError::Taken {
@@ -129,7 +136,10 @@ impl RunFolder {
             samples: open(&path.join(SAMPLES))?,
             samples_end: 0,
         };
-        folder.begin_samples()?;
+        if let Err(error) = folder.begin_samples() {
+            folder.discard();
+            return Err(error);
+        }
         folder.sweep();
         Ok(folder)
     }
@@ -189,8 +199,8 @@ impl RunFolder {
         let mut write = || -> Result<Vec<u8>, csv::Error> {
             let mut csv = csv::Writer::from_writer(Vec::new());
             for (label, task, samples) in samples {
-                let names =
-                    [&key.scene, &key.path, &key.cache, label, &key.test].map(|name| field(name));
+                let names = [&key.scene, &key.path, &key.cache, label, &key.test]
+                    .map(|name| shown_field(name));
                 for s in samples {
                     let at = (part.process, s.round, s.frame, s.queries);
                     let [cpu_ns, wall_ns] = [s.cpu_ns, s.wall_ns].map(|ns| format!("{ns:.1}"));
@@ -382,17 +392,17 @@ pub fn save_report(folder: &Path, report: &Report) -> Result<(), FolderError> {
 type Column = (&'static str, fn(&ReportCell) -> String);
 
 const SUMMARY_COLUMNS: [Column; 16] = [
-    ("scene", |cell| field(&cell.scene.name).into_owned()),
-    ("path", |cell| field(&cell.path.name).into_owned()),
+    ("scene", |cell| shown_field(&cell.scene.name)),
+    ("path", |cell| shown_field(&cell.path.name)),
     ("cache", |cell| cell.path.cache.clone()),
-    ("structure", |cell| field(&cell.structure).into_owned()),
+    ("structure", |cell| shown_field(&cell.structure)),
     ("test", |cell| cell.test.clone()),
     ("arithmetic", |cell| cell.path.arithmetic.clone()),
     ("planes", |cell| cell.path.planes.clone()),
     ("epsilon", |cell| cell.path.epsilon.to_string()),
     ("status", |cell| cell.status.name().to_owned()),
     ("reason", |cell| {
-        field(cell.reason.as_deref().unwrap_or_default()).into_owned()
+        shown_field(cell.reason.as_deref().unwrap_or_default())
     }),
     ("rank", |cell| text(cell.rank)),
     ("processes", |cell| cell.times.processes.to_string()),
@@ -463,6 +473,20 @@ mod tests {
         let nowhere = folder.path().join("no/file.txt");
         let error = write_atomically(&nowhere, |_| Ok(())).unwrap_err();
         assert!(!error.to_string().contains(".cullbench-"), "{error}");
+    }
+
+    #[test]
+    fn nobody_is_told_of_temporary_files() {
+        let error = temporary_in(Path::new("no/such")).unwrap_err();
+        assert!(
+            error.to_string().contains(TEMPORARY.0),
+            "the premise: {error}"
+        );
+        let told = FolderError::io(Path::new("no/such"))(error).to_string();
+        assert!(
+            told.starts_with("no/such: ") && !told.contains(TEMPORARY.0),
+            "{told}"
+        );
     }
 
     #[cfg(unix)]

@@ -79,6 +79,11 @@ pub fn merge(folders: &[PathBuf], args: &[String], partial: bool) -> Result<Merg
     }
     let (first, begin) = &shards[0];
     for (n, (path, stream)) in shards.iter().enumerate() {
+        if stream.header.run.shard.is_none() {
+            let reason = "a whole run; expected a shard (run --shard i/n)".to_owned();
+            let path = path.to_path_buf();
+            return Err(MergeError::Apart { path, reason });
+        }
         let mut before = shards[..n].iter();
         let reason = another_plan(&begin.header, &stream.header, first)
             .or_else(|| before.find_map(|(before, other)| overlap(stream, other, before)));

@@ -17,7 +17,7 @@ mod stream;
 mod surface;
 
 pub use changes::changes;
-pub use files::FolderError;
+pub use files::{FolderError, bare};
 pub use folder::{RunFolder, StoppedRun, save_report, temporary_in, write_atomically};
 pub use growth::{Growth, growths};
 pub use judging::{

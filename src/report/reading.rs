@@ -2,14 +2,18 @@
 //! stopped at any moment. Every error says where, what was found and what was
 //! expected.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
 use super::files::{FolderError, REPORT, STREAM};
-use super::stream::{Line, Stream};
+use super::stream::{Header, KeptPart, Stream};
 use super::{Report, SCHEMA_VERSION};
+use crate::json::{JsonError, from_json};
+use crate::measure::{GroupKey, Part};
+use crate::shown::plain;
 
 /// Reads a report from its file, or from the folder of a run, finished or not.
 /// Fields that it does not know are ignored.
@@ -38,103 +42,124 @@ fn read_json(path: PathBuf) -> Result<Report, FolderError> {
         schema_version: u32,
     }
     let bytes = fs::read(&path).map_err(FolderError::io(&path))?;
-    let text = std::str::from_utf8(&bytes).map_err(|error| {
-        let (good, bad) = bytes.split_at(error.valid_up_to());
-        let line = good.iter().filter(|byte| **byte == b'\n').count() + 1;
-        let column = good.iter().rev().take_while(|byte| **byte != b'\n').count() + 1;
-        FolderError::Json {
-            path: path.clone(),
-            place: format!("line {line}, column {column}"),
-            found: format!("byte {:#04x}, which is no UTF-8", bad.first().unwrap_or(&0)),
-            wanted: String::new(),
-        }
-    })?;
-    let Versioned { schema_version } = from_json(text, &path)?;
+    let bad = |error| FolderError::Json {
+        path: path.clone(),
+        error: Box::new(error),
+        whole: "the report of a run",
+    };
+    let Versioned { schema_version } = from_json(&bytes).map_err(bad)?;
     if schema_version != SCHEMA_VERSION {
         return Err(FolderError::Version {
             path,
             found: schema_version,
         });
     }
-    from_json(text, &path)
-}
-
-/// Reads JSON; an error names line, column and the path of the value.
-fn from_json<'t, T: Deserialize<'t>>(text: &'t str, path: &Path) -> Result<T, FolderError> {
-    let mut json = serde_json::Deserializer::from_str(text);
-    let read = serde_path_to_error::deserialize(&mut json);
-    let (value_path, error) = match read {
-        Ok(value) => match json.end() {
-            Ok(()) => return Ok(value),
-            Err(error) => (String::new(), error),
-        },
-        Err(error) => match error.path().to_string() {
-            top if top == "." => (String::new(), error.into_inner()),
-            inside => (format!(", {inside}"), error.into_inner()),
-        },
-    };
-    let told = error.to_string();
-    let told = told.split(" at line ").next().unwrap_or_default();
-    let (found, wanted) = match told.rsplit_once(", expected ") {
-        Some((found, wanted)) => (found, format!(", here {wanted}")),
-        None => (told, String::new()),
-    };
-    Err(FolderError::Json {
-        path: path.to_owned(),
-        place: format!(
-            "line {}, column {}{value_path}",
-            error.line(),
-            error.column()
-        ),
-        found: found.to_owned(),
-        wanted,
-    })
+    from_json(&bytes).map_err(bad)
 }
 
 /// Reads the stream of a run, and how long it is without half a line at its end.
 ///
 /// # Errors
-/// What the file system says; a line that is none (by its number); another
-/// schema version.
+/// What the file system says; a line that is none or does not belong there (by its
+/// number); another schema version.
 pub fn read_stream(path: &Path) -> Result<(Stream, u64), FolderError> {
+    /// Read first: what the rest of the line is.
+    #[derive(Deserialize)]
+    struct Tag {
+        line: String,
+        schema_version: Option<u32>,
+    }
     let bytes = fs::read(path).map_err(FolderError::io(path))?;
     let whole = bytes
         .iter()
         .rposition(|b| *b == b'\n')
         .map_or(0, |at| at + 1);
-    let bad = |line: usize, reason: String| FolderError::Line {
-        path: path.to_owned(),
-        line: line + 1,
-        reason,
-    };
-    let mut header = None;
+    let mut header: Option<Header> = None;
     let (mut parts, mut finished_at) = (Vec::new(), None);
+    let mut seen = BTreeSet::new();
     for (n, text) in bytes[..whole].split(|b| *b == b'\n').enumerate() {
         if text.is_empty() {
             continue;
         }
-        match serde_json::from_slice(text).map_err(|e| bad(n, e.to_string()))? {
-            Line::Run(found) if found.schema_version != SCHEMA_VERSION => {
-                return Err(FolderError::Version {
-                    path: path.to_owned(),
-                    found: found.schema_version,
-                });
+        let no_json = |error| FolderError::Json {
+            path: path.to_owned(),
+            error: Box::new(JsonError {
+                line: n + 1,
+                ..error
+            }),
+            whole: "the stream of a run",
+        };
+        let bad = |found: String, expected| FolderError::Line {
+            path: path.to_owned(),
+            line: n + 1,
+            found,
+            expected,
+        };
+        let tag: Tag = from_json(text).map_err(no_json)?;
+        match (tag.line.as_str(), &header) {
+            ("run", None) => {
+                let version = tag.schema_version.unwrap_or(SCHEMA_VERSION);
+                if version != SCHEMA_VERSION {
+                    return Err(FolderError::Version {
+                        path: path.to_owned(),
+                        found: version,
+                    });
+                }
+                header = Some(from_json(text).map_err(no_json)?);
             }
-            Line::Run(found) => header = Some(*found),
-            Line::Part(kept) => {
+            ("run", Some(_)) => {
+                return Err(bad("a second header".to_owned(), "one, in the first line"));
+            }
+            ("part", Some(header)) => {
+                let kept: KeptPart = from_json(text).map_err(no_json)?;
+                let Part { key, process, .. } = &kept.part;
+                let group = header.groups.iter().position(|group| group == key);
+                let found = || {
+                    let GroupKey {
+                        scene, path, test, ..
+                    } = key;
+                    let process = u64::from(*process) + 1;
+                    format!("process {process} of {scene}, {path}, {test}")
+                };
+                let Some(group) = group.filter(|_| *process < header.run.processes) else {
+                    return Err(bad(found(), "a part of the plan in the first line"));
+                };
+                // Counted twice, it would be a process more than there was.
+                if !seen.insert((group, *process)) {
+                    return Err(bad(found() + " a second time", "each part once"));
+                }
                 finished_at = None;
-                parts.push(*kept);
+                parts.push(kept);
             }
-            Line::Finished { at } => finished_at = Some(at),
+            ("finished", Some(_)) => {
+                let Finished { at } = from_json(text).map_err(no_json)?;
+                finished_at = Some(at);
+            }
+            (_, None) => break,
+            (other, _) => {
+                let found = format!("a line '{}'", plain(other));
+                return Err(bad(found, "'part' or 'finished'"));
+            }
         }
     }
-    let header = header.ok_or_else(|| bad(0, "no run begins here".to_owned()))?;
+    let header = header.ok_or_else(|| FolderError::Line {
+        path: path.to_owned(),
+        line: 1,
+        found: "no run begins here".to_owned(),
+        expected: "the stream of a run",
+    })?;
     let stream = Stream {
         header,
         parts,
         finished_at,
     };
     Ok((stream, whole as u64))
+}
+
+/// The last line, as it is read.
+#[derive(Deserialize)]
+struct Finished {
+    at: String,
 }
 
 #[cfg(test)]
@@ -158,8 +183,8 @@ mod tests {
                 "{\"schema_version\": 3, \"cells\": 7}",
                 "version 3; expected 2",
             ),
-            ("{\"schema_version\": 2}", "missing field `run`"),
-            ("{}", "missing field `schema_version`"),
+            ("{\"schema_version\": 2}", "no field 'run'"),
+            ("{}", "no field 'schema_version'"),
             ("[1, 2]", "expected the report of a run"),
             ("", "expected the report of a run"),
         ] {

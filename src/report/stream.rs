@@ -15,7 +15,7 @@ use crate::scene::GENERATOR_NAME;
 use crate::statistics::two_speeds;
 
 /// A line of stream.jsonl.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, PartialEq, Debug, Serialize)]
 #[serde(tag = "line", rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Line {
@@ -76,7 +76,7 @@ type Fact = (&'static str, fn(&Header) -> Option<String>);
 impl Header {
     /// The first thing that tells machine, build or program of two runs apart.
     pub fn differs_in_place(&self, other: &Header) -> Option<Difference> {
-        const FACTS: [Fact; 17] = [
+        const FACTS: [Fact; 19] = [
             ("schema version", |h| Some(h.schema_version.to_string())),
             ("processor", |h| h.machine.cpu.clone()),
             ("number of cores", |h| Some(h.machine.cores.to_string())),
@@ -85,6 +85,16 @@ impl Header {
             }),
             ("list of processor features", |h| {
                 Some(h.machine.features.join(","))
+            }),
+            ("list of caches", |h| {
+                let caches = h.machine.caches.iter();
+                let told = caches.map(|c| format!("L{} {} KiB", c.level, c.bytes >> 10));
+                Some(told.collect::<Vec<_>>().join(", "))
+            }),
+            // A system keeps some of it for itself, now more, now less.
+            ("memory", |h| {
+                let bytes = h.machine.memory_bytes? as f64;
+                Some(format!("{:.0} GiB", bytes / f64::from(1 << 30)))
             }),
             ("system", |h| h.machine.os.clone()),
             ("kernel of the system", |h| h.machine.kernel.clone()),

@@ -10,6 +10,7 @@ use serde_json::Value;
 use super::json::{At, of, shown};
 use super::vector::{Names, Vector};
 use crate::input::InputError;
+use crate::json::from_json;
 
 /// The vectors that come with the program.
 pub const BUILT_IN: &str = include_str!("../../datasets/vectors.json");
@@ -43,17 +44,11 @@ pub fn read_vectors_file(path: &Path) -> Result<Vec<Vector>, InputError> {
 /// # Errors
 /// One line: the file, the vector and field, what was found and expected.
 pub fn read_vectors(bytes: &[u8], file: &str) -> Result<Vec<Vector>, InputError> {
-    // What some editors put in front of UTF-8.
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    let json: Value = serde_json::from_slice(bytes).map_err(|error| {
-        let text = error.to_string();
-        let found = text.split(" at line ").next().unwrap_or_default();
-        InputError::Line {
-            file: file.to_owned(),
-            line: error.line() as u64,
-            found: format!("column {}: {}", error.column(), shown(found)),
-            expected: "JSON: an object with the array 'vectors'".into(),
-        }
+    let json: Value = from_json(bytes).map_err(|error| InputError::Value {
+        file: file.to_owned(),
+        place: error.place(),
+        found: error.found,
+        expected: "JSON: an object with the array 'vectors'".into(),
     })?;
     let list = match &json {
         Value::Array(list) => list,
@@ -177,10 +172,10 @@ mod tests {
         let boxed = |b: &str| format!(r#"[{{"id":"v","boxes":[{b}]}}]"#);
         let with = |field: &str| format!(r#"[{{"id":"v",{field}}}]"#);
         let cases = [
-            (String::new(), "f.json, line 1: column 0: EOF"),
+            (String::new(), "f.json, line 1, column 0: the text ends"),
             (
                 "{\"vectors\":[}".into(),
-                "f.json, line 1: column 13: expected value",
+                "f.json, line 1, column 13: no JSON (expected value)",
             ),
             ("3".into(), "the top level: '3'; expected an object"),
             ("{}".into(), "no array 'vectors'"),

@@ -379,7 +379,7 @@ fn mistakes_are_one_line() {
         ("--moved 101%", "--moved is '101%' | at most 100%"),
         ("--moved some", "--moved is 'some'"),
         ("--processes 0", "0 | --processes"),
-        ("--fovy 0", "field of view is 0"),
+        ("--fovy 0", "--fovy is '0'"),
     ] {
         all_refused(&folder, &[format!("{line} {more}")], wanted);
     }

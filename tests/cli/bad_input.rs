@@ -4,7 +4,7 @@
 use std::fs;
 
 use super::process::*;
-use super::{BOXES, FULL_CAMERA};
+use super::{BOXES, EYE_LOOK, FULL_CAMERA};
 
 /// Every command that reads a scene.
 fn commands_with_scene(scene: &str) -> [String; 10] {
@@ -149,7 +149,7 @@ fn a_scene_file_that_is_none_is_refused_by_every_command() {
 #[test]
 fn a_scene_spec_that_is_none_is_refused_by_every_command() {
     let cases: [(&str, &str); 17] = [
-        ("city:n=200%", "n=200% | a whole number from 0"),
+        ("city:n=200%", "n is '200%' | a whole number from 0"),
         (
             "unifrom",
             "unknown scene 'unifrom' | did you mean 'uniform'",
@@ -157,16 +157,16 @@ fn a_scene_spec_that_is_none_is_refused_by_every_command() {
         ("helsinky", "did you mean 'helsinki'"),
         ("''", "unknown scene '' | uniform | helsinki"),
         ("city:n", "city:n | 'n' | key=value"),
-        ("city:n=many", "n=many | a whole number from 0"),
-        ("city:n=-1", "n=-1"),
-        ("city:n=1.5", "n=1.5"),
-        ("city:n=1e30", "n=1e30"),
-        ("city:n=1,n=2", "'n' is given twice"),
+        ("city:n=many", "n is 'many' | a whole number from 0"),
+        ("city:n=-1", "n is '-1'"),
+        ("city:n=1.5", "n is '1.5'"),
+        ("city:n=1e30", "n is '1e30'"),
+        ("city:n=1,n=2", "'n' is given twice; expected it once"),
         ("city:sed=3", "unknown parameter | did you mean 'seed'"),
-        ("uniform:n=9,side=0", "side=0 | a number above 0"),
-        ("uniform:n=9,side=nan", "side=nan | a number"),
+        ("uniform:n=9,side=0", "side is '0' | a number above 0"),
+        ("uniform:n=9,side=nan", "side is 'nan' | a number"),
         ("uniform:n=9,offset=1e300,size=1e300", "f32"),
-        ("rooms:n=9,room=1e-300", "room=1e-300 | between"),
+        ("rooms:n=9,room=1e-300", "room is '1e-300' | between"),
         ("helsinki:n=5", "unknown parameter | 'n'"),
         ("two\nlines", "unknown scene 'two lines'"),
     ];
@@ -202,7 +202,7 @@ fn cameras_that_are_none_are_refused_with_line_and_rule() {
         all_refused(&folder, &commands_with_cameras("bad.csv"), &wanted);
     }
     let wad = map12();
-    let files: [(&[u8], &str); 10] = [
+    let files: [(&[u8], &str); 12] = [
         (b"", "line 1 | empty file"),
         (b"\n\n\n", "empty file"),
         (FULL_CAMERA.as_bytes(), "line 2 | no camera"),
@@ -224,6 +224,11 @@ fn cameras_that_are_none_are_refused_with_line_and_rule() {
             b"eye_x,eye_y,eye_z,\"a\nb\",\"a\nb\"\n",
             "line 1 | column 'a b' twice",
         ),
+        (
+            b"eye_x,eye_y,eye_z,look_x,look_y,look_z,forward_x\n0,0,0,1,0,0,1\n",
+            "line 1 | look_* and forward_* | not both",
+        ),
+        (b",,,\n,,,\n", "line 1 | 4 columns without a name"),
         (&wad, "line 1"),
     ];
     for (bytes, wanted) in files {
@@ -238,7 +243,10 @@ fn cameras_that_are_none_are_refused_with_line_and_rule() {
             "visible=200% | a share between 0 and 1",
         ),
         ("orbit:visible=-5%", "visible=-5% | a share between 0 and 1"),
-        ("orbit:frames=200%", "frames=200% | a whole number"),
+        (
+            "orbit:frames=200%",
+            "frames is '200%' | a whole number from 1 to",
+        ),
         ("orbit:far=-1", "far is -1 | expected a number above 0"),
         ("orbit:far=0", "far is 0 | expected a number above 0"),
         ("orbit:far=5e-324", "far is 5e-324 | expected"),
@@ -248,7 +256,10 @@ fn cameras_that_are_none_are_refused_with_line_and_rule() {
         ("folder.csv", "folder.csv: Is a directory"),
         ("orbt", "unknown path 'orbt' | did you mean 'orbit'"),
         ("''", "unknown path '' | orbit"),
-        ("orbit:frames=few", "frames=few | a whole number"),
+        (
+            "orbit:frames=few",
+            "frames is 'few' | a whole number from 1 to",
+        ),
         ("orbit:frame=3", "did you mean 'frames'"),
         ("orbit:fovy=0", "camera 0 | 0 degrees | expected"),
         ("orbit:fovy=180", "180 degrees"),
@@ -326,12 +337,12 @@ fn options_that_name_nothing_are_refused_with_the_nearest_name() {
         ("--structure all,linear", "'linear' | twice"),
         ("--structure bvh:leaf=many", "leaf | many"),
         ("--structure bvh:leaf=0", "leaf=0 | expected 1 to"),
-        ("--structure bvh:leave=4", "`leave` | `leaf`"),
+        ("--structure bvh:leave=4", "'leave' | 'leaf'"),
         (
             "--structure bvh:layout=cwbvh",
-            "`layout` | `preset` or `leaf`",
+            "'layout' | 'preset' or 'leaf'",
         ),
-        ("--structure linear:leaf=4", "linear | `leaf`"),
+        ("--structure linear:leaf=4", "linear | 'leaf'"),
         (
             "--test six-plain",
             "unknown test 'six-plain' | did you mean 'six-plane'",
@@ -343,8 +354,8 @@ fn options_that_name_nothing_are_refused_with_the_nearest_name() {
         ("--epsilon -1", "--epsilon is '-1'; expected"),
         ("--epsilon nan", "--epsilon is 'nan'; expected"),
         ("--far away", "--far is 'away' | expected"),
-        ("--fovy 0", "0 degrees | 0 < fov < 180"),
-        ("--near 0", "near is 0 | expected"),
+        ("--fovy 0", "--fovy is '0' | above 0 and below 180"),
+        ("--near 0", "--near is '0' | expected"),
         ("--near 7 --far 7", "expected near < far"),
     ];
     let folder = with_good_files(&[]);
@@ -374,7 +385,11 @@ fn options_that_name_nothing_are_refused_with_the_nearest_name() {
         "nothing to verify | expected",
     );
     let twice = "run --out new --path orbit --scene scene.csv --scene scene.csv";
-    all_refused(&folder, &[twice], "scene 'scene.csv' is named twice");
+    all_refused(
+        &folder,
+        &[twice],
+        "scene 'scene.csv' is named twice; expected each once",
+    );
 }
 
 #[test]
@@ -390,7 +405,67 @@ fn usage_errors_are_one_line_that_says_what_was_expected() {
         ("run --sead 3", "'--sead' | did you mean '--seed'"),
         (
             "run --seed x --out new",
-            "'x' for '--seed <SEED>'; expected a whole number",
+            "--seed is 'x'; expected a whole number from 0",
+        ),
+        (
+            "run --plan --resume",
+            "'--plan' cannot be used with '--resume' | expected",
+        ),
+        (
+            "run --seed -1 --out new",
+            "--seed is '-1'; expected a whole number from 0",
+        ),
+        (
+            "run --processes 0 --out new",
+            "--processes is '0'; expected a whole number from 1 to 1000",
+        ),
+        (
+            "run --timeout -3 --out new",
+            "--timeout is '-3'; expected a whole number from 1",
+        ),
+        (
+            "verify --cases -1",
+            "--cases is '-1'; expected a whole number from 0",
+        ),
+        (
+            "precision --scene scene.csv --frames 0",
+            "--frames is '0'; expected a whole number from 1",
+        ),
+        (
+            "query --scene scene.csv --cameras orbit --threads 0",
+            "--threads is '0'; expected a whole number from 1 to 256",
+        ),
+        (
+            "query --scene scene.csv --cameras orbit --fovy nan",
+            "--fovy is 'nan'; expected a number above 0 and below 180",
+        ),
+        (
+            "query --scene scene.csv --cameras orbit --near=-4",
+            "--near is '-4'; expected a number above 0",
+        ),
+        (
+            "query --scene scene.csv --cameras orbit --near 9 --far 3",
+            "--near is 9 and --far 3; expected near < far",
+        ),
+        (
+            "query --scene scene.csv --cameras orbit --epsilon 1e300",
+            "--epsilon is '1e300'; expected a number from 0 to 1e9",
+        ),
+        (
+            "query --scene scene.csv --cameras orbit:frames=0",
+            "in 'orbit': frames is '0'; expected a whole number from 1 to 1000000",
+        ),
+        (
+            "funnel --scene city:n=9 --triangle x --region portals",
+            "--region is 'portals'; expected none | 'city:n=9' has nothing for that stage",
+        ),
+        (
+            "compare a.json b.json --seed 3 --test sphere",
+            "--test says what --against BINARY measures | expected no --test",
+        ),
+        (
+            "compare --against scene.csv --metric build_ms",
+            "'--metric <LIST>' | cannot be used with | '--against <BINARY>' | expected",
         ),
         (
             "advise --scene scene.csv --path orbit --draw-ns x",
@@ -443,7 +518,11 @@ fn places_that_cannot_be_written_to_are_named_and_stay_as_they_are() {
             "kept.csv/x.csv",
             "kept.csv/x.csv: Not a directory",
         ),
-        (run, "kept.csv", "kept.csv: File exists"),
+        (
+            run,
+            "kept.csv",
+            "kept.csv: not a folder; expected a folder for --out",
+        ),
         (run, "kept.csv/run", "kept.csv/run: Not a directory"),
     ];
     for (command, out, wanted) in cases {
@@ -456,6 +535,28 @@ fn places_that_cannot_be_written_to_are_named_and_stay_as_they_are() {
     all_refused(&folder, &[mine], "mine | expected an empty or new folder");
     let resume = format!("{run} nowhere --resume");
     all_refused(&folder, &[resume], "nowhere/stream.jsonl: No such file");
+    let wanted = "no unfinished run in results; expected one | --out DIR";
+    all_refused(&folder, &["run --resume"], wanted);
+    let cache = "funnel --scene scene.csv --truth-cache kept.csv";
+    let wanted = "kept.csv: not a folder; expected a folder for --truth-cache";
+    all_refused(&folder, &[cache], wanted);
+}
+
+/// A row may be a camera whose planes do not fit f32.
+#[test]
+fn a_camera_too_far_away_is_named_by_its_line() {
+    let far = format!("{EYE_LOOK}\n\n0,0,0,1,0,0\n1e300,0,0,0,1,0\n");
+    let folder = with_good_files(&[("far.csv", far.as_bytes())]);
+    let lines = [
+        "query --scene scene.csv --cameras far.csv",
+        "run --scene scene.csv --path far.csv --out new",
+        "funnel --scene scene.csv --path far.csv",
+    ];
+    all_refused(
+        &folder,
+        &lines,
+        "far.csv, line 4: | does not fit f32 | expected",
+    );
 }
 
 #[test]

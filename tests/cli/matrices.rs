@@ -215,6 +215,6 @@ fn matrices_that_are_no_cameras_are_refused_in_one_line() {
     all_refused(
         &folder,
         &[planes],
-        "camera 0 | planes of its own | expected --planes frame",
+        "m.csv, line 2: | planes of its own | expected --planes frame",
     );
 }

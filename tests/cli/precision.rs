@@ -586,7 +586,7 @@ fn mistakes_are_one_line() {
             "bhv | did you mean 'bvh'",
         ),
         ("--scene nothing.csv", "nothing.csv"),
-        ("--scene city:n=10 --fovy 0", "field of view is 0"),
+        ("--scene city:n=10 --fovy 0", "--fovy is '0'"),
         (
             "--scene city:n=10 --kernel avx3",
             "avx3 | did you mean 'avx2'",

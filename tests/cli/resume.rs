@@ -214,6 +214,16 @@ fn only_the_recorded_run_goes_on() {
         ("/machine/cpu", "Another".into(), "processor was 'Another'"),
         ("/machine/cores", 99.into(), "number of cores was '99'"),
         (
+            "/machine/caches",
+            serde_json::json!([{"level": 3, "bytes": 3 << 20}]),
+            "list of caches was 'L3 3072 KiB'",
+        ),
+        (
+            "/machine/memory_bytes",
+            (5u64 << 40).into(),
+            "memory was '5120 GiB'",
+        ),
+        (
             "/machine/kernel",
             "2.4".into(),
             "kernel of the system was '2.4'",

@@ -169,7 +169,11 @@ fn what_must_not_be_mixed_is_refused_by_name() {
     for (place, value, wanted) in [
         ("/run/seed", Value::from(9), "part2 | seed is '9'"),
         ("/run/suite", "quick".into(), "suite is 'quick'"),
-        ("/run/processes", 1.into(), "number of processes is '1'"),
+        (
+            "/run/processes",
+            1.into(),
+            "stream.jsonl, line | process 2 of city:n=300 | expected a part of the plan",
+        ),
         (
             "/structures/1",
             "bsp".into(),
@@ -221,10 +225,33 @@ fn what_must_not_be_mixed_is_refused_by_name() {
     cut(2);
     refused("part2 | not finished");
     restore();
+    // Counted twice, a process would be two.
+    let lines: Vec<&str> = text.lines().collect();
+    for (twice, wanted) in [
+        (lines[0], "line 2: a second header; expected one"),
+        (
+            lines[1],
+            "line 3: process 1 of city:n=300 | a second time; expected each part once",
+        ),
+    ] {
+        let more = text.replace(twice, &format!("{twice}\n{twice}"));
+        fs::write(part2.join("stream.jsonl"), more).expect("writable");
+        refused(&format!("part2/stream.jsonl, {wanted}"));
+    }
+    let bad = text.replacen("\"process\":0", "\"process\":-7", 1);
+    fs::write(part2.join("stream.jsonl"), bad).expect("writable");
+    refused("stream.jsonl, line 2, column | part.process: '-7'; expected | a whole number from 0");
+    restore();
     let samples = fs::read(part2.join("samples.csv")).expect("samples");
     fs::write(part2.join("samples.csv"), &samples[..samples.len() - 1]).expect("writable");
     refused("part2/samples.csv | bytes; expected");
     fs::write(part2.join("samples.csv"), &samples).expect("writable");
+
+    works(folder.path(), &format!("{PLAN} --out whole"));
+    let wanted = "whole: a whole run; expected a shard (run --shard i/n)";
+    for runs in ["whole", "part1 whole", "whole part1 part2"] {
+        all_refused(&folder, &[format!("merge {runs} --out merged")], wanted);
+    }
 
     let twice = ["merge part1 part2 part1 --out merged"];
     all_refused(

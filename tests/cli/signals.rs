@@ -68,9 +68,13 @@ fn an_interrupted_run_keeps_its_finished_cells_and_goes_on() {
     // The first line is the header.
     wait_until("no first part", || lines() >= 2);
     let done = interrupt(child);
-    assert_stopped(&done, &line);
-    let told = "finished cells were saved; continue with --resume";
-    assert!(done.out.contains(told), "{}", done.out);
+    let told = "interrupted: finished cells were saved; continue with --resume\n";
+    assert_eq!((done.code, done.err.as_str()), (Some(130), told), "{line}");
+    assert!(
+        done.out.contains("1 of 2 processes: times without"),
+        "{}",
+        done.out
+    );
 
     let stopped = report(&run);
     let all = paths.len() * 2;
@@ -110,11 +114,16 @@ fn ctrl_c_ends_commands_that_keep_nothing() {
         "scene generate uniform:n=2000000 --out kept.csv",
         "advise --scene uniform:n=3000 --processes 1000",
         "precision --scene uniform:n=300 --cubes 0 --processes 1000",
+        // Before anything is timed it is judged, which takes minutes.
+        "precision --scene uniform:n=100000 --structure bvh",
+        "precision --scene uniform:n=300 --structure linear --processes 1",
     ];
     for line in commands {
         let child = start(folder.path(), line);
         sleep(Duration::from_millis(300));
+        let begin = Instant::now();
         assert_stopped(&interrupt(child), line);
+        assert!(begin.elapsed() < Duration::from_secs(2), "{line}");
         assert!(contents(folder.path()) == before, "{line}");
     }
 }

@@ -283,7 +283,7 @@ fn a_file_that_is_wrong_is_refused_in_one_line() {
         ("empty.json", b"", "empty.json, line 1 | expected JSON"),
         ("cut.json", b"{\"vectors\": [{\"id\": \"a\",\n \"boxes\": [", "cut.json, line 2"),
         ("bytes.json", b"\xff\xfe\x00", "bytes.json, line 1"),
-        ("nan.json", b"{\"vectors\": [NaN]}", "line 1: column 14"),
+        ("nan.json", b"{\"vectors\": [NaN]}", "line 1, column 14 | no JSON"),
         ("text.json", b"\"vectors\"", "the top level | expected an object"),
         ("none.json", b"{\"vectors\": []}", "no vector | expected at least one"),
         ("format.json", b"{\"format\": 9, \"vectors\": []}", "format '9'; expected format 1"),

@@ -96,7 +96,6 @@ fn parts(times: &[Times]) -> Vec<Part> {
                 wall_ln_ns: Some(ns[process].ln()),
                 tail_ns: Vec::new(),
                 returned: ROUNDS * CAMERAS * IDS,
-                spent_ns: ns[process] * (ROUNDS * CAMERAS) as f64,
             })
             .collect(),
     };
@@ -135,6 +134,11 @@ fn values_lie_in_their_intervals_and_ratios_are_those_of_the_shown_values() {
         }
         let has_interval = cell.metrics["query_ns"].lower.is_some();
         assert!(has_interval, "{}", cell.structure);
+        // One estimator: scaled by what a timed camera sees.
+        let [query, per_visible] = ["query_ns", "ns_per_visible"].map(|m| &cell.metrics[m]);
+        let ends = |m: &Metric| [Some(m.value), m.lower, m.upper];
+        let scaled = ends(query).map(|ns| ns.map(|ns| ns / IDS as f64));
+        assert_eq!(ends(per_visible), scaled, "{}", cell.structure);
         let of_shown = value(&group.cells[0], "query_ns") / value(cell, "query_ns");
         let found = value(cell, "speedup");
         assert!((found / of_shown - 1.0).abs() < 1e-12, "{found} {of_shown}");

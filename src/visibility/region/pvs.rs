@@ -4,6 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::answer::{RegionId, decode};
+use crate::json::{JsonError, from_json};
 
 /// A potentially visible set: for each region the set of regions seen from it.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -18,8 +19,8 @@ pub struct Pvs {
 #[non_exhaustive]
 pub enum PvsError {
     /// Not the JSON of one.
-    #[error("{0}; expected {{\"regions\": COUNT, \"sees\": [[FROM, TO], ...]}}")]
-    Json(#[from] serde_json::Error),
+    #[error("{}: {}; expected {}", .0.place(), .0.found, .0.expected_of(FORM))]
+    Json(#[from] JsonError),
     /// A region that is not there.
     #[error("pair {pair} names region {region} of {regions}; expected less")]
     Region {
@@ -44,6 +45,8 @@ pub enum PvsError {
         regions: usize,
     },
 }
+
+const FORM: &str = "{\"regions\": COUNT, \"sees\": [[FROM, TO], ...]}";
 
 /// Its form in a file: ordered pairs.
 #[derive(Serialize, Deserialize)]
@@ -74,8 +77,8 @@ impl Pvs {
     ///
     /// # Errors
     /// Other JSON, or a region that is not there.
-    pub fn from_json(text: &str) -> Result<Pvs, PvsError> {
-        let written: Written = serde_json::from_str(text)?;
+    pub fn from_json(text: impl AsRef<[u8]>) -> Result<Pvs, PvsError> {
+        let written: Written = from_json(text.as_ref())?;
         let regions = written.regions;
         if regions > MOST_REGIONS {
             return Err(PvsError::TooMany(regions));

@@ -5,6 +5,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::camera::Lens;
+use crate::json::{JsonError, from_json};
 use crate::query::ItemId;
 use crate::visibility::{Ray, Rays};
 
@@ -202,8 +203,8 @@ impl Certificates {
     ///
     /// # Errors
     /// Text that is something else.
-    pub fn from_json(text: &str) -> Result<Certificates, serde_json::Error> {
-        serde_json::from_str(text)
+    pub fn from_json(text: impl AsRef<[u8]>) -> Result<Certificates, JsonError> {
+        from_json(text.as_ref())
     }
 }
 

@@ -87,7 +87,7 @@ fn an_audit_finds_each_doctored_bit_with_a_line_of_sight() {
         (0, honest.visible)
     );
 
-    let mut doctored = Pvs::from_json(&exact.pvs().to_json()).unwrap();
+    let mut doctored = Pvs::from_json(exact.pvs().to_json()).unwrap();
     assert_eq!(&doctored, exact.pvs());
     let (mut rng, mut cleared, mut set) = (SeededRng::new(2), 0, 0);
     let n = graph.len();

@@ -77,7 +77,7 @@ fn cell(certificates: &mut Certificates, item: ItemId) -> &mut Cell {
 fn certificates_hold_and_survive_being_written() {
     for parallel in [false, true] {
         let certificates = certified(parallel);
-        let read = Certificates::from_json(&certificates.to_json()).unwrap();
+        let read = Certificates::from_json(certificates.to_json()).unwrap();
         assert_eq!(read, certificates);
         let counts = check(&read, &boxes()).unwrap();
         assert_eq!((counts.visible, counts.hidden, counts.undecided), (3, 2, 0));
