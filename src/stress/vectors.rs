@@ -175,7 +175,7 @@ mod tests {
             (String::new(), "f.json, line 1, column 0: the text ends"),
             (
                 "{\"vectors\":[}".into(),
-                "f.json, line 1, column 13: no JSON (expected value)",
+                "f.json, line 1, column 13, vectors[0]: no JSON (expected value)",
             ),
             ("3".into(), "the top level: '3'; expected an object"),
             ("{}".into(), "no array 'vectors'"),
