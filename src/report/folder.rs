@@ -7,6 +7,8 @@ use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::thread;
+use std::time::{Duration, Instant};
 
 use tempfile::{NamedTempFile, TempDir};
 
@@ -242,6 +244,10 @@ impl RunFolder {
     }
 }
 
+/// Longest to wait for the lock of a run: a worker that a killed run had just begun to start
+/// holds it until it is a program of its own.
+const PATIENCE: Duration = Duration::from_secs(1);
+
 /// The folder of a run that was stopped: locked, and as it was left.
 pub struct StoppedRun {
     path: PathBuf,
@@ -263,14 +269,20 @@ impl StoppedRun {
         let io = FolderError::io(&file);
         let opened = OpenOptions::new().read(true).append(true).open(&file);
         let lock = opened.map_err(io)?;
-        match lock.try_lock() {
-            Ok(()) => {}
-            Err(fs::TryLockError::WouldBlock) => {
-                return Err(FolderError::Locked {
-                    path: path.to_owned(),
-                });
+        let begin = Instant::now();
+        loop {
+            match lock.try_lock() {
+                Ok(()) => break,
+                Err(fs::TryLockError::WouldBlock) if begin.elapsed() < PATIENCE => {
+                    thread::sleep(PATIENCE / 50);
+                }
+                Err(fs::TryLockError::WouldBlock) => {
+                    return Err(FolderError::Locked {
+                        path: path.to_owned(),
+                    });
+                }
+                Err(fs::TryLockError::Error(source)) => return Err(io(source)),
             }
-            Err(fs::TryLockError::Error(source)) => return Err(io(source)),
         }
         let (mut stream, length) = read_stream(&file)?;
         let mut stopped = StoppedRun {
