@@ -181,7 +181,7 @@ mod tests {
     fn what_cannot_be_loaded_says_why() {
         assert!(error("unifrom").contains("did you mean 'uniform'"));
         assert!(error("mesh:sphere").contains("did you mean 'mesh:spheres'"));
-        assert!(error("mesh:statue:n=many").contains("n=many"));
+        assert!(error("mesh:statue:n=many").contains("n is 'many'; expected"));
         assert!(error("mesh:statue:size=3").contains("unknown parameter"));
         assert!(error("no/such/file.csv").contains("no/such/file.csv: No such file"));
         assert!(error("datasets/").contains("not a file"));

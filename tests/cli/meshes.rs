@@ -160,8 +160,8 @@ fn what_a_mesh_cannot_be_is_refused_in_a_line() {
             "unknown scene 'mesh:sphere' | did you mean 'mesh:spheres'",
         ),
         ("scene info mesh:", "unknown scene 'mesh:'"),
-        ("scene info mesh:statue:n=0", "mesh:statue | n=0"),
-        ("scene info mesh:statue:n=1G", "mesh:statue | n=1G"),
+        ("scene info mesh:statue:n=0", "mesh:statue | n is '0'"),
+        ("scene info mesh:statue:n=1G", "mesh:statue | n is '1G'"),
         ("scene info mesh:statue:relief=3", "mesh:statue | relief"),
         (
             "scene info mesh:statue:offset=1e300",

@@ -6,6 +6,9 @@ use crate::camera::{Camera, Frame, Lens};
 use crate::scene::{SeededRng, WorldBox};
 use crate::visibility::SampleGrid;
 
+/// Random rays of a case.
+pub const RAYS: usize = 1_000;
+
 /// Pixels of the buffers, from coarse ones, where much falls between the samples, to
 /// those of a small image.
 const GRIDS: [SampleGrid; 4] = [
@@ -83,4 +86,13 @@ pub fn looking(eye: DVec3, forward: DVec3, lens: Lens) -> Camera {
 /// A rectangle of a plane across x.
 pub fn flat(x: f64, [left, right]: [f64; 2], [low, high]: [f64; 2]) -> WorldBox {
     WorldBox::new(DVec3::new(x, left, low), DVec3::new(x, right, high))
+}
+
+/// A share of an edge: anywhere, or next to one of its ends.
+pub fn along(rng: &mut SeededRng) -> f64 {
+    match rng.below(3) {
+        0 => rng.unit(),
+        1 => rng.unit() * 1e-3,
+        _ => 1.0 - rng.unit() * 1e-3,
+    }
 }

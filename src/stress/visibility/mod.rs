@@ -24,13 +24,11 @@ use crate::visibility::occlusion::{
 };
 use crate::visibility::truth::{RayIndex, visible_by_random_rays};
 use crate::visibility::{Rays, Solids};
-use case::StageCase;
+use case::{RAYS, StageCase, along};
 use portals::Chain;
 use triangles::{Lost, TriangleCase};
 use worlds::Kind;
 
-/// Random rays of a case.
-const RAYS: usize = 1_000;
 /// Rays of a case at points of its boxes, most of them next to an edge.
 const RAYS_AT_BOXES: usize = 300;
 
@@ -258,15 +256,6 @@ fn seen(index: &RayIndex, rays: &Rays, case: &StageCase, rng: &mut SeededRng) ->
 /// A point of a box, on each axis anywhere or next to an end.
 fn point_of(b: &WorldBox, rng: &mut SeededRng) -> DVec3 {
     b.min + (b.max - b.min) * DVec3::new(along(rng), along(rng), along(rng))
-}
-
-/// A share of an edge: anywhere, or next to one of its ends.
-fn along(rng: &mut SeededRng) -> f64 {
-    match rng.below(3) {
-        0 => rng.unit(),
-        1 => rng.unit() * 1e-3,
-        _ => 1.0 - rng.unit() * 1e-3,
-    }
 }
 
 /// Whether all that is seen was handed on, and nothing from outside of the view.

@@ -6,8 +6,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
-use super::case::{StageCase, looking};
-use super::{RAYS, along};
+use super::case::{RAYS, StageCase, along, looking};
 use crate::camera::{Camera, Lens};
 use crate::kernel::Kernel;
 use crate::scene::{MESHES, Scene, SeededRng, Surfaces};

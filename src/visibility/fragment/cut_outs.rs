@@ -94,8 +94,8 @@ mod tests {
             ("solid", "unknown mask 'solid'"),
             ("fence:share=0", "share=0 is not above 0"),
             ("fence:share=1.1", "share=1.1 is not above 0 and at most 1"),
-            ("fence:tile=0", "tile=0"),
-            ("fence:seed=-1", "seed=-1"),
+            ("fence:tile=0", "tile is '0'; expected"),
+            ("fence:seed=-1", "seed is '-1'; expected"),
             ("fence:tyle=1", "did you mean 'tile'"),
         ] {
             let error = CutOuts::parse(text).unwrap_err().to_string();

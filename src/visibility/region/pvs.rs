@@ -20,7 +20,7 @@ pub struct Pvs {
 pub enum PvsError {
     /// Not the JSON of one.
     #[error("{}: {}; expected {}", .0.place(), .0.found, .0.expected_of(FORM))]
-    Json(#[from] JsonError),
+    Json(JsonError),
     /// A region that is not there.
     #[error("pair {pair} names region {region} of {regions}; expected less")]
     Region {
@@ -44,6 +44,13 @@ pub enum PvsError {
         /// Number of sectors.
         regions: usize,
     },
+}
+
+// Its words are in those of the error already: it is no cause to be told as well.
+impl From<JsonError> for PvsError {
+    fn from(error: JsonError) -> Self {
+        PvsError::Json(error)
+    }
 }
 
 const FORM: &str = "{\"regions\": COUNT, \"sees\": [[FROM, TO], ...]}";
