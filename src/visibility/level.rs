@@ -19,7 +19,7 @@ pub struct LevelMap {
     pub name: String,
     /// Items of the map as a scene.
     pub items: usize,
-    /// Wall time of decoding it, ns, in each of [`ROUNDS`] rounds over all maps; empty
+    /// Wall time of decoding it, ns, in each of seven rounds over all maps; empty
     /// where nothing was decoded again.
     pub load_ns: Vec<f64>,
 }
