@@ -107,7 +107,7 @@ pub fn counted(value: usize, one: &str) -> String {
     }
 }
 
-/// The first few names of a list and how many more there are: "a, b and 3 more".
+/// The first names of a list and the number of the others: "a, b and 3 more".
 ///
 /// ```
 /// use cullbench::shown::first_of;
@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_have_an_exponent_where_nobody_counts_their_digits() {
+    fn numbers_beyond_any_count_have_an_exponent() {
         let shown = [25.0, 182.25, 999_999_999_999_999.0, 1.5e300, f64::INFINITY].map(number);
         assert_eq!(shown, ["25", "182.25", "999999999999999", "1.5e300", "inf"]);
     }

@@ -60,7 +60,7 @@ pub struct FunnelArgs {
     pub cut_out: Option<CutOuts>,
     /// Take a face of this item for a mirror (across its shortest edge): what is seen in it, with
     /// and without a stencil of its samples
-    #[arg(long, value_name = "ITEM")]
+    #[arg(long, value_name = "ITEM", value_parser = values::whole(0..=ItemId::MAX), allow_negative_numbers = true)]
     pub mirror: Option<ItemId>,
     /// Back end of the region stage [default: the best that the scene has regions for]
     #[arg(long, value_name = "NAME")]

@@ -33,8 +33,12 @@ where
 {
     move |text| {
         let sound = text.parse().ok().filter(|n| range.contains(n));
-        let (least, most) = (range.start(), range.end());
-        expected(sound, format_args!("a whole number from {least} to {most}"))
+        let (least, most) = (range.start(), range.end().to_string());
+        // Twenty digits bound nothing that anybody types.
+        match most == u64::MAX.to_string() {
+            true => expected(sound, format_args!("a whole number of at least {least}")),
+            false => expected(sound, format_args!("a whole number from {least} to {most}")),
+        }
     }
 }
 

@@ -53,8 +53,8 @@ const FAR: f64 = 1000.0;
 ///
 /// # Errors
 /// The line of the first value that is no number or makes no camera; a file
-/// without cameras; matrices without a convention, or beside an eye or a lens; both a place to look at and a
-/// direction.
+/// without cameras; matrices without a convention, or beside an eye or a lens; both a
+/// place to look at and a direction.
 pub fn read_cameras_csv(
     input: impl Read,
     file: &str,

@@ -488,7 +488,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_is_told_of_temporary_files() {
+    fn errors_do_not_name_temporary_files() {
         let error = temporary_in(Path::new("no/such")).unwrap_err();
         assert!(
             error.to_string().contains(TEMPORARY.0),

@@ -2,7 +2,7 @@
 //! stopped at any moment. Every error says where, what was found and what was
 //! expected.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -77,6 +77,9 @@ pub fn read_stream(path: &Path) -> Result<(Stream, u64), FolderError> {
     let mut header: Option<Header> = None;
     let (mut parts, mut finished_at) = (Vec::new(), None);
     let mut seen = BTreeSet::new();
+    // By their JSON: a key has a number that is no key of a map.
+    let mut groups = BTreeMap::new();
+    let name_of = |key: &GroupKey| serde_json::to_string(key).unwrap_or_default();
     for (n, text) in bytes[..whole].split(|b| *b == b'\n').enumerate() {
         if text.is_empty() {
             continue;
@@ -105,7 +108,9 @@ pub fn read_stream(path: &Path) -> Result<(Stream, u64), FolderError> {
                         found: version,
                     });
                 }
-                header = Some(from_json(text).map_err(no_json)?);
+                let found: Header = from_json(text).map_err(no_json)?;
+                groups.extend(found.groups.iter().map(name_of).zip(0..));
+                header = Some(found);
             }
             ("run", Some(_)) => {
                 return Err(bad("a second header".to_owned(), "one, in the first line"));
@@ -113,7 +118,7 @@ pub fn read_stream(path: &Path) -> Result<(Stream, u64), FolderError> {
             ("part", Some(header)) => {
                 let kept: KeptPart = from_json(text).map_err(no_json)?;
                 let Part { key, process, .. } = &kept.part;
-                let group = header.groups.iter().position(|group| group == key);
+                let group: Option<usize> = groups.get(&name_of(key)).copied();
                 let found = || {
                     let GroupKey {
                         scene, path, test, ..

@@ -405,7 +405,7 @@ fn usage_errors_are_one_line_that_says_what_was_expected() {
         ("run --sead 3", "'--sead' | did you mean '--seed'"),
         (
             "run --seed x --out new",
-            "--seed is 'x'; expected a whole number from 0",
+            "--seed is 'x'; expected a whole number of at least 0",
         ),
         (
             "run --plan --resume",
