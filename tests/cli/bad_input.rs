@@ -413,7 +413,7 @@ fn usage_errors_are_one_line_that_says_what_was_expected() {
         ),
         (
             "run --seed -1 --out new",
-            "--seed is '-1'; expected a whole number from 0",
+            "--seed is '-1'; expected a whole number of at least 0",
         ),
         (
             "run --processes 0 --out new",
@@ -421,11 +421,11 @@ fn usage_errors_are_one_line_that_says_what_was_expected() {
         ),
         (
             "run --timeout -3 --out new",
-            "--timeout is '-3'; expected a whole number from 1",
+            "--timeout is '-3'; expected a whole number of at least 1",
         ),
         (
             "verify --cases -1",
-            "--cases is '-1'; expected a whole number from 0",
+            "--cases is '-1'; expected a whole number of at least 0",
         ),
         (
             "precision --scene scene.csv --frames 0",
