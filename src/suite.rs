@@ -72,7 +72,7 @@ pub static SUITES: &[Suite] = &[
         },
         effort: Effort {
             processes: 10,
-            rounds: [3, 40],
+            rounds: [2, 40],
             task_ns: 2.5e6,
             pass_ns: 7e6,
             beside: Beside::All,

@@ -3,6 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write};
+use std::sync::Arc;
 
 use anyhow::{Context, bail};
 
@@ -11,17 +12,18 @@ use super::funnel_args::CheckArgs;
 use super::shared_args::TableFormat;
 use super::{Ending, load_scene, print_json, text, unread_is_fine};
 use crate::camera::Camera;
-use crate::funnel::{Proofs, regions_of};
+use crate::funnel::{Proofs, holes_of, regions_of, surfaces_of};
 use crate::input::read_file;
 use crate::json::JsonError;
 use crate::path::{self, CameraPath, LensDefaults};
 use crate::query::ItemId;
-use crate::scene::{Scene, WorldBox};
+use crate::scene::{Scene, Surfaces, WorldBox};
+use crate::visibility::Rays;
+use crate::visibility::fragment::CutOuts;
 use crate::visibility::region::{ClaimErrors, Pvs, REJECT, RegionGraph};
 use crate::visibility::truth::{
-    CameraOf, Certificates, Counts, View as CertifiedView, check as check_proofs,
+    CameraOf, Certificates, Counts, Facts, Hiders, View as CertifiedView, check as check_proofs,
 };
-use crate::visibility::{Rays, Solids};
 use serde::Serialize;
 
 /// What was found in a file.
@@ -60,7 +62,7 @@ impl Checked {
     }
 
     /// The proofs of one view, which is to be that of a camera.
-    fn view(&mut self, line: usize, proofs: &Certificates, boxes: &[WorldBox], camera: &Camera) {
+    fn view(&mut self, line: usize, proofs: &Certificates, facts: &Facts, camera: &Camera) {
         self.view_count += 1;
         let is_its_view =
             Rays::of(camera).is_ok_and(|rays| CertifiedView::of(&rays) == proofs.view);
@@ -76,7 +78,7 @@ impl Checked {
                 &format!("{count} proofs of {of} items; expected one of each of {items} items"),
             );
         }
-        match check_proofs(proofs, boxes) {
+        match check_proofs(proofs, facts) {
             Ok(counts) => self.add(&counts),
             Err(rejected) => self.rejected.push(Rejection {
                 line,
@@ -112,11 +114,52 @@ impl Checked {
 struct Loaded {
     scene: Scene,
     boxes: Vec<WorldBox>,
+    surfaces: Option<Arc<Surfaces>>,
+    /// Items with holes, by how these are typed.
+    cut_outs: BTreeMap<String, Vec<bool>>,
     paths: BTreeMap<String, CameraPath>,
     regions: Option<(RegionGraph, Option<Pvs>)>,
 }
 
 impl Loaded {
+    /// The regions, with the claim of the scene itself.
+    fn regions(&mut self) -> anyhow::Result<Option<&(RegionGraph, Option<Pvs>)>> {
+        if self.regions.is_none() {
+            self.regions = regions_of(&self.scene)?;
+        }
+        Ok(self.regions.as_ref())
+    }
+
+    /// Works out which items have holes by what hides in a view.
+    fn cut_out(&mut self, hiders: &Hiders) -> anyhow::Result<()> {
+        let Hiders::Uncut(typed) = hiders else {
+            return Ok(());
+        };
+        if !self.cut_outs.contains_key(typed) {
+            let parsed = CutOuts::parse(typed)?;
+            self.regions()?;
+            let graph = self.regions.as_ref().map(|(graph, _)| graph);
+            let holes = holes_of(&parsed, &self.scene, graph);
+            let items = 0..self.scene.items.len() as ItemId;
+            let is_cut_out = items.map(|item| holes.of(item).is_some()).collect();
+            self.cut_outs.insert(typed.clone(), is_cut_out);
+        }
+        Ok(())
+    }
+
+    /// What the proofs of a view are held against.
+    fn facts(&self, hiders: &Hiders) -> Facts<'_> {
+        let cut_out = match hiders {
+            Hiders::Uncut(typed) => self.cut_outs.get(typed).map_or(&[][..], Vec::as_slice),
+            _ => &[],
+        };
+        Facts {
+            boxes: &self.boxes,
+            cut_out,
+            surfaces: self.surfaces.as_deref(),
+        }
+    }
+
     /// The camera that a view is said to be of.
     fn camera(&mut self, of: &CameraOf, lens: &LensDefaults) -> anyhow::Result<Camera> {
         let CameraOf { path, index } = of;
@@ -168,7 +211,9 @@ pub fn check(args: &CheckArgs) -> anyhow::Result<Ending> {
             scenes.insert(
                 name.clone(),
                 Loaded {
-                    boxes: Solids::of(&scene).boxes,
+                    boxes: scene.written().collect(),
+                    surfaces: surfaces_of(&scene)?,
+                    cut_outs: BTreeMap::new(),
                     paths: BTreeMap::new(),
                     regions: None,
                     scene,
@@ -202,7 +247,8 @@ pub fn check(args: &CheckArgs) -> anyhow::Result<Ending> {
                     );
                 }
                 let camera = loaded.camera(of, &lens).with_context(place)?;
-                checked.view(number, &proofs, &loaded.boxes, &camera);
+                loaded.cut_out(&proofs.hiders).with_context(place)?;
+                checked.view(number, &proofs, &loaded.facts(&proofs.hiders), &camera);
             }
             Proofs::Claim(errors) => {
                 if !about.insert(format!("{name}\n{}", errors.claim)) {
@@ -212,10 +258,7 @@ pub fn check(args: &CheckArgs) -> anyhow::Result<Ending> {
                         errors.claim
                     );
                 }
-                if loaded.regions.is_none() {
-                    loaded.regions = regions_of(&loaded.scene)?;
-                }
-                let Some((graph, own)) = &loaded.regions else {
+                let Some((graph, own)) = loaded.regions()? else {
                     bail!("{}: scene '{name}' has no regions; expected some", place());
                 };
                 let claim = match errors.claim == REJECT.name {

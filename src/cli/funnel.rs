@@ -48,9 +48,6 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     let inputs: Vec<&Path> = inputs.into_iter().flatten().collect();
     expect_places(&outputs, &inputs)?;
     expect_folder("--truth-cache", args.truth_cache.as_deref())?;
-    if args.certificates.is_some() && args.cut_out.is_some() {
-        bail!("--certificates are about boxes without holes; expected no --cut-out with them");
-    }
     if args.mirror.is_some() && args.cut_out.is_some() {
         bail!("--mirror shows whole boxes; expected no --cut-out with it");
     }

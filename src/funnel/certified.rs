@@ -4,18 +4,17 @@
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
-use super::error::FunnelError;
+use super::material::Material;
 use super::pass::{ALL, Pass};
 use super::proven::Proven;
 use super::regions::ClaimAudit;
+use super::seen::Shown;
 use super::walks::Walks;
 use super::world::{FunnelInput, World};
 use crate::json::{JsonError, from_json};
 use crate::query::ItemId;
 use crate::visibility::region::ClaimErrors;
-use crate::visibility::truth::{
-    Certificates, Class, Proof, Prover, RayIndex, SampleTruth, certify,
-};
+use crate::visibility::truth::{Certificates, Class, Proof, SampleTruth};
 
 /// A line of a file of proofs.
 #[derive(Clone, Debug, Serialize)]
@@ -62,24 +61,9 @@ impl Proofs {
     }
 }
 
-/// That there is something to be proven: solid boxes, or a claim.
-///
-/// # Errors
-/// If there is nothing.
-pub fn expect_provable(world: &World) -> Result<(), FunnelError> {
-    match world.solids().is_some() || !world.audits().is_empty() {
-        true => Ok(()),
-        false => Err(FunnelError::NoSolids {
-            scene: world.scene().name.clone(),
-            shape: world.scene().item_shape(),
-        }),
-    }
-}
-
 /// Looks for a proof of every item of each view that the frustum meets and that is
 /// either visible or removed by any back end; hands over the errors of every claim, then
-/// one view after the other. Of a map, whose items are no solids, nothing is known in a
-/// view. `None` if stopped.
+/// one view after the other. `None` if stopped.
 pub fn certified(
     input: &FunnelInput,
     world: &World,
@@ -87,16 +71,13 @@ pub fn certified(
     walks: &Walks,
     stop: &dyn Fn() -> bool,
     each: &mut dyn FnMut(Proofs),
-) -> Option<Option<Proven>> {
+) -> Option<Proven> {
     for ClaimAudit { claim, audit } in world.audits() {
         let regions = world.region_row(claim).map_or(0, |row| row.graph().len());
         let errors = ClaimErrors::of(audit, &input.scene.name, claim, regions);
         each(Proofs::Claim(errors));
     }
-    let Some(solids) = world.solids() else {
-        return Some(None);
-    };
-    let index = RayIndex::build(solids);
+    let (material, shown) = (Material::of(input, world), Shown::of(world));
     let mut known = Vec::with_capacity(world.views());
     for view in 0..world.views() {
         if stop() {
@@ -104,17 +85,15 @@ pub fn certified(
         }
         let rays = world.rays(view);
         let threads = input.execution.threads;
-        let truth = SampleTruth::of(solids, &index, rays, input.samples, threads);
+        let truth = shown.at_samples(rays, input.samples, threads);
         let items = in_question(world, pass, walks, view, &truth);
-        let prover = Prover::new(solids, &index, rays);
-        let scene = &input.scene.name;
-        let proofs = certify(scene, &prover, rays, &truth, &items, threads);
+        let proofs = material.certify(&input.scene.name, rays, &truth, &items, threads);
         let class = |(item, proof): &(ItemId, Proof)| (*item, Class::of(&truth, *item, proof));
         known.push(proofs.proofs.iter().map(class).collect());
         let proofs = proofs.of_camera(&input.path.name, world.camera(view));
         each(Proofs::View(proofs));
     }
-    Some(Some(Proven::new(known)))
+    Some(Proven::new(known))
 }
 
 /// The items in the frustum that are in front at a sample or that a back end removed, and
@@ -139,7 +118,8 @@ fn in_question(
     let in_view = boxes.filter(|(_, b)| world.volume(view).sees(b));
     let mut items: Vec<ItemId> = in_view.map(|(id, _)| id).filter(is_removed).collect();
     // What was lost is proven visible, which is the point.
-    items.extend(&truth.visible);
+    let is_item = |id: &&ItemId| (**id as usize) < world.items();
+    items.extend(truth.visible.iter().filter(is_item));
     items.sort_unstable();
     items.dedup();
     items

@@ -30,18 +30,6 @@ pub enum FunnelError {
     /// The scene's file, read a second time.
     #[error(transparent)]
     Input(#[from] InputError),
-    /// Proofs are about solid boxes.
-    #[error(
-        "the items of '{scene}' are {}; expected a scene of solid boxes, or a claim of what is \
-         seen from where, for proofs",
-        shape.name()
-    )]
-    NoSolids {
-        /// Its name.
-        scene: String,
-        /// What its items are.
-        shape: ItemShape,
-    },
     /// Holes and mirrors are made of solid boxes.
     #[error(
         "the items of '{scene}' are {}; expected a scene of solid boxes for {option}",

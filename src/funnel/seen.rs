@@ -20,7 +20,7 @@ pub fn seen(
     threads: usize,
     stop: &dyn Fn() -> bool,
 ) -> Option<Truth> {
-    let all = Hiding::of(world);
+    let all = Shown::of(world);
     let items = world.items() as ItemId;
     let mut visible = Vec::with_capacity(world.views());
     for view in 0..world.views() {
@@ -44,50 +44,53 @@ pub fn seen(
     Some(Truth::new(visible))
 }
 
-/// What rays end at: solid boxes; or the triangles of a mesh, or the walls, floors and
+/// What is shown, as rays end at it: solid boxes; or the triangles of a mesh, or the walls, floors and
 /// ceilings of a map.
-enum Hiding<'w> {
+pub enum Shown<'w> {
     Solids(&'w Solids, RayIndex, Option<&'w fragment::Surfaces>),
     /// Boxes without holes, of which some truth may be known already.
     Kept(&'w Solids, RayIndex, &'w TruthCache, [u8; 32]),
     Surfaces(SurfaceIndex),
 }
 
-impl Hiding<'_> {
-    fn of<'w>(world: &'w World) -> Hiding<'w> {
+impl Shown<'_> {
+    /// Of a scene as its items are taken.
+    pub fn of<'w>(world: &'w World) -> Shown<'w> {
         if let Some(solids) = world.solids() {
             let index = RayIndex::build(solids);
             return match (world.cut_outs(), world.truth_cache()) {
-                (None, Some(cache)) => Hiding::Kept(solids, index, cache, digest_of(solids)),
-                (holes, _) => Hiding::Solids(solids, index, holes),
+                (None, Some(cache)) => Shown::Kept(solids, index, cache, digest_of(solids)),
+                (holes, _) => Shown::Solids(solids, index, holes),
             };
         }
         let surfaces = world.surfaces().expect("triangles of what is no solid box");
-        Hiding::Surfaces(SurfaceIndex::build(surfaces))
+        Shown::Surfaces(SurfaceIndex::build(surfaces))
     }
 
-    fn at_samples(&self, rays: &Rays, grid: SampleGrid, threads: usize) -> SampleTruth {
+    /// What is in front at the samples of a view; behind a map's items come its floors and
+    /// ceilings.
+    pub fn at_samples(&self, rays: &Rays, grid: SampleGrid, threads: usize) -> SampleTruth {
         match self {
-            Hiding::Solids(_, index, Some(holes)) => {
+            Shown::Solids(_, index, Some(holes)) => {
                 let opaque = |item, b: &_, probe: &_, at: &_| holes.opaque(item, b, probe, at);
                 SampleTruth::of_opaque(index, &opaque, rays, grid, threads)
             }
-            Hiding::Solids(solids, index, None) => {
+            Shown::Solids(solids, index, None) => {
                 SampleTruth::of(solids, index, rays, grid, threads)
             }
-            Hiding::Kept(solids, index, cache, digest) => {
+            Shown::Kept(solids, index, cache, digest) => {
                 cache.sample_truth(digest, solids, index, rays, grid, threads)
             }
-            Hiding::Surfaces(index) => SampleTruth::of_surfaces(index, rays, grid, threads),
+            Shown::Surfaces(index) => SampleTruth::of_surfaces(index, rays, grid, threads),
         }
     }
 
     fn along_random(&self, rays: &Rays, count: usize, seed: u64, threads: usize) -> Vec<ItemId> {
         match self {
-            Hiding::Solids(_, index, _) | Hiding::Kept(_, index, _, _) => {
+            Shown::Solids(_, index, _) | Shown::Kept(_, index, _, _) => {
                 visible_by_random_rays(index, rays, count, seed, threads)
             }
-            Hiding::Surfaces(index) => {
+            Shown::Surfaces(index) => {
                 visible_surfaces_by_random_rays(index, rays, count, seed, threads)
             }
         }

@@ -6,7 +6,7 @@ use std::cell::RefCell;
 use serde::{Deserialize, Serialize};
 
 use super::bounds::{Bound, bounds};
-use super::certified::{Proofs, certified, expect_provable};
+use super::certified::{Proofs, certified};
 use super::conclusions::conclusions;
 use super::error::FunnelError;
 use super::faces::Faces;
@@ -62,16 +62,13 @@ struct Sides {
 /// back end removed, and the errors of every claim.
 ///
 /// # Errors
-/// A camera, a structure or a back end that cannot be had; a scene without proofs.
+/// A camera, a structure or a back end that cannot be had.
 pub fn prepare(
     input: &FunnelInput,
     proofs: Option<&mut dyn FnMut(Proofs)>,
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<Prepared>, FunnelError> {
     let world = World::new(input)?;
-    if proofs.is_some() {
-        expect_provable(&world)?;
-    }
     let threads = input.execution.threads;
     let Some(truth) = seen(&world, input.samples, 0, threads, stop) else {
         return Ok(None);
@@ -82,7 +79,7 @@ pub fn prepare(
     };
     let proven = match proofs {
         Some(each) => match certified(input, &world, &pass, &walks, stop, each) {
-            Some(proven) => proven,
+            Some(proven) => Some(proven),
             None => return Ok(None),
         },
         None => None,

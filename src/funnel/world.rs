@@ -21,6 +21,7 @@ use super::truth::Truth;
 use crate::camera::PlaneOptions;
 use crate::geometry::ConvexVolume;
 use crate::index::{BuildError, DynIndex, Execution, StructureSpec};
+use crate::input::InputError;
 use crate::kernel::Kernel;
 use crate::measure::{Protocol, WorkloadError, input_of};
 use crate::path::CameraPath;
@@ -29,7 +30,7 @@ use crate::scene::{ItemShape, Scene, Surfaces};
 use crate::visibility::fragment::{self, CutOuts};
 use crate::visibility::occlusion::{self, OccluderChoice, OccluderScene};
 use crate::visibility::region::doom::DoomMap;
-use crate::visibility::region::{EyePlace, Marks, Pvs, RegionRow, Scratch};
+use crate::visibility::region::{EyePlace, Marks, Pvs, RegionGraph, RegionRow, Scratch};
 use crate::visibility::triangle;
 use crate::visibility::truth::TruthCache;
 use crate::visibility::{Guarantee, Rays, SampleGrid, Solids};
@@ -143,7 +144,13 @@ impl<'a> World<'a> {
         let cut_outs = match (input.cut_outs, &mut solids) {
             (None, _) => None,
             (Some(typed), Some(solids)) => {
-                Some(cut_out(typed, input.scene, regions.as_ref(), solids))
+                let graph = regions.as_ref().map(Regions::graph);
+                let holes = holes_of(typed, input.scene, graph);
+                let items = 0..input.scene.items.len() as ItemId;
+                items
+                    .filter(|&item| holes.of(item).is_some())
+                    .for_each(|item| solids.hides_nothing(item));
+                Some(holes)
             }
             (Some(_), None) => {
                 return Err(FunnelError::NoBoxes {
@@ -153,15 +160,7 @@ impl<'a> World<'a> {
                 });
             }
         };
-        let surfaces = match (is_boxes, &input.scene.surfaces) {
-            (true, _) => None,
-            (_, Some(mesh)) => Some(mesh.clone()),
-            (_, None) => Some(Arc::new(match DoomMap::of_scene(input.scene)? {
-                Some(map) => map.surfaces(input.scene),
-                // A map whose file is not known.
-                None => Surfaces::from_boxes(input.scene),
-            })),
-        };
+        let surfaces = surfaces_of(input.scene)?;
         if let Some(item) = input.mirror {
             let Some(solids) = &solids else {
                 return Err(FunnelError::NoBoxes {
@@ -475,22 +474,29 @@ impl<'a> World<'a> {
     }
 }
 
-/// Gives items holes, which hide nothing from then on. Walls that close off rooms are
-/// left whole: what is seen of the rooms beyond is known by their portals alone.
-fn cut_out(
-    typed: &CutOuts,
-    scene: &Scene,
-    regions: Option<&Regions>,
-    solids: &mut Solids,
-) -> fragment::Surfaces {
-    let walls = regions.map(|regions| regions.graph().borders(scene));
+/// The triangles of a scene's items, if they are no solid boxes; of a map also those of its
+/// floors and ceilings, behind the items.
+///
+/// # Errors
+/// The map's file, read a second time.
+pub fn surfaces_of(scene: &Scene) -> Result<Option<Arc<Surfaces>>, InputError> {
+    Ok(match (scene.item_shape(), &scene.surfaces) {
+        (ItemShape::Box, _) => None,
+        (_, Some(mesh)) => Some(mesh.clone()),
+        (_, None) => Some(Arc::new(match DoomMap::of_scene(scene)? {
+            Some(map) => map.surfaces(scene),
+            // A map whose file is not known.
+            None => Surfaces::from_boxes(scene),
+        })),
+    })
+}
+
+/// Which items of a scene are cut out: any but the walls of its rooms, whose regions are
+/// `graph`.
+pub fn holes_of(typed: &CutOuts, scene: &Scene, graph: Option<&RegionGraph>) -> fragment::Surfaces {
+    let walls = graph.map(|graph| graph.borders(scene));
     let is_free = |item: ItemId| walls.as_ref().is_none_or(|walls| !walls[item as usize]);
-    let surfaces = typed.surfaces(scene.items.len(), is_free);
-    let items = 0..scene.items.len() as ItemId;
-    items
-        .filter(|&item| surfaces.of(item).is_some())
-        .for_each(|item| solids.hides_nothing(item));
-    surfaces
+    typed.surfaces(scene.items.len(), is_free)
 }
 
 #[cfg(test)]

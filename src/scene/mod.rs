@@ -33,6 +33,8 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use crate::arithmetic::rounding::{sum_down, sum_up};
+
 use crate::geometry::{Aabb, PlaneTree};
 use crate::input::InputError;
 
@@ -65,6 +67,13 @@ impl WorldBox {
     /// The box between two corners; empty where `min` is above `max`.
     pub fn new(min: DVec3, max: DVec3) -> Self {
         WorldBox { min, max }
+    }
+
+    /// The largest box within one about an origin; empty where there is none.
+    pub fn within(b: &Aabb, origin: DVec3) -> Self {
+        let low = |k: usize| sum_up(origin[k], b.min[k].into());
+        let high = |k: usize| sum_down(origin[k], b.max[k].into());
+        WorldBox::new([0, 1, 2].map(low).into(), [0, 1, 2].map(high).into())
     }
 
     /// The box standing on `base` (centre of its bottom face).

@@ -399,10 +399,6 @@ fn what_cannot_be_is_refused_in_a_line() {
             "--cut-out fence:share=2",
             "fence:share=2 | share=2 | at most 1",
         ),
-        (
-            "--cut-out fence --certificates x",
-            "--certificates | holes | --cut-out",
-        ),
     ] {
         let done = cullbench(folder.path(), &format!("{LINE} {more}"));
         assert_refused(&done, wanted, more);

@@ -168,10 +168,6 @@ fn what_a_mesh_cannot_be_is_refused_in_a_line() {
             "mesh:statue | item 0 | f32",
         ),
         (
-            "funnel --scene mesh:spheres:n=3k --certificates /dev/null",
-            "mesh:spheres:n=3k | triangles | solid boxes",
-        ),
-        (
             "precision --stage region --scene mesh:spheres:n=3k",
             "rooms or sectors",
         ),

@@ -1,6 +1,8 @@
 //! Cut-outs of a scene as they are typed: which share of its items has holes, and of
 //! which mask.
 
+use std::fmt::{self, Display, Formatter};
+
 use super::mask::{MASKS, Mask, Surface, Surfaces};
 use crate::query::ItemId;
 use crate::scene::SeededRng;
@@ -18,6 +20,19 @@ pub struct CutOuts {
     pub tile: f64,
     /// Which items they are.
     pub seed: u64,
+}
+
+/// As it is typed.
+impl Display for CutOuts {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let CutOuts {
+            mask,
+            share,
+            tile,
+            seed,
+        } = self;
+        write!(f, "{}:share={share},tile={tile},seed={seed}", mask.name())
+    }
 }
 
 impl CutOuts {

@@ -4,7 +4,6 @@
 use glam::DVec3;
 
 use super::lanes::first_lanes;
-use crate::arithmetic::rounding::{sum_down, sum_up};
 use crate::geometry::{Aabb, BoxBlock};
 use crate::kernel::{LANES, LaneMask};
 use crate::query::ItemId;
@@ -45,12 +44,9 @@ impl OccluderScene {
     pub fn within(scene: &Scene, inner: &[Aabb]) -> OccluderScene {
         let bounds = bounds_of(scene.written());
         // Rounded inward: what hides reaches a face only if this does.
-        let in_world = |b: &Aabb| {
-            let low = |k: usize| sum_up(scene.origin[k], b.min[k].into());
-            let high = |k: usize| sum_down(scene.origin[k], b.max[k].into());
-            WorldBox::new([0, 1, 2].map(low).into(), [0, 1, 2].map(high).into())
-        };
-        let faces = inner.iter().map(|b| faces_reached(&in_world(b), &bounds));
+        let faces = inner
+            .iter()
+            .map(|b| faces_reached(&WorldBox::within(b, scene.origin), &bounds));
         let faces = faces.collect();
         OccluderScene::sorted(scene.origin, &scene.items, inner, faces, bounds)
     }

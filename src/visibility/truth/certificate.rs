@@ -50,7 +50,7 @@ pub struct View {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Edge {
-    /// The items of whose boxes they are faces.
+    /// The boxes of which they are faces.
     pub items: [ItemId; 2],
     /// The axes across the faces, ascending.
     pub axes: [u8; 2],
@@ -65,8 +65,8 @@ pub struct Edge {
 pub enum Cell {
     /// There are no rays in it.
     Empty,
-    /// Every ray through it enters the box of this item first, and not before the
-    /// near plane.
+    /// Every ray through it enters this box that hides first, and not before the near
+    /// plane: an item's, or one of [`Hiders::Within`].
     Behind(ItemId),
     /// Two parts. The line between them need be proven in one of them only: in the
     /// other, the box in front may be as far as the item along it.
@@ -100,7 +100,8 @@ pub enum Except {
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Proof {
-    /// Visible: it is in front (or ties) along this ray.
+    /// Visible: it is in front (or ties) along this ray. Where items have holes: it has
+    /// none, and nothing at all is in front of it.
     Witness {
         /// Where the ray begins.
         origin: [f64; 3],
@@ -108,6 +109,7 @@ pub enum Proof {
         direction: [f64; 3],
     },
     /// Hidden: the eye is in the closed box, which is entered before any near plane.
+    /// No proof of an item of triangles.
     AroundEye,
     /// Hidden: the image of the box is covered. The outline lists corners of the
     /// box (bit k: the upper bound on axis k), so that each side has the whole box on
@@ -124,6 +126,29 @@ pub enum Proof {
     Undecided,
 }
 
+/// A box in the world as proofs name it: lower and upper corner.
+pub type Corners = [[f64; 3]; 2];
+
+/// Which boxes hide what is behind them.
+#[derive(Clone, PartialEq, Default, Debug, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Hiders {
+    /// Those of all items.
+    #[default]
+    Items,
+    /// Those of the items without holes; which these are, as it is typed.
+    Uncut(String),
+    /// Boxes inside the triangles of an item. They are numbered on behind the items.
+    Within(Vec<(ItemId, Corners)>),
+}
+
+impl Hiders {
+    fn are_items(&self) -> bool {
+        *self == Hiders::Items
+    }
+}
+
 /// What is known of some items in a view.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -138,6 +163,9 @@ pub struct Certificates {
     pub camera: Option<CameraOf>,
     /// The view.
     pub view: View,
+    /// What hides in it.
+    #[serde(default, skip_serializing_if = "Hiders::are_items")]
+    pub hiders: Hiders,
     /// How many items are in question: those in view that any back end removed, and those
     /// seen at a sample. Each has a proof or is undecided.
     pub items: usize,
@@ -179,6 +207,7 @@ impl Certificates {
             boxes,
             camera: None,
             view,
+            hiders: Hiders::Items,
             items: proofs.len(),
             proofs,
         }

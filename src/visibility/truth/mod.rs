@@ -22,9 +22,9 @@ mod surface_index;
 mod surface_sample;
 
 pub use cache::{TruthCache, digest_of};
-pub use certificate::{CameraOf, Cell, Certificates, Edge, Except, Proof, View};
-pub use certify::certify;
-pub use check::{Counts, Rejected, check};
+pub use certificate::{CameraOf, Cell, Certificates, Corners, Edge, Except, Hiders, Proof, View};
+pub use certify::{Ends, certify};
+pub use check::{Counts, Facts, Rejected, check};
 pub use class::Class;
 pub use cover::Prover;
 pub use entry::{Crossing, Probe};

@@ -1,6 +1,7 @@
 //! Covers: whether the parts of an item's image lie behind boxes.
 
 use super::super::certificate::{Cell, Edge, Except, View};
+use super::facts::Named;
 use super::line::{Line, Three, exact, face};
 use super::part::{Part, Side};
 use crate::query::ItemId;
@@ -9,7 +10,8 @@ use crate::scene::WorldBox;
 /// The cells of one item.
 pub struct Judge<'c> {
     pub view: &'c View,
-    pub boxes: &'c [WorldBox],
+    pub named: &'c Named<'c>,
+    pub own: &'c WorldBox,
     pub item: ItemId,
     /// What need not be ruled out.
     pub except: Except,
@@ -23,10 +25,7 @@ impl Judge<'_> {
             (_, None) => Err("a cell without rays claims something"),
             (Cell::Empty, Some(_)) => Err("a cell with rays is called empty"),
             (Cell::Behind(front), Some(part)) => {
-                let hides = self
-                    .boxes
-                    .get(*front as usize)
-                    .ok_or("there is no such box in front")?;
+                let hides = self.named.hider(*front)?;
                 self.hidden(part, hides, *front < self.item).map(|()| 1)
             }
             (
@@ -72,7 +71,7 @@ impl Judge<'_> {
             return Err("there is no such edge");
         }
         let bound = |side: usize, axis: usize| {
-            let b = self.boxes.get(edge.items[side] as usize)?;
+            let b = self.named.get(edge.items[side])?;
             Some(if edge.upper[side] {
                 b.max[axis]
             } else {
@@ -94,7 +93,7 @@ impl Judge<'_> {
     /// enter the item if they do, but for what is excepted. `lower`: it has a lower
     /// number than the item.
     fn hidden(&self, part: &Part, front: &WorldBox, lower: bool) -> Result<(), &'static str> {
-        let back = &self.boxes[self.item as usize];
+        let back = self.own;
         if !part.all(|line| line.meets(front)) {
             return Err("a box in front does not cover its cell");
         }

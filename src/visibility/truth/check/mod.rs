@@ -9,16 +9,21 @@
 //! direction, so this form is linear in the three numbers of a line: what it says of
 //! the corners of a cell it says of every line through it.
 
+mod facts;
+mod inside;
 mod judge;
 mod line;
 mod part;
+mod triangle;
 mod witness;
 
+pub use self::facts::Facts;
+use self::facts::Named;
 use self::judge::Judge;
 use self::line::{exact, holds};
 use self::part::{Side, has_no_area, image};
 use self::witness::witness;
-use super::certificate::{Certificates, Except, Proof, View};
+use super::certificate::{Certificates, Except, Hiders, Proof, View};
 use crate::query::ItemId;
 use crate::scene::WorldBox;
 
@@ -50,16 +55,19 @@ pub struct Rejected {
     pub reason: &'static str,
 }
 
-/// Verifies every proof, for the boxes as they were written.
+/// Verifies every proof, for the items as they were written.
 ///
 /// It takes the view as it is: that it is the camera's is for the caller to compare
 /// ([`View::of`]). O(boxes) a witness; a few microseconds a corner of a cell.
 ///
 /// # Errors
 /// The first certificate that does not hold.
-pub fn check(certificates: &Certificates, boxes: &[WorldBox]) -> Result<Counts, Rejected> {
-    let view = &certificates.view;
-    sound(view, certificates.boxes, boxes).map_err(|reason| Rejected { item: 0, reason })?;
+pub fn check(certificates: &Certificates, facts: &Facts) -> Result<Counts, Rejected> {
+    let (view, boxes) = (&certificates.view, facts.boxes);
+    let of_view = |reason| Rejected { item: 0, reason };
+    sound(view, certificates.boxes, boxes).map_err(of_view)?;
+    let named = Named::new(view, &certificates.hiders, facts).map_err(of_view)?;
+    let are_boxes = !matches!(certificates.hiders, Hiders::Within(_));
     let mut counts = Counts::default();
     for (item, proof) in &certificates.proofs {
         let reject = |reason| Rejected {
@@ -72,12 +80,14 @@ pub fn check(certificates: &Certificates, boxes: &[WorldBox]) -> Result<Counts, 
         match proof {
             Proof::Undecided => counts.undecided += 1,
             Proof::Witness { origin, direction } => {
-                witness(view, *origin, *direction, *item, boxes).map_err(reject)?;
+                witness(view, *origin, *direction, *item, facts).map_err(reject)?;
                 counts.visible += 1;
             }
             Proof::AroundEye => {
                 let around = !view.parallel && view.near > 0.0 && holds(own, view.eye);
                 around.then_some(()).ok_or(reject("the eye is not in it"))?;
+                let solid = are_boxes.then_some(());
+                solid.ok_or(reject("the eye is in a box around triangles"))?;
                 counts.hidden += 1;
             }
             Proof::Cover {
@@ -102,7 +112,8 @@ pub fn check(certificates: &Certificates, boxes: &[WorldBox]) -> Result<Counts, 
                     .try_fold(image, |image, side| image.cut(view, side));
                 let judge = Judge {
                     view,
-                    boxes,
+                    named: &named,
+                    own,
                     item: *item,
                     except: *except,
                 };
@@ -149,3 +160,5 @@ fn sound(view: &View, count: usize, boxes: &[WorldBox]) -> Result<(), &'static s
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tests_triangles;

@@ -6,7 +6,7 @@ use super::part::Part;
 use super::*;
 use crate::arithmetic::Expansion;
 use crate::camera::{Camera, Lens, look_at};
-use crate::visibility::truth::{Prover, RayIndex, SampleTruth, certify, judge};
+use crate::visibility::truth::{Ends, Prover, RayIndex, SampleTruth, certify, judge};
 use crate::visibility::{Rays, SampleGrid};
 use glam::DVec3;
 
@@ -55,13 +55,21 @@ fn certified(parallel: bool) -> Certificates {
     let rays = rays(parallel);
     let truth = SampleTruth::of(&solids, &index, &rays, SampleGrid::new(16, 16), 1);
     let prover = Prover::new(&solids, &index, &rays);
-    certify("wall", &prover, &rays, &truth, &[0, 1, 2, 3, 4], 2)
+    certify(
+        "wall",
+        &prover,
+        Ends::Boxes(&index),
+        &rays,
+        &truth,
+        &[0, 1, 2, 3, 4],
+        2,
+    )
 }
 
 fn doctored(parallel: bool, what: impl Fn(&mut Certificates)) -> &'static str {
     let mut certificates = certified(parallel);
     what(&mut certificates);
-    check(&certificates, &boxes())
+    check(&certificates, &Facts::of_boxes(&boxes()))
         .expect_err("not noticed")
         .reason
 }
@@ -79,7 +87,7 @@ fn certificates_hold_and_survive_being_written() {
         let certificates = certified(parallel);
         let read = Certificates::from_json(certificates.to_json()).unwrap();
         assert_eq!(read, certificates);
-        let counts = check(&read, &boxes()).unwrap();
+        let counts = check(&read, &Facts::of_boxes(&boxes())).unwrap();
         assert_eq!((counts.visible, counts.hidden, counts.undecided), (3, 2, 0));
         assert!(
             counts.cells >= 4,
@@ -217,7 +225,7 @@ fn of_twins_only_the_first_hides_the_other() {
             (*except, *cell) = (allowed, Cell::Behind(front));
             assert_eq!(outline.len(), 4);
             certificates.proofs[HIDDEN as usize].0 = item;
-            check(&certificates, &boxes())
+            check(&certificates, &Facts::of_boxes(&boxes()))
         };
         assert_eq!(
             with(TWIN, HIDDEN, Except::Ties).map(|counts| counts.tied),
@@ -242,7 +250,7 @@ fn a_box_seen_edge_on_has_no_area() {
             let view = prover.view().clone();
             check(
                 &Certificates::new("flat", 2, view, vec![(item, proof)]),
-                &boxes,
+                &Facts::of_boxes(&boxes),
             )
         };
         let proof = prover.prove(0);

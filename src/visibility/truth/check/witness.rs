@@ -1,7 +1,9 @@
 //! Rays that see an item.
 
 use super::super::certificate::View;
+use super::facts::Facts;
 use super::line::{Exact, Line, dot, exact, face, sign_of_difference};
+use super::triangle::sees;
 use crate::query::ItemId;
 use crate::scene::WorldBox;
 
@@ -11,7 +13,7 @@ pub fn witness(
     origin: [f64; 3],
     direction: [f64; 3],
     item: ItemId,
-    boxes: &[WorldBox],
+    facts: &Facts,
 ) -> Result<(), &'static str> {
     let line = match view.parallel {
         false if origin == view.eye => Line::new(view, exact(direction)),
@@ -29,7 +31,13 @@ pub fn witness(
     if (scale - 1.0).abs() > 1e-9 {
         return Err("its ray does not count depth as the view does");
     }
-    let own = entry(view, origin, direction, &boxes[item as usize]);
+    if let Some(surfaces) = facts.surfaces {
+        return sees(view, origin, direction, item, surfaces);
+    }
+    if facts.is_cut_out(item) {
+        return Err("it has holes: its box does not show it");
+    }
+    let own = entry(view, origin, direction, &facts.boxes[item as usize]);
     let own = own.ok_or("its ray does not meet the item")?;
     let before = |b: &WorldBox| {
         let guess = guess(origin, direction, b);
@@ -40,7 +48,7 @@ pub fn witness(
         });
         possible && entry(view, origin, direction, b).is_some_and(|other| less(&other, &own))
     };
-    match boxes.iter().any(before) {
+    match facts.boxes.iter().any(before) {
         true => Err("another item is in front of it"),
         false => Ok(()),
     }
@@ -84,13 +92,13 @@ fn entry(view: &View, origin: [f64; 3], direction: [f64; 3], b: &WorldBox) -> Op
 }
 
 /// A depth moved by more than it can have been rounded.
-fn roomy(depth: f64, by: f64) -> f64 {
+pub fn roomy(depth: f64, by: f64) -> f64 {
     depth + by * depth.abs() * 1e-14
 }
 
 /// Not above the depth where the ray enters and not below the one where it leaves:
 /// to pass over boxes far from it. `None` where that is not so simple.
-fn guess(origin: [f64; 3], direction: [f64; 3], b: &WorldBox) -> Option<[f64; 2]> {
+pub fn guess(origin: [f64; 3], direction: [f64; 3], b: &WorldBox) -> Option<[f64; 2]> {
     let (mut enters, mut leaves) = (f64::NEG_INFINITY, f64::INFINITY);
     for k in 0..3 {
         if direction[k].abs() < 1e-100 {

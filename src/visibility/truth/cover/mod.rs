@@ -13,7 +13,7 @@ use glam::DVec3;
 use self::hunt::{End, Hunt};
 use self::outline::{corners_of, is_flat, outline};
 use self::outlook::Outlook;
-use super::certificate::{Cell, Except, Proof, View};
+use super::certificate::{Cell, Except, Hiders, Proof, View};
 use super::ray_index::RayIndex;
 use super::sample::SampleTruth;
 use super::sight::{Polygon, Sight};
@@ -27,11 +27,29 @@ const LIKELY: usize = 48;
 #[derive(Clone, Debug)]
 pub struct Prover<'s> {
     look: Outlook<'s>,
+    hiders: Hiders,
+    items: usize,
 }
 
 impl<'s> Prover<'s> {
-    /// For the view of these rays.
+    /// For the view of these rays, in which every box hides.
     pub fn new(solids: &'s Solids, index: &'s RayIndex, rays: &Rays) -> Prover<'s> {
+        Prover::hidden_by(Hiders::Items, solids, index, rays)
+    }
+
+    /// The same where only the boxes in the index hide. Behind the items, `solids` has
+    /// those that are [`Hiders::Within`].
+    pub fn hidden_by(
+        hiders: Hiders,
+        solids: &'s Solids,
+        index: &'s RayIndex,
+        rays: &Rays,
+    ) -> Prover<'s> {
+        let within = match &hiders {
+            Hiders::Within(boxes) => boxes.len(),
+            Hiders::Items | Hiders::Uncut(_) => 0,
+        };
+        let items = solids.boxes.len() - within;
         let sight = Sight::new(&View::of(rays));
         let likely = Vec::new();
         let look = Outlook {
@@ -40,7 +58,11 @@ impl<'s> Prover<'s> {
             sight,
             likely,
         };
-        Prover { look }
+        Prover {
+            look,
+            hiders,
+            items,
+        }
     }
 
     /// The same, but what most samples see is tried first: proofs are found sooner.
@@ -59,9 +81,14 @@ impl<'s> Prover<'s> {
         &self.look.sight.view
     }
 
-    /// The index that finds what is in front.
-    pub(super) fn index(&self) -> &RayIndex {
-        self.look.index
+    /// What hides.
+    pub(super) fn hiders(&self) -> &Hiders {
+        &self.hiders
+    }
+
+    /// How many items there are.
+    pub(super) fn items(&self) -> usize {
+        self.items
     }
 
     /// Whether the item is visible along any ray of the view, with the proof.
@@ -71,7 +98,11 @@ impl<'s> Prover<'s> {
         let view = &sight.view;
         let holds = |p: DVec3| p.cmpge(b.min).all() && p.cmple(b.max).all();
         if !view.parallel && holds(view.eye.into()) {
-            return Proof::AroundEye;
+            return match self.hiders {
+                // Of the triangles in it, some may be in front of the eye.
+                Hiders::Within(_) => Proof::Undecided,
+                Hiders::Items | Hiders::Uncut(_) => Proof::AroundEye,
+            };
         }
         let corners = corners_of(b).map(|corner| sight.through(corner));
         let Some(outline) = outline(&corners) else {

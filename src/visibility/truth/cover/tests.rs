@@ -4,7 +4,7 @@ use super::*;
 use crate::query::ItemId;
 use crate::scene::SeededRng;
 use crate::visibility::SampleGrid;
-use crate::visibility::truth::{Class, certify, check, judge, visible_by_random_rays};
+use crate::visibility::truth::{Class, Ends, Facts, certify, check, judge, visible_by_random_rays};
 
 /// No ray sees what is proven hidden, all witnesses see their items, and `check`
 /// agrees with all of it.
@@ -25,8 +25,16 @@ fn proofs_hold_in_worlds_full_of_ties() {
             _ => prover.knowing(&truth),
         };
         let items: Vec<ItemId> = (0..boxes.len() as ItemId).collect();
-        let certificates = certify("ties", &prover, &rays, &truth, &items, 1);
-        let checked = check(&certificates, &boxes);
+        let certificates = certify(
+            "ties",
+            &prover,
+            Ends::Boxes(&index),
+            &rays,
+            &truth,
+            &items,
+            1,
+        );
+        let checked = check(&certificates, &Facts::of_boxes(&boxes));
         assert!(
             checked.is_ok(),
             "{world}: {checked:?} {certificates:?} {boxes:?}"
@@ -71,10 +79,19 @@ fn items_of_a_street_are_all_decided() {
     let truth = SampleTruth::of(&solids, &index, &rays, SampleGrid::new(90, 60), 1);
     let prover = Prover::new(&solids, &index, &rays);
     let items: Vec<ItemId> = (0..2000).collect();
-    let certificates =
-        [1, 3].map(|threads| certify("street", &prover, &rays, &truth, &items, threads));
+    let certificates = [1, 3].map(|threads| {
+        certify(
+            "street",
+            &prover,
+            Ends::Boxes(&index),
+            &rays,
+            &truth,
+            &items,
+            threads,
+        )
+    });
     assert_eq!(certificates[0], certificates[1]);
-    let counts = check(&certificates[0], &solids.boxes).unwrap();
+    let counts = check(&certificates[0], &Facts::of_boxes(&solids.boxes)).unwrap();
     assert_eq!(
         (counts.visible + counts.hidden, counts.undecided),
         (2000, 0)

@@ -1,0 +1,126 @@
+//! What proofs are held against, and which boxes hide in a view.
+
+use super::super::certificate::{Corners, Hiders, View};
+use super::inside::is_inside;
+use super::line::{Exact, corner, dot, exact};
+use crate::query::ItemId;
+use crate::scene::{SurfaceKind, Surfaces, WorldBox};
+
+/// The items as they were written.
+#[derive(Clone, Copy)]
+pub struct Facts<'s> {
+    /// Their boxes.
+    pub boxes: &'s [WorldBox],
+    /// Which of them have holes; empty if none has.
+    pub cut_out: &'s [bool],
+    /// Their triangles, if they are no solid boxes. There may be more, of no item, behind
+    /// theirs.
+    pub surfaces: Option<&'s Surfaces>,
+}
+
+impl<'s> Facts<'s> {
+    /// Solid boxes.
+    pub fn of_boxes(boxes: &'s [WorldBox]) -> Facts<'s> {
+        Facts {
+            boxes,
+            cut_out: &[],
+            surfaces: None,
+        }
+    }
+
+    /// Whether the item has holes.
+    pub fn is_cut_out(&self, item: ItemId) -> bool {
+        self.cut_out.get(item as usize).copied().unwrap_or(false)
+    }
+}
+
+/// The boxes that proofs may name: those of the items, then those within them.
+pub struct Named<'f> {
+    facts: &'f Facts<'f>,
+    within: Vec<WorldBox>,
+    is_within: bool,
+}
+
+impl<'f> Named<'f> {
+    /// Of what is said to hide, all that does not hold is refused.
+    pub fn new(
+        view: &View,
+        hiders: &Hiders,
+        facts: &'f Facts<'f>,
+    ) -> Result<Named<'f>, &'static str> {
+        let mut named = Named {
+            facts,
+            within: Vec::new(),
+            is_within: false,
+        };
+        let has_holes = !facts.cut_out.is_empty();
+        match (hiders, facts.surfaces) {
+            (Hiders::Items, None) if !has_holes => {}
+            (Hiders::Uncut(_), None) if has_holes => {}
+            (Hiders::Within(boxes), Some(surfaces)) => {
+                named.is_within = true;
+                for (item, corners) in boxes {
+                    named
+                        .within
+                        .push(inner(view, facts, surfaces, *item, corners)?);
+                }
+            }
+            _ => return Err("what it says that hides is not what the items are"),
+        }
+        Ok(named)
+    }
+
+    /// A box by its number.
+    pub fn get(&self, number: ItemId) -> Option<&WorldBox> {
+        let (number, items) = (number as usize, self.facts.boxes.len());
+        match number.checked_sub(items) {
+            None => self.facts.boxes.get(number),
+            Some(place) => self.within.get(place),
+        }
+    }
+
+    /// A box that hides what is behind it.
+    pub fn hider(&self, number: ItemId) -> Result<&WorldBox, &'static str> {
+        let found = self.get(number).ok_or("there is no such box in front")?;
+        let is_of_item = (number as usize) < self.facts.boxes.len();
+        match is_of_item {
+            true if self.is_within => Err("the box in front is one around triangles"),
+            true if self.facts.is_cut_out(number) => Err("what is in front has holes"),
+            _ => Ok(found),
+        }
+    }
+}
+
+/// A box inside a closed surface that begins beyond where boxes hide from. Whatever ray
+/// of the view enters the box has entered the surface before, through a triangle that it
+/// is in front of: so the box hides no more than the surface does.
+fn inner(
+    view: &View,
+    facts: &Facts,
+    surfaces: &Surfaces,
+    item: ItemId,
+    corners: &Corners,
+) -> Result<WorldBox, &'static str> {
+    let [low, high] = *corners;
+    let ordered = (0..3).all(|k| low[k].is_finite() && high[k].is_finite() && low[k] < high[k]);
+    let own = facts.boxes.get(item as usize);
+    let own = own.filter(|_| ordered && (item as usize) < surfaces.items());
+    let own = own.ok_or("a box within an item is none")?;
+    if surfaces.kinds[item as usize] != SurfaceKind::Opaque {
+        return Err("a box is within an item that does not hide");
+    }
+    let (eye, forward) = (exact(view.eye), exact(view.forward));
+    let is_deep = |k: u8| {
+        let point = exact(corner(own, k));
+        let from_eye = [0, 1, 2].map(|k: usize| &point[k] - &eye[k]);
+        (&dot(&from_eye, &forward) - &Exact::from(view.hides_from)).sign() >= 0
+    };
+    if !(0..8).all(is_deep) {
+        return Err("a box is within an item that reaches before the near plane");
+    }
+    let b = WorldBox::new(low.into(), high.into());
+    match is_inside(surfaces, item as usize, own, &b) {
+        true => Ok(b),
+        false => Err("a box is not inside the triangles of its item"),
+    }
+}
