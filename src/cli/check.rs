@@ -12,7 +12,7 @@ use super::funnel_args::CheckArgs;
 use super::shared_args::TableFormat;
 use super::{Ending, load_scene, print_json, text, unread_is_fine};
 use crate::camera::Camera;
-use crate::funnel::{Proofs, holes_of, regions_of, surfaces_of};
+use crate::funnel::{Proofs, holes_of, regions_of, surfaces_of, walls_of};
 use crate::input::read_file;
 use crate::json::JsonError;
 use crate::path::{self, CameraPath, LensDefaults};
@@ -22,7 +22,8 @@ use crate::visibility::Rays;
 use crate::visibility::fragment::CutOuts;
 use crate::visibility::region::{ClaimErrors, Pvs, REJECT, RegionGraph};
 use crate::visibility::truth::{
-    CameraOf, Certificates, Counts, Facts, Hiders, View as CertifiedView, check as check_proofs,
+    CameraOf, Certificates, Counts, Facts, Hiders, PlanWall, View as CertifiedView,
+    check as check_proofs,
 };
 use serde::Serialize;
 
@@ -115,6 +116,7 @@ struct Loaded {
     scene: Scene,
     boxes: Vec<WorldBox>,
     surfaces: Option<Arc<Surfaces>>,
+    walls: Vec<PlanWall>,
     /// Items with holes, by how these are typed.
     cut_outs: BTreeMap<String, Vec<bool>>,
     paths: BTreeMap<String, CameraPath>,
@@ -147,8 +149,16 @@ impl Loaded {
         Ok(())
     }
 
+    /// Whether a camera's eye, and all that is before its near plane, is in the regions.
+    fn is_inside(&mut self, camera: &Camera) -> anyhow::Result<bool> {
+        let regions = self.regions()?;
+        let rays = Rays::of(camera).ok();
+        let both = regions.zip(rays);
+        Ok(both.is_some_and(|((graph, _), rays)| graph.homes(&rays, &mut Vec::new())))
+    }
+
     /// What the proofs of a view are held against.
-    fn facts(&self, hiders: &Hiders) -> Facts<'_> {
+    fn facts(&self, hiders: &Hiders, is_inside: bool) -> Facts<'_> {
         let cut_out = match hiders {
             Hiders::Uncut(typed) => self.cut_outs.get(typed).map_or(&[][..], Vec::as_slice),
             _ => &[],
@@ -157,6 +167,7 @@ impl Loaded {
             boxes: &self.boxes,
             cut_out,
             surfaces: self.surfaces.as_deref(),
+            walls: if is_inside { &self.walls } else { &[] },
         }
     }
 
@@ -213,6 +224,7 @@ pub fn check(args: &CheckArgs) -> anyhow::Result<Ending> {
                 Loaded {
                     boxes: scene.written().collect(),
                     surfaces: surfaces_of(&scene)?,
+                    walls: walls_of(&scene)?,
                     cut_outs: BTreeMap::new(),
                     paths: BTreeMap::new(),
                     regions: None,
@@ -248,7 +260,9 @@ pub fn check(args: &CheckArgs) -> anyhow::Result<Ending> {
                 }
                 let camera = loaded.camera(of, &lens).with_context(place)?;
                 loaded.cut_out(&proofs.hiders).with_context(place)?;
-                checked.view(number, &proofs, &loaded.facts(&proofs.hiders), &camera);
+                let is_inside = !loaded.walls.is_empty() && loaded.is_inside(&camera)?;
+                let facts = loaded.facts(&proofs.hiders, is_inside);
+                checked.view(number, &proofs, &facts, &camera);
             }
             Proofs::Claim(errors) => {
                 if !about.insert(format!("{name}\n{}", errors.claim)) {

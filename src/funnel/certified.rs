@@ -87,7 +87,14 @@ pub fn certified(
         let threads = input.execution.threads;
         let truth = shown.at_samples(rays, input.samples, threads);
         let items = in_question(world, pass, walks, view, &truth);
-        let proofs = material.certify(&input.scene.name, rays, &truth, &items, threads);
+        let proofs = material.certify(
+            &input.scene.name,
+            rays,
+            world.is_inside(view),
+            &truth,
+            &items,
+            threads,
+        );
         let class = |(item, proof): &(ItemId, Proof)| (*item, Class::of(&truth, *item, proof));
         known.push(proofs.proofs.iter().map(class).collect());
         let proofs = proofs.of_camera(&input.path.name, world.camera(view));

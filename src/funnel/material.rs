@@ -6,7 +6,7 @@ use super::world::{FunnelInput, World};
 use crate::query::ItemId;
 use crate::scene::WorldBox;
 use crate::visibility::truth::{
-    Certificates, Ends, Hiders, Prover, RayIndex, SampleTruth, SurfaceIndex, certify,
+    Certificates, Ends, Hiders, PlanWall, Prover, RayIndex, SampleTruth, SurfaceIndex, certify,
 };
 use crate::visibility::{Rays, Solids};
 
@@ -24,6 +24,8 @@ pub enum Material<'w> {
         within: Vec<(ItemId, WorldBox)>,
         /// What rays end at.
         index: SurfaceIndex,
+        /// The walls of a map.
+        walls: Vec<PlanWall>,
     },
 }
 
@@ -49,6 +51,7 @@ impl Material<'_> {
                 within: inner.filter(|(_, b)| b.min.cmplt(b.max).all()).collect(),
                 around,
                 index: SurfaceIndex::build(surfaces),
+                walls: world.walls().to_vec(),
             };
         };
         let all = RayIndex::build(solids);
@@ -67,11 +70,13 @@ impl Material<'_> {
         Material::CutOuts(solids, holes)
     }
 
-    /// Proofs of the items in question in a view, whose samples show `truth`.
+    /// Proofs of the items in question in a view, whose samples show `truth`; `is_inside`:
+    /// the eye is in the scene's regions.
     pub fn certify(
         &self,
         scene: &str,
         rays: &Rays,
+        is_inside: bool,
         truth: &SampleTruth,
         items: &[ItemId],
         threads: usize,
@@ -93,7 +98,9 @@ impl Material<'_> {
                 around,
                 within,
                 index,
+                walls,
             } => {
+                let walls = if is_inside { &walls[..] } else { &[] };
                 let items_there = around.boxes.len() as ItemId;
                 let mut boxes = around.clone();
                 let mut hide = Vec::new();
@@ -106,6 +113,7 @@ impl Material<'_> {
                 let numbers: Vec<ItemId> = (items_there..boxes.boxes.len() as ItemId).collect();
                 let hiders = RayIndex::build_of(&boxes, &numbers);
                 let prover = Prover::hidden_by(Hiders::Within(hide), &boxes, &hiders, rays);
+                let prover = prover.among(walls);
                 let ends = Ends::Triangles(index);
                 certify(scene, &prover, ends, rays, truth, items, threads)
             }

@@ -52,7 +52,7 @@ pub use orders::OrderRow;
 pub use picks::{PickQuestion, PickRow};
 pub use plan_view::{Fate, PlanView};
 pub use proven::ProofCounts;
-pub use regions::{ClaimAudit, regions_of};
+pub use regions::{ClaimAudit, regions_of, walls_of};
 pub use report::{CutOutRow, FunnelReport, Gain, LevelRow, StageRow};
 pub use seen_from::{SEEN_FROM, SeenFrom};
 pub use stage::{BackEnd, NONE, STAGES, StageKind};

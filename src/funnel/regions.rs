@@ -16,6 +16,7 @@ use crate::visibility::region::{
     Audit, Flood, FromRegion, GridFlood, OtherRegions, PortalClip, PortalRect, ProvenPvs, Pvs,
     REJECT, RegionGraph, RegionItems, RegionRow, RoomsPvs, STORED, StoredPvs, audit, pairs_of,
 };
+use crate::visibility::truth::PlanWall;
 
 /// A back end, and which items are in which of its regions.
 struct Row {
@@ -29,6 +30,8 @@ pub(super) struct Regions {
     rows: Vec<Row>,
     /// What claims of what is seen from where get wrong.
     pub audits: Vec<ClaimAudit>,
+    /// The walls of a map.
+    pub walls: Vec<PlanWall>,
 }
 
 /// A claim of which regions see which, and what is wrong with it.
@@ -40,6 +43,14 @@ pub struct ClaimAudit {
     /// Against what is proven.
     #[serde(flatten)]
     pub audit: Audit,
+}
+
+/// The walls of a map, as its scene's items; none of any other scene.
+///
+/// # Errors
+/// The map's file, read a second time.
+pub fn walls_of(scene: &Scene) -> Result<Vec<PlanWall>, InputError> {
+    Ok(DoomMap::of_scene(scene)?.map_or(Vec::new(), |map| map.walls()))
 }
 
 /// The regions of a scene, and the table that its own file claims to be what is seen
@@ -128,6 +139,7 @@ impl Regions {
         rows.extend(stored(&exact, &graph));
         let mut regions = Regions::with(graph, rows, scene, from);
         regions.audits = audits;
+        regions.walls = map.walls();
         if from == SeenFrom::Region {
             regions.audit_searches(&exact)?;
         }
@@ -161,6 +173,7 @@ impl Regions {
             rows: rows.into_iter().map(row).collect(),
             graph,
             audits: Vec::new(),
+            walls: Vec::new(),
         }
     }
 

@@ -32,7 +32,7 @@ use crate::visibility::occlusion::{self, OccluderChoice, OccluderScene};
 use crate::visibility::region::doom::DoomMap;
 use crate::visibility::region::{EyePlace, Marks, Pvs, RegionGraph, RegionRow, Scratch};
 use crate::visibility::triangle;
-use crate::visibility::truth::TruthCache;
+use crate::visibility::truth::{PlanWall, TruthCache};
 use crate::visibility::{Guarantee, Rays, SampleGrid, Solids};
 
 /// What a funnel is studied on.
@@ -297,6 +297,18 @@ impl<'a> World<'a> {
     /// The regions of the scene.
     pub(super) fn regions(&self) -> Option<&Regions> {
         self.regions.as_ref()
+    }
+
+    /// Whether a view's eye, and all that is before its near plane, is in the regions of
+    /// the scene.
+    pub fn is_inside(&self, view: usize) -> bool {
+        let regions = self.regions.as_ref();
+        regions.is_some_and(|regions| regions.graph().homes(self.rays(view), &mut Vec::new()))
+    }
+
+    /// The walls of a map; none in any other scene.
+    pub fn walls(&self) -> &[PlanWall] {
+        self.regions.as_ref().map_or(&[], |regions| &regions.walls)
     }
 
     /// The rays of a view.

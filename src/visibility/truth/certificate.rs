@@ -122,8 +122,23 @@ pub enum Proof {
         /// Why each part of it is hidden.
         cell: Cell,
     },
+    /// Hidden in a map, by its plan: each of these walls stands before a part of what is
+    /// seen of the item from above, the next one from where it begins or the last one
+    /// ends; counter-clockwise about the eye.
+    Walls(Vec<ItemId>),
     /// Neither was found.
     Undecided,
+}
+
+/// A wall of a map, from above.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct PlanWall {
+    /// Whose wall it is.
+    pub item: ItemId,
+    /// Where it begins and ends.
+    pub ends: [[f64; 2]; 2],
+    /// Whether it lets nothing through at any height.
+    pub is_solid: bool,
 }
 
 /// A box in the world as proofs name it: lower and upper corner.

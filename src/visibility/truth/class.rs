@@ -31,7 +31,7 @@ impl Class {
         match proof {
             _ if truth.sees(item) => Class::Visible,
             Proof::Witness { .. } => Class::SubSample,
-            Proof::AroundEye => Class::Hidden,
+            Proof::AroundEye | Proof::Walls(_) => Class::Hidden,
             Proof::Cover { except, .. } => match except {
                 Except::Nothing => Class::Hidden,
                 Except::Ties => Class::Tied,

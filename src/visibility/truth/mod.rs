@@ -22,7 +22,9 @@ mod surface_index;
 mod surface_sample;
 
 pub use cache::{TruthCache, digest_of};
-pub use certificate::{CameraOf, Cell, Certificates, Corners, Edge, Except, Hiders, Proof, View};
+pub use certificate::{
+    CameraOf, Cell, Certificates, Corners, Edge, Except, Hiders, PlanWall, Proof, View,
+};
 pub use certify::{Ends, certify};
 pub use check::{Counts, Facts, Rejected, check};
 pub use class::Class;

@@ -1,6 +1,6 @@
 //! What proofs are held against, and which boxes hide in a view.
 
-use super::super::certificate::{Corners, Hiders, View};
+use super::super::certificate::{Corners, Hiders, PlanWall, View};
 use super::inside::is_inside;
 use super::line::{Exact, corner, dot, exact};
 use crate::query::ItemId;
@@ -16,6 +16,9 @@ pub struct Facts<'s> {
     /// Their triangles, if they are no solid boxes. There may be more, of no item, behind
     /// theirs.
     pub surfaces: Option<&'s Surfaces>,
+    /// The walls of a map, by ascending item, where the eye and all that is before its near
+    /// plane are in the map's regions; else none.
+    pub walls: &'s [PlanWall],
 }
 
 impl<'s> Facts<'s> {
@@ -25,7 +28,14 @@ impl<'s> Facts<'s> {
             boxes,
             cut_out: &[],
             surfaces: None,
+            walls: &[],
         }
+    }
+
+    /// The wall that an item is.
+    pub fn wall(&self, item: ItemId) -> Option<&PlanWall> {
+        let place = self.walls.binary_search_by_key(&item, |wall| wall.item);
+        place.ok().map(|place| &self.walls[place])
     }
 
     /// Whether the item has holes.

@@ -14,6 +14,7 @@ mod inside;
 mod judge;
 mod line;
 mod part;
+mod plan;
 mod triangle;
 mod witness;
 
@@ -22,6 +23,8 @@ use self::facts::Named;
 use self::judge::Judge;
 use self::line::{exact, holds};
 use self::part::{Side, has_no_area, image};
+use self::plan::Covers;
+pub(super) use self::plan::covers;
 use self::witness::witness;
 use super::certificate::{Certificates, Except, Hiders, Proof, View};
 use crate::query::ItemId;
@@ -89,6 +92,13 @@ pub fn check(certificates: &Certificates, facts: &Facts) -> Result<Counts, Rejec
                 let solid = are_boxes.then_some(());
                 solid.ok_or(reject("the eye is in a box around triangles"))?;
                 counts.hidden += 1;
+            }
+            Proof::Walls(walls) => {
+                match covers(view, facts, *item, walls).map_err(reject)? {
+                    Covers::Everywhere => counts.hidden += 1,
+                    Covers::ButAlongLines => counts.along_lines += 1,
+                }
+                counts.cells += walls.len();
             }
             Proof::Cover {
                 outline, except, ..
@@ -160,5 +170,7 @@ fn sound(view: &View, count: usize, boxes: &[WorldBox]) -> Result<(), &'static s
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tests_plan;
 #[cfg(test)]
 mod tests_triangles;

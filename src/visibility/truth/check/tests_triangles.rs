@@ -76,6 +76,7 @@ fn verify(certificates: &Certificates, surfaces: &Surfaces) -> Result<Counts, &'
         boxes: &boxes,
         cut_out: &[],
         surfaces: Some(surfaces),
+        walls: &[],
     };
     check(certificates, &facts).map_err(|rejected| rejected.reason)
 }
@@ -259,6 +260,7 @@ fn what_has_holes_neither_hides_nor_shows_by_its_box() {
             boxes: &boxes,
             cut_out,
             surfaces: None,
+            walls: &[],
         };
         check(certificates, &facts).map_err(|rejected| rejected.reason)
     };
@@ -322,6 +324,7 @@ fn proofs_hold_in_a_wood() {
         boxes: &boxes,
         cut_out: &[],
         surfaces: Some(&surfaces),
+        walls: &[],
     };
     let counts = check(&certificates, &facts).unwrap();
     assert!(counts.hidden > 0, "{counts:?}");

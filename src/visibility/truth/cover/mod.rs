@@ -5,6 +5,7 @@ mod hides;
 mod hunt;
 mod outline;
 mod outlook;
+mod walls;
 
 use std::cmp::Reverse;
 
@@ -13,7 +14,7 @@ use glam::DVec3;
 use self::hunt::{End, Hunt};
 use self::outline::{corners_of, is_flat, outline};
 use self::outlook::Outlook;
-use super::certificate::{Cell, Except, Hiders, Proof, View};
+use super::certificate::{Cell, Except, Hiders, PlanWall, Proof, View};
 use super::ray_index::RayIndex;
 use super::sample::SampleTruth;
 use super::sight::{Polygon, Sight};
@@ -29,6 +30,7 @@ pub struct Prover<'s> {
     look: Outlook<'s>,
     hiders: Hiders,
     items: usize,
+    walls: &'s [PlanWall],
 }
 
 impl<'s> Prover<'s> {
@@ -62,7 +64,15 @@ impl<'s> Prover<'s> {
             look,
             hiders,
             items,
+            walls: &[],
         }
+    }
+
+    /// The same in a map with these walls, by ascending item, where the eye and all that is
+    /// before its near plane are in the map's regions.
+    pub fn among(mut self, walls: &'s [PlanWall]) -> Prover<'s> {
+        self.walls = walls;
+        self
     }
 
     /// The same, but what most samples see is tried first: proofs are found sooner.
@@ -93,6 +103,14 @@ impl<'s> Prover<'s> {
 
     /// Whether the item is visible along any ray of the view, with the proof.
     pub fn prove(&self, item: ItemId) -> Proof {
+        let boxes = &self.look.solids.boxes[..self.items];
+        match walls::before(self.view(), boxes, self.walls, item) {
+            Some(walls) => Proof::Walls(walls),
+            None => self.prove_by_boxes(item),
+        }
+    }
+
+    fn prove_by_boxes(&self, item: ItemId) -> Proof {
         let b = self.look.boxed(item);
         let Outlook { sight, .. } = &self.look;
         let view = &sight.view;
