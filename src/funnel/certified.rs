@@ -22,7 +22,7 @@ use crate::visibility::truth::{Certificates, Class, Proof, SampleTruth};
 #[non_exhaustive]
 pub enum Proofs {
     /// What is visible and what is hidden in a view.
-    View(Certificates),
+    View(Box<Certificates>),
     /// What is wrong with a claim of what is seen from where.
     Claim(ClaimErrors),
 }
@@ -48,7 +48,7 @@ impl Proofs {
         let text = text.as_ref();
         Ok(match from_json::<Tag>(text)?.claim {
             Some(_) => Proofs::Claim(from_json(text)?),
-            None => Proofs::View(from_json(text)?),
+            None => Proofs::View(Box::new(from_json(text)?)),
         })
     }
 
@@ -98,7 +98,7 @@ pub fn certified(
         let class = |(item, proof): &(ItemId, Proof)| (*item, Class::of(&truth, *item, proof));
         known.push(proofs.proofs.iter().map(class).collect());
         let proofs = proofs.of_camera(&input.path.name, world.camera(view));
-        each(Proofs::View(proofs));
+        each(Proofs::View(Box::new(proofs)));
     }
     Some(Proven::new(known))
 }
