@@ -244,7 +244,10 @@ fn what_is_removed_of_meshes_maps_and_cut_outs_is_proven() {
             let decided = of("hidden_count") + of("tied_count") + of("along_lines_count");
             assert!(of("undecided_count") <= 0.1 * decided, "{what}");
         }
-        assert!(rows >= 1 || scene.starts_with("mesh:spheres"), "{scene}: {rows}");
+        assert!(
+            rows >= 1 || scene.starts_with("mesh:spheres"),
+            "{scene}: {rows}"
+        );
         let text = fs::read_to_string(at.join("proofs.jsonl")).expect("proofs");
         for (from, to) in [
             ("\"behind\":", "\"behind\":9"),

@@ -15,6 +15,7 @@ mod judge;
 mod line;
 mod part;
 mod plan;
+mod rough;
 mod triangle;
 mod witness;
 

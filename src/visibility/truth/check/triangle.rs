@@ -2,7 +2,7 @@
 
 use super::super::certificate::View;
 use super::line::{Exact, Three, cross, dot, exact, sign_of_difference};
-use super::witness::{guess, roomy};
+use super::rough::{guess, roomy};
 use crate::query::ItemId;
 use crate::scene::{SurfaceKind, Surfaces, WorldBox};
 

@@ -3,6 +3,7 @@
 use super::super::certificate::View;
 use super::facts::Facts;
 use super::line::{Exact, Line, dot, exact, face, sign_of_difference};
+use super::rough::{guess, roomy};
 use super::triangle::sees;
 use crate::query::ItemId;
 use crate::scene::WorldBox;
@@ -89,25 +90,4 @@ fn entry(view: &View, origin: [f64; 3], direction: [f64; 3], b: &WorldBox) -> Op
         && !less(&enters, &depth(view.near))
         && view.far.is_none_or(|far| !less(&depth(far), &enters));
     met.then_some(enters)
-}
-
-/// A depth moved by more than it can have been rounded.
-pub fn roomy(depth: f64, by: f64) -> f64 {
-    depth + by * depth.abs() * 1e-14
-}
-
-/// Not above the depth where the ray enters and not below the one where it leaves:
-/// to pass over boxes far from it. `None` where that is not so simple.
-pub fn guess(origin: [f64; 3], direction: [f64; 3], b: &WorldBox) -> Option<[f64; 2]> {
-    let (mut enters, mut leaves) = (f64::NEG_INFINITY, f64::INFINITY);
-    for k in 0..3 {
-        if direction[k].abs() < 1e-100 {
-            return None;
-        }
-        let low = (b.min[k] - origin[k]) / direction[k];
-        let high = (b.max[k] - origin[k]) / direction[k];
-        enters = enters.max(roomy(low.min(high), -1.0));
-        leaves = leaves.min(roomy(low.max(high), 1.0));
-    }
-    Some([enters, leaves])
 }
