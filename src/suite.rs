@@ -58,7 +58,7 @@ const FIXED_COUNT: &str = "flythrough:frames=256,visible=500";
 pub static SUITES: &[Suite] = &[
     Suite {
         name: "quick",
-        summary: "five generated worlds of 50k to 100k items and the four real ones; a little over a minute",
+        summary: "five generated worlds of 50k to 100k items and the four real ones; about a minute",
         plan: scenes! { cold: false;
             "uniform:n=100000" ["flythrough:frames=128,visible=2%", "teleport:frames=128,visible=0.1%"];
             "clustered:n=100000" ["flythrough:frames=128,visible=2%"];
