@@ -44,8 +44,8 @@ pub fn seen(
     Some(Truth::new(visible))
 }
 
-/// What is shown, as rays end at it: solid boxes; or the triangles of a mesh, or the walls, floors and
-/// ceilings of a map.
+/// What is shown, as rays end at it: solid boxes; or the triangles of a mesh, or the walls,
+/// floors and ceilings of a map.
 pub enum Shown<'w> {
     Solids(&'w Solids, RayIndex, Option<&'w fragment::Surfaces>),
     /// Boxes without holes, of which some truth may be known already.
