@@ -59,7 +59,7 @@ pub enum Command {
     Precision(PrecisionArgs),
     /// The visibility funnel: what each stage from region to fragment removes, at what cost
     Funnel(FunnelArgs),
-    /// Check the proofs that `funnel --certificates` writes, by a checker that shares no code with it
+    /// Check the proofs that `funnel --certificates` writes, by a checker that uses no code of it
     Check(CheckArgs),
     /// Advise: which structure, which test, which work can be skipped, with the evidence
     Advise(AdviseArgs),

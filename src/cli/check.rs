@@ -1,5 +1,5 @@
-//! `cullbench check`: goes through a file of certificates with a program that shares
-//! no code with what made them.
+//! `cullbench check`: goes through a file of certificates with a program that uses no
+//! code of what made them.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write};

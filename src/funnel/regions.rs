@@ -45,14 +45,6 @@ pub struct ClaimAudit {
     pub audit: Audit,
 }
 
-/// The walls of a map, as its scene's items; none of any other scene.
-///
-/// # Errors
-/// The map's file, read a second time.
-pub fn walls_of(scene: &Scene) -> Result<Vec<PlanWall>, InputError> {
-    Ok(DoomMap::of_scene(scene)?.map_or(Vec::new(), |map| map.walls()))
-}
-
 /// The regions of a scene, and the table that its own file claims to be what is seen
 /// from where; `None` for a scene without regions.
 ///

@@ -12,6 +12,7 @@ use super::chain::Chain;
 use super::error::FunnelError;
 use super::hiding::{HIDING, HidingRow};
 use super::inner::Inner;
+use super::items::{holes_of, surfaces_of};
 use super::judged::{Judged, judge_items};
 use super::plan_view::{Fate, MOST_DRAWN, PlanView};
 use super::regions::{ClaimAudit, Regions};
@@ -21,7 +22,6 @@ use super::truth::Truth;
 use crate::camera::PlaneOptions;
 use crate::geometry::ConvexVolume;
 use crate::index::{BuildError, DynIndex, Execution, StructureSpec};
-use crate::input::InputError;
 use crate::kernel::Kernel;
 use crate::measure::{Protocol, WorkloadError, input_of};
 use crate::path::CameraPath;
@@ -29,8 +29,7 @@ use crate::query::ItemId;
 use crate::scene::{ItemShape, Scene, Surfaces};
 use crate::visibility::fragment::{self, CutOuts};
 use crate::visibility::occlusion::{self, OccluderChoice, OccluderScene};
-use crate::visibility::region::doom::DoomMap;
-use crate::visibility::region::{EyePlace, Marks, Pvs, RegionGraph, RegionRow, Scratch};
+use crate::visibility::region::{EyePlace, Marks, Pvs, RegionRow, Scratch};
 use crate::visibility::triangle;
 use crate::visibility::truth::{PlanWall, TruthCache};
 use crate::visibility::{Guarantee, Rays, SampleGrid, Solids};
@@ -484,31 +483,6 @@ impl<'a> World<'a> {
                 .collect(),
         }
     }
-}
-
-/// The triangles of a scene's items, if they are no solid boxes; of a map also those of its
-/// floors and ceilings, behind the items.
-///
-/// # Errors
-/// The map's file, read a second time.
-pub fn surfaces_of(scene: &Scene) -> Result<Option<Arc<Surfaces>>, InputError> {
-    Ok(match (scene.item_shape(), &scene.surfaces) {
-        (ItemShape::Box, _) => None,
-        (_, Some(mesh)) => Some(mesh.clone()),
-        (_, None) => Some(Arc::new(match DoomMap::of_scene(scene)? {
-            Some(map) => map.surfaces(scene),
-            // A map whose file is not known.
-            None => Surfaces::from_boxes(scene),
-        })),
-    })
-}
-
-/// Which items of a scene are cut out: any but the walls of its rooms, whose regions are
-/// `graph`.
-pub fn holes_of(typed: &CutOuts, scene: &Scene, graph: Option<&RegionGraph>) -> fragment::Surfaces {
-    let walls = graph.map(|graph| graph.borders(scene));
-    let is_free = |item: ItemId| walls.as_ref().is_none_or(|walls| !walls[item as usize]);
-    typed.surfaces(scene.items.len(), is_free)
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! What is really visible: exact along the rays of a sample grid (`sample`, kept on
 //! disk by `cache`; of triangles `surface_sample`), and for all rays of a view where a
-//! witness or a cover proves it (`certificate`, held against the boxes by `check`,
-//! which shares no code with the search). It knows boxes, triangles, cameras and rays,
-//! not the back ends that it judges.
+//! witness or a cover proves it (`certificate`, held against the items by `check`,
+//! which uses no code of the search; the search asks it about plans of maps). It knows
+//! boxes, triangles, cameras and rays, not the back ends that it judges.
 
 mod cache;
 mod certificate;

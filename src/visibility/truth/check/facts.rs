@@ -67,6 +67,10 @@ impl<'f> Named<'f> {
         match (hiders, facts.surfaces) {
             (Hiders::Items, None) if !has_holes => {}
             (Hiders::Uncut(_), None) if has_holes => {}
+            // One an item: however many a file names, each triangle is looked at once.
+            (Hiders::Within(boxes), _) if !boxes.is_sorted_by(|a, b| a.0 < b.0) => {
+                return Err("boxes within items are not in the order of these, one each");
+            }
             (Hiders::Within(boxes), Some(surfaces)) => {
                 named.is_within = true;
                 for (item, corners) in boxes {

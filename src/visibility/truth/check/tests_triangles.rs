@@ -133,6 +133,14 @@ fn a_box_that_is_not_within_its_item_is_rejected() {
     assert_eq!(moved(1, 0, f64::NAN), none);
     assert_eq!(moved(1, 0, 2.25), none);
     assert_eq!(with(&|c| within(c).0 = 9), none);
+    let twice = |c: &mut Certificates| match &mut c.hiders {
+        Hiders::Within(boxes) => boxes.push(boxes[0]),
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(
+        with(&twice),
+        Err("boxes within items are not in the order of these, one each")
+    );
     let boxes_hide = |c: &mut Certificates| c.hiders = Hiders::Items;
     let other = Err("what it says that hides is not what the items are");
     assert_eq!(with(&boxes_hide), other);

@@ -1,0 +1,45 @@
+//! What the items of a scene are to the funnel, and to the check of its proofs: triangles,
+//! boxes with holes, walls of a map.
+
+use std::sync::Arc;
+
+use crate::input::InputError;
+use crate::query::ItemId;
+use crate::scene::{ItemShape, Scene, Surfaces};
+use crate::visibility::fragment::{self, CutOuts};
+use crate::visibility::region::RegionGraph;
+use crate::visibility::region::doom::DoomMap;
+use crate::visibility::truth::PlanWall;
+
+/// The triangles of a scene's items, if they are no solid boxes; of a map also those of its
+/// floors and ceilings, behind the items.
+///
+/// # Errors
+/// The map's file, read a second time.
+pub fn surfaces_of(scene: &Scene) -> Result<Option<Arc<Surfaces>>, InputError> {
+    Ok(match (scene.item_shape(), &scene.surfaces) {
+        (ItemShape::Box, _) => None,
+        (_, Some(mesh)) => Some(mesh.clone()),
+        (_, None) => Some(Arc::new(match DoomMap::of_scene(scene)? {
+            Some(map) => map.surfaces(scene),
+            // A map whose file is not known.
+            None => Surfaces::from_boxes(scene),
+        })),
+    })
+}
+
+/// Which items of a scene are cut out: any but the walls of its rooms, whose regions are
+/// `graph`. What is seen of the rooms beyond is known by their portals alone.
+pub fn holes_of(typed: &CutOuts, scene: &Scene, graph: Option<&RegionGraph>) -> fragment::Surfaces {
+    let walls = graph.map(|graph| graph.borders(scene));
+    let is_free = |item: ItemId| walls.as_ref().is_none_or(|walls| !walls[item as usize]);
+    typed.surfaces(scene.items.len(), is_free)
+}
+
+/// The walls of a map, as its scene's items; none of any other scene.
+///
+/// # Errors
+/// The map's file, read a second time.
+pub fn walls_of(scene: &Scene) -> Result<Vec<PlanWall>, InputError> {
+    Ok(DoomMap::of_scene(scene)?.map_or(Vec::new(), |map| map.walls()))
+}
