@@ -4,7 +4,8 @@
 use super::document::{Block, Rows};
 use super::text;
 use crate::funnel::{
-    FunnelReport, Gain, InnerRow, LevelRow, ProofCounts, SeenFrom, StageKind, StageRow, Times,
+    BlocksRow, FunnelReport, Gain, InnerRow, LevelRow, ProofCounts, SeenFrom, StageKind, StageRow,
+    Times,
 };
 use crate::visibility::Guarantee;
 use crate::visibility::occlusion::OccluderChoice;
@@ -30,6 +31,7 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
     ];
     blocks.extend(saved_load(&report.level).map(Block::Line));
     blocks.extend(report.inner_boxes.as_ref().map(inner_boxes));
+    blocks.extend(report.solid_blocks.as_ref().map(solid_blocks));
     if let Some(made) = &report.cut_outs {
         let line = format!(
             "{} of the items are cut out by a mask ({}, tiles of {}): they hide nothing where it has holes.",
@@ -116,6 +118,22 @@ fn inner_boxes(row: &InnerRow) -> Block {
         held.unwrap_or_default(),
         text::time(row.build_ns)
     ))
+}
+
+/// What hides in a map, and what finding it took.
+fn solid_blocks(row: &BlocksRow) -> Block {
+    Block::Line(match row.unclosed_count {
+        0 => format!(
+            "Occluders: {} in the solid between the rooms of the map, below floors and above \
+             ceilings; found in {}.",
+            text::counted(row.count, "box"),
+            text::time(row.build_ns)
+        ),
+        unclosed => format!(
+            "Occluders: none, as the linedefs of {} do not close.",
+            text::counted(unclosed, "sector")
+        ),
+    })
 }
 
 /// What the times rest on.

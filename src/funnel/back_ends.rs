@@ -6,7 +6,7 @@ use super::hiding::{HIDING, HidingRow};
 use super::seen_from::SeenFrom;
 use super::stage::{BackEnd, NONE, StageKind};
 use super::triangle_rows;
-use crate::scene::{ItemShape, Regions, Scene};
+use crate::scene::{Regions, Scene};
 use crate::visibility::{Guarantee, region};
 
 /// What a chain takes where there are rooms.
@@ -61,15 +61,13 @@ pub fn back_ends(stage: StageKind, scene: &Scene, has_cut_outs: bool) -> Vec<Bac
         "the stage is left out",
         Guarantee::Conservative,
     )];
-    // Nothing is known to hide within the boxes of walls.
-    let hides = scene.item_shape() != ItemShape::Wall;
     match stage {
         StageKind::Region => {
             let names = of_regions(scene);
             let known = region::ROWS.iter().filter(|row| names.contains(&row.name));
             rows.extend(known.map(|row| plain(row.name, row.summary, row.guarantee)));
         }
-        StageKind::Occlusion if hides => rows.extend(HIDING.iter().map(HidingRow::back_end)),
+        StageKind::Occlusion => rows.extend(HIDING.iter().map(HidingRow::back_end)),
         StageKind::Triangle => rows = triangle_rows::back_ends().collect(),
         StageKind::Fragment => rows.extend(fragment_rows::back_ends(scene, has_cut_outs)),
         _ => {}

@@ -78,16 +78,10 @@ impl Bound<'_> {
     }
 }
 
-/// The bounds that a scene has data for: of occlusion where something is known to hide, of
-/// fragments where items are solid boxes. `left` is the set that the chain leaves.
+/// The bounds that a scene has data for: of fragments where items are solid boxes. `left` is the set that the chain leaves.
 pub fn bounds<'w>(world: &'w World<'w>, pass: &Pass, left: usize, faces: &Faces) -> Vec<Bound<'w>> {
     let mut bounds = of_regions(world);
-    bounds.extend(
-        world
-            .occluders()
-            .into_iter()
-            .flat_map(|scene| of_occlusion(world, scene)),
-    );
+    bounds.extend(of_occlusion(world));
     bounds.push(of_cones(world, faces));
     bounds.extend(
         world
@@ -151,9 +145,10 @@ fn seen_openings(world: &World, row: &dyn RegionRow, view: usize) -> Vec<Opening
         .collect()
 }
 
-fn of_occlusion<'w>(world: &'w World<'w>, scene: &'w OccluderScene) -> [Bound<'w>; 3] {
-    let trace = |view| {
-        let (rays, volume) = (world.rays(view), world.volume(view));
+fn of_occlusion<'w>(world: &'w World<'w>) -> [Bound<'w>; 3] {
+    let scenes: Rc<[&OccluderScene]> = (0..world.views()).map(|v| world.occluders(v)).collect();
+    let trace = |view: usize| {
+        let (rays, volume, scene) = (world.rays(view), world.volume(view), scenes[view]);
         let view = View::new(rays, volume, scene, world.samples());
         FrameTrace::of(scene, &view, world.kernel())
     };
@@ -165,13 +160,14 @@ fn of_occlusion<'w>(world: &'w World<'w>, scene: &'w OccluderScene) -> [Bound<'w
         ask,
     };
     let [reading, replaying] = [(); 2].map(|()| traces.clone());
+    let drawn_in = scenes.clone();
     let buffer = RefCell::new(MaskedInner::new(world.samples()));
     let read = MaskedInner::new(world.samples());
     [
         bound(
             "read the occluders that are drawn",
             Box::new(move |view, _| {
-                black_box(reading[view].read_occluders(scene));
+                black_box(reading[view].read_occluders(drawn_in[view]));
             }),
         ),
         bound(
@@ -181,7 +177,7 @@ fn of_occlusion<'w>(world: &'w World<'w>, scene: &'w OccluderScene) -> [Bound<'w
         bound(
             "read the tested boxes and the deciding tiles",
             Box::new(move |view, _| {
-                black_box(traces[view].read_tested(scene, &read));
+                black_box(traces[view].read_tested(scenes[view], &read));
             }),
         ),
     ]

@@ -7,6 +7,7 @@
 //! process, [`Prepared::conclude`] puts both together.
 
 mod back_ends;
+mod blocks;
 mod bounds;
 mod certified;
 mod chain;
@@ -40,6 +41,7 @@ mod walks;
 mod world;
 
 pub use back_ends::back_ends;
+pub use blocks::BlocksRow;
 pub use bounds::BoundRow;
 pub use certified::Proofs;
 pub use chain::Chain;

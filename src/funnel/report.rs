@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::blocks::BlocksRow;
 use super::bounds::BoundRow;
 use super::chain::Chain;
 use super::fragments::FragmentCounts;
@@ -55,6 +56,9 @@ pub struct FunnelReport {
     /// The boxes inside the items of a mesh, which hide what is behind them; null for
     /// what is no mesh.
     pub inner_boxes: Option<InnerRow>,
+    /// The boxes in the solid of a map, which hide what is behind them; null for what is no
+    /// map.
+    pub solid_blocks: Option<BlocksRow>,
     /// What is seen in a mirror; null where none was asked for.
     pub mirror: Option<MirrorRow>,
     /// What is left, drawn in every order; empty unless items are solid boxes.

@@ -202,6 +202,7 @@ pub fn prepare(
             stages: rows,
             audits: world.audits().to_vec(),
             inner_boxes: world.inner().map(|inner| inner.row.clone()),
+            solid_blocks: world.blocks().cloned(),
             mirror,
             orders: drawn,
             picks: picked,

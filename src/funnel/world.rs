@@ -8,6 +8,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::back_ends::back_ends;
+use super::blocks::{Blocks, BlocksRow};
 use super::chain::Chain;
 use super::error::FunnelError;
 use super::hiding::{HIDING, HidingRow};
@@ -86,8 +87,11 @@ pub struct World<'a> {
     surfaces: Option<Arc<Surfaces>>,
     /// Boxes inside the items, if those are triangles.
     inner: Option<Inner>,
-    /// None where nothing is known to hide.
-    occluders: Option<OccluderScene>,
+    /// What is known of the boxes in the solid of a map.
+    blocks: Option<BlocksRow>,
+    occluders: OccluderScene,
+    /// Of a map: the same without what hides, for eyes outside its rooms.
+    bare: Option<OccluderScene>,
     choice: OccluderChoice,
     regions: Option<Regions>,
     truth_cache: Option<&'a TruthCache>,
@@ -177,11 +181,19 @@ impl<'a> World<'a> {
             }
         }
         let inner = Inner::of(input.scene, input.execution.threads);
+        let blocks = Blocks::of(input.scene)?;
         let occluders = match (&solids, &inner) {
-            (Some(solids), _) => Some(OccluderScene::of(solids)),
-            (None, Some(inner)) => Some(OccluderScene::within(input.scene, &inner.boxes)),
-            (None, None) => None,
+            (Some(solids), _) => OccluderScene::of(solids),
+            (None, Some(inner)) => OccluderScene::within(input.scene, &inner.boxes),
+            (None, None) => {
+                let boxes = blocks.as_ref().map_or(&[][..], |blocks| &blocks.boxes);
+                OccluderScene::among(input.scene, boxes)
+            }
         };
+        let blocks = blocks.map(|blocks| blocks.row);
+        let bare = blocks
+            .as_ref()
+            .map(|_| OccluderScene::among(input.scene, &[]));
         let world = World {
             scene: input.scene,
             kernel: input.execution.kernel,
@@ -192,7 +204,9 @@ impl<'a> World<'a> {
             cut_outs,
             surfaces,
             inner,
+            blocks,
             occluders,
+            bare,
             choice: input.occluders,
             regions,
             truth_cache: input.truth_cache,
@@ -225,10 +239,12 @@ impl<'a> World<'a> {
         self.scene
     }
 
-    /// The items as the occlusion stage draws and tests them; `None` where nothing is
-    /// known to hide.
-    pub fn occluders(&self) -> Option<&OccluderScene> {
-        self.occluders.as_ref()
+    /// The items as the occlusion stage draws and tests them in a view.
+    pub fn occluders(&self, view: usize) -> &OccluderScene {
+        match &self.bare {
+            Some(bare) if !self.is_inside(view) => bare,
+            _ => &self.occluders,
+        }
     }
 
     /// The six planes of a view.
@@ -276,6 +292,11 @@ impl<'a> World<'a> {
     /// The boxes inside the items of a mesh, which are drawn as occluders.
     pub fn inner(&self) -> Option<&Inner> {
         self.inner.as_ref()
+    }
+
+    /// What is known of the boxes in the solid of a map, which are drawn as occluders.
+    pub fn blocks(&self) -> Option<&BlocksRow> {
+        self.blocks.as_ref()
     }
 
     /// The place of a view's camera in the path.
@@ -414,8 +435,10 @@ impl<'a> World<'a> {
         let hide = RefCell::new((row.make)(buffer, self.kernel, self.choice));
         let does_both = row.back_end().does_object_stage;
         let every: Vec<ItemId> = (0..self.items() as ItemId).collect();
-        let occluders = self.occluders.as_ref().expect("a scene with occluders");
+        let views = 0..self.views();
+        let occluders: Vec<_> = views.map(|view| self.occluders(view)).collect();
         Box::new(move |view, input, out| {
+            let occluders = occluders[view];
             let View { rays, volume, .. } = &self.views[view];
             let view = occlusion::View::new(rays, volume, occluders, buffer);
             let items = input.unwrap_or(&every);

@@ -230,8 +230,11 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
         let before = self.out.len();
         for survivor in survivors {
             let again = state.second_look && !survivor.near;
+            let Some(item) = scene.item(survivor.position as usize) else {
+                continue;
+            };
             if !(again && buffer.hides(isa, &survivor.rect)) {
-                self.out.push(scene.ids()[survivor.position as usize]);
+                self.out.push(item);
             }
         }
         stats.kept = self.out.len() - before;

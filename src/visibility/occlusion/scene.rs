@@ -27,6 +27,8 @@ pub struct OccluderScene {
     faces: Vec<Faces>,
     /// Where in the tree an item is.
     positions: Vec<u32>,
+    /// How many of the boxes are items; those behind them only hide.
+    items: usize,
     bounds: WorldBox,
 }
 
@@ -49,6 +51,25 @@ impl OccluderScene {
             .map(|b| faces_reached(&WorldBox::within(b, scene.origin), &bounds));
         let faces = faces.collect();
         OccluderScene::sorted(scene.origin, &scene.items, inner, faces, bounds)
+    }
+
+    /// Items that hide nothing themselves among boxes that do and are no items: the rock
+    /// between the rooms of a map. Corners of the blocks must be exact in f32 about the
+    /// scene's origin. O(n log n).
+    pub fn among(scene: &Scene, blocks: &[WorldBox]) -> OccluderScene {
+        let bounds = bounds_of(scene.written());
+        let about = |corner: DVec3| (corner - scene.origin).as_vec3();
+        let local = blocks.iter().map(|b| Aabb::new(about(b.min), about(b.max)));
+        let local: Vec<Aabb> = local.collect();
+        let nothing = scene.items.iter().map(|_| Aabb::EMPTY);
+        let inner: Vec<Aabb> = nothing.chain(local.iter().copied()).collect();
+        let outer = [&scene.items[..], &local].concat();
+        let none = scene.items.iter().map(|_| 0);
+        let faces = none.chain(blocks.iter().map(|b| faces_reached(b, &bounds)));
+        let faces = faces.collect();
+        let mut among = OccluderScene::sorted(scene.origin, &outer, &inner, faces, bounds);
+        among.items = scene.items.len();
+        among
     }
 
     /// All by item.
@@ -83,19 +104,32 @@ impl OccluderScene {
             inner: in_order(inner),
             faces: ids.iter().map(|&id| faces[id as usize]).collect(),
             positions,
+            items: ids.len(),
             ids,
             bounds,
         }
     }
 
-    /// Number of items.
+    /// Number of boxes in the tree: items, and what hides and is none.
     pub fn len(&self) -> usize {
         self.ids.len()
     }
 
-    /// Whether there are no items.
+    /// Whether there are no boxes.
     pub fn is_empty(&self) -> bool {
         self.ids.is_empty()
+    }
+
+    /// The item at a position in tree order; `None` for what hides and is no item.
+    #[inline(always)]
+    pub fn item(&self, position: usize) -> Option<ItemId> {
+        let id = self.ids[position];
+        ((id as usize) < self.items).then_some(id)
+    }
+
+    /// Numbers, behind those of the items, of what hides and is no item.
+    pub fn blocks(&self) -> std::ops::Range<ItemId> {
+        self.items as ItemId..self.ids.len() as ItemId
     }
 
     /// Where the zero of the boxes is in the world.
@@ -106,11 +140,6 @@ impl OccluderScene {
     /// The union of the boxes as they were written.
     pub fn bounds(&self) -> &WorldBox {
         &self.bounds
-    }
-
-    /// The items in tree order.
-    pub fn ids(&self) -> &[ItemId] {
-        &self.ids
     }
 
     /// Where in tree order an item is.

@@ -121,7 +121,17 @@ impl<B: OcclusionBuffer> Work for Culled<'_, B> {
     fn run<I: Isa>(self, isa: I) -> CullStats {
         let (state, scene, view) = (self.state, self.scene, self.view);
         let mut stats = CullStats::default();
+        state.candidates.clear();
         project_all(isa, scene, view, self.ids, &mut state.candidates);
+        for first in scene.blocks().step_by(LANES) {
+            let (mut ids, end) = ([0; LANES], scene.blocks().end);
+            let chunk = first..end.min(first + LANES as ItemId);
+            let count = chunk.len();
+            ids.iter_mut()
+                .zip(chunk)
+                .for_each(|(id, block)| *id = block);
+            project_all(isa, scene, view, &ids[..count], &mut state.candidates);
+        }
         stats.boxes = self.ids.len();
         let drawable = |c: &Candidate| !view.entered_before_near(&scene.outer(c.position as usize));
         choose(&state.candidates, state.choice, &mut state.order, drawable);
@@ -141,8 +151,11 @@ impl<B: OcclusionBuffer> Work for Culled<'_, B> {
         state.buffer.finish();
         let before = self.out.len();
         for candidate in &state.candidates {
+            let Some(item) = scene.item(candidate.position as usize) else {
+                continue;
+            };
             if candidate.near || !state.buffer.hides(isa, &candidate.rect) {
-                self.out.push(scene.ids()[candidate.position as usize]);
+                self.out.push(item);
             }
         }
         stats.kept = self.out.len() - before;
@@ -160,7 +173,6 @@ fn project_all<I: Isa>(
     ids: &[ItemId],
     candidates: &mut Vec<Candidate>,
 ) {
-    candidates.clear();
     let mut rects = Rects::NONE;
     for chunk in ids.chunks(LANES) {
         let mut block = BoxBlock::EMPTY;

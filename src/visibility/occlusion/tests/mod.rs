@@ -2,6 +2,7 @@
 
 mod by_rays;
 mod lanes;
+mod maps;
 mod meshes;
 mod pairs;
 mod rules;

@@ -181,6 +181,20 @@ impl DoomMap {
         })
     }
 
+    /// Lines and sectors alone, none of which moves.
+    #[cfg(test)]
+    pub(super) fn of_parts(lines: Vec<MapLine>, sectors: Vec<Sector>) -> DoomMap {
+        DoomMap {
+            parts: vec![Vec::new(); sectors.len()],
+            numbers: (0..lines.len() as u32).collect(),
+            linedefs: lines.len(),
+            heights: sectors.iter().map(|s| [s.floor, s.ceiling]).collect(),
+            reject: None,
+            lines,
+            sectors,
+        }
+    }
+
     /// The map's REJECT table: its claim of which sectors see each other.
     pub fn reject(&self) -> Option<&Pvs> {
         self.reject.as_ref()

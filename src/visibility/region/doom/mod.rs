@@ -11,12 +11,14 @@
 //! ceiling is not promised here.
 //!
 //! The same map as triangles, floors and ceilings among them, is
-//! [`DoomMap::surfaces`].
+//! [`DoomMap::surfaces`]; what these enclose from outside, in boxes, is
+//! [`DoomMap::solid_boxes`].
 
 mod ground;
 mod map;
 mod plan;
 mod sight;
+mod solid;
 mod surfaces;
 mod sweep;
 

@@ -1,11 +1,12 @@
 //! Polygons of a map, seen from above, cut into triangles between their own corners:
 //! whole numbers throughout, so that floors meet each other and the walls exactly.
 
-type Point = [i32; 2];
+/// Map coordinates.
+pub type Point = [i32; 2];
 
 /// Twice the area of a triangle, above zero where it turns to the left. Map
 /// coordinates have 16 bits, so nothing overflows.
-fn turn(a: Point, b: Point, c: Point) -> i64 {
+pub fn turn(a: Point, b: Point, c: Point) -> i64 {
     let minus = |p: Point| [0, 1].map(|k| i64::from(p[k]) - i64::from(a[k]));
     let ([x, y], [u, v]) = (minus(b), minus(c));
     x * v - y * u

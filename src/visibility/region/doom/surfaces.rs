@@ -95,7 +95,7 @@ impl DoomMap {
     }
 
     /// The linedefs about a sector, which lies on the right of each.
-    fn outline(&self, sector: RegionId) -> Vec<[[i32; 2]; 2]> {
+    pub(super) fn outline(&self, sector: RegionId) -> Vec<[[i32; 2]; 2]> {
         let mut edges = Vec::new();
         for MapLine { ends, sectors, .. } in &self.lines {
             let [front, behind] = sectors.map(|side| side == Some(sector));

@@ -1,0 +1,55 @@
+//! The boxes in the solid of a map, made once before any view: how many there are, and
+//! what making them took.
+
+use std::time::Instant;
+
+use serde::Serialize;
+
+use crate::input::InputError;
+use crate::scene::{Scene, WorldBox};
+use crate::visibility::region::doom::DoomMap;
+
+/// What is known of the boxes in the solid of a map.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+#[non_exhaustive]
+pub struct BlocksRow {
+    /// How many there are; none if a sector does not close.
+    pub count: usize,
+    /// Sectors whose linedefs do not close: rays leave the map there.
+    pub unclosed_count: usize,
+    /// Wall time of finding them all.
+    pub build_ns: f64,
+}
+
+/// The boxes themselves.
+pub struct Blocks {
+    /// Over the heights of the map's items.
+    pub boxes: Vec<WorldBox>,
+    /// What they are.
+    pub row: BlocksRow,
+}
+
+impl Blocks {
+    /// `None` for a scene that is no map.
+    ///
+    /// # Errors
+    /// The map's file, read a second time.
+    pub fn of(scene: &Scene) -> Result<Option<Blocks>, InputError> {
+        let Some(map) = DoomMap::of_scene(scene)? else {
+            return Ok(None);
+        };
+        let begun = Instant::now();
+        let all = scene.written().map(|b| [b.min.z, b.max.z]);
+        let heights = all.reduce(|[low, high], [min, max]| [low.min(min), high.max(max)]);
+        let boxes = heights.map_or(Vec::new(), |heights| map.solid_boxes(heights));
+        let build_ns = begun.elapsed().as_nanos() as f64;
+        Ok(Some(Blocks {
+            row: BlocksRow {
+                count: boxes.len(),
+                unclosed_count: map.unclosed().len(),
+                build_ns,
+            },
+            boxes,
+        }))
+    }
+}
