@@ -8,7 +8,8 @@
 //! enters it, between near and far; a box that some ray enters before the near
 //! plane is not drawn; items as near as an occluder are not hidden by it. Of a mesh
 //! what is drawn is a box inside each item ([`OccluderScene::within`]): a ray that enters
-//! it has met the item's surface before, unless that was before the near plane.
+//! it has met the item's surface before, unless that was before the near plane. Of a map
+//! they are boxes of its solid, which are no items ([`OccluderScene::among`]).
 
 mod buffer;
 mod depth_rays;
