@@ -495,8 +495,7 @@ impl<'p> Facts<'p> {
                 values.push(own.iter().zip(reference).map(|(own, r)| own - r).collect());
             }
         }
-        let ranks = ranks(&values, ALPHA).into_iter().map(|placed| placed.rank);
-        ranked.into_iter().zip(ranks).collect()
+        ranked.into_iter().zip(ranks(&values, ALPHA)).collect()
     }
 }
 
