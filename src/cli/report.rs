@@ -10,12 +10,12 @@ use anyhow::Context;
 use super::args::ReportArgs;
 use super::document::{Block, Rows, to_html, to_markdown};
 use super::surface_diagram::{self, Picture};
-use super::{Ending, expect_folder, expect_places, surface_tables, tell, text};
+use super::{Ending, expect_folder, expect_places, surface_tables, tell, text, write_text};
 use crate::index::Registry;
 use crate::measure::Status;
 use crate::report::{
     Comparison, Ranked, Report, ReportCell, comparisons, growths, read_report, surfaces,
-    times_as_fast, write_atomically,
+    times_as_fast,
 };
 
 pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> {
@@ -34,7 +34,7 @@ pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> 
     };
     let mut blocks = blocks(&report);
     if let Some(path) = &args.markdown {
-        write(path, &to_markdown(&blocks))?;
+        write_text(path, &to_markdown(&blocks))?;
     }
     match &args.svg {
         Some(folder) if pictures.is_empty() => tell(&format!(
@@ -47,7 +47,7 @@ pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> 
     }
     if let Some(path) = &args.html {
         blocks.extend(pictures.into_iter().map(|p| Block::Picture(p.svg)));
-        write(path, &to_html(&title(&report), &blocks))?;
+        write_text(path, &to_html(&title(&report), &blocks))?;
     } else if args.markdown.is_none() && args.svg.is_none() {
         io::stdout().write_all(to_markdown(&blocks).as_bytes())?;
     }
@@ -73,17 +73,11 @@ fn write_charts(folder: &Path, pictures: &[Picture]) -> anyhow::Result<()> {
     let file = |picture: &Picture| folder.join(format!("{}.svg", picture.name));
     let written = pictures
         .iter()
-        .try_for_each(|picture| write(&file(picture), &picture.svg));
+        .try_for_each(|picture| write_text(&file(picture), &picture.svg));
     if written.is_err() && is_new {
         let _ = fs::remove_dir_all(folder);
     }
-    written
-}
-
-fn write(path: &Path, text: &str) -> anyhow::Result<()> {
-    Ok(write_atomically(path, |out| {
-        out.write_all(text.as_bytes())
-    })?)
+    Ok(written?)
 }
 
 fn title(report: &Report) -> String {

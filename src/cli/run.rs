@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 
 use super::args::RunArgs;
 use super::processes::{Ended, Said, Workers};
@@ -14,6 +14,7 @@ use super::protocol::Job;
 use super::run_plan::{RunPlan, plan};
 use super::run_resume::{create, go_on, resume, utc_now};
 use super::run_table::show_scene;
+use super::study::progress;
 use super::{Ending, expect_folder, interrupt, surface_tables, tell, text, unread_is_fine};
 use crate::index::Registry;
 use crate::measure::{
@@ -85,7 +86,7 @@ impl Run {
     ) -> anyhow::Result<Run> {
         let groups = plan.plan.groups().len() as u64;
         Ok(Run {
-            bar: progress(groups * u64::from(plan.plan.effort.processes)),
+            bar: progress(groups * u64::from(plan.plan.effort.processes), ""),
             // Files in the run's folder: what a killed run leaves is taken away by
             // the next.
             workers: Workers::new(
@@ -336,13 +337,4 @@ impl Run {
         )?;
         out.flush()
     }
-}
-
-/// A bar of so many parts.
-pub fn progress(parts: u64) -> ProgressBar {
-    // Drawn on stderr, and only if that is a terminal.
-    let style = ProgressStyle::with_template("{bar:24} {pos}/{len}  {elapsed}  {msg}");
-    let bar = ProgressBar::new(parts);
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    bar
 }
