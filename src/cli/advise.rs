@@ -8,6 +8,7 @@ use super::args::AdviseArgs;
 use super::processes::{Said, Workers};
 use super::protocol::{Job, Timing};
 use super::study::Study;
+use super::table::Table;
 use super::{Ending, interrupt, load_scene, print, text};
 use crate::advise::{
     self, Advice, AdviseInput, AdviseOptions, Check, LeftOutIf, Omission, StructureChoice,
@@ -231,18 +232,11 @@ fn ties<S: AsRef<str>>(names: &[S]) -> String {
     }
 }
 
-fn structure_table(choice: &StructureChoice) -> text::Table {
-    let header = [
-        "structure",
-        "query [95 % interval]",
-        "speed-up",
-        "build",
-        "B/item",
-        "break-even queries",
-        "locate",
-        "status",
-    ];
-    let mut table = text::table(&header, &[1, 2, 3, 4, 5, 6]);
+fn structure_table(choice: &StructureChoice) -> Table {
+    let mut table = Table::of(
+        "structure | >query [95 % interval] | >speed-up | >build | >B/item \
+         | >break-even queries | >locate | status",
+    );
     for row in &choice.rows {
         let show = |value: Option<f64>, how: fn(f64) -> String| value.map(how).unwrap_or_default();
         table.add_row([
@@ -259,17 +253,11 @@ fn structure_table(choice: &StructureChoice) -> text::Table {
     table
 }
 
-fn test_table(choice: &TestChoice) -> text::Table {
-    let header = [
-        "",
-        "test",
-        "query [95 % interval]",
-        "false positives %",
-        "missed ppm",
-        "false positives per query",
-        "query and drawing",
-    ];
-    let mut table = text::table(&header, &[2, 3, 4, 5, 6]);
+fn test_table(choice: &TestChoice) -> Table {
+    let mut table = Table::of(
+        " | test | >query [95 % interval] | >false positives % | >missed ppm \
+         | >false positives per query | >query and drawing",
+    );
     for row in &choice.rows {
         let show = |value: Option<f64>, how: fn(f64) -> String| value.map(how).unwrap_or_default();
         table.add_row([
@@ -290,21 +278,11 @@ fn test_table(choice: &TestChoice) -> text::Table {
     table
 }
 
-fn omission_table(omissions: &[Omission]) -> text::Table {
-    let header = [
-        "rule",
-        "decision",
-        "statistic",
-        "threshold",
-        "saving",
-        "measured on",
-        "kept",
-        "left out",
-        "kept / left out",
-        "false positives % kept / left out",
-        "answers",
-    ];
-    let mut table = text::table(&header, &[2, 3, 4, 6, 7, 8, 9]);
+fn omission_table(omissions: &[Omission]) -> Table {
+    let mut table = Table::of(
+        "rule | decision | >statistic | >threshold | >saving | measured on | >kept | >left out \
+         | >kept / left out | >false positives % kept / left out | answers",
+    );
     for omission in omissions {
         let figure = |value: Option<f64>| value.map(general).unwrap_or_default();
         let side = match omission.left_out_if {

@@ -8,6 +8,7 @@ use super::args::DriftArgs;
 use super::processes::Workers;
 use super::protocol::{Job, Timing};
 use super::study::Study;
+use super::table::Table;
 use super::{
     Ending, drift_arms, drift_diagram, expect_place_for, interrupt, print, text, write_text,
 };
@@ -95,11 +96,9 @@ fn grid(
     columns: &[String],
     rows: &[&str],
     cell: impl Fn(&str, usize) -> String,
-) -> text::Table {
-    let mut header = vec![corner];
-    header.extend(columns.iter().map(String::as_str));
-    let right: Vec<usize> = (1..header.len()).collect();
-    let mut table = text::table(&header, &right);
+) -> Table {
+    let columns_of_it = columns.iter().map(String::as_str);
+    let mut table = Table::of_numbers([corner].into_iter().chain(columns_of_it));
     for row in rows {
         let cells = (0..columns.len()).map(|column| cell(row, column));
         table.add_row([(*row).to_owned()].into_iter().chain(cells));
@@ -220,8 +219,7 @@ fn show_orbits(report: &DriftReport, out: &mut impl Write) -> io::Result<()> {
 
 fn show_rated(title: &str, error: &str, rated: &[Rated], out: &mut impl Write) -> io::Result<()> {
     let header = [title, error, "ns/step", "good", "dominated by", ""];
-    let mut table = text::table(&header, &[1]);
-    table.fit(WIDTH);
+    let mut table = Table::new(header, &[1]).fit(WIDTH);
     for row in rated {
         let name = match row.is_default {
             true => format!("{} (default)", row.name),

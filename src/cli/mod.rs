@@ -52,6 +52,7 @@ mod stress;
 mod study;
 mod surface_diagram;
 mod surface_tables;
+mod table;
 mod text;
 mod usage;
 mod values;

@@ -8,8 +8,9 @@ use std::path::Path;
 use anyhow::Context;
 
 use super::args::ReportArgs;
-use super::document::{Block, Rows, to_html, to_markdown};
+use super::document::{Block, to_html, to_markdown};
 use super::surface_diagram::{self, Picture};
+use super::table::Table;
 use super::{Ending, expect_folder, expect_places, surface_tables, tell, text, write_text};
 use crate::index::Registry;
 use crate::measure::Status;
@@ -189,18 +190,18 @@ fn of_comparison(comparison: &Comparison) -> Vec<Block> {
     }
     header.extend(["of lower bound: read", "copy", "build", "bytes per item"]);
     header.extend(["break-even queries", "locate", "status"]);
-    let mut rows = Rows::of_numbers(header);
+    let mut table = Table::of_numbers(header);
     for Ranked { rank, cell } in &comparison.ranked {
         let rank = rank.map_or("-".to_owned(), |rank| rank.to_string());
-        rows.rows.push(row(cell, rank, peer));
+        table.rows.push(row(cell, rank, peer));
     }
     for bound in &comparison.bounds {
-        rows.rows.push(row(bound, "lower bound".to_owned(), peer));
+        table.rows.push(row(bound, "lower bound".to_owned(), peer));
     }
     let basis = format!("{}.", text::basis(comparison));
     let mut blocks = vec![Block::Heading(3, heading), Block::Line(basis)];
     blocks.extend(false_positives(comparison).map(Block::Line));
-    blocks.push(Block::Table(rows.without_empty_columns()));
+    blocks.push(Block::Table(table.without_empty_columns()));
     let told = comparison.ranked.iter().map(|r| r.cell);
     for cell in told.filter(|c| c.reason.is_some()) {
         let reason = cell.reason.as_deref().unwrap_or_default();

@@ -5,10 +5,10 @@ use std::io::{self, Write};
 use anyhow::bail;
 
 use super::args::PrecisionArgs;
-use super::document::Rows;
 use super::processes::Workers;
 use super::protocol::{Job, Timing};
 use super::study::Study;
+use super::table::Table;
 use super::{Ending, funnel_table, interrupt, load_scene_by, print, text};
 use crate::funnel::{
     self, Chain, FunnelInput, NONE, SeenFrom, StageKind, StageSweep, SweepPlan, SweepPoint,
@@ -172,17 +172,11 @@ fn show(sweep: &StageSweep, out: &mut impl Write) -> io::Result<()> {
         SAMPLES.height,
         funnel_table::spread(sweep.processes)
     )?;
-    let mut rows = Rows::of_numbers([
-        "by",
-        "buffer",
-        "out",
-        "FP / visible",
-        "FN / visible",
-        "FN / view",
-        "time / view",
-        "front",
-    ]);
-    rows.rows.extend(sweep.points.iter().map(|point| {
+    let mut table = Table::of(
+        "by | >buffer | >out | >FP / visible | >FN / visible | >FN / view | >time / view \
+         | >front",
+    );
+    table.rows.extend(sweep.points.iter().map(|point| {
         let (errors, times) = (&point.errors, &point.times);
         let doubt = if point.back_end.guarantee == Guarantee::Unproven {
             "?"
@@ -203,7 +197,7 @@ fn show(sweep: &StageSweep, out: &mut impl Write) -> io::Result<()> {
             if point.on_front { "*" } else { "" }.to_owned(),
         ]
     }));
-    writeln!(out, "{}", rows.terminal())?;
+    writeln!(out, "{table}")?;
     let safe = sweep
         .points
         .iter()
