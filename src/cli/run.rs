@@ -278,18 +278,7 @@ impl Run {
                 .first()
                 .map(|kept| kept.part.clone());
             let structures = &self.plan.plan.structures;
-            let subject = |spec: &crate::index::StructureSpec| SubjectPart {
-                label: spec.label.clone(),
-                params: spec.params.clone(),
-                kind: spec.row.info.kind,
-                origin: spec.row.info.origin.owned(),
-                verdict: verdict.clone(),
-                build_ms: None,
-                memory_bytes: None,
-                update_ms: Vec::new(),
-                refitted_ln: None,
-                counts: BTreeMap::new(),
-            };
+            let subject = |spec| SubjectPart::unknown(spec, verdict.clone());
             let part = Part {
                 key: key.clone(),
                 process,

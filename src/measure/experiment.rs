@@ -121,20 +121,12 @@ impl Plan {
 
     /// The key of the group that a question is on a scene.
     pub fn key(&self, scene: &PlannedScene, question: &Question) -> GroupKey {
-        let Question {
-            path,
-            cold,
-            culling,
-        } = question;
-        GroupKey {
-            scene: scene.source.clone(),
-            path: path.clone(),
-            cache: if *cold { "cold" } else { "warm" }.to_owned(),
-            test: culling.test.name().to_owned(),
-            arithmetic: culling.arithmetic.name().to_owned(),
-            planes: culling.planes.method.name().to_owned(),
-            epsilon: culling.planes.epsilon,
-        }
+        GroupKey::of(
+            &scene.source,
+            &question.path,
+            question.cold,
+            &question.culling,
+        )
     }
 
     /// All groups of cells that are compared with each other, in the order in

@@ -387,7 +387,7 @@ impl<'p> Facts<'p> {
         let items = self.parts[0].scene.total_count as f64;
         let bytes = self.subjects(label).find_map(|s| s.memory_bytes);
         if let Some(bytes) = bytes {
-            metrics.ratio("memory_bytes_per_item", bytes as f64, items);
+            metrics.set("memory_bytes_per_item", bytes as f64 / items);
         }
     }
 
@@ -403,15 +403,15 @@ impl<'p> Facts<'p> {
             let Some(shown) = one_run(reference, own) else {
                 continue;
             };
-            metrics.interval(time, shown.value, shown.lower.zip(shown.upper));
+            metrics.insert(time, shown.value, shown.lower.zip(shown.upper));
             if let (TaskKind::Query, Some(visible)) = (task, self.visible_when_timed()) {
                 let interval = shown.lower.zip(shown.upper);
                 let interval = interval.map(|(lower, upper)| (lower / visible, upper / visible));
-                metrics.interval("ns_per_visible", shown.value / visible, interval);
+                metrics.insert("ns_per_visible", shown.value / visible, interval);
             }
             if let (Some(speedup), true) = (speedup, self.has_yardstick) {
                 let interval = shown.speedup_lower.zip(shown.speedup_upper);
-                metrics.interval(speedup, shown.speedup, interval);
+                metrics.insert(speedup, shown.speedup, interval);
             }
         }
         let queries = || self.tasks(label, TaskKind::Query);
@@ -513,7 +513,7 @@ fn error_metrics(metrics: &mut Metrics, judged: &Judged) {
     let (errors, queries) = (&judged.errors, judged.judged_queries as f64);
     metrics.set("judged_queries", queries);
     if let Some(excess) = errors.excess() {
-        metrics.interval("excess", excess, judged.excess_interval.map(Into::into));
+        metrics.insert("excess", excess, judged.excess_interval.map(Into::into));
     }
     for (name, count) in [
         ("false_positive_count", errors.false_positives),
@@ -521,7 +521,7 @@ fn error_metrics(metrics: &mut Metrics, judged: &Judged) {
         ("touch_dropped_count", errors.touch_dropped),
         ("undecided_count", errors.undecided),
     ] {
-        metrics.ratio(name, count as f64, queries);
+        metrics.set(name, count as f64 / queries);
     }
     metrics.set("worst_miss", errors.worst_miss);
 }
