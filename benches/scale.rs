@@ -12,7 +12,7 @@ use std::time::Duration;
 use cullbench::culling::Culling;
 use cullbench::index::StructureSpec;
 use cullbench::measure::{
-    Ask, Machine, Protocol, Stopwatch, Timed, TimedTask, Workload, cameras_within, timed_rounds,
+    Machine, Protocol, Stopwatch, Timed, TimedTask, Workload, cameras_within, timed_rounds,
 };
 use cullbench::query::AnyVolume;
 use cullbench::statistics::{median, slope};

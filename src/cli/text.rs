@@ -260,6 +260,7 @@ impl<W: Write> Write for Terminal<W> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::table::Table;
     use super::*;
 
     #[test]
@@ -316,11 +317,10 @@ mod tests {
     #[test]
     fn a_table_that_is_too_wide_moves_together_and_then_breaks_cells() {
         let fitted = |name: &str| {
-            let mut table = table(&["stage", "by", "time"], &[2]);
+            let mut table = Table::of("stage | by | > time");
             table.add_row(["occlusion", name, "1.85±0.02 ms"]);
             let whole = table.to_string();
-            table.fit(40);
-            (whole, table.to_string())
+            (whole, table.fit(40).to_string())
         };
         let widest = |text: &str| text.lines().map(|line| line.chars().count()).max();
         let (whole, same) = fitted("a-name");
@@ -338,7 +338,7 @@ mod tests {
 
     #[test]
     fn tables_and_lines_hold_no_escapes() {
-        let mut table = table(&["a\u{1b}b"], &[]);
+        let mut table = Table::of("a\u{1b}b");
         table.add_row(["two\nlines\u{202e}"]);
         let shown = table.to_string();
         assert!(shown.contains("a\\u{1b}b") && shown.contains("two lines\\u{202e}"));

@@ -442,7 +442,7 @@ mod tests {
         for (_, group) in &groups {
             assert!(group.twin.as_ref().is_some_and(|(label, _)| label == "bvh"));
             for cell in &group.cells {
-                assert_eq!(cell.verdict.status, super::super::Status::Ok);
+                assert_eq!(cell.status, super::super::Status::Ok);
             }
         }
         let (first, mut keep) = (&plan.scenes[0], |_, _| {

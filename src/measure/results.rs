@@ -5,7 +5,6 @@
 
 use std::collections::BTreeMap;
 
-use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::bounds::{BOUNDS, Bound};
@@ -15,10 +14,9 @@ use super::part::{Known, Part, SubjectPart, TaskPart};
 use super::subject::TWIN;
 use super::update::MOST_UPDATED;
 use super::{
-    Judged, PathInfo, Protocol, SceneInfo, Status, Subject, TaskKind, UPDATE_SHARES, Verdict,
-    Workload,
+    CellTimes, Judged, PathInfo, Protocol, ReportCell, SceneInfo, Status, Subject, TaskKind,
+    UPDATE_SHARES, Verdict, Workload,
 };
-use crate::index::{Kind, Origin};
 use crate::statistics::{
     ALPHA, Estimate, interquartile_mean, median, one_run, quantile, ranks, ratio, sorted,
 };
@@ -34,57 +32,13 @@ const UPDATE_METRICS: [&str; UPDATE_SHARES.len()] = [
 /// The structure that speed-ups refer to.
 pub const YARDSTICK: &str = "linear";
 
-/// One structure in one group.
-#[derive(Clone, PartialEq, Debug)]
-#[non_exhaustive]
-pub struct Cell {
-    /// Label of the structure or name of the lower bound.
-    pub structure: String,
-    /// As the structure declares; `None` for a lower bound.
-    pub declared: Option<(Kind, Origin)>,
-    /// Parameters of the structure, defaults included; null for a lower bound.
-    pub params: Value,
-    /// How building, counting and timing ended.
-    pub verdict: Verdict,
-    /// Fastest first; structures that no test tells apart share a rank. `None`
-    /// where there is no time.
-    pub rank: Option<usize>,
-    /// By name; a metric that was not measured is not there.
-    pub metrics: BTreeMap<String, Metric>,
-    /// What the metrics of time were made from.
-    pub times: CellTimes,
-    /// The errors behind the metrics, as totals.
-    pub judged: Option<Judged>,
-    /// What was not measured of it, and why.
-    pub left_out: Vec<String>,
-}
-
-/// What the times of a cell rest on.
-#[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
-#[cfg_attr(test, derive(schemars::JsonSchema))]
-#[non_exhaustive]
-pub struct CellTimes {
-    /// Processes that were timed; an interval needs three or more.
-    pub processes: usize,
-    /// Rounds in each process.
-    pub rounds: usize,
-    /// Cameras in the timed pass.
-    pub cameras_timed: usize,
-    /// Cameras whose answers were compared with the reference.
-    pub cameras_checked: usize,
-    /// Queries per clock reading.
-    pub batch: usize,
-    /// By metric: the time in each process, ns.
-    pub by_process: BTreeMap<String, Vec<f64>>,
-}
-
 /// All cells of a group, with what was measured beside them.
 #[non_exhaustive]
 pub struct Group {
     /// Structures in the order of the plan.
-    pub cells: Vec<Cell>,
+    pub cells: Vec<ReportCell>,
     /// Lower bounds: no structures, never ranked.
-    pub bounds: Vec<Cell>,
+    pub bounds: Vec<ReportCell>,
     /// Structure and ratio of the one that was entered twice: 1 is to lie in
     /// the interval.
     pub twin: Option<(String, Metric)>,
@@ -127,7 +81,7 @@ impl Group {
     pub fn of(parts: &[Part]) -> Group {
         let facts = Facts::of(parts);
         let first = &parts[0];
-        let mut cells: Vec<Cell> = first
+        let mut cells: Vec<ReportCell> = first
             .subjects
             .iter()
             .filter(|s| !s.label.ends_with(TWIN))
@@ -251,7 +205,7 @@ impl<'p> Facts<'p> {
         self.parts.iter().find_map(|part| part.known.as_ref())
     }
 
-    fn cell(&self, subject: &SubjectPart) -> Cell {
+    fn cell(&self, subject: &SubjectPart) -> ReportCell {
         let label = subject.label.as_str();
         let verdict = self.verdict(label);
         let right = verdict.status == Status::Ok;
@@ -273,36 +227,44 @@ impl<'p> Facts<'p> {
                 metrics.estimate(bound.ratio, self.ratio(label, bound.name));
             }
         }
-        Cell {
-            structure: label.to_owned(),
-            declared: Some((subject.kind, subject.origin.clone())),
+        let left_out = right.then(|| self.left_out(label));
+        ReportCell {
+            kind: Some(subject.kind),
+            origin: Some(subject.origin.clone()),
             params: subject.params.clone(),
-            rank: None,
-            times: self.times(label),
-            metrics: metrics.0,
-            judged,
-            left_out: if right {
-                self.left_out(label)
-            } else {
-                Vec::new()
-            },
-            verdict,
+            error: judged,
+            left_out: left_out.unwrap_or_default(),
+            ..self.timed(label, verdict, metrics)
         }
     }
 
-    fn bound(&self, name: &str) -> Cell {
+    fn bound(&self, name: &str) -> ReportCell {
         let mut metrics = Metrics::default();
         self.time_metrics(&mut metrics, name);
-        Cell {
-            structure: name.to_owned(),
-            declared: None,
+        self.timed(name, self.verdict(name), metrics)
+    }
+
+    /// A cell with what structures and lower bounds have in common.
+    fn timed(&self, label: &str, verdict: Verdict, metrics: Metrics) -> ReportCell {
+        let Part {
+            scene, path, key, ..
+        } = &self.parts[0];
+        ReportCell {
+            scene: scene.clone(),
+            path: path.clone(),
+            structure: label.to_owned(),
+            kind: None,
+            origin: None,
             params: Value::Null,
-            verdict: self.verdict(name),
+            test: key.test.clone(),
+            status: verdict.status,
+            reason: verdict.reason,
             rank: None,
-            times: self.times(name),
+            times: self.times(label),
             metrics: metrics.0,
-            judged: None,
+            error: None,
             left_out: Vec::new(),
+            samples_ref: None,
         }
     }
 
@@ -482,7 +444,7 @@ impl<'p> Facts<'p> {
     }
 
     /// The ranks of those cells that have times of a task.
-    fn ranks(&self, cells: &[Cell], task: TaskKind) -> Vec<(usize, usize)> {
+    fn ranks(&self, cells: &[ReportCell], task: TaskKind) -> Vec<(usize, usize)> {
         let Some(reference) = self.reference(task) else {
             return Vec::new();
         };
@@ -490,7 +452,7 @@ impl<'p> Facts<'p> {
         let mut values = Vec::new();
         for (i, cell) in cells.iter().enumerate() {
             let own = self.log(&cell.structure, task);
-            if let (Some(own), Status::Ok) = (own, cell.verdict.status) {
+            if let (Some(own), Status::Ok) = (own, cell.status) {
                 ranked.push(i);
                 values.push(own.iter().zip(reference).map(|(own, r)| own - r).collect());
             }

@@ -279,9 +279,9 @@ impl Stream {
                     rows,
                 })
             };
-            let cell = |cell: crate::measure::Cell| {
-                let rows = rows(&cell.structure);
-                ReportCell::new(&first.scene, &first.path, &key.test, cell, rows)
+            let cell = |cell: ReportCell| ReportCell {
+                samples_ref: rows(&cell.structure),
+                ..cell
             };
             report.cells.extend(group.cells.into_iter().map(cell));
             report.bounds.extend(group.bounds.into_iter().map(cell));
