@@ -12,7 +12,7 @@ use std::time::Duration;
 use cullbench::culling::Culling;
 use cullbench::index::StructureSpec;
 use cullbench::measure::{
-    Ask, Machine, Protocol, Stopwatch, Timed, TimedTask, Workload, cameras_within, timed_rounds,
+    Machine, Protocol, Stopwatch, Timed, TimedTask, Workload, cameras_within, timed_rounds,
 };
 use cullbench::query::AnyVolume;
 use cullbench::statistics::{median, slope};
@@ -140,15 +140,9 @@ fn main() -> ExitCode {
             let (peak, bytes) = (peak_mib(), index.memory().total() as f64 / n as f64);
             let mut cells = String::new();
             for (which, workload) in workloads.iter().enumerate() {
-                let ask: Ask = Box::new(|place, out| {
+                let task = TimedTask::new(expected[which].clone(), |place, out| {
                     index.query(workload.views[place].as_any(), out);
                 });
-                let task = TimedTask {
-                    ask,
-                    ask_many: None,
-                    expected: expected[which].clone(),
-                    least_ns: None,
-                };
                 let protocol = Protocol {
                     cameras: if only_test { 8 } else { cameras_within(1e9, n) },
                     ..protocol

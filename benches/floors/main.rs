@@ -14,7 +14,7 @@ use std::process::ExitCode;
 use cullbench::culling::{Culling, CullingTest};
 use cullbench::index::Registry;
 use cullbench::measure::{
-    Cell, Machine, Protocol, Schedule, Status, Stopwatch, Subject, TimedTask, Workload,
+    Machine, Protocol, ReportCell, Schedule, Status, Stopwatch, Subject, TimedTask, Workload,
     measure_group, timed,
 };
 use cullbench::statistics::trimmed_mean;
@@ -241,8 +241,8 @@ fn main() -> ExitCode {
         subjects.push(Subject::build(twin, true, &scene, CullingTest::SixPlane));
         let group =
             measure_group(&workload, &subjects, &[], &protocol, &|| false).expect("not stopped");
-        let query_ns = |cell: &Cell| {
-            assert_eq!(cell.verdict.status, Status::Ok, "{:?}", cell.verdict);
+        let query_ns = |cell: &ReportCell| {
+            assert_eq!(cell.status, Status::Ok, "{:?}", cell.reason);
             cell.metrics["query_ns"].value
         };
         let ratio = query_ns(&group.cells[0]) / query_ns(&group.cells[1]);

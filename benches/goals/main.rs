@@ -16,7 +16,7 @@ use cullbench::index::{
     FrustumQuery, Info, Input, Kind, Origin, RegionIndex, Registry, StructureSpec, Wide, caught,
 };
 use cullbench::measure::{
-    BOUNDS, Cell, Group, Machine, Metric, Protocol, Status, Stopwatch, Subject, Workload,
+    BOUNDS, Group, Machine, Metric, Protocol, ReportCell, Status, Stopwatch, Subject, Workload,
     cameras_within, measure_group,
 };
 use cullbench::query::AnyVolume;
@@ -100,7 +100,7 @@ impl Judge {
 }
 
 /// Time of `base` / time of `other`, without an interval: this is one process.
-fn quotient(base: &Cell, other: &Cell) -> Option<Metric> {
+fn quotient(base: &ReportCell, other: &ReportCell) -> Option<Metric> {
     Some(Metric {
         value: query_ns(base)? / query_ns(other)?,
         lower: None,
@@ -110,8 +110,8 @@ fn quotient(base: &Cell, other: &Cell) -> Option<Metric> {
 }
 
 /// Of a structure whose answers are right.
-fn query_ns(cell: &Cell) -> Option<f64> {
-    let sound = cell.verdict.status == Status::Ok;
+fn query_ns(cell: &ReportCell) -> Option<f64> {
+    let sound = cell.status == Status::Ok;
     let time = cell.metrics.get("query_ns").filter(|_| sound);
     time.map(|time| time.value)
 }
@@ -187,15 +187,15 @@ fn judge_row(judge: &mut Judge, world: &World, way: &Way, group: &Group) {
     let noise = noise.map_or(f64::NAN, |(_, ratio)| (ratio.value - 1.0).abs() * 100.0);
     println!("  {SUBJECT} entered twice differs by {noise:.1} %");
     for c in &group.cells {
-        if c.verdict.status != Status::Ok {
-            let reason = c.verdict.reason.as_deref().unwrap_or_default();
-            println!("  {}: {}: {reason}", c.structure, c.verdict.status.name());
+        if c.status != Status::Ok {
+            let reason = c.reason.as_deref().unwrap_or_default();
+            println!("  {}: {}: {reason}", c.structure, c.status.name());
         }
     }
     let Some(own) = cell(SUBJECT) else { return };
-    assert_eq!(own.verdict.status, Status::Ok, "{:?}", own.verdict);
+    assert_eq!(own.status, Status::Ok, "{:?}", own.reason);
     let fastest = |among: fn(&Origin) -> bool| {
-        let declared = |c: &&Cell| c.declared.as_ref().is_some_and(|(_, origin)| among(origin));
+        let declared = |c: &&ReportCell| c.origin.as_ref().is_some_and(among);
         let timed = |c| Some((c, query_ns(c)?));
         let cells = group.cells.iter().filter(declared).filter_map(timed);
         cells.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(c, _)| c)
@@ -208,7 +208,7 @@ fn judge_row(judge: &mut Judge, world: &World, way: &Way, group: &Group) {
         let suited = world.ahead.contains(&name);
         (name, if suited { 1.0 } else { LEAST_OF_TREES })
     });
-    let mut ahead = |peer: &Cell, name: &str, least: f64| {
+    let mut ahead = |peer: &ReportCell, name: &str, least: f64| {
         if let Some(times) = cell(name).and_then(|own| quotient(peer, own)) {
             let what = format!("{} / {name}", peer.structure);
             judge.line(&what, &times, Goal::AtLeast(least));
@@ -225,9 +225,9 @@ fn judge_row(judge: &mut Judge, world: &World, way: &Way, group: &Group) {
     {
         ahead(proper, SUBJECT, way.peers);
     }
-    let is_grid = |c: &&Cell| {
-        let declared = c.declared.as_ref();
-        declared.is_some_and(|(kind, origin)| is_own_grid(*kind, origin))
+    let is_grid = |c: &&ReportCell| {
+        let declared = c.kind.zip(c.origin.as_ref());
+        declared.is_some_and(|(kind, origin)| is_own_grid(kind, origin))
     };
     for grid in group.cells.iter().filter(is_grid) {
         if let Some(times) = quotient(grid, own) {

@@ -8,7 +8,7 @@ use super::case::{Case, asked};
 use super::trials::{Answered, Trials};
 use crate::culling::{Culling, CullingTest, TESTS};
 use crate::index::{BuildError, Execution, Kind, StructureSpec};
-use crate::measure::{Cell, Group, Metric, OverProcesses};
+use crate::measure::{Group, Metric, OverProcesses, ReportCell};
 use crate::statistics::{ALPHA, Rate, rate, shows_less_in_sum};
 use crate::verify::ErrorCount;
 
@@ -59,13 +59,13 @@ pub struct StructureRow {
 }
 
 impl StructureRow {
-    fn of(cell: &Cell) -> StructureRow {
+    fn of(cell: &ReportCell) -> StructureRow {
         let metric = |name: &str| -> Option<&Metric> { cell.metrics.get(name) };
         let value = |name: &str| metric(name).map(|m| m.value);
         StructureRow {
             structure: cell.structure.clone(),
-            status: cell.verdict.status.name(),
-            reason: cell.verdict.reason.clone(),
+            status: cell.status.name(),
+            reason: cell.reason.clone(),
             query_ns: value("query_ns"),
             query_ns_lower: metric("query_ns").and_then(|m| m.lower),
             query_ns_upper: metric("query_ns").and_then(|m| m.upper),
@@ -74,7 +74,7 @@ impl StructureRow {
             memory_bytes_per_item: value("memory_bytes_per_item"),
             break_even_queries: value("break_even_queries"),
             locate_ns: value("locate_ns"),
-            is_failure: cell.verdict.status.is_failure(),
+            is_failure: cell.status.is_failure(),
         }
     }
 }

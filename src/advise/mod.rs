@@ -7,6 +7,7 @@ mod case;
 mod choice;
 mod omission;
 mod options;
+mod rule;
 mod rules;
 mod trials;
 
@@ -264,7 +265,7 @@ impl<'c> Ways<'c> {
                 return Ok(None);
             }
             progress(rule.name);
-            drafts.push((rule.prepare)(case)?);
+            drafts.push(rule.draft(case)?);
         }
         let mut trials = Trials::new(case);
         let tests = choice::enter_tests(case, &mut trials)?;

@@ -192,32 +192,6 @@ pub(super) struct Draft<'c> {
 }
 
 impl Omission {
-    pub(super) fn new(
-        rule: &'static str,
-        left_out: &'static str,
-        advice: [&'static str; 2],
-        statistic_name: &'static str,
-        left_out_if: LeftOutIf,
-        by: By,
-    ) -> Omission {
-        Omission {
-            rule,
-            left_out,
-            advice,
-            statistic_name,
-            statistic: None,
-            threshold: None,
-            left_out_if,
-            predicted: None,
-            saving: None,
-            decision: Decision::NotApplicable,
-            confirmed: None,
-            reason: String::new(),
-            checks: Vec::new(),
-            by,
-        }
-    }
-
     /// What to do, in words; `None` where the rule does not apply.
     pub fn advice(&self) -> Option<&'static str> {
         match self.decision {
@@ -334,17 +308,11 @@ pub(super) fn check(ratio: f64, pays: Option<bool>) -> Check {
 
 #[cfg(test)]
 mod tests {
+    use super::super::rule::unsettled;
     use super::*;
 
     fn settled(by: By, statistic: f64, check: Check) -> Omission {
-        let rule = Omission::new(
-            "rule",
-            "something",
-            ["", ""],
-            "its size",
-            LeftOutIf::AtMost,
-            by,
-        );
+        let rule = unsettled(LeftOutIf::AtMost, by);
         let rule = rule.compares(statistic, 1.0);
         rule.settled(vec![check], &Aside::default(), None)
     }
@@ -399,12 +367,12 @@ mod tests {
 
     #[test]
     fn a_rule_without_a_statistic_says_nothing() {
-        let rule = Omission::new("rule", "x", ["", ""], "y", LeftOutIf::AtLeast, By::Time);
+        let rule = unsettled(LeftOutIf::AtLeast, By::Time);
         let omission = rule.settled(Vec::new(), &Aside::default(), None);
         assert_eq!(omission.decision, Decision::NotApplicable);
         assert_eq!((omission.predicted, omission.saving), (None, None));
         // An infinite threshold is none that can be written, but compares.
-        let rule = Omission::new("rule", "x", ["", ""], "y", LeftOutIf::AtMost, By::Time);
+        let rule = unsettled(LeftOutIf::AtMost, By::Time);
         let omission = rule.compares(3.0, f64::INFINITY);
         assert_eq!((omission.threshold, omission.predicted), (None, Some(true)));
     }

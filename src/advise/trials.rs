@@ -155,13 +155,8 @@ impl<'c> Trials<'c> {
     /// All ways, ready to be timed.
     pub fn tasks(self, counts: &[Vec<u64>]) -> Vec<TimedTask<'c>> {
         let asks = self.asks.into_iter().zip(counts);
-        let task = |(ask, counts): (Ask<'c>, &Vec<u64>)| TimedTask {
-            ask,
-            ask_many: None,
-            expected: counts.clone(),
-            least_ns: None,
-        };
-        asks.map(task).collect()
+        asks.map(|(ask, counts)| TimedTask::new(counts.clone(), ask))
+            .collect()
     }
 
     pub fn len(&self) -> usize {

@@ -3,17 +3,13 @@
 //! weighed is the library's.
 
 use std::io::{self, Write};
-use std::time::Duration;
-
-use tempfile::NamedTempFile;
 
 use super::args::AdviseArgs;
 use super::processes::{Said, Workers};
 use super::protocol::{Job, Timing};
-use super::run::progress;
-use super::run_resume::typed_args;
-use super::shared_args::TableFormat;
-use super::{Ending, interrupt, load_scene, print_json, text, unread_is_fine};
+use super::study::Study;
+use super::table::Table;
+use super::{Ending, interrupt, load_scene, print, text};
 use crate::advise::{
     self, Advice, AdviseInput, AdviseOptions, Check, LeftOutIf, Omission, StructureChoice,
     TestChoice, TrialPlan,
@@ -21,7 +17,7 @@ use crate::advise::{
 use crate::culling::Culling;
 use crate::index::Registry;
 use crate::measure::{
-    Effort, Group, Part, Plan, PlannedScene, ProcessTimes, Protocol, Share, cameras_within,
+    Group, Part, Plan, PlannedScene, ProcessTimes, Protocol, Share, cameras_within,
 };
 use crate::path;
 use crate::scene;
@@ -35,7 +31,7 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> 
     let plan = plan(registry, args)?;
     let scene = load_scene(&args.scene, &args.scene_args, plan.structures.len())?;
     let path = path::load(&args.path, &scene, &plan.lens)?;
-    let protocol = protocol(args, &plan.effort, 0, scene.items.len());
+    let protocol = protocol(args, 0, scene.items.len());
     let input = AdviseInput {
         scene: &scene,
         path: &path,
@@ -45,13 +41,11 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> 
     };
     input.check()?;
     interrupt::from_now_on_finish();
-    let workers = Workers::new(typed_args()?, Duration::MAX, &NamedTempFile::new)?;
+    let workers = Workers::of_study()?;
     let processes = plan.effort.processes;
-    let bar = progress(2 * u64::from(processes));
-    let job = |next: &str| {
-        let job = format!("{}, {}: {next}", args.scene, args.path);
-        bar.set_message(text::plain(&job));
-    };
+    let about = format!("{}, {}: ", args.scene, args.path);
+    let study = Study::new(about, processes.into(), &args.spread);
+    let begin = |step: &str| study.begin(step);
     let mut parts: Vec<Part> = Vec::new();
     for process in 0..processes {
         let share = Share {
@@ -64,43 +58,27 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> 
             share,
             samples: false,
         };
-        let Some(found) = workers.found(process, scene, &job)? else {
+        let Some(found) = workers.found(process, scene, &begin)? else {
             return Ok(Ending::Interrupted);
         };
         parts.extend(found.into_iter().filter_map(|said| match said {
             Said::Part(part, _) => Some(*part),
             _ => None,
         }));
-        bar.inc(1);
+        study.advance();
     }
     let choice = StructureChoice::of(&Group::of(&parts));
-    let Some(prepared) = advise::prepare(&input, choice, &interrupt::asked, &job)? else {
+    let Some(prepared) = advise::prepare(&input, choice, &interrupt::asked, &begin)? else {
         return Ok(Ending::Interrupted);
     };
-    let trials = |process| {
-        let timing = Timing {
-            process,
-            lens_scale: path.lens_scale,
-        };
-        Job::Trials(prepared.plan.clone(), timing)
-    };
-    let step = |process: u32, _: &str| {
-        bar.set_position(u64::from(processes + process));
-        job("with and without every rule");
-    };
-    let Some(times) = workers.times(processes, trials, &step)? else {
+    let trials = |timing| Job::Trials(prepared.plan.clone(), timing);
+    let step = "with and without every rule";
+    let Some(times) = study.times(&workers, step, path.lens_scale, trials)? else {
         return Ok(Ending::Interrupted);
     };
-    bar.finish_and_clear();
     let advice = prepared.conclude(&times);
-    unread_is_fine(match args.format {
-        TableFormat::Json => print_json(&advice),
-        TableFormat::Table => show(&advice),
-    })?;
-    Ok(match advice.found_wrong_answers() {
-        true => Ending::WrongAnswer,
-        false => Ending::Ok,
-    })
+    print(args.format, &advice, || show(&advice))?;
+    Ok(Ending::of(!advice.found_wrong_answers()))
 }
 
 /// How structures are measured before rules are: as a run does it.
@@ -121,9 +99,9 @@ pub fn plan(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Plan> {
     })
 }
 
-fn protocol(args: &AdviseArgs, effort: &Effort, process: u32, items: usize) -> Protocol {
-    let cameras = cameras_within(effort.pass_ns, items);
-    args.spread.protocol(effort, process, cameras)
+fn protocol(args: &AdviseArgs, process: u32, items: usize) -> Protocol {
+    let cameras = cameras_within(args.spread.effort(ROUNDS).pass_ns, items);
+    args.spread.protocol(ROUNDS, process, cameras)
 }
 
 /// One process's share of the trials.
@@ -142,7 +120,7 @@ pub fn time(
         path: &path,
         structures: &plan.structures,
         options: &options(args),
-        protocol: &protocol(args, &plan.effort, timing.process, scene.items.len()),
+        protocol: &protocol(args, timing.process, scene.items.len()),
     };
     Ok(advise::time(&input, trials, stop)?)
 }
@@ -254,18 +232,11 @@ fn ties<S: AsRef<str>>(names: &[S]) -> String {
     }
 }
 
-fn structure_table(choice: &StructureChoice) -> text::Table {
-    let header = [
-        "structure",
-        "query [95 % interval]",
-        "speed-up",
-        "build",
-        "B/item",
-        "break-even queries",
-        "locate",
-        "status",
-    ];
-    let mut table = text::table(&header, &[1, 2, 3, 4, 5, 6]);
+fn structure_table(choice: &StructureChoice) -> Table {
+    let mut table = Table::of(
+        "structure | >query [95 % interval] | >speed-up | >build | >B/item \
+         | >break-even queries | >locate | status",
+    );
     for row in &choice.rows {
         let show = |value: Option<f64>, how: fn(f64) -> String| value.map(how).unwrap_or_default();
         table.add_row([
@@ -282,17 +253,11 @@ fn structure_table(choice: &StructureChoice) -> text::Table {
     table
 }
 
-fn test_table(choice: &TestChoice) -> text::Table {
-    let header = [
-        "",
-        "test",
-        "query [95 % interval]",
-        "false positives %",
-        "missed ppm",
-        "false positives per query",
-        "query and drawing",
-    ];
-    let mut table = text::table(&header, &[2, 3, 4, 5, 6]);
+fn test_table(choice: &TestChoice) -> Table {
+    let mut table = Table::of(
+        " | test | >query [95 % interval] | >false positives % | >missed ppm \
+         | >false positives per query | >query and drawing",
+    );
     for row in &choice.rows {
         let show = |value: Option<f64>, how: fn(f64) -> String| value.map(how).unwrap_or_default();
         table.add_row([
@@ -313,21 +278,11 @@ fn test_table(choice: &TestChoice) -> text::Table {
     table
 }
 
-fn omission_table(omissions: &[Omission]) -> text::Table {
-    let header = [
-        "rule",
-        "decision",
-        "statistic",
-        "threshold",
-        "saving",
-        "measured on",
-        "kept",
-        "left out",
-        "kept / left out",
-        "false positives % kept / left out",
-        "answers",
-    ];
-    let mut table = text::table(&header, &[2, 3, 4, 6, 7, 8, 9]);
+fn omission_table(omissions: &[Omission]) -> Table {
+    let mut table = Table::of(
+        "rule | decision | >statistic | >threshold | >saving | measured on | >kept | >left out \
+         | >kept / left out | >false positives % kept / left out | answers",
+    );
     for omission in omissions {
         let figure = |value: Option<f64>| value.map(general).unwrap_or_default();
         let side = match omission.left_out_if {

@@ -7,12 +7,12 @@ use std::time::Duration;
 use anyhow::{Context, bail};
 use clap::CommandFactory;
 use clap::parser::ValueSource;
-use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 
 use super::against::{Against, Duel, Pairs};
 use super::args::{Cli, CompareArgs};
 use super::compare_table::{Basis, CompareTable, Side};
+use super::study::progress;
 use super::{Ending, interrupt, run_plan, text, unread_is_fine};
 use crate::index::Registry;
 use crate::measure::{CellKey, Machine, Status, Verdict};
@@ -46,9 +46,7 @@ pub fn compare_against(
     let plan = run_plan::plan_of(registry, &args.what, SUITE, Some(STRUCTURES))?;
     plan.check_inputs()?;
     interrupt::from_now_on_finish();
-    let bar = ProgressBar::new(0);
-    let style = ProgressStyle::with_template("{bar:24} {pos}/{len} pairs  {elapsed}  {msg}");
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let bar = progress(0, " pairs");
     let duel = Duel {
         args: arguments()?,
         plan: &plan,

@@ -9,8 +9,7 @@ use anyhow::{Context, bail};
 
 use super::funnel::claim;
 use super::funnel_args::CheckArgs;
-use super::shared_args::TableFormat;
-use super::{Ending, load_scene, print_json, text, unread_is_fine};
+use super::{Ending, load_scene, print, text};
 use crate::camera::Camera;
 use crate::funnel::{Proofs, holes_of, regions_of, surfaces_of, walls_of};
 use crate::input::read_file;
@@ -308,14 +307,10 @@ pub fn check(args: &CheckArgs) -> anyhow::Result<Ending> {
     if checked.view_count + checked.claim_count == 0 {
         bail!("{file}: no certificate in it; expected at least one line");
     }
-    unread_is_fine(match args.format {
-        TableFormat::Json => print_json(&checked),
-        TableFormat::Table => show(&checked, &mut text::terminal()),
+    print(args.format, &checked, || {
+        show(&checked, &mut text::terminal())
     })?;
-    Ok(match checked.rejected.is_empty() {
-        true => Ending::Ok,
-        false => Ending::WrongAnswer,
-    })
+    Ok(Ending::of(checked.rejected.is_empty()))
 }
 
 fn show(checked: &Checked, out: &mut impl Write) -> io::Result<()> {

@@ -8,8 +8,9 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::args::CompareArgs;
-use super::document::{Block, Rows, to_markdown};
+use super::document::{Block, to_markdown};
 use super::shared_args::TableFormat;
+use super::table::Table;
 use super::{Ending, print_json, text};
 use crate::measure::{CellKey, METRICS};
 use crate::report::{Changes, CommonShift, JudgedRow, Lone, Outcome, Setting, WorkChange};
@@ -109,7 +110,7 @@ impl CompareTable {
                 Block::Line(line) | Block::Heading(_, line) => {
                     writeln!(out, "{}", text::plain(&line))?;
                 }
-                Block::Table(rows) => writeln!(out, "{}", rows.terminal())?,
+                Block::Table(table) => writeln!(out, "{table}")?,
                 Block::Picture(_) => {}
             }
         }
@@ -151,25 +152,16 @@ impl CompareTable {
         blocks
     }
 
-    fn table(&self, rows: &[&JudgedRow]) -> Rows {
+    fn table(&self, rows: &[&JudgedRow]) -> Table {
         let (change, processes) = match self.basis {
             Basis::Reports => ("change vs the others [95 %]", "processes"),
             Basis::Pairs => ("change [95 %]", "pairs"),
         };
-        let header = [
-            "scene",
-            "path, test",
-            "structure",
-            "metric",
-            "old",
-            "new",
-            change,
-            "resolves",
-            processes,
-            "verdict",
-            "why",
-        ];
-        let cells = rows.iter().map(|row| {
+        let mut table = Table::of(&format!(
+            "scene | path, test | structure | metric | >old | >new | >{change} | >resolves \
+             | >{processes} | verdict | why"
+        ));
+        table.rows.extend(rows.iter().map(|row| {
             let metric = row.metric.unwrap_or_default();
             let figure = |value: Option<f64>| value.map_or(String::new(), |v| shown(metric, v));
             let judged = row.judgement.as_ref();
@@ -191,12 +183,8 @@ impl CompareTable {
                 row.outcome.name().replace('_', " "),
                 reason(row),
             ]
-        });
-        Rows {
-            rows: cells.collect(),
-            header: header.map(str::to_owned).into(),
-            right: vec![4, 5, 6, 7, 8],
-        }
+        }));
+        table
     }
 
     /// What would decide the cells that are inconclusive, if there are any.

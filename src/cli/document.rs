@@ -2,104 +2,51 @@
 //! page or for a terminal. It defines the escaping of each and knows nothing of
 //! what the document says.
 
+use super::table::Table;
 use super::text;
 
 pub enum Block {
     /// A heading of the first, second or third level.
     Heading(u8, String),
     Line(String),
-    Table(Rows),
+    Table(Table),
     /// A picture as SVG, which only HTML can hold.
     Picture(String),
 }
 
-/// A table: columns named in `right` hold numbers.
-pub struct Rows {
-    pub header: Vec<String>,
-    pub right: Vec<usize>,
-    pub rows: Vec<Vec<String>>,
+fn markdown_table(table: &Table) -> String {
+    let line = |cells: &[String]| {
+        let cells: Vec<String> = cells.iter().map(|cell| markdown(cell)).collect();
+        format!("| {} |\n", cells.join(" | "))
+    };
+    let rule = (0..table.header.len()).map(|column| match table.right.contains(&column) {
+        true => "---:|",
+        false => "---|",
+    });
+    let mut out = line(&table.header) + "|" + &rule.collect::<String>() + "\n";
+    for row in &table.rows {
+        out += &line(row);
+    }
+    out
 }
 
-impl Rows {
-    /// The first column holds names, all others numbers.
-    pub fn of_numbers<'h>(header: impl IntoIterator<Item = &'h str>) -> Rows {
-        let header: Vec<String> = header.into_iter().map(str::to_owned).collect();
-        Rows {
-            right: (1..header.len()).collect(),
-            header,
-            rows: Vec::new(),
-        }
-    }
-
-    /// Without the columns that have nothing in any row.
-    pub fn without_empty_columns(self) -> Rows {
-        let is_kept = |column: usize| self.rows.iter().any(|row| !row[column].is_empty());
-        let kept: Vec<usize> = (0..self.header.len()).filter(|c| is_kept(*c)).collect();
-        let of = |cells: &[String]| kept.iter().map(|&column| cells[column].clone()).collect();
-        Rows {
-            header: of(&self.header),
-            right: (0..kept.len())
-                .filter(|&place| self.right.contains(&kept[place]))
-                .collect(),
-            rows: self.rows.iter().map(|row| of(row)).collect(),
-        }
-    }
-
-    /// For a terminal.
-    pub fn terminal(&self) -> String {
-        self.table().to_string()
-    }
-
-    /// For a terminal, no line wider.
-    pub fn terminal_within(&self, width: u16) -> String {
-        let mut table = self.table();
-        table.fit(width);
-        table.to_string()
-    }
-
-    fn table(&self) -> text::Table {
-        let header: Vec<&str> = self.header.iter().map(String::as_str).collect();
-        let mut table = text::table(&header, &self.right);
-        for row in &self.rows {
-            table.add_row(row);
-        }
-        table
-    }
-
-    fn markdown(&self) -> String {
-        let line = |cells: &[String]| {
-            let cells: Vec<String> = cells.iter().map(|cell| markdown(cell)).collect();
-            format!("| {} |\n", cells.join(" | "))
-        };
-        let rule = (0..self.header.len()).map(|column| match self.right.contains(&column) {
-            true => "---:|",
-            false => "---|",
+fn html_table(table: &Table) -> String {
+    let line = |tag: &str, cells: &[String]| {
+        let cells = cells.iter().enumerate().map(|(column, cell)| {
+            let class = match table.right.contains(&column) {
+                true => " class=\"n\"",
+                false => "",
+            };
+            format!("<{tag}{class}>{}</{tag}>", html(cell))
         });
-        let mut out = line(&self.header) + "|" + &rule.collect::<String>() + "\n";
-        for row in &self.rows {
-            out += &line(row);
-        }
-        out
-    }
-
-    fn html(&self) -> String {
-        let line = |tag: &str, cells: &[String]| {
-            let cells = cells.iter().enumerate().map(|(column, cell)| {
-                let class = match self.right.contains(&column) {
-                    true => " class=\"n\"",
-                    false => "",
-                };
-                format!("<{tag}{class}>{}</{tag}>", html(cell))
-            });
-            format!("<tr>{}</tr>\n", cells.collect::<String>())
-        };
-        let rows = self.rows.iter().map(|row| line("td", row));
-        format!(
-            "<table>\n<thead>{}</thead>\n<tbody>\n{}</tbody>\n</table>\n",
-            line("th", &self.header),
-            rows.collect::<String>()
-        )
-    }
+        format!("<tr>{}</tr>\n", cells.collect::<String>())
+    };
+    let rows = table.rows.iter().map(|row| line("td", row));
+    format!(
+        "<table>\n<thead>{}</thead>\n<tbody>\n{}</tbody>\n</table>\n",
+        line("th", &table.header),
+        rows.collect::<String>()
+    )
 }
 
 /// What Markdown could take for its own within a line. A line break would end
@@ -141,7 +88,7 @@ pub fn to_markdown(blocks: &[Block]) -> String {
             Some(format!("{marks} {}\n", markdown(text)))
         }
         Block::Line(text) => Some(markdown(text) + "\n"),
-        Block::Table(rows) => Some(rows.markdown()),
+        Block::Table(rows) => Some(markdown_table(rows)),
         Block::Picture(_) => None,
     });
     parts.collect::<Vec<_>>().join("\n")
@@ -157,7 +104,7 @@ pub fn to_html(title: &str, blocks: &[Block]) -> String {
     let parts = blocks.iter().map(|block| match block {
         Block::Heading(level, text) => format!("<h{level}>{}</h{level}>\n", html(text)),
         Block::Line(text) => format!("<p>{}</p>\n", html(text)),
-        Block::Table(rows) => rows.html(),
+        Block::Table(rows) => html_table(rows),
         Block::Picture(svg) => format!("<figure>{svg}</figure>\n"),
     });
     format!(
@@ -173,29 +120,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn columns_of_nothing_are_left_out() {
-        let mut rows = Rows::of_numbers(["name", "none", "some"]);
-        rows.rows = [["a", "", ""], ["b", "", "7"]]
-            .map(|row| row.map(str::to_owned).to_vec())
-            .to_vec();
-        let kept = rows.without_empty_columns();
-        assert_eq!(
-            (&kept.header[..], &kept.right[..]),
-            (&["name".into(), "some".into()][..], &[1][..])
-        );
-        assert_eq!(kept.rows, [["a", ""], ["b", "7"]]);
-    }
-
-    #[test]
     fn text_stays_text_in_every_format() {
         let nasty = "a|b<script>\n`c` & \"d\"\u{202e}";
+        let mut table = Table::of_numbers(["x", nasty]);
+        table.add_row([nasty, "1"]);
         let blocks = [
             Block::Heading(2, nasty.to_owned()),
-            Block::Table(Rows {
-                header: vec!["x".into(), nasty.into()],
-                right: vec![1],
-                rows: vec![vec![nasty.into(), "1".into()]],
-            }),
+            Block::Table(table),
             Block::Picture("<svg></svg>".into()),
         ];
         let text = to_markdown(&blocks);

@@ -3,26 +3,20 @@
 
 use std::collections::BTreeSet;
 use std::io::{self, Write};
-use std::time::Duration;
-
-use tempfile::NamedTempFile;
 
 use super::args::DriftArgs;
 use super::processes::Workers;
-use super::protocol::Job;
-use super::run::progress;
-use super::run_resume::typed_args;
-use super::shared_args::TableFormat;
+use super::protocol::{Job, Timing};
+use super::study::Study;
+use super::table::Table;
 use super::{
-    Ending, drift_arms, drift_diagram, expect_place_for, interrupt, print_json, text,
-    unread_is_fine,
+    Ending, drift_arms, drift_diagram, expect_place_for, interrupt, print, text, write_text,
 };
 use crate::drift::{
     self, ArmKind, ArmOptions, DriftOptions, DriftPlan, DriftReport, ORBIT_RADIUS, Rated,
     Recommendation, SWING_DEG,
 };
 use crate::measure::{ProcessTimes, Protocol};
-use crate::report::write_atomically;
 
 /// Long summaries wrap at this width.
 const WIDTH: u16 = 100;
@@ -34,34 +28,26 @@ pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
     expect_place_for("--svg", args.svg.as_deref())?;
     let options = options(args);
     interrupt::from_now_on_finish();
-    let workers = Workers::new(typed_args()?, Duration::MAX, &NamedTempFile::new)?;
-    let jobs = drift::jobs(&options) as u64;
-    let bar = progress(jobs + u64::from(args.spread.processes));
+    let workers = Workers::of_study()?;
+    let study = Study::new(String::new(), drift::jobs(&options) as u64, &args.spread);
     let prepared = drift::prepare(&options, &protocol(args, 0), |job| {
-        bar.set_message(job.to_owned());
-        bar.inc(1);
+        study.begin(job);
+        study.advance();
         interrupt::asked()
     });
     let Some(prepared) = prepared else {
         return Ok(Ending::Interrupted);
     };
-    let job = |process| Job::Drift(prepared.plan.clone(), process);
-    let step = |process: u32, _: &str| {
-        bar.set_position(jobs + u64::from(process));
-        bar.set_message("everything, timed");
-    };
-    let Some(times) = workers.times(args.spread.processes, job, &step)? else {
+    let job = |timing| Job::Drift(prepared.plan.clone(), timing);
+    let Some(times) = study.times(&workers, "everything, timed", None, job)? else {
         return Ok(Ending::Interrupted);
     };
     let report = prepared.conclude(&times);
-    bar.finish_and_clear();
     if let Some(file) = &args.svg {
-        let svg = drift_diagram::draw(&report.arm)?;
-        write_atomically(file, |out| out.write_all(svg.as_bytes()))?;
+        write_text(file, &drift_diagram::draw(&report.arm)?)?;
     }
-    unread_is_fine(match args.format {
-        TableFormat::Json => print_json(&report),
-        TableFormat::Table => show(&report, &mut io::stdout().lock()),
+    print(args.format, &report, || {
+        show(&report, &mut io::stdout().lock())
     })?;
     Ok(Ending::Ok)
 }
@@ -90,18 +76,17 @@ fn options(args: &DriftArgs) -> DriftOptions {
 }
 
 fn protocol(args: &DriftArgs, process: u32) -> Protocol {
-    let effort = args.spread.effort(ROUNDS);
-    args.spread.protocol(&effort, process, usize::MAX)
+    args.spread.protocol(ROUNDS, process, usize::MAX)
 }
 
 /// One process's share of the times.
 pub fn time(
     args: &DriftArgs,
     plan: &DriftPlan,
-    process: u32,
+    timing: &Timing,
     stop: &dyn Fn() -> bool,
 ) -> Option<ProcessTimes> {
-    drift::time(&options(args), plan, &protocol(args, process), stop)
+    drift::time(&options(args), plan, &protocol(args, timing.process), stop)
 }
 
 /// Rows by columns, where each cell is looked up by its row's and its
@@ -111,11 +96,9 @@ fn grid(
     columns: &[String],
     rows: &[&str],
     cell: impl Fn(&str, usize) -> String,
-) -> text::Table {
-    let mut header = vec![corner];
-    header.extend(columns.iter().map(String::as_str));
-    let right: Vec<usize> = (1..header.len()).collect();
-    let mut table = text::table(&header, &right);
+) -> Table {
+    let columns_of_it = columns.iter().map(String::as_str);
+    let mut table = Table::of_numbers([corner].into_iter().chain(columns_of_it));
     for row in rows {
         let cells = (0..columns.len()).map(|column| cell(row, column));
         table.add_row([(*row).to_owned()].into_iter().chain(cells));
@@ -236,8 +219,7 @@ fn show_orbits(report: &DriftReport, out: &mut impl Write) -> io::Result<()> {
 
 fn show_rated(title: &str, error: &str, rated: &[Rated], out: &mut impl Write) -> io::Result<()> {
     let header = [title, error, "ns/step", "good", "dominated by", ""];
-    let mut table = text::table(&header, &[1]);
-    table.fit(WIDTH);
+    let mut table = Table::new(header, &[1]).fit(WIDTH);
     for row in rated {
         let name = match row.is_default {
             true => format!("{} (default)", row.name),

@@ -4,6 +4,7 @@
 
 use std::io::{self, Write};
 
+use super::table::Table;
 use super::text;
 use crate::drift::{
     ARMS, ArmChoice, ArmKind, ArmPoint, ArmReport, FrameTimes, Information, StabilityLimit,
@@ -109,23 +110,19 @@ impl<'r> Shown<'r> {
         names
     }
 
-    fn by_stiffness(&self, corner: &str, first: &str) -> text::Table {
+    fn by_stiffness(&self, corner: &str, first: &str) -> Table {
         let mut header = vec![corner.to_owned()];
         if !first.is_empty() {
             header.push(first.to_owned());
         }
         header.extend(self.stiffnesses.iter().map(|k| format!("k={k:e}")));
-        let header: Vec<&str> = header.iter().map(String::as_str).collect();
-        let mut table = text::table(&header, &[]);
-        table.fit(WIDTH);
-        table
+        Table::new(header, &[]).fit(WIDTH)
     }
 
-    fn information(&self) -> text::Table {
+    fn information(&self) -> Table {
         let mut header = vec!["error of what is told".to_owned()];
         header.extend(self.rates.iter().map(|rate| format!("{rate} Hz")));
-        let header: Vec<&str> = header.iter().map(String::as_str).collect();
-        let mut table = text::table(&header, &[1, 2, 3]);
+        let mut table = Table::new(header, &[1, 2, 3]);
         let jittered = || {
             let all = self.report.information.iter();
             all.filter(|told| told.frame_times == FrameTimes::Jittered)
@@ -147,7 +144,7 @@ impl<'r> Shown<'r> {
     }
 
     /// The cheapest effort of each method that is precise enough.
-    fn within(&self, arm: ArmKind, name: &str) -> text::Table {
+    fn within(&self, arm: ArmKind, name: &str) -> Table {
         let corner = format!(
             "{name}, {} Hz, f64, within {:e}",
             self.rate, self.report.tolerance
@@ -164,7 +161,7 @@ impl<'r> Shown<'r> {
         table
     }
 
-    fn orders(&self) -> text::Table {
+    fn orders(&self) -> Table {
         let mut table = self.by_stiffness("observed order", "arm");
         for method in self.methods() {
             for (arm, name, _) in self.arms() {
@@ -191,7 +188,7 @@ impl<'r> Shown<'r> {
     }
 
     /// What jitter and f32 cost at the stiffness in the middle.
-    fn costs(&self) -> text::Table {
+    fn costs(&self) -> Table {
         let middle = self.stiffnesses.get(self.stiffnesses.len() / 2);
         let stiffness = middle.copied().unwrap_or(f64::NAN);
         let corner = format!(
@@ -199,8 +196,8 @@ impl<'r> Shown<'r> {
             self.rate
         );
         let columns = ["arm", "steady", "jittered", "in f32", "velocity"];
-        let header: Vec<&str> = [corner.as_str()].into_iter().chain(columns).collect();
-        let mut table = text::table(&header, &[2, 3, 4, 5]);
+        let header = [corner.as_str()].into_iter().chain(columns);
+        let mut table = Table::new(header, &[2, 3, 4, 5]);
         for method in self
             .methods()
             .into_iter()
@@ -234,12 +231,10 @@ impl<'r> Shown<'r> {
         table
     }
 
-    fn choices(&self) -> text::Table {
+    fn choices(&self) -> Table {
         let mut header = vec![format!("to take within {:e}", self.report.tolerance)];
         header.extend(self.rates.iter().map(|rate| format!("{rate} Hz")));
-        let header: Vec<&str> = header.iter().map(String::as_str).collect();
-        let mut table = text::table(&header, &[]);
-        table.fit(WIDTH);
+        let mut table = Table::new(header, &[]).fit(WIDTH);
         for (arm, name, _) in self.arms() {
             for &stiffness in &self.stiffnesses {
                 let choices = self.report.choices.iter();
@@ -297,17 +292,14 @@ fn order(point: &ArmPoint) -> Option<String> {
         .map(|order| format!("{order:.1}{mark}"))
 }
 
-fn stability(limits: &[StabilityLimit]) -> text::Table {
+fn stability(limits: &[StabilityLimit]) -> Table {
     let first = limits.first().map(|limit| limit.method);
     let of_first = limits.iter().filter(|limit| Some(limit.method) == first);
     let mut header = vec!["stable while omega h <".to_owned()];
     header.extend(of_first.map(|limit| format!("zeta={}", limit.damping_ratio)));
     header.push("left per step at 16.7".to_owned());
     header.push("growth, at omega h".to_owned());
-    let header: Vec<&str> = header.iter().map(String::as_str).collect();
-    let right: Vec<usize> = (1..header.len()).collect();
-    let mut table = text::table(&header, &right);
-    table.fit(WIDTH);
+    let mut table = Table::of_numbers(header).fit(WIDTH);
     for own in limits.chunk_by(|a, b| a.method == b.method) {
         let mut cells = vec![own[0].method.to_owned()];
         cells.extend(own.iter().map(|limit| {

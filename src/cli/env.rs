@@ -6,7 +6,8 @@ use serde_json::{Value, json};
 
 use super::args::EnvArgs;
 use super::shared_args::TableFormat;
-use super::{Ending, print_json, text};
+use super::table::Table;
+use super::{Ending, print_json};
 use crate::measure::{Machine, Source, Toolchain};
 
 pub fn env(args: &EnvArgs) -> anyhow::Result<Ending> {
@@ -18,7 +19,7 @@ pub fn env(args: &EnvArgs) -> anyhow::Result<Ending> {
     match args.format {
         TableFormat::Json => print_json(&facts)?,
         TableFormat::Table => {
-            let mut table = text::table(&["fact", "value"], &[]);
+            let mut table = Table::of("fact | value");
             for (group, facts) in facts.as_object().into_iter().flatten() {
                 match facts.as_object() {
                     Some(facts) => {

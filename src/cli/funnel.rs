@@ -4,27 +4,23 @@
 use std::io::{self, Write};
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Duration;
 
 use anyhow::{Context, bail};
-use tempfile::NamedTempFile;
 
 use super::document::{Block, to_html};
 use super::funnel_args::{FunnelArgs, FunnelFormat};
 use super::processes::Workers;
 use super::protocol::{Job, Timing};
-use super::run::progress;
-use super::run_resume::typed_args;
+use super::study::Study;
 use super::{
     Ending, expect_folder, expect_places, funnel_csv, funnel_picture, funnel_table, interrupt,
-    load_scene_by, print_json, text, unread_is_fine,
+    load_scene_by, print_json, text, unread_is_fine, write_text,
 };
 use crate::funnel::{self, Chain, FunnelInput, FunnelPlan, Proofs, SeenFrom, StageKind, StageRow};
 use crate::index::{Registry, StructureSpec};
 use crate::input::read_file;
 use crate::measure::{ProcessTimes, Protocol};
-use crate::path;
-use crate::report::write_atomically;
+use crate::path::{self, CameraPath};
 use crate::scene::{self, LoadOptions, Scene};
 use crate::spec::SpecError;
 use crate::visibility::Guarantee;
@@ -55,44 +51,27 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
         bail!("--certificates are about what cameras see; expected no --from region with them");
     }
     let structures = args.kernel.structures(registry, &args.structure)?;
-    let defaults = args.lens.defaults()?;
     let load = LoadOptions {
         per_triangle: funnel::BYTES_PER_TRIANGLE,
         ..args.scene_args.options(structures.len() + 2)
     };
+    // A lens that cannot be is told before anything is loaded.
+    args.lens.defaults()?;
     let scene = load_scene_by(&args.scene, &load)?;
     if scene.items.is_empty() {
         bail!("scene '{}' has no items; expected at least one", scene.name);
     }
-    let path = path::load(&args.path, &scene, &defaults)?;
-    let chain = chain(args, &scene, &structures)?;
-    let claim = claim(args.pvs.as_deref())?;
+    let first = Timing {
+        process: 0,
+        lens_scale: None,
+    };
+    let setting = Setting::of(args, structures, scene, &first)?;
     interrupt::from_now_on_finish();
-    let workers = Workers::new(typed_args()?, Duration::MAX, &NamedTempFile::new)?;
-    let bar = progress(u64::from(args.spread.processes));
-    let job = |next: &str| {
-        let job = format!("{}, {}: {next}", args.scene, args.path);
-        bar.set_message(text::plain(&job));
-    };
-    job("the truth, and every stage held against it");
+    let workers = Workers::of_study()?;
+    let study = Study::new(format!("{}, {}: ", args.scene, args.path), 0, &args.spread);
+    study.begin("the truth, and every stage held against it");
     let truth_cache = args.truth_cache.as_ref().map(TruthCache::new);
-    let protocol = protocol(args, 0);
-    let input = FunnelInput {
-        scene: &scene,
-        path: &path,
-        most_views: args.frames as usize,
-        samples: args.samples,
-        cut_outs: args.cut_out.as_ref(),
-        mirror: args.mirror,
-        chain: &chain,
-        structures: &structures,
-        protocol: &protocol,
-        claim: claim.as_ref(),
-        from: args.from,
-        occluders: args.occluders,
-        truth_cache: truth_cache.as_ref(),
-        execution: args.kernel.execution()?,
-    };
+    let input = setting.input(args, truth_cache.as_ref())?;
     let mut lines = String::new();
     let mut each = |proofs: Proofs| {
         lines += &proofs.to_json();
@@ -106,23 +85,13 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
         return Ok(Ending::Interrupted);
     };
     if let Some(file) = &args.certificates {
-        write_atomically(file, |out| out.write_all(lines.as_bytes()))?;
+        write_text(file, &lines)?;
     }
-    let share = |process| {
-        let timing = Timing {
-            process,
-            lens_scale: path.lens_scale,
-        };
-        Job::Funnel(prepared.plan.clone(), timing)
-    };
-    let step = |process: u32, _: &str| {
-        bar.set_position(process.into());
-        job("every stage, timed");
-    };
-    let Some(times) = workers.times(args.spread.processes, share, &step)? else {
+    let job = |timing| Job::Funnel(prepared.plan.clone(), timing);
+    let lens_scale = setting.path.lens_scale;
+    let Some(times) = study.times(&workers, "every stage, timed", lens_scale, job)? else {
         return Ok(Ending::Interrupted);
     };
-    bar.finish_and_clear();
     if let Some(verdict) = funnel::failure(&times) {
         bail!(
             "a stage failed when it was timed: {}",
@@ -131,14 +100,13 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     }
     let report = prepared.conclude(&times);
     if let Some(file) = &args.svg {
-        let svg = funnel_picture::draw(&report)?;
-        write_atomically(file, |out| out.write_all(svg.as_bytes()))?;
+        write_text(file, &funnel_picture::draw(&report)?)?;
     }
     if let Some(file) = &args.html {
         let mut blocks = funnel_table::blocks(&report);
         blocks.push(Block::Picture(funnel_picture::draw(&report)?));
         let page = to_html(&format!("cullbench funnel {}", report.scene), &blocks);
-        write_atomically(file, |out| out.write_all(page.as_bytes()))?;
+        write_text(file, &page)?;
     }
     unread_is_fine(match args.format {
         FunnelFormat::Json => print_json(&report),
@@ -148,10 +116,7 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
             text::terminal().write_all(text.as_bytes())
         }
     })?;
-    Ok(match keep_their_word(&report.stages) {
-        true => Ending::Ok,
-        false => Ending::WrongAnswer,
-    })
+    Ok(Ending::of(keep_their_word(&report.stages)))
 }
 
 /// Whether nothing that promises not to lose what is visible has lost it. Stages behind
@@ -222,9 +187,56 @@ pub(super) fn claim(file: Option<&Path>) -> anyhow::Result<Option<Arc<Pvs>>> {
 }
 
 /// Of one of the processes, all views.
-fn protocol(args: &FunnelArgs, process: u32) -> Protocol {
-    let effort = args.spread.effort(ROUNDS);
-    args.spread.protocol(&effort, process, usize::MAX)
+/// All that a funnel is studied on, but for where the truth is kept.
+struct Setting {
+    scene: Scene,
+    path: CameraPath,
+    structures: Vec<StructureSpec>,
+    chain: Chain,
+    claim: Option<Arc<Pvs>>,
+    protocol: Protocol,
+}
+
+impl Setting {
+    fn of(
+        args: &FunnelArgs,
+        structures: Vec<StructureSpec>,
+        scene: Scene,
+        timing: &Timing,
+    ) -> anyhow::Result<Setting> {
+        let lens = args.lens.defaults()?;
+        Ok(Setting {
+            path: path::load_scaled(&args.path, &scene, &lens, timing.lens_scale)?,
+            chain: chain(args, &scene, &structures)?,
+            claim: claim(args.pvs.as_deref())?,
+            protocol: args.spread.protocol(ROUNDS, timing.process, usize::MAX),
+            structures,
+            scene,
+        })
+    }
+
+    fn input<'s>(
+        &'s self,
+        args: &'s FunnelArgs,
+        truth_cache: Option<&'s TruthCache>,
+    ) -> anyhow::Result<FunnelInput<'s>> {
+        Ok(FunnelInput {
+            scene: &self.scene,
+            path: &self.path,
+            most_views: args.frames as usize,
+            samples: args.samples,
+            cut_outs: args.cut_out.as_ref(),
+            mirror: args.mirror,
+            chain: &self.chain,
+            structures: &self.structures,
+            protocol: &self.protocol,
+            claim: self.claim.as_ref(),
+            from: args.from,
+            occluders: args.occluders,
+            truth_cache,
+            execution: args.kernel.execution()?,
+        })
+    }
 }
 
 /// One process's share of the times.
@@ -236,27 +248,9 @@ pub fn time(
     stop: &dyn Fn() -> bool,
 ) -> anyhow::Result<Option<ProcessTimes>> {
     let scene = scene::load(&args.scene, &args.scene_args.options(0))?;
-    let lens = args.lens.defaults()?;
     let structures = args.kernel.structures(registry, &args.structure)?;
-    let claim = claim(args.pvs.as_deref())?;
-    let input = FunnelInput {
-        scene: &scene,
-        path: &path::load_scaled(&args.path, &scene, &lens, timing.lens_scale)?,
-        most_views: args.frames as usize,
-        samples: args.samples,
-        cut_outs: args.cut_out.as_ref(),
-        mirror: args.mirror,
-        chain: &chain(args, &scene, &structures)?,
-        structures: &structures,
-        protocol: &protocol(args, timing.process),
-        claim: claim.as_ref(),
-        from: args.from,
-        occluders: args.occluders,
-        // Times are compared with counts, not with the truth.
-        truth_cache: None,
-        execution: args.kernel.execution()?,
-    };
-    Ok(funnel::time(&input, plan, stop)?)
+    let setting = Setting::of(args, structures, scene, timing)?;
+    Ok(funnel::time(&setting.input(args, None)?, plan, stop)?)
 }
 
 #[cfg(test)]

@@ -1,7 +1,8 @@
 //! The tables of `cullbench funnel`: a row for each stage and back end, what each stage
 //! of the chain is worth, and what follows.
 
-use super::document::{Block, Rows};
+use super::document::Block;
+use super::table::Table;
 use super::text;
 use crate::funnel::{
     BlocksRow, FunnelReport, Gain, InnerRow, LevelRow, ProofCounts, SeenFrom, StageKind, StageRow,
@@ -27,7 +28,7 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
             report.samples[1],
             spread(report.processes),
         )),
-        Block::Table(stages(report)),
+        Block::Table(stages(report).fit(WIDTH)),
     ];
     blocks.extend(saved_load(&report.level).map(Block::Line));
     blocks.extend(report.inner_boxes.as_ref().map(inner_boxes));
@@ -70,7 +71,10 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
         ),
     ] {
         if !table.rows.is_empty() {
-            blocks.extend([Block::Heading(2, heading.into()), Block::Table(table)]);
+            blocks.extend([
+                Block::Heading(2, heading.into()),
+                Block::Table(table.fit(WIDTH)),
+            ]);
         }
     }
     let mut stages = report.bounds.iter().map(|row| row.stage);
@@ -151,29 +155,21 @@ pub fn spread(processes: usize) -> String {
 pub fn terminal(blocks: &[Block]) -> String {
     let lines = blocks.iter().map(|block| match block {
         Block::Heading(_, text) | Block::Line(text) => text::wrapped(text, WIDTH.into()),
-        Block::Table(rows) => rows.terminal_within(WIDTH),
+        Block::Table(table) => table.to_string(),
         Block::Picture(_) => String::new(),
     });
     lines.map(|line| line + "\n").collect()
 }
 
-fn stages(report: &FunnelReport) -> Rows {
-    let mut rows = Rows {
-        header: [
-            "stage", "by", "in", "out", "truth", "FP", "FN", "time", "per item",
-        ]
-        .map(str::to_owned)
-        .into(),
-        right: (2..9).collect(),
-        rows: Vec::new(),
-    };
+fn stages(report: &FunnelReport) -> Table {
+    let mut table = Table::of("stage | by | >in | >out | >truth | >FP | >FN | >time | >per item");
     let level = &report.level;
     let mut first = vec!["level".to_owned(), level.selected.clone()];
     first.extend([level.input_count, level.output_count].map(|n| n.to_string()));
-    first.resize(rows.header.len(), String::new());
-    rows.rows.push(first);
-    rows.rows.extend(report.stages.iter().map(stage));
-    rows
+    first.resize(table.header.len(), String::new());
+    table.add_row(first);
+    table.rows.extend(report.stages.iter().map(stage));
+    table
 }
 
 /// A back end with its marks.
@@ -216,18 +212,10 @@ fn count(mean: f64) -> String {
 }
 
 /// Every back end that removed what is in view, where proofs were made.
-fn proofs(report: &FunnelReport) -> Rows {
-    let mut rows = Rows::of_numbers([
-        "stage",
-        "by",
-        "hidden",
-        "tied",
-        "along lines",
-        "undecided",
-        "sub-sample",
-        "visible",
-    ]);
-    rows.right.retain(|column| *column > 1);
+fn proofs(report: &FunnelReport) -> Table {
+    let mut table = Table::of(
+        "stage | by | >hidden | >tied | >along lines | >undecided | >sub-sample | >visible",
+    );
     let proven = report.stages.iter();
     let proven = proven.filter_map(|row| Some((row, row.proofs.as_ref()?)));
     for (row, proofs) in proven.filter(|(_, proofs)| **proofs != ProofCounts::default()) {
@@ -241,71 +229,56 @@ fn proofs(report: &FunnelReport) -> Rows {
             proofs.visible_count,
         ];
         cells.extend(counts.map(|count| count.to_string()));
-        rows.rows.push(cells);
+        table.add_row(cells);
     }
-    rows
+    table
 }
 
 /// Counts of fragments, by the name of a test.
-fn of_fragments() -> Rows {
-    Rows::of_numbers([
-        "test",
-        "samples asked",
-        "kept out",
-        "fragments",
-        "clear",
-        "shaded",
-        "covered",
-    ])
+fn of_fragments() -> Table {
+    Table::of("test | >samples asked | >kept out | >fragments | >clear | >shaded | >covered")
 }
 
 /// The reflected scene on the samples of a mirror, and on all.
-fn mirror(report: &FunnelReport) -> Rows {
-    let mut rows = of_fragments();
+fn mirror(report: &FunnelReport) -> Table {
+    let mut table = of_fragments();
     let drawn = report.mirror.iter().flat_map(|mirror| {
         [
             ("z-test", &mirror.without_stencil),
             ("stencil-test", &mirror.with_stencil),
         ]
     });
-    rows.rows.extend(drawn.map(|(name, counts)| {
+    table.rows.extend(drawn.map(|(name, counts)| {
         let mut cells = vec![name.to_owned()];
         cells.extend(counts.in_order().map(count));
         cells
     }));
-    rows
+    table
 }
 
 /// One test alone has nothing to be compared with.
-fn fragments(report: &FunnelReport) -> Rows {
-    let mut rows = of_fragments();
+fn fragments(report: &FunnelReport) -> Table {
+    let mut table = of_fragments();
     let tests = report
         .stages
         .iter()
         .filter_map(|row| Some((row, row.fragments?)));
-    rows.rows.extend(tests.map(|(row, counts)| {
+    table.rows.extend(tests.map(|(row, counts)| {
         let mut cells = vec![row.back_end.name.to_owned()];
         cells.extend(counts.in_order().map(count));
         cells
     }));
-    if rows.rows.len() < 2 {
-        rows.rows.clear();
+    if table.rows.len() < 2 {
+        table.rows.clear();
     }
-    rows
+    table
 }
 
-fn orders(report: &FunnelReport) -> Rows {
-    let mut rows = Rows::of_numbers([
-        "order",
-        "fragments",
-        "shaded",
-        "overdraw",
-        "pairs",
-        "wrong",
-        "wrong samples",
-        "time",
-    ]);
-    rows.rows.extend(report.orders.iter().map(|row| {
+fn orders(report: &FunnelReport) -> Table {
+    let mut table = Table::of(
+        "order | >fragments | >shaded | >overdraw | >pairs | >wrong | >wrong samples | >time",
+    );
+    table.rows.extend(report.orders.iter().map(|row| {
         vec![
             row.name.to_owned(),
             count(row.fragment_count),
@@ -317,13 +290,12 @@ fn orders(report: &FunnelReport) -> Rows {
             of_view(&row.times),
         ]
     }));
-    rows
+    table
 }
 
-fn picks(report: &FunnelReport) -> Rows {
-    let mut rows = Rows::of_numbers(["question", "by", "cursors", "wrong", "time per cursor"]);
-    rows.right.retain(|column| *column > 1);
-    rows.rows.extend(report.picks.iter().map(|row| {
+fn picks(report: &FunnelReport) -> Table {
+    let mut table = Table::of("question | by | >cursors | >wrong | >time per cursor");
+    table.rows.extend(report.picks.iter().map(|row| {
         let doubt = if row.guarantee == Guarantee::Unproven {
             "?"
         } else {
@@ -337,13 +309,12 @@ fn picks(report: &FunnelReport) -> Rows {
             row.ns_per_ray.map(text::time).unwrap_or_default(),
         ]
     }));
-    rows
+    table
 }
 
-fn bounds(report: &FunnelReport) -> Rows {
-    let mut rows = Rows::of_numbers(["bound", "of", "time", "ratio"]);
-    rows.right.retain(|column| *column > 1);
-    rows.rows.extend(report.bounds.iter().map(|row| {
+fn bounds(report: &FunnelReport) -> Table {
+    let mut table = Table::of("bound | of | >time | >ratio");
+    table.rows.extend(report.bounds.iter().map(|row| {
         vec![
             row.name.to_owned(),
             row.back_end.to_owned(),
@@ -355,22 +326,14 @@ fn bounds(report: &FunnelReport) -> Rows {
             },
         ]
     }));
-    rows
+    table
 }
 
-fn gains(report: &FunnelReport) -> Rows {
-    let mut rows = Rows::of_numbers([
-        "stage",
-        "time with",
-        "without",
-        "counted",
-        "with",
-        "without",
-        "pays above",
-    ]);
-    rows.right.retain(|column| *column != 3);
-    rows.rows.extend(report.gains.iter().map(gain));
-    rows
+fn gains(report: &FunnelReport) -> Table {
+    let mut table =
+        Table::of("stage | >time with | >without | counted | >with | >without | >pays above");
+    table.rows.extend(report.gains.iter().map(gain));
+    table
 }
 
 fn gain(gain: &Gain) -> Vec<String> {

@@ -6,7 +6,8 @@ use serde_json::{Map, Value, json};
 
 use super::args::{ListArgs, ListTopic};
 use super::shared_args::TableFormat;
-use super::{Ending, print_json, text};
+use super::table::Table;
+use super::{Ending, print_json};
 use crate::culling::TESTS;
 use crate::index::{Info, Registry};
 use crate::measure::METRICS;
@@ -43,8 +44,7 @@ pub fn list(registry: &Registry, args: &ListArgs) -> anyhow::Result<Ending> {
                 let mut header = vec![name];
                 header.extend(rows.first().iter().flat_map(|r| r.1.iter().map(|c| c.0)));
                 header.push("");
-                let mut table = text::table(&header, &[]);
-                table.fit(LIST_WIDTH);
+                let mut table = Table::new(header, &[]).fit(LIST_WIDTH);
                 for (name, columns, summary) in rows {
                     let columns = columns.into_iter().map(|(_, value)| told(&value));
                     table.add_row([name].into_iter().chain(columns).chain([summary]));

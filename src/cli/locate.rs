@@ -40,11 +40,7 @@ pub fn locate(registry: &Registry, args: &LocateArgs) -> anyhow::Result<Ending> 
             json!(a.cost.nodes_tested),
         ]
     }))?;
-    Ok(if all_agree(&answers, what) {
-        Ending::Ok
-    } else {
-        Ending::WrongAnswer
-    })
+    Ok(Ending::of(all_agree(&answers, what)))
 }
 
 /// The regions that hold each point.

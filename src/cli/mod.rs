@@ -49,8 +49,10 @@ mod scene_args;
 mod shared_args;
 mod stage_sweep;
 mod stress;
+mod study;
 mod surface_diagram;
 mod surface_tables;
+mod table;
 mod text;
 mod usage;
 mod values;
@@ -63,13 +65,14 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use crate::index::Registry;
+use crate::report::{FolderError, write_atomically};
 use crate::scene::{LoadOptions, NOTICE, Scene};
 use clap::{CommandFactory, Parser};
 use serde::Serialize;
 
 use args::{Cli, Command};
 use scene_args::SceneCommand;
-use shared_args::SceneArgs;
+use shared_args::{SceneArgs, TableFormat};
 
 /// How a command ended that did not fail.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -82,6 +85,16 @@ pub enum Ending {
     Regression,
     /// Stopped by Ctrl-C: exit code 130.
     Interrupted,
+}
+
+impl Ending {
+    /// Of a command that holds answers against the truth and came to its end.
+    fn of(is_right: bool) -> Ending {
+        match is_right {
+            true => Ending::Ok,
+            false => Ending::WrongAnswer,
+        }
+    }
 }
 
 /// A program that does what its arguments say with the structures of a
@@ -247,6 +260,23 @@ fn print_json(document: &impl Serialize) -> io::Result<()> {
     let mut out = io::stdout().lock();
     writeln!(out, "{}", serde_json::to_string_pretty(document)?)?;
     out.flush()
+}
+
+/// What a command found, in the format that is asked for.
+fn print(
+    format: TableFormat,
+    document: &impl Serialize,
+    table: impl FnOnce() -> io::Result<()>,
+) -> io::Result<()> {
+    unread_is_fine(match format {
+        TableFormat::Json => print_json(document),
+        TableFormat::Table => table(),
+    })
+}
+
+/// A file of its own for a text.
+fn write_text(file: &Path, text: &str) -> Result<(), FolderError> {
+    write_atomically(file, |out| out.write_all(text.as_bytes()))
 }
 
 /// For output that comes after the work: a reader who leaves early changes

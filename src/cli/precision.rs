@@ -2,26 +2,20 @@
 //! sweeps over item size and ill-conditioned cameras behind it. How it is shown is
 //! in `precision_tables` and `precision_conclusions`.
 
-use std::time::Duration;
-
 use anyhow::bail;
-use tempfile::NamedTempFile;
 
 use super::args::PrecisionArgs;
 use super::processes::Workers;
 use super::protocol::{Job, Timing};
-use super::run::progress;
-use super::run_resume::typed_args;
-use super::shared_args::TableFormat;
+use super::study::Study;
 use super::{
     Ending, expect_places, interrupt, load_scene, precision_conclusions, precision_diagram,
-    precision_tables, print_json, stage_sweep, text, unread_is_fine,
+    precision_tables, print, stage_sweep, write_text,
 };
 use crate::index::Registry;
 use crate::measure::{ProcessTimes, Protocol, Status};
 use crate::path;
 use crate::precision::{self, PointPlan, PrecisionInput, SWEEPS, size_sweep, sweep};
-use crate::report::write_atomically;
 use crate::scene;
 
 /// Rounds of a point, if one process has them all.
@@ -44,12 +38,8 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
         bail!("scene '{}' has no items; expected at least one", scene.name);
     }
     let path = path::load(&args.path, &scene, &defaults)?;
-    let bar = progress(u64::from(args.spread.processes));
-    let job = |next: &str| {
-        let job = format!("{}, {}: {next}", args.scene, args.path);
-        bar.set_message(text::plain(&job));
-    };
-    job("every point, checked");
+    let study = Study::new(format!("{}, {}: ", args.scene, args.path), 0, &args.spread);
+    study.begin("every point, checked");
     let protocol = protocol(args, 0);
     let input = PrecisionInput {
         scene: &scene,
@@ -65,7 +55,7 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
     };
     let (mut sizes, mut sweeps) = (Vec::new(), Vec::new());
     if args.cubes > 0 {
-        job("the sweep over sizes");
+        study.begin("the sweep over sizes");
         let rows = size_sweep(args.cubes, args.spread.seed, going_on)?;
         sizes = rows.unwrap_or_default();
         let cameras = args
@@ -73,32 +63,20 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
             .div_ceil(CUBES_PER_CAMERA)
             .clamp(2, SWEEP_CAMERAS);
         for (which, name, _) in SWEEPS {
-            job(&format!("the sweep over {name}"));
+            study.begin(&format!("the sweep over {name}"));
             let rows = sweep(which, cameras, args.spread.seed, going_on);
             sweeps.extend(rows.unwrap_or_default());
         }
     }
     interrupt::from_now_on_finish();
-    let workers = Workers::new(typed_args()?, Duration::MAX, &NamedTempFile::new)?;
-    let points = |process| {
-        let timing = Timing {
-            process,
-            lens_scale: path.lens_scale,
-        };
-        Job::Points(prepared.plan.clone(), timing)
-    };
-    let step = |process: u32, _: &str| {
-        bar.set_position(process.into());
-        job("every point, timed");
-    };
-    let Some(times) = workers.times(args.spread.processes, points, &step)? else {
+    let workers = Workers::of_study()?;
+    let points = |timing| Job::Points(prepared.plan.clone(), timing);
+    let Some(times) = study.times(&workers, "every point, timed", path.lens_scale, points)? else {
         return Ok(Ending::Interrupted);
     };
     let precision = prepared.conclude(&times);
-    bar.finish_and_clear();
     if let Some(file) = &args.svg {
-        let svg = precision_diagram::draw(&precision)?;
-        write_atomically(file, |out| out.write_all(svg.as_bytes()))?;
+        write_text(file, &precision_diagram::draw(&precision)?)?;
     }
     let wrong = precision
         .points
@@ -110,23 +88,15 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
         size_sweep: sizes,
         sweeps,
     };
-    unread_is_fine(match args.format {
-        TableFormat::Json => print_json(&outcome),
-        TableFormat::Table => {
-            precision_tables::show(&outcome).and_then(|()| precision_conclusions::show(&outcome))
-        }
+    print(args.format, &outcome, || {
+        precision_tables::show(&outcome).and_then(|()| precision_conclusions::show(&outcome))
     })?;
-    Ok(if wrong {
-        Ending::WrongAnswer
-    } else {
-        Ending::Ok
-    })
+    Ok(Ending::of(!wrong))
 }
 
 /// Of one of the processes, all cameras.
 fn protocol(args: &PrecisionArgs, process: u32) -> Protocol {
-    let effort = args.spread.effort(ROUNDS);
-    args.spread.protocol(&effort, process, usize::MAX)
+    args.spread.protocol(ROUNDS, process, usize::MAX)
 }
 
 /// One process's share of the points.

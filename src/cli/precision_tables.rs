@@ -5,6 +5,7 @@ use std::io::{self, Write};
 
 use serde::Serialize;
 
+use super::table::Table;
 use super::text;
 use crate::measure::Status;
 use crate::precision::{
@@ -167,16 +168,8 @@ fn by_source(errors: &ErrorCount) -> String {
     )
 }
 
-fn errors_table(points: &[&Point]) -> text::Table {
-    let header = [
-        "culling",
-        "excess %",
-        "by source",
-        "missed ppm",
-        "px",
-        "flicker %",
-    ];
-    let mut table = text::table(&header, &[1, 2, 3, 4, 5]);
+fn errors_table(points: &[&Point]) -> Table {
+    let mut table = Table::of("culling | >excess % | >by source | >missed ppm | >px | >flicker %");
     for point in points {
         let judged = point.status != Status::Refused;
         let of = |value: String| if judged { value } else { String::new() };
@@ -195,16 +188,8 @@ fn errors_table(points: &[&Point]) -> text::Table {
     table
 }
 
-fn times_table(points: &[&Point]) -> text::Table {
-    let header = [
-        "",
-        "culling",
-        "structure",
-        "query [95 % interval]",
-        "B/item",
-        "status",
-    ];
-    let mut table = text::table(&header, &[3, 4]);
+fn times_table(points: &[&Point]) -> Table {
+    let mut table = Table::of(" | culling | structure | >query [95 % interval] | >B/item | status");
     for point in points {
         let structure = point.structure.split(':').next().unwrap_or_default();
         let memory = point.memory_bytes_per_item.map(|b| format!("{b:.1}"));
@@ -265,19 +250,11 @@ fn region_rows(p: &Precision) -> Vec<&RegionPoint> {
     rows
 }
 
-fn regions_table(p: &Precision) -> text::Table {
-    let header = [
-        "",
-        "numbers",
-        "structure",
-        "points",
-        "wrong %",
-        "false",
-        "missed",
-        "farthest",
-        "per point",
-    ];
-    let mut table = text::table(&header, &[3, 4, 5, 6, 7, 8]);
+fn regions_table(p: &Precision) -> Table {
+    let mut table = Table::of(
+        " | numbers | structure | >points | >wrong % | >false | >missed | >farthest \
+         | >per point",
+    );
     for row in region_rows(p) {
         table.add_row([
             mark(row.on_front, row.is_tie).to_owned(),
@@ -294,8 +271,8 @@ fn regions_table(p: &Precision) -> text::Table {
     table
 }
 
-fn stability_table(p: &Precision) -> text::Table {
-    let mut table = text::table(&["cameras", "pairs in final order", "CPU time"], &[0, 1, 2]);
+fn stability_table(p: &Precision) -> Table {
+    let mut table = Table::of(">cameras | >pairs in final order | >CPU time");
     for row in &p.stability {
         table.add_row([
             row.cameras.to_string(),
@@ -315,11 +292,10 @@ pub fn elsewhere(rate: Option<Rate>) -> String {
 }
 
 /// Tests by ratios.
-fn sizes_table(rows: &[SizeRow]) -> text::Table {
+fn sizes_table(rows: &[SizeRow]) -> Table {
     let mut header = vec!["s/D".to_owned()];
     header.extend(rows.iter().map(|row| row.size_over_depth.to_string()));
-    let header: Vec<&str> = header.iter().map(String::as_str).collect();
-    let mut table = text::table(&header, &(1..header.len()).collect::<Vec<_>>());
+    let mut table = Table::of_numbers(header);
     let visible = rows.iter().map(|row| text::count(row.visible as usize));
     table.add_row(["visible".to_owned()].into_iter().chain(visible));
     for (i, test) in rows[0].tests.iter().enumerate() {
@@ -367,8 +343,7 @@ fn sweep_shown(name: &str, what: &str, rows: &[&SweepRow]) -> String {
             .iter()
             .map(|value| format!("{value:.4e}").replace(".0000", "")),
     );
-    let header: Vec<&str> = header.iter().map(String::as_str).collect();
-    let mut table = text::table(&header, &(1..header.len()).collect::<Vec<_>>());
+    let mut table = Table::of_numbers(header);
     let (mut losers, mut sound) = (0, Vec::new());
     for kind in rows.iter().filter(|row| row.value == values[0]) {
         let own: Vec<&&SweepRow> = rows.iter().filter(|row| row.names == kind.names).collect();

@@ -14,6 +14,7 @@ use tempfile::NamedTempFile;
 
 use super::interrupt;
 use super::protocol::{Job, Message, PROTOCOL, Request};
+use super::run_resume::typed_args;
 use crate::input;
 use crate::measure::{Part, ProcessTimes, Status, TaskSamples, Verdict};
 use crate::report::bare;
@@ -264,6 +265,14 @@ pub struct Workers {
 }
 
 impl Workers {
+    /// For a study, which waits as long as it takes.
+    ///
+    /// # Errors
+    /// As [`Workers::new`]; an argument that is no text.
+    pub fn of_study() -> anyhow::Result<Workers> {
+        Workers::new(typed_args()?, Duration::MAX, &NamedTempFile::new)
+    }
+
     /// `temporary` makes the files that stand for pipes.
     ///
     /// # Errors
@@ -348,31 +357,6 @@ impl Workers {
                 verdict.reason.unwrap_or_default()
             ),
         }
-    }
-
-    /// What every process times; `None` if the user wants to stop.
-    ///
-    /// # Errors
-    /// As [`Workers::found`].
-    pub fn times(
-        &self,
-        processes: u32,
-        job: impl Fn(u32) -> Job,
-        step: &dyn Fn(u32, &str),
-    ) -> anyhow::Result<Option<Vec<ProcessTimes>>> {
-        let mut all = Vec::new();
-        for process in 0..processes {
-            let Some(found) = self.found(process, job(process), &|text| step(process, text))?
-            else {
-                return Ok(None);
-            };
-            let times = found.into_iter().filter_map(|said| match said {
-                Said::Times(times) => Some(times),
-                _ => None,
-            });
-            all.extend(times);
-        }
-        Ok(Some(all))
     }
 }
 

@@ -48,8 +48,8 @@ pub enum Job {
     Trials(TrialPlan, Timing),
     /// All points (`precision`).
     Points(PointPlan, Timing),
-    /// Frames, eyes and arms (`drift`), in a process of this number.
-    Drift(DriftPlan, u32),
+    /// Frames, eyes and arms (`drift`).
+    Drift(DriftPlan, Timing),
     /// Every stage of the funnel with every back end (`funnel`).
     Funnel(FunnelPlan, Timing),
     /// One stage with every back end (`precision --stage`).

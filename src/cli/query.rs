@@ -55,9 +55,5 @@ pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
         row.extend(a.ids.as_ref().map(|ids| json!(ids)));
         row
     }))?;
-    Ok(if all_agree(&answers, "camera") {
-        Ending::Ok
-    } else {
-        Ending::WrongAnswer
-    })
+    Ok(Ending::of(all_agree(&answers, "camera")))
 }

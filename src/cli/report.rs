@@ -8,14 +8,15 @@ use std::path::Path;
 use anyhow::Context;
 
 use super::args::ReportArgs;
-use super::document::{Block, Rows, to_html, to_markdown};
+use super::document::{Block, to_html, to_markdown};
 use super::surface_diagram::{self, Picture};
-use super::{Ending, expect_folder, expect_places, surface_tables, tell, text};
+use super::table::Table;
+use super::{Ending, expect_folder, expect_places, surface_tables, tell, text, write_text};
 use crate::index::Registry;
 use crate::measure::Status;
 use crate::report::{
     Comparison, Ranked, Report, ReportCell, comparisons, growths, read_report, surfaces,
-    times_as_fast, write_atomically,
+    times_as_fast,
 };
 
 pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> {
@@ -34,7 +35,7 @@ pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> 
     };
     let mut blocks = blocks(&report);
     if let Some(path) = &args.markdown {
-        write(path, &to_markdown(&blocks))?;
+        write_text(path, &to_markdown(&blocks))?;
     }
     match &args.svg {
         Some(folder) if pictures.is_empty() => tell(&format!(
@@ -47,7 +48,7 @@ pub fn report(registry: &Registry, args: &ReportArgs) -> anyhow::Result<Ending> 
     }
     if let Some(path) = &args.html {
         blocks.extend(pictures.into_iter().map(|p| Block::Picture(p.svg)));
-        write(path, &to_html(&title(&report), &blocks))?;
+        write_text(path, &to_html(&title(&report), &blocks))?;
     } else if args.markdown.is_none() && args.svg.is_none() {
         io::stdout().write_all(to_markdown(&blocks).as_bytes())?;
     }
@@ -73,17 +74,11 @@ fn write_charts(folder: &Path, pictures: &[Picture]) -> anyhow::Result<()> {
     let file = |picture: &Picture| folder.join(format!("{}.svg", picture.name));
     let written = pictures
         .iter()
-        .try_for_each(|picture| write(&file(picture), &picture.svg));
+        .try_for_each(|picture| write_text(&file(picture), &picture.svg));
     if written.is_err() && is_new {
         let _ = fs::remove_dir_all(folder);
     }
-    written
-}
-
-fn write(path: &Path, text: &str) -> anyhow::Result<()> {
-    Ok(write_atomically(path, |out| {
-        out.write_all(text.as_bytes())
-    })?)
+    Ok(written?)
 }
 
 fn title(report: &Report) -> String {
@@ -195,18 +190,18 @@ fn of_comparison(comparison: &Comparison) -> Vec<Block> {
     }
     header.extend(["of lower bound: read", "copy", "build", "bytes per item"]);
     header.extend(["break-even queries", "locate", "status"]);
-    let mut rows = Rows::of_numbers(header);
+    let mut table = Table::of_numbers(header);
     for Ranked { rank, cell } in &comparison.ranked {
         let rank = rank.map_or("-".to_owned(), |rank| rank.to_string());
-        rows.rows.push(row(cell, rank, peer));
+        table.rows.push(row(cell, rank, peer));
     }
     for bound in &comparison.bounds {
-        rows.rows.push(row(bound, "lower bound".to_owned(), peer));
+        table.rows.push(row(bound, "lower bound".to_owned(), peer));
     }
     let basis = format!("{}.", text::basis(comparison));
     let mut blocks = vec![Block::Heading(3, heading), Block::Line(basis)];
     blocks.extend(false_positives(comparison).map(Block::Line));
-    blocks.push(Block::Table(rows.without_empty_columns()));
+    blocks.push(Block::Table(table.without_empty_columns()));
     let told = comparison.ranked.iter().map(|r| r.cell);
     for cell in told.filter(|c| c.reason.is_some()) {
         let reason = cell.reason.as_deref().unwrap_or_default();

@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 
 use super::args::RunArgs;
 use super::processes::{Ended, Said, Workers};
@@ -14,6 +14,7 @@ use super::protocol::Job;
 use super::run_plan::{RunPlan, plan};
 use super::run_resume::{create, go_on, resume, utc_now};
 use super::run_table::show_scene;
+use super::study::progress;
 use super::{Ending, expect_folder, interrupt, surface_tables, tell, text, unread_is_fine};
 use crate::index::Registry;
 use crate::measure::{
@@ -41,11 +42,8 @@ pub fn run(registry: &Registry, args: &RunArgs) -> anyhow::Result<Ending> {
         bail!("nothing to do: this shard has no scene; expected at most as many shards as paths");
     }
     interrupt::from_now_on_finish();
-    let (folder, stream) = create(
-        args,
-        &plan,
-        &Machine::capture().by(args.what.kernel.execution()?.kernel),
-    )?;
+    let machine = Machine::capture().by(args.what.kernel.execution()?.kernel);
+    let (folder, stream) = create(args, &plan, machine)?;
     Run::new(args, plan, folder, stream)?.all()
 }
 
@@ -85,7 +83,7 @@ impl Run {
     ) -> anyhow::Result<Run> {
         let groups = plan.plan.groups().len() as u64;
         Ok(Run {
-            bar: progress(groups * u64::from(plan.plan.effort.processes)),
+            bar: progress(groups * u64::from(plan.plan.effort.processes), ""),
             // Files in the run's folder: what a killed run leaves is taken away by
             // the next.
             workers: Workers::new(
@@ -277,18 +275,7 @@ impl Run {
                 .first()
                 .map(|kept| kept.part.clone());
             let structures = &self.plan.plan.structures;
-            let subject = |spec: &crate::index::StructureSpec| SubjectPart {
-                label: spec.label.clone(),
-                params: spec.params.clone(),
-                kind: spec.row.info.kind,
-                origin: spec.row.info.origin.owned(),
-                verdict: verdict.clone(),
-                build_ms: None,
-                memory_bytes: None,
-                update_ms: Vec::new(),
-                refitted_ln: None,
-                counts: BTreeMap::new(),
-            };
+            let subject = |spec| SubjectPart::unknown(spec, verdict.clone());
             let part = Part {
                 key: key.clone(),
                 process,
@@ -336,13 +323,4 @@ impl Run {
         )?;
         out.flush()
     }
-}
-
-/// A bar of so many parts.
-pub fn progress(parts: u64) -> ProgressBar {
-    // Drawn on stderr, and only if that is a terminal.
-    let style = ProgressStyle::with_template("{bar:24} {pos}/{len}  {elapsed}  {msg}");
-    let bar = ProgressBar::new(parts);
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    bar
 }

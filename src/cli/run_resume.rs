@@ -18,13 +18,13 @@ use crate::report::{
     Difference, Header, RunFolder, RunInfo, SCHEMA_VERSION, StoppedRun, Stream, dated, read_report,
     read_stream, utc,
 };
-use crate::scene::{self, GENERATOR_NAME};
+use crate::scene;
 
 /// Makes the folder of a new run.
 pub fn create(
     args: &RunArgs,
     plan: &RunPlan,
-    machine: &Machine,
+    machine: Machine,
 ) -> anyhow::Result<(RunFolder, Stream)> {
     let clock = SystemTime::now();
     let now = utc(clock);
@@ -42,44 +42,21 @@ pub fn create(
         None => PathBuf::from(format!("results/{stamp}-{}-{id}", machine.slug())),
     };
     let typed = typed_args()?;
+    let header = Header::of(&plan.plan, machine, format!("{stamp}-{id}"), now);
     let header = Header {
-        schema_version: SCHEMA_VERSION,
         run: RunInfo {
-            id: format!("{stamp}-{id}"),
-            started_at: now,
-            finished_at: None,
-            command: ["cullbench".to_owned()]
-                .into_iter()
-                .chain(typed.iter().cloned())
-                .collect::<Vec<_>>()
-                .join(" "),
-            seed: args.what.seed,
+            command: [&["cullbench".to_owned()], &typed[..]].concat().join(" "),
             suite: plan.from_suite.then(|| plan.suite.name.to_owned()),
-            generator: GENERATOR_NAME.to_owned(),
-            processes: plan.plan.effort.processes,
             shard: args.shard.clone(),
+            ..header.run
         },
         args: typed,
-        machine: machine.clone(),
-        toolchain: Toolchain::capture(),
-        source: Source::capture(),
-        groups: plan.plan.groups(),
         whole: plan.whole.clone(),
-        structures: plan
-            .plan
-            .structures
-            .iter()
-            .map(|s| s.label.clone())
-            .collect(),
         binary: binary_digest(),
+        ..header
     };
     let folder = RunFolder::create(&path, &header)?;
-    let stream = Stream {
-        header,
-        parts: Vec::new(),
-        finished_at: None,
-    };
-    Ok((folder, stream))
+    Ok((folder, Stream::of(header)))
 }
 
 /// The arguments behind the program's name, to be read again by a worker.

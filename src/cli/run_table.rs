@@ -4,6 +4,7 @@
 
 use std::io::{self, Write};
 
+use super::table::Table;
 use super::text;
 use crate::report::{Comparison, Ranked, Report, ReportCell, comparisons};
 
@@ -116,28 +117,18 @@ fn of(cell: &ReportCell, metric: &str, show: fn(f64) -> String) -> String {
 /// A row a cell; columns without any figure are left out, and so is a table of
 /// nothing else.
 fn table<'r>(columns: &[Column], cells: impl Iterator<Item = (String, &'r ReportCell)>) -> String {
-    let rows: Vec<Vec<String>> = cells
-        .map(|(rank, cell)| {
-            let figures = columns.iter().map(|(_, figure)| figure(cell));
-            let name = format!("{rank:>2} {}", cell.structure);
-            [name].into_iter().chain(figures).collect()
-        })
-        .collect();
     let header = ["structure"].into_iter().chain(columns.iter().map(|c| c.0));
-    let kept: Vec<(usize, &str)> = header
-        .enumerate()
-        .filter(|(column, _)| rows.iter().any(|row| !row[*column].is_empty()))
-        .collect();
-    if kept.len() < 2 {
-        return String::new();
+    let mut table = Table::of_numbers(header);
+    for (rank, cell) in cells {
+        let figures = columns.iter().map(|(_, figure)| figure(cell));
+        let name = format!("{rank:>2} {}", cell.structure);
+        table.add_row([name].into_iter().chain(figures));
     }
-    let header: Vec<&str> = kept.iter().map(|(_, name)| *name).collect();
-    let right: Vec<usize> = (1..header.len()).collect();
-    let mut table = text::table(&header, &right);
-    for row in &rows {
-        table.add_row(kept.iter().map(|(column, _)| &row[*column]));
+    let table = table.without_empty_columns();
+    match table.header.len() {
+        0 | 1 => String::new(),
+        _ => format!("{table}\n"),
     }
-    format!("{table}\n")
 }
 
 /// Why cells are not ok.

@@ -8,6 +8,7 @@ use serde_json::json;
 
 use super::scene_args::{SceneConvertArgs, SceneFormat, SceneGenerateArgs, SceneInfoArgs};
 use super::shared_args::TableFormat;
+use super::table::Table;
 use super::{Ending, interrupt, load_scene, print_json, tell, text};
 use crate::measure::SceneInfo;
 use crate::report::write_atomically;
@@ -41,7 +42,7 @@ pub fn info(args: &SceneInfoArgs) -> anyhow::Result<Ending> {
         print_json(&value)?;
         return Ok(Ending::Ok);
     }
-    let mut table = text::table(&["scene", &info.name], &[]);
+    let mut table = Table::new(["scene", &info.name], &[]);
     let [low, high, origin] = [info.bounds_min, info.bounds_max, info.origin]
         .map(|v| format!("({}, {}, {})", v[0], v[1], v[2]));
     let mut rows = vec![

@@ -97,8 +97,9 @@ impl SpreadArgs {
         }
     }
 
-    /// The protocol of one of the processes, for so many items.
-    pub fn protocol(&self, effort: &Effort, process: u32, cameras: usize) -> Protocol {
+    /// The protocol of one of the processes.
+    pub fn protocol(&self, rounds: [usize; 2], process: u32, cameras: usize) -> Protocol {
+        let effort = self.effort(rounds);
         Protocol {
             rounds: effort.rounds,
             task_ns: effort.task_ns,

@@ -1,19 +1,15 @@
 //! `cullbench precision --stage`: error against run time of one stage of the funnel.
 
 use std::io::{self, Write};
-use std::time::Duration;
 
 use anyhow::bail;
-use tempfile::NamedTempFile;
 
 use super::args::PrecisionArgs;
-use super::document::Rows;
 use super::processes::Workers;
 use super::protocol::{Job, Timing};
-use super::run::progress;
-use super::run_resume::typed_args;
-use super::shared_args::TableFormat;
-use super::{Ending, funnel_table, interrupt, load_scene_by, print_json, text, unread_is_fine};
+use super::study::Study;
+use super::table::Table;
+use super::{Ending, funnel_table, interrupt, load_scene_by, print, text};
 use crate::funnel::{
     self, Chain, FunnelInput, NONE, SeenFrom, StageKind, StageSweep, SweepPlan, SweepPoint,
 };
@@ -116,12 +112,9 @@ pub fn sweep(
         bail!("scene '{name}' has nothing for the {stage} stage; expected {expected}");
     }
     let setting = Setting::of(registry, args, scene, None)?;
-    let bar = progress(u64::from(args.spread.processes));
-    let job = |next: &str| {
-        let job = format!("{}, {} stage: {next}", args.scene, stage.name());
-        bar.set_message(text::plain(&job));
-    };
-    job("every point, judged");
+    let about = format!("{}, {} stage: ", args.scene, stage.name());
+    let study = Study::new(about, 0, &args.spread);
+    study.begin("every point, judged");
     let protocol = protocol(args, 0);
     let input = setting.input(args, &protocol)?;
     // There are no files yet: Ctrl-C ends the program.
@@ -129,39 +122,22 @@ pub fn sweep(
         return Ok(Ending::Interrupted);
     };
     interrupt::from_now_on_finish();
-    let workers = Workers::new(typed_args()?, Duration::MAX, &NamedTempFile::new)?;
-    let share = |process| {
-        let timing = Timing {
-            process,
-            lens_scale: setting.path.lens_scale,
-        };
-        Job::Sweep(prepared.plan.clone(), timing)
-    };
-    let step = |process: u32, _: &str| {
-        bar.set_position(process.into());
-        job("every point, timed");
-    };
-    let Some(times) = workers.times(args.spread.processes, share, &step)? else {
+    let workers = Workers::of_study()?;
+    let job = |timing| Job::Sweep(prepared.plan.clone(), timing);
+    let lens_scale = setting.path.lens_scale;
+    let Some(times) = study.times(&workers, "every point, timed", lens_scale, job)? else {
         return Ok(Ending::Interrupted);
     };
-    bar.finish_and_clear();
     let sweep = prepared.conclude(&times);
-    unread_is_fine(match args.format {
-        TableFormat::Json => print_json(&sweep),
-        TableFormat::Table => show(&sweep, &mut text::terminal()),
-    })?;
+    print(args.format, &sweep, || show(&sweep, &mut text::terminal()))?;
     let is_broken = |point: &SweepPoint| {
         point.back_end.guarantee != Guarantee::Unproven && point.errors.false_negative_count > 0.0
     };
-    Ok(match sweep.points.iter().any(is_broken) {
-        true => Ending::WrongAnswer,
-        false => Ending::Ok,
-    })
+    Ok(Ending::of(!sweep.points.iter().any(is_broken)))
 }
 
 fn protocol(args: &PrecisionArgs, process: u32) -> Protocol {
-    let effort = args.spread.effort(ROUNDS);
-    args.spread.protocol(&effort, process, usize::MAX)
+    args.spread.protocol(ROUNDS, process, usize::MAX)
 }
 
 /// One process's share of the times.
@@ -196,17 +172,11 @@ fn show(sweep: &StageSweep, out: &mut impl Write) -> io::Result<()> {
         SAMPLES.height,
         funnel_table::spread(sweep.processes)
     )?;
-    let mut rows = Rows::of_numbers([
-        "by",
-        "buffer",
-        "out",
-        "FP / visible",
-        "FN / visible",
-        "FN / view",
-        "time / view",
-        "front",
-    ]);
-    rows.rows.extend(sweep.points.iter().map(|point| {
+    let mut table = Table::of(
+        "by | >buffer | >out | >FP / visible | >FN / visible | >FN / view | >time / view \
+         | >front",
+    );
+    table.rows.extend(sweep.points.iter().map(|point| {
         let (errors, times) = (&point.errors, &point.times);
         let doubt = if point.back_end.guarantee == Guarantee::Unproven {
             "?"
@@ -227,7 +197,7 @@ fn show(sweep: &StageSweep, out: &mut impl Write) -> io::Result<()> {
             if point.on_front { "*" } else { "" }.to_owned(),
         ]
     }));
-    writeln!(out, "{}", rows.terminal())?;
+    writeln!(out, "{table}")?;
     let safe = sweep
         .points
         .iter()

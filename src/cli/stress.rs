@@ -10,6 +10,7 @@ use indicatif::ProgressBar;
 
 use super::args::StressArgs;
 use super::shared_args::TableFormat;
+use super::table::Table;
 use super::{Ending, interrupt, tell, text, unread_is_fine};
 use crate::index::{Execution, Registry, StructureSpec};
 use crate::kernel::Kernel;
@@ -196,10 +197,7 @@ fn json(sections: &[Section]) -> io::Result<()> {
 
 fn table(sections: &[Section], seconds: f64, note: &str) -> io::Result<()> {
     let mut out = text::terminal();
-    let header = [
-        "category", "cases", "boxes", "rows", "passed", "refused", "failed",
-    ];
-    let mut table = text::table(&header, &[1, 2, 3, 4, 5, 6]);
+    let mut table = Table::of("category | >cases | >boxes | >rows | >passed | >refused | >failed");
     for section in sections {
         table.add_row([
             section.name.clone(),

@@ -4,7 +4,8 @@
 
 use std::io::{self, Write};
 
-use super::document::{Block, Rows};
+use super::document::Block;
+use super::table::Table;
 use super::text;
 use crate::report::{Crossing, Growth, Place, Report, Surface, comparisons, growths, surfaces};
 
@@ -22,11 +23,10 @@ pub fn title(surface: &Surface) -> String {
 
 /// Rows are numbers of items, columns shares of them that are visible: who is
 /// fastest, and its speed-up vs linear.
-fn winners(surface: &Surface) -> Rows {
+fn winners(surface: &Surface) -> Table {
     let classes = surface.classes();
     let header = ["items \\ visible".to_owned()].into_iter();
-    let header: Vec<String> = header.chain(classes.iter().map(|c| class(*c))).collect();
-    let mut rows = Rows::of_numbers(header.iter().map(String::as_str));
+    let mut table = Table::of_numbers(header.chain(classes.iter().map(|c| class(*c))));
     for size in surface.sizes() {
         let mut row = vec![text::count(size)];
         for class in &classes {
@@ -34,9 +34,9 @@ fn winners(surface: &Surface) -> Rows {
             let told = surface.places.iter().filter(here).map(winner);
             row.push(told.collect::<Vec<_>>().join("; "));
         }
-        rows.rows.push(row);
+        table.add_row(row);
     }
-    rows
+    table
 }
 
 /// "wide = bvh: 12.3 (at 34.70 %)": those of one rank share the place, the fastest comes first.
@@ -60,13 +60,10 @@ fn winner(place: &Place) -> String {
 }
 
 /// From how many items on each structure beats the linear scan.
-fn crossings(surface: &Surface) -> Option<Rows> {
+fn crossings(surface: &Surface) -> Option<Table> {
     let classes = surface.classes();
-    let header: Vec<String> = ["faster than linear from".to_owned()]
-        .into_iter()
-        .chain(classes.iter().map(|c| class(*c)))
-        .collect();
-    let mut rows = Rows::of_numbers(header.iter().map(String::as_str));
+    let header = ["faster than linear from".to_owned()].into_iter();
+    let mut table = Table::of_numbers(header.chain(classes.iter().map(|c| class(*c))));
     for structure in surface.no_scans() {
         let told = classes.iter().map(|class| {
             let crossing = surface.crossing(structure, *class);
@@ -80,10 +77,10 @@ fn crossings(surface: &Surface) -> Option<Rows> {
         let told: Vec<String> = told.collect();
         if told.iter().any(|cell| !cell.is_empty()) {
             let name = [structure.to_owned()].into_iter();
-            rows.rows.push(name.chain(told).collect());
+            table.add_row(name.chain(told));
         }
     }
-    (!rows.rows.is_empty()).then_some(rows)
+    (!table.rows.is_empty()).then_some(table)
 }
 
 /// An interpolated number is not known more finely.
@@ -93,12 +90,12 @@ fn two_digits(items: f64) -> usize {
 }
 
 /// After how many queries each build is repaid against the linear scan.
-fn break_even(surface: &Surface) -> Option<Rows> {
+fn break_even(surface: &Surface) -> Option<Table> {
     let structures = surface.no_scans();
     let header = ["items, visible"]
         .into_iter()
         .chain(structures.iter().copied());
-    let mut rows = Rows::of_numbers(header);
+    let mut table = Table::of_numbers(header);
     for place in &surface.places {
         let told = structures.iter().map(|structure| {
             let cell = place.cell(structure);
@@ -115,9 +112,9 @@ fn break_even(surface: &Surface) -> Option<Rows> {
             text::count(place.items),
             text::percent(place.share)
         );
-        rows.rows.push([name].into_iter().chain(told).collect());
+        table.add_row([name].into_iter().chain(told));
     }
-    (!structures.is_empty()).then_some(rows)
+    (!structures.is_empty()).then_some(table)
 }
 
 /// The tables of one surface.
@@ -143,24 +140,14 @@ pub fn of_surface(surface: &Surface) -> Vec<Block> {
 }
 
 /// How cost grows at a fixed number of visible items.
-pub fn of_growths(growths: &[Growth]) -> Rows {
-    let mut rows = Rows {
-        header: [
-            "world, path, cache, test",
-            "structure",
-            "visible",
-            "items",
-            "query time ~ N^e, e =",
-        ]
-        .map(str::to_owned)
-        .into(),
-        right: vec![2, 3, 4],
-        rows: Vec::new(),
-    };
+pub fn of_growths(growths: &[Growth]) -> Table {
+    let mut table = Table::of(
+        "world, path, cache, test | structure | >visible | >items | >query time ~ N^e, e =",
+    );
     for growth in growths {
         let sizes = growth.sizes.first().zip(growth.sizes.last());
         let e = growth.exponent;
-        rows.rows.push(vec![
+        table.add_row([
             format!(
                 "{}, {}, {}, {}",
                 growth.world, growth.path, growth.cache, growth.test
@@ -173,7 +160,7 @@ pub fn of_growths(growths: &[Growth]) -> Rows {
             format!("{:.2} [{:.2}, {:.2}]", e.value, e.lower, e.upper),
         ]);
     }
-    rows
+    table
 }
 
 /// At the end of a run, where there is anything to cross.
@@ -186,9 +173,9 @@ pub fn show(report: &Report) -> io::Result<()> {
         }
         let title = text::plain(&title(&surface));
         writeln!(out, "\ncrossover surface: {title}")?;
-        writeln!(out, "{}", winners(&surface).terminal())?;
+        writeln!(out, "{}", winners(&surface))?;
         if let Some(rows) = crossings(&surface) {
-            writeln!(out, "{}", rows.terminal())?;
+            writeln!(out, "{}", rows)?;
         }
     }
     let growths = growths(report);
@@ -197,7 +184,7 @@ pub fn show(report: &Report) -> io::Result<()> {
             out,
             "\ngrowth at a fixed number of visible items [95 % interval]"
         )?;
-        writeln!(out, "{}", of_growths(&growths).terminal())?;
+        writeln!(out, "{}", of_growths(&growths))?;
     }
     out.flush()
 }

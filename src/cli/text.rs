@@ -1,77 +1,11 @@
-//! How figures and tables look on a terminal.
+//! How figures look on a terminal.
 
-use std::fmt;
 use std::io::{self, StdoutLock, Write};
 
 use crate::measure::Metric;
 use crate::report::{Comparison, Report, ReportCell};
 pub use crate::shown::{count, counted, lines, plain};
 use crate::statistics::{Estimate, Rate};
-use comfy_table::presets::UTF8_BORDERS_ONLY;
-use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement};
-
-/// A table whose cells may come from anywhere.
-pub struct Table {
-    cells: comfy_table::Table,
-    /// Columns of the terminal, where the table is to fit into them.
-    width: Option<u16>,
-}
-
-/// A table with a header. Columns named in `right` hold numbers.
-pub fn table(header: &[&str], right: &[usize]) -> Table {
-    let mut table = comfy_table::Table::new();
-    table
-        .load_style(UTF8_BORDERS_ONLY)
-        .set_content_arrangement(ContentArrangement::Disabled)
-        .set_header(header.iter().map(|name| plain(name)));
-    for &column in right {
-        if let Some(column) = table.column_mut(column) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
-    Table {
-        cells: table,
-        width: None,
-    }
-}
-
-impl Table {
-    pub fn add_row(&mut self, row: impl IntoIterator<Item = impl AsRef<str>>) {
-        let cells = row.into_iter().map(|cell| plain(cell.as_ref()));
-        self.cells.add_row(cells);
-    }
-
-    /// Makes the table no wider, whatever is added to it: columns move together, and if that
-    /// is not enough long cells are broken into lines; names, in the first column, stay
-    /// whole.
-    pub fn fit(&mut self, width: u16) {
-        self.width = Some(width);
-    }
-}
-
-impl fmt::Display for Table {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let wide = self.cells.to_string();
-        let is_within = |width: u16| {
-            let mut lines = wide.lines();
-            lines.all(|line| line.chars().count() <= usize::from(width))
-        };
-        let Some(width) = self.width.filter(|width| !is_within(*width)) else {
-            return f.write_str(&wide);
-        };
-        let mut cells = self.cells.clone();
-        cells
-            .set_content_arrangement(ContentArrangement::Dynamic)
-            .set_width(width);
-        for (place, column) in cells.column_iter_mut().enumerate() {
-            match place {
-                0 => column.set_constraint(ColumnConstraint::ContentWidth),
-                _ => column.set_padding((0, 1)),
-            };
-        }
-        cells.fmt(f)
-    }
-}
 
 /// What the times of a report rest on, in one sentence.
 pub fn conclusion(report: &Report) -> String {
@@ -326,6 +260,7 @@ impl<W: Write> Write for Terminal<W> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::table::Table;
     use super::*;
 
     #[test]
@@ -382,11 +317,10 @@ mod tests {
     #[test]
     fn a_table_that_is_too_wide_moves_together_and_then_breaks_cells() {
         let fitted = |name: &str| {
-            let mut table = table(&["stage", "by", "time"], &[2]);
+            let mut table = Table::of("stage | by | > time");
             table.add_row(["occlusion", name, "1.85±0.02 ms"]);
             let whole = table.to_string();
-            table.fit(40);
-            (whole, table.to_string())
+            (whole, table.fit(40).to_string())
         };
         let widest = |text: &str| text.lines().map(|line| line.chars().count()).max();
         let (whole, same) = fitted("a-name");
@@ -404,7 +338,7 @@ mod tests {
 
     #[test]
     fn tables_and_lines_hold_no_escapes() {
-        let mut table = table(&["a\u{1b}b"], &[]);
+        let mut table = Table::of("a\u{1b}b");
         table.add_row(["two\nlines\u{202e}"]);
         let shown = table.to_string();
         assert!(shown.contains("a\\u{1b}b") && shown.contains("two lines\\u{202e}"));

@@ -12,6 +12,7 @@ use serde::Serialize;
 
 use super::args::VerifyArgs;
 use super::shared_args::TableFormat;
+use super::table::Table;
 use super::{Ending, interrupt, load_scene, print_json, tell, text, unread_is_fine};
 use crate::camera::{DEFAULT_EPSILON, PlaneMethod};
 use crate::culling::{ARITHMETICS, Arithmetic, CameraView, Culling, CullingTest, TESTS};
@@ -435,17 +436,7 @@ fn show(outcome: &Outcome, format: TableFormat) -> io::Result<()> {
         return print_json(outcome);
     }
     let mut out = io::stdout().lock();
-    let mut table = text::table(
-        &[
-            "scene",
-            "path",
-            "structure",
-            "volumes",
-            "verdicts",
-            "status",
-        ],
-        &[3, 4],
-    );
+    let mut table = Table::of("scene | path | structure | >volumes | >verdicts | status");
     for check in &outcome.checks {
         table.add_row([
             check.scene.clone(),

@@ -76,8 +76,8 @@ fn answer(registry: &Registry, request: &Request) -> anyhow::Result<()> {
         (Job::Funnel(plan, timing), Command::Funnel(args)) => {
             here.times(&|stop| funnel::time(registry, &args, plan, timing, stop))?;
         }
-        (Job::Drift(plan, process), Command::Drift(args)) => {
-            here.times(&|stop| Ok(drift::time(&args, plan, *process, stop)))?;
+        (Job::Drift(plan, timing), Command::Drift(args)) => {
+            here.times(&|stop| Ok(drift::time(&args, plan, timing, stop)))?;
         }
         _ => anyhow::bail!("a job of another command"),
     }

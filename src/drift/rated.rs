@@ -86,12 +86,19 @@ pub fn rated(
     with_front((first..).zip(rows).map(row).collect())
 }
 
-/// Ranks by time, shared where a paired test over the processes does not tell two
-/// apart.
-fn places(rows: &[&Row]) -> Vec<usize> {
-    let values: Vec<Vec<f64>> = rows.iter().map(|row| row.ln_ns.clone()).collect();
-    let placed = ranks(&values, ALPHA).into_iter();
-    placed.map(|placed| placed.rank).collect()
+/// The rows that none is faster than by a paired test over the processes, the most
+/// precise first.
+pub fn fastest<'r, R>(
+    rows: &[&'r R],
+    ln_ns: fn(&R) -> &Vec<f64>,
+    error: fn(&R) -> f64,
+) -> Vec<&'r R> {
+    let values: Vec<Vec<f64>> = rows.iter().map(|row| ln_ns(row).clone()).collect();
+    let placed = ranks(&values, ALPHA).into_iter().zip(rows);
+    let first = placed.filter(|(rank, _)| *rank == 1);
+    let mut fastest: Vec<&R> = first.map(|(_, row)| *row).collect();
+    fastest.sort_by(|a, b| error(a).total_cmp(&error(b)));
+    fastest
 }
 
 /// Fills in who dominates whom. What has no error that is finite is left out:
@@ -129,15 +136,9 @@ pub fn front(values: &[[f64; 2]], ln_ns: &[&[f64]]) -> Vec<Option<Dominated>> {
 /// Of the methods that are good enough and that none is faster than, the most precise.
 pub fn cheapest(rows: &[Row], rule: &str) -> Recommendation {
     let good: Vec<&Row> = rows.iter().filter(|row| row.rated.qualifies).collect();
-    let fastest = places(&good).into_iter().zip(&good);
-    let fastest = fastest.filter(|(place, _)| *place == 1);
-    let mut fastest: Vec<&Rated> = fastest.map(|(_, row)| &row.rated).collect();
-    fastest.sort_by(|a, b| {
-        a.error
-            .partial_cmp(&b.error)
-            .unwrap_or(std::cmp::Ordering::Equal)
-    });
-    let as_fast: Vec<&str> = fastest.iter().skip(1).map(|rated| rated.name).collect();
+    let error = |row: &Row| row.rated.error.unwrap_or(f64::INFINITY);
+    let fastest = fastest(&good, |row| &row.ln_ns, error);
+    let as_fast: Vec<&str> = fastest.iter().skip(1).map(|row| row.rated.name).collect();
     let reason = match (fastest.len(), good.len()) {
         (0, _) => format!("no method has {rule}"),
         (1, good) => format!("the cheapest of {good} methods with {rule}"),
@@ -147,7 +148,7 @@ pub fn cheapest(rows: &[Row], rule: &str) -> Recommendation {
         ),
     };
     Recommendation {
-        name: fastest.first().map(|rated| rated.name),
+        name: fastest.first().map(|row| row.rated.name),
         as_fast,
         reason,
     }

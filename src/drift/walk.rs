@@ -45,12 +45,7 @@ pub struct Repeated {
 impl Repeated {
     pub fn new(units: f64, run: impl Fn() + 'static) -> Repeated {
         Repeated {
-            task: TimedTask {
-                ask: Box::new(move |_, _| run()),
-                ask_many: None,
-                expected: vec![0; QUERIES],
-                least_ns: None,
-            },
+            task: TimedTask::new(vec![0; QUERIES], move |_, _| run()),
             units,
         }
     }

@@ -43,26 +43,14 @@ impl Material<'_> {
 }
 
 /// All bounds, in the order in which they are shown.
-pub static BOUNDS: &[Bound] = &[
-    Bound {
-        name: "bound-read",
-        summary: "reads the bounds of all items once, 24 bytes each, and decides nothing",
-        ratio: "times_read",
-        make: read,
-    },
-    Bound {
-        name: "bound-memcpy",
-        summary: "copies as many ids as are visible, 4 bytes each, in one piece",
-        ratio: "times_memcpy",
-        make: memcpy,
-    },
-    Bound {
-        name: "bound-replay",
-        summary: "reads the blocks and copies the ids that 'wide' does, and decides nothing",
-        ratio: "times_replay",
-        make: replay,
-    },
-];
+pub static BOUNDS: &[Bound] = rows! { Bound { name, summary, ratio, make }
+    "bound-read", "reads the bounds of all items once, 24 bytes each, and decides nothing",
+        "times_read", read;
+    "bound-memcpy", "copies as many ids as are visible, 4 bytes each, in one piece",
+        "times_memcpy", memcpy;
+    "bound-replay", "reads the blocks and copies the ids that 'wide' does, and decides nothing",
+        "times_replay", replay;
+};
 
 /// A pass over the blocks as a kernel does it.
 struct Read<'a>(&'a BoxBlocks);
@@ -79,13 +67,11 @@ impl Work for Read<'_> {
 fn read<'a>(material: &Material<'a>) -> Option<TimedTask<'a>> {
     let blocks = blocks_of(&material.workload.items);
     let kernel = material.kernel();
-    (!blocks.is_empty()).then(|| TimedTask {
-        ask: Box::new(move |_, _| {
+    let expected = vec![0; material.visible.len()];
+    (!blocks.is_empty()).then(|| {
+        TimedTask::new(expected, move |_, _| {
             std::hint::black_box(kernel.run(Read(&blocks)));
-        }),
-        ask_many: None,
-        expected: vec![0; material.visible.len()],
-        least_ns: None,
+        })
     })
 }
 
@@ -109,14 +95,11 @@ fn memcpy<'a>(material: &Material<'a>) -> Option<TimedTask<'a>> {
         None => 0,
     };
     let starts: Vec<usize> = lengths.iter().enumerate().map(start).collect();
-    lengths.iter().any(|&length| length > 0).then(|| TimedTask {
-        expected: material.visible.to_vec(),
-        ask: Box::new(move |place, out| {
+    lengths.iter().any(|&length| length > 0).then(|| {
+        TimedTask::new(material.visible.to_vec(), move |place, out| {
             let start = starts[place];
             out.extend_from_slice(&ids[start..start + lengths[place]]);
-        }),
-        ask_many: None,
-        least_ns: None,
+        })
     })
 }
 
@@ -132,12 +115,8 @@ fn replay<'a>(material: &Material<'a>) -> Option<TimedTask<'a>> {
     let traces: Vec<Trace> = views
         .map(|view| each_volume!(view.as_any(), volume => Trace::of(&tree, volume)))
         .collect();
-    Some(TimedTask {
-        expected: material.visible.to_vec(),
-        ask: Box::new(move |place, out| traces[place].replay(&tree, out)),
-        ask_many: None,
-        least_ns: None,
-    })
+    let replay = move |place: usize, out: &mut Vec<_>| traces[place].replay(&tree, out);
+    Some(TimedTask::new(material.visible.to_vec(), replay))
 }
 
 /// Spreads consecutive places: multiples of 2^32 / golden ratio (Knuth, TAOCP

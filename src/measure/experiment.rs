@@ -121,20 +121,12 @@ impl Plan {
 
     /// The key of the group that a question is on a scene.
     pub fn key(&self, scene: &PlannedScene, question: &Question) -> GroupKey {
-        let Question {
-            path,
-            cold,
-            culling,
-        } = question;
-        GroupKey {
-            scene: scene.source.clone(),
-            path: path.clone(),
-            cache: if *cold { "cold" } else { "warm" }.to_owned(),
-            test: culling.test.name().to_owned(),
-            arithmetic: culling.arithmetic.name().to_owned(),
-            planes: culling.planes.method.name().to_owned(),
-            epsilon: culling.planes.epsilon,
-        }
+        GroupKey::of(
+            &scene.source,
+            &question.path,
+            question.cold,
+            &question.culling,
+        )
     }
 
     /// All groups of cells that are compared with each other, in the order in
@@ -450,7 +442,7 @@ mod tests {
         for (_, group) in &groups {
             assert!(group.twin.as_ref().is_some_and(|(label, _)| label == "bvh"));
             for cell in &group.cells {
-                assert_eq!(cell.verdict.status, super::super::Status::Ok);
+                assert_eq!(cell.status, super::super::Status::Ok);
             }
         }
         let (first, mut keep) = (&plan.scenes[0], |_, _| {

@@ -436,17 +436,13 @@ impl<'a> Entry<'a> {
         let counted = self.counted.as_ref().filter(|_| self.runs());
         SubjectPart {
             label: self.subject.label(),
-            params: self.subject.spec.params.clone(),
-            kind: self.subject.spec.row.info.kind,
-            origin: self.subject.spec.row.info.origin.owned(),
-            verdict: self.verdict.clone(),
             build_ms: built.map(|b| b.build_ms),
             memory_bytes: built.map(|b| b.memory.total() as u64),
             update_ms: built.map(|b| b.update_ms.clone()).unwrap_or_default(),
-            refitted_ln: None,
             counts: counted
                 .map(|c| counts(c, workload.scene.items.len()))
                 .unwrap_or_default(),
+            ..SubjectPart::unknown(&self.subject.spec, self.verdict.clone())
         }
     }
 }

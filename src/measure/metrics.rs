@@ -85,7 +85,7 @@ pub struct Metric {
 pub(super) struct Metrics(pub(super) BTreeMap<String, Metric>);
 
 impl Metrics {
-    fn insert(&mut self, name: &str, value: f64, interval: Option<(f64, f64)>) {
+    pub(super) fn insert(&mut self, name: &str, value: f64, interval: Option<(f64, f64)>) {
         let info = METRICS.iter().find(|m| m.name == name);
         debug_assert!(info.is_some(), "{name} is not in the list of metrics");
         // A missing value is absent, never 0 and never NaN.
@@ -108,14 +108,6 @@ impl Metrics {
         if let Some(value) = value {
             self.set(name, value);
         }
-    }
-
-    pub(super) fn ratio(&mut self, name: &str, sum: f64, count: f64) {
-        self.set(name, sum / count);
-    }
-
-    pub(super) fn interval(&mut self, name: &str, value: f64, interval: Option<(f64, f64)>) {
-        self.insert(name, value, interval);
     }
 
     /// An interval that is not known is NaN on both sides, and absent here.

@@ -4,10 +4,11 @@
 //!
 //! The pipeline of every measurement: [`Workload`] (scene, views, points) ->
 //! [`Subject`]s (built structures) -> [`count_pass`] -> [`timed_rounds`] ->
-//! [`Cell`]s with named metrics. [`BOUNDS`] take part in the timed rounds only.
+//! [`ReportCell`]s with named metrics. [`BOUNDS`] take part in the timed rounds only.
 
 mod answer;
 mod bounds;
+mod cell;
 mod clock;
 mod cold;
 mod count;
@@ -37,6 +38,7 @@ use crate::verify::Fault;
 
 pub use answer::{Answer, id_sum};
 pub use bounds::{BOUNDS, Bound, Material};
+pub use cell::{CellTimes, ReportCell, SamplesRef};
 pub use clock::{Lap, Stopwatch};
 pub use count::{Counted, Judged, count_pass, judge};
 pub use environment::{Machine, Source, Toolchain};
@@ -51,7 +53,7 @@ pub use notice::{Notice, TIMING};
 pub use over_processes::{OverProcesses, ProcessTimes};
 pub use part::{Known, NamedSchedule, Part, SubjectPart, TaskPart, TaskSamples};
 pub use question::{PathInfo, SceneInfo};
-pub use results::{Cell, CellTimes, Group, YARDSTICK, measure_group};
+pub use results::{Group, YARDSTICK, measure_group};
 pub use schedule::{CLOCK_NS, Protocol, Schedule, TaskPlan, cameras_within};
 pub use subject::{Built, Subject};
 pub use task::{Ask, AskMany, TaskKind, TimedTask};

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::index::{Kind, Origin};
+use crate::index::{Kind, Origin, StructureSpec};
 
 use super::{
     Answer, GroupKey, Judged, PathInfo, Sample, SceneInfo, Schedule, Status, TaskKind, Verdict,
@@ -115,6 +115,24 @@ pub struct Part {
     pub bounds: Vec<String>,
     /// Tasks in the order of the schedules.
     pub tasks: Vec<TaskPart>,
+}
+
+impl SubjectPart {
+    /// Of a structure that was not looked at.
+    pub fn unknown(spec: &StructureSpec, verdict: Verdict) -> SubjectPart {
+        SubjectPart {
+            label: spec.label.clone(),
+            params: spec.params.clone(),
+            kind: spec.row.info.kind,
+            origin: spec.row.info.origin.owned(),
+            verdict,
+            build_ms: None,
+            memory_bytes: None,
+            update_ms: Vec::new(),
+            refitted_ln: None,
+            counts: BTreeMap::new(),
+        }
+    }
 }
 
 impl Part {

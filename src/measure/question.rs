@@ -4,11 +4,12 @@
 use serde::{Deserialize, Serialize};
 
 use super::{GroupKey, Workload};
+use crate::culling::Culling;
 use crate::path;
 use crate::scene::Scene;
 
 /// The scene of a cell.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct SceneInfo {
@@ -35,13 +36,7 @@ impl SceneInfo {
     pub fn unknown(name: &str) -> SceneInfo {
         SceneInfo {
             name: name.to_owned(),
-            total_count: 0,
-            region_count: 0,
-            origin: [0.0; 3],
-            bounds_min: [0.0; 3],
-            bounds_max: [0.0; 3],
-            skipped_items: 0,
-            digest: String::new(),
+            ..SceneInfo::default()
         }
     }
 
@@ -99,20 +94,29 @@ impl PathInfo {
 
     /// The facts of a workload along the path of this name.
     pub fn of(path: &str, workload: &Workload, cold: bool) -> PathInfo {
-        let culling = &workload.culling;
+        let key = GroupKey::of(&workload.scene.name, path, cold, &workload.culling);
         PathInfo {
-            name: path.to_owned(),
             camera_count: workload.cameras.len(),
-            cache: if cold { "cold" } else { "warm" }.to_owned(),
-            planes: culling.planes.method.name().to_owned(),
-            epsilon: culling.planes.epsilon,
-            arithmetic: culling.arithmetic.name().to_owned(),
             digest: Some(path::digest(&workload.cameras)),
+            ..PathInfo::unknown(&key)
         }
     }
 }
 
 impl GroupKey {
+    /// The key of what is asked of a scene along a path.
+    pub fn of(scene: &str, path: &str, cold: bool, culling: &Culling) -> GroupKey {
+        GroupKey {
+            scene: scene.to_owned(),
+            path: path.to_owned(),
+            cache: if cold { "cold" } else { "warm" }.to_owned(),
+            test: culling.test.name().to_owned(),
+            arithmetic: culling.arithmetic.name().to_owned(),
+            planes: culling.planes.method.name().to_owned(),
+            epsilon: culling.planes.epsilon,
+        }
+    }
+
     /// The key of a path's queries by a culling test.
     pub fn new(scene: &str, path: &PathInfo, test: &str) -> GroupKey {
         GroupKey {

@@ -45,11 +45,11 @@ pub(super) fn refitted_ln(
     if answers(refitted.as_ref())? != expected {
         return None;
     }
-    let tasks = [&refitted, &rebuilt].map(|index| TimedTask {
-        ask: Box::new(|camera, out| index.query(workload.views[camera].as_any(), out)),
-        ask_many: None,
-        expected: expected.iter().map(|answer| answer.count).collect(),
-        least_ns: None,
+    let tasks = [&refitted, &rebuilt].map(|index| {
+        let counts = expected.iter().map(|answer| answer.count).collect();
+        TimedTask::new(counts, |camera, out| {
+            index.query(workload.views[camera].as_any(), out);
+        })
     });
     let few = Protocol {
         rounds: [ROUNDS, ROUNDS],

@@ -5,7 +5,6 @@
 
 use std::collections::BTreeMap;
 
-use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::bounds::{BOUNDS, Bound};
@@ -15,10 +14,9 @@ use super::part::{Known, Part, SubjectPart, TaskPart};
 use super::subject::TWIN;
 use super::update::MOST_UPDATED;
 use super::{
-    Judged, PathInfo, Protocol, SceneInfo, Status, Subject, TaskKind, UPDATE_SHARES, Verdict,
-    Workload,
+    CellTimes, Judged, PathInfo, Protocol, ReportCell, SceneInfo, Status, Subject, TaskKind,
+    UPDATE_SHARES, Verdict, Workload,
 };
-use crate::index::{Kind, Origin};
 use crate::statistics::{
     ALPHA, Estimate, interquartile_mean, median, one_run, quantile, ranks, ratio, sorted,
 };
@@ -34,57 +32,13 @@ const UPDATE_METRICS: [&str; UPDATE_SHARES.len()] = [
 /// The structure that speed-ups refer to.
 pub const YARDSTICK: &str = "linear";
 
-/// One structure in one group.
-#[derive(Clone, PartialEq, Debug)]
-#[non_exhaustive]
-pub struct Cell {
-    /// Label of the structure or name of the lower bound.
-    pub structure: String,
-    /// As the structure declares; `None` for a lower bound.
-    pub declared: Option<(Kind, Origin)>,
-    /// Parameters of the structure, defaults included; null for a lower bound.
-    pub params: Value,
-    /// How building, counting and timing ended.
-    pub verdict: Verdict,
-    /// Fastest first; structures that no test tells apart share a rank. `None`
-    /// where there is no time.
-    pub rank: Option<usize>,
-    /// By name; a metric that was not measured is not there.
-    pub metrics: BTreeMap<String, Metric>,
-    /// What the metrics of time were made from.
-    pub times: CellTimes,
-    /// The errors behind the metrics, as totals.
-    pub judged: Option<Judged>,
-    /// What was not measured of it, and why.
-    pub left_out: Vec<String>,
-}
-
-/// What the times of a cell rest on.
-#[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
-#[cfg_attr(test, derive(schemars::JsonSchema))]
-#[non_exhaustive]
-pub struct CellTimes {
-    /// Processes that were timed; an interval needs three or more.
-    pub processes: usize,
-    /// Rounds in each process.
-    pub rounds: usize,
-    /// Cameras in the timed pass.
-    pub cameras_timed: usize,
-    /// Cameras whose answers were compared with the reference.
-    pub cameras_checked: usize,
-    /// Queries per clock reading.
-    pub batch: usize,
-    /// By metric: the time in each process, ns.
-    pub by_process: BTreeMap<String, Vec<f64>>,
-}
-
 /// All cells of a group, with what was measured beside them.
 #[non_exhaustive]
 pub struct Group {
     /// Structures in the order of the plan.
-    pub cells: Vec<Cell>,
+    pub cells: Vec<ReportCell>,
     /// Lower bounds: no structures, never ranked.
-    pub bounds: Vec<Cell>,
+    pub bounds: Vec<ReportCell>,
     /// Structure and ratio of the one that was entered twice: 1 is to lie in
     /// the interval.
     pub twin: Option<(String, Metric)>,
@@ -127,7 +81,7 @@ impl Group {
     pub fn of(parts: &[Part]) -> Group {
         let facts = Facts::of(parts);
         let first = &parts[0];
-        let mut cells: Vec<Cell> = first
+        let mut cells: Vec<ReportCell> = first
             .subjects
             .iter()
             .filter(|s| !s.label.ends_with(TWIN))
@@ -251,7 +205,7 @@ impl<'p> Facts<'p> {
         self.parts.iter().find_map(|part| part.known.as_ref())
     }
 
-    fn cell(&self, subject: &SubjectPart) -> Cell {
+    fn cell(&self, subject: &SubjectPart) -> ReportCell {
         let label = subject.label.as_str();
         let verdict = self.verdict(label);
         let right = verdict.status == Status::Ok;
@@ -273,36 +227,44 @@ impl<'p> Facts<'p> {
                 metrics.estimate(bound.ratio, self.ratio(label, bound.name));
             }
         }
-        Cell {
-            structure: label.to_owned(),
-            declared: Some((subject.kind, subject.origin.clone())),
+        let left_out = right.then(|| self.left_out(label));
+        ReportCell {
+            kind: Some(subject.kind),
+            origin: Some(subject.origin.clone()),
             params: subject.params.clone(),
-            rank: None,
-            times: self.times(label),
-            metrics: metrics.0,
-            judged,
-            left_out: if right {
-                self.left_out(label)
-            } else {
-                Vec::new()
-            },
-            verdict,
+            error: judged,
+            left_out: left_out.unwrap_or_default(),
+            ..self.timed(label, verdict, metrics)
         }
     }
 
-    fn bound(&self, name: &str) -> Cell {
+    fn bound(&self, name: &str) -> ReportCell {
         let mut metrics = Metrics::default();
         self.time_metrics(&mut metrics, name);
-        Cell {
-            structure: name.to_owned(),
-            declared: None,
+        self.timed(name, self.verdict(name), metrics)
+    }
+
+    /// A cell with what structures and lower bounds have in common.
+    fn timed(&self, label: &str, verdict: Verdict, metrics: Metrics) -> ReportCell {
+        let Part {
+            scene, path, key, ..
+        } = &self.parts[0];
+        ReportCell {
+            scene: scene.clone(),
+            path: path.clone(),
+            structure: label.to_owned(),
+            kind: None,
+            origin: None,
             params: Value::Null,
-            verdict: self.verdict(name),
+            test: key.test.clone(),
+            status: verdict.status,
+            reason: verdict.reason,
             rank: None,
-            times: self.times(name),
+            times: self.times(label),
             metrics: metrics.0,
-            judged: None,
+            error: None,
             left_out: Vec::new(),
+            samples_ref: None,
         }
     }
 
@@ -387,7 +349,7 @@ impl<'p> Facts<'p> {
         let items = self.parts[0].scene.total_count as f64;
         let bytes = self.subjects(label).find_map(|s| s.memory_bytes);
         if let Some(bytes) = bytes {
-            metrics.ratio("memory_bytes_per_item", bytes as f64, items);
+            metrics.set("memory_bytes_per_item", bytes as f64 / items);
         }
     }
 
@@ -403,15 +365,15 @@ impl<'p> Facts<'p> {
             let Some(shown) = one_run(reference, own) else {
                 continue;
             };
-            metrics.interval(time, shown.value, shown.lower.zip(shown.upper));
+            metrics.insert(time, shown.value, shown.lower.zip(shown.upper));
             if let (TaskKind::Query, Some(visible)) = (task, self.visible_when_timed()) {
                 let interval = shown.lower.zip(shown.upper);
                 let interval = interval.map(|(lower, upper)| (lower / visible, upper / visible));
-                metrics.interval("ns_per_visible", shown.value / visible, interval);
+                metrics.insert("ns_per_visible", shown.value / visible, interval);
             }
             if let (Some(speedup), true) = (speedup, self.has_yardstick) {
                 let interval = shown.speedup_lower.zip(shown.speedup_upper);
-                metrics.interval(speedup, shown.speedup, interval);
+                metrics.insert(speedup, shown.speedup, interval);
             }
         }
         let queries = || self.tasks(label, TaskKind::Query);
@@ -482,7 +444,7 @@ impl<'p> Facts<'p> {
     }
 
     /// The ranks of those cells that have times of a task.
-    fn ranks(&self, cells: &[Cell], task: TaskKind) -> Vec<(usize, usize)> {
+    fn ranks(&self, cells: &[ReportCell], task: TaskKind) -> Vec<(usize, usize)> {
         let Some(reference) = self.reference(task) else {
             return Vec::new();
         };
@@ -490,13 +452,12 @@ impl<'p> Facts<'p> {
         let mut values = Vec::new();
         for (i, cell) in cells.iter().enumerate() {
             let own = self.log(&cell.structure, task);
-            if let (Some(own), Status::Ok) = (own, cell.verdict.status) {
+            if let (Some(own), Status::Ok) = (own, cell.status) {
                 ranked.push(i);
                 values.push(own.iter().zip(reference).map(|(own, r)| own - r).collect());
             }
         }
-        let ranks = ranks(&values, ALPHA).into_iter().map(|placed| placed.rank);
-        ranked.into_iter().zip(ranks).collect()
+        ranked.into_iter().zip(ranks(&values, ALPHA)).collect()
     }
 }
 
@@ -514,7 +475,7 @@ fn error_metrics(metrics: &mut Metrics, judged: &Judged) {
     let (errors, queries) = (&judged.errors, judged.judged_queries as f64);
     metrics.set("judged_queries", queries);
     if let Some(excess) = errors.excess() {
-        metrics.interval("excess", excess, judged.excess_interval.map(Into::into));
+        metrics.insert("excess", excess, judged.excess_interval.map(Into::into));
     }
     for (name, count) in [
         ("false_positive_count", errors.false_positives),
@@ -522,7 +483,7 @@ fn error_metrics(metrics: &mut Metrics, judged: &Judged) {
         ("touch_dropped_count", errors.touch_dropped),
         ("undecided_count", errors.undecided),
     ] {
-        metrics.ratio(name, count as f64, queries);
+        metrics.set(name, count as f64 / queries);
     }
     metrics.set("worst_miss", errors.worst_miss);
 }

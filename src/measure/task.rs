@@ -44,6 +44,16 @@ pub struct TimedTask<'a> {
 }
 
 impl<'a> TimedTask<'a> {
+    /// One that is asked query by query, and of which nothing was counted.
+    pub fn new(expected: Vec<u64>, ask: impl Fn(usize, &mut Vec<ItemId>) + 'a) -> Self {
+        TimedTask {
+            ask: Box::new(ask),
+            ask_many: None,
+            expected,
+            least_ns: None,
+        }
+    }
+
     /// A structure that counted right, asked a task of a workload.
     pub(super) fn of(
         task: TaskKind,

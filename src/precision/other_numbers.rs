@@ -19,14 +19,20 @@ use crate::query::{Predicate, QueryVolume};
 /// one opposite.
 pub trait PlaneForm: Copy + 'static {
     /// What the farthest corner evaluates to, as far as it takes no decision.
-    type Value: Copy;
+    type Value: Copy + Default + PartialOrd;
 
     fn normal_upper(&self) -> PVertexSigns;
     fn value(&self, far: [f32; 3], near: [f32; 3]) -> Self::Value;
     /// Whether the whole box lies outside, from [`PlaneForm::value`].
-    fn is_outside(&self, value: Self::Value, far: [f32; 3], near: [f32; 3]) -> bool;
+    #[inline(always)]
+    fn is_outside(&self, value: Self::Value, _far: [f32; 3], _near: [f32; 3]) -> bool {
+        value < Self::Value::default()
+    }
     /// Whether the whole box lies inside.
-    fn is_inside(&self, far: [f32; 3], near: [f32; 3]) -> bool;
+    #[inline(always)]
+    fn is_inside(&self, far: [f32; 3], near: [f32; 3]) -> bool {
+        self.value(near, far) >= Self::Value::default()
+    }
 }
 
 /// A view whose planes are all of one form. Without a constraint where a plane
@@ -40,6 +46,13 @@ impl<P: PlaneForm> Formed<P> {
     pub fn new(planes: impl IntoIterator<Item = P>) -> Formed<P> {
         let planes: Vec<P> = planes.into_iter().take(MAX_PLANES).collect();
         Formed { planes }
+    }
+
+    pub fn of<'p, F>(planes: &'p [F]) -> Formed<P>
+    where
+        P: From<&'p F>,
+    {
+        Formed::new(planes.iter().map(P::from))
     }
 
     #[inline(always)]
@@ -124,14 +137,6 @@ impl PlaneForm for Fused {
         let Plane { normal: n, d } = self.0;
         n.x.mul_add(far[0], n.y.mul_add(far[1], n.z.mul_add(far[2], d)))
     }
-    #[inline(always)]
-    fn is_outside(&self, value: f32, _: [f32; 3], _: [f32; 3]) -> bool {
-        value < 0.0
-    }
-    #[inline(always)]
-    fn is_inside(&self, far: [f32; 3], near: [f32; 3]) -> bool {
-        self.value(near, far) >= 0.0
-    }
 }
 
 /// An f32 plane in a processor that takes subnormal numbers for zero, operands
@@ -169,14 +174,6 @@ impl PlaneForm for Flushed {
         let [x, y, z] = far.map(flush);
         let sum = flush(flush(n.x * x) + flush(n.y * y));
         flush(flush(sum + flush(n.z * z)) + d)
-    }
-    #[inline(always)]
-    fn is_outside(&self, value: f32, _: [f32; 3], _: [f32; 3]) -> bool {
-        value < 0.0
-    }
-    #[inline(always)]
-    fn is_inside(&self, far: [f32; 3], near: [f32; 3]) -> bool {
-        self.value(near, far) >= 0.0
     }
 }
 
@@ -218,10 +215,6 @@ impl PlaneForm for CentreExtent {
     fn value(&self, far: [f32; 3], near: [f32; 3]) -> f32 {
         let [centre, reach] = self.parts(far, near);
         centre + reach
-    }
-    #[inline(always)]
-    fn is_outside(&self, value: f32, _: [f32; 3], _: [f32; 3]) -> bool {
-        value < 0.0
     }
     #[inline(always)]
     fn is_inside(&self, far: [f32; 3], near: [f32; 3]) -> bool {
@@ -391,10 +384,6 @@ impl PlaneForm for Interval {
     #[inline(always)]
     fn value(&self, far: [f32; 3], near: [f32; 3]) -> f64 {
         self.ends(far, near)[1]
-    }
-    #[inline(always)]
-    fn is_outside(&self, value: f64, _: [f32; 3], _: [f32; 3]) -> bool {
-        value < 0.0
     }
     #[inline(always)]
     fn is_inside(&self, far: [f32; 3], near: [f32; 3]) -> bool {

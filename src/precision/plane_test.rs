@@ -158,19 +158,10 @@ impl PlaneTest {
         let volume = || camera.volume(&options, around);
         let wide = || camera.convex_volume_f64(around);
         Ok(match numbers {
-            OtherNumbers::Fused => {
-                PointView::Fused(Formed::new(volume()?.planes().iter().map(Fused::from)))
-            }
-            OtherNumbers::Flushed => {
-                PointView::Flushed(Formed::new(volume()?.planes().iter().map(Flushed::from)))
-            }
-            OtherNumbers::CentreExtent => {
-                let planes = volume()?;
-                PointView::CentreExtent(Formed::new(planes.planes().iter().map(CentreExtent::from)))
-            }
-            OtherNumbers::DoubleDouble => PointView::DoubleDouble(Formed::new(
-                wide()?.planes().iter().map(DoubleDouble::from),
-            )),
+            OtherNumbers::Fused => PointView::Fused(Formed::of(volume()?.planes())),
+            OtherNumbers::Flushed => PointView::Flushed(Formed::of(volume()?.planes())),
+            OtherNumbers::CentreExtent => PointView::CentreExtent(Formed::of(volume()?.planes())),
+            OtherNumbers::DoubleDouble => PointView::DoubleDouble(Formed::of(wide()?.planes())),
             OtherNumbers::Interval => PointView::Interval(intervals(camera, around)?),
         })
     }

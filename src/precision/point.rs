@@ -1,7 +1,7 @@
 //! A point of the diagram: a structure with a culling, its errors and its time,
 //! and when one point dominates another. How it is measured is in `points`.
 
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 
 use super::judged::Judged;
 use super::plane_test::Names;
@@ -59,7 +59,6 @@ pub struct Point {
     #[serde(flatten)]
     pub names: Names,
     /// How building, counting and timing ended.
-    #[serde(serialize_with = "by_name")]
     pub status: Status,
     /// Why, where the status is not ok, or why it has no time.
     pub reason: Option<String>,
@@ -94,10 +93,6 @@ pub struct Point {
     /// worst miss.
     #[serde(skip)]
     samples: [Vec<f64>; 4],
-}
-
-fn by_name<S: Serializer>(status: &Status, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_str(status.name())
 }
 
 impl Point {

@@ -3,7 +3,7 @@
 //! each way finds for them, and how wrong that is.
 
 use glam::DVec3;
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 
 use super::judged::Shots;
 use super::point::Times;
@@ -39,7 +39,6 @@ pub struct RegionPoint {
     /// The numbers that points and regions are compared in.
     pub numbers: &'static str,
     /// How building, searching and timing ended.
-    #[serde(serialize_with = "by_name")]
     pub status: Status,
     /// Why, where the status is not ok.
     pub reason: Option<String>,
@@ -62,10 +61,6 @@ pub struct RegionPoint {
     pub is_tie: bool,
     /// Whether no row dominates it.
     pub on_front: bool,
-}
-
-fn by_name<S: Serializer>(status: &Status, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_str(status.name())
 }
 
 /// The points of every camera.

@@ -5,7 +5,7 @@
 //! and nothing is rebased.
 
 use glam::{DVec3, Vec3};
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 
 use super::plane_test::{Names, PlaneTest};
 use crate::camera::{Camera, Frame, Lens, PLANE_METHODS, PlaneOptions, Surroundings};
@@ -18,11 +18,14 @@ use crate::verify::{ErrorCount, Truth};
 
 named! {
     /// What is swept over.
-    #[derive(Clone, Copy, PartialEq, Eq, Debug)]
+    #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
+    #[serde(rename_all = "lowercase")]
     pub enum Sweep, SWEEPS {
         Offset = "offset", "distance of the world from zero along each axis";
         Scale = "scale", "size of the world, depth / 100";
+        #[serde(rename = "far/near")]
         FarOverNear = "far/near", "far / near";
+        #[serde(rename = "fov")]
         FieldOfView = "fov", "vertical field of view, degrees";
         Aspect = "aspect", "width / height";
         Up = "up", "angle between up and the direction of view, rad";
@@ -47,7 +50,6 @@ impl Sweep {
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct SweepRow {
     /// What is varied.
-    #[serde(serialize_with = "by_name")]
     pub sweep: Sweep,
     /// Its value, in the sweep's own unit.
     pub value: f64,
@@ -63,10 +65,6 @@ pub struct SweepRow {
     pub errors: ErrorCount,
     /// Why the planes cannot be made; null if they can.
     pub refused: Option<String>,
-}
-
-fn by_name<S: Serializer>(sweep: &Sweep, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_str(sweep.name())
 }
 
 /// Mean depth of the views of a world of size 1, and how many boxes each camera looks

@@ -238,24 +238,15 @@ impl<'a> Built<'a> {
 
     pub fn region_task<'b>(&'b self, way: &RegionWay<'b>, expected: Vec<u64>) -> TimedTask<'b> {
         let (index, numbers) = (way.index, way.numbers);
-        task(expected, move |n, out: &mut Vec<ItemId>| {
+        TimedTask::new(expected, move |n, out| {
             self.queries.ask(self.scene, numbers, index, n, out);
         })
-    }
-}
-
-fn task<'b>(expected: Vec<u64>, ask: impl Fn(usize, &mut Vec<ItemId>) + 'b) -> TimedTask<'b> {
-    TimedTask {
-        ask: Box::new(ask),
-        ask_many: None,
-        expected,
-        least_ns: None,
     }
 }
 
 impl<'b> Way<'b> {
     pub fn task(&self, expected: Vec<u64>) -> TimedTask<'b> {
         let (asked, judged) = (self.asked, self.judged);
-        task(expected, move |n, out| asked.see(judged, n, out))
+        TimedTask::new(expected, move |n, out| asked.see(judged, n, out))
     }
 }

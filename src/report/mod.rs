@@ -16,6 +16,7 @@ mod setting;
 mod stream;
 mod surface;
 
+pub use crate::measure::{ReportCell, SamplesRef};
 pub use changes::changes;
 pub use files::{FolderError, bare};
 pub use folder::{RunFolder, StoppedRun, save_report, temporary_in, write_atomically};
@@ -25,7 +26,7 @@ pub use judging::{
     work_changes,
 };
 pub use merge::{MergeError, Merged, merge};
-pub use model::{Noise, Report, ReportCell, RunInfo, SCHEMA_VERSION, SamplesRef, TwinEntry};
+pub use model::{Noise, Report, RunInfo, SCHEMA_VERSION, TwinEntry};
 pub use ranking::{Comparison, Ranked, comparisons, times_as_fast};
 pub use reading::{read_report, read_stream};
 pub use setting::{Setting, settings};

@@ -1,16 +1,9 @@
 //! report.json: one run with everything needed to judge it. Readers ignore
 //! unknown fields; the JSON Schema in docs/ is generated from these types.
 
-use std::collections::BTreeMap;
-
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 
-use crate::index::{Kind, Origin};
-use crate::measure::{
-    Cell, CellKey, CellTimes, GroupKey, Judged, Machine, Metric, PathInfo, SceneInfo, Source,
-    Status, Toolchain,
-};
+use crate::measure::{Machine, Metric, PathInfo, ReportCell, Source, Toolchain};
 use crate::statistics::geometric_mean;
 
 /// Raised when a field changes its meaning or goes away.
@@ -116,107 +109,6 @@ impl TwinEntry {
     /// Whether the interval holds 1; `None` without one.
     pub fn holds_one(&self) -> Option<bool> {
         Some(self.lower? <= 1.0 && 1.0 <= self.upper?)
-    }
-}
-
-/// A structure, or a lower bound, on one scene, path and test.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
-#[cfg_attr(test, derive(schemars::JsonSchema))]
-#[non_exhaustive]
-pub struct ReportCell {
-    /// The scene.
-    pub scene: SceneInfo,
-    /// The path, with caches, planes and arithmetic.
-    pub path: PathInfo,
-    /// Label of the structure or name of the bound.
-    pub structure: String,
-    /// As the structure declares; null for a bound and in older reports.
-    #[serde(default)]
-    pub kind: Option<Kind>,
-    /// Likewise.
-    #[serde(default)]
-    pub origin: Option<Origin>,
-    /// Parameters of the structure, defaults included.
-    pub params: Value,
-    /// Name of the culling test.
-    pub test: String,
-    /// How building, counting and timing ended.
-    pub status: Status,
-    /// Why, where the status is not ok.
-    pub reason: Option<String>,
-    /// Fastest first; cells that no test tells apart share a rank. Null where
-    /// there is no time.
-    #[serde(default)]
-    pub rank: Option<usize>,
-    /// What the metrics of time were made from.
-    #[serde(default)]
-    pub times: CellTimes,
-    /// By name; a metric that was not measured is not there.
-    pub metrics: BTreeMap<String, Metric>,
-    /// How the answers differ from the exact truth; null where nothing was
-    /// answered.
-    pub error: Option<Judged>,
-    /// What was not measured of an ok cell, each with its reason.
-    pub left_out: Vec<String>,
-    /// Where the samples of this cell are; null without samples.
-    pub samples_ref: Option<SamplesRef>,
-}
-
-/// The cell's rows in samples.csv: those that have its names.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
-#[cfg_attr(test, derive(schemars::JsonSchema))]
-#[non_exhaustive]
-pub struct SamplesRef {
-    /// Name of the file, beside the report.
-    pub file: String,
-    /// Number of the cell's rows.
-    pub rows: u64,
-}
-
-impl ReportCell {
-    /// A cell of a group, in the form that reports have.
-    pub fn new(
-        scene: &SceneInfo,
-        path: &PathInfo,
-        test: &str,
-        cell: Cell,
-        samples_ref: Option<SamplesRef>,
-    ) -> ReportCell {
-        ReportCell {
-            scene: scene.clone(),
-            path: path.clone(),
-            structure: cell.structure,
-            kind: cell.declared.as_ref().map(|d| d.0),
-            origin: cell.declared.map(|d| d.1),
-            rank: cell.rank,
-            times: cell.times,
-            params: cell.params,
-            test: test.to_owned(),
-            status: cell.verdict.status,
-            reason: cell.verdict.reason,
-            metrics: cell.metrics,
-            error: cell.judged,
-            left_out: cell.left_out,
-            samples_ref,
-        }
-    }
-
-    /// What the cell is found by in another report.
-    pub fn key(&self) -> CellKey {
-        CellKey {
-            group: GroupKey::new(&self.scene.name, &self.path, &self.test),
-            structure: self.structure.clone(),
-        }
-    }
-
-    /// Whether the structure looks at every item, as far as it is known.
-    pub fn is_scan(&self) -> bool {
-        self.kind == Some(Kind::Scan)
-    }
-
-    /// A metric's value, if the cell has it.
-    pub fn value(&self, metric: &str) -> Option<f64> {
-        self.metrics.get(metric).map(|m| m.value)
     }
 }
 

@@ -74,6 +74,32 @@ pub struct Difference {
 type Fact = (&'static str, fn(&Header) -> Option<String>);
 
 impl Header {
+    /// Of a plan that is begun here and now, by nobody who typed anything.
+    pub fn of(plan: &Plan, machine: Machine, id: String, started_at: String) -> Header {
+        Header {
+            schema_version: SCHEMA_VERSION,
+            run: RunInfo {
+                id,
+                started_at,
+                finished_at: None,
+                command: String::new(),
+                seed: plan.seed,
+                suite: None,
+                generator: GENERATOR_NAME.to_owned(),
+                processes: plan.effort.processes,
+                shard: None,
+            },
+            args: Vec::new(),
+            machine,
+            toolchain: Toolchain::capture(),
+            source: Source::capture(),
+            groups: plan.groups(),
+            whole: Vec::new(),
+            structures: plan.structures.iter().map(|s| s.label.clone()).collect(),
+            binary: None,
+        }
+    }
+
     /// The first thing that tells machine, build or program of two runs apart.
     pub fn differs_in_place(&self, other: &Header) -> Option<Difference> {
         const FACTS: [Fact; 19] = [
@@ -184,6 +210,15 @@ pub struct Stream {
 }
 
 impl Stream {
+    /// Of a run that was just begun.
+    pub fn of(header: Header) -> Stream {
+        Stream {
+            header,
+            parts: Vec::new(),
+            finished_at: None,
+        }
+    }
+
     /// Whether every process has measured every group.
     pub fn is_finished(&self) -> bool {
         let processes = self.header.run.processes;
@@ -244,9 +279,9 @@ impl Stream {
                     rows,
                 })
             };
-            let cell = |cell: crate::measure::Cell| {
-                let rows = rows(&cell.structure);
-                ReportCell::new(&first.scene, &first.path, &key.test, cell, rows)
+            let cell = |cell: ReportCell| ReportCell {
+                samples_ref: rows(&cell.structure),
+                ..cell
             };
             report.cells.extend(group.cells.into_iter().map(cell));
             report.bounds.extend(group.bounds.into_iter().map(cell));
@@ -292,32 +327,9 @@ impl Stream {
 /// ```
 pub fn run_here(plan: &Plan, stop: &dyn Fn() -> bool) -> Result<Option<Report>, ExperimentError> {
     let started_at = utc(SystemTime::now());
-    let mut stream = Stream {
-        header: Header {
-            schema_version: SCHEMA_VERSION,
-            run: RunInfo {
-                id: started_at.clone(),
-                started_at,
-                finished_at: None,
-                command: String::new(),
-                seed: plan.seed,
-                suite: None,
-                generator: GENERATOR_NAME.to_owned(),
-                processes: 1,
-                shard: None,
-            },
-            args: Vec::new(),
-            machine: Machine::capture(),
-            toolchain: Toolchain::capture(),
-            source: Source::capture(),
-            groups: plan.groups(),
-            whole: Vec::new(),
-            structures: plan.structures.iter().map(|s| s.label.clone()).collect(),
-            binary: None,
-        },
-        parts: Vec::new(),
-        finished_at: None,
-    };
+    let mut header = Header::of(plan, Machine::capture(), started_at.clone(), started_at);
+    header.run.processes = 1;
+    let mut stream = Stream::of(header);
     for planned in &plan.scenes {
         let share = Share::first(plan.questions(planned).len());
         let mut keep = |part: Part, _| {

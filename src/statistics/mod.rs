@@ -24,7 +24,7 @@ pub use judgement::{Change, Judgement, judge, resolved};
 pub use means::{geometric_mean, interquartile_mean};
 pub use one_run::{Estimate, Shown, one_run, ratio};
 pub use quantiles::{median, quantile, sorted};
-pub use ranking::{ALPHA, Placed, is_less, ranks};
+pub use ranking::{ALPHA, is_less, ranks};
 pub use rate::{Rate, rate, shows_less, shows_less_in_sum};
 pub use slope::slope;
 pub use speeds::two_speeds;

@@ -1,52 +1,34 @@
 //! Ranks of structures that ran in the same processes.
 
-use serde::{Deserialize, Serialize};
-
 use super::trimmed::{centre, paired_difference};
 
 /// Level at which two are told apart.
 pub const ALPHA: f64 = 0.05;
 
-/// The rank of one structure.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
-pub struct Placed {
-    /// 1 is the fastest; two that share rank 1 are followed by rank 3.
-    pub rank: usize,
-    /// Whether another structure has the same rank.
-    pub tie: bool,
-}
-
-/// Ranks structures by their trimmed means, smallest first. Per structure: one
-/// value per process, all from the same processes, paired by index.
+/// Ranks structures by their trimmed means: 1 is the smallest; two that share rank 1
+/// are followed by rank 3. Per structure: one value per process, all from the same
+/// processes, paired by index.
 ///
 /// A structure shares the rank of the fastest of that rank unless Yuen's paired
 /// test over the processes tells the two apart (two-sided, `alpha`). Under three
 /// processes nothing can be tested, and each has a rank of its own by order.
 /// Equal means are ordered by index, a structure with no values or with one
 /// that is not finite comes last: the ranks are the same for the same input.
-pub fn ranks(values: &[Vec<f64>], alpha: f64) -> Vec<Placed> {
+pub fn ranks(values: &[Vec<f64>], alpha: f64) -> Vec<usize> {
     let means: Vec<f64> = values
         .iter()
         .map(|values| centre(values).unwrap_or(f64::INFINITY))
         .collect();
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|&a, &b| means[a].total_cmp(&means[b]));
-    let (rank, tie) = (0, false);
-    let mut placed = vec![Placed { rank, tie }; values.len()];
+    let mut ranks = vec![0; values.len()];
     let mut leader: Option<(usize, usize)> = None;
-    for (position, &i) in order.iter().enumerate() {
-        match leader {
-            Some((first, rank)) if !told_apart(&values[first], &values[i], alpha) => {
-                placed[i] = Placed { rank, tie: true };
-                placed[first].tie = true;
-            }
-            _ => {
-                placed[i].rank = position + 1;
-                leader = Some((i, position + 1));
-            }
-        }
+    for (&i, place) in order.iter().zip(1..) {
+        let shared = leader.filter(|(first, _)| !told_apart(&values[*first], &values[i], alpha));
+        leader = shared.or(Some((i, place)));
+        ranks[i] = leader.map_or(place, |(_, rank)| rank);
     }
-    placed
+    ranks
 }
 
 /// Whether a paired test over the processes finds `a` less than `b` (Yuen's,
@@ -68,11 +50,6 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn found(values: &[Vec<f64>]) -> Vec<(usize, bool)> {
-        let pairs = ranks(values, 0.05).into_iter();
-        pairs.map(|placed| (placed.rank, placed.tie)).collect()
-    }
-
     #[test]
     fn ranks_are_shared_unless_the_processes_tell_them_apart() {
         // Processes differ far more than the structures within them.
@@ -83,12 +60,11 @@ mod tests {
             values.map(|(p, b)| b + shift + swing(p)).collect()
         };
         let values = [noisy(0.5, 0.0), base.clone(), noisy(0.01, 0.3)];
-        assert_eq!(found(&values), [(3, false), (1, true), (1, true)]);
+        assert_eq!(ranks(&values, 0.05), [3, 1, 1]);
         // One process: by order. A structure that did not run comes last.
         let values = [vec![2.0], vec![1.0], vec![], vec![1.0]];
-        let wanted = [(3, false), (1, false), (4, false), (2, false)];
-        assert_eq!(found(&values), wanted);
-        assert_eq!(found(&[]), []);
+        assert_eq!(ranks(&values, 0.05), [3, 1, 4, 2]);
+        assert_eq!(ranks(&[], 0.05), [0; 0]);
     }
 
     #[test]
@@ -111,12 +87,10 @@ mod tests {
             let placed = ranks(&rows, 0.05);
             let means: Vec<f64> = rows.iter().map(|row| centre(row).unwrap()).collect();
             for (i, a) in placed.iter().enumerate() {
-                let before = placed.iter().filter(|b| b.rank < a.rank).count();
-                prop_assert_eq!(a.rank, before + 1);
-                let sharing = placed.iter().filter(|b| b.rank == a.rank).count();
-                prop_assert_eq!(a.tie, sharing > 1);
+                let before = placed.iter().filter(|b| *b < a).count();
+                prop_assert_eq!(*a, before + 1);
                 for (k, b) in placed.iter().enumerate() {
-                    prop_assert!(a.rank >= b.rank || means[i] <= means[k]);
+                    prop_assert!(a >= b || means[i] <= means[k]);
                 }
             }
         }

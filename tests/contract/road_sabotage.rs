@@ -132,11 +132,11 @@ fn statuses(workload: &Workload, subjects: &[Subject]) -> Vec<Status> {
     let group = measure_group(workload, subjects, &[], &protocol(), &|| false);
     let cells = group.expect("not stopped").cells;
     for cell in &cells {
-        let is_ok = cell.verdict.status == Status::Ok;
+        let is_ok = cell.status == Status::Ok;
         assert_eq!(cell.rank.is_some(), is_ok, "{cell:?}");
         assert_eq!(cell.metrics.contains_key("query_ns"), is_ok, "{cell:?}");
     }
-    cells.iter().map(|cell| cell.verdict.status).collect()
+    cells.iter().map(|cell| cell.status).collect()
 }
 
 /// What one process hands over.
@@ -160,7 +160,7 @@ fn part(process: u32, known: Option<&Known>) -> Part {
 
 fn of_parts(parts: &[Part]) -> Vec<Status> {
     let cells = cullbench::measure::Group::of(parts).cells;
-    cells.iter().map(|cell| cell.verdict.status).collect()
+    cells.iter().map(|cell| cell.status).collect()
 }
 
 #[test]

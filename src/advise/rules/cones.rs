@@ -7,9 +7,9 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::super::AdviseError;
 use super::super::case::Case;
 use super::super::omission::{By, Draft, Forced, LeftOutIf, Omission, Way};
+use super::super::rule::{Rule, Unfit, not_applicable};
 use super::hidden::{self, PROBED, PROBES, Removal};
 use crate::kernel::Kernel;
 use crate::measure::Ask;
@@ -20,7 +20,18 @@ use crate::visibility::triangle::{
     Clusters, Cone, MOST_TRIANGLES, SafeCones, Selection, TriangleCull, View,
 };
 
-pub(super) const NAME: &str = "cones";
+pub(super) const RULE: Rule = Rule {
+    name: "cones",
+    left_out: "normal cones of clusters of triangles",
+    advice: [
+        "no normal cones: draw every triangle of what is left",
+        "cull clusters that face away by their normal cones",
+    ],
+    statistic_name: "share of the triangles of the items in the view whose cluster faces away",
+    left_out_if: LeftOutIf::AtMost,
+    by: By::Rule,
+    prepare,
+};
 
 /// Items of a camera whose triangles are looked at, evenly spread.
 const MOST_ITEMS: usize = 1_024;
@@ -39,27 +50,16 @@ struct Seen {
     view: View,
 }
 
-pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> {
-    let omission = Omission::new(
-        NAME,
-        "normal cones of clusters of triangles",
-        [
-            "no normal cones: draw every triangle of what is left",
-            "cull clusters that face away by their normal cones",
-        ],
-        "share of the triangles of the items in the view whose cluster faces away",
-        LeftOutIf::AtMost,
-        By::Rule,
-    );
+fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfit> {
     if case.scene().item_shape() == ItemShape::Wall {
         let reason = "items are walls, without faces of their own";
-        return Ok(omission.because(reason).draft(Vec::new()));
+        return Err(not_applicable(reason));
     }
     let cameras = case.workload.views.len();
     let few = hidden::frames(cameras, PROBED).map(|frame| Seen::of(case, frame));
     let Ok(few) = few.collect::<Result<Vec<Seen>, NoRays>>() else {
         let reason = "cameras without rays of their own";
-        return Ok(omission.because(reason).draft(Vec::new()));
+        return Err(not_applicable(reason));
     };
     let sum = |of: fn(&Seen) -> usize| few.iter().map(of).sum::<usize>() as f64;
     let of_item = sum(|seen| seen.clusters.triangles.len()) / sum(|seen| seen.items.len());

@@ -2,13 +2,24 @@
 //! straightened drift by some 2e-8 a step. A frame that is made anew for each
 //! camera, or takes few steps, does not need it. Checked by walking.
 
-use super::super::AdviseError;
 use super::super::case::Case;
 use super::super::omission::{By, Draft, LeftOutIf, Omission};
+use super::super::rule::{Rule, Unfit, not_applicable};
 use crate::drift::{Rated, rotations};
 use crate::statistics::Estimate;
 
-pub(super) const NAME: &str = "frame-correction";
+pub(super) const RULE: Rule = Rule {
+    name: "frame-correction",
+    left_out: "correcting an f32 camera frame between steps",
+    advice: [
+        "no need to correct an f32 camera frame between steps",
+        "correct an f32 camera frame between steps",
+    ],
+    statistic_name: "drift after all steps of the path, radians",
+    left_out_if: LeftOutIf::AtMost,
+    by: By::Rule,
+    prepare,
+};
 
 /// What an f32 frame drifts by a step: docs/NUMERICS.md.
 const DRIFT: f64 = 2e-8;
@@ -17,24 +28,13 @@ const MUCH_LESS: f64 = 0.1;
 const KEPT: &str = "f32-polar-100";
 const LEFT_OUT: &str = "f32";
 
-pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> {
-    let omission = Omission::new(
-        NAME,
-        "correcting an f32 camera frame between steps",
-        [
-            "no need to correct an f32 camera frame between steps",
-            "correct an f32 camera frame between steps",
-        ],
-        "drift after all steps of the path, radians",
-        LeftOutIf::AtMost,
-        By::Rule,
-    );
+fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfit> {
     let tolerance = case.options.tolerance;
     let steps = case.workload.cameras.len() as u64;
     let rated = rotations(&[KEPT, LEFT_OUT], steps, tolerance);
     let of = |name: &str| -> Option<&Rated> { rated.iter().find(|r| r.name == name) };
     let (Some(kept), Some(left_out)) = (of(KEPT), of(LEFT_OUT)) else {
-        return Ok(omission.because("no such method").draft(Vec::new()));
+        return Err(not_applicable("no such method"));
     };
     let walked = |rated: &Rated| match rated.error {
         Some(error) => format!("{error:.1e}"),

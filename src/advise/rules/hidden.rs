@@ -159,6 +159,7 @@ pub(super) fn draft<'c>(
 #[cfg(test)]
 mod tests {
     use super::super::super::omission::{Aside, By, Decision, LeftOutIf, check};
+    use super::super::super::rule::unsettled;
     use super::*;
 
     #[test]
@@ -173,7 +174,7 @@ mod tests {
     #[test]
     fn a_stage_is_left_out_where_it_takes_longer_than_what_it_saves() {
         let of = |with: f64, cost_ns: f64, predicted: f64| {
-            let rule = Omission::new("rule", "x", ["", ""], "y", LeftOutIf::AtMost, By::Rule);
+            let rule = unsettled(LeftOutIf::AtMost, By::Rule);
             let mut check = check(3.0, None);
             check.same_expected = false;
             let removal = Removal {
@@ -220,7 +221,7 @@ mod tests {
             cost_ns: 1.0,
             predicted: f64::NAN,
         };
-        let mut nothing = Omission::new("rule", "x", ["", ""], "y", LeftOutIf::AtMost, By::Rule);
+        let mut nothing = unsettled(LeftOutIf::AtMost, By::Rule);
         removal.weigh(&mut nothing, &check(3.0, None));
         assert_eq!((nothing.predicted, nothing.threshold), (None, None));
         assert!(nothing.reason.contains("no thing"), "{}", nothing.reason);

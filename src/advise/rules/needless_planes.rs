@@ -3,32 +3,32 @@
 
 use std::rc::Rc;
 
-use super::super::AdviseError;
 use super::super::case::Case;
 use super::super::omission::{By, Draft, Forced, LeftOutIf, Omission, Way};
+use super::super::rule::{Rule, Unfit};
 use crate::culling::CameraView;
 use crate::geometry::{Aabb, ConvexVolume, FrustumPlane};
 use crate::index::DynIndex;
 use crate::query::Predicate;
 use crate::shown::counted;
 
-pub(super) const NAME: &str = "needless-planes";
+pub(super) const RULE: Rule = Rule {
+    name: "needless-planes",
+    left_out: "planes that the whole scene is inside of",
+    advice: [
+        "skip the planes that the whole scene is inside of",
+        "test every plane: the scene reaches beyond them",
+    ],
+    statistic_name: "share of all planes that the n-vertex of the scene's bounds is inside of",
+    left_out_if: LeftOutIf::AtLeast,
+    by: By::Time,
+    prepare,
+};
 
 /// Share of the planes below which the saving is lost in noise.
 const THRESHOLD: f64 = 0.01;
 
-pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> {
-    let omission = Omission::new(
-        NAME,
-        "planes that the whole scene is inside of",
-        [
-            "skip the planes that the whole scene is inside of",
-            "test every plane: the scene reaches beyond them",
-        ],
-        "share of all planes that the n-vertex of the scene's bounds is inside of",
-        LeftOutIf::AtLeast,
-        By::Time,
-    );
+fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfit> {
     let bounds = &case.scene().bounds;
     let (mut needless, mut far, mut all) = (0, 0, 0);
     let mut fewer = Vec::with_capacity(case.workload.views.len());

@@ -4,27 +4,27 @@
 
 use std::rc::Rc;
 
-use super::super::AdviseError;
 use super::super::case::Case;
 use super::super::omission::{By, Draft, Forced, LeftOutIf, Omission, Way};
+use super::super::rule::{Rule, Unfit};
 use crate::geometry::Aabb;
 use crate::index::DynIndex;
 
-pub(super) const NAME: &str = "no-index";
+pub(super) const RULE: Rule = Rule {
+    name: "no-index",
+    left_out: "the index itself",
+    advice: ["no index: a scan is fast enough", "an index pays off"],
+    statistic_name: "items",
+    left_out_if: LeftOutIf::AtMost,
+    by: By::Time,
+    prepare,
+};
 
 /// The smallest part that is looked at, and the largest beside the whole.
 const LEAST: usize = 32;
 const MOST: usize = 16_384;
 
-pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> {
-    let omission = Omission::new(
-        NAME,
-        "the index itself",
-        ["no index: a scan is fast enough", "an index pays off"],
-        "items",
-        LeftOutIf::AtMost,
-        By::Time,
-    );
+fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfit> {
     let (scan, tree) = (&case.scan, &case.spec);
     let items = &case.scene().items;
     let whole: Rc<dyn DynIndex> = Rc::from(scan.build(items)?);

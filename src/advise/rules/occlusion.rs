@@ -4,9 +4,9 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use super::super::AdviseError;
 use super::super::case::Case;
 use super::super::omission::{By, Draft, LeftOutIf, Omission, Way};
+use super::super::rule::{Rule, Unfit, not_applicable};
 use super::hidden::{self, PROBED, PROBES};
 use crate::geometry::{Aabb, ConvexVolume};
 use crate::measure::Ask;
@@ -16,8 +16,28 @@ use crate::visibility::occlusion::{
 use crate::visibility::truth::RayIndex;
 use crate::visibility::{Rays, SampleGrid, Solids};
 
-pub(super) const NAME: &str = "occlusion";
-pub(super) const BUFFER_NAME: &str = "occlusion-buffer";
+pub(super) const RULE: Rule = Rule {
+    name: "occlusion",
+    left_out: "occlusion culling",
+    advice: [
+        "no occlusion culling: too little is hidden",
+        "cull what is hidden (masked-inner)",
+    ],
+    statistic_name: "share of the items in the view that others hide",
+    left_out_if: LeftOutIf::AtMost,
+    by: By::Rule,
+    prepare,
+};
+
+pub(super) const BUFFER_RULE: Rule = Rule {
+    name: "occlusion-buffer",
+    left_out: "half of the occlusion buffer's columns and rows",
+    advice: ["a buffer of 160x90 is enough", "use a buffer of 320x180"],
+    statistic_name: "share of the items left by 160x90 that 320x180 removes as well",
+    left_out_if: LeftOutIf::AtMost,
+    by: By::Rule,
+    prepare: prepare_buffer,
+};
 
 /// Pixels of the buffer that is usual, and of the smaller one.
 const USUAL: SampleGrid = SampleGrid::new(320, 180);
@@ -52,22 +72,8 @@ fn asked<'c>(case: &Case, all: Rc<Occlusion>, grid: SampleGrid) -> Ask<'c> {
     })
 }
 
-pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> {
-    let omission = Omission::new(
-        NAME,
-        "occlusion culling",
-        [
-            "no occlusion culling: too little is hidden",
-            "cull what is hidden (masked-inner)",
-        ],
-        "share of the items in the view that others hide",
-        LeftOutIf::AtMost,
-        By::Rule,
-    );
-    let (all, solids) = match Occlusion::of(case) {
-        Ok(both) => both,
-        Err(reason) => return Ok(omission.because(reason).draft(Vec::new())),
-    };
+fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfit> {
+    let (all, solids) = Occlusion::of(case).map_err(not_applicable)?;
     let predicted = predicted(&all, &solids);
     let on = format!(
         "masked-inner {}x{} against {}",
@@ -84,19 +90,8 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
     ))
 }
 
-pub(super) fn prepare_buffer<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> {
-    let omission = Omission::new(
-        BUFFER_NAME,
-        "half of the occlusion buffer's columns and rows",
-        ["a buffer of 160x90 is enough", "use a buffer of 320x180"],
-        "share of the items left by 160x90 that 320x180 removes as well",
-        LeftOutIf::AtMost,
-        By::Rule,
-    );
-    let all = match Occlusion::of(case) {
-        Ok((all, _)) => all,
-        Err(reason) => return Ok(omission.because(reason).draft(Vec::new())),
-    };
+fn prepare_buffer<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfit> {
+    let (all, _) = Occlusion::of(case).map_err(not_applicable)?;
     let all = Rc::new(all);
     let on = "masked-inner 320x180 against 160x90".to_owned();
     let left_out = Way::Other(asked(case, all.clone(), SMALL));

@@ -4,15 +4,26 @@
 
 use std::rc::Rc;
 
-use super::super::AdviseError;
 use super::super::case::Case;
 use super::super::omission::{By, Draft, Forced, LeftOutIf, Omission, Way};
+use super::super::rule::{Rule, Unfit};
 use crate::geometry::{Aabb, BoxBlock, ConvexVolume, LANES, LaneMask, PlaneMask};
 use crate::index::{Input, Query, RegionIndex, Wide};
 use crate::kernel::{Isa, Kernel};
 use crate::query::{ItemId, NoRecorder, Planes, Predicate, QueryCost, QueryVolume, Recorder};
 
-pub(super) const NAME: &str = "plane-masks";
+pub(super) const RULE: Rule = Rule {
+    name: "plane-masks",
+    left_out: "tests of planes that a node above is inside of (by masks)",
+    advice: [
+        "use plane masking",
+        "do without plane masking: it saves too little",
+    ],
+    statistic_name: "share of the plane tests that masks save",
+    left_out_if: LeftOutIf::AtLeast,
+    by: By::Time,
+    prepare,
+};
 
 /// Share of the plane tests that has to go: a small tree saves a few percent,
 /// and carrying masks is not free.
@@ -20,18 +31,7 @@ const THRESHOLD: f64 = 0.1;
 /// Cameras whose plane tests are counted.
 const COUNTED: usize = 64;
 
-pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> {
-    let omission = Omission::new(
-        NAME,
-        "tests of planes that a node above is inside of (by masks)",
-        [
-            "use plane masking",
-            "do without plane masking: it saves too little",
-        ],
-        "share of the plane tests that masks save",
-        LeftOutIf::AtLeast,
-        By::Time,
-    );
+fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfit> {
     let scene = case.scene();
     let kernel = case.spec.execution.kernel;
     let tree = Wide::build(&Input::new(&scene.items), &Default::default())?;

@@ -4,27 +4,27 @@
 
 use glam::DVec3;
 
-use super::super::AdviseError;
 use super::super::case::{Case, asked};
 use super::super::omission::{By, Draft, Forced, LeftOutIf, Omission, Way};
+use super::super::rule::{Rule, Unfit, not_applicable};
 use crate::culling::Culling;
 use crate::measure::Workload;
 use crate::scene::{Scene, WorldBox};
 
-pub(super) const NAME: &str = "rebasing";
+pub(super) const RULE: Rule = Rule {
+    name: "rebasing",
+    left_out: "rebasing the scene",
+    advice: [
+        "no need to rebase the scene",
+        "rebase the scene: move its origin to its middle",
+    ],
+    statistic_name: "margin for rounding in world coordinates / depth of the view",
+    left_out_if: LeftOutIf::AtMost,
+    by: By::Rule,
+    prepare,
+};
 
-pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> {
-    let omission = Omission::new(
-        NAME,
-        "rebasing the scene",
-        [
-            "no need to rebase the scene",
-            "rebase the scene: move its origin to its middle",
-        ],
-        "margin for rounding in world coordinates / depth of the view",
-        LeftOutIf::AtMost,
-        By::Rule,
-    );
+fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfit> {
     let scene = case.scene();
     let is_moved = scene.origin != DVec3::ZERO;
     let elsewhere = if is_moved {
@@ -33,14 +33,9 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
         let bounds = scene.world_bounds();
         bounds.min / 2.0 + bounds.max / 2.0
     };
-    let other = match about(scene, elsewhere) {
-        Ok(other) => other,
-        Err(error) => return Ok(omission.because(error).draft(Vec::new())),
-    };
-    let views = match Workload::new(&other, case.path, &Culling::default()) {
-        Ok(workload) => workload.views,
-        Err(error) => return Ok(omission.because(error.to_string()).draft(Vec::new())),
-    };
+    let other = about(scene, elsewhere).map_err(not_applicable)?;
+    let there = Workload::new(&other, case.path, &Culling::default());
+    let views = there.map_err(not_applicable)?.views;
     let at_zero = if is_moved { &other } else { scene };
     let moved = if is_moved { scene } else { &other };
     let (margin, better) = (case.margin(at_zero), case.margin(moved));

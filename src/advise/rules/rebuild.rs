@@ -2,25 +2,25 @@
 //! but what it leaves answers more slowly. Weighed for a share of items that
 //! move and a number of queries between two updates.
 
-use super::super::AdviseError;
 use super::super::case::{Case, asked};
 use super::super::omission::{By, Draft, Forced, LeftOutIf, Omission, Way};
+use super::super::rule::{Rule, Unfit, not_applicable};
 use crate::measure::{Stopwatch, input_of, move_share};
 
-pub(super) const NAME: &str = "rebuild";
+pub(super) const RULE: Rule = Rule {
+    name: "rebuild",
+    left_out: "building anew after items have moved",
+    advice: [
+        "refit after items have moved, do not rebuild",
+        "rebuild after items have moved",
+    ],
+    statistic_name: "what queries on the refitted tree cost more until the next update, ns",
+    left_out_if: LeftOutIf::AtMost,
+    by: By::Rule,
+    prepare,
+};
 
-pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> {
-    let omission = Omission::new(
-        NAME,
-        "building anew after items have moved",
-        [
-            "refit after items have moved, do not rebuild",
-            "rebuild after items have moved",
-        ],
-        "what queries on the refitted tree cost more until the next update, ns",
-        LeftOutIf::AtMost,
-        By::Rule,
-    );
+fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfit> {
     let scene = case.scene();
     let mut items = scene.items.clone();
     let moved = move_share(&mut items, case.options.moved);
@@ -30,7 +30,7 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
     let watch = Stopwatch::start();
     if !can || !refitted.refit(&items, &moved) {
         let why = format!("'{}' cannot be refitted", case.spec.label);
-        return Ok(omission.because(why).draft(Vec::new()));
+        return Err(not_applicable(why));
     }
     let refit_ns = watch.lap().cpu_ns;
     let watch = Stopwatch::start();

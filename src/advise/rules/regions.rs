@@ -6,9 +6,9 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::sync::Arc;
 
-use super::super::AdviseError;
 use super::super::case::Case;
 use super::super::omission::{By, Draft, LeftOutIf, Omission, Way};
+use super::super::rule::{Rule, Unfit, not_applicable};
 use super::hidden::{self, PROBED, PROBES};
 use crate::geometry::ConvexVolume;
 use crate::measure::Ask;
@@ -19,7 +19,18 @@ use crate::visibility::region::{
     EyePlace, Marks, PortalClip, RegionGraph, RegionItems, RegionRow, Scratch, seen_by_samples,
 };
 
-pub(super) const NAME: &str = "regions";
+pub(super) const RULE: Rule = Rule {
+    name: "regions",
+    left_out: "the region stage (portals)",
+    advice: [
+        "no region stage: portals close off too little",
+        "find the regions that are seen before their items (portal-clip)",
+    ],
+    statistic_name: "share of the items in the view that lie in no region that is seen",
+    left_out_if: LeftOutIf::AtMost,
+    by: By::Rule,
+    prepare,
+};
 
 /// The regions of the scene with their items, and what is asked of them.
 struct Regions {
@@ -29,35 +40,19 @@ struct Regions {
 }
 
 /// The rooms of a scene or the sectors of its map.
-fn graph_of(scene: &Scene) -> Result<Option<Arc<RegionGraph>>, AdviseError> {
+fn graph_of(scene: &Scene) -> Result<Arc<RegionGraph>, Unfit> {
     let graph = match DoomMap::of_scene(scene)? {
         Some(map) => Some(map.graph()),
         None => RegionGraph::of_scene(scene).ok(),
     };
     let joined = graph.filter(|graph| !graph.openings().is_empty());
-    Ok(joined.map(Arc::new))
+    let without = || not_applicable("the scene has no rooms or sectors that portals join");
+    joined.map(Arc::new).ok_or_else(without)
 }
 
-pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> {
-    let omission = Omission::new(
-        NAME,
-        "the region stage (portals)",
-        [
-            "no region stage: portals close off too little",
-            "find the regions that are seen before their items (portal-clip)",
-        ],
-        "share of the items in the view that lie in no region that is seen",
-        LeftOutIf::AtMost,
-        By::Rule,
-    );
-    let Some(graph) = graph_of(case.scene())? else {
-        let reason = "the scene has no rooms or sectors that portals join";
-        return Ok(omission.because(reason).draft(Vec::new()));
-    };
-    let views = match hidden::sights(case) {
-        Ok(views) => views,
-        Err(reason) => return Ok(omission.because(reason).draft(Vec::new())),
-    };
+fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfit> {
+    let graph = graph_of(case.scene())?;
+    let views = hidden::sights(case).map_err(not_applicable)?;
     let regions = Rc::new(Regions {
         items: RegionItems::of(&graph, case.scene()),
         row: PortalClip(graph),

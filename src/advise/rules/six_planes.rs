@@ -2,34 +2,31 @@
 //! the exact test adds. They cost test time and save the drawing of what cannot
 //! be seen.
 
-use super::super::AdviseError;
 use super::super::case::{Case, asked};
 use super::super::choice::TestChoice;
 use super::super::omission::{By, Decision, Draft, Forced, LeftOutIf, Omission, Way};
+use super::super::rule::{Rule, Unfit, not_applicable};
 use crate::culling::{Culling, CullingTest};
 
-pub(super) const NAME: &str = "six-planes";
+pub(super) const RULE: Rule = Rule {
+    name: "six-planes",
+    left_out: "axes beyond the six planes",
+    advice: [
+        "six planes are enough",
+        "use the exact test (separating axes): six planes are not enough",
+    ],
+    statistic_name: "cost of drawing what six planes let through, ns a query",
+    left_out_if: LeftOutIf::AtMost,
+    by: By::Rule,
+    prepare,
+};
 
-pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> {
-    let omission = Omission::new(
-        NAME,
-        "axes beyond the six planes",
-        [
-            "six planes are enough",
-            "use the exact test (separating axes): six planes are not enough",
-        ],
-        "cost of drawing what six planes let through, ns a query",
-        LeftOutIf::AtMost,
-        By::Rule,
-    );
+fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfit> {
     let exact = Culling {
         test: CullingTest::Exact,
         ..Culling::default()
     };
-    let views = match case.views(&exact) {
-        Ok(views) => views,
-        Err(error) => return Ok(omission.because(error.to_string()).draft(Vec::new())),
-    };
+    let views = case.views(&exact).map_err(not_applicable)?;
     let forced = Forced {
         on: case.spec.label.clone(),
         kept: Way::Other(asked(case.tree_for(CullingTest::Exact)?, views)),
@@ -68,7 +65,7 @@ pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> 
 /// The test that is taken has these axes or has not: one decision, said once.
 /// The rule's own side is then what it predicted.
 pub(in crate::advise) fn follow(omission: &mut Omission, choice: &TestChoice) {
-    let applies = omission.rule == NAME && omission.decision != Decision::NotApplicable;
+    let applies = omission.rule == RULE.name && omission.decision != Decision::NotApplicable;
     let Some(taken) = choice.name.filter(|_| applies) else {
         return;
     };
@@ -120,8 +117,9 @@ mod tests {
                 (tests[0], vec![tests[2]], Decision::LeaveOut, None),
                 (tests[1], vec![tests[3]], Decision::Keep, None),
             ] {
-                let rule = Omission::new(NAME, "x", ["", ""], "y", LeftOutIf::AtMost, By::Rule);
-                let rule = rule.compares(if predicted { 0.5 } else { 2.0 }, 1.0);
+                let rule = RULE
+                    .omission()
+                    .compares(if predicted { 0.5 } else { 2.0 }, 1.0);
                 let mut omission = rule.settled(Vec::new(), &Aside::default(), None);
                 let mut choice = TestChoice {
                     name: Some(taken),

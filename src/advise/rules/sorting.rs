@@ -4,9 +4,9 @@
 
 use std::rc::Rc;
 
-use super::super::AdviseError;
 use super::super::case::Case;
 use super::super::omission::{By, Draft, Forced, LeftOutIf, Omission, Way};
+use super::super::rule::{Rule, Unfit, not_applicable};
 use super::hidden::{self, PROBED, PROBES, Removal};
 use crate::query::ItemId;
 use crate::visibility::fragment::order::front_to_back;
@@ -14,29 +14,26 @@ use crate::visibility::fragment::{Canvas, Piece, Tests, draw};
 use crate::visibility::truth::RayIndex;
 use crate::visibility::{Rays, SampleGrid, Solids};
 
-pub(super) const NAME: &str = "sorting";
+pub(super) const RULE: Rule = Rule {
+    name: "sorting",
+    left_out: "sorting what is left from front to back",
+    advice: [
+        "no sorting: draw in the order of the tree",
+        "sort what is left from front to back",
+    ],
+    statistic_name: "share of the shaded fragments that an early z-test saves once items are sorted",
+    left_out_if: LeftOutIf::AtMost,
+    by: By::Rule,
+    prepare,
+};
 
 /// Samples of the images that fragments are counted in, and of the image they stand for.
 const COUNTED: SampleGrid = SampleGrid::new(160, 90);
 const SHADED: SampleGrid = SampleGrid::new(1920, 1080);
 
-pub(super) fn prepare<'c>(case: &'c Case<'c>) -> Result<Draft<'c>, AdviseError> {
-    let omission = Omission::new(
-        NAME,
-        "sorting what is left from front to back",
-        [
-            "no sorting: draw in the order of the tree",
-            "sort what is left from front to back",
-        ],
-        "share of the shaded fragments that an early z-test saves once items are sorted",
-        LeftOutIf::AtMost,
-        By::Rule,
-    );
-    let both = hidden::solids(case.scene()).and_then(|s| Ok((s, hidden::sights(case)?)));
-    let (solids, views) = match both {
-        Ok((solids, views)) => (Rc::new(solids), views),
-        Err(reason) => return Ok(omission.because(reason).draft(Vec::new())),
-    };
+fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfit> {
+    let solids = Rc::new(hidden::solids(case.scene()).map_err(not_applicable)?);
+    let views = hidden::sights(case).map_err(not_applicable)?;
     let frames = hidden::frames(views.len(), PROBED);
     let few = frames.map(|n| {
         let mut items = Vec::new();

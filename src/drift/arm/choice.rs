@@ -3,11 +3,10 @@
 
 use serde::Serialize;
 
-use super::super::rated::front;
+use super::super::rated::{fastest, front};
 use super::methods::Information;
 use super::study::{ARMS, ArmKind, ArmPoint, Setting};
 use crate::measure::OverProcesses;
-use crate::statistics::{ALPHA, ranks};
 
 /// The method to take for an arm at a frame rate.
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -102,14 +101,6 @@ pub fn conclude(
     ))
 }
 
-fn places(candidates: &[&Candidate]) -> Vec<usize> {
-    let values: Vec<Vec<f64>> = candidates.iter().map(|c| c.ln_ns.clone()).collect();
-    ranks(&values, ALPHA)
-        .into_iter()
-        .map(|placed| placed.rank)
-        .collect()
-}
-
 /// Of the points within the tolerance that nothing is faster than, the most precise.
 fn choose(
     points: &[ArmPoint],
@@ -118,12 +109,7 @@ fn choose(
     setting: Setting,
 ) -> ArmChoice {
     let good: Vec<&Candidate> = candidates.iter().filter(|c| c.error <= tolerance).collect();
-    let fastest = places(&good).into_iter().zip(&good);
-    let mut fastest: Vec<&Candidate> = fastest
-        .filter(|(place, _)| *place == 1)
-        .map(|(_, c)| *c)
-        .collect();
-    fastest.sort_by(|a, b| a.error.total_cmp(&b.error));
+    let fastest = fastest(&good, |c| &c.ln_ns, |c| c.error);
     let chosen = fastest.first().map(|candidate| &points[candidate.point]);
     let least = candidates.iter().min_by(|a, b| a.error.total_cmp(&b.error));
     let reason = match (chosen, least) {

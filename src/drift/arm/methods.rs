@@ -137,15 +137,15 @@ pub fn follow<A: Arm<R, N>, R: Real, const N: usize>(
         },
     };
     match scheme {
-        Scheme::ExplicitEuler => by.steps(keep, explicit_euler),
-        Scheme::SemiImplicitEuler => by.steps(keep, semi_implicit_euler),
-        Scheme::Verlet => by.steps(keep, verlet),
-        Scheme::Rk4 => by.steps(keep, rk4),
-        Scheme::ImplicitEuler => by.steps(keep, implicit_euler),
-        Scheme::ImplicitMidpoint => by.steps(keep, implicit_midpoint),
-        Scheme::TrBdf2 => by.steps(keep, tr_bdf2),
-        Scheme::Held => by.steps(keep, held),
-        Scheme::Closed => by.steps(keep, A::closed),
+        Scheme::ExplicitEuler => by.steps(keep, Steps::explicit_euler),
+        Scheme::SemiImplicitEuler => by.steps(keep, Steps::semi_implicit_euler),
+        Scheme::Verlet => by.steps(keep, Steps::verlet),
+        Scheme::Rk4 => by.steps(keep, Steps::rk4),
+        Scheme::ImplicitEuler => by.steps(keep, Steps::implicit_euler),
+        Scheme::ImplicitMidpoint => by.steps(keep, Steps::implicit_midpoint),
+        Scheme::TrBdf2 => by.steps(keep, Steps::tr_bdf2),
+        Scheme::Held => by.steps(keep, Steps::held),
+        Scheme::Closed => by.steps(keep, |by, target, t, y, h| by.arm.closed(target, t, y, h)),
         Scheme::BogackiShampine => {
             adaptive::follow(&BOGACKI_SHAMPINE, arm, frames, tolerance, start, keep);
         }
@@ -154,6 +154,13 @@ pub fn follow<A: Arm<R, N>, R: Real, const N: usize>(
         }
     }
 }
+
+/// Most iterations of a stage: one that needs more has no solution nearby.
+const MOST_ITERATIONS: u32 = 20;
+
+/// Share of a step of TR-BDF2 by the trapezoidal rule: 2 - sqrt(2), for which both
+/// stages have the same matrix.
+const GAMMA: f64 = 2.0 - std::f64::consts::SQRT_2;
 
 /// Equal steps in every frame.
 struct Steps<'f, A: Arm<R, N>, R: Real, const N: usize> {
@@ -164,201 +171,142 @@ struct Steps<'f, A: Arm<R, N>, R: Real, const N: usize> {
 }
 
 impl<A: Arm<R, N>, R: Real, const N: usize> Steps<'_, A, R, N> {
-    /// One step takes the arm, the target, the time since the frame began, the
+    /// One step takes the target, the time since the frame began, the
     /// state, and how long the step is.
     #[inline(always)]
     fn steps(
         self,
         mut keep: impl FnMut(State<R, N>, u32),
-        step: impl Fn(&A, &A::Target, R, &State<R, N>, R) -> State<R, N>,
+        step: impl Fn(&Self, &A::Target, R, &State<R, N>, R) -> State<R, N>,
     ) {
         let mut y = self.start;
         for (target, seconds) in self.frames {
             let h = *seconds / R::of(f64::from(self.count));
             for i in 0..self.count {
                 let t = h * R::of(f64::from(i));
-                y = self.arm.settled(step(self.arm, target, t, &y, h));
+                y = self.arm.settled(step(&self, target, t, &y, h));
             }
             keep(y, self.count);
         }
     }
-}
 
-#[inline(always)]
-pub fn explicit_euler<A: Arm<R, N>, R: Real, const N: usize>(
-    arm: &A,
-    target: &A::Target,
-    t: R,
-    y: &State<R, N>,
-    h: R,
-) -> State<R, N> {
-    along(y, h, &arm.slope(target, t, y))
-}
-
-/// The velocity alone along a slope.
-#[inline(always)]
-fn kicked<A: Arm<R, N>, R: Real, const N: usize>(
-    y: &State<R, N>,
-    h: R,
-    slope: &State<R, N>,
-) -> State<R, N> {
-    let mut kicked = *y;
-    for i in A::POSITION..N {
-        kicked[i] = y[i] + h * slope[i];
+    #[inline(always)]
+    fn explicit_euler(&self, target: &A::Target, t: R, y: &State<R, N>, h: R) -> State<R, N> {
+        along(y, h, &self.arm.slope(target, t, y))
     }
-    kicked
-}
 
-/// Euler-Cromer, also called symplectic Euler.
-#[inline(always)]
-pub fn semi_implicit_euler<A: Arm<R, N>, R: Real, const N: usize>(
-    arm: &A,
-    target: &A::Target,
-    t: R,
-    y: &State<R, N>,
-    h: R,
-) -> State<R, N> {
-    let kicked = kicked::<A, R, N>(y, h, &arm.slope(target, t, y));
-    arm.moved(&kicked, h)
-}
-
-/// Velocity Verlet with friction, explicit in the first half kick and implicit in
-/// the second, which keeps order 2 (Brünger, Brooks and Karplus 1984, "Stochastic
-/// boundary conditions for molecular dynamics simulations of ST2 water", Chemical
-/// Physics Letters 105, p. 495, without its noise).
-#[inline(always)]
-pub fn verlet<A: Arm<R, N>, R: Real, const N: usize>(
-    arm: &A,
-    target: &A::Target,
-    t: R,
-    y: &State<R, N>,
-    h: R,
-) -> State<R, N> {
-    let half = h / R::of(2.0);
-    let first = kicked::<A, R, N>(y, half, &arm.slope(target, t, y));
-    let mut last = arm.moved(&first, h);
-    let (slope, c) = (arm.slope(target, t + h, &last), arm.friction());
-    for i in A::POSITION..N {
-        let pull = slope[i] + c * last[i];
-        last[i] = (last[i] + half * pull) / (R::of(1.0) + half * c);
-    }
-    last
-}
-
-#[inline(always)]
-pub fn rk4<A: Arm<R, N>, R: Real, const N: usize>(
-    arm: &A,
-    target: &A::Target,
-    t: R,
-    y: &State<R, N>,
-    h: R,
-) -> State<R, N> {
-    let half = h / R::of(2.0);
-    let first = arm.slope(target, t, y);
-    let second = arm.slope(target, t + half, &along(y, half, &first));
-    let third = arm.slope(target, t + half, &along(y, half, &second));
-    let fourth = arm.slope(target, t + h, &along(y, h, &third));
-    let two = R::of(2.0);
-    let sum = std::array::from_fn(|i| first[i] + two * (second[i] + third[i]) + fourth[i]);
-    along(y, h / R::of(6.0), &sum)
-}
-
-/// Most iterations of a stage: one that needs more has no solution nearby.
-const MOST_ITERATIONS: u32 = 20;
-
-/// `Y = base + g F(t, Y)` by Newton's iteration from `guess`.
-#[inline(always)]
-fn stage<A: Arm<R, N>, R: Real, const N: usize>(
-    arm: &A,
-    target: &A::Target,
-    t: R,
-    base: &State<R, N>,
-    guess: &State<R, N>,
-    g: R,
-) -> State<R, N> {
-    let mut y = *guess;
-    for _ in 0..MOST_ITERATIONS {
-        let slope = arm.slope(target, t, &y);
-        let residual = std::array::from_fn(|i| base[i] + g * slope[i] - y[i]);
-        let change = arm.solve(target, t, &y, g, &residual);
-        y = along(&y, R::of(1.0), &change);
-        if A::LINEAR {
-            break;
+    /// The velocity alone along a slope.
+    #[inline(always)]
+    fn kicked(y: &State<R, N>, h: R, slope: &State<R, N>) -> State<R, N> {
+        let mut kicked = *y;
+        for i in A::POSITION..N {
+            kicked[i] = y[i] + h * slope[i];
         }
-        let size = |all: &State<R, N>| all.iter().fold(R::of(0.0), |most, x| most.max(x.abs()));
-        // Asked this way round so that NaN ends it.
-        let goes_on = size(&change) > R::NEGLIGIBLE * (R::of(1.0) + size(&y));
-        if !goes_on {
-            break;
-        }
+        kicked
     }
-    y
-}
 
-#[inline(always)]
-pub fn implicit_euler<A: Arm<R, N>, R: Real, const N: usize>(
-    arm: &A,
-    target: &A::Target,
-    t: R,
-    y: &State<R, N>,
-    h: R,
-) -> State<R, N> {
-    stage(arm, target, t + h, y, y, h)
-}
+    /// Euler-Cromer, also called symplectic Euler.
+    #[inline(always)]
+    fn semi_implicit_euler(&self, target: &A::Target, t: R, y: &State<R, N>, h: R) -> State<R, N> {
+        let kicked = Self::kicked(y, h, &self.arm.slope(target, t, y));
+        self.arm.moved(&kicked, h)
+    }
 
-/// Half a step of implicit Euler to the middle and as far again: the Gauss method
-/// of one stage (Hairer and Wanner 1996, "Solving Ordinary Differential Equations
-/// II", IV.5).
-#[inline(always)]
-pub fn implicit_midpoint<A: Arm<R, N>, R: Real, const N: usize>(
-    arm: &A,
-    target: &A::Target,
-    t: R,
-    y: &State<R, N>,
-    h: R,
-) -> State<R, N> {
-    let half = h / R::of(2.0);
-    let middle = stage(arm, target, t + half, y, y, half);
-    std::array::from_fn(|i| R::of(2.0) * middle[i] - y[i])
-}
+    /// Velocity Verlet with friction, explicit in the first half kick and implicit in
+    /// the second, which keeps order 2 (Brünger, Brooks and Karplus 1984, "Stochastic
+    /// boundary conditions for molecular dynamics simulations of ST2 water", Chemical
+    /// Physics Letters 105, p. 495, without its noise).
+    #[inline(always)]
+    fn verlet(&self, target: &A::Target, t: R, y: &State<R, N>, h: R) -> State<R, N> {
+        let half = h / R::of(2.0);
+        let first = Self::kicked(y, half, &self.arm.slope(target, t, y));
+        let mut last = self.arm.moved(&first, h);
+        let (slope, c) = (self.arm.slope(target, t + h, &last), self.arm.friction());
+        for i in A::POSITION..N {
+            let pull = slope[i] + c * last[i];
+            last[i] = (last[i] + half * pull) / (R::of(1.0) + half * c);
+        }
+        last
+    }
 
-/// Share of a step of TR-BDF2 by the trapezoidal rule: 2 - sqrt(2), for which both
-/// stages have the same matrix.
-pub const GAMMA: f64 = 2.0 - std::f64::consts::SQRT_2;
+    #[inline(always)]
+    fn rk4(&self, target: &A::Target, t: R, y: &State<R, N>, h: R) -> State<R, N> {
+        let half = h / R::of(2.0);
+        let first = self.arm.slope(target, t, y);
+        let second = self.arm.slope(target, t + half, &along(y, half, &first));
+        let third = self.arm.slope(target, t + half, &along(y, half, &second));
+        let fourth = self.arm.slope(target, t + h, &along(y, h, &third));
+        let two = R::of(2.0);
+        let sum = std::array::from_fn(|i| first[i] + two * (second[i] + third[i]) + fourth[i]);
+        along(y, h / R::of(6.0), &sum)
+    }
 
-/// The trapezoidal rule to `t + GAMMA h`, then the backward differentiation formula
-/// of order 2 through both ends (Bank, Coughran, Fichtner, Grosse, Rose and Smith
-/// 1985, "Transient simulation of silicon devices and circuits", IEEE Transactions
-/// on Computer-Aided Design 4, p. 436; Hosea and Shampine 1996, "Analysis and
-/// implementation of TR-BDF2", Applied Numerical Mathematics 20, p. 21).
-#[inline(always)]
-pub fn tr_bdf2<A: Arm<R, N>, R: Real, const N: usize>(
-    arm: &A,
-    target: &A::Target,
-    t: R,
-    y: &State<R, N>,
-    h: R,
-) -> State<R, N> {
-    let g = R::of(GAMMA / 2.0) * h;
-    let trapezoid = along(y, g, &arm.slope(target, t, y));
-    let middle = stage(arm, target, t + R::of(GAMMA) * h, &trapezoid, y, g);
-    let newer = R::of(1.0 / (GAMMA * (2.0 - GAMMA)));
-    let older = R::of((1.0 - GAMMA) * (1.0 - GAMMA) / (GAMMA * (2.0 - GAMMA)));
-    let base = std::array::from_fn(|i| newer * middle[i] - older * y[i]);
-    // (1 - gamma)/(2 - gamma) = gamma/2 for this gamma.
-    stage(arm, target, t + h, &base, &middle, g)
-}
+    /// `Y = base + g F(t, Y)` by Newton's iteration from `guess`.
+    #[inline(always)]
+    fn stage(
+        &self,
+        target: &A::Target,
+        t: R,
+        base: &State<R, N>,
+        guess: &State<R, N>,
+        g: R,
+    ) -> State<R, N> {
+        let mut y = *guess;
+        for _ in 0..MOST_ITERATIONS {
+            let slope = self.arm.slope(target, t, &y);
+            let residual = std::array::from_fn(|i| base[i] + g * slope[i] - y[i]);
+            let change = self.arm.solve(target, t, &y, g, &residual);
+            y = along(&y, R::of(1.0), &change);
+            if A::LINEAR {
+                break;
+            }
+            let size = |all: &State<R, N>| all.iter().fold(R::of(0.0), |most, x| most.max(x.abs()));
+            // Asked this way round so that NaN ends it.
+            let goes_on = size(&change) > R::NEGLIGIBLE * (R::of(1.0) + size(&y));
+            if !goes_on {
+                break;
+            }
+        }
+        y
+    }
 
-/// The closed form for the place that the target has at the end of the step.
-#[inline(always)]
-pub fn held<A: Arm<R, N>, R: Real, const N: usize>(
-    arm: &A,
-    target: &A::Target,
-    t: R,
-    y: &State<R, N>,
-    h: R,
-) -> State<R, N> {
-    arm.closed(&A::held(target, t + h), t, y, h)
+    #[inline(always)]
+    fn implicit_euler(&self, target: &A::Target, t: R, y: &State<R, N>, h: R) -> State<R, N> {
+        self.stage(target, t + h, y, y, h)
+    }
+
+    /// Half a step of implicit Euler to the middle and as far again: the Gauss method
+    /// of one stage (Hairer and Wanner 1996, "Solving Ordinary Differential Equations
+    /// II", IV.5).
+    #[inline(always)]
+    fn implicit_midpoint(&self, target: &A::Target, t: R, y: &State<R, N>, h: R) -> State<R, N> {
+        let half = h / R::of(2.0);
+        let middle = self.stage(target, t + half, y, y, half);
+        std::array::from_fn(|i| R::of(2.0) * middle[i] - y[i])
+    }
+
+    /// The trapezoidal rule to `t + GAMMA h`, then the backward differentiation formula
+    /// of order 2 through both ends (Bank, Coughran, Fichtner, Grosse, Rose and Smith
+    /// 1985, "Transient simulation of silicon devices and circuits", IEEE Transactions
+    /// on Computer-Aided Design 4, p. 436; Hosea and Shampine 1996, "Analysis and
+    /// implementation of TR-BDF2", Applied Numerical Mathematics 20, p. 21).
+    #[inline(always)]
+    fn tr_bdf2(&self, target: &A::Target, t: R, y: &State<R, N>, h: R) -> State<R, N> {
+        let g = R::of(GAMMA / 2.0) * h;
+        let trapezoid = along(y, g, &self.arm.slope(target, t, y));
+        let middle = self.stage(target, t + R::of(GAMMA) * h, &trapezoid, y, g);
+        let newer = R::of(1.0 / (GAMMA * (2.0 - GAMMA)));
+        let older = R::of((1.0 - GAMMA) * (1.0 - GAMMA) / (GAMMA * (2.0 - GAMMA)));
+        let base = std::array::from_fn(|i| newer * middle[i] - older * y[i]);
+        // (1 - gamma)/(2 - gamma) = gamma/2 for this gamma.
+        self.stage(target, t + h, &base, &middle, g)
+    }
+
+    /// The closed form for the place that the target has at the end of the step.
+    #[inline(always)]
+    fn held(&self, target: &A::Target, t: R, y: &State<R, N>, h: R) -> State<R, N> {
+        self.arm.closed(&A::held(target, t + h), t, y, h)
+    }
 }
 
 #[cfg(test)]

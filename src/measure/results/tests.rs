@@ -4,6 +4,7 @@ use serde_json::json;
 
 use super::super::{Answer, GroupKey, NamedSchedule, Schedule, TaskPlan};
 use super::*;
+use crate::index::{Kind, Origin};
 
 /// Time per query of a task in each process, ns.
 type Times<'t> = (&'t str, TaskKind, &'t [f64]);
@@ -123,7 +124,7 @@ fn values_lie_in_their_intervals_and_ratios_are_those_of_the_shown_values() {
         ("slow", TaskKind::Query, &slow),
         ("same", TaskKind::Query, &same),
     ]));
-    let value = |cell: &Cell, metric: &str| cell.metrics[metric].value;
+    let value = |cell: &ReportCell, metric: &str| cell.metrics[metric].value;
     for cell in &group.cells {
         for (name, metric) in &cell.metrics {
             let Some((lower, upper)) = metric.lower.zip(metric.upper) else {
@@ -212,7 +213,7 @@ fn what_failed_in_one_process_is_not_ok_and_has_no_time() {
         let [linear, fast] = &group.cells[..] else {
             panic!("two cells");
         };
-        assert_eq!(fast.verdict, failed);
+        assert_eq!((fast.status, &fast.reason), (failed.status, &failed.reason));
         assert_eq!((fast.rank, linear.rank), (None, Some(1)));
         assert!(!fast.metrics.contains_key("query_ns"));
         assert_eq!(linear.times.processes, 12);
@@ -229,7 +230,7 @@ fn a_build_breaks_even_by_the_times_that_are_shown() {
     let [linear, fast] = &group.cells[..] else {
         panic!("two cells");
     };
-    let value = |cell: &Cell, metric: &str| cell.metrics[metric].value;
+    let value = |cell: &ReportCell, metric: &str| cell.metrics[metric].value;
     let price = (value(fast, "build_ms") - value(linear, "build_ms")) * 1e6;
     let gain = value(linear, "query_ns") - value(fast, "query_ns");
     assert_eq!(value(fast, "break_even_queries"), (price / gain).ceil());
@@ -283,7 +284,7 @@ fn a_pass_that_is_not_the_plan_s_makes_its_structure_wrong() {
         let mut parts = sound.clone();
         change(&mut parts[5]);
         let group = Group::of(&parts);
-        let found = group.cells.iter().map(|cell| cell.verdict.status);
+        let found = group.cells.iter().map(|cell| cell.status);
         found.collect::<Vec<_>>()
     };
     let (ok, wrong) = (Status::Ok, Status::Wrong);

@@ -9,20 +9,6 @@ use crate::camera::{CameraError, Lens, PlaneMethod, PlaneOptions};
 use crate::oracle::Pose;
 use crate::scene::SeededRng;
 
-/// A camera to be built, as exact numbers.
-pub struct Setup {
-    /// Where the camera stands.
-    pub pose: Pose,
-    /// What it takes in.
-    pub lens: Lens,
-    /// Scene-local zero in world coordinates.
-    pub origin: DVec3,
-    /// How its planes are derived.
-    pub planes: PlaneOptions,
-    /// How the boxes about it are drawn.
-    pub shapes: Shapes,
-}
-
 /// One way of being extreme.
 pub struct CameraFamily {
     /// As the table of results has it.
@@ -31,39 +17,47 @@ pub struct CameraFamily {
     pub variants: &'static [f64],
     /// How a variant is named in ids.
     pub label: fn(f64) -> String,
-    /// Draws a camera for a parameter.
-    pub setup: fn(&mut SeededRng, f64) -> Result<Setup, CameraError>,
+    /// Makes an ordinary camera one of the family, for a parameter.
+    adjust: fn(&mut Draft, &mut SeededRng, f64),
 }
+
+const fn family(
+    name: &'static str,
+    variants: &'static [f64],
+    adjust: fn(&mut Draft, &mut SeededRng, f64),
+) -> CameraFamily {
+    CameraFamily {
+        name,
+        variants,
+        label: plain,
+        adjust,
+    }
+}
+
+/// Distances from zero.
+const OFFSETS: &[f64] = &[1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e12, 1e15];
 
 /// All families of cameras, in the order of the table of results.
 pub static CAMERA_FAMILIES: &[CameraFamily] = &[
-    CameraFamily {
-        name: "near-far",
-        // Far / near from 1e3 to 1e9, and infinite.
-        variants: &[1e3, 1e6, 1e9, f64::INFINITY],
-        label: plain,
-        setup: |rng, ratio| {
-            let mut draft = Draft::any(rng);
-            draft.depth(ratio);
-            draft.perspective()
-        },
-    },
-    CameraFamily {
-        name: "reversed-z",
-        // The same with planes from a reversed-Z matrix in f64.
-        variants: &[1e3, 1e6, 1e9, f64::INFINITY],
-        label: plain,
-        setup: |rng, ratio| {
-            let mut draft = Draft::any(rng);
+    // Far / near from 1e3 to 1e9, and infinite.
+    family(
+        "near-far",
+        &[1e3, 1e6, 1e9, f64::INFINITY],
+        |draft, _, ratio| draft.depth(ratio),
+    ),
+    // The same with planes from a reversed-Z matrix in f64.
+    family(
+        "reversed-z",
+        &[1e3, 1e6, 1e9, f64::INFINITY],
+        |draft, _, ratio| {
             draft.depth(ratio);
             draft.planes.method = PlaneMethod::GhRevzF64;
-            draft.perspective()
         },
-    },
-    CameraFamily {
-        name: "fov",
-        // Vertical field of view from 1e-9 to 179.9999999 degrees.
-        variants: &[
+    ),
+    // Vertical field of view from 1e-9 to 179.9999999 degrees.
+    family(
+        "fov",
+        &[
             1e-9,
             1e-6,
             1e-3,
@@ -74,165 +68,120 @@ pub static CAMERA_FAMILIES: &[CameraFamily] = &[
             179.99999,
             179.9999999,
         ],
-        label: plain,
-        setup: |rng, fov| {
-            let mut draft = Draft::any(rng);
-            draft.fovy_deg = fov;
-            draft.perspective()
+        |draft, _, fov| draft.fovy_deg = fov,
+    ),
+    // Width / height from 1e-8 to 1e8.
+    family(
+        "aspect",
+        &[1e-8, 1e-4, 1e-2, 1e2, 1e4, 1e8],
+        |draft, _, aspect| draft.aspect = aspect,
+    ),
+    // A camera 1e4 to 1e15 depths of 1 away from the scene's zero.
+    family("offset", OFFSETS, |draft, rng, offset| {
+        draft.carry_off(rng, offset)
+    }),
+    // The same in coordinates about a point near the camera.
+    family("rebased", OFFSETS, |draft, rng, offset| {
+        draft.carry_off(rng, offset);
+        draft.origin = draft.eye.round();
+    }),
+    // Up within 1e-6 to 1e-15 rad of the direction of view.
+    family(
+        "condition",
+        &[1e-6, 1e-9, 1e-11, 1e-13, 1e-14, 1e-15],
+        |draft, rng, angle| {
+            draft.until_it_has_a_frame(rng, |draft, rng| {
+                draft.to_look = rng.below(2) == 0;
+                // Along the view as f64 has it, and hardly away from it: rounding can bring
+                // one camera's up too near to the view whatever its length is.
+                let length = libm::exp2(rng.between(-4.0, 4.0));
+                let away = angle * draft.forward.length() / draft.up.length();
+                let across = draft.up * away * rng.between(0.9, 1.5);
+                draft.up = (draft.forward + across) * length;
+            });
         },
-    },
-    CameraFamily {
-        name: "aspect",
-        // Width / height from 1e-8 to 1e8.
-        variants: &[1e-8, 1e-4, 1e-2, 1e2, 1e4, 1e8],
-        label: plain,
-        setup: |rng, aspect| {
-            let mut draft = Draft::any(rng);
-            draft.aspect = aspect;
-            draft.perspective()
+    ),
+    // Eye and look 1e-6 to 1e-15 of their coordinates apart.
+    family(
+        "near-look",
+        &[1e-6, 1e-9, 1e-12, 1e-15],
+        |draft, rng, share| {
+            draft.until_it_has_a_frame(rng, |draft, _| {
+                draft.to_look = true;
+                let size = draft.eye.abs().max_element();
+                draft.forward *= 4.0 * share * size / draft.forward.length();
+            });
         },
-    },
-    CameraFamily {
-        name: "offset",
-        // A camera 1e4 to 1e15 depths of 1 away from the scene's zero.
-        variants: &[1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e12, 1e15],
-        label: plain,
-        setup: |rng, offset| {
-            let mut draft = Draft::any(rng);
-            draft.eye += rng.point().map(|c| (c - 0.5).signum() * offset);
-            draft.perspective()
-        },
-    },
-    CameraFamily {
-        name: "rebased",
-        // The same in coordinates about a point near the camera.
-        variants: &[1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e12, 1e15],
-        label: plain,
-        setup: |rng, offset| {
-            let mut draft = Draft::any(rng);
-            draft.eye += rng.point().map(|c| (c - 0.5).signum() * offset);
-            draft.origin = draft.eye.round();
-            draft.perspective()
-        },
-    },
-    CameraFamily {
-        name: "condition",
-        // Up within 1e-6 to 1e-15 rad of the direction of view.
-        variants: &[1e-6, 1e-9, 1e-11, 1e-13, 1e-14, 1e-15],
-        label: plain,
-        setup: |rng, angle| loop {
-            let mut draft = Draft::any(rng);
-            draft.to_look = rng.below(2) == 0;
-            // Along the view as f64 has it, and hardly away from it: rounding can bring
-            // one camera's up too near to the view whatever its length is.
-            let length = libm::exp2(rng.between(-4.0, 4.0));
-            let away = angle * draft.forward.length() / draft.up.length();
-            let across = draft.up * away * rng.between(0.9, 1.5);
-            draft.up = (draft.forward + across) * length;
-            if draft.pose().frame().is_ok() {
-                break draft.perspective();
-            }
-        },
-    },
-    CameraFamily {
-        name: "near-look",
-        // Eye and look 1e-6 to 1e-15 of their coordinates apart.
-        variants: &[1e-6, 1e-9, 1e-12, 1e-15],
-        label: plain,
-        setup: |rng, share| loop {
-            let mut draft = Draft::any(rng);
-            draft.to_look = true;
-            let size = draft.eye.abs().max_element();
-            draft.forward *= 4.0 * share * size / draft.forward.length();
-            if draft.pose().frame().is_ok() {
-                break draft.perspective();
-            }
-        },
-    },
-    CameraFamily {
-        name: "shell",
-        // A volume about zero, seen from 1e3 to 1e15 depths away.
-        variants: &[1e3, 1e6, 1e9, 1e12, 1e15],
-        label: plain,
-        setup: |rng, distance| {
-            let mut draft = Draft::any(rng);
+    ),
+    // A volume about zero, seen from 1e3 to 1e15 depths away.
+    family(
+        "shell",
+        &[1e3, 1e6, 1e9, 1e12, 1e15],
+        |draft, _, distance| {
             let half = draft.far.unwrap_or(1.0) / 2.0;
             let distance = distance * half;
             draft.eye = draft.forward.normalize() * -distance;
             draft.fovy_deg = (half / distance).to_degrees();
             (draft.near, draft.far) = (distance - half, Some(distance + half));
-            draft.perspective()
         },
-    },
+    ),
+    // The whole scene scaled by 2^-148 to 2^127; what may overflow may be refused.
     CameraFamily {
-        name: "scale",
-        // The whole scene scaled by 2^-148 to 2^127; what may overflow may be refused.
-        variants: &[
-            -148.0, -140.0, -126.0, -100.0, -60.0, 60.0, 100.0, 120.0, 122.0, 124.0, 127.0,
-        ],
         label: |power| format!("2^{power}"),
-        setup: |rng, power| {
-            let mut draft = Draft::any(rng);
-            draft.scale(libm::exp2(power));
-            draft.perspective()
-        },
+        ..family(
+            "scale",
+            &[
+                -148.0, -140.0, -126.0, -100.0, -60.0, 60.0, 100.0, 120.0, 122.0, 124.0, 127.0,
+            ],
+            |draft, _, power| draft.scale(libm::exp2(power)),
+        )
     },
+    // Boxes 1e-3 and 1e3 times as wide as the view, side by side.
+    family("size-ratio", &[1e6], |draft, _, _| {
+        draft.shapes = Shapes::Ratio
+    }),
+    // Sixteen boxes, over and over.
+    family("coincident", &[16.0], |draft, _, _| {
+        draft.shapes = Shapes::Coincident
+    }),
+    // Lines, plates and points without thickness.
+    family("needles", &[64.0], |draft, _, _| {
+        draft.shapes = Shapes::Needles
+    }),
+    // A 90 degree camera on a grid of integers with its boxes: exact ties and one-ulp shifts.
+    family("ties", &[8.0, 64.0, 4096.0], |draft, rng, far| {
+        draft.shapes = Shapes::Grid;
+        draft.eye = draft.eye.round();
+        draft.forward = [DVec3::X, -DVec3::Y, DVec3::Z][rng.below(3)];
+        draft.up = DVec3::new(draft.forward.z, draft.forward.x, draft.forward.y);
+        (draft.fovy_deg, draft.aspect) = (90.0, 1.0);
+        (draft.near, draft.far) = (1.0, Some(far));
+    }),
+    // Orthographic, off-axis, and off-axis without a far plane.
     CameraFamily {
-        name: "size-ratio",
-        // Boxes 1e-3 and 1e3 times as wide as the view, side by side.
-        variants: &[1e6],
-        label: plain,
-        setup: |rng, _| Draft::any(rng).shaped(Shapes::Ratio).perspective(),
-    },
-    CameraFamily {
-        name: "coincident",
-        // Sixteen boxes, over and over.
-        variants: &[16.0],
-        label: plain,
-        setup: |rng, _| Draft::any(rng).shaped(Shapes::Coincident).perspective(),
-    },
-    CameraFamily {
-        name: "needles",
-        // Lines, plates and points without thickness.
-        variants: &[64.0],
-        label: plain,
-        setup: |rng, _| Draft::any(rng).shaped(Shapes::Needles).perspective(),
-    },
-    CameraFamily {
-        name: "ties",
-        // A 90 degree camera on a grid of integers with its boxes: exact ties and one-ulp shifts.
-        variants: &[8.0, 64.0, 4096.0],
-        label: plain,
-        setup: |rng, far| {
-            let mut draft = Draft::any(rng).shaped(Shapes::Grid);
-            draft.eye = draft.eye.round();
-            draft.forward = [DVec3::X, -DVec3::Y, DVec3::Z][rng.below(3)];
-            draft.up = DVec3::new(draft.forward.z, draft.forward.x, draft.forward.y);
-            (draft.fovy_deg, draft.aspect) = (90.0, 1.0);
-            (draft.near, draft.far) = (1.0, Some(far));
-            draft.perspective()
-        },
-    },
-    CameraFamily {
-        name: "lens",
-        // Orthographic, off-axis, and off-axis without a far plane.
-        variants: &[0.0, 1.0, 2.0],
         label: |kind| ["orthographic", "off-axis", "off-axis inf"][kind as usize].to_owned(),
-        setup: |rng, kind| {
-            let draft = Draft::any(rng);
+        ..family("lens", &[0.0, 1.0, 2.0], |draft, rng, kind| {
             let half = draft.near * libm::tan(draft.fovy_deg.to_radians() / 2.0);
             let shift = half * rng.between(-3.0, 3.0);
             let window = [shift - half, shift + half, -half, half * draft.aspect];
             let far = draft.far.unwrap_or(1.0);
-            let lens = match kind as u32 {
+            draft.other_lens = Some(match kind as u32 {
                 0 => Lens::orthographic(far * rng.unit().max(0.01), draft.aspect, -far, far),
                 1 => Lens::off_axis(window, draft.near, draft.far),
                 _ => Lens::off_axis(window, draft.near, None),
-            };
-            Ok(draft.with(lens?))
-        },
+            });
+        })
     },
 ];
+
+impl CameraFamily {
+    /// Draws a camera for a parameter.
+    pub fn draft(&self, rng: &mut SeededRng, variant: f64) -> Draft {
+        let mut draft = Draft::any(rng);
+        (self.adjust)(&mut draft, rng, variant);
+        draft
+    }
+}
 
 fn plain(value: f64) -> String {
     match value {
@@ -242,8 +191,8 @@ fn plain(value: f64) -> String {
     }
 }
 
-/// A camera that is still being described.
-struct Draft {
+/// A camera that is still being described, as exact numbers.
+pub struct Draft {
     eye: DVec3,
     forward: DVec3,
     up: DVec3,
@@ -251,11 +200,16 @@ struct Draft {
     aspect: f64,
     near: f64,
     far: Option<f64>,
-    origin: DVec3,
-    planes: PlaneOptions,
-    shapes: Shapes,
     /// Whether the pose names a point to look at.
     to_look: bool,
+    /// Instead of the perspective one.
+    other_lens: Option<Result<Lens, CameraError>>,
+    /// Scene-local zero in world coordinates.
+    pub origin: DVec3,
+    /// How its planes are derived.
+    pub planes: PlaneOptions,
+    /// How the boxes about it are drawn.
+    pub shapes: Shapes,
 }
 
 impl Draft {
@@ -284,12 +238,26 @@ impl Draft {
             planes: PlaneOptions::default(),
             shapes: Shapes::Mixed,
             to_look: false,
+            other_lens: None,
         }
     }
 
-    fn shaped(mut self, shapes: Shapes) -> Draft {
-        self.shapes = shapes;
-        self
+    /// Adjusts one ordinary camera after another until its vectors make a frame.
+    fn until_it_has_a_frame(
+        &mut self,
+        rng: &mut SeededRng,
+        adjust: impl Fn(&mut Draft, &mut SeededRng),
+    ) {
+        adjust(self, rng);
+        while self.pose().frame().is_err() {
+            *self = Draft::any(rng);
+            adjust(self, rng);
+        }
+    }
+
+    /// Into some corner of space.
+    fn carry_off(&mut self, rng: &mut SeededRng, offset: f64) {
+        self.eye += rng.point().map(|c| (c - 0.5).signum() * offset);
     }
 
     fn depth(&mut self, ratio: f64) {
@@ -305,7 +273,8 @@ impl Draft {
         self.far = self.far.map(|far| far * factor);
     }
 
-    fn pose(&self) -> Pose {
+    /// Where the camera stands.
+    pub fn pose(&self) -> Pose {
         let (eye, forward, up) = (self.eye, self.forward, self.up);
         if self.to_look {
             let look = eye + forward;
@@ -315,18 +284,9 @@ impl Draft {
         }
     }
 
-    fn with(self, lens: Lens) -> Setup {
-        Setup {
-            pose: self.pose(),
-            lens,
-            origin: self.origin,
-            planes: self.planes,
-            shapes: self.shapes,
-        }
-    }
-
-    fn perspective(self) -> Result<Setup, CameraError> {
-        let lens = Lens::perspective(self.fovy_deg, self.aspect, self.near, self.far)?;
-        Ok(self.with(lens))
+    /// What it takes in.
+    pub fn lens(&self) -> Result<Lens, CameraError> {
+        let other = self.other_lens.clone();
+        other.unwrap_or_else(|| Lens::perspective(self.fovy_deg, self.aspect, self.near, self.far))
     }
 }

@@ -17,7 +17,7 @@ use crate::scene::SeededRng;
 
 pub use boxes::Shapes;
 use boxes::adversarial;
-pub use cameras::{CAMERA_FAMILIES, CameraFamily, Setup};
+pub use cameras::{CAMERA_FAMILIES, CameraFamily, Draft};
 pub use check::{Case, Drops, Fault, Findings, SCALAR, Tally};
 pub use volumes::{PLANES_FAMILIES, PlanesCase, PlanesFamily};
 
@@ -218,18 +218,17 @@ pub fn camera_case(family: &CameraFamily, variant: f64, seed: u64) -> Result<Cas
         hash.rotate_left(9).wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ u64::from(byte)
     });
     let rng = &mut SeededRng::new(words);
-    let setup = (family.setup)(rng, variant).map_err(|error| error.to_string())?;
-    let frame = setup.pose.frame().map_err(|error| error.to_string())?;
-    let camera = Camera {
-        frame,
-        lens: setup.lens,
-    };
+    let draft = family.draft(rng, variant);
+    let (lens, pose) = (draft.lens(), draft.pose());
+    let lens = lens.map_err(|error| error.to_string())?;
+    let frame = pose.frame().map_err(|error| error.to_string())?;
+    let camera = Camera { frame, lens };
     let mut around = surroundings(&[]);
-    around.origin = setup.origin;
-    let items = adversarial(rng, &camera, &around, setup.shapes, BOXES);
+    around.origin = draft.origin;
+    let items = adversarial(rng, &camera, &around, draft.shapes, BOXES);
     let items = items.ok_or("a lens without corners")?;
     around.reach = surroundings(&items).reach;
-    let case = Case::new(camera, &setup.pose, setup.planes, around, items);
+    let case = Case::new(camera, &pose, draft.planes, around, items);
     case.ok_or_else(|| "the oracle has no such camera".to_owned())
 }
 
@@ -309,8 +308,8 @@ mod tests {
         for family in CAMERA_FAMILIES {
             for &variant in family.variants {
                 for seed in 0..300 {
-                    let setup = (family.setup)(&mut SeededRng::new(seed), variant);
-                    assert!(setup.is_ok(), "{} {variant:e} {seed}", family.name);
+                    let draft = family.draft(&mut SeededRng::new(seed), variant);
+                    assert!(draft.lens().is_ok(), "{} {variant:e} {seed}", family.name);
                 }
             }
         }

@@ -1,0 +1,84 @@
+//! What the commands share that take their times in several processes of their own
+//! (`advise`, `drift`, `funnel`, `precision`): the bar that says what is done, and how
+//! the times of all processes come together.
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::processes::{Said, Workers};
+use super::protocol::{Job, Timing};
+use super::shared_args::SpreadArgs;
+use super::text;
+use crate::measure::ProcessTimes;
+
+/// A bar of so many parts, with a word for them.
+pub fn progress(parts: u64, word: &str) -> ProgressBar {
+    // Drawn on stderr, and only if that is a terminal.
+    let template = format!("{{bar:24}} {{pos}}/{{len}}{word}  {{elapsed}}  {{msg}}");
+    let style = ProgressStyle::with_template(&template);
+    let bar = ProgressBar::new(parts);
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar
+}
+
+/// A study on its way.
+pub struct Study {
+    bar: ProgressBar,
+    /// What stands before every step.
+    about: String,
+    /// Steps before the processes that take the times.
+    before: u64,
+    processes: u32,
+}
+
+impl Study {
+    pub fn new(about: String, before: u64, spread: &SpreadArgs) -> Study {
+        let processes = spread.processes;
+        Study {
+            bar: progress(before + u64::from(processes), ""),
+            about,
+            before,
+            processes,
+        }
+    }
+
+    /// Says what is done now.
+    pub fn begin(&self, step: &str) {
+        let message = format!("{}{step}", self.about);
+        self.bar.set_message(text::plain(&message));
+    }
+
+    /// One more of the steps before the processes is done.
+    pub fn advance(&self) {
+        self.bar.inc(1);
+    }
+
+    /// The times of all processes, one after the other; `None` if interrupted.
+    pub fn times(
+        self,
+        workers: &Workers,
+        step: &str,
+        lens_scale: Option<f64>,
+        job: impl Fn(Timing) -> Job,
+    ) -> anyhow::Result<Option<Vec<ProcessTimes>>> {
+        let mut all = Vec::new();
+        for process in 0..self.processes {
+            let timing = Timing {
+                process,
+                lens_scale,
+            };
+            let told = |_: &str| {
+                self.bar.set_position(self.before + u64::from(process));
+                self.begin(step);
+            };
+            let Some(found) = workers.found(process, job(timing), &told)? else {
+                return Ok(None);
+            };
+            all.extend(found.into_iter().filter_map(|said| match said {
+                Said::Times(times) => Some(times),
+                _ => None,
+            }));
+        }
+        self.bar.finish_and_clear();
+        Ok(Some(all))
+    }
+}

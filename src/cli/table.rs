@@ -1,0 +1,130 @@
+//! A table, and how it looks on a terminal. Other formats are `document`'s.
+
+use std::fmt;
+
+use comfy_table::presets::UTF8_BORDERS_ONLY;
+use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement};
+
+use super::text::plain;
+
+/// A table whose cells may come from anywhere: columns named in `right` hold numbers.
+pub struct Table {
+    pub header: Vec<String>,
+    pub right: Vec<usize>,
+    pub rows: Vec<Vec<String>>,
+    /// Columns of the terminal, where the table is to fit into them.
+    width: Option<u16>,
+}
+
+impl Table {
+    pub fn new(header: impl IntoIterator<Item = impl Into<String>>, right: &[usize]) -> Table {
+        Table {
+            header: header.into_iter().map(Into::into).collect(),
+            right: right.to_vec(),
+            rows: Vec::new(),
+            width: None,
+        }
+    }
+
+    /// Of columns that stand there as in the table, with bars between them and `>`
+    /// before those of numbers: "structure | > query | > build | status".
+    pub fn of(columns: &str) -> Table {
+        let columns = || columns.split('|').map(str::trim);
+        let right = columns()
+            .enumerate()
+            .filter(|(_, name)| name.starts_with('>'));
+        let right: Vec<usize> = right.map(|(place, _)| place).collect();
+        let names = columns().map(|name| name.trim_start_matches(['>', ' ']));
+        Table::new(names, &right)
+    }
+
+    /// The first column holds names, all others numbers.
+    pub fn of_numbers(header: impl IntoIterator<Item = impl Into<String>>) -> Table {
+        let mut table = Table::new(header, &[]);
+        table.right = (1..table.header.len()).collect();
+        table
+    }
+
+    pub fn add_row(&mut self, row: impl IntoIterator<Item = impl Into<String>>) {
+        self.rows.push(row.into_iter().map(Into::into).collect());
+    }
+
+    /// Makes the table no wider, whatever is added to it: columns move together, and if that
+    /// is not enough long cells are broken into lines; names, in the first column, stay
+    /// whole.
+    pub fn fit(mut self, width: u16) -> Table {
+        self.width = Some(width);
+        self
+    }
+
+    /// Without the columns that have nothing in any row.
+    pub fn without_empty_columns(self) -> Table {
+        let is_kept = |column: usize| self.rows.iter().any(|row| !row[column].is_empty());
+        let kept: Vec<usize> = (0..self.header.len()).filter(|c| is_kept(*c)).collect();
+        let of = |cells: &[String]| kept.iter().map(|&column| cells[column].clone()).collect();
+        Table {
+            header: of(&self.header),
+            right: (0..kept.len())
+                .filter(|&place| self.right.contains(&kept[place]))
+                .collect(),
+            rows: self.rows.iter().map(|row| of(row)).collect(),
+            width: self.width,
+        }
+    }
+}
+
+impl fmt::Display for Table {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let mut table = comfy_table::Table::new();
+        table
+            .load_style(UTF8_BORDERS_ONLY)
+            .set_content_arrangement(ContentArrangement::Disabled)
+            .set_header(self.header.iter().map(|name| plain(name)));
+        for &column in &self.right {
+            if let Some(column) = table.column_mut(column) {
+                column.set_cell_alignment(CellAlignment::Right);
+            }
+        }
+        for row in &self.rows {
+            table.add_row(row.iter().map(|cell| plain(cell)));
+        }
+        let wide = table.to_string();
+        let is_within = |width: u16| {
+            let mut lines = wide.lines();
+            lines.all(|line| line.chars().count() <= usize::from(width))
+        };
+        let Some(width) = self.width.filter(|width| !is_within(*width)) else {
+            return f.write_str(&wide);
+        };
+        table
+            .set_content_arrangement(ContentArrangement::Dynamic)
+            .set_width(width);
+        for (place, column) in table.column_iter_mut().enumerate() {
+            match place {
+                0 => column.set_constraint(ColumnConstraint::ContentWidth),
+                _ => column.set_padding((0, 1)),
+            };
+        }
+        table.fmt(f)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_of_nothing_are_left_out() {
+        let mut table = Table::of("name | >none | >some");
+        table.add_row(["a", "", ""]);
+        table.add_row(["b", "", "7"]);
+        assert_eq!(
+            (&table.right[..], table.header[1].as_str()),
+            (&[1, 2][..], "none")
+        );
+        let kept = table.without_empty_columns();
+        assert_eq!(kept.header, ["name", "some"]);
+        assert_eq!(kept.right, [1]);
+        assert_eq!(kept.rows, [["a", ""], ["b", "7"]]);
+    }
+}
