@@ -69,6 +69,12 @@ impl WorldBox {
         WorldBox { min, max }
     }
 
+    /// A scene-local box in world coordinates, rounded outward.
+    pub fn of(b: &Aabb, origin: DVec3) -> Self {
+        let (min, max) = b.in_world(origin);
+        WorldBox::new(min, max)
+    }
+
     /// The largest box within one about an origin; empty where there is none.
     pub fn within(b: &Aabb, origin: DVec3) -> Self {
         let low = |k: usize| sum_up(origin[k], b.min[k].into());

@@ -75,11 +75,6 @@ impl Ground for Rooms {
     }
 }
 
-fn in_world(b: &Aabb, origin: DVec3) -> WorldBox {
-    let (min, max) = b.in_world(origin);
-    WorldBox::new(min, max)
-}
-
 /// What is strictly within one box closes no border.
 fn is_within_one(boxes: &BoxGrid, item: &WorldBox) -> bool {
     let mut within = false;
@@ -108,7 +103,10 @@ impl RegionGraph {
             Regions::Tiling(tiling) => {
                 let mut graph = RegionGraph::of_tiling(tiling, scene.origin);
                 let boxes = BoxGrid::new(graph.parts.clone());
-                let world = scene.items.iter().map(|item| in_world(item, scene.origin));
+                let world = scene
+                    .items
+                    .iter()
+                    .map(|item| WorldBox::of(item, scene.origin));
                 let borders = world.filter(|item| !is_within_one(&boxes, item));
                 let borders = BoxGrid::new(borders.collect());
                 let boxes = Boxes(boxes);
@@ -122,13 +120,13 @@ impl RegionGraph {
     /// By item: whether it may close a border between regions; furniture does not.
     pub fn borders(&self, scene: &Scene) -> Vec<bool> {
         let boxes = BoxGrid::new(self.parts.clone());
-        let closes = |item: &Aabb| !is_within_one(&boxes, &in_world(item, scene.origin));
+        let closes = |item: &Aabb| !is_within_one(&boxes, &WorldBox::of(item, scene.origin));
         scene.items.iter().map(closes).collect()
     }
 
     /// The same for a tiling about an origin.
     pub fn of_tiling(tiling: &Tiling, origin: DVec3) -> RegionGraph {
-        let world = |b: &Aabb| in_world(b, origin);
+        let world = |b: &Aabb| WorldBox::of(b, origin);
         let boxes: Vec<WorldBox> = tiling.boxes.iter().map(world).collect();
         let mut openings = Vec::with_capacity(tiling.portals.len());
         for portal in &tiling.portals {

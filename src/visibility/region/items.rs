@@ -34,8 +34,7 @@ impl RegionItems {
         let mut loose = Vec::new();
         let (mut met, mut boxes) = (Vec::new(), Vec::new());
         for (id, item) in (0..).zip(&scene.items) {
-            let (min, max) = item.in_world(scene.origin);
-            let b = WorldBox::new(min, max);
+            let b = WorldBox::of(item, scene.origin);
             met.clear();
             grid.meeting(&b, |part| met.push(part));
             met.sort_unstable();
