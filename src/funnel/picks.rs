@@ -121,15 +121,15 @@ impl<'w> Picks<'w> {
     /// Builds every back end that can hold the scene.
     pub fn of(world: &'w World<'w>, solids: &Solids) -> Picks<'w> {
         let suits = |name: &str| name != "linear" || world.items() <= MOST_FOR_LOOP;
-        let built = BACK_ENDS.iter().filter(|row| suits(row.about.name));
+        let built = BACK_ENDS.iter().filter(|row| suits(row.name));
         let built: Vec<(_, Rc<dyn Pick>)> = built
-            .filter_map(|row| Some((row.about, (row.build)(solids).ok()?.into())))
+            .filter_map(|row| Some((row, (row.build)(solids).ok()?.into())))
             .collect();
         let by_rays = |ask: fn(Rc<dyn Pick>) -> By<'w>| {
-            let pickers = built.iter().map(move |(about, pick)| Picker {
-                name: about.name.to_owned(),
-                summary: about.summary,
-                guarantee: about.guarantee,
+            let pickers = built.iter().map(move |(row, pick)| Picker {
+                name: row.name.to_owned(),
+                summary: row.summary,
+                guarantee: row.guarantee,
                 by: ask(pick.clone()),
             });
             pickers.collect::<Vec<_>>()

@@ -49,7 +49,7 @@ impl<T: BoxTest, R: Recorder> SelectionFunction<Record> for Selected<'_, '_, T, 
 }
 
 /// Slots of a node and of all below it.
-pub(crate) fn slots(node: &ParentNode<Record>) -> usize {
+fn slots(node: &ParentNode<Record>) -> usize {
     let below = node.children().iter().map(|child| match child {
         RTreeNode::Leaf(_) => 0,
         RTreeNode::Parent(parent) => slots(parent),
