@@ -15,7 +15,6 @@ use crate::query::{Context, NoRecorder, QueryVolume, Recorder, Sink};
 /// A question, asked of one box at a time. Boxes are finite and not empty.
 pub trait BoxTest {
     /// Whether `admits` is `!rejects`.
-    #[cfg_attr(not(feature = "peers"), expect(dead_code))]
     const NODES_AS_ITEMS: bool;
     /// No item within this box belongs to the answer.
     fn rejects(&self, node: &Aabb) -> bool;

@@ -26,6 +26,12 @@ impl Record {
         Ok(Record::some(items, &indexable(items)?))
     }
 
+    /// All boxes, numbered in their order.
+    pub fn numbered(boxes: &[Aabb]) -> Vec<Record> {
+        let records = boxes.iter().zip(0..);
+        records.map(|(&bounds, id)| Record { bounds, id }).collect()
+    }
+
     fn some(items: &[Aabb], ids: &[ItemId]) -> Vec<Record> {
         let record = |&id: &ItemId| Record {
             bounds: items[id as usize],

@@ -9,7 +9,6 @@ use glam::DVec3;
 
 use crate::arithmetic::rounding::{difference_down, difference_up};
 use crate::geometry::Aabb;
-use crate::index::Record;
 use crate::query::ItemId;
 use crate::scene::{Scene, WorldBox};
 
@@ -37,12 +36,6 @@ impl Solids {
             outer: scene.items.clone(),
             origin: scene.origin,
         }
-    }
-
-    /// The outer boxes with their ids: what structures in f32 hold.
-    pub(crate) fn records(&self) -> impl Iterator<Item = Record> {
-        let outer = self.outer.iter().zip(0..);
-        outer.map(|(&bounds, id)| Record { bounds, id })
     }
 
     /// Takes an item as something with holes, which may be hidden and hides nothing.

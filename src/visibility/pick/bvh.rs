@@ -40,7 +40,8 @@ pub struct PickBvh {
 /// Builds it for the table of back ends.
 fn build(solids: &Solids) -> Result<Box<dyn Pick>, NotBuilt> {
     refuse_stacks(ROW.name, &solids.outer)?;
-    let mut shapes: Vec<Shape> = solids.records().map(Shape::from).collect();
+    let records = Record::numbered(&solids.outer).into_iter();
+    let mut shapes: Vec<Shape> = records.map(Shape::from).collect();
     Ok(Box::new(PickBvh {
         tree: Bvh::build(&mut shapes),
         shapes,

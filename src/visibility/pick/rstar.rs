@@ -43,7 +43,7 @@ pub struct PickRstar {
 /// Builds it for the table of back ends.
 fn build(solids: &Solids) -> Result<Box<dyn Pick>, NotBuilt> {
     Ok(Box::new(PickRstar {
-        tree: RTree::bulk_load(solids.records().collect()),
+        tree: RTree::bulk_load(Record::numbered(&solids.outer)),
         zero: solids.origin,
     }))
 }

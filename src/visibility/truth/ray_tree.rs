@@ -98,9 +98,7 @@ impl Slabs {
 impl RayTree {
     /// Builds the tree over boxes about an origin. O(n log n).
     pub fn build(boxes: &[Aabb], origin: DVec3) -> RayTree {
-        let items = boxes.iter().zip(0..);
-        let record = |(&bounds, id)| Record { bounds, id };
-        let mut items: Vec<Record> = items.map(record).collect();
+        let mut items = Record::numbered(boxes);
         let mut pairs: Vec<Pair> = Vec::with_capacity(boxes.len() / LEAF + 1);
         // A set to be halved, and the side of the pair that is to lead to its halves.
         let mut open = Vec::new();

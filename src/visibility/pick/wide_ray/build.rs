@@ -69,8 +69,7 @@ impl Node {
 
 /// Builds the tree. O(n log n).
 pub(super) fn build(boxes: &[Aabb]) -> Built {
-    let record = |(&bounds, id)| Record { bounds, id };
-    let mut items: Vec<Record> = boxes.iter().zip(0..).map(record).collect();
+    let mut items = Record::numbered(boxes);
     let mut nodes: Vec<Node> = Vec::with_capacity(boxes.len() / 8 + 1);
     let mut root = Child::new(0, 0);
     // Where the number of the node is to be written.
