@@ -15,7 +15,7 @@ use super::run_resume::typed_args;
 use super::shared_args::TableFormat;
 use super::{Ending, funnel_table, interrupt, load_scene_by, print_json, text, unread_is_fine};
 use crate::funnel::{
-    self, Chain, FunnelInput, NONE, SeenFrom, StageKind, StageSweep, SweepPlan, SweepPoint,
+    self, Chain, FunnelInput, FunnelPlan, NONE, SeenFrom, StageKind, StageSweep, SweepPoint,
 };
 use crate::index::{Registry, StructureSpec};
 use crate::measure::{ProcessTimes, Protocol};
@@ -168,7 +168,7 @@ fn protocol(args: &PrecisionArgs, process: u32) -> Protocol {
 pub fn time(
     registry: &Registry,
     args: &PrecisionArgs,
-    plan: &SweepPlan,
+    plan: &FunnelPlan,
     timing: &Timing,
     stop: &dyn Fn() -> bool,
 ) -> anyhow::Result<Option<ProcessTimes>> {

@@ -144,7 +144,7 @@ impl<'w> Picks<'w> {
         let pickers = by_rays(By::First).into_iter().chain(by_rays(By::Nearest));
         Picks {
             world,
-            around: world.scene().surroundings(),
+            around: world.scene.surroundings(),
             pickers: pickers.chain(through).collect(),
             cursors: (0..world.views())
                 .map(|view| Cursors::of(world, view))
@@ -222,7 +222,7 @@ impl<'w> Picks<'w> {
     fn truth(&self, index: &RayIndex, rays: &Rays, cursor: &Cursor) -> Truth {
         let front = index.front_of(&cursor.ray).map(|front| front.item());
         let volume = cursor.rectangle.volume(rays, &self.around).ok();
-        let items = &self.world.scene().items;
+        let items = &self.world.scene.items;
         let volume = volume.filter(|_| items.len() <= MOST_FOR_LOOP);
         let in_planes = volume.map(|volume| {
             let ids = (0..).zip(items);
@@ -242,7 +242,7 @@ impl<'w> Picks<'w> {
 impl Cursors {
     fn of(world: &World, view: usize) -> Cursors {
         let rays = *world.rays(view);
-        let grid = world.samples();
+        let grid = world.samples;
         let size = [grid.width, grid.height].map(f64::from);
         let rows = 0..CURSORS.height;
         let places = rows.flat_map(|row| (0..CURSORS.width).map(move |column| (column, row)));
