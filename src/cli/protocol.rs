@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::advise::TrialPlan;
 use crate::drift::DriftPlan;
-use crate::funnel::{FunnelPlan, SweepPlan};
+use crate::funnel::FunnelPlan;
 use crate::measure::{Part, ProcessTimes, Share, TaskSamples};
 use crate::precision::PointPlan;
 
@@ -53,7 +53,7 @@ pub enum Job {
     /// Every stage of the funnel with every back end (`funnel`).
     Funnel(FunnelPlan, Timing),
     /// One stage with every back end (`precision --stage`).
-    Sweep(SweepPlan, Timing),
+    Sweep(FunnelPlan, Timing),
 }
 
 /// What a process is to know beside its plan.

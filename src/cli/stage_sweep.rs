@@ -11,7 +11,7 @@ use super::study::Study;
 use super::table::Table;
 use super::{Ending, funnel_table, interrupt, load_scene_by, print, text};
 use crate::funnel::{
-    self, Chain, FunnelInput, NONE, SeenFrom, StageKind, StageSweep, SweepPlan, SweepPoint,
+    self, Chain, FunnelInput, FunnelPlan, NONE, SeenFrom, StageKind, StageSweep, SweepPoint,
 };
 use crate::index::{Registry, StructureSpec};
 use crate::measure::{ProcessTimes, Protocol};
@@ -144,7 +144,7 @@ fn protocol(args: &PrecisionArgs, process: u32) -> Protocol {
 pub fn time(
     registry: &Registry,
     args: &PrecisionArgs,
-    plan: &SweepPlan,
+    plan: &FunnelPlan,
     timing: &Timing,
     stop: &dyn Fn() -> bool,
 ) -> anyhow::Result<Option<ProcessTimes>> {

@@ -2,12 +2,12 @@
 
 use super::chain::Chain;
 use super::fragment_rows;
-use super::hiding::{HIDING, HidingRow};
+use super::hiding::HIDING;
 use super::seen_from::SeenFrom;
-use super::stage::{BackEnd, NONE, StageKind};
+use super::stage::{BackEnd, StageKind};
 use super::triangle_rows;
 use crate::scene::{Regions, Scene};
-use crate::visibility::{Guarantee, region};
+use crate::visibility::region;
 
 /// What a chain takes where there are rooms.
 const PORTAL_CLIP: &str = "portal-clip";
@@ -49,26 +49,17 @@ fn of_regions(scene: &Scene) -> &'static [&'static str] {
 /// The back ends of a stage that a scene can have, with or without cut-outs among its
 /// items; structures of the object stage are not among them.
 pub fn back_ends(stage: StageKind, scene: &Scene, has_cut_outs: bool) -> Vec<BackEnd> {
-    let plain = |name, summary, guarantee| BackEnd {
-        stage,
-        name,
-        summary,
-        guarantee,
-        does_object_stage: false,
-    };
-    let mut rows = vec![plain(
-        NONE,
-        "the stage is left out",
-        Guarantee::Conservative,
-    )];
+    let mut rows = vec![BackEnd::left_out(stage)];
     match stage {
         StageKind::Region => {
             let names = of_regions(scene);
             let known = region::ROWS.iter().filter(|row| names.contains(&row.name));
-            rows.extend(known.map(|row| plain(row.name, row.summary, row.guarantee)));
+            let declared =
+                known.map(|row| BackEnd::of(stage, [row.name, row.summary], row.guarantee));
+            rows.extend(declared);
         }
-        StageKind::Occlusion => rows.extend(HIDING.iter().map(HidingRow::back_end)),
-        StageKind::Triangle => rows = triangle_rows::back_ends().collect(),
+        StageKind::Occlusion => rows.extend(HIDING.iter().map(|row| row.back_end)),
+        StageKind::Triangle => rows.extend(triangle_rows::back_ends()),
         StageKind::Fragment => rows.extend(fragment_rows::back_ends(scene, has_cut_outs)),
         _ => {}
     }

@@ -78,14 +78,16 @@ impl Bound<'_> {
     }
 }
 
-/// The bounds that a scene has data for: of fragments where items are solid boxes. `left` is the set that the chain leaves.
+/// The bounds that a scene has data for: of fragments where items are solid boxes. `left`
+/// is the set that the chain leaves.
 pub fn bounds<'w>(world: &'w World<'w>, pass: &Pass, left: usize, faces: &Faces) -> Vec<Bound<'w>> {
     let mut bounds = of_regions(world);
     bounds.extend(of_occlusion(world));
     bounds.push(of_cones(world, faces));
     bounds.extend(
         world
-            .solids()
+            .solids
+            .as_ref()
             .map(|solids| of_fragments(world, solids, pass, left)),
     );
     bounds
@@ -149,8 +151,8 @@ fn of_occlusion<'w>(world: &'w World<'w>) -> [Bound<'w>; 3] {
     let scenes: Rc<[&OccluderScene]> = (0..world.views()).map(|v| world.occluders(v)).collect();
     let trace = |view: usize| {
         let (rays, volume, scene) = (world.rays(view), world.volume(view), scenes[view]);
-        let view = View::new(rays, volume, scene, world.samples());
-        FrameTrace::of(scene, &view, world.kernel())
+        let view = View::new(rays, volume, scene, world.samples);
+        FrameTrace::of(scene, &view, world.kernel)
     };
     let traces: Rc<[FrameTrace]> = (0..world.views()).map(trace).collect();
     let bound = |name, ask| Bound {
@@ -161,8 +163,8 @@ fn of_occlusion<'w>(world: &'w World<'w>) -> [Bound<'w>; 3] {
     };
     let [reading, replaying] = [(); 2].map(|()| traces.clone());
     let drawn_in = scenes.clone();
-    let buffer = RefCell::new(MaskedInner::new(world.samples()));
-    let read = MaskedInner::new(world.samples());
+    let buffer = RefCell::new(MaskedInner::new(world.samples));
+    let read = MaskedInner::new(world.samples);
     [
         bound(
             "read the occluders that are drawn",
@@ -186,7 +188,7 @@ fn of_occlusion<'w>(world: &'w World<'w>) -> [Bound<'w>; 3] {
 fn of_cones<'w>(world: &'w World<'w>, faces: &Faces) -> Bound<'w> {
     let views = (0..world.views()).map(|view| SafeCones::of(faces.clusters(view)));
     let cones: Vec<SafeCones> = views.collect();
-    let kernel = world.kernel();
+    let kernel = world.kernel;
     Bound {
         stage: StageKind::Triangle,
         back_end: "cone-f32-safe",
@@ -201,16 +203,14 @@ fn of_fragments<'w>(world: &'w World<'w>, solids: &Solids, pass: &Pass, left: us
     let covered = (0..world.views()).map(|view| {
         let items = world.listed(pass.items(left, view));
         let solids = solids.some(&items);
-        let pieces: Vec<Piece> = (0..items.len() as ItemId)
-            .map(|item| Piece { item, part: None })
-            .collect();
-        let canvas = Canvas::of(world.rays(view), world.samples());
+        let pieces: Vec<Piece> = (0..items.len() as ItemId).map(Piece::whole).collect();
+        let canvas = Canvas::of(world.rays(view), world.samples);
         draw(&canvas, &solids, &pieces, &Tests::default())
             .tally
             .covered as usize
     });
     let covered: Vec<usize> = covered.collect();
-    let samples = world.samples().samples();
+    let samples = world.samples.samples();
     let depths = vec![1.0f32; samples];
     let buffer = RefCell::new(vec![0.0f32; samples]);
     let ids: Vec<ItemId> = (0..samples as ItemId).collect();

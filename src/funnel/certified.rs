@@ -121,7 +121,7 @@ fn in_question(
     let outputs = outputs.into_iter().map(|set| pass.items(set, view));
     let outputs: Vec<&[ItemId]> = outputs.flatten().collect();
     let is_removed = |id: &ItemId| outputs.iter().any(|set| set.binary_search(id).is_err());
-    let boxes = (0..).zip(&world.scene().items);
+    let boxes = (0..).zip(&world.scene.items);
     let in_view = boxes.filter(|(_, b)| world.volume(view).sees(b));
     let mut items: Vec<ItemId> = in_view.map(|(id, _)| id).filter(is_removed).collect();
     // What was lost is proven visible, which is the point.

@@ -63,11 +63,11 @@ impl Faces {
     /// Of a set of items of each view. Most views have few items left; where a stage
     /// before is left out, 12 triangles an item take memory.
     pub fn of(world: &World, pass: &Pass, set: usize) -> Faces {
-        let whole = world.surfaces().map(|all| Built::of(all.clone()));
+        let whole = world.surfaces.as_ref().map(|all| Built::of(all.clone()));
         let views = (0..world.views()).map(|view| {
             let items = world.listed(pass.items(set, view));
             let built = whole.clone().unwrap_or_else(|| {
-                let surfaces = Surfaces::of_items(world.scene(), &items);
+                let surfaces = Surfaces::of_items(world.scene, &items);
                 Built::of(Arc::new(surfaces))
             });
             let clusters = &built.clusters;
@@ -83,7 +83,7 @@ impl Faces {
         });
         Faces {
             views: views.collect(),
-            kernel: world.kernel(),
+            kernel: world.kernel,
         }
     }
 

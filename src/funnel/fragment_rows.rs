@@ -31,11 +31,7 @@ pub fn back_ends(scene: &Scene, has_cut_outs: bool) -> impl Iterator<Item = Back
     let has_rooms = matches!(&scene.regions, Regions::Tiling(rooms) if !rooms.portals.is_empty());
     let rows = [(true, z), (has_cut_outs, alpha), (has_rooms, stencil)];
     let there = rows.into_iter().filter(|(is_there, _)| *is_there);
-    there.map(|(_, (name, summary, guarantee))| BackEnd {
-        stage: StageKind::Fragment,
-        name,
-        summary,
-        guarantee,
-        does_object_stage: false,
+    there.map(|(_, (name, summary, guarantee))| {
+        BackEnd::of(StageKind::Fragment, [name, summary], guarantee)
     })
 }

@@ -88,7 +88,7 @@ pub fn tested(
         }
         let given = pass.items(set, view);
         let items = world.listed(given);
-        let solids = world.solids();
+        let solids = world.solids.as_ref();
         let left = solids.map(|solids| Left::of(world, solids, view, &items));
         for (place, back_end) in back_ends.iter().enumerate() {
             let output = match (&left, back_end.name) {
@@ -139,15 +139,15 @@ impl Left {
     fn of(world: &World, solids: &Solids, view: usize, items: &[ItemId]) -> Left {
         let rays = world.rays(view);
         let room = Room::of(world, rays).map(|room| {
-            let pieces = (0..items.len() as ItemId).map(piece);
+            let pieces = (0..items.len() as ItemId).map(Piece::whole);
             let is_near = |p: &Piece| room.items.binary_search(&items[p.item as usize]).is_ok();
             let (near, beyond) = pieces.partition(is_near);
             (room, [near, beyond])
         });
         Left {
-            canvas: Canvas::of(rays, world.samples()),
+            canvas: Canvas::of(rays, world.samples),
             solids: solids.some(items),
-            cut_outs: world.cut_outs().map(|surfaces| surfaces.some(items)),
+            cut_outs: world.cut_outs.as_ref().map(|surfaces| surfaces.some(items)),
             room,
         }
     }
@@ -161,7 +161,7 @@ impl Left {
         };
         match self.room.as_ref().filter(|_| test == STENCIL) {
             None => {
-                let pieces = (0..solids.boxes.len() as ItemId).map(piece);
+                let pieces = (0..solids.boxes.len() as ItemId).map(Piece::whole);
                 draw(canvas, solids, &pieces.collect::<Vec<_>>(), &tests)
             }
             Some((room, [near, beyond])) => {
@@ -176,14 +176,10 @@ impl Left {
     }
 }
 
-fn piece(item: ItemId) -> Piece {
-    Piece { item, part: None }
-}
-
 impl Room {
     /// `None` for an eye that is in no room.
     fn of(world: &World, rays: &Rays) -> Option<Room> {
-        let regions = world.regions()?;
+        let regions = world.regions.as_ref()?;
         let graph: &RegionGraph = regions.graph();
         let mut homes = Vec::new();
         if !graph.homes(rays, &mut homes) {
@@ -192,9 +188,7 @@ impl Room {
         let exits = homes.iter().flat_map(|&home| graph.exits(home));
         let portals = exits.map(|&exit| {
             let corners = graph.openings()[exit as usize].corners;
-            let [first, rest @ ..] = corners;
-            let around = |b: WorldBox, p: &glam::DVec3| WorldBox::new(b.min.min(*p), b.max.max(*p));
-            rest.iter().fold(WorldBox::new(first, first), around)
+            WorldBox::union_of(corners.map(|corner| WorldBox::new(corner, corner)))
         });
         let portals = portals.collect();
         let items = homes

@@ -3,11 +3,11 @@
 use super::stage::{BackEnd, StageKind};
 use crate::kernel::Kernel;
 use crate::query::ItemId;
+use crate::visibility::SampleGrid;
 use crate::visibility::occlusion::{
     DepthRays, HierarchicalZ, Interleaved, MaskedCentre, MaskedInner, OccluderChoice,
     OccluderScene, OcclusionBuffer, TwoPass, View, ZBuffer,
 };
-use crate::visibility::{Guarantee, SampleGrid};
 
 /// Something that removes what is hidden, with memory of its own.
 pub trait Hide {
@@ -36,43 +36,27 @@ impl<B: OcclusionBuffer> Hide for Interleaved<B> {
 
 /// A row of the occlusion stage.
 pub struct HidingRow {
-    name: &'static str,
-    summary: &'static str,
-    guarantee: Guarantee,
-    is_interleaved: bool,
+    /// What it declares.
+    pub back_end: BackEnd,
     /// With a buffer of so many pixels, on an instruction set. Two passes draw the occluders
     /// that are chosen; a walk of a tree draws what it comes upon.
     pub make: fn(SampleGrid, Kernel, OccluderChoice) -> Box<dyn Hide>,
 }
 
 impl HidingRow {
-    /// What it declares.
-    pub fn back_end(&self) -> BackEnd {
-        BackEnd {
-            stage: StageKind::Occlusion,
-            name: self.name,
-            summary: self.summary,
-            guarantee: self.guarantee,
-            does_object_stage: self.is_interleaved,
-        }
-    }
-
     const fn interleaved<B: OcclusionBuffer + 'static>(name: &'static str) -> HidingRow {
         HidingRow {
-            name,
-            summary: B::SUMMARY,
-            guarantee: B::GUARANTEE,
-            is_interleaved: true,
+            back_end: BackEnd {
+                does_object_stage: true,
+                ..BackEnd::of(StageKind::Occlusion, [name, B::SUMMARY], B::GUARANTEE)
+            },
             make: |grid, kernel, _| Box::new(Interleaved::new(B::new(grid), kernel)),
         }
     }
 
     const fn two_pass<B: OcclusionBuffer + 'static>(name: &'static str) -> HidingRow {
         HidingRow {
-            name,
-            summary: B::SUMMARY,
-            guarantee: B::GUARANTEE,
-            is_interleaved: false,
+            back_end: BackEnd::of(StageKind::Occlusion, [name, B::SUMMARY], B::GUARANTEE),
             make: |grid, kernel, choice| Box::new(TwoPass::new(B::new(grid), choice, kernel)),
         }
     }

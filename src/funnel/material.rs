@@ -41,12 +41,15 @@ pub struct Holes {
 impl Material<'_> {
     /// Of a scene as the funnel has it.
     pub fn of<'w>(input: &FunnelInput, world: &'w World) -> Material<'w> {
-        let Some(solids) = world.solids() else {
-            let around = Solids::of(world.scene());
-            let inner = world.inner().map_or(&[][..], |inner| &inner.boxes);
+        let Some(solids) = world.solids.as_ref() else {
+            let around = Solids::of(world.scene);
+            let inner = world.inner.as_ref().map_or(&[][..], |inner| &inner.boxes);
             let inner = (0..).zip(inner).filter(|(_, b)| !b.is_empty());
             let inner = inner.map(|(item, b)| (item, WorldBox::within(b, around.origin)));
-            let surfaces = world.surfaces().expect("triangles of what is no solid box");
+            let surfaces = world
+                .surfaces
+                .as_ref()
+                .expect("triangles of what is no solid box");
             return Material::Triangles {
                 within: inner.filter(|(_, b)| b.min.cmplt(b.max).all()).collect(),
                 around,
@@ -55,7 +58,7 @@ impl Material<'_> {
             };
         };
         let all = RayIndex::build(solids);
-        let (Some(typed), Some(holes)) = (input.cut_outs, world.cut_outs()) else {
+        let (Some(typed), Some(holes)) = (input.cut_outs, world.cut_outs.as_ref()) else {
             return Material::Boxes(solids, all);
         };
         let items = 0..world.items() as ItemId;

@@ -47,7 +47,7 @@ pub fn mirrored(
     let own = &solids.boxes[item as usize];
     let axis = (own.max - own.min).min_position();
     let others = (0..solids.boxes.len() as ItemId).filter(|&other| other != item);
-    let others: Vec<Piece> = others.map(whole).collect();
+    let others: Vec<Piece> = others.map(Piece::whole).collect();
     let [mut with, mut without] = [(); 2].map(|()| Vec::new());
     let (mut views, mut marked, mut shown, mut wrong) = (0, 0, 0, 0);
     for view in 0..world.views() {
@@ -61,11 +61,11 @@ pub fn mirrored(
             continue;
         };
         let at = face.min[axis];
-        let canvas = Canvas::of(rays, world.samples());
+        let canvas = Canvas::of(rays, world.samples);
         let left: Vec<Piece> = world
             .listed(pass.items(set, view))
             .iter()
-            .map(|&item| whole(item))
+            .map(|&item| Piece::whole(item))
             .collect();
         let direct = draw(&canvas, solids, &left, &Tests::default());
         let stencil = Stencil::of_rectangle(&canvas, &face, &direct.depth);
@@ -97,10 +97,6 @@ pub fn mirrored(
         without_stencil: FragmentCounts::of(&without)?,
         wrong_sample_count: wrong,
     })
-}
-
-fn whole(item: ItemId) -> Piece {
-    Piece { item, part: None }
 }
 
 /// The face of a box across an axis that a camera sees the front of.

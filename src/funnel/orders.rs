@@ -69,7 +69,10 @@ impl Orders {
             Left {
                 orders: ORDERS.iter().map(|row| (row.build)(&solids)).collect(),
                 rays: *world.rays(view),
-                cut_outs: world.cut_outs().map(|surfaces| surfaces.some(&items)),
+                cut_outs: world
+                    .cut_outs
+                    .as_ref()
+                    .map(|surfaces| surfaces.some(&items)),
                 solids,
             }
         });

@@ -121,15 +121,15 @@ impl<'w> Picks<'w> {
     /// Builds every back end that can hold the scene.
     pub fn of(world: &'w World<'w>, solids: &Solids) -> Picks<'w> {
         let suits = |name: &str| name != "linear" || world.items() <= MOST_FOR_LOOP;
-        let built = BACK_ENDS.iter().filter(|row| suits(row.about.name));
+        let built = BACK_ENDS.iter().filter(|row| suits(row.name));
         let built: Vec<(_, Rc<dyn Pick>)> = built
-            .filter_map(|row| Some((row.about, (row.build)(solids).ok()?.into())))
+            .filter_map(|row| Some((row, (row.build)(solids).ok()?.into())))
             .collect();
         let by_rays = |ask: fn(Rc<dyn Pick>) -> By<'w>| {
-            let pickers = built.iter().map(move |(about, pick)| Picker {
-                name: about.name.to_owned(),
-                summary: about.summary,
-                guarantee: about.guarantee,
+            let pickers = built.iter().map(move |(row, pick)| Picker {
+                name: row.name.to_owned(),
+                summary: row.summary,
+                guarantee: row.guarantee,
                 by: ask(pick.clone()),
             });
             pickers.collect::<Vec<_>>()
@@ -144,7 +144,7 @@ impl<'w> Picks<'w> {
         let pickers = by_rays(By::First).into_iter().chain(by_rays(By::Nearest));
         Picks {
             world,
-            around: world.scene().surroundings(),
+            around: world.scene.surroundings(),
             pickers: pickers.chain(through).collect(),
             cursors: (0..world.views())
                 .map(|view| Cursors::of(world, view))
@@ -222,7 +222,7 @@ impl<'w> Picks<'w> {
     fn truth(&self, index: &RayIndex, rays: &Rays, cursor: &Cursor) -> Truth {
         let front = index.front_of(&cursor.ray).map(|front| front.item());
         let volume = cursor.rectangle.volume(rays, &self.around).ok();
-        let items = &self.world.scene().items;
+        let items = &self.world.scene.items;
         let volume = volume.filter(|_| items.len() <= MOST_FOR_LOOP);
         let in_planes = volume.map(|volume| {
             let ids = (0..).zip(items);
@@ -242,7 +242,7 @@ impl<'w> Picks<'w> {
 impl Cursors {
     fn of(world: &World, view: usize) -> Cursors {
         let rays = *world.rays(view);
-        let grid = world.samples();
+        let grid = world.samples;
         let size = [grid.width, grid.height].map(f64::from);
         let rows = 0..CURSORS.height;
         let places = rows.flat_map(|row| (0..CURSORS.width).map(move |column| (column, row)));

@@ -13,8 +13,8 @@ use crate::scene::Scene;
 use crate::visibility::Solids;
 use crate::visibility::region::doom::{DoomMap, SectorPvs};
 use crate::visibility::region::{
-    Audit, Flood, FromRegion, GridFlood, OtherRegions, PortalClip, PortalRect, ProvenPvs, Pvs,
-    REJECT, RegionGraph, RegionItems, RegionRow, RoomsPvs, STORED, StoredPvs, audit, pairs_of,
+    Audit, EXACT, FromRegion, OtherRegions, ProvenPvs, Pvs, REJECT, RegionGraph, RegionItems,
+    RegionRow, RoomsPvs, STORED, Searched, StoredPvs, audit, pairs_of,
 };
 use crate::visibility::truth::PlanWall;
 
@@ -115,7 +115,11 @@ impl Regions {
         let mut rows = Vec::new();
         let mut audits = Vec::new();
         if let Some(reject) = map.reject() {
-            rows.extend(StoredPvs::reject(graph.clone(), Arc::new(reject.clone())));
+            rows.extend(StoredPvs::of(
+                graph.clone(),
+                Arc::new(reject.clone()),
+                REJECT,
+            ));
             audits.push(ClaimAudit {
                 claim: REJECT.name,
                 audit: audit(reject, &exact, &graph)?,
@@ -146,11 +150,11 @@ impl Regions {
         from: SeenFrom,
     ) -> Regions {
         let items = Arc::new(RegionItems::of(&graph, scene));
-        let mut rows: Vec<Box<dyn RegionRow>> = vec![Box::new(Flood(graph.clone()))];
+        let mut rows: Vec<Box<dyn RegionRow>> = vec![Box::new(Searched::flood(graph.clone()))];
         // Portals restrict an eye: from a whole region they let through what a flood does.
         if from == SeenFrom::Eye {
-            rows.push(Box::new(PortalRect(graph.clone())));
-            rows.push(Box::new(PortalClip(graph.clone())));
+            rows.push(Box::new(Searched::portal_rect(graph.clone())));
+            rows.push(Box::new(Searched::portal_clip(graph.clone())));
         }
         let stored = stored.into_iter();
         rows.extend(stored.map(|row| Box::new(row) as Box<dyn RegionRow>));
@@ -215,7 +219,7 @@ impl Regions {
 
 /// The flood over a grid of the scene's own boxes.
 fn grid(solids: &Solids, scene: &Scene) -> Row {
-    let row = GridFlood::of(solids);
+    let row = Searched::grid_flood(solids);
     Row {
         items: Arc::new(RegionItems::of(row.graph(), scene)),
         row: Box::new(row),
@@ -224,7 +228,7 @@ fn grid(solids: &Solids, scene: &Scene) -> Row {
 
 /// The claim of a file, as a row.
 fn claimed(claim: &Arc<Pvs>, graph: &Arc<RegionGraph>) -> Result<StoredPvs, FunnelError> {
-    let row = StoredPvs::claim(graph.clone(), claim.clone());
+    let row = StoredPvs::of(graph.clone(), claim.clone(), STORED);
     row.ok_or_else(|| {
         FunnelError::Claim(OtherRegions {
             claimed: claim.len(),
@@ -235,5 +239,5 @@ fn claimed(claim: &Arc<Pvs>, graph: &Arc<RegionGraph>) -> Result<StoredPvs, Funn
 
 /// What an exact search has found, as a row.
 fn stored(exact: &impl ProvenPvs, graph: &Arc<RegionGraph>) -> Option<StoredPvs> {
-    StoredPvs::exact(graph.clone(), Arc::new(exact.pvs().clone()))
+    StoredPvs::of(graph.clone(), Arc::new(exact.pvs().clone()), EXACT)
 }

@@ -56,14 +56,17 @@ pub enum Shown<'w> {
 impl Shown<'_> {
     /// Of a scene as its items are taken.
     pub fn of<'w>(world: &'w World) -> Shown<'w> {
-        if let Some(solids) = world.solids() {
+        if let Some(solids) = world.solids.as_ref() {
             let index = RayIndex::build(solids);
-            return match (world.cut_outs(), world.truth_cache()) {
+            return match (world.cut_outs.as_ref(), world.truth_cache) {
                 (None, Some(cache)) => Shown::Kept(solids, index, cache, digest_of(solids)),
                 (holes, _) => Shown::Solids(solids, index, holes),
             };
         }
-        let surfaces = world.surfaces().expect("triangles of what is no solid box");
+        let surfaces = world
+            .surfaces
+            .as_ref()
+            .expect("triangles of what is no solid box");
         Shown::Surfaces(SurfaceIndex::build(surfaces))
     }
 

@@ -35,6 +35,29 @@ pub struct BackEnd {
     pub does_object_stage: bool,
 }
 
+impl BackEnd {
+    /// One that does a single stage, under its name and with its summary.
+    pub const fn of(
+        stage: StageKind,
+        [name, summary]: [&'static str; 2],
+        guarantee: Guarantee,
+    ) -> BackEnd {
+        BackEnd {
+            stage,
+            name,
+            summary,
+            guarantee,
+            does_object_stage: false,
+        }
+    }
+
+    /// The row of every stage that does nothing.
+    pub fn left_out(stage: StageKind) -> BackEnd {
+        let declared = [NONE, "the stage is left out"];
+        BackEnd::of(stage, declared, Guarantee::Conservative)
+    }
+}
+
 /// A guarantee as it is written.
 pub fn by_name<S: serde::Serializer>(guarantee: &Guarantee, out: S) -> Result<S::Ok, S::Error> {
     out.serialize_str(guarantee.name())

@@ -3,8 +3,6 @@
 
 use std::cell::RefCell;
 
-use serde::{Deserialize, Serialize};
-
 use super::bounds::{Bound, bounds};
 use super::certified::{Proofs, certified};
 use super::conclusions::conclusions;
@@ -17,6 +15,7 @@ use super::mirror::mirrored;
 use super::orders::{self, Orders};
 use super::pass::{Pass, Walked};
 use super::picks::Picks;
+use super::plan::{FunnelPlan, task};
 use super::plan_view::{PlanView, fate};
 use super::proven::ProofCounts;
 use super::report::{CutOutRow, FunnelReport, Gain, LevelRow, Side, StageRow};
@@ -27,17 +26,9 @@ use super::triangle_rows;
 use super::truth::Truth;
 use super::walks::Walks;
 use super::world::{FunnelInput, World};
-use crate::measure::{Ask, OverProcesses, ProcessTimes, Schedule, TimedTask, Verdict, timed};
+use crate::measure::{Ask, OverProcesses, ProcessTimes, TimedTask, Verdict};
 use crate::visibility::truth::RayIndex;
 use crate::visibility::{Level, Solids};
-
-/// What all processes time: the plan is the same for each.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct FunnelPlan {
-    schedule: Schedule,
-    /// By task and view: how much is handed on.
-    expected: Vec<Vec<u64>>,
-}
 
 /// Everything judged, and nothing timed.
 pub struct Prepared {
@@ -169,19 +160,15 @@ pub fn prepare(
     });
     let steps = pass.timed_steps(&walks.chosen);
     let behind = rows.iter().zip(&tasks).filter_map(|(row, task)| {
-        sides_behind(row, *task, &steps, world.cut_outs().is_some(), &rows)
+        sides_behind(row, *task, &steps, world.cut_outs.is_some(), &rows)
     });
     let gains = of_items.chain(behind).collect();
     let bounds = bounds_of(&world, &pass, &walks.chosen, &left);
     let bound_rows = bounds.iter().map(Bound::row).collect();
     let timed = timed_tasks(&pass, &world, &left, bounds, None);
-    let schedule = Schedule::new(world.views(), &timed, input.protocol);
     let level = Level::of(&input.scene.name, input.scene)?;
     Ok(Some(Prepared {
-        plan: FunnelPlan {
-            expected: timed.iter().map(|task| task.expected.clone()).collect(),
-            schedule,
-        },
+        plan: FunnelPlan::of(&timed, world.views(), input),
         tasks,
         gains,
         report: FunnelReport {
@@ -194,15 +181,15 @@ pub fn prepare(
             level: LevelRow::of(&level),
             cut_outs: input
                 .cut_outs
-                .zip(world.cut_outs())
+                .zip(world.cut_outs.as_ref())
                 .map(|(typed, made)| CutOutRow::of(typed, made)),
             from: input.from,
             occluders: input.occluders.to_string(),
             chain: input.chain.clone(),
             stages: rows,
             audits: world.audits().to_vec(),
-            inner_boxes: world.inner().map(|inner| inner.row.clone()),
-            solid_blocks: world.blocks().cloned(),
+            inner_boxes: world.inner.as_ref().map(|inner| inner.row.clone()),
+            solid_blocks: world.blocks.clone(),
             mirror,
             orders: drawn,
             picks: picked,
@@ -231,8 +218,7 @@ pub fn time(
     let left = Left::of(&world, &pass, &walks.chosen);
     let bounds = bounds_of(&world, &pass, &walks.chosen, &left);
     let tasks = timed_tasks(&pass, &world, &left, bounds, Some(&plan.expected));
-    let timed = timed(&tasks, &plan.schedule, input.protocol, &|_| stop());
-    Ok(timed.map(|timed| ProcessTimes::of(&timed)))
+    Ok(plan.time(&tasks, input, stop))
 }
 
 /// The chain with and without a stage behind those of whole items, if this is the chain's
@@ -287,7 +273,7 @@ impl<'w> Left<'w> {
         let set = chosen.left();
         Left {
             faces: Faces::of(world, pass, set),
-            boxes: world.solids().map(|solids| LeftBoxes {
+            boxes: world.solids.as_ref().map(|solids| LeftBoxes {
                 solids,
                 orders: Orders::of(world, solids, pass, set),
                 picks: Picks::of(world, solids),
@@ -320,8 +306,8 @@ fn timed_tasks<'p>(
         let ask: Ask = Box::new(move |view, out| run(view, pass.items(step.input, view), out));
         ask
     });
-    let culls = (1..triangle_rows::back_ends().count()).map(|place| {
-        let ask: Ask = Box::new(move |view, out| left.faces.cull(place - 1, view, out));
+    let culls = (0..triangle_rows::back_ends().count()).map(|place| {
+        let ask: Ask = Box::new(move |view, out| left.faces.cull(place, view, out));
         ask
     });
     let behind = left
@@ -343,14 +329,12 @@ fn timed_tasks<'p>(
             });
             sorts.chain(picks)
         });
-    let task = |(place, ask): (usize, Ask<'p>)| TimedTask {
-        expected: match expected {
+    let task = |(place, ask): (usize, Ask<'p>)| {
+        let expected = match expected {
             Some(expected) => expected[place].clone(),
             None => counts(&ask, world.views()),
-        },
-        ask,
-        ask_many: None,
-        least_ns: None,
+        };
+        task(ask, expected)
     };
     let bounds = bounds.into_iter().map(|bound| bound.ask);
     steps

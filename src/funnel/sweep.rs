@@ -2,20 +2,21 @@
 //! beside what it takes, the occlusion stage over the sizes of its buffer. Truth are
 //! rays between the samples too, so that no size of a buffer is its own judge.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::error::FunnelError;
 use super::faces::Faces;
-use super::hiding::HIDING;
+use super::hiding::{HIDING, HidingRow};
 use super::judged::{Errors, Judged, judge_items};
 use super::pass::{ALL, Pass};
+use super::plan::{FunnelPlan, task};
 use super::seen::seen;
 use super::stage::{BackEnd, NONE, StageKind};
 use super::times::Times;
 use super::triangle_rows;
 use super::truth::Truth;
 use super::world::{FunnelInput, World};
-use crate::measure::{Ask, OverProcesses, ProcessTimes, Schedule, TimedTask, timed};
+use crate::measure::{Ask, OverProcesses, ProcessTimes};
 use crate::visibility::SampleGrid;
 
 /// Columns of the buffers that are looked at; rows are 9 for 16 of them.
@@ -63,17 +64,10 @@ pub struct StageSweep {
     pub points: Vec<SweepPoint>,
 }
 
-/// What all processes time: the plan is the same for each.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct SweepPlan {
-    schedule: Schedule,
-    expected: Vec<Vec<u64>>,
-}
-
 /// Everything judged, and nothing timed.
 pub struct PreparedSweep {
     /// What the other processes are to measure.
-    pub plan: SweepPlan,
+    pub plan: FunnelPlan,
     sweep: StageSweep,
 }
 
@@ -125,11 +119,11 @@ impl<'w> Given<'w> {
                 let sized = HIDING
                     .iter()
                     .flat_map(|row| WIDTHS.map(|width| (row, width)));
-                let entry = |(row, width): (&'g super::hiding::HidingRow, u32)| {
+                let entry = |(row, width): (&'g HidingRow, u32)| {
                     let grid = SampleGrid::new(width, (width * 9).div_ceil(16));
                     let run = world.run_hiding(row, grid);
                     Entry {
-                        back_end: row.back_end(),
+                        back_end: row.back_end,
                         buffer: Some(grid),
                         ask: Box::new(move |view, out| run(view, given(view), out)),
                         faces: None,
@@ -138,7 +132,7 @@ impl<'w> Given<'w> {
                 sized.map(entry).collect()
             }
             StageKind::Triangle => {
-                let rows = triangle_rows::back_ends().skip(1).zip(0..);
+                let rows = triangle_rows::back_ends().zip(0..);
                 let entry = |(back_end, place): (BackEnd, usize)| Entry {
                     back_end,
                     buffer: None,
@@ -229,18 +223,10 @@ pub fn prepare_sweep(
             times: Times::default(),
             on_front: false,
         });
-        tasks.push(TimedTask {
-            ask,
-            ask_many: None,
-            expected: counts,
-            least_ns: None,
-        });
+        tasks.push(task(ask, counts));
     }
     Ok(Some(PreparedSweep {
-        plan: SweepPlan {
-            schedule: Schedule::new(world.views(), &tasks, input.protocol),
-            expected: tasks.iter().map(|task| task.expected.clone()).collect(),
-        },
+        plan: FunnelPlan::of(&tasks, world.views(), input),
         sweep: StageSweep {
             scene: input.scene.name.clone(),
             path: input.path.name.clone(),
@@ -260,7 +246,7 @@ pub fn prepare_sweep(
 pub fn time_sweep(
     input: &FunnelInput,
     stage: StageKind,
-    plan: &SweepPlan,
+    plan: &FunnelPlan,
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<ProcessTimes>, FunnelError> {
     let world = World::new(input)?;
@@ -268,15 +254,8 @@ pub fn time_sweep(
         return Ok(None);
     };
     let entries = given.entries(&world, stage).into_iter().zip(&plan.expected);
-    let tasks = entries.map(|(entry, expected)| TimedTask {
-        ask: entry.ask,
-        ask_many: None,
-        expected: expected.clone(),
-        least_ns: None,
-    });
-    let tasks: Vec<TimedTask> = tasks.collect();
-    let timed = timed(&tasks, &plan.schedule, input.protocol, &|_| stop());
-    Ok(timed.map(|timed| ProcessTimes::of(&timed)))
+    let tasks = entries.map(|(entry, expected)| task(entry.ask, expected.clone()));
+    Ok(plan.time(&tasks.collect::<Vec<_>>(), input, stop))
 }
 
 impl PreparedSweep {

@@ -74,27 +74,33 @@ pub type Run<'w> = Box<dyn Fn(usize, Option<&[ItemId]>, &mut Vec<ItemId>) + 'w>;
 
 /// A scene and the views of a path, ready for every back end.
 pub struct World<'a> {
-    scene: &'a Scene,
-    kernel: Kernel,
-    samples: SampleGrid,
+    /// The scene itself.
+    pub scene: &'a Scene,
+    /// The instructions of every stage.
+    pub kernel: Kernel,
+    /// Where it is looked whether an item is visible.
+    pub samples: SampleGrid,
     structures: Vec<(String, Box<dyn DynIndex>)>,
     views: Vec<View>,
-    /// The items, if they are solid boxes.
-    solids: Option<Solids>,
-    cut_outs: Option<fragment::Surfaces>,
+    /// The items as they hide each other, if they are solid boxes.
+    pub solids: Option<Solids>,
+    /// Which items have holes, if any have.
+    pub cut_outs: Option<fragment::Surfaces>,
     /// The triangles of the items, if they are no solid boxes; of a map also those of its
     /// floors and ceilings, behind the items.
-    surfaces: Option<Arc<Surfaces>>,
-    /// Boxes inside the items, if those are triangles.
-    inner: Option<Inner>,
-    /// What is known of the boxes in the solid of a map.
-    blocks: Option<BlocksRow>,
+    pub surfaces: Option<Arc<Surfaces>>,
+    /// The boxes inside the items of a mesh, which are drawn as occluders.
+    pub inner: Option<Inner>,
+    /// What is known of the boxes in the solid of a map, which are drawn as occluders.
+    pub blocks: Option<BlocksRow>,
     occluders: OccluderScene,
     /// Of a map: the same without what hides, for eyes outside its rooms.
     bare: Option<OccluderScene>,
     choice: OccluderChoice,
-    regions: Option<Regions>,
-    truth_cache: Option<&'a TruthCache>,
+    /// The regions of the scene.
+    pub(super) regions: Option<Regions>,
+    /// Where sample truth is kept, if it is.
+    pub truth_cache: Option<&'a TruthCache>,
 }
 
 /// A camera in every form that a stage needs.
@@ -234,11 +240,6 @@ impl<'a> World<'a> {
         self.regions.as_ref().map_or(&[], |regions| &regions.audits)
     }
 
-    /// The scene itself.
-    pub fn scene(&self) -> &Scene {
-        self.scene
-    }
-
     /// The items as the occlusion stage draws and tests them in a view.
     pub fn occluders(&self, view: usize) -> &OccluderScene {
         match &self.bare {
@@ -263,60 +264,14 @@ impl<'a> World<'a> {
         structures.map(|(label, index)| (&label[..], &**index))
     }
 
-    /// Where it is looked whether an item is visible.
-    pub fn samples(&self) -> SampleGrid {
-        self.samples
-    }
-
-    /// The instructions of every stage.
-    pub fn kernel(&self) -> Kernel {
-        self.kernel
-    }
-
     /// A view as the triangle stage has it.
     pub fn triangle_view(&self, view: usize) -> &triangle::View {
         &self.views[view].triangles
     }
 
-    /// The items as they hide each other, if they are solid boxes.
-    pub fn solids(&self) -> Option<&Solids> {
-        self.solids.as_ref()
-    }
-
-    /// The triangles of the items, if they are no solid boxes; of a map also those of its
-    /// floors and ceilings, behind the items.
-    pub fn surfaces(&self) -> Option<&Arc<Surfaces>> {
-        self.surfaces.as_ref()
-    }
-
-    /// The boxes inside the items of a mesh, which are drawn as occluders.
-    pub fn inner(&self) -> Option<&Inner> {
-        self.inner.as_ref()
-    }
-
-    /// What is known of the boxes in the solid of a map, which are drawn as occluders.
-    pub fn blocks(&self) -> Option<&BlocksRow> {
-        self.blocks.as_ref()
-    }
-
     /// The place of a view's camera in the path.
     pub fn camera(&self, view: usize) -> usize {
         self.views[view].camera
-    }
-
-    /// Which items have holes, if any have.
-    pub fn cut_outs(&self) -> Option<&fragment::Surfaces> {
-        self.cut_outs.as_ref()
-    }
-
-    /// Where sample truth is kept, if it is.
-    pub fn truth_cache(&self) -> Option<&TruthCache> {
-        self.truth_cache
-    }
-
-    /// The regions of the scene.
-    pub(super) fn regions(&self) -> Option<&Regions> {
-        self.regions.as_ref()
     }
 
     /// Whether a view's eye, and all that is before its near plane, is in the regions of
@@ -366,13 +321,8 @@ impl<'a> World<'a> {
             .back_ends(stage)
             .into_iter()
             .find(|row| row.name == name);
-        found.unwrap_or(BackEnd {
-            stage,
-            name: "frustum",
-            summary: "the six-plane test by a structure",
-            guarantee: Guarantee::Conservative,
-            does_object_stage: false,
-        })
+        let frustum = ["frustum", "the six-plane test by a structure"];
+        found.unwrap_or(BackEnd::of(stage, frustum, Guarantee::Conservative))
     }
 
     /// A back end, ready to be asked.
@@ -426,14 +376,14 @@ impl<'a> World<'a> {
     }
 
     fn run_occlusion(&self, name: &str) -> Run<'_> {
-        let row = HIDING.iter().find(|row| row.back_end().name == name);
+        let row = HIDING.iter().find(|row| row.back_end.name == name);
         self.run_hiding(row.expect("a row of the occlusion stage"), self.samples)
     }
 
     /// A back end of the occlusion stage with a buffer of so many pixels.
     pub fn run_hiding(&self, row: &HidingRow, buffer: SampleGrid) -> Run<'_> {
         let hide = RefCell::new((row.make)(buffer, self.kernel, self.choice));
-        let does_both = row.back_end().does_object_stage;
+        let does_both = row.back_end.does_object_stage;
         let every: Vec<ItemId> = (0..self.items() as ItemId).collect();
         let views = 0..self.views();
         let occluders: Vec<_> = views.map(|view| self.occluders(view)).collect();

@@ -117,6 +117,11 @@ impl Aabb {
         self.min * 0.5 + self.max * 0.5
     }
 
+    /// The bits of its six numbers: the key by which the very same boxes are found.
+    pub fn bits(&self) -> [[u32; 3]; 2] {
+        [self.min, self.max].map(|corner| corner.to_array().map(f32::to_bits))
+    }
+
     /// Edge lengths, zero for a point, negative for an empty box.
     pub fn extent(&self) -> Vec3 {
         self.max - self.min

@@ -7,14 +7,14 @@ use std::ops::ControlFlow;
 
 use glam::Vec3;
 
-use super::{BuildError, centres};
+use super::partition::Record;
+use super::{BuildError, Info, Input, MemoryUsage, NoParams, RegionIndex, centres};
 use crate::geometry::{Aabb, PlaneRows};
-use crate::query::{Context, ItemId, NoRecorder, QueryVolume, Recorder, Sink};
+use crate::query::{Context, NoRecorder, QueryVolume, Recorder, Sink};
 
 /// A question, asked of one box at a time. Boxes are finite and not empty.
 pub trait BoxTest {
     /// Whether `admits` is `!rejects`.
-    #[cfg_attr(not(feature = "peers"), expect(dead_code))]
     const NODES_AS_ITEMS: bool;
     /// No item within this box belongs to the answer.
     fn rejects(&self, node: &Aabb) -> bool;
@@ -177,34 +177,26 @@ impl<'a, R: Recorder> Tally<'a, R> {
     }
 }
 
-/// An item as these structures keep it: exact bounds and its id. 28 bytes.
-#[derive(Clone, Copy, Debug)]
-pub struct Item {
-    pub bounds: Aabb,
-    pub id: ItemId,
-}
-
-/// The items that a structure has to hold, with their bounds.
-///
-/// # Errors
-/// As [`super::indexable`].
-pub fn indexable(items: &[Aabb]) -> Result<Vec<Item>, BuildError> {
-    let ids = super::indexable(items)?;
-    let item = |id: ItemId| Item {
-        bounds: items[id as usize],
-        id,
-    };
-    Ok(ids.into_iter().map(item).collect())
-}
-
 /// Half the size of the largest item, axis by axis.
-pub fn half_of_largest(items: &[Item]) -> Vec3 {
+pub fn half_of_largest(items: &[Record]) -> Vec3 {
     let halves = items.iter().map(|item| item.bounds.extent() * 0.5);
     halves.fold(Vec3::ZERO, Vec3::max)
 }
 
-/// A structure that is searched one box at a time.
-pub trait BoxByBox {
+/// A structure that is searched one box at a time. It has nothing to choose.
+pub trait BoxByBox: Sized + Send + Sync {
+    /// Its [`RegionIndex::INFO`].
+    const ABOUT: Info;
+
+    /// Builds it over all items that are not empty.
+    ///
+    /// # Errors
+    /// If it cannot hold them.
+    fn of(items: Vec<Record>) -> Result<Self, BuildError>;
+
+    /// Its [`RegionIndex::memory`].
+    fn used(&self) -> MemoryUsage;
+
     /// Hands every item that the test admits to the sink.
     fn search<T: BoxTest, S: Sink, R: Recorder>(
         &self,
@@ -214,22 +206,30 @@ pub trait BoxByBox {
     ) -> ControlFlow<()>;
 }
 
-/// [`RegionIndex::query`](super::RegionIndex::query) of such a structure.
-#[inline(always)]
-pub fn query<X: BoxByBox, Q: QueryVolume, C: Context>(
-    index: &X,
-    volume: &Q,
-    cx: &mut C,
-) -> ControlFlow<()> {
-    let (sink, recorder) = cx.parts();
-    if Q::IS_POINT {
-        return match volume.as_point() {
-            Some(p) => index.search(&Holding(p), sink, recorder),
-            None => ControlFlow::Continue(()),
-        };
+impl<X: BoxByBox> RegionIndex for X {
+    const INFO: Info = X::ABOUT;
+    type Params = NoParams;
+
+    fn build(input: &Input<'_>, _: &NoParams) -> Result<Self, BuildError> {
+        X::of(Record::all(input.items)?)
     }
-    match volume.rows() {
-        Some(rows) => index.search(&AtOnce(rows), sink, recorder),
-        None => index.search(&PlaneByPlane(volume), sink, recorder),
+
+    fn memory(&self) -> MemoryUsage {
+        self.used()
+    }
+
+    #[inline(always)]
+    fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
+        let (sink, recorder) = cx.parts();
+        if Q::IS_POINT {
+            return match volume.as_point() {
+                Some(p) => self.search(&Holding(p), sink, recorder),
+                None => ControlFlow::Continue(()),
+            };
+        }
+        match volume.rows() {
+            Some(rows) => self.search(&AtOnce(rows), sink, recorder),
+            None => self.search(&PlaneByPlane(volume), sink, recorder),
+        }
     }
 }

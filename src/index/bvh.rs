@@ -92,10 +92,7 @@ const STACK_SAMPLE: usize = 4096;
 
 impl Stacks {
     fn of(items: &[Aabb], mut ids: Vec<ItemId>) -> Stacks {
-        let key = |&id: &ItemId| {
-            let b = items[id as usize];
-            [b.min, b.max].map(|corner| corner.to_array().map(f32::to_bits))
-        };
+        let key = |&id: &ItemId| items[id as usize].bits();
         let step = ids.len().div_ceil(STACK_SAMPLE).max(1);
         let mut sample: Vec<_> = ids.iter().step_by(step).map(key).collect();
         sample.sort_unstable();

@@ -5,8 +5,8 @@
 use std::ops::{ControlFlow, Range};
 
 use glam::Vec3;
-use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 
 use super::Info;
 use crate::geometry::{Aabb, PlaneTree};
@@ -126,6 +126,11 @@ impl<'a, Items: AsRef<[Aabb]> + ?Sized> From<&'a Items> for Input<'a> {
         Input::new(items.as_ref())
     }
 }
+
+/// Parameters of a structure that has nothing to choose.
+#[derive(Clone, Copy, Default, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NoParams {}
 
 /// A structure built over item bounds.
 pub trait RegionIndex: Sized + Send + Sync {

@@ -6,22 +6,17 @@
 use std::ops::{ControlFlow, Range};
 
 use glam::{UVec3, Vec3};
-use serde::{Deserialize, Serialize};
 
-use super::box_by_box::{self, BoxByBox, BoxTest, Item, Tally, half_of_largest, indexable};
-use super::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
+use super::box_by_box::{BoxByBox, BoxTest, Tally, half_of_largest};
+use super::partition::Record;
+use super::{BuildError, Info, Kind, MemoryUsage, Origin};
 use crate::geometry::Aabb;
-use crate::query::{Context, ItemId, QueryVolume, Recorder, Sink};
+use crate::query::{ItemId, Recorder, Sink};
 
 /// Items of a cell, on average.
 const ITEMS_A_CELL: f64 = 8.0;
 /// Most cells along an axis.
 const MOST_CELLS: f64 = 1024.0;
-
-/// The grid chooses its cells by itself.
-#[derive(Clone, Copy, Default, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct GridParams {}
 
 /// A uniform grid (Bentley and Friedman 1979, "Data structures for range
 /// searching"): cells in rows along x, items in the order of their cells.
@@ -128,6 +123,58 @@ impl UniformGrid {
 }
 
 impl BoxByBox for UniformGrid {
+    const ABOUT: Info = Info::new(
+        "uniform-grid",
+        "uniform grid: items in the cell of their centre, exact cell bounds",
+        Kind::Grid,
+        Origin::Ours,
+    );
+
+    fn of(items: Vec<Record>) -> Result<Self, BuildError> {
+        let points = items.iter().map(|item| item.bounds.centre());
+        let centres = points.fold(Aabb::EMPTY, |all, c| all.union(&Aabb::new(c, c)));
+        let counts = match items.is_empty() {
+            true => UVec3::ONE,
+            false => cells_for(centres.extent(), items.len()),
+        };
+        let cells = counts.as_usizevec3().element_product();
+        let mut grid = UniformGrid {
+            centres,
+            counts,
+            bounds: vec![Aabb::EMPTY; cells],
+            starts: vec![0; cells + 1],
+            boxes: vec![Aabb::EMPTY; items.len()],
+            ids: vec![0; items.len()],
+            scene: Aabb::union_of(items.iter().map(|item| &item.bounds)),
+            half: half_of_largest(&items),
+        };
+        // A counting sort by cell.
+        let cell_of = |item: &Record| grid.cell_of(item.bounds.centre());
+        let places: Vec<usize> = items.iter().map(cell_of).collect();
+        for &cell in &places {
+            grid.starts[cell + 1] += 1;
+        }
+        for cell in 0..cells {
+            grid.starts[cell + 1] += grid.starts[cell];
+        }
+        let mut next = grid.starts.clone();
+        for (item, &cell) in items.iter().zip(&places) {
+            let place = next[cell] as usize;
+            next[cell] += 1;
+            grid.boxes[place] = item.bounds;
+            grid.ids[place] = item.id;
+            grid.bounds[cell] = grid.bounds[cell].union(&item.bounds);
+        }
+        Ok(grid)
+    }
+
+    fn used(&self) -> MemoryUsage {
+        MemoryUsage {
+            node_bytes: size_of_val(&self.bounds[..]) + size_of_val(&self.starts[..]),
+            item_bytes: size_of_val(&self.boxes[..]) + size_of_val(&self.ids[..]),
+        }
+    }
+
     #[inline(always)]
     fn search<T: BoxTest, S: Sink, R: Recorder>(
         &self,
@@ -158,66 +205,5 @@ impl BoxByBox for UniformGrid {
             }
         }
         ControlFlow::Continue(())
-    }
-}
-
-impl RegionIndex for UniformGrid {
-    const INFO: Info = Info::new(
-        "uniform-grid",
-        "uniform grid: items in the cell of their centre, exact cell bounds",
-        Kind::Grid,
-        Origin::Ours,
-    );
-    type Params = GridParams;
-
-    fn build(input: &Input<'_>, _: &GridParams) -> Result<Self, BuildError> {
-        let items: Vec<Item> = indexable(input.items)?;
-        let points = items.iter().map(|item| item.bounds.centre());
-        let centres = points.fold(Aabb::EMPTY, |all, c| all.union(&Aabb::new(c, c)));
-        let counts = match items.is_empty() {
-            true => UVec3::ONE,
-            false => cells_for(centres.extent(), items.len()),
-        };
-        let cells = counts.as_usizevec3().element_product();
-        let mut grid = UniformGrid {
-            centres,
-            counts,
-            bounds: vec![Aabb::EMPTY; cells],
-            starts: vec![0; cells + 1],
-            boxes: vec![Aabb::EMPTY; items.len()],
-            ids: vec![0; items.len()],
-            scene: Aabb::union_of(items.iter().map(|item| &item.bounds)),
-            half: half_of_largest(&items),
-        };
-        // A counting sort by cell.
-        let cell_of = |item: &Item| grid.cell_of(item.bounds.centre());
-        let places: Vec<usize> = items.iter().map(cell_of).collect();
-        for &cell in &places {
-            grid.starts[cell + 1] += 1;
-        }
-        for cell in 0..cells {
-            grid.starts[cell + 1] += grid.starts[cell];
-        }
-        let mut next = grid.starts.clone();
-        for (item, &cell) in items.iter().zip(&places) {
-            let place = next[cell] as usize;
-            next[cell] += 1;
-            grid.boxes[place] = item.bounds;
-            grid.ids[place] = item.id;
-            grid.bounds[cell] = grid.bounds[cell].union(&item.bounds);
-        }
-        Ok(grid)
-    }
-
-    fn memory(&self) -> MemoryUsage {
-        MemoryUsage {
-            node_bytes: size_of_val(&self.bounds[..]) + size_of_val(&self.starts[..]),
-            item_bytes: size_of_val(&self.boxes[..]) + size_of_val(&self.ids[..]),
-        }
-    }
-
-    #[inline(always)]
-    fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
-        box_by_box::query(self, volume, cx)
     }
 }

@@ -4,19 +4,12 @@
 
 use std::ops::ControlFlow;
 
-use serde::{Deserialize, Serialize};
-
 use super::id_rows::IdRows;
 use super::tree::scan_blocks;
-use super::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, indexable};
+use super::{BuildError, Info, Input, Kind, MemoryUsage, NoParams, Origin, RegionIndex, indexable};
 use crate::geometry::{Aabb, BoxBlock, BoxBlocks, LANES, LaneMask, lanes_of};
 use crate::kernel::Isa;
 use crate::query::{Context, ItemId, Planes, QueryVolume, Recorder, Sink, Tests, UnpreparedPlanes};
-
-/// A scan has nothing to choose.
-#[derive(Clone, Copy, Default, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct LinearParams {}
 
 /// The plain loop over an array of boxes, leaving each box at the first plane
 /// that excludes it. O(n) per query.
@@ -32,9 +25,9 @@ impl RegionIndex for LinearScalar {
         Kind::Scan,
         Origin::Ours,
     );
-    type Params = LinearParams;
+    type Params = NoParams;
 
-    fn build(input: &Input<'_>, _: &LinearParams) -> Result<Self, BuildError> {
+    fn build(input: &Input<'_>, _: &NoParams) -> Result<Self, BuildError> {
         let items = input.items;
         let ids = indexable(items)?;
         let boxes = ids.iter().map(|&id| items[id as usize]).collect();
@@ -104,9 +97,9 @@ impl RegionIndex for Linear {
         Kind::Scan,
         Origin::Ours,
     );
-    type Params = LinearParams;
+    type Params = NoParams;
 
-    fn build(input: &Input<'_>, _: &LinearParams) -> Result<Self, BuildError> {
+    fn build(input: &Input<'_>, _: &NoParams) -> Result<Self, BuildError> {
         let items = input.items;
         let ids = indexable(items)?;
         let mut boxes = BoxBlocks::with_capacity(ids.len());
@@ -220,7 +213,7 @@ mod tests {
         ] {
             let low = (0..count).map(|i| Vec3::X * (i % 100) as f32);
             let items: Vec<Aabb> = low.map(|low| Aabb::new(low, low + Vec3::ONE)).collect();
-            let scan = Linear::build(&Input::new(&items), &LinearParams::default()).unwrap();
+            let scan = Linear::build(&Input::new(&items), &NoParams::default()).unwrap();
             for volume in &volumes {
                 let (mut found, mut cost) = (Vec::new(), QueryCost::default());
                 DynIndex::query_counted(&scan, volume.into(), &mut found, &mut cost);

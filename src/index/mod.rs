@@ -45,11 +45,13 @@ pub use bsp::{Bsp, BspBuilder, BspParams};
 pub(crate) use bundles::Leaves;
 pub use bvh::{Bvh, BvhParams, BvhPreset};
 pub(crate) use contract::check_range;
-pub use contract::{BuildError, FrustumQuery, Input, MemoryUsage, Query, RegionIndex, indexable};
+pub use contract::{
+    BuildError, FrustumQuery, Input, MemoryUsage, NoParams, Query, RegionIndex, indexable,
+};
 pub use erased::DynIndex;
 pub use execution::{By, Execution};
 pub use foreign::caught;
-pub use grid::{GridParams, UniformGrid};
+pub use grid::UniformGrid;
 pub use info::{Capabilities, Info, Kind, Origin};
 pub use linear::{Linear, LinearScalar};
 pub use node::TreeNode;

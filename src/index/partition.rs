@@ -3,6 +3,7 @@
 //! order of work, the leaves, and the way out where nothing can be divided.
 
 use super::tree::{PackedTree, TreeWriter};
+use super::{BuildError, indexable};
 use crate::geometry::Aabb;
 use crate::query::ItemId;
 
@@ -14,6 +15,30 @@ pub struct Record {
     pub bounds: Aabb,
     /// Index of the item in the scene.
     pub id: ItemId,
+}
+
+impl Record {
+    /// The items that a structure has to hold.
+    ///
+    /// # Errors
+    /// As [`indexable`].
+    pub fn all(items: &[Aabb]) -> Result<Vec<Record>, BuildError> {
+        Ok(Record::some(items, &indexable(items)?))
+    }
+
+    /// All boxes, numbered in their order.
+    pub fn numbered(boxes: &[Aabb]) -> Vec<Record> {
+        let records = boxes.iter().zip(0..);
+        records.map(|(&bounds, id)| Record { bounds, id }).collect()
+    }
+
+    fn some(items: &[Aabb], ids: &[ItemId]) -> Vec<Record> {
+        let record = |&id: &ItemId| Record {
+            bounds: items[id as usize],
+            id,
+        };
+        ids.iter().map(record).collect()
+    }
 }
 
 /// A part of a divided group.
@@ -67,13 +92,7 @@ pub fn build_top_down<S: Splitter>(
         },
         Leave(usize),
     }
-    let mut records: Vec<Record> = ids
-        .iter()
-        .map(|&id| Record {
-            bounds: items[id as usize],
-            id,
-        })
-        .collect();
+    let mut records = Record::some(items, ids);
     let mut writer = TreeWriter::with_capacity(records.len());
     let mut parts = Vec::new();
     let mut open = Vec::new();

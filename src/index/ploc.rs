@@ -37,6 +37,29 @@ pub(crate) fn build(boxes: &[Aabb], params: BvhBuildParams) -> Bvh2 {
     tree
 }
 
+/// The preset that was fastest for views and for rays: one item a leaf.
+pub(crate) const ONE_A_LEAF: BvhBuildParams = BvhBuildParams {
+    max_prims_per_leaf: 1,
+    pre_split: false,
+    ..BvhBuildParams::very_slow_build()
+};
+
+/// Most items with the very same bounds that a builder gets which needs
+/// quadratic time for them.
+pub(crate) const MOST_ALIKE: usize = 50_000;
+
+/// How many items have the same bounds, if more than [`MOST_ALIKE`] have.
+/// O(n log n) if there are that many items at all.
+pub(crate) fn too_many_alike<'a>(items: impl ExactSizeIterator<Item = &'a Aabb>) -> Option<usize> {
+    if items.len() <= MOST_ALIKE {
+        return None;
+    }
+    let mut keys: Vec<_> = items.map(Aabb::bits).collect();
+    keys.sort_unstable();
+    let alike = keys.chunk_by(|a, b| a == b).map(<[_]>::len).max();
+    alike.filter(|&alike| alike > MOST_ALIKE)
+}
+
 #[cfg(test)]
 mod tests {
     use std::time::Duration;

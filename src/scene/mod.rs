@@ -69,6 +69,25 @@ impl WorldBox {
         WorldBox { min, max }
     }
 
+    /// The smallest box that holds all of some: inverted for none.
+    pub fn union_of(boxes: impl IntoIterator<Item = WorldBox>) -> Self {
+        let none = WorldBox::new(DVec3::INFINITY, DVec3::NEG_INFINITY);
+        boxes.into_iter().fold(none, |all, b| {
+            WorldBox::new(all.min.min(b.min), all.max.max(b.max))
+        })
+    }
+
+    /// Whether two closed boxes have a point in common.
+    pub fn meets(&self, other: &WorldBox) -> bool {
+        self.min.cmple(other.max).all() && other.min.cmple(self.max).all()
+    }
+
+    /// A scene-local box in world coordinates, rounded outward.
+    pub fn of(b: &Aabb, origin: DVec3) -> Self {
+        let (min, max) = b.in_world(origin);
+        WorldBox::new(min, max)
+    }
+
     /// The largest box within one about an origin; empty where there is none.
     pub fn within(b: &Aabb, origin: DVec3) -> Self {
         let low = |k: usize| sum_up(origin[k], b.min[k].into());
@@ -219,10 +238,8 @@ pub(crate) fn hex(bytes: &[u8]) -> String {
 /// The origin that suits the boxes, by the finite ones.
 fn choose_origin(boxes: impl Iterator<Item = WorldBox>) -> DVec3 {
     let finite = boxes.filter(|b| b.min.is_finite() && b.max.is_finite());
-    let (low, high) = finite.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), b| {
-        (low.min(b.min), high.max(b.max))
-    });
-    origin_between(low, high)
+    let all = WorldBox::union_of(finite);
+    origin_between(all.min, all.max)
 }
 
 /// Zero on every axis where moving the boxes would gain less than two bits:

@@ -17,10 +17,7 @@ impl Scene {
             .enumerate()
             .map(move |(id, item)| match originals {
                 Some(boxes) => boxes[id],
-                None => {
-                    let (min, max) = item.in_world(self.origin);
-                    WorldBox::new(min, max)
-                }
+                None => WorldBox::of(item, self.origin),
             })
     }
 

@@ -177,27 +177,14 @@ impl Surfaces {
     /// # Errors
     /// An item without triangles, which has no box.
     pub fn into_scene(self, name: impl Into<String>) -> Result<Scene, InputError> {
-        let boxes = (0..self.items()).map(|item| self.bounds(item));
-        let scene = self.boxes_as_scene(name, boxes)?;
+        let boxes: Vec<WorldBox> = (0..self.items())
+            .map(|item| WorldBox::of(&self.bounds(item), self.origin))
+            .collect();
+        let scene = Scene::about(name, &boxes, self.origin)?;
         Ok(Scene {
             surfaces: Some(Arc::new(self)),
             ..scene
         })
-    }
-
-    /// Scene-local boxes as a scene about the same origin.
-    pub(crate) fn boxes_as_scene(
-        &self,
-        name: impl Into<String>,
-        boxes: impl Iterator<Item = Aabb>,
-    ) -> Result<Scene, InputError> {
-        let boxes: Vec<WorldBox> = boxes
-            .map(|b| {
-                let (min, max) = b.in_world(self.origin);
-                WorldBox::new(min, max)
-            })
-            .collect();
-        Scene::about(name, &boxes, self.origin)
     }
 
     /// How many directed edges of an item lack their opposite, or have it more than

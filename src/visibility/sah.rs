@@ -7,16 +7,11 @@ use std::ops::Range;
 use glam::Vec3;
 
 use crate::geometry::Aabb;
+use crate::index::Record;
 
 const BINS: usize = 16;
 
 /// An item while the tree is built.
-#[derive(Clone, Copy)]
-pub struct Item {
-    pub bounds: Aabb,
-    pub id: u32,
-}
-
 /// A part of the items and its bounds.
 #[derive(Clone)]
 pub struct Part {
@@ -25,7 +20,7 @@ pub struct Part {
 }
 
 impl Part {
-    pub fn of(items: &[Item], range: Range<usize>) -> Part {
+    pub fn of(items: &[Record], range: Range<usize>) -> Part {
         Part {
             bounds: Aabb::union_of(items[range.clone()].iter().map(|item| &item.bounds)),
             range,
@@ -44,13 +39,13 @@ pub fn half_area(b: &Aabb) -> f32 {
 
 /// Orders a set so that its first part, whose length is returned, is one side of
 /// the cheapest cut between bins; by halves where no cut parts the centres.
-pub fn halve(items: &mut [Item]) -> usize {
+pub fn halve(items: &mut [Record]) -> usize {
     let centres = items.iter().map(|item| item.bounds.centre());
     let (low, high) = centres.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), c| {
         (low.min(c), high.max(c))
     });
     let scale = BINS as f32 / (high - low);
-    let bin = |item: &Item, axis: usize| {
+    let bin = |item: &Record, axis: usize| {
         let along = (item.bounds.centre()[axis] - low[axis]) * scale[axis];
         (along as usize).min(BINS - 1)
     };

@@ -339,7 +339,7 @@ fn peers_pick_what_the_reference_picks() {
             };
             let (found, wanted) = (back_end.first(&ray), reference.first(&ray));
             let item = |hit: Option<Hit>| hit.map(|hit| hit.item);
-            assert_eq!(item(found), item(wanted), "{} {ray:?}", row.about.name);
+            assert_eq!(item(found), item(wanted), "{} {ray:?}", row.name);
             met += usize::from(wanted.is_some());
             if let (Some(found), Some(wanted)) = (found, wanted) {
                 assert!((found.depth - wanted.depth).abs() < 1e-3 * wanted.depth.max(1.0));

@@ -16,7 +16,7 @@ use crate::scene::Scene;
 use crate::visibility::Rays;
 use crate::visibility::region::doom::DoomMap;
 use crate::visibility::region::{
-    EyePlace, Marks, PortalClip, RegionGraph, RegionItems, RegionRow, Scratch, seen_by_samples,
+    EyePlace, Marks, RegionGraph, RegionItems, RegionRow, Scratch, Searched, seen_by_samples,
 };
 
 pub(super) const RULE: Rule = Rule {
@@ -34,7 +34,7 @@ pub(super) const RULE: Rule = Rule {
 
 /// The regions of the scene with their items, and what is asked of them.
 struct Regions {
-    row: PortalClip,
+    row: Searched,
     items: RegionItems,
     views: Vec<(Rays, ConvexVolume)>,
 }
@@ -55,7 +55,7 @@ fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfi
     let views = hidden::sights(case).map_err(not_applicable)?;
     let regions = Rc::new(Regions {
         items: RegionItems::of(&graph, case.scene()),
-        row: PortalClip(graph),
+        row: Searched::portal_clip(graph),
         views,
     });
     let predicted = predicted(case, &regions);
@@ -91,7 +91,7 @@ fn asked<'c>(case: &'c Case<'c>, regions: Rc<Regions>) -> Ask<'c> {
 
 /// Of the items that a few cameras meet, those in no region that a few rays pass.
 fn predicted(case: &Case, regions: &Regions) -> f64 {
-    let graph = &regions.row.0;
+    let graph = regions.row.graph();
     let (mut met, mut gone) = (0, 0);
     let (mut found, mut listed) = (Vec::new(), Vec::new());
     let (mut homes, mut seen, mut marks) = (Vec::new(), Vec::new(), Marks::default());

@@ -81,7 +81,7 @@ impl View {
         if sorted {
             front_to_back(&self.solids, self.rays.camera(), &mut items);
         }
-        let pieces = items.iter().map(|&item| Piece { item, part: None });
+        let pieces = items.iter().map(|&item| Piece::whole(item));
         let pieces: Vec<Piece> = pieces.collect();
         let canvas = Canvas::of(&self.rays, COUNTED);
         let tally = draw(&canvas, &self.solids, &pieces, &Tests::default()).tally;

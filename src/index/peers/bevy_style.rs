@@ -7,13 +7,13 @@
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::{BoxByBox, BoxTest, Item, PeerParams, Tally, indexable};
-use crate::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
-use crate::query::{Context, QueryVolume, Recorder, Sink};
+use super::{BoxByBox, BoxTest, Record, Tally};
+use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin};
+use crate::query::{Recorder, Sink};
 
 /// What the system reads and writes of an entity.
 struct Entity {
-    item: Item,
+    item: Record,
     /// Bits of the layers that it is drawn on.
     layers: u32,
     inherited_visibility: bool,
@@ -31,6 +31,33 @@ pub struct PeerBevyStyle {
 const LAYER: u32 = 1;
 
 impl BoxByBox for PeerBevyStyle {
+    const ABOUT: Info = Info::new(
+        "peer-bevy-style",
+        "a stand-in for Bevy's visibility system: flags and bounds of every entity, one by one",
+        Kind::Scan,
+        Origin::StandIn("Bevy"),
+    );
+
+    fn of(items: Vec<Record>) -> Result<Self, BuildError> {
+        let entity = |item| Entity {
+            item,
+            layers: LAYER,
+            inherited_visibility: true,
+            no_frustum_culling: false,
+            view_visibility: AtomicBool::new(false),
+        };
+        let mut entities = Vec::with_capacity(items.len());
+        entities.extend(items.into_iter().map(entity));
+        Ok(PeerBevyStyle { entities })
+    }
+
+    fn used(&self) -> MemoryUsage {
+        MemoryUsage {
+            node_bytes: 0,
+            item_bytes: size_of_val(&self.entities[..]),
+        }
+    }
+
     #[inline(always)]
     fn search<T: BoxTest, S: Sink, R: Recorder>(
         &self,
@@ -51,42 +78,5 @@ impl BoxByBox for PeerBevyStyle {
             }
         }
         ControlFlow::Continue(())
-    }
-}
-
-impl RegionIndex for PeerBevyStyle {
-    const INFO: Info = Info::new(
-        "peer-bevy-style",
-        "a stand-in for Bevy's visibility system: flags and bounds of every entity, one by one",
-        Kind::Scan,
-        Origin::StandIn("Bevy"),
-    );
-    type Params = PeerParams;
-
-    fn build(input: &Input<'_>, _: &PeerParams) -> Result<Self, BuildError> {
-        let items = input.items;
-        let entity = |item| Entity {
-            item,
-            layers: LAYER,
-            inherited_visibility: true,
-            no_frustum_culling: false,
-            view_visibility: AtomicBool::new(false),
-        };
-        let items = indexable(items)?;
-        let mut entities = Vec::with_capacity(items.len());
-        entities.extend(items.into_iter().map(entity));
-        Ok(PeerBevyStyle { entities })
-    }
-
-    fn memory(&self) -> MemoryUsage {
-        MemoryUsage {
-            node_bytes: 0,
-            item_bytes: size_of_val(&self.entities[..]),
-        }
-    }
-
-    #[inline(always)]
-    fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
-        super::box_by_box::query(self, volume, cx)
     }
 }

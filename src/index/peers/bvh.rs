@@ -10,16 +10,22 @@ use ::bvh::flat_bvh::{FlatBvh, FlatNode};
 use glam::Vec3;
 use nalgebra::Point3;
 
-use super::{BoxByBox, BoxTest, Item, PeerParams, Tally, indexable};
+use super::{BoxTest, BuildError, Record, Tally, peer_of_tree};
 use crate::geometry::Aabb;
-use crate::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
-use crate::query::{Context, QueryVolume, Recorder, Sink};
+use crate::index::MemoryUsage;
+use crate::query::{Recorder, Sink};
 
 /// An item that the crate tells where it put it.
 #[derive(Clone, Copy)]
-struct Shape {
-    item: Item,
+pub(crate) struct Shape {
+    pub item: Record,
     node: usize,
+}
+
+impl From<Record> for Shape {
+    fn from(item: Record) -> Shape {
+        Shape { item, node: 0 }
+    }
 }
 
 impl Bounded<f32, 3> for Shape {
@@ -43,7 +49,7 @@ impl BHShape<f32, 3> for Shape {
 }
 
 #[inline(always)]
-fn bounds_of(b: &CrateAabb<f32, 3>) -> Aabb {
+pub(crate) fn bounds_of(b: &CrateAabb<f32, 3>) -> Aabb {
     Aabb::new(
         Vec3::new(b.min.x, b.min.y, b.min.z),
         Vec3::new(b.max.x, b.max.y, b.max.z),
@@ -66,14 +72,6 @@ impl<T: BoxTest, R: Recorder> IntersectsAabb<f32, 3> for Query<'_, '_, T, R> {
     }
 }
 
-fn shapes(items: &[Aabb]) -> Result<Vec<Shape>, BuildError> {
-    let items = indexable(items)?;
-    Ok(items
-        .into_iter()
-        .map(|item| Shape { item, node: 0 })
-        .collect())
-}
-
 /// Boxes of this reach have areas that are still numbers in f32.
 const LARGEST: f32 = 1e18;
 
@@ -90,13 +88,8 @@ fn tree_over(shapes: &mut [Shape]) -> Bvh<f32, 3> {
             let smaller = |shape: &Shape| {
                 let b = shape.item.bounds;
                 let bounds = Aabb::new(b.min / LARGEST, b.max / LARGEST);
-                Shape {
-                    item: Item {
-                        bounds,
-                        ..shape.item
-                    },
-                    ..*shape
-                }
+                let id = shape.item.id;
+                Shape::from(Record { bounds, id })
             };
             let mut all: Vec<Shape> = shapes.iter().map(smaller).collect();
             let tree = Bvh::build(&mut all);
@@ -129,102 +122,95 @@ fn tree_over(shapes: &mut [Shape]) -> Bvh<f32, 3> {
     tree
 }
 
-macro_rules! peer {
-    ($(#[$doc:meta])* $peer:ident, $name:literal, $summary:literal, $tree:ty, $node:ty, $make:expr) => {
-        $(#[$doc])*
-        pub struct $peer {
-            tree: $tree,
-            shapes: Vec<Shape>,
-        }
+/// The crate's two trees, over shapes in a list of our own.
+struct Tree<T> {
+    tree: T,
+    shapes: Vec<Shape>,
+}
 
-        impl BoxByBox for $peer {
-            #[inline(always)]
-            fn search<T: BoxTest, S: Sink, R: Recorder>(
-                &self,
-                test: &T,
-                sink: &mut S,
-                recorder: &mut R,
-            ) -> ControlFlow<()> {
-                let tally = Tally::new(recorder);
-                let query = Query { test, tally: &tally };
-                for shape in BoundingHierarchy::traverse(&self.tree, &query, &self.shapes) {
-                    tally.count(|recorder| recorder.items_tested(1));
-                    if T::NODES_AS_ITEMS || test.admits(&shape.item.bounds) {
-                        sink.accept(std::slice::from_ref(&shape.item.id))?;
-                    }
-                }
-                ControlFlow::Continue(())
-            }
-        }
-
-        impl RegionIndex for $peer {
-            const INFO: Info = Info::new($name, $summary, Kind::Tree, Origin::Crate("bvh"));
-            type Params = PeerParams;
-
-            fn build(input: &Input<'_>, _: &PeerParams) -> Result<Self, BuildError> {
-                let items = input.items;
-                let mut shapes = shapes(items)?;
-                let tree = $make(tree_over(&mut shapes));
-                Ok($peer { tree, shapes })
-            }
-
-            fn memory(&self) -> MemoryUsage {
-                MemoryUsage {
-                    node_bytes: self.tree.list().capacity() * size_of::<$node>(),
-                    item_bytes: size_of_val(&self.shapes[..]),
-                }
-            }
-
-            #[inline(always)]
-    fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
-        super::box_by_box::query(self, volume, cx)
+impl<T: BoundingHierarchy<f32, 3> + Nodes> Tree<T> {
+    fn build(
+        _: &'static str,
+        items: Vec<Record>,
+        made: fn(Bvh<f32, 3>) -> T,
+    ) -> Result<Self, BuildError> {
+        let mut shapes: Vec<Shape> = items.into_iter().map(Shape::from).collect();
+        let tree = made(tree_over(&mut shapes));
+        Ok(Tree { tree, shapes })
     }
-        }
 
-    };
+    fn memory(&self) -> MemoryUsage {
+        MemoryUsage {
+            node_bytes: self.tree.node_bytes(),
+            item_bytes: size_of_val(&self.shapes[..]),
+        }
+    }
+
+    #[inline(always)]
+    fn traverse<Q: BoxTest, S: Sink, R: Recorder>(
+        &self,
+        test: &Q,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        let tally = Tally::new(recorder);
+        let query = Query {
+            test,
+            tally: &tally,
+        };
+        for shape in self.tree.traverse(&query, &self.shapes) {
+            tally.count(|recorder| recorder.items_tested(1));
+            if Q::NODES_AS_ITEMS || test.admits(&shape.item.bounds) {
+                sink.accept(std::slice::from_ref(&shape.item.id))?;
+            }
+        }
+        ControlFlow::Continue(())
+    }
 }
 
 /// Where each kind of tree keeps its nodes.
-trait Nodes<N> {
-    fn list(&self) -> &Vec<N>;
+trait Nodes {
+    fn node_bytes(&self) -> usize;
 }
 
-impl Nodes<BvhNode<f32, 3>> for Bvh<f32, 3> {
-    fn list(&self) -> &Vec<BvhNode<f32, 3>> {
-        &self.nodes
+impl Nodes for Bvh<f32, 3> {
+    fn node_bytes(&self) -> usize {
+        self.nodes.capacity() * size_of::<BvhNode<f32, 3>>()
     }
 }
 
-impl Nodes<FlatNode<f32, 3>> for FlatBvh<f32, 3> {
-    fn list(&self) -> &Vec<FlatNode<f32, 3>> {
-        self
+impl Nodes for FlatBvh<f32, 3> {
+    fn node_bytes(&self) -> usize {
+        self.capacity() * size_of::<FlatNode<f32, 3>>()
     }
 }
 
-peer!(
+peer_of_tree!(
     /// Its tree, gone through by its own recursion.
     PeerBvh,
     "peer-bvh",
     "crate bvh, asked through Bvh::traverse",
-    Bvh<f32, 3>,
-    BvhNode<f32, 3>,
-    |tree| tree
+    "bvh",
+    Tree<Bvh<f32, 3>>,
+    |tree| tree,
+    traverse
 );
 
-peer!(
+peer_of_tree!(
     /// Its tree as a list with places to jump to.
     PeerBvhFlat,
     "peer-bvh-flat",
     "crate bvh, flattened, asked through FlatBvh::traverse",
-    FlatBvh<f32, 3>,
-    FlatNode<f32, 3>,
-    |tree: Bvh<f32, 3>| tree.flatten()
+    "bvh",
+    Tree<FlatBvh<f32, 3>>,
+    |tree| tree.flatten(),
+    traverse
 );
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::index::FrustumQuery;
+    use crate::index::{FrustumQuery, Input, NoParams, RegionIndex};
 
     /// Left to the crate, nothing is found where areas overflow, and where
     /// widths do there is no tree.
@@ -239,8 +225,8 @@ mod tests {
     fn found(point: impl Fn(u16) -> Vec3) {
         let items: Vec<Aabb> = (0..100).map(|i| Aabb::new(point(i), point(i))).collect();
         let all = crate::geometry::ConvexVolume::from_planes(&[]).expect("no planes");
-        let tree = PeerBvh::build(&Input::new(&items), &PeerParams {}).expect("sound items");
-        let flat = PeerBvhFlat::build(&Input::new(&items), &PeerParams {}).expect("sound items");
+        let tree = PeerBvh::build(&Input::new(&items), &NoParams {}).expect("sound items");
+        let flat = PeerBvhFlat::build(&Input::new(&items), &NoParams {}).expect("sound items");
         let (mut seen, mut found) = (Vec::new(), Vec::new());
         for i in 0..100 {
             let _ = tree.locate(point(i), &mut found);

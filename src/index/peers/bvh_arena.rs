@@ -8,10 +8,10 @@ use std::ops::ControlFlow;
 use bvh_arena::{BoundingVolume, Bvh};
 use glam::Vec3;
 
-use super::{BoxByBox, BoxTest, Item, PeerParams, Tally, half_of_largest, indexable};
+use super::{BoxByBox, BoxTest, Record, Tally, half_of_largest};
 use crate::geometry::Aabb;
-use crate::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
-use crate::query::{Context, QueryVolume, Recorder, Sink};
+use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin};
+use crate::query::{Recorder, Sink};
 
 thread_local! {
     /// Merges since it was last set to zero: they tell how deep insertion went.
@@ -50,13 +50,71 @@ const MERGES_A_LEVEL: u32 = 3;
 
 /// The tree, and what is asked before it.
 pub struct PeerBvhArena {
-    tree: Bvh<Item, Volume>,
+    tree: Bvh<Record, Volume>,
     count: usize,
     scene: Aabb,
     half: Vec3,
 }
 
+/// Places in an order that has nothing to do with that of the scene: a sorted
+/// scene would be inserted into a list.
+fn shuffled(count: usize) -> impl Iterator<Item = usize> {
+    // A step that shares no factor with the count visits every place once.
+    let step = ((count as u64 * 0x9E37_79B1) >> 32).max(1);
+    let coprime = (step..).find(|&step| greatest_common_divisor(step, count as u64) <= 1);
+    let step = coprime.unwrap_or(1);
+    (0..count as u64).map(move |i| (i * step % count as u64) as usize)
+}
+
+fn greatest_common_divisor(a: u64, b: u64) -> u64 {
+    match b {
+        0 => a,
+        _ => greatest_common_divisor(b, a % b),
+    }
+}
+
 impl BoxByBox for PeerBvhArena {
+    const ABOUT: Info = Info::new(
+        "peer-bvh-arena",
+        "crate bvh-arena, insertion only, asked for what overlaps the view's bounds",
+        Kind::Tree,
+        Origin::Crate("bvh-arena"),
+    );
+
+    fn of(items: Vec<Record>) -> Result<Self, BuildError> {
+        let mut tree = Bvh::with_capacity(2 * items.len());
+        for place in shuffled(items.len()) {
+            let item = items[place];
+            MERGES.set(0);
+            tree.insert(item, Volume(item.bounds));
+            if MERGES.get() > DEEPEST * MERGES_A_LEVEL {
+                return Err(BuildError::Refused {
+                    structure: Self::ABOUT.name,
+                    reason: format!(
+                        "insertion has become a list of {DEEPEST} levels: too many items share \
+                         their place"
+                    ),
+                });
+            }
+        }
+        Ok(PeerBvhArena {
+            tree,
+            count: items.len(),
+            scene: Aabb::union_of(items.iter().map(|item| &item.bounds)),
+            half: half_of_largest(&items),
+        })
+    }
+
+    /// The crate does not tell: two slots an item, each with the bounds, its
+    /// parent, an item or two children, and the slot map's version.
+    fn used(&self) -> MemoryUsage {
+        const SLOT: usize = size_of::<Aabb>() + 8 + size_of::<Record>() + 4 + 4;
+        MemoryUsage {
+            node_bytes: self.count * SLOT,
+            item_bytes: self.count * SLOT,
+        }
+    }
+
     #[inline(always)]
     fn search<T: BoxTest, S: Sink, R: Recorder>(
         &self,
@@ -80,78 +138,10 @@ impl BoxByBox for PeerBvhArena {
     }
 }
 
-/// Places in an order that has nothing to do with that of the scene: a sorted
-/// scene would be inserted into a list.
-fn shuffled(count: usize) -> impl Iterator<Item = usize> {
-    // A step that shares no factor with the count visits every place once.
-    let step = ((count as u64 * 0x9E37_79B1) >> 32).max(1);
-    let coprime = (step..).find(|&step| greatest_common_divisor(step, count as u64) <= 1);
-    let step = coprime.unwrap_or(1);
-    (0..count as u64).map(move |i| (i * step % count as u64) as usize)
-}
-
-fn greatest_common_divisor(a: u64, b: u64) -> u64 {
-    match b {
-        0 => a,
-        _ => greatest_common_divisor(b, a % b),
-    }
-}
-
-impl RegionIndex for PeerBvhArena {
-    const INFO: Info = Info::new(
-        "peer-bvh-arena",
-        "crate bvh-arena, insertion only, asked for what overlaps the view's bounds",
-        Kind::Tree,
-        Origin::Crate("bvh-arena"),
-    );
-    type Params = PeerParams;
-
-    fn build(input: &Input<'_>, _: &PeerParams) -> Result<Self, BuildError> {
-        let items = input.items;
-        let items = indexable(items)?;
-        let mut tree = Bvh::with_capacity(2 * items.len());
-        for place in shuffled(items.len()) {
-            let item = items[place];
-            MERGES.set(0);
-            tree.insert(item, Volume(item.bounds));
-            if MERGES.get() > DEEPEST * MERGES_A_LEVEL {
-                return Err(BuildError::Refused {
-                    structure: Self::INFO.name,
-                    reason: format!(
-                        "insertion has become a list of {DEEPEST} levels: too many items share \
-                         their place"
-                    ),
-                });
-            }
-        }
-        Ok(PeerBvhArena {
-            tree,
-            count: items.len(),
-            scene: Aabb::union_of(items.iter().map(|item| &item.bounds)),
-            half: half_of_largest(&items),
-        })
-    }
-
-    /// The crate does not tell: two slots an item, each with the bounds, its
-    /// parent, an item or two children, and the slot map's version.
-    fn memory(&self) -> MemoryUsage {
-        const SLOT: usize = size_of::<Aabb>() + 8 + size_of::<Item>() + 4 + 4;
-        MemoryUsage {
-            node_bytes: self.count * SLOT,
-            item_bytes: self.count * SLOT,
-        }
-    }
-
-    #[inline(always)]
-    fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
-        super::box_by_box::query(self, volume, cx)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::index::FrustumQuery;
+    use crate::index::{FrustumQuery, Input, NoParams, RegionIndex};
 
     #[test]
     fn every_place_comes_once_and_neighbours_lie_apart() {
@@ -172,7 +162,7 @@ mod tests {
     #[test]
     fn a_tree_that_would_be_a_list_is_refused_before_the_stack_overflows() {
         let items = vec![Aabb::around(Vec3::ZERO, Vec3::ONE); 20_000];
-        let error = PeerBvhArena::build(&Input::new(&items), &PeerParams {}).err();
+        let error = PeerBvhArena::build(&Input::new(&items), &NoParams {}).err();
         assert!(
             matches!(error, Some(BuildError::Refused { .. })),
             "{error:?}"
@@ -184,7 +174,7 @@ mod tests {
     fn a_sorted_scene_does_not_become_a_list() {
         let item = |i: u16| Aabb::around(Vec3::X * (f32::from(i) * 2.0), Vec3::splat(0.5));
         let items: Vec<Aabb> = (0..6000).map(item).collect();
-        let tree = PeerBvhArena::build(&Input::new(&items), &PeerParams {}).expect("a tree");
+        let tree = PeerBvhArena::build(&Input::new(&items), &NoParams {}).expect("a tree");
         let mut found = Vec::new();
         let _ = tree.locate(Vec3::X * 8000.0, &mut found);
         assert_eq!(found, [4000]);

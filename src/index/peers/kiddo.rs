@@ -7,21 +7,60 @@ use std::ops::ControlFlow;
 use glam::Vec3;
 use kiddo::{Chebyshev, ImmutableKdTree};
 
-use super::{BoxByBox, BoxTest, Item, PeerParams, Tally, half_of_largest, indexable};
+use super::{BoxByBox, BoxTest, Record, Tally, half_of_largest};
 use crate::geometry::Aabb;
-use crate::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
-use crate::query::{Context, QueryVolume, Recorder, Sink};
+use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin};
+use crate::query::{Recorder, Sink};
 
 /// Centres in a tree, items beside it.
 pub struct PeerKiddo {
     /// `None` for no items.
     tree: Option<ImmutableKdTree<f32, 3>>,
-    items: Vec<Item>,
+    items: Vec<Record>,
     scene: Aabb,
     half: Vec3,
 }
 
 impl BoxByBox for PeerKiddo {
+    const ABOUT: Info = Info::new(
+        "peer-kiddo",
+        "crate kiddo, a k-d tree of the boxes' centres, asked for those within reach",
+        Kind::Tree,
+        Origin::Crate("kiddo"),
+    );
+
+    fn of(items: Vec<Record>) -> Result<Self, BuildError> {
+        let centres: Vec<[f32; 3]> = items
+            .iter()
+            .map(|item| item.bounds.centre().to_array())
+            .collect();
+        let tree = match items.is_empty() {
+            true => None,
+            false => Some(ImmutableKdTree::new_from_slice(&centres).map_err(|error| {
+                BuildError::Refused {
+                    structure: Self::ABOUT.name,
+                    reason: error.to_string(),
+                }
+            })?),
+        };
+        Ok(PeerKiddo {
+            tree,
+            scene: Aabb::union_of(items.iter().map(|item| &item.bounds)),
+            half: half_of_largest(&items),
+            items,
+        })
+    }
+
+    /// The crate does not tell: a centre and an id each, and about a stem for
+    /// every leaf of 32.
+    fn used(&self) -> MemoryUsage {
+        let count = self.items.len();
+        MemoryUsage {
+            node_bytes: count.div_ceil(32) * 2 * size_of::<f32>() + count * 16,
+            item_bytes: size_of_val(&self.items[..]),
+        }
+    }
+
     #[inline(always)]
     fn search<T: BoxTest, S: Sink, R: Recorder>(
         &self,
@@ -61,54 +100,5 @@ impl BoxByBox for PeerKiddo {
             }
         });
         flow
-    }
-}
-
-impl RegionIndex for PeerKiddo {
-    const INFO: Info = Info::new(
-        "peer-kiddo",
-        "crate kiddo, a k-d tree of the boxes' centres, asked for those within reach",
-        Kind::Tree,
-        Origin::Crate("kiddo"),
-    );
-    type Params = PeerParams;
-
-    fn build(input: &Input<'_>, _: &PeerParams) -> Result<Self, BuildError> {
-        let items = input.items;
-        let items = indexable(items)?;
-        let centres: Vec<[f32; 3]> = items
-            .iter()
-            .map(|item| item.bounds.centre().to_array())
-            .collect();
-        let tree = match items.is_empty() {
-            true => None,
-            false => Some(ImmutableKdTree::new_from_slice(&centres).map_err(|error| {
-                BuildError::Refused {
-                    structure: Self::INFO.name,
-                    reason: error.to_string(),
-                }
-            })?),
-        };
-        Ok(PeerKiddo {
-            tree,
-            scene: Aabb::union_of(items.iter().map(|item| &item.bounds)),
-            half: half_of_largest(&items),
-            items,
-        })
-    }
-
-    /// The crate does not tell: a centre and an id each, and about a stem for
-    /// every leaf of 32.
-    fn memory(&self) -> MemoryUsage {
-        let count = self.items.len();
-        MemoryUsage {
-            node_bytes: count.div_ceil(32) * 2 * size_of::<f32>() + count * 16,
-            item_bytes: size_of_val(&self.items[..]),
-        }
-    }
-
-    #[inline(always)]
-    fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
-        super::box_by_box::query(self, volume, cx)
     }
 }

@@ -10,7 +10,7 @@ use obvhs::BvhBuildParams;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
 
-use super::{BoxTest, Tally, half_of_largest, indexable, peer_of_tree, refuse_stacks};
+use super::{BoxTest, Record, Tally, half_of_largest, peer_of_tree, refuse_stacks};
 use crate::geometry::Aabb;
 use crate::index::stack::Stack;
 use crate::index::{BuildError, MemoryUsage, ploc};
@@ -35,10 +35,9 @@ fn bounds_of(node: &Bvh2Node) -> Aabb {
 impl Tree {
     fn build(
         structure: &'static str,
-        items: &[Aabb],
+        items: Vec<Record>,
         params: BvhBuildParams,
     ) -> Result<Tree, BuildError> {
-        let items = indexable(items)?;
         refuse_stacks(structure, &items)?;
         if items.is_empty() {
             return Ok(Tree::default());
@@ -178,6 +177,7 @@ peer_of_tree!(
     "peer-obvhs",
     "crate obvhs, medium build, its own nodes walked",
     "obvhs",
+    Tree,
     BvhBuildParams::medium_build(),
     walk
 );
@@ -188,11 +188,8 @@ peer_of_tree!(
     "peer-obvhs-tuned",
     "crate obvhs, very slow build, one item a leaf, nodes in stack order, walked",
     "obvhs",
-    BvhBuildParams {
-        max_prims_per_leaf: 1,
-        pre_split: false,
-        ..BvhBuildParams::very_slow_build()
-    },
+    Tree,
+    ploc::ONE_A_LEAF,
     walk
 );
 
@@ -202,10 +199,7 @@ peer_of_tree!(
     "peer-obvhs-aabb",
     "crate obvhs, as tuned: aabb_traverse with the view's bounds, then the items' test",
     "obvhs",
-    BvhBuildParams {
-        max_prims_per_leaf: 1,
-        pre_split: false,
-        ..BvhBuildParams::very_slow_build()
-    },
+    Tree,
+    ploc::ONE_A_LEAF,
     candidates
 );

@@ -8,7 +8,7 @@ use glam::Vec3;
 use parry3d::bounding_volume::Aabb as ParryAabb;
 use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhNode, TraversalAction};
 
-use super::{BoxTest, Tally, indexable, peer_of_tree, refuse_stacks};
+use super::{BoxTest, Record, Tally, peer_of_tree, refuse_stacks};
 use crate::geometry::Aabb;
 use crate::index::{BuildError, MemoryUsage};
 use crate::query::{ItemId, Recorder, Sink};
@@ -31,10 +31,9 @@ fn bounds_of(node: &BvhNode) -> Aabb {
 impl Tree {
     fn build(
         structure: &'static str,
-        items: &[Aabb],
+        items: Vec<Record>,
         strategy: BvhBuildStrategy,
     ) -> Result<Tree, BuildError> {
-        let items = indexable(items)?;
         let ploc = strategy == BvhBuildStrategy::Ploc;
         if ploc {
             refuse_stacks(structure, &items)?;
@@ -150,6 +149,7 @@ peer_of_tree!(
     "peer-parry3d",
     "crate parry3d, binned build, asked through leaves",
     "parry3d",
+    Tree,
     BvhBuildStrategy::Binned,
     leaves
 );
@@ -160,6 +160,7 @@ peer_of_tree!(
     "peer-parry3d-accept",
     "crate parry3d, binned build, asked through traverse_indexed, whole subtrees accepted",
     "parry3d",
+    Tree,
     BvhBuildStrategy::Binned,
     traverse
 );
@@ -170,6 +171,7 @@ peer_of_tree!(
     "peer-parry3d-ploc",
     "crate parry3d, PLOC build, asked through traverse_indexed, whole subtrees accepted",
     "parry3d",
+    Tree,
     BvhBuildStrategy::Ploc,
     traverse
 );

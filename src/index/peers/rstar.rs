@@ -6,12 +6,12 @@ use std::ops::ControlFlow;
 use glam::Vec3;
 use rstar::{AABB, ParentNode, RTree, RTreeNode, RTreeObject, SelectionFunction};
 
-use super::{BoxByBox, BoxTest, Item, PeerParams, Tally, indexable};
+use super::{BoxTest, BuildError, Record, Tally, peer_of_tree};
 use crate::geometry::Aabb;
-use crate::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
-use crate::query::{Context, QueryVolume, Recorder, Sink};
+use crate::index::MemoryUsage;
+use crate::query::{Recorder, Sink};
 
-impl RTreeObject for Item {
+impl RTreeObject for Record {
     type Envelope = AABB<[f32; 3]>;
 
     #[inline(always)]
@@ -34,7 +34,7 @@ struct Selected<'a, 'r, T, R> {
     tally: &'a Tally<'r, R>,
 }
 
-impl<T: BoxTest, R: Recorder> SelectionFunction<Item> for Selected<'_, '_, T, R> {
+impl<T: BoxTest, R: Recorder> SelectionFunction<Record> for Selected<'_, '_, T, R> {
     #[inline(always)]
     fn should_unpack_parent(&self, envelope: &AABB<[f32; 3]>) -> bool {
         self.tally.node(self.test);
@@ -42,144 +42,120 @@ impl<T: BoxTest, R: Recorder> SelectionFunction<Item> for Selected<'_, '_, T, R>
     }
 
     #[inline(always)]
-    fn should_unpack_leaf(&self, item: &Item) -> bool {
+    fn should_unpack_leaf(&self, item: &Record) -> bool {
         self.tally.item(self.test);
         self.test.admits(&item.bounds)
     }
 }
 
-fn memory(tree: &RTree<Item>) -> MemoryUsage {
-    fn places(node: &ParentNode<Item>) -> usize {
-        let below = node.children().iter().map(|child| match child {
-            RTreeNode::Leaf(_) => 0,
-            RTreeNode::Parent(parent) => places(parent),
-        });
-        node.children().len() + below.sum::<usize>()
-    }
-    let (all, item_bytes) = (
-        places(tree.root()) * size_of::<RTreeNode<Item>>(),
-        tree.size() * size_of::<RTreeNode<Item>>(),
-    );
-    MemoryUsage {
-        node_bytes: all.saturating_sub(item_bytes),
-        item_bytes,
-    }
+/// Slots of a node and of all below it.
+fn slots(node: &ParentNode<Record>) -> usize {
+    let below = node.children().iter().map(|child| match child {
+        RTreeNode::Leaf(_) => 0,
+        RTreeNode::Parent(parent) => slots(parent),
+    });
+    node.children().len() + below.sum::<usize>()
 }
 
-/// `locate_with_selection_function`: its iterator over the items that the
-/// selection lets pass.
-#[inline(always)]
-fn select<T: BoxTest, S: Sink, R: Recorder>(
-    tree: &RTree<Item>,
-    test: &T,
-    sink: &mut S,
-    recorder: &mut R,
-) -> ControlFlow<()> {
-    let tally = Tally::new(recorder);
-    let selected = Selected {
-        test,
-        tally: &tally,
-    };
-    for item in tree.locate_with_selection_function(selected) {
-        sink.accept(std::slice::from_ref(&item.id))?;
-    }
-    ControlFlow::Continue(())
-}
+/// The tree, which keeps the items in its leaves.
+struct Tree(RTree<Record>);
 
-/// Its public nodes from the root on, as its iterator goes through them;
-/// a node that is accepted hands its subtree down without further tests.
-#[inline(always)]
-fn walk<T: BoxTest, S: Sink, R: Recorder>(
-    tree: &RTree<Item>,
-    test: &T,
-    sink: &mut S,
-    recorder: &mut R,
-) -> ControlFlow<()> {
-    let tally = Tally::new(recorder);
-    let root = tree.root();
-    tally.node(test);
-    if root.children().is_empty() || test.rejects(&bounds_of(&root.envelope())) {
-        return ControlFlow::Continue(());
+impl Tree {
+    fn build(_: &'static str, items: Vec<Record>, (): ()) -> Result<Tree, BuildError> {
+        Ok(Tree(RTree::bulk_load(items)))
     }
-    let mut open = vec![(root, false)];
-    while let Some((parent, inside)) = open.pop() {
-        for child in parent.children() {
-            match child {
-                RTreeNode::Leaf(item) if inside => {
-                    tally.count(|recorder| recorder.subtree_accepted(1));
-                    sink.accept(std::slice::from_ref(&item.id))?;
-                }
-                RTreeNode::Leaf(item) => {
-                    tally.item(test);
-                    if test.admits(&item.bounds) {
+
+    fn memory(&self) -> MemoryUsage {
+        let slot = size_of::<RTreeNode<Record>>();
+        let item_bytes = self.0.size() * slot;
+        MemoryUsage {
+            node_bytes: (slots(self.0.root()) * slot).saturating_sub(item_bytes),
+            item_bytes,
+        }
+    }
+
+    /// `locate_with_selection_function`: its iterator over the items that the
+    /// selection lets pass.
+    #[inline(always)]
+    fn select<T: BoxTest, S: Sink, R: Recorder>(
+        &self,
+        test: &T,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        let tally = Tally::new(recorder);
+        let selected = Selected {
+            test,
+            tally: &tally,
+        };
+        for item in self.0.locate_with_selection_function(selected) {
+            sink.accept(std::slice::from_ref(&item.id))?;
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Its public nodes from the root on, as its iterator goes through them;
+    /// a node that is accepted hands its subtree down without further tests.
+    #[inline(always)]
+    fn walk<T: BoxTest, S: Sink, R: Recorder>(
+        &self,
+        test: &T,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        let tally = Tally::new(recorder);
+        let root = self.0.root();
+        tally.node(test);
+        if root.children().is_empty() || test.rejects(&bounds_of(&root.envelope())) {
+            return ControlFlow::Continue(());
+        }
+        let mut open = vec![(root, false)];
+        while let Some((parent, inside)) = open.pop() {
+            for child in parent.children() {
+                match child {
+                    RTreeNode::Leaf(item) if inside => {
+                        tally.count(|recorder| recorder.subtree_accepted(1));
                         sink.accept(std::slice::from_ref(&item.id))?;
                     }
-                }
-                RTreeNode::Parent(node) if inside => open.push((node, true)),
-                RTreeNode::Parent(node) => {
-                    tally.node(test);
-                    let bounds = bounds_of(&node.envelope());
-                    if !test.rejects(&bounds) {
-                        open.push((node, test.accepts(&bounds)));
+                    RTreeNode::Leaf(item) => {
+                        tally.item(test);
+                        if test.admits(&item.bounds) {
+                            sink.accept(std::slice::from_ref(&item.id))?;
+                        }
+                    }
+                    RTreeNode::Parent(node) if inside => open.push((node, true)),
+                    RTreeNode::Parent(node) => {
+                        tally.node(test);
+                        let bounds = bounds_of(&node.envelope());
+                        if !test.rejects(&bounds) {
+                            open.push((node, test.accepts(&bounds)));
+                        }
                     }
                 }
             }
         }
+        ControlFlow::Continue(())
     }
-    ControlFlow::Continue(())
 }
 
-macro_rules! peer {
-    ($(#[$doc:meta])* $peer:ident, $name:literal, $summary:literal, $search:ident) => {
-        $(#[$doc])*
-        pub struct $peer(RTree<Item>);
-
-        impl BoxByBox for $peer {
-            #[inline(always)]
-            fn search<T: BoxTest, S: Sink, R: Recorder>(
-                &self,
-                test: &T,
-                sink: &mut S,
-                recorder: &mut R,
-            ) -> ControlFlow<()> {
-                $search(&self.0, test, sink, recorder)
-            }
-        }
-
-        impl RegionIndex for $peer {
-            const INFO: Info = Info::new($name, $summary, Kind::Tree, Origin::Crate("rstar"));
-            type Params = PeerParams;
-
-            fn build(input: &Input<'_>, _: &PeerParams) -> Result<Self, BuildError> {
-                let items = input.items;
-                Ok($peer(RTree::bulk_load(indexable(items)?)))
-            }
-
-            fn memory(&self) -> MemoryUsage {
-                memory(&self.0)
-            }
-
-            #[inline(always)]
-    fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
-        super::box_by_box::query(self, volume, cx)
-    }
-        }
-
-    };
-}
-
-peer!(
+peer_of_tree!(
     /// Its own iterator.
     PeerRstar,
     "peer-rstar",
     "crate rstar, bulk-loaded, asked through a selection function",
+    "rstar",
+    Tree,
+    (),
     select
 );
 
-peer!(
+peer_of_tree!(
     /// Its nodes.
     PeerRstarAccept,
     "peer-rstar-accept",
     "crate rstar, bulk-loaded, its nodes walked from the root, whole subtrees accepted",
+    "rstar",
+    Tree,
+    (),
     walk
 );

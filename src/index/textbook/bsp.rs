@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 
 use glam::Vec3;
 
-use super::{Items, Node, Slice, TextbookParams, memory_of, records, test_items};
+use super::{Items, Node, Slice, TextbookParams, memory_of, test_items};
 use crate::geometry::{Aabb, Plane, PlaneTree};
 use crate::index::partition::Record;
 use crate::index::plane_choice::planes_of;
@@ -186,7 +186,7 @@ impl RegionIndex for BspTextbook {
             ..
         } = *input;
         params.check(Self::INFO.name)?;
-        let records = records(items)?;
+        let records = Record::all(items)?;
         let first = own.and_then(|own| own.root);
         let planes = Planes { own, params };
         let root = (!records.is_empty()).then(|| planes.divided(&records, first, 0));

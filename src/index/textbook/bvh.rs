@@ -4,7 +4,7 @@
 use obvhs::BvhBuildParams;
 use obvhs::bvh2::node::Bvh2Node;
 
-use super::{Items, Node, Slice, TextbookParams, answered_by_walk, records};
+use super::{Items, Node, Slice, TextbookParams, answered_by_walk};
 use crate::geometry::Aabb;
 use crate::index::partition::Record;
 use crate::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, ploc};
@@ -117,7 +117,7 @@ impl RegionIndex for BvhTextbook {
     fn build(input: &Input<'_>, params: &TextbookParams) -> Result<Self, BuildError> {
         let items = input.items;
         params.check(Self::INFO.name)?;
-        let mut records = records(items)?;
+        let mut records = Record::all(items)?;
         let mut tree = BvhTextbook {
             nodes: Vec::new(),
             items: Items::default(),
@@ -127,7 +127,7 @@ impl RegionIndex for BvhTextbook {
         }
         // Items with the very same bounds are one to the builder, which would need
         // quadratic time to find a nearest one among them.
-        let key = |r: &Record| [r.bounds.min, r.bounds.max].map(|c| c.to_array().map(f32::to_bits));
+        let key = |r: &Record| r.bounds.bits();
         records.sort_unstable_by_key(|r| (key(r), r.id));
         let stacks: Vec<&[Record]> = records.chunk_by(|a, b| key(a) == key(b)).collect();
         // At unit size: it compares areas, which must not overflow.

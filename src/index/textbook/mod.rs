@@ -16,7 +16,7 @@ use std::ops::ControlFlow;
 use serde::{Deserialize, Serialize};
 
 use super::partition::Record;
-use super::{BuildError, MemoryUsage, check_range, indexable};
+use super::{BuildError, MemoryUsage, check_range};
 use crate::geometry::{Aabb, PlaneMask};
 use crate::query::{Containment, Context, ItemId, QueryVolume, Recorder, Sink};
 
@@ -52,15 +52,6 @@ impl TextbookParams {
     fn ends_at(&self, items: usize, level: u32) -> bool {
         items <= self.leaf as usize || level == self.depth
     }
-}
-
-/// What a structure has to hold, as the recursion of its build hands it down.
-fn records(items: &[Aabb]) -> Result<Vec<Record>, BuildError> {
-    let record = |id: ItemId| Record {
-        bounds: items[id as usize],
-        id,
-    };
-    Ok(indexable(items)?.into_iter().map(record).collect())
 }
 
 /// Items that a node keeps: their ids are one slice.

@@ -3,7 +3,7 @@
 
 use glam::Vec3;
 
-use super::{Items, Node, Slice, TextbookParams, answered_by_walk, memory_of, records};
+use super::{Items, Node, Slice, TextbookParams, answered_by_walk, memory_of};
 use crate::geometry::Aabb;
 use crate::index::partition::Record;
 use crate::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
@@ -124,7 +124,7 @@ impl RegionIndex for OctreeTextbook {
     fn build(input: &Input<'_>, params: &TextbookParams) -> Result<Self, BuildError> {
         let items = input.items;
         params.check(Self::INFO.name)?;
-        let records = records(items)?;
+        let records = Record::all(items)?;
         let axes = [0, 1, 2];
         let cell = root_cell(&Aabb::union_of(items), &axes);
         let root = (!records.is_empty()).then(|| Cell::divided(cell, &axes, records, params, 0));

@@ -3,8 +3,9 @@
 //! cells are columns through the whole scene.
 
 use super::octree::{Cell, root_cell};
-use super::{TextbookParams, answered_by_walk, memory_of, records};
+use super::{TextbookParams, answered_by_walk, memory_of};
 use crate::geometry::Aabb;
+use crate::index::partition::Record;
 use crate::index::quadtree::widest_axes;
 use crate::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
 
@@ -37,7 +38,7 @@ impl RegionIndex for QuadtreeTextbook {
     fn build(input: &Input<'_>, params: &TextbookParams) -> Result<Self, BuildError> {
         let items = input.items;
         params.check(Self::INFO.name)?;
-        let records = records(items)?;
+        let records = Record::all(items)?;
         let scene = Aabb::union_of(items);
         let axes = widest_axes(&scene);
         let cell = root_cell(&scene, &axes);

@@ -10,8 +10,8 @@ use crate::camera::Lens;
 use crate::scene::{SeededRng, WorldBox};
 use crate::visibility::Rays;
 use crate::visibility::region::{
-    EveryRegion, Flood, Opening, OpeningPlane, PortalClip, PortalRect, RegionGraph, RegionRow,
-    Scratch, Witness, rectangle,
+    EveryRegion, Opening, OpeningPlane, RegionGraph, RegionRow, Scratch, Searched, Witness,
+    rectangle,
 };
 
 /// A chain of rooms along x, and a line of sight from the first to the last of them.
@@ -125,8 +125,8 @@ fn rows(graph: &Arc<RegionGraph>) -> [Box<dyn RegionRow>; 4] {
     let graph = || graph.clone();
     [
         Box::new(EveryRegion(graph())),
-        Box::new(Flood(graph())),
-        Box::new(PortalRect(graph())),
-        Box::new(PortalClip(graph())),
+        Box::new(Searched::flood(graph())),
+        Box::new(Searched::portal_rect(graph())),
+        Box::new(Searched::portal_clip(graph())),
     ]
 }

@@ -51,19 +51,6 @@ pub struct Tally {
     pub covered: u64,
 }
 
-impl Tally {
-    /// Shaded fragments per covered sample with early z: 1 at best.
-    pub fn overdraw(&self) -> f64 {
-        self.passed as f64 / self.covered as f64
-    }
-
-    /// Opaque fragments per covered sample: what is shaded without any z-test, the
-    /// depth complexity of the view.
-    pub fn depth_complexity(&self) -> f64 {
-        (self.fragments - self.clear) as f64 / self.covered as f64
-    }
-}
-
 /// A drawn image.
 #[derive(Clone, Debug)]
 #[non_exhaustive]

@@ -12,7 +12,7 @@ use order::{BspOrder, ORDERS};
 
 fn all(solids: &Solids) -> Vec<Piece> {
     let items = 0..solids.boxes.len() as ItemId;
-    items.map(|item| Piece { item, part: None }).collect()
+    items.map(Piece::whole).collect()
 }
 
 /// Cameras in a scene: on the ground and above it, of all lenses.

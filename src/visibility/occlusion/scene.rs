@@ -35,7 +35,7 @@ pub struct OccluderScene {
 impl OccluderScene {
     /// Solid boxes, which hide what is behind them. O(n log n).
     pub fn of(solids: &Solids) -> OccluderScene {
-        let bounds = bounds_of(solids.boxes.iter().copied());
+        let bounds = WorldBox::union_of(solids.boxes.iter().copied());
         let boxes = solids.boxes.iter();
         let faces = boxes.map(|b| faces_reached(b, &bounds)).collect();
         OccluderScene::sorted(solids.origin, &solids.outer, &solids.inner, faces, bounds)
@@ -44,7 +44,7 @@ impl OccluderScene {
     /// Items of a mesh, each of which hides what is behind a box inside it: by item,
     /// scene-local, empty where there is none. O(n log n).
     pub fn within(scene: &Scene, inner: &[Aabb]) -> OccluderScene {
-        let bounds = bounds_of(scene.written());
+        let bounds = WorldBox::union_of(scene.written());
         // Rounded inward: what hides reaches a face only if this does.
         let faces = inner
             .iter()
@@ -57,7 +57,7 @@ impl OccluderScene {
     /// between the rooms of a map. Corners of the blocks must be exact in f32 about the
     /// scene's origin. O(n log n).
     pub fn among(scene: &Scene, blocks: &[WorldBox]) -> OccluderScene {
-        let bounds = bounds_of(scene.written());
+        let bounds = WorldBox::union_of(scene.written());
         let about = |corner: DVec3| (corner - scene.origin).as_vec3();
         let local = blocks.iter().map(|b| Aabb::new(about(b.min), about(b.max)));
         let local: Vec<Aabb> = local.collect();
@@ -233,13 +233,6 @@ fn blocks_of(boxes: &[Aabb]) -> Vec<BoxBlock> {
         return vec![BoxBlock::EMPTY];
     }
     blocks
-}
-
-fn bounds_of(boxes: impl Iterator<Item = WorldBox>) -> WorldBox {
-    let nothing = WorldBox::new(DVec3::INFINITY, DVec3::NEG_INFINITY);
-    boxes.fold(nothing, |all, b| {
-        WorldBox::new(all.min.min(b.min), all.max.max(b.max))
-    })
 }
 
 fn faces_reached(b: &WorldBox, bounds: &WorldBox) -> Faces {

@@ -48,7 +48,7 @@ impl FrameTrace {
     pub fn read_occluders(&self, scene: &OccluderScene) -> u32 {
         let drawn = (0..self.stats.drawn).map(|position| scene.inner(position));
         drawn.fold(0, |all, b| {
-            let [low, high] = [b.min, b.max].map(|corner| corner.to_array().map(f32::to_bits));
+            let [low, high] = b.bits();
             all ^ low[0] ^ low[1] ^ low[2] ^ high[0] ^ high[1] ^ high[2]
         })
     }

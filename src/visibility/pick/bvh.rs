@@ -1,58 +1,23 @@
 //! The crate bvh: its `traverse` with a slab test hands back all that lies on the
 //! ray, from which the first is taken.
 
-use ::bvh::aabb::{Aabb as TheirBox, Bounded, IntersectsAabb};
-use ::bvh::bounding_hierarchy::BHShape;
-use ::bvh::bvh::{Bvh, BvhNode};
-use glam::{DVec3, Vec3};
-use nalgebra::Point3;
+use ::bvh::aabb::{Aabb as TheirBox, IntersectsAabb};
+use ::bvh::bvh::Bvh;
+use glam::DVec3;
 
-use super::contract::{About, Hit, NotBuilt, Pick, keep_nearest, refuse_stacks};
+use super::contract::{BackEnd, Hit, NotBuilt, Pick, keep_nearest, refuse_stacks};
 use super::rounded::RoundedRay;
-use crate::geometry::Aabb;
-use crate::index::Origin;
-use crate::query::ItemId;
+use crate::index::Record;
+use crate::index::peers::{Shape, bounds_of};
 use crate::visibility::{Guarantee, Ray, Solids};
 
-/// As typed on the command line.
-pub const NAME: &str = "bvh";
-/// One line for tables and help.
-pub const SUMMARY: &str = "crate bvh, its traverse: all items on the ray, then the first";
-
-/// What it declares of itself.
-pub const ABOUT: About = About {
-    name: NAME,
-    summary: SUMMARY,
-    origin: Origin::Crate("bvh"),
+/// The row of this file.
+pub const ROW: BackEnd = BackEnd {
+    name: "bvh",
+    summary: "crate bvh, its traverse: all items on the ray, then the first",
     guarantee: Guarantee::Unproven,
+    build: build,
 };
-
-/// An item that the crate tells where it put it.
-#[derive(Clone, Copy)]
-struct Shape {
-    bounds: Aabb,
-    id: ItemId,
-    node: usize,
-}
-
-impl Bounded<f32, 3> for Shape {
-    fn aabb(&self) -> TheirBox<f32, 3> {
-        let point = |v: Vec3| Point3::new(v.x, v.y, v.z);
-        TheirBox {
-            min: point(self.bounds.min),
-            max: point(self.bounds.max),
-        }
-    }
-}
-
-impl BHShape<f32, 3> for Shape {
-    fn set_bh_node_index(&mut self, node: usize) {
-        self.node = node;
-    }
-    fn bh_node_index(&self) -> usize {
-        self.node
-    }
-}
 
 /// The line from the origin to the far plane. The crate's own ray has a
 /// direction of length 1, whose depths would be others.
@@ -61,9 +26,7 @@ struct Line(RoundedRay);
 impl IntersectsAabb<f32, 3> for Line {
     #[inline(always)]
     fn intersects_aabb(&self, b: &TheirBox<f32, 3>) -> bool {
-        let corner = |p: Point3<f32>| Vec3::new(p.x, p.y, p.z);
-        self.0
-            .meets(&Aabb::new(corner(b.min), corner(b.max)), self.0.far)
+        self.0.meets(&bounds_of(b), self.0.far)
     }
 }
 
@@ -75,14 +38,10 @@ pub struct PickBvh {
 }
 
 /// Builds it for the table of back ends.
-pub(super) fn build(solids: &Solids) -> Result<Box<dyn Pick>, NotBuilt> {
-    refuse_stacks(NAME, &solids.outer)?;
-    let shape = |(id, &bounds): (usize, &Aabb)| Shape {
-        bounds,
-        id: id as ItemId,
-        node: 0,
-    };
-    let mut shapes: Vec<Shape> = solids.outer.iter().enumerate().map(shape).collect();
+fn build(solids: &Solids) -> Result<Box<dyn Pick>, NotBuilt> {
+    refuse_stacks(ROW.name, &solids.outer)?;
+    let records = Record::numbered(&solids.outer).into_iter();
+    let mut shapes: Vec<Shape> = records.map(Shape::from).collect();
     Ok(Box::new(PickBvh {
         tree: Bvh::build(&mut shapes),
         shapes,
@@ -95,33 +54,20 @@ impl PickBvh {
         let line = Line(RoundedRay::of(ray, self.zero));
         let found = self.tree.traverse(&line, &self.shapes);
         found.into_iter().filter_map(move |shape| {
-            let depth = line.0.entry(&shape.bounds);
-            let hit = Hit {
-                item: shape.id,
-                depth: f64::from(depth),
-            };
-            depth.is_finite().then_some(hit)
+            let Record { bounds, id } = &shape.item;
+            line.0.hit(*id, bounds)
         })
     }
 }
 
 impl Pick for PickBvh {
-    fn about(&self) -> About {
-        ABOUT
-    }
-
     fn first(&self, ray: &Ray) -> Option<Hit> {
-        self.met(ray)
-            .min_by(|a, b| a.depth.total_cmp(&b.depth).then(a.item.cmp(&b.item)))
+        self.met(ray).min_by(Hit::order)
     }
 
     fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {
         hits.clear();
         hits.extend(self.met(ray));
         keep_nearest(hits, count);
-    }
-
-    fn memory(&self) -> usize {
-        self.tree.nodes.capacity() * size_of::<BvhNode<f32, 3>>() + size_of_val(&self.shapes[..])
     }
 }

@@ -1,8 +1,10 @@
 //! What a back end of picking is: the questions it answers and what it declares
 //! of itself.
 
+use std::cmp::Ordering;
+
 use crate::geometry::Aabb;
-use crate::index::Origin;
+use crate::index::ploc;
 use crate::query::ItemId;
 use crate::visibility::{Guarantee, Ray, Solids};
 
@@ -15,27 +17,17 @@ pub struct Hit {
     pub depth: f64,
 }
 
-/// What a back end declares of itself.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[non_exhaustive]
-pub struct About {
-    /// As typed on the command line; no table has it twice.
-    pub name: &'static str,
-    /// One line for tables and help.
-    pub summary: &'static str,
-    /// Whose code answers.
-    pub origin: Origin<&'static str>,
-    /// What it promises of its answers: [`Guarantee::Exact`] is the answer of
-    /// exact arithmetic, ties included.
-    pub guarantee: Guarantee,
+impl Hit {
+    /// By depth, then by id.
+    pub(super) fn order(&self, other: &Hit) -> Ordering {
+        let by_depth = self.depth.total_cmp(&other.depth);
+        by_depth.then(self.item.cmp(&other.item))
+    }
 }
 
 /// Items of a scene that rays are asked about, as solids: which of them a ray
 /// meets is said where [`Solids`] are.
 pub trait Pick: Send + Sync {
-    /// What it declares of itself.
-    fn about(&self) -> About;
-
     /// The first item that the ray meets; of several at the same depth the one
     /// with the lowest id.
     fn first(&self, ray: &Ray) -> Option<Hit>;
@@ -45,17 +37,19 @@ pub trait Pick: Send + Sync {
     /// items at the depth of the last of them are among them, so there may be
     /// more.
     fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>);
-
-    /// Heap bytes.
-    fn memory(&self) -> usize;
 }
 
 /// A row of the table of back ends.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub struct BackEnd {
-    /// What it declares of itself.
-    pub about: About,
+    /// As typed on the command line; no table has it twice.
+    pub name: &'static str,
+    /// One line for tables and help.
+    pub summary: &'static str,
+    /// What it promises of its answers: [`Guarantee::Exact`] is the answer of
+    /// exact arithmetic, ties included.
+    pub guarantee: Guarantee,
     /// Builds it over the items. Deterministic.
     ///
     /// # Errors
@@ -92,7 +86,7 @@ pub enum NotBuilt {
 /// Sorts what was found in f32 or rounded, by depth and id, and keeps the first
 /// `count` with all that are as deep as the last of them.
 pub(super) fn keep_nearest(hits: &mut Vec<Hit>, count: usize) {
-    hits.sort_unstable_by(|a, b| a.depth.total_cmp(&b.depth).then(a.item.cmp(&b.item)));
+    hits.sort_unstable_by(Hit::order);
     if let Some(last) = count
         .checked_sub(1)
         .and_then(|last| hits.get(last))
@@ -105,26 +99,12 @@ pub(super) fn keep_nearest(hits: &mut Vec<Hit>, count: usize) {
     }
 }
 
-/// Most items with the very same bounds for a builder that needs quadratic time
-/// for them.
-const MOST_ALIKE: usize = 50_000;
-
-/// Refuses more than [`MOST_ALIKE`] items with the same bounds. O(n log n) if
-/// there are that many items at all.
+/// Refuses more items with the same bounds than a builder gets which needs
+/// quadratic time for them.
 pub(super) fn refuse_stacks(name: &'static str, boxes: &[Aabb]) -> Result<(), NotBuilt> {
-    if boxes.len() <= MOST_ALIKE {
-        return Ok(());
-    }
-    let key = |b: &Aabb| [b.min, b.max].map(|corner| corner.to_array().map(f32::to_bits));
-    let mut keys: Vec<_> = boxes.iter().map(key).collect();
-    keys.sort_unstable();
-    let alike = keys.chunk_by(|a, b| a == b).map(<[_]>::len).max();
-    match alike {
-        Some(alike) if alike > MOST_ALIKE => Err(NotBuilt::Alike {
-            name,
-            alike,
-            most: MOST_ALIKE,
-        }),
-        _ => Ok(()),
+    let most = ploc::MOST_ALIKE;
+    match ploc::too_many_alike(boxes.iter()) {
+        None => Ok(()),
+        Some(alike) => Err(NotBuilt::Alike { name, alike, most }),
     }
 }

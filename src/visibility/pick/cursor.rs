@@ -3,8 +3,6 @@
 
 use crate::camera::{Camera, CameraError, Lens, PlaneOptions, Surroundings};
 use crate::geometry::ConvexVolume;
-use crate::index::FrustumQuery;
-use crate::query::ItemId;
 use crate::visibility::Rays;
 
 /// A rectangle of the image: (0, 0) is its upper left corner, (1, 1) its lower
@@ -66,23 +64,4 @@ impl CursorRectangle {
     pub fn volume(&self, rays: &Rays, around: &Surroundings) -> Result<ConvexVolume, CameraError> {
         self.camera(rays)?.volume(&PlaneOptions::default(), around)
     }
-}
-
-/// Everything through the cursor's frustum: each item that no plane of the
-/// rectangle's own frustum excludes, in the order of the index. It holds every
-/// item that a ray through the rectangle meets, those behind others included.
-///
-/// # Errors
-/// As [`CursorRectangle::volume`].
-pub fn through_cursor<T: FrustumQuery>(
-    index: &T,
-    rays: &Rays,
-    rectangle: &CursorRectangle,
-    around: &Surroundings,
-) -> Result<Vec<ItemId>, CameraError> {
-    let volume = rectangle.volume(rays, around)?;
-    let mut found = Vec::new();
-    // A Vec never breaks off.
-    let _ = index.visible(&volume, &mut found);
-    Ok(found)
 }

@@ -11,25 +11,19 @@ use ::embree_rs::{
 };
 use glam::DVec3;
 
-use super::contract::{About, Hit, NotBuilt, Pick, keep_nearest};
+use super::contract::{BackEnd, Hit, NotBuilt, Pick, keep_nearest};
 use super::rounded::RoundedRay;
 use crate::geometry::Aabb;
-use crate::index::Origin;
 use crate::query::ItemId;
 use crate::visibility::{Guarantee, Ray, Solids};
 
-/// As typed on the command line.
-pub const NAME: &str = "embree";
-/// One line for tables and help.
-pub const SUMMARY: &str = "Embree 3 by crate embree-rs, boxes of quads, its rtcIntersect1";
-
-/// What it declares of itself.
-pub const ABOUT: About = About {
-    name: NAME,
-    summary: SUMMARY,
-    origin: Origin::Crate("embree-rs"),
+/// The row of this file.
+pub const ROW: BackEnd = BackEnd {
+    name: "embree",
+    summary: "Embree 3 by crate embree-rs, boxes of quads, its rtcIntersect1",
     // Rays and quads are in f32, and rays may slip through between two quads.
     guarantee: Guarantee::Unproven,
+    build: build,
 };
 
 /// Corners of a box in the order of its faces; a bit of a corner is an axis, set for
@@ -51,7 +45,7 @@ pub struct Embree {
 }
 
 /// Builds it for the table of back ends.
-pub(super) fn build(solids: &Solids) -> Result<Box<dyn Pick>, NotBuilt> {
+fn build(solids: &Solids) -> Result<Box<dyn Pick>, NotBuilt> {
     let most = u32::MAX as usize / 8;
     if solids.outer.len() > most {
         let count = solids.outer.len();
@@ -134,10 +128,6 @@ impl Embree {
 }
 
 impl Pick for Embree {
-    fn about(&self) -> About {
-        ABOUT
-    }
-
     fn first(&self, ray: &Ray) -> Option<Hit> {
         let rounded = RoundedRay::of(ray, self.zero);
         let mut from = rounded.near.max(0.0);
@@ -167,11 +157,5 @@ impl Pick for Embree {
             from = at.next_up();
         }
         keep_nearest(hits, count);
-    }
-
-    /// What was given to it: the library does not tell how large its tree is.
-    fn memory(&self) -> usize {
-        let quads = size_of::<[f32; 4]>() * 8 + size_of::<[u32; 4]>() * 6;
-        self.boxes.len() * quads + size_of_val(&self.boxes[..])
     }
 }

@@ -1,23 +1,17 @@
 //! Every item asked, exactly: the reference that the others are held against.
 
-use super::contract::{About, Hit, NotBuilt, Pick};
+use super::contract::{BackEnd, Hit, Pick};
 use super::exactly;
-use crate::index::Origin;
 use crate::query::ItemId;
 use crate::scene::WorldBox;
 use crate::visibility::{Guarantee, Ray, Solids};
 
-/// As typed on the command line.
-pub const NAME: &str = "linear";
-/// One line for tables and help.
-pub const SUMMARY: &str = "every item, in exact arithmetic: the reference";
-
-/// What it declares of itself.
-pub const ABOUT: About = About {
-    name: NAME,
-    summary: SUMMARY,
-    origin: Origin::Ours,
+/// The row of this file.
+pub const ROW: BackEnd = BackEnd {
+    name: "linear",
+    summary: "every item, in exact arithmetic: the reference",
     guarantee: Guarantee::Exact,
+    build: |solids| Ok(Box::new(Linear::of(solids))),
 };
 
 /// All items in the order of their ids.
@@ -42,16 +36,7 @@ impl Linear {
     }
 }
 
-/// Never an error.
-pub(super) fn build(solids: &Solids) -> Result<Box<dyn Pick>, NotBuilt> {
-    Ok(Box::new(Linear::of(solids)))
-}
-
 impl Pick for Linear {
-    fn about(&self) -> About {
-        ABOUT
-    }
-
     /// O(n).
     fn first(&self, ray: &Ray) -> Option<Hit> {
         exactly::first(ray, self.candidates())
@@ -60,9 +45,5 @@ impl Pick for Linear {
     /// O(n), and sorting what the ray meets.
     fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {
         exactly::nearest(ray, count, self.candidates(), hits);
-    }
-
-    fn memory(&self) -> usize {
-        size_of_val(&self.boxes[..])
     }
 }

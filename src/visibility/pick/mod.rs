@@ -5,65 +5,40 @@
 mod contract;
 mod cursor;
 mod exactly;
-pub mod linear;
-pub mod obvhs;
+mod linear;
+mod obvhs;
 mod rounded;
-pub mod wide_ray;
+mod wide_ray;
 
 #[cfg(feature = "peers")]
-pub mod bvh;
+mod bvh;
 #[cfg(feature = "embree")]
-pub mod embree;
+mod embree;
 #[cfg(feature = "peers")]
-pub mod parry3d;
+mod parry3d;
 #[cfg(feature = "peers")]
-pub mod rstar;
+mod rstar;
 
 #[cfg(test)]
 mod tests;
 
-pub use contract::{About, BackEnd, Hit, NotBuilt, Pick};
-pub use cursor::{CursorRectangle, through_cursor};
+pub use contract::{BackEnd, Hit, NotBuilt, Pick};
+pub use cursor::CursorRectangle;
 pub use linear::Linear;
-pub use obvhs::{Obvhs, ObvhsWide};
 pub use wide_ray::WideRay;
 
 /// All back ends, the reference first.
 pub const BACK_ENDS: &[BackEnd] = &[
-    BackEnd {
-        about: linear::ABOUT,
-        build: linear::build,
-    },
-    BackEnd {
-        about: wide_ray::ABOUT,
-        build: wide_ray::build,
-    },
-    BackEnd {
-        about: obvhs::ABOUT,
-        build: obvhs::build,
-    },
-    BackEnd {
-        about: obvhs::ABOUT_WIDE,
-        build: obvhs::build_wide,
-    },
+    linear::ROW,
+    wide_ray::ROW,
+    obvhs::ROW,
+    obvhs::ROW_WIDE,
     #[cfg(feature = "peers")]
-    BackEnd {
-        about: parry3d::ABOUT,
-        build: parry3d::build,
-    },
+    parry3d::ROW,
     #[cfg(feature = "peers")]
-    BackEnd {
-        about: bvh::ABOUT,
-        build: bvh::build,
-    },
+    bvh::ROW,
     #[cfg(feature = "peers")]
-    BackEnd {
-        about: rstar::ABOUT,
-        build: rstar::build,
-    },
+    rstar::ROW,
     #[cfg(feature = "embree")]
-    BackEnd {
-        about: embree::ABOUT,
-        build: embree::build,
-    },
+    embree::ROW,
 ];

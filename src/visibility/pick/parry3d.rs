@@ -6,24 +6,17 @@ use ::parry3d::partitioning::{Bvh, BvhBuildStrategy, TraversalAction};
 use ::parry3d::query::Ray as TheirRay;
 use glam::{DVec3, Vec3};
 
-use super::contract::{About, Hit, NotBuilt, Pick, keep_nearest};
+use super::contract::{BackEnd, Hit, NotBuilt, Pick, keep_nearest};
 use super::rounded::RoundedRay;
 use crate::geometry::Aabb;
-use crate::index::Origin;
-use crate::query::ItemId;
 use crate::visibility::{Guarantee, Ray, Solids};
 
-/// As typed on the command line.
-pub const NAME: &str = "parry3d";
-/// One line for tables and help.
-pub const SUMMARY: &str = "crate parry3d, binned build, its cast_ray";
-
-/// What it declares of itself.
-pub const ABOUT: About = About {
-    name: NAME,
-    summary: SUMMARY,
-    origin: Origin::Crate("parry3d"),
+/// The row of this file.
+pub const ROW: BackEnd = BackEnd {
+    name: "parry3d",
+    summary: "crate parry3d, binned build, its cast_ray",
     guarantee: Guarantee::Unproven,
+    build: build,
 };
 
 /// Its tree; leaves are item ids.
@@ -39,7 +32,7 @@ fn vector(v: Vec3) -> Vector {
 }
 
 /// Builds it for the table of back ends.
-pub(super) fn build(solids: &Solids) -> Result<Box<dyn Pick>, NotBuilt> {
+fn build(solids: &Solids) -> Result<Box<dyn Pick>, NotBuilt> {
     let theirs = |b: &Aabb| TheirBox::new(vector(b.min), vector(b.max));
     let leaves: Vec<TheirBox> = solids.outer.iter().map(theirs).collect();
     Ok(Box::new(Parry3d {
@@ -50,10 +43,6 @@ pub(super) fn build(solids: &Solids) -> Result<Box<dyn Pick>, NotBuilt> {
 }
 
 impl Pick for Parry3d {
-    fn about(&self) -> About {
-        ABOUT
-    }
-
     fn first(&self, ray: &Ray) -> Option<Hit> {
         let rounded = RoundedRay::of(ray, self.zero);
         let theirs = TheirRay::new(vector(rounded.origin), vector(rounded.direction));
@@ -77,20 +66,10 @@ impl Pick for Parry3d {
                 return TraversalAction::Prune;
             }
             if let Some(item) = node.leaf_data() {
-                let depth = rounded.entry(&self.boxes[item as usize]);
-                if depth.is_finite() {
-                    hits.push(Hit {
-                        item: item as ItemId,
-                        depth: f64::from(depth),
-                    });
-                }
+                hits.extend(rounded.hit(item, &self.boxes[item as usize]));
             }
             TraversalAction::Continue
         });
         keep_nearest(hits, count);
-    }
-
-    fn memory(&self) -> usize {
-        self.tree.heap_memory_size() + size_of_val(&self.boxes[..])
     }
 }

@@ -3,7 +3,9 @@
 
 use glam::{DVec3, Vec3};
 
+use super::contract::Hit;
 use crate::geometry::Aabb;
+use crate::query::ItemId;
 use crate::visibility::Ray;
 
 /// Least component of a direction that is divided by.
@@ -59,6 +61,17 @@ impl RoundedRay {
             true => enters,
             false => f32::INFINITY,
         }
+    }
+
+    /// The item of a box, if that is met.
+    #[inline(always)]
+    pub fn hit(&self, item: ItemId, b: &Aabb) -> Option<Hit> {
+        let depth = self.entry(b);
+        let hit = Hit {
+            item,
+            depth: f64::from(depth),
+        };
+        depth.is_finite().then_some(hit)
     }
 
     #[inline(always)]

@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::*;
 use crate::camera::{Camera, Frame, Lens, Surroundings};
-use crate::index::{self, Input, RegionIndex};
+use crate::index::{self, FrustumQuery, Input, RegionIndex};
 use crate::kernel::Kernel;
 use crate::query::ItemId;
 use crate::scene::{Scene, SeededRng, WorldBox, load};
@@ -120,13 +120,10 @@ fn exact_back_ends_answer_as_arithmetic_on_integers_does() {
             let solids = worlds.boxes(count);
             let built: Vec<_> = BACK_ENDS
                 .iter()
-                .filter(|row| row.about.guarantee == Guarantee::Exact)
+                .filter(|row| row.guarantee == Guarantee::Exact)
+                .map(|row| (row.name, (row.build)(&solids).unwrap()))
                 .collect();
             assert!(built.len() >= 2);
-            let built: Vec<_> = built
-                .iter()
-                .map(|row| (row.build)(&solids).unwrap())
-                .collect();
             let wide = WideRay::of(&solids).unwrap();
             for _ in 0..if count > 100 { 60 } else { 120 } {
                 let ray = worlds.ray();
@@ -134,12 +131,12 @@ fn exact_back_ends_answer_as_arithmetic_on_integers_does() {
                 met += usize::from(!truth.is_empty());
                 let tied = |pair: &[(Depth, ItemId)]| judge::order(&pair[0].0, &pair[1].0).is_eq();
                 ties += usize::from(truth.windows(2).take(1).any(tied));
-                for back_end in &built {
+                for (name, back_end) in &built {
                     let first = |ray: &Ray| back_end.first(ray);
                     let nearest =
                         |ray: &Ray, count, hits: &mut Vec<Hit>| back_end.nearest(ray, count, hits);
                     let wrong = differing(first, nearest, &ray, &truth);
-                    assert_eq!(wrong, 0, "{} {ray:?}", back_end.about().name);
+                    assert_eq!(wrong, 0, "{name} {ray:?}");
                 }
                 for kernel in Kernel::available() {
                     let first = |ray: &Ray| wide.first_by(kernel, ray);
@@ -167,7 +164,7 @@ fn exact_back_ends_answer_as_arithmetic_on_integers_does() {
 fn back_ends_in_f32_differ_on_few_ties() {
     let unproven = BACK_ENDS
         .iter()
-        .filter(|row| row.about.guarantee != Guarantee::Exact);
+        .filter(|row| row.guarantee != Guarantee::Exact);
     for row in unproven {
         let (mut on_grids, mut asked) = (0, 0);
         for mut worlds in grids(77) {
@@ -181,11 +178,7 @@ fn back_ends_in_f32_differ_on_few_ties() {
                 asked += 1;
             }
         }
-        assert!(
-            on_grids < asked / 4,
-            "{}: {on_grids} of {asked}",
-            row.about.name
-        );
+        assert!(on_grids < asked / 4, "{}: {on_grids} of {asked}", row.name);
     }
 }
 
@@ -313,9 +306,10 @@ fn a_cursors_frustum_holds_what_every_ray_through_it_meets_and_no_more_than_its_
         for half in [0.5, 4.0, 60.0] {
             let cursor = [rng.between(60.0, 260.0), rng.between(60.0, 120.0)];
             let rectangle = CursorRectangle::around(cursor, half, [320.0, 180.0]);
-            let mut items = through_cursor(&index, &rays, &rectangle, &around).unwrap();
-            items.sort_unstable();
             let volume = rectangle.volume(&rays, &around).unwrap();
+            let mut items = Vec::new();
+            let _ = index.visible(&volume, &mut items);
+            items.sort_unstable();
             let seen = scene.items.iter().map(|b| volume.sees(b));
             let seen = seen.zip(0..).filter(|(sees, _)| *sees).map(|(_, id)| id);
             assert_eq!(items, seen.collect::<Vec<ItemId>>());
@@ -335,7 +329,8 @@ fn a_cursors_frustum_holds_what_every_ray_through_it_meets_and_no_more_than_its_
                 min: [0.0; 2],
                 max: [1.0; 2],
             };
-            let all = through_cursor(&index, &rays, &whole, &around).unwrap();
+            let mut all = Vec::new();
+            let _ = index.visible(&whole.volume(&rays, &around).unwrap(), &mut all);
             assert!(items.len() < all.len() || all.is_empty());
         }
     }

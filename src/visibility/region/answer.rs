@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::clip_windows::ClipWindows;
 use super::graph::RegionGraph;
-use super::rectangle_windows::RectangleWindows;
+use super::windows::Windows;
 use crate::visibility::{Guarantee, Rays};
 
 pub(super) use super::number::{Marks, RegionId, decode};
@@ -56,6 +56,6 @@ pub struct Scratch {
     pub(super) homes: Vec<RegionId>,
     pub(super) seen: Marks,
     pub(super) queue: Vec<RegionId>,
-    pub(super) rectangles: RectangleWindows,
+    pub(super) rectangles: Windows<[f64; 4]>,
     pub(super) windows: ClipWindows,
 }

@@ -9,7 +9,7 @@ use super::witness::{ProvenPvs, Witness};
 
 /// What an audit found. Visibility is symmetric, so of each asymmetric pair one side
 /// is wrong, whichever.
-#[derive(Clone, PartialEq, Debug, Serialize)]
+#[derive(Clone, PartialEq, Default, Debug, Serialize)]
 #[non_exhaustive]
 pub struct Audit {
     /// Unordered pairs of two different regions.
@@ -63,12 +63,7 @@ pub fn audit(
     let n = regions as u32;
     let mut audit = Audit {
         pairs: u64::from(n) * u64::from(n.saturating_sub(1)) / 2,
-        claimed: 0,
-        visible: 0,
-        asymmetric: Vec::new(),
-        false_negatives: Vec::new(),
-        unproven: Vec::new(),
-        false_positives: 0,
+        ..Audit::default()
     };
     for from in 0..n {
         for to in 0..n {

@@ -20,23 +20,47 @@ use crate::visibility::Ray;
 #[error("the scene has {0} as regions; expected a tiling of boxes with portals")]
 pub struct NoRegions(pub &'static str);
 
-/// A ground of boxes.
+/// A ground of boxes, one a region.
 #[derive(Debug)]
-pub(super) struct Boxes(pub(super) BoxGrid);
+pub(super) struct Boxes {
+    pub regions: BoxGrid,
+    /// Solids that close their borders. A ray that begins in such a solid is not hidden
+    /// by it, and may go on in every region that the solid meets.
+    pub borders: BoxGrid,
+    /// Solids in which an eye is nowhere: what it is in does not hide.
+    pub solids: BoxGrid,
+}
+
+impl Boxes {
+    fn alone(regions: Vec<WorldBox>) -> Boxes {
+        let [borders, solids] = [(); 2].map(|()| BoxGrid::new(Vec::new()));
+        Boxes {
+            regions: BoxGrid::new(regions),
+            borders,
+            solids,
+        }
+    }
+}
 
 impl Ground for Boxes {
     fn regions_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) -> bool {
         let first = out.len();
-        self.0.meeting(b, |id| out.push(id));
-        let boxes = self.0.boxes();
+        self.regions.meeting(b, |id| out.push(id));
+        let boxes = self.regions.boxes();
         let met: Vec<WorldBox> = out[first..].iter().map(|&id| boxes[id as usize]).collect();
-        covers(&met, b)
+        let mut inside = covers(&met, b);
+        self.borders.meeting(b, |solid| {
+            let solid = &self.borders.boxes()[solid as usize];
+            self.regions.meeting(solid, |id| out.push(id));
+        });
+        self.solids.meeting(b, |_| inside = false);
+        inside
     }
 
     fn follow(&self, graph: &RegionGraph, ray: &Ray, seen: &mut Marks) {
         let start = ray.at(ray.near);
         let mut homes = Vec::new();
-        self.0
+        self.regions
             .meeting(&WorldBox::new(start, start), |id| homes.push(id));
         for home in homes {
             follow_boxes(graph, home, ray, seen);
@@ -46,38 +70,6 @@ impl Ground for Boxes {
     fn check(&self, graph: &RegionGraph, witness: &Witness) -> Result<(), Rejected> {
         check_boxes(graph, witness)
     }
-}
-
-/// Boxes, and the solids that close their borders. A ray that begins in such a solid
-/// is not hidden by it, and may go on in every region that the solid meets.
-#[derive(Debug)]
-struct Rooms {
-    boxes: Boxes,
-    borders: BoxGrid,
-}
-
-impl Ground for Rooms {
-    fn regions_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) -> bool {
-        let inside = self.boxes.regions_at(b, out);
-        self.borders.meeting(b, |solid| {
-            let solid = &self.borders.boxes()[solid as usize];
-            self.boxes.0.meeting(solid, |id| out.push(id));
-        });
-        inside
-    }
-
-    fn follow(&self, graph: &RegionGraph, ray: &Ray, seen: &mut Marks) {
-        self.boxes.follow(graph, ray, seen);
-    }
-
-    fn check(&self, graph: &RegionGraph, witness: &Witness) -> Result<(), Rejected> {
-        self.boxes.check(graph, witness)
-    }
-}
-
-fn in_world(b: &Aabb, origin: DVec3) -> WorldBox {
-    let (min, max) = b.in_world(origin);
-    WorldBox::new(min, max)
 }
 
 /// What is strictly within one box closes no border.
@@ -93,8 +85,13 @@ fn is_within_one(boxes: &BoxGrid, item: &WorldBox) -> bool {
 impl RegionGraph {
     /// Regions that are boxes themselves.
     pub fn of_boxes(boxes: Vec<WorldBox>, openings: Vec<Opening>) -> RegionGraph {
-        let regions: Vec<Vec<WorldBox>> = boxes.iter().map(|b| vec![*b]).collect();
-        RegionGraph::new(&regions, openings, Arc::new(Boxes(BoxGrid::new(boxes))))
+        RegionGraph::over(Boxes::alone(boxes), openings)
+    }
+
+    pub(super) fn over(ground: Boxes, openings: Vec<Opening>) -> RegionGraph {
+        let boxes = ground.regions.boxes().iter();
+        let regions: Vec<Vec<WorldBox>> = boxes.map(|b| vec![*b]).collect();
+        RegionGraph::new(&regions, openings, Arc::new(ground))
     }
 
     /// The regions of a scene that is a tiling of boxes whose borders, but for the
@@ -107,12 +104,14 @@ impl RegionGraph {
         match &scene.regions {
             Regions::Tiling(tiling) => {
                 let mut graph = RegionGraph::of_tiling(tiling, scene.origin);
-                let boxes = BoxGrid::new(graph.parts.clone());
-                let world = scene.items.iter().map(|item| in_world(item, scene.origin));
-                let borders = world.filter(|item| !is_within_one(&boxes, item));
-                let borders = BoxGrid::new(borders.collect());
-                let boxes = Boxes(boxes);
-                graph.ground = Arc::new(Rooms { boxes, borders });
+                let regions = BoxGrid::new(graph.parts.all.clone());
+                let items = scene.items.iter();
+                let world = items.map(|item| WorldBox::of(item, scene.origin));
+                let borders = world.filter(|item| !is_within_one(&regions, item));
+                graph.ground = Arc::new(Boxes {
+                    borders: BoxGrid::new(borders.collect()),
+                    ..Boxes::alone(graph.parts.all.clone())
+                });
                 Ok(graph)
             }
             other => Err(NoRegions(other.kind())),
@@ -121,14 +120,14 @@ impl RegionGraph {
 
     /// By item: whether it may close a border between regions; furniture does not.
     pub fn borders(&self, scene: &Scene) -> Vec<bool> {
-        let boxes = BoxGrid::new(self.parts.clone());
-        let closes = |item: &Aabb| !is_within_one(&boxes, &in_world(item, scene.origin));
+        let boxes = BoxGrid::new(self.parts.all.clone());
+        let closes = |item: &Aabb| !is_within_one(&boxes, &WorldBox::of(item, scene.origin));
         scene.items.iter().map(closes).collect()
     }
 
     /// The same for a tiling about an origin.
     pub fn of_tiling(tiling: &Tiling, origin: DVec3) -> RegionGraph {
-        let world = |b: &Aabb| in_world(b, origin);
+        let world = |b: &Aabb| WorldBox::of(b, origin);
         let boxes: Vec<WorldBox> = tiling.boxes.iter().map(world).collect();
         let mut openings = Vec::with_capacity(tiling.portals.len());
         for portal in &tiling.portals {

@@ -2,41 +2,15 @@
 //! not wholly within one solid. Flooding from cell to cell tells which cells the eye
 //! can see into at all.
 
-use std::sync::Arc;
-
 use glam::DVec3;
 
-use super::answer::{Marks, RegionId};
+use super::answer::RegionId;
 use super::boxes::Boxes;
-use super::graph::{Ground, RegionGraph};
+use super::graph::RegionGraph;
 use super::locate::BoxGrid;
 use super::opening::{Opening, OpeningPlane, rectangle};
-use super::witness::{Rejected, Witness};
 use crate::scene::WorldBox;
-use crate::visibility::{Ray, Solids};
-
-/// Cells as regions. An eye in a solid is nowhere: what it is in does not hide.
-#[derive(Debug)]
-struct FreeSpace {
-    cells: Boxes,
-    solids: BoxGrid,
-}
-
-impl Ground for FreeSpace {
-    fn regions_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) -> bool {
-        let mut free = true;
-        self.solids.meeting(b, |_| free = false);
-        self.cells.regions_at(b, out) && free
-    }
-
-    fn follow(&self, graph: &RegionGraph, ray: &Ray, seen: &mut Marks) {
-        self.cells.follow(graph, ray, seen);
-    }
-
-    fn check(&self, graph: &RegionGraph, witness: &Witness) -> Result<(), Rejected> {
-        self.cells.check(graph, witness)
-    }
-}
+use crate::visibility::Solids;
 
 impl RegionGraph {
     /// About so many equal cells over the bounds of all solids, numbered along x, then
@@ -46,11 +20,10 @@ impl RegionGraph {
     /// entered before: what only lies beyond is hidden. What touches the face from
     /// beyond, at the same depth, lies on this side too.
     pub fn of_free_space(solids: &Solids, cells: usize) -> RegionGraph {
-        let start = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        let (low, high) = solids
-            .boxes
-            .iter()
-            .fold(start, |(low, high), b| (low.min(b.min), high.max(b.max)));
+        let WorldBox {
+            min: low,
+            max: high,
+        } = WorldBox::union_of(solids.boxes.iter().copied());
         if !(low.is_finite() && high.is_finite()) {
             return RegionGraph::of_boxes(Vec::new(), Vec::new());
         }
@@ -104,11 +77,11 @@ impl RegionGraph {
                 }
             }
         }
-        let regions: Vec<Vec<WorldBox>> = boxes.iter().map(|b| vec![*b]).collect();
-        let ground = FreeSpace {
-            cells: Boxes(BoxGrid::new(boxes)),
+        let ground = Boxes {
+            regions: BoxGrid::new(boxes),
+            borders: BoxGrid::new(Vec::new()),
             solids: walls,
         };
-        RegionGraph::new(&regions, openings, Arc::new(ground))
+        RegionGraph::over(ground, openings)
     }
 }

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::answer::{Marks, RegionId};
+use super::lists::Lists;
 use super::opening::Opening;
 use super::witness::{Rejected, Witness};
 use crate::camera::Lens;
@@ -31,12 +32,10 @@ pub trait Ground: Send + Sync + std::fmt::Debug {
 /// through openings.
 #[derive(Clone, Debug)]
 pub struct RegionGraph {
-    /// Each region lies in the boxes of its range of `parts`.
-    pub(super) parts: Vec<WorldBox>,
-    part_starts: Vec<u32>,
+    /// The boxes that each region lies in.
+    pub(super) parts: Lists<WorldBox>,
     openings: Vec<Opening>,
-    exit_starts: Vec<u32>,
-    exits: Vec<u32>,
+    exits: Lists<u32>,
     pub(super) ground: Arc<dyn Ground>,
 }
 
@@ -47,33 +46,23 @@ impl RegionGraph {
         openings: Vec<Opening>,
         ground: Arc<dyn Ground>,
     ) -> RegionGraph {
-        let mut part_starts = vec![0];
-        for parts in regions {
-            part_starts.push(part_starts[part_starts.len() - 1] + parts.len() as u32);
-        }
         let mut lists = vec![Vec::new(); regions.len()];
         for (i, opening) in (0u32..).zip(&openings) {
             for side in opening.sides {
                 lists[side as usize].push(i);
             }
         }
-        let mut exit_starts = vec![0];
-        for list in &lists {
-            exit_starts.push(exit_starts[exit_starts.len() - 1] + list.len() as u32);
-        }
         RegionGraph {
-            parts: regions.concat(),
-            part_starts,
+            parts: Lists::of(regions),
             openings,
-            exit_starts,
-            exits: lists.concat(),
+            exits: Lists::of(&lists),
             ground,
         }
     }
 
     /// Number of regions.
     pub fn len(&self) -> usize {
-        self.exit_starts.len() - 1
+        self.exits.count()
     }
 
     /// Whether there are no regions.
@@ -83,8 +72,7 @@ impl RegionGraph {
 
     /// The boxes that together hold a region; one in most graphs.
     pub fn parts(&self, region: RegionId) -> &[WorldBox] {
-        let at = region as usize;
-        &self.parts[self.part_starts[at] as usize..self.part_starts[at + 1] as usize]
+        self.parts.list(region)
     }
 
     /// All openings; an exit is an index in this list.
@@ -94,8 +82,7 @@ impl RegionGraph {
 
     /// The openings on a region's border.
     pub fn exits(&self, region: RegionId) -> &[u32] {
-        let at = region as usize;
-        &self.exits[self.exit_starts[at] as usize..self.exit_starts[at + 1] as usize]
+        self.exits.list(region)
     }
 
     /// Checks a line of sight between two regions, exactly.
@@ -109,18 +96,6 @@ impl RegionGraph {
     /// What finds the regions of a place.
     pub fn ground(&self) -> &dyn Ground {
         &*self.ground
-    }
-
-    /// The same graph without one of its openings: wrong on purpose, so that tests
-    /// can see who notices.
-    #[doc(hidden)]
-    pub fn without_opening(&self, index: usize) -> RegionGraph {
-        let mut openings = self.openings.clone();
-        openings.remove(index);
-        let regions: Vec<Vec<WorldBox>> = (0..self.len() as u32)
-            .map(|r| self.parts(r).to_vec())
-            .collect();
-        RegionGraph::new(&regions, openings, self.ground.clone())
     }
 
     /// Replaces `homes` by the regions in which rays of the camera begin to see: all

@@ -3,10 +3,10 @@
 
 use std::sync::Arc;
 
-use super::answer::{About, EyePlace, RegionId, RegionRow, Scratch};
-use super::flood::Flood;
+use super::answer::About;
 use super::graph::RegionGraph;
-use crate::visibility::{Guarantee, Rays, Solids};
+use super::searched::Searched;
+use crate::visibility::{Guarantee, Solids};
 
 /// What it declares of itself.
 pub const ABOUT: About = About {
@@ -18,29 +18,14 @@ pub const ABOUT: About = About {
 /// Cells of the grid at least and at most; between them one for each solid.
 const CELLS: [usize; 2] = [64, 1 << 15];
 
-/// The row.
-#[derive(Clone, Debug)]
-pub struct GridFlood(Flood);
-
-impl GridFlood {
-    /// Of solid boxes, whose regions it makes itself.
-    pub fn of(solids: &Solids) -> GridFlood {
+impl Searched {
+    /// Floods the free space of solid boxes, whose regions it makes itself.
+    pub fn grid_flood(solids: &Solids) -> Searched {
         let [least, most] = CELLS;
         let cells = solids.boxes.len().clamp(least, most);
-        GridFlood(Flood(Arc::new(RegionGraph::of_free_space(solids, cells))))
-    }
-}
-
-impl RegionRow for GridFlood {
-    fn about(&self) -> About {
-        ABOUT
-    }
-
-    fn graph(&self) -> &Arc<RegionGraph> {
-        self.0.graph()
-    }
-
-    fn from_eye(&self, rays: &Rays, scratch: &mut Scratch, out: &mut Vec<RegionId>) -> EyePlace {
-        self.0.from_eye(rays, scratch, out)
+        Searched {
+            about: ABOUT,
+            ..Searched::flood(Arc::new(RegionGraph::of_free_space(solids, cells)))
+        }
     }
 }

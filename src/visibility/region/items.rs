@@ -2,17 +2,15 @@
 
 use super::answer::{Marks, RegionId};
 use super::graph::RegionGraph;
-use super::locate::{BoxGrid, covers};
+use super::lists::Lists;
+use super::locate::BoxGrid;
 use crate::query::ItemId;
 use crate::scene::{Scene, WorldBox};
 
 /// The items of each region.
 #[derive(Clone, Debug)]
 pub struct RegionItems {
-    starts: Vec<u32>,
-    lists: Vec<ItemId>,
-    /// Items that no region holds wholly, and so may be seen from outside of all.
-    loose: Vec<ItemId>,
+    lists: Lists<ItemId>,
     items: usize,
 }
 
@@ -30,56 +28,31 @@ impl RegionItems {
             }
         }
         let grid = BoxGrid::new(parts);
-        let mut pairs: Vec<(RegionId, ItemId)> = Vec::new();
-        let mut loose = Vec::new();
-        let (mut met, mut boxes) = (Vec::new(), Vec::new());
+        let mut lists = vec![Vec::new(); graph.len()];
+        let mut met = Vec::new();
         for (id, item) in (0..).zip(&scene.items) {
-            let (min, max) = item.in_world(scene.origin);
-            let b = WorldBox::new(min, max);
+            let b = WorldBox::of(item, scene.origin);
             met.clear();
-            grid.meeting(&b, |part| met.push(part));
+            grid.meeting(&b, |part| met.push(owners[part as usize]));
             met.sort_unstable();
             met.dedup();
-            boxes.clear();
-            boxes.extend(met.iter().map(|&part| grid.boxes()[part as usize]));
-            if !covers(&boxes, &b) {
-                loose.push(id);
-            }
-            pairs.extend(met.iter().map(|&part| (owners[part as usize], id)));
-        }
-        pairs.sort_unstable();
-        pairs.dedup();
-        let mut starts = vec![0; graph.len() + 1];
-        pairs
-            .iter()
-            .for_each(|(region, _)| starts[*region as usize + 1] += 1);
-        for i in 1..starts.len() {
-            starts[i] += starts[i - 1];
+            met.iter().for_each(|&owner| lists[owner as usize].push(id));
         }
         RegionItems {
-            starts,
-            lists: pairs.into_iter().map(|(_, item)| item).collect(),
-            loose,
+            lists: Lists::of(&lists),
             items: scene.items.len(),
         }
     }
 
     /// The items that meet a region, ascending.
     pub fn of_region(&self, region: RegionId) -> &[ItemId] {
-        let at = region as usize;
-        &self.lists[self.starts[at] as usize..self.starts[at + 1] as usize]
-    }
-
-    /// Items that are not wholly in regions, ascending: to be added wherever the eye
-    /// is not inside ([`super::EyePlace::Outside`]).
-    pub fn loose(&self) -> &[ItemId] {
-        &self.loose
+        self.lists.list(region)
     }
 
     /// Replaces `out` by the items of the regions, ascending. All regions together
-    /// are all items, the loose ones too. O(items of the regions + n / 64).
+    /// are all items. O(items of the regions + n / 64).
     pub fn of_regions(&self, regions: &[RegionId], marks: &mut Marks, out: &mut Vec<ItemId>) {
-        if regions.len() + 1 == self.starts.len() {
+        if regions.len() == self.lists.count() {
             out.clear();
             out.extend(0..self.items as u32);
             return;

@@ -3,6 +3,7 @@
 
 use glam::DVec3;
 
+use super::lists::Lists;
 use crate::scene::WorldBox;
 
 /// A uniform grid of buckets over boxes.
@@ -12,18 +13,17 @@ pub struct BoxGrid {
     low: DVec3,
     per_unit: DVec3,
     count: [usize; 3],
-    /// Start of each bucket in `entries`.
-    starts: Vec<u32>,
-    entries: Vec<u32>,
+    /// The boxes of each bucket.
+    buckets: Lists<u32>,
 }
 
 impl BoxGrid {
     /// About as many buckets as boxes. O(n + entries).
     pub fn new(boxes: Vec<WorldBox>) -> BoxGrid {
-        let start = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        let (low, high) = boxes
-            .iter()
-            .fold(start, |(low, high), b| (low.min(b.min), high.max(b.max)));
+        let WorldBox {
+            min: low,
+            max: high,
+        } = WorldBox::union_of(boxes.iter().copied());
         let size = (high - low).max(DVec3::ZERO);
         // Cubes: the edge that gives one bucket for each box.
         let solid = size.max(DVec3::splat(size.max_element() * 1e-3));
@@ -43,17 +43,13 @@ impl BoxGrid {
             low,
             per_unit: DVec3::new(per(0), per(1), per(2)),
             count,
-            starts: vec![0; count[0] * count[1] * count[2] + 1],
-            entries: Vec::new(),
+            buckets: Lists::of(&[]),
         };
-        let mut lists = vec![Vec::new(); grid.starts.len() - 1];
+        let mut lists = vec![Vec::new(); count[0] * count[1] * count[2]];
         for (id, b) in (0..).zip(&grid.boxes) {
-            grid.buckets(b, |bucket| lists[bucket].push(id));
+            grid.buckets(b, |bucket| lists[bucket as usize].push(id));
         }
-        for (i, list) in lists.iter().enumerate() {
-            grid.entries.extend_from_slice(list);
-            grid.starts[i + 1] = grid.entries.len() as u32;
-        }
+        grid.buckets = Lists::of(&lists);
         grid
     }
 
@@ -65,13 +61,9 @@ impl BoxGrid {
     /// Calls `found` with each box that meets a box, closed; a box that lies in
     /// several buckets may be named several times.
     pub fn meeting(&self, b: &WorldBox, mut found: impl FnMut(u32)) {
-        let meets = |id: u32| {
-            let other = &self.boxes[id as usize];
-            b.min.cmple(other.max).all() && other.min.cmple(b.max).all()
-        };
+        let meets = |id: u32| b.meets(&self.boxes[id as usize]);
         self.buckets(b, |bucket| {
-            let range = self.starts[bucket] as usize..self.starts[bucket + 1] as usize;
-            let entries = self.entries[range].iter().copied();
+            let entries = self.buckets.list(bucket).iter().copied();
             entries.filter(|id| meets(*id)).for_each(&mut found);
         });
     }
@@ -84,13 +76,13 @@ impl BoxGrid {
         (at as usize).min(self.count[axis] - 1)
     }
 
-    fn buckets(&self, b: &WorldBox, mut found: impl FnMut(usize)) {
+    fn buckets(&self, b: &WorldBox, mut found: impl FnMut(u32)) {
         let from = [0, 1, 2].map(|k| self.cell(k, b.min[k]));
         let to = [0, 1, 2].map(|k| self.cell(k, b.max[k]));
         for z in from[2]..=to[2] {
             for y in from[1]..=to[1] {
                 for x in from[0]..=to[0] {
-                    found((z * self.count[1] + y) * self.count[0] + x);
+                    found(((z * self.count[1] + y) * self.count[0] + x) as u32);
                 }
             }
         }
@@ -101,9 +93,8 @@ impl BoxGrid {
 pub fn covers(by: &[WorldBox], b: &WorldBox) -> bool {
     let mut open = vec![(*b, 0)];
     while let Some((piece, first)) = open.pop() {
-        let meets = |o: &WorldBox| piece.min.cmple(o.max).all() && o.min.cmple(piece.max).all();
         let rest = by[first..].iter();
-        let Some(hit) = rest.zip(first..).find(|(o, _)| meets(o)) else {
+        let Some(hit) = rest.zip(first..).find(|(o, _)| piece.meets(o)) else {
             return false;
         };
         let (cut, next) = (hit.0, hit.1 + 1);

@@ -8,10 +8,12 @@
 
 use std::sync::Arc;
 
-use super::answer::{About, EyePlace, RegionId, RegionRow, Scratch};
+use super::answer::{About, Scratch};
 use super::graph::RegionGraph;
+use super::searched::Searched;
 use super::view::{MOST_PLANES, View, through_edge};
-use crate::visibility::{Guarantee, Rays};
+use super::windows::Window;
+use crate::visibility::Guarantee;
 
 /// What it declares of itself.
 pub const ABOUT: About = About {
@@ -20,72 +22,59 @@ pub const ABOUT: About = About {
     guarantee: Guarantee::Conservative,
 };
 
-/// The row.
-#[derive(Clone, Debug)]
-pub struct PortalClip(pub Arc<RegionGraph>);
-
-impl RegionRow for PortalClip {
-    fn about(&self) -> About {
-        ABOUT
-    }
-
-    fn graph(&self) -> &Arc<RegionGraph> {
-        &self.0
-    }
-
-    fn from_eye(&self, rays: &Rays, scratch: &mut Scratch, out: &mut Vec<RegionId>) -> EyePlace {
-        let graph = &*self.0;
-        let inside = graph.homes(rays, &mut scratch.homes);
-        let (true, Some(view)) = (inside, View::of(rays)) else {
-            out.clear();
-            out.extend(0..graph.len() as u32);
-            return EyePlace::Outside;
-        };
-        let (seen, search) = (&mut scratch.seen, &mut scratch.windows);
-        seen.clear(graph.len());
-        search.clear(graph.len());
-        search.polygon.corners.clear();
-        for &home in &scratch.homes {
-            search.kept.clear();
-            search.kept.extend_from_slice(&view.sides);
-            search.enter(seen, home, &view);
+impl Searched {
+    /// Searches with clipped openings.
+    pub fn portal_clip(graph: Arc<RegionGraph>) -> Searched {
+        let about = ABOUT;
+        Searched {
+            about,
+            graph,
+            search,
         }
-        let mut next = 0;
-        while let Some(&window) = search.windows.get(next) {
-            next += 1;
-            for &exit in graph.exits(window.region) {
-                let opening = &graph.openings()[exit as usize];
-                let Some(entered) = opening.entered(window.region, view.eye) else {
-                    continue;
-                };
-                let (corners, reach) = view.corners(opening);
-                if view.is_beyond(&corners, reach) {
-                    continue;
-                }
-                let mut polygon = std::mem::take(&mut search.polygon);
-                let passes = polygon.begin(&view, opening, &corners, reach)
-                    && search.range(&window).iter().all(|plane| polygon.cut(plane));
-                search.polygon = polygon;
-                if !passes {
-                    continue;
-                }
-                let range = window.planes[0] as usize..window.planes[1] as usize;
-                let mut kept = std::mem::take(&mut search.kept);
-                kept.clear();
-                let edges = (0u32..4).filter_map(|edge| {
-                    through_edge(&corners, edge as usize, reach, 4 + 4 * exit + edge)
-                });
-                let all = search.planes[range].iter().copied().chain(edges);
-                // A half-space that holds all of the polygon follows from the others.
-                kept.extend(
-                    all.filter(|plane| !search.polygon.is_within(plane))
-                        .take(MOST_PLANES),
-                );
-                search.kept = kept;
-                search.enter(seen, entered, &view);
+    }
+}
+
+fn search(graph: &RegionGraph, view: &View, scratch: &mut Scratch) {
+    let (seen, search) = (&mut scratch.seen, &mut scratch.windows);
+    search.clear(graph.len());
+    search.polygon.corners.clear();
+    for &home in &scratch.homes {
+        search.kept.clear();
+        search.kept.extend_from_slice(&view.sides);
+        search.enter(seen, home, view);
+    }
+    let mut next = 0;
+    while let Some(&Window { region, shape, .. }) = search.entered.windows.get(next) {
+        next += 1;
+        for &exit in graph.exits(region) {
+            let opening = &graph.openings()[exit as usize];
+            let Some(entered) = opening.entered(region, view.eye) else {
+                continue;
+            };
+            let (corners, reach) = view.corners(opening);
+            if view.is_beyond(&corners, reach) {
+                continue;
             }
+            let mut polygon = std::mem::take(&mut search.polygon);
+            let passes = polygon.begin(view, opening, &corners, reach)
+                && search.range(shape).iter().all(|plane| polygon.cut(plane));
+            search.polygon = polygon;
+            if !passes {
+                continue;
+            }
+            let mut kept = std::mem::take(&mut search.kept);
+            kept.clear();
+            let edges = (0u32..4).filter_map(|edge| {
+                through_edge(&corners, edge as usize, reach, 4 + 4 * exit + edge)
+            });
+            let all = search.range(shape).iter().copied().chain(edges);
+            // A half-space that holds all of the polygon follows from the others.
+            kept.extend(
+                all.filter(|plane| !search.polygon.is_within(plane))
+                    .take(MOST_PLANES),
+            );
+            search.kept = kept;
+            search.enter(seen, entered, view);
         }
-        seen.list(out);
-        EyePlace::Inside
     }
 }

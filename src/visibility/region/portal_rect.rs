@@ -5,11 +5,12 @@
 
 use std::sync::Arc;
 
-use super::answer::{About, EyePlace, RegionId, RegionRow, Scratch};
+use super::answer::{About, Scratch};
 use super::graph::RegionGraph;
-use super::rectangle_windows::Window;
+use super::searched::Searched;
 use super::view::View;
-use crate::visibility::{Guarantee, Rays};
+use super::windows::{Window, Windows};
+use crate::visibility::Guarantee;
 
 /// What it declares of itself.
 pub const ABOUT: About = About {
@@ -18,60 +19,60 @@ pub const ABOUT: About = About {
     guarantee: Guarantee::Conservative,
 };
 
-/// The row.
-#[derive(Clone, Debug)]
-pub struct PortalRect(pub Arc<RegionGraph>);
-
-impl RegionRow for PortalRect {
-    fn about(&self) -> About {
-        ABOUT
-    }
-
-    fn graph(&self) -> &Arc<RegionGraph> {
-        &self.0
-    }
-
-    fn from_eye(&self, rays: &Rays, scratch: &mut Scratch, out: &mut Vec<RegionId>) -> EyePlace {
-        let graph = &*self.0;
-        let inside = graph.homes(rays, &mut scratch.homes);
-        let (true, Some(view)) = (inside, View::of(rays)) else {
-            out.clear();
-            out.extend(0..graph.len() as u32);
-            return EyePlace::Outside;
-        };
-        let (seen, search) = (&mut scratch.seen, &mut scratch.rectangles);
-        seen.clear(graph.len());
-        search.clear(graph.len());
-        let all = view.window();
-        for &home in &scratch.homes {
-            search.enter(seen, home, all, all);
+impl Searched {
+    /// Searches with rectangles of the image.
+    pub fn portal_rect(graph: Arc<RegionGraph>) -> Searched {
+        let about = ABOUT;
+        Searched {
+            about,
+            graph,
+            search,
         }
-        let mut next = 0;
-        while let Some(&Window {
-            region, rectangle, ..
-        }) = search.windows.get(next)
-        {
-            next += 1;
-            for &exit in graph.exits(region) {
-                let opening = &graph.openings()[exit as usize];
-                let Some(entered) = opening.entered(region, view.eye) else {
-                    continue;
-                };
-                let Some(through) = view.rectangle(opening) else {
-                    continue;
-                };
-                let common = [
-                    rectangle[0].max(through[0]),
-                    rectangle[1].min(through[1]),
-                    rectangle[2].max(through[2]),
-                    rectangle[3].min(through[3]),
-                ];
-                if common[0] <= common[1] && common[2] <= common[3] {
-                    search.enter(seen, entered, common, all);
-                }
+    }
+}
+
+fn search(graph: &RegionGraph, view: &View, scratch: &mut Scratch) {
+    let (seen, search) = (&mut scratch.seen, &mut scratch.rectangles);
+    search.clear(graph.len());
+    let all = view.window();
+    let mut enter = |search: &mut Windows<[f64; 4]>, region, rectangle: [f64; 4]| {
+        if !search.is_entered(seen, region, |outer| holds(outer, &rectangle)) {
+            let is_crowded = search.is_crowded(region);
+            search.push(region, if is_crowded { all } else { rectangle });
+        }
+    };
+    for &home in &scratch.homes {
+        enter(search, home, all);
+    }
+    let mut next = 0;
+    while let Some(&Window {
+        region,
+        shape: rectangle,
+        ..
+    }) = search.windows.get(next)
+    {
+        next += 1;
+        for &exit in graph.exits(region) {
+            let opening = &graph.openings()[exit as usize];
+            let Some(entered) = opening.entered(region, view.eye) else {
+                continue;
+            };
+            let Some(through) = view.rectangle(opening) else {
+                continue;
+            };
+            let common = [
+                rectangle[0].max(through[0]),
+                rectangle[1].min(through[1]),
+                rectangle[2].max(through[2]),
+                rectangle[3].min(through[3]),
+            ];
+            if common[0] <= common[1] && common[2] <= common[3] {
+                enter(search, entered, common);
             }
         }
-        seen.list(out);
-        EyePlace::Inside
     }
+}
+
+fn holds(outer: &[f64; 4], inner: &[f64; 4]) -> bool {
+    outer[0] <= inner[0] && inner[1] <= outer[1] && outer[2] <= inner[2] && inner[3] <= outer[3]
 }

@@ -1,9 +1,9 @@
 //! Which region may be seen from which: one row of bits for each region. Made by an
 //! exact search, or read from a file: then it is a claim, to be audited.
 
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 
-use super::answer::{RegionId, decode};
+use super::answer::RegionId;
 use crate::json::{JsonError, from_json};
 
 /// A potentially visible set: for each region the set of regions seen from it.
@@ -56,7 +56,7 @@ impl From<JsonError> for PvsError {
 const FORM: &str = "{\"regions\": COUNT, \"sees\": [[FROM, TO], ...]}";
 
 /// Its form in a file: ordered pairs.
-#[derive(Serialize, Deserialize)]
+#[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Written {
     regions: usize,
@@ -103,22 +103,6 @@ impl Pvs {
             pvs.insert(from, to);
         }
         Ok(pvs)
-    }
-
-    /// As [`Pvs::from_json`] reads it; what each region sees of itself is left out.
-    pub fn to_json(&self) -> String {
-        let mut sees = Vec::new();
-        let mut row = Vec::new();
-        for from in 0..self.regions as u32 {
-            row.clear();
-            decode(self.row(from), &mut row);
-            sees.extend(row.iter().filter(|to| **to != from).map(|&to| [from, to]));
-        }
-        let written = Written {
-            regions: self.regions,
-            sees,
-        };
-        serde_json::to_string(&written).expect("numbers are JSON")
     }
 
     /// The REJECT table of a Doom map: bit `from * sectors + to`, lowest bit of a
@@ -176,11 +160,6 @@ impl Pvs {
         self.bits[from as usize * self.words + to as usize / 64] |= 1 << (to % 64);
     }
 
-    /// Takes a pair away, in this direction only.
-    pub fn remove(&mut self, from: RegionId, to: RegionId) {
-        self.bits[from as usize * self.words + to as usize / 64] &= !(1 << (to % 64));
-    }
-
     /// Adds a whole set of regions to a row.
     pub fn insert_all(&mut self, from: RegionId, set: &[u64]) {
         let first = from as usize * self.words;
@@ -189,28 +168,21 @@ impl Pvs {
             .zip(set)
             .for_each(|(word, more)| *word |= more);
     }
-
-    /// Number of ordered pairs, each region with itself included.
-    pub fn pairs(&self) -> u64 {
-        self.bits.iter().map(|w| u64::from(w.count_ones())).sum()
-    }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::answer::decode;
     use super::*;
 
     #[test]
-    fn pairs_are_written_and_read_again() {
-        let mut pvs = Pvs::alone(70);
-        pvs.insert(3, 69);
-        pvs.insert(69, 4);
-        let text = pvs.to_json();
-        assert_eq!(text, r#"{"regions":70,"sees":[[3,69],[69,4]]}"#);
-        assert_eq!(Pvs::from_json(&text).unwrap(), pvs);
-        assert!(pvs.sees(3, 69) && !pvs.sees(69, 3) && pvs.pairs() == 72);
-        pvs.remove(3, 69);
-        assert!(!pvs.sees(3, 69));
+    fn pairs_are_read_and_each_region_sees_itself() {
+        let pvs = Pvs::from_json(r#"{"regions":70,"sees":[[3,69],[69,4]]}"#).unwrap();
+        let mut wanted = Pvs::alone(70);
+        wanted.insert(3, 69);
+        wanted.insert(69, 4);
+        assert_eq!(pvs, wanted);
+        assert!(pvs.sees(3, 69) && !pvs.sees(69, 3));
         let mut row = Vec::new();
         decode(pvs.row(69), &mut row);
         assert_eq!(row, [4, 69]);
@@ -230,7 +202,10 @@ mod tests {
         // Bit 1 (0 to 1) and bit 8 (2 to 2, which sees itself all the same).
         let pvs = Pvs::from_reject(&[0b10, 0b1], 3).unwrap();
         assert!(!pvs.sees(0, 1) && pvs.sees(1, 0) && pvs.sees(2, 2));
-        assert_eq!(pvs.pairs(), 8);
+        assert_eq!(
+            [0, 1, 2].map(|from| pvs.row(from)[0]),
+            [0b101, 0b111, 0b111]
+        );
         let error = Pvs::from_reject(&[0], 3).unwrap_err().to_string();
         assert!(error.contains("1 bytes for 3 sectors"), "{error}");
     }

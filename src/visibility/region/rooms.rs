@@ -29,7 +29,6 @@ use crate::scene::SeededRng;
 pub struct RoomsPvs {
     graph: Arc<RegionGraph>,
     pvs: Pvs,
-    undecided: Vec<[RegionId; 2]>,
     rising: Vec<Vec<bool>>,
     layered: bool,
 }
@@ -92,7 +91,6 @@ impl RoomsPvs {
             return Err(NotFlat(thick));
         }
         let mut pvs = Pvs::alone(graph.len());
-        let mut level = pvs.clone();
         let layered = is_layered(&graph);
         let rising = |heading: &Heading| match layered {
             true => rising(&graph, *heading),
@@ -102,46 +100,24 @@ impl RoomsPvs {
         for from in 0..graph.len() as u32 {
             for (heading, rising) in HEADINGS.into_iter().zip(&rising) {
                 let mut search = Search::new(&graph, heading, rising, layered);
-                let set = if heading.0[2] == 0 {
-                    &mut level
-                } else {
-                    &mut pvs
-                };
                 search.visit(from, &mut |to, _| {
-                    set.insert(from, to);
+                    pvs.insert(from, to);
                     false
                 });
             }
         }
-        let mut rooms = RoomsPvs {
-            graph: graph.clone(),
+        Ok(RoomsPvs {
+            graph,
             pvs,
-            undecided: Vec::new(),
             rising,
             layered,
-        };
-        for from in 0..graph.len() as u32 {
-            rooms.pvs.insert_all(from, level.row(from));
-        }
-        for a in 0..graph.len() as u32 {
-            for b in a + 1..graph.len() as u32 {
-                let open = rooms.pvs.sees(a, b) && !level.sees(a, b);
-                if open && rooms.witness(a, b).is_none() {
-                    rooms.undecided.push([a, b]);
-                }
-            }
-        }
-        Ok(rooms)
+        })
     }
 }
 
 impl ProvenPvs for RoomsPvs {
     fn pvs(&self) -> &Pvs {
         &self.pvs
-    }
-
-    fn undecided(&self) -> &[[RegionId; 2]] {
-        &self.undecided
     }
 
     fn witness(&self, from: RegionId, to: RegionId) -> Option<Witness> {

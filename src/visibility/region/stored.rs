@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::answer::{About, EyePlace, RegionId, RegionRow, Scratch, decode};
 use super::graph::RegionGraph;
+use super::lists::Lists;
 use super::pvs::Pvs;
 use crate::visibility::{Guarantee, Rays};
 
@@ -36,56 +37,29 @@ pub struct StoredPvs {
     graph: Arc<RegionGraph>,
     pvs: Arc<Pvs>,
     /// The rows as lists: what is read is what is answered.
-    starts: Vec<u32>,
-    lists: Vec<RegionId>,
+    lists: Lists<RegionId>,
     about: About,
 }
 
 impl StoredPvs {
-    /// A claim: nothing is promised of it. `None` if it is of another number of
-    /// regions.
-    pub fn claim(graph: Arc<RegionGraph>, pvs: Arc<Pvs>) -> Option<StoredPvs> {
-        StoredPvs::of(graph, pvs, ABOUT)
-    }
-
-    /// The same of a REJECT table.
-    pub fn reject(graph: Arc<RegionGraph>, pvs: Arc<Pvs>) -> Option<StoredPvs> {
-        StoredPvs::of(graph, pvs, REJECT)
-    }
-
-    /// What an exact search has found. It promises no region missing that is seen
-    /// through the inside of openings.
-    pub fn exact(graph: Arc<RegionGraph>, pvs: Arc<Pvs>) -> Option<StoredPvs> {
-        StoredPvs::of(graph, pvs, EXACT)
-    }
-
-    fn of(graph: Arc<RegionGraph>, pvs: Arc<Pvs>, about: About) -> Option<StoredPvs> {
+    /// The row that declares `about` of such a set. `None` if it is of another number
+    /// of regions.
+    pub fn of(graph: Arc<RegionGraph>, pvs: Arc<Pvs>, about: About) -> Option<StoredPvs> {
         if pvs.len() != graph.len() {
             return None;
         }
-        let (mut starts, mut lists) = (vec![0], Vec::new());
-        for from in 0..pvs.len() as u32 {
-            decode(pvs.row(from), &mut lists);
-            starts.push(lists.len() as u32);
-        }
+        let seen = |from| {
+            let mut seen = Vec::new();
+            decode(pvs.row(from), &mut seen);
+            seen
+        };
+        let lists: Vec<_> = (0..pvs.len() as u32).map(seen).collect();
         Some(StoredPvs {
+            lists: Lists::of(&lists),
             graph,
             pvs,
-            starts,
-            lists,
             about,
         })
-    }
-
-    /// The pairs.
-    pub fn pvs(&self) -> &Pvs {
-        &self.pvs
-    }
-
-    /// What a region sees, ascending. O(1).
-    pub fn list(&self, from: RegionId) -> &[RegionId] {
-        let at = from as usize;
-        &self.lists[self.starts[at] as usize..self.starts[at + 1] as usize]
     }
 }
 
@@ -105,7 +79,7 @@ impl RegionRow for StoredPvs {
             return EyePlace::Outside;
         }
         match scratch.homes[..] {
-            [home] => out.extend_from_slice(self.list(home)),
+            [home] => out.extend_from_slice(self.lists.list(home)),
             _ => {
                 scratch.seen.clear(self.graph.len());
                 for &home in &scratch.homes {
@@ -119,6 +93,6 @@ impl RegionRow for StoredPvs {
 
     fn from_region(&self, region: RegionId, out: &mut Vec<RegionId>) {
         out.clear();
-        out.extend_from_slice(self.list(region));
+        out.extend_from_slice(self.lists.list(region));
     }
 }

@@ -37,9 +37,6 @@ pub trait ProvenPvs {
     /// proven invisible.
     fn pvs(&self) -> &Pvs;
 
-    /// Pairs of it, the smaller number first, of which no proof is known either way.
-    fn undecided(&self) -> &[[RegionId; 2]];
-
     /// A line of sight between two regions; `None` where there is none, or none was
     /// found.
     fn witness(&self, from: RegionId, to: RegionId) -> Option<Witness>;

@@ -9,8 +9,7 @@ use glam::{DVec3, Vec3};
 
 use super::exact::normal;
 use crate::geometry::Aabb;
-use crate::input::InputError;
-use crate::scene::{Scene, Surfaces};
+use crate::scene::Surfaces;
 
 /// Most triangles of a cluster: the bits of a word.
 pub const MOST_TRIANGLES: usize = 64;
@@ -35,13 +34,7 @@ impl Clusters {
     /// # Panics
     /// If the number is outside 1..=64.
     pub fn of(surfaces: Arc<Surfaces>, most: usize) -> Clusters {
-        assert!((1..=MOST_TRIANGLES).contains(&most), "1 to 64 triangles");
-        let mut clusters = Clusters {
-            triangles: Vec::with_capacity(surfaces.triangles.len()),
-            starts: vec![0],
-            of_item: Vec::with_capacity(surfaces.items()),
-            surfaces: surfaces.clone(),
-        };
+        let mut clusters = Clusters::none_of(&surfaces, most);
         for item in 0..surfaces.items() {
             let first = clusters.len() as u32;
             grow(&surfaces, item, most, &mut clusters);
@@ -56,13 +49,10 @@ impl Clusters {
     /// # Panics
     /// If the number is outside 1..=64.
     pub fn as_listed(surfaces: Arc<Surfaces>, most: usize) -> Clusters {
-        assert!((1..=MOST_TRIANGLES).contains(&most), "1 to 64 triangles");
-        let mut clusters = Clusters {
-            triangles: (0..surfaces.triangles.len() as u32).collect(),
-            starts: vec![0],
-            of_item: Vec::with_capacity(surfaces.items()),
-            surfaces: surfaces.clone(),
-        };
+        let mut clusters = Clusters::none_of(&surfaces, most);
+        clusters
+            .triangles
+            .extend(0..surfaces.triangles.len() as u32);
         for item in 0..surfaces.items() {
             let (first, end) = (clusters.len() as u32, surfaces.of_item[item].end);
             let starts = surfaces.of_item[item].clone().step_by(most).skip(1);
@@ -72,14 +62,20 @@ impl Clusters {
         clusters
     }
 
-    /// How many clusters there are.
-    pub fn len(&self) -> usize {
-        self.starts.len() - 1
+    fn none_of(surfaces: &Arc<Surfaces>, most: usize) -> Clusters {
+        assert!((1..=MOST_TRIANGLES).contains(&most), "1 to 64 triangles");
+        Clusters {
+            surfaces: surfaces.clone(),
+            triangles: Vec::with_capacity(surfaces.triangles.len()),
+            starts: vec![0],
+            of_item: Vec::with_capacity(surfaces.items()),
+        }
     }
 
-    /// Whether there is no cluster.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
+    /// How many clusters there are.
+    #[allow(clippy::len_without_is_empty)] // Nobody asks whether there is none.
+    pub fn len(&self) -> usize {
+        self.starts.len() - 1
     }
 
     /// Indices of the triangles of a cluster: bit `i` of its word is the `i`-th.
@@ -101,6 +97,12 @@ impl Clusters {
         }
     }
 
+    /// The clusters that are seen from one side only, with the corners of their triangles.
+    pub fn one_sided(&self) -> impl Iterator<Item = (usize, Vec<[Vec3; 3]>)> {
+        let clusters = (0..self.len()).filter(|&cluster| !self.is_two_sided(cluster));
+        clusters.map(|cluster| (cluster, self.corners_of(cluster).collect()))
+    }
+
     /// Whether the triangles of a cluster are seen from both sides.
     pub fn is_two_sided(&self, cluster: usize) -> bool {
         let triangle = self.triangles_of(cluster)[0];
@@ -113,15 +115,6 @@ impl Clusters {
         corners.fold(Aabb::EMPTY, |all, p| {
             Aabb::new(all.min.min(p), all.max.max(p))
         })
-    }
-
-    /// The boxes of the clusters as a scene, one item each.
-    ///
-    /// # Errors
-    /// As [`Surfaces::into_scene`].
-    pub fn scene(&self, name: impl Into<String>) -> Result<Scene, InputError> {
-        let boxes = (0..self.len()).map(|cluster| self.bounds(cluster));
-        self.surfaces.boxes_as_scene(name, boxes)
     }
 
     fn close(&mut self) {
@@ -315,9 +308,5 @@ mod tests {
             .sum::<f32>()
             / clusters.len() as f32;
         assert!(mean < whole * 0.1, "{mean} of {whole}");
-        assert_eq!(
-            clusters.scene("clusters").unwrap().items.len(),
-            clusters.len()
-        );
     }
 }

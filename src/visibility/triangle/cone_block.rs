@@ -102,35 +102,6 @@ impl<I: Isa> Broadcast<I> {
     }
 }
 
-/// One bit per cone that sees nothing, sixteen a word: the test alone. `out` is
-/// overwritten.
-pub fn reject_all<B: ConeRows>(blocks: &[B], view: &View, kernel: Kernel, out: &mut Vec<LaneMask>) {
-    out.clear();
-    out.resize(blocks.len(), 0);
-    if let Some(prepared) = Prepared::of(&view.eye) {
-        let view = &prepared;
-        kernel.run(Masks { blocks, view, out });
-    }
-}
-
-struct Masks<'a, B> {
-    blocks: &'a [B],
-    view: &'a Prepared,
-    out: &'a mut [LaneMask],
-}
-
-impl<B: ConeRows> Work for Masks<'_, B> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<I: Isa>(self, isa: I) {
-        let view = Broadcast::of(isa, self.view);
-        for (block, out) in self.blocks.iter().zip(self.out) {
-            *out = rejected(isa, block, &view);
-        }
-    }
-}
-
 /// Takes the clusters away whose cones see nothing: one cone a cluster.
 pub fn cull_clusters<B: ConeRows>(blocks: &[B], view: &View, kernel: Kernel, kept: &mut Selection) {
     if let Some(prepared) = Prepared::of(&view.eye) {

@@ -25,11 +25,12 @@ pub const ROW: TriangleRow = TriangleRow {
 /// Below this cosine a cone is taken for useless.
 const LEAST_COSINE: f32 = 0.1;
 
+/// A cone as the library documents it.
 #[derive(Clone, Copy, Debug)]
-struct PlainCone {
-    apex: Vec3,
-    axis: Vec3,
-    cutoff: f32,
+pub struct PlainCone {
+    pub apex: Vec3,
+    pub axis: Vec3,
+    pub cutoff: f32,
 }
 
 /// The cones of clusters.
@@ -56,12 +57,6 @@ impl PlainCones {
         PlainCones {
             cones: (0..clusters.len()).map(cone).collect(),
         }
-    }
-
-    /// The test alone, one bool per cluster. `out` is overwritten.
-    pub fn reject(&self, eye: Vec3, out: &mut Vec<bool>) {
-        out.clear();
-        out.extend(self.cones.iter().map(|cone| cone.rejects(eye)));
     }
 }
 
@@ -93,6 +88,7 @@ impl PlainCone {
         })
     }
 
+    /// `dot(normalize(cone_apex - camera_position), cone_axis) >= cone_cutoff`.
     #[inline(always)]
     fn rejects(&self, eye: Vec3) -> bool {
         let way = self.apex - eye;
@@ -124,26 +120,28 @@ fn ball(points: impl Iterator<Item = Vec3> + Clone) -> Option<(Vec3, f32)> {
     Some((centre, radius))
 }
 
+/// Takes the clusters away whose cones see nothing, one by one.
+#[inline(always)]
+pub fn cull_one_by_one<C>(
+    cones: &[C],
+    plain: impl Fn(&C) -> PlainCone,
+    view: &View,
+    kept: &mut Selection,
+) {
+    let eye = view.eye.nearest;
+    let each = cones.iter().map(plain).zip(kept.words_mut());
+    if view.eye.weight == 0.0 {
+        // `dot(view, cone_axis) >= cone_cutoff` for a parallel lens.
+        let gone = each.filter(|(cone, _)| (-eye).dot(cone.axis) >= cone.cutoff);
+        gone.for_each(|(_, word)| *word = 0);
+    } else {
+        let gone = each.filter(|(cone, _)| cone.rejects(eye));
+        gone.for_each(|(_, word)| *word = 0);
+    }
+}
+
 impl TriangleCull for PlainCones {
     fn cull(&self, view: &View, _: Kernel, kept: &mut Selection) {
-        // The documented test for a parallel lens: the direction of view instead.
-        if view.eye.weight == 0.0 {
-            let forward = -view.eye.nearest;
-            for (cone, word) in self.cones.iter().zip(kept.words_mut()) {
-                if forward.dot(cone.axis) >= cone.cutoff {
-                    *word = 0;
-                }
-            }
-            return;
-        }
-        for (cone, word) in self.cones.iter().zip(kept.words_mut()) {
-            if cone.rejects(view.eye.nearest) {
-                *word = 0;
-            }
-        }
-    }
-
-    fn bytes(&self) -> usize {
-        size_of_val(&self.cones[..])
+        cull_one_by_one(&self.cones, |cone| *cone, view, kept);
     }
 }

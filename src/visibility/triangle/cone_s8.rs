@@ -7,12 +7,12 @@ use glam::{DVec3, Vec3};
 
 use super::super::guarantee::Guarantee;
 use super::clusters::Clusters;
-use super::cone_block::{ConeRows, cull_clusters, reject_all};
+use super::cone_block::{ConeRows, cull_clusters};
 use super::contract::{Criterion, TriangleCull, TriangleRow};
 use super::normal_cone::Cone;
 use super::selection::Selection;
 use super::view::View;
-use crate::kernel::{Isa, Kernel, LANES, LaneMask};
+use crate::kernel::{Isa, Kernel, LANES};
 
 /// The row of this file.
 pub const ROW: TriangleRow = TriangleRow {
@@ -96,8 +96,7 @@ impl ByteCones {
             sine: [NEVER; LANES],
         };
         let mut blocks = vec![empty; clusters.len().div_ceil(LANES)];
-        for cluster in (0..clusters.len()).filter(|&cluster| !clusters.is_two_sided(cluster)) {
-            let triangles: Vec<[Vec3; 3]> = clusters.corners_of(cluster).collect();
+        for (cluster, triangles) in clusters.one_sided() {
             let Some(cone) = Cone::fit(&triangles, rounded) else {
                 continue;
             };
@@ -110,20 +109,10 @@ impl ByteCones {
         }
         ByteCones { blocks }
     }
-
-    /// The test alone: bit `i` of word `w` says that cluster `16 w + i` turns only
-    /// backs to the eye. `out` is overwritten.
-    pub fn reject(&self, view: &View, kernel: Kernel, out: &mut Vec<LaneMask>) {
-        reject_all(&self.blocks, view, kernel, out);
-    }
 }
 
 impl TriangleCull for ByteCones {
     fn cull(&self, view: &View, kernel: Kernel, kept: &mut Selection) {
         cull_clusters(&self.blocks, view, kernel, kept);
-    }
-
-    fn bytes(&self) -> usize {
-        size_of_val(&self.blocks[..])
     }
 }

@@ -2,16 +2,16 @@
 
 use std::sync::Arc;
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
 use super::super::guarantee::Guarantee;
 use super::clusters::Clusters;
-use super::cone_block::{ConeBlock, cull_clusters, reject_all};
+use super::cone_block::{ConeBlock, cull_clusters};
 use super::contract::{Criterion, TriangleCull, TriangleRow};
 use super::normal_cone::Cone;
 use super::selection::Selection;
 use super::view::View;
-use crate::kernel::{Isa, Kernel, LANES, LaneMask, Work};
+use crate::kernel::{Isa, Kernel, LANES, Work};
 
 /// The row of this file.
 pub const ROW: TriangleRow = TriangleRow {
@@ -32,8 +32,7 @@ impl SafeCones {
     /// One cone per cluster. O(t).
     pub fn of(clusters: &Arc<Clusters>) -> SafeCones {
         let mut blocks = vec![ConeBlock::EMPTY; clusters.len().div_ceil(LANES)];
-        for cluster in (0..clusters.len()).filter(|&cluster| !clusters.is_two_sided(cluster)) {
-            let triangles: Vec<[Vec3; 3]> = clusters.corners_of(cluster).collect();
+        for (cluster, triangles) in clusters.one_sided() {
             if let Some(cone) = Cone::fit(&triangles, |axis: DVec3| axis.as_vec3()) {
                 blocks[cluster / LANES].set(cluster % LANES, &cone);
             }
@@ -45,12 +44,6 @@ impl SafeCones {
     /// only keeps the compiler from leaving it out.
     pub fn read(&self, kernel: Kernel) -> u64 {
         kernel.run(Read(bytemuck::cast_slice(&self.blocks)))
-    }
-
-    /// The test alone: bit `i` of word `w` says that cluster `16 w + i` turns only
-    /// backs to the eye. `out` is overwritten.
-    pub fn reject(&self, view: &View, kernel: Kernel, out: &mut Vec<LaneMask>) {
-        reject_all(&self.blocks, view, kernel, out);
     }
 }
 
@@ -74,9 +67,5 @@ impl Work for Read<'_> {
 impl TriangleCull for SafeCones {
     fn cull(&self, view: &View, kernel: Kernel, kept: &mut Selection) {
         cull_clusters(&self.blocks, view, kernel, kept);
-    }
-
-    fn bytes(&self) -> usize {
-        size_of_val(&self.blocks[..])
     }
 }

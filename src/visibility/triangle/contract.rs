@@ -27,9 +27,6 @@ pub trait TriangleCull: Send + Sync {
     /// Takes away triangles that cannot be seen. Of what was not in `kept` nothing
     /// is added. The same answer with every kernel.
     fn cull(&self, view: &View, kernel: Kernel, kept: &mut Selection);
-
-    /// Bytes that a query may read, beside the selection.
-    fn bytes(&self) -> usize;
 }
 
 /// A row of the table of back ends.

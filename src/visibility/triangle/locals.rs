@@ -108,13 +108,6 @@ impl Locals {
             *word &= front;
         }
     }
-
-    /// Bytes of all.
-    pub fn bytes(&self) -> usize {
-        let indices = size_of_val(&self.starts[..]) + size_of_val(&self.firsts[..]);
-        let corners = size_of_val(&self.corners[..]) + size_of_val(&self.triangles[..]);
-        indices + corners + size_of_val(&self.points[..])
-    }
 }
 
 /// Up to eight points; zeros where there are fewer.

@@ -136,9 +136,4 @@ impl TriangleCull for Masks {
             }
         }
     }
-
-    /// A query reads 24 of each cluster's 784.
-    fn bytes(&self) -> usize {
-        self.cells.len() * (size_of::<Vec3>() + size_of::<f32>() + size_of::<u64>())
-    }
 }

@@ -3,10 +3,9 @@
 
 use std::sync::Arc;
 
-use glam::Vec3;
-
 use super::super::guarantee::Guarantee;
 use super::clusters::Clusters;
+use super::cone_f32::{PlainCone, cull_one_by_one};
 use super::contract::{Criterion, TriangleCull, TriangleRow};
 use super::selection::Selection;
 use super::view::View;
@@ -51,42 +50,15 @@ impl MeshoptCones {
             bounds: bounds.collect(),
         }
     }
-
-    /// The test alone, one bool per cluster. `out` is overwritten.
-    pub fn reject(&self, eye: Vec3, out: &mut Vec<bool>) {
-        out.clear();
-        out.extend(self.bounds.iter().map(|bounds| rejects(bounds, eye)));
-    }
-}
-
-/// `dot(normalize(cone_apex - camera_position), cone_axis) >= cone_cutoff`.
-#[inline(always)]
-fn rejects(bounds: &meshopt::Bounds, eye: Vec3) -> bool {
-    let way = Vec3::from(bounds.cone_apex) - eye;
-    let unit = way * (1.0 / way.length());
-    unit.dot(Vec3::from(bounds.cone_axis)) >= bounds.cone_cutoff
 }
 
 impl TriangleCull for MeshoptCones {
     fn cull(&self, view: &View, _: Kernel, kept: &mut Selection) {
-        let eye = view.eye.nearest;
-        if view.eye.weight == 0.0 {
-            // `dot(view, cone_axis) >= cone_cutoff` for a parallel lens.
-            for (bounds, word) in self.bounds.iter().zip(kept.words_mut()) {
-                if (-eye).dot(Vec3::from(bounds.cone_axis)) >= bounds.cone_cutoff {
-                    *word = 0;
-                }
-            }
-            return;
-        }
-        for (bounds, word) in self.bounds.iter().zip(kept.words_mut()) {
-            if rejects(bounds, eye) {
-                *word = 0;
-            }
-        }
-    }
-
-    fn bytes(&self) -> usize {
-        size_of_val(&self.bounds[..])
+        let plain = |bounds: &meshopt::Bounds| PlainCone {
+            apex: bounds.cone_apex.into(),
+            axis: bounds.cone_axis.into(),
+            cutoff: bounds.cone_cutoff,
+        };
+        cull_one_by_one(&self.bounds, plain, view, kept);
     }
 }

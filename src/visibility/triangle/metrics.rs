@@ -72,26 +72,4 @@ impl Counts {
             false_negatives: truth.without(delivered),
         }
     }
-
-    /// Share of the candidates that was removed.
-    pub fn removed(&self) -> f64 {
-        1.0 - self.delivered as f64 / self.candidates.max(1) as f64
-    }
-
-    /// Share of what could be removed that was not: the loss of a cone.
-    pub fn loss(&self) -> f64 {
-        let removable = self.candidates - self.truth;
-        self.false_positives as f64 / removable.max(1) as f64
-    }
-
-    /// Both counts together: of several views.
-    pub fn plus(self, other: Counts) -> Counts {
-        Counts {
-            candidates: self.candidates + other.candidates,
-            delivered: self.delivered + other.delivered,
-            truth: self.truth + other.truth,
-            false_positives: self.false_positives + other.false_positives,
-            false_negatives: self.false_negatives + other.false_negatives,
-        }
-    }
 }

@@ -1,7 +1,6 @@
 //! The triangle stage: which triangles of the items that are left can be seen. One
 //! file a back end; the table names them all.
 
-mod audit;
 mod clusters;
 mod cone_block;
 mod cone_f32;
@@ -21,13 +20,13 @@ mod normal_cone;
 mod outcode;
 mod per_triangle;
 mod per_triangle_f32;
+mod plane_blocks;
 mod screen;
 mod selection;
 mod several_cones;
 mod small;
 mod view;
 
-pub use audit::{Audit, EyeKind, audit};
 pub use clusters::{Clusters, MOST_TRIANGLES};
 pub use cone_f32::PlainCones;
 pub use cone_s8::ByteCones;
@@ -40,7 +39,6 @@ pub use image::Image;
 pub use meshopt::MeshoptCones;
 pub use metrics::{Counts, facing, truth};
 pub use normal_cone::Cone;
-pub use outcode::{Clipping, clipping};
 pub use screen::Screen;
 pub use selection::Selection;
 pub use view::{View, Window};
@@ -60,13 +58,6 @@ pub const TRIANGLE_ROWS: &[TriangleRow] = &[
     #[cfg(feature = "peers")]
     meshopt::ROW,
 ];
-
-impl TriangleRow {
-    /// The row of exactly this name.
-    pub fn named(name: &str) -> Option<&'static TriangleRow> {
-        TRIANGLE_ROWS.iter().find(|row| row.name == name)
-    }
-}
 
 #[cfg(test)]
 mod tests;

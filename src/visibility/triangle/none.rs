@@ -26,8 +26,4 @@ fn build(_: &Arc<Clusters>) -> Box<dyn TriangleCull> {
 
 impl TriangleCull for Nothing {
     fn cull(&self, _: &View, _: Kernel, _: &mut Selection) {}
-
-    fn bytes(&self) -> usize {
-        0
-    }
 }

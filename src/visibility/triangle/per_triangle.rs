@@ -16,6 +16,7 @@ use super::clusters::Clusters;
 use super::contract::{Criterion, TriangleCull, TriangleRow};
 use super::exact::{faces, normal};
 use super::eye::Eye;
+use super::plane_blocks::{PlaneBlocks, Planes};
 use super::selection::Selection;
 use super::view::View;
 use crate::arithmetic::rounding::round_up;
@@ -37,54 +38,23 @@ const FAR: f32 = (1u64 << 59) as f32;
 /// For what underflows.
 const LEAST: f64 = 1e-30;
 
-/// Sixteen triangles. Without area, or without a triangle, a lane is NaN: never in
-/// front.
-#[derive(Clone, Copy)]
-#[repr(C, align(64))]
-struct Planes {
-    normal: [[f32; LANES]; 3],
-    corner: [[f32; LANES]; 3],
-}
-
 struct PerTriangle {
     clusters: Arc<Clusters>,
-    /// Rows of each cluster; one more at the end. None for a two-sided one.
-    starts: Vec<u32>,
-    planes: Vec<Planes>,
+    /// Without area, or without a triangle, a lane is NaN: never in front.
+    planes: PlaneBlocks,
     /// Whether all corners are near enough for f32.
     is_near: bool,
 }
 
 fn build(clusters: &Arc<Clusters>) -> Box<dyn TriangleCull> {
-    let empty = Planes {
-        normal: [[f32::NAN; LANES]; 3],
-        corner: [[0.0; LANES]; 3],
+    let scaled = |corners| {
+        let n = normal(corners);
+        (n != DVec3::ZERO).then(|| (n / n.abs().max_element()).as_vec3())
     };
-    let mut starts = vec![0];
-    let mut planes: Vec<Planes> = Vec::new();
-    for cluster in 0..clusters.len() {
-        if !clusters.is_two_sided(cluster) {
-            for (bit, corners) in clusters.corners_of(cluster).enumerate() {
-                if bit % LANES == 0 {
-                    planes.push(empty);
-                }
-                let n = normal(corners);
-                let row = planes.last_mut().expect("a row was just begun");
-                for k in 0..3 {
-                    if n != DVec3::ZERO {
-                        row.normal[k][bit % LANES] = (n[k] / n.abs().max_element()) as f32;
-                    }
-                    row.corner[k][bit % LANES] = corners[0][k];
-                }
-            }
-        }
-        starts.push(planes.len() as u32);
-    }
     let points = &clusters.surfaces.points;
     Box::new(PerTriangle {
         clusters: clusters.clone(),
-        starts,
-        planes,
+        planes: PlaneBlocks::of(clusters, f32::NAN, scaled),
         is_near: points.iter().all(|p| p.abs().max_element() < FAR),
     })
 }
@@ -102,10 +72,6 @@ impl TriangleCull for PerTriangle {
         }
         kernel.run(Query { all, eye, kept });
     }
-
-    fn bytes(&self) -> usize {
-        size_of_val(&self.planes[..]) + size_of_val(&self.starts[..])
-    }
 }
 
 struct Query<'a> {
@@ -121,12 +87,12 @@ impl Work for Query<'_> {
     fn run<I: Isa>(self, isa: I) {
         let eye = Lanes::of(isa, self.eye);
         for (cluster, word) in self.kept.words_mut().iter_mut().enumerate() {
-            let rows = self.all.starts[cluster] as usize..self.all.starts[cluster + 1] as usize;
+            let rows = self.all.planes.of_cluster(cluster);
             if *word == 0 || rows.is_empty() {
                 continue;
             }
             let (mut front, mut doubt) = (0, 0);
-            for (row, planes) in self.all.planes[rows].iter().enumerate() {
+            for (row, planes) in rows.iter().enumerate() {
                 let [sure, unsure] = sides(isa, planes, &eye);
                 front |= sure << (LANES * row);
                 doubt |= unsure << (LANES * row);

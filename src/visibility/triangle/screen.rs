@@ -1,11 +1,17 @@
 //! Points in the frame of the camera, in f64, with a bound on their error.
 
-use glam::{DVec3, Vec3};
+use std::sync::Arc;
+
+use glam::DVec3;
 
 use super::super::rays::SampleGrid;
-use super::locals::{EIGHT, Points};
+use super::clusters::Clusters;
+use super::contract::TriangleCull;
+use super::locals::{EIGHT, Locals, Points, Rule};
+use super::selection::Selection;
 use super::view::View;
 use crate::camera::Lens;
+use crate::kernel::{Isa, Kernel, Work};
 
 /// Error of a coordinate per unit of the numbers in it. The axes are orthonormal to
 /// some units of 2^-53; products, sums and a quotient add some more: 2^-40 is
@@ -27,6 +33,44 @@ pub struct Screen {
     grid: SampleGrid,
 }
 
+/// A back end that decides by where the points of clusters are on the screen.
+pub struct Screened<R> {
+    locals: Locals,
+    rule: fn(Screen) -> R,
+}
+
+impl<R: Rule> Screened<R> {
+    /// Copies the points. O(t).
+    pub fn of(clusters: &Arc<Clusters>, rule: fn(Screen) -> R) -> Screened<R> {
+        let locals = Locals::of(clusters);
+        Screened { locals, rule }
+    }
+}
+
+impl<R: Rule> TriangleCull for Screened<R> {
+    fn cull(&self, view: &View, kernel: Kernel, kept: &mut Selection) {
+        if let Some(screen) = Screen::of(view) {
+            let (locals, rule) = (&self.locals, (self.rule)(screen));
+            kernel.run(Query { locals, rule, kept });
+        }
+    }
+}
+
+struct Query<'a, R> {
+    locals: &'a Locals,
+    rule: R,
+    kept: &'a mut Selection,
+}
+
+impl<R: Rule> Work for Query<'_, R> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Isa>(self, _: I) {
+        self.locals.retain(self.kept, &self.rule);
+    }
+}
+
 /// Eight points: right, up, depth, and the error of each.
 struct Seen {
     x: [f64; EIGHT],
@@ -36,9 +80,6 @@ struct Seen {
 }
 
 impl Screen {
-    /// Bits of an outcode that are about depth: nearer than near, beyond far.
-    pub(super) const DEPTH: u8 = 0b11_0000;
-
     /// `None` for a view without a window.
     pub fn of(view: &View) -> Option<Screen> {
         let window = view.window.as_ref()?;
@@ -102,19 +143,6 @@ impl Screen {
             codes[lane] |= u64::from(depth[lane] - error[lane] > self.far) << 5;
         }
         codes.map(|code| code as u8)
-    }
-
-    /// Whether a point in front of the eye is in a window `band` times as large.
-    pub fn is_within(&self, p: Vec3, band: f64) -> bool {
-        let way = p.as_dvec3() - self.eye;
-        let [x, y, depth] = self.axes.map(|axis| axis.dot(way));
-        let [left, right, bottom, top] = self.window;
-        let scale = if self.is_parallel { 1.0 } else { depth };
-        let within = |at: f64, low: f64, high: f64| {
-            let (centre, half) = ((low + high) / 2.0, (high - low) / 2.0 * band);
-            (at - centre * scale).abs() <= half * scale
-        };
-        within(x, left, right) && within(y, bottom, top)
     }
 
     /// Where points may be in the image; everywhere if they are not surely in front of

@@ -47,11 +47,6 @@ impl Selection {
             .sum()
     }
 
-    /// How many clusters have a triangle left.
-    pub fn clusters(&self) -> usize {
-        self.words.iter().filter(|&&word| word != 0).count()
-    }
-
     /// How many of these triangles are not in another selection.
     pub fn without(&self, other: &Selection) -> usize {
         let pairs = self.words.iter().zip(&other.words);

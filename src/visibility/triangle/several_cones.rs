@@ -46,8 +46,7 @@ impl SeveralCones {
             triangles: [0; LANES],
         };
         let mut blocks = vec![[empty; CONES]; clusters.len().div_ceil(LANES)];
-        for cluster in (0..clusters.len()).filter(|&cluster| !clusters.is_two_sided(cluster)) {
-            let triangles: Vec<[Vec3; 3]> = clusters.corners_of(cluster).collect();
+        for (cluster, triangles) in clusters.one_sided() {
             let lane = cluster % LANES;
             for (group, word) in blocks[cluster / LANES].iter_mut().zip(groups(&triangles)) {
                 let bits = (0..triangles.len()).filter(|bit| word >> bit & 1 == 1);
@@ -109,10 +108,6 @@ impl TriangleCull for SeveralCones {
                 words: kept.words_mut(),
             });
         }
-    }
-
-    fn bytes(&self) -> usize {
-        size_of_val(&self.blocks[..])
     }
 }
 

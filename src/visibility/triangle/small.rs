@@ -2,12 +2,9 @@
 //! image.
 
 use super::super::guarantee::Guarantee;
-use super::contract::{Criterion, TriangleCull, TriangleRow};
-use super::locals::{EIGHT, Locals, Points, Rule};
-use super::screen::{PixelBox, Screen};
-use super::selection::Selection;
-use super::view::View;
-use crate::kernel::{Isa, Kernel, Work};
+use super::contract::{Criterion, TriangleRow};
+use super::locals::{EIGHT, Points, Rule};
+use super::screen::{PixelBox, Screen, Screened};
 
 /// The row of this file.
 pub const ROW: TriangleRow = TriangleRow {
@@ -15,42 +12,8 @@ pub const ROW: TriangleRow = TriangleRow {
     summary: "Drops what no sample of the image can meet: its screen box holds none",
     guarantee: Guarantee::SampleExact,
     criterion: Criterion::Samples,
-    build: |clusters| Box::new(Small(Locals::of(clusters))),
+    build: |clusters| Box::new(Screened::of(clusters, Pixels)),
 };
-
-struct Small(Locals);
-
-impl TriangleCull for Small {
-    fn cull(&self, view: &View, kernel: Kernel, kept: &mut Selection) {
-        if let Some(screen) = Screen::of(view) {
-            let locals = &self.0;
-            kernel.run(Query {
-                locals,
-                screen,
-                kept,
-            });
-        }
-    }
-
-    fn bytes(&self) -> usize {
-        self.0.bytes()
-    }
-}
-
-struct Query<'a> {
-    locals: &'a Locals,
-    screen: Screen,
-    kept: &'a mut Selection,
-}
-
-impl Work for Query<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<I: Isa>(self, _: I) {
-        self.locals.retain(self.kept, &Pixels(self.screen));
-    }
-}
 
 struct Pixels(Screen);
 

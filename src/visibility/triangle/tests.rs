@@ -1,5 +1,7 @@
 //! Every row of the table against the exact truth.
 
+mod audit;
+
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
@@ -10,6 +12,7 @@ use super::*;
 use crate::camera::{Camera, Lens, look_at};
 use crate::kernel::Kernel;
 use crate::scene::{MESHES, Mesh, SeededRng, Surfaces, load};
+use audit::{EyeKind, audit};
 
 /// Scenes of some thousand triangles: all meshes, and boxes far from the zero.
 fn scenes() -> Vec<(String, Arc<Clusters>)> {
@@ -77,7 +80,11 @@ fn rows_keep_their_promises_and_kernels_agree() {
                 let both = half.words().iter().zip(kept.words()).map(|(a, b)| a & b);
                 assert!(rest.words().iter().copied().eq(both), "{name} {}", row.name);
                 let truth = truth(row.criterion, &clusters, &view, &all);
-                sum = sum.plus(Counts::of(&all, &kept, &truth));
+                let counts = Counts::of(&all, &kept, &truth);
+                sum.candidates += counts.candidates;
+                sum.delivered += counts.delivered;
+                sum.false_positives += counts.false_positives;
+                sum.false_negatives += counts.false_negatives;
             }
             match row.guarantee {
                 Guarantee::Exact => {
@@ -89,12 +96,12 @@ fn rows_keep_their_promises_and_kernels_agree() {
                 _ => {}
             }
             // Where clusters are nearly flat, each row finds something to remove.
+            let removed = 1.0 - sum.delivered as f64 / sum.candidates as f64;
             let is_smooth = name == "mesh:spheres" || name == "mesh:statue";
             assert!(
-                row.name == "none" || !is_smooth || sum.removed() > 0.05,
-                "{name} {}: {:.3}",
-                row.name,
-                sum.removed()
+                row.name == "none" || !is_smooth || removed > 0.05,
+                "{name} {}: {removed:.3}",
+                row.name
             );
         }
     }
@@ -155,7 +162,8 @@ fn the_proven_margin_costs_next_to_nothing() {
     for (name, clusters) in scenes() {
         let all = Selection::all(&clusters);
         let removed = |wanted: &str| {
-            let row = TriangleRow::named(wanted).unwrap();
+            let mut rows = TRIANGLE_ROWS.iter();
+            let row = rows.find(|row| row.name == wanted).unwrap();
             let back_end = (row.build)(&clusters);
             let views = cameras(&clusters, 16, 8);
             let of = |camera: &Camera| {
@@ -173,26 +181,11 @@ fn the_proven_margin_costs_next_to_nothing() {
 }
 
 #[test]
-fn the_test_alone_says_what_the_stage_takes_away() {
-    for (name, clusters) in scenes() {
-        let (safe, bytes) = (SafeCones::of(&clusters), ByteCones::of(&clusters));
-        let (mut masks, mut more) = (Vec::new(), Vec::new());
-        for camera in cameras(&clusters, 6, 2) {
-            let view = view(&camera, &clusters);
-            for kernel in Kernel::available() {
-                safe.reject(&view, kernel, &mut masks);
-                bytes.reject(&view, kernel, &mut more);
-                for (masks, back_end) in [(&masks, &safe as &dyn TriangleCull), (&more, &bytes)] {
-                    let mut kept = Selection::all(&clusters);
-                    back_end.cull(&view, kernel, &mut kept);
-                    assert_eq!(masks.len(), clusters.len().div_ceil(16));
-                    for (cluster, word) in kept.words().iter().enumerate() {
-                        let is_gone = masks[cluster / 16] >> (cluster % 16) & 1 == 1;
-                        assert_eq!(is_gone, *word == 0, "{name} {kernel}");
-                    }
-                }
-                assert_eq!(safe.read(kernel), safe.read(Kernel::Portable));
-            }
+fn cones_are_read_alike_by_every_kernel() {
+    for (_, clusters) in scenes() {
+        let safe = SafeCones::of(&clusters);
+        for kernel in Kernel::available() {
+            assert_eq!(safe.read(kernel), safe.read(Kernel::Portable));
         }
     }
 }
@@ -250,29 +243,4 @@ fn no_sample_meets_what_the_window_rows_remove() {
         }
         assert!(most > 0, "{name}");
     }
-}
-
-#[test]
-fn a_clipper_is_told_what_to_do() {
-    let camera = Camera {
-        frame: look_at(DVec3::ZERO, DVec3::X, DVec3::Z).unwrap(),
-        lens: Lens::perspective(90.0, 1.0, 1.0, Some(100.0)).unwrap(),
-    };
-    let view = View::of(&camera, DVec3::ZERO, GRID).unwrap();
-    let screen = Screen::of(&view).unwrap();
-    let at = |x: f32, y: f32| {
-        clipping(
-            &screen,
-            [[x, y, 0.0], [x, y + 1.0, 0.0], [x, y, 1.0]].map(Vec3::from),
-            2.0,
-        )
-    };
-    assert_eq!(at(10.0, 0.0), Clipping::Inside);
-    assert_eq!(at(10.0, 9.5), Clipping::GuardBand);
-    assert_eq!(at(10.0, 10.5), Clipping::Outside);
-    assert_eq!(at(0.5, 0.0), Clipping::Outside);
-    let crosses = [[0.5, 0.0, 0.0], [5.0, 0.0, 0.0], [5.0, 0.0, 1.0]].map(Vec3::from);
-    assert_eq!(clipping(&screen, crosses, 2.0), Clipping::Clip);
-    let wide = [[10.0, 0.0, 0.0], [10.0, 25.0, 0.0], [10.0, 0.0, 1.0]].map(Vec3::from);
-    assert_eq!(clipping(&screen, wide, 2.0), Clipping::Clip);
 }

@@ -44,9 +44,4 @@ impl View {
         let window = Some(Window { rays, origin, grid });
         Ok(View { eye, window })
     }
-
-    /// An eye that looks everywhere.
-    pub fn from_eye(eye: Eye) -> View {
-        View { eye, window: None }
-    }
 }

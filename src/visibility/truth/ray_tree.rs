@@ -6,8 +6,9 @@ use std::ops::Range;
 use glam::DVec3;
 
 use crate::geometry::Aabb;
+use crate::index::Record;
 use crate::visibility::Ray;
-use crate::visibility::sah::{Item, Part, halve};
+use crate::visibility::sah::{Part, halve};
 
 /// Most boxes of a leaf.
 const LEAF: usize = 2;
@@ -97,8 +98,7 @@ impl Slabs {
 impl RayTree {
     /// Builds the tree over boxes about an origin. O(n log n).
     pub fn build(boxes: &[Aabb], origin: DVec3) -> RayTree {
-        let items = boxes.iter().zip(0..);
-        let mut items: Vec<Item> = items.map(|(&bounds, id)| Item { bounds, id }).collect();
+        let mut items = Record::numbered(boxes);
         let mut pairs: Vec<Pair> = Vec::with_capacity(boxes.len() / LEAF + 1);
         // A set to be halved, and the side of the pair that is to lead to its halves.
         let mut open = Vec::new();

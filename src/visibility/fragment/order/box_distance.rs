@@ -1,23 +1,14 @@
 //! By the distance of the nearest point of each box.
 
-use super::contract::{DepthOrder, Piece, by_key, distance, nearest_point, sorted};
+use super::contract::{Piece, by_key, distance, nearest_point, sorted};
 use crate::camera::Camera;
 use crate::query::ItemId;
 use crate::scene::WorldBox;
 use crate::visibility::Solids;
 
-/// As typed on the command line.
-pub const NAME: &str = "box-distance";
-/// One line for tables and help.
-pub const SUMMARY: &str = "sorted by the distance of the nearest point of each box";
-
 /// Sorted by distance. O(n log n) per view.
-pub struct BoxDistance;
-
-impl DepthOrder for BoxDistance {
-    fn order(&self, solids: &Solids, camera: &Camera, pieces: &mut Vec<Piece>) {
-        by_key(solids, pieces, |b| nearest(camera, b));
-    }
+pub fn order(solids: &Solids, camera: &Camera, pieces: &mut Vec<Piece>) {
+    by_key(solids, pieces, |b| nearest(camera, b));
 }
 
 /// Brings some of the items into this order. O(n log n).

@@ -15,11 +15,6 @@ use crate::camera::{Camera, Lens};
 use crate::scene::WorldBox;
 use crate::visibility::Solids;
 
-/// As typed on the command line.
-pub const NAME: &str = "bsp";
-/// One line for tables and help.
-pub const SUMMARY: &str = "planes through faces of boxes, which are cut where they cross: exact";
-
 /// Parts that there may be for each item before cutting ends.
 const MOST_PARTS: usize = 16;
 /// Parts that there may be at any rate: few boxes, each within the next, are cut into
@@ -105,15 +100,6 @@ impl BspOrder {
     /// How many parts the items were cut into.
     pub fn parts(&self) -> usize {
         self.parts
-    }
-
-    /// The largest number of parts between which there is no plane.
-    pub fn largest_leaf(&self) -> usize {
-        let leaf = |node: &Node| match node {
-            Node::Leaf(parts) => parts.len(),
-            Node::Plane { .. } => 0,
-        };
-        self.nodes.iter().map(leaf).max().unwrap_or(0)
     }
 }
 

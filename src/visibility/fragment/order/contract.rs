@@ -16,6 +16,13 @@ pub struct Piece {
     pub part: Option<WorldBox>,
 }
 
+impl Piece {
+    /// All of an item.
+    pub fn whole(item: ItemId) -> Piece {
+        Piece { item, part: None }
+    }
+}
+
 /// A way to order items for a camera.
 pub trait DepthOrder: Send + Sync {
     /// Puts all items, from front to back as well as it can, into `pieces` in place
@@ -28,12 +35,21 @@ pub trait DepthOrder: Send + Sync {
     }
 }
 
+impl<F> DepthOrder for F
+where
+    F: Fn(&Solids, &Camera, &mut Vec<Piece>) + Send + Sync,
+{
+    fn order(&self, solids: &Solids, camera: &Camera, pieces: &mut Vec<Piece>) {
+        self(solids, camera, pieces);
+    }
+}
+
 /// All items, least key first; of the same key the lowest id.
 pub(super) fn by_key(solids: &Solids, pieces: &mut Vec<Piece>, key: impl Fn(&WorldBox) -> f64) {
     let keyed = solids.boxes.iter().zip(0..).map(|(b, item)| (key(b), item));
     pieces.clear();
     let items = sorted(keyed).into_iter().map(|(_, item)| item);
-    pieces.extend(items.map(|item| Piece { item, part: None }));
+    pieces.extend(items.map(Piece::whole));
 }
 
 /// Items with their keys, least first; of the same key the lowest id.

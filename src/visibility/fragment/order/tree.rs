@@ -7,11 +7,6 @@ use crate::index::{Input, RegionIndex, Wide};
 use crate::query::ItemId;
 use crate::visibility::Solids;
 
-/// As typed on the command line.
-pub const NAME: &str = "tree";
-/// One line for tables and help.
-pub const SUMMARY: &str = "items as they lie in the tree 'wide', the same for all views";
-
 /// Items as they lie in the tree.
 pub struct TreeOrder(Vec<ItemId>);
 
@@ -27,6 +22,6 @@ impl TreeOrder {
 impl DepthOrder for TreeOrder {
     fn order(&self, _: &Solids, _: &Camera, pieces: &mut Vec<Piece>) {
         pieces.clear();
-        pieces.extend(self.0.iter().map(|&item| Piece { item, part: None }));
+        pieces.extend(self.0.iter().map(|&item| Piece::whole(item)));
     }
 }

@@ -3,9 +3,10 @@
 
 use super::slabs::Rows;
 use crate::geometry::Aabb;
+use crate::index::Record;
 use crate::kernel::{LANES, LaneMask};
 use crate::query::ItemId;
-use crate::visibility::sah::{Item, Part, half_area, halve};
+use crate::visibility::sah::{Part, half_area, halve};
 
 /// Sixteen boxes: items in the first lanes, nodes in those behind. 448 bytes.
 #[derive(Clone, Copy, Debug)]
@@ -68,11 +69,7 @@ impl Node {
 
 /// Builds the tree. O(n log n).
 pub(super) fn build(boxes: &[Aabb]) -> Built {
-    let item = |(id, &bounds): (usize, &Aabb)| Item {
-        bounds,
-        id: id as ItemId,
-    };
-    let mut items: Vec<Item> = boxes.iter().enumerate().map(item).collect();
+    let mut items = Record::numbered(boxes);
     let mut nodes: Vec<Node> = Vec::with_capacity(boxes.len() / 8 + 1);
     let mut root = Child::new(0, 0);
     // Where the number of the node is to be written.
@@ -109,7 +106,7 @@ pub(super) fn build(boxes: &[Aabb]) -> Built {
 /// Cuts a set into at most sixteen parts: the one with the largest surface
 /// first, as long as there is one that does not fit a node; then small ones into
 /// single items, as many as there are lanes left for.
-fn cut(items: &mut [Item], part: Part) -> Vec<Part> {
+fn cut(items: &mut [Record], part: Part) -> Vec<Part> {
     let mut parts = vec![part];
     while parts.len() < LANES {
         let wide = (0..parts.len()).filter(|&i| parts[i].len() > LANES);

@@ -10,26 +10,20 @@ use glam::{DVec3, Vec3};
 
 use self::build::{Built, Child, Node};
 use self::slabs::Slabs;
-use super::contract::{About, Hit, NotBuilt, Pick};
+use super::contract::{BackEnd, Hit, NotBuilt, Pick};
 use super::exactly;
 use crate::geometry::Aabb;
-use crate::index::Origin;
 use crate::kernel::{Isa, Kernel, LANES, Work};
 use crate::query::ItemId;
 use crate::scene::WorldBox;
 use crate::visibility::{Guarantee, Ray, Solids};
 
-/// As typed on the command line.
-pub const NAME: &str = "wide-ray";
-/// One line for tables and help.
-pub const SUMMARY: &str = "16-wide tree, sixteen slab tests at once, the last step exact";
-
-/// What it declares of itself.
-pub const ABOUT: About = About {
-    name: NAME,
-    summary: SUMMARY,
-    origin: Origin::Ours,
+/// The row of this file.
+pub const ROW: BackEnd = BackEnd {
+    name: "wide-ray",
+    summary: "16-wide tree, sixteen slab tests at once, the last step exact",
     guarantee: Guarantee::Exact,
+    build: |solids| Ok(Box::new(WideRay::of(solids)?)),
 };
 
 /// Most items: a node holds one at least.
@@ -385,25 +379,12 @@ impl Work for Nearest<'_> {
     }
 }
 
-/// Builds it for the table of back ends.
-pub(super) fn build(solids: &Solids) -> Result<Box<dyn Pick>, NotBuilt> {
-    Ok(Box::new(WideRay::of(solids)?))
-}
-
 impl Pick for WideRay {
-    fn about(&self) -> About {
-        ABOUT
-    }
-
     fn first(&self, ray: &Ray) -> Option<Hit> {
         self.first_by(self.kernel, ray)
     }
 
     fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {
         self.nearest_by(self.kernel, ray, count, hits);
-    }
-
-    fn memory(&self) -> usize {
-        size_of_val(&self.nodes[..]) + size_of_val(&self.items[..])
     }
 }

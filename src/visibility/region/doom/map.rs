@@ -210,20 +210,4 @@ impl DoomMap {
         };
         lines.map(wall).collect()
     }
-
-    /// The same map with all heights left out: each linedef of two sides is open, as
-    /// builders of REJECT tables take it.
-    pub fn without_heights(&self) -> DoomMap {
-        let mut map = self.clone();
-        for line in &mut map.lines {
-            if let [Some(_), Some(_)] = line.sectors {
-                line.open = Some([-HIGHEST, HIGHEST]);
-            }
-        }
-        map.sectors.fill(Sector {
-            floor: -HIGHEST,
-            ceiling: HIGHEST,
-        });
-        map
-    }
 }

@@ -20,7 +20,7 @@ use super::super::pvs::Pvs;
 use super::super::witness::{ProvenPvs, Witness};
 use super::ground::on_grid;
 use super::map::{DoomMap, MapLine};
-use super::sweep::{Sweep, Whole, cross};
+use super::sweep::{Sweep, Whole};
 
 /// Where a pair was found: the line through a vertex in a direction, moved to its
 /// left by next to nothing.
@@ -37,8 +37,6 @@ pub struct SectorPvs {
     graph: Arc<RegionGraph>,
     pvs: Pvs,
     found: Vec<Option<Found>>,
-    undecided: Vec<[RegionId; 2]>,
-    crossings: usize,
     /// The run that was marked last: neighbouring lines mostly see the same.
     marked: Vec<u64>,
     run: Vec<u64>,
@@ -58,10 +56,8 @@ impl SectorPvs {
         let borders = |line: &&MapLine| line.open.is_none() || line.sectors[0] != line.sectors[1];
         let lines: Vec<MapLine> = map.lines.iter().filter(borders).copied().collect();
         let mut sight = SectorPvs {
-            crossings: crossings(&lines),
             pvs: Pvs::alone(sectors),
             found: vec![None; sectors * sectors],
-            undecided: Vec::new(),
             marked: Vec::new(),
             run: Vec::new(),
             map: map.clone(),
@@ -76,12 +72,6 @@ impl SectorPvs {
             }
         }
         sight
-    }
-
-    /// How many pairs of linedefs cross where there is no vertex. The search is exact
-    /// if there are none, as in any map that a node builder has seen.
-    pub fn crossings(&self) -> usize {
-        self.crossings
     }
 
     /// Marks what a line sees that passes the vertex on its right: from the ray on,
@@ -143,34 +133,9 @@ impl SectorPvs {
     }
 }
 
-/// Pairs of borders that cross properly.
-fn crossings(lines: &[MapLine]) -> usize {
-    let ends: Vec<[Whole; 2]> = lines
-        .iter()
-        .map(|l| l.ends.map(|e| e.map(i64::from)))
-        .collect();
-    let side = |a: Whole, b: Whole, c: Whole| {
-        cross([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]).signum()
-    };
-    let crosses = |[a, b]: [Whole; 2], [c, d]: [Whole; 2]| {
-        side(a, b, c) * side(a, b, d) < 0 && side(c, d, a) * side(c, d, b) < 0
-    };
-    let count = |(i, one): (usize, &[Whole; 2])| {
-        ends[..i]
-            .iter()
-            .filter(|other| crosses(*one, **other))
-            .count()
-    };
-    ends.iter().enumerate().map(count).sum()
-}
-
 impl ProvenPvs for SectorPvs {
     fn pvs(&self) -> &Pvs {
         &self.pvs
-    }
-
-    fn undecided(&self) -> &[[RegionId; 2]] {
-        &self.undecided
     }
 
     /// The line is moved aside by less and less until a segment of it is accepted.

@@ -99,7 +99,7 @@ fn a_graph_that_lacks_openings_is_caught() {
     let world = world("freedm-map12");
     let openings = world.graph.openings().len();
     let caught = |opening: &usize| {
-        let graph = Arc::new(world.graph.without_opening(*opening));
+        let graph = Arc::new(without_opening(&world.graph, *opening));
         let (_, lost) = visible_and_lost(&world, &graph, 12);
         lost[1..].iter().any(|lost| *lost > 0)
     };

@@ -10,9 +10,9 @@ use crate::visibility::Rays;
 pub fn rows(graph: &Arc<RegionGraph>) -> Vec<Box<dyn RegionRow>> {
     vec![
         Box::new(EveryRegion(graph.clone())),
-        Box::new(Flood(graph.clone())),
-        Box::new(PortalRect(graph.clone())),
-        Box::new(PortalClip(graph.clone())),
+        Box::new(Searched::flood(graph.clone())),
+        Box::new(Searched::portal_rect(graph.clone())),
+        Box::new(Searched::portal_clip(graph.clone())),
     ]
 }
 
@@ -89,7 +89,7 @@ fn no_row_misses_a_cube_that_a_ray_passes() {
 fn a_forgotten_opening_is_noticed() {
     let (_, graph) = rooms(WORLDS[0]);
     for opening in [0, 20, 33] {
-        let wrong = Arc::new(graph.without_opening(opening));
+        let wrong = Arc::new(without_opening(&graph, opening));
         let caught = rows(&wrong)
             .iter()
             .skip(1)

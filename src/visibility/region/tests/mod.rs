@@ -7,4 +7,4 @@ mod free_space;
 mod from_eye;
 mod items;
 mod stress;
-mod worlds;
+pub(super) mod worlds;

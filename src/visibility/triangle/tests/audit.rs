@@ -6,19 +6,18 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
-use super::clusters::Clusters;
-use super::contract::TriangleRow;
-use super::exact::{faces, normal};
-use super::eye::Eye;
-use super::selection::Selection;
-use super::view::View;
+use super::super::clusters::Clusters;
+use super::super::contract::TriangleRow;
+use super::super::exact::{faces, normal};
+use super::super::eye::Eye;
+use super::super::selection::Selection;
+use super::super::view::View;
 use crate::kernel::Kernel;
 use crate::scene::{SeededRng, SurfaceKind, Surfaces};
 
 named! {
     /// Which eyes are tried.
     #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
-    #[non_exhaustive]
     pub enum EyeKind {
         /// Points that f32 holds: only the test itself rounds.
         Single = "f32",
@@ -31,7 +30,6 @@ named! {
 
 /// What a search found.
 #[derive(Clone, PartialEq, Debug)]
-#[non_exhaustive]
 pub struct Audit {
     /// Pairs of a cluster and an eye.
     pub pairs: usize,
@@ -77,7 +75,7 @@ pub fn audit(row: &TriangleRow, pairs: usize, seed: u64, eyes: EyeKind) -> Audit
                     EyeKind::Double => Eye::local(eye),
                     EyeKind::Direction => Eye::along(-way),
                 };
-                let view = View::from_eye(eye);
+                let view = View { eye, window: None };
                 let mut kept = all.clone();
                 back_end.cull(&view, Kernel::best(), &mut kept);
                 found.pairs += 1;

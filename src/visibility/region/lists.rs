@@ -1,0 +1,34 @@
+//! Lists of lists in two tables.
+
+/// Lists that lie one behind the other.
+#[derive(Clone, Debug)]
+pub struct Lists<T> {
+    /// Where each list begins; one more at the end.
+    starts: Vec<u32>,
+    pub all: Vec<T>,
+}
+
+impl<T: Clone> Lists<T> {
+    /// Puts lists together.
+    pub fn of(lists: &[Vec<T>]) -> Lists<T> {
+        let ends = lists.iter().scan(0, |end, list| {
+            *end += list.len() as u32;
+            Some(*end)
+        });
+        Lists {
+            starts: std::iter::once(0).chain(ends).collect(),
+            all: lists.concat(),
+        }
+    }
+
+    /// How many lists there are.
+    pub fn count(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    /// A list. O(1).
+    pub fn list(&self, at: u32) -> &[T] {
+        let at = at as usize;
+        &self.all[self.starts[at] as usize..self.starts[at + 1] as usize]
+    }
+}
