@@ -188,7 +188,7 @@ fn of_comparison(comparison: &Comparison) -> Vec<Block> {
     if peer.is_some() {
         header.push("speed-up vs fastest peer");
     }
-    header.extend(["of lower bound: read", "copy", "build", "bytes per item"]);
+    header.extend(["/ read", "/ copy", "/ build", "bytes per item"]);
     header.extend(["break-even queries", "locate", "status"]);
     let mut table = Table::of_numbers(header);
     for Ranked { rank, cell } in &comparison.ranked {
@@ -202,6 +202,10 @@ fn of_comparison(comparison: &Comparison) -> Vec<Block> {
     let mut blocks = vec![Block::Heading(3, heading), Block::Line(basis)];
     blocks.extend(false_positives(comparison).map(Block::Line));
     blocks.push(Block::Table(table.without_empty_columns()));
+    if !comparison.bounds.is_empty() {
+        let meaning = "/ read, / copy, / build: time / time of that lower bound.";
+        blocks.push(Block::Line(meaning.to_owned()));
+    }
     let told = comparison.ranked.iter().map(|r| r.cell);
     for cell in told.filter(|c| c.reason.is_some()) {
         let reason = cell.reason.as_deref().unwrap_or_default();

@@ -104,12 +104,11 @@ pub fn sweep(
         .iter()
         .all(|row| row.name == NONE)
     {
-        let expected = match stage {
-            StageKind::Region => "a scene with rooms or sectors",
-            _ => "a scene of solid boxes or a mesh",
-        };
+        // Every scene has something for the others.
         let (name, stage) = (&scene.name, stage.name());
-        bail!("scene '{name}' has nothing for the {stage} stage; expected {expected}");
+        bail!(
+            "scene '{name}' has nothing for the {stage} stage; expected a scene with rooms or sectors"
+        );
     }
     let setting = Setting::of(registry, args, scene, None)?;
     let about = format!("{}, {} stage: ", args.scene, stage.name());

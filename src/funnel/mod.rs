@@ -24,6 +24,7 @@ mod material;
 mod mirror;
 mod orders;
 mod pass;
+mod pickable;
 mod picks;
 mod plan;
 mod plan_view;

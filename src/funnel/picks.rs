@@ -6,22 +6,22 @@ use std::rc::Rc;
 
 use serde::{Serialize, Serializer};
 
+use super::pickable::{Exactly, Pickable};
 use super::stage::by_name;
 use super::times::Times;
 use super::world::World;
 use crate::camera::Surroundings;
 use crate::index::DynIndex;
 use crate::query::ItemId;
-use crate::visibility::pick::{BACK_ENDS, CursorRectangle, Hit, Pick};
-use crate::visibility::truth::{Probe, RayIndex};
-use crate::visibility::{Guarantee, Ray, Rays, SampleGrid, Solids};
+use crate::visibility::pick::{CursorRectangle, Hit, Pick};
+use crate::visibility::{Guarantee, Ray, Rays, SampleGrid};
 
 /// Cursor places of a view.
 const CURSORS: SampleGrid = SampleGrid::new(16, 9);
 /// Items of which every one is looked at for each ray, or each cursor's frustum, at most.
 const MOST_FOR_LOOP: usize = 20_000;
 /// How many of the nearest items are asked for.
-const NEAREST: usize = 8;
+pub const NEAREST: usize = 8;
 /// The cursor's frustum reaches so many pixels to each side.
 const REACH: f64 = 4.0;
 
@@ -110,6 +110,7 @@ struct Cursors {
 pub struct Picks<'w> {
     world: &'w World<'w>,
     around: Surroundings,
+    pickable: Pickable<'w>,
     pickers: Vec<Picker<'w>>,
     cursors: Vec<Cursors>,
 }
@@ -119,18 +120,16 @@ impl<'w> Picks<'w> {
     pub const RAYS_PER_VIEW: f64 = (CURSORS.width * CURSORS.height) as f64;
 
     /// Builds every back end that can hold the scene.
-    pub fn of(world: &'w World<'w>, solids: &Solids) -> Picks<'w> {
+    pub fn of(world: &'w World<'w>) -> Picks<'w> {
         let suits = |name: &str| name != "linear" || world.items() <= MOST_FOR_LOOP;
-        let built = BACK_ENDS.iter().filter(|row| suits(row.name));
-        let built: Vec<(_, Rc<dyn Pick>)> = built
-            .filter_map(|row| Some((row, (row.build)(solids).ok()?.into())))
-            .collect();
+        let pickable = Pickable::of(world);
+        let built = pickable.back_ends(MOST_FOR_LOOP);
         let by_rays = |ask: fn(Rc<dyn Pick>) -> By<'w>| {
-            let pickers = built.iter().map(move |(row, pick)| Picker {
-                name: row.name.to_owned(),
-                summary: row.summary,
-                guarantee: row.guarantee,
-                by: ask(pick.clone()),
+            let pickers = built.iter().map(move |back_end| Picker {
+                name: back_end.name.to_owned(),
+                summary: back_end.summary,
+                guarantee: back_end.guarantee,
+                by: ask(back_end.pick.clone()),
             });
             pickers.collect::<Vec<_>>()
         };
@@ -145,6 +144,7 @@ impl<'w> Picks<'w> {
         Picks {
             world,
             around: world.scene.surroundings(),
+            pickable,
             pickers: pickers.chain(through).collect(),
             cursors: (0..world.views())
                 .map(|view| Cursors::of(world, view))
@@ -192,7 +192,8 @@ impl<'w> Picks<'w> {
     }
 
     /// Every row against the exact answer.
-    pub fn judged(&self, index: &RayIndex) -> Vec<PickRow> {
+    pub fn judged(&self) -> Vec<PickRow> {
+        let exactly = self.pickable.exactly();
         let rows = self.pickers.iter().map(|picker| PickRow {
             question: picker.by.question(),
             name: picker.name.clone(),
@@ -207,7 +208,7 @@ impl<'w> Picks<'w> {
         let (mut hits, mut answer) = (Vec::new(), Vec::new());
         for Cursors { rays, places } in &self.cursors {
             for cursor in places {
-                let truth = self.truth(index, rays, cursor);
+                let truth = self.truth(&exactly, rays, cursor);
                 for (row, picker) in rows.iter_mut().zip(&self.pickers) {
                     answer.clear();
                     self.answer(&picker.by, rays, cursor, &mut hits, &mut answer);
@@ -219,8 +220,7 @@ impl<'w> Picks<'w> {
         rows
     }
 
-    fn truth(&self, index: &RayIndex, rays: &Rays, cursor: &Cursor) -> Truth {
-        let front = index.front_of(&cursor.ray).map(|front| front.item());
+    fn truth(&self, exactly: &Exactly, rays: &Rays, cursor: &Cursor) -> Truth {
         let volume = cursor.rectangle.volume(rays, &self.around).ok();
         let items = &self.world.scene.items;
         let volume = volume.filter(|_| items.len() <= MOST_FOR_LOOP);
@@ -231,9 +231,9 @@ impl<'w> Picks<'w> {
                 .collect()
         });
         Truth {
-            first: front.into_iter().collect(),
-            nearest: nearest(index, &cursor.ray),
-            met: met_within(index, rays, &cursor.rectangle),
+            first: exactly.first(&cursor.ray).into_iter().collect(),
+            nearest: exactly.nearest(&cursor.ray),
+            met: met_within(exactly, rays, &cursor.rectangle),
             in_planes,
         }
     }
@@ -289,27 +289,14 @@ impl Truth {
     }
 }
 
-/// The nearest items along a ray, and all that are as near as the last of them, exactly.
-fn nearest(index: &RayIndex, ray: &Ray) -> Vec<ItemId> {
-    let probe = Probe::new(*ray);
-    let mut met = index.all_along(ray, f64::INFINITY);
-    met.sort_unstable_by(|(a, at_a), (b, at_b)| probe.compare(at_a, at_b).then(a.cmp(b)));
-    if let Some((_, last)) = met.get(NEAREST - 1).copied() {
-        let kept = met.partition_point(|(_, at)| probe.compare(at, &last).is_le());
-        met.truncate(kept);
-    }
-    met.into_iter().map(|(item, _)| item).collect()
-}
-
 /// Every item that the rays through corners, edges and middle of a rectangle meet.
-fn met_within(index: &RayIndex, rays: &Rays, rectangle: &CursorRectangle) -> Vec<ItemId> {
+fn met_within(exactly: &Exactly, rays: &Rays, rectangle: &CursorRectangle) -> Vec<ItemId> {
     let CursorRectangle { min, max } = rectangle;
     let middle = [0, 1].map(|axis| (min[axis] + max[axis]) / 2.0);
     let mut met = Vec::new();
     for x in [min[0], middle[0], max[0]] {
         for y in [min[1], middle[1], max[1]] {
-            let along = index.all_along(&rays.through(x, y), f64::INFINITY);
-            met.extend(along.into_iter().map(|(item, _)| item));
+            met.extend(exactly.met(&rays.through(x, y)));
         }
     }
     met.sort_unstable();

@@ -63,8 +63,7 @@ pub struct FunnelReport {
     pub mirror: Option<MirrorRow>,
     /// What is left, drawn in every order; empty unless items are solid boxes.
     pub orders: Vec<OrderRow>,
-    /// What is under a cursor, by every back end of picking and every structure; empty as
-    /// above.
+    /// What is under a cursor, by every back end of picking and every structure.
     pub picks: Vec<PickRow>,
     /// The least that some of the back ends can take.
     pub bounds: Vec<BoundRow>,

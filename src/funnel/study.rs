@@ -27,7 +27,6 @@ use super::truth::Truth;
 use super::walks::Walks;
 use super::world::{FunnelInput, World};
 use crate::measure::{Ask, OverProcesses, ProcessTimes, TimedTask, Verdict};
-use crate::visibility::truth::RayIndex;
 use crate::visibility::{Level, Solids};
 
 /// Everything judged, and nothing timed.
@@ -104,7 +103,7 @@ pub fn prepare(
     let Some(tested) = fragments::tested(&world, &pass, last, &truth, stop) else {
         return Ok(None);
     };
-    let (mut drawn, mut picked, mut mirror) = (Vec::new(), Vec::new(), None);
+    let (mut drawn, mut mirror) = (Vec::new(), None);
     if let Some(boxes) = &left.boxes {
         if let Some(item) = input.mirror {
             let Some(row) = mirrored(item, &world, boxes.solids, &pass, last, stop) else {
@@ -116,8 +115,8 @@ pub fn prepare(
             return Ok(None);
         };
         drawn = rows;
-        picked = boxes.picks.judged(&RayIndex::build(boxes.solids));
     }
+    let picked = left.picks.judged();
     // The tests of the fragment stage are not timed.
     let tasks = rows.iter().map(|(_, _, _, task, _)| *task);
     let tasks: Vec<Option<usize>> = tasks.chain(tested.iter().map(|_| None)).collect();
@@ -257,6 +256,7 @@ fn sides_behind(
 /// What the chosen chain leaves of every view, ready for the stages behind it.
 struct Left<'w> {
     faces: Faces,
+    picks: Picks<'w>,
     /// None for a scene whose items are no solid boxes.
     boxes: Option<LeftBoxes<'w>>,
 }
@@ -265,7 +265,6 @@ struct Left<'w> {
 struct LeftBoxes<'w> {
     solids: &'w Solids,
     orders: Orders,
-    picks: Picks<'w>,
 }
 
 impl<'w> Left<'w> {
@@ -273,10 +272,10 @@ impl<'w> Left<'w> {
         let set = chosen.left();
         Left {
             faces: Faces::of(world, pass, set),
+            picks: Picks::of(world),
             boxes: world.solids.as_ref().map(|solids| LeftBoxes {
                 solids,
                 orders: Orders::of(world, solids, pass, set),
-                picks: Picks::of(world, solids),
             }),
         }
     }
@@ -310,25 +309,21 @@ fn timed_tasks<'p>(
         let ask: Ask = Box::new(move |view, out| left.faces.cull(place, view, out));
         ask
     });
-    let behind = left
-        .boxes
-        .iter()
-        .flat_map(|LeftBoxes { orders, picks, .. }| {
-            let sorts = (0..orders::COUNT).map(move |order| {
-                let pieces = RefCell::new(Vec::new());
-                let ask: Ask = Box::new(move |view, out| {
-                    let pieces = &mut *pieces.borrow_mut();
-                    orders.sort(order, view, pieces);
-                    out.extend(pieces.iter().map(|piece| piece.item));
-                });
-                ask
+    let sorts = left.boxes.iter().flat_map(|LeftBoxes { orders, .. }| {
+        (0..orders::COUNT).map(move |order| {
+            let pieces = RefCell::new(Vec::new());
+            let ask: Ask = Box::new(move |view, out| {
+                let pieces = &mut *pieces.borrow_mut();
+                orders.sort(order, view, pieces);
+                out.extend(pieces.iter().map(|piece| piece.item));
             });
-            let picks = (0..picks.count()).map(move |back_end| {
-                let ask: Ask = Box::new(move |view, out| picks.ask(back_end, view, out));
-                ask
-            });
-            sorts.chain(picks)
-        });
+            ask
+        })
+    });
+    let picks = (0..left.picks.count()).map(|back_end| {
+        let ask: Ask = Box::new(move |view, out| left.picks.ask(back_end, view, out));
+        ask
+    });
     let task = |(place, ask): (usize, Ask<'p>)| {
         let expected = match expected {
             Some(expected) => expected[place].clone(),
@@ -339,7 +334,8 @@ fn timed_tasks<'p>(
     let bounds = bounds.into_iter().map(|bound| bound.ask);
     steps
         .chain(culls)
-        .chain(behind)
+        .chain(sorts)
+        .chain(picks)
         .chain(bounds)
         .enumerate()
         .map(task)

@@ -1,6 +1,7 @@
 //! Picking, the selection under the cursor: the first item that a ray meets, the
 //! nearest few, and everything through a cursor's frustum. One file a back end;
-//! what a ray meets is said where [`Solids`](super::Solids) are.
+//! what a ray meets is said where [`Solids`](super::Solids) are. Triangles have back ends of
+//! their own ([`SURFACE_BACK_ENDS`]).
 
 mod contract;
 mod cursor;
@@ -8,6 +9,7 @@ mod exactly;
 mod linear;
 mod obvhs;
 mod rounded;
+mod surfaces;
 mod wide_ray;
 
 #[cfg(feature = "peers")]
@@ -25,6 +27,7 @@ mod tests;
 pub use contract::{BackEnd, Hit, NotBuilt, Pick};
 pub use cursor::CursorRectangle;
 pub use linear::Linear;
+pub use surfaces::{SURFACE_BACK_ENDS, SolidSurfaces, SurfaceBackEnd};
 pub use wide_ray::WideRay;
 
 /// All back ends, the reference first.

@@ -45,15 +45,20 @@ trait Cast: Sized + Send + Sync + 'static {
     fn all(&self, ray: TheirRay, visit: impl FnMut(&TheirRay, usize));
 }
 
+/// The binary tree, ready for its walks.
+pub(super) fn binary_tree(boxes: &[Aabb]) -> Bvh2 {
+    let mut tree = ploc::build(boxes, ploc::ONE_A_LEAF);
+    tree.reorder_in_stack_traversal_order();
+    // A walk keeps one entry a level; the crate's default is 96.
+    if !tree.nodes.is_empty() {
+        tree.max_depth = tree.max_depth.max(tree.depth(0) + 2);
+    }
+    tree
+}
+
 impl Cast for Bvh2 {
     fn of(boxes: &[Aabb]) -> Bvh2 {
-        let mut tree = ploc::build(boxes, ploc::ONE_A_LEAF);
-        tree.reorder_in_stack_traversal_order();
-        // A walk keeps one entry a level; the crate's default is 96.
-        if !tree.nodes.is_empty() {
-            tree.max_depth = tree.max_depth.max(tree.depth(0) + 2);
-        }
-        tree
+        binary_tree(boxes)
     }
 
     fn order(&self) -> &[u32] {
@@ -117,8 +122,9 @@ impl<T: Cast> Obvhs<T> {
     }
 }
 
+/// A ray as the crate takes it.
 #[inline(always)]
-fn their_ray(ray: &RoundedRay) -> TheirRay {
+pub(super) fn their_ray(ray: &RoundedRay) -> TheirRay {
     TheirRay::new(
         ray.origin.into(),
         ray.direction.into(),

@@ -91,6 +91,24 @@ impl SurfaceIndex {
     }
 }
 
+impl SurfaceIndex {
+    /// Every meeting of the ray with a triangle from near to far, each with its item, in no
+    /// order.
+    pub fn all_along(&self, ray: &Ray) -> Vec<(ItemId, Meeting)> {
+        let probe = TriangleProbe::new(*ray, self.origin);
+        let mut met = Vec::new();
+        self.tree.walk(ray, &mut Vec::new(), |places| {
+            let facets = self.facets[places].iter();
+            met.extend(facets.filter_map(|facet| {
+                let at = probe.meet(facet.corners, facet.two_sided, ray.far)?;
+                Some((facet.item, at))
+            }));
+            ray.far
+        });
+        met
+    }
+}
+
 /// The memory of a search, kept from ray to ray.
 #[derive(Default)]
 pub(super) struct Search {

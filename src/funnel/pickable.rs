@@ -1,0 +1,133 @@
+//! What is picked from: the items as solid boxes, or as triangles; who answers, and what
+//! is true.
+
+use std::rc::Rc;
+
+use super::picks::NEAREST;
+use super::world::World;
+use crate::query::ItemId;
+use crate::scene::Surfaces;
+use crate::visibility::pick::{BACK_ENDS, Pick, SURFACE_BACK_ENDS, SolidSurfaces};
+use crate::visibility::truth::{Probe, RayIndex};
+use crate::visibility::{Guarantee, Ray, Solids};
+
+/// The items as a ray meets them.
+#[derive(Clone, Copy)]
+pub enum Pickable<'w> {
+    /// Solid boxes.
+    Boxes(&'w Solids),
+    /// Triangles, of which the first so many items count.
+    Triangles(&'w Surfaces, usize),
+}
+
+/// A back end that was built.
+pub struct Built {
+    /// As in its table.
+    pub name: &'static str,
+    /// One line about it.
+    pub summary: &'static str,
+    /// What it promises.
+    pub guarantee: Guarantee,
+    /// Itself.
+    pub pick: Rc<dyn Pick>,
+}
+
+impl<'w> Pickable<'w> {
+    /// Of a world, whose items are one or the other.
+    pub fn of(world: &'w World) -> Pickable<'w> {
+        match (&world.solids, &world.surfaces) {
+            (Some(solids), _) => Pickable::Boxes(solids),
+            (None, Some(surfaces)) => Pickable::Triangles(surfaces, world.items()),
+            (None, None) => unreachable!("items are boxes or triangles"),
+        }
+    }
+
+    /// Every back end that can hold the items; the one that looks at each box or triangle
+    /// only up to so many.
+    pub fn back_ends(self, most_for_loop: usize) -> Vec<Built> {
+        let count = match self {
+            Pickable::Boxes(solids) => solids.boxes.len(),
+            Pickable::Triangles(surfaces, _) => surfaces.triangles.len(),
+        };
+        let suits = |name: &str| count <= most_for_loop || name != "linear";
+        let built = |name, summary, guarantee, pick: Box<dyn Pick>| Built {
+            name,
+            summary,
+            guarantee,
+            pick: pick.into(),
+        };
+        match self {
+            Pickable::Boxes(solids) => BACK_ENDS
+                .iter()
+                .filter(|row| suits(row.name))
+                .filter_map(|row| Some((row, (row.build)(solids).ok()?)))
+                .map(|(row, pick)| built(row.name, row.summary, row.guarantee, pick))
+                .collect(),
+            Pickable::Triangles(surfaces, items) => SURFACE_BACK_ENDS
+                .iter()
+                .filter(|row| suits(row.name))
+                .filter_map(|row| Some((row, (row.build)(surfaces, items).ok()?)))
+                .map(|(row, pick)| built(row.name, row.summary, row.guarantee, pick))
+                .collect(),
+        }
+    }
+
+    /// What is true of it.
+    pub fn exactly(self) -> Exactly {
+        match self {
+            Pickable::Boxes(solids) => Exactly::Boxes(RayIndex::build(solids)),
+            Pickable::Triangles(surfaces, items) => {
+                Exactly::Triangles(SolidSurfaces::of(surfaces, items))
+            }
+        }
+    }
+}
+
+/// The exact answers.
+pub enum Exactly {
+    /// Of solid boxes.
+    Boxes(RayIndex),
+    /// Of triangles.
+    Triangles(SolidSurfaces),
+}
+
+impl Exactly {
+    /// The first item along a ray.
+    pub fn first(&self, ray: &Ray) -> Option<ItemId> {
+        match self {
+            Exactly::Boxes(index) => index.front_of(ray).map(|front| front.item()),
+            Exactly::Triangles(all) => all.first(ray).map(|hit| hit.item),
+        }
+    }
+
+    /// The nearest items along a ray, and all that are as near as the last of them.
+    pub fn nearest(&self, ray: &Ray) -> Vec<ItemId> {
+        let index = match self {
+            Exactly::Boxes(index) => index,
+            Exactly::Triangles(all) => {
+                let mut hits = Vec::new();
+                all.nearest(ray, NEAREST, &mut hits);
+                return hits.into_iter().map(|hit| hit.item).collect();
+            }
+        };
+        let probe = Probe::new(*ray);
+        let mut met = index.all_along(ray, f64::INFINITY);
+        met.sort_unstable_by(|(a, at_a), (b, at_b)| probe.compare(at_a, at_b).then(a.cmp(b)));
+        if let Some((_, last)) = met.get(NEAREST - 1).copied() {
+            let kept = met.partition_point(|(_, at)| probe.compare(at, &last).is_le());
+            met.truncate(kept);
+        }
+        met.into_iter().map(|(item, _)| item).collect()
+    }
+
+    /// Every item that a ray meets.
+    pub fn met(&self, ray: &Ray) -> Vec<ItemId> {
+        match self {
+            Exactly::Boxes(index) => {
+                let along = index.all_along(ray, f64::INFINITY);
+                along.into_iter().map(|(item, _)| item).collect()
+            }
+            Exactly::Triangles(all) => all.met(ray),
+        }
+    }
+}
