@@ -286,7 +286,7 @@ impl Draft {
 
     /// What it takes in.
     pub fn lens(&self) -> Result<Lens, CameraError> {
-        let other = self.other_lens.clone();
+        let other = self.other_lens;
         other.unwrap_or_else(|| Lens::perspective(self.fovy_deg, self.aspect, self.near, self.far))
     }
 }
