@@ -5,6 +5,7 @@
 use std::io::{self, Write};
 
 use super::args::AdviseArgs;
+use super::interrupt::Interrupted;
 use super::processes::{Said, Workers};
 use super::protocol::{Job, Timing};
 use super::study::Study;
@@ -58,9 +59,7 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> 
             share,
             samples: false,
         };
-        let Some(found) = workers.found(process, scene, &begin)? else {
-            return Ok(Ending::Interrupted);
-        };
+        let found = workers.found(process, scene, &begin)?;
         parts.extend(found.into_iter().filter_map(|said| match said {
             Said::Part(part, _) => Some(*part),
             _ => None,
@@ -68,14 +67,11 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> 
         study.advance();
     }
     let choice = StructureChoice::of(&Group::of(&parts));
-    let Some(prepared) = advise::prepare(&input, choice, &interrupt::asked, &begin)? else {
-        return Ok(Ending::Interrupted);
-    };
+    let prepared = advise::prepare(&input, choice, &interrupt::asked, &begin)?;
+    let prepared = prepared.ok_or(Interrupted)?;
     let trials = |timing| Job::Trials(prepared.plan.clone(), timing);
     let step = "with and without every rule";
-    let Some(times) = study.times(&workers, step, path.lens_scale, trials)? else {
-        return Ok(Ending::Interrupted);
-    };
+    let times = study.times(&workers, step, path.lens_scale, trials)?;
     let advice = prepared.conclude(&times);
     print(args.format, &advice, || show(&advice))?;
     Ok(Ending::of(!advice.found_wrong_answers()))

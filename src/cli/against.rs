@@ -12,7 +12,7 @@ use anyhow::{Context, bail};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-use super::interrupt;
+use super::interrupt::{self, Interrupted};
 use super::processes::{Ended, Said, Worker, processors, see_through};
 use super::protocol::{Job, PROTOCOL, Request};
 use super::run_plan::RunPlan;
@@ -90,25 +90,24 @@ pub struct Duel<'a> {
 }
 
 impl Duel<'_> {
-    /// Runs it; `None` if the user wants to stop.
+    /// Runs it.
     ///
     /// # Errors
     /// A program that cannot be started or is of another version, a scene that
     /// it cannot read.
-    pub fn run(&self) -> anyhow::Result<Option<Against>> {
+    pub fn run(&self) -> anyhow::Result<Against> {
         let started = Instant::now();
         let new = std::env::current_exe().context("this program cannot be found again")?;
         let cpu = processors().last().copied();
         let scenes = self.plan.plan.scenes.len();
-        let mut seen = [Seen::default(), Seen::default()];
+        let mut seen = [Vec::new(), Vec::new()];
         for scene in 0..scenes {
             // The plan is the new side's; the old one keeps to it.
             for (side, program) in [(Side::New, new.as_path()), (Side::Old, &self.old)] {
                 (self.progress)(0, self.pairs.most, "counting and checking answers");
-                let schedules = seen[Side::New as usize].clone();
                 let known = match side {
                     Side::New => self.nothing(scene),
-                    Side::Old => self.known(scene, &schedules, None),
+                    Side::Old => self.known(scene, &seen[1], None),
                 };
                 let request = self.request(scene, 0, known, true, cpu, 0);
                 let own = &mut seen[side as usize];
@@ -118,7 +117,7 @@ impl Duel<'_> {
                     self.patience,
                     &mut |said| {
                         if let Said::Part(part, _) = said {
-                            own.parts.push(*part);
+                            own.push(*part);
                         }
                         Ok(())
                     },
@@ -126,7 +125,6 @@ impl Duel<'_> {
                 )?;
                 match ended {
                     Ended::Done => {}
-                    Ended::Stopped => return Ok(None),
                     Ended::Failed(reason) => bail!("{}: {reason}", program.display()),
                     Ended::Died(structure, verdict) => bail!(
                         "{}: {}: {}; expected a program that answers",
@@ -150,9 +148,6 @@ impl Duel<'_> {
                 for scene in 0..scenes {
                     let both =
                         self.pair(scene, pairs as u32, &seen, [&self.old, &new], cpu, &mut rng)?;
-                    let Some(both) = both else {
-                        return Ok(None);
-                    };
                     for (side, parts) in both.iter().enumerate() {
                         note(&mut cells, side, parts);
                     }
@@ -171,17 +166,14 @@ impl Duel<'_> {
             }
             if enough || pairs >= self.pairs.most {
                 let [_, new] = seen;
-                let query = new
-                    .parts
-                    .iter()
-                    .find_map(|p| p.known.as_ref()?.query.as_ref());
-                return Ok(Some(Against {
+                let query = new.iter().find_map(|p| p.known.as_ref()?.query.as_ref());
+                return Ok(Against {
                     cells,
                     pairs,
                     rounds: query.map_or(0, |named| named.schedule.rounds as usize),
                     cameras: query.map_or(0, |named| named.schedule.cameras.len()),
                     seconds: started.elapsed().as_secs_f64(),
-                }));
+                });
             }
         }
     }
@@ -200,11 +192,11 @@ impl Duel<'_> {
     }
 
     /// The plan of the new side; the answers of `own`, or none, to be counted.
-    fn known(&self, scene: usize, new: &Seen, own: Option<&Seen>) -> Vec<Option<Known>> {
+    fn known(&self, scene: usize, new: &[Part], own: Option<&[Part]>) -> Vec<Option<Known>> {
         let keys = self.keys(scene).into_iter();
         keys.map(|key| {
-            let plan = new.known(&key)?;
-            let answers = own.and_then(|own| own.known(&key));
+            let plan = counted(new, &key)?;
+            let answers = own.and_then(|own| counted(own, &key));
             Some(Known {
                 visible: answers
                     .map(|known| known.visible.clone())
@@ -252,11 +244,11 @@ impl Duel<'_> {
         &self,
         scene: usize,
         pair: u32,
-        seen: &[Seen; 2],
+        seen: &[Vec<Part>; 2],
         programs: [&Path; 2],
         cpu: Option<usize>,
         rng: &mut Pcg64,
-    ) -> anyhow::Result<Option<[Vec<Part>; 2]>> {
+    ) -> anyhow::Result<[Vec<Part>; 2]> {
         let mut parts = [Vec::new(), Vec::new()];
         // Which of the two is started first, and gets the first memory, is drawn
         // anew for every pair, and apart from it whose turn is first: old, new,
@@ -270,10 +262,10 @@ impl Duel<'_> {
             workers[side] = Some(Worker::start(programs[side], &request)?);
         }
         let mut turn = 0;
-        hold(&workers, 1 - begins);
+        workers[1 - begins].iter().for_each(Worker::hold);
         while workers.iter().any(Option::is_some) {
             if interrupt::asked() {
-                return Ok(None);
+                return Err(Interrupted.into());
             }
             let side = (begins + usize::div_ceil(turn, 2)) % 2;
             turn += 1;
@@ -283,19 +275,21 @@ impl Duel<'_> {
                 1 - side
             };
             let alone = workers[1 - side].is_none();
-            go(&workers, side);
+            workers[side].iter().for_each(Worker::go);
             thread::sleep(TURN);
             if !alone {
-                hold(&workers, side);
+                workers[side].iter().for_each(Worker::hold);
             }
             while let Some(worker) = &mut workers[side] {
                 match worker.listen(Duration::ZERO)? {
                     Said::Part(part, _) => parts[side].push(*part),
                     Said::Step(_) | Said::Times(_) => {}
                     Said::Nothing => break,
-                    Said::Done => workers[side] = None,
-                    Said::Failed(reason) => bail!("{}: {reason}", programs[side].display()),
-                    Said::Died(structure, verdict) => bail!(
+                    Said::Ended(Ended::Done) => workers[side] = None,
+                    Said::Ended(Ended::Failed(reason)) => {
+                        bail!("{}: {reason}", programs[side].display())
+                    }
+                    Said::Ended(Ended::Died(structure, verdict)) => bail!(
                         "{}: {} {}: {}; expected a program that answers",
                         programs[side].display(),
                         structure.unwrap_or_else(|| "the program".to_owned()),
@@ -305,14 +299,14 @@ impl Duel<'_> {
                 }
             }
         }
-        Ok(Some(parts))
+        Ok(parts)
     }
 
-    fn cells(&self, seen: &[Seen; 2]) -> Vec<AgainstCell> {
+    fn cells(&self, seen: &[Vec<Part>; 2]) -> Vec<AgainstCell> {
         let mut cells = Vec::new();
         for cell in self.plan.plan.cells() {
             let of = |side: usize| {
-                let part = seen[side].parts.iter().find(|part| part.key == cell.group);
+                let part = seen[side].iter().find(|part| part.key == cell.group);
                 part.and_then(|p| p.subjects.iter().find(|s| s.label == cell.structure))
             };
             let verdict = |side: usize| {
@@ -355,16 +349,9 @@ impl AgainstCell {
 }
 
 /// What a side has answered and counted.
-#[derive(Clone, Default)]
-struct Seen {
-    parts: Vec<Part>,
-}
-
-impl Seen {
-    fn known(&self, key: &GroupKey) -> Option<&Known> {
-        let part = self.parts.iter().find(|part| part.key == *key)?;
-        part.known.as_ref()
-    }
+fn counted<'p>(parts: &'p [Part], key: &GroupKey) -> Option<&'p Known> {
+    let part = parts.iter().find(|part| part.key == *key)?;
+    part.known.as_ref()
 }
 
 /// Takes over the times, and what has failed since, of one process.
@@ -388,24 +375,3 @@ fn note(cells: &mut [AgainstCell], side: usize, parts: &[Part]) {
         cell.ln_ns[side].push(interquartile_mean(&rounds).unwrap_or(f64::NAN));
     }
 }
-
-#[cfg(unix)]
-fn hold(workers: &[Option<Worker>; 2], side: usize) {
-    if let Some(worker) = &workers[side] {
-        worker.signal(rustix::process::Signal::STOP);
-    }
-}
-
-#[cfg(unix)]
-fn go(workers: &[Option<Worker>; 2], side: usize) {
-    if let Some(worker) = &workers[side] {
-        worker.signal(rustix::process::Signal::CONT);
-    }
-}
-
-/// Elsewhere both run at once, and it takes more pairs.
-#[cfg(not(unix))]
-fn hold(_: &[Option<Worker>; 2], _: usize) {}
-
-#[cfg(not(unix))]
-fn go(_: &[Option<Worker>; 2], _: usize) {}

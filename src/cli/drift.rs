@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use std::io::{self, Write};
 
 use super::args::DriftArgs;
+use super::interrupt::Interrupted;
 use super::processes::Workers;
 use super::protocol::{Job, Timing};
 use super::study::Study;
@@ -35,13 +36,9 @@ pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
         study.advance();
         interrupt::asked()
     });
-    let Some(prepared) = prepared else {
-        return Ok(Ending::Interrupted);
-    };
+    let prepared = prepared.ok_or(Interrupted)?;
     let job = |timing| Job::Drift(prepared.plan.clone(), timing);
-    let Some(times) = study.times(&workers, "everything, timed", None, job)? else {
-        return Ok(Ending::Interrupted);
-    };
+    let times = study.times(&workers, "everything, timed", None, job)?;
     let report = prepared.conclude(&times);
     if let Some(file) = &args.svg {
         write_text(file, &drift_diagram::draw(&report.arm)?)?;

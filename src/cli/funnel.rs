@@ -9,6 +9,7 @@ use anyhow::{Context, bail};
 
 use super::document::{Block, to_html};
 use super::funnel_args::{FunnelArgs, FunnelFormat};
+use super::interrupt::Interrupted;
 use super::processes::Workers;
 use super::protocol::{Job, Timing};
 use super::study::Study;
@@ -81,17 +82,13 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
         Some(_) => Some(&mut each),
         None => None,
     };
-    let Some(prepared) = funnel::prepare(&input, proofs, &interrupt::asked)? else {
-        return Ok(Ending::Interrupted);
-    };
+    let prepared = funnel::prepare(&input, proofs, &interrupt::asked)?.ok_or(Interrupted)?;
     if let Some(file) = &args.certificates {
         write_text(file, &lines)?;
     }
     let job = |timing| Job::Funnel(prepared.plan.clone(), timing);
     let lens_scale = setting.path.lens_scale;
-    let Some(times) = study.times(&workers, "every stage, timed", lens_scale, job)? else {
-        return Ok(Ending::Interrupted);
-    };
+    let times = study.times(&workers, "every stage, timed", lens_scale, job)?;
     if let Some(verdict) = funnel::failure(&times) {
         bail!(
             "a stage failed when it was timed: {}",

@@ -12,6 +12,11 @@ pub fn from_now_on_finish() {
     TO_FINISH.store(true, Ordering::Relaxed);
 }
 
+/// Ends a command that has nothing to keep, with an exit code and no message.
+#[derive(Debug, thiserror::Error)]
+#[error("interrupted")]
+pub struct Interrupted;
+
 /// Whether somebody has asked to stop.
 pub fn asked() -> bool {
     ASKED.load(Ordering::Relaxed)

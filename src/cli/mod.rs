@@ -68,11 +68,15 @@ use crate::index::Registry;
 use crate::report::{FolderError, write_atomically};
 use crate::scene::{LoadOptions, NOTICE, Scene};
 use clap::{CommandFactory, Parser};
+use interrupt::Interrupted;
 use serde::Serialize;
 
 use args::{Cli, Command};
 use scene_args::SceneCommand;
 use shared_args::{SceneArgs, TableFormat};
+
+/// Exit code after Ctrl-C.
+const INTERRUPTED: u8 = 130;
 
 /// How a command ended that did not fail.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -128,7 +132,8 @@ pub fn main_with(registry: Registry) -> ExitCode {
         Ok(Ending::Ok) => ExitCode::SUCCESS,
         Ok(Ending::WrongAnswer) => ExitCode::from(1),
         Ok(Ending::Regression) => ExitCode::from(3),
-        Ok(Ending::Interrupted) => ExitCode::from(130),
+        Ok(Ending::Interrupted) => ExitCode::from(INTERRUPTED),
+        Err(error) if error.is::<Interrupted>() => ExitCode::from(INTERRUPTED),
         // Nobody reads on: not our failure.
         Err(error) if error.chain().any(is_broken_pipe) => ExitCode::SUCCESS,
         Err(error) => {

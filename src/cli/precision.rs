@@ -5,6 +5,7 @@
 use anyhow::bail;
 
 use super::args::PrecisionArgs;
+use super::interrupt::Interrupted;
 use super::processes::Workers;
 use super::protocol::{Job, Timing};
 use super::study::Study;
@@ -50,9 +51,7 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
     };
     // There are no files yet: Ctrl-C ends the program.
     let going_on = &|| false;
-    let Some(prepared) = precision::prepare(&input, going_on)? else {
-        return Ok(Ending::Interrupted);
-    };
+    let prepared = precision::prepare(&input, going_on)?.ok_or(Interrupted)?;
     let (mut sizes, mut sweeps) = (Vec::new(), Vec::new());
     if args.cubes > 0 {
         study.begin("the sweep over sizes");
@@ -71,9 +70,7 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
     interrupt::from_now_on_finish();
     let workers = Workers::of_study()?;
     let points = |timing| Job::Points(prepared.plan.clone(), timing);
-    let Some(times) = study.times(&workers, "every point, timed", path.lens_scale, points)? else {
-        return Ok(Ending::Interrupted);
-    };
+    let times = study.times(&workers, "every point, timed", path.lens_scale, points)?;
     let precision = prepared.conclude(&times);
     if let Some(file) = &args.svg {
         write_text(file, &precision_diagram::draw(&precision)?)?;

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, bail};
 use tempfile::NamedTempFile;
 
-use super::interrupt;
+use super::interrupt::{self, Interrupted};
 use super::protocol::{Job, Message, PROTOCOL, Request};
 use super::run_resume::typed_args;
 use crate::input;
@@ -23,6 +23,15 @@ use crate::report::bare;
 const GLANCE: Duration = Duration::from_millis(20);
 /// Bytes of a worker's last words that are kept.
 const LAST_WORDS: usize = 4096;
+
+/// How a share of the work ended.
+pub enum Ended {
+    Done,
+    /// It could not do what it was asked to.
+    Failed(String),
+    /// It is gone; the structure it was at, and what became of it.
+    Died(Option<String>, Verdict),
+}
 
 /// A worker at work.
 pub struct Worker {
@@ -41,11 +50,8 @@ pub enum Said {
     Times(ProcessTimes),
     /// It does something else now.
     Step(String),
-    Done,
-    /// It could not do what it was asked to.
-    Failed(String),
-    /// It is gone; the structure it was at, and what became of it.
-    Died(Option<String>, Verdict),
+    /// Its last word, or what is known of its end without one.
+    Ended(Ended),
     /// Nothing within the time it was given.
     Nothing,
 }
@@ -107,7 +113,7 @@ impl Worker {
         let line = match self.lines.recv_timeout(wait) {
             Ok(line) => line?,
             Err(RecvTimeoutError::Timeout) => return Ok(Said::Nothing),
-            Err(RecvTimeoutError::Disconnected) => return Ok(self.obituary()?),
+            Err(RecvTimeoutError::Disconnected) => return Ok(Said::Ended(self.obituary()?)),
         };
         self.since = Instant::now();
         let message = serde_json::from_slice(&line).map_err(|_| {
@@ -133,8 +139,8 @@ impl Worker {
             }
             Message::Part(part, samples) => Said::Part(part, samples),
             Message::Times(times) => Said::Times(times),
-            Message::Failed(reason) => Said::Failed(reason),
-            Message::Done => Said::Done,
+            Message::Failed(reason) => Said::Ended(Ended::Failed(reason)),
+            Message::Done => Said::Ended(Ended::Done),
         })
     }
 
@@ -144,11 +150,11 @@ impl Worker {
     }
 
     /// Ends it; what it was at is what took too long.
-    pub fn give_up(mut self, patience: Duration) -> Said {
+    fn give_up(mut self, patience: Duration) -> Ended {
         let (structure, step) = self.doing.clone();
         self.kill();
         let reason = format!("{step} took longer than {} s", patience.as_secs());
-        Said::Died(structure, Verdict::new(Status::TimedOut, reason))
+        Ended::Died(structure, Verdict::new(Status::TimedOut, reason))
     }
 
     /// Ends it at once.
@@ -157,19 +163,30 @@ impl Worker {
         let _ = self.child.wait();
     }
 
+    /// It stands still until [`Worker::go`]; where no signal does that, it runs on.
+    pub fn hold(&self) {
+        #[cfg(unix)]
+        self.signal(rustix::process::Signal::STOP);
+    }
+
+    pub fn go(&self) {
+        #[cfg(unix)]
+        self.signal(rustix::process::Signal::CONT);
+    }
+
     #[cfg(unix)]
-    pub fn signal(&self, signal: rustix::process::Signal) {
+    fn signal(&self, signal: rustix::process::Signal) {
         if let Some(pid) = rustix::process::Pid::from_raw(self.child.id().cast_signed()) {
             let _ = rustix::process::kill_process(pid, signal);
         }
     }
 
-    fn obituary(&mut self) -> std::io::Result<Said> {
+    fn obituary(&mut self) -> std::io::Result<Ended> {
         let status = self.child.wait()?;
         let words = self.last_words.take().and_then(|words| words.join().ok());
         let words = String::from_utf8_lossy(&words.unwrap_or_default()).into_owned();
         let (structure, step) = self.doing.clone();
-        Ok(Said::Died(structure, cause(status, &step, &words)))
+        Ok(Ended::Died(structure, cause(status, &step, &words)))
     }
 }
 
@@ -211,19 +228,11 @@ fn cause(status: ExitStatus, step: &str, words: &str) -> Verdict {
     Verdict::new(Status::Panicked, reason)
 }
 
-/// How a share of the work ended.
-pub enum Ended {
-    Done,
-    /// The user wants to stop.
-    Stopped,
-    Failed(String),
-    Died(Option<String>, Verdict),
-}
-
 /// Starts a worker and sees it through.
 ///
 /// # Errors
-/// The program cannot be started or is of another version; what `keep` says.
+/// The program cannot be started or is of another version; what `keep` says;
+/// [`Interrupted`].
 pub fn see_through(
     program: &Path,
     request: &Request,
@@ -234,19 +243,14 @@ pub fn see_through(
     let mut worker = Worker::start(program, request)?;
     loop {
         if interrupt::asked() {
-            return Ok(Ended::Stopped);
+            return Err(Interrupted.into());
         }
         match worker.listen(GLANCE)? {
             found @ (Said::Part(..) | Said::Times(_)) => keep(found)?,
             Said::Step(text) => step(&text),
-            Said::Done => return Ok(Ended::Done),
-            Said::Failed(reason) => return Ok(Ended::Failed(reason)),
-            Said::Died(structure, verdict) => return Ok(Ended::Died(structure, verdict)),
+            Said::Ended(ended) => return Ok(ended),
             Said::Nothing if worker.silent_for() > patience => {
-                return Ok(match worker.give_up(patience) {
-                    Said::Died(structure, verdict) => Ended::Died(structure, verdict),
-                    _ => Ended::Stopped,
-                });
+                return Ok(worker.give_up(patience));
             }
             Said::Nothing => {}
         }
@@ -328,25 +332,18 @@ impl Workers {
         see_through(&self.program, &request, self.patience, keep, step)
     }
 
-    /// What a job finds that cannot do without any process; `None` if the user
-    /// wants to stop.
+    /// What a job finds that cannot do without any process.
     ///
     /// # Errors
     /// As [`see_through`]; a process that does not finish.
-    pub fn found(
-        &self,
-        process: u32,
-        job: Job,
-        step: &dyn Fn(&str),
-    ) -> anyhow::Result<Option<Vec<Said>>> {
+    pub fn found(&self, process: u32, job: Job, step: &dyn Fn(&str)) -> anyhow::Result<Vec<Said>> {
         let mut found = Vec::new();
         let mut keep = |said| {
             found.push(said);
             Ok(())
         };
         match self.see_through(process, job, &mut keep, step)? {
-            Ended::Done => Ok(Some(found)),
-            Ended::Stopped => Ok(None),
+            Ended::Done => Ok(found),
             Ended::Failed(reason) => bail!("{reason}"),
             Ended::Died(structure, verdict) => bail!(
                 "process {}: {}{}; expected one that finishes",

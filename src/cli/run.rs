@@ -9,6 +9,7 @@ use anyhow::{Context, bail};
 use indicatif::ProgressBar;
 
 use super::args::RunArgs;
+use super::interrupt::Interrupted;
 use super::processes::{Ended, Said, Workers};
 use super::protocol::Job;
 use super::run_plan::{RunPlan, plan};
@@ -68,12 +69,6 @@ struct Run {
     started: Instant,
 }
 
-/// How a scene ended.
-enum SceneEnd {
-    Done,
-    Stopped,
-}
-
 impl Run {
     fn new(
         args: &RunArgs,
@@ -101,8 +96,9 @@ impl Run {
     fn all(mut self) -> anyhow::Result<Ending> {
         let (mut stopped, mut unshown) = (false, None);
         for scene in 0..self.plan.plan.scenes.len() {
-            let end = match self.scene(scene) {
-                Ok(end) => end,
+            stopped = match self.scene(scene) {
+                Ok(()) => false,
+                Err(error) if error.is::<Interrupted>() => true,
                 Err(error) => {
                     self.bar.finish_and_clear();
                     self.close_early();
@@ -116,8 +112,7 @@ impl Run {
                 .bar
                 .suspend(|| unread_is_fine(show_scene(&report, source)));
             unshown = unshown.or(shown.err());
-            if matches!(end, SceneEnd::Stopped) {
-                stopped = true;
+            if stopped {
                 break;
             }
         }
@@ -162,7 +157,7 @@ impl Run {
     }
 
     /// All processes of a scene.
-    fn scene(&mut self, scene: usize) -> anyhow::Result<SceneEnd> {
+    fn scene(&mut self, scene: usize) -> anyhow::Result<()> {
         let planned = self.plan.plan.scenes[scene].clone();
         let questions = self.plan.plan.questions(&planned);
         let keys: Vec<GroupKey> = questions
@@ -173,7 +168,7 @@ impl Run {
         for process in 0..self.plan.plan.effort.processes {
             loop {
                 if interrupt::asked() {
-                    return Ok(SceneEnd::Stopped);
+                    return Err(Interrupted.into());
                 }
                 let share = self.share(&keys, process, &failed);
                 if !share.wanted.contains(&true) {
@@ -182,7 +177,6 @@ impl Run {
                 }
                 match self.worker(scene, share)? {
                     Ended::Done => break,
-                    Ended::Stopped => return Ok(SceneEnd::Stopped),
                     Ended::Failed(reason) => bail!("{reason}"),
                     Ended::Died(Some(structure), verdict) if !failed.contains_key(&structure) => {
                         failed.insert(structure, verdict);
@@ -195,7 +189,7 @@ impl Run {
                 }
             }
         }
-        Ok(SceneEnd::Done)
+        Ok(())
     }
 
     /// Structures that have ended a process on this scene, if the run was begun

@@ -5,6 +5,7 @@ use std::io::{self, Write};
 use anyhow::bail;
 
 use super::args::PrecisionArgs;
+use super::interrupt::Interrupted;
 use super::processes::Workers;
 use super::protocol::{Job, Timing};
 use super::study::Study;
@@ -117,16 +118,12 @@ pub fn sweep(
     let protocol = protocol(args, 0);
     let input = setting.input(args, &protocol)?;
     // There are no files yet: Ctrl-C ends the program.
-    let Some(prepared) = funnel::prepare_sweep(&input, stage, &|| false)? else {
-        return Ok(Ending::Interrupted);
-    };
+    let prepared = funnel::prepare_sweep(&input, stage, &|| false)?.ok_or(Interrupted)?;
     interrupt::from_now_on_finish();
     let workers = Workers::of_study()?;
     let job = |timing| Job::Sweep(prepared.plan.clone(), timing);
     let lens_scale = setting.path.lens_scale;
-    let Some(times) = study.times(&workers, "every point, timed", lens_scale, job)? else {
-        return Ok(Ending::Interrupted);
-    };
+    let times = study.times(&workers, "every point, timed", lens_scale, job)?;
     let sweep = prepared.conclude(&times);
     print(args.format, &sweep, || show(&sweep, &mut text::terminal()))?;
     let is_broken = |point: &SweepPoint| {

@@ -127,6 +127,12 @@ impl Aabb {
         self.max - self.min
     }
 
+    /// Half the surface.
+    pub fn half_area(&self) -> f32 {
+        let e = self.extent();
+        e.x * e.y + e.y * e.z + e.z * e.x
+    }
+
     /// Largest absolute coordinate on each axis: how far from the local
     /// origin anything in the box can be; zero for an empty box.
     pub fn reach(&self) -> Vec3 {

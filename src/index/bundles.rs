@@ -349,6 +349,5 @@ fn bounds_of(nodes: &[TreeNode], siblings: &[u32]) -> Aabb {
 
 /// Half the surface of what a lane bounds.
 fn area(nodes: &[TreeNode], siblings: &[u32]) -> f32 {
-    let e = bounds_of(nodes, siblings).extent();
-    e.x * e.y + e.y * e.z + e.z * e.x
+    bounds_of(nodes, siblings).half_area()
 }

@@ -11,7 +11,6 @@ use crate::index::Record;
 
 const BINS: usize = 16;
 
-/// An item while the tree is built.
 /// A part of the items and its bounds.
 #[derive(Clone)]
 pub struct Part {
@@ -30,11 +29,6 @@ impl Part {
     pub fn len(&self) -> usize {
         self.range.len()
     }
-}
-
-pub fn half_area(b: &Aabb) -> f32 {
-    let e = b.extent();
-    e.x * e.y + e.y * e.z + e.z * e.x
 }
 
 /// Orders a set so that its first part, whose length is returned, is one side of
@@ -66,7 +60,7 @@ pub fn halve(items: &mut [Record]) -> usize {
         for i in 0..BINS - 1 {
             below = (below.0.union(&bins[i].0), below.1 + bins[i].1);
             let cost =
-                half_area(&below.0) * below.1 as f32 + half_area(&above[i].0) * above[i].1 as f32;
+                below.0.half_area() * below.1 as f32 + above[i].0.half_area() * above[i].1 as f32;
             let parts = below.1 > 0 && above[i].1 > 0;
             if parts && cost.is_finite() && best.is_none_or(|best| cost < best.0) {
                 best = Some((cost, axis, i));

@@ -31,8 +31,7 @@ impl BoundingVolume for Volume {
 
     /// Half the surface.
     fn area(&self) -> f32 {
-        let e = self.0.extent();
-        e.x * e.y + e.y * e.z + e.z * e.x
+        self.0.half_area()
     }
 
     #[inline(always)]

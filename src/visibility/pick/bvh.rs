@@ -16,7 +16,7 @@ pub const ROW: BackEnd = BackEnd {
     name: "bvh",
     summary: "crate bvh, its traverse: all items on the ray, then the first",
     guarantee: Guarantee::Unproven,
-    build: build,
+    build,
 };
 
 /// The line from the origin to the far plane. The crate's own ray has a

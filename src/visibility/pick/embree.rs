@@ -23,7 +23,7 @@ pub const ROW: BackEnd = BackEnd {
     summary: "Embree 3 by crate embree-rs, boxes of quads, its rtcIntersect1",
     // Rays and quads are in f32, and rays may slip through between two quads.
     guarantee: Guarantee::Unproven,
-    build: build,
+    build,
 };
 
 /// Corners of a box in the order of its faces; a bit of a corner is an axis, set for

@@ -16,7 +16,7 @@ pub const ROW: BackEnd = BackEnd {
     name: "parry3d",
     summary: "crate parry3d, binned build, its cast_ray",
     guarantee: Guarantee::Unproven,
-    build: build,
+    build,
 };
 
 /// Its tree; leaves are item ids.

@@ -15,7 +15,7 @@ pub const ROW: BackEnd = BackEnd {
     name: "rstar",
     summary: "crate rstar, selection by a slab test, then the first",
     guarantee: Guarantee::Unproven,
-    build: build,
+    build,
 };
 
 struct Line(RoundedRay);

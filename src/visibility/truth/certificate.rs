@@ -5,7 +5,6 @@
 use serde::{Deserialize, Serialize};
 
 use crate::camera::Lens;
-use crate::json::{JsonError, from_json};
 use crate::query::ItemId;
 use crate::visibility::{Ray, Rays};
 
@@ -233,22 +232,6 @@ impl Certificates {
         let path = path.to_owned();
         self.camera = Some(CameraOf { path, index });
         self
-    }
-
-    /// As text; [`Certificates::from_json`] reads back the very same numbers.
-    ///
-    /// # Panics
-    /// Never: these types have no value that JSON cannot hold.
-    pub fn to_json(&self) -> String {
-        serde_json::to_string(self).expect("numbers, names and lists")
-    }
-
-    /// Reads what [`Certificates::to_json`] wrote.
-    ///
-    /// # Errors
-    /// Text that is something else.
-    pub fn from_json(text: impl AsRef<[u8]>) -> Result<Certificates, JsonError> {
-        from_json(text.as_ref())
     }
 }
 

@@ -6,7 +6,7 @@ use crate::geometry::Aabb;
 use crate::index::Record;
 use crate::kernel::{LANES, LaneMask};
 use crate::query::ItemId;
-use crate::visibility::sah::{Part, half_area, halve};
+use crate::visibility::sah::{Part, halve};
 
 /// Sixteen boxes: items in the first lanes, nodes in those behind. 448 bytes.
 #[derive(Clone, Copy, Debug)]
@@ -111,7 +111,7 @@ fn cut(items: &mut [Record], part: Part) -> Vec<Part> {
     while parts.len() < LANES {
         let wide = (0..parts.len()).filter(|&i| parts[i].len() > LANES);
         let largest = wide.max_by(|&a, &b| {
-            let area = |i: usize| half_area(&parts[i].bounds);
+            let area = |i: usize| parts[i].bounds.half_area();
             area(a).total_cmp(&area(b))
         });
         let Some(largest) = largest else {

@@ -85,7 +85,8 @@ fn cell(certificates: &mut Certificates, item: ItemId) -> &mut Cell {
 fn certificates_hold_and_survive_being_written() {
     for parallel in [false, true] {
         let certificates = certified(parallel);
-        let read = Certificates::from_json(certificates.to_json()).unwrap();
+        let text = serde_json::to_string(&certificates).unwrap();
+        let read: Certificates = serde_json::from_str(&text).unwrap();
         assert_eq!(read, certificates);
         let counts = check(&read, &Facts::of_boxes(&boxes())).unwrap();
         assert_eq!((counts.visible, counts.hidden, counts.undecided), (3, 2, 0));

@@ -92,7 +92,8 @@ fn within(certificates: &mut Certificates) -> &mut (ItemId, [[f64; 3]; 2]) {
 fn what_is_behind_a_box_within_triangles_is_proven_hidden() {
     let all = surfaces(SurfaceKind::Opaque, false);
     let certificates = certified(&all);
-    let read = Certificates::from_json(certificates.to_json()).unwrap();
+    let text = serde_json::to_string(&certificates).unwrap();
+    let read: Certificates = serde_json::from_str(&text).unwrap();
     assert_eq!(read, certificates);
     let counts = verify(&read, &all).unwrap();
     assert_eq!((counts.visible, counts.hidden, counts.undecided), (2, 1, 0));

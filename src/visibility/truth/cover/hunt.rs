@@ -39,12 +39,10 @@ pub struct Hunt<'p> {
 impl<'p> Hunt<'p> {
     /// For this item of a polygon.
     pub fn new(look: &'p Outlook<'p>, item: ItemId, except: Except) -> Hunt<'p> {
-        let others = look.likely.iter().filter(|likely| **likely != item);
-        let known = others.map(|&likely| (f64::INFINITY, likely)).collect();
         Hunt {
             look,
             item,
-            known,
+            known: Vec::new(),
             cells: 0,
             except,
         }

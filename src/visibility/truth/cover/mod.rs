@@ -7,8 +7,6 @@ mod outline;
 mod outlook;
 mod walls;
 
-use std::cmp::Reverse;
-
 use glam::DVec3;
 
 use self::hunt::{End, Hunt};
@@ -16,13 +14,9 @@ use self::outline::{corners_of, is_flat, outline};
 use self::outlook::Outlook;
 use super::certificate::{Cell, Except, Hiders, PlanWall, Proof, View};
 use super::ray_index::RayIndex;
-use super::sample::SampleTruth;
 use super::sight::{Polygon, Sight};
 use crate::query::ItemId;
 use crate::visibility::{Rays, Solids};
-
-/// How many of the largest items are tried first as boxes in front.
-const LIKELY: usize = 48;
 
 /// Looks for proofs in one view of a scene.
 #[derive(Clone, Debug)]
@@ -53,12 +47,10 @@ impl<'s> Prover<'s> {
         };
         let items = solids.boxes.len() - within;
         let sight = Sight::new(&View::of(rays));
-        let likely = Vec::new();
         let look = Outlook {
             solids,
             index,
             sight,
-            likely,
         };
         Prover {
             look,
@@ -72,17 +64,6 @@ impl<'s> Prover<'s> {
     /// before its near plane are in the map's regions.
     pub fn among(mut self, walls: &'s [PlanWall]) -> Prover<'s> {
         self.walls = walls;
-        self
-    }
-
-    /// The same, but what most samples see is tried first: proofs are found sooner.
-    pub fn knowing(mut self, truth: &SampleTruth) -> Prover<'s> {
-        let seen = truth.visible.iter().zip(&truth.samples_of);
-        let mut seen: Vec<_> = seen
-            .map(|(&item, &samples)| (Reverse(samples), item))
-            .collect();
-        seen.sort_unstable();
-        self.look.likely = seen.iter().take(LIKELY).map(|seen| seen.1).collect();
         self
     }
 

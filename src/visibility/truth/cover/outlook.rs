@@ -14,8 +14,6 @@ pub struct Outlook<'s> {
     pub solids: &'s Solids,
     pub index: &'s RayIndex,
     pub sight: Sight,
-    /// What is tried first as a box in front.
-    pub likely: Vec<ItemId>,
 }
 
 impl Outlook<'_> {
