@@ -126,11 +126,11 @@ fn inner_boxes(row: &InnerRow) -> Block {
 
 /// What hides in a map, and what finding it took.
 fn solid_blocks(row: &BlocksRow) -> Block {
-    Block::Line(match row.unclosed_count {
+    Block::Line(match row.unclosed_sector_count {
         0 => format!(
             "Occluders: {} in the solid between the rooms of the map, below floors and above \
              ceilings; found in {}.",
-            text::counted(row.count, "box"),
+            text::counted(row.box_count, "box"),
             text::time(row.build_ns)
         ),
         unclosed => format!(

@@ -14,9 +14,9 @@ use crate::visibility::region::doom::DoomMap;
 #[non_exhaustive]
 pub struct BlocksRow {
     /// How many there are; none if a sector does not close.
-    pub count: usize,
+    pub box_count: usize,
     /// Sectors whose linedefs do not close: rays leave the map there.
-    pub unclosed_count: usize,
+    pub unclosed_sector_count: usize,
     /// Wall time of finding them all.
     pub build_ns: f64,
 }
@@ -45,8 +45,8 @@ impl Blocks {
         let build_ns = begun.elapsed().as_nanos() as f64;
         Ok(Some(Blocks {
             row: BlocksRow {
-                count: boxes.len(),
-                unclosed_count: map.unclosed().len(),
+                box_count: boxes.len(),
+                unclosed_sector_count: map.unclosed().len(),
                 build_ns,
             },
             boxes,

@@ -3,13 +3,15 @@
 
 use std::rc::Rc;
 
-use super::picks::NEAREST;
 use super::world::World;
 use crate::query::ItemId;
 use crate::scene::Surfaces;
 use crate::visibility::pick::{BACK_ENDS, Pick, SURFACE_BACK_ENDS, SolidSurfaces};
 use crate::visibility::truth::{Probe, RayIndex};
 use crate::visibility::{Guarantee, Ray, Solids};
+
+/// How many of the nearest items are asked for.
+pub const NEAREST: usize = 8;
 
 /// The items as a ray meets them.
 #[derive(Clone, Copy)]

@@ -6,7 +6,7 @@ use std::rc::Rc;
 
 use serde::{Serialize, Serializer};
 
-use super::pickable::{Exactly, Pickable};
+use super::pickable::{Exactly, NEAREST, Pickable};
 use super::stage::by_name;
 use super::times::Times;
 use super::world::World;
@@ -20,8 +20,6 @@ use crate::visibility::{Guarantee, Ray, Rays, SampleGrid};
 const CURSORS: SampleGrid = SampleGrid::new(16, 9);
 /// Items of which every one is looked at for each ray, or each cursor's frustum, at most.
 const MOST_FOR_LOOP: usize = 20_000;
-/// How many of the nearest items are asked for.
-pub const NEAREST: usize = 8;
 /// The cursor's frustum reaches so many pixels to each side.
 const REACH: f64 = 4.0;
 
