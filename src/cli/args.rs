@@ -3,7 +3,7 @@
 
 use std::path::PathBuf;
 
-use crate::drift::ArmKind;
+use crate::drift::{ARMS, ArmKind};
 use crate::funnel::StageKind;
 use crate::suite::DEFAULT_PATH;
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -480,7 +480,7 @@ pub struct DriftArgs {
         value_name = "LIST",
         value_delimiter = ',',
         default_value = "linear,collision,quaternion",
-        value_parser = values::arm
+        value_parser = values::choice("arm", &ARMS)
     )]
     pub arm: Vec<ArmKind>,
     /// Stiffnesses of the spring arms, k in 1/s^2, critically damped
@@ -489,7 +489,7 @@ pub struct DriftArgs {
         value_name = "LIST",
         value_delimiter = ',',
         default_value = "1e2,1e4,1e6",
-        value_parser = values::stiffness,
+        value_parser = values::within(0.01..=1e8),
         allow_negative_numbers = true
     )]
     pub stiffness: Vec<f64>,
@@ -499,7 +499,7 @@ pub struct DriftArgs {
         value_name = "LIST",
         value_delimiter = ',',
         default_value = "30,60,144",
-        value_parser = values::frame_rate,
+        value_parser = values::within(1.0..=1e3),
         allow_negative_numbers = true
     )]
     pub rate: Vec<f64>,
@@ -508,7 +508,7 @@ pub struct DriftArgs {
         long,
         value_name = "S",
         default_value_t = 10.0,
-        value_parser = values::simulated_seconds,
+        value_parser = values::within(1.0..=1e3),
         allow_negative_numbers = true
     )]
     pub seconds: f64,

@@ -6,9 +6,7 @@ use std::io::{self, Write};
 
 use super::table::Table;
 use super::text;
-use crate::drift::{
-    ARMS, ArmChoice, ArmKind, ArmPoint, ArmReport, FrameTimes, Information, StabilityLimit,
-};
+use crate::drift::{ARMS, ArmKind, ArmPoint, ArmReport, FrameTimes, Information, StabilityLimit};
 
 /// No table is wider.
 const WIDTH: u16 = 100;
@@ -64,18 +62,11 @@ struct Shown<'r> {
 
 impl<'r> Shown<'r> {
     fn new(report: &'r ArmReport) -> Self {
-        let all = |of: fn(&ArmChoice) -> f64| {
-            let mut values: Vec<f64> = report.choices.iter().map(of).collect();
-            values.sort_by(f64::total_cmp);
-            values.dedup();
-            values
-        };
-        let rates = all(|choice| choice.setting.rate_hz);
         Shown {
             report,
-            stiffnesses: all(|choice| choice.setting.stiffness),
-            rate: rates.get(rates.len() / 2).copied().unwrap_or(f64::NAN),
-            rates,
+            stiffnesses: report.settings(|setting| setting.stiffness),
+            rates: report.settings(|setting| setting.rate_hz),
+            rate: report.middle_rate_hz().unwrap_or(f64::NAN),
         }
     }
 
@@ -98,16 +89,6 @@ impl<'r> Shown<'r> {
             (setting.arm, setting.stiffness, setting.rate_hz) == (arm, stiffness, rate)
                 && point.frame_times == times
         })
-    }
-
-    fn methods(&self) -> Vec<&'static str> {
-        let mut names: Vec<&str> = Vec::new();
-        for point in &self.report.points {
-            if !names.contains(&point.method) {
-                names.push(point.method);
-            }
-        }
-        names
     }
 
     fn by_stiffness(&self, corner: &str, first: &str) -> Table {
@@ -150,7 +131,7 @@ impl<'r> Shown<'r> {
             self.rate, self.report.tolerance
         );
         let mut table = self.by_stiffness(&corner, "");
-        for method in self.methods() {
+        for method in self.report.method_names() {
             let cells = self.stiffnesses.iter().map(|&stiffness| {
                 let points = self.points(arm, stiffness, FrameTimes::Jittered);
                 let own = points.filter(|p| p.method == method && p.arithmetic == "f64");
@@ -163,7 +144,7 @@ impl<'r> Shown<'r> {
 
     fn orders(&self) -> Table {
         let mut table = self.by_stiffness("observed order", "arm");
-        for method in self.methods() {
+        for method in self.report.method_names() {
             for (arm, name, _) in self.arms() {
                 let cells: Vec<String> = self
                     .stiffnesses
@@ -199,7 +180,8 @@ impl<'r> Shown<'r> {
         let header = [corner.as_str()].into_iter().chain(columns);
         let mut table = Table::new(header, &[2, 3, 4, 5]);
         for method in self
-            .methods()
+            .report
+            .method_names()
             .into_iter()
             .filter(|m| !m.ends_with("-midpoints"))
         {

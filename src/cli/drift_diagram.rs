@@ -2,12 +2,10 @@
 //! one panel per arm and stiffness at the frame rate in the middle. It draws what was
 //! measured and decides nothing.
 
-use anyhow::anyhow;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use super::log_axis::{around, is_drawn};
-use super::precision_diagram::COLOURS;
+use super::picture::{COLOURS, Drawn, around, is_drawn, svg};
 use super::text;
 use crate::drift::{ArmPoint, ArmReport, FrameTimes, Information, Setting};
 
@@ -27,16 +25,7 @@ fn place(point: &ArmPoint) -> Option<(f64, f64)> {
 
 /// The diagram as SVG.
 pub fn draw(report: &ArmReport) -> anyhow::Result<String> {
-    let mut svg = String::new();
-    let drawn = draw_on(&mut svg, report);
-    drawn.map_err(|error| anyhow!("the diagram cannot be drawn: {error}"))?;
-    Ok(text::lines(&svg))
-}
-
-type Drawn = Result<(), Box<dyn std::error::Error>>;
-
-fn draw_on(svg: &mut String, report: &ArmReport) -> Drawn {
-    let rate = middle(report.choices.iter().map(|choice| choice.setting.rate_hz));
+    let rate = report.middle_rate_hz();
     let shown: Vec<&Setting> = report
         .choices
         .iter()
@@ -46,11 +35,21 @@ fn draw_on(svg: &mut String, report: &ArmReport) -> Drawn {
     let rows = shown.chunk_by(|a, b| a.arm == b.arm).count().max(1);
     let columns = shown.len().div_ceil(rows).max(1);
     let size = (SIZE.0 * columns as u32, SIZE.1 * rows as u32 + LEGEND);
-    let root = SVGBackend::with_string(svg, size).into_drawing_area();
-    root.fill(&WHITE)?;
-    let (panels, names) = root.split_vertically(size.1 - LEGEND);
-    let methods = methods(report);
-    for (area, setting) in panels.split_evenly((rows, columns)).iter().zip(shown) {
+    let grid = (rows, columns);
+    svg("the diagram", size, |root| {
+        let (panels, names) = root.split_vertically(size.1 - LEGEND);
+        draw_panels(&panels.split_evenly(grid), &shown, report)?;
+        legend(&names, &report.method_names())
+    })
+}
+
+fn draw_panels(
+    panels: &[DrawingArea<SVGBackend, Shift>],
+    shown: &[&Setting],
+    report: &ArmReport,
+) -> Drawn {
+    let methods = report.method_names();
+    for (area, setting) in panels.iter().zip(shown.iter().copied()) {
         let points: Vec<&ArmPoint> = report
             .points
             .iter()
@@ -69,26 +68,7 @@ fn draw_on(svg: &mut String, report: &ArmReport) -> Drawn {
             &methods,
         )?;
     }
-    legend(&names, &methods)?;
-    root.present()?;
     Ok(())
-}
-
-fn middle(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    values.dedup();
-    values.get(values.len() / 2).copied()
-}
-
-fn methods(report: &ArmReport) -> Vec<&'static str> {
-    let mut names: Vec<&str> = Vec::new();
-    for point in &report.points {
-        if !names.contains(&point.method) {
-            names.push(point.method);
-        }
-    }
-    names
 }
 
 /// Colours come round: the second turn is thin.
@@ -97,16 +77,13 @@ fn style(method: usize) -> ShapeStyle {
     colour.stroke_width(if method < COLOURS.len() { 2 } else { 1 })
 }
 
-fn panel<B: DrawingBackend>(
-    area: &DrawingArea<B, Shift>,
+fn panel(
+    area: &DrawingArea<SVGBackend, Shift>,
     setting: &Setting,
     points: &[&ArmPoint],
     told: Option<f64>,
     methods: &[&str],
-) -> Drawn
-where
-    B::ErrorType: 'static,
-{
+) -> Drawn {
     let places = || points.iter().filter_map(|point| place(point));
     let times = around(places().map(|p| p.0), 1.5, 1.5);
     let errors = places().map(|p| p.1).chain(told);
@@ -152,10 +129,7 @@ where
     Ok(())
 }
 
-fn legend<B: DrawingBackend>(area: &DrawingArea<B, Shift>, methods: &[&str]) -> Drawn
-where
-    B::ErrorType: 'static,
-{
+fn legend(area: &DrawingArea<SVGBackend, Shift>, methods: &[&str]) -> Drawn {
     let text_style = ("sans-serif", 13).into_font();
     let width = area.dim_in_pixel().0 as i32 / IN_LINE as i32;
     for (i, method) in methods.iter().enumerate() {

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 
 use super::shared_args::{KernelArgs, LensArgs, SceneArgs, SpreadArgs, TableFormat};
 use super::values;
-use crate::funnel::SeenFrom;
+use crate::funnel::{SEEN_FROM, SeenFrom};
 use crate::query::ItemId;
 use crate::visibility::SampleGrid;
 use crate::visibility::fragment::CutOuts;
@@ -66,7 +66,7 @@ pub struct FunnelArgs {
     #[arg(long, value_name = "NAME")]
     pub region: Option<String>,
     /// Where the region stage looks from: the eye, or anywhere in the region that the eye is in
-    #[arg(long, value_name = "PLACE", default_value = "eye", value_parser = values::seen_from)]
+    #[arg(long, value_name = "PLACE", default_value = "eye", value_parser = values::choice("place", &SEEN_FROM))]
     pub from: SeenFrom,
     /// Structures for the object stage; the first is the chain's
     #[arg(long, value_name = "LIST", default_value = "wide,bvh,linear")]

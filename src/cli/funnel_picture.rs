@@ -1,9 +1,10 @@
 //! The picture of `cullbench funnel`: the first view from above, every item in the
 //! colour of the stage that removed it.
 
-use anyhow::anyhow;
+use plotters::coord::Shift;
 use plotters::prelude::*;
 
+use super::picture::{Drawn, svg};
 use super::text;
 use crate::funnel::{Fate, FunnelReport, PlanView, StageKind};
 
@@ -34,19 +35,14 @@ const FATES: [(Fate, RGBColor, &str); 6] = [
 
 /// The picture as SVG.
 pub fn draw(report: &FunnelReport) -> anyhow::Result<String> {
-    let mut svg = String::new();
-    let drawn = draw_on(&mut svg, report);
-    drawn.map_err(|error| anyhow!("the picture cannot be drawn: {error}"))?;
-    Ok(text::lines(&svg))
+    svg("the picture", SIZE, |root| draw_on(root, report))
 }
 
-fn draw_on(svg: &mut String, report: &FunnelReport) -> Result<(), Box<dyn std::error::Error>> {
+fn draw_on(root: &DrawingArea<SVGBackend, Shift>, report: &FunnelReport) -> Drawn {
     let plan = &report.plan_view;
-    let root = SVGBackend::with_string(svg, SIZE).into_drawing_area();
-    root.fill(&WHITE)?;
     let reach = reach(plan);
     let [x, y] = plan.eye;
-    let mut chart = ChartBuilder::on(&root)
+    let mut chart = ChartBuilder::on(root)
         .caption(
             text::plain(&format!(
                 "{}, {}: the first view from above",
@@ -90,7 +86,6 @@ fn draw_on(svg: &mut String, report: &FunnelReport) -> Result<(), Box<dyn std::e
         .background_style(WHITE.mix(0.85))
         .border_style(BLACK.mix(0.3))
         .draw()?;
-    root.present()?;
     Ok(())
 }
 

@@ -176,11 +176,15 @@ fn stages(report: &FunnelReport) -> Table {
 fn by(row: &StageRow) -> String {
     let name = row.structure.as_deref().unwrap_or(row.back_end.name);
     let mark = if row.is_chosen { "*" } else { "" };
-    let doubt = match row.back_end.guarantee {
+    format!("{name}{mark}{}", doubt(row.back_end.guarantee))
+}
+
+/// The mark of what nobody has proven.
+pub fn doubt(guarantee: Guarantee) -> &'static str {
+    match guarantee {
         Guarantee::Unproven => "?",
         _ => "",
-    };
-    format!("{name}{mark}{doubt}")
+    }
 }
 
 fn stage(row: &StageRow) -> Vec<String> {
@@ -296,14 +300,9 @@ fn orders(report: &FunnelReport) -> Table {
 fn picks(report: &FunnelReport) -> Table {
     let mut table = Table::of("question | by | >cursors | >wrong | >time per cursor");
     table.rows.extend(report.picks.iter().map(|row| {
-        let doubt = if row.guarantee == Guarantee::Unproven {
-            "?"
-        } else {
-            ""
-        };
         vec![
             row.question.name().to_owned(),
-            format!("{}{doubt}", row.name),
+            format!("{}{}", row.name, doubt(row.guarantee)),
             row.ray_count.to_string(),
             row.wrong_count.to_string(),
             row.ns_per_ray.map(text::time).unwrap_or_default(),

@@ -2,6 +2,7 @@
 
 use std::io::{self, Write};
 
+use clap::ValueEnum;
 use serde_json::{Map, Value, json};
 
 use super::args::{ListArgs, ListTopic};
@@ -24,13 +25,7 @@ type Row = (String, Vec<(&'static str, Value)>, String);
 pub fn list(registry: &Registry, args: &ListArgs) -> anyhow::Result<Ending> {
     let topics = match args.topic {
         Some(topic) => vec![topic],
-        None => vec![
-            ListTopic::Structures,
-            ListTopic::Scenes,
-            ListTopic::Paths,
-            ListTopic::Tests,
-            ListTopic::Metrics,
-        ],
+        None => ListTopic::value_variants().to_vec(),
     };
     let mut out = io::stdout().lock();
     let mut all = Map::new();
@@ -94,7 +89,12 @@ fn as_json((name, columns, summary): Row) -> Value {
 }
 
 fn rows(registry: &Registry, topic: ListTopic) -> anyhow::Result<(&'static str, String, Vec<Row>)> {
-    let plain = |name: &str, summary: &str| (name.to_owned(), Vec::new(), summary.to_owned());
+    let row = |name: &str, columns: &[(&'static str, &str)], summary: &str| {
+        let columns = columns
+            .iter()
+            .map(|&(column, value)| (column, value.into()));
+        (name.to_owned(), columns.collect(), summary.to_owned())
+    };
     Ok(match topic {
         ListTopic::Structures => {
             let rows = registry.rows().iter().map(|row| {
@@ -119,23 +119,15 @@ fn rows(registry: &Registry, topic: ListTopic) -> anyhow::Result<(&'static str, 
         ListTopic::Scenes => {
             let families = FAMILIES.iter().map(|f| {
                 let params = format!("n=100000, seed=1, offset=0, {}", f.params);
-                (
-                    f.name.to_owned(),
-                    vec![("params", params.into())],
-                    f.summary.to_owned(),
-                )
+                row(f.name, &[("params", &params)], f.summary)
             });
             let meshes = MESHES.iter().map(|m| {
                 let params = "n=100000 (triangles), seed=1, offset=0";
-                (
-                    m.name.to_owned(),
-                    vec![("params", params.into())],
-                    m.summary.to_owned(),
-                )
+                row(m.name, &[("params", params)], m.summary)
             });
             let samples = SAMPLES.iter().map(|s| {
-                let licence = vec![("params", format!("real; {}", s.licence).into())];
-                (s.name.to_owned(), licence, s.summary.to_owned())
+                let licence = format!("real; {}", s.licence);
+                row(s.name, &[("params", &licence)], s.summary)
             });
             let suites: Vec<String> = SUITES
                 .iter()
@@ -156,21 +148,17 @@ fn rows(registry: &Registry, topic: ListTopic) -> anyhow::Result<(&'static str, 
             format!(
                 "Parameters of every path: {PATH_PARAMS}.\nA path is also a file: a cameras CSV (eye_x.. and look_x.. or forward_x.., or matrices m00..m33)."
             ),
-            PATHS.iter().map(|p| plain(p.name, p.summary)).collect(),
+            PATHS.iter().map(|p| row(p.name, &[], p.summary)).collect(),
         ),
         ListTopic::Tests => (
             "tests",
             String::new(),
-            TESTS.iter().map(|(_, n, s)| plain(n, s)).collect(),
+            TESTS.iter().map(|(_, n, s)| row(n, &[], s)).collect(),
         ),
         ListTopic::Metrics => {
-            let rows = METRICS.iter().map(|m| {
-                (
-                    m.name.to_owned(),
-                    vec![("unit", m.unit.into())],
-                    m.summary.to_owned(),
-                )
-            });
+            let rows = METRICS
+                .iter()
+                .map(|m| row(m.name, &[("unit", m.unit)], m.summary));
             ("metrics", String::new(), rows.collect())
         }
     })

@@ -4,29 +4,16 @@
 
 use std::collections::BTreeMap;
 
-use anyhow::anyhow;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use super::log_axis::{around, is_drawn, left_out};
+use super::picture::{COLOURS, Drawn, around, is_drawn, left_out, svg};
 use super::text;
 use crate::precision::{Point, Precision, RegionPoint};
 
 const SIZE: (u32, u32) = (1000, 1080);
 /// Height of the picture of frustum queries.
 const UPPER: u32 = 640;
-
-/// Told apart also without colours of their own names: dark to light.
-pub const COLOURS: [RGBColor; 8] = [
-    RGBColor(0, 114, 178),
-    RGBColor(213, 94, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    RGBColor(86, 180, 233),
-    RGBColor(230, 159, 0),
-    RGBColor(0, 0, 0),
-    RGBColor(120, 120, 120),
-];
 
 /// A point of a picture.
 struct Mark {
@@ -98,22 +85,11 @@ pub fn draw(precision: &Precision) -> anyhow::Result<String> {
         // Two for each structure are too many to name.
         is_named: |marks, series| marks.iter().any(|m| m.on_front && m.series == series),
     };
-    let mut svg = String::new();
-    let drawn = draw_on(&mut svg, &queries, &regions);
-    drawn.map_err(|error| anyhow!("the diagram cannot be drawn: {error}"))?;
-    Ok(text::lines(&svg))
-}
-
-type Drawn = Result<(), Box<dyn std::error::Error>>;
-
-fn draw_on(svg: &mut String, upper: &Picture, lower: &Picture) -> Drawn {
-    let root = SVGBackend::with_string(svg, SIZE).into_drawing_area();
-    root.fill(&WHITE)?;
-    let (top, bottom) = root.split_vertically(UPPER);
-    upper.draw(&top)?;
-    lower.draw(&bottom)?;
-    root.present()?;
-    Ok(())
+    svg("the diagram", SIZE, |root| {
+        let (top, bottom) = root.split_vertically(UPPER);
+        queries.draw(&top)?;
+        regions.draw(&bottom)
+    })
 }
 
 impl Picture {

@@ -2,8 +2,10 @@
 //! how a view is made and tested, how queries are computed.
 
 use super::values;
-use crate::camera::{DEFAULT_EPSILON, PlaneMethod, PlaneOptions};
-use crate::culling::{Arithmetic, Culling};
+use crate::camera::{
+    DEFAULT_EPSILON, MATRIX_CONVENTIONS, PLANE_METHODS, PlaneMethod, PlaneOptions,
+};
+use crate::culling::{ARITHMETICS, Arithmetic, Culling, TESTS};
 use crate::index::{Execution, Registry, StructureSpec};
 use crate::kernel::Kernel;
 use crate::measure::{Beside, Effort, Machine, Protocol};
@@ -155,8 +157,9 @@ impl LensArgs {
             )));
         }
         let matrix = self.matrix_convention.as_deref();
+        let convention = values::choice("matrix convention", &MATRIX_CONVENTIONS);
         Ok(LensDefaults {
-            matrix: matrix.map(values::matrix_convention).transpose()?,
+            matrix: matrix.map(convention).transpose()?,
             fovy_deg: self.fovy,
             aspect: self.aspect,
             near: self.near,
@@ -170,13 +173,14 @@ impl LensArgs {
 #[derive(Args, Debug)]
 pub struct CullingArgs {
     /// Where the planes come from: frame, frame-f32, gh-gl-f32, gh-gl-f64, gh-d3d-f32, gh-d3d-f64, gh-revz-f32, gh-revz-f64
-    #[arg(long, value_name = "METHOD", default_value = "frame", value_parser = values::plane_method)]
+    #[arg(long, value_name = "METHOD", default_value = "frame", value_parser = values::choice("plane method", &PLANE_METHODS))]
     pub planes: PlaneMethod,
     /// Factor c of the conservative epsilon; 0 leaves the planes as derived
-    #[arg(long, value_name = "C", default_value_t = DEFAULT_EPSILON, value_parser = values::epsilon, allow_negative_numbers = true)]
+    // With the largest one everything is visible.
+    #[arg(long, value_name = "C", default_value_t = DEFAULT_EPSILON, value_parser = values::within(0.0..=1e9), allow_negative_numbers = true)]
     pub epsilon: f64,
     /// Numbers the culling test is carried out in: f32, f64, f32-relative
-    #[arg(long, value_name = "NUMBERS", default_value = "f32", value_parser = values::arithmetic)]
+    #[arg(long, value_name = "NUMBERS", default_value = "f32", value_parser = values::choice("arithmetic", &ARITHMETICS))]
     pub arithmetic: Arithmetic,
 }
 
@@ -184,7 +188,7 @@ impl CullingArgs {
     /// The culling test of that name with everything else as asked for.
     pub fn culling(&self, test: &str) -> Result<Culling, SpecError> {
         Ok(Culling {
-            test: values::culling_test(test)?,
+            test: values::choice("test", &TESTS)(test)?,
             arithmetic: self.arithmetic,
             planes: PlaneOptions {
                 method: self.planes,

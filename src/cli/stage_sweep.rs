@@ -174,13 +174,12 @@ fn show(sweep: &StageSweep, out: &mut impl Write) -> io::Result<()> {
     );
     table.rows.extend(sweep.points.iter().map(|point| {
         let (errors, times) = (&point.errors, &point.times);
-        let doubt = if point.back_end.guarantee == Guarantee::Unproven {
-            "?"
-        } else {
-            ""
-        };
         vec![
-            format!("{}{doubt}", point.back_end.name),
+            format!(
+                "{}{}",
+                point.back_end.name,
+                funnel_table::doubt(point.back_end.guarantee)
+            ),
             point
                 .buffer
                 .map(|[w, h]| format!("{w}x{h}"))

@@ -2,11 +2,10 @@
 //! logarithmic, one line for each structure. It draws what was measured and
 //! decides nothing.
 
-use anyhow::anyhow;
+use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use super::log_axis::{around, is_drawn, left_out};
-use super::precision_diagram::COLOURS;
+use super::picture::{COLOURS, Drawn, around, is_drawn, left_out, svg};
 use super::{surface_tables, text};
 use crate::report::{Place, Surface};
 
@@ -46,9 +45,7 @@ pub fn pictures(surfaces: &[Surface]) -> anyhow::Result<Vec<Picture>> {
                 measured(surface, class),
                 left_out(beyond)
             );
-            let mut svg = String::new();
-            draw(&mut svg, &caption, &curves)
-                .map_err(|error| anyhow!("{caption} cannot be drawn: {error}"))?;
+            let svg = svg(&caption, SIZE, |root| draw(root, &caption, &curves))?;
             let words = [&surface.world, surface.cache, surface.test, &shown].join("-");
             let name = slug(&words);
             // Two worlds may look the same to a file system.
@@ -60,7 +57,6 @@ pub fn pictures(surfaces: &[Surface]) -> anyhow::Result<Vec<Picture>> {
                 0 => name,
                 more => format!("{name}-{}", more + 1),
             };
-            let svg = text::lines(&svg);
             pictures.push(Picture { name, svg });
         }
     }
@@ -95,17 +91,11 @@ fn slug(words: &str) -> String {
     name.trim_matches(['-', '.']).to_owned()
 }
 
-fn draw(
-    svg: &mut String,
-    caption: &str,
-    curves: &[Curve],
-) -> Result<(), Box<dyn std::error::Error>> {
+fn draw(root: &DrawingArea<SVGBackend, Shift>, caption: &str, curves: &[Curve]) -> Drawn {
     let points = || curves.iter().flat_map(|(_, points)| points.iter());
     let items = around(points().map(|p| p.0 as f64), 1.3, 1.3).log_scale();
     let times = around(points().map(|p| p.1), 1.3, 1.3).log_scale();
-    let root = SVGBackend::with_string(svg, SIZE).into_drawing_area();
-    root.fill(&WHITE)?;
-    let mut chart = ChartBuilder::on(&root)
+    let mut chart = ChartBuilder::on(root)
         .caption(caption, ("sans-serif", 18))
         .margin(14)
         .x_label_area_size(44)
@@ -144,7 +134,6 @@ fn draw(
         .background_style(WHITE.mix(0.8))
         .border_style(BLACK.mix(0.3))
         .draw()?;
-    root.present()?;
     Ok(())
 }
 

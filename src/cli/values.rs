@@ -6,10 +6,8 @@ use std::fmt::Display;
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
-use crate::camera::{MATRIX_CONVENTIONS, MatrixConvention, PLANE_METHODS, PlaneMethod};
-use crate::culling::{ARITHMETICS, Arithmetic, CullingTest, TESTS};
-use crate::drift::{ARMS, ArmKind, MOST_STEPS};
-use crate::funnel::{SEEN_FROM, SeenFrom, StageKind};
+use crate::drift::MOST_STEPS;
+use crate::funnel::StageKind;
 use crate::kernel::Kernel;
 use crate::spec::{SpecError, parse_number};
 use crate::visibility::SampleGrid;
@@ -52,39 +50,18 @@ pub fn above_zero(text: &str) -> Result<f64, SpecError> {
     expected(sound, "a number above 0")
 }
 
-fn within(text: &str, [least, most]: [f64; 2]) -> Result<f64, SpecError> {
-    let sound = number(text).filter(|n| (least..=most).contains(n));
-    expected(sound, format_args!("a number from {least} to {most:e}"))
-}
-
-pub fn arm(name: &str) -> Result<ArmKind, SpecError> {
-    choice("arm", &ARMS, name)
-}
-
-/// Of a spring arm, in 1/s^2.
-pub fn stiffness(text: &str) -> Result<f64, SpecError> {
-    within(text, [0.01, 1e8])
-}
-
-/// Frames per second.
-pub fn frame_rate(text: &str) -> Result<f64, SpecError> {
-    within(text, [1.0, 1e3])
-}
-
-/// Simulated time.
-pub fn simulated_seconds(text: &str) -> Result<f64, SpecError> {
-    within(text, [1.0, 1e3])
+pub fn within(range: RangeInclusive<f64>) -> impl Fn(&str) -> Result<f64, SpecError> + Clone {
+    move |text| {
+        let sound = number(text).filter(|n| range.contains(n));
+        let (least, most) = (range.start(), range.end());
+        expected(sound, format_args!("a number from {least} to {most:e}"))
+    }
 }
 
 /// A vertical angle of view in degrees.
 pub fn field_of_view(text: &str) -> Result<f64, SpecError> {
     let sound = number(text).filter(|n| *n > 0.0 && *n < 180.0);
     expected(sound, "a number above 0 and below 180")
-}
-
-/// The factor of the planes' epsilon: with the largest one everything is visible.
-pub fn epsilon(text: &str) -> Result<f64, SpecError> {
-    within(text, [0.0, 1e9])
 }
 
 /// A far plane; `inf` is none.
@@ -131,12 +108,7 @@ pub fn steps(text: &str) -> Result<u64, SpecError> {
 /// A stage of the funnel whose error and time can be swept.
 pub fn stage(name: &str) -> Result<StageKind, SpecError> {
     let swept = [StageKind::Region, StageKind::Occlusion, StageKind::Triangle];
-    choice("stage", &swept.map(|stage| (stage, stage.name(), "")), name)
-}
-
-/// From where the region stage looks.
-pub fn seen_from(name: &str) -> Result<SeenFrom, SpecError> {
-    choice("place", &SEEN_FROM, name)
+    choice("stage", &swept.map(|stage| (stage, stage.name(), "")))(name)
 }
 
 /// Which candidates are drawn as occluders.
@@ -157,34 +129,19 @@ pub fn samples(text: &str) -> Result<SampleGrid, SpecError> {
 
 pub fn kernel(name: &str) -> Result<Kernel, SpecError> {
     let known = Kernel::ALL.map(|kernel| (kernel, kernel.name(), ""));
-    choice("kernel", &known, name)
-}
-
-pub fn plane_method(name: &str) -> Result<PlaneMethod, SpecError> {
-    choice("plane method", &PLANE_METHODS, name)
-}
-
-pub fn arithmetic(name: &str) -> Result<Arithmetic, SpecError> {
-    choice("arithmetic", &ARITHMETICS, name)
-}
-
-pub fn matrix_convention(name: &str) -> Result<MatrixConvention, SpecError> {
-    choice("matrix convention", &MATRIX_CONVENTIONS, name)
-}
-
-pub fn culling_test(name: &str) -> Result<CullingTest, SpecError> {
-    choice("test", &TESTS, name)
+    choice("kernel", &known)(name)
 }
 
 /// The value of that name, of a table of values, names and summaries.
-fn choice<T: Copy>(
-    what: &str,
-    table: &[(T, &'static str, &'static str)],
-    name: &str,
-) -> Result<T, SpecError> {
-    let row = table.iter().find(|row| row.1 == name);
-    row.map(|row| row.0)
-        .ok_or_else(|| SpecError::unknown(what, name, table.iter().map(|row| row.1)))
+pub fn choice<'t, T: Copy>(
+    what: &'t str,
+    table: &'t [(T, &'static str, &'static str)],
+) -> impl Fn(&str) -> Result<T, SpecError> + Clone {
+    move |name| {
+        let row = table.iter().find(|row| row.1 == name);
+        row.map(|row| row.0)
+            .ok_or_else(|| SpecError::unknown(what, name, table.iter().map(|row| row.1)))
+    }
 }
 
 #[cfg(test)]

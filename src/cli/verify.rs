@@ -295,6 +295,18 @@ fn on_the_faces(workload: &Workload) -> ErrorCount {
 }
 
 impl Check {
+    fn new(scene: &str, path: &str, structure: &StructureSpec) -> Check {
+        Check {
+            scene: scene.to_owned(),
+            path: path.to_owned(),
+            structure: structure.label.clone(),
+            volumes: 0,
+            verdicts: 0,
+            status: Status::Ok.name(),
+            difference: None,
+        }
+    }
+
     /// Takes in another kind of volume; the first difference stays.
     fn add(&mut self, more: Check) {
         self.volumes += more.volumes;
@@ -330,31 +342,20 @@ pub(super) fn check(
             .filter(|v| v.status.is_failure())
             .and_then(|v| v.reason);
         Check {
-            scene: scene.name.clone(),
-            path: workload.path.clone(),
-            structure: subject.spec.label.clone(),
             volumes: workload.views.len(),
             verdicts: questions as u64,
             status,
             difference: reason.map(|reason| format!("{kind} volume, {reason}\n  again: {again}")),
+            ..Check::new(&scene.name, &workload.path, &subject.spec)
         }
     });
     checks.collect()
 }
 
 fn random_cases(structures: &[StructureSpec], seed: u64, cases: u64) -> Vec<Check> {
-    let mut checks: Vec<Check> = structures
-        .iter()
-        .map(|s| Check {
-            scene: "random".to_owned(),
-            path: format!("{} from seed {seed}", text::counted(cases as usize, "case")),
-            structure: s.label.clone(),
-            volumes: 0,
-            verdicts: 0,
-            status: "ok",
-            difference: None,
-        })
-        .collect();
+    let path = format!("{} from seed {seed}", text::counted(cases as usize, "case"));
+    let of = |structure| Check::new("random", &path, structure);
+    let mut checks: Vec<Check> = structures.iter().map(of).collect();
     for case_seed in (0..cases).map(|i| seed.wrapping_add(i)) {
         if interrupt::asked() {
             break;

@@ -72,6 +72,33 @@ pub struct ArmReport {
     pub conclusion: String,
 }
 
+impl ArmReport {
+    /// Names of the methods that have points, in their order.
+    pub fn method_names(&self) -> Vec<&'static str> {
+        let mut names: Vec<&str> = Vec::new();
+        for point in &self.points {
+            if !names.contains(&point.method) {
+                names.push(point.method);
+            }
+        }
+        names
+    }
+
+    /// A figure of all settings, ascending, each once.
+    pub fn settings(&self, figure: fn(&Setting) -> f64) -> Vec<f64> {
+        let mut figures: Vec<f64> = self.choices.iter().map(|c| figure(&c.setting)).collect();
+        figures.sort_by(f64::total_cmp);
+        figures.dedup();
+        figures
+    }
+
+    /// The frame rate in the middle, which is shown where there is room for one.
+    pub fn middle_rate_hz(&self) -> Option<f64> {
+        let rates = self.settings(|setting| setting.rate_hz);
+        rates.get(rates.len() / 2).copied()
+    }
+}
+
 /// Everything `cullbench drift` finds.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct DriftReport {

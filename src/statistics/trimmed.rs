@@ -32,6 +32,17 @@ pub struct Trimmed {
 }
 
 impl Trimmed {
+    /// A mean with the error that winsorised values give it.
+    fn of(mean: f64, winsorised: &[f64]) -> Trimmed {
+        let kept = kept(winsorised.len());
+        Trimmed {
+            mean,
+            standard_error: (squares(winsorised) / (kept * (kept - 1.0))).sqrt(),
+            df: kept - 1.0,
+            count: winsorised.len(),
+        }
+    }
+
     /// The two-sided interval of Student's t; `level` such as 0.95.
     pub fn interval(&self, level: f64) -> (f64, f64) {
         let margin = self.margin(0.5 + level / 2.0);
@@ -73,17 +84,10 @@ impl Trimmed {
 /// ```
 pub fn trimmed_mean(values: &[f64]) -> Option<Trimmed> {
     let centre = centre(values)?;
-    let kept = kept(values.len());
     if values.len() < 3 {
         return None;
     }
-    let squares = squares(&winsorised(values));
-    Some(Trimmed {
-        mean: centre,
-        standard_error: (squares / (kept * (kept - 1.0))).sqrt(),
-        df: kept - 1.0,
-        count: values.len(),
-    })
+    Some(Trimmed::of(centre, &winsorised(values)))
 }
 
 /// The trimmed mean alone, of any number of values. `None` for none, a NaN or
@@ -126,17 +130,11 @@ pub(super) fn paired_difference(a: &[f64], b: &[f64]) -> Option<Trimmed> {
         return None;
     }
     let mean = centre(b)? - centre(a)?;
-    let kept = kept(a.len());
     // The sum of squares of the differences of the Winsorised values is q1 + q2
     // - 2 q12 of the source.
     let (a, b) = (winsorised(a), winsorised(b));
     let differences: Vec<f64> = a.iter().zip(&b).map(|(a, b)| b - a).collect();
-    Some(Trimmed {
-        mean,
-        standard_error: (squares(&differences) / (kept * (kept - 1.0))).sqrt(),
-        df: kept - 1.0,
-        count: a.len(),
-    })
+    Some(Trimmed::of(mean, &differences))
 }
 
 /// Lends each cell of one comparison what the others tell about the variance:

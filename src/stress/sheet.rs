@@ -50,6 +50,13 @@ impl Sheet<'_> {
         });
     }
 
+    /// The names of those boxes.
+    fn names_of(&self, is_one: impl Fn(&Aabb) -> bool) -> Names {
+        let boxes = self.names.iter().zip(self.items);
+        let those = boxes.filter(|(_, b)| is_one(b));
+        those.map(|(name, _)| name.clone()).collect()
+    }
+
     pub fn box_named(&self, name: &str) -> Option<&Aabb> {
         let at = self.names.iter().position(|n| n == name)?;
         self.items.get(at)
@@ -125,12 +132,8 @@ impl Sheet<'_> {
                 return;
             }
         };
-        let scalar = || {
-            let boxes = self.names.iter().zip(self.items);
-            let seen = boxes.filter(|(_, b)| volume.sees(b));
-            seen.map(|(name, _)| name.clone()).collect()
-        };
-        let wanted: Names = vector.six_plane.clone().unwrap_or_else(scalar);
+        let scalar = || self.names_of(|b| volume.sees(b));
+        let wanted = vector.six_plane.clone().unwrap_or_else(scalar);
         for (spec, built) in built {
             let found = self.see(built, (&volume).into());
             let list: Vec<String> = wanted.iter().cloned().collect();
@@ -157,12 +160,10 @@ impl Sheet<'_> {
         let Some(wanted) = &self.vector.six_plane_exact else {
             return;
         };
-        let boxes = self.names.iter().zip(self.items);
-        let seen = boxes.filter(|(_, b)| {
+        let seen = self.names_of(|b| {
             let excluded = |plane: &Plane| value_at(plane, plane.p_vertex(b)).sign() < 0;
             !b.is_empty() && !volume.planes().iter().any(excluded)
         });
-        let seen: Names = seen.map(|(name, _)| name.clone()).collect();
         let got = Ok(seen.iter().cloned().collect());
         self.answered(ORACLE, "six-plane exact", seen == *wanted, wanted, &got);
     }
@@ -254,11 +255,8 @@ impl Sheet<'_> {
     }
 
     pub fn seen_by(&self, oracle: &Oracle) -> Names {
-        let boxes = self.names.iter().zip(self.items);
         // What is not finite is no box, and nothing is built with it.
-        let boxes = boxes.filter(|(_, b)| b.is_finite());
-        let seen = boxes.filter(|(_, b)| oracle.verdict(b) != Verdict::Out);
-        seen.map(|(name, _)| name.clone()).collect()
+        self.names_of(|b| b.is_finite() && oracle.verdict(b) != Verdict::Out)
     }
 
     /// The oracle's own verdicts: visible and touching exactly as stated.

@@ -23,18 +23,6 @@ pub use trial::{Fault, Trial};
 pub use truth::{ErrorCount, Truth};
 pub use variants::variants;
 
-/// The reference: each box against each plane with [`AnyVolume::sees`], no
-/// structure, no mask, no early way out. O(items * planes) per volume.
-///
-/// Reuses its memory from query to query.
-pub struct Reference {
-    /// Per item: the number of the query that marked it last, twice: +0 if
-    /// the reference wants it, +1 once a structure has returned it.
-    marks: Vec<u64>,
-    stamp: u64,
-    expected: usize,
-}
-
 /// How a structure's answer differs from the reference.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug)]
 #[non_exhaustive]
@@ -67,70 +55,6 @@ impl fmt::Display for Difference {
             Some(id) => write!(f, "; first: item {id}"),
             None => Ok(()),
         }
-    }
-}
-
-impl Reference {
-    /// A reference for scenes of so many items.
-    pub fn new(item_count: usize) -> Self {
-        Reference {
-            marks: vec![0; item_count],
-            stamp: 0,
-            expected: 0,
-        }
-    }
-
-    /// Computes the reference answer to a frustum query; its size.
-    pub fn see<'v>(&mut self, items: &[Aabb], view: impl Into<AnyVolume<'v>>) -> usize {
-        let view = view.into();
-        let wanted = items.iter().zip(0..).filter(|(b, _)| view.sees(b));
-        self.expect(wanted.map(|(_, id)| id))
-    }
-
-    /// Takes over a reference answer found by other means; its size.
-    pub fn expect(&mut self, wanted: impl Iterator<Item = ItemId>) -> usize {
-        self.stamp += 2;
-        self.expected = 0;
-        for id in wanted {
-            self.marks[id as usize] = self.stamp;
-            self.expected += 1;
-        }
-        self.expected
-    }
-
-    /// Compares a structure's answer, in any order, with the reference. May
-    /// be called for one structure after another. O(items) in the worst case,
-    /// O(answer) if the answer is right.
-    pub fn compare(&mut self, found: &[ItemId]) -> Difference {
-        let mut difference = Difference::default();
-        let mut right = 0;
-        for &id in found {
-            let bad = match self.marks.get_mut(id as usize) {
-                Some(mark) if *mark == self.stamp => {
-                    *mark += 1;
-                    right += 1;
-                    continue;
-                }
-                Some(mark) if *mark == self.stamp + 1 => &mut difference.invalid,
-                Some(_) => &mut difference.extra,
-                None => &mut difference.invalid,
-            };
-            *bad += 1;
-            difference.first.get_or_insert(id);
-        }
-        difference.missing = self.expected - right;
-        if difference.missing > 0 {
-            let lost = self.marks.iter().position(|mark| *mark == self.stamp);
-            difference.first = lost.map(|id| id as ItemId);
-        }
-        // Ready for the next structure.
-        for &id in found {
-            let mark = self.marks.get_mut(id as usize);
-            if let Some(mark) = mark.filter(|m| **m == self.stamp + 1) {
-                *mark = self.stamp;
-            }
-        }
-        difference
     }
 }
 
@@ -192,9 +116,10 @@ mod tests {
             .map(|i| Aabb::around(Vec3::new(i as f32, 0.0, 0.0), Vec3::splat(0.25)))
             .collect();
         let half = ConvexVolume::from_planes(&[Plane::new(Vec3::X, -2.5)]).unwrap();
-        let mut reference = Reference::new(items.len());
-        assert_eq!(reference.see(&items, &half), 3);
-        assert!(reference.compare(&[5, 3, 4]).is_none());
+        let mut trial = Trial::new(items.len());
+        trial.see(&items, &half);
+        assert_eq!(trial.expected(), 3);
+        assert!(trial.ask(|out| out.extend([5, 3, 4])).is_ok());
         let cases: [(&[ItemId], Difference); 5] = [
             (
                 &[3, 4],
@@ -238,8 +163,10 @@ mod tests {
             ),
         ];
         for (answer, wanted) in cases {
-            assert_eq!(reference.compare(answer), wanted, "{answer:?}");
-            assert!(reference.compare(&[3, 4, 5]).is_none(), "state is restored");
+            let found = trial.ask(|out| out.extend(answer)).unwrap_err();
+            assert_eq!(found, Fault::Differs(wanted), "{answer:?}");
+            let right = trial.ask(|out| out.extend([3, 4, 5]));
+            assert!(right.is_ok(), "state is restored");
         }
     }
 

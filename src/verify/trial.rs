@@ -3,7 +3,7 @@
 //! first item that differs. `run`, `verify`, `precision`, `advise` and `stress`
 //! ask in no other way.
 
-use super::{Difference, Reference};
+use super::Difference;
 use crate::geometry::Aabb;
 use crate::index::caught;
 use crate::query::{AnyVolume, ItemId};
@@ -18,31 +18,45 @@ pub enum Fault {
     Differs(Difference),
 }
 
-/// One question at a time; the memory serves all of them.
+/// One question at a time; the memory serves all of them. The reference is each box
+/// against each plane with [`AnyVolume::sees`]: no structure, no mask, no early way
+/// out.
 pub struct Trial {
-    reference: Reference,
-    answer: Vec<ItemId>,
+    /// Per item: the number of the question that marked it last, twice: +0 if
+    /// the reference wants it, +1 once a structure has returned it.
+    marks: Vec<u64>,
+    stamp: u64,
     expected: usize,
+    answer: Vec<ItemId>,
 }
 
 impl Trial {
     /// For questions about so many items.
     pub fn new(items: usize) -> Trial {
         Trial {
-            reference: Reference::new(items),
-            answer: Vec::new(),
+            marks: vec![0; items],
+            stamp: 0,
             expected: 0,
+            answer: Vec::new(),
         }
     }
 
-    /// The question what a view sees, answered by the reference scan. O(items).
+    /// The question what a view sees, answered by the reference scan.
+    /// O(items * planes).
     pub fn see<'v>(&mut self, items: &[Aabb], view: impl Into<AnyVolume<'v>>) {
-        self.expected = self.reference.see(items, view);
+        let view = view.into();
+        let wanted = items.iter().zip(0..).filter(|(b, _)| view.sees(b));
+        self.expect(wanted.map(|(_, id)| id));
     }
 
     /// A question whose right answer is known.
     pub fn expect(&mut self, right: impl IntoIterator<Item = ItemId>) {
-        self.expected = self.reference.expect(right.into_iter());
+        self.stamp += 2;
+        self.expected = 0;
+        for id in right {
+            self.marks[id as usize] = self.stamp;
+            self.expected += 1;
+        }
     }
 
     /// Number of items of the right answer.
@@ -58,7 +72,7 @@ impl Trial {
     pub fn ask(&mut self, ask: impl FnOnce(&mut Vec<ItemId>)) -> Result<&[ItemId], Fault> {
         self.answer.clear();
         caught(|| ask(&mut self.answer)).map_err(Fault::Panicked)?;
-        let difference = self.reference.compare(&self.answer);
+        let difference = self.compare();
         match difference.is_none() {
             true => Ok(&self.answer),
             false => Err(Fault::Differs(difference)),
@@ -68,6 +82,41 @@ impl Trial {
     /// What was answered last, right or wrong.
     pub fn answer(&self) -> &[ItemId] {
         &self.answer
+    }
+
+    /// Compares the answer, in any order, with the reference. O(items) in the worst
+    /// case, O(answer) if it is right.
+    fn compare(&mut self) -> Difference {
+        let found = &self.answer;
+        let mut difference = Difference::default();
+        let mut right = 0;
+        for &id in found {
+            let bad = match self.marks.get_mut(id as usize) {
+                Some(mark) if *mark == self.stamp => {
+                    *mark += 1;
+                    right += 1;
+                    continue;
+                }
+                Some(mark) if *mark == self.stamp + 1 => &mut difference.invalid,
+                Some(_) => &mut difference.extra,
+                None => &mut difference.invalid,
+            };
+            *bad += 1;
+            difference.first.get_or_insert(id);
+        }
+        difference.missing = self.expected - right;
+        if difference.missing > 0 {
+            let lost = self.marks.iter().position(|mark| *mark == self.stamp);
+            difference.first = lost.map(|id| id as ItemId);
+        }
+        // Ready for the next structure.
+        for &id in found {
+            let mark = self.marks.get_mut(id as usize);
+            if let Some(mark) = mark.filter(|m| **m == self.stamp + 1) {
+                *mark = self.stamp;
+            }
+        }
+        difference
     }
 }
 

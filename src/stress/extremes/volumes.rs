@@ -10,7 +10,7 @@ use crate::geometry::{
 };
 use crate::index::StructureSpec;
 use crate::oracle::{Oracle, Verdict};
-use crate::query::{AnyVolume, ItemId};
+use crate::query::AnyVolume;
 use crate::scene::{Regions, SeededRng};
 use crate::verify::{RandomCase, Trial, VOLUME_KINDS, explain_visibility};
 
@@ -139,8 +139,7 @@ impl PlanesCase {
             };
             for (name, view, items) in &views {
                 let index = if *name == "sphere" { spheres } else { boxes };
-                let wanted = items.iter().zip(0..).filter(|(b, _)| view.sees(b));
-                trial.expect(wanted.map(|(_, id): (_, ItemId)| id));
+                trial.see(items, *view);
                 found.tried(&mut trial, &spec.label, name, self.items.len(), |out| {
                     index.query(*view, out);
                 });

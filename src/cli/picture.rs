@@ -1,7 +1,49 @@
-//! The logarithmic axes of the pictures: from the values to a range that always
-//! has an end, and which values have a place on it.
+//! What the pictures share: how one becomes a file, their colours, and logarithmic
+//! axes, from the values to a range that always has an end, and which values have a
+//! place on it.
 
+use std::error::Error;
 use std::ops::Range;
+
+use anyhow::anyhow;
+use plotters::coord::Shift;
+use plotters::prelude::*;
+
+use super::text;
+
+/// What drawing ends with.
+pub type Drawn = Result<(), Box<dyn Error>>;
+
+/// Told apart also without colours of their own names: dark to light.
+pub const COLOURS: [RGBColor; 8] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(86, 180, 233),
+    RGBColor(230, 159, 0),
+    RGBColor(0, 0, 0),
+    RGBColor(120, 120, 120),
+];
+
+/// A picture of that size on white, as lines of SVG; `what` it is, if it cannot be
+/// drawn.
+pub fn svg(
+    what: &str,
+    size: (u32, u32),
+    draw: impl FnOnce(&DrawingArea<SVGBackend, Shift>) -> Drawn,
+) -> anyhow::Result<String> {
+    let mut svg = String::new();
+    let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
+    let drawn = || -> Drawn {
+        root.fill(&WHITE)?;
+        draw(&root)?;
+        Ok(root.present()?)
+    };
+    drawn().map_err(|error| anyhow!("{what} cannot be drawn: {error}"))?;
+    drop(root);
+    Ok(text::lines(&svg))
+}
 
 /// What a figure can be and mean something: from far below a nanosecond to the
 /// age of the universe in nanoseconds, and then some. Beyond the range of
@@ -33,7 +75,7 @@ pub fn left_out(count: usize) -> String {
         0 => String::new(),
         _ => format!(
             " ({} beyond the axis left out)",
-            super::text::counted(count, "point")
+            text::counted(count, "point")
         ),
     }
 }
