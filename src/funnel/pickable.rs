@@ -6,7 +6,7 @@ use std::rc::Rc;
 use super::world::World;
 use crate::query::ItemId;
 use crate::scene::Surfaces;
-use crate::visibility::pick::{BACK_ENDS, Pick, SURFACE_BACK_ENDS, SolidSurfaces};
+use crate::visibility::pick::{BACK_ENDS, BackEnd, Facets, Pick, SolidSurfaces};
 use crate::visibility::truth::{Probe, RayIndex};
 use crate::visibility::{Guarantee, Ray, Solids};
 
@@ -51,27 +51,27 @@ impl<'w> Pickable<'w> {
             Pickable::Boxes(solids) => solids.boxes.len(),
             Pickable::Triangles(surfaces, _) => surfaces.triangles.len(),
         };
-        let suits = |name: &str| count <= most_for_loop || name != "linear";
-        let built = |name, summary, guarantee, pick: Box<dyn Pick>| Built {
-            name,
-            summary,
-            guarantee,
-            pick: pick.into(),
+        let facets = match self {
+            Pickable::Boxes(_) => None,
+            Pickable::Triangles(surfaces, items) => Some(Facets::of(surfaces, items)),
         };
-        match self {
-            Pickable::Boxes(solids) => BACK_ENDS
-                .iter()
-                .filter(|row| suits(row.name))
-                .filter_map(|row| Some((row, (row.build)(solids).ok()?)))
-                .map(|(row, pick)| built(row.name, row.summary, row.guarantee, pick))
-                .collect(),
-            Pickable::Triangles(surfaces, items) => SURFACE_BACK_ENDS
-                .iter()
-                .filter(|row| suits(row.name))
-                .filter_map(|row| Some((row, (row.build)(surfaces, items).ok()?)))
-                .map(|(row, pick)| built(row.name, row.summary, row.guarantee, pick))
-                .collect(),
-        }
+        let build = |row: &BackEnd| match (self, &facets) {
+            (Pickable::Boxes(solids), _) => (row.build)(solids).ok(),
+            (_, Some(facets)) => row.build_triangles?(facets).ok(),
+            (_, None) => None,
+        };
+        let rows = BACK_ENDS
+            .iter()
+            .filter(|row| count <= most_for_loop || row.name != "linear");
+        let built = rows.filter_map(|row| {
+            Some(Built {
+                name: row.name,
+                summary: row.summary,
+                guarantee: row.guarantee,
+                pick: build(row)?.into(),
+            })
+        });
+        built.collect()
     }
 
     /// What is true of it.

@@ -1,12 +1,18 @@
 //! The crate bvh: its `traverse` with a slab test hands back all that lies on the
-//! ray, from which the first is taken.
+//! ray, from which the first is taken; triangles by its own test of one.
 
 use ::bvh::aabb::{Aabb as TheirBox, IntersectsAabb};
 use ::bvh::bvh::Bvh;
-use glam::DVec3;
+use ::bvh::ray::Ray as TheirRay;
+use glam::{DVec3, Vec3};
+use nalgebra::{Point3, Vector3};
 
-use super::contract::{BackEnd, Hit, NotBuilt, Pick, keep_nearest, refuse_stacks};
+use super::contract::{
+    BackEnd, Hit, NotBuilt, Pick, keep_nearest, keep_nearest_items, refuse_stacks,
+};
+use super::facets::Facets;
 use super::rounded::RoundedRay;
+use crate::geometry::Aabb;
 use crate::index::Record;
 use crate::index::peers::{Shape, bounds_of};
 use crate::visibility::{Guarantee, Ray, Solids};
@@ -17,6 +23,7 @@ pub const ROW: BackEnd = BackEnd {
     summary: "crate bvh, its traverse: all items on the ray, then the first",
     guarantee: Guarantee::Unproven,
     build,
+    build_triangles: Some(|facets| Ok(Box::new(BvhTriangles::of(facets)?))),
 };
 
 /// The line from the origin to the far plane. The crate's own ray has a
@@ -37,13 +44,18 @@ pub struct PickBvh {
     zero: DVec3,
 }
 
+fn tree(boxes: &[Aabb]) -> Result<(Bvh<f32, 3>, Vec<Shape>), NotBuilt> {
+    refuse_stacks(ROW.name, boxes)?;
+    let records = Record::numbered(boxes).into_iter();
+    let mut shapes: Vec<Shape> = records.map(Shape::from).collect();
+    Ok((Bvh::build(&mut shapes), shapes))
+}
+
 /// Builds it for the table of back ends.
 fn build(solids: &Solids) -> Result<Box<dyn Pick>, NotBuilt> {
-    refuse_stacks(ROW.name, &solids.outer)?;
-    let records = Record::numbered(&solids.outer).into_iter();
-    let mut shapes: Vec<Shape> = records.map(Shape::from).collect();
+    let (tree, shapes) = tree(&solids.outer)?;
     Ok(Box::new(PickBvh {
-        tree: Bvh::build(&mut shapes),
+        tree,
         shapes,
         zero: solids.origin,
     }))
@@ -69,5 +81,66 @@ impl Pick for PickBvh {
         hits.clear();
         hits.extend(self.met(ray));
         keep_nearest(hits, count);
+    }
+}
+
+/// Its tree over triangles; shapes are their places.
+struct BvhTriangles {
+    tree: Bvh<f32, 3>,
+    shapes: Vec<Shape>,
+    facets: Facets,
+}
+
+impl BvhTriangles {
+    fn of(facets: &Facets) -> Result<BvhTriangles, NotBuilt> {
+        let (tree, shapes) = tree(&facets.bounds())?;
+        Ok(BvhTriangles {
+            tree,
+            shapes,
+            facets: facets.clone(),
+        })
+    }
+
+    /// Places of the triangles on the ray with their depths.
+    fn met(&self, ray: &Ray) -> impl Iterator<Item = (usize, f32)> {
+        let line = Line(RoundedRay::of(ray, self.facets.origin));
+        let rounded = &line.0;
+        let point = |v: Vec3| Point3::new(v.x, v.y, v.z);
+        let direction = rounded.direction;
+        let along = Vector3::new(direction.x, direction.y, direction.z);
+        let theirs = TheirRay::new(point(rounded.origin), along);
+        let unit = 1.0 / direction.length();
+        let (near, far) = (rounded.near, rounded.far);
+        let found = self.tree.traverse(&line, &self.shapes);
+        found.into_iter().filter_map(move |shape| {
+            let place = shape.item.id as usize;
+            let facet = &self.facets.all[place];
+            let [a, b, c] = facet.corners.map(point);
+            let mut met = theirs.intersects_triangle(&a, &b, &c).distance;
+            // Its test is of one side.
+            if facet.two_sided && met.is_infinite() {
+                met = theirs.intersects_triangle(&a, &c, &b).distance;
+            }
+            let depth = met * unit;
+            (depth >= near && depth <= far).then_some((place, depth))
+        })
+    }
+}
+
+impl Pick for BvhTriangles {
+    fn first(&self, ray: &Ray) -> Option<Hit> {
+        let item = |place: usize| self.facets.all[place].item;
+        let order = |a: &(usize, f32), b: &(usize, f32)| {
+            a.1.total_cmp(&b.1).then(item(a.0).cmp(&item(b.0)))
+        };
+        let (place, depth) = self.met(ray).min_by(order)?;
+        self.facets.hit(place, f64::from(depth))
+    }
+
+    fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {
+        hits.clear();
+        let hit = |(place, depth)| self.facets.hit(place, f64::from(depth));
+        hits.extend(self.met(ray).filter_map(hit));
+        keep_nearest_items(hits, count);
     }
 }

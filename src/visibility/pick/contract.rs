@@ -3,6 +3,7 @@
 
 use std::cmp::Ordering;
 
+use super::facets::Facets;
 use crate::geometry::Aabb;
 use crate::index::ploc;
 use crate::query::ItemId;
@@ -25,8 +26,8 @@ impl Hit {
     }
 }
 
-/// Items of a scene that rays are asked about, as solids: which of them a ray
-/// meets is said where [`Solids`] are.
+/// Items of a scene that rays are asked about: which of them a ray meets is said where
+/// [`Solids`] are, and for triangles where [`Facets`] are.
 pub trait Pick: Send + Sync {
     /// The first item that the ray meets; of several at the same depth the one
     /// with the lowest id.
@@ -38,6 +39,9 @@ pub trait Pick: Send + Sync {
     /// more.
     fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>);
 }
+
+/// Builds a back end over the triangles of a scene.
+pub type BuildTriangles = fn(&Facets) -> Result<Box<dyn Pick>, NotBuilt>;
 
 /// A row of the table of back ends.
 #[derive(Clone, Copy, Debug)]
@@ -55,6 +59,11 @@ pub struct BackEnd {
     /// # Errors
     /// As [`NotBuilt`] says.
     pub build: fn(&Solids) -> Result<Box<dyn Pick>, NotBuilt>,
+    /// Builds it over triangles, if it takes them. Deterministic.
+    ///
+    /// # Errors
+    /// As [`NotBuilt`] says.
+    pub build_triangles: Option<BuildTriangles>,
 }
 
 /// A back end that cannot hold the items.
@@ -97,6 +106,13 @@ pub(super) fn keep_nearest(hits: &mut Vec<Hit>, count: usize) {
     } else if count == 0 {
         hits.clear();
     }
+}
+
+/// As [`keep_nearest`], of hits of which an item may have several: the first of each.
+pub(super) fn keep_nearest_items(hits: &mut Vec<Hit>, count: usize) {
+    hits.sort_unstable_by(|a, b| a.item.cmp(&b.item).then(Hit::order(a, b)));
+    hits.dedup_by_key(|hit| hit.item);
+    keep_nearest(hits, count);
 }
 
 /// Refuses more items with the same bounds than a builder gets which needs

@@ -4,10 +4,11 @@
 use std::cmp::Ordering;
 
 use super::contract::Hit;
+use super::facets::Facet;
 use crate::query::ItemId;
 use crate::scene::WorldBox;
 use crate::visibility::Ray;
-use crate::visibility::truth::{Crossing, Probe};
+use crate::visibility::truth::{Crossing, Meeting, Probe, TriangleProbe};
 
 /// An item that the ray meets, with its exact depth.
 #[derive(Clone, Copy, Debug)]
@@ -71,4 +72,77 @@ pub(super) fn nearest<'a>(
         all.truncate(kept);
     }
     hits.extend(all.iter().map(Met::hit));
+}
+
+/// By depth, then by id.
+#[inline]
+pub(super) fn order_of_meetings(
+    probe: &TriangleProbe,
+    a: &(ItemId, Meeting),
+    b: &(ItemId, Meeting),
+) -> Ordering {
+    probe.compare(&a.1, &b.1).then(a.0.cmp(&b.0))
+}
+
+fn meeting(probe: &TriangleProbe, facet: &Facet, limit: f64) -> Option<(ItemId, Meeting)> {
+    let at = probe.meet(facet.corners, facet.two_sided, limit)?;
+    Some((facet.item, at))
+}
+
+/// The first of the triangles, if it is of one of the items that count.
+pub(super) fn first_facet<'a>(
+    probe: &TriangleProbe,
+    facets: impl Iterator<Item = &'a Facet>,
+    items: usize,
+) -> Option<Hit> {
+    let mut best: Option<(ItemId, Meeting)> = None;
+    for facet in facets {
+        let limit = best.map_or(f64::INFINITY, |best| best.1.at_most());
+        if let Some(met) = meeting(probe, facet, limit)
+            && best.is_none_or(|best| order_of_meetings(probe, &met, &best).is_lt())
+        {
+            best = Some(met);
+        }
+    }
+    let (item, at) = best?;
+    let depth = at.depth;
+    ((item as usize) < items).then_some(Hit { item, depth })
+}
+
+/// As [`nearest`], of the triangles of the items that count.
+pub(super) fn nearest_facets<'a>(
+    probe: &TriangleProbe,
+    facets: impl Iterator<Item = &'a Facet>,
+    items: usize,
+    count: usize,
+    hits: &mut Vec<Hit>,
+) {
+    let that_count = facets.filter(|facet| (facet.item as usize) < items);
+    let met = that_count.filter_map(|facet| meeting(probe, facet, f64::INFINITY));
+    nearest_meetings(probe, met.collect(), count, hits);
+}
+
+/// The first meeting of each item, the first `count` of these and all that are as deep as
+/// the last of them.
+pub(super) fn nearest_meetings(
+    probe: &TriangleProbe,
+    mut met: Vec<(ItemId, Meeting)>,
+    count: usize,
+    hits: &mut Vec<Hit>,
+) {
+    hits.clear();
+    met.sort_unstable_by(|(a, at_a), (b, at_b)| a.cmp(b).then(probe.compare(at_a, at_b)));
+    met.dedup_by_key(|(item, _)| *item);
+    met.sort_by(|(_, a), (_, b)| probe.compare(a, b));
+    if let Some((_, last)) = count.checked_sub(1).and_then(|last| met.get(last)).copied() {
+        let kept = met.partition_point(|(_, at)| probe.compare(at, &last).is_le());
+        met.truncate(kept);
+    } else if count == 0 {
+        met.clear();
+    }
+    let hit = |&(item, at): &(ItemId, Meeting)| Hit {
+        item,
+        depth: at.depth,
+    };
+    hits.extend(met.iter().map(hit));
 }

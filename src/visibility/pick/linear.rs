@@ -2,16 +2,19 @@
 
 use super::contract::{BackEnd, Hit, Pick};
 use super::exactly;
+use super::facets::Facets;
 use crate::query::ItemId;
 use crate::scene::WorldBox;
+use crate::visibility::truth::TriangleProbe;
 use crate::visibility::{Guarantee, Ray, Solids};
 
 /// The row of this file.
 pub const ROW: BackEnd = BackEnd {
     name: "linear",
-    summary: "every item, in exact arithmetic: the reference",
+    summary: "every box or triangle, in exact arithmetic: the reference",
     guarantee: Guarantee::Exact,
     build: |solids| Ok(Box::new(Linear::of(solids))),
+    build_triangles: Some(|facets| Ok(Box::new(EveryTriangle(facets.clone())))),
 };
 
 /// All items in the order of their ids.
@@ -45,5 +48,27 @@ impl Pick for Linear {
     /// O(n), and sorting what the ray meets.
     fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {
         exactly::nearest(ray, count, self.candidates(), hits);
+    }
+}
+
+/// All triangles in the order of their items.
+struct EveryTriangle(Facets);
+
+impl EveryTriangle {
+    fn probe(&self, ray: &Ray) -> TriangleProbe {
+        TriangleProbe::new(*ray, self.0.origin)
+    }
+}
+
+impl Pick for EveryTriangle {
+    /// O(triangles).
+    fn first(&self, ray: &Ray) -> Option<Hit> {
+        exactly::first_facet(&self.probe(ray), self.0.all.iter(), self.0.items)
+    }
+
+    /// O(triangles), and sorting what the ray meets.
+    fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {
+        let facets = self.0.all.iter();
+        exactly::nearest_facets(&self.probe(ray), facets, self.0.items, count, hits);
     }
 }

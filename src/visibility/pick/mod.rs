@@ -1,15 +1,16 @@
 //! Picking, the selection under the cursor: the first item that a ray meets, the
 //! nearest few, and everything through a cursor's frustum. One file a back end;
-//! what a ray meets is said where [`Solids`](super::Solids) are. Triangles have back ends of
-//! their own ([`SURFACE_BACK_ENDS`]).
+//! what a ray meets is said where [`Solids`](super::Solids) are, and for triangles where
+//! [`Facets`] are.
 
 mod contract;
 mod cursor;
 mod exactly;
+mod facets;
 mod linear;
 mod obvhs;
 mod rounded;
-mod surfaces;
+mod solid_surfaces;
 mod wide_ray;
 
 #[cfg(feature = "peers")]
@@ -24,10 +25,11 @@ mod rstar;
 #[cfg(test)]
 mod tests;
 
-pub use contract::{BackEnd, Hit, NotBuilt, Pick};
+pub use contract::{BackEnd, BuildTriangles, Hit, NotBuilt, Pick};
 pub use cursor::CursorRectangle;
+pub use facets::{Facet, Facets};
 pub use linear::Linear;
-pub use surfaces::{SURFACE_BACK_ENDS, SolidSurfaces, SurfaceBackEnd};
+pub use solid_surfaces::SolidSurfaces;
 pub use wide_ray::WideRay;
 
 /// All back ends, the reference first.

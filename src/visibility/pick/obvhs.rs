@@ -1,13 +1,17 @@
-//! The crate obvhs by its own ray traversals, boxes as primitives: over its binary
-//! tree, and over its eight-wide one with quantised nodes.
+//! The crate obvhs by its own ray traversals, boxes or its own triangles as primitives:
+//! over its binary tree, and over its eight-wide one with quantised nodes.
 
 use ::obvhs::bvh2::Bvh2;
 use ::obvhs::cwbvh::CwBvh;
 use ::obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
 use ::obvhs::ray::{Ray as TheirRay, RayHit};
+use ::obvhs::triangle::Triangle as TheirTriangle;
 use glam::DVec3;
 
-use super::contract::{BackEnd, Hit, NotBuilt, Pick, keep_nearest, refuse_stacks};
+use super::contract::{
+    BackEnd, Hit, NotBuilt, Pick, keep_nearest, keep_nearest_items, refuse_stacks,
+};
+use super::facets::Facets;
 use super::rounded::RoundedRay;
 use crate::geometry::Aabb;
 use crate::index::ploc;
@@ -21,6 +25,7 @@ pub const ROW: BackEnd = BackEnd {
     // Rays, nodes and boxes are rounded to f32.
     guarantee: Guarantee::Unproven,
     build: |solids| Obvhs::<Bvh2>::boxed(solids, ROW.name),
+    build_triangles: Some(|facets| ObvhsTriangles::<Bvh2>::boxed(facets, ROW.name)),
 };
 
 /// The row of the eight-wide tree.
@@ -29,6 +34,7 @@ pub const ROW_WIDE: BackEnd = BackEnd {
     summary: "crate obvhs, eight-wide quantised tree, its ray_traverse",
     guarantee: Guarantee::Unproven,
     build: |solids| Obvhs::<CwBvh>::boxed(solids, ROW_WIDE.name),
+    build_triangles: Some(|facets| ObvhsTriangles::<CwBvh>::boxed(facets, ROW_WIDE.name)),
 };
 
 /// A tree of the crate that rays are cast through.
@@ -45,20 +51,15 @@ trait Cast: Sized + Send + Sync + 'static {
     fn all(&self, ray: TheirRay, visit: impl FnMut(&TheirRay, usize));
 }
 
-/// The binary tree, ready for its walks.
-pub(super) fn binary_tree(boxes: &[Aabb]) -> Bvh2 {
-    let mut tree = ploc::build(boxes, ploc::ONE_A_LEAF);
-    tree.reorder_in_stack_traversal_order();
-    // A walk keeps one entry a level; the crate's default is 96.
-    if !tree.nodes.is_empty() {
-        tree.max_depth = tree.max_depth.max(tree.depth(0) + 2);
-    }
-    tree
-}
-
 impl Cast for Bvh2 {
     fn of(boxes: &[Aabb]) -> Bvh2 {
-        binary_tree(boxes)
+        let mut tree = ploc::build(boxes, ploc::ONE_A_LEAF);
+        tree.reorder_in_stack_traversal_order();
+        // A walk keeps one entry a level; the crate's default is 96.
+        if !tree.nodes.is_empty() {
+            tree.max_depth = tree.max_depth.max(tree.depth(0) + 2);
+        }
+        tree
     }
 
     fn order(&self) -> &[u32] {
@@ -124,7 +125,7 @@ impl<T: Cast> Obvhs<T> {
 
 /// A ray as the crate takes it.
 #[inline(always)]
-pub(super) fn their_ray(ray: &RoundedRay) -> TheirRay {
+fn their_ray(ray: &RoundedRay) -> TheirRay {
     TheirRay::new(
         ray.origin.into(),
         ray.direction.into(),
@@ -153,5 +154,73 @@ impl<T: Cast> Pick for Obvhs<T> {
         };
         self.tree.all(their_ray(&rounded), visit);
         keep_nearest(hits, count);
+    }
+}
+
+/// A tree over triangles.
+struct ObvhsTriangles<T> {
+    tree: T,
+    /// In the order of its primitives, as it takes them.
+    triangles: Vec<(TheirTriangle, bool, ItemId)>,
+    zero: DVec3,
+    items: usize,
+}
+
+impl<T: Cast> ObvhsTriangles<T> {
+    fn boxed(facets: &Facets, name: &'static str) -> Result<Box<dyn Pick>, NotBuilt> {
+        let boxes = facets.bounds();
+        refuse_stacks(name, &boxes)?;
+        let tree = T::of(&boxes);
+        let placed = tree.order().iter().map(|&place| {
+            let facet = &facets.all[place as usize];
+            let [v0, v1, v2] = facet.corners.map(Into::into);
+            (TheirTriangle { v0, v1, v2 }, facet.two_sided, facet.item)
+        });
+        Ok(Box::new(ObvhsTriangles {
+            triangles: placed.collect(),
+            zero: facets.origin,
+            items: facets.items,
+            tree,
+        }))
+    }
+
+    /// Depth at which a triangle is met, infinite if it is not.
+    #[inline(always)]
+    fn depth(&self, ray: &TheirRay, near: f32, place: usize) -> f32 {
+        let (triangle, two_sided, _) = &self.triangles[place];
+        let [u, v] = [triangle.v1 - triangle.v0, triangle.v2 - triangle.v0];
+        let is_behind = u.cross(v).dot(ray.direction) >= 0.0;
+        let depth = triangle.intersect(ray);
+        match depth >= near && (*two_sided || !is_behind) {
+            true => depth,
+            false => f32::INFINITY,
+        }
+    }
+}
+
+impl<T: Cast> Pick for ObvhsTriangles<T> {
+    fn first(&self, ray: &Ray) -> Option<Hit> {
+        let rounded = RoundedRay::of(ray, self.zero);
+        let mut found = RayHit::none();
+        let entry = |ray: &TheirRay, place: usize| self.depth(ray, rounded.near, place);
+        self.tree.first(their_ray(&rounded), &mut found, entry);
+        let (_, _, item) = *self.triangles.get(found.primitive_id as usize)?;
+        let depth = f64::from(found.t);
+        ((item as usize) < self.items).then_some(Hit { item, depth })
+    }
+
+    fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {
+        let rounded = RoundedRay::of(ray, self.zero);
+        hits.clear();
+        let visit = |ray: &TheirRay, place: usize| {
+            let depth = self.depth(ray, rounded.near, place);
+            let item = self.triangles[place].2;
+            if depth <= rounded.far && (item as usize) < self.items {
+                let depth = f64::from(depth);
+                hits.push(Hit { item, depth });
+            }
+        };
+        self.tree.all(their_ray(&rounded), visit);
+        keep_nearest_items(hits, count);
     }
 }

@@ -16,6 +16,7 @@ pub const ROW: BackEnd = BackEnd {
     summary: "crate rstar, selection by a slab test, then the first",
     guarantee: Guarantee::Unproven,
     build,
+    build_triangles: None,
 };
 
 struct Line(RoundedRay);

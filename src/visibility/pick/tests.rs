@@ -1,6 +1,8 @@
 //! Back ends against arithmetic on integers of any size, which shares nothing
 //! with theirs.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
 use super::*;
@@ -8,7 +10,8 @@ use crate::camera::{Camera, Frame, Lens, Surroundings};
 use crate::index::{self, FrustumQuery, Input, RegionIndex};
 use crate::kernel::Kernel;
 use crate::query::ItemId;
-use crate::scene::{Scene, SeededRng, WorldBox, load};
+use crate::scene::{Sample, Scene, SeededRng, Surfaces, WorldBox, load};
+use crate::visibility::region::doom::DoomMap;
 use crate::visibility::truth::judge::{self, Depth};
 use crate::visibility::truth::{NO_ITEM, RayIndex, SampleTruth};
 use crate::visibility::{Guarantee, Ray, Rays, SampleGrid, Solids};
@@ -335,4 +338,97 @@ fn a_cursors_frustum_holds_what_every_ray_through_it_meets_and_no_more_than_its_
         }
     }
     assert!(met > 100 && found > 300, "the premise: {met} {found}");
+}
+
+fn ray(origin: DVec3, direction: DVec3) -> Ray {
+    Ray {
+        origin,
+        direction,
+        near: 0.5,
+        far: 1e4,
+    }
+}
+
+/// Every back end that takes triangles.
+fn triangle_back_ends(facets: &Facets) -> Vec<(&'static BackEnd, Box<dyn Pick>)> {
+    let built = BACK_ENDS.iter().filter_map(|row| {
+        let build = row.build_triangles?;
+        Some((row, build(facets).unwrap()))
+    });
+    built.collect()
+}
+
+fn items(hits: &[Hit]) -> Vec<ItemId> {
+    hits.iter().map(|hit| hit.item).collect()
+}
+
+#[test]
+fn boxes_as_triangles_are_picked_as_boxes_are() {
+    let scene = load("city:n=300", &Default::default()).unwrap();
+    let reference = Linear::of(&Solids::of(&scene));
+    let facets = Facets::of(&Surfaces::from_boxes(&scene), scene.items.len());
+    let bounds = scene.bounds;
+    let (min, max) = bounds.in_world(scene.origin);
+    let built = triangle_back_ends(&facets);
+    assert!(built.len() >= 4);
+    let mut rng = SeededRng::new(11);
+    let (mut met, mut differ) = (0, 0);
+    let mut hits = Vec::new();
+    for _ in 0..3000 {
+        let origin = min + (max - min) * rng.point();
+        let direction = DVec3::new(rng.normal(), rng.normal(), rng.normal() * 0.2);
+        let ray = ray(origin, direction);
+        let first = reference.first(&ray).map(|hit| hit.item);
+        reference.nearest(&ray, 4, &mut hits);
+        let nearest = items(&hits);
+        met += usize::from(first.is_some());
+        for (row, pick) in &built {
+            pick.nearest(&ray, 4, &mut hits);
+            let same = pick.first(&ray).map(|hit| hit.item) == first && items(&hits) == nearest;
+            match row.guarantee {
+                Guarantee::Exact => assert!(same, "{}: {ray:?}", row.name),
+                _ => differ += usize::from(!same),
+            }
+        }
+    }
+    assert!(met > 400 && differ < 30 * built.len(), "{met} {differ}");
+}
+
+#[test]
+fn floors_and_ceilings_end_the_search_for_the_first_item_only() {
+    let sample = Sample::named("freedm-map12").unwrap();
+    let map = Arc::new(DoomMap::read(sample.bytes, sample.file, None).unwrap());
+    let scene = load("freedm-map12", &Default::default()).unwrap();
+    let surfaces = map.surfaces(&scene);
+    let count = scene.items.len();
+    let truth = SolidSurfaces::of(&surfaces, count);
+    let built = triangle_back_ends(&Facets::of(&surfaces, count));
+    let mut rng = SeededRng::new(5);
+    let (mut hidden, mut differ) = (0, 0);
+    let [mut wanted, mut found] = [Vec::new(), Vec::new()];
+    for _ in 0..600 {
+        let eye = scene.places[rng.below(scene.places.len())].eye;
+        let direction = DVec3::new(rng.normal(), rng.normal(), rng.normal() * 0.5);
+        let ray = ray(eye, direction);
+        let first = truth.first(&ray).map(|hit| hit.item);
+        truth.nearest(&ray, 8, &mut wanted);
+        assert!(wanted.iter().all(|hit| (hit.item as usize) < count));
+        hidden += usize::from(first.is_none() && !wanted.is_empty());
+        for (row, pick) in &built {
+            pick.nearest(&ray, 8, &mut found);
+            let same = pick.first(&ray).map(|hit| hit.item) == first;
+            match row.guarantee {
+                Guarantee::Exact => {
+                    assert!(
+                        same && items(&found) == items(&wanted),
+                        "{}: {ray:?}",
+                        row.name
+                    );
+                }
+                _ => differ += usize::from(!same),
+            }
+        }
+    }
+    let most = 60 * built.len();
+    assert!(hidden > 0 && differ < most, "{hidden} {differ}");
 }

@@ -8,7 +8,7 @@
 
 use std::cmp::Ordering;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, I64Vec3, Vec3};
 
 use crate::arithmetic::{Expansion, two_sum};
 use crate::visibility::Ray;
@@ -98,9 +98,13 @@ impl TriangleProbe {
     /// Where the ray meets a triangle, if that is from near to far, and from its front
     /// (where its corners turn counter-clockwise) if it is one-sided. `None` as well
     /// if it certainly meets it beyond `limit`.
-    #[inline]
+    #[inline(always)]
     pub fn meet(&self, corners: [Vec3; 3], two_sided: bool, limit: f64) -> Option<Meeting> {
-        let [a, b, c] = corners.map(Vec3::as_dvec3);
+        let (a, b, c) = (
+            corners[0].as_dvec3(),
+            corners[1].as_dvec3(),
+            corners[2].as_dvec3(),
+        );
         let direction = self.ray.direction;
         let (u, v, at) = (b - a, c - a, a + self.shift);
         let normal = u.cross(v);
@@ -157,7 +161,8 @@ impl TriangleProbe {
         if b.at_most() < a.at_least() {
             return Ordering::Greater;
         }
-        if a.corners == b.corners {
+        // Walls of two sides are twice in one plane, which the ray meets once.
+        if are_in_one_plane(a.corners, b.corners) {
             return Ordering::Equal;
         }
         self.compare_exactly(a, b)
@@ -225,6 +230,42 @@ impl TriangleProbe {
             sum
         })
     }
+}
+
+/// Whether the second triangle is in the plane of the first, one with area; `false` as well
+/// if their coordinates are no integers of 36 bits in any unit.
+fn are_in_one_plane(a: [Vec3; 3], b: [Vec3; 3]) -> bool {
+    if a == b {
+        return true;
+    }
+    const BITS: i32 = 36;
+    let corners = [a[0], a[1], a[2], b[0], b[1], b[2]];
+    let largest = corners.iter().fold(Vec3::ZERO, |most, p| most.max(p.abs()));
+    // Above the largest: no more than one in units of it.
+    let above = libm::frexp(f64::from(largest.max_element())).1;
+    let scale = libm::ldexp(1.0, BITS - above);
+    let mut integers = [I64Vec3::ZERO; 6];
+    for (at, corner) in integers.iter_mut().zip(corners) {
+        let scaled = corner.as_dvec3() * scale;
+        let rounded = scaled.as_i64vec3();
+        if rounded.as_dvec3() != scaled {
+            return false;
+        }
+        *at = rounded;
+    }
+    let [a, b, c, p, q, r] = integers;
+    // Sides of 37 bits, products of two sums of 75, of three 114.
+    let (u, v) = (b - a, c - a);
+    let of_two = |i: usize, j: usize| {
+        i128::from(u[i]) * i128::from(v[j]) - i128::from(u[j]) * i128::from(v[i])
+    };
+    let normal = [of_two(1, 2), of_two(2, 0), of_two(0, 1)];
+    let is_in = |p: I64Vec3| {
+        let at = p - a;
+        let [x, y, z] = [0, 1, 2].map(|k| normal[k] * i128::from(at[k]));
+        x + y + z == 0
+    };
+    is_in(p) && is_in(q) && is_in(r)
 }
 
 fn cross(a: &[Expansion; 3], b: &[Expansion; 3]) -> [Expansion; 3] {

@@ -53,7 +53,7 @@ const MOST_DEPTH: f64 = 1e38;
 /// Two f32 below and above a depth: one part in 2^24 is lost when they are
 /// rounded, and less than 1e-37 where they underflow. (Infinity has no lower one.)
 #[inline(always)]
-fn around(depth: f64) -> [f32; 2] {
+pub(super) fn around(depth: f64) -> [f32; 2] {
     let more = depth.abs() * f64::from(f32::EPSILON) + 1e-37;
     [(depth - more) as f32, (depth + more) as f32]
 }
@@ -82,15 +82,6 @@ pub(super) struct Tested<I: Isa> {
     pub lanes: LaneMask,
     /// Less the least depth at which it can enter each.
     pub less_entry: I::Floats,
-}
-
-/// Bounds of the depths of one box.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Bounds {
-    /// It is entered at this depth or later.
-    pub low: f32,
-    /// And at this depth or earlier, if it is met for certain; else infinite.
-    pub high: f32,
 }
 
 impl Slabs {
@@ -174,10 +165,11 @@ impl Slabs {
         }
     }
 
-    /// The bounds of one lane that [`Slabs::test`] let pass, `low` being what it
-    /// found; `None` if it is entered before the near plane for certain.
+    /// The box of one lane that [`Slabs::test`] let pass, `low` being what it found, is
+    /// entered at this depth or earlier if it is met for certain, else infinite; `None` if
+    /// it is entered before the near plane for certain.
     #[inline(always)]
-    pub fn bounds(&self, rows: &Rows, lane: usize, low: f32) -> Option<Bounds> {
+    pub fn latest(&self, rows: &Rows, lane: usize, low: f32) -> Option<f32> {
         let at = |row: usize, axis: usize, c: &[f32; 3]| {
             rows[row % 6][lane % LANES] * self.inverse[axis] + c[axis]
         };
@@ -192,6 +184,6 @@ impl Slabs {
         if low < self.near[1] || high > self.far[0] {
             high = f32::INFINITY;
         }
-        Some(Bounds { low, high })
+        Some(high)
     }
 }
