@@ -45,11 +45,17 @@ impl WideRay {
     /// [`Pick::first`] by an instruction set of one's choice.
     #[inline]
     pub fn first_by(&self, kernel: Kernel, ray: &Ray) -> Option<Hit> {
-        kernel.run(First { boxes: self, ray })
+        match self.tree.is_passed_by(ray) {
+            true => None,
+            false => kernel.run(First { boxes: self, ray }),
+        }
     }
 
     /// [`Pick::nearest`] by an instruction set of one's choice.
     pub fn nearest_by(&self, kernel: Kernel, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {
+        if count == 0 || self.tree.is_passed_by(ray) {
+            return hits.clear();
+        }
         kernel.run(Nearest {
             boxes: self,
             ray,
@@ -137,9 +143,6 @@ impl Work for First<'_> {
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) -> Option<Hit> {
         let First { boxes, ray } = self;
-        if boxes.tree.is_left_behind(ray) {
-            return None;
-        }
         let Some(slabs) = boxes.tree.slabs(ray) else {
             return exactly::first(ray, boxes.all());
         };
@@ -204,15 +207,9 @@ impl Work for Nearest<'_> {
             count,
             hits,
         } = self;
-        if boxes.tree.is_left_behind(ray) {
-            return hits.clear();
-        }
         let Some(slabs) = boxes.tree.slabs(ray) else {
             return exactly::nearest(ray, count, boxes.all(), hits);
         };
-        if count == 0 {
-            return hits.clear();
-        }
         let mut found = Several {
             count,
             far: slabs.far(),

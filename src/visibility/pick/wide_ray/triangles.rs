@@ -45,11 +45,17 @@ impl WideTriangles {
     /// [`Pick::first`] by an instruction set of one's choice.
     #[inline]
     pub fn first_by(&self, kernel: Kernel, ray: &Ray) -> Option<Hit> {
-        kernel.run(First { of: self, ray })
+        match self.tree.is_passed_by(ray) {
+            true => None,
+            false => kernel.run(First { of: self, ray }),
+        }
     }
 
     /// [`Pick::nearest`] by an instruction set of one's choice.
     pub fn nearest_by(&self, kernel: Kernel, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {
+        if count == 0 || self.tree.is_passed_by(ray) {
+            return hits.clear();
+        }
         kernel.run(Nearest {
             of: self,
             ray,
@@ -112,9 +118,6 @@ impl Work for First<'_> {
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) -> Option<Hit> {
         let First { of, ray } = self;
-        if of.tree.is_left_behind(ray) {
-            return None;
-        }
         let probe = of.probe(ray);
         let Some(slabs) = of.tree.slabs(ray) else {
             return exactly::first_facet(&probe, of.all(), of.items);
@@ -203,9 +206,6 @@ impl Work for Nearest<'_> {
             count,
             hits,
         } = self;
-        if count == 0 || of.tree.is_left_behind(ray) {
-            return hits.clear();
-        }
         let probe = of.probe(ray);
         let Some(slabs) = of.tree.slabs(ray) else {
             return exactly::nearest_facets(&probe, of.all(), of.items, count, hits);
