@@ -259,7 +259,7 @@ mod tests {
                 Facet {
                     corners: [at, at + grid(&mut rng, 5), at + grid(&mut rng, 5)],
                     item: (i / 2) as ItemId,
-                    two_sided: i % 3 > 0,
+                    two_sided: i % 3 != 1,
                 }
             };
             let facets = Facets {
