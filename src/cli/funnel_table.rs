@@ -51,7 +51,7 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
         );
         blocks.insert(2, Block::Line(line));
     }
-    // Drawn in order are solid boxes only.
+    // Not every scene has all of them.
     for (heading, table) in [
         (
             "What was removed within the frustum, by its proof, over all views",

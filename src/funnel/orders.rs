@@ -1,16 +1,23 @@
 //! The order in which what is left is drawn: how many fragments an early z-test keeps
 //! from being shaded, what a painter without z-test would get wrong, what sorting takes.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
+use glam::DVec3;
 use serde::Serialize;
 
 use super::pass::Pass;
 use super::stage::by_name;
 use super::times::Times;
 use super::world::World;
-use crate::visibility::fragment::order::ORDERS;
-use crate::visibility::fragment::{Canvas, DepthOrder, Piece, Surfaces, Tests, draw, order_errors};
+use crate::query::ItemId;
+use crate::visibility::fragment::order::{self, ORDERS};
+use crate::visibility::fragment::{
+    self, Canvas, DepthOrder, OrderErrors, Piece, Tally, Tests, ToOrder, draw, draw_surfaces,
+    order_errors,
+};
+use crate::visibility::truth::SurfaceIndex;
 use crate::visibility::{Guarantee, Rays, SampleGrid, Solids};
 
 /// A depth order over all views. Counts are means per view.
@@ -49,67 +56,88 @@ pub struct OrderRow {
 
 /// What is left of a view, and every order prepared for it.
 struct Left {
-    solids: Solids,
-    cut_outs: Option<Surfaces>,
+    items: Vec<ItemId>,
+    /// As they are, or the boxes about them.
+    boxes: Solids,
+    cut_outs: Option<fragment::Surfaces>,
     rays: Rays,
     orders: Vec<Box<dyn DepthOrder>>,
 }
 
 /// What is left of every view.
 pub struct Orders {
+    rows: Vec<&'static order::OrderRow>,
     views: Vec<Left>,
+    /// The triangles that are drawn, and the zero of their coordinates, of a scene whose
+    /// items are no solid boxes.
+    triangles: Option<(SurfaceIndex, DVec3)>,
 }
 
 impl Orders {
     /// For a set of items of each view.
-    pub fn of(world: &World, all: &Solids, pass: &Pass, set: usize) -> Orders {
+    pub fn of(world: &World, pass: &Pass, set: usize) -> Orders {
+        let surfaces = world.surfaces.as_deref();
+        let all = match &world.solids {
+            Some(solids) => Cow::Borrowed(solids),
+            None => Cow::Owned(Solids::of(world.scene)),
+        };
+        let mut rows = Vec::new();
         let views = (0..world.views()).map(|view| {
             let items = world.listed(pass.items(set, view));
-            let solids = all.some(&items);
+            let boxes = all.some(&items);
+            let triangles = surfaces.map(|surfaces| surfaces.some(&items));
+            let to_order = match &triangles {
+                None => ToOrder::boxes(&boxes),
+                Some(own) => ToOrder::surfaces(&boxes, own, world.scene.own_tree.as_ref()),
+            };
+            let built = ORDERS.iter();
+            let built = built.filter_map(|row| Some((row, (row.build)(&to_order)?)));
+            let (known, orders) = built.unzip();
+            rows = known;
             Left {
-                orders: ORDERS.iter().map(|row| (row.build)(&solids)).collect(),
+                orders,
                 rays: *world.rays(view),
                 cut_outs: world
                     .cut_outs
                     .as_ref()
                     .map(|surfaces| surfaces.some(&items)),
-                solids,
+                items: items.into_owned(),
+                boxes,
             }
         });
         Orders {
             views: views.collect(),
+            rows,
+            triangles: surfaces.map(|all| (SurfaceIndex::build(all), all.origin)),
         }
     }
 
-    /// Brings a view into an order; the number of pieces.
-    pub fn sort(&self, order: usize, view: usize, pieces: &mut Vec<Piece>) -> u64 {
+    /// How many orders there are.
+    pub fn count(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Brings a view into an order.
+    pub fn sort(&self, order: usize, view: usize, pieces: &mut Vec<Piece>) {
         let left = &self.views[view];
-        left.orders[order].order(&left.solids, left.rays.camera(), pieces);
-        pieces.len() as u64
+        left.orders[order].order(&left.boxes, left.rays.camera(), pieces);
     }
 
     /// Draws every view in every order; `None` if stopped.
     pub fn drawn(&self, samples: SampleGrid, stop: &dyn Fn() -> bool) -> Option<Vec<OrderRow>> {
-        let mut rows = Vec::new();
-        for (order, row) in ORDERS.iter().enumerate() {
-            let mut sums = [0.0; 7];
-            let mut exceptions = BTreeMap::new();
-            for (view, left) in self.views.iter().enumerate() {
-                if stop() {
-                    return None;
-                }
-                let canvas = Canvas::of(&left.rays, samples);
+        let mut sums = vec![[0.0; 7]; self.count()];
+        let mut exceptions = vec![BTreeMap::new(); self.count()];
+        for (view, left) in self.views.iter().enumerate() {
+            if stop() {
+                return None;
+            }
+            let sorted = (0..self.count()).map(|order| {
                 let mut pieces = Vec::new();
                 self.sort(order, view, &mut pieces);
-                if let Some(reason) = left.orders[order].exception(left.rays.camera()) {
-                    *exceptions.entry(reason).or_default() += 1;
-                }
-                let tests = Tests {
-                    surfaces: left.cut_outs.as_ref(),
-                    stencil: None,
-                };
-                let tally = draw(&canvas, &left.solids, &pieces, &tests).tally;
-                let errors = order_errors(&canvas, &left.solids, &pieces, &tests);
+                pieces
+            });
+            let counts = self.counted(left, samples, sorted.collect(), stop)?;
+            for (sums, (tally, errors)) in sums.iter_mut().zip(counts) {
                 let counts = [
                     tally.fragments,
                     tally.passed,
@@ -123,6 +151,14 @@ impl Orders {
                     *sum += count as f64 / self.views.len() as f64;
                 }
             }
+            for (order, exceptions) in left.orders.iter().zip(&mut exceptions) {
+                if let Some(reason) = order.exception(left.rays.camera()) {
+                    *exceptions.entry(reason).or_default() += 1;
+                }
+            }
+        }
+        let rows = self.rows.iter().zip(sums).zip(exceptions);
+        let rows = rows.map(|((row, sums), exceptions)| {
             let [
                 fragments,
                 shaded,
@@ -132,7 +168,7 @@ impl Orders {
                 wrong_samples,
                 cyclic,
             ] = sums;
-            rows.push(OrderRow {
+            OrderRow {
                 name: row.name,
                 summary: row.summary,
                 fragment_count: fragments,
@@ -146,11 +182,35 @@ impl Orders {
                 guarantee: row.guarantee,
                 exceptions,
                 times: Times::default(),
-            });
+            }
+        });
+        Some(rows.collect())
+    }
+
+    /// What each order of a view takes and gets wrong.
+    fn counted(
+        &self,
+        left: &Left,
+        samples: SampleGrid,
+        sorted: Vec<Vec<Piece>>,
+        stop: &dyn Fn() -> bool,
+    ) -> Option<Vec<(Tally, OrderErrors)>> {
+        if let Some((index, origin)) = &self.triangles {
+            let orders = left.orders.iter().map(|order| &**order);
+            let orders: Vec<_> = orders.zip(sorted).collect();
+            let (rays, items) = (&left.rays, &left.items);
+            return Some(draw_surfaces(rays, samples, index, *origin, items, &orders));
         }
-        Some(rows)
+        let canvas = Canvas::of(&left.rays, samples);
+        let tests = Tests {
+            surfaces: left.cut_outs.as_ref(),
+            stencil: None,
+        };
+        let counts = sorted.iter().map(|pieces| {
+            let tally = draw(&canvas, &left.boxes, pieces, &tests).tally;
+            let errors = order_errors(&canvas, &left.boxes, pieces, &tests);
+            (!stop()).then_some((tally, errors))
+        });
+        counts.collect()
     }
 }
-
-/// How many orders there are.
-pub const COUNT: usize = ORDERS.len();

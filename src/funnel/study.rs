@@ -12,7 +12,7 @@ use super::fragment_rows;
 use super::fragments;
 use super::judged::{Errors, Judged};
 use super::mirror::mirrored;
-use super::orders::{self, Orders};
+use super::orders::Orders;
 use super::pass::{Pass, Walked};
 use super::picks::Picks;
 use super::plan::{FunnelPlan, task};
@@ -27,7 +27,7 @@ use super::truth::Truth;
 use super::walks::Walks;
 use super::world::{FunnelInput, World};
 use crate::measure::{Ask, OverProcesses, ProcessTimes, TimedTask, Verdict};
-use crate::visibility::{Level, Solids};
+use crate::visibility::Level;
 
 /// Everything judged, and nothing timed.
 pub struct Prepared {
@@ -103,19 +103,16 @@ pub fn prepare(
     let Some(tested) = fragments::tested(&world, &pass, last, &truth, stop) else {
         return Ok(None);
     };
-    let (mut drawn, mut mirror) = (Vec::new(), None);
-    if let Some(boxes) = &left.boxes {
-        if let Some(item) = input.mirror {
-            let Some(row) = mirrored(item, &world, boxes.solids, &pass, last, stop) else {
-                return Ok(None);
-            };
-            mirror = Some(row);
-        }
-        let Some(rows) = boxes.orders.drawn(input.samples, stop) else {
+    let mut mirror = None;
+    if let (Some(solids), Some(item)) = (&world.solids, input.mirror) {
+        let Some(row) = mirrored(item, &world, solids, &pass, last, stop) else {
             return Ok(None);
         };
-        drawn = rows;
+        mirror = Some(row);
     }
+    let Some(drawn) = left.orders.drawn(input.samples, stop) else {
+        return Ok(None);
+    };
     let picked = left.picks.judged();
     // The tests of the fragment stage are not timed.
     let tasks = rows.iter().map(|(_, _, _, task, _)| *task);
@@ -257,13 +254,6 @@ fn sides_behind(
 struct Left<'w> {
     faces: Faces,
     picks: Picks<'w>,
-    /// None for a scene whose items are no solid boxes.
-    boxes: Option<LeftBoxes<'w>>,
-}
-
-/// What is asked of solid boxes only.
-struct LeftBoxes<'w> {
-    solids: &'w Solids,
     orders: Orders,
 }
 
@@ -273,10 +263,7 @@ impl<'w> Left<'w> {
         Left {
             faces: Faces::of(world, pass, set),
             picks: Picks::of(world),
-            boxes: world.solids.as_ref().map(|solids| LeftBoxes {
-                solids,
-                orders: Orders::of(world, solids, pass, set),
-            }),
+            orders: Orders::of(world, pass, set),
         }
     }
 }
@@ -309,16 +296,14 @@ fn timed_tasks<'p>(
         let ask: Ask = Box::new(move |view, out| left.faces.cull(place, view, out));
         ask
     });
-    let sorts = left.boxes.iter().flat_map(|LeftBoxes { orders, .. }| {
-        (0..orders::COUNT).map(move |order| {
-            let pieces = RefCell::new(Vec::new());
-            let ask: Ask = Box::new(move |view, out| {
-                let pieces = &mut *pieces.borrow_mut();
-                orders.sort(order, view, pieces);
-                out.extend(pieces.iter().map(|piece| piece.item));
-            });
-            ask
-        })
+    let sorts = (0..left.orders.count()).map(|order| {
+        let pieces = RefCell::new(Vec::new());
+        let ask: Ask = Box::new(move |view, out| {
+            let pieces = &mut *pieces.borrow_mut();
+            left.orders.sort(order, view, pieces);
+            out.extend(pieces.iter().map(|piece| piece.item));
+        });
+        ask
     });
     let picks = (0..left.picks.count()).map(|back_end| {
         let ask: Ask = Box::new(move |view, out| left.picks.ask(back_end, view, out));

@@ -84,22 +84,30 @@ impl Surfaces {
     /// # Panics
     /// If there is no such item.
     pub fn of_items(scene: &Scene, items: &[ItemId]) -> Surfaces {
-        let Some(mesh) = &scene.surfaces else {
-            return Surfaces::of_boxes(scene, items.iter().map(|&id| &scene.items[id as usize]));
-        };
-        let mut some = Surfaces::about(mesh.origin);
+        match &scene.surfaces {
+            Some(mesh) => mesh.some(items),
+            None => Surfaces::of_boxes(scene, items.iter().map(|&id| &scene.items[id as usize])),
+        }
+    }
+
+    /// Some of the items, numbered anew in this order.
+    ///
+    /// # Panics
+    /// If there is no such item.
+    pub fn some(&self, items: &[ItemId]) -> Surfaces {
+        let mut some = Surfaces::about(self.origin);
         for item in items.iter().map(|&id| id as usize) {
-            let triangles = &mesh.triangles[mesh.range(item)];
+            let triangles = &self.triangles[self.range(item)];
             let own = triangles.iter().flatten().copied();
             let (first, end) = own.fold((u32::MAX, 0), |(low, high), p| {
                 (low.min(p), high.max(p + 1))
             });
-            let points = &mesh.points[first.min(end) as usize..end as usize];
+            let points = &self.points[first.min(end) as usize..end as usize];
             let triangles: Vec<[u32; 3]> = triangles
                 .iter()
                 .map(|corners| corners.map(|p| p - first))
                 .collect();
-            some.push(mesh.kinds[item], mesh.two_sided[item], points, &triangles);
+            some.push(self.kinds[item], self.two_sided[item], points, &triangles);
         }
         some
     }

@@ -1,6 +1,6 @@
 //! The samples of an image, ready to be drawn on: it finds the fragments of a box.
 
-use super::order::Piece;
+use super::order::{Part, Piece};
 use super::screen::Screen;
 use super::stencil::Stencil;
 use crate::query::ItemId;
@@ -125,10 +125,14 @@ impl Canvas {
     ) -> Asked {
         let item = piece.item;
         let whole = &solids.boxes[item as usize];
-        let Some(part) = &piece.part else {
-            return self.meet(whole, stencil, |sample, at| {
-                found(Fragment { sample, item, at });
-            });
+        let part = match &piece.part {
+            Some(Part::Within(part)) => part,
+            // Leaves are of triangles.
+            Some(Part::InLeaf(_)) | None => {
+                return self.meet(whole, stencil, |sample, at| {
+                    found(Fragment { sample, item, at });
+                });
+            }
         };
         self.meet(part, stencil, |sample, of_part| {
             let probe = &self.probes[sample];

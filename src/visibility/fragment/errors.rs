@@ -24,12 +24,12 @@ pub struct OrderErrors {
     pub cyclic: usize,
 }
 
-/// A fragment and when it was drawn.
-#[derive(Clone, Copy)]
-struct Layer {
-    when: u32,
-    item: ItemId,
-    at: Crossing,
+/// A fragment, where its ray meets the item and when it was drawn.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Layer<A> {
+    pub when: u32,
+    pub item: ItemId,
+    pub at: A,
 }
 
 /// Compares an order from front to back with the exact one at every sample, of the
@@ -41,7 +41,7 @@ pub fn order_errors(
     pieces: &[Piece],
     tests: &Tests,
 ) -> OrderErrors {
-    let mut layers: Vec<Vec<Layer>> = vec![Vec::new(); canvas.grid().samples()];
+    let mut layers: Vec<Vec<Layer<Crossing>>> = vec![Vec::new(); canvas.grid().samples()];
     for (piece, when) in pieces.iter().zip(0..) {
         canvas.fragments(solids, piece, tests.stencil, |fragment| {
             if tests.keep(canvas, solids, &fragment) {
@@ -53,44 +53,75 @@ pub fn order_errors(
             }
         });
     }
-    let mut errors = OrderErrors::default();
-    let mut pairs = Pairs::default();
+    let mut errors = ErrorCount::default();
     for (sample, layers) in layers.iter_mut().enumerate() {
+        let probe = canvas.probe(sample);
+        errors.sample(layers, |a, b| probe.compare(a, b));
+    }
+    errors.all()
+}
+
+/// The errors so far, sample by sample.
+#[derive(Default)]
+pub(super) struct ErrorCount {
+    wrong_samples: u64,
+    pairs: Pairs,
+}
+
+impl ErrorCount {
+    /// One more sample: all its layers, and the exact order of two of them. They are left in
+    /// the order in which they were drawn, one for each item.
+    pub fn sample<A>(
+        &mut self,
+        layers: &mut Vec<Layer<A>>,
+        compare: impl Fn(&A, &A) -> std::cmp::Ordering,
+    ) {
         // A ray along a cut meets both parts: the first counts.
         layers.sort_by_key(|layer| (layer.item, layer.when));
         layers.dedup_by_key(|layer| layer.item);
         layers.sort_by_key(|layer| layer.when);
-        let probe = canvas.probe(sample);
         for (i, a) in layers.iter().enumerate() {
             for b in &layers[i + 1..] {
-                match probe.compare(&a.at, &b.at) {
-                    std::cmp::Ordering::Less => pairs.right.push((a.item, b.item)),
-                    std::cmp::Ordering::Greater => pairs.wrong.push((b.item, a.item)),
+                match compare(&a.at, &b.at) {
+                    std::cmp::Ordering::Less => self.pairs.right.push((a.item, b.item)),
+                    std::cmp::Ordering::Greater => self.pairs.wrong.push((b.item, a.item)),
                     std::cmp::Ordering::Equal => {}
                 }
             }
         }
         // Painted from the last to the first: the first of the list stays.
         if let Some((shown, rest)) = layers.split_first() {
-            let nearer = |other: &Layer| probe.compare(&other.at, &shown.at).is_lt();
-            errors.wrong_samples += u64::from(rest.iter().any(nearer));
+            let nearer = |other: &Layer<A>| compare(&other.at, &shown.at).is_lt();
+            self.wrong_samples += u64::from(rest.iter().any(nearer));
         }
-        pairs.settle(false);
+        self.pairs.settle(false);
     }
-    pairs.settle(true);
-    errors.wrong = pairs.wrong.len() as u64;
-    pairs.right.append(&mut pairs.wrong);
-    pairs.right.sort_unstable();
-    pairs.right.dedup();
-    errors.cyclic = items_in_cycles(&pairs.right);
-    let mut overlapping = pairs.right;
-    for pair in &mut overlapping {
-        *pair = (pair.0.min(pair.1), pair.0.max(pair.1));
+
+    /// Of all samples.
+    pub fn all(self) -> OrderErrors {
+        let ErrorCount {
+            wrong_samples,
+            mut pairs,
+        } = self;
+        pairs.settle(true);
+        let wrong = pairs.wrong.len() as u64;
+        pairs.right.append(&mut pairs.wrong);
+        pairs.right.sort_unstable();
+        pairs.right.dedup();
+        let cyclic = items_in_cycles(&pairs.right);
+        let mut overlapping = pairs.right;
+        for pair in &mut overlapping {
+            *pair = (pair.0.min(pair.1), pair.0.max(pair.1));
+        }
+        overlapping.sort_unstable();
+        overlapping.dedup();
+        OrderErrors {
+            pairs: overlapping.len() as u64,
+            wrong,
+            wrong_samples,
+            cyclic,
+        }
     }
-    overlapping.sort_unstable();
-    overlapping.dedup();
-    errors.pairs = overlapping.len() as u64;
-    errors
 }
 
 /// Pairs (nearer, deeper) that were drawn in the right and in the wrong order.

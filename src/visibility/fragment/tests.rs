@@ -6,13 +6,23 @@ use super::*;
 use crate::camera::{Camera, Frame, Lens};
 use crate::query::ItemId;
 use crate::scene::{SeededRng, WorldBox, load};
-use crate::visibility::truth::{NO_ITEM, RayIndex, SampleTruth, judge};
+use crate::visibility::region::doom::DoomMap;
+use crate::visibility::truth::{NO_ITEM, RayIndex, SampleTruth, SurfaceIndex, judge};
 use crate::visibility::{Guarantee, Ray, Rays, SampleGrid, Solids};
-use order::{BspOrder, ORDERS};
+use order::{BspOrder, ORDERS, OrderRow};
 
 fn all(solids: &Solids) -> Vec<Piece> {
     let items = 0..solids.boxes.len() as ItemId;
     items.map(Piece::whole).collect()
+}
+
+/// The orders of boxes, ready for them.
+fn orders(solids: &Solids) -> Vec<(&'static OrderRow, Box<dyn DepthOrder>)> {
+    let built = ORDERS.iter().filter_map(|row| {
+        let order = (row.build)(&ToOrder::boxes(solids))?;
+        Some((row, order))
+    });
+    built.collect()
 }
 
 /// Cameras in a scene: on the ground and above it, of all lenses.
@@ -54,14 +64,14 @@ fn the_z_test_leaves_the_sample_truth_whatever_the_order() {
     for name in ["city:n=800", "rooms:n=800", "clustered:n=800"] {
         let solids = Solids::of(&load(name, &Default::default()).unwrap());
         let index = RayIndex::build(&solids);
-        let orders: Vec<_> = ORDERS.iter().map(|row| (row.build)(&solids)).collect();
+        let orders = orders(&solids);
         for camera in cameras(&solids, 4) {
             let rays = Rays::of(&camera).unwrap();
             let canvas = Canvas::of(&rays, GRID);
             let truth = SampleTruth::of(&solids, &index, &rays, GRID, 1);
             seen += truth.visible.len();
             let mut pieces = Vec::new();
-            for (order, row) in orders.iter().zip(ORDERS) {
+            for (row, order) in &orders {
                 order.order(&solids, &camera, &mut pieces);
                 let drawn = draw(&canvas, &solids, &pieces, &Tests::default());
                 assert_eq!(drawn.depth.ids(), truth.front, "{name} {}", row.name);
@@ -92,8 +102,8 @@ fn worlds_full_of_ties_are_drawn_as_they_are_seen() {
         let truth = SampleTruth::of(&solids, &index, &rays, grid, 1);
         let canvas = Canvas::of(&rays, grid);
         let mut pieces = Vec::new();
-        for row in ORDERS {
-            (row.build)(&solids).order(&solids, &camera, &mut pieces);
+        for (row, order) in orders(&solids) {
+            order.order(&solids, &camera, &mut pieces);
             let drawn = draw(&canvas, &solids, &pieces, &Tests::default());
             assert_eq!(
                 drawn.depth.ids(),
@@ -151,8 +161,8 @@ fn the_painters_picture_by_bsp_is_exact_and_by_distances_it_is_not() {
             let camera = Camera { frame, lens };
             let canvas = Canvas::of(&Rays::of(&camera).unwrap(), grid);
             let mut pieces = Vec::new();
-            for (i, row) in ORDERS.iter().enumerate() {
-                (row.build)(&solids).order(&solids, &camera, &mut pieces);
+            for (i, (row, order)) in orders(&solids).into_iter().enumerate() {
+                order.order(&solids, &camera, &mut pieces);
                 let errors = order_errors(&canvas, &solids, &pieces, &Tests::default());
                 wrong[i] += errors.wrong;
                 pairs += errors.pairs;
@@ -214,9 +224,9 @@ fn overlaps_in_a_cycle_are_found_and_only_cutting_undoes_them() {
         let camera = Camera { frame, lens };
         let canvas = Canvas::of(&Rays::of(&camera).unwrap(), SampleGrid::new(80, 80));
         let mut pieces = Vec::new();
-        (row("box-distance").build)(&solids).order(&solids, &camera, &mut pieces);
+        of_boxes("box-distance", &solids).order(&solids, &camera, &mut pieces);
         let sorted = order_errors(&canvas, &solids, &pieces, &Tests::default());
-        (row("bsp").build)(&solids).order(&solids, &camera, &mut pieces);
+        of_boxes("bsp", &solids).order(&solids, &camera, &mut pieces);
         let cut = order_errors(&canvas, &solids, &pieces, &Tests::default());
         assert_eq!((cut.wrong, cut.wrong_samples), (0, 0));
         assert_eq!(cut.cyclic, sorted.cyclic);
@@ -272,6 +282,10 @@ fn nested_boxes_are_cut_until_the_order_is_exact_or_it_is_said() {
     assert!(tree.exception(&within).unwrap().contains("plane"));
     let tree = BspOrder::within(&solids, 2 * boxes.len());
     assert!(tree.exception(&camera).unwrap().contains("cutting ended"));
+}
+
+fn of_boxes(name: &str, solids: &Solids) -> Box<dyn DepthOrder> {
+    (row(name).build)(&ToOrder::boxes(solids)).unwrap()
 }
 
 fn row(name: &str) -> &'static order::OrderRow {
@@ -460,4 +474,64 @@ fn screen_rectangles_hold_every_sample_that_meets_the_box() {
         }
     }
     assert!(met > 5000 && held < 8 * met, "the premise: {met} of {held}");
+}
+
+/// Of the walls of a map its own BSP gets no pair wrong; distances do, and back to front it
+/// gets all wrong.
+#[test]
+fn a_maps_own_bsp_orders_its_walls_exactly() {
+    let mut pairs = [0; 3];
+    let mut wrong = [0; 3];
+    for name in ["freedm-map12", "freedm-map20"] {
+        let scene = load(name, &Default::default()).unwrap();
+        let map = DoomMap::of_scene(&scene).unwrap().unwrap();
+        let walls: Vec<ItemId> = (0..scene.items.len() as ItemId)
+            .filter(|&item| scene.labels[0].get(item as usize) == "linedef")
+            .collect();
+        let surfaces = map.surfaces(&scene);
+        let (index, own) = (SurfaceIndex::build(&surfaces), surfaces.some(&walls));
+        let boxes = Solids::of(&scene).some(&walls);
+        let planes = scene.own_tree.as_ref().unwrap();
+        let built = |name: &str| {
+            let of = ToOrder::surfaces(&boxes, &own, Some(planes));
+            (row(name).build)(&of).unwrap()
+        };
+        let orders = [built("map-bsp"), built("box-distance"), built("map-bsp")];
+        let mut rng = SeededRng::new(7);
+        for place in scene.places.iter().step_by(5) {
+            // No eye in a plane of the map.
+            let eye = place.eye + rng.point() * 0.3;
+            for lens in [
+                Lens::perspective(75.0, 1.6, 0.5, None),
+                Lens::orthographic(600.0, 1.6, 0.0, 4000.0),
+            ] {
+                let frame = Frame::looking_along(eye, rng.normal3().with_z(0.1), DVec3::Z);
+                let (frame, lens) = (frame.unwrap(), lens.unwrap());
+                let camera = Camera { frame, lens };
+                let rays = Rays::of(&camera).unwrap();
+                let mut sorted = orders.each_ref().map(|order| {
+                    let mut pieces = Vec::new();
+                    order.order(&boxes, &camera, &mut pieces);
+                    (&**order, pieces)
+                });
+                sorted[2].1.reverse();
+                let counts = draw_surfaces(&rays, GRID, &index, surfaces.origin, &walls, &sorted);
+                for (order, (tally, errors)) in counts.iter().enumerate() {
+                    pairs[order] += errors.pairs;
+                    wrong[order] += errors.wrong;
+                    assert!(
+                        order > 0 || tally.passed == tally.covered,
+                        "{name} {camera:?}"
+                    );
+                    assert_eq!(tally.covered, counts[0].0.covered);
+                }
+            }
+        }
+    }
+    assert!(
+        pairs[0] > 1000 && pairs == [pairs[0]; 3],
+        "the premise: {pairs:?}"
+    );
+    assert!(wrong[0] == 0 && wrong[1] > 20, "{wrong:?} of {pairs:?}");
+    assert!(wrong[2] == pairs[2], "{wrong:?} of {pairs:?}");
 }

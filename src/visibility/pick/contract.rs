@@ -19,6 +19,12 @@ pub struct Hit {
 }
 
 impl Hit {
+    /// Itself, if its item is among the first so many.
+    #[inline(always)]
+    pub(super) fn counted(self, items: usize) -> Option<Hit> {
+        ((self.item as usize) < items).then_some(self)
+    }
+
     /// By depth, then by id.
     pub(super) fn order(&self, other: &Hit) -> Ordering {
         let by_depth = self.depth.total_cmp(&other.depth);

@@ -106,7 +106,7 @@ pub(super) fn first_facet<'a>(
     }
     let (item, at) = best?;
     let depth = at.depth;
-    ((item as usize) < items).then_some(Hit { item, depth })
+    Hit { item, depth }.counted(items)
 }
 
 /// As [`nearest`], of the triangles of the items that count.

@@ -6,7 +6,6 @@
 
 use glam::{DVec3, Vec3};
 
-use super::contract::Hit;
 use crate::geometry::Aabb;
 use crate::query::ItemId;
 use crate::scene::Surfaces;
@@ -53,10 +52,11 @@ impl Facets {
     }
 
     /// The triangle of a place as a hit, if its item counts.
+    #[cfg(any(feature = "peers", feature = "embree"))]
     #[inline(always)]
-    pub(super) fn hit(&self, place: usize, depth: f64) -> Option<Hit> {
+    pub(super) fn hit(&self, place: usize, depth: f64) -> Option<super::Hit> {
         let item = self.all[place].item;
-        ((item as usize) < self.items).then_some(Hit { item, depth })
+        super::Hit { item, depth }.counted(self.items)
     }
 
     /// The box of each.

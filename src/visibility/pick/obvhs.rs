@@ -206,7 +206,7 @@ impl<T: Cast> Pick for ObvhsTriangles<T> {
         self.tree.first(their_ray(&rounded), &mut found, entry);
         let (_, _, item) = *self.triangles.get(found.primitive_id as usize)?;
         let depth = f64::from(found.t);
-        ((item as usize) < self.items).then_some(Hit { item, depth })
+        Hit { item, depth }.counted(self.items)
     }
 
     fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {

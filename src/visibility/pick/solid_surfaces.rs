@@ -47,7 +47,7 @@ impl Pick for SolidSurfaces {
         let found = self.index.front_of(ray);
         let item = *found.front.first()?;
         let depth = found.meeting?.depth;
-        ((item as usize) < self.items).then_some(Hit { item, depth })
+        Hit { item, depth }.counted(self.items)
     }
 
     fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {

@@ -10,7 +10,7 @@
 //! they are met ([`DepthOrder::exception`]): cutting ends where there are too many
 //! parts; and rays that run within a plane have both of its sides on the eye's.
 
-use super::contract::{DepthOrder, Piece, distance, nearest_point};
+use super::contract::{self, DepthOrder, Piece, distance, nearest_point};
 use crate::camera::{Camera, Lens};
 use crate::scene::WorldBox;
 use crate::visibility::Solids;
@@ -201,7 +201,7 @@ impl DepthOrder for BspOrder {
                     parts.sort_by(|a, b| far(a).total_cmp(&far(b)).then(a.item.cmp(&b.item)));
                     pieces.extend(parts.iter().map(|part| Piece {
                         item: part.item,
-                        part: part.cut.then_some(part.b),
+                        part: part.cut.then_some(contract::Part::Within(part.b)),
                     }));
                 }
             }

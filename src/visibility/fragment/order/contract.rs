@@ -3,17 +3,63 @@
 use glam::DVec3;
 
 use crate::camera::{Camera, Lens};
+use crate::geometry::PlaneTree;
 use crate::query::ItemId;
-use crate::scene::WorldBox;
+use crate::scene::{Surfaces, WorldBox};
 use crate::visibility::Solids;
+
+/// What an order is of.
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub struct ToOrder<'a> {
+    /// The items as solid boxes, or the boxes about them.
+    pub boxes: &'a Solids,
+    /// Their triangles, if they are no solid boxes.
+    pub surfaces: Option<&'a Surfaces>,
+    /// Planes that the scene brings with it.
+    pub planes: Option<&'a PlaneTree>,
+}
+
+impl<'a> ToOrder<'a> {
+    /// Items that are solid boxes.
+    pub fn boxes(boxes: &'a Solids) -> ToOrder<'a> {
+        ToOrder {
+            boxes,
+            surfaces: None,
+            planes: None,
+        }
+    }
+
+    /// Items of triangles with the boxes about them, and the planes of their scene.
+    pub fn surfaces(
+        boxes: &'a Solids,
+        surfaces: &'a Surfaces,
+        planes: Option<&'a PlaneTree>,
+    ) -> ToOrder<'a> {
+        ToOrder {
+            boxes,
+            surfaces: Some(surfaces),
+            planes,
+        }
+    }
+}
+
+/// A part of an item.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Part {
+    /// Where it is entered through this box.
+    Within(WorldBox),
+    /// What of it is in a leaf ([`DepthOrder::leaf`]).
+    InLeaf(u32),
+}
 
 /// An item to be drawn, or a part of it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Piece {
     /// The item.
     pub item: ItemId,
-    /// Only where it is entered through this part; `None` is all of it.
-    pub part: Option<WorldBox>,
+    /// `None` is all of it.
+    pub part: Option<Part>,
 }
 
 impl Piece {
@@ -28,6 +74,12 @@ pub trait DepthOrder: Send + Sync {
     /// Puts all items, from front to back as well as it can, into `pieces` in place
     /// of what it held. Deterministic.
     fn order(&self, solids: &Solids, camera: &Camera, pieces: &mut Vec<Piece>);
+
+    /// Where a point of a triangle is, about the zero of the surfaces, if parts are told by
+    /// leaves.
+    fn leaf(&self, _at: DVec3, _normal: DVec3) -> Option<u32> {
+        None
+    }
 
     /// Why an order that is declared exact may be wrong for a camera all the same.
     fn exception(&self, _: &Camera) -> Option<&'static str> {

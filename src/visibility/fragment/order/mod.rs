@@ -6,13 +6,14 @@ mod bsp;
 mod centre_distance;
 mod contract;
 mod none;
+mod partition;
 mod tree;
 
 pub use box_distance::front_to_back;
 pub use bsp::BspOrder;
-pub use contract::{DepthOrder, Piece};
+pub use contract::{DepthOrder, Part, Piece, ToOrder};
 
-use crate::visibility::{Guarantee, Solids};
+use crate::visibility::Guarantee;
 
 /// A row of the table of orders.
 #[derive(Clone, Copy, Debug)]
@@ -25,8 +26,8 @@ pub struct OrderRow {
     /// [`Guarantee::Exact`]: no pair that overlaps in the image is the wrong way
     /// round, but where it says so ([`DepthOrder::exception`]).
     pub guarantee: Guarantee,
-    /// Prepares it for the items of a scene.
-    pub build: fn(&Solids) -> Box<dyn DepthOrder>,
+    /// Prepares it for the items of a scene, if it can order them.
+    pub build: fn(&ToOrder) -> Option<Box<dyn DepthOrder>>,
 }
 
 /// All orders.
@@ -35,30 +36,43 @@ pub const ORDERS: &[OrderRow] = &[
         name: "none",
         summary: "items in the order of their ids",
         guarantee: Guarantee::Unproven,
-        build: |_| Box::new(none::order),
+        build: |_| Some(Box::new(none::order)),
     },
     OrderRow {
         name: "tree",
         summary: "items as they lie in the tree 'wide', the same for all views",
         guarantee: Guarantee::Unproven,
-        build: |solids| Box::new(tree::TreeOrder::of(solids)),
+        build: |of| Some(Box::new(tree::TreeOrder::of(of.boxes))),
     },
     OrderRow {
         name: "centre-distance",
         summary: "sorted by the distance of the centre of each box",
         guarantee: Guarantee::Unproven,
-        build: |_| Box::new(centre_distance::order),
+        build: |_| Some(Box::new(centre_distance::order)),
     },
     OrderRow {
         name: "box-distance",
         summary: "sorted by the distance of the nearest point of each box",
         guarantee: Guarantee::Unproven,
-        build: |_| Box::new(box_distance::order),
+        build: |_| Some(Box::new(box_distance::order)),
     },
     OrderRow {
         name: "bsp",
         summary: "planes through faces of boxes, which are cut where they cross: exact",
         guarantee: Guarantee::Exact,
-        build: |solids| Box::new(BspOrder::of(solids)),
+        build: |of| match of.surfaces {
+            None => Some(Box::new(BspOrder::of(of.boxes))),
+            Some(_) => None,
+        },
+    },
+    OrderRow {
+        name: "map-bsp",
+        summary: "the map's own BSP leaf by leaf, what is in one leaf by distance",
+        // In a leaf of walls that surround it nothing hides a wall but what is no wall.
+        guarantee: Guarantee::Unproven,
+        build: |of| {
+            let order = partition::PartitionOrder::of(of.surfaces?, of.planes?);
+            Some(Box::new(order))
+        },
     },
 ];

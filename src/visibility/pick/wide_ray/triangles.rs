@@ -132,7 +132,7 @@ impl Work for First<'_> {
         of.tree.search(isa, &slabs, &mut found);
         let (item, at) = found.best?;
         let depth = at.depth;
-        ((item as usize) < of.items).then_some(Hit { item, depth })
+        Hit { item, depth }.counted(of.items)
     }
 }
 

@@ -1,0 +1,259 @@
+//! A partition that the scene brings with it, such as the BSP of a Doom map: leaves from
+//! front to back, and in each what of the items is in it.
+//!
+//! Whatever the planes are, on a ray from the eye all of a leaf comes before all of one
+//! behind it, so between leaves the order is exact, but for what rounding does within
+//! [`SLACK`] of a plane. In a leaf what has all the rest before it comes last, in any order:
+//! the walls around a room hide nothing in it, and none of them another. What is left is
+//! sorted by distance. (Fuchs, Kedem and Naylor 1980; linuxdoom 1.10, r_bsp.c, draws the
+//! walls of a leaf the same way, and then its things by distance.)
+
+use glam::DVec3;
+
+use super::contract::{DepthOrder, Part, Piece, distance, nearest_point};
+use crate::camera::{Camera, Lens};
+use crate::geometry::PlaneTree;
+use crate::query::ItemId;
+use crate::scene::{Surfaces, WorldBox};
+use crate::visibility::Solids;
+
+/// What is nearer to a plane than this, per unit of the largest coordinate, lies in it: some
+/// times what the rounding of a plane to f32 moves it.
+const SLACK: f64 = 1.0 / (1u64 << 21) as f64;
+/// Triangles in a leaf of which each is held against each, at most.
+const MOST_COMPARED: usize = 1000;
+
+/// A plane: unit normal towards the front, offset, and what is in front and behind.
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    normal: DVec3,
+    d: f64,
+    children: [Option<u32>; 2],
+}
+
+impl Node {
+    fn height(&self, at: DVec3) -> f64 {
+        self.normal.dot(at) + self.d
+    }
+
+    /// The side that a surface in the plane is seen from.
+    fn faced(&self, normal: DVec3) -> usize {
+        usize::from(self.normal.dot(normal) < 0.0)
+    }
+}
+
+/// What of an item is in a leaf.
+#[derive(Clone, Copy, Debug)]
+struct Held {
+    item: ItemId,
+    bounds: WorldBox,
+    /// Whether all the rest of the leaf is before it, and it is seen from there only.
+    is_behind_all: bool,
+}
+
+/// The partition with the items in its leaves.
+pub struct PartitionOrder {
+    nodes: Vec<Node>,
+    root: Option<u32>,
+    origin: DVec3,
+    slack: f64,
+    /// By twice the node above and its side; a space that is not divided is the only one.
+    leaves: Vec<Vec<Held>>,
+}
+
+/// What of a triangle is in a leaf.
+struct Fallen {
+    item: ItemId,
+    polygon: Vec<DVec3>,
+    /// Of unit length.
+    normal: DVec3,
+    two_sided: bool,
+}
+
+/// Part of a triangle on its way down.
+struct Falling {
+    polygon: Vec<DVec3>,
+    node: Option<u32>,
+    leaf: usize,
+}
+
+impl PartitionOrder {
+    /// Cuts every triangle by the planes that it meets. O(triangles * depth) where few are
+    /// cut.
+    pub fn of(surfaces: &Surfaces, planes: &PlaneTree) -> PartitionOrder {
+        let nodes = planes.nodes.iter().map(|node| {
+            let normal = node.plane.normal.as_dvec3();
+            let unit = 1.0 / normal.length();
+            Node {
+                normal: normal * unit,
+                d: f64::from(node.plane.d) * unit,
+                children: node.children,
+            }
+        });
+        let corners = surfaces.points.iter().map(|p| p.abs().max_element());
+        let reach = f64::from(corners.fold(0.0, f32::max));
+        let mut order = PartitionOrder {
+            nodes: nodes.collect(),
+            root: planes.root,
+            origin: surfaces.origin,
+            slack: reach * SLACK,
+            leaves: vec![Vec::new(); 2 * planes.nodes.len().max(1)],
+        };
+        let mut fallen: Vec<Vec<Fallen>> = Vec::new();
+        fallen.resize_with(order.leaves.len(), Vec::new);
+        for item in 0..surfaces.items() {
+            for corners in surfaces.of(item) {
+                let [a, b, c] = corners.map(|p| p.as_dvec3());
+                let normal = (b - a).cross(c - a).normalize_or_zero();
+                order.drop_in([a, b, c], normal, |leaf, polygon| {
+                    fallen[leaf].push(Fallen {
+                        item: item as ItemId,
+                        polygon,
+                        normal,
+                        two_sided: surfaces.two_sided[item],
+                    });
+                });
+            }
+        }
+        let held = fallen.iter().map(|all| order.held(all));
+        order.leaves = held.collect();
+        order
+    }
+
+    fn drop_in(
+        &self,
+        corners: [DVec3; 3],
+        normal: DVec3,
+        mut fallen: impl FnMut(usize, Vec<DVec3>),
+    ) {
+        let mut open = vec![Falling {
+            polygon: corners.to_vec(),
+            node: self.root,
+            leaf: 0,
+        }];
+        while let Some(Falling {
+            polygon,
+            node,
+            leaf,
+        }) = open.pop()
+        {
+            let Some(at) = node else {
+                fallen(leaf, polygon);
+                continue;
+            };
+            let node = &self.nodes[at as usize];
+            let heights: Vec<f64> = polygon.iter().map(|&p| node.height(p)).collect();
+            let [above, below] = [
+                heights.iter().any(|&h| h > self.slack),
+                heights.iter().any(|&h| h < -self.slack),
+            ];
+            let sides = match (above, below) {
+                (true, true) => [true, true],
+                (false, false) => [0, 1].map(|side| node.faced(normal) == side),
+                one => [one.0, one.1],
+            };
+            for side in [0, 1] {
+                if sides[side] {
+                    let polygon = match sides[1 - side] {
+                        true => cut(&polygon, &heights, [1.0, -1.0][side]),
+                        false => polygon.clone(),
+                    };
+                    open.push(Falling {
+                        polygon,
+                        node: node.children[side],
+                        leaf: 2 * at as usize + side,
+                    });
+                }
+            }
+        }
+    }
+
+    /// The parts of a leaf, from all triangles in it, item by item.
+    fn held(&self, all: &[Fallen]) -> Vec<Held> {
+        let is_before = |own: &Fallen| {
+            let mut corners = all.iter().flat_map(|other| &other.polygon);
+            let height = |p: &DVec3| own.normal.dot(*p - own.polygon[0]);
+            !own.two_sided && corners.all(|p| height(p) >= -self.slack)
+        };
+        let parts = all.chunk_by(|a, b| a.item == b.item).map(|parts| {
+            let corners = parts.iter().flat_map(|part| &part.polygon);
+            let corners = corners.map(|&p| p + self.origin);
+            let (min, max) = corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |bounds, p| {
+                (bounds.0.min(p), bounds.1.max(p))
+            });
+            Held {
+                item: parts[0].item,
+                bounds: WorldBox::new(min, max),
+                is_behind_all: all.len() <= MOST_COMPARED && parts.iter().all(is_before),
+            }
+        });
+        parts.collect()
+    }
+}
+
+/// What of a polygon is on the side of a plane where `sign` times the height is not below
+/// zero.
+fn cut(polygon: &[DVec3], heights: &[f64], sign: f64) -> Vec<DVec3> {
+    let mut left = Vec::with_capacity(polygon.len() + 1);
+    for (i, &p) in polygon.iter().enumerate() {
+        let next = (i + 1) % polygon.len();
+        let (here, there) = (sign * heights[i], sign * heights[next]);
+        if here >= 0.0 {
+            left.push(p);
+        }
+        if (here > 0.0 && there < 0.0) || (here < 0.0 && there > 0.0) {
+            left.push(p + (polygon[next] - p) * (here / (here - there)));
+        }
+    }
+    left
+}
+
+impl DepthOrder for PartitionOrder {
+    fn order(&self, _: &Solids, camera: &Camera, pieces: &mut Vec<Piece>) {
+        pieces.clear();
+        let eye = camera.frame.eye - self.origin;
+        let parallel = matches!(camera.lens, Lens::Orthographic { .. });
+        let mut sorted = Vec::new();
+        let mut open = vec![(self.root, 0)];
+        while let Some((node, leaf)) = open.pop() {
+            if let Some(at) = node {
+                let node = &self.nodes[at as usize];
+                let is_before = match parallel {
+                    true => node.normal.dot(camera.frame.forward()) <= 0.0,
+                    false => node.height(eye) >= 0.0,
+                };
+                let near = usize::from(!is_before);
+                for side in [1 - near, near] {
+                    open.push((node.children[side], 2 * at as usize + side));
+                }
+                continue;
+            }
+            sorted.clear();
+            sorted.extend(self.leaves[leaf].iter().map(|held| {
+                let nearest = nearest_point(camera, &held.bounds);
+                (held.is_behind_all, distance(camera, nearest), held.item)
+            }));
+            sorted.sort_unstable_by(|a: &(bool, f64, ItemId), b| {
+                a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2))
+            });
+            let part = Some(Part::InLeaf(leaf as u32));
+            pieces.extend(sorted.iter().map(|&(_, _, item)| Piece { item, part }));
+        }
+    }
+
+    fn leaf(&self, at: DVec3, normal: DVec3) -> Option<u32> {
+        let (mut node, mut leaf) = (self.root, 0);
+        let normal = normal.normalize_or_zero();
+        while let Some(place) = node {
+            let plane = &self.nodes[place as usize];
+            let height = plane.height(at);
+            let along = plane.normal.dot(normal).abs();
+            let side = match height.abs() <= self.slack && along > 1.0 - 1e-6 {
+                true => plane.faced(normal),
+                false => usize::from(height < 0.0),
+            };
+            (node, leaf) = (plane.children[side], 2 * place + side as u32);
+        }
+        Some(leaf)
+    }
+}
