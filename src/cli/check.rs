@@ -11,19 +11,19 @@ use super::funnel::claim;
 use super::funnel_args::CheckArgs;
 use super::{Ending, load_scene, print, text};
 use crate::camera::Camera;
-use crate::funnel::{Proofs, holes_of, regions_of, surfaces_of, walls_of};
+use crate::funnel::{Proofs, regions_of};
 use crate::input::read_file;
 use crate::json::JsonError;
 use crate::path::{self, CameraPath, LensDefaults};
 use crate::query::ItemId;
 use crate::scene::{Scene, Surfaces, WorldBox};
-use crate::visibility::Rays;
 use crate::visibility::fragment::CutOuts;
 use crate::visibility::region::{ClaimErrors, Pvs, REJECT, RegionGraph};
 use crate::visibility::truth::{
     CameraOf, Certificates, Counts, Facts, Hiders, PlanWall, View as CertifiedView,
     check as check_proofs,
 };
+use crate::visibility::{Rays, holes_of, surfaces_of, walls_of};
 use serde::Serialize;
 
 /// What was found in a file.

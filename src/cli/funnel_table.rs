@@ -5,10 +5,10 @@ use super::document::Block;
 use super::table::Table;
 use super::text;
 use crate::funnel::{
-    BlocksRow, FunnelReport, Gain, InnerRow, LevelRow, ProofCounts, SeenFrom, StageKind, StageRow,
-    Times,
+    FunnelReport, Gain, LevelRow, ProofCounts, SeenFrom, StageKind, StageRow, Times,
 };
 use crate::visibility::Guarantee;
+use crate::visibility::hiders::{BlocksRow, InnerRow};
 use crate::visibility::occlusion::OccluderChoice;
 
 /// No line is longer.

@@ -43,7 +43,7 @@ impl Material<'_> {
     pub fn of<'w>(input: &FunnelInput, world: &'w World) -> Material<'w> {
         let Some(solids) = world.solids.as_ref() else {
             let around = Solids::of(world.scene);
-            let inner = world.inner.as_ref().map_or(&[][..], |inner| &inner.boxes);
+            let inner = world.hiders.inner();
             let inner = (0..).zip(inner).filter(|(_, b)| !b.is_empty());
             let inner = inner.map(|(item, b)| (item, WorldBox::within(b, around.origin)));
             let surfaces = world

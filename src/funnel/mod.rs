@@ -7,7 +7,6 @@
 //! process, [`Prepared::conclude`] puts both together.
 
 mod back_ends;
-mod blocks;
 mod bounds;
 mod certified;
 mod chain;
@@ -17,8 +16,6 @@ mod faces;
 mod fragment_rows;
 mod fragments;
 mod hiding;
-mod inner;
-mod items;
 mod judged;
 mod material;
 mod mirror;
@@ -43,15 +40,12 @@ mod walks;
 mod world;
 
 pub use back_ends::back_ends;
-pub use blocks::BlocksRow;
 pub use bounds::BoundRow;
 pub use certified::Proofs;
 pub use chain::Chain;
 pub use error::FunnelError;
 pub use faces::BYTES_PER_TRIANGLE;
 pub use fragments::FragmentCounts;
-pub use inner::InnerRow;
-pub use items::{holes_of, surfaces_of, walls_of};
 pub use judged::Errors;
 pub use mirror::MirrorRow;
 pub use orders::OrderRow;

@@ -2,11 +2,9 @@
 
 use serde::Serialize;
 
-use super::blocks::BlocksRow;
 use super::bounds::BoundRow;
 use super::chain::Chain;
 use super::fragments::FragmentCounts;
-use super::inner::InnerRow;
 use super::judged::Errors;
 use super::mirror::MirrorRow;
 use super::orders::OrderRow;
@@ -21,6 +19,7 @@ use crate::measure::OverProcesses;
 use crate::statistics::{ALPHA, trimmed_mean};
 use crate::visibility::Level;
 use crate::visibility::fragment::{CutOuts, Surfaces};
+use crate::visibility::hiders::{BlocksRow, InnerRow};
 
 /// The funnel of a scene and a path.
 #[derive(Clone, Debug, Serialize)]

@@ -8,12 +8,9 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::back_ends::back_ends;
-use super::blocks::{Blocks, BlocksRow};
 use super::chain::Chain;
 use super::error::FunnelError;
 use super::hiding::{HIDING, HidingRow};
-use super::inner::Inner;
-use super::items::{holes_of, surfaces_of};
 use super::judged::{Judged, judge_items};
 use super::plan_view::{Fate, MOST_DRAWN, PlanView};
 use super::regions::{ClaimAudit, Regions};
@@ -29,11 +26,12 @@ use crate::path::CameraPath;
 use crate::query::ItemId;
 use crate::scene::{ItemShape, Scene, Surfaces};
 use crate::visibility::fragment::{self, CutOuts};
+use crate::visibility::hiders::Hiders;
 use crate::visibility::occlusion::{self, OccluderChoice, OccluderScene};
 use crate::visibility::region::{EyePlace, Marks, Pvs, RegionRow, Scratch};
 use crate::visibility::triangle;
 use crate::visibility::truth::{PlanWall, TruthCache};
-use crate::visibility::{Guarantee, Rays, SampleGrid, Solids};
+use crate::visibility::{Guarantee, Rays, SampleGrid, Solids, holes_of, surfaces_of};
 
 /// What a funnel is studied on.
 #[derive(Clone, Copy)]
@@ -89,13 +87,8 @@ pub struct World<'a> {
     /// The triangles of the items, if they are no solid boxes; of a map also those of its
     /// floors and ceilings, behind the items.
     pub surfaces: Option<Arc<Surfaces>>,
-    /// The boxes inside the items of a mesh, which are drawn as occluders.
-    pub inner: Option<Inner>,
-    /// What is known of the boxes in the solid of a map, which are drawn as occluders.
-    pub blocks: Option<BlocksRow>,
-    occluders: OccluderScene,
-    /// Of a map: the same without what hides, for eyes outside its rooms.
-    bare: Option<OccluderScene>,
+    /// What hides the items.
+    pub hiders: Hiders,
     choice: OccluderChoice,
     /// The regions of the scene.
     pub(super) regions: Option<Regions>,
@@ -186,20 +179,7 @@ impl<'a> World<'a> {
                 });
             }
         }
-        let inner = Inner::of(input.scene, input.execution.threads);
-        let blocks = Blocks::of(input.scene)?;
-        let occluders = match (&solids, &inner) {
-            (Some(solids), _) => OccluderScene::of(solids),
-            (None, Some(inner)) => OccluderScene::within(input.scene, &inner.boxes),
-            (None, None) => {
-                let boxes = blocks.as_ref().map_or(&[][..], |blocks| &blocks.boxes);
-                OccluderScene::among(input.scene, boxes)
-            }
-        };
-        let blocks = blocks.map(|blocks| blocks.row);
-        let bare = blocks
-            .as_ref()
-            .map(|_| OccluderScene::among(input.scene, &[]));
+        let hiders = Hiders::of(input.scene, solids.as_ref(), input.execution.threads)?;
         let world = World {
             scene: input.scene,
             kernel: input.execution.kernel,
@@ -209,10 +189,7 @@ impl<'a> World<'a> {
             solids,
             cut_outs,
             surfaces,
-            inner,
-            blocks,
-            occluders,
-            bare,
+            hiders,
             choice: input.occluders,
             regions,
             truth_cache: input.truth_cache,
@@ -242,10 +219,7 @@ impl<'a> World<'a> {
 
     /// The items as the occlusion stage draws and tests them in a view.
     pub fn occluders(&self, view: usize) -> &OccluderScene {
-        match &self.bare {
-            Some(bare) if !self.is_inside(view) => bare,
-            _ => &self.occluders,
-        }
+        self.hiders.from_eye(|| self.is_inside(view))
     }
 
     /// The six planes of a view.

@@ -5,7 +5,9 @@
 
 pub mod fragment;
 mod guarantee;
+pub mod hiders;
 pub mod inscribed;
+mod items;
 mod level;
 pub mod occlusion;
 pub mod pick;
@@ -17,6 +19,7 @@ pub mod triangle;
 pub mod truth;
 
 pub use guarantee::Guarantee;
+pub use items::{holes_of, surfaces_of, walls_of};
 pub use level::{Level, LevelMap, MapFile};
 pub use rays::{NoRays, Ray, Rays, SampleGrid};
 pub use solids::Solids;

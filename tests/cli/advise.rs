@@ -449,12 +449,16 @@ fn sorting_pays_by_the_layers_and_the_cost_of_a_fragment() {
 }
 
 #[test]
-fn walls_of_a_map_have_neither_faces_nor_fragments() {
-    let line = "advise --scene freedm-map12 --path street:frames=4 --structure linear,wide";
-    let advice = advice(Path::new("."), line);
-    for name in ["occlusion", "cones", "sorting"] {
-        let rule = rule(&advice, name);
-        assert_eq!(rule["decision"], "not_applicable", "{rule}");
-        assert!(rule["reason"].as_str().expect("a reason").contains("walls"));
+fn the_stages_behind_the_frustum_are_weighed_on_maps_and_meshes_too() {
+    let of = |name: &str, more: &str| decided(name, &format!("--path street:frames=12 {more}"));
+    // Free drawing is worth no stage, dear drawing is worth one that removes much.
+    for (name, least) in [("occlusion", 0.2), ("cones", 0.2), ("sorting", 0.01)] {
+        let map = "--scene freedm-map20";
+        let (dear, removed) = of(name, &format!("{map} --draw-ns 1e5 --shade-ns 100"));
+        assert!(dear == "keep" && removed > least, "{name} {dear} {removed}");
+        let (free, same) = of(name, &format!("{map} --draw-ns 0 --shade-ns 0"));
+        assert_eq!((free.as_str(), same), ("leave_out", removed), "{name}");
+        let (_, removed) = of(name, "--scene mesh:spheres:n=40000");
+        assert!((0.0..1.0).contains(&removed), "{name} {removed}");
     }
 }

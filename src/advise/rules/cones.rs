@@ -15,10 +15,10 @@ use crate::kernel::Kernel;
 use crate::measure::Ask;
 use crate::query::ItemId;
 use crate::scene::{ItemShape, Surfaces};
-use crate::visibility::NoRays;
 use crate::visibility::triangle::{
     Clusters, Cone, MOST_TRIANGLES, SafeCones, Selection, TriangleCull, View,
 };
+use crate::visibility::{NoRays, surfaces_of};
 
 pub(super) const RULE: Rule = Rule {
     name: "cones",
@@ -37,7 +37,7 @@ pub(super) const RULE: Rule = Rule {
 const MOST_ITEMS: usize = 1_024;
 /// Clusters of a camera whose cones a prediction looks at.
 const MOST_CONES: usize = 64;
-/// Triangles of a cluster: a face of a box.
+/// Triangles of a cluster: a face of a box, a wall.
 const OF_A_FACE: usize = 2;
 
 /// Items that a camera meets as clusters, and the cones of these.
@@ -51,12 +51,10 @@ struct Seen {
 }
 
 fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfit> {
-    if case.scene().item_shape() == ItemShape::Wall {
-        let reason = "items are walls, without faces of their own";
-        return Err(not_applicable(reason));
-    }
     let cameras = case.workload.views.len();
-    let few = hidden::frames(cameras, PROBED).map(|frame| Seen::of(case, frame));
+    let surfaces = surfaces_of(case.scene())?;
+    let few = hidden::frames(cameras, PROBED);
+    let few = few.map(|frame| Seen::of(case, frame, surfaces.as_deref()));
     let Ok(few) = few.collect::<Result<Vec<Seen>, NoRays>>() else {
         let reason = "cameras without rays of their own";
         return Err(not_applicable(reason));
@@ -94,13 +92,16 @@ fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfi
 }
 
 impl Seen {
-    fn of(case: &Case, frame: usize) -> Result<Seen, NoRays> {
+    fn of(case: &Case, frame: usize, surfaces: Option<&Surfaces>) -> Result<Seen, NoRays> {
         let scene = case.scene();
         let mut met = Vec::new();
         case.query(frame, &mut met);
         let items = hidden::frames(met.len(), MOST_ITEMS).map(|n| met[n]);
         let items: Vec<ItemId> = items.collect();
-        let surfaces = Arc::new(Surfaces::of_items(scene, &items));
+        let surfaces = Arc::new(match surfaces {
+            Some(all) => all.some(&items),
+            None => Surfaces::of_items(scene, &items),
+        });
         let clusters = Arc::new(match scene.item_shape() {
             ItemShape::Mesh => Clusters::of(surfaces, MOST_TRIANGLES),
             _ => Clusters::as_listed(surfaces, OF_A_FACE),

@@ -5,9 +5,12 @@
 use super::super::case::Case;
 use super::super::omission::{Check, Draft, Forced, Omission, Way};
 use crate::geometry::ConvexVolume;
+use crate::input::InputError;
 use crate::measure::Ask;
+use crate::query::ItemId;
 use crate::scene::{ItemShape, Scene};
-use crate::visibility::{Rays, SampleGrid, Solids};
+use crate::visibility::truth::{RayIndex, SurfaceIndex};
+use crate::visibility::{Ray, Rays, SampleGrid, Solids, surfaces_of};
 
 /// Cameras that a prediction looks at, evenly spread, and rays of each.
 pub(super) const PROBED: usize = 8;
@@ -24,13 +27,55 @@ pub(super) fn sights(case: &Case) -> Result<Vec<(Rays, ConvexVolume)>, &'static 
     sights.ok_or("cameras without rays of their own")
 }
 
-/// The items as solid boxes, or why they are none.
-pub(super) fn solids(scene: &Scene) -> Result<Solids, &'static str> {
-    match scene.item_shape() {
-        ItemShape::Box => Ok(Solids::of(scene)),
-        ItemShape::Wall => Err("items are walls, not solid boxes"),
-        ItemShape::Mesh => Err("items are triangles, not solid boxes"),
+/// The items as rays meet them: solid boxes, or triangles.
+pub(super) enum Met {
+    Boxes(RayIndex),
+    /// With the number of items: what is behind them in the list is none.
+    Triangles(SurfaceIndex, usize),
+}
+
+impl Met {
+    /// All of a scene; `solids` are its items if they are solid boxes.
+    pub fn of(scene: &Scene, solids: Option<&Solids>) -> Result<Met, InputError> {
+        Ok(match (solids, surfaces_of(scene)?) {
+            (Some(solids), _) => Met::Boxes(RayIndex::build(solids)),
+            (None, surfaces) => {
+                let surfaces = surfaces.unwrap_or_default();
+                Met::Triangles(SurfaceIndex::build(&surfaces), scene.items.len())
+            }
+        })
     }
+
+    /// How deep a ray gets.
+    pub fn depth(&self, ray: &Ray) -> Option<f64> {
+        match self {
+            Met::Boxes(index) => index.front_of(ray).map(|front| front.entry.depth),
+            Met::Triangles(index, _) => index.front_of(ray).meeting.map(|at| at.depth),
+        }
+    }
+
+    /// How many items lie along a ray.
+    pub fn layers(&self, ray: &Ray) -> usize {
+        let mut met: Vec<ItemId> = match self {
+            Met::Boxes(index) => {
+                let all = index.all_along(ray, ray.far).into_iter();
+                all.map(|(item, _)| item).collect()
+            }
+            Met::Triangles(index, items) => {
+                let all = index.all_along(ray).into_iter();
+                let all = all.map(|(item, _)| item);
+                all.filter(|&item| (item as usize) < *items).collect()
+            }
+        };
+        met.sort_unstable();
+        met.dedup();
+        met.len()
+    }
+}
+
+/// The items as solid boxes, if they are.
+pub(super) fn solids(scene: &Scene) -> Option<Solids> {
+    (scene.item_shape() == ItemShape::Box).then(|| Solids::of(scene))
 }
 
 /// So many of the cameras, or all, evenly spread.

@@ -7,14 +7,13 @@ use std::rc::Rc;
 use super::super::case::Case;
 use super::super::omission::{By, Draft, LeftOutIf, Omission, Way};
 use super::super::rule::{Rule, Unfit, not_applicable};
-use super::hidden::{self, PROBED, PROBES};
-use crate::geometry::{Aabb, ConvexVolume};
+use super::hidden::{self, Met, PROBED, PROBES};
+use crate::geometry::ConvexVolume;
 use crate::measure::Ask;
-use crate::visibility::occlusion::{
-    Interleaved, MaskedInner, OccluderScene, OcclusionBuffer, View,
-};
-use crate::visibility::truth::RayIndex;
-use crate::visibility::{Rays, SampleGrid, Solids};
+use crate::visibility::hiders::Hiders;
+use crate::visibility::occlusion::{self, Interleaved, MaskedInner, OcclusionBuffer};
+use crate::visibility::region::doom::DoomMap;
+use crate::visibility::{Rays, SampleGrid};
 
 pub(super) const RULE: Rule = Rule {
     name: "occlusion",
@@ -45,19 +44,41 @@ const SMALL: SampleGrid = SampleGrid::new(160, 90);
 
 /// Everything that is asked, and shared by both sides.
 struct Occlusion {
-    scene: OccluderScene,
-    views: Vec<(Rays, ConvexVolume)>,
+    hiders: Hiders,
+    views: Vec<View>,
+}
+
+/// A camera, and whether its eye is in the rooms of a map.
+struct View {
+    rays: Rays,
+    volume: ConvexVolume,
+    is_inside: bool,
 }
 
 impl Occlusion {
-    /// With the solids, or why there is nothing to ask.
-    fn of(case: &Case) -> Result<(Occlusion, Solids), &'static str> {
-        let solids = hidden::solids(case.scene())?;
-        let all = Occlusion {
-            scene: OccluderScene::of(&solids),
-            views: hidden::sights(case)?,
-        };
-        Ok((all, solids))
+    /// With the items as rays meet them, or why there is nothing to ask.
+    fn of(case: &Case) -> Result<(Occlusion, Met), Unfit> {
+        let scene = case.scene();
+        let solids = hidden::solids(scene);
+        let views = hidden::sights(case).map_err(not_applicable)?;
+        let hiders = Hiders::of(scene, solids.as_ref(), case.spec.execution.threads)?;
+        if hiders.blocks_row().is_some_and(|row| row.box_count == 0) {
+            return Err(not_applicable(
+                "no boxes are known in the solid between the map's rooms",
+            ));
+        }
+        let rooms = DoomMap::of_scene(scene)?.map(|map| map.graph());
+        let mut homes = Vec::new();
+        let views = views.into_iter().map(|(rays, volume)| View {
+            is_inside: rooms
+                .as_ref()
+                .is_some_and(|rooms| rooms.homes(&rays, &mut homes)),
+            rays,
+            volume,
+        });
+        let views = views.collect();
+        let met = Met::of(scene, solids.as_ref())?;
+        Ok((Occlusion { hiders, views }, met))
     }
 }
 
@@ -66,15 +87,21 @@ fn asked<'c>(case: &Case, all: Rc<Occlusion>, grid: SampleGrid) -> Ask<'c> {
     let kernel = case.spec.execution.kernel;
     let culling = RefCell::new(Interleaved::new(MaskedInner::new(grid), kernel));
     Box::new(move |n, out| {
-        let (rays, volume) = &all.views[n];
-        let view = View::new(rays, volume, &all.scene, grid);
-        culling.borrow_mut().cull(&all.scene, &view, out);
+        let View {
+            rays,
+            volume,
+            is_inside,
+        } = &all.views[n];
+        let occluders = all.hiders.from_eye(|| *is_inside);
+        let view = occlusion::View::new(rays, volume, occluders, grid);
+        culling.borrow_mut().cull(occluders, &view, out);
     })
 }
 
 fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfit> {
-    let (all, solids) = Occlusion::of(case).map_err(not_applicable)?;
-    let predicted = predicted(&all, &solids);
+    let (all, met) = Occlusion::of(case)?;
+    let extent = f64::from(case.scene().bounds.extent().length());
+    let predicted = predicted(&all, &met, extent);
     let on = format!(
         "masked-inner {}x{} against {}",
         USUAL.width, USUAL.height, case.spec.label
@@ -91,7 +118,7 @@ fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfi
 }
 
 fn prepare_buffer<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfit> {
-    let (all, _) = Occlusion::of(case).map_err(not_applicable)?;
+    let (all, _) = Occlusion::of(case)?;
     let all = Rc::new(all);
     let on = "masked-inner 320x180 against 160x90".to_owned();
     let left_out = Way::Other(asked(case, all.clone(), SMALL));
@@ -106,19 +133,15 @@ fn prepare_buffer<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c
 
 /// Items spread evenly over the ground are hidden if they are farther than what is
 /// seen: of a view of depth D in which rays get as far as d, the share 1 - (d / D)^2.
-fn predicted(all: &Occlusion, solids: &Solids) -> f64 {
-    let index = RayIndex::build(solids);
-    let extent = f64::from(Aabb::union_of(&solids.outer).extent().length());
+fn predicted(all: &Occlusion, met: &Met, extent: f64) -> f64 {
     let mut shares = Vec::new();
     for frame in hidden::frames(all.views.len(), PROBED) {
-        let rays = &all.views[frame].0;
+        let rays = &all.views[frame].rays;
         let depth = rays.sample(PROBES, 0, 0).far.min(extent);
         for row in 0..PROBES.height {
             for column in 0..PROBES.width {
                 let ray = rays.sample(PROBES, column, row);
-                let met = index
-                    .front_of(&ray)
-                    .map_or(depth, |front| front.entry.depth.min(depth));
+                let met = met.depth(&ray).map_or(depth, |at| at.min(depth));
                 shares.push(1.0 - (met / depth).powi(2));
             }
         }

@@ -4,14 +4,16 @@
 
 use std::rc::Rc;
 
+use glam::DVec3;
+
 use super::super::case::Case;
 use super::super::omission::{By, Draft, Forced, LeftOutIf, Omission, Way};
 use super::super::rule::{Rule, Unfit, not_applicable};
-use super::hidden::{self, PROBED, PROBES, Removal};
+use super::hidden::{self, Met, PROBED, PROBES, Removal};
+use crate::camera::Camera;
 use crate::query::ItemId;
 use crate::visibility::fragment::order::front_to_back;
-use crate::visibility::fragment::{Canvas, Piece, Tests, draw};
-use crate::visibility::truth::RayIndex;
+use crate::visibility::fragment::{Canvas, DepthOrder, Piece, Tests, draw, draw_surfaces};
 use crate::visibility::{Rays, SampleGrid, Solids};
 
 pub(super) const RULE: Rule = Rule {
@@ -32,7 +34,10 @@ const COUNTED: SampleGrid = SampleGrid::new(160, 90);
 const SHADED: SampleGrid = SampleGrid::new(1920, 1080);
 
 fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfit> {
-    let solids = Rc::new(hidden::solids(case.scene()).map_err(not_applicable)?);
+    let scene = case.scene();
+    let own = hidden::solids(scene);
+    let met = Rc::new(Met::of(scene, own.as_ref())?);
+    let solids = Rc::new(own.unwrap_or_else(|| Solids::of(scene)));
     let views = hidden::sights(case).map_err(not_applicable)?;
     let frames = hidden::frames(views.len(), PROBED);
     let few = frames.map(|n| {
@@ -40,7 +45,10 @@ fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfi
         case.query(n, &mut items);
         View {
             rays: views[n].0,
-            solids: solids.some(&items),
+            solids: solids.clone(),
+            met: met.clone(),
+            origin: scene.origin,
+            items,
         }
     });
     let few: Vec<View> = few.collect();
@@ -71,21 +79,41 @@ fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfi
 /// What the frustum leaves of a view, in the order in which the tree hands it on.
 struct View {
     rays: Rays,
-    solids: Solids,
+    solids: Rc<Solids>,
+    met: Rc<Met>,
+    origin: DVec3,
+    items: Vec<ItemId>,
 }
 
 impl View {
     /// Fragments that pass an early z-test when they come.
     fn shaded(&self, sorted: bool) -> f64 {
-        let mut items: Vec<ItemId> = (0..self.solids.boxes.len() as ItemId).collect();
+        let mut items = self.items.clone();
         if sorted {
             front_to_back(&self.solids, self.rays.camera(), &mut items);
         }
-        let pieces = items.iter().map(|&item| Piece::whole(item));
-        let pieces: Vec<Piece> = pieces.collect();
-        let canvas = Canvas::of(&self.rays, COUNTED);
-        let tally = draw(&canvas, &self.solids, &pieces, &Tests::default()).tally;
-        tally.passed as f64 * (SHADED.samples() as f64 / COUNTED.samples() as f64)
+        let passed = match &*self.met {
+            Met::Boxes(_) => {
+                let pieces: Vec<Piece> = items.into_iter().map(Piece::whole).collect();
+                let canvas = Canvas::of(&self.rays, COUNTED);
+                draw(&canvas, &self.solids, &pieces, &Tests::default())
+                    .tally
+                    .passed
+            }
+            Met::Triangles(index, _) => {
+                let mut left = items.clone();
+                left.sort_unstable();
+                let place = |item| left.binary_search(item).unwrap_or_default() as ItemId;
+                let pieces = items.iter().map(place).map(Piece::whole).collect();
+                let no_parts = |_: &Solids, _: &Camera, _: &mut Vec<Piece>| ();
+                let orders: [(&dyn DepthOrder, _); 1] = [(&no_parts, pieces)];
+                let (rays, zero) = (&self.rays, self.origin);
+                draw_surfaces(rays, COUNTED, index, zero, &left, &orders)[0]
+                    .0
+                    .passed
+            }
+        };
+        passed as f64 * (SHADED.samples() as f64 / COUNTED.samples() as f64)
     }
 }
 
@@ -95,11 +123,10 @@ impl View {
 fn predicted(few: &[View]) -> f64 {
     let (mut shaded, mut covered) = (0.0, 0.0);
     for view in few {
-        let index = RayIndex::build(&view.solids);
         for row in 0..PROBES.height {
             for column in 0..PROBES.width {
                 let ray = view.rays.sample(PROBES, column, row);
-                let layers = index.all_along(&ray, ray.far).len();
+                let layers = view.met.layers(&ray);
                 shaded += (1..=layers).map(|n| 1.0 / n as f64).sum::<f64>();
                 covered += f64::from(u8::from(layers > 0));
             }

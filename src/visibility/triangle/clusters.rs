@@ -54,9 +54,12 @@ impl Clusters {
             .triangles
             .extend(0..surfaces.triangles.len() as u32);
         for item in 0..surfaces.items() {
-            let (first, end) = (clusters.len() as u32, surfaces.of_item[item].end);
-            let starts = surfaces.of_item[item].clone().step_by(most).skip(1);
-            clusters.starts.extend(starts.chain([end]));
+            let first = clusters.len() as u32;
+            let own = surfaces.of_item[item].clone();
+            // Each ends where the next one starts; of nothing there is none.
+            let ends = own.clone().step_by(most).skip(1);
+            let last = (!own.is_empty()).then_some(own.end);
+            clusters.starts.extend(ends.chain(last));
             clusters.of_item.push(first..clusters.len() as u32);
         }
         clusters
@@ -243,7 +246,7 @@ fn along_the_curve(nodes: &[Node], bounds: &Aabb) -> Vec<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{MESHES, Mesh};
+    use crate::scene::{MESHES, Mesh, SurfaceKind};
 
     #[test]
     fn every_triangle_is_in_one_cluster_of_its_item() {
@@ -289,6 +292,23 @@ mod tests {
         let fives = Clusters::as_listed(surfaces, 5);
         let sizes = (3..6).map(|cluster| fives.triangles_of(cluster).len());
         assert_eq!(sizes.collect::<Vec<_>>(), [5, 5, 2]);
+    }
+
+    #[test]
+    fn an_item_without_triangles_is_no_cluster() {
+        let scene = crate::scene::load("city:n=2", &Default::default()).unwrap();
+        let mut surfaces = Surfaces::from_boxes(&scene);
+        let whole = surfaces.of_item[1].clone();
+        surfaces.of_item.insert(1, whole.start..whole.start);
+        surfaces.kinds.push(SurfaceKind::Opaque);
+        surfaces.two_sided.push(false);
+        for clusters in
+            [Clusters::as_listed, Clusters::of].map(|make| make(surfaces.clone().into(), 2))
+        {
+            assert!(clusters.of_item[1].is_empty());
+            assert!((0..clusters.len()).all(|cluster| !clusters.triangles_of(cluster).is_empty()));
+            assert_eq!(clusters.one_sided().count(), clusters.len());
+        }
     }
 
     #[test]

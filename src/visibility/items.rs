@@ -1,15 +1,14 @@
-//! What the items of a scene are to the funnel, and to the check of its proofs: triangles,
-//! boxes with holes, walls of a map.
+//! What the items of a scene are to rays: triangles, boxes with holes, walls of a map.
 
 use std::sync::Arc;
 
+use super::fragment::{self, CutOuts};
+use super::region::RegionGraph;
+use super::region::doom::DoomMap;
+use super::truth::PlanWall;
 use crate::input::InputError;
 use crate::query::ItemId;
 use crate::scene::{ItemShape, Scene, Surfaces};
-use crate::visibility::fragment::{self, CutOuts};
-use crate::visibility::region::RegionGraph;
-use crate::visibility::region::doom::DoomMap;
-use crate::visibility::truth::PlanWall;
 
 /// The triangles of a scene's items, if they are no solid boxes; of a map also those of its
 /// floors and ceilings, behind the items.
