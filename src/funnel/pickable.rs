@@ -4,6 +4,7 @@
 use std::rc::Rc;
 
 use super::world::World;
+use crate::kernel::Kernel;
 use crate::query::ItemId;
 use crate::scene::Surfaces;
 use crate::visibility::pick::{BACK_ENDS, BackEnd, Facets, Pick, SolidSurfaces};
@@ -46,7 +47,7 @@ impl<'w> Pickable<'w> {
 
     /// Every back end that can hold the items; the one that looks at each box or triangle
     /// only up to so many.
-    pub fn back_ends(self, most_for_loop: usize) -> Vec<Built> {
+    pub fn back_ends(self, most_for_loop: usize, kernel: Kernel) -> Vec<Built> {
         let count = match self {
             Pickable::Boxes(solids) => solids.boxes.len(),
             Pickable::Triangles(surfaces, _) => surfaces.triangles.len(),
@@ -56,8 +57,8 @@ impl<'w> Pickable<'w> {
             Pickable::Triangles(surfaces, items) => Some(Facets::of(surfaces, items)),
         };
         let build = |row: &BackEnd| match (self, &facets) {
-            (Pickable::Boxes(solids), _) => (row.build)(solids).ok(),
-            (_, Some(facets)) => row.build_triangles?(facets).ok(),
+            (Pickable::Boxes(solids), _) => (row.build)(solids, kernel).ok(),
+            (_, Some(facets)) => row.build_triangles?(facets, kernel).ok(),
             (_, None) => None,
         };
         let rows = BACK_ENDS

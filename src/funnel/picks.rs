@@ -121,7 +121,7 @@ impl<'w> Picks<'w> {
     pub fn of(world: &'w World<'w>) -> Picks<'w> {
         let suits = |name: &str| name != "linear" || world.items() <= MOST_FOR_LOOP;
         let pickable = Pickable::of(world);
-        let built = pickable.back_ends(MOST_FOR_LOOP);
+        let built = pickable.back_ends(MOST_FOR_LOOP, world.kernel);
         let by_rays = |ask: fn(Rc<dyn Pick>) -> By<'w>| {
             let pickers = built.iter().map(move |back_end| Picker {
                 name: back_end.name.to_owned(),

@@ -11,7 +11,7 @@ use cullbench::index::{Bsp, Bvh, Input, Linear, LinearScalar, Octree, Quadtree};
 use cullbench::index::{BspTextbook, BvhTextbook, OctreeTextbook, QuadtreeTextbook};
 use cullbench::index::{BuildError, DynIndex, MemoryUsage, Registry, StructureSpec};
 use cullbench::index::{Info, Kind, RegionIndex, UniformGrid, Wide};
-use cullbench::kernel::Isa;
+use cullbench::kernel::{Isa, Kernel};
 use cullbench::measure::Workload;
 use cullbench::path::{self, LensDefaults};
 use cullbench::query::{AnyVolume, Context, ItemId, ManySink, QueryVolume};
@@ -323,7 +323,7 @@ fn peers_pick_what_the_reference_picks() {
     let solids = Solids::of(&Scene::from_boxes("random", &boxes).unwrap());
     let reference = pick::Linear::of(&solids);
     for row in pick::BACK_ENDS {
-        let back_end = (row.build)(&solids).unwrap();
+        let back_end = (row.build)(&solids, Kernel::best()).unwrap();
         let (mut hits, mut truth) = (Vec::new(), Vec::new());
         let mut met = 0;
         for _ in 0..300 {
@@ -357,7 +357,7 @@ fn peers_pick_the_triangles_that_the_reference_picks() {
     let bounds = scene.world_bounds();
     let built = pick::BACK_ENDS.iter().filter_map(|row| {
         let build = row.build_triangles?;
-        Some((row, build(&facets).unwrap()))
+        Some((row, build(&facets, Kernel::best()).unwrap()))
     });
     let built: Vec<_> = built.collect();
     let (_, reference) = &built[0];

@@ -15,6 +15,7 @@ use super::rounded::RoundedRay;
 use crate::geometry::Aabb;
 use crate::index::Record;
 use crate::index::peers::{Shape, bounds_of};
+use crate::kernel::Kernel;
 use crate::visibility::{Guarantee, Ray, Solids};
 
 /// The row of this file.
@@ -23,7 +24,7 @@ pub const ROW: BackEnd = BackEnd {
     summary: "crate bvh, its traverse: all items on the ray, then the first",
     guarantee: Guarantee::Unproven,
     build,
-    build_triangles: Some(|facets| Ok(Box::new(BvhTriangles::of(facets)?))),
+    build_triangles: Some(|facets, _| Ok(Box::new(BvhTriangles::of(facets)?))),
 };
 
 /// The line from the origin to the far plane. The crate's own ray has a
@@ -52,7 +53,7 @@ fn tree(boxes: &[Aabb]) -> Result<(Bvh<f32, 3>, Vec<Shape>), NotBuilt> {
 }
 
 /// Builds it for the table of back ends.
-fn build(solids: &Solids) -> Result<Box<dyn Pick>, NotBuilt> {
+fn build(solids: &Solids, _: Kernel) -> Result<Box<dyn Pick>, NotBuilt> {
     let (tree, shapes) = tree(&solids.outer)?;
     Ok(Box::new(PickBvh {
         tree,

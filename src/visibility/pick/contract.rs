@@ -6,6 +6,7 @@ use std::cmp::Ordering;
 use super::facets::Facets;
 use crate::geometry::Aabb;
 use crate::index::ploc;
+use crate::kernel::Kernel;
 use crate::query::ItemId;
 use crate::visibility::{Guarantee, Ray, Solids};
 
@@ -46,8 +47,11 @@ pub trait Pick: Send + Sync {
     fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>);
 }
 
+/// Builds a back end over the items of a scene.
+pub type BuildBoxes = fn(&Solids, Kernel) -> Result<Box<dyn Pick>, NotBuilt>;
+
 /// Builds a back end over the triangles of a scene.
-pub type BuildTriangles = fn(&Facets) -> Result<Box<dyn Pick>, NotBuilt>;
+pub type BuildTriangles = fn(&Facets, Kernel) -> Result<Box<dyn Pick>, NotBuilt>;
 
 /// A row of the table of back ends.
 #[derive(Clone, Copy, Debug)]
@@ -60,12 +64,13 @@ pub struct BackEnd {
     /// What it promises of its answers: [`Guarantee::Exact`] is the answer of
     /// exact arithmetic, ties included.
     pub guarantee: Guarantee,
-    /// Builds it over the items. Deterministic.
+    /// Builds it over the items, to answer by an instruction set if it has a choice.
+    /// Deterministic.
     ///
     /// # Errors
     /// As [`NotBuilt`] says.
-    pub build: fn(&Solids) -> Result<Box<dyn Pick>, NotBuilt>,
-    /// Builds it over triangles, if it takes them. Deterministic.
+    pub build: BuildBoxes,
+    /// Builds it over triangles, if it takes them, in the same way.
     ///
     /// # Errors
     /// As [`NotBuilt`] says.

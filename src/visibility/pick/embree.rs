@@ -15,6 +15,7 @@ use super::contract::{BackEnd, Hit, NotBuilt, Pick, keep_nearest, keep_nearest_i
 use super::facets::Facets;
 use super::rounded::RoundedRay;
 use crate::geometry::Aabb;
+use crate::kernel::Kernel;
 use crate::query::ItemId;
 use crate::visibility::{Guarantee, Ray, Solids};
 
@@ -25,7 +26,7 @@ pub const ROW: BackEnd = BackEnd {
     // Rays and quads are in f32, and rays may slip through between two quads.
     guarantee: Guarantee::Unproven,
     build,
-    build_triangles: Some(|facets| Ok(Box::new(EmbreeTriangles::of(facets)?))),
+    build_triangles: Some(|facets, _| Ok(Box::new(EmbreeTriangles::of(facets)?))),
 };
 
 /// Corners of a box in the order of its faces; a bit of a corner is an axis, set for
@@ -105,7 +106,7 @@ pub struct Embree {
 }
 
 /// Builds it for the table of back ends.
-fn build(solids: &Solids) -> Result<Box<dyn Pick>, NotBuilt> {
+fn build(solids: &Solids, _: Kernel) -> Result<Box<dyn Pick>, NotBuilt> {
     let boxes = &solids.outer;
     let faces = Faces::of(boxes.len(), u32::MAX as usize / 8, |device| {
         let mut mesh = QuadMesh::unanimated(device, boxes.len() * 6, boxes.len() * 8);

@@ -13,8 +13,8 @@ pub const ROW: BackEnd = BackEnd {
     name: "linear",
     summary: "every box or triangle, in exact arithmetic: the reference",
     guarantee: Guarantee::Exact,
-    build: |solids| Ok(Box::new(Linear::of(solids))),
-    build_triangles: Some(|facets| Ok(Box::new(EveryTriangle(facets.clone())))),
+    build: |solids, _| Ok(Box::new(Linear::of(solids))),
+    build_triangles: Some(|facets, _| Ok(Box::new(EveryTriangle(facets.clone())))),
 };
 
 /// All items in the order of their ids.

@@ -25,7 +25,7 @@ mod rstar;
 #[cfg(test)]
 mod tests;
 
-pub use contract::{BackEnd, BuildTriangles, Hit, NotBuilt, Pick};
+pub use contract::{BackEnd, BuildBoxes, BuildTriangles, Hit, NotBuilt, Pick};
 pub use cursor::CursorRectangle;
 pub use facets::{Facet, Facets};
 pub use linear::Linear;

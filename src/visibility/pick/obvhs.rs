@@ -24,8 +24,8 @@ pub const ROW: BackEnd = BackEnd {
     summary: "crate obvhs, binary tree, one item a leaf, its ray_traverse",
     // Rays, nodes and boxes are rounded to f32.
     guarantee: Guarantee::Unproven,
-    build: |solids| Obvhs::<Bvh2>::boxed(solids, ROW.name),
-    build_triangles: Some(|facets| ObvhsTriangles::<Bvh2>::boxed(facets, ROW.name)),
+    build: |solids, _| Obvhs::<Bvh2>::boxed(solids, ROW.name),
+    build_triangles: Some(|facets, _| ObvhsTriangles::<Bvh2>::boxed(facets, ROW.name)),
 };
 
 /// The row of the eight-wide tree.
@@ -33,8 +33,8 @@ pub const ROW_WIDE: BackEnd = BackEnd {
     name: "obvhs-cwbvh",
     summary: "crate obvhs, eight-wide quantised tree, its ray_traverse",
     guarantee: Guarantee::Unproven,
-    build: |solids| Obvhs::<CwBvh>::boxed(solids, ROW_WIDE.name),
-    build_triangles: Some(|facets| ObvhsTriangles::<CwBvh>::boxed(facets, ROW_WIDE.name)),
+    build: |solids, _| Obvhs::<CwBvh>::boxed(solids, ROW_WIDE.name),
+    build_triangles: Some(|facets, _| ObvhsTriangles::<CwBvh>::boxed(facets, ROW_WIDE.name)),
 };
 
 /// A tree of the crate that rays are cast through.

@@ -12,6 +12,7 @@ use super::contract::{BackEnd, Hit, NotBuilt, Pick, keep_nearest, keep_nearest_i
 use super::facets::Facets;
 use super::rounded::RoundedRay;
 use crate::geometry::Aabb;
+use crate::kernel::Kernel;
 use crate::visibility::{Guarantee, Ray, Solids};
 
 /// The row of this file.
@@ -20,7 +21,7 @@ pub const ROW: BackEnd = BackEnd {
     summary: "crate parry3d, binned build, its cast_ray",
     guarantee: Guarantee::Unproven,
     build,
-    build_triangles: Some(|facets| Ok(Box::new(Parry3dTriangles::of(facets)))),
+    build_triangles: Some(|facets, _| Ok(Box::new(Parry3dTriangles::of(facets)))),
 };
 
 /// Its tree; leaves are item ids.
@@ -60,7 +61,7 @@ fn each_leaf(tree: &Bvh, ray: &TheirRay, mut leaf: impl FnMut(u32)) {
 }
 
 /// Builds it for the table of back ends.
-fn build(solids: &Solids) -> Result<Box<dyn Pick>, NotBuilt> {
+fn build(solids: &Solids, _: Kernel) -> Result<Box<dyn Pick>, NotBuilt> {
     Ok(Box::new(Parry3d {
         tree: tree(&solids.outer),
         boxes: solids.outer.clone(),

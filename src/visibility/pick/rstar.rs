@@ -8,6 +8,7 @@ use super::contract::{BackEnd, Hit, NotBuilt, Pick, keep_nearest};
 use super::rounded::RoundedRay;
 use crate::geometry::Aabb;
 use crate::index::Record;
+use crate::kernel::Kernel;
 use crate::visibility::{Guarantee, Ray, Solids};
 
 /// The row of this file.
@@ -42,7 +43,7 @@ pub struct PickRstar {
 }
 
 /// Builds it for the table of back ends.
-fn build(solids: &Solids) -> Result<Box<dyn Pick>, NotBuilt> {
+fn build(solids: &Solids, _: Kernel) -> Result<Box<dyn Pick>, NotBuilt> {
     Ok(Box::new(PickRstar {
         tree: RTree::bulk_load(Record::numbered(&solids.outer)),
         zero: solids.origin,

@@ -124,10 +124,10 @@ fn exact_back_ends_answer_as_arithmetic_on_integers_does() {
             let built: Vec<_> = BACK_ENDS
                 .iter()
                 .filter(|row| row.guarantee == Guarantee::Exact)
-                .map(|row| (row.name, (row.build)(&solids).unwrap()))
+                .map(|row| (row.name, (row.build)(&solids, Kernel::best()).unwrap()))
                 .collect();
             assert!(built.len() >= 2);
-            let wide = WideRay::of(&solids).unwrap();
+            let wide = WideRay::of(&solids, Kernel::best()).unwrap();
             for _ in 0..if count > 100 { 60 } else { 120 } {
                 let ray = worlds.ray();
                 let truth = all_judged(&ray, &solids);
@@ -172,7 +172,7 @@ fn back_ends_in_f32_differ_on_few_ties() {
         let (mut on_grids, mut asked) = (0, 0);
         for mut worlds in grids(77) {
             let solids = worlds.boxes(40);
-            let back_end = (row.build)(&solids).unwrap();
+            let back_end = (row.build)(&solids, Kernel::best()).unwrap();
             for _ in 0..150 {
                 let ray = worlds.ray();
                 let truth = all_judged(&ray, &solids);
@@ -191,9 +191,9 @@ fn back_ends_in_f32_differ_on_few_ties() {
 fn rays_along_faces_and_beyond_the_analysis_are_exact_too() {
     let mut worlds = Worlds::new(3, 1.0, DVec3::ZERO);
     let solids = worlds.boxes(150);
-    let wide = WideRay::of(&solids).unwrap();
+    let wide = WideRay::of(&solids, Kernel::best()).unwrap();
     let sizes = [
-        0.0, 1e-70, 1e-30, -1e-26, 6e-17, -6e-17, 1e-9, 0.2, -1.0, 1.0, 3000.0,
+        0.0, 1e-70, 1e-30, -1e-26, 6e-17, -6e-17, 1e-9, 0.2, -1.0, 1.0, 900.0, -900.0,
     ];
     let mut met = 0;
     for _ in 0..1500 {
@@ -223,7 +223,10 @@ fn in_scenes_the_wide_tree_finds_what_the_reference_finds() {
         let scene = load(name, &Default::default()).unwrap();
         let bounds = scene.world_bounds();
         let solids = Solids::of(&scene);
-        let (wide, reference) = (WideRay::of(&solids).unwrap(), Linear::of(&solids));
+        let (wide, reference) = (
+            WideRay::of(&solids, Kernel::best()).unwrap(),
+            Linear::of(&solids),
+        );
         let mut rng = SeededRng::new(9);
         let (mut hits, mut truth) = (Vec::new(), Vec::new());
         for _ in 0..100 {
@@ -272,7 +275,10 @@ fn at_every_sample_the_pick_is_the_item_of_the_id_buffer() {
     for name in ["city:n=3000", "rooms:n=2000", "freedm-map12"] {
         let (scene, cameras) = cameras(name);
         let solids = Solids::of(&scene);
-        let (wide, index) = (WideRay::of(&solids).unwrap(), RayIndex::build(&solids));
+        let (wide, index) = (
+            WideRay::of(&solids, Kernel::best()).unwrap(),
+            RayIndex::build(&solids),
+        );
         let mut items = 0;
         for camera in cameras {
             let rays = Rays::of(&camera).unwrap();
@@ -295,7 +301,7 @@ fn at_every_sample_the_pick_is_the_item_of_the_id_buffer() {
 fn a_cursors_frustum_holds_what_every_ray_through_it_meets_and_no_more_than_its_planes() {
     let (scene, cameras) = cameras("city:n=3000");
     let solids = Solids::of(&scene);
-    let wide = WideRay::of(&solids).unwrap();
+    let wide = WideRay::of(&solids, Kernel::best()).unwrap();
     let index = index::Wide::build(&Input::new(&scene.items), &Default::default()).unwrap();
     let around = Surroundings {
         origin: scene.origin,
@@ -353,7 +359,7 @@ fn ray(origin: DVec3, direction: DVec3) -> Ray {
 fn triangle_back_ends(facets: &Facets) -> Vec<(&'static BackEnd, Box<dyn Pick>)> {
     let built = BACK_ENDS.iter().filter_map(|row| {
         let build = row.build_triangles?;
-        Some((row, build(facets).unwrap()))
+        Some((row, build(facets, Kernel::best()).unwrap()))
     });
     built.collect()
 }

@@ -28,12 +28,12 @@ pub struct WideRay {
 }
 
 impl WideRay {
-    /// Builds the tree. O(n log n).
+    /// Builds the tree, which answers by an instruction set unless told another. O(n log n).
     ///
     /// # Errors
     /// More than 2^27 items.
-    pub fn of(solids: &Solids) -> Result<WideRay, NotBuilt> {
-        let (tree, ids) = Tree::of(&solids.outer, solids.origin)?;
+    pub fn of(solids: &Solids, kernel: Kernel) -> Result<WideRay, NotBuilt> {
+        let (tree, ids) = Tree::of(&solids.outer, solids.origin, kernel)?;
         let item = |&id: &ItemId| Item {
             b: solids.boxes[id as usize],
             id,

@@ -12,6 +12,7 @@ use glam::DVec3;
 pub use self::boxes::WideRay;
 use self::build::{Built, Child, Node};
 use self::slabs::Slabs;
+use self::triangles::WideTriangles;
 use super::contract::{BackEnd, NotBuilt};
 use crate::geometry::Aabb;
 use crate::kernel::{Isa, Kernel, LANES};
@@ -23,8 +24,8 @@ pub const ROW: BackEnd = BackEnd {
     name: "wide-ray",
     summary: "16-wide tree, sixteen slab tests at once, the last step exact",
     guarantee: Guarantee::Exact,
-    build: |solids| Ok(Box::new(WideRay::of(solids)?)),
-    build_triangles: Some(|facets| Ok(Box::new(triangles::WideTriangles::of(facets)?))),
+    build: |solids, kernel| Ok(Box::new(WideRay::of(solids, kernel)?)),
+    build_triangles: Some(|facets, kernel| Ok(Box::new(WideTriangles::of(facets, kernel)?))),
 };
 
 /// Most items: a node holds one at least.
@@ -39,14 +40,14 @@ struct Tree {
     zero: DVec3,
     /// Of all boxes.
     bounds: Aabb,
-    /// The best of the machine that it was built on.
+    /// What answers are computed by.
     kernel: Kernel,
 }
 
 impl Tree {
     /// Builds it over boxes about a zero; the places that [`Candidates`] are told of are
     /// those of the ids that are handed back. O(n log n).
-    fn of(boxes: &[Aabb], zero: DVec3) -> Result<(Tree, Vec<ItemId>), NotBuilt> {
+    fn of(boxes: &[Aabb], zero: DVec3, kernel: Kernel) -> Result<(Tree, Vec<ItemId>), NotBuilt> {
         let count = boxes.len();
         if count > MOST {
             return Err(NotBuilt::TooMany { count, most: MOST });
@@ -57,7 +58,7 @@ impl Tree {
             root,
             zero,
             bounds: Aabb::union_of(boxes),
-            kernel: Kernel::best(),
+            kernel,
         };
         Ok((tree, ids))
     }

@@ -32,8 +32,8 @@ impl WideTriangles {
     ///
     /// # Errors
     /// More than 2^27 triangles.
-    pub fn of(facets: &Facets) -> Result<WideTriangles, NotBuilt> {
-        let (tree, ids) = Tree::of(&facets.bounds(), facets.origin)?;
+    pub fn of(facets: &Facets, kernel: Kernel) -> Result<WideTriangles, NotBuilt> {
+        let (tree, ids) = Tree::of(&facets.bounds(), facets.origin, kernel)?;
         let padded = |&id: &u32| Padded(facets.all[id as usize]);
         Ok(WideTriangles {
             tree,
@@ -268,7 +268,7 @@ mod tests {
                 // The last few are no items.
                 items: n * 2 / 5,
             };
-            let wide = WideTriangles::of(&facets).unwrap();
+            let wide = WideTriangles::of(&facets, Kernel::best()).unwrap();
             for _ in 0..1200 {
                 let mut ray = Ray {
                     origin: facets.origin + grid(&mut rng, 20).as_dvec3() * 0.5,
