@@ -257,3 +257,46 @@ impl DepthOrder for PartitionOrder {
         Some(leaf)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+    use crate::camera::Frame;
+    use crate::geometry::Aabb;
+    use crate::scene::SurfaceKind;
+
+    /// A wall that is nearer to the eye than a thing far along it hides nothing of it, seen
+    /// from its one side.
+    #[test]
+    fn what_stands_before_a_wall_comes_first_however_near_the_wall_is() {
+        let wall = [(-100.0, -9.0), (100.0, -9.0), (100.0, 9.0), (-100.0, 9.0)];
+        let wall = wall.map(|(y, z)| Vec3::new(0.0, y, z));
+        let thing = Aabb::new(Vec3::new(1.0, 50.0, -1.0), Vec3::new(2.0, 52.0, 1.0));
+        let order = |two_sided| {
+            let mut surfaces = Surfaces::about(DVec3::ZERO);
+            let triangles = [[0, 1, 2], [0, 2, 3]];
+            surfaces.push(SurfaceKind::Opaque, two_sided, &wall, &triangles);
+            surfaces.push_box(SurfaceKind::Opaque, false, &thing);
+            let order = PartitionOrder::of(&surfaces, &PlaneTree::default());
+            let frame = Frame::looking_along(DVec3::new(5.0, -60.0, 0.0), DVec3::Y, DVec3::Z);
+            let camera = Camera {
+                frame: frame.unwrap(),
+                lens: Lens::perspective(90.0, 1.0, 0.1, None).unwrap(),
+            };
+            let nothing = Solids {
+                origin: DVec3::ZERO,
+                boxes: Vec::new(),
+                outer: Vec::new(),
+                inner: Vec::new(),
+            };
+            let mut pieces = Vec::new();
+            order.order(&nothing, &camera, &mut pieces);
+            pieces.iter().map(|piece| piece.item).collect::<Vec<_>>()
+        };
+        assert_eq!(order(false), [1, 0]);
+        // Something may stand behind one of two sides.
+        assert_eq!(order(true), [0, 1]);
+    }
+}
