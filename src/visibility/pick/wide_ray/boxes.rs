@@ -28,7 +28,7 @@ pub struct WideRay {
 }
 
 impl WideRay {
-    /// Builds the tree, which answers by an instruction set unless told another. O(n log n).
+    /// Builds the tree; as a [`Pick`] it answers by `kernel`. O(n log n).
     ///
     /// # Errors
     /// More than 2^27 items.
