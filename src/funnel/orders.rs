@@ -3,8 +3,8 @@
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
-use glam::DVec3;
 use serde::Serialize;
 
 use super::pass::Pass;
@@ -12,6 +12,7 @@ use super::stage::by_name;
 use super::times::Times;
 use super::world::World;
 use crate::query::ItemId;
+use crate::scene::Surfaces;
 use crate::visibility::fragment::order::{self, ORDERS};
 use crate::visibility::fragment::{
     self, Canvas, DepthOrder, OrderErrors, Piece, Tally, Tests, ToOrder, draw, draw_surfaces,
@@ -68,9 +69,8 @@ struct Left {
 pub struct Orders {
     rows: Vec<&'static order::OrderRow>,
     views: Vec<Left>,
-    /// The triangles that are drawn, and the zero of their coordinates, of a scene whose
-    /// items are no solid boxes.
-    triangles: Option<(SurfaceIndex, DVec3)>,
+    /// The triangles that are drawn, of a scene whose items are no solid boxes.
+    triangles: Option<Arc<Surfaces>>,
 }
 
 impl Orders {
@@ -108,7 +108,7 @@ impl Orders {
         Orders {
             views: views.collect(),
             rows,
-            triangles: surfaces.map(|all| (SurfaceIndex::build(all), all.origin)),
+            triangles: world.surfaces.clone(),
         }
     }
 
@@ -127,6 +127,8 @@ impl Orders {
     pub fn drawn(&self, samples: SampleGrid, stop: &dyn Fn() -> bool) -> Option<Vec<OrderRow>> {
         let mut sums = vec![[0.0; 7]; self.count()];
         let mut exceptions = vec![BTreeMap::new(); self.count()];
+        // Here and not before: processes that time need no tree of the triangles.
+        let index = self.triangles.as_deref().map(SurfaceIndex::build);
         for (view, left) in self.views.iter().enumerate() {
             if stop() {
                 return None;
@@ -136,7 +138,7 @@ impl Orders {
                 self.sort(order, view, &mut pieces);
                 pieces
             });
-            let counts = self.counted(left, samples, sorted.collect(), stop)?;
+            let counts = self.counted(left, index.as_ref(), samples, sorted.collect(), stop)?;
             for (sums, (tally, errors)) in sums.iter_mut().zip(counts) {
                 let counts = [
                     tally.fragments,
@@ -191,15 +193,18 @@ impl Orders {
     fn counted(
         &self,
         left: &Left,
+        index: Option<&SurfaceIndex>,
         samples: SampleGrid,
         sorted: Vec<Vec<Piece>>,
         stop: &dyn Fn() -> bool,
     ) -> Option<Vec<(Tally, OrderErrors)>> {
-        if let Some((index, origin)) = &self.triangles {
+        if let (Some(index), Some(all)) = (index, &self.triangles) {
             let orders = left.orders.iter().map(|order| &**order);
             let orders: Vec<_> = orders.zip(sorted).collect();
             let (rays, items) = (&left.rays, &left.items);
-            return Some(draw_surfaces(rays, samples, index, *origin, items, &orders));
+            return Some(draw_surfaces(
+                rays, samples, index, all.origin, items, &orders,
+            ));
         }
         let canvas = Canvas::of(&left.rays, samples);
         let tests = Tests {

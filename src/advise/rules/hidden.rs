@@ -8,7 +8,7 @@ use crate::geometry::ConvexVolume;
 use crate::input::InputError;
 use crate::measure::Ask;
 use crate::query::ItemId;
-use crate::scene::{ItemShape, Scene};
+use crate::scene::Scene;
 use crate::visibility::truth::{RayIndex, SurfaceIndex};
 use crate::visibility::{Ray, Rays, SampleGrid, Solids, surfaces_of};
 
@@ -35,14 +35,11 @@ pub(super) enum Met {
 }
 
 impl Met {
-    /// All of a scene; `solids` are its items if they are solid boxes.
-    pub fn of(scene: &Scene, solids: Option<&Solids>) -> Result<Met, InputError> {
-        Ok(match (solids, surfaces_of(scene)?) {
-            (Some(solids), _) => Met::Boxes(RayIndex::build(solids)),
-            (None, surfaces) => {
-                let surfaces = surfaces.unwrap_or_default();
-                Met::Triangles(SurfaceIndex::build(&surfaces), scene.items.len())
-            }
+    /// All of a scene.
+    pub fn of(scene: &Scene) -> Result<Met, InputError> {
+        Ok(match surfaces_of(scene)? {
+            None => Met::Boxes(RayIndex::build(&Solids::of(scene))),
+            Some(surfaces) => Met::Triangles(SurfaceIndex::build(&surfaces), scene.items.len()),
         })
     }
 
@@ -71,11 +68,6 @@ impl Met {
         met.dedup();
         met.len()
     }
-}
-
-/// The items as solid boxes, if they are.
-pub(super) fn solids(scene: &Scene) -> Option<Solids> {
-    (scene.item_shape() == ItemShape::Box).then(|| Solids::of(scene))
 }
 
 /// So many of the cameras, or all, evenly spread.

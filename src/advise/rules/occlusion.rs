@@ -10,10 +10,11 @@ use super::super::rule::{Rule, Unfit, not_applicable};
 use super::hidden::{self, Met, PROBED, PROBES};
 use crate::geometry::ConvexVolume;
 use crate::measure::Ask;
+use crate::scene::ItemShape;
 use crate::visibility::hiders::Hiders;
 use crate::visibility::occlusion::{self, Interleaved, MaskedInner, OcclusionBuffer};
 use crate::visibility::region::doom::DoomMap;
-use crate::visibility::{Rays, SampleGrid};
+use crate::visibility::{Rays, SampleGrid, Solids};
 
 pub(super) const RULE: Rule = Rule {
     name: "occlusion",
@@ -56,10 +57,10 @@ struct View {
 }
 
 impl Occlusion {
-    /// With the items as rays meet them, or why there is nothing to ask.
-    fn of(case: &Case) -> Result<(Occlusion, Met), Unfit> {
+    /// Or why there is nothing to ask.
+    fn of(case: &Case) -> Result<Occlusion, Unfit> {
         let scene = case.scene();
-        let solids = hidden::solids(scene);
+        let solids = (scene.item_shape() == ItemShape::Box).then(|| Solids::of(scene));
         let views = hidden::sights(case).map_err(not_applicable)?;
         let hiders = Hiders::of(scene, solids.as_ref(), case.spec.execution.threads)?;
         if hiders.blocks_row().is_some_and(|row| row.box_count == 0) {
@@ -77,8 +78,7 @@ impl Occlusion {
             volume,
         });
         let views = views.collect();
-        let met = Met::of(scene, solids.as_ref())?;
-        Ok((Occlusion { hiders, views }, met))
+        Ok(Occlusion { hiders, views })
     }
 }
 
@@ -99,7 +99,8 @@ fn asked<'c>(case: &Case, all: Rc<Occlusion>, grid: SampleGrid) -> Ask<'c> {
 }
 
 fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfit> {
-    let (all, met) = Occlusion::of(case)?;
+    let all = Occlusion::of(case)?;
+    let met = Met::of(case.scene())?;
     let extent = f64::from(case.scene().bounds.extent().length());
     let predicted = predicted(&all, &met, extent);
     let on = format!(
@@ -118,8 +119,7 @@ fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfi
 }
 
 fn prepare_buffer<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfit> {
-    let (all, _) = Occlusion::of(case)?;
-    let all = Rc::new(all);
+    let all = Rc::new(Occlusion::of(case)?);
     let on = "masked-inner 320x180 against 160x90".to_owned();
     let left_out = Way::Other(asked(case, all.clone(), SMALL));
     let kept = asked(case, all.clone(), USUAL);
