@@ -1,13 +1,16 @@
 //! The speed floors this project promises, each a ratio in one run: all
 //! subjects of a row are interleaved and paired by the same harness as
 //! `cullbench run`. Before them, that harness beside a loop written by hand, the floors
-//! of the occlusion stage, and region search beside itself in f32 alone. Exits 3 if a
-//! floor is missed. Words after `--` choose by name what runs: `harness`, `occlusion`,
-//! `region-search`, or rows with the word in their scene or structure. `-- --test` only
-//! checks that every row runs.
+//! of the stages of visibility, and region search beside itself in f32 alone. Exits 3 if
+//! a floor is missed. Words after `--` choose by name what runs: `harness`, `occlusion`,
+//! `hidden`, `stored-rows`, `picking`, `region-search`, or rows with the word in their
+//! scene or structure. `-- --test` only checks that every row runs.
 
+mod hidden;
 mod occlusion;
+mod picking;
 mod region_search;
+mod stored_rows;
 
 use std::process::ExitCode;
 
@@ -187,6 +190,15 @@ fn ratio(turns: usize, mut one: impl FnMut() -> f64, mut other: impl FnMut() -> 
     [found.mean, low, high].map(f64::exp)
 }
 
+/// A scene, or a small one like it where nothing is timed.
+fn shortened(source: &str, only_test: bool) -> String {
+    let (kind, count) = source.split_once(":n=").unwrap_or((source, ""));
+    match only_test && !count.is_empty() {
+        true => format!("{kind}:n=1000"),
+        false => source.to_owned(),
+    }
+}
+
 fn verdict(only_test: bool, holds: bool) -> &'static str {
     match (only_test, holds) {
         (true, _) => "not judged",
@@ -210,9 +222,12 @@ fn main() -> ExitCode {
     };
     let turns = if only_test { 3 } else { TURNS };
     let mut missed = 0;
-    let parts: [(&str, Part); 3] = [
+    let parts: [(&str, Part); 6] = [
         ("harness", harness_overhead),
         ("occlusion", occlusion::missed),
+        ("hidden", hidden::missed),
+        ("stored-rows", stored_rows::missed),
+        ("picking", picking::missed),
         ("region-search", region_search::missed),
     ];
     for (_, part) in parts.iter().filter(|(name, _)| chosen(name)) {
@@ -222,11 +237,7 @@ fn main() -> ExitCode {
         .iter()
         .filter(|row| chosen(row.scene) || chosen(row.structure))
     {
-        let source = if only_test {
-            row.scene.replace("1000000", "1000")
-        } else {
-            row.scene.to_owned()
-        };
+        let source = shortened(row.scene, only_test);
         let scene = scene::load(&source, &Default::default()).expect(row.scene);
         let cameras = path::load(row.path, &scene, &Default::default()).expect(row.path);
         let workload = Workload::new(&scene, &cameras, &Culling::default()).expect(row.path);

@@ -14,7 +14,7 @@ use cullbench::visibility::occlusion::{
 use cullbench::visibility::{Rays, SampleGrid, Solids};
 use cullbench::{path, scene};
 
-use super::{ratio, verdict};
+use super::{ratio, shortened, verdict};
 
 const SCENE: &str = "city:n=100000";
 const PATH: &str = "street:frames=32";
@@ -115,11 +115,8 @@ pub fn missed(only_test: bool, turns: usize) -> u32 {
 }
 
 fn missed_by(kernel: Kernel, only_test: bool, turns: usize) -> u32 {
-    let source = match only_test {
-        true => "city:n=1000",
-        false => SCENE,
-    };
-    let scene = scene::load(source, &Default::default()).expect(source);
+    let source = shortened(SCENE, only_test);
+    let scene = scene::load(&source, &Default::default()).expect(SCENE);
     let cameras = path::load(PATH, &scene, &Default::default()).expect(PATH);
     let workload = Workload::new(&scene, &cameras, &Culling::default()).expect("views");
     let occluders = OccluderScene::of(&Solids::of(&scene));

@@ -1,0 +1,147 @@
+//! Floors of the occlusion stage as a whole, from the street: what the guarantee costs
+//! beside the same buffer without one, what a removed item costs, and how far walking the
+//! tree from front to back is ahead of drawing first and asking then.
+
+use std::hint::black_box;
+
+use cullbench::culling::Culling;
+use cullbench::kernel::Kernel;
+use cullbench::measure::{Stopwatch, Workload};
+use cullbench::query::{AnyVolume, ItemId};
+use cullbench::statistics::trimmed_mean;
+use cullbench::visibility::occlusion::{
+    Interleaved, MaskedCentre, MaskedInner, OccluderChoice, OccluderScene, OcclusionBuffer,
+    TwoPass, View,
+};
+use cullbench::visibility::{Rays, SampleGrid, Solids};
+use cullbench::{path, scene};
+
+use super::{ratio, shortened, verdict};
+
+const PATH: &str = "street:frames=32";
+const GRID: SampleGrid = SampleGrid::new(320, 180);
+/// Time with the guarantee / time without, at most.
+const MOST_TIMES: f64 = 1.05;
+/// Time in two passes / time front to back, at least.
+const LEAST_AHEAD: f64 = 2.0;
+
+/// Up to so many items: of more, most are smaller than a pixel that is covered wholly.
+const MOST_ITEMS: usize = 100_000;
+
+/// By scene: time of a removed item, at most.
+const REMOVED: [(&str, f64); 6] = [
+    ("city:n=10000", 22.0),
+    ("city:n=100000", 4.0),
+    ("city:n=1000000", 1.5),
+    ("forest:n=50000", 6.0),
+    ("rooms:n=50000", 7.0),
+    ("helsinki", 16.0),
+];
+
+/// The scene whose two couplings are compared.
+const COUPLED: &str = "city:n=100000";
+
+/// Judges every scene; how many floors are missed.
+pub fn missed(only_test: bool, turns: usize) -> u32 {
+    let rows = REMOVED.iter();
+    rows.map(|(source, most)| missed_in(source, *most, only_test, turns))
+        .sum()
+}
+
+/// Time of all views of a pass.
+fn timed<'v>(views: &'v [(View<'v>, Vec<ItemId>)], mut cull: impl FnMut(&View, &[ItemId])) -> f64 {
+    let watch = Stopwatch::start();
+    for (view, candidates) in views {
+        cull(view, candidates);
+    }
+    watch.lap().cpu_ns
+}
+
+fn missed_in(source: &str, most_ns: f64, only_test: bool, turns: usize) -> u32 {
+    let kernel = Kernel::best();
+    let typed = shortened(source, only_test);
+    let scene = scene::load(&typed, &Default::default()).expect(source);
+    let cameras = path::load(PATH, &scene, &Default::default()).expect(PATH);
+    let workload = Workload::new(&scene, &cameras, &Culling::default()).expect("views");
+    let occluders = OccluderScene::of(&Solids::of(&scene));
+    let views = cameras.cameras.iter().zip(&workload.views);
+    let views = views.map(|(camera, view)| {
+        let AnyVolume::Planes(volume) = view.as_any() else {
+            unreachable!("a perspective camera's default test")
+        };
+        let items = (0..).zip(&scene.items);
+        let seen = items.filter(|(_, b)| volume.sees(b)).map(|(id, _)| id);
+        let rays = Rays::of(camera).expect("rays");
+        (View::new(&rays, volume, &occluders, GRID), seen.collect())
+    });
+    let views: Vec<(View, Vec<ItemId>)> = views.collect();
+
+    let mut safe = Interleaved::new(MaskedInner::new(GRID), kernel);
+    let mut unsafe_one = Interleaved::new(MaskedCentre::new(GRID), kernel);
+    let mut out = Vec::new();
+    let mut kept = 0;
+    let mut laps = Vec::new();
+    let mut by_safe = || {
+        kept = 0;
+        let ns = timed(&views, |view, _| {
+            out.clear();
+            safe.cull(&occluders, view, &mut out);
+            kept += black_box(&out).len();
+        });
+        laps.push(ns);
+        ns
+    };
+    let mut out = Vec::new();
+    let by_unsafe = || {
+        timed(&views, |view, _| {
+            out.clear();
+            unsafe_one.cull(&occluders, view, &mut out);
+            black_box(&out);
+        })
+    };
+    let [times, low, high] = ratio(turns, &mut by_safe, by_unsafe);
+    let not_judged = only_test || scene.items.len() > MOST_ITEMS;
+    let cheap = not_judged || times <= MOST_TIMES;
+    println!(
+        "{typed}: with the guarantee {times:.3} x [{low:.3}, {high:.3}] the time without, at most \
+         {MOST_TIMES} x: {}",
+        verdict(not_judged, cheap)
+    );
+    let mut missed = u32::from(!cheap);
+
+    if source == COUPLED {
+        let mut two = TwoPass::new(MaskedInner::new(GRID), OccluderChoice::All, kernel);
+        let mut out = Vec::new();
+        let by_two = || {
+            timed(&views, |view, candidates| {
+                out.clear();
+                two.cull(&occluders, view, candidates, &mut out);
+                black_box(&out);
+            })
+        };
+        let [times, low, high] = ratio(turns.min(9), by_two, &mut by_safe);
+        let ahead = only_test || times >= LEAST_AHEAD;
+        println!(
+            "{typed}: two passes take {times:.1} x [{low:.1}, {high:.1}] walking front to back, at \
+             least {LEAST_AHEAD} x: {}",
+            verdict(only_test, ahead)
+        );
+        missed += u32::from(!ahead);
+    }
+
+    let candidates: usize = views.iter().map(|(_, seen)| seen.len()).sum();
+    let removed = (candidates - kept).max(1) as f64;
+    let each: Vec<f64> = laps.iter().map(|ns| ns / removed).collect();
+    let ns = trimmed_mean(&each).expect("turns");
+    let (low, high) = ns.interval(0.95);
+    let cheap = only_test || ns.mean <= most_ns;
+    println!(
+        "{typed}: {:.2} ns [{low:.2}, {high:.2}] per removed item of {:.0} in view, {:.1} left, at \
+         most {most_ns} ns: {}",
+        ns.mean,
+        candidates as f64 / views.len() as f64,
+        kept as f64 / views.len() as f64,
+        verdict(only_test, cheap)
+    );
+    missed + u32::from(!cheap)
+}

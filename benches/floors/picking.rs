@@ -1,0 +1,94 @@
+//! The floor of picking: the first item under a cursor is found no later than by `obvhs`,
+//! in items as boxes and as triangles.
+
+use std::hint::black_box;
+
+use cullbench::kernel::Kernel;
+use cullbench::measure::Stopwatch;
+use cullbench::visibility::pick::{BACK_ENDS, Facets, Pick};
+use cullbench::visibility::{Ray, Rays, Solids, surfaces_of};
+use cullbench::{path, scene};
+
+use super::{ratio, shortened, verdict};
+
+const PATH: &str = "street:frames=32";
+const SCENES: [&str; 11] = [
+    "city:n=10000",
+    "city:n=100000",
+    "forest:n=50000",
+    "rooms:n=50000",
+    "uniform:n=100000",
+    "helsinki",
+    "freedm-map12",
+    "freedm-map20",
+    "mesh:spheres:n=30000",
+    "mesh:forest:n=100000",
+    "mesh:statue:n=100000",
+];
+/// Cursors of a view, across and down.
+const CURSORS: [u32; 2] = [16, 9];
+/// Time / time of obvhs, at most.
+const MOST_TIMES: f64 = 1.0;
+
+/// Times every scene on every instruction set, and judges those that have vectors; how
+/// many floors are missed.
+pub fn missed(only_test: bool, turns: usize) -> u32 {
+    let scenes = SCENES.iter();
+    scenes
+        .map(|source| missed_in(source, only_test, turns))
+        .sum()
+}
+
+fn missed_in(source: &str, only_test: bool, turns: usize) -> u32 {
+    let typed = shortened(source, only_test);
+    let scene = scene::load(&typed, &Default::default()).expect(source);
+    let cameras = path::load(PATH, &scene, &Default::default()).expect(PATH);
+    let mut rays: Vec<Ray> = Vec::new();
+    for camera in &cameras.cameras {
+        let of_view = Rays::of(camera).expect("rays");
+        let part = |at: u32, axis: usize| (f64::from(at) + 0.5) / f64::from(CURSORS[axis]);
+        for row in 0..CURSORS[1] {
+            let places = (0..CURSORS[0]).map(|column| (part(column, 0), part(row, 1)));
+            rays.extend(places.map(|(x, y)| of_view.through(x, y)));
+        }
+    }
+    let facets = surfaces_of(&scene).expect(source);
+    let facets = facets.map(|surfaces| Facets::of(&surfaces, scene.items.len()));
+    let solids = Solids::of(&scene);
+    let built = |name: &str, kernel: Kernel| -> Box<dyn Pick> {
+        let row = BACK_ENDS.iter().find(|row| row.name == name).expect(name);
+        let pick = match (&facets, row.build_triangles) {
+            (Some(facets), Some(build)) => build(facets, kernel),
+            (Some(_), None) => unreachable!("takes triangles"),
+            (None, _) => (row.build)(&solids, kernel),
+        };
+        pick.expect(name)
+    };
+    let time = |pick: &dyn Pick| {
+        let watch = Stopwatch::start();
+        for ray in &rays {
+            black_box(pick.first(ray));
+        }
+        watch.lap().cpu_ns / rays.len() as f64
+    };
+    let theirs = built("obvhs", Kernel::Portable);
+    let mut missed = 0;
+    for kernel in Kernel::available() {
+        let ours = built("wide-ray", kernel);
+        let mut ns = 0.0;
+        let by_ours = || {
+            ns = time(&*ours);
+            ns
+        };
+        let [times, low, high] = ratio(turns, by_ours, || time(&*theirs));
+        let not_judged = only_test || kernel == Kernel::Portable;
+        let holds = not_judged || times <= MOST_TIMES;
+        missed += u32::from(!holds);
+        println!(
+            "{typed}, {kernel}: the first item in {times:.3} x [{low:.3}, {high:.3}] the time of obvhs \
+             ({ns:.0} ns), at most {MOST_TIMES} x: {}",
+            verdict(not_judged, holds)
+        );
+    }
+    missed
+}

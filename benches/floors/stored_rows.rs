@@ -1,0 +1,105 @@
+//! The floor of a stored set of visible regions: the answer from a region takes little
+//! more than reading the stored row; and what finding the eye's region adds to it.
+
+use std::hint::black_box;
+use std::sync::Arc;
+
+use cullbench::funnel::regions_of;
+use cullbench::measure::Stopwatch;
+use cullbench::visibility::Rays;
+use cullbench::visibility::region::doom::{DoomMap, SectorPvs};
+use cullbench::visibility::region::{
+    EXACT, ProvenPvs, RegionId, RegionRow, RoomsPvs, Scratch, StoredPvs,
+};
+use cullbench::{path, scene};
+
+use super::{ratio, shortened, verdict};
+
+const PATH: &str = "street:frames=32";
+const SCENES: [&str; 3] = ["rooms:n=50000", "freedm-map12", "freedm-map20"];
+/// Time of the answer / time of reading the row, at most.
+const MOST_TIMES: f64 = 1.5;
+/// Passes over the views in a turn, as one takes a microsecond.
+const PASSES: usize = 1000;
+
+/// Judges every scene; how many floors are missed.
+pub fn missed(only_test: bool, turns: usize) -> u32 {
+    let scenes = SCENES.iter();
+    scenes
+        .map(|source| missed_in(source, only_test, turns))
+        .sum()
+}
+
+fn missed_in(source: &str, only_test: bool, turns: usize) -> u32 {
+    let typed = shortened(source, only_test);
+    let scene = scene::load(&typed, &Default::default()).expect(source);
+    let cameras = path::load(PATH, &scene, &Default::default()).expect(PATH);
+    let (graph, _) = regions_of(&scene).expect(source).expect("regions");
+    let graph = Arc::new(graph);
+    let proven: Box<dyn ProvenPvs> = match DoomMap::of_scene(&scene).expect(source) {
+        Some(map) => Box::new(SectorPvs::of(map, graph.clone())),
+        None => Box::new(RoomsPvs::of(graph.clone()).expect("flat openings")),
+    };
+    let pvs = Arc::new(proven.pvs().clone());
+    let row = StoredPvs::of(graph.clone(), pvs, EXACT).expect("as many regions");
+    let eyes = cameras.cameras.iter().map(|c| Rays::of(c).expect("rays"));
+    let eyes: Vec<Rays> = eyes.collect();
+    let mut homes: Vec<RegionId> = Vec::new();
+    for rays in &eyes {
+        let mut of_eye = Vec::new();
+        if graph.homes(rays, &mut of_eye) {
+            homes.extend(of_eye);
+        }
+    }
+    // What is stored of the rows, one after the other.
+    let mut list = Vec::new();
+    let rows = homes.iter().map(|home| {
+        row.from_region(*home, &mut list);
+        list.clone()
+    });
+    let rows: Vec<Vec<RegionId>> = rows.collect();
+
+    let passes = if only_test { 1 } else { PASSES };
+    let time = |pass: &mut dyn FnMut()| {
+        let watch = Stopwatch::start();
+        for _ in 0..passes {
+            pass();
+        }
+        watch.lap().cpu_ns / passes as f64
+    };
+    let read = || {
+        time(&mut || {
+            for row in black_box(&rows) {
+                black_box(row.iter().fold(0, |all, region| all ^ region));
+            }
+        })
+    };
+    let row: &dyn RegionRow = black_box(&row);
+    let mut out = Vec::new();
+    let mut answer_ns = 0.0;
+    let answer = || {
+        answer_ns = time(&mut || {
+            for home in &homes {
+                row.from_region(*home, &mut out);
+                black_box(&out);
+            }
+        });
+        answer_ns
+    };
+    let [times, low, high] = ratio(turns, answer, read);
+    let (mut scratch, mut out) = (Scratch::default(), Vec::new());
+    let from_eye = time(&mut || {
+        for rays in &eyes {
+            black_box(row.from_eye(rays, &mut scratch, &mut out));
+        }
+    });
+    let holds = only_test || times <= MOST_TIMES;
+    println!(
+        "{typed}: a stored row is answered in {times:.2} x [{low:.2}, {high:.2}] the time of reading it \
+         ({:.1} ns), at most {MOST_TIMES} x: {}; from an eye, whose region has to be found, in {:.0} ns",
+        answer_ns / homes.len() as f64,
+        verdict(only_test, holds),
+        from_eye / eyes.len() as f64
+    );
+    u32::from(!holds)
+}
