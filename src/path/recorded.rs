@@ -48,7 +48,8 @@ const FAR: f64 = 1000.0;
 
 /// Reads a cameras CSV: `eye_x,eye_y,eye_z`, then `look_*` or `forward_*`,
 /// and any of `up_*`, `fovy_deg`, `aspect`, `near`, `far` (empty or `inf` =
-/// infinite). Or view-projection matrices: `m00,m01,..,m33` (row, column) and
+/// infinite), `ortho_height` (world units: the lens is orthographic, `fovy_deg` is
+/// not read; empty: perspective). Or view-projection matrices: `m00,m01,..,m33` (row, column) and
 /// nothing of the others. Columns in any order; unknown ones are ignored.
 ///
 /// # Errors
@@ -100,7 +101,7 @@ fn refused(row: &Row, error: &CameraError) -> InputError {
 
 /// Columns that say what a matrix says already.
 const OF_EYES: &str = "eye_x eye_y eye_z look_x look_y look_z forward_x forward_y forward_z \
-                       up_x up_y up_z fovy_deg aspect near far";
+                       up_x up_y up_z fovy_deg ortho_height aspect near far";
 
 fn matrices(
     mut table: TableReader<impl Read>,
@@ -157,7 +158,8 @@ fn eyes(
     let up = ["up_x", "up_y", "up_z"];
     let has_up = up.iter().any(|name| table.column(name).is_some());
     let up = has_up.then(|| table.columns(&up)).transpose()?;
-    let [fovy, aspect, near, far] = ["fovy_deg", "aspect", "near", "far"].map(|c| table.column(c));
+    let lens = ["fovy_deg", "ortho_height", "aspect", "near", "far"];
+    let [fovy, height, aspect, near, far] = lens.map(|name| table.column(name));
     let mut cameras = Vec::new();
     while let Some(row) = table.next_row() {
         let row = row?;
@@ -180,10 +182,13 @@ fn eyes(
             Some(column) => Some(row.finite_number(column)?),
             None => defaults.far.unwrap_or(Some(FAR)),
         };
-        let (fovy, aspect) = (
-            number(fovy, defaults.fovy_deg)?,
-            number(aspect, defaults.aspect)?,
-        );
+        let height = height.filter(|column| !row.text(*column).is_empty());
+        let height = height.map(|column| row.finite_number(column)).transpose()?;
+        let fovy = match height {
+            Some(_) => defaults.fovy_deg,
+            None => number(fovy, defaults.fovy_deg)?,
+        };
+        let aspect = number(aspect, defaults.aspect)?;
         let near = number(near, defaults.near.unwrap_or(NEAR))?;
         let camera = || -> Result<Camera, CameraError> {
             let frame = if by_forward {
@@ -191,10 +196,13 @@ fn eyes(
             } else {
                 look_at(eye, target, up)?
             };
-            Ok(Camera {
-                frame,
-                lens: Lens::perspective(fovy, aspect, near, far)?,
-            })
+            let lens = match height {
+                Some(height) => {
+                    Lens::orthographic(height, aspect, near, far.unwrap_or(f64::INFINITY))?
+                }
+                None => Lens::perspective(fovy, aspect, near, far)?,
+            };
+            Ok(Camera { frame, lens })
         };
         let camera = camera().map_err(|error| refused(&row, &error))?;
         cameras.push((row.line(), camera));
@@ -253,6 +261,36 @@ mod tests {
         let path = read(bare).unwrap();
         assert_eq!(path.cameras[0].frame.forward(), DVec3::Y);
         assert_eq!(path.cameras[0].frame.v(), DVec3::Z);
+    }
+
+    /// Line by line: a height makes a lens orthographic, none leaves it perspective.
+    #[test]
+    fn a_height_is_an_orthographic_lens() {
+        let header = "eye_x,eye_y,eye_z,look_x,look_y,look_z,fovy_deg,ortho_height,aspect,near,far";
+        let eye = "0,0,0,1,0,0";
+        let path = read(&format!("{header}\n{eye},,20,2,-5,9\n{eye},70,,2,1,9\n"));
+        let lenses: Vec<Lens> = path.unwrap().cameras.iter().map(|c| c.lens).collect();
+        let parallel = Lens::orthographic(20.0, 2.0, -5.0, 9.0).unwrap();
+        let perspective = Lens::perspective(70.0, 2.0, 1.0, Some(9.0)).unwrap();
+        assert_eq!(lenses, [parallel, perspective]);
+        for (lens, wanted) in [
+            (
+                ",0,2,1,9",
+                "the window is empty: 0 to 0 (height); expected low < high",
+            ),
+            (",-3,2,1,9", "0 to -3 (height)"),
+            (",2,2,1,inf", "far is inf; expected a finite number"),
+            (",2,2,9,9", "near is 9 and far 9"),
+            (",high,2,1,9", "ortho_height 'high'"),
+            (",,2,1,9", "fovy_deg"),
+        ] {
+            let error = read(&format!("{header}\n{eye},{lens}\n"));
+            let error = error.unwrap_err().to_string();
+            assert!(
+                error.starts_with("c.csv, line 2: ") && error.contains(wanted),
+                "{error}"
+            );
+        }
     }
 
     #[test]

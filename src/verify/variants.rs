@@ -18,8 +18,12 @@ pub fn variants(
     around: &Surroundings,
     seed: usize,
 ) -> Result<Vec<(&'static str, ConvexVolume)>, CameraError> {
-    let near = camera.lens.near();
-    let far = camera.lens.far().unwrap_or(near * 1000.0);
+    // Both may lie behind the eye of an orthographic lens, of no other.
+    let (near, far) = match (camera.lens.near(), camera.lens.far()) {
+        (near, far) if near > 0.0 => (near, far.unwrap_or(near * 1000.0)),
+        (_, Some(far)) if far > 0.0 => (far / 1000.0, far),
+        (near, _) => (1.0, near.abs().max(1000.0)),
+    };
     let with = |lens: Lens| Camera { lens, ..*camera }.volume(options, around);
     let straight = camera.volume(options, around)?;
     let planes = straight.planes().to_vec();
@@ -79,5 +83,17 @@ mod tests {
             .map(|(_, v)| v.contains_point(ahead))
             .collect();
         assert!(holds[..4].iter().all(|&h| h) && !holds[8], "{holds:?}");
+    }
+    /// Of a lens that sees behind the eye, or there alone, the other kinds are made too.
+    #[test]
+    fn planes_behind_the_eye_leave_the_other_kinds_whole() {
+        let frame = look_at(DVec3::ZERO, DVec3::X, DVec3::Z).unwrap();
+        for [near, far] in [[-10.0, 500.0], [0.0, 1.0], [-900.0, -10.0], [-1.0, 0.0]] {
+            let lens = Lens::orthographic(20.0, 1.5, near, far).unwrap();
+            let camera = Camera { frame, lens };
+            let options = PlaneOptions::default();
+            let volumes = variants(&camera, &options, &Surroundings::default(), 1).unwrap();
+            assert_eq!(volumes.len(), VOLUME_KINDS.len(), "{near} to {far}");
+        }
     }
 }

@@ -225,3 +225,45 @@ fn verify_holds_the_default_planes_to_the_camera() {
     assert_eq!(count(""), 4 * 399, "every box touches the view or is in it");
     assert!(count("--epsilon 0") < 4 * 399, "{}", count("--epsilon 0"));
 }
+
+/// Parallel rays through every command that asks about cameras, in one file with
+/// perspective ones.
+#[test]
+fn orthographic_cameras_are_typed() {
+    let cameras = "eye_x,eye_y,eye_z,look_x,look_y,look_z,up_x,up_y,up_z,ortho_height,fovy_deg,near,far\n\
+                   0,0,300,1,1,0,0,1,0,60,,-10,500\n\
+                   100,50,40,0,0,0,0,0,1,40,,1,900\n\
+                   100,50,40,0,0,0,0,0,1,,60,1,900\n";
+    let here = folder(&[("c.csv", cameras.as_bytes())]);
+    let scene = "--scene city:n=2000 --path c.csv";
+    let told = works(here.path(), &format!("query {scene} --structure all"));
+    let counts = rows(&told);
+    let by_linear = |camera: &str| {
+        let mut rows = counts.iter();
+        let found = rows.find(|row| row["structure"] == "linear" && row["camera"] == camera);
+        found.expect("a row")["visible_count"].clone()
+    };
+    // As high as 60 units from far above: a part, and the same by every structure.
+    for row in &counts {
+        assert_eq!(row["visible_count"], by_linear(&row["camera"]), "{row:?}");
+    }
+    assert!(by_linear("0") != by_linear("1") && by_linear("1") != by_linear("2"));
+    let seen: usize = by_linear("0").parse().expect("a number");
+    assert!((1..1000).contains(&seen), "{seen}");
+    let told = works(
+        here.path(),
+        &format!("verify {scene} --structure linear,bvh,wide"),
+    );
+    assert!(told.contains(", no mismatches"), "{told}");
+    let told = works(
+        here.path(),
+        &format!("funnel {scene} --processes 1 --samples 64x36 --certificates proofs"),
+    );
+    assert!(told.contains("z-test"), "{told}");
+    works(here.path(), "check proofs");
+    let endless = cameras.replace("900", "inf");
+    std::fs::write(here.path().join("endless.csv"), endless).expect("a file");
+    let done = cullbench(here.path(), "query --scene city:n=20 --path endless.csv");
+    let wanted = "error: endless.csv, line 3: far is inf; expected a finite number\n";
+    assert_eq!((done.code, done.err.as_str()), (Some(2), wanted));
+}

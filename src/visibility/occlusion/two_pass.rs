@@ -133,8 +133,13 @@ impl<B: OcclusionBuffer> Work for Culled<'_, B> {
             project_all(isa, scene, view, &ids[..count], &mut state.candidates);
         }
         stats.boxes = self.ids.len();
-        let drawable = |c: &Candidate| !view.entered_before_near(&scene.outer(c.position as usize));
-        choose(&state.candidates, state.choice, &mut state.order, drawable);
+        choose(
+            scene,
+            view,
+            &state.candidates,
+            state.choice,
+            &mut state.order,
+        );
         state.buffer.clear();
         for &index in &state.order {
             let candidate = &state.candidates[index as usize];
@@ -194,15 +199,20 @@ fn project_all<I: Isa>(
     }
 }
 
-/// The indices of the occluders, the nearest first.
+/// The indices of the occluders, the nearest first. The same for every buffer and
+/// instruction set, and compiled once.
 fn choose(
+    scene: &OccluderScene,
+    view: &View,
     candidates: &[Candidate],
     choice: OccluderChoice,
     order: &mut Vec<u32>,
-    drawable: impl Fn(&Candidate) -> bool,
 ) {
     order.clear();
-    let allowed = |&index: &u32| drawable(&candidates[index as usize]);
+    let allowed = |&index: &u32| {
+        let position = candidates[index as usize].position as usize;
+        !view.entered_before_near(&scene.outer(position))
+    };
     order.extend((0..candidates.len() as u32).filter(allowed));
     let depth = |index: u32| candidates[index as usize].depth;
     let nearer = |&a: &u32, &b: &u32| depth(a).total_cmp(&depth(b)).then(a.cmp(&b));

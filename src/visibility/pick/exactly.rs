@@ -59,14 +59,23 @@ pub(super) fn nearest<'a>(
     candidates: impl IntoIterator<Item = (ItemId, &'a WorldBox)>,
     hits: &mut Vec<Hit>,
 ) {
+    let probe = Probe::new(*ray);
+    let met = |(item, b)| probe.enter(b, ray.far).map(|at| Met { item, at });
+    nearest_met(
+        &probe,
+        candidates.into_iter().filter_map(met).collect(),
+        count,
+        hits,
+    );
+}
+
+/// The first `count` of what was met, and all that are as deep as the last of them.
+fn nearest_met(probe: &Probe, mut all: Vec<Met>, count: usize, hits: &mut Vec<Hit>) {
     hits.clear();
     let Some(last) = count.checked_sub(1) else {
         return;
     };
-    let probe = Probe::new(*ray);
-    let met = |(item, b)| probe.enter(b, ray.far).map(|at| Met { item, at });
-    let mut all: Vec<Met> = candidates.into_iter().filter_map(met).collect();
-    all.sort_unstable_by(|a, b| a.order(b, &probe));
+    all.sort_unstable_by(|a, b| a.order(b, probe));
     if let Some(last) = all.get(last).copied() {
         let kept = all.partition_point(|met| probe.compare(&met.at, &last.at).is_le());
         all.truncate(kept);

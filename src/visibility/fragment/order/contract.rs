@@ -1,5 +1,7 @@
 //! What a depth order is: a list of pieces from front to back.
 
+use std::cmp::Ordering;
+
 use glam::DVec3;
 
 use crate::camera::{Camera, Lens};
@@ -107,8 +109,12 @@ pub(super) fn by_key(solids: &Solids, pieces: &mut Vec<Piece>, key: impl Fn(&Wor
 /// Items with their keys, least first; of the same key the lowest id.
 pub(super) fn sorted(keyed: impl Iterator<Item = (f64, ItemId)>) -> Vec<(f64, ItemId)> {
     let mut keyed: Vec<(f64, ItemId)> = keyed.collect();
-    keyed.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    keyed.sort_unstable_by(order_of_keyed);
     keyed
+}
+
+fn order_of_keyed(a: &(f64, ItemId), b: &(f64, ItemId)) -> Ordering {
+    a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))
 }
 
 /// How far a point is: squared distance from the eye, or the depth for an
