@@ -6,29 +6,14 @@ use super::rect::{Rect, Rects};
 use crate::kernel::{Isa, LaneMask};
 use crate::visibility::{Guarantee, SampleGrid};
 
-/// Where the idea of a back end comes from.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[non_exhaustive]
-pub enum Origin {
-    /// Of this project.
-    Own,
-    /// Textbook knowledge.
-    Textbook,
-    /// Written for this project after a description: which one. Not the genuine
-    /// code, and no statement about its speed.
-    StandIn(&'static str),
-}
-
 /// A buffer that says what lies behind what was drawn.
 pub trait OcclusionBuffer {
     /// Its name in tables.
     const NAME: &'static str;
-    /// What it is, one line.
+    /// What it is, one line; of code written after a description, which one.
     const SUMMARY: &'static str;
     /// What it promises of the items that it does not hide.
     const GUARANTEE: Guarantee;
-    /// Where the idea is from.
-    const ORIGIN: Origin;
     /// Which pixels of an occluder are drawn.
     const COVERAGE: Coverage;
     /// Whether drawing and asking may alternate. If not, [`OcclusionBuffer::finish`]

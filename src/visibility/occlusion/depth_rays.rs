@@ -4,7 +4,7 @@
 //! A ray's depth is what drawing its one sample gives, so occluders are drawn here,
 //! at one pixel a block; only the speed of casting rays is not that of the engine.
 
-use super::buffer::{OcclusionBuffer, Origin};
+use super::buffer::OcclusionBuffer;
 use super::outline::{Coverage, Outline};
 use super::rect::Rect;
 use crate::kernel::Isa;
@@ -20,9 +20,9 @@ pub struct DepthRays<const SIZE: usize> {
 
 impl<const SIZE: usize> OcclusionBuffer for DepthRays<SIZE> {
     const NAME: &'static str = "rays";
-    const SUMMARY: &'static str = "one depth ray a block of pixels";
+    const SUMMARY: &'static str =
+        "one depth ray a block of pixels (stand-in for the occlusion culling of Godot Engine 4)";
     const GUARANTEE: Guarantee = Guarantee::Unproven;
-    const ORIGIN: Origin = Origin::StandIn("Godot Engine 4, raycast occlusion culling");
     const COVERAGE: Coverage = Coverage::Centre;
     const ALTERNATES: bool = true;
 

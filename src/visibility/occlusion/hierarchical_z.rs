@@ -3,7 +3,7 @@
 //! farthest of four below, and a rectangle is tested at the level where it covers
 //! at most two by two of them.
 
-use super::buffer::{OcclusionBuffer, Origin};
+use super::buffer::OcclusionBuffer;
 use super::outline::{Coverage, Outline};
 use super::rect::Rect;
 use super::zbuffer::ZBuffer;
@@ -26,9 +26,9 @@ struct Level {
 
 impl OcclusionBuffer for HierarchicalZ {
     const NAME: &'static str = "hierarchical-z";
-    const SUMMARY: &'static str = "a depth buffer at pixel centres with a pyramid of the farthest";
+    const SUMMARY: &'static str = "a depth buffer at pixel centres with a pyramid of the farthest (stand-in for Greene, Kass, \
+         Miller 1993)";
     const GUARANTEE: Guarantee = Guarantee::Unproven;
-    const ORIGIN: Origin = Origin::StandIn("Greene, Kass, Miller 1993");
     const COVERAGE: Coverage = Coverage::Centre;
     const ALTERNATES: bool = false;
 

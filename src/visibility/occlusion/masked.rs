@@ -6,7 +6,7 @@
 //! triangles and everything else is not. Two coverage rules, and nothing else,
 //! tell the two back ends apart.
 
-use super::buffer::{OcclusionBuffer, Origin};
+use super::buffer::OcclusionBuffer;
 use super::lanes::first_lanes;
 use super::outline::{Coverage, Outline, TileNearness};
 use super::rect::{Rect, Rects};
@@ -42,17 +42,13 @@ impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
     const SUMMARY: &'static str = if WHOLE {
         "masked tiles of 8 x 4 pixels; only wholly covered pixels hide"
     } else {
-        "masked tiles of 8 x 4 pixels; pixels hide whose centre is covered"
+        "masked tiles of 8 x 4 pixels; pixels hide whose centre is covered (stand-in for Hasselgren, \
+         Andersson, Akenine-Moeller 2016)"
     };
     const GUARANTEE: Guarantee = if WHOLE {
         Guarantee::Conservative
     } else {
         Guarantee::Unproven
-    };
-    const ORIGIN: Origin = if WHOLE {
-        Origin::Own
-    } else {
-        Origin::StandIn("Hasselgren, Andersson, Akenine-Moeller 2016")
     };
     const COVERAGE: Coverage = if WHOLE {
         Coverage::Whole

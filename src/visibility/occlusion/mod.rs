@@ -29,7 +29,7 @@ mod two_pass;
 mod view;
 mod zbuffer;
 
-pub use buffer::{OcclusionBuffer, Origin};
+pub use buffer::OcclusionBuffer;
 pub use depth_rays::DepthRays;
 pub use hierarchical_z::HierarchicalZ;
 pub use interleaved::Interleaved;

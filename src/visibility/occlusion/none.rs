@@ -1,6 +1,6 @@
 //! No occlusion at all: what leaving the stage out keeps.
 
-use super::buffer::{OcclusionBuffer, Origin};
+use super::buffer::OcclusionBuffer;
 use super::outline::{Coverage, Outline};
 use super::rect::Rect;
 use crate::kernel::Isa;
@@ -15,7 +15,6 @@ impl OcclusionBuffer for NoOcclusion {
     const NAME: &'static str = "none";
     const SUMMARY: &'static str = "hides nothing";
     const GUARANTEE: Guarantee = Guarantee::Conservative;
-    const ORIGIN: Origin = Origin::Textbook;
     const COVERAGE: Coverage = Coverage::Whole;
     const ALTERNATES: bool = true;
 

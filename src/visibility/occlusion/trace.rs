@@ -4,7 +4,7 @@
 
 use std::cell::RefCell;
 
-use super::buffer::{OcclusionBuffer, Origin};
+use super::buffer::OcclusionBuffer;
 use super::interleaved::Interleaved;
 use super::masked::{MaskedInner, Tile};
 use super::outline::{Coverage, Outline};
@@ -84,7 +84,6 @@ impl OcclusionBuffer for Traced {
     const NAME: &'static str = MaskedInner::NAME;
     const SUMMARY: &'static str = MaskedInner::SUMMARY;
     const GUARANTEE: Guarantee = MaskedInner::GUARANTEE;
-    const ORIGIN: Origin = MaskedInner::ORIGIN;
     const COVERAGE: Coverage = MaskedInner::COVERAGE;
     const ALTERNATES: bool = MaskedInner::ALTERNATES;
 

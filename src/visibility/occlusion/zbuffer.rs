@@ -1,6 +1,6 @@
 //! The plain depth buffer: one depth a pixel, sampled at its centre.
 
-use super::buffer::{OcclusionBuffer, Origin};
+use super::buffer::OcclusionBuffer;
 use super::lanes::first_lanes;
 use super::outline::{Coverage, Outline};
 use super::rect::Rect;
@@ -26,7 +26,6 @@ impl OcclusionBuffer for ZBuffer {
     const SUMMARY: &'static str =
         "one depth a pixel, at its centre; every pixel of a box is tested";
     const GUARANTEE: Guarantee = Guarantee::Unproven;
-    const ORIGIN: Origin = Origin::Textbook;
     const COVERAGE: Coverage = Coverage::Centre;
     const ALTERNATES: bool = true;
 
