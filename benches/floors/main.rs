@@ -190,6 +190,15 @@ fn ratio(turns: usize, mut one: impl FnMut() -> f64, mut other: impl FnMut() -> 
     [found.mean, low, high].map(f64::exp)
 }
 
+/// Ratios of pairs that were built anew each time, since the place in memory is worth some
+/// percent: their mean, with its interval over the builds.
+fn over_builds(builds: usize, of_one: impl FnMut(usize) -> f64) -> [f64; 3] {
+    let logs: Vec<f64> = (0..builds).map(of_one).map(f64::ln).collect();
+    let found = trimmed_mean(&logs).expect("builds");
+    let (low, high) = found.interval(0.95);
+    [found.mean, low, high].map(f64::exp)
+}
+
 /// A scene, or a small one like it where nothing is timed.
 fn shortened(source: &str, only_test: bool) -> String {
     let (kind, count) = source.split_once(":n=").unwrap_or((source, ""));

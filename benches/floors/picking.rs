@@ -9,7 +9,7 @@ use cullbench::visibility::pick::{BACK_ENDS, Facets, Pick};
 use cullbench::visibility::{Ray, Rays, Solids, surfaces_of};
 use cullbench::{path, scene};
 
-use super::{ratio, shortened, verdict};
+use super::{over_builds, ratio, shortened, verdict};
 
 const PATH: &str = "street:frames=32";
 const SCENES: [&str; 11] = [
@@ -27,7 +27,9 @@ const SCENES: [&str; 11] = [
 ];
 /// Cursors of a view, across and down.
 const CURSORS: [u32; 2] = [16, 9];
-/// Time / time of obvhs, at most.
+/// How often both are built.
+const BUILDS: usize = 9;
+/// Time / time of obvhs, at most: more than that must not be proven.
 const MOST_TIMES: f64 = 1.0;
 
 /// Times every scene on every instruction set, and judges those that have vectors; how
@@ -71,22 +73,28 @@ fn missed_in(source: &str, only_test: bool, turns: usize) -> u32 {
         }
         watch.lap().cpu_ns / rays.len() as f64
     };
-    let theirs = built("obvhs", Kernel::Portable);
     let mut missed = 0;
+    // Kept, so that the next ones lie elsewhere.
+    let mut earlier = Vec::new();
     for kernel in Kernel::available() {
-        let ours = built("wide-ray", kernel);
         let mut ns = 0.0;
-        let by_ours = || {
-            ns = time(&*ours);
-            ns
-        };
-        let [times, low, high] = ratio(turns, by_ours, || time(&*theirs));
+        let [times, low, high] = over_builds(if only_test { 3 } else { BUILDS }, |_| {
+            let ours = built("wide-ray", kernel);
+            let theirs = built("obvhs", Kernel::Portable);
+            let by_ours = || {
+                ns = time(&*ours);
+                ns
+            };
+            let [times, ..] = ratio((turns / 4).max(3), by_ours, || time(&*theirs));
+            earlier.push([ours, theirs]);
+            times
+        });
         let not_judged = only_test || kernel == Kernel::Portable;
-        let holds = not_judged || times <= MOST_TIMES;
+        let holds = not_judged || low <= MOST_TIMES;
         missed += u32::from(!holds);
         println!(
             "{typed}, {kernel}: the first item in {times:.3} x [{low:.3}, {high:.3}] the time of obvhs \
-             ({ns:.0} ns), at most {MOST_TIMES} x: {}",
+             (last {ns:.0} ns), at most {MOST_TIMES} x: {}",
             verdict(not_judged, holds)
         );
     }

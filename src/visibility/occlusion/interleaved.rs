@@ -21,7 +21,7 @@ use crate::query::ItemId;
 
 /// Survivors are drawn that may cover at least this part of the image: a pixel of
 /// 320 x 180.
-const DRAWN_PART: u32 = 65_536;
+pub const DEFAULT_DRAWN_PART: u32 = 65_536;
 
 /// The interleaved coupling, with memory that is kept from view to view.
 #[derive(Clone, Debug)]
@@ -29,6 +29,7 @@ pub struct Interleaved<B> {
     buffer: B,
     kernel: Kernel,
     drawn_part: u32,
+    second_look: bool,
     queue: BinaryHeap<Entry>,
     survivors: Vec<Survivor>,
 }
@@ -89,7 +90,8 @@ impl<B: OcclusionBuffer> Interleaved<B> {
         Interleaved {
             buffer,
             kernel,
-            drawn_part: DRAWN_PART,
+            drawn_part: DEFAULT_DRAWN_PART,
+            second_look: true,
             queue: BinaryHeap::new(),
             survivors: Vec::new(),
         }
@@ -98,6 +100,12 @@ impl<B: OcclusionBuffer> Interleaved<B> {
     /// Draws survivors that may cover at least the image's pixels divided by `part`.
     pub fn drawing_from(mut self, part: u32) -> Self {
         self.drawn_part = part.max(1);
+        self
+    }
+
+    /// Whether survivors are tested once more when all have been drawn.
+    pub fn second_look(mut self, second_look: bool) -> Self {
+        self.second_look = second_look;
         self
     }
 
@@ -221,10 +229,11 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
         }
         let before = self.out.len();
         for survivor in survivors {
+            let again = state.second_look && !survivor.near;
             let Some(item) = scene.item(survivor.position as usize) else {
                 continue;
             };
-            if survivor.near || !buffer.hides(isa, &survivor.rect) {
+            if !(again && buffer.hides(isa, &survivor.rect)) {
                 self.out.push(item);
             }
         }

@@ -32,7 +32,7 @@ mod zbuffer;
 pub use buffer::OcclusionBuffer;
 pub use depth_rays::DepthRays;
 pub use hierarchical_z::HierarchicalZ;
-pub use interleaved::Interleaved;
+pub use interleaved::{DEFAULT_DRAWN_PART, Interleaved};
 pub use masked::{Masked, MaskedCentre, MaskedInner};
 pub use none::NoOcclusion;
 pub use outline::{Coverage, Outline};

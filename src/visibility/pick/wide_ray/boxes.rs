@@ -28,7 +28,7 @@ pub struct WideRay {
 }
 
 impl WideRay {
-    /// Builds the tree; it answers by `kernel`. O(n log n).
+    /// Builds the tree; as a [`Pick`] it answers by `kernel`. O(n log n).
     ///
     /// # Errors
     /// More than 2^27 items.
@@ -40,6 +40,28 @@ impl WideRay {
         };
         let items = ids.iter().map(item).collect();
         Ok(WideRay { tree, items })
+    }
+
+    /// [`Pick::first`] by an instruction set of one's choice.
+    #[inline]
+    pub fn first_by(&self, kernel: Kernel, ray: &Ray) -> Option<Hit> {
+        match self.tree.is_passed_by(ray) {
+            true => None,
+            false => kernel.run(First { boxes: self, ray }),
+        }
+    }
+
+    /// [`Pick::nearest`] by an instruction set of one's choice.
+    pub fn nearest_by(&self, kernel: Kernel, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {
+        if count == 0 || self.tree.is_passed_by(ray) {
+            return hits.clear();
+        }
+        kernel.run(Nearest {
+            boxes: self,
+            ray,
+            count,
+            hits,
+        });
     }
 
     fn place(&self, place: u32) -> (ItemId, &WorldBox) {
@@ -204,20 +226,10 @@ impl Work for Nearest<'_> {
 
 impl Pick for WideRay {
     fn first(&self, ray: &Ray) -> Option<Hit> {
-        self.tree
-            .unless_passed_by(ray, First { boxes: self, ray })?
+        self.first_by(self.tree.kernel, ray)
     }
 
     fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {
-        hits.clear();
-        if count > 0 {
-            let work = Nearest {
-                boxes: self,
-                ray,
-                count,
-                hits,
-            };
-            self.tree.unless_passed_by(ray, work);
-        }
+        self.nearest_by(self.tree.kernel, ray, count, hits);
     }
 }

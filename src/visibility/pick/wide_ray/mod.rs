@@ -15,7 +15,7 @@ use self::slabs::Slabs;
 use self::triangles::WideTriangles;
 use super::contract::{BackEnd, NotBuilt};
 use crate::geometry::Aabb;
-use crate::kernel::{Isa, Kernel, LANES, Work};
+use crate::kernel::{Isa, Kernel, LANES};
 use crate::query::ItemId;
 use crate::visibility::{Guarantee, Ray};
 
@@ -67,12 +67,6 @@ impl Tree {
     #[inline(always)]
     fn slabs(&self, ray: &Ray) -> Option<Slabs> {
         Slabs::of(ray, self.zero, self.bounds.reach())
-    }
-
-    /// Does what is to be done with a ray that may meet a box, by the tree's kernel.
-    #[inline(always)]
-    fn unless_passed_by<W: Work>(&self, ray: &Ray, work: W) -> Option<W::Output> {
-        (!self.is_passed_by(ray)).then(|| self.kernel.run(work))
     }
 
     /// Whether the ray certainly passes all boxes by: asked first, since it costs less than

@@ -42,6 +42,28 @@ impl WideTriangles {
         })
     }
 
+    /// [`Pick::first`] by an instruction set of one's choice.
+    #[inline]
+    pub fn first_by(&self, kernel: Kernel, ray: &Ray) -> Option<Hit> {
+        match self.tree.is_passed_by(ray) {
+            true => None,
+            false => kernel.run(First { of: self, ray }),
+        }
+    }
+
+    /// [`Pick::nearest`] by an instruction set of one's choice.
+    pub fn nearest_by(&self, kernel: Kernel, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {
+        if count == 0 || self.tree.is_passed_by(ray) {
+            return hits.clear();
+        }
+        kernel.run(Nearest {
+            of: self,
+            ray,
+            count,
+            hits,
+        });
+    }
+
     fn probe(&self, ray: &Ray) -> TriangleProbe {
         TriangleProbe::new(*ray, self.tree.zero)
     }
@@ -203,20 +225,11 @@ impl Work for Nearest<'_> {
 
 impl Pick for WideTriangles {
     fn first(&self, ray: &Ray) -> Option<Hit> {
-        self.tree.unless_passed_by(ray, First { of: self, ray })?
+        self.first_by(self.tree.kernel, ray)
     }
 
     fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {
-        hits.clear();
-        if count > 0 {
-            let work = Nearest {
-                of: self,
-                ray,
-                count,
-                hits,
-            };
-            self.tree.unless_passed_by(ray, work);
-        }
+        self.nearest_by(self.tree.kernel, ray, count, hits);
     }
 }
 
@@ -255,8 +268,7 @@ mod tests {
                 // The last few are no items.
                 items: n * 2 / 5,
             };
-            let by = |kernel| (kernel, WideTriangles::of(&facets, kernel).unwrap());
-            let wides: Vec<_> = Kernel::available().map(by).collect();
+            let wide = WideTriangles::of(&facets, Kernel::best()).unwrap();
             for _ in 0..1200 {
                 let mut ray = Ray {
                     origin: facets.origin + grid(&mut rng, 20).as_dvec3() * 0.5,
@@ -268,17 +280,17 @@ mod tests {
                     ray.direction = DVec3::from([(); 3].map(|()| sizes[rng.below(sizes.len())]));
                     ray.origin *= [1.0, -1e12][rng.below(2)];
                 }
-                let probe = wides[0].1.probe(&ray);
+                let probe = wide.probe(&ray);
                 let first = exactly::first_facet(&probe, facets.all.iter(), facets.items);
                 met += usize::from(first.is_some());
                 for count in [0, 1, 3, 9] {
                     let all = facets.all.iter();
                     exactly::nearest_facets(&probe, all, facets.items, count, &mut wanted);
                     several += usize::from(wanted.len() > 1);
-                    for (kernel, wide) in &wides {
-                        wide.nearest(&ray, count, &mut found);
+                    for kernel in Kernel::available() {
+                        wide.nearest_by(kernel, &ray, count, &mut found);
                         assert_eq!(found, wanted, "{kernel} {count} {ray:?}");
-                        assert_eq!(wide.first(&ray), first, "{kernel} {ray:?}");
+                        assert_eq!(wide.first_by(kernel, &ray), first, "{kernel} {ray:?}");
                     }
                 }
             }
