@@ -14,9 +14,8 @@ use cullbench::visibility::occlusion::{
     TwoPass, View,
 };
 use cullbench::visibility::{Rays, SampleGrid, Solids};
-use cullbench::{path, scene};
 
-use super::{ratio, shortened, verdict};
+use super::{loaded, ratio, verdict};
 
 const PATH: &str = "street:frames=32";
 const GRID: SampleGrid = SampleGrid::new(320, 180);
@@ -25,7 +24,8 @@ const MOST_TIMES: f64 = 1.05;
 /// Time in two passes / time front to back, at least.
 const LEAST_AHEAD: f64 = 2.0;
 
-/// Up to so many items: of more, most are smaller than a pixel that is covered wholly.
+/// Of scenes of more items that is printed and not judged: most of them are smaller than a
+/// pixel, and none covers one wholly.
 const MOST_ITEMS: usize = 100_000;
 
 /// By scene: time of a removed item, at most.
@@ -43,9 +43,8 @@ const COUPLED: &str = "city:n=100000";
 
 /// Judges every scene; how many floors are missed.
 pub fn missed(only_test: bool, turns: usize) -> u32 {
-    let rows = REMOVED.iter();
-    rows.map(|(source, most)| missed_in(source, *most, only_test, turns))
-        .sum()
+    let missed_in = |(source, most)| missed_in(source, most, only_test, turns);
+    REMOVED.into_iter().map(missed_in).sum()
 }
 
 /// Time of all views of a pass.
@@ -59,9 +58,7 @@ fn timed<'v>(views: &'v [(View<'v>, Vec<ItemId>)], mut cull: impl FnMut(&View, &
 
 fn missed_in(source: &str, most_ns: f64, only_test: bool, turns: usize) -> u32 {
     let kernel = Kernel::best();
-    let typed = shortened(source, only_test);
-    let scene = scene::load(&typed, &Default::default()).expect(source);
-    let cameras = path::load(PATH, &scene, &Default::default()).expect(PATH);
+    let (typed, scene, cameras) = loaded(source, PATH, only_test);
     let workload = Workload::new(&scene, &cameras, &Culling::default()).expect("views");
     let occluders = OccluderScene::of(&Solids::of(&scene));
     let views = cameras.cameras.iter().zip(&workload.views);

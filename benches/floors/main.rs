@@ -20,8 +20,9 @@ use cullbench::measure::{
     Machine, Protocol, ReportCell, Schedule, Status, Stopwatch, Subject, TimedTask, Workload,
     measure_group, timed,
 };
+use cullbench::path::{self, CameraPath};
+use cullbench::scene::{self, Scene};
 use cullbench::statistics::trimmed_mean;
-use cullbench::{path, scene};
 
 /// `structure` must be at least `floor` times as fast as the textbook loop.
 struct Floor {
@@ -94,13 +95,7 @@ const TURNS: usize = 41;
 /// query and a long one; the number of structures for which it is proven to be
 /// above 1 + [`MOST_OVERHEAD`].
 fn harness_overhead(only_test: bool, turns: usize) -> u32 {
-    let scene = scene::load("city:n=20000", &Default::default()).expect("a city");
-    let cameras = path::load(
-        "flythrough:frames=512,visible=2%",
-        &scene,
-        &Default::default(),
-    );
-    let cameras = cameras.expect("a path");
+    let (_, scene, cameras) = loaded("city:n=20000", "flythrough:frames=512,visible=2%", false);
     let workload = Workload::new(&scene, &cameras, &Culling::default()).expect("views");
     let protocol = Protocol {
         rounds: [4, 4],
@@ -185,16 +180,18 @@ fn ratio(turns: usize, mut one: impl FnMut() -> f64, mut other: impl FnMut() -> 
         0 => (one() / other()).ln(),
         _ => -(other() / one()).ln(),
     });
-    let found = trimmed_mean(&ratios.collect::<Vec<_>>()).expect("turns");
-    let (low, high) = found.interval(0.95);
-    [found.mean, low, high].map(f64::exp)
+    as_ratio(&ratios.collect::<Vec<_>>())
 }
 
 /// Ratios of pairs that were built anew each time, since the place in memory is worth some
 /// percent: their mean, with its interval over the builds.
 fn over_builds(builds: usize, of_one: impl FnMut(usize) -> f64) -> [f64; 3] {
-    let logs: Vec<f64> = (0..builds).map(of_one).map(f64::ln).collect();
-    let found = trimmed_mean(&logs).expect("builds");
+    as_ratio(&(0..builds).map(of_one).map(f64::ln).collect::<Vec<_>>())
+}
+
+/// The mean of logarithms as a ratio, with its interval.
+fn as_ratio(logs: &[f64]) -> [f64; 3] {
+    let found = trimmed_mean(logs).expect("logarithms");
     let (low, high) = found.interval(0.95);
     [found.mean, low, high].map(f64::exp)
 }
@@ -206,6 +203,14 @@ fn shortened(source: &str, only_test: bool) -> String {
         true => format!("{kind}:n=1000"),
         false => source.to_owned(),
     }
+}
+
+/// That scene, as it is called, and a path through it.
+fn loaded(source: &str, path: &str, only_test: bool) -> (String, Scene, CameraPath) {
+    let source = shortened(source, only_test);
+    let scene = scene::load(&source, &Default::default()).expect(&source);
+    let cameras = path::load(path, &scene, &Default::default()).expect(path);
+    (source, scene, cameras)
 }
 
 fn verdict(only_test: bool, holds: bool) -> &'static str {
@@ -246,9 +251,7 @@ fn main() -> ExitCode {
         .iter()
         .filter(|row| chosen(row.scene) || chosen(row.structure))
     {
-        let source = shortened(row.scene, only_test);
-        let scene = scene::load(&source, &Default::default()).expect(row.scene);
-        let cameras = path::load(row.path, &scene, &Default::default()).expect(row.path);
+        let (source, scene, cameras) = loaded(row.scene, row.path, only_test);
         let workload = Workload::new(&scene, &cameras, &Culling::default()).expect(row.path);
         let specs = Registry::builtin()
             .structures(&format!("{YARDSTICK},{}", row.structure))

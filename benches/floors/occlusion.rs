@@ -12,9 +12,8 @@ use cullbench::visibility::occlusion::{
     Interleaved, MaskedInner, OccluderScene, OcclusionBuffer, Rects, View,
 };
 use cullbench::visibility::{Rays, SampleGrid, Solids};
-use cullbench::{path, scene};
 
-use super::{ratio, shortened, verdict};
+use super::{loaded, ratio, verdict};
 
 const SCENE: &str = "city:n=100000";
 const PATH: &str = "street:frames=32";
@@ -115,9 +114,7 @@ pub fn missed(only_test: bool, turns: usize) -> u32 {
 }
 
 fn missed_by(kernel: Kernel, only_test: bool, turns: usize) -> u32 {
-    let source = shortened(SCENE, only_test);
-    let scene = scene::load(&source, &Default::default()).expect(SCENE);
-    let cameras = path::load(PATH, &scene, &Default::default()).expect(PATH);
+    let (source, scene, cameras) = loaded(SCENE, PATH, only_test);
     let workload = Workload::new(&scene, &cameras, &Culling::default()).expect("views");
     let occluders = OccluderScene::of(&Solids::of(&scene));
     let mut views = Vec::new();

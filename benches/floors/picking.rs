@@ -7,9 +7,8 @@ use cullbench::kernel::Kernel;
 use cullbench::measure::Stopwatch;
 use cullbench::visibility::pick::{BACK_ENDS, Facets, Pick};
 use cullbench::visibility::{Ray, Rays, Solids, surfaces_of};
-use cullbench::{path, scene};
 
-use super::{over_builds, ratio, shortened, verdict};
+use super::{loaded, over_builds, ratio, verdict};
 
 const PATH: &str = "street:frames=32";
 const SCENES: [&str; 11] = [
@@ -35,16 +34,12 @@ const MOST_TIMES: f64 = 1.0;
 /// Times every scene on every instruction set, and judges those that have vectors; how
 /// many floors are missed.
 pub fn missed(only_test: bool, turns: usize) -> u32 {
-    let scenes = SCENES.iter();
-    scenes
-        .map(|source| missed_in(source, only_test, turns))
-        .sum()
+    let missed_in = |source| missed_in(source, only_test, turns);
+    SCENES.into_iter().map(missed_in).sum()
 }
 
 fn missed_in(source: &str, only_test: bool, turns: usize) -> u32 {
-    let typed = shortened(source, only_test);
-    let scene = scene::load(&typed, &Default::default()).expect(source);
-    let cameras = path::load(PATH, &scene, &Default::default()).expect(PATH);
+    let (typed, scene, cameras) = loaded(source, PATH, only_test);
     let mut rays: Vec<Ray> = Vec::new();
     for camera in &cameras.cameras {
         let of_view = Rays::of(camera).expect("rays");

@@ -9,7 +9,7 @@ use cullbench::query::ItemId;
 use cullbench::scene::{self, Scene, SeededRng};
 use glam::{DVec3, Vec3};
 
-use super::{ratio, verdict};
+use super::{ratio, shortened, verdict};
 
 const SCENE: &str = "rooms:n=1000000";
 const STRUCTURES: &str = "bsp,octree,quadtree,bvh,wide,uniform-grid";
@@ -51,8 +51,8 @@ fn lap(points: &[DVec3], ask: &dyn Fn(DVec3, &mut Vec<ItemId>)) -> f64 {
 
 /// Judges each structure on both kinds of points; how many are missed.
 pub fn missed(only_test: bool, turns: usize) -> u32 {
-    let source = if only_test { "rooms:n=1000" } else { SCENE };
-    let scene = scene::load(source, &Default::default()).expect(source);
+    let source = shortened(SCENE, only_test);
+    let scene = scene::load(&source, &Default::default()).expect(SCENE);
     let boxes = scene.regions.boxes(&scene.items);
     let asked = [("anywhere", false), ("beside faces", true)];
     let asked = asked.map(|(where_, beside_faces)| (where_, points(&scene, beside_faces)));

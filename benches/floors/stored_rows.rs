@@ -11,9 +11,8 @@ use cullbench::visibility::region::doom::{DoomMap, SectorPvs};
 use cullbench::visibility::region::{
     EXACT, ProvenPvs, RegionId, RegionRow, RoomsPvs, Scratch, StoredPvs,
 };
-use cullbench::{path, scene};
 
-use super::{over_builds, ratio, shortened, verdict};
+use super::{loaded, over_builds, ratio, verdict};
 
 const PATH: &str = "street:frames=32";
 const SCENES: [&str; 3] = ["rooms:n=50000", "freedm-map12", "freedm-map20"];
@@ -26,16 +25,12 @@ const PASSES: usize = 1000;
 
 /// Judges every scene; how many floors are missed.
 pub fn missed(only_test: bool, turns: usize) -> u32 {
-    let scenes = SCENES.iter();
-    scenes
-        .map(|source| missed_in(source, only_test, turns))
-        .sum()
+    let missed_in = |source| missed_in(source, only_test, turns);
+    SCENES.into_iter().map(missed_in).sum()
 }
 
 fn missed_in(source: &str, only_test: bool, turns: usize) -> u32 {
-    let typed = shortened(source, only_test);
-    let scene = scene::load(&typed, &Default::default()).expect(source);
-    let cameras = path::load(PATH, &scene, &Default::default()).expect(PATH);
+    let (typed, scene, cameras) = loaded(source, PATH, only_test);
     let (graph, _) = regions_of(&scene).expect(source).expect("regions");
     let graph = Arc::new(graph);
     let proven: Box<dyn ProvenPvs> = match DoomMap::of_scene(&scene).expect(source) {
@@ -69,7 +64,6 @@ fn missed_in(source: &str, only_test: bool, turns: usize) -> u32 {
         }
         watch.lap().cpu_ns / passes as f64
     };
-    let row: &dyn RegionRow = black_box(&stored);
     let mut answer_ns = 0.0;
     // Kept, so that the next ones lie elsewhere.
     let mut earlier: Vec<(StoredPvs, Vec<Vec<RegionId>>, Vec<RegionId>)> = Vec::new();
@@ -97,6 +91,7 @@ fn missed_in(source: &str, only_test: bool, turns: usize) -> u32 {
         earlier.push((stored, rows, out));
         times
     });
+    let row: &dyn RegionRow = black_box(&stored);
     let (mut scratch, mut out) = (Scratch::default(), Vec::new());
     let from_eye = time(&mut || {
         for rays in &eyes {

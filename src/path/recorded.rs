@@ -49,8 +49,8 @@ const FAR: f64 = 1000.0;
 /// Reads a cameras CSV: `eye_x,eye_y,eye_z`, then `look_*` or `forward_*`,
 /// and any of `up_*`, `fovy_deg`, `aspect`, `near`, `far` (empty or `inf` =
 /// infinite), `ortho_height` (world units: the lens is orthographic, `fovy_deg` is
-/// not read; empty: perspective). Or view-projection matrices: `m00,m01,..,m33` (row, column) and
-/// nothing of the others. Columns in any order; unknown ones are ignored.
+/// not read; empty: perspective). Or view-projection matrices: `m00,m01,..,m33`
+/// (row, column) and nothing of the others. Columns in any order; unknown ones are ignored.
 ///
 /// # Errors
 /// The line of the first value that is no number or makes no camera; a file
@@ -184,10 +184,9 @@ fn eyes(
         };
         let height = height.filter(|column| !row.text(*column).is_empty());
         let height = height.map(|column| row.finite_number(column)).transpose()?;
-        let fovy = match height {
-            Some(_) => defaults.fovy_deg,
-            None => number(fovy, defaults.fovy_deg)?,
-        };
+        // Not read where the lens is orthographic.
+        let fovy = fovy.filter(|_| height.is_none());
+        let fovy = number(fovy, defaults.fovy_deg)?;
         let aspect = number(aspect, defaults.aspect)?;
         let near = number(near, defaults.near.unwrap_or(NEAR))?;
         let camera = || -> Result<Camera, CameraError> {

@@ -84,6 +84,7 @@ mod tests {
             .collect();
         assert!(holds[..4].iter().all(|&h| h) && !holds[8], "{holds:?}");
     }
+
     /// Of a lens that sees behind the eye, or there alone, the other kinds are made too.
     #[test]
     fn planes_behind_the_eye_leave_the_other_kinds_whole() {

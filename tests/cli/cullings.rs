@@ -226,8 +226,8 @@ fn verify_holds_the_default_planes_to_the_camera() {
     assert!(count("--epsilon 0") < 4 * 399, "{}", count("--epsilon 0"));
 }
 
-/// Parallel rays through every command that asks about cameras, in one file with
-/// perspective ones.
+/// Parallel rays in one file with perspective ones, through query, run, verify, funnel
+/// and check.
 #[test]
 fn orthographic_cameras_are_typed() {
     let cameras = "eye_x,eye_y,eye_z,look_x,look_y,look_z,up_x,up_y,up_z,ortho_height,fovy_deg,near,far\n\
@@ -255,6 +255,9 @@ fn orthographic_cameras_are_typed() {
         &format!("verify {scene} --structure linear,bvh,wide"),
     );
     assert!(told.contains(", no mismatches"), "{told}");
+    let line = "--structure linear,wide --processes 1 --out timed";
+    works(here.path(), &format!("run {scene} {line}"));
+    assert!(!cells(&report(&here.path().join("timed"))).is_empty());
     let told = works(
         here.path(),
         &format!("funnel {scene} --processes 1 --samples 64x36 --certificates proofs"),

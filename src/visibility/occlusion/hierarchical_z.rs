@@ -26,8 +26,8 @@ struct Level {
 
 impl OcclusionBuffer for HierarchicalZ {
     const NAME: &'static str = "hierarchical-z";
-    const SUMMARY: &'static str = "a depth buffer at pixel centres with a pyramid of the farthest (stand-in for Greene, Kass, \
-         Miller 1993)";
+    const SUMMARY: &'static str = "a depth buffer at pixel centres with a pyramid of the farthest \
+                                   (stand-in for Greene, Kass, Miller 1993)";
     const GUARANTEE: Guarantee = Guarantee::Unproven;
     const COVERAGE: Coverage = Coverage::Centre;
     const ALTERNATES: bool = false;
