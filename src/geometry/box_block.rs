@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::aabb::held;
 use super::p_vertex::PVertexRows;
 use super::{Aabb, Ball, PVertexSigns, Plane, PlaneF64, SphereMargin};
-use crate::kernel::{Isa, Plain, prefetch};
+use crate::kernel::{Isa, Plain, each, first_lanes, prefetch};
 
 /// Boxes of one block, and one bit for each of them.
 pub use crate::kernel::{LANES, LaneMask};
@@ -132,7 +132,7 @@ impl BoxBlock {
             let n = plane.normal;
             let [x, y, z] = self.corner_rows(upper);
             for lane in 0..LANES {
-                let [x, y, z] = [x, y, z].map(|row| f64::from(row[lane]));
+                let [x, y, z] = each([x, y, z], |row| f64::from(row[lane]));
                 let value = ((n.x * x + n.y * y) + n.z * z) + plane.d;
                 lowest[lane] = if value < lowest[lane] {
                     value
@@ -347,22 +347,25 @@ impl BoxBlocks {
         first: usize,
         end: usize,
     ) -> impl Iterator<Item = (usize, LaneMask, &BoxBlock)> {
-        let blocks = first / LANES..end.div_ceil(LANES);
-        self.blocks[blocks.clone()]
-            .iter()
-            .zip(blocks)
-            .map(move |(block, at)| (at * LANES, lanes_of(at, first, end), block))
+        blocks_of(first, end).map(|(start, lanes)| (start, lanes, &self.blocks[start / LANES]))
     }
 }
 
-/// The lanes of block `at` that belong to the places `first..end`, of which
-/// there is at least one.
+/// The blocks that the places `first..end` are in: the place of lane 0 of each, and the
+/// lanes that belong to the range.
 #[inline(always)]
-pub fn lanes_of(at: usize, first: usize, end: usize) -> LaneMask {
-    let start = at * LANES;
-    let low = first.saturating_sub(start);
-    let high = (end - start).min(LANES);
-    (LaneMask::MAX << low) & (LaneMask::MAX >> (LANES - high))
+pub fn blocks_of(first: usize, end: usize) -> impl Iterator<Item = (usize, LaneMask)> {
+    let mut start = first - first % LANES;
+    // The lanes from `first` on, which only the first block has others than.
+    let mut from = LaneMask::MAX << (first % LANES);
+    std::iter::from_fn(move || {
+        if start >= end {
+            return None;
+        }
+        let block = (start, from & first_lanes(end - start));
+        (start, from) = (start + LANES, LaneMask::MAX);
+        Some(block)
+    })
 }
 
 #[cfg(test)]

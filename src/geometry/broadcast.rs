@@ -120,8 +120,8 @@ impl BoxBlock {
         while left != 0 {
             let plane = BroadcastPlane::new(isa, volume, left.trailing_zeros());
             left &= left - 1;
-            for (kept, block) in kept.iter_mut().zip(blocks) {
-                *kept = plane.keep(isa, *kept, block);
+            for i in 0..4 {
+                kept[i] = plane.keep(isa, kept[i], &blocks[i]);
             }
         }
         [

@@ -65,12 +65,29 @@ impl PlaneRows {
         let [nx, ny, nz, d] = &self.rows;
         let mut values = [0.0; ROW_LANES];
         for i in 0..ROW_LANES {
-            let x = pick::<FAR>(nx[i] * b.min.x, nx[i] * b.max.x);
-            let y = pick::<FAR>(ny[i] * b.min.y, ny[i] * b.max.y);
-            let z = pick::<FAR>(nz[i] * b.min.z, nz[i] * b.max.z);
+            let x = pick::<FAR>([nx[i] * b.min.x, nx[i] * b.max.x]);
+            let y = pick::<FAR>([ny[i] * b.min.y, ny[i] * b.max.y]);
+            let z = pick::<FAR>([nz[i] * b.min.z, nz[i] * b.max.z]);
             values[i] = ((x + y) + z) + d[i];
         }
         values
+    }
+
+    /// [`PlaneRows::exclude`] and [`PlaneRows::contain`], of the same products.
+    #[inline(always)]
+    pub fn exclude_contain(&self, b: &Aabb) -> (bool, bool) {
+        let [nx, ny, nz, d] = &self.rows;
+        let (mut excluded, mut contained) = (false, true);
+        for i in 0..ROW_LANES {
+            let x = [nx[i] * b.min.x, nx[i] * b.max.x];
+            let y = [ny[i] * b.min.y, ny[i] * b.max.y];
+            let z = [nz[i] * b.min.z, nz[i] * b.max.z];
+            let far = (pick::<true>(x) + pick::<true>(y)) + pick::<true>(z);
+            let near = (pick::<false>(x) + pick::<false>(y)) + pick::<false>(z);
+            excluded |= far + d[i] < 0.0;
+            contained &= near + d[i] >= 0.0;
+        }
+        (excluded, contained)
     }
 
     /// Whether any plane excludes the (finite) box.
@@ -90,7 +107,7 @@ impl PlaneRows {
 
 /// The larger of two numbers, or else the smaller.
 #[inline(always)]
-fn pick<const LARGER: bool>(p: f32, q: f32) -> f32 {
+fn pick<const LARGER: bool>([p, q]: [f32; 2]) -> f32 {
     let first = if LARGER { p > q } else { p < q };
     if first { p } else { q }
 }
@@ -115,6 +132,7 @@ mod tests {
             let rows = PlaneRows::collect(planes.iter()).expect("eight at most");
             prop_assert_eq!(rows.exclude(&b), planes.iter().any(|plane| plane.excludes(&b)));
             prop_assert_eq!(rows.contain(&b), planes.iter().all(|plane| plane.contains(&b)));
+            prop_assert_eq!(rows.exclude_contain(&b), (rows.exclude(&b), rows.contain(&b)));
             prop_assert!(rows.planes().eq(planes));
         }
     }

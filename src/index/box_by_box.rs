@@ -20,6 +20,11 @@ pub trait BoxTest {
     fn rejects(&self, node: &Aabb) -> bool;
     /// Every item within this box belongs to the answer.
     fn accepts(&self, node: &Aabb) -> bool;
+    /// Both.
+    #[inline(always)]
+    fn rejects_accepts(&self, node: &Aabb) -> (bool, bool) {
+        (self.rejects(node), self.accepts(node))
+    }
     /// This item belongs to the answer.
     fn admits(&self, item: &Aabb) -> bool;
     /// Where the centre of an item of the answer can be, if no item is larger
@@ -45,6 +50,10 @@ impl BoxTest for AtOnce {
     #[inline(always)]
     fn accepts(&self, node: &Aabb) -> bool {
         self.0.contain(node)
+    }
+    #[inline(always)]
+    fn rejects_accepts(&self, node: &Aabb) -> (bool, bool) {
+        self.0.exclude_contain(node)
     }
     #[inline(always)]
     fn admits(&self, item: &Aabb) -> bool {

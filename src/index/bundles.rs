@@ -5,10 +5,10 @@
 use std::cell::Cell;
 use std::ops::{ControlFlow, Range};
 
-use super::frontier::{AHEAD, Frontier, Merger, first_ahead, hand_over, is_far};
+use super::frontier::{AHEAD, Frontier, Merger, first_ahead, hand_over, is_far, put_back, take};
 use super::node::TreeNode;
 use crate::geometry::{Aabb, BoxBlock, LANES, LaneMask, PlaneMask};
-use crate::kernel::{Isa, prefetch};
+use crate::kernel::{Isa, pairs, prefetch};
 use crate::query::{ItemId, QueryVolume, Recorder, Sink};
 
 /// Where the lanes of a bundle lead.
@@ -229,12 +229,13 @@ impl Bundles {
         recorder: &mut R,
     ) -> ControlFlow<()> {
         let far = is_far(ids.len());
-        let mut scratch = SCRATCH.take().unwrap_or_default();
+        let mut scratch = take(&SCRATCH);
         let Scratch {
             here,
             below,
             leaves,
         } = &mut *scratch;
+        let (mut here, mut below) = (here, below);
         // The root's bundle; or the root itself, if it is a leaf.
         let start = (isa.iota(0), isa.splat_word(mask));
         here.clear(1);
@@ -260,7 +261,7 @@ impl Bundles {
             for i in first_ahead(far) {
                 self.fetch(places, i);
             }
-            for (i, (&at, &mask)) in places.iter().zip(masks).enumerate() {
+            for (i, (&at, &mask)) in pairs(places, masks).enumerate() {
                 if far {
                     self.fetch(places, i + AHEAD);
                 }
@@ -293,7 +294,7 @@ impl Bundles {
             if flow.is_break() {
                 break;
             }
-            std::mem::swap(here, below);
+            std::mem::swap(&mut here, &mut below);
         }
         if flow.is_continue() {
             let (places, masks) = leaves.entries();
@@ -303,7 +304,7 @@ impl Bundles {
             for i in first_ahead(far).take(AHEAD / 2) {
                 fetch_items(nodes, test, places, masks, i);
             }
-            for (i, (&leaf, &mask)) in places.iter().zip(masks).enumerate() {
+            for (i, (&leaf, &mask)) in pairs(places, masks).enumerate() {
                 if far {
                     fetch_items(nodes, test, places, masks, i + AHEAD / 2);
                     fetch_leaf(nodes, places, i + AHEAD);
@@ -315,7 +316,7 @@ impl Bundles {
                 }
             }
         }
-        SCRATCH.set(Some(scratch));
+        put_back(&SCRATCH, scratch);
         flow
     }
 }

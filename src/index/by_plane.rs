@@ -28,10 +28,10 @@ impl ByPlane {
         for (nodes, open, lanes) in frontier.rows() {
             let (nodes, open) = (isa.words(nodes), isa.words(open));
             let mut rest = lanes;
-            for (plane, (list, used)) in self.lists.iter_mut().zip(&mut used).enumerate() {
+            for (plane, used) in used.iter_mut().enumerate() {
                 let alone = isa.equal(open, 1 << plane) & lanes;
                 rest &= !alone;
-                if let Some(place) = list[*used..].first_chunk_mut() {
+                if let Some(place) = self.lists[plane][*used..].first_chunk_mut() {
                     isa.compress(place, nodes, alone);
                 }
                 *used += alone.count_ones() as usize;
@@ -51,11 +51,9 @@ impl ByPlane {
         self.rest.clear(nodes.div_ceil(LANES));
     }
 
-    /// The lists that are not empty, each with its plane.
+    /// The nodes that this plane alone is open for.
     #[inline(always)]
-    pub fn lists(&self) -> impl Iterator<Item = (u32, &[u32])> {
-        let lists = self.lists.iter().zip(self.used);
-        let lists = lists.map(|(list, used)| &list[..used]);
-        (0..).zip(lists).filter(|(_, list)| !list.is_empty())
+    pub fn list(&self, plane: usize) -> &[u32] {
+        &self.lists[plane][..self.used[plane]]
     }
 }

@@ -2,10 +2,12 @@
 //! to be looked at, how far ahead their memory is asked for, and how accepted
 //! neighbours become one run. Which nodes there are is the trees' business.
 
+use std::cell::Cell;
 use std::ops::{ControlFlow, Range};
+use std::thread::LocalKey;
 
 use crate::geometry::{LANES, LaneMask, PlaneMask};
-use crate::kernel::Isa;
+use crate::kernel::{Isa, pairs};
 use crate::query::{ItemId, Recorder, Sink};
 
 /// So many blocks ahead their memory is asked for: enough to hide a cache
@@ -28,6 +30,25 @@ pub fn first_ahead(far: bool) -> Range<usize> {
     0..if far { AHEAD } else { 0 }
 }
 
+/// What a thread keeps between its queries.
+pub type Kept<T> = LocalKey<Cell<Option<Box<T>>>>;
+
+/// Takes what the thread keeps, or makes it anew. (`LocalKey::take` would be a call.)
+#[inline(always)]
+pub fn take<T: Default>(kept: &'static Kept<T>) -> Box<T> {
+    match kept.try_with(|kept| kept.replace(None)) {
+        Ok(Some(scratch)) => scratch,
+        _ => Box::default(),
+    }
+}
+
+/// Puts it back for the next query.
+#[inline(always)]
+pub fn put_back<T>(kept: &'static Kept<T>, scratch: Box<T>) {
+    // A thread that is about to end keeps nothing.
+    let _ = kept.try_with(|kept| kept.set(Some(scratch)));
+}
+
 /// Nodes that are still to be looked at, each with the planes that its
 /// ancestors have left open.
 #[derive(Default)]
@@ -40,12 +61,14 @@ pub struct Frontier {
 
 impl Frontier {
     /// Empties it and makes room for the children of so many nodes.
+    #[inline(always)]
     pub fn clear(&mut self, parents: usize) {
         self.used = 0;
         self.make_room(parents);
     }
 
     /// Makes room for the children of so many nodes more.
+    #[inline(always)]
     pub fn make_room(&mut self, parents: usize) {
         let room = self.used + (parents + 1) * LANES;
         if self.nodes.len() < room {
@@ -87,7 +110,7 @@ impl Frontier {
     pub fn rows(&self) -> impl Iterator<Item = (&[u32; LANES], &[PlaneMask; LANES], LaneMask)> {
         let (nodes, open) = (self.nodes.as_chunks().0, self.open.as_chunks().0);
         let used = self.used;
-        let rows = nodes.iter().zip(open).take(used.div_ceil(LANES));
+        let rows = pairs(nodes, open).take(used.div_ceil(LANES));
         rows.enumerate().map(move |(i, (nodes, open))| {
             let missing = ((i + 1) * LANES).saturating_sub(used);
             (nodes, open, LaneMask::MAX >> missing)
@@ -111,6 +134,7 @@ pub struct NodeList {
 
 impl NodeList {
     /// Empties it and makes room for the children of so many nodes.
+    #[inline(always)]
     pub fn clear(&mut self, parents: usize) {
         self.used = 0;
         let room = (parents + 1) * LANES;

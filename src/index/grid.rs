@@ -104,11 +104,12 @@ impl UniformGrid {
         }
         tally.node(test);
         let bounds = &self.bounds[cell];
-        if test.rejects(bounds) {
+        let (rejected, accepted) = test.rejects_accepts(bounds);
+        if rejected {
             tally.count(R::subtree_rejected);
             return ControlFlow::Continue(());
         }
-        if test.accepts(bounds) {
+        if accepted {
             tally.count(|recorder| recorder.subtree_accepted(items.len()));
             return sink.accept(&self.ids[items]);
         }

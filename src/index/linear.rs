@@ -7,8 +7,8 @@ use std::ops::ControlFlow;
 use super::id_rows::IdRows;
 use super::tree::scan_blocks;
 use super::{BuildError, Info, Input, Kind, MemoryUsage, NoParams, Origin, RegionIndex, indexable};
-use crate::geometry::{Aabb, BoxBlock, BoxBlocks, LANES, LaneMask, lanes_of};
-use crate::kernel::Isa;
+use crate::geometry::{Aabb, BoxBlock, BoxBlocks, LANES, LaneMask};
+use crate::kernel::{Isa, first_lanes, pairs};
 use crate::query::{Context, ItemId, Planes, QueryVolume, Recorder, Sink, Tests, UnpreparedPlanes};
 
 /// The plain loop over an array of boxes, leaving each box at the first plane
@@ -44,7 +44,7 @@ impl RegionIndex for LinearScalar {
     #[inline(always)]
     fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
         let mask = volume.mask();
-        for (b, id) in self.boxes.iter().zip(&self.ids) {
+        for (b, id) in pairs(&self.boxes, &self.ids) {
             cx.recorder().items_tested(1);
             if volume.admits(b, mask, cx.recorder()) {
                 cx.accept(std::slice::from_ref(id))?;
@@ -72,9 +72,10 @@ impl Linear {
     ) -> ControlFlow<()> {
         let isa = cx.isa();
         let (sink, recorder) = cx.parts();
-        let blocks = self.boxes.blocks().chunks(TOGETHER);
+        let rows = self.ids.rows();
         let mut items = self.ids.len();
-        for (blocks, ids) in blocks.zip(self.ids.rows().chunks(TOGETHER)) {
+        for (i, blocks) in self.boxes.blocks().chunks(TOGETHER).enumerate() {
+            let rows = &rows[i * TOGETHER..][..blocks.len()];
             let tests = AllOf {
                 blocks,
                 planes,
@@ -83,7 +84,7 @@ impl Linear {
                 recorder: &mut *recorder,
                 four: [0; 4],
             };
-            sink.accept_tested(isa, ids, tests)?;
+            sink.accept_tested(isa, rows, tests)?;
             items -= items.min(TOGETHER * LANES);
         }
         ControlFlow::Continue(())
@@ -166,7 +167,7 @@ impl<I: Isa, P: Planes<I>, R: Recorder> Tests<I> for AllOf<'_, P, R> {
 
     #[inline(always)]
     fn test(&mut self, isa: I, i: usize) -> (usize, LaneMask) {
-        let lanes = lanes_of(i, 0, self.items);
+        let lanes = first_lanes(self.items - i * LANES);
         self.recorder.items_tested(lanes.count_ones());
         let tests = lanes.count_ones() * self.open;
         self.recorder.planes_tested(tests);
@@ -178,8 +179,8 @@ impl<I: Isa, P: Planes<I>, R: Recorder> Tests<I> for AllOf<'_, P, R> {
                 Some(blocks) => self.planes.kept_of_four(isa, blocks),
                 None => {
                     let mut four = [0; 4];
-                    for (kept, block) in four.iter_mut().zip(&self.blocks[i..]) {
-                        *kept = self.planes.kept(isa, block);
+                    for (k, block) in self.blocks[i..].iter().enumerate() {
+                        four[k] = self.planes.kept(isa, block);
                     }
                     four
                 }

@@ -4,11 +4,11 @@
 
 use std::ops::{ControlFlow, Range};
 
-use super::by_plane::ByPlane;
+use super::by_plane::{ByPlane, LISTED};
 use super::frontier::{AHEAD, Frontier, Merger, NodeList, first_ahead, hand_over};
 use super::id_rows::IdRows;
 use crate::geometry::{ALL_ROWS, BoxBlock, LANES, LaneMask, PlaneMask};
-use crate::kernel::{Isa, prefetch};
+use crate::kernel::{Isa, pairs, prefetch};
 use crate::query::{ItemId, Planes, QueryVolume, Recorder, Sink, Tests, runs};
 
 /// Where a level lies among the blocks.
@@ -96,7 +96,7 @@ impl<I: Isa, V: QueryVolume, S: Sink, R: Recorder> Pass<'_, I, V, S, R> {
         for i in first_ahead(layer.far) {
             layer.fetch(places, i);
         }
-        for (i, (&at, &mask)) in places.iter().zip(masks).enumerate() {
+        for (i, (&at, &mask)) in pairs(places, masks).enumerate() {
             layer.fetch(places, i + AHEAD);
             self.sort_block(layer, (at, mask), below, run)?;
         }
@@ -120,7 +120,7 @@ impl<I: Isa, V: QueryVolume, S: Sink, R: Recorder> Pass<'_, I, V, S, R> {
         for i in first_ahead(layer.far) {
             layer.fetch(places, i);
         }
-        for (i, (&at, &mask)) in places.iter().zip(masks).enumerate() {
+        for (i, (&at, &mask)) in pairs(places, masks).enumerate() {
             layer.fetch(places, i + AHEAD);
             let inside = self.sort_lanes(layer, (at, mask), below);
             whole.push(self.isa, self.isa.iota(at * LANES as u32), inside);
@@ -153,7 +153,12 @@ impl<I: Isa, V: QueryVolume, S: Sink, R: Recorder> Pass<'_, I, V, S, R> {
         let mut rest = here;
         if here.len() >= WORTH_PARTING {
             by_plane.part(self.isa, here);
-            for (plane, places) in by_plane.lists() {
+            for plane in 0..LISTED {
+                let places = by_plane.list(plane);
+                if places.is_empty() {
+                    continue;
+                }
+                let plane = plane as u32;
                 let tests = SinglePlaneLeaves {
                     leaves,
                     view: self.volume,

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::block_order::{BlockOrder, block_ordered};
 use super::by_plane::ByPlane;
-use super::frontier::{Frontier, Merger, NodeList, is_far};
+use super::frontier::{Frontier, Merger, NodeList, is_far, put_back, take};
 use super::id_rows::IdRows;
 use super::pass::{Layer, Level, Pass};
 use super::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, indexable};
@@ -213,6 +213,7 @@ impl Wide {
             whole,
             by_plane,
         } = scratch;
+        let (mut here, mut below) = (here, below);
         here.start(isa, volume.mask());
         let mut pass = Pass {
             ids: &self.ids,
@@ -232,7 +233,7 @@ impl Wide {
                 pass.sort_level(&layer, here, below, &mut run)?;
                 pass.hand_over(run.take())?;
             }
-            std::mem::swap(here, below);
+            std::mem::swap(&mut here, &mut below);
         }
         pass.test_leaves(&self.layer(0), here, by_plane)
     }
@@ -326,9 +327,9 @@ impl RegionIndex for Wide {
                 None => ControlFlow::Continue(()),
             };
         }
-        let mut scratch = SCRATCH.take().unwrap_or_default();
+        let mut scratch = take(&SCRATCH);
         let flow = self.search(volume, cx, &mut scratch);
-        SCRATCH.set(Some(scratch));
+        put_back(&SCRATCH, scratch);
         flow
     }
 

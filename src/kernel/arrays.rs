@@ -1,5 +1,7 @@
 //! What any machine has: the portable kernel alone, its vectors plain arrays.
 
+use std::ops::Range;
+
 use super::plain::Plain;
 use super::{Kernel, Work};
 
@@ -18,6 +20,18 @@ pub fn detect(kernel: Kernel) -> bool {
 #[inline]
 pub fn run<W: Work>(_: Kernel, work: W) -> W::Output {
     work.run(BASELINE)
+}
+
+/// As [`extend`](crate::kernel::extend).
+#[inline(always)]
+pub fn extend(out: &mut Vec<u32>, words: &[u32]) {
+    out.extend_from_slice(words);
+}
+
+/// As [`extend_by_places`](crate::kernel::extend_by_places).
+#[inline(always)]
+pub fn extend_by_places(out: &mut Vec<u32>, words: &[u32], places: Range<usize>) {
+    out.extend_from_slice(&words[places]);
 }
 
 /// There is no instruction to ask with.

@@ -8,6 +8,12 @@ pub const LANES: usize = 16;
 /// One bit per lane.
 pub type LaneMask = u16;
 
+/// The first `count` lanes, all of them from sixteen on.
+#[inline(always)]
+pub fn first_lanes(count: usize) -> LaneMask {
+    ((1u32 << count.min(LANES)) - 1) as LaneMask
+}
+
 /// An instruction set: sixteen f32 lanes and sixteen u32 lanes.
 ///
 /// Every operation rounds once, to nearest, and lane by lane; so whatever is

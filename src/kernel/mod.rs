@@ -8,6 +8,7 @@
 //! never does so unasked, whatever the instruction set offers, and the plane
 //! test relies on it.
 
+mod inlined;
 mod isa;
 mod plain;
 
@@ -19,9 +20,11 @@ mod machine;
 mod machine;
 
 use std::fmt;
+use std::ops::Range;
 use std::sync::OnceLock;
 
-pub use isa::{Isa, LANES, LaneMask, Pack, Piece};
+pub use inlined::{each, pairs};
+pub use isa::{Isa, LANES, LaneMask, Pack, Piece, first_lanes};
 pub use machine::{BASELINE, Baseline};
 pub use plain::Plain;
 
@@ -111,6 +114,20 @@ impl fmt::Display for Kernel {
 #[inline(always)]
 pub fn prefetch<T>(place: &T) {
     machine::prefetch(place);
+}
+
+/// `out.extend_from_slice(words)`, inlined: what std has is two calls, and what a
+/// structure hands over is often a few ids.
+#[inline(always)]
+pub fn extend(out: &mut Vec<u32>, words: &[u32]) {
+    machine::extend(out, words);
+}
+
+/// `extend(out, &words[places])`, row by row where there are few: a call of memcpy
+/// costs more than they do. What lies behind them in `words` is read too.
+#[inline(always)]
+pub fn extend_by_places(out: &mut Vec<u32>, words: &[u32], places: Range<usize>) {
+    machine::extend_by_places(out, words, places);
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ use crate::arithmetic::{Expansion, two_sum, upper_half};
 use crate::geometry::{
     Aabb, BoxBlock, LANES, LaneMask, MAX_PLANES, PVertexSigns, Plane, PlaneF64, PlaneMask,
 };
-use crate::kernel::Isa;
+use crate::kernel::{Isa, each};
 use crate::query::{Predicate, QueryVolume};
 
 /// A plane whose test is carried out in some numbers.
@@ -60,8 +60,8 @@ impl<P: PlaneForm> Formed<P> {
         let plane = self.planes[plane as usize];
         let upper = plane.normal_upper();
         let at = |upper: bool, k: usize| if upper { b.max[k] } else { b.min[k] };
-        let far = array::from_fn(|k| at(upper[k], k));
-        (plane, far, array::from_fn(|k| at(!upper[k], k)))
+        let far = each([0, 1, 2], |k| at(upper[k], k));
+        (plane, far, each([0, 1, 2], |k| at(!upper[k], k)))
     }
 }
 
@@ -93,12 +93,14 @@ impl<P: PlaneForm> QueryVolume for Formed<P> {
             let upper = plane.normal_upper();
             let (far, near) = (
                 block.corner_rows(upper),
-                block.corner_rows(upper.map(|u| !u)),
+                block.corner_rows(each(upper, |u| !u)),
             );
-            let of = |rows: [&[f32; LANES]; 3], lane: usize| rows.map(|row| row[lane]);
+            let of = |rows: [&[f32; LANES]; 3], lane: usize| each(rows, |row| row[lane]);
             // First what vectors do, then what may take a decision of its own.
-            let values: [P::Value; LANES] =
-                array::from_fn(|lane| plane.value(of(far, lane), of(near, lane)));
+            let mut values = [P::Value::default(); LANES];
+            for (lane, value) in values.iter_mut().enumerate() {
+                *value = plane.value(of(far, lane), of(near, lane));
+            }
             for (lane, outside) in outside.iter_mut().enumerate() {
                 *outside |= plane.is_outside(values[lane], of(far, lane), of(near, lane));
             }
@@ -110,8 +112,9 @@ impl<P: PlaneForm> QueryVolume for Formed<P> {
     }
 }
 
+#[inline(always)]
 fn upper(normal: [f64; 3]) -> PVertexSigns {
-    normal.map(|n| n >= 0.0)
+    each(normal, |n| n >= 0.0)
 }
 
 /// An f32 plane whose products are fused with the sums: three roundings, not
@@ -171,7 +174,7 @@ impl PlaneForm for Flushed {
     #[inline(always)]
     fn value(&self, far: [f32; 3], _: [f32; 3]) -> f32 {
         let Plane { normal: n, d } = self.0;
-        let [x, y, z] = far.map(flush);
+        let [x, y, z] = each(far, flush);
         let sum = flush(flush(n.x * x) + flush(n.y * y));
         flush(flush(sum + flush(n.z * z)) + d)
     }
@@ -194,8 +197,8 @@ impl CentreExtent {
     #[inline(always)]
     fn parts(&self, far: [f32; 3], near: [f32; 3]) -> [f32; 2] {
         let Plane { normal: n, d } = self.0;
-        let [x, y, z]: [f32; 3] = array::from_fn(|k| 0.5 * far[k] + 0.5 * near[k]);
-        let [a, b, c]: [f32; 3] = array::from_fn(|k| (0.5 * far[k] - 0.5 * near[k]).abs());
+        let [x, y, z] = each([0, 1, 2], |k| 0.5 * far[k] + 0.5 * near[k]);
+        let [a, b, c] = each([0, 1, 2], |k| (0.5 * far[k] - 0.5 * near[k]).abs());
         let m = n.abs();
         [
             ((n.x * x + n.y * y) + n.z * z) + d,
@@ -289,11 +292,11 @@ impl PlaneForm for DoubleDouble {
 
     #[inline(always)]
     fn normal_upper(&self) -> PVertexSigns {
-        upper(array::from_fn(|k| self.high[k]))
+        upper(each([0, 1, 2], |k| self.high[k]))
     }
     #[inline(always)]
     fn value(&self, far: [f32; 3], _: [f32; 3]) -> [f64; 2] {
-        let products: [[f64; 2]; 3] = array::from_fn(|k| {
+        let products = each([0, 1, 2], |k| {
             let x = f64::from(far[k]);
             let (high, low) = quick_two_sum(self.high[k] * x, self.low[k] * x);
             [high, low]
@@ -379,7 +382,7 @@ impl PlaneForm for Interval {
 
     #[inline(always)]
     fn normal_upper(&self) -> PVertexSigns {
-        upper(array::from_fn(|k| self.normal[k][1]))
+        upper(each([0, 1, 2], |k| self.normal[k][1]))
     }
     #[inline(always)]
     fn value(&self, far: [f32; 3], near: [f32; 3]) -> f64 {

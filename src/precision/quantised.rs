@@ -8,7 +8,7 @@ use std::ops::{ControlFlow, Range};
 use serde::{Deserialize, Serialize};
 
 use crate::arithmetic::rounding::round_up;
-use crate::geometry::{Aabb, BoxBlock, LANES, LaneMask, PlaneMask, lanes_of};
+use crate::geometry::{Aabb, BoxBlock, LANES, LaneMask, PlaneMask, blocks_of};
 use crate::index::{
     Bsp, BuildError, Info, Input, Kind, Leaves, MemoryUsage, Origin, PackedTree, RegionIndex,
     scan_blocks,
@@ -190,11 +190,8 @@ impl<C: Code> Quantised<C> {
 
     #[inline(always)]
     fn blocks(&self, items: Range<usize>) -> impl Iterator<Item = (usize, LaneMask, BoxBlock)> {
-        let blocks = items.start / LANES..items.end.div_ceil(LANES);
-        blocks.map(move |at| {
-            let lanes = lanes_of(at, items.start, items.end);
-            (at * LANES, lanes, self.block(at))
-        })
+        blocks_of(items.start, items.end)
+            .map(|(start, lanes)| (start, lanes, self.block(start / LANES)))
     }
 }
 

@@ -5,6 +5,7 @@
 use std::ops::ControlFlow;
 
 use super::ItemId;
+use crate::kernel::extend;
 
 /// Where the answers to a batch of points go: one call for every point, in
 /// ascending order of the points, with all its ids in one slice (empty where
@@ -86,7 +87,7 @@ impl ManySink for Located {
         match ids {
             // On a tiling nearly all: no call to copy four bytes.
             [id] => self.ids.push(*id),
-            _ => self.ids.extend_from_slice(ids),
+            _ => extend(&mut self.ids, ids),
         }
         self.ends.push(self.ids.len());
         ControlFlow::Continue(())

@@ -3,7 +3,7 @@
 use std::ops::{ControlFlow, Range};
 
 use super::ItemId;
-use crate::kernel::{Isa, LANES, LaneMask, Pack, Piece};
+use crate::kernel::{Isa, LANES, LaneMask, Pack, Piece, extend, extend_by_places};
 
 /// Where answers go. A structure hands over slices: a subtree that is wholly
 /// inside is one call. Returning `Break` ends the query.
@@ -83,9 +83,6 @@ pub fn runs(lanes: LaneMask) -> impl Iterator<Item = Range<usize>> {
     })
 }
 
-/// Up to so many ids are copied block by block; more, as memory.
-const SHORT: usize = 16 * LANES;
-
 /// Collects all ids, in the structure's own order.
 impl Sink for Vec<ItemId> {
     #[inline(always)]
@@ -93,7 +90,7 @@ impl Sink for Vec<ItemId> {
         match ids {
             // Often, and a call to copy four bytes would cost more than they.
             [id] => self.push(*id),
-            _ => self.extend_from_slice(ids),
+            _ => extend(self, ids),
         }
         ControlFlow::Continue(())
     }
@@ -102,17 +99,11 @@ impl Sink for Vec<ItemId> {
     #[inline(always)]
     fn accept_places<I: Isa>(
         &mut self,
-        isa: I,
+        _: I,
         ids: &[ItemId],
         places: Range<usize>,
     ) -> ControlFlow<()> {
-        let (blocks, rest) = ids[places.clone()].as_chunks();
-        if places.len() > SHORT || !rest.is_empty() {
-            return self.accept(&ids[places]);
-        }
-        for block in blocks {
-            isa.append(self, block, LaneMask::MAX);
-        }
+        extend_by_places(self, ids, places);
         ControlFlow::Continue(())
     }
 

@@ -143,10 +143,12 @@ impl QueryVolume for Unmasked<'_> {
     ) -> (LaneMask, I::Words) {
         let (kept, words) = self.0.sorted_lanes(isa, block, mask);
         let inside = isa.zeros(words);
-        let open: [PlaneMask; LANES] = std::array::from_fn(|lane| match inside >> lane & 1 {
-            0 => mask,
-            _ => 0,
-        });
+        let mut open = [mask; LANES];
+        for (lane, open) in open.iter_mut().enumerate() {
+            if inside >> lane & 1 == 1 {
+                *open = 0;
+            }
+        }
         (kept, isa.words(&open))
     }
 }

@@ -115,11 +115,12 @@ impl Tree {
             }
             tally.node(test);
             let bounds = bounds_of(node);
-            if test.rejects(&bounds) {
+            let (rejected, accepted) = test.rejects_accepts(&bounds);
+            if rejected {
                 tally.count(R::subtree_rejected);
                 return TraversalAction::Prune;
             }
-            if !test.accepts(&bounds) {
+            if !accepted {
                 return TraversalAction::Continue;
             }
             let mut accepted = 0;

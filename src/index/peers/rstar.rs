@@ -127,8 +127,9 @@ impl Tree {
                     RTreeNode::Parent(node) => {
                         tally.node(test);
                         let bounds = bounds_of(&node.envelope());
-                        if !test.rejects(&bounds) {
-                            open.push((node, test.accepts(&bounds)));
+                        let (rejected, accepted) = test.rejects_accepts(&bounds);
+                        if !rejected {
+                            open.push((node, accepted));
                         }
                     }
                 }

@@ -152,12 +152,15 @@ impl Split {
 }
 
 impl Node for &Split {
+    #[inline]
     fn bounds(&self) -> Aabb {
         self.bounds
     }
+    #[inline]
     fn items(&self) -> Slice<'_> {
         self.items.all()
     }
+    #[inline]
     fn children(self) -> impl Iterator<Item = Self> {
         self.sides.iter().flatten().map(|side| &**side)
     }

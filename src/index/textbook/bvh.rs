@@ -30,9 +30,11 @@ struct At<'t> {
 }
 
 impl Node for At<'_> {
+    #[inline]
     fn bounds(&self) -> Aabb {
         Aabb::new(self.node.min, self.node.max)
     }
+    #[inline]
     fn items(&self) -> Slice<'_> {
         let (first, count) = (self.node.first_index, self.node.prim_count);
         let places = match self.node.is_leaf() {
@@ -42,6 +44,7 @@ impl Node for At<'_> {
         let Items { boxes, ids } = &self.tree.items;
         (&boxes[places.clone()], &ids[places])
     }
+    #[inline]
     fn children(self) -> impl Iterator<Item = Self> {
         let first = self.node.first_index as usize;
         let children = match self.node.is_leaf() {

@@ -18,6 +18,7 @@ use serde::{Deserialize, Serialize};
 use super::partition::Record;
 use super::{BuildError, MemoryUsage, check_range};
 use crate::geometry::{Aabb, PlaneMask};
+use crate::kernel::pairs;
 use crate::query::{Containment, Context, ItemId, QueryVolume, Recorder, Sink};
 
 pub use bsp::BspTextbook;
@@ -69,6 +70,7 @@ impl Items {
         }
     }
 
+    #[inline]
     fn all(&self) -> Slice<'_> {
         (&self.boxes, &self.ids)
     }
@@ -130,13 +132,14 @@ fn report<N: Node, S: Sink>(node: N, sink: &mut S) -> ControlFlow<(), usize> {
 }
 
 /// Hands over those of some items that a volume sees.
+#[inline]
 fn test_items<Q: QueryVolume, C: Context>(
     (boxes, ids): Slice<'_>,
     volume: &Q,
     mask: PlaneMask,
     cx: &mut C,
 ) -> ControlFlow<()> {
-    for (bounds, id) in boxes.iter().zip(ids) {
+    for (bounds, id) in pairs(boxes, ids) {
         cx.recorder().items_tested(1);
         if volume.admits(bounds, mask, cx.recorder()) {
             cx.accept(std::slice::from_ref(id))?;

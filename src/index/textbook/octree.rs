@@ -94,12 +94,15 @@ fn part(cell: &Aabb, axes: &[usize], child: usize) -> Aabb {
 
 impl<const CHILDREN: usize> Node for &Cell<CHILDREN> {
     /// The cell itself: it was asked whether it holds each item below.
+    #[inline]
     fn bounds(&self) -> Aabb {
         self.bounds
     }
+    #[inline]
     fn items(&self) -> Slice<'_> {
         self.items.all()
     }
+    #[inline]
     fn children(self) -> impl Iterator<Item = Self> {
         self.children.iter().flatten().map(|child| &**child)
     }

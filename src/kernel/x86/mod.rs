@@ -9,6 +9,8 @@ mod avx512;
 mod packer;
 mod sse2;
 
+pub use packer::{extend, extend_by_places};
+
 use super::{Kernel, Work};
 
 /// The instruction set that the program was compiled for, with no need to ask

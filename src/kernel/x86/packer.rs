@@ -1,6 +1,8 @@
 //! Appending to a list through its spare memory: a row is stored whole, whatever
 //! of it counts, and the list's length is set once.
 
+use std::ops::Range;
+
 use crate::kernel::isa::{Isa, LANES, LaneMask, Pack};
 
 /// Instructions that pack words to memory that may not have been written yet.
@@ -20,12 +22,61 @@ pub unsafe trait PackTo: Isa {
 #[inline(always)]
 pub fn append<I: PackTo>(isa: I, out: &mut Vec<u32>, row: &[u32; LANES], lanes: LaneMask) {
     // Room first: a register would not outlive the call that makes it.
-    out.reserve(LANES);
+    make_room(out, LANES);
     let end = out.spare_capacity_mut().as_mut_ptr().cast();
     // SAFETY: there is room for sixteen words; so many are written.
     unsafe {
         isa.pack_to(end, isa.words(row), lanes);
         out.set_len(out.len() + lanes.count_ones() as usize);
+    }
+}
+
+/// `Vec::reserve`, which is a call even where there is room.
+#[inline(always)]
+fn make_room(out: &mut Vec<u32>, words: usize) {
+    if out.capacity() - out.len() < words {
+        out.reserve(words);
+    }
+}
+
+/// [`extend`](crate::kernel::extend), with no call but memcpy's where there is room.
+#[inline(always)]
+pub fn extend(out: &mut Vec<u32>, words: &[u32]) {
+    make_room(out, words.len());
+    let end = out.spare_capacity_mut().as_mut_ptr().cast();
+    // SAFETY: there is room for so many words behind the end, and a list that is
+    // borrowed mutably does not overlap `words`.
+    unsafe {
+        std::ptr::copy_nonoverlapping(words.as_ptr(), end, words.len());
+        out.set_len(out.len() + words.len());
+    }
+}
+
+/// Up to so many words are copied row by row; more, as memory.
+const FEW: usize = 16 * LANES;
+
+/// [`extend_by_places`](crate::kernel::extend_by_places).
+#[inline(always)]
+pub fn extend_by_places(out: &mut Vec<u32>, words: &[u32], places: Range<usize>) {
+    let few = &words[places.clone()];
+    let rows = few.len().div_ceil(LANES);
+    if few.len() > FEW || words.len() - places.start < rows * LANES {
+        return extend(out, few);
+    }
+    make_room(out, rows * LANES);
+    let end = out.spare_capacity_mut().as_mut_ptr().cast::<u32>();
+    // SAFETY: so many rows can be read from the first place on and written behind the
+    // end, and a list that is borrowed mutably does not overlap `words`.
+    unsafe {
+        for row in 0..rows {
+            let from = words
+                .as_ptr()
+                .add(places.start + row * LANES)
+                .cast::<[u32; LANES]>();
+            let to = end.add(row * LANES).cast::<[u32; LANES]>();
+            to.write_unaligned(from.read_unaligned());
+        }
+        out.set_len(out.len() + few.len());
     }
 }
 
@@ -42,7 +93,7 @@ impl<'a, I: PackTo> Pack<'a, I> for Packer<'a> {
     #[inline(always)]
     fn onto(out: &'a mut Vec<u32>, words: usize) -> Self {
         let room = words + LANES;
-        out.reserve(room);
+        make_room(out, room);
         Packer {
             end: out.spare_capacity_mut().as_mut_ptr().cast(),
             room,

@@ -7,11 +7,10 @@
 //! tell the two back ends apart.
 
 use super::buffer::OcclusionBuffer;
-use super::lanes::first_lanes;
 use super::outline::{Coverage, Outline, TileNearness};
 use super::rect::{Rect, Rects};
 use super::view::{TILE_HEIGHT, TILE_WIDTH};
-use crate::kernel::{Isa, LANES, LaneMask};
+use crate::kernel::{Isa, LANES, LaneMask, each, first_lanes, pairs};
 use crate::visibility::{Guarantee, SampleGrid};
 
 /// Pixels of a tile: bit `8 * row + column`.
@@ -85,9 +84,9 @@ impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
         let last = end.div_ceil(TILE_HEIGHT).min(self.rows);
         while row < last {
             let (starts, ends) = outline.spans::<16>(row * TILE_HEIGHT);
-            let tiles = starts.as_chunks().0.iter().zip(ends.as_chunks().0);
-            for (row, (start, end)) in (row..last).zip(tiles) {
-                self.draw_row(isa, row, start, end, &nearness);
+            let tiles = pairs(starts.as_chunks().0, ends.as_chunks().0).enumerate();
+            for (i, (start, end)) in tiles.take(last - row) {
+                self.draw_row(isa, row + i, start, end, &nearness);
             }
             row += 4;
         }
@@ -296,7 +295,7 @@ impl<const WHOLE: bool> Masked<WHOLE> {
         if least >= greatest {
             return;
         }
-        let lines = [top, bottom].map(|line| (row * TILE_HEIGHT + line) as f32);
+        let lines = each([top, bottom], |line| (row * TILE_HEIGHT + line) as f32);
         let columns = [least as f32, greatest as f32];
         let first = least as usize / TILE_WIDTH;
         let last = (greatest as usize).div_ceil(TILE_WIDTH);
@@ -410,7 +409,7 @@ fn pixels_between(start: &[i32; 4], end: &[i32; 4], left: i32) -> Mask {
 /// The pixels of a tile that lie in a rectangle which meets the tile.
 #[inline(always)]
 fn pixels_of(rect: &Rect, column: usize, row: usize) -> Mask {
-    let [x0, x1, y0, y1] = [rect.x0, rect.x1, rect.y0, rect.y1].map(usize::from);
+    let [x0, x1, y0, y1] = each([rect.x0, rect.x1, rect.y0, rect.y1], usize::from);
     let left = x0.saturating_sub(column * TILE_WIDTH);
     let right = (x1 - column * TILE_WIDTH).min(TILE_WIDTH - 1);
     let top = y0.saturating_sub(row * TILE_HEIGHT);

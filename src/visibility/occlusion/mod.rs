@@ -15,7 +15,6 @@ mod buffer;
 mod depth_rays;
 mod hierarchical_z;
 mod interleaved;
-mod lanes;
 mod masked;
 mod none;
 mod outline;

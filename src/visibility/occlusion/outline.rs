@@ -37,6 +37,7 @@ use super::rect::Rect;
 use super::scene::Faces;
 use super::view::{Linear, MARGIN, TILE_HEIGHT, TILE_WIDTH, U, View};
 use crate::geometry::Aabb;
+use crate::kernel::each;
 
 /// Which pixels an outline covers.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -99,7 +100,7 @@ impl Outline {
                 high[axis] = f64::INFINITY;
             }
         }
-        let size = [view.grid.width, view.grid.height].map(|s| s as usize);
+        let size = [view.grid.width as usize, view.grid.height as usize];
         let padded = |size: usize, tile: usize| (size.div_ceil(tile) * tile) as f64;
         let none = Bound {
             at: 0.0,
@@ -304,7 +305,7 @@ impl Outline {
     #[inline(always)]
     pub fn spans<const N: usize>(&self, first: usize) -> ([i32; N], [i32; N]) {
         let [left, right] = self.columns_within;
-        let [top, bottom] = self.rows.map(|row| row as f32);
+        let [top, bottom] = each(self.rows, |row| row as f32);
         let first = first as f32;
         let mut low = [left as f32; N];
         let mut high = [right as f32 - 1.0; N];
@@ -340,12 +341,12 @@ impl Outline {
     #[inline(always)]
     pub fn per_tile(&self) -> TileNearness {
         let mut faces = [[f32::INFINITY, 0.0, 0.0]; 3];
-        for (of_tile, face) in faces.iter_mut().zip(&self.faces[..self.face_count]) {
+        for (i, face) in self.faces[..self.face_count].iter().enumerate() {
             // Six u of the greatest terms: one for rounding each coefficient, one for
             // each product, two sums.
             let size = face.c.abs() + face.x.abs() * self.columns + face.y.abs() * self.height;
             let c = face.c - 6.0 * f64::from(U) * size;
-            *of_tile = [c as f32, face.x as f32, face.y as f32];
+            faces[i] = [c as f32, face.x as f32, face.y as f32];
         }
         TileNearness {
             faces,
@@ -357,9 +358,9 @@ impl Outline {
     #[inline(always)]
     pub fn per_pixel(&self) -> PixelNearness {
         let mut faces = [[f32::INFINITY, 0.0, 0.0]; 3];
-        for (of_pixel, face) in faces.iter_mut().zip(&self.faces[..self.face_count]) {
+        for (i, face) in self.faces[..self.face_count].iter().enumerate() {
             let c = face.c + 0.5 * (face.x + face.y);
-            *of_pixel = [c as f32, face.x as f32, face.y as f32];
+            faces[i] = [c as f32, face.x as f32, face.y as f32];
         }
         PixelNearness { faces }
     }
@@ -375,7 +376,7 @@ impl PixelNearness {
     /// At the centre of a pixel, by its column and row.
     #[inline(always)]
     pub fn of(&self, column: f32, row: f32) -> f32 {
-        least(self.faces.map(|f| (f[0] + f[1] * column) + f[2] * row))
+        least(each(self.faces, |f| (f[0] + f[1] * column) + f[2] * row))
     }
 }
 
@@ -392,12 +393,12 @@ impl TileNearness {
     #[inline(always)]
     pub fn within(&self, [left, right]: [f32; 2], [top, bottom]: [f32; 2]) -> f32 {
         // At the farthest corner of each face.
-        let at = |f: &[f32; 3]| {
+        let at = |f: [f32; 3]| {
             let column = if f[1] < 0.0 { right } else { left };
             let row = if f[2] < 0.0 { bottom } else { top };
             (f[0] + f[2] * row) + f[1] * column
         };
-        let least = least(self.faces.each_ref().map(at));
+        let least = least(each(self.faces, at));
         if least > self.floor {
             least
         } else {

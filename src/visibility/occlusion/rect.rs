@@ -237,9 +237,10 @@ impl<I: Isa> AboutEye<I> {
     #[inline(always)]
     fn products(&self, isa: I, row: &[f32; 3]) -> [[I::Floats; 2]; 3] {
         let mut products = self.bounds;
-        for (of_axis, factor) in products.iter_mut().zip(row) {
-            let factor = isa.splat(*factor);
-            *of_axis = [isa.mul(of_axis[0], factor), isa.mul(of_axis[1], factor)];
+        for axis in 0..3 {
+            let factor = isa.splat(row[axis]);
+            let [low, high] = self.bounds[axis];
+            products[axis] = [isa.mul(low, factor), isa.mul(high, factor)];
         }
         products
     }

@@ -3,9 +3,8 @@
 
 use glam::DVec3;
 
-use super::lanes::first_lanes;
 use crate::geometry::{Aabb, BoxBlock};
-use crate::kernel::{LANES, LaneMask};
+use crate::kernel::{LANES, LaneMask, first_lanes};
 use crate::query::ItemId;
 use crate::scene::{Scene, WorldBox};
 use crate::visibility::Solids;

@@ -1,10 +1,9 @@
 //! The plain depth buffer: one depth a pixel, sampled at its centre.
 
 use super::buffer::OcclusionBuffer;
-use super::lanes::first_lanes;
 use super::outline::{Coverage, Outline};
 use super::rect::Rect;
-use crate::kernel::{Isa, LANES};
+use crate::kernel::{Isa, LANES, first_lanes};
 use crate::visibility::{Guarantee, SampleGrid};
 
 /// Nearness at the centre of each pixel; 0 where nothing was drawn.

@@ -18,6 +18,7 @@ pub(super) struct Met {
 }
 
 impl Met {
+    #[inline]
     pub fn hit(&self) -> Hit {
         Hit {
             item: self.item,
@@ -25,30 +26,62 @@ impl Met {
         }
     }
 
+    #[inline]
     fn order(&self, other: &Met, probe: &Probe) -> Ordering {
         let by_depth = probe.compare(&self.at, &other.at);
         by_depth.then(self.item.cmp(&other.item))
     }
 }
 
+/// The first of the candidates so far that the ray meets.
+pub(super) struct First {
+    probe: Probe,
+    best: Option<Met>,
+}
+
+impl First {
+    /// Of none yet.
+    #[inline]
+    pub fn new(ray: &Ray) -> First {
+        First {
+            probe: Probe::new(*ray),
+            best: None,
+        }
+    }
+
+    /// One candidate more.
+    #[inline]
+    pub fn offer(&mut self, (item, b): (ItemId, &WorldBox)) {
+        let far = self.probe.ray().far;
+        let limit = self.best.map_or(far, |best| best.at.at_most());
+        if let Some(at) = self.probe.enter(b, limit) {
+            let met = Met { item, at };
+            if self
+                .best
+                .is_none_or(|best| met.order(&best, &self.probe).is_lt())
+            {
+                self.best = Some(met);
+            }
+        }
+    }
+
+    /// What was met first.
+    #[inline]
+    pub fn hit(&self) -> Option<Hit> {
+        self.best.map(|met| met.hit())
+    }
+}
+
 /// The first of the candidates that the ray meets.
-#[inline]
 pub(super) fn first<'a>(
     ray: &Ray,
     candidates: impl IntoIterator<Item = (ItemId, &'a WorldBox)>,
 ) -> Option<Hit> {
-    let probe = Probe::new(*ray);
-    let mut best: Option<Met> = None;
-    for (item, b) in candidates {
-        let limit = best.map_or(ray.far, |best| best.at.at_most());
-        if let Some(at) = probe.enter(b, limit) {
-            let met = Met { item, at };
-            if best.is_none_or(|best| met.order(&best, &probe).is_lt()) {
-                best = Some(met);
-            }
-        }
+    let mut first = First::new(ray);
+    for candidate in candidates {
+        first.offer(candidate);
     }
-    best.map(|met| met.hit())
+    first.hit()
 }
 
 /// The first `count` of the candidates that the ray meets, and all that are as

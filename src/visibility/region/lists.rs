@@ -1,5 +1,7 @@
 //! Lists of lists in two tables.
 
+use std::ops::Range;
+
 /// Lists that lie one behind the other.
 #[derive(Clone, Debug)]
 pub struct Lists<T> {
@@ -27,8 +29,15 @@ impl<T: Clone> Lists<T> {
     }
 
     /// A list. O(1).
+    #[inline]
     pub fn list(&self, at: u32) -> &[T] {
+        &self.all[self.places(at)]
+    }
+
+    /// Where a list lies in `all`.
+    #[inline]
+    pub fn places(&self, at: u32) -> Range<usize> {
         let at = at as usize;
-        &self.all[self.starts[at] as usize..self.starts[at + 1] as usize]
+        self.starts[at] as usize..self.starts[at + 1] as usize
     }
 }

@@ -7,6 +7,7 @@ use super::answer::{About, EyePlace, RegionId, RegionRow, Scratch, decode};
 use super::graph::RegionGraph;
 use super::lists::Lists;
 use super::pvs::Pvs;
+use crate::kernel::extend_by_places;
 use crate::visibility::{Guarantee, Rays};
 
 /// The row that reads a file of pairs: a claim promises nothing.
@@ -79,7 +80,7 @@ impl RegionRow for StoredPvs {
             return EyePlace::Outside;
         }
         match scratch.homes[..] {
-            [home] => out.extend_from_slice(self.lists.list(home)),
+            [home] => extend_by_places(out, &self.lists.all, self.lists.places(home)),
             _ => {
                 scratch.seen.clear(self.graph.len());
                 for &home in &scratch.homes {
@@ -93,6 +94,6 @@ impl RegionRow for StoredPvs {
 
     fn from_region(&self, region: RegionId, out: &mut Vec<RegionId>) {
         out.clear();
-        out.extend_from_slice(self.lists.list(region));
+        extend_by_places(out, &self.lists.all, self.lists.places(region));
     }
 }

@@ -126,8 +126,8 @@ impl<B: ConeRows> Work for Clear<'_, B> {
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) {
         let view = Broadcast::of(isa, self.view);
-        for (block, words) in self.blocks.iter().zip(self.words.chunks_mut(LANES)) {
-            let gone = rejected(isa, block, &view);
+        for (i, words) in self.words.chunks_mut(LANES).enumerate() {
+            let gone = rejected(isa, &self.blocks[i], &view);
             clear(words, gone, &[u64::MAX; LANES]);
         }
     }

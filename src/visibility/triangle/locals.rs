@@ -8,6 +8,7 @@ use glam::Vec3;
 
 use super::clusters::{Clusters, MOST_TRIANGLES};
 use super::selection::Selection;
+use crate::kernel::each;
 
 /// Points of a cluster at the most.
 const MOST_POINTS: usize = 3 * MOST_TRIANGLES;
@@ -96,13 +97,13 @@ impl Locals {
                 None => {}
             }
             let points = self.starts[cluster] as usize..self.starts[cluster + 1] as usize;
-            for (of, points) in of.chunks_exact_mut(EIGHT).zip(&self.points[points]) {
-                of.copy_from_slice(&rule.of_points(points));
+            for (i, points) in self.points[points].iter().enumerate() {
+                of.as_chunks_mut().0[i] = rule.of_points(points);
             }
             let triangles = self.firsts[cluster] as usize..self.firsts[cluster + 1] as usize;
             let mut front = 0;
             for (bit, [a, b, c]) in self.triangles[triangles].iter().enumerate() {
-                let corners = [a, b, c].map(|corner| of[usize::from(*corner)]);
+                let corners = each([*a, *b, *c], |corner| of[usize::from(corner)]);
                 front |= u64::from(rule.keep(corners)) << bit;
             }
             *word &= front;

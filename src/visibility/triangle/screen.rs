@@ -11,7 +11,7 @@ use super::locals::{EIGHT, Locals, Points, Rule};
 use super::selection::Selection;
 use super::view::View;
 use crate::camera::Lens;
-use crate::kernel::{Isa, Kernel, Work};
+use crate::kernel::{Isa, Kernel, Work, each};
 
 /// Error of a coordinate per unit of the numbers in it. The axes are orthonormal to
 /// some units of 2^-53; products, sums and a quotient add some more: 2^-40 is
@@ -103,7 +103,7 @@ impl Screen {
         let zero = [0.0; EIGHT];
         let (mut x, mut y, mut depth, mut size) = (zero, zero, zero, zero);
         for (k, row) in points.iter().enumerate() {
-            let (eye, [u, v, n]) = (self.eye[k], self.axes.map(|axis| axis[k]));
+            let (eye, [u, v, n]) = (self.eye[k], each(self.axes, |axis| axis[k]));
             let least = eye.abs() * (1.0 / 1024.0);
             for lane in 0..EIGHT {
                 let way = f64::from(row[lane]) - eye;
@@ -113,7 +113,7 @@ impl Screen {
                 size[lane] += way.abs() + least;
             }
         }
-        let error = size.map(|size| ERROR * size);
+        let error = each(size, |size| ERROR * size);
         Seen { x, y, depth, error }
     }
 
@@ -142,7 +142,7 @@ impl Screen {
             codes[lane] |= u64::from(depth[lane] + error[lane] < self.near) << 4;
             codes[lane] |= u64::from(depth[lane] - error[lane] > self.far) << 5;
         }
-        codes.map(|code| code as u8)
+        each(codes, |code| code as u8)
     }
 
     /// Where points may be in the image; everywhere if they are not surely in front of

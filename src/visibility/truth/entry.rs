@@ -4,6 +4,7 @@
 use std::cmp::Ordering;
 
 use crate::arithmetic::{Expansion, two_sum};
+use crate::kernel::each;
 use crate::scene::WorldBox;
 use crate::visibility::Ray;
 
@@ -26,11 +27,13 @@ pub struct Crossing {
 
 impl Crossing {
     /// No depth at which the ray crosses there is below this.
+    #[inline]
     pub fn at_least(&self) -> f64 {
         self.depth - GUARD * self.depth.abs()
     }
 
     /// No depth at which the ray crosses there is above this.
+    #[inline]
     pub fn at_most(&self) -> f64 {
         self.depth + GUARD * self.depth.abs()
     }
@@ -49,12 +52,14 @@ pub struct Probe {
 
 impl Probe {
     /// The ray, made ready.
+    #[inline]
     pub fn new(ray: Ray) -> Probe {
-        let inverse = ray.direction.to_array().map(|d| 1.0 / d);
+        let inverse = each(ray.direction.to_array(), |d| 1.0 / d);
         Probe { ray, inverse }
     }
 
     /// The ray as it was given.
+    #[inline]
     pub fn ray(&self) -> &Ray {
         &self.ray
     }

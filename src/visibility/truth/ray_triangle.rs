@@ -11,6 +11,7 @@ use std::cmp::Ordering;
 use glam::{DVec3, I64Vec3, Vec3};
 
 use crate::arithmetic::{Expansion, two_sum};
+use crate::kernel::each;
 use crate::visibility::Ray;
 
 /// With u = 2^-53; A, B, C the corners about the ray's origin, U = B - A, V = C - A,
@@ -44,16 +45,19 @@ pub struct Meeting {
 
 impl Meeting {
     /// The corners of the triangle, as it was given.
+    #[inline]
     pub fn corners(&self) -> [Vec3; 3] {
         self.corners
     }
 
     /// No depth at which the ray meets it there is below this.
+    #[inline]
     pub fn at_least(&self) -> f64 {
         self.depth - self.error
     }
 
     /// No depth at which the ray meets it there is above this.
+    #[inline]
     pub fn at_most(&self) -> f64 {
         self.depth + self.error
     }
@@ -78,12 +82,13 @@ pub struct TriangleProbe {
 
 impl TriangleProbe {
     /// The ray, made ready for triangles about an origin.
+    #[inline]
     pub fn new(ray: Ray, origin: DVec3) -> TriangleProbe {
-        let sums = [0, 1, 2].map(|k| two_sum(origin[k], -ray.origin[k]));
-        let shift = DVec3::from(sums.map(|sum| sum.0));
+        let sums = each([0, 1, 2], |k| two_sum(origin[k], -ray.origin[k]));
+        let shift = DVec3::from(each(sums, |sum| sum.0));
         TriangleProbe {
             shift,
-            rest: DVec3::from(sums.map(|sum| sum.1)),
+            rest: DVec3::from(each(sums, |sum| sum.1)),
             across: ray.direction.abs().max_element(),
             far: shift.abs().max_element(),
             ray,
@@ -91,6 +96,7 @@ impl TriangleProbe {
     }
 
     /// The ray as it was given.
+    #[inline]
     pub fn ray(&self) -> &Ray {
         &self.ray
     }

@@ -64,6 +64,7 @@ impl WideRay {
         });
     }
 
+    #[inline]
     fn place(&self, place: u32) -> (ItemId, &WorldBox) {
         let item = &self.items[place as usize];
         (item.id, &item.b)
@@ -86,11 +87,16 @@ struct Foremost {
 }
 
 impl Foremost {
+    /// Calls `look` with those that are still within the bound.
     #[inline(always)]
-    fn within(&self) -> impl Iterator<Item = u32> {
-        let all = self.few[..self.used].iter().chain(&self.more);
-        all.filter(|(low, _)| *low <= self.bound)
-            .map(|&(_, place)| place)
+    fn within(&self, mut look: impl FnMut(u32)) {
+        for list in [&self.few[..self.used], &self.more] {
+            for &(low, place) in list {
+                if low <= self.bound {
+                    look(place);
+                }
+            }
+        }
     }
 
     #[cold]
@@ -153,7 +159,9 @@ impl Work for First<'_> {
             more: Vec::new(),
         };
         boxes.tree.search(isa, &slabs, &mut found);
-        exactly::first(ray, found.within().map(|place| boxes.place(place)))
+        let mut first = exactly::First::new(ray);
+        found.within(|place| first.offer(boxes.place(place)));
+        first.hit()
     }
 }
 

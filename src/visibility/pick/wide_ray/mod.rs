@@ -7,6 +7,8 @@ mod build;
 mod slabs;
 mod triangles;
 
+use std::hint::black_box;
+
 use glam::DVec3;
 
 pub use self::boxes::WideRay;
@@ -105,6 +107,13 @@ impl Tree {
     /// bound, near ones first as far as the tree tells.
     #[inline(always)]
     fn search<I: Isa, C: Candidates>(&self, isa: I, slabs: &Slabs, found: &mut C) {
+        // Behind a pointer that the compiler knows nothing of, so that each node reads the
+        // ray's numbers anew, which AVX-512 does within the instruction that needs them.
+        // Spread over whole vectors ahead of the loop, they are read back from the stack.
+        let slabs = match I::MANY_REGISTERS {
+            true => black_box(slabs),
+            false => slabs,
+        };
         let mut open = Open::new();
         if self.nodes.is_empty() {
             return;

@@ -64,6 +64,7 @@ impl WideTriangles {
         });
     }
 
+    #[inline]
     fn probe(&self, ray: &Ray) -> TriangleProbe {
         TriangleProbe::new(*ray, self.tree.zero)
     }
