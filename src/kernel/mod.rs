@@ -140,6 +140,32 @@ mod tests {
         assert!(Kernel::best().is_available());
     }
 
+    #[test]
+    fn lists_are_extended_as_by_std() {
+        let words: Vec<u32> = (1..=700).collect();
+        for start in [0, 1, 15, 16, 300, 680, 700] {
+            for length in [0, 1, 2, 7, 15, 16, 17, 32, 33, 255, 256, 257, 400] {
+                let places = start..(start + length).min(words.len());
+                for held in [0, 5, 40] {
+                    let std: Vec<u32> = (0..held).chain(words[places.clone()].to_vec()).collect();
+                    let mut out: Vec<u32> = (0..held).collect();
+                    extend(&mut out, &words[places.clone()]);
+                    assert_eq!(out, std, "{places:?}");
+                    out.truncate(held as usize);
+                    extend_by_places(&mut out, &words, places.clone());
+                    assert_eq!(out, std, "{places:?}");
+                }
+            }
+        }
+        assert!((0..40).all(|count| first_lanes(count).count_ones() as usize == count.min(LANES)));
+    }
+
+    #[test]
+    #[should_panic(expected = "out of range")]
+    fn places_that_are_not_there_panic() {
+        extend_by_places(&mut Vec::new(), &[1, 2, 3], 2..4);
+    }
+
     /// Sixteen products and sums, which a fused multiply-add would round once.
     struct MulAdd<'a>(&'a [f32; 16], &'a [f32; 16], &'a [f32; 16]);
 
