@@ -20,10 +20,11 @@ pub trait BoxTest {
     fn rejects(&self, node: &Aabb) -> bool;
     /// Every item within this box belongs to the answer.
     fn accepts(&self, node: &Aabb) -> bool;
-    /// Both.
+    /// Both; of a node that is rejected the second means nothing.
     #[inline(always)]
     fn rejects_accepts(&self, node: &Aabb) -> (bool, bool) {
-        (self.rejects(node), self.accepts(node))
+        let rejects = self.rejects(node);
+        (rejects, !rejects && self.accepts(node))
     }
     /// This item belongs to the answer.
     fn admits(&self, item: &Aabb) -> bool;
