@@ -49,8 +49,8 @@ const FIELDS: &str = "
     with_stencil/clear_count with_stencil/shaded_count with_stencil/covered_count
     without_stencil/asked_count without_stencil/kept_out_count without_stencil/fragment_count
     without_stencil/clear_count without_stencil/shaded_count without_stencil/covered_count
-    mask share tile seed item_count boxed_count volume_share build_ns
-    box_count unclosed_sector_count";
+    mask share tile seed item_count boxed_count box_limit box_count volume_share build_ns
+    unclosed_sector_count";
 
 /// One row for each row of each table; numbers as they are, lists as their lengths.
 pub fn write(report: &FunnelReport, out: impl Write) -> io::Result<()> {

@@ -116,7 +116,8 @@ fn inner_boxes(row: &InnerRow) -> Block {
         format!(", {held:.1} % of the volume of these (loss {lost:.1} %)")
     });
     Block::Line(format!(
-        "Occluders: boxes proven inside {} of {}{}; found in {}.",
+        "Occluders: {} proven inside {} of {}{}; found in {}.",
+        text::counted(row.box_count, "box"),
         row.boxed_count,
         text::counted(row.item_count, "item"),
         held.unwrap_or_default(),

@@ -43,9 +43,8 @@ impl Material<'_> {
     pub fn of<'w>(input: &FunnelInput, world: &'w World) -> Material<'w> {
         let Some(solids) = world.solids.as_ref() else {
             let around = Solids::of(world.scene);
-            let inner = world.hiders.inner();
-            let inner = (0..).zip(inner).filter(|(_, b)| !b.is_empty());
-            let inner = inner.map(|(item, b)| (item, WorldBox::within(b, around.origin)));
+            let inner = world.hiders.inner().iter();
+            let inner = inner.map(|(item, b)| (*item, WorldBox::within(b, around.origin)));
             let surfaces = world
                 .surfaces
                 .as_ref()

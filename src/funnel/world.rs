@@ -60,6 +60,8 @@ pub struct FunnelInput<'a> {
     pub from: SeenFrom,
     /// What the back ends of the occlusion stage in two passes draw.
     pub occluders: OccluderChoice,
+    /// How many boxes are looked for inside each item of a mesh: at least 1.
+    pub inner_boxes: usize,
     /// Where what solid boxes show at the samples is kept from run to run.
     pub truth_cache: Option<&'a TruthCache>,
     /// Instructions of every stage, and threads that look for the truth.
@@ -179,7 +181,12 @@ impl<'a> World<'a> {
                 });
             }
         }
-        let hiders = Hiders::of(input.scene, solids.as_ref(), input.execution.threads)?;
+        let hiders = Hiders::of(
+            input.scene,
+            solids.as_ref(),
+            input.inner_boxes,
+            input.execution.threads,
+        )?;
         let world = World {
             scene: input.scene,
             kernel: input.execution.kernel,
@@ -474,6 +481,7 @@ mod tests {
             claim: None,
             from: SeenFrom::Eye,
             occluders: OccluderChoice::All,
+            inner_boxes: 1,
             truth_cache: None,
             execution: Execution::default(),
         };

@@ -216,14 +216,7 @@ impl Surfaces {
     /// Volume of an item, cubic world units, rounded: positive where a closed
     /// surface is wound outward.
     pub fn volume(&self, item: usize) -> f64 {
-        let Some(zero) = self.of(item).next() else {
-            return 0.0;
-        };
-        let six = self.of(item).map(|corners| {
-            let [a, b, c] = corners.map(|p| p.as_dvec3() - zero[0].as_dvec3());
-            a.dot(b.cross(c))
-        });
-        six.sum::<f64>() / 6.0
+        volume_within(self.of(item))
     }
 
     /// The triangles of an item as a range of indices.
@@ -231,6 +224,19 @@ impl Surfaces {
         let range = &self.of_item[item];
         range.start as usize..range.end as usize
     }
+}
+
+/// Volume within a closed surface, rounded: see [`Surfaces::volume`].
+pub(crate) fn volume_within(triangles: impl Iterator<Item = [Vec3; 3]>) -> f64 {
+    let mut triangles = triangles.peekable();
+    let Some(&[zero, ..]) = triangles.peek() else {
+        return 0.0;
+    };
+    let six = triangles.map(|corners| {
+        let [a, b, c] = corners.map(|p| p.as_dvec3() - zero.as_dvec3());
+        a.dot(b.cross(c))
+    });
+    six.sum::<f64>() / 6.0
 }
 
 #[cfg(test)]

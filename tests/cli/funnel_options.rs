@@ -87,6 +87,29 @@ fn what_is_removed_is_held_against_its_proofs() {
 }
 
 #[test]
+fn more_boxes_inside_meshes_hide_more_and_lose_nothing() {
+    let wood = "funnel --scene mesh:forest:n=20k --frames 8 --samples 96x54 --processes 1";
+    let removed = |limit: u32| {
+        let report = report(&format!("{wood} --format json --inner-boxes {limit}"));
+        let inner = &report["inner_boxes"];
+        assert_eq!(number(inner, "box_limit"), f64::from(limit));
+        let boxed = number(inner, "boxed_count");
+        let boxes = number(inner, "box_count");
+        assert!(boxes >= boxed && boxes <= boxed * f64::from(limit));
+        let hidden = row(&report, "occlusion", "masked-inner");
+        assert_eq!(number(hidden, "false_negative_count"), 0.0);
+        number(hidden, "input_count") - number(hidden, "output_count")
+    };
+    let [one, eight] = [1, 8].map(removed);
+    assert!(one > 0.0 && eight > 1.5 * one, "{one} {eight}");
+    for wrong in ["0", "17", "-1", "many"] {
+        let line = format!("{wood} --inner-boxes {wrong}");
+        let done = cullbench(Path::new("."), &line);
+        assert_refused(&done, "from 1 to 16", wrong);
+    }
+}
+
+#[test]
 fn fewer_occluders_hide_less_and_lose_nothing() {
     let all = report(CITY);
     assert_eq!(all["occluders"], "all");

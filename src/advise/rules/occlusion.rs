@@ -14,7 +14,7 @@ use crate::scene::ItemShape;
 use crate::visibility::hiders::Hiders;
 use crate::visibility::occlusion::{self, Interleaved, MaskedInner, OcclusionBuffer};
 use crate::visibility::region::doom::DoomMap;
-use crate::visibility::{Rays, SampleGrid, Solids};
+use crate::visibility::{Rays, SampleGrid, Solids, inscribed};
 
 pub(super) const RULE: Rule = Rule {
     name: "occlusion",
@@ -62,7 +62,12 @@ impl Occlusion {
         let scene = case.scene();
         let solids = (scene.item_shape() == ItemShape::Box).then(|| Solids::of(scene));
         let views = hidden::sights(case).map_err(not_applicable)?;
-        let hiders = Hiders::of(scene, solids.as_ref(), case.spec.execution.threads)?;
+        let hiders = Hiders::of(
+            scene,
+            solids.as_ref(),
+            inscribed::BOXES,
+            case.spec.execution.threads,
+        )?;
         if hiders.blocks_row().is_some_and(|row| row.box_count == 0) {
             return Err(not_applicable(
                 "no boxes are known in the solid between the map's rooms",

@@ -13,6 +13,7 @@ use super::Solids;
 use super::occlusion::OccluderScene;
 use crate::geometry::Aabb;
 use crate::input::InputError;
+use crate::query::ItemId;
 use crate::scene::Scene;
 
 /// The occluders of a scene.
@@ -25,16 +26,18 @@ pub struct Hiders {
 }
 
 impl Hiders {
-    /// Those of a scene; `solids` are its items if they are solid boxes.
+    /// Those of a scene; `solids` are its items if they are solid boxes, `most` the boxes
+    /// inside each item if they are triangles.
     ///
     /// # Errors
     /// The map's file, read a second time.
     pub fn of(
         scene: &Scene,
         solids: Option<&Solids>,
+        most: usize,
         threads: usize,
     ) -> Result<Hiders, InputError> {
-        let inner = Inner::of(scene, threads);
+        let inner = Inner::of(scene, most, threads);
         let blocks = Blocks::of(scene)?;
         let all = match (solids, &inner) {
             (Some(solids), _) => OccluderScene::of(solids),
@@ -60,8 +63,9 @@ impl Hiders {
         }
     }
 
-    /// The box inside each item of a mesh, scene-local; empty where there is none.
-    pub fn inner(&self) -> &[Aabb] {
+    /// The boxes inside the items of a mesh, each with its item, by ascending item;
+    /// scene-local.
+    pub fn inner(&self) -> &[(ItemId, Aabb)] {
         self.inner.as_ref().map_or(&[], |inner| &inner.boxes)
     }
 

@@ -221,9 +221,10 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
                     near,
                 });
                 let large = near || coverable(&rect, B::COVERAGE) >= least_area;
-                if large && draw(isa, buffer, scene, view, &survivors[survivors.len() - 1]) {
-                    drawn = true;
-                    stats.drawn += 1;
+                if large {
+                    let own = draw(isa, buffer, scene, view, &survivors[survivors.len() - 1]);
+                    drawn |= own > 0;
+                    stats.drawn += own;
                 }
             }
         }
@@ -242,7 +243,8 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
     }
 }
 
-/// Draws the item at a position, if it may be drawn and covers anything.
+/// Draws what hides at an item's position, if it may be drawn: as much of it as covers
+/// anything.
 #[inline(always)]
 fn draw<I: Isa, B: OcclusionBuffer>(
     isa: I,
@@ -250,21 +252,24 @@ fn draw<I: Isa, B: OcclusionBuffer>(
     scene: &OccluderScene,
     view: &View,
     item: &Survivor,
-) -> bool {
+) -> usize {
     let position = item.position as usize;
     if view.entered_before_near(&scene.outer(position)) {
-        return false;
+        return 0;
     }
-    let open = view.open & scene.faces(position);
-    let outline = Outline::of(scene.inner(position), open, view, B::COVERAGE);
-    let Some(mut outline) = outline else {
-        return false;
-    };
-    if !item.near {
-        outline.within(&item.rect);
+    let mut drawn = 0;
+    for hider in scene.hiders(position) {
+        let open = view.open & hider.faces;
+        let Some(mut outline) = Outline::of(&hider.inner, open, view, B::COVERAGE) else {
+            continue;
+        };
+        if !item.near {
+            outline.within(&item.rect);
+        }
+        buffer.draw(isa, &outline);
+        drawn += 1;
     }
-    buffer.draw(isa, &outline);
-    true
+    drawn
 }
 
 /// The lanes in the order of their depths, each with its key's upper bits in front

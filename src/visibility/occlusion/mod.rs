@@ -7,8 +7,8 @@
 //! Semantics are those of [`Solids`](super::Solids): a ray meets a box where it
 //! enters it, between near and far; a box that some ray enters before the near
 //! plane is not drawn; items as near as an occluder are not hidden by it. Of a mesh
-//! what is drawn is a box inside each item ([`OccluderScene::within`]): a ray that enters
-//! it has met the item's surface before, unless that was before the near plane. Of a map
+//! what is drawn are boxes inside the items ([`OccluderScene::within`]): a ray that enters
+//! one has met the item's surface before, unless that was before the near plane. Of a map
 //! they are boxes of its solid, which are no items ([`OccluderScene::among`]).
 
 mod buffer;
@@ -36,7 +36,7 @@ pub use masked::{Masked, MaskedCentre, MaskedInner};
 pub use none::NoOcclusion;
 pub use outline::{Coverage, Outline};
 pub use rect::{Rect, Rects};
-pub use scene::{Faces, OccluderScene};
+pub use scene::{Faces, Hider, OccluderScene};
 pub use stats::CullStats;
 pub use trace::FrameTrace;
 pub use two_pass::{OccluderChoice, TwoPass};

@@ -13,6 +13,15 @@ use crate::visibility::Solids;
 /// upper one.
 pub type Faces = u8;
 
+/// A box that hides what is behind it.
+#[derive(Clone, Copy, Debug)]
+pub struct Hider {
+    /// Scene-local, within what it stands for.
+    pub inner: Aabb,
+    /// The faces of the scene's bounds that it reaches, as written, exactly.
+    pub faces: Faces,
+}
+
 /// A scene's items in a tree of which every node has sixteen children but the
 /// last ones: the children of box `j` of a level are block `j` of the level below.
 #[derive(Clone, Debug)]
@@ -20,10 +29,12 @@ pub struct OccluderScene {
     origin: DVec3,
     /// Level 0 holds the items' outer boxes; the last level is one block.
     levels: Vec<Vec<BoxBlock>>,
-    /// In tree order, as all that follows.
+    /// In tree order, as what hides.
     ids: Vec<ItemId>,
-    inner: Vec<Aabb>,
-    faces: Vec<Faces>,
+    /// What hides, and which faces of the scene's bounds it reaches.
+    hiders: Vec<Hider>,
+    /// Where those of a position begin; at the end their number.
+    first_hiders: Vec<u32>,
     /// Where in the tree an item is.
     positions: Vec<u32>,
     /// How many of the boxes are items; those behind them only hide.
@@ -35,21 +46,27 @@ impl OccluderScene {
     /// Solid boxes, which hide what is behind them. O(n log n).
     pub fn of(solids: &Solids) -> OccluderScene {
         let bounds = WorldBox::union_of(solids.boxes.iter().copied());
-        let boxes = solids.boxes.iter();
-        let faces = boxes.map(|b| faces_reached(b, &bounds)).collect();
-        OccluderScene::sorted(solids.origin, &solids.outer, &solids.inner, faces, bounds)
+        let hider = |(inner, b): (&Aabb, &WorldBox)| Hider {
+            inner: *inner,
+            faces: faces_reached(b, &bounds),
+        };
+        let hiders = (0..).zip(solids.inner.iter().zip(&solids.boxes).map(hider));
+        let hiders: Vec<_> = hiders.filter(|(_, own)| !own.inner.is_empty()).collect();
+        OccluderScene::sorted(solids.origin, &solids.outer, &hiders, bounds)
     }
 
-    /// Items of a mesh, each of which hides what is behind a box inside it: by item,
-    /// scene-local, empty where there is none. O(n log n).
-    pub fn within(scene: &Scene, inner: &[Aabb]) -> OccluderScene {
+    /// Items of a mesh, which hide what is behind boxes inside them: each with its item,
+    /// by ascending item, scene-local. O(n log n).
+    pub fn within(scene: &Scene, inner: &[(ItemId, Aabb)]) -> OccluderScene {
         let bounds = WorldBox::union_of(scene.written());
-        // Rounded inward: what hides reaches a face only if this does.
-        let faces = inner
-            .iter()
-            .map(|b| faces_reached(&WorldBox::within(b, scene.origin), &bounds));
-        let faces = faces.collect();
-        OccluderScene::sorted(scene.origin, &scene.items, inner, faces, bounds)
+        let hider = |&(item, inner): &(ItemId, Aabb)| {
+            // Rounded inward: what hides reaches a face only if this does.
+            let b = WorldBox::within(&inner, scene.origin);
+            let faces = faces_reached(&b, &bounds);
+            (item, Hider { inner, faces })
+        };
+        let hiders: Vec<_> = inner.iter().map(hider).collect();
+        OccluderScene::sorted(scene.origin, &scene.items, &hiders, bounds)
     }
 
     /// Items that hide nothing themselves among boxes that do and are no items: the rock
@@ -60,23 +77,24 @@ impl OccluderScene {
         let about = |corner: DVec3| (corner - scene.origin).as_vec3();
         let local = blocks.iter().map(|b| Aabb::new(about(b.min), about(b.max)));
         let local: Vec<Aabb> = local.collect();
-        let nothing = scene.items.iter().map(|_| Aabb::EMPTY);
-        let inner: Vec<Aabb> = nothing.chain(local.iter().copied()).collect();
+        let hider = |(inner, b): (&Aabb, &WorldBox)| Hider {
+            inner: *inner,
+            faces: faces_reached(b, &bounds),
+        };
+        let hiders = local.iter().zip(blocks).map(hider);
+        let hiders: Vec<_> = (scene.items.len() as ItemId..).zip(hiders).collect();
         let outer = [&scene.items[..], &local].concat();
-        let none = scene.items.iter().map(|_| 0);
-        let faces = none.chain(blocks.iter().map(|b| faces_reached(b, &bounds)));
-        let faces = faces.collect();
-        let mut among = OccluderScene::sorted(scene.origin, &outer, &inner, faces, bounds);
+        let mut among = OccluderScene::sorted(scene.origin, &outer, &hiders, bounds);
         among.items = scene.items.len();
         among
     }
 
-    /// All by item.
+    /// Boxes by number, and what hides with the number of what it stands for, by
+    /// ascending number.
     fn sorted(
         origin: DVec3,
         outer: &[Aabb],
-        inner: &[Aabb],
-        faces: Vec<Faces>,
+        by_number: &[(ItemId, Hider)],
         bounds: WorldBox,
     ) -> OccluderScene {
         let mut ids: Vec<ItemId> = (0..outer.len() as ItemId).collect();
@@ -86,22 +104,30 @@ impl OccluderScene {
         }
         let centres: Vec<_> = outer.iter().map(Aabb::centre).collect();
         sort_into(&mut ids, capacity, &|id, axis| centres[id as usize][axis]);
-        let in_order =
-            |boxes: &[Aabb]| -> Vec<Aabb> { ids.iter().map(|&id| boxes[id as usize]).collect() };
-        let mut levels = vec![blocks_of(&in_order(outer))];
+        let in_order: Vec<Aabb> = ids.iter().map(|&id| outer[id as usize]).collect();
+        let mut levels = vec![blocks_of(&in_order)];
         while let Some(last) = levels.last().filter(|last| last.len() > 1) {
             let unions: Vec<Aabb> = last.iter().map(BoxBlock::union).collect();
             levels.push(blocks_of(&unions));
         }
         let mut positions = vec![0; ids.len()];
+        let mut hiders = Vec::with_capacity(by_number.len());
+        let mut first_hiders = vec![0];
         for (position, &id) in ids.iter().enumerate() {
             positions[id as usize] = position as u32;
+            let first = by_number.partition_point(|(number, _)| *number < id);
+            let own = by_number[first..].iter();
+            hiders.extend(
+                own.take_while(|(number, _)| *number == id)
+                    .map(|(_, hider)| *hider),
+            );
+            first_hiders.push(hiders.len() as u32);
         }
         OccluderScene {
             origin,
             levels,
-            inner: in_order(inner),
-            faces: ids.iter().map(|&id| faces[id as usize]).collect(),
+            hiders,
+            first_hiders,
             positions,
             items: ids.len(),
             ids,
@@ -174,24 +200,24 @@ impl OccluderScene {
         self.levels[0][position / LANES].get(position % LANES)
     }
 
-    /// The inner box at a position: what may hide; empty where there is none.
+    /// What hides at a position; nothing where the item is not solid.
     #[inline(always)]
-    pub fn inner(&self, position: usize) -> &Aabb {
-        &self.inner[position]
+    pub fn hiders(&self, position: usize) -> &[Hider] {
+        let [first, end] = [position, position + 1].map(|at| self.first_hiders[at] as usize);
+        &self.hiders[first..end]
     }
 
-    /// The faces of the scene's bounds that what hides at a position reaches, as
-    /// written, exactly.
-    #[inline(always)]
-    pub fn faces(&self, position: usize) -> Faces {
-        self.faces[position]
+    /// All that hides, in tree order.
+    pub fn all_hiders(&self) -> &[Hider] {
+        &self.hiders
     }
 
     /// Heap bytes.
     pub fn bytes(&self) -> usize {
         let blocks: usize = self.levels.iter().map(|l| size_of_val(&l[..])).sum();
-        let items = size_of::<ItemId>() + size_of::<Aabb>() + size_of::<Faces>() + 4;
-        blocks + self.ids.len() * items
+        let items = size_of_val(&self.ids[..]) + size_of_val(&self.positions[..]);
+        let hiders = size_of_val(&self.hiders[..]) + size_of_val(&self.first_hiders[..]);
+        blocks + items + hiders
     }
 }
 

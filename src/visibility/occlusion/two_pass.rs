@@ -144,8 +144,12 @@ impl<B: OcclusionBuffer> Work for Culled<'_, B> {
         for &index in &state.order {
             let candidate = &state.candidates[index as usize];
             let position = candidate.position as usize;
-            let open = view.open & scene.faces(position);
-            if let Some(mut outline) = Outline::of(scene.inner(position), open, view, B::COVERAGE) {
+            for hider in scene.hiders(position) {
+                let open = view.open & hider.faces;
+                let outline = Outline::of(&hider.inner, open, view, B::COVERAGE);
+                let Some(mut outline) = outline else {
+                    continue;
+                };
                 if !candidate.near {
                     outline.within(&candidate.rect);
                 }

@@ -197,6 +197,20 @@ pub struct CameraOf {
     pub index: usize,
 }
 
+impl Cell {
+    /// Every number of a box in it.
+    fn each_number(&mut self, of: &mut dyn FnMut(&mut ItemId)) {
+        match self {
+            Cell::Empty => {}
+            Cell::Behind(front) => of(front),
+            Cell::Parted { edge, cells, .. } => {
+                edge.items.iter_mut().for_each(&mut *of);
+                cells.iter_mut().for_each(|cell| cell.each_number(of));
+            }
+        }
+    }
+}
+
 impl Proof {
     /// That this ray sees the item.
     pub(super) fn witness(ray: &Ray) -> Proof {
@@ -225,6 +239,46 @@ impl Certificates {
             items: proofs.len(),
             proofs,
         }
+    }
+
+    /// Boxes within items that no proof names are left out, the others numbered anew.
+    pub(super) fn without_unused(mut self) -> Certificates {
+        let Hiders::Within(within) = &self.hiders else {
+            return self;
+        };
+        let items = self.boxes;
+        let place = |number: ItemId| (number as usize).checked_sub(items);
+        let cells = self.proofs.iter_mut().filter_map(|(_, proof)| match proof {
+            Proof::Cover { cell, .. } => Some(cell),
+            _ => None,
+        });
+        let mut cells: Vec<&mut Cell> = cells.collect();
+        let mut is_named = vec![false; within.len()];
+        for cell in &mut cells {
+            cell.each_number(&mut |number| {
+                if let Some(place) = place(*number) {
+                    is_named[place] = true;
+                }
+            });
+        }
+        let mut left = Vec::new();
+        let anew = within.iter().zip(&is_named).map(|(b, is_named)| {
+            let number = (items + left.len()) as ItemId;
+            if *is_named {
+                left.push(*b);
+            }
+            number
+        });
+        let anew: Vec<ItemId> = anew.collect();
+        for cell in &mut cells {
+            cell.each_number(&mut |number| {
+                if let Some(place) = place(*number) {
+                    *number = anew[place];
+                }
+            });
+        }
+        self.hiders = Hiders::Within(left);
+        self
     }
 
     /// Of a camera, of which the view is to be.

@@ -89,10 +89,11 @@ pub fn certify(
     let boxes = prover.items();
     let view = prover.view().clone();
     let certificates = Certificates::new(scene, boxes, view, proofs.concat());
-    Certificates {
+    let certificates = Certificates {
         hiders: prover.hiders().clone(),
         ..certificates
-    }
+    };
+    certificates.without_unused()
 }
 
 fn sample(rays: &Rays, truth: &SampleTruth, place: usize) -> Ray {

@@ -44,7 +44,7 @@ fn boxes_inside_meshes_hide_nothing_that_is_visible() {
     ] {
         let name = scene.name.clone();
         let mesh = scene.surfaces.clone().unwrap();
-        let inner = InnerBoxes::of(&mesh, 12, 1).boxes;
+        let inner = InnerBoxes::of(&mesh, 12, 4, 1).boxes;
         let ready = Ready {
             solids: Solids::of(&scene),
             occluders: OccluderScene::within(&scene, &inner),
@@ -75,15 +75,20 @@ fn only_what_hides_goes_on_beyond_the_bounds_of_the_scene() {
         |x: f64, z: f64| WorldBox::new(DVec3::new(x, 0.0, z), DVec3::new(x + 1.0, 1.0, z + 1.0));
     let scene =
         Scene::from_boxes("three", &[unit(0.0, 0.0), unit(2.0, 0.0), unit(4.0, 1.0)]).unwrap();
-    let mut inner = scene.items.clone();
-    let faces = |occluders: &OccluderScene, item| occluders.faces(occluders.position(item));
+    let mut inner: Vec<_> = (0..).zip(scene.items.iter().copied()).collect();
+    let faces = |occluders: &OccluderScene, item| {
+        let [hider] = occluders.hiders(occluders.position(item)) else {
+            panic!("one each");
+        };
+        hider.faces
+    };
     let whole = OccluderScene::within(&scene, &inner);
     let solid = OccluderScene::of(&Solids::of(&scene));
     for item in 0..3 {
         assert_eq!(faces(&whole, item), faces(&solid, item));
     }
     // The lower z of the first one is the floor no more.
-    inner[0].min.z += 0.25;
+    inner[0].1.min.z += 0.25;
     let less = OccluderScene::within(&scene, &inner);
     assert_eq!(faces(&less, 0), faces(&solid, 0) & !(1 << 2));
     assert_eq!(faces(&less, 1), faces(&solid, 1));

@@ -67,9 +67,9 @@ impl<'f> Named<'f> {
         match (hiders, facts.surfaces) {
             (Hiders::Items, None) if !has_holes => {}
             (Hiders::Uncut(_), None) if has_holes => {}
-            // One an item: however many a file names, each triangle is looked at once.
-            (Hiders::Within(boxes), _) if !boxes.is_sorted_by(|a, b| a.0 < b.0) => {
-                return Err("boxes within items are not in the order of these, one each");
+            // A few an item: however many a file names, no triangle is looked at more often.
+            (Hiders::Within(boxes), _) if !is_in_order(boxes) => {
+                return Err("boxes within items are not in the order of these, 16 each at most");
             }
             (Hiders::Within(boxes), Some(surfaces)) => {
                 named.is_within = true;
@@ -103,6 +103,13 @@ impl<'f> Named<'f> {
             _ => Ok(found),
         }
     }
+}
+
+/// Whether boxes are by ascending item, and few of each.
+fn is_in_order(boxes: &[(ItemId, Corners)]) -> bool {
+    const MOST: usize = 16;
+    let too_many = |run: &[(ItemId, Corners)]| run[0].0 == run[MOST].0;
+    boxes.is_sorted_by_key(|b| b.0) && !boxes.windows(MOST + 1).any(too_many)
 }
 
 /// A box inside a closed surface that begins beyond where boxes hide from. Whatever ray

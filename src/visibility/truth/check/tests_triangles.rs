@@ -49,14 +49,19 @@ fn written() -> Vec<WorldBox> {
 /// Proofs of the three, with a box within the first that is a little smaller.
 fn certified(surfaces: &Surfaces) -> Certificates {
     let inner = WorldBox::new(DVec3::new(2.25, -0.7, -1.75), DVec3::new(2.75, 0.7, 1.75));
+    // A box of no use, as the first of the two.
+    let aside = WorldBox::new(DVec3::new(2.5, 0.0, 1.5), DVec3::new(2.6, 0.1, 1.6));
     let mut solids = judge::solids(&written());
+    solids.push(&aside);
     solids.push(&inner);
     let rays = rays(1.0);
     let index = SurfaceIndex::build(surfaces);
     let truth = SampleTruth::of_surfaces(&index, &rays, SampleGrid::new(32, 32), 1);
     let corners = [inner.min.to_array(), inner.max.to_array()];
-    let hide = Hiders::Within(vec![(WALL as ItemId, corners)]);
-    let hiders = RayIndex::build_of(&solids, &[3]);
+    let of_no_use = [aside.min.to_array(), aside.max.to_array()];
+    let hide = [of_no_use, corners].map(|corners| (WALL as ItemId, corners));
+    let hide = Hiders::Within(hide.to_vec());
+    let hiders = RayIndex::build_of(&solids, &[3, 4]);
     let prover = Prover::hidden_by(hide, &solids, &hiders, &rays);
     let items = [0, 1, 2];
     certify(
@@ -95,6 +100,8 @@ fn what_is_behind_a_box_within_triangles_is_proven_hidden() {
     let text = serde_json::to_string(&certificates).unwrap();
     let read: Certificates = serde_json::from_str(&text).unwrap();
     assert_eq!(read, certificates);
+    // Only what a proof names is in the file.
+    assert!(matches!(&read.hiders, Hiders::Within(boxes) if boxes.len() == 1));
     let counts = verify(&read, &all).unwrap();
     assert_eq!((counts.visible, counts.hidden, counts.undecided), (2, 1, 0));
     assert!(matches!(read.proofs[HIDDEN].1, Proof::Cover { .. }));
@@ -134,14 +141,23 @@ fn a_box_that_is_not_within_its_item_is_rejected() {
     assert_eq!(moved(1, 0, f64::NAN), none);
     assert_eq!(moved(1, 0, 2.25), none);
     assert_eq!(with(&|c| within(c).0 = 9), none);
-    let twice = |c: &mut Certificates| match &mut c.hiders {
-        Hiders::Within(boxes) => boxes.push(boxes[0]),
+    // A second box is as good as the first; what is of an earlier item, or more than
+    // anybody needs, is not looked at.
+    let again = |c: &mut Certificates, item: ItemId, times: usize| match &mut c.hiders {
+        Hiders::Within(boxes) => {
+            let corners = boxes[0].1;
+            boxes.extend(std::iter::repeat_n((item, corners), times));
+        }
         other => panic!("{other:?}"),
     };
-    assert_eq!(
-        with(&twice),
-        Err("boxes within items are not in the order of these, one each")
-    );
+    assert!(with(&|c| again(c, WALL as ItemId, 15)).is_ok());
+    let disorder = Err("boxes within items are not in the order of these, 16 each at most");
+    assert_eq!(with(&|c| again(c, WALL as ItemId, 16)), disorder);
+    let backward = |c: &mut Certificates| {
+        within(c).0 = BESIDE as ItemId;
+        again(c, WALL as ItemId, 1);
+    };
+    assert_eq!(with(&backward), disorder);
     let boxes_hide = |c: &mut Certificates| c.hiders = Hiders::Items;
     let other = Err("what it says that hides is not what the items are");
     assert_eq!(with(&boxes_hide), other);
@@ -302,7 +318,7 @@ fn what_has_holes_neither_hides_nor_shows_by_its_box() {
 fn proofs_hold_in_a_wood() {
     let surfaces = (Mesh::named("mesh:forest").unwrap().build)(20_000, 3);
     let scene = surfaces.clone().into_scene("wood").unwrap();
-    let inner = crate::visibility::inscribed::InnerBoxes::of(&surfaces, 16, 1);
+    let inner = crate::visibility::inscribed::InnerBoxes::of(&surfaces, 16, 4, 1);
     let boxes: Vec<WorldBox> = scene.written().collect();
     let mut solids = Solids::of(&scene);
     let mut within = Vec::new();
@@ -311,13 +327,13 @@ fn proofs_hold_in_a_wood() {
     let frame = look_at(eye, (centre.min + centre.max) / 2.0, DVec3::Z).unwrap();
     let lens = Lens::perspective(60.0, 1.5, 0.01, None).unwrap();
     let rays = Rays::of(&Camera { frame, lens }).unwrap();
-    for (item, b) in (0..).zip(&inner.boxes).filter(|(_, b)| !b.is_empty()) {
-        let own = boxes[item as usize];
+    for (item, b) in &inner.boxes {
+        let own = boxes[*item as usize];
         let nearest = DVec3::select(frame.forward().cmpgt(DVec3::ZERO), own.min, own.max);
         if (nearest - eye).dot(frame.forward()) > 0.02 {
             let b = WorldBox::within(b, scene.origin);
             solids.push(&b);
-            within.push((item, [b.min.to_array(), b.max.to_array()]));
+            within.push((*item, [b.min.to_array(), b.max.to_array()]));
         }
     }
     assert!(within.len() > 20, "{}", within.len());

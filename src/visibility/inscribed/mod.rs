@@ -1,0 +1,315 @@
+//! Boxes within closed meshes: what a mesh hides at the least. A search on a grid
+//! of cells proposes boxes (`grid`); exact tests prove that no triangle enters them and
+//! that they are inside (`proof`).
+//!
+//! (Inscribed boxes as occluders: Silvennoinen, Saransaari, Laine and Lehtinen 2014,
+//! "Occluder simplification using planar sections", name the voxel approach.)
+
+mod grid;
+mod proof;
+
+use std::collections::BTreeMap;
+
+use glam::Vec3;
+
+use self::grid::Grid;
+use self::proof::is_in;
+use crate::geometry::Aabb;
+use crate::query::ItemId;
+use crate::scene::{SurfaceKind, Surfaces, volume_within};
+use crate::threads;
+
+/// Boxes proven to be inside an item.
+#[derive(Clone, PartialEq, Debug)]
+#[non_exhaustive]
+pub struct Inscribed {
+    /// Scene-local, those that add most first; they overlap. The open inside of none
+    /// holds a point of the piece of the surface that it is inside of.
+    pub boxes: Vec<Aabb>,
+    /// Volume of the boxes over that of the mesh, 1 less the loss; where pieces
+    /// overlap, both count.
+    pub share: f64,
+}
+
+/// Cells of the grid along each axis, by default.
+pub const CELLS: usize = 24;
+
+/// Boxes of an item at most: each costs time in every view.
+pub const MOST_BOXES: usize = 16;
+
+/// Boxes of an item by default.
+pub const BOXES: usize = 8;
+
+/// Of the item's volume that a box must add.
+const LEAST_GAIN: f64 = 1.0 / 64.0;
+
+/// How often a box shrinks when its proof fails.
+const TRIES: usize = 4;
+
+/// Large axis-parallel boxes inside an item: of whole cells, by a grid of `cells`
+/// (4 to 64) along each axis of each of its pieces; of all these the `most` (up to
+/// [`MOST_BOXES`]) that add most. `None` for an item that is not opaque, one-sided and
+/// closed, or where no box was found. O(t + cells⁴), both for each box.
+pub fn inscribed_boxes(
+    surfaces: &Surfaces,
+    item: usize,
+    cells: usize,
+    most: usize,
+) -> Option<Inscribed> {
+    let is_solid = surfaces.kinds[item] == SurfaceKind::Opaque && !surfaces.two_sided[item];
+    if !is_solid || surfaces.of_item[item].is_empty() || surfaces.open_edges(item) != 0 {
+        return None;
+    }
+    let most = most.min(MOST_BOXES);
+    let whole = surfaces.volume(item);
+    let least = whole * LEAST_GAIN;
+    // A box adds no more than its piece has.
+    let large = |part: &&Vec<[Vec3; 3]>| volume_within(part.iter().copied()) >= least;
+    let mut found: Vec<(f64, Aabb)> = parts(surfaces, item)
+        .iter()
+        .filter(large)
+        .flat_map(|part| boxes_in(part, cells.clamp(4, 64), most, least))
+        .collect();
+    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    found.truncate(most);
+    let share = found.iter().map(|(gain, _)| gain).sum::<f64>() / whole;
+    let boxes: Vec<Aabb> = found.into_iter().map(|(_, b)| b).collect();
+    (!boxes.is_empty()).then_some(Inscribed { boxes, share })
+}
+
+/// Boxes in a closed surface in one piece, up to `most`, each with the volume that it
+/// adds: at least so much.
+fn boxes_in(part: &[[Vec3; 3]], cells: usize, most: usize, least: f64) -> Vec<(f64, Aabb)> {
+    let mut found: Vec<(f64, Aabb)> = Vec::new();
+    for tried in Grid::of(part, cells).take(most) {
+        let Some(proven) = proven(part, tried) else {
+            continue;
+        };
+        let mut rest = vec![proven];
+        for (_, other) in &found {
+            rest = rest.iter().flat_map(|b| without(b, other)).collect();
+        }
+        let gain = rest.iter().map(volume).sum();
+        if gain < least {
+            break;
+        }
+        found.push((gain, proven));
+    }
+    found
+}
+
+/// A box, or a smaller one about its middle, that is inside.
+fn proven(part: &[[Vec3; 3]], mut tried: Aabb) -> Option<Aabb> {
+    for _ in 0..TRIES {
+        if !tried.is_empty() && is_in(part, &tried) {
+            return Some(tried);
+        }
+        let less = tried.extent() / 8.0;
+        tried = Aabb::new(tried.min + less, tried.max - less);
+    }
+    None
+}
+
+/// What of a box is outside another: up to six boxes.
+fn without(b: &Aabb, other: &Aabb) -> Vec<Aabb> {
+    if !b.intersects(other) {
+        return vec![*b];
+    }
+    let (mut left, mut parts) = (*b, Vec::new());
+    for axis in 0..3 {
+        if left.min[axis] < other.min[axis] {
+            let mut part = left;
+            part.max[axis] = other.min[axis];
+            left.min[axis] = other.min[axis];
+            parts.push(part);
+        }
+        if left.max[axis] > other.max[axis] {
+            let mut part = left;
+            part.min[axis] = other.max[axis];
+            left.max[axis] = other.max[axis];
+            parts.push(part);
+        }
+    }
+    parts
+}
+
+fn volume(b: &Aabb) -> f64 {
+    let size = b.max.as_dvec3() - b.min.as_dvec3();
+    size.x * size.y * size.z
+}
+
+/// The triangles of an item, apart where they have no point in common: pieces of a
+/// closed surface are closed, and may overlap.
+fn parts(surfaces: &Surfaces, item: usize) -> Vec<Vec<[Vec3; 3]>> {
+    let triangles = &surfaces.triangles[surfaces.range(item)];
+    let points = triangles.iter().flatten().copied();
+    let (low, high) = points.fold((u32::MAX, 0), |(low, high), p| (low.min(p), high.max(p)));
+    // Union and find by halving paths; the lowest point stands for its piece.
+    let mut parent: Vec<u32> = (0..=high - low).collect();
+    fn root(parent: &mut [u32], mut at: u32) -> u32 {
+        while parent[at as usize] != at {
+            parent[at as usize] = parent[parent[at as usize] as usize];
+            at = parent[at as usize];
+        }
+        at
+    }
+    for [a, b, c] in triangles {
+        for other in [b, c] {
+            let [a, b] = [a, other].map(|p| root(&mut parent, p - low));
+            parent[a.max(b) as usize] = a.min(b);
+        }
+    }
+    let mut parts: BTreeMap<u32, Vec<[Vec3; 3]>> = BTreeMap::new();
+    for corners in triangles {
+        let piece = root(&mut parent, corners[0] - low);
+        let corners = corners.map(|p| surfaces.points[p as usize]);
+        parts.entry(piece).or_default().push(corners);
+    }
+    parts.into_values().collect()
+}
+
+/// The boxes inside all items of a mesh.
+#[derive(Clone, PartialEq, Debug)]
+#[non_exhaustive]
+pub struct InnerBoxes {
+    /// Each with its item, by ascending item; scene-local.
+    pub boxes: Vec<(ItemId, Aabb)>,
+    /// How many items have one.
+    pub items: usize,
+    /// Volume of the boxes over that of the items that have one, in which pieces that
+    /// overlap count twice; `None` if no item has one.
+    pub share: Option<f64>,
+}
+
+impl InnerBoxes {
+    /// Boxes for each item, as [`inscribed_boxes`] finds them: up to `most` on a grid of
+    /// so many cells. The same on any number of threads.
+    pub fn of(surfaces: &Surfaces, cells: usize, most: usize, threads: usize) -> InnerBoxes {
+        const CHUNK: usize = 16;
+        let mut found = vec![None; surfaces.items()];
+        let chunks = found.chunks_mut(CHUNK).enumerate();
+        threads::share(threads, chunks, |(chunk, found)| {
+            for (place, found) in found.iter_mut().enumerate() {
+                *found = inscribed_boxes(surfaces, chunk * CHUNK + place, cells, most);
+            }
+        });
+        let mut all = InnerBoxes {
+            boxes: Vec::new(),
+            items: 0,
+            share: None,
+        };
+        let [mut inner, mut whole] = [0.0, 0.0];
+        for (item, found) in (0..).zip(&found) {
+            let Some(found) = found else { continue };
+            let own = surfaces.volume(item as usize);
+            inner += found.share * own;
+            whole += own;
+            all.items += 1;
+            all.boxes.extend(found.boxes.iter().map(|b| (item, *b)));
+        }
+        all.share = (all.items > 0).then(|| inner / whole);
+        all
+    }
+}
+
+/// Whether the open box is in the inside of one piece of a closed item: exactly.
+pub fn is_inside(surfaces: &Surfaces, item: usize, inner: &Aabb) -> bool {
+    parts(surfaces, item).iter().any(|part| is_in(part, inner))
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::scene::{Mesh, SeededRng, load};
+
+    fn mesh(name: &str, triangles: usize) -> Surfaces {
+        (Mesh::named(&format!("mesh:{name}")).unwrap().build)(triangles, 3)
+    }
+
+    #[test]
+    fn boxes_are_found_and_are_inside() {
+        let statue = mesh("statue", 5000);
+        let found = inscribed_boxes(&statue, 0, CELLS, MOST_BOXES).unwrap();
+        assert!(found.share > 0.45 && found.share < 1.0, "{found:?}");
+        // Independently: from random points of the boxes the surface is all around.
+        let mut rng = SeededRng::new(1);
+        for place in 0..100 {
+            let b = &found.boxes[place % found.boxes.len()];
+            let p = b.min.as_dvec3() + rng.point() * b.extent().as_dvec3();
+            let angle: f64 = statue
+                .of(0)
+                .map(|corners| solid_angle(corners.map(|c| c.as_dvec3() - p)))
+                .sum();
+            assert!((angle / (2.0 * std::f64::consts::TAU) - 1.0).abs() < 1e-6);
+        }
+        // And by points of the statue's own box, what all of them hold together.
+        let bounds = statue.bounds(0);
+        let size = bounds.max.as_dvec3() - bounds.min.as_dvec3();
+        let held = (0..100_000).filter(|_| {
+            let p = bounds.min.as_dvec3() + rng.point() * size;
+            let holds =
+                |b: &Aabb| p.cmpge(b.min.as_dvec3()).all() && p.cmple(b.max.as_dvec3()).all();
+            found.boxes.iter().any(holds)
+        });
+        let share = held.count() as f64 / 1e5 * size.x * size.y * size.z / statue.volume(0);
+        assert!(
+            (share / found.share - 1.0).abs() < 0.02,
+            "{share} {}",
+            found.share
+        );
+        let spheres = mesh("spheres", 5 * 1280);
+        for item in 0..spheres.items() {
+            // The cube in a ball has 2 / (sqrt(3) pi) = 37 % of it.
+            let found = inscribed_boxes(&spheres, item, CELLS, MOST_BOXES).unwrap();
+            let whole = spheres.volume(item);
+            let first = volume(&found.boxes[0]) / whole;
+            assert!(first > 0.25 && first < 0.37, "{first}");
+            assert!(found.share > 0.6 && found.share < 1.0, "{found:?}");
+        }
+    }
+
+    /// Seen from the zero (van Oosterom and Strackee 1983).
+    fn solid_angle([a, b, c]: [DVec3; 3]) -> f64 {
+        let lengths = [a, b, c].map(DVec3::length);
+        let [x, y, z] = lengths;
+        let below = x * y * z + a.dot(b) * z + b.dot(c) * x + c.dot(a) * y;
+        2.0 * libm::atan2(a.dot(b.cross(c)), below)
+    }
+
+    #[test]
+    fn a_box_a_step_too_large_has_no_proof() {
+        let scene = load("city:n=20", &Default::default()).unwrap();
+        let surfaces = Surfaces::from_boxes(&scene);
+        for (item, b) in scene.items.iter().enumerate() {
+            assert!(is_inside(&surfaces, item, b), "the open box itself");
+            let mut larger = *b;
+            larger.max[item % 3] = larger.max[item % 3].next_up();
+            assert!(!is_inside(&surfaces, item, &larger));
+            let away = b.max + 1.0;
+            assert!(!is_inside(&surfaces, item, &Aabb::new(away, away + 1.0)));
+            let share = inscribed_boxes(&surfaces, item, 8, 1).unwrap().share;
+            assert!(share > 0.3, "{share}");
+        }
+    }
+
+    #[test]
+    fn only_closed_opaque_items_have_one() {
+        let forest = mesh("forest", 20_000);
+        let found = InnerBoxes::of(&forest, 12, BOXES, 1);
+        assert_eq!(found, InnerBoxes::of(&forest, 12, BOXES, 3));
+        let mut trees: Vec<ItemId> = found.boxes.iter().map(|(item, _)| *item).collect();
+        trees.dedup();
+        let is_tree = |item: &ItemId| forest.of_item[*item as usize].len() == 118;
+        assert!(trees.is_sorted() && trees.iter().all(is_tree));
+        assert!(trees.len() > 20 && trees.len() == found.items);
+        for (item, inner) in &found.boxes {
+            assert!(is_inside(&forest, *item as usize, inner));
+        }
+        let share = found.share.unwrap();
+        assert!(share > 0.2 && share < 1.0, "{share}");
+        let ground = InnerBoxes::of(&mesh("terrain", 2000), CELLS, BOXES, 1);
+        assert_eq!((ground.items, ground.share), (0, None));
+    }
+}
