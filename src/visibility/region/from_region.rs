@@ -29,13 +29,14 @@ impl RegionRow for FromRegion {
             return EyePlace::Outside;
         }
         if let [home] = scratch.homes[..] {
-            self.from_region(home, out);
+            let seen = self.from_region(home, &mut scratch.queue);
+            out.extend_from_slice(seen);
             return EyePlace::Inside;
         }
         scratch.seen.clear(graph.len());
         for &home in &scratch.homes {
-            self.from_region(home, out);
-            out.iter().for_each(|&region| {
+            let seen = self.0.from_region(home, &mut scratch.queue);
+            seen.iter().for_each(|&region| {
                 scratch.seen.insert(region);
             });
         }
@@ -43,17 +44,21 @@ impl RegionRow for FromRegion {
         EyePlace::Inside
     }
 
-    fn from_region(&self, region: RegionId, out: &mut Vec<RegionId>) {
-        self.0.from_region(region, out);
+    fn from_region<'a>(
+        &'a self,
+        region: RegionId,
+        memory: &'a mut Vec<RegionId>,
+    ) -> &'a [RegionId] {
+        self.0.from_region(region, memory)
     }
 }
 
 /// What a back end says is seen from each region, as a set of pairs that can be audited.
 pub fn pairs_of(row: &dyn RegionRow) -> Pvs {
     let regions = row.graph().len();
-    let (mut pvs, mut seen) = (Pvs::alone(regions), Vec::new());
+    let (mut pvs, mut memory) = (Pvs::alone(regions), Vec::new());
     for from in 0..regions as RegionId {
-        row.from_region(from, &mut seen);
+        let seen = row.from_region(from, &mut memory);
         seen.iter().for_each(|&to| pvs.insert(from, to));
     }
     pvs

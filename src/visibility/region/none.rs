@@ -37,8 +37,9 @@ impl RegionRow for EveryRegion {
         }
     }
 
-    fn from_region(&self, _: RegionId, out: &mut Vec<RegionId>) {
-        out.clear();
-        out.extend(0..self.0.len() as u32);
+    fn from_region<'a>(&'a self, _: RegionId, memory: &'a mut Vec<RegionId>) -> &'a [RegionId] {
+        memory.clear();
+        memory.extend(0..self.0.len() as u32);
+        memory
     }
 }

@@ -92,8 +92,7 @@ impl RegionRow for StoredPvs {
         EyePlace::Inside
     }
 
-    fn from_region(&self, region: RegionId, out: &mut Vec<RegionId>) {
-        out.clear();
-        extend_by_places(out, &self.lists.all, self.lists.places(region));
+    fn from_region<'a>(&'a self, region: RegionId, _: &'a mut Vec<RegionId>) -> &'a [RegionId] {
+        self.lists.list(region)
     }
 }
