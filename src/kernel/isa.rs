@@ -43,6 +43,8 @@ pub trait Isa: Copy {
     fn load(self, row: &[f32; LANES]) -> Self::Floats;
     /// The numbers of all lanes, lane 0 first.
     fn to_array(self, floats: Self::Floats) -> [f32; LANES];
+    /// The whole parts of numbers from 0 up to 2^31, lane 0 first.
+    fn whole(self, floats: Self::Floats) -> [i32; LANES];
     /// The same number in every lane.
     fn splat(self, x: f32) -> Self::Floats;
     /// Of four numbers, for each lane the one that its two bits of `picks` say,
@@ -55,6 +57,9 @@ pub trait Isa: Copy {
     /// `a` where `a < b`, else `b`: of a NaN and a number in this order, the
     /// number.
     fn min(self, a: Self::Floats, b: Self::Floats) -> Self::Floats;
+    /// `a` where `a > b`, else `b`: of a NaN and a number in this order, the
+    /// number.
+    fn max(self, a: Self::Floats, b: Self::Floats) -> Self::Floats;
     /// The lanes where `a < 0`.
     fn below_zero(self, a: Self::Floats) -> LaneMask;
     /// All lanes.

@@ -41,6 +41,10 @@ impl Isa for Plain {
         floats
     }
     #[inline(always)]
+    fn whole(self, floats: [f32; LANES]) -> [i32; LANES] {
+        lanes(|lane| floats[lane] as i32)
+    }
+    #[inline(always)]
     fn splat(self, x: f32) -> [f32; LANES] {
         [x; LANES]
     }
@@ -59,6 +63,10 @@ impl Isa for Plain {
     #[inline(always)]
     fn min(self, a: [f32; LANES], b: [f32; LANES]) -> [f32; LANES] {
         lanes(|lane| if a[lane] < b[lane] { a[lane] } else { b[lane] })
+    }
+    #[inline(always)]
+    fn max(self, a: [f32; LANES], b: [f32; LANES]) -> [f32; LANES] {
+        lanes(|lane| if a[lane] > b[lane] { a[lane] } else { b[lane] })
     }
     #[inline(always)]
     fn below_zero(self, a: [f32; LANES]) -> LaneMask {

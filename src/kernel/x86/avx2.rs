@@ -53,6 +53,15 @@ impl Isa for Avx2 {
         row
     }
     #[inline(always)]
+    fn whole(self, floats: [__m256; 2]) -> [i32; LANES] {
+        let mut row = [0; LANES];
+        for (i, x) in floats.iter().enumerate() {
+            let eight = &mut row[8 * i..8 * i + 8];
+            unsafe { _mm256_storeu_si256(eight.as_mut_ptr().cast(), _mm256_cvttps_epi32(*x)) };
+        }
+        row
+    }
+    #[inline(always)]
     fn splat(self, x: f32) -> [__m256; 2] {
         [unsafe { _mm256_set1_ps(x) }; 2]
     }
@@ -78,6 +87,10 @@ impl Isa for Avx2 {
     #[inline(always)]
     fn min(self, a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
         each!(2, |i| unsafe { _mm256_min_ps(a[i], b[i]) })
+    }
+    #[inline(always)]
+    fn max(self, a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
+        each!(2, |i| unsafe { _mm256_max_ps(a[i], b[i]) })
     }
     #[inline(always)]
     fn below_zero(self, a: [__m256; 2]) -> LaneMask {

@@ -52,6 +52,12 @@ impl Isa for Avx512 {
         row
     }
     #[inline(always)]
+    fn whole(self, floats: __m512) -> [i32; LANES] {
+        let mut row = [0; LANES];
+        unsafe { _mm512_storeu_si512(row.as_mut_ptr().cast(), _mm512_cvttps_epi32(floats)) };
+        row
+    }
+    #[inline(always)]
     fn splat(self, x: f32) -> __m512 {
         unsafe { _mm512_set1_ps(x) }
     }
@@ -77,6 +83,10 @@ impl Isa for Avx512 {
     #[inline(always)]
     fn min(self, a: __m512, b: __m512) -> __m512 {
         unsafe { _mm512_min_ps(a, b) }
+    }
+    #[inline(always)]
+    fn max(self, a: __m512, b: __m512) -> __m512 {
+        unsafe { _mm512_max_ps(a, b) }
     }
     #[inline(always)]
     fn below_zero(self, a: __m512) -> LaneMask {

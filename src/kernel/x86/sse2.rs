@@ -34,6 +34,15 @@ impl Isa for Sse2 {
         row
     }
     #[inline(always)]
+    fn whole(self, floats: [__m128; 4]) -> [i32; LANES] {
+        let mut row = [0; LANES];
+        for (i, x) in floats.iter().enumerate() {
+            let four = &mut row[4 * i..4 * i + 4];
+            unsafe { _mm_storeu_si128(four.as_mut_ptr().cast(), _mm_cvttps_epi32(*x)) };
+        }
+        row
+    }
+    #[inline(always)]
     fn splat(self, x: f32) -> [__m128; 4] {
         [unsafe { _mm_set1_ps(x) }; 4]
     }
@@ -61,6 +70,10 @@ impl Isa for Sse2 {
     #[inline(always)]
     fn min(self, a: [__m128; 4], b: [__m128; 4]) -> [__m128; 4] {
         each!(4, |i| unsafe { _mm_min_ps(a[i], b[i]) })
+    }
+    #[inline(always)]
+    fn max(self, a: [__m128; 4], b: [__m128; 4]) -> [__m128; 4] {
+        each!(4, |i| unsafe { _mm_max_ps(a[i], b[i]) })
     }
     #[inline(always)]
     fn below_zero(self, a: [__m128; 4]) -> LaneMask {

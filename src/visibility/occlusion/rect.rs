@@ -123,7 +123,6 @@ impl Rects {
 
     #[inline(always)]
     fn project_perspective<I: Isa>(&mut self, isa: I, boxes: &AboutEye<I>, p: &Projection) {
-        let minus = isa.splat(-1.0);
         let depths = boxes.products(isa, &p.rows[2]);
         let mut inverse = [[0.0; LANES]; 8];
         let mut least = isa.splat(f32::INFINITY);
@@ -132,24 +131,26 @@ impl Rects {
             least = isa.min(depth, least);
             *row = inverses(isa.to_array(depth));
         }
-        // The greatest as the least of what has the other sign.
-        let mut extremes = [isa.splat(f32::INFINITY); 4];
+        // The least and the greatest x and y.
+        let none = [isa.splat(f32::INFINITY), isa.splat(f32::NEG_INFINITY)];
+        let mut extremes = [none; 2];
         for (axis, row) in p.rows[..2].iter().enumerate() {
             let products = boxes.products(isa, row);
             for (corner, inverse) in inverse.iter().enumerate() {
                 let at = isa.mul(at_corner(isa, &products, corner), isa.load(inverse));
-                extremes[2 * axis] = isa.min(at, extremes[2 * axis]);
-                extremes[2 * axis + 1] = isa.min(isa.mul(at, minus), extremes[2 * axis + 1]);
+                let [low, high] = &mut extremes[axis];
+                *low = isa.min(at, *low);
+                *high = isa.max(at, *high);
             }
         }
         let depth = isa.add(least, isa.mul(boxes.minus_size, isa.splat(8.0 * U)));
         let nearness = isa.load(&inverses(isa.to_array(depth)));
         // - r / w
         let relative = isa.mul(boxes.minus_size, nearness);
-        for (axis, slack) in p.slack.iter().enumerate() {
-            let slack = isa.mul(relative, isa.splat(*slack));
-            extremes[2 * axis] = isa.add(extremes[2 * axis], slack);
-            extremes[2 * axis + 1] = isa.add(extremes[2 * axis + 1], slack);
+        for (axis, [low, high]) in extremes.iter_mut().enumerate() {
+            let slack = p.slack[axis];
+            *low = isa.add(*low, isa.mul(relative, isa.splat(slack)));
+            *high = isa.add(*high, isa.mul(relative, isa.splat(-slack)));
         }
         let behind = isa.mul(boxes.minus_size, isa.splat(-1.0 / 4096.0));
         let near = isa.at_most(least, behind) | isa.at_most(least, isa.splat(1e-25));
@@ -159,16 +160,21 @@ impl Rects {
 
     #[inline(always)]
     fn project_parallel<I: Isa>(&mut self, isa: I, boxes: &AboutEye<I>, p: &Projection) {
-        let mut extremes = [isa.splat(0.0); 4];
-        for axis in 0..2 {
-            let (low, minus_high) = boxes.range(isa, &p.rows[axis]);
-            let slack = isa.mul(boxes.minus_size, isa.splat(p.slack[axis]));
-            let slack = isa.add(slack, isa.splat(-p.slack_added[axis]));
-            let shift = p.shift[axis];
-            extremes[2 * axis] = isa.add(isa.add(low, isa.splat(shift)), slack);
-            extremes[2 * axis + 1] = isa.add(isa.add(minus_high, isa.splat(-shift)), slack);
+        let mut extremes = [[isa.splat(0.0); 2]; 2];
+        for (axis, extremes) in extremes.iter_mut().enumerate() {
+            let [low, high] = boxes.range(isa, &p.rows[axis]);
+            let (slack, added) = (p.slack[axis], p.slack_added[axis]);
+            let under = isa.mul(boxes.minus_size, isa.splat(slack));
+            let under = isa.add(under, isa.splat(-added));
+            let above = isa.mul(boxes.minus_size, isa.splat(-slack));
+            let above = isa.add(above, isa.splat(added));
+            let shift = isa.splat(p.shift[axis]);
+            *extremes = [
+                isa.add(isa.add(low, shift), under),
+                isa.add(isa.add(high, shift), above),
+            ];
         }
-        let (least, _) = boxes.range(isa, &p.rows[2]);
+        let [least, _] = boxes.range(isa, &p.rows[2]);
         let depth = isa.add(least, isa.mul(boxes.minus_size, isa.splat(8.0 * U)));
         let minus = isa.splat(-1.0);
         // -|depth|
@@ -180,30 +186,29 @@ impl Rects {
         self.finish(isa, boxes, p, &extremes, [depth, raised], 0);
     }
 
-    /// From the least and (negated) greatest x and y to pixels.
+    /// From the least and greatest x and y to pixels.
     #[inline(always)]
     fn finish<I: Isa>(
         &mut self,
         isa: I,
         boxes: &AboutEye<I>,
         p: &Projection,
-        [x0, minus_x1, y0, minus_y1]: &[I::Floats; 4],
+        [[x0, x1], [y0, y1]]: &[[I::Floats; 2]; 2],
         [depth, nearness]: [I::Floats; 2],
         near: LaneMask,
     ) {
         let [width, height] = p.size;
         let zero = isa.splat(0.0);
-        let within_x = isa.at_most(*x0, isa.splat(width)) & isa.at_most(*minus_x1, zero);
-        let within_y = isa.at_most(*y0, isa.splat(height)) & isa.at_most(*minus_y1, zero);
+        let within_x = isa.at_most(*x0, isa.splat(width)) & isa.at_most(zero, *x1);
+        let within_y = isa.at_most(*y0, isa.splat(height)) & isa.at_most(zero, *y1);
         self.flat = isa.at_most(isa.splat(-1e25), boxes.minus_size) & !near;
         self.seen = within_x & within_y | !self.flat;
         self.depth = isa.to_array(depth);
         self.nearness = isa.to_array(nearness);
-        let minus = isa.splat(-1.0);
-        self.x0 = pixels(isa.to_array(*x0), width);
-        self.x1 = pixels(isa.to_array(isa.mul(*minus_x1, minus)), width);
-        self.y0 = pixels(isa.to_array(*y0), height);
-        self.y1 = pixels(isa.to_array(isa.mul(*minus_y1, minus)), height);
+        self.x0 = pixels(isa, *x0, width);
+        self.x1 = pixels(isa, *x1, width);
+        self.y0 = pixels(isa, *y0, height);
+        self.y1 = pixels(isa, *y1, height);
     }
 }
 
@@ -245,20 +250,19 @@ impl<I: Isa> AboutEye<I> {
         products
     }
 
-    /// The least product with a row at any corner, and the greatest one negated.
+    /// The least product with a row at any corner, and the greatest one.
     #[inline(always)]
-    fn range(&self, isa: I, row: &[f32; 3]) -> (I::Floats, I::Floats) {
-        let minus = isa.splat(-1.0);
+    fn range(&self, isa: I, row: &[f32; 3]) -> [I::Floats; 2] {
         let mut low = [isa.splat(0.0); 3];
         let mut high = low;
         for (axis, [p, q]) in self.products(isa, row).into_iter().enumerate() {
             low[axis] = isa.min(p, q);
-            high[axis] = isa.min(isa.mul(p, minus), isa.mul(q, minus));
+            high[axis] = isa.max(p, q);
         }
-        (
+        [
             isa.add(isa.add(low[0], low[1]), low[2]),
             isa.add(isa.add(high[0], high[1]), high[2]),
-        )
+        ]
     }
 }
 
@@ -279,12 +283,8 @@ fn inverses(mut row: [f32; LANES]) -> [f32; LANES] {
 
 /// The pixels that hold coordinates, or the nearest ones.
 #[inline(always)]
-fn pixels(at: [f32; LANES], size: f32) -> [i32; LANES] {
-    let mut pixels = [0; LANES];
-    for lane in 0..LANES {
-        let at = if at[lane] > 0.0 { at[lane] } else { 0.0 };
-        let at = if at < size - 1.0 { at } else { size - 1.0 };
-        pixels[lane] = at as i32;
-    }
-    pixels
+fn pixels<I: Isa>(isa: I, at: I::Floats, size: f32) -> [i32; LANES] {
+    // Of a NaN and a bound, the bound.
+    let at = isa.max(at, isa.splat(0.0));
+    isa.whole(isa.min(at, isa.splat(size - 1.0)))
 }
