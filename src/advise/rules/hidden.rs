@@ -43,14 +43,6 @@ impl Met {
         })
     }
 
-    /// How deep a ray gets.
-    pub fn depth(&self, ray: &Ray) -> Option<f64> {
-        match self {
-            Met::Boxes(index) => index.front_of(ray).map(|front| front.entry.depth),
-            Met::Triangles(index, _) => index.front_of(ray).meeting.map(|at| at.depth),
-        }
-    }
-
     /// How many items lie along a ray.
     pub fn layers(&self, ray: &Ray) -> usize {
         let mut met: Vec<ItemId> = match self {

@@ -1,19 +1,24 @@
 //! The occlusion stage: pays where the eye is among things that hide others, and is
-//! left out where it looks down on them. Predicted from how far a few rays get.
+//! left out where it looks down on them. Predicted from rays to a few of the items.
 
 use std::cell::RefCell;
+use std::cmp::Ordering;
 use std::rc::Rc;
+
+use glam::{BVec3, DVec3};
 
 use super::super::case::Case;
 use super::super::omission::{By, Draft, LeftOutIf, Omission, Way};
 use super::super::rule::{Rule, Unfit, not_applicable};
-use super::hidden::{self, Met, PROBED, PROBES};
+use super::hidden::{self, PROBED};
 use crate::geometry::ConvexVolume;
 use crate::measure::Ask;
-use crate::scene::ItemShape;
+use crate::query::ItemId;
+use crate::scene::{ItemShape, WorldBox};
 use crate::visibility::hiders::Hiders;
 use crate::visibility::occlusion::{self, Interleaved, MaskedInner, OcclusionBuffer};
 use crate::visibility::region::doom::DoomMap;
+use crate::visibility::truth::{Probe, RayIndex};
 use crate::visibility::{Rays, SampleGrid, Solids, inscribed};
 
 pub(super) const RULE: Rule = Rule {
@@ -42,6 +47,9 @@ pub(super) const BUFFER_RULE: Rule = Rule {
 /// Pixels of the buffer that is usual, and of the smaller one.
 const USUAL: SampleGrid = SampleGrid::new(320, 180);
 const SMALL: SampleGrid = SampleGrid::new(160, 90);
+
+/// Items of a camera that a prediction looks at.
+const ITEMS: usize = 64;
 
 /// Everything that is asked, and shared by both sides.
 struct Occlusion {
@@ -105,9 +113,7 @@ fn asked<'c>(case: &Case, all: Rc<Occlusion>, grid: SampleGrid) -> Ask<'c> {
 
 fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfit> {
     let all = Occlusion::of(case)?;
-    let met = Met::of(case.scene())?;
-    let extent = f64::from(case.scene().bounds.extent().length());
-    let predicted = predicted(&all, &met, extent);
+    let predicted = predicted(case, &all);
     let on = format!(
         "masked-inner {}x{} against {}",
         USUAL.width, USUAL.height, case.spec.label
@@ -136,29 +142,66 @@ fn prepare_buffer<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c
     Ok(hidden::draft(case, omission, on, kept, left_out, predicted))
 }
 
-/// Items spread evenly over the ground are hidden if they are farther than what is
-/// seen: of a view of depth D in which rays get as far as d, the share 1 - (d / D)^2.
-fn predicted(all: &Occlusion, met: &Met, extent: f64) -> f64 {
-    let mut shares = Vec::new();
+/// Of a few items in the view of a few cameras, the share that is hidden along each of
+/// the rays to nine of their points: what rays between these would see is not asked, nor
+/// whether one thing hides all of an item.
+fn predicted(case: &Case, all: &Occlusion) -> f64 {
+    let inside = all.hiders.from_eye(|| true);
+    let mut solids = Solids {
+        origin: inside.origin(),
+        boxes: Vec::new(),
+        outer: Vec::new(),
+        inner: Vec::new(),
+    };
+    for hider in inside.all_hiders() {
+        solids.push(&WorldBox::within(&hider.inner, solids.origin));
+    }
+    let before = RayIndex::build(&solids);
+    let boxes: Vec<WorldBox> = case.scene().written().collect();
+    let (mut in_view, mut hidden, mut counted) = (Vec::new(), 0.0, 0.0);
     for frame in hidden::frames(all.views.len(), PROBED) {
-        let rays = &all.views[frame].rays;
-        let depth = rays.sample(PROBES, 0, 0).far.min(extent);
-        for row in 0..PROBES.height {
-            for column in 0..PROBES.width {
-                let ray = rays.sample(PROBES, column, row);
-                let met = met.depth(&ray).map_or(depth, |at| at.min(depth));
-                shares.push(1.0 - (met / depth).powi(2));
-            }
-        }
+        let view = &all.views[frame];
+        let hides = !all
+            .hiders
+            .from_eye(|| view.is_inside)
+            .all_hiders()
+            .is_empty();
+        in_view.clear();
+        case.query(frame, &mut in_view);
+        let asked = in_view.iter().step_by(in_view.len().div_ceil(ITEMS).max(1));
+        let is_hidden = |&id: &ItemId| behind(&before, &view.rays, &boxes[id as usize]);
+        let found: Vec<bool> = asked.filter_map(is_hidden).collect();
+        let share = found
+            .iter()
+            .filter(|&&is_hidden| is_hidden && hides)
+            .count() as f64;
+        let count = in_view.len() as f64;
+        hidden += count * share / found.len().max(1) as f64;
+        counted += count;
     }
-    // Rays into the sky say nothing of the ground.
-    let below: Vec<f64> = shares
-        .iter()
-        .copied()
-        .filter(|share| *share > 0.0)
-        .collect();
-    match below.is_empty() {
-        true => 0.0,
-        false => below.iter().sum::<f64>() / below.len() as f64,
-    }
+    hidden / f64::max(counted, 1.0)
+}
+
+/// Whether something is before a box along every ray to its middle and its corners;
+/// `None` if none of these is in the image.
+fn behind(before: &RayIndex, rays: &Rays, b: &WorldBox) -> Option<bool> {
+    let middle = (b.min + b.max) * 0.5;
+    // A little inside, so that each ray enters the box.
+    let corner = |k: usize| {
+        let upper = BVec3::new(k & 1 == 1, k & 2 == 2, k & 4 == 4);
+        middle + (DVec3::select(upper, b.max, b.min) - middle) * 0.99
+    };
+    let points = (0..8).map(corner).chain([middle]);
+    let mut answers = points.filter_map(|point| {
+        let [x, y] = rays.in_image(point)?;
+        let ray = rays.through(x, y);
+        let probe = Probe::new(ray);
+        let own = probe.enter(b, ray.far);
+        let front = before.front_of(&ray).map(|front| front.entry);
+        Some(own.is_some_and(|own| {
+            front.is_some_and(|front| probe.compare(&front, &own) == Ordering::Less)
+        }))
+    });
+    let first = answers.next()?;
+    Some(first && answers.all(|is_hidden| is_hidden))
 }
