@@ -41,6 +41,8 @@ pub trait Isa: Copy {
 
     /// The numbers of a row.
     fn load(self, row: &[f32; LANES]) -> Self::Floats;
+    /// For each lane the number at its place in a table; 0 behind its end.
+    fn gather(self, table: &[f32], places: &[u32; LANES]) -> Self::Floats;
     /// The numbers of all lanes, lane 0 first.
     fn to_array(self, floats: Self::Floats) -> [f32; LANES];
     /// The whole parts of numbers from 0 up to 2^31, lane 0 first.
@@ -144,6 +146,8 @@ mod tests {
                 isa.add(a, b),
                 isa.mul(a, isa.splat(self.b[3])),
                 isa.min(a, b),
+                isa.max(a, b),
+                isa.gather(&self.a[..5], self.words),
                 isa.permute(&std::array::from_fn(|i| self.a[i]), self.b[5].to_bits()),
             ];
             let bits = floats.map(|x| isa.to_array(x).map(canonical));
@@ -155,6 +159,10 @@ mod tests {
                 isa.compress(&mut place, words, self.lanes);
                 out.extend_from_slice(&place[..self.lanes.count_ones() as usize]);
             }
+            // Between 0 and 2^31, all the rest at a bound.
+            let least = isa.max(a, isa.splat(0.0));
+            let whole = isa.whole(isa.min(least, isa.splat(2147483520.0)));
+            out.extend(whole.map(|x| x as u32));
             isa.append(&mut out, self.words, self.lanes);
             isa.append(&mut out, self.words, !self.lanes);
             let masks = [

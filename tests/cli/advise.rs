@@ -406,6 +406,34 @@ fn occlusion_is_left_out_from_the_air_and_kept_on_the_street() {
     assert!(hidden < 0.5, "{hidden}");
 }
 
+#[test]
+fn what_occlusion_removes_is_predicted_from_what_is_drawn() {
+    let predicted = |line: &str| {
+        let line = format!("advise --structure linear,wide {line}");
+        let advice = advice(Path::new("."), &line);
+        let rule = rule(&advice, "occlusion");
+        let reason = rule["reason"].as_str().expect("a reason").to_owned();
+        let share = reason.split("predicted ").nth(1);
+        let share = share.and_then(|text| text.split(" %").next());
+        let share: f64 = share.expect(&reason).parse().expect("a number");
+        (share, number(rule, "statistic") * 100.0)
+    };
+    let (share, removed) = predicted("--scene city:n=4000 --path street:frames=12");
+    assert!((share - removed).abs() < 10.0, "{share} {removed}");
+    let (share, removed) = predicted("--scene mesh:spheres:n=100k --path street:frames=12");
+    assert!(
+        removed > 1.0 && (share - removed).abs() < 10.0,
+        "{share} {removed}"
+    );
+    // Of ground nothing is drawn, of a map nothing for an eye outside of it.
+    for nothing in [
+        "--scene mesh:terrain:n=20k --path street:frames=12",
+        "--scene freedm-map12 --path outside:frames=12",
+    ] {
+        assert_eq!(predicted(nothing), (0.0, 0.0), "{nothing}");
+    }
+}
+
 /// The decision of a rule with its statistic, for a scene and path.
 fn decided(name: &str, line: &str) -> (String, f64) {
     let line = format!("advise --structure linear,wide {line}");

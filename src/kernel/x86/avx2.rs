@@ -5,6 +5,7 @@ use std::arch::x86_64::*;
 use super::each;
 use super::packer::{self, PackTo, Packer};
 use crate::kernel::isa::{Isa, LANES, LaneMask, Piece};
+use crate::kernel::plain::Plain;
 
 /// A value is the proof that the processor has AVX2, BMI1, BMI2, LZCNT and POPCNT.
 #[derive(Clone, Copy, Debug)]
@@ -43,6 +44,10 @@ impl Isa for Avx2 {
     #[inline(always)]
     fn load(self, row: &[f32; LANES]) -> [__m256; 2] {
         each!(2, |i| unsafe { _mm256_loadu_ps(row[8 * i..].as_ptr()) })
+    }
+    #[inline(always)]
+    fn gather(self, table: &[f32], places: &[u32; LANES]) -> [__m256; 2] {
+        self.load(&Isa::gather(Plain, table, places))
     }
     #[inline(always)]
     fn to_array(self, floats: [__m256; 2]) -> [f32; LANES] {

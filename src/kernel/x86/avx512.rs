@@ -46,6 +46,18 @@ impl Isa for Avx512 {
         unsafe { _mm512_loadu_ps(row.as_ptr()) }
     }
     #[inline(always)]
+    fn gather(self, table: &[f32], places: &[u32; LANES]) -> __m512 {
+        // No lane is read whose place is not in the table; those of f32 in memory are
+        // below 2^31.
+        let end = table.len().min(i32::MAX as usize) as i32;
+        unsafe {
+            let places = _mm512_loadu_si512(places.as_ptr().cast());
+            let inside = _mm512_cmplt_epu32_mask(places, _mm512_set1_epi32(end));
+            let zero = _mm512_setzero_ps();
+            _mm512_mask_i32gather_ps::<4>(zero, inside, places, table.as_ptr().cast())
+        }
+    }
+    #[inline(always)]
     fn to_array(self, floats: __m512) -> [f32; LANES] {
         let mut row = [0.0; LANES];
         unsafe { _mm512_storeu_ps(row.as_mut_ptr(), floats) };

@@ -6,6 +6,7 @@ use std::arch::x86_64::*;
 use super::each;
 use super::packer::{self, PackTo, Packer};
 use crate::kernel::isa::{Isa, LANES, LaneMask};
+use crate::kernel::plain::Plain;
 
 /// Part of x86-64.
 #[derive(Clone, Copy, Debug)]
@@ -24,6 +25,10 @@ impl Isa for Sse2 {
     #[inline(always)]
     fn load(self, row: &[f32; LANES]) -> [__m128; 4] {
         each!(4, |i| unsafe { _mm_loadu_ps(row[4 * i..].as_ptr()) })
+    }
+    #[inline(always)]
+    fn gather(self, table: &[f32], places: &[u32; LANES]) -> [__m128; 4] {
+        self.load(&Isa::gather(Plain, table, places))
     }
     #[inline(always)]
     fn to_array(self, floats: [__m128; 4]) -> [f32; LANES] {

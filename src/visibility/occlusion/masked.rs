@@ -234,23 +234,16 @@ impl<const WHOLE: bool> Masked<WHOLE> {
         for lane in 0..LANES {
             at[lane] = ((y[lane] >> 2) * columns + (x[lane] >> 3)) as u32;
         }
-        let mut reference = [0.0; LANES];
-        for lane in 0..LANES {
-            let tile = self.reference.get(at[lane] as usize);
-            reference[lane] = tile.copied().unwrap_or(0.0);
-        }
         let nearness = isa.load(&rects.nearness);
-        let open = isa.at_most(isa.load(&reference), nearness);
+        let open = isa.at_most(isa.gather(&self.reference, &at), nearness);
         if open & lanes == 0 {
             return lanes;
         }
         // Not by the reference alone: by the working layer and its pixels.
-        let mut working = [0.0; LANES];
+        let working = isa.gather(&self.working, &at);
         let mut masks = [0; LANES];
         for lane in 0..LANES {
-            let tile = at[lane] as usize;
-            working[lane] = self.working.get(tile).copied().unwrap_or(0.0);
-            masks[lane] = self.mask.get(tile).copied().unwrap_or(0);
+            masks[lane] = self.mask.get(at[lane] as usize).copied().unwrap_or(0);
         }
         // Of lanes that are not asked about anything may come out.
         let mut shown = [0; LANES];
@@ -265,7 +258,7 @@ impl<const WHOLE: bool> Masked<WHOLE> {
             let below = Mask::MAX.wrapping_shr(3u32.wrapping_sub(bottom).wrapping_mul(8));
             shown[lane] = (row * 0x0101_0101) & above & below & !masks[lane];
         }
-        let behind = isa.at_most(isa.load(&working), nearness);
+        let behind = isa.at_most(working, nearness);
         let covered = isa.zeros(isa.words(&shown)) & !behind;
         lanes & (!open | covered)
     }
