@@ -9,10 +9,11 @@ use crate::funnel::FunnelReport;
 use crate::shown::shown_field;
 
 /// Tables of the report: a list of rows, or a single row.
-const TABLES: [&str; 11] = [
+const TABLES: [&str; 12] = [
     "level",
     "cut_outs",
     "inner_boxes",
+    "ground",
     "solid_blocks",
     "mirror",
     "stages",

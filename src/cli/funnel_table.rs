@@ -8,7 +8,7 @@ use crate::funnel::{
     FunnelReport, Gain, LevelRow, ProofCounts, SeenFrom, StageKind, StageRow, Times,
 };
 use crate::visibility::Guarantee;
-use crate::visibility::hiders::{BlocksRow, InnerRow};
+use crate::visibility::hiders::{BlocksRow, GroundRow, InnerRow};
 use crate::visibility::occlusion::OccluderChoice;
 
 /// No line is longer.
@@ -32,6 +32,7 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
     ];
     blocks.extend(saved_load(&report.level).map(Block::Line));
     blocks.extend(report.inner_boxes.as_ref().map(inner_boxes));
+    blocks.extend(report.ground.as_ref().map(ground));
     blocks.extend(report.solid_blocks.as_ref().map(solid_blocks));
     if let Some(made) = &report.cut_outs {
         let line = format!(
@@ -115,12 +116,27 @@ fn inner_boxes(row: &InnerRow) -> Block {
         let [held, lost] = [share, 1.0 - share].map(|share| share * 100.0);
         format!(", {held:.1} % of the volume of these (loss {lost:.1} %)")
     });
+    let inside = match row.boxed_count {
+        0 => "any".to_owned(),
+        boxed => boxed.to_string(),
+    };
     Block::Line(format!(
-        "Occluders: {} proven inside {} of {}{}; found in {}.",
+        "Occluders: {} proven inside {inside} of {}{}; found in {}.",
         text::counted(row.box_count, "box"),
-        row.boxed_count,
         text::counted(row.item_count, "item"),
         held.unwrap_or_default(),
+        text::time(row.build_ns)
+    ))
+}
+
+/// What hides below the ground, and what finding it took.
+fn ground(row: &GroundRow) -> Block {
+    Block::Line(format!(
+        "Ground: {} below {}, {:.1} % of the volume between the ground and its lowest place; found \
+         in {}.",
+        text::counted(row.box_count, "box"),
+        text::counted(row.item_count, "item"),
+        row.volume_share * 100.0,
         text::time(row.build_ns)
     ))
 }

@@ -19,7 +19,7 @@ use crate::measure::OverProcesses;
 use crate::statistics::{ALPHA, trimmed_mean};
 use crate::visibility::Level;
 use crate::visibility::fragment::{CutOuts, Surfaces};
-use crate::visibility::hiders::{BlocksRow, InnerRow};
+use crate::visibility::hiders::{BlocksRow, GroundRow, InnerRow};
 
 /// The funnel of a scene and a path.
 #[derive(Clone, Debug, Serialize)]
@@ -58,6 +58,8 @@ pub struct FunnelReport {
     /// The boxes in the solid of a map, which hide what is behind them; null for what is no
     /// map.
     pub solid_blocks: Option<BlocksRow>,
+    /// The boxes below the ground of a mesh; null for a scene without ground.
+    pub ground: Option<GroundRow>,
     /// What is seen in a mirror; null where none was asked for.
     pub mirror: Option<MirrorRow>,
     /// What is left, drawn in every order; empty unless items are solid boxes.

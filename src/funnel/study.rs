@@ -185,6 +185,7 @@ pub fn prepare(
             stages: rows,
             audits: world.audits().to_vec(),
             inner_boxes: world.hiders.inner_row().cloned(),
+            ground: world.hiders.ground_row().cloned(),
             solid_blocks: world.hiders.blocks_row().cloned(),
             mirror,
             orders: drawn,

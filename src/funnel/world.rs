@@ -226,7 +226,10 @@ impl<'a> World<'a> {
 
     /// The items as the occlusion stage draws and tests them in a view.
     pub fn occluders(&self, view: usize) -> &OccluderScene {
-        self.hiders.from_eye(|| self.is_inside(view))
+        let is_open = self
+            .hiders
+            .is_open(self.rays(view), || self.is_inside(view));
+        self.hiders.from_eye(is_open)
     }
 
     /// The six planes of a view.

@@ -425,9 +425,9 @@ fn what_occlusion_removes_is_predicted_from_what_is_drawn() {
         removed > 1.0 && (share - removed).abs() < 10.0,
         "{share} {removed}"
     );
-    // Of ground nothing is drawn, of a map nothing for an eye outside of it.
+    // A lone statue has nothing behind it, of a map nothing hides from an eye outside of it.
     for nothing in [
-        "--scene mesh:terrain:n=20k --path street:frames=12",
+        "--scene mesh:statue:n=5k --path street:frames=12",
         "--scene freedm-map12 --path outside:frames=12",
     ] {
         assert_eq!(predicted(nothing), (0.0, 0.0), "{nothing}");

@@ -177,6 +177,7 @@ fn csv_has_every_field_of_every_table_of_the_json() {
         "level",
         "cut_outs",
         "inner_boxes",
+        "ground",
         "solid_blocks",
         "mirror",
         "stages",

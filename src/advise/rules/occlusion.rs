@@ -57,11 +57,11 @@ struct Occlusion {
     views: Vec<View>,
 }
 
-/// A camera, and whether its eye is in the rooms of a map.
+/// A camera, and whether its eye is in the open.
 struct View {
     rays: Rays,
     volume: ConvexVolume,
-    is_inside: bool,
+    is_open: bool,
 }
 
 impl Occlusion {
@@ -84,9 +84,10 @@ impl Occlusion {
         let rooms = DoomMap::of_scene(scene)?.map(|map| map.graph());
         let mut homes = Vec::new();
         let views = views.into_iter().map(|(rays, volume)| View {
-            is_inside: rooms
-                .as_ref()
-                .is_some_and(|rooms| rooms.homes(&rays, &mut homes)),
+            is_open: hiders.is_open(&rays, || {
+                let rooms = rooms.as_ref();
+                rooms.is_some_and(|rooms| rooms.homes(&rays, &mut homes))
+            }),
             rays,
             volume,
         });
@@ -103,9 +104,9 @@ fn asked<'c>(case: &Case, all: Rc<Occlusion>, grid: SampleGrid) -> Ask<'c> {
         let View {
             rays,
             volume,
-            is_inside,
+            is_open,
         } = &all.views[n];
-        let occluders = all.hiders.from_eye(|| *is_inside);
+        let occluders = all.hiders.from_eye(*is_open);
         let view = occlusion::View::new(rays, volume, occluders, grid);
         culling.borrow_mut().cull(occluders, &view, out);
     })
@@ -146,14 +147,14 @@ fn prepare_buffer<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c
 /// the rays to nine of their points: what rays between these would see is not asked, nor
 /// whether one thing hides all of an item.
 fn predicted(case: &Case, all: &Occlusion) -> f64 {
-    let inside = all.hiders.from_eye(|| true);
+    let open = all.hiders.from_eye(true);
     let mut solids = Solids {
-        origin: inside.origin(),
+        origin: open.origin(),
         boxes: Vec::new(),
         outer: Vec::new(),
         inner: Vec::new(),
     };
-    for hider in inside.all_hiders() {
+    for hider in open.all_hiders() {
         solids.push(&WorldBox::within(&hider.inner, solids.origin));
     }
     let before = RayIndex::build(&solids);
@@ -161,11 +162,7 @@ fn predicted(case: &Case, all: &Occlusion) -> f64 {
     let (mut in_view, mut hidden, mut counted) = (Vec::new(), 0.0, 0.0);
     for frame in hidden::frames(all.views.len(), PROBED) {
         let view = &all.views[frame];
-        let hides = !all
-            .hiders
-            .from_eye(|| view.is_inside)
-            .all_hiders()
-            .is_empty();
+        let hides = !all.hiders.from_eye(view.is_open).all_hiders().is_empty();
         in_view.clear();
         case.query(frame, &mut in_view);
         let asked = in_view.iter().step_by(in_view.len().div_ceil(ITEMS).max(1));

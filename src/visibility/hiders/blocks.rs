@@ -3,10 +3,12 @@
 
 use std::time::Instant;
 
+use glam::DVec3;
 use serde::Serialize;
 
+use crate::geometry::Aabb;
 use crate::input::InputError;
-use crate::scene::{Scene, WorldBox};
+use crate::scene::Scene;
 use crate::visibility::region::doom::DoomMap;
 
 /// What is known of the boxes in the solid of a map.
@@ -23,8 +25,8 @@ pub struct BlocksRow {
 
 /// The boxes themselves.
 pub struct Blocks {
-    /// Over the heights of the map's items.
-    pub boxes: Vec<WorldBox>,
+    /// Over the heights of the map's items, scene-local.
+    pub boxes: Vec<Aabb>,
     /// What they are.
     pub row: BlocksRow,
 }
@@ -42,6 +44,9 @@ impl Blocks {
         let all = scene.written().map(|b| [b.min.z, b.max.z]);
         let heights = all.reduce(|[low, high], [min, max]| [low.min(min), high.max(max)]);
         let boxes = heights.map_or(Vec::new(), |heights| map.solid_boxes(heights));
+        // Whole numbers, so nothing is rounded.
+        let about = |corner: DVec3| (corner - scene.origin).as_vec3();
+        let local = boxes.iter().map(|b| Aabb::new(about(b.min), about(b.max)));
         let build_ns = begun.elapsed().as_nanos() as f64;
         Ok(Some(Blocks {
             row: BlocksRow {
@@ -49,7 +54,7 @@ impl Blocks {
                 unclosed_sector_count: map.unclosed().len(),
                 build_ns,
             },
-            boxes,
+            boxes: local.collect(),
         }))
     }
 }

@@ -1,16 +1,20 @@
 //! What hides the items of a scene, made once before any view: themselves if they are solid
-//! boxes, the boxes inside those of a mesh, the boxes in the solid of a map.
+//! boxes, the boxes inside those of a mesh and below its ground, the boxes in the solid of a
+//! map.
 
 mod blocks;
+mod ground;
 mod inner;
 
 pub use blocks::BlocksRow;
+pub use ground::GroundRow;
 pub use inner::InnerRow;
 
 use self::blocks::Blocks;
+use self::ground::Ground;
 use self::inner::Inner;
-use super::Solids;
 use super::occlusion::OccluderScene;
+use super::{Rays, Solids};
 use crate::geometry::Aabb;
 use crate::input::InputError;
 use crate::query::ItemId;
@@ -19,9 +23,11 @@ use crate::scene::Scene;
 /// The occluders of a scene.
 pub struct Hiders {
     all: OccluderScene,
-    /// Of a map: the same without what hides, for eyes outside its rooms.
+    /// The same without boxes that are of no item, for eyes that these do not hide from:
+    /// outside the rooms of a map, not above the ground of a mesh.
     bare: Option<OccluderScene>,
     inner: Option<Inner>,
+    ground: Option<Ground>,
     blocks: Option<BlocksRow>,
 }
 
@@ -39,28 +45,43 @@ impl Hiders {
     ) -> Result<Hiders, InputError> {
         let inner = Inner::of(scene, most, threads);
         let blocks = Blocks::of(scene)?;
-        let all = match (solids, &inner) {
-            (Some(solids), _) => OccluderScene::of(solids),
-            (None, Some(inner)) => OccluderScene::within(scene, &inner.boxes),
-            (None, None) => {
-                let boxes = blocks.as_ref().map_or(&[][..], |blocks| &blocks.boxes);
-                OccluderScene::among(scene, boxes)
-            }
+        let ground = Ground::of(scene);
+        let within = inner.as_ref().map_or(&[][..], |inner| &inner.boxes);
+        let below = ground.as_ref().map(|ground| &ground.boxes[..]);
+        let of_no_item = below.or(blocks.as_ref().map(|blocks| &blocks.boxes[..]));
+        let all = match solids {
+            Some(solids) => OccluderScene::of(solids),
+            None => OccluderScene::among(scene, within, of_no_item.unwrap_or(&[])),
         };
         Ok(Hiders {
-            bare: blocks.as_ref().map(|_| OccluderScene::among(scene, &[])),
+            bare: of_no_item.map(|_| OccluderScene::among(scene, within, &[])),
             blocks: blocks.map(|blocks| blocks.row),
             inner,
+            ground,
             all,
         })
     }
 
-    /// Those that hide from an eye: in the rooms of the scene or not.
-    pub fn from_eye(&self, is_inside: impl FnOnce() -> bool) -> &OccluderScene {
+    /// Whether boxes that are of no item hide from the eye of these rays: it is above the
+    /// ground, or in the rooms of a map.
+    pub fn is_open(&self, rays: &Rays, is_inside: impl FnOnce() -> bool) -> bool {
+        match &self.ground {
+            Some(ground) => ground.is_below(rays),
+            None => self.bare.is_none() || is_inside(),
+        }
+    }
+
+    /// Those that hide from an eye, [in the open](Hiders::is_open) or not.
+    pub fn from_eye(&self, is_open: bool) -> &OccluderScene {
         match &self.bare {
-            Some(bare) if !is_inside() => bare,
+            Some(bare) if !is_open => bare,
             _ => &self.all,
         }
+    }
+
+    /// What is known of the boxes below the ground of a mesh.
+    pub fn ground_row(&self) -> Option<&GroundRow> {
+        self.ground.as_ref().map(|ground| &ground.row)
     }
 
     /// The boxes inside the items of a mesh, each with its item, by ascending item;

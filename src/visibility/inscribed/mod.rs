@@ -14,6 +14,7 @@ use glam::Vec3;
 
 use self::grid::Grid;
 use self::proof::is_in;
+pub(crate) use self::proof::turn;
 use crate::geometry::Aabb;
 use crate::query::ItemId;
 use crate::scene::{SurfaceKind, Surfaces, volume_within};

@@ -49,7 +49,7 @@ fn is_outside(corners: [Vec3; 3], b: &Aabb) -> bool {
 }
 
 /// The sign of the turn from `a` over `b` to `c`, exactly: 1 is to the left.
-fn turn(a: [f32; 2], b: [f32; 2], c: [f32; 2]) -> i32 {
+pub fn turn(a: [f32; 2], b: [f32; 2], c: [f32; 2]) -> i32 {
     let [[ax, ay], [bx, by], [cx, cy]] = [a, b, c].map(|p| p.map(f64::from));
     let (left, right) = ((bx - ax) * (cy - ay), (by - ay) * (cx - ax));
     let side = left - right;

@@ -7,9 +7,9 @@
 //! Semantics are those of [`Solids`](super::Solids): a ray meets a box where it
 //! enters it, between near and far; a box that some ray enters before the near
 //! plane is not drawn; items as near as an occluder are not hidden by it. Of a mesh
-//! what is drawn are boxes inside the items ([`OccluderScene::within`]): a ray that enters
+//! what is drawn are boxes inside the items ([`OccluderScene::among`]): a ray that enters
 //! one has met the item's surface before, unless that was before the near plane. Of a map
-//! they are boxes of its solid, which are no items ([`OccluderScene::among`]).
+//! they are boxes of its solid, below the ground of a mesh boxes too, which are no items.
 
 mod buffer;
 mod depth_rays;

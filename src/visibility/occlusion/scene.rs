@@ -55,35 +55,21 @@ impl OccluderScene {
         OccluderScene::sorted(solids.origin, &solids.outer, &hiders, bounds)
     }
 
-    /// Items of a mesh, which hide what is behind boxes inside them: each with its item,
-    /// by ascending item, scene-local. O(n log n).
-    pub fn within(scene: &Scene, inner: &[(ItemId, Aabb)]) -> OccluderScene {
+    /// Items that hide what is behind boxes inside them (each with its item, by ascending
+    /// item), among boxes that hide and are no items: below ground, the rock between the
+    /// rooms of a map. All scene-local. O(n log n).
+    pub fn among(scene: &Scene, inner: &[(ItemId, Aabb)], blocks: &[Aabb]) -> OccluderScene {
         let bounds = WorldBox::union_of(scene.written());
-        let hider = |&(item, inner): &(ItemId, Aabb)| {
+        let numbered = (scene.items.len() as ItemId..).zip(blocks.iter().copied());
+        let all = inner.iter().copied().chain(numbered);
+        let hiders = all.map(|(number, inner)| {
             // Rounded inward: what hides reaches a face only if this does.
             let b = WorldBox::within(&inner, scene.origin);
             let faces = faces_reached(&b, &bounds);
-            (item, Hider { inner, faces })
-        };
-        let hiders: Vec<_> = inner.iter().map(hider).collect();
-        OccluderScene::sorted(scene.origin, &scene.items, &hiders, bounds)
-    }
-
-    /// Items that hide nothing themselves among boxes that do and are no items: the rock
-    /// between the rooms of a map. Corners of the blocks must be exact in f32 about the
-    /// scene's origin. O(n log n).
-    pub fn among(scene: &Scene, blocks: &[WorldBox]) -> OccluderScene {
-        let bounds = WorldBox::union_of(scene.written());
-        let about = |corner: DVec3| (corner - scene.origin).as_vec3();
-        let local = blocks.iter().map(|b| Aabb::new(about(b.min), about(b.max)));
-        let local: Vec<Aabb> = local.collect();
-        let hider = |(inner, b): (&Aabb, &WorldBox)| Hider {
-            inner: *inner,
-            faces: faces_reached(b, &bounds),
-        };
-        let hiders = local.iter().zip(blocks).map(hider);
-        let hiders: Vec<_> = (scene.items.len() as ItemId..).zip(hiders).collect();
-        let outer = [&scene.items[..], &local].concat();
+            (number, Hider { inner, faces })
+        });
+        let hiders: Vec<_> = hiders.collect();
+        let outer = [&scene.items[..], blocks].concat();
         let mut among = OccluderScene::sorted(scene.origin, &outer, &hiders, bounds);
         among.items = scene.items.len();
         among

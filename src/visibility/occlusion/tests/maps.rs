@@ -8,6 +8,7 @@ use super::super::{MaskedInner, OccluderScene};
 use super::by_rays::{Ready, missing, with_view};
 use super::kept;
 use crate::camera::{Camera, Frame, Lens};
+use crate::geometry::Aabb;
 use crate::kernel::Kernel;
 use crate::scene::{Sample, SeededRng, WorldBox, load};
 use crate::visibility::region::doom::DoomMap;
@@ -23,9 +24,12 @@ fn removed_and_lost(name: &str, change: impl Fn(&mut WorldBox)) -> [usize; 2] {
     let graph = map.graph();
     let mut blocks = map.solid_boxes([-512.0, 1024.0]);
     blocks.iter_mut().for_each(change);
+    let about = |corner: DVec3| (corner - scene.origin).as_vec3();
+    let blocks = blocks.iter().map(|b| Aabb::new(about(b.min), about(b.max)));
+    let blocks: Vec<Aabb> = blocks.collect();
     let ready = Ready {
         solids: Solids::of(&scene),
-        occluders: OccluderScene::among(&scene, &blocks),
+        occluders: OccluderScene::among(&scene, &[], &blocks),
         scene,
     };
     let index = SurfaceIndex::build(&map.surfaces(&ready.scene));

@@ -8,9 +8,10 @@ use super::kept;
 use crate::camera::{Camera, Frame, Lens};
 use crate::kernel::Kernel;
 use crate::scene::{Scene, SeededRng, Surfaces, WorldBox, load};
+use crate::visibility::hiders::Hiders;
 use crate::visibility::inscribed::InnerBoxes;
 use crate::visibility::truth::{SurfaceIndex, visible_surfaces_by_random_rays};
-use crate::visibility::{SampleGrid, Solids};
+use crate::visibility::{Rays, SampleGrid, Solids};
 
 /// Anywhere about a scene, or in the box of an item: in its mesh as likely as not.
 fn camera(scene: &Scene, rng: &mut SeededRng, parallel: bool) -> Camera {
@@ -47,7 +48,7 @@ fn boxes_inside_meshes_hide_nothing_that_is_visible() {
         let inner = InnerBoxes::of(&mesh, 12, 4, 1).boxes;
         let ready = Ready {
             solids: Solids::of(&scene),
-            occluders: OccluderScene::within(&scene, &inner),
+            occluders: OccluderScene::among(&scene, &inner, &[]),
             scene,
         };
         let index = SurfaceIndex::build(&mesh);
@@ -70,6 +71,40 @@ fn boxes_inside_meshes_hide_nothing_that_is_visible() {
 }
 
 #[test]
+fn boxes_below_the_ground_hide_nothing_that_is_visible() {
+    for name in ["mesh:terrain:n=20k", "mesh:forest:n=20k"] {
+        let scene = load(name, &Default::default()).unwrap();
+        let hiders = Hiders::of(&scene, None, 2, 1).unwrap();
+        assert!(hiders.ground_row().unwrap().box_count > 20);
+        let index = SurfaceIndex::build(scene.surfaces.as_ref().unwrap());
+        let [open, bare] = [true, false].map(|is_open| Ready {
+            solids: Solids::of(&scene),
+            occluders: hiders.from_eye(is_open).clone(),
+            scene: scene.clone(),
+        });
+        let (mut removed, mut eyes, mut rng) = (0, [0, 0], SeededRng::new(5));
+        for number in 0..600 {
+            let camera = camera(&scene, &mut rng, number % 5 == 0);
+            let rays = Rays::of(&camera).unwrap();
+            let is_open = hiders.is_open(&rays, || true);
+            eyes[usize::from(is_open)] += 1;
+            let ready = if is_open { &open } else { &bare };
+            with_view(ready, &camera, SampleGrid::new(96, 60), |view, rays| {
+                let in_view = ready.in_view(view.volume);
+                let seen = visible_surfaces_by_random_rays(&index, rays, 1500, number, 1);
+                for kept in kept::<MaskedInner>(ready, view, Kernel::best()) {
+                    let lost = missing(&seen, &kept);
+                    assert!(lost.is_empty(), "{name} {number}: {lost:?}, {camera:?}");
+                    removed += in_view.len() - kept.len();
+                }
+            });
+        }
+        assert!(eyes.iter().all(|&count| count > 60), "{eyes:?}");
+        assert!(removed > 80, "{name}: {removed}");
+    }
+}
+
+#[test]
 fn only_what_hides_goes_on_beyond_the_bounds_of_the_scene() {
     let unit =
         |x: f64, z: f64| WorldBox::new(DVec3::new(x, 0.0, z), DVec3::new(x + 1.0, 1.0, z + 1.0));
@@ -82,14 +117,14 @@ fn only_what_hides_goes_on_beyond_the_bounds_of_the_scene() {
         };
         hider.faces
     };
-    let whole = OccluderScene::within(&scene, &inner);
+    let whole = OccluderScene::among(&scene, &inner, &[]);
     let solid = OccluderScene::of(&Solids::of(&scene));
     for item in 0..3 {
         assert_eq!(faces(&whole, item), faces(&solid, item));
     }
     // The lower z of the first one is the floor no more.
     inner[0].1.min.z += 0.25;
-    let less = OccluderScene::within(&scene, &inner);
+    let less = OccluderScene::among(&scene, &inner, &[]);
     assert_eq!(faces(&less, 0), faces(&solid, 0) & !(1 << 2));
     assert_eq!(faces(&less, 1), faces(&solid, 1));
     assert_ne!(faces(&solid, 0) & 1 << 2, 0);

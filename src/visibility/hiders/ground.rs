@@ -1,0 +1,420 @@
+//! The ground of a mesh: boxes below it, made once before any view, hide what is behind
+//! hills.
+//!
+//! Ground are the items of which every triangle faces up, if all of them together are
+//! a height over a rectangle: each edge is gone along once each way, but for those on
+//! the rectangle's sides, which part the sides without gaps. The sum of all triangles as
+//! seen from above then has the rectangle's border as its own, and as all turn the same
+//! way each place lies below one triangle, or below the common edge of some.
+//!
+//! A box whose top is nowhere above that height hides what is behind it from whatever
+//! begins above it: a ray that enters the box has come down through the height before,
+//! over the rectangle all the way, so it has met a triangle from above.
+
+use std::collections::HashMap;
+use std::time::Instant;
+
+use glam::{DVec3, Vec3};
+use serde::Serialize;
+
+use crate::camera::Lens;
+use crate::geometry::Aabb;
+use crate::scene::{Scene, SurfaceKind, Surfaces};
+use crate::visibility::Rays;
+use crate::visibility::inscribed::turn;
+
+/// Cells along each side of the rectangle, and steps of height.
+const CELLS: usize = 64;
+/// Boxes at most: each costs time in every view.
+const MOST_BOXES: usize = 512;
+/// Of the volume between the lowest and the highest place that a box must add.
+const LEAST_GAIN: f64 = 1.0 / 16384.0;
+
+/// What is known of the boxes below the ground of a mesh.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+#[non_exhaustive]
+pub struct GroundRow {
+    /// Items that are ground.
+    pub item_count: usize,
+    /// How many boxes there are below it.
+    pub box_count: usize,
+    /// Volume of the boxes / volume below the ground, both above its lowest place.
+    pub volume_share: f64,
+    /// Wall time of finding them all.
+    pub build_ns: f64,
+}
+
+/// The ground and the boxes below it, scene-local.
+pub struct Ground {
+    /// Overlapping; all of them reach below whatever else there is.
+    pub boxes: Vec<Aabb>,
+    /// What they are.
+    pub row: GroundRow,
+    triangles: Vec<[Vec3; 3]>,
+    /// Of all triangles.
+    bounds: Aabb,
+    origin: DVec3,
+}
+
+impl Ground {
+    /// `None` for a scene without one. O(t log t).
+    pub fn of(scene: &Scene) -> Option<Ground> {
+        let surfaces = scene.surfaces.as_ref()?;
+        let begun = Instant::now();
+        let items = (0..surfaces.items()).filter(|&item| faces_up(surfaces, item));
+        let items: Vec<usize> = items.collect();
+        let triangles = items.iter().flat_map(|&item| surfaces.of(item));
+        let triangles: Vec<[Vec3; 3]> = triangles.map(|t| t.map(|p| p + 0.0)).collect();
+        let bounds = height_over(&triangles)?;
+        let mut heights = Heights::of(&triangles, &bounds);
+        let (mut boxes, mut held) = (Vec::new(), 0.0);
+        let bottom = scene.bounds.min.z - scene.bounds.extent().z - 1.0;
+        while boxes.len() < MOST_BOXES {
+            let Some((gain, cells)) = heights.next_box() else {
+                break;
+            };
+            if gain < LEAST_GAIN {
+                break;
+            }
+            held += gain;
+            boxes.push(heights.close(cells, bottom));
+        }
+        Some(Ground {
+            row: GroundRow {
+                item_count: items.len(),
+                box_count: boxes.len(),
+                volume_share: held / heights.filled(),
+                build_ns: begun.elapsed().as_nanos() as f64,
+            },
+            boxes,
+            triangles,
+            bounds,
+            origin: scene.origin,
+        })
+    }
+
+    /// Whether all rays of a view begin above the ground: where they are at the near
+    /// plane. O(t).
+    pub fn is_below(&self, rays: &Rays) -> bool {
+        let camera = rays.camera();
+        let near = match camera.lens {
+            Lens::Orthographic { .. } => camera.lens.near(),
+            lens => lens.near().max(0.0),
+        };
+        let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
+        let corners = corners.map(|[x, y]| rays.through(x, y).at(near) - self.origin);
+        let (low, high) = corners
+            .iter()
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
+                (low.min(*p), high.max(*p))
+            });
+        // More than rounding of the corners, and of what begins at them, can be.
+        let size = low
+            .abs()
+            .max(high.abs())
+            .max(self.origin.abs())
+            .max_element();
+        let slack = 1e-9 * size + 1e-6 * (high - low).max_element();
+        let (low, high) = (low - slack, high + slack);
+        let [least, most] = [self.bounds.min, self.bounds.max].map(Vec3::as_dvec3);
+        let is_over = low.x >= least.x && high.x <= most.x && low.y >= least.y && high.y <= most.y;
+        let mut below = self.triangles.iter().filter(|[a, b, c]| {
+            let [least, most] = [a.min(*b).min(*c), a.max(*b).max(*c)].map(Vec3::as_dvec3);
+            most.x >= low.x && least.x <= high.x && most.y >= low.y && least.y <= high.y
+        });
+        is_over && below.all(|t| t.iter().all(|p| f64::from(p.z) < low.z))
+    }
+}
+
+/// Whether an item hides and every triangle of it faces up.
+fn faces_up(surfaces: &Surfaces, item: usize) -> bool {
+    let flat = |p: Vec3| [p.x, p.y];
+    surfaces.kinds[item] == SurfaceKind::Opaque
+        && !surfaces.of_item[item].is_empty()
+        && surfaces
+            .of(item)
+            .all(|[a, b, c]| turn(flat(a), flat(b), flat(c)) > 0)
+}
+
+/// The bounds of triangles that all face up, if they are a height over a rectangle.
+fn height_over(triangles: &[[Vec3; 3]]) -> Option<Aabb> {
+    let points = triangles.iter().flatten();
+    let low = points.clone().fold(Vec3::INFINITY, |low, p| low.min(*p));
+    let high = points.fold(Vec3::NEG_INFINITY, |high, p| high.max(*p));
+    let bits = |p: Vec3| p.to_array().map(f32::to_bits);
+    let mut rim: HashMap<[[u32; 3]; 2], [Vec3; 2]> = HashMap::new();
+    for corners in triangles {
+        for k in 0..3 {
+            let [from, to] = [corners[k], corners[(k + 1) % 3]];
+            if rim.remove(&[bits(to), bits(from)]).is_none()
+                && rim.insert([bits(from), bits(to)], [from, to]).is_some()
+            {
+                return None;
+            }
+        }
+    }
+    // Along each of the four sides from end to end.
+    let mut sides: [Vec<[f32; 2]>; 4] = Default::default();
+    for [p, q] in rim.into_values() {
+        let side = (0..4).find(|&side| {
+            let (axis, bound) = (side / 2, if side % 2 == 0 { low } else { high });
+            p[axis] == bound[axis] && q[axis] == bound[axis]
+        })?;
+        let along = 1 - side / 2;
+        sides[side].push([p[along].min(q[along]), p[along].max(q[along])]);
+    }
+    for (side, parts) in sides.iter_mut().enumerate() {
+        parts.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let along = 1 - side / 2;
+        let end = parts
+            .iter()
+            .try_fold(low[along], |end, part| (part[0] == end).then_some(part[1]));
+        if end != Some(high[along]) {
+            return None;
+        }
+    }
+    Some(Aabb::new(low, high))
+}
+
+/// Columns of cells of a rectangle, as high as the ground is at the least there.
+struct Heights {
+    bounds: Aabb,
+    /// By row and column, exactly.
+    least: Vec<f32>,
+    /// The same in whole steps, and how many of these are in a box already.
+    steps: Vec<u32>,
+    closed: Vec<u32>,
+}
+
+/// First row and column, the ones behind the last, and a number of steps.
+type Cells = ([usize; 2], [usize; 2], u32);
+
+impl Heights {
+    fn of(triangles: &[[Vec3; 3]], bounds: &Aabb) -> Heights {
+        let mut heights = Heights {
+            bounds: *bounds,
+            least: vec![f32::INFINITY; CELLS * CELLS],
+            steps: Vec::new(),
+            closed: vec![0; CELLS * CELLS],
+        };
+        for [a, b, c] in triangles {
+            let (low, high) = (a.min(*b).min(*c), a.max(*b).max(*c));
+            let [rows, columns] = [1, 0].map(|axis| heights.cells(axis, low[axis], high[axis]));
+            for row in rows {
+                for column in columns.clone() {
+                    let least = &mut heights.least[row * CELLS + column];
+                    *least = least.min(low.z);
+                }
+            }
+        }
+        let (low, high) = (bounds.min.z, bounds.max.z);
+        let step = (high - low) / CELLS as f32;
+        let whole = |z: &f32| ((z - low) / step).clamp(0.0, CELLS as f32) as u32;
+        heights.steps = heights.least.iter().map(whole).collect();
+        heights
+    }
+
+    /// Where a cell begins along an axis; at the end of the last one the bound itself.
+    fn edge(&self, axis: usize, cell: usize) -> f32 {
+        let (low, high) = (self.bounds.min[axis], self.bounds.max[axis]);
+        match cell {
+            CELLS => high,
+            _ => low + (high - low) * (cell as f32 / CELLS as f32),
+        }
+    }
+
+    /// The cells that have a point between two places.
+    fn cells(&self, axis: usize, low: f32, high: f32) -> std::ops::Range<usize> {
+        let cells = 0..CELLS;
+        let first = cells
+            .clone()
+            .position(|cell| self.edge(axis, cell + 1) >= low);
+        let end = cells.rev().position(|cell| self.edge(axis, cell) <= high);
+        first.unwrap_or(0)..CELLS - end.unwrap_or(0)
+    }
+
+    /// All that is below the ground, as a share of the bounds.
+    fn filled(&self) -> f64 {
+        self.steps
+            .iter()
+            .map(|&steps| f64::from(steps))
+            .sum::<f64>()
+            / (CELLS as f64).powi(3)
+    }
+
+    /// The box that holds the most that none before it does, as a share of the bounds; of
+    /// as many the largest, so that boxes overlap and leave no seam to look through.
+    fn next_box(&self) -> Option<(f64, Cells)> {
+        let mut best = ((0, 0), ([0; 2], [0; 2], 0));
+        for steps in 1..=CELLS as u32 {
+            let rows = self.steps.chunks(CELLS).map(|row| {
+                let high = row.iter().enumerate().filter(|(_, own)| **own >= steps);
+                high.fold(0u64, |bits, (column, _)| bits | 1 << column)
+            });
+            let rows: Vec<u64> = rows.collect();
+            let open = self.open_below(steps);
+            let sum = |row: usize, column: usize| open[row * (CELLS + 1) + column];
+            for first in 0..CELLS {
+                let mut common = u64::MAX;
+                for (last, row) in rows.iter().enumerate().skip(first) {
+                    common &= row;
+                    let mut left = common;
+                    while left != 0 {
+                        let at = left.trailing_zeros() as usize;
+                        let end = at + (left >> at).trailing_ones() as usize;
+                        left &= u64::MAX.checked_shl(end as u32).unwrap_or(0);
+                        let all = ((end - at) * (last + 1 - first)) as u32 * steps;
+                        let count = sum(last + 1, end) + sum(first, at)
+                            - sum(last + 1, at)
+                            - sum(first, end);
+                        if (count, all) > best.0 {
+                            best = ((count, all), ([first, at], [last + 1, end], steps));
+                        }
+                    }
+                    if common == 0 {
+                        break;
+                    }
+                }
+            }
+        }
+        let ((count, _), cells) = best;
+        (count > 0).then(|| (f64::from(count) / (CELLS as f64).powi(3), cells))
+    }
+
+    /// Sums over all cells below each corner of what is not in a box up to a height.
+    fn open_below(&self, steps: u32) -> Vec<u32> {
+        let side = CELLS + 1;
+        let mut sums = vec![0; side * side];
+        for row in 0..CELLS {
+            let mut own = 0;
+            for column in 0..CELLS {
+                own += steps.saturating_sub(self.closed[row * CELLS + column]);
+                sums[(row + 1) * side + column + 1] = own + sums[row * side + column + 1];
+            }
+        }
+        sums
+    }
+
+    /// The box of some cells: from `bottom` up to where the ground is lowest over them.
+    fn close(&mut self, (first, end, steps): Cells, bottom: f32) -> Aabb {
+        let mut top = f32::INFINITY;
+        for row in first[0]..end[0] {
+            for column in first[1]..end[1] {
+                let at = row * CELLS + column;
+                self.closed[at] = self.closed[at].max(steps);
+                top = top.min(self.least[at]);
+            }
+        }
+        let corner =
+            |at: [usize; 2], z: f32| Vec3::new(self.edge(0, at[1]), self.edge(1, at[0]), z);
+        Aabb::new(corner(first, bottom), corner(end, top))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{Camera, look_at};
+    use crate::scene::{SeededRng, load};
+
+    fn terrain() -> Scene {
+        load("mesh:terrain:n=8000", &Default::default()).unwrap()
+    }
+
+    /// All triangles of it.
+    fn triangles() -> Vec<[Vec3; 3]> {
+        let surfaces = terrain().surfaces.unwrap();
+        (0..surfaces.items())
+            .flat_map(|item| surfaces.of(item).collect::<Vec<_>>())
+            .collect()
+    }
+
+    /// The height of the ground at a place, by a plain search.
+    fn height(triangles: &[[Vec3; 3]], x: f64, y: f64) -> f64 {
+        let of = |t: &[Vec3; 3]| {
+            let [a, b, c] = t.map(Vec3::as_dvec3);
+            let [p, q, r] = [[a, b], [b, c], [c, a]]
+                .map(|[p, q]| (q.x - p.x) * (y - p.y) - (q.y - p.y) * (x - p.x));
+            let is_over = p >= 0.0 && q >= 0.0 && r >= 0.0;
+            is_over.then(|| (a.z * q + b.z * r + c.z * p) / (p + q + r))
+        };
+        triangles.iter().find_map(of).expect("ground everywhere")
+    }
+
+    #[test]
+    fn boxes_are_below_the_ground_and_fill_it() {
+        let (ground, all) = (Ground::of(&terrain()).unwrap(), triangles());
+        assert!(ground.boxes.len() > 20 && ground.row.box_count == ground.boxes.len());
+        assert!(ground.row.volume_share > 0.8 && ground.row.volume_share < 1.0);
+        let (mut rng, mut nearest) = (SeededRng::new(2), f64::INFINITY);
+        for b in ground.boxes.iter().cycle().take(3000) {
+            let p = b.min.as_dvec3() + rng.point() * b.extent().as_dvec3();
+            let above = height(&all, p.x, p.y) - f64::from(b.max.z);
+            assert!(above > -1e-4, "{above} {b:?}");
+            nearest = nearest.min(above);
+        }
+        assert!(nearest < 0.5, "{nearest}");
+    }
+
+    #[test]
+    fn what_is_no_height_over_a_rectangle_is_no_ground() {
+        let all = triangles();
+        let bounds = height_over(&all).unwrap();
+        let of = |change: &dyn Fn(&mut Vec<[Vec3; 3]>)| {
+            let mut changed = all.clone();
+            change(&mut changed);
+            height_over(&changed)
+        };
+        let middle = all.len() / 2;
+        let without = |place: usize| {
+            of(&|all| {
+                all.remove(place);
+            })
+        };
+        assert_eq!(of(&|all| all.reverse()), Some(bounds));
+        assert_eq!(without(middle), None, "a hole");
+        assert_eq!(without(0), None, "a corner is missing");
+        assert_eq!(of(&|all| all.push(all[middle])), None, "two layers");
+        assert_eq!(of(&|all| all[middle].swap(0, 1)), None, "one faces down");
+        let raised = |all: &mut Vec<[Vec3; 3]>| all[middle][1].z = all[middle][1].z.next_up();
+        assert_eq!(of(&raised), None, "a crack");
+        let lower_half = |all: &mut Vec<[Vec3; 3]>| {
+            let edge = (bounds.min.y + bounds.max.y) / 2.0;
+            all.retain(|t| t.iter().all(|p| p.y <= edge));
+        };
+        assert!(of(&lower_half).is_some_and(|b| b.max.y < bounds.max.y));
+        assert_eq!(height_over(&[]), None);
+        // Of a wood the ground is found among the trees, of spheres none.
+        let named = |name: &str| Ground::of(&load(name, &Default::default()).unwrap());
+        let wood = named("mesh:forest:n=20k").unwrap();
+        assert!(wood.row.item_count < 20 && wood.row.box_count > 20);
+        assert!(named("mesh:spheres:n=20k").is_none());
+        assert!(named("city:n=100").is_none());
+    }
+
+    #[test]
+    fn eyes_in_the_open_are_over_the_ground_with_their_near_plane() {
+        let (ground, all) = (Ground::of(&terrain()).unwrap(), triangles());
+        let middle = (ground.bounds.min + ground.bounds.max).as_dvec3() / 2.0;
+        let z = height(&all, middle.x, middle.y);
+        let is_below = |eye: DVec3, near: f64| {
+            let frame = look_at(eye, eye + DVec3::X, DVec3::Z).unwrap();
+            let lens = Lens::perspective(60.0, 1.5, near, None).unwrap();
+            ground.is_below(&Rays::of(&Camera { frame, lens }).unwrap())
+        };
+        let at = |height: f64| DVec3::new(middle.x, middle.y, z + height);
+        assert!(is_below(at(2.0), 0.1));
+        assert!(!is_below(at(-0.1), 0.01), "in the ground");
+        assert!(!is_below(at(2.0), 20.0), "the near window reaches into it");
+        let beside = DVec3::new(f64::from(ground.bounds.min.x) - 1.0, middle.y, z + 100.0);
+        assert!(!is_below(beside, 0.1), "beside the ground");
+        assert!(is_below(beside + DVec3::X * 2.0, 0.1));
+        let frame = look_at(at(100.0), at(0.0), DVec3::X).unwrap();
+        let down = |near: f64| Camera {
+            frame,
+            lens: Lens::orthographic(8.0, 1.0, near, 300.0).unwrap(),
+        };
+        assert!(ground.is_below(&Rays::of(&down(0.0)).unwrap()));
+        assert!(!ground.is_below(&Rays::of(&down(120.0)).unwrap()));
+    }
+}
