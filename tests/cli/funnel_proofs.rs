@@ -242,7 +242,9 @@ fn what_is_removed_of_meshes_maps_and_cut_outs_is_proven() {
             assert_eq!(of("visible_count") + of("sub_sample_count"), 0.0, "{what}");
             // Walls that only their ends hide may be seen through them: not decided.
             let decided = of("hidden_count") + of("tied_count") + of("along_lines_count");
-            assert!(of("undecided_count") <= 0.1 * decided, "{what}");
+            // Nor what the ground alone hides.
+            let most = if report["ground"].is_null() { 0.1 } else { 0.5 };
+            assert!(of("undecided_count") <= most * decided, "{what}");
         }
         assert!(
             rows >= 1 || scene.starts_with("mesh:spheres"),

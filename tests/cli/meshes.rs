@@ -105,9 +105,12 @@ fn a_mesh_is_a_scene_of_every_command() {
         "funnel --scene mesh:forest:n=5k --path street:frames=2 --samples 32x18 --processes 1",
     );
     for word in [
-        "Occluders: boxes proven inside",
+        "Occluders:",
+        "boxes proven inside",
         "of the volume of these",
         "loss",
+        "Ground:",
+        "of the volume between the ground and its lowest place",
     ] {
         assert!(table.replace('\n', " ").contains(word), "{word}: {table}");
     }

@@ -47,6 +47,27 @@ pub fn missing(row: &dyn RegionRow, truth: &RegionGraph, eyes: usize, seed: u64)
     missing
 }
 
+#[test]
+fn a_stored_row_answers_what_is_stored() {
+    let (_, graph) = rooms("rooms:n=1600,seed=1");
+    let exact = RoomsPvs::of(graph.clone()).unwrap();
+    let pvs = Arc::new(exact.pvs().clone());
+    let stored = StoredPvs::of(graph.clone(), pvs.clone(), EXACT).unwrap();
+    assert_eq!(pairs_of(&stored), *pvs);
+    let (mut rng, mut scratch) = (SeededRng::new(8), Scratch::default());
+    let [mut from_eye, mut from_region] = [Vec::new(), Vec::new()];
+    let anywhere = FromRegion(Box::new(stored.clone()));
+    for _ in 0..200 {
+        let rays = eye_in(&graph, &mut rng);
+        let places = [
+            stored.from_eye(&rays, &mut scratch, &mut from_eye),
+            anywhere.from_eye(&rays, &mut scratch, &mut from_region),
+        ];
+        assert_eq!(places[0], places[1]);
+        assert_eq!(from_eye, from_region);
+    }
+}
+
 const WORLDS: [&str; 4] = [
     "rooms:n=1600,seed=1",
     "rooms:n=700,seed=2,storeys=2",
