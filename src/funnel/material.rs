@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::world::{FunnelInput, World};
 use crate::query::ItemId;
 use crate::scene::WorldBox;
+use crate::visibility::hiders::Ground;
 use crate::visibility::truth::{
     Certificates, Ends, Hiders, PlanWall, Prover, RayIndex, SampleTruth, SurfaceIndex, certify,
 };
@@ -16,12 +17,14 @@ pub enum Material<'w> {
     Boxes(&'w Solids, RayIndex),
     /// Boxes of which some have holes.
     CutOuts(&'w Solids, Holes),
-    /// Triangles, and boxes inside those of some items.
+    /// Triangles, and boxes inside those of some items and below the ground.
     Triangles {
         /// The boxes around the items.
         around: Solids,
         /// Those inside, each with its item.
         within: Vec<(ItemId, WorldBox)>,
+        /// The ground, and the boxes below it.
+        ground: Option<(&'w Ground, Vec<WorldBox>)>,
         /// What rays end at.
         index: SurfaceIndex,
         /// The walls of a map.
@@ -49,7 +52,13 @@ impl Material<'_> {
                 .surfaces
                 .as_ref()
                 .expect("triangles of what is no solid box");
+            let ground = world.hiders.ground().map(|ground| {
+                let below = ground.boxes.iter();
+                let below = below.map(|b| WorldBox::within(b, around.origin));
+                (ground, below.collect())
+            });
             return Material::Triangles {
+                ground,
                 within: inner.filter(|(_, b)| b.min.cmplt(b.max).all()).collect(),
                 around,
                 index: SurfaceIndex::build(surfaces),
@@ -99,6 +108,7 @@ impl Material<'_> {
             Material::Triangles {
                 around,
                 within,
+                ground,
                 index,
                 walls,
             } => {
@@ -106,11 +116,15 @@ impl Material<'_> {
                 let items_there = around.boxes.len() as ItemId;
                 let mut boxes = around.clone();
                 let mut hide = Vec::new();
-                for (item, b) in within {
-                    if begins_beyond_near(rays, &around.boxes[*item as usize]) {
-                        boxes.push(b);
-                        hide.push((*item, [b.min.to_array(), b.max.to_array()]));
-                    }
+                let below = ground.iter().filter(|(ground, _)| ground.is_below(rays));
+                let below = below.flat_map(|(_, below)| below).map(|b| (None, b));
+                let beyond = |(item, _): &&(ItemId, _)| {
+                    begins_beyond_near(rays, &around.boxes[*item as usize])
+                };
+                let within = within.iter().filter(beyond);
+                for (item, b) in below.chain(within.map(|(item, b)| (Some(*item), b))) {
+                    boxes.push(b);
+                    hide.push((item, [b.min.to_array(), b.max.to_array()]));
                 }
                 let numbers: Vec<ItemId> = (items_there..boxes.boxes.len() as ItemId).collect();
                 let hiders = RayIndex::build_of(&boxes, &numbers);

@@ -185,7 +185,7 @@ pub fn prepare(
             stages: rows,
             audits: world.audits().to_vec(),
             inner_boxes: world.hiders.inner_row().cloned(),
-            ground: world.hiders.ground_row().cloned(),
+            ground: world.hiders.ground().map(|ground| ground.row.clone()),
             solid_blocks: world.hiders.blocks_row().cloned(),
             mirror,
             orders: drawn,

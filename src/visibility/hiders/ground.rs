@@ -114,7 +114,7 @@ impl Ground {
             .max(high.abs())
             .max(self.origin.abs())
             .max_element();
-        let slack = 1e-9 * size + 1e-6 * (high - low).max_element();
+        let slack = 1e-9 * size + 1e-6 * (high - low).max_element() + 1e-8 * near;
         let (low, high) = (low - slack, high + slack);
         let [least, most] = [self.bounds.min, self.bounds.max].map(Vec3::as_dvec3);
         let is_over = low.x >= least.x && high.x <= most.x && low.y >= least.y && high.y <= most.y;

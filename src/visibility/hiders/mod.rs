@@ -7,11 +7,10 @@ mod ground;
 mod inner;
 
 pub use blocks::BlocksRow;
-pub use ground::GroundRow;
+pub use ground::{Ground, GroundRow};
 pub use inner::InnerRow;
 
 use self::blocks::Blocks;
-use self::ground::Ground;
 use self::inner::Inner;
 use super::occlusion::OccluderScene;
 use super::{Rays, Solids};
@@ -79,9 +78,9 @@ impl Hiders {
         }
     }
 
-    /// What is known of the boxes below the ground of a mesh.
-    pub fn ground_row(&self) -> Option<&GroundRow> {
-        self.ground.as_ref().map(|ground| &ground.row)
+    /// The ground of a mesh, with the boxes below it.
+    pub fn ground(&self) -> Option<&Ground> {
+        self.ground.as_ref()
     }
 
     /// The boxes inside the items of a mesh, each with its item, by ascending item;

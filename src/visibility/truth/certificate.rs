@@ -153,8 +153,9 @@ pub enum Hiders {
     Items,
     /// Those of the items without holes; which these are, as it is typed.
     Uncut(String),
-    /// Boxes inside the triangles of an item. They are numbered on behind the items.
-    Within(Vec<(ItemId, Corners)>),
+    /// Boxes inside the triangles of an item, or below the ground, which is no item. They
+    /// are numbered on behind the items, first those below the ground.
+    Within(Vec<(Option<ItemId>, Corners)>),
 }
 
 impl Hiders {

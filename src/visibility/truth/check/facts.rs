@@ -1,6 +1,7 @@
 //! What proofs are held against, and which boxes hide in a view.
 
 use super::super::certificate::{Corners, Hiders, PlanWall, View};
+use super::ground::Ground;
 use super::inside::is_inside;
 use super::line::{Exact, corner, dot, exact};
 use crate::query::ItemId;
@@ -73,10 +74,21 @@ impl<'f> Named<'f> {
             }
             (Hiders::Within(boxes), Some(surfaces)) => {
                 named.is_within = true;
-                for (item, corners) in boxes {
-                    named
-                        .within
-                        .push(inner(view, facts, surfaces, *item, corners)?);
+                let is_below = |b: &(Option<ItemId>, Corners)| b.0.is_none();
+                let (below, within) = boxes.split_at(boxes.partition_point(is_below));
+                if !below.is_empty() {
+                    let ground = Ground::of(surfaces, facts.boxes.len())?;
+                    if !ground.is_below(view) {
+                        return Err("the view does not begin above the ground");
+                    }
+                    for (_, corners) in below {
+                        named.within.push(under(&ground, corners)?);
+                    }
+                }
+                for (item, corners) in within {
+                    let item = item.ok_or("a box within an item is none")?;
+                    let found = inner(view, facts, surfaces, item, corners)?;
+                    named.within.push(found);
                 }
             }
             _ => return Err("what it says that hides is not what the items are"),
@@ -105,11 +117,26 @@ impl<'f> Named<'f> {
     }
 }
 
-/// Whether boxes are by ascending item, and few of each.
-fn is_in_order(boxes: &[(ItemId, Corners)]) -> bool {
-    const MOST: usize = 16;
-    let too_many = |run: &[(ItemId, Corners)]| run[0].0 == run[MOST].0;
-    boxes.is_sorted_by_key(|b| b.0) && !boxes.windows(MOST + 1).any(too_many)
+/// Whether boxes are by ascending item, those of none first, and few of each.
+fn is_in_order(boxes: &[(Option<ItemId>, Corners)]) -> bool {
+    const MOST: [usize; 2] = [16, 1024];
+    let below = boxes.partition_point(|b| b.0.is_none());
+    let too_many = |run: &[(Option<ItemId>, Corners)]| run[0].0 == run[MOST[0]].0;
+    boxes.is_sorted_by_key(|b| b.0)
+        && below <= MOST[1]
+        && !boxes[below..].windows(MOST[0] + 1).any(too_many)
+}
+
+/// A box of corners in order.
+fn box_of([low, high]: &Corners) -> Option<WorldBox> {
+    let ordered = (0..3).all(|k| low[k].is_finite() && high[k].is_finite() && low[k] < high[k]);
+    ordered.then(|| WorldBox::new((*low).into(), (*high).into()))
+}
+
+/// A box below the ground.
+fn under(ground: &Ground, corners: &Corners) -> Result<WorldBox, &'static str> {
+    let found = box_of(corners).filter(|b| ground.holds(b));
+    found.ok_or("a box is not below the ground")
 }
 
 /// A box inside a closed surface that begins beyond where boxes hide from. Whatever ray
@@ -122,11 +149,11 @@ fn inner(
     item: ItemId,
     corners: &Corners,
 ) -> Result<WorldBox, &'static str> {
-    let [low, high] = *corners;
-    let ordered = (0..3).all(|k| low[k].is_finite() && high[k].is_finite() && low[k] < high[k]);
     let own = facts.boxes.get(item as usize);
-    let own = own.filter(|_| ordered && (item as usize) < surfaces.items());
-    let own = own.ok_or("a box within an item is none")?;
+    let own = own.filter(|_| (item as usize) < surfaces.items());
+    let (own, b) = own
+        .zip(box_of(corners))
+        .ok_or("a box within an item is none")?;
     if surfaces.kinds[item as usize] != SurfaceKind::Opaque {
         return Err("a box is within an item that does not hide");
     }
@@ -139,7 +166,6 @@ fn inner(
     if !(0..8).all(is_deep) {
         return Err("a box is within an item that reaches before the near plane");
     }
-    let b = WorldBox::new(low.into(), high.into());
     match is_inside(surfaces, item as usize, own, &b) {
         true => Ok(b),
         false => Err("a box is not inside the triangles of its item"),

@@ -10,6 +10,7 @@
 //! the corners of a cell it says of every line through it.
 
 mod facts;
+mod ground;
 mod inside;
 mod judge;
 mod line;
@@ -171,6 +172,8 @@ fn sound(view: &View, count: usize, boxes: &[WorldBox]) -> Result<(), &'static s
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tests_ground;
 #[cfg(test)]
 mod tests_plan;
 #[cfg(test)]

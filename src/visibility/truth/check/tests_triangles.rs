@@ -59,7 +59,7 @@ fn certified(surfaces: &Surfaces) -> Certificates {
     let truth = SampleTruth::of_surfaces(&index, &rays, SampleGrid::new(32, 32), 1);
     let corners = [inner.min.to_array(), inner.max.to_array()];
     let of_no_use = [aside.min.to_array(), aside.max.to_array()];
-    let hide = [of_no_use, corners].map(|corners| (WALL as ItemId, corners));
+    let hide = [of_no_use, corners].map(|corners| (Some(WALL as ItemId), corners));
     let hide = Hiders::Within(hide.to_vec());
     let hiders = RayIndex::build_of(&solids, &[3, 4]);
     let prover = Prover::hidden_by(hide, &solids, &hiders, &rays);
@@ -86,7 +86,7 @@ fn verify(certificates: &Certificates, surfaces: &Surfaces) -> Result<Counts, &'
     check(certificates, &facts).map_err(|rejected| rejected.reason)
 }
 
-fn within(certificates: &mut Certificates) -> &mut (ItemId, [[f64; 3]; 2]) {
+fn within(certificates: &mut Certificates) -> &mut (Option<ItemId>, [[f64; 3]; 2]) {
     match &mut certificates.hiders {
         Hiders::Within(boxes) => &mut boxes[0],
         other => panic!("{other:?}"),
@@ -135,18 +135,19 @@ fn a_box_that_is_not_within_its_item_is_rejected() {
         within(certificates).1[1][2] = 2.0_f64.next_up();
     };
     assert_eq!(with(&more), not_inside);
-    let elsewhere = |certificates: &mut Certificates| within(certificates).0 = BESIDE as ItemId;
+    let elsewhere =
+        |certificates: &mut Certificates| within(certificates).0 = Some(BESIDE as ItemId);
     assert_eq!(with(&elsewhere), not_inside);
     let none = Err("a box within an item is none");
     assert_eq!(moved(1, 0, f64::NAN), none);
     assert_eq!(moved(1, 0, 2.25), none);
-    assert_eq!(with(&|c| within(c).0 = 9), none);
+    assert_eq!(with(&|c| within(c).0 = Some(9)), none);
     // A second box is as good as the first; what is of an earlier item, or more than
     // anybody needs, is not looked at.
     let again = |c: &mut Certificates, item: ItemId, times: usize| match &mut c.hiders {
         Hiders::Within(boxes) => {
             let corners = boxes[0].1;
-            boxes.extend(std::iter::repeat_n((item, corners), times));
+            boxes.extend(std::iter::repeat_n((Some(item), corners), times));
         }
         other => panic!("{other:?}"),
     };
@@ -154,7 +155,7 @@ fn a_box_that_is_not_within_its_item_is_rejected() {
     let disorder = Err("boxes within items are not in the order of these, 16 each at most");
     assert_eq!(with(&|c| again(c, WALL as ItemId, 16)), disorder);
     let backward = |c: &mut Certificates| {
-        within(c).0 = BESIDE as ItemId;
+        within(c).0 = Some(BESIDE as ItemId);
         again(c, WALL as ItemId, 1);
     };
     assert_eq!(with(&backward), disorder);
@@ -333,7 +334,7 @@ fn proofs_hold_in_a_wood() {
         if (nearest - eye).dot(frame.forward()) > 0.02 {
             let b = WorldBox::within(b, scene.origin);
             solids.push(&b);
-            within.push((*item, [b.min.to_array(), b.max.to_array()]));
+            within.push((Some(*item), [b.min.to_array(), b.max.to_array()]));
         }
     }
     assert!(within.len() > 20, "{}", within.len());
