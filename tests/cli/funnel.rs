@@ -171,7 +171,7 @@ fn csv_has_every_field_of_every_table_of_the_json() {
         format!("funnel --scene city:n=500 {more} --cut-out fence"),
         format!("funnel --scene city:n=500 {more} --mirror 7"),
         format!("funnel --scene freedm-map12 {more}"),
-        format!("funnel --scene mesh:spheres:n=2000 {more}"),
+        format!("funnel --scene mesh:forest:n=5k {more}"),
     ];
     let wanted = [
         "level",

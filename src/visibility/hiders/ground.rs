@@ -93,6 +93,13 @@ impl Ground {
         })
     }
 
+    /// Whether some of the ground is higher than an eye. From above all of it hills hide
+    /// little, and boxes all over the image take the place of what else hides there.
+    pub fn rises_above(&self, rays: &Rays) -> bool {
+        let eye = rays.camera().frame.eye.z - self.origin.z;
+        eye < f64::from(self.bounds.max.z)
+    }
+
     /// Whether all rays of a view begin above the ground: where they are at the near
     /// plane. O(t).
     pub fn is_below(&self, rays: &Rays) -> bool {
@@ -404,6 +411,13 @@ mod tests {
         };
         let at = |height: f64| DVec3::new(middle.x, middle.y, z + height);
         assert!(is_below(at(2.0), 0.1));
+        let rises = |height: f64| {
+            let frame = look_at(at(height), middle, DVec3::X).unwrap();
+            let lens = Lens::perspective(60.0, 1.5, 0.1, None).unwrap();
+            ground.rises_above(&Rays::of(&Camera { frame, lens }).unwrap())
+        };
+        let top = f64::from(ground.bounds.max.z) - z;
+        assert!(rises(top - 0.1) && !rises(top + 0.1));
         assert!(!is_below(at(-0.1), 0.01), "in the ground");
         assert!(!is_below(at(2.0), 20.0), "the near window reaches into it");
         let beside = DVec3::new(f64::from(ground.bounds.min.x) - 1.0, middle.y, z + 100.0);

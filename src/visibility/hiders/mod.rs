@@ -61,11 +61,12 @@ impl Hiders {
         })
     }
 
-    /// Whether boxes that are of no item hide from the eye of these rays: it is above the
-    /// ground, or in the rooms of a map.
+    /// Whether boxes that are of no item hide from the eye of these rays, and are worth
+    /// drawing: it is above the ground where it stands and not above all of it, or in the
+    /// rooms of a map.
     pub fn is_open(&self, rays: &Rays, is_inside: impl FnOnce() -> bool) -> bool {
         match &self.ground {
-            Some(ground) => ground.is_below(rays),
+            Some(ground) => ground.rises_above(rays) && ground.is_below(rays),
             None => self.bare.is_none() || is_inside(),
         }
     }
