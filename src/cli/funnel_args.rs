@@ -78,7 +78,7 @@ pub struct FunnelArgs {
     /// What the back ends *-two-pass and hierarchical-z draw: all, nearest:64, largest:64
     #[arg(long, value_name = "CHOICE", default_value = "all", value_parser = values::occluders)]
     pub occluders: OccluderChoice,
-    /// Boxes that are looked for inside each closed item of a mesh, and drawn for it
+    /// Most boxes that are looked for inside each closed item of a mesh, and drawn for it
     #[arg(long, value_name = "N", default_value_t = BOXES as u32, value_parser = values::whole(1..=MOST_BOXES as u32), allow_negative_numbers = true)]
     pub inner_boxes: u32,
     /// Back end of the triangle stage

@@ -118,7 +118,7 @@ fn inner_boxes(row: &InnerRow) -> Block {
     });
     let inside = match row.boxed_count {
         0 => "any".to_owned(),
-        boxed => boxed.to_string(),
+        boxed => text::count(boxed),
     };
     Block::Line(format!(
         "Occluders: {} proven inside {inside} of {}{}; found in {}.",
@@ -131,12 +131,15 @@ fn inner_boxes(row: &InnerRow) -> Block {
 
 /// What hides below the ground, and what finding it took.
 fn ground(row: &GroundRow) -> Block {
+    let held = row.volume_share.map(|share| {
+        let held = share * 100.0;
+        format!(", {held:.1} % of the volume between the ground and its lowest place")
+    });
     Block::Line(format!(
-        "Ground: {} below {}, {:.1} % of the volume between the ground and its lowest place; found \
-         in {}.",
+        "Ground: {} below {}{}; found in {}.",
         text::counted(row.box_count, "box"),
         text::counted(row.item_count, "item"),
-        row.volume_share * 100.0,
+        held.unwrap_or_default(),
         text::time(row.build_ns)
     ))
 }

@@ -41,7 +41,8 @@ pub trait Isa: Copy {
 
     /// The numbers of a row.
     fn load(self, row: &[f32; LANES]) -> Self::Floats;
-    /// For each lane the number at its place in a table; 0 behind its end.
+    /// For each lane the number at its place in a table (of less than 2^31); 0 behind
+    /// its end.
     fn gather(self, table: &[f32], places: &[u32; LANES]) -> Self::Floats;
     /// The numbers of all lanes, lane 0 first.
     fn to_array(self, floats: Self::Floats) -> [f32; LANES];

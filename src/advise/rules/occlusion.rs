@@ -154,15 +154,15 @@ fn predicted(case: &Case, all: &Occlusion) -> f64 {
         outer: Vec::new(),
         inner: Vec::new(),
     };
-    for hider in open.all_hiders() {
-        solids.push(&WorldBox::within(&hider.inner, solids.origin));
+    for occluder in open.all_occluders() {
+        solids.push(&WorldBox::within(&occluder.inner, solids.origin));
     }
     let before = RayIndex::build(&solids);
     let boxes: Vec<WorldBox> = case.scene().written().collect();
     let (mut in_view, mut hidden, mut counted) = (Vec::new(), 0.0, 0.0);
     for frame in hidden::frames(all.views.len(), PROBED) {
         let view = &all.views[frame];
-        let hides = !all.hiders.from_eye(view.is_open).all_hiders().is_empty();
+        let hides = !all.hiders.from_eye(view.is_open).all_occluders().is_empty();
         in_view.clear();
         case.query(frame, &mut in_view);
         let asked = in_view.iter().step_by(in_view.len().div_ceil(ITEMS).max(1));

@@ -47,8 +47,8 @@ impl Isa for Avx512 {
     }
     #[inline(always)]
     fn gather(self, table: &[f32], places: &[u32; LANES]) -> __m512 {
-        // No lane is read whose place is not in the table; those of f32 in memory are
-        // below 2^31.
+        // No lane is read whose place is not in the table. Places are signed: of a table
+        // longer than that the rest would be taken for what is behind its end.
         let end = table.len().min(i32::MAX as usize) as i32;
         unsafe {
             let places = _mm512_loadu_si512(places.as_ptr().cast());

@@ -21,7 +21,7 @@ use crate::camera::Lens;
 use crate::geometry::Aabb;
 use crate::scene::{Scene, SurfaceKind, Surfaces};
 use crate::visibility::Rays;
-use crate::visibility::inscribed::turn;
+use crate::visibility::inscribed::{rectangles, turn};
 
 /// Cells along each side of the rectangle, and steps of height.
 const CELLS: usize = 64;
@@ -38,8 +38,9 @@ pub struct GroundRow {
     pub item_count: usize,
     /// How many boxes there are below it.
     pub box_count: usize,
-    /// Volume of the boxes / volume below the ground, both above its lowest place.
-    pub volume_share: f64,
+    /// Volume of the boxes / volume below the ground, both above its lowest place; null for
+    /// flat ground, which hides nothing.
+    pub volume_share: Option<f64>,
     /// Wall time of finding them all.
     pub build_ns: f64,
 }
@@ -83,7 +84,7 @@ impl Ground {
             row: GroundRow {
                 item_count: items.len(),
                 box_count: boxes.len(),
-                volume_share: held / heights.filled(),
+                volume_share: (held > 0.0).then(|| held / heights.filled()),
                 build_ns: begun.elapsed().as_nanos() as f64,
             },
             boxes,
@@ -261,28 +262,16 @@ impl Heights {
             let rows: Vec<u64> = rows.collect();
             let open = self.open_below(steps);
             let sum = |row: usize, column: usize| open[row * (CELLS + 1) + column];
-            for first in 0..CELLS {
-                let mut common = u64::MAX;
-                for (last, row) in rows.iter().enumerate().skip(first) {
-                    common &= row;
-                    let mut left = common;
-                    while left != 0 {
-                        let at = left.trailing_zeros() as usize;
-                        let end = at + (left >> at).trailing_ones() as usize;
-                        left &= u64::MAX.checked_shl(end as u32).unwrap_or(0);
-                        let all = ((end - at) * (last + 1 - first)) as u32 * steps;
-                        let count = sum(last + 1, end) + sum(first, at)
-                            - sum(last + 1, at)
-                            - sum(first, end);
-                        if (count, all) > best.0 {
-                            best = ((count, all), ([first, at], [last + 1, end], steps));
-                        }
-                    }
-                    if common == 0 {
-                        break;
-                    }
+            rectangles(&rows, |columns, rows| {
+                let all = (columns.len() * rows.len()) as u32 * steps;
+                let count = sum(rows.end, columns.end) + sum(rows.start, columns.start)
+                    - sum(rows.end, columns.start)
+                    - sum(rows.start, columns.end);
+                if (count, all) > best.0 {
+                    let [first, end] = [[rows.start, columns.start], [rows.end, columns.end]];
+                    best = ((count, all), (first, end, steps));
                 }
-            }
+            });
         }
         let ((count, _), cells) = best;
         (count > 0).then(|| (f64::from(count) / (CELLS as f64).powi(3), cells))
@@ -352,7 +341,8 @@ mod tests {
     fn boxes_are_below_the_ground_and_fill_it() {
         let (ground, all) = (Ground::of(&terrain()).unwrap(), triangles());
         assert!(ground.boxes.len() > 20 && ground.row.box_count == ground.boxes.len());
-        assert!(ground.row.volume_share > 0.8 && ground.row.volume_share < 1.0);
+        let share = ground.row.volume_share.unwrap();
+        assert!(share > 0.8 && share < 1.0, "{share}");
         let (mut rng, mut nearest) = (SeededRng::new(2), f64::INFINITY);
         for b in ground.boxes.iter().cycle().take(3000) {
             let p = b.min.as_dvec3() + rng.point() * b.extent().as_dvec3();
@@ -361,6 +351,24 @@ mod tests {
             nearest = nearest.min(above);
         }
         assert!(nearest < 0.5, "{nearest}");
+    }
+
+    #[test]
+    fn flat_ground_has_no_boxes() {
+        let mut flat = Surfaces::about(DVec3::ZERO);
+        let corners = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]];
+        let corners = corners.map(|[x, y]| Vec3::new(x, y, 1.0));
+        flat.push(
+            SurfaceKind::Opaque,
+            false,
+            &corners,
+            &[[0, 1, 2], [0, 2, 3]],
+        );
+        let row = Ground::of(&flat.into_scene("flat").unwrap()).unwrap().row;
+        assert_eq!(
+            (row.item_count, row.box_count, row.volume_share),
+            (1, 0, None)
+        );
     }
 
     #[test]

@@ -3,6 +3,7 @@
 
 use glam::{DVec3, Vec3};
 
+use super::rectangles::rectangles;
 use crate::geometry::Aabb;
 
 /// Cells of the bounds of a piece: inside or not. Boxes of inside cells come one after
@@ -136,36 +137,21 @@ impl Grid {
                 if rows.iter().all(|&row| row == 0) {
                     break;
                 }
-                for first in 0..n {
-                    let mut common = u64::MAX;
-                    for (last, row) in rows.iter().enumerate().skip(first) {
-                        common &= row;
-                        let deep = ((last + 1 - first) * (high - low)) as u32;
-                        let mut left = common;
-                        while left != 0 {
-                            let at = left.trailing_zeros() as usize;
-                            let length = (left >> at).trailing_ones();
-                            let end = at + length as usize;
-                            left &= u64::MAX.checked_shl(end as u32).unwrap_or(0);
-                            let all = length * deep;
-                            if all < best.0.0 {
-                                continue;
-                            }
-                            let flat = |z: usize| {
-                                below(end, last + 1, z) + below(at, first, z)
-                                    - below(at, last + 1, z)
-                                    - below(end, first, z)
-                            };
-                            let count = (flat(high) - flat(low), all);
-                            if count > best.0 {
-                                best = (count, [[at, first, low], [end, last + 1, high]]);
-                            }
-                        }
-                        if common == 0 {
-                            break;
-                        }
+                rectangles(&rows, |x, y| {
+                    let all = (x.len() * y.len() * (high - low)) as u32;
+                    if all < best.0.0 {
+                        return;
                     }
-                }
+                    let flat = |z: usize| {
+                        below(x.end, y.end, z) + below(x.start, y.start, z)
+                            - below(x.start, y.end, z)
+                            - below(x.end, y.start, z)
+                    };
+                    let count = (flat(high) - flat(low), all);
+                    if count > best.0 {
+                        best = (count, [[x.start, y.start, low], [x.end, y.end, high]]);
+                    }
+                });
             }
         }
         let ((count, _), found) = best;

@@ -7,6 +7,7 @@
 
 mod grid;
 mod proof;
+mod rectangles;
 
 use std::collections::BTreeMap;
 
@@ -15,6 +16,7 @@ use glam::Vec3;
 use self::grid::Grid;
 use self::proof::is_in;
 pub(crate) use self::proof::turn;
+pub(crate) use self::rectangles::rectangles;
 use crate::geometry::Aabb;
 use crate::query::ItemId;
 use crate::scene::{SurfaceKind, Surfaces, volume_within};

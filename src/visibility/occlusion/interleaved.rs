@@ -258,9 +258,9 @@ fn draw<I: Isa, B: OcclusionBuffer>(
         return 0;
     }
     let mut drawn = 0;
-    for hider in scene.hiders(position) {
-        let open = view.open & hider.faces;
-        let Some(mut outline) = Outline::of(&hider.inner, open, view, B::COVERAGE) else {
+    for occluder in scene.occluders(position) {
+        let open = view.open & occluder.faces;
+        let Some(mut outline) = Outline::of(&occluder.inner, open, view, B::COVERAGE) else {
             continue;
         };
         if !item.near {

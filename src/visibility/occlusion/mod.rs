@@ -36,7 +36,7 @@ pub use masked::{Masked, MaskedCentre, MaskedInner};
 pub use none::NoOcclusion;
 pub use outline::{Coverage, Outline};
 pub use rect::{Rect, Rects};
-pub use scene::{Faces, Hider, OccluderScene};
+pub use scene::{Faces, Occluder, OccluderScene};
 pub use stats::CullStats;
 pub use trace::FrameTrace;
 pub use two_pass::{OccluderChoice, TwoPass};

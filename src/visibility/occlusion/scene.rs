@@ -15,7 +15,7 @@ pub type Faces = u8;
 
 /// A box that hides what is behind it.
 #[derive(Clone, Copy, Debug)]
-pub struct Hider {
+pub struct Occluder {
     /// Scene-local, within what it stands for.
     pub inner: Aabb,
     /// The faces of the scene's bounds that it reaches, as written, exactly.
@@ -32,9 +32,9 @@ pub struct OccluderScene {
     /// In tree order, as what hides.
     ids: Vec<ItemId>,
     /// What hides, and which faces of the scene's bounds it reaches.
-    hiders: Vec<Hider>,
+    occluders: Vec<Occluder>,
     /// Where those of a position begin; at the end their number.
-    first_hiders: Vec<u32>,
+    first_occluders: Vec<u32>,
     /// Where in the tree an item is.
     positions: Vec<u32>,
     /// How many of the boxes are items; those behind them only hide.
@@ -46,13 +46,13 @@ impl OccluderScene {
     /// Solid boxes, which hide what is behind them. O(n log n).
     pub fn of(solids: &Solids) -> OccluderScene {
         let bounds = WorldBox::union_of(solids.boxes.iter().copied());
-        let hider = |(inner, b): (&Aabb, &WorldBox)| Hider {
+        let occluder = |(inner, b): (&Aabb, &WorldBox)| Occluder {
             inner: *inner,
             faces: faces_reached(b, &bounds),
         };
-        let hiders = (0..).zip(solids.inner.iter().zip(&solids.boxes).map(hider));
-        let hiders: Vec<_> = hiders.filter(|(_, own)| !own.inner.is_empty()).collect();
-        OccluderScene::sorted(solids.origin, &solids.outer, &hiders, bounds)
+        let occluders = (0..).zip(solids.inner.iter().zip(&solids.boxes).map(occluder));
+        let occluders: Vec<_> = occluders.filter(|(_, own)| !own.inner.is_empty()).collect();
+        OccluderScene::sorted(solids.origin, &solids.outer, &occluders, bounds)
     }
 
     /// Items that hide what is behind boxes inside them (each with its item, by ascending
@@ -62,15 +62,15 @@ impl OccluderScene {
         let bounds = WorldBox::union_of(scene.written());
         let numbered = (scene.items.len() as ItemId..).zip(blocks.iter().copied());
         let all = inner.iter().copied().chain(numbered);
-        let hiders = all.map(|(number, inner)| {
+        let occluders = all.map(|(number, inner)| {
             // Rounded inward: what hides reaches a face only if this does.
             let b = WorldBox::within(&inner, scene.origin);
             let faces = faces_reached(&b, &bounds);
-            (number, Hider { inner, faces })
+            (number, Occluder { inner, faces })
         });
-        let hiders: Vec<_> = hiders.collect();
+        let occluders: Vec<_> = occluders.collect();
         let outer = [&scene.items[..], blocks].concat();
-        let mut among = OccluderScene::sorted(scene.origin, &outer, &hiders, bounds);
+        let mut among = OccluderScene::sorted(scene.origin, &outer, &occluders, bounds);
         among.items = scene.items.len();
         among
     }
@@ -80,7 +80,7 @@ impl OccluderScene {
     fn sorted(
         origin: DVec3,
         outer: &[Aabb],
-        by_number: &[(ItemId, Hider)],
+        by_number: &[(ItemId, Occluder)],
         bounds: WorldBox,
     ) -> OccluderScene {
         let mut ids: Vec<ItemId> = (0..outer.len() as ItemId).collect();
@@ -97,23 +97,23 @@ impl OccluderScene {
             levels.push(blocks_of(&unions));
         }
         let mut positions = vec![0; ids.len()];
-        let mut hiders = Vec::with_capacity(by_number.len());
-        let mut first_hiders = vec![0];
+        let mut occluders = Vec::with_capacity(by_number.len());
+        let mut first_occluders = vec![0];
         for (position, &id) in ids.iter().enumerate() {
             positions[id as usize] = position as u32;
             let first = by_number.partition_point(|(number, _)| *number < id);
             let own = by_number[first..].iter();
-            hiders.extend(
+            occluders.extend(
                 own.take_while(|(number, _)| *number == id)
-                    .map(|(_, hider)| *hider),
+                    .map(|(_, occluder)| *occluder),
             );
-            first_hiders.push(hiders.len() as u32);
+            first_occluders.push(occluders.len() as u32);
         }
         OccluderScene {
             origin,
             levels,
-            hiders,
-            first_hiders,
+            occluders,
+            first_occluders,
             positions,
             items: ids.len(),
             ids,
@@ -188,22 +188,22 @@ impl OccluderScene {
 
     /// What hides at a position; nothing where the item is not solid.
     #[inline(always)]
-    pub fn hiders(&self, position: usize) -> &[Hider] {
-        let [first, end] = [position, position + 1].map(|at| self.first_hiders[at] as usize);
-        &self.hiders[first..end]
+    pub fn occluders(&self, position: usize) -> &[Occluder] {
+        let [first, end] = [position, position + 1].map(|at| self.first_occluders[at] as usize);
+        &self.occluders[first..end]
     }
 
     /// All that hides, in tree order.
-    pub fn all_hiders(&self) -> &[Hider] {
-        &self.hiders
+    pub fn all_occluders(&self) -> &[Occluder] {
+        &self.occluders
     }
 
     /// Heap bytes.
     pub fn bytes(&self) -> usize {
         let blocks: usize = self.levels.iter().map(|l| size_of_val(&l[..])).sum();
         let items = size_of_val(&self.ids[..]) + size_of_val(&self.positions[..]);
-        let hiders = size_of_val(&self.hiders[..]) + size_of_val(&self.first_hiders[..]);
-        blocks + items + hiders
+        let occluders = size_of_val(&self.occluders[..]) + size_of_val(&self.first_occluders[..]);
+        blocks + items + occluders
     }
 }
 

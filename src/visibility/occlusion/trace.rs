@@ -46,9 +46,9 @@ impl FrameTrace {
     /// Reads the boxes of the occluders that were drawn, 24 bytes each: as many, side by
     /// side.
     pub fn read_occluders(&self, scene: &OccluderScene) -> u32 {
-        let drawn = &scene.all_hiders()[..self.stats.drawn];
-        drawn.iter().fold(0, |all, hider| {
-            let [low, high] = hider.inner.bits();
+        let drawn = &scene.all_occluders()[..self.stats.drawn];
+        drawn.iter().fold(0, |all, occluder| {
+            let [low, high] = occluder.inner.bits();
             all ^ low[0] ^ low[1] ^ low[2] ^ high[0] ^ high[1] ^ high[2]
         })
     }

@@ -144,9 +144,9 @@ impl<B: OcclusionBuffer> Work for Culled<'_, B> {
         for &index in &state.order {
             let candidate = &state.candidates[index as usize];
             let position = candidate.position as usize;
-            for hider in scene.hiders(position) {
-                let open = view.open & hider.faces;
-                let outline = Outline::of(&hider.inner, open, view, B::COVERAGE);
+            for occluder in scene.occluders(position) {
+                let open = view.open & occluder.faces;
+                let outline = Outline::of(&occluder.inner, open, view, B::COVERAGE);
                 let Some(mut outline) = outline else {
                     continue;
                 };

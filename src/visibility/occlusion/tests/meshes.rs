@@ -112,10 +112,10 @@ fn only_what_hides_goes_on_beyond_the_bounds_of_the_scene() {
         Scene::from_boxes("three", &[unit(0.0, 0.0), unit(2.0, 0.0), unit(4.0, 1.0)]).unwrap();
     let mut inner: Vec<_> = (0..).zip(scene.items.iter().copied()).collect();
     let faces = |occluders: &OccluderScene, item| {
-        let [hider] = occluders.hiders(occluders.position(item)) else {
+        let [occluder] = occluders.occluders(occluders.position(item)) else {
             panic!("one each");
         };
-        hider.faces
+        occluder.faces
     };
     let whole = OccluderScene::among(&scene, &inner, &[]);
     let solid = OccluderScene::of(&Solids::of(&scene));

@@ -33,6 +33,14 @@ impl<'s> Facts<'s> {
         }
     }
 
+    /// Triangles, with the boxes around them.
+    pub fn of_surfaces(boxes: &'s [WorldBox], surfaces: &'s Surfaces) -> Facts<'s> {
+        Facts {
+            surfaces: Some(surfaces),
+            ..Facts::of_boxes(boxes)
+        }
+    }
+
     /// The wall that an item is.
     pub fn wall(&self, item: ItemId) -> Option<&PlanWall> {
         let place = self.walls.binary_search_by_key(&item, |wall| wall.item);
@@ -70,7 +78,9 @@ impl<'f> Named<'f> {
             (Hiders::Uncut(_), None) if has_holes => {}
             // A few an item: however many a file names, no triangle is looked at more often.
             (Hiders::Within(boxes), _) if !is_in_order(boxes) => {
-                return Err("boxes within items are not in the order of these, 16 each at most");
+                return Err(
+                    "boxes are not by ascending item, those below the ground first, or too many of one",
+                );
             }
             (Hiders::Within(boxes), Some(surfaces)) => {
                 named.is_within = true;

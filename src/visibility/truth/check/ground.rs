@@ -8,7 +8,7 @@
 //! triangle from its front.
 
 use super::super::certificate::View;
-use super::line::{Exact, Three, cross, dot, exact, sign_of_difference};
+use super::line::{Exact, Line, Three, cross, dot, exact, sign_of_difference};
 use crate::scene::{SurfaceKind, Surfaces, WorldBox};
 
 type Triangle = [[f32; 3]; 3];
@@ -184,7 +184,7 @@ fn corners(view: &View) -> Option<Vec<(Three, Exact)>> {
     let sides = view.sides.map(exact);
     let from = Exact::from(view.hides_from);
     let corners = [[0, 2], [0, 3], [1, 2], [1, 3]].map(|[i, j]: [usize; 2]| {
-        let line = super::line::Line::new(view, cross(&sides[i], &sides[j]));
+        let line = Line::new(view, cross(&sides[i], &sides[j]));
         // Depth along a line is counted from the eye's plane: place + direction * t.
         let reach = dot(&line.direction, &forward);
         let gone = match view.parallel {

@@ -64,12 +64,7 @@ fn verify(
     surfaces: &Surfaces,
 ) -> Result<Counts, &'static str> {
     let boxes: Vec<WorldBox> = scene.written().collect();
-    let facts = Facts {
-        boxes: &boxes,
-        cut_out: &[],
-        surfaces: Some(surfaces),
-        walls: &[],
-    };
+    let facts = Facts::of_surfaces(&boxes, surfaces);
     check(certificates, &facts).map_err(|rejected| rejected.reason)
 }
 
@@ -137,7 +132,8 @@ fn a_box_that_is_not_below_the_ground_is_rejected() {
         Hiders::Within(boxes) => boxes.extend(vec![boxes[0]; 1024]),
         other => panic!("{other:?}"),
     };
-    let disorder = Err("boxes within items are not in the order of these, 16 each at most");
+    let disorder =
+        Err("boxes are not by ascending item, those below the ground first, or too many of one");
     assert_eq!(with(&many), disorder);
 }
 

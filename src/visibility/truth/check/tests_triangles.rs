@@ -77,12 +77,7 @@ fn certified(surfaces: &Surfaces) -> Certificates {
 
 fn verify(certificates: &Certificates, surfaces: &Surfaces) -> Result<Counts, &'static str> {
     let boxes = written();
-    let facts = Facts {
-        boxes: &boxes,
-        cut_out: &[],
-        surfaces: Some(surfaces),
-        walls: &[],
-    };
+    let facts = Facts::of_surfaces(&boxes, surfaces);
     check(certificates, &facts).map_err(|rejected| rejected.reason)
 }
 
@@ -152,7 +147,8 @@ fn a_box_that_is_not_within_its_item_is_rejected() {
         other => panic!("{other:?}"),
     };
     assert!(with(&|c| again(c, WALL as ItemId, 15)).is_ok());
-    let disorder = Err("boxes within items are not in the order of these, 16 each at most");
+    let disorder =
+        Err("boxes are not by ascending item, those below the ground first, or too many of one");
     assert_eq!(with(&|c| again(c, WALL as ItemId, 16)), disorder);
     let backward = |c: &mut Certificates| {
         within(c).0 = Some(BESIDE as ItemId);
@@ -346,12 +342,7 @@ fn proofs_hold_in_a_wood() {
     let items: Vec<ItemId> = (0..boxes.len() as ItemId).collect();
     let ends = Ends::Triangles(&index);
     let certificates = certify("wood", &prover, ends, &rays, &truth, &items, 1);
-    let facts = Facts {
-        boxes: &boxes,
-        cut_out: &[],
-        surfaces: Some(&surfaces),
-        walls: &[],
-    };
+    let facts = Facts::of_surfaces(&boxes, &surfaces);
     let counts = check(&certificates, &facts).unwrap();
     assert!(counts.hidden > 0, "{counts:?}");
     assert!(counts.visible >= truth.visible.len(), "{counts:?}");
