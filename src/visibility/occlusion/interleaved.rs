@@ -205,8 +205,11 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
                 }
                 continue;
             }
+            // What may be drawn hides what comes after it in its block; the rest may come in
+            // any order.
+            let large = lanes & (!flat | coverable_from(isa, &rects, B::COVERAGE, least_area));
             let mut order = [0; LANES];
-            let count = by_depth(&rects.depth, lanes, &mut order);
+            let count = by_depth(&rects.depth, lanes, large != 0, &mut order);
             let mut drawn = false;
             for &key in &order[..count] {
                 let lane = (key & 15) as usize;
@@ -220,8 +223,7 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
                     position: position as u32,
                     near,
                 });
-                let large = near || coverable(&rect, B::COVERAGE) >= least_area;
-                if large {
+                if large >> lane & 1 == 1 {
                     let own = draw(isa, buffer, scene, view, &survivors[survivors.len() - 1]);
                     drawn |= own > 0;
                     stats.drawn += own;
@@ -272,10 +274,15 @@ fn draw<I: Isa, B: OcclusionBuffer>(
     drawn
 }
 
-/// The lanes in the order of their depths, each with its key's upper bits in front
-/// of its number; returns how many there are.
+/// The lanes, `sorted` by their depths or by their numbers, each with its key's upper
+/// bits in front of its number; returns how many there are.
 #[inline(always)]
-fn by_depth(depth: &[f32; LANES], lanes: LaneMask, order: &mut [u32; LANES]) -> usize {
+fn by_depth(
+    depth: &[f32; LANES],
+    lanes: LaneMask,
+    sorted: bool,
+    order: &mut [u32; LANES],
+) -> usize {
     let mut count = 0;
     let mut left = lanes;
     while left != 0 {
@@ -283,7 +290,7 @@ fn by_depth(depth: &[f32; LANES], lanes: LaneMask, order: &mut [u32; LANES]) -> 
         left &= left - 1;
         let key = depth_bits(depth[lane as usize]) & !15 | lane;
         let mut at = count;
-        while at > 0 && order[at - 1] > key {
+        while sorted && at > 0 && order[at - 1] > key {
             order[at] = order[at - 1];
             at -= 1;
         }
@@ -293,16 +300,21 @@ fn by_depth(depth: &[f32; LANES], lanes: LaneMask, order: &mut [u32; LANES]) -> 
     count
 }
 
-/// The pixels of a rectangle that its box may cover, as a rule: it is rounded outward,
-/// so that those at its rim are covered in part.
+/// The lanes whose boxes may cover at least so many pixels by a rule, mostly: a
+/// rectangle is rounded outward, so that the pixels at its rim are covered in part.
 #[inline(always)]
-fn coverable(rect: &Rect, coverage: Coverage) -> u32 {
+fn coverable_from<I: Isa>(isa: I, rects: &Rects, coverage: Coverage, pixels: u32) -> LaneMask {
     let rim = match coverage {
-        Coverage::Centre => 1,
-        Coverage::Whole => 2,
+        Coverage::Centre => 0,
+        Coverage::Whole => 1,
     };
-    let size = |first: u16, last: u16| u32::from(last - first + 1).saturating_sub(rim);
-    size(rect.x0, rect.x1) * size(rect.y0, rect.y1)
+    let mut enough = [0; LANES];
+    for lane in 0..LANES {
+        let across = (rects.x1[lane] - rects.x0[lane] - rim).max(0) as u32;
+        let down = (rects.y1[lane] - rects.y0[lane] - rim).max(0) as u32;
+        enough[lane] = u32::from(across * down >= pixels);
+    }
+    !isa.zeros(isa.words(&enough))
 }
 
 /// Bits of a float grow with it from zero on; what is before the eye comes first.
