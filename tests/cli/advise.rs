@@ -478,15 +478,25 @@ fn sorting_pays_by_the_layers_and_the_cost_of_a_fragment() {
 
 #[test]
 fn the_stages_behind_the_frustum_are_weighed_on_maps_and_meshes_too() {
-    let of = |name: &str, more: &str| decided(name, &format!("--path street:frames=12 {more}"));
+    let of = |more: &str| {
+        let line = format!("advise --structure linear,wide --path street:frames=8 {more}");
+        let advice = advice(Path::new("."), &line);
+        ["occlusion", "cones", "sorting"].map(|name| {
+            let rule = rule(&advice, name);
+            (rule["decision"].clone(), number(rule, "statistic"))
+        })
+    };
     // Free drawing is worth no stage, dear drawing is worth one that removes much.
-    for (name, least) in [("occlusion", 0.2), ("cones", 0.2), ("sorting", 0.01)] {
-        let map = "--scene freedm-map20";
-        let (dear, removed) = of(name, &format!("{map} --draw-ns 1e5 --shade-ns 100"));
-        assert!(dear == "keep" && removed > least, "{name} {dear} {removed}");
-        let (free, same) = of(name, &format!("{map} --draw-ns 0 --shade-ns 0"));
-        assert_eq!((free.as_str(), same), ("leave_out", removed), "{name}");
-        let (_, removed) = of(name, "--scene mesh:spheres:n=40000");
-        assert!((0.0..1.0).contains(&removed), "{name} {removed}");
+    let dear = of("--scene freedm-map20 --draw-ns 1e5 --shade-ns 100");
+    let free = of("--scene freedm-map20 --draw-ns 0 --shade-ns 0");
+    for (i, least) in [0.2, 0.2, 0.01].into_iter().enumerate() {
+        assert!(dear[i].0 == "keep" && dear[i].1 > least, "{i} {dear:?}");
+        assert!(
+            free[i].0 == "leave_out" && free[i].1 == dear[i].1,
+            "{i} {free:?}"
+        );
     }
+    let mesh = of("--scene mesh:spheres:n=40000");
+    let shares = mesh.iter().all(|(_, removed)| (0.0..1.0).contains(removed));
+    assert!(shares, "{mesh:?}");
 }

@@ -140,7 +140,7 @@ fn what_promises_to_lose_nothing_sees_through_holes() {
 
 #[test]
 fn a_stencil_of_portals_saves_samples_and_shows_the_same() {
-    let line = "funnel --scene rooms:n=3000 --path street:frames=8 --samples 96x54 --processes 1 \
+    let line = "funnel --scene rooms:n=2000 --path street:frames=4 --samples 64x36 --processes 1 \
                 --region none --occlusion none --format json";
     for more in ["", " --cut-out fence:share=0.5,tile=0.5"] {
         let report = json(&works(Path::new("."), &format!("{line}{more}")));
