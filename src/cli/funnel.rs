@@ -230,7 +230,7 @@ impl Setting {
             claim: self.claim.as_ref(),
             from: args.from,
             occluders: args.occluders,
-            inner_boxes: args.inner_boxes as usize,
+            inner_boxes: args.inner_boxes.map(|most| most as usize),
             truth_cache,
             execution: args.kernel.execution()?,
         })

@@ -11,7 +11,7 @@ use crate::funnel::{SEEN_FROM, SeenFrom};
 use crate::query::ItemId;
 use crate::visibility::SampleGrid;
 use crate::visibility::fragment::CutOuts;
-use crate::visibility::inscribed::{BOXES, MOST_BOXES};
+use crate::visibility::inscribed::MOST_BOXES;
 use crate::visibility::occlusion::OccluderChoice;
 
 const FUNNEL_HELP: &str = "\
@@ -79,8 +79,9 @@ pub struct FunnelArgs {
     #[arg(long, value_name = "CHOICE", default_value = "all", value_parser = values::occluders)]
     pub occluders: OccluderChoice,
     /// Most boxes that are looked for inside each closed item of a mesh, and drawn for it
-    #[arg(long, value_name = "N", default_value_t = BOXES as u32, value_parser = values::whole(1..=MOST_BOXES as u32), allow_negative_numbers = true)]
-    pub inner_boxes: u32,
+    /// [default: 8]
+    #[arg(long, value_name = "N", value_parser = values::whole(1..=MOST_BOXES as u32), allow_negative_numbers = true)]
+    pub inner_boxes: Option<u32>,
     /// Back end of the triangle stage
     #[arg(long, value_name = "NAME")]
     pub triangle: Option<String>,

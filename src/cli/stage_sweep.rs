@@ -20,7 +20,7 @@ use crate::path::{self, CameraPath};
 use crate::scene::{self, LoadOptions, Scene};
 use crate::suite::DEFAULT_PATH;
 use crate::visibility::occlusion::OccluderChoice;
-use crate::visibility::{Guarantee, SampleGrid, inscribed};
+use crate::visibility::{Guarantee, SampleGrid};
 
 /// Rounds of a point, if one process has them all.
 const ROUNDS: [usize; 2] = [3, 9];
@@ -79,7 +79,7 @@ impl Setting {
             claim: None,
             from: SeenFrom::Eye,
             occluders: OccluderChoice::All,
-            inner_boxes: inscribed::BOXES,
+            inner_boxes: None,
             truth_cache: None,
             execution: args.kernel.execution()?,
         })

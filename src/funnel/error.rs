@@ -30,16 +30,19 @@ pub enum FunnelError {
     /// The scene's file, read a second time.
     #[error(transparent)]
     Input(#[from] InputError),
-    /// Holes and mirrors are made of solid boxes.
+    /// Holes and mirrors are made of solid boxes, boxes looked for inside triangles.
     #[error(
-        "the items of '{scene}' are {}; expected a scene of solid boxes for {option}",
-        shape.name()
+        "the items of '{scene}' are {}; expected a scene of {} for {option}",
+        shape.name(),
+        expected.name()
     )]
-    NoBoxes {
+    Shape {
         /// Its name.
         scene: String,
         /// What its items are.
         shape: ItemShape,
+        /// What they would have to be.
+        expected: ItemShape,
         /// What was asked for.
         option: &'static str,
     },

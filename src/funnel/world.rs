@@ -27,6 +27,7 @@ use crate::query::ItemId;
 use crate::scene::{ItemShape, Scene, Surfaces};
 use crate::visibility::fragment::{self, CutOuts};
 use crate::visibility::hiders::Hiders;
+use crate::visibility::inscribed::BOXES;
 use crate::visibility::occlusion::{self, OccluderChoice, OccluderScene};
 use crate::visibility::region::{EyePlace, Marks, Pvs, RegionRow, Scratch};
 use crate::visibility::triangle;
@@ -60,8 +61,9 @@ pub struct FunnelInput<'a> {
     pub from: SeenFrom,
     /// What the back ends of the occlusion stage in two passes draw.
     pub occluders: OccluderChoice,
-    /// How many boxes are looked for inside each item of a mesh: at least 1.
-    pub inner_boxes: usize,
+    /// How many boxes are looked for inside each item of a mesh, at least 1; `None` for
+    /// [`BOXES`].
+    pub inner_boxes: Option<usize>,
     /// Where what solid boxes show at the samples is kept from run to run.
     pub truth_cache: Option<&'a TruthCache>,
     /// Instructions of every stage, and threads that look for the truth.
@@ -141,6 +143,12 @@ impl<'a> World<'a> {
         // What has holes closes no face of a grid.
         let whole = solids.as_ref().filter(|_| input.cut_outs.is_none());
         let regions = Regions::of(input.scene, input.claim, input.from, whole)?;
+        let refused = |option: &'static str, expected: ItemShape| FunnelError::Shape {
+            scene: input.scene.name.clone(),
+            shape: input.scene.item_shape(),
+            expected,
+            option,
+        };
         if input.claim.is_some() && regions.is_none() {
             let scene = input.scene.name.clone();
             return Err(FunnelError::NoRegions { scene });
@@ -156,22 +164,12 @@ impl<'a> World<'a> {
                     .for_each(|item| solids.hides_nothing(item));
                 Some(holes)
             }
-            (Some(_), None) => {
-                return Err(FunnelError::NoBoxes {
-                    scene: input.scene.name.clone(),
-                    shape: input.scene.item_shape(),
-                    option: "--cut-out",
-                });
-            }
+            (Some(_), None) => return Err(refused("--cut-out", ItemShape::Box)),
         };
         let surfaces = surfaces_of(input.scene)?;
         if let Some(item) = input.mirror {
             let Some(solids) = &solids else {
-                return Err(FunnelError::NoBoxes {
-                    scene: input.scene.name.clone(),
-                    shape: input.scene.item_shape(),
-                    option: "--mirror",
-                });
+                return Err(refused("--mirror", ItemShape::Box));
             };
             if item as usize >= solids.boxes.len() {
                 return Err(FunnelError::NoMirror {
@@ -181,10 +179,13 @@ impl<'a> World<'a> {
                 });
             }
         }
+        if input.inner_boxes.is_some() && input.scene.item_shape() != ItemShape::Mesh {
+            return Err(refused("--inner-boxes", ItemShape::Mesh));
+        }
         let hiders = Hiders::of(
             input.scene,
             solids.as_ref(),
-            input.inner_boxes,
+            input.inner_boxes.unwrap_or(BOXES),
             input.execution.threads,
         )?;
         let world = World {
@@ -484,7 +485,7 @@ mod tests {
             claim: None,
             from: SeenFrom::Eye,
             occluders: OccluderChoice::All,
-            inner_boxes: 1,
+            inner_boxes: None,
             truth_cache: None,
             execution: Execution::default(),
         };

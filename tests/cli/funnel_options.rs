@@ -4,6 +4,7 @@
 use std::fs;
 use std::path::Path;
 
+use cullbench::visibility::inscribed::BOXES;
 use serde_json::Value;
 
 use super::funnel::{row, rows};
@@ -107,6 +108,17 @@ fn more_boxes_inside_meshes_hide_more_and_lose_nothing() {
         let done = cullbench(Path::new("."), &line);
         assert_refused(&done, "from 1 to 16", wrong);
     }
+    // Not where there is nothing to look for them in.
+    for (scene, items) in [("city:n=50", "solid boxes"), ("freedm-map12", "walls")] {
+        let done = cullbench(
+            Path::new("."),
+            &format!("funnel --scene {scene} --inner-boxes 8"),
+        );
+        let told = "expected a scene of triangles for --inner-boxes";
+        assert_refused(&done, &format!("are {items}; {told}"), scene);
+    }
+    let help = works(Path::new("."), "funnel --help");
+    assert!(help.contains(&format!("[default: {BOXES}]")), "{help}");
 }
 
 #[test]

@@ -309,10 +309,10 @@ fn coverable_from<I: Isa>(isa: I, rects: &Rects, coverage: Coverage, pixels: u32
         Coverage::Whole => 1,
     };
     let mut enough = [0; LANES];
-    for lane in 0..LANES {
+    for (lane, enough) in enough.iter_mut().enumerate() {
         let across = (rects.x1[lane] - rects.x0[lane] - rim).max(0) as u32;
         let down = (rects.y1[lane] - rects.y0[lane] - rim).max(0) as u32;
-        enough[lane] = u32::from(across * down >= pixels);
+        *enough = u32::from(across * down >= pixels);
     }
     !isa.zeros(isa.words(&enough))
 }
