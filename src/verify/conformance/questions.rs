@@ -64,6 +64,14 @@ pub(super) fn each<T: RegionIndex>(
     scenes: impl IntoIterator<Item = Questions>,
     mut holds: impl FnMut(&mut Questions, &mut T) -> Outcome,
 ) -> Outcome {
+    each_of(&mut scenes.into_iter(), &mut holds)
+}
+
+/// Compiled once for each structure, not for each of its properties.
+fn each_of<T: RegionIndex>(
+    scenes: &mut dyn Iterator<Item = Questions>,
+    holds: &mut dyn FnMut(&mut Questions, &mut T) -> Outcome,
+) -> Outcome {
     for mut questions in scenes {
         let built = build(&questions.items);
         let outcome = built.and_then(|mut index| holds(&mut questions, &mut index));

@@ -6,7 +6,7 @@
 //! in the tree: less is drawn that something nearer hides than by going down child by
 //! child, and a masked buffer loses less (docs/adr/0021-nearest-block-first.md).
 
-use std::cmp::Ordering;
+use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use super::buffer::OcclusionBuffer;
@@ -30,7 +30,9 @@ pub struct Interleaved<B> {
     kernel: Kernel,
     drawn_part: u32,
     second_look: bool,
-    queue: BinaryHeap<Entry>,
+    /// The [`key`]s of blocks and their places among the entries.
+    queue: BinaryHeap<Reverse<(u64, u32)>>,
+    entries: Vec<Entry>,
     survivors: Vec<Survivor>,
 }
 
@@ -39,37 +41,23 @@ pub struct Interleaved<B> {
 struct Entry {
     rect: Rect,
     block: u32,
-    /// Of a depth that is not above the block's: see [`depth_bits`].
-    depth: u32,
     level: u16,
     /// Whether there is no rectangle.
     near: bool,
     open: PlaneMask,
+    /// How many occluders had been drawn when the rectangle was looked at.
+    drawn: u32,
 }
 
-/// The nearest is the greatest; of as near ones the first of the lowest level.
-impl Ord for Entry {
-    #[inline(always)]
-    fn cmp(&self, other: &Entry) -> Ordering {
-        let key = |entry: &Entry| (entry.depth, entry.level, entry.block);
-        key(other).cmp(&key(self))
-    }
+/// The nearest block comes first; of as near ones the first of the lowest level.
+///
+/// Upper bits a depth that is not above the block's ([`depth_bits`]), lower ones its level
+/// and its number.
+#[inline(always)]
+fn key(depth: u32, level: u16, block: u32) -> u64 {
+    debug_assert!(level < 16 && block >> 28 == 0);
+    u64::from(depth) << 32 | u64::from(level) << 28 | u64::from(block)
 }
-
-impl PartialOrd for Entry {
-    #[inline(always)]
-    fn partial_cmp(&self, other: &Entry) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Entry {
-    fn eq(&self, other: &Entry) -> bool {
-        self.cmp(other).is_eq()
-    }
-}
-
-impl Eq for Entry {}
 
 /// An item that was not hidden when it was met.
 #[derive(Clone, Copy, Debug)]
@@ -93,6 +81,7 @@ impl<B: OcclusionBuffer> Interleaved<B> {
             drawn_part: DEFAULT_DRAWN_PART,
             second_look: true,
             queue: BinaryHeap::new(),
+            entries: Vec::new(),
             survivors: Vec::new(),
         }
     }
@@ -149,25 +138,30 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
         let Interleaved {
             buffer,
             queue,
+            entries,
             survivors,
             ..
         } = state;
         buffer.clear();
         survivors.clear();
         queue.clear();
-        queue.push(Entry {
+        queue.push(Reverse((0, 0)));
+        entries.clear();
+        entries.push(Entry {
             rect: Rect::default(),
             block: 0,
-            depth: 0,
             level: (scene.height() - 1) as u16,
             near: true,
             open: view.volume.mask(),
+            drawn: 0,
         });
         let mut rects = Rects::NONE;
         let mut open = [0; LANES];
-        while let Some(entry) = queue.pop() {
+        while let Some(Reverse((_, place))) = queue.pop() {
+            let entry = entries[place as usize];
             // Much may have been drawn since it was put there.
-            if !entry.near && buffer.hides(isa, &entry.rect) {
+            let again = !entry.near && entry.drawn < stats.drawn as u32;
+            if again && buffer.hides(isa, &entry.rect) {
                 continue;
             }
             let (level, index) = (usize::from(entry.level), entry.block as usize);
@@ -194,13 +188,16 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
                 while left != 0 {
                     let lane = left.trailing_zeros() as usize;
                     left &= left - 1;
-                    queue.push(Entry {
+                    let (level, block) = (entry.level - 1, (index * LANES + lane) as u32);
+                    let key = key(depth_bits(rects.depth[lane]), level, block);
+                    queue.push(Reverse((key, entries.len() as u32)));
+                    entries.push(Entry {
                         rect: rects.get(lane),
-                        block: (index * LANES + lane) as u32,
-                        depth: depth_bits(rects.depth[lane]),
-                        level: entry.level - 1,
+                        block,
+                        level,
                         near: flat >> lane & 1 == 0,
                         open: open[lane],
+                        drawn: stats.drawn as u32,
                     });
                 }
                 continue;
