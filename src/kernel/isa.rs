@@ -41,9 +41,12 @@ pub trait Isa: Copy {
 
     /// The numbers of a row.
     fn load(self, row: &[f32; LANES]) -> Self::Floats;
-    /// For each lane the number at its place in a table (of less than 2^31); 0 behind
-    /// its end.
-    fn gather(self, table: &[f32], places: &[u32; LANES]) -> Self::Floats;
+    /// For each lane the number at its place in a table and the one behind it; of a
+    /// place without two, the last two of the table.
+    ///
+    /// # Panics
+    /// If the table has fewer than two.
+    fn pairs(self, table: &[f32], places: &[u32; LANES]) -> [Self::Floats; 2];
     /// The numbers of all lanes, lane 0 first.
     fn to_array(self, floats: Self::Floats) -> [f32; LANES];
     /// The whole parts of numbers from 0 up to 2^31, lane 0 first.
@@ -143,12 +146,14 @@ mod tests {
         #[inline(always)]
         fn run<I: Isa>(self, isa: I) -> Self::Output {
             let (a, b) = (isa.load(self.a), isa.load(self.b));
+            let [at, behind] = isa.pairs(&self.a[..5], self.words);
             let floats = [
                 isa.add(a, b),
                 isa.mul(a, isa.splat(self.b[3])),
                 isa.min(a, b),
                 isa.max(a, b),
-                isa.gather(&self.a[..5], self.words),
+                at,
+                behind,
                 isa.permute(&std::array::from_fn(|i| self.a[i]), self.b[5].to_bits()),
             ];
             let bits = floats.map(|x| isa.to_array(x).map(canonical));

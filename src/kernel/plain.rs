@@ -37,8 +37,10 @@ impl Isa for Plain {
         *row
     }
     #[inline(always)]
-    fn gather(self, table: &[f32], places: &[u32; LANES]) -> [f32; LANES] {
-        lanes(|lane| table.get(places[lane] as usize).copied().unwrap_or(0.0))
+    fn pairs(self, table: &[f32], places: &[u32; LANES]) -> [[f32; LANES]; 2] {
+        let last = table.len() - 2;
+        let at = |side| lanes(|lane| table[(places[lane] as usize).min(last) + side]);
+        [at(0), at(1)]
     }
     #[inline(always)]
     fn to_array(self, floats: [f32; LANES]) -> [f32; LANES] {

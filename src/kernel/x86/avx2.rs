@@ -4,8 +4,8 @@ use std::arch::x86_64::*;
 
 use super::each;
 use super::packer::{self, PackTo, Packer};
+use super::sse2::four_pairs;
 use crate::kernel::isa::{Isa, LANES, LaneMask, Piece};
-use crate::kernel::plain::Plain;
 
 /// A value is the proof that the processor has AVX2, BMI1, BMI2, LZCNT and POPCNT.
 #[derive(Clone, Copy, Debug)]
@@ -46,8 +46,15 @@ impl Isa for Avx2 {
         each!(2, |i| unsafe { _mm256_loadu_ps(row[8 * i..].as_ptr()) })
     }
     #[inline(always)]
-    fn gather(self, table: &[f32], places: &[u32; LANES]) -> [__m256; 2] {
-        self.load(&Isa::gather(Plain, table, places))
+    fn pairs(self, table: &[f32], places: &[u32; LANES]) -> [[__m256; 2]; 2] {
+        let fours: &[[u32; 4]] = places.as_chunks().0;
+        let [a, b, c, d] = each!(4, |i| four_pairs(table, &fours[i]));
+        each!(2, |side| unsafe {
+            [
+                _mm256_set_m128(b[side], a[side]),
+                _mm256_set_m128(d[side], c[side]),
+            ]
+        })
     }
     #[inline(always)]
     fn to_array(self, floats: [__m256; 2]) -> [f32; LANES] {

@@ -2,7 +2,9 @@
 
 use std::arch::x86_64::*;
 
+use super::each;
 use super::packer::{self, PackTo, Packer};
+use super::sse2::four_pairs;
 use crate::kernel::isa::{Isa, LANES, LaneMask, Piece};
 
 /// A value is the proof that the processor has AVX-512 (F, VL, BW, DQ) and all
@@ -46,16 +48,14 @@ impl Isa for Avx512 {
         unsafe { _mm512_loadu_ps(row.as_ptr()) }
     }
     #[inline(always)]
-    fn gather(self, table: &[f32], places: &[u32; LANES]) -> __m512 {
-        // No lane is read whose place is not in the table. Places are signed: of a table
-        // longer than that the rest would be taken for what is behind its end.
-        let end = table.len().min(i32::MAX as usize) as i32;
-        unsafe {
-            let places = _mm512_loadu_si512(places.as_ptr().cast());
-            let inside = _mm512_cmplt_epu32_mask(places, _mm512_set1_epi32(end));
-            let zero = _mm512_setzero_ps();
-            _mm512_mask_i32gather_ps::<4>(zero, inside, places, table.as_ptr().cast())
-        }
+    fn pairs(self, table: &[f32], places: &[u32; LANES]) -> [__m512; 2] {
+        let fours: &[[u32; 4]] = places.as_chunks().0;
+        let [a, b, c, d] = each!(4, |i| four_pairs(table, &fours[i]));
+        each!(2, |side| unsafe {
+            let low = _mm256_set_m128(b[side], a[side]);
+            let high = _mm256_set_m128(d[side], c[side]);
+            _mm512_insertf32x8::<1>(_mm512_castps256_ps512(low), high)
+        })
     }
     #[inline(always)]
     fn to_array(self, floats: __m512) -> [f32; LANES] {

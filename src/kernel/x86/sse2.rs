@@ -6,7 +6,6 @@ use std::arch::x86_64::*;
 use super::each;
 use super::packer::{self, PackTo, Packer};
 use crate::kernel::isa::{Isa, LANES, LaneMask};
-use crate::kernel::plain::Plain;
 
 /// Part of x86-64.
 #[derive(Clone, Copy, Debug)]
@@ -14,6 +13,33 @@ pub struct Sse2;
 
 // SAFETY, of all blocks below: SSE2 is part of every x86-64.
 // Loads and stores are unaligned ones within their arrays.
+
+/// [`Isa::pairs`] of four lanes: one load for both numbers of each. Instructions that
+/// gather are no quicker, and take one load for each number.
+#[inline(always)]
+pub(super) fn four_pairs(table: &[f32], places: &[u32; 4]) -> [__m128; 2] {
+    let [p, q, r, s] = places;
+    let [a, b] = [two_pairs(table, [p, q]), two_pairs(table, [r, s])];
+    unsafe {
+        [
+            _mm_shuffle_ps::<0b10_00_10_00>(a, b),
+            _mm_shuffle_ps::<0b11_01_11_01>(a, b),
+        ]
+    }
+}
+
+#[inline(always)]
+fn two_pairs(table: &[f32], [a, b]: [&u32; 2]) -> __m128 {
+    let last = table.len().checked_sub(2).expect("two numbers");
+    let [a, b] = [(*a as usize).min(last), (*b as usize).min(last)];
+    // Places up to the last but one: both numbers are within the table.
+    unsafe {
+        let from = table.as_ptr();
+        let low = _mm_castsi128_ps(_mm_loadl_epi64(from.add(a).cast()));
+        let high = _mm_castsi128_ps(_mm_loadl_epi64(from.add(b).cast()));
+        _mm_movelh_ps(low, high)
+    }
+}
 
 impl Isa for Sse2 {
     type Floats = [__m128; 4];
@@ -27,8 +53,10 @@ impl Isa for Sse2 {
         each!(4, |i| unsafe { _mm_loadu_ps(row[4 * i..].as_ptr()) })
     }
     #[inline(always)]
-    fn gather(self, table: &[f32], places: &[u32; LANES]) -> [__m128; 4] {
-        self.load(&Isa::gather(Plain, table, places))
+    fn pairs(self, table: &[f32], places: &[u32; LANES]) -> [[__m128; 4]; 2] {
+        let fours: &[[u32; 4]] = places.as_chunks().0;
+        let [a, b, c, d] = each!(4, |i| four_pairs(table, &fours[i]));
+        each!(2, |side| [a[side], b[side], c[side], d[side]])
     }
     #[inline(always)]
     fn to_array(self, floats: [__m128; 4]) -> [f32; LANES] {

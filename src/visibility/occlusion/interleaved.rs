@@ -228,13 +228,18 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
             }
         }
         let before = self.out.len();
-        for survivor in survivors {
-            let again = state.second_look && !survivor.near;
-            let Some(item) = scene.item(survivor.position as usize) else {
-                continue;
-            };
-            if !(again && buffer.hides(isa, &survivor.rect)) {
-                self.out.push(item);
+        for sixteen in survivors.chunks(LANES) {
+            let mut asked: LaneMask = 0;
+            for (lane, survivor) in sixteen.iter().enumerate() {
+                rects.set(lane, &survivor.rect);
+                asked |= LaneMask::from(state.second_look && !survivor.near) << lane;
+            }
+            let hidden = buffer.hides_lanes(isa, &rects, asked);
+            for (lane, survivor) in sixteen.iter().enumerate() {
+                let item = scene.item(survivor.position as usize);
+                if let Some(item) = item.filter(|_| hidden >> lane & 1 == 0) {
+                    self.out.push(item);
+                }
             }
         }
         stats.kept = self.out.len() - before;

@@ -141,16 +141,11 @@ impl<const WHOLE: bool> OcclusionBuffer for Masked<WHOLE> {
         let wide = !isa.zeros(isa.words(&across));
         let high = !isa.zeros(isa.words(&down));
         let mut hidden = small;
-        // A corner is looked at if it is in another tile than those before.
-        for (x, y, other) in [
-            (&rects.x0, &rects.y0, LaneMask::MAX),
-            (&rects.x1, &rects.y0, wide),
-            (&rects.x0, &rects.y1, high),
-            (&rects.x1, &rects.y1, wide & high),
-        ] {
+        // The lower row of tiles is looked at if it is another one.
+        for (y, other) in [(&rects.y0, LaneMask::MAX), (&rects.y1, high)] {
             let asked = hidden & other;
             if asked != 0 {
-                hidden &= !asked | self.hidden_in_tile(isa, rects, asked, x, y);
+                hidden &= !asked | self.hidden_in_row(isa, rects, asked, wide, y);
             }
         }
         let mut left = lanes & !small;
@@ -218,49 +213,64 @@ impl<const WHOLE: bool> Masked<WHOLE> {
         })
     }
 
-    /// Those of the lanes that are hidden as far as one tile goes: the one that
-    /// holds the pixel (x, y) of each.
+    /// Those of the lanes that are hidden as far as one row of tiles goes: the one that
+    /// holds the pixels of rows `y`. Of `wide` lanes two tiles of it are looked at.
     #[inline(always)]
-    fn hidden_in_tile<I: Isa>(
+    fn hidden_in_row<I: Isa>(
         &self,
         isa: I,
         rects: &Rects,
         lanes: LaneMask,
-        x: &[i32; LANES],
+        wide: LaneMask,
         y: &[i32; LANES],
     ) -> LaneMask {
         let columns = self.columns as i32;
         let mut at = [0; LANES];
         for lane in 0..LANES {
-            at[lane] = ((y[lane] >> 2) * columns + (x[lane] >> 3)) as u32;
+            at[lane] = ((y[lane] >> 2) * columns + (rects.x0[lane] >> 3)) as u32;
         }
         let nearness = isa.load(&rects.nearness);
-        let open = isa.at_most(isa.gather(&self.reference, &at), nearness);
-        if open & lanes == 0 {
+        let [left, right] = isa.pairs(&self.reference, &at);
+        let looked_at = [lanes, lanes & wide];
+        let open = [
+            isa.at_most(left, nearness) & looked_at[0],
+            isa.at_most(right, nearness) & looked_at[1],
+        ];
+        if open == [0; 2] {
             return lanes;
         }
         // Not by the reference alone: by the working layer and its pixels.
-        let working = isa.gather(&self.working, &at);
-        let mut masks = [0; LANES];
-        for lane in 0..LANES {
-            masks[lane] = self.mask.get(at[lane] as usize).copied().unwrap_or(0);
+        let working = isa.pairs(&self.working, &at);
+        let mut hidden = lanes;
+        for side in 0..2 {
+            if open[side] == 0 {
+                continue;
+            }
+            let mut masks = [0; LANES];
+            for lane in 0..LANES {
+                let tile = at[lane] as usize + side;
+                masks[lane] = self.mask.get(tile).copied().unwrap_or(0);
+            }
+            // Of lanes that are not asked about anything may come out.
+            let mut shown = [0; LANES];
+            for lane in 0..LANES {
+                let first_column = (rects.x0[lane] & !7) + (side * TILE_WIDTH) as i32;
+                let first_row = y[lane] & !3;
+                let left = (rects.x0[lane] - first_column).max(0) as u32;
+                let right = (rects.x1[lane] - first_column).min(7) as u32;
+                let top = (rects.y0[lane] - first_row).max(0) as u32;
+                let bottom = (rects.y1[lane] - first_row).min(3) as u32;
+                let row =
+                    0xffu32.wrapping_shl(left) & 0xffu32.wrapping_shr(7u32.wrapping_sub(right));
+                let above = Mask::MAX.wrapping_shl(top.wrapping_mul(8));
+                let below = Mask::MAX.wrapping_shr(3u32.wrapping_sub(bottom).wrapping_mul(8));
+                shown[lane] = (row * 0x0101_0101) & above & below & !masks[lane];
+            }
+            let behind = isa.at_most(working[side], nearness);
+            let covered = isa.zeros(isa.words(&shown)) & !behind;
+            hidden &= !open[side] | covered;
         }
-        // Of lanes that are not asked about anything may come out.
-        let mut shown = [0; LANES];
-        for lane in 0..LANES {
-            let (first_column, first_row) = (x[lane] & !7, y[lane] & !3);
-            let left = (rects.x0[lane] - first_column).max(0) as u32;
-            let right = (rects.x1[lane] - first_column).min(7) as u32;
-            let top = (rects.y0[lane] - first_row).max(0) as u32;
-            let bottom = (rects.y1[lane] - first_row).min(3) as u32;
-            let row = 0xffu32.wrapping_shl(left) & 0xffu32.wrapping_shr(7u32.wrapping_sub(right));
-            let above = Mask::MAX.wrapping_shl(top.wrapping_mul(8));
-            let below = Mask::MAX.wrapping_shr(3u32.wrapping_sub(bottom).wrapping_mul(8));
-            shown[lane] = (row * 0x0101_0101) & above & below & !masks[lane];
-        }
-        let behind = isa.at_most(working, nearness);
-        let covered = isa.zeros(isa.words(&shown)) & !behind;
-        lanes & (!open | covered)
+        hidden
     }
 
     /// Draws four rows of pixels, given by their first columns and the ones behind

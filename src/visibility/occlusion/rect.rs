@@ -110,6 +110,16 @@ impl Rects {
         }
     }
 
+    /// Puts a rectangle into a lane; what else is known of the lane stays.
+    #[inline(always)]
+    pub fn set(&mut self, lane: usize, rect: &Rect) {
+        self.x0[lane] = i32::from(rect.x0);
+        self.x1[lane] = i32::from(rect.x1);
+        self.y0[lane] = i32::from(rect.y0);
+        self.y1[lane] = i32::from(rect.y1);
+        self.nearness[lane] = rect.nearness;
+    }
+
     /// Projects the boxes of a block.
     #[inline(always)]
     pub fn project<I: Isa>(&mut self, isa: I, block: &BoxBlock, view: &View) {
