@@ -302,8 +302,8 @@ fn by_depth(
     count
 }
 
-/// The lanes whose boxes may cover at least so many pixels by a rule, mostly: a
-/// rectangle is rounded outward, so that the pixels at its rim are covered in part.
+/// The lanes whose boxes may cover at least so many pixels, about: a rectangle is rounded
+/// outward, so that the pixels at its rim are covered in part.
 #[inline(always)]
 fn coverable_from<I: Isa>(isa: I, rects: &Rects, coverage: Coverage, pixels: u32) -> LaneMask {
     let rim = match coverage {

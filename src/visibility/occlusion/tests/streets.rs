@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::super::{MaskedCentre, MaskedInner, OcclusionBuffer};
+use super::super::{CullStats, Interleaved, MaskedCentre, MaskedInner, OcclusionBuffer};
 use super::by_rays::{Ready, missing, seen_by_rays, with_view};
 use super::{asked_for, kept};
 use crate::camera::{Camera, Frame, Lens};
@@ -94,6 +94,30 @@ fn every_instruction_set_gives_the_same_answer() {
                     );
                 }
             });
+        }
+    }
+}
+
+/// [`CullStats`] of six views. What is asked, drawn and kept depends on the order of the walk and on nothing else: a
+/// quicker walk has the same counts.
+#[test]
+fn the_walk_asks_draws_and_keeps_what_it_did() {
+    let pinned = [[2067, 202, 397], [1160, 214, 182], [6003, 2535, 3517]];
+    for (spec, [boxes, drawn, kept]) in SCENES.into_iter().zip(pinned) {
+        let ready = ready(spec);
+        for kernel in Kernel::available() {
+            let mut walk = Interleaved::new(MaskedInner::new(GRID), kernel);
+            let mut total = CullStats::default();
+            for camera in cameras(&ready, 6) {
+                with_view(&ready, &camera, GRID, |view, _| {
+                    let stats = walk.cull(&ready.occluders, view, &mut Vec::new());
+                    total.boxes += stats.boxes;
+                    total.drawn += stats.drawn;
+                    total.kept += stats.kept;
+                });
+            }
+            let wanted = CullStats { boxes, drawn, kept };
+            assert_eq!(total, wanted, "{spec} {kernel}");
         }
     }
 }
