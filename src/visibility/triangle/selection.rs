@@ -2,46 +2,65 @@
 //! triangle.
 
 use super::clusters::Clusters;
+use crate::kernel::LANES;
 
 /// Some of the triangles of clusters.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Selection {
-    words: Vec<u64>,
+    /// Those beyond the last cluster are zero.
+    blocks: Vec<[u64; LANES]>,
+    clusters: usize,
 }
 
 impl Selection {
     /// All triangles.
     pub fn all(clusters: &Clusters) -> Selection {
-        let words = (0..clusters.len()).map(|cluster| clusters.word(cluster));
-        Selection {
-            words: words.collect(),
+        let mut selection = Selection::none(clusters);
+        for (cluster, word) in selection.words_mut().iter_mut().enumerate() {
+            *word = clusters.word(cluster);
         }
+        selection
     }
 
     /// All triangles of these items: what the object stage left.
     pub fn of_items(clusters: &Clusters, items: impl IntoIterator<Item = u32>) -> Selection {
-        let mut words = vec![0; clusters.len()];
+        let mut selection = Selection::none(clusters);
+        let words = selection.words_mut();
         for item in items {
             for cluster in clusters.of_item[item as usize].clone() {
                 words[cluster as usize] = clusters.word(cluster as usize);
             }
         }
-        Selection { words }
+        selection
+    }
+
+    fn none(clusters: &Clusters) -> Selection {
+        let clusters = clusters.len();
+        Selection {
+            blocks: vec![[0; LANES]; clusters.div_ceil(LANES)],
+            clusters,
+        }
     }
 
     /// One word per cluster; bit `i` is the `i`-th of [`Clusters::triangles_of`].
     pub fn words(&self) -> &[u64] {
-        &self.words
+        &self.blocks.as_flattened()[..self.clusters]
     }
 
     /// To take triangles away. Bits beyond the triangles of a cluster stay zero.
     pub fn words_mut(&mut self) -> &mut [u64] {
-        &mut self.words
+        &mut self.blocks.as_flattened_mut()[..self.clusters]
+    }
+
+    /// The words of sixteen clusters at a time; of the last ones too, where those beyond
+    /// the clusters are zero and stay so.
+    pub(super) fn blocks_mut(&mut self) -> &mut [[u64; LANES]] {
+        &mut self.blocks
     }
 
     /// How many triangles there are.
     pub fn triangles(&self) -> usize {
-        self.words
+        self.words()
             .iter()
             .map(|word| word.count_ones() as usize)
             .sum()
@@ -49,14 +68,14 @@ impl Selection {
 
     /// How many of these triangles are not in another selection.
     pub fn without(&self, other: &Selection) -> usize {
-        let pairs = self.words.iter().zip(&other.words);
+        let pairs = self.words().iter().zip(other.words());
         pairs.map(|(a, b)| (a & !b).count_ones() as usize).sum()
     }
 
     /// Keeps the triangles that a rule keeps: `(cluster, bit)`.
     #[inline(always)]
     pub fn retain(&mut self, mut keep: impl FnMut(usize, usize) -> bool) {
-        for (cluster, word) in self.words.iter_mut().enumerate() {
+        for (cluster, word) in self.words_mut().iter_mut().enumerate() {
             let mut left = *word;
             while left != 0 {
                 let bit = left.trailing_zeros() as usize;

@@ -105,7 +105,7 @@ impl TriangleCull for SeveralCones {
             kernel.run(Query {
                 blocks: &self.blocks,
                 view: &prepared,
-                words: kept.words_mut(),
+                words: kept.blocks_mut(),
             });
         }
     }
@@ -114,7 +114,7 @@ impl TriangleCull for SeveralCones {
 struct Query<'a> {
     blocks: &'a [[Group; CONES]],
     view: &'a Prepared,
-    words: &'a mut [u64],
+    words: &'a mut [[u64; LANES]],
 }
 
 impl Work for Query<'_> {
@@ -123,8 +123,8 @@ impl Work for Query<'_> {
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) {
         let view = Broadcast::of(isa, self.view);
-        for (block, words) in self.blocks.iter().zip(self.words.chunks_mut(LANES)) {
-            for group in block {
+        for (i, words) in self.words.iter_mut().enumerate() {
+            for group in &self.blocks[i] {
                 let gone = rejected(isa, &group.cones, &view);
                 clear(words, gone, &group.triangles);
             }

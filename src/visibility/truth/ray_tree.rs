@@ -7,6 +7,7 @@ use glam::DVec3;
 
 use crate::geometry::Aabb;
 use crate::index::Record;
+use crate::kernel::each;
 use crate::visibility::Ray;
 use crate::visibility::sah::{Part, halve};
 
@@ -62,9 +63,9 @@ impl Slabs {
         let size = local.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
         let pad = (size + tree.reach) * (8.0 / (1u64 << 53) as f64) + f64::MIN_POSITIVE;
         let direction = ray.direction.to_array();
-        let side = direction.map(|d| usize::from(d < 0.0));
+        let side = each(direction, |d| usize::from(d < 0.0));
         let signed = |axis: usize| if side[axis] == 0 { pad } else { -pad };
-        let inverse = direction.map(|d| {
+        let inverse = each(direction, |d| {
             if d == 0.0 {
                 STEEP
             } else {
@@ -73,8 +74,8 @@ impl Slabs {
         });
         Slabs {
             inverse,
-            enter: [0, 1, 2].map(|axis| local[axis] + signed(axis)),
-            leave: [0, 1, 2].map(|axis| local[axis] - signed(axis)),
+            enter: each([0, 1, 2], |axis| local[axis] + signed(axis)),
+            leave: each([0, 1, 2], |axis| local[axis] - signed(axis)),
             near: ray.near,
             side,
         }
@@ -162,7 +163,7 @@ impl RayTree {
                 continue;
             }
             let pair = &self.pairs[at as usize];
-            let mut open = [0, 1].map(|side| slabs.entry(&pair.bounds[side], limit));
+            let mut open = each([0, 1], |side: usize| slabs.entry(&pair.bounds[side], limit));
             let order = match open {
                 [Some(a), Some(b)] if b < a => [1, 0],
                 _ => [0, 1],

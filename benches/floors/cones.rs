@@ -1,0 +1,103 @@
+//! The floor of cones: clusters whose triangles all turn away are found, sixteen cones at a
+//! time and with the margin for rounding, several times as fast as by meshoptimizer's
+//! documented test of one cone at a time: its stand-in, and the crate with feature `peers`.
+
+use std::hint::black_box;
+use std::sync::Arc;
+
+use cullbench::kernel::Kernel;
+use cullbench::measure::Stopwatch;
+use cullbench::visibility::triangle::{
+    Clusters, Counts, Criterion, MOST_TRIANGLES, Selection, TRIANGLE_ROWS, TriangleCull, View,
+    truth,
+};
+use cullbench::visibility::{SampleGrid, surfaces_of};
+
+use super::{loaded, over_builds, ratio, verdict};
+
+const PATH: &str = "street:frames=32";
+const SCENES: [&str; 5] = [
+    "mesh:spheres:n=100000",
+    "mesh:terrain:n=200000",
+    "mesh:forest:n=200000",
+    "mesh:statue:n=100000",
+    "mesh:statue:n=1000000",
+];
+const GRID: SampleGrid = SampleGrid::new(320, 180);
+const OURS: &str = "cone-f32-safe";
+/// Those of these that the features have.
+const THEIRS: [&str; 2] = ["cone-f32", "meshopt"];
+/// How often both are built.
+const BUILDS: usize = 5;
+/// Time of theirs / time of ours, at least: less must not be proven.
+const LEAST_AHEAD: f64 = 4.0;
+
+/// Times every scene on every instruction set, and judges those that have vectors; how
+/// many floors are missed.
+pub fn missed(only_test: bool, turns: usize) -> u32 {
+    let missed_in = |source| missed_in(source, only_test, turns);
+    SCENES.into_iter().map(missed_in).sum()
+}
+
+fn missed_in(source: &str, only_test: bool, turns: usize) -> u32 {
+    let (typed, scene, cameras) = loaded(source, PATH, only_test);
+    let surfaces = surfaces_of(&scene).expect(source).expect("triangles");
+    let clusters = Arc::new(Clusters::of(surfaces, MOST_TRIANGLES));
+    let views = cameras.cameras.iter();
+    let views = views.map(|camera| View::of(camera, scene.origin, GRID).expect("rays"));
+    let views: Vec<View> = views.collect();
+    let all = Selection::all(&clusters);
+    let built = |name: &str| {
+        let row = TRIANGLE_ROWS.iter().find(|row| row.name == name);
+        row.map(|row| (row.build)(&clusters))
+    };
+
+    let ours = built(OURS).expect(OURS);
+    let lost = views.iter().map(|view| {
+        let mut kept = all.clone();
+        ours.cull(view, Kernel::best(), &mut kept);
+        let truth = truth(Criterion::Facing, &clusters, view, &all);
+        Counts::of(&all, &kept, &truth).false_negatives
+    });
+    let lost: usize = lost.sum();
+    let mut missed = u32::from(lost > 0);
+
+    let tests = (views.len() * clusters.len()) as f64;
+    // Kept, so that the next ones lie elsewhere.
+    let mut earlier = Vec::new();
+    for kernel in Kernel::available() {
+        for theirs in THEIRS.into_iter().filter(|name| built(name).is_some()) {
+            let mut ns = 0.0;
+            let [ahead, low, high] = over_builds(if only_test { 3 } else { BUILDS }, |_| {
+                let pair = [OURS, theirs].map(|name| built(name).expect(name));
+                // What was taken away once is taken away again, in the same time.
+                let mut kept = [all.clone(), all.clone()];
+                let [of_ours, of_theirs] = &mut kept;
+                let time = |cull: &dyn TriangleCull, kept: &mut Selection| {
+                    let watch = Stopwatch::start();
+                    for view in &views {
+                        cull.cull(view, kernel, black_box(kept));
+                    }
+                    watch.lap().cpu_ns / tests
+                };
+                let by_ours = || {
+                    ns = time(&*pair[0], of_ours);
+                    ns
+                };
+                let by_theirs = || time(&*pair[1], of_theirs);
+                let [ahead, ..] = ratio((turns / 4).max(3), by_theirs, by_ours);
+                earlier.push((pair, kept));
+                ahead
+            });
+            let not_judged = only_test || kernel == Kernel::Portable;
+            let holds = not_judged || high >= LEAST_AHEAD;
+            missed += u32::from(!holds);
+            println!(
+                "{typed}, {kernel}: {OURS} is {ahead:.2} x [{low:.2}, {high:.2}] as fast as {theirs} \
+                 (last {ns:.2} ns a cluster, {lost} triangles lost), at least {LEAST_AHEAD} x: {}",
+                verdict(not_judged, holds)
+            );
+        }
+    }
+    missed
+}
