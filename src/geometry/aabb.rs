@@ -118,8 +118,10 @@ impl Aabb {
     }
 
     /// The bits of its six numbers: the key by which the very same boxes are found.
+    #[inline]
     pub fn bits(&self) -> [[u32; 3]; 2] {
-        [self.min, self.max].map(|corner| corner.to_array().map(f32::to_bits))
+        let of = |p: Vec3| [p.x.to_bits(), p.y.to_bits(), p.z.to_bits()];
+        [of(self.min), of(self.max)]
     }
 
     /// Edge lengths, zero for a point, negative for an empty box.

@@ -60,19 +60,17 @@ impl Filter {
     /// Value at the p-vertex and a bound of its error.
     #[inline(always)]
     pub fn at_p_vertex(&self, b: &Corners) -> (f64, f64) {
-        let corner = [0, 1, 2].map(|k| {
-            if self.normal[k] >= 0.0 {
-                b.high[k]
-            } else {
-                b.low[k]
-            }
-        });
-        self.at(corner)
+        let vertex = |k: usize| match self.normal[k] >= 0.0 {
+            true => b.high[k],
+            false => b.low[k],
+        };
+        self.at([vertex(0), vertex(1), vertex(2)])
     }
 
     #[inline(always)]
     pub fn at(&self, point: [f64; 3]) -> (f64, f64) {
-        let [x, y, z] = [0, 1, 2].map(|k| self.normal[k] * point[k]);
+        let [a, b, c] = self.normal;
+        let (x, y, z) = (a * point[0], b * point[1], c * point[2]);
         let magnitude = x.abs() + y.abs() + z.abs() + self.d.abs();
         (((x + y) + z) + self.d, FILTER_ERROR * magnitude)
     }

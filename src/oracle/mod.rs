@@ -212,16 +212,17 @@ impl Oracle {
     /// Whether a point of the box lies strictly inside all planes for certain:
     /// the one nearest to the volume's inner point, or the box's centre.
     fn witnessed(&self, b: &Corners) -> bool {
-        let centre = [0, 1, 2].map(|k| (b.high[k] + b.low[k]) * 0.5);
-        let nearest = self
-            .inner
-            .map(|inner| [0, 1, 2].map(|k| inner[k].clamp(b.low[k], b.high[k])));
-        [nearest, Some(centre)].into_iter().flatten().any(|point| {
+        let is_inside = |point: [f64; 3]| {
             self.filter[..self.faces].iter().all(|face| {
                 let (value, error) = face.at(point);
                 value > error
             })
-        })
+        };
+        let centre = |k: usize| (b.high[k] + b.low[k]) * 0.5;
+        let near = |inner: &[f64; 3], k: usize| inner[k].clamp(b.low[k], b.high[k]);
+        let nearest = self.inner.as_ref();
+        nearest.is_some_and(|p| is_inside([near(p, 0), near(p, 1), near(p, 2)]))
+            || is_inside([centre(0), centre(1), centre(2)])
     }
 }
 
