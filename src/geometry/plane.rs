@@ -6,6 +6,7 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::Aabb;
+use crate::kernel::each;
 
 /// A half-space: the points `x` with `normal . x + d >= 0` (closed).
 ///
@@ -62,7 +63,7 @@ impl Plane {
     /// The bounds that make up [`Plane::p_vertex`]. Kernels for many boxes ask
     /// once a plane.
     pub fn upper(&self) -> PVertexSigns {
-        self.normal.to_array().map(|n| n >= 0.0)
+        each(self.normal.to_array(), |n| n >= 0.0)
     }
 
     /// The corner of `b` nearest against the normal (the n-vertex).

@@ -7,6 +7,7 @@ use glam::Vec3;
 use super::convex_volume::MAX_PLANES;
 use super::{Aabb, ConvexVolume, Plane};
 use crate::arithmetic::rounding::{difference_down, difference_up, round_up};
+use crate::kernel::each;
 
 /// The cube about a box's bounding sphere: what an index is built over when
 /// its items are to be tested as spheres.
@@ -28,7 +29,7 @@ pub fn sphere_cube(b: &Aabb) -> Aabb {
     let radius = f64::from(round_up(radius).min(f32::MAX));
     let low = |k: usize| difference_down(c[k], radius).max(f32::MIN);
     let high = |k: usize| difference_up(c[k], -radius).min(f32::MAX);
-    Aabb::new([0, 1, 2].map(low).into(), [0, 1, 2].map(high).into())
+    Aabb::new(each([0, 1, 2], low).into(), each([0, 1, 2], high).into())
 }
 
 /// A sphere as it is read back from its cube.

@@ -159,7 +159,9 @@ impl Surfaces {
     /// The corners of a triangle, scene-local.
     #[inline(always)]
     pub fn corners(&self, triangle: u32) -> [Vec3; 3] {
-        self.triangles[triangle as usize].map(|point| self.points[point as usize])
+        let [a, b, c] = self.triangles[triangle as usize];
+        let point = |at: u32| self.points[at as usize];
+        [point(a), point(b), point(c)]
     }
 
     /// The triangles of an item, as corners.

@@ -7,6 +7,7 @@ use glam::{DVec3, Vec3};
 
 use crate::camera::{Camera, Surroundings};
 use crate::geometry::Aabb;
+use crate::kernel::each;
 use crate::scene::SeededRng;
 
 /// What the boxes of a case look like.
@@ -56,7 +57,7 @@ impl Hull {
 
     fn at(&self, [s, t, w]: [f64; 3]) -> DVec3 {
         let across = |i: usize| {
-            let [a, b, c, d] = [0, 1, 2, 3].map(|k| self.corners[i + k]);
+            let [a, b, c, d] = each([0, 1, 2, 3], |k| self.corners[i + k]);
             a.lerp(b, s).lerp(c.lerp(d, s), t)
         };
         across(0).lerp(across(4), w)

@@ -9,6 +9,7 @@ use glam::{DVec3, Vec3};
 
 use super::exact::normal;
 use crate::geometry::Aabb;
+use crate::kernel::each;
 use crate::scene::Surfaces;
 
 /// Most triangles of a cluster: the bits of a word.
@@ -192,7 +193,7 @@ fn nodes(surfaces: &Surfaces, item: usize) -> Vec<Node> {
     let mut nodes: Vec<Node> = surfaces
         .of(item)
         .map(|corners| Node {
-            centre: corners.map(Vec3::as_dvec3).iter().sum::<DVec3>() / 3.0,
+            centre: each(corners, |p: Vec3| p.as_dvec3()).iter().sum::<DVec3>() / 3.0,
             normal: normal(corners).normalize_or_zero(),
             neighbours: [NONE; 3],
             is_used: false,

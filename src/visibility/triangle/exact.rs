@@ -4,6 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::eye::Eye;
 use crate::arithmetic::{Expansion, cross, two_sum};
+use crate::kernel::each;
 
 /// Error of the filter per unit of the permanent. Three differences of one rounding
 /// each, two products, a difference, a product and two sums: eight roundings on the
@@ -18,7 +19,7 @@ const FILTER: f64 = 16.0 / (1u64 << 53) as f64;
 /// Exact for finite corners and an eye whose coordinates are zero or between
 /// 2^-500 and 2^500.
 pub fn faces(eye: &Eye, corners: [Vec3; 3]) -> bool {
-    let [a, b, c] = corners.map(Vec3::as_dvec3);
+    let [a, b, c] = each(corners, |p: Vec3| p.as_dvec3());
     let (u, v) = (b - a, c - a);
     let w = eye.high - a * f64::from(eye.weight);
     let determinant = w.dot(u.cross(v));
@@ -60,7 +61,7 @@ fn orientation(eye: &Eye, corners: [Vec3; 3]) -> i32 {
 /// A normal of a triangle, each component true to 2^-50 of itself; zero exactly
 /// where the triangle has no area. Not of unit length.
 pub fn normal(corners: [Vec3; 3]) -> DVec3 {
-    let [a, b, c] = corners.map(Vec3::as_dvec3);
+    let [a, b, c] = each(corners, |p: Vec3| p.as_dvec3());
     let exact = |p: DVec3, q: DVec3| (0..3).all(|k| two_sum(p[k], -q[k]).1 == 0.0);
     if exact(b, a) && exact(c, a) {
         // Kahan's products do not cancel: two roundings at the most.

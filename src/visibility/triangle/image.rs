@@ -7,6 +7,7 @@ use super::super::rays::{Rays, SampleGrid};
 use super::super::truth::TriangleProbe;
 use super::view::{View, Window};
 use crate::camera::Lens;
+use crate::kernel::each;
 
 /// Error of a rounded coordinate per unit of the numbers in it, a million times what it
 /// can be: whatever is that near to a plane is on no side for sure.
@@ -87,9 +88,9 @@ impl Image {
     /// Corners in the camera's axes, and how far a plane may be off there.
     fn about_eye(&self, corners: [Vec3; 3]) -> (Vec<DVec3>, f64) {
         let eye = self.rays.camera().frame.eye;
-        let corners = corners.map(|p| {
+        let corners = each(corners, |p: Vec3| {
             let way = p.as_dvec3() + (self.origin - eye);
-            DVec3::from(self.axes.map(|axis| axis.dot(way)))
+            DVec3::from(each(self.axes, |axis| axis.dot(way)))
         });
         let size = |p: &DVec3| p.abs().max_element();
         let largest = corners.iter().map(size).fold(0.0, f64::max);
