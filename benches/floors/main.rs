@@ -3,8 +3,8 @@
 //! `cullbench run`. Before them, that harness beside a loop written by hand, the floors
 //! of the stages of visibility, and region search beside itself in f32 alone. Exits 3 if
 //! a floor is missed. Words after `--` choose by name what runs: `harness`, `occlusion`,
-//! `hidden`, `stored-rows`, `cones`, `picking`, `region-search`, or rows with the word in their
-//! scene or structure. `-- --test` only checks that every row runs.
+//! `hidden`, `stored-rows`, `truth`, `cones`, `picking`, `region-search`, or rows with the
+//! word in their scene or structure. `-- --test` only checks that every row runs.
 
 mod cones;
 mod hidden;

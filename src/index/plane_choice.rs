@@ -42,8 +42,8 @@ fn by_median(records: &mut [Record], normal: Vec3) -> (Vec3, usize) {
     let half = records.len() / 2;
     let along = Plane::new(normal, 0.0);
     records.select_nth_unstable_by(half, |a, b| {
-        let [a_at, b_at] = [a, b].map(|r| along.value_at(r.bounds.centre()));
-        a_at.total_cmp(&b_at).then(a.id.cmp(&b.id))
+        let at = |r: &Record| along.value_at(r.bounds.centre());
+        at(a).total_cmp(&at(b)).then(a.id.cmp(&b.id))
     });
     (normal, half)
 }
@@ -59,14 +59,18 @@ pub fn between_layers(records: &mut [Record]) -> (Vec3, usize) {
     let mut axes = [0, 1, 2];
     axes.sort_by(|&a, &b| width[b].total_cmp(&width[a]));
     let (count, half) = (records.len(), records.len() / 2);
+    let quarter = count.div_ceil(4);
     // Few items may part as they can: their depth has a bound of its own.
-    let least = if count <= DESCENT_LEAF {
-        1
-    } else {
-        count.div_ceil(4)
+    let sizes: &[usize] = match count <= DESCENT_LEAF {
+        true => &[quarter, 1],
+        false => &[quarter],
     };
-    for least in [count.div_ceil(4), least] {
-        for axis in axes {
+    for &least in sizes {
+        // No plane across an axis parts centres that are all at one place of it.
+        for axis in axes
+            .into_iter()
+            .filter(|&k| centres.min[k] < centres.max[k])
+        {
             let at = |r: &Record| r.bounds.centre()[axis];
             records
                 .select_nth_unstable_by(half, |a, b| at(a).total_cmp(&at(b)).then(a.id.cmp(&b.id)));

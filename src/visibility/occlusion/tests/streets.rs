@@ -98,8 +98,8 @@ fn every_instruction_set_gives_the_same_answer() {
     }
 }
 
-/// [`CullStats`] of six views. What is asked, drawn and kept depends on the order of the walk and on nothing else: a
-/// quicker walk has the same counts.
+/// [`CullStats`] of six views. What is asked, drawn and kept depends on the order of the
+/// walk and on nothing else: a quicker walk has the same counts.
 #[test]
 fn the_walk_asks_draws_and_keeps_what_it_did() {
     let pinned = [[2067, 202, 397], [1160, 214, 182], [6003, 2535, 3517]];
