@@ -157,6 +157,8 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
         });
         let mut rects = Rects::NONE;
         let mut open = [0; LANES];
+        // Survivors that something was drawn after; the others have been asked by all of it.
+        let mut early = 0;
         while let Some(Reverse((_, place))) = queue.pop() {
             let entry = entries[place as usize];
             // Much may have been drawn since it was put there.
@@ -222,25 +224,33 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
                 });
                 if large >> lane & 1 == 1 {
                     let own = draw(isa, buffer, scene, view, &survivors[survivors.len() - 1]);
-                    drawn |= own > 0;
+                    if own > 0 {
+                        drawn = true;
+                        // No item hides itself.
+                        early = survivors.len() - 1;
+                    }
                     stats.drawn += own;
                 }
             }
         }
         let before = self.out.len();
-        for sixteen in survivors.chunks(LANES) {
+        let early = if state.second_look { early } else { 0 };
+        let (early, late) = survivors.split_at(early);
+        for sixteen in early.chunks(LANES) {
             let mut asked: LaneMask = 0;
             for (lane, survivor) in sixteen.iter().enumerate() {
                 rects.set(lane, &survivor.rect);
-                asked |= LaneMask::from(state.second_look && !survivor.near) << lane;
+                asked |= LaneMask::from(!survivor.near) << lane;
             }
             let hidden = buffer.hides_lanes(isa, &rects, asked);
             for (lane, survivor) in sixteen.iter().enumerate() {
-                let item = scene.item(survivor.position as usize);
-                if let Some(item) = item.filter(|_| hidden >> lane & 1 == 0) {
-                    self.out.push(item);
+                if hidden >> lane & 1 == 0 {
+                    self.out.extend(scene.item(survivor.position as usize));
                 }
             }
+        }
+        for survivor in late {
+            self.out.extend(scene.item(survivor.position as usize));
         }
         stats.kept = self.out.len() - before;
         stats

@@ -243,15 +243,19 @@ impl<const WHOLE: bool> Masked<WHOLE> {
         let working = isa.pairs(&self.working, &at);
         let mut hidden = lanes;
         for side in 0..2 {
-            if open[side] == 0 {
+            let behind = open[side] & !isa.at_most(working[side], nearness);
+            hidden &= !open[side] | behind;
+            if behind == 0 {
                 continue;
             }
             let mut masks = [0; LANES];
-            for lane in 0..LANES {
-                let tile = at[lane] as usize + side;
-                masks[lane] = self.mask.get(tile).copied().unwrap_or(0);
+            let mut left = behind;
+            while left != 0 {
+                let lane = left.trailing_zeros() as usize;
+                left &= left - 1;
+                masks[lane] = self.mask[at[lane] as usize + side];
             }
-            // Of lanes that are not asked about anything may come out.
+            // Of the other lanes anything may come out.
             let mut shown = [0; LANES];
             for lane in 0..LANES {
                 let first_column = (rects.x0[lane] & !7) + (side * TILE_WIDTH) as i32;
@@ -266,9 +270,7 @@ impl<const WHOLE: bool> Masked<WHOLE> {
                 let below = Mask::MAX.wrapping_shr(3u32.wrapping_sub(bottom).wrapping_mul(8));
                 shown[lane] = (row * 0x0101_0101) & above & below & !masks[lane];
             }
-            let behind = isa.at_most(working[side], nearness);
-            let covered = isa.zeros(isa.words(&shown)) & !behind;
-            hidden &= !open[side] | covered;
+            hidden &= !behind | isa.zeros(isa.words(&shown));
         }
         hidden
     }
