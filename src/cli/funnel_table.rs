@@ -4,18 +4,13 @@
 use super::document::Block;
 use super::table::Table;
 use super::text;
-use crate::funnel::{
-    FunnelReport, Gain, LevelRow, ProofCounts, SeenFrom, StageKind, StageRow, Times,
-};
+use crate::funnel::{FunnelReport, Gain, LevelRow, ProofCounts, SeenFrom, StageRow, Times};
 use crate::visibility::Guarantee;
 use crate::visibility::hiders::{BlocksRow, GroundRow, InnerRow};
 use crate::visibility::occlusion::OccluderChoice;
 
 /// No line is longer.
 const WIDTH: u16 = 100;
-
-/// What is judged and has no time.
-const NOT_TIMED: &str = "not timed";
 
 pub fn blocks(report: &FunnelReport) -> Vec<Block> {
     let mut blocks = vec![
@@ -78,16 +73,10 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
             ]);
         }
     }
-    let mut stages = report.bounds.iter().map(|row| row.stage);
-    let mut gained = report.gains.iter().map(|gain| gain.stage);
-    if stages.any(|stage| stage == StageKind::Fragment)
-        || gained.any(|stage| stage == StageKind::Fragment)
-    {
-        let line = format!(
-            "{NOT_TIMED}: the fragment stage is the graphics processor's and judged only, so a \
-             lower bound of it has no ratio."
-        );
-        blocks.push(Block::Line(line));
+    if report.stages.iter().any(|row| row.fragments.is_some()) {
+        let line = "The fragment stage is timed as it is done here: exactly, along the ray of each \
+                    sample, on one thread. A graphics processor does it in hardware.";
+        blocks.push(Block::Line(line.into()));
     }
     blocks.extend(report.conclusions.iter().cloned().map(Block::Line));
     blocks
@@ -338,11 +327,7 @@ fn bounds(report: &FunnelReport) -> Table {
             row.name.to_owned(),
             row.back_end.to_owned(),
             of_view(&row.times),
-            match (row.ratio, row.times.stage_ns) {
-                (Some(ratio), _) => text::significant(ratio),
-                (None, Some(_)) => NOT_TIMED.to_owned(),
-                (None, None) => String::new(),
-            },
+            row.ratio.map(text::significant).unwrap_or_default(),
         ]
     }));
     table
@@ -369,7 +354,7 @@ fn gain(gain: &Gain) -> Vec<String> {
                 gain.break_even_ns,
                 [gain.break_even_ns_lower, gain.break_even_ns_upper],
             ),
-            None if gain.removed() > 0.0 => NOT_TIMED.to_owned(),
+            None if gain.removed() > 0.0 => String::new(),
             None => "removes nothing".to_owned(),
         },
     ]

@@ -9,15 +9,14 @@ use std::rc::Rc;
 use serde::Serialize;
 
 use super::faces::Faces;
-use super::pass::Pass;
+use super::fragment_rows::Z;
+use super::fragments::Fragments;
 use super::stage::StageKind;
 use super::times::Times;
 use super::world::World;
 use crate::measure::Ask;
 use crate::query::ItemId;
 use crate::statistics::Estimate;
-use crate::visibility::Solids;
-use crate::visibility::fragment::{Canvas, Piece, Tests, draw};
 use crate::visibility::occlusion::{FrameTrace, MaskedInner, OccluderScene, OcclusionBuffer, View};
 use crate::visibility::region::{Opening, RegionId, RegionRow, Scratch};
 use crate::visibility::triangle::SafeCones;
@@ -78,18 +77,12 @@ impl Bound<'_> {
     }
 }
 
-/// The bounds that a scene has data for: of fragments where items are solid boxes. `left`
-/// is the set that the chain leaves.
-pub fn bounds<'w>(world: &'w World<'w>, pass: &Pass, left: usize, faces: &Faces) -> Vec<Bound<'w>> {
+/// The bounds that a scene has data for.
+pub fn bounds<'w>(world: &'w World<'w>, faces: &Faces, fragments: &Fragments) -> Vec<Bound<'w>> {
     let mut bounds = of_regions(world);
     bounds.extend(of_occlusion(world));
     bounds.push(of_cones(world, faces));
-    bounds.extend(
-        world
-            .solids
-            .as_ref()
-            .map(|solids| of_fragments(world, solids, pass, left)),
-    );
+    bounds.push(of_fragments(world, fragments));
     bounds
 }
 
@@ -199,24 +192,19 @@ fn of_cones<'w>(world: &'w World<'w>, faces: &Faces) -> Bound<'w> {
     }
 }
 
-fn of_fragments<'w>(world: &'w World<'w>, solids: &Solids, pass: &Pass, left: usize) -> Bound<'w> {
-    let covered = (0..world.views()).map(|view| {
-        let items = world.listed(pass.items(left, view));
-        let solids = solids.some(&items);
-        let pieces: Vec<Piece> = (0..items.len() as ItemId).map(Piece::whole).collect();
-        let canvas = Canvas::of(world.rays(view), world.samples);
-        draw(&canvas, &solids, &pieces, &Tests::default())
-            .tally
-            .covered as usize
-    });
-    let covered: Vec<usize> = covered.collect();
+fn of_fragments<'w>(world: &'w World<'w>, fragments: &Fragments) -> Bound<'w> {
+    let (mut covered, mut seen) = (Vec::new(), Vec::new());
+    for view in 0..world.views() {
+        seen.clear();
+        covered.push(fragments.draw(0, view, &mut seen).covered as usize);
+    }
     let samples = world.samples.samples();
     let depths = vec![1.0f32; samples];
     let buffer = RefCell::new(vec![0.0f32; samples]);
     let ids: Vec<ItemId> = (0..samples as ItemId).collect();
     Bound {
         stage: StageKind::Fragment,
-        back_end: "z-test",
+        back_end: Z,
         name: "write id and depth of each covered sample",
         ask: Box::new(move |view, out| {
             let count = covered[view];

@@ -66,10 +66,14 @@ fn of_gain(gain: &Gain) -> String {
     match gain.break_even_ns {
         Some(0.0) => format!("{what} removes {removed:.1} {unit} per view and saves time as well."),
         Some(ns) => format!(
-            "{what} removes {removed:.1} {unit} per view and pays where drawing one of them takes \
-             more than {ns:.1} ns."
+            "{what} removes {removed:.1} {unit} per view and pays where {} one of them takes more \
+             than {ns:.1} ns.",
+            match gain.stage {
+                StageKind::Fragment => "shading",
+                _ => "drawing",
+            }
         ),
-        None => format!("{what} removes {removed:.1} {unit} per view; it is not timed."),
+        None => format!("{what} removes {removed:.1} {unit} per view."),
     }
 }
 

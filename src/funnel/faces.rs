@@ -110,6 +110,19 @@ impl Faces {
         out.extend(kept.map(|(_, cluster)| cluster));
     }
 
+    /// What a back end leaves of the triangles of a view, by their number among the
+    /// surfaces; `None` is no back end.
+    pub fn triangles(&self, back_end: Option<usize>, view: usize) -> Vec<u32> {
+        let selection = self.selected(back_end, view);
+        let clusters = self.clusters(view);
+        let mut triangles = Vec::with_capacity(selection.triangles());
+        for (cluster, word) in selection.words().iter().enumerate() {
+            let all = clusters.triangles_of(cluster).iter().enumerate();
+            triangles.extend(all.filter(|(bit, _)| word >> bit & 1 == 1).map(|(_, t)| t));
+        }
+        triangles
+    }
+
     /// Every view, held against what a back end is to decide by: the exact side of each
     /// triangle, the window or the samples.
     pub fn judged(&self, back_end: Option<usize>) -> Vec<Judged> {

@@ -3,15 +3,19 @@
 
 use serde::Serialize;
 
+use super::faces::Faces;
 use super::fragment_rows::{STENCIL, Z};
 use super::judged::Judged;
 use super::pass::Pass;
 use super::stage::{BackEnd, NONE, StageKind};
+use super::triangle_rows;
 use super::truth::Truth;
 use super::world::World;
 use crate::query::ItemId;
 use crate::scene::WorldBox;
-use crate::visibility::fragment::{Canvas, Drawn, Piece, Stencil, Surfaces, Tally, Tests, draw};
+use crate::visibility::fragment::{
+    Canvas, Drawn, Piece, Stencil, Surfaces, Tally, Tests, draw, draw_triangles,
+};
 use crate::visibility::region::RegionGraph;
 use crate::visibility::{Rays, Solids};
 
@@ -71,56 +75,120 @@ pub struct Tested {
     pub counts: Option<FragmentCounts>,
 }
 
-/// Every test on a set of items of each view; `None` if stopped.
-pub fn tested(
-    world: &World,
-    pass: &Pass,
-    set: usize,
-    truth: &Truth,
-    stop: &dyn Fn() -> bool,
-) -> Option<Vec<Tested>> {
-    let back_ends = world.back_ends(StageKind::Fragment);
-    let mut judged = vec![Vec::new(); back_ends.len()];
-    let mut tallies = vec![Vec::new(); back_ends.len()];
-    for view in 0..world.views() {
-        if stop() {
-            return None;
-        }
-        let given = pass.items(set, view);
-        let items = world.listed(given);
-        let solids = world.solids.as_ref();
-        let left = solids.map(|solids| Left::of(world, solids, view, &items));
-        for (place, back_end) in back_ends.iter().enumerate() {
-            let output = match (&left, back_end.name) {
-                (_, NONE) => items.to_vec(),
-                (Some(left), name) => {
-                    let drawn = left.drawn(name);
-                    tallies[place].push(drawn.tally);
-                    let visible = drawn.depth.visible(&left.canvas).into_iter();
-                    visible.map(|place| items[place as usize]).collect()
-                }
-                // What walls and triangles hide is known from their truth alone.
-                (None, _) => {
-                    let visible = truth.of_view(view).iter().map(|(item, _)| *item);
-                    let given = visible.filter(|item| items.binary_search(item).is_ok());
-                    given.collect::<Vec<ItemId>>()
-                }
-            };
-            judged[place].push(world.judge(view, [given, Some(&output)], truth));
-        }
-    }
-    let rows = back_ends.into_iter().zip(judged).zip(tallies);
-    let tested = rows.map(|((back_end, judged), tallies)| Tested {
-        back_end,
-        judged,
-        counts: FragmentCounts::of(&tallies),
-    });
-    Some(tested.collect())
+/// What a chain leaves of every view, ready to be drawn: boxes as they are; of a mesh or a
+/// map the triangles that the triangle stage leaves, and the floors and ceilings.
+pub struct Fragments<'w> {
+    world: &'w World<'w>,
+    tests: Vec<&'static str>,
+    views: Vec<Left>,
 }
 
-/// What is left of a view, numbered anew.
-struct Left {
-    canvas: Canvas,
+enum Left {
+    Boxes(Boxes),
+    Triangles(Vec<u32>),
+}
+
+impl<'w> Fragments<'w> {
+    /// Of a set of items of each view, whose triangles `faces` has, and what is left of
+    /// these by a back end of the triangle stage.
+    pub fn of(
+        world: &'w World<'w>,
+        pass: &Pass,
+        set: usize,
+        faces: &Faces,
+        triangle: &str,
+    ) -> Fragments<'w> {
+        let place = triangle_rows::back_ends().position(|row| row.name == triangle);
+        let tests = world.back_ends(StageKind::Fragment).into_iter();
+        let tests = tests.map(|row| row.name).filter(|name| *name != NONE);
+        let views = (0..world.views()).map(|view| match (&world.solids, &world.surfaces) {
+            (None, Some(surfaces)) => {
+                let mut triangles = faces.triangles(place, view);
+                let behind = surfaces.of_item.get(world.items()..).unwrap_or_default();
+                triangles.extend(behind.iter().flat_map(Clone::clone));
+                Left::Triangles(triangles)
+            }
+            (Some(solids), _) => {
+                let items = world.listed(pass.items(set, view));
+                Left::Boxes(Boxes::of(world, solids, view, &items))
+            }
+            (None, None) => unreachable!("triangles of what is no solid box"),
+        });
+        Fragments {
+            tests: tests.collect(),
+            views: views.collect(),
+            world,
+        }
+    }
+
+    /// How many tests there are.
+    pub fn count(&self) -> usize {
+        self.tests.len()
+    }
+
+    /// Draws a view by a test; hands over what is in front at any sample.
+    pub fn draw(&self, test: usize, view: usize, out: &mut Vec<ItemId>) -> Tally {
+        let World { samples, .. } = *self.world;
+        let rays = self.world.rays(view);
+        match &self.views[view] {
+            Left::Boxes(left) => {
+                let canvas = Canvas::of(rays, samples);
+                let drawn = left.drawn(&canvas, self.tests[test]);
+                let visible = drawn.depth.visible(&canvas).into_iter();
+                out.extend(visible.map(|place| left.items[place as usize]));
+                drawn.tally
+            }
+            Left::Triangles(triangles) => {
+                let surfaces = self.world.surfaces.as_ref().expect("triangles");
+                let canvas = Canvas::for_triangles(rays, samples, surfaces.origin);
+                let drawn = draw_triangles(&canvas, surfaces, triangles);
+                // Behind a map's items come its floors and ceilings.
+                let items = self.world.items() as ItemId;
+                let visible = drawn.visible(&canvas).into_iter();
+                out.extend(visible.filter(|item| *item < items));
+                drawn.tally
+            }
+        }
+    }
+
+    /// Every test, held against the truth; of no test what it was given. `None` if stopped.
+    pub fn tested(
+        &self,
+        pass: &Pass,
+        set: usize,
+        truth: &Truth,
+        stop: &dyn Fn() -> bool,
+    ) -> Option<Vec<Tested>> {
+        let world = self.world;
+        let tested = world.back_ends(StageKind::Fragment).into_iter();
+        let tested = tested.map(|back_end| {
+            let test = self.tests.iter().position(|name| *name == back_end.name);
+            let (mut judged, mut tallies) = (Vec::new(), Vec::new());
+            for view in 0..world.views() {
+                if stop() {
+                    return None;
+                }
+                let given = pass.items(set, view);
+                let mut output = Vec::new();
+                match test {
+                    Some(test) => tallies.push(self.draw(test, view, &mut output)),
+                    None => output.extend_from_slice(&world.listed(given)),
+                }
+                judged.push(world.judge(view, [given, Some(&output)], truth));
+            }
+            Some(Tested {
+                back_end,
+                judged,
+                counts: FragmentCounts::of(&tallies),
+            })
+        });
+        tested.collect()
+    }
+}
+
+/// What is left of a view of solid boxes, numbered anew.
+struct Boxes {
+    items: Vec<ItemId>,
     solids: Solids,
     cut_outs: Option<Surfaces>,
     /// Where the eye is in rooms: with the items that meet them, and those beyond.
@@ -135,17 +203,16 @@ struct Room {
     items: Vec<ItemId>,
 }
 
-impl Left {
-    fn of(world: &World, solids: &Solids, view: usize, items: &[ItemId]) -> Left {
-        let rays = world.rays(view);
-        let room = Room::of(world, rays).map(|room| {
+impl Boxes {
+    fn of(world: &World, solids: &Solids, view: usize, items: &[ItemId]) -> Boxes {
+        let room = Room::of(world, world.rays(view)).map(|room| {
             let pieces = (0..items.len() as ItemId).map(Piece::whole);
             let is_near = |p: &Piece| room.items.binary_search(&items[p.item as usize]).is_ok();
             let (near, beyond) = pieces.partition(is_near);
             (room, [near, beyond])
         });
-        Left {
-            canvas: Canvas::of(rays, world.samples),
+        Boxes {
+            items: items.to_vec(),
             solids: solids.some(items),
             cut_outs: world.cut_outs.as_ref().map(|surfaces| surfaces.some(items)),
             room,
@@ -153,8 +220,8 @@ impl Left {
     }
 
     /// The image by a test.
-    fn drawn(&self, test: &str) -> Drawn {
-        let Left { canvas, solids, .. } = self;
+    fn drawn(&self, canvas: &Canvas, test: &str) -> Drawn {
+        let solids = &self.solids;
         let tests = Tests {
             surfaces: self.cut_outs.as_ref().filter(|_| test != Z),
             stencil: None,

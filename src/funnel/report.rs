@@ -182,8 +182,8 @@ pub struct Gain {
     pub back_end: String,
     /// What is counted at the end: items, triangles or shaded fragments.
     pub unit: &'static str,
-    /// Time of all stages of whole items together, a view, and of the triangle stage if it
-    /// is this one; null for the fragment stage.
+    /// Time of all stages of whole items together, a view, and of the one behind them if it
+    /// is this one.
     pub with_ns: Option<f64>,
     /// The same without the stage.
     pub without_ns: Option<f64>,
@@ -203,8 +203,8 @@ pub struct Gain {
 
 /// One side of a [`Gain`]: the tasks of a chain's steps, and what is left in the end.
 pub struct Side {
-    /// Tasks of the timed pass; `None` where there is a step that is not timed.
-    pub tasks: Option<Vec<usize>>,
+    /// Tasks of the timed pass.
+    pub tasks: Vec<usize>,
     /// What is left, a view.
     pub count: f64,
 }
@@ -253,10 +253,7 @@ impl Gain {
 /// Time of all steps of a side in each process, ns. A chain without steps takes none;
 /// one with a step that has no time has none.
 fn sums(side: &Side, times: &OverProcesses) -> Vec<f64> {
-    let Some(tasks) = &side.tasks else {
-        return Vec::new();
-    };
-    let of_steps: Vec<Vec<f64>> = tasks.iter().map(|&task| times.ln_ns(task)).collect();
+    let of_steps: Vec<Vec<f64>> = side.tasks.iter().map(|&task| times.ln_ns(task)).collect();
     let processes = (0..times.processes()).map(|process| {
         let parts = of_steps
             .iter()

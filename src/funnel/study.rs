@@ -5,11 +5,12 @@ use std::cell::RefCell;
 
 use super::bounds::{Bound, bounds};
 use super::certified::{Proofs, certified};
+use super::chain::Chain;
 use super::conclusions::conclusions;
 use super::error::FunnelError;
 use super::faces::Faces;
 use super::fragment_rows;
-use super::fragments;
+use super::fragments::Fragments;
 use super::judged::{Errors, Judged};
 use super::mirror::mirrored;
 use super::orders::Orders;
@@ -74,7 +75,7 @@ pub fn prepare(
         },
         None => None,
     };
-    let left = Left::of(&world, &pass, &walks.chosen);
+    let left = Left::of(&world, &pass, &walks.chosen, input.chain);
     let mut rows = Vec::new();
     for (stage, name, step) in &walks.rows {
         if stop() {
@@ -100,7 +101,7 @@ pub fn prepare(
         rows.push((back_end, back_end.name.to_owned(), judged, task, None));
     }
     let last = walks.chosen.left();
-    let Some(tested) = fragments::tested(&world, &pass, last, &truth, stop) else {
+    let Some(tested) = left.fragments.tested(&pass, last, &truth, stop) else {
         return Ok(None);
     };
     let mut mirror = None;
@@ -114,9 +115,11 @@ pub fn prepare(
         return Ok(None);
     };
     let picked = left.picks.judged();
-    // The tests of the fragment stage are not timed.
+    // Behind the steps come the back ends of the triangle stage, then the tests of fragments.
+    let first_test = pass.steps().len() + triangle_rows::back_ends().count();
+    let tests = std::iter::once(None).chain((first_test..).map(Some));
     let tasks = rows.iter().map(|(_, _, _, task, _)| *task);
-    let tasks: Vec<Option<usize>> = tasks.chain(tested.iter().map(|_| None)).collect();
+    let tasks: Vec<Option<usize>> = tasks.chain(tests.take(tested.len())).collect();
     let row = |back_end: BackEnd, name: &str, judged: &[Judged]| StageRow {
         back_end,
         structure: None,
@@ -145,7 +148,7 @@ pub fn prepare(
     });
     let rows: Vec<StageRow> = rows.chain(tested).collect();
     let side = |walked: &Walked| Side {
-        tasks: Some(pass.timed_steps(walked)),
+        tasks: pass.timed_steps(walked),
         count: pass.mean_count(walked.left()),
     };
     let of_items = walks.without.iter().map(|(stage, without)| Sides {
@@ -159,7 +162,7 @@ pub fn prepare(
         sides_behind(row, *task, &steps, world.cut_outs.is_some(), &rows)
     });
     let gains = of_items.chain(behind).collect();
-    let bounds = bounds_of(&world, &pass, &walks.chosen, &left);
+    let bounds = bounds(&world, &left.faces, &left.fragments);
     let bound_rows = bounds.iter().map(Bound::row).collect();
     let timed = timed_tasks(&pass, &world, &left, bounds, None);
     let level = Level::of(&input.scene.name, input.scene)?;
@@ -212,8 +215,8 @@ pub fn time(
     let Some(walks) = Walks::of(&mut pass, &world, input.chain, stop) else {
         return Ok(None);
     };
-    let left = Left::of(&world, &pass, &walks.chosen);
-    let bounds = bounds_of(&world, &pass, &walks.chosen, &left);
+    let left = Left::of(&world, &pass, &walks.chosen, input.chain);
+    let bounds = bounds(&world, &left.faces, &left.fragments);
     let tasks = timed_tasks(&pass, &world, &left, bounds, Some(&plan.expected));
     Ok(plan.time(&tasks, input, stop))
 }
@@ -240,46 +243,40 @@ fn sides_behind(
         Some((own, every)) => ("fragments", [own.shaded_count, every.fragment_count]),
         None => (row.unit, [row.errors.output_count, row.errors.input_count]),
     };
-    let with = task.map(|task| [steps, &[task]].concat());
-    let without = with.is_some().then(|| steps.to_vec());
-    let [with, without] = [(with, counts[0]), (without, counts[1])];
+    let [with, without] = [[steps, &[task?]].concat(), steps.to_vec()];
+    let sides = [(with, counts[0]), (without, counts[1])];
     Some(Sides {
         stage,
         back_end: row.back_end.name.to_owned(),
         unit,
-        sides: [with, without].map(|(tasks, count)| Side { tasks, count }),
+        sides: sides.map(|(tasks, count)| Side { tasks, count }),
     })
 }
 
 /// What the chosen chain leaves of every view, ready for the stages behind it.
 struct Left<'w> {
     faces: Faces,
+    fragments: Fragments<'w>,
     picks: Picks<'w>,
     orders: Orders,
 }
 
 impl<'w> Left<'w> {
-    fn of(world: &'w World<'w>, pass: &Pass, chosen: &Walked) -> Left<'w> {
+    fn of(world: &'w World<'w>, pass: &Pass, chosen: &Walked, chain: &Chain) -> Left<'w> {
         let set = chosen.left();
+        let faces = Faces::of(world, pass, set);
+        let triangle = chain.of(StageKind::Triangle);
         Left {
-            faces: Faces::of(world, pass, set),
+            fragments: Fragments::of(world, pass, set, &faces, triangle),
+            faces,
             picks: Picks::of(world),
             orders: Orders::of(world, pass, set),
         }
     }
 }
 
-fn bounds_of<'w>(
-    world: &'w World<'w>,
-    pass: &Pass,
-    chosen: &Walked,
-    left: &Left,
-) -> Vec<Bound<'w>> {
-    bounds(world, pass, chosen.left(), &left.faces)
-}
-
-/// Every step, every back end of the triangle stage, every order, every back end of
-/// picking and every bound as a task; what it must hand on is what it has, or what another
+/// Every step, every back end of the triangle stage, every test of fragments, every order,
+/// every back end of picking and every bound as a task; what it must hand on is what it has, or what another
 /// process says.
 fn timed_tasks<'p>(
     pass: &'p Pass<'p>,
@@ -295,6 +292,12 @@ fn timed_tasks<'p>(
     });
     let culls = (0..triangle_rows::back_ends().count()).map(|place| {
         let ask: Ask = Box::new(move |view, out| left.faces.cull(place, view, out));
+        ask
+    });
+    let tests = (0..left.fragments.count()).map(|test| {
+        let ask: Ask = Box::new(move |view, out| {
+            left.fragments.draw(test, view, out);
+        });
         ask
     });
     let sorts = (0..left.orders.count()).map(|order| {
@@ -320,6 +323,7 @@ fn timed_tasks<'p>(
     let bounds = bounds.into_iter().map(|bound| bound.ask);
     steps
         .chain(culls)
+        .chain(tests)
         .chain(sorts)
         .chain(picks)
         .chain(bounds)

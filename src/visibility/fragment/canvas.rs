@@ -1,22 +1,53 @@
 //! The samples of an image, ready to be drawn on: it finds the fragments of a box.
 
+use std::cmp::Ordering;
+
+use glam::DVec3;
+
 use super::order::{Part, Piece};
 use super::screen::Screen;
 use super::stencil::Stencil;
 use crate::query::ItemId;
 use crate::scene::WorldBox;
-use crate::visibility::truth::{Crossing, Probe};
-use crate::visibility::{Rays, SampleGrid, Solids};
+use crate::visibility::truth::{Crossing, Meeting, Probe, TriangleProbe};
+use crate::visibility::{Ray, Rays, SampleGrid, Solids};
+
+/// A ray that tells exactly which of two places along it comes first.
+pub trait Along {
+    /// A place where it meets something.
+    type At: Copy;
+
+    /// Which of two comes first.
+    fn order(&self, a: &Self::At, b: &Self::At) -> Ordering;
+}
+
+impl Along for Probe {
+    type At = Crossing;
+
+    #[inline(always)]
+    fn order(&self, a: &Crossing, b: &Crossing) -> Ordering {
+        self.compare(a, b)
+    }
+}
+
+impl Along for TriangleProbe {
+    type At = Meeting;
+
+    #[inline(always)]
+    fn order(&self, a: &Meeting, b: &Meeting) -> Ordering {
+        self.compare(a, b)
+    }
+}
 
 /// An item at a sample.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Fragment {
+pub struct Fragment<At = Crossing> {
     /// Row by row from the top left.
     pub sample: usize,
     /// The item.
     pub item: ItemId,
-    /// Where the ray enters it.
-    pub at: Crossing,
+    /// Where the ray meets it.
+    pub at: At,
 }
 
 /// What it took to find the fragments of a piece.
@@ -28,23 +59,56 @@ pub(super) struct Asked {
     pub kept_out: u64,
 }
 
-/// The samples of an image with their rays. 96 bytes per sample.
+/// The samples of an image with their rays, for boxes or for triangles. About 100 bytes per
+/// sample.
 #[derive(Clone, Debug)]
-pub struct Canvas {
+pub struct Canvas<P = Probe> {
     screen: Screen,
-    probes: Vec<Probe>,
+    probes: Vec<P>,
+}
+
+impl<P> Canvas<P> {
+    fn by(rays: &Rays, grid: SampleGrid, probe: impl Fn(Ray) -> P) -> Canvas<P> {
+        let mut probes = Vec::with_capacity(grid.samples());
+        for row in 0..grid.height {
+            for column in 0..grid.width {
+                probes.push(probe(rays.sample(grid, column, row)));
+            }
+        }
+        Canvas {
+            screen: Screen::of(rays, grid),
+            probes,
+        }
+    }
+
+    /// Columns and rows.
+    pub fn grid(&self) -> SampleGrid {
+        self.screen.grid()
+    }
+
+    /// Where boxes and triangles come to lie in the image.
+    pub fn screen(&self) -> &Screen {
+        &self.screen
+    }
+
+    /// The ray of a sample.
+    #[inline]
+    pub fn probe(&self, sample: usize) -> &P {
+        &self.probes[sample]
+    }
+}
+
+impl Canvas<TriangleProbe> {
+    /// The rays of a camera through the samples of a grid, for triangles about an origin.
+    pub fn for_triangles(rays: &Rays, grid: SampleGrid, origin: DVec3) -> Self {
+        Canvas::by(rays, grid, |ray| TriangleProbe::new(ray, origin))
+    }
 }
 
 impl Canvas {
-    /// The rays of a camera through the samples of a grid.
+    /// The rays of a camera through the samples of a grid, for boxes.
     pub fn of(rays: &Rays, grid: SampleGrid) -> Canvas {
-        let rows = 0..grid.height;
-        let samples = rows.flat_map(|row| (0..grid.width).map(move |column| (column, row)));
-        let probe = |(column, row)| Probe::new(rays.sample(grid, column, row));
-        Canvas {
-            screen: Screen::of(rays, grid),
-            probes: samples.map(probe).collect(),
-        }
+        Canvas::by(rays, grid, Probe::new)
     }
 
     /// The same samples seen in a mirror that is a plane across an axis: the rays
@@ -68,22 +132,6 @@ impl Canvas {
             screen: self.screen.mirrored(axis, at),
             probes: self.probes.iter().map(reflected).collect(),
         }
-    }
-
-    /// Columns and rows.
-    pub fn grid(&self) -> SampleGrid {
-        self.screen.grid()
-    }
-
-    /// Where boxes come to lie in the image.
-    pub fn screen(&self) -> &Screen {
-        &self.screen
-    }
-
-    /// The ray of a sample.
-    #[inline]
-    pub fn probe(&self, sample: usize) -> &Probe {
-        &self.probes[sample]
     }
 
     /// Hands over each sample that meets the box, with where.

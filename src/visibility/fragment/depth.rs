@@ -1,20 +1,20 @@
 //! The z-test: the nearest fragment of each sample, by the exact order of depths.
 
-use super::canvas::{Canvas, Fragment};
+use super::canvas::{Along, Canvas, Fragment};
 use crate::query::ItemId;
-use crate::visibility::truth::{Crossing, NO_ITEM};
+use crate::visibility::truth::{NO_ITEM, Probe};
 
 /// What is in front at each sample so far; of a tie the lowest id.
 #[derive(Clone, Debug)]
-pub struct DepthBuffer {
-    front: Vec<Option<(Crossing, ItemId)>>,
+pub struct DepthBuffer<P: Along = Probe> {
+    front: Vec<Option<(P::At, ItemId)>>,
     /// Fragments that were as near as the one in front, and lost by their id.
-    ties: Vec<Fragment>,
+    ties: Vec<Fragment<P::At>>,
 }
 
-impl DepthBuffer {
+impl<P: Along> DepthBuffer<P> {
     /// A buffer in which nothing is drawn yet.
-    pub fn new(samples: usize) -> DepthBuffer {
+    pub fn new(samples: usize) -> DepthBuffer<P> {
         DepthBuffer {
             front: vec![None; samples],
             ties: Vec::new(),
@@ -24,11 +24,11 @@ impl DepthBuffer {
     /// Whether the fragment is drawn: there is nothing at its sample, or what is
     /// there is deeper, or as deep with a higher id. If so it is there from now on.
     #[inline]
-    pub fn test(&mut self, canvas: &Canvas, fragment: &Fragment) -> bool {
+    pub fn test(&mut self, canvas: &Canvas<P>, fragment: &Fragment<P::At>) -> bool {
         let Fragment { sample, item, at } = *fragment;
         let front = &mut self.front[sample];
         if let Some((other, other_item)) = *front {
-            let order = canvas.probe(sample).compare(&at, &other);
+            let order = canvas.probe(sample).order(&at, &other);
             if order.is_gt() {
                 return false;
             }
@@ -54,13 +54,13 @@ impl DepthBuffer {
 
     /// What is in front at a sample.
     #[inline]
-    pub fn front(&self, sample: usize) -> Option<(Crossing, ItemId)> {
+    pub fn front(&self, sample: usize) -> Option<(P::At, ItemId)> {
         self.front[sample]
     }
 
     /// The id buffer: the item in front at each sample, [`NO_ITEM`] for none.
     pub fn ids(&self) -> Vec<ItemId> {
-        let id = |front: &Option<(Crossing, ItemId)>| front.map_or(NO_ITEM, |front| front.1);
+        let id = |front: &Option<(P::At, ItemId)>| front.map_or(NO_ITEM, |front| front.1);
         self.front.iter().map(id).collect()
     }
 
@@ -71,10 +71,10 @@ impl DepthBuffer {
 
     /// The exact visible set of the samples, ascending: all that is in front
     /// anywhere, every item of a tie.
-    pub fn visible(&self, canvas: &Canvas) -> Vec<ItemId> {
-        let in_front = |tie: &&Fragment| {
+    pub fn visible(&self, canvas: &Canvas<P>) -> Vec<ItemId> {
+        let in_front = |tie: &&Fragment<P::At>| {
             let front = self.front[tie.sample];
-            let order = |front: (Crossing, _)| canvas.probe(tie.sample).compare(&tie.at, &front.0);
+            let order = |front: (P::At, _)| canvas.probe(tie.sample).order(&tie.at, &front.0);
             front.is_some_and(|front| order(front).is_eq())
         };
         let ties = self.ties.iter().filter(in_front).map(|tie| tie.item);

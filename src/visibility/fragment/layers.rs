@@ -12,6 +12,7 @@ use glam::DVec3;
 use super::draw::Tally;
 use super::errors::{ErrorCount, Layer, OrderErrors};
 use super::order::{DepthOrder, Part, Piece};
+use crate::kernel::each;
 use crate::query::ItemId;
 use crate::visibility::truth::{Meeting, SurfaceIndex, TriangleProbe};
 use crate::visibility::{Rays, SampleGrid};
@@ -85,7 +86,7 @@ pub fn draw_surfaces(
             layers.clear();
             layers.extend(met.iter().filter_map(|&(item, at)| {
                 let leaf = || {
-                    let [a, b, c] = at.corners().map(|p| p.as_dvec3());
+                    let [a, b, c] = each(at.corners(), |p| p.as_dvec3());
                     let point = (ray.origin - origin) + ray.direction * at.depth;
                     order.leaf(point, (b - a).cross(c - a))
                 };

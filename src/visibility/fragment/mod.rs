@@ -18,11 +18,12 @@ mod mask;
 pub mod order;
 mod screen;
 mod stencil;
+mod triangles;
 
 #[cfg(test)]
 mod tests;
 
-pub use canvas::{Canvas, Fragment};
+pub use canvas::{Along, Canvas, Fragment};
 pub use cut_outs::CutOuts;
 pub use depth::DepthBuffer;
 pub use draw::{Drawn, Tally, Tests, draw};
@@ -32,3 +33,4 @@ pub use mask::{MASKS, Mask, Surface, Surfaces};
 pub use order::{DepthOrder, Part, Piece, ToOrder};
 pub use screen::{Rectangle, Screen};
 pub use stencil::Stencil;
+pub use triangles::{DrawnTriangles, draw_triangles};

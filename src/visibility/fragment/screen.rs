@@ -2,9 +2,10 @@
 
 use std::ops::Range;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use crate::camera::Lens;
+use crate::kernel::each;
 use crate::scene::WorldBox;
 use crate::visibility::{Rays, SampleGrid};
 
@@ -108,21 +109,48 @@ impl Screen {
     /// A rectangle that holds every sample whose ray meets the box; `None` if there
     /// is none for certain.
     pub fn rectangle(&self, b: &WorldBox) -> Option<Rectangle> {
+        let mut corners = [[0.0; 4]; 8];
+        for (i, corner) in corners.iter_mut().enumerate() {
+            let pick = |k: usize| if i >> k & 1 == 1 { b.max[k] } else { b.min[k] };
+            *corner = self.place(DVec3::new(pick(0), pick(1), pick(2)) - self.eye, 0.0);
+        }
+        self.hull(&corners, |from, to| (from ^ to).is_power_of_two())
+    }
+
+    /// The same of a triangle; its corners are about an origin.
+    pub fn triangle(&self, corners: [Vec3; 3], origin: DVec3) -> Option<Rectangle> {
+        let shift = origin - self.eye;
+        let mut placed = [[0.0; 4]; 3];
+        for (corner, placed) in corners.iter().zip(&mut placed) {
+            let corner = corner.as_dvec3();
+            // One rounding of the shift and one of the sum.
+            let off = 2.0 * f64::EPSILON * (corner.abs() + shift.abs()).element_sum();
+            *placed = self.place(corner + shift, off);
+        }
+        self.hull(&placed, |from, to| from != to)
+    }
+
+    /// A point about the eye: across, up, depth, and the size that its errors are
+    /// relative to, where the point itself may be `off`.
+    #[inline]
+    fn place(&self, at: DVec3, off: f64) -> [f64; 4] {
+        let [x, y, w] = each(self.axes, |axis| at.dot(axis));
         // Of a point beyond what can be told from another, the depth is off too.
+        let size = at.abs().element_sum() + (self.eye_off + off) / ROUNDED;
+        [x, y, w, size]
+    }
+
+    /// A rectangle that holds the convex hull of some corners, of which any two that the
+    /// hull has an edge between are said to be so.
+    fn hull<const N: usize>(
+        &self,
+        corners: &[[f64; 4]; N],
+        is_edge: impl Fn(usize, usize) -> bool,
+    ) -> Option<Rectangle> {
         let mut extent = Extent {
             low: [f64::INFINITY; 2],
             high: [f64::NEG_INFINITY; 2],
         };
-        let mut corners = [[0.0; 4]; 8];
-        let mut behind = 0;
-        for (i, corner) in corners.iter_mut().enumerate() {
-            let pick = |k: usize| if i >> k & 1 == 1 { b.max[k] } else { b.min[k] };
-            let at = DVec3::new(pick(0), pick(1), pick(2)) - self.eye;
-            let [x, y, w] = self.axes.map(|axis| at.dot(axis));
-            let size = at.abs().element_sum() + self.eye_off / ROUNDED;
-            *corner = [x, y, w, size];
-            behind += usize::from(w < self.near);
-        }
         let least = corners.iter().map(|c| c[2] - c[3] * ROUNDED);
         if least.fold(f64::INFINITY, f64::min) > self.far {
             return None;
@@ -133,7 +161,7 @@ impl Screen {
                 .for_each(|&[x, y, _, size]| extent.add([x, y], size * ROUNDED + AXES));
             return self.cells(&extent);
         }
-        if behind == 8 && corners.iter().all(|c| c[2] + c[3] * ROUNDED < self.near) {
+        if corners.iter().all(|c| c[2] + c[3] * ROUNDED < self.near) {
             return None;
         }
         for (i, &[x, y, w, size]) in corners.iter().enumerate() {
@@ -141,10 +169,9 @@ impl Screen {
                 extent.add([x / w, y / w], size / w * ROUNDED + AXES);
                 continue;
             }
-            for axis in 0..3 {
-                let [to_x, to_y, to_w, to_size] = corners[i ^ 1 << axis];
+            for (to, &[to_x, to_y, to_w, to_size]) in corners.iter().enumerate() {
                 let size = size.max(to_size);
-                if to_w + size * ROUNDED < self.near {
+                if !is_edge(i, to) || to_w + size * ROUNDED < self.near {
                     continue;
                 }
                 if to_w - w < size * LEVEL {

@@ -105,8 +105,8 @@ fn axis_of(normals: impl Iterator<Item = DVec3> + Clone) -> Option<DVec3> {
     let mut centre = normals.clone().sum::<DVec3>() / count as f64;
     for step in 0..STEPS {
         let far = |a: &DVec3, b: &DVec3| {
-            let [a, b] = [a, b].map(|n| n.distance_squared(centre));
-            a.total_cmp(&b)
+            let distance = |n: &DVec3| n.distance_squared(centre);
+            distance(a).total_cmp(&distance(b))
         };
         let farthest = normals.clone().max_by(far)?;
         centre += (farthest - centre) / f64::from(step + 2);

@@ -14,6 +14,12 @@ use crate::visibility::Ray;
 /// once or twice more. 8 * 2^-53 is above their sum.
 const GUARD: f64 = 8.0 / (1u64 << 53) as f64;
 
+/// Whether the rounded depths say for certain that the true ones differ, and how.
+#[inline(always)]
+fn apart(a: f64, b: f64) -> bool {
+    (a - b).abs() > GUARD * (a.abs() + b.abs())
+}
+
 /// Where a ray crosses a plane across an axis. Its true depth is the fraction
 /// `(plane - origin[axis]) / direction[axis]`.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -76,14 +82,8 @@ impl Probe {
     #[inline]
     pub fn enter(&self, b: &WorldBox, limit: f64) -> Option<Crossing> {
         let ray = &self.ray;
-        let mut entries = [Crossing {
-            depth: f64::NEG_INFINITY,
-            plane: 0.0,
-            axis: 0,
-        }; 3];
-        let mut exits = entries;
+        let (mut entries, mut exits) = ([f64::NEG_INFINITY; 3], [f64::INFINITY; 3]);
         let (mut first, mut last) = (f64::NEG_INFINITY, f64::INFINITY);
-        let mut axes = 0;
         for axis in 0..3 {
             let (d, o) = (ray.direction[axis], ray.origin[axis]);
             let (low, high) = (b.min[axis], b.max[axis]);
@@ -94,11 +94,10 @@ impl Probe {
                 continue;
             }
             let (near_side, far_side) = if d > 0.0 { (low, high) } else { (high, low) };
-            entries[axes] = self.crossing(axis, near_side);
-            exits[axes] = self.crossing(axis, far_side);
-            first = first.max(entries[axes].depth);
-            last = last.min(exits[axes].depth);
-            axes += 1;
+            entries[axis] = self.crossing(axis, near_side).depth;
+            exits[axis] = self.crossing(axis, far_side).depth;
+            first = first.max(entries[axis]);
+            last = last.min(exits[axis]);
         }
         // x -> x + GUARD |x| grows with x: what holds for the largest rounded entry
         // holds for the true one, and likewise for the least exit.
@@ -112,10 +111,21 @@ impl Probe {
         {
             return None;
         }
-        let (entries, exits) = (&entries[..axes], &exits[..axes]);
-        let enters = self.latest(entries)?;
-        let misses = || exits.iter().any(|e| self.compare(&enters, e).is_gt());
-        if enters_to > leaves_from && misses() {
+        // As good as always the last entry is beyond doubt.
+        let mut latest = 0;
+        for axis in 1..3 {
+            latest = if entries[axis] > entries[latest] {
+                axis
+            } else {
+                latest
+            };
+        }
+        let beaten = |axis: usize| apart(first, entries[axis]) || axis == latest;
+        let enters = match beaten(0) && beaten(1) && beaten(2) {
+            true => self.crossing(latest, self.entered(b, latest)),
+            false => self.latest_entry(b)?,
+        };
+        if enters_to > leaves_from && self.leaves_before(b, &enters) {
             return None;
         }
         if enters_from < ray.near && self.compare_with(&enters, ray.near).is_lt() {
@@ -127,12 +137,40 @@ impl Probe {
         Some(enters)
     }
 
-    /// The crossing of the largest depth.
-    #[inline]
-    fn latest(&self, crossings: &[Crossing]) -> Option<Crossing> {
-        let later = |a: Crossing, b: &Crossing| if self.compare(b, &a).is_gt() { *b } else { a };
-        let (&first, rest) = crossings.split_first()?;
-        Some(rest.iter().fold(first, later))
+    /// The bound of a box that is crossed first along an axis of a direction that is not 0.
+    #[inline(always)]
+    fn entered(&self, b: &WorldBox, axis: usize) -> f64 {
+        match self.ray.direction[axis] > 0.0 {
+            true => b.min[axis],
+            false => b.max[axis],
+        }
+    }
+
+    /// The axes along which the ray crosses anything.
+    fn crossed(&self) -> impl Iterator<Item = usize> {
+        (0..3).filter(|&axis| self.ray.direction[axis] != 0.0)
+    }
+
+    /// The last of the entries into the slabs of a box, exactly; `None` for a ray without
+    /// direction.
+    #[cold]
+    fn latest_entry(&self, b: &WorldBox) -> Option<Crossing> {
+        let entries = self
+            .crossed()
+            .map(|axis| self.crossing(axis, self.entered(b, axis)));
+        entries.reduce(|a, b| if self.compare(&b, &a).is_gt() { b } else { a })
+    }
+
+    /// Whether the ray has left a slab of the box for certain where it enters the last one.
+    #[cold]
+    fn leaves_before(&self, b: &WorldBox, enters: &Crossing) -> bool {
+        self.crossed().any(|axis| {
+            let left = match self.ray.direction[axis] > 0.0 {
+                true => b.max[axis],
+                false => b.min[axis],
+            };
+            self.compare(enters, &self.crossing(axis, left)).is_gt()
+        })
     }
 
     /// Which of two crossings of this ray comes first, exactly.
@@ -147,15 +185,11 @@ impl Probe {
                 false => order.reverse(),
             };
         }
-        let difference = a.depth - b.depth;
-        if difference.abs() > GUARD * (a.depth.abs() + b.depth.abs()) {
-            return if difference > 0.0 {
-                Ordering::Greater
-            } else {
-                Ordering::Less
-            };
+        match apart(a.depth, b.depth) {
+            true if a.depth > b.depth => Ordering::Greater,
+            true => Ordering::Less,
+            false => self.compare_exactly(a, b),
         }
-        self.compare_exactly(a, b)
     }
 
     /// `N_a / d_a` against `N_b / d_b`, multiplied by both `d`.

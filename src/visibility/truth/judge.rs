@@ -4,11 +4,12 @@
 use std::cmp::Ordering;
 
 use dashu_int::IBig;
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use crate::camera::{Camera, Lens, look_at};
+use crate::geometry::Aabb;
 use crate::query::ItemId;
-use crate::scene::{Scene, SeededRng, WorldBox};
+use crate::scene::{Scene, SeededRng, SurfaceKind, Surfaces, WorldBox};
 use crate::visibility::{Ray, Solids};
 
 /// A double as a whole number of units of 2^-300.
@@ -146,4 +147,34 @@ pub fn camera(rng: &mut SeededRng) -> Camera {
         frame,
         lens: lens.unwrap(),
     }
+}
+
+/// Triangles on few whole numbers: shared edges and corners, common planes, some
+/// without area, and boxes of them.
+pub fn triangles(rng: &mut SeededRng) -> Surfaces {
+    let shift = [0.0, 0.0, 0.1, 3e6 + 0.3][rng.below(4)];
+    let mut surfaces = Surfaces::about(DVec3::splat(shift));
+    let corners: Vec<Vec3> = (0..6)
+        .map(|_| {
+            let mut one = || rng.below(7) as f32 - 3.0;
+            Vec3::new(one(), one(), one())
+        })
+        .collect();
+    for _ in 0..1 + rng.below(8) {
+        let kind = [
+            SurfaceKind::Opaque,
+            SurfaceKind::Opaque,
+            SurfaceKind::Clear,
+            SurfaceKind::CutOut,
+        ][rng.below(4)];
+        let mut triangle = || [0; 3].map(|_| rng.below(6) as u32);
+        let triangles = [triangle(), triangle()];
+        surfaces.push(kind, rng.below(2) == 0, &corners, &triangles);
+    }
+    for b in ties(rng, 6) {
+        let (low, high) = (b.min.as_vec3(), b.max.as_vec3());
+        let b = Aabb::new(low, high);
+        surfaces.push_box(SurfaceKind::Opaque, false, &b);
+    }
+    surfaces
 }

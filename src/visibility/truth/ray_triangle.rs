@@ -268,7 +268,7 @@ fn are_in_one_plane(a: [Vec3; 3], b: [Vec3; 3]) -> bool {
     let normal = [of_two(1, 2), of_two(2, 0), of_two(0, 1)];
     let is_in = |p: I64Vec3| {
         let at = p - a;
-        let [x, y, z] = [0, 1, 2].map(|k| normal[k] * i128::from(at[k]));
+        let [x, y, z] = each([0, 1, 2], |k| normal[k] * i128::from(at[k]));
         x + y + z == 0
     };
     is_in(p) && is_in(q) && is_in(r)

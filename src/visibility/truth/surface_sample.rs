@@ -136,42 +136,12 @@ mod tests {
         [items(true), items(false)]
     }
 
-    /// Triangles on few whole numbers: shared edges and corners, common planes, some
-    /// without area, and boxes of them.
-    fn small_world(rng: &mut SeededRng) -> Surfaces {
-        let shift = [0.0, 0.0, 0.1, 3e6 + 0.3][rng.below(4)];
-        let mut surfaces = Surfaces::about(DVec3::splat(shift));
-        let corners: Vec<Vec3> = (0..6)
-            .map(|_| {
-                let mut one = || rng.below(7) as f32 - 3.0;
-                Vec3::new(one(), one(), one())
-            })
-            .collect();
-        for _ in 0..1 + rng.below(8) {
-            let kind = [
-                SurfaceKind::Opaque,
-                SurfaceKind::Opaque,
-                SurfaceKind::Clear,
-                SurfaceKind::CutOut,
-            ][rng.below(4)];
-            let mut triangle = || [0; 3].map(|_| rng.below(6) as u32);
-            let triangles = [triangle(), triangle()];
-            surfaces.push(kind, rng.below(2) == 0, &corners, &triangles);
-        }
-        for b in judge::ties(rng, 6) {
-            let (low, high) = (b.min.as_vec3(), b.max.as_vec3());
-            let b = crate::geometry::Aabb::new(low, high);
-            surfaces.push_box(SurfaceKind::Opaque, false, &b);
-        }
-        surfaces
-    }
-
     #[test]
     fn triangles_full_of_ties_are_seen_as_whole_numbers_see_them() {
         let mut rng = SeededRng::new(31);
         let (mut met, mut tied, mut before, mut edges) = (0, 0, 0, 0);
         for world in 0..80 {
-            let surfaces = small_world(&mut rng);
+            let surfaces = judge::triangles(&mut rng);
             let index = SurfaceIndex::build(&surfaces);
             let mut camera = judge::camera(&mut rng);
             camera.frame.eye += surfaces.origin;
