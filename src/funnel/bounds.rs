@@ -10,7 +10,6 @@ use serde::Serialize;
 
 use super::faces::Faces;
 use super::fragment_rows::Z;
-use super::fragments::Fragments;
 use super::stage::StageKind;
 use super::times::Times;
 use super::world::World;
@@ -77,12 +76,13 @@ impl Bound<'_> {
     }
 }
 
-/// The bounds that a scene has data for.
-pub fn bounds<'w>(world: &'w World<'w>, faces: &Faces, fragments: &Fragments) -> Vec<Bound<'w>> {
+/// The bounds that a scene has data for. `covered` are the samples of each view that
+/// something covers.
+pub fn bounds<'w>(world: &'w World<'w>, faces: &Faces, covered: &[u64]) -> Vec<Bound<'w>> {
     let mut bounds = of_regions(world);
     bounds.extend(of_occlusion(world));
     bounds.push(of_cones(world, faces));
-    bounds.push(of_fragments(world, fragments));
+    bounds.push(of_fragments(world, covered));
     bounds
 }
 
@@ -192,12 +192,9 @@ fn of_cones<'w>(world: &'w World<'w>, faces: &Faces) -> Bound<'w> {
     }
 }
 
-fn of_fragments<'w>(world: &'w World<'w>, fragments: &Fragments) -> Bound<'w> {
-    let (mut covered, mut seen) = (Vec::new(), Vec::new());
-    for view in 0..world.views() {
-        seen.clear();
-        covered.push(fragments.draw(0, view, &mut seen).covered as usize);
-    }
+/// The last one: how much it hands on is what is covered.
+fn of_fragments<'w>(world: &World, covered: &[u64]) -> Bound<'w> {
+    let covered: Vec<usize> = covered.iter().map(|count| *count as usize).collect();
     let samples = world.samples.samples();
     let depths = vec![1.0f32; samples];
     let buffer = RefCell::new(vec![0.0f32; samples]);

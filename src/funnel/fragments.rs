@@ -1,6 +1,8 @@
 //! The fragment stage on what the chain leaves: the tests that decide at each sample,
 //! what they keep of the items, and how many samples and fragments that takes.
 
+use std::cell::RefCell;
+
 use serde::Serialize;
 
 use super::faces::Faces;
@@ -12,11 +14,12 @@ use super::triangle_rows;
 use super::truth::Truth;
 use super::world::World;
 use crate::query::ItemId;
-use crate::scene::WorldBox;
+use crate::scene::{self, WorldBox};
 use crate::visibility::fragment::{
-    Canvas, Drawn, Piece, Stencil, Surfaces, Tally, Tests, draw, draw_triangles,
+    Canvas, Drawn, DrawnTriangles, Piece, Stencil, Surfaces, Tally, Tests,
 };
 use crate::visibility::region::RegionGraph;
+use crate::visibility::truth::TriangleProbe;
 use crate::visibility::{Rays, Solids};
 
 /// What a test took, means per view.
@@ -73,6 +76,8 @@ pub struct Tested {
     pub judged: Vec<Judged>,
     /// `None` where nothing is drawn.
     pub counts: Option<FragmentCounts>,
+    /// By view the samples that something covers; none where nothing is drawn.
+    pub covered: Vec<u64>,
 }
 
 /// What a chain leaves of every view, ready to be drawn: boxes as they are; of a mesh or a
@@ -80,13 +85,16 @@ pub struct Tested {
 pub struct Fragments<'w> {
     world: &'w World<'w>,
     tests: Vec<&'static str>,
-    views: Vec<Left>,
+    left: Left<'w>,
 }
 
-enum Left {
-    Boxes(Boxes),
-    Triangles(Vec<u32>),
+/// By view what is drawn; and an image, whose memory is kept from view to view.
+enum Left<'w> {
+    Boxes(Vec<Boxes>, RefCell<Option<(Canvas, Drawn)>>),
+    Triangles(&'w scene::Surfaces, Vec<Vec<u32>>, TriangleImage),
 }
+
+type TriangleImage = RefCell<Option<(Canvas<TriangleProbe>, DrawnTriangles)>>;
 
 impl<'w> Fragments<'w> {
     /// Of a set of items of each view, whose triangles `faces` has, and what is left of
@@ -101,22 +109,29 @@ impl<'w> Fragments<'w> {
         let place = triangle_rows::back_ends().position(|row| row.name == triangle);
         let tests = world.back_ends(StageKind::Fragment).into_iter();
         let tests = tests.map(|row| row.name).filter(|name| *name != NONE);
-        let views = (0..world.views()).map(|view| match (&world.solids, &world.surfaces) {
-            (None, Some(surfaces)) => {
-                let mut triangles = faces.triangles(place, view);
-                let behind = surfaces.of_item.get(world.items()..).unwrap_or_default();
-                triangles.extend(behind.iter().flat_map(Clone::clone));
-                Left::Triangles(triangles)
-            }
+        let views = 0..world.views();
+        let left = match (&world.solids, &world.surfaces) {
             (Some(solids), _) => {
-                let items = world.listed(pass.items(set, view));
-                Left::Boxes(Boxes::of(world, solids, view, &items))
+                let boxes = views.map(|view| {
+                    let items = world.listed(pass.items(set, view));
+                    Boxes::of(world, solids, view, &items)
+                });
+                Left::Boxes(boxes.collect(), RefCell::new(None))
+            }
+            (None, Some(surfaces)) => {
+                let beyond = surfaces.of_item.get(world.items()..).unwrap_or_default();
+                let triangles = views.map(|view| {
+                    let mut triangles = faces.triangles(place, view);
+                    triangles.extend(beyond.iter().flat_map(Clone::clone));
+                    triangles
+                });
+                Left::Triangles(surfaces, triangles.collect(), RefCell::new(None))
             }
             (None, None) => unreachable!("triangles of what is no solid box"),
-        });
+        };
         Fragments {
             tests: tests.collect(),
-            views: views.collect(),
+            left,
             world,
         }
     }
@@ -128,23 +143,32 @@ impl<'w> Fragments<'w> {
 
     /// Draws a view by a test; hands over what is in front at any sample.
     pub fn draw(&self, test: usize, view: usize, out: &mut Vec<ItemId>) -> Tally {
-        let World { samples, .. } = *self.world;
-        let rays = self.world.rays(view);
-        match &self.views[view] {
-            Left::Boxes(left) => {
-                let canvas = Canvas::of(rays, samples);
-                let drawn = left.drawn(&canvas, self.tests[test]);
-                let visible = drawn.depth.visible(&canvas).into_iter();
+        let (rays, grid) = (self.world.rays(view), self.world.samples);
+        match &self.left {
+            Left::Boxes(views, image) => {
+                let new = || (Canvas::of(rays, grid), Drawn::new(grid.samples()));
+                let image = &mut *image.borrow_mut();
+                let (canvas, drawn) = image.get_or_insert_with(new);
+                canvas.turn_to(rays);
+                let left = &views[view];
+                left.draw(self.tests[test], canvas, drawn);
+                let visible = drawn.depth.visible(canvas).into_iter();
                 out.extend(visible.map(|place| left.items[place as usize]));
                 drawn.tally
             }
-            Left::Triangles(triangles) => {
-                let surfaces = self.world.surfaces.as_ref().expect("triangles");
-                let canvas = Canvas::for_triangles(rays, samples, surfaces.origin);
-                let drawn = draw_triangles(&canvas, surfaces, triangles);
+            Left::Triangles(surfaces, views, image) => {
+                let origin = surfaces.origin;
+                let new = || {
+                    let canvas = Canvas::for_triangles(rays, grid, origin);
+                    (canvas, DrawnTriangles::new(grid.samples()))
+                };
+                let image = &mut *image.borrow_mut();
+                let (canvas, drawn) = image.get_or_insert_with(new);
+                canvas.turn_to(rays, origin);
+                drawn.draw(canvas, surfaces, &views[view]);
                 // Behind a map's items come its floors and ceilings.
                 let items = self.world.items() as ItemId;
-                let visible = drawn.visible(&canvas).into_iter();
+                let visible = drawn.visible(canvas).into_iter();
                 out.extend(visible.filter(|item| *item < items));
                 drawn.tally
             }
@@ -180,6 +204,7 @@ impl<'w> Fragments<'w> {
                 back_end,
                 judged,
                 counts: FragmentCounts::of(&tallies),
+                covered: tallies.iter().map(|tally| tally.covered).collect(),
             })
         });
         tested.collect()
@@ -219,9 +244,10 @@ impl Boxes {
         }
     }
 
-    /// The image by a test.
-    fn drawn(&self, canvas: &Canvas, test: &str) -> Drawn {
+    /// Draws the image anew by a test.
+    fn draw(&self, test: &str, canvas: &Canvas, drawn: &mut Drawn) {
         let solids = &self.solids;
+        drawn.clear();
         let tests = Tests {
             surfaces: self.cut_outs.as_ref().filter(|_| test != Z),
             stencil: None,
@@ -229,15 +255,14 @@ impl Boxes {
         match self.room.as_ref().filter(|_| test == STENCIL) {
             None => {
                 let pieces = (0..solids.boxes.len() as ItemId).map(Piece::whole);
-                draw(canvas, solids, &pieces.collect::<Vec<_>>(), &tests)
+                drawn.draw(canvas, solids, &pieces.collect::<Vec<_>>(), &tests);
             }
             Some((room, [near, beyond])) => {
-                let mut drawn = draw(canvas, solids, near, &tests);
-                let stencil = room.stencil(canvas, &drawn);
+                drawn.draw(canvas, solids, near, &tests);
+                let stencil = room.stencil(canvas, drawn);
                 drawn.tally.asked += stencil.asked();
                 let stencil = Some(&stencil);
                 drawn.draw(canvas, solids, beyond, &Tests { stencil, ..tests });
-                drawn
             }
         }
     }

@@ -104,6 +104,12 @@ pub fn prepare(
     let Some(tested) = left.fragments.tested(&pass, last, &truth, stop) else {
         return Ok(None);
     };
+    let covered = tested
+        .iter()
+        .find(|tested| tested.back_end.name == fragment_rows::Z);
+    let covered = covered
+        .map(|tested| tested.covered.clone())
+        .unwrap_or_default();
     let mut mirror = None;
     if let (Some(solids), Some(item)) = (&world.solids, input.mirror) {
         let Some(row) = mirrored(item, &world, solids, &pass, last, stop) else {
@@ -162,7 +168,7 @@ pub fn prepare(
         sides_behind(row, *task, &steps, world.cut_outs.is_some(), &rows)
     });
     let gains = of_items.chain(behind).collect();
-    let bounds = bounds(&world, &left.faces, &left.fragments);
+    let bounds = bounds(&world, &left.faces, &covered);
     let bound_rows = bounds.iter().map(Bound::row).collect();
     let timed = timed_tasks(&pass, &world, &left, bounds, None);
     let level = Level::of(&input.scene.name, input.scene)?;
@@ -216,7 +222,9 @@ pub fn time(
         return Ok(None);
     };
     let left = Left::of(&world, &pass, &walks.chosen, input.chain);
-    let bounds = bounds(&world, &left.faces, &left.fragments);
+    // The last bound hands on what is covered.
+    let covered = plan.expected.last().map_or(&[][..], |counts| counts);
+    let bounds = bounds(&world, &left.faces, covered);
     let tasks = timed_tasks(&pass, &world, &left, bounds, Some(&plan.expected));
     Ok(plan.time(&tasks, input, stop))
 }

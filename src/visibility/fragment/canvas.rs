@@ -69,15 +69,22 @@ pub struct Canvas<P = Probe> {
 
 impl<P> Canvas<P> {
     fn by(rays: &Rays, grid: SampleGrid, probe: impl Fn(Ray) -> P) -> Canvas<P> {
-        let mut probes = Vec::with_capacity(grid.samples());
+        let mut canvas = Canvas {
+            screen: Screen::of(rays, grid),
+            probes: Vec::with_capacity(grid.samples()),
+        };
+        canvas.fill(rays, probe);
+        canvas
+    }
+
+    fn fill(&mut self, rays: &Rays, probe: impl Fn(Ray) -> P) {
+        let grid = self.grid();
+        self.screen = Screen::of(rays, grid);
+        self.probes.clear();
         for row in 0..grid.height {
             for column in 0..grid.width {
-                probes.push(probe(rays.sample(grid, column, row)));
+                self.probes.push(probe(rays.sample(grid, column, row)));
             }
-        }
-        Canvas {
-            screen: Screen::of(rays, grid),
-            probes,
         }
     }
 
@@ -103,12 +110,22 @@ impl Canvas<TriangleProbe> {
     pub fn for_triangles(rays: &Rays, grid: SampleGrid, origin: DVec3) -> Self {
         Canvas::by(rays, grid, |ray| TriangleProbe::new(ray, origin))
     }
+
+    /// Takes the samples of another camera, in the same memory.
+    pub fn turn_to(&mut self, rays: &Rays, origin: DVec3) {
+        self.fill(rays, |ray| TriangleProbe::new(ray, origin));
+    }
 }
 
 impl Canvas {
     /// The rays of a camera through the samples of a grid, for boxes.
     pub fn of(rays: &Rays, grid: SampleGrid) -> Canvas {
         Canvas::by(rays, grid, Probe::new)
+    }
+
+    /// Takes the samples of another camera, in the same memory.
+    pub fn turn_to(&mut self, rays: &Rays) {
+        self.fill(rays, Probe::new);
     }
 
     /// The same samples seen in a mirror that is a plane across an axis: the rays

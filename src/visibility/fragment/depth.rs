@@ -21,6 +21,12 @@ impl<P: Along> DepthBuffer<P> {
         }
     }
 
+    /// Forgets what was drawn.
+    pub fn clear(&mut self) {
+        self.front.fill(None);
+        self.ties.clear();
+    }
+
     /// Whether the fragment is drawn: there is nothing at its sample, or what is
     /// there is deeper, or as deep with a higher id. If so it is there from now on.
     #[inline]

@@ -71,17 +71,28 @@ pub fn draw<'a>(
     pieces: impl IntoIterator<Item = &'a Piece>,
     tests: &Tests<'_>,
 ) -> Drawn {
-    let samples = canvas.grid().samples();
-    let mut drawn = Drawn {
-        tally: Tally::default(),
-        depth: DepthBuffer::new(samples),
-        last: vec![NO_ITEM; samples],
-    };
+    let mut drawn = Drawn::new(canvas.grid().samples());
     drawn.draw(canvas, solids, pieces, tests);
     drawn
 }
 
 impl Drawn {
+    /// An image of so many samples in which nothing is drawn yet.
+    pub fn new(samples: usize) -> Drawn {
+        Drawn {
+            tally: Tally::default(),
+            depth: DepthBuffer::new(samples),
+            last: vec![NO_ITEM; samples],
+        }
+    }
+
+    /// Forgets what was drawn.
+    pub fn clear(&mut self) {
+        self.tally = Tally::default();
+        self.depth.clear();
+        self.last.fill(NO_ITEM);
+    }
+
     /// Draws more on the same image.
     pub fn draw<'a>(
         &mut self,

@@ -33,4 +33,4 @@ pub use mask::{MASKS, Mask, Surface, Surfaces};
 pub use order::{DepthOrder, Part, Piece, ToOrder};
 pub use screen::{Rectangle, Screen};
 pub use stencil::Stencil;
-pub use triangles::{DrawnTriangles, draw_triangles};
+pub use triangles::DrawnTriangles;

@@ -23,33 +23,35 @@ pub struct DrawnTriangles {
     pub before: Vec<ItemId>,
 }
 
-/// Draws some triangles. Θ(samples of the screen rectangles).
-pub fn draw_triangles(
-    canvas: &Canvas<TriangleProbe>,
-    surfaces: &Surfaces,
-    triangles: &[u32],
-) -> DrawnTriangles {
-    let mut drawn = DrawnTriangles {
-        tally: Tally::default(),
-        depth: DepthBuffer::new(canvas.grid().samples()),
-        before: Vec::new(),
-    };
-    for opaque in [true, false] {
-        for &triangle in triangles {
-            let item = surfaces.item_of(triangle);
-            if (surfaces.kinds[item] == SurfaceKind::Opaque) == opaque {
-                drawn.draw(canvas, surfaces, triangle, item, opaque);
-            }
+impl DrawnTriangles {
+    /// An image of so many samples in which nothing is drawn yet.
+    pub fn new(samples: usize) -> DrawnTriangles {
+        DrawnTriangles {
+            tally: Tally::default(),
+            depth: DepthBuffer::new(samples),
+            before: Vec::new(),
         }
     }
-    drawn.tally.covered = drawn.depth.covered();
-    drawn.before.sort_unstable();
-    drawn.before.dedup();
-    drawn
-}
 
-impl DrawnTriangles {
-    fn draw(
+    /// Forgets what was drawn, and draws some triangles. Θ(samples of the screen rectangles).
+    pub fn draw(&mut self, canvas: &Canvas<TriangleProbe>, surfaces: &Surfaces, triangles: &[u32]) {
+        self.tally = Tally::default();
+        self.depth.clear();
+        self.before.clear();
+        for opaque in [true, false] {
+            for &triangle in triangles {
+                let item = surfaces.item_of(triangle);
+                if (surfaces.kinds[item] == SurfaceKind::Opaque) == opaque {
+                    self.add(canvas, surfaces, triangle, item, opaque);
+                }
+            }
+        }
+        self.tally.covered = self.depth.covered();
+        self.before.sort_unstable();
+        self.before.dedup();
+    }
+
+    fn add(
         &mut self,
         canvas: &Canvas<TriangleProbe>,
         surfaces: &Surfaces,
@@ -117,8 +119,9 @@ mod tests {
         let truth = SampleTruth::of_surfaces(index, rays, grid, 1);
         let canvas = Canvas::for_triangles(rays, grid, surfaces.origin);
         let mut triangles: Vec<u32> = (0..surfaces.triangles.len() as u32).collect();
+        let mut drawn = DrawnTriangles::new(grid.samples());
         for turn in 0..2 {
-            let drawn = draw_triangles(&canvas, surfaces, &triangles);
+            drawn.draw(&canvas, surfaces, &triangles);
             assert_eq!(drawn.depth.ids(), truth.front, "{turn} {surfaces:?}");
             assert_eq!(drawn.visible(&canvas), truth.visible, "{turn} {surfaces:?}");
             assert!(drawn.tally.passed >= drawn.tally.covered);
