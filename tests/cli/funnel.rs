@@ -361,6 +361,20 @@ pub fn orders_of_triangles(report: &Value, more: &[&str]) {
     }
 }
 
+/// Of all that is in view: behind walls, floors and ceilings.
+#[test]
+fn a_map_is_drawn_with_its_floors_and_ceilings() {
+    let line = "funnel --scene freedm-map20 --path street:frames=8 --region none --occlusion none \
+                --processes 1 --format json";
+    let report = json(&works(Path::new("."), line));
+    let [nothing, drawn] = ["none", "z-test"].map(|name| row(&report, "fragment", name));
+    assert!(number(nothing, "false_positive_count") > 100.0, "{nothing}");
+    for wrong in ["false_positive_count", "false_negative_count"] {
+        assert_eq!(number(drawn, wrong), 0.0, "{drawn}");
+    }
+    assert!(counted(&report, "z-test", "covered_count") > 0.99 * 320.0 * 180.0);
+}
+
 #[test]
 fn a_map_has_regions_and_the_faces_of_its_walls() {
     let line = "funnel --scene freedm-map12 --path street:frames=4 --processes 1 --format json";
