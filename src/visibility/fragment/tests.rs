@@ -26,7 +26,7 @@ fn orders(solids: &Solids) -> Vec<(&'static OrderRow, Box<dyn DepthOrder>)> {
 }
 
 /// Cameras in a scene: on the ground and above it, of all lenses.
-fn cameras(solids: &Solids, seed: u64) -> Vec<Camera> {
+pub fn cameras(solids: &Solids, seed: u64) -> Vec<Camera> {
     let low = solids
         .boxes
         .iter()

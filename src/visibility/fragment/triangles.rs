@@ -104,10 +104,10 @@ impl DrawnTriangles {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::path::{self, LensDefaults};
     use crate::scene::{self, SeededRng};
+    use crate::visibility::fragment::tests::cameras;
     use crate::visibility::truth::{SampleTruth, SurfaceIndex, judge};
-    use crate::visibility::{Rays, SampleGrid, surfaces_of};
+    use crate::visibility::{Rays, SampleGrid, Solids, surfaces_of};
 
     /// What is drawn of all triangles is what rays see; how many items.
     fn drawn_as_seen(
@@ -154,9 +154,8 @@ mod tests {
             let scene = scene::load(name, &Default::default()).unwrap();
             let surfaces = surfaces_of(&scene).unwrap().unwrap();
             let index = SurfaceIndex::build(&surfaces);
-            let path = path::load("street:frames=6", &scene, &LensDefaults::default());
             let mut seen = 0;
-            for camera in &path.unwrap().cameras {
+            for camera in &cameras(&Solids::of(&scene), 4) {
                 let rays = Rays::of(camera).unwrap();
                 seen += drawn_as_seen(&surfaces, &index, &rays, SampleGrid::new(64, 40));
             }
