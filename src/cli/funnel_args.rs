@@ -29,7 +29,9 @@ own (masked-inner, masked), its time holds the object stage's. Orders: pairs of 
 the image, those drawn in the wrong order, and samples that show a wrong item without a z-test.
 A lower bound does what must be done at any rate and decides nothing. With and without each stage
 is counted what is left in the end: items, of the triangle stage triangles, of the fragment stage
-shaded fragments; it pays where drawing one of them takes longer than what stands in the last column.
+shaded fragments; it pays where drawing or shading one of them takes longer than what stands in the
+last column. A fragment is an item at a sample, of meshes and maps a triangle at a sample, but that
+orders draw whole items. The fragment stage is timed as it is done here, exactly and on one thread.
 Items that are cut out hide nothing in the occlusion stage, and at a sample only where their mask is
 opaque: z-test takes them for solid, alpha-test asks the mask. stencil-test (rooms) draws what is
 beyond the eye's room only on the samples that see its portals. Walls of rooms are never cut out,

@@ -2,12 +2,12 @@
 
 use super::stage::StageKind;
 use crate::index::BuildError;
-use crate::input::InputError;
+use crate::input::{InputError, gigabytes};
 use crate::measure::WorkloadError;
 use crate::query::ItemId;
 use crate::scene::ItemShape;
-use crate::visibility::NoRays;
 use crate::visibility::region::OtherRegions;
+use crate::visibility::{NoRays, SampleGrid};
 
 /// Why there is no funnel.
 #[derive(Debug, thiserror::Error)]
@@ -45,6 +45,22 @@ pub enum FunnelError {
         expected: ItemShape,
         /// What was asked for.
         option: &'static str,
+    },
+    /// Images that would not fit into memory; sizes in bytes.
+    #[error(
+        "--samples {}x{}: images need about {}, {} are free; expected fewer samples",
+        grid.width,
+        grid.height,
+        gigabytes(*needed),
+        gigabytes(*available)
+    )]
+    TooManySamples {
+        /// What was asked for.
+        grid: SampleGrid,
+        /// Bytes that are needed.
+        needed: u64,
+        /// Bytes that are free.
+        available: u64,
     },
     /// A mirror that is no item.
     #[error("--mirror {item}: '{scene}' has {items} items; expected one from 0 to {}", items - 1)]

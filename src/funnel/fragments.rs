@@ -20,7 +20,7 @@ use crate::visibility::fragment::{
 };
 use crate::visibility::region::RegionGraph;
 use crate::visibility::truth::TriangleProbe;
-use crate::visibility::{Guarantee, Rays, Solids};
+use crate::visibility::{Rays, Solids};
 
 /// What a test took, means per view.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
@@ -30,7 +30,7 @@ pub struct FragmentCounts {
     pub asked_count: f64,
     /// Samples that the stencil kept from being asked.
     pub kept_out_count: f64,
-    /// Samples that met an item.
+    /// Samples that met an item: of meshes and maps a triangle, as each is drawn by itself.
     pub fragment_count: f64,
     /// Of these, dropped by the alpha-test.
     pub clear_count: f64,
@@ -98,8 +98,7 @@ type TriangleImage = RefCell<Option<(Canvas<TriangleProbe>, DrawnTriangles)>>;
 
 impl<'w> Fragments<'w> {
     /// Of a set of items of each view, whose triangles `faces` has, and what is left of
-    /// these by a back end of the triangle stage. (Of one that promises nothing all are
-    /// drawn: what it loses is no error of this stage.)
+    /// these by a back end of the triangle stage.
     pub fn of(
         world: &'w World<'w>,
         pass: &Pass,
@@ -107,9 +106,7 @@ impl<'w> Fragments<'w> {
         faces: &Faces,
         triangle: &str,
     ) -> Fragments<'w> {
-        let mut back_ends = triangle_rows::back_ends();
-        let place =
-            back_ends.position(|row| row.name == triangle && row.guarantee != Guarantee::Unproven);
+        let place = triangle_rows::back_ends().position(|row| row.name == triangle);
         let tests = world.back_ends(StageKind::Fragment).into_iter();
         let tests = tests.map(|row| row.name).filter(|name| *name != NONE);
         let views = 0..world.views();

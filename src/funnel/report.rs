@@ -62,7 +62,7 @@ pub struct FunnelReport {
     pub ground: Option<GroundRow>,
     /// What is seen in a mirror; null where none was asked for.
     pub mirror: Option<MirrorRow>,
-    /// What is left, drawn in every order; empty unless items are solid boxes.
+    /// What is left, drawn in every order.
     pub orders: Vec<OrderRow>,
     /// What is under a cursor, by every back end of picking and every structure.
     pub picks: Vec<PickRow>,

@@ -96,6 +96,6 @@ pub enum InputError {
     Spec(#[from] SpecError),
 }
 
-fn gigabytes(bytes: u64) -> String {
+pub(crate) fn gigabytes(bytes: u64) -> String {
     format!("{:.1} GB", bytes as f64 / 1e9)
 }

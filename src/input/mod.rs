@@ -6,5 +6,6 @@ mod file;
 mod table;
 
 pub use error::InputError;
+pub(crate) use error::gigabytes;
 pub use file::{is_readable, pipes, read_file, stand_in};
 pub use table::{Row, TableReader};

@@ -96,7 +96,7 @@ pub(super) fn mesh_fits_here(
 }
 
 /// What the system, and the group of processes this one is in, have left.
-fn available_bytes() -> Option<u64> {
+pub(crate) fn available_bytes() -> Option<u64> {
     let wanted = RefreshKind::nothing().with_memory(MemoryRefreshKind::nothing().with_ram());
     let system = System::new_with_specifics(wanted).ok()?;
     let of_group = system.cgroup_limits().map(|limits| limits.free_memory);

@@ -13,6 +13,7 @@ mod drift;
 mod foreign_text;
 mod funnel;
 mod funnel_fragments;
+mod funnel_maps;
 mod funnel_options;
 mod funnel_proofs;
 mod kernels;

@@ -142,6 +142,8 @@ fn predicted(case: &Case, all: &Rc<Occlusion>) -> f64 {
     let in_view: Ask = Box::new(|frame, out| case.query(frame, out));
     let [left, given] =
         [&kept, &in_view].map(|ask| hidden::mean_count(ask, all.views.len(), PROBED));
-    // What is in no view is in none of these: nothing of nothing is removed.
-    1.0 - if given > 0.0 { left / given } else { 1.0 }
+    match given > 0.0 {
+        true => 1.0 - left / given,
+        false => 0.0,
+    }
 }

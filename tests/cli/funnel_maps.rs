@@ -1,0 +1,73 @@
+//! `funnel` of Doom maps: regions, the faces of walls, what is drawn with floors and ceilings.
+
+use std::path::Path;
+
+use super::funnel::{counted, orders_of_triangles, picked_exactly, row, rows};
+use super::process::*;
+
+/// Of all that is in view: behind walls, floors and ceilings.
+#[test]
+fn a_map_is_drawn_with_its_floors_and_ceilings() {
+    let line = "funnel --scene freedm-map20 --path street:frames=8 --region none --occlusion none \
+                --processes 1 --format json";
+    let report = json(&works(Path::new("."), line));
+    let [nothing, drawn] = ["none", "z-test"].map(|name| row(&report, "fragment", name));
+    assert!(number(nothing, "false_positive_count") > 100.0, "{nothing}");
+    for wrong in ["false_positive_count", "false_negative_count"] {
+        assert_eq!(number(drawn, wrong), 0.0, "{drawn}");
+    }
+    assert!(counted(&report, "z-test", "covered_count") > 0.99 * 320.0 * 180.0);
+}
+
+#[test]
+fn a_map_has_regions_and_the_faces_of_its_walls() {
+    let line = "funnel --scene freedm-map12 --path street:frames=4 --processes 1 --format json";
+    let report = json(&works(Path::new("."), line));
+    for name in ["flood", "portal-rect", "portal-clip", "reject", "exact-pvs"] {
+        let row = row(&report, "region", name);
+        assert_eq!(number(row, "false_negative_count"), 0.0, "{name}");
+        assert!(
+            number(row, "output_count") < number(row, "input_count"),
+            "{name}"
+        );
+    }
+    // Of a wall one side is seen, so about half of them face away.
+    let faces = row(&report, "triangle", "per-triangle");
+    let [given, left] = ["input_count", "output_count"].map(|count| number(faces, count));
+    assert!(left > 0.1 * given && left < 0.9 * given, "{faces}");
+    // Walls are two or four triangles, and no boxes of twelve.
+    let items = number(row(&report, "occlusion", "none"), "output_count");
+    assert!(given > items && given < 8.0 * items, "{given} of {items}");
+    for row in rows(&report, "triangle") {
+        let lost = number(row, "false_negative_count");
+        assert!(lost == 0.0 || row["guarantee"] == "unproven", "{row}");
+    }
+    let gains = array(&report, "gains");
+    assert!(gains.iter().any(|gain| gain["unit"] == "triangles"));
+    let sweep = "precision --stage triangle --scene freedm-map12 --path street:frames=2 \
+                 --processes 1 --format json";
+    let sweep = json(&works(Path::new("."), sweep));
+    assert!(array(&sweep, "points").len() > 5);
+    // Boxes in its solid hide, and nothing that is visible.
+    let blocks = &report["solid_blocks"];
+    assert!(number(blocks, "box_count") > 30.0 && number(blocks, "build_ns") > 0.0);
+    assert_eq!(number(blocks, "unclosed_sector_count"), 0.0);
+    for name in ["masked-inner", "masked-inner-two-pass"] {
+        let row = row(&report, "occlusion", name);
+        assert_eq!(number(row, "false_negative_count"), 0.0, "{name}");
+        let [given, left] = ["input_count", "output_count"].map(|count| number(row, count));
+        assert!(left < 0.8 * given, "{name}: {left} of {given}");
+    }
+    // From outside the map nothing of it hides.
+    let outside = "funnel --scene freedm-map12 --path orbit:frames=2 --processes 1 --format json";
+    let outside = json(&works(Path::new("."), outside));
+    for name in ["masked-inner", "masked-inner-two-pass"] {
+        let row = row(&outside, "occlusion", name);
+        assert_eq!(number(row, "output_count"), number(row, "input_count"));
+    }
+    orders_of_triangles(&report, &["map-bsp"]);
+    picked_exactly(&report);
+    let exact = "funnel --scene rooms:n=500 --path street:frames=2 --processes 1 --format json";
+    let report = json(&works(Path::new("."), exact));
+    row(&report, "region", "exact-pvs");
+}
