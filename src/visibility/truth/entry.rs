@@ -231,6 +231,7 @@ impl Probe {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::SeededRng;
     use glam::DVec3;
 
     #[test]
@@ -250,5 +251,34 @@ mod tests {
         };
         assert!(met(below, f64::INFINITY) && !met(above, f64::INFINITY));
         assert!(met(0.0, above) && !met(0.0, below));
+    }
+
+    #[test]
+    fn through_corners_the_last_slab_entered_is_told_exactly() {
+        let mut rng = SeededRng::new(5);
+        let (mut met, mut close) = (0, 0);
+        for _ in 0..20_000 {
+            let b = WorldBox::new(rng.point() + 1.0, rng.point() + 3.0);
+            let origin = rng.point() * 0.1;
+            let direction = b.min - origin;
+            let ray = Ray {
+                origin,
+                direction,
+                near: 0.0,
+                far: f64::INFINITY,
+            };
+            let probe = Probe::new(ray);
+            let Some(enters) = probe.enter(&b, f64::INFINITY) else {
+                continue;
+            };
+            met += 1;
+            for axis in 0..3 {
+                let entry = probe.crossing(axis, b.min[axis]);
+                assert!(probe.compare(&enters, &entry).is_ge(), "{ray:?} {b:?}");
+                // In f64 it looks the other way round.
+                close += usize::from(entry.depth > enters.depth);
+            }
+        }
+        assert!(met > 10_000 && close > 100, "the premise: {met}, {close}");
     }
 }
