@@ -1,7 +1,5 @@
 //! Lists of lists in two tables.
 
-use std::ops::Range;
-
 /// Lists that lie one behind the other.
 #[derive(Clone, Debug)]
 pub struct Lists<T> {
@@ -31,13 +29,7 @@ impl<T: Clone> Lists<T> {
     /// A list. O(1).
     #[inline]
     pub fn list(&self, at: u32) -> &[T] {
-        &self.all[self.places(at)]
-    }
-
-    /// Where a list lies in `all`.
-    #[inline]
-    pub fn places(&self, at: u32) -> Range<usize> {
         let at = at as usize;
-        self.starts[at] as usize..self.starts[at + 1] as usize
+        &self.all[self.starts[at] as usize..self.starts[at + 1] as usize]
     }
 }

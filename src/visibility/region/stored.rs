@@ -5,9 +5,8 @@ use std::sync::Arc;
 
 use super::answer::{About, EyePlace, RegionId, RegionRow, Scratch, decode};
 use super::graph::RegionGraph;
-use super::lists::Lists;
 use super::pvs::Pvs;
-use crate::kernel::extend_by_places;
+use crate::kernel::extend;
 use crate::visibility::{Guarantee, Rays};
 
 /// The row that reads a file of pairs: a claim promises nothing.
@@ -37,8 +36,10 @@ pub const EXACT: About = About {
 pub struct StoredPvs {
     graph: Arc<RegionGraph>,
     pvs: Arc<Pvs>,
-    /// The rows as lists: what is read is what is answered.
-    lists: Lists<RegionId>,
+    /// The rows as lists: what is read is what is answered. Each by itself, not one behind
+    /// the other: where it begins and ends is read at once, and it begins where a load of
+    /// several ids crosses no line of the cache.
+    lists: Box<[Box<[RegionId]>]>,
     about: About,
 }
 
@@ -52,11 +53,10 @@ impl StoredPvs {
         let seen = |from| {
             let mut seen = Vec::new();
             decode(pvs.row(from), &mut seen);
-            seen
+            seen.into_boxed_slice()
         };
-        let lists: Vec<_> = (0..pvs.len() as u32).map(seen).collect();
         Some(StoredPvs {
-            lists: Lists::of(&lists),
+            lists: (0..pvs.len() as u32).map(seen).collect(),
             graph,
             pvs,
             about,
@@ -80,7 +80,7 @@ impl RegionRow for StoredPvs {
             return EyePlace::Outside;
         }
         match scratch.homes[..] {
-            [home] => extend_by_places(out, &self.lists.all, self.lists.places(home)),
+            [home] => extend(out, &self.lists[home as usize]),
             _ => {
                 scratch.seen.clear(self.graph.len());
                 for &home in &scratch.homes {
@@ -93,6 +93,6 @@ impl RegionRow for StoredPvs {
     }
 
     fn from_region<'a>(&'a self, region: RegionId, _: &'a mut Vec<RegionId>) -> &'a [RegionId] {
-        self.lists.list(region)
+        &self.lists[region as usize]
     }
 }
