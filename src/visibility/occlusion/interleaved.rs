@@ -204,34 +204,38 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
                 }
                 continue;
             }
-            // What may be drawn hides what comes after it in its block; the rest may come in
-            // any order.
+            // What may be drawn comes first, the nearest before the others: it may hide them.
             let large = lanes & (!flat | coverable_from(isa, &rects, B::COVERAGE, least_area));
             let mut order = [0; LANES];
-            let count = by_depth(&rects.depth, lanes, large != 0, &mut order);
-            let mut drawn = false;
+            let count = by_depth(&rects.depth, large, &mut order);
+            let survivor = |lane: usize| Survivor {
+                rect: rects.get(lane),
+                position: (index * LANES + lane) as u32,
+                near: flat >> lane & 1 == 0,
+            };
+            let mut drawn = 0;
             for &key in &order[..count] {
-                let lane = (key & 15) as usize;
-                let (rect, near) = (rects.get(lane), flat >> lane & 1 == 0);
-                if drawn && !near && buffer.hides(isa, &rect) {
+                let item = survivor((key & 15) as usize);
+                if drawn > 0 && !item.near && buffer.hides(isa, &item.rect) {
                     continue;
                 }
-                let position = index * LANES + lane;
-                survivors.push(Survivor {
-                    rect,
-                    position: position as u32,
-                    near,
-                });
-                if large >> lane & 1 == 1 {
-                    let own = draw(isa, buffer, scene, view, &survivors[survivors.len() - 1]);
-                    if own > 0 {
-                        drawn = true;
-                        // No item hides itself.
-                        early = survivors.len() - 1;
-                    }
-                    stats.drawn += own;
+                survivors.push(item);
+                let own = draw(isa, buffer, scene, view, &item);
+                if own > 0 {
+                    // No item hides itself.
+                    early = survivors.len() - 1;
                 }
+                drawn += own;
             }
+            let mut left = lanes & !large;
+            if drawn > 0 {
+                left &= !buffer.hides_lanes(isa, &rects, left);
+            }
+            while left != 0 {
+                survivors.push(survivor(left.trailing_zeros() as usize));
+                left &= left - 1;
+            }
+            stats.drawn += drawn;
         }
         let before = self.out.len();
         let early = if state.second_look { early } else { 0 };
@@ -286,15 +290,10 @@ fn draw<I: Isa, B: OcclusionBuffer>(
     drawn
 }
 
-/// The lanes, `sorted` by their depths or by their numbers, each with its key's upper
-/// bits in front of its number; returns how many there are.
+/// The lanes by their depths, each with its depth's upper bits in front of its number;
+/// returns how many there are.
 #[inline(always)]
-fn by_depth(
-    depth: &[f32; LANES],
-    lanes: LaneMask,
-    sorted: bool,
-    order: &mut [u32; LANES],
-) -> usize {
+fn by_depth(depth: &[f32; LANES], lanes: LaneMask, order: &mut [u32; LANES]) -> usize {
     let mut count = 0;
     let mut left = lanes;
     while left != 0 {
@@ -302,7 +301,7 @@ fn by_depth(
         left &= left - 1;
         let key = depth_bits(depth[lane as usize]) & !15 | lane;
         let mut at = count;
-        while sorted && at > 0 && order[at - 1] > key {
+        while at > 0 && order[at - 1] > key {
             order[at] = order[at - 1];
             at -= 1;
         }

@@ -102,7 +102,7 @@ fn every_instruction_set_gives_the_same_answer() {
 /// walk and on nothing else: a quicker walk has the same counts.
 #[test]
 fn the_walk_asks_draws_and_keeps_what_it_did() {
-    let pinned = [[2067, 202, 397], [1160, 214, 182], [6003, 2535, 3517]];
+    let pinned = [[2067, 202, 398], [1160, 214, 183], [6003, 2535, 3529]];
     for (spec, [boxes, drawn, kept]) in SCENES.into_iter().zip(pinned) {
         let ready = ready(spec);
         for kernel in Kernel::available() {
