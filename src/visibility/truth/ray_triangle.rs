@@ -115,12 +115,17 @@ impl TriangleProbe {
         let (u, v, at) = (b - a, c - a, a + self.shift);
         let normal = u.cross(v);
         let towards = direction.dot(normal);
+        let size = u.abs().max(v.abs()).max_element();
+        let towards_off = 64.0 * UNIT * self.across * size * size;
+        // From behind, as every second one of a closed body.
+        if !two_sided && towards > towards_off {
+            return None;
+        }
         // Twice the signed volumes of the direction with each edge: of one sign where
         // the ray passes within, and below zero for one from the front.
         let turned = direction.cross(at);
         let (ab, ca) = (u.dot(turned), -v.dot(turned));
         let bc = towards - ab - ca;
-        let size = u.abs().max(v.abs()).max_element();
         let reach = at.abs().max_element() + self.far;
         let bound = 128.0 * UNIT * self.across * size * (size + reach);
         let (low, high) = (ab.min(bc).min(ca), ab.max(bc).max(ca));
@@ -131,7 +136,6 @@ impl TriangleProbe {
         if !certainly && !self.pierces(corners, two_sided) {
             return None;
         }
-        let towards_off = 64.0 * UNIT * self.across * size * size;
         let (mut depth, mut error) = (0.0, f64::INFINITY);
         // The true d . N is then at least half of the rounded one.
         if towards.abs() > 2.0 * towards_off {
