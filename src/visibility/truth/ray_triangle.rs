@@ -289,6 +289,7 @@ fn dot(a: &[Expansion; 3], b: &[Expansion; 3]) -> Expansion {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::SeededRng;
 
     const ACROSS: [Vec3; 3] = [
         Vec3::new(1.0, -1.0, -1.0),
@@ -342,5 +343,31 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Rays along the plane of a triangle, but for what is rounded: only the exact sign tells
+    /// which side they come from.
+    #[test]
+    fn grazing_rays_meet_a_triangle_of_one_side_from_there_alone() {
+        let mut rng = SeededRng::new(29);
+        let [mut met, mut passed_by] = [0, 0];
+        for _ in 0..20_000 {
+            let corners = [(); 3].map(|()| (rng.point() * 100.0).as_vec3());
+            let [a, b, c] = corners.map(|p| p.as_dvec3());
+            let [s, t] = [rng.unit(), rng.unit()];
+            let direction = ((b - a) * (s - 0.5) + (c - a) * (t - 0.5)) * 0.01;
+            let ray = Ray {
+                origin: (a + b + c) / 3.0 - direction,
+                direction,
+                near: f64::NEG_INFINITY,
+                far: f64::INFINITY,
+            };
+            let probe = TriangleProbe::new(ray, DVec3::ZERO);
+            let found = probe.meet(corners, false, f64::INFINITY).is_some();
+            assert_eq!(found, probe.pierces(corners, false), "{ray:?} {corners:?}");
+            met += u32::from(found);
+            passed_by += u32::from(!found);
+        }
+        assert!(met > 1000 && passed_by > 1000, "{met} {passed_by}");
     }
 }
