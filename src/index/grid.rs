@@ -113,9 +113,17 @@ impl UniformGrid {
             tally.count(|recorder| recorder.subtree_accepted(items.len()));
             return sink.accept(&self.ids[items]);
         }
-        for place in items {
-            tally.item(test);
-            if test.admits(&self.boxes[place]) {
+        // First the tests, then what they admit: between two of them nothing is called, which
+        // would cost the registers that hold the planes.
+        for (start, boxes) in items.clone().step_by(64).zip(self.boxes[items].chunks(64)) {
+            let mut admitted = 0_u64;
+            for (i, b) in boxes.iter().enumerate() {
+                tally.item(test);
+                admitted |= u64::from(test.admits(b)) << i;
+            }
+            while admitted != 0 {
+                let place = start + admitted.trailing_zeros() as usize;
+                admitted &= admitted - 1;
                 sink.accept(&self.ids[place..=place])?;
             }
         }
