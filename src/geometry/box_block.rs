@@ -59,15 +59,22 @@ impl BoxBlock {
 
     /// The union of the boxes; empty ones add nothing.
     pub fn union(&self) -> Aabb {
-        let fold = |k: usize, pick: fn(f32, f32) -> f32| {
-            self.rows[k]
-                .iter()
-                .copied()
-                .reduce(pick)
-                .unwrap_or(f32::NAN)
+        let low = |k: usize| {
+            let row = &self.rows[k];
+            let mut low = row[0];
+            for &x in &row[1..] {
+                low = if x < low { x } else { low };
+            }
+            low
         };
-        let low = |k| fold(k, |a, b| if b < a { b } else { a });
-        let high = |k| fold(k, |a, b| if b > a { b } else { a });
+        let high = |k: usize| {
+            let row = &self.rows[k];
+            let mut high = row[0];
+            for &x in &row[1..] {
+                high = if x > high { x } else { high };
+            }
+            high
+        };
         Aabb::new(
             Vec3::new(low(0), low(1), low(2)),
             Vec3::new(high(3), high(4), high(5)),

@@ -154,9 +154,9 @@ fn widest_axis(points: &[Point]) -> usize {
     let (fours, rest) = points.as_chunks::<4>();
     let (mut low, mut high) = ([Vec4::INFINITY; 4], [Vec4::NEG_INFINITY; 4]);
     for four in fours {
-        for ((low, high), p) in low.iter_mut().zip(&mut high).zip(four) {
-            *low = low.min(p.0);
-            *high = high.max(p.0);
+        for i in 0..4 {
+            low[i] = low[i].min(four[i].0);
+            high[i] = high[i].max(four[i].0);
         }
     }
     for p in rest {
