@@ -117,7 +117,7 @@ impl TriangleProbe {
         let towards = direction.dot(normal);
         let size = u.abs().max(v.abs()).max_element();
         let towards_off = 64.0 * UNIT * self.across * size * size;
-        // From behind, as every second one of a closed body.
+        // Back-facing, as about half of the triangles of a closed mesh are.
         if !two_sided && towards > towards_off {
             return None;
         }
@@ -345,10 +345,10 @@ mod tests {
         }
     }
 
-    /// Rays along the plane of a triangle, but for what is rounded: only the exact sign tells
-    /// which side they come from.
+    /// Rays in the plane of a triangle but for rounding: only the exact sign tells from which
+    /// side they come.
     #[test]
-    fn grazing_rays_meet_a_triangle_of_one_side_from_there_alone() {
+    fn grazing_rays_hit_a_one_sided_triangle_only_from_its_front() {
         let mut rng = SeededRng::new(29);
         let [mut met, mut passed_by] = [0, 0];
         for _ in 0..20_000 {
