@@ -8,7 +8,8 @@ use super::{By, MemoryUsage, Query, RegionIndex};
 use crate::geometry::{Aabb, ConvexVolume};
 use crate::kernel::{BASELINE, Isa, Kernel, Work};
 use crate::query::{
-    AnyVolume, ItemId, Located, ManySink, NoRecorder, QueryContext, QueryCost, each_volume,
+    AnyVolume, Dispatched, ItemId, Located, ManySink, NoRecorder, QueryContext, QueryCost,
+    each_volume,
 };
 
 /// A built structure of any kind. Answers are appended to `out`.
@@ -19,7 +20,8 @@ pub trait DynIndex: Send + Sync {
     fn query(&self, volume: AnyVolume<'_>, out: &mut Vec<ItemId>);
     /// The same query with its cost added up, by the portable instruction set
     /// whatever the kernel is: cost and answer are the same by all of them, and
-    /// what is timed is to be asked for its answer itself.
+    /// what is timed is to be asked for its answer itself. All volumes of planes
+    /// share a traversal here.
     fn query_counted(&self, volume: AnyVolume<'_>, out: &mut Vec<ItemId>, cost: &mut QueryCost);
     /// Region search for many points at once; `out` is cleared first. The timed
     /// path.
@@ -59,7 +61,10 @@ impl<T: RegionIndex> DynIndex for T {
     fn query_counted(&self, volume: AnyVolume<'_>, out: &mut Vec<ItemId>, cost: &mut QueryCost) {
         let mut context = QueryContext::new(BASELINE, out, cost);
         // A Vec never breaks off.
-        let _ = each_volume!(volume, v => RegionIndex::query(self, v, &mut context));
+        let _ = match Dispatched::of(volume) {
+            Ok(planes) => RegionIndex::query(self, &planes, &mut context),
+            Err(p) => RegionIndex::query(self, &p, &mut context),
+        };
     }
 
     fn query_many(&self, points: &[Vec3], out: &mut Located) {

@@ -7,7 +7,7 @@ use super::{Subject, TimedTask, Workload};
 use crate::geometry::{Aabb, BoxBlocks};
 use crate::index::{Input, RegionIndex, Trace, Wide};
 use crate::kernel::{Isa, Kernel, Work};
-use crate::query::{ItemId, each_volume};
+use crate::query::{Dispatched, ItemId};
 
 /// A row of the table of bounds.
 #[non_exhaustive]
@@ -113,7 +113,10 @@ fn replay<'a>(material: &Material<'a>) -> Option<TimedTask<'a>> {
     let tree = Wide::build(&Input::new(&material.workload.items), &params).ok()?;
     let views = material.workload.views.iter();
     let traces: Vec<Trace> = views
-        .map(|view| each_volume!(view.as_any(), volume => Trace::of(&tree, volume)))
+        .map(|view| match Dispatched::of(view.as_any()) {
+            Ok(planes) => Trace::of(&tree, &planes),
+            Err(p) => Trace::of(&tree, &p),
+        })
         .collect();
     let replay = move |place: usize, out: &mut Vec<_>| traces[place].replay(&tree, out);
     Some(TimedTask::new(material.visible.to_vec(), replay))

@@ -17,7 +17,7 @@ use crate::kernel::Isa;
 use crate::query::{Context, ItemId, QueryVolume, Recorder, Sink};
 
 /// What a coordinate is stored as.
-pub trait Code: Copy + Default + Send + Sync + 'static {
+trait Code: Copy + Default + Send + Sync + 'static {
     /// Where code 0 lies on an axis and how far codes are apart, for bounds on it;
     /// `None` if they do not fit.
     fn line_over(low: f32, high: f32) -> Option<[f32; 2]>;
@@ -69,11 +69,11 @@ grid_code!(u8, u16);
 
 /// A half float of IEEE 754 (binary16): 11 bits, up to 65504.
 #[derive(Clone, Copy, Default)]
-pub struct F16(u16);
+struct F16(u16);
 
 /// The upper half of an f32 (bfloat16): 8 bits, and its range.
 #[derive(Clone, Copy, Default)]
-pub struct Bf16(u16);
+struct Bf16(u16);
 
 /// Half floats about the scene's origin, with no grid; the largest finite one is
 /// `$largest`.
@@ -126,6 +126,29 @@ pub enum GridScope {
     Block,
 }
 
+/// The numbers that bounds are stored as.
+#[derive(Clone, Copy, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub enum CodeKind {
+    /// Whole numbers of 8 bits on a grid.
+    #[default]
+    U8,
+    /// Whole numbers of 16 bits on a grid.
+    U16,
+    /// Half floats (binary16).
+    F16,
+    /// The upper halves of f32 (bfloat16).
+    Bf16,
+}
+
+/// How items are stored: which numbers, and what they count from.
+#[derive(Clone, Copy, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct Storage {
+    /// The numbers.
+    pub kind: CodeKind,
+    /// What they count from; half floats have no grid.
+    pub scope: GridScope,
+}
+
 /// What codes count from, per axis: [`Code::line_over`].
 type Grid = [[f32; 2]; 3];
 
@@ -162,15 +185,65 @@ fn decode<C: Code>(codes: &CodeBlock<C>, grid: &Grid) -> BoxBlock {
     BoxBlock::from_rows(rows)
 }
 
-/// The tree of [`Bsp`] (median) over items in codes.
-pub struct Quantised<C> {
+/// All blocks of a scene, in codes of one kind.
+enum CodeBlocks {
+    U8(Vec<CodeBlock<u8>>),
+    U16(Vec<CodeBlock<u16>>),
+    F16(Vec<CodeBlock<F16>>),
+    Bf16(Vec<CodeBlock<Bf16>>),
+}
+
+/// Does the same with the blocks of any kind.
+macro_rules! each_kind {
+    ($codes:expr, $blocks:ident => $work:expr) => {
+        match $codes {
+            CodeBlocks::U8($blocks) => $work,
+            CodeBlocks::U16($blocks) => $work,
+            CodeBlocks::F16($blocks) => $work,
+            CodeBlocks::Bf16($blocks) => $work,
+        }
+    };
+}
+
+impl CodeBlocks {
+    /// The boxes, sixteen a block, and the grids; `None` if the scene's extent does
+    /// not fit.
+    fn over(boxes: &[Aabb], storage: Storage) -> Option<(CodeBlocks, Vec<Grid>)> {
+        fn coded<C: Code>(
+            boxes: &[Aabb],
+            scope: GridScope,
+            of: fn(Vec<CodeBlock<C>>) -> CodeBlocks,
+        ) -> Option<(CodeBlocks, Vec<Grid>)> {
+            let groups = boxes.chunks(match scope {
+                GridScope::World => boxes.len().max(1),
+                GridScope::Block => LANES,
+            });
+            let grids = groups.map(|group| grid_over::<C>(&Aabb::union_of(group)));
+            let grids: Vec<Grid> = grids.collect::<Option<_>>()?;
+            let blocks = boxes.chunks(LANES).enumerate();
+            let blocks = blocks.map(|(i, boxes)| encode(boxes, &grids[i % grids.len()]));
+            Some((of(blocks.collect()), grids))
+        }
+        let scope = storage.scope;
+        match storage.kind {
+            CodeKind::U8 => coded(boxes, scope, CodeBlocks::U8),
+            CodeKind::U16 => coded(boxes, scope, CodeBlocks::U16),
+            CodeKind::F16 => coded(boxes, scope, CodeBlocks::F16),
+            CodeKind::Bf16 => coded(boxes, scope, CodeBlocks::Bf16),
+        }
+    }
+}
+
+/// The tree of [`Bsp`] (median) over items in codes. One type for all kinds of them:
+/// which it is, a block of sixteen asks once, and the walk is compiled once.
+pub struct Quantised {
     tree: PackedTree,
-    codes: Vec<CodeBlock<C>>,
+    codes: CodeBlocks,
     /// One for the world, or one for each block.
     grids: Vec<Grid>,
 }
 
-impl<C: Code> Quantised<C> {
+impl Quantised {
     /// The boxes as the codes have them, by item; empty for items that are not
     /// indexed.
     pub fn decoded(&self, items: usize) -> Vec<Aabb> {
@@ -185,7 +258,7 @@ impl<C: Code> Quantised<C> {
     fn block(&self, at: usize) -> BoxBlock {
         // One grid serves all blocks, or each has its own.
         let grid = &self.grids[if self.grids.len() == 1 { 0 } else { at }];
-        decode(&self.codes[at], grid)
+        each_kind!(&self.codes, blocks => decode(&blocks[at], grid))
     }
 
     #[inline(always)]
@@ -196,12 +269,12 @@ impl<C: Code> Quantised<C> {
 }
 
 /// Leaves whose bounds are decoded block by block.
-struct InCodes<'a, C, V> {
-    index: &'a Quantised<C>,
+struct InCodes<'a, V> {
+    index: &'a Quantised,
     volume: &'a V,
 }
 
-impl<C: Code, V: QueryVolume> Leaves for InCodes<'_, C, V> {
+impl<V: QueryVolume> Leaves for InCodes<'_, V> {
     /// Codes are few bytes, one after the other.
     #[inline(always)]
     fn fetch(&self, _: Range<usize>, _: PlaneMask) {}
@@ -220,36 +293,25 @@ impl<C: Code, V: QueryVolume> Leaves for InCodes<'_, C, V> {
     }
 }
 
-impl<C: Code> RegionIndex for Quantised<C> {
+impl RegionIndex for Quantised {
     const INFO: Info = Info::new(
         "quantised",
         "experiment: the bsp tree with items stored in 8 or 16 bits",
         Kind::Tree,
         Origin::Ours,
     );
-    type Params = GridScope;
+    type Params = Storage;
 
-    fn build(input: &Input<'_>, scope: &GridScope) -> Result<Self, BuildError> {
+    fn build(input: &Input<'_>, storage: &Storage) -> Result<Self, BuildError> {
         let items = input.items;
         let tree = Bsp::build(input, &Default::default())?.into_tree();
         let boxes: Vec<Aabb> = (0..tree.ids().len()).map(|i| tree.boxes().get(i)).collect();
-        let groups = boxes.chunks(match scope {
-            GridScope::World => boxes.len().max(1),
-            GridScope::Block => LANES,
-        });
-        let grids = groups.map(|group| grid_over::<C>(&Aabb::union_of(group)));
-        let grids: Option<Vec<Grid>> = grids.collect();
-        let grids = grids.ok_or_else(|| BuildError::Params {
+        let coded = CodeBlocks::over(&boxes, *storage);
+        let (codes, grids) = coded.ok_or_else(|| BuildError::Params {
             structure: Self::INFO.name,
             reason: "the scene's extent does not fit these numbers".to_owned(),
         })?;
-        let blocks = boxes.chunks(LANES).enumerate();
-        let codes = blocks.map(|(i, boxes)| encode(boxes, &grids[i % grids.len()]));
-        let mut quantised = Quantised {
-            codes: codes.collect(),
-            tree,
-            grids,
-        };
+        let mut quantised = Quantised { tree, codes, grids };
         // Nodes must hold what the codes stand for.
         let decoded = quantised.decoded(items.len());
         let moved: Vec<ItemId> = quantised.tree.ids().to_vec();
@@ -260,7 +322,8 @@ impl<C: Code> RegionIndex for Quantised<C> {
 
     fn memory(&self) -> MemoryUsage {
         let mut memory = self.tree.memory();
-        memory.item_bytes += size_of_val(&self.grids[..]) + size_of_val(&self.codes[..]);
+        let codes = each_kind!(&self.codes, blocks => size_of_val(&blocks[..]));
+        memory.item_bytes += size_of_val(&self.grids[..]) + codes;
         memory
     }
 
@@ -299,19 +362,19 @@ mod tests {
     }
 
     /// How many more it returns than is there.
-    fn excess<C: Code>(scope: GridScope) -> usize {
+    fn excess(kind: CodeKind, scope: GridScope) -> usize {
         let items = items();
         let normal = Vec3::new(0.6, -0.5, 0.3);
         let planes = [Plane::new(normal, -9.0), Plane::new(-normal, 14.0)];
         let slab = ConvexVolume::from_planes(&planes).unwrap();
-        let index = Quantised::<C>::build(&Input::new(&items), &scope).unwrap();
+        let index = Quantised::build(&Input::new(&items), &Storage { kind, scope }).unwrap();
         let decoded = index.decoded(items.len());
         let holds = |(d, b): (&Aabb, &Aabb)| b.is_empty() || d.contains(b);
         assert!(decoded.iter().zip(&items).all(holds));
         let mut found = Vec::new();
         let _ = index.visible(&slab, &mut found);
         found.sort_unstable();
-        assert_eq!(found, those(&decoded, &slab), "{scope:?}");
+        assert_eq!(found, those(&decoded, &slab), "{kind:?}, {scope:?}");
         let truly = those(&items, &slab);
         assert!(truly.iter().all(|id| found.binary_search(id).is_ok()));
         let mut here = Vec::new();
@@ -322,23 +385,26 @@ mod tests {
 
     #[test]
     fn it_sees_exactly_its_decoded_boxes_and_all_of_the_true_ones() {
-        let (bytes, words) = (excess::<u8>, excess::<u16>);
-        assert!(bytes(GridScope::World) > words(GridScope::World));
-        assert!(bytes(GridScope::Block) >= words(GridScope::Block));
-        let (long, short) = (excess::<F16>, excess::<Bf16>);
-        assert!(short(GridScope::World) > long(GridScope::World));
+        let world = |kind| excess(kind, GridScope::World);
+        let block = |kind| excess(kind, GridScope::Block);
+        assert!(world(CodeKind::U8) > world(CodeKind::U16));
+        assert!(block(CodeKind::U8) >= block(CodeKind::U16));
+        assert!(world(CodeKind::Bf16) > world(CodeKind::F16));
     }
 
     #[test]
     fn what_cannot_be_stored_is_refused_and_a_point_has_a_grid() {
+        let built = |items: &[Aabb], kind| {
+            let scope = GridScope::World;
+            Quantised::build(&Input::new(items), &Storage { kind, scope })
+        };
         let huge = [Aabb::new(Vec3::splat(-3e38), Vec3::splat(3e38))];
-        let world = GridScope::World;
-        assert!(Quantised::<u16>::build(&Input::new(&huge), &world).is_err());
-        assert!(Quantised::<F16>::build(&Input::new(&huge), &world).is_err());
-        let none = Quantised::<u16>::build(&Input::new(&[]), &world);
+        assert!(built(&huge, CodeKind::U16).is_err());
+        assert!(built(&huge, CodeKind::F16).is_err());
+        let none = built(&[], CodeKind::U16);
         assert_eq!(none.map(|q| q.memory().total()).ok(), Some(0));
         let point = Aabb::new(Vec3::ONE, Vec3::ONE);
-        let one = Quantised::<u8>::build(&Input::new(&[point]), &world).unwrap();
+        let one = built(&[point], CodeKind::U8).unwrap();
         assert_eq!(one.decoded(1), [point]);
     }
 

@@ -3,7 +3,7 @@
 
 use super::judged::{Judged, Shots, Truths};
 use super::plane_test::PlaneTest;
-use super::quantised::{Bf16, Code, F16, GridScope, Quantised};
+use super::quantised::{CodeKind, GridScope, Quantised, Storage};
 use crate::culling::{Culling, CullingTest};
 use crate::index::{By, DynIndex, Input, RegionIndex};
 use crate::kernel::Kernel;
@@ -32,12 +32,12 @@ pub(super) fn stored_points(
     };
     let (world, block) = (GridScope::World, GridScope::Block);
     vec![
-        shared.stored::<u8>(world, "bits=8,grid=world"),
-        shared.stored::<u8>(block, "bits=8,grid=block"),
-        shared.stored::<u16>(world, "bits=16,grid=world"),
-        shared.stored::<u16>(block, "bits=16,grid=block"),
-        shared.stored::<F16>(world, "bits=16,float=f16"),
-        shared.stored::<Bf16>(world, "bits=16,float=bf16"),
+        shared.stored(CodeKind::U8, world, "bits=8,grid=world"),
+        shared.stored(CodeKind::U8, block, "bits=8,grid=block"),
+        shared.stored(CodeKind::U16, world, "bits=16,grid=world"),
+        shared.stored(CodeKind::U16, block, "bits=16,grid=block"),
+        shared.stored(CodeKind::F16, world, "bits=16,float=f16"),
+        shared.stored(CodeKind::Bf16, world, "bits=16,float=bf16"),
     ]
 }
 
@@ -50,7 +50,7 @@ struct Shared<'a> {
 }
 
 impl Shared<'_> {
-    fn stored<C: Code>(self, scope: GridScope, codes: &str) -> Stored {
+    fn stored(self, kind: CodeKind, scope: GridScope, codes: &str) -> Stored {
         let Shared {
             kernel,
             scene,
@@ -63,8 +63,8 @@ impl Shared<'_> {
                 ..Culling::default()
             })
         });
-        let label = format!("{}:{codes}", Quantised::<C>::INFO.name);
-        match Quantised::<C>::build(&Input::new(&scene.items), &scope) {
+        let label = format!("{}:{codes}", Quantised::INFO.name);
+        match Quantised::build(&Input::new(&scene.items), &Storage { kind, scope }) {
             Ok(index) => {
                 let items = index.decoded(scene.items.len());
                 let judged = tests.map(|test| Judged::new(scene, &items, shots, truths, test));

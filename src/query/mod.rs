@@ -4,6 +4,7 @@
 //! here.
 
 mod context;
+mod dispatched;
 mod many;
 mod planes;
 mod predicate;
@@ -12,6 +13,7 @@ mod sink;
 mod volume;
 
 pub use context::{Context, QueryContext};
+pub(crate) use dispatched::Dispatched;
 pub use many::{Located, ManySink};
 pub use planes::Planes;
 pub use predicate::{Containment, Predicate};

@@ -8,9 +8,9 @@ use super::super::case::Case;
 use super::super::omission::{By, Draft, Forced, LeftOutIf, Omission, Way};
 use super::super::rule::{Rule, Unfit};
 use crate::geometry::{Aabb, BoxBlock, ConvexVolume, LANES, LaneMask, PlaneMask};
-use crate::index::{Input, Query, RegionIndex, Wide};
-use crate::kernel::{Isa, Kernel};
-use crate::query::{ItemId, NoRecorder, Planes, Predicate, QueryCost, QueryVolume, Recorder};
+use crate::index::{DynIndex, Input, Query, RegionIndex, Wide};
+use crate::kernel::{BASELINE, Isa, Kernel};
+use crate::query::{ItemId, NoRecorder, Planes, Predicate, QueryContext, QueryCost, QueryVolume};
 
 pub(super) const RULE: Rule = Rule {
     name: "plane-masks",
@@ -42,9 +42,9 @@ fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfi
     let mut out = Vec::new();
     for volume in volumes.iter().step_by(step) {
         out.clear();
-        see(kernel, &tree, volume, &mut out, &mut with);
+        DynIndex::query_counted(&*tree, volume.into(), &mut out, &mut with);
         out.clear();
-        see(kernel, &tree, &Unmasked(volume), &mut out, &mut without);
+        count_unmasked(&tree, volume, &mut out, &mut without);
     }
     let [fewer, all] = [with, without].map(|cost| cost.planes_tested);
     let omission = match all {
@@ -57,16 +57,10 @@ fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfi
     let forced = Forced {
         on: Wide::INFO.name.to_owned(),
         kept: Way::Other(Box::new(move |n, out| {
-            see(
-                kernel,
-                &other.0,
-                &Unmasked(&other.1[n]),
-                out,
-                &mut NoRecorder,
-            );
+            see(kernel, &other.0, &Unmasked(&other.1[n]), out);
         })),
         left_out: Way::Other(Box::new(move |n, out| {
-            see(kernel, &tree, &volumes[n], out, &mut NoRecorder);
+            see(kernel, &tree, &volumes[n], out);
         })),
         same: true,
         judged: true,
@@ -74,13 +68,8 @@ fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfi
     Ok(omission.draft(vec![forced]))
 }
 
-fn see<Q: QueryVolume, R: Recorder>(
-    kernel: Kernel,
-    index: &Wide,
-    volume: &Q,
-    sink: &mut Vec<ItemId>,
-    recorder: &mut R,
-) {
+fn see<Q: QueryVolume>(kernel: Kernel, index: &Wide, volume: &Q, sink: &mut Vec<ItemId>) {
+    let recorder = &mut NoRecorder;
     // A Vec never breaks off.
     let _ = kernel.run(Query {
         index,
@@ -88,6 +77,13 @@ fn see<Q: QueryVolume, R: Recorder>(
         sink,
         recorder,
     });
+}
+
+/// [`DynIndex::query_counted`] with every plane open.
+fn count_unmasked(tree: &Wide, volume: &ConvexVolume, out: &mut Vec<ItemId>, cost: &mut QueryCost) {
+    let mut context = QueryContext::new(BASELINE, out, cost);
+    // A Vec never breaks off.
+    let _ = RegionIndex::query(tree, &Unmasked(volume), &mut context);
 }
 
 /// The six-plane view with every plane open wherever one is.
@@ -180,16 +176,17 @@ mod tests {
         let ask = |masked: bool| {
             let (mut out, mut cost) = (Vec::new(), QueryCost::default());
             match masked {
-                true => see(Kernel::best(), &tree, &volume, &mut out, &mut cost),
-                false => see(
-                    Kernel::best(),
-                    &tree,
-                    &Unmasked(&volume),
-                    &mut out,
-                    &mut cost,
-                ),
+                true => DynIndex::query_counted(&tree, (&volume).into(), &mut out, &mut cost),
+                false => count_unmasked(&tree, &volume, &mut out, &mut cost),
             }
             out.sort_unstable();
+            let mut timed = Vec::new();
+            match masked {
+                true => see(Kernel::best(), &tree, &volume, &mut timed),
+                false => see(Kernel::best(), &tree, &Unmasked(&volume), &mut timed),
+            }
+            timed.sort_unstable();
+            assert_eq!(timed, out);
             (out, cost.planes_tested, cost.subtrees_accepted)
         };
         let ((with, fewer, accepted), (without, all, also)) = (ask(true), ask(false));

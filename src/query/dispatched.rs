@@ -1,0 +1,82 @@
+//! A volume that is looked into at every test. Whoever is not timed asks by it, so
+//! that each structure is compiled once for that and not once for each volume.
+
+use glam::Vec3;
+
+use super::volume::each_volume;
+use super::{AnyVolume, Containment, Predicate, QueryVolume, Recorder};
+use crate::geometry::{Aabb, BoxBlock, LaneMask, PlaneMask, PlaneRows, RowMask};
+use crate::kernel::Isa;
+
+/// Any volume of planes: bit for bit what it holds, test by test. Points have a
+/// walk of their own in some structures and are asked as what they are.
+pub(crate) struct Dispatched<'a>(AnyVolume<'a>);
+
+impl<'a> Dispatched<'a> {
+    /// `Err` with the point, if it is one.
+    pub fn of(volume: AnyVolume<'a>) -> Result<Dispatched<'a>, Vec3> {
+        match volume {
+            AnyVolume::Point(p) => Err(p),
+            _ => Ok(Dispatched(volume)),
+        }
+    }
+}
+
+// Calls on purpose: what is inlined would be compiled into each structure again.
+impl Predicate for Dispatched<'_> {
+    #[inline(never)]
+    fn mask(&self) -> PlaneMask {
+        each_volume!(self.0, volume => Predicate::mask(volume))
+    }
+    #[inline(never)]
+    fn excludes(&self, plane: u32, bounds: &Aabb) -> bool {
+        each_volume!(self.0, volume => volume.excludes(plane, bounds))
+    }
+    #[inline(never)]
+    fn contains(&self, plane: u32, bounds: &Aabb) -> bool {
+        each_volume!(self.0, volume => Predicate::contains(volume, plane, bounds))
+    }
+    #[inline(never)]
+    fn drops(&self, plane: u32, item: &Aabb) -> bool {
+        each_volume!(self.0, volume => Predicate::drops(volume, plane, item))
+    }
+    #[inline(never)]
+    fn classify<R: Recorder>(
+        &self,
+        bounds: &Aabb,
+        mask: PlaneMask,
+        recorder: &mut R,
+    ) -> (Containment, PlaneMask) {
+        each_volume!(self.0, volume => volume.classify(bounds, mask, recorder))
+    }
+    #[inline(never)]
+    fn admits<R: Recorder>(&self, item: &Aabb, mask: PlaneMask, recorder: &mut R) -> bool {
+        each_volume!(self.0, volume => volume.admits(item, mask, recorder))
+    }
+}
+
+impl QueryVolume for Dispatched<'_> {
+    #[inline(never)]
+    fn kept_lanes<I: Isa>(&self, isa: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
+        each_volume!(self.0, volume => volume.kept_lanes(isa, block, mask))
+    }
+    #[inline(never)]
+    fn rows_read(&self, mask: PlaneMask) -> RowMask {
+        each_volume!(self.0, volume => volume.rows_read(mask))
+    }
+    /// Nobody waits for it.
+    fn prefetch(&self, _: &BoxBlock, _: PlaneMask) {}
+    #[inline(never)]
+    fn sorted_lanes<I: Isa>(
+        &self,
+        isa: I,
+        block: &BoxBlock,
+        mask: PlaneMask,
+    ) -> (LaneMask, I::Words) {
+        each_volume!(self.0, volume => volume.sorted_lanes(isa, block, mask))
+    }
+    #[inline(never)]
+    fn rows(&self) -> Option<PlaneRows> {
+        each_volume!(self.0, volume => volume.rows())
+    }
+}
