@@ -116,8 +116,9 @@ impl Worker {
             Err(RecvTimeoutError::Disconnected) => return Ok(Said::Ended(self.obituary()?)),
         };
         self.since = Instant::now();
-        let message = serde_json::from_slice(&line).map_err(|_| {
-            let text: String = String::from_utf8_lossy(&line).chars().take(60).collect();
+        let line = String::from_utf8_lossy(&line);
+        let message = serde_json::from_str(&line).map_err(|_| {
+            let text: String = line.chars().take(60).collect();
             anyhow::anyhow!(
                 "a worker said '{text}'; expected a message of protocol {PROTOCOL}: the program is \
                  of another version"
