@@ -132,3 +132,51 @@ pub(super) fn query_many<T: RegionIndex>(
     out.clear();
     kernel.run(QueryMany { index, points, out });
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{ConvexVolumeF64, Plane, RelativeVolume, Spheres};
+    use crate::index::{Input, Linear, OctreeTextbook, Wide};
+
+    /// Answer and cost of the structure compiled for the volume, and counted.
+    fn both<T: RegionIndex>(index: &T, volume: AnyVolume<'_>) -> [(Vec<ItemId>, QueryCost); 2] {
+        let [mut own, mut counted] = <[(Vec<ItemId>, QueryCost); 2]>::default();
+        let mut context = QueryContext::new(BASELINE, &mut own.0, &mut own.1);
+        let _ = each_volume!(volume, v => RegionIndex::query(index, v, &mut context));
+        index.query_counted(volume, &mut counted.0, &mut counted.1);
+        [own, counted]
+    }
+
+    #[test]
+    fn what_is_counted_is_the_cost_of_the_volume_itself() {
+        let corner = |i: u16| Vec3::new(f32::from(i % 40), f32::from(i / 40), f32::from(i % 7));
+        let items: Vec<Aabb> = (0..2000)
+            .map(|i| Aabb::around(corner(i) * 1.7, Vec3::splat(0.3)))
+            .collect();
+        let input = Input::new(&items);
+        let normals = [Vec3::new(0.6, -0.5, 0.3), Vec3::X, -Vec3::Y];
+        let planes = normals.map(|normal| Plane::new(normal, 9.0));
+        let volume = ConvexVolume::from_planes(&planes).unwrap();
+        let (spheres, wide) = (Spheres::new(&volume), ConvexVolumeF64::from(&volume));
+        let relative = RelativeVolume::new(Vec3::splat(3.0), volume.clone()).unwrap();
+        let volumes: [AnyVolume; 5] = [
+            (&volume).into(),
+            (&spheres).into(),
+            (&wide).into(),
+            (&relative).into(),
+            items[77].centre().into(),
+        ];
+        fn check<T: RegionIndex>(input: &Input<'_>, volume: AnyVolume<'_>) {
+            let index = T::build(input, &Default::default()).unwrap();
+            let [own, counted] = both(&index, volume);
+            assert!(!own.0.is_empty() && own.0.len() < input.items.len());
+            assert_eq!(own, counted, "{} {volume:?}", T::INFO.name);
+        }
+        for volume in volumes {
+            check::<Wide>(&input, volume);
+            check::<Linear>(&input, volume);
+            check::<OctreeTextbook>(&input, volume);
+        }
+    }
+}
