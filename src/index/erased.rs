@@ -137,7 +137,7 @@ pub(super) fn query_many<T: RegionIndex>(
 mod tests {
     use super::*;
     use crate::geometry::{ConvexVolumeF64, Plane, RelativeVolume, Spheres};
-    use crate::index::{Input, Linear, OctreeTextbook, Wide};
+    use crate::index::{Input, Linear, OctreeTextbook, Trace, Wide};
 
     /// Answer and cost of the structure compiled for the volume, and counted.
     fn both<T: RegionIndex>(index: &T, volume: AnyVolume<'_>) -> [(Vec<ItemId>, QueryCost); 2] {
@@ -155,8 +155,8 @@ mod tests {
             .map(|i| Aabb::around(corner(i) * 1.7, Vec3::splat(0.3)))
             .collect();
         let input = Input::new(&items);
-        let normals = [Vec3::new(0.6, -0.5, 0.3), Vec3::X, -Vec3::Y];
-        let planes = normals.map(|normal| Plane::new(normal, 9.0));
+        let normal = Vec3::new(0.6, -0.5, 0.3);
+        let planes = [Plane::new(normal, -9.0), Plane::new(-normal, 14.0)];
         let volume = ConvexVolume::from_planes(&planes).unwrap();
         let (spheres, wide) = (Spheres::new(&volume), ConvexVolumeF64::from(&volume));
         let relative = RelativeVolume::new(Vec3::splat(3.0), volume.clone()).unwrap();
@@ -173,7 +173,12 @@ mod tests {
             assert!(!own.0.is_empty() && own.0.len() < input.items.len());
             assert_eq!(own, counted, "{} {volume:?}", T::INFO.name);
         }
+        let wide_tree = Wide::build(&input, &Default::default()).unwrap();
         for volume in volumes {
+            if let Ok(planes) = Dispatched::of(volume) {
+                let own = each_volume!(volume, v => Trace::of(&wide_tree, v));
+                assert_eq!(Trace::of(&wide_tree, &planes), own, "{volume:?}");
+            }
             check::<Wide>(&input, volume);
             check::<Linear>(&input, volume);
             check::<OctreeTextbook>(&input, volume);

@@ -16,7 +16,7 @@ use crate::query::{ItemId, QueryContext, QueryVolume, Recorder, Sink, Tests};
 type Read = (u32, [u8; ROWS]);
 
 /// What one query read and handed over, in its own order.
-#[derive(Clone, Default, Debug)]
+#[derive(Clone, Default, PartialEq, Eq, Debug)]
 pub struct Trace {
     reads: Vec<Read>,
     runs: Vec<Range<u32>>,
