@@ -116,9 +116,10 @@ impl Worker {
             Err(RecvTimeoutError::Disconnected) => return Ok(Said::Ended(self.obituary()?)),
         };
         self.since = Instant::now();
-        let line = String::from_utf8_lossy(&line);
-        let message = serde_json::from_str(&line).map_err(|_| {
-            let text: String = line.chars().take(60).collect();
+        let told = str::from_utf8(&line).ok();
+        let message = told.and_then(|line| serde_json::from_str(line).ok());
+        let message = message.ok_or_else(|| {
+            let text: String = String::from_utf8_lossy(&line).chars().take(60).collect();
             anyhow::anyhow!(
                 "a worker said '{text}'; expected a message of protocol {PROTOCOL}: the program is \
                  of another version"

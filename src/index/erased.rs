@@ -21,7 +21,7 @@ pub trait DynIndex: Send + Sync {
     /// The same query with its cost added up, by the portable instruction set
     /// whatever the kernel is: cost and answer are the same by all of them, and
     /// what is timed is to be asked for its answer itself. All volumes of planes
-    /// share a traversal here.
+    /// share one compiled traversal.
     fn query_counted(&self, volume: AnyVolume<'_>, out: &mut Vec<ItemId>, cost: &mut QueryCost);
     /// Region search for many points at once; `out` is cleared first. The timed
     /// path.

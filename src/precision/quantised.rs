@@ -234,8 +234,8 @@ impl CodeBlocks {
     }
 }
 
-/// The tree of [`Bsp`] (median) over items in codes. One type for all kinds of them:
-/// which it is, a block of sixteen asks once, and the walk is compiled once.
+/// The tree of [`Bsp`] (median) over items in codes. One type for all kinds, looked
+/// up once per block of sixteen, so that the traversal is compiled once.
 pub struct Quantised {
     tree: PackedTree,
     codes: CodeBlocks,

@@ -1,5 +1,5 @@
-//! A volume that is looked into at every test. Whoever is not timed asks by it, so
-//! that each structure is compiled once for that and not once for each volume.
+//! A volume dispatched at run time, test by test, for queries that are not timed: a
+//! structure is compiled for it once instead of once per volume.
 
 use glam::Vec3;
 
@@ -8,12 +8,12 @@ use super::{AnyVolume, Containment, Predicate, QueryVolume, Recorder};
 use crate::geometry::{Aabb, BoxBlock, LaneMask, PlaneMask, PlaneRows, RowMask};
 use crate::kernel::Isa;
 
-/// Any volume of planes: bit for bit what it holds, test by test. Points have a
-/// walk of their own in some structures and are asked as what they are.
+/// Any volume of planes, with the verdicts and costs of the volume inside, bit for
+/// bit. Points are not among them: some structures search for a point differently.
 pub(crate) struct Dispatched<'a>(AnyVolume<'a>);
 
 impl<'a> Dispatched<'a> {
-    /// `Err` with the point, if it is one.
+    /// `Err` with the point if the volume is one.
     pub fn of(volume: AnyVolume<'a>) -> Result<Dispatched<'a>, Vec3> {
         match volume {
             AnyVolume::Point(p) => Err(p),
@@ -22,7 +22,7 @@ impl<'a> Dispatched<'a> {
     }
 }
 
-// Calls on purpose: what is inlined would be compiled into each structure again.
+// Not inlined, or all volumes would be compiled into each structure again.
 impl Predicate for Dispatched<'_> {
     #[inline(never)]
     fn mask(&self) -> PlaneMask {
@@ -64,7 +64,7 @@ impl QueryVolume for Dispatched<'_> {
     fn rows_read(&self, mask: PlaneMask) -> RowMask {
         each_volume!(self.0, volume => volume.rows_read(mask))
     }
-    /// Nobody waits for it.
+    /// Does nothing: an untimed query gains nothing by it.
     fn prefetch(&self, _: &BoxBlock, _: PlaneMask) {}
     #[inline(never)]
     fn sorted_lanes<I: Isa>(
