@@ -212,3 +212,27 @@ fn scenes_and_cameras_come_from_pipes() {
         "none",
     );
 }
+
+/// What no worker of this version says is one line with what was said, and no times.
+#[cfg(unix)]
+#[test]
+fn a_program_that_speaks_another_protocol_is_one_error_line() {
+    use std::os::unix::fs::PermissionsExt;
+
+    let folder = tempfile::tempdir().expect("a folder");
+    let program = folder.path().join("other");
+    for said in [
+        r"hello",
+        // A message but for the byte that is no UTF-8.
+        r#"{"doing":{"structure":null,"step":"\377"}}"#,
+        r#"{"ready":{"protocol":0}}"#,
+    ] {
+        let script = format!("#!/bin/sh\nprintf '{said}\\n'\nsleep 1\n");
+        std::fs::write(&program, script).expect("written");
+        let executable = std::fs::Permissions::from_mode(0o755);
+        std::fs::set_permissions(&program, executable).expect("executable");
+        let line = "compare --against ./other --scene city:n=100 --structure linear";
+        let done = cullbench(folder.path(), line);
+        assert_refused(&done, "expected | of another version", said);
+    }
+}
