@@ -8,7 +8,7 @@ use crate::funnel::StageKind;
 use crate::suite::DEFAULT_PATH;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use super::funnel_args::{CheckArgs, FunnelArgs};
+use super::funnel_args::FunnelArgs;
 use super::scene_args::SceneCommand;
 use super::shared_args::{
     CullingArgs, KernelArgs, LensArgs, RowFormat, SceneArgs, SpreadArgs, TableFormat,
@@ -59,8 +59,6 @@ pub enum Command {
     Precision(PrecisionArgs),
     /// The visibility funnel: what each stage from region to fragment removes, at what cost
     Funnel(FunnelArgs),
-    /// Check the proofs that `funnel --certificates` writes, by a checker that uses no code of it
-    Check(CheckArgs),
     /// Advise: which structure, which test, which work can be skipped, with the evidence
     Advise(AdviseArgs),
     /// Errors of camera updates (turn, orbit, chase) after up to ten million steps

@@ -14,10 +14,10 @@ use super::processes::Workers;
 use super::protocol::{Job, Timing};
 use super::study::Study;
 use super::{
-    Ending, expect_folder, expect_places, funnel_csv, funnel_picture, funnel_table, interrupt,
-    load_scene_by, print_json, text, unread_is_fine, write_text,
+    Ending, expect_places, funnel_csv, funnel_picture, funnel_table, interrupt, load_scene_by,
+    print_json, text, unread_is_fine, write_text,
 };
-use crate::funnel::{self, Chain, FunnelInput, FunnelPlan, Proofs, SeenFrom, StageKind, StageRow};
+use crate::funnel::{self, Chain, FunnelInput, FunnelPlan, StageKind, StageRow};
 use crate::index::{Registry, StructureSpec};
 use crate::input::read_file;
 use crate::measure::{ProcessTimes, Protocol};
@@ -26,7 +26,6 @@ use crate::scene::{self, LoadOptions, Scene};
 use crate::spec::SpecError;
 use crate::visibility::Guarantee;
 use crate::visibility::region::Pvs;
-use crate::visibility::truth::TruthCache;
 
 /// Rounds of a stage, if one process has them all.
 const ROUNDS: [usize; 2] = [5, 15];
@@ -35,7 +34,6 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     let outputs = [
         ("--svg", args.svg.as_deref()),
         ("--html", args.html.as_deref()),
-        ("--certificates", args.certificates.as_deref()),
     ];
     let inputs = [
         args.pvs.as_deref(),
@@ -44,12 +42,8 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     ];
     let inputs: Vec<&Path> = inputs.into_iter().flatten().collect();
     expect_places(&outputs, &inputs)?;
-    expect_folder("--truth-cache", args.truth_cache.as_deref())?;
     if args.mirror.is_some() && args.cut_out.is_some() {
         bail!("--mirror shows whole boxes; expected no --cut-out with it");
-    }
-    if args.certificates.is_some() && args.from == SeenFrom::Region {
-        bail!("--certificates are about what cameras see; expected no --from region with them");
     }
     let structures = args.kernel.structures(registry, &args.structure)?;
     let load = LoadOptions {
@@ -71,21 +65,8 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     let workers = Workers::of_study()?;
     let study = Study::new(format!("{}, {}: ", args.scene, args.path), 0, &args.spread);
     study.begin("the truth, and every stage held against it");
-    let truth_cache = args.truth_cache.as_ref().map(TruthCache::new);
-    let input = setting.input(args, truth_cache.as_ref())?;
-    let mut lines = String::new();
-    let mut each = |proofs: Proofs| {
-        lines += &proofs.to_json();
-        lines.push('\n');
-    };
-    let proofs: Option<&mut dyn FnMut(Proofs)> = match args.certificates {
-        Some(_) => Some(&mut each),
-        None => None,
-    };
-    let prepared = funnel::prepare(&input, proofs, &interrupt::asked)?.ok_or(Interrupted)?;
-    if let Some(file) = &args.certificates {
-        write_text(file, &lines)?;
-    }
+    let input = setting.input(args)?;
+    let prepared = funnel::prepare(&input, &interrupt::asked)?.ok_or(Interrupted)?;
     let job = |timing| Job::Funnel(prepared.plan.clone(), timing);
     let lens_scale = setting.path.lens_scale;
     let times = study.times(&workers, "every stage, timed", lens_scale, job)?;
@@ -117,14 +98,8 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
 }
 
 /// Whether nothing that promises not to lose what is visible has lost it. Stages behind
-/// an unproven one of the chain miss what that has lost. What is proven visible between
-/// the samples may be removed by what promises no more than the samples.
+/// an unproven one of the chain miss what that has lost.
 fn keep_their_word(stages: &[StageRow]) -> bool {
-    let promises_all = |row: &&StageRow| row.back_end.guarantee.is_safe();
-    let mut proven = stages.iter().filter(promises_all);
-    if proven.any(|row| row.proofs.as_ref().is_some_and(|p| p.sub_sample_count > 0)) {
-        return false;
-    }
     let is_unproven = |row: &&StageRow| row.back_end.guarantee == Guarantee::Unproven;
     let chosen = stages.iter().filter(|row| row.is_chosen);
     let first = chosen
@@ -183,8 +158,7 @@ pub(super) fn claim(file: Option<&Path>) -> anyhow::Result<Option<Arc<Pvs>>> {
     Ok(Some(Arc::new(pvs)))
 }
 
-/// Of one of the processes, all views.
-/// All that a funnel is studied on, but for where the truth is kept.
+/// All that a funnel is studied on.
 struct Setting {
     scene: Scene,
     path: CameraPath,
@@ -212,11 +186,7 @@ impl Setting {
         })
     }
 
-    fn input<'s>(
-        &'s self,
-        args: &'s FunnelArgs,
-        truth_cache: Option<&'s TruthCache>,
-    ) -> anyhow::Result<FunnelInput<'s>> {
+    fn input<'s>(&'s self, args: &'s FunnelArgs) -> anyhow::Result<FunnelInput<'s>> {
         Ok(FunnelInput {
             scene: &self.scene,
             path: &self.path,
@@ -231,7 +201,6 @@ impl Setting {
             from: args.from,
             occluders: args.occluders,
             inner_boxes: args.inner_boxes.map(|most| most as usize),
-            truth_cache,
             execution: args.kernel.execution()?,
         })
     }
@@ -248,13 +217,13 @@ pub fn time(
     let scene = scene::load(&args.scene, &args.scene_args.options(0))?;
     let structures = args.kernel.structures(registry, &args.structure)?;
     let setting = Setting::of(args, structures, scene, timing)?;
-    Ok(funnel::time(&setting.input(args, None)?, plan, stop)?)
+    Ok(funnel::time(&setting.input(args)?, plan, stop)?)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::funnel::{BackEnd, Errors, ProofCounts, Times};
+    use crate::funnel::{BackEnd, Errors, Times};
 
     fn row(stage: StageKind, guarantee: Guarantee, false_negative_count: f64) -> StageRow {
         StageRow {
@@ -276,7 +245,6 @@ mod tests {
             ns_per_removed: None,
             ns_per_decided: None,
             fragments: None,
-            proofs: None,
         }
     }
 
@@ -302,22 +270,5 @@ mod tests {
             ..region(Unproven, 1.0)
         };
         assert!(!keeps([other, occlusion(Conservative, 1.0)]));
-    }
-
-    #[test]
-    fn what_promises_all_may_not_remove_what_is_seen_between_samples() {
-        let removing = |guarantee: Guarantee| {
-            let proofs = ProofCounts {
-                sub_sample_count: 1,
-                ..ProofCounts::default()
-            };
-            StageRow {
-                proofs: Some(proofs),
-                ..row(StageKind::Occlusion, guarantee, 0.0)
-            }
-        };
-        let keeps = |guarantee| keep_their_word(&[removing(guarantee)]);
-        assert!(keeps(Guarantee::Unproven) && keeps(Guarantee::SampleExact));
-        assert!(!keeps(Guarantee::Conservative) && !keeps(Guarantee::Exact));
     }
 }

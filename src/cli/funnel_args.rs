@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::shared_args::{KernelArgs, LensArgs, SceneArgs, SpreadArgs, TableFormat};
+use super::shared_args::{KernelArgs, LensArgs, SceneArgs, SpreadArgs};
 use super::values;
 use crate::funnel::{SEEN_FROM, SeenFrom};
 use crate::query::ItemId;
@@ -93,14 +93,6 @@ pub struct FunnelArgs {
     /// A claim of what is seen from each region, to be audited: {"regions": N, "sees": [[0, 1], ..]}
     #[arg(long, value_name = "FILE")]
     pub pvs: Option<PathBuf>,
-
-    /// Keep what solid boxes without holes show at the samples in this directory, and read it
-    /// from there if it is of this very question
-    #[arg(long, value_name = "DIR")]
-    pub truth_cache: Option<PathBuf>,
-    /// Write proofs: of each claim's errors, and of every item in view that is visible or was removed
-    #[arg(long, value_name = "FILE")]
-    pub certificates: Option<PathBuf>,
     /// Write tables and picture as one HTML page too
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
@@ -117,38 +109,6 @@ pub struct FunnelArgs {
     pub lens: LensArgs,
     #[command(flatten)]
     pub kernel: KernelArgs,
-}
-
-const CHECK_HELP: &str = "\
-Example:
-  cullbench funnel --scene city:n=10000 --frames 4 --certificates proofs.jsonl
-  cullbench check proofs.jsonl
-
-A visible item is proven by a ray along which it is in front, a hidden one by a division of its
-image into parts that each lie behind one nearer box. Both are checked in exact arithmetic, against
-the boxes as they are written, and each view against the camera that it is said to be of (a lens
-that was given to funnel is to be given here too). An error of a claim of what is seen from where (a map's REJECT table,
-a file given as --pvs) is proven by a line of sight between two regions that leads through openings,
-or by what it says of the two directions. Exit code 1 if a proof does not hold.";
-
-#[derive(Args, Debug)]
-#[command(after_help = CHECK_HELP)]
-pub struct CheckArgs {
-    /// The file that `funnel --certificates` wrote
-    #[arg(value_name = "CERTIFICATES")]
-    pub certificates: PathBuf,
-    /// The stored PVS whose errors are to be checked
-    #[arg(long, value_name = "FILE")]
-    pub pvs: Option<PathBuf>,
-    /// The scene, if it is to be found elsewhere than the certificates say
-    #[arg(long)]
-    pub scene: Option<String>,
-    #[arg(long, value_enum, default_value = "table")]
-    pub format: TableFormat,
-    #[command(flatten)]
-    pub scene_args: SceneArgs,
-    #[command(flatten)]
-    pub lens: LensArgs,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum, Debug)]

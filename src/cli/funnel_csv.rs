@@ -36,8 +36,6 @@ const FIELDS: &str = "
     worst_missing_samples longest_missing_streak ns_per_removed ns_per_decided
     fragments/asked_count fragments/kept_out_count fragments/fragment_count
     fragments/clear_count fragments/shaded_count fragments/covered_count
-    proofs/visible_count proofs/sub_sample_count proofs/hidden_count proofs/tied_count
-    proofs/along_lines_count proofs/undecided_count proofs/sub_sample_items
     fragment_count shaded_count covered_count overdraw pair_count wrong_pair_count
     wrong_sample_count cyclic_count exceptions
     ray_count wrong_count ns_per_ray ratio ratio_lower ratio_upper

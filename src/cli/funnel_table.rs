@@ -4,7 +4,7 @@
 use super::document::Block;
 use super::table::Table;
 use super::text;
-use crate::funnel::{FunnelReport, Gain, LevelRow, ProofCounts, SeenFrom, StageRow, Times};
+use crate::funnel::{FunnelReport, Gain, LevelRow, SeenFrom, StageRow, Times};
 use crate::visibility::Guarantee;
 use crate::visibility::hiders::{BlocksRow, GroundRow, InnerRow};
 use crate::visibility::occlusion::OccluderChoice;
@@ -49,10 +49,6 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
     }
     // Not every scene has all of them.
     for (heading, table) in [
-        (
-            "What was removed within the frustum, by its proof, over all views",
-            proofs(report),
-        ),
         ("Samples and fragments of what is left", fragments(report)),
         ("What is seen in the mirror", mirror(report)),
         ("What is left, drawn in every order", orders(report)),
@@ -222,29 +218,6 @@ fn count(mean: f64) -> String {
         mean if mean >= 100.0 || mean.fract() == 0.0 => format!("{mean:.0}"),
         mean => text::significant(mean),
     }
-}
-
-/// Every back end that removed what is in view, where proofs were made.
-fn proofs(report: &FunnelReport) -> Table {
-    let mut table = Table::of(
-        "stage | by | >hidden | >tied | >along lines | >undecided | >sub-sample | >visible",
-    );
-    let proven = report.stages.iter();
-    let proven = proven.filter_map(|row| Some((row, row.proofs.as_ref()?)));
-    for (row, proofs) in proven.filter(|(_, proofs)| **proofs != ProofCounts::default()) {
-        let mut cells = vec![row.back_end.stage.name().to_owned(), by(row)];
-        let counts = [
-            proofs.hidden_count,
-            proofs.tied_count,
-            proofs.along_lines_count,
-            proofs.undecided_count,
-            proofs.sub_sample_count,
-            proofs.visible_count,
-        ];
-        cells.extend(counts.map(|count| count.to_string()));
-        table.add_row(cells);
-    }
-    table
 }
 
 /// Counts of fragments, by the name of a test.

@@ -11,7 +11,6 @@ mod advise;
 mod against;
 mod against_table;
 mod args;
-mod check;
 mod compare;
 mod compare_structures;
 mod compare_table;
@@ -156,7 +155,6 @@ fn dispatch(registry: &Registry, command: Command) -> anyhow::Result<Ending> {
         Command::Verify(args) => verify::verify(registry, &args),
         Command::Precision(args) => precision::precision(registry, &args),
         Command::Advise(args) => advise::advise(registry, &args),
-        Command::Check(args) => check::check(&args),
         Command::Funnel(args) => funnel::funnel(registry, &args),
         Command::Drift(args) => drift::drift(&args),
         Command::Stress(args) => stress::stress(registry, &args),

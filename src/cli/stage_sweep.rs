@@ -80,7 +80,6 @@ impl Setting {
             from: SeenFrom::Eye,
             occluders: OccluderChoice::All,
             inner_boxes: None,
-            truth_cache: None,
             execution: args.kernel.execution()?,
         })
     }

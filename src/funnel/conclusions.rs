@@ -8,18 +8,14 @@ use super::orders::OrderRow;
 use super::regions::ClaimAudit;
 use super::report::{FunnelReport, Gain, StageRow};
 use super::stage::StageKind;
-use crate::shown::{counted, first_of};
+use crate::shown::counted;
 use crate::visibility::region::STORED;
-
-/// Items that a sentence names.
-const MOST_NAMED: usize = 5;
 
 /// A sentence for each stage of the chain, and one for each back end that lost items.
 pub fn conclusions(report: &FunnelReport) -> Vec<String> {
     let mut sentences: Vec<String> = report.gains.iter().map(of_gain).collect();
     let lossy = |row: &&StageRow| row.errors.false_negative_count > 0.0;
     sentences.extend(report.stages.iter().filter(lossy).map(of_loss));
-    sentences.extend(report.stages.iter().filter_map(of_sub_samples));
     sentences.extend(of_stencil(report));
     sentences.extend(report.mirror.as_ref().map(of_mirror));
     sentences.extend(report.orders.iter().flat_map(of_order));
@@ -117,24 +113,6 @@ fn of_mirror(row: &MirrorRow) -> String {
         without.asked_count,
         counted(row.wrong_sample_count as usize, "sample")
     )
-}
-
-/// What is seen between the samples only, and removed: no error of sample truth, and one
-/// of what promises more.
-fn of_sub_samples(row: &StageRow) -> Option<String> {
-    let found = &row.proofs.as_ref()?.sub_sample_items;
-    let named = found.iter();
-    let named = named.map(|(camera, item)| format!("item {item} of camera {camera}"));
-    let named: Vec<String> = named.collect();
-    (!found.is_empty()).then(|| {
-        format!(
-            "{} {} removed {} proven visible between the samples (sub-sample): {}.",
-            row.back_end.stage.name(),
-            row.structure.as_deref().unwrap_or(row.back_end.name),
-            counted(found.len(), "item"),
-            first_of(&named, MOST_NAMED)
-        )
-    })
 }
 
 /// Where an order that is declared exact is not.

@@ -16,7 +16,6 @@ use crate::visibility::region::{
     Audit, EXACT, FromRegion, OtherRegions, ProvenPvs, Pvs, REJECT, RegionGraph, RegionItems,
     RegionRow, RoomsPvs, STORED, Searched, StoredPvs, audit, pairs_of,
 };
-use crate::visibility::truth::PlanWall;
 
 /// A back end, and which items are in which of its regions.
 struct Row {
@@ -30,8 +29,6 @@ pub(super) struct Regions {
     rows: Vec<Row>,
     /// What claims of what is seen from where get wrong.
     pub audits: Vec<ClaimAudit>,
-    /// The walls of a map.
-    pub walls: Vec<PlanWall>,
 }
 
 /// A claim of which regions see which, and what is wrong with it.
@@ -135,7 +132,6 @@ impl Regions {
         rows.extend(stored(&exact, &graph));
         let mut regions = Regions::with(graph, rows, scene, from);
         regions.audits = audits;
-        regions.walls = map.walls();
         if from == SeenFrom::Region {
             regions.audit_searches(&exact)?;
         }
@@ -169,7 +165,6 @@ impl Regions {
             rows: rows.into_iter().map(row).collect(),
             graph,
             audits: Vec::new(),
-            walls: Vec::new(),
         }
     }
 

@@ -10,7 +10,6 @@ use super::mirror::MirrorRow;
 use super::orders::OrderRow;
 use super::picks::PickRow;
 use super::plan_view::PlanView;
-use super::proven::ProofCounts;
 use super::regions::ClaimAudit;
 use super::seen_from::SeenFrom;
 use super::stage::{BackEnd, StageKind};
@@ -168,8 +167,6 @@ pub struct StageRow {
     pub ns_per_decided: Option<f64>,
     /// Samples and fragments of a test of the fragment stage; null elsewhere.
     pub fragments: Option<FragmentCounts>,
-    /// What it removed, by what is proven of it; null where nothing was to be proven.
-    pub proofs: Option<ProofCounts>,
 }
 
 /// What a stage is worth where all others are as in the chain.

@@ -6,8 +6,7 @@ use super::world::World;
 use crate::query::ItemId;
 use crate::visibility::fragment;
 use crate::visibility::truth::{
-    RayIndex, SampleTruth, SurfaceIndex, TruthCache, digest_of, visible_by_random_rays,
-    visible_surfaces_by_random_rays,
+    RayIndex, SampleTruth, SurfaceIndex, visible_by_random_rays, visible_surfaces_by_random_rays,
 };
 use crate::visibility::{Rays, SampleGrid, Solids};
 
@@ -48,8 +47,6 @@ pub fn seen(
 /// floors and ceilings of a map.
 pub enum Shown<'w> {
     Solids(&'w Solids, RayIndex, Option<&'w fragment::Surfaces>),
-    /// Boxes without holes, of which some truth may be known already.
-    Kept(&'w Solids, RayIndex, &'w TruthCache, [u8; 32]),
     Surfaces(SurfaceIndex),
 }
 
@@ -58,10 +55,7 @@ impl Shown<'_> {
     pub fn of<'w>(world: &'w World) -> Shown<'w> {
         if let Some(solids) = world.solids.as_ref() {
             let index = RayIndex::build(solids);
-            return match (world.cut_outs.as_ref(), world.truth_cache) {
-                (None, Some(cache)) => Shown::Kept(solids, index, cache, digest_of(solids)),
-                (holes, _) => Shown::Solids(solids, index, holes),
-            };
+            return Shown::Solids(solids, index, world.cut_outs.as_ref());
         }
         let surfaces = world
             .surfaces
@@ -81,18 +75,13 @@ impl Shown<'_> {
             Shown::Solids(solids, index, None) => {
                 SampleTruth::of(solids, index, rays, grid, threads)
             }
-            Shown::Kept(solids, index, cache, digest) => {
-                cache.sample_truth(digest, solids, index, rays, grid, threads)
-            }
             Shown::Surfaces(index) => SampleTruth::of_surfaces(index, rays, grid, threads),
         }
     }
 
     fn along_random(&self, rays: &Rays, count: usize, seed: u64, threads: usize) -> Vec<ItemId> {
         match self {
-            Shown::Solids(_, index, _) | Shown::Kept(_, index, _, _) => {
-                visible_by_random_rays(index, rays, count, seed, threads)
-            }
+            Shown::Solids(_, index, _) => visible_by_random_rays(index, rays, count, seed, threads),
             Shown::Surfaces(index) => {
                 visible_surfaces_by_random_rays(index, rays, count, seed, threads)
             }

@@ -4,7 +4,6 @@
 use std::cell::RefCell;
 
 use super::bounds::{Bound, bounds};
-use super::certified::{Proofs, certified};
 use super::chain::Chain;
 use super::conclusions::conclusions;
 use super::error::FunnelError;
@@ -18,7 +17,6 @@ use super::pass::{Pass, Walked};
 use super::picks::Picks;
 use super::plan::{FunnelPlan, task};
 use super::plan_view::{PlanView, fate};
-use super::proven::ProofCounts;
 use super::report::{CutOutRow, FunnelReport, Gain, LevelRow, Side, StageRow};
 use super::seen::seen;
 use super::stage::{BackEnd, NONE, StageKind};
@@ -71,14 +69,12 @@ struct Sides {
 }
 
 /// Goes through all chains, judges them, and plans how they are timed; `None` if
-/// stopped. `proofs` is handed a proof of every item in view that is visible or that a
-/// back end removed, and the errors of every claim.
+/// stopped.
 ///
 /// # Errors
 /// A camera, a structure, a back end or an image that cannot be had.
 pub fn prepare(
     input: &FunnelInput,
-    proofs: Option<&mut dyn FnMut(Proofs)>,
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<Prepared>, FunnelError> {
     fits(input.samples, available_bytes())?;
@@ -91,13 +87,6 @@ pub fn prepare(
     let Some(walks) = Walks::of(&mut pass, &world, input.chain, stop) else {
         return Ok(None);
     };
-    let proven = match proofs {
-        Some(each) => match certified(input, &world, &pass, &walks, stop, each) {
-            Some(proven) => Some(proven),
-            None => return Ok(None),
-        },
-        None => None,
-    };
     let left = Left::of(&world, &pass, &walks.chosen, input.chain);
     let mut rows = Vec::new();
     for (stage, name, step) in &walks.rows {
@@ -108,10 +97,8 @@ pub fn prepare(
         let judged: Vec<_> = (0..world.views())
             .map(|view| world.judge(view, sets.map(|set| pass.items(set, view)), &truth))
             .collect();
-        let proofs = proven.as_ref();
-        let proofs = proofs.map(|proven| ProofCounts::of(proven, &world, &pass, sets));
         let back_end = world.back_end(*stage, name);
-        rows.push((back_end, name.clone(), judged, *step, proofs));
+        rows.push((back_end, name.clone(), judged, *step));
     }
     let culls = world.back_ends(StageKind::Triangle).into_iter();
     let culls = culls.zip(std::iter::once(None).chain((0..).map(Some)));
@@ -121,7 +108,7 @@ pub fn prepare(
         }
         let task = place.map(|place: usize| pass.steps().len() + place);
         let judged = left.faces.judged(place);
-        rows.push((back_end, back_end.name.to_owned(), judged, task, None));
+        rows.push((back_end, back_end.name.to_owned(), judged, task));
     }
     let last = walks.chosen.left();
     let Some(tested) = left.fragments.tested(&pass, last, &truth, stop) else {
@@ -147,7 +134,7 @@ pub fn prepare(
     // Behind the steps come the back ends of the triangle stage, then the tests of fragments.
     let first_test = pass.steps().len() + triangle_rows::back_ends().count();
     let tests = std::iter::once(None).chain((first_test..).map(Some));
-    let tasks = rows.iter().map(|(_, _, _, task, _)| *task);
+    let tasks = rows.iter().map(|(_, _, _, task)| *task);
     let tasks: Vec<Option<usize>> = tasks.chain(tests.take(tested.len())).collect();
     let row = |back_end: BackEnd, name: &str, judged: &[Judged]| StageRow {
         back_end,
@@ -159,18 +146,14 @@ pub fn prepare(
         ns_per_removed: None,
         ns_per_decided: None,
         fragments: None,
-        proofs: None,
     };
-    let rows = rows
-        .into_iter()
-        .map(|(back_end, name, judged, task, proofs)| {
-            let is_built = back_end.stage == StageKind::Object && task.is_some();
-            StageRow {
-                structure: is_built.then(|| name.clone()),
-                proofs,
-                ..row(back_end, &name, &judged)
-            }
-        });
+    let rows = rows.into_iter().map(|(back_end, name, judged, task)| {
+        let is_built = back_end.stage == StageKind::Object && task.is_some();
+        StageRow {
+            structure: is_built.then(|| name.clone()),
+            ..row(back_end, &name, &judged)
+        }
+    });
     let tested = tested.into_iter().map(|tested| StageRow {
         fragments: tested.counts,
         ..row(tested.back_end, tested.back_end.name, &tested.judged)

@@ -31,7 +31,6 @@ use crate::visibility::inscribed::BOXES;
 use crate::visibility::occlusion::{self, OccluderChoice, OccluderScene};
 use crate::visibility::region::{EyePlace, Marks, Pvs, RegionRow, Scratch};
 use crate::visibility::triangle;
-use crate::visibility::truth::{PlanWall, TruthCache};
 use crate::visibility::{Guarantee, Rays, SampleGrid, Solids, holes_of, surfaces_of};
 
 /// What a funnel is studied on.
@@ -64,8 +63,6 @@ pub struct FunnelInput<'a> {
     /// How many boxes are looked for inside each item of a mesh, at least 1; `None` for
     /// [`BOXES`].
     pub inner_boxes: Option<usize>,
-    /// Where what solid boxes show at the samples is kept from run to run.
-    pub truth_cache: Option<&'a TruthCache>,
     /// Instructions of every stage, and threads that look for the truth.
     pub execution: Execution,
 }
@@ -96,14 +93,10 @@ pub struct World<'a> {
     choice: OccluderChoice,
     /// The regions of the scene.
     pub(super) regions: Option<Regions>,
-    /// Where sample truth is kept, if it is.
-    pub truth_cache: Option<&'a TruthCache>,
 }
 
 /// A camera in every form that a stage needs.
 struct View {
-    /// Its place in the path.
-    camera: usize,
     volume: ConvexVolume,
     rays: Rays,
     triangles: triangle::View,
@@ -124,7 +117,6 @@ impl<'a> World<'a> {
             let error = |error| FunnelError::Rays { index, error };
             let volume = camera.volume(&PlaneOptions::default(), &around);
             Ok(View {
-                camera: index,
                 volume: volume.map_err(|error| WorkloadError {
                     place: input.path.place(index),
                     error: error.into(),
@@ -200,7 +192,6 @@ impl<'a> World<'a> {
             hiders,
             choice: input.occluders,
             regions,
-            truth_cache: input.truth_cache,
         };
         for stage in StageKind::OF_ITEMS {
             let (name, known) = (input.chain.of(stage), world.names(stage));
@@ -254,21 +245,11 @@ impl<'a> World<'a> {
         &self.views[view].triangles
     }
 
-    /// The place of a view's camera in the path.
-    pub fn camera(&self, view: usize) -> usize {
-        self.views[view].camera
-    }
-
     /// Whether a view's eye, and all that is before its near plane, is in the regions of
     /// the scene.
     pub fn is_inside(&self, view: usize) -> bool {
         let regions = self.regions.as_ref();
         regions.is_some_and(|regions| regions.graph().homes(self.rays(view), &mut Vec::new()))
-    }
-
-    /// The walls of a map; none in any other scene.
-    pub fn walls(&self) -> &[PlanWall] {
-        self.regions.as_ref().map_or(&[], |regions| &regions.walls)
     }
 
     /// The rays of a view.
@@ -486,7 +467,6 @@ mod tests {
             from: SeenFrom::Eye,
             occluders: OccluderChoice::All,
             inner_boxes: None,
-            truth_cache: None,
             execution: Execution::default(),
         };
         let world = World::new(&input).expect("a world");

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use super::fragment::{self, CutOuts};
 use super::region::RegionGraph;
 use super::region::doom::DoomMap;
-use super::truth::PlanWall;
 use crate::input::InputError;
 use crate::query::ItemId;
 use crate::scene::{ItemShape, Scene, Surfaces};
@@ -33,12 +32,4 @@ pub fn holes_of(typed: &CutOuts, scene: &Scene, graph: Option<&RegionGraph>) -> 
     let walls = graph.map(|graph| graph.borders(scene));
     let is_free = |item: ItemId| walls.as_ref().is_none_or(|walls| !walls[item as usize]);
     typed.surfaces(scene.items.len(), is_free)
-}
-
-/// The walls of a map, as its scene's items; none of any other scene.
-///
-/// # Errors
-/// The map's file, read a second time.
-pub fn walls_of(scene: &Scene) -> Result<Vec<PlanWall>, InputError> {
-    Ok(DoomMap::of_scene(scene)?.map_or(Vec::new(), |map| map.walls()))
 }

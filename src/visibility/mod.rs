@@ -19,7 +19,7 @@ pub mod triangle;
 pub mod truth;
 
 pub use guarantee::Guarantee;
-pub use items::{holes_of, surfaces_of, walls_of};
+pub use items::{holes_of, surfaces_of};
 pub use level::{Level, LevelMap, MapFile};
 pub use rays::{NoRays, Ray, Rays, SampleGrid};
 pub use solids::Solids;

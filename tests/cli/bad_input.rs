@@ -537,9 +537,6 @@ fn places_that_cannot_be_written_to_are_named_and_stay_as_they_are() {
     all_refused(&folder, &[resume], "nowhere/stream.jsonl: No such file");
     let wanted = "no unfinished run in results; expected one | --out DIR";
     all_refused(&folder, &["run --resume"], wanted);
-    let cache = "funnel --scene scene.csv --truth-cache kept.csv";
-    let wanted = "kept.csv: not a folder; expected a folder for --truth-cache";
-    all_refused(&folder, &[cache], wanted);
 }
 
 /// A row may be a camera whose planes do not fit f32.

@@ -160,14 +160,9 @@ fn fields(row: &Value, before: &str, found: &mut Vec<(String, String)>) {
 
 #[test]
 fn csv_has_every_field_of_every_table_of_the_json() {
-    let folder = folder();
     let more = "--path street:frames=2 --samples 32x18 --processes 2";
-    let proofs = folder.path().join("proofs.jsonl");
     let lines = [
-        format!(
-            "funnel --scene rooms:n=500 {more} --certificates {}",
-            proofs.display()
-        ),
+        format!("funnel --scene rooms:n=500 {more}"),
         format!("funnel --scene city:n=500 {more} --cut-out fence"),
         format!("funnel --scene city:n=500 {more} --mirror 7"),
         format!("funnel --scene freedm-map12 {more}"),
@@ -388,12 +383,8 @@ fn what_cannot_be_is_refused_in_a_line() {
         ("--structure nosuch", "nosuch"),
         ("--svg no/such/folder/x.svg", "--svg"),
         ("--html no/such/folder/x.html", "--html"),
-        ("--certificates no/such/folder/x", "--certificates"),
         ("--html scene.csv", "scene.csv | input | --html"),
-        (
-            "--certificates x --svg ./x",
-            "another output | --certificates",
-        ),
+        ("--html x --svg ./x", "another output | --html"),
         ("--svg .", "--svg | a folder"),
         ("--cut-out fense", "fense | did you mean 'fence'"),
         (

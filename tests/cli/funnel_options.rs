@@ -1,7 +1,6 @@
 //! `funnel`: what its options ask beside the chain: another choice of occluders, what is
 //! seen from a whole region, truth kept on disk, every question of picking.
 
-use std::fs;
 use std::path::Path;
 
 use cullbench::visibility::inscribed::BOXES;
@@ -58,33 +57,6 @@ fn triangles_beside_the_window_and_between_samples_are_removed() {
         let point = point.unwrap_or_else(|| panic!("{name}"));
         assert_eq!(number(point, "false_negative_count"), 0.0, "{name}");
     }
-}
-
-#[test]
-fn what_is_removed_is_held_against_its_proofs() {
-    assert!(row(&report(CITY), "occlusion", "masked")["proofs"].is_null());
-    let folder = folder(&[]);
-    let line = CITY.replace("96x54", "24x14") + " --certificates proofs.jsonl";
-    let report = json(&works(folder.path(), &line));
-    let count = |name, count| number(&row(&report, "occlusion", name)["proofs"], count);
-    // Samples this far apart see none of them.
-    let lost = count("masked", "sub_sample_count");
-    assert!(lost > 0.0);
-    let named = array(
-        &row(&report, "occlusion", "masked")["proofs"],
-        "sub_sample_items",
-    );
-    assert_eq!(named.len() as f64, lost);
-    assert_eq!(count("masked-inner", "sub_sample_count"), 0.0);
-    assert!(count("masked-inner", "hidden_count") > 100.0);
-    let said = array(&report, "conclusions").iter();
-    let mut said = said.filter_map(Value::as_str);
-    assert!(
-        said.any(|told| told.contains("occlusion masked removed") && told.contains("sub-sample"))
-    );
-    let checked = json(&works(folder.path(), "check proofs.jsonl --format json"));
-    let hidden = count("masked-inner", "hidden_count");
-    assert!(number(&checked, "hidden_count") >= hidden);
 }
 
 #[test]
@@ -180,67 +152,4 @@ fn from_a_region_more_is_seen_than_from_an_eye_and_nothing_is_lost() {
     assert!(number(flood, "false_positives") > 0.0);
     assert!(array(flood, "false_negatives").is_empty() && array(flood, "unproven").is_empty());
     assert!(array(&eye, "audits").is_empty());
-    let line = format!("{ROOMS} --from region --certificates proofs.jsonl");
-    let done = cullbench(Path::new("."), &line);
-    assert_refused(&done, "--from region", &line);
-}
-
-/// The report without what a clock has a part in.
-fn counts(report: &Value) -> Vec<Value> {
-    let fields = [
-        "name",
-        "structure",
-        "input_count",
-        "output_count",
-        "truth_count",
-    ];
-    let more = [
-        "false_positive_count",
-        "false_negative_count",
-        "image_error",
-    ];
-    let of = |row: &Value| {
-        fields
-            .iter()
-            .chain(&more)
-            .map(|field| row[*field].clone())
-            .collect()
-    };
-    array(report, "stages").iter().map(of).collect()
-}
-
-#[test]
-fn truth_is_kept_on_disk_and_only_read_if_it_is_of_this_question() {
-    let folder = folder(&[]);
-    let line = format!("{CITY} --truth-cache of/truth");
-    let ask = |line: &str| counts(&json(&works(folder.path(), line)));
-    let first = ask(&line);
-    assert_eq!(first, counts(&report(CITY)), "the same without a cache");
-    let directory = folder.path().join("of/truth");
-    let files = || {
-        let entries = fs::read_dir(&directory).expect("a directory");
-        let mut paths: Vec<_> = entries.map(|entry| entry.expect("a file").path()).collect();
-        paths.sort();
-        paths
-    };
-    let kept = files();
-    assert_eq!(kept.len(), 3, "one for each view");
-    let whole: Vec<Vec<u8>> = kept.iter().map(|path| fs::read(path).unwrap()).collect();
-    let written = |path: &Path| fs::metadata(path).unwrap().modified().unwrap();
-    let before: Vec<_> = kept.iter().map(|path| written(path)).collect();
-    assert_eq!(ask(&line), first);
-    let after: Vec<_> = kept.iter().map(|path| written(path)).collect();
-    assert_eq!(before, after, "read, not written anew");
-    // An altered file, one that is cut short, one of another view: found out anew.
-    let mut altered = whole[0].clone();
-    altered[80] ^= 1;
-    fs::write(&kept[0], altered).unwrap();
-    fs::write(&kept[1], &whole[1][..whole[1].len() / 2]).unwrap();
-    fs::write(&kept[2], &whole[0]).unwrap();
-    assert_eq!(ask(&line), first);
-    let healed: Vec<Vec<u8>> = kept.iter().map(|path| fs::read(path).unwrap()).collect();
-    assert_eq!(healed, whole);
-    // Another scene is another question.
-    ask(&line.replace("n=800", "n=801"));
-    assert_eq!(files().len(), 6);
 }

@@ -15,7 +15,6 @@ mod funnel;
 mod funnel_fragments;
 mod funnel_maps;
 mod funnel_options;
-mod funnel_proofs;
 mod kernels;
 mod listing;
 mod matrices;

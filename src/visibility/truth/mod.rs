@@ -1,15 +1,7 @@
-//! What is really visible: exact along the rays of a sample grid (`sample`, kept on
-//! disk by `cache`; of triangles `surface_sample`), and for all rays of a view where a
-//! witness or a cover proves it (`certificate`, held against the items by `check`,
-//! which uses no code of the search; the search asks it about plans of maps). It knows
-//! boxes, triangles, cameras and rays, not the back ends that it judges.
+//! The visible items, exact along the rays of a sample grid: `sample` for boxes,
+//! `surface_sample` for triangles. Knows boxes, triangles, cameras and rays, not the back
+//! ends that are judged by it.
 
-mod cache;
-mod certificate;
-mod certify;
-mod check;
-mod class;
-mod cover;
 mod entry;
 #[cfg(test)]
 pub(super) mod judge;
@@ -17,18 +9,9 @@ mod ray_index;
 mod ray_tree;
 mod ray_triangle;
 mod sample;
-mod sight;
 mod surface_index;
 mod surface_sample;
 
-pub use cache::{TruthCache, digest_of};
-pub use certificate::{
-    CameraOf, Cell, Certificates, Corners, Edge, Except, Hiders, PlanWall, Proof, View,
-};
-pub use certify::{Ends, certify};
-pub use check::{Counts, Facts, Rejected, check};
-pub use class::Class;
-pub use cover::Prover;
 pub use entry::{Crossing, Probe};
 pub use ray_index::{Front, RayIndex};
 pub use ray_triangle::{Meeting, TriangleProbe};

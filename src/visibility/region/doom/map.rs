@@ -9,7 +9,6 @@ use super::super::pvs::Pvs;
 use crate::input::InputError;
 use crate::scene::{Scene, WadMap, WorldBox, map_lump};
 use crate::visibility::MapFile;
-use crate::visibility::truth::PlanWall;
 
 /// Height at which what moves ends; map units fit 16 bits.
 const HIGHEST: f64 = 32768.0;
@@ -198,16 +197,5 @@ impl DoomMap {
     /// The map's REJECT table: its claim of which sectors see each other.
     pub fn reject(&self) -> Option<&Pvs> {
         self.reject.as_ref()
-    }
-
-    /// Its linedefs as the items of its scene, from above.
-    pub fn walls(&self) -> Vec<PlanWall> {
-        let lines = self.numbers.iter().zip(&self.lines);
-        let wall = |(&item, line): (&u32, &MapLine)| PlanWall {
-            item,
-            ends: line.ends.map(|end| end.map(f64::from)),
-            is_solid: line.open.is_none(),
-        };
-        lines.map(wall).collect()
     }
 }
