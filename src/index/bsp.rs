@@ -13,7 +13,6 @@ use super::plane_choice::{
     between_layers, by_own_planes, by_principal_axis, by_surface_area, divide,
 };
 use super::stack::Stack;
-use super::tiling::Tiling;
 use super::tree::PackedTree;
 use super::treelets::{DESCENT_LEAF, Treelets};
 use super::{
@@ -29,9 +28,8 @@ use crate::query::{Context, ItemId, ManySink, Predicate, QueryVolume, Recorder, 
 /// An item that a plane cuts is neither split nor stored twice: it goes to the
 /// side of its centre, and the node keeps how far each side reaches across the
 /// plane (two offsets, as in a bounding interval hierarchy, Waechter and Keller
-/// 2006, but for planes of any direction). On a tiling the offsets meet and the
-/// tree is an exact partition: a point takes one side, O(log n); where items
-/// overlap, it takes both sides where it must.
+/// 2006, but for planes of any direction). A point takes both sides where the
+/// sides overlap.
 pub struct Bsp {
     tree: PackedTree,
     planes: Planes,
@@ -42,11 +40,7 @@ enum Planes {
     /// Of any direction, one for each node; unused for leaves.
     Any(Vec<Split>),
     /// Axis-parallel ones.
-    Axes {
-        treelets: Treelets,
-        /// Beside them, where the planes cut no item. Gone once items have moved.
-        tiling: Option<Tiling>,
-    },
+    Axes(Treelets),
 }
 
 /// The direction of a node's plane and how far its two sides reach along it.
@@ -151,8 +145,6 @@ struct PlaneSplitter<'a> {
     /// How many items come before the plane, for each division within a leaf of
     /// more than [`DESCENT_LEAF`] items.
     parts: Vec<u32>,
-    /// The same for those of fewer, as long as no plane has cut an item.
-    fine: Option<Vec<u32>>,
 }
 
 /// What the splitter knows of a group: the imported node to divide it by.
@@ -212,29 +204,12 @@ impl Splitter for PlaneSplitter<'_> {
     }
 
     fn arrange(&mut self, records: &mut [Record]) {
-        let large = records.len() > DESCENT_LEAF;
-        if self.builder != BspBuilder::Median
-            || records.len() < 2
-            || !(large || self.fine.is_some())
-        {
+        if self.builder != BspBuilder::Median || records.len() <= DESCENT_LEAF {
             return;
         }
         let (_, back) = between_layers(records);
-        if large {
-            self.parts.push(back as u32);
-        }
+        self.parts.push(back as u32);
         let (back, front) = records.split_at_mut(back);
-        if let Some(fine) = &mut self.fine {
-            let [lower, upper] = [&*back, &*front].map(|side| {
-                let boxes = side.iter().map(|r| &r.bounds);
-                Aabb::union_of(boxes)
-            });
-            if !lower.max.cmple(upper.min).any() {
-                self.fine = None;
-            } else if !large {
-                fine.push(back.len() as u32);
-            }
-        }
         self.arrange(back);
         self.arrange(front);
     }
@@ -264,14 +239,6 @@ fn measure_reach(splits: &mut [Split], tree: &PackedTree, node: usize) {
 }
 
 impl Bsp {
-    #[cfg(test)]
-    pub(super) fn tiling(&self) -> Option<&Tiling> {
-        match &self.planes {
-            Planes::Axes { tiling, .. } => tiling.as_ref(),
-            Planes::Any(_) => None,
-        }
-    }
-
     /// The tree without its planes.
     pub(crate) fn into_tree(self) -> PackedTree {
         self.tree
@@ -287,11 +254,8 @@ impl Bsp {
     ) -> ControlFlow<()> {
         let splits = match &self.planes {
             Planes::Any(splits) => splits,
-            Planes::Axes { treelets, tiling } => {
-                return match tiling {
-                    Some(tiling) => tiling.locate(isa, &self.tree, treelets, p, sink, recorder),
-                    None => treelets.locate(isa, &self.tree, p, sink, recorder),
-                };
+            Planes::Axes(treelets) => {
+                return treelets.locate(isa, &self.tree, p, sink, recorder);
             }
         };
         let nodes = self.tree.nodes();
@@ -352,15 +316,11 @@ impl RegionIndex for Bsp {
             imported,
             splits: Vec::new(),
             parts: Vec::new(),
-            fine: Some(Vec::new()),
         };
         let root = imported.and_then(|planes| planes.root);
         let tree = build_top_down(items, &ids, params.leaf as usize, root, &mut splitter);
         if builder == BspBuilder::Median {
-            let (parts, fine) = (splitter.parts, splitter.fine);
-            let tiling = fine.and_then(|fine| Tiling::over(&tree, &parts, &fine));
-            let treelets = Treelets::over(&tree, parts);
-            let planes = Planes::Axes { treelets, tiling };
+            let planes = Planes::Axes(Treelets::over(&tree, splitter.parts));
             return Ok(Bsp { tree, planes });
         }
         let mut splits = splitter.splits;
@@ -377,15 +337,12 @@ impl RegionIndex for Bsp {
         let mut memory = self.tree.memory();
         memory.node_bytes += match &self.planes {
             Planes::Any(splits) => size_of_val(&splits[..]),
-            Planes::Axes { treelets, tiling } => {
-                treelets.bytes() + tiling.as_ref().map_or(0, Tiling::bytes)
-            }
+            Planes::Axes(treelets) => treelets.bytes(),
         };
         memory
     }
 
-    /// Region search goes down by planes: one dot product per node, O(log n) on
-    /// a tiling.
+    /// Region search goes down by planes: one dot product per node.
     #[inline(always)]
     fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
         if Q::IS_POINT {
@@ -408,23 +365,16 @@ impl RegionIndex for Bsp {
     ) -> ControlFlow<()> {
         match &self.planes {
             Planes::Any(_) => batch::query_many(isa, &self.tree, points, sink),
-            Planes::Axes { treelets, tiling } => match tiling {
-                Some(tiling) => tiling.query_many(isa, &self.tree, treelets, points, sink),
-                None => treelets.query_many(&self.tree, points, sink),
-            },
+            Planes::Axes(treelets) => treelets.query_many(&self.tree, points, sink),
         }
     }
 
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
         let planes = &mut self.planes;
-        let refitted = self.tree.refit(items, moved, |tree, node| match planes {
+        self.tree.refit(items, moved, |tree, node| match planes {
             Planes::Any(splits) => measure_reach(splits, tree, node),
-            Planes::Axes { treelets, .. } => treelets.measure(tree, node),
-        });
-        if let (true, Planes::Axes { tiling, .. }) = (refitted, &mut self.planes) {
-            *tiling = None;
-        }
-        refitted
+            Planes::Axes(treelets) => treelets.measure(tree, node),
+        })
     }
 
     fn tree_order(&self) -> Option<&[ItemId]> {

@@ -35,7 +35,6 @@ mod registry;
 mod replay;
 mod stack;
 mod textbook;
-mod tiling;
 mod tree;
 mod treelets;
 mod wide;

@@ -143,10 +143,8 @@ fn located_at_once<'a>(workload: &'a Workload, built: &'a Built) -> AskMany<'a> 
         let mut is_refined = false;
         points.extend(places.iter().map(|&place| {
             let sought = &workload.sought[place as usize];
-            workload.scene.moved(sought).unwrap_or_else(|| {
-                is_refined |= workload.scene.is_refined(sought);
-                sought.local
-            })
+            is_refined |= workload.scene.is_refined(sought);
+            sought.local
         }));
         index.query_many(points, located);
         if !is_refined {

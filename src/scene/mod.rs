@@ -20,7 +20,6 @@ mod rooms;
 mod samples;
 mod settled;
 mod shape;
-mod shared_faces;
 mod side;
 mod sought;
 mod source;

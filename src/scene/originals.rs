@@ -1,12 +1,11 @@
 //! Boxes and points as they were written, in f64, beside the f32 that indexes
 //! hold. Comparing points with them is left to `side` and `sought`.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use glam::DVec3;
 
 use super::WorldBox;
-use super::shared_faces::SharedFaces;
 use crate::arithmetic::two_sum;
 use crate::geometry::Aabb;
 
@@ -14,8 +13,6 @@ use crate::geometry::Aabb;
 #[derive(Clone, Default, Debug)]
 pub struct Originals {
     boxes: Arc<[WorldBox]>,
-    /// Made when first asked for.
-    faces: Arc<OnceLock<Option<SharedFaces>>>,
 }
 
 impl Originals {
@@ -30,26 +27,7 @@ impl Originals {
         });
         Originals {
             boxes: if exact { &[] } else { written }.into(),
-            faces: Arc::default(),
         }
-    }
-
-    /// The faces that these boxes share, if they do; `of` gives the boxes as stored and
-    /// their origin, as they were given.
-    #[inline]
-    pub(super) fn faces<'a>(
-        &self,
-        of: impl FnOnce() -> (&'a [Aabb], DVec3),
-    ) -> Option<&SharedFaces> {
-        // A searched point waits for this: what is known is looked at first.
-        if let Some(known) = self.faces.get() {
-            return known.as_ref();
-        }
-        let made = || {
-            let (stored, origin) = of();
-            SharedFaces::of(self.boxes(), stored, origin)
-        };
-        self.faces.get_or_init(made).as_ref()
     }
 
     /// In world coordinates; `None` if the stored boxes are the very same.

@@ -33,8 +33,7 @@ impl Scene {
     }
 
     /// Region search: `ask` appends what an index finds, and left is what holds the
-    /// point exactly. Where boxes share their faces it is asked for a point that needs
-    /// no second look ([`Scene::moved`]).
+    /// point exactly.
     #[inline]
     pub fn search(
         &self,
@@ -42,27 +41,9 @@ impl Scene {
         out: &mut Vec<ItemId>,
         ask: impl FnOnce(Vec3, &mut Vec<ItemId>),
     ) {
-        match self.moved(p) {
-            Some(moved) => ask(moved, out),
-            None => {
-                let first = out.len();
-                ask(p.local, out);
-                self.refine(p, out, first);
-            }
-        }
-    }
-
-    /// The point moved to an f32 that the stored boxes hold if and only if the boxes
-    /// as written hold the point; `None`, then for all points, where boxes share too
-    /// few faces. O(1), and the logarithm of the number of faces beside one of them.
-    #[inline]
-    pub fn moved(&self, p: &Sought) -> Option<Vec3> {
-        if let Regions::Bsp(_) = self.regions {
-            return None;
-        }
-        let of = || (self.regions.boxes(&self.items), self.origin);
-        let faces = self.originals_of(&self.regions).faces(of)?;
-        Some(faces.moved(p.world, p.local))
+        let first = out.len();
+        ask(p.local, out);
+        self.refine(p, out, first);
     }
 
     /// Whether what an index finds for a point must still be looked at by

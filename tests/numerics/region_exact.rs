@@ -19,7 +19,7 @@ fn units(x: f64) -> IBig {
 /// Points at the walls of tilings and boxes, one or no ulp of f64 away.
 #[test]
 fn every_structure_finds_what_f64_says_where_f32_cannot_tell() {
-    let (mut wrong_in_f32, mut moved) = (0, 0);
+    let mut wrong_in_f32 = 0;
     for offset in [0.0, 1e4 + 0.3, 6.4e6 + 0.1, 1e9 + 0.7] {
         // Walls on a grid that f32 does not have, shared by neighbours.
         let wall = |i: usize| offset + i as f64 * 1.7 / 3.0;
@@ -58,22 +58,11 @@ fn every_structure_finds_what_f64_says_where_f32_cannot_tell() {
                     scene.refine(&sought, &mut found, 0);
                     found.sort_unstable();
                     assert_eq!(found, wanted, "{}: {p:?}", spec.label);
-                    let Some(p) = scene.moved(&sought) else {
-                        continue;
-                    };
-                    found.clear();
-                    index.locate(p, &mut found);
-                    found.sort_unstable();
-                    assert_eq!(found, wanted, "{}: {p:?}, moved", spec.label);
-                    moved += 1;
                 }
             }
         }
     }
-    assert!(
-        wrong_in_f32 > 1000 && moved > 1000,
-        "{wrong_in_f32} {moved}"
-    );
+    assert!(wrong_in_f32 > 1000, "{wrong_in_f32}");
 }
 
 /// Boxes whose faces meet, or pass by each other by one ulp of f64.
