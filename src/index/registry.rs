@@ -98,19 +98,11 @@ pub struct Registry {
 }
 
 /// The structures of the feature `peers`, for the hint that a build lacks it.
-const PEERS: [&str; 13] = [
+const PEERS: [&str; 5] = [
     "peer-obvhs",
-    "peer-obvhs-tuned",
-    "peer-obvhs-aabb",
     "peer-parry3d",
-    "peer-parry3d-accept",
-    "peer-parry3d-ploc",
     "peer-rstar",
-    "peer-rstar-accept",
     "peer-bvh",
-    "peer-bvh-flat",
-    "peer-bvh-arena",
-    "peer-kiddo",
     "peer-bevy-style",
 ];
 
@@ -139,17 +131,9 @@ impl Registry {
         #[cfg(feature = "peers")]
         let own = own
             .with::<peers::PeerObvhs>()
-            .with::<peers::PeerObvhsTuned>()
-            .with::<peers::PeerObvhsAabb>()
             .with::<peers::PeerParry3d>()
-            .with::<peers::PeerParry3dAccept>()
-            .with::<peers::PeerParry3dPloc>()
             .with::<peers::PeerRstar>()
-            .with::<peers::PeerRstarAccept>()
             .with::<peers::PeerBvh>()
-            .with::<peers::PeerBvhFlat>()
-            .with::<peers::PeerBvhArena>()
-            .with::<peers::PeerKiddo>()
             .with::<peers::PeerBevyStyle>();
         own
     }

@@ -108,17 +108,9 @@ macro_rules! peers {
 #[cfg(feature = "peers")]
 peers! {
     peer_obvhs: PeerObvhs;
-    peer_obvhs_tuned: PeerObvhsTuned;
-    peer_obvhs_aabb: PeerObvhsAabb;
     peer_parry3d: PeerParry3d;
-    peer_parry3d_accept: PeerParry3dAccept;
-    peer_parry3d_ploc: PeerParry3dPloc;
     peer_rstar: PeerRstar;
-    peer_rstar_accept: PeerRstarAccept;
     peer_bvh: PeerBvh;
-    peer_bvh_flat: PeerBvhFlat;
-    peer_bvh_arena: PeerBvhArena;
-    peer_kiddo: PeerKiddo;
     peer_bevy_style: PeerBevyStyle;
 }
 

@@ -1,12 +1,11 @@
-//! The crate bvh: its tree asked through `Bvh::traverse`, and flattened. Both
-//! hand back references to shapes in a list of their own.
+//! The crate bvh: its tree asked through `Bvh::traverse`, which returns references to
+//! shapes in a list of its own.
 
 use std::ops::ControlFlow;
 
 use ::bvh::aabb::{Aabb as CrateAabb, Bounded, IntersectsAabb};
-use ::bvh::bounding_hierarchy::{BHShape, BoundingHierarchy};
+use ::bvh::bounding_hierarchy::BHShape;
 use ::bvh::bvh::{Bvh, BvhNode};
-use ::bvh::flat_bvh::{FlatBvh, FlatNode};
 use glam::Vec3;
 use nalgebra::Point3;
 
@@ -122,26 +121,22 @@ fn tree_over(shapes: &mut [Shape]) -> Bvh<f32, 3> {
     tree
 }
 
-/// The crate's two trees, over shapes in a list of our own.
-struct Tree<T> {
-    tree: T,
+/// The crate's tree over shapes in a list of our own.
+struct Tree {
+    tree: Bvh<f32, 3>,
     shapes: Vec<Shape>,
 }
 
-impl<T: BoundingHierarchy<f32, 3> + Nodes> Tree<T> {
-    fn build(
-        _: &'static str,
-        items: Vec<Record>,
-        made: fn(Bvh<f32, 3>) -> T,
-    ) -> Result<Self, BuildError> {
+impl Tree {
+    fn build(_: &'static str, items: Vec<Record>, (): ()) -> Result<Self, BuildError> {
         let mut shapes: Vec<Shape> = items.into_iter().map(Shape::from).collect();
-        let tree = made(tree_over(&mut shapes));
+        let tree = tree_over(&mut shapes);
         Ok(Tree { tree, shapes })
     }
 
     fn memory(&self) -> MemoryUsage {
         MemoryUsage {
-            node_bytes: self.tree.node_bytes(),
+            node_bytes: self.tree.nodes.capacity() * size_of::<BvhNode<f32, 3>>(),
             item_bytes: size_of_val(&self.shapes[..]),
         }
     }
@@ -168,42 +163,14 @@ impl<T: BoundingHierarchy<f32, 3> + Nodes> Tree<T> {
     }
 }
 
-/// Where each kind of tree keeps its nodes.
-trait Nodes {
-    fn node_bytes(&self) -> usize;
-}
-
-impl Nodes for Bvh<f32, 3> {
-    fn node_bytes(&self) -> usize {
-        self.nodes.capacity() * size_of::<BvhNode<f32, 3>>()
-    }
-}
-
-impl Nodes for FlatBvh<f32, 3> {
-    fn node_bytes(&self) -> usize {
-        self.capacity() * size_of::<FlatNode<f32, 3>>()
-    }
-}
-
 peer_of_tree!(
     /// Its tree, gone through by its own recursion.
     PeerBvh,
     "peer-bvh",
     "crate bvh, asked through Bvh::traverse",
     "bvh",
-    Tree<Bvh<f32, 3>>,
-    |tree| tree,
-    traverse
-);
-
-peer_of_tree!(
-    /// Its tree as a list with places to jump to.
-    PeerBvhFlat,
-    "peer-bvh-flat",
-    "crate bvh, flattened, asked through FlatBvh::traverse",
-    "bvh",
-    Tree<FlatBvh<f32, 3>>,
-    |tree| tree.flatten(),
+    Tree,
+    (),
     traverse
 );
 
@@ -226,14 +193,12 @@ mod tests {
         let items: Vec<Aabb> = (0..100).map(|i| Aabb::new(point(i), point(i))).collect();
         let all = crate::geometry::ConvexVolume::from_planes(&[]).expect("no planes");
         let tree = PeerBvh::build(&Input::new(&items), &NoParams {}).expect("sound items");
-        let flat = PeerBvhFlat::build(&Input::new(&items), &NoParams {}).expect("sound items");
         let (mut seen, mut found) = (Vec::new(), Vec::new());
         for i in 0..100 {
             let _ = tree.locate(point(i), &mut found);
-            let _ = flat.locate(point(i), &mut found);
         }
         let _ = tree.visible(&all, &mut seen);
-        assert!(found.chunks(2).zip(0..).all(|(pair, id)| pair == [id, id]) && found.len() == 200);
+        assert!(found.iter().copied().eq(0..100));
         assert_eq!(seen.len(), 100);
     }
 }

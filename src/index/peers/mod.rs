@@ -8,24 +8,20 @@
 
 mod bevy_style;
 mod bvh;
-mod bvh_arena;
-mod kiddo;
 mod obvhs;
 mod parry3d;
 mod rstar;
 
-use super::box_by_box::{BoxByBox, BoxTest, Tally, half_of_largest};
+use super::box_by_box::{BoxByBox, BoxTest, Tally};
 use super::partition::Record;
 use super::{BuildError, ploc};
 
 pub use bevy_style::PeerBevyStyle;
-pub use bvh::{PeerBvh, PeerBvhFlat};
+pub use bvh::PeerBvh;
 pub(crate) use bvh::{Shape, bounds_of};
-pub use bvh_arena::PeerBvhArena;
-pub use kiddo::PeerKiddo;
-pub use obvhs::{PeerObvhs, PeerObvhsAabb, PeerObvhsTuned};
-pub use parry3d::{PeerParry3d, PeerParry3dAccept, PeerParry3dPloc};
-pub use rstar::{PeerRstar, PeerRstarAccept};
+pub use obvhs::PeerObvhs;
+pub use parry3d::PeerParry3d;
+pub use rstar::PeerRstar;
 
 /// Refuses more items with the same bounds than a builder gets which needs
 /// quadratic time for them.

@@ -1,16 +1,15 @@
 //! The crate obvhs by its own tree: its nodes in its order, its ids through
 //! `primitive_indices`. It has no frustum traversal, so its public nodes are
-//! walked as its own traversals do; or its `aabb_traverse` finds candidates.
+//! walked as its own traversals do.
 //! Our re-laid tree of the same builder is the structure `bvh`.
 
 use std::ops::ControlFlow;
 
-use glam::Vec3;
 use obvhs::BvhBuildParams;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
 
-use super::{BoxTest, Record, Tally, half_of_largest, peer_of_tree, refuse_stacks};
+use super::{BoxTest, Record, Tally, peer_of_tree, refuse_stacks};
 use crate::geometry::Aabb;
 use crate::index::stack::Stack;
 use crate::index::{BuildError, MemoryUsage, ploc};
@@ -23,8 +22,6 @@ struct Tree {
     /// Empty where every leaf is one item, whose bounds are then the leaf's.
     boxes: Vec<Aabb>,
     ids: Vec<ItemId>,
-    /// Half the size of the largest item on each axis.
-    half: Vec3,
 }
 
 #[inline(always)]
@@ -55,7 +52,6 @@ impl Tree {
                 false => bvh.primitive_indices.iter().map(|p| of(p).bounds).collect(),
             },
             ids: bvh.primitive_indices.iter().map(|p| of(p).id).collect(),
-            half: half_of_largest(&items),
             bvh,
         })
     }
@@ -142,33 +138,6 @@ impl Tree {
         }
         ControlFlow::Continue(())
     }
-
-    /// `aabb_traverse` with the bounds of the view, then the test.
-    #[inline(always)]
-    fn candidates<T: BoxTest, S: Sink, R: Recorder>(
-        &self,
-        test: &T,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        let Some(root) = self.bvh.nodes.first() else {
-            return ControlFlow::Continue(());
-        };
-        let tally = Tally::new(recorder);
-        tally.count(R::node_tested);
-        let scene = bounds_of(root);
-        if test.rejects(&scene) {
-            return ControlFlow::Continue(());
-        }
-        let asked = test.centres(self.half, &scene);
-        let asked = obvhs::aabb::Aabb::new(asked.min.into(), asked.max.into());
-        let mut flow = ControlFlow::Continue(());
-        self.bvh.aabb_traverse(asked, |bvh, leaf| {
-            flow = self.leaf(&bvh.nodes[leaf as usize], test, sink, &tally);
-            flow.is_continue()
-        });
-        flow
-    }
 }
 
 peer_of_tree!(
@@ -180,26 +149,4 @@ peer_of_tree!(
     Tree,
     BvhBuildParams::medium_build(),
     walk
-);
-
-peer_of_tree!(
-    /// The preset that was fastest for views: one item a leaf.
-    PeerObvhsTuned,
-    "peer-obvhs-tuned",
-    "crate obvhs, very slow build, one item a leaf, nodes in stack order, walked",
-    "obvhs",
-    Tree,
-    ploc::ONE_A_LEAF,
-    walk
-);
-
-peer_of_tree!(
-    /// The crate's own `aabb_traverse`, asked with the bounds of the view.
-    PeerObvhsAabb,
-    "peer-obvhs-aabb",
-    "crate obvhs, as tuned: aabb_traverse with the view's bounds, then the items' test",
-    "obvhs",
-    Tree,
-    ploc::ONE_A_LEAF,
-    candidates
 );

@@ -66,31 +66,6 @@ impl Tree {
         }
     }
 
-    /// `leaves`: an iterator over the leaves that a test of nodes lets pass.
-    #[inline(always)]
-    fn leaves<T: BoxTest, S: Sink, R: Recorder>(
-        &self,
-        test: &T,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        let tally = Tally::new(recorder);
-        let passes = |node: &BvhNode| match node.is_leaf() {
-            true => {
-                tally.item(test);
-                test.admits(&bounds_of(node))
-            }
-            false => {
-                tally.node(test);
-                !test.rejects(&bounds_of(node))
-            }
-        };
-        for place in self.bvh.leaves(passes) {
-            sink.accept(&self.ids[place as usize..=place as usize])?;
-        }
-        ControlFlow::Continue(())
-    }
-
     /// `traverse_indexed`: a subtree that is accepted is gone through once
     /// more, without tests.
     #[inline(always)]
@@ -145,34 +120,12 @@ impl Tree {
 }
 
 peer_of_tree!(
-    /// Its default: binned build, `leaves`.
+    /// Its default build; subtrees that are wholly inside are not tested further.
     PeerParry3d,
     "peer-parry3d",
-    "crate parry3d, binned build, asked through leaves",
-    "parry3d",
-    Tree,
-    BvhBuildStrategy::Binned,
-    leaves
-);
-
-peer_of_tree!(
-    /// The same tree; subtrees that are wholly inside are not tested further.
-    PeerParry3dAccept,
-    "peer-parry3d-accept",
     "crate parry3d, binned build, asked through traverse_indexed, whole subtrees accepted",
     "parry3d",
     Tree,
     BvhBuildStrategy::Binned,
-    traverse
-);
-
-peer_of_tree!(
-    /// Its other builder.
-    PeerParry3dPloc,
-    "peer-parry3d-ploc",
-    "crate parry3d, PLOC build, asked through traverse_indexed, whole subtrees accepted",
-    "parry3d",
-    Tree,
-    BvhBuildStrategy::Ploc,
     traverse
 );

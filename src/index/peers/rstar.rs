@@ -4,7 +4,7 @@
 use std::ops::ControlFlow;
 
 use glam::Vec3;
-use rstar::{AABB, ParentNode, RTree, RTreeNode, RTreeObject, SelectionFunction};
+use rstar::{AABB, ParentNode, RTree, RTreeNode, RTreeObject};
 
 use super::{BoxTest, BuildError, Record, Tally, peer_of_tree};
 use crate::geometry::Aabb;
@@ -26,26 +26,6 @@ fn bounds_of(envelope: &AABB<[f32; 3]>) -> Aabb {
         Vec3::from_array(envelope.lower()),
         Vec3::from_array(envelope.upper()),
     )
-}
-
-/// A test as rstar takes it.
-struct Selected<'a, 'r, T, R> {
-    test: &'a T,
-    tally: &'a Tally<'r, R>,
-}
-
-impl<T: BoxTest, R: Recorder> SelectionFunction<Record> for Selected<'_, '_, T, R> {
-    #[inline(always)]
-    fn should_unpack_parent(&self, envelope: &AABB<[f32; 3]>) -> bool {
-        self.tally.node(self.test);
-        !self.test.rejects(&bounds_of(envelope))
-    }
-
-    #[inline(always)]
-    fn should_unpack_leaf(&self, item: &Record) -> bool {
-        self.tally.item(self.test);
-        self.test.admits(&item.bounds)
-    }
 }
 
 /// Slots of a node and of all below it.
@@ -72,26 +52,6 @@ impl Tree {
             node_bytes: (slots(self.0.root()) * slot).saturating_sub(item_bytes),
             item_bytes,
         }
-    }
-
-    /// `locate_with_selection_function`: its iterator over the items that the
-    /// selection lets pass.
-    #[inline(always)]
-    fn select<T: BoxTest, S: Sink, R: Recorder>(
-        &self,
-        test: &T,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        let tally = Tally::new(recorder);
-        let selected = Selected {
-            test,
-            tally: &tally,
-        };
-        for item in self.0.locate_with_selection_function(selected) {
-            sink.accept(std::slice::from_ref(&item.id))?;
-        }
-        ControlFlow::Continue(())
     }
 
     /// Its public nodes from the root on, as its iterator goes through them;
@@ -140,20 +100,9 @@ impl Tree {
 }
 
 peer_of_tree!(
-    /// Its own iterator.
+    /// Its nodes.
     PeerRstar,
     "peer-rstar",
-    "crate rstar, bulk-loaded, asked through a selection function",
-    "rstar",
-    Tree,
-    (),
-    select
-);
-
-peer_of_tree!(
-    /// Its nodes.
-    PeerRstarAccept,
-    "peer-rstar-accept",
     "crate rstar, bulk-loaded, its nodes walked from the root, whole subtrees accepted",
     "rstar",
     Tree,
