@@ -15,10 +15,7 @@ use super::{Ending, interrupt, tell, text, unread_is_fine};
 use crate::index::{Execution, Registry, StructureSpec};
 use crate::kernel::Kernel;
 use crate::stress::extremes::{DEFAULT_CASES, Extremes, Progress, Tally};
-use crate::stress::{
-    Row, Section, Status, VISIBILITY_FAMILIES, Vector, built_in, read_vectors_file, replay,
-    visibility_cases,
-};
+use crate::stress::{Row, Section, Status, Vector, built_in, read_vectors_file, replay};
 
 pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> {
     let structures = args.kernel.structures(registry, &args.structure)?;
@@ -57,8 +54,7 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
     let case_passes = passes
         .iter()
         .map(|&(_, cases)| Extremes { cases, ..extremes }.total());
-    let stage_passes = (VISIBILITY_FAMILIES.len() * passes.len()) as u64;
-    let bar = ProgressBar::new(vector_passes + case_passes.sum::<u64>() + stage_passes);
+    let bar = ProgressBar::new(vector_passes + case_passes.sum::<u64>());
     for (kernel, cases) in passes {
         let by_kernel = |spec: &StructureSpec| {
             let execution = Execution {
@@ -81,7 +77,6 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
                 ..extremes
             };
             found.extend(extremes.run(&Shown(&bar)));
-            found.extend(of_stages(cases, args.seed, kernel, &bar));
         }
         if kernel != chosen {
             by_others += found
@@ -117,21 +112,6 @@ pub fn stress(registry: &Registry, args: &StressArgs) -> anyhow::Result<Ending> 
         (false, false) => Ending::Ok,
     })
 }
-
-/// The families of the other stages, by an instruction set.
-fn of_stages(cases: u64, seed: u64, kernel: Kernel, bar: &ProgressBar) -> Vec<Section> {
-    let sections = VISIBILITY_FAMILIES.iter().map(|family| {
-        bar.set_message(family.name);
-        let cases = 0..cases.saturating_mul(STAGE_CASES);
-        let section = visibility_cases(*family, cases, seed, kernel, &interrupt::asked);
-        bar.inc(1);
-        section
-    });
-    sections.collect()
-}
-
-/// Cases of each family of the other stages for one of each extreme: they are small.
-const STAGE_CASES: u64 = 4;
 
 /// Cases of each extreme by another instruction set than the chosen one.
 const OF_OTHERS: u64 = 2;

@@ -9,7 +9,6 @@ mod replay;
 mod sheet;
 mod vector;
 mod vectors;
-mod visibility;
 
 use serde::Serialize;
 
@@ -21,7 +20,6 @@ use margin::slack;
 pub use replay::{Replay, replay};
 pub use vector::{Names, Vector, VectorCamera, VectorPoint};
 pub use vectors::{BUILT_IN, BUILT_IN_NAME, built_in, read_vectors, read_vectors_file};
-pub use visibility::{Family, VISIBILITY_FAMILIES, visibility_cases};
 
 /// What is taken to be exact: the planes, or the camera's numbers.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize)]

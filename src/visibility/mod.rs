@@ -15,6 +15,8 @@ mod rays;
 pub mod region;
 mod sah;
 mod solids;
+#[cfg(test)]
+mod tests_extremes;
 pub mod triangle;
 pub mod truth;
 

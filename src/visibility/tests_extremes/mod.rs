@@ -14,11 +14,11 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use super::{Level, Row, Section, Status};
 use crate::camera::PlaneOptions;
 use crate::kernel::Kernel;
 use crate::query::ItemId;
 use crate::scene::{Scene, SeededRng, WorldBox};
+use crate::stress::{Level, Row, Section, Status};
 use crate::visibility::occlusion::{
     Interleaved, MaskedInner, OccluderChoice, OccluderScene, OcclusionBuffer, TwoPass, View,
 };
