@@ -10,6 +10,7 @@ mod clustered;
 mod forest;
 mod generate;
 mod labels;
+mod lumps;
 mod memory;
 mod meshes;
 mod originals;
@@ -54,7 +55,7 @@ pub use sought::Sought;
 pub use source::{LoadOptions, check_fits, load};
 pub(crate) use surface::volume_within;
 pub use surface::{SurfaceKind, Surfaces};
-pub use wad::{WadMap, map_lump, map_names};
+pub use wad::{Linedef, WadMap, map_names};
 
 /// A box in world coordinates, as a file or a generator states it.
 #[derive(Clone, Copy, PartialEq, Debug)]

@@ -127,7 +127,8 @@ impl BspNode {
 pub struct BspRegions {
     nodes: Vec<BspNode>,
     root: BspChild,
-    boxes: Vec<Aabb>,
+    /// About each leaf.
+    pub(super) boxes: Vec<Aabb>,
     /// For each node and leaf the node above it and the side taken there.
     node_parent: Vec<Option<(u32, usize)>>,
     leaf_parent: Vec<Option<(u32, usize)>>,
@@ -149,7 +150,8 @@ impl BspRegions {
     ) -> Result<BspRegions, String> {
         let mut node_parent = vec![None; nodes.len()];
         let mut leaf_parent = vec![None; leaf_count];
-        let mut boxes = vec![Aabb::EMPTY; leaf_count];
+        // A leaf that no node has is nowhere.
+        let mut boxes = vec![planar_bounds(&[]); leaf_count];
         let (mut node_seen, mut leaf_seen) = (vec![false; nodes.len()], vec![false; leaf_count]);
         let square = [(low, low), (high, low), (high, high), (low, high)];
         let square: Vec<DVec2> = square.iter().map(|&(x, y)| DVec2::new(x, y)).collect();

@@ -171,6 +171,12 @@ fn damaged_maps() {
         assert!(names.is_ok());
         let scene = map.into_scene("in.file").map_err(|e| e.to_string())?;
         assert!(scene.items.iter().all(|b| b.is_finite() && !b.is_empty()));
+        let map = DoomMap::read(bytes, "in.file", None).map_err(|e| e.to_string())?;
+        let graph = Arc::new(map).graph();
+        assert!(scene.places.iter().all(|place| {
+            let sectors = graph.homes(&EyeRays::about(place.eye), &mut Vec::new());
+            true
+        }));
         Ok(())
     });
 }
