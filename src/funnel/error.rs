@@ -5,7 +5,7 @@ use crate::index::BuildError;
 use crate::input::{InputError, gigabytes};
 use crate::measure::WorkloadError;
 use crate::query::ItemId;
-use crate::scene::ItemShape;
+use crate::scene::{Dispute, ItemShape};
 use crate::visibility::region::OtherRegions;
 use crate::visibility::{NoRays, SampleGrid};
 
@@ -77,6 +77,14 @@ pub enum FunnelError {
     NoRegions {
         /// Its name.
         scene: String,
+    },
+    /// The same, about a map whose sectors are no regions.
+    #[error("'{scene}': {dispute}; expected sectors that divide the map for --pvs")]
+    Disputed {
+        /// Its name.
+        scene: String,
+        /// A place of no known sector.
+        dispute: Dispute,
     },
     /// What is claimed to be seen from where is of other regions.
     #[error(transparent)]

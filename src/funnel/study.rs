@@ -3,6 +3,7 @@
 
 use std::cell::RefCell;
 
+use super::back_ends::left_out_of;
 use super::bounds::{Bound, bounds};
 use super::certified::{Proofs, certified};
 use super::chain::Chain;
@@ -222,6 +223,7 @@ pub fn prepare(
             mirror,
             orders: drawn,
             picks: picked,
+            left_out: left_out_of(input.scene),
             bounds: bound_rows,
             gains: Vec::new(),
             conclusions: Vec::new(),

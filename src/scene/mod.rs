@@ -7,6 +7,7 @@
 mod boxes_csv;
 mod city;
 mod clustered;
+mod disputes;
 mod forest;
 mod generate;
 mod labels;
@@ -40,6 +41,7 @@ use crate::geometry::{Aabb, PlaneTree};
 use crate::input::InputError;
 
 pub use boxes_csv::{read_boxes_csv, read_sought_boxes_csv, write_boxes_csv};
+pub use disputes::{Dispute, disputes};
 pub use generate::{FAMILIES, Family, GENERATOR_NAME};
 pub use labels::Labels;
 pub(crate) use memory::available_bytes;

@@ -2,9 +2,11 @@
 //! region is not just its box (a cell of a BSP tree), this file owns the exact
 //! membership test that follows.
 
+use std::sync::OnceLock;
+
 use glam::{DVec2, DVec3, Vec3};
 
-use super::Originals;
+use super::{Dispute, Linedef, Originals, disputes};
 
 use crate::geometry::{Aabb, Plane, PlaneTree, PlaneTreeNode};
 use crate::query::ItemId;
@@ -133,6 +135,9 @@ pub struct BspRegions {
     node_parent: Vec<Option<(u32, usize)>>,
     leaf_parent: Vec<Option<(u32, usize)>>,
     extent: Aabb,
+    /// The map's linedefs, and what they disagree about once that was asked.
+    pub(super) lines: Vec<Linedef>,
+    disputes: OnceLock<Vec<Dispute>>,
 }
 
 impl BspRegions {
@@ -186,6 +191,8 @@ impl BspRegions {
             node_parent,
             leaf_parent,
             extent: Aabb::new(corner(low), corner(high)),
+            lines: Vec::new(),
+            disputes: OnceLock::new(),
         })
     }
 
@@ -208,6 +215,19 @@ impl BspRegions {
             nodes: self.nodes.iter().map(node).collect(),
             root: below(self.root),
         }
+    }
+
+    /// Number of linedefs of the map.
+    pub fn line_count(&self) -> usize {
+        self.lines.len()
+    }
+
+    /// A place about which the map's linedefs disagree, if there is any: its sectors are
+    /// then no regions.
+    pub fn dispute(&self) -> Option<Dispute> {
+        let lines = self.lines.iter().map(|line| (line.ends, line.sectors));
+        let all = self.disputes.get_or_init(|| disputes(lines));
+        all.first().copied()
     }
 
     /// Number of leaves.

@@ -197,7 +197,7 @@ impl WadMap {
     }
 
     /// The map as a scene: linedefs first, then things, in lump order.
-    pub fn into_scene(self, name: impl Into<String>) -> Result<Scene, InputError> {
+    pub fn into_scene(mut self, name: impl Into<String>) -> Result<Scene, InputError> {
         let lines = self.lines.iter().map(|line| self.line_box(line));
         let mut boxes: Vec<WorldBox> = lines.collect();
         let mut kinds = Labels::new("kind");
@@ -222,6 +222,7 @@ impl WadMap {
         // Map coordinates are small integers, exact in f32: no other origin.
         let mut scene = Scene::about(name, &boxes, DVec3::ZERO)?;
         scene.own_tree = Some(self.bsp.plane_tree());
+        self.bsp.lines = self.lines;
         scene.regions = Regions::Bsp(self.bsp);
         scene.labels = vec![kinds];
         scene.places = places;

@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::super::answer::RegionId;
 use super::super::pvs::Pvs;
 use crate::input::InputError;
-use crate::scene::{Linedef, Scene, WadMap, WorldBox};
+use crate::scene::{Dispute, Linedef, Scene, WadMap, WorldBox, disputes};
 use crate::visibility::MapFile;
 use crate::visibility::truth::PlanWall;
 
@@ -48,6 +48,8 @@ pub struct DoomMap {
     pub(super) linedefs: usize,
     /// Heights of floor and ceiling as the file has them, where they move too.
     pub(super) heights: Vec<[f64; 2]>,
+    /// Places about which its linedefs disagree.
+    disputes: Vec<Dispute>,
     reject: Option<Pvs>,
 }
 
@@ -68,6 +70,10 @@ fn is_still(action: u16) -> bool {
 
 /// Tags that the end of a boss moves.
 const BOSS_TAGS: [u16; 2] = [666, 667];
+
+fn disputed(lines: &[MapLine]) -> Vec<Dispute> {
+    disputes(lines.iter().map(|line| (line.ends, line.sectors)))
+}
 
 impl DoomMap {
     /// The map that a scene was loaded from, if it was one.
@@ -136,6 +142,7 @@ impl DoomMap {
             parts[sector as usize].push(WorldBox::new(min - all_heights, max + all_heights));
         }
         DoomMap {
+            disputes: disputed(&lines),
             lines,
             parts,
             numbers,
@@ -156,6 +163,7 @@ impl DoomMap {
             linedefs: lines.len(),
             heights: sectors.iter().map(|s| [s.floor, s.ceiling]).collect(),
             reject: None,
+            disputes: disputed(&lines),
             lines,
             sectors,
         }
@@ -164,6 +172,11 @@ impl DoomMap {
     /// The map's REJECT table: its claim of which sectors see each other.
     pub fn reject(&self) -> Option<&Pvs> {
         self.reject.as_ref()
+    }
+
+    /// Places about which its linedefs disagree, by the sectors that they have there.
+    pub fn disputes(&self) -> &[Dispute] {
+        &self.disputes
     }
 
     /// Its linedefs as the items of its scene, from above.
