@@ -230,7 +230,7 @@ impl Culling {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::{Frame, Lens};
+    use crate::camera::{Frame, Lens, MatrixConvention, PLANE_METHODS};
 
     const AROUND: Surroundings = Surroundings {
         origin: DVec3::ZERO,
@@ -289,6 +289,55 @@ mod tests {
                         );
                     }
                 }
+            }
+        }
+    }
+
+    /// A box that sums of rounded planes cut off, in a view of 178 degrees.
+    #[test]
+    fn every_derivation_keeps_what_sums_of_its_own_planes_would_lose() {
+        let (forward, up) = (DVec3::new(0.16, 0.88, 0.45), DVec3::new(-0.17, 0.47, -0.87));
+        let frame = Frame::looking_along(DVec3::new(8.5, -10.0, 1.0), forward, up).unwrap();
+        let lens = Lens::perspective(178.0, 16.0 / 9.0, 0.1, Some(100.0)).unwrap();
+        let corner = Vec3::new(8964.66, 2146.831_8, -7189.876_5);
+        let item = Aabb::new(corner, Vec3::new(15958.212, 2261.151_9, -7187.773_4));
+        let around = Surroundings {
+            origin: DVec3::ZERO,
+            reach: item.reach(),
+        };
+        for (method, planes, _) in PLANE_METHODS {
+            for (test, name, _) in TESTS {
+                let mut culling = of(test, Arithmetic::F32);
+                culling.planes.method = method;
+                let view = culling.view(&Camera { frame, lens }, &around).unwrap();
+                let sees = view.as_any().sees(&test.items(&[item])[0]);
+                assert!(sees, "{name} {planes}");
+                assert_eq!(culling.unproven().is_some(), planes != "frame");
+            }
+        }
+        assert!(of(CullingTest::Exact, Arithmetic::F64).unproven().is_some());
+        let mut little = Culling::default();
+        little.planes.epsilon = 7.9;
+        assert!(little.unproven().is_some());
+    }
+
+    /// A window of 40 by 40 seen from far away: its planes are 20 from zero.
+    #[test]
+    fn an_eye_far_away_widens_no_plane_of_a_matrix() {
+        let cube = |x: f32| Aabb::new(Vec3::new(x, 0.0, 0.0), Vec3::new(x + 1.0, 1.0, 1.0));
+        for power in [6, 15, 18, 38, 60] {
+            let far = 10f64.powi(power);
+            let rows = [
+                [far / 20.0, 0.0, 0.0, 0.0],
+                [0.0, far / 20.0, 0.0, 0.0],
+                [0.0, 0.0, -far / 50.0, 0.0],
+                [0.0, 0.0, -1.0, far],
+            ];
+            let camera = Camera::of_matrix(rows, MatrixConvention::ColumnGl).unwrap();
+            for (test, name, _) in TESTS {
+                let view = of(test, Arithmetic::F32).view(&camera, &AROUND).unwrap();
+                let sees = |b| view.as_any().sees(&test.items(&[b])[0]);
+                assert!(sees(cube(0.0)) && !sees(cube(50.0)), "{name} 1e{power}");
             }
         }
     }

@@ -236,10 +236,10 @@ mod tests {
                 };
                 let mut vector = vector.clone();
                 let touch = [&mut vector.touch_planes, &mut vector.touch_camera];
-                touch.map(|list| list.as_mut().map(|list| list.insert(name.clone())));
-                if [&vector.touch_planes, &vector.touch_camera][level].is_none() {
+                let Some(touch) = touch.into_iter().nth(level).and_then(Option::as_mut) else {
                     continue;
-                }
+                };
+                touch.insert(name.clone());
                 let wrong = format!("{}/{name}", vector.id);
                 assert!(failed(&vector).contains(&wrong), "{wrong}");
                 // A list of touches is a claim without one of what is visible.
