@@ -4,7 +4,7 @@ use serde_json::json;
 
 use super::args::QueryArgs;
 use super::compare_structures::{all_agree, ask_all, write};
-use super::{Ending, load_scene, unread_is_fine};
+use super::{Ending, load_scene, tell, unread_is_fine};
 use crate::index::Registry;
 use crate::measure::Workload;
 use crate::path;
@@ -15,6 +15,9 @@ pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
     let scene = load_scene(&args.scene, &args.scene_args, 1)?;
     let cameras = path::load(&args.cameras, &scene, &defaults)?;
     let workload = Workload::new(&scene, &cameras, &culling)?;
+    if let Some(doubt) = culling.unproven() {
+        tell(&format!("note: {doubt}"));
+    }
     let ask = |index: &dyn crate::index::DynIndex, camera: usize, out: &mut _, cost: &mut _| {
         let view = workload.views[camera].as_any();
         index.query_counted(view, out, cost);

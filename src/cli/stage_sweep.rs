@@ -208,8 +208,8 @@ fn show(sweep: &StageSweep, out: &mut impl Write) -> io::Result<()> {
         .count();
     writeln!(
         out,
-        "{lossy} of {} points lost something visible; {} of them promise that they do not. * is no \
-         worse than any other in time and both errors.",
+        "{lossy} of {} points lost something visible; {} of them promise that they do not. Than a * \
+         nothing is as good in time and both errors and shown to be better in one.",
         sweep.points.len(),
         safe.filter(|point| point.errors.false_negative_count > 0.0)
             .count()
