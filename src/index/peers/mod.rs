@@ -20,7 +20,6 @@ use super::{BuildError, ploc};
 
 pub use bevy_style::PeerBevyStyle;
 pub use bvh::{PeerBvh, PeerBvhFlat};
-pub(crate) use bvh::{Shape, bounds_of};
 pub use bvh_arena::PeerBvhArena;
 pub use kiddo::PeerKiddo;
 pub use obvhs::{PeerObvhs, PeerObvhsAabb, PeerObvhsTuned};
