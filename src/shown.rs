@@ -32,6 +32,28 @@ pub fn lines(text: &str) -> String {
     plain.join("\n")
 }
 
+/// [`plain`] text of at most `most` characters and the mark of a cut.
+pub fn shortened(text: &str, most: usize) -> String {
+    let text = plain(text);
+    match text.char_indices().nth(most) {
+        Some((end, _)) => format!("{}...", &text[..end]),
+        None => text,
+    }
+}
+
+/// [`plain`] text of a message. A very long one loses its middle: a name of any length
+/// leaves where and what was expected.
+pub fn within_line(text: &str) -> String {
+    const MOST: [usize; 2] = [600, 400];
+    let text = plain(text);
+    let count = text.chars().count();
+    if count <= MOST.iter().sum() {
+        return text;
+    }
+    let end: String = text.chars().skip(count - MOST[1]).collect();
+    format!("{}{end}", shortened(&text, MOST[0]))
+}
+
 /// Control characters, marks and overrides of the direction, characters without
 /// a width, tags, and what XML does not allow at all.
 fn is_harmful(c: char) -> bool {

@@ -27,7 +27,7 @@ pub fn merge(args: &MergeArgs) -> anyhow::Result<Ending> {
     let report = merged.stream.report();
     unread_is_fine(surface_tables::show(&report))?;
     unread_is_fine(close(args, report.cells.len()))?;
-    let failed = report.cells.iter().any(|c| c.status.is_failure());
+    let failed = report.has_failed();
     Ok(Ending::of(!failed))
 }
 

@@ -50,7 +50,8 @@ const FAR: f64 = 1000.0;
 /// and any of `up_*`, `fovy_deg`, `aspect`, `near`, `far` (empty or `inf` =
 /// infinite), `ortho_height` (world units: the lens is orthographic, `fovy_deg` is
 /// not read; empty: perspective). Or view-projection matrices: `m00,m01,..,m33`
-/// (row, column) and nothing of the others. Columns in any order; unknown ones are ignored.
+/// (row, column) and nothing of the others. Columns in any order; a note names those
+/// that are not read, but for `time_s`.
 ///
 /// # Errors
 /// The line of the first value that is no number or makes no camera; a file
@@ -63,6 +64,8 @@ pub fn read_cameras_csv(
 ) -> Result<CameraPath, PathError> {
     let table = TableReader::open(input, file)?;
     let is_matrix = MATRIX_ENTRIES.iter().any(|m| table.column(m).is_some());
+    let known: &[&str] = if is_matrix { &MATRIX_ENTRIES } else { &OF_EYES };
+    table.note_unread(&[known, &["time_s"]].concat(), &SYNONYMS);
     let (lines, cameras): (Vec<u64>, Vec<Camera>) = if is_matrix {
         matrices(table, defaults.matrix)?
     } else {
@@ -100,16 +103,25 @@ fn refused(row: &Row, error: &CameraError) -> InputError {
 }
 
 /// Columns that say what a matrix says already.
-const OF_EYES: &str = "eye_x eye_y eye_z look_x look_y look_z forward_x forward_y forward_z \
-                       up_x up_y up_z fovy_deg ortho_height aspect near far";
+#[rustfmt::skip]
+const OF_EYES: [&str; 17] = [
+    "eye_x", "eye_y", "eye_z", "look_x", "look_y", "look_z", "forward_x", "forward_y", "forward_z",
+    "up_x", "up_y", "up_z", "fovy_deg", "ortho_height", "aspect", "near", "far",
+];
+
+/// Angles that other programs write, and the columns that say the same.
+const SYNONYMS: [(&str, &str); 3] = [
+    ("roll", "up_x,up_y,up_z"),
+    ("pitch", "forward_x,forward_y,forward_z"),
+    ("yaw", "forward_x,forward_y,forward_z"),
+];
 
 fn matrices(
     mut table: TableReader<impl Read>,
     convention: Option<MatrixConvention>,
 ) -> Result<Vec<(u64, Camera)>, InputError> {
     let columns = table.columns(&MATRIX_ENTRIES)?;
-    let mut of_eyes = OF_EYES.split(' ');
-    if let Some(other) = of_eyes.find(|name| table.column(name).is_some()) {
+    if let Some(other) = OF_EYES.iter().find(|name| table.column(name).is_some()) {
         return Err(table.error(
             format!("columns of a matrix and '{other}'"),
             "m00 to m33 alone, or an eye and a lens".to_owned(),
@@ -123,7 +135,7 @@ fn matrices(
         )
     })?;
     let mut cameras = Vec::new();
-    while let Some(row) = table.next_row() {
+    while let Some(row) = table.next_row()? {
         let row = row?;
         let mut entries = [[0.0; 4]; 4];
         for (entry, &column) in entries.as_flattened_mut().iter_mut().zip(&columns) {
@@ -161,7 +173,7 @@ fn eyes(
     let lens = ["fovy_deg", "ortho_height", "aspect", "near", "far"];
     let [fovy, height, aspect, near, far] = lens.map(|name| table.column(name));
     let mut cameras = Vec::new();
-    while let Some(row) = table.next_row() {
+    while let Some(row) = table.next_row()? {
         let row = row?;
         let number = |column: Option<usize>, default: f64| match column {
             Some(column) => row.finite_number(column),
@@ -217,8 +229,9 @@ fn eyes(
 pub fn read_points_csv(input: impl Read, file: &str) -> Result<Vec<DVec3>, InputError> {
     let mut table = TableReader::open(input, file)?;
     let columns = table.columns(&["x", "y", "z"])?;
+    table.note_unread(&["x", "y", "z"], &[]);
     let mut points = Vec::new();
-    while let Some(row) = table.next_row() {
+    while let Some(row) = table.next_row()? {
         points.push(vector(&row?, columns)?);
     }
     if points.is_empty() {

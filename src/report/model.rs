@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::measure::{Machine, Metric, PathInfo, ReportCell, Source, Toolchain};
+use crate::measure::{Machine, Metric, PathInfo, ReportCell, Source, Status, Toolchain};
 use crate::statistics::geometric_mean;
 
 /// Raised when a field changes its meaning or goes away.
@@ -32,6 +32,15 @@ pub struct Report {
     /// path: no structures, never ranked, and therefore a list of their own.
     #[serde(default)]
     pub bounds: Vec<ReportCell>,
+}
+
+impl Report {
+    /// Whether an answer is wrong, or no structure has answered at all (exit code 1).
+    pub fn has_failed(&self) -> bool {
+        let mut cells = self.cells.iter().map(|cell| cell.status);
+        let none = !self.cells.is_empty() && cells.clone().all(|status| status != Status::Ok);
+        none || cells.any(Status::is_failure)
+    }
 }
 
 /// A run as a whole.

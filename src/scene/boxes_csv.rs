@@ -7,8 +7,8 @@ use std::io::{self, Read, Write};
 use glam::DVec3;
 
 use super::{Labels, Scene, WorldBox};
-use crate::input::{InputError, TableReader};
-use crate::shown::{field, from_field};
+use crate::input::{InputError, TableReader, note};
+use crate::shown::{field, from_field, shortened};
 
 const BOUNDS: [&str; 6] = ["min_x", "min_y", "min_z", "max_x", "max_y", "max_z"];
 
@@ -66,10 +66,22 @@ fn read_rows(input: impl Read, file: &str, limit: f64) -> Result<Rows, InputErro
     let columns = table.columns(&BOUNDS)?;
     let others = table.header().iter().enumerate();
     let others = others.filter(|(i, _)| !columns.contains(i));
+    let others = others.inspect(|(_, name)| {
+        let letters = |name: &str| {
+            name.to_lowercase()
+                .replace(|c: char| !c.is_alphanumeric(), "")
+        };
+        if let Some(bound) = BOUNDS.iter().find(|bound| letters(bound) == letters(name)) {
+            let name = shortened(name, 60);
+            note(&format!(
+                "{file}: column '{name}' is kept as a label beside '{bound}'"
+            ));
+        }
+    });
     let labels = others.map(|(i, name)| (i, Labels::new(from_field(name))));
     let mut labels: Vec<(usize, Labels)> = labels.collect();
     let (mut boxes, mut first_bad, mut bad) = (Vec::new(), None, 0);
-    while let Some(row) = table.next_row() {
+    while let Some(row) = table.next_row()? {
         let checked = row.and_then(|row| {
             let mut bounds = [0.0; 6];
             for (bound, &column) in bounds.iter_mut().zip(&columns) {

@@ -22,7 +22,7 @@ pub struct Family {
     pub name: &'static str,
     /// One line for `cullbench list`.
     pub summary: &'static str,
-    /// Parameters beyond `n`, `seed` and `offset`, for the help.
+    /// Parameters beyond [`SCENE_PARAMS`], for the help.
     pub params: &'static str,
     build: fn(&mut Spec, usize, &mut SeededRng) -> Result<World, SpecError>,
 }
@@ -38,8 +38,11 @@ pub static FAMILIES: &[Family] = rows! { Family { name, summary, params, build }
     "forest", "trees, bushes and rocks on a fractal heightfield",
         "relief=0.12 (height / width), spacing=5 (m between plants)", forest::build;
     "rooms", "an indoor block of cells joined by doors; the cells are the regions",
-        "slabs=3, room=6 (mean edge, m)", rooms::build;
+        "storeys=3, room=6 (mean edge, m)", rooms::build;
 };
+
+/// Parameters that every generated scene takes; `n` of a mesh counts triangles.
+pub const SCENE_PARAMS: &str = "n=100000, seed=1, offset=0";
 
 /// Largest scene a spec may ask for: 12 GB while it is made, 7.2 GB then.
 pub(super) const MOST_ITEMS: u64 = 100_000_000;
@@ -148,7 +151,7 @@ mod tests {
             "city:n=-1",
             "city:n=1.5",
             "uniform:side=0",
-            "rooms:slabs=0",
+            "rooms:storeys=0",
             "city:trees=4",
         ] {
             let spec = Spec::parse(text).unwrap();
