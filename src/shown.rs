@@ -34,24 +34,36 @@ pub fn lines(text: &str) -> String {
 
 /// [`plain`] text of at most `most` characters and the mark of a cut.
 pub fn shortened(text: &str, most: usize) -> String {
-    let text = plain(text);
-    match text.char_indices().nth(most) {
-        Some((end, _)) => format!("{}...", &text[..end]),
-        None => text,
-    }
+    without_middle(&plain(text), [most, 0])
 }
 
-/// [`plain`] text of a message. A very long one loses its middle: a name of any length
-/// leaves where and what was expected.
-pub fn within_line(text: &str) -> String {
-    const MOST: [usize; 2] = [600, 400];
+/// [`plain`] text of a message. Very long words lose their middle, and so does the whole:
+/// a name of any length leaves where and what was expected.
+///
+/// ```
+/// use cullbench::shown::message;
+/// let line = message(&format!("unknown scene '{}'; expected a file", "a".repeat(100_000)));
+/// assert!(line.len() < 300 && line.ends_with("aaa'; expected a file"));
+/// ```
+pub fn message(text: &str) -> String {
     let text = plain(text);
+    let words: Vec<String> = text
+        .split(' ')
+        .map(|word| without_middle(word, [160, 80]))
+        .collect();
+    without_middle(&words.join(" "), [1200, 400])
+}
+
+/// The first and the last characters of a longer text, with the mark of a cut.
+fn without_middle(text: &str, [first, last]: [usize; 2]) -> String {
     let count = text.chars().count();
-    if count <= MOST.iter().sum() {
-        return text;
+    if count <= first + last {
+        return text.to_owned();
     }
-    let end: String = text.chars().skip(count - MOST[1]).collect();
-    format!("{}{end}", shortened(&text, MOST[0]))
+    let mut kept: String = text.chars().take(first).collect();
+    kept.push_str("...");
+    kept.extend(text.chars().skip(count - last));
+    kept
 }
 
 /// Control characters, marks and overrides of the direction, characters without

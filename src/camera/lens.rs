@@ -301,6 +301,27 @@ mod tests {
         assert!((slope(120.0) / 3f64.sqrt() - 1.0).abs() < 4e-16);
     }
 
+    /// Engines write the largest f32 for no far plane.
+    #[test]
+    fn a_far_plane_beyond_f32_is_none() {
+        let largest = f64::from(f32::MAX);
+        for far in [FARTHEST * (1.0 + f64::EPSILON), largest, 1e39, 1e308] {
+            let lens = Lens::perspective(60.0, 1.0, 1.0, Some(far)).unwrap();
+            assert_eq!(lens.far(), None, "{far:e}");
+            assert_eq!(lens.with_far(Some(far)).unwrap(), lens);
+            let lens = Lens::off_axis([-1.0, 1.0, -1.0, 1.0], 1.0, Some(far)).unwrap();
+            assert_eq!(lens.far(), None, "{far:e}");
+            let error = Lens::orthographic(1.0, 1.0, 1.0, far).unwrap_err();
+            assert!(
+                matches!(error, CameraError::FarOrthographic { .. }),
+                "{far:e}"
+            );
+        }
+        let lens = Lens::perspective(60.0, 1.0, 1.0, Some(FARTHEST)).unwrap();
+        assert_eq!(lens.far(), Some(FARTHEST));
+        assert!(Lens::perspective(60.0, 1.0, 1e39, Some(largest)).is_err());
+    }
+
     #[test]
     fn impossible_lenses_are_typed_errors() {
         for fovy_deg in [

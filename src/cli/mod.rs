@@ -189,7 +189,7 @@ fn dispatch(registry: &Registry, command: Command) -> anyhow::Result<Ending> {
 /// One line on stderr, whatever is in the text. Unlike `eprintln!` it does
 /// not panic where standard error is closed.
 fn tell(line: &str) {
-    let _ = writeln!(io::stderr(), "{}", text::within_line(line));
+    let _ = writeln!(io::stderr(), "{}", text::message(line));
 }
 
 /// Loads a scene that so many structures are to be held over at once, and says so

@@ -258,6 +258,38 @@ mod tests {
     use std::time::Duration;
 
     #[test]
+    fn an_error_of_recorded_options_is_one_line() {
+        for (recorded, wanted) in [
+            (
+                "run --no-such",
+                "recorded options: unexpected argument '--no-such' found; expected",
+            ),
+            (
+                "run --processes many",
+                "recorded options: --processes is 'many'; expected a whole",
+            ),
+            (
+                "run --help",
+                "no run was recorded there; expected the folder of a run",
+            ),
+            (
+                "list",
+                "no run was recorded there; expected the folder of a run",
+            ),
+        ] {
+            let words: Vec<String> = recorded.split(' ').map(str::to_owned).collect();
+            let error = RunOptions::recorded(&words)
+                .err()
+                .expect(recorded)
+                .to_string();
+            assert!(
+                error.starts_with(wanted) && !error.contains('\n'),
+                "{error}"
+            );
+        }
+    }
+
+    #[test]
     fn any_clock_dates_a_run() {
         let at = |seconds: i64| match u64::try_from(seconds) {
             Ok(after) => UNIX_EPOCH + Duration::from_secs(after),

@@ -93,3 +93,31 @@ pub fn pipes() -> Vec<(String, Arc<[u8]>)> {
         .map(|(path, bytes)| (path.display().to_string(), bytes.clone()));
     named.collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_changes_is_refused_once_files_are_held() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("held.csv");
+        let write = |text: &str| fs::write(&file, text).unwrap();
+        let read = || {
+            read_file(&file)
+                .map(|_| ())
+                .map_err(|error| error.to_string())
+        };
+        write("one");
+        hold_files(BTreeMap::new());
+        assert_eq!([read(), read()], [Ok(()), Ok(())]);
+        write("two");
+        let error = read().unwrap_err();
+        assert!(error.contains("held.csv: has changed since"), "{error}");
+        // As a worker is told.
+        hold_files(held_files());
+        assert_eq!(read(), Err(error));
+        write("one");
+        assert_eq!(read(), Ok(()));
+    }
+}

@@ -316,6 +316,104 @@ mod tests {
         }
     }
 
+    /// The error of reading a table of three columns to its end.
+    fn told(text: &[u8]) -> String {
+        let read = || -> Result<(), InputError> {
+            let mut table = TableReader::open(text, "t.csv")?;
+            table.columns(&["x", "y", "z"])?;
+            while let Some(row) = table.next_row()? {
+                row?;
+            }
+            Ok(())
+        };
+        read()
+            .err()
+            .map(|error| error.to_string())
+            .unwrap_or_default()
+    }
+
+    #[test]
+    fn a_quote_that_takes_in_other_lines_is_named_where_it_opens() {
+        for (text, wanted) in [
+            (
+                "x,y,z\n1,2,\"a\n1,2,3\n",
+                "t.csv, line 2: a quote that is never closed; ",
+            ),
+            (
+                "x,y,z\n1,2,3\n\"1,2,3",
+                "line 3: a quote that is never closed",
+            ),
+            ("x,\"y,z\n1,2,3\n", "line 1: a quote that is never closed"),
+            (
+                "x,y,z\n1,2,\"a\"\"\n",
+                "line 2: a quote that is never closed",
+            ),
+            (
+                "x,y,z\n1,2,\"a\n1,2,\"b\"\n",
+                "line 2: a quote that is not closed before line 3",
+            ),
+            (
+                "x,y,z\n1,2,\"a\n1,2,\" b\"\n",
+                "line 2: a quote that is not closed before line 3",
+            ),
+            ("\u{feff}\"x,y,z\n", "line 1: a quote that is never closed"),
+            // Fields of several lines, doubled quotes, and quotes within a word.
+            (
+                "x,y,z\n1,2,\"a\n\"\"b\"\"\"\n1,2,\"\" \n1,2,3\"\n\"1\"b,2,3",
+                "",
+            ),
+            ("\u{feff}\"x\",y,z\r\n1,2,\"3\"\r\n", ""),
+        ] {
+            let found = told(text.as_bytes());
+            assert!(
+                found.contains(wanted) && found.is_empty() == wanted.is_empty(),
+                "{text}: {found}"
+            );
+        }
+        // Longer than any buffer.
+        let text = format!("x,y,z\n{}\"1,2,3\n{0}", "1,2,3\n".repeat(9000));
+        assert!(told(text.as_bytes()).starts_with("t.csv, line 9002: a quote"));
+    }
+
+    #[test]
+    fn text_of_another_form_is_named() {
+        let utf16 = |to: fn(u16) -> [u8; 2]| {
+            let units = "\u{feff}x,y,z\r\n1,2,3\r\n".encode_utf16();
+            units.flat_map(to).collect::<Vec<u8>>()
+        };
+        let (little, big) = (utf16(u16::to_le_bytes), utf16(u16::to_be_bytes));
+        let cases: [(&[u8], &str); 9] = [
+            (
+                &little,
+                "line 1: zero bytes, as in UTF-16 text; expected UTF-8",
+            ),
+            (&little[2..], "UTF-16"),
+            (&big, "UTF-16"),
+            (
+                b"x;y;z\n1;2;3\n",
+                "line 1: columns separated by ';'; expected commas",
+            ),
+            (b"x\ty\tz\n1\t2\t3\n", "columns separated by tabs"),
+            (
+                b"1,0,1\n1,2,3\n",
+                "line 1: data '1,0,1' in place of the header; expected",
+            ),
+            (
+                b"1,2,3\n",
+                "data '1,2,3' in place of the header; expected a header with x,y,z",
+            ),
+            (b"x,y,z,2,2\n", "column '2' twice"),
+            ("\u{feff}x,y,z\n1,2,3\n".as_bytes(), ""),
+        ];
+        for (text, wanted) in cases {
+            let found = told(text);
+            assert!(
+                found.contains(wanted) && found.is_empty() == wanted.is_empty(),
+                "{wanted}: {found}"
+            );
+        }
+    }
+
     #[test]
     fn header_errors_fit_one_line() {
         let twice = format!("\n\"{0}\n\",\"{0}\n\"\n", "long".repeat(50));

@@ -403,6 +403,7 @@ fn up_for(forward: DVec3) -> DVec3 {
 mod tests {
     use super::*;
     use crate::camera::PlaneOptions;
+    use crate::spec::tests::{keys, known, listed};
 
     fn scene(source: &str) -> Scene {
         scene::load(source, &Default::default()).unwrap()
@@ -512,6 +513,65 @@ mod tests {
             let path = path("flythrough:frames=32,visible=200", &scene);
             let visible = visible_share(&path, &scene) * f64::from(n);
             assert!((visible / 200.0 - 1.0).abs() < 0.15, "{n}: {visible}");
+        }
+    }
+
+    /// Items that are visible together, and one that is visible at once.
+    #[test]
+    fn a_share_below_all_that_can_be_reached_is_refused() {
+        let boxes = |n| vec![WorldBox::new(DVec3::ZERO, DVec3::ONE); n];
+        for (n, path, wanted) in [
+            (1, "orbit:frames=8,visible=2%", "at least 100.00% of 'b'"),
+            (100, "orbit:frames=8,visible=5", "at least 100.00% of 'b'"),
+            (
+                100,
+                "outside:frames=4,visible=2%",
+                "0.00% or 25.00%, and no share between, of 'b'",
+            ),
+            (100, "outside:frames=4,visible=20%", ""),
+            (0, "orbit:frames=8,visible=2%", "at most 0.00% of 'b'"),
+            (1, "orbit:visible=1", "(2%); no count is possible of 1 item"),
+            (
+                2,
+                "orbit:visible=2",
+                "(2%); no count is possible of 2 items",
+            ),
+            (3, "orbit:visible=3", "(2%) or a count of 2"),
+        ] {
+            let scene = Scene::from_boxes("b", &boxes(n)).unwrap();
+            let told = load(path, &scene, &LensDefaults::default()).map(|_| ());
+            let told = told
+                .map_err(|error| error.to_string())
+                .err()
+                .unwrap_or_default();
+            assert!(
+                told.contains(wanted) && told.is_empty() == wanted.is_empty(),
+                "{path}: {told}"
+            );
+        }
+    }
+
+    #[test]
+    fn every_parameter_of_the_list_is_one_and_no_other() {
+        let map = scene("freedm-map12");
+        for family in PATHS {
+            let listed = listed(&format!("{PATH_PARAMS}, {}", family.params));
+            for (key, default) in &listed {
+                // Of these two and the share the default is no number.
+                let value = match key.as_str() {
+                    "near" => "0.5",
+                    "far" => "1e6",
+                    "visible" => "5%",
+                    _ => default,
+                };
+                let frames = if key == "frames" { "" } else { ",frames=4" };
+                let source = format!("{}:{key}={value}{frames}", family.name);
+                let made = load(&source, &map, &LensDefaults::default());
+                assert!(made.is_ok(), "{source}: {:?}", made.err());
+            }
+            let unknown = format!("{}:frames=2,no=1", family.name);
+            let error = load(&unknown, &map, &LensDefaults::default()).unwrap_err();
+            assert_eq!(known(&error.to_string()), keys(&listed), "{}", family.name);
         }
     }
 

@@ -80,7 +80,9 @@ impl Family {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{MESHES, load};
     use super::*;
+    use crate::spec::tests::{keys, known, listed};
 
     fn scene(text: &str) -> Scene {
         let spec = Spec::parse(text).unwrap();
@@ -134,6 +136,27 @@ mod tests {
             .map(|(name, digest)| (name, digest.to_owned()))
             .into();
         assert_eq!(digests, published);
+    }
+
+    #[test]
+    fn every_parameter_of_the_list_is_one_and_no_other() {
+        let families = FAMILIES.iter().map(|f| (f.name, f.params));
+        for (name, params) in families.chain(MESHES.iter().map(|mesh| (mesh.name, ""))) {
+            let load = |parameter: &str| load(&format!("{name}:{parameter}"), &Default::default());
+            let listed = listed(&format!("{SCENE_PARAMS}, {params}"));
+            for (key, default) in &listed {
+                let parameter = match key.as_str() {
+                    "n" => "n=20".to_owned(),
+                    // Follows from the others.
+                    "size" => "n=20,size=1".to_owned(),
+                    _ => format!("n=20,{key}={default}"),
+                };
+                let made = load(&parameter);
+                assert!(made.is_ok(), "{name}:{parameter}: {:?}", made.err());
+            }
+            let error = load("n=20,zzz=1").unwrap_err().to_string();
+            assert_eq!(known(&error), keys(&listed), "{name}");
+        }
     }
 
     #[test]
