@@ -4,8 +4,8 @@
 //! It is a function of a [`Registry`]: [`main_with`] is the whole of the
 //! `cullbench` program, and of any program that adds a structure.
 //!
-//! Exit codes: 0 ok; 1 a wrong answer or a failed verification; 2 usage or bad
-//! input; 3 a regression, in `compare`; 130 interrupted.
+//! Exit codes: 0 ok; 1 a wrong answer, none at all or a failed verification; 2 usage
+//! or bad input; 3 a regression, in `compare`; 130 interrupted.
 
 mod advise;
 mod against;

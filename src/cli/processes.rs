@@ -28,7 +28,7 @@ const LAST_WORDS: usize = 4096;
 /// Longest first line of a worker, bytes: another program may never end its first.
 const LONGEST_FIRST: u64 = 1 << 16;
 /// Longest line, bytes: the samples of a million cameras fit.
-const LONGEST: u64 = 1 << 30;
+const LONGEST: u64 = 1 << 29;
 /// Lines that wait to be read before the worker does.
 const WAITING: usize = 16;
 

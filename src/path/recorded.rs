@@ -64,8 +64,6 @@ pub fn read_cameras_csv(
 ) -> Result<CameraPath, PathError> {
     let table = TableReader::open(input, file)?;
     let is_matrix = MATRIX_ENTRIES.iter().any(|m| table.column(m).is_some());
-    let known: &[&str] = if is_matrix { &MATRIX_ENTRIES } else { &OF_EYES };
-    table.note_unread(&[known, &["time_s"]].concat(), &SYNONYMS);
     let (lines, cameras): (Vec<u64>, Vec<Camera>) = if is_matrix {
         matrices(table, defaults.matrix)?
     } else {
@@ -145,6 +143,7 @@ fn matrices(
         let camera = camera.map_err(|error| refused(&row, &error))?;
         cameras.push((row.line(), camera));
     }
+    table.note_unread(&[&MATRIX_ENTRIES[..], &["time_s"]].concat(), &[]);
     Ok(cameras)
 }
 
@@ -218,6 +217,7 @@ fn eyes(
         let camera = camera().map_err(|error| refused(&row, &error))?;
         cameras.push((row.line(), camera));
     }
+    table.note_unread(&[&OF_EYES[..], &["time_s"]].concat(), &SYNONYMS);
     Ok(cameras)
 }
 
@@ -229,7 +229,6 @@ fn eyes(
 pub fn read_points_csv(input: impl Read, file: &str) -> Result<Vec<DVec3>, InputError> {
     let mut table = TableReader::open(input, file)?;
     let columns = table.columns(&["x", "y", "z"])?;
-    table.note_unread(&["x", "y", "z"], &[]);
     let mut points = Vec::new();
     while let Some(row) = table.next_row()? {
         points.push(vector(&row?, columns)?);
@@ -237,6 +236,7 @@ pub fn read_points_csv(input: impl Read, file: &str) -> Result<Vec<DVec3>, Input
     if points.is_empty() {
         return Err(without_rows(file, "no point"));
     }
+    table.note_unread(&["x", "y", "z"], &[]);
     Ok(points)
 }
 
