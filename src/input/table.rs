@@ -10,6 +10,11 @@ use super::{InputError, note};
 use crate::shown::{counted, first_of, shortened};
 use crate::spec::nearest;
 
+/// Columns that say which row it is, and nothing else.
+const LABELS: [&str; 9] = [
+    "camera", "comment", "frame", "id", "label", "name", "note", "time", "time_s",
+];
+
 /// A CSV file with its header read.
 pub struct TableReader<R> {
     file: String,
@@ -139,7 +144,10 @@ impl<R: Read> TableReader<R> {
     /// Tells of columns that nothing is read from, with the nearest name that would be,
     /// or the one that stands beside it in `synonyms`.
     pub fn note_unread(&self, known: &[&str], synonyms: &[(&str, &str)]) {
-        let is_unread = |name: &&String| !name.is_empty() && !known.contains(&name.as_str());
+        let is_unread = |name: &&String| {
+            let name = name.as_str();
+            !name.is_empty() && !known.contains(&name) && !LABELS.contains(&name)
+        };
         let unread = self.header.iter().filter(is_unread);
         let named: Vec<String> = unread
             .map(|name| {

@@ -51,7 +51,7 @@ const FAR: f64 = 1000.0;
 /// infinite), `ortho_height` (world units: the lens is orthographic, `fovy_deg` is
 /// not read; empty: perspective). Or view-projection matrices: `m00,m01,..,m33`
 /// (row, column) and nothing of the others. Columns in any order; a note names those
-/// that are not read, but for `time_s`.
+/// that are not read, but for labels such as `name` and `time_s`.
 ///
 /// # Errors
 /// The line of the first value that is no number or makes no camera; a file
@@ -143,7 +143,7 @@ fn matrices(
         let camera = camera.map_err(|error| refused(&row, &error))?;
         cameras.push((row.line(), camera));
     }
-    table.note_unread(&[&MATRIX_ENTRIES[..], &["time_s"]].concat(), &[]);
+    table.note_unread(&MATRIX_ENTRIES, &[]);
     Ok(cameras)
 }
 
@@ -217,7 +217,7 @@ fn eyes(
         let camera = camera().map_err(|error| refused(&row, &error))?;
         cameras.push((row.line(), camera));
     }
-    table.note_unread(&[&OF_EYES[..], &["time_s"]].concat(), &SYNONYMS);
+    table.note_unread(&OF_EYES, &SYNONYMS);
     Ok(cameras)
 }
 
