@@ -317,6 +317,21 @@ fn a_resumed_run_does_not_try_again_what_has_ended_a_process() {
     assert_eq!(lines("tried"), 1);
 }
 
+fn a_run_without_any_answer_is_no_success() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let line = "run --scene city:n=300 --path orbit:frames=4 --processes 2 --no-bounds \
+        --structure greedy --out r";
+    let done = program(folder.path())
+        .args(line.split_whitespace())
+        .output();
+    assert_eq!(done.expect("started").status.code(), Some(1));
+    let cells = cells(folder.path(), "r");
+    assert_eq!(
+        (cells.len(), &cells[0]["status"]),
+        (1, &json!("out_of_memory"))
+    );
+}
+
 fn a_scene_without_items_is_left_out() {
     let folder = tempfile::tempdir().expect("a folder");
     let line = "run --scene city:n=0 --path outside:frames=2 --processes 2 --structure linear,bvh \
@@ -383,6 +398,7 @@ fn main() -> ExitCode {
     }
     what_does_not_fit_is_refused_before_it_is_made();
     a_scene_without_items_is_left_out();
+    a_run_without_any_answer_is_no_success();
     each_mishap_fails_its_own_rows();
     #[cfg(unix)]
     {

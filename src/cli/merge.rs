@@ -15,7 +15,8 @@ pub fn merge(args: &MergeArgs) -> anyhow::Result<Ending> {
     let recorded =
         |path: &Path| -> anyhow::Result<Stream> { Ok(read_stream(&path.join("stream.jsonl"))?.0) };
     let first = recorded(&args.runs[0])?.header.args;
-    for path in &args.runs[1..] {
+    // The first as well: its own options may be none.
+    for path in &args.runs {
         let other = recorded(path)?.header.args;
         same_recorded(&first, &other).with_context(|| path.display().to_string())?;
     }
@@ -27,7 +28,7 @@ pub fn merge(args: &MergeArgs) -> anyhow::Result<Ending> {
     let report = merged.stream.report();
     unread_is_fine(surface_tables::show(&report))?;
     unread_is_fine(close(args, report.cells.len()))?;
-    let failed = report.cells.iter().any(|c| c.status.is_failure());
+    let failed = report.has_failed();
     Ok(Ending::of(!failed))
 }
 

@@ -137,7 +137,7 @@ impl Run {
         if stopped {
             tell("interrupted: finished cells were saved; continue with --resume");
         }
-        let failed = report.cells.iter().any(|c| c.status.is_failure());
+        let failed = report.has_failed();
         Ok(match (stopped, failed) {
             (true, _) => Ending::Interrupted,
             (false, true) => Ending::WrongAnswer,

@@ -46,16 +46,15 @@ pub fn pictures(surfaces: &[Surface]) -> anyhow::Result<Vec<Picture>> {
                 left_out(beyond)
             );
             let svg = svg(&caption, SIZE, |root| draw(root, &caption, &curves))?;
-            let words = [&surface.world, surface.cache, surface.test, &shown].join("-");
-            let name = slug(&words);
+            // File systems take names of 255 bytes.
+            let world: String = surface.world.chars().take(160).collect();
+            let name = slug(&[&world, surface.cache, surface.test, &shown].join("-"));
             // Two worlds may look the same to a file system.
-            let taken = pictures
-                .iter()
-                .filter(|p| p.name.starts_with(&name))
-                .count();
-            let name = match taken {
-                0 => name,
-                more => format!("{name}-{}", more + 1),
+            let is_free = |name: &String| pictures.iter().all(|p: &Picture| p.name != *name);
+            let mut others = (2..).map(|n| format!("{name}-{n}"));
+            let name = match is_free(&name) {
+                true => name,
+                false => others.find(is_free).unwrap_or_default(),
             };
             pictures.push(Picture { name, svg });
         }

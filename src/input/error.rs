@@ -17,6 +17,12 @@ pub enum InputError {
         /// What the system says.
         source: std::io::Error,
     },
+    /// A file that is no longer what was read before ([`hold_files`](super::hold_files)).
+    #[error("{}: has changed since it was first read; expected the same file until the end", path.display())]
+    Changed {
+        /// Name of the file.
+        path: PathBuf,
+    },
     /// A text file: `line` counts from 1 and includes the header.
     #[error("{file}, line {line}: {found}; expected {expected}")]
     Line {

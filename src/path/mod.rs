@@ -17,9 +17,10 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use crate::camera::{Camera, CameraError, Frame, Lens, Surroundings};
+use crate::camera::{Camera, CameraError, FARTHEST, Frame, Lens, Surroundings};
 use crate::input::{InputError, is_readable, read_file};
 use crate::scene::{self, Scene, SeededRng, WorldBox};
+use crate::shown::counted;
 use crate::spec::{Spec, SpecError};
 
 pub use recorded::{LensDefaults, read_cameras_csv, read_points_csv};
@@ -94,19 +95,25 @@ pub struct PathFamily {
     pub name: &'static str,
     /// One line for `cullbench list`.
     pub summary: &'static str,
+    /// Parameters beyond [`PATH_PARAMS`], for the help.
+    pub params: &'static str,
     frames: fn(&Stage, &mut Spec) -> Result<Vec<Pose>, PathError>,
 }
 
 /// All generated families, in the order of the help.
-pub static PATHS: &[PathFamily] = rows! { PathFamily { name, summary, frames }
-    "orbit", "a full circle about the scene, looking at its centre", orbit::frames;
-    "flythrough", "a closed spline through seeded way points, looking ahead", flythrough::frames;
-    "spin", "a full turn in place at the centre (yaw)", spin::frames;
-    "zoom", "a dolly towards the centre, then a zoom by field of view", zoom::frames;
-    "teleport", "a new random place and direction every frame: no coherence", teleport::frames;
-    "outside", "the whole scene from outside, from all around", outside::frames;
-    "street", "eyes outside of every item, height=1.7 above the ground, looking level; near=0.1", street::frames;
-    "places", "the scene's own camera places (the things of a Doom map)", places::frames;
+pub static PATHS: &[PathFamily] = rows! { PathFamily { name, summary, params, frames }
+    "orbit", "a full circle about the scene, looking at its centre",
+        "radius=0.6 (of half the scene's diagonal), height=0.35 (of the radius)", orbit::frames;
+    "flythrough", "a closed spline through seeded way points, looking ahead",
+        "waypoints=8 (at least 4)", flythrough::frames;
+    "spin", "a full turn in place at the centre (yaw)", "", spin::frames;
+    "zoom", "a dolly towards the centre, then a zoom by field of view",
+        "power=8 (largest magnification)", zoom::frames;
+    "teleport", "a new random place and direction every frame: no coherence", "", teleport::frames;
+    "outside", "the whole scene from outside, from all around", "", outside::frames;
+    "street", "eyes outside of every item, above the ground, looking level",
+        "height=1.7 (above the ground), near=0.1", street::frames;
+    "places", "the scene's own camera places (the things of a Doom map)", "", places::frames;
 };
 
 /// Parameters that every generated path takes.
@@ -306,6 +313,7 @@ impl Optics {
             Some(_) => Some(spec.number("far", natural)?),
             None => defaults.far.unwrap_or(Some(natural)),
         };
+        let far = far.filter(|far| *far <= FARTHEST);
         let near = match spec.text("near") {
             Some(_) => Some(spec.number("near", 0.0)?),
             // What an eye among items looks at may be an arm's length away.
@@ -372,9 +380,13 @@ fn visible_share(spec: &mut Spec, text: &str, items: usize) -> Result<f64, SpecE
     if !text.ends_with('%') && value > 1.0 && value.fract() == 0.0 && value < items as f64 {
         return Ok(value / items as f64);
     }
+    let count = match items {
+        0..=2 => format!("; no count is possible of {}", counted(items, "item")),
+        3 => " or a count of 2".to_owned(),
+        _ => format!(" or a count from 2 to {}", items - 1),
+    };
     Err(SpecError::new(format_args!(
-        "visible={text}; expected a share between 0 and 1 (2%) or a count from 2 to {}",
-        items.saturating_sub(1)
+        "visible={text}; expected a share between 0 and 1 (2%){count}"
     )))
 }
 
@@ -391,6 +403,7 @@ fn up_for(forward: DVec3) -> DVec3 {
 mod tests {
     use super::*;
     use crate::camera::PlaneOptions;
+    use crate::spec::tests::{keys, known, listed};
 
     fn scene(source: &str) -> Scene {
         scene::load(source, &Default::default()).unwrap()
@@ -500,6 +513,65 @@ mod tests {
             let path = path("flythrough:frames=32,visible=200", &scene);
             let visible = visible_share(&path, &scene) * f64::from(n);
             assert!((visible / 200.0 - 1.0).abs() < 0.15, "{n}: {visible}");
+        }
+    }
+
+    /// Items that are visible together, and one that is visible at once.
+    #[test]
+    fn a_share_below_all_that_can_be_reached_is_refused() {
+        let boxes = |n| vec![WorldBox::new(DVec3::ZERO, DVec3::ONE); n];
+        for (n, path, wanted) in [
+            (1, "orbit:frames=8,visible=2%", "at least 100.00% of 'b'"),
+            (100, "orbit:frames=8,visible=5", "at least 100.00% of 'b'"),
+            (
+                100,
+                "outside:frames=4,visible=2%",
+                "0.00% or 25.00%, and no share between, of 'b'",
+            ),
+            (100, "outside:frames=4,visible=20%", ""),
+            (0, "orbit:frames=8,visible=2%", "at most 0.00% of 'b'"),
+            (1, "orbit:visible=1", "(2%); no count is possible of 1 item"),
+            (
+                2,
+                "orbit:visible=2",
+                "(2%); no count is possible of 2 items",
+            ),
+            (3, "orbit:visible=3", "(2%) or a count of 2"),
+        ] {
+            let scene = Scene::from_boxes("b", &boxes(n)).unwrap();
+            let told = load(path, &scene, &LensDefaults::default()).map(|_| ());
+            let told = told
+                .map_err(|error| error.to_string())
+                .err()
+                .unwrap_or_default();
+            assert!(
+                told.contains(wanted) && told.is_empty() == wanted.is_empty(),
+                "{path}: {told}"
+            );
+        }
+    }
+
+    #[test]
+    fn every_parameter_of_the_list_is_one_and_no_other() {
+        let map = scene("freedm-map12");
+        for family in PATHS {
+            let listed = listed(&format!("{PATH_PARAMS}, {}", family.params));
+            for (key, default) in &listed {
+                // Of these two and the share the default is no number.
+                let value = match key.as_str() {
+                    "near" => "0.5",
+                    "far" => "1e6",
+                    "visible" => "5%",
+                    _ => default,
+                };
+                let frames = if key == "frames" { "" } else { ",frames=4" };
+                let source = format!("{}:{key}={value}{frames}", family.name);
+                let made = load(&source, &map, &LensDefaults::default());
+                assert!(made.is_ok(), "{source}: {:?}", made.err());
+            }
+            let unknown = format!("{}:frames=2,no=1", family.name);
+            let error = load(&unknown, &map, &LensDefaults::default()).unwrap_err();
+            assert_eq!(known(&error.to_string()), keys(&listed), "{}", family.name);
         }
     }
 

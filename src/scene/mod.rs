@@ -42,7 +42,7 @@ use crate::input::InputError;
 
 pub use boxes_csv::{read_boxes_csv, read_sought_boxes_csv, write_boxes_csv};
 pub use disputes::{Dispute, disputes};
-pub use generate::{FAMILIES, Family, GENERATOR_NAME};
+pub use generate::{FAMILIES, Family, GENERATOR_NAME, SCENE_PARAMS};
 pub use labels::Labels;
 pub(crate) use memory::available_bytes;
 pub use memory::{fits, needed_bytes};

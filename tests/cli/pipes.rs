@@ -96,6 +96,8 @@ fn a_full_disk_is_one_error_line() {
         options.write(true).open("/dev/full").expect("/dev/full")
     };
     let commands = [
+        "--version",
+        "run --help",
         "list",
         "env --format json",
         "man",
@@ -226,8 +228,13 @@ fn a_program_that_speaks_another_protocol_is_one_error_line() {
         // A message but for the byte that is no UTF-8.
         r#"{"doing":{"structure":null,"step":"\377"}}"#,
         r#"{"ready":{"protocol":0}}"#,
+        // Not a line, and without an end.
+        "ENDLESS",
     ] {
-        let script = format!("#!/bin/sh\nprintf '{said}\\n'\nsleep 1\n");
+        let script = match said {
+            "ENDLESS" => "#!/bin/sh\nexec cat /dev/zero\n".to_owned(),
+            _ => format!("#!/bin/sh\nprintf '{said}\\n'\nsleep 1\n"),
+        };
         std::fs::write(&program, script).expect("written");
         let executable = std::fs::Permissions::from_mode(0o755);
         std::fs::set_permissions(&program, executable).expect("executable");
