@@ -96,6 +96,14 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
         );
     }
     let report = prepared.conclude(&times);
+    let shown = unread_is_fine(match args.format {
+        FunnelFormat::Json => print_json(&report),
+        FunnelFormat::Csv => funnel_csv::write(&report, io::stdout().lock()),
+        FunnelFormat::Table => {
+            let text = funnel_table::terminal(&funnel_table::blocks(&report));
+            text::terminal().write_all(text.as_bytes())
+        }
+    });
     if let Some(file) = &args.svg {
         write_text(file, &funnel_picture::draw(&report)?)?;
     }
@@ -105,14 +113,7 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
         let page = to_html(&format!("cullbench funnel {}", report.scene), &blocks);
         write_text(file, &page)?;
     }
-    unread_is_fine(match args.format {
-        FunnelFormat::Json => print_json(&report),
-        FunnelFormat::Csv => funnel_csv::write(&report, io::stdout().lock()),
-        FunnelFormat::Table => {
-            let text = funnel_table::terminal(&funnel_table::blocks(&report));
-            text::terminal().write_all(text.as_bytes())
-        }
-    })?;
+    shown?;
     Ok(Ending::of(keep_their_word(&report.stages)))
 }
 

@@ -7,7 +7,7 @@ use anyhow::Context;
 
 use super::args::MergeArgs;
 use super::run_resume::same_recorded;
-use super::{Ending, expect_folder, surface_tables, tell, text, unread_is_fine};
+use super::{Ending, expect_folder, interrupt, surface_tables, tell, text, unread_is_fine};
 use crate::report::{Stream, merge as join, read_stream};
 
 pub fn merge(args: &MergeArgs) -> anyhow::Result<Ending> {
@@ -21,7 +21,10 @@ pub fn merge(args: &MergeArgs) -> anyhow::Result<Ending> {
         same_recorded(&first, &other).with_context(|| path.display().to_string())?;
     }
     let merged = join(&args.runs, &without_place(&first), args.partial)?;
-    merged.write(&args.out)?;
+    interrupt::from_now_on_finish();
+    if !merged.write(&args.out, &interrupt::asked)? {
+        return Ok(Ending::Interrupted);
+    }
     if !merged.missing.is_empty() {
         tell(&format!("note: no shard has {}", merged.missing_named()));
     }

@@ -67,7 +67,7 @@ use std::process::ExitCode;
 
 use crate::index::Registry;
 use crate::input::{hold_files, tell_notes};
-use crate::report::{FolderError, write_atomically};
+use crate::report::{FolderError, try_folder, try_place, write_atomically};
 use crate::scene::{LoadOptions, NOTICE, Scene};
 use clap::{CommandFactory, Parser};
 use interrupt::Interrupted;
@@ -260,18 +260,19 @@ fn expect_place_for(option: &str, file: Option<&Path>) -> anyhow::Result<()> {
             "{}: expected an existing folder for {option}",
             folder.display()
         ),
-        _ => Ok(()),
+        _ => Ok(try_place(file)?),
     }
 }
 
-/// That a folder can be there: it is, or nothing of its name is.
+/// That a folder can be there and written to: it is, or nothing of its name is.
 fn expect_folder(option: &str, folder: Option<&Path>) -> anyhow::Result<()> {
     match folder {
         Some(folder) if folder.exists() && !folder.is_dir() => anyhow::bail!(
             "{}: not a folder; expected a folder for {option}",
             folder.display()
         ),
-        _ => Ok(()),
+        Some(folder) => Ok(try_folder(folder)?),
+        None => Ok(()),
     }
 }
 

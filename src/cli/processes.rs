@@ -17,7 +17,7 @@ use super::protocol::{Job, Message, PROTOCOL, Request};
 use super::run_resume::typed_args;
 use crate::input;
 use crate::measure::{Part, ProcessTimes, Status, TaskSamples, Verdict};
-use crate::report::bare;
+use crate::report::{bare, temporary_in};
 use crate::shown::shortened;
 
 /// Longest wait before looking whether the user wants to stop.
@@ -292,7 +292,8 @@ impl Workers {
     /// # Errors
     /// As [`Workers::new`]; an argument that is no text.
     pub fn of_study() -> anyhow::Result<Workers> {
-        Workers::new(typed_args()?, Duration::MAX, &NamedTempFile::new)
+        let temporary = || temporary_in(&std::env::temp_dir());
+        Workers::new(typed_args()?, Duration::MAX, &temporary)
     }
 
     /// `temporary` makes the files that stand for pipes.

@@ -3,8 +3,8 @@
 use serde_json::json;
 
 use super::args::QueryArgs;
-use super::compare_structures::{all_agree, ask_all, write};
-use super::{Ending, load_scene, tell, unread_is_fine};
+use super::compare_structures::{Row, ask_all, write};
+use super::{Ending, load_scene, tell};
 use crate::index::Registry;
 use crate::measure::Workload;
 use crate::path;
@@ -24,14 +24,6 @@ pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
         out.clear();
         index.query(view, out);
     };
-    let answers = ask_all(
-        &structures,
-        &scene,
-        &workload.items,
-        workload.views.len(),
-        args.ids,
-        ask,
-    )?;
     let mut columns = vec![
         "camera",
         "structure",
@@ -44,7 +36,7 @@ pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
     ];
     columns.extend(args.ids.then_some("visible_ids"));
     let (test, total) = (culling.test.name(), scene.items.len());
-    unread_is_fine(write(args.format, &columns, &answers, |a| {
+    let row = |a: &Row| {
         let mut row = vec![
             json!(a.question),
             json!(a.structure),
@@ -57,6 +49,10 @@ pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
         ];
         row.extend(a.ids.as_ref().map(|ids| json!(ids)));
         row
-    }))?;
-    Ok(Ending::of(all_agree(&answers, "camera")))
+    };
+    let (items, questions) = (&workload.items, ("camera", workload.views.len()));
+    let agree = write(args.format, &columns, row, |each| {
+        ask_all(&structures, &scene, items, questions, args.ids, ask, each)
+    })?;
+    Ok(Ending::of(agree))
 }

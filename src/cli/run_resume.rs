@@ -89,7 +89,7 @@ pub fn resume(args: &RunArgs) -> anyhow::Result<(StoppedRun, Stream, RunArgs)> {
 pub fn go_on(stopped: StoppedRun, stream: &Stream) -> anyhow::Result<RunFolder> {
     if stopped.lost() > 0 {
         tell(&format!(
-            "note: {}: samples.csv was cut short; {} measured again",
+            "note: {}: samples.csv lacks samples; {} measured again",
             stopped.path().display(),
             text::counted(stopped.lost(), "part")
         ));

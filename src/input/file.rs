@@ -34,12 +34,18 @@ pub fn read_file(path: &Path) -> Result<Arc<[u8]>, InputError> {
     if let Some(bytes) = pipes.get(path) {
         return Ok(bytes.clone());
     }
-    if fs::metadata(path).map_err(io)?.is_file() {
-        let bytes = fs::read(path).map_err(io)?;
+    let is_file = fs::metadata(path).map_err(io)?.is_file();
+    let bytes = fs::read(path).map_err(io)?;
+    if is_file {
         expect_same(path, &bytes)?;
-        return Ok(bytes.into());
     }
-    let bytes: Arc<[u8]> = fs::read(path).map_err(io)?.into();
+    // To be shared they are copied: room that is not there would end the program.
+    let room = Vec::<u8>::new().try_reserve_exact(bytes.len());
+    room.map_err(|_| io(std::io::ErrorKind::OutOfMemory.into()))?;
+    let bytes = Arc::from(bytes);
+    if is_file {
+        return Ok(bytes);
+    }
     pipes.insert(path.to_owned(), bytes.clone());
     Ok(bytes)
 }

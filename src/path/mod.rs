@@ -39,6 +39,19 @@ pub struct CameraPath {
 }
 
 impl CameraPath {
+    /// At most so many of the cameras, evenly spread from the first on.
+    pub fn at_most(mut self, most: usize) -> CameraPath {
+        let count = self.cameras.len();
+        if count > most {
+            let kept = |n: usize| n * count / most;
+            self.cameras = (0..most).map(|n| self.cameras[kept(n)]).collect();
+            if !self.lines.is_empty() {
+                self.lines = (0..most).map(|n| self.lines[kept(n)]).collect();
+            }
+        }
+        self
+    }
+
     /// Where a camera stands, for messages: by its line, or its index where it has none.
     pub fn place(&self, index: usize) -> String {
         match self.lines.get(index) {

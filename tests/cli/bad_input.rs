@@ -514,12 +514,20 @@ fn places_that_cannot_be_written_to_are_named_and_stay_as_they_are() {
     let generate = "scene generate uniform:n=5 --out";
     let run = "run --scene uniform:n=5 --path orbit:frames=2 --out";
     let cases = [
-        (generate, "no/where.csv", "no/where.csv: No such file"),
-        (generate, "folder.csv", "folder.csv: Is a directory"),
+        (
+            generate,
+            "no/where.csv",
+            "no: expected an existing folder for --out",
+        ),
+        (
+            generate,
+            "folder.csv",
+            "folder.csv: a folder; expected a file for --out",
+        ),
         (
             generate,
             "kept.csv/x.csv",
-            "kept.csv/x.csv: Not a directory",
+            "kept.csv: expected an existing folder for --out",
         ),
         (
             run,

@@ -19,6 +19,8 @@ mod funnel_proofs;
 mod kernels;
 mod listing;
 mod matrices;
+#[cfg(target_os = "linux")]
+mod memory;
 mod meshes;
 mod pipes;
 mod precision;

@@ -129,6 +129,27 @@ fn a_full_disk_is_one_error_line() {
     assert_eq!(status.expect("the program starts").code(), Some(2));
 }
 
+/// Work that would take minutes: what cannot be written is found before it.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_output_that_cannot_be_written_is_found_before_the_work() {
+    let folder = folder(&[]);
+    let commands = [
+        "scene generate uniform:n=9000000 --out",
+        "precision --scene uniform:n=100000 --svg",
+        "drift --svg",
+        "funnel --scene city:n=10000 --html",
+        "funnel --scene city:n=10000 --svg",
+        "run --suite full --out",
+    ];
+    let begin = std::time::Instant::now();
+    for line in commands {
+        let done = cullbench(folder.path(), &format!("{line} /proc/out"));
+        assert_refused(&done, "/proc/out: No such file", line);
+    }
+    assert!(begin.elapsed().as_secs() < 10, "{:?}", begin.elapsed());
+}
+
 #[cfg(unix)]
 #[test]
 fn links_and_pipes_are_written_to_and_not_replaced() {

@@ -27,11 +27,15 @@ fn wait_until(what: &str, mut ready: impl FnMut() -> bool) {
 }
 
 /// Sends Ctrl-C and waits for the end. Nobody reads the output until then.
-fn interrupt(mut child: Child) -> Done {
+fn interrupt(child: Child) -> Done {
+    signal(child, "-INT")
+}
+
+fn signal(mut child: Child, signal: &str) -> Done {
     let ended = child.try_wait().expect("a child");
     assert!(ended.is_none(), "ended by itself: {ended:?}");
     let id = child.id().to_string();
-    let sent = Command::new("kill").args(["-INT", &id]).status();
+    let sent = Command::new("kill").args([signal, &id]).status();
     assert!(sent.expect("kill").success());
     let begin = Instant::now();
     while child.try_wait().expect("a child").is_none() {
@@ -49,8 +53,15 @@ fn interrupt(mut child: Child) -> Done {
     }
 }
 
+/// The answer to the first signal, where something is to be kept.
+const STOPPING: &str = "stopping at the next safe place; again ends at once\n";
+
 fn assert_stopped(done: &Done, what: &str) {
-    assert_eq!((done.code, done.err.as_str()), (Some(130), ""), "{what}");
+    assert_eq!(done.code, Some(130), "{what}");
+    assert!(
+        ["", STOPPING].contains(&done.err.as_str()),
+        "{what}: {done:?}"
+    );
 }
 
 #[test]
@@ -68,8 +79,9 @@ fn an_interrupted_run_keeps_its_finished_cells_and_goes_on() {
     // The first line is the header.
     wait_until("no first part", || lines() >= 2);
     let done = interrupt(child);
-    let told = "interrupted: finished cells were saved; continue with --resume\n";
-    assert_eq!((done.code, done.err.as_str()), (Some(130), told), "{line}");
+    let told =
+        STOPPING.to_owned() + "interrupted: finished cells were saved; continue with --resume\n";
+    assert_eq!((done.code, &done.err), (Some(130), &told), "{line}");
     assert!(
         done.out.contains("1 of 2 processes: times without"),
         "{}",
@@ -159,15 +171,52 @@ fn a_worker_that_is_killed_is_told_in_one_line() {
 }
 
 #[test]
-fn ctrl_c_while_a_file_is_written_leaves_the_old_one() {
+fn a_signal_while_a_file_is_written_leaves_the_old_one() {
     let folder = folder(&[("kept.csv", b"kept")]);
     let before = contents(folder.path());
     let line = "scene generate uniform:n=500000 --out kept.csv";
-    let child = start(folder.path(), line);
     let files = || fs::read_dir(folder.path()).expect("readable").count();
-    wait_until("no temporary file", || files() > 1);
-    assert_stopped(&interrupt(child), line);
-    assert!(contents(folder.path()) == before);
+    let begun = || {
+        let child = start(folder.path(), line);
+        // A place is tried before the work: the file that stays has something in it.
+        wait_until("no temporary file", || {
+            let entries = fs::read_dir(folder.path()).expect("readable").flatten();
+            let lengths = entries.filter_map(|e| Some(e.metadata().ok()?.len()));
+            lengths.max() > Some(4096)
+        });
+        child
+    };
+    for kind in ["-INT", "-TERM", "-HUP"] {
+        let done = signal(begun(), kind);
+        assert_eq!((done.code, &*done.err), (Some(130), STOPPING), "{kind}");
+        assert!(contents(folder.path()) == before, "{kind}");
+    }
+    // A killed process cannot: the next one that writes there does.
+    assert_eq!(signal(begun(), "-KILL").code, None);
+    assert_eq!(files(), 2);
+    cullbench(folder.path(), "scene generate uniform:n=5 --out other.csv");
+    let left = contents(folder.path());
+    let names: Vec<_> = left.keys().map(|name| name.rsplit('/').next()).collect();
+    assert_eq!(names, [Some("kept.csv"), Some("other.csv")]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn what_is_to_outlive_its_terminal_does() {
+    let mut child = Command::new("nohup")
+        .args([super::PROGRAM, "verify", "--cases", "100000000"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("nohup");
+    sleep(Duration::from_millis(300));
+    let id = child.id().to_string();
+    let sent = Command::new("kill").args(["-HUP", &id]).status();
+    assert!(sent.expect("kill").success());
+    sleep(Duration::from_millis(300));
+    assert!(child.try_wait().expect("a child").is_none());
+    child.kill().expect("killed");
+    child.wait().expect("a child");
 }
 
 #[test]
