@@ -61,7 +61,7 @@ fn expect_same(path: &Path, bytes: &[u8]) -> Result<(), InputError> {
     let Some(held) = held.as_mut() else {
         return Ok(());
     };
-    let digest = crate::scene::hex(&hmac_sha256::Hash::hash(bytes));
+    let digest = crate::shown::hex(&hmac_sha256::Hash::hash(bytes));
     let first = held
         .entry(path.display().to_string())
         .or_insert_with(|| digest.clone());
