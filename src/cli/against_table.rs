@@ -225,7 +225,7 @@ pub fn expect_none_of_a_run() -> anyhow::Result<()> {
 mod tests {
     use super::*;
 
-    /// As a shell finds it: what is run is what the report names.
+    /// The report names the program that runs.
     #[cfg(unix)]
     #[test]
     fn a_name_without_a_folder_is_looked_up_in_path() {

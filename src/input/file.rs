@@ -114,7 +114,7 @@ mod tests {
         write("two");
         let error = read().unwrap_err();
         assert!(error.contains("held.csv: has changed since"), "{error}");
-        // As a worker is told.
+        // The form in which a worker gets them.
         hold_files(held_files());
         assert_eq!(read(), Err(error));
         write("one");

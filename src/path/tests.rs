@@ -154,7 +154,7 @@ fn every_parameter_of_the_list_is_one_and_no_other() {
     for family in PATHS {
         let listed = listed(&format!("{PATH_PARAMS}, {}", family.params));
         for (key, default) in &listed {
-            // Of these two and the share the default is no number.
+            // Defaults that are no number.
             let value = match key.as_str() {
                 "near" => "0.5",
                 "far" => "1e6",
