@@ -105,6 +105,11 @@ fn is_formula(text: &str) -> bool {
     begins && !text.parse::<f64>().is_ok_and(f64::is_finite)
 }
 
+/// Lower-case hexadecimal.
+pub(crate) fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
+}
+
 /// Whole numbers in groups of three.
 pub fn count(value: usize) -> String {
     let digits = value.to_string();

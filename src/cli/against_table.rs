@@ -220,3 +220,30 @@ pub fn expect_none_of_a_run() -> anyhow::Result<()> {
         None => Ok(()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The report names the program that runs.
+    #[cfg(unix)]
+    #[test]
+    fn a_name_without_a_folder_is_looked_up_in_path() {
+        let found = |name: &str| program(Path::new(name)).map_err(|error| error.to_string());
+        let shell = found("sh").unwrap();
+        assert!(shell.is_absolute() && shell.ends_with("sh") && shell.is_file());
+        let manifest = found("./Cargo.toml").unwrap();
+        assert!(manifest.is_absolute() && manifest.is_file());
+        for (name, wanted) in [
+            (
+                "Cargo.toml",
+                "Cargo.toml: not in PATH; expected a program there, or ./Cargo.toml",
+            ),
+            ("/dev/zero", "/dev/zero: no file; expected a program"),
+            ("./src", "./src: no file; expected a program"),
+        ] {
+            let error = found(name).unwrap_err();
+            assert!(error.starts_with(wanted), "{error}");
+        }
+    }
+}

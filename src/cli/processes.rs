@@ -82,11 +82,11 @@ impl Worker {
                 let mut most = LONGEST_FIRST;
                 loop {
                     let mut line = Vec::new();
-                    // What is cut short is no message.
+                    // A line that is cut short is no message.
                     let read = (&mut out).take(most).read_until(b'\n', &mut line);
                     most = LONGEST;
-                    let ended = matches!(read, Ok(0) | Err(_));
-                    if read.is_ok() && ended || send.send(read.map(|_| line)).is_err() || ended {
+                    let ended = read.is_err();
+                    if matches!(read, Ok(0)) || send.send(read.map(|_| line)).is_err() || ended {
                         break;
                     }
                 }

@@ -67,7 +67,7 @@ fn expect_same(path: &Path, bytes: &[u8]) -> Result<(), InputError> {
     let Some(held) = held.as_mut() else {
         return Ok(());
     };
-    let digest = crate::scene::hex(&hmac_sha256::Hash::hash(bytes));
+    let digest = crate::shown::hex(&hmac_sha256::Hash::hash(bytes));
     let first = held
         .entry(path.display().to_string())
         .or_insert_with(|| digest.clone());
@@ -120,7 +120,7 @@ mod tests {
         write("two");
         let error = read().unwrap_err();
         assert!(error.contains("held.csv: has changed since"), "{error}");
-        // As a worker is told.
+        // The form in which a worker gets them.
         hold_files(held_files());
         assert_eq!(read(), Err(error));
         write("one");

@@ -252,6 +252,9 @@ fn vector(row: &Row, columns: [usize; 3]) -> Result<DVec3, InputError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::input::tell_notes;
+    use crate::scene::read_boxes_csv;
+    use std::sync::Mutex;
 
     fn read(text: &str) -> Result<CameraPath, PathError> {
         read_cameras_csv(text.as_bytes(), "c.csv", &LensDefaults::default())
@@ -342,6 +345,33 @@ mod tests {
         assert_eq!(both.unwrap_err().to_string(), wanted);
         let wrong = read("x,y,z\n1,2,3\n").unwrap_err().to_string();
         assert!(wrong.contains("no column 'eye_x'"), "{wrong}");
+    }
+
+    #[test]
+    fn columns_that_are_not_read_are_told_once() {
+        static HEARD: Mutex<Vec<String>> = Mutex::new(Vec::new());
+        tell_notes(|note| HEARD.lock().unwrap().push(note.to_owned()));
+        let cameras = "eye_x,eye_y,eye_z,look_x,look_y,look_z,time_s,fov,Far,zfar,ortho_size,roll,,name,size\n\
+                       0,0,0,1,0,0,0,90,9,9,9,0,,a,1\n";
+        let points = "x,y,z,X\n1,2,3,4\n";
+        let boxes = "min_x,min_y,min_z,max_x,max_y,max_z,Min_X,max_speed\n0,0,0,1,1,1,2,3\n";
+        for _ in 0..2 {
+            read_cameras_csv(cameras.as_bytes(), "note-c.csv", &Default::default()).unwrap();
+            read_points_csv(points.as_bytes(), "note-p.csv").unwrap();
+            read_boxes_csv(boxes.as_bytes(), "note-b.csv", false).unwrap();
+        }
+        let heard = HEARD.lock().unwrap();
+        let heard: Vec<&String> = heard.iter().filter(|n| n.starts_with("note-")).collect();
+        assert_eq!(
+            heard,
+            [
+                "note-c.csv, line 1: columns that are not read: 'fov' (did you mean 'fovy_deg'?), \
+                 'Far' (did you mean 'far'?), 'zfar' (did you mean 'far'?), 'ortho_size' (did you \
+                 mean 'ortho_height'?), 'roll' (did you mean 'up_x,up_y,up_z'?), 'size'",
+                "note-p.csv, line 1: columns that are not read: 'X' (did you mean 'x'?)",
+                "note-b.csv: column 'Min_X' is kept as a label beside 'min_x'",
+            ]
+        );
     }
 
     #[test]

@@ -40,6 +40,7 @@ use crate::arithmetic::rounding::{sum_down, sum_up};
 use crate::geometry::{Aabb, PlaneTree};
 use crate::input::InputError;
 
+pub(crate) use crate::shown::hex;
 pub use boxes_csv::{read_boxes_csv, read_sought_boxes_csv, write_boxes_csv};
 pub use disputes::{Dispute, disputes};
 pub use generate::{FAMILIES, Family, GENERATOR_NAME, SCENE_PARAMS};
@@ -233,11 +234,6 @@ impl Scene {
         }
         hex(&hash.finalize())
     }
-}
-
-/// Lower-case hexadecimal.
-pub(crate) fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 
 /// The origin that suits the boxes, by the finite ones.

@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
+use super::BOXES;
 use super::process::*;
 use super::runs::{cells, report};
 
@@ -226,4 +227,32 @@ fn a_stopped_verify_does_not_claim_success() {
     let done = interrupt(child);
     assert_eq!(done.code, Some(130));
     assert!(done.err.contains("interrupted"), "{}", done.err);
+}
+
+/// Processes that read different scenes measure nothing.
+#[test]
+fn a_scene_that_changes_during_a_run_is_named() {
+    let folder = with_good_files(&[]);
+    let line = "run --scene scene.csv --path orbit:frames=4 --structure linear --processes 300 \
+        --no-bounds --out r";
+    let mut child = start(folder.path(), line);
+    let stream = folder.path().join("r/stream.jsonl");
+    wait_until("no part was kept", || {
+        fs::read_to_string(&stream).is_ok_and(|text| text.lines().count() > 2)
+    });
+    fs::write(
+        folder.path().join("scene.csv"),
+        format!("{BOXES}\n9,9,9,9,9,9\n"),
+    )
+    .expect("written");
+    wait_until("the run goes on", || {
+        child.try_wait().expect("a child").is_some()
+    });
+    let output = child.wait_with_output().expect("a child");
+    let err = String::from_utf8(output.stderr).expect("UTF-8");
+    assert_eq!(output.status.code(), Some(2), "{err}");
+    assert!(
+        err.starts_with("error: scene.csv: has changed since"),
+        "{err}"
+    );
 }
