@@ -70,7 +70,7 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     interrupt::from_now_on_finish();
     let workers = Workers::of_study()?;
     let study = Study::new(format!("{}, {}: ", args.scene, args.path), 0, &args.spread);
-    study.begin("the truth, and every stage held against it");
+    let begin = |step: &str| study.begin(step);
     let truth_cache = args.truth_cache.as_ref().map(TruthCache::new);
     let input = setting.input(args, truth_cache.as_ref())?;
     let mut lines = String::new();
@@ -82,7 +82,8 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
         Some(_) => Some(&mut each),
         None => None,
     };
-    let prepared = funnel::prepare(&input, proofs, &interrupt::asked)?.ok_or(Interrupted)?;
+    let prepared =
+        funnel::prepare(&input, proofs, &begin, &interrupt::asked)?.ok_or(Interrupted)?;
     if let Some(file) = &args.certificates {
         write_text(file, &lines)?;
     }

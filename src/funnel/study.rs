@@ -72,7 +72,7 @@ struct Sides {
 }
 
 /// Goes through all chains, judges them, and plans how they are timed; `None` if
-/// stopped. `proofs` is handed a proof of every item in view that is visible or that a
+/// stopped. `begin` is told each step before it is done. `proofs` is handed a proof of every item in view that is visible or that a
 /// back end removed, and the errors of every claim.
 ///
 /// # Errors
@@ -80,14 +80,18 @@ struct Sides {
 pub fn prepare(
     input: &FunnelInput,
     proofs: Option<&mut dyn FnMut(Proofs)>,
+    begin: &dyn Fn(&str),
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<Prepared>, FunnelError> {
     fits(input.samples, available_bytes())?;
+    begin("structures, regions, occluders");
     let world = World::new(input)?;
     let threads = input.execution.threads;
+    begin("the truth");
     let Some(truth) = seen(&world, input.samples, 0, threads, stop) else {
         return Ok(None);
     };
+    begin("every stage, held against the truth");
     let mut pass = Pass::new(&world);
     let Some(walks) = Walks::of(&mut pass, &world, input.chain, stop) else {
         return Ok(None);
@@ -141,9 +145,11 @@ pub fn prepare(
         };
         mirror = Some(row);
     }
+    begin("every order, drawn");
     let Some(drawn) = left.orders.drawn(input.samples, stop) else {
         return Ok(None);
     };
+    begin("what is under a cursor");
     let picked = left.picks.judged();
     // Behind the steps come the back ends of the triangle stage, then the tests of fragments.
     let first_test = pass.steps().len() + triangle_rows::back_ends().count();

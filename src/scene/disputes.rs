@@ -137,3 +137,138 @@ fn disputed(pair: [Option<&Edge>; 2], strip: [i64; 2]) -> Option<[Option<u32>; 2
         true => None,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::SeededRng;
+
+    /// A ring whose inside is on the right of each line.
+    fn ring([x0, y0, x1, y1]: [i32; 4], sectors: [Option<u32>; 2]) -> Vec<Sided> {
+        let corners = [[x0, y0], [x0, y1], [x1, y1], [x1, y0]];
+        let sides = (0..4).map(|k| ([corners[k], corners[(k + 1) % 4]], sectors));
+        sides.collect()
+    }
+
+    fn found(lines: &[Sided]) -> Vec<Dispute> {
+        disputes(lines.iter().copied())
+    }
+
+    #[test]
+    fn sectors_that_do_not_divide_the_plane_are_told() {
+        let room = ring([0, 0, 512, 512], [Some(0), None]);
+        let with = |sectors| [room.clone(), ring([192, 192, 320, 320], sectors)].concat();
+        let proper = with([Some(1), Some(0)]);
+        assert_eq!(found(&proper), []);
+        // Lines within a sector, even where they cross, divide nothing.
+        let within = |ends| (ends, [Some(0); 2]);
+        let mut marked = proper.clone();
+        marked.extend([[[8, 8], [40, 40]], [[8, 41], [40, 9]]].map(within));
+        assert_eq!(found(&marked), []);
+
+        let told = |lines: &[Sided]| {
+            let first = found(lines).first().map(ToString::to_string);
+            first.unwrap_or_default()
+        };
+        let between = "linedefs disagree about the sector at (96, 256), 0 or 1";
+        // A sector that refers to itself, and one whose lines are the wrong way round.
+        assert_eq!(told(&with([Some(1), Some(1)])), between);
+        assert_eq!(told(&with([Some(0), Some(1)])), between);
+        for line in 0..proper.len() {
+            let changed = |change: &dyn Fn(&mut Sided)| {
+                let mut lines = proper.clone();
+                change(&mut lines[line]);
+                !found(&lines).is_empty()
+            };
+            assert!(changed(&|(_, sectors)| sectors.swap(0, 1)), "swapped");
+            assert!(changed(&|(_, sectors)| sectors[0] = Some(7)), "foreign");
+            assert!(changed(&|(_, sectors)| sectors[1] = sectors[0]), "itself");
+            let mut lines = proper.clone();
+            lines.remove(line);
+            assert!(!found(&lines).is_empty(), "without {line}");
+        }
+        // Rooms that cross without a corner in common.
+        let other = ring([256, 100, 700, 180], [Some(2), None]);
+        assert!(!found(&[room, other].concat()).is_empty());
+        let none = told(&ring([0, 0, 8, 8], [None, Some(3)]));
+        assert_eq!(
+            none,
+            "linedefs disagree about the sector at (0, 4), none or 3"
+        );
+    }
+
+    /// What the nearest of some lines has on the side of a point, in four directions.
+    fn looks(lines: &[Sided], p: [f64; 2]) -> Vec<Option<u32>> {
+        let look = |(axis, sign): (usize, f64)| {
+            let mut nearest = (f64::INFINITY, None);
+            for (ends, [right, left]) in lines {
+                let [a, b] = ends.map(|end| [0, 1].map(|k| f64::from(end[k]) - p[k]));
+                let (up_a, up_b) = (a[1 - axis], b[1 - axis]);
+                if (up_a < 0.0) == (up_b < 0.0) {
+                    continue;
+                }
+                let at = (a[axis] - (b[axis] - a[axis]) * up_a / (up_b - up_a)) * sign;
+                if at > 0.0 && at < nearest.0 {
+                    let turn = a[0] * b[1] - a[1] * b[0];
+                    nearest = (at, if turn > 0.0 { *left } else { *right });
+                }
+            }
+            nearest.1
+        };
+        [(0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)].map(look).into()
+    }
+
+    #[test]
+    fn without_disputes_every_look_from_a_place_finds_the_same_sector() {
+        let mut rng = SeededRng::new(41);
+        let mut counts = [0; 2];
+        for _ in 0..400 {
+            // A bent grid of cells, some of one sector, some of none.
+            let side = 2 + rng.below(3);
+            let corner: Vec<[i32; 2]> = (0..(side + 1) * (side + 1))
+                .map(|k| [k % (side + 1), k / (side + 1)].map(|v| 64 * v as i32))
+                .map(|at| at.map(|v| v + rng.below(20) as i32))
+                .collect();
+            let cell: Vec<Option<u32>> = (0..side * side)
+                .map(|_| (rng.below(6) > 0).then(|| rng.below(4) as u32))
+                .collect();
+            let of = |x: usize, y: usize| match x < side && y < side {
+                true => cell[y * side + x],
+                false => None,
+            };
+            let mut lines: Vec<Sided> = Vec::new();
+            for (x, y) in (0..=side).flat_map(|x| (0..=side).map(move |y| (x, y))) {
+                let at = |x: usize, y: usize| corner[y * (side + 1) + x];
+                if y < side {
+                    let left = x.checked_sub(1).map_or(None, |x| of(x, y));
+                    lines.push(([at(x, y), at(x, y + 1)], [of(x, y), left]));
+                }
+                if x < side {
+                    let below = y.checked_sub(1).map_or(None, |y| of(x, y));
+                    lines.push(([at(x, y), at(x + 1, y)], [below, of(x, y)]));
+                }
+            }
+            lines.retain(|(_, sectors)| *sectors != [None; 2]);
+            assert_eq!(found(&lines), []);
+            if lines.is_empty() {
+                continue;
+            }
+            let line = rng.below(lines.len());
+            match rng.below(4) {
+                0 => lines[line].1.swap(0, 1),
+                1 => drop(lines.remove(line)),
+                2 => lines[line].1[rng.below(2)] = Some(rng.below(4) as u32),
+                _ => lines[line].0[1] = lines[(line + 1) % lines.len()].0[0],
+            }
+            let agree = found(&lines).is_empty();
+            let inside = || [0, 1].map(|_| 64.0 * side as f64 * rng.unit() + 7.3);
+            let differ = std::iter::repeat_with(inside).take(300).any(|p| {
+                let looks = looks(&lines, p);
+                looks.iter().any(|look| *look != looks[0])
+            });
+            assert!(!(agree && differ), "{lines:?}");
+            counts[usize::from(agree)] += 1;
+        }
+        assert!(counts.iter().all(|&count| count > 10), "{counts:?}");
+    }
+}

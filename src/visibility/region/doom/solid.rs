@@ -314,7 +314,7 @@ mod tests {
         for (name, least) in [("freedm-map12", 30), ("freedm-map20", 100)] {
             let sample = Sample::named(name).unwrap();
             let map = Arc::new(DoomMap::read(sample.bytes, sample.file, None).unwrap());
-            let graph = map.graph();
+            let graph = map.graph().unwrap();
             let boxes = map.solid_boxes([-512.0, 512.0]);
             assert!(boxes.len() >= least, "{name}: {}", boxes.len());
             let mut rng = SeededRng::new(3);
