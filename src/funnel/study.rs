@@ -12,6 +12,7 @@ use super::faces::Faces;
 use super::fragment_rows;
 use super::fragments::Fragments;
 use super::judged::{Errors, Judged};
+use super::left_out::LeftOutRow;
 use super::mirror::mirrored;
 use super::orders::Orders;
 use super::pass::{Pass, Walked};
@@ -84,7 +85,7 @@ pub fn prepare(
     fits(input.samples, available_bytes())?;
     let world = World::new(input)?;
     let threads = input.execution.threads;
-    let Some(truth) = seen(&world, input.samples, 0, threads, stop) else {
+    let Some(truth) = seen(&world, input.samples, 0, threads, stop)? else {
         return Ok(None);
     };
     let mut pass = Pass::new(&world);
@@ -134,16 +135,27 @@ pub fn prepare(
         .map(|tested| tested.covered.clone())
         .unwrap_or_default();
     let mut mirror = None;
+    let mut left_out = Vec::new();
+    let too_much = left.fragments.too_much.iter().cloned();
+    left_out.extend(too_much.map(|reason| LeftOutRow::of("stages", "fragment", reason)));
+    left_out.extend_from_slice(&left.orders.left_out);
     if let (Some(solids), Some(item)) = (&world.solids, input.mirror) {
-        let Some(row) = mirrored(item, &world, solids, &pass, last, stop) else {
-            return Ok(None);
-        };
-        mirror = Some(row);
+        match mirrored(item, &world, solids, &pass, last, stop) {
+            Ok(None) => return Ok(None),
+            Ok(row) => mirror = row,
+            Err(reason) => left_out.push(LeftOutRow::of("mirror", "all", reason)),
+        }
     }
-    let Some(drawn) = left.orders.drawn(input.samples, stop) else {
-        return Ok(None);
+    let drawn = match left.orders.drawn(input.samples, stop) {
+        Ok(None) => return Ok(None),
+        Ok(Some(drawn)) => drawn,
+        Err(reason) => {
+            left_out.push(LeftOutRow::of("orders", "all", reason));
+            Vec::new()
+        }
     };
     let picked = left.picks.judged();
+    left_out.extend_from_slice(&left.picks.left_out);
     // Behind the steps come the back ends of the triangle stage, then the tests of fragments.
     let first_test = pass.steps().len() + triangle_rows::back_ends().count();
     let tests = std::iter::once(None).chain((first_test..).map(Some));
@@ -222,6 +234,7 @@ pub fn prepare(
             mirror,
             orders: drawn,
             picks: picked,
+            left_out,
             bounds: bound_rows,
             gains: Vec::new(),
             conclusions: Vec::new(),
@@ -297,11 +310,12 @@ impl<'w> Left<'w> {
         let set = chosen.left();
         let faces = Faces::of(world, pass, set);
         let triangle = chain.of(StageKind::Triangle);
+        let fragments = Fragments::of(world, pass, set, &faces, triangle);
         Left {
-            fragments: Fragments::of(world, pass, set, &faces, triangle),
+            orders: Orders::of(world, pass, set, fragments.too_much.as_ref()),
+            fragments,
             faces,
             picks: Picks::of(world),
-            orders: Orders::of(world, pass, set),
         }
     }
 }
