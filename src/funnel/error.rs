@@ -62,6 +62,19 @@ pub enum FunnelError {
         /// Bytes that are free.
         available: u64,
     },
+    /// Items that are in front at the same samples, as those with a common face are.
+    #[error(
+        "camera {place}: about {in_front} items in front at the samples, those of each sample \
+         counted; expected at most {most}: fewer --samples or fewer items with a common face"
+    )]
+    TooManyTies {
+        /// The camera's index in the path.
+        place: usize,
+        /// Estimated number.
+        in_front: u64,
+        /// Most of them.
+        most: u64,
+    },
     /// A mirror that is no item.
     #[error("--mirror {item}: '{scene}' has {items} items; expected one from 0 to {}", items - 1)]
     NoMirror {

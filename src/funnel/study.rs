@@ -13,6 +13,7 @@ use super::faces::Faces;
 use super::fragment_rows;
 use super::fragments::Fragments;
 use super::judged::{Errors, Judged};
+use super::left_out::LeftOutRow;
 use super::mirror::mirrored;
 use super::orders::Orders;
 use super::pass::{Pass, Walked};
@@ -88,7 +89,7 @@ pub fn prepare(
     let world = World::new(input)?;
     let threads = input.execution.threads;
     begin("the truth");
-    let Some(truth) = seen(&world, input.samples, 0, threads, stop) else {
+    let Some(truth) = seen(&world, input.samples, 0, threads, stop)? else {
         return Ok(None);
     };
     begin("every stage, held against the truth");
@@ -139,18 +140,29 @@ pub fn prepare(
         .map(|tested| tested.covered.clone())
         .unwrap_or_default();
     let mut mirror = None;
+    let mut left_out = left_out_of(input.scene);
+    let too_much = left.fragments.too_much.iter().cloned();
+    left_out.extend(too_much.map(|reason| LeftOutRow::of("stages", "fragment", reason)));
+    left_out.extend_from_slice(&left.orders.left_out);
     if let (Some(solids), Some(item)) = (&world.solids, input.mirror) {
-        let Some(row) = mirrored(item, &world, solids, &pass, last, stop) else {
-            return Ok(None);
-        };
-        mirror = Some(row);
+        match mirrored(item, &world, solids, &pass, last, stop) {
+            Ok(None) => return Ok(None),
+            Ok(row) => mirror = row,
+            Err(reason) => left_out.push(LeftOutRow::of("mirror", "all", reason)),
+        }
     }
     begin("every order, drawn");
-    let Some(drawn) = left.orders.drawn(input.samples, stop) else {
-        return Ok(None);
+    let drawn = match left.orders.drawn(input.samples, stop) {
+        Ok(None) => return Ok(None),
+        Ok(Some(drawn)) => drawn,
+        Err(reason) => {
+            left_out.push(LeftOutRow::of("orders", "all", reason));
+            Vec::new()
+        }
     };
     begin("what is under a cursor");
     let picked = left.picks.judged();
+    left_out.extend_from_slice(&left.picks.left_out);
     // Behind the steps come the back ends of the triangle stage, then the tests of fragments.
     let first_test = pass.steps().len() + triangle_rows::back_ends().count();
     let tests = std::iter::once(None).chain((first_test..).map(Some));
@@ -229,7 +241,7 @@ pub fn prepare(
             mirror,
             orders: drawn,
             picks: picked,
-            left_out: left_out_of(input.scene),
+            left_out,
             bounds: bound_rows,
             gains: Vec::new(),
             conclusions: Vec::new(),
@@ -305,11 +317,12 @@ impl<'w> Left<'w> {
         let set = chosen.left();
         let faces = Faces::of(world, pass, set);
         let triangle = chain.of(StageKind::Triangle);
+        let fragments = Fragments::of(world, pass, set, &faces, triangle);
         Left {
-            fragments: Fragments::of(world, pass, set, &faces, triangle),
+            orders: Orders::of(world, pass, set, fragments.too_much.as_ref()),
+            fragments,
             faces,
             picks: Picks::of(world),
-            orders: Orders::of(world, pass, set),
         }
     }
 }

@@ -183,7 +183,7 @@ pub fn prepare_sweep(
         StageKind::Triangle => (0, Some(Truth::empty(world.views()))),
         _ => {
             let threads = input.execution.threads;
-            let truth = seen(&world, input.samples, RAYS, threads, stop);
+            let truth = seen(&world, input.samples, RAYS, threads, stop)?;
             (RAYS, truth)
         }
     };

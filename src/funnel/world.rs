@@ -10,6 +10,7 @@ use glam::DVec3;
 use super::back_ends::back_ends;
 use super::chain::Chain;
 use super::error::FunnelError;
+use super::faces;
 use super::hiding::{HIDING, HidingRow};
 use super::judged::{Judged, judge_items};
 use super::plan_view::{Fate, MOST_DRAWN, PlanView};
@@ -130,8 +131,7 @@ impl<'a> World<'a> {
                     error: error.into(),
                 })?,
                 rays: Rays::of(camera).map_err(error)?,
-                triangles: triangle::View::of(camera, input.scene.origin, input.samples)
-                    .map_err(error)?,
+                triangles: faces::view(input.scene, camera, input.samples).map_err(error)?,
             })
         });
         let built = input.structures.iter().map(|spec| {

@@ -12,6 +12,7 @@ mod cullings;
 mod drift;
 mod foreign_text;
 mod funnel;
+mod funnel_extremes;
 mod funnel_fragments;
 mod funnel_maps;
 mod funnel_options;

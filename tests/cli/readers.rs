@@ -193,7 +193,7 @@ fn damaged_maps_seen_through() {
             scene.items.len() + map.sectors.len()
         );
         map.solid_boxes([-512.0, 512.0]);
-        let graph = Arc::new(map.graph());
+        let graph = Arc::new(map.graph().map_err(|dispute| dispute.to_string())?);
         let exact = SectorPvs::of(map.clone(), graph.clone());
         let reject = map.reject().map(|reject| audit(reject, &exact, &graph));
         assert!(reject.is_none_or(|audit| audit.is_ok()));
