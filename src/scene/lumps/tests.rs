@@ -1,3 +1,5 @@
+//! Files with a map as it should be, as other formats have it, and damaged.
+
 use super::super::WadMap;
 use super::*;
 
