@@ -295,7 +295,7 @@ mod tests {
             let what = ("camera", 3000);
             let agree = ask_all(structures, &scene, items, what, true, ask, &mut each);
             assert!(agree.expect("linear answers"));
-            assert_eq!(seen.len(), 2);
+            assert!(seen.len() > 1);
             assert!(seen.concat().into_iter().eq(0..3000));
         }
     }
