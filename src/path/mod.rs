@@ -18,7 +18,7 @@ use std::path::Path;
 use glam::DVec3;
 
 use crate::camera::{Camera, CameraError, FARTHEST, Frame, Lens, Surroundings};
-use crate::input::{InputError, is_readable, read_file};
+use crate::input::{InputError, gigabytes, is_readable, read_file};
 use crate::scene::{self, Scene, SeededRng, WorldBox};
 use crate::shown::counted;
 use crate::spec::{Spec, SpecError};
@@ -263,7 +263,10 @@ pub fn load_scaled(
     let name = source.split(':').next().unwrap_or_default();
     let file = Path::new(source);
     if is_readable(file) || source.ends_with(".csv") || name.contains(['/', '\\', '.']) {
-        return read_cameras_csv(&read_file(file)?[..], source, defaults);
+        let bytes = read_file(file)?;
+        let rows = bytes.iter().filter(|byte| **byte == b'\n').count();
+        fits(source, rows as u64)?;
+        return read_cameras_csv(&bytes[..], source, defaults);
     }
     let mut spec = Spec::parse(source)?;
     let Some(family) = PATHS.iter().find(|p| p.name == spec.name()) else {
@@ -276,6 +279,7 @@ pub fn load_scaled(
         count: spec.count("frames", 256, 1_000_000)? as usize,
         seed: spec.whole("seed", 1, u64::MAX)?,
     };
+    fits(source, stage.count as u64)?;
     let poses = (family.frames)(&stage, &mut spec)?;
     let optics = Optics::from_spec(&mut spec, defaults, &stage, &poses)?;
     spec.finish()?;
@@ -300,6 +304,29 @@ pub fn load_scaled(
         lines: Vec::new(),
         lens_scale,
     })
+}
+
+/// Refuses more cameras than there is memory for.
+fn fits(source: &str, cameras: u64) -> Result<(), PathError> {
+    /// Fewer are made without a look at the memory.
+    const ANYWHERE: u64 = 10_000;
+    /// Bytes of a camera with its views and answers: 2,800 were measured.
+    const PER_CAMERA: u64 = 3000;
+    let needed = cameras.saturating_mul(PER_CAMERA);
+    if cameras <= ANYWHERE {
+        return Ok(());
+    }
+    match scene::available_bytes().filter(|available| needed > *available) {
+        Some(available) => Err(PathError::unfit(
+            source,
+            format!(
+                "{cameras} cameras need about {}, {} are free; expected fewer",
+                gigabytes(needed),
+                gigabytes(available)
+            ),
+        )),
+        None => Ok(()),
+    }
 }
 
 /// The lens parameters of a generated path.

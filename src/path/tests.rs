@@ -207,3 +207,14 @@ fn what_cannot_be_a_path_says_why() {
         assert!(error.contains(wanted), "{source}: {error}");
     }
 }
+
+#[test]
+fn a_long_path_is_thinned_evenly() {
+    let scene = scene::load("uniform:n=5", &Default::default()).unwrap();
+    let mut all = path("orbit:frames=10", &scene);
+    all.lines = (2..12).collect();
+    assert_eq!(all.clone().at_most(10).lines, all.lines);
+    let some = all.clone().at_most(4);
+    assert_eq!(some.lines, [2, 4, 7, 9]);
+    assert_eq!(some.cameras[3], all.cameras[7]);
+}
