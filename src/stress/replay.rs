@@ -227,6 +227,11 @@ mod tests {
         };
         let mut declared = 0;
         for vector in built_in().unwrap() {
+            let camera = vector.camera.is_none_or(|camera| camera.camera().is_ok());
+            if vector.planes_error.is_some() || !camera {
+                // Without a volume nothing is judged.
+                continue;
+            }
             let (names, _) = vector.sound_boxes();
             let lists = [&vector.visible_planes, &vector.visible_camera];
             for (level, visible) in lists.into_iter().enumerate() {
