@@ -32,6 +32,40 @@ pub fn lines(text: &str) -> String {
     plain.join("\n")
 }
 
+/// [`plain`] text of at most `most` characters and the mark of a cut.
+pub fn shortened(text: &str, most: usize) -> String {
+    without_middle(&plain(text), [most, 0])
+}
+
+/// [`plain`] text of a message. Very long words lose their middle, and so does the whole:
+/// a name of any length leaves where and what was expected.
+///
+/// ```
+/// use cullbench::shown::message;
+/// let line = message(&format!("unknown scene '{}'; expected a file", "a".repeat(100_000)));
+/// assert!(line.len() < 300 && line.ends_with("aaa'; expected a file"));
+/// ```
+pub fn message(text: &str) -> String {
+    let text = plain(text);
+    let words: Vec<String> = text
+        .split(' ')
+        .map(|word| without_middle(word, [160, 80]))
+        .collect();
+    without_middle(&words.join(" "), [1200, 400])
+}
+
+/// The first and the last characters of a longer text, with the mark of a cut.
+fn without_middle(text: &str, [first, last]: [usize; 2]) -> String {
+    let count = text.chars().count();
+    if count <= first + last {
+        return text.to_owned();
+    }
+    let mut kept: String = text.chars().take(first).collect();
+    kept.push_str("...");
+    kept.extend(text.chars().skip(count - last));
+    kept
+}
+
 /// Control characters, marks and overrides of the direction, characters without
 /// a width, tags, and what XML does not allow at all.
 fn is_harmful(c: char) -> bool {
@@ -69,6 +103,11 @@ fn is_formula(text: &str) -> bool {
     // A spreadsheet drops white space before it looks.
     let begins = text.trim_start().starts_with(['=', '+', '-', '@']);
     begins && !text.parse::<f64>().is_ok_and(f64::is_finite)
+}
+
+/// Lower-case hexadecimal.
+pub(crate) fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 
 /// Whole numbers in groups of three.

@@ -250,8 +250,44 @@ impl Spec {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
+    use std::collections::BTreeSet;
+
+    /// Parameters with their defaults, as `list` shows them; remarks are in parentheses.
+    pub(crate) fn listed(params: &str) -> Vec<(String, String)> {
+        let mut depth = 0;
+        let bare: String = params
+            .chars()
+            .filter(|&c| {
+                depth += i32::from(c == '(');
+                let is_outside = depth == 0;
+                depth -= i32::from(c == ')');
+                is_outside
+            })
+            .collect();
+        let each = bare
+            .split(',')
+            .map(str::trim)
+            .filter(|each| !each.is_empty());
+        each.map(|each| {
+            let (key, value) = each.split_once('=').unwrap_or((each, ""));
+            (key.trim().to_owned(), value.trim().to_owned())
+        })
+        .collect()
+    }
+
+    pub(crate) fn keys(listed: &[(String, String)]) -> BTreeSet<&str> {
+        listed.iter().map(|(key, _)| key.as_str()).collect()
+    }
+
+    /// The parameters that are read, by the error of one that is not.
+    pub(crate) fn known(error: &str) -> BTreeSet<&str> {
+        let (_, known) = error
+            .split_once("(known: ")
+            .expect("a list of what is known");
+        known.trim_end_matches(')').split(", ").collect()
+    }
 
     #[test]
     fn numbers_take_suffixes() {

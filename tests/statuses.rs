@@ -250,7 +250,11 @@ fn ctrl_c_is_answered_at_once_in_the_middle_of_a_build() {
     std::thread::sleep(Duration::from_millis(1500));
     let (output, took) = interrupted(child);
     assert_eq!(output.status.code(), Some(130));
-    assert!(output.stderr.is_empty());
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(
+        told,
+        "stopping at the next safe place; again ends at once\n"
+    );
     assert!(took < Duration::from_secs(1), "{took:?}");
     // Nothing was finished: nothing is left.
     assert!(!folder.path().join("r").exists());
@@ -317,6 +321,21 @@ fn a_resumed_run_does_not_try_again_what_has_ended_a_process() {
     assert_eq!(lines("tried"), 1);
 }
 
+fn a_run_without_any_answer_is_no_success() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let line = "run --scene city:n=300 --path orbit:frames=4 --processes 2 --no-bounds \
+        --structure greedy --out r";
+    let done = program(folder.path())
+        .args(line.split_whitespace())
+        .output();
+    assert_eq!(done.expect("started").status.code(), Some(1));
+    let cells = cells(folder.path(), "r");
+    assert_eq!(
+        (cells.len(), &cells[0]["status"]),
+        (1, &json!("out_of_memory"))
+    );
+}
+
 fn a_scene_without_items_is_left_out() {
     let folder = tempfile::tempdir().expect("a folder");
     let line = "run --scene city:n=0 --path outside:frames=2 --processes 2 --structure linear,bvh \
@@ -360,7 +379,7 @@ fn what_does_not_fit_is_refused_before_it_is_made() {
     };
     let gigabyte = 1_000_000_000;
     let told = refused(100_000_000, 0, Some(8 * gigabyte)).expect("refused");
-    let wanted = "uniform:n=9: needs about 12.0 GB, 8.0 GB are free; expected a smaller n";
+    let wanted = "uniform:n=9: needs about 12.0 GB, 8.0 GB are free; expected fewer items";
     assert_eq!(told, wanted);
     // Structures count, and the line says how many.
     assert_eq!(refused(100_000_000, 0, Some(13 * gigabyte)), None);
@@ -383,6 +402,7 @@ fn main() -> ExitCode {
     }
     what_does_not_fit_is_refused_before_it_is_made();
     a_scene_without_items_is_left_out();
+    a_run_without_any_answer_is_no_success();
     each_mishap_fails_its_own_rows();
     #[cfg(unix)]
     {

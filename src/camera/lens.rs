@@ -4,7 +4,7 @@
 
 use glam::DVec3;
 
-use super::{Camera, CameraError, Frame, MatrixConvention, Pose, ViewProjection, finite};
+use super::{Camera, CameraError, FARTHEST, Frame, MatrixConvention, Pose, ViewProjection, finite};
 
 /// What the camera's lens takes in. Lengths are world units. Use the checked
 /// constructors; the planes of an unchecked lens may be nonsense.
@@ -52,7 +52,7 @@ pub enum Lens {
 impl Lens {
     /// # Errors
     /// fov outside (0, 180), aspect or near not above 0, near >= far, a value
-    /// that is not finite.
+    /// that is not finite. A far plane beyond [`FARTHEST`] is an infinite one.
     pub fn perspective(
         fovy_deg: f64,
         aspect: f64,
@@ -64,12 +64,11 @@ impl Lens {
             return Err(CameraError::FieldOfView { fovy_deg });
         }
         check_aspect(aspect)?;
-        check_depth(near, far)?;
         Ok(Lens::Perspective {
             fovy_deg,
             aspect,
             near,
-            far,
+            far: checked_far(near, far)?,
         })
     }
 
@@ -85,6 +84,9 @@ impl Lens {
         check_window("height", 0.0, height)?;
         finite("near", near)?;
         check_far(near, far)?;
+        if far > FARTHEST {
+            return Err(CameraError::FarOrthographic { far });
+        }
         Ok(Lens::Orthographic {
             height,
             aspect,
@@ -100,7 +102,7 @@ impl Lens {
         let [left, right, bottom, top] = window;
         check_window("left to right", left, right)?;
         check_window("bottom to top", bottom, top)?;
-        check_depth(near, far)?;
+        let far = checked_far(near, far)?;
         Ok(Lens::OffAxis { window, near, far })
     }
 
@@ -221,12 +223,14 @@ fn check_aspect(aspect: f64) -> Result<(), CameraError> {
     sound.then_some(()).ok_or(CameraError::Aspect { aspect })
 }
 
-fn check_depth(near: f64, far: Option<f64>) -> Result<(), CameraError> {
+/// The far plane of a lens with a centre; `None` beyond [`FARTHEST`].
+fn checked_far(near: f64, far: Option<f64>) -> Result<Option<f64>, CameraError> {
     finite("near", near)?;
     if near <= 0.0 {
         return Err(CameraError::Near { near });
     }
-    far.map_or(Ok(()), |far| check_far(near, far))
+    far.map_or(Ok(()), |far| check_far(near, far))?;
+    Ok(far.filter(|far| *far <= FARTHEST))
 }
 
 fn check_far(near: f64, far: f64) -> Result<(), CameraError> {
@@ -295,6 +299,27 @@ mod tests {
         let off = slope(180.0 - missing) / true_slope - 1.0;
         assert!(off.abs() < 1e-15, "{off:e}");
         assert!((slope(120.0) / 3f64.sqrt() - 1.0).abs() < 4e-16);
+    }
+
+    /// Engines write the largest f32 for no far plane.
+    #[test]
+    fn a_far_plane_beyond_f32_is_none() {
+        let largest = f64::from(f32::MAX);
+        for far in [FARTHEST * (1.0 + f64::EPSILON), largest, 1e39, 1e308] {
+            let lens = Lens::perspective(60.0, 1.0, 1.0, Some(far)).unwrap();
+            assert_eq!(lens.far(), None, "{far:e}");
+            assert_eq!(lens.with_far(Some(far)).unwrap(), lens);
+            let lens = Lens::off_axis([-1.0, 1.0, -1.0, 1.0], 1.0, Some(far)).unwrap();
+            assert_eq!(lens.far(), None, "{far:e}");
+            let error = Lens::orthographic(1.0, 1.0, 1.0, far).unwrap_err();
+            assert!(
+                matches!(error, CameraError::FarOrthographic { .. }),
+                "{far:e}"
+            );
+        }
+        let lens = Lens::perspective(60.0, 1.0, 1.0, Some(FARTHEST)).unwrap();
+        assert_eq!(lens.far(), Some(FARTHEST));
+        assert!(Lens::perspective(60.0, 1.0, 1e39, Some(largest)).is_err());
     }
 
     #[test]

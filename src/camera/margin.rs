@@ -36,7 +36,9 @@ pub(super) struct Margin {
     depth: f64,
     /// The near corners' rays at unit depth, if there is no far plane.
     rays: [DVec3; 4],
-    derived: f64,
+    /// The share of the derivation in f64: of the named planes, and of those that are
+    /// made about the rounded eye.
+    derived: [f64; 2],
     /// Whether the near and the far plane are known as exactly as from a frame.
     of_frame: bool,
 }
@@ -64,7 +66,7 @@ impl Margin {
             far,
             depth: lens.far().map_or(f64::INFINITY, |far| far - lens.near()),
             rays: lens.corners_at(&frame.relative_to(frame.eye), 1.0),
-            derived: DERIVED * (coordinates.element_sum() + deepest),
+            derived: [DERIVED * (coordinates.element_sum() + deepest); 2],
             of_frame,
         }
     }
@@ -87,7 +89,8 @@ impl Margin {
             far,
             depth: f64::INFINITY,
             rays: [DVec3::ZERO; 4],
-            derived: DERIVED * (reach + eye.abs()).element_sum(),
+            // Its planes are rounded sums about the exact zero.
+            derived: [0.0, DERIVED * (reach + eye.abs()).element_sum()],
             of_frame: false,
         }
     }
@@ -97,10 +100,8 @@ impl Margin {
     pub(super) fn moved(&self, name: Option<FrustumPlane>, plane: &Plane, slack: f64) -> Plane {
         let d = f64::from(plane.d);
         let error = self.c * UNIT_ROUNDOFF * self.size(name, plane);
-        Plane::new(
-            plane.normal,
-            round_up(d + (error + TINY + self.derived + slack)),
-        )
+        let derived = self.derived[usize::from(name.is_none())];
+        Plane::new(plane.normal, round_up(d + (error + TINY + derived + slack)))
     }
 
     /// The largest sum of magnitudes at a visible point that the plane could

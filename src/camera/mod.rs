@@ -14,7 +14,7 @@ mod projection;
 pub use frame::{Frame, look_at};
 pub use lens::Lens;
 pub(crate) use margin::check_sums;
-pub use matrix::{MATRIX_CONVENTIONS, MATRIX_ENTRIES, MatrixConvention, ViewProjection};
+pub use matrix::{FARTHEST, MATRIX_CONVENTIONS, MATRIX_ENTRIES, MatrixConvention, ViewProjection};
 pub use planes::{DEFAULT_EPSILON, PLANE_METHODS, PlaneMethod, PlaneOptions, Surroundings};
 pub use pose::Pose;
 pub use projection::ClipSpace;
@@ -103,6 +103,14 @@ pub enum CameraError {
     NearFar {
         /// What was given.
         near: f64,
+        /// What was given.
+        far: f64,
+    },
+    /// An orthographic lens without an end.
+    #[error(
+        "far is {far:e}; expected at most 1.7e38, half of what f32 holds, for an orthographic lens"
+    )]
+    FarOrthographic {
         /// What was given.
         far: f64,
     },

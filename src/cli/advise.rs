@@ -10,7 +10,7 @@ use super::processes::{Said, Workers};
 use super::protocol::{Job, Timing};
 use super::study::Study;
 use super::table::Table;
-use super::{Ending, interrupt, load_scene, print, text};
+use super::{Ending, interrupt, load_scene, print, tell, text};
 use crate::advise::{
     self, Advice, AdviseInput, AdviseOptions, Check, LeftOutIf, Omission, StructureChoice,
     TestChoice, TrialPlan,
@@ -24,6 +24,9 @@ use crate::path;
 use crate::scene;
 use crate::statistics::Estimate;
 
+/// More tell no more about a scene, and every rule holds views of all of them: some 20 KB
+/// a camera.
+const MOST_CAMERAS: usize = 4096;
 /// Rounds of a task, if one process has them all.
 const ROUNDS: [usize; 2] = [5, 25];
 
@@ -32,6 +35,15 @@ pub fn advise(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Ending> 
     let plan = plan(registry, args)?;
     let scene = load_scene(&args.scene, &args.scene_args, plan.structures.len())?;
     let path = path::load(&args.path, &scene, &plan.lens)?;
+    let all = path.cameras.len();
+    let path = path.at_most(MOST_CAMERAS);
+    if path.cameras.len() < all {
+        tell(&format!(
+            "note: {} of {}, evenly spread, are looked at",
+            text::count(path.cameras.len()),
+            text::counted(all, "camera")
+        ));
+    }
     let protocol = protocol(args, 0, scene.items.len());
     let input = AdviseInput {
         scene: &scene,
@@ -89,6 +101,7 @@ pub fn plan(registry: &Registry, args: &AdviseArgs) -> anyhow::Result<Plan> {
         cullings: vec![Culling::default()],
         lens: args.lens.defaults()?,
         load: args.scene_args.options(0),
+        most_cameras: MOST_CAMERAS,
         effort: args.spread.effort(ROUNDS),
         bounds: false,
         seed: args.spread.seed,
@@ -111,6 +124,7 @@ pub fn time(
     let plan = plan(registry, args)?;
     let scene = scene::load(&args.scene, &plan.load)?;
     let path = path::load_scaled(&args.path, &scene, &plan.lens, timing.lens_scale)?;
+    let path = path.at_most(MOST_CAMERAS);
     let input = AdviseInput {
         scene: &scene,
         path: &path,

@@ -16,6 +16,7 @@ use super::interrupt::{self, Interrupted};
 use super::processes::{Ended, Said, Worker, processors, see_through};
 use super::protocol::{Job, PROTOCOL, Request};
 use super::run_plan::RunPlan;
+use crate::input;
 use crate::measure::{GroupKey, Known, Part, Share, Status, TaskKind, Verdict};
 use crate::statistics::{Judgement, interquartile_mean, judge, resolved, trimmed_mean};
 
@@ -223,6 +224,7 @@ impl Duel<'_> {
             protocol: PROTOCOL,
             args: self.args.clone(),
             spooled: BTreeMap::new(),
+            files: input::held_files(),
             job: Job::Scene {
                 scene,
                 share: Share {

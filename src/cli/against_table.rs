@@ -1,7 +1,7 @@
 //! The command behind `compare --against`: options, progress, the table.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
@@ -42,6 +42,7 @@ pub fn compare_against(
         );
     }
     let new = std::env::current_exe().context("this program cannot be found again")?;
+    let binary = &program(binary)?;
     let sides = [side(binary)?, side(&new)?];
     let plan = run_plan::plan_of(registry, &args.what, SUITE, Some(STRUCTURES))?;
     plan.check_inputs()?;
@@ -92,6 +93,26 @@ pub fn compare_against(
     };
     unread_is_fine(table.show(args))?;
     Ok(table.ending())
+}
+
+/// The program that a name stands for, as in a shell: a name without a folder is looked
+/// up in PATH.
+fn program(name: &Path) -> anyhow::Result<PathBuf> {
+    let found = match name.parent() {
+        Some(folder) if folder.as_os_str().is_empty() => {
+            let path = std::env::var_os("PATH").unwrap_or_default();
+            let mut places = std::env::split_paths(&path).map(|folder| folder.join(name));
+            places.find(|place| place.is_file()).with_context(|| {
+                let name = name.display();
+                format!("{name}: not in PATH; expected a program there, or ./{name} for one here")
+            })?
+        }
+        _ => name.to_owned(),
+    };
+    let shown = || found.display().to_string();
+    let is_file = fs::metadata(&found).with_context(shown)?.is_file();
+    anyhow::ensure!(is_file, "{}: no file; expected a program", shown());
+    std::path::absolute(&found).with_context(shown)
 }
 
 /// A program as one side of the comparison.
@@ -197,5 +218,32 @@ pub fn expect_none_of_a_run() -> anyhow::Result<()> {
              expected no {option}"
         ),
         None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The report names the program that runs.
+    #[cfg(unix)]
+    #[test]
+    fn a_name_without_a_folder_is_looked_up_in_path() {
+        let found = |name: &str| program(Path::new(name)).map_err(|error| error.to_string());
+        let shell = found("sh").unwrap();
+        assert!(shell.is_absolute() && shell.ends_with("sh") && shell.is_file());
+        let manifest = found("./Cargo.toml").unwrap();
+        assert!(manifest.is_absolute() && manifest.is_file());
+        for (name, wanted) in [
+            (
+                "Cargo.toml",
+                "Cargo.toml: not in PATH; expected a program there, or ./Cargo.toml",
+            ),
+            ("/dev/zero", "/dev/zero: no file; expected a program"),
+            ("./src", "./src: no file; expected a program"),
+        ] {
+            let error = found(name).unwrap_err();
+            assert!(error.starts_with(wanted), "{error}");
+        }
     }
 }

@@ -34,7 +34,7 @@ Examples:
   cullbench compare old/report.json new/report.json    what has become slower since
 
 Scenes and paths are files or specs such as city:n=100000,seed=7; `cullbench list` names them all.
-Exit codes: 0 ok, 1 a wrong answer or failed verification, 2 usage or bad input,
+Exit codes: 0 ok, 1 a wrong answer, none at all or failed verification, 2 usage or bad input,
 3 a regression (compare), 130 interrupted.";
 
 #[derive(Subcommand, Debug)]
@@ -229,7 +229,7 @@ pub struct CompareArgs {
     /// report.json of the newer run, or the folder it is in
     #[arg(value_name = "NEW.json", required_unless_present = "against")]
     pub new: Option<PathBuf>,
-    /// Run another build of this program against this one instead: OLD is that binary, NEW is this
+    /// Run another build of this program against this one instead: OLD is that binary (a name without a slash is looked up in PATH), NEW is this
     #[arg(long, value_name = "BINARY", conflicts_with_all = ["old", "new"])]
     pub against: Option<PathBuf>,
     #[command(flatten)]

@@ -5,6 +5,8 @@
 use std::collections::BTreeMap;
 use std::io::{self, BufWriter, Write};
 
+use serde::Serializer;
+use serde::ser::SerializeSeq;
 use serde_json::{Map, Value};
 
 use super::shared_args::RowFormat;
@@ -20,63 +22,114 @@ use crate::threads::share;
 pub struct Row {
     pub question: usize,
     pub structure: String,
-    pub ids: Option<Vec<ItemId>>,
+    pub ids: Option<Box<[ItemId]>>,
     pub answer: Answer,
     pub id_sum: u64,
     pub cost: QueryCost,
 }
 
-/// Asks every structure every question; answers in the order of questions,
-/// then of structures. Ids (ascending) are kept only if wanted.
+impl Row {
+    fn bytes(&self) -> usize {
+        let ids = self.ids.as_deref().map_or(0, size_of_val);
+        size_of::<Row>() + self.structure.len() + ids
+    }
+}
+
+/// Bytes of answers that are held at once: enough that a structure is rarely built again.
+const HELD: usize = 64 << 20;
+
+/// Asks every structure every question and hands out the answers, in the order of
+/// questions, then of structures, as soon as so many are there that they would fill memory.
+/// Ids (ascending) are kept only if wanted. False if two structures disagree, which is
+/// told as it comes.
 pub fn ask_all(
     structures: &[StructureSpec],
     scene: &Scene,
     boxes: &[Aabb],
-    questions: usize,
+    (what, questions): (&str, usize),
     keep_ids: bool,
     ask: impl Fn(&dyn DynIndex, usize, &mut Vec<ItemId>, &mut QueryCost) + Sync,
-) -> anyhow::Result<Vec<Row>> {
-    let mut answers: Vec<Vec<Row>> = (0..questions).map(|_| Vec::new()).collect();
-    for spec in structures {
-        let failed = |why: String| anyhow::anyhow!("structure '{}': {why}", spec.label);
-        let panicked = |verdict: Verdict| failed(verdict.reason.unwrap_or_default());
-        let index = match spec.build(input_of(scene, boxes)) {
-            Ok(index) => index,
-            // One of many: the others' answers are worth having.
-            Err(error @ BuildError::Refused { .. }) if structures.len() > 1 => {
-                super::tell(&format!("left out: {error}"));
-                continue;
-            }
-            Err(error) => return Err(failed(error.to_string())),
-        };
-        let asked = guarded(|| {
-            share(
-                spec.execution.threads,
-                answers.iter_mut().enumerate(),
-                |(question, row)| {
-                    let (mut out, mut cost) = (Vec::new(), QueryCost::default());
-                    ask(index.as_ref(), question, &mut out, &mut cost);
-                    if keep_ids {
-                        out.sort_unstable();
+    each: &mut dyn FnMut(Vec<Row>) -> io::Result<()>,
+) -> anyhow::Result<bool> {
+    let block = (HELD / size_of_val(boxes).max(1)).clamp(1, 1024);
+    let (mut from, mut agree) = (0, true);
+    // A single structure is built once; of several there may be memory for one.
+    let mut only: Option<Box<dyn DynIndex>> = None;
+    while from < questions {
+        let mut answers: Vec<Vec<Row>> = Vec::new();
+        for spec in structures {
+            let failed = |why: String| anyhow::anyhow!("structure '{}': {why}", spec.label);
+            let panicked = |verdict: Verdict| failed(verdict.reason.unwrap_or_default());
+            let index = match only
+                .take()
+                .map_or_else(|| spec.build(input_of(scene, boxes)), Ok)
+            {
+                Ok(index) => index,
+                // One of many: the others' answers are worth having.
+                Err(error @ (BuildError::Refused { .. } | BuildError::OutOfMemory { .. }))
+                    if structures.len() > 1 =>
+                {
+                    if from == 0 {
+                        super::tell(&format!("left out: {error}"));
                     }
-                    row.push(Row {
-                        question,
-                        structure: spec.label.clone(),
-                        answer: Answer::of(&out),
-                        id_sum: crate::measure::id_sum(&out),
-                        ids: keep_ids.then_some(out),
-                        cost,
+                    continue;
+                }
+                Err(error) => return Err(failed(error.to_string())),
+            };
+            // The first structure finds how many questions' answers there is room for.
+            let (mut held, first) = (0, answers.is_empty());
+            let end = if first {
+                questions
+            } else {
+                from + answers.len()
+            };
+            let mut next = from;
+            while next < end && (!first || held < HELD) {
+                let count = (end - next).min(block * spec.execution.threads.max(1));
+                if first {
+                    answers.extend((0..count).map(|_| Vec::new()));
+                }
+                let asked = guarded(|| {
+                    let rows = answers[next - from..][..count].iter_mut().enumerate();
+                    share(spec.execution.threads, rows, |(n, row)| {
+                        let (mut out, mut cost) = (Vec::new(), QueryCost::default());
+                        let question = next + n;
+                        ask(index.as_ref(), question, &mut out, &mut cost);
+                        if keep_ids {
+                            out.sort_unstable();
+                        }
+                        row.push(Row {
+                            question,
+                            structure: spec.label.clone(),
+                            answer: Answer::of(&out),
+                            id_sum: crate::measure::id_sum(&out),
+                            ids: keep_ids.then(|| out.as_slice().into()),
+                            cost,
+                        });
                     });
-                },
-            );
-        });
-        asked.map_err(panicked)?;
+                });
+                asked.map_err(panicked)?;
+                let rows = answers[next - from..].iter().filter_map(|row| row.last());
+                held += rows.map(Row::bytes).sum::<usize>() * structures.len();
+                next += count;
+            }
+            if structures.len() == 1 {
+                only = Some(index);
+            }
+        }
+        if answers.is_empty() {
+            break;
+        }
+        from += answers.len();
+        let rows: Vec<Row> = answers.into_iter().flatten().collect();
+        agree &= all_agree(&rows, what);
+        each(rows)?;
     }
-    Ok(answers.into_iter().flatten().collect())
+    Ok(agree)
 }
 
 /// Says which questions were answered differently; true if none was.
-pub fn all_agree(rows: &[Row], what: &str) -> bool {
+fn all_agree(rows: &[Row], what: &str) -> bool {
     let mut first: BTreeMap<usize, &Row> = BTreeMap::new();
     let mut agree = true;
     for row in rows {
@@ -102,33 +155,69 @@ pub fn all_agree(rows: &[Row], what: &str) -> bool {
     agree
 }
 
-/// The answers as CSV or JSON, with a value for each column.
+/// Writes the answers that `ask` hands out as CSV or JSON, with a value for each column.
+/// A reader who leaves early changes neither what is asked nor what is found.
 pub fn write(
     format: RowFormat,
     columns: &[&str],
-    answers: &[Row],
     row: impl Fn(&Row) -> Vec<Value>,
-) -> io::Result<()> {
-    let mut out = BufWriter::new(io::stdout().lock());
-    let rows = answers.iter().map(row);
-    match format {
+    ask: impl FnOnce(&mut dyn FnMut(Vec<Row>) -> io::Result<()>) -> anyhow::Result<bool>,
+) -> anyhow::Result<bool> {
+    let mut out = BufWriter::new(Unread(io::stdout().lock()));
+    let agree = match format {
         RowFormat::Csv => {
             let mut csv = csv::Writer::from_writer(&mut out);
-            csv.write_record(columns)?;
-            for row in rows {
-                csv.write_record(row.iter().map(cell))?;
+            // Written with the first row: an error before it is all that is said.
+            let mut header = Some(columns);
+            let agree = ask(&mut |rows| {
+                if let Some(columns) = header.take() {
+                    csv.write_record(columns)?;
+                }
+                let mut rows = rows.iter().map(&row);
+                Ok(rows.try_for_each(|row| csv.write_record(row.iter().map(cell)))?)
+            });
+            if let Some(columns) = header.filter(|_| agree.is_ok()) {
+                csv.write_record(columns)?;
             }
             csv.flush()?;
+            agree
         }
         RowFormat::Json => {
+            let mut json = serde_json::Serializer::pretty(&mut out);
+            let mut array = json.serialize_seq(None)?;
             let names = || columns.iter().map(|&name| name.to_owned());
-            let rows: Vec<Map<String, Value>> =
-                rows.map(|row| names().zip(row).collect()).collect();
-            serde_json::to_writer_pretty(&mut out, &rows)?;
+            let object = |a: &Row| names().zip(row(a)).collect::<Map<String, Value>>();
+            let agree = ask(&mut |rows| {
+                let mut rows = rows.iter().map(&object);
+                Ok(rows.try_for_each(|object| array.serialize_element(&object))?)
+            });
+            array.end()?;
             writeln!(out)?;
+            agree
+        }
+    };
+    match agree {
+        Ok(_) => out.flush()?,
+        // No answers but a beginning: it is not shown.
+        Err(_) => drop(out.into_parts()),
+    }
+    agree
+}
+
+/// Output that may be closed by its reader.
+struct Unread<W>(W);
+
+impl<W: Write> Write for Unread<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self.0.write(bytes) {
+            Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(bytes.len()),
+            other => other,
         }
     }
-    out.flush()
+
+    fn flush(&mut self) -> io::Result<()> {
+        super::unread_is_fine(self.0.flush())
+    }
 }
 
 /// A value as CSV holds it: ids separated by spaces.
@@ -176,7 +265,39 @@ mod tests {
             assert!(!panics, "deep in a peer's query");
             out.push(7);
         };
-        ask_all(structures, &scene, &scene.items, 2, true, ask).map_err(|error| error.to_string())
+        let mut all = Vec::new();
+        let mut each = |rows: Vec<Row>| {
+            all.extend(rows);
+            Ok(())
+        };
+        let what = ("camera", 2);
+        let items = &scene.items;
+        let agree = ask_all(structures, &scene, items, what, true, ask, &mut each);
+        agree.map(|_| all).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn answers_too_large_to_be_held_come_in_order_and_in_pieces() {
+        let scene = crate::scene::load("uniform:n=10", &Default::default()).expect("uniform");
+        let two = [of(REFUSES), StructureSpec::parse("linear").expect("linear")];
+        // Of two thousand answers there is more than is held.
+        let many: Vec<ItemId> = (0..HELD as ItemId / 8000).collect();
+        for structures in [&two[1..], &two[..]] {
+            let ask = |_: &dyn DynIndex, _, out: &mut Vec<ItemId>, _: &mut QueryCost| {
+                out.extend(&many);
+            };
+            let mut seen = Vec::new();
+            let mut each = |rows: Vec<Row>| {
+                seen.push(rows.iter().map(|row| row.question).collect::<Vec<_>>());
+                Ok(())
+            };
+            let items = &scene.items;
+            let what = ("camera", 3000);
+            let agree = ask_all(structures, &scene, items, what, true, ask, &mut each);
+            assert!(agree.expect("linear answers"));
+            assert!(seen.len() > 1);
+            assert!(seen.concat().into_iter().eq(0..3000));
+        }
     }
 
     #[test]

@@ -40,12 +40,13 @@ pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
     let job = |timing| Job::Drift(prepared.plan.clone(), timing);
     let times = study.times(&workers, "everything, timed", None, job)?;
     let report = prepared.conclude(&times);
+    let shown = print(args.format, &report, || {
+        show(&report, &mut io::stdout().lock())
+    });
     if let Some(file) = &args.svg {
         write_text(file, &drift_diagram::draw(&report.arm)?)?;
     }
-    print(args.format, &report, || {
-        show(&report, &mut io::stdout().lock())
-    })?;
+    shown?;
     Ok(Ending::Ok)
 }
 

@@ -224,7 +224,14 @@ impl<'r> Shown<'r> {
                     (choice.setting.arm, choice.setting.stiffness) == (arm, stiffness)
                 });
                 let cells = row.map(|choice| match (&choice.name, choice.us_per_second) {
-                    (Some(name), Some(us)) => format!("{name}, {}", text::time(us * 1e3)),
+                    (Some(name), Some(us)) => {
+                        let at_limit = if choice.at_limit {
+                            ", at the limit"
+                        } else {
+                            ""
+                        };
+                        format!("{name}, {}{at_limit}", text::time(us * 1e3))
+                    }
                     _ => choice.reason.clone(),
                 });
                 table.add_row([format!("{name} k={stiffness:e}")].into_iter().chain(cells));

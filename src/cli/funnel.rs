@@ -64,9 +64,9 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     interrupt::from_now_on_finish();
     let workers = Workers::of_study()?;
     let study = Study::new(format!("{}, {}: ", args.scene, args.path), 0, &args.spread);
-    study.begin("the truth, and every stage held against it");
+    let begin = |step: &str| study.begin(step);
     let input = setting.input(args)?;
-    let prepared = funnel::prepare(&input, &interrupt::asked)?.ok_or(Interrupted)?;
+    let prepared = funnel::prepare(&input, &begin, &interrupt::asked)?.ok_or(Interrupted)?;
     let job = |timing| Job::Funnel(prepared.plan.clone(), timing);
     let lens_scale = setting.path.lens_scale;
     let times = study.times(&workers, "every stage, timed", lens_scale, job)?;
@@ -77,6 +77,14 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
         );
     }
     let report = prepared.conclude(&times);
+    let shown = unread_is_fine(match args.format {
+        FunnelFormat::Json => print_json(&report),
+        FunnelFormat::Csv => funnel_csv::write(&report, io::stdout().lock()),
+        FunnelFormat::Table => {
+            let text = funnel_table::terminal(&funnel_table::blocks(&report));
+            text::terminal().write_all(text.as_bytes())
+        }
+    });
     if let Some(file) = &args.svg {
         write_text(file, &funnel_picture::draw(&report)?)?;
     }
@@ -86,14 +94,7 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
         let page = to_html(&format!("cullbench funnel {}", report.scene), &blocks);
         write_text(file, &page)?;
     }
-    unread_is_fine(match args.format {
-        FunnelFormat::Json => print_json(&report),
-        FunnelFormat::Csv => funnel_csv::write(&report, io::stdout().lock()),
-        FunnelFormat::Table => {
-            let text = funnel_table::terminal(&funnel_table::blocks(&report));
-            text::terminal().write_all(text.as_bytes())
-        }
-    })?;
+    shown?;
     Ok(Ending::of(keep_their_word(&report.stages)))
 }
 
@@ -134,9 +135,11 @@ fn chain(
             if !known.iter().any(|row| row.name == name) {
                 let stage = stage.name();
                 if let [_] = known[..] {
+                    let why = funnel::left_out_of(scene).pop();
+                    let why = why.map_or(String::new(), |row| format!(": {}", row.reason));
                     return Err(SpecError::new(format_args!(
                         "--{stage} is '{name}'; expected none: scene '{}' has nothing for that \
-                         stage",
+                         stage{why}",
                         scene.name
                     )));
                 }

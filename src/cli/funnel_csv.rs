@@ -9,7 +9,7 @@ use crate::funnel::FunnelReport;
 use crate::shown::shown_field;
 
 /// Tables of the report: a list of rows, or a single row.
-const TABLES: [&str; 12] = [
+const TABLES: [&str; 13] = [
     "level",
     "cut_outs",
     "inner_boxes",
@@ -20,6 +20,7 @@ const TABLES: [&str; 12] = [
     "audits",
     "orders",
     "picks",
+    "left_out",
     "bounds",
     "gains",
 ];
@@ -49,7 +50,7 @@ const FIELDS: &str = "
     without_stencil/asked_count without_stencil/kept_out_count without_stencil/fragment_count
     without_stencil/clear_count without_stencil/shaded_count without_stencil/covered_count
     mask share tile seed item_count boxed_count box_limit box_count volume_share build_ns
-    unclosed_sector_count";
+    unclosed_sector_count section reason";
 
 /// One row for each row of each table; numbers as they are, lists as their lengths.
 pub fn write(report: &FunnelReport, out: impl Write) -> io::Result<()> {

@@ -4,7 +4,7 @@
 use super::document::Block;
 use super::table::Table;
 use super::text;
-use crate::funnel::{FunnelReport, Gain, LevelRow, SeenFrom, StageRow, Times};
+use crate::funnel::{FunnelReport, Gain, LeftOutRow, LevelRow, SeenFrom, StageRow, Times};
 use crate::visibility::Guarantee;
 use crate::visibility::hiders::{BlocksRow, GroundRow, InnerRow};
 use crate::visibility::occlusion::OccluderChoice;
@@ -74,6 +74,15 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
                     sample, on one thread. A graphics processor does it in hardware.";
         blocks.push(Block::Line(line.into()));
     }
+    blocks.extend(report.left_out.iter().map(|row| {
+        let LeftOutRow {
+            section,
+            name,
+            reason,
+            ..
+        } = row;
+        Block::Line(format!("Left out ({section}, {name}): {reason}."))
+    }));
     blocks.extend(report.conclusions.iter().cloned().map(Block::Line));
     blocks
 }
@@ -139,7 +148,7 @@ fn solid_blocks(row: &BlocksRow) -> Block {
             text::time(row.build_ns)
         ),
         unclosed => format!(
-            "Occluders: none, as the linedefs of {} do not close.",
+            "Occluders: none, as the linedefs of {} do not close, or disagree with others.",
             text::counted(unclosed, "sector")
         ),
     })

@@ -1,6 +1,6 @@
-//! Ctrl-C. Until a command has something to keep, it ends the program at
-//! once. After `from_now_on_finish` the first one asks the work to stop at the
-//! next safe place, and the second one ends the program.
+//! Ctrl-C, and the signals of `kill` and of a closed terminal. Until a command has
+//! something to keep, each ends the program at once. After `from_now_on_finish` the
+//! first one stops the work at the next safe place, and the second one ends the program.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -34,10 +34,23 @@ pub fn install() {
         if ASKED.swap(true, Ordering::Relaxed) || !TO_FINISH.load(Ordering::Relaxed) {
             std::process::exit(130);
         }
+        super::tell("stopping at the next safe place; again ends at once");
     };
+    if ignores_hangup() {
+        return;
+    }
     // Without a handler Ctrl-C simply ends the program: nothing is lost but
     // the cell that was being measured.
     if let Err(error) = ctrlc::set_handler(handler) {
         super::tell(&format!("warning: no clean stop on Ctrl-C: {error}"));
     }
+}
+
+/// Whether `nohup` has started the program. The handler takes all three signals or none,
+/// and a run must outlive its terminal where that was wanted.
+fn ignores_hangup() -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let ignored = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    ignored.is_some_and(|mask| mask & 1 != 0)
 }

@@ -13,7 +13,7 @@ use crate::culling::TESTS;
 use crate::index::{Info, Registry};
 use crate::measure::METRICS;
 use crate::path::{PATH_PARAMS, PATHS};
-use crate::scene::{FAMILIES, MESHES, SAMPLES};
+use crate::scene::{FAMILIES, MESHES, SAMPLES, SCENE_PARAMS};
 use crate::suite::SUITES;
 
 /// Long summaries wrap at this width.
@@ -118,13 +118,12 @@ fn rows(registry: &Registry, topic: ListTopic) -> anyhow::Result<(&'static str, 
         }
         ListTopic::Scenes => {
             let families = FAMILIES.iter().map(|f| {
-                let params = format!("n=100000, seed=1, offset=0, {}", f.params);
+                let params = format!("{SCENE_PARAMS}, {}", f.params);
                 row(f.name, &[("params", &params)], f.summary)
             });
-            let meshes = MESHES.iter().map(|m| {
-                let params = "n=100000 (triangles), seed=1, offset=0";
-                row(m.name, &[("params", params)], m.summary)
-            });
+            let meshes = MESHES
+                .iter()
+                .map(|m| row(m.name, &[("params", SCENE_PARAMS)], m.summary));
             let samples = SAMPLES.iter().map(|s| {
                 let licence = format!("real; {}", s.licence);
                 row(s.name, &[("params", &licence)], s.summary)
@@ -134,7 +133,7 @@ fn rows(registry: &Registry, topic: ListTopic) -> anyhow::Result<(&'static str, 
                 .map(|s| format!("  {:<9} {}", s.name, s.summary))
                 .collect();
             let note = format!(
-                "A scene is also a file: boxes CSV, or a Doom WAD (maps.wad#MAP07 picks a map).\nReal scenes are works of others: `cullbench licences`.\nSuites of `run`:\n{}",
+                "n counts the triangles of a mesh.\nA scene is also a file: boxes CSV, or a Doom WAD (maps.wad#MAP07 picks a map).\nReal scenes are works of others: `cullbench licences`.\nSuites of `run`:\n{}",
                 suites.join("\n")
             );
             (
@@ -148,7 +147,10 @@ fn rows(registry: &Registry, topic: ListTopic) -> anyhow::Result<(&'static str, 
             format!(
                 "Parameters of every path: {PATH_PARAMS}.\nA path is also a file: a cameras CSV (eye_x.. and look_x.. or forward_x.., or matrices m00..m33)."
             ),
-            PATHS.iter().map(|p| row(p.name, &[], p.summary)).collect(),
+            PATHS
+                .iter()
+                .map(|p| row(p.name, &[("params", p.params)], p.summary))
+                .collect(),
         ),
         ListTopic::Tests => (
             "tests",

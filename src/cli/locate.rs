@@ -7,20 +7,18 @@ use anyhow::Context;
 use serde_json::json;
 
 use super::args::LocateArgs;
-use super::compare_structures::{Row, all_agree, ask_all, write};
-use super::{Ending, load_scene, unread_is_fine};
-use crate::index::{DynIndex, Registry, StructureSpec};
+use super::compare_structures::{Row, ask_all, write};
+use super::{Ending, load_scene};
+use crate::index::{DynIndex, Registry};
 use crate::path::read_points_csv;
 use crate::scene::{Scene, Sought, SoughtBox, read_sought_boxes_csv};
 
 pub fn locate(registry: &Registry, args: &LocateArgs) -> anyhow::Result<Ending> {
     let structures = args.kernel.structures(registry, &args.structure)?;
     let scene = load_scene(&args.scene, &args.scene_args, 1)?;
-    let (what, answers) = match (&args.sought.points, &args.sought.boxes) {
-        (Some(file), _) => ("point", by_points(&scene, &structures, file)?),
-        (_, Some(file)) => ("box", by_boxes(&scene, &structures, file)?),
-        // The argument parser has refused that.
-        (None, None) => ("point", Vec::new()),
+    let what = match args.sought.points {
+        Some(_) => "point",
+        None => "box",
     };
     let columns = [
         what,
@@ -30,7 +28,7 @@ pub fn locate(registry: &Registry, args: &LocateArgs) -> anyhow::Result<Ending> 
         "region_ids",
         "nodes_tested",
     ];
-    unread_is_fine(write(args.format, &columns, &answers, |a| {
+    let row = |a: &Row| {
         vec![
             json!(a.question),
             json!(a.structure),
@@ -39,37 +37,52 @@ pub fn locate(registry: &Registry, args: &LocateArgs) -> anyhow::Result<Ending> 
             json!(a.ids),
             json!(a.cost.nodes_tested),
         ]
-    }))?;
-    Ok(Ending::of(all_agree(&answers, what)))
+    };
+    let agree = match (&args.sought.points, &args.sought.boxes) {
+        (Some(file), _) => {
+            let points = points(&scene, file)?;
+            let boxes = scene.regions.boxes(&scene.items);
+            let ask = |index: &dyn DynIndex, point: usize, out: &mut Vec<_>, cost: &mut _| {
+                let p = &points[point];
+                scene.search(p, out, |p, out| index.query_counted(p.into(), out, cost));
+                out.clear();
+                scene.search(p, out, |p, out| index.locate(p, out));
+            };
+            let questions = (what, points.len());
+            write(args.format, &columns, row, |each| {
+                ask_all(&structures, &scene, boxes, questions, true, ask, each)
+            })?
+        }
+        (_, Some(file)) => {
+            let boxes = boxes(&scene, file)?;
+            let ask = |index: &dyn DynIndex, n: usize, out: &mut Vec<_>, cost: &mut _| {
+                index.query_counted((&boxes[n].volume).into(), out, cost);
+                out.clear();
+                index.visible(&boxes[n].volume, out);
+                scene.refine_overlapping(&boxes[n], out);
+            };
+            let questions = (what, boxes.len());
+            write(args.format, &columns, row, |each| {
+                let items = &scene.items;
+                ask_all(&structures, &scene, items, questions, true, ask, each)
+            })?
+        }
+        // The argument parser has refused that.
+        (None, None) => true,
+    };
+    Ok(Ending::of(agree))
 }
 
-/// The regions that hold each point.
-fn by_points(scene: &Scene, structures: &[StructureSpec], file: &Path) -> anyhow::Result<Vec<Row>> {
+fn points(scene: &Scene, file: &Path) -> anyhow::Result<Vec<Sought>> {
     let (input, name) = open(file)?;
     let points = read_points_csv(input, &name)?.into_iter();
-    let points: Vec<Sought> = points.map(|p| scene.sought(p)).collect();
-    let boxes = scene.regions.boxes(&scene.items);
-    let ask = |index: &dyn DynIndex, point: usize, out: &mut Vec<_>, cost: &mut _| {
-        let p = &points[point];
-        scene.search(p, out, |p, out| index.query_counted(p.into(), out, cost));
-        out.clear();
-        scene.search(p, out, |p, out| index.locate(p, out));
-    };
-    ask_all(structures, scene, boxes, points.len(), true, ask)
+    Ok(points.map(|p| scene.sought(p)).collect())
 }
 
-/// The items that overlap each box.
-fn by_boxes(scene: &Scene, structures: &[StructureSpec], file: &Path) -> anyhow::Result<Vec<Row>> {
+fn boxes(scene: &Scene, file: &Path) -> anyhow::Result<Vec<SoughtBox>> {
     let (input, name) = open(file)?;
     let boxes = read_sought_boxes_csv(input, &name)?.into_iter();
-    let boxes: Vec<SoughtBox> = boxes.map(|b| scene.sought_box(b)).collect();
-    let ask = |index: &dyn DynIndex, n: usize, out: &mut Vec<_>, cost: &mut _| {
-        index.query_counted((&boxes[n].volume).into(), out, cost);
-        out.clear();
-        index.visible(&boxes[n].volume, out);
-        scene.refine_overlapping(&boxes[n], out);
-    };
-    ask_all(structures, scene, &scene.items, boxes.len(), true, ask)
+    Ok(boxes.map(|b| scene.sought_box(b)).collect())
 }
 
 fn open(file: &Path) -> anyhow::Result<(File, String)> {

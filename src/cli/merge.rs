@@ -7,7 +7,7 @@ use anyhow::Context;
 
 use super::args::MergeArgs;
 use super::run_resume::same_recorded;
-use super::{Ending, expect_folder, surface_tables, tell, text, unread_is_fine};
+use super::{Ending, expect_folder, interrupt, surface_tables, tell, text, unread_is_fine};
 use crate::report::{Stream, merge as join, read_stream};
 
 pub fn merge(args: &MergeArgs) -> anyhow::Result<Ending> {
@@ -15,19 +15,23 @@ pub fn merge(args: &MergeArgs) -> anyhow::Result<Ending> {
     let recorded =
         |path: &Path| -> anyhow::Result<Stream> { Ok(read_stream(&path.join("stream.jsonl"))?.0) };
     let first = recorded(&args.runs[0])?.header.args;
-    for path in &args.runs[1..] {
+    // The first as well: its own options may be none.
+    for path in &args.runs {
         let other = recorded(path)?.header.args;
         same_recorded(&first, &other).with_context(|| path.display().to_string())?;
     }
     let merged = join(&args.runs, &without_place(&first), args.partial)?;
-    merged.write(&args.out)?;
+    interrupt::from_now_on_finish();
+    if !merged.write(&args.out, &interrupt::asked)? {
+        return Ok(Ending::Interrupted);
+    }
     if !merged.missing.is_empty() {
         tell(&format!("note: no shard has {}", merged.missing_named()));
     }
     let report = merged.stream.report();
     unread_is_fine(surface_tables::show(&report))?;
     unread_is_fine(close(args, report.cells.len()))?;
-    let failed = report.cells.iter().any(|c| c.status.is_failure());
+    let failed = report.has_failed();
     Ok(Ending::of(!failed))
 }
 

@@ -4,8 +4,8 @@
 //! It is a function of a [`Registry`]: [`main_with`] is the whole of the
 //! `cullbench` program, and of any program that adds a structure.
 //!
-//! Exit codes: 0 ok; 1 a wrong answer or a failed verification; 2 usage or bad
-//! input; 3 a regression, in `compare`; 130 interrupted.
+//! Exit codes: 0 ok; 1 a wrong answer, none at all or a failed verification; 2 usage
+//! or bad input; 3 a regression, in `compare`; 130 interrupted.
 
 mod advise;
 mod against;
@@ -58,13 +58,15 @@ mod values;
 mod verify;
 mod worker;
 
+use std::collections::BTreeMap;
 use std::error::Error;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use crate::index::Registry;
-use crate::report::{FolderError, write_atomically};
+use crate::input::{hold_files, tell_notes};
+use crate::report::{FolderError, try_folder, try_place, write_atomically};
 use crate::scene::{LoadOptions, NOTICE, Scene};
 use clap::{CommandFactory, Parser};
 use interrupt::Interrupted;
@@ -120,12 +122,25 @@ pub fn main_with(registry: Registry) -> ExitCode {
                 tell(&format!("error: {line}"));
                 return ExitCode::from(2);
             }
-            None => error.exit(),
+            None => {
+                return match error.print().and_then(|()| io::stdout().flush()) {
+                    Ok(()) => ExitCode::from(u8::from(error.use_stderr()) * 2),
+                    Err(unread) if is_broken_pipe(&unread) => ExitCode::SUCCESS,
+                    Err(full) => {
+                        tell(&format!("error: {full}"));
+                        ExitCode::from(2)
+                    }
+                };
+            }
         },
     };
     match cli.command {
         Command::Worker => interrupt::leave_to_the_parent(),
-        _ => interrupt::install(),
+        _ => {
+            interrupt::install();
+            hold_files(BTreeMap::new());
+            tell_notes(|note| tell(&format!("note: {note}")));
+        }
     }
     match dispatch(&registry, cli.command) {
         Ok(Ending::Ok) => ExitCode::SUCCESS,
@@ -172,7 +187,7 @@ fn dispatch(registry: &Registry, command: Command) -> anyhow::Result<Ending> {
 /// One line on stderr, whatever is in the text. Unlike `eprintln!` it does
 /// not panic where standard error is closed.
 fn tell(line: &str) {
-    let _ = writeln!(io::stderr(), "{}", text::plain(line));
+    let _ = writeln!(io::stderr(), "{}", text::message(line));
 }
 
 /// Loads a scene that so many structures are to be held over at once, and says so
@@ -243,18 +258,19 @@ fn expect_place_for(option: &str, file: Option<&Path>) -> anyhow::Result<()> {
             "{}: expected an existing folder for {option}",
             folder.display()
         ),
-        _ => Ok(()),
+        _ => Ok(try_place(file)?),
     }
 }
 
-/// That a folder can be there: it is, or nothing of its name is.
+/// That a folder can be there and written to: it is, or nothing of its name is.
 fn expect_folder(option: &str, folder: Option<&Path>) -> anyhow::Result<()> {
     match folder {
         Some(folder) if folder.exists() && !folder.is_dir() => anyhow::bail!(
             "{}: not a folder; expected a folder for {option}",
             folder.display()
         ),
-        _ => Ok(()),
+        Some(folder) => Ok(try_folder(folder)?),
+        None => Ok(()),
     }
 }
 

@@ -72,9 +72,6 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
     let points = |timing| Job::Points(prepared.plan.clone(), timing);
     let times = study.times(&workers, "every point, timed", path.lens_scale, points)?;
     let precision = prepared.conclude(&times);
-    if let Some(file) = &args.svg {
-        write_text(file, &precision_diagram::draw(&precision)?)?;
-    }
     let wrong = precision
         .points
         .iter()
@@ -85,9 +82,13 @@ pub fn precision(registry: &Registry, args: &PrecisionArgs) -> anyhow::Result<En
         size_sweep: sizes,
         sweeps,
     };
-    print(args.format, &outcome, || {
+    let shown = print(args.format, &outcome, || {
         precision_tables::show(&outcome).and_then(|()| precision_conclusions::show(&outcome))
-    })?;
+    });
+    if let Some(file) = &args.svg {
+        write_text(file, &precision_diagram::draw(&outcome.precision)?)?;
+    }
+    shown?;
     Ok(Ending::of(!wrong))
 }
 

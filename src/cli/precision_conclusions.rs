@@ -31,8 +31,12 @@ fn conclusions(outcome: &Outcome) -> Vec<String> {
 
 /// No visible item missed, and a time.
 fn is_sound(point: &&Point) -> bool {
-    let errors = &point.errors;
+    let errors = point.errors.unwrap_or_default();
     point.times.query_ns.is_some() && errors.false_negatives + errors.touch_dropped == 0
+}
+
+fn missed(point: &Point) -> u64 {
+    point.errors.map_or(0, |errors| errors.false_negatives)
 }
 
 fn ratio(a: &Point, b: &Point) -> String {
@@ -61,7 +65,8 @@ fn of_points(p: &Precision) -> Vec<String> {
         time(&fastest.times),
         percent(fastest.excess)
     )];
-    let tight = sound.find(|point| point.errors.false_positives < fastest.errors.false_positives);
+    let extra = |point: &Point| point.errors.map(|errors| errors.false_positives);
+    let tight = sound.find(|point| extra(point) < extra(fastest));
     if let Some(tight) = tight {
         all.push(format!(
             "Less excess begins at {} times its time: {}, excess {} %.",
@@ -70,10 +75,7 @@ fn of_points(p: &Precision) -> Vec<String> {
             percent(tight.excess)
         ));
     }
-    let unsafe_ = p
-        .points
-        .iter()
-        .filter(|point| point.errors.false_negatives > 0);
+    let unsafe_ = p.points.iter().filter(|point| missed(point) > 0);
     let worst = unsafe_.max_by(|a, b| {
         a.worst_miss_px
             .unwrap_or(0.0)
@@ -105,12 +107,13 @@ fn of_numbers(p: &Precision) -> Option<String> {
             .iter()
             .any(|line| line.starts_with(point.names.arithmetic));
         if point.names.arithmetic != "f32" && is_new {
-            let extra = point.errors.false_positives as i64 - own.errors.false_positives as i64;
+            let extra = |point: &Point| point.errors.unwrap_or_default().false_positives as i64;
+            let extra = extra(point) - extra(own);
             told.push(format!(
                 "{} {} times ({extra:+} items, {} missed)",
                 point.names.arithmetic,
                 ratio(point, own),
-                point.errors.false_negatives
+                missed(point)
             ));
         }
     }
@@ -183,7 +186,10 @@ fn of_sweeps(rows: &[SweepRow]) -> Vec<String> {
         let lost = |row: &&SweepRow| row.false_negative_ppm.map_or(0.0, |rate| rate.value);
         let worst = own.clone().max_by(|a, b| lost(a).total_cmp(&lost(b)))?;
         let default = own.filter(|row| numbers(&row.names) == "f32 c=8");
-        let default: u64 = default.map(|row| row.errors.false_negatives).sum();
+        let default: u64 = default
+            .filter_map(|row| row.errors)
+            .map(|e| e.false_negatives)
+            .sum();
         if lost(&worst) == 0.0 {
             return Some(format!("Over {name} nothing is missed by any."));
         }

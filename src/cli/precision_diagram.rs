@@ -32,7 +32,9 @@ impl Mark {
             series: point.structure.clone(),
             at: [point.times.query_ns? / 1e3, point.excess?.value * 100.0],
             on_front: point.on_front,
-            is_cross: point.errors.false_negatives > 0,
+            is_cross: point
+                .errors
+                .is_some_and(|errors| errors.false_negatives > 0),
         })
     }
 

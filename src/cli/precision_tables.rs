@@ -7,7 +7,6 @@ use serde::Serialize;
 
 use super::table::Table;
 use super::text;
-use crate::measure::Status;
 use crate::precision::{
     Names, Point, Precision, RegionPoint, SIZE_RATIOS, SWEEPS, SizeRow, SweepRow,
 };
@@ -31,7 +30,8 @@ pub fn show(outcome: &Outcome) -> io::Result<()> {
     let mut out = text::terminal();
     let p = &outcome.precision;
     let mut say = |sentence: &str| writeln!(out, "{}", text::wrapped(sentence, WIDTH));
-    let visible = p.points.first().map_or(0, |point| point.errors.visible);
+    let visible = p.points.iter().find_map(|point| point.errors);
+    let visible = visible.map_or(0, |errors| errors.visible);
     say(&format!(
         "{}: {}; {}: {}, {} visible in all; {}; {} in each",
         text::plain(&p.scene),
@@ -71,9 +71,9 @@ pub fn show(outcome: &Outcome) -> io::Result<()> {
         front_lines(p)
     ))?;
     say(
-        "* On the front: by no values is another point as good in every error, in the depth of its \
-         misses, in memory and in time. A tie is off it by values that intervals paired by camera \
-         and by process do not tell apart.",
+        "* On the front: no other point as good in every error, in the depth of its misses, in memory \
+         and in time is shown to be better in one. A tie shares it: what is better by the values is \
+         not told apart by intervals paired by camera and by process.",
     )?;
     say(&format!(
         "\nRegion search, the fastest structure for each:\n{}",
@@ -171,17 +171,15 @@ fn by_source(errors: &ErrorCount) -> String {
 fn errors_table(points: &[&Point]) -> Table {
     let mut table = Table::of("culling | >excess % | >by source | >missed ppm | >px | >flicker %");
     for point in points {
-        let judged = point.status != Status::Refused;
-        let of = |value: String| if judged { value } else { String::new() };
         table.add_row([
             culling(point),
             percent(point.excess),
-            of(by_source(&point.errors)),
+            point.errors.as_ref().map(by_source).unwrap_or_default(),
             text::rate(point.false_negative_ppm, 1.0),
-            of(point
+            point
                 .worst_miss_px
                 .map(text::significant)
-                .unwrap_or_default()),
+                .unwrap_or_default(),
             percent(point.flicker),
         ]);
     }
@@ -207,8 +205,8 @@ fn times_table(points: &[&Point]) -> Table {
 
 fn mark(on_front: bool, is_tie: bool) -> &'static str {
     match (on_front, is_tie) {
+        (_, true) => "* tie",
         (true, _) => "*",
-        (_, true) => "tie",
         _ => "",
     }
 }
@@ -220,8 +218,6 @@ pub fn time(times: &crate::precision::Times) -> String {
 fn front_lines(p: &Precision) -> String {
     let line = |&i: &usize| {
         let point = &p.points[i];
-        let is_tie = |other: &&Point| other.is_tie && other.dominated_by == Some(i);
-        let ties = p.points.iter().filter(is_tie).count();
         let memory = point.memory_bytes_per_item.unwrap_or(f64::NAN);
         format!(
             "* {}: {}, {} B/item, excess {} %, missed {} ppm{}",
@@ -230,10 +226,7 @@ fn front_lines(p: &Precision) -> String {
             text::significant(memory),
             percent(point.excess),
             text::rate(point.false_negative_ppm, 1.0),
-            match ties {
-                0 => String::new(),
-                _ => format!("; {}", text::counted(ties, "tie")),
-            }
+            if point.is_tie { "; tie" } else { "" }
         )
     };
     p.front.iter().map(line).collect::<Vec<_>>().join("\n")
@@ -347,7 +340,7 @@ fn sweep_shown(name: &str, what: &str, rows: &[&SweepRow]) -> String {
     let (mut losers, mut sound) = (0, Vec::new());
     for kind in rows.iter().filter(|row| row.value == values[0]) {
         let own: Vec<&&SweepRow> = rows.iter().filter(|row| row.names == kind.names).collect();
-        let is_sound = |row: &&&SweepRow| row.refused.is_none() && row.errors.false_negatives == 0;
+        let is_sound = |row: &&&SweepRow| row.errors.is_some_and(|e| e.false_negatives == 0);
         if own.iter().all(is_sound) {
             sound.push(numbers(&kind.names));
             continue;

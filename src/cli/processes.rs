@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -17,12 +17,20 @@ use super::protocol::{Job, Message, PROTOCOL, Request};
 use super::run_resume::typed_args;
 use crate::input;
 use crate::measure::{Part, ProcessTimes, Status, TaskSamples, Verdict};
-use crate::report::bare;
+use crate::report::{bare, temporary_in};
+use crate::shown::shortened;
 
 /// Longest wait before looking whether the user wants to stop.
 const GLANCE: Duration = Duration::from_millis(20);
 /// Bytes of a worker's last words that are kept.
 const LAST_WORDS: usize = 4096;
+
+/// Longest first line of a worker, bytes: another program may never end its first.
+const LONGEST_FIRST: u64 = 1 << 16;
+/// Longest line, bytes: the samples of a million cameras fit.
+const LONGEST: u64 = 1 << 29;
+/// Lines that wait to be read before the worker does.
+const WAITING: usize = 16;
 
 /// How a share of the work ended.
 pub enum Ended {
@@ -67,11 +75,18 @@ impl Worker {
             .stderr(Stdio::piped())
             .spawn()
             .with_context(|| program.display().to_string())?;
-        let (send, lines) = channel();
+        let (send, lines) = sync_channel(WAITING);
         if let Some(out) = child.stdout.take() {
             thread::spawn(move || {
-                for line in BufReader::new(out).split(b'\n') {
-                    if send.send(line).is_err() {
+                let mut out = BufReader::new(out);
+                let mut most = LONGEST_FIRST;
+                loop {
+                    let mut line = Vec::new();
+                    // A line that is cut short is no message.
+                    let read = (&mut out).take(most).read_until(b'\n', &mut line);
+                    most = LONGEST;
+                    let ended = read.is_err();
+                    if matches!(read, Ok(0)) || send.send(read.map(|_| line)).is_err() || ended {
                         break;
                     }
                 }
@@ -119,7 +134,8 @@ impl Worker {
         let told = str::from_utf8(&line).ok();
         let message = told.and_then(|line| serde_json::from_str(line).ok());
         let message = message.ok_or_else(|| {
-            let text: String = String::from_utf8_lossy(&line).chars().take(60).collect();
+            let text = String::from_utf8_lossy(&line[..line.len().min(300)]);
+            let text = shortened(text.trim_end(), 60);
             anyhow::anyhow!(
                 "a worker said '{text}'; expected a message of protocol {PROTOCOL}: the program is \
                  of another version"
@@ -276,7 +292,8 @@ impl Workers {
     /// # Errors
     /// As [`Workers::new`]; an argument that is no text.
     pub fn of_study() -> anyhow::Result<Workers> {
-        Workers::new(typed_args()?, Duration::MAX, &NamedTempFile::new)
+        let temporary = || temporary_in(&std::env::temp_dir());
+        Workers::new(typed_args()?, Duration::MAX, &temporary)
     }
 
     /// `temporary` makes the files that stand for pipes.
@@ -329,6 +346,7 @@ impl Workers {
                 count => Some(self.cpus[process as usize % count]),
             },
             layout: u64::from(process),
+            files: input::held_files(),
             job,
         };
         see_through(&self.program, &request, self.patience, keep, step)

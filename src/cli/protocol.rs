@@ -25,6 +25,9 @@ pub struct Request {
     pub args: Vec<String>,
     /// Files that stand for pipes that only the parent can read.
     pub spooled: BTreeMap<String, PathBuf>,
+    /// SHA-256 of the files that the parent has read, to be found the same.
+    #[serde(default)]
+    pub files: BTreeMap<String, String>,
     pub job: Job,
     /// The processor to stay on.
     pub cpu: Option<usize>,

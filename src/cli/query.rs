@@ -3,8 +3,8 @@
 use serde_json::json;
 
 use super::args::QueryArgs;
-use super::compare_structures::{all_agree, ask_all, write};
-use super::{Ending, load_scene, unread_is_fine};
+use super::compare_structures::{Row, ask_all, write};
+use super::{Ending, load_scene, tell};
 use crate::index::Registry;
 use crate::measure::Workload;
 use crate::path;
@@ -15,20 +15,15 @@ pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
     let scene = load_scene(&args.scene, &args.scene_args, 1)?;
     let cameras = path::load(&args.cameras, &scene, &defaults)?;
     let workload = Workload::new(&scene, &cameras, &culling)?;
+    if let Some(doubt) = culling.unproven() {
+        tell(&format!("note: {doubt}"));
+    }
     let ask = |index: &dyn crate::index::DynIndex, camera: usize, out: &mut _, cost: &mut _| {
         let view = workload.views[camera].as_any();
         index.query_counted(view, out, cost);
         out.clear();
         index.query(view, out);
     };
-    let answers = ask_all(
-        &structures,
-        &scene,
-        &workload.items,
-        workload.views.len(),
-        args.ids,
-        ask,
-    )?;
     let mut columns = vec![
         "camera",
         "structure",
@@ -41,7 +36,7 @@ pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
     ];
     columns.extend(args.ids.then_some("visible_ids"));
     let (test, total) = (culling.test.name(), scene.items.len());
-    unread_is_fine(write(args.format, &columns, &answers, |a| {
+    let row = |a: &Row| {
         let mut row = vec![
             json!(a.question),
             json!(a.structure),
@@ -54,6 +49,10 @@ pub fn query(registry: &Registry, args: &QueryArgs) -> anyhow::Result<Ending> {
         ];
         row.extend(a.ids.as_ref().map(|ids| json!(ids)));
         row
-    }))?;
-    Ok(Ending::of(all_agree(&answers, "camera")))
+    };
+    let (items, questions) = (&workload.items, ("camera", workload.views.len()));
+    let agree = write(args.format, &columns, row, |each| {
+        ask_all(&structures, &scene, items, questions, args.ids, ask, each)
+    })?;
+    Ok(Ending::of(agree))
 }

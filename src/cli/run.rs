@@ -128,16 +128,17 @@ impl Run {
             self.stream.finished_at = Some(at);
         }
         let report = self.stream.report();
+        // Tables before files: where a file cannot be written, what was measured is seen.
+        let shown = unread_is_fine(surface_tables::show(&report));
         self.folder.save(&report)?;
-        if let Some(error) = unshown {
+        if let Some(error) = unshown.or(shown.err()) {
             return Err(error.into());
         }
-        unread_is_fine(surface_tables::show(&report))?;
         unread_is_fine(self.close(&report))?;
         if stopped {
             tell("interrupted: finished cells were saved; continue with --resume");
         }
-        let failed = report.cells.iter().any(|c| c.status.is_failure());
+        let failed = report.has_failed();
         Ok(match (stopped, failed) {
             (true, _) => Ending::Interrupted,
             (false, true) => Ending::WrongAnswer,

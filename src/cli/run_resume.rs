@@ -12,7 +12,7 @@ use clap::{ArgMatches, CommandFactory, Parser};
 
 use super::args::{Cli, Command, RunArgs};
 use super::run_plan::RunPlan;
-use super::{tell, text};
+use super::{tell, text, usage};
 use crate::measure::{Machine, Source, Toolchain};
 use crate::report::{
     Difference, Header, RunFolder, RunInfo, SCHEMA_VERSION, StoppedRun, Stream, dated, read_report,
@@ -89,7 +89,7 @@ pub fn resume(args: &RunArgs) -> anyhow::Result<(StoppedRun, Stream, RunArgs)> {
 pub fn go_on(stopped: StoppedRun, stream: &Stream) -> anyhow::Result<RunFolder> {
     if stopped.lost() > 0 {
         tell(&format!(
-            "note: {}: samples.csv was cut short; {} measured again",
+            "note: {}: samples.csv lacks samples; {} measured again",
             stopped.path().display(),
             text::counted(stopped.lost(), "part")
         ));
@@ -117,7 +117,8 @@ fn same_options(recorded: &[String]) -> anyhow::Result<RunArgs> {
             before.told(&id)
         );
     }
-    match Cli::try_parse_from(program().chain(recorded.to_vec()))?.command {
+    let recorded = Cli::try_parse_from(program().chain(recorded.to_vec()));
+    match recorded.map_err(one_line)?.command {
         Command::Run(args) => Ok(args),
         _ => bail!("no run was recorded there; expected the folder of a run"),
     }
@@ -140,6 +141,14 @@ pub fn same_recorded(one: &[String], other: &[String]) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// An error of recorded options, which are no usage of this command.
+fn one_line(error: clap::Error) -> anyhow::Error {
+    match usage::one_line(&error) {
+        Some(line) => anyhow::anyhow!("recorded options: {line}"),
+        None => anyhow::anyhow!("no run was recorded there; expected the folder of a run"),
+    }
+}
+
 fn program() -> std::iter::Once<String> {
     std::iter::once("cullbench".to_owned())
 }
@@ -155,7 +164,9 @@ impl RunOptions {
     fn of(
         line: impl IntoIterator<Item = impl Into<OsString> + Clone>,
     ) -> anyhow::Result<RunOptions> {
-        let matches = Cli::command().try_get_matches_from(line)?;
+        let matches = Cli::command()
+            .try_get_matches_from(line)
+            .map_err(one_line)?;
         let run = matches.subcommand_matches("run").cloned();
         let run = run.context("no run was recorded there; expected the folder of a run")?;
         Ok(RunOptions(run))
@@ -245,6 +256,38 @@ fn newest_unfinished(results: &Path) -> anyhow::Result<PathBuf> {
 mod tests {
     use super::*;
     use std::time::Duration;
+
+    #[test]
+    fn an_error_of_recorded_options_is_one_line() {
+        for (recorded, wanted) in [
+            (
+                "run --no-such",
+                "recorded options: unexpected argument '--no-such' found; expected",
+            ),
+            (
+                "run --processes many",
+                "recorded options: --processes is 'many'; expected a whole",
+            ),
+            (
+                "run --help",
+                "no run was recorded there; expected the folder of a run",
+            ),
+            (
+                "list",
+                "no run was recorded there; expected the folder of a run",
+            ),
+        ] {
+            let words: Vec<String> = recorded.split(' ').map(str::to_owned).collect();
+            let error = RunOptions::recorded(&words)
+                .err()
+                .expect(recorded)
+                .to_string();
+            assert!(
+                error.starts_with(wanted) && !error.contains('\n'),
+                "{error}"
+            );
+        }
+    }
 
     #[test]
     fn any_clock_dates_a_run() {

@@ -93,7 +93,7 @@ fn missed(camera: Camera) -> [bool; 4] {
             && point.names.arithmetic == "f32"
             && point.names.planes == "frame"
             && point.names.epsilon > 0.0;
-        is_default && point.errors.false_negatives > 0
+        is_default && point.errors.is_some_and(|e| e.false_negatives > 0)
     });
 
     let case = Case::new(

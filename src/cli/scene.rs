@@ -9,7 +9,7 @@ use serde_json::json;
 use super::scene_args::{SceneConvertArgs, SceneFormat, SceneGenerateArgs, SceneInfoArgs};
 use super::shared_args::TableFormat;
 use super::table::Table;
-use super::{Ending, interrupt, load_scene, print_json, tell, text};
+use super::{Ending, expect_place_for, interrupt, load_scene, print_json, tell, text};
 use crate::measure::SceneInfo;
 use crate::report::write_atomically;
 use crate::scene::{Regions, Scene, write_boxes_csv};
@@ -113,6 +113,7 @@ fn sizes(scene: &Scene) -> [Option<f64>; 3] {
 }
 
 pub fn generate(args: &SceneGenerateArgs) -> anyhow::Result<Ending> {
+    expect_place_for("--out", args.out.as_deref())?;
     let scene = load_scene(&args.scene, &args.scene_args, 0)?;
     write(scene.settled()?, args.out.as_deref())
 }
@@ -120,6 +121,7 @@ pub fn generate(args: &SceneGenerateArgs) -> anyhow::Result<Ending> {
 pub fn convert(args: &SceneConvertArgs) -> anyhow::Result<Ending> {
     let out = args.output.as_deref().or(args.out.as_deref());
     let SceneFormat::Csv = args.to.map_or_else(|| format_of(out), Ok)?;
+    expect_place_for("--out", out)?;
     let scene = load_scene(&args.scene, &args.scene_args, 0)?;
     let (origin, lost) = (scene.origin, left_behind(&scene));
     let kept = scene.settled()?;

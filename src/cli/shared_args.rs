@@ -139,7 +139,7 @@ pub struct LensArgs {
     /// Near plane for cameras without one [default: 0.1 for recorded cameras, far/1000 for paths]
     #[arg(long, value_parser = values::above_zero, allow_negative_numbers = true)]
     pub near: Option<f64>,
-    /// Far plane for cameras without one, or inf [default: 1000 for recorded cameras, the scene for paths]
+    /// Far plane for cameras without one, or inf; beyond 1.7e38 is inf too [default: 1000 for recorded cameras, the scene for paths]
     #[arg(long, value_parser = values::far, allow_negative_numbers = true)]
     pub far: Option<f64>,
     /// How cameras that are matrices (columns m00 to m33: row, column) are read: column-gl or column-d3d (clip = M x, depth -1..1 or 0..1), row-gl or row-d3d (clip = x M); reversed depth and infinite far are recognised

@@ -107,8 +107,11 @@ pub fn sweep(
     {
         // Every scene has something for the others.
         let (name, stage) = (&scene.name, stage.name());
+        let why = funnel::left_out_of(&scene).pop();
+        let why = why.map_or(String::new(), |row| format!(": {}", row.reason));
         bail!(
-            "scene '{name}' has nothing for the {stage} stage; expected a scene with rooms or sectors"
+            "scene '{name}' has nothing for the {stage} stage{why}; expected a scene with rooms or \
+             sectors"
         );
     }
     let setting = Setting::of(registry, args, scene, None)?;
@@ -204,8 +207,8 @@ fn show(sweep: &StageSweep, out: &mut impl Write) -> io::Result<()> {
         .count();
     writeln!(
         out,
-        "{lossy} of {} points lost something visible; {} of them promise that they do not. * is no \
-         worse than any other in time and both errors.",
+        "{lossy} of {} points lost something visible; {} of them promise that they do not. Than a * \
+         nothing is as good in time and both errors and shown to be better in one.",
         sweep.points.len(),
         safe.filter(|point| point.errors.false_negative_count > 0.0)
             .count()

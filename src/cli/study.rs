@@ -2,6 +2,8 @@
 //! (`advise`, `drift`, `funnel`, `precision`): the bar that says what is done, and how
 //! the times of all processes come together.
 
+use std::time::Duration;
+
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::processes::{Said, Workers};
@@ -33,8 +35,13 @@ pub struct Study {
 impl Study {
     pub fn new(about: String, before: u64, spread: &SpreadArgs) -> Study {
         let processes = spread.processes;
+        let bar = progress(before + u64::from(processes), "");
+        if !bar.is_hidden() {
+            // The time goes on while a step takes long.
+            bar.enable_steady_tick(Duration::from_secs(1));
+        }
         Study {
-            bar: progress(before + u64::from(processes), ""),
+            bar,
             about,
             before,
             processes,

@@ -46,21 +46,27 @@ pub fn pictures(surfaces: &[Surface]) -> anyhow::Result<Vec<Picture>> {
                 left_out(beyond)
             );
             let svg = svg(&caption, SIZE, |root| draw(root, &caption, &curves))?;
-            let words = [&surface.world, surface.cache, surface.test, &shown].join("-");
-            let name = slug(&words);
-            // Two worlds may look the same to a file system.
-            let taken = pictures
-                .iter()
-                .filter(|p| p.name.starts_with(&name))
-                .count();
-            let name = match taken {
-                0 => name,
-                more => format!("{name}-{}", more + 1),
-            };
+            let name = file_name(
+                [&surface.world, surface.cache, surface.test, &shown],
+                &pictures,
+            );
             pictures.push(Picture { name, svg });
         }
     }
     Ok(pictures)
+}
+
+/// A name of its own, of less than the 255 bytes that file systems take.
+fn file_name([world, cache, test, class]: [&str; 4], taken: &[Picture]) -> String {
+    let world: String = world.chars().take(160).collect();
+    let name = slug(&[&world, cache, test, class].join("-"));
+    let is_free = |name: &String| taken.iter().all(|picture| picture.name != *name);
+    // Two worlds may look the same to a file system.
+    let mut names = (1..).map(|n| match n {
+        1 => name.clone(),
+        n => format!("{name}-{n}"),
+    });
+    names.find(is_free).unwrap_or_default()
 }
 
 type Curve<'s> = (&'s str, Vec<(usize, f64)>);
@@ -148,5 +154,16 @@ mod tests {
             "city-seed-7-warm-six-plane-0.1"
         );
         assert_eq!(slug("../a/b.csv"), "a-b.csv");
+        let world = "x".repeat(3000);
+        let mut pictures: Vec<Picture> = Vec::new();
+        for world in [&world, &format!("{world}y"), "a", "a-warm-t-2 %-2", "a"] {
+            let name = file_name([world, "warm", "t", "2 %"], &pictures);
+            assert!(
+                name.len() < 250 && pictures.iter().all(|p| p.name != name),
+                "{name}"
+            );
+            let svg = String::new();
+            pictures.push(Picture { name, svg });
+        }
     }
 }

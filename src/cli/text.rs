@@ -4,7 +4,7 @@ use std::io::{self, StdoutLock, Write};
 
 use crate::measure::Metric;
 use crate::report::{Comparison, Report, ReportCell};
-pub use crate::shown::{count, counted, lines, plain};
+pub use crate::shown::{count, counted, lines, message, plain};
 use crate::statistics::{Estimate, Rate};
 
 /// What the times of a report rest on, in one sentence.

@@ -51,6 +51,7 @@ fn answer(registry: &Registry, request: &Request) -> anyhow::Result<()> {
     here.at.clone().tell_of_turns();
     stay_on(request.cpu);
     let _held = vary_layout(request.layout);
+    crate::input::hold_files(request.files.clone());
     for (source, file) in &request.spooled {
         crate::input::stand_in(source, file)?;
     }

@@ -9,7 +9,9 @@ use std::borrow::Cow;
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-use crate::camera::{Camera, CameraError, PlaneMethod, PlaneOptions, Surroundings, check_sums};
+use crate::camera::{
+    Camera, CameraError, DEFAULT_EPSILON, PlaneMethod, PlaneOptions, Surroundings, check_sums,
+};
 use crate::geometry::{
     Aabb, ConvexVolume, ConvexVolumeF64, PlaneF64, RelativeVolume, Spheres, sphere_cube,
 };
@@ -32,11 +34,6 @@ named! {
 }
 
 impl CullingTest {
-    /// Whether the test has planes beyond the volume's own.
-    fn is_extended(self) -> bool {
-        matches!(self, CullingTest::SixBox | CullingTest::Exact)
-    }
-
     /// The items as an index for this test has to hold them: the boxes, or for
     /// `sphere` the cubes about their bounding spheres.
     pub fn items<'a>(self, items: &'a [Aabb]) -> Cow<'a, [Aabb]> {
@@ -130,19 +127,18 @@ impl Culling {
     pub fn view(&self, camera: &Camera, around: &Surroundings) -> Result<CameraView, CullingError> {
         self.check()?;
         let local_eye = camera.frame.eye - around.origin;
+        let more = self.more(camera, local_eye, around)?;
+        let about_scene = more.iter().map(|plane| plane.about(-local_eye));
         match self.arithmetic {
-            Arithmetic::F32 => self.in_f32(camera, around),
+            Arithmetic::F32 => self.in_f32(camera, &about_scene.collect::<Vec<_>>(), around),
             Arithmetic::F64 => {
                 let mut planes = camera.convex_volume_f64(around)?.planes().to_vec();
-                let more = self.more(&faces_about_eye(camera)?, local_eye, around);
-                planes.extend(more.iter().map(|plane| plane.about(-local_eye)));
+                planes.extend(about_scene);
                 let volume = ConvexVolumeF64::from_planes(&planes).map_err(CameraError::from)?;
                 Ok(CameraView::Wide(volume))
             }
             Arithmetic::F32Relative => {
-                let more = self.more(&faces_about_eye(camera)?, local_eye, around);
-                let epsilon = self.planes.epsilon;
-                let volume = camera.relative_volume(&more, epsilon, around)?;
+                let volume = camera.relative_volume(&more, self.planes.epsilon, around)?;
                 Ok(CameraView::Relative(volume))
             }
         }
@@ -167,28 +163,30 @@ impl Culling {
         Ok(())
     }
 
-    /// f32 planes in scene coordinates. Planes of the frame are extended in
-    /// f64, before they are rounded.
-    fn in_f32(&self, camera: &Camera, around: &Surroundings) -> Result<CameraView, CullingError> {
-        let local_eye = camera.frame.eye - around.origin;
-        let more = if self.test.is_extended() {
-            let faces = if self.planes.method == PlaneMethod::Frame {
-                faces_about_eye(camera)?
-            } else {
-                let bare = PlaneOptions {
-                    epsilon: 0.0,
-                    ..self.planes
-                };
-                let faces = camera.volume(&bare, around)?;
-                let wide = faces.planes().iter().map(PlaneF64::from);
-                wide.map(|plane| plane.about(local_eye)).collect()
-            };
-            self.more(&faces, local_eye, around)
-        } else {
-            Vec::new()
+    /// Why a margin that was asked for may still lose visible items; `None` where it is
+    /// proven to keep them, or there is none.
+    pub fn unproven(&self) -> Option<String> {
+        let PlaneOptions { method, epsilon } = self.planes;
+        let found = match method {
+            _ if self.arithmetic == Arithmetic::F64 || epsilon == 0.0 => return None,
+            PlaneMethod::Frame if epsilon >= DEFAULT_EPSILON => return None,
+            PlaneMethod::Frame => format!("c = {epsilon}"),
+            method => format!("planes by {}", method.name()),
         };
-        let more: Vec<PlaneF64> = more.iter().map(|plane| plane.about(-local_eye)).collect();
-        let volume = camera.volume_with(&more, &self.planes, around)?;
+        Some(format!(
+            "the margin is proven for planes of the frame with c = {DEFAULT_EPSILON} or more, not \
+             for {found}: visible items may be lost"
+        ))
+    }
+
+    /// f32 planes in scene coordinates.
+    fn in_f32(
+        &self,
+        camera: &Camera,
+        more: &[PlaneF64],
+        around: &Surroundings,
+    ) -> Result<CameraView, CullingError> {
+        let volume = camera.volume_with(more, &self.planes, around)?;
         Ok(match self.test {
             CullingTest::Sphere => {
                 // The cubes about the items' spheres are what is indexed.
@@ -200,33 +198,38 @@ impl Culling {
         })
     }
 
-    /// What the test asks for beyond the faces, which are about the eye.
-    fn more(&self, faces: &[PlaneF64], local_eye: DVec3, around: &Surroundings) -> Vec<PlaneF64> {
+    /// What the test asks for beyond the faces, about the eye. It is made of the
+    /// frame's planes in f64 whatever the derivation: sums of rounded ones cut off
+    /// what rounding turned them by, and no margin covers that.
+    fn more(
+        &self,
+        camera: &Camera,
+        local_eye: DVec3,
+        around: &Surroundings,
+    ) -> Result<Vec<PlaneF64>, CameraError> {
+        let of_test: fn(&[PlaneF64], f64) -> Vec<PlaneF64> = match self.test {
+            CullingTest::Sphere | CullingTest::SixPlane => return Ok(Vec::new()),
+            CullingTest::SixBox => bounds,
+            CullingTest::Exact => extended,
+        };
+        let about_eye = Surroundings {
+            origin: camera.frame.eye,
+            ..Surroundings::default()
+        };
+        let faces = camera.convex_volume_f64(&about_eye)?;
         // Of the items about the eye, or of the volume where they are not known.
-        let reach = || match around.reach {
-            Vec3::ZERO => farthest_corner(faces),
+        let reach = match around.reach {
+            Vec3::ZERO => farthest_corner(faces.planes()),
             of_scene => (of_scene.as_dvec3() + local_eye.abs()).length(),
         };
-        match self.test {
-            CullingTest::Sphere | CullingTest::SixPlane => Vec::new(),
-            CullingTest::SixBox => bounds(faces, reach()),
-            CullingTest::Exact => extended(faces, reach()),
-        }
+        Ok(of_test(faces.planes(), reach))
     }
-}
-
-fn faces_about_eye(camera: &Camera) -> Result<Vec<PlaneF64>, CameraError> {
-    let around = Surroundings {
-        origin: camera.frame.eye,
-        ..Surroundings::default()
-    };
-    Ok(camera.convex_volume_f64(&around)?.planes().to_vec())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::{Frame, Lens};
+    use crate::camera::{Frame, Lens, MatrixConvention, PLANE_METHODS};
 
     const AROUND: Surroundings = Surroundings {
         origin: DVec3::ZERO,
@@ -285,6 +288,57 @@ mod tests {
                         );
                     }
                 }
+            }
+        }
+    }
+
+    /// A box that sums of rounded planes cut off, in a view of 178 degrees.
+    #[test]
+    fn every_derivation_keeps_what_sums_of_its_own_planes_would_lose() {
+        let (forward, up) = (DVec3::new(0.16, 0.88, 0.45), DVec3::new(-0.17, 0.47, -0.87));
+        let frame = Frame::looking_along(DVec3::new(8.5, -10.0, 1.0), forward, up).unwrap();
+        let lens = Lens::perspective(178.0, 16.0 / 9.0, 0.1, Some(100.0)).unwrap();
+        let corner = Vec3::new(8964.66, 2146.831_8, -7189.876_5);
+        let item = Aabb::new(corner, Vec3::new(15958.212, 2261.151_9, -7187.773_4));
+        let around = Surroundings {
+            origin: DVec3::ZERO,
+            reach: item.reach(),
+        };
+        for (method, planes, _) in PLANE_METHODS {
+            for (test, name, _) in TESTS {
+                let mut culling = of(test, Arithmetic::F32);
+                culling.planes.method = method;
+                let view = culling.view(&Camera { frame, lens }, &around).unwrap();
+                let sees = view.as_any().sees(&test.items(&[item])[0]);
+                assert!(sees, "{name} {planes}");
+                assert_eq!(culling.unproven().is_some(), planes != "frame");
+            }
+        }
+        let with = |epsilon| {
+            let mut culling = Culling::default();
+            culling.planes.epsilon = epsilon;
+            culling.unproven().is_some()
+        };
+        assert_eq!([0.0, 7.9, 8.0].map(with), [false, true, false]);
+    }
+
+    /// A window of 40 by 40 seen from far away: its planes are 20 from zero.
+    #[test]
+    fn an_eye_far_away_widens_no_plane_of_a_matrix() {
+        let cube = |x: f32| Aabb::new(Vec3::new(x, 0.0, 0.0), Vec3::new(x + 1.0, 1.0, 1.0));
+        for power in [6, 15, 18, 38, 60] {
+            let far = 10f64.powi(power);
+            let rows = [
+                [far / 20.0, 0.0, 0.0, 0.0],
+                [0.0, far / 20.0, 0.0, 0.0],
+                [0.0, 0.0, -far / 50.0, 0.0],
+                [0.0, 0.0, -1.0, far],
+            ];
+            let camera = Camera::of_matrix(rows, MatrixConvention::ColumnGl).unwrap();
+            for (test, name, _) in TESTS {
+                let view = of(test, Arithmetic::F32).view(&camera, &AROUND).unwrap();
+                let sees = |b| view.as_any().sees(&test.items(&[b])[0]);
+                assert!(sees(cube(0.0)) && !sees(cube(50.0)), "{name} 1e{power}");
             }
         }
     }

@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::walk::QUERY_STEPS;
 use super::{orbit, rotation};
 use crate::measure::OverProcesses;
-use crate::statistics::{ALPHA, Dominated, dominance, is_less, ranks};
+use crate::statistics::{ALPHA, Standing, dominance, is_less, ranks};
 
 /// A way to turn or carry as a point of error against time.
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -29,11 +29,11 @@ pub struct Rated {
     pub ns_per_step_upper: Option<f64>,
     /// Good enough to be recommended.
     pub qualifies: bool,
-    /// Another that is no worse in error or time and better in one.
+    /// Another that is shown to be no worse in error or time and better in one.
     pub dominated_by: Option<&'static str>,
     /// It is dominated, but by times that the processes do not tell apart.
     pub is_tie: bool,
-    /// Has an error, and nothing dominates it.
+    /// Has an error, and nothing is shown to dominate it.
     pub on_front: bool,
 }
 
@@ -116,18 +116,18 @@ fn with_front(mut rows: Vec<Row>) -> Vec<Row> {
         .collect();
     let logs: Vec<&[f64]> = rated.iter().map(|&i| &*rows[i].ln_ns).collect();
     for (&i, found) in rated.iter().zip(front(&values, &logs)) {
-        let by = found.map(|found| rows[rated[found.by]].rated.name);
+        let by = found.dominated_by.map(|by| rows[rated[by]].rated.name);
         let own = &mut rows[i].rated;
         own.dominated_by = by;
         own.on_front = by.is_none();
-        own.is_tie = found.is_some_and(|found| !found.is_shown);
+        own.is_tie = found.is_tie;
     }
     rows
 }
 
 /// Dominance of points of error and time with ln of their times in every process: an
 /// error is what it is, a time what a paired test over the processes shows.
-pub fn front(values: &[[f64; 2]], ln_ns: &[&[f64]]) -> Vec<Option<Dominated>> {
+pub fn front(values: &[[f64; 2]], ln_ns: &[&[f64]]) -> Vec<Standing> {
     dominance(values, &|a, b, dimension| {
         dimension == 0 || is_less(ln_ns[a], ln_ns[b], ALPHA)
     })
@@ -248,6 +248,6 @@ mod tests {
             .collect();
         let rows = rated(swapped.into_iter(), &OverProcesses::of(&times), 0, 1e-6);
         assert_eq!(cheapest(&rows, "such errors").name, Some("slow"));
-        assert!(rows[2].rated.on_front, "the values alone make the front");
+        assert!(rows[2].rated.on_front && rows[3].rated.on_front);
     }
 }

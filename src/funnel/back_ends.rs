@@ -3,6 +3,7 @@
 use super::chain::Chain;
 use super::fragment_rows;
 use super::hiding::HIDING;
+use super::left_out::{LeftOutRow, Reason};
 use super::seen_from::SeenFrom;
 use super::stage::{BackEnd, StageKind};
 use super::triangle_rows;
@@ -16,33 +17,47 @@ const PORTAL_CLIP: &str = "portal-clip";
 const CLAIM: &str = region::STORED.name;
 /// What knows of solids only, and makes a grid of its own.
 const GRID: &str = region::GRID_FLOOD.name;
+const EXACT: &str = region::EXACT.name;
 /// Most rooms of which it is found out, exactly, what is seen from each.
 pub const MOST_EXACT_ROOMS: usize = 4_096;
+/// Most linedefs of a map of which it is; of four times as many it takes half a minute.
+pub const MOST_EXACT_LINEDEFS: usize = 1_500;
 
 /// What finds a way through the rooms or sectors of a scene.
 fn of_regions(scene: &Scene) -> &'static [&'static str] {
-    const OF_ROOMS: &[&str] = &[
-        "flood",
-        "portal-rect",
-        PORTAL_CLIP,
-        GRID,
-        CLAIM,
-        "exact-pvs",
-    ];
-    const OF_MANY_ROOMS: &[&str] = &["flood", "portal-rect", PORTAL_CLIP, GRID, CLAIM];
-    const OF_SECTORS: &[&str] = &[
-        "flood",
-        "portal-rect",
-        PORTAL_CLIP,
-        CLAIM,
-        "reject",
-        "exact-pvs",
-    ];
-    match &scene.regions {
-        Regions::Tiling(rooms) if rooms.boxes.len() <= MOST_EXACT_ROOMS => OF_ROOMS,
-        Regions::Tiling(_) => OF_MANY_ROOMS,
-        Regions::Bsp(_) => OF_SECTORS,
+    const OF_ROOMS: &[&str] = &["flood", "portal-rect", PORTAL_CLIP, GRID, CLAIM, EXACT];
+    const OF_SECTORS: &[&str] = &["flood", "portal-rect", PORTAL_CLIP, CLAIM, "reject", EXACT];
+    let all = match &scene.regions {
+        Regions::Tiling(_) => OF_ROOMS,
+        Regions::Bsp(map) if map.dispute().is_none() => OF_SECTORS,
         _ => &[],
+    };
+    // It is the last.
+    &all[..all.len() - usize::from(!all.is_empty() && !has_exact(scene))]
+}
+
+/// Whether it is found out, exactly, which regions of a scene see each other.
+pub fn has_exact(scene: &Scene) -> bool {
+    match &scene.regions {
+        Regions::Tiling(rooms) => rooms.boxes.len() <= MOST_EXACT_ROOMS,
+        Regions::Bsp(map) => map.line_count() <= MOST_EXACT_LINEDEFS,
+        _ => false,
+    }
+}
+
+/// What the region stage of a map leaves out, and why.
+pub fn left_out_of(scene: &Scene) -> Vec<LeftOutRow> {
+    let Regions::Bsp(map) = &scene.regions else {
+        return Vec::new();
+    };
+    match map.dispute() {
+        Some(dispute) => vec![LeftOutRow::of("stages", "region", dispute)],
+        None if has_exact(scene) => Vec::new(),
+        None => vec![LeftOutRow::of(
+            "stages",
+            EXACT,
+            Reason::TooManyLinedefs(map.line_count()),
+        )],
     }
 }
 
@@ -94,7 +109,7 @@ impl Chain {
     /// The same with what suits the place that the region stage looks from.
     pub fn from(self, from: SeenFrom, scene: &Scene) -> Chain {
         let known = of_regions(scene);
-        let best = ["exact-pvs", "flood"]
+        let best = [EXACT, "flood"]
             .into_iter()
             .find(|name| known.contains(name));
         match (from, best) {

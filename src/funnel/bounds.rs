@@ -77,7 +77,7 @@ impl Bound<'_> {
 }
 
 /// The bounds that a scene has data for. `covered` are the samples of each view that
-/// something covers.
+/// something covers; nothing of views where nothing is drawn.
 pub fn bounds<'w>(world: &'w World<'w>, faces: &Faces, covered: &[u64]) -> Vec<Bound<'w>> {
     let mut bounds = of_regions(world);
     bounds.extend(of_occlusion(world));
@@ -204,7 +204,7 @@ fn of_fragments<'w>(world: &World, covered: &[u64]) -> Bound<'w> {
         back_end: Z,
         name: "write id and depth of each covered sample",
         ask: Box::new(move |view, out| {
-            let count = covered[view];
+            let count = covered.get(view).map_or(0, |count| *count);
             out.extend_from_slice(&ids[..count]);
             let buffer = &mut buffer.borrow_mut();
             buffer[..count].copy_from_slice(&depths[..count]);

@@ -5,7 +5,7 @@ use crate::index::BuildError;
 use crate::input::{InputError, gigabytes};
 use crate::measure::WorkloadError;
 use crate::query::ItemId;
-use crate::scene::ItemShape;
+use crate::scene::{Dispute, ItemShape};
 use crate::visibility::region::OtherRegions;
 use crate::visibility::{NoRays, SampleGrid};
 
@@ -62,6 +62,19 @@ pub enum FunnelError {
         /// Bytes that are free.
         available: u64,
     },
+    /// Items that are in front at the same samples, as those with a common face are.
+    #[error(
+        "camera {place}: about {in_front} items in front at the samples, those of each sample \
+         counted; expected at most {most}: fewer --samples or fewer items with a common face"
+    )]
+    TooManyTies {
+        /// The camera's index in the path.
+        place: usize,
+        /// Estimated number.
+        in_front: u64,
+        /// Most of them.
+        most: u64,
+    },
     /// A mirror that is no item.
     #[error("--mirror {item}: '{scene}' has {items} items; expected one from 0 to {}", items - 1)]
     NoMirror {
@@ -77,6 +90,14 @@ pub enum FunnelError {
     NoRegions {
         /// Its name.
         scene: String,
+    },
+    /// The same, about a map whose sectors are no regions.
+    #[error("'{scene}': {dispute}; expected sectors that divide the map for --pvs")]
+    Disputed {
+        /// Its name.
+        scene: String,
+        /// A place of no known sector.
+        dispute: Dispute,
     },
     /// What is claimed to be seen from where is of other regions.
     #[error(transparent)]

@@ -7,19 +7,43 @@ use std::cell::OnceCell;
 use std::rc::Rc;
 use std::sync::Arc;
 
+use glam::DVec3;
+
 use super::judged::Judged;
 use super::pass::Pass;
 use super::triangle_rows::rows;
 use super::world::World;
+use crate::camera::Camera;
 use crate::kernel::Kernel;
-use crate::scene::Surfaces;
+use crate::scene::{ItemShape, Scene, Surfaces};
 use crate::visibility::triangle::{
     Clusters, Counts, Criterion, MOST_TRIANGLES, Selection, TriangleCull, View, truth,
 };
+use crate::visibility::{NoRays, SampleGrid};
 
 /// Bytes that the study of a mesh takes for each triangle, beside its scene: trees for
 /// rays, clusters and every back end of both; 310 were measured.
 pub const BYTES_PER_TRIANGLE: u64 = 350;
+
+/// The zero of a view's triangles. Faces of boxes are rounded about the eye, so that none
+/// changes its side; where f32 does not reach from there, about the scene's own origin.
+fn origin_of(scene: &Scene, camera: &Camera) -> DVec3 {
+    let eye = camera.frame.eye;
+    let reach = scene.bounds.reach().as_dvec3() + (eye - scene.origin).abs();
+    let is_near = reach.max_element() < f64::from(f32::MAX);
+    match scene.item_shape() {
+        ItemShape::Box if is_near => eye,
+        _ => scene.origin,
+    }
+}
+
+/// A camera's view of the triangles of a scene.
+///
+/// # Errors
+/// A camera that was given as a matrix.
+pub fn view(scene: &Scene, camera: &Camera, grid: SampleGrid) -> Result<View, NoRays> {
+    View::of(camera, origin_of(scene, camera), grid)
+}
 
 /// Triangles in clusters, ready for every back end.
 struct Built {
@@ -67,8 +91,10 @@ impl Faces {
         let views = (0..world.views()).map(|view| {
             let items = world.listed(pass.items(set, view));
             let built = whole.clone().unwrap_or_else(|| {
-                let surfaces = Surfaces::of_items(world.scene, &items);
-                Built::of(Arc::new(surfaces))
+                let solids = world.solids.as_ref().expect("boxes or triangles");
+                let origin = origin_of(world.scene, world.rays(view).camera());
+                let boxes = items.iter().map(|&item| &solids.boxes[item as usize]);
+                Built::of(Arc::new(Surfaces::of_boxes_about(origin, boxes)))
             });
             let clusters = &built.clusters;
             Left {
@@ -143,5 +169,72 @@ impl Faces {
             }
         });
         judged.collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{Frame, Lens};
+    use crate::scene::{SeededRng, WorldBox};
+    use crate::visibility::triangle::{TRIANGLE_ROWS, facing};
+
+    /// Sides of a box that an eye is in front of and that have an area: two triangles each.
+    fn seen(b: &WorldBox, eye: DVec3) -> usize {
+        let sides = (0..3).filter(|&axis| (0..3).all(|k| k == axis || b.min[k] < b.max[k]));
+        let of_axis = |axis: usize| {
+            usize::from(eye[axis] < b.min[axis]) + usize::from(eye[axis] > b.max[axis])
+        };
+        2 * sides.map(of_axis).sum::<usize>()
+    }
+
+    /// However coarse f32 is about the scene's origin.
+    #[test]
+    fn triangles_face_the_eye_where_faces_of_the_written_boxes_do() {
+        let mut rng = SeededRng::new(6);
+        let mut about_origin = 0;
+        for round in 0..300 {
+            let far = [0.0, 1e6, 1e8, 1e15, 1e30][round % 5];
+            let eye = rng.normal3() * 5.0 + far;
+            let boxes: Vec<WorldBox> = (0..8)
+                .map(|n| {
+                    let at = eye + rng.normal3() * [1e-7, 1.0, 30.0][n % 3];
+                    let thin = [(); 3].map(|()| rng.below(3) as f64 / 2.0);
+                    let size = rng.point() * DVec3::from(thin) * 3.0;
+                    // Some faces are in the plane of the eye.
+                    let at = if n == 3 { at.with_y(eye.y) } else { at };
+                    WorldBox::new(at, at + size)
+                })
+                .chain([WorldBox::new(
+                    DVec3::splat(-far - 9.0),
+                    DVec3::splat(-far - 8.0),
+                )])
+                .collect();
+            let scene = Scene::from_boxes("few", &boxes).unwrap();
+            let frame = Frame::looking_along(eye, DVec3::X, DVec3::Z).unwrap();
+            let lens = Lens::perspective(60.0, 1.5, 0.1, None).unwrap();
+            let camera = Camera { frame, lens };
+            let grid = SampleGrid::new(8, 8);
+            let view = view(&scene, &camera, grid).unwrap();
+            let wanted: usize = boxes.iter().map(|b| seen(b, eye)).sum();
+            let surfaces = Surfaces::of_boxes_about(eye, boxes.iter());
+            let clusters = Arc::new(Clusters::of(Arc::new(surfaces), MOST_TRIANGLES));
+            let truth = facing(&clusters, &view, &Selection::all(&clusters));
+            assert_eq!(truth.triangles(), wanted, "{round} {boxes:?} {eye}");
+            for row in TRIANGLE_ROWS.iter().filter(|row| row.guarantee.is_safe()) {
+                if row.criterion != Criterion::Facing {
+                    continue;
+                }
+                let mut kept = Selection::all(&clusters);
+                (row.build)(&clusters).cull(&view, Kernel::best(), &mut kept);
+                assert_eq!(truth.without(&kept), 0, "{round} {}", row.name);
+            }
+            let rounded = Arc::new(Surfaces::from_boxes(&scene));
+            let rounded = Arc::new(Clusters::of(rounded, MOST_TRIANGLES));
+            let view = View::of(&camera, scene.origin, grid).unwrap();
+            let found = facing(&rounded, &view, &Selection::all(&rounded));
+            about_origin += usize::from(found.triangles() != wanted);
+        }
+        assert!(about_origin > 50, "the premise: {about_origin}");
     }
 }

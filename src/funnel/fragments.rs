@@ -8,6 +8,7 @@ use serde::Serialize;
 use super::faces::Faces;
 use super::fragment_rows::{STENCIL, Z};
 use super::judged::Judged;
+use super::left_out::{Reason, fits_drawing};
 use super::pass::Pass;
 use super::stage::{BackEnd, NONE, StageKind};
 use super::triangle_rows;
@@ -16,7 +17,7 @@ use super::world::World;
 use crate::query::ItemId;
 use crate::scene::{self, WorldBox};
 use crate::visibility::fragment::{
-    Canvas, Drawn, DrawnTriangles, Piece, Stencil, Surfaces, Tally, Tests,
+    Canvas, Drawn, DrawnTriangles, Piece, Screen, Stencil, Surfaces, Tally, Tests,
 };
 use crate::visibility::region::RegionGraph;
 use crate::visibility::truth::TriangleProbe;
@@ -84,14 +85,35 @@ pub struct Tested {
 /// map the triangles that the triangle stage leaves, and the floors and ceilings.
 pub struct Fragments<'w> {
     world: &'w World<'w>,
+    /// None for what is too much to be drawn.
     tests: Vec<&'static str>,
     left: Left<'w>,
+    /// Why there is no test.
+    pub too_much: Option<Reason>,
 }
 
 /// By view what is drawn; and an image, whose memory is kept from view to view.
 enum Left<'w> {
     Boxes(Vec<Boxes>, RefCell<Option<(Canvas, Drawn)>>),
     Triangles(&'w scene::Surfaces, Vec<Vec<u32>>, TriangleImage),
+}
+
+impl Left<'_> {
+    /// Refuses a view of which too much would be drawn.
+    fn fits(&self, world: &World, view: usize) -> Result<(), Reason> {
+        let screen = Screen::of(world.rays(view), world.samples);
+        match self {
+            Left::Boxes(views, _) => {
+                let boxes = views[view].solids.boxes.iter();
+                fits_drawing(world.samples, boxes.filter_map(|b| screen.rectangle(b)))
+            }
+            Left::Triangles(surfaces, views, _) => {
+                let corners = views[view].iter().map(|&t| surfaces.corners(t));
+                let placed = corners.filter_map(|t| screen.triangle(t, surfaces.origin));
+                fits_drawing(world.samples, placed)
+            }
+        }
+    }
 }
 
 type TriangleImage = RefCell<Option<(Canvas<TriangleProbe>, DrawnTriangles)>>;
@@ -129,10 +151,15 @@ impl<'w> Fragments<'w> {
             }
             (None, None) => unreachable!("triangles of what is no solid box"),
         };
+        let too_much = (0..world.views()).find_map(|view| left.fits(world, view).err());
         Fragments {
-            tests: tests.collect(),
+            tests: match too_much {
+                None => tests.collect(),
+                Some(_) => Vec::new(),
+            },
             left,
             world,
+            too_much,
         }
     }
 
@@ -185,7 +212,8 @@ impl<'w> Fragments<'w> {
     ) -> Option<Vec<Tested>> {
         let world = self.world;
         let tested = world.back_ends(StageKind::Fragment).into_iter();
-        let tested = tested.map(|back_end| {
+        let is_there = |row: &BackEnd| row.name == NONE || self.tests.contains(&row.name);
+        let tested = tested.filter(is_there).map(|back_end| {
             let test = self.tests.iter().position(|name| *name == back_end.name);
             let (mut judged, mut tallies) = (Vec::new(), Vec::new());
             for view in 0..world.views() {

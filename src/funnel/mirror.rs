@@ -4,6 +4,7 @@
 use serde::Serialize;
 
 use super::fragments::FragmentCounts;
+use super::left_out::{Reason, fits_drawing};
 use super::pass::Pass;
 use super::world::World;
 use crate::camera::{Camera, Lens};
@@ -36,6 +37,9 @@ pub struct MirrorRow {
 
 /// The mirror in every view; `set` is what the chain leaves of each, which may hide it. It
 /// shows any other item. `None` if stopped.
+///
+/// # Errors
+/// More items than are drawn.
 pub fn mirrored(
     item: ItemId,
     world: &World,
@@ -43,7 +47,7 @@ pub fn mirrored(
     pass: &Pass,
     set: usize,
     stop: &dyn Fn() -> bool,
-) -> Option<MirrorRow> {
+) -> Result<Option<MirrorRow>, Reason> {
     let own = &solids.boxes[item as usize];
     let axis = (own.max - own.min).min_position();
     let others = (0..solids.boxes.len() as ItemId).filter(|&other| other != item);
@@ -52,7 +56,7 @@ pub fn mirrored(
     let (mut views, mut marked, mut shown, mut wrong) = (0, 0, 0, 0);
     for view in 0..world.views() {
         if stop() {
-            return None;
+            return Ok(None);
         }
         let rays = world.rays(view);
         let Some(face) = face_towards(rays.camera(), own, axis) else {
@@ -70,6 +74,11 @@ pub fn mirrored(
         let direct = draw(&canvas, solids, &left, &Tests::default());
         let stencil = Stencil::of_rectangle(&canvas, &face, &direct.depth);
         let reflected = canvas.mirrored(axis, at);
+        let all = solids.boxes.iter();
+        fits_drawing(
+            world.samples,
+            all.filter_map(|b| reflected.screen().rectangle(b)),
+        )?;
         let tests = Tests {
             stencil: Some(&stencil),
             surfaces: None,
@@ -87,16 +96,20 @@ pub fn mirrored(
         without.push(all.tally);
     }
     let mean = |sum: usize| sum as f64 / world.views() as f64;
-    Some(MirrorRow {
-        item,
-        axis: ['x', 'y', 'z'][axis],
-        view_count: views,
-        marked_count: mean(marked),
-        shown_count: mean(shown),
-        with_stencil: FragmentCounts::of(&with)?,
-        without_stencil: FragmentCounts::of(&without)?,
-        wrong_sample_count: wrong,
-    })
+    let of = FragmentCounts::of;
+    let row = of(&with)
+        .zip(of(&without))
+        .map(|(with_stencil, without_stencil)| MirrorRow {
+            item,
+            axis: ['x', 'y', 'z'][axis],
+            view_count: views,
+            marked_count: mean(marked),
+            shown_count: mean(shown),
+            with_stencil,
+            without_stencil,
+            wrong_sample_count: wrong,
+        });
+    Ok(row)
 }
 
 /// The face of a box across an axis that a camera sees the front of.

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
+use super::left_out::{LeftOutRow, Reason, fits_drawing};
 use super::pass::Pass;
 use super::stage::by_name;
 use super::times::Times;
@@ -15,8 +16,8 @@ use crate::query::ItemId;
 use crate::scene::Surfaces;
 use crate::visibility::fragment::order::{self, ORDERS};
 use crate::visibility::fragment::{
-    self, Canvas, DepthOrder, OrderErrors, Piece, Tally, Tests, ToOrder, draw, draw_surfaces,
-    order_errors,
+    self, Canvas, DepthOrder, OrderErrors, Part, Piece, Screen, Tally, Tests, ToOrder,
+    TooManyPairs, draw, draw_surfaces, order_errors,
 };
 use crate::visibility::truth::SurfaceIndex;
 use crate::visibility::{Guarantee, Rays, SampleGrid, Solids};
@@ -71,18 +72,44 @@ pub struct Orders {
     views: Vec<Left>,
     /// The triangles that are drawn, of a scene whose items are no solid boxes.
     triangles: Option<Arc<Surfaces>>,
+    /// Orders whose pieces are too much to be drawn.
+    pub left_out: Vec<LeftOutRow>,
+}
+
+impl Left {
+    /// Refuses an order that cuts items into pieces of which too much would be drawn.
+    fn fits(&self, order: usize, samples: SampleGrid) -> Result<(), Reason> {
+        let mut pieces = Vec::new();
+        self.orders[order].order(&self.boxes, self.rays.camera(), &mut pieces);
+        if pieces.len() == self.items.len() {
+            return Ok(());
+        }
+        let screen = Screen::of(&self.rays, samples);
+        let drawn = pieces.iter().filter_map(|piece| match &piece.part {
+            Some(Part::Within(part)) => screen.rectangle(part),
+            _ => screen.rectangle(&self.boxes.boxes[piece.item as usize]),
+        });
+        fits_drawing(samples, drawn)
+    }
 }
 
 impl Orders {
-    /// For a set of items of each view.
-    pub fn of(world: &World, pass: &Pass, set: usize) -> Orders {
+    /// For a set of items of each view; none for what is too much to be drawn.
+    pub fn of(world: &World, pass: &Pass, set: usize, too_much: Option<&Reason>) -> Orders {
         let surfaces = world.surfaces.as_deref();
         let all = match &world.solids {
             Some(solids) => Cow::Borrowed(solids),
             None => Cow::Owned(Solids::of(world.scene)),
         };
-        let mut rows = Vec::new();
-        let views = (0..world.views()).map(|view| {
+        let mut rows: Vec<&'static order::OrderRow> = Vec::new();
+        let mut left_out = Vec::new();
+        left_out.extend(too_much.map(|reason| LeftOutRow::of("orders", "all", reason.clone())));
+        let views = if too_much.is_some() {
+            0..0
+        } else {
+            0..world.views()
+        };
+        let views = views.map(|view| {
             let items = world.listed(pass.items(set, view));
             let boxes = all.some(&items);
             let triangles = surfaces.map(|surfaces| surfaces.some(&items));
@@ -105,10 +132,24 @@ impl Orders {
                 boxes,
             }
         });
+        let mut views: Vec<Left> = views.collect();
+        // Triangles are met by rays, whatever the pieces are.
+        let cuts = if surfaces.is_none() { rows.len() } else { 0 };
+        for order in (0..cuts).rev() {
+            let fits = |left: &Left| left.fits(order, world.samples);
+            if let Err(reason) = views.iter().try_for_each(fits) {
+                let row = rows.remove(order);
+                left_out.push(LeftOutRow::of("orders", row.name, reason));
+                views
+                    .iter_mut()
+                    .for_each(|left| drop(left.orders.remove(order)));
+            }
+        }
         Orders {
-            views: views.collect(),
+            views,
             rows,
             triangles: world.surfaces.clone(),
+            left_out,
         }
     }
 
@@ -124,22 +165,33 @@ impl Orders {
     }
 
     /// Draws every view in every order; `None` if stopped.
-    pub fn drawn(&self, samples: SampleGrid, stop: &dyn Fn() -> bool) -> Option<Vec<OrderRow>> {
+    ///
+    /// # Errors
+    /// Too many items behind each other.
+    pub fn drawn(
+        &self,
+        samples: SampleGrid,
+        stop: &dyn Fn() -> bool,
+    ) -> Result<Option<Vec<OrderRow>>, TooManyPairs> {
         let mut sums = vec![[0.0; 7]; self.count()];
         let mut exceptions = vec![BTreeMap::new(); self.count()];
         // Here and not before: processes that time need no tree of the triangles.
         let index = self.triangles.as_deref().map(SurfaceIndex::build);
         for (view, left) in self.views.iter().enumerate() {
             if stop() {
-                return None;
+                return Ok(None);
             }
             let sorted = (0..self.count()).map(|order| {
                 let mut pieces = Vec::new();
                 self.sort(order, view, &mut pieces);
                 pieces
             });
-            let counts = self.counted(left, index.as_ref(), samples, sorted.collect(), stop)?;
+            let sorted = sorted.collect();
+            let Some(counts) = self.counted(left, index.as_ref(), samples, sorted, stop) else {
+                return Ok(None);
+            };
             for (sums, (tally, errors)) in sums.iter_mut().zip(counts) {
+                let errors = errors?;
                 let counts = [
                     tally.fragments,
                     tally.passed,
@@ -186,7 +238,7 @@ impl Orders {
                 times: Times::default(),
             }
         });
-        Some(rows.collect())
+        Ok(Some(rows.collect()))
     }
 
     /// What each order of a view takes and gets wrong.
@@ -197,7 +249,7 @@ impl Orders {
         samples: SampleGrid,
         sorted: Vec<Vec<Piece>>,
         stop: &dyn Fn() -> bool,
-    ) -> Option<Vec<(Tally, OrderErrors)>> {
+    ) -> Option<Vec<(Tally, Result<OrderErrors, TooManyPairs>)>> {
         if let (Some(index), Some(all)) = (index, &self.triangles) {
             let orders = left.orders.iter().map(|order| &**order);
             let orders: Vec<_> = orders.zip(sorted).collect();

@@ -3,6 +3,7 @@
 
 use std::rc::Rc;
 
+use super::left_out::LeftOutRow;
 use super::world::World;
 use crate::kernel::Kernel;
 use crate::query::ItemId;
@@ -45,9 +46,9 @@ impl<'w> Pickable<'w> {
         }
     }
 
-    /// Every back end that can hold the items; the one that looks at each box or triangle
-    /// only up to so many.
-    pub fn back_ends(self, most_for_loop: usize, kernel: Kernel) -> Vec<Built> {
+    /// Every back end that can hold the items, and those that refuse them; the one that
+    /// looks at each box or triangle only up to so many.
+    pub fn back_ends(self, most_for_loop: usize, kernel: Kernel) -> (Vec<Built>, Vec<LeftOutRow>) {
         let count = match self {
             Pickable::Boxes(solids) => solids.boxes.len(),
             Pickable::Triangles(surfaces, _) => surfaces.triangles.len(),
@@ -57,22 +58,27 @@ impl<'w> Pickable<'w> {
             Pickable::Triangles(surfaces, items) => Some(Facets::of(surfaces, items)),
         };
         let build = |row: &BackEnd| match (self, &facets) {
-            (Pickable::Boxes(solids), _) => (row.build)(solids, kernel).ok(),
-            (_, Some(facets)) => row.build_triangles?(facets, kernel).ok(),
+            (Pickable::Boxes(solids), _) => Some((row.build)(solids, kernel)),
+            (_, Some(facets)) => Some(row.build_triangles?(facets, kernel)),
             (_, None) => None,
         };
+        let (mut built, mut left_out) = (Vec::new(), Vec::new());
         let rows = BACK_ENDS
             .iter()
             .filter(|row| count <= most_for_loop || row.name != "linear");
-        let built = rows.filter_map(|row| {
-            Some(Built {
-                name: row.name,
-                summary: row.summary,
-                guarantee: row.guarantee,
-                pick: build(row)?.into(),
-            })
-        });
-        built.collect()
+        for row in rows {
+            match build(row) {
+                None => {}
+                Some(Err(reason)) => left_out.push(LeftOutRow::of("picks", row.name, reason)),
+                Some(Ok(pick)) => built.push(Built {
+                    name: row.name,
+                    summary: row.summary,
+                    guarantee: row.guarantee,
+                    pick: pick.into(),
+                }),
+            }
+        }
+        (built, left_out)
     }
 
     /// What is true of it.

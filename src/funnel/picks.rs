@@ -6,14 +6,15 @@ use std::rc::Rc;
 
 use serde::{Serialize, Serializer};
 
-use super::pickable::{Exactly, NEAREST, Pickable};
+use super::left_out::LeftOutRow;
+use super::pickable::{Built, Exactly, NEAREST, Pickable};
 use super::stage::by_name;
 use super::times::Times;
 use super::world::World;
 use crate::camera::Surroundings;
-use crate::index::DynIndex;
+use crate::index::{DynIndex, caught};
 use crate::query::ItemId;
-use crate::visibility::pick::{CursorRectangle, Hit, Pick};
+use crate::visibility::pick::{CursorRectangle, Hit, NotBuilt, Pick};
 use crate::visibility::{Guarantee, Ray, Rays, SampleGrid};
 
 /// Cursor places of a view.
@@ -111,6 +112,8 @@ pub struct Picks<'w> {
     pickable: Pickable<'w>,
     pickers: Vec<Picker<'w>>,
     cursors: Vec<Cursors>,
+    /// Back ends that refuse the scene.
+    pub left_out: Vec<LeftOutRow>,
 }
 
 impl<'w> Picks<'w> {
@@ -121,7 +124,16 @@ impl<'w> Picks<'w> {
     pub fn of(world: &'w World<'w>) -> Picks<'w> {
         let suits = |name: &str| name != "linear" || world.items() <= MOST_FOR_LOOP;
         let pickable = Pickable::of(world);
-        let built = pickable.back_ends(MOST_FOR_LOOP, world.kernel);
+        let views = 0..world.views();
+        let cursors: Vec<Cursors> = views.map(|view| Cursors::of(world, view)).collect();
+        let (mut built, mut left_out) = pickable.back_ends(MOST_FOR_LOOP, world.kernel);
+        built.retain(|back_end| {
+            let refused = answers(back_end, &cursors).err();
+            let row = |reason| LeftOutRow::of("picks", back_end.name, reason);
+            let is_there = refused.is_none();
+            left_out.extend(refused.map(row));
+            is_there
+        });
         let by_rays = |ask: fn(Rc<dyn Pick>) -> By<'w>| {
             let pickers = built.iter().map(move |back_end| Picker {
                 name: back_end.name.to_owned(),
@@ -143,10 +155,9 @@ impl<'w> Picks<'w> {
             world,
             around: world.scene.surroundings(),
             pickable,
+            left_out,
             pickers: pickers.chain(through).collect(),
-            cursors: (0..world.views())
-                .map(|view| Cursors::of(world, view))
-                .collect(),
+            cursors,
         }
     }
 
@@ -235,6 +246,21 @@ impl<'w> Picks<'w> {
             in_planes,
         }
     }
+}
+
+/// Has code of others answer at every cursor once, so that a panic is known before any row.
+fn answers(back_end: &Built, cursors: &[Cursors]) -> Result<(), NotBuilt> {
+    if back_end.guarantee != Guarantee::Unproven {
+        return Ok(());
+    }
+    let (name, mut hits) = (back_end.name, Vec::new());
+    let ask = || {
+        for cursor in cursors.iter().flat_map(|of_view| &of_view.places) {
+            back_end.pick.first(&cursor.ray);
+            back_end.pick.nearest(&cursor.ray, NEAREST, &mut hits);
+        }
+    };
+    caught(ask).map_err(|message| NotBuilt::Panicked { name, message })
 }
 
 impl Cursors {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use super::back_ends::MOST_EXACT_ROOMS;
+use super::back_ends::has_exact;
 use super::error::FunnelError;
 use super::seen_from::SeenFrom;
 use crate::input::InputError;
@@ -43,13 +43,13 @@ pub struct ClaimAudit {
 }
 
 /// The regions of a scene, and the table that its own file claims to be what is seen
-/// from where; `None` for a scene without regions.
+/// from where; `None` for a scene without regions, such as a map whose linedefs disagree.
 ///
 /// # Errors
 /// The map's file, read a second time.
 pub fn regions_of(scene: &Scene) -> Result<Option<(RegionGraph, Option<Pvs>)>, InputError> {
     Ok(match DoomMap::of_scene(scene)? {
-        Some(map) => Some((map.graph(), map.reject().cloned())),
+        Some(map) => map.graph().ok().map(|graph| (graph, map.reject().cloned())),
         None => RegionGraph::of_scene(scene).ok().map(|graph| (graph, None)),
     })
 }
@@ -66,13 +66,20 @@ impl Regions {
         solids: Option<&Solids>,
     ) -> Result<Option<Regions>, FunnelError> {
         if let Some(map) = DoomMap::of_scene(scene)? {
-            return Regions::of_map(map, scene, claim, from).map(Some);
+            return match map.graph() {
+                Ok(graph) => Regions::of_map(map, Arc::new(graph), scene, claim, from).map(Some),
+                Err(dispute) if claim.is_some() => Err(FunnelError::Disputed {
+                    scene: scene.name.clone(),
+                    dispute,
+                }),
+                Err(_) => Ok(None),
+            };
         }
         let Ok(graph) = RegionGraph::of_scene(scene) else {
             return Ok(None);
         };
         let graph = Arc::new(graph);
-        let exact = match graph.len() <= MOST_EXACT_ROOMS {
+        let exact = match has_exact(scene) {
             true => RoomsPvs::of(graph.clone()).ok(),
             false => None,
         };
@@ -103,36 +110,40 @@ impl Regions {
     /// The sectors of a map, with its own table and with what is exact.
     fn of_map(
         map: Arc<DoomMap>,
+        graph: Arc<RegionGraph>,
         scene: &Scene,
         claim: Option<&Arc<Pvs>>,
         from: SeenFrom,
     ) -> Result<Regions, FunnelError> {
-        let graph = Arc::new(map.graph());
-        let exact = SectorPvs::of(map.clone(), graph.clone());
+        // A claim is to be audited at any price.
+        let exact = (has_exact(scene) || claim.is_some())
+            .then(|| SectorPvs::of(map.clone(), graph.clone()));
         let mut rows = Vec::new();
-        let mut audits = Vec::new();
         if let Some(reject) = map.reject() {
-            rows.extend(StoredPvs::of(
-                graph.clone(),
-                Arc::new(reject.clone()),
-                REJECT,
-            ));
-            audits.push(ClaimAudit {
-                claim: REJECT.name,
-                audit: audit(reject, &exact, &graph)?,
-            });
+            let reject = Arc::new(reject.clone());
+            rows.extend(StoredPvs::of(graph.clone(), reject, REJECT));
         }
         if let Some(claim) = claim {
             rows.push(claimed(claim, &graph)?);
-            audits.push(ClaimAudit {
-                claim: STORED.name,
-                audit: audit(claim, &exact, &graph)?,
-            });
         }
-        rows.extend(stored(&exact, &graph));
+        let mut audits = Vec::new();
+        if let Some(exact) = &exact {
+            let claims = [
+                (REJECT, map.reject()),
+                (STORED, claim.map(|claim| &**claim)),
+            ];
+            for (row, claim) in claims {
+                let found = claim.map(|claim| audit(claim, exact, &graph)).transpose()?;
+                audits.extend(found.map(|audit| ClaimAudit {
+                    claim: row.name,
+                    audit,
+                }));
+            }
+            rows.extend(stored(exact, &graph));
+        }
         let mut regions = Regions::with(graph, rows, scene, from);
         regions.audits = audits;
-        if from == SeenFrom::Region {
+        if let Some(exact) = exact.filter(|_| from == SeenFrom::Region) {
             regions.audit_searches(&exact)?;
         }
         Ok(regions)

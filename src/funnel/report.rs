@@ -6,6 +6,7 @@ use super::bounds::BoundRow;
 use super::chain::Chain;
 use super::fragments::FragmentCounts;
 use super::judged::Errors;
+use super::left_out::LeftOutRow;
 use super::mirror::MirrorRow;
 use super::orders::OrderRow;
 use super::picks::PickRow;
@@ -65,6 +66,8 @@ pub struct FunnelReport {
     pub orders: Vec<OrderRow>,
     /// What is under a cursor, by every back end of picking and every structure.
     pub picks: Vec<PickRow>,
+    /// Rows that are not there, and why.
+    pub left_out: Vec<LeftOutRow>,
     /// The least that some of the back ends can take.
     pub bounds: Vec<BoundRow>,
     /// Each stage of the chain, with it and without it.

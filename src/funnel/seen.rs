@@ -1,6 +1,8 @@
 //! What the views of a funnel show, exactly: solid boxes as boxes, meshes and maps as
 //! triangles.
 
+use super::error::FunnelError;
+use super::left_out::most_drawn;
 use super::truth::Truth;
 use super::world::World;
 use crate::query::ItemId;
@@ -10,23 +12,42 @@ use crate::visibility::truth::{
 };
 use crate::visibility::{Rays, SampleGrid, Solids};
 
+/// Samples that tell how many items are in front at all.
+const FEW: SampleGrid = SampleGrid::new(16, 9);
+
 /// At the samples of every view and along so many random rays, whose items count as
 /// one sample each if they are at none. `None` if stopped.
+///
+/// # Errors
+/// Too many items in front at the same samples.
 pub fn seen(
     world: &World,
     samples: SampleGrid,
     random_rays: usize,
     threads: usize,
     stop: &dyn Fn() -> bool,
-) -> Option<Truth> {
+) -> Result<Option<Truth>, FunnelError> {
     let all = Shown::of(world);
     let items = world.items() as ItemId;
     let mut visible = Vec::with_capacity(world.views());
     for view in 0..world.views() {
         if stop() {
-            return None;
+            return Ok(None);
         }
         let rays = world.rays(view);
+        let at_few = all.at_samples(rays, FEW, threads).samples_of;
+        let at_few: u64 = at_few.into_iter().map(u64::from).sum();
+        let (in_front, most) = (
+            at_few * samples.samples() as u64 / FEW.samples() as u64,
+            most_drawn(samples),
+        );
+        if in_front > most {
+            return Err(FunnelError::TooManyTies {
+                place: world.camera(view),
+                in_front,
+                most,
+            });
+        }
         let truth = all.at_samples(rays, samples, threads);
         let counts = truth.visible.iter().copied().zip(truth.samples_of);
         let mut seen: Vec<(ItemId, u32)> = counts.collect();
@@ -40,7 +61,7 @@ pub fn seen(
         seen.retain(|(item, _)| *item < items);
         visible.push(seen);
     }
-    Some(Truth::new(visible))
+    Ok(Some(Truth::new(visible)))
 }
 
 /// What is shown, as rays end at it: solid boxes; or the triangles of a mesh, or the walls,

@@ -3,6 +3,7 @@
 
 use std::cell::RefCell;
 
+use super::back_ends::left_out_of;
 use super::bounds::{Bound, bounds};
 use super::chain::Chain;
 use super::conclusions::conclusions;
@@ -11,6 +12,7 @@ use super::faces::Faces;
 use super::fragment_rows;
 use super::fragments::Fragments;
 use super::judged::{Errors, Judged};
+use super::left_out::LeftOutRow;
 use super::mirror::mirrored;
 use super::orders::Orders;
 use super::pass::{Pass, Walked};
@@ -69,20 +71,24 @@ struct Sides {
 }
 
 /// Goes through all chains, judges them, and plans how they are timed; `None` if
-/// stopped.
+/// stopped. `begin` gets the name of each step before it starts.
 ///
 /// # Errors
 /// A camera, a structure, a back end or an image that cannot be had.
 pub fn prepare(
     input: &FunnelInput,
+    begin: &dyn Fn(&str),
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<Prepared>, FunnelError> {
     fits(input.samples, available_bytes())?;
+    begin("structures, regions, occluders");
     let world = World::new(input)?;
     let threads = input.execution.threads;
-    let Some(truth) = seen(&world, input.samples, 0, threads, stop) else {
+    begin("the truth");
+    let Some(truth) = seen(&world, input.samples, 0, threads, stop)? else {
         return Ok(None);
     };
+    begin("every stage, held against the truth");
     let mut pass = Pass::new(&world);
     let Some(walks) = Walks::of(&mut pass, &world, input.chain, stop) else {
         return Ok(None);
@@ -121,16 +127,29 @@ pub fn prepare(
         .map(|tested| tested.covered.clone())
         .unwrap_or_default();
     let mut mirror = None;
+    let mut left_out = left_out_of(input.scene);
+    let too_much = left.fragments.too_much.iter().cloned();
+    left_out.extend(too_much.map(|reason| LeftOutRow::of("stages", "fragment", reason)));
+    left_out.extend_from_slice(&left.orders.left_out);
     if let (Some(solids), Some(item)) = (&world.solids, input.mirror) {
-        let Some(row) = mirrored(item, &world, solids, &pass, last, stop) else {
-            return Ok(None);
-        };
-        mirror = Some(row);
+        match mirrored(item, &world, solids, &pass, last, stop) {
+            Ok(None) => return Ok(None),
+            Ok(row) => mirror = row,
+            Err(reason) => left_out.push(LeftOutRow::of("mirror", "all", reason)),
+        }
     }
-    let Some(drawn) = left.orders.drawn(input.samples, stop) else {
-        return Ok(None);
+    begin("every order, drawn");
+    let drawn = match left.orders.drawn(input.samples, stop) {
+        Ok(None) => return Ok(None),
+        Ok(Some(drawn)) => drawn,
+        Err(reason) => {
+            left_out.push(LeftOutRow::of("orders", "all", reason));
+            Vec::new()
+        }
     };
+    begin("what is under a cursor");
     let picked = left.picks.judged();
+    left_out.extend_from_slice(&left.picks.left_out);
     // Behind the steps come the back ends of the triangle stage, then the tests of fragments.
     let first_test = pass.steps().len() + triangle_rows::back_ends().count();
     let tests = std::iter::once(None).chain((first_test..).map(Some));
@@ -205,6 +224,7 @@ pub fn prepare(
             mirror,
             orders: drawn,
             picks: picked,
+            left_out,
             bounds: bound_rows,
             gains: Vec::new(),
             conclusions: Vec::new(),
@@ -280,11 +300,12 @@ impl<'w> Left<'w> {
         let set = chosen.left();
         let faces = Faces::of(world, pass, set);
         let triangle = chain.of(StageKind::Triangle);
+        let fragments = Fragments::of(world, pass, set, &faces, triangle);
         Left {
-            fragments: Fragments::of(world, pass, set, &faces, triangle),
+            orders: Orders::of(world, pass, set, fragments.too_much.as_ref()),
+            fragments,
             faces,
             picks: Picks::of(world),
-            orders: Orders::of(world, pass, set),
         }
     }
 }

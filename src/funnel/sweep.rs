@@ -17,6 +17,7 @@ use super::triangle_rows;
 use super::truth::Truth;
 use super::world::{FunnelInput, World};
 use crate::measure::{Ask, OverProcesses, ProcessTimes};
+use crate::statistics::dominance;
 use crate::visibility::SampleGrid;
 
 /// Columns of the buffers that are looked at; rows are 9 for 16 of them.
@@ -39,8 +40,8 @@ pub struct SweepPoint {
     /// Thread CPU time of a view.
     #[serde(flatten)]
     pub times: Times,
-    /// Whether no other point is at least as good in time and both errors, and better
-    /// in one.
+    /// Whether no other point is at least as good in time and both errors, and shown
+    /// to be better in one.
     pub on_front: bool,
 }
 
@@ -182,7 +183,7 @@ pub fn prepare_sweep(
         StageKind::Triangle => (0, Some(Truth::empty(world.views()))),
         _ => {
             let threads = input.execution.threads;
-            let truth = seen(&world, input.samples, RAYS, threads, stop);
+            let truth = seen(&world, input.samples, RAYS, threads, stop)?;
             (RAYS, truth)
         }
     };
@@ -267,14 +268,12 @@ impl PreparedSweep {
         for (task, point) in sweep.points.iter_mut().enumerate() {
             point.times = Times::of(times.ns(task));
         }
-        let figures: Vec<Option<[f64; 3]>> = sweep.points.iter().map(figures).collect();
-        for (place, point) in sweep.points.iter_mut().enumerate() {
-            let Some(own) = figures[place] else { continue };
-            let beats = |other: &[f64; 3]| {
-                let pairs = || other.iter().zip(&own);
-                pairs().all(|(a, b)| a <= b) && pairs().any(|(a, b)| a < b)
-            };
-            point.on_front = !figures.iter().flatten().any(beats);
+        let all = sweep.points.iter().enumerate();
+        let (timed, values): (Vec<usize>, Vec<[f64; 3]>) =
+            all.filter_map(|(i, p)| Some((i, figures(p)?))).unzip();
+        let is_less = |a: usize, b: usize, k: usize| k > 0 || times.is_faster(timed[a], timed[b]);
+        for (&i, found) in timed.iter().zip(dominance(&values, &is_less)) {
+            sweep.points[i].on_front = found.dominated_by.is_none();
         }
         sweep
     }

@@ -10,6 +10,7 @@ use glam::DVec3;
 use super::back_ends::back_ends;
 use super::chain::Chain;
 use super::error::FunnelError;
+use super::faces;
 use super::hiding::{HIDING, HidingRow};
 use super::judged::{Judged, judge_items};
 use super::plan_view::{Fate, MOST_DRAWN, PlanView};
@@ -97,6 +98,8 @@ pub struct World<'a> {
 
 /// A camera in every form that a stage needs.
 struct View {
+    /// Its place in the path.
+    camera: usize,
     volume: ConvexVolume,
     rays: Rays,
     triangles: triangle::View,
@@ -117,13 +120,13 @@ impl<'a> World<'a> {
             let error = |error| FunnelError::Rays { index, error };
             let volume = camera.volume(&PlaneOptions::default(), &around);
             Ok(View {
+                camera: index,
                 volume: volume.map_err(|error| WorkloadError {
                     place: input.path.place(index),
                     error: error.into(),
                 })?,
                 rays: Rays::of(camera).map_err(error)?,
-                triangles: triangle::View::of(camera, input.scene.origin, input.samples)
-                    .map_err(error)?,
+                triangles: faces::view(input.scene, camera, input.samples).map_err(error)?,
             })
         });
         let built = input.structures.iter().map(|spec| {
@@ -250,6 +253,11 @@ impl<'a> World<'a> {
     pub fn is_inside(&self, view: usize) -> bool {
         let regions = self.regions.as_ref();
         regions.is_some_and(|regions| regions.graph().homes(self.rays(view), &mut Vec::new()))
+    }
+
+    /// The place of a view's camera in the path.
+    pub fn camera(&self, view: usize) -> usize {
+        self.views[view].camera
     }
 
     /// The rays of a view.

@@ -44,6 +44,20 @@ pub enum BuildError {
         /// What about the items, and what is expected.
         reason: String,
     },
+    /// More memory than the process can have.
+    #[error(
+        "'{structure}' needs about {} MB for {count} items, more than this process can have; \
+         expected fewer items",
+        needed / 1_000_000
+    )]
+    OutOfMemory {
+        /// Name of the structure.
+        structure: &'static str,
+        /// Number of items.
+        count: usize,
+        /// Bytes that are needed, the build included.
+        needed: usize,
+    },
     /// The structure's own code did.
     #[error("panicked: {message}")]
     Panicked {

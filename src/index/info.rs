@@ -76,6 +76,16 @@ pub struct Capabilities {
 }
 
 impl Info {
+    /// Bytes per item that a build takes at its peak, its index included. Measured: 24 to 48
+    /// of scans, up to 245 of our trees and grids.
+    pub(super) fn build_bytes(&self) -> usize {
+        match (self.kind, self.origin) {
+            (Kind::Scan, _) => 64,
+            (_, Origin::Ours) => 256,
+            _ => 512,
+        }
+    }
+
     /// A structure that can do what the contract asks, and no more.
     pub const fn new(
         name: &'static str,

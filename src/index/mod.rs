@@ -42,6 +42,7 @@ mod wide;
 pub use block_order::BlockOrder;
 pub use bsp::{Bsp, BspBuilder, BspParams};
 pub(crate) use bundles::Leaves;
+pub(crate) use bvh::scale_for;
 pub use bvh::{Bvh, BvhParams, BvhPreset};
 pub(crate) use contract::check_range;
 pub use contract::{

@@ -2,6 +2,8 @@
 //! from what the structure declares. It is a value: another crate adds its
 //! own with [`Registry::with`] and hands it on, to `cli::main_with` for example.
 
+use std::hint::black_box;
+
 use serde_json::{Map, Value};
 
 #[cfg(feature = "peers")]
@@ -296,9 +298,23 @@ impl StructureSpec {
     /// Builds the structure, with the threads of [`StructureSpec::execution`].
     ///
     /// # Errors
-    /// As [`RegionIndex::build`]; a panic of the structure's code.
+    /// As [`RegionIndex::build`]; a panic of the structure's code; too little memory.
     pub fn build<'a>(&self, input: impl Into<Input<'a>>) -> Result<Box<dyn DynIndex>, BuildError> {
         let input = input.into();
+        let count = input.items.len();
+        let needed = count.saturating_mul(self.info().build_bytes());
+        // Taken and given back untouched: an allocation that fails later would end the
+        // program.
+        let mut room = Vec::<u8>::new();
+        if room.try_reserve_exact(needed).is_err() {
+            let structure = self.info().name;
+            return Err(BuildError::OutOfMemory {
+                structure,
+                count,
+                needed,
+            });
+        }
+        drop(black_box(room));
         let build = || (self.row.build)(self.execution, &input, &self.params);
         caught(build).unwrap_or_else(|message| Err(BuildError::Panicked { message }))
     }

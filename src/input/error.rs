@@ -17,6 +17,12 @@ pub enum InputError {
         /// What the system says.
         source: std::io::Error,
     },
+    /// A file that is no longer what was read before ([`hold_files`](super::hold_files)).
+    #[error("{}: has changed since it was first read; expected the same file until the end", path.display())]
+    Changed {
+        /// Name of the file.
+        path: PathBuf,
+    },
     /// A text file: `line` counts from 1 and includes the header.
     #[error("{file}, line {line}: {found}; expected {expected}")]
     Line {
@@ -65,9 +71,13 @@ pub enum InputError {
     },
     /// A scene that would not fit into memory; sizes in bytes.
     #[error(
-        "{scene}: needs about {}{}, {} are free; expected a smaller n{}",
+        "{scene}: needs about {}{}, {} are free; expected fewer items{}",
         gigabytes(*needed),
-        if *structures > 0 { format!(" with {structures} structures") } else { String::new() },
+        match structures {
+            0 => String::new(),
+            1 => " with 1 structure".to_owned(),
+            more => format!(" with {more} structures"),
+        },
         gigabytes(*available),
         if *structures > 1 { " or fewer structures" } else { "" }
     )]
@@ -97,5 +107,8 @@ pub enum InputError {
 }
 
 pub(crate) fn gigabytes(bytes: u64) -> String {
-    format!("{:.1} GB", bytes as f64 / 1e9)
+    match bytes {
+        0..1_000_000_000 => format!("{:.0} MB", bytes as f64 / 1e6),
+        _ => format!("{:.1} GB", bytes as f64 / 1e9),
+    }
 }

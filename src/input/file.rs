@@ -11,6 +11,9 @@ use super::InputError;
 /// What came out of pipes, by their names.
 static PIPES: Mutex<BTreeMap<PathBuf, Arc<[u8]>>> = Mutex::new(BTreeMap::new());
 
+/// SHA-256 of files, by their names, if they are held.
+static HELD: Mutex<Option<BTreeMap<String, String>>> = Mutex::new(None);
+
 /// Whether there is a file, a pipe or a device of that name.
 pub fn is_readable(path: &Path) -> bool {
     let pipes = PIPES.lock().unwrap_or_else(PoisonError::into_inner);
@@ -31,12 +34,49 @@ pub fn read_file(path: &Path) -> Result<Arc<[u8]>, InputError> {
     if let Some(bytes) = pipes.get(path) {
         return Ok(bytes.clone());
     }
-    if fs::metadata(path).map_err(io)?.is_file() {
-        return fs::read(path).map(Arc::from).map_err(io);
+    let is_file = fs::metadata(path).map_err(io)?.is_file();
+    let bytes = fs::read(path).map_err(io)?;
+    if is_file {
+        expect_same(path, &bytes)?;
     }
-    let bytes: Arc<[u8]> = fs::read(path).map_err(io)?.into();
+    // To be shared they are copied: room that is not there would end the program.
+    let room = Vec::<u8>::new().try_reserve_exact(bytes.len());
+    room.map_err(|_| io(std::io::ErrorKind::OutOfMemory.into()))?;
+    let bytes = Arc::from(bytes);
+    if is_file {
+        return Ok(bytes);
+    }
     pipes.insert(path.to_owned(), bytes.clone());
     Ok(bytes)
+}
+
+/// From now on a file that is read again must be what it was: what is measured in
+/// several processes is one scene. `known` has the SHA-256 of those read before.
+pub fn hold_files(known: BTreeMap<String, String>) {
+    *HELD.lock().unwrap_or_else(PoisonError::into_inner) = Some(known);
+}
+
+/// SHA-256 of the files that are held, by their names.
+pub fn held_files() -> BTreeMap<String, String> {
+    let held = HELD.lock().unwrap_or_else(PoisonError::into_inner);
+    held.clone().unwrap_or_default()
+}
+
+fn expect_same(path: &Path, bytes: &[u8]) -> Result<(), InputError> {
+    let mut held = HELD.lock().unwrap_or_else(PoisonError::into_inner);
+    let Some(held) = held.as_mut() else {
+        return Ok(());
+    };
+    let digest = crate::shown::hex(&hmac_sha256::Hash::hash(bytes));
+    let first = held
+        .entry(path.display().to_string())
+        .or_insert_with(|| digest.clone());
+    match *first == digest {
+        true => Ok(()),
+        false => Err(InputError::Changed {
+            path: path.to_owned(),
+        }),
+    }
 }
 
 /// Lets a file stand for what is no file: the bytes of a pipe that another
@@ -58,4 +98,32 @@ pub fn pipes() -> Vec<(String, Arc<[u8]>)> {
         .iter()
         .map(|(path, bytes)| (path.display().to_string(), bytes.clone()));
     named.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_changes_is_refused_once_files_are_held() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("held.csv");
+        let write = |text: &str| fs::write(&file, text).unwrap();
+        let read = || {
+            read_file(&file)
+                .map(|_| ())
+                .map_err(|error| error.to_string())
+        };
+        write("one");
+        hold_files(BTreeMap::new());
+        assert_eq!([read(), read()], [Ok(()), Ok(())]);
+        write("two");
+        let error = read().unwrap_err();
+        assert!(error.contains("held.csv: has changed since"), "{error}");
+        // The form in which a worker gets them.
+        hold_files(held_files());
+        assert_eq!(read(), Err(error));
+        write("one");
+        assert_eq!(read(), Ok(()));
+    }
 }

@@ -3,9 +3,13 @@
 
 mod error;
 mod file;
+mod lines;
+mod note;
 mod table;
 
 pub use error::InputError;
 pub(crate) use error::gigabytes;
-pub use file::{is_readable, pipes, read_file, stand_in};
+pub use file::{held_files, hold_files, is_readable, pipes, read_file, stand_in};
+pub(crate) use note::note;
+pub use note::tell_notes;
 pub use table::{Row, TableReader};

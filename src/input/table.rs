@@ -2,11 +2,18 @@
 //! file, line and column. It defines the mechanics that the box, camera and point
 //! readers share; what the columns mean is theirs.
 
-use std::collections::{HashSet, VecDeque};
-use std::io::{self, Read};
+use std::collections::HashSet;
+use std::io::Read;
 
-use super::InputError;
-use crate::shown::{counted, plain};
+use super::lines::{LineCounter, QuoteFault};
+use super::{InputError, note};
+use crate::shown::{counted, first_of, shortened};
+use crate::spec::nearest;
+
+/// Columns that say which row it is, and nothing else.
+const LABELS: [&str; 9] = [
+    "camera", "comment", "frame", "id", "label", "name", "note", "time", "time_s",
+];
 
 /// A CSV file with its header read.
 pub struct TableReader<R> {
@@ -29,7 +36,8 @@ impl<R: Read> TableReader<R> {
     /// Reads the header. Names are trimmed; a byte order mark is dropped.
     ///
     /// # Errors
-    /// An unreadable or empty file, a column named twice.
+    /// An unreadable or empty file, a column named twice, text that is no
+    /// comma-separated UTF-8 with a header.
     pub fn open(input: R, file: &str) -> Result<Self, InputError> {
         let mut csv = csv::ReaderBuilder::new()
             .flexible(true)
@@ -54,6 +62,22 @@ impl<R: Read> TableReader<R> {
             found,
             expected: expected.to_owned(),
         };
+        if fields.as_slice().contains(&0) {
+            let found = "zero bytes, as in UTF-16 text".to_owned();
+            return Err(complain(found, "UTF-8 text"));
+        }
+        if let Some(fault) = csv.get_ref().fault_before(csv.position().byte()) {
+            return Err(quote_error(file, fault));
+        }
+        if let [only] = &header[..]
+            && let Some(separator) = only.chars().find(|&c| matches!(c, ';' | '\t' | '|'))
+        {
+            let name = match separator {
+                '\t' => "tabs".to_owned(),
+                other => format!("'{other}'"),
+            };
+            return Err(complain(format!("columns separated by {name}"), "commas"));
+        }
         if header.iter().all(String::is_empty) {
             let found = match header.len() {
                 0 | 1 => "an empty file".to_owned(),
@@ -63,8 +87,12 @@ impl<R: Read> TableReader<R> {
         }
         let mut seen = HashSet::with_capacity(header.len());
         for name in header.iter().filter(|name| !name.is_empty()) {
+            if seen.contains(name.as_str()) && is_data(&header) {
+                let found = format!("data '{}' in place of the header", joined(&header));
+                return Err(complain(found, "a line with the names of the columns"));
+            }
             if !seen.insert(name.as_str()) {
-                let found = format!("column '{}' twice", shortened(name));
+                let found = format!("column '{}' twice", shortened(name, 60));
                 return Err(complain(found, "each column once"));
             }
         }
@@ -92,10 +120,11 @@ impl<R: Read> TableReader<R> {
         let mut places = [0; N];
         for (place, name) in places.iter_mut().zip(names) {
             *place = self.column(name).ok_or_else(|| {
-                let found = format!(
-                    "no column '{name}' in '{}'",
-                    shortened(&self.header.join(","))
-                );
+                let all = joined(&self.header);
+                let found = match is_data(&self.header) {
+                    true => format!("data '{all}' in place of the header"),
+                    false => format!("no column '{name}' in '{all}'"),
+                };
                 self.error(found, format!("a header with {}", names.join(",")))
             })?;
         }
@@ -112,30 +141,62 @@ impl<R: Read> TableReader<R> {
         }
     }
 
-    /// The next row; `None` at the end of the file.
-    pub fn next_row(&mut self) -> Option<Result<Row<'_>, InputError>> {
-        match self.csv.read_byte_record(&mut self.record) {
-            Ok(false) => None,
-            Err(error) => Some(Err(csv_error(&self.file, error))),
-            Ok(true) => {
-                let start = self.record.position().map_or(0, csv::Position::byte);
-                let row = Row {
-                    file: &self.file,
-                    header: &self.header,
-                    line: self.csv.get_mut().line_of_record_at(start),
-                    record: &self.record,
-                };
-                let (found, wanted) = (self.record.len(), self.header.len());
-                Some(if found == wanted {
-                    Ok(row)
-                } else {
-                    Err(row.error(
-                        counted(found, "field"),
-                        format!("{wanted}, as in the header"),
-                    ))
-                })
-            }
+    /// Tells of columns that nothing is read from, with the nearest name that would be,
+    /// or the one that stands beside it in `synonyms`.
+    pub fn note_unread(&self, known: &[&str], synonyms: &[(&str, &str)]) {
+        let is_unread = |name: &&String| {
+            let name = name.as_str();
+            !name.is_empty() && !known.contains(&name) && !LABELS.contains(&name)
+        };
+        let unread = self.header.iter().filter(is_unread);
+        let named: Vec<String> = unread
+            .map(|name| {
+                let synonym = synonyms.iter().find(|(other, _)| name == other);
+                let guess = synonym.map(|(_, guess)| *guess);
+                let shown = shortened(name, 60);
+                match guess.or_else(|| nearest(&shown, known.iter().copied())) {
+                    Some(guess) => format!("'{shown}' (did you mean '{guess}'?)"),
+                    None => format!("'{shown}'"),
+                }
+            })
+            .collect();
+        if !named.is_empty() {
+            let (file, line, named) = (&self.file, self.header_line, first_of(&named, 16));
+            note(&format!(
+                "{file}, line {line}: columns that are not read: {named}"
+            ));
         }
+    }
+
+    /// The next row, or what is wrong with it; `None` at the end of the file.
+    ///
+    /// # Errors
+    /// Nothing can be read any more: an unreadable file, a quote that is never
+    /// closed.
+    pub fn next_row(&mut self) -> Result<Option<Result<Row<'_>, InputError>>, InputError> {
+        let read = self.csv.read_byte_record(&mut self.record);
+        if !read.map_err(|error| csv_error(&self.file, error))? {
+            return Ok(None);
+        }
+        let end = self.csv.position().byte();
+        if let Some(fault) = self.csv.get_ref().fault_before(end) {
+            return Err(quote_error(&self.file, fault));
+        }
+        let start = self.record.position().map_or(0, csv::Position::byte);
+        let row = Row {
+            file: &self.file,
+            header: &self.header,
+            line: self.csv.get_mut().line_of_record_at(start),
+            record: &self.record,
+        };
+        let (found, wanted) = (self.record.len(), self.header.len());
+        Ok(Some(match found == wanted {
+            true => Ok(row),
+            false => Err(row.error(
+                counted(found, "field"),
+                format!("{wanted}, as in the header"),
+            )),
+        }))
     }
 }
 
@@ -149,7 +210,7 @@ impl Row<'_> {
     pub fn finite_number(&self, column: usize) -> Result<f64, InputError> {
         let value = self.text(column).parse::<f64>().ok();
         value.filter(|v| v.is_finite()).ok_or_else(|| {
-            let (name, text) = (&self.header[column], shortened(self.text(column)));
+            let (name, text) = (&self.header[column], shortened(self.text(column), 60));
             self.error(format!("{name} '{text}'"), "a finite number".into())
         })
     }
@@ -170,66 +231,27 @@ impl Row<'_> {
     }
 }
 
-/// Counts lines as an editor does, on the way to the CSV reader. That one
-/// states where it began to look for a record, which after an empty line, and
-/// after every line of a file with Windows line ends, is a line too early.
-struct LineCounter<R> {
-    input: R,
-    offset: u64,
-    line: u64,
-    last: u8,
-    /// Offset and number of the lines that are not empty, as far as the CSV
-    /// reader has not passed them.
-    starts: VecDeque<(u64, u64)>,
+/// Names of columns, cut down to what fits an error line.
+fn joined(header: &[String]) -> String {
+    shortened(&header.join(","), 60)
 }
 
-impl<R> LineCounter<R> {
-    fn new(input: R) -> Self {
-        LineCounter {
-            input,
-            offset: 0,
-            line: 0,
-            last: b'\n',
-            starts: VecDeque::new(),
-        }
-    }
-
-    /// The line of the first record that begins at or after a byte. Records
-    /// must be asked for in the order of the file.
-    fn line_of_record_at(&mut self, byte: u64) -> u64 {
-        while self.starts.front().is_some_and(|start| start.0 < byte) {
-            self.starts.pop_front();
-        }
-        self.starts
-            .front()
-            .map_or(self.line.max(1), |start| start.1)
-    }
+/// Numbers where the names of columns should be: no table here has fewer than three.
+fn is_data(header: &[String]) -> bool {
+    let numbers = header.iter().filter(|name| name.parse::<f64>().is_ok());
+    numbers.count() >= 3
 }
 
-impl<R: Read> Read for LineCounter<R> {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let count = self.input.read(buffer)?;
-        for &byte in &buffer[..count] {
-            let is_end = |b: u8| b == b'\n' || b == b'\r';
-            if is_end(self.last) && (self.last, byte) != (b'\r', b'\n') {
-                self.line += 1;
-                if !is_end(byte) {
-                    self.starts.push_back((self.offset, self.line));
-                }
-            }
-            (self.last, self.offset) = (byte, self.offset + 1);
-        }
-        Ok(count)
+fn quote_error(file: &str, fault: QuoteFault) -> InputError {
+    InputError::Line {
+        file: file.to_owned(),
+        line: fault.line,
+        found: match fault.end {
+            None => "a quote that is never closed".to_owned(),
+            Some(end) => format!("a quote that is not closed before line {end}"),
+        },
+        expected: "'\"' at both ends of a field, and doubled within it".to_owned(),
     }
-}
-
-/// Long or multi-line text cut down to what fits an error line.
-fn shortened(text: &str) -> String {
-    let mut short: String = plain(text).chars().take(60).collect();
-    if text.chars().count() > 60 {
-        short.push_str("...");
-    }
-    short
 }
 
 fn csv_error(file: &str, error: csv::Error) -> InputError {
@@ -255,7 +277,7 @@ mod tests {
     /// The line of the first row whose field `x` is no number.
     fn bad_line(text: &str) -> u64 {
         let mut table = TableReader::open(text.as_bytes(), "t.csv").unwrap();
-        while let Some(row) = table.next_row() {
+        while let Some(row) = table.next_row().unwrap() {
             match row.and_then(|row| row.finite_number(0)) {
                 Err(InputError::Line { line, .. }) => return line,
                 other => assert!(other.is_ok(), "{other:?}"),
@@ -299,6 +321,104 @@ mod tests {
         ] {
             let error = TableReader::open(text.as_bytes(), "t.csv").err().unwrap();
             assert_eq!(error.to_string(), wanted, "{text:?}");
+        }
+    }
+
+    /// The error of reading a table of three columns to its end.
+    fn told(text: &[u8]) -> String {
+        let read = || -> Result<(), InputError> {
+            let mut table = TableReader::open(text, "t.csv")?;
+            table.columns(&["x", "y", "z"])?;
+            while let Some(row) = table.next_row()? {
+                row?;
+            }
+            Ok(())
+        };
+        read()
+            .err()
+            .map(|error| error.to_string())
+            .unwrap_or_default()
+    }
+
+    #[test]
+    fn a_quote_that_takes_in_other_lines_is_named_where_it_opens() {
+        for (text, wanted) in [
+            (
+                "x,y,z\n1,2,\"a\n1,2,3\n",
+                "t.csv, line 2: a quote that is never closed; ",
+            ),
+            (
+                "x,y,z\n1,2,3\n\"1,2,3",
+                "line 3: a quote that is never closed",
+            ),
+            ("x,\"y,z\n1,2,3\n", "line 1: a quote that is never closed"),
+            (
+                "x,y,z\n1,2,\"a\"\"\n",
+                "line 2: a quote that is never closed",
+            ),
+            (
+                "x,y,z\n1,2,\"a\n1,2,\"b\"\n",
+                "line 2: a quote that is not closed before line 3",
+            ),
+            (
+                "x,y,z\n1,2,\"a\n1,2,\" b\"\n",
+                "line 2: a quote that is not closed before line 3",
+            ),
+            ("\u{feff}\"x,y,z\n", "line 1: a quote that is never closed"),
+            // Fields of several lines, doubled quotes, and quotes within a word.
+            (
+                "x,y,z\n1,2,\"a\n\"\"b\"\"\"\n1,2,\"\" \n1,2,3\"\n\"1\"b,2,3",
+                "",
+            ),
+            ("\u{feff}\"x\",y,z\r\n1,2,\"3\"\r\n", ""),
+        ] {
+            let found = told(text.as_bytes());
+            assert!(
+                found.contains(wanted) && found.is_empty() == wanted.is_empty(),
+                "{text}: {found}"
+            );
+        }
+        // Longer than any buffer.
+        let text = format!("x,y,z\n{}\"1,2,3\n{0}", "1,2,3\n".repeat(9000));
+        assert!(told(text.as_bytes()).starts_with("t.csv, line 9002: a quote"));
+    }
+
+    #[test]
+    fn text_of_another_form_is_named() {
+        let utf16 = |to: fn(u16) -> [u8; 2]| {
+            let units = "\u{feff}x,y,z\r\n1,2,3\r\n".encode_utf16();
+            units.flat_map(to).collect::<Vec<u8>>()
+        };
+        let (little, big) = (utf16(u16::to_le_bytes), utf16(u16::to_be_bytes));
+        let cases: [(&[u8], &str); 9] = [
+            (
+                &little,
+                "line 1: zero bytes, as in UTF-16 text; expected UTF-8",
+            ),
+            (&little[2..], "UTF-16"),
+            (&big, "UTF-16"),
+            (
+                b"x;y;z\n1;2;3\n",
+                "line 1: columns separated by ';'; expected commas",
+            ),
+            (b"x\ty\tz\n1\t2\t3\n", "columns separated by tabs"),
+            (
+                b"1,0,1\n1,2,3\n",
+                "line 1: data '1,0,1' in place of the header; expected",
+            ),
+            (
+                b"1,2,3\n",
+                "data '1,2,3' in place of the header; expected a header with x,y,z",
+            ),
+            (b"x,y,z,2,2\n", "column '2' twice"),
+            ("\u{feff}x,y,z\n1,2,3\n".as_bytes(), ""),
+        ];
+        for (text, wanted) in cases {
+            let found = told(text);
+            assert!(
+                found.contains(wanted) && found.is_empty() == wanted.is_empty(),
+                "{wanted}: {found}"
+            );
         }
     }
 

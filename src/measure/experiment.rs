@@ -78,6 +78,8 @@ pub struct Plan {
     pub lens: LensDefaults,
     /// How scenes are read.
     pub load: LoadOptions,
+    /// Most cameras of a path, evenly spread; the others are left out.
+    pub most_cameras: usize,
     /// How many processes, rounds and tasks.
     pub effort: Effort,
     /// Whether lower bounds are measured beside the structures.
@@ -291,6 +293,7 @@ pub fn measure_scene(
         notice(None, &question.path);
         let scale = known.and_then(|known| known.lens_scale);
         let way = path::load_scaled(&question.path, &scene, &plan.lens, scale)?;
+        let way = way.at_most(plan.most_cameras);
         let workload = Workload::new(&scene, &way, &question.culling)?;
         let group = GroupPlan {
             scene: &info,
@@ -365,6 +368,7 @@ mod tests {
             cullings: vec![sphere, Culling::default()],
             lens: LensDefaults::default(),
             load: LoadOptions::default(),
+            most_cameras: usize::MAX,
             effort: Effort {
                 processes: 1,
                 rounds: [1, 1],

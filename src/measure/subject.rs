@@ -132,6 +132,7 @@ fn build(
 fn not_built(error: BuildError) -> Verdict {
     let status = match error {
         BuildError::Panicked { .. } => Status::Panicked,
+        BuildError::OutOfMemory { .. } => Status::OutOfMemory,
         _ => Status::Refused,
     };
     Verdict::new(status, error.to_string())

@@ -129,18 +129,11 @@ impl Oracle {
             return proved(Verdict::Out);
         }
         let mut least = if self.extent == Extent::Flat { 0 } else { 1 };
-        for (i, certificate) in self.filter.iter().enumerate() {
+        for i in 0..self.filter.len() {
             if i == self.faces && least > 0 && self.witnessed(corners) {
                 return proved(Verdict::In);
             }
-            let (value, error) = certificate.at_p_vertex(corners);
-            if value > error {
-                continue;
-            }
-            if value < -error {
-                return proved(Verdict::Out);
-            }
-            match self.exact[i].sign_at_p_vertex(corners, self.precision) {
+            match self.sign(i, corners) {
                 -1 => return proved(Verdict::Out),
                 sign => least = least.min(sign),
             }
@@ -190,11 +183,24 @@ impl Oracle {
     }
 
     /// Whether one of the volume's own planes has the whole box on its outer
-    /// side, to f64 rounding: what a six-plane test without any error tells.
+    /// side: what a six-plane test without any error tells.
     pub fn faces_exclude(&self, b: &Aabb) -> bool {
         let corners = Corners::of(b);
-        let mut faces = self.filter[..self.faces].iter();
-        self.extent == Extent::Empty || faces.any(|face| face.at_p_vertex(&corners).0 < 0.0)
+        self.extent == Extent::Empty || (0..self.faces).any(|face| self.sign(face, &corners) < 0)
+    }
+
+    /// The sign of a certificate at the box's p-vertex, exact sums where the filter
+    /// does not decide.
+    #[inline]
+    fn sign(&self, certificate: usize, corners: &Corners) -> i32 {
+        let (value, error) = self.filter[certificate].at_p_vertex(corners);
+        if value > error {
+            return 1;
+        }
+        if value < -error {
+            return -1;
+        }
+        self.exact[certificate].sign_at_p_vertex(corners, self.precision)
     }
 
     fn depth_of_corners(&self, corners: &Corners) -> f64 {

@@ -14,11 +14,16 @@ const MOST_CAMERAS: usize = 128;
 /// more items than that: a share of 0.02 % of eight thousand would be one or two.
 const LEAST_SEEN: f64 = 8.0;
 
+/// Largest ratio of the share that is reached to the one that was asked for: one item
+/// more than two.
+const MOST_ABOVE: f64 = 1.5;
+
 /// The scale of far (and near, a thousandth of it) at which on average `share`
 /// of the items is visible, within the sample's accuracy.
 ///
 /// # Errors
-/// A share that even four times the present far plane does not reach.
+/// A share that even four times the present far plane does not reach, or that is less
+/// than what is visible at once.
 pub(super) fn for_visible_share(
     path: &str,
     scene: &Scene,
@@ -43,17 +48,34 @@ pub(super) fn for_visible_share(
         return Err(PathError::unfit(
             path,
             format_args!(
-                "visible={share} cannot be reached: at most {percent:.2}% of '{scene}' is visible along it"
+                "visible={share} cannot be reached: at most {percent:.2}% of '{scene}' is visible along it; expected a smaller share"
             ),
         ));
     }
+    let mut reached = [visible(low)?, most];
     for _ in 0..16 {
         let middle = f64::sqrt(low * high);
-        if visible(middle)? < share {
-            low = middle;
+        let found = visible(middle)?;
+        if found < share {
+            (low, reached[0]) = (middle, found);
         } else {
-            high = middle;
+            (high, reached[1]) = (middle, found);
         }
+    }
+    if reached[1] > share * MOST_ABOVE {
+        let [below, above] = reached.map(|share| share * 100.0);
+        let scene = &scene.name;
+        let found = match below < share * 100.0 {
+            true => format!("{below:.2}% or {above:.2}%, and no share between,"),
+            false => format!("at least {above:.2}%"),
+        };
+        return Err(PathError::unfit(
+            path,
+            format_args!(
+                "visible={share} cannot be reached: {found} of '{scene}' is visible along it; \
+                 expected a larger share"
+            ),
+        ));
     }
     Ok(high)
 }

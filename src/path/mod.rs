@@ -17,9 +17,10 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use crate::camera::{Camera, CameraError, Frame, Lens, Surroundings};
-use crate::input::{InputError, is_readable, read_file};
+use crate::camera::{Camera, CameraError, FARTHEST, Frame, Lens, Surroundings};
+use crate::input::{InputError, gigabytes, is_readable, read_file};
 use crate::scene::{self, Scene, SeededRng, WorldBox};
+use crate::shown::counted;
 use crate::spec::{Spec, SpecError};
 
 pub use recorded::{LensDefaults, read_cameras_csv, read_points_csv};
@@ -38,6 +39,19 @@ pub struct CameraPath {
 }
 
 impl CameraPath {
+    /// At most so many of the cameras, evenly spread from the first on.
+    pub fn at_most(mut self, most: usize) -> CameraPath {
+        let count = self.cameras.len();
+        if count > most {
+            let kept = |n: usize| n * count / most;
+            self.cameras = (0..most).map(|n| self.cameras[kept(n)]).collect();
+            if !self.lines.is_empty() {
+                self.lines = (0..most).map(|n| self.lines[kept(n)]).collect();
+            }
+        }
+        self
+    }
+
     /// Where a camera stands, for messages: by its line, or its index where it has none.
     pub fn place(&self, index: usize) -> String {
         match self.lines.get(index) {
@@ -94,19 +108,25 @@ pub struct PathFamily {
     pub name: &'static str,
     /// One line for `cullbench list`.
     pub summary: &'static str,
+    /// Parameters beyond [`PATH_PARAMS`], for the help.
+    pub params: &'static str,
     frames: fn(&Stage, &mut Spec) -> Result<Vec<Pose>, PathError>,
 }
 
 /// All generated families, in the order of the help.
-pub static PATHS: &[PathFamily] = rows! { PathFamily { name, summary, frames }
-    "orbit", "a full circle about the scene, looking at its centre", orbit::frames;
-    "flythrough", "a closed spline through seeded way points, looking ahead", flythrough::frames;
-    "spin", "a full turn in place at the centre (yaw)", spin::frames;
-    "zoom", "a dolly towards the centre, then a zoom by field of view", zoom::frames;
-    "teleport", "a new random place and direction every frame: no coherence", teleport::frames;
-    "outside", "the whole scene from outside, from all around", outside::frames;
-    "street", "eyes outside of every item, height=1.7 above the ground, looking level; near=0.1", street::frames;
-    "places", "the scene's own camera places (the things of a Doom map)", places::frames;
+pub static PATHS: &[PathFamily] = rows! { PathFamily { name, summary, params, frames }
+    "orbit", "a full circle about the scene, looking at its centre",
+        "radius=0.6 (of half the scene's diagonal), height=0.35 (of the radius)", orbit::frames;
+    "flythrough", "a closed spline through seeded way points, looking ahead",
+        "waypoints=8 (at least 4)", flythrough::frames;
+    "spin", "a full turn in place at the centre (yaw)", "", spin::frames;
+    "zoom", "a dolly towards the centre, then a zoom by field of view",
+        "power=8 (largest magnification)", zoom::frames;
+    "teleport", "a new random place and direction every frame: no coherence", "", teleport::frames;
+    "outside", "the whole scene from outside, from all around", "", outside::frames;
+    "street", "eyes outside of every item, above the ground, looking level",
+        "height=1.7 (above the ground), near=0.1", street::frames;
+    "places", "the scene's own camera places (the things of a Doom map)", "", places::frames;
 };
 
 /// Parameters that every generated path takes.
@@ -243,7 +263,10 @@ pub fn load_scaled(
     let name = source.split(':').next().unwrap_or_default();
     let file = Path::new(source);
     if is_readable(file) || source.ends_with(".csv") || name.contains(['/', '\\', '.']) {
-        return read_cameras_csv(&read_file(file)?[..], source, defaults);
+        let bytes = read_file(file)?;
+        let rows = bytes.iter().filter(|byte| **byte == b'\n').count();
+        fits(source, rows as u64)?;
+        return read_cameras_csv(&bytes[..], source, defaults);
     }
     let mut spec = Spec::parse(source)?;
     let Some(family) = PATHS.iter().find(|p| p.name == spec.name()) else {
@@ -256,6 +279,7 @@ pub fn load_scaled(
         count: spec.count("frames", 256, 1_000_000)? as usize,
         seed: spec.whole("seed", 1, u64::MAX)?,
     };
+    fits(source, stage.count as u64)?;
     let poses = (family.frames)(&stage, &mut spec)?;
     let optics = Optics::from_spec(&mut spec, defaults, &stage, &poses)?;
     spec.finish()?;
@@ -282,6 +306,29 @@ pub fn load_scaled(
     })
 }
 
+/// Refuses more cameras than there is memory for.
+fn fits(source: &str, cameras: u64) -> Result<(), PathError> {
+    /// Fewer are made without a look at the memory.
+    const ANYWHERE: u64 = 10_000;
+    /// Bytes of a camera with its views and answers: 2,800 were measured.
+    const PER_CAMERA: u64 = 3000;
+    let needed = cameras.saturating_mul(PER_CAMERA);
+    if cameras <= ANYWHERE {
+        return Ok(());
+    }
+    match scene::available_bytes().filter(|available| needed > *available) {
+        Some(available) => Err(PathError::unfit(
+            source,
+            format!(
+                "{cameras} cameras need about {}, {} are free; expected fewer",
+                gigabytes(needed),
+                gigabytes(available)
+            ),
+        )),
+        None => Ok(()),
+    }
+}
+
 /// The lens parameters of a generated path.
 struct Optics {
     fovy_deg: f64,
@@ -306,6 +353,7 @@ impl Optics {
             Some(_) => Some(spec.number("far", natural)?),
             None => defaults.far.unwrap_or(Some(natural)),
         };
+        let far = far.filter(|far| *far <= FARTHEST);
         let near = match spec.text("near") {
             Some(_) => Some(spec.number("near", 0.0)?),
             // What an eye among items looks at may be an arm's length away.
@@ -372,9 +420,13 @@ fn visible_share(spec: &mut Spec, text: &str, items: usize) -> Result<f64, SpecE
     if !text.ends_with('%') && value > 1.0 && value.fract() == 0.0 && value < items as f64 {
         return Ok(value / items as f64);
     }
+    let count = match items {
+        0..=2 => format!("; no count is possible of {}", counted(items, "item")),
+        3 => " or a count of 2".to_owned(),
+        _ => format!(" or a count from 2 to {}", items - 1),
+    };
     Err(SpecError::new(format_args!(
-        "visible={text}; expected a share between 0 and 1 (2%) or a count from 2 to {}",
-        items.saturating_sub(1)
+        "visible={text}; expected a share between 0 and 1 (2%){count}"
     )))
 }
 
@@ -388,154 +440,4 @@ fn up_for(forward: DVec3) -> DVec3 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::camera::PlaneOptions;
-
-    fn scene(source: &str) -> Scene {
-        scene::load(source, &Default::default()).unwrap()
-    }
-
-    fn path(source: &str, scene: &Scene) -> CameraPath {
-        load(source, scene, &LensDefaults::default()).unwrap()
-    }
-
-    fn visible_share(path: &CameraPath, scene: &Scene) -> f64 {
-        let around = scene.surroundings();
-        let visible = path.cameras.iter().map(|camera| {
-            let volume = camera.volume(&PlaneOptions::default(), &around).unwrap();
-            scene.items.iter().filter(|b| volume.sees(b)).count()
-        });
-        visible.sum::<usize>() as f64 / (path.cameras.len() * scene.items.len()) as f64
-    }
-
-    #[test]
-    fn the_digest_tells_cameras_apart() {
-        let scene = scene("city:n=100");
-        let cameras = path("orbit:frames=3", &scene).cameras;
-        assert_eq!(digest(&cameras), digest(&cameras.clone()));
-        let mut digests = vec![digest(&cameras), digest(&cameras[1..])];
-        let turned = {
-            let mut turned = cameras.clone();
-            turned.swap(0, 1);
-            turned
-        };
-        digests.push(digest(&turned));
-        let window = [-1.0, 1.0, -1.0, 1.0];
-        for lens in [
-            Lens::perspective(50.0, 1.5, 0.1, Some(9.0)),
-            Lens::perspective(50.0, 1.5, 0.1, Some(9.5)),
-            Lens::perspective(50.0, 1.5, 0.1, None),
-            Lens::perspective(50.0, 1.5, 0.2, None),
-            Lens::orthographic(50.0, 1.5, 0.1, 9.0),
-            Lens::off_axis(window, 0.1, Some(9.0)),
-            Lens::off_axis(window, 0.1, None),
-        ] {
-            let mut other = cameras.clone();
-            other[2].lens = lens.unwrap();
-            digests.push(digest(&other));
-        }
-        for (i, one) in digests.iter().enumerate() {
-            assert!(one.len() == 64 && !digests[..i].contains(one), "{i}");
-        }
-    }
-
-    #[test]
-    fn every_family_works_on_every_kind_of_scene() {
-        for source in [
-            "uniform:n=0",
-            "uniform:n=1",
-            "city:n=300",
-            "us-counties",
-            "freedm-map12",
-        ] {
-            let scene = scene(source);
-            for family in PATHS.iter().filter(|p| p.name != "places") {
-                let path = path(&format!("{}:frames=9", family.name), &scene);
-                assert_eq!(path.cameras.len(), 9, "{source} {}", family.name);
-                for camera in &path.cameras {
-                    let volume = camera.volume(&PlaneOptions::default(), &scene.surroundings());
-                    assert!(volume.is_ok(), "{source} {}", family.name);
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn outside_sees_everything_and_the_others_see_something() {
-        let scene = scene("city:n=2000");
-        assert_eq!(
-            visible_share(&path("outside:frames=12", &scene), &scene),
-            1.0
-        );
-        for source in [
-            "orbit:frames=8",
-            "flythrough:frames=32",
-            "spin:frames=8",
-            "zoom:frames=8",
-        ] {
-            let share = visible_share(&path(source, &scene), &scene);
-            assert!(share > 0.001, "{source}: {share}");
-        }
-    }
-
-    #[test]
-    fn a_visible_share_can_be_asked_for() {
-        let scene = scene("uniform:n=20000");
-        for (source, wanted) in [
-            ("flythrough:visible=2%", 0.02),
-            ("teleport:frames=128,visible=0.05", 0.05),
-            ("flythrough:visible=1000", 0.05),
-            ("flythrough:visible=2k", 0.1),
-        ] {
-            let share = visible_share(&path(source, &scene), &scene);
-            assert!((share / wanted - 1.0).abs() < 0.1, "{source}: {share}");
-        }
-    }
-
-    #[test]
-    fn a_count_is_met_in_scenes_of_any_size() {
-        for n in [5_000, 1_000_000] {
-            let scene = scene(&format!("uniform:n={n}"));
-            let path = path("flythrough:frames=32,visible=200", &scene);
-            let visible = visible_share(&path, &scene) * f64::from(n);
-            assert!((visible / 200.0 - 1.0).abs() < 0.15, "{n}: {visible}");
-        }
-    }
-
-    #[test]
-    fn the_maps_things_are_camera_places() {
-        let map = scene("freedm-map12");
-        let things = path("places", &map);
-        assert_eq!(things.cameras.len(), map.places.len());
-        let none = load("places", &scene("city:n=10"), &LensDefaults::default());
-        assert!(none.unwrap_err().to_string().contains("no camera places"));
-    }
-
-    #[test]
-    fn what_cannot_be_a_path_says_why() {
-        let scene = scene("city:n=10");
-        for (source, wanted) in [
-            ("orbt", "did you mean 'orbit'"),
-            ("orbit:frame=3", "did you mean 'frames'"),
-            ("orbit:fovy=0", "field of view is 0"),
-            ("orbit:near=5,far=5", "near < far"),
-            ("orbit:visible=10", "visible=10; expected a share"),
-            ("orbit:visible=1", "count from 2 to 9"),
-            ("orbit:visible=100%", "visible=100%; expected"),
-            ("orbit:visible=200%", "visible=200%; expected a share"),
-            ("orbit:visible=0%", "visible=0%; expected a share"),
-            ("orbit:visible=2.5", "visible=2.5; expected"),
-            ("orbit:visible=-1", "visible=-1; expected"),
-            ("nothing.csv", "No such file"),
-            ("nothing.txt", "No such file"),
-            ("no/where", "No such file"),
-            ("datasets/", "datasets/: Is a directory"),
-        ] {
-            let error = load(source, &scene, &LensDefaults::default())
-                .unwrap_err()
-                .to_string();
-            assert!(error.contains(wanted), "{source}: {error}");
-        }
-    }
-}
+mod tests;

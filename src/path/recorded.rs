@@ -50,7 +50,8 @@ const FAR: f64 = 1000.0;
 /// and any of `up_*`, `fovy_deg`, `aspect`, `near`, `far` (empty or `inf` =
 /// infinite), `ortho_height` (world units: the lens is orthographic, `fovy_deg` is
 /// not read; empty: perspective). Or view-projection matrices: `m00,m01,..,m33`
-/// (row, column) and nothing of the others. Columns in any order; unknown ones are ignored.
+/// (row, column) and nothing of the others. Columns in any order; a note names those
+/// that are not read, but for labels such as `name` and `time_s`.
 ///
 /// # Errors
 /// The line of the first value that is no number or makes no camera; a file
@@ -100,16 +101,25 @@ fn refused(row: &Row, error: &CameraError) -> InputError {
 }
 
 /// Columns that say what a matrix says already.
-const OF_EYES: &str = "eye_x eye_y eye_z look_x look_y look_z forward_x forward_y forward_z \
-                       up_x up_y up_z fovy_deg ortho_height aspect near far";
+#[rustfmt::skip]
+const OF_EYES: [&str; 17] = [
+    "eye_x", "eye_y", "eye_z", "look_x", "look_y", "look_z", "forward_x", "forward_y", "forward_z",
+    "up_x", "up_y", "up_z", "fovy_deg", "ortho_height", "aspect", "near", "far",
+];
+
+/// Angles that other programs write, and the columns that say the same.
+const SYNONYMS: [(&str, &str); 3] = [
+    ("roll", "up_x,up_y,up_z"),
+    ("pitch", "forward_x,forward_y,forward_z"),
+    ("yaw", "forward_x,forward_y,forward_z"),
+];
 
 fn matrices(
     mut table: TableReader<impl Read>,
     convention: Option<MatrixConvention>,
 ) -> Result<Vec<(u64, Camera)>, InputError> {
     let columns = table.columns(&MATRIX_ENTRIES)?;
-    let mut of_eyes = OF_EYES.split(' ');
-    if let Some(other) = of_eyes.find(|name| table.column(name).is_some()) {
+    if let Some(other) = OF_EYES.iter().find(|name| table.column(name).is_some()) {
         return Err(table.error(
             format!("columns of a matrix and '{other}'"),
             "m00 to m33 alone, or an eye and a lens".to_owned(),
@@ -123,7 +133,7 @@ fn matrices(
         )
     })?;
     let mut cameras = Vec::new();
-    while let Some(row) = table.next_row() {
+    while let Some(row) = table.next_row()? {
         let row = row?;
         let mut entries = [[0.0; 4]; 4];
         for (entry, &column) in entries.as_flattened_mut().iter_mut().zip(&columns) {
@@ -133,6 +143,7 @@ fn matrices(
         let camera = camera.map_err(|error| refused(&row, &error))?;
         cameras.push((row.line(), camera));
     }
+    table.note_unread(&MATRIX_ENTRIES, &[]);
     Ok(cameras)
 }
 
@@ -161,7 +172,7 @@ fn eyes(
     let lens = ["fovy_deg", "ortho_height", "aspect", "near", "far"];
     let [fovy, height, aspect, near, far] = lens.map(|name| table.column(name));
     let mut cameras = Vec::new();
-    while let Some(row) = table.next_row() {
+    while let Some(row) = table.next_row()? {
         let row = row?;
         let number = |column: Option<usize>, default: f64| match column {
             Some(column) => row.finite_number(column),
@@ -206,6 +217,7 @@ fn eyes(
         let camera = camera().map_err(|error| refused(&row, &error))?;
         cameras.push((row.line(), camera));
     }
+    table.note_unread(&OF_EYES, &SYNONYMS);
     Ok(cameras)
 }
 
@@ -218,12 +230,13 @@ pub fn read_points_csv(input: impl Read, file: &str) -> Result<Vec<DVec3>, Input
     let mut table = TableReader::open(input, file)?;
     let columns = table.columns(&["x", "y", "z"])?;
     let mut points = Vec::new();
-    while let Some(row) = table.next_row() {
+    while let Some(row) = table.next_row()? {
         points.push(vector(&row?, columns)?);
     }
     if points.is_empty() {
         return Err(without_rows(file, "no point"));
     }
+    table.note_unread(&["x", "y", "z"], &[]);
     Ok(points)
 }
 
@@ -239,6 +252,9 @@ fn vector(row: &Row, columns: [usize; 3]) -> Result<DVec3, InputError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::input::tell_notes;
+    use crate::scene::read_boxes_csv;
+    use std::sync::Mutex;
 
     fn read(text: &str) -> Result<CameraPath, PathError> {
         read_cameras_csv(text.as_bytes(), "c.csv", &LensDefaults::default())
@@ -247,9 +263,10 @@ mod tests {
     #[test]
     fn full_rows_in_any_order_and_bare_ones_with_defaults() {
         let full = "far,near,eye_x,eye_y,eye_z,note,look_x,look_y,look_z,up_x,up_y,up_z,fovy_deg,aspect\n\
-                    inf,0.5,1,2,3,hello,1,2,-7,0,1,0,90,1.5\n,0.5,1,2,3,,1,2,-7,0,1,0,90,1.5\n";
+                    inf,0.5,1,2,3,hello,1,2,-7,0,1,0,90,1.5\n,0.5,1,2,3,,1,2,-7,0,1,0,90,1.5\n\
+                    3.4028235e38,0.5,1,2,3,,1,2,-7,0,1,0,90,1.5\n";
         let path = read(full).unwrap();
-        assert_eq!(path.cameras[0], path.cameras[1]);
+        assert_eq!(path.cameras, [path.cameras[0]; 3]);
         assert_eq!(path.cameras[0].frame.eye, DVec3::new(1.0, 2.0, 3.0));
         assert_eq!(path.cameras[0].frame.forward(), -DVec3::Z);
         assert_eq!(
@@ -328,6 +345,33 @@ mod tests {
         assert_eq!(both.unwrap_err().to_string(), wanted);
         let wrong = read("x,y,z\n1,2,3\n").unwrap_err().to_string();
         assert!(wrong.contains("no column 'eye_x'"), "{wrong}");
+    }
+
+    #[test]
+    fn columns_that_are_not_read_are_told_once() {
+        static HEARD: Mutex<Vec<String>> = Mutex::new(Vec::new());
+        tell_notes(|note| HEARD.lock().unwrap().push(note.to_owned()));
+        let cameras = "eye_x,eye_y,eye_z,look_x,look_y,look_z,time_s,fov,Far,zfar,ortho_size,roll,,name,size\n\
+                       0,0,0,1,0,0,0,90,9,9,9,0,,a,1\n";
+        let points = "x,y,z,X\n1,2,3,4\n";
+        let boxes = "min_x,min_y,min_z,max_x,max_y,max_z,Min_X,max_speed\n0,0,0,1,1,1,2,3\n";
+        for _ in 0..2 {
+            read_cameras_csv(cameras.as_bytes(), "note-c.csv", &Default::default()).unwrap();
+            read_points_csv(points.as_bytes(), "note-p.csv").unwrap();
+            read_boxes_csv(boxes.as_bytes(), "note-b.csv", false).unwrap();
+        }
+        let heard = HEARD.lock().unwrap();
+        let heard: Vec<&String> = heard.iter().filter(|n| n.starts_with("note-")).collect();
+        assert_eq!(
+            heard,
+            [
+                "note-c.csv, line 1: columns that are not read: 'fov' (did you mean 'fovy_deg'?), \
+                 'Far' (did you mean 'far'?), 'zfar' (did you mean 'far'?), 'ortho_size' (did you \
+                 mean 'ortho_height'?), 'roll' (did you mean 'up_x,up_y,up_z'?), 'size'",
+                "note-p.csv, line 1: columns that are not read: 'X' (did you mean 'x'?)",
+                "note-b.csv: column 'Min_X' is kept as a label beside 'min_x'",
+            ]
+        );
     }
 
     #[test]

@@ -1,7 +1,8 @@
 //! A point of the diagram: a structure with a culling, its errors and its time,
 //! and when one point dominates another. How it is measured is in `points`.
 
-use serde::Serialize;
+use serde::ser::Error as _;
+use serde::{Serialize, Serializer};
 
 use super::judged::Judged;
 use super::plane_test::Names;
@@ -69,9 +70,9 @@ pub struct Point {
     /// Items that change from a camera to its neighbour on the path while their
     /// truth does not / visible items; null for a path of one camera.
     pub flicker: Option<Rate>,
-    /// The same as counts.
-    #[serde(flatten)]
-    pub errors: ErrorCount,
+    /// The same as counts; null for what is refused.
+    #[serde(flatten, serialize_with = "counts_or_null")]
+    pub errors: Option<ErrorCount>,
     /// How deep the deepest false negative reaches into the view, in pixels of a
     /// view 1080 pixels high.
     pub worst_miss_px: Option<f64>,
@@ -83,11 +84,11 @@ pub struct Point {
     /// Memory of nodes and items / number of items.
     pub memory_bytes_per_item: Option<f64>,
     /// Index of a point of the front that is no worse in anything and better in
-    /// something.
+    /// something, where the samples show that it is dominated.
     pub dominated_by: Option<usize>,
-    /// Whether it is dominated by the values alone, and the samples do not show it.
+    /// Whether it is dominated by the values alone: it shares the front.
     pub is_tie: bool,
-    /// Whether by the values no point dominates it.
+    /// Whether no point is shown to dominate it.
     pub on_front: bool,
     /// By camera: false negatives, dropped touches, false positives, depth of the
     /// worst miss.
@@ -95,10 +96,20 @@ pub struct Point {
     samples: [Vec<f64>; 4],
 }
 
+/// Every count by its name, null where there are none.
+pub(super) fn counts_or_null<S: Serializer>(
+    errors: &Option<ErrorCount>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    let counts = serde_json::to_value(errors.unwrap_or_default()).map_err(S::Error::custom)?;
+    let named = counts.as_object().into_iter().flatten();
+    serializer.collect_map(named.map(|(name, count)| (name, errors.map(|_| count))))
+}
+
 impl Point {
     pub(super) fn new(structure: &str, judged: &Judged) -> Point {
-        let errors = judged.errors();
         let is_refused = judged.refused.is_some();
+        let errors = (!is_refused).then(|| judged.errors());
         let untimed =
             (!judged.test.is_timed()).then(|| "emulated: errors without times".to_owned());
         let by_camera = |of: fn(&super::judged::CameraErrors) -> f64| -> Vec<f64> {
@@ -109,7 +120,7 @@ impl Point {
             names: judged.test.names(),
             status: match is_refused {
                 true => Status::Refused,
-                false if errors.false_negatives > 0 => Status::Unsafe,
+                false if judged.errors().false_negatives > 0 => Status::Unsafe,
                 false => Status::Ok,
             },
             reason: judged.refused.clone().or(untimed),
@@ -152,7 +163,7 @@ impl Point {
     /// What less is better of: three errors, the depth of the worst miss, memory
     /// and time.
     fn values(&self) -> [f64; 6] {
-        let e = &self.errors;
+        let e = self.errors.unwrap_or_default();
         let [missed, dropped, extra] =
             [e.false_negatives, e.touch_dropped, e.false_positives].map(|n| n as f64);
         let memory = self.memory_bytes_per_item.unwrap_or(f64::INFINITY);
@@ -182,9 +193,9 @@ fn mark(points: &mut [Point], is_faster: &dyn Fn(&Point, &Point) -> bool) {
     };
     let found = dominance(&values, &is_less);
     for (&i, found) in timed.iter().zip(found) {
-        points[i].on_front = found.is_none();
-        points[i].dominated_by = found.map(|found| timed[found.by]);
-        points[i].is_tie = found.is_some_and(|found| !found.is_shown);
+        points[i].dominated_by = found.dominated_by.map(|by| timed[by]);
+        points[i].on_front = found.dominated_by.is_none();
+        points[i].is_tie = found.is_tie;
     }
 }
 
@@ -205,12 +216,12 @@ mod tests {
             excess: None,
             false_negative_ppm: None,
             flicker: None,
-            errors: ErrorCount {
+            errors: Some(ErrorCount {
                 false_negatives,
                 touch_dropped,
                 false_positives,
                 ..ErrorCount::default()
-            },
+            }),
             worst_miss_px: Some(0.0),
             times: Times {
                 query_ns: ns,
@@ -245,11 +256,11 @@ mod tests {
     }
 
     #[test]
-    fn errors_are_not_traded_and_ties_are_no_front() {
+    fn errors_are_not_traded_and_ties_share_the_front() {
         let (none, some) = ([0, 0, 5], [0, 0, 9]);
         let (front, tie, worse) = (
             (None, false, true),
-            (Some(0), true, false),
+            (None, true, true),
             (Some(0), false, false),
         );
         let cases = [

@@ -315,9 +315,9 @@ pub(super) fn conclude(points: &mut [RegionPoint], judged: &[RegionJudged], time
     };
     let found = dominance(&values, &is_less);
     for (&i, found) in timed.iter().zip(found) {
-        points[i].on_front = found.is_none();
-        points[i].dominated_by = found.map(|found| timed[found.by]);
-        points[i].is_tie = found.is_some_and(|found| !found.is_shown);
+        points[i].dominated_by = found.dominated_by.map(|by| timed[by]);
+        points[i].on_front = found.dominated_by.is_none();
+        points[i].is_tie = found.is_tie;
     }
 }
 

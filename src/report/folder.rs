@@ -5,88 +5,24 @@
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use tempfile::{NamedTempFile, TempDir};
+use tempfile::NamedTempFile;
 
 use super::files::{FolderError, REPORT, SAMPLES, STREAM, SUMMARY};
 use super::reading::read_stream;
 use super::stream::{Header, KeptPart, Line, Stream};
+use super::writing::{locked_temporary_in, replace_atomically, sweep};
 use super::{Report, ReportCell};
 use crate::measure::{METRICS, Part, TaskSamples};
 use crate::shown::shown_field;
 
-/// How names of half-written files begin and end.
-const TEMPORARY: (&str, &str) = (".cullbench-", ".tmp");
 /// The first line of samples.csv.
 pub(super) const SAMPLE_COLUMNS: &str = "scene,path,cache,structure,test,task,process,round,frame,\
                                          queries,cpu_ns,wall_ns,returned\n";
-
-/// Writes a file whole or not at all. A link stays one, and its target is
-/// what is replaced; an existing file keeps its permissions. What is no file
-/// (a terminal, a pipe, `/dev/null`) is written to and never replaced.
-///
-/// # Errors
-/// What the file system says, with the path.
-pub fn write_atomically(
-    path: &Path,
-    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-) -> Result<(), FolderError> {
-    let attempt = || -> io::Result<()> {
-        let old = fs::metadata(path).ok();
-        if old
-            .as_ref()
-            .is_some_and(|old| !old.is_file() && !old.is_dir())
-        {
-            let mut stream = BufWriter::new(OpenOptions::new().write(true).open(path)?);
-            write(&mut stream)?;
-            return stream.flush();
-        }
-        let target = match &old {
-            Some(_) => fs::canonicalize(path)?,
-            None => path.to_owned(),
-        };
-        let folder = match target.parent() {
-            Some(parent) if !parent.as_os_str().is_empty() => parent,
-            _ => Path::new("."),
-        };
-        // A missing folder is reported by its own name, not by a temporary one.
-        fs::metadata(folder)?;
-        let mut file = temporary_in(folder)?;
-        {
-            let mut buffered = BufWriter::new(&mut file);
-            write(&mut buffered)?;
-            buffered.flush()?;
-        }
-        if let Some(old) = old.filter(fs::Metadata::is_file) {
-            file.as_file().set_permissions(old.permissions())?;
-        }
-        file.persist(target)?;
-        Ok(())
-    };
-    attempt().map_err(FolderError::io(path))
-}
-
-/// A file that is gone when this process ends well, and that the next run in
-/// the folder takes away if it does not.
-///
-/// # Errors
-/// What the file system says.
-pub fn temporary_in(folder: &Path) -> io::Result<NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    // Private by themselves; results are meant to be read, as far as the user's
-    // umask lets them.
-    builder.prefix(TEMPORARY.0).suffix(TEMPORARY.1);
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(fs::Permissions::from_mode(0o666));
-    }
-    builder.tempfile_in(folder)
-}
 
 /// The folder of a run that is being measured, locked against others.
 pub struct RunFolder {
@@ -109,11 +45,11 @@ impl RunFolder {
         refuse_taken(path)?;
         // There is no stream without its first line: it gets its name with it.
         let begin = || -> io::Result<NamedTempFile> {
-            let mut stream = temporary_in(path)?;
+            let (mut stream, is_locked) = locked_temporary_in(path)?;
             let mut text = serde_json::to_vec(&Line::Run(Box::new(header.clone())))?;
             text.push(b'\n');
             stream.write_all(&text)?;
-            stream.as_file().try_lock()?;
+            is_locked?;
             Ok(stream)
         };
         let file = path.join(STREAM);
@@ -142,7 +78,6 @@ impl RunFolder {
             folder.discard();
             return Err(error);
         }
-        folder.sweep();
         Ok(folder)
     }
 
@@ -155,22 +90,6 @@ impl RunFolder {
         write().map_err(FolderError::io(&self.path.join(SAMPLES)))?;
         self.samples_end = SAMPLE_COLUMNS.len() as u64;
         Ok(())
-    }
-
-    /// Takes away what killed processes have left half written.
-    fn sweep(&self) {
-        let entries = fs::read_dir(&self.path).into_iter().flatten().flatten();
-        for entry in entries {
-            let name = entry.file_name();
-            let name = name.to_string_lossy();
-            if name.starts_with(TEMPORARY.0) && name.ends_with(TEMPORARY.1) {
-                let path = entry.path();
-                let _ = match path.is_dir() {
-                    true => fs::remove_dir_all(path),
-                    false => fs::remove_file(path),
-                };
-            }
-        }
     }
 
     /// The folder that is written to.
@@ -267,8 +186,8 @@ impl StoppedRun {
     pub fn open(path: &Path) -> Result<(StoppedRun, Stream), FolderError> {
         let file = path.join(STREAM);
         let io = FolderError::io(&file);
-        let opened = OpenOptions::new().read(true).append(true).open(&file);
-        let lock = opened.map_err(io)?;
+        fs::metadata(&file).map_err(io)?;
+        let lock = open(&file)?;
         let begin = Instant::now();
         loop {
             match lock.try_lock() {
@@ -291,7 +210,7 @@ impl StoppedRun {
             length,
             lost: 0,
         };
-        let samples = fs::metadata(path.join(SAMPLES)).map_or(0, |found| found.len());
+        let samples = length_of_samples(&path.join(SAMPLES)).unwrap_or(0);
         let mut parts = stream.parts.iter();
         if let Some(kept) = parts.position(|kept| kept.samples_end > samples) {
             stopped.lost = stream.parts.len() - kept;
@@ -303,7 +222,7 @@ impl StoppedRun {
         Ok((stopped, stream))
     }
 
-    /// Parts that are to be measured again: samples.csv was shorter than the
+    /// Parts that are to be measured again: samples.csv holds less than the
     /// stream says.
     pub fn lost(&self) -> usize {
         self.lost
@@ -335,16 +254,9 @@ impl StoppedRun {
             }
             None => folder.begin_samples()?,
         }
-        folder.sweep();
+        sweep(&path);
         Ok(folder)
     }
-}
-
-/// A folder for files that are not whole yet.
-pub(super) fn temporary_folder_in(folder: &Path) -> io::Result<TempDir> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(TEMPORARY.0).suffix(TEMPORARY.1);
-    builder.tempdir_in(folder)
 }
 
 /// Refuses a folder that holds a file of a run.
@@ -353,7 +265,9 @@ pub(super) fn temporary_folder_in(folder: &Path) -> io::Result<TempDir> {
 /// [`FolderError::Taken`].
 pub(super) fn refuse_taken(path: &Path) -> Result<(), FolderError> {
     let files = [REPORT, SUMMARY, SAMPLES, STREAM];
-    match files.iter().any(|file| path.join(file).exists()) {
+    // A link that leads nowhere is one too.
+    let is_there = |file| fs::symlink_metadata(path.join(file)).is_ok();
+    match files.into_iter().any(is_there) {
         true => Err(FolderError::Taken {
             path: path.to_owned(),
         }),
@@ -361,14 +275,40 @@ pub(super) fn refuse_taken(path: &Path) -> Result<(), FolderError> {
     }
 }
 
-/// To append to; made if it is not there.
+/// Opens a file to append to, made if it is not there. A link is refused: what it
+/// leads to is not the run's.
 fn open(file: &Path) -> Result<File, FolderError> {
+    if fs::symlink_metadata(file).is_ok_and(|found| !found.is_file()) {
+        let found = io::Error::other("a link or a device; expected a file of the run's own");
+        return Err(FolderError::io(file)(found));
+    }
     let opened = OpenOptions::new()
         .read(true)
         .append(true)
         .create(true)
         .open(file);
     opened.map_err(FolderError::io(file))
+}
+
+/// Bytes of samples.csv up to the first NUL, which a power cut leaves where data never
+/// reached the disk.
+pub(super) fn length_of_samples(file: &Path) -> io::Result<u64> {
+    // A pipe would wait for its writer.
+    if !fs::metadata(file)?.is_file() {
+        return Ok(0);
+    }
+    let mut reader = BufReader::new(File::open(file)?);
+    let mut length = 0;
+    loop {
+        let bytes = reader.fill_buf()?;
+        let whole = bytes.iter().position(|b| *b == 0);
+        let (sound, read) = (whole.unwrap_or(bytes.len()), bytes.len());
+        length += sound as u64;
+        if whole.is_some() || read == 0 {
+            return Ok(length);
+        }
+        reader.consume(read);
+    }
 }
 
 /// Bytes of the first lines of a file that are not empty.
@@ -386,15 +326,15 @@ fn length_of_lines(file: &Path, lines: usize) -> io::Result<u64> {
     Ok(length)
 }
 
-/// Writes report.json and summary.csv into a folder.
+/// Writes report.json and summary.csv into a folder; a link of that name is replaced.
 ///
 /// # Errors
 /// What the file system says.
 pub fn save_report(folder: &Path, report: &Report) -> Result<(), FolderError> {
-    write_atomically(&folder.join(SUMMARY), |out| {
+    replace_atomically(&folder.join(SUMMARY), |out| {
         write_summary(&report.cells, out)
     })?;
-    write_atomically(&folder.join(REPORT), |out| {
+    replace_atomically(&folder.join(REPORT), |out| {
         serde_json::to_writer_pretty(&mut *out, report)?;
         writeln!(out)
     })
@@ -464,58 +404,4 @@ fn write_summary(cells: &[ReportCell], out: &mut dyn Write) -> io::Result<()> {
         csv.write_record(&row)?;
     }
     csv.flush()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_failed_write_leaves_the_old_file_and_no_rubbish() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("file.txt");
-        write_atomically(&path, |out| out.write_all(b"old")).unwrap();
-        let failed = write_atomically(&path, |out| {
-            out.write_all(b"half of the new")?;
-            Err(io::Error::other("disk full"))
-        });
-        assert!(failed.unwrap_err().to_string().contains("disk full"));
-        assert_eq!(fs::read_to_string(&path).unwrap(), "old");
-        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
-        let nowhere = folder.path().join("no/file.txt");
-        let error = write_atomically(&nowhere, |_| Ok(())).unwrap_err();
-        assert!(!error.to_string().contains(".cullbench-"), "{error}");
-    }
-
-    #[test]
-    fn errors_do_not_name_temporary_files() {
-        let error = temporary_in(Path::new("no/such")).unwrap_err();
-        assert!(
-            error.to_string().contains(TEMPORARY.0),
-            "the premise: {error}"
-        );
-        let told = FolderError::io(Path::new("no/such"))(error).to_string();
-        assert!(
-            told.starts_with("no/such: ") && !told.contains(TEMPORARY.0),
-            "{told}"
-        );
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn links_and_permissions_stay() {
-        use std::os::unix::fs::{PermissionsExt, symlink};
-        let folder = tempfile::tempdir().unwrap();
-        let (file, link) = (folder.path().join("file"), folder.path().join("link"));
-        fs::write(&file, "old").unwrap();
-        fs::set_permissions(&file, fs::Permissions::from_mode(0o600)).unwrap();
-        symlink("file", &link).unwrap();
-        write_atomically(&link, |out| out.write_all(b"new")).unwrap();
-        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
-        assert_eq!(fs::read_to_string(&file).unwrap(), "new");
-        assert_eq!(
-            fs::metadata(&file).unwrap().permissions().mode() & 0o777,
-            0o600
-        );
-    }
 }

@@ -6,10 +6,11 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use super::files::{FolderError, REPORT, SAMPLES, STREAM, SUMMARY};
+use super::files::{FolderError, SAMPLES, STREAM};
 use super::folder::{self, SAMPLE_COLUMNS, save_report};
 use super::reading::read_stream;
 use super::stream::{Difference, Header, KeptPart, Line, Stream};
+use super::writing::temporary_folder_in;
 use crate::measure::GroupKey;
 use crate::shown::first_of;
 
@@ -34,12 +35,12 @@ pub enum MergeError {
         /// What they do not have in common.
         reason: String,
     },
-    /// samples.csv of a shard is shorter than its stream says.
-    #[error("{}: {found} bytes; expected {wanted} that stream.jsonl refers to", path.display())]
+    /// samples.csv of a shard holds less than its stream says.
+    #[error("{}: {found} sound bytes; expected {wanted} that stream.jsonl refers to", path.display())]
     Samples {
         /// That file.
         path: PathBuf,
-        /// Its length in bytes.
+        /// Its length in bytes, up to the first NUL.
         found: u64,
         /// The length that the stream needs, in bytes.
         wanted: u64,
@@ -107,11 +108,11 @@ pub fn merge(folders: &[PathBuf], args: &[String], partial: bool) -> Result<Merg
             parts.push((kept, (file.clone(), [from, kept.samples_end])));
             from = kept.samples_end;
         }
-        let found = fs::metadata(&file).map_err(FolderError::io(&file))?;
-        if found.len() < from {
+        let found = folder::length_of_samples(&file).map_err(FolderError::io(&file))?;
+        if found < from {
             return Err(MergeError::Samples {
                 path: file,
-                found: found.len(),
+                found,
                 wanted: from,
             });
         }
@@ -151,50 +152,59 @@ impl Merged {
         pairs(&self.missing)
     }
 
-    /// Writes the four files of a run into a folder that holds none: beside
-    /// their place first, so that an error leaves nothing.
+    /// Writes the four files of a run into a folder that is new or empty: beside its
+    /// place, then renamed as a whole, so that nothing that ends it leaves half a run.
+    /// False if stopped.
     ///
     /// # Errors
     /// [`FolderError::Taken`]; what the file system says.
-    pub fn write(&self, out: &Path) -> Result<(), FolderError> {
+    pub fn write(&self, out: &Path, stop: &dyn Fn() -> bool) -> Result<bool, FolderError> {
         let io = FolderError::io(out);
         folder::refuse_taken(out)?;
-        let is_new = !out.exists();
-        let parent = match out.parent() {
-            Some(parent) if is_new && !parent.as_os_str().is_empty() => parent,
-            _ if is_new => Path::new("."),
-            _ => out,
+        let out = match out.exists() {
+            true => fs::canonicalize(out).map_err(io)?,
+            false => out.to_owned(),
         };
+        let parent = match out.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => parent,
+            _ => Path::new("."),
+        };
+        if fs::read_dir(&out).is_ok_and(|mut entries| entries.next().is_some()) {
+            let found = "has other files; expected an empty or new folder";
+            return Err(io(io::Error::other(found)));
+        }
         fs::create_dir_all(parent).map_err(io)?;
-        let beside = folder::temporary_folder_in(parent).map_err(io)?;
-        self.write_samples(&beside.path().join(SAMPLES))
-            .and_then(|()| self.write_stream(&beside.path().join(STREAM)))
-            .map_err(io)?;
+        let (beside, lock) = temporary_folder_in(parent).map_err(io)?;
+        let all = self.write_samples(&beside.path().join(SAMPLES), stop);
+        if !all.map_err(io)? {
+            return Ok(false);
+        }
+        let stream = beside.path().join(STREAM);
+        self.write_stream(&stream).map_err(io)?;
         save_report(beside.path(), &self.stream.report())?;
-        if is_new {
-            fs::create_dir(out).map_err(io)?;
+        if stop() {
+            return Ok(false);
         }
-        // The stream last: with it there is a run.
-        for name in [SAMPLES, SUMMARY, REPORT, STREAM] {
-            if let Err(error) = fs::rename(beside.path().join(name), out.join(name)) {
-                for name in [SAMPLES, SUMMARY, REPORT] {
-                    let _ = fs::remove_file(out.join(name));
-                }
-                return Err(io(error));
-            }
-        }
-        Ok(())
+        fs::rename(beside.path(), &out).map_err(io)?;
+        let _ = beside.keep();
+        drop(lock);
+        Ok(true)
     }
 
-    fn write_samples(&self, path: &Path) -> io::Result<()> {
+    /// False if stopped.
+    fn write_samples(&self, path: &Path, stop: &dyn Fn() -> bool) -> io::Result<bool> {
         let mut out = BufWriter::new(File::create_new(path)?);
         out.write_all(SAMPLE_COLUMNS.as_bytes())?;
         for (file, [from, to]) in &self.samples {
+            if stop() {
+                return Ok(false);
+            }
             let mut file = File::open(file)?;
             file.seek(SeekFrom::Start(*from))?;
             io::copy(&mut file.take(to - from), &mut out)?;
         }
-        out.flush()
+        out.flush()?;
+        Ok(true)
     }
 
     fn write_stream(&self, path: &Path) -> io::Result<()> {

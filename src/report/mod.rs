@@ -15,11 +15,12 @@ mod reading;
 mod setting;
 mod stream;
 mod surface;
+mod writing;
 
 pub use crate::measure::{ReportCell, SamplesRef};
 pub use changes::changes;
 pub use files::{FolderError, bare};
-pub use folder::{RunFolder, StoppedRun, save_report, temporary_in, write_atomically};
+pub use folder::{RunFolder, StoppedRun, save_report};
 pub use growth::{Growth, growths};
 pub use judging::{
     COUNTERS, Changes, CommonShift, JUDGED_METRICS, JudgedRow, Lone, Outcome, WorkChange,
@@ -32,3 +33,4 @@ pub use reading::{read_report, read_stream};
 pub use setting::{Setting, settings};
 pub use stream::{Difference, Header, KeptPart, Line, Stream, dated, run_here, utc};
 pub use surface::{Crossing, Place, Surface, surfaces};
+pub use writing::{temporary_in, try_folder, try_place, write_atomically};

@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::measure::{Machine, Metric, PathInfo, ReportCell, Source, Toolchain};
+use crate::measure::{Machine, Metric, PathInfo, ReportCell, Source, Status, Toolchain};
 use crate::statistics::geometric_mean;
 
 /// Raised when a field changes its meaning or goes away.
@@ -32,6 +32,16 @@ pub struct Report {
     /// path: no structures, never ranked, and therefore a list of their own.
     #[serde(default)]
     pub bounds: Vec<ReportCell>,
+}
+
+impl Report {
+    /// Returns true if an answer is wrong, or if structures were tried and none has
+    /// answered (exit code 1).
+    pub fn has_failed(&self) -> bool {
+        let any = |is: fn(Status) -> bool| self.cells.iter().any(|cell| is(cell.status));
+        let tried = any(|status| status != Status::LeftOut);
+        any(Status::is_failure) || tried && !any(|status| status == Status::Ok)
+    }
 }
 
 /// A run as a whole.

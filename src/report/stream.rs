@@ -316,6 +316,7 @@ impl Stream {
 ///     cullings: vec![Default::default()],
 ///     lens: Default::default(),
 ///     load: Default::default(),
+///     most_cameras: usize::MAX,
 ///     effort: Effort { processes: 1, rounds: [3, 3], task_ns: 1e5, pass_ns: 1e6, beside: Beside::All },
 ///     bounds: false,
 ///     seed: 1,

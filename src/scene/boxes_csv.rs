@@ -7,8 +7,8 @@ use std::io::{self, Read, Write};
 use glam::DVec3;
 
 use super::{Labels, Scene, WorldBox};
-use crate::input::{InputError, TableReader};
-use crate::shown::{field, from_field};
+use crate::input::{InputError, TableReader, note};
+use crate::shown::{field, from_field, shortened};
 
 const BOUNDS: [&str; 6] = ["min_x", "min_y", "min_z", "max_x", "max_y", "max_z"];
 
@@ -27,8 +27,8 @@ pub fn read_boxes_csv(
     file: &str,
     skip_bad_items: bool,
 ) -> Result<Scene, InputError> {
-    let rows = read_rows(input, file, f64::from(f32::MAX))?;
-    if let Some(first) = rows.first_bad.filter(|_| !skip_bad_items) {
+    let mut rows = read_rows(input, file, f64::from(f32::MAX))?;
+    if let Some(first) = rows.first_bad.take().filter(|_| !skip_bad_items) {
         return Err(match rows.bad {
             1 => first,
             count => InputError::BadItems {
@@ -37,6 +37,7 @@ pub fn read_boxes_csv(
             },
         });
     }
+    rows.note_near_names(file);
     let mut scene = Scene::from_boxes(file, &rows.boxes)?;
     scene.labels = rows.labels;
     scene.skipped_items = rows.bad;
@@ -48,8 +49,10 @@ pub fn read_boxes_csv(
 /// # Errors
 /// [`InputError::Line`] for a missing or wrong header and the first bad row.
 pub fn read_sought_boxes_csv(input: impl Read, file: &str) -> Result<Vec<WorldBox>, InputError> {
-    let rows = read_rows(input, file, f64::MAX)?;
-    rows.first_bad.map_or(Ok(rows.boxes), Err)
+    let mut rows = read_rows(input, file, f64::MAX)?;
+    rows.first_bad.take().map_or(Ok(()), Err)?;
+    rows.note_near_names(file);
+    Ok(rows.boxes)
 }
 
 /// What a file holds, and what is wrong with it.
@@ -58,6 +61,24 @@ struct Rows {
     labels: Vec<Labels>,
     first_bad: Option<InputError>,
     bad: usize,
+}
+
+impl Rows {
+    /// Tells of labels that may have been meant as bounds.
+    fn note_near_names(&self, file: &str) {
+        let letters = |name: &str| {
+            name.to_lowercase()
+                .replace(|c: char| !c.is_alphanumeric(), "")
+        };
+        for name in self.labels.iter().map(|label| &label.column) {
+            if let Some(bound) = BOUNDS.iter().find(|bound| letters(bound) == letters(name)) {
+                let name = shortened(name, 60);
+                note(&format!(
+                    "{file}: column '{name}' is kept as a label beside '{bound}'"
+                ));
+            }
+        }
+    }
 }
 
 /// Reads all rows; bad is also a bound beyond `limit`.
@@ -69,7 +90,7 @@ fn read_rows(input: impl Read, file: &str, limit: f64) -> Result<Rows, InputErro
     let labels = others.map(|(i, name)| (i, Labels::new(from_field(name))));
     let mut labels: Vec<(usize, Labels)> = labels.collect();
     let (mut boxes, mut first_bad, mut bad) = (Vec::new(), None, 0);
-    while let Some(row) = table.next_row() {
+    while let Some(row) = table.next_row()? {
         let checked = row.and_then(|row| {
             let mut bounds = [0.0; 6];
             for (bound, &column) in bounds.iter_mut().zip(&columns) {

@@ -22,7 +22,7 @@ pub struct Family {
     pub name: &'static str,
     /// One line for `cullbench list`.
     pub summary: &'static str,
-    /// Parameters beyond `n`, `seed` and `offset`, for the help.
+    /// Parameters beyond [`SCENE_PARAMS`], for the help.
     pub params: &'static str,
     build: fn(&mut Spec, usize, &mut SeededRng) -> Result<World, SpecError>,
 }
@@ -38,8 +38,11 @@ pub static FAMILIES: &[Family] = rows! { Family { name, summary, params, build }
     "forest", "trees, bushes and rocks on a fractal heightfield",
         "relief=0.12 (height / width), spacing=5 (m between plants)", forest::build;
     "rooms", "an indoor block of cells joined by doors; the cells are the regions",
-        "slabs=3, room=6 (mean edge, m)", rooms::build;
+        "storeys=3, room=6 (mean edge, m)", rooms::build;
 };
+
+/// Parameters that every generated scene takes; `n` of a mesh counts triangles.
+pub const SCENE_PARAMS: &str = "n=100000, seed=1, offset=0";
 
 /// Largest scene a spec may ask for: 12 GB while it is made, 7.2 GB then.
 pub(super) const MOST_ITEMS: u64 = 100_000_000;
@@ -77,7 +80,9 @@ impl Family {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{MESHES, load};
     use super::*;
+    use crate::spec::tests::{keys, known, listed};
 
     fn scene(text: &str) -> Scene {
         let spec = Spec::parse(text).unwrap();
@@ -134,6 +139,27 @@ mod tests {
     }
 
     #[test]
+    fn every_parameter_of_the_list_is_one_and_no_other() {
+        let families = FAMILIES.iter().map(|f| (f.name, f.params));
+        for (name, params) in families.chain(MESHES.iter().map(|mesh| (mesh.name, ""))) {
+            let load = |parameter: &str| load(&format!("{name}:{parameter}"), &Default::default());
+            let listed = listed(&format!("{SCENE_PARAMS}, {params}"));
+            for (key, default) in &listed {
+                let parameter = match key.as_str() {
+                    "n" => "n=20".to_owned(),
+                    // Follows from the others.
+                    "size" => "n=20,size=1".to_owned(),
+                    _ => format!("n=20,{key}={default}"),
+                };
+                let made = load(&parameter);
+                assert!(made.is_ok(), "{name}:{parameter}: {:?}", made.err());
+            }
+            let error = load("n=20,zzz=1").unwrap_err().to_string();
+            assert_eq!(known(&error), keys(&listed), "{name}");
+        }
+    }
+
+    #[test]
     fn an_offset_moves_the_origin_and_keeps_the_boxes() {
         let (here, far) = (scene("uniform:n=100"), scene("uniform:n=100,offset=1e7"));
         assert_eq!(here.origin, DVec3::ZERO);
@@ -148,7 +174,7 @@ mod tests {
             "city:n=-1",
             "city:n=1.5",
             "uniform:side=0",
-            "rooms:slabs=0",
+            "rooms:storeys=0",
             "city:trees=4",
         ] {
             let spec = Spec::parse(text).unwrap();

@@ -1,5 +1,8 @@
-//! Whether a generated scene fits into memory, known before it is made: a
-//! machine that begins to swap, or ends the process, has measured nothing.
+//! Whether a scene fits into memory, known before it is made: a machine that begins
+//! to swap, or ends the process, has measured nothing.
+
+use std::fs;
+use std::path::Path;
 
 use sysinfo::{MemoryRefreshKind, RefreshKind, System};
 
@@ -19,7 +22,7 @@ const INDEXED: u64 = 40;
 /// What a build needs beside that, for the one that is being built.
 const BUILT: u64 = 64;
 /// Scenes of fewer items, and meshes of fewer triangles, are made without asking.
-const ANYWHERE: u64 = 1_000_000;
+const ANYWHERE: u64 = 10_000;
 /// Bytes of a triangle while a mesh is made: 117 were measured of the statue, which
 /// finds its points in a table, 20 to 24 of the others.
 const MESHED: u64 = 120;
@@ -77,6 +80,14 @@ pub(super) fn fits_here(scene: &str, spec: &Spec, structures: u64) -> Result<(),
     }
 }
 
+/// The same of a file with so many rows.
+pub(super) fn rows_fit_here(file: &str, rows: u64, structures: u64) -> Result<(), InputError> {
+    match rows > ANYWHERE {
+        true => fits(file, rows, structures, available_bytes()),
+        false => Ok(()),
+    }
+}
+
 /// The same of the text of a mesh, whose `n` counts triangles, each of which will need
 /// so many bytes beside the scene.
 pub(super) fn mesh_fits_here(
@@ -95,13 +106,72 @@ pub(super) fn mesh_fits_here(
     }
 }
 
-/// What the system, and the group of processes this one is in, have left.
+/// What the system, the control groups of this process and its own limits leave.
 pub(crate) fn available_bytes() -> Option<u64> {
     let wanted = RefreshKind::nothing().with_memory(MemoryRefreshKind::nothing().with_ram());
-    let system = System::new_with_specifics(wanted).ok()?;
-    let of_group = system.cgroup_limits().map(|limits| limits.free_memory);
-    let here = system.available_memory();
-    Some(of_group.map_or(here, |group| group.min(here))).filter(|bytes| *bytes > 0)
+    let system = System::new_with_specifics(wanted).ok();
+    let groups = fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
+    let [limits, status] = ["limits", "status"]
+        .map(|file| fs::read_to_string(format!("/proc/self/{file}")).unwrap_or_default());
+    let left = [
+        system
+            .map(|system| system.available_memory())
+            .filter(|bytes| *bytes > 0),
+        left_in_groups(Path::new("/sys/fs/cgroup"), &groups),
+        left_of_limits(&limits, &status),
+    ];
+    left.into_iter().flatten().min()
+}
+
+/// Address space that the system's allocator and the stack of another thread may take.
+const THREADS: u64 = 80 << 20;
+
+/// The number behind a name at the beginning of a line; `None` for "unlimited".
+fn figure(text: &str, name: &str) -> Option<u64> {
+    let rest = text.lines().find_map(|line| line.strip_prefix(name))?;
+    rest.split_whitespace().next()?.parse().ok()
+}
+
+/// What `ulimit -v` and `ulimit -d` leave, from the process's own files of limits and
+/// status.
+fn left_of_limits(limits: &str, status: &str) -> Option<u64> {
+    let left = |limit, used| {
+        let used = 1024 * figure(status, used)? + THREADS;
+        Some(figure(limits, limit)?.saturating_sub(used))
+    };
+    let address_space = left("Max address space", "VmSize:");
+    let data = left("Max data size", "VmData:");
+    address_space.into_iter().chain(data).min()
+}
+
+/// What the control groups leave that a process is in, and those that they are in;
+/// pages of files that can be dropped are free. Version 2, where the line names no
+/// controller, or 1.
+fn left_in_groups(root: &Path, groups: &str) -> Option<u64> {
+    const V1: [&str; 3] = [
+        "memory.limit_in_bytes",
+        "memory.usage_in_bytes",
+        "total_inactive_file",
+    ];
+    const V2: [&str; 3] = ["memory.max", "memory.current", "inactive_file"];
+    let of_line = |line: &str| {
+        let (controllers, path) = line.split_once(':')?.1.split_once(':')?;
+        let (root, files) = match controllers {
+            "" => (root.to_owned(), V2),
+            some if some.split(',').any(|name| name == "memory") => (root.join("memory"), V1),
+            _ => return None,
+        };
+        let left = |group: &Path| {
+            let read = |file: &str| fs::read_to_string(group.join(file)).ok();
+            let [limit, usage] = [files[0], files[1]].map(|file| figure(&read(file)?, ""));
+            let pages = read("memory.stat").and_then(|stat| figure(&stat, files[2]));
+            Some(limit?.saturating_sub(usage?.saturating_sub(pages.unwrap_or(0))))
+        };
+        let own = root.join(path.trim_start_matches('/'));
+        let all = own.ancestors().take_while(|group| group.starts_with(&root));
+        all.filter_map(left).min()
+    };
+    groups.lines().filter_map(of_line).min()
 }
 
 #[cfg(test)]
@@ -111,5 +181,55 @@ mod tests {
     #[test]
     fn what_is_free_is_known_here() {
         assert!(available_bytes() > Some(1 << 20));
+    }
+
+    #[test]
+    fn limits_of_the_process_count() {
+        let status = "VmPeak:\t  900 kB\nVmSize:\t     300 kB\nVmData:\t     100 kB\n";
+        let limits = |data: &str, space: &str| {
+            format!("Max data size  {data}  unlimited  bytes\nMax address space  {space}  x  bytes")
+        };
+        let left = |data, space| left_of_limits(&limits(data, space), status);
+        assert_eq!(left("unlimited", "unlimited"), None);
+        assert_eq!(
+            left("unlimited", "1024000000"),
+            Some(1_024_000_000 - 300 * 1024 - THREADS)
+        );
+        assert_eq!(
+            left("204800000", "1024000000"),
+            Some(204_800_000 - 100 * 1024 - THREADS)
+        );
+        assert_eq!(left("unlimited", "1024"), Some(0));
+        assert_eq!(left_of_limits("", ""), None);
+    }
+
+    #[test]
+    fn groups_count_with_those_they_are_in() {
+        let root = tempfile::tempdir().unwrap();
+        let write = |file: &str, text: &str| {
+            let file = root.path().join(file);
+            fs::create_dir_all(file.parent().unwrap()).unwrap();
+            fs::write(file, text).unwrap();
+        };
+        let left = |groups: &str| left_in_groups(root.path(), groups);
+        write("a/b/memory.max", "max\n");
+        write("a/b/memory.current", "70\n");
+        assert_eq!(left("0::/a/b\n"), None);
+        write("a/memory.max", "1000\n");
+        write("a/memory.current", "800\n");
+        write("a/memory.stat", "anon 500\ninactive_file 300\n");
+        assert_eq!(left("0::/a/b\n"), Some(500));
+        write("memory/c/memory.limit_in_bytes", "400\n");
+        write("memory/c/memory.usage_in_bytes", "100\n");
+        write(
+            "memory/c/memory.stat",
+            "inactive_file 5\ntotal_inactive_file 10\n",
+        );
+        assert_eq!(left("9:cpu:/\n4:hugetlb,memory:/c\n0::/a/b\n"), Some(310));
+        // Within a container the path is the host's: what is mounted is the limit.
+        write("memory/memory.limit_in_bytes", "90\n");
+        write("memory/memory.usage_in_bytes", "100\n");
+        assert_eq!(left("4:memory:/docker/1\n"), Some(0));
+        assert_eq!(left("0::/elsewhere\n"), None);
     }
 }

@@ -7,9 +7,11 @@
 mod boxes_csv;
 mod city;
 mod clustered;
+mod disputes;
 mod forest;
 mod generate;
 mod labels;
+mod lumps;
 mod memory;
 mod meshes;
 mod originals;
@@ -37,8 +39,10 @@ use crate::arithmetic::rounding::{sum_down, sum_up};
 use crate::geometry::{Aabb, PlaneTree};
 use crate::input::InputError;
 
+pub(crate) use crate::shown::hex;
 pub use boxes_csv::{read_boxes_csv, read_sought_boxes_csv, write_boxes_csv};
-pub use generate::{FAMILIES, Family, GENERATOR_NAME};
+pub use disputes::{Dispute, disputes};
+pub use generate::{FAMILIES, Family, GENERATOR_NAME, SCENE_PARAMS};
 pub use labels::Labels;
 pub(crate) use memory::available_bytes;
 pub use memory::{fits, needed_bytes};
@@ -53,7 +57,7 @@ pub use sought::Sought;
 pub use source::{LoadOptions, check_fits, load};
 pub(crate) use surface::volume_within;
 pub use surface::{SurfaceKind, Surfaces};
-pub use wad::{WadMap, map_lump, map_names};
+pub use wad::{Linedef, WadMap, map_names};
 
 /// A box in world coordinates, as a file or a generator states it.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -229,11 +233,6 @@ impl Scene {
         }
         hex(&hash.finalize())
     }
-}
-
-/// Lower-case hexadecimal.
-pub(crate) fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 
 /// The origin that suits the boxes, by the finite ones.

@@ -2,9 +2,11 @@
 //! region is not just its box (a cell of a BSP tree), this file owns the exact
 //! membership test that follows.
 
+use std::sync::OnceLock;
+
 use glam::{DVec2, DVec3, Vec3};
 
-use super::Originals;
+use super::{Dispute, Linedef, Originals, disputes};
 
 use crate::geometry::{Aabb, Plane, PlaneTree, PlaneTreeNode};
 use crate::query::ItemId;
@@ -127,11 +129,15 @@ impl BspNode {
 pub struct BspRegions {
     nodes: Vec<BspNode>,
     root: BspChild,
-    boxes: Vec<Aabb>,
+    /// About each leaf.
+    pub(super) boxes: Vec<Aabb>,
     /// For each node and leaf the node above it and the side taken there.
     node_parent: Vec<Option<(u32, usize)>>,
     leaf_parent: Vec<Option<(u32, usize)>>,
     extent: Aabb,
+    /// The map's linedefs, and what they disagree about once that was asked.
+    pub(super) lines: Vec<Linedef>,
+    disputes: OnceLock<Vec<Dispute>>,
 }
 
 impl BspRegions {
@@ -149,7 +155,8 @@ impl BspRegions {
     ) -> Result<BspRegions, String> {
         let mut node_parent = vec![None; nodes.len()];
         let mut leaf_parent = vec![None; leaf_count];
-        let mut boxes = vec![Aabb::EMPTY; leaf_count];
+        // A leaf that no node has is nowhere.
+        let mut boxes = vec![planar_bounds(&[]); leaf_count];
         let (mut node_seen, mut leaf_seen) = (vec![false; nodes.len()], vec![false; leaf_count]);
         let square = [(low, low), (high, low), (high, high), (low, high)];
         let square: Vec<DVec2> = square.iter().map(|&(x, y)| DVec2::new(x, y)).collect();
@@ -184,6 +191,8 @@ impl BspRegions {
             node_parent,
             leaf_parent,
             extent: Aabb::new(corner(low), corner(high)),
+            lines: Vec::new(),
+            disputes: OnceLock::new(),
         })
     }
 
@@ -206,6 +215,19 @@ impl BspRegions {
             nodes: self.nodes.iter().map(node).collect(),
             root: below(self.root),
         }
+    }
+
+    /// Number of linedefs of the map.
+    pub fn line_count(&self) -> usize {
+        self.lines.len()
+    }
+
+    /// A place about which the map's linedefs disagree, if there is any: its sectors are
+    /// then no regions.
+    pub fn dispute(&self) -> Option<Dispute> {
+        let lines = self.lines.iter().map(|line| (line.ends, line.sectors));
+        let all = self.disputes.get_or_init(|| disputes(lines));
+        all.first().copied()
     }
 
     /// Number of leaves.

@@ -123,6 +123,8 @@ pub(super) fn parse_bytes(
     if is_wad || named_wad {
         return WadMap::read(bytes, file, None)?.into_scene(name);
     }
+    let rows = bytes.iter().filter(|byte| **byte == b'\n').count();
+    memory::rows_fit_here(name, rows as u64, options.structures)?;
     let mut scene = boxes_csv::read_boxes_csv(bytes, file, options.skip_bad_items)?;
     scene.name = name.to_owned();
     Ok(scene)

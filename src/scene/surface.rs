@@ -78,6 +78,24 @@ impl Surfaces {
         Surfaces::of_boxes(scene, scene.items.iter())
     }
 
+    /// Boxes as they are written, each as twelve triangles, opaque and one-sided: rounded
+    /// outward about an origin, and as flat as they are. No face comes to lie on the other
+    /// side of the origin. O(n).
+    pub fn of_boxes_about<'b>(
+        origin: DVec3,
+        boxes: impl Iterator<Item = &'b WorldBox>,
+    ) -> Surfaces {
+        let mut all = Surfaces::about(origin);
+        for b in boxes {
+            let mut rounded = Aabb::rounded_outward(b.min, b.max, origin);
+            for axis in (0..3).filter(|&axis| b.min[axis] == b.max[axis]) {
+                rounded.max[axis] = rounded.min[axis];
+            }
+            all.push_box(SurfaceKind::Opaque, false, &rounded);
+        }
+        all
+    }
+
     /// The same for some of the items, numbered anew in this order; of a mesh their own
     /// triangles.
     ///

@@ -1,16 +1,17 @@
 //! The Pareto front, of any dimensions that are samples.
 
-/// What keeps a point off the front.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Dominated {
-    /// A point of the front that is no worse in anything and better in something.
-    pub by: usize,
-    /// Whether the samples show it; otherwise it is a tie.
-    pub is_shown: bool,
+/// How a point stands to the front.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+pub struct Standing {
+    /// A point of the front that is no worse in anything and better in something,
+    /// where the samples show that the point is dominated; `None` on the front.
+    pub dominated_by: Option<usize>,
+    /// Dominated by the values, which the samples do not show: it shares the front.
+    pub is_tie: bool,
 }
 
 /// Dominance among points in `N` dimensions, less is better in each. The front is
-/// that of the values: `None`, nothing is as good in all and better in one.
+/// what nothing is shown to dominate: which of two equals came out ahead is luck.
 ///
 /// `is_less(a, b, k)` says whether the samples show `a` to be better than `b` in
 /// dimension `k`; it is asked only where the values say so. That a point is
@@ -22,7 +23,7 @@ pub struct Dominated {
 pub fn dominance<const N: usize>(
     values: &[[f64; N]],
     is_less: &dyn Fn(usize, usize, usize) -> bool,
-) -> Vec<Option<Dominated>> {
+) -> Vec<Standing> {
     let all = 0..values.len();
     let no_worse = |a: usize, b: usize| (0..N).all(|k| values[a][k] <= values[b][k]);
     let better = |a: usize, b: usize| no_worse(a, b) && values[a] != values[b];
@@ -38,9 +39,12 @@ pub fn dominance<const N: usize>(
     };
     let beaten: Vec<usize> = all.clone().filter(|&b| is_beaten(b)).collect();
     let of = |c: usize| {
-        let by = front.iter().copied().find(|&a| better(a, c))?;
+        let by = front.iter().copied().find(|&a| better(a, c));
         let is_shown = beaten.iter().any(|&b| no_worse(b, c));
-        Some(Dominated { by, is_shown })
+        Standing {
+            dominated_by: by.filter(|_| is_shown),
+            is_tie: by.is_some() && !is_shown,
+        }
     };
     all.clone().map(of).collect()
 }
@@ -51,18 +55,26 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn a_noisy_point_is_a_tie_and_never_on_the_front() {
+    fn what_is_not_told_apart_shares_the_front() {
         // Error and time; the third is slower but too noisy to be told apart.
         let values = [[5.0, 10.0], [5.0, 12.0], [5.0, 11.0], [0.0, 30.0]];
         let told = |a: usize, b: usize, _: usize| a != 2 && b != 2;
         let found = dominance(&values, &told);
-        let by = |is_shown| Some(Dominated { by: 0, is_shown });
-        assert_eq!(found, [None, by(true), by(false), None]);
+        let front = Standing::default();
+        let tie = Standing {
+            is_tie: true,
+            ..front
+        };
+        let beaten = Standing {
+            dominated_by: Some(0),
+            ..front
+        };
+        assert_eq!(found, [front, beaten, tie, front]);
         // Worse than one that is shown to be worse.
         let values = [[5.0, 10.0], [5.0, 12.0], [5.0, 13.0]];
-        assert_eq!(dominance(&values, &told), [None, by(true), by(true)]);
+        assert_eq!(dominance(&values, &told), [front, beaten, beaten]);
         // Equal points stand beside each other.
-        assert_eq!(dominance(&[[1.0], [1.0]], &|_, _, _| true), [None, None]);
+        assert_eq!(dominance(&[[1.0], [1.0]], &|_, _, _| true), [front; 2]);
     }
 
     proptest! {
@@ -76,13 +88,15 @@ mod tests {
             let found = dominance(&values, &is_less);
             for (i, own) in found.iter().enumerate() {
                 let better = |k: usize| (0..3).all(|d| values[k][d] <= values[i][d]) && values[k] != values[i];
-                prop_assert_eq!(own.is_none(), !(0..values.len()).any(better));
-                let Some(own) = own else { continue };
-                prop_assert!(found[own.by].is_none() && better(own.by));
+                let by_values = own.is_tie || own.dominated_by.is_some();
+                prop_assert_eq!(by_values, (0..values.len()).any(better));
+                if let Some(by) = own.dominated_by {
+                    prop_assert!(found[by] == Standing::default() && better(by));
+                }
                 // What is no better than something beaten is beaten.
-                let beaten = |k: usize| found[k].is_some_and(|d| d.is_shown);
+                let beaten = |k: usize| found[k].dominated_by.is_some();
                 let below_beaten = (0..values.len()).any(|k| better(k) && beaten(k));
-                prop_assert!(own.is_shown || !below_beaten);
+                prop_assert!(beaten(i) || !below_beaten);
             }
         }
     }

@@ -18,7 +18,7 @@ mod student;
 mod trimmed;
 mod unpaired;
 
-pub use front::{Dominated, dominance};
+pub use front::{Standing, dominance};
 pub use holm::holm;
 pub use judgement::{Change, Judgement, judge, resolved};
 pub use means::{geometric_mean, interquartile_mean};

@@ -218,6 +218,45 @@ mod tests {
     }
 
     #[test]
+    fn a_touch_that_is_declared_of_a_box_outside_fails() {
+        let structures = Registry::builtin().structures("linear").unwrap();
+        let failed = |vector: &Vector| -> Vec<String> {
+            let rows = replay(vector, &structures).into_iter();
+            let failed = rows.filter(|row| row.status == Status::Fail);
+            failed.map(|row| row.id).collect()
+        };
+        let mut declared = 0;
+        for vector in built_in().unwrap() {
+            let camera = vector.camera.is_none_or(|camera| camera.camera().is_ok());
+            if vector.planes_error.is_some() || !camera {
+                // Without a volume nothing is judged.
+                continue;
+            }
+            let (names, _) = vector.sound_boxes();
+            let lists = [&vector.visible_planes, &vector.visible_camera];
+            for (level, visible) in lists.into_iter().enumerate() {
+                let outside = |name: &&String| !visible.iter().flatten().any(|v| v == *name);
+                let (Some(_), Some(name)) = (visible, names.iter().find(outside)) else {
+                    continue;
+                };
+                let mut vector = vector.clone();
+                let touch = [&mut vector.touch_planes, &mut vector.touch_camera];
+                let Some(touch) = touch.into_iter().nth(level).and_then(Option::as_mut) else {
+                    continue;
+                };
+                touch.insert(name.clone());
+                let wrong = format!("{}/{name}", vector.id);
+                assert!(failed(&vector).contains(&wrong), "{wrong}");
+                // A list of touches is a claim without one of what is visible.
+                (vector.visible_planes, vector.visible_camera) = (None, None);
+                assert!(failed(&vector).contains(&wrong), "{wrong} alone");
+                declared += 1;
+            }
+        }
+        assert!(declared > 20, "{declared}");
+    }
+
+    #[test]
     fn the_six_plane_test_without_rounding_is_judged_beside_the_one_in_f32() {
         let structures = Registry::builtin().structures("linear").unwrap();
         let named = |rows: &[Row]| -> Vec<Status> {

@@ -261,31 +261,34 @@ impl Sheet<'_> {
 
     /// The oracle's own verdicts: visible and touching exactly as stated.
     pub fn verdicts(&mut self, oracle: &Oracle, visible: &Option<Names>, touch: &Option<Names>) {
-        let Some(visible) = visible else { return };
+        let Some(listed) = visible.as_ref().or(touch.as_ref()) else {
+            return;
+        };
         let got = self.seen_by(oracle);
         let mut wrong = Vec::new();
         let boxes = self.names.iter().zip(self.items);
         for (name, b) in boxes.filter(|(_, b)| b.is_finite()) {
             let said = oracle.verdict(b);
-            let touches = touch.as_ref().map(|names| names.contains(name));
-            let wanted = match (visible.contains(name), touches) {
-                (false, _) => Verdict::Out,
-                (true, Some(true)) => Verdict::Touch,
-                (true, Some(false)) => Verdict::In,
-                // A file that does not tell touches is content with either.
-                (true, None) if said == Verdict::Out => Verdict::In,
-                (true, None) => said,
+            let names = |list: &Option<Names>| list.as_ref().map(|names| names.contains(name));
+            let wanted = match (names(visible), names(touch)) {
+                (_, Some(true)) => Verdict::Touch,
+                (Some(false), _) => Verdict::Out,
+                (Some(true), Some(false)) => Verdict::In,
+                // A file that does not tell one of the two is content with either.
+                (Some(true), None) if said == Verdict::Out => Verdict::In,
+                (None, Some(false)) if said == Verdict::Touch => Verdict::In,
+                _ => said,
             };
             if said != wanted {
                 wrong.push((name.clone(), format!("{wanted:?}"), format!("{said:?}")));
             }
         }
-        let listed = visible.iter().chain(touch.iter().flatten());
-        let unknown = listed.filter(|name| self.box_named(name).is_none());
+        let names = visible.iter().chain(touch).flatten();
+        let unknown = names.filter(|name| self.box_named(name).is_none());
         wrong.extend(unknown.map(|name| (name.clone(), "In".to_owned(), "no such box".to_owned())));
         let test = CullingTest::Exact.name();
         let got = Ok(got.into_iter().collect());
-        self.answered(ORACLE, test, wrong.is_empty(), visible, &got);
+        self.answered(ORACLE, test, wrong.is_empty(), listed, &got);
         for (name, expected, got) in wrong {
             let id = format!("{}/{name}", self.vector.id);
             let (expected, got) = (expected.to_lowercase(), got.to_lowercase());

@@ -223,7 +223,7 @@ impl Truth {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::{Lens, look_at};
+    use crate::camera::{Lens, MatrixConvention, look_at};
     use crate::geometry::{ConvexVolume, Plane};
     use crate::scene::WorldBox;
     use glam::Vec3;
@@ -252,6 +252,28 @@ mod tests {
         // This volume's only plane drops both.
         assert_eq!((poor.by_storage, poor.by_planes, poor.by_test()), (0, 2, 0));
         assert!((poor.false_negative_ppm().unwrap() - 1e6 / 3.0).abs() < 1e-6);
+    }
+
+    /// The first box lies outside a plane by less than f64 tells.
+    #[test]
+    fn excess_is_put_down_to_planes_by_exact_sums() {
+        let rows = [
+            [0.0, 0.0, 0.001001001001001001, -1.0],
+            [-0.9742785792574936, 0.0, 0.0, 0.0],
+            [0.0, 1.7320508075688774, 0.0, 0.0],
+            [0.0, 0.0, 0.10010010010010009, 0.0],
+        ];
+        let camera = Camera::of_matrix(rows, MatrixConvention::RowD3d).unwrap();
+        let beside = WorldBox::new(
+            DVec3::new(-100.00002523352248, -102.64636042094048, -839.8455706186825),
+            DVec3::new(-100.00000000000001, -102.64004785593343, 1389.0507383728436),
+        );
+        let around = WorldBox::new(DVec3::splat(-1000.0), DVec3::splat(1000.0));
+        let scene = Scene::about("two", &[beside, around], DVec3::ZERO).unwrap();
+        let truth = Truth::of_scene(&camera, &scene).unwrap();
+        let all = truth.errors(&scene.items, &[0, 1]);
+        assert_eq!((all.visible, all.false_positives), (1, 1));
+        assert_eq!((all.by_storage, all.by_planes), (0, 1));
     }
 
     /// Boxes of some metres beside a camera 1e11 m away from zero, where f32

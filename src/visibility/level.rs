@@ -216,10 +216,14 @@ mod tests {
         refused(&two, &wanted);
         let wanted = ["'map7' among MAP12, MAP20; expected"];
         refused(&format!("{two}#map7"), &wanted);
+        // Of maps of one name the last is the one that there is.
         let many = ["freedm-map20", "freedm-map12"].repeat(6);
         let many = written(folder.path(), &many);
-        refused(&many, &["12 maps, MAP20, MAP12, ", "MAP12 and 4 more;"]);
-        refused(&format!("{many}#MAP12"), &["6 maps of the name 'MAP12'"]);
+        refused(&many, &["2 maps, MAP20, MAP12;"]);
+        let source = format!("{many}#MAP12");
+        let scene = scene::load(&source, &Default::default()).expect("a map");
+        let level = Level::of(&source, &scene).expect("a level");
+        assert_eq!((level.maps.len(), level.selected), (2, 1));
         let one = written(folder.path(), &["freedm-map12"]);
         for source in [one.clone(), format!("{one}#MAP12")] {
             let level = |scene: &Scene| Level::of(&source, scene).expect("a level");

@@ -266,7 +266,10 @@ fn cameras_that_are_none_are_refused_with_line_and_rule() {
         ("orbit:near=0", "near is 0"),
         ("orbit:near=5,far=5", "near < far"),
         ("orbit:visible=2", "visible=2 | between 0 and 1"),
-        ("orbit:far=1e308", "camera 0 | does not fit f32 | expected"),
+        (
+            "orbit:near=1e300,far=inf",
+            "camera 0 | does not fit f32 | expected",
+        ),
         ("places", "no camera places"),
         ("two\nlines", "unknown path 'two lines'"),
     ];
@@ -285,7 +288,7 @@ fn points_that_are_none_are_refused() {
         (b"x,y,z\n1,2,nan\n", "line 2 | z 'nan'"),
         (b"x,y,z\n1,2\n", "2 fields | 3"),
         (b"x,y,z,x\n1,2,3,4\n", "column 'x' twice"),
-        (b"\x00\xff\x80,,\n\xfe", "line 1 | no column 'x'"),
+        (b"\x00\xff\x80,,\n\xfe", "line 1 | zero bytes | UTF-8"),
     ];
     let locate = |points| [format!("locate --scene scene.csv --points {points}")];
     for (bytes, wanted) in cases {
@@ -511,12 +514,20 @@ fn places_that_cannot_be_written_to_are_named_and_stay_as_they_are() {
     let generate = "scene generate uniform:n=5 --out";
     let run = "run --scene uniform:n=5 --path orbit:frames=2 --out";
     let cases = [
-        (generate, "no/where.csv", "no/where.csv: No such file"),
-        (generate, "folder.csv", "folder.csv: Is a directory"),
+        (
+            generate,
+            "no/where.csv",
+            "no: expected an existing folder for --out",
+        ),
+        (
+            generate,
+            "folder.csv",
+            "folder.csv: a folder; expected a file for --out",
+        ),
         (
             generate,
             "kept.csv/x.csv",
-            "kept.csv/x.csv: Not a directory",
+            "kept.csv: expected an existing folder for --out",
         ),
         (
             run,

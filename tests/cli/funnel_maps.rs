@@ -71,3 +71,39 @@ fn a_map_has_regions_and_the_faces_of_its_walls() {
     let report = json(&works(Path::new("."), exact));
     row(&report, "region", "exact-pvs");
 }
+
+/// Linedefs that have the pool on both sides: it is where the map's tree has it, and no
+/// floor of the room about it hides what stands in it.
+#[test]
+fn a_map_whose_linedefs_disagree_has_no_regions_and_loses_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let maps = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cli/maps");
+    let from = "eye_x,eye_y,eye_z,look_x,look_y,look_z,fovy_deg,aspect,near,far\n";
+    let cases = [
+        (
+            "self_referencing",
+            "64,256,41,512,256,41,60,1.5,1,2000",
+            5.0,
+        ),
+        ("deep_water", "150,256,90,256,256,-60,60,1.5,1,2000", 1.0),
+    ];
+    for (map, camera, visible) in cases {
+        std::fs::write(folder.path().join("eye.csv"), format!("{from}{camera}\n")).unwrap();
+        let map = maps.join(format!("{map}.wad"));
+        let line = "--path eye.csv --samples 48x32 --processes 1 --format json";
+        let line = format!("funnel --scene {} {line}", map.display());
+        let report = json(&works(folder.path(), &line));
+        let regions: Vec<_> = rows(&report, "region").collect();
+        assert_eq!(regions.len(), 1, "{regions:?}");
+        assert_eq!(number(regions[0], "truth_count"), visible);
+        for row in array(&report, "stages") {
+            assert_eq!(number(row, "false_negative_count"), 0.0, "{row}");
+        }
+        let [left_out] = &array(&report, "left_out")[..] else {
+            panic!("{report}");
+        };
+        assert_eq!(left_out["name"], "region");
+        let reason = "linedefs disagree about the sector at (96, 256), 0 or 1";
+        assert_eq!(left_out["reason"], reason);
+    }
+}

@@ -12,12 +12,15 @@ mod cullings;
 mod drift;
 mod foreign_text;
 mod funnel;
+mod funnel_extremes;
 mod funnel_fragments;
 mod funnel_maps;
 mod funnel_options;
 mod kernels;
 mod listing;
 mod matrices;
+#[cfg(target_os = "linux")]
+mod memory;
 mod meshes;
 mod pipes;
 mod precision;

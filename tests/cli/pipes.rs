@@ -96,6 +96,8 @@ fn a_full_disk_is_one_error_line() {
         options.write(true).open("/dev/full").expect("/dev/full")
     };
     let commands = [
+        "--version",
+        "run --help",
         "list",
         "env --format json",
         "man",
@@ -125,6 +127,27 @@ fn a_full_disk_is_one_error_line() {
     let mut command = command(folder.path(), "scene info nothing");
     let status = command.stderr(full()).status();
     assert_eq!(status.expect("the program starts").code(), Some(2));
+}
+
+/// Work that would take minutes: what cannot be written is found before it.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_output_that_cannot_be_written_is_found_before_the_work() {
+    let folder = folder(&[]);
+    let commands = [
+        "scene generate uniform:n=9000000 --out",
+        "precision --scene uniform:n=100000 --svg",
+        "drift --svg",
+        "funnel --scene city:n=10000 --html",
+        "funnel --scene city:n=10000 --svg",
+        "run --suite full --out",
+    ];
+    let begin = std::time::Instant::now();
+    for line in commands {
+        let done = cullbench(folder.path(), &format!("{line} /proc/out"));
+        assert_refused(&done, "/proc/out: No such file", line);
+    }
+    assert!(begin.elapsed().as_secs() < 10, "{:?}", begin.elapsed());
 }
 
 #[cfg(unix)]
@@ -226,8 +249,13 @@ fn a_program_that_speaks_another_protocol_is_one_error_line() {
         // A message but for the byte that is no UTF-8.
         r#"{"doing":{"structure":null,"step":"\377"}}"#,
         r#"{"ready":{"protocol":0}}"#,
+        // Not a line, and without an end.
+        "ENDLESS",
     ] {
-        let script = format!("#!/bin/sh\nprintf '{said}\\n'\nsleep 1\n");
+        let script = match said {
+            "ENDLESS" => "#!/bin/sh\nexec cat /dev/zero\n".to_owned(),
+            _ => format!("#!/bin/sh\nprintf '{said}\\n'\nsleep 1\n"),
+        };
         std::fs::write(&program, script).expect("written");
         let executable = std::fs::Permissions::from_mode(0o755);
         std::fs::set_permissions(&program, executable).expect("executable");

@@ -1,12 +1,18 @@
 //! The library's readers, fed with damaged copies of good input and with
 //! plain noise: no panic, and every error is one line that says where.
 
-use cullbench::camera::MATRIX_CONVENTIONS;
+use std::sync::Arc;
+
+use cullbench::camera::{Camera, Frame, Lens, MATRIX_CONVENTIONS};
 use cullbench::index::Registry;
 use cullbench::path::{LensDefaults, read_cameras_csv, read_points_csv};
 use cullbench::scene::{WadMap, map_names, read_boxes_csv};
 
 use cullbench::stress::{read_vectors, replay};
+use cullbench::visibility::Rays;
+use cullbench::visibility::region::doom::{DoomMap, SectorPvs};
+use cullbench::visibility::region::{RegionRow, Scratch, Searched, audit};
+use glam::DVec3;
 
 use super::process::*;
 use super::{BOXES, FULL_CAMERA};
@@ -171,6 +177,49 @@ fn damaged_maps() {
         assert!(names.is_ok());
         let scene = map.into_scene("in.file").map_err(|e| e.to_string())?;
         assert!(scene.items.iter().all(|b| b.is_finite() && !b.is_empty()));
+        Ok(())
+    });
+}
+
+/// A map that is accepted can be seen through, whatever it says.
+#[test]
+fn damaged_maps_seen_through() {
+    feed("rooms", include_bytes!("../data/two_rooms.wad"), |bytes| {
+        let map = DoomMap::read(bytes, "in.file", None).map_err(|e| e.to_string())?;
+        let scene = WadMap::read(bytes, "in.file", None).and_then(|map| map.into_scene("in.file"));
+        let (map, scene) = (Arc::new(map), scene.map_err(|e| e.to_string())?);
+        assert_eq!(
+            map.surfaces(&scene).items(),
+            scene.items.len() + map.sectors.len()
+        );
+        map.solid_boxes([-512.0, 512.0]);
+        let graph = Arc::new(map.graph().map_err(|dispute| dispute.to_string())?);
+        let exact = SectorPvs::of(map.clone(), graph.clone());
+        let reject = map.reject().map(|reject| audit(reject, &exact, &graph));
+        assert!(reject.is_none_or(|audit| audit.is_ok()));
+        let rows = [
+            Searched::flood,
+            Searched::portal_rect,
+            Searched::portal_clip,
+        ];
+        let rows = rows.map(|row| row(graph.clone()));
+        let (mut scratch, mut seen) = (Scratch::default(), Vec::new());
+        for place in &scene.places {
+            let frame = Frame::looking_along(place.eye, place.forward, DVec3::Z);
+            let lens = Lens::perspective(60.0, 1.5, 0.5, None).expect("a lens");
+            let rays = Rays::of(&Camera {
+                frame: frame.expect("a frame"),
+                lens,
+            });
+            let rays = rays.expect("rays");
+            for row in &rows {
+                row.from_eye(&rays, &mut scratch, &mut seen);
+                assert!(
+                    seen.iter()
+                        .all(|&sector| (sector as usize) < map.sectors.len())
+                );
+            }
+        }
         Ok(())
     });
 }

@@ -271,13 +271,24 @@ fn half_a_line_and_lost_samples_are_measured_again() {
     fs::write(&samples, &whole[..whole.len() / 2]).expect("writable");
     let done = cullbench(folder.path(), "run --resume --out r");
     assert_eq!(done.code, Some(0), "{done:?}");
-    assert!(
-        done.err.starts_with("note: r: samples.csv was cut short; ")
-            && done.err.ends_with(" measured again\n"),
-        "{}",
-        done.err
-    );
+    let told = |done: &Done| {
+        assert!(
+            done.err.starts_with("note: r: samples.csv lacks samples; ")
+                && done.err.ends_with(" measured again\n"),
+            "{}",
+            done.err
+        );
+    };
+    told(&done);
     assert_complete(&run);
+    // After a power cut: as long as it was, and nothing in it.
+    let mut whole = fs::read(&samples).expect("samples");
+    let half = whole.len() / 2;
+    whole[half..].fill(0);
+    fs::write(&samples, &whole).expect("writable");
+    told(&cullbench(folder.path(), "run --resume --out r"));
+    assert_complete(&run);
+    assert!(!fs::read(&samples).expect("samples").contains(&0));
     // What has its samples has not been touched.
     assert_eq!(lines(&run)[..2], kept[..2]);
     fs::remove_file(&samples).expect("removed");
@@ -287,6 +298,39 @@ fn half_a_line_and_lost_samples_are_measured_again() {
             .contains("6 parts")
     );
     assert_complete(&run);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_run_writes_through_no_link() {
+    use std::os::unix::fs::symlink;
+
+    let folder = stopped();
+    let (run, other) = (folder.path().join("r"), folder.path().join("other"));
+    let linked = |name: &str| {
+        fs::rename(run.join(name), &other).expect("moved");
+        symlink(&other, run.join(name)).expect("linked");
+        fs::read(&other).expect("there")
+    };
+    for name in ["samples.csv", "stream.jsonl"] {
+        let before = linked(name);
+        let done = cullbench(folder.path(), "run --resume --out r");
+        let wanted = format!("r/{name}: a link or a device; expected a file");
+        assert_refused(&done, &wanted, name);
+        assert_eq!(fs::read(&other).expect("there"), before, "{name}");
+        fs::rename(&other, run.join(name)).expect("moved");
+    }
+    // What is made anew takes the link's place.
+    let before = linked("report.json");
+    works(folder.path(), "run --resume --out r");
+    assert_eq!(fs::read(&other).expect("there"), before);
+    assert_complete(&run);
+    // A link that leads nowhere is no free place.
+    fs::create_dir(folder.path().join("new")).expect("made");
+    symlink("nowhere", folder.path().join("new/samples.csv")).expect("linked");
+    let line = PLAN.replace("--out r", "--out new");
+    let wanted = "new already holds a run";
+    assert_refused(&cullbench(folder.path(), &line), wanted, "a loose link");
 }
 
 #[test]

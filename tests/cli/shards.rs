@@ -245,7 +245,14 @@ fn what_must_not_be_mixed_is_refused_by_name() {
     let samples = fs::read(part2.join("samples.csv")).expect("samples");
     fs::write(part2.join("samples.csv"), &samples[..samples.len() - 1]).expect("writable");
     refused("part2/samples.csv | bytes; expected");
+    let nothing = vec![0; samples.len()];
+    fs::write(part2.join("samples.csv"), nothing).expect("writable");
+    refused("part2/samples.csv: 0 sound bytes; expected");
     fs::write(part2.join("samples.csv"), &samples).expect("writable");
+    fs::create_dir(folder.path().join("mine")).expect("made");
+    fs::write(folder.path().join("mine/notes"), "mine").expect("writable");
+    let wanted = "mine: has other files; expected an empty or new folder";
+    all_refused(&folder, &["merge part1 part2 --out mine"], wanted);
 
     works(folder.path(), &format!("{PLAN} --out whole"));
     let wanted = "whole: a whole run; expected a shard (run --shard i/n)";
@@ -269,5 +276,12 @@ fn what_must_not_be_mixed_is_refused_by_name() {
         &["merge part1 nowhere --out merged"],
         "nowhere/stream.jsonl",
     );
+    // An empty folder is as good as a new one; what a killed merge has left goes.
+    fs::create_dir_all(folder.path().join("merged")).expect("made");
+    let left = folder.path().join(".cullbench-left.tmp");
+    fs::create_dir(&left).expect("made");
+    fs::write(left.join("samples.csv"), "half").expect("writable");
     works(folder.path(), "merge part1 part2 --out merged");
+    assert!(!left.exists());
+    assert_eq!(cells(&report(&folder.path().join("merged"))).len(), 8);
 }

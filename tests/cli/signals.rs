@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
+use super::BOXES;
 use super::process::*;
 use super::runs::{cells, report};
 
@@ -27,11 +28,15 @@ fn wait_until(what: &str, mut ready: impl FnMut() -> bool) {
 }
 
 /// Sends Ctrl-C and waits for the end. Nobody reads the output until then.
-fn interrupt(mut child: Child) -> Done {
+fn interrupt(child: Child) -> Done {
+    signal(child, "-INT")
+}
+
+fn signal(mut child: Child, signal: &str) -> Done {
     let ended = child.try_wait().expect("a child");
     assert!(ended.is_none(), "ended by itself: {ended:?}");
     let id = child.id().to_string();
-    let sent = Command::new("kill").args(["-INT", &id]).status();
+    let sent = Command::new("kill").args([signal, &id]).status();
     assert!(sent.expect("kill").success());
     let begin = Instant::now();
     while child.try_wait().expect("a child").is_none() {
@@ -49,8 +54,15 @@ fn interrupt(mut child: Child) -> Done {
     }
 }
 
+/// The answer to the first signal, where something is to be kept.
+const STOPPING: &str = "stopping at the next safe place; again ends at once\n";
+
 fn assert_stopped(done: &Done, what: &str) {
-    assert_eq!((done.code, done.err.as_str()), (Some(130), ""), "{what}");
+    assert_eq!(done.code, Some(130), "{what}");
+    assert!(
+        ["", STOPPING].contains(&done.err.as_str()),
+        "{what}: {done:?}"
+    );
 }
 
 #[test]
@@ -68,8 +80,9 @@ fn an_interrupted_run_keeps_its_finished_cells_and_goes_on() {
     // The first line is the header.
     wait_until("no first part", || lines() >= 2);
     let done = interrupt(child);
-    let told = "interrupted: finished cells were saved; continue with --resume\n";
-    assert_eq!((done.code, done.err.as_str()), (Some(130), told), "{line}");
+    let told =
+        STOPPING.to_owned() + "interrupted: finished cells were saved; continue with --resume\n";
+    assert_eq!((done.code, &done.err), (Some(130), &told), "{line}");
     assert!(
         done.out.contains("1 of 2 processes: times without"),
         "{}",
@@ -159,15 +172,52 @@ fn a_worker_that_is_killed_is_told_in_one_line() {
 }
 
 #[test]
-fn ctrl_c_while_a_file_is_written_leaves_the_old_one() {
+fn a_signal_while_a_file_is_written_leaves_the_old_one() {
     let folder = folder(&[("kept.csv", b"kept")]);
     let before = contents(folder.path());
     let line = "scene generate uniform:n=500000 --out kept.csv";
-    let child = start(folder.path(), line);
     let files = || fs::read_dir(folder.path()).expect("readable").count();
-    wait_until("no temporary file", || files() > 1);
-    assert_stopped(&interrupt(child), line);
-    assert!(contents(folder.path()) == before);
+    let begun = || {
+        let child = start(folder.path(), line);
+        // A place is tried before the work: the file that stays has something in it.
+        wait_until("no temporary file", || {
+            let entries = fs::read_dir(folder.path()).expect("readable").flatten();
+            let lengths = entries.filter_map(|e| Some(e.metadata().ok()?.len()));
+            lengths.max() > Some(4096)
+        });
+        child
+    };
+    for kind in ["-INT", "-TERM", "-HUP"] {
+        let done = signal(begun(), kind);
+        assert_eq!((done.code, &*done.err), (Some(130), STOPPING), "{kind}");
+        assert!(contents(folder.path()) == before, "{kind}");
+    }
+    // A killed process cannot: the next one that writes there does.
+    assert_eq!(signal(begun(), "-KILL").code, None);
+    assert_eq!(files(), 2);
+    cullbench(folder.path(), "scene generate uniform:n=5 --out other.csv");
+    let left = contents(folder.path());
+    let names: Vec<_> = left.keys().map(|name| name.rsplit('/').next()).collect();
+    assert_eq!(names, [Some("kept.csv"), Some("other.csv")]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn what_is_to_outlive_its_terminal_does() {
+    let mut child = Command::new("nohup")
+        .args([super::PROGRAM, "verify", "--cases", "100000000"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("nohup");
+    sleep(Duration::from_millis(300));
+    let id = child.id().to_string();
+    let sent = Command::new("kill").args(["-HUP", &id]).status();
+    assert!(sent.expect("kill").success());
+    sleep(Duration::from_millis(300));
+    assert!(child.try_wait().expect("a child").is_none());
+    child.kill().expect("killed");
+    child.wait().expect("a child");
 }
 
 #[test]
@@ -177,4 +227,32 @@ fn a_stopped_verify_does_not_claim_success() {
     let done = interrupt(child);
     assert_eq!(done.code, Some(130));
     assert!(done.err.contains("interrupted"), "{}", done.err);
+}
+
+/// Processes that read different scenes measure nothing.
+#[test]
+fn a_scene_that_changes_during_a_run_is_named() {
+    let folder = with_good_files(&[]);
+    let line = "run --scene scene.csv --path orbit:frames=4 --structure linear --processes 300 \
+        --no-bounds --out r";
+    let mut child = start(folder.path(), line);
+    let stream = folder.path().join("r/stream.jsonl");
+    wait_until("no part was kept", || {
+        fs::read_to_string(&stream).is_ok_and(|text| text.lines().count() > 2)
+    });
+    fs::write(
+        folder.path().join("scene.csv"),
+        format!("{BOXES}\n9,9,9,9,9,9\n"),
+    )
+    .expect("written");
+    wait_until("the run goes on", || {
+        child.try_wait().expect("a child").is_some()
+    });
+    let output = child.wait_with_output().expect("a child");
+    let err = String::from_utf8(output.stderr).expect("UTF-8");
+    assert_eq!(output.status.code(), Some(2), "{err}");
+    assert!(
+        err.starts_with("error: scene.csv: has changed since"),
+        "{err}"
+    );
 }

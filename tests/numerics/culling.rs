@@ -1,7 +1,7 @@
 //! No culling test drops what the exact truth says a camera sees, each sees no
 //! more than the coarser ones, and `exact` sees nothing else.
 
-use cullbench::camera::{Camera, Frame, Lens, Surroundings};
+use cullbench::camera::{Camera, Frame, Lens, PLANE_METHODS, PlaneMethod, Surroundings};
 use cullbench::culling::{ARITHMETICS, Arithmetic, Culling, CullingTest};
 use cullbench::geometry::Aabb;
 use cullbench::oracle::{Oracle, Pose, Verdict};
@@ -82,6 +82,64 @@ proptest! {
                     if test == CullingTest::Exact && seen {
                         prop_assert!(depth > -1e-3, "{name} {b:?} {depth}");
                     }
+                }
+            }
+        }
+    }
+}
+
+prop_compose! {
+    /// A wide view, and boxes at places of it: its sides are at -1 and 1, its far
+    /// plane is at 1.
+    fn a_wide_view()(
+        direction in [-1.0..1.0, -1.0..1.0, -1.0..1.0f64],
+        offset in prop_oneof![Just(0.0), Just(1e3), Just(1e5)],
+        fovy in prop_oneof![Just(60.0), Just(178.0), Just(179.9), Just(179.99), 170.0..179.99f64],
+        aspect in prop_oneof![Just(16.0 / 9.0), 0.2..5.0f64],
+        places in prop::collection::vec(([-1.1..1.1, -1.1..1.1, 0.0..1.1f64], 0.0..5.0f64), 60),
+    ) -> Option<(Camera, Vec<Aabb>)> {
+        let eye = DVec3::from(direction).map(|c| c.signum() * offset + 10.0 * c);
+        let frame = Frame::looking_along(eye, DVec3::from(direction), DVec3::Z).ok()?;
+        let lens = Lens::perspective(fovy, aspect, 0.1, Some(100.0)).ok()?;
+        let slope = (fovy / 2.0).to_radians().tan();
+        let boxes = places.into_iter().map(|([x, y, ahead], power)| {
+            let ahead = 100.0 * ahead;
+            let at = frame.u() * (x * slope * aspect * ahead) + frame.v() * (y * slope * ahead);
+            let size = 100.0 * slope * 10f64.powf(-power);
+            let at = (eye + at - frame.n() * ahead).as_vec3();
+            Aabb::around(at, Vec3::new(1.0, 0.1, 0.01) * size as f32)
+        });
+        Some((Camera { frame, lens }, boxes.collect()))
+    }
+}
+
+proptest! {
+    /// What the six planes of a derivation keep, the planes that `six-box` and `exact`
+    /// add must not lose: no margin is proven for sums of those.
+    #[test]
+    fn planes_that_a_test_adds_lose_nothing_whatever_the_derivation(view in a_wide_view()) {
+        let Some((camera, boxes)) = view else { return Ok(()) };
+        let oracle = Oracle::of_camera(&Pose::of(&camera), &camera.lens, DVec3::ZERO).unwrap();
+        let around = Surroundings {
+            origin: DVec3::ZERO,
+            reach: Aabb::union_of(&boxes).reach(),
+        };
+        for (method, name, _) in PLANE_METHODS {
+            let sees = |test| {
+                let mut culling = of(test, Arithmetic::F32);
+                culling.planes.method = method;
+                let view = culling.view(&camera, &around).ok()?;
+                Some(boxes.iter().map(|b| view.as_any().sees(b)).collect::<Vec<_>>())
+            };
+            let Some(by_six) = sees(CullingTest::SixPlane) else { continue };
+            for test in [CullingTest::SixBox, CullingTest::Exact] {
+                let found = sees(test).unwrap();
+                for ((b, &six), &seen) in boxes.iter().zip(&by_six).zip(&found) {
+                    let kept = six || method == PlaneMethod::Frame;
+                    prop_assert!(
+                        !kept || seen || oracle.verdict(b) != Verdict::In,
+                        "{} {name} drops {b:?}, {} deep", test.name(), oracle.depth(b)
+                    );
                 }
             }
         }

@@ -73,7 +73,7 @@ impl Occlusion {
                 "no boxes are known in the solid between the map's rooms",
             ));
         }
-        let rooms = DoomMap::of_scene(scene)?.map(|map| map.graph());
+        let rooms = DoomMap::of_scene(scene)?.and_then(|map| map.graph().ok());
         let mut homes = Vec::new();
         let views = views.into_iter().map(|(rays, volume)| View {
             is_open: hiders.is_open(&rays, || {

@@ -42,7 +42,10 @@ struct Regions {
 /// The rooms of a scene or the sectors of its map.
 fn graph_of(scene: &Scene) -> Result<Arc<RegionGraph>, Unfit> {
     let graph = match DoomMap::of_scene(scene)? {
-        Some(map) => Some(map.graph()),
+        Some(map) => Some(
+            map.graph()
+                .map_err(|dispute| not_applicable(dispute.to_string()))?,
+        ),
         None => RegionGraph::of_scene(scene).ok(),
     };
     let joined = graph.filter(|graph| !graph.openings().is_empty());

@@ -8,6 +8,9 @@ use super::methods::Information;
 use super::study::{ARMS, ArmKind, ArmPoint, Setting};
 use crate::measure::OverProcesses;
 
+/// Errors above this share of the tolerance are at its limit.
+const AT_LIMIT: f64 = 0.99;
+
 /// The method to take for an arm at a frame rate.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct ArmChoice {
@@ -20,6 +23,9 @@ pub struct ArmChoice {
     pub name: Option<String>,
     /// Largest error of its position, in the unit of the arm; null without a method.
     pub position_error: Option<f64>,
+    /// Whether that is so near to the tolerance that another machine's rounding may
+    /// choose another.
+    pub at_limit: bool,
     /// Thread CPU time per simulated second; null without a method or a time.
     pub us_per_second: Option<f64>,
     /// Others that are precise enough and that the processes do not show to be slower.
@@ -87,10 +93,11 @@ pub fn conclude(
     let values: Vec<[f64; 2]> = candidates.iter().map(value).collect();
     let logs: Vec<&[f64]> = candidates.iter().map(|c| &*c.ln_ns).collect();
     for (candidate, found) in candidates.iter().zip(front(&values, &logs)) {
-        let by = found.map(|found| points[candidates[found.by].point].label());
+        let by = found.dominated_by;
+        let by = by.map(|by| points[candidates[by].point].label());
         let point = &mut points[candidate.point];
         point.on_front = by.is_none();
-        point.is_tie = found.is_some_and(|found| !found.is_shown);
+        point.is_tie = found.is_tie;
         point.dominated_by = by;
     }
     Some(choose(
@@ -111,12 +118,14 @@ fn choose(
     let good: Vec<&Candidate> = candidates.iter().filter(|c| c.error <= tolerance).collect();
     let fastest = fastest(&good, |c| &c.ln_ns, |c| c.error);
     let chosen = fastest.first().map(|candidate| &points[candidate.point]);
+    let error = fastest.first().map(|candidate| candidate.error);
     let least = candidates.iter().min_by(|a, b| a.error.total_cmp(&b.error));
     let reason = match (chosen, least) {
         (Some(_), _) => format!(
-            "the most precise of {} that are as fast, of {} within {tolerance:e}",
+            "the most precise of {} that are as fast, of {} within {tolerance:e}; {:.4e} off",
             fastest.len(),
-            good.len()
+            good.len(),
+            error.unwrap_or(f64::NAN)
         ),
         (None, Some(least)) => format!(
             "none is within {tolerance:e}; {} comes nearest, {:.1e} off",
@@ -130,7 +139,8 @@ fn choose(
         setting,
         method: chosen.map(|point| point.method),
         name: chosen.map(ArmPoint::label),
-        position_error: chosen.and_then(|point| point.position_error),
+        position_error: error,
+        at_limit: error.is_some_and(|error| error > AT_LIMIT * tolerance),
         us_per_second: chosen.and_then(|point| point.us_per_second),
         as_fast: others.map(|c| points[c.point].label()).collect(),
         reason,
@@ -146,6 +156,10 @@ pub fn conclusion(choices: &[ArmChoice], tolerance: f64) -> String {
         let spans: Vec<String> = spans
             .map(|span| {
                 let method = span[0].method.unwrap_or("nothing");
+                let method = match span.iter().any(|choice| choice.at_limit) {
+                    true => &*format!("{method} (at the limit)"),
+                    false => method,
+                };
                 let ends = [span[0], span[span.len() - 1]].map(|c| c.setting.omega_h);
                 match own.len() == span.len() {
                     true => method.to_owned(),
@@ -228,6 +242,18 @@ mod tests {
     }
 
     #[test]
+    fn a_choice_that_the_last_percent_of_the_tolerance_decides_says_so() {
+        let (_, choice) = concluded(1e-2, 10);
+        let error = choice.position_error.expect("chosen");
+        for (share, at_limit) in [(0.9998, true), (0.98, false)] {
+            let (_, choice) = concluded(error / share, 10);
+            assert_eq!(choice.at_limit, at_limit, "{choice:?}");
+            let off = format!("; {error:.4e} off");
+            assert!(choice.reason.ends_with(&off), "{choice:?}");
+        }
+    }
+
+    #[test]
     fn nothing_is_taken_where_nothing_is_precise_enough() {
         let (_, choice) = concluded(1e-9, 1);
         assert_eq!((choice.method, choice.as_fast.len()), (None, 0));
@@ -254,6 +280,7 @@ mod tests {
         let with = |method, omega_h: f64| {
             let mut choice = choice.clone();
             (choice.method, choice.setting.omega_h) = (method, omega_h);
+            choice.at_limit = omega_h > 10.0 && method.is_some();
             choice
         };
         let choices = [
@@ -265,7 +292,7 @@ mod tests {
         assert_eq!(
             conclusion(&choices, 1e-3),
             "Cheapest within 1e-3 on jittered frames: for the linear arm a at omega h 0.10 to 0.30, \
-             b at omega h 16.70, nothing at omega h 30.00."
+             b (at the limit) at omega h 16.70, nothing at omega h 30.00."
         );
         assert!(conclusion(&choices[1..3], 1e-3).ends_with("for the linear arm a."));
     }

@@ -16,7 +16,7 @@ use crate::query::{Recorder, Sink};
 
 /// An item that the crate tells where it put it.
 #[derive(Clone, Copy)]
-pub(crate) struct Shape {
+struct Shape {
     pub item: Record,
     node: usize,
 }
@@ -48,7 +48,7 @@ impl BHShape<f32, 3> for Shape {
 }
 
 #[inline(always)]
-pub(crate) fn bounds_of(b: &CrateAabb<f32, 3>) -> Aabb {
+fn bounds_of(b: &CrateAabb<f32, 3>) -> Aabb {
     Aabb::new(
         Vec3::new(b.min.x, b.min.y, b.min.z),
         Vec3::new(b.max.x, b.max.y, b.max.z),

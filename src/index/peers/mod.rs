@@ -18,7 +18,6 @@ use super::{BuildError, ploc};
 
 pub use bevy_style::PeerBevyStyle;
 pub use bvh::PeerBvh;
-pub(crate) use bvh::{Shape, bounds_of};
 pub use obvhs::PeerObvhs;
 pub use parry3d::PeerParry3d;
 pub use rstar::PeerRstar;

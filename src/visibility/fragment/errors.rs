@@ -1,5 +1,7 @@
 //! What an order gets wrong, by the exact order of depths at each sample.
 
+use std::cmp::Ordering;
+
 use super::canvas::Canvas;
 use super::cycles::items_in_cycles;
 use super::draw::Tests;
@@ -24,6 +26,22 @@ pub struct OrderErrors {
     pub cyclic: usize,
 }
 
+/// Pairs of layers that are looked at in an image, where a sample does not show the very
+/// layers of the one before.
+const MOST_PAIRS: u64 = 1 << 25;
+
+/// Items of which more lie behind each other than are compared.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[error(
+    "more than {most} pairs of layers at the samples of a view; \
+     expected fewer --samples or fewer items behind each other"
+)]
+#[non_exhaustive]
+pub struct TooManyPairs {
+    /// Most pairs.
+    pub most: u64,
+}
+
 /// A fragment, where its ray meets the item and when it was drawn.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Layer<A> {
@@ -34,13 +52,16 @@ pub(super) struct Layer<A> {
 
 /// Compares an order from front to back with the exact one at every sample, of the
 /// fragments that the tests beside the z-test let through. It keeps all of them: 40
-/// bytes each. O(samples * layers^2).
+/// bytes each. O(fragments log layers) and the pairs that are looked at.
+///
+/// # Errors
+/// Too many pairs.
 pub fn order_errors(
     canvas: &Canvas,
     solids: &Solids,
     pieces: &[Piece],
     tests: &Tests,
-) -> OrderErrors {
+) -> Result<OrderErrors, TooManyPairs> {
     let mut layers: Vec<Vec<Layer<Crossing>>> = vec![Vec::new(); canvas.grid().samples()];
     for (piece, when) in pieces.iter().zip(0..) {
         canvas.fragments(solids, piece, tests.stencil, |fragment| {
@@ -66,42 +87,66 @@ pub fn order_errors(
 pub(super) struct ErrorCount {
     wrong_samples: u64,
     pairs: Pairs,
+    /// Items of the last sample in the order in which they were drawn, each with its
+    /// place in the exact order of depths; items at the same depth share one.
+    ranked: Vec<(ItemId, u32)>,
+    looked_at: u64,
 }
 
 impl ErrorCount {
     /// One more sample: all its layers, and the exact order of two of them. They are left in
     /// the order in which they were drawn, one for each item.
-    pub fn sample<A>(
-        &mut self,
-        layers: &mut Vec<Layer<A>>,
-        compare: impl Fn(&A, &A) -> std::cmp::Ordering,
-    ) {
+    pub fn sample<A>(&mut self, layers: &mut Vec<Layer<A>>, compare: impl Fn(&A, &A) -> Ordering) {
         // A ray along a cut meets both parts: the first counts.
         layers.sort_by_key(|layer| (layer.item, layer.when));
         layers.dedup_by_key(|layer| layer.item);
         layers.sort_by_key(|layer| layer.when);
-        for (i, a) in layers.iter().enumerate() {
-            for b in &layers[i + 1..] {
-                match compare(&a.at, &b.at) {
-                    std::cmp::Ordering::Less => self.pairs.right.push((a.item, b.item)),
-                    std::cmp::Ordering::Greater => self.pairs.wrong.push((b.item, a.item)),
-                    std::cmp::Ordering::Equal => {}
-                }
-            }
+        let mut ranked: Vec<(ItemId, u32)> = layers.iter().map(|l| (l.item, 0)).collect();
+        let mut by_depth: Vec<usize> = (0..layers.len()).collect();
+        by_depth.sort_by(|&a, &b| compare(&layers[a].at, &layers[b].at));
+        let mut rank = 0;
+        for pair in by_depth.windows(2) {
+            rank += u32::from(compare(&layers[pair[0]].at, &layers[pair[1]].at).is_lt());
+            ranked[pair[1]].1 = rank;
         }
         // Painted from the last to the first: the first of the list stays.
-        if let Some((shown, rest)) = layers.split_first() {
-            let nearer = |other: &Layer<A>| compare(&other.at, &shown.at).is_lt();
-            self.wrong_samples += u64::from(rest.iter().any(nearer));
+        self.wrong_samples += u64::from(ranked.first().is_some_and(|first| first.1 > 0));
+        if ranked != self.ranked {
+            if rank > 0 {
+                self.pairs_of(&ranked);
+            }
+            self.ranked = ranked;
+        }
+    }
+
+    /// Adds the pairs of a sample, unless there are too many.
+    fn pairs_of(&mut self, ranked: &[(ItemId, u32)]) {
+        let layers = ranked.len() as u64;
+        self.looked_at += layers * (layers - 1) / 2;
+        if self.looked_at > MOST_PAIRS {
+            return;
+        }
+        for (i, a) in ranked.iter().enumerate() {
+            for b in &ranked[i + 1..] {
+                match a.1.cmp(&b.1) {
+                    Ordering::Less => self.pairs.right.push((a.0, b.0)),
+                    Ordering::Greater => self.pairs.wrong.push((b.0, a.0)),
+                    Ordering::Equal => {}
+                }
+            }
         }
         self.pairs.settle(false);
     }
 
     /// Of all samples.
-    pub fn all(self) -> OrderErrors {
+    pub fn all(self) -> Result<OrderErrors, TooManyPairs> {
+        if self.looked_at > MOST_PAIRS {
+            return Err(TooManyPairs { most: MOST_PAIRS });
+        }
         let ErrorCount {
             wrong_samples,
             mut pairs,
+            ..
         } = self;
         pairs.settle(true);
         let wrong = pairs.wrong.len() as u64;
@@ -115,12 +160,12 @@ impl ErrorCount {
         }
         overlapping.sort_unstable();
         overlapping.dedup();
-        OrderErrors {
+        Ok(OrderErrors {
             pairs: overlapping.len() as u64,
             wrong,
             wrong_samples,
             cyclic,
-        }
+        })
     }
 }
 
@@ -143,5 +188,72 @@ impl Pairs {
             }
             self.sorted = self.right.len() + self.wrong.len();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+    use crate::scene::SeededRng;
+
+    fn layer(when: u32, item: ItemId, at: u32) -> Layer<u32> {
+        Layer { when, item, at }
+    }
+
+    #[test]
+    fn pairs_are_those_of_every_sample_by_itself() {
+        let mut rng = SeededRng::new(4);
+        for _ in 0..40 {
+            let (mut count, mut wrong_samples) = (ErrorCount::default(), 0);
+            let (mut right, mut wrong) = (BTreeSet::new(), BTreeSet::new());
+            let mut layers: Vec<Layer<u32>> = Vec::new();
+            for _ in 0..30 {
+                // The layers of the sample before, or others.
+                if rng.below(3) == 0 {
+                    let items = 1 + rng.below(9) as u32;
+                    layers = (0..items).map(|i| layer(i, i * 7 % 11, 0)).collect();
+                    layers.iter_mut().for_each(|l| l.at = rng.below(4) as u32);
+                }
+                for (i, a) in layers.iter().enumerate() {
+                    for b in layers[i + 1..].iter().filter(|b| b.at != a.at) {
+                        match a.at < b.at {
+                            true => right.insert((a.item, b.item)),
+                            false => wrong.insert((b.item, a.item)),
+                        };
+                    }
+                }
+                let nearest = layers.iter().map(|l| l.at).min();
+                wrong_samples += u64::from(layers.first().map(|l| l.at) > nearest);
+                count.sample(&mut layers.clone(), u32::cmp);
+            }
+            let errors = count.all().unwrap();
+            assert_eq!(
+                (errors.wrong, errors.wrong_samples),
+                (wrong.len() as u64, wrong_samples)
+            );
+            let both = right.union(&wrong).map(|&(a, b)| (a.min(b), a.max(b)));
+            assert_eq!(errors.pairs, both.collect::<BTreeSet<_>>().len() as u64);
+        }
+    }
+
+    #[test]
+    fn layers_of_one_depth_are_no_pairs_and_too_many_pairs_are_refused() {
+        let mut count = ErrorCount::default();
+        count.sample(
+            &mut (0..200_000).map(|i| layer(i, i, 5)).collect(),
+            u32::cmp,
+        );
+        assert_eq!(count.all(), Ok(OrderErrors::default()));
+        let mut count = ErrorCount::default();
+        // The same layers at every sample are looked at once.
+        let behind: Vec<Layer<u32>> = (0..1000).map(|i| layer(i, i, i)).collect();
+        for _ in 0..100 {
+            count.sample(&mut behind.clone(), u32::cmp);
+        }
+        assert_eq!(count.looked_at, 499_500);
+        count.sample(&mut (0..9000).map(|i| layer(i, i, i)).collect(), u32::cmp);
+        assert_eq!(count.all(), Err(TooManyPairs { most: MOST_PAIRS }));
     }
 }

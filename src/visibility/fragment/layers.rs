@@ -10,7 +10,7 @@
 use glam::DVec3;
 
 use super::draw::Tally;
-use super::errors::{ErrorCount, Layer, OrderErrors};
+use super::errors::{ErrorCount, Layer, OrderErrors, TooManyPairs};
 use super::order::{DepthOrder, Part, Piece};
 use crate::kernel::each;
 use crate::query::ItemId;
@@ -53,7 +53,7 @@ impl Ranks {
 /// What each of several orders takes and gets wrong, of the items that are left.
 ///
 /// `left` has their ids among those of `index`, ascending; pieces are numbered by the place
-/// there. O(samples * layers^2).
+/// there. O(fragments log layers) and the pairs that are looked at.
 pub fn draw_surfaces(
     rays: &Rays,
     grid: SampleGrid,
@@ -61,7 +61,7 @@ pub fn draw_surfaces(
     origin: DVec3,
     left: &[ItemId],
     orders: &[(&dyn DepthOrder, Vec<Piece>)],
-) -> Vec<(Tally, OrderErrors)> {
+) -> Vec<(Tally, Result<OrderErrors, TooManyPairs>)> {
     let ranks: Vec<Ranks> = orders
         .iter()
         .map(|(_, pieces)| Ranks::of(pieces, left.len()))

@@ -27,7 +27,7 @@ pub use canvas::{Along, Canvas, Fragment};
 pub use cut_outs::CutOuts;
 pub use depth::DepthBuffer;
 pub use draw::{Drawn, Tally, Tests, draw};
-pub use errors::{OrderErrors, order_errors};
+pub use errors::{OrderErrors, TooManyPairs, order_errors};
 pub use layers::draw_surfaces;
 pub use mask::{MASKS, Mask, Surface, Surfaces};
 pub use order::{DepthOrder, Part, Piece, ToOrder};

@@ -163,7 +163,7 @@ fn the_painters_picture_by_bsp_is_exact_and_by_distances_it_is_not() {
             let mut pieces = Vec::new();
             for (i, (row, order)) in orders(&solids).into_iter().enumerate() {
                 order.order(&solids, &camera, &mut pieces);
-                let errors = order_errors(&canvas, &solids, &pieces, &Tests::default());
+                let errors = order_errors(&canvas, &solids, &pieces, &Tests::default()).unwrap();
                 wrong[i] += errors.wrong;
                 pairs += errors.pairs;
                 // The painter's picture, drawn, is wrong where it was said to be.
@@ -225,9 +225,9 @@ fn overlaps_in_a_cycle_are_found_and_only_cutting_undoes_them() {
         let canvas = Canvas::of(&Rays::of(&camera).unwrap(), SampleGrid::new(80, 80));
         let mut pieces = Vec::new();
         of_boxes("box-distance", &solids).order(&solids, &camera, &mut pieces);
-        let sorted = order_errors(&canvas, &solids, &pieces, &Tests::default());
+        let sorted = order_errors(&canvas, &solids, &pieces, &Tests::default()).unwrap();
         of_boxes("bsp", &solids).order(&solids, &camera, &mut pieces);
-        let cut = order_errors(&canvas, &solids, &pieces, &Tests::default());
+        let cut = order_errors(&canvas, &solids, &pieces, &Tests::default()).unwrap();
         assert_eq!((cut.wrong, cut.wrong_samples), (0, 0));
         assert_eq!(cut.cyclic, sorted.cyclic);
         sorted
@@ -269,7 +269,7 @@ fn nested_boxes_are_cut_until_the_order_is_exact_or_it_is_said() {
     let canvas = Canvas::of(&Rays::of(&camera).unwrap(), SampleGrid::new(32, 18));
     let mut pieces = Vec::new();
     tree.order(&solids, &camera, &mut pieces);
-    let errors = order_errors(&canvas, &solids, &pieces, &Tests::default());
+    let errors = order_errors(&canvas, &solids, &pieces, &Tests::default()).unwrap();
     assert_eq!((errors.wrong_samples, tree.exception(&camera)), (0, None));
     assert!(errors.pairs > 6, "the premise: they overlap in the image");
     // What is within a box is never drawn.
@@ -512,6 +512,7 @@ fn pairs_of_maps(is_meant: fn(&str) -> bool) -> [[u64; 3]; 3] {
                 sorted[2].1.reverse();
                 let counts = draw_surfaces(&rays, GRID, &index, surfaces.origin, &items, &sorted);
                 for ((tally, errors), counted) in counts.iter().zip(&mut counted) {
+                    let errors = errors.as_ref().unwrap();
                     let again = tally.passed - tally.covered;
                     for (sum, count) in counted.iter_mut().zip([errors.pairs, errors.wrong, again])
                     {

@@ -32,8 +32,10 @@
 //! reciprocal is raised by 8 u of itself. With parallel rays nearness is
 //! `base - w`, true to 2 u of both, and raised by 8 u of both.
 //!
-//! Underflow: with w > 1e-25 and r < 1e25 nothing that counts is subnormal, and
-//! nothing overflows. Comparisons are such that a NaN makes a box near.
+//! Underflow: with w > 1e-25 and r < 1e25 nothing that counts is subnormal but, with
+//! parallel rays, coordinates, whose loss is added to the slack. Overflow: boxes with
+//! |m| r > 1e37 are near too, and in windows so narrow that |m| is infinite in f32 all
+//! boxes are. Comparisons are such that a NaN makes a box near.
 
 use super::view::{Projection, U, View};
 use crate::geometry::BoxBlock;
@@ -190,7 +192,11 @@ impl Rects {
         // -|depth|
         let size = isa.min(depth, isa.mul(depth, minus));
         let slack = isa.mul(size, isa.splat(-8.0 * U));
-        let slack = isa.add(slack, isa.splat(8.0 * U * p.base.abs()));
+        // Depths may be subnormal and lose their lower bits.
+        let slack = isa.add(
+            slack,
+            isa.splat(8.0 * U * p.base.abs() + f32::from_bits(16)),
+        );
         let nearness = isa.add(isa.splat(p.base), isa.mul(depth, minus));
         let raised = isa.add(nearness, slack);
         self.finish(isa, boxes, p, &extremes, [depth, raised], 0);
@@ -211,7 +217,7 @@ impl Rects {
         let zero = isa.splat(0.0);
         let within_x = isa.at_most(*x0, isa.splat(width)) & isa.at_most(zero, *x1);
         let within_y = isa.at_most(*y0, isa.splat(height)) & isa.at_most(zero, *y1);
-        self.flat = isa.at_most(isa.splat(-1e25), boxes.minus_size) & !near;
+        self.flat = isa.at_most(isa.splat(-p.most_size), boxes.minus_size) & !near;
         self.seen = within_x & within_y | !self.flat;
         self.depth = isa.to_array(depth);
         self.nearness = isa.to_array(nearness);

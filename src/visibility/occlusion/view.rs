@@ -80,6 +80,8 @@ pub struct Projection {
     pub slack_added: [f32; 2],
     /// What depths are subtracted from for an orthographic lens.
     pub base: f32,
+    /// Boxes farther away than this are near: see `rect`. Below 0 all of them are.
+    pub most_size: f32,
 }
 
 /// A camera's rays over a buffer of so many pixels, in a scene's coordinates.
@@ -260,7 +262,17 @@ impl Projection {
             true => (10.0 * u_f64 * row.length()) as f32,
             false => (10.0 * u_f64 * (row.length() + 2.0 * size)) as f32,
         };
-        let added = |shift: f64, size: f64| (10.0 * u_f64 * (shift.abs() + 2.0 * size)) as f32;
+        // Of subnormal coordinates about the eye 2^-149 of each is lost.
+        let lost = |row: DVec3| 4.0 * f64::from(f32::from_bits(1)) * row.abs().element_sum();
+        let added = |row: DVec3, shift: f64, size: f64| {
+            (lost(row) + 10.0 * u_f64 * (shift.abs() + 2.0 * size)) as f32
+        };
+        let largest = rows[0].abs().max(rows[1].abs()).max_element();
+        let most_size = match largest <= 1e37 && shift.iter().all(|s| s.abs() <= 1e37) {
+            true => (1e37 / largest).min(1e25),
+            // Infinite in f32, or no number.
+            false => -1.0,
+        };
         Projection {
             eye: local.to_array(),
             rest: rest.to_array(),
@@ -269,8 +281,12 @@ impl Projection {
             size: [width as f32, height as f32],
             far_from_zero: (u_f64 * far_from_zero) as f32,
             slack: [factor(rows[0], width), factor(rows[1], height)],
-            slack_added: [added(shift[0], width), added(shift[1], height)],
+            slack_added: [
+                added(rows[0], shift[0], width),
+                added(rows[1], shift[1], height),
+            ],
             base: base as f32,
+            most_size: most_size as f32,
         }
     }
 }

@@ -101,6 +101,24 @@ pub enum NotBuilt {
         /// How many may.
         most: usize,
     },
+    /// A tree with more levels than its walks can take.
+    #[error("the tree of '{name}' has {levels} levels; expected at most {most}")]
+    TooDeep {
+        /// The back end.
+        name: &'static str,
+        /// How many levels it has.
+        levels: usize,
+        /// How many it may have.
+        most: usize,
+    },
+    /// A back end that panics, when it is built or when it answers.
+    #[error("'{name}' panicked: {message}")]
+    Panicked {
+        /// The back end.
+        name: &'static str,
+        /// The panic's message.
+        message: String,
+    },
 }
 
 /// Sorts what was found in f32 or rounded, by depth and id, and keeps the first

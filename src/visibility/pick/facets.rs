@@ -51,14 +51,6 @@ impl Facets {
         }
     }
 
-    /// The triangle of a place as a hit, if its item counts.
-    #[cfg(any(feature = "peers", feature = "embree"))]
-    #[inline(always)]
-    pub(super) fn hit(&self, place: usize, depth: f64) -> Option<super::Hit> {
-        let item = self.all[place].item;
-        super::Hit { item, depth }.counted(self.items)
-    }
-
     /// The box of each.
     pub(super) fn bounds(&self) -> Vec<Aabb> {
         let bounds = |facet: &Facet| {

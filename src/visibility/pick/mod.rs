@@ -13,15 +13,6 @@ mod rounded;
 mod solid_surfaces;
 mod wide_ray;
 
-#[cfg(feature = "peers")]
-mod bvh;
-#[cfg(feature = "embree")]
-mod embree;
-#[cfg(feature = "peers")]
-mod parry3d;
-#[cfg(feature = "peers")]
-mod rstar;
-
 #[cfg(test)]
 mod tests;
 
@@ -33,17 +24,4 @@ pub use solid_surfaces::SolidSurfaces;
 pub use wide_ray::WideRay;
 
 /// All back ends, the reference first.
-pub const BACK_ENDS: &[BackEnd] = &[
-    linear::ROW,
-    wide_ray::ROW,
-    obvhs::ROW,
-    obvhs::ROW_WIDE,
-    #[cfg(feature = "peers")]
-    parry3d::ROW,
-    #[cfg(feature = "peers")]
-    bvh::ROW,
-    #[cfg(feature = "peers")]
-    rstar::ROW,
-    #[cfg(feature = "embree")]
-    embree::ROW,
-];
+pub const BACK_ENDS: &[BackEnd] = &[linear::ROW, wide_ray::ROW, obvhs::ROW, obvhs::ROW_WIDE];

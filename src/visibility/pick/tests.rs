@@ -185,6 +185,32 @@ fn back_ends_in_f32_differ_on_few_ties() {
     }
 }
 
+/// Areas of large boxes overflow in f32, those of small ones vanish.
+#[test]
+fn boxes_of_any_size_are_picked_alike() {
+    for unit in [1e-36, 1e-20, 1e10, 2e17, 1e19, 2e19, 1e30, 1e36] {
+        let (mut met, mut differ) = (0, 0);
+        let mut worlds = Worlds::new(5, unit, DVec3::ZERO);
+        let solids = worlds.boxes(60);
+        let built: Vec<_> = BACK_ENDS
+            .iter()
+            .map(|row| (row, (row.build)(&solids, Kernel::best()).unwrap()))
+            .collect();
+        for _ in 0..100 {
+            let ray = worlds.ray();
+            let truth = all_judged(&ray, &solids);
+            met += usize::from(!truth.is_empty());
+            for (row, back_end) in &built {
+                let wrong = back_end.first(&ray).map(|hit| hit.item) != truth.first().map(|t| t.1);
+                let is_exact = row.guarantee == Guarantee::Exact;
+                assert!(!(wrong && is_exact), "{} {unit:e} {ray:?}", row.name);
+                differ += usize::from(wrong);
+            }
+        }
+        assert!(met > 20 && differ < 60, "{unit:e}: {differ} of {met}");
+    }
+}
+
 /// Directions that hardly move along an axis, or not at all, and rays that the
 /// bounds in f32 do not cover.
 #[test]

@@ -16,6 +16,10 @@ pub trait Ground: Send + Sync + std::fmt::Debug {
     /// part of it may be in none.
     fn regions_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) -> bool;
 
+    /// Appends regions that a closed box meets where none of their parts is, if regions are
+    /// not the same as their parts.
+    fn more_at(&self, _: &WorldBox, _: &mut Vec<RegionId>) {}
+
     /// Adds the regions that a ray passes before it meets what is opaque, by a
     /// search that shares nothing with the back ends.
     fn follow(&self, graph: &RegionGraph, ray: &Ray, seen: &mut Marks);

@@ -15,7 +15,8 @@ pub struct RegionItems {
 }
 
 impl RegionItems {
-    /// Items and regions are closed: an item that touches a region's box is listed.
+    /// Items and regions are closed: an item that touches a region's box is listed, and one
+    /// that [meets](super::Ground::more_at) the region elsewhere.
     /// Where regions have no height of their own (a map's), boxes of regions are taken
     /// to go on for ever up and down. O(n log n) for items much smaller than regions.
     pub fn of(graph: &RegionGraph, scene: &Scene) -> RegionItems {
@@ -34,6 +35,7 @@ impl RegionItems {
             let b = WorldBox::of(item, scene.origin);
             met.clear();
             grid.meeting(&b, |part| met.push(owners[part as usize]));
+            graph.ground().more_at(&b, &mut met);
             met.sort_unstable();
             met.dedup();
             met.iter().for_each(|&owner| lists[owner as usize].push(id));

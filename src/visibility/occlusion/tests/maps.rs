@@ -21,7 +21,7 @@ fn removed_and_lost(name: &str, change: impl Fn(&mut WorldBox)) -> [usize; 2] {
     let sample = Sample::named(name).unwrap();
     let map = Arc::new(DoomMap::read(sample.bytes, sample.file, None).unwrap());
     let scene = load(name, &Default::default()).unwrap();
-    let graph = map.graph();
+    let graph = map.graph().unwrap();
     let mut blocks = map.solid_boxes([-512.0, 1024.0]);
     blocks.iter_mut().for_each(change);
     let about = |corner: DVec3| (corner - scene.origin).as_vec3();

@@ -9,6 +9,7 @@ mod rules;
 mod slits;
 mod streets;
 mod traces;
+mod windows;
 mod worlds;
 
 use super::{Interleaved, OccluderChoice, OcclusionBuffer, TwoPass, View};

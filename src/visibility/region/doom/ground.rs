@@ -10,7 +10,7 @@ use super::super::graph::{Ground, RegionGraph};
 use super::super::opening::{Opening, OpeningPlane};
 use super::super::witness::{Rejected, Witness};
 use super::map::{DoomMap, MapLine};
-use crate::scene::WorldBox;
+use crate::scene::{Dispute, WorldBox};
 use crate::visibility::Ray;
 
 /// Coordinates of witnesses are whole multiples of 2^-20 map units.
@@ -103,7 +103,13 @@ fn meets(line: &MapLine, b: &WorldBox) -> bool {
 impl DoomMap {
     /// Sectors as regions, linedefs that are open as openings. A sector's parts have
     /// all heights.
-    pub fn graph(self: &Arc<Self>) -> RegionGraph {
+    ///
+    /// # Errors
+    /// A place about which the linedefs disagree: what is open to what is not known then.
+    pub fn graph(self: &Arc<Self>) -> Result<RegionGraph, Dispute> {
+        if let Some(dispute) = self.disputes().first() {
+            return Err(*dispute);
+        }
         let opening = |line: &MapLine| {
             let ([Some(front), Some(behind)], Some([low, high])) = (line.sectors, line.open) else {
                 return None;
@@ -123,7 +129,7 @@ impl DoomMap {
         };
         let openings = self.lines.iter().filter_map(opening).collect();
         let ground = Arc::new(SectorGround::new(self.clone()));
-        RegionGraph::new(&self.parts, openings, ground)
+        Ok(RegionGraph::new(&self.parts, openings, ground))
     }
 }
 
@@ -146,6 +152,11 @@ impl Ground for SectorGround {
                 let sector = &self.map.sectors[sector as usize];
                 sector.floor <= b.min.z && b.max.z <= sector.ceiling
             })
+    }
+
+    /// Leaves of the map's tree differ from its sectors by what a node builder rounds.
+    fn more_at(&self, b: &WorldBox, out: &mut Vec<RegionId>) {
+        self.regions_at(b, out);
     }
 
     fn follow(&self, _: &RegionGraph, ray: &Ray, seen: &mut Marks) {

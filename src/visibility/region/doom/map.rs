@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::super::answer::RegionId;
 use super::super::pvs::Pvs;
 use crate::input::InputError;
-use crate::scene::{Scene, WadMap, WorldBox, map_lump};
+use crate::scene::{Dispute, Linedef, Scene, WadMap, WorldBox, disputes};
 use crate::visibility::MapFile;
 
 /// Height at which what moves ends; map units fit 16 bits.
@@ -47,6 +47,8 @@ pub struct DoomMap {
     pub(super) linedefs: usize,
     /// Heights of floor and ceiling as the file has them, where they move too.
     pub(super) heights: Vec<[f64; 2]>,
+    /// Places about which its linedefs disagree.
+    disputes: Vec<Dispute>,
     reject: Option<Pvs>,
 }
 
@@ -68,6 +70,10 @@ fn is_still(action: u16) -> bool {
 /// Tags that the end of a boss moves.
 const BOSS_TAGS: [u16; 2] = [666, 667];
 
+fn disputed(lines: &[MapLine]) -> Vec<Dispute> {
+    disputes(lines.iter().map(|line| (line.ends, line.sectors)))
+}
+
 impl DoomMap {
     /// The map that a scene was loaded from, if it was one.
     ///
@@ -84,55 +90,33 @@ impl DoomMap {
     /// # Errors
     /// What [`WadMap::read`] finds wrong.
     pub fn read(bytes: &[u8], file: &str, map: Option<&str>) -> Result<DoomMap, InputError> {
-        // All numbers of one lump in another are checked here.
-        let scene = WadMap::read(bytes, file, map)?.into_scene(file)?;
-        let lump = |name: &str| -> Result<&[u8], InputError> {
-            Ok(map_lump(bytes, file, map, name)?.unwrap_or_default())
-        };
-        let word = |record: &[u8], at: usize| u16::from_le_bytes([record[at], record[at + 1]]);
-        let height = |record: &[u8], at: usize| f64::from(word(record, at) as i16);
-        let lines = lump("LINEDEFS")?;
-        let (sides, vertices) = (lump("SIDEDEFS")?, lump("VERTEXES")?);
-        let side = |number: u16| -> Option<RegionId> {
-            let record = sides.chunks_exact(30).nth(number.into())?;
-            (number != u16::MAX).then(|| word(record, 28).into())
-        };
-        let vertex = |number: u16| -> [i32; 2] {
-            let record = &vertices[usize::from(number) * 4..][..4];
-            [0, 2].map(|at| i32::from(word(record, at) as i16))
-        };
-        let both = |line: &[u8]| [side(word(line, 10)), side(word(line, 12))];
+        Ok(DoomMap::of(&WadMap::read(bytes, file, map)?))
+    }
 
-        let records = lump("SECTORS")?;
-        let mut moves = vec![false; records.len() / 26];
-        for line in lines.chunks_exact(14) {
-            let (action, tag) = (word(line, 6), word(line, 8));
-            if let (true, [_, Some(behind)]) = (is_door(action), both(line)) {
+    /// What a decoded map says.
+    fn of(map: &WadMap) -> DoomMap {
+        let mut moves = vec![false; map.sectors.len()];
+        for line in &map.lines {
+            if let (true, [_, Some(behind)]) = (is_door(line.action), line.sectors) {
                 moves[behind as usize] = true;
             }
-            for (moves, sector) in moves.iter_mut().zip(records.chunks_exact(26)) {
-                let tagged = tag != 0 && word(sector, 24) == tag && !is_still(action);
-                *moves |= tagged || BOSS_TAGS.contains(&word(sector, 24));
+            for (moves, sector) in moves.iter_mut().zip(&map.sectors) {
+                let tagged = line.tag != 0 && sector.tag == line.tag && !is_still(line.action);
+                *moves |= tagged || BOSS_TAGS.contains(&sector.tag);
             }
         }
-        let sectors = records
-            .chunks_exact(26)
-            .zip(&moves)
-            .map(|(r, moves)| match moves {
-                true => Sector {
-                    floor: -HIGHEST,
-                    ceiling: HIGHEST,
-                },
-                false => Sector {
-                    floor: height(r, 0),
-                    ceiling: height(r, 2),
-                },
-            });
+        let sectors = map.sectors.iter().zip(&moves);
+        let sectors = sectors.map(|(sector, moves)| match (moves, sector.heights) {
+            (true, _) => Sector {
+                floor: -HIGHEST,
+                ceiling: HIGHEST,
+            },
+            (false, [floor, ceiling]) => Sector { floor, ceiling },
+        });
         let sectors: Vec<Sector> = sectors.collect();
 
-        let line = |record: &[u8]| {
-            let sectors_of = both(record);
-            let open = match sectors_of {
+        let line = |line: &Linedef| {
+            let open = match line.sectors {
                 [Some(a), Some(b)] => {
                     let (a, b) = (&sectors[a as usize], &sectors[b as usize]);
                     let [low, high] = [a.floor.max(b.floor), a.ceiling.min(b.ceiling)];
@@ -141,43 +125,32 @@ impl DoomMap {
                 _ => None,
             };
             MapLine {
-                ends: [vertex(word(record, 0)), vertex(word(record, 2))],
-                sectors: sectors_of,
+                ends: line.ends,
+                sectors: line.sectors,
                 open,
             }
         };
-        let all = (0..).zip(lines.chunks_exact(14).map(line));
+        let all = (0..).zip(map.lines.iter().map(line));
         let all = all.filter(|(_, l)| l.ends[0] != l.ends[1]);
-        let (numbers, map_lines): (Vec<u32>, Vec<MapLine>) = all.unzip();
+        let (numbers, lines): (Vec<u32>, Vec<MapLine>) = all.unzip();
 
         let mut parts = vec![Vec::new(); sectors.len()];
-        let (segs, leaves) = (lump("SEGS")?, lump("SSECTORS")?);
-        let boxes = scene.regions.boxes(&scene.items);
-        for (leaf, b) in leaves.chunks_exact(4).zip(boxes) {
-            let seg = &segs[usize::from(word(leaf, 2)) * 12..][..12];
-            let line = &lines[usize::from(word(seg, 6)) * 14..][..14];
-            if let Some(sector) = both(line)[usize::from(word(seg, 8) != 0)] {
-                let (min, max) = b.in_world(scene.origin);
-                let all_heights = DVec3::Z * (2.0 * HIGHEST);
-                let part = WorldBox::new(min - all_heights, max + all_heights);
-                parts[sector as usize].push(part);
-            }
+        for (&sector, b) in map.leaf_sectors.iter().zip(map.leaf_boxes()) {
+            let all_heights = DVec3::Z * (2.0 * HIGHEST);
+            let (min, max) = (b.min.as_dvec3(), b.max.as_dvec3());
+            parts[sector as usize].push(WorldBox::new(min - all_heights, max + all_heights));
         }
-        let reject = map_lump(bytes, file, map, "REJECT")?;
-        // A table that is too short is taken as none, as engines do.
-        let reject = reject.and_then(|bytes| Pvs::from_reject(bytes, sectors.len()).ok());
-        Ok(DoomMap {
-            lines: map_lines,
-            sectors,
+        DoomMap {
+            disputes: disputed(&lines),
+            lines,
             parts,
             numbers,
-            linedefs: lines.len() / 14,
-            heights: records
-                .chunks_exact(26)
-                .map(|r| [0, 2].map(|at| height(r, at)))
-                .collect(),
-            reject,
-        })
+            linedefs: map.lines.len(),
+            heights: map.sectors.iter().map(|sector| sector.heights).collect(),
+            // A table that is too short is taken as none, as engines do.
+            reject: Pvs::from_reject(&map.reject, sectors.len()).ok(),
+            sectors,
+        }
     }
 
     /// Lines and sectors alone, none of which moves.
@@ -189,6 +162,7 @@ impl DoomMap {
             linedefs: lines.len(),
             heights: sectors.iter().map(|s| [s.floor, s.ceiling]).collect(),
             reject: None,
+            disputes: disputed(&lines),
             lines,
             sectors,
         }
@@ -197,5 +171,10 @@ impl DoomMap {
     /// The map's REJECT table: its claim of which sectors see each other.
     pub fn reject(&self) -> Option<&Pvs> {
         self.reject.as_ref()
+    }
+
+    /// Places about which its linedefs disagree, by the sectors that they have there.
+    pub fn disputes(&self) -> &[Dispute] {
+        &self.disputes
     }
 }

@@ -10,7 +10,7 @@
 use glam::DVec3;
 
 use super::map::DoomMap;
-use super::plan::{self, Point, turn};
+use super::plan::{Point, turn};
 use crate::scene::WorldBox;
 
 /// Most columns, and most rows, of the plan.
@@ -28,8 +28,8 @@ const MOST_BOXES: usize = 2048;
 impl DoomMap {
     /// Boxes whose open inside holds no point of any sector between its floor and its
     /// ceiling, from `low` to `high` at most: rock between rooms, below floors and above
-    /// ceilings, first those that fill the whole height. None if some sector's
-    /// linedefs do not close, as rays leave the map there.
+    /// ceilings, first those that fill the whole height. None if some sector is
+    /// [unclosed](DoomMap::unclosed), as rays leave the map there.
     ///
     /// A search for large rectangles of the plan, whose lines are those of the map's
     /// corners; they may overlap, which leaves no seams between them.
@@ -100,7 +100,7 @@ impl Plan {
             cells: vec![None; columns * rows],
         };
         for (sector, heights) in (0..).zip(&map.sectors) {
-            for triangle in plan::triangles(&map.outline(sector))? {
+            for triangle in map.triangles(sector)? {
                 plan.open(triangle, [heights.floor, heights.ceiling]);
             }
         }
@@ -314,7 +314,7 @@ mod tests {
         for (name, least) in [("freedm-map12", 30), ("freedm-map20", 100)] {
             let sample = Sample::named(name).unwrap();
             let map = Arc::new(DoomMap::read(sample.bytes, sample.file, None).unwrap());
-            let graph = map.graph();
+            let graph = map.graph().unwrap();
             let boxes = map.solid_boxes([-512.0, 512.0]);
             assert!(boxes.len() >= least, "{name}: {}", boxes.len());
             let mut rng = SeededRng::new(3);

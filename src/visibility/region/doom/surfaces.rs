@@ -5,7 +5,7 @@ use glam::Vec3;
 
 use super::super::answer::RegionId;
 use super::map::{DoomMap, MapLine};
-use super::plan;
+use super::plan::{self, Point};
 use crate::scene::{Scene, SurfaceKind, Surfaces};
 
 /// A part of a linedef's wall: which of its two sides is faced, from which height to
@@ -30,8 +30,9 @@ impl DoomMap {
     /// sector's item. Such a sector has no floor and no ceiling. Heights alone decide:
     /// what is drawn as sky hides like any ceiling.
     ///
-    /// A sector whose linedefs do not close has no floor and no ceiling either, which
-    /// only makes more visible; [`DoomMap::unclosed`] lists them.
+    /// A sector that its linedefs do not close, or of which they disagree where it is, has
+    /// no floor and no ceiling either, which only makes more visible;
+    /// [`DoomMap::unclosed`] lists them.
     ///
     /// # Panics
     /// If the scene has fewer items than the map has linedefs.
@@ -68,7 +69,7 @@ impl DoomMap {
                 self.walls_about(sector, &mut shape);
             } else {
                 let [floor, ceiling] = self.heights[sector as usize];
-                for corners in plan::triangles(&self.outline(sector)).unwrap_or_default() {
+                for corners in self.triangles(sector).unwrap_or_default() {
                     let [a, b, c] = corners;
                     shape.triangle([a, c, b], floor);
                     shape.triangle([a, b, c], ceiling);
@@ -79,12 +80,21 @@ impl DoomMap {
         all
     }
 
-    /// Sectors whose linedefs do not close, and so have no floor and no ceiling as
-    /// surfaces, ascending.
+    /// Sectors that have no floor and no ceiling as surfaces, as it is not known where
+    /// they are; ascending.
     pub fn unclosed(&self) -> Vec<RegionId> {
         let sectors = 0..self.sectors.len() as RegionId;
-        let open = |&sector: &RegionId| plan::triangles(&self.outline(sector)).is_none();
-        sectors.filter(open).collect()
+        sectors.filter(|&s| self.triangles(s).is_none()).collect()
+    }
+
+    /// The triangles of a sector, seen from above; `None` if its linedefs do not close or
+    /// disagree with others about a part of it.
+    pub(super) fn triangles(&self, sector: RegionId) -> Option<Vec<[Point; 3]>> {
+        let mut disputed = self.disputes().iter().flat_map(|dispute| dispute.sectors);
+        match disputed.any(|of| of == Some(sector)) {
+            true => None,
+            false => plan::triangles(&self.outline(sector)),
+        }
     }
 
     /// Whether the floor or the ceiling of a sector is not where the file has it, or
@@ -95,7 +105,7 @@ impl DoomMap {
     }
 
     /// The linedefs about a sector, which lies on the right of each.
-    pub(super) fn outline(&self, sector: RegionId) -> Vec<[[i32; 2]; 2]> {
+    fn outline(&self, sector: RegionId) -> Vec<[[i32; 2]; 2]> {
         let mut edges = Vec::new();
         for MapLine { ends, sectors, .. } in &self.lines {
             let [front, behind] = sectors.map(|side| side == Some(sector));

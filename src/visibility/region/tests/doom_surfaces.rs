@@ -26,7 +26,7 @@ fn world(name: &str) -> World {
     let scene = crate::scene::load(name, &Default::default()).unwrap();
     let map = Arc::new(DoomMap::read(sample.bytes, sample.file, None).unwrap());
     World {
-        graph: Arc::new(map.graph()),
+        graph: Arc::new(map.graph().unwrap()),
         surfaces: map.surfaces(&scene),
         scene,
         map,

@@ -10,7 +10,7 @@ use crate::scene::{Sample, SeededRng};
 fn sample(name: &str) -> (Arc<DoomMap>, Arc<RegionGraph>) {
     let sample = Sample::named(name).unwrap();
     let map = Arc::new(DoomMap::read(sample.bytes, sample.file, None).unwrap());
-    let graph = Arc::new(map.graph());
+    let graph = Arc::new(map.graph().unwrap());
     (map, graph)
 }
 
@@ -69,7 +69,7 @@ fn the_small_maps_set_is_proven_pair_by_pair() {
     println!("map12: {} pairs, {unproven} without a witness", pairs(pvs));
     assert_eq!(unproven, 0);
     // Rays of all heights: on a map without heights they are blocked by walls alone.
-    let flat = Arc::new(Arc::new(without_heights(&map)).graph());
+    let flat = Arc::new(Arc::new(without_heights(&map)).graph().unwrap());
     let rays = joined_by_rays(&flat, 40_000, 3);
     for a in 0..n {
         for b in 0..n {
@@ -101,7 +101,7 @@ fn reject_tables_of_the_samples_under_audit() {
 fn without_heights_the_search_and_the_maps_own_table_agree_pair_by_pair() {
     let (map, _) = sample("freedm-map12");
     let map = Arc::new(without_heights(&map));
-    let exact = SectorPvs::of(map.clone(), Arc::new(map.graph()));
+    let exact = SectorPvs::of(map.clone(), Arc::new(map.graph().unwrap()));
     assert_eq!(exact.pvs(), map.reject().unwrap());
 }
 
@@ -165,7 +165,7 @@ fn no_row_misses_a_sector_that_a_ray_passes() {
         let sample = Sample::named(name).unwrap();
         let scene = crate::scene::load(name, &Default::default()).unwrap();
         let map = Arc::new(DoomMap::read(sample.bytes, sample.file, None).unwrap());
-        let graph = Arc::new(map.graph());
+        let graph = Arc::new(map.graph().unwrap());
         let mut rows = super::from_eye::rows(&graph);
         let reject = Arc::new(map.reject().unwrap().clone());
         rows.push(Box::new(

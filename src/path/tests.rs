@@ -1,0 +1,220 @@
+use super::*;
+use crate::camera::PlaneOptions;
+use crate::spec::tests::{keys, known, listed};
+
+fn scene(source: &str) -> Scene {
+    scene::load(source, &Default::default()).unwrap()
+}
+
+fn path(source: &str, scene: &Scene) -> CameraPath {
+    load(source, scene, &LensDefaults::default()).unwrap()
+}
+
+fn visible_share(path: &CameraPath, scene: &Scene) -> f64 {
+    let around = scene.surroundings();
+    let visible = path.cameras.iter().map(|camera| {
+        let volume = camera.volume(&PlaneOptions::default(), &around).unwrap();
+        scene.items.iter().filter(|b| volume.sees(b)).count()
+    });
+    visible.sum::<usize>() as f64 / (path.cameras.len() * scene.items.len()) as f64
+}
+
+#[test]
+fn the_digest_tells_cameras_apart() {
+    let scene = scene("city:n=100");
+    let cameras = path("orbit:frames=3", &scene).cameras;
+    assert_eq!(digest(&cameras), digest(&cameras.clone()));
+    let mut digests = vec![digest(&cameras), digest(&cameras[1..])];
+    let turned = {
+        let mut turned = cameras.clone();
+        turned.swap(0, 1);
+        turned
+    };
+    digests.push(digest(&turned));
+    let window = [-1.0, 1.0, -1.0, 1.0];
+    for lens in [
+        Lens::perspective(50.0, 1.5, 0.1, Some(9.0)),
+        Lens::perspective(50.0, 1.5, 0.1, Some(9.5)),
+        Lens::perspective(50.0, 1.5, 0.1, None),
+        Lens::perspective(50.0, 1.5, 0.2, None),
+        Lens::orthographic(50.0, 1.5, 0.1, 9.0),
+        Lens::off_axis(window, 0.1, Some(9.0)),
+        Lens::off_axis(window, 0.1, None),
+    ] {
+        let mut other = cameras.clone();
+        other[2].lens = lens.unwrap();
+        digests.push(digest(&other));
+    }
+    for (i, one) in digests.iter().enumerate() {
+        assert!(one.len() == 64 && !digests[..i].contains(one), "{i}");
+    }
+}
+
+#[test]
+fn every_family_works_on_every_kind_of_scene() {
+    for source in [
+        "uniform:n=0",
+        "uniform:n=1",
+        "city:n=300",
+        "us-counties",
+        "freedm-map12",
+    ] {
+        let scene = scene(source);
+        for family in PATHS.iter().filter(|p| p.name != "places") {
+            let path = path(&format!("{}:frames=9", family.name), &scene);
+            assert_eq!(path.cameras.len(), 9, "{source} {}", family.name);
+            for camera in &path.cameras {
+                let volume = camera.volume(&PlaneOptions::default(), &scene.surroundings());
+                assert!(volume.is_ok(), "{source} {}", family.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn outside_sees_everything_and_the_others_see_something() {
+    let scene = scene("city:n=2000");
+    assert_eq!(
+        visible_share(&path("outside:frames=12", &scene), &scene),
+        1.0
+    );
+    for source in [
+        "orbit:frames=8",
+        "flythrough:frames=32",
+        "spin:frames=8",
+        "zoom:frames=8",
+    ] {
+        let share = visible_share(&path(source, &scene), &scene);
+        assert!(share > 0.001, "{source}: {share}");
+    }
+}
+
+#[test]
+fn a_visible_share_can_be_asked_for() {
+    let scene = scene("uniform:n=20000");
+    for (source, wanted) in [
+        ("flythrough:visible=2%", 0.02),
+        ("teleport:frames=128,visible=0.05", 0.05),
+        ("flythrough:visible=1000", 0.05),
+        ("flythrough:visible=2k", 0.1),
+    ] {
+        let share = visible_share(&path(source, &scene), &scene);
+        assert!((share / wanted - 1.0).abs() < 0.1, "{source}: {share}");
+    }
+}
+
+#[test]
+fn a_count_is_met_in_scenes_of_any_size() {
+    for n in [5_000, 1_000_000] {
+        let scene = scene(&format!("uniform:n={n}"));
+        let path = path("flythrough:frames=32,visible=200", &scene);
+        let visible = visible_share(&path, &scene) * f64::from(n);
+        assert!((visible / 200.0 - 1.0).abs() < 0.15, "{n}: {visible}");
+    }
+}
+
+/// Items that are visible together, and one that is visible at once.
+#[test]
+fn a_share_below_all_that_can_be_reached_is_refused() {
+    let boxes = |n| vec![WorldBox::new(DVec3::ZERO, DVec3::ONE); n];
+    for (n, path, wanted) in [
+        (1, "orbit:frames=8,visible=2%", "at least 100.00% of 'b'"),
+        (100, "orbit:frames=8,visible=5", "at least 100.00% of 'b'"),
+        (
+            100,
+            "outside:frames=4,visible=2%",
+            "0.00% or 25.00%, and no share between, of 'b'",
+        ),
+        (100, "outside:frames=4,visible=20%", ""),
+        (0, "orbit:frames=8,visible=2%", "at most 0.00% of 'b'"),
+        (1, "orbit:visible=1", "(2%); no count is possible of 1 item"),
+        (
+            2,
+            "orbit:visible=2",
+            "(2%); no count is possible of 2 items",
+        ),
+        (3, "orbit:visible=3", "(2%) or a count of 2"),
+    ] {
+        let scene = Scene::from_boxes("b", &boxes(n)).unwrap();
+        let told = load(path, &scene, &LensDefaults::default()).map(|_| ());
+        let told = told
+            .map_err(|error| error.to_string())
+            .err()
+            .unwrap_or_default();
+        assert!(
+            told.contains(wanted) && told.is_empty() == wanted.is_empty(),
+            "{path}: {told}"
+        );
+    }
+}
+
+#[test]
+fn every_parameter_of_the_list_is_one_and_no_other() {
+    let map = scene("freedm-map12");
+    for family in PATHS {
+        let listed = listed(&format!("{PATH_PARAMS}, {}", family.params));
+        for (key, default) in &listed {
+            // Defaults that are no number.
+            let value = match key.as_str() {
+                "near" => "0.5",
+                "far" => "1e6",
+                "visible" => "5%",
+                _ => default,
+            };
+            let frames = if key == "frames" { "" } else { ",frames=4" };
+            let source = format!("{}:{key}={value}{frames}", family.name);
+            let made = load(&source, &map, &LensDefaults::default());
+            assert!(made.is_ok(), "{source}: {:?}", made.err());
+        }
+        let unknown = format!("{}:frames=2,no=1", family.name);
+        let error = load(&unknown, &map, &LensDefaults::default()).unwrap_err();
+        assert_eq!(known(&error.to_string()), keys(&listed), "{}", family.name);
+    }
+}
+
+#[test]
+fn the_maps_things_are_camera_places() {
+    let map = scene("freedm-map12");
+    let things = path("places", &map);
+    assert_eq!(things.cameras.len(), map.places.len());
+    let none = load("places", &scene("city:n=10"), &LensDefaults::default());
+    assert!(none.unwrap_err().to_string().contains("no camera places"));
+}
+
+#[test]
+fn what_cannot_be_a_path_says_why() {
+    let scene = scene("city:n=10");
+    for (source, wanted) in [
+        ("orbt", "did you mean 'orbit'"),
+        ("orbit:frame=3", "did you mean 'frames'"),
+        ("orbit:fovy=0", "field of view is 0"),
+        ("orbit:near=5,far=5", "near < far"),
+        ("orbit:visible=10", "visible=10; expected a share"),
+        ("orbit:visible=1", "count from 2 to 9"),
+        ("orbit:visible=100%", "visible=100%; expected"),
+        ("orbit:visible=200%", "visible=200%; expected a share"),
+        ("orbit:visible=0%", "visible=0%; expected a share"),
+        ("orbit:visible=2.5", "visible=2.5; expected"),
+        ("orbit:visible=-1", "visible=-1; expected"),
+        ("nothing.csv", "No such file"),
+        ("nothing.txt", "No such file"),
+        ("no/where", "No such file"),
+        ("datasets/", "datasets/: Is a directory"),
+    ] {
+        let error = load(source, &scene, &LensDefaults::default())
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains(wanted), "{source}: {error}");
+    }
+}
+
+#[test]
+fn a_long_path_is_thinned_evenly() {
+    let scene = scene::load("uniform:n=5", &Default::default()).unwrap();
+    let mut all = path("orbit:frames=10", &scene);
+    all.lines = (2..12).collect();
+    assert_eq!(all.clone().at_most(10).lines, all.lines);
+    let some = all.clone().at_most(4);
+    assert_eq!(some.lines, [2, 4, 7, 9]);
+    assert_eq!(some.cameras[3], all.cameras[7]);
+}

@@ -1,0 +1,293 @@
+//! Files and folders that appear whole or not at all: written beside their place under
+//! a temporary name, then renamed into it. A temporary name is locked by its process
+//! for as long as it lives; one that nobody has locked is the leftover of a killed
+//! process, and goes with the next write into the same folder.
+
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+
+use tempfile::{Builder, NamedTempFile, TempDir};
+
+use super::files::FolderError;
+
+/// Beginning and end of temporary names.
+const TEMPORARY: (&str, &str) = (".cullbench-", ".tmp");
+
+/// Writes a file whole or not at all. A link stays one, and its target is
+/// replaced; an existing file keeps its permissions. A terminal, a pipe or a device
+/// is written to and never replaced.
+///
+/// # Errors
+/// What the file system says, with the path.
+pub fn write_atomically(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), FolderError> {
+    let attempt = || -> io::Result<()> {
+        let old = fs::metadata(path).ok();
+        if old.as_ref().is_some_and(is_stream) {
+            let mut stream = BufWriter::new(OpenOptions::new().write(true).open(path)?);
+            write(&mut stream)?;
+            return stream.flush();
+        }
+        match &old {
+            Some(_) => replace(&fs::canonicalize(path)?, write),
+            None => replace(path, write),
+        }
+    };
+    attempt().map_err(FolderError::io(path))
+}
+
+/// The same of a file in a folder of the program's own: whatever has its name, a link
+/// too, is replaced.
+pub(super) fn replace_atomically(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), FolderError> {
+    replace(path, write).map_err(FolderError::io(path))
+}
+
+fn replace(target: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+    let folder = folder_of(target);
+    // A missing folder is reported by its own name, not by a temporary one.
+    fs::metadata(folder)?;
+    let mut file = temporary_in(folder)?;
+    {
+        let mut buffered = BufWriter::new(&mut file);
+        write(&mut buffered)?;
+        buffered.flush()?;
+    }
+    if let Ok(old) = fs::symlink_metadata(target)
+        && old.is_file()
+    {
+        file.as_file().set_permissions(old.permissions())?;
+    }
+    file.persist(target)?;
+    Ok(())
+}
+
+fn folder_of(file: &Path) -> &Path {
+    match file.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    }
+}
+
+fn is_stream(found: &fs::Metadata) -> bool {
+    !found.is_file() && !found.is_dir()
+}
+
+/// Tries to write into the folder where a file is to appear, and leaves nothing there: a
+/// folder that is read-only or full is found before the work.
+///
+/// # Errors
+/// What the file system says, with the path.
+pub fn try_place(path: &Path) -> Result<(), FolderError> {
+    let attempt = || -> io::Result<()> {
+        let target = match fs::metadata(path) {
+            // A pipe or a device has no place; opening a pipe would wait for its reader.
+            Ok(found) if is_stream(&found) => return Ok(()),
+            Ok(_) => fs::canonicalize(path)?,
+            Err(_) => path.to_owned(),
+        };
+        try_writing(folder_of(&target))
+    };
+    attempt().map_err(FolderError::io(path))
+}
+
+/// The same of a folder that is there or is to be made.
+///
+/// # Errors
+/// What the file system says, with the path.
+pub fn try_folder(path: &Path) -> Result<(), FolderError> {
+    let folder = path.ancestors().find(|folder| folder.exists());
+    try_writing(folder.unwrap_or(Path::new("."))).map_err(FolderError::io(path))
+}
+
+/// Writes a block and takes it away again.
+fn try_writing(folder: &Path) -> io::Result<()> {
+    temporary_in(folder)?.write_all(&[0; 4096])
+}
+
+/// Makes a file that goes with this process, or with the next write into the folder.
+///
+/// # Errors
+/// What the file system says.
+pub fn temporary_in(folder: &Path) -> io::Result<NamedTempFile> {
+    Ok(locked_temporary_in(folder)?.0)
+}
+
+/// The same, and why it could not be locked where a file system has no locks.
+pub(super) fn locked_temporary_in(
+    folder: &Path,
+) -> io::Result<(NamedTempFile, Result<(), TryLockError>)> {
+    sweep(folder);
+    loop {
+        let made = named(0o666).tempfile_in(folder)?;
+        match made.as_file().try_lock() {
+            // Another process has swept it away between the two calls.
+            Err(TryLockError::WouldBlock) => {}
+            Ok(()) if !made.path().exists() => {}
+            locked => return Ok((made, locked)),
+        }
+    }
+}
+
+/// Makes a folder that goes with this process, or with the next write beside it; locked
+/// for as long as the file is open.
+pub(super) fn temporary_folder_in(folder: &Path) -> io::Result<(TempDir, Option<File>)> {
+    sweep(folder);
+    loop {
+        let made = named(0o777).tempdir_in(folder)?;
+        // Not every system opens folders.
+        let Ok(lock) = File::open(made.path()) else {
+            return Ok((made, None));
+        };
+        match lock.try_lock() {
+            Err(TryLockError::WouldBlock) => {}
+            Ok(()) if !made.path().exists() => {}
+            _ => return Ok((made, Some(lock))),
+        }
+    }
+}
+
+/// Names of temporary files. Private by themselves; results are meant to be read, as far
+/// as the user's umask lets them.
+fn named(mode: u32) -> Builder<'static, 'static> {
+    let mut builder = Builder::new();
+    builder.prefix(TEMPORARY.0).suffix(TEMPORARY.1);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(fs::Permissions::from_mode(mode));
+    }
+    #[cfg(not(unix))]
+    let _ = mode;
+    builder
+}
+
+/// Takes away what killed processes have left half written in a folder.
+pub(super) fn sweep(folder: &Path) {
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        if !name.starts_with(TEMPORARY.0) || !name.ends_with(TEMPORARY.1) {
+            continue;
+        }
+        let path = entry.path();
+        let Ok(kind) = entry.file_type() else {
+            continue;
+        };
+        if !kind.is_file() && !kind.is_dir() {
+            continue;
+        }
+        // Held until it is gone, so that its maker sees it.
+        let Ok(lock) = File::open(&path) else {
+            continue;
+        };
+        if let Err(TryLockError::WouldBlock) = lock.try_lock() {
+            continue;
+        }
+        let _ = match kind.is_dir() {
+            true => fs::remove_dir_all(path),
+            false => fs::remove_file(path),
+        };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failed_write_leaves_the_old_file_and_no_rubbish() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("file.txt");
+        write_atomically(&path, |out| out.write_all(b"old")).unwrap();
+        let failed = write_atomically(&path, |out| {
+            out.write_all(b"half of the new")?;
+            Err(io::Error::other("disk full"))
+        });
+        assert!(failed.unwrap_err().to_string().contains("disk full"));
+        assert_eq!(fs::read_to_string(&path).unwrap(), "old");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+        let nowhere = folder.path().join("no/file.txt");
+        let error = write_atomically(&nowhere, |_| Ok(())).unwrap_err();
+        assert!(!error.to_string().contains(".cullbench-"), "{error}");
+    }
+
+    #[test]
+    fn errors_do_not_name_temporary_files() {
+        let error = temporary_in(Path::new("no/such")).unwrap_err();
+        assert!(
+            error.to_string().contains(TEMPORARY.0),
+            "the premise: {error}"
+        );
+        let told = FolderError::io(Path::new("no/such"))(error).to_string();
+        assert!(
+            told.starts_with("no/such: ") && !told.contains(TEMPORARY.0),
+            "{told}"
+        );
+    }
+
+    #[test]
+    fn leftovers_of_the_killed_go_and_what_is_written_now_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        let live = temporary_in(folder.path()).unwrap();
+        let (live_folder, _lock) = temporary_folder_in(folder.path()).unwrap();
+        fs::write(path(".cullbench-left.tmp"), "half").unwrap();
+        fs::create_dir(path(".cullbench-leftfolder.tmp")).unwrap();
+        fs::write(
+            path(".cullbench-leftfolder.tmp").join("stream.jsonl"),
+            "half",
+        )
+        .unwrap();
+        fs::write(path(".cullbench-foreign"), "of another program").unwrap();
+        write_atomically(&path("file"), |out| out.write_all(b"new")).unwrap();
+        let mut left: Vec<_> = fs::read_dir(folder.path())
+            .unwrap()
+            .map(|entry| entry.unwrap().path())
+            .collect();
+        left.sort();
+        let mut wanted = vec![
+            live.path().to_owned(),
+            live_folder.path().to_owned(),
+            path(".cullbench-foreign"),
+            path("file"),
+        ];
+        wanted.sort();
+        assert_eq!(left, wanted);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_in_a_folder_of_ones_own_is_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let (file, link) = (folder.path().join("file"), folder.path().join("link"));
+        fs::write(&file, "another's").unwrap();
+        std::os::unix::fs::symlink("file", &link).unwrap();
+        replace_atomically(&link, |out| out.write_all(b"new")).unwrap();
+        assert!(!fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(fs::read_to_string(&file).unwrap(), "another's");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_and_permissions_stay() {
+        use std::os::unix::fs::{PermissionsExt, symlink};
+        let folder = tempfile::tempdir().unwrap();
+        let (file, link) = (folder.path().join("file"), folder.path().join("link"));
+        fs::write(&file, "old").unwrap();
+        fs::set_permissions(&file, fs::Permissions::from_mode(0o600)).unwrap();
+        symlink("file", &link).unwrap();
+        write_atomically(&link, |out| out.write_all(b"new")).unwrap();
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(fs::read_to_string(&file).unwrap(), "new");
+        assert_eq!(
+            fs::metadata(&file).unwrap().permissions().mode() & 0o777,
+            0o600
+        );
+    }
+}

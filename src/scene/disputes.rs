@@ -1,0 +1,274 @@
+//! Places about which the linedefs of a map disagree. Sectors divide the plane where any
+//! two neighbouring linedefs have the same sector, or none, on the sides that face each
+//! other. A sector that refers to itself, a side of a foreign sector, swapped sides and a
+//! missing linedef all break that somewhere. Whole numbers decide, exactly.
+
+use std::cmp::Ordering;
+
+/// A place between two linedefs that disagree about it.
+#[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
+#[error(
+    "linedefs disagree about the sector at ({}, {}), {} or {}",
+    at[0], at[1], named(sectors[0]), named(sectors[1])
+)]
+pub struct Dispute {
+    /// Between them, map units.
+    pub at: [f64; 2],
+    /// What each has there.
+    pub sectors: [Option<u32>; 2],
+}
+
+/// Where a linedef begins and ends, and the sectors on its right and on its left.
+pub type Sided = ([[i32; 2]; 2], [Option<u32>; 2]);
+
+fn named(sector: Option<u32>) -> String {
+    sector.map_or("none".to_owned(), |sector| sector.to_string())
+}
+
+/// All disputes of a map, the first between each two sectors; none where its sectors
+/// divide the plane. O(linedefs * those that a line across the map meets).
+pub fn disputes(lines: impl Iterator<Item = Sided> + Clone) -> Vec<Dispute> {
+    let mut found: Vec<Dispute> = Vec::new();
+    for axis in [0, 1] {
+        between_levels(lines.clone(), axis, |dispute| {
+            if found.iter().all(|known| known.sectors != dispute.sectors) {
+                found.push(dispute);
+            }
+        });
+    }
+    found
+}
+
+/// A linedef across a direction: its ends from low to high in that direction, each with
+/// its place across first, and the sectors on its sides of lesser and of greater places.
+struct Edge {
+    ends: [[i64; 2]; 2],
+    sides: [Option<u32>; 2],
+}
+
+impl Edge {
+    /// `None` for a linedef along the direction, which the other direction crosses.
+    fn of((ends, [right, left]): Sided, axis: usize) -> Option<Edge> {
+        let turned = |end: [i32; 2]| [end[axis], end[1 - axis]].map(i64::from);
+        let [mut from, mut to] = ends.map(turned);
+        // Upwards the left has lesser x; towards larger x the right has lesser y.
+        let mut sides = if axis == 0 {
+            [left, right]
+        } else {
+            [right, left]
+        };
+        if from[1] > to[1] {
+            std::mem::swap(&mut from, &mut to);
+            sides.reverse();
+        }
+        (from[1] < to[1]).then_some(Edge {
+            ends: [from, to],
+            sides,
+        })
+    }
+
+    /// Its place across at half of a level, as a fraction: below 2^35 over below 2^18.
+    fn place(&self, level: i64) -> [i64; 2] {
+        let [from, to] = self.ends;
+        let rise = 2 * (to[1] - from[1]);
+        let run = (to[0] - from[0]) * (level - 2 * from[1]);
+        [from[0] * rise + run, rise]
+    }
+
+    /// Which of two comes first at half of a level.
+    fn compared(&self, other: &Edge, level: i64) -> Ordering {
+        let ([a, over_a], [b, over_b]) = (self.place(level), other.place(level));
+        (a * over_b).cmp(&(b * over_a))
+    }
+}
+
+/// Goes through the strips between the levels of all ends, in which no edge begins or
+/// ends, from edge to edge.
+fn between_levels(lines: impl Iterator<Item = Sided>, axis: usize, mut found: impl FnMut(Dispute)) {
+    let mut edges: Vec<Edge> = lines.filter_map(|line| Edge::of(line, axis)).collect();
+    edges.sort_by_key(|edge| edge.ends[0][1]);
+    let ends = edges.iter().flat_map(|edge| edge.ends);
+    let mut levels: Vec<i64> = ends.map(|end| end[1]).collect();
+    levels.sort_unstable();
+    levels.dedup();
+    let (mut waiting, mut strip) = (edges.iter().peekable(), Vec::<&Edge>::new());
+    for level in levels.windows(2) {
+        let [low, high] = [level[0], level[1]];
+        strip.retain(|edge| edge.ends[1][1] > low);
+        while let Some(edge) = waiting.next_if(|edge| edge.ends[0][1] == low) {
+            strip.push(edge);
+        }
+        let middle = low + high;
+        strip.sort_by(|a, b| a.compared(b, middle));
+        for behind in 0..=strip.len() {
+            let before = behind.checked_sub(1).map(|before| strip[before]);
+            let pair = [before, strip.get(behind).copied()];
+            if let Some(sectors) = disputed(pair, [low, high]) {
+                let across = pair.into_iter().flatten().map(|edge| {
+                    let [place, over] = edge.place(middle);
+                    place as f64 / over as f64
+                });
+                let count = across.clone().count() as f64;
+                let mut at = [across.sum::<f64>() / count, middle as f64 / 2.0];
+                if axis == 1 {
+                    at.reverse();
+                }
+                found(Dispute { at, sectors });
+            }
+        }
+    }
+}
+
+/// What two neighbours of a strip, or one and the outside, disagree about: the place
+/// between them, or one where they cross.
+fn disputed(pair: [Option<&Edge>; 2], strip: [i64; 2]) -> Option<[Option<u32>; 2]> {
+    let [before, behind] = pair.map(|edge| edge.map_or([None; 2], |edge| edge.sides));
+    let crosses = || {
+        let [Some(a), Some(b)] = pair else {
+            return false;
+        };
+        strip.into_iter().any(|end| a.compared(b, 2 * end).is_gt())
+    };
+    let facing = [before[1], behind[0]];
+    let beside = [[before[0], behind[0]], [before[1], behind[1]]];
+    match facing[0] == facing[1] {
+        false => Some(facing),
+        true if crosses() => beside.into_iter().find(|[a, b]| a != b),
+        true => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::SeededRng;
+
+    /// A ring whose inside is on the right of each line.
+    fn ring([x0, y0, x1, y1]: [i32; 4], sectors: [Option<u32>; 2]) -> Vec<Sided> {
+        let corners = [[x0, y0], [x0, y1], [x1, y1], [x1, y0]];
+        let sides = (0..4).map(|k| ([corners[k], corners[(k + 1) % 4]], sectors));
+        sides.collect()
+    }
+
+    fn found(lines: &[Sided]) -> Vec<Dispute> {
+        disputes(lines.iter().copied())
+    }
+
+    #[test]
+    fn sectors_that_do_not_divide_the_plane_are_told() {
+        let room = ring([0, 0, 512, 512], [Some(0), None]);
+        let with = |sectors| [room.clone(), ring([192, 192, 320, 320], sectors)].concat();
+        let proper = with([Some(1), Some(0)]);
+        assert_eq!(found(&proper), []);
+        // Lines within a sector, even where they cross, divide nothing.
+        let within = |ends| (ends, [Some(0); 2]);
+        let mut marked = proper.clone();
+        marked.extend([[[8, 8], [40, 40]], [[8, 41], [40, 9]]].map(within));
+        assert_eq!(found(&marked), []);
+
+        let told = |lines: &[Sided]| {
+            let first = found(lines).first().map(ToString::to_string);
+            first.unwrap_or_default()
+        };
+        let between = "linedefs disagree about the sector at (96, 256), 0 or 1";
+        // A sector that refers to itself, and one whose lines are the wrong way round.
+        assert_eq!(told(&with([Some(1), Some(1)])), between);
+        assert_eq!(told(&with([Some(0), Some(1)])), between);
+        for line in 0..proper.len() {
+            let changed = |change: &dyn Fn(&mut Sided)| {
+                let mut lines = proper.clone();
+                change(&mut lines[line]);
+                !found(&lines).is_empty()
+            };
+            assert!(changed(&|(_, sectors)| sectors.swap(0, 1)), "swapped");
+            assert!(changed(&|(_, sectors)| sectors[0] = Some(7)), "foreign");
+            assert!(changed(&|(_, sectors)| sectors[1] = sectors[0]), "itself");
+            let mut lines = proper.clone();
+            lines.remove(line);
+            assert!(!found(&lines).is_empty(), "without {line}");
+        }
+        // Rooms that cross without a corner in common.
+        let other = ring([256, 100, 700, 180], [Some(2), None]);
+        assert!(!found(&[room, other].concat()).is_empty());
+        let none = told(&ring([0, 0, 8, 8], [None, Some(3)]));
+        assert_eq!(
+            none,
+            "linedefs disagree about the sector at (0, 4), none or 3"
+        );
+    }
+
+    /// What the nearest of some lines has on the side of a point, in four directions.
+    fn looks(lines: &[Sided], p: [f64; 2]) -> Vec<Option<u32>> {
+        let look = |(axis, sign): (usize, f64)| {
+            let mut nearest = (f64::INFINITY, None);
+            for (ends, [right, left]) in lines {
+                let [a, b] = ends.map(|end| [0, 1].map(|k| f64::from(end[k]) - p[k]));
+                let (up_a, up_b) = (a[1 - axis], b[1 - axis]);
+                if (up_a < 0.0) == (up_b < 0.0) {
+                    continue;
+                }
+                let at = (a[axis] - (b[axis] - a[axis]) * up_a / (up_b - up_a)) * sign;
+                if at > 0.0 && at < nearest.0 {
+                    let turn = a[0] * b[1] - a[1] * b[0];
+                    nearest = (at, if turn > 0.0 { *left } else { *right });
+                }
+            }
+            nearest.1
+        };
+        [(0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)].map(look).into()
+    }
+
+    #[test]
+    fn without_disputes_every_look_from_a_place_finds_the_same_sector() {
+        let mut rng = SeededRng::new(41);
+        let mut counts = [0; 2];
+        for _ in 0..400 {
+            // A bent grid of cells, some of one sector, some of none.
+            let side = 2 + rng.below(3);
+            let corner: Vec<[i32; 2]> = (0..(side + 1) * (side + 1))
+                .map(|k| [k % (side + 1), k / (side + 1)].map(|v| 64 * v as i32))
+                .map(|at| at.map(|v| v + rng.below(20) as i32))
+                .collect();
+            let cell: Vec<Option<u32>> = (0..side * side)
+                .map(|_| (rng.below(6) > 0).then(|| rng.below(4) as u32))
+                .collect();
+            let of = |x: usize, y: usize| match x < side && y < side {
+                true => cell[y * side + x],
+                false => None,
+            };
+            let mut lines: Vec<Sided> = Vec::new();
+            for (x, y) in (0..=side).flat_map(|x| (0..=side).map(move |y| (x, y))) {
+                let at = |x: usize, y: usize| corner[y * (side + 1) + x];
+                if y < side {
+                    let left = x.checked_sub(1).map_or(None, |x| of(x, y));
+                    lines.push(([at(x, y), at(x, y + 1)], [of(x, y), left]));
+                }
+                if x < side {
+                    let below = y.checked_sub(1).map_or(None, |y| of(x, y));
+                    lines.push(([at(x, y), at(x + 1, y)], [below, of(x, y)]));
+                }
+            }
+            lines.retain(|(_, sectors)| *sectors != [None; 2]);
+            assert_eq!(found(&lines), []);
+            if lines.is_empty() {
+                continue;
+            }
+            let line = rng.below(lines.len());
+            match rng.below(4) {
+                0 => lines[line].1.swap(0, 1),
+                1 => drop(lines.remove(line)),
+                2 => lines[line].1[rng.below(2)] = Some(rng.below(4) as u32),
+                _ => lines[line].0[1] = lines[(line + 1) % lines.len()].0[0],
+            }
+            let agree = found(&lines).is_empty();
+            let inside = || [0, 1].map(|_| 64.0 * side as f64 * rng.unit() + 7.3);
+            let differ = std::iter::repeat_with(inside).take(300).any(|p| {
+                let looks = looks(&lines, p);
+                looks.iter().any(|look| *look != looks[0])
+            });
+            assert!(!(agree && differ), "{lines:?}");
+            counts[usize::from(agree)] += 1;
+        }
+        assert!(counts.iter().all(|&count| count > 10), "{counts:?}");
+    }
+}

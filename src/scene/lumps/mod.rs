@@ -1,0 +1,315 @@
+//! The lumps of a WAD file, and which of them are a map's. It defines the WAD format
+//! (the unofficial Doom specs 1.666, Matthew S. Fell 1994) and trusts no byte of it.
+
+use std::collections::HashSet;
+use std::ops::Range;
+
+use crate::input::InputError;
+use crate::shown::first_of;
+
+/// The lumps of a map in their fixed order, that of UDMF first.
+const LUMPS: [&str; 13] = [
+    "TEXTMAP", "THINGS", "LINEDEFS", "SIDEDEFS", "VERTEXES", "SEGS", "SSECTORS", "NODES",
+    "SECTORS", "REJECT", "BLOCKMAP", "BEHAVIOR", "SCRIPTS",
+];
+/// What stands behind a map's marker.
+const FIRST: [&str; 2] = ["THINGS", "TEXTMAP"];
+/// Lumps that a node builder fills.
+const BUILT: [&str; 3] = ["SEGS", "SSECTORS", "NODES"];
+/// Lumps whose lack is the same as their being empty.
+const MAY_LACK: [&str; 4] = ["SEGS", "SSECTORS", "NODES", "REJECT"];
+/// How nodes that are not Doom's own begin.
+const NODE_KINDS: [(&str, &str); 9] = [
+    ("XNOD", "extended"),
+    ("ZNOD", "compressed extended"),
+    ("XGLN", "extended GL"),
+    ("ZGLN", "compressed GL"),
+    ("XGL2", "extended GL"),
+    ("ZGL2", "compressed GL"),
+    ("XGL3", "extended GL"),
+    ("ZGL3", "compressed GL"),
+    ("xNd4", "DeePBSP's"),
+];
+const OWN_NODES: &str = "nodes in Doom's own format, as node builders (ZDBSP, ZenNode) write them \
+                         unless told otherwise";
+/// Maps that a message names.
+const MOST_NAMED: usize = 8;
+
+/// A file's directory.
+pub struct Wad<'a> {
+    file: &'a str,
+    bytes: &'a [u8],
+    lumps: Vec<Lump>,
+}
+
+struct Lump {
+    name: String,
+    /// Where its directory entry begins.
+    entry: usize,
+}
+
+/// The tables of one map.
+pub struct MapTables<'a> {
+    pub things: Table<'a>,
+    pub lines: Table<'a>,
+    pub sides: Table<'a>,
+    pub vertices: Table<'a>,
+    pub segs: Table<'a>,
+    pub leaves: Table<'a>,
+    pub nodes: Table<'a>,
+    pub sectors: Table<'a>,
+    /// Empty if the map has none.
+    pub reject: &'a [u8],
+}
+
+impl<'a> Wad<'a> {
+    /// Reads the directory. Where a lump lies is checked when it is read: damage in
+    /// another is no business of a map.
+    pub fn open(bytes: &'a [u8], file: &'a str) -> Result<Self, InputError> {
+        let mut wad = Wad {
+            file,
+            bytes,
+            lumps: Vec::new(),
+        };
+        let magic = bytes.get(..4).unwrap_or(bytes);
+        if magic != b"IWAD" && magic != b"PWAD" {
+            let found = format!("'{}'", magic.escape_ascii());
+            return Err(wad.error(0, found, "the magic IWAD or PWAD"));
+        }
+        let (count, directory) = (wad.header_int(4)?, wad.header_int(8)?);
+        for i in 0..count {
+            let at = directory + i * 16;
+            let Some(entry) = bytes.get(at..at + 16) else {
+                let found = format!("the end of the file in directory entry {i} of {count}");
+                return Err(wad.error(bytes.len(), found, "16 bytes an entry"));
+            };
+            let shown = |b: &u8| b.is_ascii_graphic().then(|| b.to_ascii_uppercase() as char);
+            let name = entry[8..16].iter().take_while(|b| **b != 0);
+            let name = name.map(|b| shown(b).unwrap_or('?')).collect();
+            wad.lumps.push(Lump { name, entry: at });
+        }
+        Ok(wad)
+    }
+
+    /// The names of the maps and the indices of their markers, in file order: of maps
+    /// of one name the last, as engines have it.
+    pub fn markers(&self) -> Vec<(&str, usize)> {
+        let mut seen = HashSet::new();
+        let all = (0..self.lumps.len()).rev().filter(|&at| self.is_marker(at));
+        let named = all.map(|at| (&self.lumps[at].name[..], at));
+        let mut last: Vec<_> = named.filter(|(name, _)| seen.insert(*name)).collect();
+        last.reverse();
+        last
+    }
+
+    fn is_marker(&self, at: usize) -> bool {
+        let (name, next) = (&self.lumps[at].name[..], self.lumps.get(at + 1));
+        !LUMPS.contains(&name) && next.is_some_and(|next| FIRST.contains(&&next.name[..]))
+    }
+
+    /// The name of the wanted map, or of the only one, and the index of its marker.
+    fn marker(&self, map: Option<&str>) -> Result<(&str, usize), InputError> {
+        let is_wanted = |name: &str| map.is_none_or(|map| name.eq_ignore_ascii_case(map));
+        let maps = self.markers();
+        let listed = || first_of(&maps.iter().map(|m| m.0).collect::<Vec<_>>(), MOST_NAMED);
+        let mut wanted = maps.iter().filter(|(name, _)| is_wanted(name));
+        let (found, expected) = match (wanted.next(), wanted.next(), map) {
+            (Some(one), None, _) => return Ok(*one),
+            (Some(first), _, _) => (
+                format!("{} maps, {}", maps.len(), listed()),
+                format!("one of them by name, as in '{}#{}'", self.file, first.0),
+            ),
+            (None, _, None) => (
+                "no map".to_owned(),
+                "a map marker followed by THINGS".to_owned(),
+            ),
+            (None, _, Some(map)) => {
+                let lump = self.lumps.iter().any(|lump| is_wanted(&lump.name));
+                let lump = lump.then_some(" (THINGS does not follow the lump of that name)");
+                (
+                    format!("no map '{map}' among {}{}", listed(), lump.unwrap_or("")),
+                    "one of the file's maps".to_owned(),
+                )
+            }
+        };
+        Err(self.error(0, found, expected))
+    }
+
+    /// The tables of the named map, or of the only one.
+    ///
+    /// A map's lumps are found by name behind its marker, up to the next marker or to
+    /// the first that the order of a map's lumps does not allow; others are passed over.
+    pub fn tables(&self, map: Option<&str>) -> Result<MapTables<'_>, InputError> {
+        let (name, marker) = self.marker(map)?;
+        let behind = marker + 1..self.lumps.len();
+        let mut last = None;
+        let is_own = |lump: &&Lump| {
+            let place = LUMPS.iter().position(|name| *name == lump.name);
+            place.is_none() || std::mem::replace(&mut last, place) < place
+        };
+        let own = behind
+            .take_while(|&at| !self.is_marker(at))
+            .map(|at| &self.lumps[at]);
+        let own: Vec<&Lump> = own.take_while(is_own).collect();
+        let lump = |name: &str| own.iter().find(|lump| lump.name == name);
+        for (other, format) in [("TEXTMAP", "UDMF"), ("BEHAVIOR", "Hexen")] {
+            if let Some(lump) = lump(other) {
+                let found = format!("map {name} in the format of {format} ({other})");
+                return Err(self.error(lump.entry, found, "Doom's map format"));
+            }
+        }
+        let table = |of: &'static str, record: usize| -> Result<Table<'_>, InputError> {
+            let at = self.lumps[marker].entry;
+            let range = match lump(of) {
+                Some(lump) => self.range(lump)?,
+                None if MAY_LACK.contains(&of) => at..at,
+                None => {
+                    let found = format!("map {name} without {of}");
+                    return Err(self.error(at, found, "all lumps of a Doom map, in their order"));
+                }
+            };
+            let (start, data) = (range.start, &self.bytes[range]);
+            let mut kinds = NODE_KINDS.iter();
+            if let Some((magic, kind)) = kinds.find(|kind| data.starts_with(kind.0.as_bytes()))
+                && BUILT.contains(&of)
+            {
+                let found = format!("map {name} with {kind} nodes ({magic} in {of})");
+                return Err(self.error(start, found, OWN_NODES));
+            }
+            if data.len() % record != 0 {
+                let found = format!("{of} of {} bytes", data.len());
+                return Err(self.error(start, found, format!("a multiple of {record} bytes")));
+            }
+            Ok(Table {
+                wad: self,
+                name: of,
+                start,
+                data,
+                record,
+            })
+        };
+        let [segs, leaves] = [table("SEGS", 12)?, table("SSECTORS", 4)?];
+        let nodes = table("NODES", 28)?;
+        // A map of one leaf has no nodes.
+        let is_empty =
+            |table: &&Table| table.len() == 0 && (table.name != "NODES" || leaves.len() != 1);
+        if let Some(empty) = [&segs, &leaves, &nodes].into_iter().find(is_empty) {
+            let gl = format!("GL_{name}");
+            let gl = self.lumps.iter().any(|lump| lump.name == gl);
+            let which = if gl {
+                "with GL nodes alone"
+            } else {
+                "whose nodes are not built"
+            };
+            let found = format!("map {name} {which} (no {})", empty.name);
+            return Err(self.error(empty.start, found, OWN_NODES));
+        }
+        Ok(MapTables {
+            things: table("THINGS", 10)?,
+            lines: table("LINEDEFS", 14)?,
+            sides: table("SIDEDEFS", 30)?,
+            vertices: table("VERTEXES", 4)?,
+            segs,
+            leaves,
+            nodes,
+            sectors: table("SECTORS", 26)?,
+            reject: table("REJECT", 1)?.data,
+        })
+    }
+
+    /// Where a lump's bytes are; those of an empty one, whose place means nothing, at its
+    /// directory entry.
+    fn range(&self, lump: &Lump) -> Result<Range<usize>, InputError> {
+        let [offset, size] = [0, 4].map(|at| i32_at(self.bytes, lump.entry + at));
+        if size == 0 {
+            return Ok(lump.entry..lump.entry);
+        }
+        let range = usize::try_from(offset).ok().zip(usize::try_from(size).ok());
+        let range = range.and_then(|(offset, size)| Some(offset..offset.checked_add(size)?));
+        let whole = range.filter(|range| range.end <= self.bytes.len());
+        whole.ok_or_else(|| {
+            let found = format!("lump {} at {offset}, {size} bytes long", lump.name);
+            let expected = format!("a lump within the file's {} bytes", self.bytes.len());
+            self.error(lump.entry, found, expected)
+        })
+    }
+
+    fn header_int(&self, at: usize) -> Result<usize, InputError> {
+        let Some(field) = self.bytes.get(at..at + 4) else {
+            let end = self.bytes.len();
+            return Err(self.error(end, "the end of the file", "a 12 byte header"));
+        };
+        let value = i32_at(field, 0);
+        usize::try_from(value)
+            .map_err(|_| self.error(at, value.to_string(), "a count or offset of at least 0"))
+    }
+
+    fn error(
+        &self,
+        offset: usize,
+        found: impl Into<String>,
+        expected: impl Into<String>,
+    ) -> InputError {
+        InputError::Byte {
+            file: self.file.to_owned(),
+            offset: offset as u64,
+            found: found.into(),
+            expected: expected.into(),
+        }
+    }
+}
+
+/// A lump of fixed-size records.
+pub struct Table<'a> {
+    wad: &'a Wad<'a>,
+    name: &'static str,
+    /// Where it begins in the file.
+    start: usize,
+    data: &'a [u8],
+    record: usize,
+}
+
+impl Table<'_> {
+    pub fn len(&self) -> usize {
+        self.data.len() / self.record
+    }
+
+    /// The unsigned 16-bit field at byte `at` of record `i`.
+    pub fn word(&self, i: usize, at: usize) -> u16 {
+        let start = i * self.record + at;
+        u16::from_le_bytes([self.data[start], self.data[start + 1]])
+    }
+
+    /// The signed 16-bit field, as a coordinate.
+    pub fn int(&self, i: usize, at: usize) -> f64 {
+        f64::from(self.word(i, at) as i16)
+    }
+
+    /// A field that counts records of another table.
+    pub fn index(&self, i: usize, at: usize, of: &Table) -> Result<usize, InputError> {
+        let index = usize::from(self.word(i, at));
+        if index < of.len() {
+            return Ok(index);
+        }
+        let found = format!("{} {index} in {} {i}", of.name, self.name);
+        Err(self.error(i, at, found, format!("less than {}", of.len())))
+    }
+
+    pub fn error(
+        &self,
+        i: usize,
+        at: usize,
+        found: impl Into<String>,
+        expected: impl Into<String>,
+    ) -> InputError {
+        let offset = self.start + i * self.record + at;
+        self.wad.error(offset, found, expected)
+    }
+}
+
+fn i32_at(bytes: &[u8], at: usize) -> i32 {
+    i32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
+}
+
+#[cfg(test)]
+mod tests;

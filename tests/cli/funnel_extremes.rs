@@ -1,0 +1,102 @@
+//! `funnel` of scenes at the ends of what it takes: sizes, windows, and how many items lie
+//! behind each other.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+
+use super::BOXES;
+use super::funnel::row;
+use super::process::*;
+
+const FORWARD: &str = "eye_x,eye_y,eye_z,forward_x,forward_y,forward_z,up_x,up_y,up_z";
+
+/// The report of one view; `lens` names the columns behind those of the frame.
+fn report(scene: &str, lens: &str, camera: &str, options: &str) -> Value {
+    let folder = tempfile::tempdir().expect("a folder");
+    write(folder.path(), "scene.csv", &format!("{BOXES}\n{scene}"));
+    write(
+        folder.path(),
+        "cameras.csv",
+        &format!("{FORWARD},{lens}\n{camera}\n"),
+    );
+    let line = "funnel --scene scene.csv --path cameras.csv --processes 1 --format json";
+    json(&works(folder.path(), &format!("{line} {options}")))
+}
+
+fn write(folder: &Path, name: &str, text: &str) {
+    fs::write(folder.join(name), text).expect("written");
+}
+
+#[test]
+fn triangles_are_those_of_the_boxes_in_the_file() {
+    // Where the camera is, numbers of f32 are 8 apart.
+    let scene = "99999950.0,0.0,0.0,100000001.0,100.0,100.0\n\
+                 -100000010.0,0.0,0.0,-100000000.0,10.0,10.0\n";
+    let camera = "100000004.0,-20.0,50.0,-0.2,1.0,0.0,0.0,0.0,1.0,60.0,1.5,0.1,1000.0";
+    let options = "--occlusion none --region none --samples 48x32";
+    let report = report(scene, "fovy_deg,aspect,near,far", camera, options);
+    for name in ["per-triangle", "cone-f32-safe", "several-cones"] {
+        let row = row(&report, "triangle", name);
+        assert_eq!(number(row, "truth_count"), 4.0, "{name}");
+        assert_eq!(number(row, "false_negative_count"), 0.0, "{name}");
+    }
+    let exact = row(&report, "triangle", "per-triangle");
+    assert_eq!(number(exact, "output_count"), 4.0);
+}
+
+#[test]
+fn areas_that_overflow_and_windows_too_narrow_for_f32_lose_nothing() {
+    let large = "4e19,-1e19,-1e19,6e19,1e19,1e19\n8e19,1e19,1e19,1e20,3e19,3e19\n";
+    let camera = "0,0,0,1,0,0,0,0,1,60,1.5,1e19,5e20";
+    let far = report(large, "fovy_deg,aspect,near,far", camera, "--samples 48x32");
+    for pick in array(&far, "picks") {
+        assert_eq!(number(pick, "wrong_count"), 0.0, "{pick}");
+    }
+    assert_eq!(array(&far, "left_out").len(), 0);
+    let tiny = "-8.32e-42,1.48e-41,-9.08e-42,-1.72e-42,1.82e-41,-8.4e-42\n";
+    let camera = "1.64e-42,-1.08e-43,-1.23e-42,-0.376,0.882,-0.2825,0.837,0.527,0.177,3.5e-41,\
+                  1.5,1e-42,1e-37";
+    let narrow = report(
+        tiny,
+        "ortho_height,aspect,near,far",
+        camera,
+        "--samples 48x32",
+    );
+    let row = row(&narrow, "occlusion", "masked-inner");
+    assert_eq!(
+        (number(row, "truth_count"), number(row, "output_count")),
+        (1.0, 1.0)
+    );
+}
+
+/// Forty boxes that overlap are cut into hundreds of parts, each as large in the image.
+#[test]
+fn an_order_that_cuts_too_much_is_left_out_and_says_why() {
+    let of = |i: i32| format!("{0},-50,-50,{1},50,50\n", f64::from(i) * 1e-3, 100 + i);
+    let scene: String = (0..40).map(of).collect();
+    let camera = "-20,1,2,1,0,0,0,0,1,60,1.5,0.1,1000";
+    let report = report(
+        &scene,
+        "fovy_deg,aspect,near,far",
+        camera,
+        "--samples 300x200",
+    );
+    let [row] = &array(&report, "left_out")[..] else {
+        panic!("{}", report["left_out"]);
+    };
+    assert_eq!(
+        (&row["section"], &row["name"]),
+        (&"orders".into(), &"bsp".into())
+    );
+    let reason = row["reason"].as_str().expect("a reason");
+    assert!(reason.contains("samples to be drawn in a view"), "{reason}");
+    let orders = array(&report, "orders");
+    assert!(orders.iter().all(|order| order["name"] != "bsp") && orders.len() >= 4);
+    for order in orders {
+        // Each is in front of all that begin after it, but for those that share a face.
+        assert_eq!(number(order, "pair_count"), 780.0, "{order}");
+        assert!(number(order, "stage_ns") > 0.0);
+    }
+}

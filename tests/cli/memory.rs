@@ -1,0 +1,61 @@
+//! Memory that cannot be had is one line and exit code 2, or a row that is left out, in
+//! every command, and never the end of the program.
+
+use std::path::Path;
+use std::process::Command;
+
+use super::PROGRAM;
+use super::process::*;
+
+/// Runs a command that may take so many KiB of address space.
+fn limited(folder: &Path, kibibytes: u32, line: &str) -> Done {
+    let mut command = Command::new("sh");
+    let script = format!("ulimit -v {kibibytes}; exec {PROGRAM} {line}");
+    let output = command.args(["-c", &script]).current_dir(folder).output();
+    let output = output.expect("the program starts");
+    Done {
+        code: output.status.code(),
+        out: String::from_utf8(output.stdout).expect("UTF-8 on stdout"),
+        err: String::from_utf8(output.stderr).expect("UTF-8 on stderr"),
+    }
+}
+
+#[test]
+fn a_scene_beyond_the_limits_of_the_process_is_one_line() {
+    let folder = folder(&[("points.csv", b"x,y,z\n0,0,0\n")]);
+    let commands = [
+        "scene info SCENE",
+        "scene generate SCENE --out out.csv",
+        "query --scene SCENE --cameras spin:frames=1",
+        "locate --scene SCENE --points points.csv",
+        "verify --scene SCENE --path spin:frames=1",
+        "funnel --scene SCENE --path spin:frames=1",
+        "advise --scene SCENE --path spin:frames=1",
+        "precision --scene SCENE --path spin:frames=1",
+    ];
+    for scene in ["city:n=50000000", "mesh:statue:n=50000000"] {
+        for line in commands {
+            let line = line.replace("SCENE", scene);
+            let done = limited(folder.path(), 500_000, &line);
+            let wanted = format!("{scene}: needs about |  MB are free; expected fewer items");
+            assert_refused(&done, &wanted, &line);
+        }
+    }
+    assert!(!folder.path().join("out.csv").exists());
+    let line = "query --scene uniform:n=5 --cameras orbit:frames=1000000";
+    let wanted = "orbit:frames=1000000 | 1000000 cameras need about 3.0 GB | expected fewer";
+    assert_refused(&limited(folder.path(), 500_000, line), wanted, line);
+}
+
+#[test]
+fn a_structure_beyond_the_limits_leaves_the_others() {
+    let line = "query --scene uniform:n=1500000 --cameras spin:frames=1 --structure";
+    let here = Path::new(".");
+    let done = limited(here, 527_000, &format!("{line} linear,bvh"));
+    assert_eq!(done.code, Some(0), "{done:?}");
+    let told = "left out: 'bvh' needs about 384 MB for 1500000 items, more than";
+    assert!(done.err.starts_with(told), "{}", done.err);
+    assert_eq!(rows(&done.out).len(), 1, "{}", done.out);
+    let done = limited(here, 527_000, &format!("{line} bvh"));
+    assert_refused(&done, "structure 'bvh': | needs about 384 MB", "bvh alone");
+}
