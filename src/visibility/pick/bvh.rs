@@ -7,14 +7,12 @@ use ::bvh::ray::Ray as TheirRay;
 use glam::{DVec3, Vec3};
 use nalgebra::{Point3, Vector3};
 
-use super::contract::{
-    BackEnd, Hit, NotBuilt, Pick, keep_nearest, keep_nearest_items, refuse_stacks,
-};
+use super::contract::{BackEnd, Hit, NotBuilt, Pick, keep_nearest, keep_nearest_items};
 use super::facets::Facets;
 use super::rounded::RoundedRay;
 use crate::geometry::Aabb;
-use crate::index::Record;
 use crate::index::peers::{Shape, bounds_of};
+use crate::index::{Record, ploc};
 use crate::kernel::Kernel;
 use crate::visibility::{Guarantee, Ray, Solids};
 
@@ -46,7 +44,13 @@ pub struct PickBvh {
 }
 
 fn tree(boxes: &[Aabb]) -> Result<(Bvh<f32, 3>, Vec<Shape>), NotBuilt> {
-    refuse_stacks(ROW.name, boxes)?;
+    if let Some(alike) = ploc::too_many_alike(boxes.iter()) {
+        return Err(NotBuilt::Alike {
+            name: ROW.name,
+            alike,
+            most: ploc::MOST_ALIKE,
+        });
+    }
     let records = Record::numbered(boxes).into_iter();
     let mut shapes: Vec<Shape> = records.map(Shape::from).collect();
     Ok((Bvh::build(&mut shapes), shapes))

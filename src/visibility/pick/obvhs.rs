@@ -8,9 +8,7 @@ use ::obvhs::ray::{Ray as TheirRay, RayHit};
 use ::obvhs::triangle::Triangle as TheirTriangle;
 use glam::DVec3;
 
-use super::contract::{
-    BackEnd, Hit, NotBuilt, Pick, keep_nearest, keep_nearest_items, refuse_stacks,
-};
+use super::contract::{BackEnd, Hit, Pick, keep_nearest, keep_nearest_items};
 use super::facets::Facets;
 use super::rounded::RoundedRay;
 use crate::geometry::Aabb;
@@ -24,8 +22,8 @@ pub const ROW: BackEnd = BackEnd {
     summary: "crate obvhs, binary tree, one item a leaf, its ray_traverse",
     // Rays, nodes and boxes are rounded to f32.
     guarantee: Guarantee::Unproven,
-    build: |solids, _| Obvhs::<Bvh2>::boxed(solids, ROW.name),
-    build_triangles: Some(|facets, _| ObvhsTriangles::<Bvh2>::boxed(facets, ROW.name)),
+    build: |solids, _| Ok(Obvhs::<Bvh2>::boxed(solids)),
+    build_triangles: Some(|facets, _| Ok(ObvhsTriangles::<Bvh2>::boxed(facets))),
 };
 
 /// The row of the eight-wide tree.
@@ -33,8 +31,8 @@ pub const ROW_WIDE: BackEnd = BackEnd {
     name: "obvhs-cwbvh",
     summary: "crate obvhs, eight-wide quantised tree, its ray_traverse",
     guarantee: Guarantee::Unproven,
-    build: |solids, _| Obvhs::<CwBvh>::boxed(solids, ROW_WIDE.name),
-    build_triangles: Some(|facets, _| ObvhsTriangles::<CwBvh>::boxed(facets, ROW_WIDE.name)),
+    build: |solids, _| Ok(Obvhs::<CwBvh>::boxed(solids)),
+    build_triangles: Some(|facets, _| Ok(ObvhsTriangles::<CwBvh>::boxed(facets))),
 };
 
 /// A tree of the crate that rays are cast through.
@@ -110,16 +108,15 @@ struct Obvhs<T> {
 }
 
 impl<T: Cast> Obvhs<T> {
-    fn boxed(solids: &Solids, name: &'static str) -> Result<Box<dyn Pick>, NotBuilt> {
-        refuse_stacks(name, &solids.outer)?;
+    fn boxed(solids: &Solids) -> Box<dyn Pick> {
         let tree = T::of(&solids.outer);
         let ids = tree.order().to_vec();
-        Ok(Box::new(Obvhs {
+        Box::new(Obvhs {
             boxes: ids.iter().map(|&id| solids.outer[id as usize]).collect(),
             ids,
             zero: solids.origin,
             tree,
-        }))
+        })
     }
 }
 
@@ -167,21 +164,20 @@ struct ObvhsTriangles<T> {
 }
 
 impl<T: Cast> ObvhsTriangles<T> {
-    fn boxed(facets: &Facets, name: &'static str) -> Result<Box<dyn Pick>, NotBuilt> {
+    fn boxed(facets: &Facets) -> Box<dyn Pick> {
         let boxes = facets.bounds();
-        refuse_stacks(name, &boxes)?;
         let tree = T::of(&boxes);
         let placed = tree.order().iter().map(|&place| {
             let facet = &facets.all[place as usize];
             let [v0, v1, v2] = facet.corners.map(Into::into);
             (TheirTriangle { v0, v1, v2 }, facet.two_sided, facet.item)
         });
-        Ok(Box::new(ObvhsTriangles {
+        Box::new(ObvhsTriangles {
             triangles: placed.collect(),
             zero: facets.origin,
             items: facets.items,
             tree,
-        }))
+        })
     }
 
     /// Depth at which a triangle is met, infinite if it is not.
