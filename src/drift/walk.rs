@@ -1,5 +1,5 @@
-//! Taking many steps of one kind and looking at where they led, and steps as tasks of
-//! the timed pass. What a step is, its owners know.
+//! Many steps of one kind with looks at where they led, and such steps as tasks of the
+//! timed pass.
 
 use std::hint::black_box;
 
@@ -36,19 +36,14 @@ pub const QUERIES: usize = 8;
 /// Steps of a frame or an eye in one query.
 pub const QUERY_STEPS: u64 = 500;
 
-/// A task of the timed pass, and how many steps or simulated seconds one query is.
-pub struct Repeated {
-    pub task: TimedTask<'static>,
-    pub units: f64,
+/// A task of the timed pass that asks for nothing.
+pub fn task(run: impl Fn() + 'static) -> TimedTask<'static> {
+    TimedTask::new(vec![0; QUERIES], move |_, _| run())
 }
 
-impl Repeated {
-    pub fn new(units: f64, run: impl Fn() + 'static) -> Repeated {
-        Repeated {
-            task: TimedTask::new(vec![0; QUERIES], move |_, _| run()),
-            units,
-        }
-    }
+/// The task of [`QUERY_STEPS`] equal steps.
+pub fn walking<S: 'static, P: 'static>(walk: Walk<S, P>, by: S) -> TimedTask<'static> {
+    task(move || drop(walk(&by, &[QUERY_STEPS])))
 }
 
 #[cfg(test)]
