@@ -31,15 +31,16 @@ pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
     interrupt::from_now_on_finish();
     let workers = Workers::of_study()?;
     let study = Study::new(String::new(), drift::jobs(&options) as u64, &args.spread);
-    let prepared = drift::prepare(&options, &protocol(args, 0), |job| {
+    let report = drift::prepare(&options, |job| {
         study.begin(job);
         study.advance();
         interrupt::asked()
     });
-    let prepared = prepared.ok_or(Interrupted)?;
-    let job = |timing| Job::Drift(prepared.schedule.clone(), timing);
+    let mut report = report.ok_or(Interrupted)?;
+    let schedule = drift::plan(&options, &protocol(args, 0));
+    let job = |timing| Job::Drift(schedule.clone(), timing);
     let times = study.times(&workers, "everything, timed", None, job)?;
-    let report = prepared.conclude(&times);
+    report.conclude(&times, schedule.rounds);
     if let Some(file) = &args.svg {
         write_text(file, &drift_diagram::draw(&report.arm)?)?;
     }
@@ -56,14 +57,13 @@ fn options(args: &DriftArgs) -> DriftOptions {
         list.dedup();
         list
     };
+    let mut arms = ArmKind::ALL.to_vec();
+    arms.retain(|kind| args.arm.contains(kind));
     DriftOptions {
         steps: args.steps,
         tolerance_rad: args.tolerance,
         arm: ArmOptions {
-            arms: ArmKind::ALL
-                .into_iter()
-                .filter(|kind| args.arm.contains(kind))
-                .collect(),
+            arms,
             stiffnesses: once(&args.stiffness),
             rates_hz: once(&args.rate),
             seconds: args.seconds,

@@ -110,11 +110,9 @@ fn stability(limits: &[StabilityLimit]) -> Table {
     let methods: Vec<_> = limits.chunk_by(|a, b| a.method == b.method).collect();
     let ratios = methods.iter().take(1).flat_map(|own| own.iter());
     let ratios = ratios.map(|limit| format!("zeta={}", limit.damping_ratio));
-    let header = ["stable while omega h <".to_owned()]
-        .into_iter()
-        .chain(ratios);
+    let first = ["stable while omega h <".to_owned()].into_iter();
     let left = ["left per step at 16.7, zeta=1".to_owned()];
-    let mut table = Table::of_numbers(header.chain(left)).fit(WIDTH);
+    let mut table = Table::of_numbers(first.chain(ratios).chain(left)).fit(WIDTH);
     for own in methods {
         let limit = |limit: &StabilityLimit| match limit.limit_omega_h {
             Some(limit) => format!("{limit:.4}"),
@@ -132,30 +130,19 @@ fn stability(limits: &[StabilityLimit]) -> Table {
 }
 
 fn choices(report: &ArmReport) -> Table {
-    let header = [
-        format!("to take within {:e}", report.tolerance),
-        "method".into(),
-    ];
-    let columns = ["error", "time per s", "why"].map(String::from);
-    let mut table = Table::new(header.into_iter().chain(columns), &[2, 3]).fit(WIDTH);
+    let header = format!("to take within {:e}", report.tolerance);
+    let header = [header.as_str(), "method", "error", "time per s", "why"];
+    let mut table = Table::new(header, &[2, 3]).fit(WIDTH);
     for choice in &report.choices {
         let setting = &choice.setting;
+        let (arm, k, rate) = (setting.arm.name(), setting.stiffness, setting.rate_hz);
+        let error = choice.position_error.map(|error| format!("{error:.1e}"));
+        let time = choice.us_per_second.map(|us| text::time(us * 1e3));
         table.add_row([
-            format!(
-                "{} k={:e}, {} Hz",
-                setting.arm.name(),
-                setting.stiffness,
-                setting.rate_hz
-            ),
+            format!("{arm} k={k:e}, {rate} Hz"),
             choice.choice.name.clone().unwrap_or("nothing".into()),
-            choice
-                .position_error
-                .map(|error| format!("{error:.1e}"))
-                .unwrap_or_default(),
-            choice
-                .us_per_second
-                .map(|us| text::time(us * 1e3))
-                .unwrap_or_default(),
+            error.unwrap_or_default(),
+            time.unwrap_or_default(),
             choice.choice.reason.clone(),
         ]);
     }

@@ -57,31 +57,26 @@ pub struct Chase {
 impl Chase {
     /// A critically damped arm behind `sin t`, in frames until `seconds` are over.
     pub fn new(kind: ArmKind, stiffness: f64, rate_hz: f64, seconds: f64) -> Chase {
-        let (stiffening, stop, start) = match kind {
+        let (stiffening, stop, from) = match kind {
             ArmKind::Linear => (0.0, f64::INFINITY, 1.0),
             ArmKind::Collision => (1.0, 0.6, -1.0),
         };
-        let friction = 2.0 * stiffness.sqrt();
-        let (frame_s, mut start_s, mut frames) = (1.0 / rate_hz, 0.0, Vec::new());
-        while start_s < seconds * (1.0 - 1e-9) {
-            let (base, end_s) = (libm::sin(start_s), start_s + frame_s);
-            let speed = (libm::sin(end_s) - base) / frame_s;
-            frames.push(Line {
-                start: start_s,
-                base,
-                speed,
-            });
-            start_s = end_s;
+        let (frame_s, mut start, mut frames) = (1.0 / rate_hz, 0.0, Vec::new());
+        while start < seconds * (1.0 - 1e-9) {
+            let (base, end) = (libm::sin(start), start + frame_s);
+            let speed = (libm::sin(end) - base) / frame_s;
+            frames.push(Line { start, base, speed });
+            start = end;
         }
-        let arm = Arm {
-            stiffness,
-            friction,
-            stiffening,
-            stop,
-        };
+        let friction = 2.0 * stiffness.sqrt();
         Chase {
-            arm,
-            start: [start, 0.0],
+            arm: Arm {
+                stiffness,
+                friction,
+                stiffening,
+                stop,
+            },
+            start: [from, 0.0],
             frames,
             frame_s,
         }
@@ -246,5 +241,112 @@ impl Arm {
         let base = [0, 1].map(|i| newer * middle[i] - older * y[i]);
         // (1 - gamma)/(2 - gamma) = gamma/2 for this gamma.
         self.stage(line.at(t + h), base, middle, g)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::arm_study::{ArmOptions, ArmPoint, errors, settings};
+    use super::super::exact::linear_way;
+    use super::*;
+
+    #[test]
+    fn the_reference_is_the_closed_form_where_there_is_one() {
+        for stiffness in [1e2, 1e4, 1e6] {
+            let chase = Chase::new(ArmKind::Linear, stiffness, 30.0, 1.0);
+            let omega = stiffness.sqrt();
+            let count = (omega / 30.0 / 5e-4).ceil() as u32;
+            let truth = |chase: &Chase, count, keep: &mut dyn FnMut(State)| {
+                chase.follow(count, keep, |arm, line, t, y, h| {
+                    arm.rk4(|t| libm::sin(line.start + t), t, y, h)
+                });
+            };
+            let closed = linear_way(omega, chase.frame_s, chase.frames.len());
+            for (a, b) in chase.states(truth, count).iter().zip(&closed) {
+                assert!((a[0] - b[0]).abs() < 1e-12, "{stiffness}: {a:?} {b:?}");
+            }
+            let exact = METHODS.iter().find(|m| m.name == EXACT).expect("a row");
+            let lines = chase.states(exact.follow, 1);
+            for (a, b) in chase.states(rk4, count).iter().zip(&lines) {
+                assert!((a[0] - b[0]).abs() < 1e-12, "{stiffness}: {a:?} {b:?}");
+            }
+        }
+    }
+
+    /// sin t = 0.6 on the way down: until then the arm is pushed into its stop.
+    #[test]
+    fn the_stop_is_met_and_left() {
+        let chase = Chase::new(ArmKind::Collision, 1e2, 60.0, 3.0);
+        let left = std::f64::consts::PI - 0.6f64.asin();
+        let states = chase.states(rk4, 500);
+        let at_stop = |i: &usize| states[*i] == [0.6, 0.0];
+        let first = (0..states.len()).find(at_stop).expect("it is met");
+        let last = (0..states.len()).rfind(at_stop).expect("it is met");
+        assert!((first..=last).all(|i| at_stop(&i)) && first < 60);
+        let end = |i: usize| chase.frames[i].start + chase.frame_s;
+        assert!(end(last) <= left + 1e-9 && end(last + 1) > left - 1e-9);
+    }
+
+    fn points(arm: ArmKind, stiffness: f64, seconds: f64) -> Vec<ArmPoint> {
+        let options = ArmOptions {
+            arms: vec![arm],
+            stiffnesses: vec![stiffness],
+            rates_hz: vec![60.0],
+            seconds,
+            tolerance: 1e-3,
+        };
+        errors(settings(&options)[0], options.seconds)
+    }
+
+    fn find<'p>(points: &'p [ArmPoint], label: &str) -> &'p ArmPoint {
+        points.iter().find(|p| p.label() == label).expect(label)
+    }
+
+    #[test]
+    fn orders_show_and_are_reduced_at_the_stop() {
+        let soft = points(ArmKind::Linear, 1e2, 2.0);
+        for method in METHODS.iter().filter(|method| method.name != EXACT) {
+            let point = find(&soft, &format!("{} x4", method.name));
+            let order = point.observed_order.expect("an order");
+            assert!((order - f64::from(method.order)).abs() < 0.3, "{point:?}");
+            assert!(!point.order_reduced, "{point:?}");
+        }
+        assert!(find(&soft, EXACT).own_error < Some(1e-13));
+        let stopped = points(ArmKind::Collision, 1e2, 4.0);
+        let reduced = ["rk4 x2", "rk4 x4", "rk4 x16"];
+        let reduced = reduced.map(|label| find(&stopped, label).order_reduced);
+        assert!(reduced.contains(&true), "{reduced:?}");
+        let order = find(&stopped, "exact-linear x4").observed_order;
+        assert!((order.expect("an order") - 1.0).abs() < 0.1, "{order:?}");
+    }
+
+    /// The figures of the study as it was with every reference of its own.
+    #[test]
+    fn errors_of_the_collision_arm_have_their_known_size() {
+        for (stiffness, label, wanted) in [
+            (1e2, "tr-bdf2", 1.429_168e-3),
+            (1e4, "rk4 x4", 9.433_686e-4),
+            (1e6, "exact-linear", 9.998_789e-4),
+        ] {
+            let points = points(ArmKind::Collision, stiffness, 1.0);
+            let found = find(&points, label).position_error.expect("stable");
+            assert!((found / wanted - 1.0).abs() < 1e-6, "{label}: {found:e}");
+        }
+    }
+
+    #[test]
+    fn explicit_methods_blow_up_exactly_beyond_their_limits() {
+        let explicit = ["explicit-euler", "semi-implicit-euler", "rk4"];
+        for (stiffness, unstable) in [
+            (1e3, &explicit[..0]),
+            (1e4, &explicit[1..2]),
+            (1e5, &explicit[..]),
+        ] {
+            let points = points(ArmKind::Linear, stiffness, 2.0);
+            for method in METHODS {
+                let lost = find(&points, method.name).position_error.is_none();
+                assert_eq!(lost, unstable.contains(&method.name), "{}", method.name);
+            }
+        }
     }
 }

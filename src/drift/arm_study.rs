@@ -110,10 +110,9 @@ impl Setting {
     /// Methods with their numbers of steps, those that make a difference on this arm.
     fn efforts(&self) -> impl Iterator<Item = (&'static Method, u32)> + use<> {
         let is_linear = self.arm == ArmKind::Linear;
-        let all = METHODS
-            .iter()
-            .flat_map(|method| method.substeps.iter().map(move |n| (method, *n)));
-        all.filter(move |(method, substeps)| !is_linear || method.name != EXACT || *substeps == 1)
+        let of = |method: &'static Method| method.substeps.iter().map(move |n| (method, *n));
+        let all = METHODS.iter().flat_map(of);
+        all.filter(move |(method, n)| !is_linear || method.name != EXACT || *n == 1)
     }
 }
 
@@ -215,40 +214,28 @@ pub fn conclude(
     let setting = points.first()?.setting;
     let mut candidates = Vec::new();
     for ((task, point), (_, seconds)) in (first..).zip(&mut *points).zip(tasks(setting)) {
-        let Some(error) = point.position_error else {
-            continue;
-        };
-        let ln_ns = times
-            .ln_ns(task)
-            .iter()
-            .map(|ns| ns - seconds.ln())
-            .collect();
-        candidates.push(Candidate {
-            name: point.label(),
-            error,
-            ln_ns,
-        });
-        [
-            point.us_per_second,
-            point.us_per_second_lower,
-            point.us_per_second_upper,
-        ] = per_unit(times, task, 1e3 * seconds);
+        if let Some(error) = point.position_error {
+            let ln_ns = times.ln_ns(task).into_iter();
+            candidates.push(Candidate {
+                name: point.label(),
+                error,
+                ln_ns: ln_ns.map(|ns| ns - seconds.ln()).collect(),
+            });
+            let us = per_unit(times, task, 1e3 * seconds);
+            point.us_per_second = us[0];
+            point.us_per_second_lower = us[1];
+            point.us_per_second_upper = us[2];
+        }
     }
-    let mut choice = recommended(
-        &candidates,
-        tolerance,
-        &format!("an error within {tolerance:e}"),
-    );
-    let taken = points
-        .iter()
-        .find(|point| choice.name.as_ref() == Some(&point.label()));
-    let step = taken.map_or(0.0, |point| setting.omega_h / f64::from(point.substeps));
-    let method = METHODS
-        .iter()
-        .find(|method| taken.is_some_and(|p| p.method == method.name));
-    let free = method
-        .and_then(|method| stability::limit(method, 1.0))
-        .map(|limit| 1.0 - step / limit);
+    let rule = format!("an error within {tolerance:e}");
+    let mut choice = recommended(&candidates, tolerance, &rule);
+    let is_taken = |point: &&ArmPoint| choice.name.as_ref() == Some(&point.label());
+    let taken = points.iter().find(is_taken);
+    let free = taken.and_then(|point| {
+        let method = METHODS.iter().find(|method| method.name == point.method);
+        let step = setting.omega_h / f64::from(point.substeps);
+        Some(1.0 - step / stability::limit(method?, 1.0)?)
+    });
     choice.reason += &small_margin("its step", "the limit of stability", free);
     Some(ArmChoice {
         setting,

@@ -59,3 +59,46 @@ pub fn chased(arm: &Arm, line: &Line, t: f64, [x, v]: State, h: f64) -> State {
     let [x, v] = released(secant, zeta, [x - steady(t), v - line.speed], h);
     [steady(t + h) + x, line.speed + v]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::arithmetic::Expansion;
+
+    /// The series of the matrix exponential in 200 bits: no case distinction,
+    /// no square root of anything but k.
+    fn by_series(k: f64, zeta: f64, [x, v]: State, t: f64) -> State {
+        let [k, zeta, t] = [k, zeta, t].map(Expansion::from);
+        let omega = k.sqrt(5);
+        let friction = (&(&zeta * &omega) * &Expansion::from(2.0)).leading(5);
+        let (mut x, mut v) = (Expansion::from(x), Expansion::from(v));
+        let mut sum = [x.clone(), v.clone()];
+        for n in 1..400 {
+            let share = t.over(f64::from(n), 5);
+            let pull = &-&(&k * &x) - &(&friction * &v);
+            (x, v) = (
+                (&v * &share).leading(5),
+                (&pull.leading(5) * &share).leading(5),
+            );
+            sum = [(&sum[0] + &x).leading(5), (&sum[1] + &v).leading(5)];
+        }
+        sum.map(|sum| sum.estimate())
+    }
+
+    #[test]
+    fn the_released_arm_is_right_at_and_near_critical_damping() {
+        let near = [0.0, 1e-15, 1e-12, 1e-9, 1e-6, 1e-4, 1e-3, 1e-2];
+        let near = near.into_iter().flat_map(|d| [1.0 - d, 1.0 + d]);
+        for zeta in near.chain([0.1, 0.5, 2.0, 5.0]) {
+            for (k, t) in [(1.0, 0.01), (1e2, 1.0 / 60.0), (1e4, 0.05), (1e6, 0.008)] {
+                let state = [1.0, -3.0];
+                let (found, wanted) = (released(k, zeta, state, t), by_series(k, zeta, state, t));
+                let off = (found[0] - wanted[0]).abs();
+                let off = off.max((found[1] - wanted[1]).abs() / k.sqrt());
+                assert!(off < 2e-15, "{k} {zeta} {t}: {off:e}");
+            }
+        }
+        // exp times cosh would be zero times infinity here.
+        assert!(released(1e6, 2.0, [1.0, -3.0], 20.0)[0].abs() < 1e-300);
+    }
+}

@@ -394,4 +394,38 @@ mod tests {
         }
         assert!(Matrix::from(DMat3::NAN).orthogonality_error().is_nan());
     }
+
+    #[test]
+    fn the_chase_of_a_sine_is_that_of_another_program() {
+        // Position and velocity by the closed form with 50 digits, from (1, 0).
+        for (stiffness, t, wanted) in [
+            (
+                1e2,
+                0.25,
+                [0.373_848_712_904_617_2, -1.346_139_945_323_537_3],
+            ),
+            (
+                1e2,
+                2.0,
+                [0.964_056_336_238_460_4, -0.225_591_948_837_311_96],
+            ),
+            (
+                1e4,
+                0.25,
+                [0.227_955_377_434_252_8, 0.973_568_851_059_739_9],
+            ),
+            (
+                1e6,
+                2.0,
+                [0.910_126_990_946_457_1, -0.414_326_996_892_246_4],
+            ),
+        ] {
+            for frames in [1, 64] {
+                let way = linear_way(f64::sqrt(stiffness), t / frames as f64, frames);
+                for (found, wanted) in way[frames - 1].into_iter().zip(wanted) {
+                    assert!((found - wanted).abs() < 4e-16, "{stiffness} {t}: {found}");
+                }
+            }
+        }
+    }
 }

@@ -25,7 +25,7 @@ pub use rotation::{ORBIT_RADIUS, PERIOD, RotationDrift, TurnDrift};
 pub use stability::StabilityLimit;
 
 use crate::measure::{OverProcesses, ProcessTimes, Protocol, Schedule, TimedTask, timed};
-use orbit::CARRIERS;
+use orbit::{CARRIERS, SWING};
 use rated::rated;
 use rotation::{METHODS, Method, STEADY, moments};
 use walk::{QUERIES, walking};
@@ -49,7 +49,7 @@ pub struct DriftOptions {
 }
 
 /// The study of spring arms.
-#[derive(Debug, Serialize)]
+#[derive(Default, Debug, Serialize)]
 pub struct ArmReport {
     /// Simulated time.
     pub seconds: f64,
@@ -66,7 +66,7 @@ pub struct ArmReport {
 }
 
 /// Everything `cullbench drift` finds.
-#[derive(Debug, Serialize)]
+#[derive(Default, Debug, Serialize)]
 pub struct DriftReport {
     /// The most steps.
     pub steps: u64,
@@ -98,17 +98,6 @@ pub struct DriftReport {
     pub arm: ArmReport,
 }
 
-/// All errors, without times.
-pub struct Prepared {
-    /// What all processes are to measure.
-    pub schedule: Schedule,
-    options: DriftOptions,
-    rotation: Vec<RotationDrift>,
-    one_degree_turns: Vec<TurnDrift>,
-    orbit: Vec<OrbitDrift>,
-    points: Vec<ArmPoint>,
-}
-
 /// Jobs that `progress` of [`prepare`] is told of.
 pub fn jobs(options: &DriftOptions) -> usize {
     METHODS.len() + CARRIERS.len() + arm_study::settings(&options.arm).len()
@@ -121,54 +110,61 @@ fn looks(most: u64) -> Vec<u64> {
     below.chain([most]).collect()
 }
 
-/// Finds all errors and plans how everything is timed; `progress` gets each job's
-/// name before it starts, and ends the work early by returning true.
+/// Finds all errors: a report without times. `progress` gets each job's name before it
+/// starts, and ends the work early by returning true.
 pub fn prepare(
     options: &DriftOptions,
-    protocol: &Protocol,
     mut progress: impl FnMut(&str) -> bool,
-) -> Option<Prepared> {
+) -> Option<DriftReport> {
     let looks = looks(options.steps);
     let moments = moments(&looks);
-    let (mut rotation, mut one_degree_turns) = (Vec::new(), Vec::new());
-    let (mut orbit, mut points) = (Vec::new(), Vec::new());
+    let mut report = DriftReport {
+        steps: options.steps,
+        tolerance_rad: options.tolerance_rad,
+        turn_per_step: STEADY,
+        period_steps: PERIOD,
+        ..DriftReport::default()
+    };
     let mut goes_on = |job: &str| (!progress(job)).then_some(());
     for method in METHODS {
         goes_on(method.name)?;
-        rotation.extend(method.drift(&moments));
-        one_degree_turns.extend(method.turn_drift(&TURNS));
+        report.rotation.extend(method.drift(&moments));
+        let turns = method.turn_drift(&TURNS);
+        report.one_degree_turns.extend(turns);
     }
     for carrier in CARRIERS {
         goes_on(carrier.name)?;
-        orbit.extend(carrier.drift(&looks));
+        report.orbit.extend(orbit::drift(carrier, &looks));
     }
+    let mut points = Vec::new();
     for setting in arm_study::settings(&options.arm) {
-        goes_on(&format!(
-            "{} arm, k = {:e}",
-            setting.arm.name(),
-            setting.stiffness
-        ))?;
+        let (arm, k) = (setting.arm.name(), setting.stiffness);
+        goes_on(&format!("{arm} arm, k = {k:e}"))?;
         points.extend(arm_study::errors(setting, options.arm.seconds));
     }
-    Some(Prepared {
-        schedule: Schedule::new(QUERIES, &tasks(options), protocol),
-        options: options.clone(),
-        rotation,
-        one_degree_turns,
-        orbit,
+    report.arm = ArmReport {
+        seconds: options.arm.seconds,
+        tolerance: options.arm.tolerance,
+        methods: arm::METHODS,
         points,
-    })
+        stability: stability::limits(),
+        choices: Vec::new(),
+    };
+    Some(report)
 }
 
 /// All that is timed: frames, eyes, arms.
 fn tasks(options: &DriftOptions) -> Vec<TimedTask<'static>> {
     let frames = METHODS.iter().map(|method| walking(method.walk, STEADY));
-    let eyes = CARRIERS
-        .iter()
-        .map(|carrier| walking(carrier.walk, SWING_DEG));
+    let eyes = CARRIERS.iter().map(|carrier| walking(carrier.walk, SWING));
     let settings = arm_study::settings(&options.arm).into_iter();
     let arms = settings.flat_map(arm_study::tasks).map(|(task, _)| task);
     frames.chain(eyes).chain(arms).collect()
+}
+
+/// Plans how everything is timed, the same in every process.
+pub fn plan(options: &DriftOptions, protocol: &Protocol) -> Schedule {
+    Schedule::new(QUERIES, &tasks(options), protocol)
 }
 
 /// Times in this process what was planned; `None` if stopped.
@@ -182,61 +178,29 @@ pub fn time(
     Some(ProcessTimes::of(&timed))
 }
 
-impl Prepared {
-    /// The report from the times of all processes.
-    pub fn conclude(mut self, processes: &[ProcessTimes]) -> DriftReport {
+impl DriftReport {
+    /// Fills in the times of all processes, of so many rounds, and what follows.
+    pub fn conclude(&mut self, processes: &[ProcessTimes], rounds: u32) {
         let times = OverProcesses::of(processes);
-        let DriftOptions {
-            steps,
-            tolerance_rad,
-            arm,
-        } = self.options;
-        let (rotation_methods, recommended_rotation) =
-            rate(METHODS.iter(), &self.rotation, steps, tolerance_rad, &times);
-        let eyes = CARRIERS.iter().map(|carrier| {
+        (self.processes, self.rounds) = (processes.len(), rounds as usize);
+        let turned = frame_errors(METHODS.iter(), &self.rotation);
+        let carried = CARRIERS.iter().map(|carrier| {
             let own = self.orbit.iter().filter(|d| d.method == carrier.name);
-            let error = own.last().map(|d| d.position_error / ORBIT_RADIUS);
-            (carrier.name, carrier.summary, error)
+            (carrier, own.last().map(|d| d.position_error / ORBIT_RADIUS))
         });
-        let rule = rule(tolerance_rad, steps);
-        let (orbit_methods, recommended_orbit) =
-            rated(eyes, &times, METHODS.len(), tolerance_rad, &rule);
-        let (mut choices, mut first) = (Vec::new(), METHODS.len() + CARRIERS.len());
-        for points in self.points.chunk_by_mut(|a, b| a.setting == b.setting) {
-            choices.extend(arm_study::conclude(points, &times, first, arm.tolerance));
+        let limit = (self.tolerance_rad, self.steps);
+        let turned = rated(turned, &times, 0, limit);
+        let carried = rated(carried, &times, METHODS.len(), limit);
+        (self.rotation_methods, self.recommended_rotation) = turned;
+        (self.orbit_methods, self.recommended_orbit) = carried;
+        let mut first = METHODS.len() + CARRIERS.len();
+        let settings = self.arm.points.chunk_by_mut(|a, b| a.setting == b.setting);
+        for points in settings {
+            let choice = arm_study::conclude(points, &times, first, self.arm.tolerance);
+            self.arm.choices.extend(choice);
             first += points.len();
         }
-        DriftReport {
-            steps,
-            tolerance_rad,
-            processes: processes.len(),
-            rounds: self.schedule.rounds as usize,
-            turn_per_step: STEADY,
-            period_steps: PERIOD,
-            rotation: self.rotation,
-            one_degree_turns: self.one_degree_turns,
-            orbit: self.orbit,
-            rotation_methods,
-            orbit_methods,
-            recommended_rotation,
-            recommended_orbit,
-            arm: ArmReport {
-                seconds: arm.seconds,
-                tolerance: arm.tolerance,
-                methods: arm::METHODS,
-                points: self.points,
-                stability: stability::limits(),
-                choices,
-            },
-        }
     }
-}
-
-fn rule(tolerance: f64, steps: u64) -> String {
-    format!(
-        "an error within {tolerance:e} after {:e} steps",
-        steps as f64
-    )
 }
 
 /// Ways to turn a frame with their errors after the most steps, timed in this process
@@ -256,29 +220,29 @@ pub fn rotations(names: &[&str], steps: u64, tolerance: f64) -> Vec<Rated> {
     let tasks: Vec<TimedTask> = methods().map(|m| walking(m.walk, STEADY)).collect();
     let timed = crate::measure::timed_rounds(QUERIES, &tasks, &protocol, &|| false);
     let times = OverProcesses::of(&[ProcessTimes::of(&timed.unwrap_or_default())]);
-    rate(methods(), &drifts, steps, tolerance, &times).0
+    rated(
+        frame_errors(methods(), &drifts),
+        &times,
+        0,
+        (tolerance, steps),
+    )
+    .0
 }
 
-fn rate<'m>(
+/// The larger error of each method after the most steps.
+fn frame_errors<'m>(
     methods: impl Iterator<Item = &'m Method>,
     drifts: &[RotationDrift],
-    steps: u64,
-    tolerance: f64,
-    times: &OverProcesses,
-) -> (Vec<Rated>, Recommendation) {
-    let rows = methods.map(|method| {
-        let last = drifts
-            .iter()
-            .filter(|d| d.method == method.name)
-            .next_back();
+) -> impl Iterator<Item = (&'m Method, Option<f64>)> {
+    methods.map(|method| {
+        let last = drifts.iter().rfind(|d| d.method == method.name);
         // NaN is no maximum to `max`: a frame that is lost has no error.
-        let error = last.and_then(|d| {
-            let lost = d.angle_error_rad.is_nan() || d.orthogonality_error.is_nan();
-            (!lost).then(|| d.angle_error_rad.max(d.orthogonality_error))
-        });
-        (method.name, method.summary, error)
-    });
-    rated(rows, times, 0, tolerance, &rule(tolerance, steps))
+        let error = last.filter(|d| !(d.angle_error_rad + d.orthogonality_error).is_nan());
+        (
+            method,
+            error.map(|d| d.angle_error_rad.max(d.orthogonality_error)),
+        )
+    })
 }
 
 #[cfg(test)]

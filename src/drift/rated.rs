@@ -2,8 +2,9 @@
 
 use serde::Serialize;
 
+use super::orbit;
+use super::rotation::{self, Method};
 use super::walk::QUERY_STEPS;
-use super::{orbit, rotation};
 use crate::measure::OverProcesses;
 use crate::statistics::{ALPHA, ranks};
 
@@ -30,7 +31,7 @@ pub struct Rated {
 }
 
 /// A method to take, and why.
-#[derive(Debug, Serialize)]
+#[derive(Default, Debug, Serialize)]
 pub struct Recommendation {
     /// `None` if nothing is good enough.
     pub name: Option<String>,
@@ -56,37 +57,39 @@ pub fn per_unit(times: &OverProcesses, task: usize, units: f64) -> [Option<f64>;
     found.map_or([None; 3], |found| found.map(finite))
 }
 
-/// Names with summaries and errors, and the times of the tasks from `first` on; which of
-/// those within the tolerance to take.
-pub fn rated(
-    rows: impl Iterator<Item = (&'static str, &'static str, Option<f64>)>,
+/// Methods with their errors, and the times of the tasks from `first` on; which to take
+/// of those within a tolerance after so many steps.
+pub fn rated<'m>(
+    rows: impl Iterator<Item = (&'m Method, Option<f64>)>,
     times: &OverProcesses,
     first: usize,
-    tolerance: f64,
-    rule: &str,
+    (tolerance, steps): (f64, u64),
 ) -> (Vec<Rated>, Recommendation) {
-    let mut candidates = Vec::new();
-    let row = |(task, (name, summary, error)): (usize, (_, _, Option<f64>))| {
+    let (mut all, mut candidates) = (Vec::new(), Vec::new());
+    for (task, (method, error)) in (first..).zip(rows) {
+        let name = method.name;
         candidates.extend(error.map(|error| Candidate {
-            name: String::from(name),
+            name: name.to_owned(),
             error,
             ln_ns: times.ln_ns(task),
         }));
-        let [ns_per_step, ns_per_step_lower, ns_per_step_upper] =
-            per_unit(times, task, QUERY_STEPS as f64);
-        Rated {
+        let ns = per_unit(times, task, QUERY_STEPS as f64);
+        all.push(Rated {
             name,
-            summary,
+            summary: method.summary,
             is_default: [rotation::TOOLKIT, orbit::TOOLKIT].contains(&name),
             error,
-            ns_per_step,
-            ns_per_step_lower,
-            ns_per_step_upper,
+            ns_per_step: ns[0],
+            ns_per_step_lower: ns[1],
+            ns_per_step_upper: ns[2],
             qualifies: error.is_some_and(|error| error <= tolerance),
-        }
-    };
-    let rows = (first..).zip(rows).map(row).collect();
-    (rows, recommended(&candidates, tolerance, rule))
+        });
+    }
+    let rule = format!(
+        "an error within {tolerance:e} after {:e} steps",
+        steps as f64
+    );
+    (all, recommended(&candidates, tolerance, &rule))
 }
 
 /// Margins below this share of a limit are said.
@@ -129,5 +132,66 @@ pub fn recommended(candidates: &[Candidate], tolerance: f64, rule: &str) -> Reco
         as_fast,
         margin,
         reason,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rough and fast, precise, slower and less precise; the third is `noise` faster or
+    /// slower in every other process.
+    fn three(processes: i32, noise: f64) -> Vec<Candidate> {
+        let row = |(name, error, ns): (&str, f64, f64)| Candidate {
+            name: name.to_owned(),
+            error,
+            ln_ns: (0..processes)
+                .map(|n| {
+                    let noise = if name == "slow" { noise } else { 0.0 };
+                    ns.ln() + 0.1 * f64::from(n % 3) + if n % 2 == 0 { noise } else { -noise }
+                })
+                .collect(),
+        };
+        [
+            ("rough", 0.96e-3, 5.0),
+            ("precise", 1e-12, 9.0),
+            ("slow", 1e-9, 9.5),
+        ]
+        .map(row)
+        .into()
+    }
+
+    #[test]
+    fn the_cheapest_within_the_tolerance_is_recommended() {
+        for processes in [1, 10] {
+            let choose = |tolerance| recommended(&three(processes, 0.0), tolerance, "such errors");
+            let rough = choose(1e-2);
+            assert_eq!(rough.name.as_deref(), Some("rough"));
+            assert_eq!(rough.reason, "the cheapest of 3 with such errors");
+            assert_eq!(choose(1e-6).name.as_deref(), Some("precise"));
+            let none = choose(1e-15);
+            assert_eq!((none.name, none.margin), (None, None));
+            assert_eq!(
+                none.reason,
+                "no method has such errors: precise has 1.0e-12"
+            );
+        }
+        assert_eq!(recommended(&[], 1.0, "any").reason, "no method has any");
+    }
+
+    #[test]
+    fn a_small_margin_is_said() {
+        let near = recommended(&three(1, 0.0), 1e-3, "such errors");
+        assert!((near.margin.unwrap_or(0.0) - 0.04).abs() < 1e-12);
+        let said = "; its error is only 4.00 % below the limit";
+        assert!(near.reason.ends_with(said), "{}", near.reason);
+        assert_eq!(small_margin("its step", "the limit", Some(0.051)), "");
+    }
+
+    #[test]
+    fn times_that_are_not_told_apart_leave_the_choice_to_the_error() {
+        let choice = recommended(&three(10, 0.3), 1e-6, "such errors");
+        assert_eq!(choice.name.as_deref(), Some("precise"));
+        assert_eq!(choice.as_fast, ["slow"]);
     }
 }

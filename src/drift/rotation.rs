@@ -4,7 +4,6 @@
 
 use std::collections::BTreeMap;
 
-use glam::DMat3;
 use serde::Serialize;
 
 use super::exact::Matrix;
@@ -50,13 +49,13 @@ pub enum Sum {
     Angles,
 }
 
-/// One way to keep a frame.
+/// One way to keep a frame, or to carry an eye around.
 pub struct Method {
     pub name: &'static str,
     pub summary: &'static str,
     pub sum: Sum,
     /// The frame's axes u, v, n after each of the ascending numbers of steps.
-    pub walk: Walk<Turn, DMat3>,
+    pub walk: Walk,
 }
 
 /// What the toolkit's own camera does.

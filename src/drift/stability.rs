@@ -113,3 +113,86 @@ pub fn limits() -> Vec<StabilityLimit> {
     })
     .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn method(name: &str) -> &'static Method {
+        METHODS.iter().find(|m| m.name == name).expect(name)
+    }
+
+    /// `|1 + z + z^2/2 + z^3/6 + z^4/24|` at `z = h (-zeta + i sqrt(1 - zeta^2))`.
+    fn rk4_left(zeta: f64, h: f64) -> f64 {
+        let (re, im) = (-zeta * h, (1.0 - zeta * zeta).sqrt() * h);
+        let (mut x, mut y) = (1.0, 0.0);
+        for divisor in [4.0, 3.0, 2.0, 1.0] {
+            (x, y) = (
+                1.0 + (re * x - im * y) / divisor,
+                (re * y + im * x) / divisor,
+            );
+        }
+        f64::hypot(x, y)
+    }
+
+    /// The eigenvalues of the arm are `omega (-zeta +- sqrt(zeta^2 - 1))`; explicit Euler
+    /// and RK4 are stable while `|R(h lambda)| <= 1` (on the negative axis RK4 up to the
+    /// root of z^3 + 4 z^2 + 12 z + 24: Hairer and Wanner 1996, "Solving Ordinary
+    /// Differential Equations II", IV.2), semi-implicit Euler by Jury's conditions.
+    #[test]
+    fn limits_found_are_the_limits_of_the_formulas() {
+        for zeta in DAMPING_RATIOS {
+            let fast = zeta + (zeta * zeta - 1.0).max(0.0).sqrt();
+            let explicit = if zeta <= 1.0 { 2.0 * zeta } else { 2.0 / fast };
+            let found = |name| limit(method(name), zeta);
+            let near = |name, wanted: f64| {
+                let found = found(name).expect(name);
+                assert!(
+                    (found / wanted - 1.0).abs() < 1e-6,
+                    "{name} {zeta}: {found}"
+                );
+            };
+            near("explicit-euler", explicit);
+            near(
+                "semi-implicit-euler",
+                2.0 * ((1.0 + zeta * zeta).sqrt() - zeta),
+            );
+            if zeta >= 1.0 {
+                near("rk4", 2.785_293_563_405_282 / fast);
+            } else {
+                let limit = found("rk4").expect("a limit");
+                assert!((rk4_left(zeta, limit) - 1.0).abs() < 1e-9, "{limit}");
+            }
+            for name in ["implicit-euler", "tr-bdf2", "exact-linear"] {
+                assert_eq!(found(name), None, "{name} is stable always");
+            }
+        }
+    }
+
+    /// At critical damping the eigenvalue is R(-omega h), a double one: 1 + z for explicit
+    /// Euler, 1/(1 - z) for implicit Euler, exp(z), and for TR-BDF2
+    /// `(1 + (sqrt(2) - 1) z) / (1 - (1 - 1/sqrt(2)) z)^2`, which is below zero from
+    /// `omega h = sqrt(2) + 1` on and tends to zero from below.
+    #[test]
+    fn the_share_that_is_left_has_its_sign() {
+        let root = std::f64::consts::SQRT_2;
+        for h in [1e-3, 0.5, 2.4, 2.42, 1e1, STIFFEST, 1e3, 1e4] {
+            let z: f64 = -h;
+            let tr_bdf2 = (1.0 + (root - 1.0) * z) / (1.0 - (1.0 - 1.0 / root) * z).powi(2);
+            assert_eq!(tr_bdf2 < 0.0, h > root + 1.0);
+            for (name, wanted) in [
+                ("explicit-euler", 1.0 + z),
+                ("implicit-euler", 1.0 / (1.0 - z)),
+                ("tr-bdf2", tr_bdf2),
+            ] {
+                let left = left_per_step(method(name), 1.0, h);
+                assert!(
+                    (left - wanted).abs() < 1e-5 * wanted.abs(),
+                    "{name} {h}: {left:e}"
+                );
+            }
+        }
+        let left = left_per_step(method("exact-linear"), 1.0, STIFFEST);
+        assert!((left / libm::exp(-STIFFEST) - 1.0).abs() < 1e-9, "{left:e}");
+    }
+}

@@ -3,11 +3,13 @@
 
 use std::hint::black_box;
 
+use glam::DMat3;
+
+use super::frames::Turn;
 use crate::measure::TimedTask;
 
-/// Takes equal steps of one kind: the places after each of the ascending numbers
-/// of them.
-pub type Walk<S, P> = fn(&S, &[u64]) -> Vec<P>;
+/// Takes equal steps: the axes after each of the ascending numbers of them.
+pub type Walk = fn(&Turn, &[u64]) -> Vec<DMat3>;
 
 /// A [`Walk`] by what a step does to the walker and where that is then.
 pub fn walk<W, S, P>(
@@ -42,7 +44,7 @@ pub fn task(run: impl Fn() + 'static) -> TimedTask<'static> {
 }
 
 /// The task of [`QUERY_STEPS`] equal steps.
-pub fn walking<S: 'static, P: 'static>(walk: Walk<S, P>, by: S) -> TimedTask<'static> {
+pub fn walking(walk: Walk, by: Turn) -> TimedTask<'static> {
     task(move || drop(walk(&by, &[QUERY_STEPS])))
 }
 
@@ -52,7 +54,12 @@ mod tests {
 
     #[test]
     fn looks_are_taken_after_exactly_so_many_steps() {
-        let places = walk(5, &3, &[0, 1, 10, 10, 12], |at, by| *at += by, |at| *at);
-        assert_eq!(places, [5, 8, 35, 35, 41]);
+        let by = Turn {
+            yaw_deg: 3.0,
+            ..Turn::default()
+        };
+        let step = |at: &mut f64, by: &Turn| *at += by.yaw_deg;
+        let places = walk(5.0, &by, &[0, 1, 10, 10, 12], step, |at| *at);
+        assert_eq!(places, [5.0, 8.0, 35.0, 35.0, 41.0]);
     }
 }
