@@ -18,7 +18,6 @@ const FUNNEL_HELP: &str = "\
 Columns of the table:
   in, out      items (triangles in the triangle stage) that the stage is given and hands on, per view
   truth        of them those that are in front at a sample; of triangles those that face the eye
-               (outcode: that are in the window; below-a-sample: that the ray of a sample meets)
   FP, FN       handed on though not visible; visible and not handed on
   time         CPU time of the stage per view, with half of its 95 % interval
   per item     time / what the stage removed

@@ -10,7 +10,6 @@ use glam::DVec3;
 use super::back_ends::back_ends;
 use super::chain::Chain;
 use super::error::FunnelError;
-use super::faces;
 use super::hiding::{HIDING, HidingRow};
 use super::judged::{Judged, judge_items};
 use super::plan_view::{Fate, MOST_DRAWN, PlanView};
@@ -31,7 +30,6 @@ use crate::visibility::hiders::Hiders;
 use crate::visibility::inscribed::BOXES;
 use crate::visibility::occlusion::{self, OccluderChoice, OccluderScene};
 use crate::visibility::region::{EyePlace, Marks, Pvs, RegionRow, Scratch};
-use crate::visibility::triangle;
 use crate::visibility::{Guarantee, Rays, SampleGrid, Solids, holes_of, surfaces_of};
 
 /// What a funnel is studied on.
@@ -102,7 +100,6 @@ struct View {
     camera: usize,
     volume: ConvexVolume,
     rays: Rays,
-    triangles: triangle::View,
 }
 
 impl<'a> World<'a> {
@@ -126,7 +123,6 @@ impl<'a> World<'a> {
                     error: error.into(),
                 })?,
                 rays: Rays::of(camera).map_err(error)?,
-                triangles: faces::view(input.scene, camera, input.samples).map_err(error)?,
             })
         });
         let built = input.structures.iter().map(|spec| {
@@ -241,11 +237,6 @@ impl<'a> World<'a> {
     pub fn structures(&self) -> impl Iterator<Item = (&str, &dyn DynIndex)> {
         let structures = self.structures.iter();
         structures.map(|(label, index)| (&label[..], &**index))
-    }
-
-    /// A view as the triangle stage has it.
-    pub fn triangle_view(&self, view: usize) -> &triangle::View {
-        &self.views[view].triangles
     }
 
     /// Whether a view's eye, and all that is before its near plane, is in the regions of

@@ -34,32 +34,6 @@ fn every_question_of_picking_is_answered_exactly() {
 }
 
 #[test]
-fn triangles_beside_the_window_and_between_samples_are_removed() {
-    // Without occlusion much of what is left reaches beyond the window, or is tiny.
-    let report = report(&format!("{CITY} --occlusion none"));
-    for name in ["outcode", "below-a-sample", "per-triangle"] {
-        let row = row(&report, "triangle", name);
-        assert_eq!(number(row, "false_negative_count"), 0.0, "{name}");
-        assert!(
-            number(row, "output_count") < number(row, "input_count"),
-            "{name}"
-        );
-        assert!(
-            number(row, "truth_count") > 0.0 && number(row, "stage_ns") > 0.0,
-            "{name}"
-        );
-    }
-    let line =
-        "precision --scene city:n=300 --stage triangle --frames 2 --processes 1 --format json";
-    let sweep = json(&works(Path::new("."), line));
-    for name in ["outcode", "below-a-sample"] {
-        let point = array(&sweep, "points").iter().find(|p| p["name"] == name);
-        let point = point.unwrap_or_else(|| panic!("{name}"));
-        assert_eq!(number(point, "false_negative_count"), 0.0, "{name}");
-    }
-}
-
-#[test]
 fn more_boxes_inside_meshes_hide_more_and_lose_nothing() {
     let wood = "funnel --scene mesh:forest:n=20k --frames 8 --samples 96x54 --processes 1";
     let removed = |limit: u32| {
