@@ -76,7 +76,7 @@ pub struct FunnelArgs {
     /// Back end of the occlusion stage
     #[arg(long, value_name = "NAME")]
     pub occlusion: Option<String>,
-    /// What the back ends *-two-pass and hierarchical-z draw: all, nearest:64, largest:64
+    /// What hierarchical-z draws: all, nearest:64, largest:64
     #[arg(long, value_name = "CHOICE", default_value = "all", value_parser = values::occluders)]
     pub occluders: OccluderChoice,
     /// Most boxes that are looked for inside each closed item of a mesh, and drawn for it

@@ -43,7 +43,7 @@ pub struct FunnelReport {
     pub cut_outs: Option<CutOutRow>,
     /// From where the region stage looks.
     pub from: SeenFrom,
-    /// What the back ends of the occlusion stage in two passes draw: `all`, `nearest:64`.
+    /// What `hierarchical-z` draws: `all`, `nearest:64`.
     pub occluders: String,
     /// The chain whose stages follow each other in [`FunnelReport::stages`].
     pub chain: Chain,

@@ -57,7 +57,7 @@ pub struct FunnelInput<'a> {
     pub claim: Option<&'a Arc<Pvs>>,
     /// From where the region stage looks.
     pub from: SeenFrom,
-    /// What the back ends of the occlusion stage in two passes draw.
+    /// What `hierarchical-z` draws.
     pub occluders: OccluderChoice,
     /// How many boxes are looked for inside each item of a mesh, at least 1; `None` for
     /// [`BOXES`].
