@@ -13,8 +13,7 @@ use super::error::FunnelError;
 use super::hiding::{HIDING, HidingRow};
 use super::judged::{Judged, judge_items};
 use super::plan_view::{Fate, MOST_DRAWN, PlanView};
-use super::regions::{ClaimAudit, Regions};
-use super::seen_from::SeenFrom;
+use super::regions::Regions;
 use super::stage::{BackEnd, NONE, StageKind};
 use super::truth::Truth;
 use crate::camera::PlaneOptions;
@@ -55,8 +54,6 @@ pub struct FunnelInput<'a> {
     pub protocol: &'a Protocol,
     /// What is claimed to be seen from each region: a back end of the region stage.
     pub claim: Option<&'a Arc<Pvs>>,
-    /// From where the region stage looks.
-    pub from: SeenFrom,
     /// What `hierarchical-z` draws.
     pub occluders: OccluderChoice,
     /// How many boxes are looked for inside each item of a mesh, at least 1; `None` for
@@ -131,9 +128,7 @@ impl<'a> World<'a> {
         });
         let is_boxes = input.scene.item_shape() == ItemShape::Box;
         let mut solids = is_boxes.then(|| Solids::of(input.scene));
-        // What has holes closes no face of a grid.
-        let whole = solids.as_ref().filter(|_| input.cut_outs.is_none());
-        let regions = Regions::of(input.scene, input.claim, input.from, whole)?;
+        let regions = Regions::of(input.scene, input.claim)?;
         let refused = |option: &'static str, expected: ItemShape| FunnelError::Shape {
             scene: input.scene.name.clone(),
             shape: input.scene.item_shape(),
@@ -208,11 +203,6 @@ impl<'a> World<'a> {
     /// How many views there are.
     pub fn views(&self) -> usize {
         self.views.len()
-    }
-
-    /// What each claim of what is seen from where gets wrong.
-    pub fn audits(&self) -> &[ClaimAudit] {
-        self.regions.as_ref().map_or(&[], |regions| &regions.audits)
     }
 
     /// The items as the occlusion stage draws and tests them in a view.
@@ -306,7 +296,7 @@ impl<'a> World<'a> {
     fn run_region(&self, name: &str) -> Run<'_> {
         let regions = self.regions.as_ref().expect("a scene with regions");
         let row = regions.row(name).expect("a row of the region stage");
-        let items = regions.items(name).expect("the items of its regions");
+        let items = regions.items();
         let kept = RefCell::new((Scratch::default(), Marks::default(), Vec::new()));
         Box::new(move |view, _, out| {
             let (scratch, marks, seen) = &mut *kept.borrow_mut();
@@ -463,7 +453,6 @@ mod tests {
                 cache_bytes: 0,
             },
             claim: None,
-            from: SeenFrom::Eye,
             occluders: OccluderChoice::All,
             inner_boxes: None,
             execution: Execution::default(),

@@ -176,7 +176,6 @@ fn csv_has_every_field_of_every_table_of_the_json() {
         "solid_blocks",
         "mirror",
         "stages",
-        "audits",
         "orders",
         "picks",
         "bounds",

@@ -1,18 +1,16 @@
-//! `funnel`: what its options ask beside the chain: another choice of occluders, what is
-//! seen from a whole region, truth kept on disk, every question of picking.
+//! `funnel`: options beside the chain: another choice of occluders, boxes inside meshes, and
+//! every question of picking.
 
 use std::path::Path;
 
 use cullbench::visibility::inscribed::BOXES;
 use serde_json::Value;
 
-use super::funnel::{row, rows};
+use super::funnel::row;
 use super::process::*;
 
 const CITY: &str = "funnel --scene city:n=800 --path street:frames=3 --samples 96x54 --processes 1 \
                     --format json";
-const ROOMS: &str = "funnel --scene rooms:n=800 --path street:frames=3 --samples 96x54 \
-                     --processes 1 --format json";
 
 fn report(line: &str) -> Value {
     json(&works(Path::new("."), line))
@@ -87,40 +85,4 @@ fn fewer_occluders_hide_less() {
         let done = cullbench(Path::new("."), &line);
         assert_refused(&done, "nearest:COUNT", wrong);
     }
-}
-
-#[test]
-fn from_a_region_more_is_seen_than_from_an_eye_and_nothing_is_lost() {
-    let [eye, region] = ["eye", "region"].map(|from| report(&format!("{ROOMS} --from {from}")));
-    let names = |report: &Value| -> Vec<String> {
-        let names = rows(report, "region").map(|row| row["name"].as_str().unwrap().to_owned());
-        names.collect()
-    };
-    let of_eye = [
-        "none",
-        "flood",
-        "portal-rect",
-        "portal-clip",
-        "grid-flood",
-        "exact-pvs",
-    ];
-    assert_eq!(names(&eye), of_eye);
-    assert_eq!(names(&region), ["none", "flood", "exact-pvs"]);
-    for report in [&eye, &region] {
-        for row in rows(report, "region") {
-            assert_eq!(number(row, "false_negative_count"), 0.0, "{row}");
-        }
-    }
-    let left = |report, name| number(row(report, "region", name), "output_count");
-    // The rooms of these scenes hang together.
-    assert_eq!(left(&region, "flood"), number(&region, "items"));
-    assert!(left(&eye, "flood") < left(&region, "flood"));
-    assert_eq!(left(&eye, "exact-pvs"), left(&region, "exact-pvs"));
-    assert!(left(&eye, "grid-flood") < number(&eye, "items"));
-    let audits = array(&region, "audits");
-    let flood = audits.iter().find(|audit| audit["claim"] == "flood");
-    let flood = flood.expect("the search, held against what is proven");
-    assert!(number(flood, "false_positives") > 0.0);
-    assert!(array(flood, "false_negatives").is_empty() && array(flood, "unproven").is_empty());
-    assert!(array(&eye, "audits").is_empty());
 }

@@ -1,5 +1,5 @@
 //! Exact sample truth: the front item of each ray of an image, here of a box scene.
-//! What lies between the rays is left to certificates, triangles to `surface_sample`.
+//! Triangles are in `surface_sample`.
 
 use crate::query::ItemId;
 use crate::scene::{SeededRng, WorldBox};
