@@ -50,7 +50,7 @@ pub use picks::{PickQuestion, PickRow};
 pub use plan::FunnelPlan;
 pub use plan_view::{Fate, PlanView};
 pub use report::{CutOutRow, FunnelReport, Gain, LevelRow, StageRow};
-pub use stage::{BackEnd, NONE, STAGES, StageKind};
+pub use stage::{BackEnd, NONE, StageKind};
 pub use study::{Prepared, failure, prepare, time};
 pub use sweep::{PreparedSweep, StageSweep, SweepPoint, prepare_sweep, time_sweep};
 pub use times::Times;

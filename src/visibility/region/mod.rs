@@ -35,17 +35,15 @@ pub use answer::{About, EyePlace, RegionRow, Scratch};
 pub use boxes::NoRegions;
 pub use graph::{Ground, RegionGraph};
 pub use items::RegionItems;
-pub use locate::{BoxGrid, covers};
 pub use number::{Marks, RegionId, decode};
 pub use opening::{Opening, OpeningPlane, rectangle};
 pub use pvs::{Pvs, PvsError};
 pub use rooms::NotFlat;
 pub use searched::Searched;
-pub use stab::{Stabbing, turn};
 pub use stored::{ABOUT as STORED, EXACT, REJECT, StoredPvs};
 #[cfg(test)]
 pub use tests::leads_through;
-pub use walk::{follow_boxes, seen_by_samples};
+pub use walk::seen_by_samples;
 
 /// The back ends of the region stage.
 pub const ROWS: [About; 6] = [
