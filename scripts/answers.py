@@ -111,8 +111,7 @@ def answers():
         text = output("funnel", *arguments, "--samples", "64x36", "--processes", "1", "--format", "json")
         found = json.loads(text)
         for section, names in (("stages", ("stage", "name", "structure")), ("orders", ("name",)),
-                               ("picks", ("question", "name")), ("audits", ("name",)),
-                               ("gains", ("stage", "back_end"))):
+                               ("picks", ("question", "name")), ("gains", ("stage", "back_end"))):
             for name, rows in rows_by(found.pop(section), *names).items():
                 yield f"funnel {' '.join(arguments)} {section} {name}", rows
         for section in ("level", "inner_boxes", "ground", "mirror", "chain"):
