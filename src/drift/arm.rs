@@ -255,7 +255,7 @@ mod tests {
         for stiffness in [1e2, 1e4, 1e6] {
             let chase = Chase::new(ArmKind::Linear, stiffness, 30.0, 1.0);
             let omega = stiffness.sqrt();
-            let count = (omega / 30.0 / 5e-4).ceil() as u32;
+            let count = (omega / 30.0 / 1e-3).ceil() as u32;
             let truth = |chase: &Chase, count, keep: &mut dyn FnMut(State)| {
                 chase.follow(count, keep, |arm, line, t, y, h| {
                     arm.rk4(|t| libm::sin(line.start + t), t, y, h)

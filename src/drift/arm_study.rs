@@ -117,7 +117,7 @@ impl Setting {
 }
 
 /// `omega h` of the steps of the reference: RK4 is then off by less than 1e-12.
-const REFERENCE_STEP: f64 = 5e-4;
+const REFERENCE_STEP: f64 = 1e-3;
 
 /// The true way of an arm, and its way behind straight lines between frame ends.
 fn ways(setting: &Setting, chase: &Chase) -> [Vec<State>; 2] {
