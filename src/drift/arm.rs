@@ -4,7 +4,7 @@
 use super::closed_form::chased;
 
 named! {
-    /// What the camera hangs on.
+    /// Kind of spring arm.
     #[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Serialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum ArmKind, ARMS {
@@ -118,9 +118,9 @@ pub type Follow = fn(&Chase, u32, &mut dyn FnMut(State));
 /// A method of the study.
 #[derive(Debug, serde::Serialize)]
 pub struct Method {
-    /// As in tables and JSON.
+    /// Name in tables and JSON.
     pub name: &'static str,
-    /// What it does, in one line.
+    /// One line about what it does.
     pub summary: &'static str,
     /// Classical order: of the error for steps far below 1/omega. Of the closed form on
     /// the collision arm, by the stretch that it freezes.
