@@ -89,18 +89,23 @@ pub fn time(
 /// A table of one figure: a row per method, a column per number of steps or turns.
 fn grid<T>(
     title: &str,
-    unit: &str,
+    head: impl Fn(u64) -> String,
     all: &[T],
-    of: impl Fn(&T) -> (&'static str, u64, f64),
+    of: impl Fn(&T) -> (&'static str, u64, String),
 ) -> Table {
     let columns: BTreeSet<u64> = all.iter().map(|row| of(row).1).collect();
-    let columns = columns.iter().map(|&n| format!("{:e}{unit}", n as f64));
+    let columns = columns.into_iter().map(head);
     let mut table = Table::of_numbers([title.to_owned()].into_iter().chain(columns));
     for own in all.chunk_by(|a, b| of(a).0 == of(b).0) {
-        let cells = own.iter().map(|row| scientific(of(row).2));
+        let cells = own.iter().map(|row| of(row).2);
         table.add_row([of(&own[0]).0.to_owned()].into_iter().chain(cells));
     }
     table
+}
+
+/// A number of steps.
+fn steps(count: u64) -> String {
+    format!("{:e}", count as f64)
 }
 
 /// Two digits of something that spans many powers of ten.
@@ -136,46 +141,38 @@ fn show_rotations(report: &DriftReport, out: &mut impl Write) -> io::Result<()> 
          the eye hangs on the base.",
         turn.yaw_deg, turn.pitch_deg, turn.roll_deg, report.period_steps
     )?;
-    type Figure = fn(&drift::RotationDrift) -> f64;
-    let figures: [(&str, Figure); 4] = [
+    let (all, turns) = (&report.rotation, &report.one_degree_turns);
+    let figures: [(&str, fn(&drift::RotationDrift) -> f64); 4] = [
         ("orthogonality after", |d| d.orthogonality_error),
         ("angle off in rad after", |d| d.angle_error_rad),
         ("position on orbit off after", |d| d.orbit_position_error),
         ("radius of orbit off after", |d| d.orbit_radius_error),
     ];
     for (title, figure) in figures {
-        let table = grid(title, "", &report.rotation, |d| {
-            (d.method, d.steps, figure(d))
-        });
-        writeln!(out, "{table}")?;
+        let of = |d: &drift::RotationDrift| (d.method, d.steps, scientific(figure(d)));
+        writeln!(out, "{}", grid(title, steps, all, of))?;
     }
     let title = "in steps of 1 degree: angle off in rad after";
-    let of = |d: &drift::TurnDrift| (d.method, d.turns, d.angle_error_rad);
-    writeln!(
-        out,
-        "{}",
-        grid(title, " turns", &report.one_degree_turns, of)
-    )?;
-    let title = format!("bases after {:e} steps", report.steps as f64);
+    let head = |turns| text::counted(turns as usize, "turn");
+    let of = |d: &drift::TurnDrift| (d.method, d.turns, format!("{:.3e}", d.angle_error_rad));
+    writeln!(out, "{}", grid(title, head, turns, of))?;
+    let title = format!("bases after {} steps", steps(report.steps));
     show_rated(&title, "error", &report.rotation_methods, out)?;
     recommend("a camera base", &report.recommended_rotation, out)
 }
 
 fn show_orbits(report: &DriftReport, out: &mut impl Write) -> io::Result<()> {
-    writeln!(
-        out,
-        "Orbits: an eye carried around by {SWING_DEG:.3} degrees per step"
-    )?;
-    type Figure = fn(&drift::OrbitDrift) -> f64;
-    let figures: [(&str, Figure); 2] = [
+    let swing = format!("an eye carried around by {SWING_DEG:.3} degrees per step");
+    writeln!(out, "Orbits: {swing}")?;
+    let figures: [(&str, fn(&drift::OrbitDrift) -> f64); 2] = [
         ("position off after", |d| d.position_error),
         ("radius off after", |d| d.radius_error),
     ];
     for (title, figure) in figures {
-        let table = grid(title, "", &report.orbit, |d| (d.method, d.steps, figure(d)));
-        writeln!(out, "{table}")?;
+        let of = |d: &drift::OrbitDrift| (d.method, d.steps, scientific(figure(d)));
+        writeln!(out, "{}", grid(title, steps, &report.orbit, of))?;
     }
-    let title = format!("orbits after {:e} steps", report.steps as f64);
+    let title = format!("orbits after {} steps", steps(report.steps));
     show_rated(&title, "error / radius", &report.orbit_methods, out)?;
     recommend("an orbit", &report.recommended_orbit, out)
 }

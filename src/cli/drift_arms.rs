@@ -20,11 +20,7 @@ pub fn show(report: &ArmReport, out: &mut impl Write) -> io::Result<()> {
         report.seconds
     )?;
     for (arm, name, what) in ARMS {
-        if report
-            .choices
-            .iter()
-            .any(|choice| choice.setting.arm == arm)
-        {
+        if report.points.iter().any(|p| p.setting.arm == arm) {
             let title = format!("{name} arm: {what}");
             writeln!(out, "{}", text::wrapped(&title, WIDTH.into()))?;
             let title = format!("{name}, {} Hz, within {:e}", rate(report), report.tolerance);
@@ -63,9 +59,8 @@ fn by_stiffness(
     let points = points.filter(|p| (p.setting.arm, p.setting.rate_hz) == shown);
     let settings: Vec<_> = points.collect();
     let settings: Vec<_> = settings.chunk_by(|a, b| a.setting == b.setting).collect();
-    let columns = settings
-        .iter()
-        .map(|own| format!("k={:e}", own[0].setting.stiffness));
+    let stiffness = |own: &&[&ArmPoint]| format!("k={:e}", own[0].setting.stiffness);
+    let columns = settings.iter().map(stiffness);
     let mut table = Table::new([title.to_owned()].into_iter().chain(columns), &[]).fit(WIDTH);
     for method in report.methods {
         let cells = settings.iter().map(|all| {

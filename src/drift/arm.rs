@@ -4,7 +4,7 @@
 use super::closed_form::chased;
 
 named! {
-    /// What the camera hangs on.
+    /// Kind of spring arm.
     #[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Serialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum ArmKind, ARMS {
@@ -118,9 +118,9 @@ pub type Follow = fn(&Chase, u32, &mut dyn FnMut(State));
 /// A method of the study.
 #[derive(Debug, serde::Serialize)]
 pub struct Method {
-    /// As in tables and JSON.
+    /// Name in tables and JSON.
     pub name: &'static str,
-    /// What it does, in one line.
+    /// One line about what it does.
     pub summary: &'static str,
     /// Classical order: of the error for steps far below 1/omega. Of the closed form on
     /// the collision arm, by the stretch that it freezes.
@@ -255,7 +255,7 @@ mod tests {
         for stiffness in [1e2, 1e4, 1e6] {
             let chase = Chase::new(ArmKind::Linear, stiffness, 30.0, 1.0);
             let omega = stiffness.sqrt();
-            let count = (omega / 30.0 / 5e-4).ceil() as u32;
+            let count = (omega / 30.0 / 1e-3).ceil() as u32;
             let truth = |chase: &Chase, count, keep: &mut dyn FnMut(State)| {
                 chase.follow(count, keep, |arm, line, t, y, h| {
                     arm.rk4(|t| libm::sin(line.start + t), t, y, h)

@@ -12,7 +12,7 @@ use super::stability;
 use super::walk::task;
 use crate::measure::{OverProcesses, TimedTask};
 
-/// What is to be studied.
+/// Scope of the study.
 #[derive(Clone, Debug)]
 pub struct ArmOptions {
     /// Kinds of arm, each with every stiffness and rate.
@@ -23,7 +23,7 @@ pub struct ArmOptions {
     pub rates_hz: Vec<f64>,
     /// Simulated time that errors are the maxima of.
     pub seconds: f64,
-    /// What a recommended method's position may be off.
+    /// Largest position error of a recommended method.
     pub tolerance: f64,
 }
 
@@ -117,7 +117,7 @@ impl Setting {
 }
 
 /// `omega h` of the steps of the reference: RK4 is then off by less than 1e-12.
-const REFERENCE_STEP: f64 = 5e-4;
+const REFERENCE_STEP: f64 = 1e-3;
 
 /// The true way of an arm, and its way behind straight lines between frame ends.
 fn ways(setting: &Setting, chase: &Chase) -> [Vec<State>; 2] {
@@ -247,7 +247,7 @@ pub fn conclude(
 }
 
 impl ArmPoint {
-    /// As it is named in sentences: "rk4 x4".
+    /// Name with the number of steps: "rk4 x4".
     pub fn label(&self) -> String {
         match self.substeps {
             1 => self.method.to_owned(),

@@ -20,7 +20,7 @@ const PI: [f64; 4] = [
     1.112_454_220_863_365_3e-49,
 ];
 
-/// Where series stop: below the last digit of one.
+/// Size of the terms that end a series: below the last digit of one.
 const NEGLIGIBLE: f64 = 1e-70;
 
 /// `first` plus `first factor^n / (d(1) d(2) ... d(n))` for all n.

@@ -36,12 +36,12 @@ pub const MOST_STEPS: u64 = 1_000_000_000;
 /// Whole turns that are looked at, in steps of one degree.
 const TURNS: [u64; 2] = [1, 1000];
 
-/// What is to be studied.
+/// Scope of the study.
 #[derive(Clone, Debug)]
 pub struct DriftOptions {
     /// Up to how many steps.
     pub steps: u64,
-    /// What a recommended method may be off after all of them: a frame's angle
+    /// Largest error of a recommended method after all of them: a frame's angle
     /// in radians and orthogonality, an eye's distance in radii.
     pub tolerance_rad: f64,
     /// Which spring arms are studied.
@@ -53,7 +53,7 @@ pub struct DriftOptions {
 pub struct ArmReport {
     /// Simulated time.
     pub seconds: f64,
-    /// What a recommended method's position may be off.
+    /// Largest position error of a recommended method.
     pub tolerance: f64,
     /// All methods.
     pub methods: &'static [ArmMethod],

@@ -40,7 +40,7 @@ pub const CARRIERS: &[Method] = rows! { Method { name, summary, sum, walk }
         Sum::Angles, angle;
 };
 
-/// What the toolkit's own orbit does.
+/// The toolkit's own orbit.
 pub const TOOLKIT: &str = "f64-carried";
 
 const START: DVec3 = DVec3::new(CENTRE.x + ORBIT_RADIUS, CENTRE.y, CENTRE.z);

@@ -11,11 +11,11 @@ use crate::statistics::{ALPHA, ranks};
 /// A way to turn or carry as a point of error against time.
 #[derive(Debug, Serialize)]
 pub struct Rated {
-    /// As in tables and JSON.
+    /// Name in tables and JSON.
     pub name: &'static str,
-    /// What it does, in one line.
+    /// One line about what it does.
     pub summary: &'static str,
-    /// What this toolkit's camera does.
+    /// The way of this toolkit's camera.
     pub is_default: bool,
     /// Worst error after the most steps: of a frame the larger of angle and
     /// orthogonality, of an eye the distance in radii. `None` if it is not finite.
@@ -105,8 +105,8 @@ pub fn small_margin(figure: &str, limit: &str, margin: Option<f64>) -> String {
     }
 }
 
-/// Of the candidates within the tolerance that none is faster than, by a paired test
-/// over the processes, the most precise.
+/// The most precise of the candidates within the tolerance that none is faster than, by a
+/// paired test over the processes.
 pub fn recommended(candidates: &[Candidate], tolerance: f64, rule: &str) -> Recommendation {
     let good = candidates.iter().filter(|c| c.error <= tolerance);
     let (good, ln_ns): (Vec<_>, Vec<_>) = good.map(|c| (c, c.ln_ns.clone())).unzip();

@@ -39,7 +39,7 @@ fn turned(times: u64) -> Matrix {
     turned.times(&about(2, STEADY.roll_deg))
 }
 
-/// What the steps of a method add up to. The two differ, since turns do not commute;
+/// The sum of the steps of a method. The two differ, since turns do not commute;
 /// each method is compared with its own.
 #[derive(Clone, Copy)]
 pub enum Sum {
@@ -58,7 +58,7 @@ pub struct Method {
     pub walk: Walk,
 }
 
-/// What the toolkit's own camera does.
+/// The toolkit's own camera.
 pub const TOOLKIT: &str = "f64-polar-100";
 
 pub const METHODS: &[Method] = rows! { Method { name, summary, sum, walk }
@@ -107,7 +107,7 @@ pub struct RotationDrift {
     pub orthogonality_error: f64,
     /// Between the rotation nearest to the axes and the exact one.
     pub angle_error_rad: f64,
-    /// Of an eye ten away from the centre that the camera looks at.
+    /// Position error of an eye ten away from the centre that the camera looks at.
     pub orbit_position_error: f64,
     /// Difference of that eye's radius from ten.
     pub orbit_radius_error: f64,

@@ -48,7 +48,7 @@ fn trace_and_determinant(method: &Method, zeta: f64, omega_h: f64) -> (f64, f64)
     (a + d, a * d - b * c)
 }
 
-/// Whether both eigenvalues lie in the unit circle: Jury's conditions
+/// Tests that both eigenvalues lie in the unit circle: Jury's conditions
 /// `|trace| <= 1 + det` and `det <= 1`, which need no square root.
 fn is_stable(method: &Method, zeta: f64, omega_h: f64) -> bool {
     let (trace, determinant) = trace_and_determinant(method, zeta, omega_h);
