@@ -131,9 +131,7 @@ def answers():
             yield f"drift {section} {name}", rows
     for row in found["arm"]["points"]:
         errors = {name: row[name] for name in ("position_error", "velocity_error")}
-        name = " ".join(str(row[name]) for name in ("method", "arithmetic", "stiffness", "substeps"))
-        if row["frame_times"] == "steady" and row["step_tolerance"] is None:
-            yield f"drift arm {name}", [json.dumps(errors, sort_keys=True)]
+        yield f"drift arm {row['method']} f64 {row['stiffness']} {row['substeps']}", [json.dumps(errors, sort_keys=True)]
     for row in found["arm"]["stability"]:
         yield f"drift stability {row['method']} {row['damping_ratio']}", [str(row["limit_omega_h"])]
     for suite in ("quick", "standard", "full", "compare"):
