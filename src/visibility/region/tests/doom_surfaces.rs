@@ -89,7 +89,7 @@ fn what_is_visible_lies_in_sectors_that_every_row_lists() {
         let world = world(name);
         let (visible, lost) = visible_and_lost(&world, &world.graph, 40);
         println!("{name}: {visible} visible");
-        assert_eq!(lost, [0; 4], "{name}");
+        assert_eq!(lost, [0; 3], "{name}");
         assert!(visible > 500, "{visible}");
     }
 }
@@ -101,7 +101,7 @@ fn a_graph_that_lacks_openings_is_caught() {
     let caught = |opening: &usize| {
         let graph = Arc::new(without_opening(&world.graph, *opening));
         let (_, lost) = visible_and_lost(&world, &graph, 12);
-        lost[1..].iter().any(|lost| *lost > 0)
+        lost.iter().any(|lost| *lost > 0)
     };
     let caught = (0..openings).step_by(16).filter(caught).count();
     println!("{caught} of {}", openings.div_ceil(16));
