@@ -19,9 +19,20 @@ use super::values;
 /// how fast, and is the answer right?
 #[derive(Parser, Debug)]
 #[command(name = "cullbench", version, about, max_term_width = 100, after_help = EXAMPLES)]
+#[command(mut_subcommands(taking_negative_numbers))]
 pub struct Cli {
     #[command(subcommand)]
     pub command: Command,
+}
+
+/// The command with options whose values may begin with a minus: what is wrong with
+/// them is said by their own readers.
+fn taking_negative_numbers(command: clap::Command) -> clap::Command {
+    let command = command.mut_subcommands(taking_negative_numbers);
+    command.mut_args(|arg| {
+        let has_value = arg.get_action().takes_values() && !arg.is_positional();
+        arg.allow_negative_numbers(has_value)
+    })
 }
 
 const EXAMPLES: &str = "\
@@ -117,7 +128,7 @@ pub struct WhatArgs {
     #[arg(long, value_name = "TEST", default_value = "six-plane")]
     pub test: Vec<String>,
     /// Seed of the order in which structures are measured
-    #[arg(long, default_value_t = 1, value_parser = values::whole(0..=u64::MAX), allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 1, value_parser = values::whole(0..=u64::MAX))]
     pub seed: u64,
     /// Measure with cold caches as well (the suite full does by itself)
     #[arg(long)]
@@ -126,7 +137,7 @@ pub struct WhatArgs {
     #[arg(long)]
     pub no_bounds: bool,
     /// Seconds without progress after which a structure has timed out
-    #[arg(long, value_name = "SECONDS", default_value_t = 300, value_parser = values::whole(1..=u64::MAX), allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 300, value_parser = values::whole(1..=u64::MAX))]
     pub timeout: u64,
     #[command(flatten)]
     pub scene_args: SceneArgs,
@@ -160,7 +171,7 @@ pub struct RunArgs {
     #[arg(long)]
     pub resume: bool,
     /// Processes to spread the rounds over; ten or more give intervals [default: the suite's]
-    #[arg(long, value_name = "N", value_parser = values::whole(1..=1000u32), allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = values::whole(1..=1000u32))]
     pub processes: Option<u32>,
     /// Print the cells as JSON lines instead of measuring them
     #[arg(long, conflicts_with = "resume")]
@@ -332,10 +343,10 @@ pub struct VerifyArgs {
     #[arg(long, value_name = "LIST", default_value = "all")]
     pub structure: String,
     /// Random differential cases [default: 20000, or 0 if scenes or paths are named]
-    #[arg(long, value_name = "N", value_parser = values::whole(0..=u64::MAX), allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = values::whole(0..=u64::MAX))]
     pub cases: Option<u64>,
     /// Seed of the first case; case i has seed N + i
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = values::whole(0..=u64::MAX), allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = values::whole(0..=u64::MAX))]
     pub seed: u64,
     #[arg(long, value_enum, default_value = "table")]
     pub format: TableFormat,
@@ -361,10 +372,10 @@ pub struct PrecisionArgs {
     #[arg(long, value_name = "LIST", default_value = "default")]
     pub structure: String,
     /// Cameras of the path to look at, evenly spread
-    #[arg(long, value_name = "N", default_value_t = 16, value_parser = values::whole(1..=u32::MAX), allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = values::whole(1..=u32::MAX))]
     pub frames: u32,
     /// Cubes for each ratio of the size sweep; 0 skips all sweeps
-    #[arg(long, value_name = "N", default_value_t = 2_000_000, value_parser = values::whole(0..=usize::MAX), allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 2_000_000, value_parser = values::whole(0..=usize::MAX))]
     pub cubes: usize,
     /// Draw false positives against time as an SVG file too
     #[arg(long, value_name = "FILE")]
@@ -396,49 +407,19 @@ pub struct AdviseArgs {
     #[arg(long, value_name = "LIST", default_value = "default")]
     pub structure: String,
     /// Cost of drawing an item that cannot be seen, ns
-    #[arg(
-        long,
-        value_name = "NS",
-        default_value_t = 1000.0,
-        value_parser = values::at_least_zero,
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "NS", default_value_t = 1000.0, value_parser = values::at_least_zero)]
     pub draw_ns: f64,
     /// Cost of shading a fragment, ns (1 shades an image of 1920 x 1080 in 2 ms)
-    #[arg(
-        long,
-        value_name = "NS",
-        default_value_t = 1.0,
-        value_parser = values::at_least_zero,
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "NS", default_value_t = 1.0, value_parser = values::at_least_zero)]
     pub shade_ns: f64,
     /// The largest error to accept: of planes in depths of the view, of a camera frame in radians
-    #[arg(
-        long,
-        value_name = "SHARE",
-        default_value_t = 1e-5,
-        value_parser = values::above_zero,
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "SHARE", default_value_t = 1e-5, value_parser = values::above_zero)]
     pub tolerance: f64,
     /// Share of the items that move between two updates
-    #[arg(
-        long,
-        value_name = "SHARE",
-        default_value = "1%",
-        value_parser = values::share,
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "SHARE", default_value = "1%", value_parser = values::share)]
     pub moved: f64,
     /// Queries between two updates
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = 1.0,
-        value_parser = values::at_least_zero,
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "N", default_value_t = 1.0, value_parser = values::at_least_zero)]
     pub queries_per_update: f64,
     #[command(flatten)]
     pub spread: SpreadArgs,
@@ -455,22 +436,10 @@ pub struct AdviseArgs {
 #[derive(Args, Debug)]
 pub struct DriftArgs {
     /// Number of steps; errors are shown at 1e3, 1e4, ... and at the last one
-    #[arg(
-        long,
-        value_name = "N",
-        default_value = "1e6",
-        value_parser = values::steps,
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "N", default_value = "1e6", value_parser = values::steps)]
     pub steps: u64,
     /// The largest error of a recommended way to turn or orbit after all steps
-    #[arg(
-        long,
-        value_name = "RAD",
-        default_value_t = 1e-6,
-        value_parser = values::above_zero,
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "RAD", default_value_t = 1e-6, value_parser = values::above_zero)]
     pub tolerance: f64,
     /// Spring arms to study: linear, collision (stiffens as it is stretched, and has a stop)
     #[arg(
@@ -487,8 +456,7 @@ pub struct DriftArgs {
         value_name = "LIST",
         value_delimiter = ',',
         default_value = "1e2,1e4,1e6",
-        value_parser = values::within(0.01..=1e8),
-        allow_negative_numbers = true
+        value_parser = values::within(0.01..=1e8)
     )]
     pub stiffness: Vec<f64>,
     /// Frames per second of the spring arms; tables of errors show the middle one
@@ -497,27 +465,14 @@ pub struct DriftArgs {
         value_name = "LIST",
         value_delimiter = ',',
         default_value = "30,60,144",
-        value_parser = values::within(1.0..=1e3),
-        allow_negative_numbers = true
+        value_parser = values::within(1.0..=1e3)
     )]
     pub rate: Vec<f64>,
     /// Simulated time over which the largest error of a spring arm is taken
-    #[arg(
-        long,
-        value_name = "S",
-        default_value_t = 10.0,
-        value_parser = values::within(1.0..=1e3),
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = values::within(1.0..=1e3))]
     pub seconds: f64,
     /// Largest position error of a spring arm to recommend; its target swings by one
-    #[arg(
-        long,
-        value_name = "ERROR",
-        default_value_t = 1e-3,
-        value_parser = values::above_zero,
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "ERROR", default_value_t = 1e-3, value_parser = values::above_zero)]
     pub arm_tolerance: f64,
     /// Draw error against time of the spring arms as an SVG file too
     #[arg(long, value_name = "FILE")]
@@ -537,10 +492,10 @@ pub struct StressArgs {
     #[arg(long, value_name = "LIST", default_value = "all")]
     pub structure: String,
     /// Cases of each generated extreme, 0 for none [default: 66, ten million boxes; 0 with --vectors]
-    #[arg(long, value_name = "N", value_parser = values::whole(0..=u64::MAX), allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = values::whole(0..=u64::MAX))]
     pub cases: Option<u64>,
     /// Seed of the first case; case i has seed N + i
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = values::whole(0..=u64::MAX), allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = values::whole(0..=u64::MAX))]
     pub seed: u64,
     #[arg(long, value_enum, default_value = "table")]
     pub format: TableFormat,

@@ -50,7 +50,7 @@ pub struct FunnelArgs {
     )]
     pub path: String,
     /// Cameras of the path to look at, evenly spread
-    #[arg(long, value_name = "N", default_value_t = 32, value_parser = values::whole(1..=u32::MAX), allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 32, value_parser = values::whole(1..=u32::MAX))]
     pub frames: u32,
     /// Columns and rows of samples
     #[arg(long, value_name = "WxH", default_value = "320x180", value_parser = values::samples)]
@@ -60,7 +60,7 @@ pub struct FunnelArgs {
     pub cut_out: Option<CutOuts>,
     /// Take a face of this item for a mirror (across its shortest edge): what is seen in it, with
     /// and without a stencil of its samples
-    #[arg(long, value_name = "ITEM", value_parser = values::whole(0..=ItemId::MAX), allow_negative_numbers = true)]
+    #[arg(long, value_name = "ITEM", value_parser = values::whole(0..=ItemId::MAX))]
     pub mirror: Option<ItemId>,
     /// Back end of the region stage [default: the best that the scene has regions for]
     #[arg(long, value_name = "NAME")]
@@ -76,7 +76,7 @@ pub struct FunnelArgs {
     pub occluders: OccluderChoice,
     /// Most boxes that are looked for inside each closed item of a mesh, and drawn for it
     /// [default: 8]
-    #[arg(long, value_name = "N", value_parser = values::whole(1..=MOST_BOXES as u32), allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = values::whole(1..=MOST_BOXES as u32))]
     pub inner_boxes: Option<u32>,
     /// Back end of the triangle stage
     #[arg(long, value_name = "NAME")]

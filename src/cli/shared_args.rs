@@ -41,7 +41,7 @@ pub struct KernelArgs {
     #[arg(long = "kernel", value_name = "NAME", value_parser = values::kernel)]
     pub name: Option<Kernel>,
     /// Threads of a build; query and locate divide cameras and points among them
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = values::whole(1..=MOST_THREADS), allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = values::whole(1..=MOST_THREADS))]
     pub threads: usize,
 }
 
@@ -75,10 +75,10 @@ impl KernelArgs {
 #[derive(Args, Debug)]
 pub struct SpreadArgs {
     /// Processes to spread the rounds over; ten or more give intervals, one gives values alone
-    #[arg(long, value_name = "N", default_value_t = 10, value_parser = values::whole(1..=1000u32), allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = values::whole(1..=1000u32))]
     pub processes: u32,
     /// Seed of all that is random: scenes of sweeps, order of measurement
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = values::whole(0..=u64::MAX), allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = values::whole(0..=u64::MAX))]
     pub seed: u64,
 }
 
@@ -125,22 +125,16 @@ const PASS_NS: f64 = 20e6;
 #[derive(Args, Debug)]
 pub struct LensArgs {
     /// Vertical field of view in degrees for cameras without one
-    #[arg(
-        long,
-        value_name = "DEG",
-        default_value_t = 60.0,
-        value_parser = values::field_of_view,
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "DEG", default_value_t = 60.0, value_parser = values::field_of_view)]
     pub fovy: f64,
     /// Width / height for cameras without one
-    #[arg(long, default_value_t = 16.0 / 9.0, value_parser = values::above_zero, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 16.0 / 9.0, value_parser = values::above_zero)]
     pub aspect: f64,
     /// Near plane for cameras without one [default: 0.1 for recorded cameras, far/1000 for paths]
-    #[arg(long, value_parser = values::above_zero, allow_negative_numbers = true)]
+    #[arg(long, value_parser = values::above_zero)]
     pub near: Option<f64>,
     /// Far plane for cameras without one, or inf; beyond 1.7e38 is inf too [default: 1000 for recorded cameras, the scene for paths]
-    #[arg(long, value_parser = values::far, allow_negative_numbers = true)]
+    #[arg(long, value_parser = values::far)]
     pub far: Option<f64>,
     /// How cameras that are matrices (columns m00 to m33: row, column) are read: column-gl or column-d3d (clip = M x, depth -1..1 or 0..1), row-gl or row-d3d (clip = x M); reversed depth and infinite far are recognised
     #[arg(long, value_name = "NAME")]
@@ -177,7 +171,7 @@ pub struct CullingArgs {
     pub planes: PlaneMethod,
     /// Factor c of the conservative epsilon; 0 leaves the planes as derived
     // With the largest one everything is visible.
-    #[arg(long, value_name = "C", default_value_t = DEFAULT_EPSILON, value_parser = values::within(0.0..=1e9), allow_negative_numbers = true)]
+    #[arg(long, value_name = "C", default_value_t = DEFAULT_EPSILON, value_parser = values::within(0.0..=1e9))]
     pub epsilon: f64,
     /// Numbers the culling test is carried out in: f32, f64, f32-relative
     #[arg(long, value_name = "NUMBERS", default_value = "f32", value_parser = values::choice("arithmetic", &ARITHMETICS))]
