@@ -1,14 +1,19 @@
-//! Builds on scenes that break naive structures: each structure's build time
-//! and depth-driven memory on a million unpleasant items against the uniform
-//! scene of the same size, in one run. Exits 3 if a build takes more than
-//! three times as long. `-- --test` runs a thousand items and judges nothing.
+//! Builds on scenes that break naive structures: the build time and depth-driven
+//! memory of each structure, and the build time of the picking back ends written here
+//! or over obvhs, on a million unpleasant items against the uniform scene of the same
+//! size, in one run. Exits 3 if a build takes more than three times as long.
+//! `-- --test` runs a thousand items and judges nothing. Other crates' structures are
+//! left out: obvhs by itself takes quadratic time for posts and nested boxes.
 
 use std::process::ExitCode;
 use std::time::Instant;
 
 use cullbench::geometry::Aabb;
-use cullbench::index::{Registry, StructureSpec};
-use cullbench::scene;
+use cullbench::index::{Origin, Registry, Row, StructureSpec};
+use cullbench::kernel::Kernel;
+use cullbench::scene::{self, Scene};
+use cullbench::visibility::Solids;
+use cullbench::visibility::pick::BACK_ENDS;
 use glam::Vec3;
 
 const MOST: f64 = 3.0;
@@ -28,7 +33,7 @@ fn point(i: usize) -> Vec3 {
 
 type Shape = (&'static str, fn(usize) -> Aabb);
 
-const SHAPES: [Shape; 7] = [
+const SHAPES: [Shape; 12] = [
     ("identical", |_| Aabb::around(Vec3::splat(3.0), Vec3::ONE)),
     ("straddling every split", |i| {
         Aabb::around(Vec3::splat(500.0), Vec3::splat(1.0 + 499.0 * unit(i, 0)))
@@ -50,49 +55,87 @@ const SHAPES: [Shape; 7] = [
         Aabb::around(point(i), Vec3::splat(10f32.powf(unit(i, 3) * 12.0 - 6.0)))
     }),
     ("offset of 1e7", |i| Aabb::around(point(i) + 1e7, Vec3::ONE)),
+    ("posts", |i| {
+        let at = Vec3::X * 2.0 * i as f32;
+        Aabb::new(at, at + 1.0)
+    }),
+    ("posts that overlap", |i| {
+        let at = Vec3::X * 1e-3 * i as f32;
+        Aabb::new(at, at + 100.0)
+    }),
+    ("nested", |i| {
+        Aabb::around(Vec3::ZERO, Vec3::splat(1.0 + i as f32))
+    }),
+    ("growing", |i| {
+        Aabb::new(Vec3::ZERO, Vec3::splat(1.0 + i as f32))
+    }),
+    ("growing by factors", |i| {
+        Aabb::new(Vec3::ZERO, Vec3::splat((8e-5 * i as f32 - 40.0).exp2()))
+    }),
 ];
 
-/// Median build time in seconds.
-fn build_time(spec: &StructureSpec, items: &[Aabb]) -> f64 {
-    let mut times: Vec<f64> = (0..BUILDS)
-        .map(|_| {
-            let start = Instant::now();
-            let index = spec.build(items).expect("these scenes can be built");
-            let took = start.elapsed().as_secs_f64();
-            drop(std::hint::black_box(index));
-            took
-        })
-        .collect();
+/// Back ends of picking whose trees are built or clustered here.
+const PICKING: [&str; 3] = ["wide-ray", "obvhs", "obvhs-cwbvh"];
+
+/// Median build time in seconds, and the bytes where they are known.
+type Build = Box<dyn Fn(&Scene) -> (f64, Option<usize>)>;
+
+fn median<T>(build: impl Fn() -> T) -> (f64, T) {
+    let timed = || {
+        let start = Instant::now();
+        let built = std::hint::black_box(build());
+        (start.elapsed().as_secs_f64(), built)
+    };
+    let mut times: Vec<f64> = (1..BUILDS).map(|_| timed().0).collect();
+    let (last, built) = timed();
+    times.push(last);
     times.sort_by(f64::total_cmp);
-    times[BUILDS / 2]
+    (times[BUILDS / 2], built)
+}
+
+/// All that is built, by name.
+fn builds() -> Vec<(&'static str, Build)> {
+    let mut all: Vec<(&str, Build)> = Vec::new();
+    let registry = Registry::builtin();
+    let ours = |row: &&Row| matches!(row.info.origin, Origin::Ours);
+    for row in registry.rows().iter().filter(ours) {
+        let spec = StructureSpec::parse(row.info.name).expect(row.info.name);
+        let build = move |scene: &Scene| {
+            let (time, built) = median(|| spec.build(&scene.items).expect("can be built"));
+            (time, Some(built.memory().total()))
+        };
+        all.push((row.info.name, Box::new(build)));
+    }
+    for row in BACK_ENDS.iter().filter(|row| PICKING.contains(&row.name)) {
+        let build = |scene: &Scene| {
+            let solids = Solids::of(scene);
+            let built = || (row.build)(&solids, Kernel::best()).expect("can be built");
+            (median(built).0, None)
+        };
+        all.push((row.name, Box::new(build)));
+    }
+    all
 }
 
 fn main() -> ExitCode {
     let only_test = std::env::args().any(|arg| arg == "--test");
-    // A structure's name picks it alone, as criterion's filters do.
+    // A name picks one alone, as criterion's filters do.
     let wanted = std::env::args().skip(1).find(|arg| !arg.starts_with("--"));
     let n: usize = if only_test { 1_000 } else { 1_000_000 };
-    let uniform = scene::load(&format!("uniform:n={n}"), &Default::default())
-        .expect("uniform")
-        .items;
+    let mut scene = scene::load(&format!("uniform:n={n}"), &Default::default()).expect("uniform");
+    let uniform = scene.items.clone();
     let mut missed = 0;
-    let chosen = |name: &str| wanted.as_deref().is_none_or(|w| w == name);
-    for row in Registry::builtin()
-        .rows()
-        .iter()
-        .filter(|row| chosen(row.info.name))
-    {
-        let spec = StructureSpec::parse(row.info.name).expect(row.info.name);
-        let base = build_time(&spec, &uniform);
-        println!(
-            "{}: uniform {:.0} ns an item",
-            row.info.name,
-            base / n as f64 * 1e9
-        );
-        for (name, shape) in SHAPES {
-            let items: Vec<Aabb> = (0..n).map(shape).collect();
-            let ratio = build_time(&spec, &items) / base;
-            let bytes = spec.build(&items).expect(name).memory().total() as f64 / n as f64;
+    for (name, build) in builds() {
+        if wanted.as_deref().is_some_and(|wanted| wanted != name) {
+            continue;
+        }
+        scene.items.clone_from(&uniform);
+        let (base, _) = build(&scene);
+        println!("{name}: uniform {:.0} ns an item", base / n as f64 * 1e9);
+        for (shape, item) in SHAPES {
+            scene.items = (0..n).map(item).collect();
+            let (time, bytes) = build(&scene);
+            let ratio = time / base;
             let holds = only_test || ratio <= MOST;
             missed += u32::from(!holds);
             let verdict = match (only_test, holds) {
@@ -100,7 +143,10 @@ fn main() -> ExitCode {
                 (false, true) => "ok",
                 (false, false) => "MISSED",
             };
-            println!("  {name:<24} {ratio:>5.2} x uniform, {bytes:.1} bytes an item: {verdict}");
+            let bytes =
+                bytes.map(|bytes| format!(", {:.1} bytes an item", bytes as f64 / n as f64));
+            let bytes = bytes.unwrap_or_default();
+            println!("  {shape:<24} {ratio:>5.2} x uniform{bytes}: {verdict}");
         }
     }
     ExitCode::from(if missed > 0 { 3 } else { 0 })

@@ -30,7 +30,14 @@ pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
     let options = options(args);
     interrupt::from_now_on_finish();
     let workers = Workers::of_study()?;
-    let study = Study::new(String::new(), drift::jobs(&options) as u64, &args.spread);
+    let jobs = drift::jobs(&options);
+    let study = Study::new(String::new(), jobs as u64, &args.spread);
+    study.announce(&format!(
+        "{}, up to {:e} steps or {} s each",
+        text::counted(jobs, "study"),
+        options.steps as f64,
+        options.arm.seconds
+    ));
     let prepared = drift::prepare(&options, &protocol(args, 0), |job| {
         study.begin(job);
         study.advance();

@@ -3,7 +3,7 @@
 
 use std::io::{self, Write};
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, Once};
 
 use anyhow::{Context, bail};
 
@@ -24,9 +24,9 @@ use crate::measure::{ProcessTimes, Protocol};
 use crate::path::{self, CameraPath};
 use crate::scene::{self, LoadOptions, Scene};
 use crate::spec::SpecError;
-use crate::visibility::Guarantee;
 use crate::visibility::region::Pvs;
 use crate::visibility::truth::TruthCache;
+use crate::visibility::{Guarantee, SampleGrid};
 
 /// Rounds of a stage, if one process has them all.
 const ROUNDS: [usize; 2] = [5, 15];
@@ -69,8 +69,7 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     let setting = Setting::of(args, structures, scene, &first)?;
     interrupt::from_now_on_finish();
     let workers = Workers::of_study()?;
-    let study = Study::new(format!("{}, {}: ", args.scene, args.path), 0, &args.spread);
-    let begin = |step: &str| study.begin(step);
+    let study = Study::new(format!("{}, {}: ", args.scene, args.path), 1, &args.spread);
     let truth_cache = args.truth_cache.as_ref().map(TruthCache::new);
     let input = setting.input(args, truth_cache.as_ref())?;
     let mut lines = String::new();
@@ -82,8 +81,14 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
         Some(_) => Some(&mut each),
         None => None,
     };
+    let announced = Once::new();
+    let begin = |step: &str| {
+        announced.call_once(|| study.announce(&work(&input)));
+        study.begin(step);
+    };
     let prepared =
         funnel::prepare(&input, proofs, &begin, &interrupt::asked)?.ok_or(Interrupted)?;
+    study.advance();
     if let Some(file) = &args.certificates {
         write_text(file, &lines)?;
     }
@@ -116,6 +121,16 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     }
     shown?;
     Ok(Ending::of(keep_their_word(&report.stages)))
+}
+
+/// How much there is to do.
+fn work(input: &FunnelInput) -> String {
+    let SampleGrid { width, height } = input.samples;
+    format!(
+        "{}, {} of {width}x{height} samples",
+        text::counted(input.scene.items.len(), "item"),
+        text::counted(input.most_views.min(input.path.cameras.len()), "view"),
+    )
 }
 
 /// Whether nothing that promises not to lose what is visible has lost it. Stages behind

@@ -2,23 +2,31 @@
 //! (`advise`, `drift`, `funnel`, `precision`): the bar that says what is done, and how
 //! the times of all processes come together.
 
+use std::fmt::Write;
 use std::time::Duration;
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle};
 
 use super::processes::{Said, Workers};
 use super::protocol::{Job, Timing};
 use super::shared_args::SpreadArgs;
-use super::text;
+use super::{tell, text};
 use crate::measure::ProcessTimes;
 
 /// A bar of so many parts, with a word for them.
 pub fn progress(parts: u64, word: &str) -> ProgressBar {
     // Drawn on stderr, and only if that is a terminal.
-    let template = format!("{{bar:24}} {{pos}}/{{len}}{word}  {{elapsed}}  {{msg}}");
+    let template = format!("{{bar:24}} {{pos}}/{{len}}{word}  {{elapsed}}{{left}}  {{msg}}");
     let style = ProgressStyle::with_template(&template);
+    let left = |state: &ProgressState, out: &mut dyn Write| {
+        // Before the first part is done nothing is known.
+        if state.pos() > 0 {
+            let _ = write!(out, ", {:#} left", HumanDuration(state.eta()));
+        }
+    };
     let bar = ProgressBar::new(parts);
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let style = style.unwrap_or_else(|_| ProgressStyle::default_bar());
+    bar.set_style(style.with_key("left", left));
     bar
 }
 
@@ -46,6 +54,16 @@ impl Study {
             before,
             processes,
         }
+    }
+
+    /// Says how much there is to do, on a terminal or not, before it is done.
+    pub fn announce(&self, work: &str) {
+        let times = text::counted(self.processes as usize, "process");
+        let line = format!(
+            "at work: {}{work}, timed in {times}; the defaults take minutes",
+            self.about
+        );
+        self.bar.suspend(|| tell(&line));
     }
 
     /// Says what is done now.

@@ -85,7 +85,7 @@ pub struct Tested {
 /// map the triangles that the triangle stage leaves, and the floors and ceilings.
 pub struct Fragments<'w> {
     world: &'w World<'w>,
-    /// None for what is too much to be drawn.
+    /// Empty where too much would be drawn.
     tests: Vec<&'static str>,
     left: Left<'w>,
     /// Why there is no test.

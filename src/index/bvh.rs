@@ -78,8 +78,8 @@ impl BvhPreset {
 }
 
 /// Items in stacks of the very same bounds. Clustering by nearest neighbour
-/// finds no nearest one among equals and needs quadratic time: obvhs gets one
-/// box for a stack, and the stack's items share its leaf.
+/// finds no nearest one among equals: obvhs gets one box for a stack, and the
+/// stack's items share its leaf.
 struct Stacks {
     members: Vec<ItemId>,
     /// Where each stack begins in `members`; empty if every item stands alone.

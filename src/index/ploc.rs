@@ -2,12 +2,20 @@
 //! without the validation that ends it in debug builds. That one recurses once a
 //! level and compares with a depth noted before reinsertion, which may have made the
 //! tree deeper: deep trees panic or overflow the stack. No walk here relies on either.
+//!
+//! The crate takes quadratic time where few neighbours agree in a round of clustering,
+//! as in a row of posts or of growing boxes, and where boxes lie in one another. Here
+//! that has a bound; the trees of other scenes are the crate's own.
 
+use glam::DVec3;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::leaf_collapser::collapse;
+use obvhs::bvh2::node::Bvh2Node;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
-use obvhs::ploc::PlocBuilder;
+use obvhs::ploc::morton::{morton_encode_u64_unorm, morton_encode_u128_unorm};
+use obvhs::ploc::{PlocSearchDistance, SortPrecision};
 use obvhs::{Boundable, BvhBuildParams};
+use rdst::{RadixKey, RadixSort};
 
 use crate::geometry::Aabb;
 
@@ -19,22 +27,197 @@ impl Boundable for Aabb {
 
 /// Clusters boxes bottom-up (PLOC), reinserts, and puts leaves together, as
 /// obvhs 0.4.0 does with the same parameters; `pre_split` is for triangles only.
+/// O(n log n): clustering has a bound, and what would be reinserted in quadratic time
+/// stays where it is.
 pub(crate) fn build(boxes: &[Aabb], params: BvhBuildParams) -> Bvh2 {
-    let mut tree = PlocBuilder::with_capacity(boxes.len()).build(
+    finished(clustered(boxes, &params), params)
+}
+
+/// The same by the crate's own clustering, whose time has no bound.
+#[cfg(feature = "peers")]
+pub(crate) fn build_as_it_comes(boxes: &[Aabb], params: BvhBuildParams) -> Bvh2 {
+    let tree = obvhs::ploc::PlocBuilder::with_capacity(boxes.len()).build(
         params.ploc_search_distance,
         boxes,
         (0..boxes.len() as u32).collect(),
         params.sort_precision,
         params.search_depth_threshold,
     );
-    let mut reinsertion = ReinsertionOptimizer::default();
+    finished(tree, params)
+}
+
+fn finished(mut tree: Bvh2, params: BvhBuildParams) -> Bvh2 {
     let share = params.reinsertion_batch_ratio;
-    reinsertion.run(&mut tree, share, None);
+    reinsert(&mut tree, share);
     let leaf = params.max_prims_per_leaf.clamp(1, 255);
     collapse(&mut tree, leaf, params.collapse_traversal_cost);
     let after = params.post_collapse_reinsertion_batch_ratio_multiplier;
-    reinsertion.run(&mut tree, share * after, None);
+    reinsert(&mut tree, share * after);
     tree
+}
+
+/// Reinserts a share of the nodes, unless they lie in too many others.
+fn reinsert(tree: &mut Bvh2, share: f32) {
+    if !is_nested(tree, share) {
+        ReinsertionOptimizer::default().run(tree, share, None);
+    }
+}
+
+/// Nodes that are looked at to see how many others they lie in.
+const SAMPLE: usize = 1024;
+/// Most nodes that one may lie in on average. Ten to forty are usual.
+const MOST_AROUND: usize = 150;
+
+/// Whether the nodes that would be reinserted lie in so many others that the search
+/// for a better place, which looks into all of them, takes quadratic time.
+fn is_nested(tree: &Bvh2, share: f32) -> bool {
+    let nodes = &tree.nodes;
+    let candidates = (nodes.len() as f32 * (2.0 * share).min(1.0)) as usize;
+    let step = candidates.div_ceil(SAMPLE).max(16);
+    let mut left = candidates.div_ceil(step) * MOST_AROUND;
+    let mut open = Vec::new();
+    for inner in nodes[..candidates].iter().step_by(step) {
+        open.push(0);
+        while let Some(at) = open.pop() {
+            let outer = nodes[at as usize];
+            if inner.min.cmpge(outer.min).all() && inner.max.cmple(outer.max).all() {
+                if left == 0 {
+                    return true;
+                }
+                left -= 1;
+                if !outer.is_leaf() {
+                    open.extend([outer.first_index, outer.first_index + 1]);
+                }
+            }
+        }
+    }
+    false
+}
+
+/// Clusters that all rounds together may look at, as a multiple of the boxes: three
+/// to six are usual.
+const CREDIT: usize = 10;
+
+/// PLOC: in every round, each cluster finds the neighbour in Morton order with which
+/// its bounds are least, and those that found each other become one. Once the credit
+/// is spent, neighbours become one two by two.
+fn clustered(boxes: &[Aabb], params: &BvhBuildParams) -> Bvh2 {
+    let mut tree = Bvh2::zeroed(boxes.len());
+    tree.primitive_indices = (0..boxes.len() as u32).collect();
+    tree.children_are_ordered_after_parents = true;
+    let mut clusters = match params.sort_precision {
+        SortPrecision::U64 => in_morton_order(boxes, morton_encode_u64_unorm),
+        SortPrecision::U128 => in_morton_order(boxes, morton_encode_u128_unorm),
+    };
+    let (mut next, mut found) = (Vec::with_capacity(clusters.len()), Vec::new());
+    let (mut free, mut rounds) = (tree.nodes.len(), 0);
+    let mut credit = CREDIT * boxes.len();
+    while clusters.len() > 1 {
+        let reach = match rounds < params.search_depth_threshold {
+            true => 1,
+            false => reach(params.ploc_search_distance),
+        };
+        credit = credit.saturating_sub(clusters.len());
+        match credit {
+            0 => pair(clusters.len(), &mut found),
+            _ => find_nearest(&clusters, reach, &mut found),
+        }
+        for (i, &(_, other)) in found.iter().enumerate() {
+            if other == i || found[other].1 != i {
+                next.push(clusters[i]);
+            } else if other < i {
+                free -= 2;
+                let children = [clusters[i], clusters[other]];
+                tree.nodes[free..free + 2].copy_from_slice(&children);
+                let [left, right] = children.map(|node| *node.aabb());
+                next.push(Bvh2Node::new(left.union(&right), 0, free as u32));
+            }
+        }
+        std::mem::swap(&mut clusters, &mut next);
+        next.clear();
+        rounds += 1;
+    }
+    if let Some(root) = clusters.first() {
+        tree.nodes[0] = *root;
+    }
+    tree.max_depth = tree.max_depth.max(rounds + 1);
+    tree
+}
+
+fn reach(distance: PlocSearchDistance) -> usize {
+    match distance {
+        PlocSearchDistance::Minimum => 1,
+        PlocSearchDistance::VeryLow => 2,
+        PlocSearchDistance::Low => 6,
+        PlocSearchDistance::Medium => 14,
+        PlocSearchDistance::High => 24,
+        PlocSearchDistance::VeryHigh => 32,
+    }
+}
+
+/// The least area of bounds with a neighbour so far, and that neighbour.
+type Nearest = (f32, usize);
+
+/// For each cluster the last of the nearest ones that are at most so many places away.
+fn find_nearest(clusters: &[Bvh2Node], reach: usize, found: &mut Vec<Nearest>) {
+    found.clear();
+    found.extend((0..clusters.len()).map(|i| (f32::INFINITY, i)));
+    for (i, cluster) in clusters.iter().enumerate() {
+        let mut own = found[i];
+        for other in i + 1..clusters.len().min(i + reach + 1) {
+            let cost = cluster.aabb().union(clusters[other].aabb()).half_area();
+            if cost <= own.0 {
+                own = (cost, other);
+            }
+            if cost <= found[other].0 {
+                found[other] = (cost, i);
+            }
+        }
+        found[i] = own;
+    }
+}
+
+/// Has clusters find each other two by two.
+fn pair(clusters: usize, found: &mut Vec<Nearest>) {
+    found.clear();
+    found.extend((0..clusters).map(|i| (0.0, (i ^ 1).min(clusters - 1))));
+}
+
+/// A box's place, by the code of its centre.
+#[derive(Clone, Copy)]
+struct Coded<C> {
+    code: C,
+    place: u64,
+}
+
+impl<C: RadixKey> RadixKey for Coded<C> {
+    const LEVELS: usize = C::LEVELS;
+
+    #[inline(always)]
+    fn get_level(&self, level: usize) -> u8 {
+        self.code.get_level(level)
+    }
+}
+
+/// The boxes as leaves, those with the same code in the crate's order.
+fn in_morton_order<C>(boxes: &[Aabb], code: impl Fn(DVec3) -> C) -> Vec<Bvh2Node>
+where
+    C: RadixKey + Copy + Ord + Send + Sync,
+{
+    let all = Aabb::union_of(boxes).aabb();
+    let scale = 1.0 / all.diagonal().as_dvec3();
+    let offset = -all.min.as_dvec3() * scale;
+    let coded = |(place, b): (usize, &Aabb)| Coded {
+        code: code(b.aabb().center().as_dvec3() * scale + offset),
+        place: place as u64,
+    };
+    let mut order: Vec<_> = boxes.iter().enumerate().map(coded).collect();
+    match order.len() {
+        0..=250_000 => order.sort_unstable_by_key(|coded| coded.code),
+        _ => order.radix_sort_unstable(),
+    }
+    let leaf = |at: &Coded<C>| Bvh2Node::new(boxes[at.place as usize].aabb(), 1, at.place as u32);
+    order.iter().map(leaf).collect()
 }
 
 /// The preset that was fastest for views and for rays: one item a leaf.
@@ -46,10 +229,12 @@ pub(crate) const ONE_A_LEAF: BvhBuildParams = BvhBuildParams {
 
 /// Most items with the very same bounds that a builder gets which needs
 /// quadratic time for them.
+#[cfg(feature = "peers")]
 pub(crate) const MOST_ALIKE: usize = 50_000;
 
 /// How many items have the same bounds, if more than [`MOST_ALIKE`] have.
 /// O(n log n) if there are that many items at all.
+#[cfg(feature = "peers")]
 pub(crate) fn too_many_alike<'a>(items: impl ExactSizeIterator<Item = &'a Aabb>) -> Option<usize> {
     if items.len() <= MOST_ALIKE {
         return None;
@@ -68,16 +253,21 @@ mod tests {
     use obvhs::bvh2::builder::build_bvh2;
 
     use super::*;
+    use crate::scene::SeededRng;
 
-    /// Boxes one behind the other, each larger than all before.
-    fn growing(n: i32) -> Vec<Aabb> {
-        let corner = |i| Vec3::splat(1.3_f32.powi(i));
-        (0..n).map(|i| Aabb::new(Vec3::ZERO, corner(i))).collect()
+    /// Boxes in no order, some of which share their centre or their bounds.
+    fn scattered(n: usize) -> Vec<Aabb> {
+        let mut rng = SeededRng::new(5);
+        let mut some = || {
+            let at = (rng.point() * 20.0).as_vec3().floor();
+            Aabb::around(at, (rng.point() * 3.0).as_vec3())
+        };
+        (0..n).map(|_| some()).collect()
     }
 
     #[test]
     fn the_tree_is_that_of_the_crates_own_helper() {
-        let boxes = growing(60);
+        let boxes = scattered(3000);
         for params in [
             BvhBuildParams::fastest_build(),
             BvhBuildParams::very_fast_build(),
@@ -96,21 +286,25 @@ mod tests {
         }
     }
 
-    /// One that is validated overflows the stack of a test's thread here.
+    /// Clustering by agreement alone takes as many rounds as there are boxes.
     #[test]
-    fn deep_trees_are_built_in_debug_builds_too() {
-        let tree = build(
-            &[Aabb::new(Vec3::ZERO, Vec3::ONE); 2000],
-            BvhBuildParams::medium_build(),
-        );
-        let (mut deepest, mut open) = (0, vec![(0, 0)]);
-        while let Some((at, depth)) = open.pop() {
-            deepest = deepest.max(depth);
-            let node = &tree.nodes[at as usize];
-            if !node.is_leaf() {
-                open.extend([0, 1].map(|child| (node.first_index + child, depth + 1)));
+    fn rounds_are_few_where_few_neighbours_agree() {
+        let rows: [fn(f32) -> Aabb; 5] = [
+            |_| Aabb::new(Vec3::ZERO, Vec3::ONE),
+            |i| Aabb::new(Vec3::X * 2.0 * i, Vec3::X * (2.0 * i + 1.0) + Vec3::ONE),
+            |i| Aabb::new(Vec3::splat(-1.0 - i), Vec3::splat(1.0 + i)),
+            |i| Aabb::new(Vec3::ZERO, Vec3::splat(1.0 + i)),
+            |i| Aabb::new(Vec3::ZERO, Vec3::splat((i / 50.0).exp2())),
+        ];
+        for (row, at) in rows.iter().enumerate() {
+            let boxes: Vec<Aabb> = (0..3000).map(|i| at(i as f32)).collect();
+            for params in [BvhBuildParams::very_fast_build(), ONE_A_LEAF] {
+                let tree = clustered(&boxes, &params);
+                assert!(tree.max_depth <= 100, "row {row}: {}", tree.max_depth);
+                assert_eq!(is_nested(&tree, 1.0), row != 1, "row {row}");
             }
         }
-        assert!(deepest > 1000, "{deepest}");
+        let tree = clustered(&scattered(3000), &ONE_A_LEAF);
+        assert!(!is_nested(&tree, 1.0));
     }
 }

@@ -16,8 +16,8 @@ fn row(count: u16, scale: f32) -> Vec<Aabb> {
     boxes.collect()
 }
 
-/// The scenes with their names: nothing, points, coincident boxes, extreme
-/// sizes and places, inverted boxes.
+/// The scenes with their names: nothing, points, coincident and nested boxes,
+/// extreme sizes and places, inverted boxes.
 pub fn edge_scenes() -> Vec<(&'static str, Vec<Aabb>)> {
     let needle = |i: u16| {
         let at = f32::from(i) * 0.01;
@@ -29,6 +29,8 @@ pub fn edge_scenes() -> Vec<(&'static str, Vec<Aabb>)> {
     };
     let far = |i: u16| cube(1e7 + f32::from(i), 1e7, -1e7, 1.0);
     let point = Aabb::new(Vec3::ONE, Vec3::ONE);
+    let nested = |i: u16| cube(0.0, 0.0, 0.0, 1.0 + f32::from(i));
+    let growing = |i: u16| Aabb::new(Vec3::ZERO, Vec3::splat((f32::from(i) / 10.0).exp2()));
     let everything = Aabb::new(Vec3::splat(-1e6), Vec3::splat(1e6));
     let everything = [vec![everything; 50], row(500, 1.0)].concat();
     let mut third_inverted = row(300, 1.0);
@@ -50,6 +52,8 @@ pub fn edge_scenes() -> Vec<(&'static str, Vec<Aabb>)> {
         ("near the largest float", row(100, 1e36)),
         ("far away", (0..500).map(far).collect()),
         ("everything overlaps", everything),
+        ("nested", (0..500).map(nested).collect()),
+        ("growing from a corner", (0..500).map(growing).collect()),
         ("inverted among sound", third_inverted),
         ("only inverted", vec![Aabb::new(Vec3::ONE, Vec3::ZERO); 10]),
     ]

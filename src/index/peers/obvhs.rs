@@ -43,7 +43,7 @@ impl Tree {
             return Ok(Tree::default());
         }
         let boxes: Vec<Aabb> = items.iter().map(|item| item.bounds).collect();
-        let mut bvh = ploc::build(&boxes, params);
+        let mut bvh = ploc::build_as_it_comes(&boxes, params);
         bvh.reorder_in_stack_traversal_order();
         // A walk keeps one entry a level; the crate's default is 96.
         bvh.max_depth = bvh.max_depth.max(bvh.depth(0) + 2);

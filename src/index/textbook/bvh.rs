@@ -63,8 +63,8 @@ impl BvhTextbook {
     }
 
     /// Lays the items of a subtree out in its order and fits its nodes; its bounds.
-    /// The deepest level that is allowed keeps all that is below it: of items that
-    /// lie alike obvhs makes trees as deep as they have items.
+    /// The deepest level that is allowed keeps all that is below it: the builder's
+    /// trees may be deeper.
     fn settle(&mut self, at: u32, levels: u32, stacks: &[&[Record]], order: &[u32]) -> Aabb {
         let node = self.nodes[at as usize];
         if levels > 0 && !node.is_leaf() {
@@ -128,8 +128,8 @@ impl RegionIndex for BvhTextbook {
         if records.is_empty() {
             return Ok(tree);
         }
-        // Items with the very same bounds are one to the builder, which would need
-        // quadratic time to find a nearest one among them.
+        // Items with the very same bounds are one to the builder, which finds no nearest
+        // one among them.
         let key = |r: &Record| r.bounds.bits();
         records.sort_unstable_by_key(|r| (key(r), r.id));
         let stacks: Vec<&[Record]> = records.chunk_by(|a, b| key(a) == key(b)).collect();

@@ -5,7 +5,7 @@
 use glam::DVec3;
 
 use super::boxes::Shapes;
-use crate::camera::{CameraError, Lens, PlaneMethod, PlaneOptions};
+use crate::camera::{CameraError, FARTHEST, Lens, PlaneMethod, PlaneOptions};
 use crate::oracle::Pose;
 use crate::scene::SeededRng;
 
@@ -268,6 +268,8 @@ impl Draft {
     }
 
     fn scale(&mut self, factor: f64) {
+        // A far plane beyond the farthest would be an infinite one.
+        let factor = self.far.map_or(factor, |far| factor.min(FARTHEST / far));
         self.eye *= factor;
         self.near *= factor;
         self.far = self.far.map(|far| far * factor);

@@ -4,8 +4,6 @@
 use std::cmp::Ordering;
 
 use super::facets::Facets;
-use crate::geometry::Aabb;
-use crate::index::ploc;
 use crate::kernel::Kernel;
 use crate::query::ItemId;
 use crate::visibility::{Guarantee, Ray, Solids};
@@ -89,18 +87,6 @@ pub enum NotBuilt {
         /// How many there may be.
         most: usize,
     },
-    /// Its builder needs quadratic time for these items.
-    #[error(
-        "'{name}' needs quadratic time for {alike} items with the same bounds; expected at most {most}"
-    )]
-    Alike {
-        /// The back end.
-        name: &'static str,
-        /// How many items have the same bounds.
-        alike: usize,
-        /// How many may.
-        most: usize,
-    },
     /// A tree with more levels than its walks can take.
     #[error("the tree of '{name}' has {levels} levels; expected at most {most}")]
     TooDeep {
@@ -142,14 +128,4 @@ pub(super) fn keep_nearest_items(hits: &mut Vec<Hit>, count: usize) {
     hits.sort_unstable_by(|a, b| a.item.cmp(&b.item).then(Hit::order(a, b)));
     hits.dedup_by_key(|hit| hit.item);
     keep_nearest(hits, count);
-}
-
-/// Refuses more items with the same bounds than a builder gets which needs
-/// quadratic time for them.
-pub(super) fn refuse_stacks(name: &'static str, boxes: &[Aabb]) -> Result<(), NotBuilt> {
-    let most = ploc::MOST_ALIKE;
-    match ploc::too_many_alike(boxes.iter()) {
-        None => Ok(()),
-        Some(alike) => Err(NotBuilt::Alike { name, alike, most }),
-    }
 }

@@ -3,9 +3,7 @@
 
 use std::ops::Range;
 
-use super::contract::{
-    BackEnd, Hit, NotBuilt, Pick, keep_nearest, keep_nearest_items, refuse_stacks,
-};
+use super::contract::{BackEnd, Hit, NotBuilt, Pick, keep_nearest, keep_nearest_items};
 use super::facets::Facets;
 use super::rounded::{About, RoundedRay};
 use crate::geometry::Aabb;
@@ -133,7 +131,6 @@ fn levels_of(nodes: usize, children: impl Fn(usize) -> Range<usize>) -> usize {
 
 /// The tree over boxes; a panic of the crate is an error.
 fn tree<T: Cast>(boxes: &[Aabb], name: &'static str) -> Result<T, NotBuilt> {
-    refuse_stacks(name, boxes)?;
     let build = || {
         let binary = ploc::build(boxes, ploc::ONE_A_LEAF);
         let levels = levels_of(binary.nodes.len(), |node| {

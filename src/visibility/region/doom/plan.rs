@@ -24,6 +24,21 @@ fn cross([a, b]: [Point; 2], [c, d]: [Point; 2]) -> bool {
         && turn(c, d, a).signum() * turn(c, d, b).signum() < 0
 }
 
+/// The parts of an edge between those of some points that lie on it.
+pub fn parted([from, to]: [Point; 2], points: &[Point]) -> Vec<[Point; 2]> {
+    let away = |p: Point| [0, 1].map(|k| (p[k] - from[k]).abs()).iter().sum::<i32>();
+    let within =
+        |p: &Point| (0..2).all(|k| (from[k].min(to[k])..=from[k].max(to[k])).contains(&p[k]));
+    let on = points
+        .iter()
+        .copied()
+        .filter(|p| within(p) && turn(from, to, *p) == 0);
+    let mut stops: Vec<Point> = on.chain([from, to]).collect();
+    stops.sort_unstable_by_key(|&p| away(p));
+    stops.dedup();
+    stops.windows(2).map(|pair| [pair[0], pair[1]]).collect()
+}
+
 /// Cuts the polygons that lie on the right of all edges together, holes and all, into
 /// triangles that turn to the right. `None` where the edges do not close, cross, or one
 /// has a corner of another between its ends.

@@ -310,6 +310,20 @@ mod tests {
     }
 
     #[test]
+    fn a_corner_on_a_wall_between_its_ends_leaves_no_gap() {
+        let mut map = nested(&[([0, 0, 400, 300], Some([0.0, 100.0]))]);
+        let pillar = [[0, 150], [50, 100], [100, 150], [50, 200]];
+        map.lines.extend((0..4).map(|k| MapLine {
+            ends: [pillar[k], pillar[(k + 1) % 4]],
+            sectors: [Some(0), None],
+            open: None,
+        }));
+        let map = DoomMap::of_parts(map.lines, map.sectors);
+        assert!(map.disputes().is_empty() && map.unclosed().is_empty());
+        assert!(!map.solid_boxes([-8.0, 120.0]).is_empty());
+    }
+
+    #[test]
     fn no_point_of_a_box_is_in_a_sector() {
         for (name, least) in [("freedm-map12", 30), ("freedm-map20", 100)] {
             let sample = Sample::named(name).unwrap();

@@ -104,7 +104,8 @@ impl DoomMap {
         [now.floor, now.ceiling] != self.heights[sector as usize]
     }
 
-    /// The linedefs about a sector, which lies on the right of each.
+    /// The linedefs about a sector, which lies on the right of each, in parts between all of
+    /// their ends.
     fn outline(&self, sector: RegionId) -> Vec<[[i32; 2]; 2]> {
         let mut edges = Vec::new();
         for MapLine { ends, sectors, .. } in &self.lines {
@@ -116,7 +117,11 @@ impl DoomMap {
                 _ => {}
             }
         }
+        let ends: Vec<Point> = edges.iter().map(|[from, _]| *from).collect();
         edges
+            .iter()
+            .flat_map(|edge| plan::parted(*edge, &ends))
+            .collect()
     }
 
     /// The walls of linedefs about a sector that moves, as far as they hide however it
