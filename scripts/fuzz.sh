@@ -19,7 +19,7 @@ coverage=(--cfg fuzzing -Cpasses=sancov-module)
 for argument in level=4 inline-8bit-counters pc-table trace-compares; do
     coverage+=("-Cllvm-args=-sanitizer-coverage-$argument")
 done
-RUSTFLAGS="${coverage[*]}" CARGO_INCREMENTAL=0 cargo build --locked \
+RUSTFLAGS="${coverage[*]}" CARGO_INCREMENTAL=0 cargo build \
     --manifest-path fuzz/Cargo.toml --target "$target" --target-dir target \
     --config "profile.dev.package.cullbench.opt-level=$level"
 
