@@ -23,14 +23,18 @@ RUSTFLAGS="${coverage[*]}" CARGO_INCREMENTAL=0 cargo build \
     --manifest-path fuzz/Cargo.toml --target "$target" --target-dir target \
     --config "profile.dev.package.cullbench.opt-level=$level"
 
-scratch=$(mktemp -d)
+# In memory if there is such a place: runs are written and synchronised.
+scratch=$(mktemp -d -p /dev/shm 2>/dev/null || mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 for reader in "${readers[@]}"; do
     found=target/fuzz/$reader
     mkdir -p "$found"
-    # A WAD holds a map of a dozen tables; of the rest, short texts reach as much.
+    # Words to put in whole, such as names of columns.
+    grep -aohE '[A-Za-z_][A-Za-z_0-9-]{2,30}' -r "fuzz/corpus/$reader" |
+        sort -u | sed 's/.*/"&"/' >"$scratch/words"
     run=(env TMPDIR="$scratch" FUZZ_READER="$reader" "target/$target/debug/fuzz"
-        -timeout=10 -rss_limit_mb=2048 -max_len=16384 -artifact_prefix="$found/" -verbosity=0)
+        -timeout=10 -rss_limit_mb=2048 -max_len=16384 -dict="$scratch/words"
+        -artifact_prefix="$found/" -verbosity=0)
     mapfile -t corpus < <(find "fuzz/corpus/$reader" -type f)
     "${run[@]}" "${corpus[@]}"
     mkdir -p "$found/corpus"

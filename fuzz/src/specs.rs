@@ -53,9 +53,13 @@ fn structures(list: &str) {
     }
 }
 
-/// The spec, unless a number of it makes a large scene or a long path.
+/// The spec, unless a number of it makes a large scene or a long path. What could be the name
+/// of a file is told as it is: that one would have control characters in it.
 fn small(line: &str) -> Option<Spec> {
     let spec = read(Spec::parse_behind("mesh:", line))?;
+    if line.contains(char::is_control) {
+        return None;
+    }
     let is_small = |(key, value)| key == "seed" || parse_number(value).is_none_or(|n| n <= MOST);
     let all_are = spec.given().all(is_small);
     all_are.then_some(spec)
