@@ -28,17 +28,17 @@ scratch=$(mktemp -d -p /dev/shm 2>/dev/null || mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 for reader in "${readers[@]}"; do
     found=target/fuzz/$reader
-    mkdir -p "$found"
     # Words to put in whole, such as names of columns.
     grep -aohE '[A-Za-z_][A-Za-z_0-9-]{2,30}' -r "fuzz/corpus/$reader" |
         sort -u | sed 's/.*/"&"/' >"$scratch/words"
     run=(env TMPDIR="$scratch" FUZZ_READER="$reader" "target/$target/debug/fuzz"
         -timeout=10 -rss_limit_mb=2048 -max_len=16384 -dict="$scratch/words"
-        -artifact_prefix="$found/" -verbosity=0)
+        -artifact_prefix="$found/")
     mapfile -t corpus < <(find "fuzz/corpus/$reader" -type f)
-    "${run[@]}" "${corpus[@]}"
     mkdir -p "$found/corpus"
-    [ "$seconds" -eq 0 ] ||
-        "${run[@]}" -max_total_time="$seconds" -print_final_stats=1 "$found/corpus" "fuzz/corpus/$reader"
-    echo "$reader: ${#corpus[@]} inputs replayed, $seconds s of mutations"
+    log=$found/log
+    mutate=("${run[@]}" -max_total_time="$seconds" "$found/corpus" "fuzz/corpus/$reader")
+    [ "$seconds" -gt 0 ] || mutate=(true)
+    { "${run[@]}" "${corpus[@]}" && "${mutate[@]}"; } >"$log" 2>&1 || { cat "$log" && exit 1; }
+    echo "$reader: ${#corpus[@]} inputs replayed; $(sed -n 's/^Done //p' "$log")"
 done
