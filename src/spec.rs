@@ -7,6 +7,8 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::ops::RangeInclusive;
 
+use crate::shown::plain;
+
 /// A name with its parameters, as typed.
 ///
 /// ```
@@ -27,7 +29,7 @@ pub struct Spec {
 
 /// What is wrong with a spec, in one line.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
-#[error("{0}")]
+#[error("{}", plain(.0))]
 pub struct SpecError(String);
 
 impl SpecError {
@@ -304,6 +306,12 @@ pub(crate) mod tests {
         for text in ["", "k", "ten", "inf", "nan", "1e999"] {
             assert_eq!(parse_number(text), None, "{text}");
         }
+    }
+
+    #[test]
+    fn errors_are_one_line_whatever_was_typed() {
+        let error = Spec::parse("city:a\u{1b}\nb").unwrap_err().to_string();
+        assert!(error.contains("'a\\u{1b} b' is not of the form"), "{error}");
     }
 
     #[test]

@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::bounds::{BOUNDS, Bound};
 use super::group::{GroupPlan, LEAST_TAIL, measure_part};
-use super::metrics::{Metric, Metrics};
+use super::metrics::{METRICS, Metric, Metrics};
 use super::part::{Known, Part, SubjectPart, TaskPart};
 use super::subject::TWIN;
 use super::update::MOST_UPDATED;
@@ -214,8 +214,9 @@ impl<'p> Facts<'p> {
             .filter(|_| right || verdict.status == Status::Unsafe);
         let mut metrics = Metrics::default();
         self.build_metrics(&mut metrics, label);
-        for (name, &mean) in subject.counts.iter().filter(|_| right) {
-            metrics.set(name, mean);
+        // A stream may hold others.
+        for metric in METRICS.iter().filter(|_| right) {
+            metrics.maybe(metric.name, subject.counts.get(metric.name).copied());
         }
         if let Some(judged) = &judged {
             error_metrics(&mut metrics, judged);

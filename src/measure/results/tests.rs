@@ -116,6 +116,16 @@ fn times(factor: f64, salt: u64) -> Vec<f64> {
 }
 
 #[test]
+fn counts_that_are_no_metrics_are_left_alone() {
+    let mut parts = parts(&[("linear", TaskKind::Query, &[1000.0])]);
+    let counts = [("items_tested", 3.0), ("items_boiled", 4.0)];
+    parts[0].subjects[0].counts = counts.map(|(name, n)| (name.to_owned(), n)).into();
+    let metrics = &Group::of(&parts).cells[0].metrics;
+    assert_eq!(metrics["items_tested"].value, 3.0);
+    assert!(!metrics.contains_key("items_boiled"));
+}
+
+#[test]
 fn values_lie_in_their_intervals_and_ratios_are_those_of_the_shown_values() {
     let (linear, fast, slow, same) = (times(1.0, 1), times(0.2, 2), times(3.0, 3), times(0.2, 4));
     let group = Group::of(&parts(&[

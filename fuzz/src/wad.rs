@@ -1,6 +1,4 @@
-//! Any bytes as a Doom WAD: no panic, one-line errors, and a map that is accepted has
-//! one region for every point and can be seen through.
-#![no_main]
+//! Doom maps: a map that is accepted has one region for every point and can be seen through.
 
 use std::sync::Arc;
 
@@ -8,31 +6,29 @@ use cullbench::scene::{Scene, WadMap, map_names};
 use cullbench::visibility::Ray;
 use cullbench::visibility::region::Marks;
 use cullbench::visibility::region::doom::DoomMap;
-use libfuzzer_sys::fuzz_target;
+
+use crate::read;
 
 /// Most linedefs, and most sectors: searches of larger maps take seconds.
 const MOST: usize = 64;
 
-fuzz_target!(|bytes: &[u8]| {
-    let names = map_names(bytes, "fuzz.wad").unwrap_or_default();
+pub fn wad(bytes: &[u8]) {
+    let names = read(map_names(bytes, "fuzz.wad")).unwrap_or_default();
     // Of several maps one is to be named.
     let first = names.first().filter(|_| names.len() > 1);
     let first = first.map(String::as_str);
     let map = WadMap::read(bytes, "fuzz.wad", first);
-    let scene = map.and_then(|map| map.into_scene("fuzz"));
-    match scene {
-        Err(error) => assert!(!error.to_string().contains('\n'), "{error}"),
-        Ok(scene) => {
-            for place in &scene.places {
-                assert_eq!(scene.holding(&scene.sought(place.eye)).len(), 1);
-            }
-            let map = DoomMap::read(bytes, "fuzz.wad", first).expect("the same map");
-            if map.lines.len().max(map.sectors.len()) <= MOST {
-                see_through(Arc::new(map), &scene);
-            }
-        }
+    let Some(scene) = read(map.and_then(|map| map.into_scene("fuzz"))) else {
+        return;
+    };
+    for place in &scene.places {
+        assert_eq!(scene.holding(&scene.sought(place.eye)).len(), 1);
     }
-});
+    let map = DoomMap::read(bytes, "fuzz.wad", first).expect("the same map");
+    if map.lines.len().max(map.sectors.len()) <= MOST {
+        see_through(Arc::new(map), &scene);
+    }
+}
 
 /// What the stages of the funnel make of a map.
 fn see_through(map: Arc<DoomMap>, scene: &Scene) {

@@ -1,0 +1,54 @@
+//! Any bytes for every reader: no panic, no hang, errors of one line, and what was read can be
+//! used, and written and read again the same. One program, so that one is linked;
+//! `FUZZ_READER` says which reader it is.
+#![no_main]
+
+mod runs;
+mod specs;
+mod tables;
+mod wad;
+
+use std::fmt::Display;
+use std::sync::LazyLock;
+
+use libfuzzer_sys::fuzz_target;
+
+type Reader = fn(&[u8]);
+
+/// By the name of its corpus.
+const READERS: [(&str, Reader); 11] = [
+    ("boxes", tables::boxes),
+    ("cameras", tables::cameras),
+    ("points", tables::points),
+    ("pvs", tables::pvs),
+    ("report", runs::report),
+    ("samples", runs::samples),
+    ("sought", tables::sought),
+    ("specs", specs::specs),
+    ("stream", runs::stream),
+    ("vectors", tables::vectors),
+    ("wad", wad::wad),
+];
+
+static READER: LazyLock<Reader> = LazyLock::new(|| {
+    let name = std::env::var("FUZZ_READER").unwrap_or_default();
+    let row = READERS.iter().find(|row| row.0 == name);
+    let known = READERS.map(|row| row.0).join(", ");
+    row.unwrap_or_else(|| panic!("FUZZ_READER is '{name}'; expected one of {known}"))
+        .1
+});
+
+fuzz_target!(init: LazyLock::force(&READER), |bytes: &[u8]| READER(bytes));
+
+/// What there is, or an error in one line that a terminal takes.
+fn read<T, E: Display>(result: Result<T, E>) -> Option<T> {
+    let error = match result {
+        Ok(value) => return Some(value),
+        Err(error) => error.to_string(),
+    };
+    assert!(
+        !error.is_empty() && !error.contains(char::is_control),
+        "{error:?}"
+    );
+    None
+}

@@ -1,0 +1,86 @@
+//! Tables and JSON of boxes, cameras, points, regions and test vectors.
+
+use std::fmt::Write;
+
+use cullbench::camera::{MATRIX_CONVENTIONS, PlaneOptions, Surroundings};
+use cullbench::index::Registry;
+use cullbench::path::{LensDefaults, read_cameras_csv, read_points_csv};
+use cullbench::scene::{Scene, read_boxes_csv, read_sought_boxes_csv, write_boxes_csv};
+use cullbench::stress::{Vector, read_vectors, replay};
+use cullbench::visibility::region::Pvs;
+
+use crate::read;
+
+pub fn boxes(bytes: &[u8]) {
+    for skip in [false, true] {
+        let scene = read(read_boxes_csv(bytes, "fuzz.csv", skip));
+        let Some(scene) = scene.and_then(|scene| read(scene.settled())) else {
+            continue;
+        };
+        let written = |scene: &Scene| {
+            let mut text = Vec::new();
+            write_boxes_csv(scene, &mut text).expect("a Vec takes everything");
+            text
+        };
+        let text = written(&scene);
+        let again = read_boxes_csv(&text[..], "again.csv", false).expect("what was written");
+        assert!(again.written().eq(scene.written()));
+        assert_eq!(written(&again), text);
+    }
+}
+
+pub fn sought(bytes: &[u8]) {
+    let Some(boxes) = read(read_sought_boxes_csv(bytes, "fuzz.csv")) else {
+        return;
+    };
+    for b in boxes {
+        assert!(b.min.is_finite() && b.max.is_finite() && b.min.cmple(b.max).all());
+    }
+}
+
+pub fn cameras(bytes: &[u8]) {
+    let conventions = MATRIX_CONVENTIONS.map(|row| Some(row.0));
+    for matrix in conventions.into_iter().chain([None]) {
+        let defaults = LensDefaults {
+            matrix,
+            ..LensDefaults::default()
+        };
+        let path = read(read_cameras_csv(bytes, "fuzz.csv", &defaults));
+        for camera in path.iter().flat_map(|path| &path.cameras) {
+            read(camera.volume(&PlaneOptions::default(), &Surroundings::default()));
+        }
+    }
+}
+
+pub fn points(bytes: &[u8]) {
+    let points = read(read_points_csv(bytes, "fuzz.csv"));
+    assert!(points.iter().flatten().all(|point| point.is_finite()));
+}
+
+pub fn pvs(bytes: &[u8]) {
+    let Some(pvs) = read(Pvs::from_json(bytes)).filter(|pvs| pvs.len() <= 256) else {
+        return;
+    };
+    let mut text = format!("{{\"regions\":{},\"sees\":[", pvs.len());
+    let all = 0..pvs.len() as u32;
+    let pairs = all
+        .clone()
+        .flat_map(|from| all.clone().map(move |to| (from, to)));
+    for (from, to) in pairs.filter(|&(from, to)| pvs.sees(from, to)) {
+        write!(text, "[{from},{to}],").expect("a String takes everything");
+    }
+    let text = text.trim_end_matches(',').to_owned() + "]}";
+    assert_eq!(Pvs::from_json(text).expect("what was written"), pvs);
+}
+
+pub fn vectors(bytes: &[u8]) {
+    let linear = Registry::builtin().structures("linear");
+    let linear = linear.expect("a structure");
+    // Certificates grow with the fourth power of the planes.
+    let is_small = |v: &Vector| v.planes.iter().flatten().count() < 9 && v.boxes.len() < 99;
+    for vector in read(read_vectors(bytes, "fuzz.json")).unwrap_or_default() {
+        if is_small(&vector) {
+            let _ = replay(&vector, &linear);
+        }
+    }
+}
