@@ -111,8 +111,7 @@ def answers():
         text = output("funnel", *arguments, "--samples", "64x36", "--processes", "1", "--format", "json")
         found = json.loads(text)
         for section, names in (("stages", ("stage", "name", "structure")), ("orders", ("name",)),
-                               ("picks", ("question", "name")), ("audits", ("name",)),
-                               ("gains", ("stage", "back_end"))):
+                               ("picks", ("question", "name")), ("gains", ("stage", "back_end"))):
             for name, rows in rows_by(found.pop(section), *names).items():
                 yield f"funnel {' '.join(arguments)} {section} {name}", rows
         for section in ("level", "inner_boxes", "ground", "mirror", "chain"):
@@ -132,9 +131,7 @@ def answers():
             yield f"drift {section} {name}", rows
     for row in found["arm"]["points"]:
         errors = {name: row[name] for name in ("position_error", "velocity_error")}
-        name = " ".join(str(row[name]) for name in ("method", "arithmetic", "stiffness", "substeps"))
-        if row["frame_times"] == "steady" and row["step_tolerance"] is None:
-            yield f"drift arm {name}", [json.dumps(errors, sort_keys=True)]
+        yield f"drift arm {row['method']} f64 {row['stiffness']} {row['substeps']}", [json.dumps(errors, sort_keys=True)]
     for row in found["arm"]["stability"]:
         yield f"drift stability {row['method']} {row['damping_ratio']}", [str(row["limit_omega_h"])]
     for suite in ("quick", "standard", "full", "compare"):

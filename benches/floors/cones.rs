@@ -7,11 +7,10 @@ use std::sync::Arc;
 
 use cullbench::kernel::Kernel;
 use cullbench::measure::Stopwatch;
+use cullbench::visibility::surfaces_of;
 use cullbench::visibility::triangle::{
-    Clusters, Counts, Criterion, MOST_TRIANGLES, Selection, TRIANGLE_ROWS, TriangleCull, View,
-    truth,
+    Clusters, Counts, Eye, MOST_TRIANGLES, Selection, TRIANGLE_ROWS, TriangleCull, facing,
 };
-use cullbench::visibility::{SampleGrid, surfaces_of};
 
 use super::{loaded, over_builds, ratio, verdict};
 
@@ -23,7 +22,6 @@ const SCENES: [&str; 5] = [
     "mesh:statue:n=100000",
     "mesh:statue:n=1000000",
 ];
-const GRID: SampleGrid = SampleGrid::new(320, 180);
 const OURS: &str = "cone-f32-safe";
 /// Those of these that the features have.
 const THEIRS: [&str; 2] = ["cone-f32", "meshopt"];
@@ -43,9 +41,8 @@ fn missed_in(source: &str, only_test: bool, turns: usize) -> u32 {
     let (typed, scene, cameras) = loaded(source, PATH, only_test);
     let surfaces = surfaces_of(&scene).expect(source).expect("triangles");
     let clusters = Arc::new(Clusters::of(surfaces, MOST_TRIANGLES));
-    let views = cameras.cameras.iter();
-    let views = views.map(|camera| View::of(camera, scene.origin, GRID).expect("rays"));
-    let views: Vec<View> = views.collect();
+    let cameras = cameras.cameras.iter();
+    let eyes: Vec<Eye> = cameras.map(|c| Eye::of(c, scene.origin)).collect();
     let all = Selection::all(&clusters);
     let built = |name: &str| {
         let row = TRIANGLE_ROWS.iter().find(|row| row.name == name);
@@ -53,16 +50,16 @@ fn missed_in(source: &str, only_test: bool, turns: usize) -> u32 {
     };
 
     let ours = built(OURS).expect(OURS);
-    let lost = views.iter().map(|view| {
+    let lost = eyes.iter().map(|eye| {
         let mut kept = all.clone();
-        ours.cull(view, Kernel::best(), &mut kept);
-        let truth = truth(Criterion::Facing, &clusters, view, &all);
+        ours.cull(eye, Kernel::best(), &mut kept);
+        let truth = facing(&clusters, eye, &all);
         Counts::of(&all, &kept, &truth).false_negatives
     });
     let lost: usize = lost.sum();
 
     let mut missed = 0;
-    let tests = (views.len() * clusters.len()) as f64;
+    let tests = (eyes.len() * clusters.len()) as f64;
     // Kept, so that the next ones lie elsewhere.
     let mut earlier = Vec::new();
     for kernel in Kernel::available() {
@@ -75,8 +72,8 @@ fn missed_in(source: &str, only_test: bool, turns: usize) -> u32 {
                 let [of_ours, of_theirs] = &mut kept;
                 let time = |cull: &dyn TriangleCull, kept: &mut Selection| {
                     let watch = Stopwatch::start();
-                    for view in &views {
-                        cull.cull(view, kernel, black_box(kept));
+                    for eye in &eyes {
+                        cull.cull(eye, kernel, black_box(kept));
                     }
                     watch.lap().cpu_ns / tests
                 };

@@ -1,17 +1,15 @@
 //! Floors of the occlusion stage as a whole, from the street: what the guarantee costs
-//! beside the same buffer without one, what a removed item costs, and how far walking the
-//! tree from front to back is ahead of drawing first and asking then.
+//! beside the same buffer without one, and what a removed item costs.
 
 use std::hint::black_box;
 
 use cullbench::culling::Culling;
 use cullbench::kernel::Kernel;
 use cullbench::measure::{Stopwatch, Workload};
-use cullbench::query::{AnyVolume, ItemId};
+use cullbench::query::AnyVolume;
 use cullbench::statistics::trimmed_mean;
 use cullbench::visibility::occlusion::{
-    Interleaved, MaskedCentre, MaskedInner, OccluderChoice, OccluderScene, OcclusionBuffer,
-    TwoPass, View,
+    Interleaved, MaskedCentre, MaskedInner, OccluderScene, OcclusionBuffer, View,
 };
 use cullbench::visibility::{Rays, SampleGrid, Solids};
 
@@ -24,8 +22,6 @@ const MOST_TIMES: f64 = 1.05;
 /// How often scene and buffers are made anew: their place in memory is worth as much as the
 /// few percent between the two.
 const BUILDS: usize = 7;
-/// Time in two passes / time front to back, at least.
-const LEAST_AHEAD: f64 = 2.0;
 
 /// Of scenes of more items that is printed and not judged: most of them are smaller than a
 /// pixel, and none covers one wholly.
@@ -41,9 +37,6 @@ const REMOVED: [(&str, f64); 6] = [
     ("helsinki", 16.0),
 ];
 
-/// The scene whose two couplings are compared.
-const COUPLED: &str = "city:n=100000";
-
 /// Judges every scene; how many floors are missed.
 pub fn missed(only_test: bool, turns: usize) -> u32 {
     let missed_in = |(source, most)| missed_in(source, most, only_test, turns);
@@ -51,10 +44,10 @@ pub fn missed(only_test: bool, turns: usize) -> u32 {
 }
 
 /// Time of all views of a pass.
-fn timed<'v>(views: &'v [(View<'v>, Vec<ItemId>)], mut cull: impl FnMut(&View, &[ItemId])) -> f64 {
+fn timed<'v>(views: &'v [(View<'v>, usize)], mut cull: impl FnMut(&View)) -> f64 {
     let watch = Stopwatch::start();
-    for (view, candidates) in views {
-        cull(view, candidates);
+    for (view, _) in views {
+        cull(view);
     }
     watch.lap().cpu_ns
 }
@@ -69,12 +62,11 @@ fn missed_in(source: &str, most_ns: f64, only_test: bool, turns: usize) -> u32 {
         let AnyVolume::Planes(volume) = view.as_any() else {
             unreachable!("a perspective camera's default test")
         };
-        let items = (0..).zip(&scene.items);
-        let seen = items.filter(|(_, b)| volume.sees(b)).map(|(id, _)| id);
+        let seen = scene.items.iter().filter(|b| volume.sees(b)).count();
         let rays = Rays::of(camera).expect("rays");
-        (View::new(&rays, volume, &occluders, GRID), seen.collect())
+        (View::new(&rays, volume, &occluders, GRID), seen)
     });
-    let views: Vec<(View, Vec<ItemId>)> = views.collect();
+    let views: Vec<(View, usize)> = views.collect();
 
     let mut kept = 0;
     let mut laps = Vec::new();
@@ -87,7 +79,7 @@ fn missed_in(source: &str, most_ns: f64, only_test: bool, turns: usize) -> u32 {
         let (mut out, mut unsafe_out) = (Vec::new(), Vec::new());
         let by_safe = || {
             kept = 0;
-            let ns = timed(&views, |view, _| {
+            let ns = timed(&views, |view| {
                 out.clear();
                 safe.cull(&occluders, view, &mut out);
                 kept += black_box(&out).len();
@@ -96,7 +88,7 @@ fn missed_in(source: &str, most_ns: f64, only_test: bool, turns: usize) -> u32 {
             ns
         };
         let by_unsafe = || {
-            timed(&views, |view, _| {
+            timed(&views, |view| {
                 unsafe_out.clear();
                 unsafe_one.cull(&occluders, view, &mut unsafe_out);
                 black_box(&unsafe_out);
@@ -113,37 +105,9 @@ fn missed_in(source: &str, most_ns: f64, only_test: bool, turns: usize) -> u32 {
          {MOST_TIMES} x: {}",
         verdict(not_judged, cheap)
     );
-    let mut missed = u32::from(!cheap);
+    let missed = u32::from(!cheap);
 
-    if source == COUPLED {
-        let mut two = TwoPass::new(MaskedInner::new(GRID), OccluderChoice::All, kernel);
-        let mut one = Interleaved::new(MaskedInner::new(GRID), kernel);
-        let (mut out, mut one_out) = (Vec::new(), Vec::new());
-        let by_two = || {
-            timed(&views, |view, candidates| {
-                out.clear();
-                two.cull(&occluders, view, candidates, &mut out);
-                black_box(&out);
-            })
-        };
-        let by_one = || {
-            timed(&views, |view, _| {
-                one_out.clear();
-                one.cull(&occluders, view, &mut one_out);
-                black_box(&one_out);
-            })
-        };
-        let [times, low, high] = ratio(turns.min(9), by_two, by_one);
-        let ahead = only_test || times >= LEAST_AHEAD;
-        println!(
-            "{typed}: two passes take {times:.1} x [{low:.1}, {high:.1}] walking front to back, at \
-             least {LEAST_AHEAD} x: {}",
-            verdict(only_test, ahead)
-        );
-        missed += u32::from(!ahead);
-    }
-
-    let candidates: usize = views.iter().map(|(_, seen)| seen.len()).sum();
+    let candidates: usize = views.iter().map(|(_, seen)| seen).sum();
     let removed = (candidates - kept).max(1) as f64;
     let each: Vec<f64> = laps.iter().map(|ns| ns / removed).collect();
     let ns = trimmed_mean(&each).expect("turns");

@@ -5,18 +5,16 @@
 use std::hint::black_box;
 use std::sync::Arc;
 
-use cullbench::funnel::regions_of;
 use cullbench::measure::Stopwatch;
 use cullbench::visibility::Rays;
-use cullbench::visibility::region::doom::{DoomMap, SectorPvs};
 use cullbench::visibility::region::{
-    EXACT, ProvenPvs, RegionId, RegionRow, RoomsPvs, Scratch, StoredPvs,
+    EXACT, Pvs, RegionGraph, RegionId, RegionRow, Scratch, StoredPvs,
 };
 
 use super::{loaded, over_builds, ratio, verdict};
 
 const PATH: &str = "street:frames=32";
-const SCENES: [&str; 3] = ["rooms:n=50000", "freedm-map12", "freedm-map20"];
+const SCENE: &str = "rooms:n=50000";
 /// How often the rows are stored anew.
 const BUILDS: usize = 9;
 /// Time of the answer / time of reading the row, at most: more must not be proven.
@@ -24,21 +22,11 @@ const MOST_TIMES: f64 = 1.5;
 /// Passes over the views in a turn, as one takes a microsecond.
 const PASSES: usize = 1000;
 
-/// Judges every scene; how many floors are missed.
+/// Whether the floor is missed: 1 or 0.
 pub fn missed(only_test: bool, turns: usize) -> u32 {
-    let missed_in = |source| missed_in(source, only_test, turns);
-    SCENES.into_iter().map(missed_in).sum()
-}
-
-fn missed_in(source: &str, only_test: bool, turns: usize) -> u32 {
-    let (typed, scene, cameras) = loaded(source, PATH, only_test);
-    let (graph, _) = regions_of(&scene).expect(source).expect("regions");
-    let graph = Arc::new(graph);
-    let proven: Box<dyn ProvenPvs> = match DoomMap::of_scene(&scene).expect(source) {
-        Some(map) => Box::new(SectorPvs::of(map, graph.clone())),
-        None => Box::new(RoomsPvs::of(graph.clone()).expect("flat openings")),
-    };
-    let pvs = Arc::new(proven.pvs().clone());
+    let (typed, scene, cameras) = loaded(SCENE, PATH, only_test);
+    let graph = Arc::new(RegionGraph::of_scene(&scene).expect("rooms"));
+    let pvs = Arc::new(Pvs::of_rooms(&graph).expect("flat openings"));
     let stored = StoredPvs::of(graph.clone(), pvs, EXACT).expect("as many regions");
     let eyes = cameras.cameras.iter().map(|c| Rays::of(c).expect("rays"));
     let eyes: Vec<Rays> = eyes.collect();
@@ -50,9 +38,7 @@ fn missed_in(source: &str, only_test: bool, turns: usize) -> u32 {
         }
     }
     // What is stored of the rows, one after the other.
-    let mut memory = Vec::new();
-    let rows = homes.iter();
-    let rows = rows.map(|home| stored.from_region(*home, &mut memory).to_vec());
+    let rows = homes.iter().map(|home| stored.stored(*home).to_vec());
     let rows: Vec<Vec<RegionId>> = rows.collect();
 
     let passes = if only_test { 1 } else { PASSES };
@@ -68,15 +54,14 @@ fn missed_in(source: &str, only_test: bool, turns: usize) -> u32 {
     };
     let mut answer_ns = 0.0;
     // Kept, so that the next ones lie elsewhere.
-    let mut earlier: Vec<(StoredPvs, Vec<Vec<RegionId>>, Vec<RegionId>)> = Vec::new();
+    let mut earlier: Vec<(StoredPvs, Vec<Vec<RegionId>>)> = Vec::new();
     let [times, low, high] = over_builds(if only_test { 3 } else { BUILDS }, |_| {
         let (stored, rows) = (stored.clone(), rows.clone());
         let row: &dyn RegionRow = black_box(&stored);
-        let mut out = Vec::new();
         let answer = || {
             answer_ns = time(&mut || {
                 for home in &homes {
-                    read_all(row.from_region(*home, &mut out));
+                    read_all(row.stored(*home));
                 }
             });
             answer_ns
@@ -89,7 +74,7 @@ fn missed_in(source: &str, only_test: bool, turns: usize) -> u32 {
             })
         };
         let [times, ..] = ratio((turns / 4).max(3), answer, read);
-        earlier.push((stored, rows, out));
+        earlier.push((stored, rows));
         times
     });
     let row: &dyn RegionRow = black_box(&stored);

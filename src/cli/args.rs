@@ -458,7 +458,7 @@ pub struct DriftArgs {
     #[arg(
         long,
         value_name = "N",
-        default_value = "1e7",
+        default_value = "1e6",
         value_parser = values::steps,
         allow_negative_numbers = true
     )]
@@ -472,12 +472,12 @@ pub struct DriftArgs {
         allow_negative_numbers = true
     )]
     pub tolerance: f64,
-    /// Spring arms to study: linear, collision (stiffens as it is stretched, and has a stop), quaternion (turns)
+    /// Spring arms to study: linear, collision (stiffens as it is stretched, and has a stop)
     #[arg(
         long,
         value_name = "LIST",
         value_delimiter = ',',
-        default_value = "linear,collision,quaternion",
+        default_value = "linear,collision",
         value_parser = values::choice("arm", &ARMS)
     )]
     pub arm: Vec<ArmKind>,
@@ -491,7 +491,7 @@ pub struct DriftArgs {
         allow_negative_numbers = true
     )]
     pub stiffness: Vec<f64>,
-    /// Frames per second of the spring arms; tables show the middle one
+    /// Frames per second of the spring arms; tables of errors show the middle one
     #[arg(
         long,
         value_name = "LIST",
@@ -510,7 +510,7 @@ pub struct DriftArgs {
         allow_negative_numbers = true
     )]
     pub seconds: f64,
-    /// Largest position error of a spring arm to recommend; its target swings by one (or a radian)
+    /// Largest position error of a spring arm to recommend; its target swings by one
     #[arg(
         long,
         value_name = "ERROR",
@@ -519,7 +519,7 @@ pub struct DriftArgs {
         allow_negative_numbers = true
     )]
     pub arm_tolerance: f64,
-    /// Draw work against precision of the spring arms as an SVG file too
+    /// Draw error against time of the spring arms as an SVG file too
     #[arg(long, value_name = "FILE")]
     pub svg: Option<PathBuf>,
     #[command(flatten)]

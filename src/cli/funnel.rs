@@ -141,9 +141,7 @@ fn chain(
         (StageKind::Triangle, &args.triangle),
         (StageKind::Fragment, &args.fragment),
     ];
-    let mut chain = Chain::for_scene(scene, args.cut_out.is_some())
-        .from(args.from, scene)
-        .with(StageKind::Object, object);
+    let mut chain = Chain::for_scene(scene, args.cut_out.is_some()).with(StageKind::Object, object);
     for (stage, name) in typed {
         if let Some(name) = name {
             let known = funnel::back_ends(stage, scene, args.cut_out.is_some());
@@ -169,7 +167,7 @@ fn chain(
 }
 
 /// The claim of what is seen from each region that a file holds.
-pub(super) fn claim(file: Option<&Path>) -> anyhow::Result<Option<Arc<Pvs>>> {
+fn claim(file: Option<&Path>) -> anyhow::Result<Option<Arc<Pvs>>> {
     let Some(file) = file else { return Ok(None) };
     let bytes = read_file(file)?;
     let pvs = Pvs::from_json(&bytes).with_context(|| file.display().to_string())?;
@@ -216,7 +214,6 @@ impl Setting {
             structures: &self.structures,
             protocol: &self.protocol,
             claim: self.claim.as_ref(),
-            from: args.from,
             occluders: args.occluders,
             inner_boxes: args.inner_boxes.map(|most| most as usize),
             execution: args.kernel.execution()?,

@@ -1,4 +1,4 @@
-//! What can be typed behind `cullbench funnel` and `cullbench check`. Values are checked
+//! What can be typed behind `cullbench funnel`. Values are checked
 //! where they are used, like those of all [commands](super::args).
 
 use std::path::PathBuf;
@@ -7,7 +7,6 @@ use clap::{Args, ValueEnum};
 
 use super::shared_args::{KernelArgs, LensArgs, SceneArgs, SpreadArgs};
 use super::values;
-use crate::funnel::{SEEN_FROM, SeenFrom};
 use crate::query::ItemId;
 use crate::visibility::SampleGrid;
 use crate::visibility::fragment::CutOuts;
@@ -18,7 +17,6 @@ const FUNNEL_HELP: &str = "\
 Columns of the table:
   in, out      items (triangles in the triangle stage) that the stage is given and hands on, per view
   truth        of them those that are in front at a sample; of triangles those that face the eye
-               (outcode: that are in the window; below-a-sample: that the ray of a sample meets)
   FP, FN       handed on though not visible; visible and not handed on
   time         CPU time of the stage per view, with half of its 95 % interval
   per item     time / what the stage removed
@@ -35,8 +33,7 @@ orders draw whole items. The fragment stage is timed as it is done here, exactly
 Items that are cut out hide nothing in the occlusion stage, and at a sample only where their mask is
 opaque: z-test takes them for solid, alpha-test asks the mask. stencil-test (rooms) draws what is
 beyond the eye's room only on the samples that see its portals. Walls of rooms are never cut out,
-picking takes every item for solid. --from region asks what may be seen from anywhere in the eye's
-region: portals restrict an eye only, so the searches that are left are flood and the stored sets.";
+picking takes every item for solid.";
 
 #[derive(Args, Debug)]
 #[command(after_help = FUNNEL_HELP)]
@@ -68,16 +65,13 @@ pub struct FunnelArgs {
     /// Back end of the region stage [default: the best that the scene has regions for]
     #[arg(long, value_name = "NAME")]
     pub region: Option<String>,
-    /// Where the region stage looks from: the eye, or anywhere in the region that the eye is in
-    #[arg(long, value_name = "PLACE", default_value = "eye", value_parser = values::choice("place", &SEEN_FROM))]
-    pub from: SeenFrom,
     /// Structures for the object stage; the first is the chain's
     #[arg(long, value_name = "LIST", default_value = "wide,bvh,linear")]
     pub structure: String,
     /// Back end of the occlusion stage
     #[arg(long, value_name = "NAME")]
     pub occlusion: Option<String>,
-    /// What the back ends *-two-pass and hierarchical-z draw: all, nearest:64, largest:64
+    /// What hierarchical-z draws: all, nearest:64, largest:64
     #[arg(long, value_name = "CHOICE", default_value = "all", value_parser = values::occluders)]
     pub occluders: OccluderChoice,
     /// Most boxes that are looked for inside each closed item of a mesh, and drawn for it
@@ -90,7 +84,7 @@ pub struct FunnelArgs {
     /// Back end of the fragment stage
     #[arg(long, value_name = "NAME")]
     pub fragment: Option<String>,
-    /// A claim of what is seen from each region, to be audited: {"regions": N, "sees": [[0, 1], ..]}
+    /// A claim of what is seen from each region, for the row stored-pvs: {"regions": N, "sees": [[0, 1], ..]}
     #[arg(long, value_name = "FILE")]
     pub pvs: Option<PathBuf>,
     /// Write tables and picture as one HTML page too

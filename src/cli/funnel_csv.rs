@@ -9,7 +9,7 @@ use crate::funnel::FunnelReport;
 use crate::shown::shown_field;
 
 /// Tables of the report: a list of rows, or a single row.
-const TABLES: [&str; 13] = [
+const TABLES: [&str; 12] = [
     "level",
     "cut_outs",
     "inner_boxes",
@@ -17,7 +17,6 @@ const TABLES: [&str; 13] = [
     "solid_blocks",
     "mirror",
     "stages",
-    "audits",
     "orders",
     "picks",
     "left_out",
@@ -28,7 +27,7 @@ const TABLES: [&str; 13] = [
 /// Fields of the rows of all tables, `/` before a field of a field. The columns are the
 /// same for every report.
 const FIELDS: &str = "
-    stage name back_end structure question claim selected guarantee is_chosen does_object_stage
+    stage name back_end structure question selected guarantee is_chosen does_object_stage
     unit stage_ns stage_ns_lower stage_ns_upper
     input_count output_count truth_count false_positive_count false_negative_count
     excess/value excess/lower excess/upper missing/value missing/lower missing/upper
@@ -43,7 +42,6 @@ const FIELDS: &str = "
     with_ns without_ns with_count without_count
     break_even_ns break_even_ns_lower break_even_ns_upper
     map_count saved_load_ns saved_load_ns_lower saved_load_ns_upper
-    pairs claimed visible asymmetric false_negatives unproven false_positives
     item axis view_count marked_count shown_count
     with_stencil/asked_count with_stencil/kept_out_count with_stencil/fragment_count
     with_stencil/clear_count with_stencil/shaded_count with_stencil/covered_count

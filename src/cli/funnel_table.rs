@@ -4,7 +4,7 @@
 use super::document::Block;
 use super::table::Table;
 use super::text;
-use crate::funnel::{FunnelReport, Gain, LeftOutRow, LevelRow, SeenFrom, StageRow, Times};
+use crate::funnel::{FunnelReport, Gain, LeftOutRow, LevelRow, StageRow, Times};
 use crate::visibility::Guarantee;
 use crate::visibility::hiders::{BlocksRow, GroundRow, InnerRow};
 use crate::visibility::occlusion::OccluderChoice;
@@ -36,15 +36,8 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
         );
         blocks.insert(2, Block::Line(line));
     }
-    if report.from == SeenFrom::Region {
-        let line = "The region stage is asked what may be seen from anywhere in the eye's region.";
-        blocks.insert(2, Block::Line(line.into()));
-    }
     if report.occluders != OccluderChoice::All.to_string() {
-        let line = format!(
-            "Occluders of the back ends in two passes: {}.",
-            report.occluders
-        );
+        let line = format!("Occluders of hierarchical-z: {}.", report.occluders);
         blocks.insert(2, Block::Line(line));
     }
     // Not every scene has all of them.

@@ -3,9 +3,11 @@
 
 use std::io::{self, Write};
 
-use super::precision_tables::{Outcome, WIDTH, elsewhere, named, numbers, percent, swept, time};
+use super::precision_tables::{
+    CullingPoint, Outcome, WIDTH, elsewhere, named, numbers, percent, swept, time,
+};
 use super::text;
-use crate::precision::{Names, Point, Precision, SWEEPS, SizeRow, SweepRow};
+use crate::precision::{Precision, SWEEPS, SizeRow, SweepRow};
 
 pub fn show(outcome: &Outcome) -> io::Result<()> {
     let mut out = text::terminal();
@@ -21,7 +23,6 @@ fn conclusions(outcome: &Outcome) -> Vec<String> {
     let p = &outcome.precision;
     let mut all = Vec::new();
     all.extend(of_points(p));
-    all.extend(of_numbers(p));
     all.extend(of_storage(p));
     all.extend(of_regions(p));
     all.extend(of_sizes(&outcome.size_sweep));
@@ -30,31 +31,26 @@ fn conclusions(outcome: &Outcome) -> Vec<String> {
 }
 
 /// No visible item missed, and a time.
-fn is_sound(point: &&Point) -> bool {
-    let errors = point.errors.unwrap_or_default();
+fn is_sound(point: &&CullingPoint) -> bool {
+    let errors = point.errors.counts.unwrap_or_default();
     point.times.query_ns.is_some() && errors.false_negatives + errors.touch_dropped == 0
 }
 
-fn missed(point: &Point) -> u64 {
-    point.errors.map_or(0, |errors| errors.false_negatives)
+fn missed(point: &CullingPoint) -> u64 {
+    point
+        .errors
+        .counts
+        .map_or(0, |errors| errors.false_negatives)
 }
 
-fn ratio(a: &Point, b: &Point) -> String {
+fn ratio(a: &CullingPoint, b: &CullingPoint) -> String {
     let both = a.times.query_ns.zip(b.times.query_ns);
     text::significant(both.map_or(f64::NAN, |(a, b)| a / b))
 }
 
 fn of_points(p: &Precision) -> Vec<String> {
     // The margin is proven for these: docs/NUMERICS.md.
-    let proven = ["f32", "f32-relative", "f32-fma"];
-    let safe = |point: &&Point| {
-        let Names {
-            arithmetic,
-            epsilon,
-            ..
-        } = point.names;
-        arithmetic == "interval" || epsilon > 0.0 && proven.contains(&arithmetic)
-    };
+    let safe = |point: &&CullingPoint| point.errors.names.epsilon > 0.0;
     let mut sound = p.points.iter().filter(is_sound).filter(safe);
     let Some(fastest) = sound.clone().next() else {
         return vec!["No point that is safe by its margin has a time.".to_owned()];
@@ -63,28 +59,25 @@ fn of_points(p: &Precision) -> Vec<String> {
         "Fastest of those that cannot miss anything: {} at {}, excess {} %.",
         named(fastest),
         time(&fastest.times),
-        percent(fastest.excess)
+        percent(fastest.errors.excess)
     )];
-    let extra = |point: &Point| point.errors.map(|errors| errors.false_positives);
+    let extra = |point: &CullingPoint| point.errors.counts.map(|errors| errors.false_positives);
     let tight = sound.find(|point| extra(point) < extra(fastest));
     if let Some(tight) = tight {
         all.push(format!(
             "Less excess begins at {} times its time: {}, excess {} %.",
             ratio(tight, fastest),
             named(tight),
-            percent(tight.excess)
+            percent(tight.errors.excess)
         ));
     }
+    let depth = |point: &CullingPoint| point.errors.worst_miss_px.unwrap_or(0.0);
     let unsafe_ = p.points.iter().filter(|point| missed(point) > 0);
-    let worst = unsafe_.max_by(|a, b| {
-        a.worst_miss_px
-            .unwrap_or(0.0)
-            .total_cmp(&b.worst_miss_px.unwrap_or(0.0))
-    });
+    let worst = unsafe_.max_by(|a, b| depth(a).total_cmp(&depth(b)));
     all.push(match worst {
         Some(worst) => format!(
             "Missed items: up to {} pixels deep ({}).",
-            text::significant(worst.worst_miss_px.unwrap_or(0.0)),
+            text::significant(depth(worst)),
             named(worst)
         ),
         None => "No point missed a visible item on these cameras.".to_owned(),
@@ -92,46 +85,15 @@ fn of_points(p: &Precision) -> Vec<String> {
     all
 }
 
-/// The other numbers against f32, in the same loop.
-fn of_numbers(p: &Precision) -> Option<String> {
-    let mut scans = p.points.iter().filter(|point| point.structure == "scan");
-    let own = scans
-        .clone()
-        .find(|point| point.names.arithmetic == "f32")?;
-    let mut told: Vec<String> = Vec::new();
-    let timed = scans
-        .by_ref()
-        .filter(|point| point.times.query_ns.is_some());
-    for point in timed {
-        let is_new = !told
-            .iter()
-            .any(|line| line.starts_with(point.names.arithmetic));
-        if point.names.arithmetic != "f32" && is_new {
-            let extra = |point: &Point| point.errors.unwrap_or_default().false_positives as i64;
-            let extra = extra(point) - extra(own);
-            told.push(format!(
-                "{} {} times ({extra:+} items, {} missed)",
-                point.names.arithmetic,
-                ratio(point, own),
-                missed(point)
-            ));
-        }
-    }
-    Some(format!(
-        "In the same loop, against f32 with epsilon: {}.",
-        told.join("; ")
-    ))
-}
-
 fn of_storage(p: &Precision) -> Option<String> {
-    let memory = |point: &&Point| point.memory_bytes_per_item.unwrap_or(f64::INFINITY);
+    let memory = |point: &&CullingPoint| point.errors.memory_bytes_per_item;
     let least = p.points.iter().filter(is_sound);
     let least = least.min_by(|a, b| memory(a).total_cmp(&memory(b)))?;
     Some(format!(
         "Least memory: {} at {} B/item, excess {} %, {}.",
         named(least),
         text::significant(memory(&least)),
-        percent(least.excess),
+        percent(least.errors.excess),
         least.times.query_ns.map(text::time).unwrap_or_default()
     ))
 }
@@ -140,11 +102,12 @@ fn of_regions(p: &Precision) -> Option<String> {
     let of = |numbers: &str| {
         p.region_points
             .iter()
-            .find(|point| point.numbers == numbers)
+            .find(|point| point.errors.numbers == numbers)
     };
     let (plain, checked) = (of("f32")?, of("f32 + check")?);
     let same = p.region_points.iter();
-    let mut same = same.filter(|c| c.numbers == "f32 + check" && c.structure == plain.structure);
+    let mut same =
+        same.filter(|c| c.errors.numbers == "f32 + check" && c.structure == plain.structure);
     let cost = same
         .next()
         .and_then(|c| c.times.query_ns)
@@ -152,10 +115,10 @@ fn of_regions(p: &Precision) -> Option<String> {
     Some(format!(
         "Region search in f32 is wrong for {} % of {} (farthest {} outside); an exact look at the hits \
          leaves {} wrong and takes {} times as long on {}.",
-        percent(plain.wrong),
-        text::counted(plain.points as usize, "point"),
-        text::significant(plain.worst_false),
-        checked.false_region_count + checked.missed_region_count,
+        percent(plain.errors.wrong),
+        text::counted(plain.errors.points as usize, "point"),
+        text::significant(plain.errors.worst_false),
+        checked.errors.false_region_count + checked.errors.missed_region_count,
         text::significant(cost.map_or(f64::NAN, |(a, b)| a / b)),
         plain.structure
     ))

@@ -8,8 +8,9 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::picture::{COLOURS, Drawn, around, is_drawn, left_out, svg};
+use super::precision_tables::CullingPoint;
 use super::text;
-use crate::precision::{Point, Precision, RegionPoint};
+use crate::precision::{Point, Precision, RegionErrors};
 
 const SIZE: (u32, u32) = (1000, 1080);
 /// Height of the picture of frustum queries.
@@ -27,23 +28,27 @@ struct Mark {
 
 impl Mark {
     /// If the point has a time and an error.
-    fn of(point: &Point) -> Option<Mark> {
+    fn of(point: &CullingPoint) -> Option<Mark> {
         Some(Mark {
             series: point.structure.clone(),
-            at: [point.times.query_ns? / 1e3, point.excess?.value * 100.0],
+            at: [
+                point.times.query_ns? / 1e3,
+                point.errors.excess?.value * 100.0,
+            ],
             on_front: point.on_front,
             is_cross: point
                 .errors
+                .counts
                 .is_some_and(|errors| errors.false_negatives > 0),
         })
     }
 
-    fn of_region(point: &RegionPoint) -> Option<Mark> {
+    fn of_region(point: &Point<RegionErrors>) -> Option<Mark> {
         Some(Mark {
-            series: format!("{} {}", point.structure, point.numbers),
-            at: [point.times.query_ns?, point.wrong?.value * 100.0],
+            series: format!("{} {}", point.structure, point.errors.numbers),
+            at: [point.times.query_ns?, point.errors.wrong?.value * 100.0],
             on_front: point.on_front,
-            is_cross: point.missed_region_count > 0,
+            is_cross: point.errors.missed_region_count > 0,
         })
     }
 }

@@ -8,10 +8,13 @@ use serde::Serialize;
 use super::table::Table;
 use super::text;
 use crate::precision::{
-    Names, Point, Precision, RegionPoint, SIZE_RATIOS, SWEEPS, SizeRow, SweepRow,
+    CullingErrors, Names, Point, Precision, RegionErrors, SIZE_RATIOS, SWEEPS, SizeRow, SweepRow,
 };
 use crate::statistics::Rate;
 use crate::verify::ErrorCount;
+
+/// A structure with a culling.
+pub type CullingPoint = Point<CullingErrors>;
 
 /// Everything that is printed.
 #[derive(Serialize)]
@@ -30,7 +33,7 @@ pub fn show(outcome: &Outcome) -> io::Result<()> {
     let mut out = text::terminal();
     let p = &outcome.precision;
     let mut say = |sentence: &str| writeln!(out, "{}", text::wrapped(sentence, WIDTH));
-    let visible = p.points.iter().find_map(|point| point.errors);
+    let visible = p.points.iter().find_map(|point| point.errors.counts);
     let visible = visible.map_or(0, |errors| errors.visible);
     say(&format!(
         "{}: {}; {}: {}, {} visible in all; {}; {} in each",
@@ -97,26 +100,23 @@ pub fn show(outcome: &Outcome) -> io::Result<()> {
     out.flush()
 }
 
-pub fn named(point: &Point) -> String {
+pub fn named(point: &CullingPoint) -> String {
     let Names {
         test,
         arithmetic,
         planes,
         epsilon,
-    } = point.names;
+    } = point.errors.names;
     format!(
         "{} {test} {arithmetic} {planes} eps {epsilon}",
         point.structure
     )
 }
 
-/// A culling in short; items in few bits are told by how they are stored.
-fn culling(point: &Point) -> String {
-    let Names { test, .. } = point.names;
-    match point.structure.strip_prefix("quantised:") {
-        Some(stored) => format!("{test} {stored}"),
-        None => format!("{test} {}", numbers(&point.names)),
-    }
+/// A culling in short.
+fn culling(point: &CullingPoint) -> String {
+    let names = &point.errors.names;
+    format!("{} {}", names.test, numbers(names))
 }
 
 /// Numbers, planes where they are not the frame's, and epsilon.
@@ -125,32 +125,24 @@ pub fn numbers(names: &Names) -> String {
         "frame" => String::new(),
         planes => format!(" {planes}"),
     };
-    let is_f64 = matches!(names.arithmetic, "f64" | "double-double" | "interval");
-    let epsilon = match is_f64 {
-        true => String::new(),
-        false => format!(" c={}", names.epsilon),
+    let epsilon = match names.arithmetic {
+        "f64" => String::new(),
+        _ => format!(" c={}", names.epsilon),
     };
     format!("{}{planes}{epsilon}", names.arithmetic)
 }
 
 /// The first point of each culling, in their order by test; points come fastest
 /// first.
-fn fastest(points: &[Point]) -> Vec<&Point> {
-    let mut found: Vec<&Point> = Vec::new();
+fn fastest(points: &[CullingPoint]) -> Vec<&CullingPoint> {
+    let mut found: Vec<&CullingPoint> = Vec::new();
     for point in points {
-        let is_same = |other: &&Point| culling(other) == culling(point);
+        let is_same = |other: &&CullingPoint| other.errors.names == point.errors.names;
         if !found.iter().any(is_same) {
             found.push(point);
         }
     }
-    let key = |p: &Point| {
-        (
-            p.structure.starts_with("quantised:"),
-            p.names.test,
-            culling(p),
-        )
-    };
-    found.sort_by_key(|p| key(p));
+    found.sort_by_key(|p| (p.errors.names.test, culling(p)));
     found
 }
 
@@ -168,35 +160,35 @@ fn by_source(errors: &ErrorCount) -> String {
     )
 }
 
-fn errors_table(points: &[&Point]) -> Table {
+fn errors_table(points: &[&CullingPoint]) -> Table {
     let mut table = Table::of("culling | >excess % | >by source | >missed ppm | >px | >flicker %");
     for point in points {
+        let errors = &point.errors;
         table.add_row([
             culling(point),
-            percent(point.excess),
-            point.errors.as_ref().map(by_source).unwrap_or_default(),
-            text::rate(point.false_negative_ppm, 1.0),
-            point
+            percent(errors.excess),
+            errors.counts.as_ref().map(by_source).unwrap_or_default(),
+            text::rate(errors.false_negative_ppm, 1.0),
+            errors
                 .worst_miss_px
                 .map(text::significant)
                 .unwrap_or_default(),
-            percent(point.flicker),
+            percent(errors.flicker),
         ]);
     }
     table
 }
 
-fn times_table(points: &[&Point]) -> Table {
+fn times_table(points: &[&CullingPoint]) -> Table {
     let mut table = Table::of(" | culling | structure | >query [95 % interval] | >B/item | status");
     for point in points {
         let structure = point.structure.split(':').next().unwrap_or_default();
-        let memory = point.memory_bytes_per_item.map(|b| format!("{b:.1}"));
         table.add_row([
             mark(point.on_front, point.is_tie).to_owned(),
             culling(point),
             structure.to_owned(),
             time(&point.times),
-            memory.unwrap_or_default(),
+            format!("{:.1}", point.errors.memory_bytes_per_item),
             point.status.name().to_owned(),
         ]);
     }
@@ -218,14 +210,13 @@ pub fn time(times: &crate::precision::Times) -> String {
 fn front_lines(p: &Precision) -> String {
     let line = |&i: &usize| {
         let point = &p.points[i];
-        let memory = point.memory_bytes_per_item.unwrap_or(f64::NAN);
         format!(
             "* {}: {}, {} B/item, excess {} %, missed {} ppm{}",
             named(point),
             point.times.query_ns.map(text::time).unwrap_or_default(),
-            text::significant(memory),
-            percent(point.excess),
-            text::rate(point.false_negative_ppm, 1.0),
+            text::significant(point.errors.memory_bytes_per_item),
+            percent(point.errors.excess),
+            text::rate(point.errors.false_negative_ppm, 1.0),
             if point.is_tie { "; tie" } else { "" }
         )
     };
@@ -233,10 +224,13 @@ fn front_lines(p: &Precision) -> String {
 }
 
 /// The fastest point of each kind of numbers.
-fn region_rows(p: &Precision) -> Vec<&RegionPoint> {
-    let mut rows: Vec<&RegionPoint> = Vec::new();
+fn region_rows(p: &Precision) -> Vec<&Point<RegionErrors>> {
+    let mut rows: Vec<&Point<RegionErrors>> = Vec::new();
     for point in &p.region_points {
-        if !rows.iter().any(|row| row.numbers == point.numbers) {
+        if !rows
+            .iter()
+            .any(|row| row.errors.numbers == point.errors.numbers)
+        {
             rows.push(point);
         }
     }
@@ -251,13 +245,13 @@ fn regions_table(p: &Precision) -> Table {
     for row in region_rows(p) {
         table.add_row([
             mark(row.on_front, row.is_tie).to_owned(),
-            row.numbers.to_owned(),
+            row.errors.numbers.to_owned(),
             row.structure.clone(),
-            row.points.to_string(),
-            percent(row.wrong),
-            row.false_region_count.to_string(),
-            row.missed_region_count.to_string(),
-            format!("{:.2e}", row.worst_false),
+            row.errors.points.to_string(),
+            percent(row.errors.wrong),
+            row.errors.false_region_count.to_string(),
+            row.errors.missed_region_count.to_string(),
+            format!("{:.2e}", row.errors.worst_false),
             time(&row.times),
         ]);
     }

@@ -8,9 +8,8 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 
 use crate::advise::TrialPlan;
-use crate::drift::DriftPlan;
 use crate::funnel::FunnelPlan;
-use crate::measure::{Part, ProcessTimes, Share, TaskSamples};
+use crate::measure::{Part, ProcessTimes, Schedule, Share, TaskSamples};
 use crate::precision::PointPlan;
 
 /// Raised when requests or messages change: programs of different versions do
@@ -52,7 +51,7 @@ pub enum Job {
     /// All points (`precision`).
     Points(PointPlan, Timing),
     /// Frames, eyes and arms (`drift`).
-    Drift(DriftPlan, Timing),
+    Drift(Schedule, Timing),
     /// Every stage of the funnel with every back end (`funnel`).
     Funnel(FunnelPlan, Timing),
     /// One stage with every back end (`precision --stage`).

@@ -12,7 +12,7 @@ use super::study::Study;
 use super::table::Table;
 use super::{Ending, funnel_table, interrupt, load_scene_by, print, text};
 use crate::funnel::{
-    self, Chain, FunnelInput, FunnelPlan, NONE, SeenFrom, StageKind, StageSweep, SweepPoint,
+    self, Chain, FunnelInput, FunnelPlan, NONE, StageKind, StageSweep, SweepPoint,
 };
 use crate::index::{Registry, StructureSpec};
 use crate::measure::{ProcessTimes, Protocol};
@@ -77,7 +77,6 @@ impl Setting {
             structures: &self.structures,
             protocol,
             claim: None,
-            from: SeenFrom::Eye,
             occluders: OccluderChoice::All,
             inner_boxes: None,
             execution: args.kernel.execution()?,

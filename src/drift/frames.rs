@@ -12,7 +12,7 @@ use crate::camera::{self, look_at};
 /// The turn of every step: yaw, pitch and roll in degrees about the camera's
 /// own axes, in this order, as [`camera::Frame`] turns. The doubles are taken
 /// as exact.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+#[derive(Clone, Copy, Default, Debug, Serialize)]
 pub struct Turn {
     /// About the camera's v, degrees per step.
     pub yaw_deg: f64,
@@ -52,9 +52,7 @@ macro_rules! precision {
             const DEGREE: $real = std::f64::consts::PI as $real / 180.0;
 
             fn wide(axes: [$vector; 3]) -> DMat3 {
-                let [u, v, n] =
-                    axes.map(|a| DVec3::new(f64::from(a.x), f64::from(a.y), f64::from(a.z)));
-                DMat3::from_cols(u, v, n)
+                DMat3::from_cols_array_2d(&axes.map(|axis| axis.to_array().map(f64::from)))
             }
 
             /// u, v and n after yaw, pitch and roll with these sines and
@@ -93,8 +91,7 @@ macro_rules! precision {
                         *rotations += 3;
                         if *rotations >= CORRECT_EVERY {
                             *rotations = 0;
-                            let [u, v, n] = *axes;
-                            let x = $matrix::from_cols(u, v, n);
+                            let x = $matrix::from_cols(axes[0], axes[1], axes[2]);
                             let three = $matrix::from_diagonal($vector::splat(3.0));
                             let x = x * (three - x.transpose() * x) * 0.5;
                             *axes = [x.x_axis, x.y_axis, x.z_axis];
@@ -108,10 +105,9 @@ macro_rules! precision {
             pub fn quaternion(turn: &Turn, looks: &[u64]) -> Vec<DMat3> {
                 let step = |q: &mut $quaternion, turn: &Turn| {
                     let half = degrees(turn).map(|angle| sin_cos(angle * DEGREE * 0.5));
-                    let [(yaw, yaw_cos), (pitch, pitch_cos), (roll, roll_cos)] = half;
-                    let yaw = $quaternion::from_xyzw(0.0, yaw, 0.0, yaw_cos);
-                    let pitch = $quaternion::from_xyzw(pitch, 0.0, 0.0, pitch_cos);
-                    let roll = $quaternion::from_xyzw(0.0, 0.0, roll, roll_cos);
+                    let yaw = $quaternion::from_xyzw(0.0, half[0].0, 0.0, half[0].1);
+                    let pitch = $quaternion::from_xyzw(half[1].0, 0.0, 0.0, half[1].1);
+                    let roll = $quaternion::from_xyzw(0.0, 0.0, half[2].0, half[2].1);
                     *q = (*q * (yaw * pitch * roll)).normalize();
                 };
                 let axes = |q: &$quaternion| wide(LEVEL.map(|axis| *q * axis));
@@ -122,11 +118,7 @@ macro_rules! precision {
             pub fn angles<const KIND: u8>(turn: &Turn, looks: &[u64]) -> Vec<DMat3> {
                 let step = |(sums, axes): &mut ([$real; 3], [$vector; 3]), turn: &Turn| {
                     for (sum, angle) in sums.iter_mut().zip(degrees(turn)) {
-                        *sum += if KIND == RADIANS {
-                            angle * DEGREE
-                        } else {
-                            angle
-                        };
+                        *sum += angle * if KIND == RADIANS { DEGREE } else { 1.0 };
                         if KIND == WRAPPED && sum.abs() >= 360.0 {
                             // No rounding: the rest needs no more bits.
                             *sum %= 360.0;

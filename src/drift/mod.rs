@@ -1,26 +1,23 @@
-//! Small errors that add up: frames that are turned step by step, eyes that
-//! are carried around, and a chase camera on a spring arm. It owns the methods
-//! that are compared, their exact references and what follows
-//! from the figures; how those look on a terminal is the program's business.
+//! Small errors that add up: camera bases that are turned step by step, eyes that are
+//! carried around, and a chase camera on a spring arm. The methods that are compared,
+//! their references and what follows from the figures.
 
 mod arm;
+mod arm_study;
+mod closed_form;
 mod exact;
 mod frames;
 mod orbit;
-mod oscillator;
 mod rated;
-mod real;
 mod rotation;
 mod stability;
 mod walk;
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 pub use arm::Method as ArmMethod;
-pub use arm::{
-    ARMS, ArmChoice, ArmKind, ArmOptions, ArmPoint, FrameTimes, Information, InformationError,
-    Setting,
-};
+pub use arm::{ARMS, ArmKind};
+pub use arm_study::{ArmChoice, ArmOptions, ArmPoint, Setting};
 pub use frames::Turn;
 pub use orbit::{OrbitDrift, SWING_DEG};
 pub use rated::{Rated, Recommendation};
@@ -28,10 +25,10 @@ pub use rotation::{ORBIT_RADIUS, PERIOD, RotationDrift, TurnDrift};
 pub use stability::StabilityLimit;
 
 use crate::measure::{OverProcesses, ProcessTimes, Protocol, Schedule, TimedTask, timed};
-use orbit::CARRIERS;
-use rated::{Row, cheapest, rated};
-use rotation::{Exact, METHODS, Method, STEADY};
-use walk::{QUERIES, QUERY_STEPS, Repeated};
+use orbit::{CARRIERS, SWING};
+use rated::rated;
+use rotation::{METHODS, Method, STEADY, moments};
+use walk::{QUERIES, walking};
 
 /// The most steps: beyond, an f32 frame overflows and a run takes hours.
 pub const MOST_STEPS: u64 = 1_000_000_000;
@@ -39,8 +36,8 @@ pub const MOST_STEPS: u64 = 1_000_000_000;
 /// Whole turns that are looked at, in steps of one degree.
 const TURNS: [u64; 2] = [1, 1000];
 
-/// What is asked.
-#[derive(Clone, PartialEq, Debug)]
+/// What is to be studied.
+#[derive(Clone, Debug)]
 pub struct DriftOptions {
     /// Up to how many steps.
     pub steps: u64,
@@ -52,55 +49,24 @@ pub struct DriftOptions {
 }
 
 /// The study of spring arms.
-#[derive(Clone, PartialEq, Debug, Serialize)]
+#[derive(Default, Debug, Serialize)]
 pub struct ArmReport {
     /// Simulated time.
     pub seconds: f64,
     /// What a recommended method's position may be off.
     pub tolerance: f64,
-    /// All methods, timed or not.
+    /// All methods.
     pub methods: &'static [ArmMethod],
-    /// Every method with every effort on every arm.
+    /// Every method with every number of steps on every arm.
     pub points: Vec<ArmPoint>,
-    /// Error of the information that steps have, before any method adds its own.
-    pub information: Vec<InformationError>,
     /// Limits of stability of every method.
     pub stability: Vec<StabilityLimit>,
     /// One of every setting.
     pub choices: Vec<ArmChoice>,
-    /// All of them in a sentence.
-    pub conclusion: String,
-}
-
-impl ArmReport {
-    /// Names of the methods that have points, in their order.
-    pub fn method_names(&self) -> Vec<&'static str> {
-        let mut names: Vec<&str> = Vec::new();
-        for point in &self.points {
-            if !names.contains(&point.method) {
-                names.push(point.method);
-            }
-        }
-        names
-    }
-
-    /// A figure of all settings, ascending, each once.
-    pub fn settings(&self, figure: fn(&Setting) -> f64) -> Vec<f64> {
-        let mut figures: Vec<f64> = self.choices.iter().map(|c| figure(&c.setting)).collect();
-        figures.sort_by(f64::total_cmp);
-        figures.dedup();
-        figures
-    }
-
-    /// The frame rate in the middle, which is shown where there is room for one.
-    pub fn middle_rate_hz(&self) -> Option<f64> {
-        let rates = self.settings(|setting| setting.rate_hz);
-        rates.get(rates.len() / 2).copied()
-    }
 }
 
 /// Everything `cullbench drift` finds.
-#[derive(Clone, PartialEq, Debug, Serialize)]
+#[derive(Default, Debug, Serialize)]
 pub struct DriftReport {
     /// The most steps.
     pub steps: u64,
@@ -132,30 +98,9 @@ pub struct DriftReport {
     pub arm: ArmReport,
 }
 
-/// What all processes time: the plan is the same for each.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct DriftPlan {
-    schedule: Schedule,
-    /// Points of the arms that are timed, by their place among all.
-    arms: Vec<usize>,
-}
-
-/// All errors, without times.
-pub struct Prepared {
-    /// What the other processes are to measure.
-    pub plan: DriftPlan,
-    options: DriftOptions,
-    units: Vec<f64>,
-    rotation: Vec<RotationDrift>,
-    one_degree_turns: Vec<TurnDrift>,
-    orbit: Vec<OrbitDrift>,
-    points: Vec<ArmPoint>,
-    information: Vec<InformationError>,
-}
-
 /// Jobs that `progress` of [`prepare`] is told of.
 pub fn jobs(options: &DriftOptions) -> usize {
-    METHODS.len() + CARRIERS.len() + arm::settings(&options.arm).len()
+    METHODS.len() + CARRIERS.len() + arm_study::settings(&options.arm).len()
 }
 
 /// Powers of ten from a thousand on, and the most steps themselves.
@@ -165,162 +110,102 @@ fn looks(most: u64) -> Vec<u64> {
     below.chain([most]).collect()
 }
 
-/// Finds all errors and plans how everything is timed; `progress` is told each job's
-/// name before it starts, and ends the work early if it says so.
+/// Finds all errors: a report without times. `progress` gets each job's name before it
+/// starts, and ends the work early by returning true.
 pub fn prepare(
     options: &DriftOptions,
-    protocol: &Protocol,
     mut progress: impl FnMut(&str) -> bool,
-) -> Option<Prepared> {
+) -> Option<DriftReport> {
     let looks = looks(options.steps);
-    let exact = Exact::new(&looks);
-    let (mut rotation, mut one_degree_turns, mut orbit) = (Vec::new(), Vec::new(), Vec::new());
+    let moments = moments(&looks);
+    let mut report = DriftReport {
+        steps: options.steps,
+        tolerance_rad: options.tolerance_rad,
+        turn_per_step: STEADY,
+        period_steps: PERIOD,
+        ..DriftReport::default()
+    };
+    let mut goes_on = |job: &str| (!progress(job)).then_some(());
     for method in METHODS {
-        if progress(method.name) {
-            return None;
-        }
-        rotation.extend(method.drift(&exact));
-        one_degree_turns.extend(method.turn_drift(&TURNS));
+        goes_on(method.name)?;
+        report.rotation.extend(method.drift(&moments));
+        let turns = method.turn_drift(&TURNS);
+        report.one_degree_turns.extend(turns);
     }
     for carrier in CARRIERS {
-        if progress(carrier.name) {
-            return None;
-        }
-        orbit.extend(carrier.drift(&looks));
+        goes_on(carrier.name)?;
+        report.orbit.extend(orbit::drift(carrier, &looks));
     }
-    let (mut points, mut information) = (Vec::new(), Vec::new());
-    for setting in arm::settings(&options.arm) {
-        if progress(&format!(
-            "{} arm, k = {:e}",
-            setting.arm.name(),
-            setting.stiffness
-        )) {
-            return None;
-        }
-        let (found, told) = arm::errors(setting, options.arm.seconds);
-        points.extend(found);
-        information.extend(told);
+    let mut points = Vec::new();
+    for setting in arm_study::settings(&options.arm) {
+        let (arm, k) = (setting.arm.name(), setting.stiffness);
+        goes_on(&format!("{arm} arm, k = {k:e}"))?;
+        points.extend(arm_study::errors(setting, options.arm.seconds));
     }
-    // Real frames are never steady, and what has blown up is no choice.
-    let is_timed =
-        |p: &ArmPoint| p.frame_times == FrameTimes::Jittered && p.position_error.is_some();
-    let arms: Vec<usize> = (0..points.len())
-        .filter(|&i| is_timed(&points[i]))
-        .collect();
-    let (tasks, units) = tasks(options, &arms);
-    Some(Prepared {
-        plan: DriftPlan {
-            schedule: Schedule::new(QUERIES, &tasks, protocol),
-            arms,
-        },
-        options: options.clone(),
-        units,
-        rotation,
-        one_degree_turns,
-        orbit,
+    report.arm = ArmReport {
+        seconds: options.arm.seconds,
+        tolerance: options.arm.tolerance,
+        methods: arm::METHODS,
         points,
-        information,
-    })
+        stability: stability::limits(),
+        choices: Vec::new(),
+    };
+    Some(report)
 }
 
-/// All that is timed, with the units of a query: frames, eyes, arms.
-fn tasks(options: &DriftOptions, arms: &[usize]) -> (Vec<TimedTask<'static>>, Vec<f64>) {
-    let frames = METHODS.iter().map(of_frame);
-    let eyes = CARRIERS.iter().map(|carrier| {
-        let walk = carrier.walk;
-        Repeated::new(QUERY_STEPS as f64, move || {
-            walk(&SWING_DEG, &[QUERY_STEPS]);
-        })
-    });
-    let settings = arm::settings(&options.arm).into_iter();
-    let keys: Vec<_> = settings.flat_map(arm::keys).collect();
-    let arms = arms.iter().map(|&i| arm::task(&keys[i]));
-    let all = frames.chain(eyes).chain(arms);
-    all.map(|repeated| (repeated.task, repeated.units)).unzip()
+/// All that is timed: frames, eyes, arms.
+fn tasks(options: &DriftOptions) -> Vec<TimedTask<'static>> {
+    let frames = METHODS.iter().map(|method| walking(method.walk, STEADY));
+    let eyes = CARRIERS.iter().map(|carrier| walking(carrier.walk, SWING));
+    let settings = arm_study::settings(&options.arm).into_iter();
+    let arms = settings.flat_map(arm_study::tasks).map(|(task, _)| task);
+    frames.chain(eyes).chain(arms).collect()
 }
 
-fn of_frame(method: &Method) -> Repeated {
-    let walk = method.walk;
-    Repeated::new(QUERY_STEPS as f64, move || {
-        walk(&STEADY, &[QUERY_STEPS]);
-    })
+/// Plans how everything is timed, the same in every process.
+pub fn plan(options: &DriftOptions, protocol: &Protocol) -> Schedule {
+    Schedule::new(QUERIES, &tasks(options), protocol)
 }
 
 /// Times in this process what was planned; `None` if stopped.
 pub fn time(
     options: &DriftOptions,
-    plan: &DriftPlan,
+    schedule: &Schedule,
     protocol: &Protocol,
     stop: &dyn Fn() -> bool,
 ) -> Option<ProcessTimes> {
-    let (tasks, _) = tasks(options, &plan.arms);
-    let timed = timed(&tasks, &plan.schedule, protocol, &|_| stop())?;
+    let timed = timed(&tasks(options), schedule, protocol, &|_| stop())?;
     Some(ProcessTimes::of(&timed))
 }
 
-impl Prepared {
-    /// The report from the times of all processes.
-    pub fn conclude(mut self, processes: &[ProcessTimes]) -> DriftReport {
+impl DriftReport {
+    /// Fills in the times of all processes, of so many rounds, and what follows.
+    pub fn conclude(&mut self, processes: &[ProcessTimes], rounds: u32) {
         let times = OverProcesses::of(processes);
-        let options = &self.options;
-        let rotation_methods = rate_rotations(
-            METHODS.iter(),
-            &self.rotation,
-            options.steps,
-            options.tolerance_rad,
-            &times,
-        );
-        let orbit_methods = rate_orbits(&self.orbit, options, &times);
-        let rule = format!(
-            "an error below {:e} after {:e} steps",
-            options.tolerance_rad, options.steps as f64
-        );
-        let mut tasks = vec![None; self.points.len()];
-        let first = METHODS.len() + CARRIERS.len();
-        for (task, &point) in (first..).zip(&self.plan.arms) {
-            tasks[point] = Some((task, self.units[task]));
-        }
-        let tolerance = options.arm.tolerance;
-        let of_setting = |points: &mut [ArmPoint], from: usize| {
-            let tasks = &tasks[from..from + points.len()];
-            arm::conclude(points, tasks, &times, tolerance)
-        };
-        let (mut choices, mut from) = (Vec::new(), 0);
-        for points in self.points.chunk_by_mut(|a, b| a.setting == b.setting) {
-            choices.extend(of_setting(points, from));
-            from += points.len();
-        }
-        DriftReport {
-            steps: options.steps,
-            tolerance_rad: options.tolerance_rad,
-            processes: processes.len(),
-            rounds: self.plan.schedule.rounds as usize,
-            turn_per_step: STEADY,
-            period_steps: PERIOD,
-            rotation: self.rotation,
-            one_degree_turns: self.one_degree_turns,
-            orbit: self.orbit,
-            recommended_rotation: cheapest(&rotation_methods, &rule),
-            recommended_orbit: cheapest(&orbit_methods, &rule),
-            rotation_methods: rotation_methods.into_iter().map(|row| row.rated).collect(),
-            orbit_methods: orbit_methods.into_iter().map(|row| row.rated).collect(),
-            arm: ArmReport {
-                seconds: options.arm.seconds,
-                tolerance,
-                methods: arm::METHODS,
-                points: self.points,
-                information: self.information,
-                stability: stability::limits(),
-                conclusion: arm::conclusion(&choices, tolerance),
-                choices,
-            },
+        (self.processes, self.rounds) = (processes.len(), rounds as usize);
+        let turned = frame_errors(METHODS.iter(), &self.rotation);
+        let carried = CARRIERS.iter().map(|carrier| {
+            let own = self.orbit.iter().filter(|d| d.method == carrier.name);
+            (carrier, own.last().map(|d| d.position_error / ORBIT_RADIUS))
+        });
+        let limit = (self.tolerance_rad, self.steps);
+        let turned = rated(turned, &times, 0, limit);
+        let carried = rated(carried, &times, METHODS.len(), limit);
+        (self.rotation_methods, self.recommended_rotation) = turned;
+        (self.orbit_methods, self.recommended_orbit) = carried;
+        let mut first = METHODS.len() + CARRIERS.len();
+        let settings = self.arm.points.chunk_by_mut(|a, b| a.setting == b.setting);
+        for points in settings {
+            let choice = arm_study::conclude(points, &times, first, self.arm.tolerance);
+            self.arm.choices.extend(choice);
+            first += points.len();
         }
     }
 }
 
-/// How some ways to turn a frame fare after so many steps, timed in this process: what
-/// a report says of them, by themselves.
-pub fn rotations(names: &[&str], steps: u64, tolerance_rad: f64) -> Vec<Rated> {
+/// Ways to turn a frame with their errors after the most steps, timed in this process
+/// alone.
+pub fn rotations(names: &[&str], steps: u64, tolerance: f64) -> Vec<Rated> {
     let protocol = Protocol {
         rounds: [5, 5],
         task_ns: 0.0,
@@ -330,42 +215,34 @@ pub fn rotations(names: &[&str], steps: u64, tolerance_rad: f64) -> Vec<Rated> {
         cache_bytes: 0,
     };
     let methods = || METHODS.iter().filter(|method| names.contains(&method.name));
-    let exact = Exact::new(&[steps]);
-    let drifts: Vec<_> = methods().flat_map(|m| m.drift(&exact)).collect();
-    let tasks: Vec<TimedTask> = methods().map(|method| of_frame(method).task).collect();
+    let moments = moments(&[steps]);
+    let drifts: Vec<_> = methods().flat_map(|m| m.drift(&moments)).collect();
+    let tasks: Vec<TimedTask> = methods().map(|m| walking(m.walk, STEADY)).collect();
     let timed = crate::measure::timed_rounds(QUERIES, &tasks, &protocol, &|| false);
     let times = OverProcesses::of(&[ProcessTimes::of(&timed.unwrap_or_default())]);
-    let rows = rate_rotations(methods(), &drifts, steps, tolerance_rad, &times);
-    rows.into_iter().map(|row| row.rated).collect()
+    rated(
+        frame_errors(methods(), &drifts),
+        &times,
+        0,
+        (tolerance, steps),
+    )
+    .0
 }
 
-fn rate_rotations<'m>(
+/// The larger error of each method after the most steps.
+fn frame_errors<'m>(
     methods: impl Iterator<Item = &'m Method>,
     drifts: &[RotationDrift],
-    steps: u64,
-    tolerance: f64,
-    times: &OverProcesses,
-) -> Vec<Row> {
-    let rows = methods.map(|method| {
-        let last = |d: &&RotationDrift| d.method == method.name && d.steps == steps;
+) -> impl Iterator<Item = (&'m Method, Option<f64>)> {
+    methods.map(|method| {
+        let last = drifts.iter().rfind(|d| d.method == method.name);
         // NaN is no maximum to `max`: a frame that is lost has no error.
-        let error = drifts.iter().find(last).and_then(|d| {
-            let lost = d.angle_error_rad.is_nan() || d.orthogonality_error.is_nan();
-            (!lost).then(|| d.angle_error_rad.max(d.orthogonality_error))
-        });
-        (method.name, method.summary, error)
-    });
-    rated(rows, times, 0, tolerance)
-}
-
-fn rate_orbits(drifts: &[OrbitDrift], options: &DriftOptions, times: &OverProcesses) -> Vec<Row> {
-    let rows = CARRIERS.iter().map(|carrier| {
-        let last = |d: &&OrbitDrift| d.method == carrier.name && d.steps == options.steps;
-        let last = drifts.iter().find(last);
-        let error = last.map(|d| d.position_error / ORBIT_RADIUS);
-        (carrier.name, carrier.summary, error)
-    });
-    rated(rows, times, METHODS.len(), options.tolerance_rad)
+        let error = last.filter(|d| !(d.angle_error_rad + d.orthogonality_error).is_nan());
+        (
+            method,
+            error.map(|d| d.angle_error_rad.max(d.orthogonality_error)),
+        )
+    })
 }
 
 #[cfg(test)]

@@ -2,9 +2,8 @@
 //! each way to keep one, which are in `frames`. The eye that circles a point
 //! by itself is in `orbit`.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
-use glam::DMat3;
 use serde::Serialize;
 
 use super::exact::Matrix;
@@ -33,9 +32,16 @@ pub const ONE_DEGREE: Turn = Turn {
 /// the centre has its eye at `centre + 10 n`.
 pub const ORBIT_RADIUS: f64 = 10.0;
 
-/// What the steps add up to. The two differ, since turns do not commute; each
-/// method is judged by its own.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+/// Yaw, pitch and roll by so many times the angles of [`STEADY`], to more than 40 digits.
+fn turned(times: u64) -> Matrix {
+    let about = |axis, degrees| Matrix::about(axis, &Expansion::product(degrees, times as f64));
+    let turned = about(1, STEADY.yaw_deg).times(&about(0, STEADY.pitch_deg));
+    turned.times(&about(2, STEADY.roll_deg))
+}
+
+/// What the steps of a method add up to. The two differ, since turns do not commute;
+/// each method is compared with its own.
+#[derive(Clone, Copy)]
 pub enum Sum {
     /// One turn after another, about the axes as they then are.
     Turns,
@@ -43,30 +49,13 @@ pub enum Sum {
     Angles,
 }
 
-impl Sum {
-    /// The frame after so many steps, to more than 40 digits.
-    pub fn exact(self, turn: &Turn, steps: u64) -> Matrix {
-        let times = match self {
-            Sum::Turns => 1,
-            Sum::Angles => steps,
-        };
-        let about = |axis, degrees| Matrix::about(axis, &Expansion::product(degrees, times as f64));
-        let turned = about(1, turn.yaw_deg).times(&about(0, turn.pitch_deg));
-        let turned = turned.times(&about(2, turn.roll_deg));
-        match self {
-            Sum::Turns => turned.power(steps),
-            Sum::Angles => turned,
-        }
-    }
-}
-
-/// One way to keep a frame.
+/// One way to keep a frame, or to carry an eye around.
 pub struct Method {
     pub name: &'static str,
     pub summary: &'static str,
     pub sum: Sum,
     /// The frame's axes u, v, n after each of the ascending numbers of steps.
-    pub walk: Walk<Turn, DMat3>,
+    pub walk: Walk,
 }
 
 /// What the toolkit's own camera does.
@@ -135,94 +124,71 @@ pub struct TurnDrift {
     pub angle_error_rad: f64,
 }
 
-/// The frames that methods ought to have in the period before each number of steps
-/// that they are looked at.
-pub struct Exact {
-    periods: Vec<Period>,
+/// The frames that methods ought to have at one step of a period.
+pub struct Moment {
+    /// The last step of the period, which its figures are named for.
+    last: u64,
+    steps: u64,
+    turns: Matrix,
+    angles: Matrix,
 }
 
-struct Period {
-    /// Ascending; the last is the number of steps that the figures are named for.
-    steps: Vec<u64>,
-    turns: Vec<Matrix>,
-    angles: Vec<Matrix>,
-}
-
-impl Period {
-    fn new(last: u64) -> Period {
-        let steps: Vec<u64> = (last.saturating_sub(PERIOD - 1).max(1)..=last).collect();
-        let step = Sum::Turns.exact(&STEADY, 1);
-        let first = Sum::Turns.exact(&STEADY, steps[0]);
-        let turns = std::iter::successors(Some(first), |now| Some(now.times(&step)));
-        Period {
-            turns: turns.take(steps.len()).collect(),
-            angles: steps
-                .iter()
-                .map(|&n| Sum::Angles.exact(&STEADY, n))
-                .collect(),
-            steps,
-        }
-    }
-}
-
-impl Exact {
-    /// For [`STEADY`] steps, at ascending numbers of them.
-    pub fn new(steps: &[u64]) -> Self {
-        Exact {
-            periods: steps.iter().map(|&last| Period::new(last)).collect(),
-        }
-    }
-}
-
-impl RotationDrift {
-    /// The larger of each figure, NaN the largest; the later number of steps.
-    fn worst(self, later: RotationDrift) -> RotationDrift {
-        let larger = |a: f64, b: f64| if b > a || b.is_nan() { b } else { a };
-        let of = |figure: fn(&RotationDrift) -> f64| larger(figure(&self), figure(&later));
-        RotationDrift {
-            method: later.method,
-            steps: later.steps,
-            orthogonality_error: of(|d| d.orthogonality_error),
-            angle_error_rad: of(|d| d.angle_error_rad),
-            orbit_position_error: of(|d| d.orbit_position_error),
-            orbit_radius_error: of(|d| d.orbit_radius_error),
-        }
-    }
+/// Every moment of the periods that end at these numbers of steps, in order.
+pub fn moments(looks: &[u64]) -> Vec<Moment> {
+    let step = turned(1);
+    let period = |&last: &u64| {
+        let steps = last.saturating_sub(PERIOD - 1).max(1)..=last;
+        let mut turns = step.power(steps.start() - 1);
+        let moment = |steps| {
+            turns = turns.times(&step);
+            let (turns, angles) = (turns.clone(), turned(steps));
+            Moment {
+                last,
+                steps,
+                turns,
+                angles,
+            }
+        };
+        steps.map(moment).collect::<Vec<_>>()
+    };
+    let mut all: Vec<Moment> = looks.iter().flat_map(period).collect();
+    all.sort_by_key(|moment| moment.steps);
+    all
 }
 
 impl Method {
-    pub fn drift(&self, exact: &Exact) -> Vec<RotationDrift> {
-        let looks: BTreeSet<u64> = exact.periods.iter().flat_map(|p| p.steps.clone()).collect();
-        let looks: Vec<u64> = looks.into_iter().collect();
-        let reached: BTreeMap<u64, DMat3> = looks
-            .iter()
-            .copied()
-            .zip((self.walk)(&STEADY, &looks))
-            .collect();
-        let of = |period: &Period| {
-            let ideals = match self.sum {
-                Sum::Turns => &period.turns,
-                Sum::Angles => &period.angles,
+    pub fn drift(&self, moments: &[Moment]) -> Vec<RotationDrift> {
+        let steps: Vec<u64> = moments.iter().map(|moment| moment.steps).collect();
+        let mut worst: BTreeMap<u64, [f64; 4]> = BTreeMap::new();
+        for (moment, axes) in moments.iter().zip((self.walk)(&STEADY, &steps)) {
+            let ideal = match self.sum {
+                Sum::Turns => &moment.turns,
+                Sum::Angles => &moment.angles,
             };
-            let moments = period.steps.iter().zip(ideals);
-            moments
-                .map(|(steps, ideal)| self.moment(*steps, reached[steps], ideal))
-                .reduce(RotationDrift::worst)
-        };
-        exact.periods.iter().filter_map(of).collect()
-    }
-
-    fn moment(&self, steps: u64, axes: DMat3, ideal: &Matrix) -> RotationDrift {
-        let axes = Matrix::from(axes);
-        let (position, longer) = axes.column_error(ideal, 2);
-        RotationDrift {
+            let axes = Matrix::from(axes);
+            let (position, longer) = axes.column_error(ideal, 2);
+            let now = [
+                axes.orthogonality_error(),
+                axes.angle_to(ideal),
+                ORBIT_RADIUS * position,
+                (ORBIT_RADIUS * longer).abs(),
+            ];
+            // NaN is the largest.
+            for (worst, now) in worst.entry(moment.last).or_default().iter_mut().zip(now) {
+                if now > *worst || now.is_nan() {
+                    *worst = now;
+                }
+            }
+        }
+        let row = |(steps, worst): (u64, [f64; 4])| RotationDrift {
             method: self.name,
             steps,
-            orthogonality_error: axes.orthogonality_error(),
-            angle_error_rad: axes.angle_to(ideal),
-            orbit_position_error: ORBIT_RADIUS * position,
-            orbit_radius_error: (ORBIT_RADIUS * longer).abs(),
-        }
+            orthogonality_error: worst[0],
+            angle_error_rad: worst[1],
+            orbit_position_error: worst[2],
+            orbit_radius_error: worst[3],
+        };
+        worst.into_iter().map(row).collect()
     }
 
     /// After each of the ascending numbers of whole turns the camera ought to
@@ -254,7 +220,7 @@ mod tests {
         // lecture's constant its 1.3e-4 of all angles.
         for method in METHODS {
             let steps = [1, 20];
-            let drifts = method.drift(&Exact::new(&steps));
+            let drifts = method.drift(&moments(&steps));
             for (drift, steps) in drifts.iter().zip(steps) {
                 let (angle, orthogonality) = match method.name {
                     "f64-lecture" => (2e-6 * steps as f64, 4e-15),
@@ -274,7 +240,7 @@ mod tests {
 
     #[test]
     fn only_corrected_frames_stay_orthonormal() {
-        let exact = Exact::new(&[100_000]);
+        let exact = moments(&[100_000]);
         for method in METHODS {
             let found = method.drift(&exact)[0].orthogonality_error;
             // Uncorrected f32 as found when this was written; mpmath has
@@ -295,7 +261,7 @@ mod tests {
     fn figures_are_the_worst_of_a_period_between_corrections() {
         assert_eq!(PERIOD, 34);
         let toolkit = method(TOOLKIT);
-        let found = |steps| toolkit.drift(&Exact::new(&[steps]))[0].orthogonality_error;
+        let found = |steps| toolkit.drift(&moments(&[steps]))[0].orthogonality_error;
         let all: Vec<f64> = (100_000..100_040).step_by(13).map(found).collect();
         for worst in &all {
             assert!((3e-15..8e-15).contains(worst), "{all:?}");

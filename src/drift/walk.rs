@@ -1,13 +1,15 @@
-//! Taking many steps of one kind and looking at where they led, and steps as tasks of
-//! the timed pass. What a step is, its owners know.
+//! Many steps of one kind with looks at where they led, and such steps as tasks of the
+//! timed pass.
 
 use std::hint::black_box;
 
+use glam::DMat3;
+
+use super::frames::Turn;
 use crate::measure::TimedTask;
 
-/// Takes equal steps of one kind: the places after each of the ascending numbers
-/// of them.
-pub type Walk<S, P> = fn(&S, &[u64]) -> Vec<P>;
+/// Takes equal steps: the axes after each of the ascending numbers of them.
+pub type Walk = fn(&Turn, &[u64]) -> Vec<DMat3>;
 
 /// A [`Walk`] by what a step does to the walker and where that is then.
 pub fn walk<W, S, P>(
@@ -36,19 +38,14 @@ pub const QUERIES: usize = 8;
 /// Steps of a frame or an eye in one query.
 pub const QUERY_STEPS: u64 = 500;
 
-/// A task of the timed pass, and how many steps or simulated seconds one query is.
-pub struct Repeated {
-    pub task: TimedTask<'static>,
-    pub units: f64,
+/// A task of the timed pass that asks for nothing.
+pub fn task(run: impl Fn() + 'static) -> TimedTask<'static> {
+    TimedTask::new(vec![0; QUERIES], move |_, _| run())
 }
 
-impl Repeated {
-    pub fn new(units: f64, run: impl Fn() + 'static) -> Repeated {
-        Repeated {
-            task: TimedTask::new(vec![0; QUERIES], move |_, _| run()),
-            units,
-        }
-    }
+/// The task of [`QUERY_STEPS`] equal steps.
+pub fn walking(walk: Walk, by: Turn) -> TimedTask<'static> {
+    task(move || drop(walk(&by, &[QUERY_STEPS])))
 }
 
 #[cfg(test)]
@@ -57,7 +54,12 @@ mod tests {
 
     #[test]
     fn looks_are_taken_after_exactly_so_many_steps() {
-        let places = walk(5, &3, &[0, 1, 10, 10, 12], |at, by| *at += by, |at| *at);
-        assert_eq!(places, [5, 8, 35, 35, 41]);
+        let by = Turn {
+            yaw_deg: 3.0,
+            ..Turn::default()
+        };
+        let step = |at: &mut f64, by: &Turn| *at += by.yaw_deg;
+        let places = walk(5.0, &by, &[0, 1, 10, 10, 12], step, |at| *at);
+        assert_eq!(places, [5.0, 8.0, 35.0, 35.0, 41.0]);
     }
 }

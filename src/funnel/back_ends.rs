@@ -3,8 +3,7 @@
 use super::chain::Chain;
 use super::fragment_rows;
 use super::hiding::HIDING;
-use super::left_out::{LeftOutRow, Reason};
-use super::seen_from::SeenFrom;
+use super::left_out::LeftOutRow;
 use super::stage::{BackEnd, StageKind};
 use super::triangle_rows;
 use crate::scene::{Regions, Scene};
@@ -15,34 +14,26 @@ const PORTAL_CLIP: &str = "portal-clip";
 
 /// What there is only where a claim was given.
 const CLAIM: &str = region::STORED.name;
-/// What knows of solids only, and makes a grid of its own.
-const GRID: &str = region::GRID_FLOOD.name;
 const EXACT: &str = region::EXACT.name;
 /// Most rooms of which it is found out, exactly, what is seen from each.
-pub const MOST_EXACT_ROOMS: usize = 4_096;
-/// Most linedefs of a map of which it is; of four times as many it takes half a minute.
-pub const MOST_EXACT_LINEDEFS: usize = 1_500;
+const MOST_EXACT_ROOMS: usize = 4_096;
 
 /// What finds a way through the rooms or sectors of a scene.
 fn of_regions(scene: &Scene) -> &'static [&'static str] {
-    const OF_ROOMS: &[&str] = &["flood", "portal-rect", PORTAL_CLIP, GRID, CLAIM, EXACT];
-    const OF_SECTORS: &[&str] = &["flood", "portal-rect", PORTAL_CLIP, CLAIM, "reject", EXACT];
-    let all = match &scene.regions {
-        Regions::Tiling(_) => OF_ROOMS,
+    const OF_ROOMS: &[&str] = &["flood", "portal-rect", PORTAL_CLIP, CLAIM, EXACT];
+    const OF_SECTORS: &[&str] = &["flood", "portal-rect", PORTAL_CLIP, CLAIM, "reject"];
+    match &scene.regions {
+        Regions::Tiling(_) if has_exact(scene) => OF_ROOMS,
+        // It is the last.
+        Regions::Tiling(_) => &OF_ROOMS[..OF_ROOMS.len() - 1],
         Regions::Bsp(map) if map.dispute().is_none() => OF_SECTORS,
         _ => &[],
-    };
-    // It is the last.
-    &all[..all.len() - usize::from(!all.is_empty() && !has_exact(scene))]
+    }
 }
 
-/// Whether it is found out, exactly, which regions of a scene see each other.
+/// Whether it is found out, exactly, which rooms of a scene see each other.
 pub fn has_exact(scene: &Scene) -> bool {
-    match &scene.regions {
-        Regions::Tiling(rooms) => rooms.boxes.len() <= MOST_EXACT_ROOMS,
-        Regions::Bsp(map) => map.line_count() <= MOST_EXACT_LINEDEFS,
-        _ => false,
-    }
+    matches!(&scene.regions, Regions::Tiling(rooms) if rooms.boxes.len() <= MOST_EXACT_ROOMS)
 }
 
 /// What the region stage of a map leaves out, and why.
@@ -50,15 +41,10 @@ pub fn left_out_of(scene: &Scene) -> Vec<LeftOutRow> {
     let Regions::Bsp(map) = &scene.regions else {
         return Vec::new();
     };
-    match map.dispute() {
-        Some(dispute) => vec![LeftOutRow::of("stages", "region", dispute)],
-        None if has_exact(scene) => Vec::new(),
-        None => vec![LeftOutRow::of(
-            "stages",
-            EXACT,
-            Reason::TooManyLinedefs(map.line_count()),
-        )],
-    }
+    let dispute = map.dispute().into_iter();
+    dispute
+        .map(|dispute| LeftOutRow::of("stages", "region", dispute))
+        .collect()
 }
 
 /// The back ends of a stage that a scene can have, with or without cut-outs among its
@@ -104,17 +90,5 @@ impl Chain {
                 None => chain,
             }
         })
-    }
-
-    /// The same with what suits the place that the region stage looks from.
-    pub fn from(self, from: SeenFrom, scene: &Scene) -> Chain {
-        let known = of_regions(scene);
-        let best = [EXACT, "flood"]
-            .into_iter()
-            .find(|name| known.contains(name));
-        match (from, best) {
-            (SeenFrom::Region, Some(best)) => self.with(StageKind::Region, best),
-            _ => self,
-        }
     }
 }

@@ -1,15 +1,12 @@
 //! What follows from a funnel, in sentences: which stages pay from which draw cost on,
 //! and which back ends lost what is visible.
 
-use super::back_ends::MOST_EXACT_ROOMS;
 use super::fragment_rows;
 use super::mirror::MirrorRow;
 use super::orders::OrderRow;
-use super::regions::ClaimAudit;
 use super::report::{FunnelReport, Gain, StageRow};
 use super::stage::StageKind;
 use crate::shown::counted;
-use crate::visibility::region::STORED;
 
 /// A sentence for each stage of the chain, and one for each back end that lost items.
 pub fn conclusions(report: &FunnelReport) -> Vec<String> {
@@ -19,27 +16,6 @@ pub fn conclusions(report: &FunnelReport) -> Vec<String> {
     sentences.extend(of_stencil(report));
     sentences.extend(report.mirror.as_ref().map(of_mirror));
     sentences.extend(report.orders.iter().flat_map(of_order));
-    for ClaimAudit { claim, audit } in &report.audits {
-        sentences.push(format!(
-            "The claim of {claim} calls {} of {} visible, {} are: {} in one direction only, {} \
-             with a line of sight, {}.",
-            audit.claimed,
-            counted(2 * audit.pairs as usize, "ordered pair"),
-            audit.visible,
-            counted(audit.asymmetric.len(), "pair"),
-            counted(audit.false_negatives.len(), "false negative"),
-            counted(audit.false_positives as usize, "false positive"),
-        ));
-    }
-    let is_claim = |row: &&StageRow| row.back_end.name == STORED.name;
-    let is_audited = report.audits.iter().any(|a| a.claim == STORED.name);
-    if !is_audited && report.stages.iter().any(|row| is_claim(&row)) {
-        sentences.push(format!(
-            "The claim of {} is not audited: what is seen from each is found out, exactly, of at \
-             most {MOST_EXACT_ROOMS} rooms.",
-            STORED.name
-        ));
-    }
     let of_chain = |stage| {
         let mut chosen = report.stages.iter().filter(|row| row.is_chosen);
         chosen.find(|row| row.back_end.stage == stage)

@@ -6,7 +6,6 @@ use crate::input::{InputError, gigabytes};
 use crate::measure::WorkloadError;
 use crate::query::ItemId;
 use crate::scene::{Dispute, ItemShape};
-use crate::visibility::region::OtherRegions;
 use crate::visibility::{NoRays, SampleGrid};
 
 /// Why there is no funnel.
@@ -100,8 +99,15 @@ pub enum FunnelError {
         dispute: Dispute,
     },
     /// What is claimed to be seen from where is of other regions.
-    #[error(transparent)]
-    Claim(#[from] OtherRegions),
+    #[error(
+        "the claim of what is seen from where is of {claimed} regions; expected the scene's {regions}"
+    )]
+    Claim {
+        /// Regions of the claim.
+        claimed: usize,
+        /// Regions of the scene.
+        regions: usize,
+    },
     /// A back end that the scene has no data for.
     #[error("{stage} '{name}' needs what the scene does not have; expected one of {known}", stage = stage.name())]
     Absent {

@@ -1,9 +1,8 @@
 //! The triangle stage on what the chain leaves: the faces of those items in clusters, and
-//! every back end that tells which of them are turned away or beside the image. Of solid
+//! every back end that tells which of them are turned away. Of solid
 //! boxes clusters are made for each view; of a mesh or a map once, and a back end passes
 //! over those of other items. A map's floors and ceilings are of no item.
 
-use std::cell::OnceCell;
 use std::rc::Rc;
 use std::sync::Arc;
 
@@ -17,9 +16,8 @@ use crate::camera::Camera;
 use crate::kernel::Kernel;
 use crate::scene::{ItemShape, Scene, Surfaces};
 use crate::visibility::triangle::{
-    Clusters, Counts, Criterion, MOST_TRIANGLES, Selection, TriangleCull, View, truth,
+    Clusters, Counts, Eye, MOST_TRIANGLES, Selection, TriangleCull, facing,
 };
-use crate::visibility::{NoRays, SampleGrid};
 
 /// Bytes that the study of a mesh takes for each triangle, beside its scene: trees for
 /// rays, clusters and every back end of both; 310 were measured.
@@ -37,12 +35,9 @@ fn origin_of(scene: &Scene, camera: &Camera) -> DVec3 {
     }
 }
 
-/// A camera's view of the triangles of a scene.
-///
-/// # Errors
-/// A camera that was given as a matrix.
-pub fn view(scene: &Scene, camera: &Camera, grid: SampleGrid) -> Result<View, NoRays> {
-    View::of(camera, origin_of(scene, camera), grid)
+/// The eye of a camera about the zero of its view's triangles.
+fn eye(scene: &Scene, camera: &Camera) -> Eye {
+    Eye::of(camera, origin_of(scene, camera))
 }
 
 /// Triangles in clusters, ready for every back end.
@@ -65,16 +60,9 @@ impl Built {
 struct Left {
     built: Rc<Built>,
     given: Selection,
-    view: View,
-    /// By criterion: what should be left, found where it is asked for.
-    truths: [OnceCell<Selection>; Criterion::ALL.len()],
-}
-
-impl Left {
-    fn truth(&self, criterion: Criterion) -> &Selection {
-        let find = || truth(criterion, &self.built.clusters, &self.view, &self.given);
-        self.truths[criterion as usize].get_or_init(find)
-    }
+    eye: Eye,
+    /// The triangles that should be left.
+    truth: Selection,
 }
 
 /// The faces of what is left of every view.
@@ -97,13 +85,15 @@ impl Faces {
                 Built::of(Arc::new(Surfaces::of_boxes_about(origin, boxes)))
             });
             let clusters = &built.clusters;
+            let given = match whole {
+                Some(_) => Selection::of_items(clusters, items.iter().copied()),
+                None => Selection::all(clusters),
+            };
+            let eye = eye(world.scene, world.rays(view).camera());
             Left {
-                given: match whole {
-                    Some(_) => Selection::of_items(clusters, items.iter().copied()),
-                    None => Selection::all(clusters),
-                },
-                view: *world.triangle_view(view),
-                truths: Default::default(),
+                truth: facing(clusters, &eye, &given),
+                given,
+                eye,
                 built,
             }
         });
@@ -123,7 +113,7 @@ impl Faces {
         let left = &self.views[view];
         let mut selection = left.given.clone();
         if let Some(back_end) = back_end {
-            left.built.culls[back_end].cull(&left.view, self.kernel, &mut selection);
+            left.built.culls[back_end].cull(&left.eye, self.kernel, &mut selection);
         }
         selection
     }
@@ -149,15 +139,11 @@ impl Faces {
         triangles
     }
 
-    /// Every view, held against what a back end is to decide by: the exact side of each
-    /// triangle, the window or the samples.
+    /// Every view, held against the exact side of each triangle.
     pub fn judged(&self, back_end: Option<usize>) -> Vec<Judged> {
-        let row = back_end.and_then(|back_end| rows().nth(back_end));
-        let criterion = row.map_or(Criterion::Facing, |row| row.criterion);
         let judged = (0..self.views.len()).map(|view| {
             let left = &self.views[view];
-            let truth = left.truth(criterion);
-            let counts = Counts::of(&left.given, &self.selected(back_end, view), truth);
+            let counts = Counts::of(&left.given, &self.selected(back_end, view), &left.truth);
             Judged {
                 input: counts.candidates as u64,
                 hidden: (counts.candidates - counts.truth) as u64,
@@ -177,7 +163,7 @@ mod tests {
     use super::*;
     use crate::camera::{Frame, Lens};
     use crate::scene::{SeededRng, WorldBox};
-    use crate::visibility::triangle::{TRIANGLE_ROWS, facing};
+    use crate::visibility::triangle::TRIANGLE_ROWS;
 
     /// Sides of a box that an eye is in front of and that have an area: two triangles each.
     fn seen(b: &WorldBox, eye: DVec3) -> usize {
@@ -214,25 +200,21 @@ mod tests {
             let frame = Frame::looking_along(eye, DVec3::X, DVec3::Z).unwrap();
             let lens = Lens::perspective(60.0, 1.5, 0.1, None).unwrap();
             let camera = Camera { frame, lens };
-            let grid = SampleGrid::new(8, 8);
-            let view = view(&scene, &camera, grid).unwrap();
             let wanted: usize = boxes.iter().map(|b| seen(b, eye)).sum();
             let surfaces = Surfaces::of_boxes_about(eye, boxes.iter());
+            let about_eye = super::eye(&scene, &camera);
             let clusters = Arc::new(Clusters::of(Arc::new(surfaces), MOST_TRIANGLES));
-            let truth = facing(&clusters, &view, &Selection::all(&clusters));
+            let truth = facing(&clusters, &about_eye, &Selection::all(&clusters));
             assert_eq!(truth.triangles(), wanted, "{round} {boxes:?} {eye}");
             for row in TRIANGLE_ROWS.iter().filter(|row| row.guarantee.is_safe()) {
-                if row.criterion != Criterion::Facing {
-                    continue;
-                }
                 let mut kept = Selection::all(&clusters);
-                (row.build)(&clusters).cull(&view, Kernel::best(), &mut kept);
+                (row.build)(&clusters).cull(&about_eye, Kernel::best(), &mut kept);
                 assert_eq!(truth.without(&kept), 0, "{round} {}", row.name);
             }
             let rounded = Arc::new(Surfaces::from_boxes(&scene));
             let rounded = Arc::new(Clusters::of(rounded, MOST_TRIANGLES));
-            let view = View::of(&camera, scene.origin, grid).unwrap();
-            let found = facing(&rounded, &view, &Selection::all(&rounded));
+            let about_zero = Eye::of(&camera, scene.origin);
+            let found = facing(&rounded, &about_zero, &Selection::all(&rounded));
             about_origin += usize::from(found.triangles() != wanted);
         }
         assert!(about_origin > 50, "the premise: {about_origin}");

@@ -313,7 +313,7 @@ impl Room {
         let portals = portals.collect();
         let items = homes
             .iter()
-            .flat_map(|&home| regions.items_of_graph().of_region(home));
+            .flat_map(|&home| regions.items().of_region(home));
         let mut items: Vec<ItemId> = items.copied().collect();
         items.sort_unstable();
         items.dedup();

@@ -5,8 +5,8 @@ use crate::kernel::Kernel;
 use crate::query::ItemId;
 use crate::visibility::SampleGrid;
 use crate::visibility::occlusion::{
-    DepthRays, HierarchicalZ, Interleaved, MaskedCentre, MaskedInner, OccluderChoice,
-    OccluderScene, OcclusionBuffer, TwoPass, View, ZBuffer,
+    HierarchicalZ, Interleaved, MaskedCentre, MaskedInner, OccluderChoice, OccluderScene,
+    OcclusionBuffer, TwoPass, View, ZBuffer,
 };
 
 /// Something that removes what is hidden, with memory of its own.
@@ -67,8 +67,5 @@ pub static HIDING: &[HidingRow] = &[
     HidingRow::interleaved::<MaskedInner>("masked-inner"),
     HidingRow::interleaved::<MaskedCentre>("masked"),
     HidingRow::interleaved::<ZBuffer>("z-buffer"),
-    HidingRow::interleaved::<DepthRays<16>>("rays"),
-    HidingRow::two_pass::<MaskedInner>("masked-inner-two-pass"),
-    HidingRow::two_pass::<MaskedCentre>("masked-two-pass"),
     HidingRow::two_pass::<HierarchicalZ>("hierarchical-z"),
 ];

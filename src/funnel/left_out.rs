@@ -2,7 +2,6 @@
 
 use serde::{Serialize, Serializer};
 
-use super::back_ends::MOST_EXACT_LINEDEFS;
 use crate::scene::Dispute;
 use crate::visibility::SampleGrid;
 use crate::visibility::fragment::{Rectangle, TooManyPairs};
@@ -15,9 +14,6 @@ pub enum Reason {
     /// A map whose sectors do not divide the plane.
     #[error(transparent)]
     Disputed(#[from] Dispute),
-    /// A map that is too large to find out which sectors see each other.
-    #[error("{0} linedefs; expected at most {MOST_EXACT_LINEDEFS}")]
-    TooManyLinedefs(usize),
     /// A back end of picking that refuses the items.
     #[error(transparent)]
     NotBuilt(#[from] NotBuilt),

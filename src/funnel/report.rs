@@ -11,8 +11,6 @@ use super::mirror::MirrorRow;
 use super::orders::OrderRow;
 use super::picks::PickRow;
 use super::plan_view::PlanView;
-use super::regions::ClaimAudit;
-use super::seen_from::SeenFrom;
 use super::stage::{BackEnd, StageKind};
 use super::times::Times;
 use crate::measure::OverProcesses;
@@ -41,17 +39,12 @@ pub struct FunnelReport {
     pub level: LevelRow,
     /// Which items have holes; null where none was asked for.
     pub cut_outs: Option<CutOutRow>,
-    /// From where the region stage looks.
-    pub from: SeenFrom,
-    /// What the back ends of the occlusion stage in two passes draw: `all`, `nearest:64`.
+    /// What `hierarchical-z` draws: `all`, `nearest:64`.
     pub occluders: String,
     /// The chain whose stages follow each other in [`FunnelReport::stages`].
     pub chain: Chain,
     /// Every stage with every back end, each given what the chain hands it.
     pub stages: Vec<StageRow>,
-    /// What each claim of what is seen from where gets wrong: a map's own table of
-    /// sectors that cannot see each other, and what was given in a file.
-    pub audits: Vec<ClaimAudit>,
     /// The boxes inside the items of a mesh, which hide what is behind them; null for
     /// what is no mesh.
     pub inner_boxes: Option<InnerRow>,

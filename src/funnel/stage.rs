@@ -9,12 +9,17 @@ named! {
     #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Serialize, Deserialize)]
     #[serde(rename_all = "snake_case")]
     #[non_exhaustive]
-    pub enum StageKind, STAGES {
-        Region = "region", "which rooms can be seen into, and so which items";
-        Object = "object", "which items the frustum meets";
-        Occlusion = "occlusion", "which items are not hidden behind others";
-        Triangle = "triangle", "which triangles of what is left face the eye";
-        Fragment = "fragment", "which items are in front at a sample";
+    pub enum StageKind {
+        /// Rooms that can be seen into, and so items.
+        Region = "region",
+        /// Items that the frustum meets.
+        Object = "object",
+        /// Items that are not hidden behind others.
+        Occlusion = "occlusion",
+        /// Triangles of what is left that face the eye.
+        Triangle = "triangle",
+        /// Items that are in front at a sample.
+        Fragment = "fragment",
     }
 }
 

@@ -213,11 +213,9 @@ pub fn prepare(
                 .cut_outs
                 .zip(world.cut_outs.as_ref())
                 .map(|(typed, made)| CutOutRow::of(typed, made)),
-            from: input.from,
             occluders: input.occluders.to_string(),
             chain: input.chain.clone(),
             stages: rows,
-            audits: world.audits().to_vec(),
             inner_boxes: world.hiders.inner_row().cloned(),
             ground: world.hiders.ground().map(|ground| ground.row.clone()),
             solid_blocks: world.hiders.blocks_row().cloned(),

@@ -10,12 +10,10 @@ use glam::DVec3;
 use super::back_ends::back_ends;
 use super::chain::Chain;
 use super::error::FunnelError;
-use super::faces;
 use super::hiding::{HIDING, HidingRow};
 use super::judged::{Judged, judge_items};
 use super::plan_view::{Fate, MOST_DRAWN, PlanView};
-use super::regions::{ClaimAudit, Regions};
-use super::seen_from::SeenFrom;
+use super::regions::Regions;
 use super::stage::{BackEnd, NONE, StageKind};
 use super::truth::Truth;
 use crate::camera::PlaneOptions;
@@ -31,7 +29,6 @@ use crate::visibility::hiders::Hiders;
 use crate::visibility::inscribed::BOXES;
 use crate::visibility::occlusion::{self, OccluderChoice, OccluderScene};
 use crate::visibility::region::{EyePlace, Marks, Pvs, RegionRow, Scratch};
-use crate::visibility::triangle;
 use crate::visibility::{Guarantee, Rays, SampleGrid, Solids, holes_of, surfaces_of};
 
 /// What a funnel is studied on.
@@ -57,9 +54,7 @@ pub struct FunnelInput<'a> {
     pub protocol: &'a Protocol,
     /// What is claimed to be seen from each region: a back end of the region stage.
     pub claim: Option<&'a Arc<Pvs>>,
-    /// From where the region stage looks.
-    pub from: SeenFrom,
-    /// What the back ends of the occlusion stage in two passes draw.
+    /// What `hierarchical-z` draws.
     pub occluders: OccluderChoice,
     /// How many boxes are looked for inside each item of a mesh, at least 1; `None` for
     /// [`BOXES`].
@@ -102,7 +97,6 @@ struct View {
     camera: usize,
     volume: ConvexVolume,
     rays: Rays,
-    triangles: triangle::View,
 }
 
 impl<'a> World<'a> {
@@ -126,7 +120,6 @@ impl<'a> World<'a> {
                     error: error.into(),
                 })?,
                 rays: Rays::of(camera).map_err(error)?,
-                triangles: faces::view(input.scene, camera, input.samples).map_err(error)?,
             })
         });
         let built = input.structures.iter().map(|spec| {
@@ -135,9 +128,7 @@ impl<'a> World<'a> {
         });
         let is_boxes = input.scene.item_shape() == ItemShape::Box;
         let mut solids = is_boxes.then(|| Solids::of(input.scene));
-        // What has holes closes no face of a grid.
-        let whole = solids.as_ref().filter(|_| input.cut_outs.is_none());
-        let regions = Regions::of(input.scene, input.claim, input.from, whole)?;
+        let regions = Regions::of(input.scene, input.claim)?;
         let refused = |option: &'static str, expected: ItemShape| FunnelError::Shape {
             scene: input.scene.name.clone(),
             shape: input.scene.item_shape(),
@@ -214,11 +205,6 @@ impl<'a> World<'a> {
         self.views.len()
     }
 
-    /// What each claim of what is seen from where gets wrong.
-    pub fn audits(&self) -> &[ClaimAudit] {
-        self.regions.as_ref().map_or(&[], |regions| &regions.audits)
-    }
-
     /// The items as the occlusion stage draws and tests them in a view.
     pub fn occluders(&self, view: usize) -> &OccluderScene {
         let is_open = self
@@ -241,11 +227,6 @@ impl<'a> World<'a> {
     pub fn structures(&self) -> impl Iterator<Item = (&str, &dyn DynIndex)> {
         let structures = self.structures.iter();
         structures.map(|(label, index)| (&label[..], &**index))
-    }
-
-    /// A view as the triangle stage has it.
-    pub fn triangle_view(&self, view: usize) -> &triangle::View {
-        &self.views[view].triangles
     }
 
     /// Whether a view's eye, and all that is before its near plane, is in the regions of
@@ -315,7 +296,7 @@ impl<'a> World<'a> {
     fn run_region(&self, name: &str) -> Run<'_> {
         let regions = self.regions.as_ref().expect("a scene with regions");
         let row = regions.row(name).expect("a row of the region stage");
-        let items = regions.items(name).expect("the items of its regions");
+        let items = regions.items();
         let kept = RefCell::new((Scratch::default(), Marks::default(), Vec::new()));
         Box::new(move |view, _, out| {
             let (scratch, marks, seen) = &mut *kept.borrow_mut();
@@ -472,7 +453,6 @@ mod tests {
                 cache_bytes: 0,
             },
             claim: None,
-            from: SeenFrom::Eye,
             occluders: OccluderChoice::All,
             inner_boxes: None,
             execution: Execution::default(),

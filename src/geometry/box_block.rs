@@ -33,12 +33,6 @@ impl BoxBlock {
         },
     };
 
-    /// Six rows of lanes, as [`BoxBlock`] keeps them.
-    #[inline(always)]
-    pub(crate) fn from_rows(rows: [[f32; LANES]; 6]) -> BoxBlock {
-        BoxBlock { rows }
-    }
-
     /// Puts a box into a lane, 0 to 15.
     pub fn set(&mut self, lane: usize, b: &Aabb) {
         let values = b.min.to_array().into_iter().chain(b.max.to_array());

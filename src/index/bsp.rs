@@ -239,11 +239,6 @@ fn measure_reach(splits: &mut [Split], tree: &PackedTree, node: usize) {
 }
 
 impl Bsp {
-    /// The tree without its planes.
-    pub(crate) fn into_tree(self) -> PackedTree {
-        self.tree
-    }
-
     #[inline(always)]
     fn descend<I: Isa, S: Sink, R: Recorder>(
         &self,

@@ -7,7 +7,7 @@ use std::ops::{ControlFlow, Range};
 
 use super::frontier::{AHEAD, Frontier, Merger, first_ahead, hand_over, is_far, put_back, take};
 use super::node::TreeNode;
-use crate::geometry::{Aabb, BoxBlock, LANES, LaneMask, PlaneMask};
+use crate::geometry::{Aabb, BoxBlock, BoxBlocks, LANES, LaneMask, PlaneMask};
 use crate::kernel::{Isa, pairs, prefetch};
 use crate::query::{ItemId, QueryVolume, Recorder, Sink};
 
@@ -40,22 +40,61 @@ pub struct Bundles {
 /// Mark of a node whose children were bundled in its place.
 const NOWHERE: u32 = u32::MAX;
 
-/// What happens at a leaf that is not decided. A trait and no closure: what is
-/// hot must be inlined for each instruction set.
-pub trait Leaves {
+/// The items of leaves that are not decided, in blocks of sixteen.
+pub struct Leaves<'a, Q> {
+    pub boxes: &'a BoxBlocks,
+    pub ids: &'a [ItemId],
+    pub volume: &'a Q,
+}
+
+impl<Q: QueryVolume> Leaves<'_, Q> {
     /// Asks for the memory of some items ahead of their test.
-    fn fetch(&self, items: Range<usize>, mask: PlaneMask);
+    #[inline(always)]
+    fn fetch(&self, items: Range<usize>, mask: PlaneMask) {
+        for (start, _, block) in self.boxes.range(items.start, items.end) {
+            self.volume.prefetch(block, mask);
+            prefetch(&self.ids[start]);
+        }
+    }
 
     /// Tests some items against the planes of the mask and hands over those that
     /// are kept.
-    fn test<I: Isa, S: Sink, R: Recorder>(
+    #[inline(always)]
+    pub fn test<I: Isa, S: Sink, R: Recorder>(
         &self,
         isa: I,
         items: Range<usize>,
         mask: PlaneMask,
         sink: &mut S,
         recorder: &mut R,
-    ) -> ControlFlow<()>;
+    ) -> ControlFlow<()> {
+        let blocks = self.boxes.range(items.start, items.end);
+        scan_blocks(isa, blocks, self.ids, (self.volume, mask), sink, recorder)
+    }
+}
+
+/// Tests items in blocks (each with the place of its lane 0 and the lanes that
+/// count) and hands over runs of admitted ones: the leaf test of every tree and
+/// region search in the linear scan.
+#[inline(always)]
+pub fn scan_blocks<'b, I: Isa, Q: QueryVolume, S: Sink, R: Recorder>(
+    isa: I,
+    blocks: impl Iterator<Item = (usize, LaneMask, &'b BoxBlock)>,
+    ids: &[ItemId],
+    (volume, mask): (&Q, PlaneMask),
+    sink: &mut S,
+    recorder: &mut R,
+) -> ControlFlow<()> {
+    for (start, lanes, block) in blocks {
+        let tested = lanes.count_ones();
+        recorder.items_tested(tested);
+        recorder.planes_tested(tested * Q::planes_open(mask));
+        let admitted = volume.kept_lanes(isa, block, mask) & lanes;
+        if admitted != 0 {
+            sink.accept_lanes(isa, ids, start, admitted)?;
+        }
+    }
+    ControlFlow::Continue(())
 }
 
 /// The memory of a traversal, kept between queries.
@@ -219,12 +258,12 @@ impl Bundles {
     ///
     /// The tree's root straddles the planes of `mask`.
     #[inline(always)]
-    pub fn search<I: Isa, Q: QueryVolume, L: Leaves, S: Sink, R: Recorder>(
+    pub fn search<I: Isa, Q: QueryVolume, S: Sink, R: Recorder>(
         &self,
         isa: I,
         (nodes, ids): (&[TreeNode], &[ItemId]),
         (volume, mask): (&Q, PlaneMask),
-        test: &L,
+        items: &Leaves<Q>,
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()> {
@@ -302,15 +341,15 @@ impl Bundles {
                 fetch_leaf(nodes, places, i);
             }
             for i in first_ahead(far).take(AHEAD / 2) {
-                fetch_items(nodes, test, places, masks, i);
+                fetch_items(nodes, items, places, masks, i);
             }
             for (i, (&leaf, &mask)) in pairs(places, masks).enumerate() {
                 if far {
-                    fetch_items(nodes, test, places, masks, i + AHEAD / 2);
+                    fetch_items(nodes, items, places, masks, i + AHEAD / 2);
                     fetch_leaf(nodes, places, i + AHEAD);
                 }
-                let items = nodes[leaf as usize].items();
-                flow = test.test(isa, items, mask, sink, recorder);
+                let own = nodes[leaf as usize].items();
+                flow = items.test(isa, own, mask, sink, recorder);
                 if flow.is_break() {
                     break;
                 }
@@ -331,15 +370,15 @@ fn fetch_leaf(nodes: &[TreeNode], places: &[u32], i: usize) {
 
 /// Asks for the items of a leaf, whose node has arrived by now.
 #[inline(always)]
-fn fetch_items<L: Leaves>(
+fn fetch_items<Q: QueryVolume>(
     nodes: &[TreeNode],
-    test: &L,
+    items: &Leaves<Q>,
     places: &[u32],
     masks: &[PlaneMask],
     i: usize,
 ) {
     if let (Some(&leaf), Some(&mask)) = (places.get(i), masks.get(i)) {
-        test.fetch(nodes[leaf as usize].items(), mask);
+        items.fetch(nodes[leaf as usize].items(), mask);
     }
 }
 

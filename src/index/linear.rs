@@ -4,8 +4,8 @@
 
 use std::ops::ControlFlow;
 
+use super::bundles::scan_blocks;
 use super::id_rows::IdRows;
-use super::tree::scan_blocks;
 use super::{BuildError, Info, Input, Kind, MemoryUsage, NoParams, Origin, RegionIndex, indexable};
 use crate::geometry::{Aabb, BoxBlock, BoxBlocks, LANES, LaneMask};
 use crate::kernel::{Isa, first_lanes, pairs};

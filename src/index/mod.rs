@@ -41,7 +41,6 @@ mod wide;
 
 pub use block_order::BlockOrder;
 pub use bsp::{Bsp, BspBuilder, BspParams};
-pub(crate) use bundles::Leaves;
 pub(crate) use bvh::scale_for;
 pub use bvh::{Bvh, BvhParams, BvhPreset};
 pub(crate) use contract::check_range;
@@ -61,5 +60,5 @@ pub use quadtree::Quadtree;
 pub use registry::{Registry, Row, StructureSpec};
 pub use replay::Trace;
 pub use textbook::{BspTextbook, BvhTextbook, OctreeTextbook, QuadtreeTextbook, TextbookParams};
-pub use tree::{PackedTree, TreeWriter, scan_blocks};
+pub use tree::{PackedTree, TreeWriter};
 pub use wide::{Wide, WideParams};

@@ -3,7 +3,6 @@
 //! blocks of sixteen; one traversal with plane masks for every kind of region;
 //! refitting. How a tree comes to be is each structure's own business.
 
-use std::borrow::Borrow;
 use std::ops::{ControlFlow, Range};
 
 use glam::Vec3;
@@ -11,7 +10,7 @@ use glam::Vec3;
 use super::bundles::{Bundles, Leaves};
 use super::node::TreeNode;
 use super::stack::Stack;
-use crate::geometry::{Aabb, BoxBlock, BoxBlocks, LaneMask, PlaneMask};
+use crate::geometry::{Aabb, BoxBlocks, PlaneMask};
 use crate::kernel::{Isa, prefetch};
 use crate::query::{Containment, Context, ItemId, QueryVolume, Recorder, Sink};
 
@@ -112,13 +111,6 @@ impl PackedTree {
         &self.ids
     }
 
-    /// Gives up the item bounds: for a structure that keeps them in another
-    /// form and tests leaves through [`PackedTree::query_leaves`].
-    pub fn forget_boxes(&mut self) {
-        self.boxes = BoxBlocks::default();
-        self.place_of = Vec::new();
-    }
-
     /// Whether the node has no children.
     #[inline(always)]
     pub fn is_leaf(&self, node: usize) -> bool {
@@ -148,33 +140,28 @@ impl PackedTree {
         if Q::IS_POINT {
             return self.walk(volume, cx);
         }
-        let leaves = InBlocks { tree: self, volume };
-        self.query_leaves(volume, &leaves, cx)
-    }
-
-    /// [`PackedTree::query`] with the items of straddling leaves fetched and
-    /// tested by the caller, who may keep their bounds in another form.
-    #[inline(always)]
-    pub fn query_leaves<Q: QueryVolume, L: Leaves, C: Context>(
-        &self,
-        volume: &Q,
-        leaves: &L,
-        cx: &mut C,
-    ) -> ControlFlow<()> {
         let isa = cx.isa();
         let (sink, recorder) = cx.parts();
-        self.search(isa, volume, leaves, sink, recorder)
+        self.search(isa, volume, sink, recorder)
+    }
+
+    #[inline(always)]
+    fn leaves<'a, Q>(&'a self, volume: &'a Q) -> Leaves<'a, Q> {
+        Leaves {
+            boxes: &self.boxes,
+            ids: &self.ids,
+            volume,
+        }
     }
 
     /// Sink and recorder come apart here, as they do in all that loops over nodes
     /// or blocks: a reference that is a parameter aliases nothing, as the compiler
     /// knows; one that is read from a context may. It is worth 3 to 7 %.
     #[inline(always)]
-    fn search<I: Isa, Q: QueryVolume, L: Leaves, S: Sink, R: Recorder>(
+    fn search<I: Isa, Q: QueryVolume, S: Sink, R: Recorder>(
         &self,
         isa: I,
         volume: &Q,
-        leaves: &L,
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()> {
@@ -194,9 +181,9 @@ impl PackedTree {
             }
             Containment::Straddles => {}
         }
-        let tree = (&self.nodes[..], &self.ids[..]);
+        let (tree, leaves) = ((&self.nodes[..], &self.ids[..]), self.leaves(volume));
         self.bundles
-            .search(isa, tree, (volume, mask), leaves, sink, recorder)
+            .search(isa, tree, (volume, mask), &leaves, sink, recorder)
     }
 
     /// Hands every item that the volume sees to the sink, in tree order.
@@ -281,12 +268,11 @@ impl PackedTree {
         &self,
         isa: I,
         items: Range<usize>,
-        asked: (&Q, PlaneMask),
+        (volume, mask): (&Q, PlaneMask),
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()> {
-        let blocks = self.boxes.range(items.start, items.end);
-        scan_blocks(isa, blocks, &self.ids, asked, sink, recorder)
+        self.leaves(volume).test(isa, items, mask, sink, recorder)
     }
 
     /// Takes over the new bounds of moved items without changing the tree's
@@ -373,59 +359,6 @@ impl PackedTree {
         }
         self.nodes[node].bounds = bounds;
     }
-}
-
-/// The leaves of a tree that keeps its items' bounds in blocks.
-struct InBlocks<'a, Q> {
-    tree: &'a PackedTree,
-    volume: &'a Q,
-}
-
-impl<Q: QueryVolume> Leaves for InBlocks<'_, Q> {
-    #[inline(always)]
-    fn fetch(&self, items: Range<usize>, mask: PlaneMask) {
-        for (start, _, block) in self.tree.boxes.range(items.start, items.end) {
-            self.volume.prefetch(block, mask);
-            prefetch(&self.tree.ids[start]);
-        }
-    }
-
-    #[inline(always)]
-    fn test<I: Isa, S: Sink, R: Recorder>(
-        &self,
-        isa: I,
-        items: Range<usize>,
-        mask: PlaneMask,
-        sink: &mut S,
-        recorder: &mut R,
-    ) -> ControlFlow<()> {
-        self.tree
-            .test_items(isa, items, (self.volume, mask), sink, recorder)
-    }
-}
-
-/// Tests items in blocks (each with the place of its lane 0 and the lanes that
-/// count) and hands over runs of admitted ones: the leaf test of every tree and
-/// region search in the linear scan.
-#[inline(always)]
-pub fn scan_blocks<I: Isa, B: Borrow<BoxBlock>, Q: QueryVolume, S: Sink, R: Recorder>(
-    isa: I,
-    blocks: impl Iterator<Item = (usize, LaneMask, B)>,
-    ids: &[ItemId],
-    (volume, mask): (&Q, PlaneMask),
-    sink: &mut S,
-    recorder: &mut R,
-) -> ControlFlow<()> {
-    for (start, lanes, block) in blocks {
-        let tested = lanes.count_ones();
-        recorder.items_tested(tested);
-        recorder.planes_tested(tested * Q::planes_open(mask));
-        let admitted = volume.kept_lanes(isa, block.borrow(), mask) & lanes;
-        if admitted != 0 {
-            sink.accept_lanes(isa, ids, start, admitted)?;
-        }
-    }
-    ControlFlow::Continue(())
 }
 
 #[cfg(test)]

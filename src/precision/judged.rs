@@ -1,16 +1,77 @@
 //! What a culling answers to every camera by the plain loop, and how wrong that
 //! is. No structure and no clock.
 
-use super::plane_test::{PlaneTest, PointView};
+use serde::ser::Error as _;
+use serde::{Serialize, Serializer};
+
+use super::point::{Dimension, Point};
 use crate::camera::Camera;
-use crate::culling::CullingTest;
-use crate::geometry::Aabb;
-use crate::index::BuildError;
+use crate::culling::{CameraView, Culling, CullingTest};
+use crate::measure::Status;
 use crate::path::CameraPath;
 use crate::query::ItemId;
 use crate::scene::Scene;
 use crate::statistics::{Rate, rate};
 use crate::verify::{ErrorCount, Truth};
+
+/// Names of a culling: test, arithmetic, planes and epsilon.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct Names {
+    /// Name of the culling test.
+    pub test: &'static str,
+    /// Name of the arithmetic.
+    pub arithmetic: &'static str,
+    /// Name of the derivation of the planes.
+    pub planes: &'static str,
+    /// Factor c of the planes' epsilon.
+    pub epsilon: f64,
+}
+
+impl Names {
+    pub(super) fn of(culling: &Culling) -> Names {
+        Names {
+            test: culling.test.name(),
+            arithmetic: culling.arithmetic.name(),
+            planes: culling.planes.method.name(),
+            epsilon: culling.planes.epsilon,
+        }
+    }
+}
+
+/// Errors of a culling over all cameras, and what it costs per item.
+#[derive(Clone, Debug, Serialize)]
+pub struct CullingErrors {
+    /// What structures are asked with.
+    #[serde(flatten)]
+    pub names: Names,
+    /// False positives / visible items, by camera.
+    pub excess: Option<Rate>,
+    /// Visible items that were not returned, in millionths.
+    pub false_negative_ppm: Option<Rate>,
+    /// Items that change from a camera to its neighbour on the path while their
+    /// truth does not / visible items; null for a path of one camera.
+    pub flicker: Option<Rate>,
+    /// The same as counts; null for what is refused.
+    #[serde(flatten, serialize_with = "counts_or_null")]
+    pub counts: Option<ErrorCount>,
+    /// How deep the deepest false negative reaches into the view, in pixels of a
+    /// view 1080 pixels high.
+    pub worst_miss_px: Option<f64>,
+    /// `query_ns` / number of items.
+    pub ns_per_item: Option<f64>,
+    /// Memory of nodes and items / number of items.
+    pub memory_bytes_per_item: f64,
+}
+
+/// Every count by its name, null where there are none.
+pub(super) fn counts_or_null<S: Serializer>(
+    errors: &Option<ErrorCount>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    let counts = serde_json::to_value(errors.unwrap_or_default()).map_err(S::Error::custom)?;
+    let named = counts.as_object().into_iter().flatten();
+    serializer.collect_map(named.map(|(name, count)| (name, errors.map(|_| count))))
+}
 
 /// The cameras that are looked at, evenly spread over a path, and behind each of
 /// them its neighbour on the path, for what changes from frame to frame.
@@ -60,90 +121,76 @@ pub(super) struct Truths {
 
 /// What one camera's answer gets wrong.
 #[derive(Clone, Copy, Default)]
-pub(super) struct CameraErrors {
-    pub errors: ErrorCount,
+struct CameraErrors {
+    counts: ErrorCount,
     /// How deep the deepest false negative reaches into the view, in pixels of
     /// 1080p; 0 if there is none.
-    pub worst_miss_px: f64,
+    worst_miss_px: f64,
     /// Items whose answer changes to the neighbour while their truth does not.
-    pub flicker: Option<u64>,
+    flicker: Option<u64>,
 }
 
 /// What one culling answers to every camera, and how wrong that is.
 pub(super) struct Judged {
-    pub test: PlaneTest,
-    pub views: Vec<PointView>,
-    pub answers: Vec<Vec<ItemId>>,
+    pub culling: Culling,
+    pub views: Vec<CameraView>,
     /// By camera; nothing without a truth.
-    pub by_camera: Vec<CameraErrors>,
+    pub answers: Vec<Vec<ItemId>>,
+    by_camera: Vec<CameraErrors>,
+    /// Why there are no such views.
     pub refused: Option<String>,
 }
 
 impl Judged {
-    fn without_views(test: PlaneTest) -> Judged {
-        Judged {
-            test,
+    /// Answers judged by the truth; the views alone where there is none.
+    pub fn new(scene: &Scene, shots: &Shots, truths: Option<&Truths>, culling: Culling) -> Judged {
+        let mut judged = Judged {
+            culling,
             views: Vec::new(),
             answers: Vec::new(),
             by_camera: Vec::new(),
             refused: None,
-        }
+        };
+        judged.refused = judged.judge(scene, shots, truths).err();
+        judged
     }
 
-    pub fn refused(test: PlaneTest, error: &BuildError) -> Judged {
-        Judged {
-            refused: Some(error.to_string()),
-            ..Judged::without_views(test)
-        }
-    }
-
-    /// Answers from `items`, judged by the truth about the scene's own; the views
-    /// alone where there is none.
-    pub fn new(
+    fn judge(
+        &mut self,
         scene: &Scene,
-        items: &[Aabb],
         shots: &Shots,
         truths: Option<&Truths>,
-        test: PlaneTest,
-    ) -> Judged {
-        let mut judged = Judged::without_views(test);
+    ) -> Result<(), String> {
         let around = scene.surroundings();
-        let answered = |camera: &Camera| {
-            let view = test.view(camera, &around).map_err(|e| e.to_string())?;
+        let items = self.culling.test.items(&scene.items);
+        let culling = self.culling;
+        let view_of = |camera: &Camera| culling.view(camera, &around).map_err(|e| e.to_string());
+        let answer = |view: &CameraView| -> Vec<ItemId> {
+            let view = view.as_any();
             let seen = items.iter().zip(0..).filter(|(b, _)| view.sees(b));
-            let answer: Vec<ItemId> = match truths {
-                Some(_) => seen.map(|(_, id)| id).collect(),
-                None => Vec::new(),
-            };
-            Ok::<_, String>((view, answer))
+            seen.map(|(_, id)| id).collect()
         };
-        for (i, camera) in shots.cameras.iter().enumerate() {
-            let (view, answer) = match answered(camera) {
-                Ok(found) => found,
-                Err(error) => {
-                    judged.refused = Some(error);
-                    return judged;
-                }
-            };
-            judged.views.push(view);
-            let Some(truths) = truths else {
-                continue;
-            };
-            if let Some(truth) = truths.cameras.get(i) {
-                let pair = shots.neighbours.get(i).zip(truths.neighbours.get(i));
-                let flicker = pair.and_then(|(neighbour, then)| {
-                    let (_, answer_then) = answered(neighbour).ok()?;
-                    Some(flicker(items.len(), [truth, then], [&answer, &answer_then]))
-                });
-                judged.by_camera.push(CameraErrors {
-                    errors: blamed(test.test(), truth.errors(&scene.items, &answer)),
-                    worst_miss_px: worst_miss_px(camera, scene, truth, &answer),
-                    flicker,
-                });
-            }
-            judged.answers.push(answer);
+        for camera in &shots.cameras {
+            self.views.push(view_of(camera)?);
         }
-        judged
+        let Some(truths) = truths else {
+            return Ok(());
+        };
+        for (i, (camera, truth)) in shots.cameras.iter().zip(&truths.cameras).enumerate() {
+            let own = answer(&self.views[i]);
+            let pair = shots.neighbours.get(i).zip(truths.neighbours.get(i));
+            let flicker = pair.and_then(|(neighbour, then)| {
+                let answer_then = answer(&view_of(neighbour).ok()?);
+                Some(flicker(items.len(), [truth, then], [&own, &answer_then]))
+            });
+            self.by_camera.push(CameraErrors {
+                counts: blamed(culling.test, truth.errors(&scene.items, &own)),
+                worst_miss_px: worst_miss_px(camera, scene, truth, &own),
+                flicker,
+            });
+            self.answers.push(own);
+        }
+        Ok(())
     }
 
     /// Ids of every answer.
@@ -151,32 +198,53 @@ impl Judged {
         self.answers.iter().map(|a| a.len() as u64).collect()
     }
 
-    /// Of all cameras.
-    pub fn errors(&self) -> ErrorCount {
-        let mut sum = ErrorCount::default();
-        self.by_camera
-            .iter()
-            .for_each(|camera| sum += camera.errors);
-        sum
-    }
-
-    /// What a camera counts, per visible item.
-    pub fn rate_of(&self, count: impl Fn(&CameraErrors) -> u64) -> Option<Rate> {
-        let clusters = self.by_camera.iter();
-        let clusters = clusters.map(|c| [count(c) as f64, c.errors.visible as f64]);
-        rate(&clusters.collect::<Vec<_>>()).filter(|_| self.refused.is_none())
-    }
-
-    /// Null where no camera has a neighbour.
-    pub fn flicker(&self) -> Option<Rate> {
-        let is_known = self.by_camera.iter().any(|c| c.flicker.is_some());
-        let rate = self.rate_of(|c| c.flicker.unwrap_or(0));
-        rate.filter(|_| is_known)
-    }
-
-    pub fn worst_miss_px(&self) -> f64 {
-        let depths = self.by_camera.iter().map(|c| c.worst_miss_px);
-        depths.fold(0.0, f64::max)
+    /// The culling's errors as a point of a structure, without a time.
+    pub fn point(&self, structure: &str, memory_bytes_per_item: f64) -> Point<CullingErrors> {
+        let known = self.by_camera.iter().filter(|_| self.refused.is_none());
+        let mut counts = ErrorCount::default();
+        known.clone().for_each(|camera| counts += camera.counts);
+        let rate_of = |count: fn(&CameraErrors) -> u64| -> Option<Rate> {
+            let clusters = known.clone();
+            let clusters = clusters.map(|c| [count(c) as f64, c.counts.visible as f64]);
+            rate(&clusters.collect::<Vec<_>>())
+        };
+        let has_neighbours = self.by_camera.iter().any(|c| c.flicker.is_some());
+        let flicker = rate_of(|c| c.flicker.unwrap_or(0)).filter(|_| has_neighbours);
+        let worst_miss_px = known.clone().map(|c| c.worst_miss_px).fold(0.0, f64::max);
+        let is_judged = self.refused.is_none();
+        let errors = CullingErrors {
+            names: Names::of(&self.culling),
+            excess: rate_of(|c| c.counts.false_positives),
+            false_negative_ppm: rate_of(|c| c.counts.false_negatives).map(|share| share.per(1e6)),
+            flicker,
+            counts: is_judged.then_some(counts),
+            worst_miss_px: is_judged.then_some(worst_miss_px),
+            ns_per_item: None,
+            memory_bytes_per_item,
+        };
+        let sampled = |value: f64, of: fn(&CameraErrors) -> f64| Dimension {
+            value,
+            by_camera: known.clone().map(of).collect(),
+        };
+        let count = |value: u64, of: fn(&CameraErrors) -> f64| sampled(value as f64, of);
+        let dimensions = vec![
+            count(counts.false_negatives, |c| c.counts.false_negatives as f64),
+            count(counts.touch_dropped, |c| c.counts.touch_dropped as f64),
+            count(counts.false_positives, |c| c.counts.false_positives as f64),
+            sampled(worst_miss_px, |c| c.worst_miss_px),
+            Dimension {
+                value: memory_bytes_per_item,
+                by_camera: Vec::new(),
+            },
+        ];
+        let mut point = Point::new(structure, errors, dimensions);
+        point.reason = self.refused.clone();
+        point.status = match is_judged {
+            false => Status::Refused,
+            true if counts.false_negatives > 0 => Status::Unsafe,
+            true => Status::Ok,
+        };
+        point
     }
 }
 

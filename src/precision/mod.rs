@@ -4,22 +4,17 @@
 //! oracle's, the clock is `measure`'s.
 
 mod judged;
-mod other_numbers;
-mod plane_test;
 mod point;
 mod points;
-mod quantised;
 mod region_search;
 mod size_sweep;
 mod stability;
-mod stored;
 mod sweeps;
-mod ways;
 
-pub use plane_test::Names;
+pub use judged::{CullingErrors, Names};
 pub use point::{Point, Times};
 pub use points::{PointPlan, Precision, PrecisionInput, Prepared, measure_points, prepare, time};
-pub use region_search::{POINTS_PER_CAMERA, RegionPoint};
+pub use region_search::{POINTS_PER_CAMERA, RegionErrors};
 pub use size_sweep::{SIZE_RATIOS, SizeError, SizeRow, size_sweep};
 pub use stability::StableAfter;
 pub use sweeps::{SWEEPS, Sweep, SweepRow, sweep};

@@ -6,12 +6,12 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::judged::Shots;
-use super::point::Times;
+use super::point::{Dimension, Point};
 use crate::index::DynIndex;
-use crate::measure::{OverProcesses, Status};
+use crate::measure::Status;
 use crate::query::ItemId;
 use crate::scene::{Regions, Scene, SeededRng, Sought};
-use crate::statistics::{ALPHA, Rate, dominance, rate, shows_less};
+use crate::statistics::{Rate, rate};
 
 named! {
     /// In which numbers a point and a region are compared.
@@ -31,17 +31,11 @@ pub const POINTS_PER_CAMERA: usize = 16;
 const ANYWHERE: usize = 5;
 const SEED: u64 = 18;
 
-/// One way to search, with its error and its time.
+/// Errors of a way to search, over all points.
 #[derive(Clone, Debug, Serialize)]
-pub struct RegionPoint {
-    /// Label of the structure.
-    pub structure: String,
+pub struct RegionErrors {
     /// The numbers that points and regions are compared in.
     pub numbers: &'static str,
-    /// How building, searching and timing ended.
-    pub status: Status,
-    /// Why, where the status is not ok.
-    pub reason: Option<String>,
     /// Share of the points whose answer is not the exact one.
     pub wrong: Option<Rate>,
     /// Points that were searched for.
@@ -52,19 +46,11 @@ pub struct RegionPoint {
     pub missed_region_count: u64,
     /// How far outside its farthest false region a point lies, world units.
     pub worst_false: f64,
-    /// Per point.
-    #[serde(flatten)]
-    pub times: Times,
-    /// Index of a row that is no worse in anything and better in something.
-    pub dominated_by: Option<usize>,
-    /// Whether it is dominated by the values alone, and the samples do not show it.
-    pub is_tie: bool,
-    /// Whether no row dominates it.
-    pub on_front: bool,
 }
 
 /// The points of every camera.
-pub(super) struct RegionQueries {
+pub(super) struct RegionQueries<'a> {
+    scene: &'a Scene,
     by_camera: Vec<Vec<Sought>>,
     /// Of the regions, in the world, rounded to f64.
     boxes: Vec<[DVec3; 2]>,
@@ -72,11 +58,14 @@ pub(super) struct RegionQueries {
 
 /// What is found by one kind of numbers, by camera and point, and how wrong it is.
 pub(super) struct RegionJudged {
-    pub numbers: RegionNumbers,
-    answers: Vec<Vec<Vec<ItemId>>>,
+    numbers: RegionNumbers,
+    answers: Answers,
     /// By camera: wrong answers, false regions, missed regions, worst.
     by_camera: Vec<[f64; 4]>,
 }
+
+/// By camera and point.
+type Answers = Vec<Vec<Vec<ItemId>>>;
 
 fn boxes_of(scene: &Scene) -> Vec<[DVec3; 2]> {
     let originals = match &scene.regions {
@@ -95,8 +84,8 @@ fn boxes_of(scene: &Scene) -> Vec<[DVec3; 2]> {
     }
 }
 
-impl RegionQueries {
-    pub fn new(scene: &Scene, shots: &Shots) -> RegionQueries {
+impl RegionQueries<'_> {
+    pub fn new<'a>(scene: &'a Scene, shots: &Shots) -> RegionQueries<'a> {
         let boxes = boxes_of(scene);
         let mut rng = SeededRng::new(SEED);
         let bounds = boxes
@@ -117,27 +106,37 @@ impl RegionQueries {
         };
         let eyes = shots.cameras.iter().map(|camera| camera.frame.eye);
         RegionQueries {
+            scene,
             by_camera: eyes.map(&mut of_camera).collect(),
             boxes,
         }
     }
 
-    /// What the numbers find for a point, by a look at every region.
-    fn found(&self, scene: &Scene, numbers: RegionNumbers, p: &Sought) -> Vec<ItemId> {
-        match numbers {
-            RegionNumbers::F32 => scene.regions.holding(p.local, &scene.items),
-            RegionNumbers::Checked | RegionNumbers::Exact => scene.holding(p),
-            RegionNumbers::F64 => {
-                let mut found = Vec::new();
-                self.in_f64(scene, p, &mut found);
-                found
+    /// Appends what the numbers find for a point: by an index, or by a look at every
+    /// region.
+    fn find(
+        &self,
+        numbers: RegionNumbers,
+        index: Option<&dyn DynIndex>,
+        p: &Sought,
+        out: &mut Vec<ItemId>,
+    ) {
+        let scene = self.scene;
+        match (numbers, index) {
+            (RegionNumbers::F32, Some(index)) => index.locate(p.local, out),
+            (RegionNumbers::F32, None) => out.extend(scene.regions.holding(p.local, &scene.items)),
+            (RegionNumbers::Checked, Some(index)) => {
+                scene.search(p, out, |p, out| index.locate(p, out));
             }
+            (RegionNumbers::F64, _) => self.find_in_f64(p, out),
+            _ => out.extend(scene.holding(p)),
         }
     }
 
     /// The point less the origin, rounded to f64, against the boxes as they are
     /// stored: a scan.
-    fn in_f64(&self, scene: &Scene, p: &Sought, out: &mut Vec<ItemId>) {
+    fn find_in_f64(&self, p: &Sought, out: &mut Vec<ItemId>) {
+        let scene = self.scene;
         let mut local = p.world - scene.origin;
         if let Regions::Bsp(_) = scene.regions {
             local.z = 0.0;
@@ -152,30 +151,22 @@ impl RegionQueries {
     /// Answers query `camera`: the regions of all its points, appended.
     pub fn ask(
         &self,
-        scene: &Scene,
         numbers: RegionNumbers,
         index: Option<&dyn DynIndex>,
         camera: usize,
         out: &mut Vec<ItemId>,
     ) {
         for p in &self.by_camera[camera] {
-            match (numbers, index) {
-                (RegionNumbers::F32, Some(index)) => index.locate(p.local, out),
-                (RegionNumbers::Checked, Some(index)) => {
-                    scene.search(p, out, |p, out| index.locate(p, out));
-                }
-                (RegionNumbers::F64, _) => self.in_f64(scene, p, out),
-                _ => out.extend(scene.holding(p)),
-            }
+            self.find(numbers, index, p, out);
         }
     }
 
     /// What each kind of numbers finds, judged by the exact answer. O(points *
     /// regions).
-    pub fn judged(&self, scene: &Scene) -> Vec<RegionJudged> {
-        let truth: Vec<Vec<Vec<ItemId>>> = self.answers(scene, RegionNumbers::Exact);
+    pub fn judged(&self) -> Vec<RegionJudged> {
+        let truth = self.answers(RegionNumbers::Exact);
         let of = |numbers| {
-            let answers = self.answers(scene, numbers);
+            let answers = self.answers(numbers);
             let by_camera = answers.iter().zip(&truth).zip(&self.by_camera);
             let by_camera = by_camera.map(|((found, truth), points)| {
                 let points = found.iter().zip(truth).zip(points);
@@ -192,14 +183,14 @@ impl RegionQueries {
         RegionNumbers::ALL.into_iter().map(of).collect()
     }
 
-    fn answers(&self, scene: &Scene, numbers: RegionNumbers) -> Vec<Vec<Vec<ItemId>>> {
-        let of = |points: &Vec<Sought>| {
-            points
-                .iter()
-                .map(|p| self.found(scene, numbers, p))
-                .collect()
+    fn answers(&self, numbers: RegionNumbers) -> Answers {
+        let of_point = |p: &Sought| {
+            let mut found = Vec::new();
+            self.find(numbers, None, p, &mut found);
+            found
         };
-        self.by_camera.iter().map(of).collect()
+        let of_camera = |points: &Vec<Sought>| points.iter().map(of_point).collect();
+        self.by_camera.iter().map(of_camera).collect()
     }
 
     fn plus_errors(
@@ -259,65 +250,30 @@ impl RegionJudged {
         }) && rest.is_empty()
     }
 
-    pub fn point(&self, structure: &str) -> RegionPoint {
-        let sum = |k: usize| self.by_camera.iter().map(|c| c[k]).sum::<f64>();
-        let points = POINTS_PER_CAMERA as f64;
-        let wrong: Vec<[f64; 2]> = self.by_camera.iter().map(|c| [c[0], points]).collect();
-        RegionPoint {
-            structure: structure.to_owned(),
+    /// The errors of these numbers as a point of a structure, without a time.
+    pub fn point(&self, structure: &str) -> Point<RegionErrors> {
+        let column = |k: usize| self.by_camera.iter().map(move |c| c[k]);
+        let (falsely, missed) = (column(1).sum::<f64>(), column(2).sum::<f64>());
+        let worst_false = column(3).fold(0.0, f64::max);
+        let wrong: Vec<[f64; 2]> = column(0).map(|n| [n, POINTS_PER_CAMERA as f64]).collect();
+        let errors = RegionErrors {
             numbers: self.numbers.name(),
-            status: match sum(2) > 0.0 {
-                true => Status::Unsafe,
-                false => Status::Ok,
-            },
-            reason: None,
             wrong: rate(&wrong),
             points: (self.by_camera.len() * POINTS_PER_CAMERA) as u64,
-            false_region_count: sum(1) as u64,
-            missed_region_count: sum(2) as u64,
-            worst_false: self.by_camera.iter().map(|c| c[3]).fold(0.0, f64::max),
-            times: Times::default(),
-            dominated_by: None,
-            is_tie: false,
-            on_front: false,
+            false_region_count: falsely as u64,
+            missed_region_count: missed as u64,
+            worst_false,
+        };
+        let dimensions = [(missed, 2), (falsely, 1), (worst_false, 3)];
+        let dimensions = dimensions.map(|(value, k)| Dimension {
+            value,
+            by_camera: column(k).collect(),
+        });
+        let mut point = Point::new(structure, errors, dimensions.into());
+        if missed > 0.0 {
+            point.status = Status::Unsafe;
         }
-    }
-}
-
-/// Sorts the points by time and marks what is dominated: missed and false regions,
-/// how far off, and time.
-pub(super) fn conclude(points: &mut [RegionPoint], judged: &[RegionJudged], times: &OverProcesses) {
-    points.sort_by(|a, b| a.times.order().total_cmp(&b.times.order()));
-    let timed: Vec<usize> = (0..points.len())
-        .filter(|&i| points[i].times.task.is_some())
-        .collect();
-    let values: Vec<[f64; 4]> = timed
-        .iter()
-        .map(|&i| {
-            let p = &points[i];
-            let (missed, falsely) = (p.missed_region_count as f64, p.false_region_count as f64);
-            [missed, falsely, p.worst_false, p.times.order()]
-        })
-        .collect();
-    let samples = |i: usize, k: usize| -> Vec<f64> {
-        let name = points[timed[i]].numbers;
-        let own = judged.iter().find(|judged| judged.numbers.name() == name);
-        own.map_or_else(Vec::new, |own| own.by_camera.iter().map(|c| c[k]).collect())
-    };
-    let is_less = |a: usize, b: usize, k: usize| match k {
-        3 => points[timed[a]]
-            .times
-            .is_faster(&points[timed[b]].times, times),
-        _ => {
-            let column = [2, 1, 3][k];
-            shows_less(&samples(a, column), &samples(b, column), ALPHA)
-        }
-    };
-    let found = dominance(&values, &is_less);
-    for (&i, found) in timed.iter().zip(found) {
-        points[i].dominated_by = found.dominated_by.map(|by| timed[by]);
-        points[i].on_front = found.dominated_by.is_none();
-        points[i].is_tie = found.is_tie;
+        point
     }
 }
 
@@ -339,8 +295,8 @@ mod tests {
         let scene = Scene::about("far", &boxes, DVec3::ZERO).unwrap();
         let path = path::load("orbit:frames=12", &scene, &LensDefaults::default()).unwrap();
         let queries = RegionQueries::new(&scene, &Shots::of(&path, 12));
-        let judged = queries.judged(&scene);
-        let [f32s, checked, f64s, exact] = [0, 1, 2, 3].map(|i| judged[i].point("x"));
+        let judged = queries.judged();
+        let [f32s, checked, f64s, exact] = [0, 1, 2, 3].map(|i| judged[i].point("x").errors);
         assert!(
             f32s.wrong.unwrap().value > 0.2 && f32s.worst_false > 0.1,
             "{f32s:?}"
@@ -353,11 +309,10 @@ mod tests {
             assert_eq!(right.wrong.unwrap().value, 0.0);
         }
         for judged in &judged {
-            assert_eq!(judged.point("x").missed_region_count, 0);
+            assert_eq!(judged.point("x").errors.missed_region_count, 0);
             let mut out = Vec::new();
-            queries.ask(&scene, judged.numbers, None, 3, &mut out);
-            let loops = judged.numbers != RegionNumbers::F32;
-            assert!(judged.is_right(3, &out) || !loops, "{:?}", judged.numbers);
+            queries.ask(judged.numbers, None, 3, &mut out);
+            assert!(judged.is_right(3, &out), "{:?}", judged.numbers);
             out.push(0);
             assert!(!judged.is_right(3, &out));
         }

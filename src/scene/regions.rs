@@ -217,11 +217,6 @@ impl BspRegions {
         }
     }
 
-    /// Number of linedefs of the map.
-    pub fn line_count(&self) -> usize {
-        self.lines.len()
-    }
-
     /// A place about which the map's linedefs disagree, if there is any: its sectors are
     /// then no regions.
     pub fn dispute(&self) -> Option<Dispute> {

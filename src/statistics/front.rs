@@ -10,8 +10,8 @@ pub struct Standing {
     pub is_tie: bool,
 }
 
-/// Dominance among points in `N` dimensions, less is better in each. The front is
-/// what nothing is shown to dominate: which of two equals came out ahead is luck.
+/// Dominance among points by their values, as many for each; less is better. The
+/// front is what nothing is shown to dominate: which of two equals came out ahead is luck.
 ///
 /// `is_less(a, b, k)` says whether the samples show `a` to be better than `b` in
 /// dimension `k`; it is asked only where the values say so. That a point is
@@ -20,16 +20,17 @@ pub struct Standing {
 /// point that is no worse than that one. So dominance is transitive, as it is by
 /// the values alone, and a point that is only known less well is protected by it
 /// neither from the front's points nor from those that they dominate. O(n^2).
-pub fn dominance<const N: usize>(
-    values: &[[f64; N]],
+pub fn dominance<V: AsRef<[f64]>>(
+    values: &[V],
     is_less: &dyn Fn(usize, usize, usize) -> bool,
 ) -> Vec<Standing> {
     let all = 0..values.len();
-    let no_worse = |a: usize, b: usize| (0..N).all(|k| values[a][k] <= values[b][k]);
-    let better = |a: usize, b: usize| no_worse(a, b) && values[a] != values[b];
-    let shown = |a: usize, b: usize| {
-        better(a, b) && (0..N).any(|k| values[a][k] < values[b][k] && is_less(a, b, k))
-    };
+    let pairs = |a: usize, b: usize| values[a].as_ref().iter().zip(values[b].as_ref());
+    let no_worse = |a: usize, b: usize| pairs(a, b).all(|(a, b)| a <= b);
+    let less = |a: usize, b: usize| pairs(a, b).map(|(a, b)| a < b).enumerate();
+    let better = |a: usize, b: usize| no_worse(a, b) && less(a, b).any(|(_, is_less)| is_less);
+    let shown =
+        |a: usize, b: usize| better(a, b) && less(a, b).any(|(k, less)| less && is_less(a, b, k));
     let on_front = |&a: &usize| !all.clone().any(|b| better(b, a));
     let front: Vec<usize> = all.clone().filter(on_front).collect();
     // Those of the front first: they dominate most.

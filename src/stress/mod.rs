@@ -3,7 +3,6 @@
 //! as passed; what is typed and printed is the command line's.
 
 pub mod extremes;
-mod json;
 mod margin;
 mod replay;
 mod sheet;

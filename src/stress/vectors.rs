@@ -1,16 +1,19 @@
 //! Reading test vectors: JSON with the answers that exact arithmetic gave. It
-//! owns the format and every way in which a file can be wrong; asking the
-//! vectors is left to the files beside this one.
+//! owns the format; asking the vectors is left to the files beside this one.
 
 use std::collections::BTreeSet;
+use std::fmt;
 use std::path::Path;
 
-use serde_json::Value;
+use glam::{DVec3, Vec3};
+use serde::de::{Error, Unexpected, Visitor};
+use serde::{Deserialize, Deserializer};
 
-use super::json::{At, of, shown};
-use super::vector::{Names, Vector};
+use super::vector::{Names, Vector, VectorCamera, VectorPoint};
+use crate::geometry::{Aabb, Plane};
 use crate::input::InputError;
-use crate::json::from_json;
+use crate::json::{JsonError, from_json};
+use crate::shown::plain;
 
 /// The vectors that come with the program.
 pub const BUILT_IN: &str = include_str!("../../datasets/vectors.json");
@@ -42,110 +45,303 @@ pub fn read_vectors_file(path: &Path) -> Result<Vec<Vector>, InputError> {
 /// -Infinity (-inf); fields that are not known are left alone.
 ///
 /// # Errors
-/// One line: the file, the vector and field, what was found and expected.
+/// One line: the file, the path of the field, what was found and expected.
 pub fn read_vectors(bytes: &[u8], file: &str) -> Result<Vec<Vector>, InputError> {
-    let json: Value = from_json(bytes).map_err(|error| InputError::Value {
+    let wrong = |place: String, found: String, expected: String| InputError::Value {
         file: file.to_owned(),
-        place: error.place(),
-        found: error.found,
-        expected: "JSON: an object with the array 'vectors'".into(),
-    })?;
-    let list = match &json {
-        Value::Array(list) => list,
-        Value::Object(object) => {
-            let top = At::new(file, "the top level".into());
-            let format = object.get("format").unwrap_or(&Value::Null);
-            if !(format.is_null() || format.as_f64() == Some(1.0)) {
-                return Err(top.wrong(&format!("format {}", of(format)), "format 1"));
-            }
-            let list = object.get("vectors").unwrap_or(&Value::Null);
-            let list = list.as_array();
-            list.ok_or_else(|| top.wrong("no array 'vectors'", "an array of vectors"))?
-        }
-        other => {
-            let top = At::new(file, "the top level".into());
-            return Err(top.wrong(&of(other), "an object with the array 'vectors'"));
-        }
+        place,
+        found,
+        expected,
     };
-    let mut seen = Names::new();
-    let vectors = list.iter().enumerate().map(|(index, value)| {
-        let vector = vector(value, file, index)?;
-        if !seen.insert(vector.id.clone()) {
-            let at = At::new(file, format!("vector {index}"));
-            let found = format!("the id '{}' a second time", shown(&vector.id));
-            return Err(at.wrong(&found, "an id of its own"));
+    let is_array = bytes.iter().find(|byte| b"[{".contains(byte)) == Some(&b'[');
+    let read = match is_array {
+        true => from_json(bytes).map(|vectors| File {
+            format: (),
+            vectors,
+        }),
+        false => from_json(bytes),
+    };
+    let refused = |error: JsonError| {
+        let place = error.place();
+        let expected = error.expected;
+        let expected = expected.unwrap_or_else(|| format!("JSON in the form of {BUILT_IN_NAME}"));
+        wrong(place, error.found, expected)
+    };
+    let vectors: Vec<Written> = read.map_err(refused)?.vectors;
+    let again = |place: String, id: &str| {
+        let found = format!("the id '{}' a second time", plain(id));
+        wrong(place, found, "an id of its own".to_owned())
+    };
+    let mut seen = BTreeSet::new();
+    for (n, vector) in vectors.iter().enumerate() {
+        if !seen.insert(&vector.id.0) {
+            return Err(again(format!("vectors[{n}]"), &vector.id.0));
         }
-        Ok(vector)
-    });
-    vectors.collect()
+        let mut names = BTreeSet::new();
+        let boxes = vector.boxes.iter().flatten().enumerate();
+        let mut twice = boxes.filter(|(_, b)| !names.insert(&b.id.0));
+        if let Some((i, b)) = twice.next() {
+            return Err(again(format!("vectors[{n}].boxes[{i}]"), &b.id.0));
+        }
+    }
+    Ok(vectors.into_iter().map(Vector::from).collect())
 }
 
-fn vector(value: &Value, file: &str, index: usize) -> Result<Vector, InputError> {
-    let at = At::new(file, format!("vector {index}"));
-    let object = at.object(value)?;
-    let id = at.child("id").name(at.required(object, "id")?)?;
-    let at = At::new(file, format!("vector {index} ({})", shown(&id)));
-    let optional = |field: &str| object.get(field).filter(|value| !value.is_null());
-    let names = |field: &str| -> Result<Option<Names>, InputError> {
-        let read = optional(field).map(|value| at.child(field).names(value));
-        read.transpose()
-    };
-    let error = |field: &str| match optional(field) {
-        None | Some(Value::Bool(false)) => Ok(None),
-        Some(Value::Bool(true)) => Ok(Some("an error".to_owned())),
-        Some(Value::String(text)) => Ok(Some(text.clone())),
-        Some(other) => Err(at.child(field).wrong(&of(other), "the error in words")),
-    };
-    let elements = |field: &str| match optional(field) {
-        None => Ok(Vec::new()),
-        Some(value) => at.child(field).elements(value),
-    };
-    let planes = |field: &str, number: fn(&At, &Value) -> Result<f32, InputError>| {
-        let rows = optional(field).map(|rows| at.child(field).planes(rows, number));
-        rows.transpose()
-    };
-    // Bits are what the answers were found for.
-    let planes = match planes("planes_f32_hex", |at, value| at.bits(value))? {
-        None => planes("planes", |at, value| at.f32_number(value))?,
-        bits => bits,
-    };
-    let camera = optional("camera").map(|value| at.child("camera").camera(value));
-    let mut boxes = Vec::new();
-    let mut seen = BTreeSet::new();
-    for (at, value) in elements("boxes")? {
-        let (name, b) = at.bounds(value)?;
-        if !seen.insert(name.clone()) {
-            let found = format!("the id '{}' a second time", shown(&name));
-            return Err(at.wrong(&found, "an id of its own"));
+#[derive(Deserialize)]
+#[serde(expecting = "an object with the array 'vectors'")]
+struct File {
+    #[serde(default, deserialize_with = "format")]
+    #[expect(dead_code, reason = "there is but one")]
+    format: (),
+    vectors: Vec<Written>,
+}
+
+/// A vector as a file has it.
+#[derive(Deserialize)]
+struct Written {
+    id: Name,
+    category: Option<Name>,
+    /// Takes precedence: what the answers were found for.
+    planes_f32_hex: Option<Vec<Four<Bits>>>,
+    planes: Option<Vec<Four<Narrow>>>,
+    camera: Option<WrittenCamera>,
+    boxes: Option<Vec<WrittenBox>>,
+    points: Option<Vec<WrittenPoint>>,
+    expected_visible_planes: Option<BTreeSet<Name>>,
+    touch_planes: Option<BTreeSet<Name>>,
+    expected_visible_camera: Option<BTreeSet<Name>>,
+    touch_camera: Option<BTreeSet<Name>>,
+    observed_f32_pvertex_mul_add: Option<BTreeSet<Name>>,
+    p_vertex_exact_visible: Option<BTreeSet<Name>>,
+    expect_camera_error: Option<Declared>,
+    expect_planes_error: Option<Declared>,
+    expect_rejected_at_load: Option<BTreeSet<Name>>,
+    expect_empty_boxes: Option<BTreeSet<Name>>,
+}
+
+#[derive(Deserialize)]
+struct WrittenCamera {
+    eye: Three<Number>,
+    look: Three<Number>,
+    up: Three<Number>,
+    fovy_deg: Number,
+    aspect: Number,
+    near: Number,
+    far: Option<Number>,
+}
+
+#[derive(Deserialize)]
+struct WrittenBox {
+    id: Name,
+    lo: Three<Narrow>,
+    hi: Three<Narrow>,
+}
+
+#[derive(Deserialize)]
+struct WrittenPoint {
+    id: Name,
+    p: Three<Number>,
+    expected_containing: BTreeSet<Name>,
+}
+
+impl From<Written> for Vector {
+    fn from(written: Written) -> Vector {
+        let names = |names: Option<BTreeSet<Name>>| names.map(names_of);
+        let bits = written
+            .planes_f32_hex
+            .map(|rows| planes(rows, |bits: Bits| bits.0));
+        let exact = names(written.p_vertex_exact_visible);
+        let boxes = written.boxes.into_iter().flatten().map(|b| {
+            let corner = |Three(row): Three<Narrow>| Vec3::from(row.map(|x| x.0));
+            (b.id.0, Aabb::new(corner(b.lo), corner(b.hi)))
+        });
+        let points = written
+            .points
+            .into_iter()
+            .flatten()
+            .map(|point| VectorPoint {
+                id: point.id.0,
+                p: vector(point.p),
+                containing: names_of(point.expected_containing),
+            });
+        Vector {
+            id: written.id.0,
+            category: written.category.map_or("vector".to_owned(), |name| name.0),
+            planes: bits.or_else(|| Some(planes(written.planes?, |x: Narrow| x.0))),
+            camera: written.camera.map(|camera| VectorCamera {
+                eye: vector(camera.eye),
+                look: vector(camera.look),
+                up: vector(camera.up),
+                fovy_deg: camera.fovy_deg.0,
+                aspect: camera.aspect.0,
+                near: camera.near.0,
+                far: camera
+                    .far
+                    .map(|far| far.0)
+                    .filter(|&far| far != f64::INFINITY),
+            }),
+            boxes: boxes.collect(),
+            points: points.collect(),
+            visible_planes: names(written.expected_visible_planes),
+            touch_planes: names(written.touch_planes),
+            visible_camera: names(written.expected_visible_camera),
+            touch_camera: names(written.touch_camera),
+            six_plane: names(written.observed_f32_pvertex_mul_add).or_else(|| exact.clone()),
+            six_plane_exact: exact,
+            camera_error: written.expect_camera_error.and_then(|error| error.0),
+            planes_error: written.expect_planes_error.and_then(|error| error.0),
+            rejected_at_load: names(written.expect_rejected_at_load).unwrap_or_default(),
+            empty_boxes: names(written.expect_empty_boxes).unwrap_or_default(),
         }
-        boxes.push((name, b));
     }
-    let points = elements("points")?;
-    let points = points.iter().map(|(at, value)| at.point(value));
-    Ok(Vector {
-        category: match optional("category") {
-            None => "vector".to_owned(),
-            Some(value) => at.child("category").name(value)?,
-        },
-        planes,
-        camera: camera.transpose()?,
-        boxes,
-        points: points.collect::<Result<_, _>>()?,
-        visible_planes: names("expected_visible_planes")?,
-        touch_planes: names("touch_planes")?,
-        visible_camera: names("expected_visible_camera")?,
-        touch_camera: names("touch_camera")?,
-        six_plane: match names("observed_f32_pvertex_mul_add")? {
-            None => names("p_vertex_exact_visible")?,
-            some => some,
-        },
-        six_plane_exact: names("p_vertex_exact_visible")?,
-        camera_error: error("expect_camera_error")?,
-        planes_error: error("expect_planes_error")?,
-        rejected_at_load: names("expect_rejected_at_load")?.unwrap_or_default(),
-        empty_boxes: names("expect_empty_boxes")?.unwrap_or_default(),
-        id,
-    })
+}
+
+fn names_of(names: BTreeSet<Name>) -> Names {
+    names.into_iter().map(|name| name.0).collect()
+}
+
+fn vector(Three(row): Three<Number>) -> DVec3 {
+    DVec3::from(row.map(|x| x.0))
+}
+
+fn planes<T>(rows: Vec<Four<T>>, number: fn(T) -> f32) -> Vec<Plane> {
+    let plane = |Four(row): Four<T>| {
+        let [x, y, z, d] = row.map(number);
+        Plane::new(Vec3::new(x, y, z), d)
+    };
+    rows.into_iter().map(plane).collect()
+}
+
+/// Names of boxes and vectors: text, or a whole number taken as text.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+struct Name(String);
+
+/// A number of f64, or a word for one that JSON does not have.
+struct Number(f64);
+
+/// A number of f32, exactly or in the fewest decimals that read back as it: the
+/// answers beside it are about this very number. What is beyond its range is infinite.
+struct Narrow(f32);
+
+/// The bits of an f32 in hexadecimal: "0x3f800000".
+struct Bits(f32);
+
+/// The error that is expected, in words; `false` is none.
+struct Declared(Option<String>);
+
+struct Three<T>([T; 3]);
+
+struct Four<T>([T; 4]);
+
+/// Reads one of the types above from each kind of JSON value that it may have.
+macro_rules! written_as {
+    ($Type:ident, $expected:literal, $($visit:ident($From:ty, $Kind:ident) $read:expr;)+) => {
+        impl<'de> Deserialize<'de> for $Type {
+            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<$Type, D::Error> {
+                struct Reader;
+
+                impl Visitor<'_> for Reader {
+                    type Value = $Type;
+
+                    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                        f.write_str($expected)
+                    }
+
+                    $(fn $visit<E: Error>(self, value: $From) -> Result<$Type, E> {
+                        let read: fn($From) -> Option<$Type> = $read;
+                        let found = Unexpected::$Kind(value);
+                        read(value).ok_or_else(|| E::invalid_value(found, &self))
+                    })+
+                }
+
+                deserializer.deserialize_any(Reader)
+            }
+        }
+    };
+}
+written_as! {
+    Name, "a name",
+    visit_str(&str, Str) |text| Some(Name(text.to_owned()));
+    visit_u64(u64, Unsigned) |number| Some(Name(number.to_string()));
+}
+written_as! {
+    Number, "a number, NaN, Infinity or -Infinity",
+    visit_str(&str, Str) |text| word(text).map(Number);
+    visit_f64(f64, Float) |number| Some(Number(number));
+    visit_u64(u64, Unsigned) |number| Some(Number(number as f64));
+    visit_i64(i64, Signed) |number| Some(Number(number as f64));
+}
+written_as! {
+    Narrow, "a number that f32 holds",
+    visit_str(&str, Str) |text| word(text).map(|x| Narrow(x as f32));
+    visit_f64(f64, Float) narrow;
+    visit_u64(u64, Unsigned) |number| narrow(number as f64);
+    visit_i64(i64, Signed) |number| narrow(number as f64);
+}
+written_as! {
+    Bits, "the 32 bits of an f32 such as \"0x3f800000\"",
+    visit_str(&str, Str) bits;
+}
+written_as! {
+    Declared, "the error in words",
+    visit_bool(bool, Bool) |is_wrong| Some(Declared(is_wrong.then(|| "an error".to_owned())));
+    visit_str(&str, Str) |text| Some(Declared(Some(text.to_owned())));
+}
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Three<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        exactly(deserializer, "three numbers").map(Three)
+    }
+}
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Four<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        exactly(deserializer, "four numbers: the normal and the offset").map(Four)
+    }
+}
+
+fn exactly<'de, D: Deserializer<'de>, T: Deserialize<'de>, const N: usize>(
+    deserializer: D,
+    expected: &str,
+) -> Result<[T; N], D::Error> {
+    let row = Vec::deserialize(deserializer)?;
+    let found = row.len();
+    row.try_into()
+        .map_err(|_| D::Error::invalid_length(found, &expected))
+}
+
+fn format<'de, D: Deserializer<'de>>(deserializer: D) -> Result<(), D::Error> {
+    match Option::<f64>::deserialize(deserializer)? {
+        None | Some(1.0) => Ok(()),
+        Some(other) => Err(D::Error::invalid_value(
+            Unexpected::Float(other),
+            &"format 1",
+        )),
+    }
+}
+
+fn word(text: &str) -> Option<f64> {
+    match text.to_ascii_lowercase().as_str() {
+        "nan" => Some(f64::NAN),
+        "inf" | "infinity" => Some(f64::INFINITY),
+        "-inf" | "-infinity" => Some(f64::NEG_INFINITY),
+        _ => None,
+    }
+}
+
+fn narrow(number: f64) -> Option<Narrow> {
+    let narrow = number as f32;
+    let is_shortest = || narrow.to_string().parse() == Ok(number);
+    let is_held = !narrow.is_finite() || f64::from(narrow) == number || is_shortest();
+    is_held.then_some(Narrow(narrow))
+}
+
+fn bits(text: &str) -> Option<Bits> {
+    let bare = text.strip_prefix("0x").or_else(|| text.strip_prefix("0X"));
+    let digits = bare.unwrap_or(text);
+    let is_sound = digits.len() == 8 && digits.bytes().all(|b| b.is_ascii_hexdigit());
+    let bits = u32::from_str_radix(digits, 16).ok().filter(|_| is_sound)?;
+    Some(Bits(f32::from_bits(bits)))
 }
 
 #[cfg(test)]
@@ -177,33 +373,33 @@ mod tests {
                 "{\"vectors\":[}".into(),
                 "f.json, line 1, column 13, vectors[0]: no JSON (expected value)",
             ),
-            ("3".into(), "the top level: '3'; expected an object"),
-            ("{}".into(), "no array 'vectors'"),
+            (
+                "3".into(),
+                "column 1: '3'; expected an object with the array",
+            ),
+            ("{}".into(), "no field 'vectors'"),
             (
                 r#"{"format":2,"vectors":[]}"#.into(),
-                "format '2'; expected format 1",
+                "format: '2.0'; expected format 1",
             ),
-            ("[3]".into(), "vector 0: '3'; expected an object"),
-            ("[{}]".into(), "vector 0: no 'id'; expected the field 'id'"),
-            (
-                r#"[{"id":true}]"#.into(),
-                "vector 0, id: 'true'; expected a name",
-            ),
+            ("[3]".into(), "[0]: '3'; expected an object"),
+            ("[{}]".into(), "[0]: no field 'id'; expected"),
+            (r#"[{"id":true}]"#.into(), "[0].id: 'true'; expected a name"),
             (
                 r#"[{"id":"v"},{"id":"v"}]"#.into(),
-                "vector 1: the id 'v' a second time",
+                "vectors[1]: the id 'v' a second time",
             ),
             (
                 boxed(r#"{"id":"b","lo":[0,0,0]}"#),
-                "vector 0 (v), boxes[0]: no 'hi'",
+                "[0].boxes[0]: no field 'hi'",
             ),
             (
                 boxed(r#"{"id":"b","lo":[0,0],"hi":0}"#),
-                "boxes[0], lo: 2 elements; expected three",
+                "boxes[0].lo: 2 values; expected three",
             ),
             (
                 boxed(r#"{"id":"b","lo":[0,0,"x"],"hi":[1,1,1]}"#),
-                r#"boxes[0], lo[2]: '"x"'; expected a number, NaN, Infinity"#,
+                "boxes[0].lo[2]: the text 'x'; expected a number",
             ),
             (
                 boxed(
@@ -213,7 +409,7 @@ mod tests {
             ),
             (
                 with(r#""planes":[[1,2,3]]"#),
-                "planes[0]: 3 elements; expected four",
+                "planes[0]: 3 values; expected four",
             ),
             (
                 with(r#""planes_f32_hex":[["0x3f80000","","",""]]"#),
@@ -225,21 +421,24 @@ mod tests {
             ),
             (
                 boxed(r#"{"id":"b","lo":[0,0,0],"hi":[1,0.1000001,0.10000000001]}"#),
-                "boxes[0], hi[2]: '0.10000000001'; expected a number that f32 holds",
+                "boxes[0].hi[2]: '0.10000000001'; expected a number that f32 holds",
             ),
-            (with(r#""camera":{"eye":[0,0,0]}"#), "camera: no 'look'"),
+            (
+                with(r#""camera":{"eye":[0,0,0]}"#),
+                "camera: no field 'look'",
+            ),
             (
                 with(r#""camera":[]"#),
-                "camera: an array of 0; expected an object",
+                "camera: 0 values; expected an object",
             ),
             (
                 with(r#""expected_visible_planes":"all""#),
-                "expected_visible_planes: '\"all\"'",
+                "expected_visible_planes: the text 'all'; expected a list",
             ),
             (with(r#""expect_camera_error":[1]"#), "the error in words"),
             (
                 with(r#""points":[{"id":"p","p":[0,0,0]}]"#),
-                "points[0]: no 'expected_containing'",
+                "points[0]: no field 'expected_containing'",
             ),
         ];
         for (text, wanted) in cases {

@@ -43,14 +43,6 @@ impl Solids {
         self.inner[item as usize] = Aabb::EMPTY;
     }
 
-    /// One more box, behind the items.
-    pub fn push(&mut self, b: &WorldBox) {
-        self.boxes.push(*b);
-        let outer = Aabb::rounded_outward(b.min, b.max, self.origin);
-        self.outer.push(outer);
-        self.inner.push(rounded_inward(b, self.origin));
-    }
-
     /// Some of them, numbered anew in this order.
     ///
     /// # Panics

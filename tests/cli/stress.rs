@@ -284,29 +284,29 @@ fn a_file_that_is_wrong_is_refused_in_one_line() {
         ("cut.json", b"{\"vectors\": [{\"id\": \"a\",\n \"boxes\": [", "cut.json, line 2"),
         ("bytes.json", b"\xff\xfe\x00", "bytes.json, line 1"),
         ("nan.json", b"{\"vectors\": [NaN]}", "line 1, column 14 | no JSON"),
-        ("text.json", b"\"vectors\"", "the top level | expected an object"),
+        ("text.json", b"\"vectors\"", "line 1, column 9: the text 'vectors'; expected an object"),
         ("none.json", b"{\"vectors\": []}", "no vector | expected at least one"),
-        ("format.json", b"{\"format\": 9, \"vectors\": []}", "format '9'; expected format 1"),
-        ("id.json", b"[{\"boxes\": []}]", "id.json, vector 0: no 'id'"),
+        ("format.json", b"{\"format\": 9, \"vectors\": []}", "format: '9.0'; expected format 1"),
+        ("id.json", b"[{\"boxes\": []}]", "id.json, line 1, column 14, [0]: no field 'id'"),
         (
             "box.json",
             b"[{\"id\": \"q\", \"boxes\": [{\"id\": \"b\", \"lo\": [0, 0, \"\\n\"], \"hi\": [1, 1, 1]}]}]",
-            "box.json, vector 0 (q), boxes[0], lo[2] | expected a number",
+            "box.json | [0].boxes[0].lo[2] | expected a number",
         ),
         (
             "hex.json",
             b"[{\"id\": \"q\", \"planes_f32_hex\": [[\"0x1\", \"0\", \"0\", \"0\"]]}]",
-            "vector 0 (q), planes_f32_hex[0][0] | 0x3f800000",
+            "[0].planes_f32_hex[0][0] | 0x3f800000",
         ),
         (
             "camera.json",
             b"[{\"id\": \"q\", \"camera\": {\"eye\": [0, 0, 0]}}]",
-            "vector 0 (q), camera: no 'look'",
+            "[0].camera: no field 'look'",
         ),
         (
             "names.json",
             b"[{\"id\": \"q\", \"expected_visible_camera\": [[]]}]",
-            "expected_visible_camera[0]: an array of 0; expected a name",
+            "expected_visible_camera[0]: a list; expected a name",
         ),
     ];
     for (name, bytes, wanted) in cases {

@@ -5,20 +5,18 @@
 use std::rc::Rc;
 use std::sync::Arc;
 
-use glam::DVec3;
-
 use super::super::case::Case;
 use super::super::omission::{By, Draft, Forced, LeftOutIf, Omission, Way};
 use super::super::rule::{Rule, Unfit, not_applicable};
-use super::hidden::{self, PROBED, PROBES, Removal};
+use super::hidden::{self, PROBED, Removal};
 use crate::kernel::Kernel;
 use crate::measure::Ask;
 use crate::query::ItemId;
 use crate::scene::{ItemShape, Surfaces};
 use crate::visibility::triangle::{
-    Clusters, Cone, MOST_TRIANGLES, SafeCones, Selection, TriangleCull, View,
+    Clusters, Cone, Eye, MOST_TRIANGLES, SafeCones, Selection, TriangleCull,
 };
-use crate::visibility::{NoRays, surfaces_of};
+use crate::visibility::{NoRays, Rays, surfaces_of};
 
 pub(super) const RULE: Rule = Rule {
     name: "cones",
@@ -47,7 +45,7 @@ struct Seen {
     /// By cluster: the item that it is of.
     owners: Vec<ItemId>,
     cones: SafeCones,
-    view: View,
+    eye: Eye,
 }
 
 fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfit> {
@@ -93,7 +91,8 @@ fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfi
 
 impl Seen {
     fn of(case: &Case, frame: usize, surfaces: Option<&Surfaces>) -> Result<Seen, NoRays> {
-        let scene = case.scene();
+        let (scene, camera) = (case.scene(), &case.workload.cameras[frame]);
+        Rays::of(camera)?;
         let mut met = Vec::new();
         case.query(frame, &mut met);
         let items = hidden::frames(met.len(), MOST_ITEMS).map(|n| met[n]);
@@ -114,7 +113,7 @@ impl Seen {
             cones: SafeCones::of(&clusters),
             clusters,
             items,
-            view: View::of(&case.workload.cameras[frame], scene.origin, PROBES)?,
+            eye: Eye::of(camera, scene.origin),
         })
     }
 
@@ -122,7 +121,7 @@ impl Seen {
     fn left(&self, cones: Option<Kernel>) -> Selection {
         let mut selection = Selection::all(&self.clusters);
         if let Some(kernel) = cones {
-            self.cones.cull(&self.view, kernel, &mut selection);
+            self.cones.cull(&self.eye, kernel, &mut selection);
         }
         selection
     }
@@ -148,7 +147,7 @@ fn turned_away(few: &[Seen]) -> f64 {
     });
     let (mut triangles, mut away) = (0.0, 0.0);
     for corners in some {
-        let cone = Cone::fit(&corners, |axis: DVec3| axis.as_vec3());
+        let cone = Cone::fit(&corners);
         triangles += corners.len() as f64;
         away += corners.len() as f64 * cone.map_or(0.0, |cone| cone.turned_away());
     }

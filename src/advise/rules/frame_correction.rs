@@ -48,7 +48,9 @@ fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfi
         omission.predicted = Some(error <= tolerance);
     }
     let mut draft = omission.draft(Vec::new());
-    draft.once_ns = vec![left_out.ns_per_step, kept.ns_per_step];
+    draft.once_ns = [left_out, kept]
+        .map(|rated| rated.ns_per_step.unwrap_or(f64::NAN))
+        .into();
     Ok(draft.finished_by(move |omission, aside| {
         let ([left_out_ns, kept_ns], Some(ratio)) = (&aside.once_ns[..], &aside.once_ratio) else {
             return;

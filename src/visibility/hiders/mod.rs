@@ -14,9 +14,7 @@ use self::blocks::Blocks;
 use self::inner::Inner;
 use super::occlusion::OccluderScene;
 use super::{Rays, Solids};
-use crate::geometry::Aabb;
 use crate::input::InputError;
-use crate::query::ItemId;
 use crate::scene::Scene;
 
 /// The occluders of a scene.
@@ -25,7 +23,7 @@ pub struct Hiders {
     /// The same without boxes that are of no item, for eyes that these do not hide from:
     /// outside the rooms of a map, not above the ground of a mesh.
     bare: Option<OccluderScene>,
-    inner: Option<Inner>,
+    inner: Option<InnerRow>,
     ground: Option<Ground>,
     blocks: Option<BlocksRow>,
 }
@@ -55,7 +53,7 @@ impl Hiders {
         Ok(Hiders {
             bare: of_no_item.map(|_| OccluderScene::among(scene, within, &[])),
             blocks: blocks.map(|blocks| blocks.row),
-            inner,
+            inner: inner.map(|inner| inner.row),
             ground,
             all,
         })
@@ -84,15 +82,9 @@ impl Hiders {
         self.ground.as_ref()
     }
 
-    /// The boxes inside the items of a mesh, each with its item, by ascending item;
-    /// scene-local.
-    pub fn inner(&self) -> &[(ItemId, Aabb)] {
-        self.inner.as_ref().map_or(&[], |inner| &inner.boxes)
-    }
-
     /// What is known of those boxes.
     pub fn inner_row(&self) -> Option<&InnerRow> {
-        self.inner.as_ref().map(|inner| &inner.row)
+        self.inner.as_ref()
     }
 
     /// What is known of the boxes in the solid of a map.

@@ -215,17 +215,17 @@ impl InnerBoxes {
     }
 }
 
-/// Whether the open box is in the inside of one piece of a closed item: exactly.
-pub fn is_inside(surfaces: &Surfaces, item: usize, inner: &Aabb) -> bool {
-    parts(surfaces, item).iter().any(|part| is_in(part, inner))
-}
-
 #[cfg(test)]
 mod tests {
     use glam::DVec3;
 
     use super::*;
     use crate::scene::{Mesh, SeededRng, load};
+
+    /// Whether the open box is in the inside of one piece of a closed item: exactly.
+    fn is_inside(surfaces: &Surfaces, item: usize, inner: &Aabb) -> bool {
+        parts(surfaces, item).iter().any(|part| is_in(part, inner))
+    }
 
     fn mesh(name: &str, triangles: usize) -> Surfaces {
         (Mesh::named(&format!("mesh:{name}")).unwrap().build)(triangles, 3)

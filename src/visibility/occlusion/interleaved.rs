@@ -29,7 +29,6 @@ pub struct Interleaved<B> {
     buffer: B,
     kernel: Kernel,
     drawn_part: u32,
-    second_look: bool,
     /// The [`key`]s of blocks and their places among the entries.
     queue: BinaryHeap<Reverse<(u64, u32)>>,
     entries: Vec<Entry>,
@@ -79,7 +78,6 @@ impl<B: OcclusionBuffer> Interleaved<B> {
             buffer,
             kernel,
             drawn_part: DEFAULT_DRAWN_PART,
-            second_look: true,
             queue: BinaryHeap::new(),
             entries: Vec::new(),
             survivors: Vec::new(),
@@ -89,12 +87,6 @@ impl<B: OcclusionBuffer> Interleaved<B> {
     /// Draws survivors that may cover at least the image's pixels divided by `part`.
     pub fn drawing_from(mut self, part: u32) -> Self {
         self.drawn_part = part.max(1);
-        self
-    }
-
-    /// Whether survivors are tested once more when all have been drawn.
-    pub fn second_look(mut self, second_look: bool) -> Self {
-        self.second_look = second_look;
         self
     }
 
@@ -238,7 +230,6 @@ impl<B: OcclusionBuffer> Work for Walk<'_, B> {
             stats.drawn += drawn;
         }
         let before = self.out.len();
-        let early = if state.second_look { early } else { 0 };
         let (early, late) = survivors.split_at(early);
         for sixteen in early.chunks(LANES) {
             let mut asked: LaneMask = 0;

@@ -12,11 +12,9 @@
 //! they are boxes of its solid, below the ground of a mesh boxes too, which are no items.
 
 mod buffer;
-mod depth_rays;
 mod hierarchical_z;
 mod interleaved;
 mod masked;
-mod none;
 mod outline;
 mod rect;
 mod scene;
@@ -29,15 +27,15 @@ mod view;
 mod zbuffer;
 
 pub use buffer::OcclusionBuffer;
-pub use depth_rays::DepthRays;
 pub use hierarchical_z::HierarchicalZ;
 pub use interleaved::{DEFAULT_DRAWN_PART, Interleaved};
 pub use masked::{Masked, MaskedCentre, MaskedInner};
-pub use none::NoOcclusion;
 pub use outline::{Coverage, Outline};
 pub use rect::{Rect, Rects};
 pub use scene::{Faces, Occluder, OccluderScene};
 pub use stats::CullStats;
+#[cfg(test)]
+pub use tests::NoOcclusion;
 pub use trace::FrameTrace;
 pub use two_pass::{OccluderChoice, TwoPass};
 pub use view::{Linear, Projection, View};

@@ -197,14 +197,6 @@ impl OccluderScene {
     pub fn all_occluders(&self) -> &[Occluder] {
         &self.occluders
     }
-
-    /// Heap bytes.
-    pub fn bytes(&self) -> usize {
-        let blocks: usize = self.levels.iter().map(|l| size_of_val(&l[..])).sum();
-        let items = size_of_val(&self.ids[..]) + size_of_val(&self.positions[..]);
-        let occluders = size_of_val(&self.occluders[..]) + size_of_val(&self.first_occluders[..]);
-        blocks + items + occluders
-    }
 }
 
 /// Orders the items so that each run of `capacity` of them (the last may be

@@ -99,11 +99,6 @@ impl<B: OcclusionBuffer> TwoPass<B> {
             out,
         })
     }
-
-    /// The buffer as the last view left it.
-    pub fn buffer(&self) -> &B {
-        &self.buffer
-    }
 }
 
 struct Culled<'a, B> {

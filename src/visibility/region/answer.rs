@@ -43,15 +43,10 @@ pub trait RegionRow: Send + Sync {
     /// Replaces `out` by the regions that a camera may see, ascending.
     fn from_eye(&self, rays: &Rays, scratch: &mut Scratch, out: &mut Vec<RegionId>) -> EyePlace;
 
-    /// The regions that may be seen from any point of a region, ascending; itself is one
-    /// of them. What is not stored replaces `memory`.
-    fn from_region<'a>(
-        &'a self,
-        region: RegionId,
-        memory: &'a mut Vec<RegionId>,
-    ) -> &'a [RegionId] {
-        self.graph().component(region, memory);
-        memory
+    /// What is stored of the regions that are seen from a region, ascending; nothing of a
+    /// row that searches.
+    fn stored(&self, _: RegionId) -> &[RegionId] {
+        &[]
     }
 }
 

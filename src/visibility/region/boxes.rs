@@ -4,13 +4,11 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::check_boxes::check_boxes;
 use super::graph::{Ground, RegionGraph};
 use super::locate::{BoxGrid, covers};
 use super::number::{Marks, RegionId};
 use super::opening::{Opening, OpeningPlane, rectangle};
 use super::walk::follow_boxes;
-use super::witness::{Rejected, Witness};
 use crate::geometry::Aabb;
 use crate::scene::{Regions, Scene, Tiling, WorldBox};
 use crate::visibility::Ray;
@@ -22,22 +20,18 @@ pub struct NoRegions(pub &'static str);
 
 /// A ground of boxes, one a region.
 #[derive(Debug)]
-pub(super) struct Boxes {
-    pub regions: BoxGrid,
+struct Boxes {
+    regions: BoxGrid,
     /// Solids that close their borders. A ray that begins in such a solid is not hidden
     /// by it, and may go on in every region that the solid meets.
-    pub borders: BoxGrid,
-    /// Solids in which an eye is nowhere: what it is in does not hide.
-    pub solids: BoxGrid,
+    borders: BoxGrid,
 }
 
 impl Boxes {
     fn alone(regions: Vec<WorldBox>) -> Boxes {
-        let [borders, solids] = [(); 2].map(|()| BoxGrid::new(Vec::new()));
         Boxes {
             regions: BoxGrid::new(regions),
-            borders,
-            solids,
+            borders: BoxGrid::new(Vec::new()),
         }
     }
 }
@@ -48,12 +42,11 @@ impl Ground for Boxes {
         self.regions.meeting(b, |id| out.push(id));
         let boxes = self.regions.boxes();
         let met: Vec<WorldBox> = out[first..].iter().map(|&id| boxes[id as usize]).collect();
-        let mut inside = covers(&met, b);
+        let inside = covers(&met, b);
         self.borders.meeting(b, |solid| {
             let solid = &self.borders.boxes()[solid as usize];
             self.regions.meeting(solid, |id| out.push(id));
         });
-        self.solids.meeting(b, |_| inside = false);
         inside
     }
 
@@ -65,10 +58,6 @@ impl Ground for Boxes {
         for home in homes {
             follow_boxes(graph, home, ray, seen);
         }
-    }
-
-    fn check(&self, graph: &RegionGraph, witness: &Witness) -> Result<(), Rejected> {
-        check_boxes(graph, witness)
     }
 }
 
@@ -85,13 +74,8 @@ fn is_within_one(boxes: &BoxGrid, item: &WorldBox) -> bool {
 impl RegionGraph {
     /// Regions that are boxes themselves.
     pub fn of_boxes(boxes: Vec<WorldBox>, openings: Vec<Opening>) -> RegionGraph {
-        RegionGraph::over(Boxes::alone(boxes), openings)
-    }
-
-    pub(super) fn over(ground: Boxes, openings: Vec<Opening>) -> RegionGraph {
-        let boxes = ground.regions.boxes().iter();
-        let regions: Vec<Vec<WorldBox>> = boxes.map(|b| vec![*b]).collect();
-        RegionGraph::new(&regions, openings, Arc::new(ground))
+        let regions: Vec<Vec<WorldBox>> = boxes.iter().map(|b| vec![*b]).collect();
+        RegionGraph::new(&regions, openings, Arc::new(Boxes::alone(boxes)))
     }
 
     /// The regions of a scene that is a tiling of boxes whose borders, but for the
@@ -110,7 +94,7 @@ impl RegionGraph {
                 let borders = world.filter(|item| !is_within_one(&regions, item));
                 graph.ground = Arc::new(Boxes {
                     borders: BoxGrid::new(borders.collect()),
-                    ..Boxes::alone(graph.parts.all.clone())
+                    regions,
                 });
                 Ok(graph)
             }

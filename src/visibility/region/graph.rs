@@ -5,7 +5,6 @@ use std::sync::Arc;
 use super::answer::{Marks, RegionId};
 use super::lists::Lists;
 use super::opening::Opening;
-use super::witness::{Rejected, Witness};
 use crate::camera::Lens;
 use crate::scene::WorldBox;
 use crate::visibility::{Ray, Rays};
@@ -23,13 +22,6 @@ pub trait Ground: Send + Sync + std::fmt::Debug {
     /// Adds the regions that a ray passes before it meets what is opaque, by a
     /// search that shares nothing with the back ends.
     fn follow(&self, graph: &RegionGraph, ray: &Ray, seen: &mut Marks);
-
-    /// Checks a line of sight exactly, by a walk that shares nothing with what finds
-    /// such lines.
-    ///
-    /// # Errors
-    /// What is wrong with it.
-    fn check(&self, graph: &RegionGraph, witness: &Witness) -> Result<(), Rejected>;
 }
 
 /// Regions joined by openings: what one can see from one into another is seen
@@ -89,14 +81,6 @@ impl RegionGraph {
         self.exits.list(region)
     }
 
-    /// Checks a line of sight between two regions, exactly.
-    ///
-    /// # Errors
-    /// What is wrong with it.
-    pub fn check_witness(&self, witness: &Witness) -> Result<(), Rejected> {
-        self.ground.check(self, witness)
-    }
-
     /// What finds the regions of a place.
     pub fn ground(&self) -> &dyn Ground {
         &*self.ground
@@ -126,24 +110,5 @@ impl RegionGraph {
         homes.sort_unstable();
         homes.dedup();
         inside
-    }
-
-    /// Replaces `out` by the regions that can be reached from one, ascending.
-    pub fn component(&self, region: RegionId, out: &mut Vec<RegionId>) {
-        let mut seen = vec![false; self.len()];
-        seen[region as usize] = true;
-        out.clear();
-        out.push(region);
-        let mut next = 0;
-        while let Some(&at) = out.get(next) {
-            next += 1;
-            for &exit in self.exits(at) {
-                let other = self.openings[exit as usize].other(at);
-                if !std::mem::replace(&mut seen[other as usize], true) {
-                    out.push(other);
-                }
-            }
-        }
-        out.sort_unstable();
     }
 }

@@ -2,9 +2,7 @@
 //! and so which items.
 //!
 //! A [`RegionGraph`] is what is searched: regions and the openings between them, made
-//! from a tiling of rooms, a Doom map, or a grid over the free space of any box scene.
-//! The back ends are one file each; all answer "from this camera", some also "from
-//! anywhere in this region".
+//! from a tiling of rooms or a Doom map. The back ends are one file each.
 //!
 //! What is seen is defined by regions and openings alone: a line of sight leaves a
 //! region through an opening, and everything else on a region's border is opaque.
@@ -12,20 +10,14 @@
 //! ends but the exact ones list what they touch too.
 
 mod answer;
-mod audit;
 mod boxes;
-mod check_boxes;
 mod clip_windows;
 pub mod doom;
 mod flood;
-mod free_space;
-mod from_region;
 mod graph;
-mod grid_flood;
 mod items;
 mod lists;
 mod locate;
-mod none;
 mod number;
 mod opening;
 mod portal_clip;
@@ -38,35 +30,26 @@ mod stored;
 mod view;
 mod walk;
 mod windows;
-mod witness;
 
 pub use answer::{About, EyePlace, RegionRow, Scratch};
-pub use audit::{Audit, OtherRegions, audit};
 pub use boxes::NoRegions;
-pub use check_boxes::check_boxes;
-pub use from_region::{FromRegion, pairs_of};
 pub use graph::{Ground, RegionGraph};
-pub use grid_flood::ABOUT as GRID_FLOOD;
 pub use items::RegionItems;
-pub use locate::{BoxGrid, covers};
-pub use none::EveryRegion;
 pub use number::{Marks, RegionId, decode};
 pub use opening::{Opening, OpeningPlane, rectangle};
 pub use pvs::{Pvs, PvsError};
-pub use rooms::{NotFlat, RoomsPvs};
+pub use rooms::NotFlat;
 pub use searched::Searched;
-pub use stab::{Stabbing, turn};
 pub use stored::{ABOUT as STORED, EXACT, REJECT, StoredPvs};
-pub use walk::{follow_boxes, seen_by_samples};
-pub use witness::{ProvenPvs, Rejected, Witness};
+#[cfg(test)]
+pub use tests::leads_through;
+pub use walk::seen_by_samples;
 
 /// The back ends of the region stage.
-pub const ROWS: [About; 8] = [
-    none::ABOUT,
+pub const ROWS: [About; 6] = [
     flood::ABOUT,
     portal_rect::ABOUT,
     portal_clip::ABOUT,
-    grid_flood::ABOUT,
     stored::ABOUT,
     stored::REJECT,
     stored::EXACT,

@@ -1,5 +1,5 @@
 //! Which region may be seen from which: one row of bits for each region. Made by an
-//! exact search, or read from a file: then it is a claim, to be audited.
+//! exact search, or read from a file: then it is a claim.
 
 use serde::Deserialize;
 
@@ -158,15 +158,6 @@ impl Pvs {
     /// Adds a pair, in this direction only.
     pub fn insert(&mut self, from: RegionId, to: RegionId) {
         self.bits[from as usize * self.words + to as usize / 64] |= 1 << (to % 64);
-    }
-
-    /// Adds a whole set of regions to a row.
-    pub fn insert_all(&mut self, from: RegionId, set: &[u64]) {
-        let first = from as usize * self.words;
-        let row = &mut self.bits[first..first + self.words];
-        row.iter_mut()
-            .zip(set)
-            .for_each(|(word, more)| *word |= more);
     }
 }
 

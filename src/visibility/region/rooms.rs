@@ -9,10 +9,7 @@
 //! common, the line from above is enough, as a level line does: the answer is exact.
 //! Otherwise (through stairwells, or where heights differ) the three together are
 //! necessary, not sufficient (Teller 1992, "Visibility computations in densely occluded
-//! polyhedral environments", chapter 5); a line of sight that is found and checked
-//! settles the pair, else it stays undecided and is listed as visible.
-
-use std::sync::Arc;
+//! polyhedral environments", chapter 5), and the pair is listed as visible.
 
 use glam::{DVec2, DVec3};
 
@@ -21,17 +18,6 @@ use super::graph::RegionGraph;
 use super::opening::{Opening, OpeningPlane};
 use super::pvs::Pvs;
 use super::stab::Stabbing;
-use super::witness::{ProvenPvs, Witness};
-use crate::scene::SeededRng;
-
-/// The exact set of a tiling.
-#[derive(Clone, Debug)]
-pub struct RoomsPvs {
-    graph: Arc<RegionGraph>,
-    pvs: Pvs,
-    rising: Vec<Vec<bool>>,
-    layered: bool,
-}
 
 /// Openings for which there is no exact search.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
@@ -40,9 +26,6 @@ pub struct NotFlat(pub usize);
 
 /// The three looks at a line: the axes that remain when it is seen along the third.
 const VIEWS: [[usize; 2]; 3] = [[0, 1], [0, 2], [1, 2]];
-
-/// How many lines are tried for a pair that passes a stairwell.
-const TRIES: usize = 64;
 
 /// One kind of lines: the signs of their direction. Lines of sign 0 along z pass no
 /// opening across z, and may be level.
@@ -79,92 +62,50 @@ struct Search<'a> {
     risen: usize,
 }
 
-impl RoomsPvs {
-    /// Searches all pairs. Time is proportional to the number of sequences of
-    /// openings that a line passes.
+impl Pvs {
+    /// Which rooms of a tiling see each other. Time is proportional to the number of
+    /// sequences of openings that a line passes.
     ///
     /// # Errors
     /// An opening with a thickness.
-    pub fn of(graph: Arc<RegionGraph>) -> Result<RoomsPvs, NotFlat> {
+    pub fn of_rooms(graph: &RegionGraph) -> Result<Pvs, NotFlat> {
         let flat = |o: &Opening| matches!(o.plane, OpeningPlane::Axis { .. });
         if let Some(thick) = graph.openings().iter().position(|o| !flat(o)) {
             return Err(NotFlat(thick));
         }
         let mut pvs = Pvs::alone(graph.len());
-        let layered = is_layered(&graph);
-        let rising = |heading: &Heading| match layered {
-            true => rising(&graph, *heading),
-            false => vec![true; graph.len()],
-        };
-        let rising: Vec<Vec<bool>> = HEADINGS.iter().map(rising).collect();
-        for from in 0..graph.len() as u32 {
-            for (heading, rising) in HEADINGS.into_iter().zip(&rising) {
-                let mut search = Search::new(&graph, heading, rising, layered);
-                search.visit(from, &mut |to, _| {
-                    pvs.insert(from, to);
-                    false
-                });
+        let layered = is_layered(graph);
+        for heading in HEADINGS {
+            let rising = match layered {
+                true => rising(graph, heading),
+                false => vec![true; graph.len()],
+            };
+            let mut search = Search {
+                graph,
+                heading,
+                rising: &rising,
+                layered,
+                stabbing: Default::default(),
+                path: Vec::new(),
+                risen: 0,
+            };
+            for from in 0..graph.len() as u32 {
+                search.visit(from, &mut |to| pvs.insert(from, to));
             }
         }
-        Ok(RoomsPvs {
-            graph,
-            pvs,
-            rising,
-            layered,
-        })
+        Ok(pvs)
     }
 }
 
-impl ProvenPvs for RoomsPvs {
-    fn pvs(&self) -> &Pvs {
-        &self.pvs
-    }
-
-    fn witness(&self, from: RegionId, to: RegionId) -> Option<Witness> {
-        let mut found = None;
-        for (heading, rising) in HEADINGS.into_iter().zip(&self.rising) {
-            let mut search = Search::new(&self.graph, heading, rising, self.layered);
-            search.visit(from, &mut |region, search| {
-                if region == to && found.is_none() {
-                    found = search.line_of_sight(from, to);
-                }
-                found.is_some()
-            });
-            if found.is_some() {
-                break;
-            }
-        }
-        found
-    }
-}
-
-impl<'a> Search<'a> {
-    fn new(
-        graph: &'a RegionGraph,
-        heading: Heading,
-        rising: &'a [bool],
-        layered: bool,
-    ) -> Search<'a> {
-        Search {
-            graph,
-            heading,
-            rising,
-            layered,
-            risen: 0,
-            stabbing: Default::default(),
-            path: Vec::new(),
-        }
-    }
-
-    /// Calls `reached` with each region that a line of the heading reaches, until it
-    /// says that it is enough.
-    fn visit(&mut self, at: RegionId, reached: &mut dyn FnMut(RegionId, &Search) -> bool) -> bool {
+impl Search<'_> {
+    /// Calls `reached` with each region that a line of the heading reaches.
+    fn visit(&mut self, at: RegionId, reached: &mut dyn FnMut(RegionId)) {
         let is_level = self.heading.0[2] == 0;
         if !is_level && self.risen == 0 && !self.rising[at as usize] {
-            return false;
+            return;
         }
-        if (is_level || self.risen > 0 || !self.layered) && reached(at, self) {
-            return true;
+        if is_level || self.risen > 0 || !self.layered {
+            reached(at);
         }
         let graph = self.graph;
         for &exit in graph.exits(at) {
@@ -174,20 +115,13 @@ impl<'a> Search<'a> {
             };
             // Towards larger coordinates from the region behind.
             let sign = if opening.sides[1] == at { 1 } else { -1 };
-            if sign != self.heading.0[axis] {
-                continue;
-            }
-            if self.push(exit) {
+            if sign == self.heading.0[axis] && self.push(exit) {
                 self.risen += usize::from(axis == 2);
-                let enough = self.visit(opening.other(at), reached);
+                self.visit(opening.other(at), reached);
                 self.risen -= usize::from(axis == 2);
                 self.pop();
-                if enough {
-                    return true;
-                }
             }
         }
-        false
     }
 
     fn push(&mut self, exit: u32) -> bool {
@@ -221,117 +155,14 @@ impl<'a> Search<'a> {
 
     /// Whether one height passes all openings.
     fn heights_overlap(&self) -> bool {
-        let (low, high) = self.heights();
-        low < high
-    }
-
-    fn heights(&self) -> (f64, f64) {
         let bounds = self.path.iter().map(|&exit| {
             let (min, max) = bounds(&self.graph.openings()[exit as usize]);
             (min.z, max.z)
         });
-        bounds.fold((f64::NEG_INFINITY, f64::INFINITY), |all, one| {
+        let (low, high) = bounds.fold((f64::NEG_INFINITY, f64::INFINITY), |all, one| {
             (all.0.max(one.0), all.1.min(one.1))
-        })
-    }
-
-    /// A line through all openings of the path, as a segment between the regions.
-    fn line_of_sight(&self, from: RegionId, to: RegionId) -> Option<Witness> {
-        if self.path.is_empty() {
-            return None;
-        }
-        let lines = self.stabbing[0].passing_lines();
-        let mut rng = SeededRng::new(1);
-        (0..TRIES).find_map(|round| {
-            let mut sum = [0.0; 3];
-            for line in &lines {
-                let weight = if round == 0 {
-                    1.0
-                } else {
-                    libm::exp2(-16.0 * rng.unit())
-                };
-                (0..3).for_each(|k| sum[k] += weight * line[k]);
-            }
-            let witness = self.segment(sum, from, to)?;
-            self.graph.check_witness(&witness).ok().map(|()| witness)
-        })
-    }
-
-    /// The segment over a line of the plan, as near to level as the heights allow.
-    fn segment(&self, [a, b, c]: [f64; 3], from: RegionId, to: RegionId) -> Option<Witness> {
-        let length = libm::hypot(a, b);
-        let direction = DVec2::new(b, -a) / length;
-        let foot = -DVec2::new(a, b) * (c / (length * length));
-        // Along the line, where it passes each opening, and how high.
-        let mut heights = Stabbing::default();
-        let along = |axis: usize, at: f64| (at - foot[axis]) / direction[axis];
-        for &exit in &self.path {
-            let opening = &self.graph.openings()[exit as usize];
-            let (min, max) = bounds(opening);
-            let OpeningPlane::Axis { axis, at } = opening.plane else {
-                return None;
-            };
-            let (left, right) = if axis < 2 {
-                let t = along(axis, at);
-                (DVec2::new(t, max.z), DVec2::new(t, min.z))
-            } else {
-                let (x, y) = (
-                    [along(0, min.x), along(0, max.x)],
-                    [along(1, min.y), along(1, max.y)],
-                );
-                let enter = x[0].min(x[1]).max(y[0].min(y[1]));
-                let leave = x[0].max(x[1]).min(y[0].max(y[1]));
-                if enter >= leave {
-                    return None;
-                }
-                let (enter, leave) = (DVec2::new(enter, at), DVec2::new(leave, at));
-                if self.heading.0[2] > 0 {
-                    (enter, leave)
-                } else {
-                    (leave, enter)
-                }
-            };
-            if !heights.push(left, right) {
-                return None;
-            }
-        }
-        let mut sum = [0.0; 3];
-        for line in heights.passing_lines() {
-            (0..3).for_each(|k| sum[k] += line[k]);
-        }
-        // The line over that of the plan: how far along it, and how high.
-        let [a, b, c] = sum.map(|v| v / libm::hypot(sum[0], sum[1]));
-        let (start, onward) = (DVec2::new(-a * c, -b * c), DVec2::new(b, -a));
-        let line = (
-            (foot + direction * start.x).extend(start.y),
-            (direction * onward.x).extend(onward.y),
-        );
-        // Half way between where the line enters or leaves the region and the opening.
-        let passing = |exit: u32| {
-            let OpeningPlane::Axis { axis, at } = self.graph.openings()[exit as usize].plane else {
-                return f64::NAN;
-            };
-            (at - line.0[axis]) / line.1[axis]
-        };
-        let end = |region: RegionId, exit: u32, onward: bool| {
-            let room = self.graph.parts(region)[0];
-            let (p, d) = line;
-            let border = (0..3).filter(|&k| d[k] != 0.0).map(|k| {
-                let high = (d[k] > 0.0) == onward;
-                (if high { room.max[k] } else { room.min[k] } - p[k]) / d[k]
-            });
-            let border = match onward {
-                true => border.fold(f64::INFINITY, f64::min),
-                false => border.fold(f64::NEG_INFINITY, f64::max),
-            };
-            let t = 0.5 * (border + passing(exit));
-            p + d * t
-        };
-        let (first, last) = (self.path[0], self.path[self.path.len() - 1]);
-        Some(Witness {
-            regions: [from, to],
-            ends: [end(from, first, false), end(to, last, true)],
-        })
+        });
+        low < high
     }
 }
 

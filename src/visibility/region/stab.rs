@@ -99,35 +99,6 @@ impl Stabbing {
                 _ => false,
             })
     }
-
-    /// Coefficients (a, b, c) of lines a x + b y + c that the openings let pass, at
-    /// least weakly, above zero on the left: a positive combination of them is
-    /// strictly inside, but for rounding. There is at least one opening.
-    pub fn passing_lines(&self) -> Vec<[f64; 3]> {
-        let (left, right) = (self.lefts[0], self.rights[0]);
-        let same = |all: &[DVec2], one: DVec2| all.iter().all(|p| *p == one);
-        if same(&self.lefts, left) && same(&self.rights, right) {
-            // Across a single opening, towards larger x rather than straight up.
-            let v = left - right;
-            let d = DVec2::new(v.y + v.x.abs(), -v.x).normalize();
-            let middle = (left + right) * 0.5;
-            return vec![[-d.y, d.x, d.y * middle.x - d.x * middle.y]];
-        }
-        let points: Vec<DVec2> = self.lefts.iter().chain(&self.rights).copied().collect();
-        let mut lines = Vec::new();
-        for (i, &from) in points.iter().enumerate() {
-            for &to in points[..i].iter().chain(&points[i + 1..]) {
-                let fits = from != to
-                    && self.lefts.iter().all(|&p| turn(from, to, p) >= 0)
-                    && self.rights.iter().all(|&p| turn(from, to, p) <= 0);
-                if fits {
-                    let d = (to - from).normalize();
-                    lines.push([-d.y, d.x, d.y * from.x - d.x * from.y]);
-                }
-            }
-        }
-        lines
-    }
 }
 
 #[cfg(test)]

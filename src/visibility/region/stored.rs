@@ -91,7 +91,7 @@ impl RegionRow for StoredPvs {
         EyePlace::Inside
     }
 
-    fn from_region<'a>(&'a self, region: RegionId, _: &'a mut Vec<RegionId>) -> &'a [RegionId] {
+    fn stored(&self, region: RegionId) -> &[RegionId] {
         &self.lists[region as usize]
     }
 }

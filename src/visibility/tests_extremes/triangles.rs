@@ -1,5 +1,5 @@
 //! The triangle stage: a triangle that a ray meets first must be left, wherever in the
-//! image the ray is, or at a sample if no more than the samples is promised.
+//! image the ray is.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -11,10 +11,10 @@ use crate::camera::{Camera, Lens};
 use crate::kernel::Kernel;
 use crate::scene::{MESHES, Scene, SeededRng, Surfaces};
 use crate::visibility::triangle::{
-    Clusters, MOST_TRIANGLES, Selection, TRIANGLE_ROWS, TriangleRow, View,
+    Clusters, Eye, MOST_TRIANGLES, Selection, TRIANGLE_ROWS, TriangleRow,
 };
 use crate::visibility::truth::SurfaceIndex;
-use crate::visibility::{Guarantee, Ray, Rays, SampleGrid};
+use crate::visibility::{Ray, Rays};
 
 /// Triangles of a mesh.
 const OF_MESH: usize = 1_500;
@@ -23,30 +23,16 @@ const OF_MESH: usize = 1_500;
 pub struct TriangleCase {
     surfaces: Surfaces,
     camera: Camera,
-    grid: SampleGrid,
     /// Points that rays are sent through beside random ones.
     aims: Vec<DVec3>,
 }
 
-/// Triangles that a back end removed though a ray meets them first, by their numbers.
+/// Triangles that a back end removed though a ray meets them first.
 pub struct Lost {
     /// The back end.
     pub row: &'static TriangleRow,
-    /// Met anywhere in the image.
-    pub anywhere: Vec<u32>,
-    /// Met at a sample.
-    pub at_samples: Vec<u32>,
-}
-
-impl Lost {
-    /// Those that the back end promises to leave; `None` if it promises nothing.
-    pub fn against_promise(&self) -> Option<&[u32]> {
-        match self.row.guarantee {
-            Guarantee::Exact | Guarantee::Conservative => Some(&self.anywhere),
-            Guarantee::SampleExact => Some(&self.at_samples),
-            _ => None,
-        }
-    }
+    /// Their numbers.
+    pub triangles: Vec<u32>,
 }
 
 /// The twelve triangles of each box.
@@ -56,7 +42,6 @@ impl From<StageCase> for TriangleCase {
         TriangleCase {
             surfaces: Surfaces::from_boxes(&scene),
             camera: case.camera,
-            grid: case.grid,
             aims: case.aims,
         }
     }
@@ -77,7 +62,6 @@ pub fn mesh(rng: &mut SeededRng) -> TriangleCase {
     TriangleCase {
         surfaces,
         camera: looking(eye, look - eye, lens),
-        grid: SampleGrid::new(40, 25),
         aims: Vec::new(),
     }
 }
@@ -88,8 +72,8 @@ impl TriangleCase {
         self.surfaces.triangles.len()
     }
 
-    /// What every back end loses, by rays anywhere, most of them at triangles, and by rays of
-    /// samples.
+    /// Triangles that each back end with a promise loses, by rays anywhere in the image, most
+    /// of them at triangles.
     pub fn lost(self, rng: &mut SeededRng, kernel: Kernel) -> Vec<Lost> {
         let rays = Rays::of(&self.camera).expect("a camera with a lens");
         let aimed: Vec<DVec3> = (0..RAYS).map(|_| self.point(rng)).collect();
@@ -98,36 +82,25 @@ impl TriangleCase {
         let random = (0..RAYS).map(|_| [rng.unit(), rng.unit()]);
         let anywhere: Vec<[f64; 2]> = aims.chain(random).collect();
         let anywhere = anywhere.iter().map(|&[x, y]| rays.through(x, y));
-        let SampleGrid { width, height } = self.grid;
-        let samples = (0..RAYS).map(|_| [width, height].map(|n| rng.below(n as usize) as u32));
-        let samples: Vec<[u32; 2]> = samples.collect();
-        let samples = samples.iter().map(|&[x, y]| rays.sample(self.grid, x, y));
 
         let clusters = Arc::new(Clusters::of(Arc::new(self.surfaces), MOST_TRIANGLES));
         let origin = clusters.surfaces.origin;
-        let view = View::of(&self.camera, origin, self.grid).expect("a camera with a lens");
-        let met = Met::new(&clusters);
-        let (anywhere, at_samples) = (met.first(anywhere), met.first(samples));
+        let eye = Eye::of(&self.camera, origin);
+        let met = Met::new(&clusters).first(anywhere);
         let all = Selection::all(&clusters);
-        let lost = TRIANGLE_ROWS.iter().map(|row| {
+        let promising = TRIANGLE_ROWS.iter().filter(|row| row.guarantee.is_safe());
+        let lost = promising.map(|row| {
             let mut kept = all.clone();
-            (row.build)(&clusters).cull(&view, kernel, &mut kept);
-            let missing = |met: &[(usize, u64)]| {
-                let lost = met.iter().map(|&(c, bits)| (c, bits & !kept.words()[c]));
-                let lost = lost.flat_map(|(c, bits)| {
-                    let own = clusters.triangles_of(c).iter().enumerate();
-                    own.filter_map(move |(i, &t)| (bits >> i & 1 == 1).then_some(t))
-                });
-                let mut lost: Vec<u32> = lost.collect();
-                lost.sort_unstable();
-                lost.dedup();
-                lost
-            };
-            Lost {
-                row,
-                anywhere: missing(&anywhere),
-                at_samples: missing(&at_samples),
-            }
+            (row.build)(&clusters).cull(&eye, kernel, &mut kept);
+            let lost = met.iter().map(|&(c, bits)| (c, bits & !kept.words()[c]));
+            let lost = lost.flat_map(|(c, bits)| {
+                let own = clusters.triangles_of(c).iter().enumerate();
+                own.filter_map(move |(i, &t)| (bits >> i & 1 == 1).then_some(t))
+            });
+            let mut triangles: Vec<u32> = lost.collect();
+            triangles.sort_unstable();
+            triangles.dedup();
+            Lost { row, triangles }
         });
         lost.collect()
     }

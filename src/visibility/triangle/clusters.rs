@@ -113,14 +113,6 @@ impl Clusters {
         self.surfaces.two_sided[self.surfaces.item_of(triangle)]
     }
 
-    /// The box of a cluster, scene-local.
-    pub fn bounds(&self, cluster: usize) -> Aabb {
-        let corners = self.corners_of(cluster).flatten();
-        corners.fold(Aabb::EMPTY, |all, p| {
-            Aabb::new(all.min.min(p), all.max.max(p))
-        })
-    }
-
     fn close(&mut self) {
         self.starts.push(self.triangles.len() as u32);
     }
@@ -249,6 +241,13 @@ mod tests {
     use super::*;
     use crate::scene::{MESHES, Mesh, SurfaceKind};
 
+    fn bounds(clusters: &Clusters, cluster: usize) -> Aabb {
+        let corners = clusters.corners_of(cluster).flatten();
+        corners.fold(Aabb::EMPTY, |all, p| {
+            Aabb::new(all.min.min(p), all.max.max(p))
+        })
+    }
+
     #[test]
     fn every_triangle_is_in_one_cluster_of_its_item() {
         for mesh in MESHES {
@@ -281,7 +280,7 @@ mod tests {
         let faces = Clusters::as_listed(surfaces.clone(), 2);
         assert_eq!((faces.len(), faces.of_item[7].clone()), (120, 42..48));
         for cluster in 0..faces.len() {
-            let extent = faces.bounds(cluster).extent();
+            let extent = bounds(&faces, cluster).extent();
             assert_eq!(faces.triangles_of(cluster).len(), 2);
             assert_eq!(extent.to_array().iter().filter(|e| **e == 0.0).count(), 1);
             assert_eq!(
@@ -325,7 +324,7 @@ mod tests {
         let size = |b: Aabb| b.extent().max_element();
         let whole = size(surfaces.bounds(0));
         let mean = (0..clusters.len())
-            .map(|c| size(clusters.bounds(c)))
+            .map(|c| size(bounds(&clusters, c)))
             .sum::<f32>()
             / clusters.len() as f32;
         assert!(mean < whole * 0.1, "{mean} of {whole}");

@@ -1,15 +1,9 @@
 //! Sixteen cones at a time: the test of `normal_cone` in lanes.
 
+use super::eye::Eye;
 use super::normal_cone::{Cone, Prepared};
 use super::selection::Selection;
-use super::view::View;
 use crate::kernel::{Isa, Kernel, LANES, LaneMask, Work};
-
-/// Sixteen cones in some encoding.
-pub trait ConeRows: Sync {
-    /// Apex and axis, three rows each, and the square of the sine.
-    fn rows<I: Isa>(&self, isa: I) -> [I::Floats; 7];
-}
 
 /// Sixteen cones in f32: 28 bytes a cone.
 #[derive(Clone, Copy, Debug, bytemuck::Zeroable, bytemuck::Pod)]
@@ -37,9 +31,8 @@ impl ConeBlock {
         }
         self.square[lane] = cone.square();
     }
-}
 
-impl ConeRows for ConeBlock {
+    /// Apex and axis, three rows each, and the square of the sine.
     #[inline(always)]
     fn rows<I: Isa>(&self, isa: I) -> [I::Floats; 7] {
         // One by one: a closure would be compiled for the portable set.
@@ -57,7 +50,7 @@ impl ConeRows for ConeBlock {
 
 /// The lanes that see none of their triangles. At the lowest: 21 operations.
 #[inline(always)]
-pub fn rejected<I: Isa, B: ConeRows>(isa: I, block: &B, view: &Broadcast<I>) -> LaneMask {
+pub fn rejected<I: Isa>(isa: I, block: &ConeBlock, view: &Broadcast<I>) -> LaneMask {
     let [x, y, z, a, b, c, square] = block.rows(isa);
     let [ex, ey, ez] = view.minus_eye;
     let [x, y, z] = match view.is_parallel {
@@ -103,8 +96,8 @@ impl<I: Isa> Broadcast<I> {
 }
 
 /// Takes the clusters away whose cones see nothing: one cone a cluster.
-pub fn cull_clusters<B: ConeRows>(blocks: &[B], view: &View, kernel: Kernel, kept: &mut Selection) {
-    if let Some(prepared) = Prepared::of(&view.eye) {
+pub fn cull_clusters(blocks: &[ConeBlock], eye: &Eye, kernel: Kernel, kept: &mut Selection) {
+    if let Some(prepared) = Prepared::of(eye) {
         let (view, words) = (&prepared, kept.blocks_mut());
         kernel.run(Clear {
             blocks,
@@ -114,13 +107,13 @@ pub fn cull_clusters<B: ConeRows>(blocks: &[B], view: &View, kernel: Kernel, kep
     }
 }
 
-struct Clear<'a, B> {
-    blocks: &'a [B],
+struct Clear<'a> {
+    blocks: &'a [ConeBlock],
     view: &'a Prepared,
     words: &'a mut [[u64; LANES]],
 }
 
-impl<B: ConeRows> Work for Clear<'_, B> {
+impl Work for Clear<'_> {
     type Output = ();
 
     #[inline(always)]

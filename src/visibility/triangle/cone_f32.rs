@@ -8,9 +8,9 @@ use glam::Vec3;
 
 use super::super::guarantee::Guarantee;
 use super::clusters::Clusters;
-use super::contract::{Criterion, TriangleCull, TriangleRow};
+use super::contract::{TriangleCull, TriangleRow};
+use super::eye::Eye;
 use super::selection::Selection;
-use super::view::View;
 use crate::kernel::Kernel;
 
 /// The row of this file.
@@ -18,7 +18,6 @@ pub const ROW: TriangleRow = TriangleRow {
     name: "cone-f32",
     summary: "One normal cone per cluster as meshoptimizer tests it (stand-in, scalar)",
     guarantee: Guarantee::Unproven,
-    criterion: Criterion::Facing,
     build: |clusters| Box::new(PlainCones::of(clusters)),
 };
 
@@ -125,23 +124,22 @@ fn ball(points: impl Iterator<Item = Vec3> + Clone) -> Option<(Vec3, f32)> {
 pub fn cull_one_by_one<C>(
     cones: &[C],
     plain: impl Fn(&C) -> PlainCone,
-    view: &View,
+    eye: &Eye,
     kept: &mut Selection,
 ) {
-    let eye = view.eye.nearest;
     let each = cones.iter().map(plain).zip(kept.words_mut());
-    if view.eye.weight == 0.0 {
+    if eye.weight == 0.0 {
         // `dot(view, cone_axis) >= cone_cutoff` for a parallel lens.
-        let gone = each.filter(|(cone, _)| (-eye).dot(cone.axis) >= cone.cutoff);
+        let gone = each.filter(|(cone, _)| (-eye.nearest).dot(cone.axis) >= cone.cutoff);
         gone.for_each(|(_, word)| *word = 0);
     } else {
-        let gone = each.filter(|(cone, _)| cone.rejects(eye));
+        let gone = each.filter(|(cone, _)| cone.rejects(eye.nearest));
         gone.for_each(|(_, word)| *word = 0);
     }
 }
 
 impl TriangleCull for PlainCones {
-    fn cull(&self, view: &View, _: Kernel, kept: &mut Selection) {
-        cull_one_by_one(&self.cones, |cone| *cone, view, kept);
+    fn cull(&self, eye: &Eye, _: Kernel, kept: &mut Selection) {
+        cull_one_by_one(&self.cones, |cone| *cone, eye, kept);
     }
 }

@@ -2,15 +2,13 @@
 
 use std::sync::Arc;
 
-use glam::DVec3;
-
 use super::super::guarantee::Guarantee;
 use super::clusters::Clusters;
 use super::cone_block::{ConeBlock, cull_clusters};
-use super::contract::{Criterion, TriangleCull, TriangleRow};
+use super::contract::{TriangleCull, TriangleRow};
+use super::eye::Eye;
 use super::normal_cone::Cone;
 use super::selection::Selection;
-use super::view::View;
 use crate::kernel::{Isa, Kernel, LANES, Work};
 
 /// The row of this file.
@@ -18,7 +16,6 @@ pub const ROW: TriangleRow = TriangleRow {
     name: "cone-f32-safe",
     summary: "One normal cone per cluster, sixteen at a time, rounding proven; 28 B",
     guarantee: Guarantee::Conservative,
-    criterion: Criterion::Facing,
     build: |clusters| Box::new(SafeCones::of(clusters)),
 };
 
@@ -33,7 +30,7 @@ impl SafeCones {
     pub fn of(clusters: &Arc<Clusters>) -> SafeCones {
         let mut blocks = vec![ConeBlock::EMPTY; clusters.len().div_ceil(LANES)];
         for (cluster, triangles) in clusters.one_sided() {
-            if let Some(cone) = Cone::fit(&triangles, |axis: DVec3| axis.as_vec3()) {
+            if let Some(cone) = Cone::fit(&triangles) {
                 blocks[cluster / LANES].set(cluster % LANES, &cone);
             }
         }
@@ -65,7 +62,7 @@ impl Work for Read<'_> {
 }
 
 impl TriangleCull for SafeCones {
-    fn cull(&self, view: &View, kernel: Kernel, kept: &mut Selection) {
-        cull_clusters(&self.blocks, view, kernel, kept);
+    fn cull(&self, eye: &Eye, kernel: Kernel, kept: &mut Selection) {
+        cull_clusters(&self.blocks, eye, kernel, kept);
     }
 }

@@ -3,6 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use crate::arithmetic::two_sum;
+use crate::camera::{Camera, Lens};
 
 /// An eye in scene-local coordinates, as an exact sum of two f64 per axis, beside
 /// the nearest f32 point.
@@ -26,6 +27,14 @@ pub struct Eye {
 }
 
 impl Eye {
+    /// The eye of a camera on surfaces about an origin.
+    pub fn of(camera: &Camera, origin: DVec3) -> Eye {
+        match camera.lens {
+            Lens::Orthographic { .. } => Eye::along(camera.frame.forward()),
+            _ => Eye::at(camera.frame.eye, origin),
+        }
+    }
+
     /// A point of the world as seen from a scene's origin. Exact.
     pub fn at(world: DVec3, origin: DVec3) -> Eye {
         let [x, y, z] = [0, 1, 2].map(|k| two_sum(world[k], -origin[k]));

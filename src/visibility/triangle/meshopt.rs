@@ -6,9 +6,9 @@ use std::sync::Arc;
 use super::super::guarantee::Guarantee;
 use super::clusters::Clusters;
 use super::cone_f32::{PlainCone, cull_one_by_one};
-use super::contract::{Criterion, TriangleCull, TriangleRow};
+use super::contract::{TriangleCull, TriangleRow};
+use super::eye::Eye;
 use super::selection::Selection;
-use super::view::View;
 use crate::kernel::Kernel;
 
 /// The row of this file.
@@ -16,7 +16,6 @@ pub const ROW: TriangleRow = TriangleRow {
     name: "meshopt",
     summary: "One cone per cluster: crate meshopt's bounds and documented test, scalar",
     guarantee: Guarantee::Unproven,
-    criterion: Criterion::Facing,
     build: |clusters| Box::new(MeshoptCones::of(clusters)),
 };
 
@@ -53,12 +52,12 @@ impl MeshoptCones {
 }
 
 impl TriangleCull for MeshoptCones {
-    fn cull(&self, view: &View, _: Kernel, kept: &mut Selection) {
+    fn cull(&self, eye: &Eye, _: Kernel, kept: &mut Selection) {
         let plain = |bounds: &meshopt::Bounds| PlainCone {
             apex: bounds.cone_apex.into(),
             axis: bounds.cone_axis.into(),
             cutoff: bounds.cone_cutoff,
         };
-        cull_one_by_one(&self.bounds, plain, view, kept);
+        cull_one_by_one(&self.bounds, plain, eye, kept);
     }
 }

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use super::super::guarantee::Guarantee;
 use super::clusters::Clusters;
-use super::contract::{Criterion, TriangleCull, TriangleRow};
+use super::contract::{TriangleCull, TriangleRow};
+use super::eye::Eye;
 use super::selection::Selection;
-use super::view::View;
 use crate::kernel::Kernel;
 
 /// The row of this file.
@@ -14,7 +14,6 @@ pub const ROW: TriangleRow = TriangleRow {
     name: "none",
     summary: "Keeps every triangle",
     guarantee: Guarantee::Conservative,
-    criterion: Criterion::Facing,
     build,
 };
 
@@ -25,5 +24,5 @@ fn build(_: &Arc<Clusters>) -> Box<dyn TriangleCull> {
 }
 
 impl TriangleCull for Nothing {
-    fn cull(&self, _: &View, _: Kernel, _: &mut Selection) {}
+    fn cull(&self, _: &Eye, _: Kernel, _: &mut Selection) {}
 }

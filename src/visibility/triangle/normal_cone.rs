@@ -46,23 +46,23 @@ const STEPS: u32 = 48;
 pub struct Cone {
     /// Not in front of any triangle.
     pub apex: Vec3,
-    /// As rounded by the caller; not longer than 1 + 2^-20.
+    /// Not longer than 1 + 2^-20.
     pub axis: Vec3,
     /// k: at least sin(alpha) |axis| and the slack.
     pub sine: f64,
 }
 
 impl Cone {
-    /// The cone of some triangles, the axis rounded by `rounded`; `None` where the
-    /// normals leave no eye that sees none of them.
-    pub fn fit(triangles: &[[Vec3; 3]], rounded: impl Fn(DVec3) -> Vec3) -> Option<Cone> {
+    /// The cone of some triangles; `None` where the normals leave no eye that sees none of
+    /// them.
+    pub fn fit(triangles: &[[Vec3; 3]]) -> Option<Cone> {
         // A triangle without area is never seen.
         let with_area = triangles.iter().map(|corners| (*corners, normal(*corners)));
         let planes: Vec<([Vec3; 3], DVec3)> = with_area
             .filter(|(_, n)| *n != DVec3::ZERO)
             .map(|(corners, n)| (corners, n.normalize()))
             .collect();
-        let axis = rounded(axis_of(planes.iter().map(|(_, n)| *n))?);
+        let axis = axis_of(planes.iter().map(|(_, n)| *n))?.as_vec3();
         let exact = axis.as_dvec3();
         let length = exact.length();
         if !(length > 0.5 && length <= 1.0 + 1.0 / (1 << 21) as f64) {

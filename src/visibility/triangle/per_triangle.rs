@@ -13,12 +13,11 @@ use glam::DVec3;
 
 use super::super::guarantee::Guarantee;
 use super::clusters::Clusters;
-use super::contract::{Criterion, TriangleCull, TriangleRow};
+use super::contract::{TriangleCull, TriangleRow};
 use super::exact::{faces, normal};
 use super::eye::Eye;
 use super::plane_blocks::{PlaneBlocks, Planes};
 use super::selection::Selection;
-use super::view::View;
 use crate::arithmetic::rounding::round_up;
 use crate::kernel::{Isa, Kernel, LANES, Work};
 
@@ -27,7 +26,6 @@ pub const ROW: TriangleRow = TriangleRow {
     name: "per-triangle",
     summary: "The side of each triangle's plane, exactly (f32, f64, then expansions)",
     guarantee: Guarantee::Exact,
-    criterion: Criterion::Facing,
     build,
 };
 
@@ -60,8 +58,8 @@ fn build(clusters: &Arc<Clusters>) -> Box<dyn TriangleCull> {
 }
 
 impl TriangleCull for PerTriangle {
-    fn cull(&self, view: &View, kernel: Kernel, kept: &mut Selection) {
-        let (all, eye) = (self, &view.eye);
+    fn cull(&self, eye: &Eye, kernel: Kernel, kept: &mut Selection) {
+        let all = self;
         if !(self.is_near && eye.nearest.abs().max_element() < FAR) {
             let clusters = &self.clusters;
             kept.retain(|cluster, bit| {

@@ -7,11 +7,11 @@ use glam::{DVec3, Vec3};
 use super::super::guarantee::Guarantee;
 use super::clusters::Clusters;
 use super::cone_block::{Broadcast, ConeBlock, clear, rejected};
-use super::contract::{Criterion, TriangleCull, TriangleRow};
+use super::contract::{TriangleCull, TriangleRow};
 use super::exact::normal;
+use super::eye::Eye;
 use super::normal_cone::{Cone, Prepared};
 use super::selection::Selection;
-use super::view::View;
 use crate::kernel::{Isa, Kernel, LANES, Work};
 
 /// The row of this file.
@@ -19,7 +19,6 @@ pub const ROW: TriangleRow = TriangleRow {
     name: "several-cones",
     summary: "Four cones per cluster, each of triangles turned alike, rounding proven",
     guarantee: Guarantee::Conservative,
-    criterion: Criterion::Facing,
     build: |clusters| Box::new(SeveralCones::of(clusters)),
 };
 
@@ -51,7 +50,7 @@ impl SeveralCones {
             for (group, word) in blocks[cluster / LANES].iter_mut().zip(groups(&triangles)) {
                 let bits = (0..triangles.len()).filter(|bit| word >> bit & 1 == 1);
                 let own: Vec<[Vec3; 3]> = bits.map(|bit| triangles[bit]).collect();
-                if let Some(cone) = Cone::fit(&own, |axis: DVec3| axis.as_vec3()) {
+                if let Some(cone) = Cone::fit(&own) {
                     group.cones.set(lane, &cone);
                     group.triangles[lane] = word;
                 }
@@ -100,8 +99,8 @@ fn groups(triangles: &[[Vec3; 3]]) -> [u64; CONES] {
 }
 
 impl TriangleCull for SeveralCones {
-    fn cull(&self, view: &View, kernel: Kernel, kept: &mut Selection) {
-        if let Some(prepared) = Prepared::of(&view.eye) {
+    fn cull(&self, eye: &Eye, kernel: Kernel, kept: &mut Selection) {
+        if let Some(prepared) = Prepared::of(eye) {
             kernel.run(Query {
                 blocks: &self.blocks,
                 view: &prepared,

@@ -32,12 +32,6 @@ pub struct Crossing {
 }
 
 impl Crossing {
-    /// No depth at which the ray crosses there is below this.
-    #[inline]
-    pub fn at_least(&self) -> f64 {
-        self.depth - GUARD * self.depth.abs()
-    }
-
     /// No depth at which the ray crosses there is above this.
     #[inline]
     pub fn at_most(&self) -> f64 {

@@ -34,34 +34,12 @@ impl Front {
     pub fn item(&self) -> ItemId {
         self.items[0]
     }
-
-    /// The depth in f64, true to 2^-50 of itself.
-    pub fn depth(&self) -> f64 {
-        self.entry.depth
-    }
 }
 
 impl RayIndex {
     /// Builds the tree. O(n log n).
     pub fn build(solids: &Solids) -> RayIndex {
         let tree = RayTree::build(&solids.outer, solids.origin);
-        RayIndex::of(solids, tree)
-    }
-
-    /// The same over some of the items, which keep their numbers.
-    ///
-    /// # Panics
-    /// If there is no such item.
-    pub fn build_of(solids: &Solids, items: &[ItemId]) -> RayIndex {
-        let outer: Vec<_> = items.iter().map(|&id| solids.outer[id as usize]).collect();
-        let mut tree = RayTree::build(&outer, solids.origin);
-        tree.ids
-            .iter_mut()
-            .for_each(|place| *place = items[*place as usize]);
-        RayIndex::of(solids, tree)
-    }
-
-    fn of(solids: &Solids, tree: RayTree) -> RayIndex {
         let boxes = tree.ids.iter().map(|&item| solids.boxes[item as usize]);
         RayIndex {
             boxes: boxes.collect(),

@@ -4,7 +4,7 @@
 use glam::DVec3;
 
 use super::super::rect::Rects;
-use super::super::{MaskedInner, OccluderChoice, OcclusionBuffer, TwoPass, View};
+use super::super::{Interleaved, MaskedInner, OcclusionBuffer, View};
 use super::by_rays::{Ready, point_between, with_view};
 use crate::camera::{Camera, Frame, Lens};
 use crate::kernel::{Isa, Kernel, LaneMask, Work};
@@ -154,14 +154,8 @@ fn sixteen_at_once_are_each_one_by_itself() {
     let (ready, frame) = before_eye(0.0, 4);
     for lens in lenses() {
         with_view(&ready, &Camera { frame, lens }, GRID, |view, _| {
-            let choice = OccluderChoice::Largest(40);
-            let mut culler = TwoPass::new(MaskedInner::new(GRID), choice, Kernel::best());
-            culler.cull(
-                &ready.occluders,
-                view,
-                &ready.in_view(view.volume),
-                &mut Vec::new(),
-            );
+            let mut culler = Interleaved::new(MaskedInner::new(GRID), Kernel::best());
+            culler.cull(&ready.occluders, view, &mut Vec::new());
             let rects = Kernel::best().run(Projected(&ready, view));
             for kernel in Kernel::available() {
                 let answers = kernel.run(Hidden(culler.buffer(), &rects));

@@ -4,6 +4,7 @@ mod by_rays;
 mod lanes;
 mod maps;
 mod meshes;
+mod none;
 mod pairs;
 mod rules;
 mod slits;
@@ -16,6 +17,7 @@ use super::{Interleaved, OccluderChoice, OcclusionBuffer, TwoPass, View};
 use crate::kernel::Kernel;
 use crate::query::ItemId;
 use by_rays::Ready;
+pub use none::NoOcclusion;
 
 /// How many cases a test that takes minutes goes through: `cargo test --release --lib --
 /// --ignored`, and this variable for more or fewer.

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::super::{
-    DepthRays, HierarchicalZ, MaskedCentre, MaskedInner, NoOcclusion, OcclusionBuffer, ZBuffer,
+    HierarchicalZ, MaskedCentre, MaskedInner, NoOcclusion, OcclusionBuffer, ZBuffer,
 };
 use super::by_rays::{Ready, with_view};
 use super::kept;
@@ -58,7 +58,6 @@ fn a_wall_hides_what_is_behind_it_and_nothing_beside_it() {
         // Coarser ones need a larger wall.
         let large = within_bounds(&[solid([10.0, -7.0, -9.0], [11.0, 7.0, 9.0]), behind]);
         assert_eq!(kept_of::<HierarchicalZ>(&large, DVec3::ZERO, lens), [0]);
-        assert_eq!(kept_of::<DepthRays<4>>(&large, DVec3::ZERO, lens), [0]);
         assert_eq!(kept_of::<NoOcclusion>(&boxes, DVec3::ZERO, lens), [0, 1, 2]);
     }
 }

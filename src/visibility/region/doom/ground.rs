@@ -1,20 +1,16 @@
-//! Places and rays in a map: the sector of a point, rays followed from linedef to
-//! linedef, and the check of a line of sight in whole numbers.
+//! Places and rays in a map: the sector of a point, and rays followed from linedef to
+//! linedef.
 
 use std::sync::Arc;
 
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 
 use super::super::answer::{Marks, RegionId};
 use super::super::graph::{Ground, RegionGraph};
 use super::super::opening::{Opening, OpeningPlane};
-use super::super::witness::{Rejected, Witness};
 use super::map::{DoomMap, MapLine};
 use crate::scene::{Dispute, WorldBox};
 use crate::visibility::Ray;
-
-/// Coordinates of witnesses are whole multiples of 2^-20 map units.
-pub(super) const UNITS: f64 = (1 << 20) as f64;
 
 /// The height, seen from above, of a strip of the map that lists its linedefs.
 const STRIP: f64 = 64.0;
@@ -196,84 +192,4 @@ impl Ground for SectorGround {
             }
         }
     }
-
-    /// Seen from above; heights of the ends say nothing. All products are of whole
-    /// numbers below 2^38, so i128 holds them.
-    fn check(&self, graph: &RegionGraph, witness: &Witness) -> Result<(), Rejected> {
-        if witness.regions.iter().any(|r| *r as usize >= graph.len()) {
-            return Err(Rejected::Region);
-        }
-        let mut ends = [[0i128; 2]; 2];
-        for (i, end) in witness.ends.iter().enumerate() {
-            for axis in 0..2 {
-                let units = end[axis] * UNITS;
-                if units.fract() != 0.0 || units.is_nan() || units.abs() > 65536.0 * UNITS {
-                    return Err(Rejected::End(i));
-                }
-                ends[i][axis] = units as i128;
-            }
-            if whole_sector_at(&self.map.lines, ends[i]) != Some(witness.regions[i]) {
-                return Err(Rejected::End(i));
-            }
-        }
-        let [a, b] = ends;
-        let blocks = |line: &&MapLine| {
-            let [c, d] = whole_ends(line);
-            let apart = side(a, b, c) * side(a, b, d) > 0 || side(c, d, a) * side(c, d, b) > 0;
-            line.open.is_none() && !apart
-        };
-        match self.map.lines.iter().find(blocks) {
-            Some(line) => {
-                let region = line.sectors[0].or(line.sectors[1]);
-                Err(Rejected::Blocked(region.unwrap_or_default()))
-            }
-            None => Ok(()),
-        }
-    }
-}
-
-fn whole_ends(line: &MapLine) -> [[i128; 2]; 2] {
-    line.ends.map(|end| end.map(|v| i128::from(v) << 20))
-}
-
-/// 1 where c is left of the line from a to b.
-fn side(a: [i128; 2], b: [i128; 2], c: [i128; 2]) -> i128 {
-    ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).signum()
-}
-
-/// The sector strictly within which a point lies: two first linedefs at the same
-/// distance, or one through the point, leave it without.
-fn whole_sector_at(lines: &[MapLine], p: [i128; 2]) -> Option<RegionId> {
-    // Distance towards larger x as a fraction of positive denominator.
-    let mut nearest: Option<(i128, i128)> = None;
-    let mut found = None;
-    for line in lines {
-        let [a, b] = whole_ends(line);
-        if (a[1] <= p[1]) == (b[1] <= p[1]) {
-            continue;
-        }
-        let rise = b[1] - a[1];
-        let run = (a[0] - p[0]) * rise + (b[0] - a[0]) * (p[1] - a[1]);
-        let (run, rise) = (run * rise.signum(), rise.abs());
-        if run == 0 {
-            return None;
-        }
-        // Both are whole multiples of 2^20, as linedefs are.
-        let here = (run >> 20, rise >> 20);
-        let sector = line.sectors[usize::from(b[1] > a[1])];
-        match nearest {
-            _ if run < 0 => {}
-            Some((far, over)) if here.0 * over > far * here.1 => {}
-            Some((far, over)) if here.0 * over == far * here.1 && found != Some(sector) => {
-                found = Some(None);
-            }
-            _ => (nearest, found) = (Some(here), Some(sector)),
-        }
-    }
-    found.flatten()
-}
-
-/// The nearest coordinates that a witness may have.
-pub(super) fn on_grid(p: DVec2, z: f64) -> DVec3 {
-    ((p * UNITS).round() / UNITS).extend(z)
 }

@@ -2,9 +2,7 @@
 //!
 //! Solid are one-sided linedefs and those between sectors whose heights leave no
 //! opening. What the game can move (a sector that a linedef's action moves) is taken
-//! to be open, whatever its heights. Floors and ceilings hide for the eye; the set of
-//! pairs and its witnesses are seen from above, where heights matter only in so far
-//! as a linedef is open at all.
+//! to be open, whatever its heights. Floors and ceilings hide for the eye.
 //!
 //! This is the world of the game. Where items are taken as solid boxes, rays over and
 //! under them pass, as floors and ceilings are no items: what such a ray meets beyond a
@@ -17,10 +15,7 @@
 mod ground;
 mod map;
 mod plan;
-mod sight;
 mod solid;
 mod surfaces;
-mod sweep;
 
 pub use map::{DoomMap, MapLine, Sector};
-pub use sight::SectorPvs;

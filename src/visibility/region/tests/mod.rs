@@ -1,10 +1,12 @@
 //! Every row against rays that are followed through the regions one by one.
 
+mod doom;
 mod doom_surfaces;
-mod exact_doom;
-mod exact_rooms;
-mod free_space;
 mod from_eye;
 mod items;
+mod rooms;
+mod sight;
 mod stress;
 pub(super) mod worlds;
+
+pub use sight::leads_through;

@@ -76,11 +76,7 @@ fn lost(row: usize, shrink: f64) -> (usize, usize) {
         let truth = chain(&mut SeededRng::new(round), base, length, 0.0, &margins);
         let told = chain(&mut SeededRng::new(round), base, length, shrink, &margins);
         let graph = RegionGraph::of_boxes(truth.rooms, truth.openings);
-        let witness = Witness {
-            regions: [0, length as u32 - 1],
-            ends: truth.ends,
-        };
-        if graph.check_witness(&witness).is_err() {
+        if !leads_through(&graph, [0, length as u32 - 1], truth.ends) {
             continue;
         }
         accepted += 1;
@@ -102,7 +98,7 @@ fn lost(row: usize, shrink: f64) -> (usize, usize) {
 
 #[test]
 fn lines_through_chains_of_slits_are_not_lost() {
-    for row in 0..4 {
+    for row in 0..3 {
         let (lost, accepted) = lost(row, 0.0);
         assert_eq!(lost, 0, "row {row}");
         assert!(accepted > 100, "{accepted}");
@@ -111,7 +107,7 @@ fn lines_through_chains_of_slits_are_not_lost() {
 
 #[test]
 fn openings_that_are_told_too_small_are_noticed() {
-    for row in 2..4 {
+    for row in 1..3 {
         let (lost, accepted) = lost(row, 1e-5);
         assert!(lost * 20 > accepted, "row {row}: {lost} of {accepted}");
     }
@@ -129,7 +125,7 @@ fn an_orthographic_camera_and_one_with_a_far_plane() {
         let place = row.from_eye(&rays, &mut Scratch::default(), &mut out);
         (place, out.len())
     };
-    for row in &rows(&graph)[1..] {
+    for row in &rows(&graph) {
         let level = Lens::orthographic(1.0, 1.0, 0.1, 50.0).unwrap();
         assert_eq!(answer(&**row, level), (EyePlace::Outside, 40));
         // The last opening that is not beyond the far plane leads one room on.

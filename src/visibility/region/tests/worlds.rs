@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::super::{Marks, Opening, OpeningPlane, Pvs, RegionGraph, RegionId, rectangle};
+use super::super::{Marks, Opening, OpeningPlane, Pvs, RegionGraph, rectangle};
 use crate::camera::{Camera, Frame, Lens};
 use crate::scene::{self, Scene, SeededRng, WorldBox};
 use crate::visibility::{Ray, Rays};
@@ -129,13 +129,4 @@ pub fn without_opening(graph: &RegionGraph, index: usize) -> RegionGraph {
 pub fn pairs(pvs: &Pvs) -> u64 {
     let rows = (0..pvs.len() as u32).flat_map(|from| pvs.row(from));
     rows.map(|word| u64::from(word.count_ones())).sum()
-}
-
-/// A set without one of its pairs.
-pub fn remove(pvs: &mut Pvs, [from, to]: [RegionId; 2]) {
-    let all = std::mem::replace(pvs, Pvs::alone(pvs.len()));
-    for a in 0..all.len() as u32 {
-        let seen = (0..all.len() as u32).filter(|&b| all.sees(a, b) && [a, b] != [from, to]);
-        seen.for_each(|b| pvs.insert(a, b));
-    }
 }

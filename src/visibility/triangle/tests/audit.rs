@@ -11,7 +11,6 @@ use super::super::contract::TriangleRow;
 use super::super::exact::{faces, normal};
 use super::super::eye::Eye;
 use super::super::selection::Selection;
-use super::super::view::View;
 use crate::kernel::Kernel;
 use crate::scene::{SeededRng, SurfaceKind, Surfaces};
 
@@ -75,17 +74,16 @@ pub fn audit(row: &TriangleRow, pairs: usize, seed: u64, eyes: EyeKind) -> Audit
                     EyeKind::Double => Eye::local(eye),
                     EyeKind::Direction => Eye::along(-way),
                 };
-                let view = View { eye, window: None };
                 let mut kept = all.clone();
-                back_end.cull(&view, Kernel::best(), &mut kept);
+                back_end.cull(&eye, Kernel::best(), &mut kept);
                 found.pairs += 1;
                 let removed = all.words()[cluster] & !kept.words()[cluster];
                 found.rejected += usize::from(removed != 0);
                 let mut is_lost = false;
                 for (bit, corners) in clusters.corners_of(cluster).enumerate() {
-                    if removed >> bit & 1 == 1 && faces(&view.eye, corners) {
+                    if removed >> bit & 1 == 1 && faces(&eye, corners) {
                         is_lost = true;
-                        found.worst_sine = found.worst_sine.max(sine(&view.eye, corners));
+                        found.worst_sine = found.worst_sine.max(sine(&eye, corners));
                         found.witness.get_or_insert((eye.high, corners));
                     }
                 }

@@ -1,52 +1,41 @@
-//! The check of a line of sight through boxes and openings: by a walk that shares nothing
-//! with the search for such lines.
+//! Lines of sight through boxes and openings, followed from box to box in exact arithmetic.
 
 use glam::DVec3;
 
-use super::graph::RegionGraph;
-use super::opening::OpeningPlane;
-use super::witness::{Rejected, Witness};
+use super::super::{OpeningPlane, RegionGraph, RegionId};
 use crate::arithmetic::Expansion;
 
-/// Checks a witness in a graph of boxes, exactly, by walking from box to box. It
-/// shares nothing with what finds witnesses. O(regions passed * exits).
-///
-/// # Errors
-/// What is wrong with it.
-pub fn check_boxes(graph: &RegionGraph, witness: &Witness) -> Result<(), Rejected> {
-    let [a, b] = witness.ends;
-    if witness.regions.iter().any(|r| *r as usize >= graph.len()) {
-        return Err(Rejected::Region);
-    }
-    for (end, p) in [a, b].into_iter().enumerate() {
-        let room = graph.parts(witness.regions[end])[0];
+/// Whether a segment from strictly within one region to strictly within another leads
+/// through openings only, touching no edge. Of a graph of boxes; O(regions passed * exits).
+pub fn leads_through(graph: &RegionGraph, regions: [RegionId; 2], [a, b]: [DVec3; 2]) -> bool {
+    for (region, p) in regions.into_iter().zip([a, b]) {
+        let room = graph.parts(region)[0];
         if !(p.cmpgt(room.min).all() && p.cmplt(room.max).all()) {
-            return Err(Rejected::End(end));
+            return false;
         }
     }
-    let mut region = witness.regions[0];
+    let [mut region, last] = regions;
     for _ in 0..graph.len() {
-        if region == witness.regions[1] {
-            return Ok(());
+        if region == last {
+            return true;
         }
         let passed = |exit: &&u32| {
             let opening = &graph.openings()[**exit as usize];
             let OpeningPlane::Axis { axis, at } = opening.plane else {
                 return false;
             };
-            let onward = if opening.sides[0] == region {
-                b[axis] < at && at < a[axis]
-            } else {
-                a[axis] < at && at < b[axis]
+            let onward = match opening.sides[0] == region {
+                true => b[axis] < at && at < a[axis],
+                false => a[axis] < at && at < b[axis],
             };
             onward && passes(axis, at, &opening.corners, a, b)
         };
         match graph.exits(region).iter().find(passed) {
             Some(&exit) => region = graph.openings()[exit as usize].other(region),
-            None => break,
+            None => return false,
         }
     }
-    Err(Rejected::Blocked(region))
+    false
 }
 
 /// Whether the line from a to b meets the plane at `at` strictly within the corners.

@@ -1,8 +1,8 @@
 //! No occlusion at all: what leaving the stage out keeps.
 
-use super::buffer::OcclusionBuffer;
-use super::outline::{Coverage, Outline};
-use super::rect::Rect;
+use super::super::buffer::OcclusionBuffer;
+use super::super::outline::{Coverage, Outline};
+use super::super::rect::Rect;
 use crate::kernel::Isa;
 use crate::visibility::{Guarantee, SampleGrid};
 

@@ -1,0 +1,352 @@
+//! Spring arms, and the six methods that step them: a camera on a spring behind a target
+//! that is known where frames end, and moves on a straight line in between.
+
+use super::closed_form::chased;
+
+named! {
+    /// What the camera hangs on.
+    #[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Serialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum ArmKind, ARMS {
+        Linear = "linear", "a spring on a line behind sin t";
+        Collision = "collision", "a spring that stiffens as it is stretched, and a stop at 0.6 that takes all velocity";
+    }
+}
+
+/// Position and velocity.
+pub type State = [f64; 2];
+
+/// `x'' = k d (1 + s d^2) - c x'` with the stretch `d = T - x` and a stop.
+#[derive(Clone, Copy, Debug)]
+pub struct Arm {
+    /// k in 1/s^2.
+    pub stiffness: f64,
+    /// c in 1/s.
+    pub friction: f64,
+    /// s: 0 for a linear spring, 1 for Duffing's.
+    pub stiffening: f64,
+    /// Position that the arm cannot pass; meeting it takes all velocity.
+    pub stop: f64,
+}
+
+/// The target during one frame, in seconds since the frame began.
+#[derive(Clone, Copy, Debug)]
+pub struct Line {
+    /// When the frame begins.
+    pub start: f64,
+    pub base: f64,
+    pub speed: f64,
+}
+
+impl Line {
+    #[inline(always)]
+    pub fn at(&self, t: f64) -> f64 {
+        self.base + t * self.speed
+    }
+}
+
+/// An arm behind a target that is seen in frames of equal length.
+pub struct Chase {
+    pub arm: Arm,
+    pub start: State,
+    pub frames: Vec<Line>,
+    /// Length of a frame.
+    pub frame_s: f64,
+}
+
+impl Chase {
+    /// A critically damped arm behind `sin t`, in frames until `seconds` are over.
+    pub fn new(kind: ArmKind, stiffness: f64, rate_hz: f64, seconds: f64) -> Chase {
+        let (stiffening, stop, from) = match kind {
+            ArmKind::Linear => (0.0, f64::INFINITY, 1.0),
+            ArmKind::Collision => (1.0, 0.6, -1.0),
+        };
+        let (frame_s, mut start, mut frames) = (1.0 / rate_hz, 0.0, Vec::new());
+        while start < seconds * (1.0 - 1e-9) {
+            let (base, end) = (libm::sin(start), start + frame_s);
+            let speed = (libm::sin(end) - base) / frame_s;
+            frames.push(Line { start, base, speed });
+            start = end;
+        }
+        let friction = 2.0 * stiffness.sqrt();
+        Chase {
+            arm: Arm {
+                stiffness,
+                friction,
+                stiffening,
+                stop,
+            },
+            start: [from, 0.0],
+            frames,
+            frame_s,
+        }
+    }
+
+    /// Steps through all frames, `count` equal steps each, and hands out the state at
+    /// the end of each frame.
+    #[inline(always)]
+    pub fn follow(
+        &self,
+        count: u32,
+        keep: &mut dyn FnMut(State),
+        step: impl Fn(&Arm, &Line, f64, State, f64) -> State,
+    ) {
+        let h = self.frame_s / f64::from(count);
+        let mut y = self.start;
+        for line in &self.frames {
+            for i in 0..count {
+                y = step(&self.arm, line, h * f64::from(i), y, h);
+                if y[0] >= self.arm.stop {
+                    y = [self.arm.stop, if 0.0 < y[1] { 0.0 } else { y[1] }];
+                }
+            }
+            keep(y);
+        }
+    }
+
+    /// The states at the ends of all frames.
+    pub fn states(&self, follow: Follow, count: u32) -> Vec<State> {
+        let mut states = Vec::with_capacity(self.frames.len());
+        follow(self, count, &mut |y| states.push(y));
+        states
+    }
+}
+
+/// Steps a chase, so many steps per frame.
+pub type Follow = fn(&Chase, u32, &mut dyn FnMut(State));
+
+/// A method of the study.
+#[derive(Debug, serde::Serialize)]
+pub struct Method {
+    /// As in tables and JSON.
+    pub name: &'static str,
+    /// What it does, in one line.
+    pub summary: &'static str,
+    /// Classical order: of the error for steps far below 1/omega. Of the closed form on
+    /// the collision arm, by the stretch that it freezes.
+    pub order: u32,
+    #[serde(skip)]
+    pub(super) substeps: &'static [u32],
+    #[serde(skip)]
+    pub(super) follow: Follow,
+}
+
+/// The method that is exact on a linear arm: one step is enough there.
+pub const EXACT: &str = "exact-linear";
+
+pub const METHODS: &[Method] = rows! { Method { name, summary, order, substeps, follow }
+    "explicit-euler", "position and velocity by the values before the step", 1, &[1, 4, 16, 64],
+        |chase, count, keep| chase.follow(count, keep, Arm::explicit_euler);
+    "semi-implicit-euler", "velocity first, position by the new velocity", 1, &[1, 4, 16, 64],
+        |chase, count, keep| chase.follow(count, keep, Arm::semi_implicit_euler);
+    "rk4", "the classical Runge-Kutta method of order 4", 4, &[1, 2, 4, 16], rk4;
+    "implicit-euler", "position and velocity by the values after the step; L-stable", 1, &[1, 4, 16, 64],
+        |chase, count, keep| chase.follow(count, keep, Arm::implicit_euler);
+    "tr-bdf2", "trapezoidal rule to 0.59 of a step, then backward differences; L-stable", 2, &[1, 2, 4, 16],
+        |chase, count, keep| chase.follow(count, keep, Arm::tr_bdf2);
+    EXACT, "the closed form for a target on a straight line between frames", 1, &[1, 2, 4, 16],
+        |chase, count, keep| chase.follow(count, keep, chased);
+};
+
+pub fn rk4(chase: &Chase, count: u32, keep: &mut dyn FnMut(State)) {
+    chase.follow(count, keep, |arm, line, t, y, h| {
+        arm.rk4(|t| line.at(t), t, y, h)
+    });
+}
+
+/// `y + h slope`.
+#[inline(always)]
+fn along(y: State, h: f64, slope: State) -> State {
+    [y[0] + h * slope[0], y[1] + h * slope[1]]
+}
+
+/// Most iterations of a stage: one that needs more has no solution nearby.
+const MOST_ITERATIONS: u32 = 20;
+/// A change that is not worth another iteration.
+const NEGLIGIBLE: f64 = 1e-14;
+
+/// Share of a step of TR-BDF2 by the trapezoidal rule: 2 - sqrt(2), for which both
+/// stages have the same matrix.
+const GAMMA: f64 = 2.0 - std::f64::consts::SQRT_2;
+
+impl Arm {
+    /// `y'` for a target there.
+    #[inline(always)]
+    fn slope(&self, target: f64, [x, v]: State) -> State {
+        let stretch = target - x;
+        let pull = self.stiffness * stretch * (1.0 + self.stiffening * stretch * stretch);
+        [v, pull - self.friction * v]
+    }
+
+    fn explicit_euler(&self, line: &Line, t: f64, y: State, h: f64) -> State {
+        along(y, h, self.slope(line.at(t), y))
+    }
+
+    /// Euler-Cromer, also called symplectic Euler.
+    fn semi_implicit_euler(&self, line: &Line, t: f64, [x, v]: State, h: f64) -> State {
+        let v = v + h * self.slope(line.at(t), [x, v])[1];
+        [x + h * v, v]
+    }
+
+    #[inline(always)]
+    pub fn rk4(&self, target: impl Fn(f64) -> f64, t: f64, y: State, h: f64) -> State {
+        let half = h / 2.0;
+        let a = self.slope(target(t), y);
+        let b = self.slope(target(t + half), along(y, half, a));
+        let c = self.slope(target(t + half), along(y, half, b));
+        let d = self.slope(target(t + h), along(y, h, c));
+        along(
+            y,
+            h / 6.0,
+            [0, 1].map(|i| a[i] + 2.0 * (b[i] + c[i]) + d[i]),
+        )
+    }
+
+    /// `Y = base + g F(Y)` by Newton's iteration from `guess`: one step on a linear arm.
+    fn stage(&self, target: f64, base: State, guess: State, g: f64) -> State {
+        let mut y = guess;
+        for _ in 0..MOST_ITERATIONS {
+            let slope = self.slope(target, y);
+            let [dx, dv] = [0, 1].map(|i| base[i] + g * slope[i] - y[i]);
+            let stretch = target - y[0];
+            let tangent = 1.0 + 3.0 * self.stiffening * stretch * stretch;
+            let k = self.stiffness * tangent;
+            let dv = (dv - g * k * dx) / (1.0 + g * (self.friction + g * k));
+            let change = [dx + g * dv, dv];
+            y = along(y, 1.0, change);
+            let size = |y: State| y[0].abs().max(y[1].abs());
+            let goes_on = size(change) > NEGLIGIBLE * (1.0 + size(y));
+            if self.stiffening == 0.0 || !goes_on {
+                break;
+            }
+        }
+        y
+    }
+
+    fn implicit_euler(&self, line: &Line, t: f64, y: State, h: f64) -> State {
+        self.stage(line.at(t + h), y, y, h)
+    }
+
+    /// The trapezoidal rule to `t + GAMMA h`, then the backward differentiation formula
+    /// of order 2 through both ends (Bank, Coughran, Fichtner, Grosse, Rose and Smith
+    /// 1985, "Transient simulation of silicon devices and circuits", IEEE Transactions
+    /// on Computer-Aided Design 4, p. 436; Hosea and Shampine 1996, "Analysis and
+    /// implementation of TR-BDF2", Applied Numerical Mathematics 20, p. 21).
+    fn tr_bdf2(&self, line: &Line, t: f64, y: State, h: f64) -> State {
+        let g = GAMMA / 2.0 * h;
+        let trapezoid = along(y, g, self.slope(line.at(t), y));
+        let middle = self.stage(line.at(t + GAMMA * h), trapezoid, y, g);
+        let newer = 1.0 / (GAMMA * (2.0 - GAMMA));
+        let older = (1.0 - GAMMA) * (1.0 - GAMMA) / (GAMMA * (2.0 - GAMMA));
+        let base = [0, 1].map(|i| newer * middle[i] - older * y[i]);
+        // (1 - gamma)/(2 - gamma) = gamma/2 for this gamma.
+        self.stage(line.at(t + h), base, middle, g)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::arm_study::{ArmOptions, ArmPoint, errors, settings};
+    use super::super::exact::linear_way;
+    use super::*;
+
+    #[test]
+    fn the_reference_is_the_closed_form_where_there_is_one() {
+        for stiffness in [1e2, 1e4, 1e6] {
+            let chase = Chase::new(ArmKind::Linear, stiffness, 30.0, 1.0);
+            let omega = stiffness.sqrt();
+            let count = (omega / 30.0 / 5e-4).ceil() as u32;
+            let truth = |chase: &Chase, count, keep: &mut dyn FnMut(State)| {
+                chase.follow(count, keep, |arm, line, t, y, h| {
+                    arm.rk4(|t| libm::sin(line.start + t), t, y, h)
+                });
+            };
+            let closed = linear_way(omega, chase.frame_s, chase.frames.len());
+            for (a, b) in chase.states(truth, count).iter().zip(&closed) {
+                assert!((a[0] - b[0]).abs() < 1e-12, "{stiffness}: {a:?} {b:?}");
+            }
+            let exact = METHODS.iter().find(|m| m.name == EXACT).expect("a row");
+            let lines = chase.states(exact.follow, 1);
+            for (a, b) in chase.states(rk4, count).iter().zip(&lines) {
+                assert!((a[0] - b[0]).abs() < 1e-12, "{stiffness}: {a:?} {b:?}");
+            }
+        }
+    }
+
+    /// sin t = 0.6 on the way down: until then the arm is pushed into its stop.
+    #[test]
+    fn the_stop_is_met_and_left() {
+        let chase = Chase::new(ArmKind::Collision, 1e2, 60.0, 3.0);
+        let left = std::f64::consts::PI - 0.6f64.asin();
+        let states = chase.states(rk4, 500);
+        let at_stop = |i: &usize| states[*i] == [0.6, 0.0];
+        let first = (0..states.len()).find(at_stop).expect("it is met");
+        let last = (0..states.len()).rfind(at_stop).expect("it is met");
+        assert!((first..=last).all(|i| at_stop(&i)) && first < 60);
+        let end = |i: usize| chase.frames[i].start + chase.frame_s;
+        assert!(end(last) <= left + 1e-9 && end(last + 1) > left - 1e-9);
+    }
+
+    fn points(arm: ArmKind, stiffness: f64, seconds: f64) -> Vec<ArmPoint> {
+        let options = ArmOptions {
+            arms: vec![arm],
+            stiffnesses: vec![stiffness],
+            rates_hz: vec![60.0],
+            seconds,
+            tolerance: 1e-3,
+        };
+        errors(settings(&options)[0], options.seconds)
+    }
+
+    fn find<'p>(points: &'p [ArmPoint], label: &str) -> &'p ArmPoint {
+        points.iter().find(|p| p.label() == label).expect(label)
+    }
+
+    #[test]
+    fn orders_show_and_are_reduced_at_the_stop() {
+        let soft = points(ArmKind::Linear, 1e2, 2.0);
+        for method in METHODS.iter().filter(|method| method.name != EXACT) {
+            let point = find(&soft, &format!("{} x4", method.name));
+            let order = point.observed_order.expect("an order");
+            assert!((order - f64::from(method.order)).abs() < 0.3, "{point:?}");
+            assert!(!point.order_reduced, "{point:?}");
+        }
+        assert!(find(&soft, EXACT).own_error < Some(1e-13));
+        let stopped = points(ArmKind::Collision, 1e2, 4.0);
+        let reduced = ["rk4 x2", "rk4 x4", "rk4 x16"];
+        let reduced = reduced.map(|label| find(&stopped, label).order_reduced);
+        assert!(reduced.contains(&true), "{reduced:?}");
+        let order = find(&stopped, "exact-linear x4").observed_order;
+        assert!((order.expect("an order") - 1.0).abs() < 0.1, "{order:?}");
+    }
+
+    /// The figures of the study as it was with every reference of its own.
+    #[test]
+    fn errors_of_the_collision_arm_have_their_known_size() {
+        for (stiffness, label, wanted) in [
+            (1e2, "tr-bdf2", 1.429_168e-3),
+            (1e4, "rk4 x4", 9.433_686e-4),
+            (1e6, "exact-linear", 9.998_789e-4),
+        ] {
+            let points = points(ArmKind::Collision, stiffness, 1.0);
+            let found = find(&points, label).position_error.expect("stable");
+            assert!((found / wanted - 1.0).abs() < 1e-6, "{label}: {found:e}");
+        }
+    }
+
+    #[test]
+    fn explicit_methods_blow_up_exactly_beyond_their_limits() {
+        let explicit = ["explicit-euler", "semi-implicit-euler", "rk4"];
+        for (stiffness, unstable) in [
+            (1e3, &explicit[..0]),
+            (1e4, &explicit[1..2]),
+            (1e5, &explicit[..]),
+        ] {
+            let points = points(ArmKind::Linear, stiffness, 2.0);
+            for method in METHODS {
+                let lost = find(&points, method.name).position_error.is_none();
+                assert_eq!(lost, unstable.contains(&method.name), "{}", method.name);
+            }
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! Rows over the sectors of maps, the REJECT table among them, against rays.
+
+use std::sync::Arc;
+
+use super::super::doom::DoomMap;
+use super::super::*;
+use super::from_eye;
+use super::worlds::*;
+use crate::scene::{Sample, SeededRng};
+
+fn sample(name: &str) -> (Arc<DoomMap>, Arc<RegionGraph>) {
+    let sample = Sample::named(name).unwrap();
+    let map = Arc::new(DoomMap::read(sample.bytes, sample.file, None).unwrap());
+    let graph = Arc::new(map.graph().unwrap());
+    (map, graph)
+}
+
+#[test]
+fn no_row_misses_a_sector_that_a_ray_passes() {
+    for name in ["freedm-map12", "freedm-map20"] {
+        let sample = Sample::named(name).unwrap();
+        let scene = crate::scene::load(name, &Default::default()).unwrap();
+        let map = Arc::new(DoomMap::read(sample.bytes, sample.file, None).unwrap());
+        let graph = Arc::new(map.graph().unwrap());
+        let mut rows = from_eye::rows(&graph);
+        let reject = Arc::new(map.reject().unwrap().clone());
+        rows.push(Box::new(
+            StoredPvs::of(graph.clone(), reject, REJECT).unwrap(),
+        ));
+        let mut rng = SeededRng::new(8);
+        let (mut scratch, mut out) = (Scratch::default(), Vec::new());
+        let mut sums = vec![0; rows.len() + 1];
+        for place in scene.places.iter().take(30) {
+            let rays = looking(place.eye, &mut rng);
+            let mut seen = Marks::default();
+            seen.clear(graph.len());
+            for _ in 0..300 {
+                let ray = rays.through(rng.unit(), rng.unit());
+                graph.ground().follow(&graph, &ray, &mut seen);
+            }
+            let mut truth = Vec::new();
+            seen.list(&mut truth);
+            sums[rows.len()] += truth.len();
+            for (i, row) in rows.iter().enumerate() {
+                row.from_eye(&rays, &mut scratch, &mut out);
+                let lost = truth
+                    .iter()
+                    .filter(|r| out.binary_search(r).is_err())
+                    .count();
+                assert_eq!(lost, 0, "{name} {}", row.about().name);
+                sums[i] += out.len();
+            }
+        }
+        println!("{name} {sums:?}");
+        // Every row narrows the answer down, and rays see something.
+        assert!(sums[..3].is_sorted_by(|a, b| a > b), "{sums:?}");
+        assert!(sums[2] >= sums[rows.len()] && sums[rows.len()] > 60);
+    }
+}
+
+#[test]
+fn an_eye_at_a_wall_or_below_the_floor_is_nowhere() {
+    let (map, graph) = sample("freedm-map12");
+    let wall = map.lines.iter().find(|l| l.sectors[1].is_none()).unwrap();
+    let [from, to] = wall.ends.map(|[x, y]| glam::DVec2::new(x.into(), y.into()));
+    let sector = map.sectors[wall.sectors[0].unwrap() as usize];
+    let (middle, right) = ((from + to) * 0.5, -(to - from).perp().normalize());
+    let mut rng = SeededRng::new(1);
+    // The near window is some 0.1 wide; right of a linedef is its front.
+    for (away, height, place) in [
+        (4.0, 41.0, EyePlace::Inside),
+        (0.01, 41.0, EyePlace::Outside),
+        (-4.0, 41.0, EyePlace::Outside),
+        (4.0, -1.0, EyePlace::Outside),
+    ] {
+        let eye = (middle + right * away).extend(sector.floor + height);
+        let rays = looking(eye, &mut rng);
+        for row in from_eye::rows(&graph) {
+            let mut out = Vec::new();
+            let answer = row.from_eye(&rays, &mut Scratch::default(), &mut out);
+            assert_eq!(answer, place, "{away} {height} {}", row.about().name);
+        }
+    }
+}
