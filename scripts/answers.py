@@ -51,8 +51,9 @@ def output(*arguments, codes=(0,)):
 
 def untimed(value):
     if isinstance(value, dict):
+        # A field without a value is no answer.
         return {name: untimed(inner) for name, inner in value.items()
-                if name not in TIMED and not name.endswith(TIMED_ENDS)}
+                if inner is not None and name not in TIMED and not name.endswith(TIMED_ENDS)}
     return [untimed(inner) for inner in value] if isinstance(value, list) else value
 
 
