@@ -2,6 +2,7 @@
 //! that is known where frames end, and moves on a straight line in between.
 
 use super::closed_form::chased;
+pub use super::closed_form::{Arm, Line, State};
 
 named! {
     /// Kind of spring arm.
@@ -10,38 +11,6 @@ named! {
     pub enum ArmKind, ARMS {
         Linear = "linear", "a spring on a line behind sin t";
         Collision = "collision", "a spring that stiffens as it is stretched, and a stop at 0.6 that takes all velocity";
-    }
-}
-
-/// Position and velocity.
-pub type State = [f64; 2];
-
-/// `x'' = k d (1 + s d^2) - c x'` with the stretch `d = T - x` and a stop.
-#[derive(Clone, Copy, Debug)]
-pub struct Arm {
-    /// k in 1/s^2.
-    pub stiffness: f64,
-    /// c in 1/s.
-    pub friction: f64,
-    /// s: 0 for a linear spring, 1 for Duffing's.
-    pub stiffening: f64,
-    /// Position that the arm cannot pass; meeting it takes all velocity.
-    pub stop: f64,
-}
-
-/// The target during one frame, in seconds since the frame began.
-#[derive(Clone, Copy, Debug)]
-pub struct Line {
-    /// When the frame begins.
-    pub start: f64,
-    pub base: f64,
-    pub speed: f64,
-}
-
-impl Line {
-    #[inline(always)]
-    pub fn at(&self, t: f64) -> f64 {
-        self.base + t * self.speed
     }
 }
 

@@ -1,7 +1,37 @@
 //! The spring arm in closed form, for every damping. What is not linear in an arm is
 //! frozen as it is when the step begins.
 
-use super::arm::{Arm, Line, State};
+/// Position and velocity.
+pub type State = [f64; 2];
+
+/// `x'' = k d (1 + s d^2) - c x'` with the stretch `d = T - x` and a stop.
+#[derive(Clone, Copy, Debug)]
+pub struct Arm {
+    /// k in 1/s^2.
+    pub stiffness: f64,
+    /// c in 1/s.
+    pub friction: f64,
+    /// s: 0 for a linear spring, 1 for Duffing's.
+    pub stiffening: f64,
+    /// Position that the arm cannot pass; meeting it takes all velocity.
+    pub stop: f64,
+}
+
+/// The target during one frame, in seconds since the frame began.
+#[derive(Clone, Copy, Debug)]
+pub struct Line {
+    /// When the frame begins.
+    pub start: f64,
+    pub base: f64,
+    pub speed: f64,
+}
+
+impl Line {
+    #[inline(always)]
+    pub fn at(&self, t: f64) -> f64 {
+        self.base + t * self.speed
+    }
+}
 
 /// Below this, the square of the angle (or of its hyperbolic kin) goes into
 /// series instead of being divided by; their first term left out is 3e-17.

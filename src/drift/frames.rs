@@ -4,23 +4,10 @@
 use std::f64::consts::PI;
 
 use glam::{DMat3, DVec3};
-use serde::Serialize;
 
+pub use super::walk::Turn;
 use super::walk::walk;
 use crate::camera::{self, look_at};
-
-/// The turn of every step: yaw, pitch and roll in degrees about the camera's
-/// own axes, in this order, as [`camera::Frame`] turns. The doubles are taken
-/// as exact.
-#[derive(Clone, Copy, Default, Debug, Serialize)]
-pub struct Turn {
-    /// About the camera's v, degrees per step.
-    pub yaw_deg: f64,
-    /// About the camera's u, degrees per step.
-    pub pitch_deg: f64,
-    /// About the camera's n, degrees per step.
-    pub roll_deg: f64,
-}
 
 /// How the axes of a frame are corrected.
 pub const NONE: u8 = 0;

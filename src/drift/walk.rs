@@ -5,8 +5,21 @@ use std::hint::black_box;
 
 use glam::DMat3;
 
-use super::frames::Turn;
 use crate::measure::TimedTask;
+use serde::Serialize;
+
+/// The turn of every step: yaw, pitch and roll in degrees about the camera's
+/// own axes, in this order, as [`crate::camera::Frame`] turns. The doubles are taken
+/// as exact.
+#[derive(Clone, Copy, Default, Debug, Serialize)]
+pub struct Turn {
+    /// About the camera's v, degrees per step.
+    pub yaw_deg: f64,
+    /// About the camera's u, degrees per step.
+    pub pitch_deg: f64,
+    /// About the camera's n, degrees per step.
+    pub roll_deg: f64,
+}
 
 /// Takes equal steps: the axes after each of the ascending numbers of them.
 pub type Walk = fn(&Turn, &[u64]) -> Vec<DMat3>;

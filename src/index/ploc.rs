@@ -253,14 +253,20 @@ mod tests {
     use obvhs::bvh2::builder::build_bvh2;
 
     use super::*;
-    use crate::scene::SeededRng;
 
     /// Boxes in no order, some of which share their centre or their bounds.
     fn scattered(n: usize) -> Vec<Aabb> {
-        let mut rng = SeededRng::new(5);
+        let mut state = 5_u64;
+        let mut unit = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 40) as f32 / (1 << 24) as f32
+        };
+        let mut point = || Vec3::new(unit(), unit(), unit());
         let mut some = || {
-            let at = (rng.point() * 20.0).as_vec3().floor();
-            Aabb::around(at, (rng.point() * 3.0).as_vec3())
+            let at = (point() * 20.0).floor();
+            Aabb::around(at, point() * 3.0)
         };
         (0..n).map(|_| some()).collect()
     }

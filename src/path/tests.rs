@@ -1,3 +1,5 @@
+//! Paths against scenes: specs, files, what cannot be a path.
+
 use super::*;
 use crate::camera::PlaneOptions;
 use crate::spec::tests::{keys, known, listed};

@@ -5,6 +5,19 @@
 
 use std::cmp::Ordering;
 
+/// A linedef as the file has it.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Linedef {
+    /// Where it begins and ends, map units.
+    pub ends: [[i32; 2]; 2],
+    /// What crossing or using it does; 0 for nothing.
+    pub action: u16,
+    /// Of the sectors that it acts on.
+    pub tag: u16,
+    /// The sectors on its right (its front) and on its left.
+    pub sectors: [Option<u32>; 2],
+}
+
 /// A place between two linedefs that disagree about it.
 #[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
 #[error(

@@ -41,7 +41,7 @@ use crate::input::InputError;
 
 pub(crate) use crate::shown::hex;
 pub use boxes_csv::{read_boxes_csv, read_sought_boxes_csv, write_boxes_csv};
-pub use disputes::{Dispute, disputes};
+pub use disputes::{Dispute, Linedef, disputes};
 pub use generate::{FAMILIES, Family, GENERATOR_NAME, SCENE_PARAMS};
 pub use labels::Labels;
 pub(crate) use memory::available_bytes;
@@ -57,7 +57,7 @@ pub use sought::Sought;
 pub use source::{LoadOptions, check_fits, load};
 pub(crate) use surface::volume_within;
 pub use surface::{SurfaceKind, Surfaces};
-pub use wad::{Linedef, WadMap, map_names};
+pub use wad::{WadMap, map_names};
 
 /// A box in world coordinates, as a file or a generator states it.
 #[derive(Clone, Copy, PartialEq, Debug)]

@@ -3,6 +3,7 @@
 
 use glam::{DVec2, DVec3};
 
+use super::disputes::Linedef;
 use super::lumps::{MapTables, Table, Wad};
 use super::{BspNode, BspRegions, CameraPlace, Labels, Regions, Scene, WorldBox};
 use crate::geometry::Aabb;
@@ -29,19 +30,6 @@ pub struct WadMap {
     /// The lump REJECT, empty if there is none.
     pub reject: Vec<u8>,
     bsp: BspRegions,
-}
-
-/// A linedef as the file has it.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Linedef {
-    /// Where it begins and ends, map units.
-    pub ends: [[i32; 2]; 2],
-    /// What crossing or using it does; 0 for nothing.
-    pub action: u16,
-    /// Of the sectors that it acts on.
-    pub tag: u16,
-    /// The sectors on its right (its front) and on its left.
-    pub sectors: [Option<u32>; 2],
 }
 
 /// A sector as the file has it.

@@ -15,8 +15,6 @@ mod rays;
 pub mod region;
 mod sah;
 mod solids;
-#[cfg(test)]
-mod tests_extremes;
 pub mod triangle;
 pub mod truth;
 
@@ -25,3 +23,6 @@ pub use items::{holes_of, surfaces_of};
 pub use level::{Level, LevelMap, MapFile};
 pub use rays::{NoRays, Ray, Rays, SampleGrid};
 pub use solids::Solids;
+
+#[cfg(test)]
+mod tests_extremes;
