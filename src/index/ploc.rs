@@ -123,7 +123,8 @@ fn clustered(boxes: &[Aabb], params: &BvhBuildParams) -> Bvh2 {
             _ => find_nearest(&clusters, reach, &mut found),
         }
         for (i, &(_, other)) in found.iter().enumerate() {
-            if other == i || found[other].1 != i {
+            let other = other as usize;
+            if other == i || found[other].1 as usize != i {
                 next.push(clusters[i]);
             } else if other < i {
                 free -= 2;
@@ -156,21 +157,21 @@ fn reach(distance: PlocSearchDistance) -> usize {
 }
 
 /// The least area of bounds with a neighbour so far, and that neighbour.
-type Nearest = (f32, usize);
+type Nearest = (f32, u32);
 
 /// For each cluster the last of the nearest ones that are at most so many places away.
 fn find_nearest(clusters: &[Bvh2Node], reach: usize, found: &mut Vec<Nearest>) {
     found.clear();
-    found.extend((0..clusters.len()).map(|i| (f32::INFINITY, i)));
+    found.extend((0..clusters.len() as u32).map(|i| (f32::INFINITY, i)));
     for (i, cluster) in clusters.iter().enumerate() {
         let mut own = found[i];
         for other in i + 1..clusters.len().min(i + reach + 1) {
             let cost = cluster.aabb().union(clusters[other].aabb()).half_area();
             if cost <= own.0 {
-                own = (cost, other);
+                own = (cost, other as u32);
             }
             if cost <= found[other].0 {
-                found[other] = (cost, i);
+                found[other] = (cost, i as u32);
             }
         }
         found[i] = own;
@@ -180,7 +181,8 @@ fn find_nearest(clusters: &[Bvh2Node], reach: usize, found: &mut Vec<Nearest>) {
 /// Has clusters find each other two by two.
 fn pair(clusters: usize, found: &mut Vec<Nearest>) {
     found.clear();
-    found.extend((0..clusters).map(|i| (0.0, (i ^ 1).min(clusters - 1))));
+    let last = clusters as u32 - 1;
+    found.extend((0..=last).map(|i| (0.0, (i ^ 1).min(last))));
 }
 
 /// A box's place, by the code of its centre.
