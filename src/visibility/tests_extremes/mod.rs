@@ -28,32 +28,14 @@ use portals::Chain;
 use triangles::TriangleCase;
 use worlds::Kind;
 
-/// Outcome of a check.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Status {
-    Pass,
-    Fail,
-}
-
-/// One case under one back end.
-#[derive(Debug)]
-#[expect(dead_code, reason = "shown where a test fails")]
-struct Row {
-    id: String,
-    structure: String,
-    test: String,
-    status: Status,
-    got: String,
-}
-
 /// Rays of a case at points of its boxes, most of them next to an edge.
 const RAYS_AT_BOXES: usize = 300;
 
 /// Extremes of one kind.
 #[derive(Clone, Copy)]
-pub struct Family {
+struct Family {
     /// As in the table of results.
-    pub name: &'static str,
+    name: &'static str,
     draw: Draw,
 }
 
@@ -81,7 +63,7 @@ const fn triangle(name: &'static str, draw: fn(&mut SeededRng) -> TriangleCase) 
 }
 
 /// All of them.
-pub const VISIBILITY_FAMILIES: [Family; 21] = [
+const VISIBILITY_FAMILIES: [Family; 21] = [
     occlusion("occlusion-contacts", |rng| {
         worlds::contacts(rng, 0.0, Kind::Perspective)
     }),
@@ -129,8 +111,21 @@ pub const VISIBILITY_FAMILIES: [Family; 21] = [
     triangle("triangle-mesh", triangles::mesh),
 ];
 
-/// Rows of a family's cases by an instruction set: one per case and back end.
-pub fn visibility_cases(family: Family, cases: Range<u64>, seed: u64, kernel: Kernel) -> Vec<Row> {
+/// The answer of one back end to one case.
+#[derive(Debug)]
+struct Row {
+    /// The case, read where a row is printed.
+    #[expect(dead_code, reason = "printed")]
+    id: String,
+    /// The back end.
+    #[expect(dead_code, reason = "printed")]
+    back_end: String,
+    /// What is wrong with it.
+    result: Result<(), String>,
+}
+
+/// Cases of a family, each asked by a kernel: a row for each case and back end.
+fn rows_of(family: Family, cases: Range<u64>, seed: u64, kernel: Kernel) -> Vec<Row> {
     let mut rows = Vec::new();
     for case in cases {
         let mut rng = SeededRng::new(seed.wrapping_mul(0x9E37_79B9).wrapping_add(case));
@@ -141,16 +136,12 @@ pub fn visibility_cases(family: Family, cases: Range<u64>, seed: u64, kernel: Ke
                 let back_ends = answers::<MaskedInner>(kernel, "masked-inner");
                 rows.extend(occlusion_rows(&id, &case, &mut rng, &back_ends));
             }
-            Draw::Region(draw) => {
-                let chain = draw(&mut rng);
-                rows.extend(region_rows(&id, &chain, 0.0));
-            }
+            Draw::Region(draw) => rows.extend(region_rows(&id, &draw(&mut rng), 0.0)),
             Draw::Triangle(draw) => {
-                let case = draw(&mut rng);
-                let lost = case.lost(&mut rng, kernel).into_iter();
+                let lost = draw(&mut rng).lost(&mut rng, kernel).into_iter();
                 rows.extend(lost.map(|lost| {
-                    let status = nothing_lost("triangles", &lost.triangles);
-                    row(&id, lost.row.name, "triangle", status)
+                    let result = nothing_lost("triangles", &lost.triangles);
+                    row(&id, lost.row.name, result)
                 }));
             }
         }
@@ -158,13 +149,11 @@ pub fn visibility_cases(family: Family, cases: Range<u64>, seed: u64, kernel: Ke
     rows
 }
 
-fn row(id: &str, structure: &str, test: &str, (status, got): (Status, String)) -> Row {
+fn row(id: &str, back_end: &str, result: Result<(), String>) -> Row {
     Row {
         id: id.to_owned(),
-        structure: structure.to_owned(),
-        test: test.to_owned(),
-        status,
-        got,
+        back_end: back_end.to_owned(),
+        result,
     }
 }
 
@@ -219,7 +208,7 @@ fn occlusion_rows(
     });
     let (volume, rays, scene) = match made {
         Ok(made) => made,
-        Err(reason) => return vec![row(id, "occlusion", "occlusion", (Status::Fail, reason))],
+        Err(reason) => return vec![row(id, "occlusion", Err(reason))],
     };
     let solids = Solids::of(&scene);
     let occluders = OccluderScene::of(&solids);
@@ -232,7 +221,7 @@ fn occlusion_rows(
     let seen = seen(&RayIndex::build(&solids), &rays, case, rng);
     let judged = back_ends.iter().map(|(name, answer)| {
         let kept = answer(&occluders, &view, &in_view);
-        row(id, name, "occlusion", status(&seen, kept, &in_view))
+        row(id, name, judged(&seen, kept, &in_view))
     });
     judged.collect()
 }
@@ -261,40 +250,29 @@ fn point_of(b: &WorldBox, rng: &mut SeededRng) -> DVec3 {
 }
 
 /// Whether all that is seen was handed on, and nothing from outside of the view.
-fn status(seen: &[ItemId], mut kept: Vec<ItemId>, in_view: &[ItemId]) -> (Status, String) {
+fn judged(seen: &[ItemId], mut kept: Vec<ItemId>, in_view: &[ItemId]) -> Result<(), String> {
     kept.sort_unstable();
     let lost = seen.iter().filter(|id| kept.binary_search(id).is_err());
     let lost: Vec<u32> = lost.copied().collect();
     let outside = |id: &&ItemId| in_view.binary_search(id).is_err();
     match kept.iter().filter(outside).count() {
         0 => nothing_lost("items", &lost),
-        more if lost.is_empty() => (Status::Fail, format!("{more} items outside of the frustum")),
+        more if lost.is_empty() => Err(format!("{more} items outside of the frustum")),
         _ => nothing_lost("items", &lost),
     }
 }
 
-fn nothing_lost(what: &str, lost: &[u32]) -> (Status, String) {
-    if lost.is_empty() {
-        return (Status::Pass, "all of it".to_owned());
+fn nothing_lost(what: &str, lost: &[u32]) -> Result<(), String> {
+    match lost {
+        [] => Ok(()),
+        _ => Err(format!("{what} {lost:?} are missing")),
     }
-    let lost: Vec<String> = lost.iter().map(u32::to_string).collect();
-    (
-        Status::Fail,
-        format!("{what} {} are missing", lost.join(", ")),
-    )
 }
 
 /// A row for each back end of the region stage; none where no line of sight is proven.
 fn region_rows(id: &str, chain: &Chain, shrink: f64) -> Vec<Row> {
     let answers = chain.answers(shrink).unwrap_or_default().into_iter();
-    let rows = answers.map(|answer| {
-        row(
-            id,
-            answer.row,
-            "region",
-            nothing_lost("rooms", &answer.lost),
-        )
-    });
+    let rows = answers.map(|answer| row(id, answer.row, nothing_lost("rooms", &answer.lost)));
     rows.collect()
 }
 
@@ -318,18 +296,15 @@ mod tests {
                 }
             })
             .collect();
-        let failed = rows.iter().filter(|row| row.status == Status::Fail);
+        let failed = rows.iter().filter(|row| row.result.is_err());
         [failed.count(), rows.len()]
     }
 
     #[test]
     fn what_promises_everything_passes() {
         for family in VISIBILITY_FAMILIES {
-            let rows = visibility_cases(family, 0..12, 5, Kernel::best());
-            let failed: Vec<&Row> = rows
-                .iter()
-                .filter(|row| row.status != Status::Pass)
-                .collect();
+            let rows = rows_of(family, 0..12, 5, Kernel::best());
+            let failed: Vec<&Row> = rows.iter().filter(|row| row.result.is_err()).collect();
             assert!(failed.is_empty(), "{}: {failed:?}", family.name);
             assert!(rows.len() >= 24, "{}", family.name);
         }
@@ -339,9 +314,12 @@ mod tests {
     fn every_instruction_set_is_asked() {
         for kernel in Kernel::available() {
             for family in VISIBILITY_FAMILIES {
-                let rows = visibility_cases(family, 0..4, 9, kernel);
-                let is_failed = |row: &Row| row.status == Status::Fail;
-                assert!(!rows.iter().any(is_failed), "{} {kernel}", family.name);
+                let rows = rows_of(family, 0..4, 9, kernel);
+                assert!(
+                    rows.iter().all(|row| row.result.is_ok()),
+                    "{} {kernel}",
+                    family.name
+                );
             }
         }
     }
@@ -393,9 +371,10 @@ mod tests {
     /// A row fails where an item is missing: judged with an answer that lacks one.
     #[test]
     fn a_missing_item_fails_its_row() {
-        let judge = |seen: &[ItemId], kept: &[ItemId]| status(seen, kept.to_vec(), &[0, 1, 2]).0;
-        assert_eq!(judge(&[0, 2], &[2, 0]), Status::Pass);
-        assert_eq!(judge(&[0, 2], &[0, 1]), Status::Fail);
-        assert_eq!(judge(&[0], &[0, 7]), Status::Fail, "what is not in view");
+        let passes =
+            |seen: &[ItemId], kept: &[ItemId]| judged(seen, kept.to_vec(), &[0, 1, 2]).is_ok();
+        assert!(passes(&[0, 2], &[2, 0]));
+        assert!(!passes(&[0, 2], &[0, 1]));
+        assert!(!passes(&[0], &[0, 7]), "what is not in view");
     }
 }

@@ -67,11 +67,6 @@ pub fn chain(rng: &mut SeededRng, length: u32, ahead: f64) -> Chain {
 }
 
 impl Chain {
-    /// How many rooms there are.
-    pub fn len(&self) -> usize {
-        self.rooms.len()
-    }
-
     /// What the rows that promise everything lose, with every opening narrower by
     /// `shrink` on each side than it is. `None` if the line of sight does not lead through
     /// the openings, as exact arithmetic has it.
