@@ -150,9 +150,8 @@ impl Part {
                 continue;
             };
             let cameras = schedule.cameras.iter();
-            let one_round: Option<u64> = cameras
-                .map(|&camera| answers.get(camera as usize).map(|answer| answer.count))
-                .sum();
+            let mut counts = cameras.map(|&camera| Some(answers.get(camera as usize)?.count));
+            let one_round = counts.try_fold(0, |sum: u64, count| sum.checked_add(count?));
             let mut planned = names.iter().zip(&schedule.tasks);
             let own = self.tasks.iter();
             for task in own.filter(|t| (t.task == TaskKind::Query) == (pass == 0)) {
@@ -170,7 +169,7 @@ impl Part {
                     break;
                 };
                 let rounds = schedule.rounds.div_ceil(plan.every.max(1));
-                let wanted = one_round.map(|ids| ids * u64::from(rounds));
+                let wanted = one_round.and_then(|ids| ids.checked_mul(u64::from(rounds)));
                 let is_bound = self.bounds.contains(&task.label);
                 if task.verdict.status != Status::Ok {
                     continue;

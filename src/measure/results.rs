@@ -196,9 +196,9 @@ impl<'p> Facts<'p> {
     fn visible_when_timed(&self) -> Option<f64> {
         let known = self.known()?;
         let cameras = &known.query.as_ref()?.schedule.cameras;
-        let of_camera = |camera: &u32| Some(known.visible.get(*camera as usize)?.count);
-        let visible: u64 = cameras.iter().map(of_camera).sum::<Option<u64>>()?;
-        Some(visible as f64 / cameras.len() as f64)
+        let of_camera = |camera: &u32| Some(known.visible.get(*camera as usize)?.count as f64);
+        let visible = cameras.iter().map(of_camera).sum::<Option<f64>>()?;
+        Some(visible / cameras.len() as f64)
     }
 
     fn known(&self) -> Option<&'p Known> {
@@ -298,7 +298,7 @@ impl<'p> Facts<'p> {
                 .names
                 .iter()
                 .position(|(l, task)| l == label && *task == TaskKind::Query)?;
-            Some((named.schedule.tasks[place], &named.schedule))
+            Some((named.schedule.tasks.get(place)?, &named.schedule))
         });
         let mut by_process = BTreeMap::new();
         for (metric, task) in [

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::files::{FolderError, REPORT, STREAM};
+use super::folder::SAMPLE_COLUMNS;
 use super::stream::{Header, KeptPart, Stream};
 use super::{Report, SCHEMA_VERSION};
 use crate::json::{JsonError, from_json};
@@ -77,6 +78,7 @@ pub fn read_stream(path: &Path) -> Result<(Stream, u64), FolderError> {
     let mut header: Option<Header> = None;
     let (mut parts, mut finished_at) = (Vec::new(), None);
     let mut seen = BTreeSet::new();
+    let mut samples_end = SAMPLE_COLUMNS.len() as u64;
     // By their JSON: a key has a number that is no key of a map.
     let mut groups = BTreeMap::new();
     let name_of = |key: &GroupKey| serde_json::to_string(key).unwrap_or_default();
@@ -133,6 +135,11 @@ pub fn read_stream(path: &Path) -> Result<(Stream, u64), FolderError> {
                 if !seen.insert((group, *process)) {
                     return Err(bad(found() + " a second time", "each part once"));
                 }
+                if kept.samples_end < samples_end {
+                    let found = format!("samples that end at byte {}", kept.samples_end);
+                    return Err(bad(found, "an end behind that of the part before"));
+                }
+                samples_end = kept.samples_end;
                 finished_at = None;
                 parts.push(kept);
             }

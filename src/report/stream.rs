@@ -273,7 +273,8 @@ impl Stream {
                 report.noise.add(&key.scene, &first.path, &key.test, twin);
             }
             let rows = |label: &str| {
-                let rows: u64 = kept.iter().filter_map(|kept| kept.rows.get(label)).sum();
+                let rows = kept.iter().filter_map(|kept| kept.rows.get(label));
+                let rows = rows.fold(0, |sum: u64, rows| sum.saturating_add(*rows));
                 (rows > 0).then(|| SamplesRef {
                     file: super::files::SAMPLES.to_owned(),
                     rows,
