@@ -1,9 +1,10 @@
 //! `cullbench funnel`: every stage from region to fragment with every back end on the
 //! views of a path, and what each is worth. How it is shown is in `funnel_table`.
 
+use std::cell::Cell;
 use std::io::{self, Write};
 use std::path::Path;
-use std::sync::{Arc, Once};
+use std::sync::Arc;
 
 use anyhow::{Context, bail};
 
@@ -65,9 +66,12 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     let workers = Workers::of_study()?;
     let study = Study::new(format!("{}, {}: ", args.scene, args.path), 1, &args.spread);
     let input = setting.input(args)?;
-    let announced = Once::new();
+    let begun = Cell::new(0);
     let begin = |step: &str| {
-        announced.call_once(|| study.announce(&work(&input)));
+        // The first step refuses what it cannot take; of that is one line said.
+        if begun.replace(begun.get() + 1) == 1 {
+            study.announce(&work(&input));
+        }
         study.begin(step);
     };
     let prepared = funnel::prepare(&input, &begin, &interrupt::asked)?.ok_or(Interrupted)?;

@@ -221,7 +221,9 @@ fn workloads<'a>(
     }
     for (i, camera) in cameras.cameras.iter().enumerate() {
         let volumes = variants(camera, &culling.planes, &around, i)?;
-        for ((_, workload), (_, volume)) in all.iter_mut().zip(volumes).skip(1) {
+        for (kind, volume) in volumes.into_iter().skip(1) {
+            let of_kind = all.iter_mut().find(|(name, _)| name == kind);
+            let (_, workload) = of_kind.expect("one of each kind");
             workload.views.push(CameraView::Volume(volume));
         }
     }

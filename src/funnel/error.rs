@@ -19,10 +19,10 @@ pub enum FunnelError {
     #[error(transparent)]
     View(#[from] WorkloadError),
     /// A camera without rays.
-    #[error("camera {index}: {error}")]
+    #[error("{place}: {error}")]
     Rays {
-        /// Its index in the path.
-        index: usize,
+        /// Its place in the path.
+        place: String,
         /// Why.
         error: NoRays,
     },

@@ -111,7 +111,10 @@ impl<'a> World<'a> {
         let chosen = (0..count).map(|k| k * all.len() / count);
         let views = chosen.map(|index| {
             let camera = &all[index];
-            let error = |error| FunnelError::Rays { index, error };
+            let error = |error| FunnelError::Rays {
+                place: input.path.place(index),
+                error,
+            };
             let volume = camera.volume(&PlaneOptions::default(), &around);
             Ok(View {
                 camera: index,

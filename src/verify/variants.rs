@@ -7,27 +7,29 @@ use super::VOLUME_KINDS;
 use crate::camera::{Camera, CameraError, Lens, PlaneOptions, Surroundings};
 use crate::geometry::{ConvexVolume, Plane};
 
-/// The volumes of all [`VOLUME_KINDS`] at a camera's place, with their kind;
-/// `seed` picks how many planes an unbounded volume keeps.
+/// The volumes of all [`VOLUME_KINDS`] at a camera's place, with their kind, but for those
+/// whose planes do not fit f32; `seed` picks how many planes an unbounded volume keeps.
 ///
 /// # Errors
-/// A volume whose planes do not fit f32.
+/// The camera's own planes do not fit f32.
 pub fn variants(
     camera: &Camera,
     options: &PlaneOptions,
     around: &Surroundings,
     seed: usize,
 ) -> Result<Vec<(&'static str, ConvexVolume)>, CameraError> {
-    // Both may lie behind the eye of an orthographic lens, of no other.
+    // Both may lie behind the eye of an orthographic lens, of no other; those of a matrix
+    // may be one number once they are rounded.
     let (near, far) = match (camera.lens.near(), camera.lens.far()) {
-        (near, far) if near > 0.0 => (near, far.unwrap_or(near * 1000.0)),
+        (near, Some(far)) if near > 0.0 && near < far => (near, far),
+        (near, _) if near > 0.0 => (near, near * 1000.0),
         (_, Some(far)) if far > 0.0 => (far / 1000.0, far),
         (near, _) => (1.0, near.abs().max(1000.0)),
     };
     let with = |lens: Lens| Camera { lens, ..*camera }.volume(options, around);
     let straight = camera.volume(options, around)?;
     let planes = straight.planes().to_vec();
-    let ortho = Lens::orthographic(0.3 * far, 1.5, -0.1 * far, 0.6 * far)?;
+    let ortho = Lens::orthographic(0.3 * far, 1.5, -0.1 * far, 0.6 * far);
     let window = [-0.2, 0.9, -0.7, 0.1].map(|edge| edge * near);
     let sheared = planes.iter().map(|p| {
         let n = p.normal;
@@ -36,25 +38,27 @@ pub fn variants(
     let mut turned = *camera;
     turned.frame.yaw(25.0);
     turned.frame.pitch(-10.0);
-    let meeting = turned.volume(options, around)?;
-    let twelve = planes.iter().chain(meeting.planes()).copied();
+    let meeting = turned.volume(options, around);
+    let meeting = meeting.as_ref().map_or(&planes[..], ConvexVolume::planes);
+    let twelve = planes.iter().chain(meeting).copied();
     let many = twelve.clone().cycle().take(31).enumerate().map(|(i, p)| {
         // The same planes again, each a little farther out.
         Plane::new(p.normal, p.d + (i / 12) as f32 * 0.01 * far as f32)
     });
     let away = Plane::new(-planes[0].normal, -planes[0].d - 0.01 * far as f32);
     let mut volumes = vec![
-        straight.clone(),
-        with(camera.lens.with_far(None).unwrap_or(camera.lens))?,
-        with(ortho)?,
-        with(Lens::off_axis(window, near, Some(far))?)?,
+        Some(straight.clone()),
+        with(camera.lens.with_far(None).unwrap_or(camera.lens)).ok(),
+        ortho.and_then(with).ok(),
+        Lens::off_axis(window, near, Some(far)).and_then(with).ok(),
     ];
     let few = planes[..1 + seed % 5].to_vec();
     let (sheared, twelve, many) = (sheared.collect(), twelve.clone().collect(), many.collect());
     for planes in [sheared, few, twelve, many, vec![planes[0], away]] {
-        volumes.push(ConvexVolume::from_planes(&planes)?);
+        volumes.push(ConvexVolume::from_planes(&planes).ok());
     }
-    Ok(VOLUME_KINDS.into_iter().zip(volumes).collect())
+    let kinds = VOLUME_KINDS.into_iter().zip(volumes);
+    Ok(kinds.filter_map(|(kind, v)| Some((kind, v?))).collect())
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 
 mod advise;
 mod bad_input;
+mod cases;
 mod compare;
 mod converting;
 mod cullings;

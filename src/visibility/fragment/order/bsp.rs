@@ -8,7 +8,7 @@
 //! own faces, at the same depth; or flat ones in a face of another. So the order is
 //! exact for boxes that overlap in space as well. Two limits are left, and told where
 //! they are met ([`DepthOrder::exception`]): cutting ends where there are too many
-//! parts; and rays that run within a plane have both of its sides on the eye's.
+//! parts, or too many planes about them; and rays that run within a plane have both of its sides on the eye's.
 
 use super::contract::{self, DepthOrder, Piece, distance, nearest_point};
 use crate::camera::{Camera, Lens};
@@ -20,6 +20,9 @@ const MOST_PARTS: usize = 16;
 /// Parts that there may be at any rate: few boxes, each within the next, are cut into
 /// hundreds.
 const ROOM: usize = 1 << 14;
+/// Planes that part one part, in the mean of the most parts, before parting ends: boxes
+/// nested within each other are parted one at a time.
+const MOST_PLANES: usize = 64;
 /// A cut costs as much as so many boxes of imbalance.
 const COST_OF_CUT: usize = 8;
 
@@ -73,9 +76,12 @@ impl BspOrder {
             nodes: vec![Node::Leaf(Vec::new())],
         };
         let mut open = vec![(0, all)];
+        let mut left = most.saturating_mul(MOST_PLANES);
         while let Some((node, parts)) = open.pop() {
+            left = left.saturating_sub(parts.len());
             let room = most.saturating_sub(tree.parts);
-            let Some((axis, at)) = plane(&parts, room) else {
+            let found = (left > 0).then(|| plane(&parts, room)).flatten();
+            let Some((axis, at)) = found else {
                 tree.is_cut_short |= plane(&parts, usize::MAX).is_some();
                 tree.nodes[node] = Node::Leaf(parts);
                 continue;
@@ -221,5 +227,26 @@ impl DepthOrder for BspOrder {
         };
         let within = self.nodes.iter().any(is_within);
         within.then_some("rays may run within the plane of a face")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::visibility::truth::judge;
+    use glam::DVec3;
+
+    /// Boxes within each other are parted one at a time: a limit of parts does not end that.
+    #[test]
+    fn parting_nested_boxes_ends_before_it_is_quadratic() {
+        for (count, is_whole) in [(60, true), (200, false)] {
+            let half = |i: usize| DVec3::splat(i as f64 + 1.0);
+            let boxes: Vec<_> = (0..count)
+                .map(|i| WorldBox::new(-half(i), half(i)))
+                .collect();
+            let tree = BspOrder::within(&judge::solids(&boxes), 8 * count);
+            assert!(tree.parts() < 8 * count);
+            assert_eq!(!tree.is_cut_short, is_whole, "{count}");
+        }
     }
 }

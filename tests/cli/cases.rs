@@ -1,0 +1,195 @@
+//! Small inputs with a right answer that is easily missed: maps with lumps or linedefs out
+//! of order, numbers at the ends of f32, CSV that is not closed.
+
+use std::path::PathBuf;
+
+use serde_json::Value;
+
+use super::funnel::{row, rows};
+use super::process::*;
+
+fn cases() -> PathBuf {
+    PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/cases"))
+}
+
+/// Runs `funnel`; what promises to lose nothing must keep its word. The report, and what
+/// is visible in all views together.
+fn funnel(scene: &str, path: &str, options: &str) -> (Value, f64) {
+    let line = format!(
+        "funnel --scene {scene} --path {path} --samples 48x32 --processes 1 --format json {options}"
+    );
+    let report = json(&works(&cases(), &line));
+    for row in array(&report, "stages") {
+        let kept = number(row, "false_negative_count") == 0.0 || row["guarantee"] == "unproven";
+        assert!(kept, "{line}: {row}");
+    }
+    for pick in array(&report, "picks") {
+        let right = number(pick, "wrong_count") == 0.0 || pick["guarantee"] == "unproven";
+        assert!(right, "{line}: {pick}");
+    }
+    let visible = number(row(&report, "region", "none"), "truth_count");
+    let seen = (visible * number(&report, "views")).round();
+    (report, seen)
+}
+
+#[test]
+fn maps_that_cannot_be_read_are_refused_by_name() {
+    let refused = [
+        ("next_maps_sidedefs.wad#MAP01", "MAP01 without SIDEDEFS"),
+        ("nonodes.wad", "MAP01 whose nodes are not built"),
+        ("freedm12_zX.wad", "MAP12 with extended nodes"),
+        ("freedm12_zz.wad", "MAP12 with compressed extended nodes"),
+        ("freedm12_zgX.wad", "MAP12 with extended GL nodes"),
+        ("freedm12_zx.wad", "MAP12 with GL nodes alone"),
+        ("two_rooms_foreign_after_MAP01.wad#MAP01", "no map 'MAP01'"),
+        (
+            "unclosed_quote.csv",
+            "line 2 | a quote that is never closed",
+        ),
+    ];
+    let commands = [
+        "scene info",
+        "query --cameras two_cam.csv --scene",
+        "locate --points two_cam.csv --scene",
+        "verify --path two_cam.csv --scene",
+        "run --path two_cam.csv --scene",
+        "advise --path two_cam.csv --scene",
+        "precision --path two_cam.csv --scene",
+        "funnel --path two_cam.csv --scene",
+    ];
+    for (scene, wanted) in refused {
+        for command in commands {
+            let line = format!("{command} {scene}");
+            assert_refused(&cullbench(&cases(), &line), wanted, &line);
+        }
+    }
+}
+
+#[test]
+fn a_foreign_lump_among_a_maps_own_changes_nothing() {
+    let asked = |scene: &str| {
+        let (_, seen) = funnel(scene, "two_cam.csv", "");
+        let query = format!("query --scene {scene} --cameras two_cam.csv --ids");
+        (seen, works(&cases(), &query))
+    };
+    let own = asked("two_rooms.wad");
+    assert_eq!(own.0, 8.0);
+    for lump in
+        "MAP01 THINGS LINEDEFS SIDEDEFS VERTEXES SEGS SSECTORS NODES SECTORS REJECT BLOCKMAP"
+            .split(' ')
+    {
+        let scene = format!("two_rooms_foreign_after_{lump}.wad");
+        assert!(asked(&scene) == own, "{lump}");
+    }
+}
+
+/// How much is seen in maps whose sectors their lines close or do not: the same, without
+/// regions.
+#[test]
+fn sectors_that_their_lines_do_not_close_lose_nothing() {
+    let maps = [
+        ("sr_proper.wad", "src.csv", 10.0, true),
+        (
+            "../../cli/maps/self_referencing.wad",
+            "src.csv",
+            10.0,
+            false,
+        ),
+        ("sr_c3.wad", "src.csv", 10.0, false),
+        ("sr_proper_pit.wad", "pit.csv", 11.0, true),
+        ("../../cli/maps/deep_water.wad", "pit.csv", 3.0, false),
+        ("sr_d.wad", "sd.csv", 10.0, false),
+        ("sr_f.wad", "sd.csv", 10.0, false),
+        ("se_2.wad", "sd.csv", 6.0, false),
+    ];
+    for (map, path, visible, has_regions) in maps {
+        let (report, seen) = funnel(map, path, "");
+        assert_eq!(seen, visible, "{map}");
+        let left_out = array(&report, "left_out");
+        assert_eq!(rows(&report, "region").count() > 1, has_regions, "{map}");
+        assert_eq!(left_out.is_empty(), has_regions, "{map}: {left_out:?}");
+    }
+}
+
+/// The items that every structure finds; `None` if the question is refused.
+fn found(name: &str, options: &str) -> Option<String> {
+    let line = format!("query --scene {name}_b.csv --cameras {name}_c.csv --ids {options}");
+    let done = cullbench(&cases(), &line);
+    if done.code == Some(2) {
+        assert_refused(&done, "expected", &line);
+        return None;
+    }
+    assert_eq!(done.code, Some(0), "{line}: {done:?}");
+    let answers = super::process::rows(&done.out);
+    let ids = &answers[0]["visible_ids"];
+    for answer in &answers {
+        assert_eq!(&answer["visible_ids"], ids, "{line}");
+    }
+    Some(ids.clone())
+}
+
+#[test]
+fn numbers_at_the_ends_of_f32_are_decided_or_refused() {
+    let planes =
+        "frame frame-f32 gh-gl-f32 gh-gl-f64 gh-d3d-f32 gh-d3d-f64 gh-revz-f32 gh-revz-f64";
+    let linear = "--structure linear,bvh,wide";
+    for test in ["sphere", "six-plane", "six-box", "exact"] {
+        for (name, ids) in [("gh_exact_min", "0"), ("ortho_tiny_min", "0")] {
+            for planes in planes.split(' ') {
+                let options = format!("{linear} --test {test} --planes {planes}");
+                let found = found(name, &options);
+                let is_refused = found.is_none() && planes != "frame";
+                assert!(
+                    is_refused || found.as_deref() == Some(ids),
+                    "{name} {options}"
+                );
+            }
+        }
+        for read in ["column-gl", "column-d3d"] {
+            let options = format!("--test {test} --matrix-convention {read}");
+            assert_eq!(found("near_ortho", &options).as_deref(), Some("1"));
+        }
+    }
+    let files = "--scene near_ortho_b.csv --path near_ortho_c.csv --matrix-convention column-gl";
+    works(&cases(), &format!("verify {files}"));
+    let matrix = "near_ortho_c.csv, line 2 | a matrix | an eye and a lens";
+    let line = format!("funnel {files}");
+    assert_refused(&cullbench(&cases(), &line), matrix, &line);
+}
+
+#[test]
+fn large_and_tiny_boxes_are_seen_by_every_stage() {
+    for scene in ["two_boxes_overflow.csv", "two_boxes_2e19.csv"] {
+        for path in ["street:frames=2", "orbit:frames=2"] {
+            assert_eq!(funnel(scene, path, "").1, 2.0, "{scene} {path}");
+        }
+    }
+    for (name, visible) in [("obvhs_panic", 2.0), ("ortho_tiny_min", 1.0)] {
+        let [boxes, cameras] = ["b", "c"].map(|end| format!("{name}_{end}.csv"));
+        assert_eq!(funnel(&boxes, &cameras, "").1, visible, "{name}");
+    }
+    let options = "--occlusion none --region none";
+    let (report, _) = funnel("tri_storage_b.csv", "tri_storage_c.csv", options);
+    let faces = row(&report, "triangle", "per-triangle");
+    let counts = ["truth_count", "output_count"].map(|count| number(faces, count));
+    assert_eq!(counts, [4.0, 4.0]);
+}
+
+#[test]
+fn what_planes_return_too_much_is_counted_exactly() {
+    for (scene, wanted) in [("planes_count_b.csv", 1), ("planes_count_many_b.csv", 2)] {
+        let line = format!(
+            "precision --scene {scene} --path planes_count_c.csv --matrix-convention row-d3d \
+             --cubes 0 --processes 1 --format json"
+        );
+        let report = json(&works(&cases(), &line));
+        let points = array(&report, "points").iter();
+        let of_planes =
+            points.filter(|point| point["planes"] == "frame" && point["test"] != "sphere");
+        let counts: Vec<_> = of_planes.map(|p| &p["excess_by_planes_count"]).collect();
+        assert!(
+            counts.len() > 10 && counts.iter().all(|&count| *count == wanted),
+            "{counts:?}"
+        );
+    }
+}
