@@ -142,7 +142,8 @@ fn show_rotations(report: &DriftReport, out: &mut impl Write) -> io::Result<()> 
         turn.yaw_deg, turn.pitch_deg, turn.roll_deg, report.period_steps
     )?;
     let (all, turns) = (&report.rotation, &report.one_degree_turns);
-    let figures: [(&str, fn(&drift::RotationDrift) -> f64); 4] = [
+    type Figure = fn(&drift::RotationDrift) -> f64;
+    let figures: [(&str, Figure); 4] = [
         ("orthogonality after", |d| d.orthogonality_error),
         ("angle off in rad after", |d| d.angle_error_rad),
         ("position on orbit off after", |d| d.orbit_position_error),
@@ -164,7 +165,8 @@ fn show_rotations(report: &DriftReport, out: &mut impl Write) -> io::Result<()> 
 fn show_orbits(report: &DriftReport, out: &mut impl Write) -> io::Result<()> {
     let swing = format!("an eye carried around by {SWING_DEG:.3} degrees per step");
     writeln!(out, "Orbits: {swing}")?;
-    let figures: [(&str, fn(&drift::OrbitDrift) -> f64); 2] = [
+    type Figure = fn(&drift::OrbitDrift) -> f64;
+    let figures: [(&str, Figure); 2] = [
         ("position off after", |d| d.position_error),
         ("radius off after", |d| d.radius_error),
     ];

@@ -298,8 +298,8 @@ mod tests {
         let (forward, up) = (DVec3::new(0.16, 0.88, 0.45), DVec3::new(-0.17, 0.47, -0.87));
         let frame = Frame::looking_along(DVec3::new(8.5, -10.0, 1.0), forward, up).unwrap();
         let lens = Lens::perspective(178.0, 16.0 / 9.0, 0.1, Some(100.0)).unwrap();
-        let corner = Vec3::new(8964.66, 2146.831_8, -7189.876_5);
-        let item = Aabb::new(corner, Vec3::new(15958.212, 2261.151_9, -7187.773_4));
+        let corner = Vec3::new(8_964.66, 2_146.831_8, -7_189.876_5);
+        let item = Aabb::new(corner, Vec3::new(15_958.212, 2_261.151_9, -7_187.773_4));
         let around = Surroundings {
             origin: DVec3::ZERO,
             reach: item.reach(),

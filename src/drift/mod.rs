@@ -185,8 +185,9 @@ impl DriftReport {
         (self.processes, self.rounds) = (processes.len(), rounds as usize);
         let turned = frame_errors(METHODS.iter(), &self.rotation);
         let carried = CARRIERS.iter().map(|carrier| {
-            let own = self.orbit.iter().filter(|d| d.method == carrier.name);
-            (carrier, own.last().map(|d| d.position_error / ORBIT_RADIUS))
+            let mut own = self.orbit.iter().rev();
+            let last = own.find(|d| d.method == carrier.name);
+            (carrier, last.map(|d| d.position_error / ORBIT_RADIUS))
         });
         let limit = (self.tolerance_rad, self.steps);
         let turned = rated(turned, &times, 0, limit);

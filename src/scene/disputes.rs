@@ -253,11 +253,11 @@ mod tests {
             for (x, y) in (0..=side).flat_map(|x| (0..=side).map(move |y| (x, y))) {
                 let at = |x: usize, y: usize| corner[y * (side + 1) + x];
                 if y < side {
-                    let left = x.checked_sub(1).map_or(None, |x| of(x, y));
+                    let left = x.checked_sub(1).and_then(|x| of(x, y));
                     lines.push(([at(x, y), at(x, y + 1)], [of(x, y), left]));
                 }
                 if x < side {
-                    let below = y.checked_sub(1).map_or(None, |y| of(x, y));
+                    let below = y.checked_sub(1).and_then(|y| of(x, y));
                     lines.push(([at(x, y), at(x + 1, y)], [below, of(x, y)]));
                 }
             }

@@ -103,7 +103,8 @@ impl WadMap {
         let linedefs = (0..lines.len()).map(linedef);
         let linedefs = linedefs.collect::<Result<Vec<_>, _>>()?;
         for i in 0..segs.len() {
-            (vertex(segs, i, 0)?, vertex(segs, i, 2)?);
+            vertex(segs, i, 0)?;
+            vertex(segs, i, 2)?;
             segs.index(i, 6, lines)?;
         }
         let leaf_sector = |i: usize| -> Result<u32, InputError> {

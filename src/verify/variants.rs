@@ -7,8 +7,10 @@ use super::VOLUME_KINDS;
 use crate::camera::{Camera, CameraError, Lens, PlaneOptions, Surroundings};
 use crate::geometry::{ConvexVolume, Plane};
 
-/// The volumes of all [`VOLUME_KINDS`] at a camera's place, with their kind, but for those
-/// whose planes do not fit f32; `seed` picks how many planes an unbounded volume keeps.
+/// Volumes of all [`VOLUME_KINDS`] at a camera's place, with their kind.
+///
+/// Kinds whose planes do not fit f32 are left out; `seed` picks how many planes an
+/// unbounded volume keeps.
 ///
 /// # Errors
 /// The camera's own planes do not fit f32.
@@ -89,7 +91,7 @@ mod tests {
         assert!(holds[..4].iter().all(|&h| h) && !holds[8], "{holds:?}");
     }
 
-    /// Of a lens that sees behind the eye, or there alone, the other kinds are made too.
+    /// A lens that sees behind the eye, or there alone, has the other kinds too.
     #[test]
     fn planes_behind_the_eye_leave_the_other_kinds_whole() {
         let frame = look_at(DVec3::ZERO, DVec3::X, DVec3::Z).unwrap();

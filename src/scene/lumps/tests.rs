@@ -152,7 +152,6 @@ fn what_engines_pass_over_is_passed_over() {
     bytes[entry(0) + 14..][..2].copy_from_slice(b"\xFFx");
     assert_eq!(read(&bytes, Some("MAP12")), own);
     // The place of an empty lump, and damage in lumps that are not read.
-    let mut lumps = lumps;
     lumps[0].1.clear();
     let (marker, other) = (entry(0), entry(lumps.len() - 1));
     for offset in [-1, i32::MIN, i32::MAX, 7] {

@@ -280,8 +280,10 @@ mod tests {
         let bounds = Aabb::new(Vec3::ZERO, Vec3::ONE);
         let bounds = ::obvhs::aabb::Aabb::new(bounds.min.into(), bounds.max.into());
         let leaf = |item: usize| Bvh2Node::new(bounds, 1, item as u32);
-        let mut tree = Bvh2::default();
-        tree.nodes = vec![Bvh2Node::new(bounds, 0, 1)];
+        let mut tree = Bvh2 {
+            nodes: vec![Bvh2Node::new(bounds, 0, 1)],
+            ..Bvh2::default()
+        };
         for item in 0..levels - 1 {
             let next = tree.nodes.len() as u32 + 2;
             let last = item == levels - 2;

@@ -8,7 +8,8 @@
 //! own faces, at the same depth; or flat ones in a face of another. So the order is
 //! exact for boxes that overlap in space as well. Two limits are left, and told where
 //! they are met ([`DepthOrder::exception`]): cutting ends where there are too many
-//! parts, or too many planes about them; and rays that run within a plane have both of its sides on the eye's.
+//! parts, or too many planes about them; and rays that run within a plane have both of
+//! its sides on the eye's.
 
 use super::contract::{self, DepthOrder, Piece, distance, nearest_point};
 use crate::camera::{Camera, Lens};
@@ -20,8 +21,8 @@ const MOST_PARTS: usize = 16;
 /// Parts that there may be at any rate: few boxes, each within the next, are cut into
 /// hundreds.
 const ROOM: usize = 1 << 14;
-/// Planes that part one part, in the mean of the most parts, before parting ends: boxes
-/// nested within each other are parted one at a time.
+/// Cuts per part, on average, before cutting ends.
+// Boxes nested within each other are split off one at a time.
 const MOST_PLANES: usize = 64;
 /// A cut costs as much as so many boxes of imbalance.
 const COST_OF_CUT: usize = 8;
@@ -236,7 +237,7 @@ mod tests {
     use crate::visibility::truth::judge;
     use glam::DVec3;
 
-    /// Boxes within each other are parted one at a time: a limit of parts does not end that.
+    /// A limit of parts alone does not end the cutting of nested boxes.
     #[test]
     fn parting_nested_boxes_ends_before_it_is_quadratic() {
         for (count, is_whole) in [(60, true), (200, false)] {
