@@ -110,6 +110,14 @@ fn shards_together_are_the_run_of_the_whole_plan() {
     works(folder.path(), "run --resume --out merged");
     assert!(contents(&at("merged")) == before, "resuming changed files");
     works(folder.path(), "report merged");
+
+    let stream = at("part1").join("stream.jsonl");
+    let text = fs::read_to_string(&stream).expect("a stream");
+    let (before, end) = text.rsplit_once("\"samples_end\":").expect("a part");
+    let after = end.trim_start_matches(|c: char| c.is_ascii_digit());
+    fs::write(&stream, format!("{before}\"samples_end\":5{after}")).expect("writable");
+    let wanted = "part1/stream.jsonl, line | samples that end at byte 5 | expected an end behind";
+    all_refused(&folder, &["merge part1 part2 part3 --out again"], wanted);
 }
 
 #[test]

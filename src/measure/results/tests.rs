@@ -126,6 +126,22 @@ fn counts_that_are_no_metrics_are_left_alone() {
 }
 
 #[test]
+fn counts_beyond_any_number_and_names_beyond_the_plan_are_wrong() {
+    let ns: &[f64] = &[1000.0, 1000.0];
+    let timed = [
+        ("linear", TaskKind::Query, ns),
+        ("bvh", TaskKind::Query, ns),
+    ];
+    let mut parts = parts(&timed);
+    let known = parts[0].known.as_mut().unwrap();
+    known.visible.iter_mut().for_each(|a| a.count = u64::MAX);
+    known.query.as_mut().unwrap().schedule.tasks.truncate(1);
+    for cell in Group::of(&parts).cells {
+        assert_eq!(cell.status, Status::Wrong, "{}", cell.structure);
+    }
+}
+
+#[test]
 fn values_lie_in_their_intervals_and_ratios_are_those_of_the_shown_values() {
     let (linear, fast, slow, same) = (times(1.0, 1), times(0.2, 2), times(3.0, 3), times(0.2, 4));
     let group = Group::of(&parts(&[
