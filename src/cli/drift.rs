@@ -30,7 +30,15 @@ pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
     let options = options(args);
     interrupt::from_now_on_finish();
     let workers = Workers::of_study()?;
-    let study = Study::new(String::new(), drift::jobs(&options) as u64, &args.spread);
+    let jobs = drift::jobs(&options);
+    let study = Study::new(String::new(), jobs as u64, &args.spread);
+    let work = text::counted(jobs, "study");
+    let steps = options.steps as f64;
+    let seconds = options.arm.seconds;
+    study.announce(
+        &format!("{work}, up to {steps:e} steps or {seconds} s each"),
+        "less than a minute",
+    );
     let report = drift::prepare(&options, |job| {
         study.begin(job);
         study.advance();
@@ -41,12 +49,12 @@ pub fn drift(args: &DriftArgs) -> anyhow::Result<Ending> {
     let job = |timing| Job::Drift(schedule.clone(), timing);
     let times = study.times(&workers, "everything, timed", None, job)?;
     report.conclude(&times, schedule.rounds);
-    if let Some(file) = &args.svg {
-        write_text(file, &drift_diagram::draw(&report.arm)?)?;
-    }
     print(args.format, &report, || {
         show(&report, &mut io::stdout().lock())
     })?;
+    if let Some(file) = &args.svg {
+        write_text(file, &drift_diagram::draw(&report.arm)?)?;
+    }
     Ok(Ending::Ok)
 }
 

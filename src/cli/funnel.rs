@@ -70,7 +70,7 @@ pub fn funnel(registry: &Registry, args: &FunnelArgs) -> anyhow::Result<Ending> 
     let begin = |step: &str| {
         // The first step refuses what it cannot take; of that is one line said.
         if begun.replace(begun.get() + 1) == 1 {
-            study.announce(&work(&input));
+            study.announce(&work(&input), "minutes");
         }
         study.begin(step);
     };

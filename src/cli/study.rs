@@ -56,11 +56,11 @@ impl Study {
         }
     }
 
-    /// Says how much there is to do, on a terminal or not, before it is done.
-    pub fn announce(&self, work: &str) {
+    /// Prints the amount of work, on a terminal or not, and how long the defaults take.
+    pub fn announce(&self, work: &str, by_default: &str) {
         let times = text::counted(self.processes as usize, "process");
         let line = format!(
-            "at work: {}{work}, timed in {times}; the defaults take minutes",
+            "at work: {}{work}, timed in {times}; the defaults take {by_default}",
             self.about
         );
         self.bar.suspend(|| tell(&line));

@@ -151,8 +151,8 @@ fn what_cannot_be_converted_leaves_no_trace() {
         ("bad.csv kept.csv", "bad.csv, line 1 | no column 'min_x'"),
         ("half.wad kept.csv", "half.wad"),
         ("unifrom kept.csv", "did you mean 'uniform'"),
-        ("scene.csv no/where.csv", "no/where.csv: No such file"),
-        ("scene.csv folder.csv", "folder.csv: Is a directory"),
+        ("scene.csv no/where.csv", "no: expected an existing folder"),
+        ("scene.csv folder.csv", "folder.csv: a folder"),
         ("uniform:n=2,offset=1e39 new.csv", beyond),
     ] {
         all_refused(&folder, &[format!("scene convert {line}")], wanted);

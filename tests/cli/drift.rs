@@ -308,7 +308,7 @@ fn how_much_there_is_to_do_is_said_before_it_is_done() {
         drift.err,
         format!(
             "at work: {studies} studies, up to 1e3 steps or 1 s each, timed in 1 process; the \
-             defaults take minutes\n"
+             defaults take less than a minute\n"
         )
     );
     let options = "--processes 2 --frames 3 --samples 20x10 --path orbit:frames=5";

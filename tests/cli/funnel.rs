@@ -400,7 +400,7 @@ fn what_cannot_be_is_refused_in_a_line() {
     let line = LINE.replace("cameras.csv", "matrix.csv --matrix-convention column-gl");
     assert_refused(
         &cullbench(folder.path(), &line),
-        "camera 0 | matrix",
+        "matrix.csv, line 2 | matrix",
         "a matrix",
     );
     fs::write(folder.path().join("empty.csv"), format!("{BOXES}\n")).expect("written");
