@@ -11,6 +11,10 @@ pub(super) const SUMMARY: &str = "summary.csv";
 pub(super) const SAMPLES: &str = "samples.csv";
 pub(super) const STREAM: &str = "stream.jsonl";
 
+/// The first line of samples.csv.
+pub(super) const SAMPLE_COLUMNS: &str = "scene,path,cache,structure,test,task,process,round,frame,\
+                                         queries,cpu_ns,wall_ns,returned\n";
+
 /// Why the folder of a run cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]

@@ -12,17 +12,13 @@ use std::time::{Duration, Instant};
 
 use tempfile::NamedTempFile;
 
-use super::files::{FolderError, REPORT, SAMPLES, STREAM, SUMMARY};
+use super::files::{FolderError, REPORT, SAMPLE_COLUMNS, SAMPLES, STREAM, SUMMARY};
 use super::reading::read_stream;
 use super::stream::{Header, KeptPart, Line, Stream};
 use super::writing::{locked_temporary_in, replace_atomically, sweep};
 use super::{Report, ReportCell};
 use crate::measure::{METRICS, Part, TaskSamples};
 use crate::shown::shown_field;
-
-/// The first line of samples.csv.
-pub(super) const SAMPLE_COLUMNS: &str = "scene,path,cache,structure,test,task,process,round,frame,\
-                                         queries,cpu_ns,wall_ns,returned\n";
 
 /// The folder of a run that is being measured, locked against others.
 pub struct RunFolder {

@@ -6,8 +6,8 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use super::files::{FolderError, SAMPLES, STREAM};
-use super::folder::{self, SAMPLE_COLUMNS, save_report};
+use super::files::{FolderError, SAMPLE_COLUMNS, SAMPLES, STREAM};
+use super::folder::{self, save_report};
 use super::reading::read_stream;
 use super::stream::{Difference, Header, KeptPart, Line, Stream};
 use super::writing::temporary_folder_in;

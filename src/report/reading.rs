@@ -8,8 +8,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::files::{FolderError, REPORT, STREAM};
-use super::folder::SAMPLE_COLUMNS;
+use super::files::{FolderError, REPORT, SAMPLE_COLUMNS, STREAM};
 use super::stream::{Header, KeptPart, Stream};
 use super::{Report, SCHEMA_VERSION};
 use crate::json::{JsonError, from_json};
