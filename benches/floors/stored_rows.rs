@@ -22,7 +22,7 @@ const MOST_TIMES: f64 = 1.5;
 /// Passes over the views in a turn, as one takes a microsecond.
 const PASSES: usize = 1000;
 
-/// Whether the floor is missed: 1 or 0.
+/// Returns 1 if the floor is missed, else 0.
 pub fn missed(only_test: bool, turns: usize) -> u32 {
     let (typed, scene, cameras) = loaded(SCENE, PATH, only_test);
     let graph = Arc::new(RegionGraph::of_scene(&scene).expect("rooms"));

@@ -15,7 +15,7 @@ use libfuzzer_sys::fuzz_target;
 
 type Reader = fn(&[u8]);
 
-/// By the name of its corpus.
+/// Readers by the name of their corpus.
 const READERS: [(&str, Reader); 11] = [
     ("boxes", tables::boxes),
     ("cameras", tables::cameras),
@@ -40,7 +40,7 @@ static READER: LazyLock<Reader> = LazyLock::new(|| {
 
 fuzz_target!(init: LazyLock::force(&READER), |bytes: &[u8]| READER(bytes));
 
-/// What there is, or an error in one line that a terminal takes.
+/// Returns the value; an error must be one line without control characters.
 fn read<T, E: Display>(result: Result<T, E>) -> Option<T> {
     let error = match result {
         Ok(value) => return Some(value),

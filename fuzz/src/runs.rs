@@ -1,4 +1,4 @@
-//! What runs leave: report.json, stream.jsonl and samples.csv.
+//! Readers of what a run leaves: report.json, stream.jsonl and samples.csv.
 
 use std::fs;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! What is typed: scenes, paths, structures, suites and the language they are named in.
+//! Readers of typed text: scenes, paths, structures, suites and the language that names them.
 
 use std::sync::LazyLock;
 

@@ -1,7 +1,7 @@
 //! Files and folders that appear whole or not at all: written beside their place under
-//! a temporary name, then renamed into it. A temporary name is locked by its process
-//! for as long as it lives; one that nobody has locked is the leftover of a killed
-//! process, and goes with the next write into the same folder.
+//! a temporary name, then renamed into it. A process locks its temporary names while it
+//! runs; an unlocked one is the leftover of a killed process, and the next write into
+//! the same folder removes it.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, BufWriter, Write};
