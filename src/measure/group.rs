@@ -8,11 +8,11 @@ use super::bounds::{Bound, Material};
 use super::count::{Counted, count_pass, judge, note_scan};
 use super::key::GroupKey;
 use super::notice::{Notice, TIMING};
-use super::part::{Known, NamedSchedule, Part, SubjectPart, TaskPart, TaskSamples};
+use super::part::{Known, Part, SubjectPart, TaskKey, TaskPart, TaskSamples};
 use super::subject::TWIN;
 use super::{
-    Answer, Built, Judged, PathInfo, Protocol, SceneInfo, Schedule, Status, Subject, TaskKind,
-    Timed, TimedTask, Verdict, Workload, guarded, timed,
+    Answer, Built, Judged, KeyedSchedule, PathInfo, Protocol, SceneInfo, Schedule, Status, Subject,
+    TaskKind, Tasks, Timed, TimedTask, Verdict, Workload, guarded, timed,
 };
 use crate::index::Kind;
 use crate::statistics::{interquartile_mean, median};
@@ -109,7 +109,7 @@ pub fn measure_part(
             for bound in plan.bounds {
                 if let Some(task) = (bound.make)(&material) {
                     part.bounds.push(bound.name.to_owned());
-                    entered.push(bound.name.to_owned(), TaskKind::Query, task);
+                    entered.push((bound.name.to_owned(), TaskKind::Query), task);
                 }
             }
         }
@@ -124,7 +124,7 @@ pub fn measure_part(
             ..plan.protocol
         };
         let schedule = entered.schedule(given, workload.views.len(), &protocol);
-        let labels = entered.names.iter().map(|(label, _)| label);
+        let labels = entered.keys().iter().map(|(label, _)| label);
         let structures: Vec<_> = labels.map(|l| structure_of(l, &part.bounds)).collect();
         let turn = |task: usize| {
             notice(structures[task], TIMING);
@@ -132,10 +132,10 @@ pub fn measure_part(
         };
         let timed = match plan.plan_only {
             true => Vec::new(),
-            false => timed(&entered.tasks, &schedule, &plan.protocol, &turn)?,
+            false => timed(entered.tasks(), &schedule, &plan.protocol, &turn)?,
         };
         let largest = schedule.tasks.iter().map(|t| t.batch).max().unwrap_or(1) as usize;
-        for ((label, kind), result) in entered.names.iter().zip(timed) {
+        for ((label, kind), result) in entered.keys().iter().zip(timed) {
             let groups = match kind {
                 TaskKind::Query => schedule.cameras.len().div_ceil(largest),
                 _ => 0,
@@ -154,8 +154,8 @@ pub fn measure_part(
                 result.map(|t| t.samples).unwrap_or_default(),
             ));
         }
-        schedules[pass] = Some(NamedSchedule {
-            names: entered.names,
+        schedules[pass] = Some(KeyedSchedule {
+            keys: entered.keys().to_vec(),
             schedule,
         });
     }
@@ -180,54 +180,14 @@ fn structure_of<'l>(label: &'l str, bounds: &[String]) -> Option<&'l str> {
     (!is_bound).then(|| label.strip_suffix(TWIN).unwrap_or(label))
 }
 
-/// Tasks of one timed pass with their names.
-struct Entered<'a> {
-    names: Vec<(String, TaskKind)>,
-    tasks: Vec<TimedTask<'a>>,
-}
-
-impl<'a> Entered<'a> {
-    fn push(&mut self, label: String, kind: TaskKind, task: TimedTask<'a>) {
-        self.names.push((label, kind));
-        self.tasks.push(task);
-    }
-
-    /// The plan of the first process for those tasks that are here, or a new one.
-    fn schedule(
-        &mut self,
-        given: Option<&NamedSchedule>,
-        cameras: usize,
-        protocol: &Protocol,
-    ) -> Schedule {
-        let Some(given) = given else {
-            return Schedule::new(cameras, &self.tasks, protocol);
-        };
-        let mut kept = Vec::new();
-        let planned = |name: &(String, TaskKind)| given.names.iter().position(|n| n == name);
-        let mut names = std::mem::take(&mut self.names);
-        let tasks = std::mem::take(&mut self.tasks);
-        for (name, task) in names.drain(..).zip(tasks) {
-            // What failed in the first process has no plan and is not timed.
-            if let Some(place) = planned(&name) {
-                kept.push(place);
-                self.push(name.0, name.1, task);
-            }
-        }
-        given.schedule.of_tasks(&kept)
-    }
-}
-
 fn enter<'a>(
     workload: &'a Workload,
     subjects: &'a [Subject],
     entries: &[Entry],
     kinds: &[TaskKind],
     answers: &[Vec<Answer>; 2],
-) -> Entered<'a> {
-    let mut entered = Entered {
-        names: Vec::new(),
-        tasks: Vec::new(),
-    };
+) -> Tasks<'a, TaskKey> {
+    let mut entered = Tasks::default();
     for &kind in kinds {
         let answers = match kind {
             TaskKind::Query => &answers[0],
@@ -240,7 +200,7 @@ fn enter<'a>(
             let least_ns = entry.counted.as_ref().map(|c| c.least_ns(kind));
             let label = &subject.spec.label;
             let task = TimedTask::of(kind, label, workload, built, answers, least_ns);
-            entered.push(subject.label(), kind, task);
+            entered.push((subject.label(), kind), task);
         }
     }
     entered
@@ -409,7 +369,7 @@ impl<'a> Entry<'a> {
             };
             true
         };
-        let timed = |named: &Option<NamedSchedule>| {
+        let timed = |named: &Option<KeyedSchedule<TaskKey>>| {
             let cameras = named.iter().flat_map(|named| &named.schedule.cameras);
             cameras.map(|&camera| camera as usize).collect::<Vec<_>>()
         };

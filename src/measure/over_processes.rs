@@ -1,14 +1,18 @@
 //! The times of tasks in one process, and over several: values, ratios and who
 //! is faster, by the estimators of a run.
 
+use std::borrow::Borrow;
+
 use serde::{Deserialize, Serialize};
 
+#[cfg(doc)]
+use super::Tasks;
 use super::results::shown;
 use super::{Timed, Verdict};
 use crate::statistics::{ALPHA, Estimate, is_less, ratio};
 
-/// What one process timed of the tasks of a schedule: plain data that goes from
-/// process to process.
+/// Times of the tasks of a schedule in one process: plain data that goes from process
+/// to process, in the order of the schedule.
 #[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 pub struct ProcessTimes {
     /// By task: ln of the CPU ns per query; nothing where no camera is timed.
@@ -33,33 +37,49 @@ impl ProcessTimes {
     }
 }
 
-/// The times of the same tasks in several processes.
-pub struct OverProcesses {
+/// The times of the same tasks in several processes. A task is found by its key: its
+/// position in the schedule, or a value of the study's own.
+pub struct OverProcesses<K = usize> {
+    keys: Vec<K>,
     /// By task, ln ns in each process: empty without times, or the verdict of
     /// the first process in which it failed.
     logs: Vec<Result<Vec<f64>, Verdict>>,
     /// The first task with times: what slows it slows all.
     reference: Vec<f64>,
-    /// Of what is done once, by process.
+    /// ln ns of work that is done once, by process.
     once: Vec<Vec<f64>>,
 }
 
 impl OverProcesses {
+    /// The times of tasks by their positions in the schedule.
+    ///
     /// # Panics
     /// If the processes have not timed the same tasks.
     pub fn of(processes: &[ProcessTimes]) -> OverProcesses {
         let tasks = processes.first().map_or(0, |first| first.ln_ns.len());
+        OverProcesses::keyed((0..tasks).collect(), processes)
+    }
+}
+
+impl<K: PartialEq> OverProcesses<K> {
+    /// The times of tasks by their keys, given in the order of the schedule
+    /// ([`Tasks::keys`]).
+    ///
+    /// # Panics
+    /// If the processes have not timed the same tasks.
+    pub fn keyed(keys: Vec<K>, processes: &[ProcessTimes]) -> OverProcesses<K> {
         let of_task = |task: usize| {
             let found = processes.iter().map(|p| p.ln_ns[task].clone());
             let logs: Result<Option<Vec<f64>>, Verdict> = found.collect();
             logs.map(Option::unwrap_or_default)
         };
-        let logs: Vec<_> = (0..tasks).map(of_task).collect();
+        let logs: Vec<_> = (0..keys.len()).map(of_task).collect();
         let timed = logs.iter().flatten().find(|own| !own.is_empty());
         let once = processes.first().map_or(0, |first| first.once_ns.len());
         // Below the resolution of a clock there may be 0.
         let ln = |process: &ProcessTimes, i: usize| process.once_ns[i].max(1.0).ln();
         OverProcesses {
+            keys,
             reference: timed.cloned().unwrap_or_default(),
             logs,
             once: (0..once)
@@ -68,28 +88,34 @@ impl OverProcesses {
         }
     }
 
-    /// How many there are.
+    fn log(&self, task: impl Borrow<K>) -> Option<&Result<Vec<f64>, Verdict>> {
+        let position = self.keys.iter().position(|key| key == task.borrow())?;
+        self.logs.get(position)
+    }
+
+    fn own(&self, task: impl Borrow<K>) -> &[f64] {
+        let timed = self.log(task).and_then(|log| log.as_deref().ok());
+        timed.unwrap_or_default()
+    }
+
+    /// Number of processes with times.
     pub fn processes(&self) -> usize {
         self.reference.len()
     }
 
-    /// Why a task has no times.
-    pub fn failure(&self, task: usize) -> Option<&Verdict> {
-        self.logs[task].as_ref().err()
+    /// Verdict of a task that failed; `None` for a sound one and for an unknown key.
+    pub fn failure(&self, task: impl Borrow<K>) -> Option<&Verdict> {
+        self.log(task)?.as_ref().err()
     }
 
-    fn own(&self, task: usize) -> &[f64] {
-        self.logs[task].as_deref().unwrap_or_default()
-    }
-
-    /// Time of a query of a task, ns.
-    pub fn ns(&self, task: usize) -> Option<Estimate> {
+    /// Time of a query of a task, ns; `None` without times and for an unknown key.
+    pub fn ns(&self, task: impl Borrow<K>) -> Option<Estimate> {
         shown(&self.reference, self.own(task))
     }
 
     /// ln of the time of a task in each process, ns, all brought to the speed that
     /// [`Self::ns`] shows; empty without times.
-    pub fn ln_ns(&self, task: usize) -> Vec<f64> {
+    pub fn ln_ns(&self, task: impl Borrow<K>) -> Vec<f64> {
         let speed = shown(&self.reference, &self.reference);
         let speed = speed.map_or(f64::NAN, |found| found.value.ln());
         let both = self.own(task).iter().zip(&self.reference);
@@ -97,24 +123,24 @@ impl OverProcesses {
             .collect()
     }
 
-    /// Time of what is done once, ns.
+    /// Time of work that is done once, ns.
     pub fn once_ns(&self, i: usize) -> f64 {
         shown(&self.once[i], &self.once[i]).map_or(f64::NAN, |found| found.value)
     }
 
-    /// Time of one thing that is done once / time of another.
+    /// Time of one piece of work that is done once / time of another.
     pub fn once_ratio(&self, i: usize, other: usize) -> Option<Estimate> {
         ratio(&self.once[i], &self.once[i], &self.once[other])
     }
 
     /// Time of `task` / time of `other`: the ratio of the two that [`Self::ns`]
     /// gives.
-    pub fn ratio(&self, task: usize, other: usize) -> Option<Estimate> {
+    pub fn ratio(&self, task: impl Borrow<K>, other: impl Borrow<K>) -> Option<Estimate> {
         ratio(&self.reference, self.own(task), self.own(other))
     }
 
-    /// Whether the processes show a task to be faster than another.
-    pub fn is_faster(&self, task: usize, other: usize) -> bool {
+    /// Returns true if the processes show a task to be faster than another.
+    pub fn is_faster(&self, task: impl Borrow<K>, other: impl Borrow<K>) -> bool {
         is_less(&self.ln_ns(task), &self.ln_ns(other), ALPHA)
     }
 }
@@ -185,5 +211,17 @@ mod tests {
         );
         assert!(times.ns(0).is_some() && times.ratio(1, 0).is_none());
         assert!(!times.is_faster(0, 1) && !times.is_faster(1, 0));
+    }
+
+    #[test]
+    fn a_task_is_found_by_its_key() {
+        let processes = processes();
+        let (keyed, by_position) = (
+            OverProcesses::keyed(vec!["sweep", "scan", "tree"], &processes),
+            OverProcesses::of(&processes),
+        );
+        assert_eq!(keyed.ns("tree"), by_position.ns(2));
+        assert_eq!(keyed.ratio("scan", "sweep"), by_position.ratio(1, 0));
+        assert_eq!((keyed.ns("other"), keyed.failure("other")), (None, None));
     }
 }

@@ -10,7 +10,7 @@ use serde_json::Value;
 use crate::index::{Kind, Origin, StructureSpec};
 
 use super::{
-    Answer, GroupKey, Judged, PathInfo, Sample, SceneInfo, Schedule, Status, TaskKind, Verdict,
+    Answer, GroupKey, Judged, KeyedSchedule, PathInfo, Sample, SceneInfo, Status, TaskKind, Verdict,
 };
 
 /// What the first process counted and planned; the others keep to it.
@@ -24,21 +24,16 @@ pub struct Known {
     pub located: Vec<Answer>,
     /// Of frustum queries, bounds last, and of region searches. `None` where
     /// nothing is timed.
-    pub query: Option<NamedSchedule>,
+    pub query: Option<KeyedSchedule<TaskKey>>,
     /// As `query`, of region searches.
-    pub locate: Option<NamedSchedule>,
+    pub locate: Option<KeyedSchedule<TaskKey>>,
     /// Scale of the lens where the path was asked for by its visible share.
     pub lens_scale: Option<f64>,
 }
 
-/// A schedule with the names of its tasks.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
-pub struct NamedSchedule {
-    /// Label and kind of each task, in the order of the schedule.
-    pub names: Vec<(String, TaskKind)>,
-    /// Cameras, batches and rounds.
-    pub schedule: Schedule,
-}
+/// Key of a task of a group: label of a structure or a lower bound, and what it is
+/// timed at.
+pub type TaskKey = (String, TaskKind);
 
 /// A structure in one process.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
@@ -146,13 +141,13 @@ impl Part {
             (&known.locate, &known.located),
         ];
         for (pass, (plan, answers)) in passes.into_iter().enumerate() {
-            let Some(NamedSchedule { names, schedule }) = plan else {
+            let Some(KeyedSchedule { keys, schedule }) = plan else {
                 continue;
             };
             let cameras = schedule.cameras.iter();
             let mut counts = cameras.map(|&camera| Some(answers.get(camera as usize)?.count));
             let one_round = counts.try_fold(0, |sum: u64, count| sum.checked_add(count?));
-            let mut planned = names.iter().zip(&schedule.tasks);
+            let mut planned = keys.iter().zip(&schedule.tasks);
             let own = self.tasks.iter();
             for task in own.filter(|t| (t.task == TaskKind::Query) == (pass == 0)) {
                 let mut wrong = |reason: String| {

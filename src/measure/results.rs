@@ -295,7 +295,7 @@ impl<'p> Facts<'p> {
         let named = known.and_then(|known| known.query.as_ref());
         let plan = named.and_then(|named| {
             let place = named
-                .names
+                .keys
                 .iter()
                 .position(|(l, task)| l == label && *task == TaskKind::Query)?;
             Some((named.schedule.tasks.get(place)?, &named.schedule))

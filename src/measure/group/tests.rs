@@ -84,8 +84,8 @@ fn a_process_that_only_plans_times_nothing() {
     let part = measured("linear,bvh", 0, None, true);
     assert!(part.tasks.is_empty());
     let known = part.known.expect("a plan");
-    assert_eq!(known.query.map(|plan| plan.names.len()), Some(2));
-    assert_eq!(known.locate.map(|plan| plan.names.len()), Some(4));
+    assert_eq!(known.query.map(|plan| plan.keys.len()), Some(2));
+    assert_eq!(known.locate.map(|plan| plan.keys.len()), Some(4));
 }
 
 #[test]
@@ -124,7 +124,7 @@ fn what_has_no_plan_is_not_timed_and_the_rest_keeps_its_own() {
     for (batch, task) in (1..).zip(&mut plan.schedule.tasks) {
         task.batch = batch;
     }
-    plan.names.remove(1);
+    plan.keys.remove(1);
     plan.schedule.tasks.remove(1);
     let part = measured("linear,octree,bvh", 1, Some(&known), false);
     let queries = part.tasks.iter().filter(|t| t.task == TaskKind::Query);

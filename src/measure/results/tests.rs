@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use super::super::{Answer, GroupKey, NamedSchedule, Schedule, TaskPlan};
+use super::super::{Answer, GroupKey, KeyedSchedule, Schedule, TaskPlan};
 use super::*;
 use crate::index::{Kind, Origin};
 
@@ -38,20 +38,20 @@ fn parts(times: &[Times]) -> Vec<Part> {
         digest: 7,
     };
     let schedule = |of: fn(TaskKind) -> bool| {
-        let names: Vec<(String, TaskKind)> = times
+        let keys: Vec<(String, TaskKind)> = times
             .iter()
             .filter(|(_, task, _)| of(*task))
             .map(|(label, task, _)| ((*label).to_owned(), *task))
             .collect();
-        let tasks = names.iter().map(|_| TaskPlan { batch: 2, every: 1 });
-        Some(NamedSchedule {
+        let tasks = keys.iter().map(|_| TaskPlan { batch: 2, every: 1 });
+        Some(KeyedSchedule {
             schedule: Schedule {
                 cameras: (0..CAMERAS as u32).collect(),
                 rounds: ROUNDS as u32,
                 cold: false,
                 tasks: tasks.collect(),
             },
-            names,
+            keys,
         })
     };
     let known = Known {
