@@ -11,15 +11,15 @@ use super::results::shown;
 use super::{Timed, Verdict};
 use crate::statistics::{ALPHA, Estimate, is_less, ratio};
 
-/// Times of the tasks of a schedule in one process: plain data that goes from process
-/// to process, in the order of the schedule.
+/// Times of the tasks of a schedule in one process, in the order of the schedule.
+/// Plain data that goes from process to process.
 #[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize)]
 pub struct ProcessTimes {
-    /// By task: ln of the CPU ns per query; nothing where no camera is timed.
+    /// Per task: ln of the CPU ns per query; nothing where no camera is timed.
     pub ln_ns: Vec<Result<Option<f64>, Verdict>>,
     /// CPU ns of what is done once and not in rounds, where there is such.
     pub once_ns: Vec<f64>,
-    /// By task and camera: median CPU ns over the rounds, where it is wanted.
+    /// Per task and camera: median CPU ns over the rounds; empty unless requested.
     pub by_camera: Vec<Vec<f64>>,
 }
 
@@ -37,11 +37,11 @@ impl ProcessTimes {
     }
 }
 
-/// The times of the same tasks in several processes. A task is found by its key: its
-/// position in the schedule, or a value of the study's own.
+/// The times of the same tasks in several processes, found by the keys of the tasks.
+/// A key is the position in the schedule, or a value of the study's own.
 pub struct OverProcesses<K = usize> {
     keys: Vec<K>,
-    /// By task, ln ns in each process: empty without times, or the verdict of
+    /// Per task, ln ns in each process: empty without times, or the verdict of
     /// the first process in which it failed.
     logs: Vec<Result<Vec<f64>, Verdict>>,
     /// The first task with times: what slows it slows all.

@@ -1,5 +1,5 @@
-//! Keyed tasks: the tasks of one timed pass, each with the key that its times are found
-//! by, and the schedule that goes to the other processes.
+//! Keyed tasks of one timed pass: times are found by key, never by position. With
+//! their schedule, which goes to the other processes.
 
 use serde::{Deserialize, Serialize};
 
