@@ -335,8 +335,8 @@ impl<'a> Entry<'a> {
         self.verdict.status == Status::Ok && self.subject.built.is_ok()
     }
 
-    /// Asks every camera that is to be timed once more: the answers must be those of the first
-    /// process, which has compared them with the reference.
+    /// Queries with every camera that will be timed. The answers must be those of the
+    /// first process, which compared them with the reference.
     fn compare_digests(&mut self, workload: &Workload, known: &Known, notice: Notice) {
         let Ok(built) = &self.subject.built else {
             return;

@@ -37,7 +37,7 @@ impl ProcessTimes {
     }
 }
 
-/// The times of the same tasks in several processes, found by the keys of the tasks.
+/// Times of the same tasks in several processes, found by the keys of the tasks.
 /// A key is the position in the schedule, or a value of the study's own.
 pub struct OverProcesses<K = usize> {
     keys: Vec<K>,
