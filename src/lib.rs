@@ -74,13 +74,16 @@
 #[macro_use]
 mod named;
 
+#[cfg(feature = "cli")]
 pub mod advise;
 pub mod arithmetic;
 pub mod camera;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod culling;
+#[cfg(feature = "cli")]
 pub mod drift;
+#[cfg(feature = "cli")]
 pub mod funnel;
 pub mod geometry;
 pub mod index;
@@ -90,6 +93,7 @@ pub mod kernel;
 pub mod measure;
 pub mod oracle;
 pub mod path;
+#[cfg(feature = "cli")]
 pub mod precision;
 pub mod query;
 pub mod report;
@@ -97,8 +101,10 @@ pub mod scene;
 pub mod shown;
 pub mod spec;
 pub mod statistics;
+#[cfg(feature = "cli")]
 pub mod stress;
 pub mod suite;
 pub mod threads;
 pub mod verify;
+#[cfg(feature = "cli")]
 pub mod visibility;

@@ -41,6 +41,7 @@ mod wide;
 
 pub use block_order::BlockOrder;
 pub use bsp::{Bsp, BspBuilder, BspParams};
+#[cfg(feature = "cli")]
 pub(crate) use bvh::scale_for;
 pub use bvh::{Bvh, BvhParams, BvhPreset};
 pub(crate) use contract::check_range;

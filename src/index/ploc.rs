@@ -223,6 +223,7 @@ where
 }
 
 /// The preset that was fastest for views and for rays: one item a leaf.
+#[cfg(any(test, feature = "cli"))]
 pub(crate) const ONE_A_LEAF: BvhBuildParams = BvhBuildParams {
     max_prims_per_leaf: 1,
     pre_split: false,

@@ -55,6 +55,7 @@ pub use samples::{NOTICE, SAMPLES, Sample};
 pub use shape::ItemShape;
 pub use sought::Sought;
 pub use source::{LoadOptions, check_fits, load};
+#[cfg(feature = "cli")]
 pub(crate) use surface::volume_within;
 pub use surface::{SurfaceKind, Surfaces};
 pub use wad::{WadMap, map_names};

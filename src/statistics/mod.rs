@@ -10,11 +10,11 @@ mod one_run;
 mod quantiles;
 mod ranking;
 mod rate;
-#[cfg(test)]
-mod simulation;
 mod slope;
 mod speeds;
 mod student;
+#[cfg(test)]
+mod tests_simulation;
 mod trimmed;
 mod unpaired;
 

@@ -4,10 +4,13 @@
 
 mod conformance;
 mod kernels;
+#[cfg(feature = "cli")]
+mod picking;
 mod portable;
 mod ranges;
 mod road_sabotage;
 mod sabotage;
 mod stability;
+#[cfg(feature = "cli")]
 mod stress_sabotage;
 mod threads;

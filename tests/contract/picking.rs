@@ -1,0 +1,90 @@
+//! Conformance of the picking back ends: what each declares exact is the answer of the
+//! plain loop.
+
+use cullbench::kernel::Kernel;
+use cullbench::scene::{self, Scene, SeededRng, WorldBox};
+use cullbench::visibility::pick::{self, Facets, Hit, Pick};
+use cullbench::visibility::{Ray, Solids};
+use glam::DVec3;
+
+/// Back ends of picking that declare nothing may differ from the exact answer where
+/// depths are equal or rounded, but not in the open: on rays and boxes without any grid
+/// the answers are the same.
+#[test]
+fn peers_pick_what_the_reference_picks() {
+    let mut rng = SeededRng::new(5);
+    let mut random = |_| WorldBox::around(rng.point() * 100.0, rng.point() * 8.0);
+    let boxes = (0..300).map(&mut random).collect::<Vec<_>>();
+    let solids = Solids::of(&Scene::from_boxes("random", &boxes).unwrap());
+    let reference = pick::Linear::of(&solids);
+    for row in pick::BACK_ENDS {
+        let back_end = (row.build)(&solids, Kernel::best()).unwrap();
+        let (mut hits, mut truth) = (Vec::new(), Vec::new());
+        let mut met = 0;
+        for _ in 0..300 {
+            let ray = Ray {
+                origin: rng.point() * 20.0,
+                direction: DVec3::splat(50.0) - rng.point() * 20.0,
+                near: 0.5,
+                far: 200.0,
+            };
+            let (found, wanted) = (back_end.first(&ray), reference.first(&ray));
+            let item = |hit: Option<Hit>| hit.map(|hit| hit.item);
+            assert_eq!(item(found), item(wanted), "{} {ray:?}", row.name);
+            met += usize::from(wanted.is_some());
+            if let (Some(found), Some(wanted)) = (found, wanted) {
+                assert!((found.depth - wanted.depth).abs() < 1e-3 * wanted.depth.max(1.0));
+            }
+            back_end.nearest(&ray, 4, &mut hits);
+            reference.nearest(&ray, 4, &mut truth);
+            assert!(hits.iter().map(|h| h.item).eq(truth.iter().map(|h| h.item)));
+        }
+        assert!(met > 100, "the premise: {met}");
+    }
+}
+
+/// The same of triangles: of spheres, which no ray of these meets on an edge.
+#[test]
+fn peers_pick_the_triangles_that_the_reference_picks() {
+    let scene = scene::load("mesh:spheres:n=26000", &Default::default()).unwrap();
+    let surfaces = scene.surfaces.as_ref().expect("a mesh has triangles");
+    let facets = Facets::of(surfaces, scene.items.len());
+    let bounds = scene.world_bounds();
+    let built = pick::BACK_ENDS.iter().filter_map(|row| {
+        let build = row.build_triangles?;
+        Some((row, build(&facets, Kernel::best()).unwrap()))
+    });
+    let built: Vec<_> = built.collect();
+    let (_, reference) = &built[0];
+    assert_eq!(built[0].0.name, "linear");
+    let mut rng = SeededRng::new(6);
+    let (mut hits, mut truth) = (Vec::new(), Vec::new());
+    let (mut met, mut several) = (0, 0);
+    for _ in 0..300 {
+        let target = &scene.items[rng.below(scene.items.len())];
+        let target = scene.origin + target.centre().as_dvec3() + rng.normal3();
+        let origin = bounds.min + (bounds.max - bounds.min) * rng.point();
+        let ray = Ray {
+            origin,
+            direction: (target - origin).normalize() * 2.0,
+            near: 0.5,
+            far: 500.0,
+        };
+        let wanted = reference.first(&ray);
+        reference.nearest(&ray, 4, &mut truth);
+        met += usize::from(wanted.is_some());
+        several += usize::from(truth.len() > 1);
+        for (row, back_end) in &built {
+            let found = back_end.first(&ray);
+            let item = |hit: Option<Hit>| hit.map(|hit| hit.item);
+            assert_eq!(item(found), item(wanted), "{} {ray:?}", row.name);
+            if let (Some(found), Some(wanted)) = (found, wanted) {
+                assert!((found.depth - wanted.depth).abs() < 1e-3 * wanted.depth.max(1.0));
+            }
+            back_end.nearest(&ray, 4, &mut hits);
+            let same = hits.iter().map(|h| h.item).eq(truth.iter().map(|h| h.item));
+            assert!(same, "{} {ray:?}", row.name);
+        }
+    }
+    assert!(met > 50 && several > 20, "the premise: {met} {several}");
+}
