@@ -177,7 +177,8 @@ fn main() -> ExitCode {
         let Some(exponent) = slope(logs) else {
             continue;
         };
-        let (value, lower, upper) = (exponent.value, exponent.lower, exponent.upper);
+        let value = exponent.value;
+        let [lower, upper] = [exponent.lower, exponent.upper].map(|end| end.unwrap_or(f64::NAN));
         println!("{name}: N^{value:.3} [{lower:.3}, {upper:.3}] at {FIXED} visible items");
         if *name == "wide" && value > MOST_EXPONENT {
             missed.push(format!("exponent {value:.3} > {MOST_EXPONENT}"));

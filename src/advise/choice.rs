@@ -279,8 +279,8 @@ impl TestChoice {
             TestRow {
                 test: test.name(),
                 query_ns: query.map(|q| q.value),
-                query_ns_lower: query.map(|q| q.lower).filter(|ns| ns.is_finite()),
-                query_ns_upper: query.map(|q| q.upper).filter(|ns| ns.is_finite()),
+                query_ns_lower: query.and_then(|q| q.lower),
+                query_ns_upper: query.and_then(|q| q.upper),
                 excess: rate_of(|e| e.false_positives),
                 false_negative_ppm: rate_of(|e| e.false_negatives).map(|share| share.per(1e6)),
                 false_positives_per_query: extra,

@@ -157,7 +157,12 @@ pub fn of_growths(growths: &[Growth]) -> Table {
             sizes.map_or(String::new(), |(least, most)| {
                 format!("{} - {}", text::count(*least), text::count(*most))
             }),
-            format!("{:.2} [{:.2}, {:.2}]", e.value, e.lower, e.upper),
+            format!(
+                "{:.2} [{:.2}, {:.2}]",
+                e.value,
+                e.lower.unwrap_or(f64::NAN),
+                e.upper.unwrap_or(f64::NAN)
+            ),
         ]);
     }
     table

@@ -76,10 +76,9 @@ pub fn estimate(metric: Option<&Metric>) -> String {
     metric.map(shown).unwrap_or_default()
 }
 
-/// The same of one whose interval may be NaN.
+/// The same of an estimate.
 pub fn within(found: &Estimate) -> String {
-    let ends = [found.lower, found.upper].map(|end| Some(end).filter(|end| end.is_finite()));
-    significant(found.value) + &interval(ends, 1.0)
+    significant(found.value) + &interval([found.lower, found.upper], 1.0)
 }
 
 /// A time with its 95 % interval in the same unit: "1.81 us [1.75, 1.90]".
@@ -175,7 +174,7 @@ pub fn interval(ends: [Option<f64>; 2], unit: f64) -> String {
 /// twice: "10 processes (a twin took 1.00 [0.99, 1.01] times as long)".
 pub fn over(processes: usize, twin: Option<&Estimate>) -> String {
     let count = counted(processes, "process");
-    match twin.filter(|twin| twin.lower.is_finite()) {
+    match twin.filter(|twin| twin.lower.is_some()) {
         Some(twin) => format!("{count} (a twin took {} times as long)", within(twin)),
         None => format!("{count}: times without intervals, no ties (--processes 10 gives both)"),
     }

@@ -52,9 +52,8 @@ pub struct Candidate {
 
 /// Value and interval of a task's time per unit, in ns.
 pub fn per_unit(times: &OverProcesses, task: usize, units: f64) -> [Option<f64>; 3] {
-    let found = times.ns(task).map(|ns| [ns.value, ns.lower, ns.upper]);
-    let finite = |ns: f64| Some(ns / units).filter(|ns| ns.is_finite());
-    found.map_or([None; 3], |found| found.map(finite))
+    let found = times.ns(task).map(|ns| ns.per(units));
+    found.map_or([None; 3], |ns| [Some(ns.value), ns.lower, ns.upper])
 }
 
 /// Methods with their errors, and the times of the tasks from `first` on; which to take

@@ -45,10 +45,9 @@ impl BoundRow {
     /// With its time, and the back end's over it.
     pub fn set(&mut self, own: Option<Estimate>, ratio: Option<Estimate>) {
         self.times = Times::of(own);
-        let finite = |end: f64| Some(end).filter(|end| end.is_finite());
         self.ratio = ratio.map(|r| r.value);
-        self.ratio_lower = ratio.and_then(|r| finite(r.lower));
-        self.ratio_upper = ratio.and_then(|r| finite(r.upper));
+        self.ratio_lower = ratio.and_then(|r| r.lower);
+        self.ratio_upper = ratio.and_then(|r| r.upper);
     }
 }
 

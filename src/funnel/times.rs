@@ -23,8 +23,8 @@ impl Times {
         };
         Times {
             stage_ns: Some(found.value),
-            stage_ns_lower: Some(found.lower).filter(|ns| ns.is_finite()),
-            stage_ns_upper: Some(found.upper).filter(|ns| ns.is_finite()),
+            stage_ns_lower: found.lower,
+            stage_ns_upper: found.upper,
         }
     }
 }

@@ -1,5 +1,4 @@
-//! The list of metrics, a measured value, and the map in which a cell collects
-//! its own. What each value is computed from is `cell`'s.
+//! The list of metrics, a measured value, and the metrics of one cell.
 
 use std::collections::BTreeMap;
 
@@ -18,15 +17,8 @@ pub struct MetricInfo {
     pub summary: &'static str,
 }
 
-macro_rules! metrics {
-    ($($name:literal, $unit:literal, $summary:literal;)*) => {
-        /// All metrics of a cell, in the order of the columns.
-        pub static METRICS: &[MetricInfo] =
-            &[$(MetricInfo { name: $name, unit: $unit, summary: $summary }),*];
-    };
-}
-
-metrics! {
+/// All metrics of a cell, in the order of the columns.
+pub static METRICS: &[MetricInfo] = rows! { MetricInfo { name, unit, summary }
     "visible_count", "items", "visible items per query, mean over the path";
     "cull_rate", "1", "1 - visible/total, mean over the path";
     "query_ns", "ns", "thread CPU time per frustum query, mean over the timed cameras: trimmed mean over the processes, each the interquartile mean over its rounds; interval over the processes";
@@ -64,7 +56,7 @@ metrics! {
     "locate_speedup", "1", "as speedup, for region search";
     "comparisons", "bounds", "bounds tested per region search, of nodes and items, mean";
     "regions_found", "regions", "regions that hold the eye, mean over the path";
-}
+};
 
 /// A value, with its 95 % interval where it was sampled.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
@@ -85,36 +77,28 @@ pub struct Metric {
 pub(super) struct Metrics(pub(super) BTreeMap<String, Metric>);
 
 impl Metrics {
-    pub(super) fn insert(&mut self, name: &str, value: f64, interval: Option<(f64, f64)>) {
+    /// A missing or infinite value is absent, never 0 and never NaN.
+    pub(super) fn estimate(&mut self, name: &str, estimate: Option<Estimate>) {
         let info = METRICS.iter().find(|m| m.name == name);
         debug_assert!(info.is_some(), "{name} is not in the list of metrics");
-        // A missing value is absent, never 0 and never NaN.
-        if let Some(info) = info.filter(|_| value.is_finite()) {
+        if let (Some(info), Some(found)) = (info, estimate.filter(|e| e.value.is_finite())) {
             let metric = Metric {
-                value,
-                lower: interval.map(|i| i.0),
-                upper: interval.map(|i| i.1),
+                value: found.value,
+                lower: found.lower,
+                upper: found.upper,
                 unit: info.unit.to_owned(),
             };
             self.0.insert(name.to_owned(), metric);
         }
     }
 
-    pub(super) fn set(&mut self, name: &str, value: f64) {
-        self.insert(name, value, None);
-    }
-
-    pub(super) fn maybe(&mut self, name: &str, value: Option<f64>) {
-        if let Some(value) = value {
-            self.set(name, value);
-        }
-    }
-
-    /// An interval that is not known is NaN on both sides, and absent here.
-    pub(super) fn estimate(&mut self, name: &str, estimate: Option<Estimate>) {
-        if let Some(e) = estimate {
-            let interval = Some((e.lower, e.upper)).filter(|i| i.0.is_finite());
-            self.insert(name, e.value, interval);
-        }
+    /// A value without an interval.
+    pub(super) fn set(&mut self, name: &str, value: impl Into<Option<f64>>) {
+        let exact = |value| Estimate {
+            value,
+            lower: None,
+            upper: None,
+        };
+        self.estimate(name, value.into().map(exact));
     }
 }

@@ -1,7 +1,6 @@
-//! From the parts of all processes to the cells of a report: every value, its
-//! interval, every ratio and every rank come from the same quantities, the
-//! logarithms of time of each structure in each process, by the estimators of
-//! [`crate::statistics`].
+//! Cells of a report from the parts of all processes. Every value, interval, ratio and
+//! rank comes from the same quantities, the logarithms of time of each structure in
+//! each process, by the estimators of [`crate::statistics`].
 
 use std::collections::BTreeMap;
 
@@ -9,7 +8,7 @@ use serde_json::Value;
 
 use super::bounds::{BOUNDS, Bound};
 use super::group::{GroupPlan, LEAST_TAIL, measure_part};
-use super::metrics::{METRICS, Metric, Metrics};
+use super::metrics::{METRICS, Metrics};
 use super::part::{Known, Part, SubjectPart, TaskPart};
 use super::subject::TWIN;
 use super::update::MOST_UPDATED;
@@ -18,7 +17,7 @@ use super::{
     UPDATE_SHARES, Verdict, Workload,
 };
 use crate::statistics::{
-    ALPHA, Estimate, interquartile_mean, median, one_run, quantile, ranks, ratio, sorted,
+    ALPHA, Estimate, interquartile_mean, median, one_run, quantile, ranks, ratio, sorted, speedup,
 };
 
 /// In the order of [`UPDATE_SHARES`].
@@ -27,6 +26,21 @@ const UPDATE_METRICS: [&str; UPDATE_SHARES.len()] = [
     "update_ms",
     "update_ms_10_percent",
     "update_ms_100_percent",
+];
+
+/// Metrics of each task: its time, and its speed-up over the yardstick.
+const TIME_METRICS: [(TaskKind, &str, Option<&str>); 3] = [
+    (TaskKind::Query, "query_ns", Some("speedup")),
+    (TaskKind::Locate, "locate_ns", Some("locate_speedup")),
+    (TaskKind::LocateBatched, "locate_batched_ns", None),
+];
+
+/// Quantiles over groups of cameras.
+const TAIL_METRICS: [(&str, f64); 4] = [
+    ("query_ns_p5", 0.05),
+    ("query_ns_p95", 0.95),
+    ("query_ns_p99", 0.99),
+    ("query_ns_max", 1.0),
 ];
 
 /// The structure that speed-ups refer to.
@@ -39,9 +53,9 @@ pub struct Group {
     pub cells: Vec<ReportCell>,
     /// Lower bounds: no structures, never ranked.
     pub bounds: Vec<ReportCell>,
-    /// Structure and ratio of the one that was entered twice: 1 is to lie in
-    /// the interval.
-    pub twin: Option<(String, Metric)>,
+    /// The structure that was entered twice, and time of the second entry / time of the
+    /// first: the interval should contain 1.
+    pub twin: Option<(String, Estimate)>,
     /// The ranks of structures by their times of region search.
     pub located: Vec<(String, usize)>,
 }
@@ -70,20 +84,16 @@ pub fn measure_group(
     Some(Group::of(&[part]))
 }
 
-/// ln ns per query in each process, by label and task.
-type Logs<'p> = BTreeMap<(&'p str, TaskKind), Vec<f64>>;
-
 impl Group {
-    /// Of the parts of one group, one for each process, the first process first.
+    /// Cells of a group from its parts, one per process, the first process first.
     ///
     /// # Panics
     /// Without parts.
     pub fn of(parts: &[Part]) -> Group {
         let facts = Facts::of(parts);
         let first = &parts[0];
-        let mut cells: Vec<ReportCell> = first
-            .subjects
-            .iter()
+        let subjects = first.subjects.iter();
+        let mut cells: Vec<ReportCell> = subjects
             .filter(|s| !s.label.ends_with(TWIN))
             .map(|subject| facts.cell(subject))
             .collect();
@@ -105,24 +115,23 @@ impl Group {
 /// The parts of a group in the form that cells are read off.
 struct Facts<'p> {
     parts: &'p [Part],
+    known: Option<&'p Known>,
     /// Structures whose timed pass is not what the plan asks for.
     contradictions: Vec<(&'p str, Verdict)>,
-    logs: Logs<'p>,
-    /// ln ns of the yardstick for each task, or of the first structure that has
-    /// times where there is no yardstick.
-    reference: BTreeMap<TaskKind, &'p str>,
-    has_yardstick: bool,
+    /// ln ns per query in each process, by label and task.
+    logs: BTreeMap<(&'p str, TaskKind), Vec<f64>>,
+    /// The yardstick, or the first structure that has times where there is no yardstick.
+    reference: Option<&'p str>,
 }
 
 impl<'p> Facts<'p> {
     fn of(parts: &'p [Part]) -> Facts<'p> {
-        let mut logs: Logs = BTreeMap::new();
+        let mut logs: BTreeMap<_, Vec<f64>> = BTreeMap::new();
         for task in parts.iter().flat_map(|part| &part.tasks) {
             let rounds: Vec<f64> = task.rounds_ns.iter().map(|ns| ns.ln()).collect();
             if let (Some(ln_ns), Status::Ok) = (interquartile_mean(&rounds), task.verdict.status) {
-                logs.entry((&task.label, task.task))
-                    .or_default()
-                    .push(ln_ns);
+                let key = (task.label.as_str(), task.task);
+                logs.entry(key).or_default().push(ln_ns);
             }
         }
         // What is not there in every process is paired with nothing.
@@ -135,74 +144,71 @@ impl<'p> Facts<'p> {
         });
         let mut facts = Facts {
             parts,
+            known,
             contradictions,
             logs,
-            reference: BTreeMap::new(),
-            has_yardstick: false,
+            reference: None,
         };
-        let right = |label: &str| facts.verdict(label).status == Status::Ok;
         let labels = parts[0].subjects.iter().map(|s| s.label.as_str());
-        let has_yardstick =
-            right(YARDSTICK) && facts.logs.contains_key(&(YARDSTICK, TaskKind::Query));
-        let reference = match has_yardstick {
-            true => Some(YARDSTICK),
-            false => labels
-                .filter(|label| right(label))
-                .find(|label| facts.logs.contains_key(&(*label, TaskKind::Query))),
-        };
-        let tasks = [TaskKind::Query, TaskKind::Locate, TaskKind::LocateBatched];
-        let reference = reference
-            .iter()
-            .flat_map(|label| tasks.map(|task| (task, *label)));
-        facts.reference = reference.collect();
-        facts.has_yardstick = has_yardstick;
+        facts.reference = std::iter::once(YARDSTICK).chain(labels).find(|label| {
+            let is_timed = facts.logs.contains_key(&(*label, TaskKind::Query));
+            is_timed && facts.verdict(label).status == Status::Ok
+        });
         facts
+    }
+
+    fn has_yardstick(&self) -> bool {
+        self.reference == Some(YARDSTICK)
     }
 
     fn log<'s>(&'s self, label: &'s str, task: TaskKind) -> Option<&'s [f64]> {
         self.logs.get(&(label, task)).map(Vec::as_slice)
     }
 
-    fn reference(&self, task: TaskKind) -> Option<&[f64]> {
-        self.log(self.reference.get(&task)?, task)
+    /// Times of a structure and of the reference, ln ns in each process.
+    fn paired<'s>(&'s self, label: &'s str, task: TaskKind) -> Option<[&'s [f64]; 2]> {
+        Some([self.log(self.reference?, task)?, self.log(label, task)?])
     }
 
-    /// What became of a structure over all processes: the first that failed.
+    fn ns(&self, label: &str, task: TaskKind) -> Option<Estimate> {
+        let [reference, own] = self.paired(label, task)?;
+        one_run(reference, own)
+    }
+
+    /// Verdict of a structure over all processes: the first failure.
     fn verdict(&self, label: &str) -> Verdict {
-        let subjects = self.parts.iter().flat_map(|part| &part.subjects);
-        let own = subjects.filter(|s| s.label == label).map(|s| &s.verdict);
+        let own = self.subjects(label).map(|s| &s.verdict);
         let tasks = self.parts.iter().flat_map(|part| &part.tasks);
         let timed = tasks.filter(|t| t.label == label).map(|t| &t.verdict);
         let contradictions = self.contradictions.iter();
         let contradicted = contradictions.filter(|c| c.0 == label).map(|c| &c.1);
         let mut all = own.chain(timed).chain(contradicted);
-        let first = all.clone().next().cloned().unwrap_or_else(Verdict::ok);
-        all.find(|v| v.status != Status::Ok)
-            .cloned()
-            .unwrap_or(first)
+        let first = all.clone().next();
+        let failed = all.find(|v| v.status != Status::Ok);
+        failed.or(first).cloned().unwrap_or_else(Verdict::ok)
     }
 
-    fn subjects(&self, label: &str) -> impl Iterator<Item = &'p SubjectPart> {
+    fn subjects<'l>(
+        &self,
+        label: &'l str,
+    ) -> impl Iterator<Item = &'p SubjectPart> + Clone + use<'p, 'l> {
         let all = self.parts.iter().flat_map(|part| &part.subjects);
         all.filter(move |s| s.label == label)
     }
 
-    fn tasks(&self, label: &str, task: TaskKind) -> impl Iterator<Item = &'p TaskPart> {
+    /// The frustum queries of a structure in each process.
+    fn queries<'l>(&self, label: &'l str) -> impl Iterator<Item = &'p TaskPart> + use<'p, 'l> {
         let all = self.parts.iter().flat_map(|part| &part.tasks);
-        all.filter(move |t| t.label == label && t.task == task)
+        all.filter(move |t| t.label == label && t.task == TaskKind::Query)
     }
 
     /// Visible items of a timed camera, mean.
     fn visible_when_timed(&self) -> Option<f64> {
-        let known = self.known()?;
+        let known = self.known?;
         let cameras = &known.query.as_ref()?.schedule.cameras;
         let of_camera = |camera: &u32| Some(known.visible.get(*camera as usize)?.count as f64);
         let visible = cameras.iter().map(of_camera).sum::<Option<f64>>()?;
         Some(visible / cameras.len() as f64)
-    }
-
-    fn known(&self) -> Option<&'p Known> {
-        self.parts.iter().find_map(|part| part.known.as_ref())
     }
 
     fn cell(&self, subject: &SubjectPart) -> ReportCell {
@@ -214,27 +220,28 @@ impl<'p> Facts<'p> {
             .filter(|_| right || verdict.status == Status::Unsafe);
         let mut metrics = Metrics::default();
         self.build_metrics(&mut metrics, label);
-        // A stream may hold others.
-        for metric in METRICS.iter().filter(|_| right) {
-            metrics.maybe(metric.name, subject.counts.get(metric.name).copied());
-        }
         if let Some(judged) = &judged {
             error_metrics(&mut metrics, judged);
         }
+        let mut left_out = Vec::new();
         if right {
+            // A stream may hold others.
+            for metric in METRICS {
+                metrics.set(metric.name, subject.counts.get(metric.name).copied());
+            }
             self.time_metrics(&mut metrics, label);
-            self.break_even(&mut metrics, label);
+            metrics.set("break_even_queries", self.break_even(label));
             for bound in BOUNDS {
                 metrics.estimate(bound.ratio, self.ratio(label, bound.name));
             }
+            left_out = self.left_out(label);
         }
-        let left_out = right.then(|| self.left_out(label));
         ReportCell {
             kind: Some(subject.kind),
             origin: Some(subject.origin.clone()),
             params: subject.params.clone(),
             error: judged,
-            left_out: left_out.unwrap_or_default(),
+            left_out,
             ..self.timed(label, verdict, metrics)
         }
     }
@@ -247,17 +254,15 @@ impl<'p> Facts<'p> {
 
     /// A cell with what structures and lower bounds have in common.
     fn timed(&self, label: &str, verdict: Verdict, metrics: Metrics) -> ReportCell {
-        let Part {
-            scene, path, key, ..
-        } = &self.parts[0];
+        let first = &self.parts[0];
         ReportCell {
-            scene: scene.clone(),
-            path: path.clone(),
+            scene: first.scene.clone(),
+            path: first.path.clone(),
             structure: label.to_owned(),
             kind: None,
             origin: None,
             params: Value::Null,
-            test: key.test.clone(),
+            test: first.key.test.clone(),
             status: verdict.status,
             reason: verdict.reason,
             rank: None,
@@ -271,41 +276,32 @@ impl<'p> Facts<'p> {
 
     /// Metrics that an ok cell has elsewhere and not here.
     fn left_out(&self, label: &str) -> Vec<String> {
-        let mut left_out = Vec::new();
-        let items = self.parts[0].scene.total_count;
-        if items > MOST_UPDATED {
-            left_out.push(format!(
-                "update_ms: scenes of more than {MOST_UPDATED} items are not moved"
-            ));
-        }
-        if self.log(label, TaskKind::Locate).is_none() {
-            left_out.push("locate_ns: this suite times frustum queries only".to_owned());
-        }
-        let mut queries = self.tasks(label, TaskKind::Query);
-        if queries.any(|task| task.tail_ns.len() < LEAST_TAIL) {
-            left_out.push(format!(
-                "query_ns_p95: fewer than {LEAST_TAIL} comparable groups of cameras"
-            ));
-        }
-        left_out
+        let is_large = self.parts[0].scene.total_count > MOST_UPDATED;
+        let has_few_groups = |task: &TaskPart| task.tail_ns.len() < LEAST_TAIL;
+        let reasons = [
+            is_large.then(|| {
+                format!("update_ms: scenes of more than {MOST_UPDATED} items are not moved")
+            }),
+            (self.log(label, TaskKind::Locate).is_none())
+                .then(|| "locate_ns: this suite times frustum queries only".to_owned()),
+            (self.queries(label).any(has_few_groups)).then(|| {
+                format!("query_ns_p95: fewer than {LEAST_TAIL} comparable groups of cameras")
+            }),
+        ];
+        reasons.into_iter().flatten().collect()
     }
 
     fn times(&self, label: &str) -> CellTimes {
-        let known = self.known();
-        let named = known.and_then(|known| known.query.as_ref());
-        let plan = named.and_then(|named| {
-            let place = named
-                .keys
-                .iter()
-                .position(|(l, task)| l == label && *task == TaskKind::Query)?;
-            Some((named.schedule.tasks.get(place)?, &named.schedule))
+        let planned = self.known.and_then(|known| known.query.as_ref());
+        let planned = planned.and_then(|plan| {
+            let own =
+                |(other, task): &(String, TaskKind)| other == label && *task == TaskKind::Query;
+            let task = plan.schedule.tasks.get(plan.keys.iter().position(own)?)?;
+            Some((task.batch as usize, plan.schedule.cameras.len()))
         });
+        let (batch, cameras_timed) = planned.unwrap_or_default();
         let mut by_process = BTreeMap::new();
-        for (metric, task) in [
-            ("query_ns", TaskKind::Query),
-            ("locate_ns", TaskKind::Locate),
-            ("locate_batched_ns", TaskKind::LocateBatched),
-        ] {
+        for (task, metric, _) in TIME_METRICS {
             if let Some(own) = self.log(label, task) {
                 by_process.insert(metric.to_owned(), own.iter().map(|x| x.exp()).collect());
             }
@@ -314,170 +310,122 @@ impl<'p> Facts<'p> {
         if !builds.is_empty() {
             by_process.insert("build_ms".to_owned(), builds);
         }
-        let rounds = self
-            .tasks(label, TaskKind::Query)
-            .map(|t| t.rounds_ns.len())
-            .min();
         CellTimes {
             processes: self.log(label, TaskKind::Query).map_or(0, <[f64]>::len),
-            rounds: rounds.unwrap_or(0),
-            cameras_timed: plan.map_or(0, |(_, schedule)| schedule.cameras.len()),
-            cameras_checked: known.map_or(0, |known| known.visible.len()),
-            batch: plan.map_or(0, |(task, _)| task.batch as usize),
+            rounds: (self.queries(label).map(|t| t.rounds_ns.len()).min()).unwrap_or(0),
+            cameras_timed,
+            cameras_checked: self.known.map_or(0, |known| known.visible.len()),
+            batch,
             by_process,
         }
     }
 
+    /// A positive value of a structure over the processes that have it.
+    fn over_processes(
+        &self,
+        label: &str,
+        of: impl Fn(&SubjectPart) -> Option<f64>,
+    ) -> Option<Estimate> {
+        let values = self.subjects(label).filter_map(of).filter(|v| *v > 0.0);
+        let logs: Vec<f64> = values.map(f64::ln).collect();
+        one_run(&logs, &logs)
+    }
+
     fn build_metrics(&self, metrics: &mut Metrics, label: &str) {
-        let ln = |values: Vec<f64>| -> Vec<f64> {
-            let positive = values.into_iter().filter(|v| *v > 0.0);
-            positive.map(f64::ln).collect()
-        };
-        let over = |values: Vec<f64>| {
-            let logs = ln(values);
-            shown(&logs, &logs)
-        };
-        let builds = self.subjects(label).filter_map(|s| s.build_ms).collect();
-        metrics.estimate("build_ms", over(builds));
+        metrics.estimate("build_ms", self.over_processes(label, |s| s.build_ms));
         for (share, name) in UPDATE_METRICS.into_iter().enumerate() {
-            let updates = self
-                .subjects(label)
-                .filter_map(|s| s.update_ms.get(share).copied());
-            metrics.estimate(name, over(updates.collect()));
+            let update = self.over_processes(label, |s| s.update_ms.get(share).copied());
+            metrics.estimate(name, update);
         }
         let worn: Vec<f64> = self.subjects(label).filter_map(|s| s.refitted_ln).collect();
-        metrics.estimate("refitted_over_rebuilt", shown(&worn, &worn));
+        metrics.estimate("refitted_over_rebuilt", one_run(&worn, &worn));
         let items = self.parts[0].scene.total_count as f64;
         let bytes = self.subjects(label).find_map(|s| s.memory_bytes);
-        if let Some(bytes) = bytes {
-            metrics.set("memory_bytes_per_item", bytes as f64 / items);
-        }
+        metrics.set(
+            "memory_bytes_per_item",
+            bytes.map(|bytes| bytes as f64 / items),
+        );
     }
 
     fn time_metrics(&self, metrics: &mut Metrics, label: &str) {
-        for (task, time, speedup) in [
-            (TaskKind::Query, "query_ns", Some("speedup")),
-            (TaskKind::Locate, "locate_ns", Some("locate_speedup")),
-            (TaskKind::LocateBatched, "locate_batched_ns", None),
-        ] {
-            let (Some(own), Some(reference)) = (self.log(label, task), self.reference(task)) else {
+        for (task, time, faster) in TIME_METRICS {
+            let Some([reference, own]) = self.paired(label, task) else {
                 continue;
             };
-            let Some(shown) = one_run(reference, own) else {
-                continue;
-            };
-            metrics.insert(time, shown.value, shown.lower.zip(shown.upper));
-            if let (TaskKind::Query, Some(visible)) = (task, self.visible_when_timed()) {
-                let interval = shown.lower.zip(shown.upper);
-                let interval = interval.map(|(lower, upper)| (lower / visible, upper / visible));
-                metrics.insert("ns_per_visible", shown.value / visible, interval);
+            let ns = one_run(reference, own);
+            metrics.estimate(time, ns);
+            if task == TaskKind::Query {
+                let visible = self.visible_when_timed();
+                metrics.estimate("ns_per_visible", ns.zip(visible).map(|(ns, v)| ns.per(v)));
             }
-            if let (Some(speedup), true) = (speedup, self.has_yardstick) {
-                let interval = shown.speedup_lower.zip(shown.speedup_upper);
-                metrics.insert(speedup, shown.speedup, interval);
+            if let Some(faster) = faster.filter(|_| self.has_yardstick()) {
+                metrics.estimate(faster, speedup(reference, own));
             }
         }
-        let queries = || self.tasks(label, TaskKind::Query);
-        let wall: Vec<f64> = queries().filter_map(|t| t.wall_ln_ns).collect();
-        metrics.estimate("query_wall_ns", shown(&wall, &wall));
-        let tails: Vec<&Vec<f64>> = queries().map(|t| &t.tail_ns).collect();
-        let groups = tails.iter().map(|t| t.len()).min().unwrap_or(0);
+        let wall: Vec<f64> = self.queries(label).filter_map(|t| t.wall_ln_ns).collect();
+        metrics.estimate("query_wall_ns", one_run(&wall, &wall));
+        let tails: Vec<&[f64]> = self.queries(label).map(|t| &t.tail_ns[..]).collect();
+        let groups = tails.iter().map(|tail| tail.len()).min().unwrap_or(0);
         if groups >= LEAST_TAIL {
             let of_group = |g: usize| median(&tails.iter().map(|t| t[g]).collect::<Vec<_>>());
             let all = sorted((0..groups).filter_map(of_group).collect());
-            for (name, q) in [
-                ("query_ns_p5", 0.05),
-                ("query_ns_p95", 0.95),
-                ("query_ns_p99", 0.99),
-                ("query_ns_max", 1.0),
-            ] {
-                metrics.maybe(name, quantile(&all, q));
+            for (name, q) in TAIL_METRICS {
+                metrics.set(name, quantile(&all, q));
             }
         }
     }
 
-    /// Queries after which a build is repaid against the yardstick, from the
-    /// times that are shown.
-    fn break_even(&self, metrics: &mut Metrics, label: &str) {
-        if !self.has_yardstick {
-            return;
-        }
-        let cost = |label: &str| -> Option<(f64, f64)> {
-            let reference = self.reference(TaskKind::Query)?;
-            let query = one_run(reference, self.log(label, TaskKind::Query)?)?.value;
-            let mut built = Metrics::default();
-            self.build_metrics(&mut built, label);
-            Some((built.0.get("build_ms")?.value * 1e6, query))
+    /// Queries after which a build is repaid against the yardstick, from the times
+    /// that are shown; `None` if never.
+    fn break_even(&self, label: &str) -> Option<f64> {
+        let cost = |label: &str| -> Option<[f64; 2]> {
+            let build = self.over_processes(label, |s| s.build_ms)?.value * 1e6;
+            Some([build, self.ns(label, TaskKind::Query)?.value])
         };
-        if let (Some((build, query)), Some((linear_build, linear_query))) =
-            (cost(label), cost(YARDSTICK))
-        {
-            let (price, gain) = (build - linear_build, linear_query - query);
-            if gain > 0.0 && price > 0.0 {
-                metrics.set("break_even_queries", (price / gain).ceil());
-            }
-        }
+        let [build, query] = cost(label).filter(|_| self.has_yardstick())?;
+        let [linear_build, linear_query] = cost(YARDSTICK)?;
+        let (price, gain) = (build - linear_build, linear_query - query);
+        (gain > 0.0 && price > 0.0).then(|| (price / gain).ceil())
     }
 
     /// Time of `label` / time of `other`: the ratio of the two shown values.
     fn ratio(&self, label: &str, other: &str) -> Option<Estimate> {
-        let reference = self.reference(TaskKind::Query)?;
-        let (own, base) = (
-            self.log(label, TaskKind::Query)?,
-            self.log(other, TaskKind::Query)?,
-        );
-        ratio(reference, own, base)
+        let [reference, own] = self.paired(label, TaskKind::Query)?;
+        ratio(reference, own, self.log(other, TaskKind::Query)?)
     }
 
-    fn twin(&self) -> Option<(String, Metric)> {
+    fn twin(&self) -> Option<(String, Estimate)> {
         let mut labels = self.parts[0].subjects.iter().map(|s| s.label.as_str());
-        let twin = labels.find(|label| label.ends_with(TWIN))?;
-        let original = twin.strip_suffix(TWIN)?;
-        let ratio = self.ratio(twin, original)?;
-        let interval = |bound: f64| Some(bound).filter(|b| b.is_finite());
-        let metric = Metric {
-            value: ratio.value,
-            lower: interval(ratio.lower),
-            upper: interval(ratio.upper),
-            unit: "1".to_owned(),
-        };
-        Some((original.to_owned(), metric))
+        let (twin, original) = labels.find_map(|l| Some((l, l.strip_suffix(TWIN)?)))?;
+        Some((original.to_owned(), self.ratio(twin, original)?))
     }
 
-    /// The ranks of those cells that have times of a task.
+    /// Position and rank of each ok cell that has times of a task.
     fn ranks(&self, cells: &[ReportCell], task: TaskKind) -> Vec<(usize, usize)> {
-        let Some(reference) = self.reference(task) else {
-            return Vec::new();
-        };
-        let mut ranked = Vec::new();
-        let mut values = Vec::new();
-        for (i, cell) in cells.iter().enumerate() {
-            let own = self.log(&cell.structure, task);
-            if let (Some(own), Status::Ok) = (own, cell.status) {
-                ranked.push(i);
-                values.push(own.iter().zip(reference).map(|(own, r)| own - r).collect());
-            }
-        }
-        ranked.into_iter().zip(ranks(&values, ALPHA)).collect()
+        let ok = cells.iter().enumerate();
+        let ok = ok.filter(|(_, cell)| cell.status == Status::Ok);
+        let timed = ok.filter_map(|(i, cell)| {
+            let [reference, own] = self.paired(&cell.structure, task)?;
+            let relative = own.iter().zip(reference).map(|(own, r)| own - r);
+            Some((i, relative.collect()))
+        });
+        let (positions, values): (Vec<usize>, Vec<Vec<f64>>) = timed.unzip();
+        positions.into_iter().zip(ranks(&values, ALPHA)).collect()
     }
-}
-
-/// A value over processes from its logarithms.
-pub(super) fn shown(reference: &[f64], own: &[f64]) -> Option<Estimate> {
-    let found = one_run(reference, own)?;
-    Some(Estimate {
-        value: found.value,
-        lower: found.lower.unwrap_or(f64::NAN),
-        upper: found.upper.unwrap_or(f64::NAN),
-    })
 }
 
 fn error_metrics(metrics: &mut Metrics, judged: &Judged) {
     let (errors, queries) = (&judged.errors, judged.judged_queries as f64);
     metrics.set("judged_queries", queries);
-    if let Some(excess) = errors.excess() {
-        metrics.insert("excess", excess, judged.excess_interval.map(Into::into));
-    }
+    let interval = judged.excess_interval;
+    metrics.estimate(
+        "excess",
+        errors.excess().map(|value| Estimate {
+            value,
+            lower: interval.map(|ends| ends[0]),
+            upper: interval.map(|ends| ends[1]),
+        }),
+    );
     for (name, count) in [
         ("false_positive_count", errors.false_positives),
         ("false_negative_count", errors.false_negatives),

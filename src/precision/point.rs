@@ -76,14 +76,13 @@ impl<E> Point<E> {
         if let Some(wrong) = times.failure(task) {
             (self.status, self.reason) = (wrong.status, wrong.reason.clone());
         }
-        let Some(found) = times.ns(task) else {
+        let Some(found) = times.ns(task).map(|ns| ns.per(per)) else {
             return;
         };
-        let end = |ns: f64| Some(ns / per).filter(|ns| ns.is_finite());
         self.times = Times {
-            query_ns: Some(found.value / per),
-            query_ns_lower: end(found.lower),
-            query_ns_upper: end(found.upper),
+            query_ns: Some(found.value),
+            query_ns_lower: found.lower,
+            query_ns_upper: found.upper,
             task: Some(task),
         };
     }

@@ -104,7 +104,8 @@ mod tests {
         let found = grown(&points);
         assert_eq!(found.len(), 1);
         assert!((found[0].exponent.value - 0.5).abs() < 1e-6);
-        assert!(found[0].exponent.upper - found[0].exponent.lower < 1e-5);
+        let exponent = found[0].exponent;
+        assert!(exponent.upper.unwrap() - exponent.lower.unwrap() < 1e-5);
         assert_eq!(found[0].sizes, [10_000, 100_000, 1_000_000]);
         assert!((found[0].visible - 500.0).abs() < 1e-9);
         assert!(grown(&points[..2]).is_empty());

@@ -3,8 +3,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::measure::{Machine, Metric, PathInfo, ReportCell, Source, Status, Toolchain};
-use crate::statistics::geometric_mean;
+use crate::measure::{Machine, PathInfo, ReportCell, Source, Status, Toolchain};
+use crate::statistics::{Estimate, geometric_mean};
 
 /// Raised when a field changes its meaning or goes away.
 pub const SCHEMA_VERSION: u32 = 2;
@@ -124,7 +124,7 @@ impl TwinEntry {
 
 impl Noise {
     /// Adds a twin and brings the mean ratio up to date.
-    pub fn add(&mut self, scene: &str, path: &PathInfo, test: &str, twin: &(String, Metric)) {
+    pub fn add(&mut self, scene: &str, path: &PathInfo, test: &str, twin: &(String, Estimate)) {
         let (structure, ratio) = twin;
         self.twins.push(TwinEntry {
             scene: scene.to_owned(),

@@ -22,7 +22,7 @@ pub use front::{Standing, dominance};
 pub use holm::holm;
 pub use judgement::{Change, Judgement, judge, resolved};
 pub use means::{geometric_mean, interquartile_mean};
-pub use one_run::{Estimate, Shown, one_run, ratio};
+pub use one_run::{Estimate, one_run, ratio, speedup};
 pub use quantiles::{median, quantile, sorted};
 pub use ranking::{ALPHA, is_less, ranks};
 pub use rate::{Rate, rate, shows_less, shows_less_in_sum};

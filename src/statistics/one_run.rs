@@ -1,4 +1,4 @@
-//! What a run shows of one structure: its time, and its speed-up.
+//! The figures of one run: time, speed-up and ratio, each with its interval.
 
 use serde::Serialize;
 
@@ -8,76 +8,86 @@ use super::{Trimmed, trimmed_mean};
 /// Level of the intervals shown.
 const LEVEL: f64 = 0.95;
 
-/// A value with its 95 % interval; NaN on both sides where it has none.
+/// A value with its 95 % interval; no interval below three processes.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Estimate {
     /// The value itself.
     pub value: f64,
     /// Lower end of the interval.
-    pub lower: f64,
-    /// Upper end of the interval.
-    pub upper: f64,
-}
-
-/// A structure's time and its speed-up over the reference, each with its 95 %
-/// interval; no intervals below three processes.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Shown {
-    /// In the unit that the logarithms were taken of.
-    pub value: f64,
-    /// Lower end of the interval of `value`.
     pub lower: Option<f64>,
-    /// Upper end of the interval of `value`.
+    /// Upper end of the interval.
     pub upper: Option<f64>,
-    /// Time of the reference / time of the structure, above 1 is faster: the
-    /// ratio of the two shown values.
-    pub speedup: f64,
-    /// `None` also for the reference itself, whose speed-up is 1 by definition.
-    pub speedup_lower: Option<f64>,
-    /// Upper end of the interval of `speedup`.
-    pub speedup_upper: Option<f64>,
 }
 
-/// What to show of a structure, from ln(time) per process of the `reference`
-/// and of the structure's `own` in the same processes. `None` if the processes
-/// are not the same number, none, or a value is not finite.
+impl Estimate {
+    /// An estimate with an interval if both ends are finite.
+    pub fn within(value: f64, [lower, upper]: [f64; 2]) -> Estimate {
+        let ends = Some((lower, upper)).filter(|(l, u)| l.is_finite() && u.is_finite());
+        Estimate {
+            value,
+            lower: ends.map(|ends| ends.0),
+            upper: ends.map(|ends| ends.1),
+        }
+    }
+
+    /// Value and interval divided by a number of units.
+    pub fn per(self, units: f64) -> Estimate {
+        Estimate {
+            value: self.value / units,
+            lower: self.lower.map(|end| end / units),
+            upper: self.upper.map(|end| end / units),
+        }
+    }
+}
+
+/// Time of a structure, from ln(time) per process of the `reference` and of the
+/// structure's `own` in the same processes, in the unit that the logarithms were taken
+/// of. `None` if the processes are not the same number, none, or a value is not finite.
 ///
 /// The difference r of a process is own - reference: what slows both leaves it
-/// alone. Shown are exp(X + mean r) and the speed-up exp(-mean r), with X the
+/// alone. Shown are exp(X + mean r) and the [`speedup`] exp(-mean r), with X the
 /// reference's trimmed mean, so the ratio of two shown values is the ratio that
 /// is shown. The value's interval is as wide as that of the structure's own
 /// trimmed mean, about X + mean r: it holds the value by construction.
-pub fn one_run(reference: &[f64], own: &[f64]) -> Option<Shown> {
-    if reference.len() != own.len() {
-        return None;
-    }
-    let differences: Vec<f64> = own.iter().zip(reference).map(|(own, r)| own - r).collect();
-    let (x, r) = (centre(reference)?, centre(&differences)?);
-    let time = estimate(own).map(|own| own.margin(0.5 + LEVEL / 2.0));
-    let ratio = estimate(&differences)
-        .filter(|_| reference != own)
-        .map(|r| r.interval(LEVEL));
-    Some(Shown {
-        value: (x + r).exp(),
-        lower: time.map(|margin| (x + r - margin).exp()),
-        upper: time.map(|margin| (x + r + margin).exp()),
-        speedup: (-r).exp(),
-        speedup_lower: ratio.map(|(_, slowest)| (-slowest).exp()),
-        speedup_upper: ratio.map(|(fastest, _)| (-fastest).exp()),
-    })
+pub fn one_run(reference: &[f64], own: &[f64]) -> Option<Estimate> {
+    let middle = centre(reference)? + centre(&differences(own, reference)?)?;
+    let margin = margin(own);
+    let ends = [middle - margin, middle + margin];
+    Some(Estimate::within(middle.exp(), ends.map(f64::exp)))
 }
 
-/// Time of `own` / time of `other`: the ratio of the two values that [`one_run`]
-/// shows beside the same `reference`. `None` as there.
+/// Time of the reference / time of the structure, above 1 is faster: the ratio of the
+/// two values of [`one_run`]. No interval for the reference itself, whose speed-up is 1
+/// by definition. `None` as there.
+pub fn speedup(reference: &[f64], own: &[f64]) -> Option<Estimate> {
+    let differences = differences(own, reference)?;
+    let mean = centre(&differences)?;
+    let margin = match reference == own {
+        true => f64::NAN,
+        false => margin(&differences),
+    };
+    let ends = [mean + margin, mean - margin].map(|ln| (-ln).exp());
+    Some(Estimate::within((-mean).exp(), ends))
+}
+
+/// Time of `own` / time of `other`: the ratio of the two values of [`one_run`] beside
+/// the same `reference`. `None` as there.
 pub fn ratio(reference: &[f64], own: &[f64], other: &[f64]) -> Option<Estimate> {
     let value = one_run(reference, own)?.value / one_run(reference, other)?.value;
-    let differences: Vec<f64> = own.iter().zip(other).map(|(a, b)| a - b).collect();
-    let margin = estimate(&differences).map_or(f64::NAN, |found| found.margin(0.5 + LEVEL / 2.0));
-    Some(Estimate {
-        value,
-        lower: value * (-margin).exp(),
-        upper: value * margin.exp(),
-    })
+    let margin = margin(&differences(own, other)?);
+    let ends = [-margin, margin].map(|ln| value * ln.exp());
+    Some(Estimate::within(value, ends))
+}
+
+/// `own` - `other` per process; `None` if those are not the same number.
+fn differences(own: &[f64], other: &[f64]) -> Option<Vec<f64>> {
+    let pairs = own.iter().zip(other);
+    (own.len() == other.len()).then(|| pairs.map(|(own, other)| own - other).collect())
+}
+
+/// Half the width of the 95 % interval; NaN below three values.
+fn margin(values: &[f64]) -> f64 {
+    estimate(values).map_or(f64::NAN, |found| found.margin(0.5 + LEVEL / 2.0))
 }
 
 /// The trimmed mean with a standard error no smaller than the plain mean's, and
@@ -115,18 +125,16 @@ mod tests {
             rows in prop::collection::vec((-2.0..9.0f64, -2.0..9.0f64), 1..20)
         ) {
             let (reference, own): (Vec<f64>, Vec<f64>) = rows.into_iter().unzip();
-            let base = one_run(&reference, &reference).unwrap();
-            let shown = one_run(&reference, &own).unwrap();
-            prop_assert!((base.value / shown.value / shown.speedup - 1.0).abs() < 1e-12);
-            prop_assert_eq!((base.speedup, base.speedup_lower), (1.0, None));
-            let holds = |value: f64, lower: Option<f64>, upper: Option<f64>| {
-                lower.is_some_and(|l| l <= value) && upper.is_some_and(|u| value <= u)
+            let [base, shown] = [&reference, &own].map(|own| one_run(&reference, own).unwrap());
+            let speedups = [&reference, &own].map(|own| speedup(&reference, own).unwrap());
+            prop_assert!((base.value / shown.value / speedups[1].value - 1.0).abs() < 1e-12);
+            prop_assert_eq!((speedups[0].value, speedups[0].lower), (1.0, None));
+            let holds = |e: Estimate| {
+                e.lower.is_some_and(|l| l <= e.value) && e.upper.is_some_and(|u| e.value <= u)
             };
-            let enough = own.len() >= 3;
-            prop_assert_eq!(holds(shown.value, shown.lower, shown.upper), enough);
-            prop_assert_eq!(holds(base.value, base.lower, base.upper), enough);
-            let speedup = (shown.speedup, shown.speedup_lower, shown.speedup_upper);
-            prop_assert_eq!(holds(speedup.0, speedup.1, speedup.2), enough);
+            for estimate in [shown, base, speedups[1]] {
+                prop_assert_eq!(holds(estimate), own.len() >= 3);
+            }
         }
     }
 
@@ -141,7 +149,8 @@ mod tests {
             (shown.upper.unwrap().ln() - margin).abs() < 1e-8,
             "{shown:?}"
         );
-        assert!((shown.speedup_lower.unwrap().ln() + margin).abs() < 1e-8);
+        let faster = speedup(&[0.0; 10], &own).unwrap();
+        assert!((faster.lower.unwrap().ln() + margin).abs() < 1e-8);
     }
 
     #[test]

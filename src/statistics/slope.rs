@@ -16,11 +16,8 @@ pub fn slope(points: &[(f64, f64)]) -> Option<Estimate> {
     let residual: f64 = centred().map(|(x, y)| (y - value * x).powi(2)).sum();
     let error = (residual / freedom as f64 / spread).sqrt();
     let margin = student::quantile(0.975, freedom as f64) * error;
-    value.is_finite().then_some(Estimate {
-        value,
-        lower: value - margin,
-        upper: value + margin,
-    })
+    let ends = [value - margin, value + margin];
+    value.is_finite().then(|| Estimate::within(value, ends))
 }
 
 #[cfg(test)]
@@ -35,11 +32,11 @@ mod tests {
         let found = slope(&points).unwrap();
         assert!((found.value - 1.94).abs() < 1e-9, "{found:?}");
         assert!(
-            (found.upper - found.value - 0.3897).abs() < 1e-3,
+            (found.upper.unwrap() - found.value - 0.3897).abs() < 1e-3,
             "{found:?}"
         );
         assert!(
-            (found.value - found.lower - 0.3897).abs() < 1e-3,
+            (found.value - found.lower.unwrap() - 0.3897).abs() < 1e-3,
             "{found:?}"
         );
         // Twenty degrees of freedom: t(20) = 2.085963, no longer that of ten.
@@ -49,7 +46,7 @@ mod tests {
         let residual = 5.5 - found.value.powi(2) * spread;
         let margin = 2.085_963 * (residual / 20.0 / spread).sqrt();
         assert!(
-            (found.upper - found.value - margin).abs() < 1e-6,
+            (found.upper.unwrap() - found.value - margin).abs() < 1e-6,
             "{found:?}"
         );
         assert_eq!(slope(&points[..2]), None);

@@ -68,14 +68,12 @@ fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfi
 
 /// How much longer it takes, and whether the processes show that it does.
 fn dearer(ratio: &Estimate) -> String {
-    let Estimate {
-        value,
-        lower,
-        upper,
-    } = ratio;
-    match (lower.is_finite(), *lower > 1.0) {
-        (false, _) => format!("{value:.2} times as long"),
-        (_, true) => format!("{value:.2} [{lower:.2}, {upper:.2}] times as long"),
-        (_, false) => format!("as long: {value:.2} [{lower:.2}, {upper:.2}]"),
+    let value = ratio.value;
+    match ratio.lower.zip(ratio.upper) {
+        None => format!("{value:.2} times as long"),
+        Some((lower, upper)) if lower > 1.0 => {
+            format!("{value:.2} [{lower:.2}, {upper:.2}] times as long")
+        }
+        Some((lower, upper)) => format!("as long: {value:.2} [{lower:.2}, {upper:.2}]"),
     }
 }

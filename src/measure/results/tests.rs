@@ -163,7 +163,7 @@ fn values_lie_in_their_intervals_and_ratios_are_those_of_the_shown_values() {
         assert!(has_interval, "{}", cell.structure);
         // One estimator: scaled by what a timed camera sees.
         let [query, per_visible] = ["query_ns", "ns_per_visible"].map(|m| &cell.metrics[m]);
-        let ends = |m: &Metric| [Some(m.value), m.lower, m.upper];
+        let ends = |m: &super::super::Metric| [Some(m.value), m.lower, m.upper];
         let scaled = ends(query).map(|ns| ns.map(|ns| ns / IDS as f64));
         assert_eq!(ends(per_visible), scaled, "{}", cell.structure);
         let of_shown = value(&group.cells[0], "query_ns") / value(cell, "query_ns");
