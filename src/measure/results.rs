@@ -1,6 +1,8 @@
-//! Cells of a report from the parts of all processes. Every value, interval, ratio and
-//! rank comes from the same quantities, the logarithms of time of each structure in
-//! each process, by the estimators of [`crate::statistics`].
+//! Cells of a report from the parts of all processes.
+//!
+//! Every value, interval, ratio and rank comes from the same quantities, the logarithms
+//! of time of each structure in each process, by the estimators of
+//! [`crate::statistics`].
 
 use std::collections::BTreeMap;
 
@@ -53,8 +55,8 @@ pub struct Group {
     pub cells: Vec<ReportCell>,
     /// Lower bounds: no structures, never ranked.
     pub bounds: Vec<ReportCell>,
-    /// The structure that was entered twice, and time of the second entry / time of the
-    /// first: the interval should contain 1.
+    /// The structure that was entered twice, and second time / first time: the
+    /// interval should contain 1.
     pub twin: Option<(String, Estimate)>,
     /// The ranks of structures by their times of region search.
     pub located: Vec<(String, usize)>,
@@ -120,7 +122,7 @@ struct Facts<'p> {
     contradictions: Vec<(&'p str, Verdict)>,
     /// ln ns per query in each process, by label and task.
     logs: BTreeMap<(&'p str, TaskKind), Vec<f64>>,
-    /// The yardstick, or the first structure that has times where there is no yardstick.
+    /// The yardstick; without one, the first structure that has times.
     reference: Option<&'p str>,
 }
 
@@ -375,8 +377,8 @@ impl<'p> Facts<'p> {
         }
     }
 
-    /// Queries after which a build is repaid against the yardstick, from the times
-    /// that are shown; `None` if never.
+    /// Queries after which the build is repaid against the yardstick, `None` if never,
+    /// from the times that are shown.
     fn break_even(&self, label: &str) -> Option<f64> {
         let cost = |label: &str| -> Option<[f64; 2]> {
             let build = self.over_processes(label, |s| s.build_ms)?.value * 1e6;

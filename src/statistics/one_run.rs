@@ -40,9 +40,11 @@ impl Estimate {
     }
 }
 
-/// Time of a structure, from ln(time) per process of the `reference` and of the
-/// structure's `own` in the same processes, in the unit that the logarithms were taken
-/// of. `None` if the processes are not the same number, none, or a value is not finite.
+/// Time of a structure, in the unit that the logarithms were taken of.
+///
+/// From ln(time) per process of the `reference` and of the structure's `own` in the same
+/// processes. `None` if there are no processes, not the same number, or a value that is
+/// not finite.
 ///
 /// The difference r of a process is own - reference: what slows both leaves it
 /// alone. Shown are exp(X + mean r) and the [`speedup`] exp(-mean r), with X the
@@ -56,8 +58,9 @@ pub fn one_run(reference: &[f64], own: &[f64]) -> Option<Estimate> {
     Some(Estimate::within(middle.exp(), ends.map(f64::exp)))
 }
 
-/// Time of the reference / time of the structure, above 1 is faster: the ratio of the
-/// two values of [`one_run`]. No interval for the reference itself, whose speed-up is 1
+/// Time of the reference / time of the structure: above 1 is faster.
+///
+/// The ratio of the two values of [`one_run`]. No interval for the reference itself, whose speed-up is 1
 /// by definition. `None` as there.
 pub fn speedup(reference: &[f64], own: &[f64]) -> Option<Estimate> {
     let differences = differences(own, reference)?;
@@ -70,8 +73,8 @@ pub fn speedup(reference: &[f64], own: &[f64]) -> Option<Estimate> {
     Some(Estimate::within((-mean).exp(), ends))
 }
 
-/// Time of `own` / time of `other`: the ratio of the two values of [`one_run`] beside
-/// the same `reference`. `None` as there.
+/// Time of `own` / time of `other`: the ratio of the two values of [`one_run`].
+/// Beside the same `reference`; `None` as there.
 pub fn ratio(reference: &[f64], own: &[f64], other: &[f64]) -> Option<Estimate> {
     let value = one_run(reference, own)?.value / one_run(reference, other)?.value;
     let margin = margin(&differences(own, other)?);
