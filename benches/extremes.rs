@@ -14,6 +14,7 @@ use cullbench::kernel::Kernel;
 use cullbench::scene::{self, Scene};
 use cullbench::visibility::Solids;
 use cullbench::visibility::pick::BACK_ENDS;
+use cullbench::visibility::truth::Boxes;
 use glam::Vec3;
 
 const MOST: f64 = 3.0;
@@ -108,8 +109,8 @@ fn builds() -> Vec<(&'static str, Build)> {
     }
     for row in BACK_ENDS.iter().filter(|row| PICKING.contains(&row.name)) {
         let build = |scene: &Scene| {
-            let solids = Solids::of(scene);
-            let built = || (row.build)(&solids, Kernel::best()).expect("can be built");
+            let boxes = Boxes::of(&Solids::of(scene));
+            let built = || (row.boxes)(&boxes, Kernel::best()).expect("can be built");
             (median(built).0, None)
         };
         all.push((row.name, Box::new(build)));

@@ -5,7 +5,8 @@ use std::hint::black_box;
 
 use cullbench::kernel::Kernel;
 use cullbench::measure::Stopwatch;
-use cullbench::visibility::pick::{BACK_ENDS, Facets, Pick};
+use cullbench::visibility::pick::{BACK_ENDS, Pick};
+use cullbench::visibility::truth::{Boxes, Facets};
 use cullbench::visibility::{Ray, Rays, Solids, surfaces_of};
 
 use super::{loaded, over_builds, ratio, verdict};
@@ -50,14 +51,13 @@ fn missed_in(source: &str, only_test: bool, turns: usize) -> u32 {
         }
     }
     let facets = surfaces_of(&scene).expect(source);
-    let facets = facets.map(|surfaces| Facets::of(&surfaces, scene.items.len()));
-    let solids = Solids::of(&scene);
+    let facets = facets.map(|surfaces| Facets::solid(&surfaces, scene.items.len()));
+    let boxes = Boxes::of(&Solids::of(&scene));
     let built = |name: &str, kernel: Kernel| -> Box<dyn Pick> {
         let row = BACK_ENDS.iter().find(|row| row.name == name).expect(name);
-        let pick = match (&facets, row.build_triangles) {
-            (Some(facets), Some(build)) => build(facets, kernel),
-            (Some(_), None) => unreachable!("takes triangles"),
-            (None, _) => (row.build)(&solids, kernel),
+        let pick = match &facets {
+            Some(facets) => (row.facets)(facets, kernel),
+            None => (row.boxes)(&boxes, kernel),
         };
         pick.expect(name)
     };

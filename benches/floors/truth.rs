@@ -44,11 +44,11 @@ fn missed_in(source: &str, only_test: bool, turns: usize) -> u32 {
     let see: Box<dyn Fn(&Rays) -> SampleTruth> = match surfaces_of(&scene).expect(source) {
         Some(surfaces) => {
             let index = SurfaceIndex::build(&surfaces);
-            Box::new(move |rays| SampleTruth::of_surfaces(&index, rays, GRID, 1))
+            Box::new(move |rays| SampleTruth::of(&index, rays, GRID, 1))
         }
         None => {
             let index = RayIndex::build(&solids);
-            Box::new(move |rays| SampleTruth::of(&solids, &index, rays, GRID, 1))
+            Box::new(move |rays| SampleTruth::of(&index, rays, GRID, 1))
         }
     };
     let rates = (0..(turns / 8).max(3)).map(|_| {

@@ -8,8 +8,8 @@ use super::world::World;
 use crate::kernel::Kernel;
 use crate::query::ItemId;
 use crate::scene::Surfaces;
-use crate::visibility::pick::{BACK_ENDS, BackEnd, Facets, Pick, SolidSurfaces};
-use crate::visibility::truth::{Probe, RayIndex};
+use crate::visibility::pick::{BACK_ENDS, BackEnd, NotBuilt, Pick};
+use crate::visibility::truth::{Boxes, Facets, RayIndex, SurfaceIndex};
 use crate::visibility::{Guarantee, Ray, Solids};
 
 /// How many of the nearest items are asked for.
@@ -53,14 +53,16 @@ impl<'w> Pickable<'w> {
             Pickable::Boxes(solids) => solids.boxes.len(),
             Pickable::Triangles(surfaces, _) => surfaces.triangles.len(),
         };
-        let facets = match self {
-            Pickable::Boxes(_) => None,
-            Pickable::Triangles(surfaces, items) => Some(Facets::of(surfaces, items)),
-        };
-        let build = |row: &BackEnd| match (self, &facets) {
-            (Pickable::Boxes(solids), _) => Some((row.build)(solids, kernel)),
-            (_, Some(facets)) => Some(row.build_triangles?(facets, kernel)),
-            (_, None) => None,
+        type Build<'b> = Box<dyn Fn(&BackEnd) -> Result<Box<dyn Pick>, NotBuilt> + 'b>;
+        let build: Build = match self {
+            Pickable::Boxes(solids) => {
+                let boxes = Boxes::of(solids);
+                Box::new(move |row| (row.boxes)(&boxes, kernel))
+            }
+            Pickable::Triangles(surfaces, items) => {
+                let facets = Facets::solid(surfaces, items);
+                Box::new(move |row| (row.facets)(&facets, kernel))
+            }
         };
         let (mut built, mut left_out) = (Vec::new(), Vec::new());
         let rows = BACK_ENDS
@@ -68,9 +70,8 @@ impl<'w> Pickable<'w> {
             .filter(|row| count <= most_for_loop || row.name != "linear");
         for row in rows {
             match build(row) {
-                None => {}
-                Some(Err(reason)) => left_out.push(LeftOutRow::of("picks", row.name, reason)),
-                Some(Ok(pick)) => built.push(Built {
+                Err(reason) => left_out.push(LeftOutRow::of("picks", row.name, reason)),
+                Ok(pick) => built.push(Built {
                     name: row.name,
                     summary: row.summary,
                     guarantee: row.guarantee,
@@ -81,62 +82,30 @@ impl<'w> Pickable<'w> {
         (built, left_out)
     }
 
-    /// What is true of it.
+    /// The exact answers.
     pub fn exactly(self) -> Exactly {
-        match self {
-            Pickable::Boxes(solids) => Exactly::Boxes(RayIndex::build(solids)),
+        Exactly(match self {
+            Pickable::Boxes(solids) => Box::new(RayIndex::build(solids)),
             Pickable::Triangles(surfaces, items) => {
-                Exactly::Triangles(SolidSurfaces::of(surfaces, items))
+                Box::new(SurfaceIndex::of(&Facets::solid(surfaces, items)))
             }
-        }
+        })
     }
 }
 
 /// The exact answers.
-pub enum Exactly {
-    /// Of solid boxes.
-    Boxes(RayIndex),
-    /// Of triangles.
-    Triangles(SolidSurfaces),
-}
+pub struct Exactly(Box<dyn Pick>);
 
 impl Exactly {
     /// The first item along a ray.
     pub fn first(&self, ray: &Ray) -> Option<ItemId> {
-        match self {
-            Exactly::Boxes(index) => index.front_of(ray).map(|front| front.item()),
-            Exactly::Triangles(all) => all.first(ray).map(|hit| hit.item),
-        }
+        self.0.first(ray).map(|hit| hit.item)
     }
 
-    /// The nearest items along a ray, and all that are as near as the last of them.
-    pub fn nearest(&self, ray: &Ray) -> Vec<ItemId> {
-        let index = match self {
-            Exactly::Boxes(index) => index,
-            Exactly::Triangles(all) => {
-                let mut hits = Vec::new();
-                all.nearest(ray, NEAREST, &mut hits);
-                return hits.into_iter().map(|hit| hit.item).collect();
-            }
-        };
-        let probe = Probe::new(*ray);
-        let mut met = index.all_along(ray, f64::INFINITY);
-        met.sort_unstable_by(|(a, at_a), (b, at_b)| probe.compare(at_a, at_b).then(a.cmp(b)));
-        if let Some((_, last)) = met.get(NEAREST - 1).copied() {
-            let kept = met.partition_point(|(_, at)| probe.compare(at, &last).is_le());
-            met.truncate(kept);
-        }
-        met.into_iter().map(|(item, _)| item).collect()
-    }
-
-    /// Every item that a ray meets.
-    pub fn met(&self, ray: &Ray) -> Vec<ItemId> {
-        match self {
-            Exactly::Boxes(index) => {
-                let along = index.all_along(ray, f64::INFINITY);
-                along.into_iter().map(|(item, _)| item).collect()
-            }
-            Exactly::Triangles(all) => all.met(ray),
-        }
+    /// The nearest `count` items along a ray, and all that are as near as the last of them.
+    pub fn nearest(&self, ray: &Ray, count: usize) -> Vec<ItemId> {
+        let mut hits = Vec::new();
+        self.0.nearest(ray, count, &mut hits);
+        hits.into_iter().map(|hit| hit.item).collect()
     }
 }

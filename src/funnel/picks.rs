@@ -241,7 +241,7 @@ impl<'w> Picks<'w> {
         });
         Truth {
             first: exactly.first(&cursor.ray).into_iter().collect(),
-            nearest: exactly.nearest(&cursor.ray),
+            nearest: exactly.nearest(&cursor.ray, NEAREST),
             met: met_within(exactly, rays, &cursor.rectangle),
             in_planes,
         }
@@ -320,7 +320,7 @@ fn met_within(exactly: &Exactly, rays: &Rays, rectangle: &CursorRectangle) -> Ve
     let mut met = Vec::new();
     for x in [min[0], middle[0], max[0]] {
         for y in [min[1], middle[1], max[1]] {
-            met.extend(exactly.met(&rays.through(x, y)));
+            met.extend(exactly.nearest(&rays.through(x, y), usize::MAX));
         }
     }
     met.sort_unstable();

@@ -8,9 +8,9 @@ use super::world::World;
 use crate::query::ItemId;
 use crate::visibility::fragment;
 use crate::visibility::truth::{
-    RayIndex, SampleTruth, SurfaceIndex, visible_by_random_rays, visible_surfaces_by_random_rays,
+    RayIndex, SampleTruth, SolidBox, SurfaceIndex, visible_by_random_rays,
 };
-use crate::visibility::{Rays, SampleGrid, Solids};
+use crate::visibility::{Rays, SampleGrid};
 
 /// Samples that tell how many items are in front at all.
 const FEW: SampleGrid = SampleGrid::new(16, 9);
@@ -67,7 +67,7 @@ pub fn seen(
 /// What is shown, as rays end at it: solid boxes; or the triangles of a mesh, or the walls,
 /// floors and ceilings of a map.
 pub enum Shown<'w> {
-    Solids(&'w Solids, RayIndex, Option<&'w fragment::Surfaces>),
+    Solids(RayIndex, Option<&'w fragment::Surfaces>),
     Surfaces(SurfaceIndex),
 }
 
@@ -76,7 +76,7 @@ impl Shown<'_> {
     pub fn of<'w>(world: &'w World) -> Shown<'w> {
         if let Some(solids) = world.solids.as_ref() {
             let index = RayIndex::build(solids);
-            return Shown::Solids(solids, index, world.cut_outs.as_ref());
+            return Shown::Solids(index, world.cut_outs.as_ref());
         }
         let surfaces = world
             .surfaces
@@ -89,23 +89,21 @@ impl Shown<'_> {
     /// ceilings.
     pub fn at_samples(&self, rays: &Rays, grid: SampleGrid, threads: usize) -> SampleTruth {
         match self {
-            Shown::Solids(_, index, Some(holes)) => {
-                let opaque = |item, b: &_, probe: &_, at: &_| holes.opaque(item, b, probe, at);
+            Shown::Solids(index, Some(holes)) => {
+                let opaque = |body: &SolidBox, probe: &_, at: &_| {
+                    holes.opaque(body.item, &body.b, probe, at)
+                };
                 SampleTruth::of_opaque(index, &opaque, rays, grid, threads)
             }
-            Shown::Solids(solids, index, None) => {
-                SampleTruth::of(solids, index, rays, grid, threads)
-            }
-            Shown::Surfaces(index) => SampleTruth::of_surfaces(index, rays, grid, threads),
+            Shown::Solids(index, None) => SampleTruth::of(index, rays, grid, threads),
+            Shown::Surfaces(index) => SampleTruth::of(index, rays, grid, threads),
         }
     }
 
     fn along_random(&self, rays: &Rays, count: usize, seed: u64, threads: usize) -> Vec<ItemId> {
         match self {
-            Shown::Solids(_, index, _) => visible_by_random_rays(index, rays, count, seed, threads),
-            Shown::Surfaces(index) => {
-                visible_surfaces_by_random_rays(index, rays, count, seed, threads)
-            }
+            Shown::Solids(index, _) => visible_by_random_rays(index, rays, count, seed, threads),
+            Shown::Surfaces(index) => visible_by_random_rays(index, rays, count, seed, threads),
         }
     }
 }

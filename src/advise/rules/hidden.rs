@@ -47,7 +47,7 @@ impl Met {
     pub fn layers(&self, ray: &Ray) -> usize {
         let mut met: Vec<ItemId> = match self {
             Met::Boxes(index) => {
-                let all = index.all_along(ray, ray.far).into_iter();
+                let all = index.all_along(ray).into_iter();
                 all.map(|(item, _)| item).collect()
             }
             Met::Triangles(index, items) => {

@@ -1,7 +1,5 @@
 //! The samples of an image, ready to be drawn on: it finds the fragments of a box.
 
-use std::cmp::Ordering;
-
 use glam::DVec3;
 
 use super::order::{Part, Piece};
@@ -9,35 +7,8 @@ use super::screen::Screen;
 use super::stencil::Stencil;
 use crate::query::ItemId;
 use crate::scene::WorldBox;
-use crate::visibility::truth::{Crossing, Meeting, Probe, TriangleProbe};
+use crate::visibility::truth::{Crossing, Probe, TriangleProbe};
 use crate::visibility::{Ray, Rays, SampleGrid, Solids};
-
-/// A ray that tells exactly which of two places along it comes first.
-pub trait Along {
-    /// A place where it meets something.
-    type At: Copy;
-
-    /// Which of two comes first.
-    fn order(&self, a: &Self::At, b: &Self::At) -> Ordering;
-}
-
-impl Along for Probe {
-    type At = Crossing;
-
-    #[inline(always)]
-    fn order(&self, a: &Crossing, b: &Crossing) -> Ordering {
-        self.compare(a, b)
-    }
-}
-
-impl Along for TriangleProbe {
-    type At = Meeting;
-
-    #[inline(always)]
-    fn order(&self, a: &Meeting, b: &Meeting) -> Ordering {
-        self.compare(a, b)
-    }
-}
 
 /// An item at a sample.
 #[derive(Clone, Copy, PartialEq, Debug)]

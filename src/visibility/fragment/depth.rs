@@ -1,8 +1,8 @@
 //! The z-test: the nearest fragment of each sample, by the exact order of depths.
 
-use super::canvas::{Along, Canvas, Fragment};
+use super::canvas::{Canvas, Fragment};
 use crate::query::ItemId;
-use crate::visibility::truth::{NO_ITEM, Probe};
+use crate::visibility::truth::{Along, NO_ITEM, Probe};
 
 /// What is in front at each sample so far; of a tie the lowest id.
 #[derive(Clone, Debug)]

@@ -23,7 +23,7 @@ mod triangles;
 #[cfg(test)]
 mod tests;
 
-pub use canvas::{Along, Canvas, Fragment};
+pub use canvas::{Canvas, Fragment};
 pub use cut_outs::CutOuts;
 pub use depth::DepthBuffer;
 pub use draw::{Drawn, Tally, Tests, draw};

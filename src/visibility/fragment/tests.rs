@@ -7,7 +7,7 @@ use crate::camera::{Camera, Frame, Lens};
 use crate::query::ItemId;
 use crate::scene::{SeededRng, WorldBox, load};
 use crate::visibility::region::doom::DoomMap;
-use crate::visibility::truth::{NO_ITEM, RayIndex, SampleTruth, SurfaceIndex, judge};
+use crate::visibility::truth::{NO_ITEM, RayIndex, SampleTruth, SolidBox, SurfaceIndex, judge};
 use crate::visibility::{Guarantee, Ray, Rays, SampleGrid, Solids};
 use order::{BspOrder, ORDERS, OrderRow};
 
@@ -68,7 +68,7 @@ fn the_z_test_leaves_the_sample_truth_whatever_the_order() {
         for camera in cameras(&solids, 4) {
             let rays = Rays::of(&camera).unwrap();
             let canvas = Canvas::of(&rays, GRID);
-            let truth = SampleTruth::of(&solids, &index, &rays, GRID, 1);
+            let truth = SampleTruth::of(&index, &rays, GRID, 1);
             seen += truth.visible.len();
             let mut pieces = Vec::new();
             for (row, order) in &orders {
@@ -99,7 +99,7 @@ fn worlds_full_of_ties_are_drawn_as_they_are_seen() {
         let camera = judge::camera(&mut rng);
         let rays = Rays::of(&camera).unwrap();
         let index = RayIndex::build(&solids);
-        let truth = SampleTruth::of(&solids, &index, &rays, grid, 1);
+        let truth = SampleTruth::of(&index, &rays, grid, 1);
         let canvas = Canvas::of(&rays, grid);
         let mut pieces = Vec::new();
         for (row, order) in orders(&solids) {
@@ -313,14 +313,15 @@ fn through_the_holes_of_cut_outs_is_seen_what_is_behind_them() {
         let drawn = draw(&canvas, &solids, &all(&solids), &tests);
         clear += drawn.tally.clear;
         let solid = draw(&canvas, &solids, &all(&solids), &Tests::default());
-        let opaque = |item, b: &_, probe: &_, at: &_| surfaces.opaque(item, b, probe, at);
+        let opaque =
+            |body: &SolidBox, probe: &_, at: &_| surfaces.opaque(body.item, &body.b, probe, at);
         let truth = SampleTruth::of_opaque(&index, &opaque, &rays, GRID, 1);
         assert_eq!(drawn.depth.visible(&canvas), truth.visible);
         let (ids, solid) = (drawn.depth.ids(), solid.depth.ids());
         assert_eq!(ids, truth.front);
         for (sample, &id) in ids.iter().enumerate() {
             let probe = canvas.probe(sample);
-            let mut along = index.all_along(probe.ray(), f64::INFINITY);
+            let mut along = index.all_along(probe.ray());
             along.sort_by(|a, b| probe.compare(&a.1, &b.1).then(a.0.cmp(&b.0)));
             let opaque =
                 |item: ItemId, at| surfaces.opaque(item, &solids.boxes[item as usize], probe, at);

@@ -116,7 +116,7 @@ mod tests {
         rays: &Rays,
         grid: SampleGrid,
     ) -> usize {
-        let truth = SampleTruth::of_surfaces(index, rays, grid, 1);
+        let truth = SampleTruth::of(index, rays, grid, 1);
         let canvas = Canvas::for_triangles(rays, grid, surfaces.origin);
         let mut triangles: Vec<u32> = (0..surfaces.triangles.len() as u32).collect();
         let mut drawn = DrawnTriangles::new(grid.samples());

@@ -1,190 +1,111 @@
-//! The nearest of some candidates, decided exactly: what the exact back ends end
-//! with.
+//! The exact decision among candidates, which ends every exact back end.
 
 use std::cmp::Ordering;
 
-use super::contract::Hit;
-use super::facets::Facet;
+use super::contract::{Hit, Pick};
 use crate::query::ItemId;
-use crate::scene::WorldBox;
 use crate::visibility::Ray;
-use crate::visibility::truth::{Crossing, Meeting, Probe, TriangleProbe};
+use crate::visibility::truth::{Along, Body, BodyIndex};
 
-/// An item that the ray meets, with its exact depth.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Met {
-    pub item: ItemId,
-    pub at: Crossing,
+/// An item and where a ray meets it.
+type Met<B> = (ItemId, <B as Body>::At);
+
+/// Exact order by depth, then by id.
+#[inline]
+fn order<B: Body>(probe: &B::Probe, a: &Met<B>, b: &Met<B>) -> Ordering {
+    probe.order(&a.1, &b.1).then(a.0.cmp(&b.0))
 }
 
-impl Met {
-    #[inline]
-    pub fn hit(&self) -> Hit {
-        Hit {
-            item: self.item,
-            depth: self.at.depth,
-        }
-    }
-
-    #[inline]
-    fn order(&self, other: &Met, probe: &Probe) -> Ordering {
-        let by_depth = probe.compare(&self.at, &other.at);
-        by_depth.then(self.item.cmp(&other.item))
-    }
+/// A hit, unless its item is not among the first `items`.
+#[inline]
+fn hit<B: Body>((item, at): Met<B>, items: usize) -> Option<Hit> {
+    let depth = B::Probe::depth(&at);
+    ((item as usize) < items).then_some(Hit { item, depth })
 }
 
-/// The first of the candidates so far that the ray meets.
-pub(super) struct First {
-    probe: Probe,
-    best: Option<Met>,
+/// The first of the candidates so far that a ray meets.
+pub(super) struct First<B: Body> {
+    probe: B::Probe,
+    /// Upper bound of the depth of the first one.
+    pub limit: f64,
+    best: Option<Met<B>>,
 }
 
-impl First {
-    /// Of none yet.
+impl<B: Body> First<B> {
+    /// Starts without candidates; nothing beyond `limit` counts.
     #[inline]
-    pub fn new(ray: &Ray) -> First {
+    pub fn new(probe: B::Probe, limit: f64) -> First<B> {
         First {
-            probe: Probe::new(*ray),
+            probe,
+            limit,
             best: None,
         }
     }
 
-    /// One candidate more.
-    #[inline]
-    pub fn offer(&mut self, (item, b): (ItemId, &WorldBox)) {
-        let far = self.probe.ray().far;
-        let limit = self.best.map_or(far, |best| best.at.at_most());
-        if let Some(at) = self.probe.enter(b, limit) {
-            let met = Met { item, at };
-            if self
-                .best
-                .is_none_or(|best| met.order(&best, &self.probe).is_lt())
-            {
-                self.best = Some(met);
-            }
+    /// Tests a candidate; returns whether it is the first one now.
+    #[inline(always)]
+    pub fn offer(&mut self, body: &B) -> bool {
+        let Some(at) = body.meet(&self.probe, self.limit) else {
+            return false;
+        };
+        let met = (body.item(), at);
+        let is_first = |best: Met<B>| order::<B>(&self.probe, &met, &best).is_lt();
+        if !self.best.is_none_or(is_first) {
+            return false;
         }
+        self.best = Some(met);
+        self.limit = self.limit.min(B::Probe::at_most(&at));
+        true
     }
 
-    /// What was met first.
+    /// The first hit, if it is one of the first `items`.
     #[inline]
-    pub fn hit(&self) -> Option<Hit> {
-        self.best.map(|met| met.hit())
+    pub fn hit(&self, items: usize) -> Option<Hit> {
+        hit::<B>(self.best?, items)
     }
 }
 
-/// The first of the candidates that the ray meets.
-pub(super) fn first<'a>(
-    ray: &Ray,
-    candidates: impl IntoIterator<Item = (ItemId, &'a WorldBox)>,
-) -> Option<Hit> {
-    let mut first = First::new(ray);
-    for candidate in candidates {
-        first.offer(candidate);
-    }
-    first.hit()
-}
-
-/// The first `count` of the candidates that the ray meets, and all that are as
-/// deep as the last of them.
-pub(super) fn nearest<'a>(
-    ray: &Ray,
+/// Replaces `hits` by the first meeting of each item: the first `count` of these and all that
+/// are as deep as the last of them.
+pub(super) fn nearest<B: Body>(
+    probe: &B::Probe,
+    mut met: Vec<Met<B>>,
     count: usize,
-    candidates: impl IntoIterator<Item = (ItemId, &'a WorldBox)>,
     hits: &mut Vec<Hit>,
 ) {
-    let probe = Probe::new(*ray);
-    let met = |(item, b)| probe.enter(b, ray.far).map(|at| Met { item, at });
-    nearest_met(
-        &probe,
-        candidates.into_iter().filter_map(met).collect(),
-        count,
-        hits,
-    );
+    if !B::IS_BOX {
+        met.sort_unstable_by(|a, b| a.0.cmp(&b.0).then_with(|| probe.order(&a.1, &b.1)));
+        met.dedup_by_key(|(item, _)| *item);
+    }
+    met.sort_unstable_by(|a, b| order::<B>(probe, a, b));
+    met.truncate(kept(&met, count, |a, last| {
+        probe.order(&a.1, &last.1).is_le()
+    }));
+    hits.clear();
+    hits.extend(met.into_iter().filter_map(|met| hit::<B>(met, usize::MAX)));
 }
 
-/// The first `count` of what was met, and all that are as deep as the last of them.
-fn nearest_met(probe: &Probe, mut all: Vec<Met>, count: usize, hits: &mut Vec<Hit>) {
-    hits.clear();
+/// Length of the first `count` of a sorted list with all that are no deeper than the last of them.
+pub(super) fn kept<T>(sorted: &[T], count: usize, is_within: impl Fn(&T, &T) -> bool) -> usize {
     let Some(last) = count.checked_sub(1) else {
-        return;
+        return 0;
     };
-    all.sort_unstable_by(|a, b| a.order(b, probe));
-    if let Some(last) = all.get(last).copied() {
-        let kept = all.partition_point(|met| probe.compare(&met.at, &last.at).is_le());
-        all.truncate(kept);
+    let last = sorted.get(last);
+    last.map_or(sorted.len(), |last| {
+        sorted.partition_point(|met| is_within(met, last))
+    })
+}
+
+/// The truth of picking, by the tree of the truth of samples.
+impl<B: Body> Pick for BodyIndex<B> {
+    fn first(&self, ray: &Ray) -> Option<Hit> {
+        let found = self.front_of(ray);
+        hit::<B>((*found.front.first()?, found.meeting?), self.items())
     }
-    hits.extend(all.iter().map(Met::hit));
-}
 
-/// By depth, then by id.
-#[inline]
-pub(super) fn order_of_meetings(
-    probe: &TriangleProbe,
-    a: &(ItemId, Meeting),
-    b: &(ItemId, Meeting),
-) -> Ordering {
-    probe.compare(&a.1, &b.1).then(a.0.cmp(&b.0))
-}
-
-fn meeting(probe: &TriangleProbe, facet: &Facet, limit: f64) -> Option<(ItemId, Meeting)> {
-    let at = probe.meet(facet.corners, facet.two_sided, limit)?;
-    Some((facet.item, at))
-}
-
-/// The first of the triangles, if it is of one of the items that count.
-pub(super) fn first_facet<'a>(
-    probe: &TriangleProbe,
-    facets: impl Iterator<Item = &'a Facet>,
-    items: usize,
-) -> Option<Hit> {
-    let mut best: Option<(ItemId, Meeting)> = None;
-    for facet in facets {
-        let limit = best.map_or(f64::INFINITY, |best| best.1.at_most());
-        if let Some(met) = meeting(probe, facet, limit)
-            && best.is_none_or(|best| order_of_meetings(probe, &met, &best).is_lt())
-        {
-            best = Some(met);
-        }
+    fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {
+        let mut met = self.all_along(ray);
+        met.retain(|(item, _)| (*item as usize) < self.items());
+        nearest::<B>(&self.probe(ray), met, count, hits);
     }
-    let (item, at) = best?;
-    let depth = at.depth;
-    Hit { item, depth }.counted(items)
-}
-
-/// As [`nearest`], of the triangles of the items that count.
-pub(super) fn nearest_facets<'a>(
-    probe: &TriangleProbe,
-    facets: impl Iterator<Item = &'a Facet>,
-    items: usize,
-    count: usize,
-    hits: &mut Vec<Hit>,
-) {
-    let that_count = facets.filter(|facet| (facet.item as usize) < items);
-    let met = that_count.filter_map(|facet| meeting(probe, facet, f64::INFINITY));
-    nearest_meetings(probe, met.collect(), count, hits);
-}
-
-/// The first meeting of each item, the first `count` of these and all that are as deep as
-/// the last of them.
-pub(super) fn nearest_meetings(
-    probe: &TriangleProbe,
-    mut met: Vec<(ItemId, Meeting)>,
-    count: usize,
-    hits: &mut Vec<Hit>,
-) {
-    hits.clear();
-    met.sort_unstable_by(|(a, at_a), (b, at_b)| a.cmp(b).then(probe.compare(at_a, at_b)));
-    met.dedup_by_key(|(item, _)| *item);
-    met.sort_by(|(_, a), (_, b)| probe.compare(a, b));
-    if let Some((_, last)) = count.checked_sub(1).and_then(|last| met.get(last)).copied() {
-        let kept = met.partition_point(|(_, at)| probe.compare(at, &last).is_le());
-        met.truncate(kept);
-    } else if count == 0 {
-        met.clear();
-    }
-    let hit = |&(item, at): &(ItemId, Meeting)| Hit {
-        item,
-        depth: at.depth,
-    };
-    hits.extend(met.iter().map(hit));
 }

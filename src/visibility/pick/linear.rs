@@ -1,74 +1,42 @@
-//! Every item asked, exactly: the reference that the others are held against.
+//! Every body tested, exactly: the reference for the other back ends.
 
 use super::contract::{BackEnd, Hit, Pick};
-use super::exactly;
-use super::facets::Facets;
-use crate::query::ItemId;
-use crate::scene::WorldBox;
-use crate::visibility::truth::TriangleProbe;
-use crate::visibility::{Guarantee, Ray, Solids};
+use super::exactly::{self, First};
+use crate::visibility::truth::{Bodies, Body};
+use crate::visibility::{Guarantee, Ray};
 
 /// The row of this file.
 pub const ROW: BackEnd = BackEnd {
     name: "linear",
     summary: "every box or triangle, in exact arithmetic: the reference",
     guarantee: Guarantee::Exact,
-    build: |solids, _| Ok(Box::new(Linear::of(solids))),
-    build_triangles: Some(|facets, _| Ok(Box::new(EveryTriangle(facets.clone())))),
+    boxes: |boxes, _| Ok(Box::new(Linear(boxes.clone()))),
+    facets: |facets, _| Ok(Box::new(Linear(facets.clone()))),
 };
 
-/// All items in the order of their ids.
+/// All bodies, item by item.
 #[derive(Clone, Debug)]
-pub struct Linear {
-    boxes: Vec<WorldBox>,
-}
+pub struct Linear<B>(pub Bodies<B>);
 
-impl Linear {
-    /// Takes over the items.
-    pub fn of(solids: &Solids) -> Linear {
-        Linear {
-            boxes: solids.boxes.clone(),
-        }
-    }
-
-    fn candidates(&self) -> impl Iterator<Item = (ItemId, &WorldBox)> {
-        self.boxes
-            .iter()
-            .enumerate()
-            .map(|(item, b)| (item as ItemId, b))
-    }
-}
-
-impl Pick for Linear {
+impl<B: Body> Pick for Linear<B> {
     /// O(n).
     fn first(&self, ray: &Ray) -> Option<Hit> {
-        exactly::first(ray, self.candidates())
+        let mut first = First::<B>::new(B::probe(ray, self.0.origin), f64::INFINITY);
+        self.0.all.iter().for_each(|body| {
+            first.offer(body);
+        });
+        first.hit(self.0.items)
     }
 
     /// O(n), and sorting what the ray meets.
     fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {
-        exactly::nearest(ray, count, self.candidates(), hits);
-    }
-}
-
-/// All triangles in the order of their items.
-struct EveryTriangle(Facets);
-
-impl EveryTriangle {
-    fn probe(&self, ray: &Ray) -> TriangleProbe {
-        TriangleProbe::new(*ray, self.0.origin)
-    }
-}
-
-impl Pick for EveryTriangle {
-    /// O(triangles).
-    fn first(&self, ray: &Ray) -> Option<Hit> {
-        exactly::first_facet(&self.probe(ray), self.0.all.iter(), self.0.items)
-    }
-
-    /// O(triangles), and sorting what the ray meets.
-    fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {
-        let facets = self.0.all.iter();
-        exactly::nearest_facets(&self.probe(ray), facets, self.0.items, count, hits);
+        let probe = B::probe(ray, self.0.origin);
+        let counted = self
+            .0
+            .all
+            .iter()
+            .filter(|body| (body.item() as usize) < self.0.items);
+        let met = counted.filter_map(|body| Some((body.item(), body.meet(&probe, ray.far)?)));
+        exactly::nearest::<B>(&probe, met.collect(), count, hits);
     }
 }

@@ -3,18 +3,18 @@
 
 use std::ops::Range;
 
-use super::contract::{BackEnd, Hit, NotBuilt, Pick, keep_nearest, keep_nearest_items};
-use super::facets::Facets;
-use super::rounded::{About, RoundedRay};
+use super::contract::{BackEnd, Hit, NotBuilt, Pick};
+use super::exactly::kept;
+use super::rounded::{About, Primitive, RoundedRay};
 use crate::geometry::Aabb;
 use crate::index::{caught, ploc};
 use crate::query::ItemId;
-use crate::visibility::{Guarantee, Ray, Solids};
+use crate::visibility::truth::Bodies;
+use crate::visibility::{Guarantee, Ray};
 use ::obvhs::bvh2::Bvh2;
 use ::obvhs::cwbvh::CwBvh;
 use ::obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
 use ::obvhs::ray::{Ray as TheirRay, RayHit};
-use ::obvhs::triangle::Triangle as TheirTriangle;
 
 /// The row of the binary tree.
 pub const ROW: BackEnd = BackEnd {
@@ -22,8 +22,8 @@ pub const ROW: BackEnd = BackEnd {
     summary: "crate obvhs, binary tree, one item a leaf, its ray_traverse",
     // Rays, nodes and boxes are rounded to f32.
     guarantee: Guarantee::Unproven,
-    build: |solids, _| Obvhs::<Bvh2>::boxed(solids, ROW.name),
-    build_triangles: Some(|facets, _| ObvhsTriangles::<Bvh2>::boxed(facets, ROW.name)),
+    boxes: |boxes, _| Obvhs::<Bvh2, _>::boxed(boxes, ROW.name),
+    facets: |facets, _| Obvhs::<Bvh2, _>::boxed(facets, ROW.name),
 };
 
 /// The row of the eight-wide tree.
@@ -31,8 +31,8 @@ pub const ROW_WIDE: BackEnd = BackEnd {
     name: "obvhs-cwbvh",
     summary: "crate obvhs, eight-wide quantised tree, its ray_traverse",
     guarantee: Guarantee::Unproven,
-    build: |solids, _| Obvhs::<CwBvh>::boxed(solids, ROW_WIDE.name),
-    build_triangles: Some(|facets, _| ObvhsTriangles::<CwBvh>::boxed(facets, ROW_WIDE.name)),
+    boxes: |boxes, _| Obvhs::<CwBvh, _>::boxed(boxes, ROW_WIDE.name),
+    facets: |facets, _| Obvhs::<CwBvh, _>::boxed(facets, ROW_WIDE.name),
 };
 
 /// A tree of the crate that rays are cast through.
@@ -129,142 +129,73 @@ fn levels_of(nodes: usize, children: impl Fn(usize) -> Range<usize>) -> usize {
     deepest
 }
 
-/// The tree over boxes; a panic of the crate is an error.
-fn tree<T: Cast>(boxes: &[Aabb], name: &'static str) -> Result<T, NotBuilt> {
-    let build = || {
-        let binary = ploc::build(boxes, ploc::ONE_A_LEAF);
-        let levels = levels_of(binary.nodes.len(), |node| {
-            let node = &binary.nodes[node];
-            let first = node.first_index as usize;
-            first..first + if node.is_leaf() { 0 } else { 2 }
-        });
-        T::of(binary, levels)
-    };
-    caught(build).unwrap_or_else(|message| Err(NotBuilt::Panicked { name, message }))
-}
-
-/// A tree, and the items in the order of its primitives.
-struct Obvhs<T> {
+/// A tree of the crate over bodies.
+struct Obvhs<T, B: Primitive> {
     tree: T,
-    boxes: Vec<Aabb>,
+    /// In the order of the tree's primitives.
+    bodies: Vec<B::Rounded>,
     ids: Vec<ItemId>,
-    about: About,
-}
-
-impl<T: Cast> Obvhs<T> {
-    fn boxed(solids: &Solids, name: &'static str) -> Result<Box<dyn Pick>, NotBuilt> {
-        let about = About::of(solids.origin, &solids.outer);
-        let boxes: Vec<Aabb> = solids.outer.iter().map(|b| about.scaled(b)).collect();
-        let tree: T = tree(&boxes, name)?;
-        let ids = tree.order().to_vec();
-        Ok(Box::new(Obvhs {
-            boxes: ids.iter().map(|&id| boxes[id as usize]).collect(),
-            ids,
-            about,
-            tree,
-        }))
-    }
-}
-
-/// A ray as the crate takes it.
-#[inline(always)]
-fn their_ray(ray: &RoundedRay) -> TheirRay {
-    TheirRay::new(
-        ray.origin.into(),
-        ray.direction.into(),
-        0.0,
-        ray.far.next_up(),
-    )
-}
-
-impl<T: Cast> Pick for Obvhs<T> {
-    fn first(&self, ray: &Ray) -> Option<Hit> {
-        let rounded = RoundedRay::of(ray, &self.about);
-        let mut found = RayHit::none();
-        let entry = |_: &TheirRay, place: usize| rounded.entry(&self.boxes[place]);
-        self.tree.first(their_ray(&rounded), &mut found, entry);
-        let item = *self.ids.get(found.primitive_id as usize)?;
-        Some(self.about.hit(item, found.t))
-    }
-
-    fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {
-        let rounded = RoundedRay::of(ray, &self.about);
-        hits.clear();
-        let visit = |_: &TheirRay, place: usize| {
-            let depth = rounded.entry(&self.boxes[place]);
-            if depth.is_finite() {
-                hits.push(self.about.hit(self.ids[place], depth));
-            }
-        };
-        self.tree.all(their_ray(&rounded), visit);
-        keep_nearest(hits, count);
-    }
-}
-
-/// A tree over triangles.
-struct ObvhsTriangles<T> {
-    tree: T,
-    /// In the order of its primitives, as it takes them.
-    triangles: Vec<(TheirTriangle, bool, ItemId)>,
     about: About,
     items: usize,
 }
 
-impl<T: Cast> ObvhsTriangles<T> {
-    fn boxed(facets: &Facets, name: &'static str) -> Result<Box<dyn Pick>, NotBuilt> {
-        let mut boxes = facets.bounds();
-        let about = About::of(facets.origin, &boxes);
-        boxes.iter_mut().for_each(|b| *b = about.scaled(b));
-        let tree: T = tree(&boxes, name)?;
-        let placed = tree.order().iter().map(|&place| {
-            let facet = &facets.all[place as usize];
-            let [v0, v1, v2] = facet.corners.map(|corner| (corner * about.scale).into());
-            (TheirTriangle { v0, v1, v2 }, facet.two_sided, facet.item)
-        });
-        Ok(Box::new(ObvhsTriangles {
-            triangles: placed.collect(),
+impl<T: Cast, B: Primitive> Obvhs<T, B> {
+    /// Builds the tree; a panic of the crate is an error.
+    fn boxed(all: &Bodies<B>, name: &'static str) -> Result<Box<dyn Pick>, NotBuilt> {
+        let about = About::of(all.origin, &all.bounds);
+        let boxes: Vec<Aabb> = all.bounds.iter().map(|b| about.scaled(b)).collect();
+        let build = || {
+            let binary = ploc::build(&boxes, ploc::ONE_A_LEAF);
+            let levels = levels_of(binary.nodes.len(), |node| {
+                let node = &binary.nodes[node];
+                let first = node.first_index as usize;
+                first..first + if node.is_leaf() { 0 } else { 2 }
+            });
+            T::of(binary, levels)
+        };
+        let tree =
+            caught(build).unwrap_or_else(|message| Err(NotBuilt::Panicked { name, message }))?;
+        let order = tree.order().iter().map(|&place| place as usize);
+        Ok(Box::new(Obvhs::<T, B> {
+            bodies: order
+                .clone()
+                .map(|place| all.all[place].rounded(&all.bounds[place], &about))
+                .collect(),
+            ids: order.map(|place| all.all[place].item()).collect(),
             about,
-            items: facets.items,
+            items: all.items,
             tree,
         }))
     }
-
-    /// Depth at which a triangle is met, infinite if it is not.
-    #[inline(always)]
-    fn depth(&self, ray: &TheirRay, near: f32, place: usize) -> f32 {
-        let (triangle, two_sided, _) = &self.triangles[place];
-        let [u, v] = [triangle.v1 - triangle.v0, triangle.v2 - triangle.v0];
-        let is_behind = u.cross(v).dot(ray.direction) >= 0.0;
-        let depth = triangle.intersect(ray);
-        match depth >= near && (*two_sided || !is_behind) {
-            true => depth,
-            false => f32::INFINITY,
-        }
-    }
 }
 
-impl<T: Cast> Pick for ObvhsTriangles<T> {
+impl<T: Cast, B: Primitive> Pick for Obvhs<T, B> {
     fn first(&self, ray: &Ray) -> Option<Hit> {
         let rounded = RoundedRay::of(ray, &self.about);
         let mut found = RayHit::none();
-        let entry = |ray: &TheirRay, place: usize| self.depth(ray, rounded.near, place);
-        self.tree.first(their_ray(&rounded), &mut found, entry);
-        let (_, _, item) = *self.triangles.get(found.primitive_id as usize)?;
-        self.about.hit(item, found.t).counted(self.items)
+        let entry = |ray: &TheirRay, place: usize| B::depth(&self.bodies[place], &rounded, ray);
+        self.tree.first(rounded.theirs(), &mut found, entry);
+        let item = *self.ids.get(found.primitive_id as usize)?;
+        ((item as usize) < self.items).then(|| self.about.hit(item, found.t))
     }
 
     fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>) {
         let rounded = RoundedRay::of(ray, &self.about);
         hits.clear();
         let visit = |ray: &TheirRay, place: usize| {
-            let depth = self.depth(ray, rounded.near, place);
-            let item = self.triangles[place].2;
+            let depth = B::depth(&self.bodies[place], &rounded, ray);
+            let item = self.ids[place];
             if depth <= rounded.far && (item as usize) < self.items {
                 hits.push(self.about.hit(item, depth));
             }
         };
-        self.tree.all(their_ray(&rounded), visit);
-        keep_nearest_items(hits, count);
+        self.tree.all(rounded.theirs(), visit);
+        if !B::IS_BOX {
+            hits.sort_unstable_by(|a, b| a.item.cmp(&b.item).then(a.order(b)));
+            hits.dedup_by_key(|hit| hit.item);
+        }
+        hits.sort_unstable_by(Hit::order);
+        hits.truncate(kept(hits, count, |hit, last| hit.depth <= last.depth));
     }
 }
 

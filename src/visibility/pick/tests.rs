@@ -13,7 +13,7 @@ use crate::query::ItemId;
 use crate::scene::{Sample, Scene, SeededRng, Surfaces, WorldBox, load};
 use crate::visibility::region::doom::DoomMap;
 use crate::visibility::truth::judge::{self, Depth};
-use crate::visibility::truth::{NO_ITEM, RayIndex, SampleTruth};
+use crate::visibility::truth::{Boxes, Facets, NO_ITEM, RayIndex, SampleTruth, SurfaceIndex};
 use crate::visibility::{Guarantee, Ray, Rays, SampleGrid, Solids};
 
 /// All items that the ray meets, by depth and id.
@@ -124,10 +124,15 @@ fn exact_back_ends_answer_as_arithmetic_on_integers_does() {
             let built: Vec<_> = BACK_ENDS
                 .iter()
                 .filter(|row| row.guarantee == Guarantee::Exact)
-                .map(|row| (row.name, (row.build)(&solids, Kernel::best()).unwrap()))
+                .map(|row| {
+                    (
+                        row.name,
+                        (row.boxes)(&Boxes::of(&solids), Kernel::best()).unwrap(),
+                    )
+                })
                 .collect();
             assert!(built.len() >= 2);
-            let wide = WideRay::of(&solids, Kernel::best()).unwrap();
+            let wide = WideRay::of(&Boxes::of(&solids), Kernel::best()).unwrap();
             for _ in 0..if count > 100 { 60 } else { 120 } {
                 let ray = worlds.ray();
                 let truth = all_judged(&ray, &solids);
@@ -172,7 +177,7 @@ fn back_ends_in_f32_differ_on_few_ties() {
         let (mut on_grids, mut asked) = (0, 0);
         for mut worlds in grids(77) {
             let solids = worlds.boxes(40);
-            let back_end = (row.build)(&solids, Kernel::best()).unwrap();
+            let back_end = (row.boxes)(&Boxes::of(&solids), Kernel::best()).unwrap();
             for _ in 0..150 {
                 let ray = worlds.ray();
                 let truth = all_judged(&ray, &solids);
@@ -194,7 +199,12 @@ fn boxes_of_any_size_are_picked_alike() {
         let solids = worlds.boxes(60);
         let built: Vec<_> = BACK_ENDS
             .iter()
-            .map(|row| (row, (row.build)(&solids, Kernel::best()).unwrap()))
+            .map(|row| {
+                (
+                    row,
+                    (row.boxes)(&Boxes::of(&solids), Kernel::best()).unwrap(),
+                )
+            })
             .collect();
         for _ in 0..100 {
             let ray = worlds.ray();
@@ -217,7 +227,7 @@ fn boxes_of_any_size_are_picked_alike() {
 fn rays_along_faces_and_beyond_the_analysis_are_exact_too() {
     let mut worlds = Worlds::new(3, 1.0, DVec3::ZERO);
     let solids = worlds.boxes(150);
-    let wide = WideRay::of(&solids, Kernel::best()).unwrap();
+    let wide = WideRay::of(&Boxes::of(&solids), Kernel::best()).unwrap();
     let sizes = [
         0.0, 1e-70, 1e-30, -1e-26, 6e-17, -6e-17, 1e-9, 0.2, -1.0, 1.0, 900.0, -900.0,
     ];
@@ -250,8 +260,8 @@ fn in_scenes_the_wide_tree_finds_what_the_reference_finds() {
         let bounds = scene.world_bounds();
         let solids = Solids::of(&scene);
         let (wide, reference) = (
-            WideRay::of(&solids, Kernel::best()).unwrap(),
-            Linear::of(&solids),
+            WideRay::of(&Boxes::of(&solids), Kernel::best()).unwrap(),
+            Linear(Boxes::of(&solids)),
         );
         let mut rng = SeededRng::new(9);
         let (mut hits, mut truth) = (Vec::new(), Vec::new());
@@ -302,13 +312,13 @@ fn at_every_sample_the_pick_is_the_item_of_the_id_buffer() {
         let (scene, cameras) = cameras(name);
         let solids = Solids::of(&scene);
         let (wide, index) = (
-            WideRay::of(&solids, Kernel::best()).unwrap(),
+            WideRay::of(&Boxes::of(&solids), Kernel::best()).unwrap(),
             RayIndex::build(&solids),
         );
         let mut items = 0;
         for camera in cameras {
             let rays = Rays::of(&camera).unwrap();
-            let truth = SampleTruth::of(&solids, &index, &rays, grid, 1);
+            let truth = SampleTruth::of(&index, &rays, grid, 1);
             items += truth.visible.len();
             for row in 0..grid.height {
                 for column in 0..grid.width {
@@ -327,7 +337,7 @@ fn at_every_sample_the_pick_is_the_item_of_the_id_buffer() {
 fn a_cursors_frustum_holds_what_every_ray_through_it_meets_and_no_more_than_its_planes() {
     let (scene, cameras) = cameras("city:n=3000");
     let solids = Solids::of(&scene);
-    let wide = WideRay::of(&solids, Kernel::best()).unwrap();
+    let wide = WideRay::of(&Boxes::of(&solids), Kernel::best()).unwrap();
     let index = index::Wide::build(&Input::new(&scene.items), &Default::default()).unwrap();
     let around = Surroundings {
         origin: scene.origin,
@@ -381,13 +391,10 @@ fn ray(origin: DVec3, direction: DVec3) -> Ray {
     }
 }
 
-/// Every back end that takes triangles.
+/// Every back end over triangles.
 fn triangle_back_ends(facets: &Facets) -> Vec<(&'static BackEnd, Box<dyn Pick>)> {
-    let built = BACK_ENDS.iter().filter_map(|row| {
-        let build = row.build_triangles?;
-        Some((row, build(facets, Kernel::best()).unwrap()))
-    });
-    built.collect()
+    let built = |row: &'static BackEnd| (row, (row.facets)(facets, Kernel::best()).unwrap());
+    BACK_ENDS.iter().map(built).collect()
 }
 
 fn items(hits: &[Hit]) -> Vec<ItemId> {
@@ -397,8 +404,8 @@ fn items(hits: &[Hit]) -> Vec<ItemId> {
 #[test]
 fn boxes_as_triangles_are_picked_as_boxes_are() {
     let scene = load("city:n=300", &Default::default()).unwrap();
-    let reference = Linear::of(&Solids::of(&scene));
-    let facets = Facets::of(&Surfaces::from_boxes(&scene), scene.items.len());
+    let reference = Linear(Boxes::of(&Solids::of(&scene)));
+    let facets = Facets::solid(&Surfaces::from_boxes(&scene), scene.items.len());
     let bounds = scene.bounds;
     let (min, max) = bounds.in_world(scene.origin);
     let built = triangle_back_ends(&facets);
@@ -433,8 +440,8 @@ fn floors_and_ceilings_end_the_search_for_the_first_item_only() {
     let scene = load("freedm-map12", &Default::default()).unwrap();
     let surfaces = map.surfaces(&scene);
     let count = scene.items.len();
-    let truth = SolidSurfaces::of(&surfaces, count);
-    let built = triangle_back_ends(&Facets::of(&surfaces, count));
+    let truth = SurfaceIndex::of(&Facets::solid(&surfaces, count));
+    let built = triangle_back_ends(&Facets::solid(&surfaces, count));
     let mut rng = SeededRng::new(5);
     let (mut hidden, mut differ) = (0, 0);
     let [mut wanted, mut found] = [Vec::new(), Vec::new()];

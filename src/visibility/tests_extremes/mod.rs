@@ -235,8 +235,7 @@ fn seen(index: &RayIndex, rays: &Rays, case: &StageCase, rng: &mut SeededRng) ->
         (0..RAYS_AT_BOXES).map(|_| point_of(&case.boxes[rng.below(case.boxes.len())], rng));
     for point in at_boxes.chain(case.aims.iter().copied()) {
         if let Some([x, y]) = rays.in_image(point) {
-            let front = index.front_of(&rays.through(x, y));
-            seen.extend(front.into_iter().flat_map(|front| front.items));
+            seen.extend(index.front_of(&rays.through(x, y)).front);
         }
     }
     seen.sort_unstable();

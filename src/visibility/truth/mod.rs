@@ -1,20 +1,19 @@
-//! The visible items, exact along the rays of a sample grid: `sample` for boxes,
-//! `surface_sample` for triangles. Knows boxes, triangles, cameras and rays, not the back
-//! ends that are judged by it.
+//! The visible items, exact along the rays of a sample grid, for solid boxes and triangles.
+//! No back end shares this code, except for the exact tests of rays against bodies.
 
-mod entry;
-#[cfg(test)]
-pub(super) mod judge;
+mod body;
+mod ray_box;
 mod ray_index;
 mod ray_tree;
 mod ray_triangle;
 mod sample;
-mod surface_index;
-mod surface_sample;
+#[cfg(test)]
+pub(super) mod tests;
 
-pub use entry::{Crossing, Probe};
-pub use ray_index::{Front, RayIndex};
+pub use body::{Along, Bodies, Body, Boxes, Facet, Facets, SolidBox};
+pub use ray_box::{Crossing, Probe};
+pub use ray_index::{BodyIndex, Front, RayIndex, SurfaceIndex};
 pub use ray_triangle::{Meeting, TriangleProbe};
 pub use sample::{NO_ITEM, SampleTruth, visible_by_random_rays};
-pub use surface_index::{SurfaceFront, SurfaceIndex};
-pub use surface_sample::visible_surfaces_by_random_rays;
+#[cfg(test)]
+pub(super) use tests::judge;

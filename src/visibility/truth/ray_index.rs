@@ -1,145 +1,167 @@
-//! The boxes of a scene in a tree for rays. It finds the front item of a ray, and
-//! whatever else a ray pierces; no node that holds the answer is ever left out, and
-//! what lies in the leaves is decided exactly.
+//! Exact search for what a ray meets: the bodies of a scene in the leaves of a tree.
 
 use std::cmp::Ordering;
-use std::ops::Range;
 
-use super::entry::{Crossing, Probe};
+use super::body::{Along, Bodies, Body, Boxes, Facet, Facets, SolidBox};
 use super::ray_tree::RayTree;
 use crate::query::ItemId;
-use crate::scene::WorldBox;
+use crate::scene::Surfaces;
 use crate::visibility::{Ray, Solids};
 
-/// A tree over the outer boxes of a scene with the boxes as they were written in its
-/// leaves.
+/// A tree over the bounds of bodies with the bodies in its leaves.
 #[derive(Clone, Debug)]
-pub struct RayIndex {
+pub struct BodyIndex<B> {
     tree: RayTree,
-    /// By place in the tree.
-    boxes: Vec<WorldBox>,
+    /// In tree order.
+    bodies: Vec<B>,
+    items: usize,
 }
 
-/// What is in front along a ray.
+/// An index of solid boxes.
+pub type RayIndex = BodyIndex<SolidBox>;
+
+/// An index of triangles. Clear ones and cut-outs hide nothing.
+pub type SurfaceIndex = BodyIndex<Facet>;
+
+/// The items that are seen along a ray.
 #[derive(Clone, PartialEq, Debug)]
-pub struct Front {
-    /// Where the ray enters it.
-    pub entry: Crossing,
-    /// The items that it enters there, ascending: more than one of them is a tie.
-    pub items: Vec<ItemId>,
-}
-
-impl Front {
-    /// The item, the lowest of a tie.
-    pub fn item(&self) -> ItemId {
-        self.items[0]
-    }
+#[non_exhaustive]
+pub struct Front<At> {
+    /// Items that the ray meets first among those that hide, ascending: several are a tie.
+    /// Empty if it meets none from near to far.
+    pub front: Vec<ItemId>,
+    /// Items that hide nothing and are met before these or with them, ascending.
+    pub before: Vec<ItemId>,
+    /// Where the ray meets the front items.
+    pub meeting: Option<At>,
 }
 
 impl RayIndex {
-    /// Builds the tree. O(n log n).
+    /// Builds the index of solid boxes. O(n log n).
     pub fn build(solids: &Solids) -> RayIndex {
-        let tree = RayTree::build(&solids.outer, solids.origin);
-        let boxes = tree.ids.iter().map(|&item| solids.boxes[item as usize]);
-        RayIndex {
-            boxes: boxes.collect(),
+        BodyIndex::of(&Boxes::of(solids))
+    }
+}
+
+impl SurfaceIndex {
+    /// Builds the index of triangles. O(t log t).
+    pub fn build(surfaces: &Surfaces) -> SurfaceIndex {
+        BodyIndex::of(&Facets::of(surfaces))
+    }
+}
+
+impl<B: Body> BodyIndex<B> {
+    /// Builds the index. O(n log n).
+    pub fn of(bodies: &Bodies<B>) -> BodyIndex<B> {
+        let tree = RayTree::build(&bodies.bounds, bodies.origin);
+        let placed = tree.ids.iter().map(|&id| bodies.all[id as usize]);
+        BodyIndex {
+            bodies: placed.collect(),
+            items: bodies.items,
             tree,
         }
     }
 
-    /// How many items there are.
-    pub fn len(&self) -> usize {
-        self.tree.ids.len()
+    /// Number of items, see [`Bodies::items`].
+    pub fn items(&self) -> usize {
+        self.items
     }
 
-    /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
-        self.tree.ids.is_empty()
+    /// Prepares a ray for exact tests against these bodies.
+    pub fn probe(&self, ray: &Ray) -> B::Probe {
+        B::probe(ray, self.tree.origin)
     }
 
-    /// The items at some places of the tree, with their boxes.
-    fn at(&self, places: Range<usize>) -> impl Iterator<Item = (ItemId, &WorldBox)> {
-        let ids = self.tree.ids[places.clone()].iter().copied();
-        ids.zip(&self.boxes[places])
+    /// Searches for what is seen along a ray, exactly.
+    pub fn front_of(&self, ray: &Ray) -> Front<B::At> {
+        let mut search = Search::new();
+        let meeting = search.front(self, ray, &|_, _, _| true);
+        Front {
+            front: search.front,
+            before: search.before,
+            meeting,
+        }
     }
 
-    /// The front item of a ray and those that tie with it, exactly. `None` where it
-    /// meets nothing from near to far.
-    pub fn front_of(&self, ray: &Ray) -> Option<Front> {
-        let mut search = Search::default();
-        search.front(self, ray).map(|entry| Front {
-            entry,
-            items: search.items,
-        })
-    }
-
-    /// Every item that the ray enters from near to `limit`, with where: in no order.
-    pub fn all_along(&self, ray: &Ray, limit: f64) -> Vec<(ItemId, Crossing)> {
-        let ray = Ray {
-            far: ray.far.min(limit),
-            ..*ray
-        };
-        let probe = Probe::new(ray);
-        let mut found = Vec::new();
-        self.tree.walk(&ray, &mut Vec::new(), |places| {
-            for (id, b) in self.at(places) {
-                found.extend(probe.enter(b, ray.far).map(|entry| (id, entry)));
-            }
+    /// Every meeting of a ray with a body from near to far, in no order.
+    pub fn all_along(&self, ray: &Ray) -> Vec<(ItemId, B::At)> {
+        let probe = self.probe(ray);
+        let mut met = Vec::new();
+        self.tree.walk(ray, &mut Vec::new(), |places| {
+            let bodies = self.bodies[places].iter();
+            met.extend(bodies.filter_map(|b| Some((b.item(), b.meet(&probe, ray.far)?))));
             ray.far
         });
-        found
+        met
     }
 }
 
-/// The memory of a search, kept from ray to ray.
-#[derive(Default)]
-pub(super) struct Search {
+/// Memory of a search, kept from ray to ray.
+pub(super) struct Search<At> {
     stack: Vec<(f64, u32)>,
-    /// The front items of the last ray, ascending.
-    pub items: Vec<ItemId>,
+    through: Vec<(ItemId, At)>,
+    /// As [`Front::front`], of the last ray.
+    pub front: Vec<ItemId>,
+    /// As [`Front::before`], of the last ray.
+    pub before: Vec<ItemId>,
 }
 
-impl Search {
-    /// Where the front items of the ray are entered; which they are is in `items`.
-    #[inline]
-    pub fn front(&mut self, index: &RayIndex, ray: &Ray) -> Option<Crossing> {
-        self.front_of(index, ray, &|_, _, _, _| true)
+impl<At: Copy> Search<At> {
+    pub fn new() -> Search<At> {
+        Search {
+            stack: Vec::new(),
+            through: Vec::new(),
+            front: Vec::new(),
+            before: Vec::new(),
+        }
     }
 
-    /// The same among the items that are opaque where the ray enters them.
+    /// Returns where the ray meets the front items, and leaves what is seen in `front` and
+    /// `before`. Rays pass through points of bodies that are not `is_opaque`.
     #[inline]
-    pub fn front_of(
+    pub fn front<B: Body<At = At>>(
         &mut self,
-        index: &RayIndex,
+        index: &BodyIndex<B>,
         ray: &Ray,
-        is_opaque: &impl Fn(ItemId, &WorldBox, &Probe, &Crossing) -> bool,
-    ) -> Option<Crossing> {
-        let probe = Probe::new(*ray);
-        let items = &mut self.items;
-        items.clear();
-        let mut best: Option<Crossing> = None;
+        is_opaque: &impl Fn(&B, &B::Probe, &At) -> bool,
+    ) -> Option<At> {
+        let probe = index.probe(ray);
+        let (front, through) = (&mut self.front, &mut self.through);
+        front.clear();
+        through.clear();
+        let mut best: Option<At> = None;
         let mut limit = ray.far;
         index.tree.walk(ray, &mut self.stack, |places| {
-            for (id, b) in index.at(places) {
-                let Some(entry) = probe.enter(b, limit) else {
+            for body in &index.bodies[places] {
+                let Some(at) = body.meet(&probe, limit) else {
                     continue;
                 };
-                let order = best.map_or(Ordering::Less, |best| probe.compare(&entry, &best));
-                match order {
+                if !body.hides() {
+                    through.push((body.item(), at));
+                    continue;
+                }
+                match best.map_or(Ordering::Less, |best| probe.order(&at, &best)) {
                     Ordering::Greater => continue,
-                    _ if !is_opaque(id, b, &probe, &entry) => continue,
+                    _ if !is_opaque(body, &probe, &at) => continue,
                     Ordering::Less => {
-                        items.clear();
-                        best = Some(entry);
-                        limit = entry.at_most();
+                        front.clear();
+                        best = Some(at);
+                        limit = limit.min(B::Probe::at_most(&at));
                     }
                     Ordering::Equal => {}
                 }
-                items.push(id);
+                front.push(body.item());
             }
             limit
         });
-        items.sort_unstable();
+        let reached = |at: &At| best.is_none_or(|best| probe.order(at, &best).is_le());
+        self.before.clear();
+        let before = through.iter().filter(|(_, at)| reached(at));
+        self.before.extend(before.map(|(item, _)| *item));
+        for items in [&mut self.front, &mut self.before] {
+            items.sort_unstable();
+            items.dedup();
+        }
         best
     }
 }

@@ -29,7 +29,7 @@ struct Pair {
 /// A binary tree over boxes, halved by the surface area heuristic.
 #[derive(Clone, Debug)]
 pub(super) struct RayTree {
-    origin: DVec3,
+    pub origin: DVec3,
     /// Largest local coordinate of all.
     reach: f64,
     pairs: Vec<Pair>,

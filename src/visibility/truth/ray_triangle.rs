@@ -10,6 +10,7 @@ use std::cmp::Ordering;
 
 use glam::{DVec3, I64Vec3, Vec3};
 
+use super::body::Along;
 use crate::arithmetic::{Expansion, two_sum};
 use crate::kernel::each;
 use crate::visibility::Ray;
@@ -80,8 +81,27 @@ pub struct TriangleProbe {
     far: f64,
 }
 
+impl Along for TriangleProbe {
+    type At = Meeting;
+
+    #[inline(always)]
+    fn order(&self, a: &Meeting, b: &Meeting) -> Ordering {
+        self.compare(a, b)
+    }
+
+    #[inline(always)]
+    fn depth(at: &Meeting) -> f64 {
+        at.depth
+    }
+
+    #[inline(always)]
+    fn at_most(at: &Meeting) -> f64 {
+        at.at_most()
+    }
+}
+
 impl TriangleProbe {
-    /// The ray, made ready for triangles about an origin.
+    /// Prepares a ray for triangles relative to an origin.
     #[inline]
     pub fn new(ray: Ray, origin: DVec3) -> TriangleProbe {
         let sums = each([0, 1, 2], |k| two_sum(origin[k], -ray.origin[k]));

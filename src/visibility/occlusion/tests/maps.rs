@@ -12,7 +12,7 @@ use crate::geometry::Aabb;
 use crate::kernel::Kernel;
 use crate::scene::{Sample, SeededRng, WorldBox, load};
 use crate::visibility::region::doom::DoomMap;
-use crate::visibility::truth::{SurfaceIndex, visible_surfaces_by_random_rays};
+use crate::visibility::truth::{SurfaceIndex, visible_by_random_rays};
 use crate::visibility::{SampleGrid, Solids};
 
 /// Of a map: how many items were removed and how many lost, with boxes in its solid that
@@ -50,7 +50,7 @@ fn removed_and_lost(name: &str, change: impl Fn(&mut WorldBox)) -> [usize; 2] {
                 return;
             }
             let in_view = ready.in_view(view.volume);
-            let mut seen = visible_surfaces_by_random_rays(&index, rays, 4000, number, 1);
+            let mut seen = visible_by_random_rays(&index, rays, 4000, number, 1);
             seen.retain(|&item| item < own);
             assert!(missing(&seen, &in_view).is_empty());
             for kept in kept::<MaskedInner>(&ready, view, Kernel::best()) {

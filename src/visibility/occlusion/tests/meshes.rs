@@ -10,7 +10,7 @@ use crate::kernel::Kernel;
 use crate::scene::{Scene, SeededRng, Surfaces, WorldBox, load};
 use crate::visibility::hiders::Hiders;
 use crate::visibility::inscribed::InnerBoxes;
-use crate::visibility::truth::{SurfaceIndex, visible_surfaces_by_random_rays};
+use crate::visibility::truth::{SurfaceIndex, visible_by_random_rays};
 use crate::visibility::{Rays, SampleGrid, Solids};
 
 /// Anywhere about a scene, or in the box of an item: in its mesh as likely as not.
@@ -57,7 +57,7 @@ fn boxes_inside_meshes_hide_nothing_that_is_visible() {
             let camera = camera(&ready.scene, &mut rng, number % 5 == 0);
             with_view(&ready, &camera, SampleGrid::new(96, 60), |view, rays| {
                 let in_view = ready.in_view(view.volume);
-                let seen = visible_surfaces_by_random_rays(&index, rays, 1500, number, 1);
+                let seen = visible_by_random_rays(&index, rays, 1500, number, 1);
                 assert!(missing(&seen, &in_view).is_empty());
                 for kept in kept::<MaskedInner>(&ready, view, Kernel::best()) {
                     let lost = missing(&seen, &kept);
@@ -91,7 +91,7 @@ fn boxes_below_the_ground_hide_nothing_that_is_visible() {
             let ready = if is_open { &open } else { &bare };
             with_view(ready, &camera, SampleGrid::new(96, 60), |view, rays| {
                 let in_view = ready.in_view(view.volume);
-                let seen = visible_surfaces_by_random_rays(&index, rays, 1500, number, 1);
+                let seen = visible_by_random_rays(&index, rays, 1500, number, 1);
                 for kept in kept::<MaskedInner>(ready, view, Kernel::best()) {
                     let lost = missing(&seen, &kept);
                     assert!(lost.is_empty(), "{name} {number}: {lost:?}, {camera:?}");

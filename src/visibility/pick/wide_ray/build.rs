@@ -42,13 +42,6 @@ impl Child {
     }
 }
 
-/// The tree: nodes, the root first, and the ids of the items in tree order.
-pub(super) struct Built {
-    pub nodes: Vec<Node>,
-    pub root: Child,
-    pub ids: Vec<ItemId>,
-}
-
 const EMPTY: Node = Node {
     rows: {
         let (low, high) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
@@ -67,8 +60,9 @@ impl Node {
     }
 }
 
-/// Builds the tree. O(n log n).
-pub(super) fn build(boxes: &[Aabb]) -> Built {
+/// Builds the tree: its nodes, the root first; the root; ids of the items in tree order.
+/// O(n log n).
+pub(super) fn build(boxes: &[Aabb]) -> (Vec<Node>, Child, Vec<ItemId>) {
     let mut items = Record::numbered(boxes);
     let mut nodes: Vec<Node> = Vec::with_capacity(boxes.len() / 8 + 1);
     let mut root = Child::new(0, 0);
@@ -96,11 +90,7 @@ pub(super) fn build(boxes: &[Aabb]) -> Built {
             open.push((part, Some((at, lane))));
         }
     }
-    Built {
-        nodes,
-        root,
-        ids: items.iter().map(|item| item.id).collect(),
-    }
+    (nodes, root, items.iter().map(|item| item.id).collect())
 }
 
 /// Cuts a set into at most sixteen parts: the one with the largest surface
@@ -142,7 +132,7 @@ mod tests {
     use crate::scene::SeededRng;
 
     fn check(boxes: &[Aabb]) -> usize {
-        let Built { nodes, root, ids } = build(boxes);
+        let (nodes, root, ids) = build(boxes);
         let mut sorted = ids.clone();
         sorted.sort_unstable();
         assert!(sorted.iter().copied().eq(0..boxes.len() as u32));

@@ -1,20 +1,17 @@
-//! The sixteen-wide tree: sixteen slab tests at once, nearest children first, over boxes
-//! of any things. What the tests in f32 leave open is decided exactly, by what the things
-//! are: solid boxes (`boxes`) or triangles (`triangles`). This file owns the traversal.
+//! The sixteen-wide tree: sixteen slab tests at once, nearest children first, over the bounds
+//! of bodies. The exact tests of the bodies (`bodies`) decide what those in f32 leave open.
 
-mod boxes;
+mod bodies;
 mod build;
 mod slabs;
-mod triangles;
 
 use std::hint::black_box;
 
 use glam::DVec3;
 
-pub use self::boxes::WideRay;
-use self::build::{Built, Child, Node};
+pub use self::bodies::WideRay;
+use self::build::{Child, Node};
 use self::slabs::Slabs;
-use self::triangles::WideTriangles;
 use super::contract::{BackEnd, NotBuilt};
 use crate::geometry::Aabb;
 use crate::kernel::{Isa, Kernel, LANES};
@@ -26,12 +23,9 @@ pub const ROW: BackEnd = BackEnd {
     name: "wide-ray",
     summary: "16-wide tree, sixteen slab tests at once, the last step exact",
     guarantee: Guarantee::Exact,
-    build: |solids, kernel| Ok(Box::new(WideRay::of(solids, kernel)?)),
-    build_triangles: Some(|facets, kernel| Ok(Box::new(WideTriangles::of(facets, kernel)?))),
+    boxes: |boxes, kernel| Ok(Box::new(WideRay::of(boxes, kernel)?)),
+    facets: |facets, kernel| Ok(Box::new(WideRay::of(facets, kernel)?)),
 };
-
-/// Most items: a node holds one at least.
-const MOST: usize = Child::MOST;
 
 /// The nodes, some 45 bytes of them a box.
 #[derive(Clone, Debug)]
@@ -50,11 +44,12 @@ impl Tree {
     /// Builds it over boxes about a zero; the places that [`Candidates`] are told of are
     /// those of the ids that are handed back. O(n log n).
     fn of(boxes: &[Aabb], zero: DVec3, kernel: Kernel) -> Result<(Tree, Vec<ItemId>), NotBuilt> {
-        let count = boxes.len();
-        if count > MOST {
-            return Err(NotBuilt::TooMany { count, most: MOST });
+        // Each node holds at least one box.
+        let (count, most) = (boxes.len(), Child::MOST);
+        if count > most {
+            return Err(NotBuilt::TooMany { count, most });
         }
-        let Built { nodes, root, ids } = build::build(boxes);
+        let (nodes, root, ids) = build::build(boxes);
         let tree = Tree {
             nodes,
             root,

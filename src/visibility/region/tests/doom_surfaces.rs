@@ -44,7 +44,7 @@ fn visible_and_lost(world: &World, graph: &Arc<RegionGraph>, eyes: usize) -> (us
     let (mut visible, mut lost) = (0, vec![0; rows.len()]);
     for place in world.scene.places.iter().cycle().take(eyes) {
         let rays = looking(place.eye, &mut rng);
-        let truth = SampleTruth::of_surfaces(&index, &rays, SampleGrid::new(64, 36), 2);
+        let truth = SampleTruth::of(&index, &rays, SampleGrid::new(64, 36), 2);
         let own = (world.scene.items.len()) as ItemId;
         let seen: Vec<ItemId> = truth.visible.into_iter().filter(|&id| id < own).collect();
         visible += seen.len();

@@ -3,6 +3,7 @@
 
 use std::cmp::Ordering;
 
+use super::body::Along;
 use crate::arithmetic::{Expansion, two_sum};
 use crate::kernel::each;
 use crate::scene::WorldBox;
@@ -31,14 +32,6 @@ pub struct Crossing {
     axis: usize,
 }
 
-impl Crossing {
-    /// No depth at which the ray crosses there is above this.
-    #[inline]
-    pub fn at_most(&self) -> f64 {
-        self.depth + GUARD * self.depth.abs()
-    }
-}
-
 /// A ray that asks boxes where it enters them.
 ///
 /// Exact for coordinates and components of direction that are 0 or from 2^-400 to
@@ -50,8 +43,27 @@ pub struct Probe {
     inverse: [f64; 3],
 }
 
+impl Along for Probe {
+    type At = Crossing;
+
+    #[inline(always)]
+    fn order(&self, a: &Crossing, b: &Crossing) -> Ordering {
+        self.compare(a, b)
+    }
+
+    #[inline(always)]
+    fn depth(at: &Crossing) -> f64 {
+        at.depth
+    }
+
+    #[inline(always)]
+    fn at_most(at: &Crossing) -> f64 {
+        at.depth + GUARD * at.depth.abs()
+    }
+}
+
 impl Probe {
-    /// The ray, made ready.
+    /// Prepares a ray.
     #[inline]
     pub fn new(ray: Ray) -> Probe {
         let inverse = each(ray.direction.to_array(), |d| 1.0 / d);
@@ -158,12 +170,13 @@ impl Probe {
     /// Whether the ray has left a slab of the box for certain where it enters the last one.
     #[cold]
     fn leaves_before(&self, b: &WorldBox, enters: &Crossing) -> bool {
+        let mirrored = WorldBox {
+            min: b.max,
+            max: b.min,
+        };
         self.crossed().any(|axis| {
-            let left = match self.ray.direction[axis] > 0.0 {
-                true => b.max[axis],
-                false => b.min[axis],
-            };
-            self.compare(enters, &self.crossing(axis, left)).is_gt()
+            let left = self.crossing(axis, self.entered(&mirrored, axis));
+            self.compare(enters, &left).is_gt()
         })
     }
 

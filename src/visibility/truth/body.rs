@@ -1,0 +1,192 @@
+//! Bodies that rays meet: solid boxes and triangles.
+
+use std::cmp::Ordering;
+use std::fmt::Debug;
+
+use glam::{DVec3, Vec3};
+
+use super::ray_box::Probe;
+use super::ray_triangle::TriangleProbe;
+use crate::geometry::Aabb;
+use crate::query::ItemId;
+use crate::scene::{SurfaceKind, Surfaces, WorldBox};
+use crate::visibility::{Ray, Solids};
+
+/// A ray prepared for exact tests against one kind of body.
+pub trait Along: Copy {
+    /// A point of the ray on the surface of a body.
+    type At: Copy + Debug;
+
+    /// Exact order of two such points along the ray.
+    fn order(&self, a: &Self::At, b: &Self::At) -> Ordering;
+
+    /// Depth of a point, rounded.
+    fn depth(at: &Self::At) -> f64;
+
+    /// Upper bound of the true depth of a point.
+    fn at_most(at: &Self::At) -> f64;
+}
+
+/// A body that rays meet.
+pub trait Body: Copy + Debug + Send + Sync + 'static {
+    /// A ray prepared for such bodies.
+    type Probe: Along<At = Self::At> + Debug;
+    /// A point of a ray on the surface of such a body.
+    type At: Copy + Debug;
+    /// Whether an item is one body that fills its bounding box.
+    const IS_BOX: bool;
+
+    /// Prepares a ray for bodies whose local coordinates are relative to `origin`.
+    fn probe(ray: &Ray, origin: DVec3) -> Self::Probe;
+
+    /// The item that the body belongs to.
+    fn item(&self) -> ItemId;
+
+    /// Whether the body hides what is behind it.
+    fn hides(&self) -> bool;
+
+    /// Exact meeting from near to far. `None` as well if it certainly lies beyond `limit`.
+    fn meet(&self, probe: &Self::Probe, limit: f64) -> Option<Self::At>;
+}
+
+/// An item as a solid box.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct SolidBox {
+    /// The box as written in the scene.
+    pub b: WorldBox,
+    /// The item.
+    pub item: ItemId,
+}
+
+impl Body for SolidBox {
+    type Probe = Probe;
+    type At = <Probe as Along>::At;
+    const IS_BOX: bool = true;
+
+    #[inline(always)]
+    fn probe(ray: &Ray, _: DVec3) -> Probe {
+        Probe::new(*ray)
+    }
+
+    #[inline(always)]
+    fn item(&self) -> ItemId {
+        self.item
+    }
+
+    #[inline(always)]
+    fn hides(&self) -> bool {
+        true
+    }
+
+    #[inline(always)]
+    fn meet(&self, probe: &Probe, limit: f64) -> Option<Self::At> {
+        probe.enter(&self.b, limit)
+    }
+}
+
+/// A triangle of an item.
+///
+/// A one-sided triangle is met from its front only.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Facet {
+    /// Scene-local corners, counter-clockwise seen from the front.
+    pub corners: [Vec3; 3],
+    /// The item.
+    pub item: ItemId,
+    /// Whether rays meet it from behind too.
+    pub two_sided: bool,
+    /// Whether it hides what is behind it.
+    pub hides: bool,
+}
+
+impl Body for Facet {
+    type Probe = TriangleProbe;
+    type At = <TriangleProbe as Along>::At;
+    const IS_BOX: bool = false;
+
+    #[inline(always)]
+    fn probe(ray: &Ray, origin: DVec3) -> TriangleProbe {
+        TriangleProbe::new(*ray, origin)
+    }
+
+    #[inline(always)]
+    fn item(&self) -> ItemId {
+        self.item
+    }
+
+    #[inline(always)]
+    fn hides(&self) -> bool {
+        self.hides
+    }
+
+    #[inline(always)]
+    fn meet(&self, probe: &TriangleProbe, limit: f64) -> Option<Self::At> {
+        probe.meet(self.corners, self.two_sided, limit)
+    }
+}
+
+/// The bodies of a scene, of which ray indexes are built.
+#[derive(Clone, Debug)]
+pub struct Bodies<B> {
+    /// Item by item.
+    pub all: Vec<B>,
+    /// Bounds of each body, f32 relative to `origin`.
+    pub bounds: Vec<Aabb>,
+    /// World position of the local zero.
+    pub origin: DVec3,
+    /// Number of items. Bodies of higher ids (floors and ceilings of a map) end the search
+    /// for the first item of a ray and are otherwise ignored by picking.
+    pub items: usize,
+}
+
+/// The items of a scene as solid boxes.
+pub type Boxes = Bodies<SolidBox>;
+
+/// The triangles of a scene.
+pub type Facets = Bodies<Facet>;
+
+impl Boxes {
+    /// All solids.
+    pub fn of(solids: &Solids) -> Boxes {
+        let numbered = solids.boxes.iter().zip(0..);
+        Bodies {
+            all: numbered.map(|(&b, item)| SolidBox { b, item }).collect(),
+            bounds: solids.outer.clone(),
+            origin: solids.origin,
+            items: solids.boxes.len(),
+        }
+    }
+}
+
+impl Facets {
+    /// All triangles of surfaces; opaque ones hide what is behind them.
+    pub fn of(surfaces: &Surfaces) -> Facets {
+        let of_item = |item: usize| {
+            surfaces.of(item).map(move |corners| Facet {
+                corners,
+                item: item as ItemId,
+                two_sided: surfaces.two_sided[item],
+                hides: surfaces.kinds[item] == SurfaceKind::Opaque,
+            })
+        };
+        let all: Vec<Facet> = (0..surfaces.items()).flat_map(of_item).collect();
+        let bounds =
+            |&Facet {
+                 corners: [a, b, c], ..
+             }: &Facet| { Aabb::new(a.min(b).min(c), a.max(b).max(c)) };
+        Bodies {
+            bounds: all.iter().map(bounds).collect(),
+            all,
+            origin: surfaces.origin,
+            items: surfaces.items(),
+        }
+    }
+
+    /// The triangles as picking treats them: all of them hide, cut-outs too, and the first
+    /// `items` of the surfaces' items count.
+    pub fn solid(surfaces: &Surfaces, items: usize) -> Facets {
+        let mut facets = Facets::of(surfaces);
+        facets.all.iter_mut().for_each(|facet| facet.hides = true);
+        Bodies { items, ..facets }
+    }
+}
