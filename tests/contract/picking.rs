@@ -3,7 +3,8 @@
 
 use cullbench::kernel::Kernel;
 use cullbench::scene::{self, Scene, SeededRng, WorldBox};
-use cullbench::visibility::pick::{self, Facets, Hit, Pick};
+use cullbench::visibility::pick::{self, Hit, Pick};
+use cullbench::visibility::truth::{Boxes, Facets};
 use cullbench::visibility::{Ray, Solids};
 use glam::DVec3;
 
@@ -16,9 +17,10 @@ fn peers_pick_what_the_reference_picks() {
     let mut random = |_| WorldBox::around(rng.point() * 100.0, rng.point() * 8.0);
     let boxes = (0..300).map(&mut random).collect::<Vec<_>>();
     let solids = Solids::of(&Scene::from_boxes("random", &boxes).unwrap());
-    let reference = pick::Linear::of(&solids);
+    let boxes = Boxes::of(&solids);
+    let reference = pick::Linear(boxes.clone());
     for row in pick::BACK_ENDS {
-        let back_end = (row.build)(&solids, Kernel::best()).unwrap();
+        let back_end = (row.boxes)(&boxes, Kernel::best()).unwrap();
         let (mut hits, mut truth) = (Vec::new(), Vec::new());
         let mut met = 0;
         for _ in 0..300 {
@@ -48,12 +50,10 @@ fn peers_pick_what_the_reference_picks() {
 fn peers_pick_the_triangles_that_the_reference_picks() {
     let scene = scene::load("mesh:spheres:n=26000", &Default::default()).unwrap();
     let surfaces = scene.surfaces.as_ref().expect("a mesh has triangles");
-    let facets = Facets::of(surfaces, scene.items.len());
+    let facets = Facets::solid(surfaces, scene.items.len());
     let bounds = scene.world_bounds();
-    let built = pick::BACK_ENDS.iter().filter_map(|row| {
-        let build = row.build_triangles?;
-        Some((row, build(&facets, Kernel::best()).unwrap()))
-    });
+    let rows = pick::BACK_ENDS.iter();
+    let built = rows.map(|row| (row, (row.facets)(&facets, Kernel::best()).unwrap()));
     let built: Vec<_> = built.collect();
     let (_, reference) = &built[0];
     assert_eq!(built[0].0.name, "linear");
