@@ -1,5 +1,4 @@
-//! What is picked from: the items as solid boxes, or as triangles; who answers, and what
-//! is true.
+//! Items as rays pick them, solid boxes or triangles: the back ends and the truth.
 
 use std::rc::Rc;
 
@@ -12,7 +11,7 @@ use crate::visibility::pick::{BACK_ENDS, BackEnd, NotBuilt, Pick};
 use crate::visibility::truth::{Boxes, Facets, RayIndex, SurfaceIndex};
 use crate::visibility::{Guarantee, Ray, Solids};
 
-/// How many of the nearest items are asked for.
+/// Number of nearest items of a query.
 pub const NEAREST: usize = 8;
 
 /// The items as a ray meets them.
@@ -20,24 +19,24 @@ pub const NEAREST: usize = 8;
 pub enum Pickable<'w> {
     /// Solid boxes.
     Boxes(&'w Solids),
-    /// Triangles, of which the first so many items count.
+    /// Triangles, and how many of their first items count.
     Triangles(&'w Surfaces, usize),
 }
 
 /// A back end that was built.
 pub struct Built {
-    /// As in its table.
+    /// Name in the table of back ends.
     pub name: &'static str,
     /// One line about it.
     pub summary: &'static str,
-    /// What it promises.
+    /// Guarantee of its answers.
     pub guarantee: Guarantee,
     /// Itself.
     pub pick: Rc<dyn Pick>,
 }
 
 impl<'w> Pickable<'w> {
-    /// Of a world, whose items are one or the other.
+    /// The items of a world.
     pub fn of(world: &'w World) -> Pickable<'w> {
         match (&world.solids, &world.surfaces) {
             (Some(solids), _) => Pickable::Boxes(solids),
@@ -46,8 +45,9 @@ impl<'w> Pickable<'w> {
         }
     }
 
-    /// Every back end that can hold the items, and those that refuse them; the one that
-    /// looks at each box or triangle only up to so many.
+    /// Every back end that can hold the items, and those that refuse them.
+    ///
+    /// The plain loop is built over at most `most_for_loop` boxes or triangles.
     pub fn back_ends(self, most_for_loop: usize, kernel: Kernel) -> (Vec<Built>, Vec<LeftOutRow>) {
         let count = match self {
             Pickable::Boxes(solids) => solids.boxes.len(),
@@ -102,7 +102,7 @@ impl Exactly {
         self.0.first(ray).map(|hit| hit.item)
     }
 
-    /// The nearest `count` items along a ray, and all that are as near as the last of them.
+    /// The nearest `count` items along a ray, and all as near as the last of them.
     pub fn nearest(&self, ray: &Ray, count: usize) -> Vec<ItemId> {
         let mut hits = Vec::new();
         self.0.nearest(ray, count, &mut hits);

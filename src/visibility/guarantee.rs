@@ -1,8 +1,7 @@
-//! What a back end of a stage promises of its answers.
+//! Guarantees of the answers of a stage's back ends.
 
 named! {
-    /// What a back end of a stage promises: declared by it, held against it by the
-    /// tests.
+    /// Guarantee that a back end declares of its answers and that tests check.
     #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
     #[non_exhaustive]
     pub enum Guarantee {
@@ -18,7 +17,7 @@ named! {
 }
 
 impl Guarantee {
-    /// Whether no visible item is ever missing.
+    /// Returns `true` if no visible item is ever missing.
     pub fn is_safe(self) -> bool {
         matches!(self, Guarantee::Exact | Guarantee::Conservative)
     }

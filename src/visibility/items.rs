@@ -1,4 +1,4 @@
-//! What the items of a scene are to rays: triangles, boxes with holes, walls of a map.
+//! Items of a scene as rays meet them: triangles, boxes with holes, walls of a map.
 
 use std::sync::Arc;
 
@@ -9,8 +9,9 @@ use crate::input::InputError;
 use crate::query::ItemId;
 use crate::scene::{ItemShape, Scene, Surfaces};
 
-/// The triangles of a scene's items, if they are no solid boxes; of a map also those of its
-/// floors and ceilings, behind the items.
+/// The triangles of a scene's items, if they are no solid boxes.
+///
+/// Those of a map's floors and ceilings follow the items.
 ///
 /// # Errors
 /// The map's file, read a second time.
@@ -26,8 +27,9 @@ pub fn surfaces_of(scene: &Scene) -> Result<Option<Arc<Surfaces>>, InputError> {
     })
 }
 
-/// Which items of a scene are cut out: any but the walls of its rooms, whose regions are
-/// `graph`. What is seen of the rooms beyond is known by their portals alone.
+/// The items of a scene that are cut out: all but the walls of its rooms.
+///
+/// The regions of the rooms are `graph`; a view into the next room leads through portals only.
 pub fn holes_of(typed: &CutOuts, scene: &Scene, graph: Option<&RegionGraph>) -> fragment::Surfaces {
     let walls = graph.map(|graph| graph.borders(scene));
     let is_free = |item: ItemId| walls.as_ref().is_none_or(|walls| !walls[item as usize]);

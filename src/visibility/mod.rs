@@ -1,7 +1,8 @@
-//! Where visibility is resolved, stage by stage: level, region, object, occlusion,
-//! triangle, fragment; and picking. One folder a stage, one file a back end; the
-//! object stage is [`crate::index`]. The truth that all are held against is in
-//! `truth`. It knows scenes and cameras, not how anything is timed or shown.
+//! The stages of visibility, and picking.
+//!
+//! Level, region, object, occlusion, triangle and fragment: one folder per stage, one file per
+//! back end; the object stage is [`crate::index`]. All are compared with the exact answers of
+//! `truth`. Nothing here is timed or printed.
 
 pub mod fragment;
 mod guarantee;

@@ -16,7 +16,7 @@ pub struct SampleGrid {
 }
 
 impl SampleGrid {
-    /// So many columns and rows.
+    /// A grid of `width` columns and `height` rows.
     pub const fn new(width: u32, height: u32) -> SampleGrid {
         SampleGrid { width, height }
     }
@@ -112,8 +112,9 @@ impl Rays {
         }
     }
 
-    /// Where in the image a point is, rounded, if it is in it: across and down, so that the
-    /// ray [`through`](Rays::through) there leads to it.
+    /// Position of a point in the image, across and down, rounded; `None` outside.
+    ///
+    /// The ray [`through`](Rays::through) the position leads to the point.
     pub fn in_image(&self, point: DVec3) -> Option<[f64; 2]> {
         let frame = &self.camera.frame;
         let about = point - frame.eye;

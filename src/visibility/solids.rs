@@ -15,9 +15,9 @@ use crate::scene::{Scene, WorldBox};
 /// The items of a scene as solid boxes, in three forms.
 #[derive(Clone, Debug)]
 pub struct Solids {
-    /// Where the zero of `outer` and `inner` is in the world.
+    /// World position of the zero of `outer` and `inner`.
     pub origin: DVec3,
-    /// As they were written: the truth.
+    /// The boxes as written: the truth.
     pub boxes: Vec<WorldBox>,
     /// The smallest f32 boxes that hold them: what may be hidden.
     pub outer: Vec<Aabb>,
@@ -43,7 +43,7 @@ impl Solids {
         self.inner[item as usize] = Aabb::EMPTY;
     }
 
-    /// Some of them, numbered anew in this order.
+    /// Some of the items, numbered in this order.
     ///
     /// # Panics
     /// If there is no such item.

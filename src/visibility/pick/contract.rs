@@ -17,7 +17,7 @@ pub struct Hit {
 }
 
 impl Hit {
-    /// By depth, then by id.
+    /// Order by depth, then by id.
     pub(super) fn order(&self, other: &Hit) -> Ordering {
         let by_depth = self.depth.total_cmp(&other.depth);
         by_depth.then(self.item.cmp(&other.item))
@@ -33,13 +33,16 @@ pub trait Pick: Send + Sync {
     /// with the lowest id.
     fn first(&self, ray: &Ray) -> Option<Hit>;
 
-    /// Replaces `hits` by the `count` items that the ray meets first, ordered by depth and
-    /// then by id. All items at the depth of the last of them are included, so there may be
-    /// more.
+    /// Replaces `hits` by the `count` items that the ray meets first.
+    ///
+    /// Ordered by depth, then by id. All items at the depth of the last of them are included,
+    /// so there may be more.
     fn nearest(&self, ray: &Ray, count: usize, hits: &mut Vec<Hit>);
 }
 
-/// Builds a back end over bodies for an instruction set, if it has a choice. Deterministic.
+/// Builds a back end over bodies, for an instruction set if it has a choice.
+///
+/// Deterministic.
 ///
 /// # Errors
 /// [`NotBuilt`].

@@ -1,5 +1,7 @@
-//! Everything within a rectangle of the image: the cursor's own frustum, a camera
-//! with an off-axis lens, asked of any index of boxes.
+//! Everything within a rectangle of the image: the cursor's own frustum.
+//!
+//! The frustum is that of a camera with an off-axis lens, for which any index of boxes can be
+//! queried.
 
 use crate::camera::{Camera, CameraError, Lens, PlaneOptions, Surroundings};
 use crate::geometry::ConvexVolume;

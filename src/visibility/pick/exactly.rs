@@ -65,8 +65,9 @@ impl<B: Body> First<B> {
     }
 }
 
-/// Replaces `hits` by the first meeting of each item: the first `count` of these and all that
-/// are as deep as the last of them.
+/// Replaces `hits` by the first `count` items of the meetings.
+///
+/// All items as deep as the last of them are included.
 pub(super) fn nearest<B: Body>(
     probe: &B::Probe,
     mut met: Vec<Met<B>>,
@@ -85,7 +86,7 @@ pub(super) fn nearest<B: Body>(
     hits.extend(met.into_iter().filter_map(|met| hit::<B>(met, usize::MAX)));
 }
 
-/// Length of the first `count` of a sorted list with all that are no deeper than the last of them.
+/// Length of the first `count` of a sorted list, with all as deep as the last.
 pub(super) fn kept<T>(sorted: &[T], count: usize, is_within: impl Fn(&T, &T) -> bool) -> usize {
     let Some(last) = count.checked_sub(1) else {
         return 0;

@@ -1,5 +1,7 @@
-//! Picking, the selection under the cursor: the first item that a ray meets, the nearest few,
-//! and everything in a cursor's frustum. One file per back end.
+//! Picking, the selection under the cursor. One file per back end.
+//!
+//! Queries are the first item that a ray meets, the nearest few, and everything in the
+//! cursor's frustum.
 
 mod contract;
 mod cursor;

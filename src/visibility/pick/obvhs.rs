@@ -1,5 +1,6 @@
-//! The crate obvhs by its own ray traversals, boxes or its own triangles as primitives:
-//! over its binary tree, and over its eight-wide one with quantised nodes.
+//! Ray traversals of the crate obvhs: boxes, or its own triangles, as primitives.
+//!
+//! One row for its binary tree, one for its eight-wide tree with quantised nodes.
 
 use std::ops::Range;
 
@@ -104,8 +105,7 @@ impl Cast for CwBvh {
     }
 }
 
-/// Levels of a binary tree up to which the conversion, which calls itself once per level,
-/// stays on a small stack.
+/// Most levels of a binary tree to be converted: the conversion recurses per level.
 const MOST_BINARY: usize = 500;
 /// Levels of an eight-wide tree for which the crate's walk has memory.
 const MOST_WIDE: usize = 32;

@@ -1,4 +1,4 @@
-//! Rays and bodies in f32 as crate obvhs takes them; rounding errors are not bounded.
+//! Rays and bodies in f32 as crate obvhs takes them, without bounds on rounding.
 
 use ::obvhs::ray::Ray as TheirRay;
 use ::obvhs::triangle::Triangle;

@@ -166,8 +166,9 @@ fn exact_back_ends_answer_as_arithmetic_on_integers_does() {
     );
 }
 
-/// What declares nothing may differ where depths are equal or rounded. In the open it
-/// may not: tests/contract/conformance.rs.
+/// Unproven back ends may differ where depths are equal or rounded.
+///
+/// Elsewhere they may not: tests/contract/picking.rs.
 #[test]
 fn back_ends_in_f32_differ_on_few_ties() {
     let unproven = BACK_ENDS

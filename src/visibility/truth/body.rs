@@ -33,7 +33,7 @@ pub trait Body: Copy + Debug + Send + Sync + 'static {
     type Probe: Along<At = Self::At> + Debug;
     /// A point of a ray on the surface of such a body.
     type At: Copy + Debug;
-    /// Whether an item is one body that fills its bounding box.
+    /// `true` if an item is one body that fills its bounding box.
     const IS_BOX: bool;
 
     /// Prepares a ray for bodies whose local coordinates are relative to `origin`.
@@ -42,10 +42,10 @@ pub trait Body: Copy + Debug + Send + Sync + 'static {
     /// The item that the body belongs to.
     fn item(&self) -> ItemId;
 
-    /// Whether the body hides what is behind it.
+    /// Returns `true` if the body hides what is behind it.
     fn hides(&self) -> bool;
 
-    /// Exact meeting from near to far. `None` as well if it certainly lies beyond `limit`.
+    /// Exact meeting from near to far; may be `None` if it lies beyond `limit`.
     fn meet(&self, probe: &Self::Probe, limit: f64) -> Option<Self::At>;
 }
 
@@ -93,9 +93,9 @@ pub struct Facet {
     pub corners: [Vec3; 3],
     /// The item.
     pub item: ItemId,
-    /// Whether rays meet it from behind too.
+    /// `true` if rays meet it from behind too.
     pub two_sided: bool,
-    /// Whether it hides what is behind it.
+    /// `true` if it hides what is behind it.
     pub hides: bool,
 }
 
@@ -134,8 +134,10 @@ pub struct Bodies<B> {
     pub bounds: Vec<Aabb>,
     /// World position of the local zero.
     pub origin: DVec3,
-    /// Number of items. Bodies of higher ids (floors and ceilings of a map) end the search
-    /// for the first item of a ray and are otherwise ignored by picking.
+    /// Number of items.
+    ///
+    /// Bodies of higher ids (floors and ceilings of a map) end the search for the first item
+    /// of a ray; picking ignores them otherwise.
     pub items: usize,
 }
 
@@ -182,8 +184,9 @@ impl Facets {
         }
     }
 
-    /// The triangles as picking treats them: all of them hide, cut-outs too, and the first
-    /// `items` of the surfaces' items count.
+    /// The triangles as picking treats them: all of them hide, cut-outs too.
+    ///
+    /// The first `items` of the surfaces' items count.
     pub fn solid(surfaces: &Surfaces, items: usize) -> Facets {
         let mut facets = Facets::of(surfaces);
         facets.all.iter_mut().for_each(|facet| facet.hides = true);

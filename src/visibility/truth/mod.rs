@@ -1,5 +1,6 @@
-//! The visible items, exact along the rays of a sample grid, for solid boxes and triangles.
-//! No back end shares this code, except for the exact tests of rays against bodies.
+//! The visible items, exact along the rays of a sample grid.
+//!
+//! No back end shares this code but for the bodies and their exact tests.
 
 mod body;
 mod ray_box;

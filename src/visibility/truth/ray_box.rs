@@ -1,5 +1,4 @@
-//! Where a ray enters a box, exactly: in f64 with an error bound, and by expansions
-//! where that does not decide. Which box is the front one is left to the index.
+//! Exact entry of a ray into a box: in f64 with an error bound, else by expansions.
 
 use std::cmp::Ordering;
 
@@ -15,24 +14,24 @@ use crate::visibility::Ray;
 /// once or twice more. 8 * 2^-53 is above their sum.
 const GUARD: f64 = 8.0 / (1u64 << 53) as f64;
 
-/// Whether the rounded depths say for certain that the true ones differ, and how.
+/// Returns `true` if the rounded depths prove that the true ones differ.
 #[inline(always)]
 fn apart(a: f64, b: f64) -> bool {
     (a - b).abs() > GUARD * (a.abs() + b.abs())
 }
 
-/// Where a ray crosses a plane across an axis. Its true depth is the fraction
+/// Crossing of a ray and a plane across an axis. Its true depth is the fraction
 /// `(plane - origin[axis]) / direction[axis]`.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Crossing {
-    /// That depth in f64, true to 2^-50 of itself.
+    /// Depth in f64, true to 2^-50 of itself.
     pub depth: f64,
     /// The bound of the box that is crossed there, world coordinate.
     pub plane: f64,
     axis: usize,
 }
 
-/// A ray that asks boxes where it enters them.
+/// A ray prepared for exact tests against boxes.
 ///
 /// Exact for coordinates and components of direction that are 0 or from 2^-400 to
 /// 2^400 in size.
@@ -82,9 +81,10 @@ impl Probe {
         Crossing { depth, plane, axis }
     }
 
-    /// Where the ray enters the closed box, if that is from near to far: the truth
-    /// of [`Solids`](crate::visibility::Solids). `None` as well if it certainly
-    /// enters beyond `limit`.
+    /// Entry of the ray into the closed box, if that is from near to far.
+    ///
+    /// This is the truth of [`Solids`](crate::visibility::Solids). `None` as well if the ray
+    /// certainly enters beyond `limit`.
     #[inline]
     pub fn enter(&self, b: &WorldBox, limit: f64) -> Option<Crossing> {
         let ray = &self.ray;
@@ -143,7 +143,7 @@ impl Probe {
         Some(enters)
     }
 
-    /// The bound of a box that is crossed first along an axis of a direction that is not 0.
+    /// The bound of a box that the ray crosses first along an axis it moves along.
     #[inline(always)]
     fn entered(&self, b: &WorldBox, axis: usize) -> f64 {
         match self.ray.direction[axis] > 0.0 {
@@ -157,8 +157,7 @@ impl Probe {
         (0..3).filter(|&axis| self.ray.direction[axis] != 0.0)
     }
 
-    /// The last of the entries into the slabs of a box, exactly; `None` for a ray without
-    /// direction.
+    /// The last entry into the slabs of a box, exactly; `None` without a direction.
     #[cold]
     fn latest_entry(&self, b: &WorldBox) -> Option<Crossing> {
         let entries = self
@@ -167,7 +166,7 @@ impl Probe {
         entries.reduce(|a, b| if self.compare(&b, &a).is_gt() { b } else { a })
     }
 
-    /// Whether the ray has left a slab of the box for certain where it enters the last one.
+    /// Returns `true` if the ray leaves a slab before it enters the last one.
     #[cold]
     fn leaves_before(&self, b: &WorldBox, enters: &Crossing) -> bool {
         let mirrored = WorldBox {

@@ -1,4 +1,4 @@
-//! Exact search for what a ray meets: the bodies of a scene in the leaves of a tree.
+//! Exact search along a ray, with the bodies of a scene in the leaves of a tree.
 
 use std::cmp::Ordering;
 
@@ -27,12 +27,13 @@ pub type SurfaceIndex = BodyIndex<Facet>;
 #[derive(Clone, PartialEq, Debug)]
 #[non_exhaustive]
 pub struct Front<At> {
-    /// Items that the ray meets first among those that hide, ascending: several are a tie.
-    /// Empty if it meets none from near to far.
+    /// Items that the ray meets first among those that hide, ascending.
+    ///
+    /// Several are a tie. Empty if the ray meets none from near to far.
     pub front: Vec<ItemId>,
     /// Items that hide nothing and are met before these or with them, ascending.
     pub before: Vec<ItemId>,
-    /// Where the ray meets the front items.
+    /// Point where the ray meets the front items.
     pub meeting: Option<At>,
 }
 
@@ -100,9 +101,9 @@ impl<B: Body> BodyIndex<B> {
 pub(super) struct Search<At> {
     stack: Vec<(f64, u32)>,
     through: Vec<(ItemId, At)>,
-    /// As [`Front::front`], of the last ray.
+    /// [`Front::front`] of the last ray.
     pub front: Vec<ItemId>,
-    /// As [`Front::before`], of the last ray.
+    /// [`Front::before`] of the last ray.
     pub before: Vec<ItemId>,
 }
 
@@ -116,8 +117,9 @@ impl<At: Copy> Search<At> {
         }
     }
 
-    /// Returns where the ray meets the front items, and leaves what is seen in `front` and
-    /// `before`. Rays pass through points of bodies that are not `is_opaque`.
+    /// Sets `front` and `before`; returns where the ray meets the front items.
+    ///
+    /// Rays pass through points of bodies that are not `is_opaque`.
     #[inline]
     pub fn front<B: Body<At = At>>(
         &mut self,

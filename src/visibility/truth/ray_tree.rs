@@ -1,5 +1,4 @@
-//! A binary tree for rays over boxes of any things: no node that a ray meets is ever
-//! left out. What the things are, and what a ray does at them, is left to the caller.
+//! A binary tree of boxes for rays: a walk visits every node that the ray meets.
 
 use std::ops::Range;
 
@@ -42,7 +41,7 @@ struct Slabs {
     /// 1 where the ray goes down the axis: the side that it enters by.
     side: [usize; 3],
     inverse: [f64; 3],
-    /// What is taken from the bound that is entered, and from the one that is left.
+    /// Subtracted from the bound that is entered, and from the one that is left.
     enter: [f64; 3],
     leave: [f64; 3],
     near: f64,

@@ -1,10 +1,8 @@
-//! Where a ray meets a triangle, exactly: in f64 with an error bound, and by
-//! expansions where that does not decide. Which triangle is the front one is left to
-//! the index.
+//! Exact meeting of a ray and a triangle: f64 with an error bound, else expansions.
 //!
-//! What a triangle is to a ray: closed, so that a ray through a common edge or corner
-//! meets all triangles that share it and slips between none. A ray in its plane does
-//! not meet it (there is nothing to be seen of it), nor does any ray one without area.
+//! Triangles are closed: a ray through a common edge or corner meets all triangles that share
+//! it and slips between none. A ray in its plane does not meet a triangle (nothing of it is
+//! seen), and no ray meets a triangle without area.
 
 use std::cmp::Ordering;
 
@@ -15,7 +13,9 @@ use crate::arithmetic::{Expansion, two_sum};
 use crate::kernel::each;
 use crate::visibility::Ray;
 
-/// With u = 2^-53; A, B, C the corners about the ray's origin, U = B - A, V = C - A,
+/// Unit of the error bounds, u = 2^-53.
+///
+/// With A, B, C the corners about the ray's origin, U = B - A, V = C - A,
 /// d the direction; D, L, M, S the largest absolute coordinate of d, of U and V, of A,
 /// and of the shift from scene-local coordinates to those about the ray's origin:
 ///
@@ -34,7 +34,7 @@ use crate::visibility::Ray;
 /// that of A . N, each by an eighth and more.
 const UNIT: f64 = 1.0 / (1u64 << 53) as f64;
 
-/// Where a ray meets a triangle.
+/// Meeting of a ray and a triangle.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Meeting {
     /// The depth in f64; 0 where f64 says nothing of it.
@@ -64,7 +64,7 @@ impl Meeting {
     }
 }
 
-/// A ray that asks triangles where it meets them.
+/// A ray prepared for exact tests against triangles.
 ///
 /// Exact for coordinates of corners, origins and eyes and components of direction
 /// that are 0 or from 2^-100 to 2^100 in size: products of six of them, of two depths
@@ -72,8 +72,7 @@ impl Meeting {
 #[derive(Clone, Copy, Debug)]
 pub struct TriangleProbe {
     ray: Ray,
-    /// What is added to a scene-local point to have it about the ray's origin, as a
-    /// sum of two.
+    /// Sum of two that moves a scene-local point to the ray's origin.
     shift: DVec3,
     rest: DVec3,
     /// Largest coordinate of the direction, and of the shift.
@@ -121,9 +120,10 @@ impl TriangleProbe {
         &self.ray
     }
 
-    /// Where the ray meets a triangle, if that is from near to far, and from its front
-    /// (where its corners turn counter-clockwise) if it is one-sided. `None` as well
-    /// if it certainly meets it beyond `limit`.
+    /// Meeting of the ray and a triangle, if that is from near to far.
+    ///
+    /// A one-sided triangle is met from its front, where its corners turn counter-clockwise.
+    /// `None` as well if the ray certainly meets it beyond `limit`.
     #[inline(always)]
     pub fn meet(&self, corners: [Vec3; 3], two_sided: bool, limit: f64) -> Option<Meeting> {
         let (a, b, c) = (
@@ -218,8 +218,7 @@ impl TriangleProbe {
             .cmp(&0)
     }
 
-    /// Whether the ray's line meets the closed triangle, from its front if that is
-    /// asked for.
+    /// Returns `true` if the ray's line meets the closed triangle on a visible side.
     #[cold]
     fn pierces(&self, corners: [Vec3; 3], two_sided: bool) -> bool {
         let d = self.direction();
@@ -262,8 +261,9 @@ impl TriangleProbe {
     }
 }
 
-/// Whether the second triangle is in the plane of the first, one with area; `false` as well
-/// if their coordinates are no integers of 36 bits in any unit.
+/// Returns `true` if the second triangle is in the first one's plane.
+///
+/// `false` as well if their coordinates are no integers of 36 bits in any unit.
 fn are_in_one_plane(a: [Vec3; 3], b: [Vec3; 3]) -> bool {
     if a == b {
         return true;
@@ -365,8 +365,9 @@ mod tests {
         }
     }
 
-    /// Rays in the plane of a triangle but for rounding: only the exact sign tells from which
-    /// side they come.
+    /// Rays in the plane of a triangle but for rounding.
+    ///
+    /// Only the exact sign tells from which side they come.
     #[test]
     fn grazing_rays_hit_a_one_sided_triangle_only_from_its_front() {
         let mut rng = SeededRng::new(29);

@@ -13,7 +13,7 @@ pub const NO_ITEM: ItemId = ItemId::MAX;
 /// Rows of samples that a thread takes at a time.
 const BAND: usize = 4;
 
-/// What the rays of a sample grid see: exact for these rays.
+/// Items that the rays of a sample grid see: exact for these rays.
 ///
 /// The same on any number of threads.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -43,8 +43,9 @@ impl SampleTruth {
         SampleTruth::of_opaque(index, &|_, _, _| true, rays, grid, threads)
     }
 
-    /// Follows every ray of a scene of bodies with holes: a ray ends at the first body that
-    /// is opaque where the ray meets it.
+    /// Follows every ray through a scene of bodies with holes.
+    ///
+    /// A ray ends at the first body that is opaque where the ray meets it.
     pub fn of_opaque<B: Body>(
         index: &BodyIndex<B>,
         is_opaque: &(impl Fn(&B, &B::Probe, &B::At) -> bool + Sync),
@@ -96,9 +97,9 @@ fn counted(
         .unzip()
 }
 
-/// Items that are visible along any of `count` seeded random rays through the window,
-/// ascending: a conservative back end delivers all of them.
+/// Items visible along any of `count` seeded random rays through the window.
 ///
+/// Ascending. A conservative back end delivers all of them.
 /// The same on any number of threads.
 pub fn visible_by_random_rays<B: Body>(
     index: &BodyIndex<B>,

@@ -17,7 +17,9 @@ use crate::visibility::truth::{Along, Bodies, Body};
 #[repr(align(64))]
 struct Padded<B>(B);
 
-/// Bodies under a tree of nodes of sixteen: per body some 45 bytes of nodes and 64 of itself.
+/// Bodies under a tree of nodes of sixteen.
+///
+/// Some 45 bytes of nodes and 64 of the body itself per body.
 #[derive(Clone, Debug)]
 pub struct WideRay<B> {
     tree: Tree,
@@ -271,7 +273,7 @@ impl<B: Body> Work for SearchNearest<'_, B> {
     }
 }
 
-/// The lowest upper bounds of depths, each of another item, sorted, at most `count`.
+/// The lowest upper bounds of depths of `count` items at most, sorted.
 struct Lowest<T> {
     count: usize,
     far: T,
@@ -379,8 +381,9 @@ mod tests {
         Vec3::new(along(), along(), along())
     }
 
-    /// Corners on a grid, so that depths are equal, rays lie in planes and triangles have no
-    /// area; directions that hardly move along an axis, and origins beyond the analysis.
+    /// Corners on a grid: depths are equal, rays lie in planes, triangles have no area.
+    ///
+    /// Directions hardly move along an axis, and origins lie beyond the error analysis.
     #[test]
     fn every_instruction_set_finds_what_testing_all_finds() {
         let mut rng = SeededRng::new(17);

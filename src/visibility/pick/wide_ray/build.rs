@@ -60,8 +60,9 @@ impl Node {
     }
 }
 
-/// Builds the tree: its nodes, the root first; the root; ids of the items in tree order.
-/// O(n log n).
+/// Builds the tree. O(n log n).
+///
+/// Returns its nodes, the root first, the root, and the ids of the items in tree order.
 pub(super) fn build(boxes: &[Aabb]) -> (Vec<Node>, Child, Vec<ItemId>) {
     let mut items = Record::numbered(boxes);
     let mut nodes: Vec<Node> = Vec::with_capacity(boxes.len() / 8 + 1);

@@ -1,5 +1,7 @@
-//! The sixteen-wide tree: sixteen slab tests at once, nearest children first, over the bounds
-//! of bodies. The exact tests of the bodies (`bodies`) decide what those in f32 leave open.
+//! The sixteen-wide tree: sixteen slab tests at once, nearest children first.
+//!
+//! It holds the bounds of bodies. The exact tests of the bodies (`bodies`) decide what the slab
+//! tests in f32 leave open.
 
 mod bodies;
 mod build;
@@ -32,17 +34,18 @@ pub const ROW: BackEnd = BackEnd {
 struct Tree {
     nodes: Vec<Node>,
     root: Child,
-    /// Where the zero of the nodes is.
+    /// World position of the zero of the nodes.
     zero: DVec3,
-    /// Of all boxes.
+    /// Bounds of all boxes.
     bounds: Aabb,
-    /// What answers are computed by.
+    /// Instruction set of the queries.
     kernel: Kernel,
 }
 
 impl Tree {
-    /// Builds it over boxes about a zero; the places that [`Candidates`] are told of are
-    /// those of the ids that are handed back. O(n log n).
+    /// Builds it over boxes relative to a zero. O(n log n).
+    ///
+    /// Returns their ids in tree order; [`Candidates`] get positions in these.
     fn of(boxes: &[Aabb], zero: DVec3, kernel: Kernel) -> Result<(Tree, Vec<ItemId>), NotBuilt> {
         // Each node holds at least one box.
         let (count, most) = (boxes.len(), Child::MOST);
@@ -66,8 +69,9 @@ impl Tree {
         Slabs::of(ray, self.zero, self.bounds.reach())
     }
 
-    /// Whether the ray certainly passes all boxes by: asked first, since it costs less than
-    /// making ready for the nodes.
+    /// Returns `true` if the ray certainly misses all boxes.
+    ///
+    /// Called first, since it costs less than preparing the ray for the nodes.
     ///
     /// It begins outside and comes no nearer along an axis, or the shadows of its line and of
     /// the bounds on the plane of two axes are apart (Gottschalk, Lin and Manocha 1996,
@@ -102,8 +106,8 @@ impl Tree {
     /// bound, near ones first as far as the tree tells.
     #[inline(always)]
     fn search<I: Isa, C: Candidates>(&self, isa: I, slabs: &Slabs, found: &mut C) {
-        // Behind a pointer that the compiler knows nothing of, so that each node reads the
-        // ray's numbers anew, which AVX-512 does within the instruction that needs them.
+        // Behind an opaque pointer, so that each node reads the ray's numbers again, which
+        // AVX-512 does within the instruction that needs them.
         // Spread over whole vectors ahead of the loop, they are read back from the stack.
         let slabs = match I::MANY_REGISTERS {
             true => black_box(slabs),
@@ -170,7 +174,7 @@ impl Tree {
     }
 }
 
-/// What a search collects.
+/// Candidates that a search collects.
 trait Candidates {
     /// Nothing deeper than this is wanted.
     fn bound(&self) -> f32;
@@ -185,7 +189,7 @@ const NEAR: usize = 48;
 struct Open {
     near: [(f32, u32); NEAR],
     used: usize,
-    /// What does not fit.
+    /// Nodes that do not fit.
     far: Vec<(f32, u32)>,
 }
 

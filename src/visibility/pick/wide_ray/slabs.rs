@@ -76,7 +76,7 @@ pub(super) struct Slabs {
     far: [f32; 2],
 }
 
-/// What the test of sixteen boxes found.
+/// Result of the test of sixteen boxes.
 pub(super) struct Tested<I: Isa> {
     /// Those that the ray can meet.
     pub lanes: LaneMask,

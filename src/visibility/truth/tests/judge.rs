@@ -33,7 +33,7 @@ pub fn order(a: &Depth, b: &Depth) -> Ordering {
     (&a.0 * &b.1).cmp(&(&b.0 * &a.1))
 }
 
-/// Where a ray enters a box, if it meets it.
+/// Entry of a ray into a box, if it meets it.
 pub fn entry(ray: &Ray, b: &WorldBox) -> Option<Depth> {
     let mut range: Option<(Depth, Depth)> = None;
     for axis in 0..3 {

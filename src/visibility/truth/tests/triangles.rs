@@ -30,7 +30,7 @@ fn dot(a: &Point, b: &Point) -> IBig {
     &a[0] * &b[0] + &a[1] * &b[1] + &a[2] * &b[2]
 }
 
-/// By another way than the code under test: the depth in the plane, then the sides
+/// Another way than the code under test: the depth in the plane, then the sides
 /// of the point there, scaled by the depth's denominator.
 fn met(ray: &Ray, origin: DVec3, corners: [Vec3; 3], two_sided: bool) -> Option<Depth> {
     let zero = point(origin.x, origin.y, origin.z);
@@ -63,7 +63,7 @@ fn met(ray: &Ray, origin: DVec3, corners: [Vec3; 3], two_sided: bool) -> Option<
     within.then_some(depth)
 }
 
-/// What is in front, and what is seen before it.
+/// Items in front, and items seen before them.
 fn seen(ray: &Ray, surfaces: &Surfaces) -> [Vec<ItemId>; 2] {
     let mut all = Vec::new();
     for item in 0..surfaces.items() {
