@@ -1,9 +1,8 @@
-//! Arithmetic whose error is known: directed rounding, error-free
-//! transformations, products that do not cancel, and expansions (sums of
-//! doubles without any error). It
-//! knows no geometry.
+//! Arithmetic with a known error: directed rounding, error-free sums and products, cross
+//! products without cancellation, and expansions (exact sums of doubles).
 
 mod cross;
+pub mod exact;
 mod expansion;
 pub mod rounding;
 

@@ -5,7 +5,7 @@
 use glam::{DQuat, DVec3};
 
 use super::pose::unit;
-use super::{Camera, CameraError, Frame, Lens};
+use super::{Camera, CameraError, Frame, Lens, require};
 
 /// Rotations between two corrections: a rotation drifts by about 2e-16, so
 /// the frame stays orthonormal to 1e-13 at no visible cost.
@@ -65,9 +65,12 @@ impl Frame {
         around: f64,
         over: f64,
     ) -> Result<(), CameraError> {
-        let finite = Some(axis).filter(|axis| axis.is_finite());
-        let axis = finite.and_then(unit).ok_or(CameraError::Axis)?;
-        self.swing(centre, axis, around);
+        require(
+            axis.is_finite() && axis != DVec3::ZERO,
+            || "the axis of the orbit is zero or not finite".to_owned(),
+            "a direction",
+        )?;
+        self.swing(centre, unit(axis), around);
         // Read only now: the first swing has turned u.
         self.swing(centre, self.u, over);
         Ok(())
@@ -105,9 +108,12 @@ impl Camera {
 impl Lens {
     /// The lens with its window made smaller by `factor`.
     fn zoomed(&self, factor: f64) -> Result<Lens, CameraError> {
-        if !factor.is_finite() || factor <= 0.0 {
-            return Err(CameraError::Zoom { factor });
-        }
+        let found = || format!("the zoom factor is {factor}");
+        require(
+            factor.is_finite() && factor > 0.0,
+            found,
+            "a number above 0",
+        )?;
         match *self {
             Lens::Perspective {
                 fovy_deg,
@@ -133,9 +139,7 @@ impl Lens {
                 let window = [l / factor, r / factor, b / factor, t / factor];
                 Lens::off_axis(window, near, far)
             }
-            Lens::Matrix(_) => Err(CameraError::MatrixFixed {
-                what: "a field of view",
-            }),
+            Lens::Matrix(_) => Err(CameraError::of_matrix("a field of view")),
         }
     }
 }

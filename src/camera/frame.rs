@@ -170,23 +170,26 @@ mod tests {
         assert_eq!(far.forward(), DVec3::X);
     }
 
+    fn refused(frame: Result<Frame, CameraError>, what: &str) -> bool {
+        frame.is_err_and(|error| error.to_string().starts_with(what))
+    }
+
     #[test]
-    fn impossible_frames_are_typed_errors() {
+    fn impossible_frames_are_errors_that_name_the_value() {
+        const SAME: &str = "eye and look are the same point";
+        const PARALLEL: &str = "up is zero or parallel";
         let (o, y) = (DVec3::ZERO, DVec3::Y);
-        assert_eq!(look_at(o, o, y), Err(CameraError::EyeIsLook));
-        assert_eq!(
-            Frame::looking_along(o, o, y),
-            Err(CameraError::ForwardIsZero)
-        );
-        assert_eq!(look_at(o, y, o), Err(CameraError::UpParallel));
+        assert!(refused(look_at(o, o, y), SAME));
+        assert!(refused(Frame::looking_along(o, o, y), "forward is zero"));
+        assert!(refused(look_at(o, y, o), PARALLEL));
         let odd = DVec3::new(1.0, 2.0, 2.0);
-        assert_eq!(look_at(o, odd, odd * 0.1), Err(CameraError::UpParallel));
+        assert!(refused(look_at(o, odd, odd * 0.1), PARALLEL));
         for length in [1.0, 1e-300, 1e300] {
             let same = DVec3::splat(length);
-            assert_eq!(look_at(same, same, y), Err(CameraError::EyeIsLook));
+            assert!(refused(look_at(same, same, y), SAME));
             for (look, up) in [(y, y), (-y, y), (odd, -odd)] {
-                let error = look_at(o, look * length, up);
-                assert_eq!(error, Err(CameraError::UpParallel), "{look} {length:e}");
+                let frame = look_at(o, look * length, up);
+                assert!(refused(frame, PARALLEL), "{look} {length:e}");
             }
         }
         for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
@@ -199,10 +202,8 @@ mod tests {
                     ("up", o, -y, broken),
                 ];
                 for (named, eye, look, up) in attempts {
-                    let Err(CameraError::NotFinite { name, .. }) = look_at(eye, look, up) else {
-                        panic!("{named} {broken}");
-                    };
-                    assert_eq!(name, format!("{named} {}", ["x", "y", "z"][axis]));
+                    let found = format!("{named} {} is {bad}", ["x", "y", "z"][axis]);
+                    assert!(refused(look_at(eye, look, up), &found), "{found}");
                 }
             }
         }

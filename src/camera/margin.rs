@@ -158,8 +158,10 @@ fn reach(near: &[DVec3; 4], far: Option<&[DVec3; 4]>, of_scene: DVec3) -> DVec3 
 pub(crate) fn check_sums(volume: &ConvexVolume, reach: DVec3) -> Result<(), CameraError> {
     let sums = volume.planes().iter().map(|p| largest_sum(p, reach));
     let largest = sums.fold(0.0, f64::max);
-    let error = CameraError::Sums { largest };
-    (largest <= LARGEST_SUM).then_some(()).ok_or(error)
+    match largest <= LARGEST_SUM {
+        true => Ok(()),
+        false => Err(CameraError::Sums { largest }),
+    }
 }
 
 /// What the parts of a plane's sum can add up to within `reach`; no number for a plane

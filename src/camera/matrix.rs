@@ -5,7 +5,7 @@
 use glam::DVec3;
 
 use super::CameraError;
-use crate::arithmetic::Expansion;
+use crate::arithmetic::{Expansion, exact};
 use crate::geometry::{FrustumPlane, PlaneF64};
 
 named! {
@@ -65,9 +65,11 @@ impl ViewProjection {
     ) -> Result<ViewProjection, CameraError> {
         for (&name, value) in MATRIX_ENTRIES.iter().zip(entries.concat()) {
             super::finite(name, value)?;
-            if value != 0.0 && !SIZES.contains(&value.abs()) {
-                return Err(CameraError::MatrixEntry { name, value });
-            }
+            super::require(
+                value == 0.0 || SIZES.contains(&value.abs()),
+                || format!("the matrix has {name} = {value:e}"),
+                "0 or a size from 1e-60 to 1e60",
+            )?;
         }
         let transposed = [0, 1, 2, 3].map(|i| entries.map(|row| row[i]));
         let mut matrix = ViewProjection {
@@ -84,14 +86,18 @@ impl ViewProjection {
             near: 0.0,
             far: None,
         };
-        let inverse = matrix.inverse().ok_or(CameraError::MatrixSingular)?;
+        let inverse = matrix.inverse().ok_or_else(|| {
+            CameraError::invalid("the matrix is singular", "one that has an inverse")
+        })?;
         (matrix.eye, matrix.is_reversed) = eye(&inverse)?;
         let ahead = matrix
             .clip_corners()
             .map(|c| unprojected(&inverse, c)[3].sign());
-        if ahead.iter().all(|&sign| sign <= 0) {
-            return Err(CameraError::MatrixSeesNothing);
-        }
+        super::require(
+            ahead.iter().any(|&sign| sign > 0),
+            || "the matrix sees nothing, no point has w > 0 within its clip volume".to_owned(),
+            "another sign or --matrix-convention",
+        )?;
         let is_bounded = ahead.iter().all(|&sign| sign > 0);
         for (name, plane) in matrix.planes_about(&[matrix.eye]) {
             match name {
@@ -212,7 +218,9 @@ fn eye(inverse: &[Four; 4]) -> Result<(DVec3, bool), CameraError> {
     // The same point, with a positive last coordinate.
     let eye = if is_reversed { eye } else { eye.map(|e| -&e) };
     let eye = about(&eye, &[]).filter(|eye| eye.is_finite());
-    Ok((eye.ok_or(CameraError::MatrixWithoutEye)?, is_reversed))
+    let found = "the matrix has no eye (is it orthographic?)";
+    let eye = eye.ok_or_else(|| CameraError::invalid(found, "a perspective one"))?;
+    Ok((eye, is_reversed))
 }
 
 /// The determinant of what is left without a row and a column.
@@ -261,9 +269,7 @@ fn plane_about(face: &Four, zero: &[DVec3]) -> Option<PlaneF64> {
             offset = &offset + &(n * &Expansion::from(at));
         }
     }
-    let largest = [x, y, z].map(|n| n.estimate().abs());
-    let largest = largest.into_iter().fold(0.0, f64::max);
-    let exponent = (largest > 0.0).then(|| libm::ilogb(largest))?;
+    let exponent = exact::exponent(&[x, y, z].map(Expansion::clone))?;
     // Near 1, so that no square overflows.
     let [x, y, z, d] = [x, y, z, &offset].map(|n| n.scaled(-exponent).estimate());
     let normal = DVec3::new(x, y, z);

@@ -49,134 +49,59 @@ pub struct Camera {
     pub lens: Lens,
 }
 
-/// Why there is no such camera. Every message names the value and the rule.
-#[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
+/// Numbers that make no camera, or a camera whose planes f32 cannot hold.
+#[derive(Clone, PartialEq, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CameraError {
-    /// A number that is infinite or no number.
-    #[error("{name} is {value}; expected a finite number")]
-    NotFinite {
-        /// Name of the argument.
-        name: &'static str,
-        /// What was given.
-        value: f64,
+    /// Eye, direction, lens or matrix outside of what is allowed.
+    #[error("{found}; expected {expected}")]
+    Invalid {
+        /// The argument and its value.
+        found: String,
+        /// The rule it breaks.
+        expected: &'static str,
     },
-    /// There is no direction of view.
-    #[error("eye and look are the same point; expected two different points")]
-    EyeIsLook,
-    /// There is no direction of view.
-    #[error("forward is zero; expected a direction")]
-    ForwardIsZero,
-    /// There is no side that is up.
-    #[error(
-        "up is zero or parallel to the direction of view; expected an up vector that is neither"
-    )]
-    UpParallel,
-    /// The direction of up is all rounding.
-    #[error(
-        "up is {sine:e} rad from the direction of view or its opposite; expected more than 8.9e-16"
-    )]
-    UpNearlyParallel {
-        /// Sine of the angle between up and the direction of view.
-        sine: f64,
-    },
-    /// No angle that a perspective lens can have.
-    #[error("the vertical field of view is {fovy_deg} degrees; expected 0 < fov < 180")]
-    FieldOfView {
-        /// What was given.
-        fovy_deg: f64,
-    },
-    /// No ratio of width to height.
-    #[error("the aspect ratio is {aspect}; expected a number above 0")]
-    Aspect {
-        /// What was given.
-        aspect: f64,
-    },
-    /// A near plane at or behind the eye.
-    #[error("near is {near}; expected near > 0 for a perspective lens")]
-    Near {
-        /// What was given.
-        near: f64,
-    },
-    /// A depth range that is empty.
-    #[error("near is {near} and far {far}; expected near < far")]
-    NearFar {
-        /// What was given.
-        near: f64,
-        /// What was given.
-        far: f64,
-    },
-    /// An orthographic lens without an end.
-    #[error(
-        "far is {far:e}; expected at most 1.7e38, half of what f32 holds, for an orthographic lens"
-    )]
-    FarOrthographic {
-        /// What was given.
-        far: f64,
-    },
-    /// An off-axis window that is empty.
-    #[error("the window is empty: {low} to {high} ({name}); expected low < high")]
-    Window {
-        /// Which sides.
-        name: &'static str,
-        /// The side that should be lower.
-        low: f64,
-        /// The side that should be higher.
-        high: f64,
-    },
-    /// An entry whose products would leave the range of f64.
-    #[error("the matrix has {name} = {value:e}; expected 0 or a size from 1e-60 to 1e60")]
-    MatrixEntry {
-        /// Row and column, `m03`.
-        name: &'static str,
-        /// What was given.
-        value: f64,
-    },
-    /// A matrix without inverse.
-    #[error("the matrix is singular; expected one that has an inverse")]
-    MatrixSingular,
-    /// A matrix that maps no point to the centre of projection.
-    #[error("the matrix has no eye (is it orthographic?); expected a perspective one")]
-    MatrixWithoutEye,
-    /// A matrix with an empty clip volume.
-    #[error(
-        "the matrix sees nothing, no point has w > 0 within its clip volume; expected another sign or --matrix-convention"
-    )]
-    MatrixSeesNothing,
-    /// A matrix camera cannot be moved or given a lens.
-    #[error(
-        "the camera is a matrix, which has {what} of its own; expected an eye and a lens for another"
-    )]
-    MatrixFixed {
-        /// What was to be changed.
-        what: &'static str,
-    },
-    /// Planes of a matrix are not derived by another method.
-    #[error("the camera is a matrix, which has planes of its own; expected --planes frame")]
-    MatrixMethod,
-    /// A zoom that is not positive.
-    #[error("the zoom factor is {factor}; expected a number above 0")]
-    Zoom {
-        /// What was given.
-        factor: f64,
-    },
-    /// No axis to turn about.
-    #[error("the axis of the orbit is zero or not finite; expected a direction")]
-    Axis,
-    /// The planes cannot be stored in f32.
+    /// A plane that f32 cannot store.
     #[error("the view volume does not fit f32: {0}; expected planes within its range")]
     Volume(#[from] VolumeError),
-    /// Sums of the plane test could overflow f32.
+    /// A sum of the plane test that could overflow f32.
     #[error(
         "sums of the plane test reach {largest:e} in scene coordinates; expected at most 1.7e38, half of what f32 holds"
     )]
     Sums {
-        /// Largest sum that may come up.
+        /// Upper bound of the sums.
         largest: f64,
     },
 }
 
-pub(crate) fn finite(name: &'static str, value: f64) -> Result<f64, CameraError> {
-    let error = CameraError::NotFinite { name, value };
-    value.is_finite().then_some(value).ok_or(error)
+impl CameraError {
+    fn invalid(found: impl Into<String>, expected: &'static str) -> CameraError {
+        let found = found.into();
+        CameraError::Invalid { found, expected }
+    }
+
+    /// Matrix cameras cannot be moved or given a lens.
+    fn of_matrix(what: &str) -> CameraError {
+        CameraError::invalid(
+            format!("the camera is a matrix, which has {what} of its own"),
+            "an eye and a lens for another",
+        )
+    }
+}
+
+/// Checks a rule of camera arguments; `found` is only formatted where it is broken.
+fn require(
+    holds: bool,
+    found: impl FnOnce() -> String,
+    expected: &'static str,
+) -> Result<(), CameraError> {
+    match holds {
+        true => Ok(()),
+        false => Err(CameraError::invalid(found(), expected)),
+    }
+}
+
+fn finite(name: &str, value: f64) -> Result<(), CameraError> {
+    let found = || format!("{name} is {value}");
+    require(value.is_finite(), found, "a finite number")
 }

@@ -212,7 +212,10 @@ impl Camera {
             Lens::Matrix(matrix) if method == PlaneMethod::Frame => {
                 Ok(narrow(matrix.planes_about(zero)))
             }
-            Lens::Matrix(_) => Err(CameraError::MatrixMethod),
+            Lens::Matrix(_) => Err(CameraError::invalid(
+                "the camera is a matrix, which has planes of its own",
+                "--planes frame",
+            )),
             lens => Ok(derive(&self.frame_about(zero), lens, method)),
         }
     }

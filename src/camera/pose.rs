@@ -1,13 +1,12 @@
-//! Where a camera stands as it was written, beside the frame that was made of
-//! it. It defines the exact arithmetic between the two; judging by it is left to
-//! others.
+//! Position and direction of a camera as written, and the exact arithmetic from them to
+//! the axes of its frame.
 
 use glam::DVec3;
 
-use super::{CameraError, finite};
-use crate::arithmetic::Expansion;
+use super::{CameraError, require};
+use crate::arithmetic::exact::{self, ExactVector};
 
-/// Where a camera stands, as the numbers that say so: all are exact.
+/// Position and direction of a camera; the numbers as written count as exact.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Pose {
     /// From the eye to a point.
@@ -44,88 +43,68 @@ impl Pose {
 
     /// The direction of view without any rounding, but for a power of two; its
     /// largest component is near 1. `None` for zero.
-    fn direction(&self) -> Option<Vector> {
-        let exact = |v: DVec3| v.to_array().map(Expansion::from);
-        near_unit(match *self {
-            Pose::Forward { forward, .. } => exact(forward),
-            Pose::LookAt { eye, look, .. } => {
-                // Quartered where the difference could overflow.
-                let share = if eye.abs().max(look.abs()).max_element() > 1e300 {
-                    0.25
-                } else {
-                    1.0
-                };
-                let (eye, look) = (exact(eye * share), exact(look * share));
-                [0, 1, 2].map(|k| &look[k] - &eye[k])
+    pub(crate) fn direction(&self) -> Option<ExactVector> {
+        exact::near_unit(match *self {
+            Pose::Forward { forward, .. } => exact::vector(forward),
+            // Quartered where the difference could overflow.
+            Pose::LookAt { eye, look, .. } if eye.abs().max(look.abs()).max_element() > 1e300 => {
+                exact::difference(look / 4.0, eye / 4.0)
             }
+            Pose::LookAt { eye, look, .. } => exact::difference(look, eye),
         })
     }
 
-    /// The axes u and n of this pose, true to some units of 2^-53 however near up
-    /// is to the direction of view, and look to the eye: nothing is rounded before
-    /// the cross product.
+    /// The axes u and n, true to some units of 2^-53 however near up is to the
+    /// direction of view, and look to the eye: the cross product is exact.
     ///
     /// # Errors
     /// As [`look_at`](super::look_at).
     pub(super) fn axes(&self) -> Result<[DVec3; 2], CameraError> {
-        let (eye, towards, up) = match *self {
-            Pose::LookAt { eye, look, up } => (eye, (["look x", "look y", "look z"], look), up),
-            Pose::Forward { eye, forward, up } => {
-                (eye, (["forward x", "forward y", "forward z"], forward), up)
+        let (eye, name, towards, up) = match *self {
+            Pose::LookAt { eye, look, up } => (eye, "look", look, up),
+            Pose::Forward { eye, forward, up } => (eye, "forward", forward, up),
+        };
+        check_finite("eye", eye)?;
+        check_finite(name, towards)?;
+        check_finite("up", up)?;
+        let forward = self.direction().ok_or_else(|| match self {
+            Pose::LookAt { .. } => {
+                let found = "eye and look are the same point";
+                CameraError::invalid(found, "two different points")
             }
-        };
-        check_finite(["eye x", "eye y", "eye z"], eye)?;
-        check_finite(towards.0, towards.1)?;
-        check_finite(["up x", "up y", "up z"], up)?;
-        let forward = self.direction().ok_or(match self {
-            Pose::LookAt { .. } => CameraError::EyeIsLook,
-            Pose::Forward { .. } => CameraError::ForwardIsZero,
+            Pose::Forward { .. } => CameraError::invalid("forward is zero", "a direction"),
         })?;
-        let up = near_unit(up.to_array().map(Expansion::from)).ok_or(CameraError::UpParallel)?;
-        // up x n, but for its length.
-        let across = [(1, 2), (2, 0), (0, 1)]
-            .map(|(i, j)| &(&forward[i] * &up[j]) - &(&forward[j] * &up[i]));
-        let (forward, up) = (estimate(&forward), estimate(&up));
-        let Some(u) = near_unit(across.clone()).and_then(|across| unit(estimate(&across))) else {
-            return Err(CameraError::UpParallel);
+        let parallel = || {
+            let found = "up is zero or parallel to the direction of view";
+            CameraError::invalid(found, "an up vector that is neither")
         };
-        let sine = estimate(&across).length() / (forward.length() * up.length());
-        if sine <= PARALLEL {
-            return Err(CameraError::UpNearlyParallel { sine });
-        }
-        let n = -unit(forward).ok_or(CameraError::ForwardIsZero)?;
-        Ok([u, n])
+        let up = exact::near_unit(exact::vector(up)).ok_or_else(parallel)?;
+        // up x n, but for its length.
+        let across = exact::cross(&forward, &up);
+        let length = |v: &ExactVector| exact::estimate(v).length();
+        let sine = length(&across) / (length(&forward) * length(&up));
+        let n = -unit(exact::estimate(&forward));
+        let u = exact::near_unit(across).ok_or_else(parallel)?;
+        require(
+            sine > PARALLEL,
+            || format!("up is {sine:e} rad from the direction of view or its opposite"),
+            "more than 8.9e-16",
+        )?;
+        Ok([unit(exact::estimate(&u)), n])
     }
 }
 
-/// The unit vector along `v`, whatever its length; `None` for zero.
-pub(super) fn unit(v: DVec3) -> Option<DVec3> {
-    let largest = v.abs().max_element();
-    if largest == 0.0 {
-        return None;
-    }
+/// The unit vector along `v`, whatever its length above 0.
+pub(super) fn unit(v: DVec3) -> DVec3 {
     // Twice: 1/largest alone overflows for subnormal lengths.
-    let scaled = v / largest;
-    Some(scaled / scaled.length())
+    let scaled = v / v.abs().max_element();
+    scaled / scaled.length()
 }
 
-type Vector = [Expansion; 3];
-
-fn check_finite(names: [&'static str; 3], v: DVec3) -> Result<(), CameraError> {
-    for (name, value) in names.into_iter().zip(v.to_array()) {
-        finite(name, value)?;
+fn check_finite(name: &str, v: DVec3) -> Result<(), CameraError> {
+    for (axis, value) in ["x", "y", "z"].into_iter().zip(v.to_array()) {
+        let found = || format!("{name} {axis} is {value}");
+        require(value.is_finite(), found, "a finite number")?;
     }
     Ok(())
-}
-
-fn estimate(v: &Vector) -> DVec3 {
-    DVec3::new(v[0].estimate(), v[1].estimate(), v[2].estimate())
-}
-
-/// The vector times a power of two that brings its largest component near 1,
-/// so that no product overflows; `None` for zero.
-fn near_unit(v: Vector) -> Option<Vector> {
-    let largest = estimate(&v).abs().max_element();
-    let exponent = (largest > 0.0).then(|| libm::ilogb(largest))?;
-    Some(v.map(|component| component.scaled(-exponent)))
 }

@@ -5,50 +5,19 @@ use std::ops::Neg;
 
 use glam::DMat3;
 
-use crate::arithmetic::Expansion;
+use crate::arithmetic::{Expansion, exact};
 
 /// Leading doubles kept of every number: about 2e-63 relative. Raised to the
 /// power 1e10, that still leaves more than 50 digits.
 const TERMS: usize = 4;
-
-/// pi in four doubles (Hida, Li and Bailey 2001, "Algorithms for quad-double
-/// precision floating point arithmetic").
-const PI: [f64; 4] = [
-    std::f64::consts::PI,
-    1.224_646_799_147_353_2e-16,
-    -2.994_769_809_718_339_7e-33,
-    1.112_454_220_863_365_3e-49,
-];
-
-/// Size of the terms that end a series: below the last digit of one.
-const NEGLIGIBLE: f64 = 1e-70;
-
-/// `first` plus `first factor^n / (d(1) d(2) ... d(n))` for all n.
-fn series(first: Expansion, factor: &Expansion, divisor: impl Fn(f64) -> f64) -> Expansion {
-    let (mut sum, mut term, mut n) = (first.clone(), first, 0.0);
-    while term.estimate().abs() > NEGLIGIBLE {
-        n += 1.0;
-        term = (&term * factor).leading(TERMS).over(divisor(n), TERMS);
-        sum = (&sum + &term).leading(TERMS);
-    }
-    sum
-}
-
-fn sin_cos(radians: &Expansion) -> (Expansion, Expansion) {
-    let square = -&(radians * radians).leading(TERMS);
-    let sin = series(radians.clone(), &square, |n| 2.0 * n * (2.0 * n + 1.0));
-    let cos = series(1.0.into(), &square, |n| 2.0 * n * (2.0 * n - 1.0));
-    (sin, cos)
-}
 
 /// Sine and cosine of an angle in degrees, after whole turns are taken off, which is
 /// exact in degrees.
 fn sin_cos_degrees(degrees: &Expansion) -> (Expansion, Expansion) {
     let turns = (degrees.estimate() / 360.0).round();
     let rest = degrees - &Expansion::product(360.0, turns);
-    let mut pi = Expansion::default();
-    PI.into_iter().rev().for_each(|term| pi.grow(term));
-    sin_cos(&(&rest * &pi.over(180.0, TERMS + 1)).leading(TERMS))
+    let radians = &rest * &exact::pi().over(180.0, TERMS + 1);
+    exact::sin_cos(&radians.leading(TERMS), TERMS)
 }
 
 /// `exp(-x)` of a number that is not negative; zero below 1e-300.
@@ -57,7 +26,7 @@ fn decay(x: &Expansion) -> Expansion {
         return Expansion::ZERO;
     }
     // Halved ten times, and the result squared as often.
-    let small = series(1.0.into(), &-&x.scaled(-10), |n| n);
+    let small = exact::series(1.0.into(), &-&x.scaled(-10), |n| n, TERMS);
     (0..10).fold(small, |power, _| (&power * &power).leading(TERMS))
 }
 
@@ -74,7 +43,7 @@ pub fn linear_way(omega: f64, frame_s: f64, frames: usize) -> Vec<[f64; 2]> {
     let b = product(&gain, &omega.scaled(1)).neg();
     let c = &one - &b;
     let d = &product(&omega, &c) - &a;
-    let (step_sin, step_cos) = sin_cos(&frame_s.into());
+    let (step_sin, step_cos) = exact::sin_cos(&frame_s.into(), TERMS);
     let step_fall = decay(&product(&omega, &frame_s.into()));
     let (mut sin, mut cos, mut fall) = (Expansion::ZERO, one.clone(), one);
     let mut frame = |n: usize| {

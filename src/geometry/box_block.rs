@@ -5,8 +5,7 @@
 use glam::Vec3;
 
 use super::aabb::held;
-use super::p_vertex::PVertexRows;
-use super::{Aabb, Ball, PVertexSigns, Plane, PlaneF64, SphereMargin};
+use super::{Aabb, Ball, BoxCorner, Plane, PlaneF64, SphereMargin};
 use crate::kernel::{Isa, Plain, each, first_lanes, prefetch};
 
 /// Boxes of one block, and one bit for each of them.
@@ -83,8 +82,8 @@ impl BoxBlock {
 
     /// Asks for the rows of one corner.
     #[inline(always)]
-    pub fn prefetch_p_vertex(&self, corner: PVertexRows) {
-        for row in corner.far() {
+    pub fn prefetch_corner(&self, corner: BoxCorner) {
+        for row in corner.rows() {
             prefetch(&self.rows[row]);
         }
     }
@@ -108,17 +107,11 @@ impl BoxBlock {
         isa.below_zero(sum)
     }
 
+    /// The coordinates of one corner, the same one of every box.
     #[inline(always)]
-    pub(super) fn numbered_rows(&self, [x, y, z]: [usize; 3]) -> [&[f32; LANES]; 3] {
+    pub(crate) fn corner_rows(&self, corner: BoxCorner) -> [&[f32; LANES]; 3] {
+        let [x, y, z] = corner.rows();
         [&self.rows[x], &self.rows[y], &self.rows[z]]
-    }
-
-    /// The rows of one corner, the same one of every box: the upper bounds
-    /// where `upper` says so.
-    #[inline(always)]
-    pub(crate) fn corner_rows(&self, upper: PVertexSigns) -> [&[f32; LANES]; 3] {
-        let row = |k: usize| &self.rows[k + 3 * usize::from(upper[k])];
-        [row(0), row(1), row(2)]
     }
 
     /// The lanes that none of the f64 planes excludes: bit for bit
@@ -126,12 +119,12 @@ impl BoxBlock {
     #[inline(always)]
     pub fn admitted_by_wide<'p>(
         &self,
-        planes: impl Iterator<Item = (&'p PlaneF64, PVertexSigns)>,
+        planes: impl Iterator<Item = (&'p PlaneF64, BoxCorner)>,
     ) -> LaneMask {
         let mut lowest = [f64::INFINITY; LANES];
-        for (plane, upper) in planes {
+        for (plane, corner) in planes {
             let n = plane.normal;
-            let [x, y, z] = self.corner_rows(upper);
+            let [x, y, z] = self.corner_rows(corner);
             for lane in 0..LANES {
                 let [x, y, z] = each([x, y, z], |row| f64::from(row[lane]));
                 let value = ((n.x * x + n.y * y) + n.z * z) + plane.d;
@@ -158,7 +151,7 @@ impl BoxBlock {
     #[inline(always)]
     pub fn admitted_as_spheres<'p>(
         &self,
-        planes: impl Iterator<Item = (&'p Plane, PVertexSigns, &'p SphereMargin)>,
+        planes: impl Iterator<Item = (&'p Plane, BoxCorner, &'p SphereMargin)>,
     ) -> LaneMask {
         // Row by row, like the block itself: centre x, y, z, radius, reach.
         let mut balls = [[0.0; LANES]; 5];
@@ -172,8 +165,8 @@ impl BoxBlock {
         }
         let [x, y, z, radius, reach] = balls;
         let mut dropped = [0; LANES];
-        for (plane, upper, margin) in planes {
-            let far = values_at(Plain, plane, self.corner_rows(upper));
+        for (plane, corner, margin) in planes {
+            let far = values_at(Plain, plane, self.corner_rows(corner));
             for lane in 0..LANES {
                 let ball = Ball {
                     centre: Vec3::new(x[lane], y[lane], z[lane]),

@@ -2,8 +2,7 @@
 //! corners, and its numbers in vectors for many blocks.
 
 use super::box_block::{BoxBlock, sums_at};
-use super::p_vertex::PVertexRows;
-use super::{ConvexVolume, PlaneMask};
+use super::{BoxCorner, ConvexVolume, PlaneMask};
 use crate::kernel::{Isa, LaneMask};
 
 /// One plane as the block kernels read it, in vectors, for many blocks.
@@ -15,7 +14,7 @@ use crate::kernel::{Isa, LaneMask};
 pub struct BroadcastPlane<I: Isa> {
     normal: [I::Floats; 3],
     pub(super) minus_d: I::Floats,
-    pub(super) p_vertex: PVertexRows,
+    pub(super) p_vertex: BoxCorner,
 }
 
 impl<I: Isa> BroadcastPlane<I> {
@@ -34,7 +33,7 @@ impl<I: Isa> BroadcastPlane<I> {
     #[inline(always)]
     pub(super) fn keep(&self, isa: I, kept: I::Kept, block: &BoxBlock) -> I::Kept {
         let [a, b, c] = self.normal;
-        let [x, y, z] = block.numbered_rows(self.p_vertex.far());
+        let [x, y, z] = block.corner_rows(self.p_vertex);
         let sum = isa.add(isa.mul(a, isa.load(x)), isa.mul(b, isa.load(y)));
         let sum = isa.add(sum, isa.mul(c, isa.load(z)));
         isa.keep(kept, sum, self.minus_d)
@@ -49,7 +48,7 @@ impl<I: Isa> BroadcastPlane<I> {
     /// Asks for the rows that [`BroadcastPlane::admitted`] reads.
     #[inline(always)]
     pub fn prefetch(&self, block: &BoxBlock) {
-        block.prefetch_p_vertex(self.p_vertex);
+        block.prefetch_corner(self.p_vertex);
     }
 }
 
@@ -150,7 +149,7 @@ impl BoxBlock {
             left &= left - 1;
             let plane = BroadcastPlane::new(isa, volume, bit);
             kept = plane.keep(isa, kept, self);
-            let near = self.numbered_rows(plane.p_vertex.near());
+            let near = self.corner_rows(plane.p_vertex.opposite());
             let nearest = sums_at(isa, volume.plane_of_bit(bit).normal, near);
             let minus_d = isa.splat(volume.minus_d_of_bit(bit));
             open = isa.without(open, nearest, minus_d, 1 << bit);

@@ -6,7 +6,7 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::aabb::held;
-use super::{Aabb, PVertexRows, PVertexSigns, Plane, PlaneF64};
+use super::{Aabb, BoxCorner, Plane};
 
 /// Largest number of planes of one volume: one bit each in a [`PlaneMask`].
 pub const MAX_PLANES: usize = 32;
@@ -38,8 +38,8 @@ named! {
     }
 }
 
-/// Why a set of planes is no volume.
-#[derive(Clone, Copy, PartialEq, Debug, thiserror::Error)]
+/// Planes that are no volume.
+#[derive(Clone, PartialEq, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum VolumeError {
     /// More planes than a mask has bits.
@@ -48,40 +48,31 @@ pub enum VolumeError {
         /// Number of planes given.
         count: usize,
     },
-    /// A plane in f32 with a NaN or infinite number.
-    #[error(
-        "{} is not finite: ({}, {}, {}, {})", label(*index, *name),
-        plane.normal.x, plane.normal.y, plane.normal.z, plane.d
-    )]
-    NonFinitePlane {
-        /// Its position in the list.
-        index: usize,
-        /// Its name, of a frustum's planes.
-        name: Option<FrustumPlane>,
-        /// The plane itself.
-        plane: Plane,
-    },
-    /// A plane in f64 with a NaN or infinite number.
-    #[error("plane {index} is not finite: ({}, {}, {}, {})", plane.normal.x, plane.normal.y, plane.normal.z, plane.d)]
-    NonFinitePlaneF64 {
-        /// Its position in the list.
-        index: usize,
-        /// The plane itself.
-        plane: PlaneF64,
-    },
-    /// The eye of planes about the eye leaves the range of f32.
-    #[error("the eye is not finite in f32: {eye}")]
-    NonFiniteEye {
-        /// The eye in scene coordinates.
-        eye: Vec3,
+    /// A NaN or infinite number in a plane or in the eye of planes about the eye.
+    #[error("{what}: {value}")]
+    NotFinite {
+        /// "the left plane is not finite", "plane 7 is not finite".
+        what: String,
+        /// The numbers.
+        value: String,
     },
 }
 
-/// What messages call a plane.
-fn label(index: usize, name: Option<FrustumPlane>) -> String {
-    match name {
-        Some(name) => format!("the {} plane", name.name()),
-        None => format!("plane {index}"),
+impl VolumeError {
+    /// Checks the number of planes.
+    pub(super) fn check_count(count: usize) -> Result<(), VolumeError> {
+        match count > MAX_PLANES {
+            true => Err(VolumeError::TooManyPlanes { count }),
+            false => Ok(()),
+        }
+    }
+
+    /// A plane, by its label, with numbers that are not finite.
+    pub(super) fn plane(label: &str, [x, y, z, d]: [impl std::fmt::Display; 4]) -> VolumeError {
+        VolumeError::NotFinite {
+            what: format!("{label} is not finite"),
+            value: format!("({x}, {y}, {z}, {d})"),
+        }
     }
 }
 
@@ -109,8 +100,7 @@ pub struct ConvexVolume {
     names: [Option<FrustumPlane>; MAX_PLANES],
     count: usize,
     mask: PlaneMask,
-    upper: [PVertexSigns; MAX_PLANES],
-    corners: [PVertexRows; MAX_PLANES],
+    p_vertices: [BoxCorner; MAX_PLANES],
     /// What `n * p` must not be below: `-d`.
     minus_d: [f32; MAX_PLANES],
 }
@@ -155,26 +145,27 @@ impl ConvexVolume {
         planes: impl ExactSizeIterator<Item = (Plane, Option<FrustumPlane>)>,
     ) -> Result<Self, VolumeError> {
         let count = planes.len();
-        if count > MAX_PLANES {
-            return Err(VolumeError::TooManyPlanes { count });
-        }
+        VolumeError::check_count(count)?;
         let mut volume = ConvexVolume {
             planes: [Plane::new(Vec3::ZERO, 0.0); MAX_PLANES],
             names: [None; MAX_PLANES],
             count,
             mask: 0,
-            upper: [[true; 3]; MAX_PLANES],
-            corners: [PVertexRows::of([true; 3]); MAX_PLANES],
+            p_vertices: [BoxCorner([true; 3]); MAX_PLANES],
             minus_d: [0.0; MAX_PLANES],
         };
         for (index, (plane, name)) in planes.enumerate() {
             if !plane.is_finite() {
-                return Err(VolumeError::NonFinitePlane { index, name, plane });
+                let numbers = plane.normal.extend(plane.d).to_array();
+                let label = match name {
+                    Some(name) => format!("the {} plane", name.name()),
+                    None => format!("plane {index}"),
+                };
+                return Err(VolumeError::plane(&label, numbers));
             }
             volume.planes[index] = plane;
             volume.names[index] = name;
-            volume.upper[index] = plane.upper();
-            volume.corners[index] = PVertexRows::of(plane.upper());
+            volume.p_vertices[index] = plane.p_vertex_corner();
             volume.minus_d[index] = -plane.d;
             volume.mask |= PlaneMask::from(!plane.is_trivial()) << index;
         }
@@ -193,23 +184,16 @@ impl ConvexVolume {
         &self.planes[index as usize % MAX_PLANES]
     }
 
-    /// The rows of a [`BoxBlock`](super::BoxBlock) that hold the p-vertices of
-    /// plane `index`, likewise.
+    /// The p-vertex of plane `index`, likewise.
     #[inline(always)]
-    pub fn p_vertex_of_bit(&self, index: u32) -> PVertexRows {
-        self.corners[index as usize % MAX_PLANES]
+    pub fn p_vertex_of_bit(&self, index: u32) -> BoxCorner {
+        self.p_vertices[index as usize % MAX_PLANES]
     }
 
     /// `-d` of plane `index`, likewise.
     #[inline(always)]
     pub fn minus_d_of_bit(&self, index: u32) -> f32 {
         self.minus_d[index as usize % MAX_PLANES]
-    }
-
-    /// [`Plane::upper`] of plane `index`, likewise.
-    #[inline(always)]
-    pub fn p_vertex_signs_of_bit(&self, index: u32) -> PVertexSigns {
-        self.upper[index as usize % MAX_PLANES]
     }
 
     /// The plane of that name, if the volume has one.
@@ -274,7 +258,7 @@ mod tests {
                 let planes = [sound, Plane::new(Vec3::new(x, y, z), d), sound];
                 assert!(matches!(
                     ConvexVolume::from_planes(&planes),
-                    Err(VolumeError::NonFinitePlane { index: 1, .. })
+                    Err(VolumeError::NotFinite { what, .. }) if what.starts_with("plane 1 ")
                 ));
             }
         }

@@ -1,11 +1,10 @@
-//! The plane test in f64: planes that keep all of a camera's digits, against
-//! f32 boxes that are promoted exactly. The same corners and the same order of
-//! operations as in f32, and therefore just as monotone.
+//! Convex volumes with planes in f64, tested against f32 boxes that are promoted exactly.
+//! Corners and order of operations are those of the f32 test, so it is as monotone.
 
 use glam::DVec3;
 
 use super::convex_volume::MAX_PLANES;
-use super::{ConvexVolume, PVertexSigns, PlaneF64, PlaneMask, VolumeError};
+use super::{BoxCorner, ConvexVolume, PlaneF64, PlaneMask, VolumeError};
 
 /// The closed intersection of up to 32 half-spaces in f64.
 #[derive(Clone, Debug)]
@@ -13,33 +12,38 @@ pub struct ConvexVolumeF64 {
     planes: [PlaneF64; MAX_PLANES],
     count: usize,
     mask: PlaneMask,
-    upper: [PVertexSigns; MAX_PLANES],
+    p_vertices: [BoxCorner; MAX_PLANES],
 }
 
 impl ConvexVolumeF64 {
     /// # Errors
     /// More than 32 planes, or a plane with a NaN or infinite number.
     pub fn from_planes(planes: &[PlaneF64]) -> Result<Self, VolumeError> {
-        let count = planes.len();
-        if count > MAX_PLANES {
-            return Err(VolumeError::TooManyPlanes { count });
+        VolumeError::check_count(planes.len())?;
+        for (index, plane) in planes.iter().enumerate() {
+            let numbers = plane.normal.extend(plane.d);
+            if !numbers.is_finite() {
+                let label = format!("plane {index}");
+                return Err(VolumeError::plane(&label, numbers.to_array()));
+            }
         }
+        Ok(Self::from_finite(planes.iter().copied()))
+    }
+
+    fn from_finite(planes: impl ExactSizeIterator<Item = PlaneF64>) -> Self {
         let mut volume = ConvexVolumeF64 {
             planes: [PlaneF64::new(DVec3::ZERO, 0.0); MAX_PLANES],
-            count,
+            count: planes.len(),
             mask: 0,
-            upper: [[true; 3]; MAX_PLANES],
+            p_vertices: [BoxCorner([true; 3]); MAX_PLANES],
         };
-        for (index, &plane) in planes.iter().enumerate() {
-            if !(plane.normal.is_finite() && plane.d.is_finite()) {
-                return Err(VolumeError::NonFinitePlaneF64 { index, plane });
-            }
+        for (index, plane) in planes.enumerate() {
             let trivial = plane.normal == DVec3::ZERO && plane.d >= 0.0;
             volume.planes[index] = plane;
-            volume.upper[index] = plane.normal.to_array().map(|n| n >= 0.0);
+            volume.p_vertices[index] = BoxCorner(plane.normal.to_array().map(|n| n >= 0.0));
             volume.mask |= PlaneMask::from(!trivial) << index;
         }
-        Ok(volume)
+        volume
     }
 
     /// The planes, in the order in which they were given.
@@ -53,10 +57,10 @@ impl ConvexVolumeF64 {
         &self.planes[index as usize % MAX_PLANES]
     }
 
-    /// Which bounds the p-vertex of plane `index` takes, likewise.
+    /// The p-vertex of plane `index`, likewise.
     #[inline(always)]
-    pub fn p_vertex_signs_of_bit(&self, index: u32) -> PVertexSigns {
-        self.upper[index as usize % MAX_PLANES]
+    pub fn p_vertex_of_bit(&self, index: u32) -> BoxCorner {
+        self.p_vertices[index as usize % MAX_PLANES]
     }
 
     /// Bits of the planes that constrain anything.
@@ -69,16 +73,7 @@ impl ConvexVolumeF64 {
 /// The very same planes; only the arithmetic of the test is finer.
 impl From<&ConvexVolume> for ConvexVolumeF64 {
     fn from(volume: &ConvexVolume) -> Self {
-        let mut planes = [PlaneF64::new(DVec3::ZERO, 0.0); MAX_PLANES];
-        for (wide, plane) in planes.iter_mut().zip(volume.planes()) {
-            *wide = plane.into();
-        }
-        ConvexVolumeF64 {
-            planes,
-            count: volume.planes().len(),
-            mask: volume.mask(),
-            upper: std::array::from_fn(|index| volume.p_vertex_signs_of_bit(index as u32)),
-        }
+        Self::from_finite(volume.planes().iter().map(PlaneF64::from))
     }
 }
 
@@ -102,7 +97,7 @@ mod tests {
         let bad = PlaneF64::new(DVec3::X, f64::NAN);
         assert!(matches!(
             ConvexVolumeF64::from_planes(&[good, bad]),
-            Err(VolumeError::NonFinitePlaneF64 { index: 1, .. })
+            Err(VolumeError::NotFinite { what, .. }) if what.starts_with("plane 1 ")
         ));
         assert!(matches!(
             ConvexVolumeF64::from_planes(&[good; 33]),

@@ -1,5 +1,4 @@
-//! Boxes, planes and convex volumes, and the one plane test that every
-//! structure shares. Nothing here knows what an index, a camera or a file is.
+//! Boxes, planes and convex volumes, and the one plane test that all structures share.
 
 mod aabb;
 #[cfg(test)]
@@ -21,8 +20,8 @@ pub use box_block::{BoxBlock, BoxBlocks, LANES, LaneMask, ROWS, blocks_of, xor_o
 pub use broadcast::{BroadcastPlane, BroadcastPlanes};
 pub use convex_volume::{ConvexVolume, FrustumPlane, MAX_PLANES, PlaneMask, VolumeError};
 pub use convex_volume_f64::ConvexVolumeF64;
-pub use p_vertex::{ALL_ROWS, PVertexRows, RowMask};
-pub use plane::{PVertexSigns, Plane};
+pub use p_vertex::{ALL_ROWS, BoxCorner, RowMask};
+pub use plane::Plane;
 pub use plane_f64::PlaneF64;
 pub use plane_rows::{PlaneRows, ROW_LANES};
 pub use plane_tree::{PlaneTree, PlaneTreeNode};

@@ -1,31 +1,31 @@
-//! Which rows of a block are a plane's corners.
-
-use super::PVertexSigns;
+//! Rows of a block that hold the corners of its boxes a plane test reads.
 
 /// Some of the six rows of a [`BoxBlock`](super::BoxBlock), one bit each.
 pub type RowMask = u8;
 
-/// All of them.
+/// All six rows.
 pub const ALL_ROWS: RowMask = 0b11_1111;
 
-/// The rows of a block that hold the p-vertices of a plane, and those of the
-/// opposite corners, its n-vertices: the same ones for every box.
-#[derive(Clone, Copy, Debug)]
-pub struct PVertexRows {
-    /// Whether the p-vertex is at the upper bound, axis by axis. Booleans and no
-    /// numbers: a row of theirs needs no check.
-    upper: PVertexSigns,
-}
+/// BoxCorner of a box: on each axis the upper bound, or else the lower one.
+///
+/// The p-vertex of a plane (the corner farthest along its normal) is the same corner of
+/// every box, and so three fixed rows of a block.
+// Booleans and no numbers: a row of theirs needs no check.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct BoxCorner(pub [bool; 3]);
 
-impl PVertexRows {
-    /// Of the upper bounds where `upper` says so.
-    pub const fn of(upper: PVertexSigns) -> PVertexRows {
-        PVertexRows { upper }
+impl BoxCorner {
+    /// The corner across the box; of a p-vertex the n-vertex.
+    #[inline(always)]
+    pub(super) fn opposite(self) -> BoxCorner {
+        let BoxCorner([x, y, z]) = self;
+        BoxCorner([!x, !y, !z])
     }
 
+    /// Rows of a block that hold its coordinates.
     #[inline(always)]
-    pub(super) fn far(self) -> [usize; 3] {
-        let [x, y, z] = self.upper;
+    pub(super) fn rows(self) -> [usize; 3] {
+        let BoxCorner([x, y, z]) = self;
         [
             3 * usize::from(x),
             1 + 3 * usize::from(y),
@@ -33,19 +33,9 @@ impl PVertexRows {
         ]
     }
 
+    /// The same rows as a set.
     #[inline(always)]
-    pub(super) fn near(self) -> [usize; 3] {
-        let [x, y, z] = self.upper;
-        [
-            3 * usize::from(!x),
-            1 + 3 * usize::from(!y),
-            2 + 3 * usize::from(!z),
-        ]
-    }
-
-    /// The rows of the p-vertices as a set.
-    #[inline(always)]
-    pub fn rows(self) -> RowMask {
-        self.far().iter().fold(0, |rows, &row| rows | 1 << row)
+    pub fn row_mask(self) -> RowMask {
+        self.rows().iter().fold(0, |rows, &row| rows | 1 << row)
     }
 }

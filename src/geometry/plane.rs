@@ -5,8 +5,7 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::Aabb;
-use crate::kernel::each;
+use super::{Aabb, BoxCorner};
 
 /// A half-space: the points `x` with `normal . x + d >= 0` (closed).
 ///
@@ -20,9 +19,6 @@ pub struct Plane {
     /// Offset: above 0 where the zero point is inside.
     pub d: f32,
 }
-
-/// Which bound the p-vertex takes on each axis: the upper one?
-pub type PVertexSigns = [bool; 3];
 
 impl Plane {
     /// The half-space `normal . x + d >= 0`.
@@ -60,10 +56,9 @@ impl Plane {
         )
     }
 
-    /// The bounds that make up [`Plane::p_vertex`]. Kernels for many boxes ask
-    /// once a plane.
-    pub fn upper(&self) -> PVertexSigns {
-        each(self.normal.to_array(), |n| n >= 0.0)
+    /// The corner that [`Plane::p_vertex`] takes of every box.
+    pub fn p_vertex_corner(&self) -> BoxCorner {
+        BoxCorner(self.normal.to_array().map(|n| n >= 0.0))
     }
 
     /// The corner of `b` nearest against the normal (the n-vertex).

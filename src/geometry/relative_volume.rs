@@ -23,7 +23,10 @@ impl RelativeVolume {
     /// An eye with a NaN or infinite coordinate.
     pub fn new(eye: Vec3, planes: ConvexVolume) -> Result<Self, VolumeError> {
         if !eye.is_finite() {
-            return Err(VolumeError::NonFiniteEye { eye });
+            return Err(VolumeError::NotFinite {
+                what: "the eye is not finite in f32".to_owned(),
+                value: eye.to_string(),
+            });
         }
         Ok(RelativeVolume { eye, planes })
     }
@@ -84,7 +87,7 @@ mod tests {
         let eye = Vec3::new(0.0, f32::INFINITY, 0.0);
         assert!(matches!(
             RelativeVolume::new(eye, all),
-            Err(VolumeError::NonFiniteEye { .. })
+            Err(VolumeError::NotFinite { .. })
         ));
     }
 }

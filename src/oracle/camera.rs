@@ -8,101 +8,25 @@ use super::Oracle;
 use super::half_space::HalfSpace;
 use super::number::{Number, Precision};
 use crate::arithmetic::Expansion;
+use crate::arithmetic::exact::{self, ExactVector};
 use crate::camera::{Lens, Pose, ViewProjection};
 
 const PRECISION: Precision = Precision::CAMERA;
-
-/// Pi as a sum of doubles (true to 2^-330).
-const PI: [f64; 6] = [
-    std::f64::consts::PI,
-    1.2246467991473532e-16,
-    -2.9947698097183397e-33,
-    1.1124542208633653e-49,
-    5.672231979640316e-66,
-    1.7449862161352486e-83,
-];
-
-fn pi() -> Expansion {
-    let terms = PI.iter().rev();
-    terms.fold(Expansion::ZERO, |pi, &term| &pi + &Expansion::from(term))
-}
 
 fn times(a: &Expansion, b: &Expansion) -> Expansion {
     (a * b).leading(PRECISION.terms() + 1)
 }
 
-type Vector = [Expansion; 3];
-
-fn dot(a: &Vector, b: &Vector) -> Expansion {
-    let products = (0..3).map(|k| times(&a[k], &b[k]));
-    products.fold(Expansion::ZERO, |sum, p| &sum + &p)
+/// The cross product to the terms that are carried.
+fn cross(a: &ExactVector, b: &ExactVector) -> ExactVector {
+    exact::cross(a, b).map(|component| component.leading(PRECISION.terms() + 1))
 }
 
-fn cross(a: &Vector, b: &Vector) -> Vector {
-    [(1, 2), (2, 0), (0, 1)]
-        .map(|(i, j)| (&times(&a[i], &b[j]) - &times(&a[j], &b[i])).leading(PRECISION.terms() + 1))
-}
-
-fn unit(v: &Vector) -> Vector {
+fn unit(v: &ExactVector) -> ExactVector {
     let terms = PRECISION.terms() + 1;
-    let inverse = dot(v, v).leading(terms).sqrt(terms).reciprocal(terms);
+    let squares = exact::dot(v, v).leading(terms);
+    let inverse = squares.sqrt(terms).reciprocal(terms);
     [0, 1, 2].map(|k| times(&v[k], &inverse))
-}
-
-fn exact(v: DVec3) -> Vector {
-    v.to_array().map(Expansion::from)
-}
-
-/// `a - b`, exact.
-fn difference(a: DVec3, b: DVec3) -> Vector {
-    let (a, b) = (exact(a), exact(b));
-    [0, 1, 2].map(|k| &a[k] - &b[k])
-}
-
-/// The exponent of the largest component; `None` for the zero vector.
-fn exponent(v: &Vector) -> Option<i32> {
-    let largest = v.iter().map(|c| c.estimate().abs()).fold(0.0, f64::max);
-    (largest > 0.0).then(|| libm::ilogb(largest))
-}
-
-/// The vector times a power of two that brings it near unit length: its square
-/// could overflow otherwise. `None` for the zero vector.
-fn near_unit(v: Vector) -> Option<Vector> {
-    let exponent = exponent(&v)?;
-    Some(v.map(|component| component.scaled(-exponent)))
-}
-
-/// Sine and cosine of an angle in [0, pi/2]: Taylor series of a sixteenth of
-/// it, then four times the double-angle formulas.
-fn sine_and_cosine(angle: &Expansion) -> (Expansion, Expansion) {
-    let terms = PRECISION.terms() + 1;
-    let x = times(angle, &Expansion::from(1.0 / 16.0));
-    let square = times(&x, &x);
-    let mut sine = x.clone();
-    // 1 - cos: doubling it loses nothing, doubling the cosine would.
-    let mut versine = Expansion::ZERO;
-    let mut power = Expansion::from(1.0);
-    let mut odd = x;
-    for k in 1..40 {
-        let step = |p: &Expansion, divisor: f64| -&times(p, &square).over(divisor, terms);
-        let even_order = f64::from(2 * k);
-        power = step(&power, (even_order - 1.0) * even_order);
-        odd = step(&odd, even_order * (even_order + 1.0));
-        versine = (&versine - &power).leading(terms);
-        sine = (&sine + &odd).leading(terms);
-        if odd.estimate().abs() < 1e-110 {
-            break;
-        }
-    }
-    let one = Expansion::from(1.0);
-    let two = Expansion::from(2.0);
-    for _ in 0..4 {
-        let cosine = &one - &versine;
-        let next = times(&two, &times(&sine, &sine));
-        sine = times(&two, &times(&sine, &cosine));
-        versine = next;
-    }
-    (sine, (&one - &versine).leading(terms))
 }
 
 impl Oracle {
@@ -134,38 +58,31 @@ impl Oracle {
         if !finite || lens.with_far(lens.far()).is_err() {
             return None;
         }
-        let forward = match pose {
-            // Quartered where the difference could overflow.
-            Pose::LookAt { .. } if towards.abs().max(eye.abs()).max_element() > 1e300 => {
-                difference(towards / 4.0, eye / 4.0)
-            }
-            Pose::LookAt { .. } => difference(towards, eye),
-            Pose::Forward { .. } => exact(towards),
-        };
-        let forward = near_unit(forward)?;
-        let right = near_unit(cross(&forward, &near_unit(exact(up))?))?;
+        let forward = pose.direction()?;
+        let up = exact::near_unit(exact::vector(up))?;
+        let right = exact::near_unit(cross(&forward, &up))?;
         let u = unit(&right);
         let back = unit(&forward).map(|c| -&c);
         let v = cross(&back, &u);
-        let eye = difference(eye, origin);
+        let eye = exact::difference(eye, origin);
         let constraints = planes(&View { u, v, back, eye }, lens);
         Some(Oracle::new(&constraints, PRECISION))
     }
 }
 
 struct View {
-    u: Vector,
-    v: Vector,
-    back: Vector,
-    eye: Vector,
+    u: ExactVector,
+    v: ExactVector,
+    back: ExactVector,
+    eye: ExactVector,
 }
 
 impl View {
     /// The points x with `normal . (x - eye) + offset >= 0`.
-    fn half_space(&self, normal: &Vector, offset: &Expansion) -> HalfSpace {
+    fn half_space(&self, normal: &ExactVector, offset: &Expansion) -> HalfSpace {
         let p = PRECISION;
         // Products of three normals and an offset must stay within f64.
-        let exponent = exponent(normal).unwrap_or(0);
+        let exponent = exact::exponent(normal).unwrap_or(0);
         let normal = normal.clone().map(|n| n.scaled(-exponent));
         let offset = offset.scaled(-exponent);
         // Each component is as large as the whole normal, as far as noise goes.
@@ -184,7 +101,13 @@ impl View {
 
     /// The plane through the eye and an edge of the window at `offset` along
     /// `axis`, `depth` ahead; `sign` is +1 for the lower edge.
-    fn side(&self, axis: &Vector, offset: &Expansion, depth: &Expansion, sign: f64) -> HalfSpace {
+    fn side(
+        &self,
+        axis: &ExactVector,
+        offset: &Expansion,
+        depth: &Expansion,
+        sign: f64,
+    ) -> HalfSpace {
         let sign = Expansion::from(sign);
         let normal = [0, 1, 2].map(|k| {
             let lean = &times(&axis[k], depth) + &times(&self.back[k], offset);
@@ -202,8 +125,8 @@ fn planes(view: &View, lens: &Lens) -> Vec<HalfSpace> {
         Lens::Perspective {
             fovy_deg, aspect, ..
         } => {
-            let half = times(&pi(), &number(fovy_deg)).over(360.0, PRECISION.terms() + 1);
-            let (sine, cosine) = sine_and_cosine(&half);
+            let half = times(&exact::pi(), &number(fovy_deg)).over(360.0, PRECISION.terms() + 1);
+            let (sine, cosine) = exact::sin_cos(&half, PRECISION.terms() + 1);
             let wide = times(&sine, &number(aspect));
             ([-&wide, wide, -&sine, sine], cosine)
         }
@@ -255,34 +178,11 @@ fn planes_of_matrix(matrix: &ViewProjection, origin: DVec3) -> Vec<HalfSpace> {
     let about = rows.map(|[a, b, c, d]| {
         let along = [&a, &b, &c].into_iter().zip(origin.to_array());
         let d = along.fold(d, |d, (n, at)| &d + &(n * &Expansion::from(at)));
-        let exponent = exponent(&[a.clone(), b.clone(), c.clone()]).unwrap_or(0);
+        let exponent = exact::exponent(&[a.clone(), b.clone(), c.clone()]).unwrap_or(0);
         HalfSpace {
             normal: [a, b, c].map(|n| Number::from(n.scaled(-exponent))),
             d: Number::from(d.scaled(-exponent)),
         }
     });
     about.into()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn sines_of_known_angles_are_true_to_250_bits() {
-        let pi = pi();
-        for (divisor, sine_squared) in [(6.0, 0.25), (4.0, 0.5), (3.0, 0.75), (2.0, 1.0)] {
-            let (sine, cosine) = sine_and_cosine(&pi.over(divisor, PRECISION.terms() + 1));
-            let off = &times(&sine, &sine) - &Expansion::from(sine_squared);
-            assert!(
-                off.estimate().abs() < libm::exp2(-250.0),
-                "{divisor}: {off:?}"
-            );
-            let off = &times(&cosine, &cosine) - &Expansion::from(1.0 - sine_squared);
-            assert!(
-                off.estimate().abs() < libm::exp2(-250.0),
-                "{divisor}: {off:?}"
-            );
-        }
-    }
 }

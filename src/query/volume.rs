@@ -181,14 +181,16 @@ impl QueryVolume for ConvexVolume {
     }
     #[inline(always)]
     fn rows_read(&self, mask: PlaneMask) -> RowMask {
-        Bits(mask).fold(0, |rows, plane| rows | self.p_vertex_of_bit(plane).rows())
+        Bits(mask).fold(0, |rows, plane| {
+            rows | self.p_vertex_of_bit(plane).row_mask()
+        })
     }
     #[inline(always)]
     fn prefetch(&self, block: &BoxBlock, mask: PlaneMask) {
         // Mostly one plane or two; more read nearly everything.
         let (lowest, highest) = (mask.trailing_zeros(), mask.checked_ilog2().unwrap_or(0));
-        block.prefetch_p_vertex(self.p_vertex_of_bit(lowest));
-        block.prefetch_p_vertex(self.p_vertex_of_bit(highest));
+        block.prefetch_corner(self.p_vertex_of_bit(lowest));
+        block.prefetch_corner(self.p_vertex_of_bit(highest));
         if mask & mask.wrapping_sub(1) & !(1 << highest) != 0 {
             block.prefetch();
         }
@@ -212,7 +214,7 @@ impl QueryVolume for Spheres {
     fn kept_lanes<I: Isa>(&self, _: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
         block.admitted_as_spheres(Bits(mask).map(|index| {
             let (plane, margin) = self.plane_of_bit(index);
-            (plane, self.planes().p_vertex_signs_of_bit(index), margin)
+            (plane, self.planes().p_vertex_of_bit(index), margin)
         }))
     }
 }
@@ -221,7 +223,7 @@ impl QueryVolume for ConvexVolumeF64 {
     #[inline(always)]
     fn kept_lanes<I: Isa>(&self, _: I, block: &BoxBlock, mask: PlaneMask) -> LaneMask {
         let planes =
-            Bits(mask).map(|plane| (self.plane_of_bit(plane), self.p_vertex_signs_of_bit(plane)));
+            Bits(mask).map(|plane| (self.plane_of_bit(plane), self.p_vertex_of_bit(plane)));
         block.admitted_by_wide(planes)
     }
 }

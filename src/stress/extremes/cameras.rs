@@ -288,7 +288,7 @@ impl Draft {
 
     /// What it takes in.
     pub fn lens(&self) -> Result<Lens, CameraError> {
-        let other = self.other_lens;
+        let other = self.other_lens.clone();
         other.unwrap_or_else(|| Lens::perspective(self.fovy_deg, self.aspect, self.near, self.far))
     }
 }

@@ -38,7 +38,7 @@
 //! boxes are. Comparisons are such that a NaN makes a box near.
 
 use super::view::{Projection, U, View};
-use crate::geometry::BoxBlock;
+use crate::geometry::{BoxBlock, BoxCorner};
 use crate::kernel::{Isa, LANES, LaneMask};
 
 /// Pixels and nearness of one box: columns and rows from the first to the last
@@ -240,7 +240,7 @@ impl<I: Isa> AboutEye<I> {
     #[inline(always)]
     fn of(isa: I, block: &BoxBlock, p: &Projection) -> Self {
         let minus = isa.splat(-1.0);
-        let [lower, upper] = [block.corner_rows([false; 3]), block.corner_rows([true; 3])];
+        let [lower, upper] = [false, true].map(|upper| block.corner_rows(BoxCorner([upper; 3])));
         let mut bounds = [[isa.splat(0.0); 2]; 3];
         let mut minus_size = isa.splat(-p.far_from_zero);
         for (axis, bounds) in bounds.iter_mut().enumerate() {

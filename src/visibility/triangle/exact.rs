@@ -3,6 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::eye::Eye;
+use crate::arithmetic::exact::{self, ExactVector};
 use crate::arithmetic::{Expansion, cross, two_sum};
 use crate::kernel::each;
 
@@ -41,19 +42,14 @@ pub fn faces(eye: &Eye, corners: [Vec3; 3]) -> bool {
 /// The sign of the determinant by expansions.
 #[cold]
 fn orientation(eye: &Eye, corners: [Vec3; 3]) -> i32 {
-    let (u, v) = (
-        difference(corners[1], corners[0]),
-        difference(corners[2], corners[0]),
-    );
+    let normal = exact_normal(corners);
     let a = corners[0] * eye.weight;
     let mut sum = Expansion::ZERO;
     for k in 0..3 {
-        let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-        let minor = &(&u[i] * &v[j]) - &(&u[j] * &v[i]);
         let mut w = Expansion::from(eye.low[k]);
         w.grow(eye.high[k]);
         w.grow(f64::from(-a[k]));
-        sum = &sum + &(&w * &minor);
+        sum = &sum + &(&w * &normal[k]);
     }
     sum.sign()
 }
@@ -62,26 +58,18 @@ fn orientation(eye: &Eye, corners: [Vec3; 3]) -> i32 {
 /// where the triangle has no area. Not of unit length.
 pub fn normal(corners: [Vec3; 3]) -> DVec3 {
     let [a, b, c] = each(corners, |p: Vec3| p.as_dvec3());
-    let exact = |p: DVec3, q: DVec3| (0..3).all(|k| two_sum(p[k], -q[k]).1 == 0.0);
-    if exact(b, a) && exact(c, a) {
+    let is_exact = |p: DVec3, q: DVec3| (0..3).all(|k| two_sum(p[k], -q[k]).1 == 0.0);
+    if is_exact(b, a) && is_exact(c, a) {
         // Kahan's products do not cancel: two roundings at the most.
         return cross(b - a, c - a);
     }
-    let (u, v) = (
-        difference(corners[1], corners[0]),
-        difference(corners[2], corners[0]),
-    );
-    let minor = |i: usize, j: usize| &(&u[i] * &v[j]) - &(&u[j] * &v[i]);
-    DVec3::new(
-        minor(1, 2).estimate(),
-        minor(2, 0).estimate(),
-        minor(0, 1).estimate(),
-    )
+    exact::estimate(&exact_normal(corners))
 }
 
-/// `p - q`, exactly.
-fn difference(p: Vec3, q: Vec3) -> [Expansion; 3] {
-    [0, 1, 2].map(|k| &Expansion::from(p[k]) - &Expansion::from(q[k]))
+/// The cross product of two edges, exactly.
+fn exact_normal(corners: [Vec3; 3]) -> ExactVector {
+    let [a, b, c] = corners.map(|p| p.as_dvec3());
+    exact::cross(&exact::difference(b, a), &exact::difference(c, a))
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use std::cmp::Ordering;
 use glam::{DVec3, I64Vec3, Vec3};
 
 use super::body::Along;
+use crate::arithmetic::exact::{self, ExactVector};
 use crate::arithmetic::{Expansion, two_sum};
 use crate::kernel::each;
 use crate::visibility::Ray;
@@ -223,7 +224,8 @@ impl TriangleProbe {
     fn pierces(&self, corners: [Vec3; 3], two_sided: bool) -> bool {
         let d = self.direction();
         let about = corners.map(|corner| self.about(corner));
-        let volume = |i: usize, j: usize| dot(&d, &cross(&about[i], &about[j])).sign();
+        let volume =
+            |i: usize, j: usize| exact::dot(&d, &exact::cross(&about[i], &about[j])).sign();
         let signs = [volume(0, 1), volume(1, 2), volume(2, 0)];
         // Their sum is d . N, which is zero only if all are.
         match (signs.contains(&1), signs.contains(&-1)) {
@@ -236,22 +238,22 @@ impl TriangleProbe {
     /// The depth as a fraction, A . N over d . N, the latter made positive.
     fn fraction(&self, corners: [Vec3; 3]) -> (Expansion, Expansion) {
         let [a, b, c] = corners;
-        let minus = |p: Vec3| [0, 1, 2].map(|k| &Expansion::from(p[k]) - &Expansion::from(a[k]));
-        let normal = cross(&minus(b), &minus(c));
-        let above = dot(&self.about(a), &normal);
-        let below = dot(&self.direction(), &normal);
+        let minus = |p: Vec3| exact::difference(p.as_dvec3(), a.as_dvec3());
+        let normal = exact::cross(&minus(b), &minus(c));
+        let above = exact::dot(&self.about(a), &normal);
+        let below = exact::dot(&self.direction(), &normal);
         match below.sign() {
             -1 => (-&above, -&below),
             _ => (above, below),
         }
     }
 
-    fn direction(&self) -> [Expansion; 3] {
-        self.ray.direction.to_array().map(Expansion::from)
+    fn direction(&self) -> ExactVector {
+        exact::vector(self.ray.direction)
     }
 
     /// A scene-local point about the ray's origin.
-    fn about(&self, p: Vec3) -> [Expansion; 3] {
+    fn about(&self, p: Vec3) -> ExactVector {
         [0, 1, 2].map(|k| {
             let mut sum = Expansion::from(self.rest[k]);
             sum.grow(self.shift[k]);
@@ -296,14 +298,6 @@ fn are_in_one_plane(a: [Vec3; 3], b: [Vec3; 3]) -> bool {
         x + y + z == 0
     };
     is_in(p) && is_in(q) && is_in(r)
-}
-
-fn cross(a: &[Expansion; 3], b: &[Expansion; 3]) -> [Expansion; 3] {
-    [(1, 2), (2, 0), (0, 1)].map(|(i, j)| &(&a[i] * &b[j]) - &(&a[j] * &b[i]))
-}
-
-fn dot(a: &[Expansion; 3], b: &[Expansion; 3]) -> Expansion {
-    &(&(&a[0] * &b[0]) + &(&a[1] * &b[1])) + &(&a[2] * &b[2])
 }
 
 #[cfg(test)]

@@ -120,10 +120,9 @@ fn an_up_vector_parallel_but_for_its_decimals_is_refused() {
         let look = up * factor;
         let frame = look_at(DVec3::ZERO, look, up);
         assert!(
-            matches!(
-                frame,
-                Err(CameraError::UpParallel | CameraError::UpNearlyParallel { .. })
-            ),
+            frame
+                .as_ref()
+                .is_err_and(|e| e.to_string().starts_with("up is ")),
             "{look}: {frame:?}"
         );
     }

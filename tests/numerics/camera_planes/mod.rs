@@ -12,8 +12,7 @@ use std::collections::BTreeMap;
 
 use super::by_hand::{Kind, Setup, View};
 use cullbench::camera::{
-    Camera, CameraError, ClipSpace, Frame, PLANE_METHODS, PlaneMethod, PlaneOptions, Surroundings,
-    look_at,
+    Camera, ClipSpace, Frame, PLANE_METHODS, PlaneMethod, PlaneOptions, Surroundings, look_at,
 };
 use cullbench::geometry::{ConvexVolume, FrustumPlane};
 use glam::dcamera::rh::{proj, view};

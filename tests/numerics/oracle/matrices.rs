@@ -3,8 +3,8 @@
 //! cameras against those.
 
 use cullbench::camera::{
-    Camera, CameraError, ClipSpace, Lens, MATRIX_CONVENTIONS, MatrixConvention, PlaneOptions,
-    Surroundings, look_at,
+    Camera, ClipSpace, Lens, MATRIX_CONVENTIONS, MatrixConvention, PlaneOptions, Surroundings,
+    look_at,
 };
 use cullbench::culling::CameraView;
 use cullbench::geometry::{Aabb, sphere_cube};
@@ -408,26 +408,30 @@ fn a_matrix_of_a_known_camera_sees_what_the_camera_sees() {
 #[test]
 fn what_is_no_camera_is_refused() {
     use MatrixConvention::{ColumnD3d, ColumnGl};
-    let of = |entries: Entries, convention| Camera::of_matrix(entries, convention).unwrap_err();
+    let of = |entries: Entries, convention| {
+        let error = Camera::of_matrix(entries, convention).unwrap_err();
+        error.to_string()
+    };
+    let starts = |error: String, what: &str| assert!(error.starts_with(what), "{error}");
     let singular = [[1.0; 4]; 4];
-    assert_eq!(of(singular, ColumnGl), CameraError::MatrixSingular);
-    assert_eq!(of([[0.0; 4]; 4], ColumnGl), CameraError::MatrixSingular);
+    starts(of(singular, ColumnGl), "the matrix is singular");
+    starts(of([[0.0; 4]; 4], ColumnGl), "the matrix is singular");
     let mut ortho = DMat4::IDENTITY.to_cols_array_2d();
-    assert_eq!(of(ortho, ColumnGl), CameraError::MatrixWithoutEye);
+    starts(of(ortho, ColumnGl), "the matrix has no eye");
     ortho[1][3] = 0.7;
-    assert_eq!(of(ortho, ColumnD3d), CameraError::MatrixWithoutEye);
+    starts(of(ortho, ColumnD3d), "the matrix has no eye");
     let negated = OPEN_GL.map(|row| row.map(|entry| -entry));
-    assert_eq!(of(negated, ColumnGl), CameraError::MatrixSeesNothing);
+    starts(of(negated, ColumnGl), "the matrix sees nothing");
     for value in [f64::NAN, f64::INFINITY] {
         let mut entries = OPEN_GL;
         entries[1][2] = value;
-        let error = of(entries, ColumnGl).to_string();
+        let error = of(entries, ColumnGl);
         assert!(error.contains("m12") && error.contains("finite"), "{error}");
     }
     for value in [1e61, -1e-61, 5e-324] {
         let mut entries = OPEN_GL;
         entries[2][0] = value;
-        let error = of(entries, ColumnGl).to_string();
+        let error = of(entries, ColumnGl);
         assert!(error.contains("m20") && error.contains("1e-60"), "{error}");
     }
 }
