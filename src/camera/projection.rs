@@ -31,81 +31,65 @@ macro_rules! precision {
 
             use super::*;
 
-            /// The projection matrix of a lens; not a number for a matrix, which is
-            /// no projection without a view.
+            /// The projection matrix of a lens; NaN for a matrix, which is no projection
+            /// without a view.
             pub fn projection(lens: &Lens, clip: ClipSpace) -> $Mat {
-                match *lens {
+                let (near, is_gl) = (lens.near(), clip == ClipSpace::OpenGl);
+                // Depths of the first and the last plane in clip space.
+                let depths = match (clip, lens.far()) {
+                    (ClipSpace::ReversedZ, Some(far)) => [far, near],
+                    (_, far) => [near, far.unwrap_or(2.0 * near)],
+                };
+                let [first, last] = depths.map(|depth| depth as $float);
+                let windowed = |[l, r, b, t]: [f64; 4]| {
+                    let of: fn($float, $float, $float, $float, $float, $float) -> $Mat =
+                        match (lens.is_orthographic(), is_gl) {
+                            (true, true) => opengl::orthographic,
+                            (true, false) => directx::orthographic,
+                            (false, true) => opengl::frustum,
+                            (false, false) => directx::frustum,
+                        };
+                    let [l, r, b, t] = [l, r, b, t].map(|edge| edge as $float);
+                    of(l, r, b, t, first, last)
+                };
+                let mut matrix = match *lens {
                     Lens::Perspective {
-                        fovy_deg,
-                        aspect,
-                        near,
-                        far,
+                        fovy_deg, aspect, ..
                     } => {
                         let fovy = fovy_deg.to_radians() as $float;
-                        let (aspect, near) = (aspect as $float, near as $float);
-                        let mut matrix = match (clip, far.map(|far| far as $float)) {
-                            (ClipSpace::OpenGl, Some(far)) => {
-                                opengl::perspective(fovy, aspect, near, far)
-                            }
-                            (ClipSpace::D3d, Some(far)) => {
-                                directx::perspective(fovy, aspect, near, far)
-                            }
-                            (ClipSpace::ReversedZ, Some(far)) => {
-                                directx::perspective(fovy, aspect, far, near)
-                            }
-                            (ClipSpace::ReversedZ, None) => {
-                                directx::perspective_infinite_reverse(fovy, aspect, near)
-                            }
-                            (_, None) => directx::perspective_infinite(fovy, aspect, near),
+                        let aspect = aspect as $float;
+                        let of = if is_gl {
+                            opengl::perspective
+                        } else {
+                            directx::perspective
                         };
-                        if clip == ClipSpace::OpenGl && far.is_none() {
-                            matrix.w_axis.z = -2.0 * near;
-                        }
+                        let mut matrix = of(fovy, aspect, first, last);
                         let half = 0.5 * fovy;
                         let cotangent = $cos(half) / $sin(half);
                         matrix.x_axis.x = cotangent / aspect;
                         matrix.y_axis.y = cotangent;
                         matrix
                     }
-                    Lens::Orthographic { near, far, .. } => {
-                        let [l, r, b, t] = lens.window().map(|v| v as $float);
-                        let (near, far) = (near as $float, far as $float);
-                        match clip {
-                            ClipSpace::OpenGl => opengl::orthographic(l, r, b, t, near, far),
-                            ClipSpace::D3d => directx::orthographic(l, r, b, t, near, far),
-                            ClipSpace::ReversedZ => directx::orthographic(l, r, b, t, far, near),
+                    Lens::Orthographic { .. } => return windowed(lens.window()),
+                    // glam's window lies on its near plane, which reversed Z swaps with
+                    // the far one.
+                    Lens::OffAxis { window, .. } => match (clip, lens.far()) {
+                        (ClipSpace::ReversedZ, Some(far)) => {
+                            windowed(window.map(|edge| edge * (far / near)))
                         }
-                    }
-                    Lens::OffAxis { window, near, far } => {
-                        // glam's window lies on its near plane, which reversed Z
-                        // swaps with the far one.
-                        let grow = match far {
-                            Some(far) if clip == ClipSpace::ReversedZ => far / near,
-                            _ => 1.0,
-                        };
-                        let [l, r, b, t] = window.map(|v| (v * grow) as $float);
-                        let near = near as $float;
-                        match (clip, far.map(|far| far as $float)) {
-                            (ClipSpace::OpenGl, Some(far)) => {
-                                opengl::frustum(l, r, b, t, near, far)
-                            }
-                            (ClipSpace::D3d, Some(far)) => directx::frustum(l, r, b, t, near, far),
-                            (ClipSpace::ReversedZ, Some(far)) => {
-                                directx::frustum(l, r, b, t, far, near)
-                            }
-                            (_, None) => {
-                                let mut m = directx::frustum(l, r, b, t, near, 2.0 * near);
-                                (m.z_axis.z, m.w_axis.z) = match clip {
-                                    ClipSpace::OpenGl => (-1.0, -2.0 * near),
-                                    ClipSpace::D3d => (-1.0, -near),
-                                    ClipSpace::ReversedZ => (0.0, near),
-                                };
-                                m
-                            }
-                        }
-                    }
-                    Lens::Matrix(_) => $Mat::NAN,
+                        _ => windowed(window),
+                    },
+                    Lens::Matrix(_) => return $Mat::NAN,
+                };
+                if lens.far().is_none() {
+                    let near = near as $float;
+                    (matrix.z_axis.z, matrix.w_axis.z) = match clip {
+                        ClipSpace::OpenGl => (-1.0, -2.0 * near),
+                        ClipSpace::D3d => (-1.0, -near),
+                        ClipSpace::ReversedZ => (0.0, near),
+                    };
                 }
+                matrix
             }
 
             /// The world-to-eye matrix: rows u, v, n with `-e.u`, `-e.v`, `-e.n` in
