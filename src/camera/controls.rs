@@ -5,7 +5,7 @@
 use glam::{DQuat, DVec3};
 
 use super::pose::unit;
-use super::{Camera, CameraError, Frame, Lens, require};
+use super::{Camera, CameraError, Frame, Lens, LensKind, require};
 
 /// Rotations between two corrections: a rotation drifts by about 2e-16, so
 /// the frame stays orthonormal to 1e-13 at no visible cost.
@@ -100,47 +100,26 @@ impl Camera {
     /// # Errors
     /// A factor that is not above zero, or a lens that would have no window.
     pub fn zoom(&mut self, factor: f64) -> Result<(), CameraError> {
-        self.lens = self.lens.zoomed(factor)?;
-        Ok(())
-    }
-}
-
-impl Lens {
-    /// The lens with its window made smaller by `factor`.
-    fn zoomed(&self, factor: f64) -> Result<Lens, CameraError> {
         let found = || format!("the zoom factor is {factor}");
-        require(
-            factor.is_finite() && factor > 0.0,
-            found,
-            "a number above 0",
-        )?;
-        match *self {
-            Lens::Perspective {
-                fovy_deg,
-                aspect,
-                near,
-                far,
-            } => {
+        let is_sound = factor.is_finite() && factor > 0.0;
+        require(is_sound, found, "a number above 0")?;
+        let kind = match *self.lens.kind() {
+            LensKind::Perspective { fovy_deg, aspect } => {
                 let half = libm::tan(fovy_deg.to_radians() / 2.0) / factor;
                 let fovy_deg = 2.0 * libm::atan(half).to_degrees();
-                Lens::perspective(fovy_deg, aspect, near, far)
+                LensKind::Perspective { fovy_deg, aspect }
             }
-            Lens::Orthographic {
-                height,
+            LensKind::Orthographic { height, aspect } => LensKind::Orthographic {
+                height: height / factor,
                 aspect,
-                near,
-                far,
-            } => Lens::orthographic(height / factor, aspect, near, far),
-            Lens::OffAxis {
-                window: [l, r, b, t],
-                near,
-                far,
-            } => {
-                let window = [l / factor, r / factor, b / factor, t / factor];
-                Lens::off_axis(window, near, far)
-            }
-            Lens::Matrix(_) => Err(CameraError::of_matrix("a field of view")),
-        }
+            },
+            LensKind::OffAxis { window } => LensKind::OffAxis {
+                window: window.map(|edge| edge / factor),
+            },
+            LensKind::Matrix(_) => return Err(CameraError::of_matrix("a field of view")),
+        };
+        self.lens = Lens::new(kind, self.lens.near(), self.lens.far())?;
+        Ok(())
     }
 }
 
@@ -215,7 +194,7 @@ mod tests {
             lens,
         };
         camera.zoom(2.0).unwrap();
-        let Lens::Perspective { fovy_deg, .. } = camera.lens else {
+        let LensKind::Perspective { fovy_deg, .. } = *camera.lens.kind() else {
             panic!("zooming keeps the kind of lens");
         };
         assert!((fovy_deg - 2.0 * 0.5f64.atan().to_degrees()).abs() < 1e-12);

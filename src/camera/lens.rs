@@ -1,51 +1,43 @@
-//! Lenses: perspective, orthographic, off-axis and matrices, each with a finite or (but
-//! for orthographic) infinite far plane. It defines their validation and the
-//! corners of what they see.
+//! Lenses: perspective, orthographic, off-axis and matrices, each with a near plane and a
+//! finite or (but for orthographic) infinite far plane; their checks and their corners.
 
 use glam::DVec3;
 
-use super::{
-    Camera, CameraError, FARTHEST, Frame, MatrixConvention, Pose, ViewProjection, finite, require,
-};
+use super::{Camera, CameraError, FARTHEST, Frame, MatrixConvention, Pose, ViewProjection};
+use super::{finite, require};
 
-/// What the camera's lens takes in. Lengths are world units. Use the checked
-/// constructors; the planes of an unchecked lens may be nonsense.
+/// Window, near and far plane of a camera. Lengths are world units.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub enum Lens {
-    /// Symmetric; `fovy_deg` is the full vertical angle, aspect = width/height.
+pub struct Lens {
+    kind: LensKind,
+    near: f64,
+    far: Option<f64>,
+}
+
+/// Window of a lens.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum LensKind {
+    /// Symmetric about the axis of view.
     Perspective {
         /// Full vertical angle of view, 0 < fovy < 180.
         fovy_deg: f64,
         /// Width / height.
         aspect: f64,
-        /// Distance of the near plane, above 0.
-        near: f64,
-        /// `None` is infinite: the volume has five planes.
-        far: Option<f64>,
     },
-    /// A box `height` high; near and far may lie behind the eye.
+    /// A box; near and far may lie behind the eye.
     Orthographic {
         /// Height of the box.
         height: f64,
         /// Width / height.
         aspect: f64,
-        /// Distance of the near plane along the direction of view; may be negative.
-        near: f64,
-        /// Distance of the far plane, above `near`.
-        far: f64,
     },
-    /// Any window `[left, right, bottom, top]` on the near plane: stereo,
-    /// tiled displays, portals.
+    /// Any window on the near plane: stereo, tiled displays, portals.
     OffAxis {
-        /// `[left, right, bottom, top]` on the near plane, about the axis of view.
+        /// `[left, right, bottom, top]` about the axis of view.
         window: [f64; 4],
-        /// Distance of the near plane, above 0.
-        near: f64,
-        /// Distance of the far plane; `None` is infinite.
-        far: Option<f64>,
     },
-    /// The whole camera as a matrix, see [`Camera::of_matrix`]; the frame says
-    /// nothing about what is visible.
+    /// The whole camera as a matrix, see [`Camera::of_matrix`]; the frame does not affect
+    /// what is visible.
     ///
     /// [`Camera::of_matrix`]: super::Camera::of_matrix
     Matrix(ViewProjection),
@@ -61,15 +53,7 @@ impl Lens {
         near: f64,
         far: Option<f64>,
     ) -> Result<Lens, CameraError> {
-        let found = || format!("the vertical field of view is {fovy_deg} degrees");
-        require(fovy_deg > 0.0 && fovy_deg < 180.0, found, "0 < fov < 180")?;
-        check_aspect(aspect)?;
-        Ok(Lens::Perspective {
-            fovy_deg,
-            aspect,
-            near,
-            far: checked_far(near, far)?,
-        })
+        Lens::new(LensKind::Perspective { fovy_deg, aspect }, near, far)
     }
 
     /// # Errors
@@ -80,51 +64,79 @@ impl Lens {
         near: f64,
         far: f64,
     ) -> Result<Lens, CameraError> {
-        check_aspect(aspect)?;
-        check_window("height", 0.0, height)?;
-        finite("near", near)?;
-        check_far(near, far)?;
-        require(
-            far <= FARTHEST,
-            || format!("far is {far:e}"),
-            "at most 1.7e38, half of what f32 holds, for an orthographic lens",
-        )?;
-        Ok(Lens::Orthographic {
-            height,
-            aspect,
-            near,
-            far,
-        })
+        Lens::new(LensKind::Orthographic { height, aspect }, near, Some(far))
     }
 
     /// # Errors
     /// An empty window, near not above 0, near >= far, a value that is not
     /// finite.
     pub fn off_axis(window: [f64; 4], near: f64, far: Option<f64>) -> Result<Lens, CameraError> {
-        let [left, right, bottom, top] = window;
-        check_window("left to right", left, right)?;
-        check_window("bottom to top", bottom, top)?;
-        let far = checked_far(near, far)?;
-        Ok(Lens::OffAxis { window, near, far })
+        Lens::new(LensKind::OffAxis { window }, near, far)
+    }
+
+    /// A lens of any kind but a matrix.
+    ///
+    /// # Errors
+    /// As the constructor of that kind; no far plane for an orthographic lens; a matrix.
+    pub fn new(kind: LensKind, near: f64, far: Option<f64>) -> Result<Lens, CameraError> {
+        match kind {
+            LensKind::Perspective { fovy_deg, aspect } => {
+                let found = || format!("the vertical field of view is {fovy_deg} degrees");
+                require(fovy_deg > 0.0 && fovy_deg < 180.0, found, "0 < fov < 180")?;
+                check_aspect(aspect)?;
+            }
+            LensKind::Orthographic { height, aspect } => {
+                check_aspect(aspect)?;
+                check_window("height", 0.0, height)?;
+            }
+            LensKind::OffAxis {
+                window: [left, right, bottom, top],
+            } => {
+                check_window("left to right", left, right)?;
+                check_window("bottom to top", bottom, top)?;
+            }
+            LensKind::Matrix(_) => return Err(CameraError::of_matrix("near and far planes")),
+        }
+        finite("near", near)?;
+        let parallel = matches!(kind, LensKind::Orthographic { .. });
+        let found = || format!("near is {near}");
+        require(
+            parallel || near > 0.0,
+            found,
+            "near > 0 for a perspective lens",
+        )?;
+        let far = if parallel {
+            far.or(Some(f64::INFINITY))
+        } else {
+            far
+        };
+        if let Some(far) = far {
+            finite("far", far)?;
+            let found = || format!("near is {near} and far {far}");
+            require(near < far, found, "near < far")?;
+            require(
+                !parallel || far <= FARTHEST,
+                || format!("far is {far:e}"),
+                "at most 1.7e38, half of what f32 holds, for an orthographic lens",
+            )?;
+        }
+        let far = far.filter(|far| *far <= FARTHEST);
+        Ok(Lens { kind, near, far })
+    }
+
+    /// Window of the lens.
+    pub fn kind(&self) -> &LensKind {
+        &self.kind
     }
 
     /// Distance of the near plane along the direction of view.
     pub fn near(&self) -> f64 {
-        match *self {
-            Lens::Perspective { near, .. }
-            | Lens::Orthographic { near, .. }
-            | Lens::OffAxis { near, .. } => near,
-            Lens::Matrix(matrix) => matrix.near(),
-        }
+        self.near
     }
 
-    /// `None` for an infinite far plane.
+    /// Distance of the far plane; `None` for an infinite one.
     pub fn far(&self) -> Option<f64> {
-        match *self {
-            Lens::Perspective { far, .. } | Lens::OffAxis { far, .. } => far,
-            Lens::Orthographic { far, .. } => Some(far),
-            Lens::Matrix(matrix) => matrix.far(),
-        }
+        self.far
     }
 
     /// The same lens with another far plane.
@@ -133,42 +145,20 @@ impl Lens {
     /// near >= far, no far plane for an orthographic lens, a value that is not
     /// finite; a matrix.
     pub fn with_far(&self, far: Option<f64>) -> Result<Lens, CameraError> {
-        match *self {
-            Lens::Perspective {
-                fovy_deg,
-                aspect,
-                near,
-                ..
-            } => Lens::perspective(fovy_deg, aspect, near, far),
-            Lens::OffAxis { window, near, .. } => Lens::off_axis(window, near, far),
-            Lens::Orthographic {
-                height,
-                aspect,
-                near,
-                ..
-            } => Lens::orthographic(height, aspect, near, far.unwrap_or(f64::INFINITY)),
-            Lens::Matrix(_) => Err(CameraError::of_matrix("near and far planes")),
-        }
+        Lens::new(self.kind, self.near, far)
     }
 
     /// Left, right, bottom and top: slopes (offset per unit of depth) for a
     /// lens with a centre, plain offsets for an orthographic one. A matrix need
     /// not have any: its planes and corners are its own.
     pub fn window(&self) -> [f64; 4] {
-        match *self {
-            Lens::Perspective {
-                fovy_deg, aspect, ..
-            } => {
-                let y = slope(fovy_deg);
-                [-y * aspect, y * aspect, -y, y]
-            }
-            Lens::Orthographic { height, aspect, .. } => {
-                let y = height / 2.0;
-                [-y * aspect, y * aspect, -y, y]
-            }
-            Lens::OffAxis { window, near, .. } => window.map(|offset| offset / near),
-            Lens::Matrix(_) => [f64::NAN; 4],
-        }
+        let (y, aspect) = match self.kind {
+            LensKind::Perspective { fovy_deg, aspect } => (slope(fovy_deg), aspect),
+            LensKind::Orthographic { height, aspect } => (height / 2.0, aspect),
+            LensKind::OffAxis { window } => return window.map(|offset| offset / self.near),
+            LensKind::Matrix(_) => return [f64::NAN; 4],
+        };
+        [-y * aspect, y * aspect, -y, y]
     }
 
     /// How high the view is at a depth, world units; `None` for a matrix, which
@@ -179,14 +169,15 @@ impl Lens {
         Some((top - bottom) * reach).filter(|height| height.is_finite())
     }
 
-    pub(super) fn is_orthographic(&self) -> bool {
-        matches!(self, Lens::Orthographic { .. })
+    /// Whether all lines of sight are parallel.
+    pub fn is_orthographic(&self) -> bool {
+        matches!(self.kind, LensKind::Orthographic { .. })
     }
 
     /// The eight corners of the view volume in the frame's world, near ones
     /// first; `None` if the far plane is infinite.
     pub fn corners(&self, frame: &Frame) -> Option<[DVec3; 8]> {
-        if let Lens::Matrix(matrix) = self {
+        if let LensKind::Matrix(matrix) = self.kind {
             return matrix.corners_about(&[]);
         }
         let far = self.far()?;
@@ -224,21 +215,6 @@ fn check_aspect(aspect: f64) -> Result<(), CameraError> {
     require(sound, found, "a number above 0")
 }
 
-/// The far plane of a lens with a centre; `None` beyond [`FARTHEST`].
-fn checked_far(near: f64, far: Option<f64>) -> Result<Option<f64>, CameraError> {
-    finite("near", near)?;
-    let found = || format!("near is {near}");
-    require(near > 0.0, found, "near > 0 for a perspective lens")?;
-    far.map_or(Ok(()), |far| check_far(near, far))?;
-    Ok(far.filter(|far| *far <= FARTHEST))
-}
-
-fn check_far(near: f64, far: f64) -> Result<(), CameraError> {
-    finite("far", far)?;
-    let found = || format!("near is {near} and far {far}");
-    require(near < far, found, "near < far")
-}
-
 fn check_window(name: &str, low: f64, high: f64) -> Result<(), CameraError> {
     finite(name, low)?;
     finite(name, high)?;
@@ -265,7 +241,11 @@ impl Camera {
         let frame = with(up).or_else(|_| with(forward.any_orthogonal_vector()))?;
         Ok(Camera {
             frame,
-            lens: Lens::Matrix(matrix),
+            lens: Lens {
+                kind: LensKind::Matrix(matrix),
+                near: matrix.near,
+                far: matrix.far,
+            },
         })
     }
 }

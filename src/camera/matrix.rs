@@ -50,8 +50,9 @@ pub struct ViewProjection {
     /// Rounded.
     pub(super) eye: DVec3,
     /// Distances of the eye from the near and the far plane, rounded: a scale.
-    near: f64,
-    far: Option<f64>,
+    pub(super) near: f64,
+    /// `None` if what is visible has no end.
+    pub(super) far: Option<f64>,
 }
 
 impl ViewProjection {
@@ -117,16 +118,6 @@ impl ViewProjection {
     /// Whether depth begins at 0, and not at -w.
     pub fn is_from_zero(&self) -> bool {
         self.from_zero
-    }
-
-    /// Distance of the near plane from the eye along the direction of view.
-    pub fn near(&self) -> f64 {
-        self.near
-    }
-
-    /// `None` if what is visible has no end.
-    pub fn far(&self) -> Option<f64> {
-        self.far
     }
 
     /// The planes in f64 about the sum of some points, of unit length: sums and

@@ -12,7 +12,7 @@ mod pose;
 mod projection;
 
 pub use frame::{Frame, look_at};
-pub use lens::Lens;
+pub use lens::{Lens, LensKind};
 pub(crate) use margin::check_sums;
 pub use matrix::{FARTHEST, MATRIX_CONVENTIONS, MATRIX_ENTRIES, MatrixConvention, ViewProjection};
 pub use planes::{DEFAULT_EPSILON, PLANE_METHODS, PlaneMethod, PlaneOptions, Surroundings};

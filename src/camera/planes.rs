@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::margin::{LARGEST_SUM, Margin, TINY, check_sums, largest_sum};
 use super::projection::{double, single};
-use super::{Camera, CameraError, ClipSpace, Frame, Lens};
+use super::{Camera, CameraError, ClipSpace, Frame, Lens, LensKind};
 use crate::geometry::{
     ConvexVolume, ConvexVolumeF64, FrustumPlane, Plane, PlaneF64, RelativeVolume, VolumeError,
 };
@@ -187,36 +187,36 @@ impl Camera {
     }
 
     fn planes_f64(&self, zero: &[DVec3]) -> Vec<(FrustumPlane, PlaneF64)> {
-        match &self.lens {
-            Lens::Matrix(matrix) => matrix.planes_about(zero),
-            lens => from_frame_f64(&self.frame_about(zero), lens),
+        match self.lens.kind() {
+            LensKind::Matrix(matrix) => matrix.planes_about(zero),
+            _ => from_frame_f64(&self.frame_about(zero), &self.lens),
         }
     }
 
     fn margin(&self, zero: &[DVec3], of_scene: DVec3, options: &PlaneOptions) -> Margin {
         let frame = self.frame_about(zero);
         let c = options.epsilon;
-        match &self.lens {
-            Lens::Matrix(matrix) => {
+        match self.lens.kind() {
+            LensKind::Matrix(matrix) => {
                 Margin::of_matrix(matrix.corners_about(zero), frame.eye, of_scene, c)
             }
-            lens => {
+            _ => {
                 let of_frame = options.method == PlaneMethod::Frame;
-                Margin::new(&frame, lens, of_scene, c, of_frame)
+                Margin::new(&frame, &self.lens, of_scene, c, of_frame)
             }
         }
     }
 
     fn derive(&self, zero: &[DVec3], method: PlaneMethod) -> Result<NamedPlanes, CameraError> {
-        match &self.lens {
-            Lens::Matrix(matrix) if method == PlaneMethod::Frame => {
+        match self.lens.kind() {
+            LensKind::Matrix(matrix) if method == PlaneMethod::Frame => {
                 Ok(narrow(matrix.planes_about(zero)))
             }
-            Lens::Matrix(_) => Err(CameraError::invalid(
+            LensKind::Matrix(_) => Err(CameraError::invalid(
                 "the camera is a matrix, which has planes of its own",
                 "--planes frame",
             )),
-            lens => Ok(derive(&self.frame_about(zero), lens, method)),
+            _ => Ok(derive(&self.frame_about(zero), &self.lens, method)),
         }
     }
 }

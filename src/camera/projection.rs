@@ -5,7 +5,7 @@
 
 use glam::{DMat4, DVec3, Vec3};
 
-use super::{Frame, Lens};
+use super::{Frame, Lens, LensKind};
 use crate::geometry::Plane;
 
 /// What a projection maps near and far to.
@@ -52,10 +52,8 @@ macro_rules! precision {
                     let [l, r, b, t] = [l, r, b, t].map(|edge| edge as $float);
                     of(l, r, b, t, first, last)
                 };
-                let mut matrix = match *lens {
-                    Lens::Perspective {
-                        fovy_deg, aspect, ..
-                    } => {
+                let mut matrix = match *lens.kind() {
+                    LensKind::Perspective { fovy_deg, aspect } => {
                         let fovy = fovy_deg.to_radians() as $float;
                         let aspect = aspect as $float;
                         let of = if is_gl {
@@ -70,16 +68,16 @@ macro_rules! precision {
                         matrix.y_axis.y = cotangent;
                         matrix
                     }
-                    Lens::Orthographic { .. } => return windowed(lens.window()),
+                    LensKind::Orthographic { .. } => return windowed(lens.window()),
                     // glam's window lies on its near plane, which reversed Z swaps with
                     // the far one.
-                    Lens::OffAxis { window, .. } => match (clip, lens.far()) {
+                    LensKind::OffAxis { window } => match (clip, lens.far()) {
                         (ClipSpace::ReversedZ, Some(far)) => {
                             windowed(window.map(|edge| edge * (far / near)))
                         }
                         _ => windowed(window),
                     },
-                    Lens::Matrix(_) => return $Mat::NAN,
+                    LensKind::Matrix(_) => return $Mat::NAN,
                 };
                 if lens.far().is_none() {
                     let near = near as $float;

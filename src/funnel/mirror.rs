@@ -7,7 +7,7 @@ use super::fragments::FragmentCounts;
 use super::left_out::{Reason, fits_drawing};
 use super::pass::Pass;
 use super::world::World;
-use crate::camera::{Camera, Lens};
+use crate::camera::Camera;
 use crate::query::ItemId;
 use crate::scene::WorldBox;
 use crate::visibility::Solids;
@@ -115,9 +115,9 @@ pub fn mirrored(
 /// The face of a box across an axis that a camera sees the front of.
 fn face_towards(camera: &Camera, b: &WorldBox, axis: usize) -> Option<WorldBox> {
     let (eye, forward) = (camera.frame.eye[axis], camera.frame.forward()[axis]);
-    let [is_low, is_high] = match camera.lens {
-        Lens::Orthographic { .. } => [forward > 0.0, forward < 0.0],
-        _ => [eye < b.min[axis], eye > b.max[axis]],
+    let [is_low, is_high] = match camera.lens.is_orthographic() {
+        true => [forward > 0.0, forward < 0.0],
+        false => [eye < b.min[axis], eye > b.max[axis]],
     };
     let at = match (is_low, is_high) {
         (true, _) => b.min[axis],

@@ -9,7 +9,7 @@ use super::half_space::HalfSpace;
 use super::number::{Number, Precision};
 use crate::arithmetic::Expansion;
 use crate::arithmetic::exact::{self, ExactVector};
-use crate::camera::{Lens, Pose, ViewProjection};
+use crate::camera::{Lens, LensKind, Pose, ViewProjection};
 
 const PRECISION: Precision = Precision::CAMERA;
 
@@ -41,10 +41,9 @@ impl Oracle {
     /// [`Oracle::of_volume`].
     ///
     /// `None` if pose and lens make no camera: a value that is not finite, no
-    /// direction of view, `up` zero or exactly parallel to it, a lens that its
-    /// constructor would refuse.
+    /// direction of view, `up` zero or exactly parallel to it.
     pub fn of_camera(pose: &Pose, lens: &Lens, origin: DVec3) -> Option<Oracle> {
-        if let Lens::Matrix(matrix) = lens {
+        if let LensKind::Matrix(matrix) = lens.kind() {
             let constraints = planes_of_matrix(matrix, origin);
             return origin
                 .is_finite()
@@ -55,7 +54,7 @@ impl Oracle {
             Pose::Forward { eye, forward, up } => (eye, forward, up),
         };
         let finite = [eye, towards, up, origin].iter().all(|v| v.is_finite());
-        if !finite || lens.with_far(lens.far()).is_err() {
+        if !finite {
             return None;
         }
         let forward = pose.direction()?;
@@ -121,19 +120,17 @@ fn planes(view: &View, lens: &Lens) -> Vec<HalfSpace> {
     let number = |x: f64| Expansion::from(x);
     let mut planes = Vec::with_capacity(6);
     // Left, right, bottom and top edges of the window and how far ahead it is.
-    let (edges, depth) = match *lens {
-        Lens::Perspective {
-            fovy_deg, aspect, ..
-        } => {
+    let (edges, depth) = match *lens.kind() {
+        LensKind::Perspective { fovy_deg, aspect } => {
             let half = times(&exact::pi(), &number(fovy_deg)).over(360.0, PRECISION.terms() + 1);
             let (sine, cosine) = exact::sin_cos(&half, PRECISION.terms() + 1);
             let wide = times(&sine, &number(aspect));
             ([-&wide, wide, -&sine, sine], cosine)
         }
-        Lens::OffAxis { window, near, .. } => (window.map(number), number(near)),
+        LensKind::OffAxis { window } => (window.map(number), number(lens.near())),
         // Has planes of its own, see `planes_of_matrix`.
-        Lens::Matrix(_) => return planes,
-        Lens::Orthographic { height, aspect, .. } => {
+        LensKind::Matrix(_) => return planes,
+        LensKind::Orthographic { height, aspect } => {
             let half = number(height / 2.0);
             let wide = times(&half, &number(aspect));
             ([-&wide, wide, -&half, half], Expansion::ZERO)
@@ -141,7 +138,7 @@ fn planes(view: &View, lens: &Lens) -> Vec<HalfSpace> {
     };
     let axes = [&view.u, &view.u, &view.v, &view.v];
     for ((axis, edge), sign) in axes.into_iter().zip(&edges).zip([1.0, -1.0, 1.0, -1.0]) {
-        planes.push(if matches!(lens, Lens::Orthographic { .. }) {
+        planes.push(if lens.is_orthographic() {
             let sign = number(sign);
             let normal = axis.clone().map(|c| times(&sign, &c));
             view.half_space(&normal, &-&times(&sign, edge))

@@ -3,7 +3,7 @@
 //! knows no index.
 
 use super::PathError;
-use crate::camera::{Camera, CameraError, Lens, PlaneOptions, Surroundings};
+use crate::camera::{Camera, CameraError, Lens, LensKind, PlaneOptions, Surroundings};
 use crate::geometry::Aabb;
 use crate::scene::Scene;
 
@@ -99,20 +99,14 @@ fn count(
 }
 
 fn rescaled(camera: &Camera, scale: f64) -> Result<Camera, CameraError> {
-    let lens = match camera.lens {
-        Lens::Perspective {
-            fovy_deg,
-            aspect,
-            near,
-            far,
-        } => {
-            // An infinite far plane is replaced: its near stood at far/1000.
-            let far = far.unwrap_or(near * 1000.0) * scale;
-            Lens::perspective(fovy_deg, aspect, far / 1000.0, Some(far))?
-        }
-        other => other,
-    };
-    Ok(Camera { lens, ..*camera })
+    let mut camera = *camera;
+    if let LensKind::Perspective { .. } = camera.lens.kind() {
+        // An infinite far plane is replaced: its near stood at far/1000.
+        let lens = &camera.lens;
+        let far = lens.far().unwrap_or(lens.near() * 1000.0) * scale;
+        camera.lens = Lens::new(*lens.kind(), far / 1000.0, Some(far))?;
+    }
+    Ok(camera)
 }
 
 /// At most `most` elements, evenly spaced.

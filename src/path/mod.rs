@@ -17,7 +17,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use crate::camera::{Camera, CameraError, FARTHEST, Frame, Lens, Surroundings};
+use crate::camera::{Camera, CameraError, FARTHEST, Frame, Lens, LensKind, Surroundings};
 use crate::input::{InputError, gigabytes, is_readable, read_file};
 use crate::scene::{self, Scene, SeededRng, WorldBox};
 use crate::shown::counted;
@@ -66,34 +66,24 @@ impl CameraPath {
 pub fn digest(cameras: &[Camera]) -> String {
     let mut hash = hmac_sha256::Hash::new();
     let mut add = |value: f64| hash.update(value.to_bits().to_le_bytes());
-    // No far plane is an infinite one, which no lens can have otherwise.
-    let far = |far: Option<f64>| far.unwrap_or(f64::INFINITY);
     for Camera { frame, lens } in cameras {
         for axis in [frame.eye, frame.u(), frame.v(), frame.n()] {
             axis.to_array().into_iter().for_each(&mut add);
         }
-        // The kind of the lens first.
-        let lens = match *lens {
-            Lens::Perspective {
-                fovy_deg,
-                aspect,
-                near,
-                far: end,
-            } => vec![0.0, fovy_deg, aspect, near, far(end)],
-            Lens::Orthographic {
-                height,
-                aspect,
-                near,
-                far,
-            } => vec![1.0, height, aspect, near, far],
-            Lens::OffAxis {
-                window: [left, right, bottom, top],
-                near,
-                far: end,
-            } => vec![2.0, left, right, bottom, top, near, far(end)],
-            Lens::Matrix(matrix) => {
+        // The kind of the lens first. No far plane is an infinite one, which no lens can
+        // have otherwise.
+        let depths = [lens.near(), lens.far().unwrap_or(f64::INFINITY)];
+        let lens = match *lens.kind() {
+            LensKind::Perspective { fovy_deg, aspect } => {
+                [&[0.0, fovy_deg, aspect][..], &depths].concat()
+            }
+            LensKind::Orthographic { height, aspect } => {
+                [&[1.0, height, aspect][..], &depths].concat()
+            }
+            LensKind::OffAxis { window } => [&[2.0][..], &window, &depths].concat(),
+            LensKind::Matrix(matrix) => {
                 let kind = if matrix.is_from_zero() { 4.0 } else { 3.0 };
-                [vec![kind], matrix.rows().concat()].concat()
+                [&[kind], matrix.rows().as_flattened()].concat()
             }
         };
         lens.into_iter().for_each(&mut add);

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::judged::{Names, counts_or_null};
 use crate::camera::{
-    Camera, CameraError, Frame, Lens, PLANE_METHODS, PlaneOptions, Pose, Surroundings,
+    Camera, CameraError, Frame, Lens, LensKind, PLANE_METHODS, PlaneOptions, Pose, Surroundings,
 };
 use crate::culling::{Arithmetic, CameraView, Culling, CullingError};
 use crate::geometry::Aabb;
@@ -214,7 +214,9 @@ fn camera_at(rng: &mut SeededRng, sweep: Sweep, value: f64) -> Option<Camera> {
 /// Boxes in and about the view, no larger than a twentieth of what it is narrow
 /// by. As a world in f32 has them: rounded to its grid, and exact from there on.
 fn boxes_about(rng: &mut SeededRng, camera: &Camera) -> Vec<Aabb> {
-    let (Lens::Perspective { aspect, .. }, Some(depth)) = (camera.lens, camera.lens.far()) else {
+    let (LensKind::Perspective { aspect, .. }, Some(depth)) =
+        (*camera.lens.kind(), camera.lens.far())
+    else {
         return Vec::new();
     };
     let slope = camera.lens.height_at(1.0).unwrap_or(0.0) / 2.0;

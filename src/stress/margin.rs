@@ -1,7 +1,7 @@
 //! How far out a box may lie that the exact test still returns: the margin of
 //! its planes, stated once for vectors and extremes.
 
-use crate::camera::{Camera, Lens, Surroundings};
+use crate::camera::{Camera, Lens, LensKind, Surroundings};
 use crate::geometry::Aabb;
 
 /// How far outside the camera's volume a box may lie that the exact test still
@@ -47,19 +47,17 @@ pub fn slack(camera: &Camera, around: &Surroundings, b: &Aabb) -> f64 {
 /// The determinant of near's, a side's and the bottom's or top's normals: what
 /// is left when the three make a bound along an axis.
 fn openness(lens: &Lens) -> f64 {
-    let slopes = match *lens {
-        Lens::Perspective {
-            fovy_deg, aspect, ..
-        } => {
+    let slopes = match *lens.kind() {
+        LensKind::Perspective { fovy_deg, aspect } => {
             let y = libm::tan(fovy_deg.to_radians() / 2.0);
             [y * aspect, y]
         }
-        Lens::OffAxis { window, near, .. } => {
-            let [left, right, bottom, top] = window.map(|edge| edge.abs() / near);
+        LensKind::OffAxis { window } => {
+            let [left, right, bottom, top] = window.map(|edge| edge.abs() / lens.near());
             [left.max(right), bottom.max(top)]
         }
         // Matrices are not drawn here.
-        Lens::Orthographic { .. } | Lens::Matrix(_) => [0.0; 2],
+        LensKind::Orthographic { .. } | LensKind::Matrix(_) => [0.0; 2],
     };
     slopes.map(|s| 1.0 / libm::hypot(1.0, s)).iter().product()
 }

@@ -4,7 +4,7 @@
 
 use glam::DVec3;
 
-use crate::camera::{Camera, Lens};
+use crate::camera::{Camera, LensKind};
 
 /// An image's samples: one at the centre of each pixel.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
@@ -69,7 +69,7 @@ impl Rays {
     /// # Errors
     /// A camera that was given as a matrix.
     pub fn of(camera: &Camera) -> Result<Rays, NoRays> {
-        if matches!(camera.lens, Lens::Matrix(_)) {
+        if matches!(camera.lens.kind(), LensKind::Matrix(_)) {
             return Err(NoRays);
         }
         Ok(Rays {
@@ -100,9 +100,9 @@ impl Rays {
         let frame = &self.camera.frame;
         let aside = frame.u() * across + frame.v() * up;
         let (near, far) = (self.near, self.far);
-        let (origin, direction) = match self.camera.lens {
-            Lens::Orthographic { .. } => (frame.eye + aside, frame.forward()),
-            _ => (frame.eye, aside + frame.forward()),
+        let (origin, direction) = match self.camera.lens.is_orthographic() {
+            true => (frame.eye + aside, frame.forward()),
+            false => (frame.eye, aside + frame.forward()),
         };
         Ray {
             origin,
@@ -118,9 +118,9 @@ impl Rays {
     pub fn in_image(&self, point: DVec3) -> Option<[f64; 2]> {
         let frame = &self.camera.frame;
         let about = point - frame.eye;
-        let depth = match self.camera.lens {
-            Lens::Orthographic { .. } => 1.0,
-            _ => about.dot(frame.forward()),
+        let depth = match self.camera.lens.is_orthographic() {
+            true => 1.0,
+            false => about.dot(frame.forward()),
         };
         let [left, right, bottom, top] = self.window;
         let across = about.dot(frame.u()) / depth;
@@ -144,7 +144,7 @@ impl Rays {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::look_at;
+    use crate::camera::{Lens, look_at};
 
     #[test]
     fn rays_pass_through_the_corners_of_the_view() {

@@ -4,7 +4,6 @@ use std::ops::Range;
 
 use glam::{DVec3, Vec3};
 
-use crate::camera::Lens;
 use crate::kernel::each;
 use crate::scene::WorldBox;
 use crate::visibility::{Rays, SampleGrid};
@@ -86,7 +85,7 @@ impl Screen {
             axes: [frame.u(), frame.v(), frame.forward()],
             near: near - near.abs() * 1e-9,
             far: far + far.abs() * 1e-9,
-            parallel: matches!(lens, Lens::Orthographic { .. }),
+            parallel: lens.is_orthographic(),
             eye_off: 0.0,
         }
     }

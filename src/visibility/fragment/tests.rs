@@ -49,7 +49,7 @@ pub fn cameras(solids: &Solids, seed: u64) -> Vec<Camera> {
             let forward = DVec3::new(to.x, to.y, to.truncate().length() * down);
             let eye = DVec3::new(at.x, at.y, height);
             let frame = Frame::looking_along(eye, forward, DVec3::Z).unwrap();
-            let lens = lens.unwrap();
+            let lens = lens.clone().unwrap();
             cameras.push(Camera { frame, lens });
         }
     }
@@ -157,7 +157,7 @@ fn the_painters_picture_by_bsp_is_exact_and_by_distances_it_is_not() {
         ] {
             let eye = rng.normal3().normalize() * 25.0;
             let frame = Frame::looking_along(eye, -eye, DVec3::Z).unwrap();
-            let lens = lens.unwrap();
+            let lens = lens.clone().unwrap();
             let camera = Camera { frame, lens };
             let canvas = Canvas::of(&Rays::of(&camera).unwrap(), grid);
             let mut pieces = Vec::new();

@@ -17,7 +17,6 @@ use std::time::Instant;
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 
-use crate::camera::Lens;
 use crate::geometry::Aabb;
 use crate::scene::{Scene, SurfaceKind, Surfaces};
 use crate::visibility::Rays;
@@ -105,9 +104,9 @@ impl Ground {
     /// plane. O(t).
     pub fn is_below(&self, rays: &Rays) -> bool {
         let camera = rays.camera();
-        let near = match camera.lens {
-            Lens::Orthographic { .. } => camera.lens.near(),
-            lens => lens.near().max(0.0),
+        let near = match camera.lens.is_orthographic() {
+            true => camera.lens.near(),
+            false => camera.lens.near().max(0.0),
         };
         let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
         let corners = corners.map(|[x, y]| rays.through(x, y).at(near) - self.origin);
@@ -310,7 +309,7 @@ impl Heights {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::{Camera, look_at};
+    use crate::camera::{Camera, Lens, look_at};
     use crate::scene::{SeededRng, load};
 
     fn terrain() -> Scene {

@@ -130,7 +130,7 @@ impl<'v> View<'v> {
     ) -> View<'v> {
         let camera = rays.camera();
         let frame = &camera.frame;
-        let parallel = matches!(camera.lens, crate::camera::Lens::Orthographic { .. });
+        let parallel = camera.lens.is_orthographic();
         let [left, right, bottom, top] = rays.window();
         let (width, height) = (f64::from(grid.width), f64::from(grid.height));
         let (u, v, forward) = (frame.u(), frame.v(), frame.forward());

@@ -45,8 +45,8 @@ impl CursorRectangle {
         ];
         let (near, far) = (camera.lens.near(), camera.lens.far());
         let mut frame = camera.frame;
-        let lens = match camera.lens {
-            Lens::Orthographic { .. } => {
+        let lens = match camera.lens.is_orthographic() {
+            true => {
                 let [left, right, bottom, top] = window;
                 let (middle, middle_up) = ((left + right) / 2.0, (bottom + top) / 2.0);
                 frame.eye += frame.u() * middle + frame.v() * middle_up;
@@ -54,7 +54,7 @@ impl CursorRectangle {
                 let far = far.unwrap_or(f64::INFINITY);
                 Lens::orthographic(height, width / height, near, far)?
             }
-            _ => Lens::off_axis(window.map(|slope| slope * near), near, far)?,
+            false => Lens::off_axis(window.map(|slope| slope * near), near, far)?,
         };
         Ok(Camera { frame, lens })
     }

@@ -299,7 +299,7 @@ fn cameras(name: &str) -> (Scene, Vec<Camera>) {
             let turn = rng.between(0.0, std::f64::consts::TAU);
             let forward = DVec3::new(libm::cos(turn), libm::sin(turn), down);
             let frame = Frame::looking_along(eye, forward, DVec3::Z).unwrap();
-            let lens = lens.unwrap();
+            let lens = lens.clone().unwrap();
             cameras.push(Camera { frame, lens });
         }
     }

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use super::answer::{Marks, RegionId};
 use super::lists::Lists;
 use super::opening::Opening;
-use crate::camera::Lens;
 use crate::scene::WorldBox;
 use crate::visibility::{Ray, Rays};
 
@@ -93,7 +92,7 @@ impl RegionGraph {
     pub fn homes(&self, rays: &Rays, homes: &mut Vec<RegionId>) -> bool {
         homes.clear();
         let lens = &rays.camera().lens;
-        if matches!(lens, Lens::Orthographic { .. }) {
+        if lens.is_orthographic() {
             return false;
         }
         let eye = rays.camera().frame.eye;

@@ -7,7 +7,6 @@
 use glam::DVec3;
 
 use super::opening::Opening;
-use crate::camera::Lens;
 use crate::visibility::Rays;
 
 /// How far outside of a half-space `n . x >= 0` a point is still kept, relative to
@@ -75,7 +74,7 @@ impl View {
     /// `None` for an orthographic lens, whose rays share no eye.
     pub fn of(rays: &Rays) -> Option<View> {
         let camera = rays.camera();
-        if let Lens::Orthographic { .. } = camera.lens {
+        if camera.lens.is_orthographic() {
             return None;
         }
         let frame = &camera.frame;

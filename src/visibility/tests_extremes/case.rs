@@ -51,9 +51,9 @@ impl StageCase {
             let corner = [b.min, b.max].map(|corner| corner.to_array());
             let corner = DVec3::from([0, 1, 2].map(|axis| corner[rng.below(2)][axis]));
             let way = corner - frame.eye;
-            let beyond = match self.camera.lens {
-                Lens::Orthographic { .. } => frame.forward() * rng.between(0.5, 10.0),
-                _ => way * rng.between(0.1, 2.0),
+            let beyond = match self.camera.lens.is_orthographic() {
+                true => frame.forward() * rng.between(0.5, 10.0),
+                false => way * rng.between(0.1, 2.0),
             };
             let size = (way + beyond).length() * libm::pow(10.0, rng.between(-4.0, -2.0));
             let centre = corner + beyond + (rng.point() * 2.0 - 1.0) * size;

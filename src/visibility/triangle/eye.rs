@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use crate::arithmetic::two_sum;
-use crate::camera::{Camera, Lens};
+use crate::camera::Camera;
 
 /// An eye in scene-local coordinates, as an exact sum of two f64 per axis, beside
 /// the nearest f32 point.
@@ -29,9 +29,9 @@ pub struct Eye {
 impl Eye {
     /// The eye of a camera on surfaces about an origin.
     pub fn of(camera: &Camera, origin: DVec3) -> Eye {
-        match camera.lens {
-            Lens::Orthographic { .. } => Eye::along(camera.frame.forward()),
-            _ => Eye::at(camera.frame.eye, origin),
+        match camera.lens.is_orthographic() {
+            true => Eye::along(camera.frame.forward()),
+            false => Eye::at(camera.frame.eye, origin),
         }
     }
 

@@ -88,8 +88,8 @@ fn whole_camera(rng: &mut SeededRng) -> (Pose, Lens, DVec3, Vec<ExactPlane>, Vec
         (up, window[2], 1.0),
         (up, window[3], -1.0),
     ] {
-        planes.push(match lens {
-            Lens::Orthographic { .. } => (axis * sign, -edge * length * sign),
+        planes.push(match lens.is_orthographic() {
+            true => (axis * sign, -edge * length * sign),
             _ => ((axis * near - forward * edge) * sign, 0.0),
         });
     }

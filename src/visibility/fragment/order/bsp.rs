@@ -12,7 +12,7 @@
 //! its sides on the eye's.
 
 use super::contract::{self, DepthOrder, Piece, distance, nearest_point};
-use crate::camera::{Camera, Lens};
+use crate::camera::Camera;
 use crate::scene::WorldBox;
 use crate::visibility::Solids;
 
@@ -187,7 +187,7 @@ fn plane(parts: &[Part], room: usize) -> Option<(usize, f64)> {
 impl DepthOrder for BspOrder {
     fn order(&self, _: &Solids, camera: &Camera, pieces: &mut Vec<Piece>) {
         pieces.clear();
-        let parallel = matches!(camera.lens, Lens::Orthographic { .. });
+        let parallel = camera.lens.is_orthographic();
         let mut open = vec![0];
         while let Some(node) = open.pop() {
             match &self.nodes[node] {
@@ -220,7 +220,7 @@ impl DepthOrder for BspOrder {
             return Some("cutting ended before everything was parted");
         }
         let Camera { frame, lens } = camera;
-        let parallel = matches!(lens, Lens::Orthographic { .. });
+        let parallel = lens.is_orthographic();
         let is_within = |node: &Node| match node {
             Node::Plane { axis, .. } if parallel => frame.forward()[*axis] == 0.0,
             Node::Plane { axis, at, .. } => frame.eye[*axis] == *at,

@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 
 use glam::DVec3;
 
-use crate::camera::{Camera, Lens};
+use crate::camera::Camera;
 use crate::geometry::PlaneTree;
 use crate::query::ItemId;
 use crate::scene::{Surfaces, WorldBox};
@@ -121,21 +121,21 @@ fn order_of_keyed(a: &(f64, ItemId), b: &(f64, ItemId)) -> Ordering {
 /// orthographic lens.
 pub(super) fn distance(camera: &Camera, point: DVec3) -> f64 {
     let away = point - camera.frame.eye;
-    match camera.lens {
-        Lens::Orthographic { .. } => away.dot(camera.frame.forward()),
-        _ => away.length_squared(),
+    match camera.lens.is_orthographic() {
+        true => away.dot(camera.frame.forward()),
+        false => away.length_squared(),
     }
 }
 
 /// The point of a box that is nearest to the eye, or of least depth for an
 /// orthographic lens.
 pub(super) fn nearest_point(camera: &Camera, b: &WorldBox) -> DVec3 {
-    match camera.lens {
-        Lens::Orthographic { .. } => {
+    match camera.lens.is_orthographic() {
+        true => {
             let forward = camera.frame.forward();
             let pick = |k: usize| if forward[k] > 0.0 { b.min[k] } else { b.max[k] };
             DVec3::new(pick(0), pick(1), pick(2))
         }
-        _ => camera.frame.eye.max(b.min).min(b.max),
+        false => camera.frame.eye.max(b.min).min(b.max),
     }
 }

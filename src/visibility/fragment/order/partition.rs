@@ -11,7 +11,7 @@
 use glam::DVec3;
 
 use super::contract::{DepthOrder, Part, Piece, distance, nearest_point};
-use crate::camera::{Camera, Lens};
+use crate::camera::Camera;
 use crate::geometry::PlaneTree;
 use crate::query::ItemId;
 use crate::scene::{Surfaces, WorldBox};
@@ -212,7 +212,7 @@ impl DepthOrder for PartitionOrder {
     fn order(&self, _: &Solids, camera: &Camera, pieces: &mut Vec<Piece>) {
         pieces.clear();
         let eye = camera.frame.eye - self.origin;
-        let parallel = matches!(camera.lens, Lens::Orthographic { .. });
+        let parallel = camera.lens.is_orthographic();
         let mut sorted = Vec::new();
         let mut open = vec![(self.root, 0)];
         while let Some((node, leaf)) = open.pop() {
@@ -263,7 +263,7 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::camera::Frame;
+    use crate::camera::{Frame, Lens};
     use crate::geometry::Aabb;
     use crate::scene::SurfaceKind;
 
