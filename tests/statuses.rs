@@ -372,35 +372,10 @@ fn a_scene_without_items_is_left_out() {
     );
 }
 
-fn what_does_not_fit_is_refused_before_it_is_made() {
-    let refused = |items, structures, available| {
-        let result = cullbench::scene::fits("uniform:n=9", items, structures, available);
-        result.err().map(|error| error.to_string())
-    };
-    let gigabyte = 1_000_000_000;
-    let told = refused(100_000_000, 0, Some(8 * gigabyte)).expect("refused");
-    let wanted = "uniform:n=9: needs about 12.0 GB, 8.0 GB are free; expected fewer items";
-    assert_eq!(told, wanted);
-    // Structures count, and the line says how many.
-    assert_eq!(refused(100_000_000, 0, Some(13 * gigabyte)), None);
-    let told = refused(100_000_000, 8, Some(13 * gigabyte)).expect("refused");
-    assert!(
-        told.contains("45.6 GB with 8 structures, 13.0 GB are free"),
-        "{told}"
-    );
-    assert_eq!(refused(1000, 8, Some(gigabyte)), None);
-    // To the byte, and without overflow.
-    assert_eq!(refused(10, 0, Some(1200)), None);
-    assert!(refused(10, 0, Some(1199)).is_some());
-    assert!(refused(u64::MAX, 3, Some(u64::MAX - 1)).is_some());
-    assert_eq!(refused(u64::MAX, 3, None), None);
-}
-
 fn main() -> ExitCode {
     if env::var_os(CHILD).is_some() {
         return cullbench::cli::main_with(registry().with::<Broken<HangsLate>>());
     }
-    what_does_not_fit_is_refused_before_it_is_made();
     a_scene_without_items_is_left_out();
     a_run_without_any_answer_is_no_success();
     each_mishap_fails_its_own_rows();

@@ -39,7 +39,7 @@ pub fn missed(only_test: bool, turns: usize) -> u32 {
 
 fn missed_in(source: &str, only_test: bool, turns: usize) -> u32 {
     let (typed, scene, cameras) = loaded(source, PATH, only_test);
-    let surfaces = surfaces_of(&scene).expect(source).expect("triangles");
+    let surfaces = surfaces_of(&scene).expect("triangles");
     let clusters = Arc::new(Clusters::of(surfaces, MOST_TRIANGLES));
     let cameras = cameras.cameras.iter();
     let eyes: Vec<Eye> = cameras.map(|c| Eye::of(c, scene.origin)).collect();

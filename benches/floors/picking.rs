@@ -50,7 +50,7 @@ fn missed_in(source: &str, only_test: bool, turns: usize) -> u32 {
             rays.extend(places.map(|(x, y)| of_view.through(x, y)));
         }
     }
-    let facets = surfaces_of(&scene).expect(source);
+    let facets = surfaces_of(&scene);
     let facets = facets.map(|surfaces| Facets::solid(&surfaces, scene.items.len()));
     let boxes = Boxes::of(&Solids::of(&scene));
     let built = |name: &str, kernel: Kernel| -> Box<dyn Pick> {

@@ -41,7 +41,7 @@ fn missed_in(source: &str, only_test: bool, turns: usize) -> u32 {
         .iter()
         .map(|camera| Rays::of(camera).expect("rays"))
         .collect();
-    let see: Box<dyn Fn(&Rays) -> SampleTruth> = match surfaces_of(&scene).expect(source) {
+    let see: Box<dyn Fn(&Rays) -> SampleTruth> = match surfaces_of(&scene) {
         Some(surfaces) => {
             let index = SurfaceIndex::build(&surfaces);
             Box::new(move |rays| SampleTruth::of(&index, rays, GRID, 1))

@@ -26,7 +26,7 @@ fn of_regions(scene: &Scene) -> &'static [&'static str] {
         Regions::Tiling(_) if has_exact(scene) => OF_ROOMS,
         // It is the last.
         Regions::Tiling(_) => &OF_ROOMS[..OF_ROOMS.len() - 1],
-        Regions::Bsp(map) if map.dispute().is_none() => OF_SECTORS,
+        Regions::Bsp(map) if map.disputes().is_empty() => OF_SECTORS,
         _ => &[],
     }
 }
@@ -41,9 +41,9 @@ pub fn left_out_of(scene: &Scene) -> Vec<LeftOutRow> {
     let Regions::Bsp(map) = &scene.regions else {
         return Vec::new();
     };
-    let dispute = map.dispute().into_iter();
+    let dispute = map.disputes().first().into_iter();
     dispute
-        .map(|dispute| LeftOutRow::of("stages", "region", dispute))
+        .map(|dispute| LeftOutRow::of("stages", "region", *dispute))
         .collect()
 }
 

@@ -21,9 +21,9 @@ impl Regions {
     /// `None` for a scene without any, such as a map whose linedefs disagree.
     ///
     /// # Errors
-    /// The map's file, read a second time; a claim of other regions.
+    /// A claim of other regions, or about a map whose linedefs disagree.
     pub fn of(scene: &Scene, claim: Option<&Arc<Pvs>>) -> Result<Option<Regions>, FunnelError> {
-        let map = DoomMap::of_scene(scene)?;
+        let map = DoomMap::of_scene(scene);
         let graph = match &map {
             Some(map) => match map.graph() {
                 Err(dispute) if claim.is_some() => {
@@ -44,10 +44,10 @@ impl Regions {
             Box::new(Searched::portal_rect(graph.clone())),
             Box::new(Searched::portal_clip(graph.clone())),
         ];
-        let reject = map.as_ref().and_then(|map| map.reject());
+        let reject = map.and_then(|map| map.reject());
         let exact = has_exact(scene).then(|| Pvs::of_rooms(&graph).ok());
         let stored = [
-            (reject.cloned().map(Arc::new), REJECT),
+            (reject.map(Arc::new), REJECT),
             (claim.cloned(), STORED),
             (exact.flatten().map(Arc::new), EXACT),
         ];

@@ -155,7 +155,7 @@ impl<'a> World<'a> {
             }
             (Some(_), None) => return Err(refused("--cut-out", ItemShape::Box)),
         };
-        let surfaces = surfaces_of(input.scene)?;
+        let surfaces = surfaces_of(input.scene);
         if let Some(item) = input.mirror {
             let Some(solids) = &solids else {
                 return Err(refused("--mirror", ItemShape::Box));
@@ -176,7 +176,7 @@ impl<'a> World<'a> {
             solids.as_ref(),
             input.inner_boxes.unwrap_or(BOXES),
             input.execution.threads,
-        )?;
+        );
         let world = World {
             scene: input.scene,
             kernel: input.execution.kernel,

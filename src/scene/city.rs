@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::WorldBox;
 use super::rng::SeededRng;
-use super::world::World;
+use super::tiling::World;
 use crate::spec::{Spec, SpecError};
 
 /// Items of one block on average: the city grows with the item count and
@@ -31,7 +31,10 @@ pub fn build(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Result<World, Sp
             furniture(low, block, street, rng)
         }
     });
-    Ok(boxes.collect::<Vec<WorldBox>>().into())
+    Ok(World {
+        boxes: boxes.collect(),
+        ..World::default()
+    })
 }
 
 /// A house on one of 4 x 4 plots of the block; towers grow towards the centre.

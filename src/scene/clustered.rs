@@ -3,7 +3,7 @@
 
 use super::WorldBox;
 use super::rng::SeededRng;
-use super::world::World;
+use super::tiling::World;
 use crate::spec::{Spec, SpecError};
 
 /// Cluster k attracts items in proportion to 1/(k+1) (Zipf), so that a few
@@ -27,5 +27,8 @@ pub fn build(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Result<World, Sp
         let centre = centres[k] + rng.normal3() * spread;
         WorldBox::around(centre, (rng.point() + 0.5) * size)
     });
-    Ok(boxes.collect::<Vec<WorldBox>>().into())
+    Ok(World {
+        boxes: boxes.collect(),
+        ..World::default()
+    })
 }

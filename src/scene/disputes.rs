@@ -1,18 +1,20 @@
-//! Places about which the linedefs of a map disagree. Sectors divide the plane where any
-//! two neighbouring linedefs have the same sector, or none, on the sides that face each
-//! other. A sector that refers to itself, a side of a foreign sector, swapped sides and a
-//! missing linedef all break that somewhere. Whole numbers decide, exactly.
+//! Places about which the linedefs of a map disagree.
+//!
+//! Sectors divide the plane where any two neighbouring linedefs have the same sector, or
+//! none, on the sides that face each other. A sector that refers to itself, a side of a
+//! foreign sector, swapped sides and a missing linedef all break that somewhere.
+//! Integer arithmetic decides, exactly.
 
 use std::cmp::Ordering;
 
 /// A linedef as the file has it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Linedef {
-    /// Where it begins and ends, map units.
+    /// Start and end, map units.
     pub ends: [[i32; 2]; 2],
-    /// What crossing or using it does; 0 for nothing.
+    /// Effect of crossing or using it; 0 for none.
     pub action: u16,
-    /// Of the sectors that it acts on.
+    /// Tag of the sectors that it acts on.
     pub tag: u16,
     /// The sectors on its right (its front) and on its left.
     pub sectors: [Option<u32>; 2],
@@ -25,14 +27,11 @@ pub struct Linedef {
     at[0], at[1], named(sectors[0]), named(sectors[1])
 )]
 pub struct Dispute {
-    /// Between them, map units.
+    /// A point between them, map units.
     pub at: [f64; 2],
-    /// What each has there.
+    /// The sector that each has there.
     pub sectors: [Option<u32>; 2],
 }
-
-/// Where a linedef begins and ends, and the sectors on its right and on its left.
-pub type Sided = ([[i32; 2]; 2], [Option<u32>; 2]);
 
 fn named(sector: Option<u32>) -> String {
     sector.map_or("none".to_owned(), |sector| sector.to_string())
@@ -40,10 +39,10 @@ fn named(sector: Option<u32>) -> String {
 
 /// All disputes of a map, the first between each two sectors; none where its sectors
 /// divide the plane. O(linedefs * those that a line across the map meets).
-pub fn disputes(lines: impl Iterator<Item = Sided> + Clone) -> Vec<Dispute> {
+pub fn disputes(lines: &[Linedef]) -> Vec<Dispute> {
     let mut found: Vec<Dispute> = Vec::new();
     for axis in [0, 1] {
-        between_levels(lines.clone(), axis, |dispute| {
+        between_levels(lines, axis, |dispute| {
             if found.iter().all(|known| known.sectors != dispute.sectors) {
                 found.push(dispute);
             }
@@ -61,23 +60,18 @@ struct Edge {
 
 impl Edge {
     /// `None` for a linedef along the direction, which the other direction crosses.
-    fn of((ends, [right, left]): Sided, axis: usize) -> Option<Edge> {
+    fn of(line: &Linedef, axis: usize) -> Option<Edge> {
         let turned = |end: [i32; 2]| [end[axis], end[1 - axis]].map(i64::from);
-        let [mut from, mut to] = ends.map(turned);
+        let (mut ends, mut sides) = (line.ends.map(turned), line.sectors);
+        let [from, to] = ends.map(|end| end[1]);
         // Upwards the left has lesser x; towards larger x the right has lesser y.
-        let mut sides = if axis == 0 {
-            [left, right]
-        } else {
-            [right, left]
-        };
-        if from[1] > to[1] {
-            std::mem::swap(&mut from, &mut to);
+        if (axis == 0) != (from > to) {
             sides.reverse();
         }
-        (from[1] < to[1]).then_some(Edge {
-            ends: [from, to],
-            sides,
-        })
+        if from > to {
+            ends.reverse();
+        }
+        (from != to).then_some(Edge { ends, sides })
     }
 
     /// Its place across at half of a level, as a fraction: below 2^35 over below 2^18.
@@ -97,8 +91,9 @@ impl Edge {
 
 /// Goes through the strips between the levels of all ends, in which no edge begins or
 /// ends, from edge to edge.
-fn between_levels(lines: impl Iterator<Item = Sided>, axis: usize, mut found: impl FnMut(Dispute)) {
-    let mut edges: Vec<Edge> = lines.filter_map(|line| Edge::of(line, axis)).collect();
+fn between_levels(lines: &[Linedef], axis: usize, mut found: impl FnMut(Dispute)) {
+    let edges = lines.iter().filter_map(|line| Edge::of(line, axis));
+    let mut edges: Vec<Edge> = edges.collect();
     edges.sort_by_key(|edge| edge.ends[0][1]);
     let ends = edges.iter().flat_map(|edge| edge.ends);
     let mut levels: Vec<i64> = ends.map(|end| end[1]).collect();
@@ -132,8 +127,8 @@ fn between_levels(lines: impl Iterator<Item = Sided>, axis: usize, mut found: im
     }
 }
 
-/// What two neighbours of a strip, or one and the outside, disagree about: the place
-/// between them, or one where they cross.
+/// The sectors that two neighbours of a strip, or one and the outside, disagree about:
+/// between them, or where they cross.
 fn disputed(pair: [Option<&Edge>; 2], strip: [i64; 2]) -> Option<[Option<u32>; 2]> {
     let [before, behind] = pair.map(|edge| edge.map_or([None; 2], |edge| edge.sides));
     let crosses = || {
@@ -156,15 +151,20 @@ mod tests {
     use super::*;
     use crate::scene::SeededRng;
 
-    /// A ring whose inside is on the right of each line.
-    fn ring([x0, y0, x1, y1]: [i32; 4], sectors: [Option<u32>; 2]) -> Vec<Sided> {
-        let corners = [[x0, y0], [x0, y1], [x1, y1], [x1, y0]];
-        let sides = (0..4).map(|k| ([corners[k], corners[(k + 1) % 4]], sectors));
-        sides.collect()
+    fn line(ends: [[i32; 2]; 2], sectors: [Option<u32>; 2]) -> Linedef {
+        Linedef {
+            ends,
+            sectors,
+            action: 0,
+            tag: 0,
+        }
     }
 
-    fn found(lines: &[Sided]) -> Vec<Dispute> {
-        disputes(lines.iter().copied())
+    /// A ring whose inside is on the right of each line.
+    fn ring([x0, y0, x1, y1]: [i32; 4], sectors: [Option<u32>; 2]) -> Vec<Linedef> {
+        let corners = [[x0, y0], [x0, y1], [x1, y1], [x1, y0]];
+        let sides = (0..4).map(|k| line([corners[k], corners[(k + 1) % 4]], sectors));
+        sides.collect()
     }
 
     #[test]
@@ -172,37 +172,37 @@ mod tests {
         let room = ring([0, 0, 512, 512], [Some(0), None]);
         let with = |sectors| [room.clone(), ring([192, 192, 320, 320], sectors)].concat();
         let proper = with([Some(1), Some(0)]);
-        assert_eq!(found(&proper), []);
+        assert_eq!(disputes(&proper), []);
         // Lines within a sector, even where they cross, divide nothing.
-        let within = |ends| (ends, [Some(0); 2]);
+        let within = |ends| line(ends, [Some(0); 2]);
         let mut marked = proper.clone();
         marked.extend([[[8, 8], [40, 40]], [[8, 41], [40, 9]]].map(within));
-        assert_eq!(found(&marked), []);
+        assert_eq!(disputes(&marked), []);
 
-        let told = |lines: &[Sided]| {
-            let first = found(lines).first().map(ToString::to_string);
+        let told = |lines: &[Linedef]| {
+            let first = disputes(lines).first().map(ToString::to_string);
             first.unwrap_or_default()
         };
         let between = "linedefs disagree about the sector at (96, 256), 0 or 1";
         // A sector that refers to itself, and one whose lines are the wrong way round.
         assert_eq!(told(&with([Some(1), Some(1)])), between);
         assert_eq!(told(&with([Some(0), Some(1)])), between);
-        for line in 0..proper.len() {
-            let changed = |change: &dyn Fn(&mut Sided)| {
+        for at in 0..proper.len() {
+            let changed = |change: &dyn Fn(&mut Linedef)| {
                 let mut lines = proper.clone();
-                change(&mut lines[line]);
-                !found(&lines).is_empty()
+                change(&mut lines[at]);
+                !disputes(&lines).is_empty()
             };
-            assert!(changed(&|(_, sectors)| sectors.swap(0, 1)), "swapped");
-            assert!(changed(&|(_, sectors)| sectors[0] = Some(7)), "foreign");
-            assert!(changed(&|(_, sectors)| sectors[1] = sectors[0]), "itself");
+            assert!(changed(&|line| line.sectors.swap(0, 1)), "swapped");
+            assert!(changed(&|line| line.sectors[0] = Some(7)), "foreign");
+            assert!(changed(&|line| line.sectors[1] = line.sectors[0]), "itself");
             let mut lines = proper.clone();
-            lines.remove(line);
-            assert!(!found(&lines).is_empty(), "without {line}");
+            lines.remove(at);
+            assert!(!disputes(&lines).is_empty(), "without {at}");
         }
         // Rooms that cross without a corner in common.
         let other = ring([256, 100, 700, 180], [Some(2), None]);
-        assert!(!found(&[room, other].concat()).is_empty());
+        assert!(!disputes(&[room, other].concat()).is_empty());
         let none = told(&ring([0, 0, 8, 8], [None, Some(3)]));
         assert_eq!(
             none,
@@ -210,12 +210,15 @@ mod tests {
         );
     }
 
-    /// What the nearest of some lines has on the side of a point, in four directions.
-    fn looks(lines: &[Sided], p: [f64; 2]) -> Vec<Option<u32>> {
+    /// The sector on the near side of the nearest line, in four directions from a point.
+    fn looks(lines: &[Linedef], p: [f64; 2]) -> Vec<Option<u32>> {
         let look = |(axis, sign): (usize, f64)| {
             let mut nearest = (f64::INFINITY, None);
-            for (ends, [right, left]) in lines {
-                let [a, b] = ends.map(|end| [0, 1].map(|k| f64::from(end[k]) - p[k]));
+            for line in lines {
+                let [right, left] = line.sectors;
+                let [a, b] = line
+                    .ends
+                    .map(|end| [0, 1].map(|k| f64::from(end[k]) - p[k]));
                 let (up_a, up_b) = (a[1 - axis], b[1 - axis]);
                 if (up_a < 0.0) == (up_b < 0.0) {
                     continue;
@@ -223,7 +226,7 @@ mod tests {
                 let at = (a[axis] - (b[axis] - a[axis]) * up_a / (up_b - up_a)) * sign;
                 if at > 0.0 && at < nearest.0 {
                     let turn = a[0] * b[1] - a[1] * b[0];
-                    nearest = (at, if turn > 0.0 { *left } else { *right });
+                    nearest = (at, if turn > 0.0 { left } else { right });
                 }
             }
             nearest.1
@@ -249,31 +252,31 @@ mod tests {
                 true => cell[y * side + x],
                 false => None,
             };
-            let mut lines: Vec<Sided> = Vec::new();
+            let mut lines: Vec<Linedef> = Vec::new();
             for (x, y) in (0..=side).flat_map(|x| (0..=side).map(move |y| (x, y))) {
                 let at = |x: usize, y: usize| corner[y * (side + 1) + x];
                 if y < side {
                     let left = x.checked_sub(1).and_then(|x| of(x, y));
-                    lines.push(([at(x, y), at(x, y + 1)], [of(x, y), left]));
+                    lines.push(line([at(x, y), at(x, y + 1)], [of(x, y), left]));
                 }
                 if x < side {
                     let below = y.checked_sub(1).and_then(|y| of(x, y));
-                    lines.push(([at(x, y), at(x + 1, y)], [below, of(x, y)]));
+                    lines.push(line([at(x, y), at(x + 1, y)], [below, of(x, y)]));
                 }
             }
-            lines.retain(|(_, sectors)| *sectors != [None; 2]);
-            assert_eq!(found(&lines), []);
+            lines.retain(|line| line.sectors != [None; 2]);
+            assert_eq!(disputes(&lines), []);
             if lines.is_empty() {
                 continue;
             }
-            let line = rng.below(lines.len());
+            let at = rng.below(lines.len());
             match rng.below(4) {
-                0 => lines[line].1.swap(0, 1),
-                1 => drop(lines.remove(line)),
-                2 => lines[line].1[rng.below(2)] = Some(rng.below(4) as u32),
-                _ => lines[line].0[1] = lines[(line + 1) % lines.len()].0[0],
+                0 => lines[at].sectors.swap(0, 1),
+                1 => drop(lines.remove(at)),
+                2 => lines[at].sectors[rng.below(2)] = Some(rng.below(4) as u32),
+                _ => lines[at].ends[1] = lines[(at + 1) % lines.len()].ends[0],
             }
-            let agree = found(&lines).is_empty();
+            let agree = disputes(&lines).is_empty();
             let inside = || [0, 1].map(|_| 64.0 * side as f64 * rng.unit() + 7.3);
             let differ = std::iter::repeat_with(inside).take(300).any(|p| {
                 let looks = looks(&lines, p);

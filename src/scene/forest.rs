@@ -4,8 +4,9 @@
 use glam::DVec3;
 
 use super::WorldBox;
-use super::rng::SeededRng;
-use super::world::World;
+use super::noise::octaves;
+use super::rng::{SeededRng, mix64};
+use super::tiling::World;
 use crate::spec::{Spec, SpecError};
 
 /// Share of the items that are ground tiles.
@@ -24,11 +25,8 @@ pub fn build(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Result<World, Sp
     let mut boxes = Vec::with_capacity(n);
     let tile = width / tiles_per_side.max(1) as f64;
     for i in 0..tiles_per_side * tiles_per_side {
-        let (x, y) = (
-            (i % tiles_per_side) as f64 * tile,
-            (i / tiles_per_side) as f64 * tile,
-        );
-        boxes.push(land.tile(x, y, tile));
+        let at = [i % tiles_per_side, i / tiles_per_side].map(|i| i as f64 * tile);
+        boxes.push(land.tile(at, tile));
     }
     boxes.extend((boxes.len()..n).map(|_| {
         let (x, y) = (rng.unit() * width, rng.unit() * width);
@@ -43,11 +41,13 @@ pub fn build(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Result<World, Sp
         };
         WorldBox::standing(base, size)
     }));
-    Ok(boxes.into())
+    Ok(World {
+        boxes,
+        ..World::default()
+    })
 }
 
-/// Value noise in octaves: each doubles the frequency and halves the height
-/// (Musgrave in Ebert et al., "Texturing and Modeling", ch. 16).
+/// A square fractal heightfield.
 struct Terrain {
     width: f64,
     height: f64,
@@ -56,48 +56,24 @@ struct Terrain {
 
 impl Terrain {
     fn altitude(&self, x: f64, y: f64) -> f64 {
-        let (mut frequency, mut amplitude, mut sum) = (4.0 / self.width, 0.5, 0.0);
-        for octave in 0..6 {
-            sum += amplitude * self.noise(x * frequency, y * frequency, octave);
-            frequency *= 2.0;
-            amplitude *= 0.5;
-        }
-        sum * self.height
-    }
-
-    /// Lattice noise in `[0, 1)`, smoothstep between lattice points.
-    fn noise(&self, x: f64, y: f64, octave: u64) -> f64 {
-        let (cell_x, cell_y) = (x.floor(), y.floor());
-        let smooth = |t: f64| t * t * (3.0 - 2.0 * t);
-        let (u, v) = (smooth(x - cell_x), smooth(y - cell_y));
-        let corner = |dx: f64, dy: f64| {
-            let (i, j) = ((cell_x + dx) as i64 as u64, (cell_y + dy) as i64 as u64);
-            unit_hash(self.seed ^ (octave << 56) ^ i.wrapping_mul(0x9E37_79B9) ^ (j << 32))
-        };
-        let mix = |a: f64, b: f64, t: f64| a + (b - a) * t;
-        mix(
-            mix(corner(0.0, 0.0), corner(1.0, 0.0), u),
-            mix(corner(0.0, 1.0), corner(1.0, 1.0), u),
-            v,
-        )
+        let frequency = 4.0 / self.width;
+        let at = DVec3::new(x * frequency, y * frequency, 0.0);
+        let height = octaves(at, 6, |octave, corner| {
+            let [i, j] = [corner.x, corner.y].map(|v| v as i64 as u64);
+            let key = self.seed ^ (octave << 56) ^ i.wrapping_mul(0x9E37_79B9) ^ (j << 32);
+            mix64(key) as f64 / (1u128 << 64) as f64
+        });
+        height * self.height
     }
 
     /// A ground tile: it spans the heights at its corners and centre.
-    fn tile(&self, x: f64, y: f64, edge: f64) -> WorldBox {
+    fn tile(&self, [x, y]: [f64; 2], edge: f64) -> WorldBox {
         let samples = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0), (0.5, 0.5)];
         let heights = samples.map(|(u, v)| self.altitude(x + u * edge, y + v * edge));
         let low = heights.iter().copied().fold(f64::INFINITY, f64::min);
         let high = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         WorldBox::new(DVec3::new(x, y, low), DVec3::new(x + edge, y + edge, high))
     }
-}
-
-/// A hash in `[0, 1)`: the SplitMix64 finaliser (Steele et al. 2014).
-fn unit_hash(key: u64) -> f64 {
-    let mut z = key.wrapping_add(0x9E37_79B9_7F4A_7C15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    (z ^ (z >> 31)) as f64 / (1u128 << 64) as f64
 }
 
 #[cfg(test)]

@@ -1,12 +1,10 @@
-//! The table of generated worlds and what they share: the named random
-//! generator, the item count, the seed and the offset. Each family has a file
-//! of its own; adding one is that file and one row here.
+//! The tables of generated worlds and their common parameters: count, seed and offset.
+//! Each family has a file of its own; adding one is that file and one row here.
 
-use glam::DVec3;
-
+use super::meshes::{forest as mesh_forest, spheres, statue, terrain};
 use super::rng::SeededRng;
-use super::world::World;
-use super::{Regions, Scene, WorldBox, city, clustered, forest, rooms, uniform};
+use super::tiling::World;
+use super::{Regions, Scene, Surfaces, city, clustered, forest, rooms, uniform};
 use crate::input::InputError;
 use crate::spec::{Spec, SpecError};
 
@@ -16,41 +14,68 @@ use crate::spec::{Spec, SpecError};
 pub const GENERATOR_NAME: &str = "rand_pcg::Pcg64 (PCG XSL RR 128/64)";
 
 /// A kind of generated world.
+#[derive(Clone, Copy)]
 #[non_exhaustive]
 pub struct Family {
-    /// What is typed.
+    /// Name as typed: `city`, `mesh:statue`.
     pub name: &'static str,
     /// One line for `cullbench list`.
     pub summary: &'static str,
     /// Parameters beyond [`SCENE_PARAMS`], for the help.
     pub params: &'static str,
-    build: fn(&mut Spec, usize, &mut SeededRng) -> Result<World, SpecError>,
+    /// The generator.
+    pub build: Build,
 }
 
-/// All families, in the order of the help.
+/// A generator: the same world for the same arguments on every machine.
+#[derive(Clone, Copy)]
+pub enum Build {
+    /// Makes `n` boxes from parameters and a random stream.
+    Boxes(fn(&mut Spec, usize, &mut SeededRng) -> Result<World, SpecError>),
+    /// Makes about `n` triangles (at least one object) from a seed.
+    Mesh(fn(usize, u64) -> Surfaces),
+}
+use Build::{Boxes, Mesh};
+
+/// All families of boxes, in the order of the help.
 pub static FAMILIES: &[Family] = rows! { Family { name, summary, params, build }
     "uniform", "boxes scattered evenly in a cube",
-        "side=1000 (cube edge, m), size=0.2*side/cbrt(n) (mean box edge, m)", uniform::build;
+        "side=1000 (cube edge, m), size=0.2*side/cbrt(n) (mean box edge, m)", Boxes(uniform::build);
     "clustered", "Gaussian clusters of uneven weight",
-        "clusters=64, side=1000 (m), spread=0.02 (standard deviation / side)", clustered::build;
+        "clusters=64, side=1000 (m), spread=0.02 (standard deviation / side)", Boxes(clustered::build);
     "city", "a flat grid of blocks: tall buildings, streets, tiny street furniture",
-        "block=80 (m), street=16 (m)", city::build;
+        "block=80 (m), street=16 (m)", Boxes(city::build);
     "forest", "trees, bushes and rocks on a fractal heightfield",
-        "relief=0.12 (height / width), spacing=5 (m between plants)", forest::build;
+        "relief=0.12 (height / width), spacing=5 (m between plants)", Boxes(forest::build);
     "rooms", "an indoor block of cells joined by doors; the cells are the regions",
-        "storeys=3, room=6 (mean edge, m)", rooms::build;
+        "storeys=3, room=6 (mean edge, m)", Boxes(rooms::build);
+};
+
+/// All generated meshes, in the order of the help.
+pub static MESHES: &[Family] = rows! { Family { name, summary, params, build }
+    "mesh:terrain", "A heightfield in tiles of 512 triangles; one-sided, open",
+        "", Mesh(terrain::build);
+    "mesh:forest", "Terrain with trees (closed) and bushes of cut-out leaf cards",
+        "", Mesh(mesh_forest::build);
+    "mesh:spheres", "Geodesic spheres of 1,280 triangles each; closed",
+        "", Mesh(spheres::build);
+    "mesh:statue", "One bumpy closed blob, up to millions of triangles",
+        "", Mesh(statue::build);
 };
 
 /// Parameters that every generated scene takes; `n` of a mesh counts triangles.
 pub const SCENE_PARAMS: &str = "n=100000, seed=1, offset=0";
 
-/// Largest scene a spec may ask for: 12 GB while it is made, 7.2 GB then.
-pub(super) const MOST_ITEMS: u64 = 100_000_000;
+/// Default of `n`.
+pub(super) const COUNT: u64 = 100_000;
+/// Most items or triangles of a scene: 12 GB while boxes are made, 7.2 GB then; the
+/// corners of triangles fit u32.
+pub(super) const MOST: u64 = 100_000_000;
 
 impl Family {
-    /// The family of exactly this name.
+    /// The family or mesh of exactly this name.
     pub fn named(name: &str) -> Option<&'static Family> {
-        FAMILIES.iter().find(|f| f.name == name)
+        FAMILIES.iter().chain(MESHES).find(|f| f.name == name)
     }
 
     /// Generates the scene that the spec describes.
@@ -58,21 +83,28 @@ impl Family {
     /// # Errors
     /// A parameter that is unknown or out of range.
     pub fn generate(&self, text: &str, mut spec: Spec) -> Result<Scene, InputError> {
-        let n = spec.whole("n", 100_000, MOST_ITEMS)? as usize;
+        let n = match self.build {
+            Boxes(_) => spec.whole("n", COUNT, MOST)?,
+            Mesh(_) => spec.count("n", COUNT, MOST)?,
+        };
         let seed = spec.whole("seed", 1, u64::MAX)?;
         let offset = spec.number("offset", 0.0)?;
-        let mut rng = SeededRng::new(seed);
-        let mut world = (self.build)(&mut spec, n, &mut rng)?;
+        let mut world = match self.build {
+            Boxes(build) => build(&mut spec, n as usize, &mut SeededRng::new(seed))?,
+            Mesh(build) => {
+                spec.finish()?;
+                let mut surfaces = build(n as usize, seed);
+                surfaces.origin += offset;
+                return surfaces.into_scene(text);
+            }
+        };
         spec.finish()?;
         if offset != 0.0 {
-            for b in &mut world.boxes {
-                *b = WorldBox::new(b.min + offset, b.max + offset);
-            }
+            world.shift(offset);
         }
         let mut scene = Scene::from_boxes(text, &world.boxes)?;
-        if let Some(mut plan) = world.rooms {
-            plan.shift(DVec3::splat(offset));
-            scene.regions = Regions::Tiling(plan.tiling(scene.origin));
+        if !world.rooms.is_empty() {
+            scene.regions = Regions::Tiling(world.tiling(scene.origin));
         }
         Ok(scene)
     }
@@ -80,9 +112,20 @@ impl Family {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{MESHES, load};
+    use super::super::load;
     use super::*;
     use crate::spec::tests::{keys, known, listed};
+    use glam::DVec3;
+
+    impl Family {
+        /// The triangles of a mesh.
+        pub fn mesh(&self, n: usize, seed: u64) -> Surfaces {
+            match self.build {
+                Mesh(build) => build(n, seed),
+                Boxes(_) => panic!("{} is no mesh", self.name),
+            }
+        }
+    }
 
     fn scene(text: &str) -> Scene {
         let spec = Spec::parse(text).unwrap();
@@ -140,8 +183,7 @@ mod tests {
 
     #[test]
     fn every_parameter_of_the_list_is_one_and_no_other() {
-        let families = FAMILIES.iter().map(|f| (f.name, f.params));
-        for (name, params) in families.chain(MESHES.iter().map(|mesh| (mesh.name, ""))) {
+        for Family { name, params, .. } in FAMILIES.iter().chain(MESHES) {
             let load = |parameter: &str| load(&format!("{name}:{parameter}"), &Default::default());
             let listed = listed(&format!("{SCENE_PARAMS}, {params}"));
             for (key, default) in &listed {

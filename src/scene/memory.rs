@@ -1,5 +1,5 @@
-//! Whether a scene fits into memory, known before it is made: a machine that begins
-//! to swap, or ends the process, has measured nothing.
+//! Memory that a scene needs, and memory that is free: a scene that does not fit is
+//! refused before it is made, as a machine that swaps measures nothing.
 
 use std::fs;
 use std::path::Path;
@@ -7,21 +7,18 @@ use std::path::Path;
 use sysinfo::{MemoryRefreshKind, RefreshKind, System};
 
 use super::WorldBox;
-use super::generate::MOST_ITEMS;
-use super::meshes::{MOST_TRIANGLES, TRIANGLES};
 use crate::geometry::Aabb;
 use crate::input::InputError;
-use crate::spec::Spec;
 
 /// Bytes of an item in a scene: as indexes hold it, and as it was written.
 const HELD: u64 = (size_of::<Aabb>() + size_of::<WorldBox>()) as u64;
-/// While the scene is made there is the written box twice.
+/// Bytes of an item while the scene is made: the written box is there twice.
 const MADE: u64 = HELD + size_of::<WorldBox>() as u64;
-/// What a structure holds for an item; 28 to 39 were measured.
+/// Bytes of an item in a structure; 28 to 39 were measured.
 const INDEXED: u64 = 40;
-/// What a build needs beside that, for the one that is being built.
+/// Bytes of an item that a build needs beside its structure.
 const BUILT: u64 = 64;
-/// Scenes of fewer items, and meshes of fewer triangles, are made without asking.
+/// Scenes of fewer items, and meshes of fewer triangles, are made without a check.
 const ANYWHERE: u64 = 10_000;
 /// Bytes of a triangle while a mesh is made: 117 were measured of the statue, which
 /// finds its points in a table, 20 to 24 of the others.
@@ -29,32 +26,23 @@ const MESHED: u64 = 120;
 /// Fewest triangles of an item: those of a bush.
 const FEWEST: u64 = 24;
 
-/// About how much memory a scene takes with so many structures over it.
-pub fn needed_bytes(items: u64, structures: u64) -> u64 {
+/// About how many bytes a scene takes with `structures` over it.
+pub fn needed_by_items(items: u64, structures: u64) -> u64 {
     let built = if structures > 0 { BUILT } else { 0 };
     items.saturating_mul(MADE.max(HELD + structures * INDEXED + built))
 }
 
-/// Refuses a scene that needs more than is available; what is not known is no
-/// reason.
+/// About how many bytes a mesh takes, `beside` of them per triangle for other ends.
+pub fn needed_by_triangles(triangles: u64, beside: u64, structures: u64) -> u64 {
+    triangles * (MESHED + beside) + needed_by_items(triangles / FEWEST, structures)
+}
+
+/// Refuses a scene that needs more bytes than are available; if that is unknown, any
+/// scene passes.
 ///
 /// # Errors
 /// [`InputError::TooLarge`].
-pub fn fits(
-    scene: &str,
-    items: u64,
-    structures: u64,
-    available: Option<u64>,
-) -> Result<(), InputError> {
-    fits_bytes(
-        scene,
-        needed_bytes(items, structures),
-        structures,
-        available,
-    )
-}
-
-fn fits_bytes(
+pub fn check_fits(
     scene: &str,
     needed: u64,
     structures: u64,
@@ -71,42 +59,13 @@ fn fits_bytes(
     }
 }
 
-/// The same of the text of a generated scene, on this machine as it is now.
-pub(super) fn fits_here(scene: &str, spec: &Spec, structures: u64) -> Result<(), InputError> {
-    // What is no number is told by the generator.
-    match spec.clone().whole("n", 0, MOST_ITEMS) {
-        Ok(items) if items > ANYWHERE => fits(scene, items, structures, available_bytes()),
-        _ => Ok(()),
-    }
+/// Bytes that are free for a scene of `count` items or triangles; `None` where that is
+/// unknown or the scene is small.
+pub fn free_for(count: u64) -> Option<u64> {
+    (count > ANYWHERE).then(available_bytes).flatten()
 }
 
-/// The same of a file with so many rows.
-pub(super) fn rows_fit_here(file: &str, rows: u64, structures: u64) -> Result<(), InputError> {
-    match rows > ANYWHERE {
-        true => fits(file, rows, structures, available_bytes()),
-        false => Ok(()),
-    }
-}
-
-/// The same of the text of a mesh, whose `n` counts triangles, each of which will need
-/// so many bytes beside the scene.
-pub(super) fn mesh_fits_here(
-    scene: &str,
-    spec: &Spec,
-    structures: u64,
-    per_triangle: u64,
-) -> Result<(), InputError> {
-    match spec.clone().whole("n", TRIANGLES, MOST_TRIANGLES) {
-        Ok(triangles) if triangles > ANYWHERE => {
-            let of_items = needed_bytes(triangles / FEWEST, structures);
-            let needed = triangles * (MESHED + per_triangle) + of_items;
-            fits_bytes(scene, needed, structures, available_bytes())
-        }
-        _ => Ok(()),
-    }
-}
-
-/// What the system, the control groups of this process and its own limits leave.
+/// Bytes that the system, the control groups and the limits of this process leave.
 pub(crate) fn available_bytes() -> Option<u64> {
     let wanted = RefreshKind::nothing().with_memory(MemoryRefreshKind::nothing().with_ram());
     let system = System::new_with_specifics(wanted).ok();
@@ -132,8 +91,8 @@ fn figure(text: &str, name: &str) -> Option<u64> {
     rest.split_whitespace().next()?.parse().ok()
 }
 
-/// What `ulimit -v` and `ulimit -d` leave, from the process's own files of limits and
-/// status.
+/// Bytes that `ulimit -v` and `ulimit -d` leave, from the process's own files of limits
+/// and status.
 fn left_of_limits(limits: &str, status: &str) -> Option<u64> {
     let left = |limit, used| {
         let used = 1024 * figure(status, used)? + THREADS;
@@ -144,9 +103,8 @@ fn left_of_limits(limits: &str, status: &str) -> Option<u64> {
     address_space.into_iter().chain(data).min()
 }
 
-/// What the control groups leave that a process is in, and those that they are in;
-/// pages of files that can be dropped are free. Version 2, where the line names no
-/// controller, or 1.
+/// Bytes that the control groups of a process and their ancestors leave; pages of files
+/// that can be dropped are free. Version 2, where the line names no controller, or 1.
 fn left_in_groups(root: &Path, groups: &str) -> Option<u64> {
     const V1: [&str; 3] = [
         "memory.limit_in_bytes",
@@ -181,6 +139,32 @@ mod tests {
     #[test]
     fn what_is_free_is_known_here() {
         assert!(available_bytes() > Some(1 << 20));
+    }
+
+    #[test]
+    fn what_does_not_fit_is_refused_before_it_is_made() {
+        let refused = |items, structures, available| {
+            let needed = needed_by_items(items, structures);
+            let result = check_fits("uniform:n=9", needed, structures, available);
+            result.err().map(|error| error.to_string())
+        };
+        let gigabyte = 1_000_000_000;
+        let told = refused(100_000_000, 0, Some(8 * gigabyte)).expect("refused");
+        let wanted = "uniform:n=9: needs about 12.0 GB, 8.0 GB are free; expected fewer items";
+        assert_eq!(told, wanted);
+        // Structures count, and the line says how many.
+        assert_eq!(refused(100_000_000, 0, Some(13 * gigabyte)), None);
+        let told = refused(100_000_000, 8, Some(13 * gigabyte)).expect("refused");
+        assert!(
+            told.contains("45.6 GB with 8 structures, 13.0 GB are free"),
+            "{told}"
+        );
+        assert_eq!(refused(1000, 8, Some(gigabyte)), None);
+        // To the byte, and without overflow.
+        assert_eq!(refused(10, 0, Some(1200)), None);
+        assert!(refused(10, 0, Some(1199)).is_some());
+        assert!(refused(u64::MAX, 3, Some(u64::MAX - 1)).is_some());
+        assert_eq!(refused(u64::MAX, 3, None), None);
     }
 
     #[test]

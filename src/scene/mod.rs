@@ -1,10 +1,11 @@
-//! A scene: boxes in local f32 coordinates about an f64 origin, the triangles in
-//! them where it is a mesh, the regions that region search looks for, and camera
-//! places the scene itself knows.
-//! Generators and readers each have a file of their own; this one owns what
-//! they all produce and how the origin is chosen.
+//! A scene: boxes in local f32 coordinates about an f64 origin, the triangles of a
+//! mesh, the regions for region search, and the scene's own camera places.
+//!
+//! Generators and readers have a file each; this file defines their common output
+//! and the choice of the origin.
 
 mod boxes_csv;
+mod bsp;
 mod city;
 mod clustered;
 mod disputes;
@@ -14,50 +15,46 @@ mod labels;
 mod lumps;
 mod memory;
 mod meshes;
+mod noise;
 mod originals;
-mod overlap;
-mod regions;
 mod rng;
 mod rooms;
 mod samples;
 mod settled;
 mod shape;
-mod side;
 mod sought;
 mod source;
 mod surface;
+mod tiling;
 mod uniform;
 mod wad;
-mod world;
 
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use crate::arithmetic::rounding::{sum_down, sum_up};
 
 use crate::geometry::{Aabb, PlaneTree};
 use crate::input::InputError;
+use crate::query::ItemId;
 
 pub(crate) use crate::shown::hex;
 pub use boxes_csv::{read_boxes_csv, read_sought_boxes_csv, write_boxes_csv};
-pub use disputes::{Dispute, Linedef, disputes};
-pub use generate::{FAMILIES, Family, GENERATOR_NAME, SCENE_PARAMS};
+pub use disputes::{Dispute, Linedef};
+pub use generate::{Build, FAMILIES, Family, GENERATOR_NAME, MESHES, SCENE_PARAMS};
 pub use labels::Labels;
 pub(crate) use memory::available_bytes;
-pub use memory::{fits, needed_bytes};
-pub use meshes::{MESHES, Mesh};
 pub use originals::Originals;
-pub use overlap::SoughtBox;
-pub use regions::{BspNode, BspRegions, Portal, Regions, Tiling};
 pub use rng::SeededRng;
 pub use samples::{NOTICE, SAMPLES, Sample};
 pub use shape::ItemShape;
-pub use sought::Sought;
-pub use source::{LoadOptions, check_fits, load};
+pub use sought::{Sought, SoughtBox};
+pub use source::{LoadOptions, check_fits, is_wad, load, split_map};
 #[cfg(feature = "cli")]
 pub(crate) use surface::volume_within;
 pub use surface::{SurfaceKind, Surfaces};
+pub use tiling::{Portal, Tiling};
 pub use wad::{WadMap, map_names};
 
 /// A box in world coordinates, as a file or a generator states it.
@@ -83,7 +80,7 @@ impl WorldBox {
         })
     }
 
-    /// Whether two closed boxes have a point in common.
+    /// Tests whether two closed boxes have a point in common.
     pub fn meets(&self, other: &WorldBox) -> bool {
         self.min.cmple(other.max).all() && other.min.cmple(self.max).all()
     }
@@ -122,12 +119,56 @@ pub struct CameraPlace {
     pub forward: DVec3,
 }
 
-/// What every structure is built from. z is up.
+/// The regions of a scene, numbered from zero: the targets of region search.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub enum Regions {
+    /// The items themselves, closed boxes that may overlap: a point belongs
+    /// to every one that holds it.
+    Items,
+    /// Boxes that tile a volume, joined by portals. Closed as well: a point
+    /// on a shared wall belongs to both sides.
+    Tiling(Tiling),
+    /// The leaves of a map's own 2-D BSP tree: every point of the map belongs
+    /// to exactly one, whatever its height.
+    Bsp(Arc<WadMap>),
+}
+
+impl Regions {
+    /// The boxes to build an index over. Every point of region i lies in
+    /// box i.
+    pub fn boxes<'a>(&'a self, items: &'a [Aabb]) -> &'a [Aabb] {
+        match self {
+            Regions::Items => items,
+            Regions::Tiling(tiling) => &tiling.boxes,
+            Regions::Bsp(map) => &map.tree.boxes,
+        }
+    }
+
+    /// The boxes that hold a local point, found by testing each: the answer an
+    /// index must give. Ascending ids.
+    pub fn holding(&self, p: Vec3, items: &[Aabb]) -> Vec<ItemId> {
+        let boxes = self.boxes(items).iter().zip(0..);
+        let holding = boxes.filter(|(b, _)| b.contains_point(p));
+        holding.map(|(_, id)| id).collect()
+    }
+
+    /// Description for `scene info`.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Regions::Items => "the items' boxes",
+            Regions::Tiling(_) => "a tiling of boxes",
+            Regions::Bsp(_) => "the leaves of the map's BSP tree",
+        }
+    }
+}
+
+/// Input of every structure. z is up.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// As it was asked for: a file or a spec such as `city:n=100000,seed=7`.
+    /// Its source: a file or a spec such as `city:n=100000,seed=7`.
     pub name: String,
-    /// Where the local coordinates' zero lies in the world.
+    /// Zero of the local coordinates, in the world.
     pub origin: DVec3,
     /// Item bounds, rounded outward about the origin; the id is the index.
     pub items: Vec<Aabb>,
@@ -137,7 +178,7 @@ pub struct Scene {
     pub bounds: Aabb,
     /// The triangles that the items are the boxes of, if the scene is a mesh.
     pub surfaces: Option<Arc<Surfaces>>,
-    /// What region search finds.
+    /// Targets of region search.
     pub regions: Regions,
     /// Columns of the file beyond the bounds.
     pub labels: Vec<Labels>,
@@ -167,20 +208,18 @@ impl Scene {
         origin: DVec3,
     ) -> Result<Scene, InputError> {
         let name = name.into();
-        let stored = boxes.iter().enumerate().map(|(item, b)| {
-            let rounded = Aabb::rounded_outward(b.min, b.max, origin);
-            let sound = rounded.is_finite() && !rounded.is_empty();
-            sound.then_some(rounded).ok_or_else(|| {
-                let [min, max] = [b.min, b.max].map(|corner| corner.to_array());
-                let rule = "expected min <= max within the range of f32";
-                InputError::BadItem {
-                    scene: name.clone(),
-                    item,
-                    reason: format!("a box from {min:?} to {max:?}; {rule}"),
-                }
-            })
-        });
-        let items = stored.collect::<Result<Vec<_>, _>>()?;
+        let rounded = |b: &WorldBox| Aabb::rounded_outward(b.min, b.max, origin);
+        let items: Vec<Aabb> = boxes.iter().map(rounded).collect();
+        let is_bad = |b: &Aabb| !b.is_finite() || b.is_empty();
+        if let Some(item) = items.iter().position(is_bad) {
+            let [min, max] = [boxes[item].min, boxes[item].max].map(|corner| corner.to_array());
+            let rule = "expected min <= max within the range of f32";
+            return Err(InputError::BadItem {
+                reason: format!("a box from {min:?} to {max:?}; {rule}"),
+                scene: name,
+                item,
+            });
+        }
         Ok(Scene {
             bounds: Aabb::union_of(&items),
             originals: Originals::of(boxes, &items, origin),
@@ -202,10 +241,8 @@ impl Scene {
         if self.bounds.is_empty() {
             return WorldBox::around(self.origin, DVec3::ONE);
         }
-        WorldBox::new(
-            self.origin + self.bounds.min.as_dvec3(),
-            self.origin + self.bounds.max.as_dvec3(),
-        )
+        let [min, max] = [self.bounds.min, self.bounds.max].map(|corner| corner.as_dvec3());
+        WorldBox::new(self.origin + min, self.origin + max)
     }
 
     /// SHA-256 over origin and item bounds, and over the boxes as they were
@@ -214,23 +251,15 @@ impl Scene {
     /// the same truth. O(n).
     pub fn digest(&self) -> String {
         let mut hash = hmac_sha256::Hash::new();
-        let corner = |hash: &mut hmac_sha256::Hash, corner: DVec3| {
-            let values = corner.to_array().into_iter();
-            values.for_each(|value| hash.update(value.to_bits().to_le_bytes()));
-        };
-        corner(&mut hash, self.origin);
-        for value in self
-            .items
-            .iter()
-            .flat_map(|b| [b.min, b.max])
-            .flat_map(|c| c.to_array())
-        {
-            hash.update(value.to_bits().to_le_bytes());
+        let le_bytes = |corner: DVec3| corner.to_array().map(f64::to_le_bytes).concat();
+        hash.update(le_bytes(self.origin));
+        for corner in self.items.iter().flat_map(|b| [b.min, b.max]) {
+            hash.update(corner.to_array().map(f32::to_le_bytes).concat());
         }
         if let Some(boxes) = self.originals.boxes() {
             hash.update("as written");
             let corners = boxes.iter().flat_map(|b| [b.min, b.max]);
-            corners.for_each(|c| corner(&mut hash, c));
+            corners.for_each(|corner| hash.update(le_bytes(corner)));
         }
         hex(&hash.finalize())
     }

@@ -1,4 +1,4 @@
-//! What every generated scene is drawn with: random numbers from a seed.
+//! Random numbers from a seed, and a hash: the only randomness of generated scenes.
 
 use glam::DVec3;
 use rand::{Rng, RngExt, SeedableRng};
@@ -45,4 +45,12 @@ impl SeededRng {
     pub fn normal3(&mut self) -> DVec3 {
         DVec3::new(self.normal(), self.normal(), self.normal())
     }
+}
+
+/// A hash of a number: a step of SplitMix64 (Steele et al. 2014).
+pub fn mix64(key: u64) -> u64 {
+    let mut z = key.wrapping_add(0x9E37_79B9_7F4A_7C15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^ (z >> 31)
 }

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::WorldBox;
 use super::rng::SeededRng;
-use super::world::{Plan, World};
+use super::tiling::World;
 use crate::query::ItemId;
 use crate::spec::{Spec, SpecError};
 
@@ -37,48 +37,45 @@ pub fn build(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Result<World, Sp
         lines
     };
     let (xs, ys) = (lines(), lines());
-    let mut plan = Plan::default();
-    let mut boxes = Vec::with_capacity(n);
+    let mut world = World::default();
+    let boxes = &mut world.boxes;
     for storey in 0..storeys {
         for (j, y) in ys.windows(2).enumerate() {
             for (i, x) in xs.windows(2).enumerate() {
                 let low = DVec3::new(x[0], y[0], storey as f64 * STOREY_HEIGHT);
                 let high = DVec3::new(x[1], y[1], low.z + STOREY_HEIGHT);
-                let id = plan.rooms.len();
+                let id = world.rooms.len();
                 let room = WorldBox::new(low, high);
                 boxes.push(WorldBox::new(low, DVec3::new(high.x, high.y, low.z + WALL)));
                 // The walls towards the rooms before this one carry doors.
                 for (axis, first, before) in [(0, i == 0, 1), (1, j == 0, per_side)] {
                     let door = door_in(&room, axis, rng);
-                    push_wall(&mut boxes, &room, axis, (!first).then_some(&door));
+                    push_wall(boxes, &room, axis, (!first).then_some(&door));
                     if !first {
-                        plan.doors
-                            .push(([(id - before) as ItemId, id as ItemId], door));
+                        let between = [(id - before) as ItemId, id as ItemId];
+                        world.doors.push((between, door));
                     }
                 }
-                plan.rooms.push(room);
+                world.rooms.push(room);
             }
         }
     }
     boxes.truncate(n);
     while boxes.len() < n {
-        let room = plan.rooms[rng.below(plan.rooms.len())];
+        let room = world.rooms[rng.below(world.rooms.len())];
         boxes.push(furniture(&room, rng));
     }
     // Storeys are joined by one stairwell: the first room of each.
     let per_storey = per_side * per_side;
     for storey in 1..storeys {
         let (below, above) = ((storey - 1) * per_storey, storey * per_storey);
-        let room = plan.rooms[above];
+        let room = world.rooms[above];
         let hole = DVec3::new(DOOR_WIDTH, DOOR_WIDTH, 0.0);
         let opening = WorldBox::new(room.min, room.min + hole);
-        plan.doors
-            .push(([below as ItemId, above as ItemId], opening));
+        let between = [below as ItemId, above as ItemId];
+        world.doors.push((between, opening));
     }
-    Ok(World {
-        boxes,
-        rooms: Some(plan),
-    })
+    Ok(world)
 }
 
 /// The door in the room's low wall across `axis`: flat in that axis.
@@ -135,8 +132,7 @@ mod tests {
 
     #[test]
     fn rooms_tile_the_block_and_doors_join_them_all() {
-        let plan = world("rooms:storeys=2", 2000).rooms.unwrap();
-        let tiling = plan.tiling(DVec3::ZERO);
+        let tiling = world("rooms:storeys=2", 2000).tiling(DVec3::ZERO);
         let block = Aabb::union_of(&tiling.boxes);
         let volume =
             |b: &Aabb| f64::from(b.extent().x) * f64::from(b.extent().y) * f64::from(b.extent().z);
@@ -162,8 +158,7 @@ mod tests {
     fn the_shell_fits_the_item_budget() {
         // Slab, two walls in two pieces each, and their lintels.
         const SHELL_ITEMS: usize = 7;
-        let most = world("rooms", 5000);
-        let rooms = most.rooms.unwrap().rooms.len();
+        let rooms = world("rooms", 5000).rooms.len();
         assert!(rooms * SHELL_ITEMS <= 5000, "{rooms} rooms");
     }
 }

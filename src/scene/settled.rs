@@ -1,10 +1,9 @@
-//! What a boxes file keeps of a scene: the boxes as they were written, and
-//! labels. It defines the promise that what is read back is the same; the format
-//! itself is `boxes_csv`'s.
+//! The part of a scene that a boxes file keeps: the boxes as they were written, and
+//! labels. What is read back is the same; the format itself is `boxes_csv`'s.
 
 use glam::DVec3;
 
-use super::{Regions, Scene, WorldBox, choose_origin};
+use super::{Scene, WorldBox};
 use crate::input::InputError;
 
 impl Scene {
@@ -12,18 +11,15 @@ impl Scene {
     /// original is kept, origin and stored box add up without rounding.
     pub fn written(&self) -> impl Iterator<Item = WorldBox> {
         let originals = self.originals.boxes();
-        self.items
-            .iter()
-            .enumerate()
-            .map(move |(id, item)| match originals {
-                Some(boxes) => boxes[id],
-                None => WorldBox::of(item, self.origin),
-            })
+        let items = self.items.iter().enumerate();
+        items.map(move |(id, item)| match originals {
+            Some(boxes) => boxes[id],
+            None => WorldBox::of(item, self.origin),
+        })
     }
 
     /// The scene as it is read back from a boxes file: the same boxes, as they
-    /// were written, and labels, without triangles, regions, camera places and a partition
-    /// of its own.
+    /// were written, and labels; no triangles, regions, camera places or own tree.
     ///
     /// Almost always the stored items are the very same too. Where the reader
     /// chooses another origin (a map whose zero lies far away), they are rounded
@@ -33,37 +29,21 @@ impl Scene {
     /// [`InputError::BadItem`] for an item that lies beyond what the reader
     /// takes: the range of f32, in world coordinates.
     pub fn settled(self) -> Result<Scene, InputError> {
-        self.check_range()?;
-        let read_back = choose_origin(self.written());
-        if read_back != self.origin {
-            let boxes: Vec<WorldBox> = self.written().collect();
-            let read = Scene::about(self.name, &boxes, read_back)?;
-            return Ok(Scene {
-                labels: self.labels,
-                skipped_items: self.skipped_items,
-                ..read
+        let most = f64::from(f32::MAX);
+        let within = |v: DVec3| v.abs().cmple(DVec3::splat(most)).all();
+        let boxes: Vec<WorldBox> = self.written().collect();
+        let outside = boxes.iter().position(|b| !within(b.min) || !within(b.max));
+        if let Some(item) = outside {
+            return Err(InputError::BadItem {
+                scene: self.name,
+                item,
+                reason: format!("in world coordinates beyond +-{most:e}; expected less in a file"),
             });
         }
         Ok(Scene {
-            surfaces: None,
-            regions: Regions::Items,
-            places: Vec::new(),
-            own_tree: None,
-            ..self
-        })
-    }
-
-    fn check_range(&self) -> Result<(), InputError> {
-        let most = f64::from(f32::MAX);
-        let within = |v: DVec3| v.abs().cmple(DVec3::splat(most)).all();
-        let mut written = self.written();
-        let outside = written.position(|b| !within(b.min) || !within(b.max));
-        outside.map_or(Ok(()), |item| {
-            Err(InputError::BadItem {
-                scene: self.name.clone(),
-                item,
-                reason: format!("in world coordinates beyond +-{most:e}; expected less in a file"),
-            })
+            labels: self.labels,
+            skipped_items: self.skipped_items,
+            ..Scene::from_boxes(self.name, &boxes)?
         })
     }
 }

@@ -1,9 +1,9 @@
-//! What the items of a scene are within their boxes: what a ray can meet there.
+//! The shape of the items of a scene within their boxes, as rays meet it.
 
 use super::{Regions, Scene};
 
 named! {
-    /// What is in the box of an item.
+    /// Content of the box of an item.
     #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
     #[non_exhaustive]
     pub enum ItemShape {
@@ -17,7 +17,7 @@ named! {
 }
 
 impl Scene {
-    /// What the items are.
+    /// Shape of the items.
     pub fn item_shape(&self) -> ItemShape {
         match (&self.surfaces, &self.regions) {
             (Some(_), _) => ItemShape::Mesh,

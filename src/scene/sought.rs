@@ -1,17 +1,18 @@
-//! Region search made exact: a point as it was written, as indexes are asked for
-//! it, and the second look at what they find.
+//! Region search made exact: points and boxes as they were written, as indexes take
+//! them, and the exact test of the candidates that an index returns.
 
 use glam::{DVec3, Vec3};
 
 use super::originals::Originals;
-use super::side::side;
-use super::{Regions, Scene};
+use super::{Regions, Scene, WorldBox};
+use crate::arithmetic::two_sum;
+use crate::geometry::{Aabb, ConvexVolume};
 use crate::query::ItemId;
 
-/// A point to search for: as it was written, and as indexes are asked.
+/// A point to search for: as it was written, and as indexes take it.
 ///
-/// Rounding to nearest loses no box: a bound is an f32 number, and what lies
-/// beyond it is rounded beyond it or onto it. It can only find too many.
+/// Rounding to nearest loses no box: a bound is an f32 number, and a coordinate
+/// beyond it is rounded beyond it or onto it. It can only add candidates.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Sought {
     /// World coordinates, in f64.
@@ -20,9 +21,19 @@ pub struct Sought {
     pub local: Vec3,
 }
 
+/// A box to search by: as it was written, and as indexes take it.
+#[derive(Clone, Debug)]
+pub struct SoughtBox {
+    /// World coordinates, in f64.
+    pub world: WorldBox,
+    /// The planes of the smallest f32 box that holds it. They admit too many items
+    /// rather than too few.
+    pub volume: ConvexVolume,
+}
+
 impl Scene {
-    /// A point of the world as this scene's indexes are asked for it. A planar
-    /// BSP ignores the height.
+    /// A point of the world as this scene's indexes take it. A planar BSP ignores the
+    /// height.
     #[inline]
     pub fn sought(&self, world: DVec3) -> Sought {
         let mut local = (world - self.origin).as_vec3();
@@ -32,8 +43,17 @@ impl Scene {
         Sought { world, local }
     }
 
-    /// Region search: `ask` appends what an index finds, and left is what holds the
-    /// point exactly.
+    /// A box of the world as this scene's indexes take it.
+    pub fn sought_box(&self, world: WorldBox) -> SoughtBox {
+        let local = Aabb::rounded_outward(world.min, world.max, self.origin);
+        SoughtBox {
+            volume: ConvexVolume::of_box(&local),
+            world,
+        }
+    }
+
+    /// Region search: `ask` appends the candidates of an index; those that hold the
+    /// point exactly are kept.
     #[inline]
     pub fn search(
         &self,
@@ -46,20 +66,16 @@ impl Scene {
         self.refine(p, out, first);
     }
 
-    /// Whether what an index finds for a point must still be looked at by
-    /// [`Scene::refine`].
+    /// Tests whether candidates for a point need [`Scene::refine`].
     pub fn is_refined(&self, p: &Sought) -> bool {
-        match &self.regions {
-            Regions::Bsp(_) => true,
-            regions => {
-                let is_rounded = |k| side(p.world[k], self.origin[k], p.local[k]) != 0;
-                self.originals_of(regions).boxes().is_some() || (0..3).any(is_rounded)
-            }
-        }
+        let is_rounded = |k: usize| side(p.world[k], self.origin[k], p.local[k]) != 0;
+        matches!(self.regions, Regions::Bsp(_))
+            || self.region_originals().boxes().is_some()
+            || (0..3).any(is_rounded)
     }
 
-    /// Keeps of the boxes that an index found, those from `first` on, the regions that
-    /// hold the point exactly.
+    /// Keeps, of the candidates from `first` on, the regions that hold the point
+    /// exactly.
     #[inline]
     pub fn refine(&self, p: &Sought, found: &mut Vec<ItemId>, first: usize) {
         if found.len() > first && self.is_refined(p) {
@@ -69,45 +85,79 @@ impl Scene {
 
     fn keep_holding(&self, p: &Sought, found: &mut Vec<ItemId>, first: usize) {
         match &self.regions {
-            Regions::Bsp(bsp) => {
+            Regions::Bsp(map) => {
                 let at = (p.world - self.origin).truncate();
-                let covers = bsp.covers(at);
-                retain_from(first, found, |region| covers && bsp.holds(region, at));
+                let covers = map.tree.covers(at);
+                retain_from(first, found, |region| covers && map.tree.holds(region, at));
             }
             _ => retain_from(first, found, |id| self.holds(id, p.world)),
         }
     }
 
-    /// Whether a region that is a box holds a point of the world, exactly.
-    fn holds(&self, id: ItemId, p: DVec3) -> bool {
-        let id = id as usize;
-        if let Some(boxes) = self.originals_of(&self.regions).boxes() {
-            return p.cmpge(boxes[id].min).all() && p.cmple(boxes[id].max).all();
-        }
-        let b = &self.regions.boxes(&self.items)[id];
-        (0..3).all(|k| {
-            let origin = self.origin[k];
-            side(p[k], origin, b.min[k]) >= 0 && side(p[k], origin, b.max[k]) <= 0
-        })
+    /// Keeps the items, of an index's candidates, that overlap the box exactly: closed
+    /// boxes that have a point in common.
+    pub fn refine_overlapping(&self, sought: &SoughtBox, found: &mut Vec<ItemId>) {
+        found.retain(|&id| self.overlaps(id, &sought.world));
     }
 
-    /// The reference answer, by the simplest method: the map's own
-    /// descent, or an exact look at every box. Ascending ids.
+    /// Reference answer of region search: the map's own descent, or an exact test of
+    /// every box. Ascending ids.
     pub fn holding(&self, p: &Sought) -> Vec<ItemId> {
-        if let Regions::Bsp(bsp) = &self.regions {
+        if let Regions::Bsp(map) = &self.regions {
             let at = (p.world - self.origin).truncate();
-            return bsp.descend(at).into_iter().collect();
+            return map.tree.descend(at).into_iter().collect();
         }
         let count = self.regions.boxes(&self.items).len() as ItemId;
         (0..count).filter(|&id| self.holds(id, p.world)).collect()
     }
 
-    fn originals_of<'a>(&'a self, regions: &'a Regions) -> &'a Originals {
-        match regions {
+    /// Reference answer of a search by a box: an exact test of every item. Ascending
+    /// ids.
+    pub fn overlapping(&self, sought: &SoughtBox) -> Vec<ItemId> {
+        let all = 0..self.items.len() as ItemId;
+        all.filter(|&id| self.overlaps(id, &sought.world)).collect()
+    }
+
+    /// Tests whether a region that is a box holds a point of the world.
+    fn holds(&self, id: ItemId, p: DVec3) -> bool {
+        let boxes = self.regions.boxes(&self.items);
+        self.meets(boxes, self.region_originals(), id, &WorldBox::new(p, p))
+    }
+
+    fn overlaps(&self, id: ItemId, by: &WorldBox) -> bool {
+        self.meets(&self.items, &self.originals, id, by)
+    }
+
+    /// Tests whether a box of a list, as it was written, has a point in common with
+    /// another one.
+    fn meets(&self, boxes: &[Aabb], originals: &Originals, id: ItemId, by: &WorldBox) -> bool {
+        if let Some(written) = originals.boxes() {
+            return written[id as usize].meets(by);
+        }
+        let b = &boxes[id as usize];
+        (0..3).all(|k| {
+            let origin = self.origin[k];
+            side(by.max[k], origin, b.min[k]) >= 0 && side(by.min[k], origin, b.max[k]) <= 0
+        })
+    }
+
+    fn region_originals(&self) -> &Originals {
+        match &self.regions {
             Regions::Tiling(tiling) => &tiling.originals,
             _ => &self.originals,
         }
     }
+}
+
+/// The sign of `(p - origin) - bound`, exactly: -1, 0 or 1.
+fn side(p: f64, origin: f64, bound: f32) -> i32 {
+    let (difference, lost) = two_sum(p, -origin);
+    let bound = f64::from(bound);
+    // The rounded difference is on the true one's side of any double.
+    if difference != bound {
+        return if difference > bound { 1 } else { -1 };
+    }
+    i32::from(lost > 0.0) - i32::from(lost < 0.0)
 }
 
 /// `Vec::retain` of the ids from `first` on.
@@ -121,4 +171,67 @@ fn retain_from(first: usize, ids: &mut Vec<ItemId>, keep: impl Fn(ItemId) -> boo
         }
     }
     ids.truncate(kept);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dashu_int::IBig;
+
+    #[test]
+    fn boxes_beyond_f32_are_searched_by_what_lies_within() {
+        let unit = WorldBox::new(DVec3::ZERO, DVec3::ONE);
+        let scene = Scene::from_boxes("one", &[unit]).expect("a box");
+        let found = |min: f64, max: f64| {
+            let by = WorldBox::new(DVec3::splat(min), DVec3::splat(max));
+            let sought = scene.sought_box(by);
+            let found = scene.overlapping(&sought).len();
+            // What the planes admit may be too much, never too little.
+            assert!(scene.items.iter().filter(|b| sought.volume.sees(b)).count() >= found);
+            found
+        };
+        assert_eq!(found(-1e300, 1e300), 1);
+        // Touching, from either side, and not quite.
+        assert_eq!(found(1.0, 1e300), 1);
+        assert_eq!(found(-1e300, 0.0), 1);
+        assert_eq!(found(1.0f64.next_up(), 1e300), 0);
+        assert_eq!(found(1e299, 1e300), 0);
+        assert_eq!(found(-1e300, -1e299), 0);
+    }
+
+    /// A double as a whole number of 2^-1074.
+    fn units(x: f64) -> IBig {
+        let bits = x.abs().to_bits();
+        let exponent = (bits >> 52) as usize;
+        let mantissa = bits & ((1 << 52) - 1) | u64::from(exponent > 0) << 52;
+        let size = IBig::from(mantissa) << exponent.saturating_sub(1);
+        if x < 0.0 { -size } else { size }
+    }
+
+    #[test]
+    fn sides_are_those_of_whole_numbers() {
+        let mut state = 7u64;
+        let mut next = || {
+            state = state.wrapping_mul(0x5851_F42D_4C95_7F2D).wrapping_add(1);
+            state >> 33
+        };
+        let mut ties = 0;
+        for _ in 0..20_000 {
+            let origin = (next() % 4096) as f64 * libm::exp2((next() % 60) as f64 - 20.0);
+            let bound = (next() % 4096) as f32 * 0.1;
+            let mut p = origin + f64::from(bound);
+            for _ in 0..next() % 3 {
+                p = if next() % 2 == 0 {
+                    p.next_up()
+                } else {
+                    p.next_down()
+                };
+            }
+            let exact = units(p) - units(origin) - units(f64::from(bound));
+            let wanted = i32::from(exact > IBig::ZERO) - i32::from(exact < IBig::ZERO);
+            assert_eq!(side(p, origin, bound), wanted, "{p:e} {origin:e} {bound:e}");
+            ties += u32::from(wanted == 0);
+        }
+        assert!(ties > 1000, "{ties}");
+    }
 }

@@ -1,14 +1,16 @@
-//! From what a user names to a scene: a built-in sample, a generated family
-//! with parameters, or a file by its contents. It makes that decision only.
+//! From a typed scene to its data: a built-in sample, a generated family with
+//! parameters, or a file by its contents.
 
 use std::fs;
 use std::path::Path;
 
-use super::{
-    FAMILIES, Family, MESHES, Mesh, SAMPLES, Sample, Scene, WadMap, boxes_csv, memory, meshes,
-};
+use super::generate::{Build, COUNT, MOST};
+use super::{FAMILIES, Family, MESHES, SAMPLES, Sample, Scene, WadMap, boxes_csv, memory};
 use crate::input::{InputError, is_readable, read_file};
 use crate::spec::{Spec, SpecError, nearest};
+
+/// First part of the name of every mesh.
+const MESH_PREFIX: &str = "mesh:";
 
 /// How to read a scene.
 #[derive(Clone, Copy, Default, Debug)]
@@ -21,113 +23,106 @@ pub struct LoadOptions {
     pub per_triangle: u64,
 }
 
+/// The file and the name of a map in `maps.wad#MAP07`; an existing file wins.
+pub fn split_map(source: &str) -> (&str, Option<&str>) {
+    match source.rsplit_once('#') {
+        Some((file, map)) if !Path::new(source).exists() => (file, Some(map)),
+        _ => (source, None),
+    }
+}
+
 /// Loads `freedm-map12`, `city:n=100000,seed=7`, `mesh:statue:n=1M`, `boxes.csv`,
 /// `map.wad` or `maps.wad#MAP07`. An existing file wins over a name.
 ///
 /// # Errors
 /// One line that names what was found and what was expected.
 pub fn load(source: &str, options: &LoadOptions) -> Result<Scene, InputError> {
-    let (file, map) = match source.rsplit_once('#') {
-        Some((file, map)) if !Path::new(source).exists() => (file, Some(map)),
-        _ => (source, None),
-    };
+    let (file, map) = split_map(source);
     if is_readable(Path::new(file)) {
         let bytes = read_file(Path::new(file))?;
-        return match map {
-            Some(map) => WadMap::read(&bytes, file, Some(map))?.into_scene(source),
-            None => parse_bytes(&bytes, file, source, options),
-        };
+        return parse_bytes(&bytes, [file, source], map, options);
     }
     let looks_like_a_file = source.contains(['/', '\\', '.']) && !source.contains('=');
-    if !looks_like_a_file {
-        if let Some(generated) = Generated::named(source)? {
-            generated.check_fits(source, options)?;
-            return generated.generate(source);
-        }
-        let spec = Spec::parse_behind(meshes::PREFIX, source)?;
-        if let Some(sample) = Sample::named(spec.name()) {
-            spec.finish()?;
-            return sample.load();
-        }
-        return Err(unknown_scene(spec.name()).into());
+    if looks_like_a_file {
+        return Err(InputError::Io {
+            path: file.into(),
+            source: match fs::metadata(file) {
+                Ok(_) => std::io::Error::other("is not a file"),
+                Err(error) => error,
+            },
+        });
     }
-    Err(InputError::Io {
-        path: file.into(),
-        source: match fs::metadata(file) {
-            Ok(_) => std::io::Error::other("is not a file"),
-            Err(error) => error,
-        },
-    })
+    let spec = Spec::parse_behind(MESH_PREFIX, source)?;
+    if let Some(family) = Family::named(spec.name()) {
+        check_generated(source, family, &spec, options)?;
+        return family.generate(source, spec);
+    }
+    if let Some(sample) = Sample::named(spec.name()) {
+        spec.finish()?;
+        return sample.load();
+    }
+    Err(unknown_scene(spec.name()).into())
 }
 
-/// Whether a scene will fit into memory, as far as its name says; nothing is
+/// Refuses a scene whose name says that it will not fit into memory; nothing is
 /// loaded.
 ///
 /// # Errors
 /// [`InputError::TooLarge`].
 pub fn check_fits(source: &str, options: &LoadOptions) -> Result<(), InputError> {
-    match Generated::named(source) {
-        Ok(Some(generated)) if !is_readable(Path::new(source)) => {
-            generated.check_fits(source, options)
+    let Ok(spec) = Spec::parse_behind(MESH_PREFIX, source) else {
+        return Ok(());
+    };
+    match Family::named(spec.name()) {
+        Some(family) if !is_readable(Path::new(source)) => {
+            check_generated(source, family, &spec, options)
         }
         _ => Ok(()),
     }
 }
 
-/// Something that is made from parameters.
-enum Generated {
-    Family(&'static Family, Spec),
-    Mesh(&'static Mesh, Spec),
+fn check_generated(
+    source: &str,
+    family: &Family,
+    spec: &Spec,
+    options: &LoadOptions,
+) -> Result<(), InputError> {
+    // The generator reports a count that is no number.
+    let Ok(n) = spec.clone().whole("n", COUNT, MOST) else {
+        return Ok(());
+    };
+    let structures = options.structures;
+    let needed = match family.build {
+        Build::Boxes(_) => memory::needed_by_items(n, structures),
+        Build::Mesh(_) => memory::needed_by_triangles(n, options.per_triangle, structures),
+    };
+    memory::check_fits(source, needed, structures, memory::free_for(n))
 }
 
-impl Generated {
-    /// `None` if no generator has this name.
-    fn named(source: &str) -> Result<Option<Generated>, SpecError> {
-        let spec = Spec::parse_behind(meshes::PREFIX, source)?;
-        if let Some(mesh) = Mesh::named(spec.name()) {
-            return Ok(Some(Generated::Mesh(mesh, spec)));
-        }
-        let family = Family::named(spec.name());
-        Ok(family.map(|family| Generated::Family(family, spec)))
-    }
-
-    fn check_fits(&self, source: &str, options: &LoadOptions) -> Result<(), InputError> {
-        let structures = options.structures;
-        match self {
-            Generated::Family(_, spec) => memory::fits_here(source, spec, structures),
-            Generated::Mesh(_, spec) => {
-                memory::mesh_fits_here(source, spec, structures, options.per_triangle)
-            }
-        }
-    }
-
-    fn generate(self, source: &str) -> Result<Scene, InputError> {
-        match self {
-            Generated::Family(family, spec) => family.generate(source, spec),
-            Generated::Mesh(mesh, spec) => mesh.generate(source, spec),
-        }
-    }
-}
-
-/// A WAD by its magic, anything else as boxes CSV.
-pub(super) fn parse_bytes(
+/// Reads a WAD, known by its magic, its extension or the map named in it; anything
+/// else as boxes CSV.
+fn parse_bytes(
     bytes: &[u8],
-    file: &str,
-    name: &str,
+    [file, name]: [&str; 2],
+    map: Option<&str>,
     options: &LoadOptions,
 ) -> Result<Scene, InputError> {
-    let is_wad = bytes.starts_with(b"PWAD") || bytes.starts_with(b"IWAD");
-    let named_wad = Path::new(file)
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("wad"));
-    if is_wad || named_wad {
-        return WadMap::read(bytes, file, None)?.into_scene(name);
+    let extension = Path::new(file).extension();
+    if is_wad(bytes) || map.is_some() || extension.is_some_and(|e| e.eq_ignore_ascii_case("wad")) {
+        return WadMap::read(bytes, file, map)?.into_scene(name);
     }
-    let rows = bytes.iter().filter(|byte| **byte == b'\n').count();
-    memory::rows_fit_here(name, rows as u64, options.structures)?;
+    let rows = bytes.iter().filter(|byte| **byte == b'\n').count() as u64;
+    let structures = options.structures;
+    let needed = memory::needed_by_items(rows, structures);
+    memory::check_fits(name, needed, structures, memory::free_for(rows))?;
     let mut scene = boxes_csv::read_boxes_csv(bytes, file, options.skip_bad_items)?;
     scene.name = name.to_owned();
     Ok(scene)
+}
+
+/// Tests for the magic of a WAD file.
+pub fn is_wad(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"PWAD") || bytes.starts_with(b"IWAD")
 }
 
 fn unknown_scene(word: &str) -> SpecError {
@@ -150,7 +145,8 @@ impl Sample {
     /// # Errors
     /// The file cannot be read; no sample of this build has that error.
     pub fn load(&self) -> Result<Scene, InputError> {
-        parse_bytes(self.bytes, self.file, self.name, &LoadOptions::default())
+        let names = [self.file, self.name];
+        parse_bytes(self.bytes, names, None, &LoadOptions::default())
     }
 }
 

@@ -72,40 +72,35 @@ impl Surfaces {
         }
     }
 
-    /// Every item of a scene as the twelve triangles of its box (the smallest f32
-    /// box that holds it), opaque and one-sided. O(n).
-    pub fn from_boxes(scene: &Scene) -> Surfaces {
-        Surfaces::of_boxes(scene, scene.items.iter())
+    /// Boxes about an origin, each as twelve triangles, opaque and one-sided. O(n).
+    pub fn of_boxes(origin: DVec3, boxes: impl IntoIterator<Item = Aabb>) -> Surfaces {
+        let mut all = Surfaces::about(origin);
+        let push = |b: Aabb| all.push_box(SurfaceKind::Opaque, false, &b);
+        boxes.into_iter().for_each(push);
+        all
     }
 
-    /// Boxes as they are written, each as twelve triangles, opaque and one-sided: rounded
-    /// outward about an origin, and as flat as they are. No face comes to lie on the other
-    /// side of the origin. O(n).
+    /// Every item of a scene as the smallest f32 box that holds it:
+    /// [`Surfaces::of_boxes`].
+    pub fn from_boxes(scene: &Scene) -> Surfaces {
+        Surfaces::of_boxes(scene.origin, scene.items.iter().copied())
+    }
+
+    /// Boxes as they are written: [`Surfaces::of_boxes`], rounded outward about an
+    /// origin, and as flat as they are. No face comes to lie on the other side of the
+    /// origin.
     pub fn of_boxes_about<'b>(
         origin: DVec3,
         boxes: impl Iterator<Item = &'b WorldBox>,
     ) -> Surfaces {
-        let mut all = Surfaces::about(origin);
-        for b in boxes {
+        let rounded = boxes.map(|b| {
             let mut rounded = Aabb::rounded_outward(b.min, b.max, origin);
             for axis in (0..3).filter(|&axis| b.min[axis] == b.max[axis]) {
                 rounded.max[axis] = rounded.min[axis];
             }
-            all.push_box(SurfaceKind::Opaque, false, &rounded);
-        }
-        all
-    }
-
-    /// The same for some of the items, numbered anew in this order; of a mesh their own
-    /// triangles.
-    ///
-    /// # Panics
-    /// If there is no such item.
-    pub fn of_items(scene: &Scene, items: &[ItemId]) -> Surfaces {
-        match &scene.surfaces {
-            Some(mesh) => mesh.some(items),
-            None => Surfaces::of_boxes(scene, items.iter().map(|&id| &scene.items[id as usize])),
-        }
+            rounded
+        });
+        Surfaces::of_boxes(origin, rounded)
     }
 
     /// Some of the items, numbered anew in this order.
@@ -128,12 +123,6 @@ impl Surfaces {
             some.push(self.kinds[item], self.two_sided[item], points, &triangles);
         }
         some
-    }
-
-    fn of_boxes<'b>(scene: &Scene, boxes: impl Iterator<Item = &'b Aabb>) -> Surfaces {
-        let mut all = Surfaces::about(scene.origin);
-        boxes.for_each(|item| all.push_box(SurfaceKind::Opaque, false, item));
-        all
     }
 
     /// Appends the twelve triangles of a scene-local box as an item.
@@ -215,20 +204,16 @@ impl Surfaces {
         })
     }
 
-    /// How many directed edges of an item lack their opposite, or have it more than
-    /// once: zero for a closed surface whose triangles are wound alike. Edges are
-    /// told by their indices. O(t log t).
+    /// Number of directed edges of an item that lack their opposite, or have it more
+    /// than once: zero for a closed surface whose triangles are wound alike. Edges are
+    /// told apart by their indices. O(t log t).
     pub fn open_edges(&self, item: usize) -> usize {
-        let mut edges: Vec<(u64, bool)> = Vec::new();
-        for triangle in &self.triangles[self.range(item)] {
-            for k in 0..3 {
-                let (a, b) = (triangle[k], triangle[(k + 1) % 3]);
-                let key = u64::from(a.min(b)) << 32 | u64::from(a.max(b));
-                edges.push((key, a < b));
-            }
-        }
+        let triangles = self.triangles[self.range(item)].iter();
+        let edges = triangles.flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
+        let mut edges: Vec<([u32; 2], bool)> =
+            edges.map(|(a, b)| ([a.min(b), a.max(b)], a < b)).collect();
         edges.sort_unstable();
-        let matched = |run: &&[(u64, bool)]| matches!(run, [(_, false), (_, true)]);
+        let matched = |run: &&[([u32; 2], bool)]| matches!(run, [(_, false), (_, true)]);
         let runs = edges.chunk_by(|a, b| a.0 == b.0);
         runs.filter(|run| !matched(run)).map(<[_]>::len).sum()
     }
@@ -268,7 +253,7 @@ mod tests {
     fn some_items_of_a_mesh_keep_their_triangles() {
         let scene = load("mesh:spheres:n=5k", &Default::default()).unwrap();
         let mesh = scene.surfaces.as_ref().unwrap();
-        let some = Surfaces::of_items(&scene, &[2, 0]);
+        let some = mesh.some(&[2, 0]);
         assert_eq!(some.items(), 2);
         for (place, item) in [(0, 2), (1, 0)] {
             assert!(some.of(place).eq(mesh.of(item)));

@@ -3,7 +3,7 @@
 
 use super::WorldBox;
 use super::rng::SeededRng;
-use super::world::World;
+use super::tiling::World;
 use crate::spec::{Spec, SpecError};
 
 /// Edges vary between half and one and a half times the mean, per axis.
@@ -16,5 +16,8 @@ pub fn build(spec: &mut Spec, n: usize, rng: &mut SeededRng) -> Result<World, Sp
         let edges = (rng.point() + 0.5) * size;
         WorldBox::around(centre, edges)
     });
-    Ok(boxes.collect::<Vec<WorldBox>>().into())
+    Ok(World {
+        boxes: boxes.collect(),
+        ..World::default()
+    })
 }

@@ -1,21 +1,21 @@
 //! Doom maps: linedefs and things as boxes, the map's own BSP leaves as
 //! regions, its things as camera places.
 
+use std::sync::{Arc, OnceLock};
+
 use glam::{DVec2, DVec3};
 
-use super::disputes::Linedef;
-use super::lumps::{MapTables, Table, Wad};
-use super::{BspNode, BspRegions, CameraPlace, Labels, Regions, Scene, WorldBox};
-use crate::geometry::Aabb;
+use super::bsp::{BspChild, BspNode, BspTree};
+use super::disputes::{Dispute, Linedef, disputes};
+use super::lumps::{Table, Wad};
+use super::{CameraPlace, Labels, Regions, Scene, WorldBox};
 use crate::input::InputError;
-use crate::query::ItemId;
-use crate::scene::regions::BspChild;
 
 /// Height of a player's eyes above the floor, in map units.
 const EYE_HEIGHT: f64 = 41.0;
-/// Map coordinates are 16-bit.
-const LOW: f64 = i16::MIN as f64;
-const HIGH: f64 = i16::MAX as f64;
+/// Least and greatest map coordinate: they have 16 bits.
+const EXTENT: [f64; 2] = [i16::MIN as f64, i16::MAX as f64];
+
 /// One map of a WAD file, decoded and cross-checked.
 #[derive(Clone, Debug)]
 pub struct WadMap {
@@ -29,13 +29,15 @@ pub struct WadMap {
     pub leaf_sectors: Vec<u32>,
     /// The lump REJECT, empty if there is none.
     pub reject: Vec<u8>,
-    bsp: BspRegions,
+    /// The BSP tree of the map.
+    pub tree: BspTree,
+    disputes: OnceLock<Vec<Dispute>>,
 }
 
 /// A sector as the file has it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct SectorRecord {
-    /// Of its floor and its ceiling, which may lie below the floor.
+    /// Heights of its floor and its ceiling, which may lie below the floor.
     pub heights: [f64; 2],
     pub tag: u16,
 }
@@ -43,8 +45,8 @@ pub struct SectorRecord {
 /// A thing: player start, item, lamp.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Thing {
-    pub x: f64,
-    pub y: f64,
+    /// Position, map units.
+    pub at: DVec2,
     pub angle_deg: f64,
     pub kind: u16,
 }
@@ -64,144 +66,123 @@ impl WadMap {
     /// [`InputError::Byte`] with the offset of the first thing that is wrong.
     pub fn read(bytes: &[u8], file: &str, map: Option<&str>) -> Result<WadMap, InputError> {
         let wad = Wad::open(bytes, file)?;
-        let MapTables {
-            things,
-            lines,
-            sides,
-            vertices,
-            segs,
-            leaves,
-            nodes,
-            sectors,
-            reject,
-        } = &wad.tables(map)?;
+        let of = wad.tables(map)?;
         let vertex = |table: &Table, i: usize, at: usize| -> Result<[i32; 2], InputError> {
-            let v = table.index(i, at, vertices)?;
-            Ok([0, 2].map(|at| vertices.int(v, at) as i32))
+            let v = table.index(i, at, &of.vertices)?;
+            Ok([0, 2].map(|at| of.vertices.int(v, at) as i32))
         };
         // The sector on a side of a line (0 right, 1 left), if there is one.
         let sector_of = |line: usize, side: usize| -> Result<Option<u32>, InputError> {
             let at = 10 + 2 * side;
-            if lines.word(line, at) == u16::MAX {
+            if of.lines.word(line, at) == u16::MAX {
                 return Ok(None);
             }
-            let side = lines.index(line, at, sides)?;
-            Ok(Some(sides.index(side, 28, sectors)? as u32))
+            let side = of.lines.index(line, at, &of.sides)?;
+            Ok(Some(of.sides.index(side, 28, &of.sectors)? as u32))
         };
         let linedef = |i: usize| -> Result<Linedef, InputError> {
             let sectors = [sector_of(i, 0)?, sector_of(i, 1)?];
             if sectors == [None; 2] {
-                return Err(lines.error(i, 10, "a linedef without a side", "at least one side"));
+                let found = "a linedef without a side";
+                return Err(of.lines.error(i, 10, found, "at least one side"));
             }
             Ok(Linedef {
-                ends: [vertex(lines, i, 0)?, vertex(lines, i, 2)?],
-                action: lines.word(i, 6),
-                tag: lines.word(i, 8),
+                ends: [vertex(&of.lines, i, 0)?, vertex(&of.lines, i, 2)?],
+                action: of.lines.word(i, 6),
+                tag: of.lines.word(i, 8),
                 sectors,
             })
         };
-        let linedefs = (0..lines.len()).map(linedef);
-        let linedefs = linedefs.collect::<Result<Vec<_>, _>>()?;
-        for i in 0..segs.len() {
-            vertex(segs, i, 0)?;
-            vertex(segs, i, 2)?;
-            segs.index(i, 6, lines)?;
+        let lines = (0..of.lines.len()).map(linedef);
+        let lines = lines.collect::<Result<Vec<_>, _>>()?;
+        for i in 0..of.segs.len() {
+            vertex(&of.segs, i, 0)?;
+            vertex(&of.segs, i, 2)?;
+            of.segs.index(i, 6, &of.lines)?;
         }
         let leaf_sector = |i: usize| -> Result<u32, InputError> {
-            let (count, first) = (leaves.word(i, 0), leaves.index(i, 2, segs)?);
-            if count == 0 || first + usize::from(count) > segs.len() {
+            let (count, first) = (of.leaves.word(i, 0), of.leaves.index(i, 2, &of.segs)?);
+            if count == 0 || first + usize::from(count) > of.segs.len() {
                 let found = format!("a subsector of {count} segs from {first} on");
-                let expected = format!("at least one, of {}", segs.len());
-                return Err(leaves.error(i, 0, found, expected));
+                let expected = format!("at least one, of {}", of.segs.len());
+                return Err(of.leaves.error(i, 0, found, expected));
             }
-            let line = segs.index(first, 6, lines)?;
-            let side = usize::from(segs.word(first, 8) != 0);
-            linedefs[line].sectors[side].ok_or_else(|| {
+            let line = of.segs.index(first, 6, &of.lines)?;
+            let side = usize::from(of.segs.word(first, 8) != 0);
+            lines[line].sectors[side].ok_or_else(|| {
                 let found = format!("a seg on the missing side of linedef {line}");
-                segs.error(first, 8, found, "a side that exists")
+                of.segs.error(first, 8, found, "a side that exists")
             })
         };
-        let leaf_sectors = (0..leaves.len()).map(leaf_sector);
-        let child = |i: usize, at: usize| -> BspChild {
-            let word = nodes.word(i, at);
-            let index = u32::from(word & 0x7FFF);
-            match word & 0x8000 {
-                0 => BspChild::Node(index),
-                _ => BspChild::Leaf(index),
-            }
+        let leaf_sectors = (0..of.leaves.len()).map(leaf_sector);
+        let child = |word: u16| match u32::from(word & 0x7FFF) {
+            node if word & 0x8000 == 0 => BspChild::Node(node),
+            leaf => BspChild::Leaf(leaf),
         };
-        let tree: Vec<BspNode> = (0..nodes.len())
-            .map(|i| BspNode {
-                x: nodes.int(i, 0),
-                y: nodes.int(i, 2),
-                dx: nodes.int(i, 4),
-                dy: nodes.int(i, 6),
-                children: [child(i, 24), child(i, 26)],
-            })
-            .collect();
+        let nodes = (0..of.nodes.len()).map(|i| BspNode {
+            start: of.nodes.point(i, 0),
+            direction: of.nodes.point(i, 4),
+            children: [24, 26].map(|at| child(of.nodes.word(i, at))),
+        });
         // The root is the last node; a map of one leaf has none.
-        let root = match tree.len() {
+        let root = match of.nodes.len() {
             0 => BspChild::Leaf(0),
             count => BspChild::Node(count as u32 - 1),
         };
+        let things = (0..of.things.len()).map(|i| Thing {
+            at: of.things.point(i, 0),
+            angle_deg: of.things.int(i, 4),
+            kind: of.things.word(i, 6),
+        });
+        let sectors = (0..of.sectors.len()).map(|i| SectorRecord {
+            heights: [0, 2].map(|at| of.sectors.int(i, at)),
+            tag: of.sectors.word(i, 24),
+        });
         Ok(WadMap {
             leaf_sectors: leaf_sectors.collect::<Result<_, _>>()?,
-            bsp: BspRegions::new(tree, root, leaves.len(), LOW, HIGH)
-                .map_err(|found| nodes.error(0, 0, found, "a BSP tree"))?,
-            things: (0..things.len())
-                .map(|i| Thing {
-                    x: things.int(i, 0),
-                    y: things.int(i, 2),
-                    angle_deg: things.int(i, 4),
-                    kind: things.word(i, 6),
-                })
-                .collect(),
-            lines: linedefs,
-            sectors: (0..sectors.len())
-                .map(|i| SectorRecord {
-                    heights: [0, 2].map(|at| sectors.int(i, at)),
-                    tag: sectors.word(i, 24),
-                })
-                .collect(),
-            reject: reject.to_vec(),
+            tree: BspTree::new(nodes.collect(), root, of.leaves.len(), EXTENT)
+                .map_err(|found| of.nodes.error(0, 0, found, "a BSP tree"))?,
+            things: things.collect(),
+            sectors: sectors.collect(),
+            reject: of.reject.to_vec(),
+            disputes: OnceLock::new(),
+            lines,
         })
     }
 
-    /// A box about each BSP leaf, without a height.
-    pub fn leaf_boxes(&self) -> &[Aabb] {
-        &self.bsp.boxes
+    /// Places about which the linedefs disagree: the sectors are then no regions.
+    pub fn disputes(&self) -> &[Dispute] {
+        self.disputes.get_or_init(|| disputes(&self.lines))
     }
 
     /// The box of a linedef: over the heights of the sectors on its sides.
     fn line_box(&self, line: &Linedef) -> WorldBox {
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        for &sector in line.sectors.iter().flatten() {
-            // A closed door's ceiling may lie below its floor.
-            for height in self.sectors[sector as usize].heights {
-                (low, high) = (low.min(height), high.max(height));
-            }
-        }
+        let sectors = line.sectors.iter().flatten();
+        // A closed door's ceiling may lie below its floor.
+        let heights = sectors.flat_map(|&sector| self.sectors[sector as usize].heights);
+        let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| {
+            (low.min(z), high.max(z))
+        });
         let [a, b] = line.ends.map(|[x, y]| DVec2::new(x.into(), y.into()));
         WorldBox::new(a.min(b).extend(low), a.max(b).extend(high))
     }
 
     /// The map as a scene: linedefs first, then things, in lump order.
-    pub fn into_scene(mut self, name: impl Into<String>) -> Result<Scene, InputError> {
+    pub fn into_scene(self, name: impl Into<String>) -> Result<Scene, InputError> {
         let lines = self.lines.iter().map(|line| self.line_box(line));
         let mut boxes: Vec<WorldBox> = lines.collect();
         let mut kinds = Labels::new("kind");
         boxes.iter().for_each(|_| kinds.push("linedef"));
         let mut places = Vec::with_capacity(self.things.len());
         for thing in &self.things {
-            let at = DVec2::new(thing.x, thing.y);
             // Things are 16-bit, so the descent always ends in a leaf.
-            let leaf = self.bsp.descend(at);
-            let sector = leaf.map(|leaf: ItemId| self.leaf_sectors[leaf as usize] as usize);
+            let leaf = self.tree.descend(thing.at);
+            let sector = leaf.map(|leaf| self.leaf_sectors[leaf as usize] as usize);
             let floor = sector.map_or(0.0, |sector| self.sectors[sector].heights[0]);
-            let base = at.extend(floor);
-            let (edge, height) = thing.size();
+            let base = thing.at.extend(floor);
+            let (kind, edge, height) = thing.kind_and_size();
             boxes.push(WorldBox::standing(base, DVec3::new(edge, edge, height)));
-            kinds.push(thing.kind_name());
+            kinds.push(kind);
             let angle = thing.angle_deg.to_radians();
             places.push(CameraPlace {
                 eye: base + DVec3::Z * EYE_HEIGHT,
@@ -209,38 +190,49 @@ impl WadMap {
             });
         }
         // Map coordinates are small integers, exact in f32: no other origin.
-        let mut scene = Scene::about(name, &boxes, DVec3::ZERO)?;
-        scene.own_tree = Some(self.bsp.plane_tree());
-        self.bsp.lines = self.lines;
-        scene.regions = Regions::Bsp(self.bsp);
-        scene.labels = vec![kinds];
-        scene.places = places;
-        Ok(scene)
+        let scene = Scene::about(name, &boxes, DVec3::ZERO)?;
+        Ok(Scene {
+            own_tree: Some(self.tree.plane_tree()),
+            regions: Regions::Bsp(Arc::new(self)),
+            labels: vec![kinds],
+            places,
+            ..scene
+        })
     }
 }
 
 impl Thing {
-    fn is_start(&self) -> bool {
-        matches!(self.kind, 1..=4 | 11)
-    }
-
-    /// Width and height (linuxdoom 1.10, info.c: players 16 by 56, the
+    /// Label, width and height (linuxdoom 1.10, info.c: players 16 by 56, the
     /// pickups of a deathmatch map 20 by 16).
-    fn size(&self) -> (f64, f64) {
-        match self.is_start() {
-            true => (32.0, 56.0),
-            false => (40.0, 16.0),
+    fn kind_and_size(&self) -> (&'static str, f64, f64) {
+        match self.kind {
+            1..=4 | 11 => ("start", 32.0, 56.0),
+            _ => ("thing", 40.0, 16.0),
         }
-    }
-
-    fn kind_name(&self) -> &'static str {
-        if self.is_start() { "start" } else { "thing" }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    impl WadMap {
+        /// Sectors at rest between lines, all of them in one leaf.
+        pub fn at_rest(lines: Vec<Linedef>, heights: Vec<[f64; 2]>) -> WadMap {
+            let sectors = heights.into_iter();
+            WadMap {
+                sectors: sectors
+                    .map(|heights| SectorRecord { heights, tag: 0 })
+                    .collect(),
+                lines,
+                things: Vec::new(),
+                leaf_sectors: Vec::new(),
+                reject: Vec::new(),
+                tree: BspTree::new(Vec::new(), BspChild::Leaf(0), 1, EXTENT).unwrap(),
+                disputes: OnceLock::new(),
+            }
+        }
+    }
 
     const MAP12: &[u8] = include_bytes!("../../datasets/freedm_map12.wad");
     const MAP20: &[u8] = include_bytes!("../../datasets/freedm_map20.wad");
@@ -249,7 +241,7 @@ mod tests {
     fn both_maps_have_their_published_size() {
         for (bytes, leaves, things) in [(MAP12, 87, 21), (MAP20, 825, 108)] {
             let map = WadMap::read(bytes, "m.wad", None).unwrap();
-            assert_eq!((map.bsp.len(), map.things.len()), (leaves, things));
+            assert_eq!((map.tree.boxes.len(), map.things.len()), (leaves, things));
         }
         assert_eq!(map_names(MAP12, "m.wad").unwrap(), ["MAP12"]);
     }
@@ -259,11 +251,11 @@ mod tests {
         for bytes in [MAP12, MAP20] {
             let map = WadMap::read(bytes, "m.wad", None).unwrap();
             for thing in &map.things {
-                let at = DVec2::new(thing.x, thing.y);
-                let owners: Vec<u32> = (0..map.bsp.len() as u32)
-                    .filter(|&leaf| map.bsp.holds(leaf, at))
+                let at = thing.at;
+                let owners: Vec<u32> = (0..map.tree.boxes.len() as u32)
+                    .filter(|&leaf| map.tree.holds(leaf, at))
                     .collect();
-                assert_eq!(owners, [map.bsp.descend(at).unwrap()], "{thing:?}");
+                assert_eq!(owners, [map.tree.descend(at).unwrap()], "{thing:?}");
             }
         }
     }

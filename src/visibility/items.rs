@@ -5,26 +5,15 @@ use std::sync::Arc;
 use super::fragment::{self, CutOuts};
 use super::region::RegionGraph;
 use super::region::doom::DoomMap;
-use crate::input::InputError;
 use crate::query::ItemId;
-use crate::scene::{ItemShape, Scene, Surfaces};
+use crate::scene::{Scene, Surfaces};
 
 /// The triangles of a scene's items, if they are no solid boxes.
 ///
 /// Those of a map's floors and ceilings follow the items.
-///
-/// # Errors
-/// The map's file, read a second time.
-pub fn surfaces_of(scene: &Scene) -> Result<Option<Arc<Surfaces>>, InputError> {
-    Ok(match (scene.item_shape(), &scene.surfaces) {
-        (ItemShape::Box, _) => None,
-        (_, Some(mesh)) => Some(mesh.clone()),
-        (_, None) => Some(Arc::new(match DoomMap::of_scene(scene)? {
-            Some(map) => map.surfaces(scene),
-            // A map whose file is not known.
-            None => Surfaces::from_boxes(scene),
-        })),
-    })
+pub fn surfaces_of(scene: &Scene) -> Option<Arc<Surfaces>> {
+    let of_map = || Some(Arc::new(DoomMap::of_scene(scene)?.surfaces(scene)));
+    scene.surfaces.clone().or_else(of_map)
 }
 
 /// The items of a scene that are cut out: all but the walls of its rooms.

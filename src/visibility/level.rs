@@ -1,92 +1,61 @@
-//! The level stage, the lecture's user selection: of the maps in a file only the one
-//! that was chosen is loaded at all.
+//! The level stage, the lecture's user selection: of the maps in a file, only the
+//! chosen one is loaded at all.
 
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
 use crate::input::{InputError, is_readable, read_file};
-use crate::scene::{Sample, Scene, WadMap, map_names};
+use crate::scene::{Sample, Scene, WadMap, is_wad, map_names, split_map};
 use crate::statistics::{Trimmed, trimmed_mean};
 
-/// How often all maps of a file are decoded, so that the time has an interval.
+/// Rounds of decoding all maps of a file, so that the time has an interval.
 const ROUNDS: usize = 7;
 
-/// A map of a file, decoded to see what it would have added.
+/// A map of a file, decoded to count the items that it would add.
 #[derive(Clone, PartialEq, Debug)]
 pub struct LevelMap {
-    /// As the file names it.
+    /// Name in the file.
     pub name: String,
-    /// Items of the map as a scene.
+    /// Number of items of the map as a scene.
     pub items: usize,
-    /// Wall time of decoding it, ns, in each of seven rounds over all maps; empty
-    /// where nothing was decoded again.
+    /// Wall time of decoding it, ns, in each of seven rounds over all maps; empty for
+    /// a file of one map.
     pub load_ns: Vec<f64>,
 }
 
-/// The maps of a scene's file, and which of them the scene is.
+/// The maps of a scene's file, and the one that the scene is.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Level {
-    /// In file order; one for whatever holds no maps.
+    /// Maps in file order; one for a source without maps.
     pub maps: Vec<LevelMap>,
     /// Index of the one that was loaded.
     pub selected: usize,
 }
 
-/// The WAD file that a scene comes from.
-#[derive(Clone, Debug)]
-pub struct MapFile {
-    /// Its contents.
-    pub bytes: Arc<[u8]>,
-    /// As it was typed, or the name of a sample.
-    pub name: String,
-    /// The map that was asked for; if any was.
-    pub map: Option<String>,
-}
-
-impl MapFile {
-    /// The file behind what was typed for a scene; `None` if that is no WAD.
-    ///
-    /// # Errors
-    /// The file cannot be read (again).
-    pub fn of(source: &str) -> Result<Option<MapFile>, InputError> {
-        let (file, map) = match source.rsplit_once('#') {
-            Some((file, map)) if !Path::new(source).exists() => (file, Some(map)),
-            _ => (source, None),
-        };
-        let bytes: Arc<[u8]> = match (is_readable(Path::new(file)), Sample::named(file)) {
-            (true, _) => read_file(Path::new(file))?,
-            (false, Some(sample)) => sample.bytes.into(),
-            (false, None) => return Ok(None),
-        };
-        let is_wad = bytes.starts_with(b"PWAD") || bytes.starts_with(b"IWAD");
-        Ok(is_wad.then(|| MapFile {
-            bytes,
-            name: file.to_owned(),
-            map: map.map(str::to_owned),
-        }))
-    }
-}
-
 impl Level {
-    /// The level that a scene was loaded from, by what was typed for it. Maps that
+    /// The level that a scene was loaded from, by its source as typed. Maps that
     /// cannot be decoded were not selected and are left out.
     ///
     /// # Errors
     /// The file cannot be read again.
     pub fn of(source: &str, scene: &Scene) -> Result<Level, InputError> {
-        let file = MapFile::of(source)?;
-        let Some(file) = file else {
-            return Ok(Level::alone(scene));
+        let (file, selected) = split_map(source);
+        let bytes: Arc<[u8]> = match (is_readable(Path::new(file)), Sample::named(file)) {
+            (true, _) => read_file(Path::new(file))?,
+            (false, Some(sample)) => sample.bytes.into(),
+            (false, None) => return Ok(Level::alone(scene)),
         };
-        let (bytes, map) = (&file.bytes, file.map.as_deref());
+        if !is_wad(&bytes) {
+            return Ok(Level::alone(scene));
+        }
         let decode = |name: &str| {
             let begun = Instant::now();
-            let map = WadMap::read(bytes, &file.name, Some(name)).ok()?;
+            let map = WadMap::read(&bytes, file, Some(name)).ok()?;
             let items = map.into_scene(name).ok()?.items.len();
             Some((items, begun.elapsed().as_nanos() as f64))
         };
-        let names = map_names(bytes, &file.name)?;
+        let names = map_names(&bytes, file)?;
         let has_others = names.len() > 1;
         // The first time is of memory that has not been read yet.
         let decoded = names.into_iter().filter_map(|name| {
@@ -103,14 +72,14 @@ impl Level {
             }
         }
         let is_selected =
-            |candidate: &LevelMap| map.is_none_or(|map| candidate.name.eq_ignore_ascii_case(map));
+            |map: &LevelMap| selected.is_none_or(|name| map.name.eq_ignore_ascii_case(name));
         match maps.iter().position(is_selected) {
             Some(selected) => Ok(Level { maps, selected }),
             None => Ok(Level::alone(scene)),
         }
     }
 
-    /// A scene that is all there is.
+    /// The level of a source without maps: the scene itself.
     fn alone(scene: &Scene) -> Level {
         Level {
             maps: vec![LevelMap {
@@ -132,14 +101,15 @@ impl Level {
         self.maps[self.selected].items
     }
 
-    /// What decoding the other maps would take, ns; `None` if there are none.
+    /// Wall time of decoding the maps that were not selected, ns; `None` if there are
+    /// none.
     pub fn saved_ns(&self) -> Option<Trimmed> {
-        let others = self.maps.iter().enumerate();
-        let others: Vec<&LevelMap> = others
-            .filter_map(|(i, map)| (i != self.selected).then_some(map))
-            .collect();
-        let rounds = others.first()?.load_ns.len();
-        let sums = (0..rounds).map(|round| others.iter().map(|map| map.load_ns[round]).sum());
+        let others = || {
+            let maps = self.maps.iter().enumerate();
+            maps.filter_map(|(i, map)| (i != self.selected).then_some(&map.load_ns))
+        };
+        let rounds = others().next()?.len();
+        let sums = (0..rounds).map(|round| others().map(|load_ns| load_ns[round]).sum());
         trimmed_mean(&sums.collect::<Vec<f64>>())
     }
 }

@@ -185,9 +185,9 @@ fn damaged_maps() {
 #[test]
 fn damaged_maps_seen_through() {
     feed("rooms", include_bytes!("../data/two_rooms.wad"), |bytes| {
-        let map = DoomMap::read(bytes, "in.file", None).map_err(|e| e.to_string())?;
         let scene = WadMap::read(bytes, "in.file", None).and_then(|map| map.into_scene("in.file"));
-        let (map, scene) = (Arc::new(map), scene.map_err(|e| e.to_string())?);
+        let scene = scene.map_err(|e| e.to_string())?;
+        let map = DoomMap::of_scene(&scene).expect("a map");
         assert_eq!(
             map.surfaces(&scene).items(),
             scene.items.len() + map.sectors.len()

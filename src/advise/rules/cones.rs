@@ -50,7 +50,7 @@ struct Seen {
 
 fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfit> {
     let cameras = case.workload.views.len();
-    let surfaces = surfaces_of(case.scene())?;
+    let surfaces = surfaces_of(case.scene());
     let few = hidden::frames(cameras, PROBED);
     let few = few.map(|frame| Seen::of(case, frame, surfaces.as_deref()));
     let Ok(few) = few.collect::<Result<Vec<Seen>, NoRays>>() else {
@@ -99,7 +99,10 @@ impl Seen {
         let items: Vec<ItemId> = items.collect();
         let surfaces = Arc::new(match surfaces {
             Some(all) => all.some(&items),
-            None => Surfaces::of_items(scene, &items),
+            None => {
+                let boxes = items.iter().map(|&id| scene.items[id as usize]);
+                Surfaces::of_boxes(scene.origin, boxes)
+            }
         });
         let clusters = Arc::new(match scene.item_shape() {
             ItemShape::Mesh => Clusters::of(surfaces, MOST_TRIANGLES),

@@ -5,7 +5,6 @@
 use super::super::case::Case;
 use super::super::omission::{Check, Draft, Forced, Omission, Way};
 use crate::geometry::ConvexVolume;
-use crate::input::InputError;
 use crate::measure::Ask;
 use crate::query::ItemId;
 use crate::scene::Scene;
@@ -36,11 +35,11 @@ pub(super) enum Met {
 
 impl Met {
     /// All of a scene.
-    pub fn of(scene: &Scene) -> Result<Met, InputError> {
-        Ok(match surfaces_of(scene)? {
+    pub fn of(scene: &Scene) -> Met {
+        match surfaces_of(scene) {
             None => Met::Boxes(RayIndex::build(&Solids::of(scene))),
             Some(surfaces) => Met::Triangles(SurfaceIndex::build(&surfaces), scene.items.len()),
-        })
+        }
     }
 
     /// How many items lie along a ray.

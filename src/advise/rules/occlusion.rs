@@ -67,13 +67,13 @@ impl Occlusion {
             solids.as_ref(),
             inscribed::BOXES,
             case.spec.execution.threads,
-        )?;
+        );
         if hiders.blocks_row().is_some_and(|row| row.box_count == 0) {
             return Err(not_applicable(
                 "no boxes are known in the solid between the map's rooms",
             ));
         }
-        let rooms = DoomMap::of_scene(scene)?.and_then(|map| map.graph().ok());
+        let rooms = DoomMap::of_scene(scene).and_then(|map| map.graph().ok());
         let mut homes = Vec::new();
         let views = views.into_iter().map(|(rays, volume)| View {
             is_open: hiders.is_open(&rays, || {

@@ -41,7 +41,7 @@ struct Regions {
 
 /// The rooms of a scene or the sectors of its map.
 fn graph_of(scene: &Scene) -> Result<Arc<RegionGraph>, Unfit> {
-    let graph = match DoomMap::of_scene(scene)? {
+    let graph = match DoomMap::of_scene(scene) {
         Some(map) => Some(
             map.graph()
                 .map_err(|dispute| not_applicable(dispute.to_string()))?,

@@ -35,7 +35,7 @@ const SHADED: SampleGrid = SampleGrid::new(1920, 1080);
 
 fn prepare<'c>(case: &'c Case<'c>, omission: Omission) -> Result<Draft<'c>, Unfit> {
     let scene = case.scene();
-    let met = Rc::new(Met::of(scene)?);
+    let met = Rc::new(Met::of(scene));
     let solids = Rc::new(Solids::of(scene));
     let views = hidden::sights(case).map_err(not_applicable)?;
     let frames = hidden::frames(views.len(), PROBED);

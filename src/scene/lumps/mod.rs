@@ -4,6 +4,8 @@
 use std::collections::HashSet;
 use std::ops::Range;
 
+use glam::DVec2;
+
 use crate::input::InputError;
 use crate::shown::first_of;
 
@@ -12,7 +14,7 @@ const LUMPS: [&str; 13] = [
     "TEXTMAP", "THINGS", "LINEDEFS", "SIDEDEFS", "VERTEXES", "SEGS", "SSECTORS", "NODES",
     "SECTORS", "REJECT", "BLOCKMAP", "BEHAVIOR", "SCRIPTS",
 ];
-/// What stands behind a map's marker.
+/// Names of the lump right behind a map's marker.
 const FIRST: [&str; 2] = ["THINGS", "TEXTMAP"];
 /// Lumps that a node builder fills.
 const BUILT: [&str; 3] = ["SEGS", "SSECTORS", "NODES"];
@@ -44,7 +46,7 @@ pub struct Wad<'a> {
 
 struct Lump {
     name: String,
-    /// Where its directory entry begins.
+    /// Offset of its directory entry in the file.
     entry: usize,
 }
 
@@ -63,8 +65,8 @@ pub struct MapTables<'a> {
 }
 
 impl<'a> Wad<'a> {
-    /// Reads the directory. Where a lump lies is checked when it is read: damage in
-    /// another is no business of a map.
+    /// Reads the directory. The place of a lump is checked when the lump is read:
+    /// damage in another does not concern a map.
     pub fn open(bytes: &'a [u8], file: &'a str) -> Result<Self, InputError> {
         let mut wad = Wad {
             file,
@@ -76,7 +78,7 @@ impl<'a> Wad<'a> {
             let found = format!("'{}'", magic.escape_ascii());
             return Err(wad.error(0, found, "the magic IWAD or PWAD"));
         }
-        let (count, directory) = (wad.header_int(4)?, wad.header_int(8)?);
+        let [count, directory] = wad.header()?;
         for i in 0..count {
             let at = directory + i * 16;
             let Some(entry) = bytes.get(at..at + 16) else {
@@ -141,16 +143,14 @@ impl<'a> Wad<'a> {
     /// the first that the order of a map's lumps does not allow; others are passed over.
     pub fn tables(&self, map: Option<&str>) -> Result<MapTables<'_>, InputError> {
         let (name, marker) = self.marker(map)?;
-        let behind = marker + 1..self.lumps.len();
         let mut last = None;
-        let is_own = |lump: &&Lump| {
-            let place = LUMPS.iter().position(|name| *name == lump.name);
-            place.is_none() || std::mem::replace(&mut last, place) < place
+        let is_own = |&at: &usize| {
+            let place = LUMPS.iter().position(|name| *name == self.lumps[at].name);
+            let is_next = place.is_none() || std::mem::replace(&mut last, place) < place;
+            is_next && !self.is_marker(at)
         };
-        let own = behind
-            .take_while(|&at| !self.is_marker(at))
-            .map(|at| &self.lumps[at]);
-        let own: Vec<&Lump> = own.take_while(is_own).collect();
+        let own = (marker + 1..self.lumps.len()).take_while(is_own);
+        let own: Vec<&Lump> = own.map(|at| &self.lumps[at]).collect();
         let lump = |name: &str| own.iter().find(|lump| lump.name == name);
         for (other, format) in [("TEXTMAP", "UDMF"), ("BEHAVIOR", "Hexen")] {
             if let Some(lump) = lump(other) {
@@ -196,10 +196,9 @@ impl<'a> Wad<'a> {
         if let Some(empty) = [&segs, &leaves, &nodes].into_iter().find(is_empty) {
             let gl = format!("GL_{name}");
             let gl = self.lumps.iter().any(|lump| lump.name == gl);
-            let which = if gl {
-                "with GL nodes alone"
-            } else {
-                "whose nodes are not built"
+            let which = match gl {
+                true => "with GL nodes alone",
+                false => "whose nodes are not built",
             };
             let found = format!("map {name} {which} (no {})", empty.name);
             return Err(self.error(empty.start, found, OWN_NODES));
@@ -217,8 +216,8 @@ impl<'a> Wad<'a> {
         })
     }
 
-    /// Where a lump's bytes are; those of an empty one, whose place means nothing, at its
-    /// directory entry.
+    /// The bytes of a lump; an empty range at the directory entry for an empty lump,
+    /// whose place means nothing.
     fn range(&self, lump: &Lump) -> Result<Range<usize>, InputError> {
         let [offset, size] = [0, 4].map(|at| i32_at(self.bytes, lump.entry + at));
         if size == 0 {
@@ -234,14 +233,17 @@ impl<'a> Wad<'a> {
         })
     }
 
-    fn header_int(&self, at: usize) -> Result<usize, InputError> {
-        let Some(field) = self.bytes.get(at..at + 4) else {
-            let end = self.bytes.len();
-            return Err(self.error(end, "the end of the file", "a 12 byte header"));
+    /// The number of lumps and the offset of the directory.
+    fn header(&self) -> Result<[usize; 2], InputError> {
+        if self.bytes.len() < 12 {
+            return Err(self.error(self.bytes.len(), "the end of the file", "a 12 byte header"));
+        }
+        let int = |at: usize| {
+            let value = i32_at(self.bytes, at);
+            let expected = "a count or offset of at least 0";
+            usize::try_from(value).map_err(|_| self.error(at, value.to_string(), expected))
         };
-        let value = i32_at(field, 0);
-        usize::try_from(value)
-            .map_err(|_| self.error(at, value.to_string(), "a count or offset of at least 0"))
+        Ok([int(4)?, int(8)?])
     }
 
     fn error(
@@ -263,7 +265,7 @@ impl<'a> Wad<'a> {
 pub struct Table<'a> {
     wad: &'a Wad<'a>,
     name: &'static str,
-    /// Where it begins in the file.
+    /// Offset of its first byte in the file.
     start: usize,
     data: &'a [u8],
     record: usize,
@@ -283,6 +285,11 @@ impl Table<'_> {
     /// The signed 16-bit field, as a coordinate.
     pub fn int(&self, i: usize, at: usize) -> f64 {
         f64::from(self.word(i, at) as i16)
+    }
+
+    /// Two signed 16-bit fields, x then y.
+    pub fn point(&self, i: usize, at: usize) -> DVec2 {
+        DVec2::new(self.int(i, at), self.int(i, at + 2))
     }
 
     /// A field that counts records of another table.

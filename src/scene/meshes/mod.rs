@@ -1,83 +1,25 @@
 //! Generated meshes: scenes of triangles, each from a number of triangles and a
-//! seed. One file a mesh; the table names them all.
+//! seed. One file a mesh; the table `MESHES` in `generate` names them all.
 
-mod forest;
+pub mod forest;
 mod icosphere;
-mod noise;
 mod shapes;
-mod spheres;
-mod statue;
-mod terrain;
-
-use super::{Scene, Surfaces};
-use crate::input::InputError;
-use crate::spec::Spec;
-
-/// A kind of generated mesh.
-#[derive(Clone, Copy, Debug)]
-#[non_exhaustive]
-pub struct Mesh {
-    /// As it is typed: `mesh:terrain`.
-    pub name: &'static str,
-    /// What it is, in a line.
-    pub summary: &'static str,
-    /// Makes about so many triangles (at least one object) from a seed: the same
-    /// ones on every machine.
-    pub build: fn(triangles: usize, seed: u64) -> Surfaces,
-}
-
-/// All generated meshes.
-pub const MESHES: &[Mesh] = rows! {
-    Mesh { name, summary, build }
-    "mesh:terrain", "A heightfield in tiles of 512 triangles; one-sided, open", terrain::build;
-    "mesh:forest", "Terrain with trees (closed) and bushes of cut-out leaf cards", forest::build;
-    "mesh:spheres", "Geodesic spheres of 1,280 triangles each; closed", spheres::build;
-    "mesh:statue", "One bumpy closed blob, up to millions of triangles", statue::build;
-};
-
-/// What the names of all meshes begin with.
-pub(super) const PREFIX: &str = "mesh:";
-
-/// Most triangles that a spec may ask for: the indices of their corners fit u32.
-pub(super) const MOST_TRIANGLES: u64 = 100_000_000;
-/// So many triangles, where a spec does not say.
-pub(super) const TRIANGLES: u64 = 100_000;
-
-impl Mesh {
-    /// The mesh of exactly this name.
-    pub fn named(name: &str) -> Option<&'static Mesh> {
-        MESHES.iter().find(|mesh| mesh.name == name)
-    }
-
-    /// Generates the scene that the spec describes. Parameters: `n` triangles
-    /// (100k), `seed` (1), and `offset`, where the zero of the mesh lies on all axes
-    /// of the world (0).
-    ///
-    /// # Errors
-    /// A parameter that is unknown or out of range.
-    pub fn generate(&self, text: &str, mut spec: Spec) -> Result<Scene, InputError> {
-        let triangles = spec.count("n", TRIANGLES, MOST_TRIANGLES)?;
-        let seed = spec.whole("seed", 1, u64::MAX)?;
-        let offset = spec.number("offset", 0.0)?;
-        spec.finish()?;
-        let mut surfaces = (self.build)(triangles as usize, seed);
-        surfaces.origin += offset;
-        surfaces.into_scene(text)
-    }
-}
+pub mod spheres;
+pub mod statue;
+pub mod terrain;
 
 #[cfg(test)]
 mod tests {
-    use super::super::{SurfaceKind, hex, load};
+    use super::super::{Family, MESHES, SurfaceKind, hex, load};
     use super::*;
     use glam::Vec3;
 
     #[test]
     fn every_mesh_has_about_the_triangles_asked_for_and_a_box_an_item() {
         for mesh in MESHES {
-            assert_eq!(Mesh::named(mesh.name).unwrap().name, mesh.name);
+            assert_eq!(Family::named(mesh.name).unwrap().name, mesh.name);
             for asked in [1, 20_000] {
-                let surfaces = (mesh.build)(asked, 7);
+                let surfaces = mesh.mesh(asked, 7);
                 let made = surfaces.triangles.len();
                 assert!(made > 0 && made < asked + 2000, "{}: {made}", mesh.name);
                 assert!(asked == 1 || made > asked / 2, "{}: {made}", mesh.name);
@@ -89,7 +31,7 @@ mod tests {
                 assert_eq!(scene.items.len(), items);
             }
         }
-        assert!(Mesh::named("mesh:teapot").is_none() && Mesh::named("statue").is_none());
+        assert!(Family::named("mesh:teapot").is_none() && Family::named("statue").is_none());
     }
 
     #[test]
@@ -135,8 +77,8 @@ mod tests {
     /// figure and belongs into the CHANGELOG.
     #[test]
     fn generated_meshes_are_the_published_ones() {
-        let digest = |mesh: &Mesh| {
-            let surfaces = (mesh.build)(10_000, 7);
+        let digest = |mesh: &Family| {
+            let surfaces = mesh.mesh(10_000, 7);
             let mut hash = hmac_sha256::Hash::new();
             let points = surfaces.points.iter().flat_map(|p| p.to_array());
             points.for_each(|x| hash.update(x.to_bits().to_le_bytes()));
@@ -161,7 +103,7 @@ mod tests {
     #[test]
     fn the_seed_decides_everything() {
         for mesh in MESHES {
-            let [a, b, other] = [3, 3, 4].map(|seed| (mesh.build)(5000, seed));
+            let [a, b, other] = [3, 3, 4].map(|seed| mesh.mesh(5000, seed));
             assert_eq!(a.points, b.points);
             assert_eq!(a.triangles, b.triangles);
             assert_ne!(a.points, other.points, "{}", mesh.name);
@@ -171,7 +113,7 @@ mod tests {
     #[test]
     fn closed_meshes_are_watertight_and_no_triangle_is_empty() {
         for mesh in MESHES {
-            let surfaces = (mesh.build)(20_000, 11);
+            let surfaces = mesh.mesh(20_000, 11);
             for item in 0..surfaces.items() {
                 // Ground is open, and so are the cards of bushes.
                 let is_tile = surfaces.of_item[item].len() == terrain::TILE;

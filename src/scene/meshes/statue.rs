@@ -4,9 +4,9 @@
 
 use glam::{DVec3, Vec3};
 
+use super::super::noise::fractal;
 use super::super::{SurfaceKind, Surfaces};
 use super::icosphere::icosphere;
-use super::noise::fractal;
 use crate::scene::SeededRng;
 
 /// Bulges (positive) and hollows of the body.

@@ -3,8 +3,8 @@
 
 use glam::{DVec3, Vec3};
 
+use super::super::noise::fractal;
 use super::super::{SurfaceKind, Surfaces};
-use super::noise::fractal;
 use super::shapes::Shape;
 
 /// Quads along the edge of a tile.

@@ -483,7 +483,7 @@ fn pairs_of_maps(is_meant: fn(&str) -> bool) -> [[u64; 3]; 3] {
     let mut counted = [[0; 3]; 3];
     for name in ["freedm-map12", "freedm-map20"] {
         let scene = load(name, &Default::default()).unwrap();
-        let map = DoomMap::of_scene(&scene).unwrap().unwrap();
+        let map = DoomMap::of_scene(&scene).unwrap();
         let items: Vec<ItemId> = (0..scene.items.len() as ItemId)
             .filter(|&item| is_meant(scene.labels[0].get(item as usize)))
             .collect();

@@ -152,7 +152,7 @@ mod tests {
             "freedm-map12",
         ] {
             let scene = scene::load(name, &Default::default()).unwrap();
-            let surfaces = surfaces_of(&scene).unwrap().unwrap();
+            let surfaces = surfaces_of(&scene).unwrap();
             let index = SurfaceIndex::build(&surfaces);
             let mut seen = 0;
             for camera in &cameras(&Solids::of(&scene), 4) {

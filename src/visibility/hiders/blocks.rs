@@ -7,7 +7,6 @@ use glam::DVec3;
 use serde::Serialize;
 
 use crate::geometry::Aabb;
-use crate::input::InputError;
 use crate::scene::Scene;
 use crate::visibility::region::doom::DoomMap;
 
@@ -33,13 +32,8 @@ pub struct Blocks {
 
 impl Blocks {
     /// `None` for a scene that is no map.
-    ///
-    /// # Errors
-    /// The map's file, read a second time.
-    pub fn of(scene: &Scene) -> Result<Option<Blocks>, InputError> {
-        let Some(map) = DoomMap::of_scene(scene)? else {
-            return Ok(None);
-        };
+    pub fn of(scene: &Scene) -> Option<Blocks> {
+        let map = DoomMap::of_scene(scene)?;
         let begun = Instant::now();
         let all = scene.written().map(|b| [b.min.z, b.max.z]);
         let heights = all.reduce(|[low, high], [min, max]| [low.min(min), high.max(max)]);
@@ -48,13 +42,13 @@ impl Blocks {
         let about = |corner: DVec3| (corner - scene.origin).as_vec3();
         let local = boxes.iter().map(|b| Aabb::new(about(b.min), about(b.max)));
         let build_ns = begun.elapsed().as_nanos() as f64;
-        Ok(Some(Blocks {
+        Some(Blocks {
             row: BlocksRow {
                 box_count: boxes.len(),
                 unclosed_sector_count: map.unclosed().len(),
                 build_ns,
             },
             boxes: local.collect(),
-        }))
+        })
     }
 }

@@ -14,7 +14,6 @@ use self::blocks::Blocks;
 use self::inner::Inner;
 use super::occlusion::OccluderScene;
 use super::{Rays, Solids};
-use crate::input::InputError;
 use crate::scene::Scene;
 
 /// The occluders of a scene.
@@ -31,17 +30,9 @@ pub struct Hiders {
 impl Hiders {
     /// Those of a scene; `solids` are its items if they are solid boxes, `most` the boxes
     /// inside each item if they are triangles.
-    ///
-    /// # Errors
-    /// The map's file, read a second time.
-    pub fn of(
-        scene: &Scene,
-        solids: Option<&Solids>,
-        most: usize,
-        threads: usize,
-    ) -> Result<Hiders, InputError> {
+    pub fn of(scene: &Scene, solids: Option<&Solids>, most: usize, threads: usize) -> Hiders {
         let inner = Inner::of(scene, most, threads);
-        let blocks = Blocks::of(scene)?;
+        let blocks = Blocks::of(scene);
         let ground = Ground::of(scene);
         let within = inner.as_ref().map_or(&[][..], |inner| &inner.boxes);
         let below = ground.as_ref().map(|ground| &ground.boxes[..]);
@@ -50,13 +41,13 @@ impl Hiders {
             Some(solids) => OccluderScene::of(solids),
             None => OccluderScene::among(scene, within, of_no_item.unwrap_or(&[])),
         };
-        Ok(Hiders {
+        Hiders {
             bare: of_no_item.map(|_| OccluderScene::among(scene, within, &[])),
             blocks: blocks.map(|blocks| blocks.row),
             inner: inner.map(|inner| inner.row),
             ground,
             all,
-        })
+        }
     }
 
     /// Whether boxes that are of no item hide from the eye of these rays, and are worth

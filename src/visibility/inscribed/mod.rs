@@ -220,7 +220,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::scene::{Mesh, SeededRng, load};
+    use crate::scene::{Family, SeededRng, load};
 
     /// Whether the open box is in the inside of one piece of a closed item: exactly.
     fn is_inside(surfaces: &Surfaces, item: usize, inner: &Aabb) -> bool {
@@ -228,7 +228,8 @@ mod tests {
     }
 
     fn mesh(name: &str, triangles: usize) -> Surfaces {
-        (Mesh::named(&format!("mesh:{name}")).unwrap().build)(triangles, 3)
+        let family = Family::named(&format!("mesh:{name}"));
+        family.unwrap().mesh(triangles, 3)
     }
 
     #[test]

@@ -1,8 +1,6 @@
 //! Back ends against arithmetic on integers of any size, which shares nothing
 //! with theirs.
 
-use std::sync::Arc;
-
 use glam::DVec3;
 
 use super::*;
@@ -10,7 +8,7 @@ use crate::camera::{Camera, Frame, Lens, Surroundings};
 use crate::index::{self, FrustumQuery, Input, RegionIndex};
 use crate::kernel::Kernel;
 use crate::query::ItemId;
-use crate::scene::{Sample, Scene, SeededRng, Surfaces, WorldBox, load};
+use crate::scene::{Scene, SeededRng, Surfaces, WorldBox, load};
 use crate::visibility::region::doom::DoomMap;
 use crate::visibility::truth::judge::{self, Depth};
 use crate::visibility::truth::{Boxes, Facets, NO_ITEM, RayIndex, SampleTruth, SurfaceIndex};
@@ -436,9 +434,8 @@ fn boxes_as_triangles_are_picked_as_boxes_are() {
 
 #[test]
 fn floors_and_ceilings_end_the_search_for_the_first_item_only() {
-    let sample = Sample::named("freedm-map12").unwrap();
-    let map = Arc::new(DoomMap::read(sample.bytes, sample.file, None).unwrap());
     let scene = load("freedm-map12", &Default::default()).unwrap();
+    let map = DoomMap::of_scene(&scene).unwrap();
     let surfaces = map.surfaces(&scene);
     let count = scene.items.len();
     let truth = SurfaceIndex::of(&Facets::solid(&surfaces, count));

@@ -50,7 +50,7 @@ impl From<StageCase> for TriangleCase {
 /// Any of the meshes, from anywhere in it or about it.
 pub fn mesh(rng: &mut SeededRng) -> TriangleCase {
     let mesh = &MESHES[rng.below(MESHES.len())];
-    let surfaces = (mesh.build)(OF_MESH, rng.below(1000) as u64);
+    let surfaces = mesh.mesh(OF_MESH, rng.below(1000) as u64);
     let scene = surfaces.clone().into_scene("mesh").expect("a mesh");
     let bounds = scene.world_bounds();
     let (centre, size) = ((bounds.min + bounds.max) / 2.0, bounds.max - bounds.min);

@@ -239,7 +239,7 @@ fn along_the_curve(nodes: &[Node], bounds: &Aabb) -> Vec<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{MESHES, Mesh, SurfaceKind};
+    use crate::scene::{Family, MESHES, SurfaceKind};
 
     fn bounds(clusters: &Clusters, cluster: usize) -> Aabb {
         let corners = clusters.corners_of(cluster).flatten();
@@ -251,7 +251,7 @@ mod tests {
     #[test]
     fn every_triangle_is_in_one_cluster_of_its_item() {
         for mesh in MESHES {
-            let surfaces = Arc::new((mesh.build)(20_000, 3));
+            let surfaces = Arc::new(mesh.mesh(20_000, 3));
             for most in [1, 17, 64] {
                 let clusters = Clusters::of(surfaces.clone(), most);
                 let mut seen = clusters.triangles.clone();
@@ -313,7 +313,7 @@ mod tests {
 
     #[test]
     fn clusters_are_full_and_small() {
-        let surfaces = Arc::new((Mesh::named("mesh:statue").unwrap().build)(50_000, 3));
+        let surfaces = Arc::new(Family::named("mesh:statue").unwrap().mesh(50_000, 3));
         let clusters = Clusters::of(surfaces.clone(), 64);
         let least = surfaces.triangles.len() / 64;
         assert!(

@@ -10,12 +10,12 @@ use super::super::guarantee::Guarantee;
 use super::*;
 use crate::camera::{Camera, Lens, look_at};
 use crate::kernel::Kernel;
-use crate::scene::{MESHES, Mesh, SeededRng, Surfaces, load};
+use crate::scene::{Family, MESHES, SeededRng, Surfaces, load};
 use audit::{EyeKind, audit};
 
 /// Scenes of some thousand triangles: all meshes, and boxes far from the zero.
 fn scenes() -> Vec<(String, Arc<Clusters>)> {
-    let mesh = |mesh: &Mesh| (mesh.name.to_string(), (mesh.build)(6000, 5));
+    let mesh = |mesh: &Family| (mesh.name.to_string(), mesh.mesh(6000, 5));
     let boxes = ["city:n=200", "rooms:n=200", "uniform:n=100,offset=1e7"].map(|name| {
         let scene = load(name, &Default::default()).unwrap();
         (name.to_string(), Surfaces::from_boxes(&scene))

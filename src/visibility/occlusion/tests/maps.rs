@@ -1,7 +1,5 @@
 //! Items of maps behind boxes in their solid: nothing that a ray sees may be missing.
 
-use std::sync::Arc;
-
 use glam::DVec3;
 
 use super::super::{MaskedInner, OccluderScene};
@@ -10,7 +8,7 @@ use super::kept;
 use crate::camera::{Camera, Frame, Lens};
 use crate::geometry::Aabb;
 use crate::kernel::Kernel;
-use crate::scene::{Sample, SeededRng, WorldBox, load};
+use crate::scene::{SeededRng, WorldBox, load};
 use crate::visibility::region::doom::DoomMap;
 use crate::visibility::truth::{SurfaceIndex, visible_by_random_rays};
 use crate::visibility::{SampleGrid, Solids};
@@ -18,9 +16,8 @@ use crate::visibility::{SampleGrid, Solids};
 /// Of a map: how many items were removed and how many lost, with boxes in its solid that
 /// were changed first.
 fn removed_and_lost(name: &str, change: impl Fn(&mut WorldBox)) -> [usize; 2] {
-    let sample = Sample::named(name).unwrap();
-    let map = Arc::new(DoomMap::read(sample.bytes, sample.file, None).unwrap());
     let scene = load(name, &Default::default()).unwrap();
+    let map = DoomMap::of_scene(&scene).unwrap();
     let graph = map.graph().unwrap();
     let mut blocks = map.solid_boxes([-512.0, 1024.0]);
     blocks.iter_mut().for_each(change);

@@ -3,13 +3,13 @@
 
 use std::sync::Arc;
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
-use super::super::answer::{Marks, RegionId};
 use super::super::graph::{Ground, RegionGraph};
+use super::super::number::{Marks, RegionId};
 use super::super::opening::{Opening, OpeningPlane};
-use super::map::{DoomMap, MapLine};
-use crate::scene::{Dispute, WorldBox};
+use super::map::{DoomMap, HIGHEST};
+use crate::scene::{Dispute, Linedef, WorldBox};
 use crate::visibility::Ray;
 
 /// The height, seen from above, of a strip of the map that lists its linedefs.
@@ -20,7 +20,7 @@ const STRIP: f64 = 64.0;
 pub(super) struct SectorGround {
     map: Arc<DoomMap>,
     /// The linedefs that meet each strip, from the least y on.
-    strips: Vec<Vec<MapLine>>,
+    strips: Vec<Vec<Linedef>>,
     low: f64,
 }
 
@@ -31,13 +31,10 @@ fn plan([x, y]: [i32; 2]) -> DVec2 {
 impl SectorGround {
     /// Sorts the linedefs into strips. O(linedefs * strips that each meets).
     pub fn new(map: Arc<DoomMap>) -> SectorGround {
-        let ends = || {
-            map.lines
-                .iter()
-                .flat_map(|line| line.ends)
-                .map(|[_, y]| f64::from(y))
-        };
-        let (low, high) = (ends().fold(0.0, f64::min), ends().fold(0.0, f64::max));
+        let ends = map.lines.iter().flat_map(|line| line.ends);
+        let (low, high) = ends.fold((0.0f64, 0.0f64), |(low, high), [_, y]| {
+            (low.min(y.into()), high.max(y.into()))
+        });
         let mut ground = SectorGround {
             strips: vec![Vec::new(); ((high - low) / STRIP) as usize + 1],
             map: map.clone(),
@@ -77,7 +74,7 @@ impl SectorGround {
 }
 
 /// Whether a linedef may meet a closed box, seen from above.
-fn meets(line: &MapLine, b: &WorldBox) -> bool {
+fn meets(line: &Linedef, b: &WorldBox) -> bool {
     let [from, to] = line.ends.map(plan);
     let (low, high) = (b.min.truncate(), b.max.truncate());
     if !(from.min(to).cmple(high).all() && low.cmple(from.max(to)).all()) {
@@ -85,12 +82,13 @@ fn meets(line: &MapLine, b: &WorldBox) -> bool {
     }
     let d = to - from;
     let side = |x: f64, y: f64| d.x * (y - from.y) - d.y * (x - from.x);
-    let sides = [
-        side(low.x, low.y),
-        side(high.x, low.y),
-        side(low.x, high.y),
-        side(high.x, high.y),
+    let corners = [
+        (low.x, low.y),
+        (high.x, low.y),
+        (low.x, high.y),
+        (high.x, high.y),
     ];
+    let sides = corners.map(|(x, y)| side(x, y));
     // Rounding of the side is below this: |d| and distances are below 2^18.
     let slack = 1e-9;
     sides.iter().any(|s| *s <= slack) && sides.iter().any(|s| *s >= -slack)
@@ -106,11 +104,13 @@ impl DoomMap {
         if let Some(dispute) = self.disputes().first() {
             return Err(*dispute);
         }
-        let opening = |line: &MapLine| {
-            let ([Some(front), Some(behind)], Some([low, high])) = (line.sectors, line.open) else {
+        let opening = |line: &Linedef| {
+            let ([Some(front), Some(behind)], Some([low, high])) =
+                (line.sectors, self.opening(line))
+            else {
                 return None;
             };
-            let [from, to] = line.ends.map(|[x, y]| DVec2::new(x.into(), y.into()));
+            let [from, to] = line.ends.map(plan);
             let corners = [
                 from.extend(low),
                 to.extend(low),
@@ -124,8 +124,15 @@ impl DoomMap {
             })
         };
         let openings = self.lines.iter().filter_map(opening).collect();
+        // Boxes about the leaves of the map's own tree, without a height.
+        let all_heights = DVec3::Z * (2.0 * HIGHEST);
+        let mut parts = vec![Vec::new(); self.sectors.len()];
+        for (&sector, b) in self.file.leaf_sectors.iter().zip(&self.file.tree.boxes) {
+            let (min, max) = (b.min.as_dvec3(), b.max.as_dvec3());
+            parts[sector as usize].push(WorldBox::new(min - all_heights, max + all_heights));
+        }
         let ground = Arc::new(SectorGround::new(self.clone()));
-        Ok(RegionGraph::new(&self.parts, openings, ground))
+        Ok(RegionGraph::new(&parts, openings, ground))
     }
 }
 
@@ -145,8 +152,8 @@ impl Ground for SectorGround {
         // Below a floor or above a ceiling is nowhere.
         inside
             && out[first..].iter().all(|&sector| {
-                let sector = &self.map.sectors[sector as usize];
-                sector.floor <= b.min.z && b.max.z <= sector.ceiling
+                let [floor, ceiling] = self.map.sectors[sector as usize];
+                floor <= b.min.z && b.max.z <= ceiling
             })
     }
 
@@ -178,12 +185,10 @@ impl Ground for SectorGround {
         seen.insert(sector);
         for (t, line, to_right) in crossings {
             let z = ray.origin.z + ray.direction.z * t;
-            let here = &self.map.sectors[sector as usize];
-            let (Some([low, high]), true) = (line.open, here.floor <= z && z <= here.ceiling)
-            else {
-                return;
-            };
-            if z <= low || z >= high {
+            let [floor, ceiling] = self.map.sectors[sector as usize];
+            let passes = |[low, high]: [f64; 2]| low < z && z < high;
+            let is_inside = floor <= z && z <= ceiling;
+            if !is_inside || !self.map.opening(line).is_some_and(passes) {
                 return;
             }
             if let Some(next) = line.sectors[usize::from(!to_right)] {

@@ -18,4 +18,4 @@ mod plan;
 mod solid;
 mod surfaces;
 
-pub use map::{DoomMap, MapLine, Sector};
+pub use map::DoomMap;

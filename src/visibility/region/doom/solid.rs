@@ -101,7 +101,7 @@ impl Plan {
         };
         for (sector, heights) in (0..).zip(&map.sectors) {
             for triangle in map.triangles(sector)? {
-                plan.open(triangle, [heights.floor, heights.ceiling]);
+                plan.open(triangle, *heights);
             }
         }
         Some(plan)
@@ -236,9 +236,21 @@ fn for_each_maximal(cells: &[bool], columns: usize, mut found: impl FnMut(Cells)
 mod tests {
     use std::sync::Arc;
 
-    use super::super::map::{MapLine, Sector};
     use super::*;
-    use crate::scene::{Sample, SeededRng};
+    use crate::scene::{Linedef, SeededRng, WadMap, load};
+
+    fn map_of(lines: Vec<Linedef>, heights: Vec<[f64; 2]>) -> DoomMap {
+        DoomMap::of(Arc::new(WadMap::at_rest(lines, heights)))
+    }
+
+    fn line(ends: [[i32; 2]; 2], sectors: [Option<u32>; 2]) -> Linedef {
+        Linedef {
+            ends,
+            sectors,
+            action: 0,
+            tag: 0,
+        }
+    }
 
     /// A map of sectors that are rectangles one in the other, each with its heights; what
     /// has none is rock. The first one is the outline.
@@ -260,16 +272,10 @@ mod tests {
                     None => ([to, from], [around, None]),
                     own => ([from, to], [own, around]),
                 };
-                lines.push(MapLine {
-                    ends,
-                    sectors: sides,
-                    open: None,
-                });
+                lines.push(line(ends, sides));
             }
         }
-        let heights = sectors.iter().filter_map(|(_, own)| *own);
-        let own = heights.map(|[floor, ceiling]| Sector { floor, ceiling });
-        DoomMap::of_parts(lines, own.collect())
+        map_of(lines, sectors.iter().filter_map(|(_, own)| *own).collect())
     }
 
     fn sorted(boxes: Vec<WorldBox>) -> Vec<[[f64; 3]; 2]> {
@@ -313,12 +319,9 @@ mod tests {
     fn a_corner_on_a_wall_between_its_ends_leaves_no_gap() {
         let mut map = nested(&[([0, 0, 400, 300], Some([0.0, 100.0]))]);
         let pillar = [[0, 150], [50, 100], [100, 150], [50, 200]];
-        map.lines.extend((0..4).map(|k| MapLine {
-            ends: [pillar[k], pillar[(k + 1) % 4]],
-            sectors: [Some(0), None],
-            open: None,
-        }));
-        let map = DoomMap::of_parts(map.lines, map.sectors);
+        let sides = (0..4).map(|k| line([pillar[k], pillar[(k + 1) % 4]], [Some(0), None]));
+        map.lines.extend(sides);
+        let map = map_of(map.lines, map.sectors);
         assert!(map.disputes().is_empty() && map.unclosed().is_empty());
         assert!(!map.solid_boxes([-8.0, 120.0]).is_empty());
     }
@@ -326,8 +329,8 @@ mod tests {
     #[test]
     fn no_point_of_a_box_is_in_a_sector() {
         for (name, least) in [("freedm-map12", 30), ("freedm-map20", 100)] {
-            let sample = Sample::named(name).unwrap();
-            let map = Arc::new(DoomMap::read(sample.bytes, sample.file, None).unwrap());
+            let scene = load(name, &Default::default()).unwrap();
+            let map = DoomMap::of_scene(&scene).unwrap();
             let graph = map.graph().unwrap();
             let boxes = map.solid_boxes([-512.0, 512.0]);
             assert!(boxes.len() >= least, "{name}: {}", boxes.len());

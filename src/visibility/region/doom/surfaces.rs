@@ -3,10 +3,10 @@
 
 use glam::Vec3;
 
-use super::super::answer::RegionId;
-use super::map::{DoomMap, MapLine};
+use super::super::number::RegionId;
+use super::map::DoomMap;
 use super::plan::{self, Point};
-use crate::scene::{Scene, SurfaceKind, Surfaces};
+use crate::scene::{Linedef, Scene, SurfaceKind, Surfaces};
 
 /// A part of a linedef's wall: which of its two sides is faced, from which height to
 /// which.
@@ -39,24 +39,20 @@ impl DoomMap {
     ///
     /// [`WadMap::into_scene`]: crate::scene::WadMap::into_scene
     pub fn surfaces(&self, scene: &Scene) -> Surfaces {
-        let things = &scene.items[self.linedefs..];
+        let things = &scene.items[self.file.lines.len()..];
         let mut all = Surfaces::about(scene.origin);
         let zero = scene.origin.as_vec3();
-        let mut lines = self.numbers.iter().zip(&self.lines).peekable();
-        for item in 0..self.linedefs as u32 {
-            let line = lines.next_if(|(number, _)| **number == item);
-            let Some((_, line)) = line else {
-                // A linedef of no length.
-                all.push(SurfaceKind::Opaque, false, &[], &[]);
-                continue;
-            };
-            let kind = match line.sectors.iter().flatten().any(|&s| self.moves(s)) {
+        let heights = |sector: RegionId| self.file.sectors[sector as usize].heights;
+        for line in &self.file.lines {
+            let mut shape = Shape::default();
+            let has_length = line.ends[0] != line.ends[1];
+            let moves = |sector: &RegionId| self.moves(*sector);
+            let kind = match has_length && line.sectors.iter().flatten().any(moves) {
                 true => SurfaceKind::CutOut,
                 false => SurfaceKind::Opaque,
             };
-            let mut shape = Shape::default();
-            for part in parts(line, |sector| self.heights[sector as usize]) {
-                shape.wall(line, part);
+            if has_length {
+                parts(line, heights).for_each(|part| shape.wall(line, part));
             }
             shape.push(&mut all, kind, zero);
         }
@@ -68,7 +64,7 @@ impl DoomMap {
             if self.moves(sector) {
                 self.walls_about(sector, &mut shape);
             } else {
-                let [floor, ceiling] = self.heights[sector as usize];
+                let [floor, ceiling] = heights(sector);
                 for corners in self.triangles(sector).unwrap_or_default() {
                     let [a, b, c] = corners;
                     shape.triangle([a, c, b], floor);
@@ -97,18 +93,17 @@ impl DoomMap {
         }
     }
 
-    /// Whether the floor or the ceiling of a sector is not where the file has it, or
-    /// need not stay there.
+    /// Tests for a sector whose floor or ceiling may leave the height that the file has.
     fn moves(&self, sector: RegionId) -> bool {
-        let now = &self.sectors[sector as usize];
-        [now.floor, now.ceiling] != self.heights[sector as usize]
+        let sector = sector as usize;
+        self.sectors[sector] != self.file.sectors[sector].heights
     }
 
     /// The linedefs about a sector, which lies on the right of each, in parts between all of
     /// their ends.
     fn outline(&self, sector: RegionId) -> Vec<[[i32; 2]; 2]> {
         let mut edges = Vec::new();
-        for MapLine { ends, sectors, .. } in &self.lines {
+        for Linedef { ends, sectors, .. } in &self.lines {
             let [front, behind] = sectors.map(|side| side == Some(sector));
             let [from, to] = *ends;
             match (front, behind) {
@@ -127,10 +122,7 @@ impl DoomMap {
     /// The walls of linedefs about a sector that moves, as far as they hide however it
     /// does; those between two such sectors belong to the lower number.
     fn walls_about(&self, sector: RegionId, shape: &mut Shape) {
-        let open = |of: RegionId| {
-            let of = &self.sectors[of as usize];
-            [of.floor, of.ceiling]
-        };
+        let open = |of: RegionId| self.sectors[of as usize];
         for line in &self.lines {
             let moving = line.sectors.iter().flatten().filter(|&&s| self.moves(s));
             if moving.min() == Some(&sector) {
@@ -141,7 +133,7 @@ impl DoomMap {
 }
 
 /// The parts of a linedef's wall between sectors of these heights.
-fn parts(line: &MapLine, heights: impl Fn(RegionId) -> [f64; 2]) -> impl Iterator<Item = Part> {
+fn parts(line: &Linedef, heights: impl Fn(RegionId) -> [f64; 2]) -> impl Iterator<Item = Part> {
     let parts = match line.sectors.map(|sector| sector.map(&heights)) {
         [Some(a), Some(b)] => {
             // The side of the lower floor sees the lower part, that of the higher
@@ -173,7 +165,7 @@ impl Shape {
         self.points.len() as u32 - 1
     }
 
-    fn wall(&mut self, line: &MapLine, (side, [low, high]): Part) {
+    fn wall(&mut self, line: &Linedef, (side, [low, high]): Part) {
         let [mut from, mut to] = line.ends;
         // Seen from the right, a linedef runs to the right.
         if side == 1 {

@@ -6,11 +6,10 @@ use super::super::doom::DoomMap;
 use super::super::*;
 use super::from_eye;
 use super::worlds::*;
-use crate::scene::{Sample, SeededRng};
+use crate::scene::{Scene, SeededRng, load};
 
-fn sample(name: &str) -> (Arc<DoomMap>, Arc<RegionGraph>) {
-    let sample = Sample::named(name).unwrap();
-    let map = Arc::new(DoomMap::read(sample.bytes, sample.file, None).unwrap());
+fn sample(scene: &Scene) -> (Arc<DoomMap>, Arc<RegionGraph>) {
+    let map = DoomMap::of_scene(scene).unwrap();
     let graph = Arc::new(map.graph().unwrap());
     (map, graph)
 }
@@ -18,12 +17,10 @@ fn sample(name: &str) -> (Arc<DoomMap>, Arc<RegionGraph>) {
 #[test]
 fn no_row_misses_a_sector_that_a_ray_passes() {
     for name in ["freedm-map12", "freedm-map20"] {
-        let sample = Sample::named(name).unwrap();
-        let scene = crate::scene::load(name, &Default::default()).unwrap();
-        let map = Arc::new(DoomMap::read(sample.bytes, sample.file, None).unwrap());
-        let graph = Arc::new(map.graph().unwrap());
+        let scene = load(name, &Default::default()).unwrap();
+        let (map, graph) = sample(&scene);
         let mut rows = from_eye::rows(&graph);
-        let reject = Arc::new(map.reject().unwrap().clone());
+        let reject = Arc::new(map.reject().unwrap());
         rows.push(Box::new(
             StoredPvs::of(graph.clone(), reject, REJECT).unwrap(),
         ));
@@ -60,10 +57,10 @@ fn no_row_misses_a_sector_that_a_ray_passes() {
 
 #[test]
 fn an_eye_at_a_wall_or_below_the_floor_is_nowhere() {
-    let (map, graph) = sample("freedm-map12");
+    let (map, graph) = sample(&load("freedm-map12", &Default::default()).unwrap());
     let wall = map.lines.iter().find(|l| l.sectors[1].is_none()).unwrap();
     let [from, to] = wall.ends.map(|[x, y]| glam::DVec2::new(x.into(), y.into()));
-    let sector = map.sectors[wall.sectors[0].unwrap() as usize];
+    let [floor, _] = map.sectors[wall.sectors[0].unwrap() as usize];
     let (middle, right) = ((from + to) * 0.5, -(to - from).perp().normalize());
     let mut rng = SeededRng::new(1);
     // The near window is some 0.1 wide; right of a linedef is its front.
@@ -73,7 +70,7 @@ fn an_eye_at_a_wall_or_below_the_floor_is_nowhere() {
         (-4.0, 41.0, EyePlace::Outside),
         (4.0, -1.0, EyePlace::Outside),
     ] {
-        let eye = (middle + right * away).extend(sector.floor + height);
+        let eye = (middle + right * away).extend(floor + height);
         let rays = looking(eye, &mut rng);
         for row in from_eye::rows(&graph) {
             let mut out = Vec::new();

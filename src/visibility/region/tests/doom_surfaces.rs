@@ -8,7 +8,7 @@ use super::super::*;
 use super::from_eye::rows;
 use super::worlds::*;
 use crate::query::ItemId;
-use crate::scene::{Sample, Scene, SeededRng, SurfaceKind, Surfaces};
+use crate::scene::{Scene, SeededRng, SurfaceKind, Surfaces};
 use crate::visibility::SampleGrid;
 use crate::visibility::truth::{SampleTruth, SurfaceIndex};
 
@@ -22,9 +22,8 @@ struct World {
 }
 
 fn world(name: &str) -> World {
-    let sample = Sample::named(name).unwrap();
     let scene = crate::scene::load(name, &Default::default()).unwrap();
-    let map = Arc::new(DoomMap::read(sample.bytes, sample.file, None).unwrap());
+    let map = DoomMap::of_scene(&scene).unwrap();
     World {
         graph: Arc::new(map.graph().unwrap()),
         surfaces: map.surfaces(&scene),

@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 use super::judge::{self, Depth, exact};
 use crate::camera::{Camera, Lens};
 use crate::query::ItemId;
-use crate::scene::{self, Mesh, SeededRng, SurfaceKind, Surfaces};
+use crate::scene::{self, Family, SeededRng, SurfaceKind, Surfaces};
 use crate::visibility::truth::{NO_ITEM, RayIndex, SampleTruth, SurfaceIndex};
 use crate::visibility::{Ray, Rays, SampleGrid, Solids};
 
@@ -148,7 +148,7 @@ fn triangles_full_of_ties_are_seen_as_whole_numbers_see_them() {
 
 #[test]
 fn no_ray_slips_through_the_edges_of_a_closed_surface() {
-    let surfaces = (Mesh::named("mesh:statue").unwrap().build)(2000, 3);
+    let surfaces = Family::named("mesh:statue").unwrap().mesh(2000, 3);
     let index = SurfaceIndex::build(&surfaces);
     let bounds = surfaces.bounds(0);
     let eye = bounds.centre().as_dvec3()

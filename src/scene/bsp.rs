@@ -1,0 +1,336 @@
+//! The 2-D BSP tree of a Doom map: the bounds of its leaves, and which leaf holds a
+//! point, exactly.
+
+use glam::{DVec2, DVec3, Vec3};
+
+use crate::geometry::{Aabb, Plane, PlaneTree, PlaneTreeNode};
+use crate::query::ItemId;
+
+/// A node of the tree with its partition line, map units.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct BspNode {
+    /// A point of the line.
+    pub start: DVec2,
+    /// Direction of the line, not of unit length.
+    pub direction: DVec2,
+    /// Front (right of the direction) first, then back.
+    pub children: [BspChild; 2],
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum BspChild {
+    Node(u32),
+    Leaf(u32),
+}
+
+impl BspNode {
+    /// 0 for the front (right) side, 1 for the back.
+    ///
+    /// Ties follow the Doom engine's `R_PointOnSide` (linuxdoom 1.10, r_main.c), which
+    /// treats a point on an axis-parallel line unlike one on any other line. Exact for
+    /// map coordinates (integers), correctly signed up to f64 rounding for others; the
+    /// engine's 16.16 truncation is not imitated.
+    pub fn side(&self, p: DVec2) -> usize {
+        let (DVec2 { x, y }, DVec2 { x: dx, y: dy }) = (self.start, self.direction);
+        if dx == 0.0 {
+            let along = if p.x <= x { dy } else { -dy };
+            return usize::from(along > 0.0);
+        }
+        if dy == 0.0 {
+            let along = if p.y <= y { -dx } else { dx };
+            return usize::from(along > 0.0);
+        }
+        let to = p - self.start;
+        // The engine's short cut by sign bits; it differs from the products
+        // below only for a point exactly at the line's start.
+        let parts = [dy, dx, to.x, to.y].into_iter();
+        if parts.filter(|v| *v < 0.0).count() % 2 == 1 {
+            return usize::from((dy < 0.0) != (to.x < 0.0));
+        }
+        usize::from(to.y * dx >= dy * to.x)
+    }
+}
+
+/// A node and the side of it that leads down.
+type Parent = Option<(u32, usize)>;
+
+/// A BSP tree with links up from its leaves.
+#[derive(Clone, Debug)]
+pub struct BspTree {
+    nodes: Vec<BspNode>,
+    root: BspChild,
+    /// Bounds of each leaf, at height zero.
+    pub boxes: Vec<Aabb>,
+    node_parents: Vec<Parent>,
+    leaf_parents: Vec<Parent>,
+    /// Least and greatest coordinate of the square that the leaves divide.
+    extent: [f64; 2],
+}
+
+impl BspTree {
+    /// Links the tree and bounds its leaves within the closed square
+    /// `[low, high]^2`, outside of which no point has a leaf. O(nodes * depth).
+    ///
+    /// # Errors
+    /// A node or leaf that is reached twice or does not exist: the nodes form no tree.
+    pub fn new(
+        nodes: Vec<BspNode>,
+        root: BspChild,
+        leaf_count: usize,
+        [low, high]: [f64; 2],
+    ) -> Result<BspTree, String> {
+        let mut node_parents = vec![None; nodes.len()];
+        let mut leaf_parents = vec![None; leaf_count];
+        // A leaf that no node has is nowhere.
+        let mut boxes = vec![planar_bounds(&[]); leaf_count];
+        let corners = [(low, low), (high, low), (high, high), (low, high)];
+        let square = corners.map(DVec2::from).to_vec();
+        let mut open = vec![(root, None, square)];
+        while let Some((child, parent, polygon)) = open.pop() {
+            let (parents, index) = match child {
+                BspChild::Node(n) => (&mut node_parents, n),
+                BspChild::Leaf(l) => (&mut leaf_parents, l),
+            };
+            match parents.get_mut(index as usize) {
+                None => return Err(format!("{child:?} does not exist")),
+                Some(Some(_)) => return Err(format!("{child:?} is reached twice")),
+                Some(fresh) => *fresh = Some(parent),
+            }
+            match child {
+                BspChild::Leaf(leaf) => boxes[leaf as usize] = planar_bounds(&polygon),
+                BspChild::Node(n) => {
+                    let node = nodes[n as usize];
+                    for side in [1, 0] {
+                        let part = clip(&polygon, &node, side);
+                        open.push((node.children[side], Some((n, side)), part));
+                    }
+                }
+            }
+        }
+        let known = |parents: Vec<Option<Parent>>| parents.into_iter().map(Option::flatten);
+        Ok(BspTree {
+            nodes,
+            root,
+            boxes,
+            node_parents: known(node_parents).collect(),
+            leaf_parents: known(leaf_parents).collect(),
+            extent: [low, high],
+        })
+    }
+
+    /// The partition lines as upright planes, for structures that can use them.
+    /// Ties do not matter to those: they keep their own bounds.
+    pub fn plane_tree(&self) -> PlaneTree {
+        let below = |child: BspChild| match child {
+            BspChild::Node(node) => Some(node),
+            BspChild::Leaf(_) => None,
+        };
+        let node = |node: &BspNode| {
+            // Right of the direction is the front.
+            let normal = -node.direction.perp().as_vec2().extend(0.0);
+            PlaneTreeNode {
+                plane: Plane::through(node.start.as_vec2().extend(0.0), normal),
+                children: node.children.map(below),
+            }
+        };
+        PlaneTree {
+            nodes: self.nodes.iter().map(node).collect(),
+            root: below(self.root),
+        }
+    }
+
+    /// The leaf that holds the point, by descent from the root; `None` outside the
+    /// square. O(depth).
+    pub fn descend(&self, p: DVec2) -> Option<ItemId> {
+        if !self.covers(p) {
+            return None;
+        }
+        let mut at = self.root;
+        loop {
+            match at {
+                BspChild::Leaf(leaf) => return Some(leaf),
+                BspChild::Node(n) => {
+                    let node = &self.nodes[n as usize];
+                    at = node.children[node.side(p)];
+                }
+            }
+        }
+    }
+
+    /// Tests whether the point lies in the closed square that the leaves divide.
+    pub fn covers(&self, p: DVec2) -> bool {
+        let [low, high] = self.extent.map(DVec2::splat);
+        p.cmpge(low).all() && p.cmple(high).all()
+    }
+
+    /// Tests whether the leaf holds the point: the same side tests as
+    /// [`BspTree::descend`], from the leaf up to the root. O(depth).
+    pub fn holds(&self, leaf: ItemId, p: DVec2) -> bool {
+        let mut above = self.leaf_parents[leaf as usize];
+        while let Some((node, side)) = above {
+            if self.nodes[node as usize].side(p) != side {
+                return false;
+            }
+            above = self.node_parents[node as usize];
+        }
+        true
+    }
+}
+
+/// Margin by which a cell is grown on every side before its box is taken, in map
+/// units: far above the rounding of the clipping below (under 2^-20 for
+/// coordinates of 2^16), far below anything a map shows.
+const CELL_MARGIN: f64 = 1.0 / 1024.0;
+
+/// The part of a convex polygon on one side of a node's line (Sutherland and
+/// Hodgman 1974), the line moved outward by [`CELL_MARGIN`] so that rounding
+/// and ties can only make the cell larger.
+fn clip(polygon: &[DVec2], node: &BspNode, side: usize) -> Vec<DVec2> {
+    let length = node.direction.length();
+    if length == 0.0 {
+        return polygon.to_vec();
+    }
+    let sign = if side == 0 { 1.0 } else { -1.0 };
+    let front = -node.direction.perp() / length * sign;
+    let depth = |p: DVec2| front.dot(p - node.start) + CELL_MARGIN;
+    let mut kept = Vec::with_capacity(polygon.len() + 1);
+    for (i, &p) in polygon.iter().enumerate() {
+        let previous = polygon[(i + polygon.len() - 1) % polygon.len()];
+        let (a, b) = (depth(previous), depth(p));
+        if (a < 0.0) != (b < 0.0) {
+            kept.push(previous + (p - previous) * (a / (a - b)));
+        }
+        if b >= 0.0 {
+            kept.push(p);
+        }
+    }
+    kept
+}
+
+/// The polygon's box at height zero, grown by [`CELL_MARGIN`].
+///
+/// An empty polygon, whose cell holds no point of the square, gets a point box
+/// outside the square, which region search never enters.
+fn planar_bounds(polygon: &[DVec2]) -> Aabb {
+    let Some(&first) = polygon.first() else {
+        let beyond = Vec3::splat(f32::from(i16::MAX) * 2.0);
+        return Aabb::new(beyond, beyond);
+    };
+    let bounds = polygon
+        .iter()
+        .fold((first, first), |(low, high), &p| (low.min(p), high.max(p)));
+    Aabb::rounded_outward(
+        (bounds.0 - CELL_MARGIN).extend(0.0),
+        (bounds.1 + CELL_MARGIN).extend(0.0),
+        DVec3::ZERO,
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(x: f64, y: f64, dx: f64, dy: f64) -> BspNode {
+        BspNode {
+            start: DVec2::new(x, y),
+            direction: DVec2::new(dx, dy),
+            children: [BspChild::Leaf(0), BspChild::Leaf(1)],
+        }
+    }
+
+    #[test]
+    fn sides_follow_the_engine_on_and_off_the_line() {
+        let at = DVec2::new;
+        // Upward vertical line: the right is the front, a tie the back.
+        let up = line(0.0, 0.0, 0.0, 4.0);
+        assert_eq!(
+            [
+                up.side(at(1.0, 0.0)),
+                up.side(at(-1.0, 0.0)),
+                up.side(at(0.0, 9.0))
+            ],
+            [0, 1, 1]
+        );
+        // Downward: front and back swap, and so does the tie.
+        let down = line(0.0, 0.0, 0.0, -4.0);
+        assert_eq!(
+            [
+                down.side(at(1.0, 0.0)),
+                down.side(at(-1.0, 0.0)),
+                down.side(at(0.0, 9.0))
+            ],
+            [1, 0, 0]
+        );
+        let east = line(0.0, 0.0, 4.0, 0.0);
+        assert_eq!(
+            [
+                east.side(at(0.0, -1.0)),
+                east.side(at(0.0, 1.0)),
+                east.side(at(3.0, 0.0))
+            ],
+            [0, 1, 0]
+        );
+        let west = line(0.0, 0.0, -4.0, 0.0);
+        assert_eq!(
+            [
+                west.side(at(0.0, -1.0)),
+                west.side(at(0.0, 1.0)),
+                west.side(at(3.0, 0.0))
+            ],
+            [1, 0, 1]
+        );
+        let slope = line(0.0, 0.0, 2.0, 2.0);
+        assert_eq!(
+            [
+                slope.side(at(2.0, 0.0)),
+                slope.side(at(0.0, 2.0)),
+                slope.side(at(5.0, 5.0))
+            ],
+            [0, 1, 1]
+        );
+    }
+
+    #[test]
+    fn cells_tile_the_square_and_ties_have_one_owner() {
+        let nodes = vec![
+            BspNode {
+                children: [BspChild::Leaf(0), BspChild::Node(1)],
+                ..line(0.0, 0.0, 0.0, 8.0)
+            },
+            BspNode {
+                children: [BspChild::Leaf(1), BspChild::Leaf(2)],
+                ..line(-4.0, 0.0, 3.0, 1.0)
+            },
+        ];
+        let bsp = BspTree::new(nodes, BspChild::Node(0), 3, [-16.0, 16.0]).unwrap();
+        for x in -16..=16 {
+            for y in -16..=16 {
+                let p = DVec2::new(x.into(), y.into());
+                let owners: Vec<u32> = (0..3).filter(|&leaf| bsp.holds(leaf, p)).collect();
+                assert_eq!(owners, [bsp.descend(p).unwrap()], "{p}");
+                let bounds = bsp.boxes[owners[0] as usize];
+                assert!(
+                    bounds.contains_point(p.as_vec2().extend(0.0)),
+                    "{p} {bounds:?}"
+                );
+            }
+        }
+        assert_eq!(bsp.descend(DVec2::new(17.0, 0.0)), None);
+    }
+
+    #[test]
+    fn loops_and_missing_nodes_are_no_tree() {
+        let looped = BspNode {
+            children: [BspChild::Node(0), BspChild::Leaf(0)],
+            ..line(0.0, 0.0, 1.0, 1.0)
+        };
+        let error = BspTree::new(vec![looped], BspChild::Node(0), 1, [-1.0, 1.0]).unwrap_err();
+        assert!(error.contains("twice"), "{error}");
+        let missing = BspNode {
+            children: [BspChild::Leaf(0), BspChild::Leaf(7)],
+            ..line(0.0, 0.0, 1.0, 1.0)
+        };
+        let error = BspTree::new(vec![missing], BspChild::Node(0), 1, [-1.0, 1.0]).unwrap_err();
+        assert!(error.contains("does not exist"), "{error}");
+    }
+}
