@@ -326,27 +326,17 @@ pub(super) fn check(
     kind: &str,
     again: &str,
 ) -> Vec<Check> {
-    let built: Vec<_> = subjects
-        .iter()
-        .filter_map(|c| Some((c.label(), c.built.as_ref().ok()?)))
-        .collect();
-    let mut counted = count_pass(workload, &built, &|_, _| ()).into_iter();
+    let counted = count_pass(workload, subjects, &|_, _| ());
     let scene = workload.scene;
     let questions = workload.views.len() * scene.items.len()
         + workload.points.len() * scene.regions.boxes(&scene.items).len();
-    let checks = subjects.iter().map(|subject| {
-        let verdict = match &subject.built {
-            Ok(_) => counted.next().map(|c| c.verdict),
-            Err(verdict) => Some(verdict.clone()),
-        };
-        let status = verdict.as_ref().map_or("left_out", |v| v.status.name());
-        let reason = verdict
-            .filter(|v| v.status.is_failure())
-            .and_then(|v| v.reason);
+    let checks = subjects.iter().zip(counted).map(|(subject, counted)| {
+        let status = counted.verdict.status;
+        let reason = counted.verdict.reason.filter(|_| status.is_failure());
         Check {
             volumes: workload.views.len(),
             verdicts: questions as u64,
-            status,
+            status: status.name(),
             difference: reason.map(|reason| format!("{kind} volume, {reason}\n  again: {again}")),
             ..Check::new(&scene.name, &workload.path, &subject.spec)
         }

@@ -24,14 +24,13 @@ pub struct Bound {
 }
 
 /// What a bound is made from.
-#[derive(Clone, Copy)]
 pub struct Material<'a> {
     /// The queries that it bounds.
     pub workload: &'a Workload<'a>,
     /// What was built on the scene, under the names they were asked for by.
     pub subjects: &'a [Subject],
     /// Items visible to each camera of the path, as everyone counted them.
-    pub visible: &'a [u64],
+    pub visible: Vec<u64>,
 }
 
 impl Material<'_> {
@@ -96,7 +95,7 @@ fn memcpy<'a>(material: &Material<'a>) -> Option<TimedTask<'a>> {
     };
     let starts: Vec<usize> = lengths.iter().enumerate().map(start).collect();
     lengths.iter().any(|&length| length > 0).then(|| {
-        TimedTask::new(material.visible.to_vec(), move |place, out| {
+        TimedTask::new(material.visible.clone(), move |place, out| {
             let start = starts[place];
             out.extend_from_slice(&ids[start..start + lengths[place]]);
         })
@@ -119,7 +118,7 @@ fn replay<'a>(material: &Material<'a>) -> Option<TimedTask<'a>> {
         })
         .collect();
     let replay = move |place: usize, out: &mut Vec<_>| traces[place].replay(&tree, out);
-    Some(TimedTask::new(material.visible.to_vec(), replay))
+    Some(TimedTask::new(material.visible.clone(), replay))
 }
 
 /// Spreads consecutive places: multiples of 2^32 / golden ratio (Knuth, TAOCP
@@ -154,7 +153,7 @@ mod tests {
         let mut material = Material {
             workload: &workload,
             subjects: &[],
-            visible: &visible,
+            visible: visible.clone(),
         };
         assert!(replay(&material).is_none(), "nothing to replay");
         let subjects = [wide];
@@ -211,7 +210,7 @@ mod tests {
         let material = Material {
             workload: &workload,
             subjects: &[],
-            visible: &[0, 0],
+            visible: vec![0, 0],
         };
         assert!(BOUNDS.iter().all(|b| (b.make)(&material).is_none()));
     }

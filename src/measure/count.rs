@@ -7,127 +7,107 @@ use std::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
 
 use super::notice::Notice;
-use super::{Answer, Built, Status, TaskKind, Verdict, Workload, guarded};
+use super::task::Pass;
+use super::{Answer, Built, Status, Subject, Verdict, Workload, guarded};
 use crate::culling::CullingTest;
+use crate::index::Kind;
 use crate::query::{ItemId, Located, QueryCost};
 use crate::statistics::rate;
 use crate::verify::{ErrorCount, Fault, Trial, Truth, explain_containment, explain_visibility};
 
-/// What one subject answered and what it cost.
-#[derive(Clone, Debug)]
+/// Answers of one subject, and their cost.
+#[derive(Clone, Default, Debug)]
 #[non_exhaustive]
 pub struct Counted {
-    /// Whether every answer was that of the reference scan.
+    /// Ok if every answer is that of the reference scan.
     pub verdict: Verdict,
-    /// The frustum query of each camera.
-    pub frames: Vec<Answer>,
-    /// Counters summed over all frustum queries.
-    pub cost: QueryCost,
-    /// The region search of each eye.
-    pub located: Vec<Answer>,
-    /// Counters summed over all region searches.
-    pub locate_cost: QueryCost,
+    /// Frustum queries, one per camera, and region searches, one per eye.
+    pub answers: [Vec<Answer>; 2],
+    /// Counters summed over all frustum queries, and over all region searches.
+    pub costs: [QueryCost; 2],
 }
 
 impl Counted {
-    fn new() -> Self {
-        Counted {
-            verdict: Verdict::ok(),
-            frames: Vec::new(),
-            cost: QueryCost::default(),
-            located: Vec::new(),
-            locate_cost: QueryCost::default(),
-        }
+    /// Lower bound of the time of a query of a pass, ns: from counters alone, and so
+    /// the same in every run. Far below the real time of most structures.
+    pub(super) fn least_ns(&self, pass: Pass) -> f64 {
+        let queries = self.answers[pass as usize].len().max(1) as f64;
+        20.0 + 0.1 * self.costs[pass as usize].comparisons() as f64 / queries
     }
 
-    /// What a query of this task surely takes, ns: from counters alone, and so
-    /// the same in every run. Far below the real time of most structures.
-    pub(super) fn least_ns(&self, task: TaskKind) -> f64 {
-        let (cost, queries) = match task {
-            TaskKind::Query => (&self.cost, self.frames.len()),
-            TaskKind::Locate | TaskKind::LocateBatched => (&self.locate_cost, self.located.len()),
-        };
-        20.0 + 0.1 * cost.comparisons() as f64 / queries.max(1) as f64
+    fn is_ok(&self) -> bool {
+        self.verdict.status == Status::Ok
     }
 }
 
 /// Longest a subject may take for its whole count pass.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-/// Counts and verifies. One reference serves all subjects of a frame; a
-/// subject that fails once is asked no more.
-pub fn count_pass(
-    workload: &Workload,
-    subjects: &[(String, &Built)],
-    notice: Notice,
-) -> Vec<Counted> {
-    let mut all: Vec<Counted> = subjects.iter().map(|_| Counted::new()).collect();
+/// Counts and verifies. One reference serves all subjects of a camera; a subject that
+/// fails once, or was not built, is skipped.
+pub fn count_pass(workload: &Workload, subjects: &[Subject], notice: Notice) -> Vec<Counted> {
+    let fresh = |subject: &Subject| Counted {
+        verdict: subject.built.as_ref().err().cloned().unwrap_or_default(),
+        ..Counted::default()
+    };
+    let mut all: Vec<Counted> = subjects.iter().map(fresh).collect();
+    let labels: Vec<String> = subjects.iter().map(Subject::label).collect();
     let mut spent = vec![Duration::ZERO; subjects.len()];
-    let items = &workload.items;
-    let mut trial = Trial::new(items.len());
-    for (frame, view) in workload.views.iter().enumerate() {
-        let view = view.as_any();
-        trial.see(items, view);
-        for (i, (label, subject)) in subjects.iter().enumerate() {
-            let counted = &mut all[i];
-            if counted.verdict.status != Status::Ok {
-                continue;
+    let scene = workload.scene;
+    let boxes = scene.regions.boxes(&scene.items);
+    for pass in Pass::ALL {
+        let (mut trial, queries) = match pass {
+            Pass::Queries => (Trial::new(workload.items.len()), workload.views.len()),
+            Pass::Searches => (Trial::new(boxes.len()), workload.points.len()),
+        };
+        for n in 0..queries {
+            match pass {
+                Pass::Queries => trial.see(&workload.items, workload.views[n].as_any()),
+                Pass::Searches => trial.expect(scene.holding(&workload.sought[n])),
             }
-            notice(Some(label), "counting");
-            let start = Instant::now();
-            let cost = &mut counted.cost;
-            let index = subject.items.as_ref();
-            let counting = trial.ask(|out| index.query_counted(view, out, cost));
-            // What will be timed is another traversal.
-            let asked = match counting.map(drop) {
-                Ok(()) => trial.ask(|out| index.query(view, out)).map(drop),
-                Err(fault) => Err(fault),
-            };
-            spent[i] += start.elapsed();
-            counted.verdict = verdict(asked, spent[i], &format!("camera {frame}"), |id| {
-                explain_visibility(&items[id], view)
-            });
-            counted.frames.push(Answer::of(trial.answer()));
+            for (i, subject) in subjects.iter().enumerate() {
+                let (counted, Ok(built)) = (&mut all[i], &subject.built) else {
+                    continue;
+                };
+                if !counted.is_ok() {
+                    continue;
+                }
+                notice(Some(&labels[i]), "counting");
+                let start = Instant::now();
+                let cost = &mut counted.costs[pass as usize];
+                let counting = trial.ask(|out| built.count(workload, pass, n, out, cost));
+                // What will be timed is another traversal.
+                let answered = match counting.map(drop) {
+                    Ok(()) => trial
+                        .ask(|out| built.answer(workload, pass, n, out))
+                        .map(drop),
+                    Err(fault) => Err(fault),
+                };
+                spent[i] += start.elapsed();
+                let question = format!("{} {n}", pass.question());
+                counted.verdict = verdict(answered, spent[i], &question, |id| match pass {
+                    Pass::Queries => {
+                        explain_visibility(&workload.items[id], workload.views[n].as_any())
+                    }
+                    Pass::Searches => explain_containment(&boxes[id], workload.points[n]),
+                });
+                counted.answers[pass as usize].push(Answer::of(trial.answer()));
+            }
         }
     }
-    let regions = &workload.scene.regions;
-    let boxes = regions.boxes(&workload.scene.items);
-    let mut trial = Trial::new(boxes.len());
-    for (n, &p) in workload.points.iter().enumerate() {
-        trial.expect(workload.scene.holding(&workload.sought[n]));
-        for (i, (label, subject)) in subjects.iter().enumerate() {
-            let counted = &mut all[i];
-            if counted.verdict.status != Status::Ok {
-                continue;
+    for (counted, subject) in all.iter_mut().zip(subjects) {
+        if let (true, Ok(built)) = (counted.is_ok(), &subject.built) {
+            counted.verdict = batch_verdict(workload, built);
+            if subject.spec.info().kind != Kind::Scan {
+                note_scan(counted, workload.items.len());
             }
-            notice(Some(label), "counting");
-            let start = Instant::now();
-            let cost = &mut counted.locate_cost;
-            let index = subject.regions();
-            let counting = trial.ask(|out| {
-                workload.search(n, out, |p, out| index.query_counted(p.into(), out, cost));
-            });
-            let asked = match counting.map(drop) {
-                Ok(()) => trial.ask(|out| workload.search(n, out, |p, out| index.locate(p, out))),
-                Err(fault) => Err(fault),
-            };
-            spent[i] += start.elapsed();
-            counted.verdict = verdict(asked.map(drop), spent[i], &format!("point {n}"), |id| {
-                explain_containment(&boxes[id], p)
-            });
-            counted.located.push(Answer::of(trial.answer()));
-        }
-    }
-    for (counted, (_, subject)) in all.iter_mut().zip(subjects) {
-        if counted.verdict.status == Status::Ok {
-            counted.verdict = batch_verdict(workload, subject);
         }
     }
     all
 }
 
-/// Whether all points of the path asked at once get what each got alone, which
-/// has been compared with the reference.
+/// Compares the answers of one batch of all points with the answers of each point
+/// alone, which were compared with the reference.
 fn batch_verdict(workload: &Workload, subject: &Built) -> Verdict {
     let (mut many, mut alone) = (Located::default(), Vec::new());
     let index = subject.regions();
@@ -145,7 +125,7 @@ fn batch_verdict(workload: &Workload, subject: &Built) -> Verdict {
     Verdict::ok()
 }
 
-/// How the answers of a workload differ from the truth at camera level.
+/// Difference of the answers of a workload from the truth at camera level.
 #[derive(Clone, Copy, Default, PartialEq, Debug, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[non_exhaustive]
@@ -160,8 +140,8 @@ pub struct Judged {
     pub excess_interval: Option<[f64; 2]>,
 }
 
-/// Checks the reference's answers, which all right structures share, against the oracle.
-/// As many cameras as `most` verdicts allow, at least one.
+/// Checks the answers of the reference, which all right structures share, with the
+/// oracle. As many cameras as `most` verdicts allow, at least one.
 pub fn judge(workload: &Workload, most: usize) -> Judged {
     let scene = workload.scene;
     let count = workload.cameras.len();
@@ -191,15 +171,15 @@ pub fn judge(workload: &Workload, most: usize) -> Judged {
     judged
 }
 
-/// What an answer makes of a structure. A false negative is worse than anything
+/// Verdict on a structure from one answer. A false negative is worse than anything
 /// that is returned too much.
 fn verdict(
-    asked: Result<(), Fault>,
+    answered: Result<(), Fault>,
     spent: Duration,
     question: &str,
     explain: impl FnOnce(usize) -> String,
 ) -> Verdict {
-    match asked {
+    match answered {
         Err(fault) => {
             let status = Status::of(&fault);
             let told = fault.explained(|id| Some(explain(id)));
@@ -216,18 +196,15 @@ fn verdict(
     }
 }
 
-/// Counters must fit the structure: something that declares itself no scan but looks at
-/// (almost) every item for a sliver of the scene is reported.
-pub(super) fn note_scan(counted: &mut Counted, items: usize) {
-    let queries = counted.frames.len().max(1) as u64;
-    let visible: u64 = counted.frames.iter().map(|f| f.count).sum();
-    let sliver = visible * 1000 <= queries * items as u64;
-    let compared = counted.cost.comparisons() / queries;
-    if counted.verdict.status == Status::Ok
-        && items >= 1000
-        && sliver
-        && compared * 10 >= 9 * items as u64
-    {
+/// Adds a note to a structure that declares itself no scan, but tests (almost) every
+/// item for a sliver of the scene.
+fn note_scan(counted: &mut Counted, items: usize) {
+    let answers = &counted.answers[Pass::Queries as usize];
+    let queries = answers.len().max(1) as u64;
+    let visible: u64 = answers.iter().map(|f| f.count).sum();
+    let is_sliver = visible * 1000 <= queries * items as u64;
+    let compared = counted.costs[Pass::Queries as usize].comparisons() / queries;
+    if counted.is_ok() && items >= 1000 && is_sliver && compared * 10 >= 9 * items as u64 {
         counted.verdict.reason = Some(format!(
             "tests {compared} bounds per query for {items} items, as a scan does"
         ));

@@ -65,12 +65,13 @@ pub use workload::{Workload, WorkloadError, input_of};
 
 named! {
     /// What became of a cell. A gap is never silent.
-    #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+    #[derive(Clone, Copy, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
     #[cfg_attr(test, derive(schemars::JsonSchema))]
     #[serde(rename_all = "snake_case")]
     #[non_exhaustive]
     pub enum Status {
         /// Every answer equals the reference.
+        #[default]
         Ok = "ok",
         /// An answer holds ids it should not, or one twice.
         Wrong = "wrong",
@@ -107,7 +108,7 @@ impl Status {
 }
 
 /// A status with its reason.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[derive(Clone, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub struct Verdict {
     /// How it ended.
     pub status: Status,
@@ -118,10 +119,7 @@ pub struct Verdict {
 impl Verdict {
     /// Nothing wrong.
     pub fn ok() -> Self {
-        Verdict {
-            status: Status::Ok,
-            reason: None,
-        }
+        Verdict::default()
     }
 
     /// A status that has to be explained.

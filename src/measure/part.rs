@@ -9,6 +9,7 @@ use serde_json::Value;
 
 use crate::index::{Kind, Origin, StructureSpec};
 
+use super::task::Pass;
 use super::{
     Answer, GroupKey, Judged, KeyedSchedule, PathInfo, Sample, SceneInfo, Status, TaskKind, Verdict,
 };
@@ -34,6 +35,16 @@ pub struct Known {
 /// Key of a task of a group: label of a structure or a lower bound, and what it is
 /// timed at.
 pub type TaskKey = (String, TaskKind);
+
+impl Known {
+    /// Schedule of a pass, if it is timed, and the right answers.
+    pub(super) fn pass(&self, pass: Pass) -> (Option<&KeyedSchedule<TaskKey>>, &[Answer]) {
+        match pass {
+            Pass::Queries => (self.query.as_ref(), &self.visible),
+            Pass::Searches => (self.locate.as_ref(), &self.located),
+        }
+    }
+}
 
 /// A structure in one process.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
@@ -136,51 +147,42 @@ impl Part {
     /// or counted twice. Answers are known, so the ids of a whole pass are too.
     pub fn contradictions(&self, known: &Known) -> Vec<(&str, Verdict)> {
         let mut found = Vec::new();
-        let passes = [
-            (&known.query, &known.visible),
-            (&known.locate, &known.located),
-        ];
-        for (pass, (plan, answers)) in passes.into_iter().enumerate() {
-            let Some(KeyedSchedule { keys, schedule }) = plan else {
+        for pass in Pass::ALL {
+            let (Some(KeyedSchedule { keys, schedule }), answers) = known.pass(pass) else {
                 continue;
             };
             let cameras = schedule.cameras.iter();
             let mut counts = cameras.map(|&camera| Some(answers.get(camera as usize)?.count));
             let one_round = counts.try_fold(0, |sum: u64, count| sum.checked_add(count?));
             let mut planned = keys.iter().zip(&schedule.tasks);
-            let own = self.tasks.iter();
-            for task in own.filter(|t| (t.task == TaskKind::Query) == (pass == 0)) {
-                let mut wrong = |reason: String| {
-                    let verdict = Verdict::new(Status::Wrong, reason);
-                    found.push((task.label.as_str(), verdict));
-                };
-                let (process, name) = (self.process, task.task.name());
-                let Some((_, plan)) = planned
-                    .find(|((label, planned), _)| *label == task.label && *planned == task.task)
-                else {
-                    wrong(format!(
-                        "process {process}, {name}: not in its place in the plan of the first process"
-                    ));
-                    break;
-                };
-                let rounds = schedule.rounds.div_ceil(plan.every.max(1));
-                let wanted = one_round.and_then(|ids| ids.checked_mul(u64::from(rounds)));
+            let own = self.tasks.iter().filter(|t| Pass::of(t.task) == pass);
+            for task in own {
+                let is_own = |(label, kind): &TaskKey| *label == task.label && *kind == task.task;
+                let plan = planned.find(|(key, _)| is_own(key)).map(|(_, plan)| plan);
+                let rounds = plan.map(|plan| schedule.rounds.div_ceil(plan.every.max(1)));
+                let ids = |rounds: u32| one_round.and_then(|n| n.checked_mul(rounds.into()));
                 let is_bound = self.bounds.contains(&task.label);
-                if task.verdict.status != Status::Ok {
-                    continue;
-                }
-                if task.rounds_ns.len() > rounds as usize {
-                    let found = task.rounds_ns.len();
-                    wrong(format!(
-                        "process {process}, {name}: {found} rounds; the plan has {rounds}"
-                    ));
-                } else if !is_bound && wanted != Some(task.returned) {
-                    let wanted = wanted.map_or("other cameras".to_owned(), |ids| ids.to_string());
-                    wrong(format!(
-                        "process {process}, {name}: {} ids in all its samples; the plan asks for \
-                         {wanted}",
-                        task.returned
-                    ));
+                let reason = match rounds {
+                    None => "not in its place in the plan of the first process".to_owned(),
+                    Some(_) if task.verdict.status != Status::Ok => continue,
+                    Some(rounds) if task.rounds_ns.len() > rounds as usize => {
+                        format!("{} rounds; the plan has {rounds}", task.rounds_ns.len())
+                    }
+                    Some(rounds) if !is_bound && ids(rounds) != Some(task.returned) => {
+                        let wanted = ids(rounds);
+                        let wanted = wanted.map_or("other cameras".to_owned(), |n| n.to_string());
+                        format!(
+                            "{} ids in all its samples; the plan asks for {wanted}",
+                            task.returned
+                        )
+                    }
+                    Some(_) => continue,
+                };
+                let reason = format!("process {}, {}: {reason}", self.process, task.task.name());
+                let verdict = Verdict::new(Status::Wrong, reason);
+                found.push((task.label.as_str(), verdict));
+                if plan.is_none() {
+                    break;
                 }
             }
         }

@@ -4,11 +4,12 @@
 
 use super::clock::Stopwatch;
 use super::guarded::guarded;
-use super::input_of;
+use super::task::Pass;
 use super::update::measure_updates;
-use super::{Status, Verdict};
+use super::{Status, Verdict, Workload, input_of};
 use crate::culling::CullingTest;
 use crate::index::{BuildError, DynIndex, MemoryUsage, StructureSpec};
+use crate::query::{ItemId, QueryCost};
 use crate::scene::Scene;
 
 /// A structure with its two indexes: over the items (what does the camera
@@ -42,6 +43,31 @@ impl Built {
     /// The index that answers region search.
     pub fn regions(&self) -> &dyn DynIndex {
         self.regions.as_deref().unwrap_or(self.items.as_ref())
+    }
+
+    /// Answers query `n` of a pass: appends ids to an empty output.
+    pub(super) fn answer(&self, workload: &Workload, pass: Pass, n: usize, out: &mut Vec<ItemId>) {
+        match pass {
+            Pass::Queries => self.items.query(workload.views[n].as_any(), out),
+            Pass::Searches => workload.search(n, out, |p, out| self.regions().locate(p, out)),
+        }
+    }
+
+    /// The same with the counting recorder.
+    pub(super) fn count(
+        &self,
+        workload: &Workload,
+        pass: Pass,
+        n: usize,
+        out: &mut Vec<ItemId>,
+        cost: &mut QueryCost,
+    ) {
+        match pass {
+            Pass::Queries => (self.items).query_counted(workload.views[n].as_any(), out, cost),
+            Pass::Searches => workload.search(n, out, |p, out| {
+                self.regions().query_counted(p.into(), out, cost);
+            }),
+        }
     }
 }
 

@@ -137,9 +137,13 @@ fn what_has_no_plan_is_not_timed_and_the_rest_keeps_its_own() {
     assert!(part.contradictions(&known).is_empty());
     let scene = scene();
     let (workload, subjects) = (workload(&scene), subjects("bvh", &scene));
-    let entries: Vec<Entry> = subjects.iter().map(Entry::new).collect();
-    let answers = [known.visible.clone(), known.located.clone()];
-    let mut entered = enter(&workload, &subjects, &entries, &[TaskKind::Query], &answers);
+    let entry = |subject| Entry {
+        subject,
+        verdict: Verdict::ok(),
+        counted: None,
+    };
+    let entries: Vec<Entry> = subjects.iter().map(entry).collect();
+    let mut entered = enter(&workload, &entries, Pass::Queries, &known.visible);
     let schedule = entered.schedule(known.query.as_ref(), 8, &protocol());
     let batches: Vec<u32> = schedule.tasks.iter().map(|t| t.batch).collect();
     assert_eq!(batches, [3], "its own, not the one in its place");
