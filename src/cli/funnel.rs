@@ -152,7 +152,7 @@ fn chain(
             if !known.iter().any(|row| row.name == name) {
                 let stage = stage.name();
                 if let [_] = known[..] {
-                    let why = funnel::left_out_of(scene).pop();
+                    let why = funnel::left_out_of(scene);
                     let why = why.map_or(String::new(), |row| format!(": {}", row.reason));
                     return Err(SpecError::new(format_args!(
                         "--{stage} is '{name}'; expected none: scene '{}' has nothing for that \

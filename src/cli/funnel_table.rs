@@ -72,7 +72,6 @@ pub fn blocks(report: &FunnelReport) -> Vec<Block> {
             section,
             name,
             reason,
-            ..
         } = row;
         Block::Line(format!("Left out ({section}, {name}): {reason}."))
     }));

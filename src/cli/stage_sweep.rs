@@ -106,7 +106,7 @@ pub fn sweep(
     {
         // Every scene has something for the others.
         let (name, stage) = (&scene.name, stage.name());
-        let why = funnel::left_out_of(&scene).pop();
+        let why = funnel::left_out_of(&scene);
         let why = why.map_or(String::new(), |row| format!(": {}", row.reason));
         bail!(
             "scene '{name}' has nothing for the {stage} stage{why}; expected a scene with rooms or \

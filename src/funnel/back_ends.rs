@@ -1,94 +1,171 @@
-//! What each stage can be done by, for a scene, and what a chain takes of it.
+//! Back ends of every stage that a scene can have, and the default chain of a scene.
 
-use super::chain::Chain;
-use super::fragment_rows;
-use super::hiding::HIDING;
-use super::left_out::LeftOutRow;
-use super::stage::{BackEnd, StageKind};
-use super::triangle_rows;
+use super::error::LeftOutRow;
+use super::stage::{BackEnd, Chain, NONE, StageKind};
+use crate::kernel::Kernel;
+use crate::query::ItemId;
 use crate::scene::{Regions, Scene};
-use crate::visibility::region;
+use crate::visibility::occlusion::{
+    HierarchicalZ, Interleaved, MaskedCentre, MaskedInner, OccluderChoice, OccluderScene,
+    OcclusionBuffer, TwoPass, View, ZBuffer,
+};
+use crate::visibility::region::{self, About};
+use crate::visibility::triangle::TRIANGLE_ROWS;
+use crate::visibility::{Guarantee, SampleGrid};
 
-/// What a chain takes where there are rooms.
-const PORTAL_CLIP: &str = "portal-clip";
+pub const PORTAL_CLIP: &str = "portal-clip";
+pub const MASKED_INNER: &str = "masked-inner";
+/// The test that takes every item for solid.
+pub const Z: &str = "z-test";
+const ALPHA: &str = "alpha-test";
+/// The test that is restricted to the samples of portals.
+pub const STENCIL: &str = "stencil-test";
 
-/// What there is only where a claim was given.
-const CLAIM: &str = region::STORED.name;
-const EXACT: &str = region::EXACT.name;
-/// Most rooms of which it is found out, exactly, what is seen from each.
+/// Most rooms for which the exact potentially visible sets are computed.
 const MOST_EXACT_ROOMS: usize = 4_096;
 
-/// What finds a way through the rooms or sectors of a scene.
-fn of_regions(scene: &Scene) -> &'static [&'static str] {
-    const OF_ROOMS: &[&str] = &["flood", "portal-rect", PORTAL_CLIP, CLAIM, EXACT];
-    const OF_SECTORS: &[&str] = &["flood", "portal-rect", PORTAL_CLIP, CLAIM, "reject"];
-    match &scene.regions {
-        Regions::Tiling(_) if has_exact(scene) => OF_ROOMS,
-        // It is the last.
-        Regions::Tiling(_) => &OF_ROOMS[..OF_ROOMS.len() - 1],
-        Regions::Bsp(map) if map.disputes().is_empty() => OF_SECTORS,
-        _ => &[],
-    }
-}
-
-/// Whether it is found out, exactly, which rooms of a scene see each other.
+/// Whether the exact potentially visible sets of a scene's rooms are computed.
 pub fn has_exact(scene: &Scene) -> bool {
     matches!(&scene.regions, Regions::Tiling(rooms) if rooms.boxes.len() <= MOST_EXACT_ROOMS)
 }
 
-/// What the region stage of a map leaves out, and why.
-pub fn left_out_of(scene: &Scene) -> Vec<LeftOutRow> {
+/// The region stage of a map whose sectors do not divide the plane, with the reason.
+pub fn left_out_of(scene: &Scene) -> Option<LeftOutRow> {
     let Regions::Bsp(map) = &scene.regions else {
-        return Vec::new();
+        return None;
     };
-    let dispute = map.disputes().first().into_iter();
-    dispute
-        .map(|dispute| LeftOutRow::of("stages", "region", *dispute))
-        .collect()
+    let dispute = map.disputes().first();
+    dispute.map(|dispute| LeftOutRow::new("stages", "region", dispute))
 }
 
-/// The back ends of a stage that a scene can have, with or without cut-outs among its
-/// items; structures of the object stage are not among them.
+/// Back ends of a stage that a scene can have, without structures of the object stage.
+///
+/// With `has_cut_outs` some items have holes.
 pub fn back_ends(stage: StageKind, scene: &Scene, has_cut_outs: bool) -> Vec<BackEnd> {
-    let mut rows = vec![BackEnd::left_out(stage)];
+    let declared = [NONE, "the stage is left out"];
+    let mut rows = vec![BackEnd::new(stage, declared, Guarantee::Conservative)];
     match stage {
         StageKind::Region => {
-            let names = of_regions(scene);
-            let known = region::ROWS.iter().filter(|row| names.contains(&row.name));
-            let declared =
-                known.map(|row| BackEnd::of(stage, [row.name, row.summary], row.guarantee));
-            rows.extend(declared);
+            let known = region::ROWS.iter().filter(|row| searches(row, scene));
+            rows.extend(
+                known.map(|row| BackEnd::new(stage, [row.name, row.summary], row.guarantee)),
+            );
         }
-        StageKind::Occlusion => rows.extend(HIDING.iter().map(|row| row.back_end)),
-        StageKind::Triangle => rows.extend(triangle_rows::back_ends()),
-        StageKind::Fragment => rows.extend(fragment_rows::back_ends(scene, has_cut_outs)),
-        _ => {}
+        StageKind::Object => {}
+        StageKind::Occlusion => rows.extend(OCCLUSION_ROWS.iter().map(|row| row.back_end)),
+        StageKind::Triangle => {
+            let culls = TRIANGLE_ROWS.iter().filter(|row| row.name != NONE);
+            rows.extend(
+                culls.map(|row| BackEnd::new(stage, [row.name, row.summary], row.guarantee)),
+            );
+        }
+        StageKind::Fragment => rows.extend(fragment_tests(scene, has_cut_outs)),
     }
     rows
 }
 
+/// Whether a back end of the region stage finds a way through a scene's regions.
+fn searches(row: &About, scene: &Scene) -> bool {
+    let is = |other: About| row.name == other.name;
+    match &scene.regions {
+        Regions::Tiling(_) => !is(region::REJECT) && (!is(region::EXACT) || has_exact(scene)),
+        Regions::Bsp(map) => !is(region::EXACT) && map.disputes().is_empty(),
+        _ => false,
+    }
+}
+
+fn fragment_tests(scene: &Scene, has_cut_outs: bool) -> impl Iterator<Item = BackEnd> {
+    let exact = Guarantee::SampleExact;
+    let z = match has_cut_outs {
+        true => (
+            [Z, "the nearest fragment, holes or not"],
+            Guarantee::Unproven,
+        ),
+        false => ([Z, "the nearest fragment of each sample, exactly"], exact),
+    };
+    let alpha = ([ALPHA, "the nearest fragment that is no hole"], exact);
+    let beyond = "the same, beyond the eye's room only where its portals are seen";
+    let has_rooms = matches!(&scene.regions, Regions::Tiling(rooms) if !rooms.portals.is_empty());
+    let rows = [
+        (true, z),
+        (has_cut_outs, alpha),
+        (has_rooms, ([STENCIL, beyond], exact)),
+    ];
+    let there = rows.into_iter().filter(|(is_there, _)| *is_there);
+    there.map(|(_, (declared, guarantee))| BackEnd::new(StageKind::Fragment, declared, guarantee))
+}
+
+/// Default test of the fragment stage.
+pub fn default_test(has_cut_outs: bool) -> &'static str {
+    if has_cut_outs { ALPHA } else { Z }
+}
+
 impl Chain {
-    /// What suits a scene, but for the object stage: the safest back end of each stage
+    /// Default chain of a scene without an object stage: of every stage the safe back end
     /// that removes the most.
     pub fn for_scene(scene: &Scene, has_cut_outs: bool) -> Chain {
-        let has = |stage, name: &'static str| {
-            back_ends(stage, scene, has_cut_outs)
-                .iter()
-                .any(|row| row.name == name)
-                .then_some(name)
-        };
-        [
+        let wanted = [
             (StageKind::Region, PORTAL_CLIP),
-            (StageKind::Occlusion, "masked-inner"),
-            (StageKind::Triangle, triangle_rows::DEFAULT),
-            (StageKind::Fragment, fragment_rows::default(has_cut_outs)),
-        ]
-        .into_iter()
-        .fold(Chain::empty(), |chain, (stage, name)| {
-            match has(stage, name) {
-                Some(name) => chain.with(stage, name),
-                None => chain,
-            }
+            (StageKind::Occlusion, MASKED_INNER),
+            (StageKind::Triangle, "per-triangle"),
+            (StageKind::Fragment, default_test(has_cut_outs)),
+        ];
+        let is_there = |(stage, name): &(StageKind, &str)| {
+            let mut rows = back_ends(*stage, scene, has_cut_outs).into_iter();
+            rows.any(|row| row.name == *name)
+        };
+        let known = wanted.into_iter().filter(is_there);
+        known.fold(Chain::empty(), |chain, (stage, name)| {
+            chain.with(stage, name)
         })
     }
 }
+
+/// Appends the items that are not hidden, of those given or, for a coupling that
+/// traverses its own tree, of all items of the view.
+pub type Occlude = Box<dyn FnMut(&OccluderScene, &View, &[ItemId], &mut Vec<ItemId>)>;
+
+/// A row of the occlusion stage.
+pub struct OcclusionRow {
+    pub back_end: BackEnd,
+    /// Allocates a buffer of the given size. Two passes draw the chosen occluders; a
+    /// traversal draws the items that it finds visible.
+    pub new: fn(SampleGrid, Kernel, OccluderChoice) -> Occlude,
+}
+
+impl OcclusionRow {
+    const fn interleaved<B: OcclusionBuffer + 'static>(name: &'static str) -> OcclusionRow {
+        OcclusionRow {
+            back_end: BackEnd {
+                does_object_stage: true,
+                ..BackEnd::new(StageKind::Occlusion, [name, B::SUMMARY], B::GUARANTEE)
+            },
+            new: |grid, kernel, _| {
+                let mut state = Interleaved::new(B::new(grid), kernel);
+                Box::new(move |scene, view, _, out| {
+                    state.cull(scene, view, out);
+                })
+            },
+        }
+    }
+
+    const fn two_pass<B: OcclusionBuffer + 'static>(name: &'static str) -> OcclusionRow {
+        OcclusionRow {
+            back_end: BackEnd::new(StageKind::Occlusion, [name, B::SUMMARY], B::GUARANTEE),
+            new: |grid, kernel, choice| {
+                let mut state = TwoPass::new(B::new(grid), choice, kernel);
+                Box::new(move |scene, view, items, out| {
+                    state.cull(scene, view, items, out);
+                })
+            },
+        }
+    }
+}
+
+/// Rows of the occlusion stage.
+pub static OCCLUSION_ROWS: [OcclusionRow; 4] = [
+    OcclusionRow::interleaved::<MaskedInner>(MASKED_INNER),
+    OcclusionRow::interleaved::<MaskedCentre>("masked"),
+    OcclusionRow::interleaved::<ZBuffer>("z-buffer"),
+    OcclusionRow::two_pass::<HierarchicalZ>("hierarchical-z"),
+];

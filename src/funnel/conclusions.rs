@@ -1,7 +1,7 @@
-//! What follows from a funnel, in sentences: which stages pay from which draw cost on,
-//! and which back ends lost what is visible.
+//! Conclusions of a funnel, in sentences: the draw cost above which each stage pays, and
+//! the back ends that lost visible items.
 
-use super::fragment_rows;
+use super::back_ends::{STENCIL, default_test};
 use super::mirror::MirrorRow;
 use super::orders::OrderRow;
 use super::report::{FunnelReport, Gain, StageRow};
@@ -16,16 +16,13 @@ pub fn conclusions(report: &FunnelReport) -> Vec<String> {
     sentences.extend(of_stencil(report));
     sentences.extend(report.mirror.as_ref().map(of_mirror));
     sentences.extend(report.orders.iter().flat_map(of_order));
-    let of_chain = |stage| {
-        let mut chosen = report.stages.iter().filter(|row| row.is_chosen);
-        chosen.find(|row| row.back_end.stage == stage)
-    };
-    if let Some(last) = of_chain(StageKind::Occlusion) {
-        sentences.push(format!(
+    let is_last = |row: &&StageRow| row.is_chosen && row.back_end.stage == StageKind::Occlusion;
+    sentences.extend(report.stages.iter().find(is_last).map(|last| {
+        format!(
             "Of {} items {:.1} are left and {:.1} are in front at a sample, per view.",
             report.items, last.errors.output_count, last.errors.truth_count
-        ));
-    }
+        )
+    }));
     sentences
 }
 
@@ -49,14 +46,14 @@ fn of_gain(gain: &Gain) -> String {
     }
 }
 
-/// What the stencil saves, against the same tests without it.
+/// Samples that the stencil-test saves against the default test.
 fn of_stencil(report: &FunnelReport) -> Option<String> {
-    let tests = || report.stages.iter().filter(|row| row.fragments.is_some());
-    let stencil = tests().find(|row| row.back_end.name == fragment_rows::STENCIL)?;
-    let other = fragment_rows::default(report.cut_outs.is_some());
-    let other = tests().find(|row| row.back_end.name == other)?;
-    let [with, without] = [stencil, other].map(|row| row.fragments);
-    let (with, without) = (with?.asked_count, without?.asked_count);
+    let test = |name: &str| {
+        let row = report.stages.iter().find(|row| row.back_end.name == name)?;
+        Some((row, row.fragments?.asked_count))
+    };
+    let (stencil, with) = test(STENCIL)?;
+    let (other, without) = test(default_test(report.cut_outs.is_some()))?;
     Some(format!(
         "fragment {} asks {with:.0} samples per view in place of {without:.0} ({:.1} % fewer) and \
          leaves {} items as {} does.",
@@ -70,13 +67,7 @@ fn of_stencil(report: &FunnelReport) -> Option<String> {
     ))
 }
 
-/// What the stencil of a mirror saves.
 fn of_mirror(row: &MirrorRow) -> String {
-    let MirrorRow {
-        with_stencil: with,
-        without_stencil: without,
-        ..
-    } = row;
     format!(
         "In item {} as a mirror across {} (in front in {}, at {:.1} samples per view) {:.1} items are \
          seen; the stencil asks {:.0} samples per view in place of {:.0}, and {} are shown differently.",
@@ -85,20 +76,17 @@ fn of_mirror(row: &MirrorRow) -> String {
         counted(row.view_count, "view"),
         row.marked_count,
         row.shown_count,
-        with.asked_count,
-        without.asked_count,
+        row.with_stencil.asked_count,
+        row.without_stencil.asked_count,
         counted(row.wrong_sample_count as usize, "sample")
     )
 }
 
-/// Where an order that is declared exact is not.
+/// Exceptions of an order that is declared exact.
 fn of_order(row: &OrderRow) -> impl Iterator<Item = String> {
     row.exceptions.iter().map(|(reason, views)| {
-        format!(
-            "Order {} may be wrong in {}: {reason}.",
-            row.name,
-            counted(*views, "view")
-        )
+        let views = counted(*views, "view");
+        format!("Order {} may be wrong in {views}: {reason}.", row.name)
     })
 }
 

@@ -1,21 +1,20 @@
-//! An item as a mirror: what is seen in it is drawn by the reflected camera, on the samples
-//! that see the mirror (the stencil) or on all of them. Both show the same there.
+//! An item as a mirror: the reflected camera draws the samples that see the mirror (the
+//! stencil), or all of them. Both show the same there.
 
 use serde::Serialize;
 
-use super::fragments::FragmentCounts;
-use super::left_out::{Reason, fits_drawing};
-use super::pass::Pass;
+use super::error::fits_drawing;
+use super::fragment_stage::FragmentCounts;
+use super::item_stages::ItemStages;
+use super::stage::Step;
 use super::world::World;
 use crate::camera::Camera;
 use crate::query::ItemId;
 use crate::scene::WorldBox;
-use crate::visibility::Solids;
 use crate::visibility::fragment::{Canvas, Piece, Stencil, Tests, draw};
 
-/// What a mirror shows. Counts are means per view.
+/// Items in a mirror. Counts are means per view.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-#[non_exhaustive]
 pub struct MirrorRow {
     /// The item whose face it is.
     pub item: ItemId,
@@ -27,34 +26,36 @@ pub struct MirrorRow {
     pub marked_count: f64,
     /// Items that are in front in it at one of them.
     pub shown_count: f64,
-    /// Drawn on these samples only, with those asked to find them.
+    /// Counts of these samples only, with those that find them.
     pub with_stencil: FragmentCounts,
-    /// Drawn on the whole image.
+    /// Counts of the whole image.
     pub without_stencil: FragmentCounts,
     /// Samples of the mirror that the two show differently: none.
     pub wrong_sample_count: u64,
 }
 
-/// The mirror in every view; `set` is what the chain leaves of each, which may hide it. It
-/// shows any other item. `None` if stopped.
+/// The mirror in every view, behind the items that `steps` leave. It shows every other
+/// item of the scene. `None` if stopped, without views or for triangles.
 ///
 /// # Errors
-/// More items than are drawn.
+/// Items that cover too many samples.
 pub fn mirrored(
     item: ItemId,
     world: &World,
-    solids: &Solids,
-    pass: &Pass,
-    set: usize,
+    stages: &ItemStages,
+    steps: &[Step],
     stop: &dyn Fn() -> bool,
-) -> Result<Option<MirrorRow>, Reason> {
+) -> Result<Option<MirrorRow>, String> {
+    let Some(solids) = world.shape.boxes() else {
+        return Ok(None);
+    };
     let own = &solids.boxes[item as usize];
     let axis = (own.max - own.min).min_position();
     let others = (0..solids.boxes.len() as ItemId).filter(|&other| other != item);
     let others: Vec<Piece> = others.map(Piece::whole).collect();
-    let [mut with, mut without] = [(); 2].map(|()| Vec::new());
+    let (mut with, mut without) = (Vec::new(), Vec::new());
     let (mut views, mut marked, mut shown, mut wrong) = (0, 0, 0, 0);
-    for view in 0..world.views() {
+    for view in world.views() {
         if stop() {
             return Ok(None);
         }
@@ -64,21 +65,15 @@ pub fn mirrored(
             without.push(Default::default());
             continue;
         };
-        let at = face.min[axis];
         let canvas = Canvas::of(rays, world.samples);
-        let left: Vec<Piece> = world
-            .listed(pass.items(set, view))
-            .iter()
-            .map(|&item| Piece::whole(item))
-            .collect();
+        let left = world.listed(stages.items(steps, view));
+        let left: Vec<Piece> = left.iter().copied().map(Piece::whole).collect();
         let direct = draw(&canvas, solids, &left, &Tests::default());
         let stencil = Stencil::of_rectangle(&canvas, &face, &direct.depth);
-        let reflected = canvas.mirrored(axis, at);
-        let all = solids.boxes.iter();
-        fits_drawing(
-            world.samples,
-            all.filter_map(|b| reflected.screen().rectangle(b)),
-        )?;
+        let reflected = canvas.mirrored(axis, face.min[axis]);
+        let screen = reflected.screen();
+        let rectangles = solids.boxes.iter().filter_map(|b| screen.rectangle(b));
+        fits_drawing(world.samples, rectangles)?;
         let tests = Tests {
             stencil: Some(&stencil),
             surfaces: None,
@@ -95,24 +90,21 @@ pub fn mirrored(
         with.push(seen.tally);
         without.push(all.tally);
     }
-    let mean = |sum: usize| sum as f64 / world.views() as f64;
-    let of = FragmentCounts::of;
-    let row = of(&with)
-        .zip(of(&without))
-        .map(|(with_stencil, without_stencil)| MirrorRow {
-            item,
-            axis: ['x', 'y', 'z'][axis],
-            view_count: views,
-            marked_count: mean(marked),
-            shown_count: mean(shown),
-            with_stencil,
-            without_stencil,
-            wrong_sample_count: wrong,
-        });
-    Ok(row)
+    let mean = |sum: usize| sum as f64 / world.views.len() as f64;
+    let counts = FragmentCounts::of(&with).zip(FragmentCounts::of(&without));
+    Ok(counts.map(|(with_stencil, without_stencil)| MirrorRow {
+        item,
+        axis: ['x', 'y', 'z'][axis],
+        view_count: views,
+        marked_count: mean(marked),
+        shown_count: mean(shown),
+        with_stencil,
+        without_stencil,
+        wrong_sample_count: wrong,
+    }))
 }
 
-/// The face of a box across an axis that a camera sees the front of.
+/// The face of a box across an axis whose front a camera sees.
 fn face_towards(camera: &Camera, b: &WorldBox, axis: usize) -> Option<WorldBox> {
     let (eye, forward) = (camera.frame.eye[axis], camera.frame.forward()[axis]);
     let [is_low, is_high] = match camera.lens.is_orthographic() {

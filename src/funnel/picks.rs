@@ -1,304 +1,316 @@
-//! What is under the cursor: the first item along rays of every view, the nearest few, by
-//! every back end of picking; and everything through the cursor's own frustum, by every
-//! structure of the object stage. All held against the exact answer.
+//! Picking: the first and the nearest items along rays of every view by every back end,
+//! and everything in the frustum of a cursor by every structure of the object stage. All
+//! answers are compared with the exact ones.
 
+use std::cell::RefCell;
 use std::rc::Rc;
 
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Serialize};
 
-use super::left_out::LeftOutRow;
-use super::pickable::{Built, Exactly, NEAREST, Pickable};
-use super::stage::by_name;
-use super::times::Times;
-use super::world::World;
-use crate::camera::Surroundings;
-use crate::index::{DynIndex, caught};
+use super::error::LeftOutRow;
+use super::task::{FunnelKey, KeyedTask, Times};
+use super::world::{Shape, World};
+use crate::index::caught;
 use crate::query::ItemId;
-use crate::visibility::pick::{CursorRectangle, Hit, NotBuilt, Pick};
+use crate::visibility::pick::{BACK_ENDS, BackEnd, CursorRectangle, NotBuilt, Pick};
+use crate::visibility::truth::{Boxes, Facets, RayIndex, SurfaceIndex};
 use crate::visibility::{Guarantee, Ray, Rays, SampleGrid};
 
-/// Cursor places of a view.
+/// Cursors of a view.
 const CURSORS: SampleGrid = SampleGrid::new(16, 9);
-/// Items of which every one is looked at for each ray, or each cursor's frustum, at most.
+/// Most items of which every one is tested for each ray, or each cursor's frustum.
 const MOST_FOR_LOOP: usize = 20_000;
-/// The cursor's frustum reaches so many pixels to each side.
+/// Half width of a cursor's frustum, pixels.
 const REACH: f64 = 4.0;
+/// Number of nearest items.
+pub const NEAREST: usize = 8;
 
 named! {
-    /// What is asked at a cursor.
-    #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
-    #[non_exhaustive]
+    /// A question about a cursor.
+    #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
     pub enum PickQuestion {
         /// The first item along the ray.
+        #[serde(rename = "first item")]
         First = "first item",
-        /// The nearest few along the ray, and what is as near as the last of them.
+        /// The nearest few along the ray, and all that are as near as the last of them.
+        #[serde(rename = "nearest 8")]
         Nearest = "nearest 8",
         /// Every item in the frustum of a small rectangle about the cursor.
+        #[serde(rename = "all within 4 pixels")]
         Through = "all within 4 pixels",
-    }
-}
-
-impl Serialize for PickQuestion {
-    fn serialize<S: Serializer>(&self, out: S) -> Result<S::Ok, S::Error> {
-        out.serialize_str(self.name())
     }
 }
 
 /// A back end of picking over all views.
 #[derive(Clone, Debug, Serialize)]
-#[non_exhaustive]
 pub struct PickRow {
-    /// What is asked.
+    /// The question that it answers.
     pub question: PickQuestion,
-    /// As in the table of back ends, or the structure.
+    /// Name in the table of back ends, or of the structure.
     pub name: String,
     /// One line about it.
     pub summary: &'static str,
-    /// What it promises.
-    #[serde(serialize_with = "by_name")]
+    /// Declared guarantee of its answers.
     pub guarantee: Guarantee,
-    /// Cursor places that were asked about, over all views.
+    /// Cursors of all views.
     pub ray_count: usize,
-    /// Of them those for which the answer was not the exact one.
+    /// Cursors for which the answer is not the exact one.
     pub wrong_count: usize,
-    /// Thread CPU time of all places of a view.
+    /// Thread CPU time of all cursors of a view.
     #[serde(flatten)]
     pub times: Times,
-    /// The same per place.
+    /// The same per cursor.
     pub ns_per_ray: Option<f64>,
 }
 
-/// What answers a question.
-enum By<'w> {
-    First(Rc<dyn Pick>),
-    Nearest(Rc<dyn Pick>),
-    Through(&'w dyn DynIndex),
-}
+impl PickRow {
+    pub(super) fn key(&self) -> FunnelKey {
+        FunnelKey::Pick(self.question, self.name.clone())
+    }
 
-impl By<'_> {
-    fn question(&self) -> PickQuestion {
-        match self {
-            By::First(_) => PickQuestion::First,
-            By::Nearest(_) => PickQuestion::Nearest,
-            By::Through(_) => PickQuestion::Through,
-        }
+    pub(super) fn set(&mut self, times: Times) {
+        self.times = times;
+        self.ns_per_ray = times.stage_ns.map(|ns| ns / CURSORS.samples() as f64);
     }
 }
 
-/// A question with what answers it.
-struct Picker<'w> {
-    name: String,
-    summary: &'static str,
-    guarantee: Guarantee,
-    by: By<'w>,
-}
+/// Appends the answer at a cursor of a view.
+type Answer<'w> = Box<dyn Fn(&Rays, &Cursor, &mut Vec<ItemId>) + 'w>;
 
-/// A cursor: its ray and its rectangle of the image.
+/// Builds a back end over the items of a scene.
+type Build<'w> = Box<dyn Fn(&BackEnd) -> Result<Box<dyn Pick>, NotBuilt> + 'w>;
+
+/// A ray and a rectangle of the image.
 struct Cursor {
     ray: Ray,
     rectangle: CursorRectangle,
 }
 
-/// The cursors of a view, and the rays of its whole image.
-struct Cursors {
-    rays: Rays,
-    places: Vec<Cursor>,
-}
-
-/// Everything that answers, and the cursors of every view.
+/// Every back end with its row, and the cursors of every view.
 pub struct Picks<'w> {
     world: &'w World<'w>,
-    around: Surroundings,
-    pickable: Pickable<'w>,
-    pickers: Vec<Picker<'w>>,
-    cursors: Vec<Cursors>,
+    pickers: Vec<(PickRow, Answer<'w>)>,
+    cursors: Vec<Vec<Cursor>>,
     /// Back ends that refuse the scene.
     pub left_out: Vec<LeftOutRow>,
 }
 
 impl<'w> Picks<'w> {
-    /// Cursor places of a view.
-    pub const RAYS_PER_VIEW: f64 = (CURSORS.width * CURSORS.height) as f64;
-
     /// Builds every back end that can hold the scene.
-    pub fn of(world: &'w World<'w>) -> Picks<'w> {
-        let suits = |name: &str| name != "linear" || world.items() <= MOST_FOR_LOOP;
-        let pickable = Pickable::of(world);
-        let views = 0..world.views();
-        let cursors: Vec<Cursors> = views.map(|view| Cursors::of(world, view)).collect();
-        let (mut built, mut left_out) = pickable.back_ends(MOST_FOR_LOOP, world.kernel);
-        built.retain(|back_end| {
-            let refused = answers(back_end, &cursors).err();
-            let row = |reason| LeftOutRow::of("picks", back_end.name, reason);
-            let is_there = refused.is_none();
-            left_out.extend(refused.map(row));
-            is_there
-        });
-        let by_rays = |ask: fn(Rc<dyn Pick>) -> By<'w>| {
-            let pickers = built.iter().map(move |back_end| Picker {
-                name: back_end.name.to_owned(),
-                summary: back_end.summary,
-                guarantee: back_end.guarantee,
-                by: ask(back_end.pick.clone()),
-            });
-            pickers.collect::<Vec<_>>()
-        };
-        let structures = world.structures().filter(|(label, _)| suits(label));
-        let through = structures.map(|(label, index)| Picker {
-            name: label.to_owned(),
-            summary: "the six-plane test of the cursor's frustum by a structure",
-            guarantee: Guarantee::Conservative,
-            by: By::Through(index),
-        });
-        let pickers = by_rays(By::First).into_iter().chain(by_rays(By::Nearest));
-        Picks {
+    pub fn new(world: &'w World<'w>) -> Picks<'w> {
+        let cursors = world
+            .views()
+            .map(|view| cursors(world.rays(view), world.samples));
+        let mut picks = Picks {
             world,
-            around: world.scene.surroundings(),
-            pickable,
-            left_out,
-            pickers: pickers.chain(through).collect(),
-            cursors,
-        }
+            pickers: Vec::new(),
+            cursors: cursors.collect(),
+            left_out: Vec::new(),
+        };
+        picks.add_rays();
+        picks.add_frusta();
+        picks
     }
 
-    /// How many rows there are.
-    pub fn count(&self) -> usize {
-        self.pickers.len()
-    }
-
-    /// The answers at all cursors of a view, one after the other.
-    pub fn ask(&self, picker: usize, view: usize, out: &mut Vec<ItemId>) {
-        let by = &self.pickers[picker].by;
-        let Cursors { rays, places } = &self.cursors[view];
-        let mut hits = Vec::new();
-        for cursor in places {
-            self.answer(by, rays, cursor, &mut hits, out);
-        }
-    }
-
-    /// Appends the answer at a cursor.
-    fn answer(
-        &self,
-        by: &By,
-        rays: &Rays,
-        cursor: &Cursor,
-        hits: &mut Vec<Hit>,
-        out: &mut Vec<ItemId>,
+    fn add(
+        &mut self,
+        question: PickQuestion,
+        (name, summary, guarantee): (&str, &'static str, Guarantee),
+        answer: Answer<'w>,
     ) {
-        match by {
-            By::First(pick) => out.extend(pick.first(&cursor.ray).map(|hit| hit.item)),
-            By::Nearest(pick) => {
-                pick.nearest(&cursor.ray, NEAREST, hits);
-                out.extend(hits.iter().map(|hit| hit.item));
-            }
-            // A rectangle that f64 cannot tell from a point holds nothing.
-            By::Through(index) => {
-                if let Ok(volume) = cursor.rectangle.volume(rays, &self.around) {
-                    index.visible(&volume, out);
-                }
-            }
-        }
-    }
-
-    /// Every row against the exact answer.
-    pub fn judged(&self) -> Vec<PickRow> {
-        let exactly = self.pickable.exactly();
-        let rows = self.pickers.iter().map(|picker| PickRow {
-            question: picker.by.question(),
-            name: picker.name.clone(),
-            summary: picker.summary,
-            guarantee: picker.guarantee,
+        let row = PickRow {
+            question,
+            name: name.to_owned(),
+            summary,
+            guarantee,
             ray_count: 0,
             wrong_count: 0,
             times: Times::default(),
             ns_per_ray: None,
-        });
-        let mut rows: Vec<PickRow> = rows.collect();
-        let (mut hits, mut answer) = (Vec::new(), Vec::new());
-        for Cursors { rays, places } in &self.cursors {
-            for cursor in places {
-                let truth = self.truth(&exactly, rays, cursor);
-                for (row, picker) in rows.iter_mut().zip(&self.pickers) {
-                    answer.clear();
-                    self.answer(&picker.by, rays, cursor, &mut hits, &mut answer);
+        };
+        self.pickers.push((row, answer));
+    }
+
+    /// Back ends along rays: first the rows of the first item, then those of the nearest.
+    fn add_rays(&mut self) {
+        let world = self.world;
+        let (count, build): (usize, Build) = match &world.shape {
+            Shape::Boxes(solids) => {
+                let boxes = Boxes::of(solids);
+                let build: Build = Box::new(move |row| (row.boxes)(&boxes, world.kernel));
+                (solids.boxes.len(), build)
+            }
+            Shape::Triangles(surfaces) => {
+                let facets = Facets::solid(surfaces, world.items());
+                let build: Build = Box::new(move |row| (row.facets)(&facets, world.kernel));
+                (surfaces.triangles.len(), build)
+            }
+        };
+        let mut built: Vec<((&str, &'static str, Guarantee), Rc<dyn Pick>)> = Vec::new();
+        for row in BACK_ENDS {
+            if row.name == "linear" && count > MOST_FOR_LOOP {
+                continue;
+            }
+            let pick = build(row);
+            let pick = pick.map(Rc::from).and_then(|pick| {
+                let is_foreign = row.guarantee == Guarantee::Unproven;
+                if is_foreign {
+                    self.try_out(row.name, &pick)?;
+                }
+                Ok(pick)
+            });
+            match pick {
+                Ok(pick) => built.push(((row.name, row.summary, row.guarantee), pick)),
+                Err(reason) => {
+                    let row = LeftOutRow::new("picks", row.name, reason);
+                    self.left_out.push(row);
+                }
+            }
+        }
+        for (declared, pick) in built.iter().cloned() {
+            let first: Answer = Box::new(move |_, cursor, out| {
+                out.extend(pick.first(&cursor.ray).map(|hit| hit.item));
+            });
+            self.add(PickQuestion::First, declared, first);
+        }
+        for (declared, pick) in built {
+            let hits = RefCell::new(Vec::new());
+            let nearest: Answer = Box::new(move |_, cursor, out| {
+                let hits = &mut *hits.borrow_mut();
+                pick.nearest(&cursor.ray, NEAREST, hits);
+                out.extend(hits.iter().map(|hit| hit.item));
+            });
+            self.add(PickQuestion::Nearest, declared, nearest);
+        }
+    }
+
+    /// Structures of the object stage, by the frusta of the cursors.
+    fn add_frusta(&mut self) {
+        let world = self.world;
+        for (label, index) in &world.structures {
+            if label == "linear" && world.items() > MOST_FOR_LOOP {
+                continue;
+            }
+            let around = world.scene.surroundings();
+            let through: Answer = Box::new(move |rays, cursor, out| {
+                // A rectangle that f64 cannot tell from a point holds nothing.
+                if let Ok(volume) = cursor.rectangle.volume(rays, &around) {
+                    index.visible(&volume, out);
+                }
+            });
+            let summary = "the six-plane test of the cursor's frustum by a structure";
+            let declared = (label.as_str(), summary, Guarantee::Conservative);
+            self.add(PickQuestion::Through, declared, through);
+        }
+    }
+
+    /// Runs code of another crate at every cursor once, so that it panics here or never.
+    fn try_out(&self, name: &'static str, pick: &Rc<dyn Pick>) -> Result<(), NotBuilt> {
+        let mut hits = Vec::new();
+        let ask = || {
+            for cursor in self.cursors.iter().flatten() {
+                pick.first(&cursor.ray);
+                pick.nearest(&cursor.ray, NEAREST, &mut hits);
+            }
+        };
+        caught(ask).map_err(|message| NotBuilt::Panicked { name, message })
+    }
+
+    /// Every row; the ids are the answers at all cursors of a view, one after the other.
+    pub fn tasks(&self) -> impl Iterator<Item = KeyedTask<'_>> {
+        self.pickers.iter().map(move |(row, answer)| KeyedTask {
+            key: row.key(),
+            ask: Box::new(move |view, out| {
+                for cursor in &self.cursors[view] {
+                    answer(self.world.rays(view), cursor, out);
+                }
+            }),
+        })
+    }
+
+    /// Every row, compared with the exact answers.
+    pub fn compared(&self) -> Vec<PickRow> {
+        let exact: Box<dyn Pick> = match &self.world.shape {
+            Shape::Boxes(solids) => Box::new(RayIndex::build(solids)),
+            Shape::Triangles(surfaces) => Box::new(SurfaceIndex::of(&Facets::solid(
+                surfaces,
+                self.world.items(),
+            ))),
+        };
+        let mut rows: Vec<PickRow> = self.pickers.iter().map(|(row, _)| row.clone()).collect();
+        let mut found = Vec::new();
+        for (cursors, view) in self.cursors.iter().zip(self.world.views()) {
+            let rays = self.world.rays(view);
+            for cursor in cursors {
+                let truth = self.truth(&*exact, rays, cursor);
+                for (row, (_, answer)) in rows.iter_mut().zip(&self.pickers) {
+                    found.clear();
+                    answer(rays, cursor, &mut found);
                     row.ray_count += 1;
-                    row.wrong_count += usize::from(!truth.agrees(row.question, &mut answer));
+                    row.wrong_count += usize::from(!truth.agrees(row.question, &mut found));
                 }
             }
         }
         rows
     }
 
-    fn truth(&self, exactly: &Exactly, rays: &Rays, cursor: &Cursor) -> Truth {
-        let volume = cursor.rectangle.volume(rays, &self.around).ok();
-        let items = &self.world.scene.items;
-        let volume = volume.filter(|_| items.len() <= MOST_FOR_LOOP);
-        let in_planes = volume.map(|volume| {
-            let ids = (0..).zip(items);
-            ids.filter(|(_, b)| volume.sees(b))
-                .map(|(id, _)| id)
-                .collect()
+    fn truth(&self, exact: &dyn Pick, rays: &Rays, cursor: &Cursor) -> Truth {
+        let scene = self.world.scene;
+        let is_small = scene.items.len() <= MOST_FOR_LOOP;
+        let volume = cursor.rectangle.volume(rays, &scene.surroundings());
+        let in_planes = volume.ok().filter(|_| is_small).map(|volume| {
+            let ids = (0..).zip(&scene.items).filter(|(_, b)| volume.sees(b));
+            ids.map(|(id, _)| id).collect()
         });
         Truth {
-            first: exactly.first(&cursor.ray).into_iter().collect(),
-            nearest: exactly.nearest(&cursor.ray, NEAREST),
-            met: met_within(exactly, rays, &cursor.rectangle),
+            first: exact
+                .first(&cursor.ray)
+                .iter()
+                .map(|hit| hit.item)
+                .collect(),
+            nearest: nearest(exact, &cursor.ray, NEAREST),
+            met: met_within(exact, rays, &cursor.rectangle),
             in_planes,
         }
     }
 }
 
-/// Has code of others answer at every cursor once, so that a panic is known before any row.
-fn answers(back_end: &Built, cursors: &[Cursors]) -> Result<(), NotBuilt> {
-    if back_end.guarantee != Guarantee::Unproven {
-        return Ok(());
-    }
-    let (name, mut hits) = (back_end.name, Vec::new());
-    let ask = || {
-        for cursor in cursors.iter().flat_map(|of_view| &of_view.places) {
-            back_end.pick.first(&cursor.ray);
-            back_end.pick.nearest(&cursor.ray, NEAREST, &mut hits);
+fn nearest(pick: &dyn Pick, ray: &Ray, count: usize) -> Vec<ItemId> {
+    let mut hits = Vec::new();
+    pick.nearest(ray, count, &mut hits);
+    hits.into_iter().map(|hit| hit.item).collect()
+}
+
+/// Cursors at the centres of a grid over the image.
+fn cursors(rays: &Rays, image: SampleGrid) -> Vec<Cursor> {
+    let size = [image.width, image.height].map(f64::from);
+    let part = |index: u32, of: u32| (f64::from(index) + 0.5) / f64::from(of);
+    let rows = 0..CURSORS.height;
+    let places = rows.flat_map(|row| (0..CURSORS.width).map(move |column| (column, row)));
+    let cursor = |(column, row): (u32, u32)| {
+        let (x, y) = (part(column, CURSORS.width), part(row, CURSORS.height));
+        Cursor {
+            ray: rays.through(x, y),
+            rectangle: CursorRectangle::around([x * size[0], y * size[1]], REACH, size),
         }
     };
-    caught(ask).map_err(|message| NotBuilt::Panicked { name, message })
+    places.map(cursor).collect()
 }
 
-impl Cursors {
-    fn of(world: &World, view: usize) -> Cursors {
-        let rays = *world.rays(view);
-        let grid = world.samples;
-        let size = [grid.width, grid.height].map(f64::from);
-        let rows = 0..CURSORS.height;
-        let places = rows.flat_map(|row| (0..CURSORS.width).map(move |column| (column, row)));
-        let cursor = |(column, row): (u32, u32)| {
-            let part = |index: u32, of: u32| (f64::from(index) + 0.5) / f64::from(of);
-            let (x, y) = (part(column, CURSORS.width), part(row, CURSORS.height));
-            Cursor {
-                ray: rays.through(x, y),
-                rectangle: CursorRectangle::around([x * size[0], y * size[1]], REACH, size),
-            }
-        };
-        Cursors {
-            rays,
-            places: places.map(cursor).collect(),
-        }
-    }
-}
-
-/// What is true at a cursor.
+/// Exact answers at a cursor.
 struct Truth {
     first: Vec<ItemId>,
     /// In the order of depth, then of ids.
     nearest: Vec<ItemId>,
     /// Items that some rays through the rectangle meet, ascending: none may be missing.
     met: Vec<ItemId>,
-    /// What no plane of the rectangle's frustum excludes, ascending; `None` where there
-    /// are too many items to look at each.
+    /// Items that no plane of the rectangle's frustum excludes, ascending; `None` where
+    /// there are too many items to test each.
     in_planes: Option<Vec<ItemId>>,
 }
 
 impl Truth {
-    /// Whether an answer is the exact one; a set is put in order.
+    /// Whether an answer is the exact one; sorts a set.
     fn agrees(&self, question: PickQuestion, answer: &mut [ItemId]) -> bool {
         match question {
             PickQuestion::First => *answer == self.first[..],
@@ -313,14 +325,14 @@ impl Truth {
     }
 }
 
-/// Every item that the rays through corners, edges and middle of a rectangle meet.
-fn met_within(exactly: &Exactly, rays: &Rays, rectangle: &CursorRectangle) -> Vec<ItemId> {
+/// Items that the rays through corners, edges and middle of a rectangle meet.
+fn met_within(exact: &dyn Pick, rays: &Rays, rectangle: &CursorRectangle) -> Vec<ItemId> {
     let CursorRectangle { min, max } = rectangle;
     let middle = [0, 1].map(|axis| (min[axis] + max[axis]) / 2.0);
     let mut met = Vec::new();
     for x in [min[0], middle[0], max[0]] {
         for y in [min[1], middle[1], max[1]] {
-            met.extend(exactly.nearest(&rays.through(x, y), usize::MAX));
+            met.extend(nearest(exact, &rays.through(x, y), usize::MAX));
         }
     }
     met.sort_unstable();

@@ -1,14 +1,19 @@
-//! The first view from above: where each item is and which stage removed it.
+//! The first view from above: the place of each item, and the stage that removed it.
 
-use super::stage::StageKind;
+use glam::DVec3;
+
+use super::item_stages::ItemStages;
+use super::stage::{Chain, StageKind};
+use super::truth::Truth;
+use super::world::World;
 use crate::query::ItemId;
 
-/// What became of an item.
+/// The stage that removed an item, or the item's visibility.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum Fate {
     /// A stage removed it.
     Removed(StageKind),
-    /// Every stage handed it on, and no sample sees it.
+    /// Every stage kept it, and no sample sees it.
     Kept,
     /// In front at a sample.
     Visible,
@@ -23,18 +28,52 @@ pub struct PlanView {
     pub eye: [f64; 2],
     /// Directions of the left and the right edge of the view.
     pub edges: [[f64; 2]; 2],
-    /// Low and high corner of each item, and its fate; what is farthest first.
+    /// Low and high corner of each item, and its fate; the farthest first.
     pub items: Vec<([f64; 4], Fate)>,
 }
 
 /// Most items that are drawn: those nearest to the eye.
-pub const MOST_DRAWN: usize = 4_000;
+const MOST_DRAWN: usize = 4_000;
 
-/// The fate of an item from the sets before and after each stage, and whether it is
-/// visible. Sets are ascending, `None` is all items.
-pub fn fate(item: ItemId, sets: &[(StageKind, Option<&[ItemId]>)], is_visible: bool) -> Fate {
+impl PlanView {
+    /// The first view, behind the stages of whole items of a chain.
+    pub fn of(world: &World, stages: &ItemStages, chain: &Chain, truth: &Truth) -> PlanView {
+        let (Some(view), Some(visible)) = (world.views.first(), truth.first()) else {
+            return PlanView::default();
+        };
+        let left = StageKind::OF_ITEMS.map(|stage| {
+            let steps = chain.steps_with(stage, chain.of(stage));
+            (stage, stages.items(&steps, 0))
+        });
+        let is_visible = |item| visible.binary_search_by_key(&item, |(id, _)| *id).is_ok();
+        let eye = view.rays.camera().frame.eye;
+        let flat = |v: DVec3| [v.x, v.y];
+        let items = world.scene.items.iter().zip(0..);
+        let mut near: Vec<(f64, [f64; 4], ItemId)> = items
+            .filter(|(b, _)| !b.is_empty())
+            .map(|(b, item)| {
+                let (min, max) = b.in_world(world.scene.origin);
+                let nearest = eye.clamp(min, max).with_z(eye.z);
+                (nearest.distance(eye), [min.x, min.y, max.x, max.y], item)
+            })
+            .collect();
+        near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.2.cmp(&b.2)));
+        near.truncate(MOST_DRAWN);
+        let drawn = near.into_iter().rev();
+        PlanView {
+            eye: flat(eye),
+            edges: [0.0, 1.0].map(|x| flat(view.rays.through(x, 0.5).direction)),
+            items: drawn
+                .map(|(_, plan, item)| (plan, fate(item, &left, is_visible(item))))
+                .collect(),
+        }
+    }
+}
+
+/// Fate of an item, from the ascending items behind each stage (`None`: all items).
+fn fate(item: ItemId, left: &[(StageKind, Option<&[ItemId]>)], is_visible: bool) -> Fate {
     let lacks = |set: &Option<&[ItemId]>| set.is_some_and(|set| set.binary_search(&item).is_err());
-    let removed = sets.iter().find(|(_, set)| lacks(set));
+    let removed = left.iter().find(|(_, set)| lacks(set));
     match (removed, is_visible) {
         (Some(_), true) => Fate::Lost,
         (Some((stage, _)), false) => Fate::Removed(*stage),

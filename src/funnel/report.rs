@@ -1,19 +1,17 @@
-//! What a study of the funnel finds, as it is shown and written.
+//! Report of a study, as it is shown and written.
 
 use serde::Serialize;
 
 use super::bounds::BoundRow;
-use super::chain::Chain;
-use super::fragments::FragmentCounts;
-use super::judged::Errors;
-use super::left_out::LeftOutRow;
+use super::counts::Errors;
+use super::error::LeftOutRow;
+use super::fragment_stage::FragmentCounts;
 use super::mirror::MirrorRow;
 use super::orders::OrderRow;
 use super::picks::PickRow;
 use super::plan_view::PlanView;
-use super::stage::{BackEnd, StageKind};
-use super::times::Times;
-use crate::measure::OverProcesses;
+use super::stage::{BackEnd, Chain, StageKind};
+use super::task::{FunnelKey, KeyedTimes, Times};
 use crate::statistics::{ALPHA, trimmed_mean};
 use crate::visibility::Level;
 use crate::visibility::fragment::{CutOuts, Surfaces};
@@ -21,51 +19,48 @@ use crate::visibility::hiders::{BlocksRow, GroundRow, InnerRow};
 
 /// The funnel of a scene and a path.
 #[derive(Clone, Debug, Serialize)]
-#[non_exhaustive]
 pub struct FunnelReport {
-    /// As it was asked for.
+    /// Scene as typed.
     pub scene: String,
-    /// As it was asked for.
+    /// Path as typed.
     pub path: String,
-    /// Items of the scene.
+    /// Number of items of the scene.
     pub items: usize,
-    /// Views that were looked at.
+    /// Number of views.
     pub views: usize,
     /// Columns and rows of samples of a view.
     pub samples: [u32; 2],
-    /// Processes that the times are of.
+    /// Number of timed processes.
     pub processes: usize,
-    /// What was selected of the scene's file.
+    /// The selected level of the scene's file.
     pub level: LevelRow,
-    /// Which items have holes; null where none was asked for.
+    /// Items that have holes; null unless requested.
     pub cut_outs: Option<CutOutRow>,
-    /// What `hierarchical-z` draws: `all`, `nearest:64`.
+    /// Occluders that `hierarchical-z` draws: `all`, `nearest:64`.
     pub occluders: String,
-    /// The chain whose stages follow each other in [`FunnelReport::stages`].
+    /// The chain; each stage of [`FunnelReport::stages`] gets the items that it leaves.
     pub chain: Chain,
-    /// Every stage with every back end, each given what the chain hands it.
+    /// Every stage with every back end.
     pub stages: Vec<StageRow>,
-    /// The boxes inside the items of a mesh, which hide what is behind them; null for
-    /// what is no mesh.
+    /// Occluding boxes inside the items of a mesh; null for other scenes.
     pub inner_boxes: Option<InnerRow>,
-    /// The boxes in the solid of a map, which hide what is behind them; null for what is no
-    /// map.
+    /// Occluding boxes in the solid of a map; null for other scenes.
     pub solid_blocks: Option<BlocksRow>,
-    /// The boxes below the ground of a mesh; null for a scene without ground.
+    /// Occluding boxes below the ground of a mesh; null for a scene without ground.
     pub ground: Option<GroundRow>,
-    /// What is seen in a mirror; null where none was asked for.
+    /// Items in a mirror; null unless requested.
     pub mirror: Option<MirrorRow>,
-    /// What is left, drawn in every order.
+    /// Every depth order of the remaining items.
     pub orders: Vec<OrderRow>,
-    /// What is under a cursor, by every back end of picking and every structure.
+    /// Items under a cursor, by every back end of picking and every structure.
     pub picks: Vec<PickRow>,
-    /// Rows that are not there, and why.
+    /// Missing rows, each with its reason.
     pub left_out: Vec<LeftOutRow>,
-    /// The least that some of the back ends can take.
+    /// Lower bounds of some of the back ends.
     pub bounds: Vec<BoundRow>,
     /// Each stage of the chain, with it and without it.
     pub gains: Vec<Gain>,
-    /// What follows, in a sentence each.
+    /// Conclusions, a sentence each.
     pub conclusions: Vec<String>,
     /// The first view from above.
     #[serde(skip)]
@@ -74,17 +69,16 @@ pub struct FunnelReport {
 
 /// The level stage.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-#[non_exhaustive]
 pub struct LevelRow {
-    /// Maps of the file; 1 for what holds none.
+    /// Maps of the file; 1 for a file without maps.
     pub map_count: usize,
-    /// The one that was selected.
+    /// The selected map.
     pub selected: String,
     /// Items of all maps.
     pub input_count: usize,
-    /// Items of the selected one.
+    /// Items of the selected map.
     pub output_count: usize,
-    /// Wall time that decoding the others takes; null where there are none.
+    /// Wall time of decoding the other maps; null without others.
     pub saved_load_ns: Option<f64>,
     /// Lower end of its 95 % interval.
     pub saved_load_ns_lower: Option<f64>,
@@ -92,9 +86,8 @@ pub struct LevelRow {
     pub saved_load_ns_upper: Option<f64>,
 }
 
-impl LevelRow {
-    /// Of a level.
-    pub fn of(level: &Level) -> LevelRow {
+impl From<&Level> for LevelRow {
+    fn from(level: &Level) -> LevelRow {
         let saved = level.saved_ns();
         let interval = saved.map(|saved| saved.interval(1.0 - ALPHA));
         LevelRow {
@@ -111,23 +104,22 @@ impl LevelRow {
 
 /// The items that have holes.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-#[non_exhaustive]
 pub struct CutOutRow {
-    /// Where they are opaque.
+    /// Name of the mask that says where they are opaque.
     pub mask: &'static str,
-    /// Of the items that may be cut out.
+    /// Share of the items that may be cut out.
     pub share: f64,
     /// Edge length of a tile of the mask, world units.
     pub tile: f64,
-    /// Which items they are.
+    /// Seed of the choice of items.
     pub seed: u64,
-    /// How many they are.
+    /// Number of items with holes.
     pub item_count: usize,
 }
 
 impl CutOutRow {
-    /// Of what was asked for, and what it made.
-    pub fn of(cut_outs: &CutOuts, made: &Surfaces) -> CutOutRow {
+    /// Options, and the surfaces made from them.
+    pub(super) fn new(cut_outs: &CutOuts, made: &Surfaces) -> CutOutRow {
         CutOutRow {
             mask: cut_outs.mask.name(),
             share: cut_outs.share,
@@ -140,120 +132,133 @@ impl CutOutRow {
 
 /// A stage done by a back end.
 #[derive(Clone, Debug, Serialize)]
-#[non_exhaustive]
 pub struct StageRow {
-    /// What does it.
+    /// The back end.
     #[serde(flatten)]
     pub back_end: BackEnd,
     /// The structure of the object stage; `null` elsewhere.
     pub structure: Option<String>,
     /// Whether it is part of the chain.
     pub is_chosen: bool,
-    /// What is counted: items or triangles.
+    /// Unit of the counts: items or triangles.
     pub unit: &'static str,
-    /// What it let through and what it lost.
+    /// Errors against the truth.
     #[serde(flatten)]
     pub errors: Errors,
     /// Thread CPU time of a view.
     #[serde(flatten)]
     pub times: Times,
-    /// Time / what it removed: above this cost of drawing one of them it pays.
+    /// Time / removed candidates: drawing one must cost more for the stage to pay.
     pub ns_per_removed: Option<f64>,
-    /// Time / what it was given.
+    /// Time / candidates.
     pub ns_per_decided: Option<f64>,
     /// Samples and fragments of a test of the fragment stage; null elsewhere.
     pub fragments: Option<FragmentCounts>,
 }
 
-/// What a stage is worth where all others are as in the chain.
+impl StageRow {
+    /// A row without times, done in its place in a chain.
+    pub(super) fn new(back_end: BackEnd, name: &str, chain: &Chain, errors: Errors) -> StageRow {
+        StageRow {
+            structure: (back_end.name != name).then(|| name.to_owned()),
+            is_chosen: chain.of(back_end.stage) == name,
+            unit: back_end.stage.unit(),
+            back_end,
+            errors,
+            times: Times::default(),
+            ns_per_removed: None,
+            ns_per_decided: None,
+            fragments: None,
+        }
+    }
+
+    pub(super) fn key(&self, chain: &Chain) -> Option<FunnelKey> {
+        let name = self.structure.as_deref().unwrap_or(self.back_end.name);
+        FunnelKey::of_stage(chain, self.back_end.stage, name)
+    }
+
+    pub(super) fn set(&mut self, chain: &Chain, times: &KeyedTimes) {
+        let Some(found) = self.key(chain).and_then(|key| times.ns(&key)) else {
+            return;
+        };
+        let per = |count: f64| (count > 0.0).then(|| found.value / count);
+        self.ns_per_removed = per(self.errors.input_count - self.errors.output_count);
+        self.ns_per_decided = per(self.errors.input_count);
+        self.times = Times::of(Some(found));
+    }
+}
+
+/// Worth of a stage where all others are as in the chain.
 #[derive(Clone, Debug, Serialize)]
-#[non_exhaustive]
 pub struct Gain {
     /// The stage that is left out on the other side.
     pub stage: StageKind,
-    /// What does it.
+    /// Its back end.
     pub back_end: String,
-    /// What is counted at the end: items, triangles or shaded fragments.
+    /// Unit of the counts: items, triangles or shaded fragments.
     pub unit: &'static str,
-    /// Time of all stages of whole items together, a view, and of the one behind them if it
-    /// is this one.
+    /// Time of a view: all stages of whole items, and the stage itself.
     pub with_ns: Option<f64>,
     /// The same without the stage.
     pub without_ns: Option<f64>,
-    /// What is left in the end, a view.
+    /// Count at the end of the chain, per view.
     pub with_count: f64,
     /// The same without the stage.
     pub without_count: f64,
-    /// Cost of drawing one of them above which the stage pays: what it costs in all / what
-    /// it removes in the end. 0 if it saves time as well; null if it removes nothing or has no
-    /// time.
+    /// Extra time / removed candidates: the cost of drawing one above which the stage pays.
+    ///
+    /// 0 if it saves time as well; null if it removes nothing or has no time.
     pub break_even_ns: Option<f64>,
     /// Lower end of its 95 % interval.
     pub break_even_ns_lower: Option<f64>,
     /// Upper end of its 95 % interval.
     pub break_even_ns_upper: Option<f64>,
-}
-
-/// One side of a [`Gain`]: the tasks of a chain's steps, and what is left in the end.
-pub struct Side {
-    /// Tasks of the timed pass.
-    pub tasks: Vec<usize>,
-    /// What is left, a view.
-    pub count: f64,
+    /// Tasks with the stage, and without it.
+    #[serde(skip)]
+    pub(super) tasks: [Vec<FunnelKey>; 2],
 }
 
 impl Gain {
-    /// What the stage removes in the end, a view.
-    pub fn removed(&self) -> f64 {
-        self.without_count - self.with_count
-    }
-
-    /// Of a chain with and without a stage.
-    pub fn of(
+    /// A gain without times, from counts and tasks with the stage and without it.
+    pub(super) fn new(
         stage: StageKind,
-        back_end: &str,
-        unit: &'static str,
-        [with, without]: [&Side; 2],
-        times: &OverProcesses,
+        (back_end, unit): (&str, &'static str),
+        [with_count, without_count]: [f64; 2],
+        tasks: [Vec<FunnelKey>; 2],
     ) -> Gain {
-        let (spent, saved) = (sums(with, times), sums(without, times));
-        let mean = |sums: &[f64]| centre(sums).filter(|_| !sums.is_empty());
-        let removed = without.count - with.count;
-        let costs: Vec<f64> = spent
-            .iter()
-            .zip(&saved)
-            .map(|(a, b)| (a - b) / removed)
-            .collect();
-        let pays = removed > 0.0;
-        let interval = trimmed_mean(&costs)
-            .map(|cost| cost.interval(1.0 - ALPHA))
-            .filter(|_| pays);
         Gain {
             stage,
             back_end: back_end.to_owned(),
             unit,
-            with_ns: mean(&spent),
-            without_ns: mean(&saved),
-            with_count: with.count,
-            without_count: without.count,
-            break_even_ns: centre(&costs).filter(|_| pays).map(|ns| ns.max(0.0)),
-            break_even_ns_lower: interval.map(|(lower, _)| lower.max(0.0)),
-            break_even_ns_upper: interval.map(|(_, upper)| upper.max(0.0)),
+            with_ns: None,
+            without_ns: None,
+            with_count,
+            without_count,
+            break_even_ns: None,
+            break_even_ns_lower: None,
+            break_even_ns_upper: None,
+            tasks,
         }
     }
-}
 
-/// Time of all steps of a side in each process, ns. A chain without steps takes none;
-/// one with a step that has no time has none.
-fn sums(side: &Side, times: &OverProcesses) -> Vec<f64> {
-    let of_steps: Vec<Vec<f64>> = side.tasks.iter().map(|&task| times.ln_ns(task)).collect();
-    let processes = (0..times.processes()).map(|process| {
-        let parts = of_steps
-            .iter()
-            .map(|step| step.get(process).map(|ln| ln.exp()));
-        parts.sum::<Option<f64>>().map(|sum| sum + 0.0)
-    });
-    processes.collect::<Option<_>>().unwrap_or_default()
+    /// Candidates that the stage removes in the end, per view.
+    pub fn removed(&self) -> f64 {
+        self.without_count - self.with_count
+    }
+
+    pub(super) fn set(&mut self, times: &KeyedTimes) {
+        let [with, without] = self.tasks.each_ref().map(|tasks| times.sums(tasks));
+        (self.with_ns, self.without_ns) = (centre(&with), centre(&without));
+        let removed = self.removed();
+        if removed > 0.0 {
+            let costs = with.iter().zip(&without).map(|(a, b)| (a - b) / removed);
+            let costs: Vec<f64> = costs.collect();
+            let interval = trimmed_mean(&costs).map(|cost| cost.interval(1.0 - ALPHA));
+            self.break_even_ns = centre(&costs).map(|ns| ns.max(0.0));
+            self.break_even_ns_lower = interval.map(|(lower, _)| lower.max(0.0));
+            self.break_even_ns_upper = interval.map(|(_, upper)| upper.max(0.0));
+        }
+    }
 }
 
 /// The trimmed mean, or below three values the plain one.

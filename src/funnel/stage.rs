@@ -1,11 +1,11 @@
-//! The stages of the funnel that cameras go through, in their order.
+//! Stages of the funnel in their order, their back ends, and chains of these.
 
 use serde::{Deserialize, Serialize};
 
 use crate::visibility::Guarantee;
 
 named! {
-    /// A stage that takes what may be visible and hands on less.
+    /// A stage that takes candidates and returns fewer of them.
     #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Serialize, Deserialize)]
     #[serde(rename_all = "snake_case")]
     #[non_exhaustive]
@@ -16,33 +16,48 @@ named! {
         Object = "object",
         /// Items that are not hidden behind others.
         Occlusion = "occlusion",
-        /// Triangles of what is left that face the eye.
+        /// Triangles of the remaining items that face the eye.
         Triangle = "triangle",
         /// Items that are in front at a sample.
         Fragment = "fragment",
     }
 }
 
+impl StageKind {
+    /// The stages that return whole items, which are then drawn.
+    pub const OF_ITEMS: [StageKind; 3] =
+        [StageKind::Region, StageKind::Object, StageKind::Occlusion];
+
+    /// Unit of the counts at the exit of the stage.
+    pub fn unit(self) -> &'static str {
+        match self {
+            StageKind::Triangle => "triangles",
+            _ => "items",
+        }
+    }
+}
+
+/// Name of the row of every stage that removes nothing.
+pub const NONE: &str = "none";
+
 /// A way to do a stage.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-#[non_exhaustive]
 pub struct BackEnd {
     /// The stage that it does.
     pub stage: StageKind,
-    /// What is typed.
+    /// Name on the command line.
     pub name: &'static str,
     /// One line about it.
     pub summary: &'static str,
-    /// What it promises.
-    #[serde(serialize_with = "by_name")]
+    /// Declared guarantee of its answers.
     pub guarantee: Guarantee,
     /// Whether it does the object stage as well, in one traversal.
     pub does_object_stage: bool,
 }
 
 impl BackEnd {
-    /// One that does a single stage, under its name and with its summary.
-    pub const fn of(
+    /// A back end of a single stage.
+    pub const fn new(
         stage: StageKind,
         [name, summary]: [&'static str; 2],
         guarantee: Guarantee,
@@ -55,32 +70,54 @@ impl BackEnd {
             does_object_stage: false,
         }
     }
-
-    /// The row of every stage that does nothing.
-    pub fn left_out(stage: StageKind) -> BackEnd {
-        let declared = [NONE, "the stage is left out"];
-        BackEnd::of(stage, declared, Guarantee::Conservative)
-    }
 }
 
-/// A guarantee as it is written.
-pub fn by_name<S: serde::Serializer>(guarantee: &Guarantee, out: S) -> Result<S::Ok, S::Error> {
-    out.serialize_str(guarantee.name())
+/// A stage of whole items and the name of its back end.
+pub type Step = (StageKind, String);
+
+/// A back end for each stage, by name.
+#[derive(Clone, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
+pub struct Chain {
+    names: [String; StageKind::ALL.len()],
 }
 
-/// The name of doing nothing: a row of every stage.
-pub const NONE: &str = "none";
-
-impl StageKind {
-    /// The stages that hand on whole items, which is what is drawn.
-    pub const OF_ITEMS: [StageKind; 3] =
-        [StageKind::Region, StageKind::Object, StageKind::Occlusion];
-
-    /// What is counted at its exit.
-    pub fn unit(self) -> &'static str {
-        match self {
-            StageKind::Triangle => "triangles",
-            _ => "items",
+impl Chain {
+    /// The chain that leaves out every stage.
+    pub fn empty() -> Chain {
+        Chain {
+            names: StageKind::ALL.map(|_| NONE.to_owned()),
         }
+    }
+
+    /// Name of the back end of a stage.
+    pub fn of(&self, stage: StageKind) -> &str {
+        &self.names[stage as usize]
+    }
+
+    /// The same chain with another back end in one stage.
+    pub fn with(mut self, stage: StageKind, name: &str) -> Chain {
+        name.clone_into(&mut self.names[stage as usize]);
+        self
+    }
+
+    /// The stages of whole items before `end` that the chain does not leave out.
+    pub fn steps_before(&self, end: StageKind) -> Vec<Step> {
+        let stages = StageKind::OF_ITEMS.into_iter().filter(|stage| *stage < end);
+        let steps = stages.map(|stage| (stage, self.of(stage).to_owned()));
+        steps.filter(|(_, name)| name != NONE).collect()
+    }
+
+    /// The stages of whole items up to one that another back end does.
+    pub fn steps_with(&self, stage: StageKind, name: &str) -> Vec<Step> {
+        let mut steps = self.steps_before(stage);
+        if name != NONE {
+            steps.push((stage, name.to_owned()));
+        }
+        steps
+    }
+
+    /// All stages of whole items that the chain does not leave out.
+    pub fn steps(&self) -> Vec<Step> {
+        self.steps_before(StageKind::Triangle)
     }
 }

@@ -1,237 +1,266 @@
-//! The study: every stage with every back end on the views of a path, held against
-//! the truth, then timed side by side in one or more processes.
+//! The study: every stage with every back end on the views of a path, compared with the
+//! truth, then timed side by side in one or more processes.
 
-use std::cell::RefCell;
-
-use super::back_ends::left_out_of;
-use super::bounds::{Bound, bounds};
-use super::chain::Chain;
+use super::back_ends::{Z, default_test, left_out_of};
+use super::bounds::{bounds, covered_key};
 use super::conclusions::conclusions;
-use super::error::FunnelError;
-use super::faces::Faces;
-use super::fragment_rows;
-use super::fragments::Fragments;
-use super::judged::{Errors, Judged};
-use super::left_out::LeftOutRow;
+use super::counts::Errors;
+use super::error::{FunnelError, LeftOutRow};
+use super::fragment_stage::{FragmentCounts, FragmentStage, Tested};
+use super::item_stages::ItemStages;
 use super::mirror::mirrored;
 use super::orders::Orders;
-use super::pass::{Pass, Walked};
 use super::picks::Picks;
-use super::plan::{FunnelPlan, task};
-use super::plan_view::{PlanView, fate};
-use super::report::{CutOutRow, FunnelReport, Gain, LevelRow, Side, StageRow};
-use super::seen::seen;
-use super::stage::{BackEnd, NONE, StageKind};
-use super::times::Times;
-use super::triangle_rows;
-use super::truth::Truth;
-use super::walks::Walks;
+use super::plan_view::PlanView;
+use super::report::{CutOutRow, FunnelReport, Gain, StageRow};
+use super::stage::{Chain, NONE, StageKind, Step};
+use super::task::{FunnelKey, FunnelPlan, KeyedTask, Times};
+use super::triangle_stage::TriangleStage;
+use super::truth::{Truth, visible};
 use super::world::{FunnelInput, World};
-use crate::measure::{Ask, OverProcesses, ProcessTimes, TimedTask, Verdict};
+use crate::input::gigabytes;
+use crate::measure::{ProcessTimes, Verdict};
 use crate::scene::available_bytes;
 use crate::visibility::{Level, SampleGrid};
 
-/// Bytes that a study takes for each sample of a view: rays and depths of two images, and
-/// what ties at them. Of a mesh 230 were measured, of boxes 290 to 350, with a mirror 440;
-/// where nothing is culled 660.
+/// Bytes that a study takes per sample of a view: rays and depths of two images, and ties
+/// at them. Of a mesh 230 were measured, of boxes 290 to 350, with a mirror 440; where
+/// nothing is culled 660.
 const BYTES_PER_SAMPLE: u64 = 450;
-/// Images of fewer samples are drawn without asking.
+/// Images of fewer samples are drawn without a look at the memory.
 const ANYWHERE: u64 = 1_000_000;
 
-/// Refuses images that need more memory than is available; what is not known is no reason.
+/// Refuses images that need more memory than is available; unknown is no reason.
 fn fits(grid: SampleGrid, available: Option<u64>) -> Result<(), FunnelError> {
     let samples = u64::from(grid.width) * u64::from(grid.height);
     let needed = samples * BYTES_PER_SAMPLE;
     match available.filter(|available| samples > ANYWHERE && needed > *available) {
-        Some(available) => Err(FunnelError::TooManySamples {
-            grid,
-            needed,
-            available,
-        }),
+        Some(available) => Err(FunnelError::Refused(format!(
+            "--samples {}x{}: images need about {}, {} are free; expected fewer samples",
+            grid.width,
+            grid.height,
+            gigabytes(needed),
+            gigabytes(available)
+        ))),
         None => Ok(()),
     }
 }
 
-/// Everything judged, and nothing timed.
+/// Everything that is timed, on the items that the chain leaves.
+struct Study<'w> {
+    world: &'w World<'w>,
+    chain: &'w Chain,
+    steps: Vec<Step>,
+    items: ItemStages<'w>,
+    triangles: TriangleStage,
+    fragments: FragmentStage<'w>,
+    orders: Orders,
+    picks: Picks<'w>,
+}
+
+impl<'w> Study<'w> {
+    /// `None` if stopped.
+    fn new(world: &'w World<'w>, chain: &'w Chain, stop: &dyn Fn() -> bool) -> Option<Study<'w>> {
+        let items = ItemStages::all(world, chain, stop)?;
+        let steps = chain.steps();
+        let triangles = TriangleStage::new(world, &items, &steps);
+        let culled = (&triangles, chain.of(StageKind::Triangle));
+        let fragments = FragmentStage::new(world, &items, &steps, culled);
+        Some(Study {
+            orders: Orders::new(world, &items, &steps, fragments.too_much.as_ref()),
+            picks: Picks::new(world),
+            world,
+            chain,
+            steps,
+            items,
+            triangles,
+            fragments,
+        })
+    }
+
+    /// Every task but the bounds.
+    fn tasks(&self) -> Vec<KeyedTask<'_>> {
+        let mut tasks: Vec<KeyedTask> = self.items.tasks().collect();
+        tasks.extend(self.triangles.tasks());
+        tasks.extend(self.fragments.tasks());
+        tasks.extend(self.orders.tasks());
+        tasks.extend(self.picks.tasks());
+        tasks
+    }
+
+    /// Rows of all stages before the fragment stage; `None` if stopped.
+    fn rows(&self, truth: &Truth, stop: &dyn Fn() -> bool) -> Option<Vec<StageRow>> {
+        let mut rows = Vec::new();
+        for stage in [&StageKind::OF_ITEMS[..], &[StageKind::Triangle]].concat() {
+            for name in self.world.names(stage) {
+                if stop() {
+                    return None;
+                }
+                let counts = match stage {
+                    StageKind::Triangle => self.triangles.counts(&name),
+                    _ => {
+                        let before = self.chain.steps_before(stage);
+                        let steps = self.chain.steps_with(stage, &name);
+                        self.items.counts(&before, &steps, truth)
+                    }
+                };
+                let back_end = self.world.back_end(stage, &name);
+                rows.push(StageRow::new(
+                    back_end,
+                    &name,
+                    self.chain,
+                    Errors::of(&counts),
+                ));
+            }
+        }
+        Some(rows)
+    }
+
+    /// Row of a test of the fragment stage.
+    fn test_row(&self, tested: &Tested) -> StageRow {
+        let errors = Errors::of(&tested.counts);
+        StageRow {
+            fragments: FragmentCounts::of(&tested.tallies),
+            ..StageRow::new(tested.back_end, tested.back_end.name, self.chain, errors)
+        }
+    }
+
+    /// The chain without each of its stages, from the rows of all stages.
+    fn gains(&self, rows: &[StageRow]) -> Vec<Gain> {
+        let timed = self.items.timed(self.chain);
+        let of_items = StageKind::OF_ITEMS.into_iter().filter(|&stage| {
+            self.chain.of(stage) != NONE && self.world.is_separate(self.chain, stage)
+        });
+        let of_items = of_items.map(|stage| {
+            let without = self.chain.clone().with(stage, NONE);
+            let counts = [&self.steps, &without.steps()].map(|steps| self.items.mean_count(steps));
+            let tasks = [timed.clone(), self.items.timed(&without)];
+            Gain::new(stage, (self.chain.of(stage), stage.unit()), counts, tasks)
+        });
+        let behind = rows.iter().filter(|row| row.is_chosen).filter_map(|row| {
+            let stage = row.back_end.stage;
+            if StageKind::OF_ITEMS.contains(&stage) {
+                return None;
+            }
+            let with = [&timed[..], &[row.key(self.chain)?]].concat();
+            let (unit, counts) = self.counts_behind(row, rows);
+            let tasks = [with, timed.clone()];
+            Some(Gain::new(stage, (row.back_end.name, unit), counts, tasks))
+        });
+        of_items.chain(behind).collect()
+    }
+
+    /// Unit and counts with and without a stage behind those of whole items. Without a
+    /// test every fragment of the remaining items is shaded.
+    fn counts_behind(&self, row: &StageRow, rows: &[StageRow]) -> (&'static str, [f64; 2]) {
+        let default = default_test(self.world.cut_outs.is_some());
+        let every = rows.iter().find(|row| row.back_end.name == default);
+        match row.fragments.zip(every.and_then(|row| row.fragments)) {
+            Some((own, every)) => ("fragments", [own.shaded_count, every.fragment_count]),
+            None => (row.unit, [row.errors.output_count, row.errors.input_count]),
+        }
+    }
+}
+
+/// A compared study before its times.
 pub struct Prepared {
-    /// What the other processes are to measure.
+    /// Tasks and schedule for all processes.
     pub plan: FunnelPlan,
     report: FunnelReport,
-    /// By row: its task.
-    tasks: Vec<Option<usize>>,
-    gains: Vec<Sides>,
 }
 
-/// The chain with a stage and without it.
-struct Sides {
-    stage: StageKind,
-    back_end: String,
-    unit: &'static str,
-    sides: [Side; 2],
-}
-
-/// Goes through all chains, judges them, and plans how they are timed; `None` if
-/// stopped. `begin` gets the name of each step before it starts.
+/// Compares all back ends with the truth and plans their times; `None` if stopped.
+/// `begin` gets the name of each step before it starts.
 ///
 /// # Errors
-/// A camera, a structure, a back end or an image that cannot be had.
+/// A camera, a structure, a back end or an image that is refused.
 pub fn prepare(
     input: &FunnelInput,
     begin: &dyn Fn(&str),
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<Prepared>, FunnelError> {
     fits(input.samples, available_bytes())?;
-    begin("structures, regions, occluders");
-    let world = World::new(input)?;
-    let threads = input.execution.threads;
-    begin("the truth");
-    let Some(truth) = seen(&world, input.samples, 0, threads, stop)? else {
+    let world = World::new(input.scene, input, begin)?;
+    begin("truth");
+    let Some(truth) = visible(&world, 0, input.execution.threads, stop)? else {
         return Ok(None);
     };
-    begin("every stage, held against the truth");
-    let mut pass = Pass::new(&world);
-    let Some(walks) = Walks::of(&mut pass, &world, input.chain, stop) else {
+    begin("every stage, compared with the truth");
+    let Some(study) = Study::new(&world, input.chain, stop) else {
         return Ok(None);
     };
-    let left = Left::of(&world, &pass, &walks.chosen, input.chain);
-    let mut rows = Vec::new();
-    for (stage, name, step) in &walks.rows {
-        if stop() {
-            return Ok(None);
-        }
-        let sets = walks.sets(&pass, *stage, *step);
-        let judged: Vec<_> = (0..world.views())
-            .map(|view| world.judge(view, sets.map(|set| pass.items(set, view)), &truth))
-            .collect();
-        let back_end = world.back_end(*stage, name);
-        rows.push((back_end, name.clone(), judged, *step));
-    }
-    let culls = world.back_ends(StageKind::Triangle).into_iter();
-    let culls = culls.zip(std::iter::once(None).chain((0..).map(Some)));
-    for (back_end, place) in culls {
-        if stop() {
-            return Ok(None);
-        }
-        let task = place.map(|place: usize| pass.steps().len() + place);
-        let judged = left.faces.judged(place);
-        rows.push((back_end, back_end.name.to_owned(), judged, task));
-    }
-    let last = walks.chosen.left();
-    let Some(tested) = left.fragments.tested(&pass, last, &truth, stop) else {
+    let Some(mut rows) = study.rows(&truth, stop) else {
         return Ok(None);
     };
-    let covered = tested
-        .iter()
-        .find(|tested| tested.back_end.name == fragment_rows::Z);
-    let covered = covered
-        .map(|tested| tested.covered.clone())
-        .unwrap_or_default();
-    let mut mirror = None;
-    let mut left_out = left_out_of(input.scene);
-    let too_much = left.fragments.too_much.iter().cloned();
-    left_out.extend(too_much.map(|reason| LeftOutRow::of("stages", "fragment", reason)));
-    left_out.extend_from_slice(&left.orders.left_out);
-    if let (Some(solids), Some(item)) = (&world.solids, input.mirror) {
-        match mirrored(item, &world, solids, &pass, last, stop) {
-            Ok(None) => return Ok(None),
-            Ok(row) => mirror = row,
-            Err(reason) => left_out.push(LeftOutRow::of("mirror", "all", reason)),
-        }
-    }
+    let Some(tested) = study
+        .fragments
+        .tested(&study.items, &study.steps, &truth, stop)
+    else {
+        return Ok(None);
+    };
+    rows.extend(tested.iter().map(|tested| study.test_row(tested)));
+    let mut left_out = Vec::from_iter(left_out_of(input.scene));
+    let too_much = study.fragments.too_much.as_ref();
+    left_out.extend(too_much.map(|reason| LeftOutRow::new("stages", "fragment", reason)));
+    left_out.extend_from_slice(&study.orders.left_out);
+    let mirror = input.mirror.map_or(Ok(None), |item| {
+        mirrored(item, &world, &study.items, &study.steps, stop)
+    });
+    let mirror = mirror.unwrap_or_else(|reason| {
+        left_out.push(LeftOutRow::new("mirror", "all", reason));
+        None
+    });
     begin("every order, drawn");
-    let drawn = match left.orders.drawn(input.samples, stop) {
-        Ok(None) => return Ok(None),
-        Ok(Some(drawn)) => drawn,
-        Err(reason) => {
-            left_out.push(LeftOutRow::of("orders", "all", reason));
-            Vec::new()
-        }
+    let orders = study.orders.drawn(stop).unwrap_or_else(|reason| {
+        left_out.push(LeftOutRow::new("orders", "all", reason));
+        Some(Vec::new())
+    });
+    if stop() {
+        return Ok(None);
+    }
+    begin("picking");
+    let picks = study.picks.compared();
+    left_out.extend_from_slice(&study.picks.left_out);
+    let z = tested.iter().find(|tested| tested.back_end.name == Z);
+    let tallies = z.iter().flat_map(|z| &z.tallies);
+    let covered: Vec<u64> = tallies.map(|tally| tally.covered).collect();
+    let bounds = bounds(&world, &study.triangles, &covered);
+    let report = FunnelReport {
+        scene: input.scene.name.clone(),
+        path: input.path.name.clone(),
+        items: input.scene.items.len(),
+        views: world.views.len(),
+        samples: [input.samples.width, input.samples.height],
+        processes: 0,
+        level: (&Level::of(&input.scene.name, input.scene)?).into(),
+        cut_outs: input
+            .cut_outs
+            .zip(world.cut_outs.as_ref())
+            .map(|(typed, made)| CutOutRow::new(typed, made)),
+        occluders: input.occluders.to_string(),
+        chain: input.chain.clone(),
+        gains: study.gains(&rows),
+        stages: rows,
+        inner_boxes: world.hiders.inner_row().cloned(),
+        ground: world.hiders.ground().map(|ground| ground.row.clone()),
+        solid_blocks: world.hiders.blocks_row().cloned(),
+        mirror,
+        orders: orders.unwrap_or_default(),
+        picks,
+        left_out,
+        bounds: bounds.iter().map(|bound| bound.row.clone()).collect(),
+        conclusions: Vec::new(),
+        plan_view: PlanView::of(&world, &study.items, input.chain, &truth),
     };
-    begin("what is under a cursor");
-    let picked = left.picks.judged();
-    left_out.extend_from_slice(&left.picks.left_out);
-    // Behind the steps come the back ends of the triangle stage, then the tests of fragments.
-    let first_test = pass.steps().len() + triangle_rows::back_ends().count();
-    let tests = std::iter::once(None).chain((first_test..).map(Some));
-    let tasks = rows.iter().map(|(_, _, _, task)| *task);
-    let tasks: Vec<Option<usize>> = tasks.chain(tests.take(tested.len())).collect();
-    let row = |back_end: BackEnd, name: &str, judged: &[Judged]| StageRow {
-        back_end,
-        structure: None,
-        is_chosen: input.chain.of(back_end.stage) == name,
-        unit: back_end.stage.unit(),
-        errors: Errors::of(judged),
-        times: Times::default(),
-        ns_per_removed: None,
-        ns_per_decided: None,
-        fragments: None,
-    };
-    let rows = rows.into_iter().map(|(back_end, name, judged, task)| {
-        let is_built = back_end.stage == StageKind::Object && task.is_some();
-        StageRow {
-            structure: is_built.then(|| name.clone()),
-            ..row(back_end, &name, &judged)
-        }
-    });
-    let tested = tested.into_iter().map(|tested| StageRow {
-        fragments: tested.counts,
-        ..row(tested.back_end, tested.back_end.name, &tested.judged)
-    });
-    let rows: Vec<StageRow> = rows.chain(tested).collect();
-    let side = |walked: &Walked| Side {
-        tasks: pass.timed_steps(walked),
-        count: pass.mean_count(walked.left()),
-    };
-    let of_items = walks.without.iter().map(|(stage, without)| Sides {
-        stage: *stage,
-        back_end: input.chain.of(*stage).to_owned(),
-        unit: stage.unit(),
-        sides: [side(&walks.chosen), side(without)],
-    });
-    let steps = pass.timed_steps(&walks.chosen);
-    let behind = rows.iter().zip(&tasks).filter_map(|(row, task)| {
-        sides_behind(row, *task, &steps, world.cut_outs.is_some(), &rows)
-    });
-    let gains = of_items.chain(behind).collect();
-    let bounds = bounds(&world, &left.faces, &covered);
-    let bound_rows = bounds.iter().map(Bound::row).collect();
-    let timed = timed_tasks(&pass, &world, &left, bounds, None);
-    let level = Level::of(&input.scene.name, input.scene)?;
+    let mut tasks = study.tasks();
+    tasks.extend(bounds.into_iter().map(|bound| bound.task()));
     Ok(Some(Prepared {
-        plan: FunnelPlan::of(&timed, world.views(), input),
-        tasks,
-        gains,
-        report: FunnelReport {
-            scene: input.scene.name.clone(),
-            path: input.path.name.clone(),
-            items: input.scene.items.len(),
-            views: world.views(),
-            samples: [input.samples.width, input.samples.height],
-            processes: 0,
-            level: LevelRow::of(&level),
-            cut_outs: input
-                .cut_outs
-                .zip(world.cut_outs.as_ref())
-                .map(|(typed, made)| CutOutRow::of(typed, made)),
-            occluders: input.occluders.to_string(),
-            chain: input.chain.clone(),
-            stages: rows,
-            inner_boxes: world.hiders.inner_row().cloned(),
-            ground: world.hiders.ground().map(|ground| ground.row.clone()),
-            solid_blocks: world.hiders.blocks_row().cloned(),
-            mirror,
-            orders: drawn,
-            picks: picked,
-            left_out,
-            bounds: bound_rows,
-            gains: Vec::new(),
-            conclusions: Vec::new(),
-            plan_view: plan_view(&world, &pass, &walks.chosen, &truth),
-        },
+        plan: FunnelPlan::new(tasks, world.views.len(), input),
+        report,
     }))
 }
 
-/// One process's share of the times; `None` if stopped.
+/// Times of one process; `None` if stopped.
 ///
 /// # Errors
 /// As [`prepare`].
@@ -240,199 +269,45 @@ pub fn time(
     plan: &FunnelPlan,
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<ProcessTimes>, FunnelError> {
-    let world = World::new(input)?;
-    let mut pass = Pass::new(&world);
-    let Some(walks) = Walks::of(&mut pass, &world, input.chain, stop) else {
+    let world = World::new(input.scene, input, &|_| ())?;
+    let Some(study) = Study::new(&world, input.chain, stop) else {
         return Ok(None);
     };
-    let left = Left::of(&world, &pass, &walks.chosen, input.chain);
-    // The last bound hands on what is covered.
-    let covered = plan.expected.last().map_or(&[][..], |counts| counts);
-    let bounds = bounds(&world, &left.faces, covered);
-    let tasks = timed_tasks(&pass, &world, &left, bounds, Some(&plan.expected));
-    Ok(plan.time(&tasks, input, stop))
-}
-
-/// The chain with and without a stage behind those of whole items, if this is the chain's
-/// row of one: of triangles what is left of them, of fragments those that are shaded.
-fn sides_behind(
-    row: &StageRow,
-    task: Option<usize>,
-    steps: &[usize],
-    cut_outs: bool,
-    rows: &[StageRow],
-) -> Option<Sides> {
-    let stage = row.back_end.stage;
-    if !row.is_chosen || row.back_end.name == NONE || StageKind::OF_ITEMS.contains(&stage) {
-        return None;
-    }
-    // Without a test every fragment of what is left is shaded.
-    let every = rows
-        .iter()
-        .find(|row| row.back_end.name == fragment_rows::default(cut_outs));
-    let every = every.and_then(|row| row.fragments);
-    let (unit, counts) = match row.fragments.zip(every) {
-        Some((own, every)) => ("fragments", [own.shaded_count, every.fragment_count]),
-        None => (row.unit, [row.errors.output_count, row.errors.input_count]),
-    };
-    let [with, without] = [[steps, &[task?]].concat(), steps.to_vec()];
-    let sides = [(with, counts[0]), (without, counts[1])];
-    Some(Sides {
-        stage,
-        back_end: row.back_end.name.to_owned(),
-        unit,
-        sides: sides.map(|(tasks, count)| Side { tasks, count }),
-    })
-}
-
-/// What the chosen chain leaves of every view, ready for the stages behind it.
-struct Left<'w> {
-    faces: Faces,
-    fragments: Fragments<'w>,
-    picks: Picks<'w>,
-    orders: Orders,
-}
-
-impl<'w> Left<'w> {
-    fn of(world: &'w World<'w>, pass: &Pass, chosen: &Walked, chain: &Chain) -> Left<'w> {
-        let set = chosen.left();
-        let faces = Faces::of(world, pass, set);
-        let triangle = chain.of(StageKind::Triangle);
-        let fragments = Fragments::of(world, pass, set, &faces, triangle);
-        Left {
-            orders: Orders::of(world, pass, set, fragments.too_much.as_ref()),
-            fragments,
-            faces,
-            picks: Picks::of(world),
-        }
-    }
-}
-
-/// Every step, every back end of the triangle stage, every test of fragments, every order,
-/// every back end of picking and every bound as a task; what it must hand on is what it has,
-/// or what another process says.
-fn timed_tasks<'p>(
-    pass: &'p Pass<'p>,
-    world: &'p World<'p>,
-    left: &'p Left<'p>,
-    bounds: Vec<Bound<'p>>,
-    expected: Option<&[Vec<u64>]>,
-) -> Vec<TimedTask<'p>> {
-    let steps = pass.steps().iter().map(|step| {
-        let run = world.run(step.stage, &step.back_end);
-        let ask: Ask = Box::new(move |view, out| run(view, pass.items(step.input, view), out));
-        ask
-    });
-    let culls = (0..triangle_rows::back_ends().count()).map(|place| {
-        let ask: Ask = Box::new(move |view, out| left.faces.cull(place, view, out));
-        ask
-    });
-    let tests = (0..left.fragments.count()).map(|test| {
-        let ask: Ask = Box::new(move |view, out| {
-            left.fragments.draw(test, view, out);
-        });
-        ask
-    });
-    let sorts = (0..left.orders.count()).map(|order| {
-        let pieces = RefCell::new(Vec::new());
-        let ask: Ask = Box::new(move |view, out| {
-            let pieces = &mut *pieces.borrow_mut();
-            left.orders.sort(order, view, pieces);
-            out.extend(pieces.iter().map(|piece| piece.item));
-        });
-        ask
-    });
-    let picks = (0..left.picks.count()).map(|back_end| {
-        let ask: Ask = Box::new(move |view, out| left.picks.ask(back_end, view, out));
-        ask
-    });
-    let task = |(place, ask): (usize, Ask<'p>)| {
-        let expected = match expected {
-            Some(expected) => expected[place].clone(),
-            None => counts(&ask, world.views()),
-        };
-        task(ask, expected)
-    };
-    let bounds = bounds.into_iter().map(|bound| bound.ask);
-    steps
-        .chain(culls)
-        .chain(tests)
-        .chain(sorts)
-        .chain(picks)
-        .chain(bounds)
-        .enumerate()
-        .map(task)
-        .collect()
-}
-
-/// How much is handed on in each view.
-fn counts(ask: &Ask, views: usize) -> Vec<u64> {
-    let mut out = Vec::new();
-    let counts = (0..views).map(|view| {
-        out.clear();
-        ask(view, &mut out);
-        out.len() as u64
-    });
-    counts.collect()
-}
-
-/// The first view from above, after the stages that decide what is drawn.
-fn plan_view(world: &World, pass: &Pass, walked: &Walked, truth: &Truth) -> PlanView {
-    let handed_on = StageKind::OF_ITEMS.into_iter().zip(&walked.sets[1..]);
-    let sets: Vec<_> = handed_on
-        .map(|(stage, &set)| (stage, pass.items(set, 0)))
-        .collect();
-    world.plan_view(0, |item| fate(item, &sets, truth.sees(0, item)))
+    let covered = plan.expected(&covered_key()).unwrap_or_default();
+    let bounds = bounds(&world, &study.triangles, covered).into_iter();
+    let mut tasks = study.tasks();
+    tasks.extend(bounds.map(|bound| bound.task()));
+    Ok(plan.time(tasks, input, stop))
 }
 
 impl Prepared {
-    /// The funnel from the times of all processes.
+    /// The funnel with the times of all processes.
     pub fn conclude(self, processes: &[ProcessTimes]) -> FunnelReport {
-        let times = OverProcesses::of(processes);
+        let times = self.plan.times(processes);
         let mut report = self.report;
         report.processes = processes.len();
-        for (row, task) in report.stages.iter_mut().zip(&self.tasks) {
-            let Some(found) = task.and_then(|task| times.ns(task)) else {
-                continue;
-            };
-            row.times = Times::of(Some(found));
-            let per = |count: f64| (count > 0.0).then(|| found.value / count);
-            row.ns_per_removed = per(row.errors.input_count - row.errors.output_count);
-            row.ns_per_decided = per(row.errors.input_count);
+        let chain = &report.chain;
+        report
+            .stages
+            .iter_mut()
+            .for_each(|row| row.set(chain, &times));
+        report
+            .bounds
+            .iter_mut()
+            .for_each(|row| row.set(chain, &times));
+        for row in &mut report.picks {
+            row.set(Times::of(times.ns(&row.key())));
         }
-        // Behind the stages come the orders, then picking, and last of all the bounds.
-        let bounds = self.plan.expected.len() - report.bounds.len();
-        for (bound, own) in report.bounds.iter_mut().zip(bounds..) {
-            let of = |row: &StageRow| {
-                row.back_end.stage == bound.stage && row.back_end.name == bound.back_end
-            };
-            let task = report
-                .stages
-                .iter()
-                .position(of)
-                .and_then(|row| self.tasks[row]);
-            bound.set(times.ns(own), task.and_then(|task| times.ratio(task, own)));
+        for row in &mut report.orders {
+            row.times = Times::of(times.ns(&FunnelKey::Order(row.name.to_owned())));
         }
-        let picks = bounds - report.picks.len();
-        for (row, task) in report.picks.iter_mut().zip(picks..) {
-            row.times = Times::of(times.ns(task));
-            row.ns_per_ray = row.times.stage_ns.map(|ns| ns / Picks::RAYS_PER_VIEW);
-        }
-        for (row, task) in report.orders.iter_mut().rev().zip((0..picks).rev()) {
-            row.times = Times::of(times.ns(task));
-        }
-        let gains = self.gains.iter().map(|sides| {
-            let [with, without] = &sides.sides;
-            let back_end = &sides.back_end;
-            Gain::of(sides.stage, back_end, sides.unit, [with, without], &times)
-        });
-        report.gains = gains.collect();
+        report.gains.iter_mut().for_each(|gain| gain.set(&times));
         report.conclusions = conclusions(&report);
         report
     }
 }
 
-/// Why a task has no time, if one failed: the first of them.
+/// The first reason for which a task has no time, if one failed.
 pub fn failure(processes: &[ProcessTimes]) -> Option<&Verdict> {
     let results = processes.iter().flat_map(|process| &process.ln_ns);
     results.filter_map(|result| result.as_ref().err()).next()

@@ -1,40 +1,38 @@
-//! Error against run time of one stage: what each back end loses and lets through
-//! beside what it takes, the occlusion stage over the sizes of its buffer. Truth are
-//! rays between the samples too, so that no size of a buffer is its own judge.
+//! Error against run time of one stage: false negatives, false positives and time of each
+//! back end, of the occlusion stage for several sizes of its buffer.
+//!
+//! The truth has rays between the samples too, so that no size of a buffer judges itself.
 
 use serde::Serialize;
 
+use super::back_ends::OCCLUSION_ROWS;
+use super::counts::{Errors, ViewCounts, count_items};
 use super::error::FunnelError;
-use super::faces::Faces;
-use super::hiding::{HIDING, HidingRow};
-use super::judged::{Errors, Judged, judge_items};
-use super::pass::{ALL, Pass};
-use super::plan::{FunnelPlan, task};
-use super::seen::seen;
-use super::stage::{BackEnd, NONE, StageKind};
-use super::times::Times;
-use super::triangle_rows;
-use super::truth::Truth;
+use super::item_stages::{ItemStages, Run};
+use super::stage::{BackEnd, Chain, NONE, StageKind, Step};
+use super::task::{FunnelKey, FunnelPlan, KeyedTask, Times};
+use super::triangle_stage::TriangleStage;
+use super::truth::{Truth, visible};
 use super::world::{FunnelInput, World};
-use crate::measure::{Ask, OverProcesses, ProcessTimes};
+use crate::measure::{Ask, ProcessTimes};
+use crate::query::ItemId;
 use crate::statistics::dominance;
 use crate::visibility::SampleGrid;
 
-/// Columns of the buffers that are looked at; rows are 9 for 16 of them.
+/// Columns of the buffers; there are 9 rows for 16 of them.
 pub const WIDTHS: [u32; 7] = [40, 80, 160, 320, 640, 1280, 1920];
 /// Random rays of a view, beside the samples.
 const RAYS: usize = 100_000;
 
-/// One back end, at one size of its buffer.
+/// One back end, with one size of its buffer.
 #[derive(Clone, Debug, Serialize)]
-#[non_exhaustive]
 pub struct SweepPoint {
-    /// What does the stage.
+    /// The back end.
     #[serde(flatten)]
     pub back_end: BackEnd,
     /// Columns and rows of its buffer; null where it has none.
     pub buffer: Option<[u32; 2]>,
-    /// What it let through and what it lost.
+    /// Errors against the truth.
     #[serde(flatten)]
     pub errors: Errors,
     /// Thread CPU time of a view.
@@ -45,126 +43,149 @@ pub struct SweepPoint {
     pub on_front: bool,
 }
 
+impl SweepPoint {
+    fn new(back_end: BackEnd, buffer: Option<[u32; 2]>) -> SweepPoint {
+        SweepPoint {
+            back_end,
+            buffer,
+            errors: Errors::of(&[]),
+            times: Times::default(),
+            on_front: false,
+        }
+    }
+
+    fn key(&self) -> FunnelKey {
+        let BackEnd { stage, name, .. } = self.back_end;
+        match self.buffer {
+            Some([width, _]) => FunnelKey::Buffer(name.to_owned(), width),
+            None => FunnelKey::Stage(stage, name.to_owned()),
+        }
+    }
+
+    /// Time, false negatives, false positives.
+    fn figures(&self) -> Option<[f64; 3]> {
+        let errors = &self.errors;
+        let ns = self.times.stage_ns?;
+        Some([ns, errors.false_negative_count, errors.false_positive_count])
+    }
+}
+
 /// The points of a stage.
 #[derive(Clone, Debug, Serialize)]
-#[non_exhaustive]
 pub struct StageSweep {
-    /// As it was asked for.
+    /// Scene as typed.
     pub scene: String,
-    /// As it was asked for.
+    /// Path as typed.
     pub path: String,
     /// The stage.
     pub stage: StageKind,
-    /// Views that were looked at.
+    /// Number of views.
     pub views: usize,
     /// Random rays of each view that are the truth together with its samples.
     pub rays_per_view: usize,
-    /// Processes that the times are of.
+    /// Number of timed processes.
     pub processes: usize,
     /// In the order of the table of back ends, small buffers first.
     pub points: Vec<SweepPoint>,
 }
 
-/// Everything judged, and nothing timed.
+/// A compared sweep before its times.
 pub struct PreparedSweep {
-    /// What the other processes are to measure.
+    /// Tasks and schedule for all processes.
     pub plan: FunnelPlan,
     sweep: StageSweep,
 }
 
-/// A point, and how it is asked.
-struct Entry<'w> {
-    back_end: BackEnd,
-    buffer: Option<SampleGrid>,
-    ask: Ask<'w>,
-    /// Of the triangle stage: its place among the back ends.
-    faces: Option<usize>,
+/// A stage on the items that it gets in each view.
+struct Swept<'w> {
+    world: &'w World<'w>,
+    stage: StageKind,
+    /// Items that the frustum meets.
+    items: ItemStages<'w>,
+    steps: Vec<Step>,
+    /// Triangles of the items that occlusion leaves, of the triangle stage.
+    triangles: Option<TriangleStage>,
 }
 
-/// What the stage is given in each view, and the faces of what occlusion leaves.
-struct Given<'w> {
-    pass: Pass<'w>,
-    set: usize,
-    faces: Option<Faces>,
-}
-
-impl<'w> Given<'w> {
-    fn of(
+impl<'w> Swept<'w> {
+    /// `None` if stopped.
+    fn new(
         world: &'w World<'w>,
-        input: &FunnelInput,
+        chain: &Chain,
         stage: StageKind,
         stop: &dyn Fn() -> bool,
-    ) -> Option<Given<'w>> {
-        let mut pass = Pass::new(world);
-        let set = match (stage, input.chain.of(StageKind::Object)) {
-            (StageKind::Region, _) | (_, NONE) => ALL,
-            (_, name) => {
-                let step = pass.step(StageKind::Object, name, ALL, stop)?;
-                pass.steps()[step].output
-            }
+    ) -> Option<Swept<'w>> {
+        let steps = match stage {
+            StageKind::Region => Vec::new(),
+            StageKind::Triangle => chain.steps(),
+            _ => Chain::empty().steps_with(StageKind::Object, chain.of(StageKind::Object)),
         };
-        let faces = match stage {
-            StageKind::Triangle => {
-                let walked = pass.walk(input.chain, stop)?;
-                Some(Faces::of(world, &pass, walked.left()))
-            }
-            _ => None,
-        };
-        Some(Given { pass, set, faces })
+        let mut items = ItemStages::new(world);
+        items.run(&steps, stop)?;
+        let is_of_triangles = stage == StageKind::Triangle;
+        Some(Swept {
+            triangles: is_of_triangles.then(|| TriangleStage::new(world, &items, &steps)),
+            world,
+            stage,
+            items,
+            steps,
+        })
     }
 
-    fn entries<'g>(&'g self, world: &'g World<'g>, stage: StageKind) -> Vec<Entry<'g>> {
-        let given = move |view| self.pass.items(self.set, view);
-        match stage {
-            StageKind::Occlusion => {
-                let sized = HIDING
-                    .iter()
-                    .flat_map(|row| WIDTHS.map(|width| (row, width)));
-                let entry = |(row, width): (&'g HidingRow, u32)| {
-                    let grid = SampleGrid::new(width, (width * 9).div_ceil(16));
-                    let run = world.run_hiding(row, grid);
-                    Entry {
-                        back_end: row.back_end,
-                        buffer: Some(grid),
-                        ask: Box::new(move |view, out| run(view, given(view), out)),
-                        faces: None,
-                    }
-                };
-                sized.map(entry).collect()
-            }
-            StageKind::Triangle => {
-                let rows = triangle_rows::back_ends().zip(0..);
-                let entry = |(back_end, place): (BackEnd, usize)| Entry {
-                    back_end,
-                    buffer: None,
-                    ask: Box::new(move |view, out| {
-                        if let Some(faces) = &self.faces {
-                            faces.cull(place, view, out);
-                        }
-                    }),
-                    faces: Some(place),
-                };
-                rows.map(entry).collect()
-            }
-            _ => {
-                let rows = world.names(stage).into_iter();
-                let rows = rows.map(|name| world.back_end(stage, &name));
-                let entry = |back_end: BackEnd| {
-                    let run = world.run(stage, back_end.name);
-                    Entry {
-                        back_end,
-                        buffer: None,
-                        ask: Box::new(move |view, out| run(view, given(view), out)),
-                        faces: None,
-                    }
-                };
-                rows.filter(|row| row.name != NONE).map(entry).collect()
-            }
+    /// Every point without errors and times, with its task.
+    fn points(&self) -> Vec<(SweepPoint, KeyedTask<'_>)> {
+        if let Some(triangles) = &self.triangles {
+            let rows = self.rows().map(|row| SweepPoint::new(row, None));
+            return rows.zip(triangles.tasks()).collect();
         }
+        if self.stage == StageKind::Occlusion {
+            let rows = OCCLUSION_ROWS.iter();
+            let sized = rows.flat_map(|row| WIDTHS.map(|width| (row, width)));
+            let points = sized.map(|(row, width)| {
+                let grid = SampleGrid::new(width, (width * 9).div_ceil(16));
+                let point = SweepPoint::new(row.back_end, Some([grid.width, grid.height]));
+                self.with_task(point, self.world.run_occlusion(row, grid))
+            });
+            return points.collect();
+        }
+        let points = self.rows().map(|row| {
+            let run = self.world.run(self.stage, row.name);
+            self.with_task(SweepPoint::new(row, None), run)
+        });
+        points.collect()
+    }
+
+    fn rows(&self) -> impl Iterator<Item = BackEnd> {
+        let names = self.world.names(self.stage).into_iter();
+        let names = names.filter(|name| name != NONE);
+        names.map(|name| self.world.back_end(self.stage, &name))
+    }
+
+    fn with_task<'s>(&'s self, point: SweepPoint, run: Run<'s>) -> (SweepPoint, KeyedTask<'s>) {
+        let ask: Ask = Box::new(move |view, out| run(view, self.given(view), out));
+        let key = point.key();
+        (point, KeyedTask { key, ask })
+    }
+
+    fn given(&self, view: usize) -> Option<&[ItemId]> {
+        self.items.items(&self.steps, view)
+    }
+
+    fn counts(&self, back_end: &BackEnd, ask: &Ask, truth: &Truth) -> Vec<ViewCounts> {
+        if let Some(triangles) = &self.triangles {
+            return triangles.counts(back_end.name);
+        }
+        let count = |view: usize| {
+            let mut out = Vec::new();
+            ask(view, &mut out);
+            out.sort_unstable();
+            count_items(self.given(view), self.world.items(), &out, &truth[view])
+        };
+        self.world.views().map(count).collect()
     }
 }
 
-/// Judges all points of a stage and plans how they are timed; `None` if stopped.
+/// Compares all points of a stage with the truth and plans their times; `None` if stopped.
 ///
 /// # Errors
 /// As [`prepare`](super::prepare).
@@ -173,66 +194,34 @@ pub fn prepare_sweep(
     stage: StageKind,
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<PreparedSweep>, FunnelError> {
-    let world = World::new(input)?;
-    let Some(given) = Given::of(&world, input, stage, stop) else {
+    let world = World::new(input.scene, input, &|_| ())?;
+    let Some(swept) = Swept::new(&world, input.chain, stage, stop) else {
         return Ok(None);
     };
-    let entries = given.entries(&world, stage);
-    // What faces the eye is no question of rays.
+    // The side of a triangle needs no rays.
     let (rays, truth) = match stage {
-        StageKind::Triangle => (0, Some(Truth::empty(world.views()))),
-        _ => {
-            let threads = input.execution.threads;
-            let truth = seen(&world, input.samples, RAYS, threads, stop)?;
-            (RAYS, truth)
-        }
+        StageKind::Triangle => (0, Some(Truth::new())),
+        _ => (RAYS, visible(&world, RAYS, input.execution.threads, stop)?),
     };
     let Some(truth) = truth else {
         return Ok(None);
     };
     let (mut points, mut tasks) = (Vec::new(), Vec::new());
-    for Entry {
-        back_end,
-        buffer,
-        ask,
-        faces,
-    } in entries
-    {
+    for (mut point, task) in swept.points() {
         if stop() {
             return Ok(None);
         }
-        let mut counts = Vec::new();
-        let mut judged: Vec<Judged> = Vec::new();
-        let mut out = Vec::new();
-        for view in 0..world.views() {
-            out.clear();
-            ask(view, &mut out);
-            counts.push(out.len() as u64);
-            if faces.is_none() {
-                out.sort_unstable();
-                let input = given.pass.items(given.set, view);
-                judged.push(judge_items(input, world.items(), &out, truth.of_view(view)));
-            }
-        }
-        if let (Some(place), Some(of_views)) = (faces, &given.faces) {
-            judged = of_views.judged(Some(place));
-        }
-        points.push(SweepPoint {
-            back_end,
-            buffer: buffer.map(|grid| [grid.width, grid.height]),
-            errors: Errors::of(&judged),
-            times: Times::default(),
-            on_front: false,
-        });
-        tasks.push(task(ask, counts));
+        point.errors = Errors::of(&swept.counts(&point.back_end, &task.ask, &truth));
+        points.push(point);
+        tasks.push(task);
     }
     Ok(Some(PreparedSweep {
-        plan: FunnelPlan::of(&tasks, world.views(), input),
+        plan: FunnelPlan::new(tasks, world.views.len(), input),
         sweep: StageSweep {
             scene: input.scene.name.clone(),
             path: input.path.name.clone(),
             stage,
-            views: world.views(),
+            views: world.views.len(),
             rays_per_view: rays,
             processes: 0,
             points,
@@ -240,7 +229,7 @@ pub fn prepare_sweep(
     }))
 }
 
-/// One process's share of the times; `None` if stopped.
+/// Times of one process; `None` if stopped.
 ///
 /// # Errors
 /// As [`prepare_sweep`].
@@ -250,38 +239,31 @@ pub fn time_sweep(
     plan: &FunnelPlan,
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<ProcessTimes>, FunnelError> {
-    let world = World::new(input)?;
-    let Some(given) = Given::of(&world, input, stage, stop) else {
+    let world = World::new(input.scene, input, &|_| ())?;
+    let Some(swept) = Swept::new(&world, input.chain, stage, stop) else {
         return Ok(None);
     };
-    let entries = given.entries(&world, stage).into_iter().zip(&plan.expected);
-    let tasks = entries.map(|(entry, expected)| task(entry.ask, expected.clone()));
-    Ok(plan.time(&tasks.collect::<Vec<_>>(), input, stop))
+    let tasks = swept.points().into_iter().map(|(_, task)| task);
+    Ok(plan.time(tasks.collect(), input, stop))
 }
 
 impl PreparedSweep {
     /// The points with the times of all processes.
     pub fn conclude(self, processes: &[ProcessTimes]) -> StageSweep {
-        let times = OverProcesses::of(processes);
+        let times = self.plan.times(processes);
         let mut sweep = self.sweep;
         sweep.processes = processes.len();
-        for (task, point) in sweep.points.iter_mut().enumerate() {
-            point.times = Times::of(times.ns(task));
+        for point in &mut sweep.points {
+            point.times = Times::of(times.ns(&point.key()));
         }
         let all = sweep.points.iter().enumerate();
         let (timed, values): (Vec<usize>, Vec<[f64; 3]>) =
-            all.filter_map(|(i, p)| Some((i, figures(p)?))).unzip();
-        let is_less = |a: usize, b: usize, k: usize| k > 0 || times.is_faster(timed[a], timed[b]);
+            all.filter_map(|(i, p)| Some((i, p.figures()?))).unzip();
+        let keys: Vec<FunnelKey> = timed.iter().map(|&i| sweep.points[i].key()).collect();
+        let is_less = |a: usize, b: usize, k: usize| k > 0 || times.is_faster(&keys[a], &keys[b]);
         for (&i, found) in timed.iter().zip(dominance(&values, &is_less)) {
             sweep.points[i].on_front = found.dominated_by.is_none();
         }
         sweep
     }
-}
-
-/// What a point is compared by: time, missing, handed on too much.
-fn figures(point: &SweepPoint) -> Option<[f64; 3]> {
-    let errors = &point.errors;
-    let ns = point.times.stage_ns?;
-    Some([ns, errors.false_negative_count, errors.false_positive_count])
 }

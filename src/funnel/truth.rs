@@ -1,33 +1,100 @@
-//! What the views of a funnel show, item by item.
+//! Exactly visible items of each view: solid boxes as boxes, meshes and maps as triangles.
 
+use super::error::{FunnelError, most_drawn};
+use super::world::{Shape, World};
 use crate::query::ItemId;
+use crate::visibility::fragment;
+use crate::visibility::truth::{
+    RayIndex, SampleTruth, SolidBox, SurfaceIndex, visible_by_random_rays,
+};
+use crate::visibility::{Rays, SampleGrid};
 
-/// What is visible in each view: items with the samples of each, ascending.
-pub struct Truth {
-    visible: Vec<Vec<(ItemId, u32)>>,
+/// Samples that estimate how many items are in front at all samples.
+const FEW: SampleGrid = SampleGrid::new(16, 9);
+
+/// Visible items of each view with the samples of each, ascending.
+pub type Truth = Vec<Vec<(ItemId, u32)>>;
+
+/// Visible items at the samples of every view and along `random_rays` random rays, whose
+/// items count as one sample each if they are at none. `None` if stopped.
+///
+/// # Errors
+/// Too many items in front at the same samples.
+pub fn visible(
+    world: &World,
+    random_rays: usize,
+    threads: usize,
+    stop: &dyn Fn() -> bool,
+) -> Result<Option<Truth>, FunnelError> {
+    let (rays_end, samples) = (RaysEnd::at(world), world.samples);
+    let items = world.items() as ItemId;
+    let mut all = Vec::with_capacity(world.views.len());
+    for view in world.views() {
+        if stop() {
+            return Ok(None);
+        }
+        let rays = world.rays(view);
+        let at_few = rays_end.at_samples(rays, FEW, threads).samples_of;
+        let at_few: u64 = at_few.into_iter().map(u64::from).sum();
+        let in_front = at_few * samples.samples() as u64 / FEW.samples() as u64;
+        let most = most_drawn(samples);
+        if in_front > most {
+            return Err(FunnelError::Refused(format!(
+                "camera {}: about {in_front} items in front at the samples, those of each sample \
+                 counted; expected at most {most}: fewer --samples or fewer items with a common \
+                 face",
+                world.views[view].camera
+            )));
+        }
+        let truth = rays_end.at_samples(rays, samples, threads);
+        let counts = truth.visible.iter().copied().zip(truth.samples_of);
+        let mut seen: Vec<(ItemId, u32)> = counts.collect();
+        if random_rays > 0 {
+            let more = rays_end.along_random(rays, random_rays, view as u64 + 1, threads);
+            let is_new = |id: &ItemId| truth.visible.binary_search(id).is_err();
+            seen.extend(more.into_iter().filter(is_new).map(|id| (id, 1)));
+            seen.sort_unstable();
+        }
+        // Floors and ceilings of a map come behind its items.
+        seen.retain(|(item, _)| *item < items);
+        all.push(seen);
+    }
+    Ok(Some(all))
 }
 
-impl Truth {
-    /// By view: items with the samples of each, ascending.
-    pub fn new(visible: Vec<Vec<(ItemId, u32)>>) -> Truth {
-        Truth { visible }
-    }
+/// Surfaces at which rays end: solid boxes, or triangles with the floors of a map.
+enum RaysEnd<'w> {
+    Boxes(RayIndex, Option<&'w fragment::Surfaces>),
+    Triangles(SurfaceIndex),
+}
 
-    /// Nothing, in so many views.
-    pub fn empty(views: usize) -> Truth {
-        Truth {
-            visible: vec![Vec::new(); views],
+impl RaysEnd<'_> {
+    fn at<'w>(world: &'w World) -> RaysEnd<'w> {
+        match &world.shape {
+            Shape::Boxes(solids) => {
+                RaysEnd::Boxes(RayIndex::build(solids), world.cut_outs.as_ref())
+            }
+            Shape::Triangles(surfaces) => RaysEnd::Triangles(SurfaceIndex::build(surfaces)),
         }
     }
 
-    /// Items with their samples, ascending.
-    pub fn of_view(&self, view: usize) -> &[(ItemId, u32)] {
-        &self.visible[view]
+    fn at_samples(&self, rays: &Rays, grid: SampleGrid, threads: usize) -> SampleTruth {
+        match self {
+            RaysEnd::Boxes(index, Some(holes)) => {
+                let opaque = |body: &SolidBox, probe: &_, at: &_| {
+                    holes.opaque(body.item, &body.b, probe, at)
+                };
+                SampleTruth::of_opaque(index, &opaque, rays, grid, threads)
+            }
+            RaysEnd::Boxes(index, None) => SampleTruth::of(index, rays, grid, threads),
+            RaysEnd::Triangles(index) => SampleTruth::of(index, rays, grid, threads),
+        }
     }
 
-    /// Whether an item is in front at a sample of a view.
-    pub fn sees(&self, view: usize, item: ItemId) -> bool {
-        let found = self.visible[view].binary_search_by_key(&item, |(item, _)| *item);
-        found.is_ok()
+    fn along_random(&self, rays: &Rays, count: usize, seed: u64, threads: usize) -> Vec<ItemId> {
+        match self {
+            RaysEnd::Boxes(index, _) => visible_by_random_rays(index, rays, count, seed, threads),
+            RaysEnd::Triangles(index) => visible_by_random_rays(index, rays, count, seed, threads),
+        }
     }
 }

@@ -1,8 +1,11 @@
 //! Guarantees of the answers of a stage's back ends.
 
+use serde::Serialize;
+
 named! {
     /// Guarantee that a back end declares of its answers and that tests check.
-    #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+    #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Serialize)]
+    #[serde(rename_all = "kebab-case")]
     #[non_exhaustive]
     pub enum Guarantee {
         /// The visible set itself.

@@ -1,5 +1,4 @@
-//! What a stage hands on beside what is truly visible: counts of a view, and their
-//! rates over views.
+//! Counts of a stage against the exactly visible items: of a view, and over views.
 
 use serde::Serialize;
 
@@ -8,70 +7,71 @@ use crate::statistics::{Rate, rate};
 
 /// One view of one stage.
 #[derive(Clone, Copy, Default, PartialEq, Debug)]
-pub struct Judged {
-    /// What the stage was given.
+pub struct ViewCounts {
+    /// Candidates.
     pub input: u64,
-    /// What it handed on.
+    /// Returned candidates.
     pub output: u64,
-    /// Of that what is not visible.
+    /// Candidates that are not visible.
     pub hidden: u64,
-    /// What it should have handed on, and no more.
+    /// Visible items.
     pub truth: u64,
-    /// Handed on, though not visible.
+    /// Returned, though not visible.
     pub false_positives: u64,
-    /// Visible, and not handed on.
+    /// Visible, and not returned.
     pub false_negatives: u64,
-    /// Samples whose front item is not handed on.
+    /// Samples whose front item is not returned.
     pub missing_samples: u64,
     /// The most of them of one item.
     pub worst_missing_samples: u64,
-    /// Samples that any item is in front at.
+    /// Samples with an item in front.
     pub samples: u64,
 }
 
-/// What was made of the items `input` (`None`: of `all` that there are) against the
-/// visible ones with the samples of each; all ascending.
-pub fn judge_items(
+/// Counts of a stage that got `input` (`None`: `all` items) and returned `output`.
+///
+/// `visible` are the visible items with the samples of each. All lists are ascending.
+pub fn count_items(
     input: Option<&[ItemId]>,
     all: usize,
     output: &[ItemId],
     visible: &[(ItemId, u32)],
-) -> Judged {
+) -> ViewCounts {
     let is_given = |item: &ItemId| input.is_none_or(|input| input.binary_search(item).is_ok());
-    let given = visible.iter().filter(|(item, _)| is_given(item)).count();
-    let count = input.map_or(all, <[ItemId]>::len) as u64;
-    let mut judged = Judged {
-        input: count,
-        hidden: count - given as u64,
+    let given = visible.iter().filter(|(item, _)| is_given(item)).count() as u64;
+    let input = input.map_or(all, <[ItemId]>::len) as u64;
+    let mut counts = ViewCounts {
+        input,
+        hidden: input - given,
         output: output.len() as u64,
         truth: visible.len() as u64,
-        ..Judged::default()
+        ..ViewCounts::default()
     };
     for &(item, samples) in visible {
-        judged.samples += u64::from(samples);
+        let samples = u64::from(samples);
+        counts.samples += samples;
         if output.binary_search(&item).is_err() {
-            judged.false_negatives += 1;
-            judged.missing_samples += u64::from(samples);
-            judged.worst_missing_samples = judged.worst_missing_samples.max(samples.into());
+            counts.false_negatives += 1;
+            counts.missing_samples += samples;
+            counts.worst_missing_samples = counts.worst_missing_samples.max(samples);
         }
     }
-    judged.false_positives = judged.output + judged.false_negatives - judged.truth;
-    judged
+    counts.false_positives = counts.output + counts.false_negatives - counts.truth;
+    counts
 }
 
-/// All views of one stage together. Counts are means per view.
+/// Errors of a stage over all views. Counts are means per view.
 #[derive(Clone, Debug, Serialize)]
-#[non_exhaustive]
 pub struct Errors {
-    /// Items (or triangles) that it was given.
+    /// Candidates: items or triangles.
     pub input_count: f64,
-    /// Of them those that it handed on.
+    /// Returned candidates.
     pub output_count: f64,
-    /// Those that are visible.
+    /// Visible ones.
     pub truth_count: f64,
-    /// Handed on, though not visible.
+    /// Returned, though not visible.
     pub false_positive_count: f64,
-    /// Visible, and not handed on.
+    /// Visible, and not returned.
     pub false_negative_count: f64,
     /// False positives / visible, by view.
     pub excess: Option<Rate>,
@@ -81,23 +81,24 @@ pub struct Errors {
     pub image_error: Option<Rate>,
     /// Most samples that one missing item is in front at.
     pub worst_missing_samples: u64,
-    /// Longest run of views one after the other that each lack something.
+    /// Longest run of consecutive views that each lack a visible item.
     pub longest_missing_streak: usize,
-    /// Of what is not visible, the share that it removed.
+    /// Share of the candidates that are not visible that the stage removed.
     pub removed_share: Option<Rate>,
 }
 
 impl Errors {
-    /// Of the views of a path, in its order.
-    pub fn of(views: &[Judged]) -> Errors {
-        let mean = |of: fn(&Judged) -> u64| {
+    /// Errors over the views of a path, in its order.
+    pub fn of(views: &[ViewCounts]) -> Errors {
+        let mean = |of: fn(&ViewCounts) -> u64| {
             views.iter().map(|view| of(view) as f64).sum::<f64>() / views.len().max(1) as f64
         };
-        let share = |of: fn(&Judged) -> [u64; 2]| {
-            let clusters: Vec<[f64; 2]> = views.iter().map(|v| of(v).map(|n| n as f64)).collect();
-            rate(&clusters)
+        let share = |of: fn(&ViewCounts) -> [u64; 2]| {
+            let clusters = views.iter().map(|v| of(v).map(|n| n as f64));
+            rate(&clusters.collect::<Vec<_>>())
         };
         let streaks = views.split(|view| view.false_negatives == 0);
+        let worst = views.iter().map(|v| v.worst_missing_samples).max();
         Errors {
             input_count: mean(|v| v.input),
             output_count: mean(|v| v.output),
@@ -107,12 +108,8 @@ impl Errors {
             excess: share(|v| [v.false_positives, v.truth]),
             missing: share(|v| [v.false_negatives, v.truth]),
             image_error: share(|v| [v.missing_samples, v.samples]),
-            worst_missing_samples: views
-                .iter()
-                .map(|v| v.worst_missing_samples)
-                .max()
-                .unwrap_or(0),
-            longest_missing_streak: streaks.map(<[Judged]>::len).max().unwrap_or(0),
+            worst_missing_samples: worst.unwrap_or(0),
+            longest_missing_streak: streaks.map(<[_]>::len).max().unwrap_or(0),
             removed_share: share(|v| [v.hidden.saturating_sub(v.false_positives), v.hidden]),
         }
     }
@@ -125,28 +122,28 @@ mod tests {
     #[test]
     fn errors_are_counted_by_item_and_by_sample() {
         let visible = [(2, 10), (5, 1), (9, 4)];
-        let judged = judge_items(Some(&[1, 2, 3, 7, 9]), 12, &[1, 2, 3, 9], &visible);
-        assert_eq!((judged.false_positives, judged.false_negatives), (2, 1));
+        let counts = count_items(Some(&[1, 2, 3, 7, 9]), 12, &[1, 2, 3, 9], &visible);
+        assert_eq!((counts.false_positives, counts.false_negatives), (2, 1));
         assert_eq!(
-            (judged.missing_samples, judged.worst_missing_samples),
+            (counts.missing_samples, counts.worst_missing_samples),
             (1, 1)
         );
-        assert_eq!((judged.samples, judged.truth), (15, 3));
-        assert_eq!((judged.input, judged.hidden), (5, 3));
-        assert_eq!(judge_items(None, 12, &[], &visible).false_negatives, 3);
-        assert_eq!(judge_items(None, 12, &[1, 4], &[]).false_positives, 2);
+        assert_eq!((counts.samples, counts.truth), (15, 3));
+        assert_eq!((counts.input, counts.hidden), (5, 3));
+        assert_eq!(count_items(None, 12, &[], &visible).false_negatives, 3);
+        assert_eq!(count_items(None, 12, &[1, 4], &[]).false_positives, 2);
     }
 
     #[test]
     fn streaks_are_of_views_one_after_the_other() {
-        let view = |false_negatives| Judged {
+        let view = |false_negatives| ViewCounts {
             input: 10,
             hidden: 6,
             output: 6,
             truth: 4,
             false_positives: 2 + false_negatives,
             false_negatives,
-            ..Judged::default()
+            ..ViewCounts::default()
         };
         let errors = Errors::of(&[1, 0, 2, 1, 0].map(view));
         assert_eq!(errors.longest_missing_streak, 2);

@@ -1,29 +1,30 @@
-//! The triangle stage on what the chain leaves: the faces of those items in clusters, and
-//! every back end that tells which of them are turned away. Of solid
-//! boxes clusters are made for each view; of a mesh or a map once, and a back end passes
-//! over those of other items. A map's floors and ceilings are of no item.
+//! Triangle stage: clusters of triangles of the items that the chain leaves.
+//!
+//! Clusters of solid boxes are built for each view; those of a mesh or a map once, without
+//! its floors and ceilings, and a back end skips those of other items.
 
 use std::rc::Rc;
 use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::judged::Judged;
-use super::pass::Pass;
-use super::triangle_rows::rows;
-use super::world::World;
+use super::counts::ViewCounts;
+use super::item_stages::ItemStages;
+use super::stage::{NONE, StageKind, Step};
+use super::task::{FunnelKey, KeyedTask};
+use super::world::{Shape, World};
 use crate::camera::Camera;
 use crate::kernel::Kernel;
 use crate::scene::{ItemShape, Scene, Surfaces};
 use crate::visibility::triangle::{
-    Clusters, Counts, Eye, MOST_TRIANGLES, Selection, TriangleCull, facing,
+    Clusters, Counts, Eye, MOST_TRIANGLES, Selection, TRIANGLE_ROWS, TriangleCull, facing,
 };
 
-/// Bytes that the study of a mesh takes for each triangle, beside its scene: trees for
-/// rays, clusters and every back end of both; 310 were measured.
+/// Bytes that the study of a mesh takes per triangle, beside its scene: trees for rays,
+/// clusters and every back end of both; 310 were measured.
 pub const BYTES_PER_TRIANGLE: u64 = 350;
 
-/// The zero of a view's triangles. Faces of boxes are rounded about the eye, so that none
+/// Origin of a view's triangles. Faces of boxes are rounded about the eye, so that none
 /// changes its side; where f32 does not reach from there, about the scene's own origin.
 fn origin_of(scene: &Scene, camera: &Camera) -> DVec3 {
     let eye = camera.frame.eye;
@@ -35,12 +36,12 @@ fn origin_of(scene: &Scene, camera: &Camera) -> DVec3 {
     }
 }
 
-/// The eye of a camera about the zero of its view's triangles.
+/// The eye of a camera about the origin of its view's triangles.
 fn eye(scene: &Scene, camera: &Camera) -> Eye {
     Eye::of(camera, origin_of(scene, camera))
 }
 
-/// Triangles in clusters, ready for every back end.
+/// Clusters and all back ends over them, in the order of [`TRIANGLE_ROWS`].
 struct Built {
     clusters: Arc<Clusters>,
     culls: Vec<Box<dyn TriangleCull>>,
@@ -49,113 +50,127 @@ struct Built {
 impl Built {
     fn of(surfaces: Arc<Surfaces>) -> Rc<Built> {
         let clusters = Arc::new(Clusters::of(surfaces, MOST_TRIANGLES));
+        let culls = TRIANGLE_ROWS.iter().map(|row| (row.build)(&clusters));
         Rc::new(Built {
-            culls: rows().map(|row| (row.build)(&clusters)).collect(),
+            culls: culls.collect(),
             clusters,
         })
     }
 }
 
-/// The faces of what is left of one view.
-struct Left {
+/// Triangles of one view.
+struct Faces {
     built: Rc<Built>,
     given: Selection,
     eye: Eye,
-    /// The triangles that should be left.
+    /// Triangles that face the eye.
     truth: Selection,
 }
 
-/// The faces of what is left of every view.
-pub struct Faces {
-    views: Vec<Left>,
+/// Triangles of the items that the chain leaves, in every view.
+pub struct TriangleStage {
+    views: Vec<Faces>,
     kernel: Kernel,
 }
 
-impl Faces {
-    /// Of a set of items of each view. Most views have few items left; where a stage
-    /// before is left out, 12 triangles an item take memory.
-    pub fn of(world: &World, pass: &Pass, set: usize) -> Faces {
-        let whole = world.surfaces.as_ref().map(|all| Built::of(all.clone()));
-        let views = (0..world.views()).map(|view| {
-            let items = world.listed(pass.items(set, view));
-            let built = whole.clone().unwrap_or_else(|| {
-                let solids = world.solids.as_ref().expect("boxes or triangles");
-                let origin = origin_of(world.scene, world.rays(view).camera());
-                let boxes = items.iter().map(|&item| &solids.boxes[item as usize]);
-                Built::of(Arc::new(Surfaces::of_boxes_about(origin, boxes)))
-            });
-            let clusters = &built.clusters;
-            let given = match whole {
-                Some(_) => Selection::of_items(clusters, items.iter().copied()),
-                None => Selection::all(clusters),
+impl TriangleStage {
+    /// Clusters of the items behind `steps`.
+    ///
+    /// A box takes 12 triangles, which is much memory where a stage before is left out.
+    pub fn new(world: &World, stages: &ItemStages, steps: &[Step]) -> TriangleStage {
+        let whole = match &world.shape {
+            Shape::Triangles(all) => Ok(Built::of(all.clone())),
+            Shape::Boxes(solids) => Err(solids),
+        };
+        let views = world.views().map(|view| {
+            let items = world.listed(stages.items(steps, view));
+            let camera = world.rays(view).camera();
+            let (built, given) = match &whole {
+                Err(solids) => {
+                    let boxes = items.iter().map(|&item| &solids.boxes[item as usize]);
+                    let origin = origin_of(world.scene, camera);
+                    let built = Built::of(Arc::new(Surfaces::of_boxes_about(origin, boxes)));
+                    let given = Selection::all(&built.clusters);
+                    (built, given)
+                }
+                Ok(built) => {
+                    let given = Selection::of_items(&built.clusters, items.iter().copied());
+                    (built.clone(), given)
+                }
             };
-            let eye = eye(world.scene, world.rays(view).camera());
-            Left {
-                truth: facing(clusters, &eye, &given),
+            let eye = eye(world.scene, camera);
+            Faces {
+                truth: facing(&built.clusters, &eye, &given),
                 given,
                 eye,
                 built,
             }
         });
-        Faces {
+        TriangleStage {
             views: views.collect(),
             kernel: world.kernel,
         }
     }
 
-    /// The faces of a view.
     pub fn clusters(&self, view: usize) -> &Arc<Clusters> {
         &self.views[view].built.clusters
     }
 
-    /// What a back end leaves of the triangles of a view; `None` is no back end.
-    fn selected(&self, back_end: Option<usize>, view: usize) -> Selection {
-        let left = &self.views[view];
-        let mut selection = left.given.clone();
-        if let Some(back_end) = back_end {
-            left.built.culls[back_end].cull(&left.eye, self.kernel, &mut selection);
-        }
-        selection
+    fn kept(&self, row: usize, view: usize) -> Selection {
+        let faces = &self.views[view];
+        let mut kept = faces.given.clone();
+        faces.built.culls[row].cull(&faces.eye, self.kernel, &mut kept);
+        kept
     }
 
-    /// The clusters of a view that keep a triangle.
-    pub fn cull(&self, back_end: usize, view: usize, out: &mut Vec<u32>) {
-        let selection = self.selected(Some(back_end), view);
-        let clusters = selection.words().iter().zip(0..);
-        let kept = clusters.filter(|(word, _)| **word != 0);
-        out.extend(kept.map(|(_, cluster)| cluster));
+    /// Every back end that removes something; the ids are of clusters with a triangle left.
+    pub fn tasks(&self) -> impl Iterator<Item = KeyedTask<'_>> {
+        let rows = TRIANGLE_ROWS.iter().enumerate();
+        let rows = rows.filter(|(_, row)| row.name != NONE);
+        rows.map(move |(index, row)| KeyedTask {
+            key: FunnelKey::Stage(StageKind::Triangle, row.name.to_owned()),
+            ask: Box::new(move |view, out| {
+                let kept = self.kept(index, view);
+                let clusters = kept.words().iter().zip(0..);
+                let left = clusters.filter(|(word, _)| **word != 0);
+                out.extend(left.map(|(_, cluster)| cluster));
+            }),
+        })
     }
 
-    /// What a back end leaves of the triangles of a view, by their number among the
-    /// surfaces; `None` is no back end.
-    pub fn triangles(&self, back_end: Option<usize>, view: usize) -> Vec<u32> {
-        let selection = self.selected(back_end, view);
-        let clusters = self.clusters(view);
-        let mut triangles = Vec::with_capacity(selection.triangles());
-        for (cluster, word) in selection.words().iter().enumerate() {
-            let all = clusters.triangles_of(cluster).iter().enumerate();
+    /// Triangles of a view that a back end leaves, by their index among the surfaces.
+    pub fn triangles(&self, name: &str, view: usize) -> Vec<u32> {
+        let kept = self.kept(row(name), view);
+        let mut triangles = Vec::with_capacity(kept.triangles());
+        for (cluster, word) in kept.words().iter().enumerate() {
+            let all = self.clusters(view).triangles_of(cluster).iter().enumerate();
             triangles.extend(all.filter(|(bit, _)| word >> bit & 1 == 1).map(|(_, t)| t));
         }
         triangles
     }
 
-    /// Every view, held against the exact side of each triangle.
-    pub fn judged(&self, back_end: Option<usize>) -> Vec<Judged> {
-        let judged = (0..self.views.len()).map(|view| {
-            let left = &self.views[view];
-            let counts = Counts::of(&left.given, &self.selected(back_end, view), &left.truth);
-            Judged {
+    /// Counts of a back end in every view, against the exact side of each triangle.
+    pub fn counts(&self, name: &str) -> Vec<ViewCounts> {
+        let count = |(view, faces): (usize, &Faces)| {
+            let counts = Counts::of(&faces.given, &self.kept(row(name), view), &faces.truth);
+            ViewCounts {
                 input: counts.candidates as u64,
                 hidden: (counts.candidates - counts.truth) as u64,
                 output: counts.delivered as u64,
                 truth: counts.truth as u64,
                 false_positives: counts.false_positives as u64,
                 false_negatives: counts.false_negatives as u64,
-                ..Judged::default()
+                ..ViewCounts::default()
             }
-        });
-        judged.collect()
+        };
+        self.views.iter().enumerate().map(count).collect()
     }
+}
+
+/// Index of a back end in [`TRIANGLE_ROWS`].
+fn row(name: &str) -> usize {
+    let found = TRIANGLE_ROWS.iter().position(|row| row.name == name);
+    found.expect("a row of the triangle stage")
 }
 
 #[cfg(test)]

@@ -1,41 +1,40 @@
-//! The fragment stage on what the chain leaves: the tests that decide at each sample,
-//! what they keep of the items, and how many samples and fragments that takes.
+//! Fragment stage: the tests that decide at each sample which of the remaining items is
+//! in front, with the samples and fragments that they take.
 
 use std::cell::RefCell;
+use std::collections::HashSet;
 
 use serde::Serialize;
 
-use super::faces::Faces;
-use super::fragment_rows::{STENCIL, Z};
-use super::judged::Judged;
-use super::left_out::{Reason, fits_drawing};
-use super::pass::Pass;
-use super::stage::{BackEnd, NONE, StageKind};
-use super::triangle_rows;
+use super::back_ends::{STENCIL, Z};
+use super::counts::{ViewCounts, count_items};
+use super::error::fits_drawing;
+use super::item_stages::ItemStages;
+use super::stage::{BackEnd, NONE, StageKind, Step};
+use super::task::{FunnelKey, KeyedTask};
+use super::triangle_stage::TriangleStage;
 use super::truth::Truth;
-use super::world::World;
+use super::world::{Shape, World};
 use crate::query::ItemId;
 use crate::scene::{self, WorldBox};
 use crate::visibility::fragment::{
     Canvas, Drawn, DrawnTriangles, Piece, Screen, Stencil, Surfaces, Tally, Tests,
 };
-use crate::visibility::region::RegionGraph;
 use crate::visibility::truth::TriangleProbe;
 use crate::visibility::{Rays, Solids};
 
-/// What a test took, means per view.
+/// Samples and fragments of a test, means per view.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
-#[non_exhaustive]
 pub struct FragmentCounts {
-    /// Samples whose rays were asked, those that mark a stencil among them.
+    /// Samples whose rays are tested, those that mark a stencil among them.
     pub asked_count: f64,
-    /// Samples that the stencil kept from being asked.
+    /// Samples that the stencil excludes.
     pub kept_out_count: f64,
-    /// Samples that met an item: of meshes and maps a triangle, as each is drawn by itself.
+    /// Samples that meet an item: of meshes and maps a triangle, as each is drawn by itself.
     pub fragment_count: f64,
-    /// Of these, dropped by the alpha-test.
+    /// Fragments that the alpha-test drops.
     pub clear_count: f64,
-    /// Of the rest, those that passed the z-test when they came.
+    /// Other fragments that pass the z-test when they come.
     pub shaded_count: f64,
     /// Samples that something opaque covers.
     pub covered_count: f64,
@@ -54,7 +53,7 @@ impl FragmentCounts {
         ]
     }
 
-    /// `None` of no view.
+    /// `None` without views.
     pub(super) fn of(tallies: &[Tally]) -> Option<FragmentCounts> {
         let views = tallies.len() as f64;
         let mean = |of: fn(&Tally) -> u64| tallies.iter().map(of).sum::<u64>() as f64 / views;
@@ -69,38 +68,34 @@ impl FragmentCounts {
     }
 }
 
-/// A test on every view.
+/// A test in every view.
 pub struct Tested {
-    /// The test.
     pub back_end: BackEnd,
-    /// By view.
-    pub judged: Vec<Judged>,
-    /// `None` where nothing is drawn.
-    pub counts: Option<FragmentCounts>,
-    /// By view the samples that something covers; none where nothing is drawn.
-    pub covered: Vec<u64>,
+    pub counts: Vec<ViewCounts>,
+    /// Empty where nothing is drawn.
+    pub tallies: Vec<Tally>,
 }
 
-/// What a chain leaves of every view, ready to be drawn: boxes as they are; of a mesh or a
-/// map the triangles that the triangle stage leaves, and the floors and ceilings.
-pub struct Fragments<'w> {
+/// Items that the chain leaves, drawn: boxes as they are; of a mesh or a map the triangles
+/// that the triangle stage leaves, and floors and ceilings.
+pub struct FragmentStage<'w> {
     world: &'w World<'w>,
-    /// Empty where too much would be drawn.
-    tests: Vec<&'static str>,
     left: Left<'w>,
-    /// Why there is no test.
-    pub too_much: Option<Reason>,
+    /// Reason for which nothing is drawn.
+    pub too_much: Option<String>,
 }
 
-/// By view what is drawn; and an image, whose memory is kept from view to view.
+/// Geometry of every view, and the memory of an image.
 enum Left<'w> {
     Boxes(Vec<Boxes>, RefCell<Option<(Canvas, Drawn)>>),
     Triangles(&'w scene::Surfaces, Vec<Vec<u32>>, TriangleImage),
 }
 
+type TriangleImage = RefCell<Option<(Canvas<TriangleProbe>, DrawnTriangles)>>;
+
 impl Left<'_> {
-    /// Refuses a view of which too much would be drawn.
-    fn fits(&self, world: &World, view: usize) -> Result<(), Reason> {
+    /// Refuses a view that covers too many samples.
+    fn fits(&self, world: &World, view: usize) -> Result<(), String> {
         let screen = Screen::of(world.rays(view), world.samples);
         match self {
             Left::Boxes(views, _) => {
@@ -116,60 +111,41 @@ impl Left<'_> {
     }
 }
 
-type TriangleImage = RefCell<Option<(Canvas<TriangleProbe>, DrawnTriangles)>>;
-
-impl<'w> Fragments<'w> {
-    /// Of a set of items of each view, whose triangles `faces` has, and what is left of
-    /// these by a back end of the triangle stage.
-    pub fn of(
+impl<'w> FragmentStage<'w> {
+    /// Items behind `steps`, of whose triangles the back end `triangle` removes some.
+    pub fn new(
         world: &'w World<'w>,
-        pass: &Pass,
-        set: usize,
-        faces: &Faces,
-        triangle: &str,
-    ) -> Fragments<'w> {
-        let place = triangle_rows::back_ends().position(|row| row.name == triangle);
-        let tests = world.back_ends(StageKind::Fragment).into_iter();
-        let tests = tests.map(|row| row.name).filter(|name| *name != NONE);
-        let views = 0..world.views();
-        let left = match (&world.solids, &world.surfaces) {
-            (Some(solids), _) => {
-                let boxes = views.map(|view| {
-                    let items = world.listed(pass.items(set, view));
+        stages: &ItemStages,
+        steps: &[Step],
+        (triangles, triangle): (&TriangleStage, &str),
+    ) -> FragmentStage<'w> {
+        let left = match &world.shape {
+            Shape::Boxes(solids) => {
+                let boxes = world.views().map(|view| {
+                    let items = world.listed(stages.items(steps, view));
                     Boxes::of(world, solids, view, &items)
                 });
                 Left::Boxes(boxes.collect(), RefCell::new(None))
             }
-            (None, Some(surfaces)) => {
+            Shape::Triangles(surfaces) => {
                 let beyond = surfaces.of_item.get(world.items()..).unwrap_or_default();
-                let triangles = views.map(|view| {
-                    let mut triangles = faces.triangles(place, view);
+                let triangles = world.views().map(|view| {
+                    let mut triangles = triangles.triangles(triangle, view);
                     triangles.extend(beyond.iter().flat_map(Clone::clone));
                     triangles
                 });
                 Left::Triangles(surfaces, triangles.collect(), RefCell::new(None))
             }
-            (None, None) => unreachable!("triangles of what is no solid box"),
         };
-        let too_much = (0..world.views()).find_map(|view| left.fits(world, view).err());
-        Fragments {
-            tests: match too_much {
-                None => tests.collect(),
-                Some(_) => Vec::new(),
-            },
+        FragmentStage {
+            too_much: world.views().find_map(|view| left.fits(world, view).err()),
             left,
             world,
-            too_much,
         }
     }
 
-    /// How many tests there are.
-    pub fn count(&self) -> usize {
-        self.tests.len()
-    }
-
-    /// Draws a view by a test; hands over what is in front at any sample.
-    pub fn draw(&self, test: usize, view: usize, out: &mut Vec<ItemId>) -> Tally {
+    /// Draws a view by a test; appends the items that are in front at any sample.
+    fn draw(&self, test: &str, view: usize, out: &mut Vec<ItemId>) -> Tally {
         let (rays, grid) = (self.world.rays(view), self.world.samples);
         match &self.left {
             Left::Boxes(views, image) => {
@@ -178,9 +154,9 @@ impl<'w> Fragments<'w> {
                 let (canvas, drawn) = image.get_or_insert_with(new);
                 canvas.turn_to(rays);
                 let left = &views[view];
-                left.draw(self.tests[test], canvas, drawn);
+                left.draw(test, canvas, drawn);
                 let visible = drawn.depth.visible(canvas).into_iter();
-                out.extend(visible.map(|place| left.items[place as usize]));
+                out.extend(visible.map(|index| left.items[index as usize]));
                 drawn.tally
             }
             Left::Triangles(surfaces, views, image) => {
@@ -193,7 +169,7 @@ impl<'w> Fragments<'w> {
                 let (canvas, drawn) = image.get_or_insert_with(new);
                 canvas.turn_to(rays, origin);
                 drawn.draw(canvas, surfaces, &views[view]);
-                // Behind a map's items come its floors and ceilings.
+                // Floors and ceilings of a map come behind its items.
                 let items = self.world.items() as ItemId;
                 let visible = drawn.visible(canvas).into_iter();
                 out.extend(visible.filter(|item| *item < items));
@@ -202,77 +178,83 @@ impl<'w> Fragments<'w> {
         }
     }
 
-    /// Every test, held against the truth; of no test what it was given. `None` if stopped.
+    /// Tests that are drawn.
+    fn tests(&self) -> impl Iterator<Item = BackEnd> {
+        let rows = self.world.back_ends(StageKind::Fragment).into_iter();
+        rows.filter(|row| row.name != NONE && self.too_much.is_none())
+    }
+
+    pub fn tasks(&self) -> impl Iterator<Item = KeyedTask<'_>> {
+        self.tests().map(move |row| KeyedTask {
+            key: FunnelKey::Stage(StageKind::Fragment, row.name.to_owned()),
+            ask: Box::new(move |view, out| {
+                self.draw(row.name, view, out);
+            }),
+        })
+    }
+
+    /// Counts of no test and of every test; `None` if stopped.
     pub fn tested(
         &self,
-        pass: &Pass,
-        set: usize,
+        stages: &ItemStages,
+        steps: &[Step],
         truth: &Truth,
         stop: &dyn Fn() -> bool,
     ) -> Option<Vec<Tested>> {
         let world = self.world;
-        let tested = world.back_ends(StageKind::Fragment).into_iter();
-        let is_there = |row: &BackEnd| row.name == NONE || self.tests.contains(&row.name);
-        let tested = tested.filter(is_there).map(|back_end| {
-            let test = self.tests.iter().position(|name| *name == back_end.name);
-            let (mut judged, mut tallies) = (Vec::new(), Vec::new());
-            for view in 0..world.views() {
+        let none = world.back_end(StageKind::Fragment, NONE);
+        let tested = std::iter::once(none).chain(self.tests()).map(|back_end| {
+            let (mut counts, mut tallies) = (Vec::new(), Vec::new());
+            for view in world.views() {
                 if stop() {
                     return None;
                 }
-                let given = pass.items(set, view);
+                let given = stages.items(steps, view);
                 let mut output = Vec::new();
-                match test {
-                    Some(test) => tallies.push(self.draw(test, view, &mut output)),
-                    None => output.extend_from_slice(&world.listed(given)),
+                match back_end.name {
+                    NONE => output.extend_from_slice(&world.listed(given)),
+                    test => tallies.push(self.draw(test, view, &mut output)),
                 }
-                judged.push(world.judge(view, [given, Some(&output)], truth));
+                counts.push(count_items(given, world.items(), &output, &truth[view]));
             }
             Some(Tested {
                 back_end,
-                judged,
-                counts: FragmentCounts::of(&tallies),
-                covered: tallies.iter().map(|tally| tally.covered).collect(),
+                counts,
+                tallies,
             })
         });
         tested.collect()
     }
 }
 
-/// What is left of a view of solid boxes, numbered anew.
+/// Solid boxes of a view, renumbered.
 struct Boxes {
     items: Vec<ItemId>,
     solids: Solids,
     cut_outs: Option<Surfaces>,
-    /// Where the eye is in rooms: with the items that meet them, and those beyond.
-    room: Option<(Room, [Vec<Piece>; 2])>,
+    room: Option<Room>,
 }
 
-/// The rooms that the eye is in.
+/// Rooms of an eye in rooms, for the stencil-test.
 struct Room {
-    /// Their portals, flat.
+    /// Flat boxes.
     portals: Vec<WorldBox>,
-    /// The items that meet them, ascending.
-    items: Vec<ItemId>,
+    /// Items that meet the rooms.
+    near: Vec<Piece>,
+    beyond: Vec<Piece>,
 }
 
 impl Boxes {
     fn of(world: &World, solids: &Solids, view: usize, items: &[ItemId]) -> Boxes {
-        let room = Room::of(world, world.rays(view)).map(|room| {
-            let pieces = (0..items.len() as ItemId).map(Piece::whole);
-            let is_near = |p: &Piece| room.items.binary_search(&items[p.item as usize]).is_ok();
-            let (near, beyond) = pieces.partition(is_near);
-            (room, [near, beyond])
-        });
         Boxes {
             items: items.to_vec(),
             solids: solids.some(items),
             cut_outs: world.cut_outs.as_ref().map(|surfaces| surfaces.some(items)),
-            room,
+            room: Room::of(world, world.rays(view), items),
         }
     }
 
-    /// Draws the image anew by a test.
+    /// Replaces the image by that of a test.
     fn draw(&self, test: &str, canvas: &Canvas, drawn: &mut Drawn) {
         let solids = &self.solids;
         drawn.clear();
@@ -285,12 +267,12 @@ impl Boxes {
                 let pieces = (0..solids.boxes.len() as ItemId).map(Piece::whole);
                 drawn.draw(canvas, solids, &pieces.collect::<Vec<_>>(), &tests);
             }
-            Some((room, [near, beyond])) => {
-                drawn.draw(canvas, solids, near, &tests);
+            Some(room) => {
+                drawn.draw(canvas, solids, &room.near, &tests);
                 let stencil = room.stencil(canvas, drawn);
                 drawn.tally.asked += stencil.asked();
                 let stencil = Some(&stencil);
-                drawn.draw(canvas, solids, beyond, &Tests { stencil, ..tests });
+                drawn.draw(canvas, solids, &room.beyond, &Tests { stencil, ..tests });
             }
         }
     }
@@ -298,9 +280,9 @@ impl Boxes {
 
 impl Room {
     /// `None` for an eye that is in no room.
-    fn of(world: &World, rays: &Rays) -> Option<Room> {
+    fn of(world: &World, rays: &Rays, items: &[ItemId]) -> Option<Room> {
         let regions = world.regions.as_ref()?;
-        let graph: &RegionGraph = regions.graph();
+        let graph = &regions.graph;
         let mut homes = Vec::new();
         if !graph.homes(rays, &mut homes) {
             return None;
@@ -310,17 +292,19 @@ impl Room {
             let corners = graph.openings()[exit as usize].corners;
             WorldBox::union_of(corners.map(|corner| WorldBox::new(corner, corner)))
         });
-        let portals = portals.collect();
-        let items = homes
-            .iter()
-            .flat_map(|&home| regions.items().of_region(home));
-        let mut items: Vec<ItemId> = items.copied().collect();
-        items.sort_unstable();
-        items.dedup();
-        Some(Room { portals, items })
+        let of_rooms = homes.iter().flat_map(|&home| regions.items.of_region(home));
+        let of_rooms: HashSet<ItemId> = of_rooms.copied().collect();
+        let pieces = (0..items.len() as ItemId).map(Piece::whole);
+        let is_near = |piece: &Piece| of_rooms.contains(&items[piece.item as usize]);
+        let (near, beyond) = pieces.partition(is_near);
+        Some(Room {
+            portals: portals.collect(),
+            near,
+            beyond,
+        })
     }
 
-    /// The samples that see a portal before what is drawn already.
+    /// Samples that see a portal before everything that is drawn already.
     fn stencil(&self, canvas: &Canvas, drawn: &Drawn) -> Stencil {
         let mut stencil = Stencil::of(vec![false; canvas.grid().samples()]);
         for portal in &self.portals {

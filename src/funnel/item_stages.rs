@@ -1,0 +1,204 @@
+//! Stages of whole items: their back ends, and the items that chains of them leave.
+
+use std::cell::RefCell;
+
+use super::back_ends::{OCCLUSION_ROWS, OcclusionRow};
+use super::counts::{ViewCounts, count_items};
+use super::stage::{Chain, NONE, StageKind, Step};
+use super::task::{FunnelKey, KeyedTask};
+use super::truth::Truth;
+use super::world::{View, World};
+use crate::measure::Ask;
+use crate::query::ItemId;
+use crate::visibility::SampleGrid;
+use crate::visibility::occlusion;
+use crate::visibility::region::{EyePlace, Marks, Scratch};
+
+/// Appends the items of a view that a stage leaves of those given (`None`: all items).
+pub type Run<'w> = Box<dyn Fn(usize, Option<&[ItemId]>, &mut Vec<ItemId>) + 'w>;
+
+impl World<'_> {
+    /// A back end of a stage of whole items.
+    ///
+    /// # Panics
+    /// If there is no such back end.
+    pub fn run(&self, stage: StageKind, name: &str) -> Run<'_> {
+        match stage {
+            StageKind::Region => self.run_region(name),
+            StageKind::Object => self.run_object(name),
+            StageKind::Occlusion => {
+                let row = OCCLUSION_ROWS.iter().find(|row| row.back_end.name == name);
+                self.run_occlusion(row.expect("a row of the occlusion stage"), self.samples)
+            }
+            StageKind::Triangle | StageKind::Fragment => unreachable!("no stage of whole items"),
+        }
+    }
+
+    fn run_region(&self, name: &str) -> Run<'_> {
+        let regions = self.regions.as_ref().expect("a scene with regions");
+        let row = regions.row(name).expect("a row of the region stage");
+        let state = RefCell::new((Scratch::default(), Marks::default(), Vec::new()));
+        Box::new(move |view, _, out| {
+            let (scratch, marks, seen) = &mut *state.borrow_mut();
+            match row.from_eye(&self.views[view].rays, scratch, seen) {
+                EyePlace::Inside => regions.items.of_regions(seen, marks, out),
+                _ => out.extend(0..self.items() as ItemId),
+            }
+        })
+    }
+
+    fn run_object(&self, name: &str) -> Run<'_> {
+        let found = self.structures.iter().find(|(label, _)| label == name);
+        let (_, index) = found.expect("a structure that was built");
+        let state = RefCell::new((Marks::default(), Vec::new()));
+        Box::new(move |view, input, out| {
+            let volume = &self.views[view].volume;
+            let Some(items) = input else {
+                return index.visible(volume, out);
+            };
+            // A structure searches the whole scene.
+            let (marks, found) = &mut *state.borrow_mut();
+            found.clear();
+            index.visible(volume, found);
+            marks.clear(self.items());
+            for &id in found.iter() {
+                marks.insert(id);
+            }
+            out.extend(items.iter().filter(|&&id| marks.holds(id)));
+        })
+    }
+
+    /// A back end of the occlusion stage with a buffer of the given size.
+    pub fn run_occlusion(&self, row: &OcclusionRow, buffer: SampleGrid) -> Run<'_> {
+        let occlude = RefCell::new((row.new)(buffer, self.kernel, self.choice));
+        let does_both = row.back_end.does_object_stage;
+        let every: Vec<ItemId> = (0..self.items() as ItemId).collect();
+        let occluders: Vec<_> = self.views().map(|view| self.occluders(view)).collect();
+        Box::new(move |view, input, out| {
+            let occluders = occluders[view];
+            let View { rays, volume, .. } = &self.views[view];
+            let view = occlusion::View::new(rays, volume, occluders, buffer);
+            let items = input.unwrap_or(&every);
+            (occlude.borrow_mut())(occluders, &view, items, out);
+            // A traversal of the whole scene ignores the visible regions.
+            if does_both && self.regions.is_some() && input.is_some() {
+                out.retain(|id| items.binary_search(id).is_ok());
+            }
+        })
+    }
+}
+
+/// Items that the back ends of the item stages leave of each view.
+pub struct ItemStages<'w> {
+    world: &'w World<'w>,
+    /// By the steps behind which they are left: ascending ids of every view.
+    left: Vec<(Vec<Step>, Vec<Vec<ItemId>>)>,
+}
+
+impl<'w> ItemStages<'w> {
+    pub fn new(world: &'w World<'w>) -> ItemStages<'w> {
+        let left = Vec::new();
+        ItemStages { world, left }
+    }
+
+    /// Runs a chain, every back end in its place in it, and the chain without each of its
+    /// stages; `None` if stopped.
+    pub fn all(
+        world: &'w World<'w>,
+        chain: &Chain,
+        stop: &dyn Fn() -> bool,
+    ) -> Option<ItemStages<'w>> {
+        let mut all = ItemStages::new(world);
+        all.run(&chain.steps(), stop)?;
+        for stage in StageKind::OF_ITEMS {
+            for name in world.names(stage) {
+                all.run(&chain.steps_with(stage, &name), stop)?;
+            }
+            if world.is_separate(chain, stage) {
+                all.run(&chain.clone().with(stage, NONE).steps(), stop)?;
+            }
+        }
+        Some(all)
+    }
+
+    /// Runs stages one after the other, those that were run before only once.
+    pub fn run(&mut self, steps: &[Step], stop: &dyn Fn() -> bool) -> Option<()> {
+        let Some(((stage, name), before)) = steps.split_last() else {
+            return Some(());
+        };
+        if self.left.iter().any(|(own, _)| own == steps) {
+            return Some(());
+        }
+        self.run(before, stop)?;
+        let run = self.world.run(*stage, name);
+        let mut output = Vec::with_capacity(self.world.views.len());
+        for view in self.world.views() {
+            if stop() {
+                return None;
+            }
+            let mut ids = Vec::new();
+            run(view, self.items(before, view), &mut ids);
+            ids.sort_unstable();
+            output.push(ids);
+        }
+        self.left.push((steps.to_vec(), output));
+        Some(())
+    }
+
+    /// Items of each view behind some steps; `None` for all items, without steps.
+    fn behind(&self, steps: &[Step]) -> Option<&[Vec<ItemId>]> {
+        let found = self.left.iter().find(|(own, _)| own == steps);
+        let left = found.map(|(_, left)| &left[..]);
+        assert!(left.is_some() || steps.is_empty(), "steps that were run");
+        left
+    }
+
+    /// Items of a view behind some steps; `None` for all items, without steps.
+    pub fn items(&self, steps: &[Step], view: usize) -> Option<&[ItemId]> {
+        self.behind(steps).map(|left| &left[view][..])
+    }
+
+    /// Mean number of items behind some steps, over the views.
+    pub fn mean_count(&self, steps: &[Step]) -> f64 {
+        let count = |view| {
+            self.items(steps, view)
+                .map_or(self.world.items(), <[ItemId]>::len)
+        };
+        let counts = self.world.views().map(|view| count(view) as f64);
+        counts.sum::<f64>() / self.world.views.len().max(1) as f64
+    }
+
+    /// Counts of the last of some steps in every view.
+    pub fn counts(&self, before: &[Step], steps: &[Step], truth: &Truth) -> Vec<ViewCounts> {
+        let views = self.world.views();
+        let count = |view: usize| {
+            let output = self.world.listed(self.items(steps, view));
+            let input = self.items(before, view);
+            count_items(input, self.world.items(), &output, &truth[view])
+        };
+        views.map(count).collect()
+    }
+
+    /// Every step that was run.
+    pub fn tasks(&self) -> impl Iterator<Item = KeyedTask<'_>> {
+        self.left.iter().map(|(steps, _)| {
+            let (stage, name) = steps.last().expect("at least one step");
+            let run = self.world.run(*stage, name);
+            let input = self.behind(&steps[..steps.len() - 1]);
+            let ask: Ask = Box::new(move |view, out| {
+                run(view, input.map(|left| &left[view][..]), out);
+            });
+            let key = FunnelKey::Steps(steps.clone());
+            KeyedTask { key, ask }
+        })
+    }
+
+    /// Tasks of a chain whose times add up.
+    pub fn timed(&self, chain: &Chain) -> Vec<FunnelKey> {
+        let steps = chain.steps();
+        let is_timed = |end: &usize| self.world.is_separate(chain, steps[end - 1].0);
+        let ends = (1..=steps.len()).filter(is_timed);
+        ends.map(|end| FunnelKey::Steps(steps[..end].to_vec()))
+            .collect()
+    }
+}

@@ -1,0 +1,190 @@
+//! Timed tasks of a study by key: plan, timed pass, and times over the processes.
+
+use std::collections::HashMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::picks::PickQuestion;
+use super::stage::{Chain, NONE, StageKind, Step};
+use super::world::FunnelInput;
+use crate::measure::{Ask, OverProcesses, ProcessTimes, Schedule, TimedTask, timed};
+use crate::statistics::Estimate;
+
+/// Identity of a timed task, the same in every process.
+#[derive(Clone, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
+pub enum FunnelKey {
+    /// The last of some stages of whole items, on the items that the others leave.
+    Steps(Vec<Step>),
+    /// A back end of the triangle or fragment stage, on the items that the chain leaves.
+    Stage(StageKind, String),
+    /// A back end with an occlusion buffer of the given columns.
+    Buffer(String, u32),
+    /// A depth order.
+    Order(String),
+    /// A back end of picking.
+    Pick(PickQuestion, String),
+    /// A lower bound of a stage.
+    Bound(StageKind, String),
+}
+
+impl FunnelKey {
+    /// A back end of a stage in its place in a chain; `None` for the one that does nothing.
+    pub fn of_stage(chain: &Chain, stage: StageKind, name: &str) -> Option<FunnelKey> {
+        match stage {
+            _ if name == NONE => None,
+            StageKind::Triangle | StageKind::Fragment => {
+                Some(FunnelKey::Stage(stage, name.to_owned()))
+            }
+            _ => Some(FunnelKey::Steps(chain.steps_with(stage, name))),
+        }
+    }
+}
+
+/// A task of the timed pass.
+pub struct KeyedTask<'w> {
+    pub key: FunnelKey,
+    /// Does the task in a view; the number of appended ids is checked.
+    pub ask: Ask<'w>,
+}
+
+/// Tasks and schedule of the timed pass, the same for all processes.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct FunnelPlan {
+    schedule: Schedule,
+    /// Tasks with the expected number of ids in each view.
+    tasks: Vec<(FunnelKey, Vec<u64>)>,
+}
+
+impl FunnelPlan {
+    /// Does every task once in each of `views` views, and plans their times.
+    pub fn new(tasks: Vec<KeyedTask>, views: usize, input: &FunnelInput) -> FunnelPlan {
+        let mut out = Vec::new();
+        let mut count = |ask: &Ask, view| {
+            out.clear();
+            ask(view, &mut out);
+            out.len() as u64
+        };
+        let (keys, tasks): (Vec<_>, Vec<_>) = tasks
+            .into_iter()
+            .map(|KeyedTask { key, ask }| {
+                let expected = (0..views).map(|view| count(&ask, view)).collect();
+                (key, TimedTask::new(expected, ask))
+            })
+            .unzip();
+        FunnelPlan {
+            schedule: Schedule::new(views, &tasks, input.protocol),
+            tasks: keys
+                .into_iter()
+                .zip(tasks.into_iter().map(|task| task.expected))
+                .collect(),
+        }
+    }
+
+    /// Times of one process; `None` if stopped.
+    ///
+    /// A planned task that this process does not have fails by its counts.
+    pub fn time(
+        &self,
+        tasks: Vec<KeyedTask>,
+        input: &FunnelInput,
+        stop: &dyn Fn() -> bool,
+    ) -> Option<ProcessTimes> {
+        let tasks = tasks.into_iter().map(|task| (task.key, task.ask));
+        let mut asks: HashMap<FunnelKey, Ask> = tasks.collect();
+        let planned = self.tasks.iter().map(|(key, expected)| {
+            let ask = asks.remove(key).unwrap_or_else(|| Box::new(|_, _| ()));
+            TimedTask::new(expected.clone(), ask)
+        });
+        let planned: Vec<TimedTask> = planned.collect();
+        let timed = timed(&planned, &self.schedule, input.protocol, &|_| stop())?;
+        Some(ProcessTimes::of(&timed))
+    }
+
+    /// Expected numbers of ids of a task, by view.
+    pub fn expected(&self, key: &FunnelKey) -> Option<&[u64]> {
+        let found = self.tasks.iter().find(|(own, _)| own == key);
+        found.map(|(_, expected)| &expected[..])
+    }
+
+    /// Times of all processes.
+    pub fn times(&self, processes: &[ProcessTimes]) -> KeyedTimes {
+        let keys = self.tasks.iter().map(|(key, _)| key.clone());
+        KeyedTimes {
+            indices: keys.zip(0..).collect(),
+            all: OverProcesses::of(processes),
+        }
+    }
+}
+
+/// Times of the tasks of a plan over the processes.
+pub struct KeyedTimes {
+    indices: HashMap<FunnelKey, usize>,
+    all: OverProcesses,
+}
+
+impl KeyedTimes {
+    /// Time of a view, ns.
+    pub fn ns(&self, key: &FunnelKey) -> Option<Estimate> {
+        self.all.ns(*self.indices.get(key)?)
+    }
+
+    /// Time of a task / time of another.
+    pub fn ratio(&self, key: &FunnelKey, other: &FunnelKey) -> Option<Estimate> {
+        let index = |key| self.indices.get(key).copied();
+        self.all.ratio(index(key)?, index(other)?)
+    }
+
+    /// Whether the processes show that a task is faster than another.
+    pub fn is_faster(&self, key: &FunnelKey, other: &FunnelKey) -> bool {
+        let both = self.indices.get(key).zip(self.indices.get(other));
+        both.is_some_and(|(own, other)| self.all.is_faster(*own, *other))
+    }
+
+    /// Sum of the times of some tasks in each process, ns: 0 without tasks, empty if one
+    /// of them has no times.
+    pub fn sums(&self, keys: &[FunnelKey]) -> Vec<f64> {
+        let logs = keys.iter().map(|key| {
+            let index = self.indices.get(key);
+            index.map_or(Vec::new(), |index| self.all.ln_ns(*index))
+        });
+        let logs: Vec<Vec<f64>> = logs.collect();
+        let sum = |process: usize| {
+            let parts = logs.iter().map(|own| own.get(process).map(|ln| ln.exp()));
+            parts.sum::<Option<f64>>().map(|sum| sum + 0.0)
+        };
+        let sums: Option<Vec<f64>> = (0..self.all.processes()).map(sum).collect();
+        sums.unwrap_or_default()
+    }
+}
+
+/// A time with its interval; null where there is none.
+#[derive(Clone, Copy, Default, PartialEq, Debug, Serialize)]
+pub struct Times {
+    /// Mean over the views, ns.
+    pub stage_ns: Option<f64>,
+    /// Lower end of the 95 % interval.
+    pub stage_ns_lower: Option<f64>,
+    /// Upper end of the 95 % interval.
+    pub stage_ns_upper: Option<f64>,
+}
+
+impl Times {
+    /// Fields of an estimate.
+    pub fn of(found: Option<Estimate>) -> Times {
+        let [stage_ns, stage_ns_lower, stage_ns_upper] = ends(found);
+        Times {
+            stage_ns,
+            stage_ns_lower,
+            stage_ns_upper,
+        }
+    }
+}
+
+/// Value, lower and upper end of an estimate.
+pub fn ends(found: Option<Estimate>) -> [Option<f64>; 3] {
+    [
+        found.map(|found| found.value),
+        found.and_then(|found| found.lower),
+        found.and_then(|found| found.upper),
+    ]
+}
