@@ -54,11 +54,11 @@ impl RegionIndex for Tiles {
     fn query<Q: QueryVolume, C: Context>(&self, q: &Q, cx: &mut C) -> ControlFlow<()> {
         let tiles = self.ids.chunks(TILE).zip(self.boxes.chunks(TILE));
         for ((ids, boxes), bounds) in tiles.zip(&self.bounds) {
-            cx.recorder().node_tested();
+            cx.recorder().nodes_tested(1);
             // The mask knows which planes are decided for all of the tile.
             let (verdict, mask) = q.classify(bounds, q.mask(), cx.recorder());
             if verdict == Containment::Outside {
-                cx.recorder().subtree_rejected();
+                cx.recorder().subtrees_rejected(1);
             } else if verdict == Containment::Inside {
                 cx.recorder().subtree_accepted(ids.len());
                 cx.accept(ids)?; // `?`: a sink may break off

@@ -1,15 +1,14 @@
-//! Does a recorder that is off cost anything? Asks the same queries through the
-//! library's traversal with `NoRecorder` (`with`) or through a copy of it that
-//! has no such parameter (`without`); `scripts/check-recorder.sh` compares the
+//! Cost of a recorder that is off: the same queries by the library's traversal with
+//! `NoRecorder` (`with`) or by a copy of it without such a parameter (`without`); `scripts/check-recorder.sh` compares the
 //! instruction counts of the two.
 
 use std::hint::black_box;
 
 use cullbench::camera::PlaneOptions;
 use cullbench::geometry::{Aabb, ConvexVolume, PlaneMask};
-use cullbench::index::{PackedTree, Part, Record, Splitter, build_top_down, indexable};
+use cullbench::index::{PackedTree, Part, Record, Splitter, build_top_down};
 use cullbench::kernel::BASELINE;
-use cullbench::query::{ItemId, NoRecorder, QueryContext, Sink};
+use cullbench::query::{ItemId, NoRecorder, Sink};
 use cullbench::{path, scene};
 
 /// The median along the widest axis: the plainest tree there is.
@@ -137,10 +136,7 @@ fn without(tree: &PackedTree, volume: &ConvexVolume, out: &mut Vec<ItemId>) {
 
 #[inline(never)]
 fn with(tree: &PackedTree, volume: &ConvexVolume, out: &mut Vec<ItemId>) {
-    let _ = tree.walk(
-        volume,
-        &mut QueryContext::new(BASELINE, out, &mut NoRecorder),
-    );
+    let _ = tree.walk(BASELINE, volume, out, &mut NoRecorder);
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -151,9 +147,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let city = scene::load("city:n=20000", &Default::default())?;
     let orbit = path::load("orbit:frames=64", &city, &Default::default())?;
-    let ids = indexable(&city.items)?;
-    let tree = build_top_down(&city.items, &ids, 32, (), &mut Halves);
-    let (mut out, mut sum) = (Vec::with_capacity(ids.len()), 0u64);
+    let records = Record::all(&city.items)?;
+    let tree = build_top_down(records, 32, (), &mut Halves);
+    let (mut out, mut sum) = (Vec::with_capacity(city.items.len()), 0u64);
     for camera in &orbit.cameras {
         let volume = camera.volume(&PlaneOptions::default(), &city.surroundings())?;
         out.clear();

@@ -294,38 +294,3 @@ pub(crate) fn check_range(
         reason: format!("{name}={value}; expected {low} to {high}"),
     })
 }
-
-/// The items a structure has to hold: finite and not empty, with their ids.
-///
-/// # Errors
-/// As [`RegionIndex::build`].
-pub fn indexable(items: &[Aabb]) -> Result<Vec<ItemId>, BuildError> {
-    // The top id stays free as a mark of "none".
-    let most = ItemId::MAX as usize - 1;
-    if items.len() > most {
-        return Err(BuildError::TooManyItems {
-            count: items.len(),
-            most,
-        });
-    }
-    // One look at each item: large scenes do not fit the cache.
-    let (mut count, mut all_finite) = (0, true);
-    for b in items {
-        count += usize::from(!b.is_empty());
-        all_finite &= b.is_finite();
-    }
-    if !all_finite && let Some(item) = items.iter().position(|b| !b.is_finite()) {
-        return Err(BuildError::NonFiniteItem {
-            item,
-            bounds: items[item],
-        });
-    }
-    if count == items.len() {
-        return Ok((0..count as ItemId).collect());
-    }
-    let sound = items.iter().zip(0..).filter(|(b, _)| !b.is_empty());
-    // A structure keeps this list, so no slack.
-    let mut ids = Vec::with_capacity(count);
-    ids.extend(sound.map(|(_, id)| id));
-    Ok(ids)
-}

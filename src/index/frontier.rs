@@ -1,6 +1,5 @@
-//! What the traversals that go level by level share: the nodes that are still
-//! to be looked at, how far ahead their memory is asked for, and how accepted
-//! neighbours become one run. Which nodes there are is the trees' business.
+//! Parts of level-by-level traversals: the nodes still to be tested, the distance of
+//! prefetches, and the merging of accepted neighbours into one run.
 
 use std::cell::Cell;
 use std::ops::{ControlFlow, Range};
@@ -10,30 +9,31 @@ use crate::geometry::{LANES, LaneMask, PlaneMask};
 use crate::kernel::{Isa, pairs};
 use crate::query::{ItemId, Recorder, Sink};
 
-/// So many blocks ahead their memory is asked for: enough to hide a cache
-/// miss, and not so many that lines are gone before their turn.
+/// Distance of prefetches, in blocks: enough to hide a cache miss, and not enough
+/// to evict lines before their use.
 pub const AHEAD: usize = 12;
 
-/// A tree over so many items (3 MiB of blocks) is taken to lie in the caches
-/// nearest to the processor, where asking ahead costs more than it gains.
+/// Most items of a tree (3 MiB of blocks) that is expected to fit the nearest
+/// caches, where prefetches cost more than they gain.
 const NEAR: usize = 131_072;
 
-/// Whether a tree over so many items is to be asked for ahead.
+/// Decides whether the blocks of a tree over `items` items are prefetched.
 pub fn is_far(items: usize) -> bool {
     items > NEAR
 }
 
-/// The entries of a list that are to be fetched before it is begun: none is
-/// ahead of them that could do it, and of a small view they are most.
+/// The entries of a list that are prefetched before its first entry is processed:
+/// most entries of a small view.
 #[inline(always)]
 pub fn first_ahead(far: bool) -> Range<usize> {
     0..if far { AHEAD } else { 0 }
 }
 
-/// What a thread keeps between its queries.
+/// Memory that a thread keeps between its queries.
 pub type Kept<T> = LocalKey<Cell<Option<Box<T>>>>;
 
-/// Takes what the thread keeps, or makes it anew. (`LocalKey::take` would be a call.)
+/// Takes the memory that the thread keeps, or allocates it. (`LocalKey::take` would be a
+/// call.)
 #[inline(always)]
 pub fn take<T: Default>(kept: &'static Kept<T>) -> Box<T> {
     match kept.try_with(|kept| kept.replace(None)) {
@@ -42,32 +42,31 @@ pub fn take<T: Default>(kept: &'static Kept<T>) -> Box<T> {
     }
 }
 
-/// Puts it back for the next query.
+/// Returns the memory for the next query.
 #[inline(always)]
 pub fn put_back<T>(kept: &'static Kept<T>, scratch: Box<T>) {
     // A thread that is about to end keeps nothing.
     let _ = kept.try_with(|kept| kept.set(Some(scratch)));
 }
 
-/// Nodes that are still to be looked at, each with the planes that its
-/// ancestors have left open.
+/// Nodes still to be tested, each with the planes that its ancestors straddle.
 #[derive(Default)]
 pub struct Frontier {
-    /// Longer than what is used, so that sixteen lanes can always be stored.
+    /// Longer than `used`, so that sixteen lanes can always be stored.
     nodes: Vec<u32>,
     open: Vec<PlaneMask>,
     used: usize,
 }
 
 impl Frontier {
-    /// Empties it and makes room for the children of so many nodes.
+    /// Clears the list and reserves room for the children of `parents` nodes.
     #[inline(always)]
     pub fn clear(&mut self, parents: usize) {
         self.used = 0;
         self.make_room(parents);
     }
 
-    /// Makes room for the children of so many nodes more.
+    /// Reserves room for the children of `parents` more nodes.
     #[inline(always)]
     pub fn make_room(&mut self, parents: usize) {
         let room = self.used + (parents + 1) * LANES;
@@ -105,7 +104,7 @@ impl Frontier {
         }
     }
 
-    /// Sixteen entries at a time, and which of them there are.
+    /// Rows of sixteen entries, and a mask of those that exist.
     #[inline(always)]
     pub fn rows(&self) -> impl Iterator<Item = (&[u32; LANES], &[PlaneMask; LANES], LaneMask)> {
         let (nodes, open) = (self.nodes.as_chunks().0, self.open.as_chunks().0);
@@ -127,13 +126,13 @@ impl Frontier {
 /// Nodes for which no plane is open any more.
 #[derive(Default)]
 pub struct NodeList {
-    /// Longer than what is used, so that sixteen lanes can always be stored.
+    /// Longer than `used`, so that sixteen lanes can always be stored.
     nodes: Vec<u32>,
     used: usize,
 }
 
 impl NodeList {
-    /// Empties it and makes room for the children of so many nodes.
+    /// Clears the list and reserves room for the children of `parents` nodes.
     #[inline(always)]
     pub fn clear(&mut self, parents: usize) {
         self.used = 0;
@@ -161,12 +160,12 @@ impl NodeList {
     }
 }
 
-/// Joins runs of items that follow each other before they are handed over.
+/// Joins adjoining runs of items before they are passed to the sink.
 #[derive(Clone, Default)]
 pub struct Merger(Range<usize>);
 
 impl Merger {
-    /// Adds a run; the one before it, if it has ended.
+    /// Adds a run; returns the run before it, if that has ended.
     #[inline(always)]
     pub fn join(&mut self, places: Range<usize>) -> Option<Range<usize>> {
         if places.start == self.0.end {
@@ -183,9 +182,9 @@ impl Merger {
     }
 }
 
-/// Hands over a run of items that are wholly inside, unless it is empty.
+/// Passes a run of items that are wholly inside to the sink, unless it is empty.
 #[inline(always)]
-pub fn hand_over<I: Isa, S: Sink, R: Recorder>(
+pub fn pass_run<I: Isa, S: Sink, R: Recorder>(
     isa: I,
     places: Range<usize>,
     ids: &[ItemId],

@@ -1,32 +1,32 @@
 //! A uniform grid as engines have it: equal cells over the scene, each item in
-//! the cell of its centre, cells with the exact bounds of what they hold. Our
-//! own file: the grids on the registry are hash maps for moving bodies. It
-//! visits the cells that the view's bounds reach.
+//! the cell of its centre, cells with the exact bounds of their items. A query visits
+//! the cells that its bounds reach. (Grids on crates.io are hash maps for moving
+//! bodies.)
 
 use std::ops::{ControlFlow, Range};
 
 use glam::{UVec3, Vec3};
 
-use super::box_by_box::{BoxByBox, BoxTest, Tally, half_of_largest};
-use super::partition::Record;
+use super::box_test::{BoxTest, BoxTested, Tally, half_of_largest};
+use super::items::{Record, bounds_of_centres};
 use super::{BuildError, Info, Kind, MemoryUsage, Origin};
 use crate::geometry::Aabb;
 use crate::query::{ItemId, Recorder, Sink};
 
-/// Items of a cell, on average.
-const ITEMS_A_CELL: f64 = 8.0;
+/// Average number of items per cell.
+const ITEMS_PER_CELL: f64 = 8.0;
 /// Most cells along an axis.
 const MOST_CELLS: f64 = 1024.0;
 
 /// A uniform grid (Bentley and Friedman 1979, "Data structures for range
 /// searching"): cells in rows along x, items in the order of their cells.
 pub struct UniformGrid {
-    /// Bounds of the centres: what the cells divide.
+    /// Bounds of the centres, divided into cells.
     centres: Aabb,
     counts: UVec3,
     /// Exact union of each cell's items.
     bounds: Vec<Aabb>,
-    /// Where each cell's items begin, and an end.
+    /// First item of each cell, and the end of the last one.
     starts: Vec<u32>,
     boxes: Vec<Aabb>,
     ids: Vec<ItemId>,
@@ -34,37 +34,32 @@ pub struct UniformGrid {
     half: Vec3,
 }
 
-/// How many cells along each axis: nearly cubes, flat axes undivided.
+/// Number of cells along each axis: nearly cubes, flat axes undivided.
 fn cells_for(extent: Vec3, items: usize) -> UVec3 {
     let extent = extent.as_dvec3();
-    let mut flat = [false; 3];
-    let mut counts = [1.0; 3];
-    // An axis shorter than a cell drops out, and the others are cut finer.
-    for _ in 0..3 {
-        let open = (0..3).filter(|&axis| !flat[axis] && extent[axis] > 0.0);
-        let open: Vec<usize> = open.collect();
+    let wanted = (items as f64 / ITEMS_PER_CELL).max(1.0);
+    let mut open: Vec<usize> = (0..3).filter(|&axis| extent[axis] > 0.0).collect();
+    loop {
         let volume: f64 = open.iter().map(|&axis| extent[axis]).product();
-        let wanted = (items as f64 / ITEMS_A_CELL).max(1.0);
         let edge = (volume / wanted).powf(1.0 / open.len().max(1) as f64);
-        counts = [1.0; 3];
-        let mut changed = false;
-        for &axis in &open {
-            counts[axis] = (extent[axis] / edge).round().clamp(1.0, MOST_CELLS);
-            if extent[axis] < edge {
-                flat[axis] = true;
-                changed = true;
-            }
+        // An axis shorter than a cell drops out, and the others are cut finer.
+        let short = |axis: usize| extent[axis] < edge;
+        if open.iter().any(|&axis| short(axis)) {
+            open.retain(|&axis| !short(axis));
+            continue;
         }
-        if !changed {
-            break;
+        let mut counts = UVec3::ONE;
+        for axis in open {
+            // The quotient of infinite numbers is a NaN, which becomes 0 and then 1.
+            let count = (extent[axis] / edge).round().clamp(1.0, MOST_CELLS);
+            counts[axis] = (count as u32).max(1);
         }
+        return counts;
     }
-    let count = counts.map(|count| if count.is_finite() { count as u32 } else { 1 });
-    UVec3::from_array(count)
 }
 
 impl UniformGrid {
-    /// The cell of a centre on an axis. Monotone: a larger coordinate never
+    /// The cell of a coordinate on an axis. Monotone: a larger coordinate never
     /// lies in a lower cell.
     #[inline(always)]
     fn cell_on(&self, axis: usize, coordinate: f32) -> u32 {
@@ -106,15 +101,15 @@ impl UniformGrid {
         let bounds = &self.bounds[cell];
         let (rejected, accepted) = test.rejects_accepts(bounds);
         if rejected {
-            tally.count(R::subtree_rejected);
+            tally.count(|recorder| recorder.subtrees_rejected(1));
             return ControlFlow::Continue(());
         }
         if accepted {
             tally.count(|recorder| recorder.subtree_accepted(items.len()));
             return sink.accept(&self.ids[items]);
         }
-        // First the tests, then what they admit: between two of them nothing is called, which
-        // would cost the registers that hold the planes.
+        // All tests before the first answer: a call between two of them would cost the
+        // registers that hold the planes.
         for (start, boxes) in items.clone().step_by(64).zip(self.boxes[items].chunks(64)) {
             let mut admitted = 0_u64;
             for (i, b) in boxes.iter().enumerate() {
@@ -131,7 +126,7 @@ impl UniformGrid {
     }
 }
 
-impl BoxByBox for UniformGrid {
+impl BoxTested for UniformGrid {
     const ABOUT: Info = Info::new(
         "uniform-grid",
         "uniform grid: items in the cell of their centre, exact cell bounds",
@@ -140,8 +135,7 @@ impl BoxByBox for UniformGrid {
     );
 
     fn of(items: Vec<Record>) -> Result<Self, BuildError> {
-        let points = items.iter().map(|item| item.bounds.centre());
-        let centres = points.fold(Aabb::EMPTY, |all, c| all.union(&Aabb::new(c, c)));
+        let centres = bounds_of_centres(items.iter().map(|item| item.bounds.centre()));
         let counts = match items.is_empty() {
             true => UVec3::ONE,
             false => cells_for(centres.extent(), items.len()),

@@ -1,18 +1,42 @@
-//! The linear scans: no structure at all, every box against every plane, O(n).
-//! `linear-scalar` is the textbook loop and the yardstick of every ratio;
-//! `linear` is the same answer from blocks of sixteen boxes.
+//! The linear scans: every box against every plane, O(n). `linear-scalar` is the
+//! textbook loop and the yardstick of every ratio; `linear` gives the same answer
+//! from blocks of sixteen boxes.
 
 use std::ops::ControlFlow;
 
-use super::bundles::scan_blocks;
-use super::id_rows::IdRows;
-use super::{BuildError, Info, Input, Kind, MemoryUsage, NoParams, Origin, RegionIndex, indexable};
-use crate::geometry::{Aabb, BoxBlock, BoxBlocks, LANES, LaneMask};
+use super::items::indexable;
+use super::padded_ids::PaddedIds;
+use super::{BuildError, Info, Input, Kind, MemoryUsage, NoParams, Origin, RegionIndex};
+use crate::geometry::{Aabb, BoxBlock, BoxBlocks, LANES, LaneMask, PlaneMask};
 use crate::kernel::{Isa, first_lanes, pairs};
 use crate::query::{Context, ItemId, Planes, QueryVolume, Recorder, Sink, Tests, UnpreparedPlanes};
 
-/// The plain loop over an array of boxes, leaving each box at the first plane
-/// that excludes it. O(n) per query.
+/// Tests items in blocks (each with the position of its lane 0 and a mask of the lanes
+/// that count) and passes runs of kept ones to the sink: the leaf test of every tree
+/// and region search in the linear scan.
+#[inline(always)]
+pub fn scan_blocks<'b, I: Isa, Q: QueryVolume, S: Sink, R: Recorder>(
+    isa: I,
+    blocks: impl Iterator<Item = (usize, LaneMask, &'b BoxBlock)>,
+    ids: &[ItemId],
+    (volume, mask): (&Q, PlaneMask),
+    sink: &mut S,
+    recorder: &mut R,
+) -> ControlFlow<()> {
+    for (start, lanes, block) in blocks {
+        let tested = lanes.count_ones();
+        recorder.items_tested(tested);
+        recorder.planes_tested(tested * Q::planes_open(mask));
+        let kept = volume.kept_lanes(isa, block, mask) & lanes;
+        if kept != 0 {
+            sink.accept_lanes(isa, ids, start, kept)?;
+        }
+    }
+    ControlFlow::Continue(())
+}
+
+/// The plain loop over an array of boxes, which ends the test of a box at the first
+/// plane that excludes it. O(n) per query.
 pub struct LinearScalar {
     boxes: Vec<Aabb>,
     ids: Vec<ItemId>,
@@ -54,15 +78,15 @@ impl RegionIndex for LinearScalar {
     }
 }
 
-/// The scan over blocks: all planes against sixteen boxes at once, no early
-/// way out. O(n) per query, with a constant several times smaller.
+/// The scan over blocks: all planes against sixteen boxes at once, no early exit. O(n)
+/// per query, with a constant several times smaller.
 pub struct Linear {
     boxes: BoxBlocks,
-    ids: IdRows,
+    ids: PaddedIds,
 }
 
 impl Linear {
-    /// All planes, made ready, against every block; they count as so many.
+    /// Tests every block against all planes, which count as `open` plane tests per item.
     #[inline(always)]
     fn scan_all<P: Planes<C::Isa>, C: Context>(
         &self,
@@ -141,19 +165,19 @@ impl RegionIndex for Linear {
     }
 }
 
-/// Blocks that are handed over together: room for all of their items is made
-/// ahead, 64 KiB.
+/// Blocks that are passed to the sink together, which reserves room for all of their
+/// items, 64 KiB.
 const TOGETHER: usize = 1024;
 
 /// Consecutive blocks, all planes open.
 struct AllOf<'a, P, R> {
     blocks: &'a [BoxBlock],
     planes: P,
-    /// In these blocks and behind them.
+    /// Number of items in these blocks and the following ones.
     items: usize,
     open: u32,
     recorder: &'a mut R,
-    /// What is found out about the next few blocks together.
+    /// Results of four blocks that are tested together.
     four: [LaneMask; 4],
 }
 

@@ -1,44 +1,30 @@
-//! What is counted while a query runs, and the recorder that counts nothing.
+//! Counters of a query, and the recorder that counts nothing.
 
 use crate::geometry::RowMask;
 use serde::{Deserialize, Serialize};
 
-/// Counts what a query does. The calls of [`NoRecorder`] compile to nothing,
+/// Counts the steps of a query. The calls of [`NoRecorder`] compile to nothing,
 /// and nothing is ever timed with counters on.
 pub trait Recorder {
-    /// A node's bounds were classified.
+    /// The bounds of nodes were classified.
     #[inline(always)]
-    fn node_tested(&mut self) {}
-    /// The bounds of so many nodes were classified.
-    #[inline(always)]
-    fn nodes_tested(&mut self, count: u32) {
-        for _ in 0..count {
-            self.node_tested();
-        }
-    }
+    fn nodes_tested(&mut self, _count: u32) {}
     /// Planes were evaluated against nodes or items.
     #[inline(always)]
     fn planes_tested(&mut self, _count: u32) {}
     /// Bounds of items were tested.
     #[inline(always)]
     fn items_tested(&mut self, _count: u32) {}
-    /// Rows of a block of bounds were read, by the block's place among all of
-    /// the structure's; only structures that can be replayed tell.
+    /// Rows of a block of bounds were read; `block` is its index among all blocks of
+    /// the structure. Only structures that can be replayed report it.
     #[inline(always)]
     fn block_read(&mut self, _block: usize, _rows: impl FnOnce() -> RowMask) {}
-    /// A subtree was accepted whole: `items` ids that nobody tested.
+    /// A subtree was accepted whole: `items` ids without a test of their own.
     #[inline(always)]
     fn subtree_accepted(&mut self, _items: usize) {}
-    /// A subtree was rejected whole.
+    /// Subtrees were rejected whole.
     #[inline(always)]
-    fn subtree_rejected(&mut self) {}
-    /// So many subtrees were rejected whole.
-    #[inline(always)]
-    fn subtrees_rejected(&mut self, count: u32) {
-        for _ in 0..count {
-            self.subtree_rejected();
-        }
-    }
+    fn subtrees_rejected(&mut self, _count: u32) {}
 }
 
 /// Records nothing.
@@ -47,7 +33,7 @@ pub struct NoRecorder;
 
 impl Recorder for NoRecorder {}
 
-/// What one query, or a sum of queries, cost.
+/// Cost of one query, or of a sum of queries.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct QueryCost {
@@ -66,7 +52,7 @@ pub struct QueryCost {
 }
 
 impl QueryCost {
-    /// Bounds looked at, of nodes and items together: the "compares" of the
+    /// Bounds tested, of nodes and items together: the "compares" of the
     /// lecture's O(n) against O(log n).
     pub fn comparisons(&self) -> u64 {
         self.nodes_tested + self.items_tested
@@ -75,8 +61,8 @@ impl QueryCost {
 
 impl Recorder for QueryCost {
     #[inline(always)]
-    fn node_tested(&mut self) {
-        self.nodes_tested += 1;
+    fn nodes_tested(&mut self, count: u32) {
+        self.nodes_tested += u64::from(count);
     }
     #[inline(always)]
     fn planes_tested(&mut self, count: u32) {
@@ -92,8 +78,8 @@ impl Recorder for QueryCost {
         self.items_accepted_untested += items as u64;
     }
     #[inline(always)]
-    fn subtree_rejected(&mut self) {
-        self.subtrees_rejected += 1;
+    fn subtrees_rejected(&mut self, count: u32) {
+        self.subtrees_rejected += u64::from(count);
     }
 }
 

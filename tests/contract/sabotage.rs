@@ -146,10 +146,10 @@ impl<const CLAIMS: Claims> Toy<CLAIMS> {
         sink: &mut S,
         recorder: &mut R,
     ) -> ControlFlow<()> {
-        recorder.node_tested();
+        recorder.nodes_tested(1);
         let (verdict, mut mask) = volume.classify(&node.bounds, mask, recorder);
         if verdict == Containment::Outside {
-            recorder.subtree_rejected();
+            recorder.subtrees_rejected(1);
             return ControlFlow::Continue(());
         }
         if verdict == Containment::Inside {

@@ -7,18 +7,19 @@
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::{BoxByBox, BoxTest, Record, Tally};
+use crate::index::box_test::{BoxTest, BoxTested, Tally};
+use crate::index::items::Record;
 use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin};
 use crate::query::{Recorder, Sink};
 
-/// What the system reads and writes of an entity.
+/// The components of an entity that the system reads and writes.
 struct Entity {
     item: Record,
     /// Bits of the layers that it is drawn on.
     layers: u32,
     inherited_visibility: bool,
     no_frustum_culling: bool,
-    /// Set by the last query: whether some view saw it.
+    /// Set by the last query: visible in some view.
     view_visibility: AtomicBool,
 }
 
@@ -30,7 +31,7 @@ pub struct PeerBevyStyle {
 /// The layer of every view.
 const LAYER: u32 = 1;
 
-impl BoxByBox for PeerBevyStyle {
+impl BoxTested for PeerBevyStyle {
     const ABOUT: Info = Info::new(
         "peer-bevy-style",
         "a stand-in for Bevy's visibility system: flags and bounds of every entity, one by one",

@@ -1,4 +1,4 @@
-//! The crate bvh: its tree asked through `Bvh::traverse`, which returns references to
+//! The crate bvh: its tree queried through `Bvh::traverse`, which returns references to
 //! shapes in a list of its own.
 
 use std::ops::ControlFlow;
@@ -9,22 +9,17 @@ use ::bvh::bvh::{Bvh, BvhNode};
 use glam::Vec3;
 use nalgebra::Point3;
 
-use super::{BoxTest, BuildError, Record, Tally, peer_of_tree};
 use crate::geometry::Aabb;
-use crate::index::MemoryUsage;
+use crate::index::box_test::{BoxTest, BoxTested, Tally};
+use crate::index::items::Record;
+use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin};
 use crate::query::{Recorder, Sink};
 
-/// An item that the crate tells where it put it.
+/// An item with its node, which the crate writes.
 #[derive(Clone, Copy)]
 struct Shape {
-    pub item: Record,
+    item: Record,
     node: usize,
-}
-
-impl From<Record> for Shape {
-    fn from(item: Record) -> Shape {
-        Shape { item, node: 0 }
-    }
 }
 
 impl Bounded<f32, 3> for Shape {
@@ -55,9 +50,8 @@ fn bounds_of(b: &CrateAabb<f32, 3>) -> Aabb {
     )
 }
 
-/// A test as the crate takes it. It does not say whether a box is a node's or
-/// an item's, so items are tested once more when they come out if the two
-/// tests can differ.
+/// A test for the crate, which does not distinguish boxes of nodes and items: returned
+/// items are tested once more if the two tests can differ.
 struct Query<'a, 'r, T, R> {
     test: &'a T,
     tally: &'a Tally<'r, R>,
@@ -74,67 +68,66 @@ impl<T: BoxTest, R: Recorder> IntersectsAabb<f32, 3> for Query<'_, '_, T, R> {
 /// Boxes of this reach have areas that are still numbers in f32.
 const LARGEST: f32 = 1e18;
 
-/// The crate's tree. Where areas overflow its builder finds no cheapest split
-/// and leaves both children with empty boxes, in which nothing would be found;
-/// where widths do, it panics. It is given such a scene made smaller, and the
-/// nodes are then fitted to the true boxes.
-fn tree_over(shapes: &mut [Shape]) -> Bvh<f32, 3> {
-    let scene = Aabb::union_of(shapes.iter().map(|shape| &shape.item.bounds));
-    let too_large = !shapes.is_empty() && scene.reach().max_element() > LARGEST;
-    let mut tree = match too_large {
-        false => Bvh::build(shapes),
-        true => {
-            let smaller = |shape: &Shape| {
-                let b = shape.item.bounds;
-                let bounds = Aabb::new(b.min / LARGEST, b.max / LARGEST);
-                let id = shape.item.id;
-                Shape::from(Record { bounds, id })
-            };
-            let mut all: Vec<Shape> = shapes.iter().map(smaller).collect();
-            let tree = Bvh::build(&mut all);
-            for (shape, placed) in shapes.iter_mut().zip(&all) {
-                shape.node = placed.node;
-            }
-            tree
-        }
+/// The crate's tree over shapes scaled down by [`LARGEST`], its nodes then fitted to the
+/// true boxes. Where areas overflow, the crate's builder finds no cheapest split and
+/// leaves both children with empty boxes; where widths overflow, it panics.
+fn scaled_tree(shapes: &mut [Shape]) -> Bvh<f32, 3> {
+    let smaller = |shape: &Shape| {
+        let (mut small, b) = (*shape, shape.item.bounds);
+        small.item.bounds = Aabb::new(b.min / LARGEST, b.max / LARGEST);
+        small
     };
-    if too_large {
-        let mut fitted = vec![CrateAabb::empty(); tree.nodes.len()];
-        // Children come after their parent.
-        for at in (0..tree.nodes.len()).rev() {
-            fitted[at] = match &mut tree.nodes[at] {
-                BvhNode::Leaf { shape_index, .. } => shapes[*shape_index].aabb(),
-                BvhNode::Node {
-                    child_l_index,
-                    child_l_aabb,
-                    child_r_index,
-                    child_r_aabb,
-                    ..
-                } => {
-                    (*child_l_aabb, *child_r_aabb) =
-                        (fitted[*child_l_index], fitted[*child_r_index]);
-                    child_l_aabb.join(child_r_aabb)
-                }
-            };
-        }
+    let mut small: Vec<Shape> = shapes.iter().map(smaller).collect();
+    let mut tree = Bvh::build(&mut small);
+    for (shape, placed) in shapes.iter_mut().zip(&small) {
+        shape.node = placed.node;
+    }
+    let mut fitted = vec![CrateAabb::empty(); tree.nodes.len()];
+    // Children come after their parent.
+    for at in (0..tree.nodes.len()).rev() {
+        fitted[at] = match &mut tree.nodes[at] {
+            BvhNode::Leaf { shape_index, .. } => shapes[*shape_index].aabb(),
+            BvhNode::Node {
+                child_l_index,
+                child_l_aabb,
+                child_r_index,
+                child_r_aabb,
+                ..
+            } => {
+                (*child_l_aabb, *child_r_aabb) = (fitted[*child_l_index], fitted[*child_r_index]);
+                child_l_aabb.join(child_r_aabb)
+            }
+        };
     }
     tree
 }
 
-/// The crate's tree over shapes in a list of our own.
-struct Tree {
+/// The crate's tree over a list of shapes, traversed by the crate's own recursion.
+pub struct PeerBvh {
     tree: Bvh<f32, 3>,
     shapes: Vec<Shape>,
 }
 
-impl Tree {
-    fn build(_: &'static str, items: Vec<Record>, (): ()) -> Result<Self, BuildError> {
-        let mut shapes: Vec<Shape> = items.into_iter().map(Shape::from).collect();
-        let tree = tree_over(&mut shapes);
-        Ok(Tree { tree, shapes })
+impl BoxTested for PeerBvh {
+    const ABOUT: Info = Info::new(
+        "peer-bvh",
+        "crate bvh, asked through Bvh::traverse",
+        Kind::Tree,
+        Origin::Crate("bvh"),
+    );
+
+    fn of(items: Vec<Record>) -> Result<Self, BuildError> {
+        let scene = Aabb::union_of(items.iter().map(|item| &item.bounds));
+        let shapes = items.into_iter().map(|item| Shape { item, node: 0 });
+        let mut shapes: Vec<Shape> = shapes.collect();
+        let tree = match scene.reach().max_element() > LARGEST {
+            true => scaled_tree(&mut shapes),
+            false => Bvh::build(&mut shapes),
+        };
+        Ok(PeerBvh { tree, shapes })
     }
 
-    fn memory(&self) -> MemoryUsage {
+    fn used(&self) -> MemoryUsage {
         MemoryUsage {
             node_bytes: self.tree.nodes.capacity() * size_of::<BvhNode<f32, 3>>(),
             item_bytes: size_of_val(&self.shapes[..]),
@@ -142,7 +135,7 @@ impl Tree {
     }
 
     #[inline(always)]
-    fn traverse<Q: BoxTest, S: Sink, R: Recorder>(
+    fn search<Q: BoxTest, S: Sink, R: Recorder>(
         &self,
         test: &Q,
         sink: &mut S,
@@ -162,17 +155,6 @@ impl Tree {
         ControlFlow::Continue(())
     }
 }
-
-peer_of_tree!(
-    /// Its tree, gone through by its own recursion.
-    PeerBvh,
-    "peer-bvh",
-    "crate bvh, asked through Bvh::traverse",
-    "bvh",
-    Tree,
-    (),
-    traverse
-);
 
 #[cfg(test)]
 mod tests {

@@ -1,7 +1,6 @@
 //! The crate obvhs by its own tree: its nodes in its order, its ids through
-//! `primitive_indices`. It has no frustum traversal, so its public nodes are
-//! walked as its own traversals do.
-//! Our re-laid tree of the same builder is the structure `bvh`.
+//! `primitive_indices`. It has no frustum traversal, so its public nodes are walked as
+//! its own traversals do. The structure `bvh` reorders a tree of the same builder.
 
 use std::ops::ControlFlow;
 
@@ -9,15 +8,17 @@ use obvhs::BvhBuildParams;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
 
-use super::{BoxTest, Record, Tally, peer_of_tree, refuse_stacks};
+use super::refuse_stacks;
 use crate::geometry::Aabb;
-use crate::index::stack::Stack;
-use crate::index::{BuildError, MemoryUsage, ploc};
+use crate::index::box_test::{BoxTest, BoxTested, Tally};
+use crate::index::items::Record;
+use crate::index::tree::stack::Stack;
+use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin, ploc};
 use crate::query::{ItemId, Recorder, Sink};
 
-/// A tree of obvhs with the items in the order of its primitives.
+/// The crate's tree by its medium preset, with the items in the order of its primitives.
 #[derive(Default)]
-struct Tree {
+pub struct PeerObvhs {
     bvh: Bvh2,
     /// Empty where every leaf is one item, whose bounds are then the leaf's.
     boxes: Vec<Aabb>,
@@ -29,52 +30,8 @@ fn bounds_of(node: &Bvh2Node) -> Aabb {
     Aabb::new(node.min, node.max)
 }
 
-impl Tree {
-    fn build(
-        structure: &'static str,
-        items: Vec<Record>,
-        params: BvhBuildParams,
-    ) -> Result<Tree, BuildError> {
-        refuse_stacks(structure, &items)?;
-        if items.is_empty() {
-            return Ok(Tree::default());
-        }
-        let boxes: Vec<Aabb> = items.iter().map(|item| item.bounds).collect();
-        let mut bvh = ploc::build_as_it_comes(&boxes, params);
-        bvh.reorder_in_stack_traversal_order();
-        // A walk keeps one entry a level; the crate's default is 96.
-        bvh.max_depth = bvh.max_depth.max(bvh.depth(0) + 2);
-        let single = bvh.nodes.iter().all(|node| node.prim_count <= 1);
-        let of = |&place: &u32| items[place as usize];
-        Ok(Tree {
-            boxes: match single {
-                true => Vec::new(),
-                false => bvh.primitive_indices.iter().map(|p| of(p).bounds).collect(),
-            },
-            ids: bvh.primitive_indices.iter().map(|p| of(p).id).collect(),
-            bvh,
-        })
-    }
-
-    fn memory(&self) -> MemoryUsage {
-        let bvh = &self.bvh;
-        let places = [
-            &bvh.primitive_indices,
-            &bvh.primitives_to_nodes,
-            &bvh.parents,
-        ];
-        let leaves = match self.boxes.is_empty() {
-            true => self.ids.len() * size_of::<Bvh2Node>(),
-            false => 0,
-        };
-        MemoryUsage {
-            node_bytes: bvh.nodes.capacity() * size_of::<Bvh2Node>() - leaves
-                + places.iter().map(|list| list.capacity() * 4).sum::<usize>(),
-            item_bytes: leaves + size_of_val(&self.boxes[..]) + size_of_val(&self.ids[..]),
-        }
-    }
-
-    /// Hands over the items of a leaf that was not rejected.
+impl PeerObvhs {
+    /// Tests the items of a leaf that was not rejected.
     #[inline(always)]
     fn leaf<T: BoxTest, S: Sink, R: Recorder>(
         &self,
@@ -96,11 +53,59 @@ impl Tree {
         }
         ControlFlow::Continue(())
     }
+}
 
-    /// The walk: pairs of children from a stack, as in the crate's own
-    /// `point_traverse`.
+impl BoxTested for PeerObvhs {
+    const ABOUT: Info = Info::new(
+        "peer-obvhs",
+        "crate obvhs, medium build, its own nodes walked",
+        Kind::Tree,
+        Origin::Crate("obvhs"),
+    );
+
+    fn of(items: Vec<Record>) -> Result<Self, BuildError> {
+        refuse_stacks(Self::ABOUT.name, &items)?;
+        if items.is_empty() {
+            return Ok(PeerObvhs::default());
+        }
+        let boxes: Vec<Aabb> = items.iter().map(|item| item.bounds).collect();
+        let mut bvh = ploc::build_as_it_comes(&boxes, BvhBuildParams::medium_build());
+        bvh.reorder_in_stack_traversal_order();
+        // A walk keeps one entry a level; the crate's default is 96.
+        bvh.max_depth = bvh.max_depth.max(bvh.depth(0) + 2);
+        let single = bvh.nodes.iter().all(|node| node.prim_count <= 1);
+        let of = |&place: &u32| items[place as usize];
+        Ok(PeerObvhs {
+            boxes: match single {
+                true => Vec::new(),
+                false => bvh.primitive_indices.iter().map(|p| of(p).bounds).collect(),
+            },
+            ids: bvh.primitive_indices.iter().map(|p| of(p).id).collect(),
+            bvh,
+        })
+    }
+
+    fn used(&self) -> MemoryUsage {
+        let bvh = &self.bvh;
+        let places = [
+            &bvh.primitive_indices,
+            &bvh.primitives_to_nodes,
+            &bvh.parents,
+        ];
+        let leaves = match self.boxes.is_empty() {
+            true => self.ids.len() * size_of::<Bvh2Node>(),
+            false => 0,
+        };
+        MemoryUsage {
+            node_bytes: bvh.nodes.capacity() * size_of::<Bvh2Node>() - leaves
+                + places.iter().map(|list| list.capacity() * 4).sum::<usize>(),
+            item_bytes: leaves + size_of_val(&self.boxes[..]) + size_of_val(&self.ids[..]),
+        }
+    }
+
+    /// Pops pairs of children from a stack, as the crate's own `point_traverse` does.
     #[inline(always)]
-    fn walk<T: BoxTest, S: Sink, R: Recorder>(
+    fn search<T: BoxTest, S: Sink, R: Recorder>(
         &self,
         test: &T,
         sink: &mut S,
@@ -139,14 +144,3 @@ impl Tree {
         ControlFlow::Continue(())
     }
 }
-
-peer_of_tree!(
-    /// obvhs as it comes: the middle preset, its public nodes walked.
-    PeerObvhs,
-    "peer-obvhs",
-    "crate obvhs, medium build, its own nodes walked",
-    "obvhs",
-    Tree,
-    BvhBuildParams::medium_build(),
-    walk
-);

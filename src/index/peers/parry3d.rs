@@ -1,6 +1,5 @@
-//! The crate parry3d's BVH: built from leaves by either of its strategies,
-//! asked through `leaves` with a test of its nodes, or through
-//! `traverse_indexed`, which lets whole subtrees be accepted.
+//! The crate parry3d's BVH: its default build, queried through `traverse_indexed`,
+//! which lets whole subtrees be accepted.
 
 use std::ops::ControlFlow;
 
@@ -8,16 +7,15 @@ use glam::Vec3;
 use parry3d::bounding_volume::Aabb as ParryAabb;
 use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhNode, TraversalAction};
 
-use super::{BoxTest, Record, Tally, peer_of_tree, refuse_stacks};
 use crate::geometry::Aabb;
-use crate::index::{BuildError, MemoryUsage};
+use crate::index::box_test::{BoxTest, BoxTested, Tally};
+use crate::index::items::Record;
+use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin};
 use crate::query::{ItemId, Recorder, Sink};
 
-/// A box of this reach has an area that is still a number in f32.
-const LARGEST_FOR_PLOC: f32 = 1e18;
-
-/// A tree whose leaves are the places of items.
-struct Tree {
+/// The crate's tree by its binned builder, whose leaves are indices of items. Subtrees
+/// that are wholly inside are not tested further.
+pub struct PeerParry3d {
     bvh: Bvh,
     ids: Vec<ItemId>,
 }
@@ -28,35 +26,26 @@ fn bounds_of(node: &BvhNode) -> Aabb {
     Aabb::new(vector(node.mins()), vector(node.maxs()))
 }
 
-impl Tree {
-    fn build(
-        structure: &'static str,
-        items: Vec<Record>,
-        strategy: BvhBuildStrategy,
-    ) -> Result<Tree, BuildError> {
-        let ploc = strategy == BvhBuildStrategy::Ploc;
-        if ploc {
-            refuse_stacks(structure, &items)?;
-        }
-        let scene = Aabb::union_of(items.iter().map(|item| &item.bounds));
-        // PLOC compares areas, and panics where they overflow.
-        let strategy = match ploc && scene.reach().max_element() > LARGEST_FOR_PLOC {
-            true => BvhBuildStrategy::Binned,
-            false => strategy,
-        };
+impl BoxTested for PeerParry3d {
+    const ABOUT: Info = Info::new(
+        "peer-parry3d",
+        "crate parry3d, binned build, asked through traverse_indexed, whole subtrees accepted",
+        Kind::Tree,
+        Origin::Crate("parry3d"),
+    );
+
+    fn of(items: Vec<Record>) -> Result<Self, BuildError> {
         let vector = |v: Vec3| parry3d::math::Vector::new(v.x, v.y, v.z);
-        let leaves = items
-            .iter()
-            .map(|item| ParryAabb::new(vector(item.bounds.min), vector(item.bounds.max)));
-        let leaves: Vec<ParryAabb> = leaves.collect();
-        Ok(Tree {
-            bvh: Bvh::from_leaves(strategy, &leaves),
+        let leaf = |item: &Record| ParryAabb::new(vector(item.bounds.min), vector(item.bounds.max));
+        let leaves: Vec<ParryAabb> = items.iter().map(leaf).collect();
+        Ok(PeerParry3d {
+            bvh: Bvh::from_leaves(BvhBuildStrategy::Binned, &leaves),
             ids: items.iter().map(|item| item.id).collect(),
         })
     }
 
-    fn memory(&self) -> MemoryUsage {
-        // The crate counts the place of a leaf as a number; it keeps an Option.
+    fn used(&self) -> MemoryUsage {
+        // The crate counts the index of a leaf as a number; it stores an Option.
         let uncounted = self.ids.len() * (size_of::<Option<usize>>() - size_of::<usize>());
         // Half of the nodes are the leaves.
         let leaves = self.ids.len() * size_of::<BvhNode>();
@@ -66,10 +55,9 @@ impl Tree {
         }
     }
 
-    /// `traverse_indexed`: a subtree that is accepted is gone through once
-    /// more, without tests.
+    /// Traverses an accepted subtree once more, without tests.
     #[inline(always)]
-    fn traverse<T: BoxTest, S: Sink, R: Recorder>(
+    fn search<T: BoxTest, S: Sink, R: Recorder>(
         &self,
         test: &T,
         sink: &mut S,
@@ -92,7 +80,7 @@ impl Tree {
             let bounds = bounds_of(node);
             let (rejected, accepted) = test.rejects_accepts(&bounds);
             if rejected {
-                tally.count(R::subtree_rejected);
+                tally.count(|recorder| recorder.subtrees_rejected(1));
                 return TraversalAction::Prune;
             }
             if !accepted {
@@ -118,14 +106,3 @@ impl Tree {
         flow
     }
 }
-
-peer_of_tree!(
-    /// Its default build; subtrees that are wholly inside are not tested further.
-    PeerParry3d,
-    "peer-parry3d",
-    "crate parry3d, binned build, asked through traverse_indexed, whole subtrees accepted",
-    "parry3d",
-    Tree,
-    BvhBuildStrategy::Binned,
-    traverse
-);

@@ -1,14 +1,14 @@
-//! The crate rstar: an R*-tree, bulk-loaded, asked through a selection
-//! function, either by its iterator or by a walk of its own over its nodes.
+//! The crate rstar: an R*-tree, bulk-loaded, its public nodes walked from the root.
 
 use std::ops::ControlFlow;
 
 use glam::Vec3;
 use rstar::{AABB, ParentNode, RTree, RTreeNode, RTreeObject};
 
-use super::{BoxTest, BuildError, Record, Tally, peer_of_tree};
 use crate::geometry::Aabb;
-use crate::index::MemoryUsage;
+use crate::index::box_test::{BoxTest, BoxTested, Tally};
+use crate::index::items::Record;
+use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin};
 use crate::query::{Recorder, Sink};
 
 impl RTreeObject for Record {
@@ -28,7 +28,7 @@ fn bounds_of(envelope: &AABB<[f32; 3]>) -> Aabb {
     )
 }
 
-/// Slots of a node and of all below it.
+/// Slots of a node and of its descendants.
 fn slots(node: &ParentNode<Record>) -> usize {
     let below = node.children().iter().map(|child| match child {
         RTreeNode::Leaf(_) => 0,
@@ -37,15 +37,22 @@ fn slots(node: &ParentNode<Record>) -> usize {
     node.children().len() + below.sum::<usize>()
 }
 
-/// The tree, which keeps the items in its leaves.
-struct Tree(RTree<Record>);
+/// The crate's tree, with the items in its leaves.
+pub struct PeerRstar(RTree<Record>);
 
-impl Tree {
-    fn build(_: &'static str, items: Vec<Record>, (): ()) -> Result<Tree, BuildError> {
-        Ok(Tree(RTree::bulk_load(items)))
+impl BoxTested for PeerRstar {
+    const ABOUT: Info = Info::new(
+        "peer-rstar",
+        "crate rstar, bulk-loaded, its nodes walked from the root, whole subtrees accepted",
+        Kind::Tree,
+        Origin::Crate("rstar"),
+    );
+
+    fn of(items: Vec<Record>) -> Result<Self, BuildError> {
+        Ok(PeerRstar(RTree::bulk_load(items)))
     }
 
-    fn memory(&self) -> MemoryUsage {
+    fn used(&self) -> MemoryUsage {
         let slot = size_of::<RTreeNode<Record>>();
         let item_bytes = self.0.size() * slot;
         MemoryUsage {
@@ -54,10 +61,10 @@ impl Tree {
         }
     }
 
-    /// Its public nodes from the root on, as its iterator goes through them;
-    /// a node that is accepted hands its subtree down without further tests.
+    /// Walks the nodes in the order of the crate's iterator; the subtree of an accepted
+    /// node is not tested further.
     #[inline(always)]
-    fn walk<T: BoxTest, S: Sink, R: Recorder>(
+    fn search<T: BoxTest, S: Sink, R: Recorder>(
         &self,
         test: &T,
         sink: &mut S,
@@ -98,14 +105,3 @@ impl Tree {
         ControlFlow::Continue(())
     }
 }
-
-peer_of_tree!(
-    /// Its nodes.
-    PeerRstar,
-    "peer-rstar",
-    "crate rstar, bulk-loaded, its nodes walked from the root, whole subtrees accepted",
-    "rstar",
-    Tree,
-    (),
-    walk
-);

@@ -1,39 +1,38 @@
 //! The textbook BSP tree: a plane of any orientation puts items in front of it and
-//! behind it, and those that it cuts stay at its node. Planes are the map's own, if
-//! the scene brings a tree, else faces and diagonals of the items.
+//! behind it, and items that it cuts stay at its node. Planes are the map's own, if
+//! the scene has a tree, else faces and diagonals of the items.
 
-use std::ops::ControlFlow;
-
-use glam::Vec3;
-
-use super::{Items, Node, Slice, TextbookParams, memory_of, test_items};
+use super::{Division, Node, Textbook, TextbookParams};
 use crate::geometry::{Aabb, Plane, PlaneTree};
-use crate::index::partition::Record;
-use crate::index::plane_choice::planes_of;
-use crate::index::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
-use crate::query::{Context, Predicate, QueryVolume, Recorder};
+use crate::index::Input;
+use crate::index::build::bsp_split_planes::planes_of;
+use crate::index::items::Record;
 
 /// A BSP tree (Fuchs, Kedem and Naylor 1980, "On visible surface generation by a
 /// priori tree structures"; lecture on visibility, slides "BSP trees" and "Region
-/// search"). Region search takes the side of the plane that the point is on: O(log
-/// n) where planes cut few items. A view is tested against the bounds of what lies
-/// below a node.
-pub struct BspTextbook {
-    root: Option<Box<Split>>,
+/// search").
+///
+/// Region search takes the side of the plane that the point is on: O(log n) where planes
+/// cut few items. A frustum is tested against the bounds of each node's items.
+pub type BspTextbook = Textbook<DividingPlanes>;
+
+/// Division of [`BspTextbook`].
+pub struct DividingPlanes;
+
+impl Division for DividingPlanes {
+    const NAME: &str = "bsp-textbook";
+    const SUMMARY: &str =
+        "lecture form: the map's own planes or item faces, cut items at their plane";
+    const BY_HALF_SPACES: bool = true;
+
+    fn root(input: &Input<'_>, records: Vec<Record>, params: &TextbookParams) -> Node {
+        let own = input.own_tree;
+        let planes = Planes { own, params };
+        planes.divided(&records, own.and_then(|own| own.root), 0)
+    }
 }
 
-/// A plane with its two sides; a leaf has none.
-struct Split {
-    /// Exact union of all items from here on down.
-    bounds: Aabb,
-    plane: Option<Plane>,
-    /// Those that the plane cuts; all of a leaf.
-    items: Items,
-    /// In front of the plane, and behind it.
-    sides: [Option<Box<Split>>; 2],
-}
-
-/// What a plane makes of some items.
+/// Items on the sides of a plane.
 struct Sides {
     plane: Plane,
     /// Wholly in front, and wholly behind.
@@ -63,8 +62,8 @@ impl Sides {
     }
 }
 
-/// How badly a plane divides: first what its emptier side lacks to a quarter of the
-/// items, then the items it cuts, since every search that comes by looks at them.
+/// Rank of a plane, best first: the items that its emptier side lacks to a quarter, then
+/// the items it cuts, since every search of the node tests them.
 fn demerit(plane: &Plane, records: &[Record]) -> (usize, usize) {
     let mut sides = [0, 0];
     for side in records.iter().filter_map(|r| side_of(plane, &r.bounds)) {
@@ -75,20 +74,20 @@ fn demerit(plane: &Plane, records: &[Record]) -> (usize, usize) {
     (lacking, records.len() - front - back)
 }
 
-/// Where planes come from.
+/// Source of dividing planes.
 struct Planes<'a> {
     own: Option<&'a PlaneTree>,
     params: &'a TextbookParams,
 }
 
-/// Items that planes are taken from, and items that they are judged by, at a node.
+/// Boxes per node that offer planes, and items by which the planes are ranked.
 const OFFER: usize = 4;
 const JUDGES: usize = 512;
 
 impl Planes<'_> {
-    /// How some items are divided, and by which of the map's nodes in front and
-    /// behind; `at` is the one that is next. Those of its planes with everything on
-    /// one side are passed by. `None` if no plane that is looked at parts the items.
+    /// The division of some items, with the map's nodes in front and behind; `at` is
+    /// the map's next node. Skips those of its planes with everything on one side.
+    /// `None` if no candidate plane divides the items.
     fn sides(&self, records: &[Record], mut at: Option<u32>) -> Option<(Sides, [Option<u32>; 2])> {
         while let Some(own) = at.and_then(|at| self.own?.nodes.get(at as usize)) {
             let sides = Sides::of(own.plane, records);
@@ -102,108 +101,26 @@ impl Planes<'_> {
         let judges: Vec<Record> = records.iter().step_by(step).copied().collect();
         let best = planes_of(records, OFFER).min_by_key(|plane| demerit(plane, &judges))?;
         let sides = Sides::of(best, records);
-        let parts = sides.of.iter().all(|side| !side.is_empty());
-        parts.then_some((sides, [None; 2]))
+        let divides = sides.of.iter().all(|side| !side.is_empty());
+        divides.then_some((sides, [None; 2]))
     }
 
-    fn divided(&self, records: &[Record], at: Option<u32>, level: u32) -> Box<Split> {
+    fn divided(&self, records: &[Record], at: Option<u32>, level: u32) -> Node {
         let bounds = Aabb::union_of(records.iter().map(|record| &record.bounds));
         let ends = self.params.ends_at(records.len(), level);
         let found = if ends { None } else { self.sides(records, at) };
-        let Some((found, own)) = found else {
-            return Box::new(Split {
-                bounds,
-                plane: None,
-                items: Items::of(records),
-                sides: [None, None],
-            });
+        let Some((Sides { plane, of, cut }, own)) = found else {
+            return Node::with(bounds, records);
         };
-        let side = |side: usize| {
-            let records = &found.of[side];
-            (!records.is_empty()).then(|| self.divided(records, own[side], level + 1))
-        };
-        Box::new(Split {
-            bounds,
-            plane: Some(found.plane),
-            items: Items::of(&found.cut),
-            sides: [side(0), side(1)],
-        })
-    }
-}
-
-impl Split {
-    /// Region search. An item in front of a plane has no point behind it, by the
-    /// very arithmetic that the point's side is decided by: it is monotone.
-    fn search<C: Context>(&self, p: Vec3, cx: &mut C) -> ControlFlow<()> {
-        cx.recorder().node_tested();
-        test_items(self.items.all(), &p, p.mask(), cx)?;
-        let Some(plane) = self.plane else {
-            return ControlFlow::Continue(());
-        };
-        let value = plane.value_at(p);
-        // On the plane, both; a NaN (coordinates beyond f32) is on neither.
-        for (side, is_there) in self.sides.iter().zip([value >= 0.0, value <= 0.0]) {
-            if let (Some(side), true) = (side, is_there) {
-                side.search(p, cx)?;
+        let mut node = Node::with(bounds, &cut);
+        let half_spaces = [plane, Plane::new(-plane.normal, -plane.d)];
+        for ((records, at), half_space) in of.iter().zip(own).zip(half_spaces) {
+            if !records.is_empty() {
+                let mut side = self.divided(records, at, level + 1);
+                side.half_space = Some(half_space);
+                node.children.push(side);
             }
         }
-        ControlFlow::Continue(())
-    }
-}
-
-impl Node for &Split {
-    #[inline]
-    fn bounds(&self) -> Aabb {
-        self.bounds
-    }
-    #[inline]
-    fn items(&self) -> Slice<'_> {
-        self.items.all()
-    }
-    #[inline]
-    fn children(self) -> impl Iterator<Item = Self> {
-        self.sides.iter().flatten().map(|side| &**side)
-    }
-}
-
-impl BspTextbook {
-    fn root(&self) -> Option<&Split> {
-        self.root.as_deref()
-    }
-}
-
-impl RegionIndex for BspTextbook {
-    const INFO: Info = Info::new(
-        "bsp-textbook",
-        "lecture form: the map's own planes or item faces, cut items at their plane",
-        Kind::Tree,
-        Origin::Ours,
-    )
-    .textbook();
-    type Params = TextbookParams;
-
-    fn build(input: &Input<'_>, params: &TextbookParams) -> Result<Self, BuildError> {
-        let Input {
-            items,
-            own_tree: own,
-            ..
-        } = *input;
-        params.check(Self::INFO.name)?;
-        let records = Record::all(items)?;
-        let first = own.and_then(|own| own.root);
-        let planes = Planes { own, params };
-        let root = (!records.is_empty()).then(|| planes.divided(&records, first, 0));
-        Ok(BspTextbook { root })
-    }
-
-    fn memory(&self) -> MemoryUsage {
-        memory_of(self.root(), size_of::<Split>())
-    }
-
-    fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
-        match (volume.as_point(), self.root()) {
-            (Some(p), Some(root)) => root.search(p, cx),
-            (_, root) => super::query(root, volume, cx),
-        }
+        node
     }
 }

@@ -1,39 +1,38 @@
 //! The trees as lectures show them: nodes with child pointers, a recursive walk,
-//! one box at a time, no SIMD. Beside the packed trees they show what a layout
-//! brings; beside the scan, what a tree does. A file has a structure's nodes and
-//! how they are divided; here is the walk, which is the same for all of them.
+//! one box at a time, no SIMD. Compared with the packed trees they show the effect of
+//! a layout; compared with the scan, of a tree. Here are the node and the walk; a file
+//! per kind of tree has its division.
 //!
-//! A recursive function stays a call, so it runs portable code whatever the
-//! kernel of the query.
+//! The walk does not depend on the instruction set, so it is compiled once for all.
 
 mod bsp;
 mod bvh;
-mod octree;
-mod quadtree;
+mod cells;
 
+use std::marker::PhantomData;
 use std::ops::ControlFlow;
 
+use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::partition::Record;
-use super::{BuildError, MemoryUsage, check_range};
-use crate::geometry::{Aabb, PlaneMask};
+use super::items::Record;
+use super::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, check_range};
+use crate::geometry::{Aabb, Plane, PlaneMask};
 use crate::kernel::pairs;
-use crate::query::{Containment, Context, ItemId, QueryVolume, Recorder, Sink};
+use crate::query::{Containment, Context, ItemId, Predicate, QueryVolume, Recorder, Sink};
 
 pub use bsp::BspTextbook;
 pub use bvh::BvhTextbook;
-pub use octree::OctreeTextbook;
-pub use quadtree::QuadtreeTextbook;
+pub use cells::{OctreeTextbook, QuadtreeTextbook};
 
 /// Parameters: `octree-textbook:leaf=8,depth=64`.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TextbookParams {
-    /// So few items are not divided any further (1 to 4096).
+    /// Most items that are not divided any further (1 to 4096).
     pub leaf: u32,
     /// Most levels below the root (0 to 256), and so the depth of the recursion:
-    /// what is still together there, such as coincident items, stays so.
+    /// items that share a node there, such as coincident ones, stay together.
     pub depth: u32,
 }
 
@@ -44,151 +43,172 @@ impl Default for TextbookParams {
 }
 
 impl TextbookParams {
-    fn check(&self, structure: &'static str) -> Result<(), BuildError> {
-        check_range(structure, "leaf", self.leaf.into(), 1.0, 4096.0)?;
-        check_range(structure, "depth", self.depth.into(), 0.0, 256.0)
-    }
-
-    /// Whether a group of items at a level stays together.
+    /// Decides whether a group of items at a level stays together.
     fn ends_at(&self, items: usize, level: u32) -> bool {
         items <= self.leaf as usize || level == self.depth
     }
 }
 
-/// Items that a node keeps: their ids are one slice.
-#[derive(Default)]
-struct Items {
+/// A node with its items and subtrees.
+pub struct Node {
+    /// Closed bounds that contain every item from here down, bit for bit: a verdict
+    /// about the node holds for all of them (docs/NUMERICS.md).
+    bounds: Aabb,
+    /// For the side of a dividing plane: points outside of this half-space are in none
+    /// of the items from here down.
+    half_space: Option<Plane>,
+    /// The items that the node itself keeps, and their ids.
     boxes: Vec<Aabb>,
     ids: Vec<ItemId>,
+    children: Vec<Node>,
 }
 
-impl Items {
-    fn of(records: &[Record]) -> Items {
-        Items {
+impl Node {
+    /// A node that keeps some items, without children.
+    fn with(bounds: Aabb, records: &[Record]) -> Node {
+        Node {
+            bounds,
+            half_space: None,
             boxes: records.iter().map(|r| r.bounds).collect(),
             ids: records.iter().map(|r| r.id).collect(),
+            children: Vec::new(),
         }
     }
 
-    #[inline]
-    fn all(&self) -> Slice<'_> {
-        (&self.boxes, &self.ids)
-    }
-}
-
-/// Bounds and ids of some items.
-type Slice<'t> = (&'t [Aabb], &'t [ItemId]);
-
-/// A node of a tree, as the walk sees it.
-trait Node: Copy {
-    /// Holds every item from here on down, bit for bit: what makes a verdict
-    /// about the node one about all of them (docs/NUMERICS.md).
-    fn bounds(&self) -> Aabb;
-    /// The items that the node itself keeps.
-    fn items(&self) -> Slice<'_>;
-    /// Its subtrees.
-    fn children(self) -> impl Iterator<Item = Self>;
-}
-
-/// Hands over what a volume sees of a subtree: nothing of a node that lies
-/// outside, all of one that lies inside; else the node's own items are tested
-/// one by one, and then its children in the same way. O(log n + answers) where
-/// the volume is small and the items are.
-fn walk<N: Node, Q: QueryVolume, C: Context>(
-    node: N,
-    volume: &Q,
-    mask: PlaneMask,
-    cx: &mut C,
-) -> ControlFlow<()> {
-    cx.recorder().node_tested();
-    let (verdict, mask) = volume.classify(&node.bounds(), mask, cx.recorder());
-    match verdict {
-        Containment::Outside => cx.recorder().subtree_rejected(),
-        Containment::Inside => {
-            let count = report(node, cx.sink())?;
-            cx.recorder().subtree_accepted(count);
-        }
-        Containment::Straddles => {
-            test_items(node.items(), volume, mask, cx)?;
-            for child in node.children() {
-                walk(child, volume, mask, cx)?;
+    /// Passes the items that a volume sees to the sink: no item of a node that lies
+    /// outside, all of one that lies inside; else it tests the node's own items one by
+    /// one, and then its children in the same way. O(log n + answers) where the
+    /// volume and the items are small.
+    fn walk<Q: QueryVolume, S: Sink, R: Recorder>(
+        &self,
+        volume: &Q,
+        mask: PlaneMask,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        recorder.nodes_tested(1);
+        let (verdict, mask) = volume.classify(&self.bounds, mask, recorder);
+        match verdict {
+            Containment::Outside => recorder.subtrees_rejected(1),
+            Containment::Inside => {
+                let count = self.report(sink)?;
+                recorder.subtree_accepted(count);
+            }
+            Containment::Straddles => {
+                self.test_items(volume, mask, sink, recorder)?;
+                for child in &self.children {
+                    child.walk(volume, mask, sink, recorder)?;
+                }
             }
         }
+        ControlFlow::Continue(())
     }
-    ControlFlow::Continue(())
-}
 
-/// Hands over a whole subtree without a test; how many items it has.
-fn report<N: Node, S: Sink>(node: N, sink: &mut S) -> ControlFlow<(), usize> {
-    let (_, ids) = node.items();
-    if !ids.is_empty() {
-        sink.accept(ids)?;
+    /// Region search by dividing planes. An item in front of a plane has no point
+    /// behind it, by the same arithmetic that decides the point's side: it is monotone.
+    fn locate<S: Sink, R: Recorder>(
+        &self,
+        p: Vec3,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        recorder.nodes_tested(1);
+        self.test_items(&p, p.mask(), sink, recorder)?;
+        for child in &self.children {
+            // A point on the plane is on both sides; a NaN (coordinates beyond f32) on none.
+            if child.half_space.is_none_or(|side| side.value_at(p) >= 0.0) {
+                child.locate(p, sink, recorder)?;
+            }
+        }
+        ControlFlow::Continue(())
     }
-    let mut count = ids.len();
-    for child in node.children() {
-        count += report(child, sink)?;
-    }
-    ControlFlow::Continue(count)
-}
 
-/// Hands over those of some items that a volume sees.
-#[inline]
-fn test_items<Q: QueryVolume, C: Context>(
-    (boxes, ids): Slice<'_>,
-    volume: &Q,
-    mask: PlaneMask,
-    cx: &mut C,
-) -> ControlFlow<()> {
-    for (bounds, id) in pairs(boxes, ids) {
-        cx.recorder().items_tested(1);
-        if volume.admits(bounds, mask, cx.recorder()) {
-            cx.accept(std::slice::from_ref(id))?;
+    /// Passes a whole subtree to the sink without a test; its number of items.
+    fn report<S: Sink>(&self, sink: &mut S) -> ControlFlow<(), usize> {
+        if !self.ids.is_empty() {
+            sink.accept(&self.ids)?;
+        }
+        let mut count = self.ids.len();
+        for child in &self.children {
+            count += child.report(sink)?;
+        }
+        ControlFlow::Continue(count)
+    }
+
+    /// Tests the node's own items one by one.
+    fn test_items<Q: QueryVolume, S: Sink, R: Recorder>(
+        &self,
+        volume: &Q,
+        mask: PlaneMask,
+        sink: &mut S,
+        recorder: &mut R,
+    ) -> ControlFlow<()> {
+        for (bounds, id) in pairs(&self.boxes, &self.ids) {
+            recorder.items_tested(1);
+            if volume.admits(bounds, mask, recorder) {
+                sink.accept(std::slice::from_ref(id))?;
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Adds the memory of a subtree to a sum.
+    fn add_memory(&self, sum: &mut MemoryUsage) {
+        sum.node_bytes += size_of::<Node>();
+        sum.item_bytes += size_of_val(&self.boxes[..]) + size_of_val(&self.ids[..]);
+        for child in &self.children {
+            child.add_memory(sum);
         }
     }
-    ControlFlow::Continue(())
 }
 
-/// What a tree of nodes with pointers takes.
-fn memory_of<N: Node>(root: Option<N>, bytes_per_node: usize) -> MemoryUsage {
-    let Some(root) = root else {
-        return MemoryUsage::default();
-    };
-    let (boxes, ids) = root.items();
-    let own = MemoryUsage {
-        node_bytes: bytes_per_node,
-        item_bytes: size_of_val(boxes) + size_of_val(ids),
-    };
-    root.children().fold(own, |sum, child| {
-        let below = memory_of(Some(child), bytes_per_node);
-        MemoryUsage {
-            node_bytes: sum.node_bytes + below.node_bytes,
-            item_bytes: sum.item_bytes + below.item_bytes,
+/// The division of a kind of tree.
+pub trait Division: Send + Sync {
+    /// Name of the structure.
+    const NAME: &str;
+    /// Summary of the structure.
+    const SUMMARY: &str;
+    /// Whether region search goes by [`Node::half_space`].
+    const BY_HALF_SPACES: bool = false;
+
+    /// The root over items, of which there is at least one.
+    fn root(input: &Input<'_>, records: Vec<Record>, params: &TextbookParams) -> Node;
+}
+
+/// A tree as lectures show it, divided by `D`.
+pub struct Textbook<D> {
+    root: Option<Node>,
+    division: PhantomData<D>,
+}
+
+impl<D: Division> RegionIndex for Textbook<D> {
+    const INFO: Info = Info::new(D::NAME, D::SUMMARY, Kind::Tree, Origin::Ours).textbook();
+    type Params = TextbookParams;
+
+    fn build(input: &Input<'_>, params: &TextbookParams) -> Result<Self, BuildError> {
+        check_range(D::NAME, "leaf", params.leaf.into(), 1.0, 4096.0)?;
+        check_range(D::NAME, "depth", params.depth.into(), 0.0, 256.0)?;
+        let records = Record::all(input.items)?;
+        Ok(Textbook {
+            root: (!records.is_empty()).then(|| D::root(input, records, params)),
+            division: PhantomData,
+        })
+    }
+
+    fn memory(&self) -> MemoryUsage {
+        let mut sum = MemoryUsage::default();
+        if let Some(root) = &self.root {
+            root.add_memory(&mut sum);
         }
-    })
-}
+        sum
+    }
 
-/// The walk from the root, if there is one.
-fn query<N: Node, Q: QueryVolume, C: Context>(
-    root: Option<N>,
-    volume: &Q,
-    cx: &mut C,
-) -> ControlFlow<()> {
-    match root {
-        Some(root) => walk(root, volume, volume.mask(), cx),
-        None => ControlFlow::Continue(()),
+    fn query<Q: QueryVolume, C: Context>(&self, volume: &Q, cx: &mut C) -> ControlFlow<()> {
+        let (sink, recorder) = cx.parts();
+        match (&self.root, volume.as_point()) {
+            (Some(root), Some(p)) if D::BY_HALF_SPACES => root.locate(p, sink, recorder),
+            (Some(root), _) => root.walk(volume, volume.mask(), sink, recorder),
+            (None, _) => ControlFlow::Continue(()),
+        }
     }
 }
-
-/// What a structure with a method `root` answers by the walk.
-macro_rules! answered_by_walk {
-    () => {
-        fn query<Q: $crate::query::QueryVolume, C: $crate::query::Context>(
-            &self,
-            volume: &Q,
-            cx: &mut C,
-        ) -> std::ops::ControlFlow<()> {
-            super::query(self.root(), volume, cx)
-        }
-    };
-}
-use answered_by_walk;

@@ -1,6 +1,5 @@
-//! Item ids in tree order, sixteen a cache line: the ids of one block of boxes
-//! are read with one access to memory. It owns the layout; which ids, and in
-//! which order, is the structures' business.
+//! Item ids in rows of sixteen, a cache line each: the ids of one block of boxes
+//! are read with one access to memory.
 
 use std::ops::Deref;
 
@@ -13,27 +12,27 @@ use crate::query::ItemId;
 #[repr(C, align(64))]
 struct Line([ItemId; LANES]);
 
-/// Ids, the last line of which is filled up with zeros.
+/// Ids, the last row of which is padded with zeros.
 #[derive(Clone, Default, PartialEq)]
-pub struct IdRows {
+pub struct PaddedIds {
     lines: Vec<Line>,
     len: usize,
 }
 
-impl From<&[ItemId]> for IdRows {
+impl From<&[ItemId]> for PaddedIds {
     /// O(ids).
     fn from(ids: &[ItemId]) -> Self {
         let mut lines = vec![Line::zeroed(); ids.len().div_ceil(LANES)];
         bytemuck::cast_slice_mut(&mut lines)[..ids.len()].copy_from_slice(ids);
-        IdRows {
+        PaddedIds {
             lines,
             len: ids.len(),
         }
     }
 }
 
-impl IdRows {
-    /// Sixteen ids at a time; behind the last id come zeros.
+impl PaddedIds {
+    /// Sixteen ids per row; zeros follow the last id.
     #[inline(always)]
     pub fn rows(&self) -> &[[ItemId; LANES]] {
         bytemuck::cast_slice(&self.lines)
@@ -45,7 +44,7 @@ impl IdRows {
     }
 }
 
-impl Deref for IdRows {
+impl Deref for PaddedIds {
     type Target = [ItemId];
 
     #[inline(always)]
@@ -62,7 +61,7 @@ mod tests {
     fn rows_hold_the_ids_and_begin_cache_lines() {
         for len in [0, 1, 15, 16, 17, 40] {
             let ids: Vec<ItemId> = (7..7 + len).collect();
-            let rows = IdRows::from(&ids[..]);
+            let rows = PaddedIds::from(&ids[..]);
             assert_eq!(rows[..], ids);
             assert_eq!(rows.rows().len(), ids.len().div_ceil(LANES));
             assert!(rows.rows().as_flattened().starts_with(&ids));

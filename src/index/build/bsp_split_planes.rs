@@ -1,16 +1,15 @@
-//! How the BSP tree's builders choose a plane for some items: by the median, by
-//! surface areas, across their principal axis, or from their own faces. Each
-//! sorts the items by its plane and says how many lie on the back side; what
-//! becomes of the plane is the tree's business.
+//! Choice of a plane for a group of items: by the median, by surface areas, across
+//! their principal axis, or from their own faces. Each function moves the items
+//! behind its plane to the front of the slice and returns their number.
 
 use glam::Vec3;
 
-use super::partition::Record;
-use super::treelets::DESCENT_LEAF;
 use crate::geometry::{Aabb, Plane};
+use crate::index::items::{Record, bounds_of_centres};
+use crate::index::tree::kd_treelets::DESCENT_LEAF;
 
-/// Moves the records that belong to the back to the front of the slice,
-/// keeping nothing else in order; how many they are. O(n).
+/// Moves the records that belong to the back to the front of the slice, in any
+/// order, and returns their number. O(n).
 pub fn divide(records: &mut [Record], to_back: impl Fn(&Record) -> bool) -> usize {
     let mut back = 0;
     for i in 0..records.len() {
@@ -23,8 +22,7 @@ pub fn divide(records: &mut [Record], to_back: impl Fn(&Record) -> bool) -> usiz
 }
 
 fn centres(records: &[Record]) -> Aabb {
-    let boxes = records.iter().map(|r| r.bounds.centre());
-    boxes.fold(Aabb::EMPTY, |all, c| all.union(&Aabb::new(c, c)))
+    bounds_of_centres(records.iter().map(|r| r.bounds.centre()))
 }
 
 const AXES: [Vec3; 3] = [Vec3::X, Vec3::Y, Vec3::Z];

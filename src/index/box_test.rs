@@ -1,18 +1,18 @@
-//! One box at a time: the test that the uniform grid and the structures of other
-//! crates get, made once per query, and what they share beside it. Those that
-//! go by planes and masks have [`QueryVolume`].
+//! The test of one box at a time, for the uniform grid and the structures of other
+//! crates; prepared once per query. Structures that test plane by plane with masks use
+//! [`QueryVolume`] itself.
 
 use std::cell::RefCell;
 use std::ops::ControlFlow;
 
 use glam::Vec3;
 
-use super::partition::Record;
-use super::{BuildError, Info, Input, MemoryUsage, NoParams, RegionIndex, centres};
+use super::items::Record;
+use super::{BuildError, Info, Input, MemoryUsage, NoParams, RegionIndex, centre_bounds};
 use crate::geometry::{Aabb, PlaneRows};
 use crate::query::{Context, NoRecorder, QueryVolume, Recorder, Sink};
 
-/// A question, asked of one box at a time. Boxes are finite and not empty.
+/// A query as a test of one box at a time. Boxes are finite and not empty.
 pub trait BoxTest {
     /// Whether `admits` is `!rejects`.
     const NODES_AS_ITEMS: bool;
@@ -20,7 +20,7 @@ pub trait BoxTest {
     fn rejects(&self, node: &Aabb) -> bool;
     /// Every item within this box belongs to the answer.
     fn accepts(&self, node: &Aabb) -> bool;
-    /// Both; of a node that is rejected the second means nothing.
+    /// Both results; the second is unspecified for a rejected node.
     #[inline(always)]
     fn rejects_accepts(&self, node: &Aabb) -> (bool, bool) {
         let rejects = self.rejects(node);
@@ -28,16 +28,16 @@ pub trait BoxTest {
     }
     /// This item belongs to the answer.
     fn admits(&self, item: &Aabb) -> bool;
-    /// Where the centre of an item of the answer can be, if no item is larger
-    /// than `half` either way from its centre and all lie in `scene`.
+    /// Bounds of the centres of answers, if no item extends farther than `half` from
+    /// its centre and all lie in `scene`.
     fn centres(&self, half: Vec3, scene: &Aabb) -> Aabb;
-    /// How many planes a test looks at.
+    /// Number of planes per test.
     fn planes(&self) -> u32 {
         0
     }
 }
 
-/// A view with THE plane test in f32 and at most eight planes, all of them at
+/// A volume with THE plane test in f32 and at most eight planes, all of them at
 /// once. Nodes and items are tested alike.
 pub struct AtOnce(pub PlaneRows);
 
@@ -61,7 +61,7 @@ impl BoxTest for AtOnce {
         !self.0.exclude(item)
     }
     fn centres(&self, half: Vec3, scene: &Aabb) -> Aabb {
-        centres::of_planes(&self.0, half, scene)
+        centre_bounds::of_planes(&self.0, half, scene)
     }
     #[inline(always)]
     fn planes(&self) -> u32 {
@@ -69,11 +69,11 @@ impl BoxTest for AtOnce {
     }
 }
 
-/// Any other view, plane by plane: right, and not meant to be fast. Behind a
-/// pointer, so that a walk is compiled for it once and not once a view.
+/// Any other volume, plane by plane: correct, not fast. Behind a pointer, so that a
+/// traversal is compiled once for all such volumes.
 pub struct PlaneByPlane<'a>(pub &'a dyn Planes);
 
-/// A view without its type.
+/// A volume without its type.
 pub trait Planes {
     fn exclude(&self, node: &Aabb) -> bool;
     fn contain(&self, node: &Aabb) -> bool;
@@ -149,12 +149,12 @@ impl BoxTest for Holding {
         item.contains_point(self.0)
     }
     fn centres(&self, half: Vec3, scene: &Aabb) -> Aabb {
-        centres::of_point(self.0, half, scene)
+        centre_bounds::of_point(self.0, half, scene)
     }
 }
 
-/// A recorder that several closures of a foreign call can reach. The counts of
-/// a recorder without a state are dropped, and nothing is borrowed.
+/// A recorder that several closures of a foreign call share. Counts of a recorder
+/// without state are dropped, and nothing is borrowed.
 pub struct Tally<'a, R>(RefCell<&'a mut R>);
 
 impl<'a, R: Recorder> Tally<'a, R> {
@@ -173,7 +173,7 @@ impl<'a, R: Recorder> Tally<'a, R> {
     #[inline(always)]
     pub fn node(&self, test: &impl BoxTest) {
         self.count(|recorder| {
-            recorder.node_tested();
+            recorder.nodes_tested(1);
             recorder.planes_tested(test.planes());
         });
     }
@@ -193,8 +193,8 @@ pub fn half_of_largest(items: &[Record]) -> Vec3 {
     halves.fold(Vec3::ZERO, Vec3::max)
 }
 
-/// A structure that is searched one box at a time. It has nothing to choose.
-pub trait BoxByBox: Sized + Send + Sync {
+/// A structure without parameters that is searched one box at a time.
+pub trait BoxTested: Sized + Send + Sync {
     /// Its [`RegionIndex::INFO`].
     const ABOUT: Info;
 
@@ -207,7 +207,7 @@ pub trait BoxByBox: Sized + Send + Sync {
     /// Its [`RegionIndex::memory`].
     fn used(&self) -> MemoryUsage;
 
-    /// Hands every item that the test admits to the sink.
+    /// Passes every item that the test admits to the sink.
     fn search<T: BoxTest, S: Sink, R: Recorder>(
         &self,
         test: &T,
@@ -216,7 +216,7 @@ pub trait BoxByBox: Sized + Send + Sync {
     ) -> ControlFlow<()>;
 }
 
-impl<X: BoxByBox> RegionIndex for X {
+impl<X: BoxTested> RegionIndex for X {
     const INFO: Info = X::ABOUT;
     type Params = NoParams;
 

@@ -1,14 +1,13 @@
 //! Region search by axis-parallel planes alone: a k-d tree down to a few items
-//! a leaf, four levels to a node of three cache lines. It owns the planes and
-//! the descents of one point and of many; the items and the upper shape of the
-//! tree are the structure's.
+//! per leaf, four levels to a treelet of three cache lines. The planes and the
+//! descents of one point and of many; items and upper shape are the packed tree's.
 
 use std::ops::{ControlFlow, Range};
 
 use glam::Vec3;
 
-use super::batch::{Descent, GROUP, answer};
-use super::tree::PackedTree;
+use super::packed::PackedTree;
+use super::search::{Cursor, GROUP};
 use crate::geometry::{Aabb, LANES};
 use crate::kernel::{Isa, prefetch};
 use crate::query::{ManySink, Predicate, Recorder, Sink};
@@ -17,10 +16,10 @@ use crate::query::{ManySink, Predicate, Recorder, Sink};
 pub const DESCENT_LEAF: usize = LANES;
 
 /// Levels of a binary tree that a treelet decides, and the subtrees below it.
-pub const LEVELS: usize = 4;
-pub const CHILDREN: usize = 1 << LEVELS;
+const LEVELS: usize = 4;
+const CHILDREN: usize = 1 << LEVELS;
 /// The lane that is no plane.
-pub const AXES: usize = CHILDREN - 1;
+const AXES: usize = CHILDREN - 1;
 
 /// Four levels of planes (a treelet: Aila and Karras 2010, "Architecture
 /// considerations for tracing incoherent rays"). Lane 0 is the root, lanes 1
@@ -111,7 +110,7 @@ const fn powers_of_two(first: u32, step: usize) -> [u32; CHILDREN] {
 }
 
 /// Planes above the last level, and as a mask; the last level as a mask.
-pub const TOP_PLANES: usize = CHILDREN / 2 - 1;
+const TOP_PLANES: usize = CHILDREN / 2 - 1;
 const TOP: usize = (1 << TOP_PLANES) - 1;
 const LAST: usize = (1 << (CHILDREN / 2)) - 1;
 
@@ -163,48 +162,82 @@ static SPREAD: [u16; LAST + 1] = {
     table
 };
 
-/// The planes over a binary tree.
+/// The planes over a packed binary tree.
 #[derive(Clone, Default, Debug)]
 pub struct Treelets {
     treelets: Vec<Treelet>,
     /// The first item of each leaf, and the end of the last one.
     starts: Vec<u32>,
-    /// For each node of the tree its [`Place`].
+    /// The plane or leaf of each node of the tree.
     places: Vec<Place>,
     /// Most treelets on a way from the root to a leaf.
     height: usize,
 }
 
-/// Where a plane or a leaf stands: sixteen times its treelet plus its lane, or
-/// [`LEAF`] and the number of a leaf.
+/// A plane, as sixteen times its treelet plus its lane; or [`LEAF`] and the number
+/// of a leaf.
 type Place = u32;
 
-/// The binary tree before it is cut into treelets, in depth-first order.
-pub struct Branch {
+/// A node of the binary tree before it is cut into treelets; depth-first order.
+struct Branch {
     /// The branch of the upper side; 0 for a leaf.
-    pub upper: usize,
+    upper: usize,
     /// Levels of planes from here down to the deepest leaf.
     height: u32,
-    /// Places of its items.
-    pub items: Range<u32>,
-    /// The node of the structure's tree, if it has one.
-    node: Option<u32>,
+    /// First of its items.
+    start: u32,
+    /// Its node of the packed tree, if it has one.
+    node: Option<usize>,
 }
 
 impl Branch {
-    /// Whether it begins a treelet of its own instead of taking this lane: where
-    /// four levels or a multiple of four are left, so that those above the
-    /// leaves are full.
-    pub fn ends(&self, lane: usize) -> bool {
+    /// Whether the branch begins a treelet of its own instead of taking this lane:
+    /// where four levels or a multiple of four are left, so that the treelets above
+    /// the leaves are full.
+    fn begins_treelet(&self, lane: usize) -> bool {
         lane >= AXES || (lane > 0 && (self.height as usize).is_multiple_of(LEVELS))
     }
 }
 
+/// Lists the branches of a node, or of a range of items within a leaf, in depth-first
+/// order; their height. `cuts` has the number of items before the plane for each
+/// division of more than [`DESCENT_LEAF`] items within a leaf, in the same order.
+fn grow(
+    tree: &PackedTree,
+    node: Option<usize>,
+    items: Range<u32>,
+    cuts: &mut impl Iterator<Item = u32>,
+    branches: &mut Vec<Branch>,
+) -> u32 {
+    let at = branches.len();
+    branches.push(Branch {
+        upper: 0,
+        height: 0,
+        start: items.start,
+        node,
+    });
+    let (lower, upper, middle) = match node.filter(|&node| !tree.is_leaf(node)) {
+        Some(node) => {
+            let upper = tree.nodes()[node + 1].after();
+            (Some(node + 1), Some(upper), tree.nodes()[upper].first)
+        }
+        None if items.len() > DESCENT_LEAF => match cuts.next() {
+            Some(cut) => (None, None, items.start + cut),
+            None => return 0,
+        },
+        None => return 0,
+    };
+    let below = grow(tree, lower, items.start..middle, cuts, branches);
+    branches[at].upper = branches.len();
+    let above = grow(tree, upper, middle..items.end, cuts, branches);
+    branches[at].height = 1 + below.max(above);
+    branches[at].height
+}
+
 impl Treelets {
-    /// The planes over a binary tree, continued below its leaves: `parts` says
-    /// how many items come before the plane, for each division of more than
-    /// [`DESCENT_LEAF`] items in depth-first order. O(n).
-    pub fn over(tree: &PackedTree, parts: impl IntoIterator<Item = u32>) -> Treelets {
+    /// The planes over a binary tree, continued below its leaves by `cuts` as
+    /// [`grow`] reads them. O(n).
+    pub fn over(tree: &PackedTree, cuts: Vec<u32>) -> Treelets {
         let mut treelets = Treelets {
             places: vec![LEAF; tree.nodes().len()],
             ..Treelets::default()
@@ -212,18 +245,18 @@ impl Treelets {
         if tree.nodes().is_empty() {
             return treelets;
         }
+        let count = tree.ids().len() as u32;
         let mut branches = Vec::new();
-        let mut parts = parts.into_iter();
-        grow(tree, 0, &mut branches, &mut |items| {
-            if items > DESCENT_LEAF {
-                parts.next()
-            } else {
-                None
-            }
-        });
+        grow(
+            tree,
+            Some(0),
+            0..count,
+            &mut cuts.into_iter(),
+            &mut branches,
+        );
         treelets.treelets.push(Treelet::UNUSED);
-        treelets.cut(&branches, 0, 0, 0, 1);
-        treelets.starts.push(tree.ids().len() as u32);
+        treelets.cut(&branches, 0, (0, 0), 1);
+        treelets.starts.push(count);
         treelets.treelets.shrink_to_fit();
         treelets.starts.shrink_to_fit();
         for node in (0..tree.nodes().len()).rev() {
@@ -232,41 +265,40 @@ impl Treelets {
         treelets
     }
 
-    /// Puts a branch in a lane of a treelet, and all that is below it where it
-    /// belongs.
-    fn cut(&mut self, branches: &[Branch], at: usize, treelet: usize, lane: usize, depth: usize) {
+    /// Places a branch in a lane of a treelet, and its descendants below.
+    fn cut(
+        &mut self,
+        branches: &[Branch],
+        at: usize,
+        (treelet, mut lane): (usize, usize),
+        depth: usize,
+    ) {
         self.height = self.height.max(depth);
         let branch = &branches[at];
         let is_leaf = branch.upper == 0;
-        if !is_leaf && !branch.ends(lane) {
-            self.place(branch, (treelet * CHILDREN + lane) as Place);
-            // Used from now on; measured later.
+        let mut place = (treelet * CHILDREN + lane) as Place;
+        if !is_leaf && !branch.begins_treelet(lane) {
+            // In use from here on; measured later.
             self.treelets[treelet].low[lane] = f32::INFINITY;
-            self.cut(branches, at + 1, treelet, 2 * lane + 1, depth);
-            self.cut(branches, branch.upper, treelet, 2 * lane + 2, depth);
-            return;
-        }
-        let mut lane = lane;
-        while lane < AXES {
-            lane = 2 * lane + 1;
-        }
-        let child = lane - AXES;
-        if is_leaf {
-            let leaf = LEAF | self.starts.len() as u32;
-            self.treelets[treelet].children[child] = leaf;
-            self.starts.push(branch.items.start);
-            self.place(branch, leaf);
+            self.cut(branches, at + 1, (treelet, 2 * lane + 1), depth);
+            self.cut(branches, branch.upper, (treelet, 2 * lane + 2), depth);
         } else {
-            let below = self.treelets.len();
-            self.treelets[treelet].children[child] = below as u32;
-            self.treelets.push(Treelet::UNUSED);
-            self.cut(branches, at, below, 0, depth + 1);
+            while lane < AXES {
+                lane = 2 * lane + 1;
+            }
+            let child = lane - AXES;
+            if !is_leaf {
+                let below = self.treelets.len();
+                self.treelets[treelet].children[child] = below as u32;
+                self.treelets.push(Treelet::UNUSED);
+                return self.cut(branches, at, (below, 0), depth + 1);
+            }
+            place = LEAF | self.starts.len() as u32;
+            self.treelets[treelet].children[child] = place;
+            self.starts.push(branch.start);
         }
-    }
-
-    fn place(&mut self, branch: &Branch, place: Place) {
         if let Some(node) = branch.node {
-            self.places[node as usize] = place;
+            self.places[node] = place;
         }
     }
 
@@ -312,7 +344,7 @@ impl Treelets {
     }
 
     fn part(&mut self, place: Place, lower: &Aabb, upper: &Aabb) {
-        let axis = parting_axis(lower, upper);
+        let axis = split_axis(lower, upper);
         let (treelet, lane) = (place as usize / CHILDREN, place as usize % CHILDREN);
         self.treelets[treelet].set(lane, axis, lower.max[axis], upper.min[axis]);
     }
@@ -377,7 +409,7 @@ impl Treelets {
 
     #[inline(always)]
     fn open<R: Recorder>(&self, at: usize, p: Vec3, recorder: &mut R) -> u32 {
-        (0..AXES).for_each(|_| recorder.node_tested());
+        recorder.nodes_tested(AXES as u32);
         self.treelets[at].sides(p)
     }
 
@@ -394,15 +426,15 @@ impl Treelets {
         for (group, first) in points.chunks(GROUP).zip((0..).step_by(GROUP)) {
             now.clear();
             if !self.treelets.is_empty() {
-                now.extend((0..group.len() as u32).map(|point| Descent { point, at: 0 }));
+                now.extend((0..group.len() as u32).map(|point| Cursor { point, at: 0 }));
             }
             // Descents keep the order of their points, and those that have
             // come to a leaf their place among the others.
             for _ in 0..self.height {
                 next.clear();
-                for &Descent { point, at } in &now {
+                for &Cursor { point, at } in &now {
                     if at & LEAF != 0 {
-                        next.push(Descent { point, at });
+                        next.push(Cursor { point, at });
                         continue;
                     }
                     let treelet = &self.treelets[at as usize];
@@ -414,13 +446,13 @@ impl Treelets {
                             0 => self.treelets[at as usize].prefetch(),
                             _ => prefetch(&self.starts[(at & !LEAF) as usize]),
                         }
-                        next.push(Descent { point, at });
+                        next.push(Cursor { point, at });
                     }
                 }
                 std::mem::swap(&mut now, &mut next);
             }
             let items_of = |leaf| self.items(leaf);
-            answer(tree, group, first, &now, items_of, &mut ids, sink)?;
+            tree.answer(group, first, &now, items_of, &mut ids, sink)?;
         }
         ControlFlow::Continue(())
     }
@@ -428,7 +460,7 @@ impl Treelets {
 
 /// The axis of the plane between two parts: on which they share least of their
 /// extent.
-pub fn parting_axis(lower: &Aabb, upper: &Aabb) -> usize {
+fn split_axis(lower: &Aabb, upper: &Aabb) -> usize {
     let shared = (lower.max - upper.min) / lower.union(upper).extent();
     // A NaN (no extent, or one beyond f32) is as bad as all of it.
     let shared = |axis: usize| match shared[axis] {
@@ -437,68 +469,6 @@ pub fn parting_axis(lower: &Aabb, upper: &Aabb) -> usize {
     };
     let best = (0..3).min_by(|&a, &b| shared(a).total_cmp(&shared(b)));
     best.unwrap_or(0)
-}
-
-/// The structure's tree from a node down, continued below its leaves: `parts`
-/// says of a number of items how many come before the plane, if there is one,
-/// in depth-first order.
-pub fn grow(
-    tree: &PackedTree,
-    node: usize,
-    branches: &mut Vec<Branch>,
-    parts: &mut impl FnMut(usize) -> Option<u32>,
-) -> u32 {
-    let at = branches.len();
-    let items = tree.nodes()[node].items();
-    let items = items.start as u32..items.end as u32;
-    branches.push(Branch {
-        upper: 0,
-        height: 0,
-        items: items.clone(),
-        node: Some(node as u32),
-    });
-    let height = if tree.is_leaf(node) {
-        divide(items, at, branches, parts)
-    } else {
-        let lower = grow(tree, node + 1, branches, parts);
-        branches[at].upper = branches.len();
-        let upper = tree.nodes()[node + 1].after();
-        1 + lower.max(grow(tree, upper, branches, parts))
-    };
-    branches[at].height = height;
-    height
-}
-
-/// Divides the items of the branch `at`, a leaf so far; its height.
-fn divide(
-    items: Range<u32>,
-    at: usize,
-    branches: &mut Vec<Branch>,
-    parts: &mut impl FnMut(usize) -> Option<u32>,
-) -> u32 {
-    let Some(part) = parts(items.len()) else {
-        return 0;
-    };
-    let middle = items.start + part;
-    let mut height = 0;
-    for (side, items) in [items.start..middle, middle..items.end]
-        .into_iter()
-        .enumerate()
-    {
-        let child = branches.len();
-        branches.push(Branch {
-            upper: 0,
-            height: 0,
-            items: items.clone(),
-            node: None,
-        });
-        if side == 1 {
-            branches[at].upper = child;
-        }
-        branches[child].height = divide(items, child, branches, parts);
-        height = height.max(1 + branches[child].height);
-    }
-    height
 }
 
 /// Treelets above each other: a division leaves a quarter of the items or more

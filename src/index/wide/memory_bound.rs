@@ -1,31 +1,31 @@
-//! Oracle replay: what a query of the wide tree read and copied, done again
-//! without a single decision. A bound that no traversal of the same blocks can
-//! beat; nobody answers queries with it.
+//! Replay of a query of the wide tree: its reads and copies again, without a single
+//! decision. A lower bound for every traversal of the same blocks; not an index.
 
 use std::ops::{ControlFlow, Range};
 
-use super::RegionIndex;
-use super::frontier::AHEAD;
-use super::wide::Wide;
+use super::Wide;
 use crate::geometry::{BoxBlock, LANES, LaneMask, ROWS, RowMask};
+use crate::index::RegionIndex;
+use crate::index::frontier::AHEAD;
 use crate::kernel::{BASELINE, Isa, Kernel, Work, prefetch};
 use crate::query::{ItemId, QueryContext, QueryVolume, Recorder, Sink, Tests};
 
-/// A block with those of its rows that were read; if they are fewer than six,
-/// some come twice.
+/// A block with the rows that were read; of fewer than six rows, some are repeated.
 type Read = (u32, [u8; ROWS]);
 
-/// What one query read and handed over, in its own order.
+/// Reads and answers of one query, in its own order.
 #[derive(Clone, Default, PartialEq, Eq, Debug)]
 pub struct Trace {
     reads: Vec<Read>,
     runs: Vec<Range<u32>>,
-    /// What was handed over of the leaves: of so many that were wholly inside, then
-    /// of those that were tested, which are the last of the reads.
+    /// First position and answers of each leaf: leaves wholly inside come first, then
+    /// the tested ones, which are the last of the reads.
     leaves: Vec<(u32, LaneMask)>,
+    /// Number of leaves wholly inside.
     whole: usize,
 }
 
+/// Records the blocks that are read.
 struct Reads<'a>(&'a mut Vec<Read>);
 
 impl Recorder for Reads<'_> {
@@ -38,6 +38,7 @@ impl Recorder for Reads<'_> {
     }
 }
 
+/// Records the positions of the answers.
 struct TraceSink<'a> {
     runs: &'a mut Vec<Range<u32>>,
     leaves: &'a mut Vec<(u32, LaneMask)>,
@@ -88,12 +89,11 @@ impl Trace {
         trace
     }
 
-    /// Reads what the query read and appends what it answered.
+    /// Repeats the reads of the query and appends its answers.
     pub fn replay(&self, tree: &Wide, out: &mut Vec<ItemId>) {
         Kernel::best().run(Replay {
             trace: self,
             blocks: tree.blocks(),
-            ids: tree.id_rows().as_flattened(),
             id_rows: tree.id_rows(),
             out,
         });
@@ -103,14 +103,13 @@ impl Trace {
 struct Replay<'a> {
     trace: &'a Trace,
     blocks: &'a [BoxBlock],
-    ids: &'a [ItemId],
     id_rows: &'a [[ItemId; LANES]],
     out: &'a mut Vec<ItemId>,
 }
 
-/// Asks for what one read will want, if there is such a read.
+/// Prefetches the rows of the i-th read, if there is such a read.
 #[inline(always)]
-fn fetch(blocks: &[BoxBlock], reads: &[Read], i: usize) {
+fn prefetch_read(blocks: &[BoxBlock], reads: &[Read], i: usize) {
     if let Some((block, rows)) = reads.get(i)
         && let Some(block) = blocks.get(*block as usize)
     {
@@ -134,14 +133,15 @@ impl Work for Replay<'_> {
         let (whole, tested) = leaves.split_at(*whole);
         let (above, below) = reads.split_at(reads.len() - tested.len());
         let mut seen: LaneMask = 0;
-        (0..AHEAD).for_each(|i| fetch(self.blocks, above, i));
+        (0..AHEAD).for_each(|i| prefetch_read(self.blocks, above, i));
         for (i, (block, rows)) in above.iter().enumerate() {
-            fetch(self.blocks, above, i + AHEAD);
+            prefetch_read(self.blocks, above, i + AHEAD);
             seen |= self.blocks[*block as usize].touch(isa, rows);
         }
         for run in runs {
-            let places = run.start as usize..run.end as usize;
-            let _ = self.out.accept_places(isa, self.ids, places);
+            let items = run.start as usize..run.end as usize;
+            let ids = self.id_rows.as_flattened();
+            let _ = self.out.accept_places(isa, ids, items);
         }
         for (reads, leaves) in [(&[][..], whole), (below, tested)] {
             let tests = TracedLeaves {
@@ -151,15 +151,14 @@ impl Work for Replay<'_> {
                 id_rows: self.id_rows,
                 seen: &mut seen,
             };
-            (0..AHEAD).for_each(|i| tests.fetch(i));
+            (0..AHEAD).for_each(|i| tests.prefetch(i));
             let _ = self.out.accept_tested(isa, self.id_rows, tests);
         }
         std::hint::black_box(seen);
     }
 }
 
-/// Leaves of which it is known what they hold, read all the same if they have
-/// been.
+/// Leaves with known answers; those that the query read are read again.
 struct TracedLeaves<'a> {
     blocks: &'a [BoxBlock],
     reads: &'a [Read],
@@ -170,8 +169,8 @@ struct TracedLeaves<'a> {
 
 impl TracedLeaves<'_> {
     #[inline(always)]
-    fn fetch(&self, i: usize) {
-        fetch(self.blocks, self.reads, i);
+    fn prefetch(&self, i: usize) {
+        prefetch_read(self.blocks, self.reads, i);
         if let Some(&(next, _)) = self.leaves.get(i)
             && let Some(row) = self.id_rows.get(next as usize / LANES)
         {
@@ -190,7 +189,7 @@ impl<I: Isa> Tests<I> for TracedLeaves<'_> {
 
     #[inline(always)]
     fn test(&mut self, isa: I, i: usize) -> (usize, LaneMask) {
-        self.fetch(i + AHEAD);
+        self.prefetch(i + AHEAD);
         if let Some((block, rows)) = self.reads.get(i) {
             *self.seen |= self.blocks[*block as usize].touch(isa, rows);
         }

@@ -1,7 +1,6 @@
 //! Orders items so that every run of 16^k of them, from a multiple of 16^k on,
-//! is a compact group: what an implicit tree of blocks is built on. By medians
-//! that fall on block boundaries, or by Morton codes, which is quicker to make
-//! and slower to ask.
+//! is a compact group, as an implicit tree of blocks needs it. By medians that fall
+//! on block boundaries, or by Morton codes, for faster builds and slower queries.
 
 use std::cmp::Ordering;
 use std::sync::{Mutex, PoisonError};
@@ -10,24 +9,25 @@ use glam::{Vec3, Vec4};
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::{Aabb, LANES};
+use crate::index::items::bounds_of_centres;
 use crate::query::ItemId;
 use crate::threads::share;
 
-/// How items are brought into order.
+/// Order of the items of an implicit tree.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum BlockOrder {
-    /// Halved at the median of the widest axis, again and again, always at a
-    /// multiple of the block size that the half is made of.
+    /// Recursive halving at the median of the widest axis, always at a multiple of
+    /// the block size of the halves.
     #[default]
     Median,
     /// Sorted along the Morton curve of the centres.
     Morton,
 }
 
-/// A centre on its way into order, its id in the bits of the fourth number:
-/// sixteen bytes that one register holds.
+/// A centre, with its id in the bits of the fourth number: sixteen bytes, one
+/// register.
 #[derive(Clone, Copy)]
 struct Point(Vec4);
 
@@ -113,9 +113,8 @@ fn by_medians(items: &[Aabb], ids: &mut [ItemId], threads: usize) {
         points: &mut points,
         unit,
     }];
-    // What becomes of a group depends on that group alone, so that it does not
-    // matter who halves it. First, round by round, as many groups as it takes
-    // for nobody to be idle in the end.
+    // The order within a group depends on that group alone, not on the thread that
+    // halves it. First, round by round, enough groups to keep all threads busy.
     let enough = 4 * threads;
     while threads > 1 && open.len() < enough {
         if open.iter().all(|g| g.points.len() < SHARED_POINTS) {
@@ -137,7 +136,7 @@ fn by_medians(items: &[Aabb], ids: &mut [ItemId], threads: usize) {
     }
 }
 
-/// The order of finite numbers: one comparison where only "less" is asked.
+/// The order of finite numbers: one comparison where the caller uses only "less".
 #[inline(always)]
 fn order(a: f32, b: f32) -> Ordering {
     if a < b {
@@ -177,9 +176,7 @@ const BITS: u32 = 16;
 /// centres within their own bounds, 16 bits an axis.
 fn by_morton(items: &[Aabb], ids: &mut [ItemId]) {
     let centre = |id: ItemId| items[id as usize].centre();
-    let bounds = ids.iter().fold(Aabb::EMPTY, |bounds, &id| {
-        bounds.union(&Aabb::new(centre(id), centre(id)))
-    });
+    let bounds = bounds_of_centres(ids.iter().map(|&id| centre(id)));
     let cells = (1u32 << BITS) as f32;
     // In halves, so that the width of a scene of all numbers stays finite.
     let half = bounds.max * 0.5 - bounds.min * 0.5;
@@ -203,8 +200,8 @@ fn by_morton(items: &[Aabb], ids: &mut [ItemId]) {
     }
 }
 
-/// Lower bits of a code, which the radix sort leaves out: what is left are 32,
-/// and an entry is 8 bytes.
+/// Lower bits of a code that the radix sort ignores: 32 bits remain, and an entry is
+/// 8 bytes.
 const LOW: u32 = 3 * BITS - u32::BITS;
 
 /// Sorts by code, equal ones in the order given: least significant digit

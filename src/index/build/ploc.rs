@@ -29,13 +29,13 @@ impl Boundable for Aabb {
 /// obvhs 0.4.0 does with the same parameters; `pre_split` is for triangles only.
 /// O(n log n): clustering has a bound, and what would be reinserted in quadratic time
 /// stays where it is.
-pub(crate) fn build(boxes: &[Aabb], params: BvhBuildParams) -> Bvh2 {
+pub fn build(boxes: &[Aabb], params: BvhBuildParams) -> Bvh2 {
     finished(clustered(boxes, &params), params)
 }
 
 /// The same by the crate's own clustering, whose time has no bound.
 #[cfg(feature = "peers")]
-pub(crate) fn build_as_it_comes(boxes: &[Aabb], params: BvhBuildParams) -> Bvh2 {
+pub fn build_as_it_comes(boxes: &[Aabb], params: BvhBuildParams) -> Bvh2 {
     let tree = obvhs::ploc::PlocBuilder::with_capacity(boxes.len()).build(
         params.ploc_search_distance,
         boxes,
@@ -224,29 +224,11 @@ where
 
 /// The preset that was fastest for views and for rays: one item a leaf.
 #[cfg(any(test, feature = "cli"))]
-pub(crate) const ONE_A_LEAF: BvhBuildParams = BvhBuildParams {
+pub const ONE_A_LEAF: BvhBuildParams = BvhBuildParams {
     max_prims_per_leaf: 1,
     pre_split: false,
     ..BvhBuildParams::very_slow_build()
 };
-
-/// Most items with the very same bounds that a builder gets which needs
-/// quadratic time for them.
-#[cfg(feature = "peers")]
-pub(crate) const MOST_ALIKE: usize = 50_000;
-
-/// How many items have the same bounds, if more than [`MOST_ALIKE`] have.
-/// O(n log n) if there are that many items at all.
-#[cfg(feature = "peers")]
-pub(crate) fn too_many_alike<'a>(items: impl ExactSizeIterator<Item = &'a Aabb>) -> Option<usize> {
-    if items.len() <= MOST_ALIKE {
-        return None;
-    }
-    let mut keys: Vec<_> = items.map(Aabb::bits).collect();
-    keys.sort_unstable();
-    let alike = keys.chunk_by(|a, b| a == b).map(<[_]>::len).max();
-    alike.filter(|&alike| alike > MOST_ALIKE)
-}
 
 #[cfg(test)]
 mod tests {

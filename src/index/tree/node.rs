@@ -1,11 +1,10 @@
-//! A node of the packed trees: nodes lie in depth-first order, items in tree
-//! order, so that every subtree is one slice of either.
+//! A node of the packed tree.
 
 use std::ops::Range;
 
 use crate::geometry::Aabb;
 
-/// A node: the exact union of its items' bounds and where they lie.
+/// A node: the exact union of its items' bounds and the position of its subtree.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct TreeNode {
@@ -21,7 +20,7 @@ pub struct TreeNode {
 }
 
 impl TreeNode {
-    /// The places of the subtree's items in tree order.
+    /// Positions of the subtree's items in tree order.
     #[inline(always)]
     pub fn items(&self) -> Range<usize> {
         self.first as usize..(self.first + self.count) as usize
@@ -32,4 +31,22 @@ impl TreeNode {
     pub fn after(&self) -> usize {
         self.after as usize
     }
+}
+
+/// Whether the node at this index has no children.
+#[inline(always)]
+pub fn is_leaf(nodes: &[TreeNode], node: usize) -> bool {
+    nodes[node].after() == node + 1
+}
+
+/// Indices of a node's children, ascending.
+#[inline(always)]
+pub fn children(nodes: &[TreeNode], node: usize) -> impl Iterator<Item = usize> {
+    let end = nodes[node].after();
+    let mut child = node + 1;
+    std::iter::from_fn(move || {
+        let this = (child < end).then_some(child)?;
+        child = nodes[this].after();
+        Some(this)
+    })
 }

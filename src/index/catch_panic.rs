@@ -1,10 +1,9 @@
-//! Code of others, which may panic: a panic becomes a value here, so that one
-//! structure's end is not everybody's.
+//! Panics of code from elsewhere as values, so that a structure that panics fails alone.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Runs it; of a panic, what it says. What the work has changed by then is left
-/// as it is, and not to be relied upon.
+/// Runs a closure; returns the message of a panic. The state that the closure has
+/// changed by then stays as it is and must not be relied upon.
 pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     catch_unwind(AssertUnwindSafe(work)).map_err(|panic| {
         let text = panic

@@ -1,6 +1,6 @@
-//! Where the centres of a view's items can be: the box that an index asks for
-//! which knows only boxes, balls or cells. Nothing that the six-plane test sees
-//! lies outside it; what lies in it is still tested.
+//! Bounds of the centres of a query's answers, for an index that searches boxes or
+//! cells only. Every item that the six-plane test sees has its centre within them; not
+//! every item within them is seen.
 
 use glam::{DVec3, Vec3};
 

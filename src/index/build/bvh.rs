@@ -1,6 +1,6 @@
 //! The bounding volume hierarchy of the crate `obvhs`: its builders decide
-//! the topology, and the items are then re-laid so that an accepted subtree
-//! is one slice. obvhs has no frustum traversal of its own; ours is shared.
+//! the topology, and the items are then reordered so that an accepted subtree
+//! is one slice. obvhs has no frustum traversal; ours is the packed tree's.
 
 use std::borrow::Cow;
 
@@ -8,18 +8,20 @@ use obvhs::BvhBuildParams;
 use obvhs::bvh2::Bvh2;
 use serde::{Deserialize, Serialize};
 
-use super::by_tree::answered_by_tree;
-use super::tree::{PackedTree, TreeWriter};
-use super::{BuildError, Info, Input, Kind, Origin, RegionIndex, check_range, indexable, ploc};
+use super::ploc;
 use crate::geometry::Aabb;
+use crate::index::items::indexable;
+use crate::index::tree::{PackedTree, Tree, TreeBuilder};
+use crate::index::{BuildError, Info, Input, Kind, Origin, check_range};
 use crate::query::ItemId;
 
 /// A BVH built bottom-up (PLOC: Meister and Bittner 2018, "Parallel locally
 /// ordered clustering for bounding volume hierarchy construction", with
 /// reinsertion: Meister and Bittner 2018b), by obvhs.
-pub struct Bvh {
-    tree: PackedTree,
-}
+pub type Bvh = Tree<BvhBuilder>;
+
+/// Builder of [`Bvh`].
+pub struct BvhBuilder;
 
 /// Parameters: `bvh:preset=medium,leaf=4`.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
@@ -78,16 +80,17 @@ impl BvhPreset {
 }
 
 /// Items in stacks of the very same bounds. Clustering by nearest neighbour
-/// finds no nearest one among equals: obvhs gets one box for a stack, and the
+/// finds no nearest one among equals: obvhs gets one box per stack, and the
 /// stack's items share its leaf.
 struct Stacks {
     members: Vec<ItemId>,
-    /// Where each stack begins in `members`; empty if every item stands alone.
+    /// First member of each stack, and the end of the last one; empty if every item
+    /// is a stack of its own.
     starts: Vec<u32>,
 }
 
-/// Items that are looked at to see whether there are stacks at all. What slips
-/// through is small, and so is its cost.
+/// Items that are sampled to find out whether there are stacks at all. Stacks that the
+/// sample misses are small, and so is their cost.
 const STACK_SAMPLE: usize = 4096;
 
 impl Stacks {
@@ -99,11 +102,10 @@ impl Stacks {
         let mut starts = Vec::new();
         if sample.windows(2).any(|pair| pair[0] == pair[1]) {
             ids.sort_unstable_by_key(|id| (key(id), *id));
-            let begins = |i: usize| i == 0 || key(&ids[i]) != key(&ids[i - 1]);
-            starts = (0..ids.len())
-                .filter(|&i| begins(i))
-                .map(|i| i as u32)
-                .collect();
+            starts.push(0);
+            for stack in ids.chunk_by(|a, b| key(a) == key(b)) {
+                starts.push(starts[starts.len() - 1] + stack.len() as u32);
+            }
         }
         Stacks {
             members: ids,
@@ -113,43 +115,35 @@ impl Stacks {
 
     fn get(&self, stack: u32) -> &[ItemId] {
         let stack = stack as usize;
-        if self.starts.is_empty() {
-            return &self.members[stack..=stack];
+        match self.starts.get(stack..stack + 2) {
+            Some(&[start, end]) => &self.members[start as usize..end as usize],
+            _ => &self.members[stack..=stack],
         }
-        let end = self
-            .starts
-            .get(stack + 1)
-            .map_or(self.members.len(), |&end| end as usize);
-        &self.members[self.starts[stack] as usize..end]
     }
 
-    /// The boxes that obvhs is to build over, one a stack: the items
-    /// themselves where they can be used as they are, so that ten million of
-    /// them are not copied.
+    /// The boxes that obvhs builds over, one per stack: the items themselves where
+    /// they can be used as they are, so that ten million of them are not copied.
     fn boxes<'a>(&self, items: &'a [Aabb]) -> Cow<'a, [Aabb]> {
         let scale = scale_for(items);
         if scale == 1.0 && self.starts.is_empty() && self.members.len() == items.len() {
             return Cow::Borrowed(items);
         }
-        let scaled = |&id: &ItemId| {
-            let b = items[id as usize];
+        let stacks = match self.starts.len() {
+            0 => self.members.len(),
+            ends => ends - 1,
+        };
+        let scaled = |stack: u32| {
+            let b = items[self.get(stack)[0] as usize];
             Aabb::new(b.min * scale, b.max * scale)
         };
-        match self.starts.is_empty() {
-            true => self.members.iter().map(scaled).collect(),
-            false => self
-                .starts
-                .iter()
-                .map(|&at| scaled(&self.members[at as usize]))
-                .collect(),
-        }
+        (0..stacks as u32).map(scaled).collect()
     }
 }
 
-/// A power of two that brings the scene near unit size, or 1 for coordinates
+/// A power of two that scales the scene to about unit size, or 1 for coordinates
 /// between 2^-40 and 2^40: beyond, the areas that the builder compares would
 /// overflow or vanish in f32.
-pub(crate) fn scale_for(items: &[Aabb]) -> f32 {
+pub fn scale_for(items: &[Aabb]) -> f32 {
     let largest = Aabb::union_of(items).reach().max_element();
     let exponent = libm::ilogbf(largest);
     if largest == 0.0 || !largest.is_finite() || exponent.abs() <= 40 {
@@ -159,51 +153,34 @@ pub(crate) fn scale_for(items: &[Aabb]) -> f32 {
     libm::ldexpf(1.0, (-exponent).clamp(-126, 126))
 }
 
-/// Lays the items out in depth-first order. Iterative, so that a degenerate
-/// tree cannot overflow the stack. O(n).
-fn relaid(items: &[Aabb], stacks: &Stacks, built: &Bvh2) -> PackedTree {
-    enum TaskKind {
-        Enter(u32),
-        Leave(usize),
-    }
-    let mut writer = TreeWriter::with_capacity(stacks.members.len());
-    let mut open = vec![TaskKind::Enter(0)];
-    while let Some(task) = open.pop() {
-        match task {
-            TaskKind::Leave(node) => writer.close(node),
-            TaskKind::Enter(node) => {
-                open.push(TaskKind::Leave(writer.open()));
-                let node = &built.nodes[node as usize];
-                let first = node.first_index;
-                if node.is_leaf() {
-                    let here = first as usize..(first + node.prim_count) as usize;
-                    let stacks = built.primitive_indices[here]
-                        .iter()
-                        .map(|&at| stacks.get(at));
-                    for &id in stacks.flatten() {
-                        writer.push(id, &items[id as usize]);
-                    }
-                } else {
-                    open.extend([TaskKind::Enter(first + 1), TaskKind::Enter(first)]);
-                }
+/// The packed tree of obvhs's topology. O(n).
+fn packed(items: &[Aabb], stacks: &Stacks, built: &Bvh2) -> PackedTree {
+    PackedTree::grow(stacks.members.len(), 0, |tree, _, node: u32, children| {
+        let node = &built.nodes[node as usize];
+        let first = node.first_index;
+        if !node.is_leaf() {
+            return children.extend([first, first + 1]);
+        }
+        let here = first as usize..(first + node.prim_count) as usize;
+        for &stack in &built.primitive_indices[here] {
+            for &id in stacks.get(stack) {
+                tree.push(id, &items[id as usize]);
             }
         }
-    }
-    writer.finish()
+    })
 }
 
-impl RegionIndex for Bvh {
+impl TreeBuilder for BvhBuilder {
     const INFO: Info = Info::new(
         "bvh",
         "bounding volume hierarchy (crate obvhs), items re-laid in tree order, plane masks",
         Kind::Tree,
         Origin::Ours,
-    )
-    .refits()
-    .ranges();
+    );
     type Params = BvhParams;
+    type Descent = ();
 
-    fn build(input: &Input<'_>, params: &BvhParams) -> Result<Self, BuildError> {
+    fn build(input: &Input<'_>, params: &BvhParams) -> Result<(PackedTree, ()), BuildError> {
         let items = input.items;
         check_range(Self::INFO.name, "leaf", params.leaf.into(), 1.0, 255.0)?;
         let config = BvhBuildParams {
@@ -212,18 +189,10 @@ impl RegionIndex for Bvh {
             ..params.preset.params()
         };
         let stacks = Stacks::of(items, indexable(items)?);
-        let boxes = stacks.boxes(items);
-        if boxes.is_empty() || stacks.members.is_empty() {
-            return Ok(Bvh {
-                tree: PackedTree::default(),
-            });
+        if stacks.members.is_empty() {
+            return Ok((PackedTree::default(), ()));
         }
-        let built = ploc::build(&boxes, config);
-        drop(boxes);
-        Ok(Bvh {
-            tree: relaid(items, &stacks, &built),
-        })
+        let built = ploc::build(&stacks.boxes(items), config);
+        Ok((packed(items, &stacks, &built), ()))
     }
-
-    answered_by_tree!();
 }

@@ -1,7 +1,11 @@
-//! The wide tree: sixteen children a node, no pointers, one block of 384 bytes
-//! for each node and each leaf. It owns the layout and the traversal, level by
-//! level; the order of the items is made next door (`block_order`), and the
-//! tests of a block are the view's.
+//! The wide tree: sixteen children per node, no pointers, one block of 384 bytes
+//! for each node and each leaf. Layout, construction, queries, refit.
+
+mod block_order;
+mod level_traversal;
+mod levels;
+mod memory_bound;
+mod single_plane_buckets;
 
 use std::cell::Cell;
 use std::ops::ControlFlow;
@@ -9,22 +13,28 @@ use std::ops::ControlFlow;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::block_order::{BlockOrder, block_ordered};
-use super::by_plane::ByPlane;
-use super::frontier::{Frontier, Merger, NodeList, is_far, put_back, take};
-use super::id_rows::IdRows;
-use super::pass::{Layer, Level, Pass};
-use super::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex, indexable};
+use self::block_order::block_ordered;
+use self::level_traversal::LevelTraversal;
+use self::levels::{Layer, Level};
+use self::single_plane_buckets::SinglePlaneBuckets;
+use super::frontier::{Frontier, NodeList, is_far, put_back, take};
+use super::items::indexable;
+use super::padded_ids::PaddedIds;
+use super::positions::Positions;
+use super::{BuildError, Info, Input, Kind, MemoryUsage, Origin, RegionIndex};
 use crate::geometry::{Aabb, BoxBlock, LANES};
 use crate::kernel::{Isa, prefetch};
 use crate::query::{Context, ItemId, QueryVolume, Recorder, Sink};
 use crate::threads::share;
 
+pub use self::block_order::BlockOrder;
+pub use self::memory_bound::Trace;
+
 /// Parameters: `wide:order=median`.
 #[derive(Clone, Copy, Default, Debug, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct WideParams {
-    /// How items come into tree order: `median` or `morton`.
+    /// The order of the items: `median` or `morton`.
     pub order: BlockOrder,
 }
 
@@ -40,11 +50,10 @@ const MOST_LEVELS: usize = 8;
 pub struct Wide {
     blocks: Vec<BoxBlock>,
     /// Item ids in tree order.
-    ids: IdRows,
+    ids: PaddedIds,
     /// Lowest level first.
     levels: Vec<Level>,
-    /// Place of each item in tree order, made when first needed.
-    place_of: Vec<u32>,
+    positions: Positions,
 }
 
 /// The memory of a traversal: frontiers, kept between queries.
@@ -53,26 +62,25 @@ struct Scratch {
     here: Frontier,
     below: Frontier,
     whole: NodeList,
-    by_plane: ByPlane,
+    buckets: SinglePlaneBuckets,
 }
 
 thread_local! {
     static SCRATCH: Cell<Option<Box<Scratch>>> = const { Cell::new(None) };
 }
 
-/// Blocks of items whose memory is asked for ahead while the tree is filled.
-const GATHERED_AHEAD: usize = 2;
+/// Distance of prefetches while the leaves are filled, in blocks of items.
+const FILL_AHEAD: usize = 2;
 
 /// Leaves that are filled in one go, by one thread: whole parents of parents.
 const SHARED_BLOCKS: usize = LANES * LANES;
 
-/// Fills consecutive leaves, the first of which is number `first`, with the
-/// boxes of their items.
+/// Fills consecutive leaves, from the leaf `first` on, with the boxes of their items.
 fn fill(items: &[Aabb], ids: &[ItemId], first: usize, leaves: &mut [BoxBlock]) {
     let ids = &ids[first * LANES..];
     for (i, (block, here)) in leaves.iter_mut().zip(ids.chunks(LANES)).enumerate() {
-        // The items lie all over memory.
-        for &id in ids.iter().skip((i + GATHERED_AHEAD) * LANES).take(LANES) {
+        // Items are scattered over memory.
+        for &id in ids.iter().skip((i + FILL_AHEAD) * LANES).take(LANES) {
             prefetch(&items[id as usize].min);
             prefetch(&items[id as usize].max);
         }
@@ -136,7 +144,7 @@ impl Wide {
         tree
     }
 
-    /// [`RegionIndex::build`] on so many threads: the very same structure.
+    /// [`RegionIndex::build`] on several threads: the very same structure.
     ///
     /// # Errors
     /// As [`RegionIndex::build`].
@@ -149,10 +157,9 @@ impl Wide {
         Ok(Wide::over(items, &ids, threads))
     }
 
-    /// Whether both are the same bit for bit: the ids, the blocks, the levels.
+    /// Compares two trees bit for bit: ids, blocks, levels.
     pub fn same_as(&self, other: &Wide) -> bool {
-        let depths = (self.depth(), other.depth());
-        depths.0 == depths.1 && self.ids == other.ids && self.blocks == other.blocks
+        self.depth() == other.depth() && self.ids == other.ids && self.blocks == other.blocks
     }
 
     /// Levels of blocks; 0 for no items.
@@ -162,35 +169,34 @@ impl Wide {
 
     /// The ids of each leaf.
     #[inline(always)]
-    pub(super) fn id_rows(&self) -> &[[ItemId; LANES]] {
+    fn id_rows(&self) -> &[[ItemId; LANES]] {
         self.ids.rows()
     }
 
     /// All blocks, leaves first.
     #[inline(always)]
-    pub(super) fn blocks(&self) -> &[BoxBlock] {
+    fn blocks(&self) -> &[BoxBlock] {
         &self.blocks
     }
 
-    /// A level for a traversal, leaves first.
+    /// A level for a traversal; level 0 are the leaves.
     #[inline(always)]
-    pub(super) fn layer(&self, level: usize) -> Layer<'_> {
-        let place = self.levels[level];
+    fn layer(&self, index: usize) -> Layer<'_> {
+        let level = self.levels[index];
         Layer {
-            blocks: &self.blocks[place.first..place.first + place.blocks],
-            place,
-            span: 1 << (level * LANES.ilog2() as usize),
+            blocks: &self.blocks[level.first..level.first + level.blocks],
+            level,
+            span: 1 << (index * LANES.ilog2() as usize),
             far: is_far(self.ids.len()),
         }
     }
 
-    /// Hands every item that the view sees to the sink: level by level, runs of
-    /// items that are wholly inside first, then what is left of the leaves.
+    /// Passes every item that the volume sees to the sink: level by level, runs of
+    /// items that are wholly inside first, then the tested items of leaves.
     ///
-    /// A block at a time: its children are sorted into outside, inside and
-    /// undecided; what is undecided comes into the next level's frontier with
-    /// the planes that are left. Level by level, so that the blocks to come are
-    /// known and can be fetched ahead.
+    /// Each block is sorted into outside, inside and straddling children; straddling
+    /// ones go to the next level's frontier with their open planes. Level by level,
+    /// so that the next blocks are known and can be prefetched.
     #[inline(always)]
     fn search<Q: QueryVolume, C: Context>(
         &self,
@@ -211,34 +217,32 @@ impl Wide {
             here,
             below,
             whole,
-            by_plane,
+            buckets,
         } = scratch;
         let (mut here, mut below) = (here, below);
         here.start(isa, volume.mask());
-        let mut pass = Pass {
+        let mut traversal = LevelTraversal {
             ids: &self.ids,
             isa,
             volume,
             sink,
             recorder,
         };
-        for height in (0..top).rev() {
+        for level in (1..=top).rev() {
             below.clear(here.len());
-            let layer = self.layer(height + 1);
-            if height == 0 {
+            let layer = self.layer(level);
+            if level == 1 {
                 whole.clear(here.len());
-                pass.sort_last_level(&layer, &self.layer(0), here, below, whole)?;
+                traversal.sort_last_level(&layer, &self.layer(0), here, below, whole)?;
             } else {
-                let mut run = Merger::default();
-                pass.sort_level(&layer, here, below, &mut run)?;
-                pass.hand_over(run.take())?;
+                traversal.sort_level(&layer, here, below)?;
             }
             std::mem::swap(&mut here, &mut below);
         }
-        pass.test_leaves(&self.layer(0), here, by_plane)
+        traversal.test_leaves(&self.layer(0), here, buckets)
     }
 
-    /// Region search: from the root down, one block at a time.
+    /// Region search: descends from the root, one block at a time.
     #[inline(always)]
     fn descend<I: Isa, S: Sink, R: Recorder>(
         &self,
@@ -282,7 +286,7 @@ impl Wide {
         }
     }
 
-    /// Bounds of the boxes of one block, as the lane above them holds them.
+    /// Writes the bounds of a block's boxes to its lane of the level above.
     fn fit(&mut self, level: usize, block: usize) {
         let bounds = self.blocks[self.levels[level].first + block].union();
         let above = self.levels[level + 1].first + block / LANES;
@@ -311,9 +315,7 @@ impl RegionIndex for Wide {
         let leaves = self.levels.first().map_or(0, |l| l.blocks);
         MemoryUsage {
             node_bytes: (self.blocks.len() - leaves) * size_of::<BoxBlock>(),
-            item_bytes: leaves * size_of::<BoxBlock>()
-                + self.ids.bytes()
-                + size_of_val(&self.place_of[..]),
+            item_bytes: leaves * size_of::<BoxBlock>() + self.ids.bytes() + self.positions.bytes(),
         }
     }
 
@@ -335,24 +337,13 @@ impl RegionIndex for Wide {
 
     /// O(moved * depth).
     fn refit(&mut self, items: &[Aabb], moved: &[ItemId]) -> bool {
-        const ABSENT: u32 = u32::MAX;
-        if self.place_of.len() != items.len() {
-            self.place_of = vec![ABSENT; items.len()];
-            for (place, &id) in self.ids.iter().enumerate() {
-                self.place_of[id as usize] = place as u32;
-            }
-        }
-        let stays =
-            |&id: &ItemId| (self.place_of[id as usize] == ABSENT) == items[id as usize].is_empty();
-        if !moved.iter().all(stays) {
+        let Some(placed) = self.positions.of_moved(&self.ids, items, moved) else {
             return false;
-        }
-        let places = moved.iter().map(|&id| (id, self.place_of[id as usize]));
-        let mut touched: Vec<usize> = Vec::with_capacity(moved.len());
-        for (id, place) in places.filter(|&(_, place)| place != ABSENT) {
-            let place = place as usize;
-            self.blocks[place / LANES].set(place % LANES, &items[id as usize]);
-            touched.push(place / LANES);
+        };
+        let mut touched: Vec<usize> = Vec::with_capacity(placed.len());
+        for (position, bounds) in placed {
+            self.blocks[position / LANES].set(position % LANES, &bounds);
+            touched.push(position / LANES);
         }
         for level in 0..self.levels.len().saturating_sub(1) {
             touched.sort_unstable();

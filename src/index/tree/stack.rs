@@ -1,11 +1,10 @@
-//! The open nodes of a walk that goes down and comes back: a stack that needs
-//! the heap for degenerate trees only.
+//! The open nodes of a depth-first traversal: a stack that needs the heap for
+//! degenerate trees only.
 
 /// Open subtrees kept without the heap: enough for any balanced tree.
 const NEAR: usize = 64;
 
-/// Nodes with what is known of them, such as the ends and memos of the
-/// straddling nodes above the present one.
+/// Open nodes, each with a state of the traversal such as its open planes.
 pub struct Stack<M> {
     near: [(u32, M); NEAR],
     used: usize,

@@ -1,0 +1,366 @@
+//! Octree and quadtree: regular subdivision into cells. An item descends with its
+//! centre, and nodes are fitted to their items, so that items across a split plane
+//! cost a little overlap and never a collapse.
+
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use crate::geometry::Aabb;
+use crate::index::items::Record;
+use crate::index::tree::{PackedTree, Part, Splitter, Tree, TreeBuilder, build_top_down};
+use crate::index::{BuildError, Info, Input, Kind, Origin, check_range};
+
+/// An octree with fitted nodes (Meagher 1982, "Geometric modeling using octree
+/// encoding"; loose variant Ulrich 2000).
+///
+/// A textbook octree keeps an item that crosses a split plane at the inner
+/// node. In a flat city, or among needles, nearly everything crosses one and
+/// the tree collapses into a list. Here every item descends with its centre
+/// and each node's bounds are the exact union of its items: crossing items
+/// make neighbours overlap, nothing more. Levels in which all items take the
+/// same child are skipped, and coincident items are halved by size below the
+/// depth limit, so a leaf never exceeds its limit and the build never runs
+/// away.
+pub type Octree = Tree<OctreeBuilder>;
+
+/// A quadtree (Finkel and Bentley 1974) over the two axes in which the scene is
+/// widest, with fitted three-dimensional node bounds, so that the height still culls.
+///
+/// For terrain, cities and maps, which are flat. Cells that are much higher than wide
+/// are columns of slabs with as many items each (docs/adr/0012); in a flat scene
+/// there are none. Crossing and coincident items are treated as in [`Octree`].
+pub type Quadtree = Tree<QuadtreeBuilder>;
+
+/// Builder of [`Octree`].
+pub struct OctreeBuilder;
+
+/// Builder of [`Quadtree`].
+pub struct QuadtreeBuilder;
+
+impl TreeBuilder for OctreeBuilder {
+    const INFO: Info = Info::new(
+        "octree",
+        "octree with fitted nodes; loose=2 for the loose variant",
+        Kind::Tree,
+        Origin::Ours,
+    );
+    type Params = CellParams;
+    type Descent = ();
+
+    fn build(input: &Input<'_>, params: &CellParams) -> Result<(PackedTree, ()), BuildError> {
+        params.build(Self::INFO.name, input.items, &[0, 1, 2], None)
+    }
+}
+
+impl TreeBuilder for QuadtreeBuilder {
+    const INFO: Info = Info::new(
+        "quadtree",
+        "quadtree over the two widest axes, high cells in slabs; loose=2 for the loose variant",
+        Kind::Tree,
+        Origin::Ours,
+    );
+    type Params = CellParams;
+    type Descent = ();
+
+    fn build(input: &Input<'_>, params: &CellParams) -> Result<(PackedTree, ()), BuildError> {
+        let axes = widest_axes(&Aabb::union_of(input.items));
+        let height = 3 - axes[0] - axes[1];
+        params.build(Self::INFO.name, input.items, &axes, Some(height))
+    }
+}
+
+/// The two axes in which the bounds are widest, ascending.
+pub fn widest_axes(bounds: &Aabb) -> [usize; 2] {
+    let width = bounds.max * 0.5 - bounds.min * 0.5;
+    let narrowest = (0..3).rev().min_by(|&a, &b| width[a].total_cmp(&width[b]));
+    match narrowest {
+        Some(0) => [1, 2],
+        Some(1) => [0, 2],
+        _ => [0, 1],
+    }
+}
+
+/// Parameters of octree and quadtree: `octree:leaf=32,depth=20,loose=2`.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct CellParams {
+    /// Most items of a leaf (1 to 4096).
+    pub leaf: u32,
+    /// Most levels of cells (0 to 64).
+    pub depth: u32,
+    /// Looseness (1 to 16): 1 sends every item down with its centre; k > 1
+    /// keeps items larger than k - 1 edges of the smaller cell where they are.
+    pub loose: f32,
+}
+
+impl Default for CellParams {
+    fn default() -> Self {
+        CellParams {
+            leaf: 32,
+            depth: 24,
+            loose: 1.0,
+        }
+    }
+}
+
+impl CellParams {
+    /// Builds a tree of cells that are split along `axes`; `column` is the axis along
+    /// which high cells are cut into slabs.
+    fn build(
+        &self,
+        structure: &'static str,
+        items: &[Aabb],
+        axes: &[usize],
+        column: Option<usize>,
+    ) -> Result<(PackedTree, ()), BuildError> {
+        check_range(structure, "leaf", self.leaf.into(), 1.0, 4096.0)?;
+        check_range(structure, "depth", self.depth.into(), 0.0, 64.0)?;
+        check_range(structure, "loose", self.loose.into(), 1.0, 16.0)?;
+        let leaf = self.leaf as usize;
+        let mut splitter = CellSplitter {
+            axes,
+            columns: column.map(|axis| Columns { axis, leaf }),
+            depth: self.depth,
+            reach: match self.loose > 1.0 {
+                true => self.loose - 1.0,
+                false => f32::INFINITY,
+            },
+            sorted: Vec::new(),
+        };
+        let bounds = Aabb::union_of(items);
+        let root = Cell {
+            centre: bounds.centre(),
+            // Halved before subtracting: bounds may span the range of f32.
+            half: (bounds.max * 0.5 - bounds.min * 0.5).max_element(),
+            level: 0,
+        };
+        let records = Record::all(items)?;
+        Ok((build_top_down(records, leaf, root, &mut splitter), ()))
+    }
+}
+
+/// A cell, a cube in the axes that are split.
+#[derive(Clone, Copy)]
+struct Cell {
+    centre: Vec3,
+    /// Half an edge.
+    half: f32,
+    level: u32,
+}
+
+/// Splits cells in the middle of each of `axes`.
+struct CellSplitter<'a> {
+    axes: &'a [usize],
+    /// Treatment of cells that are too high for their width.
+    columns: Option<Columns>,
+    /// Most splits on the way from the root.
+    depth: u32,
+    /// An item stays at a cell once it is larger than this many edges of the next
+    /// smaller cell. With looseness (Ulrich, "Loose octrees", Game Programming Gems 1,
+    /// p. 444) cells count as grown by that factor, so this is `loose - 1`; infinite
+    /// for items that always descend.
+    reach: f32,
+    sorted: Vec<Record>,
+}
+
+impl CellSplitter<'_> {
+    /// The child cell of an item; the number of cells for an item that stays.
+    fn child(&self, cell: &Cell, b: &Aabb) -> usize {
+        if b.extent().max_element() > self.reach * cell.half {
+            return 1 << self.axes.len();
+        }
+        let centre = b.centre();
+        let bits = self.axes.iter().enumerate();
+        bits.fold(0, |child, (bit, &axis)| {
+            child | usize::from(centre[axis] >= cell.centre[axis]) << bit
+        })
+    }
+
+    fn child_cell(&self, cell: &Cell, child: usize) -> Cell {
+        let quarter = cell.half * 0.5;
+        let mut centre = cell.centre;
+        for (bit, &axis) in self.axes.iter().enumerate() {
+            centre[axis] += match child >> bit & 1 {
+                1 => quarter,
+                _ => -quarter,
+            };
+        }
+        Cell {
+            centre,
+            half: quarter,
+            level: cell.level + 1,
+        }
+    }
+}
+
+/// The cut of a column, a cell with many items above each other, into slabs.
+///
+/// Cells that leave one axis alone become ever narrower columns over the full
+/// height of the world. Where that is high, a leaf is a thin needle, and even a
+/// small view grazes many. So a cell is split on only while a cube of its width
+/// would hold more than some leaves; then its items are sorted by height and
+/// stacked, the same number in each slab.
+struct Columns {
+    axis: usize,
+    leaf: usize,
+}
+
+/// A cell is a column once a cube of its width would hold fewer than this
+/// many leaves. A split makes that number eight times less, so slabs come
+/// out between a third as high as they are wide and three times as high.
+const LEAVES_OF_A_CUBE: f32 = 3.0;
+
+/// Most slabs of one node: one test of sixteen.
+const SLABS: usize = 16;
+
+impl Columns {
+    /// Decides whether the items of a cell are stacked. O(items).
+    fn is_column(&self, cell: &Cell, records: &[Record]) -> bool {
+        let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
+        for record in records {
+            let at = record.bounds.centre()[self.axis];
+            (low, high) = (low.min(at), high.max(at));
+        }
+        // Divided first: the product with the number of items may overflow.
+        let most = LEAVES_OF_A_CUBE * self.leaf as f32 / records.len() as f32;
+        cell.half <= (high * 0.5 - low * 0.5) * most
+    }
+
+    /// Sorts the items by height and divides them evenly.
+    fn stack(&self, records: &mut [Record], cell: Cell, parts: &mut Vec<Part<Cell>>) {
+        let height = |record: &Record| record.bounds.centre()[self.axis];
+        records.sort_unstable_by(|a, b| height(a).total_cmp(&height(b)).then(a.id.cmp(&b.id)));
+        let slabs = records.len().div_ceil(self.leaf).min(SLABS);
+        let place = |slab| records.len() * slab / slabs;
+        for slab in 0..slabs {
+            parts.push(Part {
+                items: place(slab + 1) - place(slab),
+                cell: Some(cell),
+            });
+        }
+    }
+}
+
+impl Splitter for CellSplitter<'_> {
+    type Cell = Cell;
+
+    fn split(
+        &mut self,
+        records: &mut [Record],
+        mut cell: Cell,
+        _: usize,
+        parts: &mut Vec<Part<Cell>>,
+    ) {
+        let cells = 1 << self.axes.len();
+        while cell.level < self.depth {
+            if let Some(columns) = &self.columns
+                && columns.is_column(&cell, records)
+            {
+                return columns.stack(records, cell, parts);
+            }
+            // At most eight cells, and one place for items that stay.
+            let mut counts = [0; 9];
+            for record in records.iter() {
+                counts[self.child(&cell, &record.bounds)] += 1;
+            }
+            if let Some(only) = counts.iter().position(|&count| count == records.len()) {
+                if only == cells {
+                    return;
+                }
+                // A level without a choice is no level: on to the one child.
+                cell = self.child_cell(&cell, only);
+                continue;
+            }
+            let mut next = [0; 9];
+            for k in 1..9 {
+                next[k] = next[k - 1] + counts[k - 1];
+            }
+            self.sorted.clear();
+            self.sorted.extend_from_slice(records);
+            for record in &self.sorted {
+                let k = self.child(&cell, &record.bounds);
+                records[next[k]] = *record;
+                next[k] += 1;
+            }
+            for (k, &items) in counts.iter().enumerate().filter(|(_, count)| **count > 0) {
+                let cell = (k < cells).then(|| self.child_cell(&cell, k));
+                parts.push(Part { items, cell });
+            }
+            return;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::index::RegionIndex;
+
+    #[test]
+    fn the_narrowest_axis_is_left_alone() {
+        let of = |x, y, z| widest_axes(&Aabb::new(Vec3::ZERO, Vec3::new(x, y, z)));
+        assert_eq!(of(9.0, 5.0, 1.0), [0, 1]);
+        assert_eq!(of(1.0, 5.0, 9.0), [1, 2]);
+        assert_eq!(of(9.0, 1.0, 5.0), [0, 2]);
+        assert_eq!(of(1.0, 1.0, 1.0), [0, 1]);
+        assert_eq!(widest_axes(&Aabb::EMPTY).len(), 2);
+    }
+
+    /// Small cubes on a grid, `counts` along each axis.
+    fn grid(counts: [u32; 3]) -> Vec<Aabb> {
+        let corner = |i: u32| {
+            let (x, yz) = (i % counts[0], i / counts[0]);
+            Vec3::new(x as f32, (yz % counts[1]) as f32, (yz / counts[1]) as f32)
+        };
+        let corners = (0..counts.iter().product()).map(corner);
+        corners.map(|at| Aabb::new(at, at + 0.5)).collect()
+    }
+
+    fn built(items: &[Aabb]) -> PackedTree {
+        let quadtree = Quadtree::build(&Input::new(items), &CellParams::default());
+        quadtree.expect("boxes on a grid").tree
+    }
+
+    #[test]
+    fn leaves_of_a_high_world_are_no_needles() {
+        // About 3 times as high as wide at most, but a grid has no fractions.
+        for (counts, height) in [([32; 3], 2), ([40, 64, 48], 0), ([64, 16, 64], 1)] {
+            let tree = built(&grid(counts));
+            let nodes = 0..tree.nodes().len();
+            let leaves: Vec<usize> = nodes.filter(|&node| tree.is_leaf(node)).collect();
+            assert!(leaves.len() > 1000, "{}", leaves.len());
+            for leaf in leaves {
+                let size = tree.nodes()[leaf].bounds.extent();
+                let width = (0..3).filter(|&axis| axis != height).map(|axis| size[axis]);
+                let width = width.fold(0.0, f32::max);
+                assert!(size[height] <= 4.0 * width, "{size} of {counts:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_flat_world_has_no_slabs() {
+        let items = grid([64, 64, 2]);
+        let (tree, params) = (built(&items), CellParams::default());
+        let plain = params.build("plain", &items, &[0, 1], None);
+        let (plain, ()) = plain.expect("boxes on a grid");
+        assert_eq!(tree.ids(), plain.ids());
+        assert_eq!(tree.nodes().len(), plain.nodes().len());
+    }
+
+    #[test]
+    fn towers_are_cut_in_slabs() {
+        // Items above each other, which no split of the two axes separates.
+        let ground = |i: u32| [(i & 1) as f32 * 4000.0, (i >> 1 & 1) as f32 * 4000.0];
+        let items: Vec<Aabb> = (0..4000)
+            .map(|i| (ground(i), (i / 4) as f32))
+            .map(|([x, y], z)| Aabb::new(Vec3::new(x, y, z), Vec3::new(x, y, z + 1.0)))
+            .collect();
+        let tree = built(&items);
+        // The world, a tower, sixteen slabs of 62 or 63, two of those each.
+        assert_eq!(tree.depth(), 4);
+        let leaves = (0..tree.nodes().len()).filter(|&node| tree.is_leaf(node));
+        let highest = leaves.map(|leaf| tree.nodes()[leaf].bounds.extent().z);
+        assert_eq!(highest.fold(0.0, f32::max), 32.0);
+    }
+}

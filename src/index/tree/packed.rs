@@ -1,0 +1,262 @@
+//! The packed tree: nodes in depth-first order over items in tree order, so that
+//! every subtree is one slice of either; item bounds in blocks of sixteen. Layout,
+//! construction, memory and refit; `search` has the queries.
+
+use super::node::{TreeNode, children, is_leaf};
+use super::wide_nodes::WideNodes;
+use crate::geometry::{Aabb, BoxBlocks};
+use crate::index::MemoryUsage;
+use crate::index::positions::Positions;
+use crate::query::ItemId;
+
+/// A tree packed for queries: 36 bytes per node, 28 per item. Nodes may have
+/// any number of children.
+#[derive(Default)]
+pub struct PackedTree {
+    nodes: Vec<TreeNode>,
+    boxes: BoxBlocks,
+    ids: Vec<ItemId>,
+    depth: usize,
+    /// The nodes again, sixteen to a block, for queries by volumes.
+    pub(super) wide_nodes: WideNodes,
+    positions: Positions,
+}
+
+impl PackedTree {
+    /// Builds a tree in depth-first order from the group of its root.
+    ///
+    /// `expand` is called once per node with the tree so far, the node's index and its
+    /// group: it either [pushes](PackedTree::push) the items of a leaf or lists the
+    /// groups of the children, in order. Iterative, so that a degenerate tree cannot
+    /// overflow the stack.
+    pub fn grow<G>(
+        items: usize,
+        root: G,
+        mut expand: impl FnMut(&mut PackedTree, usize, G, &mut Vec<G>),
+    ) -> PackedTree {
+        enum Task<G> {
+            Open(G),
+            Close(usize),
+        }
+        let mut tree = PackedTree {
+            boxes: BoxBlocks::with_capacity(items),
+            ids: Vec::with_capacity(items),
+            ..PackedTree::default()
+        };
+        let (mut tasks, mut groups, mut level) = (vec![Task::Open(root)], Vec::new(), 0);
+        while let Some(task) = tasks.pop() {
+            match task {
+                Task::Open(group) => {
+                    level += 1;
+                    tree.depth = tree.depth.max(level);
+                    let node = tree.nodes.len();
+                    tree.nodes.push(TreeNode {
+                        bounds: Aabb::EMPTY,
+                        first: tree.ids.len() as u32,
+                        count: 0,
+                        after: 0,
+                    });
+                    tasks.push(Task::Close(node));
+                    expand(&mut tree, node, group, &mut groups);
+                    tasks.extend(groups.drain(..).rev().map(Task::Open));
+                }
+                Task::Close(node) => {
+                    level -= 1;
+                    let (after, items) = (tree.nodes.len(), tree.ids.len());
+                    let closed = &mut tree.nodes[node];
+                    closed.count = items as u32 - closed.first;
+                    closed.after = after as u32;
+                    tree.fit(node);
+                }
+            }
+        }
+        tree.nodes.shrink_to_fit();
+        tree.boxes.shrink_to_fit();
+        tree.ids.shrink_to_fit();
+        tree.wide_nodes = WideNodes::new(&tree.nodes);
+        tree
+    }
+
+    /// Adds an item to the leaf that is being expanded.
+    pub fn push(&mut self, id: ItemId, bounds: &Aabb) {
+        self.ids.push(id);
+        self.boxes.push(bounds);
+    }
+
+    /// The nodes in depth-first order, the root first.
+    #[inline(always)]
+    pub fn nodes(&self) -> &[TreeNode] {
+        &self.nodes
+    }
+
+    /// Item bounds in tree order.
+    #[inline(always)]
+    pub fn boxes(&self) -> &BoxBlocks {
+        &self.boxes
+    }
+
+    /// Item ids in tree order.
+    #[inline(always)]
+    pub fn ids(&self) -> &[ItemId] {
+        &self.ids
+    }
+
+    /// Whether the node has no children.
+    #[inline(always)]
+    pub fn is_leaf(&self, node: usize) -> bool {
+        is_leaf(&self.nodes, node)
+    }
+
+    /// Levels from the root to the deepest leaf; 0 for no items.
+    pub fn depth(&self) -> usize {
+        self.depth
+    }
+
+    /// Bytes of nodes and of items, as allocated.
+    pub fn memory(&self) -> MemoryUsage {
+        MemoryUsage {
+            node_bytes: size_of_val(&self.nodes[..]) + self.wide_nodes.bytes(),
+            item_bytes: self.boxes.bytes() + size_of_val(&self.ids[..]) + self.positions.bytes(),
+        }
+    }
+
+    /// Takes over the new bounds of moved items without changing the tree's
+    /// shape: refits the nodes above them. False, with the tree unchanged, if an
+    /// item enters or leaves the tree (it is or was empty).
+    ///
+    /// Calls `fitted` for every node that changed, children first.
+    /// O(moved * depth), or O(nodes) where that is less.
+    pub fn refit(
+        &mut self,
+        items: &[Aabb],
+        moved: &[ItemId],
+        mut fitted: impl FnMut(&PackedTree, usize),
+    ) -> bool {
+        let Some(placed) = self.positions.of_moved(&self.ids, items, moved) else {
+            return false;
+        };
+        let mut dirty = vec![false; self.nodes.len()];
+        let all = moved.len() * self.depth.max(1) > self.nodes.len();
+        for (position, bounds) in placed {
+            self.boxes.set(position, &bounds);
+            if !all {
+                self.mark_path(position, &mut dirty);
+            }
+        }
+        let mut fits = true;
+        for node in (0..self.nodes.len()).rev() {
+            if all || dirty[node] {
+                self.fit(node);
+                fits &= self.wide_nodes.refit(node, &self.nodes[node].bounds);
+                fitted(self, node);
+            }
+        }
+        if !fits {
+            self.wide_nodes = WideNodes::new(&self.nodes);
+        }
+        true
+    }
+
+    /// Marks the nodes from the root to the leaf that holds a position.
+    fn mark_path(&self, position: usize, dirty: &mut [bool]) {
+        let holds = |&node: &usize| self.nodes[node].items().contains(&position);
+        let mut next = (!self.nodes.is_empty()).then_some(0);
+        while let Some(node) = next {
+            dirty[node] = true;
+            next = children(&self.nodes, node).find(holds);
+        }
+    }
+
+    /// Computes a node's bounds from its children, or a leaf's from its items.
+    fn fit(&mut self, node: usize) {
+        let mut bounds = Aabb::EMPTY;
+        if self.is_leaf(node) {
+            for position in self.nodes[node].items() {
+                bounds = bounds.union(&self.boxes.get(position));
+            }
+        }
+        for child in children(&self.nodes, node) {
+            bounds = bounds.union(&self.nodes[child].bounds);
+        }
+        self.nodes[node].bounds = bounds;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernel::BASELINE;
+    use crate::query::{Count, NoRecorder, QueryContext};
+    use glam::Vec3;
+
+    /// A degenerate tree: each node has one leaf and the rest.
+    fn comb(items: &[Aabb]) -> PackedTree {
+        enum Group {
+            Rest(usize),
+            Item(usize),
+        }
+        PackedTree::grow(
+            items.len(),
+            Group::Rest(0),
+            |tree, _, group, groups| match group {
+                Group::Item(id) => tree.push(id as ItemId, &items[id]),
+                Group::Rest(from) => {
+                    groups.push(Group::Item(from));
+                    groups.extend((from + 1 < items.len()).then_some(Group::Rest(from + 1)));
+                }
+            },
+        )
+    }
+
+    fn row(count: usize) -> Vec<Aabb> {
+        let centre = |i| Vec3::new(i as f32, -(i as f32), 0.1);
+        (0..count)
+            .map(|i| Aabb::around(centre(i), Vec3::splat(0.3)))
+            .collect()
+    }
+
+    #[test]
+    fn a_tree_of_a_hundred_thousand_levels_is_walked_without_recursion() {
+        let items = row(100_000);
+        let tree = comb(&items);
+        assert_eq!(tree.depth(), 100_001);
+        let mut all = Count::default();
+        let everything = Aabb::new(Vec3::splat(-1e9), Vec3::splat(1e9));
+        let _ = tree.walk(BASELINE, &everything, &mut all, &mut NoRecorder);
+        assert_eq!(all.0, 100_000);
+        for id in [0, 50_000, 99_999] {
+            let mut found = Vec::new();
+            let _ = tree.query(
+                &items[id].centre(),
+                &mut QueryContext::new(BASELINE, &mut found, &mut NoRecorder),
+            );
+            assert_eq!(found, [id as ItemId]);
+        }
+    }
+
+    fn assert_fitted(tree: &PackedTree, items: &[Aabb]) {
+        for node in &tree.nodes {
+            let own = tree.ids[node.items()].iter().map(|&id| &items[id as usize]);
+            assert_eq!(node.bounds, Aabb::union_of(own));
+        }
+    }
+
+    #[test]
+    fn nodes_hold_the_exact_union_of_their_items_also_after_moves() {
+        let mut items = row(40);
+        let mut tree = comb(&items);
+        assert_fitted(&tree, &items);
+        for moved in [vec![3], vec![39, 0], (0..40).collect::<Vec<ItemId>>()] {
+            for &id in &moved {
+                items[id as usize] = Aabb::around(Vec3::splat(id as f32 * 7.0), Vec3::ONE);
+            }
+            assert!(tree.refit(&items, &moved, |_, _| ()));
+            assert_fitted(&tree, &items);
+        }
+        items[5] = Aabb::EMPTY;
+        assert!(
+            !tree.refit(&items, &[5], |_, _| ()),
+            "an item that leaves needs a rebuild"
+        );
+    }
+}

@@ -1,0 +1,91 @@
+//! Top-down construction, shared by octree, quadtree and BSP tree: the order of
+//! work, the leaves, and the fallback for groups that cannot be divided. A splitter
+//! decides how a group of items is divided.
+
+use super::packed::PackedTree;
+use crate::index::items::Record;
+
+/// A part of a divided group.
+#[derive(Clone, Copy, Debug)]
+pub struct Part<C> {
+    /// Number of items of the part.
+    pub items: usize,
+    /// State that the splitter gets back with the part; `None` for a part that
+    /// the splitter does not divide further.
+    pub cell: Option<C>,
+}
+
+/// The way in which a group of items is divided.
+pub trait Splitter {
+    /// State of a group, such as its cell.
+    type Cell: Copy;
+
+    /// Reorders the records so that the parts lie one after the other, and
+    /// pushes the parts. No part, or a single one, means that the group
+    /// cannot be divided in this way. `node` is the index of the group's node.
+    fn split(
+        &mut self,
+        records: &mut [Record],
+        cell: Self::Cell,
+        node: usize,
+        parts: &mut Vec<Part<Self::Cell>>,
+    );
+
+    /// Orders the items of a group that becomes a leaf.
+    fn arrange(&mut self, _records: &mut [Record]) {}
+}
+
+/// Builds a tree over items, with at most `leaf` items per leaf.
+///
+/// Groups that the splitter cannot divide (coincident items, say) are halved
+/// by size, so that no leaf exceeds its limit and the depth stays bounded.
+/// O(n log n) for splitters that divide evenly.
+pub fn build_top_down<S: Splitter>(
+    mut records: Vec<Record>,
+    leaf: usize,
+    root: S::Cell,
+    splitter: &mut S,
+) -> PackedTree {
+    if records.is_empty() {
+        return PackedTree::default();
+    }
+    let count = records.len();
+    let mut parts = Vec::new();
+    PackedTree::grow(
+        count,
+        (0..count, Some(root)),
+        |tree, node, (range, cell), groups| {
+            let mut start = range.start;
+            let group = &mut records[range];
+            if group.len() <= leaf {
+                splitter.arrange(group);
+                for record in group.iter() {
+                    tree.push(record.id, &record.bounds);
+                }
+                return;
+            }
+            parts.clear();
+            if let Some(cell) = cell {
+                splitter.split(group, cell, node, &mut parts);
+            }
+            if parts.len() < 2 {
+                halve_by_size(group, &mut parts);
+            }
+            for part in &parts {
+                groups.push((start..start + part.items, part.cell));
+                start += part.items;
+            }
+        },
+    )
+}
+
+/// Divides a group into its smaller and its larger boxes.
+fn halve_by_size<C>(group: &mut [Record], parts: &mut Vec<Part<C>>) {
+    let size = |r: &Record| r.bounds.extent().max_element();
+    let half = group.len() / 2;
+    group.select_nth_unstable_by(half, |a, b| {
+        size(a).total_cmp(&size(b)).then(a.id.cmp(&b.id))
+    });
+    parts.clear();
+    parts.extend([half, group.len() - half].map(|items| Part { items, cell: None }));
+}

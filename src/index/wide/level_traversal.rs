@@ -1,0 +1,312 @@
+//! One level of a query of the wide tree: the test of its blocks, and of the leaves
+//! at the end.
+
+use std::ops::{ControlFlow, Range};
+
+use super::levels::Layer;
+use super::single_plane_buckets::{BUCKETS, SinglePlaneBuckets};
+use crate::geometry::{ALL_ROWS, BoxBlock, LANES, LaneMask, PlaneMask};
+use crate::index::frontier::{AHEAD, Frontier, Merger, NodeList, first_ahead, pass_run};
+use crate::index::padded_ids::PaddedIds;
+use crate::kernel::{Isa, pairs, prefetch};
+use crate::query::{ItemId, Planes, QueryVolume, Recorder, Sink, Tests};
+
+/// A query in progress.
+pub struct LevelTraversal<'a, I, V, S, R> {
+    pub ids: &'a PaddedIds,
+    pub isa: I,
+    pub volume: &'a V,
+    pub sink: &'a mut S,
+    pub recorder: &'a mut R,
+}
+
+impl<I: Isa, V: QueryVolume, S: Sink, R: Recorder> LevelTraversal<'_, I, V, S, R> {
+    /// Sorts all blocks of a frontier: straddling children go to the frontier
+    /// `below`, runs of items wholly inside to the sink.
+    #[inline(always)]
+    pub fn sort_level(
+        &mut self,
+        layer: &Layer,
+        here: &Frontier,
+        below: &mut Frontier,
+    ) -> ControlFlow<()> {
+        let (blocks, masks) = here.entries();
+        let mut run = Merger::default();
+        for i in first_ahead(layer.far) {
+            layer.prefetch(blocks, i);
+        }
+        for (i, (&block, &mask)) in pairs(blocks, masks).enumerate() {
+            layer.prefetch(blocks, i + AHEAD);
+            let inside = self.sort_lanes(layer, (block, mask), below);
+            for items in layer.items_of(block as usize, inside, self.ids.len()) {
+                if let Some(ended) = run.join(items) {
+                    self.pass_run(ended)?;
+                }
+            }
+        }
+        self.pass_run(run.take())
+    }
+
+    /// [`LevelTraversal::sort_level`] for the level above the leaves: leaves wholly
+    /// inside are collected in `whole` and passed to the sink afterwards, a row of
+    /// prefetched ids each. Run ends are unpredictable branches, so they are not tested.
+    #[inline(always)]
+    pub fn sort_last_level(
+        &mut self,
+        layer: &Layer,
+        leaves: &Layer,
+        here: &Frontier,
+        below: &mut Frontier,
+        whole: &mut NodeList,
+    ) -> ControlFlow<()> {
+        let (blocks, masks) = here.entries();
+        for i in first_ahead(layer.far) {
+            layer.prefetch(blocks, i);
+        }
+        for (i, (&block, &mask)) in pairs(blocks, masks).enumerate() {
+            layer.prefetch(blocks, i + AHEAD);
+            let inside = self.sort_lanes(layer, (block, mask), below);
+            whole.push(self.isa, self.isa.iota(block * LANES as u32), inside);
+        }
+        if whole.entries().is_empty() {
+            return ControlFlow::Continue(());
+        }
+        self.test_listed(leaves, whole.entries(), WhollyInside)
+    }
+
+    /// Passes the items of a frontier's leaves that no open plane drops to the sink.
+    /// Of many leaves, those with a single open plane come first, plane by plane.
+    #[inline(always)]
+    pub fn test_leaves(
+        &mut self,
+        leaves: &Layer,
+        here: &Frontier,
+        buckets: &mut SinglePlaneBuckets,
+    ) -> ControlFlow<()> {
+        let mut rest = here;
+        if here.len() >= WORTH_BUCKETS {
+            buckets.distribute(self.isa, here);
+            for plane in 0..BUCKETS {
+                let listed = buckets.bucket(plane);
+                if listed.is_empty() {
+                    continue;
+                }
+                let plane = plane as u32;
+                let test = SinglePlane {
+                    volume: self.volume,
+                    plane: self.volume.one_plane(self.isa, plane),
+                    mask: 1 << plane,
+                };
+                self.test_listed(leaves, listed, test)?;
+            }
+            rest = &buckets.rest;
+        }
+        let (listed, masks) = rest.entries();
+        let volume = self.volume;
+        self.test_listed(leaves, listed, OpenPlanes { volume, masks })
+    }
+
+    /// Tests listed leaves in order and passes their items to the sink.
+    #[inline(always)]
+    fn test_listed<T: LeafTest<I>>(
+        &mut self,
+        leaves: &Layer,
+        listed: &[u32],
+        test: T,
+    ) -> ControlFlow<()> {
+        let tests = ListedLeaves {
+            leaves,
+            listed,
+            test,
+            ids: self.ids.rows(),
+            recorder: &mut *self.recorder,
+        };
+        for i in first_ahead(leaves.far) {
+            tests.prefetch(i);
+        }
+        self.sink.accept_tested(self.isa, self.ids.rows(), tests)
+    }
+
+    /// Sorts the lanes of a block: straddling ones go to the frontier `below`; returns
+    /// the lanes that are inside.
+    #[inline(always)]
+    fn sort_lanes(
+        &mut self,
+        layer: &Layer,
+        (block, mask): (u32, PlaneMask),
+        below: &mut Frontier,
+    ) -> LaneMask {
+        let at = block as usize;
+        let lanes = layer.level.lanes(at);
+        self.recorder.nodes_tested(lanes.count_ones());
+        self.recorder
+            .planes_tested(lanes.count_ones() * V::planes_open(mask));
+        self.recorder
+            .block_read(layer.level.first + at, || ALL_ROWS);
+        let (kept, open) = self.volume.sorted_lanes(self.isa, &layer.blocks[at], mask);
+        let kept = kept & lanes;
+        self.recorder
+            .subtrees_rejected((lanes & !kept).count_ones());
+        let inside = self.isa.zeros(open) & kept;
+        let undecided = kept & !inside;
+        let first = at * LANES;
+        below.push(self.isa, self.isa.iota(first as u32), open, undecided);
+        inside
+    }
+
+    #[inline(always)]
+    fn pass_run(&mut self, items: Range<usize>) -> ControlFlow<()> {
+        pass_run(self.isa, items, self.ids, self.sink, self.recorder)
+    }
+}
+
+/// Fewest leaves that are distributed over buckets.
+const WORTH_BUCKETS: usize = 48;
+
+/// The test of one leaf after another.
+trait LeafTest<I: Isa> {
+    /// Prefetches the rows of the i-th leaf that its test reads.
+    fn prefetch(&self, block: &BoxBlock, i: usize);
+
+    /// The lanes of a leaf, of those that hold an item, that are answers; `leaf` is its
+    /// index in the list and its block.
+    fn kept<R: Recorder>(
+        &self,
+        isa: I,
+        leaves: &Layer,
+        leaf: (usize, usize),
+        recorder: &mut R,
+    ) -> LaneMask;
+}
+
+/// Leaves of a list, tested when the sink requests them.
+struct ListedLeaves<'a, 't, T, R> {
+    leaves: &'a Layer<'t>,
+    listed: &'a [u32],
+    test: T,
+    ids: &'a [[ItemId; LANES]],
+    recorder: &'a mut R,
+}
+
+impl<T, R> ListedLeaves<'_, '_, T, R> {
+    /// Prefetches the i-th leaf and its ids, if there is such a leaf.
+    #[inline(always)]
+    fn prefetch<I: Isa>(&self, i: usize)
+    where
+        T: LeafTest<I>,
+    {
+        if let Some(&leaf) = self.listed.get(i)
+            && let Some(block) = self.leaves.blocks.get(leaf as usize)
+        {
+            self.test.prefetch(block, i);
+            if let Some(row) = self.ids.get(leaf as usize) {
+                prefetch(row);
+            }
+        }
+    }
+}
+
+impl<I: Isa, T: LeafTest<I>, R: Recorder> Tests<I> for ListedLeaves<'_, '_, T, R> {
+    const SPARSE: bool = false;
+
+    #[inline(always)]
+    fn count(&self) -> usize {
+        self.listed.len()
+    }
+
+    #[inline(always)]
+    fn test(&mut self, isa: I, i: usize) -> (usize, LaneMask) {
+        if self.leaves.far {
+            self.prefetch(i + AHEAD);
+        }
+        let at = self.listed[i] as usize;
+        let kept = self.test.kept(isa, self.leaves, (i, at), self.recorder);
+        (at, kept & self.leaves.level.lanes(at))
+    }
+}
+
+/// Records the test of a leaf.
+#[inline(always)]
+fn record<V: QueryVolume, R: Recorder>(
+    recorder: &mut R,
+    volume: &V,
+    leaves: &Layer,
+    (at, mask): (usize, PlaneMask),
+) {
+    let items = leaves.level.lanes(at).count_ones();
+    recorder.items_tested(items);
+    recorder.planes_tested(items * V::planes_open(mask));
+    recorder.block_read(leaves.level.first + at, || volume.rows_read(mask));
+}
+
+/// Nothing to test: the leaves are wholly inside.
+struct WhollyInside;
+
+impl<I: Isa> LeafTest<I> for WhollyInside {
+    #[inline(always)]
+    fn prefetch(&self, _: &BoxBlock, _: usize) {}
+
+    #[inline(always)]
+    fn kept<R: Recorder>(
+        &self,
+        _: I,
+        leaves: &Layer,
+        (_, at): (usize, usize),
+        recorder: &mut R,
+    ) -> LaneMask {
+        recorder.subtree_accepted(leaves.level.lanes(at).count_ones() as usize);
+        LaneMask::MAX
+    }
+}
+
+/// The same single plane for all leaves.
+struct SinglePlane<'a, V, P> {
+    volume: &'a V,
+    plane: P,
+    mask: PlaneMask,
+}
+
+impl<I: Isa, V: QueryVolume, P: Planes<I>> LeafTest<I> for SinglePlane<'_, V, P> {
+    #[inline(always)]
+    fn prefetch(&self, block: &BoxBlock, _: usize) {
+        self.plane.prefetch(block);
+    }
+
+    #[inline(always)]
+    fn kept<R: Recorder>(
+        &self,
+        isa: I,
+        leaves: &Layer,
+        (_, at): (usize, usize),
+        recorder: &mut R,
+    ) -> LaneMask {
+        record(recorder, self.volume, leaves, (at, self.mask));
+        self.plane.kept(isa, &leaves.blocks[at])
+    }
+}
+
+/// Open planes of each leaf.
+struct OpenPlanes<'a, V> {
+    volume: &'a V,
+    masks: &'a [PlaneMask],
+}
+
+impl<I: Isa, V: QueryVolume> LeafTest<I> for OpenPlanes<'_, V> {
+    #[inline(always)]
+    fn prefetch(&self, block: &BoxBlock, i: usize) {
+        self.volume.prefetch(block, self.masks[i]);
+    }
+
+    #[inline(always)]
+    fn kept<R: Recorder>(
+        &self,
+        isa: I,
+        leaves: &Layer,
+        (i, at): (usize, usize),
+        recorder: &mut R,
+    ) -> LaneMask {
+        let mask = self.masks[i];
+        record(recorder, self.volume, leaves, (at, mask));
+        self.volume.kept_lanes(isa, &leaves.blocks[at], mask)
+    }
+}

@@ -1,0 +1,70 @@
+//! The blocks of the wide tree by level.
+
+use std::ops::Range;
+
+use crate::geometry::{BoxBlock, LANES, LaneMask};
+use crate::query::runs;
+
+/// A level's position among the blocks of the tree.
+#[derive(Clone, Copy, Debug)]
+pub struct Level {
+    /// Index of its first block.
+    pub first: usize,
+    /// Number of its blocks.
+    pub blocks: usize,
+    /// Boxes in these blocks; only the last block has lanes without one.
+    pub boxes: usize,
+}
+
+impl Level {
+    /// The lanes of a block that hold a box.
+    #[inline(always)]
+    pub fn lanes(&self, block: usize) -> LaneMask {
+        if block + 1 < self.blocks {
+            LaneMask::MAX
+        } else {
+            LaneMask::MAX >> (self.blocks * LANES - self.boxes)
+        }
+    }
+}
+
+/// One level during a traversal.
+pub struct Layer<'t> {
+    /// Its blocks.
+    pub blocks: &'t [BoxBlock],
+    /// Its position.
+    pub level: Level,
+    /// Items below one lane.
+    pub span: usize,
+    /// Whether its memory is prefetched.
+    pub far: bool,
+}
+
+impl Layer<'_> {
+    /// Positions of the items below some lanes of a block, run by run; there are
+    /// `count` items in all.
+    #[inline(always)]
+    pub fn items_of(
+        &self,
+        block: usize,
+        lanes: LaneMask,
+        count: usize,
+    ) -> impl Iterator<Item = Range<usize>> {
+        let (first, span) = (block * LANES, self.span);
+        runs(lanes).map(move |run| {
+            let end = ((first + run.end) * span).min(count);
+            (first + run.start) * span..end
+        })
+    }
+
+    /// Prefetches the block of an entry of a frontier, if there is such an entry.
+    #[inline(always)]
+    pub fn prefetch(&self, entries: &[u32], i: usize) {
+        if self.far
+            && let Some(&block) = entries.get(i)
+            && let Some(block) = self.blocks.get(block as usize)
+        {
+            block.prefetch();
+        }
+    }
+}
