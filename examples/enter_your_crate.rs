@@ -1,5 +1,6 @@
-//! Your crate enters the benchmark: the whole contract of a structure, on tiles of items
-//! in slabs along x, and `main_with`, which gives it every command of the program:
+//! Your crate enters the benchmark: the whole contract of a structure.
+//!
+//! Tiles of items in slabs along x, and `main_with`, which gives it every command of the program:
 //! `cargo run --release --example enter_your_crate -- run --structure linear,bvh,tiles`
 //! (or list, verify, query, report, compare). `cargo test --example enter_your_crate`
 //! puts it through the conformance suite.

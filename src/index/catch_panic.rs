@@ -1,4 +1,4 @@
-//! Panics of code from elsewhere as values, so that a structure that panics fails alone.
+//! Panics as values, so that a structure that panics fails alone.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 

@@ -1,5 +1,7 @@
-//! Parts of level-by-level traversals: the nodes still to be tested, the distance of
-//! prefetches, and the merging of accepted neighbours into one run.
+//! Parts of level-by-level traversals.
+//!
+//! The nodes still to be tested, the distance of prefetches, and the merging of accepted
+//! neighbours into one run.
 
 use std::cell::Cell;
 use std::ops::{ControlFlow, Range};
@@ -32,8 +34,7 @@ pub fn first_ahead(far: bool) -> Range<usize> {
 /// Memory that a thread keeps between its queries.
 pub type Kept<T> = LocalKey<Cell<Option<Box<T>>>>;
 
-/// Takes the memory that the thread keeps, or allocates it. (`LocalKey::take` would be a
-/// call.)
+/// Takes the memory of the thread, or allocates it. (`LocalKey::take` is a call.)
 #[inline(always)]
 pub fn take<T: Default>(kept: &'static Kept<T>) -> Box<T> {
     match kept.try_with(|kept| kept.replace(None)) {

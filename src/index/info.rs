@@ -76,8 +76,9 @@ pub struct Capabilities {
 }
 
 impl Info {
-    /// Bytes per item that a build takes at its peak, its index included. Measured: 24 to 48
-    /// of scans, up to 245 of our trees and grids.
+    /// Peak bytes per item of a build, its index included.
+    ///
+    /// Measured: 24 to 48 of scans, up to 245 of our trees and grids.
     pub(super) fn build_bytes(&self) -> usize {
         match (self.kind, self.origin) {
             (Kind::Scan, _) => 64,

@@ -6,7 +6,7 @@ use super::BuildError;
 use crate::geometry::Aabb;
 use crate::query::ItemId;
 
-/// Ids of the items that a structure has to hold, ascending: all that are not empty.
+/// Ids of the items that a structure has to hold: all non-empty ones, ascending.
 ///
 /// # Errors
 /// An item with a NaN or infinite bound; more items than ids.

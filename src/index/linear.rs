@@ -11,9 +11,10 @@ use crate::geometry::{Aabb, BoxBlock, BoxBlocks, LANES, LaneMask, PlaneMask};
 use crate::kernel::{Isa, first_lanes, pairs};
 use crate::query::{Context, ItemId, Planes, QueryVolume, Recorder, Sink, Tests, UnpreparedPlanes};
 
-/// Tests items in blocks (each with the position of its lane 0 and a mask of the lanes
-/// that count) and passes runs of kept ones to the sink: the leaf test of every tree
-/// and region search in the linear scan.
+/// Tests items in blocks and passes runs of kept ones to the sink.
+///
+/// Each block comes with the position of its lane 0 and a mask of the lanes that count.
+/// The leaf test of every tree and the region search of the linear scan.
 #[inline(always)]
 pub fn scan_blocks<'b, I: Isa, Q: QueryVolume, S: Sink, R: Recorder>(
     isa: I,
@@ -78,15 +79,15 @@ impl RegionIndex for LinearScalar {
     }
 }
 
-/// The scan over blocks: all planes against sixteen boxes at once, no early exit. O(n)
-/// per query, with a constant several times smaller.
+/// The scan over blocks: all planes against sixteen boxes at once, no early exit.
+/// O(n) per query, with a constant several times smaller.
 pub struct Linear {
     boxes: BoxBlocks,
     ids: PaddedIds,
 }
 
 impl Linear {
-    /// Tests every block against all planes, which count as `open` plane tests per item.
+    /// Tests every block against all planes: `open` plane tests per item.
     #[inline(always)]
     fn scan_all<P: Planes<C::Isa>, C: Context>(
         &self,
@@ -165,8 +166,7 @@ impl RegionIndex for Linear {
     }
 }
 
-/// Blocks that are passed to the sink together, which reserves room for all of their
-/// items, 64 KiB.
+/// Blocks that are passed to the sink together, which reserves 64 KiB for their ids.
 const TOGETHER: usize = 1024;
 
 /// Consecutive blocks, all planes open.

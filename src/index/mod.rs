@@ -1,7 +1,8 @@
-//! The structures, their contract and the registry of all of them. To add one, write
-//! a file beside this one and a row in [`Registry::builtin`], or in a crate of your
-//! own [`Registry::with`]; list, run, query, verify, benches and conformance tests read
-//! the registry.
+//! The structures, their contract and the registry of all of them.
+//!
+//! To add one, write a file beside this one and a row in [`Registry::builtin`], or in a
+//! crate of your own call [`Registry::with`]; list, run, query, verify, benches and
+//! conformance tests read the registry.
 
 mod box_test;
 mod build;

@@ -160,7 +160,7 @@ impl Predicate for ConvexVolume {
     }
 }
 
-/// The sphere test, on an index over [`sphere_cube`](crate::geometry::sphere_cube)s.
+/// The sphere test, on an index over [sphere cubes](crate::geometry::sphere_cube).
 /// Nodes get the plane test, items that and their spheres'; monotone because
 /// the cube's corners have a say in both: see [`Spheres`].
 impl Predicate for Spheres {

@@ -89,8 +89,8 @@ struct Stacks {
     starts: Vec<u32>,
 }
 
-/// Items that are sampled to find out whether there are stacks at all. Stacks that the
-/// sample misses are small, and so is their cost.
+/// Size of the sample that decides whether there are stacks at all. Stacks that it
+/// misses are small, and so is their cost.
 const STACK_SAMPLE: usize = 4096;
 
 impl Stacks {

@@ -98,9 +98,10 @@ fn is_nested(tree: &Bvh2, share: f32) -> bool {
 /// to six are usual.
 const CREDIT: usize = 10;
 
-/// PLOC: in every round, each cluster finds the neighbour in Morton order with which
-/// its bounds are least, and those that found each other become one. Once the credit
-/// is spent, neighbours become one two by two.
+/// PLOC: repeatedly merges clusters that are each other's nearest neighbour.
+///
+/// The nearest neighbour in Morton order is the one with the least common bounds. Once
+/// the credit is spent, neighbours merge two by two.
 fn clustered(boxes: &[Aabb], params: &BvhBuildParams) -> Bvh2 {
     let mut tree = Bvh2::zeroed(boxes.len());
     tree.primitive_indices = (0..boxes.len() as u32).collect();
@@ -159,7 +160,7 @@ fn reach(distance: PlocSearchDistance) -> usize {
 /// The least area of bounds with a neighbour so far, and that neighbour.
 type Nearest = (f32, u32);
 
-/// For each cluster the last of the nearest ones that are at most so many places away.
+/// Finds, for each cluster, the last of the nearest ones at most `reach` away.
 fn find_nearest(clusters: &[Bvh2Node], reach: usize, found: &mut Vec<Nearest>) {
     found.clear();
     found.extend((0..clusters.len() as u32).map(|i| (f32::INFINITY, i)));

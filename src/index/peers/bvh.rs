@@ -1,5 +1,5 @@
-//! The crate bvh: its tree queried through `Bvh::traverse`, which returns references to
-//! shapes in a list of its own.
+//! The crate bvh: its tree queried through `Bvh::traverse`, which returns references
+//! to shapes in a list.
 
 use std::ops::ControlFlow;
 
@@ -50,8 +50,8 @@ fn bounds_of(b: &CrateAabb<f32, 3>) -> Aabb {
     )
 }
 
-/// A test for the crate, which does not distinguish boxes of nodes and items: returned
-/// items are tested once more if the two tests can differ.
+/// A test for the crate, which does not distinguish boxes of nodes and items.
+/// Returned items are tested once more if the two tests can differ.
 struct Query<'a, 'r, T, R> {
     test: &'a T,
     tally: &'a Tally<'r, R>,
@@ -68,8 +68,9 @@ impl<T: BoxTest, R: Recorder> IntersectsAabb<f32, 3> for Query<'_, '_, T, R> {
 /// Boxes of this reach have areas that are still numbers in f32.
 const LARGEST: f32 = 1e18;
 
-/// The crate's tree over shapes scaled down by [`LARGEST`], its nodes then fitted to the
-/// true boxes. Where areas overflow, the crate's builder finds no cheapest split and
+/// The crate's tree over shapes scaled down, its nodes then fitted to the true boxes.
+///
+/// Where areas overflow, the crate's builder finds no cheapest split and
 /// leaves both children with empty boxes; where widths overflow, it panics.
 fn scaled_tree(shapes: &mut [Shape]) -> Bvh<f32, 3> {
     let smaller = |shape: &Shape| {

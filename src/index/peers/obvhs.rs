@@ -16,7 +16,7 @@ use crate::index::tree::stack::Stack;
 use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin, ploc};
 use crate::query::{ItemId, Recorder, Sink};
 
-/// The crate's tree by its medium preset, with the items in the order of its primitives.
+/// The crate's tree by its medium preset; items in the order of its primitives.
 #[derive(Default)]
 pub struct PeerObvhs {
     bvh: Bvh2,

@@ -13,8 +13,9 @@ use crate::index::items::Record;
 use crate::index::{BuildError, Info, Kind, MemoryUsage, Origin};
 use crate::query::{ItemId, Recorder, Sink};
 
-/// The crate's tree by its binned builder, whose leaves are indices of items. Subtrees
-/// that are wholly inside are not tested further.
+/// The crate's tree by its binned builder, whose leaves are indices of items.
+///
+/// Subtrees that are wholly inside are not tested further.
 pub struct PeerParry3d {
     bvh: Bvh,
     ids: Vec<ItemId>,

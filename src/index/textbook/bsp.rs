@@ -62,8 +62,10 @@ impl Sides {
     }
 }
 
-/// Rank of a plane, best first: the items that its emptier side lacks to a quarter, then
-/// the items it cuts, since every search of the node tests them.
+/// Rank of a plane, best first.
+///
+/// First the items that its emptier side lacks to a quarter, then the items it cuts,
+/// since every search of the node tests them.
 fn demerit(plane: &Plane, records: &[Record]) -> (usize, usize) {
     let mut sides = [0, 0];
     for side in records.iter().filter_map(|r| side_of(plane, &r.bounds)) {

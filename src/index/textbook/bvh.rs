@@ -45,7 +45,8 @@ impl Division for ObvhsNodes {
     }
 }
 
-/// A node of obvhs with the exact bounds of its items, whatever the builder has rounded.
+/// A node of obvhs with the exact bounds of its items, which the builder rounds.
+///
 /// At the deepest level allowed it keeps the items of all leaves below: the builder's
 /// trees may be deeper.
 fn subtree(built: &Bvh2, node: Bvh2Node, levels: u32, stacks: &[&[Record]]) -> Node {

@@ -1,6 +1,7 @@
-//! The textbook octree and quadtree: a cube cut in the middle of all three axes, or a
-//! square column in the middle of two, recursively, and every item at the smallest cell
-//! that contains it.
+//! The textbook octree and quadtree.
+//!
+//! A cube is cut in the middle of all three axes, or a square column in the middle of
+//! two, recursively; every item is at the smallest cell that contains it.
 
 use glam::Vec3;
 
@@ -72,8 +73,9 @@ fn root_cell(scene: &Aabb, axes: &[usize]) -> Aabb {
     cell
 }
 
-/// A cell with its items and subtrees. Bit `k` of a child's number is its side of the
-/// middle of `axes[k]`; children without items are left out.
+/// A cell with its items and subtrees; children without items are left out.
+///
+/// Bit `k` of a child's number is its side of the middle of `axes[k]`.
 fn divided(
     bounds: Aabb,
     axes: &[usize],
@@ -105,7 +107,7 @@ fn divided(
     node
 }
 
-/// A part of a cell. Its faces are the cell's and the middle, so parts meet exactly.
+/// A part of a cell. Its faces are the cell's or the middle, so parts meet exactly.
 fn part(cell: &Aabb, axes: &[usize], child: usize) -> Aabb {
     let (mut part, middle) = (*cell, cell.centre());
     for (bit, &axis) in axes.iter().enumerate() {

@@ -199,8 +199,9 @@ impl Branch {
     }
 }
 
-/// Lists the branches of a node, or of a range of items within a leaf, in depth-first
-/// order; their height. `cuts` has the number of items before the plane for each
+/// Lists the branches of a node, or of items within a leaf; returns their height.
+///
+/// Branches are in depth-first order. `cuts` has the number of items before the plane for each
 /// division of more than [`DESCENT_LEAF`] items within a leaf, in the same order.
 fn grow(
     tree: &PackedTree,

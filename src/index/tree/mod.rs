@@ -1,5 +1,7 @@
-//! The tree that all builders share: one layout, one traversal, one refit. A builder
-//! decides only how items are grouped and, if it keeps planes, how points descend.
+//! The tree that all builders share: one layout, one traversal, one refit.
+//!
+//! A builder decides only how items are grouped and, if it keeps planes, how points
+//! descend.
 
 pub mod kd_treelets;
 mod node;

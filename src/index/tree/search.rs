@@ -381,8 +381,10 @@ fn prefetch_leaf(nodes: &[TreeNode], entries: &[u32], i: usize) {
     }
 }
 
-/// Points that descend together: enough to hide the waits for memory, few enough for
-/// their data to stay in the nearest caches.
+/// Points that descend together.
+///
+/// Enough to hide the waits for memory, few enough for their data to stay in the
+/// nearest caches.
 pub const GROUP: usize = 64;
 
 /// A point during its descent, or the leaf that it has reached.
@@ -394,8 +396,8 @@ pub struct Cursor {
     pub at: u32,
 }
 
-/// Items from which on a tree does not fit the caches: in smaller ones, steps in turn
-/// only cost (docs/adr/0009).
+/// Fewest items of a tree that does not fit the caches. In smaller ones, steps in
+/// turn only cost (docs/adr/0009).
 const WAITS_FROM: usize = 1 << 18;
 
 #[cfg(test)]

@@ -200,8 +200,7 @@ fn by_morton(items: &[Aabb], ids: &mut [ItemId]) {
     }
 }
 
-/// Lower bits of a code that the radix sort ignores: 32 bits remain, and an entry is
-/// 8 bytes.
+/// Lower bits of a code that the radix sort ignores, so that an entry is 8 bytes.
 const LOW: u32 = 3 * BITS - u32::BITS;
 
 /// Sorts by code, equal ones in the order given: least significant digit

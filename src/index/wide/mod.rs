@@ -75,7 +75,7 @@ const FILL_AHEAD: usize = 2;
 /// Leaves that are filled in one go, by one thread: whole parents of parents.
 const SHARED_BLOCKS: usize = LANES * LANES;
 
-/// Fills consecutive leaves, from the leaf `first` on, with the boxes of their items.
+/// Fills consecutive leaves, from leaf `first` on, with the boxes of their items.
 fn fill(items: &[Aabb], ids: &[ItemId], first: usize, leaves: &mut [BoxBlock]) {
     let ids = &ids[first * LANES..];
     for (i, (block, here)) in leaves.iter_mut().zip(ids.chunks(LANES)).enumerate() {

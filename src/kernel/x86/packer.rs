@@ -39,7 +39,7 @@ fn make_room(out: &mut Vec<u32>, words: usize) {
     }
 }
 
-/// [`extend`](crate::kernel::extend), with no call but memcpy's where there is room.
+/// [`extend`](crate::kernel::extend), without a call but memcpy where there is room.
 #[inline(always)]
 pub fn extend(out: &mut Vec<u32>, words: &[u32]) {
     make_room(out, words.len());
